@@ -1,0 +1,80 @@
+# Targets of this project: one place for the language level, warnings, sanitizers, and the two shapes of
+# target (library, test) that every folder uses.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+
+find_program(VOXELD_CCACHE ccache)
+if(VOXELD_CCACHE)
+  set(CMAKE_C_COMPILER_LAUNCHER ${VOXELD_CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${VOXELD_CCACHE})
+endif()
+
+find_package(Threads REQUIRED)
+find_package(absl REQUIRED)
+
+add_library(voxeld_options INTERFACE)
+target_include_directories(voxeld_options INTERFACE ${CMAKE_SOURCE_DIR})
+# Both machines must round alike: a product and a sum are never fused.
+target_compile_options(voxeld_options INTERFACE -ffp-contract=off)
+if(VOXELD_SANITIZE)
+  target_compile_options(voxeld_options INTERFACE -fsanitize=${VOXELD_SANITIZE}
+                                                  -fno-omit-frame-pointer)
+  target_link_options(voxeld_options INTERFACE -fsanitize=${VOXELD_SANITIZE})
+  if(VOXELD_SANITIZE STREQUAL "undefined")
+    target_compile_options(voxeld_options INTERFACE -fno-sanitize-recover=all)
+  endif()
+else()
+  target_compile_options(voxeld_options INTERFACE -fstack-protector-strong)
+endif()
+target_link_libraries(voxeld_options INTERFACE Threads::Threads)
+
+# Warnings are for our own code only, not for what protoc generates.
+add_library(voxeld_warnings INTERFACE)
+target_compile_options(voxeld_warnings INTERFACE -Wall -Wextra -Wno-unused-parameter
+                                                 -Wno-missing-field-initializers)
+if(VOXELD_WERROR)
+  target_compile_options(voxeld_warnings INTERFACE -Werror)
+endif()
+
+# voxeld_library(NAME SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. Each of HEADERS is also
+# compiled alone, so none leans on what its includer happened to include.
+function(voxeld_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;LINK" ${ARGN})
+  set(alone "")
+  foreach(header ${ARG_HEADERS})
+    file(RELATIVE_PATH path ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${header})
+    string(MAKE_C_IDENTIFIER ${path} id)
+    set(file ${CMAKE_BINARY_DIR}/headers/${id}.cc)
+    file(CONFIGURE OUTPUT ${file} CONTENT "#include \"${path}\"\n" @ONLY)
+    list(APPEND alone ${file})
+  endforeach()
+  add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
+  target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
+endfunction()
+
+# voxeld_test(NAME LABELS … SOURCES … LINK …): an executable `NAME` in bin/tests; each of its cases is a
+# ctest test. LABELS: host (default), gpu, hil, e2e.
+function(voxeld_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS host)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} voxeld_options voxeld_warnings
+                                        GTest::gmock GTest::gtest_main)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
+  gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+                       PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()

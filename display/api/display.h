@@ -1,0 +1,175 @@
+// The one interface between the frame pipeline and any display.
+//
+// Threads: an object is bound to one thread (its pipeline's), which makes every call; only the wake
+// function that it was given may be called from elsewhere. No call blocks. Completions of the transport
+// arrive in a queue, a wake makes the owner call Tick, and Tick does all the work.
+//
+// The base class holds what no driver may get wrong: the state machine, the newest-frame mailbox (one
+// volume in flight, one waiting), exactly one outcome a volume, and the tap for captures. A driver
+// implements the protected Do… functions.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/api/geometry.h"
+#include "display/api/outcome.h"
+#include "display/api/slice_frame.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::display {
+
+// Fixed for the lifetime of a Display. Geometry and format are data, from its options or its profile.
+struct DisplayInfo {
+  std::string name;    // unique in the daemon
+  std::string driver;  // "simulated", "voxlink", …
+  Geometry geometry;
+  FrameLayout layout;
+  Tone tone;
+  double volumes_per_second = 0;  // of the sweep
+};
+
+struct DisplayStats {
+  uint64_t volumes_submitted = 0;
+  uint64_t volumes_presented = 0;
+  uint64_t volumes_replaced = 0;
+  uint64_t volumes_lost = 0;
+  uint64_t bytes_out = 0;
+  uint64_t slices_sent = 0;
+  uint64_t slices_resent = 0;
+  uint64_t underruns = 0;  // sweeps for which the device had to repeat a volume while a newer was on its way
+  uint64_t attaches = 0;
+};
+
+// What an eye would see: every slice as 8-bit RGB light, sub-frames averaged, rebuilt from wire bytes.
+struct DecodedVolume {
+  enum class Source : uint8_t { kDecodedFromSent, kReportedByDevice };
+  uint64_t volume = 0;
+  FrameLayout layout;        // of the wire; `rgb` is always 8-bit RGB
+  std::vector<uint8_t> rgb;  // slices · height · width · 3, row-major
+  Source source = Source::kDecodedFromSent;
+};
+
+// Rebuilds volumes from a driver's outgoing wire bytes. Single-threaded.
+class WireDecoder {
+ public:
+  virtual ~WireDecoder() = default;
+  // `endpoint` as on the wire. An error means that the bytes break the protocol.
+  virtual absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes) = 0;
+  // The newest complete volume, once; nothing if none was completed since the last call.
+  virtual std::optional<DecodedVolume> TakeVolume() = 0;
+};
+
+class Display {
+ public:
+  // Called inside Start, Submit, Tick, Stop, SetBlank on the owner's thread; must not call back.
+  struct Listener {
+    virtual ~Listener() = default;
+    virtual void OnOutcome(const VolumeOutcome& outcome) = 0;
+    virtual void OnState(DisplayState state, const std::string& reason) = 0;
+  };
+  using CaptureDone = std::function<void(absl::StatusOr<DecodedVolume>)>;
+
+  virtual ~Display() = default;
+  Display(const Display&) = delete;
+  Display& operator=(const Display&) = delete;
+
+  const DisplayInfo& info() const { return info_; }
+  DisplayState state() const { return state_; }
+  const std::string& state_reason() const { return state_reason_; }
+  const DisplayStats& stats() const { return stats_; }
+
+  // From kStopped. `listener` outlives the display's stop; `wake` is thread-safe, cheap, and asks for a
+  // Tick soon.
+  absl::Status Start(Listener* listener, std::function<void()> wake);
+
+  // Ends what is in flight (each volume still owed gets kLost) and goes to kStopped. Safe at any time.
+  void Stop();
+
+  // Takes a volume (any state). While one is in flight it waits; one that waited gets kReplaced. A
+  // volume submitted while not kShowing waits for the device to come, unless blanked: then kLost at
+  // once. `frame->volume` must ascend.
+  void Submit(SliceFramePtr frame);
+
+  // True if no volume waits: a pipeline that only draws when this holds never has a volume replaced.
+  bool mailbox_free() const { return waiting_ == nullptr; }
+
+  // Does what is due, drains completions; returns when it wants to be called again at the latest.
+  sync::TimeNs Tick();
+
+  // The device's global brightness, 0 to 1; dark and light again. InvalidArgument for a value outside.
+  absl::Status SetBrightness(double brightness);
+  absl::Status SetBlank(bool blank);
+  double brightness() const { return brightness_; }
+  bool blanked() const { return blanked_; }
+
+  // The next volume shown, rebuilt from the bytes that go out; the display re-sends the current one whole
+  // for it. `done` gets DeadlineExceeded after `timeout`, Unavailable when the display stops or is lost.
+  void Capture(sync::TimeNs timeout, CaptureDone done);
+
+  // Predicted starts of coming sweeps (owner's clock), nearest first; empty if not known.
+  virtual std::vector<sync::TimeNs> ComingSweeps(int /*count*/) const { return {}; }
+
+ protected:
+  Display(DisplayInfo info, sync::Clock& clock);
+
+  // Begin to attach; go on in DoTick; report by Attached or DeviceLost.
+  virtual absl::Status DoStart() = 0;
+  // Ends all transfers; returns when the device may be closed. Must not wait longer than `stop_limit_ns`.
+  virtual void DoStop() = 0;
+  // Begins to send `frame` (only when attached and nothing is in flight). With `full` no slice may be left
+  // out; otherwise those that changed since the last volume the device completed. Ends in FrameDone or
+  // FrameLost, from here or from DoTick.
+  virtual void DoSend(const SliceFramePtr& frame, bool full) = 0;
+  virtual sync::TimeNs DoTick(sync::TimeNs now) = 0;
+  virtual absl::Status DoSetBrightness(double brightness) = 0;
+  virtual absl::Status DoSetBlank(bool blank) = 0;
+  virtual std::unique_ptr<WireDecoder> DoMakeDecoder() const = 0;
+
+  // For drivers, on the owner's thread.
+  void Attached();                             // the device is set up: the current frame goes out first
+  void DeviceLost(const std::string& reason);  // whatever is in flight is lost; DoTick attaches again
+  void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns, uint64_t bytes);
+  void FrameLost(const std::string& reason, uint64_t bytes);
+  void TapOut(uint8_t endpoint, std::span<const std::byte> bytes);  // every outgoing byte of a volume
+  bool tapped() const { return decoder_ != nullptr; }
+  void Wake() const { if (wake_) wake_(); }  // any thread
+  DisplayStats& mutable_stats() { return stats_; }
+  sync::Clock& clock() const { return clock_; }
+  const SliceFramePtr& in_flight() const { return in_flight_; }
+
+ private:
+  struct PendingCapture {
+    sync::TimeNs deadline;
+    CaptureDone done;
+  };
+
+  void SetState(DisplayState state, const std::string& reason);
+  void Report(VolumeOutcome outcome);
+  void SendNext();
+  void FinishCaptures(const absl::StatusOr<DecodedVolume>& result);
+
+  const DisplayInfo info_;
+  sync::Clock& clock_;
+  Listener* listener_ = nullptr;
+  std::function<void()> wake_;
+  DisplayState state_ = DisplayState::kStopped;
+  std::string state_reason_;
+  DisplayStats stats_;
+  double brightness_ = 1;
+  bool blanked_ = false;
+  SliceFramePtr in_flight_, waiting_, last_shown_;
+  bool full_next_ = true;  // the next volume may leave out nothing (attach, capture)
+  std::unique_ptr<WireDecoder> decoder_;
+  std::vector<PendingCapture> captures_;
+};
+
+}  // namespace voxeld::display

@@ -1,0 +1,103 @@
+// The door to a USB device, shaped like libusb: submit, cancel, completion with status and actual length,
+// hotplug, a cap on the bytes in flight. Implementations: in-process (an emulated device in this process),
+// later libusb, recording, replaying and fault-injecting ones. Drivers see nothing else of USB.
+//
+// Threads: bound to the owner's thread, but for the wake function, which an implementation may call from
+// any thread. Completions queue up and are handed out by Drain, so no code of ours ever runs inside a
+// library's callback. No call blocks except Close, which ends within its limit.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::display {
+
+enum class TransferType : uint8_t { kControl, kBulk, kInterrupt };
+
+// The eight bytes of USB 2.0, section 9.3.
+struct UsbSetup {
+  uint8_t request_type = 0;
+  uint8_t request = 0;
+  uint16_t value = 0;
+  uint16_t index = 0;
+  uint16_t length = 0;
+};
+
+enum class TransferStatus : uint8_t {
+  kOk,
+  kShort,         // IN: fewer bytes than asked (not an error by itself)
+  kStall,         // endpoint halted (control: request refused)
+  kTimedOut,      // OUT: actual_length must not be trusted
+  kCancelled,
+  kOverflow,      // the device sent more than asked
+  kError,         // protocol error on the bus
+  kDisconnected,
+};
+
+const char* TransferStatusName(TransferStatus status);
+
+using TransferId = uint64_t;
+
+struct Transfer {
+  TransferType type = TransferType::kBulk;
+  uint8_t endpoint = 0;                   // with bit 7 for IN
+  UsbSetup setup;                         // kControl only
+  std::vector<std::byte> data;            // OUT: what to send; moved in, handed back in the completion
+  uint32_t length = 0;                    // IN: bytes asked for
+  sync::TimeNs timeout = 0;               // 0: none
+};
+
+struct TransferCompletion {
+  TransferId id = 0;
+  TransferType type = TransferType::kBulk;
+  uint8_t endpoint = 0;
+  TransferStatus status = TransferStatus::kOk;
+  uint32_t actual_length = 0;
+  std::vector<std::byte> data;  // IN: what came (actual_length bytes). OUT: the buffer, to be used again
+};
+
+struct UsbIdentity {
+  uint16_t vendor_id = 0, product_id = 0, bcd_device = 0;
+  std::string serial;  // as the device says it: hostile until escaped
+  std::string path;    // bus position, "in-process" for emulated ones
+};
+
+class UsbTransport {
+ public:
+  virtual ~UsbTransport() = default;
+
+  // Looks for the device and opens it; NotFound while there is none. Claims the interface.
+  virtual absl::Status Open() = 0;
+  // Cancels everything, drains it, and closes; completions not yet drained are discarded. Idempotent.
+  virtual void Close() = 0;
+  virtual bool is_open() const = 0;
+  virtual UsbIdentity identity() const = 0;
+
+  // Queues a transfer. ResourceExhausted when max_bytes_in_flight() would be passed (submit again after a
+  // completion), Unavailable when the device is gone.
+  virtual absl::StatusOr<TransferId> Submit(Transfer transfer) = 0;
+  // The transfer completes as kCancelled, or as it would have; unknown ids are ignored.
+  virtual void Cancel(TransferId id) = 0;
+  // Clears the halt of an endpoint; completes as a control transfer with the id returned.
+  virtual absl::StatusOr<TransferId> ClearHalt(uint8_t endpoint) = 0;
+
+  // Moves all completions into `out`, in the order in which they happened. Returns how many.
+  virtual size_t Drain(std::vector<TransferCompletion>& out) = 0;
+
+  virtual size_t bytes_in_flight() const = 0;
+  virtual size_t max_bytes_in_flight() const = 0;
+
+  // `wake` is called, from any thread, when Drain has something, or when a device came or went.
+  virtual void SetWake(std::function<void()> wake) = 0;
+};
+
+}  // namespace voxeld::display

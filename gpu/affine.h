@@ -1,0 +1,49 @@
+// Affine maps in double precision, composed and applied in one fixed order of operations, so that every
+// machine gets the same bits (no contraction: the build says so for both compilers).
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "gpu/portable.h"
+
+namespace voxeld::gpu {
+
+// Row-major 3×4: p ↦ (m[0]x + m[1]y + m[2]z + m[3], …).
+struct Affine {
+  double m[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  bool operator==(const Affine&) const = default;
+};
+
+struct Point3d {
+  double x, y, z;
+};
+
+VOXELD_HD inline Point3d Map(const Affine& a, double x, double y, double z) {
+  return {((a.m[0] * x + a.m[1] * y) + a.m[2] * z) + a.m[3],
+          ((a.m[4] * x + a.m[5] * y) + a.m[6] * z) + a.m[7],
+          ((a.m[8] * x + a.m[9] * y) + a.m[10] * z) + a.m[11]};
+}
+
+// outer ∘ inner: inner is applied first.
+VOXELD_HD inline Affine Compose(const Affine& outer, const Affine& inner) {
+  Affine r;
+  for (int row = 0; row < 3; ++row) {
+    const double* o = outer.m + row * 4;
+    for (int col = 0; col < 4; ++col) {
+      const double sum =
+          (o[0] * inner.m[col] + o[1] * inner.m[4 + col]) + o[2] * inner.m[8 + col];
+      r.m[row * 4 + col] = col == 3 ? sum + o[3] : sum;
+    }
+  }
+  return r;
+}
+
+// Of the linear part.
+VOXELD_HD inline double Determinant(const Affine& a) {
+  const double* m = a.m;
+  return (m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8])) +
+         m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,154 @@
+// A scene's change as flat bytes: what goes through the engine's door, whoever is behind it.
+//
+// A delta is a sequence of records, each 16-byte aligned: RecordHeader, a fixed struct, arrays. Little-endian;
+// no pointers; ids are the caller's and unique within their kind. Records apply in order; order between
+// drawables has no influence on what is drawn.
+//
+//   geometry  immutable content: a kind of primitive, its parameters and arrays, in its own coordinates
+//   drawable  puts a geometry into a layer, under a transform, with a priority; several may share one
+//   layer     how its voxels combine with those below
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <span>
+
+#include "absl/status/status.h"
+#include "gpu/affine.h"
+
+namespace voxeld::gpu {
+
+enum class Op : uint32_t {
+  kPutGeometry = 1,   // GeometryRecord, positions, indices, colors. The id must be new
+  kDropGeometry = 2,  // IdRecord; no drawable may use it any more at the end of the delta
+  kPutDrawable = 3,   // DrawableRecord; replaces one of the same id
+  kDropDrawable = 4,  // IdRecord
+  kPutLayer = 5,      // LayerRecord; replaces one of the same id
+  kDropLayer = 6,     // IdRecord; no drawable may be in it any more at the end of the delta
+  kReset = 7,         // nothing follows: forget everything
+};
+
+enum class PrimitiveKind : uint32_t {
+  kPoints = 1,     // a voxel each, or a ball of `thickness`
+  kSegments = 2,   // list, strip or loop
+  kTriangles = 3,  // indexed or not
+  kBox = 4,        // centre params[0..2], full sizes params[3..5] along its own axes
+  kSphere = 5,     // centre params[0..2], radius params[3] (an ellipsoid under a transform)
+  kCylinder = 6,   // centre params[0..2], radius params[3], height params[4] along its own z
+};
+
+enum class LineSampling : uint32_t { kThin = 0, kEuclidean = 1, kCover = 2 };
+enum class SurfaceRule : uint32_t { kThin = 0, kCover = 1 };
+enum class Fill : uint32_t { kSurface = 0, kSolid = 1 };
+enum class Topology : uint32_t { kList = 0, kStrip = 1, kLoop = 2 };
+enum class ColorMode : uint32_t { kUniform = 0, kPerVertex = 1 };
+enum class ThicknessUnit : uint32_t { kVoxels = 0, kUnits = 1 };
+enum class BlendMode : uint32_t { kOver = 0, kAdd = 1, kErase = 2 };
+
+struct RecordHeader {
+  Op op;
+  uint32_t reserved = 0;
+  uint64_t size;  // of the whole record, this header and padding included; a multiple of 16
+};
+
+struct IdRecord {
+  uint64_t id;
+  uint64_t reserved = 0;
+};
+
+// Arrays follow in this order, each padded to 16 bytes: positions f32[vertex_count][3], indices
+// u32[index_count], colors u32[vertex_count] (0x00RRGGBB; only with kPerVertex).
+struct GeometryRecord {
+  uint64_t id = 0;
+  PrimitiveKind kind = PrimitiveKind::kPoints;
+  uint32_t color = 0x00FFFFFF;  // kUniform
+  ColorMode color_mode = ColorMode::kUniform;
+  LineSampling sampling = LineSampling::kThin;  // kSegments
+  SurfaceRule rule = SurfaceRule::kThin;        // surfaces
+  Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder
+  Topology topology = Topology::kList;          // kSegments
+  ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
+  float thickness = 0;  // diameter of points and segments; 0: one voxel. kUnits: scaled by ∛|det| of the map
+  uint32_t vertex_count = 0;
+  uint32_t index_count = 0;  // 0: vertices as they stand
+  float params[8] = {};
+  uint32_t reserved[3] = {};
+};
+
+struct DrawableRecord {
+  uint64_t id = 0;
+  uint64_t geometry = 0;
+  uint64_t layer = 0;
+  uint32_t priority = 0;  // 0 to 126
+  uint32_t erase = 0;     // 1: removes what is of lower or equal priority in its layer
+  Affine transform;       // geometry's coordinates → layer's
+};
+
+// Layers combine in ascending (order, id).
+struct LayerRecord {
+  uint64_t id = 0;  // the number of creation
+  int32_t order = 0;
+  uint32_t visible = 1;
+  uint32_t opacity = 255;  // 0 to 255
+  BlendMode blend = BlendMode::kOver;
+  uint64_t reserved = 0;
+  Affine transform;  // layer's coordinates → scene's
+};
+
+// Appends records to a span. Overruns are counted, not written: size the span with the Size functions.
+class DeltaWriter {
+ public:
+  explicit DeltaWriter(std::span<std::byte> out) : out_(out) {}
+
+  static size_t SizeOf(const GeometryRecord& g);
+  static size_t SizeOf(const DrawableRecord&) { return sizeof(RecordHeader) + sizeof(DrawableRecord); }
+  static size_t SizeOf(const LayerRecord&) { return sizeof(RecordHeader) + sizeof(LayerRecord); }
+  static constexpr size_t kSizeOfId = sizeof(RecordHeader) + sizeof(IdRecord);
+  static constexpr size_t kSizeOfReset = sizeof(RecordHeader);
+
+  // Spans must have the lengths that the record states (indices: index_count; colors: vertex_count with
+  // kPerVertex, else empty).
+  void PutGeometry(const GeometryRecord& g, std::span<const float> positions,
+                   std::span<const uint32_t> indices, std::span<const uint32_t> colors);
+  void PutDrawable(const DrawableRecord& d);
+  void PutLayer(const LayerRecord& l);
+  void Drop(Op op, uint64_t id);  // kDropGeometry, kDropDrawable, kDropLayer
+  void Reset();
+
+  size_t size() const { return size_; }
+  bool overrun() const { return size_ > out_.size(); }
+
+ private:
+  void Append(const void* data, size_t size);
+  void Pad();
+  void Begin(Op op, size_t size);
+
+  std::span<std::byte> out_;
+  size_t size_ = 0;
+};
+
+// A geometry as it lies in a delta: views into the block.
+struct GeometryView {
+  GeometryRecord record;
+  std::span<const float> positions;  // 3 · vertex_count
+  std::span<const uint32_t> indices;
+  std::span<const uint32_t> colors;
+};
+
+// What ReadDelta calls, in order. An error from any ends the reading.
+struct DeltaVisitor {
+  virtual ~DeltaVisitor() = default;
+  virtual absl::Status OnGeometry(const GeometryView& g) = 0;
+  virtual absl::Status OnDrawable(const DrawableRecord& d) = 0;
+  virtual absl::Status OnLayer(const LayerRecord& l) = 0;
+  virtual absl::Status OnDrop(Op op, uint64_t id) = 0;
+  virtual absl::Status OnReset() = 0;
+};
+
+// Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands it to `visitor`.
+// InvalidArgument with the byte offset, the value and what would be right. `delta` is 16-byte aligned.
+absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor);
+
+}  // namespace voxeld::gpu

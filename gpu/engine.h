@@ -1,0 +1,145 @@
+// The one door to the volume engine: a scene's deltas in, packed slices out.
+//
+//   StatusOr<unique_ptr<Engine>> engine = CreateEngine({.kind = EngineKind::kAuto});
+//   engine->SetTarget(target, done);                     // which display, which view
+//   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared with a process
+//   DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
+//   engine->Apply(std::move(block), writer.size(), done);
+//   engine->SubmitFrame({.frame = 7}, buffer, done);
+//
+// Contract
+// - Calls are carried out in the order in which they were made; each ends in exactly one call of its
+//   `done`, from a thread of the engine's (or inside the call, with EngineOptions::inline_execution).
+//   `done` must only post: it must not call the engine, block, or throw.
+// - No pointer passes for keeps: the engine owns a staging block from Apply on; a FrameBuffer belongs to
+//   the caller, is written only between SubmitFrame and its `done`, and is not remembered.
+// - For any scene every engine gives the same bytes, in any number of threads, parts and frames between.
+// - An error leaves the engine as it was before that call, unless the code is DataLoss: then the engine is
+//   gone, every later call ends in DataLoss, and its owner makes a new one and gives it the whole scene
+//   (what an engine holds is always derived).
+// - Thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/api/geometry.h"
+#include "display/api/slice_frame.h"
+#include "gpu/affine.h"
+
+namespace voxeld::gpu {
+
+enum class EngineKind : uint8_t { kAuto, kCpu, kCuda };
+const char* EngineKindName(EngineKind kind);
+
+// The slices that an engine owns, [begin, end) of the layout's; it draws only the tiles that they look
+// at. Several engines, each with a part, make one display: their slices joined equal the whole's.
+struct SlicePart {
+  int32_t begin = 0;
+  int32_t end = -1;  // −1: to the last
+};
+
+struct EngineOptions {
+  EngineKind kind = EngineKind::kAuto;
+  int threads = 0;                // worker threads of the CPU engine; 0: one a core
+  bool inline_execution = false;  // every call finishes before it returns, in the caller's thread
+  SlicePart part;
+  uint64_t staging_limit_bytes = uint64_t{1} << 30;  // held in staging and retained geometry
+};
+
+struct EngineInfo {
+  EngineKind kind = EngineKind::kCpu;  // never kAuto
+  std::string device;                  // "CPU, 8 threads", "NVIDIA H200"
+  std::string reason;                  // why this kind: "no CUDA driver", "asked for", …
+};
+
+// The display that an engine draws for. `view` maps scene units to voxel space (voxel i = [i, i+1)).
+struct Target {
+  display::Geometry geometry;
+  display::FrameLayout layout;
+  display::Tone tone;
+  Affine view;
+};
+
+// Staging memory, written by the caller before it goes to Apply. Movable; given back on destruction.
+class StagingBlock {
+ public:
+  struct Memory {
+    virtual ~Memory() = default;
+    virtual std::span<std::byte> bytes() = 0;
+  };
+  StagingBlock() = default;
+  explicit StagingBlock(std::shared_ptr<Memory> memory) : memory_(std::move(memory)) {}
+  std::span<std::byte> bytes() const { return memory_ ? memory_->bytes() : std::span<std::byte>(); }
+  const std::shared_ptr<Memory>& memory() const { return memory_; }
+
+ private:
+  std::shared_ptr<Memory> memory_;
+};
+
+struct FrameRequest {
+  uint64_t frame = 0;  // ascending; recorded as the frame in which a picture's bytes changed
+  // The last frame that this very buffer held, whole; 0: none. Pictures that have not changed since then
+  // are not written again.
+  uint64_t buffer_holds = 0;
+};
+
+// Caller's memory. Sizes are the whole layout's, also when the engine owns a part: it writes its slices.
+struct FrameBuffer {
+  std::span<std::byte> bytes;       // layout.bytes()
+  std::span<uint64_t> changed_in;   // layout.pictures()
+};
+
+struct FrameResult {
+  uint64_t frame = 0;
+  bool changed = false;        // some picture differs from the frame before
+  uint64_t lit_voxels = 0;     // of the engine's tiles: result not black
+  uint32_t tiles_drawn = 0;    // dirty tiles drawn for this frame
+  uint32_t pictures_drawn = 0; // pictures sliced again
+  int64_t assemble_ns = 0, slice_ns = 0;
+};
+
+// A box of voxels, half-open.
+struct VoxelBox {
+  int32_t x0 = 0, y0 = 0, z0 = 0, x1 = 0, y1 = 0, z1 = 0;
+};
+
+class Engine {
+ public:
+  using Done = std::function<void(absl::Status)>;
+  using FrameDone = std::function<void(absl::StatusOr<FrameResult>)>;
+
+  virtual ~Engine() = default;
+
+  virtual const EngineInfo& info() const = 0;
+
+  // Sets or replaces the target; the scene stays, everything is drawn anew. InvalidArgument for a geometry
+  // or layout that does not hold together. Must come before the first frame.
+  virtual void SetTarget(Target target, Done done) = 0;
+
+  // `size` bytes of staging memory. ResourceExhausted past the limit.
+  virtual absl::StatusOr<StagingBlock> AcquireStaging(size_t size) = 0;
+
+  // Applies the first `size` bytes of `block`, a delta as gpu/delta.h has it. InvalidArgument for a
+  // malformed one, with the offset; then nothing of it is applied.
+  virtual void Apply(StagingBlock block, size_t size, Done done) = 0;
+
+  // Brings the scene up to date, and `buffer` up to `request.frame`.
+  virtual void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) = 0;
+
+  // The blended voxels of `box`, x fastest, as 0x00RRGGBB; those outside the engine's tiles are 0. For
+  // tests and tools: brings the scene up to date first.
+  virtual void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) = 0;
+};
+
+// FailedPrecondition if the kind asked for cannot be had, with the reason; kAuto always succeeds.
+absl::StatusOr<std::unique_ptr<Engine>> CreateEngine(const EngineOptions& options);
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,52 @@
+// The voxel word: what blending within a layer compares, and how colours are kept.
+//
+//   bits 31–25  priority + 1 (1 to 127; word 0 means uncovered, so black covers)
+//   bit  24     erase: at one priority an erase wins; its colour is 0
+//   bits 23–0   colour, the bits of green, red and blue interleaved from the top: G7 R7 B7 G6 …
+//
+// A layer's voxel is the maximum of all words that cover it, so neither order nor repetition matters.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/portable.h"
+
+namespace voxeld::gpu {
+
+inline constexpr uint32_t kEraseBit = 1u << 24;
+inline constexpr uint32_t kColorMask = kEraseBit - 1;
+
+// Bits of an 8-bit value to every third position.
+VOXELD_HD inline uint32_t Spread3(uint32_t v) {
+  v = (v | (v << 8)) & 0x00F00Fu;
+  v = (v | (v << 4)) & 0x0C30C3u;
+  v = (v | (v << 2)) & 0x249249u;
+  return v;
+}
+
+VOXELD_HD inline uint32_t Gather3(uint32_t v) {
+  v &= 0x249249u;
+  v = (v | (v >> 2)) & 0x0C30C3u;
+  v = (v | (v >> 4)) & 0x00F00Fu;
+  v = (v | (v >> 8)) & 0x0000FFu;
+  return v;
+}
+
+// 0x00RRGGBB ↔ interleaved.
+VOXELD_HD inline uint32_t Interleave(uint32_t rgb) {
+  return Spread3((rgb >> 8) & 0xFF) << 2 | Spread3((rgb >> 16) & 0xFF) << 1 | Spread3(rgb & 0xFF);
+}
+
+VOXELD_HD inline uint32_t Deinterleave(uint32_t w) {
+  return Gather3(w >> 1) << 16 | Gather3(w >> 2) << 8 | Gather3(w);
+}
+
+// `priority` 0 to 126; `rgb` 0x00RRGGBB.
+VOXELD_HD inline uint32_t MakeWord(uint32_t priority, bool erase, uint32_t rgb) {
+  return (priority + 1) << 25 | (erase ? kEraseBit : Interleave(rgb));
+}
+
+// Covered in its layer: neither 0 nor an erase.
+VOXELD_HD inline bool IsCovered(uint32_t word) { return word != 0 && (word & kEraseBit) == 0; }
+
+}  // namespace voxeld::gpu
