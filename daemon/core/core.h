@@ -1,0 +1,188 @@
+// The daemon below gRPC: sessions, the scene store, one frame pipeline a display. Knows no protobuf.
+//
+//   Core core(options, clock);
+//   core.AddDisplay(std::move(display), engine_options);
+//   core.Start();                                   // or, in a simulation, Step() by hand
+//   SessionId id = *core.OpenSession(open, sink);
+//   core.Handle(id, std::move(operations), issues, bytes);
+//   core.CloseSession(id);
+//   core.Stop(deadline);
+//
+// Threads: the public functions are thread-safe and only post to the core's thread (queries post and answer
+// by callback on the core's thread, or on the display's pipeline thread; callbacks must only post). One more
+// thread a display runs its pipeline. With CoreOptions::threads = false there are none: Step() does everything
+// that is due, in the caller's thread, so that a whole daemon can be simulated under a FakeClock.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "daemon/core/receipt.h"
+#include "daemon/core/stats.h"
+#include "daemon/scene/operation.h"
+#include "display/api/display.h"
+#include "display/sync/clock.h"
+#include "gpu/engine.h"
+
+namespace voxeld::daemon {
+
+using SessionId = uint64_t;
+
+// Where a session's answers go. Thread-safe; called on the core's thread; must only post.
+class SessionSink {
+ public:
+  virtual ~SessionSink() = default;
+  virtual void OnIssue(const Issue& issue) = 0;
+  virtual void OnReceipt(const Receipt& receipt) = 0;
+};
+
+struct CoreOptions {
+  Limits limits;
+  std::string version;
+  bool threads = true;
+};
+
+struct SessionInfo {
+  SessionId session = 0;
+  uint64_t owner = 0;
+  std::vector<std::string> displays;
+};
+
+// How the scene is laid into a display's volume; DESIGN: FIT, MILLIMETRES, VOXELS.
+struct ViewOptions {
+  enum class Mode : uint8_t { kFit, kMillimetres, kVoxels };
+  Mode mode = Mode::kFit;
+  std::optional<std::pair<display::Vec3, display::Vec3>> box;  // kFit; default ±1 on the longest axis
+  gpu::Affine transform;
+};
+
+enum class TestPattern : uint8_t { kNone, kAxes, kCorners, kGrid, kRamp, kWhite };
+
+struct DisplayDescription {
+  display::DisplayInfo info;
+  display::DisplayState state = display::DisplayState::kStopped;
+  std::string state_reason;
+  double brightness = 1;
+  bool blank = false;
+  TestPattern pattern = TestPattern::kNone;
+  ViewOptions view;
+  gpu::Affine scene_to_voxel;
+};
+
+struct DisplayUpdate {
+  std::optional<double> brightness;
+  std::optional<bool> blank;
+  std::optional<TestPattern> pattern;
+  std::optional<ViewOptions> view;
+};
+
+struct EntityKey {
+  uint64_t owner = 0;
+  std::string layer, id;
+  auto operator<=>(const EntityKey&) const = default;
+};
+
+struct EntityInfo {
+  EntityKey key;
+  std::string kind;
+  uint64_t vertices = 0, bytes = 0;
+  uint32_t priority = 0;
+  bool erase = false;
+  gpu::Affine transform;
+  uint64_t sequence = 0;
+  sync::TimeNs expires_ns = 0;
+  std::string label;
+  uint32_t color = 0;  // 0x00RRGGBB
+};
+
+struct LayerInfo {
+  uint64_t owner = 0;
+  std::string layer;
+  uint64_t number = 0;
+  bool visible = true;
+  uint32_t opacity = 255;
+  int32_t order = 0;
+  gpu::BlendMode blend = gpu::BlendMode::kOver;
+  gpu::Affine transform;
+  uint64_t entities = 0, bytes = 0;
+  bool orphaned = false;
+  std::string client_name;
+};
+
+struct EntityQuery {
+  uint64_t owner = 0;  // 0: all
+  std::string layer, id_prefix;
+  uint32_t page_size = 1000;
+  std::string page_token;
+};
+
+struct EntityPage {
+  std::vector<EntityInfo> entities;
+  std::vector<LayerInfo> layers;
+  std::string next_page_token;
+  uint64_t total = 0;
+};
+
+struct Cleared {
+  uint64_t entities = 0, layers = 0;
+};
+
+class Core {
+ public:
+  template <typename T>
+  using Reply = std::function<void(absl::StatusOr<T>)>;
+
+  Core(CoreOptions options, sync::Clock& clock);
+  ~Core();  // stops, if it still runs
+  Core(const Core&) = delete;
+  Core& operator=(const Core&) = delete;
+
+  const Limits& limits() const;
+
+  // Before Start. The name must be new. The engine is made here; its failure is the answer.
+  absl::Status AddDisplay(std::unique_ptr<display::Display> display,
+                          const gpu::EngineOptions& engine, const ViewOptions& view = {});
+  absl::Status Start();
+
+  // Ends displays and threads; what is owed by then counts as lost or undelivered. Returns after at most
+  // `limit`, with an error that names what had not ended.
+  absl::Status Stop(sync::TimeNs limit);
+
+  // threads = false only: does all that is due and returns when more is.
+  sync::TimeNs Step();
+
+  // ---- sessions. `sink` is kept until after the answer to CloseSession.
+  // ResourceExhausted past max_sessions.
+  void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink, Reply<SessionInfo> reply);
+  // `issues` are what decoding refused; `bytes` is what the message weighed. `done` (may be empty) runs when the
+  // message has been taken in: the time to read the next.
+  void Handle(SessionId session, std::vector<Operation> operations, std::vector<Issue> issues,
+              uint64_t bytes, std::function<void()> done);
+  // Carries out the session's DisconnectPolicy; unknown sessions are ignored.
+  void CloseSession(SessionId session, std::function<void()> done);
+
+  // ---- queries
+  void ListEntities(EntityQuery query, Reply<EntityPage> reply);
+  void GetEntity(EntityKey key, Reply<EntityInfo> reply);
+  void ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<Cleared> reply);
+  void GetStats(Reply<Stats> reply);
+  void ListDisplays(Reply<std::vector<DisplayDescription>> reply);
+  // An empty name is the first display; NotFound lists those there are.
+  void GetDisplay(std::string name, Reply<DisplayDescription> reply);
+  void UpdateDisplay(std::string name, DisplayUpdate update, Reply<DisplayDescription> reply);
+  // The next volume shown that contains at least `at_least_snapshot`.
+  void Capture(std::string name, sync::TimeNs timeout, uint64_t at_least_snapshot,
+               Reply<display::DecodedVolume> reply);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace voxeld::daemon

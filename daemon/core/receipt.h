@@ -1,0 +1,48 @@
+// What a session is told of its commits.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "display/api/outcome.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::daemon {
+
+struct Accepted {
+  uint64_t snapshot = 0;
+  uint64_t refused_operations = 0;
+  sync::TimeNs applied_time_ns = 0;
+  std::vector<std::string> displays;  // each gives exactly one outcome
+};
+
+struct Refused {
+  uint64_t refused_operations = 0;
+  std::string message;
+};
+
+// What became of a commit on one display.
+struct CommitOutcome {
+  enum class Kind : uint8_t { kPresented, kUnchanged, kSuperseded, kLost, kNotShown };
+  enum class NotShown : uint8_t { kAbsent, kRemoved, kBlanked, kHidden };
+  std::string display;
+  Kind kind = Kind::kLost;
+  uint64_t volume = 0;             // presented, unchanged
+  sync::TimeNs time_ns = 0;        // presented
+  display::Evidence evidence = display::Evidence::kEstimated;
+  sync::TimeNs last_byte_ns = 0;   // presented
+  uint64_t by_frame_id = 0;        // superseded
+  uint64_t by_sequence = 0;        // superseded
+  std::string reason;              // lost
+  NotShown why = NotShown::kAbsent;
+};
+
+struct Receipt {
+  uint64_t frame_id = 0;
+  uint64_t sequence = 0;
+  std::variant<Accepted, Refused, CommitOutcome> what;
+};
+
+}  // namespace voxeld::daemon

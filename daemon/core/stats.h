@@ -1,0 +1,43 @@
+// The one struct of figures, printed alike to gRPC, JSON and Prometheus.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "display/api/outcome.h"
+
+namespace voxeld::daemon {
+
+// Quantiles over a sliding window: the last 10 s, at most the last 4096 values.
+struct LatencyStats {
+  uint64_t count = 0;
+  int64_t p50_ns = 0, p99_ns = 0, max_ns = 0;
+};
+
+struct DisplayFigures {
+  std::string name;
+  display::DisplayState state = display::DisplayState::kStopped;
+  std::string engine, engine_device, engine_reason;
+  uint64_t lit_voxels = 0;
+  uint64_t volumes_drawn = 0, volumes_presented = 0, volumes_replaced = 0, volumes_lost = 0;
+  double volumes_per_second = 0;
+  uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
+  LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice;
+  // commits_owed = presented + unchanged + superseded + lost + not_shown + pending, always.
+  uint64_t commits_owed = 0, commits_presented = 0, commits_unchanged = 0, commits_superseded = 0,
+           commits_lost = 0, commits_not_shown = 0, commits_pending = 0;
+};
+
+struct Stats {
+  int64_t time_ns = 0;
+  std::string version;
+  int64_t uptime_ns = 0;
+  uint64_t sessions = 0, owners = 0, layers = 0, entities = 0, objects = 0, scene_bytes = 0;
+  uint64_t commits_accepted = 0, commits_refused = 0, operations_applied = 0, operations_refused = 0;
+  uint64_t bytes_in = 0;
+  uint64_t outcomes_undelivered = 0;
+  std::vector<DisplayFigures> displays;
+};
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,164 @@
+// What clients ask for, decoded and checked in itself: plain data, without protobuf. daemon/wire makes these
+// from bytes; the core applies them. Everything about a single operation has been validated (finite numbers,
+// counts, enums, index ranges, id lengths); what depends on the scene (existence, quotas, cycles, range on the
+// displays) is the core's to check.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "display/sync/clock.h"
+#include "gpu/affine.h"
+#include "gpu/delta.h"
+
+namespace voxeld::daemon {
+
+// Why something was refused; the wire's Reason, by the same numbers.
+enum class Reason : uint8_t {
+  kUnspecified = 0,
+  kInvalidValue = 1,
+  kSizeMismatch = 2,
+  kIndexOutOfRange = 3,
+  kQuotaExceeded = 4,
+  kNotFound = 5,
+  kAlreadyExists = 6,
+  kInUse = 7,
+  kCycle = 8,
+  kSingularTransform = 9,
+  kOutOfRange = 10,
+  kStaleSequence = 11,
+  kOutOfOrder = 12,
+  kPermissionDenied = 13,
+  kUnimplemented = 14,
+};
+
+// One refused operation. Not fatal.
+struct Issue {
+  uint64_t sequence = 0;
+  std::string layer, id;
+  std::string field;    // path within the request
+  Reason reason = Reason::kUnspecified;
+  std::string message;  // what was wrong, the value, what would be right
+};
+
+// The limits in force. One field each, here, in the configuration and on the wire.
+struct Limits {
+  uint64_t max_message_bytes = 16u << 20;
+  uint64_t max_entities_per_owner = 1'000'000;
+  uint64_t max_layers_per_owner = 1024;
+  uint64_t max_bytes_per_owner = uint64_t{1} << 30;
+  uint64_t max_vertices_per_entity = 16u << 20;
+  uint64_t max_indices_per_entity = 48u << 20;
+  uint32_t max_id_bytes = 256;
+  uint32_t max_operations_per_commit = 1'000'000;
+  uint64_t max_uncommitted_bytes = 256u << 20;
+  uint32_t max_instance_depth = 8;
+  double max_coordinate_voxels = 1073741824.0;  // 2³⁰
+  uint32_t max_timed_commits = 64;
+  int64_t max_present_at_horizon_ns = 10 * sync::kSecond;
+  int64_t must_show_timeout_ns = 2 * sync::kSecond;
+  uint32_t max_sessions = 1024;
+  uint32_t max_parts_per_object = 4096;
+};
+
+// Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be copied into
+// staging. Shared by snapshots.
+struct GeometryData {
+  gpu::GeometryRecord record;
+  std::vector<float> positions;   // 3 · vertex_count
+  std::vector<uint32_t> indices;  // index_count
+  std::vector<uint32_t> colors;   // 0x00RRGGBB, vertex_count or none
+  // Bounds in its own coordinates, thickness left out.
+  double min[3] = {}, max[3] = {};
+  uint64_t bytes() const {
+    return sizeof(*this) + positions.size() * 4 + indices.size() * 4 + colors.size() * 4;
+  }
+};
+using GeometryPtr = std::shared_ptr<const GeometryData>;
+
+struct InstanceRef {
+  std::string object;
+};
+
+using Content = std::variant<GeometryPtr, InstanceRef>;
+
+struct EntityData {
+  Content content;
+  gpu::Affine transform;
+  uint32_t priority = 0;
+  bool erase = false;
+  int64_t lifetime_ns = 0;
+  std::string label;
+};
+
+struct ObjectPart {
+  Content content;
+  gpu::Affine transform;
+};
+
+struct ObjectData {
+  std::vector<ObjectPart> parts;
+};
+
+enum class DisconnectPolicy : uint8_t { kClear, kLinger, kKeep };
+
+struct OpenOptions {
+  std::string client_name;
+  DisconnectPolicy on_disconnect = DisconnectPolicy::kClear;
+  int64_t linger_ns = 0;
+  bool strict = false;
+  bool no_outcomes = false;
+};
+
+struct Upsert {
+  std::string layer, id;
+  EntityData entity;
+};
+struct Delete {
+  enum class What : uint8_t { kId, kPrefix, kAllOfLayer, kAllMine };
+  What what = What::kId;
+  std::string layer, id_or_prefix;
+  uint64_t guard_sequence = 0;
+};
+struct SetTransform {
+  std::string layer, id;
+  gpu::Affine transform;
+};
+struct LayerState {
+  std::string layer;
+  std::optional<bool> visible;
+  std::optional<uint32_t> opacity;
+  std::optional<int32_t> order;
+  std::optional<gpu::BlendMode> blend;
+  std::optional<gpu::Affine> transform;
+};
+struct FrameBegin {
+  std::string layer;
+};
+struct FrameEnd {
+  std::string layer;
+};
+struct DefineObject {
+  std::string object;
+  std::shared_ptr<const ObjectData> data;
+};
+struct DeleteObject {
+  std::string object;
+  bool cascade = false;
+};
+struct Commit {
+  uint64_t frame_id = 0;
+  int64_t send_time_ns = 0;
+  uint64_t client_drops = 0;
+};
+
+struct Operation {
+  uint64_t sequence = 0;
+  std::variant<Upsert, Delete, SetTransform, LayerState, FrameBegin, FrameEnd, DefineObject, DeleteObject, Commit> op;
+};
+
+}  // namespace voxeld::daemon
