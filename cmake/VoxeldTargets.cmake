@@ -18,6 +18,11 @@ if(VOXELD_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${VOXELD_CCACHE})
 endif()
 
+find_program(VOXELD_MOLD mold)
+if(VOXELD_MOLD AND NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  add_link_options(-fuse-ld=mold)
+endif()
+
 find_package(Threads REQUIRED)
 find_package(absl REQUIRED)
 

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""Runs clang-16's analyses over translation units, as many at once as there are cores.
+
+usage: analyze.py thread-safety|tidy BUILD_DIR FILE...
+Exit 1 if any finding; each is printed once.
+"""
+
+import concurrent.futures
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+
+def compile_commands(build_dir):
+    with open(os.path.join(build_dir, "compile_commands.json"), encoding="utf-8") as file:
+        return {os.path.realpath(entry["file"]): entry for entry in json.load(file)}
+
+
+def analysis_command(mode, build_dir, path, entry):
+    if mode == "tidy":
+        return ["clang-tidy-16", "--quiet", "-p", build_dir, path]
+    arguments = shlex.split(entry["command"])
+    if os.path.basename(arguments[0]) == "ccache":
+        arguments = arguments[1:]
+    cut = arguments.index("-o")
+    del arguments[cut : cut + 2]
+    arguments.remove("-c")
+    return arguments + ["-fsyntax-only", "-w", "-Wthread-safety", "-Werror=thread-safety"]
+
+
+def run(mode, build_dir, path, commands):
+    entry = commands.get(os.path.realpath(path))
+    if entry is None:
+        return f"{path}: not part of the build\n" if mode == "tidy" and not optional(path) else ""
+    done = subprocess.run(
+        analysis_command(mode, build_dir, path, entry),
+        cwd=entry["directory"] if mode == "thread-safety" else None,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return (done.stdout + done.stderr) if done.returncode else ""
+
+
+def optional(path):
+    """CUDA sources and sources of switched-off parts are built elsewhere."""
+    return path.startswith(("gpu/cuda/", "gpu/worker/"))
+
+
+def main():
+    if len(sys.argv) < 3 or sys.argv[1] not in ("thread-safety", "tidy"):
+        print(__doc__, file=sys.stderr)
+        return 2
+    mode, build_dir, paths = sys.argv[1], sys.argv[2], sys.argv[3:]
+    commands = compile_commands(build_dir)
+    found = False
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for output in pool.map(lambda path: run(mode, build_dir, path, commands), paths):
+            if output:
+                found = True
+                print(output, end="")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

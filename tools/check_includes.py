@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""Checks that includes point the way that ARCHITECTURE.md says, and that gRPC stays behind its two doors."""
+
+import re
+import subprocess
+import sys
+
+# A folder may include itself and these; the longest prefix decides.
+ALLOWED = {
+    "display/sync": [],
+    "display/api": ["display/sync"],
+    "display/geometry": ["display/api"],
+    "display/usb": ["display/api", "display/sync"],
+    "display/emulator": ["display/api", "display/sync", "display/usb", "display/geometry",
+                         "display/drivers/voxlink/protocol", "display/drivers/voxlink/decoder",
+                         "display/drivers/voxlink/crc32c"],
+    "display/drivers": ["display/api", "display/sync", "display/usb", "display/geometry"],
+    # The one driver whose device is not on a bus: it brings its model and carrier along.
+    "display/drivers/simulated": ["display"],
+    "gpu": ["display/api", "display/geometry", "display/sync"],
+    "daemon": ["gpu", "display", "voxeld/v1", "daemon"],
+    "daemon/scene": ["gpu", "display/api", "display/sync"],
+    "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
+    "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
+    "tools": ["client", "display/geometry", "display/api", "display/sync", "gpu", "voxeld/v1", "tools"],
+    "client": ["voxeld/v1"],
+    "tests": ["daemon", "gpu", "display", "voxeld/v1", "tools", "client"],
+}
+
+# The only places that may include gRPC's headers: one on each side of the wire. No header does.
+GRPC = ("daemon/services/", "tools/voxelctl/connection", "client/cpp/")
+GRPC_TESTS = ("tests/daemon/services/", "tests/e2e/", "tests/tools/", "tests/integration/")
+PROTOBUF_FREE = ("gpu/", "display/", "daemon/scene/", "daemon/core/", "daemon/pipeline/", "daemon/config/")
+
+INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^">]+)[">]')
+
+
+def rule_of(path):
+    best = max((f for f in ALLOWED if path.startswith(f + "/")), key=len, default=None)
+    return best
+
+
+def main():
+    files = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard",
+         "*.cc", "*.h", "*.cu", "*.cuh"],
+        capture_output=True, text=True, check=True).stdout.split()
+    wrong = []
+    for path in files:
+        folder = rule_of(path)
+        if folder is None:
+            wrong.append(f"{path}: lies in no folder that has a rule")
+            continue
+        with open(path, encoding="utf-8") as file:
+            lines = file.readlines()
+        for number, line in enumerate(lines, 1):
+            match = INCLUDE.match(line)
+            if not match:
+                continue
+            kind, target = match.groups()
+            where = f"{path}:{number}"
+            if target.startswith(("grpc/", "grpcpp/", "grpc++/")) or target.endswith(".grpc.pb.h"):
+                if path.endswith(".h") and not path.startswith("tests/"):
+                    wrong.append(f"{where}: a header includes gRPC's {target}")
+                elif not path.startswith(GRPC + GRPC_TESTS):
+                    wrong.append(f"{where}: only {', '.join(GRPC)} may include gRPC's headers")
+                continue
+            if target.startswith("google/protobuf/") and path.startswith(PROTOBUF_FREE):
+                wrong.append(f"{where}: {folder} knows no protobuf")
+            if kind != '"':
+                continue
+            if not re.match(r"(display|gpu|daemon|tools|client|tests|voxeld)/", target):
+                wrong.append(f'{where}: "{target}" is not written from the repository root')
+                continue
+            if target.startswith("tests/") and not path.startswith("tests/"):
+                wrong.append(f"{where}: product code includes a test's header")
+            ok = target.startswith(folder + "/") or any(
+                target.startswith(a) for a in ALLOWED[folder]) or path.startswith("tests/")
+            if not ok:
+                wrong.append(f"{where}: {folder} must not include {target}")
+    print(f"include directions: {len(files)} files, {len(wrong)} wrong")
+    for line in wrong:
+        print(line, file=sys.stderr)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
