@@ -1,0 +1,47 @@
+// Words of the core and of the displays as words of the wire, and back. The way back is for clients
+// and for requests: it checks.
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "daemon/core/core.h"
+#include "daemon/scene/operation.h"
+#include "display/api/display.h"
+#include "voxeld/v1/display.pb.h"
+#include "voxeld/v1/scene.pb.h"
+#include "voxeld/v1/types.pb.h"
+
+namespace voxeld::daemon::wire {
+
+v1::Reason ToWire(Reason reason);
+v1::BlendMode ToWire(gpu::BlendMode blend);
+v1::Evidence ToWire(display::Evidence evidence);
+v1::NotShown::Why ToWire(CommitOutcome::NotShown why);
+v1::DisplayState ToWire(display::DisplayState state);
+v1::PixelFormat ToWire(display::PixelFormat format);
+v1::TestPattern ToWire(TestPattern pattern);
+v1::VolumeHeader::Source ToWire(display::DecodedVolume::Source source);
+
+void ToWire(const display::Vec3& in, v1::Vec3* out);
+void ToWire(const gpu::Affine& in, v1::Affine* out);  // always 12 values
+void ToWire(const display::Geometry& in, v1::Geometry* out);
+void ToWire(const display::FrameLayout& in, v1::FrameLayout* out);
+void ToWire(const ViewOptions& in, v1::View* out);
+
+// InvalidArgument for values that are no word of theirs. Whether a geometry holds together is not
+// checked here (display/geometry does).
+absl::StatusOr<Reason> FromWire(v1::Reason reason);
+absl::StatusOr<gpu::BlendMode> FromWire(v1::BlendMode blend);
+absl::StatusOr<display::Evidence> FromWire(v1::Evidence evidence);
+absl::StatusOr<CommitOutcome::NotShown> FromWire(v1::NotShown::Why why);
+absl::StatusOr<display::DisplayState> FromWire(v1::DisplayState state);
+absl::StatusOr<display::PixelFormat> FromWire(v1::PixelFormat format);
+absl::StatusOr<TestPattern> FromWire(v1::TestPattern pattern);
+absl::StatusOr<display::DecodedVolume::Source> FromWire(v1::VolumeHeader::Source source);
+
+display::Vec3 FromWire(const v1::Vec3& in);
+absl::StatusOr<display::Geometry> FromWire(const v1::Geometry& in);
+absl::StatusOr<display::FrameLayout> FromWire(const v1::FrameLayout& in);
+absl::StatusOr<ViewOptions> FromWire(const v1::View& in);
+absl::StatusOr<DisplayUpdate> FromWire(const v1::UpdateDisplayRequest& in);
+
+}  // namespace voxeld::daemon::wire

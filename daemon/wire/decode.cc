@@ -1,0 +1,182 @@
+#include "daemon/wire/decode.h"
+
+#include <google/protobuf/arena.h>
+
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/wire/check.h"
+#include "daemon/wire/operations.h"
+#include "daemon/wire/slice_stream.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+constexpr size_t kClientNameBytes = 128;
+constexpr int64_t kGreatestLingerNs = 3600 * sync::kSecond;
+
+absl::Status OpenError(const Fault& fault) {
+  const std::string text = absl::StrCat(fault.field, " ", fault.message);
+  return fault.reason == Reason::kUnimplemented ? absl::UnimplementedError(text)
+                                                : absl::InvalidArgumentError(text);
+}
+
+MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, OpenOptions* out) {
+  switch (in.on_disconnect()) {
+    case v1::DISCONNECT_POLICY_UNSPECIFIED:
+    case v1::DISCONNECT_POLICY_CLEAR:
+      out->on_disconnect = DisconnectPolicy::kClear;
+      break;
+    case v1::DISCONNECT_POLICY_LINGER:
+      out->on_disconnect = DisconnectPolicy::kLinger;
+      break;
+    case v1::DISCONNECT_POLICY_KEEP:
+      out->on_disconnect = DisconnectPolicy::kKeep;
+      break;
+    default:
+      return UnknownEnum(
+          FieldPath(path, "on_disconnect"), in.on_disconnect(),
+          "DISCONNECT_POLICY_CLEAR, DISCONNECT_POLICY_LINGER, DISCONNECT_POLICY_KEEP");
+  }
+  if (in.linger_ns() < 0 || in.linger_ns() > kGreatestLingerNs) {
+    return Fault{
+        FieldPath(path, "linger_ns").ToString(), Reason::kInvalidValue,
+        absl::StrCat("is ", in.linger_ns(), "; give 0 to ", kGreatestLingerNs, " (1 hour)")};
+  }
+  if (in.linger_ns() != 0 && out->on_disconnect != DisconnectPolicy::kLinger) {
+    return Fault{FieldPath(path, "linger_ns").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.linger_ns(),
+                              "; it goes with on_disconnect = DISCONNECT_POLICY_LINGER only")};
+  }
+  out->linger_ns = in.linger_ns();
+  return {};
+}
+
+MaybeFault CheckFlow(const FieldPath& path, const v1::Open& in) {
+  switch (in.flow()) {
+    case v1::FLOW_POLICY_UNSPECIFIED:
+    case v1::FLOW_POLICY_RELIABLE:
+      break;
+    case v1::FLOW_POLICY_LATEST:
+    case v1::FLOW_POLICY_DROP_OLDEST:
+      return Unimplemented(FieldPath(path, "flow"),
+                           "every frame waits its turn; use FLOW_POLICY_RELIABLE");
+    default:
+      return UnknownEnum(FieldPath(path, "flow"), in.flow(), "FLOW_POLICY_RELIABLE");
+  }
+  if (in.drop_oldest_frames() == 0) return {};
+  return Fault{FieldPath(path, "drop_oldest_frames").ToString(), Reason::kInvalidValue,
+               absl::StrCat("is ", in.drop_oldest_frames(),
+                            "; it goes with flow = FLOW_POLICY_DROP_OLDEST only")};
+}
+
+MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, OpenOptions* out) {
+  if (auto fault = CheckLabel(FieldPath(path, "client_name"), in.client_name(), kClientNameBytes)) {
+    return fault;
+  }
+  if (auto fault = ToPolicy(path, in, out)) return fault;
+  if (!in.resume_token().empty()) {
+    return Unimplemented(FieldPath(path, "resume_token"),
+                         "every stream is a session of its own; leave it empty");
+  }
+  if (auto fault = CheckFlow(path, in)) return fault;
+  out->client_name = in.client_name();
+  out->strict = in.strict();
+  out->no_outcomes = in.no_outcomes();
+  return {};
+}
+
+Decoded Failed(absl::Status status) {
+  Decoded failed;
+  failed.status = std::move(status);
+  return failed;
+}
+
+// Numbers the request and takes its operation. An Open has been dealt with.
+void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits& limits,
+          uint64_t previous_sequence, Decoded* out) {
+  out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
+  if (out->sequence <= previous_sequence) {
+    const std::string field = FieldPath(path, "sequence").ToString();
+    out->issues.push_back(
+        {request.sequence(),
+         {},
+         {},
+         field,
+         Reason::kOutOfOrder,
+         absl::StrCat(field, " is ", request.sequence(), " after ", previous_sequence,
+                      "; numbers ascend, or are 0 to have the server count")});
+    out->sequence = previous_sequence;
+    if (request.op_case() != v1::StreamRequest::kCommit) return;
+  }
+  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->issues});
+}
+
+}  // namespace
+
+absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open) {
+  OpenOptions options;
+  if (auto fault = ToOpen(FieldPath("open"), open, &options)) return OpenError(*fault);
+  return options;
+}
+
+Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
+                            uint64_t previous_sequence) {
+  Decoded out;
+  if (request.op_case() == v1::StreamRequest::kOpen) {
+    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open());
+    if (!open.ok()) return Failed(open.status());
+    out.open = *std::move(open);
+    out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
+    return out;
+  }
+  Take(FieldPath(""), request, limits, previous_sequence, &out);
+  return out;
+}
+
+Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
+                            uint64_t previous_sequence) {
+  uint64_t size = 0;
+  for (const std::string_view slice : slices) size += slice.size();
+  if (size > limits.max_message_bytes) {
+    return Failed(absl::ResourceExhaustedError(
+        absl::StrCat("a message of ", size, " bytes; max_message_bytes allows ",
+                     limits.max_message_bytes, ": send more messages that are smaller")));
+  }
+  google::protobuf::Arena arena;
+  auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
+  SliceStream stream(slices);
+  if (!request->ParseFromZeroCopyStream(&stream)) {
+    return Failed(absl::InvalidArgumentError(absl::StrCat(
+        "a message of ", size,
+        " bytes is not a voxeld.v1.StreamRequest: malformed protobuf, or text that is not UTF-8")));
+  }
+  return DecodeStreamRequest(*request, limits, previous_sequence);
+}
+
+Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits) {
+  Decoded out;
+  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open());
+  if (!open.ok()) return Failed(open.status());
+  if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {
+    open->on_disconnect = DisconnectPolicy::kKeep;
+  }
+  open->no_outcomes = true;  // the answer has no place for them
+  for (int i = 0; i < request.operations_size(); ++i) {
+    const v1::StreamRequest& operation = request.operations(i);
+    const FieldPath path("operations", i);
+    if (operation.has_open() || operation.has_commit()) {
+      return Failed(absl::InvalidArgumentError(
+          absl::StrCat(FieldPath(path, operation.has_open() ? "open" : "commit").ToString(),
+                       " is set; an update is opened by its own field and committed by itself")));
+    }
+    Take(path, operation, limits, out.sequence, &out);
+  }
+  out.open = *std::move(open);
+  out.operations.push_back({++out.sequence, Commit{}});
+  return out;
+}
+
+}  // namespace voxeld::daemon::wire

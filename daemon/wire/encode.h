@@ -1,0 +1,35 @@
+// What the core says as messages of the wire. Reentrant.
+#pragma once
+
+#include "daemon/core/core.h"
+
+namespace voxeld::v1 {
+class ClearLayerResponse;
+class DisplayDescription;
+class EntityInfo;
+class EntityKey;
+class Issue;
+class Limits;
+class ListEntitiesResponse;
+class Receipt;
+class Stats;
+class VolumeHeader;
+}  // namespace voxeld::v1
+
+namespace voxeld::daemon::wire {
+
+void Encode(const Issue& in, v1::Issue* out);
+void Encode(const Receipt& in, v1::Receipt* out);
+void Encode(const Limits& in, v1::Limits* out);
+void Encode(const EntityKey& in, v1::EntityKey* out);
+void Encode(const EntityInfo& in, v1::EntityInfo* out);
+void Encode(const EntityPage& in, v1::ListEntitiesResponse* out);
+void Encode(const Cleared& in, v1::ClearLayerResponse* out);
+void Encode(const Stats& in, v1::Stats* out);
+void Encode(const DisplayDescription& in, v1::DisplayDescription* out);
+
+// The header of a captured volume; its slices follow as they are.
+void Encode(const DisplayDescription& display, const display::DecodedVolume& volume,
+            v1::VolumeHeader* out);
+
+}  // namespace voxeld::daemon::wire

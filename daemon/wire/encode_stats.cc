@@ -1,0 +1,65 @@
+#include "daemon/wire/convert.h"
+#include "daemon/wire/encode.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+void EncodeLatency(const LatencyStats& in, v1::Latency* out) {
+  out->set_count(in.count);
+  out->set_p50_ns(in.p50_ns);
+  out->set_p99_ns(in.p99_ns);
+  out->set_max_ns(in.max_ns);
+}
+
+void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
+  out->set_name(in.name);
+  out->set_state(ToWire(in.state));
+  out->set_engine(in.engine);
+  out->set_engine_device(in.engine_device);
+  out->set_engine_reason(in.engine_reason);
+  out->set_lit_voxels(in.lit_voxels);
+  out->set_volumes_drawn(in.volumes_drawn);
+  out->set_volumes_presented(in.volumes_presented);
+  out->set_volumes_replaced(in.volumes_replaced);
+  out->set_volumes_lost(in.volumes_lost);
+  out->set_volumes_per_second(in.volumes_per_second);
+  out->set_bytes_out(in.bytes_out);
+  out->set_slices_sent(in.slices_sent);
+  out->set_slices_resent(in.slices_resent);
+  out->set_underruns(in.underruns);
+  out->set_attaches(in.attaches);
+  EncodeLatency(in.commit_to_last_byte, out->mutable_commit_to_last_byte());
+  EncodeLatency(in.commit_to_presented, out->mutable_commit_to_presented());
+  EncodeLatency(in.assemble, out->mutable_assemble());
+  EncodeLatency(in.slice, out->mutable_slice());
+  out->set_commits_owed(in.commits_owed);
+  out->set_commits_presented(in.commits_presented);
+  out->set_commits_unchanged(in.commits_unchanged);
+  out->set_commits_superseded(in.commits_superseded);
+  out->set_commits_lost(in.commits_lost);
+  out->set_commits_not_shown(in.commits_not_shown);
+  out->set_commits_pending(in.commits_pending);
+}
+
+}  // namespace
+
+void Encode(const Stats& in, v1::Stats* out) {
+  out->set_time_ns(in.time_ns);
+  out->set_version(in.version);
+  out->set_uptime_ns(in.uptime_ns);
+  out->set_sessions(in.sessions);
+  out->set_owners(in.owners);
+  out->set_layers(in.layers);
+  out->set_entities(in.entities);
+  out->set_objects(in.objects);
+  out->set_scene_bytes(in.scene_bytes);
+  out->set_commits_accepted(in.commits_accepted);
+  out->set_commits_refused(in.commits_refused);
+  out->set_operations_applied(in.operations_applied);
+  out->set_operations_refused(in.operations_refused);
+  out->set_bytes_in(in.bytes_in);
+  out->set_outcomes_undelivered(in.outcomes_undelivered);
+  for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
+}
+
+}  // namespace voxeld::daemon::wire

@@ -1,0 +1,323 @@
+#include "daemon/wire/operations.h"
+
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/wire/primitive.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+constexpr uint32_t kGreatestPriority = 126;
+constexpr uint32_t kGreatestOpacity = 255;
+constexpr size_t kLabelBytes = 256;
+
+MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& limits,
+                    EntityData* out) {
+  if (in.priority() > kGreatestPriority) {
+    return Fault{FieldPath(path, "priority").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.priority(), "; give 0 to ", kGreatestPriority)};
+  }
+  if (in.lifetime_ns() < 0) {
+    return Fault{FieldPath(path, "lifetime_ns").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.lifetime_ns(),
+                              "; give nanoseconds greater than 0, or 0 for an entity that stays")};
+  }
+  if (auto fault = CheckLabel(FieldPath(path, "label"), in.label(), kLabelBytes)) return fault;
+  if (auto fault = ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform)) {
+    return fault;
+  }
+  if (auto fault = ToContent(FieldPath(path, "primitive"), in.primitive(), limits, &out->content)) {
+    return fault;
+  }
+  out->priority = in.priority();
+  out->erase = in.erase();
+  out->lifetime_ns = in.lifetime_ns();
+  out->label = in.label();
+  return {};
+}
+
+MaybeFault To(const FieldPath& path, const v1::Upsert& in, const Limits& limits, Upsert* out) {
+  if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
+    return fault;
+  }
+  if (auto fault = CheckName(FieldPath(path, "id"), in.id(), limits.max_id_bytes)) return fault;
+  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), limits, &out->entity)) {
+    return fault;
+  }
+  out->layer = in.layer();
+  out->id = in.id();
+  return {};
+}
+
+MaybeFault To(const FieldPath& path, const v1::Delete& in, const Limits& limits, Delete* out) {
+  switch (in.what_case()) {
+    case v1::Delete::kId:
+      out->what = Delete::What::kId;
+      out->id_or_prefix = in.id();
+      if (auto fault = CheckName(FieldPath(path, "id"), in.id(), limits.max_id_bytes)) {
+        return fault;
+      }
+      break;
+    case v1::Delete::kPrefix:
+      out->what = Delete::What::kPrefix;
+      out->id_or_prefix = in.prefix();
+      if (auto fault = CheckName(FieldPath(path, "prefix"), in.prefix(), limits.max_id_bytes)) {
+        return fault;
+      }
+      break;
+    case v1::Delete::kAllOfLayer:
+      out->what = Delete::What::kAllOfLayer;
+      if (!in.all_of_layer()) {
+        return Fault{FieldPath(path, "all_of_layer").ToString(), Reason::kInvalidValue,
+                     "is false; set it to true, or leave it out"};
+      }
+      break;
+    case v1::Delete::kAllMine:
+      out->what = Delete::What::kAllMine;
+      if (!in.all_mine()) {
+        return Fault{FieldPath(path, "all_mine").ToString(), Reason::kInvalidValue,
+                     "is false; set it to true, or leave it out"};
+      }
+      break;
+    default:
+      return Fault{FieldPath(path, "what").ToString(), Reason::kInvalidValue,
+                   "is not set; give one of id, prefix, all_of_layer, all_mine"};
+  }
+  if (out->what == Delete::What::kAllMine) {
+    if (!in.layer().empty()) {
+      return Fault{FieldPath(path, "layer").ToString(), Reason::kInvalidValue,
+                   absl::StrCat("is ", Quote(in.layer()),
+                                "; all_mine is about every layer: leave it empty")};
+    }
+  } else if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
+    return fault;
+  }
+  out->layer = in.layer();
+  out->guard_sequence = in.guard_sequence();
+  return {};
+}
+
+MaybeFault To(const FieldPath& path, const v1::SetTransform& in, const Limits& limits,
+              SetTransform* out) {
+  if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
+    return fault;
+  }
+  if (auto fault = CheckName(FieldPath(path, "id"), in.id(), limits.max_id_bytes)) return fault;
+  out->layer = in.layer();
+  out->id = in.id();
+  return ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform);
+}
+
+MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& limits,
+              LayerState* out) {
+  if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
+    return fault;
+  }
+  if (in.opacity() > kGreatestOpacity) {
+    return Fault{FieldPath(path, "opacity").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.opacity(), "; give 0 to ", kGreatestOpacity)};
+  }
+  switch (in.blend()) {
+    case v1::BLEND_MODE_UNSPECIFIED:
+      break;
+    case v1::BLEND_MODE_OVER:
+      out->blend = gpu::BlendMode::kOver;
+      break;
+    case v1::BLEND_MODE_ADD:
+      out->blend = gpu::BlendMode::kAdd;
+      break;
+    case v1::BLEND_MODE_ERASE:
+      out->blend = gpu::BlendMode::kErase;
+      break;
+    default:
+      return UnknownEnum(FieldPath(path, "blend"), in.blend(),
+                         "BLEND_MODE_OVER, BLEND_MODE_ADD, BLEND_MODE_ERASE");
+  }
+  if (in.has_transform()) {
+    gpu::Affine transform;
+    if (auto fault = ToAffine(FieldPath(path, "transform"), in.transform(), &transform)) {
+      return fault;
+    }
+    out->transform = transform;
+  }
+  if (in.has_clip()) {
+    return Unimplemented(FieldPath(path, "clip"), "layers are drawn whole; leave it unset");
+  }
+  if (in.has_region()) {
+    return Unimplemented(FieldPath(path, "region"), "layers are drawn whole; leave it unset");
+  }
+  if (!in.mask_layer().empty()) {
+    return Unimplemented(FieldPath(path, "mask_layer"), "layers are drawn whole; leave it empty");
+  }
+  out->layer = in.layer();
+  if (in.has_visible()) out->visible = in.visible();
+  if (in.has_opacity()) out->opacity = in.opacity();
+  if (in.has_order()) out->order = in.order();
+  return {};
+}
+
+MaybeFault To(const FieldPath& path, const v1::FrameBegin& in, const Limits& limits,
+              FrameBegin* out) {
+  out->layer = in.layer();
+  return CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes);
+}
+
+MaybeFault To(const FieldPath& path, const v1::FrameEnd& in, const Limits& limits, FrameEnd* out) {
+  out->layer = in.layer();
+  return CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes);
+}
+
+MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& limits,
+              DefineObject* out) {
+  if (auto fault = CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes)) {
+    return fault;
+  }
+  const FieldPath definition(path, "definition");
+  if (!in.has_definition()) {
+    return Fault{definition.ToString(), Reason::kInvalidValue,
+                 "is not set; give the parts that the object consists of"};
+  }
+  const auto& parts = in.definition().parts();
+  if (static_cast<uint32_t>(parts.size()) > limits.max_parts_per_object) {
+    return Fault{FieldPath(definition, "parts").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("has ", parts.size(), " parts; max_parts_per_object allows ",
+                              limits.max_parts_per_object)};
+  }
+  auto data = std::make_shared<ObjectData>();
+  data->parts.resize(static_cast<size_t>(parts.size()));
+  for (int i = 0; i < parts.size(); ++i) {
+    const FieldPath part(definition, "parts", i);
+    ObjectPart& to = data->parts[static_cast<size_t>(i)];
+    if (auto fault = ToAffine(FieldPath(part, "transform"), parts[i].transform(), &to.transform)) {
+      return fault;
+    }
+    if (auto fault =
+            ToContent(FieldPath(part, "primitive"), parts[i].primitive(), limits, &to.content)) {
+      return fault;
+    }
+  }
+  out->object = in.object();
+  out->data = std::move(data);
+  return {};
+}
+
+MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& limits,
+              DeleteObject* out) {
+  out->object = in.object();
+  out->cascade = in.cascade();
+  return CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes);
+}
+
+// What a Commit asks for that this version has not; the commit itself is carried out.
+MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
+  *out = {in.frame_id(), in.send_time_ns(), in.client_drops()};
+  if (in.present_at_ns() != 0) {
+    return Unimplemented(FieldPath(path, "present_at_ns"),
+                         "a commit is applied when it arrives; leave it 0");
+  }
+  if (in.must_show()) {
+    return Unimplemented(FieldPath(path, "must_show"),
+                         "a newer commit may supersede this one; leave it false");
+  }
+  if (in.durable()) {
+    return Unimplemented(FieldPath(path, "durable"),
+                         "the scene is kept in memory only; leave it false");
+  }
+  return {};
+}
+
+void AddIssue(Fault fault, uint64_t sequence, std::string layer, std::string id, const Sinks& out) {
+  std::string message = absl::StrCat(fault.field, " ", fault.message);
+  out.issues->push_back({sequence, std::move(layer), std::move(id), std::move(fault.field),
+                         fault.reason, std::move(message)});
+}
+
+template <typename In>
+std::string LayerOf(const In& in) {
+  if constexpr (requires { in.layer(); }) return in.layer();
+  return {};
+}
+
+template <typename In>
+std::string IdOf(const In& in) {
+  if constexpr (requires { in.id(); }) return in.id();
+  if constexpr (requires { in.object(); }) return in.object();
+  return {};
+}
+
+template <typename Out, typename In>
+void Add(const FieldPath& path, const In& in, uint64_t sequence, const Limits& limits,
+         const Sinks& out) {
+  Out op;
+  if (auto fault = To(path, in, limits, &op)) {
+    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), out);
+    if (!std::is_same_v<Out, Commit>) return;
+  }
+  out.operations->push_back({sequence, std::move(op)});
+}
+
+void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence, const Limits& limits,
+              const Sinks& out) {
+  if (static_cast<uint32_t>(in.upserts_size()) > limits.max_operations_per_commit) {
+    const FieldPath upserts(path, "upserts");
+    AddIssue(
+        {upserts.ToString(), Reason::kQuotaExceeded,
+         absl::StrCat("has ", in.upserts_size(), " entities; max_operations_per_commit allows ",
+                      limits.max_operations_per_commit)},
+        sequence, {}, {}, out);
+    return;
+  }
+  out.operations->reserve(out.operations->size() + static_cast<size_t>(in.upserts_size()));
+  for (int i = 0; i < in.upserts_size(); ++i) {
+    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, limits, out);
+  }
+}
+
+}  // namespace
+
+void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
+                     const Limits& limits, const Sinks& out) {
+  switch (request.op_case()) {
+    case v1::StreamRequest::kUpsert:
+      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, limits, out);
+    case v1::StreamRequest::kDelete:
+      return Add<Delete>(FieldPath(path, "delete"), request.delete_(), sequence, limits, out);
+    case v1::StreamRequest::kSetTransform:
+      return Add<SetTransform>(FieldPath(path, "set_transform"), request.set_transform(), sequence,
+                               limits, out);
+    case v1::StreamRequest::kLayerState:
+      return Add<LayerState>(FieldPath(path, "layer_state"), request.layer_state(), sequence,
+                             limits, out);
+    case v1::StreamRequest::kFrameBegin:
+      return Add<FrameBegin>(FieldPath(path, "frame_begin"), request.frame_begin(), sequence,
+                             limits, out);
+    case v1::StreamRequest::kFrameEnd:
+      return Add<FrameEnd>(FieldPath(path, "frame_end"), request.frame_end(), sequence, limits,
+                           out);
+    case v1::StreamRequest::kCommit:
+      return Add<Commit>(FieldPath(path, "commit"), request.commit(), sequence, limits, out);
+    case v1::StreamRequest::kDefineObject:
+      return Add<DefineObject>(FieldPath(path, "define_object"), request.define_object(), sequence,
+                               limits, out);
+    case v1::StreamRequest::kDeleteObject:
+      return Add<DeleteObject>(FieldPath(path, "delete_object"), request.delete_object(), sequence,
+                               limits, out);
+    case v1::StreamRequest::kBatch:
+      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, limits, out);
+    case v1::StreamRequest::kOpen:
+    case v1::StreamRequest::OP_NOT_SET:
+      break;
+  }
+  AddIssue({FieldPath(path, "op").ToString(), Reason::kInvalidValue,
+            "is not set, or not known to this version of the server; give one of upsert, delete, "
+            "set_transform, layer_state, frame_begin, frame_end, commit, define_object, "
+            "delete_object, batch"},
+           sequence, {}, {}, out);
+}
+
+}  // namespace voxeld::daemon::wire

@@ -1,0 +1,24 @@
+// The operations of a StreamRequest, one by one.
+#pragma once
+
+#include <vector>
+
+#include "daemon/wire/check.h"
+
+namespace voxeld::v1 {
+class StreamRequest;
+}
+
+namespace voxeld::daemon::wire {
+
+struct Sinks {
+  std::vector<Operation>* operations;
+  std::vector<Issue>* issues;
+};
+
+// Appends what `request` asks for (anything but an Open) to `out`, under `sequence`. `path` is that
+// of the request itself.
+void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
+                     const Limits& limits, const Sinks& out);
+
+}  // namespace voxeld::daemon::wire

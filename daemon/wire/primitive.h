@@ -1,0 +1,15 @@
+// Primitives (voxeld.v1.Primitive) into content that the core keeps and the engine draws.
+#pragma once
+
+#include "daemon/wire/check.h"
+
+namespace voxeld::v1 {
+class Primitive;
+}
+
+namespace voxeld::daemon::wire {
+
+MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
+                     Content* out);
+
+}  // namespace voxeld::daemon::wire
