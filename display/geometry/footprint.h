@@ -1,25 +1,39 @@
-// Footprints: for every slice pixel the voxels that it stands for, with weights, as tables that an engine on
-// any machine reads alike.
+// Footprints: for every slice pixel the voxels that it stands for, with weights, as tables that an
+// engine on any machine reads alike.
 //
-// A footprint is a product: pixel (u, v) of slice s stands for all voxels o + i with o from the list of
-// (s, u) and i from the list of v, each with weight (wo·wi + 127) / 255. Coordinates add component-wise. A
-// planar stack's lists are (x, z) by y; a rotor's are columns (x, y) by z. So a table of a 192-slice
-// projector display with 200 million pixels has 175,000 outer entries.
+// A footprint is a product: pixel (u, v) of slice s stands for all voxels o + i with o from the
+// list of (s, u) and i from the list of v, each with weight (wo·wi + 127) / 255. Coordinates add
+// component-wise. A planar stack's lists are (x, z) by y or (x, y) by z; a rotor's are columns (x,
+// y) by z. So a table of a 192-slice projector display with 200 million pixels has 220,000 outer
+// entries.
 //
-// What every geometry guarantees, and tests prove: each voxel whose centre lies in the solid swept by the
-// pixels' rectangles is in at least one footprint with weight ≥ 128; each pixel whose centre lies in the
-// grid has that voxel in its footprint, so no pixel stays dark inside a lit solid.
+// What every geometry guarantees, and tests prove: each voxel whose centre lies in the solid swept
+// by the pixels' rectangles is in at least one footprint with weight ≥ 128; each pixel whose centre
+// lies in the grid has that voxel in its footprint, with weight ≥ 128, so no pixel stays dark
+// inside a lit solid.
 //
-// Decisions are in integers (positions in 2⁻¹⁶ voxel, directions in 2⁻³⁰), sines and cosines by integer
-// CORDIC: the same table on every machine.
+// Which voxels. Of a planar stack: those whose centre lies in the pixel's half-open rectangle and
+// in the half-open slab that the slice stands for. Of a rotor: those whose centre the pixel's
+// rectangle passes while the rotor turns through the slice's half-open interval; a panel passes a
+// voxel nearer to the axis than its plane never, one on the axis (when its plane contains the axis)
+// in every slice, any other twice a turn. And on each axis the voxel that holds the pixel's centre,
+// at the slice's own position or at the middle of its interval.
+//
+// Which weights. kMax: 255. kWeighted: a voxel between the positions (or middle angles) of two
+// neighbouring slices is in the footprints of both, weighted by its distance d from each:
+// ⌊255·(1 − d/spacing) + ½⌋, 0 left out; outside the outer positions of a stack 255, the slab's own
+// voxels only. The voxel that holds the pixel's centre has at least 128.
+//
+// Decisions are in integers (positions in 2⁻¹⁶ voxel, angles in 2⁻³² turn, directions in 2⁻³⁰),
+// sines, cosines and arc tangents by integer CORDIC: the same table on every machine.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/status/statusor.h"
 #include "display/api/geometry.h"
 #include "display/api/slice_frame.h"
 
@@ -31,54 +45,95 @@ struct FootprintEntry {
   bool operator==(const FootprintEntry&) const = default;
 };
 
-// Compressed rows: list r is entries[begin[r] .. begin[r+1]).
+// Compressed rows: list r is entries[begin[r] .. begin[r+1]), ascending by (z, y, x), each voxel
+// once.
 struct FootprintLists {
   std::vector<uint32_t> begin;
   std::vector<FootprintEntry> entries;
   std::span<const FootprintEntry> list(size_t r) const {
     return std::span(entries).subspan(begin[r], begin[r + 1] - begin[r]);
   }
+  bool operator==(const FootprintLists&) const = default;
 };
+
+enum class Axis : uint8_t { kX, kY, kZ };
 
 struct FootprintTable {
   int32_t slices = 0, width = 0, height = 0;
+  // Slices take the inner lists in turn: slice s those of set s % inner_sets. One set, but for a
+  // rotor whose panels differ along v: one a panel.
+  int32_t inner_sets = 1;
+  // The axis along which inner entries lie; their other coordinates are 0, and outer entries' is 0
+  // here.
+  Axis inner_axis = Axis::kZ;
   FootprintLists outer;  // slices·width lists; list (s, u) = s·width + u
-  FootprintLists inner;  // height lists
+  FootprintLists inner;  // inner_sets·height lists; list (set, v) = set·height + v
+
+  std::span<const FootprintEntry> Outer(int32_t s, int32_t u) const {
+    return outer.list(static_cast<size_t>(s) * static_cast<size_t>(width) + static_cast<size_t>(u));
+  }
+  std::span<const FootprintEntry> Inner(int32_t s, int32_t v) const {
+    return inner.list(static_cast<size_t>(s % inner_sets) * static_cast<size_t>(height) +
+                      static_cast<size_t>(v));
+  }
+  bool operator==(const FootprintTable&) const = default;
 };
 
-// A Geometry's slices, as FrameLayout counts them.
-int32_t SliceCount(const Geometry& geometry);
-
-// InvalidArgument with the field, its value and what would be right.
+// InvalidArgument with the first field that is wrong, its value and what would be right.
+// ValidateShape looks at the shape alone, which is what DefaultGrid needs; ValidateGeometry at
+// shape and grid. The limits are in display/geometry/limits.h.
+absl::Status ValidateShape(const Geometry& geometry);
 absl::Status ValidateGeometry(const Geometry& geometry);
 
-// The grid that suits a shape when none is stated: cubic or panel-pitch cells just around the swept solid.
+// A Geometry's slices, as FrameLayout counts them. The shape must be valid.
+int32_t SliceCount(const Geometry& geometry);
+
+// The grid that suits a shape when none is stated, just around the swept solid. The shape must be
+// valid; the grid may still be too large for ValidateGeometry.
+// - Planar: cells of the pixels' pitch, so across the slices a pixel is a voxel. Along the normal,
+// over
+//   the depth of all slabs: as many as slices if these are evenly spaced (within 10⁻⁶), else as
+//   many as the least spacing goes into the depth, 4096 at the most.
+// - Rotor: cells of the first panel's pitches (u for x and y, v for z); nx = ny even, over the
+// circle
+//   that the farthest corner describes; nz over the height of all panels.
 VoxelGrid DefaultGrid(const Geometry& geometry);
 
-// `geometry` must be valid. With kMax all weights are 255.
+// `geometry` must be valid.
 FootprintTable BuildFootprints(const Geometry& geometry, Sampling sampling);
 
-// The centre of pixel (u, v) of `slice` in display millimetres (a rotor's at the middle of its sweep).
+// The centre of pixel (u, v) of `slice` in display millimetres (a rotor's at the middle of its
+// sweep). `geometry` must be valid and the pixel one of its own. The grid plays no part.
 Vec3 PixelPosition(const Geometry& geometry, int32_t slice, int32_t u, int32_t v);
 
-// Which slices look at which tiles: conservative, proved by test. Tiles are boxes of tx·ty·tz voxels.
+// Which slices look at which tiles: a slice is named if and only if some pixel of it has a voxel of
+// the tile in its footprint. Tiles are boxes of tx·ty·tz voxels (each ≥ 1), tile (i, j, k) from
+// voxel (i·tx, j·ty, k·tz). Immutable, so thread-safe.
 class TileToSlices {
  public:
-  TileToSlices(const FootprintTable& table, const VoxelGrid& grid, int32_t tx, int32_t ty, int32_t tz);
-  // Slices, ascending, that may show a voxel of tile (i, j, k).
+  // Keeps nothing of its arguments.
+  TileToSlices(const FootprintTable& table, const VoxelGrid& grid, int32_t tx, int32_t ty,
+               int32_t tz);
+  // Slices, ascending, that may show a voxel of tile (i, j, k), which must lie in the grid.
   std::vector<int32_t> Slices(int32_t i, int32_t j, int32_t k) const;
   // True if some slice of [begin, end) may show a voxel of tile (i, j, k).
   bool Visible(int32_t i, int32_t j, int32_t k, int32_t begin, int32_t end) const;
 
  private:
-  // Distinct parts of tile coordinates seen from the outer lists (with their slices) and the inner lists.
-  struct OuterPart {
-    int32_t i, j, k;
-    std::vector<int32_t> slices;
+  // A tile's place on the plane of the outer axes, and along the inner one.
+  struct Place {
+    size_t outer, inner;
   };
+  Place PlaceOf(int32_t i, int32_t j, int32_t k) const;
+  bool SeenInner(int32_t slice, size_t inner) const;
+  std::span<const int32_t> OuterSlices(size_t outer) const;
+
   int32_t tiles_x_, tiles_y_, tiles_z_;
-  std::vector<OuterPart> outer_;
-  std::vector<std::vector<uint32_t>> by_tile_;  // a tile → indices into outer_
+  Axis inner_axis_;
+  int32_t inner_sets_;
+  std::vector<uint32_t> begin_;      // a place on the outer plane → its range of slices_
+  std::vector<int32_t> slices_;      // ascending within a place
+  std::vector<uint8_t> inner_seen_;  // set · tiles on the inner axis + place along it
 };
 
 }  // namespace voxeld::display

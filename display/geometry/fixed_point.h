@@ -1,0 +1,24 @@
+// Where millimetres become integers: once, by IEEE operations alone.
+#pragma once
+
+#include <cstdint>
+
+namespace voxeld::display {
+
+// A position in units of 2⁻¹⁶ voxel.
+using Fixed = int64_t;
+inline constexpr int kFixedBits = 16;
+inline constexpr Fixed kFixedOne = Fixed{1} << kFixedBits;
+inline constexpr Fixed kFixedHalf = kFixedOne / 2;
+
+// ⌊value + ½⌋. |value| < 2⁶².
+inline int64_t RoundHalfUp(double value) {
+  const double raised = value + 0.5;
+  const int64_t truncated = static_cast<int64_t>(raised);
+  return truncated - (raised < static_cast<double>(truncated) ? 1 : 0);
+}
+
+// A length or position in millimetres, in cells of `pitch_mm`.
+inline Fixed ToFixed(double mm, double pitch_mm) { return RoundHalfUp(mm / pitch_mm * 65536.0); }
+
+}  // namespace voxeld::display

@@ -1,0 +1,25 @@
+// What ValidateGeometry allows. Together they keep every integer of display/geometry within 64
+// bits.
+#pragma once
+
+#include <cstdint>
+
+namespace voxeld::display {
+
+inline constexpr int64_t kMaxPixelsPerAxis = 16384;  // width_px, height_px
+inline constexpr int64_t kMaxSliceSteps = 16384;     // positions_mm, slices_per_turn
+inline constexpr int64_t kMaxPanels = 16;
+inline constexpr int64_t kMaxCellsPerAxis = 16384;       // nx, ny, nz; coordinates fit 16 bits
+inline constexpr int64_t kMaxCells = int64_t{1} << 36;   // nx·ny·nz
+inline constexpr int64_t kMaxPixels = int64_t{1} << 32;  // slices·width·height
+// Entries of a footprint table as bounded before it is built: 8 bytes each.
+inline constexpr int64_t kMaxFootprintEntries = int64_t{1} << 28;
+inline constexpr double kMinPitchMm = 1e-4, kMaxPitchMm = 1e4;
+inline constexpr double kMaxPositionMm = 1e6;  // either side of the middle
+// A rotor's grid and panels lie within this many of the grid's smaller horizontal pitch of the
+// axis.
+inline constexpr int64_t kMaxRotorReach = 16384;
+// Neighbouring slices of a stack are at least this fraction of a voxel apart.
+inline constexpr double kMinSpacingVoxels = 1.0 / 1024;
+
+}  // namespace voxeld::display

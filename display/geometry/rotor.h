@@ -1,0 +1,28 @@
+// Rotors. Callers use display/geometry/footprint.h, where the contracts are.
+#pragma once
+
+#include <cstdint>
+
+#include "display/api/geometry.h"
+#include "display/api/slice_frame.h"
+#include "display/geometry/angle.h"
+#include "display/geometry/cells.h"
+#include "display/geometry/footprint.h"
+
+namespace voxeld::display {
+
+// The pictures' axes on a panel: u along its plane, measured from the foot of the perpendicular
+// from the axis; v along z.
+PixelRow PanelRowU(const Rotor& rotor, const Rotor::Panel& panel);
+PixelRow PanelRowV(const Rotor& rotor, const Rotor::Panel& panel);
+
+// Where u points at the middle of step `step` (0 to slices_per_turn − 1).
+Turn PanelTurn(const Rotor& rotor, const Rotor::Panel& panel, int32_t step);
+
+// The greatest distance from the axis of any point of any panel.
+double RadiusMm(const Rotor& rotor);
+
+FootprintTable BuildRotorFootprints(const Rotor& rotor, const VoxelGrid& grid, Sampling sampling);
+Vec3 RotorPixelPosition(const Rotor& rotor, int32_t slice, int32_t u, int32_t v);
+
+}  // namespace voxeld::display

@@ -1,0 +1,189 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "display/geometry/cells.h"
+#include "display/geometry/fixed_point.h"
+#include "display/geometry/footprint.h"
+#include "display/geometry/limits.h"
+#include "display/geometry/planar_stack.h"
+#include "display/geometry/rotor.h"
+
+namespace voxeld::display {
+namespace {
+
+// Keeps the first thing that is wrong.
+class Checker {
+ public:
+  bool ok() const { return status_.ok(); }
+  const absl::Status& status() const { return status_; }
+
+  template <typename Value>
+  void Require(bool holds, absl::string_view field, Value value, absl::string_view rule) {
+    if (ok() && !holds) {
+      status_ =
+          absl::InvalidArgumentError(absl::StrCat(field, " is ", value, ": it must be ", rule));
+    }
+  }
+  void Count(absl::string_view field, int64_t value, int64_t most) {
+    if (value < 1 || value > most) Require(false, field, value, absl::StrCat("from 1 to ", most));
+  }
+  // NaN is in no range.
+  void Number(absl::string_view field, double value, double least, double most) {
+    if (!(value >= least && value <= most)) {
+      Require(false, field, value, absl::StrCat("from ", least, " to ", most, " mm"));
+    }
+  }
+  void Pitch(absl::string_view field, double mm) { Number(field, mm, kMinPitchMm, kMaxPitchMm); }
+  void Position(absl::string_view field, double mm) {
+    Number(field, mm, -kMaxPositionMm, kMaxPositionMm);
+  }
+
+ private:
+  absl::Status status_;
+};
+
+void CheckPictures(Checker& check, int64_t slices, int64_t width, int64_t height) {
+  if (!check.ok()) return;
+  const int64_t pixels = slices * width * height;
+  check.Require(pixels <= kMaxPixels,
+                absl::StrCat("slices·width_px·height_px (", slices, "·", width, "·", height, ")"),
+                pixels, absl::StrCat("at most ", kMaxPixels, " pixels"));
+}
+
+void CheckStack(Checker& check, const PlanarStack& stack) {
+  check.Require(stack.normal == PlanarStack::Normal::kZ || stack.normal == PlanarStack::Normal::kY,
+                "normal", static_cast<int>(stack.normal), "kZ (0) or kY (1)");
+  check.Count("width_px", stack.width_px, kMaxPixelsPerAxis);
+  check.Count("height_px", stack.height_px, kMaxPixelsPerAxis);
+  check.Pitch("pitch_u_mm", stack.pitch_u_mm);
+  check.Pitch("pitch_v_mm", stack.pitch_v_mm);
+  const std::vector<double>& p = stack.positions_mm;
+  check.Count("the number of positions_mm", static_cast<int64_t>(p.size()), kMaxSliceSteps);
+  for (size_t s = 0; check.ok() && s < p.size(); ++s) {
+    const std::string field = absl::StrCat("positions_mm[", s, "]");
+    check.Position(field, p[s]);
+    if (s > 0) {
+      check.Require(p[s] > p[s - 1], field, p[s],
+                    absl::StrCat("above positions_mm[", s - 1, "], ", p[s - 1],
+                                 ": positions ascend strictly"));
+    }
+  }
+  if (p.size() == 1) check.Pitch("thickness_mm", stack.thickness_mm);
+  CheckPictures(check, static_cast<int64_t>(p.size()), stack.width_px, stack.height_px);
+}
+
+void CheckRotor(Checker& check, const Rotor& rotor) {
+  check.Count("slices_per_turn", rotor.slices_per_turn, kMaxSliceSteps);
+  check.Count("width_px", rotor.width_px, kMaxPixelsPerAxis);
+  check.Count("height_px", rotor.height_px, kMaxPixelsPerAxis);
+  check.Count("the number of panels", static_cast<int64_t>(rotor.panels.size()), kMaxPanels);
+  for (size_t p = 0; check.ok() && p < rotor.panels.size(); ++p) {
+    const Rotor::Panel& panel = rotor.panels[p];
+    const std::string name = absl::StrCat("panels[", p, "].");
+    check.Pitch(name + "pitch_u_mm", panel.pitch_u_mm);
+    check.Pitch(name + "pitch_v_mm", panel.pitch_v_mm);
+    check.Position(name + "eccentricity_mm", panel.eccentricity_mm);
+    check.Position(name + "shift_u_mm", panel.shift_u_mm);
+    check.Position(name + "shift_v_mm", panel.shift_v_mm);
+    check.Require(panel.phase_turns >= 0 && panel.phase_turns < 1, name + "phase_turns",
+                  panel.phase_turns, "at least 0 and below 1");
+  }
+  CheckPictures(check, rotor.slices_per_turn * static_cast<int64_t>(rotor.panels.size()),
+                rotor.width_px, rotor.height_px);
+}
+
+void CheckShape(Checker& check, const Geometry& geometry) {
+  if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
+    CheckStack(check, *stack);
+  } else {
+    CheckRotor(check, std::get<Rotor>(geometry.shape));
+  }
+}
+
+void CheckGrid(Checker& check, const VoxelGrid& grid) {
+  check.Count("grid.nx", grid.nx, kMaxCellsPerAxis);
+  check.Count("grid.ny", grid.ny, kMaxCellsPerAxis);
+  check.Count("grid.nz", grid.nz, kMaxCellsPerAxis);
+  check.Pitch("grid.pitch_mm.x", grid.pitch_mm.x);
+  check.Pitch("grid.pitch_mm.y", grid.pitch_mm.y);
+  check.Pitch("grid.pitch_mm.z", grid.pitch_mm.z);
+  check.Position("grid.origin_mm.x", grid.origin_mm.x);
+  check.Position("grid.origin_mm.y", grid.origin_mm.y);
+  check.Position("grid.origin_mm.z", grid.origin_mm.z);
+  if (!check.ok()) return;
+  const int64_t cells = int64_t{grid.nx} * grid.ny * grid.nz;
+  check.Require(cells <= kMaxCells,
+                absl::StrCat("grid.nx·ny·nz (", grid.nx, "·", grid.ny, "·", grid.nz, ")"), cells,
+                absl::StrCat("at most ", kMaxCells, " voxels"));
+}
+
+void CheckTable(Checker& check, int64_t entries) {
+  check.Require(entries <= kMaxFootprintEntries, "the bound on the footprint table", entries,
+                absl::StrCat("at most ", kMaxFootprintEntries,
+                             " entries: use a coarser grid, or fewer slices or columns of pixels"));
+}
+
+void CheckStackInGrid(Checker& check, const PlanarStack& stack, const VoxelGrid& grid) {
+  const bool flat = stack.normal == PlanarStack::Normal::kZ;
+  const double pitch = flat ? grid.pitch_mm.z : grid.pitch_mm.y;
+  const std::vector<double>& p = stack.positions_mm;
+  for (size_t s = 1; check.ok() && s < p.size(); ++s) {
+    check.Require((p[s] - p[s - 1]) / pitch >= kMinSpacingVoxels,
+                  absl::StrCat("positions_mm[", s, "] − positions_mm[", s - 1, "]"),
+                  p[s] - p[s - 1],
+                  absl::StrCat("at least 1/1024 of the grid's pitch along the normal, ",
+                               pitch * kMinSpacingVoxels, " mm"));
+  }
+  // A column of voxels is in one list of each slice that sees it; a depth in two slices at the
+  // most. Each pixel and each slice may add the one that holds its centre.
+  const int64_t slices = static_cast<int64_t>(p.size());
+  const int64_t depths = 2 * int64_t{flat ? grid.nz : grid.ny} + slices;
+  CheckTable(check, (int64_t{grid.nx} + stack.width_px) * depths);
+}
+
+void CheckRotorInGrid(Checker& check, const Rotor& rotor, const VoxelGrid& grid) {
+  const double reach = kMaxRotorReach * std::min(grid.pitch_mm.x, grid.pitch_mm.y);
+  const auto within = [&](absl::string_view field, double mm) {
+    check.Require(std::abs(mm) <= reach, field, mm,
+                  absl::StrCat("within ", reach, " mm of the axis, ", kMaxRotorReach,
+                               " times the grid's smaller horizontal pitch"));
+  };
+  within("grid.origin_mm.x", grid.origin_mm.x);
+  within("grid.origin_mm.y", grid.origin_mm.y);
+  within("the grid's far end along x", grid.origin_mm.x + grid.nx * grid.pitch_mm.x);
+  within("the grid's far end along y", grid.origin_mm.y + grid.ny * grid.pitch_mm.y);
+  within("the panels' greatest distance from the axis", RadiusMm(rotor));
+  // A panel passes a column twice a turn, each pass is in two slices at the most; each pixel may
+  // add the column that holds its centre, and a column on the axis is in every slice.
+  const int64_t panels = static_cast<int64_t>(rotor.panels.size());
+  CheckTable(check, panels * (4 * int64_t{grid.nx} * grid.ny +
+                              int64_t{rotor.slices_per_turn} * (int64_t{rotor.width_px} + 1)));
+}
+
+}  // namespace
+
+absl::Status ValidateShape(const Geometry& geometry) {
+  Checker check;
+  CheckShape(check, geometry);
+  return check.status();
+}
+
+absl::Status ValidateGeometry(const Geometry& geometry) {
+  Checker check;
+  CheckShape(check, geometry);
+  CheckGrid(check, geometry.grid);
+  if (!check.ok()) return check.status();
+  if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
+    CheckStackInGrid(check, *stack, geometry.grid);
+  } else {
+    CheckRotorInGrid(check, std::get<Rotor>(geometry.shape), geometry.grid);
+  }
+  return check.status();
+}
+
+}  // namespace voxeld::display
