@@ -1,0 +1,171 @@
+#include "daemon/address/address.h"
+
+#include <netdb.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr std::string_view kUnixPrefix = "unix:";
+constexpr size_t kPathBytes = sizeof(sockaddr_un::sun_path) - 1;
+
+absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
+
+absl::Status Wrong(std::string_view text, absl::string_view why) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("the address \"", View(text), "\" ", why,
+                   "; give HOST:PORT or unix:PATH, such as "
+                   "127.0.0.1:50551 or unix:/run/voxeld/voxeld.sock"));
+}
+
+class Socket {
+ public:
+  explicit Socket(int fd) : fd_(fd) {}
+  ~Socket() {
+    if (fd_ >= 0) close(fd_);
+  }
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  const int fd_;
+};
+
+absl::StatusOr<Address> ParseUnix(std::string_view text) {
+  Address address;
+  address.unix_socket = true;
+  std::string_view path = text.substr(kUnixPrefix.size());
+  if (path.starts_with("//")) path.remove_prefix(2);  // unix:///path
+  if (path.empty() || path.front() != '/') return Wrong(text, "has no absolute path");
+  if (path.size() > kPathBytes) {
+    return Wrong(text, absl::StrCat("has a path of ", path.size(), " bytes, and ", kPathBytes,
+                                    " is the most that a unix socket can have"));
+  }
+  if (path.find('\0') != std::string_view::npos) return Wrong(text, "has a zero byte");
+  address.path = std::string(path);
+  return address;
+}
+
+absl::Status PrepareUnix(const Address& address) {
+  const std::filesystem::path folder = std::filesystem::path(address.path).parent_path();
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) {
+    std::filesystem::create_directories(folder, error);
+    if (!error) {
+      std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
+    }
+    if (error) {
+      return absl::ErrnoToStatus(
+          error.value(), absl::StrCat("the folder ", folder.string(), " of ", address.ToString(),
+                                      " cannot be made"));
+    }
+  }
+  struct stat found;
+  if (lstat(address.path.c_str(), &found) != 0) return absl::OkStatus();
+  if (!S_ISSOCK(found.st_mode)) {
+    return absl::AlreadyExistsError(absl::StrCat(
+        address.path, " is there and is no socket; move it away, or listen elsewhere"));
+  }
+  const Socket probe(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  sockaddr_un name = {};
+  name.sun_family = AF_UNIX;
+  std::memcpy(name.sun_path, address.path.data(), address.path.size());
+  if (connect(probe.get(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0 ||
+      errno == EAGAIN || errno == EINPROGRESS) {
+    return absl::AlreadyExistsError(
+        absl::StrCat("somebody listens on ", address.ToString(), " already"));
+  }
+  if (errno != ECONNREFUSED) {
+    return absl::ErrnoToStatus(
+        errno, absl::StrCat("whether somebody listens on ", address.ToString(), " is not known"));
+  }
+  if (unlink(address.path.c_str()) != 0) {
+    return absl::ErrnoToStatus(
+        errno, absl::StrCat("the left-over socket ", address.path, " cannot be removed"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PrepareTcp(const Address& address) {
+  addrinfo hints = {};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int code =
+      getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
+  if (code != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the host of ", address.ToString(), " is not known: ", gai_strerror(code)));
+  }
+  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> list(found, freeaddrinfo);
+  int first_error = 0;
+  for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
+    const Socket probe(socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol));
+    if (probe.get() < 0) continue;  // no IPv6 here, say
+    const int on = 1;
+    setsockopt(probe.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+    if (bind(probe.get(), at->ai_addr, at->ai_addrlen) == 0) return absl::OkStatus();
+    if (first_error == 0 || errno == EADDRINUSE) first_error = errno;
+    if (errno == EADDRINUSE) break;
+  }
+  if (first_error == EADDRINUSE) {
+    return absl::AlreadyExistsError(
+        absl::StrCat("somebody listens on ", address.ToString(), " already"));
+  }
+  return absl::ErrnoToStatus(first_error == 0 ? EADDRNOTAVAIL : first_error,
+                             absl::StrCat(address.ToString(), " cannot be listened on"));
+}
+
+}  // namespace
+
+std::string Address::ToString() const {
+  if (unix_socket) return absl::StrCat("unix:", path);
+  const bool brackets = host.find(':') != std::string::npos;
+  return absl::StrCat(brackets ? "[" : "", host, brackets ? "]:" : ":", port);
+}
+
+absl::StatusOr<Address> ParseAddress(std::string_view text) {
+  if (text.starts_with(kUnixPrefix)) return ParseUnix(text);
+  const size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos) return Wrong(text, "has no port");
+  Address address;
+  std::string_view host = text.substr(0, colon);
+  if (host.starts_with('[') && host.ends_with(']')) {
+    host = host.substr(1, host.size() - 2);
+  } else if (host.find(':') != std::string_view::npos) {
+    return Wrong(text, "has more than one colon (write an IPv6 number as [::1]:50551)");
+  }
+  if (host.empty()) return Wrong(text, "has no host");
+  if (host.find_first_of(" \t\r\n/[]") != std::string_view::npos) {
+    return Wrong(text, "has a host that is none");
+  }
+  address.host = std::string(host);
+  const std::string_view port = text.substr(colon + 1);
+  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), address.port);
+  if (parsed.ec != std::errc() || parsed.ptr != port.data() + port.size()) {
+    return Wrong(text, absl::StrCat("has the port \"", View(port), "\", which is not 0 to 65535"));
+  }
+  return address;
+}
+
+absl::Status PrepareToListen(const Address& address) {
+  return address.unix_socket ? PrepareUnix(address) : PrepareTcp(address);
+}
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,37 @@
+// The long calls that are open: streams, watches, captures. At shutdown each is told to end.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "display/sync/mutex.h"
+
+namespace voxeld::daemon::services {
+
+class ActiveCall {
+ public:
+  virtual ~ActiveCall() = default;
+  // Ends the call with `status` once what is queued for its client has been written. May be called
+  // from any thread, and more than once.
+  virtual void End(const absl::Status& status) = 0;
+};
+
+// Thread-safe.
+class ActiveCalls {
+ public:
+  // `call` is kept until Remove. After EndAll it is told to end at once.
+  void Add(std::shared_ptr<ActiveCall> call);
+  void Remove(const ActiveCall* call);
+
+  void EndAll(const absl::Status& status);
+  size_t size() const;
+
+ private:
+  mutable sync::Mutex mutex_;
+  std::map<const ActiveCall*, std::shared_ptr<ActiveCall>> calls_ VOXELD_GUARDED_BY(mutex_);
+  std::optional<absl::Status> ended_ VOXELD_GUARDED_BY(mutex_);
+};
+
+}  // namespace voxeld::daemon::services

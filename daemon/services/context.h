@@ -1,0 +1,30 @@
+// What every service is given.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "daemon/core/core.h"
+#include "daemon/services/active_calls.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::daemon::services {
+
+// Outlives the services; the core and the clock outlive it.
+struct ServiceContext {
+  Core& core;
+  sync::Clock& clock;
+  std::string version;
+  // How long a stream that was half-closed waits for outcomes that it is still owed, and any ending
+  // stream for its client to read what is queued.
+  sync::TimeNs drain_limit_ns = 5 * sync::kSecond;
+  // Of answers that a client has not read. Beyond, its stream ends with RESOURCE_EXHAUSTED.
+  size_t max_queued_answers = 16384;
+  size_t max_queued_bytes = 16u << 20;
+
+  ActiveCalls calls;
+  std::atomic<uint64_t> streams_overrun{0};  // ended because their client did not read
+};
+
+}  // namespace voxeld::daemon::services

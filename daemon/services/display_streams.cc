@@ -1,0 +1,213 @@
+// The long calls of DisplayService: WatchStats and CaptureVolume.
+#include <grpcpp/alarm.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/services/services.h"
+#include "daemon/services/status.h"
+#include "daemon/wire/encode.h"
+#include "voxeld/v1/display.pb.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+// A call that sends one message after another. Owns itself until gRPC is done with it; the core may
+// hold it longer.
+template <typename Message>
+class Sender : public grpc::ServerWriteReactor<Message>,
+               public ActiveCall,
+               public std::enable_shared_from_this<Sender<Message>> {
+ public:
+  explicit Sender(ServiceContext& context) : context_(context) {}
+
+  void Begin() {
+    self_ = this->shared_from_this();
+    context_.calls.Add(self_);
+  }
+
+  void End(const absl::Status& status) final {
+    sync::MutexLock lock(mutex_);
+    if (end_.has_value()) return;
+    end_ = status;
+    if (!writing_) this->Finish(ToGrpc(*end_));
+  }
+
+  void OnWriteDone(bool ok) final {
+    {
+      sync::MutexLock lock(mutex_);
+      writing_ = false;
+      if (end_.has_value()) return this->Finish(ToGrpc(*end_));
+    }
+    if (!ok) return End(absl::CancelledError("the client is gone"));
+    OnSent();
+  }
+
+  void OnCancel() final { End(absl::CancelledError("the client is gone")); }
+
+  void OnDone() final {
+    context_.calls.Remove(this);
+    alarm_.reset();
+    const std::shared_ptr<Sender> last = std::move(self_);
+  }
+
+ protected:
+  virtual void OnSent() = 0;
+  virtual void OnAlarm() {}
+
+  void Send(Message message) {
+    sync::MutexLock lock(mutex_);
+    if (end_.has_value()) return;
+    message_ = std::move(message);
+    writing_ = true;
+    this->StartWrite(&message_);
+  }
+
+  void SetAlarm(sync::TimeNs delay) {
+    alarm_ = std::make_unique<grpc::Alarm>();
+    const gpr_timespec deadline =
+        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(delay, GPR_TIMESPAN));
+    alarm_->Set(deadline, [self = this->shared_from_this()](bool due) {
+      if (due) self->OnAlarm();
+    });
+  }
+
+  ServiceContext& context_;
+
+ private:
+  std::shared_ptr<Sender> self_;
+  std::unique_ptr<grpc::Alarm> alarm_;
+  sync::Mutex mutex_;
+  Message message_ VOXELD_GUARDED_BY(mutex_);
+  bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
+  std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);
+};
+
+class StatsWatch final : public Sender<v1::Stats> {
+ public:
+  static constexpr int64_t kDefaultNs = sync::kSecond;
+  static constexpr int64_t kLeastNs = 10 * sync::kMillisecond;
+  static constexpr int64_t kGreatestNs = 3600 * sync::kSecond;
+
+  using Sender::Sender;
+
+  void Start(const v1::WatchStatsRequest& request) {
+    Begin();
+    interval_ns_ = request.interval_ns() == 0 ? kDefaultNs : request.interval_ns();
+    once_ = request.once();
+    if (interval_ns_ < kLeastNs || interval_ns_ > kGreatestNs) {
+      return End(absl::InvalidArgumentError(absl::StrCat("interval_ns is ", interval_ns_, "; give ",
+                                                         kLeastNs, " (10 ms) to ", kGreatestNs,
+                                                         " (1 hour), or 0 for 1 s")));
+    }
+    Ask();
+  }
+
+ private:
+  std::shared_ptr<StatsWatch> Self() {
+    return std::static_pointer_cast<StatsWatch>(shared_from_this());
+  }
+
+  void Ask() {
+    context_.core.GetStats([self = Self()](absl::StatusOr<Stats> stats) {
+      if (!stats.ok()) return self->End(stats.status());
+      v1::Stats message;
+      wire::Encode(*stats, &message);
+      self->Send(std::move(message));
+    });
+  }
+
+  void OnSent() override {
+    if (once_) return End(absl::OkStatus());
+    SetAlarm(interval_ns_);
+  }
+
+  void OnAlarm() override { Ask(); }
+
+  int64_t interval_ns_ = kDefaultNs;
+  bool once_ = false;
+};
+
+class Capture final : public Sender<v1::VolumeChunk> {
+ public:
+  static constexpr int64_t kDefaultNs = 5 * sync::kSecond;
+  static constexpr int64_t kGreatestNs = 60 * sync::kSecond;
+  static constexpr size_t kChunkBytes = 1u << 20;
+
+  using Sender::Sender;
+
+  void Start(const v1::CaptureVolumeRequest& request) {
+    Begin();
+    const int64_t timeout = request.timeout_ns() == 0 ? kDefaultNs : request.timeout_ns();
+    if (timeout < 0 || timeout > kGreatestNs) {
+      return End(absl::InvalidArgumentError(absl::StrCat("timeout_ns is ", timeout, "; give 1 to ",
+                                                         kGreatestNs, " (60 s), or 0 for 5 s")));
+    }
+    const uint64_t snapshot = request.at_least_snapshot();
+    context_.core.GetDisplay(request.name(), [self = Self(), timeout, snapshot](
+                                                 absl::StatusOr<DisplayDescription> display) {
+      if (!display.ok()) return self->End(display.status());
+      self->display_ = *std::move(display);
+      self->Ask(timeout, snapshot);
+    });
+  }
+
+ private:
+  std::shared_ptr<Capture> Self() { return std::static_pointer_cast<Capture>(shared_from_this()); }
+
+  void Ask(sync::TimeNs timeout, uint64_t snapshot) {
+    context_.core.Capture(display_.info.name, timeout, snapshot,
+                          [self = Self()](absl::StatusOr<display::DecodedVolume> volume) {
+                            if (!volume.ok()) return self->End(volume.status());
+                            self->volume_ = *std::move(volume);
+                            v1::VolumeChunk chunk;
+                            wire::Encode(self->display_, self->volume_, chunk.mutable_header());
+                            self->Send(std::move(chunk));
+                          });
+  }
+
+  // Whole slices, as many as fit into a chunk, but at least one.
+  void OnSent() override {
+    const display::FrameLayout& layout = volume_.layout;
+    if (next_slice_ >= layout.slices) return End(absl::OkStatus());
+    const size_t slice_bytes =
+        static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) * 3;
+    const size_t fit = std::max<size_t>(1, kChunkBytes / std::max<size_t>(1, slice_bytes));
+    const auto count = static_cast<int32_t>(
+        std::min<size_t>(fit, static_cast<size_t>(layout.slices - next_slice_)));
+    v1::VolumeChunk chunk;
+    v1::VolumeSlices* slices = chunk.mutable_slices();
+    slices->set_first_slice(next_slice_);
+    slices->set_rgb(volume_.rgb.data() + static_cast<size_t>(next_slice_) * slice_bytes,
+                    static_cast<size_t>(count) * slice_bytes);
+    next_slice_ += count;
+    Send(std::move(chunk));
+  }
+
+  // Set before the first message goes out, then touched by one reaction after another.
+  DisplayDescription display_;
+  display::DecodedVolume volume_;
+  int32_t next_slice_ = 0;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context,
+                                                   const v1::WatchStatsRequest& request) {
+  const auto watch = std::make_shared<StatsWatch>(context);
+  watch->Start(request);
+  return watch.get();
+}
+
+grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
+                                                      const v1::CaptureVolumeRequest& request) {
+  const auto capture = std::make_shared<Capture>(context);
+  capture->Start(request);
+  return capture.get();
+}
+
+}  // namespace voxeld::daemon::services

@@ -1,0 +1,149 @@
+// SceneService: every method one line over what it does.
+#include <grpcpp/support/server_callback.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/services/apply_update.h"
+#include "daemon/services/services.h"
+#include "daemon/services/status.h"
+#include "daemon/wire/encode.h"
+#include "voxeld/v1/scene.grpc.pb.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
+
+constexpr uint32_t kPageSize = 1000;
+
+// A reactor for a method that has no working server side: it finishes at once.
+template <typename Request>
+class RefusedReads final : public grpc::ServerReadReactor<Request> {
+ public:
+  explicit RefusedReads(const absl::Status& status) { this->Finish(ToGrpc(status)); }
+  void OnDone() override { delete this; }
+};
+
+template <typename Response>
+class RefusedWrites final : public grpc::ServerWriteReactor<Response> {
+ public:
+  explicit RefusedWrites(const absl::Status& status) { this->Finish(ToGrpc(status)); }
+  void OnDone() override { delete this; }
+};
+
+// The core's answer into `response`, which gRPC keeps until the call is finished.
+template <typename T, typename Response>
+Core::Reply<T> Answer(ServerUnaryReactor* reactor, Response* response) {
+  return [reactor, response](absl::StatusOr<T> result) {
+    if (result.ok()) wire::Encode(*result, response);
+    reactor->Finish(ToGrpc(result.status()));
+  };
+}
+
+using SceneStub = v1::SceneService;
+using SceneBase = SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithCallbackMethod_ApplyUpdate<
+    SceneStub::WithCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
+        SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
+            SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>;
+
+class SceneService final : public SceneBase {
+ public:
+  explicit SceneService(ServiceContext& context) : context_(context) {}
+
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Stream(
+      CallbackServerContext*) override {
+    return NewStream(context_);
+  }
+
+  ServerUnaryReactor* ApplyUpdate(CallbackServerContext* call,
+                                  const v1::ApplyUpdateRequest* request,
+                                  v1::ApplyUpdateResponse* response) override {
+    return DoApplyUpdate(call->DefaultReactor(), *request, response);
+  }
+
+  grpc::ServerWriteReactor<v1::WatchSceneResponse>* WatchScene(
+      CallbackServerContext*, const v1::WatchSceneRequest*) override {
+    return new RefusedWrites<v1::WatchSceneResponse>(absl::UnimplementedError(
+        "WatchScene is not implemented in this version of the server: use ListEntities"));
+  }
+
+  ServerUnaryReactor* ListEntities(CallbackServerContext* call,
+                                   const v1::ListEntitiesRequest* request,
+                                   v1::ListEntitiesResponse* response) override {
+    return DoListEntities(call->DefaultReactor(), *request, response);
+  }
+
+  ServerUnaryReactor* GetEntity(CallbackServerContext* call, const v1::GetEntityRequest* request,
+                                v1::GetEntityResponse* response) override {
+    return DoGetEntity(call->DefaultReactor(), *request, response);
+  }
+
+  ServerUnaryReactor* ClearLayer(CallbackServerContext* call, const v1::ClearLayerRequest* request,
+                                 v1::ClearLayerResponse* response) override {
+    return DoClearLayer(call->DefaultReactor(), *request, response);
+  }
+
+  grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(CallbackServerContext*,
+                                                               v1::UploadAssetResponse*) override {
+    return new RefusedReads<v1::UploadAssetRequest>(absl::UnimplementedError(
+        "UploadAsset is not implemented in this version of the server: send geometry in Upsert or "
+        "Batch"));
+  }
+
+ private:
+  ServerUnaryReactor* DoApplyUpdate(ServerUnaryReactor* reactor,
+                                    const v1::ApplyUpdateRequest& request,
+                                    v1::ApplyUpdateResponse* response) {
+    services::ApplyUpdate(context_, request, response, [reactor](const absl::Status& status) {
+      reactor->Finish(ToGrpc(status));
+    });
+    return reactor;
+  }
+
+  ServerUnaryReactor* DoListEntities(ServerUnaryReactor* reactor,
+                                     const v1::ListEntitiesRequest& request,
+                                     v1::ListEntitiesResponse* response) {
+    EntityQuery query{
+        request.owner(), request.layer(), request.id_prefix(),
+        request.page_size() == 0 ? kPageSize : std::min(request.page_size(), kPageSize),
+        request.page_token()};
+    context_.core.ListEntities(std::move(query), Answer<EntityPage>(reactor, response));
+    return reactor;
+  }
+
+  ServerUnaryReactor* DoGetEntity(ServerUnaryReactor* reactor, const v1::GetEntityRequest& request,
+                                  v1::GetEntityResponse* response) {
+    const v1::EntityKey& key = request.key();
+    if (key.layer().empty() || key.id().empty()) {
+      reactor->Finish(ToGrpc(absl::InvalidArgumentError(
+          absl::StrCat("key.", key.layer().empty() ? "layer" : "id",
+                       " is empty; an entity is asked for by its layer and id"))));
+      return reactor;
+    }
+    context_.core.GetEntity({key.owner(), key.layer(), key.id()},
+                            Answer<EntityInfo>(reactor, response->mutable_info()));
+    return reactor;
+  }
+
+  ServerUnaryReactor* DoClearLayer(ServerUnaryReactor* reactor,
+                                   const v1::ClearLayerRequest& request,
+                                   v1::ClearLayerResponse* response) {
+    context_.core.ClearLayer(request.owner(), request.layer(), request.keep_state(),
+                             Answer<Cleared>(reactor, response));
+    return reactor;
+  }
+
+  ServiceContext& context_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeSceneService(ServiceContext& context) {
+  return std::make_unique<SceneService>(context);
+}
+
+}  // namespace voxeld::daemon::services

@@ -1,0 +1,130 @@
+#include "daemon/services/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/impl/service_type.h>
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/services/services.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+constexpr const char* kServices[] = {"voxeld.v1.SceneService", "voxeld.v1.DisplayService"};
+
+// Bytes that a stream may have on the way before they are asked for: HTTP/2's own window is no
+// back-pressure, and with the bandwidth probe it grows to megabytes that wait unseen.
+constexpr int kLookaheadBytes = 256 << 10;
+
+// How a client that vanished without a word is noticed.
+constexpr int kKeepaliveMs = 20'000;
+constexpr int kKeepaliveTimeoutMs = 10'000;
+constexpr int kLeastPingIntervalMs = 5'000;
+
+constexpr int kStreamsPerConnection = 256;
+constexpr mode_t kSocketMode = 0660;
+
+}  // namespace
+
+class Server::Impl {
+ public:
+  Impl(Core& core, sync::Clock& clock, ServerOptions options)
+      : context_{core, clock, options.version, options.drain_limit_ns, options.max_queued_answers},
+        options_(std::move(options)),
+        scene_(MakeSceneService(context_)),
+        display_(MakeDisplayService(context_)) {}
+
+  ~Impl() { Shutdown(0); }
+
+  absl::Status Start() {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::ServerBuilder builder;
+    const uint64_t greatest = std::numeric_limits<int>::max();
+    builder.SetMaxReceiveMessageSize(
+        static_cast<int>(std::min(context_.core.limits().max_message_bytes, greatest)));
+    builder.SetMaxSendMessageSize(-1);
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a busy port is an error
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kLookaheadBytes);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                               kLeastPingIntervalMs);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kStreamsPerConnection);
+    builder.RegisterService(scene_.get());
+    builder.RegisterService(display_.get());
+
+    if (options_.listen.empty()) {
+      return absl::InvalidArgumentError("no address to listen on; give at least one");
+    }
+    std::vector<int> ports(options_.listen.size(), 0);
+    for (size_t i = 0; i < options_.listen.size(); ++i) {
+      const Address& address = options_.listen[i];
+      if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
+      builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &ports[i]);
+    }
+    server_ = builder.BuildAndStart();
+    for (size_t i = 0; i < options_.listen.size(); ++i) {
+      Address address = options_.listen[i];
+      if (ports[i] == 0) {
+        return absl::UnavailableError(absl::StrCat(address.ToString(), " cannot be listened on"));
+      }
+      if (address.unix_socket) {
+        chmod(address.path.c_str(), kSocketMode);
+      } else {
+        address.port = static_cast<uint16_t>(ports[i]);
+      }
+      addresses_.push_back(std::move(address));
+    }
+    if (server_ == nullptr) return absl::InternalError("the gRPC server could not be started");
+    for (const char* service : kServices) {
+      server_->GetHealthCheckService()->SetServingStatus(service, true);
+    }
+    return absl::OkStatus();
+  }
+
+  void Shutdown(sync::TimeNs limit) {
+    if (server_ == nullptr) return;
+    server_->GetHealthCheckService()->Shutdown();
+    context_.calls.EndAll(absl::UnavailableError("shutting down"));
+    server_->Shutdown(
+        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(limit, GPR_TIMESPAN)));
+    server_->Wait();
+    server_.reset();
+  }
+
+  const std::vector<Address>& addresses() const { return addresses_; }
+  uint64_t streams_overrun() const { return context_.streams_overrun; }
+
+ private:
+  ServiceContext context_;
+  const ServerOptions options_;
+  const std::unique_ptr<grpc::Service> scene_, display_;
+  std::unique_ptr<grpc::Server> server_;
+  std::vector<Address> addresses_;
+};
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::~Server() = default;
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(Core& core, sync::Clock& clock,
+                                                      ServerOptions options) {
+  auto impl = std::make_unique<Impl>(core, clock, std::move(options));
+  if (absl::Status status = impl->Start(); !status.ok()) return status;
+  return std::unique_ptr<Server>(new Server(std::move(impl)));
+}
+
+const std::vector<Address>& Server::addresses() const { return impl_->addresses(); }
+uint64_t Server::streams_overrun() const { return impl_->streams_overrun(); }
+void Server::Shutdown(sync::TimeNs limit) { impl_->Shutdown(limit); }
+
+}  // namespace voxeld::daemon::services

@@ -1,0 +1,52 @@
+// The gRPC server: both services, health and reflection, on any number of addresses.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "daemon/address/address.h"
+#include "daemon/core/core.h"
+#include "daemon/services/context.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::daemon::services {
+
+struct ServerOptions {
+  std::vector<Address> listen;  // at least one
+  std::string version;
+  sync::TimeNs drain_limit_ns = 5 * sync::kSecond;
+  size_t max_queued_answers = 16384;  // that a client of Stream has not read
+};
+
+// Thread-safe. The core must run, outlive the server, and be stopped after it.
+class Server {
+ public:
+  // Listens and serves, or says which address could not be had: AlreadyExists if somebody listens
+  // there. Unix sockets get the mode 0660.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(Core& core, sync::Clock& clock,
+                                                       ServerOptions options);
+  ~Server();  // shuts down, if that has not been done
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  // Where it listens, with the ports that were chosen.
+  const std::vector<Address>& addresses() const;
+
+  // Streams that were ended because their client did not read.
+  uint64_t streams_overrun() const;
+
+  // Health answers NOT_SERVING, nothing new is accepted, every long call ends with `Unavailable:
+  // shutting down` after what is queued for it. Returns when all calls have ended, after at most
+  // `limit`: then those left are cancelled.
+  void Shutdown(sync::TimeNs limit);
+
+ private:
+  class Impl;
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace voxeld::daemon::services

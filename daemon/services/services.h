@@ -1,0 +1,38 @@
+// The services and their long calls, for the server that binds them. No gRPC header is needed to
+// know them.
+#pragma once
+
+#include <memory>
+
+#include "daemon/services/context.h"
+
+namespace grpc {
+class ByteBuffer;
+class Service;
+template <class Request, class Response>
+class ServerBidiReactor;
+template <class Response>
+class ServerWriteReactor;
+}  // namespace grpc
+
+namespace voxeld::v1 {
+class CaptureVolumeRequest;
+class Stats;
+class VolumeChunk;
+class WatchStatsRequest;
+}  // namespace voxeld::v1
+
+namespace voxeld::daemon::services {
+
+std::unique_ptr<grpc::Service> MakeSceneService(ServiceContext& context);
+std::unique_ptr<grpc::Service> MakeDisplayService(ServiceContext& context);
+
+// Reactors that own themselves until gRPC is done with them. Requests are read before the call
+// returns.
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context);
+grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context,
+                                                   const v1::WatchStatsRequest& request);
+grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
+                                                      const v1::CaptureVolumeRequest& request);
+
+}  // namespace voxeld::daemon::services

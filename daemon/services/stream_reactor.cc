@@ -1,0 +1,88 @@
+// SceneService.Stream on gRPC: a port for StreamSession, and nothing else.
+#include <grpcpp/alarm.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/server_callback.h>
+#include <grpcpp/support/slice.h>
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/services/services.h"
+#include "daemon/services/status.h"
+#include "daemon/services/stream_session.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
+                            public StreamPort {
+ public:
+  explicit StreamReactor(ServiceContext& context)
+      : session_(std::make_shared<StreamSession>(context, this)) {
+    session_->Start();
+  }
+
+  void Read() override { StartRead(&incoming_); }
+
+  void Write(const std::string& message) override {
+    const grpc::Slice slice(message);
+    outgoing_ = grpc::ByteBuffer(&slice, 1);
+    StartWrite(&outgoing_);
+  }
+
+  void Finish(const absl::Status& status) override {
+    grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>::Finish(ToGrpc(status));
+  }
+
+  void SetAlarm(sync::TimeNs delay) override {
+    alarm_ = std::make_unique<grpc::Alarm>();
+    const gpr_timespec deadline =
+        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(delay, GPR_TIMESPAN));
+    alarm_->Set(deadline, [session = session_](bool due) {
+      if (due) session->OnAlarm();
+    });
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) return session_->OnReadsDone();
+    std::vector<grpc::Slice> slices;
+    const grpc::Status dumped = incoming_.Dump(&slices);
+    incoming_.Clear();
+    if (!dumped.ok()) {
+      return session_->End(absl::InternalError("a message could not be decompressed"));
+    }
+    std::vector<std::string_view> views;
+    views.reserve(slices.size());
+    for (const grpc::Slice& slice : slices) {
+      views.emplace_back(reinterpret_cast<const char*>(slice.begin()), slice.size());
+    }
+    session_->OnMessage(views);
+  }
+
+  void OnWriteDone(bool ok) override {
+    outgoing_.Clear();
+    session_->OnWritten(ok);
+  }
+
+  void OnCancel() override { session_->OnCancel(); }
+
+  void OnDone() override {
+    session_->OnPortDone();
+    delete this;
+  }
+
+ private:
+  const std::shared_ptr<StreamSession> session_;
+  grpc::ByteBuffer incoming_, outgoing_;
+  std::unique_ptr<grpc::Alarm> alarm_;
+};
+
+}  // namespace
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context) {
+  return new StreamReactor(context);
+}
+
+}  // namespace voxeld::daemon::services
