@@ -1,17 +1,16 @@
 // The one interface between the frame pipeline and any display.
 //
 // Threads: an object is bound to one thread (its pipeline's), which makes every call; only the wake
-// function that it was given may be called from elsewhere. No call blocks. Completions of the transport
-// arrive in a queue, a wake makes the owner call Tick, and Tick does all the work.
+// function that it was given may be called from elsewhere. No call blocks. Completions of the
+// transport arrive in a queue, a wake makes the owner call Tick, and Tick does all the work.
 //
-// The base class holds what no driver may get wrong: the state machine, the newest-frame mailbox (one
-// volume in flight, one waiting), exactly one outcome a volume, and the tap for captures. A driver
-// implements the protected Do… functions.
+// The base class holds what no driver may get wrong: the state machine, the newest-frame mailbox
+// (one volume in flight, one waiting), exactly one outcome a volume, and the tap for captures. A
+// driver implements the protected Do… functions.
 #pragma once
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -27,7 +26,8 @@
 
 namespace voxeld::display {
 
-// Fixed for the lifetime of a Display. Geometry and format are data, from its options or its profile.
+// Fixed for the lifetime of a Display. Geometry and format are data, from its options or its
+// profile.
 struct DisplayInfo {
   std::string name;    // unique in the daemon
   std::string driver;  // "simulated", "voxlink", …
@@ -45,11 +45,13 @@ struct DisplayStats {
   uint64_t bytes_out = 0;
   uint64_t slices_sent = 0;
   uint64_t slices_resent = 0;
-  uint64_t underruns = 0;  // sweeps for which the device had to repeat a volume while a newer was on its way
+  uint64_t underruns =
+      0;  // sweeps for which the device had to repeat a volume while a newer was on its way
   uint64_t attaches = 0;
 };
 
-// What an eye would see: every slice as 8-bit RGB light, sub-frames averaged, rebuilt from wire bytes.
+// What an eye would see: every slice as 8-bit RGB light, sub-frames averaged, rebuilt from wire
+// bytes.
 struct DecodedVolume {
   enum class Source : uint8_t { kDecodedFromSent, kReportedByDevice };
   uint64_t volume = 0;
@@ -76,9 +78,10 @@ class Display {
     virtual void OnOutcome(const VolumeOutcome& outcome) = 0;
     virtual void OnState(DisplayState state, const std::string& reason) = 0;
   };
+  // Called where a listener's functions are; must not call back.
   using CaptureDone = std::function<void(absl::StatusOr<DecodedVolume>)>;
 
-  virtual ~Display() = default;
+  virtual ~Display() = default;  // a driver's destructor calls Stop
   Display(const Display&) = delete;
   Display& operator=(const Display&) = delete;
 
@@ -87,32 +90,41 @@ class Display {
   const std::string& state_reason() const { return state_reason_; }
   const DisplayStats& stats() const { return stats_; }
 
-  // From kStopped. `listener` outlives the display's stop; `wake` is thread-safe, cheap, and asks for a
-  // Tick soon.
+  // From kStopped; FailedPrecondition otherwise. `listener` outlives the display's stop; `wake` is
+  // thread-safe, cheap, and asks for a Tick soon. Volumes are counted anew.
   absl::Status Start(Listener* listener, std::function<void()> wake);
 
-  // Ends what is in flight (each volume still owed gets kLost) and goes to kStopped. Safe at any time.
+  // Ends what is in flight (each volume still owed gets kLost) and goes to kStopped. Safe at any
+  // time.
   void Stop();
 
-  // Takes a volume (any state). While one is in flight it waits; one that waited gets kReplaced. A
-  // volume submitted while not kShowing waits for the device to come, unless blanked: then kLost at
-  // once. `frame->volume` must ascend.
+  // Takes a volume, in any state between Start and Stop (outside there is no listener to tell: it
+  // is dropped). While one is in flight it waits; one that waited gets kReplaced. A volume
+  // submitted while not kShowing waits for the device to come, unless blanked: then kLost at once.
+  // `frame->volume` must ascend and `frame->layout` must be info().layout: what breaks that is
+  // kLost at once.
   void Submit(SliceFramePtr frame);
 
-  // True if no volume waits: a pipeline that only draws when this holds never has a volume replaced.
+  // True if no volume waits: a pipeline that only draws when this holds never has a volume
+  // replaced.
   bool mailbox_free() const { return waiting_ == nullptr; }
 
   // Does what is due, drains completions; returns when it wants to be called again at the latest.
+  // Any other call may bring that time forward: call Tick after it.
   sync::TimeNs Tick();
 
-  // The device's global brightness, 0 to 1; dark and light again. InvalidArgument for a value outside.
+  // The device's global brightness, 0 to 1; dark and light again. InvalidArgument for a value
+  // outside. Both are kept while there is no device, and are part of its set-up. What waits or is
+  // in flight when the display is blanked gets kLost; light again brings back the volume before.
   absl::Status SetBrightness(double brightness);
   absl::Status SetBlank(bool blank);
   double brightness() const { return brightness_; }
   bool blanked() const { return blanked_; }
 
-  // The next volume shown, rebuilt from the bytes that go out; the display re-sends the current one whole
-  // for it. `done` gets DeadlineExceeded after `timeout`, Unavailable when the display stops or is lost.
+  // The next volume shown, rebuilt from the bytes that go out; if no new one comes, the display
+  // re-sends the current one whole for it, or a black one (number 0) if it never had any; such a
+  // volume has no outcome. `done` gets DeadlineExceeded after `timeout`, Unavailable when the
+  // display stops, is blanked or is lost (at once, if it is already).
   void Capture(sync::TimeNs timeout, CaptureDone done);
 
   // Predicted starts of coming sweeps (owner's clock), nearest first; empty if not known.
@@ -123,28 +135,38 @@ class Display {
 
   // Begin to attach; go on in DoTick; report by Attached or DeviceLost.
   virtual absl::Status DoStart() = 0;
-  // Ends all transfers; returns when the device may be closed. Must not wait longer than `stop_limit_ns`.
+  // Ends all transfers and closes the device; from its return on Wake is not called any more. Must
+  // not wait for the device.
   virtual void DoStop() = 0;
-  // Begins to send `frame` (only when attached and nothing is in flight). With `full` no slice may be left
-  // out; otherwise those that changed since the last volume the device completed. Ends in FrameDone or
-  // FrameLost, from here or from DoTick.
+  // Begins to send `frame` (only when attached and nothing is in flight). With `full` no slice may
+  // be left out; otherwise those that changed since the last volume the device completed. Ends in
+  // FrameDone or FrameLost, from here or from DoTick.
   virtual void DoSend(const SliceFramePtr& frame, bool full) = 0;
   virtual sync::TimeNs DoTick(sync::TimeNs now) = 0;
+  // Only while attached; set-up applies brightness() and blanked() by itself.
   virtual absl::Status DoSetBrightness(double brightness) = 0;
   virtual absl::Status DoSetBlank(bool blank) = 0;
   virtual std::unique_ptr<WireDecoder> DoMakeDecoder() const = 0;
 
   // For drivers, on the owner's thread.
-  void Attached();                             // the device is set up: the current frame goes out first
-  void DeviceLost(const std::string& reason);  // whatever is in flight is lost; DoTick attaches again
-  void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns, uint64_t bytes);
+  void Attached();  // the device is set up: the current frame goes out first
+  // Whatever is in flight (`bytes` of it sent) is lost; DoTick attaches again.
+  void DeviceLost(const std::string& reason, uint64_t bytes = 0);
+  void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,
+                 uint64_t bytes);
   void FrameLost(const std::string& reason, uint64_t bytes);
-  void TapOut(uint8_t endpoint, std::span<const std::byte> bytes);  // every outgoing byte of a volume
+  void TapOut(uint8_t endpoint,
+              std::span<const std::byte> bytes);  // every outgoing byte of a volume
   bool tapped() const { return decoder_ != nullptr; }
-  void Wake() const { if (wake_) wake_(); }  // any thread
+  void Wake() const {
+    if (wake_) wake_();
+  }  // any thread
   DisplayStats& mutable_stats() { return stats_; }
   sync::Clock& clock() const { return clock_; }
   const SliceFramePtr& in_flight() const { return in_flight_; }
+  bool attached() const {
+    return state_ == DisplayState::kShowing || state_ == DisplayState::kBlanked;
+  }
 
  private:
   struct PendingCapture {
@@ -154,8 +176,14 @@ class Display {
 
   void SetState(DisplayState state, const std::string& reason);
   void Report(VolumeOutcome outcome);
+  void ReportLost(uint64_t volume, const std::string& reason, uint64_t bytes);
+  // Ends in_flight_, or what waits, without a show; told if owed.
+  void LoseInFlight(const std::string& reason, uint64_t bytes);
+  void LoseWaiting(const std::string& reason);
   void SendNext();
+  // The capture's volume is in `decoder_`, or an error is to be told; ends the tap.
   void FinishCaptures(const absl::StatusOr<DecodedVolume>& result);
+  void ExpireCaptures(sync::TimeNs now);
 
   const DisplayInfo info_;
   sync::Clock& clock_;
@@ -166,9 +194,18 @@ class Display {
   DisplayStats stats_;
   double brightness_ = 1;
   bool blanked_ = false;
-  SliceFramePtr in_flight_, waiting_, last_shown_;
-  bool full_next_ = true;  // the next volume may leave out nothing (attach, capture)
+
+  SliceFramePtr in_flight_, waiting_;
+  SliceFramePtr newest_;      // the newest volume given to DoSend: what belongs on the display
+  bool owed_ = false;         // in_flight_ still owes its outcome (false: a re-send of our own)
+  bool full_next_ = true;     // the next volume may leave out nothing
+  bool sending_ = false;      // inside SendNext
+  uint64_t last_volume_ = 0;  // newest number submitted
+  sync::TimeNs resend_at_ = sync::kNever;  // newest_ goes out again, if nothing newer did before
+  sync::TimeNs resend_delay_ = 0;          // doubles with each loss
+
   std::unique_ptr<WireDecoder> decoder_;
+  absl::Status decoder_status_;
   std::vector<PendingCapture> captures_;
 };
 

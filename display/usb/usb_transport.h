@@ -1,10 +1,11 @@
-// The door to a USB device, shaped like libusb: submit, cancel, completion with status and actual length,
-// hotplug, a cap on the bytes in flight. Implementations: in-process (an emulated device in this process),
-// later libusb, recording, replaying and fault-injecting ones. Drivers see nothing else of USB.
+// The door to a USB device, shaped like libusb: submit, cancel, completion with status and actual
+// length, hotplug, a cap on the bytes in flight. Implementations: in-process (an emulated device in
+// this process), later libusb, recording, replaying and fault-injecting ones. Drivers see nothing
+// else of USB.
 //
-// Threads: bound to the owner's thread, but for the wake function, which an implementation may call from
-// any thread. Completions queue up and are handed out by Drain, so no code of ours ever runs inside a
-// library's callback. No call blocks except Close, which ends within its limit.
+// Threads: bound to the owner's thread, but for the wake function, which an implementation may call
+// from any thread. Completions queue up and are handed out by Drain, so no code of ours ever runs
+// inside a library's callback. No call blocks except Close, which ends within its limit.
 #pragma once
 
 #include <cstddef>
@@ -34,12 +35,12 @@ struct UsbSetup {
 
 enum class TransferStatus : uint8_t {
   kOk,
-  kShort,         // IN: fewer bytes than asked (not an error by itself)
-  kStall,         // endpoint halted (control: request refused)
-  kTimedOut,      // OUT: actual_length must not be trusted
+  kShort,     // IN: fewer bytes than asked (not an error by itself)
+  kStall,     // endpoint halted (control: request refused)
+  kTimedOut,  // OUT: actual_length must not be trusted
   kCancelled,
-  kOverflow,      // the device sent more than asked
-  kError,         // protocol error on the bus
+  kOverflow,  // the device sent more than asked
+  kError,     // protocol error on the bus
   kDisconnected,
 };
 
@@ -49,11 +50,11 @@ using TransferId = uint64_t;
 
 struct Transfer {
   TransferType type = TransferType::kBulk;
-  uint8_t endpoint = 0;                   // with bit 7 for IN
-  UsbSetup setup;                         // kControl only
-  std::vector<std::byte> data;            // OUT: what to send; moved in, handed back in the completion
-  uint32_t length = 0;                    // IN: bytes asked for
-  sync::TimeNs timeout = 0;               // 0: none
+  uint8_t endpoint = 0;         // with bit 7 for IN
+  UsbSetup setup;               // kControl only
+  std::vector<std::byte> data;  // OUT: what to send; moved in, handed back in the completion
+  uint32_t length = 0;          // IN: bytes asked for
+  sync::TimeNs timeout = 0;     // 0: none
 };
 
 struct TransferCompletion {
@@ -62,7 +63,8 @@ struct TransferCompletion {
   uint8_t endpoint = 0;
   TransferStatus status = TransferStatus::kOk;
   uint32_t actual_length = 0;
-  std::vector<std::byte> data;  // IN: what came (actual_length bytes). OUT: the buffer, to be used again
+  std::vector<std::byte>
+      data;  // IN: what came (actual_length bytes). OUT: the buffer, to be used again
 };
 
 struct UsbIdentity {
@@ -77,13 +79,14 @@ class UsbTransport {
 
   // Looks for the device and opens it; NotFound while there is none. Claims the interface.
   virtual absl::Status Open() = 0;
-  // Cancels everything, drains it, and closes; completions not yet drained are discarded. Idempotent.
+  // Lets control transfers that the device answers at once go out, cancels everything else, and
+  // closes; completions not yet drained are discarded. Idempotent.
   virtual void Close() = 0;
   virtual bool is_open() const = 0;
   virtual UsbIdentity identity() const = 0;
 
-  // Queues a transfer. ResourceExhausted when max_bytes_in_flight() would be passed (submit again after a
-  // completion), Unavailable when the device is gone.
+  // Queues a transfer. ResourceExhausted when max_bytes_in_flight() would be passed (submit again
+  // after a completion), Unavailable when the device is gone.
   virtual absl::StatusOr<TransferId> Submit(Transfer transfer) = 0;
   // The transfer completes as kCancelled, or as it would have; unknown ids are ignored.
   virtual void Cancel(TransferId id) = 0;
@@ -96,7 +99,9 @@ class UsbTransport {
   virtual size_t bytes_in_flight() const = 0;
   virtual size_t max_bytes_in_flight() const = 0;
 
-  // `wake` is called, from any thread, when Drain has something, or when a device came or went.
+  // `wake` is called, from any thread, when Drain has something, or when a device came or went. It
+  // must not call the transport. Once SetWake returns, the function set before is not called any
+  // more.
   virtual void SetWake(std::function<void()> wake) = 0;
 };
 

@@ -1,0 +1,324 @@
+#include "display/api/display.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::display {
+namespace {
+
+// After a lost volume the newest one is sent again: first after this time, then after twice as
+// long.
+constexpr sync::TimeNs kFirstResendDelay = 100 * sync::kMillisecond;
+constexpr sync::TimeNs kLongestResendDelay = 5 * sync::kSecond;
+
+SliceFramePtr BlackFrame(const FrameLayout& layout) {
+  auto frame = std::make_shared<SliceFrame>();
+  frame->layout = layout;
+  frame->bytes.resize(layout.bytes());
+  frame->changed_in.resize(layout.pictures());
+  return frame;
+}
+
+}  // namespace
+
+const char* DisplayStateName(DisplayState state) {
+  switch (state) {
+    case DisplayState::kStopped:
+      return "stopped";
+    case DisplayState::kAttaching:
+      return "attaching";
+    case DisplayState::kShowing:
+      return "showing";
+    case DisplayState::kBlanked:
+      return "blanked";
+    case DisplayState::kLost:
+      return "lost";
+  }
+  return "?";
+}
+
+Display::Display(DisplayInfo info, sync::Clock& clock) : info_(std::move(info)), clock_(clock) {}
+
+absl::Status Display::Start(Listener* listener, std::function<void()> wake) {
+  if (state_ != DisplayState::kStopped) {
+    return absl::FailedPreconditionError(absl::StrCat("display \"", info_.name, "\" is ",
+                                                      DisplayStateName(state_),
+                                                      "; only a stopped one can be started"));
+  }
+  listener_ = listener;
+  wake_ = std::move(wake);
+  newest_ = nullptr;
+  full_next_ = true;
+  last_volume_ = 0;
+  resend_at_ = sync::kNever;
+  resend_delay_ = 0;
+  SetState(DisplayState::kAttaching, "looking for the device");
+  const absl::Status status = DoStart();
+  if (!status.ok()) {
+    SetState(DisplayState::kStopped, std::string(status.message()));
+    listener_ = nullptr;
+    wake_ = nullptr;
+  }
+  return status;
+}
+
+void Display::Stop() {
+  if (state_ == DisplayState::kStopped) return;
+  DoStop();
+  LoseInFlight("the display was stopped", 0);
+  LoseWaiting("the display was stopped");
+  FinishCaptures(absl::UnavailableError("the display was stopped"));
+  SetState(DisplayState::kStopped, "stopped");
+  listener_ = nullptr;
+  wake_ = nullptr;
+}
+
+void Display::Submit(SliceFramePtr frame) {
+  if (state_ == DisplayState::kStopped || frame == nullptr) return;
+  ++stats_.volumes_submitted;
+  if (frame->volume <= last_volume_) {
+    return ReportLost(frame->volume,
+                      absl::StrCat("volume ", frame->volume, " does not follow volume ",
+                                   last_volume_, ": numbers must ascend"),
+                      0);
+  }
+  last_volume_ = frame->volume;
+  const FrameLayout& layout = info_.layout;
+  if (frame->layout != layout || frame->bytes.size() != layout.bytes() ||
+      frame->changed_in.size() != layout.pictures()) {
+    return ReportLost(frame->volume, "the volume is not of the display's layout", 0);
+  }
+  if (blanked_) return ReportLost(frame->volume, "blanked", 0);
+  if (waiting_ != nullptr) {
+    VolumeOutcome outcome;
+    outcome.kind = VolumeOutcome::Kind::kReplaced;
+    outcome.volume = waiting_->volume;
+    outcome.replaced_by = frame->volume;
+    waiting_ = nullptr;
+    Report(std::move(outcome));
+  }
+  waiting_ = std::move(frame);
+  SendNext();
+}
+
+sync::TimeNs Display::Tick() {
+  if (state_ == DisplayState::kStopped) return sync::kNever;
+  ExpireCaptures(clock_.Now());
+  sync::TimeNs next = DoTick(clock_.Now());
+  if (state_ == DisplayState::kShowing && in_flight_ == nullptr) {
+    SendNext();
+    if (in_flight_ != nullptr) next = clock_.Now();
+    next = std::min(next, resend_at_);
+  }
+  for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
+  return next;
+}
+
+absl::Status Display::SetBrightness(double brightness) {
+  if (!(brightness >= 0 && brightness <= 1)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("brightness is ", brightness, "; it must be from 0 to 1"));
+  }
+  brightness_ = brightness;
+  return attached() ? DoSetBrightness(brightness) : absl::OkStatus();
+}
+
+absl::Status Display::SetBlank(bool blank) {
+  if (blank == blanked_) return absl::OkStatus();
+  blanked_ = blank;
+  if (blank) {
+    // The verdict falls now; the driver may still finish what it sends, and that is what light
+    // brings back.
+    if (in_flight_ != nullptr && owed_) {
+      owed_ = false;
+      ReportLost(in_flight_->volume, "blanked", 0);
+    }
+    LoseWaiting("blanked");
+    FinishCaptures(absl::UnavailableError("the display was blanked"));
+  }
+  if (!attached()) return absl::OkStatus();
+  const absl::Status status = DoSetBlank(blank);
+  if (!attached()) return status;
+  if (blank) {
+    SetState(DisplayState::kBlanked, "blanked");
+  } else {
+    SetState(DisplayState::kShowing, "showing");
+    if (full_next_ && newest_ != nullptr) resend_at_ = clock_.Now();
+    SendNext();
+  }
+  return status;
+}
+
+void Display::Capture(sync::TimeNs timeout, CaptureDone done) {
+  if (state_ != DisplayState::kShowing && state_ != DisplayState::kAttaching) {
+    return done(absl::UnavailableError(absl::StrCat(
+        "display \"", info_.name, "\" is ", DisplayStateName(state_), ": ", state_reason_)));
+  }
+  const sync::TimeNs now = clock_.Now();
+  captures_.push_back(
+      {timeout < sync::kNever - now ? now + timeout : sync::kNever, std::move(done)});
+  SendNext();
+}
+
+void Display::Attached() {
+  full_next_ = true;
+  resend_delay_ = 0;
+  if (newest_ != nullptr) resend_at_ = clock_.Now();
+  if (blanked_) {
+    SetState(DisplayState::kBlanked, "blanked");
+  } else {
+    SetState(DisplayState::kShowing, "showing");
+    SendNext();
+  }
+}
+
+void Display::DeviceLost(const std::string& reason, uint64_t bytes) {
+  SetState(DisplayState::kLost, reason);
+  full_next_ = true;
+  resend_at_ = sync::kNever;
+  LoseInFlight(reason, bytes);
+  FinishCaptures(absl::UnavailableError(absl::StrCat("the display was lost: ", reason)));
+}
+
+void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,
+                        uint64_t bytes) {
+  if (in_flight_ == nullptr) return;
+  const SliceFramePtr frame = std::move(in_flight_);
+  in_flight_ = nullptr;
+  resend_delay_ = 0;
+  full_next_ = frame->volume == 0;  // a black one of our own is no base for what the engine counts
+  if (owed_) {
+    owed_ = false;
+    VolumeOutcome outcome;
+    outcome.kind = VolumeOutcome::Kind::kPresented;
+    outcome.volume = frame->volume;
+    outcome.time_ns = shown_ns;
+    outcome.evidence = evidence;
+    outcome.last_byte_ns = last_byte_ns;
+    outcome.bytes_sent = bytes;
+    Report(std::move(outcome));
+  }
+  if (decoder_ != nullptr) {
+    std::optional<DecodedVolume> decoded = decoder_->TakeVolume();
+    if (!decoder_status_.ok()) {
+      FinishCaptures(decoder_status_);
+    } else if (!decoded.has_value()) {
+      FinishCaptures(
+          absl::InternalError(absl::StrCat("the bytes sent hold no whole volume, though volume ",
+                                           frame->volume, " was reported shown")));
+    } else {
+      decoded->volume = frame->volume;
+      FinishCaptures(*std::move(decoded));
+    }
+  }
+  SendNext();
+}
+
+void Display::FrameLost(const std::string& reason, uint64_t bytes) {
+  if (in_flight_ == nullptr) return;
+  full_next_ = true;
+  resend_delay_ =
+      resend_delay_ == 0 ? kFirstResendDelay : std::min(2 * resend_delay_, kLongestResendDelay);
+  resend_at_ = clock_.Now() + resend_delay_;
+  decoder_ = nullptr;
+  LoseInFlight(reason, bytes);
+  SendNext();
+}
+
+void Display::TapOut(uint8_t endpoint, std::span<const std::byte> bytes) {
+  if (decoder_ == nullptr || !decoder_status_.ok()) return;
+  decoder_status_ = decoder_->OnBytes(endpoint, bytes);
+}
+
+void Display::SetState(DisplayState state, const std::string& reason) {
+  if (state == state_ && reason == state_reason_) return;
+  state_ = state;
+  state_reason_ = reason;
+  if (state == DisplayState::kShowing || state == DisplayState::kBlanked) {
+    resend_delay_ = 0;
+  }
+  if (listener_ != nullptr) listener_->OnState(state_, state_reason_);
+}
+
+void Display::Report(VolumeOutcome outcome) {
+  switch (outcome.kind) {
+    case VolumeOutcome::Kind::kPresented:
+      ++stats_.volumes_presented;
+      break;
+    case VolumeOutcome::Kind::kReplaced:
+      ++stats_.volumes_replaced;
+      break;
+    case VolumeOutcome::Kind::kLost:
+      ++stats_.volumes_lost;
+      break;
+  }
+  if (outcome.time_ns == 0) outcome.time_ns = clock_.Now();
+  listener_->OnOutcome(outcome);
+}
+
+void Display::ReportLost(uint64_t volume, const std::string& reason, uint64_t bytes) {
+  VolumeOutcome outcome;
+  outcome.kind = VolumeOutcome::Kind::kLost;
+  outcome.volume = volume;
+  outcome.reason = reason;
+  outcome.bytes_sent = bytes;
+  Report(std::move(outcome));
+}
+
+void Display::LoseInFlight(const std::string& reason, uint64_t bytes) {
+  const SliceFramePtr frame = std::move(in_flight_);
+  in_flight_ = nullptr;
+  if (frame != nullptr && std::exchange(owed_, false)) ReportLost(frame->volume, reason, bytes);
+}
+
+void Display::LoseWaiting(const std::string& reason) {
+  const SliceFramePtr frame = std::move(waiting_);
+  waiting_ = nullptr;
+  if (frame != nullptr) ReportLost(frame->volume, reason, 0);
+}
+
+void Display::SendNext() {
+  if (sending_) return;  // a driver that ends a volume inside DoSend comes back to the loop below
+  sending_ = true;
+  while (state_ == DisplayState::kShowing && in_flight_ == nullptr) {
+    const bool owed = waiting_ != nullptr;
+    if (owed) {
+      newest_ = std::move(waiting_);
+      waiting_ = nullptr;
+    } else {
+      const bool due = resend_at_ == sync::kNever ? !captures_.empty() : resend_at_ <= clock_.Now();
+      if (!due || (newest_ == nullptr && captures_.empty())) break;
+    }
+    in_flight_ = newest_ != nullptr ? newest_ : BlackFrame(info_.layout);
+    owed_ = owed;
+    resend_at_ = sync::kNever;
+    decoder_status_ = absl::OkStatus();
+    decoder_ = captures_.empty() ? nullptr : DoMakeDecoder();
+    DoSend(SliceFramePtr(in_flight_), full_next_ || decoder_ != nullptr);
+  }
+  sending_ = false;
+}
+
+void Display::FinishCaptures(const absl::StatusOr<DecodedVolume>& result) {
+  decoder_ = nullptr;
+  const std::vector<PendingCapture> captures = std::move(captures_);
+  captures_.clear();
+  for (const PendingCapture& capture : captures) capture.done(result);
+}
+
+void Display::ExpireCaptures(sync::TimeNs now) {
+  std::vector<PendingCapture> late;
+  const auto due = [now](const PendingCapture& capture) { return capture.deadline <= now; };
+  std::copy_if(captures_.begin(), captures_.end(), std::back_inserter(late), due);
+  std::erase_if(captures_, due);
+  if (captures_.empty()) decoder_ = nullptr;
+  for (const PendingCapture& capture : late) {
+    capture.done(absl::DeadlineExceededError(
+        absl::StrCat("no volume was shown in time; display \"", info_.name, "\" is ",
+                     DisplayStateName(state_), ": ", state_reason_)));
+  }
+}
+
+}  // namespace voxeld::display

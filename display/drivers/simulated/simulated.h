@@ -1,0 +1,37 @@
+// The display that everybody has: the voxlink driver, with a device model of voxlink at the other
+// end of a cable that lies inside this process. Same driver, same wire bytes as a real one.
+#pragma once
+
+#include <memory>
+
+#include "absl/status/statusor.h"
+#include "display/api/display.h"
+#include "display/drivers/options.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::display {
+class InProcessTransport;
+namespace emulator {
+class FaultInjector;
+class VoxlinkDevice;
+}  // namespace emulator
+}  // namespace voxeld::display
+
+namespace voxeld::display::simulated {
+
+// README.md lists the options.
+absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options, sync::Clock& clock);
+
+// The same with its insides, which belong to `display`. The device and the faults may be touched
+// within transport->WithDevice only.
+struct Parts {
+  std::unique_ptr<Display> display;
+  InProcessTransport* transport = nullptr;
+  emulator::FaultInjector* faults = nullptr;
+  emulator::VoxlinkDevice* device = nullptr;
+};
+// `own_thread` false: nothing happens but when transport->Pump is called.
+absl::StatusOr<Parts> CreateParts(const DisplayOptions& options, sync::Clock& clock,
+                                  bool own_thread);
+
+}  // namespace voxeld::display::simulated

@@ -1,0 +1,34 @@
+// Capabilities of a voxlink device (docs/protocols/voxlink.md §4.1, §4.2) to and from a display's
+// geometry.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/api/geometry.h"
+#include "display/api/slice_frame.h"
+#include "display/drivers/voxlink/protocol.h"
+
+namespace voxeld::display::voxlink {
+
+struct DeviceCapabilities {
+  Capabilities fixed{};
+  Geometry geometry;  // the shape; the grid is the host's affair and stays empty
+};
+
+// The block as GET_CAPABILITIES sends it, page after page; `fixed.total_length`, `slices`, `width`
+// and `height` are set from the geometry.
+std::vector<std::byte> EncodeCapabilities(const DeviceCapabilities& capabilities);
+
+// From an unknown device: every field is checked. DataLoss with the field and its value.
+absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> block);
+
+// FailedPrecondition, with what was asked for and what the device has, if it cannot show `layout`
+// on `geometry` (grids are not compared).
+absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
+                               const FrameLayout& layout);
+
+}  // namespace voxeld::display::voxlink

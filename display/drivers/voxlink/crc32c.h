@@ -1,0 +1,18 @@
+// CRC-32C (Castagnoli), reflected, initial value and final XOR all ones: docs/protocols/voxlink.md
+// §5.6. The check value of "123456789" is 0xE3069283.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace voxeld::display::voxlink {
+
+// Of `bytes` after bytes whose CRC was `crc` (0 for none). By the processor's instruction where it
+// has one.
+uint32_t Crc32c(std::span<const std::byte> bytes, uint32_t crc = 0);
+
+// The same by table, on any machine.
+uint32_t Crc32cPortable(std::span<const std::byte> bytes, uint32_t crc = 0);
+
+}  // namespace voxeld::display::voxlink

@@ -1,0 +1,72 @@
+// Packets of voxlink (docs/protocols/voxlink.md §5): writing them, and finding them in a stream of
+// bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "display/drivers/voxlink/protocol.h"
+
+namespace voxeld::display::voxlink {
+
+// Appends packets to a buffer and numbers them.
+class PacketWriter {
+ public:
+  // The next packet's number.
+  uint32_t sequence() const { return sequence_; }
+  // The stream begins anew (START).
+  void Restart() { sequence_ = 0; }
+
+  void Slice(std::vector<std::byte>& out, uint64_t volume, uint32_t slice, uint16_t sub_frame,
+             uint32_t offset, std::span<const std::byte> payload);
+  // `bitmap` is empty for base 0.
+  void Begin(std::vector<std::byte>& out, uint64_t volume, uint64_t base, uint32_t pictures,
+             std::span<const std::byte> bitmap);
+  void End(std::vector<std::byte>& out, uint64_t volume, bool show);
+  void Show(std::vector<std::byte>& out, uint64_t volume, uint64_t sweep);
+  // ABORT, DROP and KEEPALIVE carry nothing (volume 0 for the last).
+  void Plain(std::vector<std::byte>& out, PacketType type, uint64_t volume);
+
+ private:
+  // Fills in what all packets share; sequence and sums included.
+  void Put(std::vector<std::byte>& out, PacketHeader header, std::span<const std::byte> head,
+           std::span<const std::byte> tail);
+
+  uint32_t sequence_ = 0;
+};
+
+// Finds packets in a stream that may be cut anywhere, and finds its feet again after damage: what
+// is not a sound header is skipped byte by byte. Holds at most one packet.
+class PacketParser {
+ public:
+  struct Sink {
+    virtual ~Sink() = default;
+    // Header and payload are sound; `payload` is valid during the call.
+    virtual void OnPacket(const PacketHeader& header, std::span<const std::byte> payload) = 0;
+    // The header is sound, the payload is not.
+    virtual void OnBadPayload(const PacketHeader& header) = 0;
+    // `bytes` that belong to no packet were skipped, just before what follows.
+    virtual void OnSkipped(size_t bytes) = 0;
+  };
+
+  // A header that announces more than `max_payload` bytes is not sound.
+  explicit PacketParser(uint32_t max_payload) : max_payload_(max_payload) {}
+
+  void Feed(std::span<const std::byte> bytes, Sink& sink);
+  // Bytes of a packet that has begun and not ended.
+  size_t pending() const { return partial_.size(); }
+  void Reset();
+
+ private:
+  bool SoundHeader(std::span<const std::byte> bytes) const;
+  void Deliver(std::span<const std::byte> packet, Sink& sink);
+  void FlushSkipped(Sink& sink);
+
+  uint32_t max_payload_;
+  std::vector<std::byte> partial_;  // a packet's beginning, carried over from one Feed to the next
+  size_t skipped_ = 0;
+};
+
+}  // namespace voxeld::display::voxlink

@@ -1,0 +1,290 @@
+#include "display/drivers/voxlink/voxlink_display.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "display/drivers/voxlink/decoder.h"
+
+namespace voxeld::display::voxlink {
+namespace {
+
+constexpr sync::TimeNs kFirstRetry = 100 * sync::kMillisecond;
+constexpr sync::TimeNs kLongestRetry = 5 * sync::kSecond;
+constexpr sync::TimeNs kReadyLimit = sync::kSecond;
+// Earlier than the protocol's 100 ms, for the jitter of the owner's thread.
+constexpr sync::TimeNs kKeepaliveAfter = 70 * sync::kMillisecond;
+constexpr sync::TimeNs kClockWindow = 5 * sync::kSecond;
+
+// An interface of the protocol with its two endpoints, in a configuration descriptor.
+absl::Status CheckDescriptor(std::span<const std::byte> descriptor) {
+  bool ours = false, out = false, in = false;
+  while (descriptor.size() >= 2) {
+    const size_t length = std::to_integer<size_t>(descriptor[0]);
+    if (length < 2 || length > descriptor.size()) break;
+    const auto at = [&](size_t i) { return std::to_integer<int>(descriptor[i]); };
+    if (at(1) == 4 && length >= 9) {
+      ours = at(5) == kInterfaceClass && at(6) == kInterfaceSubclass && at(7) == kInterfaceProtocol;
+    } else if (at(1) == 5 && length >= 7 && ours) {
+      out |= at(2) == kBulkOut && (at(3) & 3) == 2;
+      in |= at(2) == kInterruptIn && (at(3) & 3) == 3;
+    }
+    descriptor = descriptor.subspan(length);
+  }
+  if (out && in) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      "the device has no voxlink interface (class FF, subclass 56, protocol 01, bulk OUT 01, "
+      "interrupt IN 82)");
+}
+
+uint16_t WireBrightness(double brightness) {
+  return static_cast<uint16_t>(std::lround(brightness * 65535));
+}
+
+}  // namespace
+
+VoxlinkDisplay::VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> transport,
+                               sync::Clock& clock, VoxlinkLink::Options options)
+    : Display(std::move(info), clock), link_(std::move(transport), clock, this, options) {}
+
+VoxlinkDisplay::~VoxlinkDisplay() { Stop(); }
+
+void VoxlinkDisplay::ClockMap::Note(uint64_t device_ns, sync::TimeNs host_ns) {
+  const int64_t difference = host_ns - static_cast<int64_t>(device_ns);
+  if (!known) {
+    known = true;
+    offset = coming = difference;
+    window_end = host_ns + kClockWindow;
+  }
+  if (host_ns >= window_end) {
+    offset = coming;
+    coming = difference;
+    window_end = host_ns + kClockWindow;
+  }
+  coming = std::min(coming, difference);
+  offset = std::min(offset, difference);
+}
+
+// ---- life
+
+absl::Status VoxlinkDisplay::DoStart() {
+  link_.transport().SetWake([this] { Wake(); });
+  phase_ = Phase::kDetached;
+  attach_at_ = clock().Now();
+  retry_delay_ = 0;
+  Wake();
+  return absl::OkStatus();
+}
+
+void VoxlinkDisplay::DoStop() {
+  if (phase_ == Phase::kReady) link_.Write(Request::kStop, 0);
+  link_.transport().SetWake(nullptr);
+  link_.Close();
+  phase_ = Phase::kDetached;
+  sending_ = Sending{};
+}
+
+void VoxlinkDisplay::OnLinkFailed(const std::string& reason) {
+  link_.Close();
+  phase_ = Phase::kDetached;
+  retry_delay_ = retry_delay_ == 0 ? kFirstRetry : std::min(2 * retry_delay_, kLongestRetry);
+  attach_at_ = clock().Now() + retry_delay_;
+  const uint64_t bytes = sending_.bytes;
+  sending_ = Sending{};
+  sweep_.reset();
+  DeviceLost(reason, bytes);
+}
+
+sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
+  link_.Poll();
+  if (phase_ == Phase::kDetached && now >= attach_at_) TryAttach(now);
+  const sync::TimeNs next = Advance(now);
+  return link_.failed() ? now : next;
+}
+
+sync::TimeNs VoxlinkDisplay::Advance(sync::TimeNs now) {
+  if (phase_ == Phase::kDetached) return attach_at_;
+  if (phase_ == Phase::kSettingUp) return sync::kNever;  // requests have their own time limit
+  if (phase_ == Phase::kWaitingReady) {
+    if (now < ready_by_) return ready_by_;
+    OnLinkFailed("the device did not start its session");
+    return attach_at_;
+  }
+  const sync::TimeNs check = CheckOnVolume(now);
+  if (phase_ != Phase::kReady) return attach_at_;
+  Pump();
+  return std::min(check, KeepAlive(now));
+}
+
+sync::TimeNs VoxlinkDisplay::KeepAlive(sync::TimeNs now) {
+  if (link_.bulk_in_flight() > 0 || link_.recovering()) return sync::kNever;  // a completion wakes
+  const sync::TimeNs due = link_.last_sent() + kKeepaliveAfter;
+  if (now < due) return due;
+  if (link_.Room() < sizeof(PacketHeader)) return now + kKeepaliveAfter;
+  std::vector<std::byte> buffer = link_.TakeBuffer();
+  writer_.Plain(buffer, PacketType::kKeepalive, 0);
+  mutable_stats().bytes_out += buffer.size();
+  TapOut(kBulkOut, buffer);
+  link_.Send(std::move(buffer));
+  return now + kKeepaliveAfter;
+}
+
+// ---- attach: docs/protocols/voxlink.md §9
+
+void VoxlinkDisplay::TryAttach(sync::TimeNs now) {
+  const absl::Status status = link_.Open();
+  if (!status.ok()) {
+    retry_delay_ = retry_delay_ == 0 ? kFirstRetry : std::min(2 * retry_delay_, kLongestRetry);
+    attach_at_ = now + retry_delay_;
+    if (!absl::IsNotFound(status)) DeviceLost(std::string(status.message()));
+    return;
+  }
+  phase_ = Phase::kSettingUp;
+  capability_bytes_.clear();
+  link_.ReadConfiguration();
+}
+
+void VoxlinkDisplay::OnConfiguration(std::span<const std::byte> descriptor) {
+  const absl::Status status = CheckDescriptor(descriptor);
+  if (!status.ok()) return OnLinkFailed(std::string(status.message()));
+  link_.Read(Request::kGetCapabilities, 0, kCapabilitiesPage);
+}
+
+void VoxlinkDisplay::OnCapabilities(std::span<const std::byte> page) {
+  capability_bytes_.insert(capability_bytes_.end(), page.begin(), page.end());
+  const size_t total =
+      capability_bytes_.size() < sizeof(uint32_t) ? 0 : Load<uint32_t>(capability_bytes_);
+  const size_t have = capability_bytes_.size();
+  if (total > have && total <= kMaxCapabilities && page.size() == kCapabilitiesPage) {
+    return link_.Read(Request::kGetCapabilities, static_cast<uint16_t>(have / kCapabilitiesPage),
+                      kCapabilitiesPage);
+  }
+  absl::StatusOr<DeviceCapabilities> parsed = ParseCapabilities(capability_bytes_);
+  if (!parsed.ok()) return OnLinkFailed(std::string(parsed.status().message()));
+  const absl::Status fits = CheckCapabilities(*parsed, info().geometry, info().layout);
+  if (!fits.ok()) return OnLinkFailed(std::string(fits.message()));
+  const double rate_mhz = std::round(info().volumes_per_second * 1000);
+  if (rate_mhz < parsed->fixed.min_rate_mhz || rate_mhz > parsed->fixed.max_rate_mhz) {
+    return OnLinkFailed(absl::StrCat(
+        "the display is configured for ", info().volumes_per_second, " volumes/s; the device has ",
+        parsed->fixed.min_rate_mhz / 1000.0, " to ", parsed->fixed.max_rate_mhz / 1000.0));
+  }
+  capabilities_ = *std::move(parsed);
+  Configure();
+}
+
+void VoxlinkDisplay::Configure() {
+  fragment_ = std::min<size_t>(capabilities_.fixed.max_payload, link_.bulk_limit() / 4);
+  link_.Write(Request::kStop, 0);
+  Mode mode{};
+  mode.format = static_cast<uint8_t>(info().layout.format);
+  mode.sub_frames = static_cast<uint8_t>(info().layout.sub_frames);
+  mode.rate_mhz = static_cast<uint32_t>(std::lround(info().volumes_per_second * 1000));
+  link_.Write(Request::kSetMode, 0, BytesOf(mode));
+  if ((capabilities_.fixed.features & kFeatureBrightness) != 0) {
+    link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
+  }
+  link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
+  link_.Write(Request::kStart, 0);
+}
+
+void VoxlinkDisplay::OnReply(Request request, std::span<const std::byte> data) {
+  if (request == Request::kGetCapabilities) return OnCapabilities(data);
+  if (request != Request::kStart) return;
+  // The session is there: READY waits for the first read.
+  writer_.Restart();
+  sending_ = Sending{};
+  last_number_ = complete_number_ = complete_frame_ = 0;
+  to_abort_.clear();
+  clock_map_ = ClockMap{};
+  sweep_.reset();
+  session_underruns_ = 0;
+  phase_ = Phase::kWaitingReady;
+  ready_by_ = clock().Now() + kReadyLimit;
+  link_.BeginSession(capabilities_.fixed.receive_buffer);
+}
+
+absl::Status VoxlinkDisplay::DoSetBrightness(double brightness) {
+  if ((capabilities_.fixed.features & kFeatureBrightness) == 0) {
+    return absl::UnimplementedError(
+        absl::StrCat("the device of display \"", info().name, "\" has no brightness"));
+  }
+  link_.Write(Request::kSetBrightness, WireBrightness(brightness));
+  return absl::OkStatus();
+}
+
+absl::Status VoxlinkDisplay::DoSetBlank(bool blank) {
+  link_.Write(Request::kSetBlank, blank ? 1 : 0);
+  return absl::OkStatus();
+}
+
+std::unique_ptr<WireDecoder> VoxlinkDisplay::DoMakeDecoder() const {
+  return std::make_unique<VoxlinkDecoder>(info().layout, capabilities_.fixed.max_payload);
+}
+
+// ---- events
+
+void VoxlinkDisplay::NoteUnderruns(uint32_t total) {
+  if (total <= session_underruns_) return;
+  mutable_stats().underruns += total - session_underruns_;
+  session_underruns_ = total;
+}
+
+void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byte> body) {
+  clock_map_.Note(header.time_ns, clock().Now());
+  const auto fits = [&](size_t size) { return body.size() >= size; };
+  switch (static_cast<EventType>(header.type)) {
+    case EventType::kReady:
+      if (phase_ != Phase::kWaitingReady) return;
+      phase_ = Phase::kReady;
+      ++mutable_stats().attaches;
+      return Attached();
+    case EventType::kSweep:
+      if (!fits(sizeof(SweepEvent))) break;
+      sweep_ = Load<SweepEvent>(body);
+      return NoteUnderruns(sweep_->underruns);
+    case EventType::kUnderrun:
+      if (!fits(sizeof(UnderrunEvent))) break;
+      return NoteUnderruns(Load<UnderrunEvent>(body).total);
+    case EventType::kComplete:
+      if (!fits(sizeof(CompleteEvent))) break;
+      return OnComplete(Load<CompleteEvent>(body).volume);
+    case EventType::kMissing:
+      if (!fits(sizeof(MissingEvent))) break;
+      return OnMissing(header, Load<MissingEvent>(body));
+    case EventType::kAborted:
+      if (!fits(sizeof(VolumeEvent))) break;
+      return OnRefused(Load<VolumeEvent>(body), false);
+    case EventType::kDropped:
+      if (!fits(sizeof(VolumeEvent))) break;
+      return OnRefused(Load<VolumeEvent>(body), true);
+    case EventType::kShown: {
+      if (!fits(sizeof(ShownEvent))) break;
+      const auto shown = Load<ShownEvent>(body);
+      return OnShown(shown.volume, shown.start_ns, (header.flags & kShownDark) != 0);
+    }
+    case EventType::kCredit:
+    case EventType::kHealth:
+    case EventType::kError:  // what an error damaged, VOLUME_END brings to light
+    case EventType::kLight:
+      return;
+    default:
+      return;  // of a later minor version
+  }
+  OnLinkFailed(
+      absl::StrCat("event ", static_cast<int>(header.type), " has only ", body.size(), " bytes"));
+}
+
+std::vector<sync::TimeNs> VoxlinkDisplay::ComingSweeps(int count) const {
+  std::vector<sync::TimeNs> starts;
+  if (!sweep_ || sweep_->period_ns == 0 || count <= 0) return starts;
+  const sync::TimeNs period = sweep_->period_ns;
+  const sync::TimeNs last = clock_map_.ToHost(sweep_->start_ns);
+  const sync::TimeNs since = std::max<sync::TimeNs>(clock().Now() - last, 0);
+  sync::TimeNs next = last + (since / period + 1) * period;
+  for (int i = 0; i < count; ++i, next += period) starts.push_back(next);
+  return starts;
+}
+
+}  // namespace voxeld::display::voxlink

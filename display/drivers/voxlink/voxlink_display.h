@@ -1,0 +1,118 @@
+// The driver of voxlink 1.x displays, over any USB transport. README.md has its ways; the protocol
+// is in docs/protocols/voxlink.md.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "display/api/display.h"
+#include "display/drivers/voxlink/capabilities.h"
+#include "display/drivers/voxlink/packet.h"
+#include "display/drivers/voxlink/voxlink_link.h"
+
+namespace voxeld::display::voxlink {
+
+class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
+ public:
+  // `info` is what the device must be: attaching to another ends in a state reason that names both.
+  VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> transport, sync::Clock& clock,
+                 VoxlinkLink::Options options = {});
+  ~VoxlinkDisplay() override;
+
+  std::vector<sync::TimeNs> ComingSweeps(int count) const override;
+
+ private:
+  enum class Phase : uint8_t { kDetached, kSettingUp, kWaitingReady, kReady };
+  enum class Stage : uint8_t { kIdle, kBegin, kPictures, kEnd, kAwaitComplete, kAwaitShown };
+
+  // The volume on its way.
+  struct Sending {
+    Stage stage = Stage::kIdle;
+    uint64_t number = 0;  // on the wire
+    uint64_t base = 0;
+    std::vector<uint32_t> pictures;  // to send in this round
+    size_t next = 0;                 // of `pictures`
+    size_t offset = 0;               // in that picture
+    std::vector<bool> announced;
+    std::vector<PictureRun> missing;  // listed so far
+    int rounds = 0;                   // of re-sending
+    int queries = 0;                  // without an answer
+    uint64_t bytes = 0;
+    sync::TimeNs last_byte_ns = 0;
+    uint64_t end_mark = 0;       // kAwaitComplete: link_.sent() after VOLUME_END
+    sync::TimeNs answer_by = 0;  // when to ask at the latest; 0: not known yet
+    sync::TimeNs asked_ns = 0;
+  };
+
+  // Device's clock → ours: the smallest difference seen lately is the least delayed one.
+  struct ClockMap {
+    bool known = false;
+    int64_t offset = 0, coming = 0;  // of the last whole window and of the one that runs
+    sync::TimeNs window_end = 0;
+    void Note(uint64_t device_ns, sync::TimeNs host_ns);
+    sync::TimeNs ToHost(uint64_t device_ns) const {
+      return static_cast<int64_t>(device_ns) + offset;
+    }
+  };
+
+  absl::Status DoStart() override;
+  void DoStop() override;
+  void DoSend(const SliceFramePtr& frame, bool full) override;
+  sync::TimeNs DoTick(sync::TimeNs now) override;
+  absl::Status DoSetBrightness(double brightness) override;
+  absl::Status DoSetBlank(bool blank) override;
+  std::unique_ptr<WireDecoder> DoMakeDecoder() const override;
+
+  void OnEvent(const EventHeader& header, std::span<const std::byte> body) override;
+  void OnReply(Request request, std::span<const std::byte> data) override;
+  void OnConfiguration(std::span<const std::byte> descriptor) override;
+  void OnStatus(const Status& status, bool settled) override;
+  void OnLinkFailed(const std::string& reason) override;
+
+  sync::TimeNs Advance(sync::TimeNs now);
+
+  // Attach.
+  void TryAttach(sync::TimeNs now);
+  void OnCapabilities(std::span<const std::byte> page);
+  void Configure();
+
+  // Volumes.
+  void Begin(const SliceFramePtr& frame, bool full);
+  void Pump();
+  size_t NextPacketSize() const;
+  void WritePacket(std::vector<std::byte>& out);
+  void OnMissing(const EventHeader& header, const MissingEvent& event);
+  void OnComplete(uint64_t volume);
+  void OnShown(uint64_t volume, uint64_t start_ns, bool dark);
+  void OnRefused(const VolumeEvent& event, bool dropped);
+  void SendAgain(const char* why);
+  void Lose(const std::string& reason);
+  sync::TimeNs CheckOnVolume(sync::TimeNs now);
+  sync::TimeNs KeepAlive(sync::TimeNs now);
+  void NoteUnderruns(uint32_t total);
+
+  VoxlinkLink link_;
+  Phase phase_ = Phase::kDetached;
+  sync::TimeNs attach_at_ = 0;
+  sync::TimeNs retry_delay_ = 0;
+  sync::TimeNs ready_by_ = 0;
+  std::vector<std::byte> capability_bytes_;
+  DeviceCapabilities capabilities_;
+
+  PacketWriter writer_;
+  Sending sending_;
+  uint64_t last_number_ = 0;        // wire number of the newest volume of this session
+  uint64_t complete_number_ = 0;    // the last one that the device completed; 0: none
+  uint64_t complete_frame_ = 0;     // and the frame that it was
+  size_t fragment_ = 0;             // the most of a picture that one packet carries
+  std::vector<uint64_t> to_abort_;  // volumes given up, whose ABORT has to go out
+
+  ClockMap clock_map_;
+  std::optional<SweepEvent> sweep_;
+  uint32_t session_underruns_ = 0;
+};
+
+}  // namespace voxeld::display::voxlink

@@ -1,0 +1,51 @@
+// The device's end of a USB cable, as software: what an emulated device is to whatever carries it
+// (this process, usbip, a fake kernel).
+//
+// A model is single-threaded and does no I/O: all calls come from one thread at a time, answers go
+// out through `complete`, from inside any call. Its time is a Clock's; it acts when it is called.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "display/sync/clock.h"
+#include "display/usb/usb_transport.h"
+
+namespace voxeld::display {
+
+struct Urb {
+  uint64_t id = 0;
+  uint8_t endpoint = 0;            // with bit 7 for IN; 0 for control
+  UsbSetup setup;                  // control only
+  std::span<const std::byte> out;  // valid until the URB is complete or unlinked
+  uint32_t length = 0;             // IN: bytes asked for
+};
+
+class UsbDeviceModel {
+ public:
+  // `in` is valid during the call; `actual` counts OUT bytes as well. Must not call the model.
+  using Complete = std::function<void(uint64_t id, TransferStatus status, uint32_t actual,
+                                      std::span<const std::byte> in)>;
+
+  virtual ~UsbDeviceModel() = default;
+
+  virtual void SetComplete(Complete complete) = 0;
+  // Each URB is completed exactly once, unless it is unlinked before.
+  virtual void Submit(const Urb& urb) = 0;
+  // True if it was pending: it will not complete.
+  virtual bool Unlink(uint64_t id) = 0;
+  // Does what is due by the clock.
+  virtual void Tick() = 0;
+  // When Tick has something to do at the latest; kNever if nothing.
+  virtual sync::TimeNs NextTimeout() const = 0;
+
+  // Plugs the cable, or pulls it: then all URBs complete as kDisconnected and the device forgets
+  // its state.
+  virtual void SetPlugged(bool plugged) = 0;
+  virtual bool plugged() const = 0;
+  // Counts the times that it was plugged in: a handle to an earlier plug is stale.
+  virtual uint32_t plugs() const = 0;
+};
+
+}  // namespace voxeld::display
