@@ -1,0 +1,77 @@
+#include "daemon/config/command_line.h"
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "daemon/config/suggest.h"
+
+namespace voxeld::daemon {
+namespace {
+
+std::vector<std::string> OptionNames(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+absl::Status UnknownArgument(const CLI::App& app) {
+  const std::string wrong = app.remaining().empty() ? "" : app.remaining().front();
+  if (wrong.empty() || wrong.front() != '-') {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\"", wrong, "\" is not expected; voxeld takes options only (see --help)"));
+  }
+  const std::string name = wrong.substr(0, wrong.find('='));
+  return absl::InvalidArgumentError(
+      absl::StrCat("unknown option ", name, Suggestion(name, OptionNames(app))));
+}
+
+}  // namespace
+
+absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
+                                             const std::string& version) {
+  CommandLine out;
+  CLI::App app("Volumetric display driver: takes 3D primitives over gRPC, shows them on displays.",
+               "voxeld");
+  app.footer(
+      "ADDR is HOST:PORT or unix:PATH. Without --config the first of $XDG_CONFIG_HOME/voxeld/"
+      "voxeld.toml\n(~/.config), /etc/voxeld/voxeld.toml is read. --listen and --display replace "
+      "the defaults and the file's.");
+  app.add_option("--config", out.config, "Configuration file (TOML)")->type_name("FILE");
+  app.add_option("--listen", out.listen, "Where to serve gRPC; may be repeated")
+      ->type_name("ADDR")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--http", out.http, "Where to serve /healthz and /metrics, or off")
+      ->type_name("ADDR|off");
+  app.add_option("--display", out.displays, "A display and its options; may be repeated")
+      ->type_name("NAME=DRIVER[,KEY=VALUE...]")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--engine", out.engine, "Volume engine")->type_name("auto|cpu|cuda");
+  app.add_option("--log-level", out.log_level, "How much is logged")
+      ->type_name("trace|debug|info|warn|error|off");
+  app.add_option("--log-format", out.log_format, "How it is logged")->type_name("text|json");
+  app.add_flag("--check-config", out.check_config,
+               "Print the configuration in force, or what is wrong with it, and exit");
+  app.set_version_flag("--version", "voxeld " + version, "Print the version and exit");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    out.print_and_exit = app.help();
+  } catch (const CLI::CallForVersion& call) {
+    out.print_and_exit = absl::StrCat(call.what(), "\n");
+  } catch (const CLI::ExtrasError&) {
+    return UnknownArgument(app);
+  } catch (const CLI::ParseError& error) {
+    return absl::InvalidArgumentError(absl::StrCat(error.what(), " (see --help)"));
+  }
+  return out;
+}
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,28 @@
+// voxeld's command line, as it was given. What it means is for ResolveConfig.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace voxeld::daemon {
+
+struct CommandLine {
+  std::optional<std::string> config;  // --config FILE
+  std::vector<std::string> listen;    // --listen ADDR…
+  std::optional<std::string> http;    // --http ADDR|off
+  std::vector<std::string> displays;  // --display NAME=DRIVER[,k=v…]…
+  std::optional<std::string> engine;  // --engine auto|cpu|cuda
+  std::optional<std::string> log_level;
+  std::optional<std::string> log_format;
+  bool check_config = false;
+  std::string print_and_exit;  // not empty: the answer to --help or --version
+};
+
+// InvalidArgument for a usage error, with what would be right.
+absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
+                                             const std::string& version);
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,229 @@
+#include "daemon/config/config.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/config/fields.h"
+#include "daemon/config/suggest.h"
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr const char* kDefaultListen = "127.0.0.1:50551";
+constexpr const char* kDefaultHttp = "127.0.0.1:8088";
+constexpr const char* kSystemFile = "/etc/voxeld/voxeld.toml";
+constexpr const char* kSystemRunFolder = "/run/voxeld";
+constexpr uintmax_t kGreatestFileBytes = 16u << 20;
+
+std::string DefaultSocket(const Environment& environment) {
+  const std::optional<std::string> folder = environment("XDG_RUNTIME_DIR");
+  if (folder.has_value() && folder->starts_with('/')) return *folder + "/voxeld.sock";
+  if (access(kSystemRunFolder, W_OK | X_OK) == 0) {
+    return absl::StrCat(kSystemRunFolder, "/voxeld.sock");
+  }
+  return absl::StrCat("/tmp/voxeld-", geteuid(), "/voxeld.sock");
+}
+
+absl::Status SetDefaults(const Environment& environment, Config* config) {
+  for (const std::string& text :
+       {std::string(kDefaultListen), absl::StrCat("unix:", DefaultSocket(environment))}) {
+    absl::StatusOr<Address> address = ParseAddress(text);
+    if (!address.ok()) return address.status();
+    config->server.listen.push_back(*std::move(address));
+  }
+  absl::StatusOr<Address> http = ParseAddress(kDefaultHttp);
+  if (!http.ok()) return http.status();
+  config->server.http = *std::move(http);
+  config->displays.push_back({"sim", "simulated", {}, "the default"});
+  return absl::OkStatus();
+}
+
+absl::Status ApplyAddresses(const CommandLine& command_line, Config* config) {
+  if (!command_line.listen.empty()) config->server.listen.clear();
+  for (const std::string& text : command_line.listen) {
+    absl::StatusOr<Address> address = ParseAddress(text);
+    if (!address.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--listen: ", address.status().message()));
+    }
+    config->server.listen.push_back(*std::move(address));
+  }
+  if (command_line.http.has_value()) {
+    absl::StatusOr<std::optional<Address>> http = ParseHttp(*command_line.http);
+    if (!http.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--http: ", http.status().message()));
+    }
+    config->server.http = *std::move(http);
+    config->server.http_asked = true;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ApplyDisplays(const CommandLine& command_line, Config* config) {
+  if (command_line.displays.empty()) return absl::OkStatus();
+  config->displays.clear();
+  std::set<std::string> names;
+  for (const std::string& text : command_line.displays) {
+    absl::StatusOr<DisplayConfig> display = ParseDisplayOption(text);
+    if (!display.ok()) return display.status();
+    if (!names.insert(display->name).second) {
+      return absl::InvalidArgumentError(absl::StrCat("--display: there are two displays named \"",
+                                                     display->name, "\"; give each its own name"));
+    }
+    config->displays.push_back(*std::move(display));
+  }
+  return absl::OkStatus();
+}
+
+// A value of the command line for one of the fields with a few possible values.
+struct ChoiceSetter {
+  const char* key;  // the section's and the field's, as in "log.level"
+  const std::optional<std::string>& value;
+  const char* option;
+  std::string section;
+  absl::Status status;
+
+  void Section(const char* name) { section = name; }
+  void Choice(const char* name, std::string& out, std::initializer_list<const char*> values) {
+    if (section + "." + name != key || !value.has_value()) return;
+    const std::vector<std::string> known(values.begin(), values.end());
+    for (const std::string& candidate : known) {
+      if (candidate == *value) {
+        out = *value;
+        return;
+      }
+    }
+    status = absl::InvalidArgumentError(
+        absl::StrCat(option, " is \"", *value, "\"", Suggestion(*value, known)));
+  }
+  void Listen(const char*, std::vector<Address>&) {}
+  void Http(const char*, std::optional<Address>&, bool&) {}
+  void Engine(const char*, gpu::EngineKind&) {}
+  template <typename T>
+  void Integer(const char*, T&, int64_t, int64_t) {}
+  void Real(const char*, double&, double, double) {}
+};
+
+absl::Status ApplyChoice(const char* key, const char* option,
+                         const std::optional<std::string>& value, Config* config) {
+  ChoiceSetter setter{key, value, option, {}, {}};
+  VisitFields(*config, setter);
+  return setter.status;
+}
+
+absl::Status Apply(const CommandLine& command_line, Config* config) {
+  if (absl::Status status = ApplyAddresses(command_line, config); !status.ok()) return status;
+  if (absl::Status status = ApplyDisplays(command_line, config); !status.ok()) return status;
+  if (command_line.engine.has_value()) {
+    const absl::StatusOr<gpu::EngineKind> kind = ParseEngineKind(*command_line.engine);
+    if (!kind.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--engine ", kind.status().message()));
+    }
+    config->engine.kind = *kind;
+  }
+  if (absl::Status status = ApplyChoice("log.level", "--log-level", command_line.log_level, config);
+      !status.ok()) {
+    return status;
+  }
+  return ApplyChoice("log.format", "--log-format", command_line.log_format, config);
+}
+
+}  // namespace
+
+absl::StatusOr<gpu::EngineKind> ParseEngineKind(std::string_view text) {
+  std::vector<std::string> known;
+  for (const gpu::EngineKind kind :
+       {gpu::EngineKind::kAuto, gpu::EngineKind::kCpu, gpu::EngineKind::kCuda}) {
+    known.push_back(EngineKindText(kind));
+    if (known.back() == text) return kind;
+  }
+  return absl::InvalidArgumentError(absl::StrCat(
+      "is \"", absl::string_view(text.data(), text.size()), "\"", Suggestion(text, known)));
+}
+
+std::string EngineKindText(gpu::EngineKind kind) {
+  switch (kind) {
+    case gpu::EngineKind::kAuto:
+      return "auto";
+    case gpu::EngineKind::kCpu:
+      return "cpu";
+    case gpu::EngineKind::kCuda:
+      return "cuda";
+  }
+  return {};
+}
+
+absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text) {
+  if (text == "off") return std::optional<Address>();
+  absl::StatusOr<Address> address = ParseAddress(text);
+  if (!address.ok()) return address.status();
+  return std::optional<Address>(*std::move(address));
+}
+
+Environment ProcessEnvironment() {
+  return [](const char* name) -> std::optional<std::string> {
+    const char* value = std::getenv(name);
+    if (value == nullptr || *value == '\0') return {};
+    return std::string(value);
+  };
+}
+
+absl::Status ReadConfigFile(const std::string& path, Config* config) {
+  std::error_code error;
+  const uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) {
+    return absl::ErrnoToStatus(error.value(), absl::StrCat("the configuration file ", path));
+  }
+  if (size > kGreatestFileBytes) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, " has ", size, " bytes; a configuration has at most ", kGreatestFileBytes));
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file) {
+    return absl::ErrnoToStatus(errno, absl::StrCat("the configuration file ", path));
+  }
+  return ReadConfigText(text.str(), path, config);
+}
+
+std::string FindConfigFile(const Environment& environment,
+                           const std::function<bool(const std::string&)>& exists) {
+  std::optional<std::string> folder = environment("XDG_CONFIG_HOME");
+  if (!folder.has_value() || !folder->starts_with('/')) {
+    folder = environment("HOME");
+    if (folder.has_value()) *folder += "/.config";
+  }
+  if (folder.has_value()) {
+    const std::string own = *folder + "/voxeld/voxeld.toml";
+    if (exists(own)) return own;
+  }
+  return exists(kSystemFile) ? kSystemFile : "";
+}
+
+absl::StatusOr<Config> ResolveConfig(const CommandLine& command_line,
+                                     const Environment& environment) {
+  Config config;
+  if (absl::Status status = SetDefaults(environment, &config); !status.ok()) return status;
+  const std::string file = command_line.config.has_value()
+                               ? *command_line.config
+                               : FindConfigFile(environment, [](const std::string& path) {
+                                   std::error_code error;
+                                   return std::filesystem::exists(path, error);
+                                 });
+  if (!file.empty()) {
+    if (absl::Status status = ReadConfigFile(file, &config); !status.ok()) return status;
+  }
+  if (absl::Status status = Apply(command_line, &config); !status.ok()) return status;
+  return config;
+}
+
+}  // namespace voxeld::daemon

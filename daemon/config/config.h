@@ -1,0 +1,75 @@
+// The daemon's configuration in force: defaults, then a TOML file, then the command line.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "daemon/address/address.h"
+#include "daemon/config/command_line.h"
+#include "daemon/config/display_config.h"
+#include "daemon/scene/operation.h"
+#include "gpu/engine.h"
+
+namespace voxeld::daemon {
+
+struct ServerConfig {
+  std::vector<Address> listen;
+  // Nothing: no http port. `http_asked`: it was asked for, so that a busy one is an error.
+  std::optional<Address> http;
+  bool http_asked = false;
+  uint32_t max_queued_answers = 16384;  // that a client of Stream has not read
+  uint32_t max_http_connections = 64;
+};
+
+struct EngineConfig {
+  gpu::EngineKind kind = gpu::EngineKind::kAuto;
+  uint32_t threads = 0;  // 0: one a core
+  uint64_t staging_limit_bytes = uint64_t{1} << 30;
+};
+
+struct LogConfig {
+  std::string level = "info";   // trace, debug, info, warn, error, off
+  std::string format = "text";  // text, json
+};
+
+struct Config {
+  std::string file;  // that was read; empty: none
+  ServerConfig server;
+  EngineConfig engine;
+  LogConfig log;
+  Limits limits;
+  std::vector<DisplayConfig> displays;
+};
+
+// What the environment says: a variable's value, or nothing.
+using Environment = std::function<std::optional<std::string>(const char* name)>;
+Environment ProcessEnvironment();
+
+// Reads `path` over `config`. Every fault of the file is in the message, one a line, each as
+// "path:line:column: key what was wrong, the value, what would be right". InvalidArgument, or
+// NotFound if there is no such file.
+absl::Status ReadConfigFile(const std::string& path, Config* config);
+
+// The same for text; `name` stands for the path in messages.
+absl::Status ReadConfigText(std::string_view text, const std::string& name, Config* config);
+
+// Which file is read when none is named: $XDG_CONFIG_HOME/voxeld/voxeld.toml (~/.config without
+// it), else /etc/voxeld/voxeld.toml, else none. `exists` says whether a file is there.
+std::string FindConfigFile(const Environment& environment,
+                           const std::function<bool(const std::string&)>& exists);
+
+// Defaults, file, command line. InvalidArgument and NotFound as above.
+absl::StatusOr<Config> ResolveConfig(const CommandLine& command_line,
+                                     const Environment& environment);
+
+// As a file that would read back the same.
+std::string ToToml(const Config& config);
+
+}  // namespace voxeld::daemon

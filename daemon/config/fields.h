@@ -1,0 +1,68 @@
+// Every field of the configuration, once: its section, its key, its range. Reading and printing
+// walk this list.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "daemon/config/config.h"
+
+namespace voxeld::daemon {
+
+// `visitor` has
+//   Section(name)                         what follows belongs to it
+//   Listen(key, addresses&)
+//   Http(key, optional<Address>&, asked&)
+//   Choice(key, string&, {values…})
+//   Engine(key, kind&)
+//   Integer(key, integer&, least, greatest)
+//   Real(key, double&, least, greatest)
+template <typename Visitor, typename ConfigType>
+void VisitFields(ConfigType& config, Visitor& visitor) {
+  constexpr int64_t kMost = std::numeric_limits<int64_t>::max();
+  constexpr int64_t kGiB = int64_t{1} << 30;
+  constexpr int64_t kMost32 = std::numeric_limits<uint32_t>::max();
+
+  visitor.Section("server");
+  visitor.Listen("listen", config.server.listen);
+  visitor.Http("http", config.server.http, config.server.http_asked);
+  visitor.Integer("max_queued_answers", config.server.max_queued_answers, 16, 1 << 24);
+  visitor.Integer("max_http_connections", config.server.max_http_connections, 1, 4096);
+
+  visitor.Section("engine");
+  visitor.Engine("kind", config.engine.kind);
+  visitor.Integer("threads", config.engine.threads, 0, 1024);
+  visitor.Integer("staging_limit_bytes", config.engine.staging_limit_bytes, 1 << 20, 1024 * kGiB);
+
+  visitor.Section("log");
+  visitor.Choice("level", config.log.level, {"trace", "debug", "info", "warn", "error", "off"});
+  visitor.Choice("format", config.log.format, {"text", "json"});
+
+  auto& limits = config.limits;
+  visitor.Section("limits");
+  visitor.Integer("max_message_bytes", limits.max_message_bytes, 1024, 2 * kGiB - 1);
+  visitor.Integer("max_entities_per_owner", limits.max_entities_per_owner, 1, kMost);
+  visitor.Integer("max_layers_per_owner", limits.max_layers_per_owner, 1, kMost);
+  visitor.Integer("max_bytes_per_owner", limits.max_bytes_per_owner, 1, kMost);
+  visitor.Integer("max_vertices_per_entity", limits.max_vertices_per_entity, 1, kMost32);
+  visitor.Integer("max_indices_per_entity", limits.max_indices_per_entity, 1, kMost32);
+  visitor.Integer("max_id_bytes", limits.max_id_bytes, 1, 65536);
+  visitor.Integer("max_operations_per_commit", limits.max_operations_per_commit, 1, kMost32);
+  visitor.Integer("max_uncommitted_bytes", limits.max_uncommitted_bytes, 1, kMost);
+  visitor.Integer("max_instance_depth", limits.max_instance_depth, 1, 8);
+  visitor.Real("max_coordinate_voxels", limits.max_coordinate_voxels, 1, 1073741824);
+  visitor.Integer("max_timed_commits", limits.max_timed_commits, 1, kMost32);
+  visitor.Integer("max_present_at_horizon_ns", limits.max_present_at_horizon_ns, 1, kMost);
+  visitor.Integer("must_show_timeout_ns", limits.must_show_timeout_ns, 1, kMost);
+  visitor.Integer("max_sessions", limits.max_sessions, 1, kMost32);
+  visitor.Integer("max_parts_per_object", limits.max_parts_per_object, 1, kMost32);
+}
+
+// "auto", "cpu", "cuda".
+absl::StatusOr<gpu::EngineKind> ParseEngineKind(std::string_view text);
+std::string EngineKindText(gpu::EngineKind kind);
+
+// An address, or "off".
+absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text);
+
+}  // namespace voxeld::daemon
