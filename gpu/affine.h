@@ -1,5 +1,5 @@
-// Affine maps in double precision, composed and applied in one fixed order of operations, so that every
-// machine gets the same bits (no contraction: the build says so for both compilers).
+// Affine maps in double precision, composed and applied in one fixed order of operations, so that
+// every machine gets the same bits (no contraction: the build says so for both compilers).
 #pragma once
 
 #include <array>
@@ -31,8 +31,7 @@ VOXELD_HD inline Affine Compose(const Affine& outer, const Affine& inner) {
   for (int row = 0; row < 3; ++row) {
     const double* o = outer.m + row * 4;
     for (int col = 0; col < 4; ++col) {
-      const double sum =
-          (o[0] * inner.m[col] + o[1] * inner.m[4 + col]) + o[2] * inner.m[8 + col];
+      const double sum = (o[0] * inner.m[col] + o[1] * inner.m[4 + col]) + o[2] * inner.m[8 + col];
       r.m[row * 4 + col] = col == 3 ? sum + o[3] : sum;
     }
   }

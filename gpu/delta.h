@@ -1,12 +1,12 @@
 // A scene's change as flat bytes: what goes through the engine's door, whoever is behind it.
 //
-// A delta is a sequence of records, each 16-byte aligned: RecordHeader, a fixed struct, arrays. Little-endian;
-// no pointers; ids are the caller's and unique within their kind. Records apply in order; order between
-// drawables has no influence on what is drawn.
+// A delta is a sequence of records, each 16-byte aligned: RecordHeader, a fixed struct, arrays.
+// Little-endian; no pointers; ids are the caller's and unique within their kind. Records apply in
+// order; order between drawables has no influence on what is drawn.
 //
-//   geometry  immutable content: a kind of primitive, its parameters and arrays, in its own coordinates
-//   drawable  puts a geometry into a layer, under a transform, with a priority; several may share one
-//   layer     how its voxels combine with those below
+//   geometry  immutable content: a kind of primitive, its parameters and arrays, in its own
+//   coordinates drawable  puts a geometry into a layer, under a transform, with a priority; several
+//   may share one layer     how its voxels combine with those below
 #pragma once
 
 #include <cstddef>
@@ -70,7 +70,8 @@ struct GeometryRecord {
   Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder
   Topology topology = Topology::kList;          // kSegments
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  float thickness = 0;  // diameter of points and segments; 0: one voxel. kUnits: scaled by ∛|det| of the map
+  float thickness =
+      0;  // diameter of points and segments; 0: one voxel. kUnits: scaled by ∛|det| of the map
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand
   float params[8] = {};
@@ -97,19 +98,22 @@ struct LayerRecord {
   Affine transform;  // layer's coordinates → scene's
 };
 
-// Appends records to a span. Overruns are counted, not written: size the span with the Size functions.
+// Appends records to a span. Overruns are counted, not written: size the span with the Size
+// functions.
 class DeltaWriter {
  public:
   explicit DeltaWriter(std::span<std::byte> out) : out_(out) {}
 
   static size_t SizeOf(const GeometryRecord& g);
-  static size_t SizeOf(const DrawableRecord&) { return sizeof(RecordHeader) + sizeof(DrawableRecord); }
+  static size_t SizeOf(const DrawableRecord&) {
+    return sizeof(RecordHeader) + sizeof(DrawableRecord);
+  }
   static size_t SizeOf(const LayerRecord&) { return sizeof(RecordHeader) + sizeof(LayerRecord); }
   static constexpr size_t kSizeOfId = sizeof(RecordHeader) + sizeof(IdRecord);
   static constexpr size_t kSizeOfReset = sizeof(RecordHeader);
 
-  // Spans must have the lengths that the record states (indices: index_count; colors: vertex_count with
-  // kPerVertex, else empty).
+  // Spans must have the lengths that the record states (indices: index_count; colors: vertex_count
+  // with kPerVertex, else empty).
   void PutGeometry(const GeometryRecord& g, std::span<const float> positions,
                    std::span<const uint32_t> indices, std::span<const uint32_t> colors);
   void PutDrawable(const DrawableRecord& d);
@@ -147,8 +151,9 @@ struct DeltaVisitor {
   virtual absl::Status OnReset() = 0;
 };
 
-// Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands it to `visitor`.
-// InvalidArgument with the byte offset, the value and what would be right. `delta` is 16-byte aligned.
+// Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands it to
+// `visitor`. InvalidArgument with the byte offset, the value and what would be right. `delta` is
+// 16-byte aligned.
 absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor);
 
 }  // namespace voxeld::gpu

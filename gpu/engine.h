@@ -2,21 +2,27 @@
 //
 //   StatusOr<unique_ptr<Engine>> engine = CreateEngine({.kind = EngineKind::kAuto});
 //   engine->SetTarget(target, done);                     // which display, which view
-//   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared with a process
-//   DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
+//   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared with a
+//   process DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
 //   engine->Apply(std::move(block), writer.size(), done);
 //   engine->SubmitFrame({.frame = 7}, buffer, done);
 //
 // Contract
-// - Calls are carried out in the order in which they were made; each ends in exactly one call of its
-//   `done`, from a thread of the engine's (or inside the call, with EngineOptions::inline_execution).
-//   `done` must only post: it must not call the engine, block, or throw.
-// - No pointer passes for keeps: the engine owns a staging block from Apply on; a FrameBuffer belongs to
+// - Calls are carried out in the order in which they were made; each ends in exactly one call of
+// its
+//   `done`, from a thread of the engine's (or inside the call, with
+//   EngineOptions::inline_execution); those not begun when the engine is destroyed end in
+//   Cancelled, before its destructor returns. `done` must only post: it must not call the engine,
+//   block, or throw.
+// - No pointer passes for keeps: the engine owns a staging block from Apply on; a FrameBuffer
+// belongs to
 //   the caller, is written only between SubmitFrame and its `done`, and is not remembered.
-// - For any scene every engine gives the same bytes, in any number of threads, parts and frames between.
-// - An error leaves the engine as it was before that call, unless the code is DataLoss: then the engine is
-//   gone, every later call ends in DataLoss, and its owner makes a new one and gives it the whole scene
-//   (what an engine holds is always derived).
+// - For any scene every engine gives the same bytes, in any number of threads, parts and frames
+// between.
+// - An error leaves the engine as it was before that call, unless the code is DataLoss: then the
+// engine is
+//   gone, every later call ends in DataLoss, and its owner makes a new one and gives it the whole
+//   scene (what an engine holds is always derived).
 // - Thread-safe.
 #pragma once
 
@@ -39,8 +45,9 @@ namespace voxeld::gpu {
 enum class EngineKind : uint8_t { kAuto, kCpu, kCuda };
 const char* EngineKindName(EngineKind kind);
 
-// The slices that an engine owns, [begin, end) of the layout's; it draws only the tiles that they look
-// at. Several engines, each with a part, make one display: their slices joined equal the whole's.
+// The slices that an engine owns, [begin, end) of the layout's; it draws only the tiles that they
+// look at. Several engines, each with a part, make one display: their slices joined equal the
+// whole's.
 struct SlicePart {
   int32_t begin = 0;
   int32_t end = -1;  // −1: to the last
@@ -60,7 +67,8 @@ struct EngineInfo {
   std::string reason;                  // why this kind: "no CUDA driver", "asked for", …
 };
 
-// The display that an engine draws for. `view` maps scene units to voxel space (voxel i = [i, i+1)).
+// The display that an engine draws for. `view` maps scene units to voxel space (voxel i = [i,
+// i+1)).
 struct Target {
   display::Geometry geometry;
   display::FrameLayout layout;
@@ -68,7 +76,8 @@ struct Target {
   Affine view;
 };
 
-// Staging memory, written by the caller before it goes to Apply. Movable; given back on destruction.
+// Staging memory, written by the caller before it goes to Apply. Movable; given back on
+// destruction.
 class StagingBlock {
  public:
   struct Memory {
@@ -86,23 +95,25 @@ class StagingBlock {
 
 struct FrameRequest {
   uint64_t frame = 0;  // ascending; recorded as the frame in which a picture's bytes changed
-  // The last frame that this very buffer held, whole; 0: none. Pictures that have not changed since then
-  // are not written again.
+  // The last frame that this very buffer held, whole; 0: none. Pictures that have not changed since
+  // then are not written again.
   uint64_t buffer_holds = 0;
 };
 
-// Caller's memory. Sizes are the whole layout's, also when the engine owns a part: it writes its slices.
+// Caller's memory. Sizes are the whole layout's, also when the engine owns a part: it writes its
+// slices.
 struct FrameBuffer {
-  std::span<std::byte> bytes;       // layout.bytes()
-  std::span<uint64_t> changed_in;   // layout.pictures()
+  std::span<std::byte> bytes;      // layout.bytes()
+  std::span<uint64_t> changed_in;  // layout.pictures()
 };
 
 struct FrameResult {
   uint64_t frame = 0;
-  bool changed = false;        // some picture differs from the frame before
-  uint64_t lit_voxels = 0;     // of the engine's tiles: result not black
-  uint32_t tiles_drawn = 0;    // dirty tiles drawn for this frame
-  uint32_t pictures_drawn = 0; // pictures sliced again
+  bool changed = false;             // some picture differs from the frame before
+  uint64_t lit_voxels = 0;          // of the engine's tiles: result not black
+  uint32_t tiles_drawn = 0;         // dirty tiles drawn for this frame
+  uint32_t pictures_drawn = 0;      // pictures sliced again
+  uint32_t singular_drawables = 0;  // solids whose map has no inverse: they draw nothing
   int64_t assemble_ns = 0, slice_ns = 0;
 };
 
@@ -120,8 +131,8 @@ class Engine {
 
   virtual const EngineInfo& info() const = 0;
 
-  // Sets or replaces the target; the scene stays, everything is drawn anew. InvalidArgument for a geometry
-  // or layout that does not hold together. Must come before the first frame.
+  // Sets or replaces the target; the scene stays, everything is drawn anew. InvalidArgument for a
+  // geometry or layout that does not hold together. Must come before the first frame.
   virtual void SetTarget(Target target, Done done) = 0;
 
   // `size` bytes of staging memory. ResourceExhausted past the limit.
@@ -134,8 +145,8 @@ class Engine {
   // Brings the scene up to date, and `buffer` up to `request.frame`.
   virtual void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) = 0;
 
-  // The blended voxels of `box`, x fastest, as 0x00RRGGBB; those outside the engine's tiles are 0. For
-  // tests and tools: brings the scene up to date first.
+  // The blended voxels of `box`, x fastest, as 0x00RRGGBB; those outside the engine's tiles are 0.
+  // For tests and tools: brings the scene up to date first.
   virtual void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) = 0;
 };
 

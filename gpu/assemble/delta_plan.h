@@ -1,0 +1,32 @@
+// A delta read and checked against the scene, before anything of it is applied.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "gpu/assemble/scene.h"
+#include "gpu/delta.h"
+
+namespace voxeld::gpu {
+
+struct DropStep {
+  Op op;
+  uint64_t id;
+};
+struct ResetStep {};
+using DeltaStep = std::variant<GeometryView, DrawableRecord, LayerRecord, DropStep, ResetStep>;
+
+struct DeltaPlan {
+  std::vector<DeltaStep> steps;
+  // Dropped, and not put again later in the delta. They have no users at its end.
+  std::vector<uint64_t> geometries_to_erase, layers_to_erase;
+};
+
+// InvalidArgument for what ReadDelta refuses, for an id that is not new where it must be or does
+// not exist where it must, and for drawables left without their geometry or layer.
+absl::StatusOr<DeltaPlan> PlanDelta(std::span<const std::byte> delta, const Scene& scene);
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,133 @@
+#include "gpu/assemble/scene.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "gpu/assemble/delta_plan.h"
+
+namespace voxeld::gpu {
+
+int64_t Scene::GeometryUses(uint64_t id) const {
+  const auto it = geometries_.find(id);
+  return it == geometries_.end() ? -1 : static_cast<int64_t>(it->second.users.size());
+}
+
+int64_t Scene::LayerUses(uint64_t id) const {
+  const auto it = layers_.find(id);
+  return it == layers_.end() ? -1 : static_cast<int64_t>(it->second->drawables.size());
+}
+
+const Drawable* Scene::FindDrawable(uint64_t id) const {
+  const auto it = drawables_.find(id);
+  return it == drawables_.end() ? nullptr : it->second.get();
+}
+
+void Scene::PutGeometry(const GeometryView& view,
+                        const std::shared_ptr<StagingBlock::Memory>& block,
+                        SceneObserver& observer) {
+  auto geometry = std::make_shared<RetainedGeometry>();
+  geometry->view = view;
+  if (!view.positions.empty()) geometry->block = block;
+  GeometryEntry& entry = geometries_[view.record.id];
+  entry.geometry = std::move(geometry);
+  // Only after a drop in the same delta can it have users already.
+  for (Drawable* drawable : entry.users) {
+    observer.OnLeave(*drawable);
+    drawable->geometry = entry.geometry;
+    observer.OnEnter(*drawable);
+  }
+}
+
+std::unique_ptr<Drawable> Scene::TakeDrawable(uint64_t id, SceneObserver& observer) {
+  auto node = drawables_.extract(id);
+  std::unique_ptr<Drawable> drawable = std::move(node.mapped());
+  observer.OnLeave(*drawable);
+  drawable->layer->drawables.erase(drawable.get());
+  geometries_[drawable->record.geometry].users.erase(drawable.get());
+  drawable->layer = nullptr;
+  drawable->geometry = nullptr;
+  return drawable;
+}
+
+void Scene::PutDrawable(const DrawableRecord& record, SceneObserver& observer) {
+  std::unique_ptr<Drawable>& slot = drawables_[record.id];
+  if (slot == nullptr) {
+    slot = std::make_unique<Drawable>();
+  } else {
+    observer.OnLeave(*slot);
+    slot->layer->drawables.erase(slot.get());
+    geometries_[slot->record.geometry].users.erase(slot.get());
+  }
+  slot->record = record;
+  slot->geometry = geometries_[record.geometry].geometry;
+  slot->layer = layers_[record.layer].get();
+  geometries_[record.geometry].users.insert(slot.get());
+  slot->layer->drawables.insert(slot.get());
+  observer.OnEnter(*slot);
+}
+
+void Scene::PutLayer(const LayerRecord& record, SceneObserver& observer) {
+  std::unique_ptr<Layer>& slot = layers_[record.id];
+  if (slot == nullptr) {
+    slot = std::make_unique<Layer>();
+    slot->record = record;
+    return;
+  }
+  observer.OnLayerLook(*slot, record);
+  const bool moved = !(slot->record.transform == record.transform);
+  if (moved) {
+    for (Drawable* drawable : slot->drawables) observer.OnLeave(*drawable);
+  }
+  slot->record = record;
+  if (moved) {
+    for (Drawable* drawable : slot->drawables) observer.OnEnter(*drawable);
+  }
+}
+
+void Scene::RankLayers() {
+  std::vector<Layer*> layers;
+  for (const auto& [id, layer] : layers_) layers.push_back(layer.get());
+  std::sort(layers.begin(), layers.end(), [](const Layer* a, const Layer* b) {
+    return std::pair(a->record.order, a->record.id) < std::pair(b->record.order, b->record.id);
+  });
+  for (size_t i = 0; i < layers.size(); ++i) layers[i]->rank = static_cast<int>(i);
+}
+
+absl::Status Scene::Apply(std::span<const std::byte> delta,
+                          const std::shared_ptr<StagingBlock::Memory>& block,
+                          SceneObserver& observer, std::vector<std::unique_ptr<Drawable>>& gone) {
+  absl::StatusOr<DeltaPlan> plan = PlanDelta(delta, *this);
+  if (!plan.ok()) return plan.status();
+  // A record may name a geometry or layer that comes later in the delta.
+  for (const DeltaStep& step : plan->steps) {
+    if (std::holds_alternative<ResetStep>(step)) {
+      for (auto& [id, drawable] : drawables_) {
+        observer.OnLeave(*drawable);
+        drawable->layer = nullptr;
+        drawable->geometry = nullptr;
+        gone.push_back(std::move(drawable));
+      }
+      drawables_.clear();
+      layers_.clear();
+      geometries_.clear();
+    } else if (const auto* geometry = std::get_if<GeometryView>(&step)) {
+      PutGeometry(*geometry, block, observer);
+    } else if (const auto* layer = std::get_if<LayerRecord>(&step)) {
+      PutLayer(*layer, observer);
+    }
+  }
+  for (const DeltaStep& step : plan->steps) {
+    if (const auto* drawable = std::get_if<DrawableRecord>(&step)) {
+      PutDrawable(*drawable, observer);
+    } else if (const auto* drop = std::get_if<DropStep>(&step);
+               drop != nullptr && drop->op == Op::kDropDrawable) {
+      gone.push_back(TakeDrawable(drop->id, observer));
+    }
+  }
+  for (uint64_t id : plan->geometries_to_erase) geometries_.erase(id);
+  for (uint64_t id : plan->layers_to_erase) layers_.erase(id);
+  RankLayers();
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::gpu

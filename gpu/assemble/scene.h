@@ -1,0 +1,91 @@
+// What an engine holds of a scene: geometries, drawables and layers by id, and how a delta changes
+// them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
+#include "absl/status/status.h"
+#include "gpu/assemble/bins.h"
+#include "gpu/delta.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu {
+
+// Immutable. Its arrays lie in the staging block in which they came, which it keeps.
+struct RetainedGeometry {
+  GeometryView view;
+  std::shared_ptr<StagingBlock::Memory> block;  // none if there are no arrays
+};
+
+struct Layer;
+
+struct Drawable {
+  DrawableRecord record;
+  std::shared_ptr<const RetainedGeometry> geometry;
+  Layer* layer = nullptr;
+
+  // Derived, in voxel space; empty while `pending`.
+  std::vector<Int3> vertices;
+  Source source;
+  Bins bins;
+  bool pending = false;  // awaits preparation
+  bool leaving = false;  // its entries are being taken out of the tiles
+};
+
+struct Layer {
+  LayerRecord record;
+  absl::flat_hash_set<Drawable*> drawables;
+  int rank = 0;  // in the order of combination
+};
+
+// Told of changes while a delta is applied, before they are made.
+struct SceneObserver {
+  virtual ~SceneObserver() = default;
+  // It goes, or what it is drawn from changes.
+  virtual void OnLeave(Drawable& drawable) = 0;
+  // It is new, or has changed (after OnLeave); `layer` and `geometry` are set.
+  virtual void OnEnter(Drawable& drawable) = 0;
+  // Its drawables stay as they are, but combine otherwise (visibility, opacity, order, blend).
+  virtual void OnLayerLook(Layer& layer, const LayerRecord& next) = 0;
+};
+
+class Scene {
+ public:
+  // Applies a delta, all of it or, if it is malformed, nothing (InvalidArgument). Drawables that
+  // left and do not come back are moved to `gone`. `delta` lies in `block`.
+  absl::Status Apply(std::span<const std::byte> delta,
+                     const std::shared_ptr<StagingBlock::Memory>& block, SceneObserver& observer,
+                     std::vector<std::unique_ptr<Drawable>>& gone);
+
+  const absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>>& drawables() const {
+    return drawables_;
+  }
+  // How many drawables use it; −1 if there is no such id.
+  int64_t GeometryUses(uint64_t id) const;
+  int64_t LayerUses(uint64_t id) const;
+  const Drawable* FindDrawable(uint64_t id) const;
+
+ private:
+  struct GeometryEntry {
+    std::shared_ptr<const RetainedGeometry> geometry;
+    absl::flat_hash_set<Drawable*> users;
+  };
+
+  void PutGeometry(const GeometryView& view, const std::shared_ptr<StagingBlock::Memory>& block,
+                   SceneObserver& observer);
+  void PutDrawable(const DrawableRecord& record, SceneObserver& observer);
+  void PutLayer(const LayerRecord& record, SceneObserver& observer);
+  std::unique_ptr<Drawable> TakeDrawable(uint64_t id, SceneObserver& observer);
+  void RankLayers();
+
+  absl::flat_hash_map<uint64_t, GeometryEntry> geometries_;
+  absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>> layers_;
+  absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>> drawables_;
+};
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,251 @@
+#include "gpu/assemble/volume.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "gpu/assemble/blend.h"
+
+namespace voxeld::gpu {
+namespace {
+
+constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
+constexpr size_t kVertexRun = 1024;
+
+bool IsSingular(const Drawable& d) {
+  return WithPrimitive(d.geometry->view.record.kind, [&](auto primitive) {
+    return kIsSolid<typename decltype(primitive)::type> && !d.source.solid.drawable;
+  });
+}
+
+// Raises the words of a tile to what its items cover.
+void DrawItems(const Drawable& d, std::span<const uint32_t> items, const Box3& box,
+               uint32_t* words) {
+  const uint32_t priority = d.record.priority;
+  const bool erase = d.record.erase != 0;
+  uint32_t rgb_before = 0;
+  uint32_t word = MakeWord(priority, erase, rgb_before);
+  const auto raise = [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
+    if (rgb != rgb_before) {
+      rgb_before = rgb;
+      word = MakeWord(priority, erase, rgb);
+    }
+    uint32_t& at = words[IndexInTile(x, y, z)];
+    at = std::max(at, word);
+  };
+  WithPrimitive(d.source.record->kind, [&](auto primitive) {
+    for (uint32_t item : items) decltype(primitive)::type::EmitVoxels(d.source, item, box, raise);
+  });
+}
+
+}  // namespace
+
+void TileStore::Reset(const TileGrid& grid) {
+  grid_ = grid;
+  colors_.clear();
+  colors_.resize(grid.count());
+  lit_.assign(grid.count(), 0);
+}
+
+bool TileStore::Set(uint32_t tile, const uint32_t* colors, uint32_t lit) {
+  constexpr size_t kBytes = kTileVoxels * sizeof(uint32_t);
+  std::unique_ptr<uint32_t[]>& held = colors_[tile];
+  if (lit == 0) {
+    lit_[tile] = 0;
+    return std::exchange(held, nullptr) != nullptr;
+  }
+  if (held == nullptr) {
+    held = std::make_unique_for_overwrite<uint32_t[]>(kTileVoxels);
+  } else if (std::memcmp(held.get(), colors, kBytes) == 0) {
+    return false;
+  }
+  std::memcpy(held.get(), colors, kBytes);
+  lit_[tile] = lit;
+  return true;
+}
+
+void Volume::MarkDirty(uint32_t tile) {
+  if (index_[tile].dirty) return;
+  index_[tile].dirty = true;
+  dirty_.push_back(tile);
+}
+
+void Volume::OnLeave(Drawable& drawable) {
+  if (drawable.pending || drawable.leaving) return;  // in no tile, or on its way out already
+  for (uint32_t tile : drawable.bins.tiles) {
+    if (drawable.layer->record.visible != 0) MarkDirty(tile);
+    if (!index_[tile].leaving) {
+      index_[tile].leaving = true;
+      leaving_.push_back(tile);
+    }
+  }
+  singular_ -= IsSingular(drawable);
+  drawable.leaving = true;
+  left_.push_back(&drawable);
+}
+
+void Volume::OnEnter(Drawable& drawable) {
+  if (drawable.pending) return;
+  drawable.pending = true;
+  pending_.push_back(&drawable);
+}
+
+void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
+  const LayerRecord& now = layer.record;
+  const bool same = now.visible == next.visible && now.opacity == next.opacity &&
+                    now.order == next.order && now.blend == next.blend;
+  if (same || (now.visible == 0 && next.visible == 0)) return;
+  for (Drawable* drawable : layer.drawables) {
+    for (uint32_t tile : drawable->bins.tiles) MarkDirty(tile);
+  }
+}
+
+// At a cost that drawing those tiles exceeds.
+void Volume::TakeOutLeaving() {
+  for (uint32_t tile : leaving_) {
+    std::erase_if(index_[tile].entries, [](const Entry& e) { return e.drawable->leaving; });
+    index_[tile].leaving = false;
+  }
+  leaving_.clear();
+  for (Drawable* drawable : left_) {
+    drawable->leaving = false;
+    drawable->bins = {};
+  }
+  left_.clear();
+}
+
+absl::Status Volume::Apply(std::span<const std::byte> delta,
+                           const std::shared_ptr<StagingBlock::Memory>& block) {
+  std::vector<std::unique_ptr<Drawable>> gone;
+  absl::Status status = scene_.Apply(delta, block, *this, gone);
+  TakeOutLeaving();
+  if (!gone.empty()) {
+    std::erase_if(pending_, [](const Drawable* d) { return d->layer == nullptr; });
+  }
+  return status;
+}
+
+void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8_t> owned) {
+  grid_ = grid;
+  view_ = view;
+  owned_ = std::move(owned);
+  index_.clear();
+  index_.resize(grid.count());
+  dirty_.clear();
+  pending_.clear();
+  tiles_.Reset(grid);
+  lit_voxels_ = 0;
+  singular_ = 0;
+  for (const auto& [id, drawable] : scene_.drawables()) {
+    drawable->pending = true;
+    drawable->bins = {};
+    pending_.push_back(drawable.get());
+  }
+  scratch_.resize(static_cast<size_t>(executor_.concurrency()));
+}
+
+void Volume::Prepare(Drawable& d, Executor& executor) const {
+  const GeometryView& view = d.geometry->view;
+  const Affine map = Compose(Compose(view_, d.layer->record.transform), d.record.transform);
+  d.source = {};
+  d.source.record = &view.record;
+  WithPrimitive(view.record.kind, [&](auto primitive) {
+    using Primitive = typename decltype(primitive)::type;
+    if constexpr (kIsSolid<Primitive>) {
+      d.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
+    } else {
+      d.vertices.resize(view.record.vertex_count);
+      const size_t runs = (d.vertices.size() + kVertexRun - 1) / kVertexRun;
+      executor.For(runs, 1, [&](size_t run, int) {
+        const size_t end = std::min(d.vertices.size(), (run + 1) * kVertexRun);
+        for (size_t i = run * kVertexRun; i < end; ++i) {
+          d.vertices[i] = SnapPoint(map, &view.positions[i * 3]);
+        }
+      });
+      d.source.vertices = d.vertices.data();
+      d.source.indices = view.indices.data();
+      d.source.colors = view.colors.data();
+      d.source.radius = RadiusOf(view.record, map);
+    }
+  });
+  d.bins = BinItems(d.source, grid_, owned_, executor);
+}
+
+void Volume::PreparePending() {
+  std::vector<Drawable*> small, large;
+  for (Drawable* d : pending_) {
+    const GeometryRecord& g = d->geometry->view.record;
+    (std::max(g.vertex_count, g.index_count) <= kSmallDrawable ? small : large).push_back(d);
+  }
+  const std::unique_ptr<Executor> serial = MakeSerialExecutor();
+  executor_.For(small.size(), 4, [&](size_t i, int) { Prepare(*small[i], *serial); });
+  for (Drawable* d : large) Prepare(*d, executor_);
+  for (Drawable* d : pending_) {
+    d->pending = false;
+    singular_ += IsSingular(*d);
+    for (uint32_t row = 0; row < d->bins.tiles.size(); ++row) {
+      const uint32_t tile = d->bins.tiles[row];
+      index_[tile].entries.push_back({d, row});
+      if (d->layer->record.visible != 0) MarkDirty(tile);
+    }
+  }
+  pending_.clear();
+}
+
+// Into scratch.colors; returns how many are not black.
+uint32_t Volume::DrawTile(uint32_t tile, Scratch& scratch) const {
+  scratch.entries.clear();
+  for (const Entry& e : index_[tile].entries) {
+    if (e.drawable->layer->record.visible != 0) scratch.entries.push_back(e);
+  }
+  if (scratch.entries.empty()) return 0;
+  const auto rank = [](const Entry& e) { return e.drawable->layer->rank; };
+  std::sort(scratch.entries.begin(), scratch.entries.end(),
+            [&](const Entry& a, const Entry& b) { return rank(a) < rank(b); });
+  const Box3 box = grid_.VoxelsOf(tile);
+  scratch.colors.assign(kTileVoxels, 0);
+  for (size_t i = 0; i < scratch.entries.size();) {
+    const Layer& layer = *scratch.entries[i].drawable->layer;
+    scratch.words.assign(kTileVoxels, 0);
+    for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
+      const Entry& e = scratch.entries[i];
+      DrawItems(*e.drawable, e.drawable->bins.row(e.row), box, scratch.words.data());
+    }
+    const BlendMode mode = layer.record.blend;
+    const uint32_t opacity = layer.record.opacity;
+    for (size_t v = 0; v < kTileVoxels; ++v) {
+      if (scratch.words[v] == 0) continue;
+      scratch.colors[v] = BlendLayer(scratch.colors[v], scratch.words[v], mode, opacity);
+    }
+  }
+  return static_cast<uint32_t>(kTileVoxels -
+                               std::count(scratch.colors.begin(), scratch.colors.end(), 0u));
+}
+
+Volume::Changes Volume::Update() {
+  PreparePending();
+  std::sort(dirty_.begin(), dirty_.end());
+  Changes changes;
+  changes.tiles_drawn = static_cast<uint32_t>(dirty_.size());
+  std::vector<uint8_t> differs(dirty_.size());
+  std::vector<uint32_t> lit_before(dirty_.size());
+  executor_.For(dirty_.size(), 1, [&](size_t i, int worker) {
+    Scratch& scratch = scratch_[static_cast<size_t>(worker)];
+    const uint32_t tile = dirty_[i];
+    lit_before[i] = tiles_.lit(tile);
+    const uint32_t lit = DrawTile(tile, scratch);
+    differs[i] = tiles_.Set(tile, scratch.colors.data(), lit);
+  });
+  for (size_t i = 0; i < dirty_.size(); ++i) {
+    const uint32_t tile = dirty_[i];
+    index_[tile].dirty = false;
+    lit_voxels_ = lit_voxels_ - lit_before[i] + tiles_.lit(tile);
+    if (differs[i] == 0) continue;
+    changes.tiles.push_back(tile);
+    changes.was_lit.push_back(lit_before[i] != 0);
+  }
+  dirty_.clear();
+  return changes;
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,103 @@
+// The voxel volume on the CPU: tiles, the index of what lies in each, and the drawing of those that
+// changed.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "gpu/affine.h"
+#include "gpu/assemble/scene.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/engine.h"
+#include "gpu/primitives/grid.h"
+
+namespace voxeld::gpu {
+
+// Blended colours, interleaved (word.h), of the tiles that have any: a tile without light costs
+// nothing.
+class TileStore {
+ public:
+  void Reset(const TileGrid& grid);
+  const TileGrid& grid() const { return grid_; }
+  // kTileVoxels colours (IndexInTile), or nothing if all are black.
+  const uint32_t* colors(uint32_t tile) const { return colors_[tile].get(); }
+  uint32_t lit(uint32_t tile) const { return lit_[tile]; }
+  // Copies `colors`, of which `lit` are not black. False if the tile is as it was.
+  bool Set(uint32_t tile, const uint32_t* colors, uint32_t lit);
+
+ private:
+  TileGrid grid_;
+  std::vector<std::unique_ptr<uint32_t[]>> colors_;
+  std::vector<uint32_t> lit_;
+};
+
+// Thread-bound; the work inside is spread over `executor`.
+class Volume final : private SceneObserver {
+ public:
+  explicit Volume(Executor& executor) : executor_(executor) {}
+
+  // All or nothing; InvalidArgument for a malformed delta.
+  absl::Status Apply(std::span<const std::byte> delta,
+                     const std::shared_ptr<StagingBlock::Memory>& block);
+
+  // Everything is to be drawn anew, in the tiles with owned[tile] != 0. `view`: scene → voxel
+  // space.
+  void SetView(const TileGrid& grid, const Affine& view, std::vector<uint8_t> owned);
+
+  struct Changes {
+    uint32_t tiles_drawn = 0;
+    std::vector<uint32_t> tiles;   // whose colours differ from before
+    std::vector<uint8_t> was_lit;  // for each of them
+  };
+  // Draws what is dirty.
+  Changes Update();
+
+  const TileStore& tiles() const { return tiles_; }
+  uint64_t lit_voxels() const { return lit_voxels_; }
+  // Solids whose map has no inverse: they draw nothing.
+  uint32_t singular_drawables() const { return singular_; }
+
+ private:
+  struct Entry {
+    Drawable* drawable;
+    uint32_t row;  // of its bins
+  };
+  struct TileIndex {
+    std::vector<Entry> entries;
+    bool dirty = false;
+    bool leaving = false;  // some of its entries' drawables are
+  };
+  struct Scratch {
+    std::vector<uint32_t> words, colors;
+    std::vector<Entry> entries;
+  };
+
+  void OnLeave(Drawable& drawable) override;
+  void OnEnter(Drawable& drawable) override;
+  void OnLayerLook(Layer& layer, const LayerRecord& next) override;
+
+  void MarkDirty(uint32_t tile);
+  void TakeOutLeaving();
+  void Prepare(Drawable& drawable, Executor& executor) const;
+  void PreparePending();
+  uint32_t DrawTile(uint32_t tile, Scratch& scratch) const;
+
+  Executor& executor_;
+  Scene scene_;
+  TileGrid grid_;
+  Affine view_;
+  std::vector<uint8_t> owned_;
+  std::vector<TileIndex> index_;
+  std::vector<uint32_t> dirty_;    // tiles
+  std::vector<uint32_t> leaving_;  // tiles with leaving entries
+  std::vector<Drawable*> pending_, left_;
+  TileStore tiles_;
+  std::vector<Scratch> scratch_;
+  uint64_t lit_voxels_ = 0;
+  uint32_t singular_ = 0;
+};
+
+}  // namespace voxeld::gpu

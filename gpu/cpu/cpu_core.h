@@ -1,0 +1,41 @@
+// The CPU engine's work, without its threads of control: what each call of gpu/engine.h does.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/assemble/volume.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/engine.h"
+#include "gpu/slice/pictures.h"
+
+namespace voxeld::gpu {
+
+// Thread-bound. An error leaves it as it was.
+class CpuCore {
+ public:
+  CpuCore(std::unique_ptr<Executor> executor, SlicePart part);
+
+  absl::Status SetTarget(Target target);
+  absl::Status Apply(const StagingBlock& block, size_t size);
+  absl::StatusOr<FrameResult> SubmitFrame(const FrameRequest& request, FrameBuffer buffer);
+  absl::Status ReadVoxels(VoxelBox box, std::span<uint32_t> out);
+
+ private:
+  absl::Status CheckFrame(const FrameRequest& request, const FrameBuffer& buffer) const;
+  void UpdateVolume();
+
+  const std::unique_ptr<Executor> executor_;
+  const SlicePart part_;
+  std::optional<display::FrameLayout> layout_;  // the target's
+  Volume volume_;
+  Pictures pictures_;
+  Volume::Changes unsliced_;  // changes to the volume that no frame has shown yet
+  uint64_t last_frame_ = 0;
+};
+
+}  // namespace voxeld::gpu

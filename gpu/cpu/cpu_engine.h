@@ -1,0 +1,14 @@
+// The engine on the CPU.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "gpu/engine.h"
+
+namespace voxeld::gpu {
+
+// `reason`: for EngineInfo. `options.kind` is not looked at.
+std::unique_ptr<Engine> CreateCpuEngine(const EngineOptions& options, std::string reason);
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,286 @@
+#include "gpu/delta.h"
+
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::gpu {
+namespace {
+
+constexpr size_t kAlign = 16;
+
+static_assert(std::is_trivially_copyable_v<GeometryRecord> && sizeof(GeometryRecord) % kAlign == 0);
+static_assert(std::is_trivially_copyable_v<DrawableRecord> && sizeof(DrawableRecord) % kAlign == 0);
+static_assert(std::is_trivially_copyable_v<LayerRecord> && sizeof(LayerRecord) % kAlign == 0);
+static_assert(sizeof(RecordHeader) == kAlign && sizeof(IdRecord) == kAlign);
+
+constexpr uint64_t Padded(uint64_t size) { return (size + kAlign - 1) / kAlign * kAlign; }
+
+uint64_t ColorCount(const GeometryRecord& g) {
+  return g.color_mode == ColorMode::kPerVertex ? g.vertex_count : 0;
+}
+
+// Of the three arrays, padding included. Counts are 32-bit, so the sum fits.
+uint64_t ArrayBytes(const GeometryRecord& g) {
+  return Padded(uint64_t{g.vertex_count} * 12) + Padded(uint64_t{g.index_count} * 4) +
+         Padded(ColorCount(g) * 4);
+}
+
+// Builds messages that say where, what, and what would be right.
+class Checker {
+ public:
+  Checker(uint64_t offset, const char* record) : offset_(offset), record_(record) {}
+
+  template <typename Value>
+  absl::Status Wrong(const char* field, const Value& value, const char* right) const {
+    return absl::InvalidArgumentError(absl::StrCat("delta, record at byte ", offset_, ": ", record_,
+                                                   ".", field, " is ", value, ", must be ", right));
+  }
+  absl::Status Enum(const char* field, uint32_t value, uint32_t least, uint32_t greatest) const {
+    if (value >= least && value <= greatest) return absl::OkStatus();
+    return Wrong(field, value, absl::StrCat(least, " to ", greatest).c_str());
+  }
+  template <typename Number>
+  absl::Status Finite(const char* field, const Number* values, size_t count) const {
+    for (size_t i = 0; i < count; ++i) {
+      if (!std::isfinite(values[i])) {
+        return Wrong(absl::StrCat(field, "[", i, "]").c_str(), values[i], "finite");
+      }
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  uint64_t offset_;
+  const char* record_;
+};
+
+absl::Status FirstError(std::initializer_list<absl::Status> statuses) {
+  for (const absl::Status& status : statuses) {
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+bool IsSolid(PrimitiveKind kind) {
+  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
+         kind == PrimitiveKind::kCylinder;
+}
+
+absl::Status CheckSizes(const Checker& check, const GeometryRecord& g) {
+  const int first = 3;
+  const int count = g.kind == PrimitiveKind::kBox ? 3 : g.kind == PrimitiveKind::kSphere ? 1 : 2;
+  for (int i = first; i < first + count; ++i) {
+    if (!(g.params[i] >= 0)) {
+      return check.Wrong(absl::StrCat("params[", i, "]").c_str(), g.params[i], "0 or greater");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
+  absl::Status status =
+      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 6),
+                  check.Enum("color_mode", static_cast<uint32_t>(g.color_mode), 0, 1),
+                  check.Enum("sampling", static_cast<uint32_t>(g.sampling), 0, 2),
+                  check.Enum("rule", static_cast<uint32_t>(g.rule), 0, 1),
+                  check.Enum("fill", static_cast<uint32_t>(g.fill), 0, 1),
+                  check.Enum("topology", static_cast<uint32_t>(g.topology), 0, 2),
+                  check.Enum("thickness_unit", static_cast<uint32_t>(g.thickness_unit), 0, 1),
+                  check.Finite("thickness", &g.thickness, 1), check.Finite("params", g.params, 8)});
+  if (!status.ok()) return status;
+  if (g.thickness < 0) return check.Wrong("thickness", g.thickness, "0 or greater");
+  if (IsSolid(g.kind)) {
+    if (g.vertex_count != 0) return check.Wrong("vertex_count", g.vertex_count, "0 for a solid");
+    if (g.index_count != 0) return check.Wrong("index_count", g.index_count, "0 for a solid");
+    if (g.color_mode != ColorMode::kUniform) {
+      return check.Wrong("color_mode", static_cast<uint32_t>(g.color_mode), "0 for a solid");
+    }
+    return CheckSizes(check, g);
+  }
+  const bool indexed = g.index_count != 0;
+  const uint32_t corners = indexed ? g.index_count : g.vertex_count;
+  const char* field = indexed ? "index_count" : "vertex_count";
+  if (g.kind == PrimitiveKind::kTriangles && corners % 3 != 0) {
+    return check.Wrong(field, corners, "a multiple of 3 for triangles");
+  }
+  if (g.kind == PrimitiveKind::kSegments && g.topology == Topology::kList && corners % 2 != 0) {
+    return check.Wrong(field, corners, "even for a list of segments");
+  }
+  return absl::OkStatus();
+}
+
+// `body`: what follows the header.
+absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
+  const Checker check(offset, "geometry");
+  GeometryView view;
+  if (body.size() < sizeof(GeometryRecord)) {
+    return check.Wrong("size", body.size() + sizeof(RecordHeader), "112 at least");
+  }
+  std::memcpy(&view.record, body.data(), sizeof(GeometryRecord));
+  const GeometryRecord& g = view.record;
+  if (absl::Status status = CheckGeometry(check, g); !status.ok()) return status;
+  const uint64_t expected = sizeof(GeometryRecord) + ArrayBytes(g);
+  if (body.size() != expected) {
+    return check.Wrong(
+        "size", body.size() + sizeof(RecordHeader),
+        absl::StrCat(expected + sizeof(RecordHeader), " for ", g.vertex_count, " vertices, ",
+                     g.index_count, " indices and ", ColorCount(g), " colours")
+            .c_str());
+  }
+  const std::byte* at = body.data() + sizeof(GeometryRecord);
+  view.positions = {reinterpret_cast<const float*>(at), size_t{g.vertex_count} * 3};
+  at += Padded(uint64_t{g.vertex_count} * 12);
+  view.indices = {reinterpret_cast<const uint32_t*>(at), g.index_count};
+  at += Padded(uint64_t{g.index_count} * 4);
+  view.colors = {reinterpret_cast<const uint32_t*>(at), ColorCount(g)};
+  absl::Status status = check.Finite("positions", view.positions.data(), view.positions.size());
+  if (!status.ok()) return status;
+  for (size_t i = 0; i < view.indices.size(); ++i) {
+    if (view.indices[i] >= g.vertex_count) {
+      return check.Wrong(absl::StrCat("indices[", i, "]").c_str(), view.indices[i],
+                         absl::StrCat("less than vertex_count ", g.vertex_count).c_str());
+    }
+  }
+  return visitor.OnGeometry(view);
+}
+
+template <typename Record>
+absl::StatusOr<Record> Fixed(const Checker& check, std::span<const std::byte> body) {
+  if (body.size() != sizeof(Record)) {
+    return check.Wrong("size", body.size() + sizeof(RecordHeader),
+                       absl::StrCat(sizeof(Record) + sizeof(RecordHeader)).c_str());
+  }
+  Record record;
+  std::memcpy(&record, body.data(), sizeof(Record));
+  return record;
+}
+
+absl::Status ReadDrawable(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
+  const Checker check(offset, "drawable");
+  absl::StatusOr<DrawableRecord> d = Fixed<DrawableRecord>(check, body);
+  if (!d.ok()) return d.status();
+  absl::Status status =
+      FirstError({check.Enum("priority", d->priority, 0, 126), check.Enum("erase", d->erase, 0, 1),
+                  check.Finite("transform", d->transform.m, 12)});
+  return status.ok() ? visitor.OnDrawable(*d) : status;
+}
+
+absl::Status ReadLayer(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
+  const Checker check(offset, "layer");
+  absl::StatusOr<LayerRecord> l = Fixed<LayerRecord>(check, body);
+  if (!l.ok()) return l.status();
+  absl::Status status = FirstError({check.Enum("visible", l->visible, 0, 1),
+                                    check.Enum("opacity", l->opacity, 0, 255),
+                                    check.Enum("blend", static_cast<uint32_t>(l->blend), 0, 2),
+                                    check.Finite("transform", l->transform.m, 12)});
+  return status.ok() ? visitor.OnLayer(*l) : status;
+}
+
+absl::Status ReadRecord(Op op, uint64_t offset, std::span<const std::byte> body,
+                        DeltaVisitor& visitor) {
+  switch (op) {
+    case Op::kPutGeometry:
+      return ReadGeometry(offset, body, visitor);
+    case Op::kPutDrawable:
+      return ReadDrawable(offset, body, visitor);
+    case Op::kPutLayer:
+      return ReadLayer(offset, body, visitor);
+    case Op::kDropGeometry:
+    case Op::kDropDrawable:
+    case Op::kDropLayer: {
+      absl::StatusOr<IdRecord> id = Fixed<IdRecord>(Checker(offset, "drop"), body);
+      return id.ok() ? visitor.OnDrop(op, id->id) : id.status();
+    }
+    case Op::kReset:
+      if (!body.empty()) {
+        return Checker(offset, "reset").Wrong("size", body.size() + sizeof(RecordHeader), "16");
+      }
+      return visitor.OnReset();
+  }
+  return Checker(offset, "header").Wrong("op", static_cast<uint32_t>(op), "1 to 7");
+}
+
+}  // namespace
+
+size_t DeltaWriter::SizeOf(const GeometryRecord& g) {
+  return sizeof(RecordHeader) + sizeof(GeometryRecord) + ArrayBytes(g);
+}
+
+void DeltaWriter::Append(const void* data, size_t size) {
+  if (size != 0 && size_ <= out_.size() && size <= out_.size() - size_) {
+    std::memcpy(out_.data() + size_, data, size);
+  }
+  size_ += size;
+}
+
+void DeltaWriter::Pad() {
+  constexpr std::byte kZeros[kAlign] = {};
+  Append(kZeros, Padded(size_) - size_);
+}
+
+void DeltaWriter::Begin(Op op, size_t size) {
+  const RecordHeader header{.op = op, .size = size};
+  Append(&header, sizeof(header));
+}
+
+void DeltaWriter::PutGeometry(const GeometryRecord& g, std::span<const float> positions,
+                              std::span<const uint32_t> indices, std::span<const uint32_t> colors) {
+  Begin(Op::kPutGeometry, SizeOf(g));
+  Append(&g, sizeof(g));
+  Append(positions.data(), positions.size_bytes());
+  Pad();
+  Append(indices.data(), indices.size_bytes());
+  Pad();
+  Append(colors.data(), colors.size_bytes());
+  Pad();
+}
+
+void DeltaWriter::PutDrawable(const DrawableRecord& d) {
+  Begin(Op::kPutDrawable, SizeOf(d));
+  Append(&d, sizeof(d));
+}
+
+void DeltaWriter::PutLayer(const LayerRecord& l) {
+  Begin(Op::kPutLayer, SizeOf(l));
+  Append(&l, sizeof(l));
+}
+
+void DeltaWriter::Drop(Op op, uint64_t id) {
+  const IdRecord record{.id = id};
+  Begin(op, kSizeOfId);
+  Append(&record, sizeof(record));
+}
+
+void DeltaWriter::Reset() { Begin(Op::kReset, kSizeOfReset); }
+
+absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor) {
+  if (reinterpret_cast<uintptr_t>(delta.data()) % kAlign != 0) {
+    return absl::InvalidArgumentError("delta: its memory must be 16-byte aligned");
+  }
+  for (uint64_t offset = 0; offset < delta.size();) {
+    const uint64_t left = delta.size() - offset;
+    const Checker check(offset, "header");
+    if (left < sizeof(RecordHeader)) {
+      return check.Wrong("size", left, "16 at least: the delta is cut off");
+    }
+    RecordHeader header;
+    std::memcpy(&header, delta.data() + offset, sizeof(header));
+    if (header.size < sizeof(RecordHeader) || header.size % kAlign != 0 || header.size > left) {
+      return check.Wrong(
+          "size", header.size,
+          absl::StrCat("a multiple of 16 from 16 to ", left, ", what is left").c_str());
+    }
+    absl::Status status = ReadRecord(
+        header.op, offset,
+        delta.subspan(offset + sizeof(RecordHeader), header.size - sizeof(RecordHeader)), visitor);
+    if (!status.ok()) return status;
+    offset += header.size;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::gpu

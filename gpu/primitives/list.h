@@ -1,0 +1,48 @@
+// Every primitive there is. To add one: its header, its kind in gpu/delta.h, a line here (the
+// compiler asks for it).
+//
+// A primitive is a type with
+//   kKind                            its PrimitiveKind
+//   Count(source)                    how many items a drawable has
+//   EmitTiles(source, i, grid, f)    f(tile) for every tile that item i may touch
+//   EmitVoxels(source, i, box, f)    f(x, y, z, rgb) for exactly the voxels of item i in a box
+//   inside the
+//                                    volume (repetition is allowed)
+//   CanonicalMap(record)             of a solid only
+#pragma once
+
+#include <type_traits>
+
+#include "gpu/primitives/box.h"
+#include "gpu/primitives/cylinder.h"
+#include "gpu/primitives/points.h"
+#include "gpu/primitives/segments.h"
+#include "gpu/primitives/sphere.h"
+#include "gpu/primitives/triangles.h"
+
+namespace voxeld::gpu {
+
+// Calls f(std::type_identity<Primitive>{}) for the primitive of `kind`.
+template <class F>
+decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
+  switch (kind) {
+    case PrimitiveKind::kPoints:
+      return f(std::type_identity<Points>{});
+    case PrimitiveKind::kSegments:
+      return f(std::type_identity<Segments>{});
+    case PrimitiveKind::kTriangles:
+      return f(std::type_identity<Triangles>{});
+    case PrimitiveKind::kBox:
+      return f(std::type_identity<Box>{});
+    case PrimitiveKind::kSphere:
+      return f(std::type_identity<Sphere>{});
+    case PrimitiveKind::kCylinder:
+      return f(std::type_identity<Cylinder>{});
+  }
+  __builtin_unreachable();  // ReadDelta lets no other kind in
+}
+
+template <class Primitive>
+inline constexpr bool kIsSolid = requires(const GeometryRecord& g) { Primitive::CanonicalMap(g); };
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,86 @@
+// What box, sphere and cylinder share: their canonical coordinates.
+//
+// q = inverse linear part · (voxel centre − origin), in IEEE single, in the order written here. The
+// origin is snapped to a unit and split into whole voxels and a rest, so a shift by whole voxels
+// shifts the shape. The inverse is computed in double and rounded once. A row of it with a greatest
+// component beyond kMaxRow is scaled down to it: so a shape thinner than a voxel is drawn one voxel
+// thick. (A voxel's step is then a little less than the shape's thickness of 2, which leaves room
+// for the rounding of q.)
+//
+// A voxel is inside if it lies in `bounds` (a little more than the shape's, in double; part of the
+// definition) and the shape's test of q holds; the voxel of the origin is always covered.
+#pragma once
+
+#include "gpu/affine.h"
+#include "gpu/primitives/fixed.h"
+
+namespace voxeld::gpu {
+
+struct Solid {
+  static constexpr double kMaxRow = 2.0 - 0.0009765625;
+
+  int64_t origin[3] = {};  // voxel
+  int64_t rest[3] = {};    // 0 to 255 units
+  float inverse[3][3] = {};
+  Box3 bounds;
+  bool drawable = false;  // false: no inverse, nothing is drawn
+
+  // `map`: canonical coordinates (each −1 to 1) → voxel space.
+  VOXELD_HD static Solid Of(const Affine& map) {
+    Solid s;
+    const double* m = map.m;
+    const double cofactor[3][3] = {
+        {m[5] * m[10] - m[6] * m[9], m[2] * m[9] - m[1] * m[10], m[1] * m[6] - m[2] * m[5]},
+        {m[6] * m[8] - m[4] * m[10], m[0] * m[10] - m[2] * m[8], m[2] * m[4] - m[0] * m[6]},
+        {m[4] * m[9] - m[5] * m[8], m[1] * m[8] - m[0] * m[9], m[0] * m[5] - m[1] * m[4]}};
+    const double det = (m[0] * cofactor[0][0] + m[1] * cofactor[1][0]) + m[2] * cofactor[2][0];
+    constexpr double kHuge = 1e300;
+    double reach[3] = {};  // of the shape from its origin, voxels
+    for (int r = 0; r < 3; ++r) {
+      double row[3], greatest = 0;
+      for (int c = 0; c < 3; ++c) {
+        row[c] = cofactor[r][c] / det;
+        if (!(Abs(row[c]) < kHuge) || !(Abs(m[c * 4 + r]) < kHuge)) return s;
+        greatest = Max(greatest, Abs(row[c]));
+      }
+      const double scale = greatest > kMaxRow ? kMaxRow / greatest : 1.0;
+      for (int c = 0; c < 3; ++c) {
+        s.inverse[r][c] = static_cast<float>(row[c] * scale);
+        reach[c] = reach[c] + Abs(m[c * 4 + r]) / scale;
+      }
+    }
+    for (int a = 0; a < 3; ++a) {
+      const int64_t units = Snap(m[a * 4 + 3]);
+      s.origin[a] = VoxelOf(units);
+      s.rest[a] = units - s.origin[a] * kUnitsPerVoxel;
+      const int64_t size = reach[a] < 1073741824.0 ? FloorToInt(reach[a] * 1.0001) + 2 : 1 << 30;
+      s.bounds.lo[a] = ToVoxel32(s.origin[a] - size);
+      s.bounds.hi[a] = ToVoxel32(s.origin[a] + size + 1);
+    }
+    s.drawable = true;
+    return s;
+  }
+
+  // Of a voxel's centre from the origin along one axis, in voxels.
+  VOXELD_HD float Distance(int axis, int64_t voxel) const {
+    return static_cast<float>((voxel - origin[axis]) * kUnitsPerVoxel + kHalfVoxel - rest[axis]) *
+           0.00390625f;
+  }
+
+  VOXELD_HD void Canonical(float dx, float dy, float dz, float q[3]) const {
+    for (int r = 0; r < 3; ++r) {
+      q[r] = (inverse[r][0] * dx + inverse[r][1] * dy) + inverse[r][2] * dz;
+    }
+  }
+};
+
+// Whether a voxel is inside. `Shape::Contains(q)` is the test of canonical coordinates.
+template <class Shape>
+VOXELD_HD bool IsInside(const Solid& s, int64_t x, int64_t y, int64_t z) {
+  if (!Contains(s.bounds, x, y, z)) return false;
+  float q[3];
+  s.Canonical(s.Distance(0, x), s.Distance(1, y), s.Distance(2, z), q);
+  return Shape::Contains(q);
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,64 @@
+// A drawable in voxel space, as flat arrays: what every primitive takes its items from.
+#pragma once
+
+#include "gpu/delta.h"
+#include "gpu/primitives/fixed.h"
+#include "gpu/primitives/solid.h"
+
+namespace voxeld::gpu {
+
+struct Source {
+  const GeometryRecord* record = nullptr;
+  const Int3* vertices = nullptr;     // record->vertex_count, mapped and snapped
+  const uint32_t* indices = nullptr;  // record->index_count
+  const uint32_t* colors = nullptr;   // record->vertex_count, with kPerVertex
+  int64_t radius = 0;                 // of points and segments, units; 0: one voxel
+  Solid solid;                        // kBox, kSphere, kCylinder
+
+  // Corners are what indices name, or the vertices as they stand.
+  VOXELD_HD uint32_t corners() const {
+    return record->index_count != 0 ? record->index_count : record->vertex_count;
+  }
+  VOXELD_HD uint32_t VertexOf(uint32_t corner) const {
+    return record->index_count != 0 ? indices[corner] : corner;
+  }
+  VOXELD_HD uint32_t ColorOf(uint32_t vertex) const {
+    return (record->color_mode == ColorMode::kPerVertex ? colors[vertex] : record->color) &
+           0x00FFFFFF;
+  }
+};
+
+// The cube root of x ≥ 0 in IEEE double: a guess from the exponent, then Newton's steps.
+VOXELD_HD inline double CubeRoot(double x) {
+  if (!(x > 0)) return 0;
+  if (x > 1e300) return 1e100;
+  uint64_t bits;
+  std::memcpy(&bits, &x, sizeof(bits));
+  bits = bits / 3 + 0x2A9F7893782DA1CEull;
+  double y;
+  std::memcpy(&y, &bits, sizeof(y));
+  for (int i = 0; i < 6; ++i) y = y - (y * y * y - x) / (3.0 * (y * y));
+  return y;
+}
+
+// Half the thickness, in units. `map`: from the geometry's coordinates to voxel space.
+VOXELD_HD inline int64_t RadiusOf(const GeometryRecord& g, const Affine& map) {
+  double thickness = static_cast<double>(g.thickness);
+  if (g.thickness_unit == ThicknessUnit::kUnits) {
+    const double det = Determinant(map);
+    thickness = thickness * CubeRoot(det < 0 ? -det : det);
+  }
+  return Max<int64_t>(0, Snap(thickness / 2.0));
+}
+
+VOXELD_HD inline Int3 SnapPoint(const Affine& map, const float* p) {
+  const Point3d q =
+      Map(map, static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+  Int3 r;
+  r[0] = Snap(q.x);
+  r[1] = Snap(q.y);
+  r[2] = Snap(q.z);
+  return r;
+}
+
+}  // namespace voxeld::gpu

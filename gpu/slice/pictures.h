@@ -1,0 +1,69 @@
+// The packed pictures of the slices that an engine owns: which are out of date, and since which
+// frame each has its bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/assemble/volume.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/engine.h"
+#include "gpu/slice/sampler.h"
+
+namespace voxeld::gpu {
+
+// What a target comes to.
+struct SlicePlan {
+  display::FrameLayout layout;
+  display::Tone tone;
+  int32_t begin = 0, end = 0;  // the slices owned
+  Sampler sampler;
+  display::TileToSlices tile_to_slices;
+};
+
+// Thread-bound; the work inside is spread over `executor`.
+class Pictures {
+ public:
+  explicit Pictures(Executor& executor) : executor_(executor) {}
+
+  // Everything is to be sliced anew, from a volume that is drawn anew. With the layout as before,
+  // pictures that come out the same keep the frame of their last change.
+  void SetPlan(SlicePlan plan);
+
+  struct Result {
+    bool changed = false;
+    uint32_t pictures_drawn = 0;
+  };
+  // Slices again what looks at `changes`, as pictures of `frame`.
+  Result Update(const TileStore& tiles, const Volume::Changes& changes, uint64_t frame);
+
+  // Writes the pictures that changed after frame `buffer_holds`, and when each did.
+  void CopyTo(FrameBuffer buffer, uint64_t buffer_holds) const;
+
+ private:
+  struct Scratch {
+    SlicePixels pixels;
+    std::vector<uint8_t> picture;
+  };
+
+  uint8_t* picture(size_t index) { return bytes_.data() + index * plan_->layout.bytes_per_slice(); }
+  void MarkSlices(const TileStore& tiles, const Volume::Changes& changes);
+  bool DrawSlice(const TileStore& tiles, int32_t slice, uint64_t frame, Scratch& scratch);
+  void Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
+
+  Executor& executor_;
+  std::optional<SlicePlan> plan_;
+  std::vector<uint8_t> bytes_;        // the owned slices' pictures, from the first on
+  std::vector<uint64_t> changed_in_;  // 0: not drawn yet
+  std::vector<uint32_t> lit_tiles_;   // of each owned slice
+  std::vector<uint8_t> dirty_;        // of each owned slice
+  std::vector<uint8_t> blank_;        // all its pictures are zeros
+  std::vector<Scratch> scratch_;
+};
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,34 @@
+// From linear light to the levels that a display has, with ordered dither. Host and device.
+#pragma once
+
+#include <cstdint>
+
+#include "display/api/slice_frame.h"
+#include "gpu/portable.h"
+
+namespace voxeld::gpu {
+
+// 8×8 Bayer matrix, 0 to 63: column u, row v; the lowest bits of u and v weigh most.
+VOXELD_HD inline uint32_t Bayer8(uint32_t u, uint32_t v) {
+  uint32_t b = 0;
+  for (int bit = 0; bit < 3; ++bit) {
+    b = b << 2 | (((u ^ v) >> bit) & 1u) << 1 | ((v >> bit) & 1u);
+  }
+  return b;
+}
+
+// What is added before rounding down: 0 to 65534. Over sub-frames the matrix' values rotate, so
+// that each pixel runs through evenly spread thresholds.
+VOXELD_HD inline uint32_t Threshold(display::Dither dither, uint32_t u, uint32_t v, uint32_t sub,
+                                    uint32_t sub_frames) {
+  if (dither == display::Dither::kNone) return 32767;
+  const uint32_t b = (Bayer8(u, v) + sub * 64 / sub_frames) % 64;
+  return (2 * b + 1) * 65535 / 128;
+}
+
+// Light 0 to 65535 → 0 to levels − 1. Full light is always the highest level, none the lowest.
+VOXELD_HD inline uint32_t Quantize(uint32_t light, uint32_t levels, uint32_t threshold) {
+  return (light * (levels - 1) + threshold) / 65535;
+}
+
+}  // namespace voxeld::gpu

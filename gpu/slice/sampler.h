@@ -1,0 +1,60 @@
+// The colours of a slice's pixels, from the voxels of their footprints.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/assemble/volume.h"
+
+namespace voxeld::gpu {
+
+// A slice's pixels. `rgb` is 0x00RRGGBB, row-major; only pixels in `lit` may differ from 0.
+struct SlicePixels {
+  std::vector<uint32_t> rgb;
+  std::vector<uint32_t> lit;   // indices
+  std::vector<uint32_t> line;  // scratch of the sampler's
+
+  void Clear(size_t pixels);
+};
+
+// Immutable; used by any number of threads.
+class Sampler {
+ public:
+  // Internal if the table names a voxel outside `grid`.
+  static absl::StatusOr<Sampler> Create(display::FootprintTable table, const TileGrid& grid,
+                                        display::Sampling sampling);
+
+  // `out` is cleared already.
+  void Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
+
+ private:
+  // The inner lists' distinct voxels in a row along an axis; they have consecutive places in a
+  // line.
+  struct Run {
+    int32_t at[3];
+    int axis;
+    int32_t length;
+    uint32_t place;
+  };
+  struct InnerEntry {
+    uint32_t place;
+    uint32_t weight;
+  };
+
+  Sampler() = default;
+  void BuildInner();
+  bool Gather(const TileStore& tiles, const display::FootprintEntry& outer, uint32_t* line) const;
+  void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
+  void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
+
+  display::FootprintTable table_;
+  display::Sampling sampling_ = display::Sampling::kMax;
+  std::vector<Run> runs_;
+  std::vector<InnerEntry> inner_;  // rows as table_.inner.begin has them
+  size_t places_ = 0;
+};
+
+}  // namespace voxeld::gpu
