@@ -1,0 +1,89 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/geojson.h"
+#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/json_text.h"
+#include "tools/voxelctl/import/mesh_checks.h"
+#include "tools/voxelctl/import/ply_header.h"
+#include "tools/voxelctl/import/ply_points.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
+  const absl::StatusOr<nlohmann::json> document = ParseJson(file, file.bytes);
+  if (!document.ok()) return document.status();
+  const auto type = document->is_object() ? document->find("type") : document->end();
+  if (!document->is_object() || type == document->end() || !type->is_string()) {
+    return FileError(file, "is JSON without a \"type\"", "GeoJSON or TopoJSON is expected");
+  }
+  return *type == "Topology" ? ReadTopoJson(file, *document, globe)
+                             : ReadGeoJson(file, *document, globe);
+}
+
+absl::StatusOr<Model> ReadMesh(const SourceFile& file, absl::Status checked) {
+  if (!checked.ok()) return checked;
+  return NewMeshImporter()->Import(file);
+}
+
+absl::StatusOr<Model> ReadPly(const SourceFile& file) {
+  const absl::StatusOr<PlyHeader> header = ParsePlyHeader(file);
+  if (!header.ok()) return header.status();
+  const bool surfaces = header->Find("face") != nullptr || header->Find("tristrips") != nullptr;
+  return surfaces ? ReadMesh(file, absl::OkStatus()) : ReadPlyPoints(file, *header);
+}
+
+absl::StatusOr<Model> Read(const SourceFile& file, bool globe) {
+  const std::string& extension = file.extension;
+  if (extension == "obj") return ReadMesh(file, CheckObj(file));
+  if (extension == "stl") return ReadMesh(file, CheckStl(file));
+  if (extension == "gltf" || extension == "glb") return ReadMesh(file, CheckGltf(file));
+  if (extension == "ply") return ReadPly(file);
+  if (extension == "json" || extension == "geojson" || extension == "topojson")
+    return ReadMap(file, globe);
+  return FileError(file,
+                   extension.empty() ? "its name has no extension"
+                                     : absl::StrCat("files of type .", EscapeForTerminal(extension),
+                                                    " are not read"),
+                   "play reads .obj, .stl, .ply, .gltf, .glb, .geojson, .topojson and .json");
+}
+
+// What every reader promises, held to: a slip in a library must not reach the server.
+absl::Status CheckModel(const SourceFile& file, const Model& model) {
+  uint64_t vertices = 0;
+  for (const Part& part : model.parts) {
+    vertices += part.positions.size();
+    for (const Point3& p : part.positions) {
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        return FileError(file, absl::StrCat("holds the vertex (", p.x, ", ", p.y, ", ", p.z, ")"),
+                         "coordinates must be finite");
+      }
+    }
+    for (const uint32_t index : part.indices) {
+      if (index >= part.positions.size()) {
+        return FileError(file, absl::StrCat("refers to vertex ", index),
+                         absl::StrCat("a part of it has ", part.positions.size()));
+      }
+    }
+  }
+  if (vertices == 0)
+    return FileError(file, "holds nothing to draw", "at least one vertex is expected");
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
+  const absl::StatusOr<SourceFile> file = ReadSourceFile(path);
+  if (!file.ok()) return file.status();
+  absl::StatusOr<Model> model = Read(*file, options.globe);
+  if (!model.ok()) return model;
+  const absl::Status status = CheckModel(*file, *model);
+  if (!status.ok()) return status;
+  return model;
+}
+
+}  // namespace voxeld::voxelctl

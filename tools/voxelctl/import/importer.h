@@ -1,0 +1,34 @@
+// From a file's name to a model: which reader reads what.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+struct ImportOptions {
+  bool globe = false;  // longitude and latitude of maps go on a sphere; meshes do not care
+};
+
+// Reads meshes. Stateless between calls; thread-safe. Exceptions of a library do not leave it.
+class MeshImporter {
+ public:
+  virtual ~MeshImporter() = default;
+  // `file` has passed the checks of its format (mesh_checks.h), so its counts fit its size.
+  virtual absl::StatusOr<Model> Import(const SourceFile& file) const = 0;
+};
+
+// The one that this build has; without VOXELD_IMPORTERS one that says what it would take.
+std::unique_ptr<MeshImporter> NewMeshImporter();
+
+// Reads `path` by its extension, having checked that the contents are of that kind: obj, stl, ply,
+// gltf, glb, geojson, topojson, json. Every index is in range and every number finite in what is
+// returned, and it is not empty. An error's message begins with the path and says what was found
+// and what would be right.
+absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,60 @@
+#include "tools/voxelctl/import/json_text.h"
+
+#include <algorithm>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+namespace voxeld::voxelctl {
+
+int JsonDepth(absl::string_view text) {
+  int depth = 0, deepest = 0;
+  bool in_string = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') {
+        ++i;
+      } else if (c == '"') {
+        in_string = false;
+      }
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '{' || c == '[') {
+      deepest = std::max(deepest, ++depth);
+    } else if (c == '}' || c == ']') {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_view text) {
+  if (absl::StartsWith(text, "\xef\xbb\xbf")) text.remove_prefix(3);
+  const absl::string_view body = absl::StripLeadingAsciiWhitespace(text);
+  if (body.empty() || (body.front() != '{' && body.front() != '[')) {
+    return FileError(file, absl::StrCat("is ", DescribeContents(text)), "JSON is expected");
+  }
+  if (const int depth = JsonDepth(text); depth > kMaxJsonDepth) {
+    return FileError(file, absl::StrCat("nests ", depth, " deep"),
+                     absl::StrCat("at most ", kMaxJsonDepth, " are read"));
+  }
+  try {
+    return nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
+    if (error.byte > text.size()) {
+      return FileError(file,
+                       absl::StrCat("the JSON ends after ", text.size(), " bytes, unfinished"),
+                       "the file is probably truncated");
+    }
+    return FileError(file, absl::StrCat("the JSON is malformed at byte ", error.byte),
+                     "well-formed JSON is expected");
+  } catch (const nlohmann::json::exception& error) {
+    return FileError(file, absl::StrCat("the JSON holds a number out of range"),
+                     "numbers must fit a double");
+  }
+}
+
+}  // namespace voxeld::voxelctl

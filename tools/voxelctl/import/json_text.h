@@ -1,0 +1,21 @@
+// JSON from files that nobody vouches for.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+inline constexpr int kMaxJsonDepth = 64;
+
+// How deep brackets nest outside strings; does not recurse.
+int JsonDepth(absl::string_view text);
+
+// `text` is the whole of `file` or a part of it. InvalidArgument: what is wrong, and at which byte
+// or depth.
+absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_view text);
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,50 @@
+// What comes out of a file: parts with vertices, in the file's own axes and units until
+// scene/normalise.h puts them into the display.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace voxeld::voxelctl {
+
+struct Point3 {
+  double x = 0, y = 0, z = 0;
+  bool operator==(const Point3&) const = default;
+};
+
+struct Rgb {
+  uint8_t r = 0, g = 0, b = 0;
+  bool operator==(const Rgb&) const = default;
+};
+
+enum class Kind : uint8_t { kPoints, kSegments, kTriangles };
+
+// Vertices of one kind. Arrays beside `positions` are empty or as long as it.
+struct Part {
+  Kind kind = Kind::kTriangles;
+  std::vector<Point3> positions;
+  std::vector<Point3> normals;  // of unit length, or zero where there is none
+  std::vector<Rgb> colors;
+  std::vector<uint32_t>
+      indices;  // two a segment, three a triangle; none for points; all < positions.size()
+};
+
+// Which of the file's axes points up. The smallest turn that brings it to +z is applied: +y up
+// makes +z the front and keeps +x right; +x up keeps −y the front.
+enum class Up : uint8_t { kAuto, kX, kY, kZ };
+
+struct Model {
+  std::string path;
+  std::string format;        // for people: "glTF binary", "PLY points"
+  Up up = Up::kZ;            // the format's own; never kAuto
+  bool globe = false;        // on the unit sphere about the origin, upright already
+  bool lit_already = false;  // its colours carry their light (scans): no shading is baked into them
+  std::vector<Part> parts;
+};
+
+// What one model may hold in all, so that no file makes the tool run out of memory.
+inline constexpr uint64_t kMaxModelVertices = 32'000'000;
+inline constexpr uint64_t kMaxModelIndices = 192'000'000;
+
+}  // namespace voxeld::voxelctl

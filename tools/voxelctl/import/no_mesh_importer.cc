@@ -1,0 +1,22 @@
+// Stands in where the build has no library for meshes.
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/importer.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+class NoMeshImporter final : public MeshImporter {
+ public:
+  absl::StatusOr<Model> Import(const SourceFile& file) const override {
+    return absl::UnimplementedError(
+        absl::StrCat(file.path,
+                     ": this voxelctl is built without mesh importers (VOXELD_IMPORTERS=OFF); "
+                     "it reads point clouds (.ply) and maps (.geojson, .topojson)"));
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<MeshImporter> NewMeshImporter() { return std::make_unique<NoMeshImporter>(); }
+
+}  // namespace voxeld::voxelctl

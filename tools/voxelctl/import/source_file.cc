@@ -1,0 +1,106 @@
+#include "tools/voxelctl/import/source_file.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+
+absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) {
+    const int error = errno;
+    const std::string text = absl::StrCat(path, ": ", std::strerror(error));
+    return error == ENOENT ? absl::NotFoundError(text) : absl::PermissionDeniedError(text);
+  }
+  if (!S_ISREG(info.st_mode)) {
+    return absl::InvalidArgumentError(absl::StrCat(path, S_ISDIR(info.st_mode)
+                                                             ? ": is a directory; a file is wanted"
+                                                             : ": is not a regular file"));
+  }
+  const auto size = static_cast<uint64_t>(info.st_size);
+  if (size == 0) return absl::InvalidArgumentError(absl::StrCat(path, ": the file is empty"));
+  if (size > kMaxFileBytes) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": the file has ", size,
+                                                   " bytes; at most ", kMaxFileBytes, " are read"));
+  }
+  SourceFile file;
+  file.path = path;
+  const std::string extension = std::filesystem::path(path).extension().string();
+  file.extension = absl::AsciiStrToLower(extension.empty() ? extension : extension.substr(1));
+  std::ifstream in(path, std::ios::binary);
+  file.bytes.resize(size);
+  if (!in.read(file.bytes.data(), static_cast<std::streamsize>(size))) {
+    return absl::PermissionDeniedError(absl::StrCat(path, ": could not be read to its end (",
+                                                    in.gcount(), " of ", size, " bytes)"));
+  }
+  return file;
+}
+
+std::string DescribeContents(absl::string_view bytes) {
+  struct Magic {
+    absl::string_view begins;
+    absl::string_view name;
+  };
+  static constexpr Magic kMagics[] = {
+      {"\x89PNG", "a PNG picture"},
+      {"\xff\xd8\xff", "a JPEG picture"},
+      {"GIF8", "a GIF picture"},
+      {"%PDF", "a PDF document"},
+      {"PK\x03\x04", "a ZIP archive"},
+      {"\x1f\x8b", "gzip-compressed data"},
+      {"\x7f"
+       "ELF",
+       "a program"},
+      {"glTF", "glTF binary (GLB)"},
+      {"ply", "a PLY file"},
+      {"solid", "text as in an ASCII STL"},
+      {"Kaydara FBX", "an FBX file"},
+      {"BLENDER", "a Blender file"},
+      {"<?xml", "XML text"},
+      {"<!DOCTYPE", "an HTML page"},
+      {"<html", "an HTML page"},
+  };
+  for (const Magic& magic : kMagics) {
+    if (absl::StartsWith(bytes, magic.begins)) return std::string(magic.name);
+  }
+  const absl::string_view text = absl::StripLeadingAsciiWhitespace(bytes);
+  if (text.empty()) return "nothing but white space";
+  if (text.front() == '{' || text.front() == '[') return "JSON text";
+  const absl::string_view head = bytes.substr(0, 512);
+  for (const char c : head) {
+    const auto u = static_cast<unsigned char>(c);
+    if (u < 0x20 && c != '\n' && c != '\r' && c != '\t') return "binary data";
+  }
+  const absl::string_view line = text.substr(0, std::min<size_t>(text.find('\n'), 24));
+  return absl::StrCat("text that begins with \"",
+                      EscapeForTerminal(absl::StripTrailingAsciiWhitespace(line)), "\"");
+}
+
+std::string TextModeHint(absl::string_view bytes) {
+  // In binary data of this size some LF follows a CR by chance.
+  constexpr std::ptrdiff_t kTelling = 100;
+  if (std::count(bytes.begin(), bytes.end(), '\n') < kTelling || absl::StrContains(bytes, "\r\n"))
+    return "";
+  return " (it holds no CR LF at all: it was probably copied as text, which drops bytes; copy it "
+         "as "
+         "binary)";
+}
+
+absl::Status FileError(const SourceFile& file, absl::string_view found,
+                       absl::string_view expected) {
+  return absl::InvalidArgumentError(absl::StrCat(file.path, ": ", found, "; ", expected));
+}
+
+}  // namespace voxeld::voxelctl
