@@ -1,4 +1,5 @@
-// The daemon below gRPC: sessions, the scene store, one frame pipeline a display. Knows no protobuf.
+// The daemon below gRPC: sessions, the scene store, one frame pipeline a display. Knows no
+// protobuf.
 //
 //   Core core(options, clock);
 //   core.AddDisplay(std::move(display), engine_options);
@@ -8,10 +9,11 @@
 //   core.CloseSession(id);
 //   core.Stop(deadline);
 //
-// Threads: the public functions are thread-safe and only post to the core's thread (queries post and answer
-// by callback on the core's thread, or on the display's pipeline thread; callbacks must only post). One more
-// thread a display runs its pipeline. With CoreOptions::threads = false there are none: Step() does everything
-// that is due, in the caller's thread, so that a whole daemon can be simulated under a FakeClock.
+// Threads: the public functions are thread-safe and only post to the core's thread (queries post
+// and answer by callback on the core's thread, or on the display's pipeline thread; callbacks must
+// only post). One more thread a display runs its pipeline. With CoreOptions::threads = false there
+// are none: Step() does everything that is due, in the caller's thread, so that a whole daemon can
+// be simulated under a FakeClock.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +27,7 @@
 #include "absl/status/statusor.h"
 #include "daemon/core/receipt.h"
 #include "daemon/core/stats.h"
+#include "daemon/pipeline/display_settings.h"
 #include "daemon/scene/operation.h"
 #include "display/api/display.h"
 #include "display/sync/clock.h"
@@ -46,40 +49,16 @@ struct CoreOptions {
   Limits limits;
   std::string version;
   bool threads = true;
+  // Makes every engine; empty: gpu::CreateEngine. Called from AddDisplay, and on a display's thread
+  // when its engine was lost.
+  std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>
+      make_engine;
 };
 
 struct SessionInfo {
   SessionId session = 0;
   uint64_t owner = 0;
   std::vector<std::string> displays;
-};
-
-// How the scene is laid into a display's volume; DESIGN: FIT, MILLIMETRES, VOXELS.
-struct ViewOptions {
-  enum class Mode : uint8_t { kFit, kMillimetres, kVoxels };
-  Mode mode = Mode::kFit;
-  std::optional<std::pair<display::Vec3, display::Vec3>> box;  // kFit; default ±1 on the longest axis
-  gpu::Affine transform;
-};
-
-enum class TestPattern : uint8_t { kNone, kAxes, kCorners, kGrid, kRamp, kWhite };
-
-struct DisplayDescription {
-  display::DisplayInfo info;
-  display::DisplayState state = display::DisplayState::kStopped;
-  std::string state_reason;
-  double brightness = 1;
-  bool blank = false;
-  TestPattern pattern = TestPattern::kNone;
-  ViewOptions view;
-  gpu::Affine scene_to_voxel;
-};
-
-struct DisplayUpdate {
-  std::optional<double> brightness;
-  std::optional<bool> blank;
-  std::optional<TestPattern> pattern;
-  std::optional<ViewOptions> view;
 };
 
 struct EntityKey {
@@ -150,8 +129,8 @@ class Core {
                           const gpu::EngineOptions& engine, const ViewOptions& view = {});
   absl::Status Start();
 
-  // Ends displays and threads; what is owed by then counts as lost or undelivered. Returns after at most
-  // `limit`, with an error that names what had not ended.
+  // Ends displays and threads; what is owed by then counts as lost or undelivered. Returns after at
+  // most `limit`, with an error that names what had not ended.
   absl::Status Stop(sync::TimeNs limit);
 
   // threads = false only: does all that is due and returns when more is.
@@ -159,9 +138,10 @@ class Core {
 
   // ---- sessions. `sink` is kept until after the answer to CloseSession.
   // ResourceExhausted past max_sessions.
-  void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink, Reply<SessionInfo> reply);
-  // `issues` are what decoding refused; `bytes` is what the message weighed. `done` (may be empty) runs when the
-  // message has been taken in: the time to read the next.
+  void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
+                   Reply<SessionInfo> reply);
+  // `issues` are what decoding refused; `bytes` is what the message weighed. `done` (may be empty)
+  // runs when the message has been taken in: the time to read the next.
   void Handle(SessionId session, std::vector<Operation> operations, std::vector<Issue> issues,
               uint64_t bytes, std::function<void()> done);
   // Carries out the session's DisconnectPolicy; unknown sessions are ignored.
@@ -182,7 +162,7 @@ class Core {
 
  private:
   class Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<Impl> impl_;  // shared with its thread, which may outlive the limit of Stop
 };
 
 }  // namespace voxeld::daemon

@@ -29,13 +29,13 @@ struct CommitOutcome {
   enum class NotShown : uint8_t { kAbsent, kRemoved, kBlanked, kHidden };
   std::string display;
   Kind kind = Kind::kLost;
-  uint64_t volume = 0;             // presented, unchanged
-  sync::TimeNs time_ns = 0;        // presented
+  uint64_t volume = 0;       // presented, unchanged
+  sync::TimeNs time_ns = 0;  // presented
   display::Evidence evidence = display::Evidence::kEstimated;
-  sync::TimeNs last_byte_ns = 0;   // presented
-  uint64_t by_frame_id = 0;        // superseded
-  uint64_t by_sequence = 0;        // superseded
-  std::string reason;              // lost
+  sync::TimeNs last_byte_ns = 0;  // presented
+  uint64_t by_frame_id = 0;       // superseded
+  uint64_t by_sequence = 0;       // superseded
+  std::string reason;             // lost
   NotShown why = NotShown::kAbsent;
 };
 

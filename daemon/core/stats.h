@@ -34,7 +34,8 @@ struct Stats {
   std::string version;
   int64_t uptime_ns = 0;
   uint64_t sessions = 0, owners = 0, layers = 0, entities = 0, objects = 0, scene_bytes = 0;
-  uint64_t commits_accepted = 0, commits_refused = 0, operations_applied = 0, operations_refused = 0;
+  uint64_t commits_accepted = 0, commits_refused = 0, operations_applied = 0,
+           operations_refused = 0;
   uint64_t bytes_in = 0;
   uint64_t outcomes_undelivered = 0;
   std::vector<DisplayFigures> displays;

@@ -1,7 +1,7 @@
-// What clients ask for, decoded and checked in itself: plain data, without protobuf. daemon/wire makes these
-// from bytes; the core applies them. Everything about a single operation has been validated (finite numbers,
-// counts, enums, index ranges, id lengths); what depends on the scene (existence, quotas, cycles, range on the
-// displays) is the core's to check.
+// What clients ask for, decoded and checked in itself: plain data, without protobuf. daemon/wire
+// makes these from bytes; the core applies them. Everything about a single operation has been
+// validated (finite numbers, counts, enums, index ranges, id lengths); what depends on the scene
+// (existence, quotas, cycles, range on the displays) is the core's to check.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +40,7 @@ enum class Reason : uint8_t {
 struct Issue {
   uint64_t sequence = 0;
   std::string layer, id;
-  std::string field;    // path within the request
+  std::string field;  // path within the request
   Reason reason = Reason::kUnspecified;
   std::string message;  // what was wrong, the value, what would be right
 };
@@ -65,8 +65,8 @@ struct Limits {
   uint32_t max_parts_per_object = 4096;
 };
 
-// Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be copied into
-// staging. Shared by snapshots.
+// Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be
+// copied into staging. Shared by snapshots.
 struct GeometryData {
   gpu::GeometryRecord record;
   std::vector<float> positions;   // 3 · vertex_count
@@ -158,7 +158,9 @@ struct Commit {
 
 struct Operation {
   uint64_t sequence = 0;
-  std::variant<Upsert, Delete, SetTransform, LayerState, FrameBegin, FrameEnd, DefineObject, DeleteObject, Commit> op;
+  std::variant<Upsert, Delete, SetTransform, LayerState, FrameBegin, FrameEnd, DefineObject,
+               DeleteObject, Commit>
+      op;
 };
 
 }  // namespace voxeld::daemon

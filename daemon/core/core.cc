@@ -1,0 +1,126 @@
+#include "daemon/core/core.h"
+
+#include <memory>
+#include <utility>
+
+#include "daemon/core/core_impl.h"
+
+namespace voxeld::daemon {
+namespace {
+
+// Posts `work(reply)`; once the core has stopped the reply is the answer instead, in the caller's
+// thread.
+template <typename T, typename Work>
+void Ask(Loop& loop, Core::Reply<T> reply, Work work) {
+  auto shared = std::make_shared<const Core::Reply<T>>(std::move(reply));
+  auto task = [shared, work = std::move(work)]() mutable { work(*shared); };
+  if (!loop.Post(std::move(task))) (*shared)(absl::UnavailableError("the daemon has stopped"));
+}
+
+void PostThen(Loop& loop, std::function<void()> work, std::function<void()> done) {
+  const bool posted = loop.Post([work = std::move(work), done] {
+    work();
+    if (done) done();
+  });
+  if (!posted && done) done();
+}
+
+}  // namespace
+
+Core::Core(CoreOptions options, sync::Clock& clock)
+    : impl_(std::make_shared<Impl>(std::move(options), clock)) {}
+
+Core::~Core() { Stop(5 * sync::kSecond).IgnoreError(); }
+
+const Limits& Core::limits() const { return impl_->options().limits; }
+
+absl::Status Core::AddDisplay(std::unique_ptr<display::Display> display,
+                              const gpu::EngineOptions& engine, const ViewOptions& view) {
+  return impl_->AddDisplay(std::move(display), engine, view);
+}
+
+absl::Status Core::Start() { return impl_->Start(impl_); }
+
+absl::Status Core::Stop(sync::TimeNs limit) { return impl_->Stop(limit); }
+
+sync::TimeNs Core::Step() { return impl_->Step(); }
+
+void Core::OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
+                       Reply<SessionInfo> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), options = std::move(options),
+       sink = std::move(sink)](const Reply<SessionInfo>& answer) mutable {
+        impl->OpenSession(std::move(options), std::move(sink), answer);
+      });
+}
+
+void Core::Handle(SessionId session, std::vector<Operation> operations, std::vector<Issue> issues,
+                  uint64_t bytes, std::function<void()> done) {
+  PostThen(
+      impl_->loop(),
+      [impl = impl_.get(), session, operations = std::move(operations), issues = std::move(issues),
+       bytes]() mutable { impl->Handle(session, std::move(operations), issues, bytes); },
+      std::move(done));
+}
+
+void Core::CloseSession(SessionId session, std::function<void()> done) {
+  PostThen(
+      impl_->loop(), [impl = impl_.get(), session] { impl->CloseSession(session); },
+      std::move(done));
+}
+
+void Core::ListEntities(EntityQuery query, Reply<EntityPage> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), query = std::move(query)](const Reply<EntityPage>& answer) {
+        impl->ListEntities(query, answer);
+      });
+}
+
+void Core::GetEntity(EntityKey key, Reply<EntityInfo> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), key = std::move(key)](const Reply<EntityInfo>& answer) {
+        impl->GetEntity(key, answer);
+      });
+}
+
+void Core::ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<Cleared> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), owner, layer = std::move(layer), keep_state](
+          const Reply<Cleared>& answer) { impl->ClearLayer(owner, layer, keep_state, answer); });
+}
+
+void Core::GetStats(Reply<Stats> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get()](const Reply<Stats>& answer) { impl->GetStats(answer); });
+}
+
+void Core::ListDisplays(Reply<std::vector<DisplayDescription>> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get()](const Reply<std::vector<DisplayDescription>>& answer) {
+        impl->ListDisplays(answer);
+      });
+}
+
+void Core::GetDisplay(std::string name, Reply<DisplayDescription> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), name = std::move(name)](const Reply<DisplayDescription>& answer) {
+        impl->GetDisplay(name, answer);
+      });
+}
+
+void Core::UpdateDisplay(std::string name, DisplayUpdate update, Reply<DisplayDescription> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), name = std::move(name), update = std::move(update)](
+          const Reply<DisplayDescription>& answer) { impl->UpdateDisplay(name, update, answer); });
+}
+
+void Core::Capture(std::string name, sync::TimeNs timeout, uint64_t at_least_snapshot,
+                   Reply<display::DecodedVolume> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), name = std::move(name), timeout,
+       at_least_snapshot](const Reply<display::DecodedVolume>& answer) {
+        impl->Capture(name, timeout, at_least_snapshot, answer);
+      });
+}
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,189 @@
+// Core's displays: what is asked of their pipelines, and the answers brought together.
+#include <set>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "daemon/core/core_impl.h"
+
+namespace voxeld::daemon {
+namespace {
+
+absl::Status Ended(const std::string& name) {
+  return absl::UnavailableError(absl::StrCat("display \"", name, "\" has been stopped"));
+}
+
+}  // namespace
+
+absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
+                                    const gpu::EngineOptions& engine, const ViewOptions& view) {
+  const display::DisplayInfo info = display->info();
+  if (phase_ != Phase::kNew) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("display \"", info.name, "\" comes after Start; add displays before it"));
+  }
+  for (const auto& slot : displays_) {
+    if (slot->info.name == info.name) {
+      return absl::AlreadyExistsError(
+          absl::StrCat("there is a display \"", info.name, "\" already; names must differ"));
+    }
+  }
+  FramePipeline::Options options;
+  options.display = std::move(display);
+  options.make_engine = options_.make_engine ? options_.make_engine : gpu::CreateEngine;
+  options.engine = engine;
+  options.view = view;
+  options.work = std::make_shared<Loop>(clock_);
+  options.clock = &clock_;
+  // The core's queue is what keeps this safe: it is closed before the core is gone.
+  options.tell = [this, loop = loop_](const Rider& rider, const CommitOutcome& outcome) {
+    loop->Post([this, rider, outcome] { DeliverOutcome(rider, outcome); });
+  };
+  auto host = std::make_shared<Host>();
+  host->work = options.work;
+  absl::StatusOr<std::unique_ptr<FramePipeline>> pipeline =
+      FramePipeline::Create(std::move(options));
+  if (!pipeline.ok()) {
+    return absl::Status(pipeline.status().code(),
+                        absl::StrCat("display \"", info.name, "\": ", pipeline.status().message()));
+  }
+  host->pipeline = *std::move(pipeline);
+  auto slot = std::make_unique<DisplaySlot>();
+  slot->info = info;
+  slot->scene_to_voxel = host->pipeline->Describe().scene_to_voxel;
+  slot->host = std::move(host);
+  displays_.push_back(std::move(slot));
+  return absl::OkStatus();
+}
+
+void Core::Impl::UpdateViews() {
+  std::vector<DisplayView> views;
+  for (const auto& slot : displays_) views.push_back({slot->info.name, slot->scene_to_voxel});
+  store_.SetViews(std::move(views));
+}
+
+absl::StatusOr<Core::Impl::DisplaySlot*> Core::Impl::FindDisplay(const std::string& name) {
+  std::vector<std::string> names;
+  for (const auto& slot : displays_) {
+    if (name.empty() || slot->info.name == name) return slot.get();
+    names.push_back(absl::StrCat("\"", slot->info.name, "\""));
+  }
+  return absl::NotFoundError(
+      names.empty()
+          ? std::string("there are no displays")
+          : absl::StrCat("no display \"", name, "\"; there are: ", absl::StrJoin(names, ", ")));
+}
+
+template <typename T>
+void Core::Impl::Collect(std::function<T(const FramePipeline&)> ask,
+                         std::function<T(const DisplaySlot&)> absent,
+                         std::function<void(std::vector<T>)> done) {
+  struct Answers {
+    std::vector<T> values;
+    size_t left;
+    std::function<void(std::vector<T>)> done;
+  };
+  if (displays_.empty()) return done({});
+  auto answers = std::make_shared<Answers>(
+      Answers{std::vector<T>(displays_.size()), displays_.size(), std::move(done)});
+  const auto arrived = [answers](size_t i, T value) {
+    answers->values[i] = std::move(value);
+    if (--answers->left == 0) answers->done(std::move(answers->values));
+  };
+  for (size_t i = 0; i < displays_.size(); ++i) {
+    const Host& host = *displays_[i]->host;
+    const bool posted =
+        host.work->Post([i, ask, arrived, loop = loop_, pipeline = host.pipeline.get()] {
+          loop->Post([i, arrived, value = ask(*pipeline)] { arrived(i, value); });
+        });
+    if (!posted) arrived(i, absent(*displays_[i]));
+  }
+}
+
+void Core::Impl::ListDisplays(Reply<std::vector<DisplayDescription>> reply) {
+  Collect<DisplayDescription>(
+      [](const FramePipeline& pipeline) { return pipeline.Describe(); },
+      [](const DisplaySlot& slot) {
+        DisplayDescription description;
+        description.info = slot.info;
+        return description;
+      },
+      [reply = std::move(reply)](std::vector<DisplayDescription> all) { reply(std::move(all)); });
+}
+
+void Core::Impl::GetStats(Reply<Stats> reply) {
+  Stats stats;
+  stats.time_ns = clock_.Now();
+  stats.version = options_.version;
+  stats.uptime_ns = stats.time_ns - started_ns_;
+  const Snapshot& scene = *store_.snapshot();
+  std::set<uint64_t> owners;
+  for (const auto& [id, session] : sessions_) owners.insert(session.owner);
+  scene.owners.ForEach([&](uint64_t owner, const OwnerTally& tally) {
+    owners.insert(owner);
+    stats.scene_bytes += tally.bytes;
+  });
+  stats.sessions = sessions_.size();
+  stats.owners = owners.size();
+  stats.layers = scene.layers.size();
+  stats.entities = scene.entities;
+  stats.objects = scene.objects.size();
+  stats.commits_accepted = commits_accepted_;
+  stats.commits_refused = commits_refused_;
+  stats.operations_applied = operations_applied_;
+  stats.operations_refused = operations_refused_;
+  stats.bytes_in = bytes_in_;
+  stats.outcomes_undelivered = outcomes_undelivered_;
+  Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
+                          [](const DisplaySlot& slot) {
+                            DisplayFigures figures;
+                            figures.name = slot.info.name;
+                            return figures;
+                          },
+                          [reply = std::move(reply),
+                           stats = std::move(stats)](std::vector<DisplayFigures> all) mutable {
+                            stats.displays = std::move(all);
+                            reply(std::move(stats));
+                          });
+}
+
+void Core::Impl::GetDisplay(const std::string& name, Reply<DisplayDescription> reply) {
+  const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
+  if (!slot.ok()) return reply(slot.status());
+  const Host& host = *(*slot)->host;
+  const bool posted =
+      host.work->Post([reply, pipeline = host.pipeline.get()] { reply(pipeline->Describe()); });
+  if (!posted) reply(Ended((*slot)->info.name));
+}
+
+void Core::Impl::UpdateDisplay(const std::string& name, DisplayUpdate update,
+                               Reply<DisplayDescription> reply) {
+  const absl::StatusOr<DisplaySlot*> found = FindDisplay(name);
+  if (!found.ok()) return reply(found.status());
+  DisplaySlot* slot = *found;
+  const bool posted = slot->host->work->Post([this, slot, reply, update = std::move(update),
+                                              loop = loop_, pipeline = slot->host->pipeline.get()] {
+    if (absl::Status status = pipeline->Update(update); !status.ok()) return reply(status);
+    const bool answered = loop->Post([this, slot, reply, description = pipeline->Describe()] {
+      slot->scene_to_voxel = description.scene_to_voxel;
+      UpdateViews();
+      reply(description);
+    });
+    if (!answered) reply(Ended(pipeline->info().name));
+  });
+  if (!posted) reply(Ended(slot->info.name));
+}
+
+void Core::Impl::Capture(const std::string& name, sync::TimeNs timeout, uint64_t at_least_snapshot,
+                         Reply<display::DecodedVolume> reply) {
+  const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
+  if (!slot.ok()) return reply(slot.status());
+  const Host& host = *(*slot)->host;
+  const bool posted =
+      host.work->Post([reply, timeout, at_least_snapshot, pipeline = host.pipeline.get()] {
+        pipeline->Capture(timeout, at_least_snapshot, reply);
+      });
+  if (!posted) reply(Ended((*slot)->info.name));
+}
+
+}  // namespace voxeld::daemon

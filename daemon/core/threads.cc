@@ -1,0 +1,170 @@
+// Core's threads: start, stop within a limit, and a simulation's steps.
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "daemon/core/core_impl.h"
+
+namespace voxeld::daemon {
+
+Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
+    : options_(std::move(options)),
+      clock_(clock),
+      started_ns_(clock.Now()),
+      loop_(std::make_shared<Loop>(clock)),
+      store_(options_.limits),
+      published_(store_.snapshot()) {}
+
+void Core::Impl::Launch(std::string name, std::function<void()> body) {
+  {
+    sync::MutexLock lock(running_->mutex);
+    running_->names.insert(name);
+  }
+  std::thread thread([body = std::move(body), name, running = running_]() mutable {
+    body();
+    body = nullptr;  // what it keeps alive ends before the thread counts as ended
+    sync::MutexLock lock(running->mutex);
+    running->names.erase(name);
+    running->changed.NotifyAll();
+  });
+  threads_.push_back({std::move(name), std::move(thread)});
+}
+
+std::set<std::string> Core::Impl::AwaitEnd(const std::set<std::string>& names,
+                                           sync::TimeNs deadline) {
+  sync::MutexLock lock(running_->mutex);
+  for (;;) {
+    std::set<std::string> left;
+    std::set_intersection(names.begin(), names.end(), running_->names.begin(),
+                          running_->names.end(), std::inserter(left, left.end()));
+    if (left.empty() || clock_.Now() >= deadline) return left;
+    clock_.WaitUntil(running_->mutex, running_->changed, deadline);
+  }
+}
+
+void Core::Impl::RunCore() {
+  while (!loop_->closed()) {
+    loop_->RunPosted();
+    loop_->Wait(RunDue());
+  }
+  while (loop_->RunPosted()) {
+  }
+}
+
+void Core::Impl::RunPipeline(Host& host) {
+  while (!host.work->closed()) {
+    host.work->RunPosted();
+    host.work->Wait(host.pipeline->Step());
+  }
+  host.pipeline->Stop();
+  while (host.work->RunPosted()) {
+  }
+}
+
+absl::Status Core::Impl::StartPipelines() {
+  // On each pipeline's own thread, where there is one; here it is only waited for.
+  struct Answers {
+    sync::Mutex mutex;
+    sync::CondVar changed;
+    size_t left VOXELD_GUARDED_BY(mutex) = 0;
+    absl::Status first_error VOXELD_GUARDED_BY(mutex);
+  };
+  auto answers = std::make_shared<Answers>();
+  {
+    sync::MutexLock lock(answers->mutex);
+    answers->left = displays_.size();
+  }
+  for (const auto& slot : displays_) {
+    slot->host->work->Post(
+        [pipeline = slot->host->pipeline.get(), snapshot = store_.snapshot(), answers] {
+          const absl::Status status = pipeline->Start();
+          pipeline->Show(snapshot);
+          sync::MutexLock lock(answers->mutex);
+          if (answers->first_error.ok() && !status.ok()) {
+            answers->first_error = absl::Status(
+                status.code(),
+                absl::StrCat("display \"", pipeline->info().name, "\": ", status.message()));
+          }
+          --answers->left;
+          answers->changed.NotifyAll();
+        });
+    if (!options_.threads) slot->host->work->RunPosted();
+  }
+  sync::MutexLock lock(answers->mutex);
+  while (answers->left > 0) answers->changed.Wait(answers->mutex);
+  return answers->first_error;
+}
+
+absl::Status Core::Impl::Start(std::shared_ptr<Impl> self) {
+  if (phase_ != Phase::kNew) {
+    return absl::FailedPreconditionError("the core has been started before; make a new one");
+  }
+  UpdateViews();
+  phase_ = Phase::kRunning;
+  if (options_.threads) {
+    Launch("core", [self = std::move(self)] { self->RunCore(); });
+    for (const auto& slot : displays_) {
+      Launch(absl::StrCat("display \"", slot->info.name, "\""),
+             [host = slot->host] { RunPipeline(*host); });
+    }
+  }
+  absl::Status status = StartPipelines();
+  if (!status.ok()) Stop(5 * sync::kSecond).IgnoreError();
+  return status;
+}
+
+absl::Status Core::Impl::Stop(sync::TimeNs limit) {
+  const Phase before = std::exchange(phase_, Phase::kStopped);
+  if (before == Phase::kStopped) return absl::OkStatus();
+  for (const auto& slot : displays_) slot->host->work->Close();
+  if (before == Phase::kNew || !options_.threads) {
+    for (const auto& slot : displays_) {
+      slot->host->pipeline->Stop();
+      slot->host->work->RunPosted();
+    }
+    loop_->Close();
+    while (loop_->RunPosted()) {
+    }
+    return absl::OkStatus();
+  }
+
+  // Displays first: the core's thread hands on what they still owe. It gets the last quarter for
+  // itself.
+  const sync::TimeNs now = clock_.Now();
+  std::set<std::string> displays;
+  for (const NamedThread& t : threads_) {
+    if (t.name != "core") displays.insert(t.name);
+  }
+  std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
+  loop_->Close();
+  left.merge(AwaitEnd({"core"}, now + limit));
+  for (NamedThread& t : threads_) {
+    if (left.contains(t.name)) {
+      t.thread.detach();
+    } else {
+      t.thread.join();
+    }
+  }
+  threads_.clear();
+  if (left.empty()) return absl::OkStatus();
+  return absl::DeadlineExceededError(
+      absl::StrCat("had not ended ", limit / sync::kMillisecond,
+                   " ms after being asked to: ", absl::StrJoin(left, ", ")));
+}
+
+sync::TimeNs Core::Impl::Step() {
+  for (;;) {
+    bool any = loop_->RunPosted();
+    sync::TimeNs next = RunDue();
+    for (const auto& slot : displays_) {
+      any = slot->host->work->RunPosted() || any;
+      next = std::min(next, slot->host->pipeline->Step());
+      any = slot->host->work->RunPosted() || any;
+    }
+    any = loop_->RunPosted() || any;
+    if (!any) return next;
+  }
+}
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,178 @@
+// From snapshots to one display: takes the newest snapshot when the display's mailbox is free and
+// something has changed, has the engine draw it, hands the volume over, and tells every commit what
+// became of it.
+//
+//   auto pipeline = FramePipeline::Create({…});
+//   (*pipeline)->Start();
+//   loop: work.RunPosted(); next = (*pipeline)->Step(); work.Wait(next);
+//   (*pipeline)->Stop();
+//
+// Thread: bound to one, which runs `work`; nothing here blocks (the engine's calls are
+// asynchronous, and the display is ticked in between while a large delta is written).
+//
+// Which volumes are drawn
+// - The first shows whatever the scene is, if only darkness. From then on a volume is drawn only if
+// the scene,
+//   the view or the test pattern has changed, and handed over only if its bytes differ from the one
+//   before.
+// - While the display is absent or blanked nothing is drawn; when it shows again it gets the newest
+// scene.
+// - If the volume handed over last was lost, the next drawn is handed over even if it looks the
+// same.
+// - While a test pattern is shown, commits are NOT_SHOWN(hidden).
+// - Volumes are numbered as the engine's frames are: ascending, with gaps where one came out the
+// same.
+// - An engine that is lost (DataLoss) is replaced by a new one, which gets the whole scene; riders
+// stay aboard
+//   the first time. Any other failure is LOST to its riders; the engine gets the whole scene next
+//   time.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "daemon/core/stats.h"
+#include "daemon/pipeline/display_settings.h"
+#include "daemon/pipeline/frame_pool.h"
+#include "daemon/pipeline/loop.h"
+#include "daemon/pipeline/rider_book.h"
+#include "daemon/pipeline/sliding_window.h"
+#include "daemon/scene/engine_delta.h"
+#include "daemon/scene/snapshot.h"
+#include "display/api/display.h"
+#include "display/sync/clock.h"
+#include "gpu/engine.h"
+
+namespace voxeld::daemon {
+
+class FramePipeline final : private display::Display::Listener {
+ public:
+  using MakeEngine =
+      std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>;
+
+  struct Options {
+    std::unique_ptr<display::Display> display;
+    MakeEngine make_engine;
+    gpu::EngineOptions engine;
+    ViewOptions view;
+    // Where wakes and the engine's completions go: the queue of the thread that this pipeline is
+    // bound to.
+    std::shared_ptr<Loop> work;
+    sync::Clock* clock = nullptr;  // outlives the pipeline
+    // An outcome, inside any call to the pipeline.
+    RiderBook::Tell tell;
+  };
+
+  // Makes the engine. Its failure, or a view that cannot be, is the answer.
+  static absl::StatusOr<std::unique_ptr<FramePipeline>> Create(Options options);
+  ~FramePipeline() override;  // stops
+
+  const display::DisplayInfo& info() const { return display_->info(); }
+
+  absl::Status Start();
+  // Every commit still pending is LOST, captures are Unavailable, the engine ends.
+  void Stop();
+  // Does what is due; answers when more is.
+  sync::TimeNs Step();
+
+  // A newer snapshot, of a commit or of something internal. Drawn by a later Step.
+  void Show(SnapshotPtr snapshot);
+  // `hidden`: all the commit's operations were in hidden layers.
+  void Show(SnapshotPtr snapshot, const Rider& rider, bool hidden);
+
+  // Checks every field first, and changes nothing if one is refused.
+  absl::Status Update(const DisplayUpdate& update);
+  DisplayDescription Describe() const;
+  DisplayFigures Figures() const;
+
+  // The next volume shown that contains at least this snapshot. DeadlineExceeded, or Unavailable
+  // while the display does not show.
+  void Capture(sync::TimeNs timeout, uint64_t at_least_snapshot,
+               display::Display::CaptureDone done);
+
+ private:
+  struct Drawing {
+    uint64_t volume = 0;
+    uint64_t snapshot = 0;
+    FramePool::Lease lease;
+    absl::Status status;  // of what went before SubmitFrame
+  };
+  struct PendingCapture {
+    sync::TimeNs deadline = 0;
+    uint64_t at_least = 0;
+    display::Display::CaptureDone done;
+  };
+
+  explicit FramePipeline(Options options);
+
+  void OnOutcome(const display::VolumeOutcome& outcome) override;
+  void OnState(display::DisplayState state, const std::string& reason) override;
+
+  bool showing() const { return display_->state() == display::DisplayState::kShowing; }
+  bool MaybeDraw();
+  bool HaveEngine();
+  absl::Status ApplyDelta(size_t size);
+  void OnCallDone(const absl::Status& status);
+  void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
+  void OnEngineFailure(const absl::Status& status);
+  void SubmitDrawn(Drawing drawing);
+  void KeepUnchanged(uint64_t snapshot);
+  void ShowAgain(sync::TimeNs delay);
+  void ServeCaptures();
+  void Breathe();
+  void Told(const Rider& rider, const CommitOutcome& outcome);
+  // `method` on this thread with what a call of the engine's ended in, unless the drawing that the
+  // call was made for is over by then.
+  template <typename Result>
+  std::function<void(Result)> Completion(void (FramePipeline::*method)(const Result&));
+
+  sync::Clock& clock_;
+  const std::shared_ptr<Loop> work_;
+  const std::unique_ptr<display::Display> display_;
+  const MakeEngine make_engine_;
+  const gpu::EngineOptions engine_options_;
+  const RiderBook::Tell tell_;
+
+  std::unique_ptr<gpu::Engine> engine_;
+  gpu::EngineInfo engine_info_;  // of the engine, or why there is none
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  bool started_ = false;
+
+  ViewOptions view_;
+  gpu::Affine scene_to_voxel_;
+  TestPattern pattern_ = TestPattern::kNone;
+  SnapshotPtr pattern_scene_;
+
+  SnapshotPtr newest_;
+  EngineScene scene_;
+  FramePool pool_;
+  std::optional<Drawing> drawing_;
+  std::optional<uint64_t> drawn_snapshot_;  // the newest that a draw was begun for
+  bool target_stale_ = true;       // the engine has not been told the target that there is now
+  bool settings_changed_ = false;  // view or pattern, since a draw was last begun
+  bool lost_engine_ = false;       // and no frame has come out since
+
+  uint64_t last_volume_ = 0;     // numbered
+  uint64_t last_submitted_ = 0;  // handed over
+  bool show_again_ = false;      // the display may not have what was drawn last
+  sync::TimeNs show_again_at_ = 0;
+  std::map<uint64_t, uint64_t>
+      in_display_;  // volume handed over, without outcome → snapshot it contains
+  std::optional<uint64_t> shown_snapshot_;
+  std::vector<PendingCapture> captures_;
+  sync::TimeNs next_tick_ = 0;
+
+  RiderBook riders_;
+  uint64_t lit_voxels_ = 0, volumes_drawn_ = 0;
+  SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_;
+  SlidingRate presented_rate_;
+};
+
+}  // namespace voxeld::daemon

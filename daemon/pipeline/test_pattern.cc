@@ -1,0 +1,180 @@
+#include "daemon/pipeline/test_pattern.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpu/delta.h"
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr uint64_t kFirstPatternNumber = uint64_t{1} << 63;
+
+// A geometry under construction.
+struct Shape {
+  GeometryData data;
+  bool any = false;
+
+  void Extend(double x, double y, double z) {
+    const double p[3] = {x, y, z};
+    for (int axis = 0; axis < 3; ++axis) {
+      data.min[axis] = any ? std::min(data.min[axis], p[axis]) : p[axis];
+      data.max[axis] = any ? std::max(data.max[axis], p[axis]) : p[axis];
+    }
+    any = true;
+  }
+
+  void Vertex(double x, double y, double z, uint32_t color) {
+    data.positions.insert(data.positions.end(), {float(x), float(y), float(z)});
+    data.colors.push_back(color);
+    ++data.record.vertex_count;
+    data.record.color_mode = gpu::ColorMode::kPerVertex;
+    Extend(x, y, z);
+  }
+};
+
+class Pattern {
+ public:
+  // No two patterns share a number.
+  Pattern(TestPattern pattern, const display::VoxelGrid& grid)
+      : nx_(grid.nx),
+        ny_(grid.ny),
+        nz_(grid.nz),
+        first_number_(kFirstPatternNumber + (uint64_t(pattern) << 32)) {}
+
+  void Axes() {
+    const double x = nx_ / 2, y = ny_ / 2, z = nz_ / 2;
+    Shape axes;
+    axes.data.record.kind = gpu::PrimitiveKind::kSegments;
+    Segment(axes, {x, y, z}, {nx_ - 0.5, y, z}, 0xFF0000);
+    Segment(axes, {x, y, z}, {x, ny_ - 0.5, z}, 0x00FF00);
+    Segment(axes, {x, y, z}, {x, y, nz_ - 0.5}, 0x0000FF);
+    axes.data.record.thickness = 2;
+    Add("axes", std::move(axes), 0);
+  }
+
+  void Corners() {
+    Shape edges, balls;
+    edges.data.record.kind = gpu::PrimitiveKind::kSegments;
+    balls.data.record.kind = gpu::PrimitiveKind::kPoints;
+    balls.data.record.thickness = float(std::max(1.0, std::min({nx_, ny_, nz_}) / 8));
+    static constexpr uint32_t kColors[8] = {0xFFFFFF, 0xFF0000, 0x00FF00, 0xFFFF00,
+                                            0x0000FF, 0xFF00FF, 0x00FFFF, 0xFF8000};
+    for (int corner = 0; corner < 8; ++corner) {
+      const display::Vec3 at = Corner(corner);
+      balls.Vertex(at.x, at.y, at.z, kColors[corner]);
+      for (const int axis : {1, 2, 4}) {
+        if ((corner & axis) == 0) Segment(edges, at, Corner(corner | axis), 0x808080);
+      }
+    }
+    Add("edges", std::move(edges), 0);
+    Add("corners", std::move(balls), 1);
+  }
+
+  void Grid() {
+    Shape dots;
+    dots.data.record.kind = gpu::PrimitiveKind::kPoints;
+    for (double z = Phase(nz_); z < nz_; z += 8) {
+      for (double y = Phase(ny_); y < ny_; y += 8) {
+        for (double x = Phase(nx_); x < nx_; x += 8) dots.Vertex(x, y, z, 0xFFFFFF);
+      }
+    }
+    Add("dots", std::move(dots), 0);
+  }
+
+  void Ramp() {
+    // Boxes a voxel thick along x: one for each level, or each voxel where there are fewer of
+    // those.
+    const int steps = int(std::min(256.0, nx_));
+    for (int i = 0; i < steps; ++i) {
+      const double x0 = double(int64_t(nx_) * i / steps),
+                   x1 = double(int64_t(nx_) * (i + 1) / steps);
+      const auto level = uint32_t(steps == 1 ? 255 : i * 255 / (steps - 1));
+      const uint32_t grey = level << 16 | level << 8 | level;
+      const double y = double(int64_t(ny_) / 2), z = double(int64_t(nz_) / 2);
+      Box("z" + std::to_string(i), {x0, 0, z}, {x1, ny_, z + 1}, grey);
+      Box("y" + std::to_string(i), {x0, y, 0}, {x1, y + 1, nz_}, grey);
+    }
+  }
+
+  void White() { Box("white", {0, 0, 0}, {nx_, ny_, nz_}, 0xFFFFFF); }
+
+  SnapshotPtr Finish(uint64_t number) {
+    auto snapshot = std::make_shared<Snapshot>();
+    layer_.number = first_number_;
+    snapshot->number = number;
+    snapshot->entities = layer_.entities.size();
+    snapshot->layers.Put({0, "test pattern"}, std::make_shared<const Layer>(std::move(layer_)));
+    return snapshot;
+  }
+
+ private:
+  static double Phase(double cells) { return std::min(4.5, double(int64_t(cells) / 2) + 0.5); }
+
+  display::Vec3 Corner(int corner) const {
+    return {corner & 1 ? nx_ - 0.5 : 0.5, corner & 2 ? ny_ - 0.5 : 0.5,
+            corner & 4 ? nz_ - 0.5 : 0.5};
+  }
+
+  static void Segment(Shape& shape, display::Vec3 a, display::Vec3 b, uint32_t color) {
+    shape.Vertex(a.x, a.y, a.z, color);
+    shape.Vertex(b.x, b.y, b.z, color);
+  }
+
+  void Box(const std::string& id, display::Vec3 low, display::Vec3 high, uint32_t color) {
+    Shape box;
+    box.data.record.kind = gpu::PrimitiveKind::kBox;
+    box.data.record.fill = gpu::Fill::kSolid;
+    box.data.record.color = color;
+    const double min[3] = {low.x, low.y, low.z}, max[3] = {high.x, high.y, high.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      box.data.record.params[axis] = float((min[axis] + max[axis]) / 2);
+      box.data.record.params[axis + 3] = float(max[axis] - min[axis]);
+    }
+    box.Extend(low.x, low.y, low.z);
+    box.Extend(high.x, high.y, high.z);
+    Add(id, std::move(box), 0);
+  }
+
+  void Add(const std::string& id, Shape shape, uint32_t priority) {
+    auto entity = std::make_shared<Entity>();
+    entity->number = first_number_ + layer_.entities.size();
+    entity->data.content = std::make_shared<const GeometryData>(std::move(shape.data));
+    entity->data.priority = priority;
+    layer_.entities.Put(id, std::move(entity));
+  }
+
+  const double nx_, ny_, nz_;
+  const uint64_t first_number_;
+  Layer layer_;
+};
+
+}  // namespace
+
+SnapshotPtr MakePattern(TestPattern pattern, const display::VoxelGrid& grid, uint64_t number) {
+  Pattern made(pattern, grid);
+  switch (pattern) {
+    case TestPattern::kNone:
+      break;
+    case TestPattern::kAxes:
+      made.Axes();
+      break;
+    case TestPattern::kCorners:
+      made.Corners();
+      break;
+    case TestPattern::kGrid:
+      made.Grid();
+      break;
+    case TestPattern::kRamp:
+      made.Ramp();
+      break;
+    case TestPattern::kWhite:
+      made.White();
+      break;
+  }
+  return made.Finish(number);
+}
+
+}  // namespace voxeld::daemon

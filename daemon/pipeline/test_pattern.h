@@ -1,0 +1,20 @@
+// Test patterns: small scenes in voxel units, drawn by the same engine as any other.
+#pragma once
+
+#include "daemon/pipeline/display_settings.h"
+#include "daemon/scene/snapshot.h"
+#include "display/api/geometry.h"
+
+namespace voxeld::daemon {
+
+// A snapshot whose coordinates are voxels of `grid` (the view is the identity), to be shown in
+// place of scene number `number`. Its layers' and entities' numbers are none that a scene uses.
+// `pattern` is not kNone.
+//   kAxes     x red, y green, z blue, from the middle to the positive faces
+//   kCorners  the edges of the grid in grey, each corner a ball in its own colour
+//   kGrid     dots of one voxel, eight apart on every axis
+//   kRamp     brightness from 0 to 255 along x, on three middle planes
+//   kWhite    every voxel
+SnapshotPtr MakePattern(TestPattern pattern, const display::VoxelGrid& grid, uint64_t number);
+
+}  // namespace voxeld::daemon

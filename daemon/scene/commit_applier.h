@@ -1,0 +1,115 @@
+// Applies one commit's operations to a draft: the rules of the scene, and every refusal that
+// depends on it.
+//
+// A refused operation leaves its entity, layer or object as it was and gives one Issue. What is
+// upserted between FrameBegin and FrameEnd takes effect at FrameEnd, in place of all that the layer
+// held; a frame still open when the commit ends is discarded whole, with one Issue (OUT_OF_ORDER)
+// of its FrameBegin, and every operation in it counts as refused. Single-threaded.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "daemon/scene/draft.h"
+#include "daemon/scene/operation.h"
+
+namespace voxeld::daemon {
+
+// Whose commit it is.
+struct Author {
+  uint64_t owner = 0;
+  WriterPtr writer;
+};
+
+// A display's map from the scene to its voxels, for range checks.
+struct DisplayView {
+  std::string display;
+  gpu::Affine scene_to_voxel;
+};
+
+class CommitApplier {
+ public:
+  // All are borrowed.
+  CommitApplier(Draft& draft, const Limits& limits, const std::vector<DisplayView>& views,
+                const Author& author, sync::TimeNs now);
+
+  // Operations must have passed CheckAlone, be no Commit, and live until End.
+  void Apply(Operation& operation);
+  void End();
+
+  const std::vector<Issue>& issues() const { return issues_; }
+  uint64_t applied() const { return applied_; }
+  uint64_t refused() const { return refused_; }
+
+  // True if every applied operation acted on layers that were hidden (or not there) before the
+  // commit and are hidden after it. Operations on objects act on no layer, so with them, or with
+  // none at all, false.
+  bool hidden() const;
+
+ private:
+  struct Frame {
+    uint64_t begin_sequence = 0;
+    std::vector<Operation*> operations;
+  };
+  using ObjectDataPtr = std::shared_ptr<const ObjectData>;
+
+  void Dispatch(Operation& operation);
+  void Do(Operation& operation, Upsert& upsert);
+  void Do(Operation& operation, Delete& del);
+  void Do(Operation& operation, SetTransform& set);
+  void Do(Operation& operation, LayerState& state);
+  void Do(Operation& operation, FrameBegin& begin);
+  void Do(Operation& operation, FrameEnd& end);
+  void Do(Operation& operation, DefineObject& define);
+  void Do(Operation& operation, DeleteObject& del);
+  void Do(Operation& operation, Commit& commit);
+
+  OwnedName Key(const std::string& name) const { return {author_.owner, name}; }
+  // The layer whose open frame takes this operation; null: none does.
+  Frame* FrameOf(const Operation& operation);
+  void Applied(const std::string& layer);
+  void Refuse(const Operation& operation, std::string layer, std::string id, std::string field,
+              Reason reason, std::string message);
+  // What is wrong with `in_layer` on some display; nothing if it is in range on all.
+  std::optional<std::string> OutOfRange(const gpu::Affine& layer_transform,
+                                        const Bounds& in_layer) const;
+  bool RefusedNewLayer(const Operation& operation, const std::string& layer,
+                       const std::string& field);
+
+  // ---- objects (object_rules.cc)
+  // Objects that refer to `name`, directly or through others.
+  std::set<std::string> ObjectsAbove(const std::string& name) const;
+  // `name` with `data`, and every object above it, with what is derived worked out anew; parts
+  // before wholes.
+  std::vector<std::pair<std::string, Object>> Derive(const std::string& name,
+                                                     const ObjectDataPtr& data) const;
+  // Entities that are instances of `name`; at most `limit`.
+  std::vector<UseKey> InstancesOf(const std::string& name, size_t limit = SIZE_MAX) const;
+  std::vector<std::string> ObjectsUsing(const std::string& name) const;
+  bool RefusedDefinition(const Operation& operation, const DefineObject& define);
+  bool RefusedDerived(const Operation& operation, const DefineObject& define,
+                      const std::vector<std::pair<std::string, Object>>& derived);
+
+  Draft& draft_;
+  const Limits& limits_;
+  const std::vector<DisplayView>& views_;
+  const Author& author_;
+  const sync::TimeNs now_;
+
+  std::map<std::string, Frame> frames_;
+  EntityMap replaced_;  // what the layer held whose frame is being applied
+  std::set<std::string> touched_;
+  bool objects_touched_ = false;
+  std::vector<Issue> issues_;
+  uint64_t applied_ = 0, refused_ = 0;
+};
+
+// What can be said of an operation without the scene: singular transforms, counts against the
+// limits.
+std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits);
+
+}  // namespace voxeld::daemon

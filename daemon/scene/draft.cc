@@ -1,0 +1,236 @@
+#include "daemon/scene/draft.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+namespace voxeld::daemon {
+
+uint64_t AddSaturating(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
+
+uint64_t BytesOf(const Content& content) {
+  if (const auto* geometry = std::get_if<GeometryPtr>(&content)) return (*geometry)->bytes();
+  return sizeof(InstanceRef) + std::get<InstanceRef>(content).object.size();
+}
+
+namespace {
+
+const InstanceRef* InstanceOf(const Content& content) { return std::get_if<InstanceRef>(&content); }
+
+UseKey UseBy(const OwnedName& layer, const std::string& id, const InstanceRef& instance) {
+  return {layer.owner, instance.object, false, layer.name, id};
+}
+
+}  // namespace
+
+Draft::Draft(SnapshotPtr base, uint64_t& next_number)
+    : base_(std::move(base)), next_number_(next_number), next_(*base_) {}
+
+const Layer* Draft::FindLayer(const OwnedName& key) const {
+  const auto it = open_.find(key);
+  if (it != open_.end()) return it->second.has_value() ? &*it->second : nullptr;
+  return next_.FindLayer(key);
+}
+
+const EntityPtr* Draft::FindEntity(const OwnedName& layer, const std::string& id) const {
+  const Layer* l = FindLayer(layer);
+  return l == nullptr ? nullptr : l->entities.Find(id);
+}
+
+const OwnerTally& Draft::tally(uint64_t owner) const {
+  const auto it = tallies_.find(owner);
+  if (it != tallies_.end()) return it->second;
+  const OwnerTally* found = next_.owners.Find(owner);
+  return tallies_.emplace(owner, found == nullptr ? OwnerTally() : *found).first->second;
+}
+
+OwnerTally& Draft::EditTally(uint64_t owner) {
+  tally(owner);
+  return tallies_.find(owner)->second;
+}
+
+uint64_t Draft::DrawablesOf(uint64_t owner, const Content& content) const {
+  const InstanceRef* instance = InstanceOf(content);
+  if (instance == nullptr) return 1;
+  return std::max<uint64_t>(1, FindObject({owner, instance->object})->drawables);
+}
+
+Bounds Draft::BoundsOf(uint64_t owner, const Content& content) const {
+  if (const InstanceRef* instance = InstanceOf(content)) {
+    return FindObject({owner, instance->object})->bounds;
+  }
+  const GeometryData& geometry = *std::get<GeometryPtr>(content);
+  Bounds bounds;
+  bounds.empty = false;
+  std::copy(std::begin(geometry.min), std::end(geometry.min), bounds.min);
+  std::copy(std::begin(geometry.max), std::end(geometry.max), bounds.max);
+  return bounds;
+}
+
+Layer& Draft::OpenLayer(const OwnedName& key) {
+  const auto it = open_.find(key);
+  if (it != open_.end()) return *it->second;
+  return *open_.emplace(key, *next_.FindLayer(key)).first->second;
+}
+
+Layer& Draft::EditLayer(const OwnedName& key, const WriterPtr& writer) {
+  if (FindLayer(key) == nullptr) {
+    Layer layer;
+    layer.number = next_number_++;
+    layer.writer = writer;
+    open_.insert_or_assign(key, std::move(layer));
+    ++EditTally(key.owner).layers;
+  }
+  Layer& layer = OpenLayer(key);
+  if (layer.writer != writer) layer.writer = writer;
+  return layer;
+}
+
+void Draft::RemoveLayer(const OwnedName& key) {
+  ClearLayer(key);
+  open_.insert_or_assign(key, std::nullopt);
+  --EditTally(key.owner).layers;
+}
+
+void Draft::ClearLayer(const OwnedName& key) {
+  Layer& layer = OpenLayer(key);
+  layer.entities.ForEach(
+      [&](const std::string& id, const EntityPtr& entity) { Unindex(key, id, *entity); });
+  layer.entities = {};
+  layer.bytes = 0;
+  layer.bounds = {};
+}
+
+void Draft::Index(const OwnedName& layer, const std::string& id, const Entity& entity) {
+  OwnerTally& tally = EditTally(layer.owner);
+  tally.drawables += DrawablesOf(layer.owner, entity.data.content);
+  tally.bytes += entity.bytes;
+  ++next_.entities;
+  if (const InstanceRef* instance = InstanceOf(entity.data.content)) {
+    next_.uses.Put(UseBy(layer, id, *instance), true);
+  }
+  if (entity.expires_ns != sync::kNever) {
+    next_.expiries.Put({entity.expires_ns, entity.number}, {layer, id});
+  }
+}
+
+void Draft::Unindex(const OwnedName& layer, const std::string& id, const Entity& entity) {
+  OwnerTally& tally = EditTally(layer.owner);
+  tally.drawables -= DrawablesOf(layer.owner, entity.data.content);
+  tally.bytes -= entity.bytes;
+  --next_.entities;
+  if (const InstanceRef* instance = InstanceOf(entity.data.content)) {
+    next_.uses.Erase(UseBy(layer, id, *instance));
+  }
+  if (entity.expires_ns != sync::kNever) {
+    next_.expiries.Erase({entity.expires_ns, entity.number});
+  }
+}
+
+uint64_t Draft::EntityBytes(const OwnedName& layer, const std::string& id, const EntityData& data) {
+  return sizeof(Entity) + layer.name.size() + id.size() + data.label.size() + BytesOf(data.content);
+}
+
+uint64_t Draft::ObjectBytes(const std::string& name, const ObjectData& data) {
+  uint64_t bytes = sizeof(Object) + name.size();
+  for (const ObjectPart& part : data.parts) bytes += sizeof(ObjectPart) + BytesOf(part.content);
+  return bytes;
+}
+
+void Draft::PutEntity(const OwnedName& layer, const std::string& id, Entity entity) {
+  Layer& l = OpenLayer(layer);
+  entity.bytes = EntityBytes(layer, id, entity.data);
+  if (const EntityPtr* old = l.entities.Find(id)) {
+    entity.number = (*old)->number;
+    l.bytes -= (*old)->bytes;
+    Unindex(layer, id, **old);
+  } else if (entity.number == 0) {
+    entity.number = next_number_++;
+  }
+  l.bytes += entity.bytes;
+  l.bounds.Include(MapBounds(entity.data.transform, BoundsOf(layer.owner, entity.data.content)));
+  Index(layer, id, entity);
+  l.entities.Put(id, std::make_shared<const Entity>(std::move(entity)));
+}
+
+void Draft::RemoveEntity(const OwnedName& layer, const std::string& id) {
+  Layer& l = OpenLayer(layer);
+  const EntityPtr entity = *l.entities.Find(id);
+  l.bytes -= entity->bytes;
+  Unindex(layer, id, *entity);
+  l.entities.Erase(id);
+  if (l.entities.empty()) l.bounds = {};
+}
+
+void Draft::PutObject(const OwnedName& key, Object object) {
+  const ObjectPtr* found = next_.objects.Find(key);
+  const ObjectPtr old = found == nullptr ? nullptr : *found;
+  OwnerTally& tally = EditTally(key.owner);
+
+  object.bytes = ObjectBytes(key.name, *object.data);
+  if (old != nullptr) {
+    tally.bytes -= old->bytes;
+    for (const ObjectPart& part : old->data->parts) {
+      if (const InstanceRef* child = InstanceOf(part.content)) {
+        next_.uses.Erase({key.owner, child->object, true, key.name, ""});
+      }
+    }
+  }
+  tally.bytes += object.bytes;
+  for (const ObjectPart& part : object.data->parts) {
+    if (const InstanceRef* child = InstanceOf(part.content)) {
+      next_.uses.Put({key.owner, child->object, true, key.name, ""}, true);
+    }
+  }
+  if (old != nullptr) {
+    // What its instances count for changes with it, and where they lie.
+    const uint64_t before = std::max<uint64_t>(1, old->drawables);
+    const uint64_t now = std::max<uint64_t>(1, object.drawables);
+    std::vector<UseKey> instances;
+    next_.uses.ForEachFrom({key.owner, key.name, false, "", ""}, [&](const UseKey& use, bool) {
+      if (use.owner != key.owner || use.object != key.name || use.by_object) return false;
+      instances.push_back(use);
+      return true;
+    });
+    for (const UseKey& use : instances) {
+      tally.drawables += now - before;
+      const OwnedName layer{use.owner, use.layer};
+      const gpu::Affine transform = (*FindEntity(layer, use.id))->data.transform;
+      OpenLayer(layer).bounds.Include(MapBounds(transform, object.bounds));
+    }
+  }
+  next_.objects.Put(key, std::make_shared<const Object>(std::move(object)));
+}
+
+void Draft::RemoveObject(const OwnedName& key) {
+  const ObjectPtr old = *next_.objects.Find(key);
+  EditTally(key.owner).bytes -= old->bytes;
+  for (const ObjectPart& part : old->data->parts) {
+    if (const InstanceRef* child = InstanceOf(part.content)) {
+      next_.uses.Erase({key.owner, child->object, true, key.name, ""});
+    }
+  }
+  next_.objects.Erase(key);
+}
+
+SnapshotPtr Draft::Finish(uint64_t number) && {
+  for (auto& [key, layer] : open_) {
+    if (layer.has_value()) {
+      next_.layers.Put(key, std::make_shared<const Layer>(*std::move(layer)));
+    } else {
+      next_.layers.Erase(key);
+    }
+  }
+  for (const auto& [owner, tally] : tallies_) {
+    if (tally == OwnerTally()) {
+      next_.owners.Erase(owner);
+    } else {
+      next_.owners.Put(owner, tally);
+    }
+  }
+  next_.number = number;
+  return std::make_shared<const Snapshot>(std::move(next_));
+}
+
+}  // namespace voxeld::daemon

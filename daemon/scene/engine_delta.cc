@@ -1,0 +1,238 @@
+#include "daemon/scene/engine_delta.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr uint32_t kRecordsPerBreath = 256;
+constexpr size_t kBytesPerBreath = size_t{1} << 20;
+
+const Snapshot& EmptyScene() {
+  static const Snapshot empty;
+  return empty;
+}
+
+gpu::LayerRecord RecordOf(const Layer& layer) {
+  gpu::LayerRecord record;
+  record.id = layer.number;
+  record.order = layer.order;
+  record.visible = layer.visible ? 1 : 0;
+  record.opacity = layer.opacity;
+  record.blend = layer.blend;
+  record.transform = layer.transform;
+  return record;
+}
+
+bool LooksSame(const Layer& a, const Layer& b) {
+  return a.order == b.order && a.visible == b.visible && a.opacity == b.opacity &&
+         a.blend == b.blend && a.transform == b.transform;
+}
+
+// Nothing that an engine sees: label, sequence and expiry may differ.
+bool LooksSame(const Entity& a, const Entity& b) {
+  if (a.number != b.number || a.data.priority != b.data.priority || a.data.erase != b.data.erase ||
+      a.data.transform != b.data.transform || a.data.content.index() != b.data.content.index()) {
+    return false;
+  }
+  if (const auto* geometry = std::get_if<GeometryPtr>(&a.data.content)) {
+    return *geometry == std::get<GeometryPtr>(b.data.content);
+  }
+  return std::get<InstanceRef>(a.data.content).object ==
+         std::get<InstanceRef>(b.data.content).object;
+}
+
+}  // namespace
+
+EngineScene::EngineScene(std::function<void()> breathe) : breathe_(std::move(breathe)) {}
+
+void EngineScene::Breathe() {
+  if (++since_breath_ < kRecordsPerBreath) return;
+  since_breath_ = 0;
+  if (breathe_) breathe_();
+}
+
+void EngineScene::Forget() {
+  held_ = nullptr;
+  reset_ = true;
+  geometries_.clear();
+  drawn_.clear();
+}
+
+size_t EngineScene::Plan(SnapshotPtr next) {
+  next_ = std::move(next);
+  put_geometries_.clear();
+  unused_.clear();
+  drop_geometries_.clear();
+  drop_drawables_.clear();
+  drop_layers_.clear();
+  put_layers_.clear();
+  put_drawables_.clear();
+  put_reset_ = std::exchange(reset_, false);
+
+  const Snapshot& before = held_ == nullptr ? EmptyScene() : *held_;
+  PlanInstances(before, *next_);
+  PersistentMap<OwnedName, LayerPtr>::Diff(
+      before.layers, next_->layers,
+      [&](const OwnedName& key, const LayerPtr* was, const LayerPtr* is) {
+        const Layer* old_layer = was == nullptr ? nullptr : was->get();
+        const Layer* new_layer = is == nullptr ? nullptr : is->get();
+        if (old_layer != nullptr && new_layer != nullptr &&
+            old_layer->number != new_layer->number) {
+          PlanLayer(key, old_layer, nullptr);  // removed, and another made by the same name
+          old_layer = nullptr;
+        }
+        PlanLayer(key, old_layer, new_layer);
+      });
+  for (const auto& [number, place] : redraw_) {
+    Draw(place.layer.owner, *next_->FindLayer(place.layer),
+         *next_->FindEntity(place.layer, place.id));
+  }
+  redraw_.clear();
+
+  size_t size = put_reset_ ? gpu::DeltaWriter::kSizeOfReset : 0;
+  for (const GeometryPtr& geometry : unused_) {
+    const auto it = geometries_.find(geometry.get());
+    if (it == geometries_.end() || it->second.uses > 0) continue;
+    // What this very delta would put and drop it leaves out.
+    if (!it->second.fresh) drop_geometries_.push_back(it->second.id);
+    geometries_.erase(it);
+  }
+  std::erase_if(put_geometries_,
+                [&](const GeometryPtr& geometry) { return !geometries_.contains(geometry.get()); });
+  for (const GeometryPtr& geometry : put_geometries_) {
+    geometries_.find(geometry.get())->second.fresh = false;
+    size += gpu::DeltaWriter::SizeOf(geometry->record);
+  }
+  size += put_layers_.size() * gpu::DeltaWriter::SizeOf(gpu::LayerRecord());
+  size += put_drawables_.size() * gpu::DeltaWriter::SizeOf(gpu::DrawableRecord());
+  size += gpu::DeltaWriter::kSizeOfId *
+          (drop_geometries_.size() + drop_drawables_.size() + drop_layers_.size());
+  held_ = next_;
+  return size;
+}
+
+void EngineScene::Write(gpu::DeltaWriter& writer) {
+  if (put_reset_) writer.Reset();
+  size_t since = 0;
+  for (const GeometryPtr& geometry : put_geometries_) {
+    gpu::GeometryRecord record = geometry->record;
+    record.id = geometries_.find(geometry.get())->second.id;
+    writer.PutGeometry(record, geometry->positions, geometry->indices, geometry->colors);
+    Breathe();
+    since += geometry->bytes();
+    if (since >= kBytesPerBreath) {
+      since = 0;
+      if (breathe_) breathe_();
+    }
+  }
+  for (const gpu::LayerRecord& layer : put_layers_) writer.PutLayer(layer);
+  for (const gpu::DrawableRecord& drawable : put_drawables_) {
+    writer.PutDrawable(drawable);
+    Breathe();
+  }
+  for (const uint64_t id : drop_drawables_) writer.Drop(gpu::Op::kDropDrawable, id);
+  for (const uint64_t id : drop_geometries_) writer.Drop(gpu::Op::kDropGeometry, id);
+  for (const uint64_t id : drop_layers_) writer.Drop(gpu::Op::kDropLayer, id);
+  put_geometries_.clear();
+  unused_.clear();
+}
+
+void EngineScene::PlanInstances(const Snapshot& before, const Snapshot& next) {
+  redraw_.clear();
+  PersistentMap<OwnedName, ObjectPtr>::Diff(
+      before.objects, next.objects,
+      [&](const OwnedName& key, const ObjectPtr*, const ObjectPtr* is) {
+        if (is == nullptr) return;
+        next.uses.ForEachFrom({key.owner, key.name, false, "", ""}, [&](const UseKey& use, bool) {
+          if (use.owner != key.owner || use.object != key.name || use.by_object) return false;
+          EntityPlace place{{use.owner, use.layer}, use.id};
+          const uint64_t number = next.FindEntity(place.layer, place.id)->number;
+          redraw_.emplace(number, std::move(place));
+          return true;
+        });
+      });
+}
+
+void EngineScene::PlanLayer(const OwnedName& key, const Layer* before, const Layer* now) {
+  if (now == nullptr) {
+    before->entities.ForEach([&](const std::string&, const EntityPtr& entity) { Undraw(*entity); });
+    drop_layers_.push_back(before->number);
+    return;
+  }
+  if (before == nullptr || !LooksSame(*before, *now)) put_layers_.push_back(RecordOf(*now));
+  EntityMap::Diff(before == nullptr ? EntityMap() : before->entities, now->entities,
+                  [&](const std::string&, const EntityPtr* was, const EntityPtr* is) {
+                    if (is == nullptr) return Undraw(**was);
+                    if (was != nullptr && (*was)->number != (*is)->number) Undraw(**was);
+                    if (was != nullptr && LooksSame(**was, **is)) return;
+                    redraw_.erase((*is)->number);
+                    Draw(key.owner, *now, **is);
+                  });
+}
+
+void EngineScene::Draw(uint64_t owner, const Layer& layer, const Entity& entity) {
+  flat_.clear();
+  Flatten(owner, entity.data.content, entity.data.transform);
+  std::vector<Part>& parts = drawn_[entity.number];
+  // Old geometries are let go only when the new ones are held: what stays is not sent again.
+  const std::vector<Part> old = std::move(parts);
+  parts.clear();
+  parts.reserve(flat_.size());
+  for (size_t i = 0; i < flat_.size(); ++i) {
+    gpu::DrawableRecord record;
+    record.id = i < old.size() ? old[i].drawable : next_id_++;
+    record.geometry = Use(flat_[i].geometry);
+    record.layer = layer.number;
+    record.priority = entity.data.priority;
+    record.erase = entity.data.erase ? 1 : 0;
+    record.transform = flat_[i].transform;
+    put_drawables_.push_back(record);
+    parts.push_back({record.id, std::move(flat_[i].geometry)});
+    Breathe();
+  }
+  for (size_t i = 0; i < old.size(); ++i) {
+    if (i >= parts.size()) drop_drawables_.push_back(old[i].drawable);
+    Release(old[i].geometry);
+  }
+}
+
+void EngineScene::Undraw(const Entity& entity) {
+  const auto it = drawn_.find(entity.number);
+  if (it == drawn_.end()) return;
+  for (const Part& part : it->second) {
+    drop_drawables_.push_back(part.drawable);
+    Release(part.geometry);
+  }
+  drawn_.erase(it);
+  Breathe();
+}
+
+void EngineScene::Flatten(uint64_t owner, const Content& content, const gpu::Affine& map) {
+  if (const auto* geometry = std::get_if<GeometryPtr>(&content)) {
+    flat_.push_back({*geometry, map});
+    return;
+  }
+  const Object* object = next_->FindObject({owner, std::get<InstanceRef>(content).object});
+  for (const ObjectPart& part : object->data->parts) {
+    Flatten(owner, part.content, gpu::Compose(map, part.transform));
+  }
+}
+
+uint64_t EngineScene::Use(const GeometryPtr& geometry) {
+  const auto [it, fresh] = geometries_.try_emplace(geometry.get());
+  if (fresh) {
+    it->second.id = next_id_++;
+    it->second.fresh = true;
+    put_geometries_.push_back(geometry);
+  }
+  ++it->second.uses;
+  return it->second.id;
+}
+
+void EngineScene::Release(const GeometryPtr& geometry) {
+  if (--geometries_.find(geometry.get())->second.uses == 0) unused_.push_back(geometry);
+}
+
+}  // namespace voxeld::daemon

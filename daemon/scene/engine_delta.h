@@ -1,0 +1,94 @@
+// What an engine holds of the scene, and the delta that brings it to another snapshot, whichever.
+//
+//   EngineScene scene;                          // an engine that holds nothing
+//   size_t size = scene.Plan(snapshot);         // what differs; 0: nothing
+//   DeltaWriter writer(block.bytes());
+//   scene.Write(writer);                        // writer.size() == size
+//
+// An instance becomes one drawable for each primitive that it draws; all share the primitive's
+// geometry. Maps of nested parts are composed from the outside in: ((entity ∘ part) ∘ part of the
+// part) …
+//
+// Single-threaded. Plan takes it that the delta will be applied; if it was not, call Forget.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "daemon/scene/snapshot.h"
+#include "gpu/delta.h"
+
+namespace voxeld::daemon {
+
+class EngineScene {
+ public:
+  // `breathe` (may be empty) is called now and then during long work, so that its owner can do what
+  // will not wait. It must not call back.
+  explicit EngineScene(std::function<void()> breathe = nullptr);
+
+  // Of what is held (since the last Plan); null: nothing.
+  const SnapshotPtr& held() const { return held_; }
+
+  // Works out the delta from what is held to `next`, and takes that to be held from now on. Answers
+  // its size in bytes; 0 if nothing that an engine sees differs. The cost is of what differs.
+  size_t Plan(SnapshotPtr next);
+  // Writes the delta planned last, once.
+  void Write(gpu::DeltaWriter& writer);
+
+  // The engine is new, or nobody knows what it holds: the next delta begins with a reset.
+  void Forget();
+
+  // What is held, for tests and figures.
+  size_t geometries() const { return geometries_.size(); }
+
+ private:
+  struct Part {
+    uint64_t drawable = 0;
+    GeometryPtr geometry;
+  };
+  struct GeometryUse {
+    uint64_t id = 0;
+    uint64_t uses = 0;
+    bool fresh = false;  // put by the delta that is being planned
+  };
+  struct Flat {
+    GeometryPtr geometry;
+    gpu::Affine transform;
+  };
+
+  void PlanLayer(const OwnedName& key, const Layer* before, const Layer* now);
+  void PlanInstances(const Snapshot& before, const Snapshot& next);
+  void Draw(uint64_t owner, const Layer& layer, const Entity& entity);
+  void Undraw(const Entity& entity);
+  void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map);
+  uint64_t Use(const GeometryPtr& geometry);
+  void Release(const GeometryPtr& geometry);
+  void Breathe();
+
+  const std::function<void()> breathe_;
+  uint32_t since_breath_ = 0;
+
+  SnapshotPtr held_;
+  bool reset_ = true;  // the next delta begins with one
+  uint64_t next_id_ = 1;
+  std::unordered_map<const GeometryData*, GeometryUse> geometries_;
+  std::unordered_map<uint64_t, std::vector<Part>> drawn_;  // by number of entity
+
+  // The plan.
+  SnapshotPtr next_;
+  std::vector<Flat> flat_;
+  // Entities to draw anew though they have not changed: objects that they draw have. By number.
+  std::map<uint64_t, EntityPlace> redraw_;
+  std::vector<GeometryPtr> put_geometries_;
+  std::vector<GeometryPtr> unused_;  // dropped to no use at some time; may be in use again
+  std::vector<uint64_t> drop_geometries_, drop_drawables_, drop_layers_;
+  std::vector<gpu::LayerRecord> put_layers_;
+  std::vector<gpu::DrawableRecord> put_drawables_;
+  bool put_reset_ = false;
+};
+
+}  // namespace voxeld::daemon

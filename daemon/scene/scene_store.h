@@ -1,0 +1,69 @@
+// The truth about the scene: applies commits one after another, each making one immutable snapshot
+// or none.
+//
+// Single-threaded; the snapshots that it gives away may be used anywhere.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "daemon/scene/commit_applier.h"
+#include "daemon/scene/operation.h"
+#include "daemon/scene/snapshot.h"
+
+namespace voxeld::daemon {
+
+struct CommitResult {
+  bool applied = false;  // false: a strict commit with a refusal; nothing was changed
+  uint64_t applied_operations = 0, refused_operations = 0;
+  std::vector<Issue> issues;
+  bool hidden = false;  // see CommitApplier::hidden
+};
+
+class SceneStore {
+ public:
+  explicit SceneStore(const Limits& limits);
+  SceneStore(const SceneStore&) = delete;
+  SceneStore& operator=(const SceneStore&) = delete;
+
+  // The newest; number 0 is the empty scene.
+  const SnapshotPtr& snapshot() const { return snapshot_; }
+
+  // What coordinates are checked against from now on.
+  void SetViews(std::vector<DisplayView> views) { views_ = std::move(views); }
+
+  // Applies `operations`, which have passed CheckAlone, as one commit. With `strict` any refusal,
+  // or `refused_before` > 0 (what was refused on arrival), refuses it whole. Call Expire(now)
+  // first.
+  CommitResult Apply(const Author& author, std::vector<Operation> operations, sync::TimeNs now,
+                     bool strict = false, uint64_t refused_before = 0);
+
+  // Removes what has outlived its lifetime by `now`; one snapshot for each moment at which
+  // something ended, in order of time. True if there is a new snapshot.
+  bool Expire(sync::TimeNs now);
+  // kNever if nothing will.
+  sync::TimeNs next_expiry() const;
+
+  struct Removed {
+    uint64_t entities = 0, layers = 0;
+    std::vector<uint64_t> owners;  // whose layers were affected; ascending, each once
+  };
+  // Clears every layer for which `matches` holds, and removes the layers themselves unless
+  // keep_state. A new snapshot only if that changed something.
+  Removed RemoveLayers(const std::function<bool(const OwnedName&, const Layer&)>& matches,
+                       bool keep_state);
+
+  // Drops the objects of an owner who has no session any more, unless layers of theirs are left.
+  void ForgetOwner(uint64_t owner);
+
+ private:
+  void Publish(Draft draft);
+
+  const Limits limits_;
+  std::vector<DisplayView> views_;
+  uint64_t next_number_ = 1;
+  SnapshotPtr snapshot_;
+};
+
+}  // namespace voxeld::daemon

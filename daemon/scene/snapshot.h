@@ -1,0 +1,136 @@
+// The scene at one moment, immutable: what every display draws from and every query reads.
+//
+// Snapshots share what they have in common, so one costs what changed since the one before, and the
+// difference of any two costs what differs.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "daemon/scene/bounds.h"
+#include "daemon/scene/operation.h"
+#include "daemon/scene/persistent_map.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::daemon {
+
+// The session that last wrote a layer.
+struct Writer {
+  uint64_t session = 0;
+  std::string client_name;
+};
+using WriterPtr = std::shared_ptr<const Writer>;
+
+// (owner, name): of a layer or of an object.
+struct OwnedName {
+  uint64_t owner = 0;
+  std::string name;
+  auto operator<=>(const OwnedName&) const = default;
+  template <typename H>
+  friend H AbslHashValue(H h, const OwnedName& k) {
+    return H::combine(std::move(h), k.owner, k.name);
+  }
+};
+
+struct Entity {
+  EntityData data;
+  uint64_t number = 0;    // unique in the store; stays when an entity of the same key is replaced
+  uint64_t sequence = 0;  // of its last upsert
+  sync::TimeNs expires_ns = sync::kNever;
+  uint64_t bytes = 0;
+};
+using EntityPtr = std::shared_ptr<const Entity>;
+using EntityMap = PersistentMap<std::string, EntityPtr>;
+
+struct Layer {
+  uint64_t number = 0;  // of creation; the engine's id
+  bool visible = true;
+  uint32_t opacity = 255;
+  int32_t order = 0;
+  gpu::BlendMode blend = gpu::BlendMode::kOver;
+  gpu::Affine transform;
+  WriterPtr writer;
+  EntityMap entities;
+  uint64_t bytes = 0;
+  // Holds every entity, in the layer's coordinates; wider than need be after removals.
+  Bounds bounds;
+};
+using LayerPtr = std::shared_ptr<const Layer>;
+
+struct Object {
+  std::shared_ptr<const ObjectData> data;
+  uint64_t bytes = 0;
+  // Derived from the definition and those that it refers to.
+  uint32_t depth = 1;      // 1: no instances inside
+  uint64_t drawables = 0;  // primitives that one instance draws; saturates
+  Bounds bounds;           // in the object's coordinates
+};
+using ObjectPtr = std::shared_ptr<const Object>;
+
+// Something that refers to an object: an entity (layer, id), or another object (its name in
+// `layer`, no id).
+struct UseKey {
+  uint64_t owner = 0;
+  std::string object;
+  bool by_object = false;
+  std::string layer, id;
+  auto operator<=>(const UseKey&) const = default;
+  template <typename H>
+  friend H AbslHashValue(H h, const UseKey& k) {
+    return H::combine(std::move(h), k.owner, k.object, k.by_object, k.layer, k.id);
+  }
+};
+
+struct ExpiryKey {
+  sync::TimeNs time_ns = 0;
+  uint64_t entity = 0;  // its number
+  auto operator<=>(const ExpiryKey&) const = default;
+  template <typename H>
+  friend H AbslHashValue(H h, const ExpiryKey& k) {
+    return H::combine(std::move(h), k.time_ns, k.entity);
+  }
+};
+
+struct EntityPlace {
+  OwnedName layer;
+  std::string id;
+  auto operator<=>(const EntityPlace&) const = default;
+};
+
+// What counts against an owner's quotas.
+struct OwnerTally {
+  uint64_t drawables = 0;  // entities, an instance counting as what it draws (at least 1)
+  uint64_t layers = 0;
+  uint64_t bytes = 0;
+  bool operator==(const OwnerTally&) const = default;
+};
+
+struct Snapshot {
+  uint64_t number = 0;  // ascending
+  PersistentMap<OwnedName, LayerPtr> layers;
+  PersistentMap<OwnedName, ObjectPtr> objects;
+  PersistentMap<UseKey, bool> uses;
+  PersistentMap<ExpiryKey, EntityPlace> expiries;
+  PersistentMap<uint64_t, OwnerTally> owners;
+  uint64_t entities = 0;
+
+  const Layer* FindLayer(const OwnedName& key) const {
+    const LayerPtr* layer = layers.Find(key);
+    return layer == nullptr ? nullptr : layer->get();
+  }
+  const Object* FindObject(const OwnedName& key) const {
+    const ObjectPtr* object = objects.Find(key);
+    return object == nullptr ? nullptr : object->get();
+  }
+  EntityPtr FindEntity(const OwnedName& layer, const std::string& id) const {
+    const Layer* l = FindLayer(layer);
+    const EntityPtr* entity = l == nullptr ? nullptr : l->entities.Find(id);
+    return entity == nullptr ? nullptr : *entity;
+  }
+};
+using SnapshotPtr = std::shared_ptr<const Snapshot>;
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,108 @@
+// Short ways to write operations in tests.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/scene/operation.h"
+
+namespace voxeld::daemon::testing {
+
+// Points at (x, 0, 0), (x+1, 0, 0), … in one colour.
+inline GeometryPtr Dots(float x, uint32_t color = 0xFFFFFF, uint32_t count = 1) {
+  auto data = std::make_shared<GeometryData>();
+  data->record.kind = gpu::PrimitiveKind::kPoints;
+  data->record.color = color;
+  data->record.vertex_count = count;
+  for (uint32_t i = 0; i < count; ++i) {
+    data->positions.insert(data->positions.end(), {x + static_cast<float>(i), 0, 0});
+  }
+  data->min[0] = x;
+  data->max[0] = x + count - 1;
+  return data;
+}
+
+inline gpu::Affine Shift(double x, double y = 0, double z = 0) {
+  gpu::Affine map;
+  map.m[3] = x;
+  map.m[7] = y;
+  map.m[11] = z;
+  return map;
+}
+
+inline gpu::Affine Scale(double x, double y, double z) {
+  gpu::Affine map;
+  map.m[0] = x;
+  map.m[5] = y;
+  map.m[10] = z;
+  return map;
+}
+
+inline EntityData Entity1(Content content, gpu::Affine transform = {}) {
+  EntityData data;
+  data.content = std::move(content);
+  data.transform = transform;
+  return data;
+}
+
+inline Operation Put(std::string layer, std::string id, EntityData data) {
+  return {0, Upsert{std::move(layer), std::move(id), std::move(data)}};
+}
+inline Operation Put(std::string layer, std::string id, float x = 0) {
+  return Put(std::move(layer), std::move(id), Entity1(Dots(x)));
+}
+inline Operation PutInstance(std::string layer, std::string id, std::string object,
+                             gpu::Affine transform = {}) {
+  return Put(std::move(layer), std::move(id), Entity1(InstanceRef{std::move(object)}, transform));
+}
+inline Operation Move(std::string layer, std::string id, gpu::Affine transform) {
+  return {0, SetTransform{std::move(layer), std::move(id), transform}};
+}
+inline Operation DeleteId(std::string layer, std::string id, uint64_t guard = 0) {
+  return {0, Delete{Delete::What::kId, std::move(layer), std::move(id), guard}};
+}
+inline Operation DeletePrefix(std::string layer, std::string prefix, uint64_t guard = 0) {
+  return {0, Delete{Delete::What::kPrefix, std::move(layer), std::move(prefix), guard}};
+}
+inline Operation DeleteAllOf(std::string layer, uint64_t guard = 0) {
+  return {0, Delete{Delete::What::kAllOfLayer, std::move(layer), "", guard}};
+}
+inline Operation DeleteAllMine() { return {0, Delete{Delete::What::kAllMine, "", "", 0}}; }
+inline Operation SetLayer(std::string layer, std::optional<bool> visible,
+                          std::optional<gpu::Affine> transform = {}) {
+  LayerState state;
+  state.layer = std::move(layer);
+  state.visible = visible;
+  state.transform = transform;
+  return {0, std::move(state)};
+}
+inline Operation Begin(std::string layer) { return {0, FrameBegin{std::move(layer)}}; }
+inline Operation End(std::string layer) { return {0, FrameEnd{std::move(layer)}}; }
+inline Operation Define(std::string object, std::vector<ObjectPart> parts) {
+  auto data = std::make_shared<ObjectData>();
+  data->parts = std::move(parts);
+  return {0, DefineObject{std::move(object), std::move(data)}};
+}
+inline Operation Undefine(std::string object, bool cascade = false) {
+  return {0, DeleteObject{std::move(object), cascade}};
+}
+inline Operation EndCommit(uint64_t frame_id = 0) {
+  Commit commit;
+  commit.frame_id = frame_id;
+  return {0, commit};
+}
+
+// Numbers them as a stream does: 1, 2, 3, … after `last`.
+template <typename... Ops>
+std::vector<Operation> Sequence(uint64_t last, Ops... ops) {
+  std::vector<Operation> all;
+  (all.push_back(std::move(ops)), ...);
+  for (Operation& op : all) op.sequence = ++last;
+  return all;
+}
+
+}  // namespace voxeld::daemon::testing

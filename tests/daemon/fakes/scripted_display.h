@@ -1,0 +1,91 @@
+// A display whose device does what a test says. Time passes only when the test moves it.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "display/api/display.h"
+
+namespace voxeld::daemon::testing {
+
+inline display::DisplayInfo SmallDisplay(std::string name) {
+  display::DisplayInfo info;
+  info.name = std::move(name);
+  info.driver = "scripted";
+  display::PlanarStack stack;
+  stack.width_px = 8;
+  stack.height_px = 8;
+  stack.positions_mm = {-0.5, 0.5};
+  info.geometry.shape = stack;
+  info.geometry.grid = {8, 8, 2, {1, 1, 1}, {-4, -4, -1}};
+  info.layout = {2, 8, 8, 1, display::PixelFormat::kRgb888};
+  info.volumes_per_second = 30;
+  return info;
+}
+
+class ScriptedDisplay final : public display::Display {
+ public:
+  ScriptedDisplay(display::DisplayInfo info, sync::Clock& clock)
+      : Display(std::move(info), clock), now_(clock) {}
+
+  // ---- what the device does
+  bool attach_at_once = true;
+  sync::TimeNs show_after_ns = -1;  // ≥ 0: each volume is shown that long after it was sent
+  absl::Status refuse_brightness, refuse_blank;
+
+  void Attach() { Attached(); }
+  void Lose(const std::string& reason) { DeviceLost(reason); }
+  // The volume in flight ends. False if none is.
+  bool Show() {
+    if (in_flight() == nullptr) return false;
+    FrameDone(now_.Now(), display::Evidence::kDevice, now_.Now() - sync::kMillisecond, 100);
+    return true;
+  }
+  bool Abort(const std::string& reason) {
+    if (in_flight() == nullptr) return false;
+    FrameLost(reason, 50);
+    return true;
+  }
+  using Display::in_flight;
+
+  int sent = 0;  // volumes begun, of any cause
+
+ protected:
+  absl::Status DoStart() override {
+    if (attach_at_once) Attached();
+    return absl::OkStatus();
+  }
+  void DoStop() override {}
+  void DoSend(const display::SliceFramePtr&, bool) override {
+    ++sent;
+    sent_at_ = now_.Now();
+  }
+  sync::TimeNs DoTick(sync::TimeNs now) override {
+    if (show_after_ns < 0 || in_flight() == nullptr) return sync::kNever;
+    if (now < sent_at_ + show_after_ns) return sent_at_ + show_after_ns;
+    Show();
+    return now;
+  }
+  absl::Status DoSetBrightness(double) override { return refuse_brightness; }
+  absl::Status DoSetBlank(bool) override { return refuse_blank; }
+  std::unique_ptr<display::WireDecoder> DoMakeDecoder() const override {
+    struct Decoder final : display::WireDecoder {
+      absl::Status OnBytes(uint8_t, std::span<const std::byte>) override {
+        return absl::OkStatus();
+      }
+      std::optional<display::DecodedVolume> TakeVolume() override {
+        return display::DecodedVolume();
+      }
+    };
+    return std::make_unique<Decoder>();
+  }
+
+ private:
+  sync::Clock& now_;
+  sync::TimeNs sent_at_ = 0;
+};
+
+}  // namespace voxeld::daemon::testing

@@ -1,0 +1,162 @@
+// A whole core in one thread, under a clock that stands still, with scripted displays and recording
+// engines.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "daemon/core/core.h"
+#include "display/sync/fake_clock.h"
+#include "tests/daemon/fakes/operations.h"
+#include "tests/daemon/fakes/recording_engine.h"
+#include "tests/daemon/fakes/scripted_display.h"
+
+namespace voxeld::daemon::testing {
+
+struct RecordingSink final : SessionSink {
+  void OnIssue(const Issue& issue) override { issues.push_back(issue); }
+  void OnReceipt(const Receipt& receipt) override { receipts.push_back(receipt); }
+
+  std::vector<Issue> issues;
+  std::vector<Receipt> receipts;
+
+  template <typename T>
+  std::vector<std::pair<Receipt, T>> Of() const {
+    std::vector<std::pair<Receipt, T>> found;
+    for (const Receipt& receipt : receipts) {
+      if (const T* what = std::get_if<T>(&receipt.what)) found.emplace_back(receipt, *what);
+    }
+    return found;
+  }
+  // Of one commit, in the order of arrival.
+  std::vector<CommitOutcome> OutcomesOf(uint64_t frame_id) const {
+    std::vector<CommitOutcome> found;
+    for (const auto& [receipt, outcome] : Of<CommitOutcome>()) {
+      if (receipt.frame_id == frame_id) found.push_back(outcome);
+    }
+    return found;
+  }
+};
+
+class Simulation {
+ public:
+  struct Client {
+    SessionInfo info;
+    std::shared_ptr<RecordingSink> sink = std::make_shared<RecordingSink>();
+    uint64_t last_sequence = 0;
+  };
+
+  explicit Simulation(Limits limits = {}, int displays = 1) {
+    CoreOptions options;
+    options.limits = limits;
+    options.version = "test";
+    options.threads = false;
+    options.make_engine =
+        [this](const gpu::EngineOptions&) -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
+      if (!make_engine_fails.ok()) return make_engine_fails;
+      return std::make_unique<RecordingEngine>(engine_script(engines_made_++));
+    };
+    core.emplace(std::move(options), clock);
+    for (int i = 0; i < displays; ++i) {
+      auto display = std::make_unique<ScriptedDisplay>(
+          SmallDisplay(i == 0 ? "main" : "display" + std::to_string(i)), clock);
+      display_.push_back(display.get());
+      const absl::Status status = core->AddDisplay(std::move(display), {});
+      if (!status.ok()) std::abort();
+    }
+    displays_ = displays;
+  }
+
+  // Starts, and shows the first (dark) volume unless a display does not attach.
+  void Start() {
+    if (!core->Start().ok()) std::abort();
+    core->Step();
+    for (ScriptedDisplay* d : display_) d->Show();
+    core->Step();
+  }
+
+  Client Open(OpenOptions options = {}) {
+    Client client;
+    core->OpenSession(std::move(options), client.sink,
+                      [&](absl::StatusOr<SessionInfo> info) { client.info = *info; });
+    core->Step();
+    return client;
+  }
+
+  // Numbers the operations and hands them over, with a commit at the end if `frame_id` is not 0.
+  template <typename... Ops>
+  void Send(Client& client, uint64_t frame_id, Ops... ops) {
+    std::vector<Operation> all = Sequence(client.last_sequence, std::move(ops)...);
+    client.last_sequence += all.size();
+    if (frame_id != 0) {
+      all.push_back(EndCommit(frame_id));
+      all.back().sequence = ++client.last_sequence;
+    }
+    core->Handle(client.info.session, std::move(all), {}, 100, nullptr);
+    core->Step();
+  }
+
+  void Close(const Client& client) {
+    core->CloseSession(client.info.session, nullptr);
+    core->Step();
+  }
+
+  void Advance(sync::TimeNs delta) {
+    clock.Advance(delta);
+    core->Step();
+  }
+
+  // Lets the device show what is in flight.
+  bool Show(int display = 0) {
+    const bool shown = display_[display]->Show();
+    core->Step();
+    return shown;
+  }
+
+  EntityPage List(EntityQuery query = {}) {
+    EntityPage page;
+    core->ListEntities(std::move(query), [&](absl::StatusOr<EntityPage> p) { page = *p; });
+    core->Step();
+    return page;
+  }
+
+  Stats GetStats() {
+    Stats stats;
+    core->GetStats([&](absl::StatusOr<Stats> s) { stats = *s; });
+    core->Step();
+    return stats;
+  }
+
+  absl::StatusOr<DisplayDescription> Update(DisplayUpdate update, std::string name = "") {
+    absl::StatusOr<DisplayDescription> result = absl::UnknownError("no answer");
+    core->UpdateDisplay(std::move(name), std::move(update), [&](auto r) { result = std::move(r); });
+    core->Step();
+    return result;
+  }
+
+  ScriptedDisplay& display(int i = 0) { return *display_[i]; }
+  EngineScript& engine(int i = 0) { return *engine_script(i); }
+
+  sync::FakeClock clock;
+  absl::Status make_engine_fails;
+  std::optional<Core> core;
+
+ private:
+  // Engines are made in the order of displays; those that replace a lost one belong to the first.
+  std::shared_ptr<EngineScript> engine_script(int made) {
+    const size_t i = made < displays_ || displays_ == 0 ? made : 0;
+    while (scripts_.size() <= i) scripts_.push_back(std::make_shared<EngineScript>());
+    return scripts_[i];
+  }
+
+  int engines_made_ = 0;
+  int displays_ = 0;
+  std::vector<std::shared_ptr<EngineScript>> scripts_;
+  std::vector<ScriptedDisplay*> display_;
+};
+
+}  // namespace voxeld::daemon::testing
