@@ -119,23 +119,6 @@ absl::Status ApplyChoice(const char* key, const char* option,
   return setter.status;
 }
 
-absl::Status Apply(const CommandLine& command_line, Config* config) {
-  if (absl::Status status = ApplyAddresses(command_line, config); !status.ok()) return status;
-  if (absl::Status status = ApplyDisplays(command_line, config); !status.ok()) return status;
-  if (command_line.engine.has_value()) {
-    const absl::StatusOr<gpu::EngineKind> kind = ParseEngineKind(*command_line.engine);
-    if (!kind.ok()) {
-      return absl::InvalidArgumentError(absl::StrCat("--engine ", kind.status().message()));
-    }
-    config->engine.kind = *kind;
-  }
-  if (absl::Status status = ApplyChoice("log.level", "--log-level", command_line.log_level, config);
-      !status.ok()) {
-    return status;
-  }
-  return ApplyChoice("log.format", "--log-format", command_line.log_format, config);
-}
-
 }  // namespace
 
 absl::StatusOr<gpu::EngineKind> ParseEngineKind(std::string_view text) {
@@ -209,21 +192,35 @@ std::string FindConfigFile(const Environment& environment,
   return exists(kSystemFile) ? kSystemFile : "";
 }
 
-absl::StatusOr<Config> ResolveConfig(const CommandLine& command_line,
-                                     const Environment& environment) {
+absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
+                                  const Environment& environment) {
   Config config;
   if (absl::Status status = SetDefaults(environment, &config); !status.ok()) return status;
-  const std::string file = command_line.config.has_value()
-                               ? *command_line.config
-                               : FindConfigFile(environment, [](const std::string& path) {
-                                   std::error_code error;
-                                   return std::filesystem::exists(path, error);
-                                 });
-  if (!file.empty()) {
-    if (absl::Status status = ReadConfigFile(file, &config); !status.ok()) return status;
-  }
-  if (absl::Status status = Apply(command_line, &config); !status.ok()) return status;
+  const auto exists = [](const std::string& path) {
+    std::error_code error;
+    return std::filesystem::exists(path, error);
+  };
+  const std::string path = file.has_value() ? *file : FindConfigFile(environment, exists);
+  if (path.empty()) return config;
+  if (absl::Status status = ReadConfigFile(path, &config); !status.ok()) return status;
   return config;
+}
+
+absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config) {
+  if (absl::Status status = ApplyAddresses(command_line, config); !status.ok()) return status;
+  if (absl::Status status = ApplyDisplays(command_line, config); !status.ok()) return status;
+  if (command_line.engine.has_value()) {
+    const absl::StatusOr<gpu::EngineKind> kind = ParseEngineKind(*command_line.engine);
+    if (!kind.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--engine ", kind.status().message()));
+    }
+    config->engine.kind = *kind;
+  }
+  if (absl::Status status = ApplyChoice("log.level", "--log-level", command_line.log_level, config);
+      !status.ok()) {
+    return status;
+  }
+  return ApplyChoice("log.format", "--log-format", command_line.log_format, config);
 }
 
 }  // namespace voxeld::daemon

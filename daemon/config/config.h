@@ -65,9 +65,13 @@ absl::Status ReadConfigText(std::string_view text, const std::string& name, Conf
 std::string FindConfigFile(const Environment& environment,
                            const std::function<bool(const std::string&)>& exists);
 
-// Defaults, file, command line. InvalidArgument and NotFound as above.
-absl::StatusOr<Config> ResolveConfig(const CommandLine& command_line,
-                                     const Environment& environment);
+// Defaults, then the file: `file` if one is named, else the one that is found. Errors as of
+// ReadConfigFile.
+absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
+                                  const Environment& environment);
+
+// What the command line says goes over it. InvalidArgument is a usage error.
+absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config);
 
 // As a file that would read back the same.
 std::string ToToml(const Config& config);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "daemon/core/core.h"
+#include "daemon/log/logger.h"
 #include "daemon/services/active_calls.h"
 #include "display/sync/clock.h"
 
@@ -16,6 +17,7 @@ struct ServiceContext {
   Core& core;
   sync::Clock& clock;
   std::string version;
+  Logger* log = nullptr;  // may be none
   // How long a stream that was half-closed waits for outcomes that it is still owed, and any ending
   // stream for its client to read what is queued.
   sync::TimeNs drain_limit_ns = 5 * sync::kSecond;

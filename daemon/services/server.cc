@@ -37,7 +37,12 @@ constexpr mode_t kSocketMode = 0660;
 class Server::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ServerOptions options)
-      : context_{core, clock, options.version, options.drain_limit_ns, options.max_queued_answers},
+      : context_{core,
+                 clock,
+                 options.version,
+                 options.log,
+                 options.drain_limit_ns,
+                 options.max_queued_answers},
         options_(std::move(options)),
         scene_(MakeSceneService(context_)),
         display_(MakeDisplayService(context_)) {}

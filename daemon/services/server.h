@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
 #include "daemon/core/core.h"
+#include "daemon/log/logger.h"
 #include "daemon/services/context.h"
 #include "display/sync/clock.h"
 
@@ -19,6 +20,7 @@ struct ServerOptions {
   std::string version;
   sync::TimeNs drain_limit_ns = 5 * sync::kSecond;
   size_t max_queued_answers = 16384;  // that a client of Stream has not read
+  Logger* log = nullptr;              // outlives the server; may be none
 };
 
 // Thread-safe. The core must run, outlive the server, and be stopped after it.

@@ -1,0 +1,277 @@
+#include "daemon/http/http_server.h"
+
+#include <sys/stat.h>
+
+#include <boost/asio/basic_socket_acceptor.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/basic_stream.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http.hpp>
+#include <chrono>
+#include <cstring>
+#include <optional>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon::http {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace wire = boost::beast::http;
+using Protocol = asio::generic::stream_protocol;
+using Acceptor = asio::basic_socket_acceptor<Protocol, asio::io_context::executor_type>;
+using Stream = beast::basic_stream<Protocol, asio::io_context::executor_type>;
+using boost::system::error_code;
+
+constexpr auto kAcceptRetry = std::chrono::milliseconds(100);
+constexpr uint64_t kGreatestBody = 4096;  // read and thrown away
+constexpr mode_t kSocketMode = 0660;
+
+Response Plain(unsigned status, std::string text) {
+  return {status, "text/plain; charset=utf-8", std::move(text) + "\n"};
+}
+
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(std::shared_ptr<asio::io_context> io, Stream::socket_type socket,
+             const ServerOptions& options, const Handler& handler,
+             std::function<void(Connection*)> closed)
+      : io_(std::move(io)),
+        stream_(std::move(socket)),
+        timer_(io_->get_executor()),
+        options_(options),
+        handler_(handler),
+        closed_(std::move(closed)) {}
+
+  void Read() {
+    parser_.emplace();
+    parser_->header_limit(options_.max_header_bytes);
+    parser_->body_limit(kGreatestBody);
+    stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
+    wire::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](error_code error, size_t) { self->OnRead(error); });
+  }
+
+  void Close() {
+    error_code ignored;
+    timer_.cancel();
+    stream_.socket().shutdown(Stream::socket_type::shutdown_both, ignored);
+    stream_.close();
+    if (auto closed = std::exchange(closed_, nullptr)) closed(this);
+  }
+
+ private:
+  void OnRead(const error_code& error) {
+    if (!error) return Answer();
+    // What is no HTTP gets an answer too; what is no request any more does not.
+    if (error == wire::error::header_limit)
+      return Write(Plain(431, "the header is too large"), true);
+    if (error == wire::error::body_limit) return Write(Plain(413, "the body is too large"), true);
+    const bool gone = error == wire::error::end_of_stream ||
+                      error == wire::error::partial_message ||
+                      error.category() != make_error_code(wire::error::bad_method).category();
+    if (gone) return Close();
+    Write(Plain(400, absl::StrCat("bad request: ", error.message())), true);
+  }
+
+  void Answer() {
+    const auto& request = parser_->get();
+    head_ = request.method() == wire::verb::head;
+    const bool close = request.need_eof() || !request.keep_alive();
+    if (request.method() != wire::verb::get && !head_) {
+      return Write(Plain(405, "only GET and HEAD are answered"), close);
+    }
+    std::string_view path(request.target().data(), request.target().size());
+    path = path.substr(0, path.find('?'));
+    const uint64_t number = ++number_;
+    // The answer may come when the connection, or the whole server, is gone.
+    const bool known = handler_(path, [weak = weak_from_this(), number, close](Response answer) {
+      const std::shared_ptr<Connection> open = weak.lock();
+      if (open == nullptr) return;
+      asio::post(*open->io_, [weak, number, close, answer = std::move(answer)]() mutable {
+        if (const auto self = weak.lock()) self->OnAnswer(number, std::move(answer), close);
+      });
+    });
+    if (!known) return Write(Plain(404, "there is nothing here; try /healthz or /metrics"), close);
+    stream_.expires_never();
+    timer_.expires_after(std::chrono::nanoseconds(options_.answer_limit_ns));
+    timer_.async_wait([self = shared_from_this(), number, close](error_code error) {
+      if (!error) self->OnAnswer(number, Plain(503, "the daemon did not answer in time"), close);
+    });
+  }
+
+  // The first answer to request `number` counts.
+  void OnAnswer(uint64_t number, Response answer, bool close) {
+    if (number != number_ || !closed_) return;
+    ++number_;
+    timer_.cancel();
+    Write(std::move(answer), close);
+  }
+
+  void Write(Response answer, bool close) {
+    response_.emplace(static_cast<wire::status>(answer.status), 11);
+    response_->set(wire::field::content_type, answer.content_type);
+    response_->set(wire::field::cache_control, "no-store");
+    if (answer.status == 405) response_->set(wire::field::allow, "GET, HEAD");
+    response_->keep_alive(!close);
+    response_->content_length(answer.body.size());
+    if (!head_) response_->body() = std::move(answer.body);
+    stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
+    serializer_.emplace(*response_);
+    const auto written = [self = shared_from_this(), close](error_code error, size_t) {
+      if (error || close) return self->Close();
+      self->Read();
+    };
+    if (head_) {
+      wire::async_write_header(stream_, *serializer_, written);
+    } else {
+      wire::async_write(stream_, *serializer_, written);
+    }
+  }
+
+  const std::shared_ptr<asio::io_context> io_;
+  Stream stream_;
+  asio::steady_timer timer_;
+  const ServerOptions& options_;
+  const Handler& handler_;
+  std::function<void(Connection*)> closed_;  // empty once closed
+  beast::flat_buffer buffer_;
+  std::optional<wire::request_parser<wire::string_body>> parser_;
+  std::optional<wire::response<wire::string_body>> response_;
+  std::optional<wire::response_serializer<wire::string_body>> serializer_;
+  bool head_ = false;
+  uint64_t number_ = 0;  // of the request that waits for its answer
+};
+
+absl::StatusOr<Protocol::endpoint> Endpoint(const Address& address, asio::io_context& io) {
+  if (address.unix_socket) {
+    return Protocol::endpoint(asio::local::stream_protocol::endpoint(address.path));
+  }
+  error_code error;
+  asio::ip::tcp::resolver resolver(io);
+  const auto found = resolver.resolve(address.host, std::to_string(address.port),
+                                      asio::ip::tcp::resolver::passive, error);
+  if (error || found.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the host of ", address.ToString(), " is not known: ", error.message()));
+  }
+  return Protocol::endpoint(found.begin()->endpoint());
+}
+
+}  // namespace
+
+// Everything but Start and the destructor runs on the one thread.
+class Server::Impl {
+ public:
+  Impl(ServerOptions options, Handler handler)
+      : options_(std::move(options)),
+        handler_(std::move(handler)),
+        io_(std::make_shared<asio::io_context>(1)),
+        acceptor_(io_->get_executor()),
+        retry_(io_->get_executor()) {}
+
+  ~Impl() {
+    if (!thread_.joinable()) return;
+    asio::post(*io_, [this] {
+      stopping_ = true;
+      error_code ignored;
+      acceptor_.close(ignored);
+      retry_.cancel();
+      const std::set<std::shared_ptr<Connection>> connections = connections_;
+      for (const auto& connection : connections) connection->Close();
+    });
+    thread_.join();
+  }
+
+  absl::Status Start() {
+    if (absl::Status ready = PrepareToListen(options_.listen); !ready.ok()) return ready;
+    absl::StatusOr<Protocol::endpoint> endpoint = Endpoint(options_.listen, *io_);
+    if (!endpoint.ok()) return endpoint.status();
+    error_code error;
+    acceptor_.open(endpoint->protocol(), error);
+    if (!error && !options_.listen.unix_socket) {
+      acceptor_.set_option(asio::socket_base::reuse_address(true), error);
+    }
+    if (!error) acceptor_.bind(*endpoint, error);
+    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+    if (error) {
+      return absl::ErrnoToStatus(
+          error.value(), absl::StrCat(options_.listen.ToString(), " cannot be listened on"));
+    }
+    if (options_.listen.unix_socket) {
+      chmod(options_.listen.path.c_str(), kSocketMode);
+    } else {
+      const Protocol::endpoint local = acceptor_.local_endpoint(error);
+      asio::ip::tcp::endpoint tcp;
+      std::memcpy(tcp.data(), local.data(), local.size());
+      options_.listen.port = tcp.port();
+    }
+    Accept();
+    thread_ = std::thread([this] { io_->run(); });
+    return absl::OkStatus();
+  }
+
+  const Address& address() const { return options_.listen; }
+
+ private:
+  void Accept() {
+    if (accepting_ || stopping_ || connections_.size() >= options_.max_connections) return;
+    accepting_ = true;
+    acceptor_.async_accept([this](error_code error, Stream::socket_type socket) {
+      accepting_ = false;
+      if (stopping_) return;
+      if (error) return AcceptLater();
+      const auto connection =
+          std::make_shared<Connection>(io_, std::move(socket), options_, handler_,
+                                       [this](Connection* closed) { OnClosed(closed); });
+      connections_.insert(connection);
+      connection->Read();
+      Accept();
+    });
+  }
+
+  // Out of descriptors, say: what is open may close.
+  void AcceptLater() {
+    retry_.expires_after(kAcceptRetry);
+    retry_.async_wait([this](error_code error) {
+      if (!error) Accept();
+    });
+  }
+
+  void OnClosed(Connection* closed) {
+    connections_.erase(closed->shared_from_this());
+    Accept();
+  }
+
+  ServerOptions options_;
+  const Handler handler_;
+  const std::shared_ptr<asio::io_context> io_;
+  Acceptor acceptor_;
+  asio::steady_timer retry_;
+  std::set<std::shared_ptr<Connection>> connections_;
+  bool accepting_ = false, stopping_ = false;
+  std::thread thread_;
+};
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::~Server() = default;
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options, Handler handler) {
+  auto impl = std::make_unique<Impl>(std::move(options), std::move(handler));
+  if (absl::Status status = impl->Start(); !status.ok()) return status;
+  return std::unique_ptr<Server>(new Server(std::move(impl)));
+}
+
+const Address& Server::address() const { return impl_->address(); }
+
+}  // namespace voxeld::daemon::http

@@ -1,0 +1,55 @@
+// A small HTTP/1.1 server for people's and machines' questions about the daemon: GET and HEAD of a
+// few paths, one thread, asynchronous, bounded in connections, request size and time.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "daemon/address/address.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::daemon::http {
+
+struct Response {
+  unsigned status = 200;
+  std::string content_type = "text/plain; charset=utf-8";
+  std::string body;
+};
+
+// Answers a path by calling `done` once, from any thread, at once or later. False: there is no such
+// path, and `done` will not be called. Called on the server's thread; must not block.
+using Done = std::function<void(Response)>;
+using Handler = std::function<bool(std::string_view path, Done done)>;
+
+struct ServerOptions {
+  Address listen;
+  uint32_t max_connections = 64;     // further ones wait to be accepted
+  uint32_t max_header_bytes = 8192;  // 431 beyond
+  sync::TimeNs idle_limit_ns =
+      10 * sync::kSecond;  // for a request to come in, and for an answer to be read
+  sync::TimeNs answer_limit_ns = 5 * sync::kSecond;  // for the handler; then 503
+};
+
+// Times are the system's: sockets know no other.
+class Server {
+ public:
+  // AlreadyExists if somebody listens there.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options, Handler handler);
+  ~Server();  // closes every connection and joins the thread; `done` functions may be called later
+              // still
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  const Address& address() const;  // with the port that was chosen
+
+ private:
+  class Impl;
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace voxeld::daemon::http

@@ -1,0 +1,192 @@
+#include "daemon/http/metrics.h"
+
+#include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
+
+#include <utility>
+#include <vector>
+
+#include "display/api/outcome.h"
+
+namespace voxeld::daemon::http {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+
+constexpr double kNsPerSecond = 1e9;
+
+template <typename Owner>
+struct Row {
+  const char* name;
+  uint64_t Owner::*figure;
+  MetricType type;
+  const char* help;
+};
+
+// Each figure is listed here, once.
+constexpr Row<Stats> kDaemonRows[] = {
+    {"voxeld_sessions", &Stats::sessions, MetricType::Gauge, "Open sessions"},
+    {"voxeld_owners", &Stats::owners, MetricType::Gauge, "Owners of layers or sessions"},
+    {"voxeld_layers", &Stats::layers, MetricType::Gauge, "Layers"},
+    {"voxeld_entities", &Stats::entities, MetricType::Gauge, "Entities retained"},
+    {"voxeld_objects", &Stats::objects, MetricType::Gauge, "Objects defined"},
+    {"voxeld_scene_bytes", &Stats::scene_bytes, MetricType::Gauge, "Retained payload"},
+    {"voxeld_commits_accepted_total", &Stats::commits_accepted, MetricType::Counter,
+     "Commits applied"},
+    {"voxeld_commits_refused_total", &Stats::commits_refused, MetricType::Counter,
+     "Commits refused whole"},
+    {"voxeld_operations_applied_total", &Stats::operations_applied, MetricType::Counter,
+     "Operations applied"},
+    {"voxeld_operations_refused_total", &Stats::operations_refused, MetricType::Counter,
+     "Operations refused, each with an issue"},
+    {"voxeld_bytes_in_total", &Stats::bytes_in, MetricType::Counter, "Bytes of requests taken in"},
+    {"voxeld_outcomes_undelivered_total", &Stats::outcomes_undelivered, MetricType::Counter,
+     "Outcomes owed to clients that had gone"},
+};
+
+constexpr Row<DisplayFigures> kDisplayRows[] = {
+    {"voxeld_display_lit_voxels", &DisplayFigures::lit_voxels, MetricType::Gauge,
+     "Voxels that are not black"},
+    {"voxeld_display_volumes_drawn_total", &DisplayFigures::volumes_drawn, MetricType::Counter,
+     "Volumes drawn by the engine"},
+    {"voxeld_display_volumes_presented_total", &DisplayFigures::volumes_presented,
+     MetricType::Counter, "Volumes shown whole"},
+    {"voxeld_display_volumes_replaced_total", &DisplayFigures::volumes_replaced,
+     MetricType::Counter, "Volumes whose place a newer one took before they were sent"},
+    {"voxeld_display_volumes_lost_total", &DisplayFigures::volumes_lost, MetricType::Counter,
+     "Volumes whose sending or showing failed"},
+    {"voxeld_display_bytes_out_total", &DisplayFigures::bytes_out, MetricType::Counter,
+     "Bytes handed to the transport"},
+    {"voxeld_display_slices_sent_total", &DisplayFigures::slices_sent, MetricType::Counter,
+     "Slices sent"},
+    {"voxeld_display_slices_resent_total", &DisplayFigures::slices_resent, MetricType::Counter,
+     "Slices sent again at the device's request"},
+    {"voxeld_display_underruns_total", &DisplayFigures::underruns, MetricType::Counter,
+     "Sweeps that repeated a volume while a newer was on its way"},
+    {"voxeld_display_attaches_total", &DisplayFigures::attaches, MetricType::Counter,
+     "Times that the device was set up"},
+    {"voxeld_display_commits_owed_total", &DisplayFigures::commits_owed, MetricType::Counter,
+     "Commits accepted while the display existed"},
+    {"voxeld_display_commits_presented_total", &DisplayFigures::commits_presented,
+     MetricType::Counter, "Commits shown"},
+    {"voxeld_display_commits_unchanged_total", &DisplayFigures::commits_unchanged,
+     MetricType::Counter, "Commits that changed nothing on the display"},
+    {"voxeld_display_commits_superseded_total", &DisplayFigures::commits_superseded,
+     MetricType::Counter, "Commits in whose volume a newer one of the same stream rode"},
+    {"voxeld_display_commits_lost_total", &DisplayFigures::commits_lost, MetricType::Counter,
+     "Commits whose volume was lost"},
+    {"voxeld_display_commits_not_shown_total", &DisplayFigures::commits_not_shown,
+     MetricType::Counter, "Commits on an absent or blanked display, or in hidden layers"},
+    {"voxeld_display_commits_pending", &DisplayFigures::commits_pending, MetricType::Gauge,
+     "Commits that wait for their outcome"},
+};
+
+struct LatencyRow {
+  const char* name;
+  LatencyStats DisplayFigures::*figure;
+  const char* help;
+};
+
+constexpr LatencyRow kLatencyRows[] = {
+    {"voxeld_display_commit_to_last_byte_seconds", &DisplayFigures::commit_to_last_byte,
+     "From a commit to its last byte handed to the transport, over 10 s"},
+    {"voxeld_display_commit_to_presented_seconds", &DisplayFigures::commit_to_presented,
+     "From a commit to its presentation, over 10 s"},
+    {"voxeld_display_assemble_seconds", &DisplayFigures::assemble,
+     "The engine's blending of a frame, over 10 s"},
+    {"voxeld_display_slice_seconds", &DisplayFigures::slice,
+     "The engine's slicing of a frame, over 10 s"},
+};
+
+constexpr display::DisplayState kStates[] = {
+    display::DisplayState::kStopped, display::DisplayState::kAttaching,
+    display::DisplayState::kShowing, display::DisplayState::kBlanked, display::DisplayState::kLost};
+
+using Labels = std::vector<std::pair<const char*, std::string>>;
+
+void Add(MetricFamily* family, const Labels& labels, double value) {
+  ClientMetric metric;
+  for (const auto& [name, text] : labels) metric.label.push_back({name, text});
+  if (family->type == MetricType::Counter) {
+    metric.counter.value = value;
+  } else {
+    metric.gauge.value = value;
+  }
+  family->metric.push_back(std::move(metric));
+}
+
+class Families {
+ public:
+  MetricFamily* New(const char* name, MetricType type, const char* help) {
+    all_.push_back({name, help, type, {}});
+    return &all_.back();
+  }
+  void Gauge(const char* name, const char* help, const Labels& labels, double value) {
+    Add(New(name, MetricType::Gauge, help), labels, value);
+  }
+  std::string Text() const { return prometheus::TextSerializer().Serialize(all_); }
+
+ private:
+  std::vector<MetricFamily> all_;
+};
+
+void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
+  for (const auto& row : kDisplayRows) {
+    MetricFamily* family = out->New(row.name, row.type, row.help);
+    for (const DisplayFigures& display : displays) {
+      Add(family, {{"display", display.name}}, static_cast<double>(display.*row.figure));
+    }
+  }
+  for (const LatencyRow& row : kLatencyRows) {
+    MetricFamily* family = out->New(row.name, MetricType::Gauge, row.help);
+    for (const DisplayFigures& display : displays) {
+      const LatencyStats& latency = display.*row.figure;
+      for (const auto& [quantile, ns] :
+           {std::pair("0.5", latency.p50_ns), {"0.99", latency.p99_ns}, {"1", latency.max_ns}}) {
+        Add(family, {{"display", display.name}, {"quantile", quantile}},
+            static_cast<double>(ns) / kNsPerSecond);
+      }
+    }
+  }
+  MetricFamily* rate = out->New("voxeld_display_volumes_per_second", MetricType::Gauge,
+                                "Volumes presented, over 2 s");
+  for (const DisplayFigures& display : displays) {
+    Add(rate, {{"display", display.name}}, display.volumes_per_second);
+  }
+  MetricFamily* states =
+      out->New("voxeld_display_state", MetricType::Gauge, "1 for the state that the display is in");
+  for (const DisplayFigures& display : displays) {
+    for (const display::DisplayState state : kStates) {
+      Add(states, {{"display", display.name}, {"state", DisplayStateName(state)}},
+          display.state == state ? 1 : 0);
+    }
+  }
+  MetricFamily* engines =
+      out->New("voxeld_display_engine_info", MetricType::Gauge, "1; which engine, and why");
+  for (const DisplayFigures& display : displays) {
+    Add(engines,
+        {{"display", display.name},
+         {"engine", display.engine},
+         {"device", display.engine_device},
+         {"reason", display.engine_reason}},
+        1);
+  }
+}
+
+}  // namespace
+
+std::string MetricsText(const Stats& stats) {
+  Families families;
+  families.Gauge("voxeld_info", "1; which version", {{"version", stats.version}}, 1);
+  families.Gauge("voxeld_uptime_seconds", "Since the daemon started", {},
+                 static_cast<double>(stats.uptime_ns) / kNsPerSecond);
+  for (const auto& row : kDaemonRows) {
+    Add(families.New(row.name, row.type, row.help), {}, static_cast<double>(stats.*row.figure));
+  }
+  AddDisplays(stats.displays, &families);
+  return families.Text();
+}
+
+}  // namespace voxeld::daemon::http

@@ -1,0 +1,69 @@
+#include "daemon/http/monitor.h"
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "daemon/http/metrics.h"
+
+namespace voxeld::daemon::http {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Response Unavailable(const absl::Status& status) {
+  return {503, "text/plain; charset=utf-8", std::string(status.message()) + "\n"};
+}
+
+}  // namespace
+
+Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
+                        bool draining) {
+  Json reasons = Json::array();
+  if (draining) reasons.push_back({{"what", "shutting down"}});
+  for (const DisplayDescription& display : displays) {
+    if (display.state != display::DisplayState::kLost &&
+        display.state != display::DisplayState::kStopped) {
+      continue;
+    }
+    reasons.push_back({{"display", display.info.name},
+                       {"what", DisplayStateName(display.state)},
+                       {"why", display.state_reason}});
+  }
+  for (const DisplayFigures& figures : stats.displays) {
+    if (!figures.engine.empty()) continue;
+    reasons.push_back(
+        {{"display", figures.name}, {"what", "no engine"}, {"why", figures.engine_reason}});
+  }
+  const bool well = reasons.empty();
+  const Json answer = {{"status", well ? "ok" : "failing"}, {"reasons", std::move(reasons)}};
+  return {well ? 200u : 503u, "application/json",
+          answer.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
+}
+
+Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<bool>> draining) {
+  return [&core, draining](std::string_view path, Done done) {
+    if (path == "/metrics") {
+      core.GetStats([done](absl::StatusOr<Stats> stats) {
+        if (!stats.ok()) return done(Unavailable(stats.status()));
+        done({200, kMetricsContentType, MetricsText(*stats)});
+      });
+      return true;
+    }
+    if (path == "/healthz") {
+      core.ListDisplays(
+          [&core, draining, done](absl::StatusOr<std::vector<DisplayDescription>> displays) {
+            if (!displays.ok()) return done(Unavailable(displays.status()));
+            core.GetStats(
+                [draining, done, displays = *std::move(displays)](absl::StatusOr<Stats> stats) {
+                  if (!stats.ok()) return done(Unavailable(stats.status()));
+                  done(HealthResponse(displays, *stats, *draining));
+                });
+          });
+      return true;
+    }
+    return false;
+  };
+}
+
+}  // namespace voxeld::daemon::http

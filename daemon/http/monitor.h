@@ -1,0 +1,23 @@
+// What the http port answers: /healthz and /metrics.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "daemon/core/core.h"
+#include "daemon/http/http_server.h"
+
+namespace voxeld::daemon::http {
+
+// 200 while every display is there and has an engine and the daemon is not shutting down, else 503:
+// {"status":"failing","reasons":[{"display":"sim","what":"lost","why":"…"}]}. A display that is
+// being looked for for the first time fails nothing.
+Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
+                        bool draining);
+
+// The handler for Server. `core` outlives every call of it; `draining`: from when on /healthz says
+// so.
+Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<bool>> draining);
+
+}  // namespace voxeld::daemon::http

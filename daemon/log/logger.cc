@@ -1,0 +1,105 @@
+#include "daemon/log/logger.h"
+
+#include <spdlog/logger.h>
+#include <spdlog/sinks/stdout_sinks.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr const char* kTextPattern = "%Y-%m-%dT%H:%M:%S.%e%z %l %v";
+constexpr const char* kJsonPattern = R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%v})";
+
+constexpr std::pair<Logger::Level, std::string_view> kLevels[] = {
+    {Logger::Level::kTrace, "trace"}, {Logger::Level::kDebug, "debug"},
+    {Logger::Level::kInfo, "info"},   {Logger::Level::kWarn, "warn"},
+    {Logger::Level::kError, "error"}, {Logger::Level::kOff, "off"}};
+
+spdlog::level::level_enum ToSpdlog(Logger::Level level) {
+  switch (level) {
+    case Logger::Level::kTrace:
+      return spdlog::level::trace;
+    case Logger::Level::kDebug:
+      return spdlog::level::debug;
+    case Logger::Level::kInfo:
+      return spdlog::level::info;
+    case Logger::Level::kWarn:
+      return spdlog::level::warn;
+    case Logger::Level::kError:
+      return spdlog::level::err;
+    case Logger::Level::kOff:
+      return spdlog::level::off;
+  }
+  return spdlog::level::info;
+}
+
+absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
+
+std::string JsonText(std::string_view text) {
+  using Json = nlohmann::json;
+  return Json(std::string(text)).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+// Bare where no reader could be misled.
+std::string TextValue(std::string_view text) {
+  const bool bare = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return c > ' ' && c < 0x7F && c != '"' && c != '=' && c != '\\';
+  });
+  if (bare) return std::string(text);
+  return absl::StrCat("\"", absl::CHexEscape(View(text)), "\"");
+}
+
+}  // namespace
+
+Logger::Logger(Level level, Format format)
+    : Logger(level, format, std::make_shared<spdlog::sinks::stderr_sink_mt>()) {}
+
+Logger::Logger(Level level, Format format, std::shared_ptr<spdlog::sinks::sink> sink)
+    : format_(format), logger_(std::make_unique<spdlog::logger>("voxeld", std::move(sink))) {
+  logger_->set_pattern(format == Format::kJson ? kJsonPattern : kTextPattern);
+  logger_->set_level(ToSpdlog(level));
+  logger_->flush_on(spdlog::level::info);
+}
+
+Logger::~Logger() = default;
+
+absl::StatusOr<Logger::Level> Logger::ParseLevel(std::string_view text) {
+  for (const auto& [level, name] : kLevels) {
+    if (name == text) return level;
+  }
+  return absl::InvalidArgumentError(absl::StrCat(
+      "the log level \"", View(text), "\" is not trace, debug, info, warn, error or off"));
+}
+
+absl::StatusOr<Logger::Format> Logger::ParseFormat(std::string_view text) {
+  if (text == "text") return Format::kText;
+  if (text == "json") return Format::kJson;
+  return absl::InvalidArgumentError(
+      absl::StrCat("the log format \"", View(text), "\" is not text or json"));
+}
+
+void Logger::Log(Level level, std::string_view event, Fields fields) {
+  if (!logger_->should_log(ToSpdlog(level))) return;
+  std::string line;
+  if (format_ == Format::kJson) {
+    line = absl::StrCat("\"event\":", JsonText(event));
+    for (const LogField& field : fields) {
+      absl::StrAppend(&line, ",", JsonText(field.key), ":", JsonText(field.value));
+    }
+  } else {
+    line = std::string(event);
+    for (const LogField& field : fields) {
+      absl::StrAppend(&line, " ", View(field.key), "=", TextValue(field.value));
+    }
+  }
+  logger_->log(ToSpdlog(level), spdlog::string_view_t(line.data(), line.size()));
+}
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,172 @@
+// voxeld: wiring only.
+#include <pthread.h>
+#include <sys/stat.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "daemon/config/config.h"
+#include "daemon/core/core.h"
+#include "daemon/http/http_server.h"
+#include "daemon/http/monitor.h"
+#include "daemon/log/logger.h"
+#include "daemon/services/server.h"
+#include "daemon/version/version.h"
+#include "display/drivers/registry.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr int kUsageError = 2;
+constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;  // together below the 5 s that we promise
+constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
+
+int Fail(int code, const absl::Status& status) {
+  std::fprintf(stderr, "voxeld: %s\n", std::string(status.message()).c_str());
+  return code;
+}
+
+using Displays = std::vector<std::unique_ptr<display::Display>>;
+
+absl::StatusOr<Displays> MakeDisplays(const Config& config, sync::Clock& clock) {
+  Displays displays;
+  for (const DisplayConfig& wanted : config.displays) {
+    absl::StatusOr<std::unique_ptr<display::Display>> made = display::CreateDisplay(
+        {.name = wanted.name, .driver = wanted.driver, .options = wanted.options}, clock);
+    if (!made.ok()) {
+      return absl::Status(made.status().code(),
+                          absl::StrCat(wanted.source, ": ", made.status().message()));
+    }
+    displays.push_back(*std::move(made));
+  }
+  return displays;
+}
+
+absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
+    const ServerConfig& config, Core& core, std::shared_ptr<const std::atomic<bool>> draining,
+    Logger& log) {
+  std::unique_ptr<http::Server> none;
+  if (!config.http.has_value()) return none;
+  absl::StatusOr<std::unique_ptr<http::Server>> server =
+      http::Server::Start({.listen = *config.http, .max_connections = config.max_http_connections},
+                          http::MonitorHandler(core, std::move(draining)));
+  if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
+  log.Warn("no http port", {{"why", std::string(server.status().message())},
+                            {"hint", "choose another with --http ADDR, or none with --http off"}});
+  return none;
+}
+
+void LogDisplays(Core& core, Logger& log) {
+  std::promise<absl::StatusOr<Stats>> promise;
+  core.GetStats([&promise](absl::StatusOr<Stats> stats) { promise.set_value(std::move(stats)); });
+  const absl::StatusOr<Stats> stats = promise.get_future().get();
+  if (!stats.ok()) {
+    return log.Error("no figures", {{"why", std::string(stats.status().message())}});
+  }
+  for (const DisplayFigures& display : stats->displays) {
+    log.Info("display", {{"name", display.name},
+                         {"state", DisplayStateName(display.state)},
+                         {"engine", display.engine},
+                         {"device", display.engine_device},
+                         {"why", display.engine_reason}});
+  }
+}
+
+int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
+          Logger& log) {
+  Core core({.limits = config.limits, .version = Version()}, clock);
+  const gpu::EngineOptions engine{.kind = config.engine.kind,
+                                  .threads = static_cast<int>(config.engine.threads),
+                                  .staging_limit_bytes = config.engine.staging_limit_bytes};
+  for (auto& display : displays) {
+    const std::string name = display->info().name;
+    if (absl::Status status = core.AddDisplay(std::move(display), engine); !status.ok()) {
+      return Fail(
+          1, absl::Status(status.code(), absl::StrCat("display ", name, ": ", status.message())));
+    }
+  }
+  if (absl::Status status = core.Start(); !status.ok()) return Fail(1, status);
+
+  const auto draining = std::make_shared<std::atomic<bool>>(false);
+  absl::StatusOr<std::unique_ptr<http::Server>> http =
+      StartHttp(config.server, core, draining, log);
+  if (!http.ok()) return Fail(1, http.status());
+  absl::StatusOr<std::unique_ptr<services::Server>> server =
+      services::Server::Start(core, clock,
+                              {.listen = config.server.listen,
+                               .version = Version(),
+                               .max_queued_answers = config.server.max_queued_answers,
+                               .log = &log});
+  if (!server.ok()) return Fail(1, server.status());
+
+  log.Info("voxeld",
+           {{"version", Version()}, {"config", config.file.empty() ? "defaults" : config.file}});
+  LogDisplays(core, log);
+  std::vector<std::string> addresses;
+  for (const Address& address : (*server)->addresses()) addresses.push_back(address.ToString());
+  log.Info("ready", {{"listen", absl::StrJoin(addresses, " ")},
+                     {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
+
+  int signal = 0;
+  while (sigwait(&signals, &signal) != 0) {
+  }
+  log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
+  *draining = true;
+  (*server)->Shutdown(kServerLimit);
+  const absl::Status stopped = core.Stop(kCoreLimit);
+  http->reset();
+  if (!stopped.ok()) log.Error("not all ended", {{"why", std::string(stopped.message())}});
+  log.Info("stopped");
+  return stopped.ok() ? 0 : 1;
+}
+
+int Main(int argc, char** argv) {
+  absl::StatusOr<CommandLine> command_line = ParseCommandLine(argc, argv, Version());
+  if (!command_line.ok()) return Fail(kUsageError, command_line.status());
+  if (!command_line->print_and_exit.empty()) {
+    std::fputs(command_line->print_and_exit.c_str(), stdout);
+    return 0;
+  }
+  absl::StatusOr<Config> config = LoadConfig(command_line->config, ProcessEnvironment());
+  if (!config.ok()) return Fail(1, config.status());
+  if (absl::Status status = ApplyCommandLine(*command_line, &*config); !status.ok()) {
+    return Fail(kUsageError, status);
+  }
+  const absl::StatusOr<Logger::Level> level = Logger::ParseLevel(config->log.level);
+  const absl::StatusOr<Logger::Format> format = Logger::ParseFormat(config->log.format);
+  if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
+
+  sync::SystemClock clock;
+  absl::StatusOr<Displays> displays = MakeDisplays(*config, clock);
+  if (!displays.ok()) {
+    return Fail(command_line->displays.empty() ? 1 : kUsageError, displays.status());
+  }
+  if (command_line->check_config) {
+    std::fputs(ToToml(*config).c_str(), stdout);
+    return 0;
+  }
+
+  umask(0007);  // sockets are for the user and the group from the moment that they exist
+  std::signal(SIGPIPE, SIG_IGN);
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread is made: main alone waits
+  Logger log(*level, *format);
+  return Serve(*config, *std::move(displays), signals, clock, log);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon
+
+int main(int argc, char** argv) { return voxeld::daemon::Main(argc, argv); }
