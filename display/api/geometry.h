@@ -52,7 +52,7 @@ struct Rotor {
     double eccentricity_mm = 0;             // distance of the panel's plane from the axis; signed
     double shift_u_mm = 0;                  // of the panel's middle along u
     double shift_v_mm = 0;                  // of the panel's middle along +z
-    double phase_turns = 0;                 // [0,1): angle of the panel at turn angle 0
+    double phase_turns = 0;  // [0,1): angle of the panel at turn angle 0, always counter-clockwise
     bool mirror_u = false, mirror_v = false;
     bool operator==(const Panel&) const = default;
   };

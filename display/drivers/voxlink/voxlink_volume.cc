@@ -203,6 +203,7 @@ void VoxlinkDisplay::OnStatus(const Status& status, bool settled) {
     return Attached();
   }
   if (sending_.stage == Stage::kIdle) return;
+  sending_.end_mark = std::min(sending_.end_mark, link_.sent());  // what was lost is not counted
   if (status.shown == sending_.number) return OnShown(status.shown, status.shown_start_ns, false);
   if (status.last_complete == sending_.number) return OnComplete(status.last_complete);
   if (!settled || sending_.stage == Stage::kBegin) return;

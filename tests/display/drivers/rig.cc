@@ -31,8 +31,9 @@ SliceFramePtr FrameSource::Next(double share) {
   ++current_.volume;
   const size_t size = current_.layout.bytes_per_slice();
   std::bernoulli_distribution changes(share);
+  const size_t chosen = share > 0 ? random_() % current_.layout.pictures() : SIZE_MAX;
   for (size_t p = 0; p < current_.layout.pictures(); ++p) {
-    if (current_.volume > 1 && !changes(random_)) continue;
+    if (current_.volume > 1 && p != chosen && !changes(random_)) continue;
     current_.changed_in[p] = current_.volume;
     for (size_t i = 0; i < size; ++i) {
       current_.bytes[p * size + i] = static_cast<std::byte>(random_());
@@ -62,6 +63,7 @@ void Rig::Settle() {
     woken_ = false;
     next_tick_ = display().Tick();
     next_pump_ = transport().Pump();
+    if (observer_) observer_();
   } while (woken_ || next_tick_ <= clock_.Now());
 }
 

@@ -38,7 +38,8 @@ struct Recorder final : Display::Listener {
 class FrameSource {
  public:
   FrameSource(const FrameLayout& layout, uint32_t seed);
-  // The next volume, in which each picture changes with probability `share`.
+  // The next volume, in which each picture changes with probability `share`, at least one if it is
+  // above 0.
   SliceFramePtr Next(double share);
   std::mt19937& random() { return random_; }
 
@@ -70,11 +71,14 @@ class Rig {
   // Until the volume has its outcome.
   bool RunUntilOutcome(uint64_t volume, sync::TimeNs limit = 10 * sync::kSecond);
   void SetPlugged(bool plugged);
+  // Called whenever the device may have done something, before the driver hears of it.
+  void SetObserver(std::function<void()> observer) { observer_ = std::move(observer); }
 
  private:
   sync::FakeClock clock_;
   Recorder recorder_;
   simulated::Parts parts_;
+  std::function<void()> observer_;
   bool woken_ = false;
   sync::TimeNs next_tick_ = 0;
   sync::TimeNs next_pump_ = 0;

@@ -1,0 +1,487 @@
+// The base class, with a driver that does what the test tells it.
+
+#include "display/api/display.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "display/api/pixels.h"
+#include "display/sync/fake_clock.h"
+#include "gtest/gtest.h"
+
+namespace voxeld::display {
+namespace {
+
+using sync::kMillisecond;
+using sync::kSecond;
+using Kind = VolumeOutcome::Kind;
+
+constexpr FrameLayout kLayout{.slices = 2, .width = 2, .height = 1};
+
+// The whole of a volume is its bytes.
+class PlainDecoder final : public WireDecoder {
+ public:
+  absl::Status OnBytes(uint8_t, std::span<const std::byte> bytes) override {
+    if (bytes.empty()) return absl::DataLossError("nothing");
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+    return absl::OkStatus();
+  }
+  std::optional<DecodedVolume> TakeVolume() override {
+    if (bytes_.size() != kLayout.bytes()) return std::nullopt;
+    DecodedVolume decoded{.volume = 99, .layout = kLayout};
+    for (const std::byte b : bytes_) decoded.rgb.push_back(std::to_integer<uint8_t>(b));
+    return decoded;
+  }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+class ScriptedDisplay final : public Display {
+ public:
+  explicit ScriptedDisplay(sync::Clock& clock)
+      : Display(DisplayInfo{.name = "d", .driver = "scripted", .layout = kLayout}, clock) {}
+  ~ScriptedDisplay() override { Stop(); }
+
+  using Display::Attached;
+  using Display::DeviceLost;
+  using Display::FrameDone;
+  using Display::FrameLost;
+  using Display::in_flight;
+  using Display::tapped;
+
+  void Done() { FrameDone(clock().Now(), Evidence::kEstimated, clock().Now() - 1, 10); }
+
+  struct Sent {
+    uint64_t volume;
+    bool full;
+    bool operator==(const Sent&) const = default;
+  };
+  std::vector<Sent> sent;
+  std::vector<std::string> calls;
+  absl::Status start_status;
+  bool done_at_once = false;
+  bool lost_at_once = false;
+  size_t tap_bytes = kLayout.bytes();
+  std::function<void()> in_tick;
+
+ private:
+  absl::Status DoStart() override { return start_status; }
+  void DoStop() override { calls.push_back("stop"); }
+  void DoSend(const SliceFramePtr& frame, bool full) override {
+    sent.push_back({frame->volume, full});
+    if (tapped()) TapOut(1, std::span(frame->bytes).first(tap_bytes));
+    if (lost_at_once) return FrameLost("script", 3);
+    if (done_at_once) Done();
+  }
+  sync::TimeNs DoTick(sync::TimeNs now) override {
+    if (in_tick) std::exchange(in_tick, nullptr)();
+    return now + kSecond;
+  }
+  absl::Status DoSetBrightness(double brightness) override {
+    calls.push_back("brightness " + std::to_string(brightness));
+    return absl::OkStatus();
+  }
+  absl::Status DoSetBlank(bool blank) override {
+    calls.push_back(blank ? "blank" : "unblank");
+    return absl::OkStatus();
+  }
+  std::unique_ptr<WireDecoder> DoMakeDecoder() const override {
+    return std::make_unique<PlainDecoder>();
+  }
+};
+
+struct Log final : Display::Listener {
+  void OnOutcome(const VolumeOutcome& outcome) override { outcomes.push_back(outcome); }
+  void OnState(DisplayState state, const std::string& reason) override { states.push_back(state); }
+  std::vector<VolumeOutcome> outcomes;
+  std::vector<DisplayState> states;
+};
+
+class DisplayTest : public testing::Test {
+ protected:
+  DisplayTest() : display_(clock_) {}
+
+  static SliceFramePtr Frame(uint64_t volume) {
+    SliceFrame frame{.volume = volume, .layout = kLayout};
+    frame.bytes.assign(kLayout.bytes(), static_cast<std::byte>(volume));
+    frame.changed_in.assign(kLayout.pictures(), volume);
+    return std::make_shared<SliceFrame>(std::move(frame));
+  }
+  void Start() {
+    ASSERT_TRUE(display_.Start(&log_, [] {}).ok());
+  }
+  void StartAttached() {
+    Start();
+    display_.Attached();
+  }
+  void ExpectOutcome(size_t index, uint64_t volume, Kind kind, const std::string& reason = "") {
+    ASSERT_LT(index, log_.outcomes.size());
+    EXPECT_EQ(log_.outcomes[index].volume, volume);
+    EXPECT_EQ(log_.outcomes[index].kind, kind);
+    EXPECT_EQ(log_.outcomes[index].reason, reason);
+  }
+  using Captured = std::optional<absl::StatusOr<DecodedVolume>>;
+  void Capture(Captured& into, sync::TimeNs timeout = kSecond) {
+    display_.Capture(timeout, [&into](absl::StatusOr<DecodedVolume> v) {
+      ASSERT_FALSE(into.has_value()) << "answered twice";
+      into = std::move(v);
+    });
+  }
+
+  sync::FakeClock clock_;
+  Log log_;
+  ScriptedDisplay display_;
+};
+
+TEST_F(DisplayTest, StatesAreToldInOrder) {
+  EXPECT_EQ(display_.state(), DisplayState::kStopped);
+  StartAttached();
+  display_.DeviceLost("gone");
+  EXPECT_EQ(display_.state_reason(), "gone");
+  display_.Attached();
+  ASSERT_TRUE(display_.SetBlank(true).ok());
+  ASSERT_TRUE(display_.SetBlank(false).ok());
+  display_.Stop();
+  EXPECT_EQ(log_.states, (std::vector<DisplayState>{
+                             DisplayState::kAttaching, DisplayState::kShowing, DisplayState::kLost,
+                             DisplayState::kShowing, DisplayState::kBlanked, DisplayState::kShowing,
+                             DisplayState::kStopped}));
+  EXPECT_STREQ(DisplayStateName(DisplayState::kAttaching), "attaching");
+}
+
+TEST_F(DisplayTest, StartsOnceAndAgainAfterStop) {
+  Start();
+  EXPECT_EQ(display_.Start(&log_, [] {}).code(), absl::StatusCode::kFailedPrecondition);
+  display_.Stop();
+  display_.Stop();
+  EXPECT_EQ(display_.calls, std::vector<std::string>{"stop"});
+  StartAttached();
+  display_.Submit(Frame(1));
+  EXPECT_EQ(display_.sent.size(), 1u);
+}
+
+TEST_F(DisplayTest, AStartThatFailsLeavesItStopped) {
+  display_.start_status = absl::InternalError("no bus");
+  EXPECT_EQ(display_.Start(&log_, [] {}).message(), "no bus");
+  EXPECT_EQ(display_.state(), DisplayState::kStopped);
+  EXPECT_EQ(display_.state_reason(), "no bus");
+}
+
+TEST_F(DisplayTest, PresentsWithTimesAndBytes) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  EXPECT_TRUE(display_.mailbox_free());
+  display_.FrameDone(500, Evidence::kDevice, 400, 77);
+  ASSERT_EQ(log_.outcomes.size(), 1u);
+  ExpectOutcome(0, 1, Kind::kPresented);
+  EXPECT_EQ(log_.outcomes[0].time_ns, 500);
+  EXPECT_EQ(log_.outcomes[0].evidence, Evidence::kDevice);
+  EXPECT_EQ(log_.outcomes[0].last_byte_ns, 400);
+  EXPECT_EQ(log_.outcomes[0].bytes_sent, 77u);
+  EXPECT_EQ(display_.stats().volumes_presented, 1u);
+  display_.Done();  // nothing is in flight: a driver's late word changes nothing
+  display_.FrameLost("late", 0);
+  EXPECT_EQ(log_.outcomes.size(), 1u);
+}
+
+TEST_F(DisplayTest, TheMailboxKeepsTheNewest) {
+  StartAttached();
+  for (uint64_t volume = 1; volume <= 4; ++volume) display_.Submit(Frame(volume));
+  EXPECT_FALSE(display_.mailbox_free());
+  ASSERT_EQ(log_.outcomes.size(), 2u);
+  ExpectOutcome(0, 2, Kind::kReplaced);
+  EXPECT_EQ(log_.outcomes[0].replaced_by, 3u);
+  ExpectOutcome(1, 3, Kind::kReplaced);
+  EXPECT_EQ(log_.outcomes[1].replaced_by, 4u);
+  display_.Done();
+  EXPECT_TRUE(display_.mailbox_free());
+  display_.Done();
+  ExpectOutcome(2, 1, Kind::kPresented);
+  ExpectOutcome(3, 4, Kind::kPresented);
+  EXPECT_EQ(display_.sent, (std::vector<ScriptedDisplay::Sent>{{1, true}, {4, false}}));
+  EXPECT_EQ(display_.stats().volumes_submitted, 4u);
+  EXPECT_EQ(display_.stats().volumes_replaced, 2u);
+}
+
+TEST_F(DisplayTest, RefusesNumbersThatDoNotAscendAndOtherLayouts) {
+  StartAttached();
+  display_.Submit(Frame(5));
+  display_.Submit(Frame(5));
+  ExpectOutcome(0, 5, Kind::kLost, "volume 5 does not follow volume 5: numbers must ascend");
+  SliceFrame frame = *Frame(6);
+  frame.bytes.pop_back();
+  display_.Submit(std::make_shared<SliceFrame>(frame));
+  ExpectOutcome(1, 6, Kind::kLost, "the volume is not of the display's layout");
+  frame = *Frame(7);
+  frame.layout.width = 1;
+  display_.Submit(std::make_shared<SliceFrame>(frame));
+  ExpectOutcome(2, 7, Kind::kLost, "the volume is not of the display's layout");
+  EXPECT_EQ(display_.sent.size(), 1u);
+}
+
+TEST_F(DisplayTest, WaitsForTheDevice) {
+  Start();
+  display_.Submit(Frame(1));
+  display_.Submit(Frame(2));
+  EXPECT_TRUE(display_.sent.empty());
+  display_.Attached();
+  EXPECT_EQ(display_.sent, (std::vector<ScriptedDisplay::Sent>{{2, true}}));
+  ASSERT_EQ(log_.outcomes.size(), 1u);
+  ExpectOutcome(0, 1, Kind::kReplaced);
+}
+
+TEST_F(DisplayTest, LosingTheDeviceLosesWhatIsInFlightAndKeepsWhatWaits) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Submit(Frame(2));
+  display_.DeviceLost("unplugged", 12);
+  ASSERT_EQ(log_.outcomes.size(), 1u);
+  ExpectOutcome(0, 1, Kind::kLost, "unplugged");
+  EXPECT_EQ(log_.outcomes[0].bytes_sent, 12u);
+  display_.Attached();
+  EXPECT_EQ(display_.sent, (std::vector<ScriptedDisplay::Sent>{{1, true}, {2, true}}));
+  display_.Done();
+  ExpectOutcome(1, 2, Kind::kPresented);
+}
+
+TEST_F(DisplayTest, AfterAttachTheCurrentFrameGoesOutWholeAndOwesNothing) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  display_.Submit(Frame(2));
+  display_.Done();
+  display_.DeviceLost("unplugged");
+  display_.Attached();
+  EXPECT_EQ(display_.sent, (std::vector<ScriptedDisplay::Sent>{{1, true}, {2, false}, {2, true}}));
+  display_.Done();
+  EXPECT_EQ(log_.outcomes.size(), 2u);
+  display_.Submit(Frame(3));
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{3, false}));
+}
+
+TEST_F(DisplayTest, ALostVolumeIsSentAgainLaterAndLater) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.FrameLost("slices missing", 5);
+  ExpectOutcome(0, 1, Kind::kLost, "slices missing");
+  EXPECT_EQ(log_.outcomes[0].bytes_sent, 5u);
+  EXPECT_EQ(display_.Tick(), clock_.Now() + 100 * kMillisecond);
+  clock_.Advance(99 * kMillisecond);
+  display_.Tick();
+  EXPECT_EQ(display_.sent.size(), 1u);
+  clock_.Advance(kMillisecond);
+  display_.Tick();
+  EXPECT_EQ(display_.sent, (std::vector<ScriptedDisplay::Sent>{{1, true}, {1, true}}));
+  display_.FrameLost("again", 5);
+  EXPECT_EQ(display_.Tick(), clock_.Now() + 200 * kMillisecond);
+  display_.Submit(Frame(2));  // a newer one waits for nothing
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{2, true}));
+  display_.Done();
+  clock_.Advance(kSecond);
+  display_.Tick();
+  EXPECT_EQ(display_.sent.size(), 3u);
+  EXPECT_EQ(log_.outcomes.size(), 2u);
+}
+
+TEST_F(DisplayTest, ADriverMayEndAVolumeInsideSend) {
+  StartAttached();
+  display_.done_at_once = true;
+  for (uint64_t volume = 1; volume <= 3; ++volume) display_.Submit(Frame(volume));
+  EXPECT_EQ(display_.stats().volumes_presented, 3u);
+  display_.done_at_once = false;
+  display_.lost_at_once = true;
+  display_.Submit(Frame(4));
+  EXPECT_EQ(display_.sent.size(), 4u);  // the re-send waits for its time
+  ExpectOutcome(3, 4, Kind::kLost, "script");
+}
+
+TEST_F(DisplayTest, BlankLosesAllAndRefusesMore) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Submit(Frame(2));
+  ASSERT_TRUE(display_.SetBlank(true).ok());
+  EXPECT_EQ(display_.state(), DisplayState::kBlanked);
+  ExpectOutcome(0, 1, Kind::kLost, "blanked");
+  ExpectOutcome(1, 2, Kind::kLost, "blanked");
+  display_.Submit(Frame(3));
+  ExpectOutcome(2, 3, Kind::kLost, "blanked");
+  display_.Done();  // the driver finishes volume 1, which was told already
+  EXPECT_EQ(log_.outcomes.size(), 3u);
+  ASSERT_TRUE(display_.SetBlank(false).ok());
+  EXPECT_EQ(display_.calls, (std::vector<std::string>{"blank", "unblank"}));
+  EXPECT_EQ(display_.sent.size(), 1u);  // the device still has volume 1
+  display_.Submit(Frame(4));
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{4, false}));
+}
+
+TEST_F(DisplayTest, BlankedWhileAwayItComesBackDarkAndThenWithTheCurrentFrame) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  display_.DeviceLost("unplugged");
+  ASSERT_TRUE(display_.SetBlank(true).ok());
+  EXPECT_TRUE(display_.calls.empty());
+  display_.Attached();
+  EXPECT_EQ(display_.state(), DisplayState::kBlanked);
+  EXPECT_EQ(display_.sent.size(), 1u);
+  ASSERT_TRUE(display_.SetBlank(false).ok());
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+}
+
+TEST_F(DisplayTest, StopLosesWhatIsOwed) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Submit(Frame(2));
+  Captured captured;
+  Capture(captured);
+  display_.Stop();
+  ExpectOutcome(0, 1, Kind::kLost, "the display was stopped");
+  ExpectOutcome(1, 2, Kind::kLost, "the display was stopped");
+  EXPECT_TRUE(absl::IsUnavailable(captured->status()));
+  display_.Submit(Frame(3));
+  EXPECT_EQ(log_.outcomes.size(), 2u);
+  EXPECT_EQ(display_.Tick(), sync::kNever);
+}
+
+TEST_F(DisplayTest, BrightnessIsCheckedKeptAndPassedOn) {
+  EXPECT_EQ(display_.SetBrightness(-0.1).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(display_.SetBrightness(1.5).message(), "brightness is 1.5; it must be from 0 to 1");
+  EXPECT_FALSE(display_.SetBrightness(std::nan("")).ok());
+  Start();
+  ASSERT_TRUE(display_.SetBrightness(0.25).ok());
+  EXPECT_EQ(display_.brightness(), 0.25);
+  EXPECT_TRUE(display_.calls.empty());
+  display_.Attached();
+  ASSERT_TRUE(display_.SetBrightness(0.5).ok());
+  EXPECT_EQ(display_.calls, std::vector<std::string>{"brightness 0.500000"});
+}
+
+TEST_F(DisplayTest, CaptureTakesTheNextVolumeWhole) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  display_.Submit(Frame(2));
+  Captured captured;
+  Capture(captured);  // volume 2 is on its way already, untapped
+  EXPECT_FALSE(display_.tapped());
+  display_.Submit(Frame(3));
+  display_.Done();
+  EXPECT_FALSE(captured.has_value());
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{3, true}));
+  EXPECT_TRUE(display_.tapped());
+  Captured second;
+  Capture(second);  // the tap is there: the same volume serves
+  display_.Done();
+  ASSERT_TRUE(captured.has_value() && captured->ok());
+  EXPECT_EQ((*captured)->volume, 3u);
+  EXPECT_EQ((*captured)->rgb, FrameToRgb(*Frame(3)));
+  ASSERT_TRUE(second.has_value() && second->ok());
+  EXPECT_FALSE(display_.tapped());
+  EXPECT_EQ(display_.sent.size(), 3u);
+}
+
+TEST_F(DisplayTest, CaptureSendsTheCurrentVolumeAgainWithoutAnOutcome) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  Captured captured;
+  Capture(captured);
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+  display_.Done();
+  EXPECT_TRUE(captured->ok());
+  EXPECT_EQ(log_.outcomes.size(), 1u);
+}
+
+TEST_F(DisplayTest, CaptureOfADisplayThatNeverHadAVolumeIsBlack) {
+  StartAttached();
+  Captured captured;
+  Capture(captured);
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{0, true}));
+  display_.Done();
+  ASSERT_TRUE(captured->ok());
+  EXPECT_EQ((*captured)->volume, 0u);
+  EXPECT_EQ((*captured)->rgb, std::vector<uint8_t>(12, 0));
+  display_.Submit(Frame(1));  // black is no base
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+}
+
+TEST_F(DisplayTest, CaptureWaitsForTheDeviceAndGivesUp) {
+  Start();
+  Captured early, late;
+  Capture(early, 10 * kMillisecond);
+  Capture(late, kSecond);
+  EXPECT_EQ(display_.Tick(), clock_.Now() + 10 * kMillisecond);
+  clock_.Advance(10 * kMillisecond);
+  display_.Tick();
+  ASSERT_TRUE(early.has_value());
+  EXPECT_TRUE(absl::IsDeadlineExceeded(early->status()));
+  display_.Attached();
+  display_.Done();
+  ASSERT_TRUE(late.has_value());
+  EXPECT_TRUE(late->ok());
+}
+
+TEST_F(DisplayTest, CaptureEndsWithTheDeviceOrTheLight) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  Captured lost, blanked, at_once;
+  Capture(lost);
+  display_.DeviceLost("unplugged");
+  ASSERT_TRUE(lost.has_value());
+  EXPECT_TRUE(absl::IsUnavailable(lost->status()));
+  Capture(at_once);
+  ASSERT_TRUE(at_once.has_value());
+  EXPECT_TRUE(absl::IsUnavailable(at_once->status()));
+  display_.Attached();
+  Capture(blanked);
+  ASSERT_TRUE(display_.SetBlank(true).ok());
+  ASSERT_TRUE(blanked.has_value());
+  EXPECT_TRUE(absl::IsUnavailable(blanked->status()));
+}
+
+TEST_F(DisplayTest, CaptureOutlivesALostVolume) {
+  StartAttached();
+  Captured captured;
+  display_.Submit(Frame(1));
+  display_.Done();
+  Capture(captured);
+  display_.FrameLost("noise", 0);
+  EXPECT_FALSE(captured.has_value());
+  clock_.Advance(100 * kMillisecond);
+  display_.Tick();
+  display_.Done();
+  ASSERT_TRUE(captured.has_value());
+  EXPECT_TRUE(captured->ok());
+}
+
+TEST_F(DisplayTest, CaptureTellsOfBytesThatBreakTheProtocol) {
+  StartAttached();
+  display_.tap_bytes = 0;
+  Captured broken, torn;
+  Capture(broken);
+  display_.Done();
+  EXPECT_TRUE(absl::IsDataLoss(broken->status()));
+  display_.tap_bytes = 3;
+  Capture(torn);
+  display_.Done();
+  EXPECT_TRUE(absl::IsInternal(torn->status()));
+}
+
+TEST_F(DisplayTest, WhatTickSendsIsTickedAgain) {
+  Start();
+  display_.Submit(Frame(1));
+  display_.in_tick = [&] {
+    display_.Attached();
+    display_.FrameLost("script", 0);
+  };
+  EXPECT_EQ(display_.Tick(), clock_.Now() + 100 * kMillisecond);
+  clock_.Advance(100 * kMillisecond);
+  EXPECT_EQ(display_.Tick(), clock_.Now());
+  EXPECT_EQ(display_.sent.size(), 2u);
+}
+
+}  // namespace
+}  // namespace voxeld::display
