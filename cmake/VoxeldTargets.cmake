@@ -51,10 +51,13 @@ if(VOXELD_WERROR)
 endif()
 
 # voxeld_library(NAME SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. Each of HEADERS is also
-# compiled alone, so none leans on what its includer happened to include.
+# compiled alone (but under a sanitizer), so none leans on what its includer happened to include.
 function(voxeld_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;LINK" ${ARGN})
   set(alone "")
+  if(VOXELD_SANITIZE)
+    set(ARG_HEADERS "")
+  endif()
   foreach(header ${ARG_HEADERS})
     file(RELATIVE_PATH path ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${header})
     string(MAKE_C_IDENTIFIER ${path} id)
