@@ -1,4 +1,5 @@
 #include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
@@ -35,6 +36,8 @@ class TbbExecutor final : public Executor {
 
 std::unique_ptr<Executor> MakeExecutor(int threads) {
   if (threads <= 1) return MakeSerialExecutor();
+  // The scheduler runs no more threads than there are cores, whatever it is asked for.
+  if (threads > oneapi::tbb::info::default_concurrency()) return MakeThreadExecutor(threads);
   return std::make_unique<TbbExecutor>(threads);
 }
 

@@ -1,0 +1,58 @@
+// The fixture of the conformance suite.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "tests/conformance/engine_cases.h"
+#include "tests/conformance/engine_driver.h"
+#include "tests/conformance/oracle.h"
+#include "tests/conformance/scene_generator.h"
+
+namespace voxeld::gpu::conformance {
+
+// Where an engine's voxels first differ from what they must be, for people; empty if nowhere.
+// Voxels that no slice looks at may be 0.
+inline std::string FirstDifference(const std::vector<uint32_t>& got, const DenseVolume& want,
+                                   const Target& target) {
+  const std::vector<uint8_t> seen = OracleSeen(want, target);
+  if (got.size() != want.rgb.size()) return "sizes differ";
+  for (size_t i = 0; i < got.size(); ++i) {
+    if (got[i] == want.rgb[i] || (got[i] == 0 && seen[i] == 0)) continue;
+    const size_t nx = static_cast<size_t>(want.nx), ny = static_cast<size_t>(want.ny);
+    char text[128];
+    std::snprintf(text, sizeof(text), "voxel (%zu, %zu, %zu): got %06X, want %06X", i % nx,
+                  i / nx % ny, i / nx / ny, got[i], want.rgb[i]);
+    return text;
+  }
+  return "";
+}
+
+inline uint64_t CountLit(const std::vector<uint32_t>& voxels) {
+  uint64_t lit = 0;
+  for (uint32_t rgb : voxels) lit += rgb != 0;
+  return lit;
+}
+
+class EngineConformance : public testing::TestWithParam<EngineCase> {
+ protected:
+  EngineDriver Make(EngineOptions options = {.threads = 2}) {
+    return EngineDriver(GetParam(), std::move(options));
+  }
+  // A scene drawn whole must be what the oracle draws.
+  void ExpectLikeOracle(EngineDriver& engine, const SceneModel& scene, const Target& target) {
+    const absl::StatusOr<FrameResult> frame = engine.Frame();
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    const DenseVolume want = OracleVoxels(scene, target);
+    const std::vector<uint32_t> voxels = engine.Voxels();
+    ASSERT_EQ(FirstDifference(voxels, want, target), "");
+    EXPECT_EQ(frame->lit_voxels, CountLit(voxels));
+    ASSERT_TRUE(engine.pictures() == OraclePictures(want, target)) << "pictures differ";
+  }
+};
+
+}  // namespace voxeld::gpu::conformance

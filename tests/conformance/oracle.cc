@@ -1,0 +1,238 @@
+#include "tests/conformance/oracle.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "display/geometry/footprint.h"
+#include "tests/conformance/oracle_shapes.h"
+
+namespace voxeld::gpu::conformance {
+namespace {
+
+Units SnapVertex(const Affine& map, const float* p) {
+  const Point3d q = Map(map, p[0], p[1], p[2]);
+  const double v[3] = {q.x, q.y, q.z};
+  Units u;
+  for (int a = 0; a < 3; ++a) {
+    u.v[a] = static_cast<int64_t>(std::clamp(std::floor(v[a] * 256 + 0.5), -0x1p38, 0x1p38));
+  }
+  return u;
+}
+
+// Half the thickness in units. Tests keep to maps for which a cube root by libm rounds to the same
+// unit.
+int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
+  double thickness = g.thickness;
+  if (g.thickness_unit == ThicknessUnit::kUnits)
+    thickness *= std::cbrt(std::fabs(Determinant(map)));
+  return static_cast<int64_t>(std::min(std::floor(thickness / 2 * 256 + 0.5), 0x1p38));
+}
+
+// Bits of green, red, blue from the top, bit by bit.
+uint32_t Interleaved(uint32_t rgb) {
+  uint32_t word = 0;
+  for (int bit = 7; bit >= 0; --bit) {
+    word = word << 1 | (rgb >> (8 + bit) & 1);
+    word = word << 1 | (rgb >> (16 + bit) & 1);
+    word = word << 1 | (rgb >> bit & 1);
+  }
+  return word;
+}
+
+// A voxel of one layer.
+struct LayerVoxel {
+  bool covered = false, erased = false;
+  uint32_t priority = 0, rgb = 0;
+
+  // The higher priority wins; at one priority an erase, then the greater colour word.
+  void Add(uint32_t p, bool erase, uint32_t color) {
+    const bool none = !covered && !erased;
+    if (!none && p < priority) return;
+    if (none || p > priority) {
+      priority = p;
+      covered = !erase;
+      erased = erase;
+      rgb = color;
+    } else if (erase) {
+      covered = false;
+      erased = true;
+    } else if (!erased && Interleaved(color) > Interleaved(rgb)) {
+      rgb = color;
+    }
+  }
+};
+
+uint32_t Blended(uint32_t below, uint32_t rgb, const LayerRecord& layer) {
+  uint32_t result = 0;
+  for (int shift = 0; shift < 24; shift += 8) {
+    const uint32_t b = below >> shift & 255, c = rgb >> shift & 255, o = layer.opacity;
+    uint32_t r = 0;
+    if (layer.blend == BlendMode::kOver) r = (c * o + 127) / 255;
+    if (layer.blend == BlendMode::kAdd) r = std::min<uint32_t>(255, b + (c * o + 127) / 255);
+    if (layer.blend == BlendMode::kErase) r = (b * (255 - o) + 127) / 255;
+    result |= r << shift;
+  }
+  return result;
+}
+
+constexpr int kBayer[8][8] = {{0, 32, 8, 40, 2, 34, 10, 42},  {48, 16, 56, 24, 50, 18, 58, 26},
+                              {12, 44, 4, 36, 14, 46, 6, 38}, {60, 28, 52, 20, 62, 30, 54, 22},
+                              {3, 35, 11, 43, 1, 33, 9, 41},  {51, 19, 59, 27, 49, 17, 57, 25},
+                              {15, 47, 7, 39, 13, 45, 5, 37}, {63, 31, 55, 23, 61, 29, 53, 21}};
+
+uint32_t Level(uint32_t channel, uint32_t levels, int u, int v, int sub, const Target& target) {
+  uint32_t threshold = 32767;
+  if (target.tone.dither == display::Dither::kOrdered) {
+    const int b = (kBayer[v % 8][u % 8] + sub * 64 / target.layout.sub_frames) % 64;
+    threshold = static_cast<uint32_t>((2 * b + 1) * 65535 / 128);
+  }
+  return static_cast<uint32_t>((uint64_t{target.tone.lut[channel]} * (levels - 1) + threshold) /
+                               65535);
+}
+
+uint32_t PixelOf(const DenseVolume& volume, const display::FootprintTable& table, size_t outer_list,
+                 size_t inner_list, display::Sampling sampling) {
+  uint32_t best = 0, red = 0, green = 0, blue = 0;
+  for (const display::FootprintEntry& o : table.outer.list(outer_list)) {
+    for (const display::FootprintEntry& i : table.inner.list(inner_list)) {
+      const uint32_t rgb = volume.rgb[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)];
+      if (Interleaved(rgb) > Interleaved(best)) best = rgb;
+      const uint32_t w = (uint32_t{o.weight} * i.weight + 127) / 255;
+      red = std::max(red, (w * (rgb >> 16) + 127) / 255);
+      green = std::max(green, (w * (rgb >> 8 & 255) + 127) / 255);
+      blue = std::max(blue, (w * (rgb & 255) + 127) / 255);
+    }
+  }
+  return sampling == display::Sampling::kMax ? best : red << 16 | green << 8 | blue;
+}
+
+}  // namespace
+
+void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
+                  const Plot& plot) {
+  const GeometryRecord& record = g.record;
+  if (record.kind == PrimitiveKind::kBox || record.kind == PrimitiveKind::kSphere ||
+      record.kind == PrimitiveKind::kCylinder) {
+    return PlotSolid(record, map, grid, plot);
+  }
+  std::vector<Units> at;
+  std::vector<uint32_t> colors;
+  const size_t corners = record.index_count ? record.index_count : record.vertex_count;
+  for (size_t corner = 0; corner < corners; ++corner) {
+    const size_t vertex = record.index_count ? g.indices[corner] : corner;
+    at.push_back(SnapVertex(map, &g.positions[vertex * 3]));
+    colors.push_back(record.color_mode == ColorMode::kPerVertex ? g.colors[vertex] : record.color);
+  }
+  const int64_t radius = OracleRadius(record, map);
+  const auto segment = [&](size_t a, size_t b) {
+    const OracleLine line{at[a], at[b], colors[a], colors[b], record.sampling};
+    PlotLine(line, grid, plot);
+    if (radius > 0) PlotCapsule(line, radius, grid, plot);
+  };
+  if (record.kind == PrimitiveKind::kPoints) {
+    for (size_t i = 0; i < corners; ++i) segment(i, i);
+  } else if (record.kind == PrimitiveKind::kTriangles) {
+    for (size_t i = 0; i < corners; i += 3) {
+      PlotTriangle(
+          {{at[i], at[i + 1], at[i + 2]}, {colors[i], colors[i + 1], colors[i + 2]}, record.rule},
+          grid, plot);
+    }
+  } else if (record.topology == Topology::kList) {
+    for (size_t i = 0; i < corners; i += 2) segment(i, i + 1);
+  } else {
+    for (size_t i = 0; i + 1 < corners; ++i) segment(i, i + 1);
+    if (record.topology == Topology::kLoop && corners >= 2) segment(corners - 1, 0);
+  }
+}
+
+DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
+  DenseVolume volume;
+  volume.nx = target.geometry.grid.nx;
+  volume.ny = target.geometry.grid.ny;
+  volume.nz = target.geometry.grid.nz;
+  volume.rgb.assign(static_cast<size_t>(volume.nx) * static_cast<size_t>(volume.ny) *
+                        static_cast<size_t>(volume.nz),
+                    0);
+  std::vector<const LayerRecord*> order;
+  for (const auto& [id, layer] : scene.layers) order.push_back(&layer);
+  std::stable_sort(order.begin(), order.end(), [](const LayerRecord* a, const LayerRecord* b) {
+    return a->order < b->order;  // ids ascend already
+  });
+  for (const LayerRecord* layer : order) {
+    if (!layer->visible) continue;
+    std::vector<LayerVoxel> voxels(volume.rgb.size());
+    for (const auto& [id, drawable] : scene.drawables) {
+      if (drawable.layer != layer->id) continue;
+      const Affine map = Compose(Compose(target.view, layer->transform), drawable.transform);
+      PlotGeometry(scene.geometries.at(drawable.geometry), map, volume,
+                   [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
+                     voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
+                   });
+    }
+    for (size_t i = 0; i < voxels.size(); ++i) {
+      if (voxels[i].covered) volume.rgb[i] = Blended(volume.rgb[i], voxels[i].rgb, *layer);
+    }
+  }
+  return volume;
+}
+
+std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target) {
+  const display::FootprintTable table =
+      display::BuildFootprints(target.geometry, target.tone.sampling);
+  std::vector<uint8_t> seen(volume.rgb.size());
+  for (const display::FootprintEntry& o : table.outer.entries) {
+    for (const display::FootprintEntry& i : table.inner.entries) {
+      seen[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)] = 1;
+    }
+  }
+  return seen;
+}
+
+std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& target) {
+  const display::FootprintTable table =
+      display::BuildFootprints(target.geometry, target.tone.sampling);
+  const display::FrameLayout& layout = target.layout;
+  std::vector<std::byte> bytes(layout.bytes());
+  const size_t width = static_cast<size_t>(layout.width);
+  const size_t height = static_cast<size_t>(layout.height);
+  const auto set = [&](size_t at, uint32_t bits) { bytes[at] |= static_cast<std::byte>(bits); };
+  for (int32_t slice = 0; slice < layout.slices; ++slice) {
+    for (size_t v = 0; v < height; ++v) {
+      for (size_t u = 0; u < width; ++u) {
+        const uint32_t rgb =
+            PixelOf(volume, table, static_cast<size_t>(slice) * width + u, v, target.tone.sampling);
+        for (int32_t sub = 0; sub < layout.sub_frames; ++sub) {
+          const size_t picture =
+              (static_cast<size_t>(slice) * static_cast<size_t>(layout.sub_frames) +
+               static_cast<size_t>(sub)) *
+              layout.bytes_per_slice();
+          const auto level = [&](int shift, uint32_t levels) {
+            return Level(rgb >> shift & 255, levels, static_cast<int>(u), static_cast<int>(v), sub,
+                         target);
+          };
+          switch (layout.format) {
+            case display::PixelFormat::kRgb888:
+              for (size_t channel = 0; channel < 3; ++channel) {
+                set(picture + (v * width + u) * 3 + channel,
+                    level(16 - 8 * static_cast<int>(channel), 256));
+              }
+              break;
+            case display::PixelFormat::kRgb332:
+              set(picture + v * width + u, level(16, 8) * 32 + level(8, 8) * 4 + level(0, 4));
+              break;
+            case display::PixelFormat::kBitPlanes3:
+              for (size_t channel = 0; channel < 3; ++channel) {
+                const size_t row = (width + 7) / 8;
+                set(picture + channel * row * height + v * row + u / 8,
+                    level(16 - 8 * static_cast<int>(channel), 2) * (0x80u >> u % 8));
+              }
+              break;
+          }
+        }
+      }
+    }
+  }
+  return bytes;
+}
+
+}  // namespace voxeld::gpu::conformance

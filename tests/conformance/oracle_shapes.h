@@ -1,0 +1,47 @@
+// Which voxels a drawable covers, by formulations other than the engine's: rational arithmetic in
+// 128 bits, voxel by voxel. Only the formulas in floating point are the published ones, written a
+// second time.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "gpu/delta.h"
+#include "tests/conformance/oracle.h"
+#include "tests/conformance/scene_model.h"
+
+namespace voxeld::gpu::conformance {
+
+// Called for voxels inside the volume only.
+using Plot = std::function<void(int64_t x, int64_t y, int64_t z, uint32_t rgb)>;
+
+// Position in 2⁻⁸ voxel.
+struct Units {
+  int64_t v[3];
+};
+
+struct OracleLine {
+  Units s, e;
+  uint32_t color_s, color_e;
+  LineSampling sampling;
+};
+
+struct OracleTriangle {
+  Units v[3];
+  uint32_t color[3];
+  SurfaceRule rule;
+};
+
+void PlotLine(const OracleLine& line, const DenseVolume& grid, const Plot& plot);
+// Centres within `radius` units of the segment.
+void PlotCapsule(const OracleLine& line, int64_t radius, const DenseVolume& grid, const Plot& plot);
+void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& plot);
+// `map`: geometry → voxel space.
+void PlotSolid(const GeometryRecord& g, const Affine& map, const DenseVolume& grid,
+               const Plot& plot);
+
+// Everything that a geometry under a map covers.
+void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
+                  const Plot& plot);
+
+}  // namespace voxeld::gpu::conformance

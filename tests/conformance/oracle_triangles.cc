@@ -1,0 +1,174 @@
+#include <algorithm>
+
+#include "tests/conformance/oracle_shapes.h"
+
+namespace voxeld::gpu::conformance {
+namespace {
+
+using Int128 = __int128;
+
+struct Vec {
+  Int128 x, y, z;
+  Int128 operator[](int a) const { return a == 0 ? x : a == 1 ? y : z; }
+};
+Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec Cross(const Vec& a, const Vec& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+Int128 Dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+int Sign(Int128 v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
+Int128 Magnitude(Int128 v) { return v < 0 ? -v : v; }
+
+Vec Axis(int a) { return {a == 0, a == 1, a == 2}; }
+
+struct Tri {
+  Vec p[3];
+  Vec n;
+};
+
+// Whether the line through `q` along `a`, not parallel to the triangle, passes through it, rim
+// included: the signed volumes that it spans with the edges have no two signs.
+bool LineMeets(const Tri& t, const Vec& q, int a) {
+  bool positive = false, negative = false;
+  for (int i = 0; i < 3; ++i) {
+    const Int128 volume = Dot(Axis(a), Cross(t.p[i] - q, t.p[(i + 1) % 3] - q));
+    positive |= volume > 0;
+    negative |= volume < 0;
+  }
+  return !(positive && negative);
+}
+
+int Side(const Tri& t, const Vec& q) { return Sign(Dot(t.n, q - t.p[0])); }
+
+// THIN: the triangle meets the segment from `low` one voxel along `a`, its far end excluded.
+bool MeetsHalfOpen(const Tri& t, const Vec& low, int a) {
+  if (t.n[a] == 0 || !LineMeets(t, low, a)) return false;
+  Vec high = low;
+  (a == 0 ? high.x : a == 1 ? high.y : high.z) += 256;
+  const int from = Side(t, low), to = Side(t, high);
+  return from == 0 || (to != 0 && from != to);
+}
+
+bool MeetsClosed(const Tri& t, const Vec& low, int a) {
+  if (t.n[a] == 0 || !LineMeets(t, low, a)) return false;
+  Vec high = low;
+  (a == 0 ? high.x : a == 1 ? high.y : high.z) += 256;
+  return Side(t, low) * Side(t, high) <= 0;
+}
+
+// A closed segment and a closed box: the parts of the way inside each slab have a common point.
+bool SegmentMeetsBox(const Vec& s, const Vec& e, const Vec& corner) {
+  Int128 in_num = 0, in_den = 1, out_num = 1, out_den = 1;
+  for (int a = 0; a < 3; ++a) {
+    const Int128 d = e[a] - s[a];
+    Int128 near = corner[a] - s[a], far = corner[a] + 256 - s[a];
+    if (d == 0) {
+      if (near > 0 || far < 0) return false;
+      continue;
+    }
+    if (d < 0) {
+      std::swap(near, far);
+      near = -near;
+      far = -far;
+    }
+    const Int128 den = Magnitude(d);
+    if (near * in_den > in_num * den) in_num = near, in_den = den;
+    if (far * out_den < out_num * den) out_num = far, out_den = den;
+  }
+  return in_num * out_den <= out_num * in_den;
+}
+
+// Two closed convex sets meet iff an edge of the triangle meets the box or an edge of the box the
+// triangle.
+bool MeetsBox(const Tri& t, const Vec& corner) {
+  for (int i = 0; i < 3; ++i) {
+    if (SegmentMeetsBox(t.p[i], t.p[(i + 1) % 3], corner)) return true;
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int side = 0; side < 4; ++side) {
+      Vec low = corner;
+      const Int128 first = side & 1 ? 256 : 0, second = side & 2 ? 256 : 0;
+      if (a == 0) low.y += first, low.z += second;
+      if (a == 1) low.x += first, low.z += second;
+      if (a == 2) low.x += first, low.y += second;
+      if (MeetsClosed(t, low, a)) return true;
+    }
+  }
+  return false;
+}
+
+uint32_t ColorOf(const OracleTriangle& t, const Tri& tri, const Vec& centre) {
+  if (t.color[0] == t.color[1] && t.color[1] == t.color[2]) return t.color[0];
+  int major = 0;
+  for (int a = 1; a < 3; ++a) {
+    if (Magnitude(tri.n[a]) > Magnitude(tri.n[major])) major = a;
+  }
+  Int128 weight[3], sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Vec& b = tri.p[(i + 1) % 3];
+    const Vec& c = tri.p[(i + 2) % 3];
+    const Int128 area = Dot(Axis(major), Cross(c - b, centre - b)) * Sign(tri.n[major]);
+    weight[i] = area > 0 ? area : 0;
+    sum += weight[i];
+  }
+  uint32_t rgb = 0;
+  for (int shift = 0; shift < 24; shift += 8) {
+    Int128 total = sum / 2;
+    for (int i = 0; i < 3; ++i) total += weight[i] * (t.color[i] >> shift & 255);
+    rgb |= static_cast<uint32_t>(total / sum) << shift;
+  }
+  return rgb;
+}
+
+OracleLine LongestEdgeOf(const OracleTriangle& t) {
+  const LineSampling sampling =
+      t.rule == SurfaceRule::kThin ? LineSampling::kThin : LineSampling::kCover;
+  Int128 longest = -1;
+  OracleLine line{};
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    Int128 square = 0;
+    for (int a = 0; a < 3; ++a) {
+      const Int128 d = t.v[j].v[a] - t.v[i].v[a];
+      square += d * d;
+    }
+    if (square <= longest) continue;
+    longest = square;
+    line = {t.v[i], t.v[j], t.color[i], t.color[j], sampling};
+  }
+  return line;
+}
+
+}  // namespace
+
+void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& plot) {
+  Tri tri;
+  // Relative to vertex 0, so that products fit.
+  const Vec origin = {t.v[0].v[0], t.v[0].v[1], t.v[0].v[2]};
+  for (int i = 0; i < 3; ++i) tri.p[i] = Vec{t.v[i].v[0], t.v[i].v[1], t.v[i].v[2]} - origin;
+  tri.n = Cross(tri.p[1] - tri.p[0], tri.p[2] - tri.p[0]);
+  const bool flat = tri.n.x == 0 && tri.n.y == 0 && tri.n.z == 0;
+  if (flat) PlotLine(LongestEdgeOf(t), grid, plot);
+  if (flat || t.rule == SurfaceRule::kThin) {
+    for (int i = 0; i < 3; ++i) {
+      PlotLine({t.v[i], t.v[i], t.color[i], t.color[i], LineSampling::kThin}, grid, plot);
+    }
+  }
+  if (flat) return;
+  for (int64_t z = 0; z < grid.nz; ++z) {
+    for (int64_t y = 0; y < grid.ny; ++y) {
+      for (int64_t x = 0; x < grid.nx; ++x) {
+        const Vec corner = Vec{x * 256, y * 256, z * 256} - origin;
+        const Vec centre = {corner.x + 128, corner.y + 128, corner.z + 128};
+        const bool covered = t.rule == SurfaceRule::kCover
+                                 ? MeetsBox(tri, corner)
+                                 : MeetsHalfOpen(tri, {corner.x, centre.y, centre.z}, 0) ||
+                                       MeetsHalfOpen(tri, {centre.x, corner.y, centre.z}, 1) ||
+                                       MeetsHalfOpen(tri, {centre.x, centre.y, corner.z}, 2);
+        if (covered) plot(x, y, z, ColorOf(t, tri, centre));
+      }
+    }
+  }
+}
+
+}  // namespace voxeld::gpu::conformance

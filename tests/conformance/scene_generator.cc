@@ -1,0 +1,279 @@
+#include "tests/conformance/scene_generator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "display/geometry/footprint.h"
+
+namespace voxeld::gpu::conformance {
+
+uint64_t SeedOr(uint64_t fallback) {
+  const char* seed = std::getenv("VOXELD_SEED");
+  return seed == nullptr ? fallback : std::strtoull(seed, nullptr, 0);
+}
+
+int64_t SceneGenerator::Int(int64_t low, int64_t high) {
+  return std::uniform_int_distribution<int64_t>(low, high)(engine_);
+}
+double SceneGenerator::Real(double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(engine_);
+}
+bool SceneGenerator::Chance(double probability) { return Real(0, 1) < probability; }
+
+uint64_t SceneGenerator::RandomId(const auto& map) {
+  return std::next(map.begin(), Int(0, static_cast<int64_t>(map.size()) - 1))->first;
+}
+
+Target SceneGenerator::RandomTarget() {
+  Target target;
+  if (Chance(0.5)) {
+    display::PlanarStack stack;
+    stack.normal =
+        Chance(0.5) ? display::PlanarStack::Normal::kZ : display::PlanarStack::Normal::kY;
+    stack.width_px = static_cast<int32_t>(Int(1, 40));
+    stack.height_px = static_cast<int32_t>(Int(1, 40));
+    stack.pitch_u_mm = Real(0.7, 1.5);
+    stack.pitch_v_mm = Real(0.7, 1.5);
+    double position = Real(-10, 0);
+    for (int64_t n = Int(1, 30); n > 0; --n) {
+      stack.positions_mm.push_back(position);
+      position += Real(0.5, 2);
+    }
+    stack.mirror_u = Chance(0.3);
+    target.geometry.shape = stack;
+  } else {
+    display::Rotor rotor;
+    rotor.slices_per_turn = static_cast<int32_t>(Int(1, 40));
+    rotor.width_px = static_cast<int32_t>(Int(2, 40));
+    rotor.height_px = static_cast<int32_t>(Int(1, 40));
+    rotor.panels.resize(static_cast<size_t>(Int(1, 2)));
+    for (display::Rotor::Panel& panel : rotor.panels) {
+      panel.eccentricity_mm = Chance(0.5) ? 0 : Real(-3, 3);
+      panel.phase_turns = Chance(0.5) ? 0 : Real(0, 0.99);
+    }
+    rotor.clockwise = Chance(0.3);
+    target.geometry.shape = rotor;
+  }
+  target.geometry.grid = display::DefaultGrid(target.geometry);
+  target.layout.slices = display::SliceCount(target.geometry);
+  std::visit(
+      [&](const auto& shape) {
+        target.layout.width = shape.width_px;
+        target.layout.height = shape.height_px;
+      },
+      target.geometry.shape);
+  const int32_t sub_frames[] = {1, 1, 2, 3, 8};
+  target.layout.sub_frames = sub_frames[Int(0, 4)];
+  target.layout.format = static_cast<display::PixelFormat>(Int(0, 2));
+  target.tone.dither = static_cast<display::Dither>(Int(0, 1));
+  target.tone.sampling = static_cast<display::Sampling>(Int(0, 1));
+  const double gamma = Real(0.5, 3);
+  for (size_t i = 0; i < 256; ++i) {
+    target.tone.lut[i] =
+        static_cast<uint16_t>(std::lround(65535 * std::pow(static_cast<double>(i) / 255, gamma)));
+  }
+  if (Chance(0.3)) target.view = RandomTransform(20);
+  return target;
+}
+
+uint32_t SceneGenerator::RandomColor() {
+  const uint32_t special[] = {0x000000, 0xFFFFFF, 0xFF0000, 0x00FF00, 0x0000FF, 0x010101};
+  return Chance(0.3) ? special[Int(0, 5)] : static_cast<uint32_t>(Int(0, 0xFFFFFF));
+}
+
+double SceneGenerator::RandomCoordinate(int size) {
+  switch (Int(0, 7)) {
+    case 0:
+      return static_cast<double>(Int(-2, size + 2));  // a face
+    case 1:
+      return static_cast<double>(Int(-2, size + 2)) + 0.5;  // a centre
+    case 2:
+      return static_cast<double>(Int(0, size / 16)) * 16 + static_cast<double>(Int(-2, 2)) / 256;
+    case 3:
+      return Real(-3.0 * size, 4.0 * size);
+    default:
+      return Real(-0.2 * size, 1.2 * size);
+  }
+}
+
+void SceneGenerator::AddVertices(ModelGeometry& g, uint32_t count, int size) {
+  const bool far = Chance(0.08);
+  const double spread = Chance(0.4) ? Real(0.1, 6) : 0;  // small things near one place
+  double place[3];
+  for (double& p : place) p = RandomCoordinate(size);
+  for (uint32_t i = 0; i < count; ++i) {
+    for (int a = 0; a < 3; ++a) {
+      double c = spread > 0 ? place[a] + Real(-spread, spread) : RandomCoordinate(size);
+      if (far && Chance(0.4)) c = Real(-1, 1) * std::ldexp(1.0, static_cast<int>(Int(8, 30)));
+      if (i > 0 && Chance(0.15)) c = g.positions[(i - 1) * 3 + static_cast<uint32_t>(a)];
+      g.positions.push_back(static_cast<float>(c));
+    }
+  }
+  g.record.vertex_count = count;
+}
+
+ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
+  ModelGeometry g;
+  GeometryRecord& r = g.record;
+  r.id = id;
+  r.kind = static_cast<PrimitiveKind>(Int(1, 6));
+  r.color = RandomColor();
+  r.sampling = static_cast<LineSampling>(Int(0, 2));
+  r.rule = static_cast<SurfaceRule>(Int(0, 1));
+  r.fill = static_cast<Fill>(Int(0, 1));
+  r.topology = static_cast<Topology>(Int(0, 2));
+  r.thickness_unit = static_cast<ThicknessUnit>(Int(0, 1));
+  if (Chance(0.25)) r.thickness = static_cast<float>(Real(0, 5));
+  if (r.kind == PrimitiveKind::kBox || r.kind == PrimitiveKind::kSphere ||
+      r.kind == PrimitiveKind::kCylinder) {
+    for (int i = 0; i < 3; ++i) r.params[i] = static_cast<float>(RandomCoordinate(size));
+    for (int i = 3; i < 6; ++i) {
+      r.params[i] = static_cast<float>(Chance(0.2) ? Real(0, 1) : Real(0.5, size));
+    }
+    if (Chance(0.03)) r.params[3] = 0;
+    return g;
+  }
+  uint32_t corners = static_cast<uint32_t>(Int(0, 4));
+  if (r.kind == PrimitiveKind::kTriangles) corners *= 3;
+  if (r.kind == PrimitiveKind::kSegments && r.topology == Topology::kList) corners *= 2;
+  const bool indexed = corners > 0 && Chance(0.4);
+  AddVertices(g, indexed ? static_cast<uint32_t>(Int(1, 8)) : corners, size);
+  if (indexed) {
+    r.index_count = corners;
+    for (uint32_t i = 0; i < corners; ++i) {
+      g.indices.push_back(static_cast<uint32_t>(Int(0, r.vertex_count - 1)));
+    }
+  }
+  if (Chance(0.5)) {
+    r.color_mode = ColorMode::kPerVertex;
+    for (uint32_t i = 0; i < r.vertex_count; ++i) g.colors.push_back(RandomColor());
+  }
+  return g;
+}
+
+Affine SceneGenerator::RandomTransform(int size) {
+  Affine t;
+  switch (Int(0, 4)) {
+    case 0:
+      return t;
+    case 1:  // a shift, whole or not
+      for (int row = 0; row < 3; ++row) {
+        t.m[row * 4 + 3] = Chance(0.5) ? static_cast<double>(Int(-5, 5)) : Real(-5, 5);
+      }
+      return t;
+    case 2:  // a turn about the middle, with a stretch
+    {
+      const double angle = Real(0, 7), scale = Real(0.3, 2), middle = size / 2.0;
+      const double c = std::cos(angle) * scale, s = std::sin(angle) * scale;
+      t.m[0] = c, t.m[1] = -s, t.m[4] = s, t.m[5] = c, t.m[10] = Real(0.3, 2);
+      t.m[3] = middle - (c - s) * middle;
+      t.m[7] = middle - (c + s) * middle;
+      return t;
+    }
+    default:
+      for (double& m : t.m) m = Real(-1.5, 1.5);
+      for (int row = 0; row < 3; ++row) t.m[row * 4 + 3] = Real(0, size);
+      if (Chance(0.1)) t.m[0] = t.m[1] = t.m[2] = 0;  // flat: singular
+      if (Chance(0.1)) t.m[0] *= 0.01, t.m[1] *= 0.01, t.m[2] *= 0.01;
+      return t;
+  }
+}
+
+LayerRecord SceneGenerator::RandomLayer(uint64_t id) {
+  LayerRecord l;
+  l.id = id;
+  l.order = static_cast<int32_t>(Int(-1, 1));
+  l.visible = Chance(0.85);
+  l.opacity = Chance(0.5) ? 255 : static_cast<uint32_t>(Int(0, 255));
+  l.blend = Chance(0.5) ? BlendMode::kOver : static_cast<BlendMode>(Int(0, 2));
+  if (Chance(0.3)) l.transform = RandomTransform(20);
+  return l;
+}
+
+DrawableRecord SceneGenerator::RandomDrawable(uint64_t id, const SceneModel& scene, int size) {
+  DrawableRecord d;
+  d.id = id;
+  d.geometry = RandomId(scene.geometries);
+  d.layer = RandomId(scene.layers);
+  d.priority = Chance(0.6) ? 5 : static_cast<uint32_t>(Int(0, 126));
+  d.erase = Chance(0.15);
+  if (Chance(0.6)) d.transform = RandomTransform(size);
+  return d;
+}
+
+SceneModel SceneGenerator::RandomScene(int size) {
+  SceneModel scene;
+  for (int64_t n = Int(1, 4); n > 0; --n) {
+    const uint64_t id = next_id_++;
+    scene.layers[id] = RandomLayer(id);
+  }
+  for (int64_t n = Int(1, 10); n > 0; --n) {
+    const uint64_t id = next_id_++;
+    scene.geometries[id] = RandomGeometry(id, size);
+  }
+  for (int64_t n = Int(1, 14); n > 0; --n) {
+    const uint64_t id = next_id_++;
+    scene.drawables[id] = RandomDrawable(id, scene, size);
+  }
+  return scene;
+}
+
+void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
+  const auto put_drawable = [&](uint64_t id) {
+    scene.drawables[id] = RandomDrawable(id, scene, size);
+    delta.Put(scene.drawables[id]);
+  };
+  switch (Int(0, 6)) {
+    case 0: {  // a new geometry, for a new drawable or one that is there
+      const uint64_t id = next_id_++;
+      scene.geometries[id] = RandomGeometry(id, size);
+      delta.Put(scene.geometries[id]);
+      put_drawable(scene.drawables.empty() || Chance(0.5) ? next_id_++ : RandomId(scene.drawables));
+      break;
+    }
+    case 1:
+      put_drawable(next_id_++);
+      break;
+    case 2:
+      if (scene.drawables.empty()) return;
+      put_drawable(RandomId(scene.drawables));
+      break;
+    case 3: {
+      if (scene.drawables.size() < 3) return;
+      const uint64_t id = RandomId(scene.drawables);
+      scene.drawables.erase(id);
+      delta.Drop(Op::kDropDrawable, id);
+      break;
+    }
+    case 4: {
+      const uint64_t id = Chance(0.2) ? next_id_++ : RandomId(scene.layers);
+      scene.layers[id] = RandomLayer(id);
+      delta.Put(scene.layers[id]);
+      break;
+    }
+    case 5: {  // drop what is not used
+      const uint64_t id = RandomId(scene.geometries);
+      const bool used = std::any_of(scene.drawables.begin(), scene.drawables.end(),
+                                    [&](const auto& d) { return d.second.geometry == id; });
+      if (used || scene.geometries.size() < 3) return;
+      scene.geometries.erase(id);
+      delta.Drop(Op::kDropGeometry, id);
+      break;
+    }
+    case 6: {  // drop a layer with everything in it
+      if (scene.layers.size() < 3) return;
+      const uint64_t id = RandomId(scene.layers);
+      scene.layers.erase(id);
+      delta.Drop(Op::kDropLayer, id);
+      std::erase_if(scene.drawables, [&](const auto& d) {
+        if (d.second.layer != id) return false;
+        delta.Drop(Op::kDropDrawable, d.first);
+        return true;
+      });
+      break;
+    }
+  }
+}
+
+}  // namespace voxeld::gpu::conformance

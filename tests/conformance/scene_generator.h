@@ -1,0 +1,47 @@
+// Random scenes, targets and changes, from a seed.
+#pragma once
+
+#include <cstdint>
+#include <random>
+
+#include "gpu/engine.h"
+#include "tests/conformance/scene_model.h"
+
+namespace voxeld::gpu::conformance {
+
+// VOXELD_SEED, or `fallback`. Every test that draws on chance prints what it used.
+uint64_t SeedOr(uint64_t fallback);
+
+class SceneGenerator {
+ public:
+  explicit SceneGenerator(uint64_t seed) : engine_(seed) {}
+
+  // A small display of either kind, any format, sampling, dither, number of sub-frames; any view.
+  Target RandomTarget();
+
+  // Layers, geometries (some shared) and drawables of every kind, for a grid of about `size`
+  // voxels.
+  SceneModel RandomScene(int size);
+
+  // One change to `scene`, written to `delta` as well.
+  void Change(SceneModel& scene, int size, DeltaBuffer& delta);
+
+  int64_t Int(int64_t low, int64_t high);
+  double Real(double low, double high);
+  bool Chance(double probability);
+
+ private:
+  LayerRecord RandomLayer(uint64_t id);
+  ModelGeometry RandomGeometry(uint64_t id, int size);
+  DrawableRecord RandomDrawable(uint64_t id, const SceneModel& scene, int size);
+  Affine RandomTransform(int size);
+  void AddVertices(ModelGeometry& g, uint32_t count, int size);
+  double RandomCoordinate(int size);
+  uint32_t RandomColor();
+  uint64_t RandomId(const auto& map);
+
+  std::mt19937_64 engine_;
+  uint64_t next_id_ = 1;
+};
+
+}  // namespace voxeld::gpu::conformance
