@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "gpu/delta.h"
 
 namespace voxeld::daemon {
@@ -94,8 +95,8 @@ class Pattern {
       const auto level = uint32_t(steps == 1 ? 255 : i * 255 / (steps - 1));
       const uint32_t grey = level << 16 | level << 8 | level;
       const double y = double(int64_t(ny_) / 2), z = double(int64_t(nz_) / 2);
-      Box("z" + std::to_string(i), {x0, 0, z}, {x1, ny_, z + 1}, grey);
-      Box("y" + std::to_string(i), {x0, y, 0}, {x1, y + 1, nz_}, grey);
+      Box(absl::StrCat("z", i), {x0, 0, z}, {x1, ny_, z + 1}, grey);
+      Box(absl::StrCat("y", i), {x0, y, 0}, {x1, y + 1, nz_}, grey);
     }
   }
 

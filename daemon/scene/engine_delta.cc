@@ -32,15 +32,9 @@ bool LooksSame(const Layer& a, const Layer& b) {
 
 // Nothing that an engine sees: label, sequence and expiry may differ.
 bool LooksSame(const Entity& a, const Entity& b) {
-  if (a.number != b.number || a.data.priority != b.data.priority || a.data.erase != b.data.erase ||
-      a.data.transform != b.data.transform || a.data.content.index() != b.data.content.index()) {
-    return false;
-  }
-  if (const auto* geometry = std::get_if<GeometryPtr>(&a.data.content)) {
-    return *geometry == std::get<GeometryPtr>(b.data.content);
-  }
-  return std::get<InstanceRef>(a.data.content).object ==
-         std::get<InstanceRef>(b.data.content).object;
+  return a.number == b.number && a.data.priority == b.data.priority &&
+         a.data.erase == b.data.erase && a.data.transform == b.data.transform &&
+         a.data.content == b.data.content;
 }
 
 }  // namespace

@@ -82,6 +82,7 @@ using GeometryPtr = std::shared_ptr<const GeometryData>;
 
 struct InstanceRef {
   std::string object;
+  bool operator==(const InstanceRef&) const = default;
 };
 
 using Content = std::variant<GeometryPtr, InstanceRef>;

@@ -18,9 +18,8 @@ inline GeometryPtr Dots(float x, uint32_t color = 0xFFFFFF, uint32_t count = 1) 
   data->record.kind = gpu::PrimitiveKind::kPoints;
   data->record.color = color;
   data->record.vertex_count = count;
-  for (uint32_t i = 0; i < count; ++i) {
-    data->positions.insert(data->positions.end(), {x + static_cast<float>(i), 0, 0});
-  }
+  data->positions.resize(size_t{3} * count);
+  for (uint32_t i = 0; i < count; ++i) data->positions[3 * i] = x + static_cast<float>(i);
   data->min[0] = x;
   data->max[0] = x + count - 1;
   return data;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "daemon/core/core.h"
 #include "display/sync/fake_clock.h"
 #include "tests/daemon/fakes/operations.h"
@@ -63,7 +64,7 @@ class Simulation {
     core.emplace(std::move(options), clock);
     for (int i = 0; i < displays; ++i) {
       auto display = std::make_unique<ScriptedDisplay>(
-          SmallDisplay(i == 0 ? "main" : "display" + std::to_string(i)), clock);
+          SmallDisplay(i == 0 ? "main" : absl::StrCat("display", i)), clock);
       display_.push_back(display.get());
       const absl::Status status = core->AddDisplay(std::move(display), {});
       if (!status.ok()) std::abort();

@@ -1,0 +1,169 @@
+// PersistentMap against std::map.
+#include "daemon/scene/persistent_map.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon {
+namespace {
+
+using Map = PersistentMap<std::string, int>;
+using Model = std::map<std::string, int>;
+
+Model ToModel(const Map& map) {
+  Model model;
+  std::string last;
+  map.ForEach([&](const std::string& key, int value) {
+    EXPECT_TRUE(model.empty() || last < key);
+    last = key;
+    model[key] = value;
+  });
+  return model;
+}
+
+struct Change {
+  std::string key;
+  std::optional<int> before, after;
+  bool operator==(const Change&) const = default;
+};
+
+std::vector<Change> Diff(const Map& a, const Map& b) {
+  std::vector<Change> changes;
+  Map::Diff(a, b, [&](const std::string& key, const int* before, const int* after) {
+    changes.push_back({key, before ? std::optional(*before) : std::nullopt,
+                       after ? std::optional(*after) : std::nullopt});
+  });
+  return changes;
+}
+
+std::vector<Change> Diff(const Model& a, const Model& b) {
+  std::map<std::string, Change> changes;
+  for (const auto& [key, value] : a) changes[key] = {key, value, std::nullopt};
+  for (const auto& [key, value] : b) {
+    changes[key].key = key;
+    changes[key].after = value;
+  }
+  std::vector<Change> list;
+  for (auto& [key, change] : changes) {
+    if (change.before != change.after) list.push_back(std::move(change));
+  }
+  return list;
+}
+
+TEST(PersistentMap, RandomPathsAgreeWithStdMap) {
+  for (uint32_t seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    const int keys = seed % 2 == 0 ? 20 : 300;
+    std::vector<std::pair<Map, Model>> versions = {{}};
+    for (int step = 0; step < 60; ++step) {
+      // From any version there is, not only the newest.
+      auto [map, model] = versions[random() % versions.size()];
+      for (uint32_t n = random() % 30; n > 0; --n) {
+        const std::string key = absl::StrCat("k", random() % keys);
+        if (random() % 3 == 0) {
+          EXPECT_EQ(map.Erase(key), model.erase(key) == 1);
+        } else {
+          const int value = static_cast<int>(random() % 5);
+          map.Put(key, value);
+          model[key] = value;
+        }
+        EXPECT_EQ(map.size(), model.size());
+      }
+      versions.emplace_back(std::move(map), std::move(model));
+    }
+    for (const auto& [map, model] : versions) ASSERT_EQ(ToModel(map), model);
+    for (int n = 0; n < 200; ++n) {
+      const auto& [map_a, model_a] = versions[random() % versions.size()];
+      const auto& [map_b, model_b] = versions[random() % versions.size()];
+      ASSERT_EQ(Diff(map_a, map_b), Diff(model_a, model_b)) << "seed " << seed;
+    }
+  }
+}
+
+TEST(PersistentMap, FindsAndWalksFromAKey) {
+  Map map;
+  for (const char* key : {"d", "a", "c", "f"}) map.Put(key, key[0]);
+  EXPECT_EQ(*map.Find("c"), 'c');
+  EXPECT_EQ(map.Find("b"), nullptr);
+  const auto from = [&](const std::string& start, size_t most) {
+    std::string seen;
+    map.ForEachFrom(start, [&](const std::string& key, int) {
+      seen += key;
+      return seen.size() < most;
+    });
+    return seen;
+  };
+  EXPECT_EQ(from("", 9), "acdf");
+  EXPECT_EQ(from("b", 9), "cdf");
+  EXPECT_EQ(from("c", 2), "cd");
+  EXPECT_EQ(from("g", 9), "");
+}
+
+TEST(PersistentMap, ACopyStaysAsItWas) {
+  Map map;
+  for (int i = 0; i < 100; ++i) map.Put(std::to_string(i), i);
+  const Map copy = map;
+  const Model before = ToModel(map);
+  for (int i = 0; i < 100; i += 2) map.Erase(std::to_string(i));
+  for (int i = 1; i < 100; i += 2) map.Put(std::to_string(i), -i);
+  EXPECT_EQ(ToModel(copy), before);
+  EXPECT_EQ(map.size(), 50u);
+}
+
+// Counts comparisons of values: equal subtrees must not be looked into.
+struct Counted {
+  int value = 0;
+  static inline int comparisons = 0;
+  bool operator==(const Counted& other) const {
+    ++comparisons;
+    return value == other.value;
+  }
+};
+
+TEST(PersistentMap, ADifferenceCostsWhatDiffers) {
+  PersistentMap<int, Counted> a;
+  for (int i = 0; i < 100000; ++i) a.Put(i, {i});
+  PersistentMap<int, Counted> b = a;
+  for (int i = 500; i < 510; ++i) b.Put(i, {-i});
+  b.Erase(70000);
+  b.Put(100001, {1});
+  Counted::comparisons = 0;
+  int changes = 0;
+  PersistentMap<int, Counted>::Diff(a, b, [&](int, const Counted*, const Counted*) { ++changes; });
+  EXPECT_EQ(changes, 12);
+  EXPECT_LT(Counted::comparisons, 1000);  // 12 paths of a tree of 100,000
+}
+
+TEST(PersistentMap, VersionsMayBeUsedFromSeveralThreads) {
+  Map base;
+  for (int i = 0; i < 2000; ++i) base.Put(std::to_string(i), i);
+  std::vector<std::thread> threads;
+  std::vector<int> sums(4);
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([copy = base, t, &sums]() mutable {
+      for (int i = t; i < 2000; i += 4) copy.Put(std::to_string(i), 0);
+      copy.ForEach([&](const std::string&, int value) { sums[t] += value; });
+    });
+  }
+  base = Map();  // let go of at the same time
+  for (std::thread& thread : threads) thread.join();
+  const int all = 1999 * 2000 / 2;
+  for (int t = 0; t < 4; ++t) {
+    int zeroed = 0;
+    for (int i = t; i < 2000; i += 4) zeroed += i;
+    EXPECT_EQ(sums[t], all - zeroed);
+  }
+}
+
+}  // namespace
+}  // namespace voxeld::daemon
