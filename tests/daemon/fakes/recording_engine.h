@@ -130,6 +130,7 @@ struct EngineScript {
   std::vector<uint64_t> frames;      // drawn so far
   std::deque<std::function<void()>> calls;
   SceneModel* scene = nullptr;  // of the newest engine; null when there is none
+  std::function<void(uint64_t frame, const SceneModel& scene)> on_frame;  // as it is drawn
 
   // Carries out what waits. False if nothing did.
   bool Run() {
@@ -197,6 +198,7 @@ class RecordingEngine final : public gpu::Engine {
       }
       if (gone_) return done(absl::DataLossError("gone"));
       script_->frames.push_back(request.frame);
+      if (script_->on_frame) script_->on_frame(request.frame, scene_);
       gpu::FrameResult result;
       result.frame = request.frame;
       std::vector<std::string> content = scene_.Canonical(/*visible_only=*/true);
