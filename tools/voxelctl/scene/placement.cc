@@ -136,6 +136,20 @@ absl::StatusOr<DisplaySpace> VisibleSpace(int nx, int ny, int nz, const gpu::Aff
   return space;
 }
 
+DisplaySpace Intersection(const DisplaySpace& a, const DisplaySpace& b) {
+  DisplaySpace common;
+  common.round = a.round || b.round;
+  const auto along = [&](double Point3::*axis) {
+    const double low = std::max(a.center.*axis - a.half.*axis, b.center.*axis - b.half.*axis);
+    const double high = std::min(a.center.*axis + a.half.*axis, b.center.*axis + b.half.*axis);
+    common.center.*axis = (low + high) / 2;
+    common.half.*axis = (high - low) / 2;
+    return high > low;
+  };
+  const bool meet = along(&Point3::x) && along(&Point3::y) && along(&Point3::z);
+  return meet ? common : a;
+}
+
 void PlaceModels(std::span<Model> models, const DisplaySpace& space,
                  const PlacementOptions& options) {
   const bool round = space.round || options.spin;

@@ -21,6 +21,9 @@ struct DisplaySpace {
 absl::StatusOr<DisplaySpace> VisibleSpace(int nx, int ny, int nz, const gpu::Affine& scene_to_voxel,
                                           bool round);
 
+// What both show; `a` if that is nothing.
+DisplaySpace Intersection(const DisplaySpace& a, const DisplaySpace& b);
+
 struct PlacementOptions {
   Up up = Up::kAuto;  // kAuto: each format's own
   bool spin = false;  // leaves room to turn about the vertical axis

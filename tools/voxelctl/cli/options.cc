@@ -1,0 +1,355 @@
+#include "tools/voxelctl/cli/options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "tools/voxelctl/cli/suggest.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr const char* kAbout =
+    "Puts files into the volumetric displays of a voxeld server, and shows how they do.\n"
+    "Data goes to standard output, words to standard error; --json makes the data JSON.";
+constexpr const char* kPlayAbout =
+    "Puts files up: meshes (.obj .stl .ply .gltf .glb), point clouds (.ply), maps (.geojson "
+    ".topojson .json).\n"
+    "The scene is turned upright, centred and made as large as fits. Light is baked into the "
+    "colours by the\n"
+    "direction of each surface, so that shape can be read on a display that only glows (--flat: "
+    "not).\n"
+    "What is up stays when this ends, in the layer \"voxelctl\", until the next play, or clear.";
+constexpr const char* kSnapshotAbout =
+    "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
+    "perspective, dimmer with\n"
+    "distance, with the outline of its volume; with --slices all its slices side by side.";
+
+struct UsageError {
+  std::string message;
+};
+
+template <typename T>
+using Choices = std::vector<std::pair<std::string, T>>;
+
+std::string DidYouMean(absl::string_view wrong, const std::vector<std::string>& known) {
+  const std::string nearest = Nearest(wrong, known);
+  return nearest.empty() ? absl::StrCat("; known are ", absl::StrJoin(known, ", "))
+                         : absl::StrCat("; did you mean ", nearest, "?");
+}
+
+template <typename T>
+T Choose(const char* option, const std::string& value, const Choices<T>& choices) {
+  std::vector<std::string> names;
+  for (const auto& [name, result] : choices) {
+    if (name == value) return result;
+    names.push_back(name);
+  }
+  throw UsageError{absl::StrCat(option, " ", EscapeForTerminal(value), " is not known",
+                                DidYouMean(value, names))};
+}
+
+void CheckRange(const char* option, double value, double least, double most) {
+  if (value >= least && value <= most) return;
+  throw UsageError{absl::StrCat(option, " is ", value, "; ", least, " to ", most, " is expected")};
+}
+
+const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
+const Choices<FillStyle> kFills = {
+    {"dots", FillStyle::kDots}, {"lines", FillStyle::kLines}, {"surface", FillStyle::kSurface}};
+const Choices<v1::TestPattern> kPatterns = {
+    {"axes", v1::TEST_PATTERN_AXES},   {"corners", v1::TEST_PATTERN_CORNERS},
+    {"grid", v1::TEST_PATTERN_GRID},   {"ramp", v1::TEST_PATTERN_RAMP},
+    {"white", v1::TEST_PATTERN_WHITE}, {"none", v1::TEST_PATTERN_NONE}};
+
+// The command line as declared, and the values that it fills in.
+class Parser {
+ public:
+  Parser() : app_(kAbout, "voxelctl") {
+    app_.set_version_flag("--version", absl::StrCat("voxelctl ", VOXELD_VERSION),
+                          "Print the version and end");
+    app_.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    app_.add_option("--server", options_.server,
+                    "Address of voxeld: HOST:PORT or unix:PATH (default: VOXELD_SERVER, else its "
+                    "socket, else 127.0.0.1:50551)")
+        ->type_name("ADDR");
+    app_.add_flag("--json", options_.json,
+                  "Write data as one JSON document (a line each with stats --watch)");
+    app_.require_subcommand(0, 1);
+    app_.fallthrough();
+    app_.allow_extras();
+    AddPlay();
+    AddSnapshot();
+    Add("displays", "Lists the displays, their geometry and state");
+    AddStats();
+    AddEntities();
+    AddClear();
+    AddPattern();
+  }
+
+  ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
+    ParsedCommandLine result;
+    try {
+      CheckCommand(arguments);
+      // CLI11 takes them from the back.
+      app_.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+      CheckExtras();
+      FillIn();
+      result.options = options_;
+    } catch (const UsageError& error) {
+      result.err = Usage(error.message);
+      result.exit_code = kExitUsage;
+    } catch (const CLI::CallForHelp&) {
+      const CLI::App* chosen = Chosen();
+      result.out = chosen == &app_ ? app_.help() : chosen->help("voxelctl");
+    } catch (const CLI::CallForVersion& version) {
+      result.out = absl::StrCat(version.what(), "\n");
+    } catch (const CLI::Error& error) {
+      result.err = Usage(EscapeForTerminal(error.what()));
+      result.exit_code = kExitUsage;
+    }
+    return result;
+  }
+
+ private:
+  CLI::App* Add(const char* name, const char* about) {
+    CLI::App* command = app_.add_subcommand(name, about);
+    command->fallthrough();
+    command->footer("Before or after the command: --server ADDR, --json (voxelctl --help)");
+    command->allow_extras();
+    command->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    names_.emplace_back(name);
+    return command;
+  }
+
+  void AddPlay() {
+    CLI::App* c = Add("play", kPlayAbout);
+    c->add_option("FILE", play_.files,
+                  "Files; several share one space, as parts of one thing (meshes beside a --globe "
+                  "come inside it)")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    c->add_flag("--spin", play_.spin,
+                "Turn about the vertical axis, 8 s a turn, until Ctrl-C or --duration");
+    c->add_option("--up", up_,
+                  "The files' axis that points up: auto, x, y or z. auto: y for glTF, OBJ and flat "
+                  "maps, z for STL and PLY; y up has +z in front, z and x up have -y in front")
+        ->type_name("AXIS")
+        ->capture_default_str();
+    c->add_option("--fill", fill_, "Draw meshes as dots, lines or surface")
+        ->type_name("STYLE")
+        ->capture_default_str();
+    c->add_option("--fps", play_.fps, "Frames a second while spinning, 0.1 to 240")
+        ->type_name("N")
+        ->capture_default_str();
+    c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
+    c->add_flag("--globe", play_.globe,
+                "Put maps on a sphere by longitude and latitude, poles on the vertical axis");
+    c->add_flag("--flat", play_.flat, "Colours as they are in the file, without shading");
+    c->add_flag("--each", play_.each, "Fit every file by itself instead of all together");
+    c->add_option("--display", play_.display, "Fill this display's volume (default: fit into all)")
+        ->type_name("NAME");
+    c->add_flag("--clear", play_.clear, "Take the scene down at the end");
+  }
+
+  void AddSnapshot() {
+    CLI::App* c = Add("snapshot", kSnapshotAbout);
+    c->add_option("OUT.png", snapshot_.file,
+                  "Where the picture goes; an old one is replaced when the new one is whole");
+    c->add_option("--display", snapshot_.display, "Which display (default: the first)")
+        ->type_name("NAME");
+    c->add_option("--size", size_, "Size of the picture, 64x64 to 8192x8192")
+        ->type_name("WxH")
+        ->capture_default_str();
+    c->add_option("--azimuth", snapshot_.azimuth_degrees,
+                  "Degrees that the viewer has walked to the right from the front")
+        ->type_name("DEG")
+        ->capture_default_str();
+    c->add_option("--elevation", snapshot_.elevation_degrees,
+                  "Degrees that the viewer stands above the middle, -89 to 89")
+        ->type_name("DEG")
+        ->capture_default_str();
+    c->add_flag("--slices", snapshot_.slices, "A contact sheet of all slices instead");
+    c->add_option("--timeout", snapshot_.timeout_s, "Seconds to wait for a volume, up to 60")
+        ->type_name("S")
+        ->capture_default_str();
+  }
+
+  void AddStats() {
+    CLI::App* c = Add("stats", "Shows the server's and the displays' figures");
+    c->add_flag("--watch", stats_.watch, "Again and again, until Ctrl-C");
+    c->add_option("--interval", stats_.interval_s, "Seconds between, 0.01 to 3600")
+        ->type_name("S")
+        ->capture_default_str();
+  }
+
+  void AddEntities() {
+    CLI::App* c = Add("entities", "Lists layers and entities");
+    c->add_option("--layer", entities_.layer, "Only this layer's")->type_name("NAME");
+    c->add_option("--owner", entities_.owner, "Only this owner's")->type_name("N");
+  }
+
+  void AddClear() {
+    CLI::App* c = Add("clear", "Takes down what voxelctl put up: its layer and test patterns");
+    c->add_option("--layer", clear_.layer, "This layer instead, whoever owns it")
+        ->type_name("NAME");
+    c->add_flag("--all", clear_.all, "Every layer of every owner, and test patterns");
+  }
+
+  void AddPattern() {
+    CLI::App* c = Add("pattern",
+                      "Shows a test pattern instead of the scene: axes, corners, grid, ramp or "
+                      "white; none ends it, list names them");
+    c->add_option("NAME", pattern_name_, "The pattern, none, or list");
+    c->add_option("--display", pattern_.display, "Only on this display (default: on all)")
+        ->type_name("NAME");
+  }
+
+  // CLI11 says nothing useful about a command that is not there.
+  void CheckCommand(const std::vector<std::string>& arguments) const {
+    if (arguments.empty())
+      throw UsageError{absl::StrCat("a command is expected: ", absl::StrJoin(names_, ", "))};
+    for (size_t i = 0; i < arguments.size(); ++i) {
+      const std::string& word = arguments[i];
+      if (word == "--server") {
+        ++i;
+      } else if (!absl::StartsWith(word, "-") || word == "-") {
+        if (std::find(names_.begin(), names_.end(), word) != names_.end()) return;
+        throw UsageError{absl::StrCat("\"", EscapeForTerminal(word), "\" is no command",
+                                      DidYouMean(word, names_))};
+      } else if (word == "--help" || word == "-h" || word == "--version") {
+        return;
+      }
+    }
+  }
+
+  const CLI::App* Chosen() const {
+    const std::vector<const CLI::App*> chosen =
+        app_.get_subcommands([](const CLI::App* app) { return app->parsed(); });
+    return chosen.empty() ? &app_ : chosen.front();
+  }
+
+  void CheckExtras() const {
+    const std::vector<std::string> extras = app_.remaining(true);
+    if (extras.empty()) return;
+    const std::string& extra = extras.front();
+    if (!absl::StartsWith(extra, "-")) {
+      throw UsageError{absl::StrCat("\"", EscapeForTerminal(extra), "\" is one argument too many")};
+    }
+    std::vector<std::string> known;
+    for (const CLI::App* app : {Chosen(), &app_}) {
+      for (const CLI::Option* option : app->get_options()) {
+        for (const std::string& name : option->get_lnames())
+          known.push_back(absl::StrCat("--", name));
+      }
+    }
+    std::sort(known.begin(), known.end());
+    known.erase(std::unique(known.begin(), known.end()), known.end());
+    const std::string name = extra.substr(0, extra.find('='));
+    throw UsageError{
+        absl::StrCat(EscapeForTerminal(name), " is no option here", DidYouMean(name, known))};
+  }
+
+  void FillIn() {
+    const CLI::App* chosen = Chosen();
+    if (chosen == &app_)
+      throw UsageError{absl::StrCat("a command is expected: ", absl::StrJoin(names_, ", "))};
+    const std::string name = chosen->get_name();
+    if (name == "play") return FillInPlay();
+    if (name == "snapshot") return FillInSnapshot();
+    if (name == "pattern") return FillInPattern();
+    if (name == "displays") options_.command = DisplaysOptions();
+    if (name == "entities") options_.command = entities_;
+    if (name == "stats") {
+      CheckRange("--interval", stats_.interval_s, 0.01, 3600);
+      options_.command = stats_;
+    }
+    if (name == "clear") {
+      if (clear_.all && !clear_.layer.empty())
+        throw UsageError{"--all and --layer do not go together"};
+      options_.command = clear_;
+    }
+  }
+
+  void FillInPlay() {
+    if (play_.files.empty()) throw UsageError{"play wants at least one FILE"};
+    play_.up = Choose("--up", up_, kUps);
+    play_.fill = Choose("--fill", fill_, kFills);
+    CheckRange("--fps", play_.fps, 0.1, 240);
+    if (!std::isnan(duration_)) {
+      CheckRange("--duration", duration_, 0, 1e9);
+      play_.duration_s = duration_;
+    }
+    options_.command = play_;
+  }
+
+  void FillInSnapshot() {
+    if (snapshot_.file.empty()) throw UsageError{"snapshot wants the name of a file, OUT.png"};
+    const std::vector<std::string> sides = absl::StrSplit(size_, absl::ByAnyChar("xX"));
+    if (sides.size() != 2 || !absl::SimpleAtoi(sides[0], &snapshot_.width) ||
+        !absl::SimpleAtoi(sides[1], &snapshot_.height)) {
+      throw UsageError{absl::StrCat("--size is ", EscapeForTerminal(size_),
+                                    "; WIDTHxHEIGHT is expected, such as 1200x1000")};
+    }
+    CheckRange("the width in --size", snapshot_.width, 64, 8192);
+    CheckRange("the height in --size", snapshot_.height, 64, 8192);
+    CheckRange("--azimuth", snapshot_.azimuth_degrees, -3600, 3600);
+    CheckRange("--elevation", snapshot_.elevation_degrees, -89, 89);
+    CheckRange("--timeout", snapshot_.timeout_s, 0.01, 60);
+    options_.command = snapshot_;
+  }
+
+  void FillInPattern() {
+    if (pattern_name_.empty())
+      throw UsageError{absl::StrCat("pattern wants a name: ", absl::StrJoin(PatternNames(), ", "),
+                                    ", none or list")};
+    pattern_.list = pattern_name_ == "list";
+    if (!pattern_.list) {
+      Choices<v1::TestPattern> choices = kPatterns;
+      choices.emplace_back("list", v1::TEST_PATTERN_UNSPECIFIED);
+      pattern_.pattern = Choose("the pattern", pattern_name_, choices);
+    }
+    options_.command = pattern_;
+  }
+
+  std::string Usage(absl::string_view message) const {
+    const CLI::App* chosen = Chosen();
+    return absl::StrCat("voxelctl: ", message, "\nTry `voxelctl ",
+                        chosen == &app_ ? "" : absl::StrCat(chosen->get_name(), " "), "--help`.\n");
+  }
+
+  CLI::App app_;
+  std::vector<std::string> names_;
+  Options options_;
+  PlayOptions play_;
+  SnapshotOptions snapshot_;
+  StatsOptions stats_;
+  EntitiesOptions entities_;
+  ClearOptions clear_;
+  PatternOptions pattern_;
+  std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
+  double duration_ = std::nan("");
+};
+
+}  // namespace
+
+ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments) {
+  return Parser().Parse(arguments);
+}
+
+std::vector<std::string> PatternNames() {
+  std::vector<std::string> names;
+  for (const auto& [name, pattern] : kPatterns) {
+    if (pattern != v1::TEST_PATTERN_NONE) names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,90 @@
+// What the command line says.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/scene/look.h"
+#include "voxeld/v1/display.pb.h"
+
+namespace voxeld::voxelctl {
+
+struct PlayOptions {
+  std::vector<std::string> files;  // at least one
+  bool spin = false;
+  bool clear = false;  // takes it down at the end
+  bool globe = false;
+  bool flat = false;
+  bool each = false;
+  Up up = Up::kAuto;
+  FillStyle fill = FillStyle::kSurface;
+  double fps = 20;  // 0.1 to 240
+  std::optional<double> duration_s;
+  std::string display;  // whose space is filled; empty: all of them fit
+};
+
+struct SnapshotOptions {
+  std::string file;
+  std::string display;  // empty: the first
+  int width = 1200, height = 1000;
+  double azimuth_degrees = 24, elevation_degrees = 20;
+  bool slices = false;
+  double timeout_s = 5;
+};
+
+struct DisplaysOptions {};
+
+struct StatsOptions {
+  bool watch = false;
+  double interval_s = 1;
+};
+
+struct EntitiesOptions {
+  std::string layer;   // empty: all
+  uint64_t owner = 0;  // 0: all
+};
+
+struct ClearOptions {
+  std::string layer;  // empty: what voxelctl put up
+  bool all = false;
+};
+
+struct PatternOptions {
+  bool list = false;
+  v1::TestPattern pattern = v1::TEST_PATTERN_NONE;
+  std::string display;  // empty: all
+};
+
+struct Options {
+  std::string server;  // empty: see ChooseServer
+  bool json = false;
+  std::variant<PlayOptions, SnapshotOptions, DisplaysOptions, StatsOptions, EntitiesOptions,
+               ClearOptions, PatternOptions>
+      command;
+};
+
+// Exit codes of the whole tool.
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitFailure = 1;
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitInterrupted = 130;
+
+// Either what to do, or what to print and the code to end with (help, version, a usage error).
+struct ParsedCommandLine {
+  std::optional<Options> options;
+  int exit_code = kExitOk;
+  std::string out, err;
+};
+
+// `arguments` without the program's name. Global options may stand before the command or after it.
+// A usage error says what was not understood, the nearest that would have been, and where help is.
+ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments);
+
+// "axes", "corners", …: the names of the test patterns, without none.
+std::vector<std::string> PatternNames();
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,47 @@
+#include "tools/voxelctl/cli/suggest.h"
+
+#include <algorithm>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+
+namespace voxeld::voxelctl {
+
+size_t EditDistance(absl::string_view a, absl::string_view b) {
+  std::vector<size_t> before_last, last(b.size() + 1), row(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    before_last = last;
+    last = row;
+    row[0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const auto same = [&](size_t x, size_t y) {
+        return absl::ascii_tolower(a[x]) == absl::ascii_tolower(b[y]);
+      };
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same(i - 1, j - 1) ? 0 : 1)});
+      if (i > 1 && j > 1 && same(i - 1, j - 2) && same(i - 2, j - 1))
+        row[j] = std::min(row[j], before_last[j - 2] + 1);
+    }
+  }
+  return row[b.size()];
+}
+
+std::string Nearest(absl::string_view wrong, const std::vector<std::string>& known) {
+  std::string nearest;
+  size_t least = 1 + wrong.size() / 3;
+  if (wrong.size() > 64) return nearest;
+  for (const std::string& name : known) {
+    const size_t distance = EditDistance(wrong, name);
+    if (distance <= least && distance < name.size()) {
+      nearest = name;
+      least = distance - (distance > 0 ? 1 : 0);
+    }
+  }
+  if (!nearest.empty() || wrong.empty()) return nearest;
+  for (const std::string& name : known) {
+    if (absl::StartsWith(name, absl::AsciiStrToLower(wrong))) return name;
+  }
+  return nearest;
+}
+
+}  // namespace voxeld::voxelctl

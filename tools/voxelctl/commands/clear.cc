@@ -1,0 +1,94 @@
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/proto_json.h"
+#include "tools/voxelctl/text/table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+absl::StatusOr<uint64_t> EndPatterns(Connection& connection) {
+  const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
+  if (!displays.ok()) return displays.status();
+  uint64_t ended = 0;
+  for (const v1::DisplayDescription& display : displays->displays()) {
+    if (display.test_pattern() == v1::TEST_PATTERN_NONE ||
+        display.test_pattern() == v1::TEST_PATTERN_UNSPECIFIED)
+      continue;
+    v1::UpdateDisplayRequest request;
+    request.set_name(display.name());
+    request.set_test_pattern(v1::TEST_PATTERN_NONE);
+    const absl::StatusOr<v1::DisplayDescription> updated = connection.UpdateDisplay(request);
+    if (!updated.ok()) return updated.status();
+    ++ended;
+  }
+  return ended;
+}
+
+}  // namespace
+
+absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console) {
+  v1::ClearLayerRequest request;
+  if (!options.all) request.set_layer(options.layer.empty() ? kLayer : options.layer);
+  absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
+  // A layer that is not there is as clear as can be.
+  if (absl::IsNotFound(cleared.status())) cleared = v1::ClearLayerResponse();
+  if (!cleared.ok()) return cleared.status();
+  absl::StatusOr<uint64_t> patterns = uint64_t{0};
+  if (options.layer.empty()) patterns = EndPatterns(connection);
+  if (!patterns.ok()) return patterns.status();
+  if (console.json()) {
+    nlohmann::ordered_json json = ToJson(*cleared);
+    json["patterns"] = *patterns;
+    console.Data(JsonText(json, false));
+    return absl::OkStatus();
+  }
+  console.Say(absl::StrCat(
+      "cleared ", Grouped(cleared->entities()), " entities in ", Grouped(cleared->layers()),
+      " layers", *patterns > 0 ? absl::StrCat(", ended ", *patterns, " test patterns") : ""));
+  return absl::OkStatus();
+}
+
+absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console) {
+  std::vector<std::string> names = {options.display};
+  if (options.display.empty()) {
+    const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
+    if (!displays.ok()) return displays.status();
+    names.clear();
+    for (const v1::DisplayDescription& display : displays->displays())
+      names.push_back(display.name());
+    if (names.empty()) return absl::FailedPreconditionError("the server has no display");
+  }
+  v1::ListDisplaysResponse updated;
+  for (const std::string& name : names) {
+    v1::UpdateDisplayRequest request;
+    request.set_name(name);
+    request.set_test_pattern(options.pattern);
+    absl::StatusOr<v1::DisplayDescription> display = connection.UpdateDisplay(request);
+    if (!display.ok()) return display.status();
+    *updated.add_displays() = *std::move(display);
+  }
+  if (console.json()) {
+    console.Data(JsonText(ToJson(updated), false));
+    return absl::OkStatus();
+  }
+  for (const v1::DisplayDescription& display : updated.displays()) {
+    console.Say(absl::StrCat(
+        EscapeForTerminal(display.name()),
+        options.pattern == v1::TEST_PATTERN_NONE
+            ? ": the scene again"
+            : ": shows the pattern until `voxelctl pattern none` or `voxelctl clear`"));
+  }
+  return absl::OkStatus();
+}
+
+void ListPatterns(Console& console) {
+  const std::vector<std::string> names = PatternNames();
+  if (console.json()) {
+    console.Data(JsonText(nlohmann::ordered_json{{"patterns", names}}, false));
+    return;
+  }
+  for (const std::string& name : names) console.Data(absl::StrCat(name, "\n"));
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,39 @@
+// What voxelctl does. Each command writes its data and words to the console and returns a status
+// whose message is for people; Cancelled means that an interrupt ended it before its end.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/cli/options.h"
+#include "tools/voxelctl/commands/console.h"
+#include "tools/voxelctl/connection/address.h"
+#include "tools/voxelctl/connection/connection.h"
+#include "tools/voxelctl/process/interrupt.h"
+
+namespace voxeld::voxelctl {
+
+// Whatever voxelctl puts up lies in this layer.
+inline constexpr const char* kLayer = "voxelctl";
+
+using Connector = std::function<absl::StatusOr<std::unique_ptr<Connection>>()>;
+
+// Reads the files before it connects: nothing is put up unless all of them can be.
+absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
+                  Console& console);
+absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console);
+absl::Status Displays(Connection& connection, Console& console);
+absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,
+                       Console& console);
+absl::Status Entities(const EntitiesOptions& options, Connection& connection, Console& console);
+absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console);
+absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console);
+void ListPatterns(Console& console);
+
+// Connects if the command needs it, runs it, says what went wrong; the exit code.
+int Run(const Options& options, const Environment& environment, Interrupt& interrupt,
+        Console& console);
+
+}  // namespace voxeld::voxelctl

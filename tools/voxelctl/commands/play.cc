@@ -1,0 +1,340 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "display/sync/clock.h"
+#include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/play_summary.h"
+#include "tools/voxelctl/connection/scene_stream.h"
+#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/scene/look.h"
+#include "tools/voxelctl/scene/pack.h"
+#include "tools/voxelctl/scene/placement.h"
+#include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr double kSecondsPerTurn = 8;
+constexpr sync::TimeNs kAnswerTime = 30 * sync::kSecond;   // for the scene to be taken in
+constexpr sync::TimeNs kOutcomeTime = 10 * sync::kSecond;  // for a still scene to be shown
+constexpr sync::TimeNs kLastOutcomeTime = 2 * sync::kSecond;
+constexpr sync::TimeNs kLiveLineTime = 200 * sync::kMillisecond;
+constexpr uint64_t kStagedBytes = 8 << 20;
+constexpr size_t kLabelBytes = 200;
+
+absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
+                                             Console& console) {
+  std::vector<Model> models;
+  std::vector<std::string> errors;
+  for (size_t i = 0; i < options.files.size(); ++i) {
+    if (interrupt.requested()) return absl::CancelledError("interrupted");
+    console.ProgressBar("reading",
+                        static_cast<double>(i) / static_cast<double>(options.files.size()),
+                        EscapeForTerminal(options.files[i]));
+    absl::StatusOr<Model> model = ImportFile(options.files[i], {.globe = options.globe});
+    if (model.ok()) {
+      models.push_back(*std::move(model));
+    } else {
+      errors.emplace_back(model.status().message());
+    }
+  }
+  if (!errors.empty()) {
+    if (options.files.size() > errors.size())
+      errors.emplace_back("nothing is put up unless all files can be");
+    return absl::InvalidArgumentError(absl::StrJoin(errors, "\n"));
+  }
+  const auto is_globe = [](const Model& model) { return model.globe; };
+  if (options.globe && std::none_of(models.begin(), models.end(), is_globe)) {
+    return absl::InvalidArgumentError(
+        "--globe is for maps (GeoJSON, TopoJSON), and none of the files is one");
+  }
+  return models;
+}
+
+// What all of `displays` show; the first one's, if they show nothing in common.
+absl::StatusOr<DisplaySpace> CommonSpace(std::span<const v1::DisplayDescription* const> displays) {
+  std::optional<DisplaySpace> common;
+  for (const v1::DisplayDescription* display : displays) {
+    if (display->scene_to_voxel().m_size() != 12) continue;
+    gpu::Affine view;
+    std::copy(display->scene_to_voxel().m().begin(), display->scene_to_voxel().m().end(), view.m);
+    const v1::VoxelGrid& grid = display->geometry().grid();
+    absl::StatusOr<DisplaySpace> space =
+        VisibleSpace(grid.nx(), grid.ny(), grid.nz(), view, display->geometry().has_rotor());
+    if (!space.ok()) return space.status();
+    common = common ? Intersection(*common, *space) : *space;
+  }
+  return common.value_or(DisplaySpace());
+}
+
+absl::StatusOr<DisplaySpace> ChooseSpace(Connection& connection, const std::string& name,
+                                         Console& console) {
+  const absl::StatusOr<v1::ListDisplaysResponse> all = connection.ListDisplays();
+  if (!all.ok()) return all.status();
+  std::vector<const v1::DisplayDescription*> displays;
+  std::vector<std::string> names;
+  for (const v1::DisplayDescription& display : all->displays()) {
+    names.push_back(EscapeForTerminal(display.name()));
+    if (name.empty() || display.name() == name) displays.push_back(&display);
+  }
+  if (!name.empty() && displays.empty()) {
+    return absl::NotFoundError(absl::StrCat("there is no display \"", EscapeForTerminal(name),
+                                            "\"; there are ", absl::StrJoin(names, ", ")));
+  }
+  if (displays.empty()) console.Say("the server has no display: the scene is put up unseen");
+  return CommonSpace(displays);
+}
+
+// At most kLabelBytes of what a person calls the file; no code point is cut.
+std::string Label(const std::string& path) {
+  std::string label = EscapeForTerminal(std::filesystem::path(path).filename().string());
+  if (label.size() <= kLabelBytes) return label;
+  size_t end = kLabelBytes;
+  while (end > 0 && (label[end] & 0xc0) == 0x80) --end;
+  return label.substr(0, end);
+}
+
+class Player {
+ public:
+  Player(const PlayOptions& options, Connection& connection, Interrupt& interrupt, Console& console)
+      : options_(options), connection_(connection), interrupt_(interrupt), console_(console) {}
+
+  absl::Status Run(std::vector<Model> models) {
+    absl::StatusOr<DisplaySpace> space = ChooseSpace(connection_, options_.display, console_);
+    if (!space.ok()) return space.status();
+    space_ = *space;
+    PlaceModels(models, space_, {.up = options_.up, .spin = options_.spin, .each = options_.each});
+    ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
+
+    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore();
+    if (!before.ok()) return before.status();
+    absl::Status status = Open();
+    if (status.ok()) status = PutUp(std::move(models));
+    if (status.ok()) status = TakeDown(*before);
+    if (!status.ok()) return status;
+    status = Stay();
+    if (status.ok() && options_.clear) status = ClearMine();
+    const absl::Status settled =
+        stream_->WaitSettled(clock_.Now() + (options_.spin ? kLastOutcomeTime : kOutcomeTime));
+    const absl::Status closed = stream_->Close();
+    summary_.duration_ns = clock_.Now() - start_;
+    summary_.still_up = status.ok() && !options_.clear && !taken_down_;
+    summary_.tally = stream_->tally();
+    summary_.latencies_ns = stream_->latencies_ns();
+    Report(std::move(summary_), console_);
+    if (!settled.ok() && status.ok()) console_.Say(settled.message());
+    return status.ok() ? closed : status;
+  }
+
+ private:
+  // Owners that have something in our layer: what an earlier play left.
+  absl::StatusOr<std::vector<uint64_t>> OwnersBefore() {
+    v1::ListEntitiesRequest request;
+    request.set_layer(kLayer);
+    const absl::StatusOr<v1::ListEntitiesResponse> response = connection_.ListEntities(request);
+    if (!response.ok()) return response.status();
+    std::vector<uint64_t> owners;
+    for (const v1::LayerInfo& layer : response->layers()) owners.push_back(layer.owner());
+    return owners;
+  }
+
+  absl::Status Open() {
+    v1::Open open;
+    open.set_client_name("voxelctl play");
+    open.set_on_disconnect(options_.clear ? v1::DISCONNECT_POLICY_CLEAR
+                                          : v1::DISCONNECT_POLICY_KEEP);
+    open.set_strict(true);
+    absl::StatusOr<std::unique_ptr<SceneStream>> stream = connection_.OpenStream(open);
+    if (!stream.ok()) return stream.status();
+    stream_ = *std::move(stream);
+    start_ = clock_.Now();
+    summary_.layer = kLayer;
+    summary_.owner = stream_->opened().owner();
+    return absl::OkStatus();
+  }
+
+  absl::Status CommitAndWait() {
+    uint64_t frame = 0;
+    absl::Status status = stream_->Commit(&frame);
+    if (status.ok()) status = stream_->WaitAccepted(frame, clock_.Now() + kAnswerTime);
+    staged_bytes_ = staged_operations_ = 0;
+    return status;
+  }
+
+  // Definitions draw nothing, so they may be committed in as many steps as the limits want.
+  absl::Status SendDefinition(v1::StreamRequest request, uint64_t total) {
+    const v1::Limits& limits = stream_->opened().limits();
+    const uint64_t bytes = request.ByteSizeLong();
+    uint64_t most_bytes = kStagedBytes;
+    if (limits.max_uncommitted_bytes() > 0)
+      most_bytes = std::min(most_bytes, limits.max_uncommitted_bytes());
+    uint64_t most_operations = limits.max_operations_per_commit();
+    if (most_operations == 0) most_operations = UINT64_MAX;
+    if (staged_operations_ > 0 &&
+        (staged_bytes_ + bytes > most_bytes || staged_operations_ + 1 > most_operations)) {
+      absl::Status status = CommitAndWait();
+      if (!status.ok()) return status;
+    }
+    staged_bytes_ += bytes;
+    ++staged_operations_;
+    sent_bytes_ += bytes;
+    console_.ProgressBar("sending", static_cast<double>(sent_bytes_) / static_cast<double>(total),
+                         absl::StrCat(Bytes(sent_bytes_), " of about ", Bytes(total)));
+    return stream_->Send(std::move(request));
+  }
+
+  absl::Status PutUp(std::vector<Model> models) {
+    uint64_t total = 1;
+    for (const Model& model : models) {
+      for (const Part& part : model.parts)
+        total += part.positions.size() * 15 + part.indices.size() * 2;
+    }
+    for (size_t i = 0; i < models.size(); ++i) {
+      const std::string object = absl::StrCat("voxelctl/", i + 1);
+      const absl::StatusOr<PackedSizes> sizes = PackObject(
+          models[i], object, stream_->opened().limits(),
+          [&](v1::StreamRequest request) { return SendDefinition(std::move(request), total); });
+      if (!sizes.ok()) return sizes.status();
+      summary_.files.push_back({models[i].path, models[i].format, sizes->vertices, sizes->indices,
+                                sizes->objects, sizes->bytes});
+      models[i].parts = {};  // sent; the memory is not needed any more
+    }
+    if (staged_operations_ > 0) {
+      const absl::Status status = CommitAndWait();
+      if (!status.ok()) return status;
+    }
+    // One frame replaces the layer whole, should this owner have had it before.
+    v1::StreamRequest begin, end;
+    begin.mutable_frame_begin()->set_layer(kLayer);
+    end.mutable_frame_end()->set_layer(kLayer);
+    absl::Status status = stream_->Send(std::move(begin));
+    for (size_t i = 0; status.ok() && i < models.size(); ++i) {
+      status = stream_->Send(InstanceRequest(kLayer, Id(i), absl::StrCat("voxelctl/", i + 1),
+                                             Label(models[i].path), InstanceTransform(space_, 0)));
+    }
+    if (status.ok()) status = stream_->Send(std::move(end));
+    return status.ok() ? CommitAndWait() : status;
+  }
+
+  static std::string Id(size_t file) { return absl::StrCat(file + 1); }
+
+  // After the new scene is in: for a moment both may be up, but never neither.
+  absl::Status TakeDown(const std::vector<uint64_t>& owners) {
+    for (const uint64_t owner : owners) {
+      if (owner == stream_->opened().owner() || owner == 0) continue;
+      v1::ClearLayerRequest request;
+      request.set_owner(owner);
+      request.set_layer(kLayer);
+      const absl::StatusOr<v1::ClearLayerResponse> cleared = connection_.ClearLayer(request);
+      if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
+    }
+    return absl::OkStatus();
+  }
+
+  sync::TimeNs End() const {
+    if (options_.duration_s) return start_ + std::llround(*options_.duration_s * 1e9);
+    // What is taken down at the end must have been up for someone.
+    return options_.spin || options_.clear ? sync::kNever : start_;
+  }
+
+  absl::Status Stay() {
+    if (options_.spin) return Spin();
+    if (End() > clock_.Now()) {
+      console_.Progress("up; Ctrl-C ends");
+      interrupt_.WaitUntil(clock_, End());
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Spin() {
+    const sync::TimeNs began = clock_.Now();
+    const double period_ns = 1e9 / options_.fps;
+    sync::TimeNs next_line = began;
+    for (int64_t frame = 1;;) {
+      const sync::TimeNs due = began + std::llround(static_cast<double>(frame) * period_ns);
+      if (due >= End()) {
+        interrupt_.WaitUntil(clock_, End());
+        return absl::OkStatus();
+      }
+      if (interrupt_.WaitUntil(clock_, due)) return absl::OkStatus();
+      const sync::TimeNs now = clock_.Now();
+      // Frames whose time has passed are not made up for.
+      frame =
+          std::max(frame, static_cast<int64_t>(static_cast<double>(now - began) / period_ns)) + 1;
+      if (!stream_->HasRoom()) {
+        ++summary_.frames_skipped;
+        continue;
+      }
+      const absl::Status status = Turn(static_cast<double>(now - began) / 1e9 / kSecondsPerTurn);
+      if (!status.ok()) return status;
+      ++summary_.frames;
+      if (stream_->tally().not_found > 0) {
+        console_.Say("the scene was taken down by another client");
+        taken_down_ = true;
+        return absl::OkStatus();
+      }
+      if (console_.live() && now >= next_line) {
+        next_line = now + kLiveLineTime;
+        ShowLine(static_cast<double>(now - began) / 1e9);
+      }
+    }
+  }
+
+  absl::Status Turn(double turns) {
+    absl::Status status;
+    for (size_t i = 0; status.ok() && i < summary_.files.size(); ++i) {
+      status = stream_->Send(TransformRequest(kLayer, Id(i), InstanceTransform(space_, turns)));
+    }
+    return status.ok() ? stream_->Commit(nullptr) : status;
+  }
+
+  void ShowLine(double seconds) {
+    std::string line =
+        absl::StrFormat("spinning %.0f s, %s frames", seconds, Grouped(summary_.frames));
+    for (const auto& [name, counts] : stream_->tally().displays) {
+      absl::StrAppend(&line, ", ", EscapeForTerminal(name), " ", Grouped(counts.presented),
+                      " presented ", Grouped(counts.lost), " lost");
+    }
+    console_.Progress(absl::StrCat(line, "; Ctrl-C ends"));
+  }
+
+  absl::Status ClearMine() {
+    v1::StreamRequest request;
+    request.mutable_delete_()->set_all_mine(true);
+    const absl::Status status = stream_->Send(std::move(request));
+    return status.ok() ? stream_->Commit(nullptr) : status;
+  }
+
+  const PlayOptions& options_;
+  Connection& connection_;
+  Interrupt& interrupt_;
+  Console& console_;
+  sync::SystemClock clock_;
+  DisplaySpace space_;
+  std::unique_ptr<SceneStream> stream_;
+  sync::TimeNs start_ = 0;
+  uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
+  bool taken_down_ = false;
+  PlaySummary summary_;
+};
+
+}  // namespace
+
+absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
+                  Console& console) {
+  absl::StatusOr<std::vector<Model>> models = ReadFiles(options, interrupt, console);
+  if (!models.ok()) return models.status();
+  const absl::StatusOr<std::unique_ptr<Connection>> connection = connect();
+  if (!connection.ok()) return connection.status();
+  return Player(options, **connection, interrupt, console).Run(*std::move(models));
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,122 @@
+#include "tools/voxelctl/commands/play_summary.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/proto_json.h"
+#include "tools/voxelctl/text/table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct Quantiles {
+  uint64_t count = 0;
+  int64_t p50_ns = 0, p99_ns = 0, max_ns = 0;
+};
+
+Quantiles Measure(std::vector<int64_t> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  // The smallest value that so many are at most: nearest rank.
+  const auto rank = [&](size_t percent) {
+    return values[(values.size() * percent + 99) / 100 - 1];
+  };
+  return {values.size(), rank(50), rank(99), values.back()};
+}
+
+ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
+  ordered_json files = ordered_json::array(), displays = ordered_json::array(),
+               issues = ordered_json::array();
+  for (const PlayedFile& f : s.files) {
+    files.push_back({{"path", f.path},
+                     {"format", f.format},
+                     {"vertices", f.vertices},
+                     {"indices", f.indices},
+                     {"objects", f.objects},
+                     {"bytes", f.bytes}});
+  }
+  for (const auto& [name, counts] : s.tally.displays) {
+    displays.push_back({{"display", name},
+                        {"presented", counts.presented},
+                        {"unchanged", counts.unchanged},
+                        {"superseded", counts.superseded},
+                        {"lost", counts.lost},
+                        {"not_shown", counts.not_shown}});
+  }
+  for (const v1::Issue& issue : s.tally.issues) issues.push_back(ToJson(issue));
+  return {{"layer", s.layer},
+          {"owner", s.owner},
+          {"entities", s.files.size()},
+          {"files", files},
+          {"duration_ns", s.duration_ns},
+          {"frames", s.frames},
+          {"frames_skipped", s.frames_skipped},
+          {"still_up", s.still_up},
+          {"commits", s.tally.commits},
+          {"accepted", s.tally.accepted},
+          {"refused", s.tally.refused},
+          {"refused_operations", s.tally.refused_operations},
+          {"unanswered", s.tally.unanswered},
+          {"displays", displays},
+          {"latency",
+           {{"count", latency.count},
+            {"p50_ns", latency.p50_ns},
+            {"p99_ns", latency.p99_ns},
+            {"max_ns", latency.max_ns}}},
+          {"issue_count", s.tally.issue_count},
+          {"issues", issues}};
+}
+
+}  // namespace
+
+void Report(PlaySummary summary, Console& console) {
+  const Quantiles latency = Measure(std::move(summary.latencies_ns));
+  if (console.json()) {
+    console.Data(JsonText(Json(summary, latency), false));
+    return;
+  }
+  uint64_t vertices = 0, bytes = 0;
+  for (const PlayedFile& file : summary.files) {
+    vertices += file.vertices;
+    bytes += file.bytes;
+  }
+  std::string line =
+      absl::StrCat(summary.files.size(), summary.files.size() == 1 ? " entity, " : " entities, ",
+                   Grouped(vertices), " vertices, ", Bytes(bytes));
+  if (summary.frames > 0) {
+    absl::StrAppendFormat(&line, "; %s frames in %s", Grouped(summary.frames),
+                          Duration(summary.duration_ns));
+    if (summary.frames_skipped > 0)
+      absl::StrAppend(&line, " (", Grouped(summary.frames_skipped),
+                      " left out while a display was behind)");
+  }
+  for (const auto& [name, counts] : summary.tally.displays) {
+    absl::StrAppend(&line, "; ", EscapeForTerminal(name), ": ", Grouped(counts.presented),
+                    " presented, ", Grouped(counts.superseded), " superseded, ",
+                    Grouped(counts.lost), " lost");
+    if (counts.unchanged > 0) absl::StrAppend(&line, ", ", Grouped(counts.unchanged), " unchanged");
+    if (counts.not_shown > 0) absl::StrAppend(&line, ", ", Grouped(counts.not_shown), " not shown");
+  }
+  if (latency.count > 0)
+    absl::StrAppend(&line, "; latency p50 ", Duration(latency.p50_ns), ", p99 ",
+                    Duration(latency.p99_ns));
+  console.Say(line);
+  for (const auto& [name, counts] : summary.tally.displays) {
+    if (!counts.last_lost_reason.empty()) {
+      console.Say(absl::StrCat(EscapeForTerminal(name),
+                               " lost a volume: ", EscapeForTerminal(counts.last_lost_reason)));
+    }
+  }
+  for (const v1::Issue& issue : summary.tally.issues)
+    console.Say(absl::StrCat("issue: ", DescribeIssue(issue)));
+  if (summary.still_up)
+    console.Say(
+        absl::StrCat("it stays up in the layer ", summary.layer, " until `voxelctl clear`"));
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,32 @@
+// What play says at its end.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tools/voxelctl/commands/console.h"
+#include "tools/voxelctl/connection/scene_stream.h"
+
+namespace voxeld::voxelctl {
+
+struct PlayedFile {
+  std::string path, format;
+  uint64_t vertices = 0, indices = 0, objects = 0, bytes = 0;
+};
+
+struct PlaySummary {
+  std::string layer;
+  uint64_t owner = 0;
+  std::vector<PlayedFile> files;
+  int64_t duration_ns = 0;
+  uint64_t frames = 0, frames_skipped = 0;  // of a spin; skipped while the displays were behind
+  bool still_up = false;
+  StreamTally tally;
+  std::vector<int64_t> latencies_ns;
+};
+
+// JSON to the data, or lines of words.
+void Report(PlaySummary summary, Console& console);
+
+}  // namespace voxeld::voxelctl

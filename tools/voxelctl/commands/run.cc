@@ -1,0 +1,62 @@
+#include <type_traits>
+
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/commands/commands.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+absl::Status Dispatch(const Options& options, const Connector& connect, Interrupt& interrupt,
+                      Console& console) {
+  if (const auto* play = std::get_if<PlayOptions>(&options.command))
+    return Play(*play, connect, interrupt, console);
+  if (const auto* pattern = std::get_if<PatternOptions>(&options.command);
+      pattern != nullptr && pattern->list) {
+    ListPatterns(console);
+    return absl::OkStatus();
+  }
+  absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
+  if (!connected.ok()) return connected.status();
+  Connection& connection = **connected;
+  return std::visit(
+      [&](const auto& command) -> absl::Status {
+        using Command = std::decay_t<decltype(command)>;
+        if constexpr (std::is_same_v<Command, SnapshotOptions>)
+          return Snapshot(command, connection, console);
+        if constexpr (std::is_same_v<Command, DisplaysOptions>)
+          return Displays(connection, console);
+        if constexpr (std::is_same_v<Command, StatsOptions>)
+          return ShowStats(command, connection, interrupt, console);
+        if constexpr (std::is_same_v<Command, EntitiesOptions>)
+          return Entities(command, connection, console);
+        if constexpr (std::is_same_v<Command, ClearOptions>)
+          return Clear(command, connection, console);
+        if constexpr (std::is_same_v<Command, PatternOptions>)
+          return Pattern(command, connection, console);
+        return absl::OkStatus();
+      },
+      options.command);
+}
+
+}  // namespace
+
+int Run(const Options& options, const Environment& environment, Interrupt& interrupt,
+        Console& console) {
+  const std::string server = ChooseServer(options.server, environment);
+  if (const absl::StatusOr<std::string> target = ServerTarget(server); !target.ok()) {
+    console.Say(absl::StrCat("voxelctl: ", target.status().message()));
+    return kExitUsage;
+  }
+  const auto connect = [&] { return Connection::Connect(server, interrupt); };
+  const absl::Status status = Dispatch(options, connect, interrupt, console);
+  console.EndProgress();
+  if (status.ok()) return kExitOk;
+  if (absl::IsCancelled(status) && interrupt.requested()) {
+    console.Say("voxelctl: interrupted");
+    return kExitInterrupted;
+  }
+  console.Say(absl::StrCat("voxelctl: ", status.message()));
+  return kExitFailure;
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,71 @@
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/commands/captured_volume.h"
+#include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/render/png_file.h"
+#include "tools/voxelctl/render/render_volume.h"
+#include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/proto_json.h"
+#include "tools/voxelctl/text/table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+uint64_t LitPixels(const Volume& volume) {
+  uint64_t lit = 0;
+  for (size_t i = 0; i < volume.rgb.size(); i += 3) {
+    lit += (volume.rgb[i] | volume.rgb[i + 1] | volume.rgb[i + 2]) != 0 ? 1 : 0;
+  }
+  return lit;
+}
+
+}  // namespace
+
+absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console) {
+  v1::CaptureVolumeRequest request;
+  request.set_name(options.display);
+  request.set_timeout_ns(std::llround(options.timeout_s * 1e9));
+  console.Progress("waiting for a volume …");
+  CapturedVolume captured;
+  absl::Status status = connection.CaptureVolume(
+      request, [&](const v1::VolumeChunk& chunk) { return captured.Add(chunk); });
+  if (!status.ok()) return status;
+  const bool decoded = captured.header().source() == v1::VolumeHeader::DECODED_FROM_SENT;
+  const absl::StatusOr<Volume> volume = std::move(captured).Finish();
+  if (!volume.ok()) return volume.status();
+
+  console.Progress("drawing …");
+  const Image image =
+      options.slices
+          ? ContactSheet(*volume)
+          : RenderVolume(*volume, {.width = options.width,
+                                   .height = options.height,
+                                   .angles = {options.azimuth_degrees, options.elevation_degrees}});
+  status = WritePng(options.file, image);
+  if (!status.ok()) return status;
+
+  const uint64_t lit = LitPixels(*volume);
+  if (console.json()) {
+    console.Data(JsonText({{"file", options.file},
+                           {"display", volume->display},
+                           {"volume", volume->number},
+                           {"slices", volume->slices},
+                           {"slice_width", volume->width},
+                           {"slice_height", volume->height},
+                           {"lit_pixels", lit},
+                           {"source", decoded ? "DECODED_FROM_SENT" : "REPORTED_BY_DEVICE"},
+                           {"width", image.width},
+                           {"height", image.height}},
+                          false));
+    return absl::OkStatus();
+  }
+  console.Say(absl::StrCat(
+      EscapeForTerminal(options.file), ": ", image.width, "x", image.height, ", volume ",
+      volume->number, " of display ", EscapeForTerminal(volume->display), ", ", Grouped(lit),
+      " slice pixels lit, ", decoded ? "decoded from the bytes sent" : "reported by the device"));
+  if (lit == 0) console.Say("nothing is lit: is anything up? see `voxelctl entities`");
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,202 @@
+#include "tools/voxelctl/connection/connection.h"
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/channel_arguments.h>
+
+#include <chrono>
+#include <set>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "display/sync/mutex.h"
+#include "tools/voxelctl/connection/address.h"
+#include "tools/voxelctl/connection/grpc_scene_stream.h"
+#include "tools/voxelctl/connection/scene_stream.h"
+#include "tools/voxelctl/connection/status.h"
+#include "voxeld/v1/display.grpc.pb.h"
+#include "voxeld/v1/scene.grpc.pb.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::system_clock;
+
+constexpr milliseconds kConnectTime(5000);
+constexpr milliseconds kConnectStep(100);
+constexpr milliseconds kCallTime(15000);
+constexpr int kMostMessageBytes = 64 << 20;  // a slice of 16384² pixels would not come in less
+
+}  // namespace
+
+class Connection::Impl {
+ public:
+  Impl(std::string address, std::shared_ptr<grpc::Channel> channel, Interrupt& interrupt)
+      : address_(std::move(address)),
+        channel_(std::move(channel)),
+        displays_(v1::DisplayService::NewStub(channel_)),
+        scene_(v1::SceneService::NewStub(channel_)),
+        interrupt_(interrupt),
+        listener_(interrupt.AddListener([this] { CancelAll(); })) {}
+
+  ~Impl() { interrupt_.RemoveListener(listener_); }
+
+  // Makes one call with a context that an interrupt cancels.
+  template <typename Call>
+  absl::Status Invoke(milliseconds limit, Call call) {
+    grpc::ClientContext context;
+    if (limit > milliseconds::zero()) context.set_deadline(system_clock::now() + limit);
+    {
+      sync::MutexLock lock(mutex_);
+      if (interrupt_.requested()) return absl::CancelledError("interrupted");
+      active_.insert(&context);
+    }
+    const grpc::Status status = call(&context);
+    {
+      sync::MutexLock lock(mutex_);
+      active_.erase(&context);
+    }
+    if (status.error_code() == grpc::StatusCode::CANCELLED && interrupt_.requested()) {
+      return absl::CancelledError("interrupted");
+    }
+    return FromGrpc(status, address_);
+  }
+
+  template <typename Response, typename Call>
+  absl::StatusOr<Response> Unary(Call call) {
+    Response response;
+    const absl::Status status =
+        Invoke(kCallTime, [&](grpc::ClientContext* context) { return call(context, &response); });
+    if (!status.ok()) return status;
+    return response;
+  }
+
+  v1::DisplayService::Stub& displays() { return *displays_; }
+  v1::SceneService::Stub& scene() { return *scene_; }
+  std::shared_ptr<grpc::ChannelInterface> channel() { return channel_; }
+  const std::string& address() const { return address_; }
+  Interrupt& interrupt() { return interrupt_; }
+
+ private:
+  void CancelAll() {
+    sync::MutexLock lock(mutex_);
+    for (grpc::ClientContext* context : active_) context->TryCancel();
+  }
+
+  const std::string address_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::DisplayService::Stub> displays_;
+  std::unique_ptr<v1::SceneService::Stub> scene_;
+  Interrupt& interrupt_;
+  sync::Mutex mutex_;
+  std::set<grpc::ClientContext*> active_ VOXELD_GUARDED_BY(mutex_);
+  const int listener_;
+};
+
+Connection::Connection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Connection::~Connection() = default;
+
+absl::StatusOr<std::unique_ptr<Connection>> Connection::Connect(const std::string& address,
+                                                                Interrupt& interrupt) {
+  const absl::StatusOr<std::string> target = ServerTarget(address);
+  if (!target.ok()) return target.status();
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMostMessageBytes);
+  // The server is near; what a web proxy is set for is not meant for it.
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  std::shared_ptr<grpc::Channel> channel =
+      grpc::CreateCustomChannel(*target, grpc::InsecureChannelCredentials(), arguments);
+  const system_clock::time_point deadline = system_clock::now() + kConnectTime;
+  for (grpc_connectivity_state state = channel->GetState(true); state != GRPC_CHANNEL_READY;
+       state = channel->GetState(true)) {
+    if (interrupt.requested()) return absl::CancelledError("interrupted");
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) {
+      return Unreachable(address, "nobody listens there");
+    }
+    if (system_clock::now() >= deadline) return Unreachable(address, "no answer in 5 s");
+    channel->WaitForStateChange(state, system_clock::now() + kConnectStep);
+  }
+  return std::unique_ptr<Connection>(
+      new Connection(std::make_unique<Impl>(address, std::move(channel), interrupt)));
+}
+
+absl::StatusOr<v1::ListDisplaysResponse> Connection::ListDisplays() {
+  return impl_->Unary<v1::ListDisplaysResponse>(
+      [&](grpc::ClientContext* context, v1::ListDisplaysResponse* response) {
+        return impl_->displays().ListDisplays(context, {}, response);
+      });
+}
+
+absl::StatusOr<v1::DisplayDescription> Connection::UpdateDisplay(
+    const v1::UpdateDisplayRequest& request) {
+  return impl_->Unary<v1::DisplayDescription>(
+      [&](grpc::ClientContext* context, v1::DisplayDescription* response) {
+        return impl_->displays().UpdateDisplay(context, request, response);
+      });
+}
+
+absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntitiesRequest request) {
+  v1::ListEntitiesResponse all;
+  do {
+    absl::StatusOr<v1::ListEntitiesResponse> page = impl_->Unary<v1::ListEntitiesResponse>(
+        [&](grpc::ClientContext* context, v1::ListEntitiesResponse* response) {
+          return impl_->scene().ListEntities(context, request, response);
+        });
+    if (!page.ok()) return page;
+    all.MergeFrom(*page);
+    all.set_next_page_token(page->next_page_token());
+    request.set_page_token(page->next_page_token());
+  } while (!request.page_token().empty());
+  return all;
+}
+
+absl::StatusOr<v1::ClearLayerResponse> Connection::ClearLayer(
+    const v1::ClearLayerRequest& request) {
+  return impl_->Unary<v1::ClearLayerResponse>(
+      [&](grpc::ClientContext* context, v1::ClearLayerResponse* response) {
+        return impl_->scene().ClearLayer(context, request, response);
+      });
+}
+
+absl::Status Connection::WatchStats(const v1::WatchStatsRequest& request,
+                                    const std::function<bool(const v1::Stats&)>& each) {
+  bool stopped = false;
+  const milliseconds limit = request.once() ? kCallTime : milliseconds::zero();
+  absl::Status status = impl_->Invoke(limit, [&](grpc::ClientContext* context) {
+    auto reader = impl_->displays().WatchStats(context, request);
+    v1::Stats stats;
+    while (reader->Read(&stats)) {
+      if (each(stats)) continue;
+      stopped = true;
+      context->TryCancel();
+      break;
+    }
+    return reader->Finish();
+  });
+  return stopped ? absl::OkStatus() : status;
+}
+
+absl::Status Connection::CaptureVolume(
+    const v1::CaptureVolumeRequest& request,
+    const std::function<absl::Status(const v1::VolumeChunk&)>& each) {
+  absl::Status refused;
+  // The server's own limit comes first; this one is for a server that hangs.
+  const milliseconds limit = kCallTime + milliseconds(request.timeout_ns() / 1'000'000);
+  absl::Status status = impl_->Invoke(limit, [&](grpc::ClientContext* context) {
+    auto reader = impl_->displays().CaptureVolume(context, request);
+    v1::VolumeChunk chunk;
+    while (refused.ok() && reader->Read(&chunk)) refused = each(chunk);
+    if (!refused.ok()) context->TryCancel();
+    return reader->Finish();
+  });
+  return refused.ok() ? status : refused;
+}
+
+absl::StatusOr<std::unique_ptr<SceneStream>> Connection::OpenStream(const v1::Open& open) {
+  return OpenGrpcSceneStream(impl_->channel(), impl_->address(), open, impl_->interrupt());
+}
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,52 @@
+// The calls that voxelctl makes. This folder alone knows gRPC; its headers do not.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/process/interrupt.h"
+#include "voxeld/v1/display.pb.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::voxelctl {
+
+class SceneStream;
+
+// One channel. Calls block until their answer, a deadline of seconds, or an interrupt: then
+// Cancelled. Statuses are the server's, their messages made fit for a terminal; Unavailable names
+// the address and what to do about it. Thread-safe.
+class Connection {
+ public:
+  // `interrupt` must outlive it. Unavailable if the server does not answer in time.
+  static absl::StatusOr<std::unique_ptr<Connection>> Connect(const std::string& address,
+                                                             Interrupt& interrupt);
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  absl::StatusOr<v1::ListDisplaysResponse> ListDisplays();
+  absl::StatusOr<v1::DisplayDescription> UpdateDisplay(const v1::UpdateDisplayRequest& request);
+  // All pages in one answer.
+  absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request);
+  absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
+
+  // Calls `each` with every answer until that returns false, or the stream ends.
+  absl::Status WatchStats(const v1::WatchStatsRequest& request,
+                          const std::function<bool(const v1::Stats&)>& each);
+  absl::Status CaptureVolume(const v1::CaptureVolumeRequest& request,
+                             const std::function<absl::Status(const v1::VolumeChunk&)>& each);
+
+  // A session that is open: the server has answered Opened.
+  absl::StatusOr<std::unique_ptr<SceneStream>> OpenStream(const v1::Open& open);
+
+ private:
+  class Impl;
+  explicit Connection(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,42 @@
+// voxelctl: command-line client of voxeld.
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "tools/voxelctl/cli/options.h"
+#include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/console.h"
+#include "tools/voxelctl/process/interrupt.h"
+
+namespace {
+
+std::string EnvironmentVariable(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)
+  try {
+    // A reader that goes away is an error of the write, not the end of the process.
+    std::signal(SIGPIPE, SIG_IGN);
+    const ParsedCommandLine parsed =
+        ParseCommandLine(std::vector<std::string>(argv + 1, argv + argc));
+    std::cout << parsed.out << std::flush;
+    std::cerr << parsed.err;
+    if (!parsed.options) return parsed.exit_code;
+    Interrupt interrupt(Interrupt::Watch::kSignals);
+    Console console(std::cout, std::cerr, parsed.options->json, ::isatty(STDERR_FILENO) == 1);
+    return Run(*parsed.options, EnvironmentVariable, interrupt, console);
+  } catch (const std::exception& error) {
+    std::cerr << "voxelctl: " << error.what() << "\n";
+    return kExitFailure;
+  }
+}
