@@ -95,6 +95,8 @@ void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const bool same = now.visible == next.visible && now.opacity == next.opacity &&
                     now.order == next.order && now.blend == next.blend;
   if (same || (now.visible == 0 && next.visible == 0)) return;
+  // Nothing of it was to be seen, and where it will be is not known yet.
+  if (now.visible == 0 && !(now.transform == next.transform)) return;
   for (Drawable* drawable : layer.drawables) {
     for (uint32_t tile : drawable->bins.tiles) MarkDirty(tile);
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct EngineCase {
   std::string name;
   std::function<absl::StatusOr<std::unique_ptr<Engine>>(EngineOptions)> create;
 };
+
+inline void PrintTo(const EngineCase& engine_case, std::ostream* out) { *out << engine_case.name; }
 
 class EngineDriver {
  public:

@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <vector>
+
+#include "gpu/cpu/call_queue.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/cpu/staging.h"
+
+namespace voxeld::gpu {
+namespace {
+
+void ExpectEachIndexOnce(Executor& executor) {
+  for (size_t count : {size_t{0}, size_t{1}, size_t{5}, size_t{1000}}) {
+    for (size_t grain : {size_t{1}, size_t{7}, size_t{5000}}) {
+      std::vector<std::atomic<int>> calls(count);
+      std::vector<std::atomic<int>> inside(static_cast<size_t>(executor.concurrency()));
+      std::atomic<bool> alone{true};
+      executor.For(count, grain, [&](size_t i, int worker) {
+        ASSERT_LT(worker, executor.concurrency());
+        std::atomic<int>& mine = inside[static_cast<size_t>(worker)];
+        if (mine.fetch_add(1) != 0) alone = false;
+        ++calls[i];
+        mine.fetch_sub(1);
+      });
+      for (const std::atomic<int>& c : calls) EXPECT_EQ(c, 1);
+      EXPECT_TRUE(alone) << "two ran under one worker's number";
+    }
+  }
+}
+
+TEST(Executor, EveryKindRunsEachIndexOnce) {
+  ExpectEachIndexOnce(*MakeSerialExecutor());
+  for (int threads : {1, 2, 5}) {
+    std::unique_ptr<Executor> executor = MakeThreadExecutor(threads);
+    EXPECT_EQ(executor->concurrency(), threads);
+    ExpectEachIndexOnce(*executor);
+    ExpectEachIndexOnce(*MakeExecutor(threads));
+  }
+}
+
+TEST(StagingPool, CountsWhatIsHeld) {
+  StagingPool pool(100);
+  absl::StatusOr<StagingBlock> a = pool.Acquire(60);
+  ASSERT_TRUE(a.ok());
+  EXPECT_FALSE(pool.Acquire(41).ok());
+  absl::StatusOr<StagingBlock> b = pool.Acquire(40);
+  ASSERT_TRUE(b.ok());
+  EXPECT_FALSE(pool.Acquire(1).ok());
+  EXPECT_TRUE(pool.Acquire(0).ok());
+  *a = StagingBlock();
+  EXPECT_TRUE(pool.Acquire(60).ok());
+  EXPECT_EQ(pool.Acquire(101).status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+TEST(StagingPool, BlocksOutliveIt) {
+  StagingBlock block;
+  {
+    StagingPool pool(100);
+    block = *pool.Acquire(32);
+  }
+  block.bytes()[31] = std::byte{1};
+  EXPECT_EQ(block.bytes().size(), 32u);
+}
+
+TEST(CallQueue, InlineRunsBeforePostReturns) {
+  CallQueue queue(/*run_inline=*/true);
+  int calls = 0;
+  queue.Post([&](bool cancelled) { calls += !cancelled; });
+  EXPECT_EQ(calls, 1);
+}
+
+// Each call is answered once and in order; from the first that is cancelled on, all are.
+TEST(CallQueue, DestructionCancelsWhatHasNotBegun) {
+  sync::Mutex mutex;
+  sync::CondVar changed;
+  bool begun = false, release = false;
+  std::vector<int> order;
+  std::vector<bool> cancelled;
+  {
+    CallQueue queue(/*run_inline=*/false);
+    for (int i = 0; i < 50; ++i) {
+      queue.Post([&, i](bool c) {
+        sync::MutexLock lock(mutex);
+        order.push_back(i);
+        cancelled.push_back(c);
+        begun = true;
+        changed.NotifyAll();
+        while (!release) changed.Wait(mutex);
+      });
+    }
+    sync::MutexLock lock(mutex);
+    while (!begun) changed.Wait(mutex);
+    release = true;
+    changed.NotifyAll();
+  }
+  ASSERT_EQ(order.size(), 50u);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(order[static_cast<size_t>(i)], i);
+  EXPECT_FALSE(cancelled[0]);
+  EXPECT_TRUE(std::is_sorted(cancelled.begin(), cancelled.end()));
+}
+
+}  // namespace
+}  // namespace voxeld::gpu

@@ -1,0 +1,169 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "gpu/slice/pack.h"
+#include "gpu/slice/quantize.h"
+#include "gpu/slice/sampler.h"
+#include "gpu/slice/weight.h"
+#include "gpu/word.h"
+
+namespace voxeld::gpu {
+namespace {
+
+TEST(Quantize, BayerMatrixHasEachValueOnceAndTheClassicFirstRows) {
+  std::set<uint32_t> values;
+  for (uint32_t v = 0; v < 8; ++v) {
+    for (uint32_t u = 0; u < 8; ++u) values.insert(Bayer8(u, v));
+  }
+  EXPECT_EQ(values.size(), 64u);
+  EXPECT_EQ(*values.rbegin(), 63u);
+  const uint32_t row0[8] = {0, 32, 8, 40, 2, 34, 10, 42};
+  const uint32_t row1[8] = {48, 16, 56, 24, 50, 18, 58, 26};
+  for (uint32_t u = 0; u < 8; ++u) {
+    EXPECT_EQ(Bayer8(u, 0), row0[u]);
+    EXPECT_EQ(Bayer8(u + 8, 9), row1[u]);  // repeats every 8 pixels
+  }
+}
+
+TEST(Quantize, FullIsFullAndDarkIsDarkUnderEveryThreshold) {
+  for (uint32_t levels : {2u, 4u, 8u, 256u}) {
+    for (uint32_t sub = 0; sub < 64; ++sub) {
+      for (uint32_t u = 0; u < 8; ++u) {
+        const uint32_t t = Threshold(display::Dither::kOrdered, u, 3, sub, 64);
+        EXPECT_LE(t, 65534u);
+        EXPECT_EQ(Quantize(65535, levels, t), levels - 1);
+        EXPECT_EQ(Quantize(0, levels, t), 0u);
+      }
+    }
+  }
+}
+
+// Without dither, to the nearest: of two levels the step is at 32768; of 256, at half of 257.
+TEST(Quantize, WithoutDitherRoundsToTheNearest) {
+  const uint32_t t = Threshold(display::Dither::kNone, 5, 6, 1, 2);
+  EXPECT_EQ(t, 32767u);
+  EXPECT_EQ(Quantize(32767, 2, t), 0u);
+  EXPECT_EQ(Quantize(32768, 2, t), 1u);
+  EXPECT_EQ(Quantize(128, 256, t), 0u);
+  EXPECT_EQ(Quantize(129, 256, t), 1u);
+}
+
+// B = 0: 65535/128 = 511; one sub-frame of two on: B = 32: 65·65535/128 = 33279.
+TEST(Quantize, ThresholdsAreAsCountedByHand) {
+  EXPECT_EQ(Threshold(display::Dither::kOrdered, 0, 0, 0, 2), 511u);
+  EXPECT_EQ(Threshold(display::Dither::kOrdered, 0, 0, 1, 2), 33279u);
+  EXPECT_EQ(Threshold(display::Dither::kOrdered, 5, 7, 0, 1), (2u * 29 + 1) * 65535 / 128);
+}
+
+// A quarter of the light lights a quarter of the pixels, in space and in time.
+TEST(Quantize, LightIsKeptOnAverage) {
+  for (uint32_t sub_frames : {1u, 4u, 64u}) {
+    uint32_t lit = 0;
+    for (uint32_t sub = 0; sub < sub_frames; ++sub) {
+      for (uint32_t v = 0; v < 8; ++v) {
+        for (uint32_t u = 0; u < 8; ++u) {
+          lit += Quantize(16384, 2, Threshold(display::Dither::kOrdered, u, v, sub, sub_frames));
+        }
+      }
+    }
+    EXPECT_EQ(lit, 16 * sub_frames);
+  }
+}
+
+TEST(Pack, Rgb888) {
+  uint8_t picture[2 * 2 * 3] = {};
+  PackPixel(display::PixelFormat::kRgb888, 2, 2, 1, 1, {1, 2, 3}, picture);
+  const uint8_t want[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3};
+  EXPECT_TRUE(std::equal(std::begin(want), std::end(want), picture));
+}
+
+TEST(Pack, Rgb332) {
+  uint8_t picture[2] = {};
+  PackPixel(display::PixelFormat::kRgb332, 2, 1, 1, 0, {7, 2, 1}, picture);
+  EXPECT_EQ(picture[0], 0);
+  EXPECT_EQ(picture[1], 0b11101001);
+}
+
+// Nine pixels a row: two bytes; three planes of 2 × 2 bytes.
+TEST(Pack, BitPlanes) {
+  uint8_t picture[12] = {};
+  PackPixel(display::PixelFormat::kBitPlanes3, 9, 2, 0, 0, {1, 0, 1}, picture);
+  PackPixel(display::PixelFormat::kBitPlanes3, 9, 2, 8, 1, {0, 1, 1}, picture);
+  PackPixel(display::PixelFormat::kBitPlanes3, 9, 2, 7, 0, {1, 0, 0}, picture);
+  const uint8_t want[12] = {0x81, 0, 0, 0, 0, 0, 0, 0x80, 0x80, 0, 0, 0x80};
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(picture[i], want[i]) << i;
+}
+
+TEST(Weight, RoundsAsTheDefinitionSays) {
+  EXPECT_EQ(FootprintWeight(255, 200), 200u);
+  EXPECT_EQ(FootprintWeight(128, 128), 64u);  // (16384 + 127)/255
+  EXPECT_EQ(WeighChannel(128, 255), 128u);
+  EXPECT_EQ(WeighChannel(64, 1), 0u);
+  EXPECT_EQ(WeighChannel(128, 1), 1u);
+  EXPECT_EQ(RaiseWeighted(0x10FF00, 128, 0xFF0002), 0x80FF01u);
+}
+
+// One slice, two pixels wide, two high. Pixel (0, ·) sees x = 1 and 17 (in the next tile), pixel
+// (1, ·) nothing lit; rows see z = 0 alone, and z = 0 and 1.
+display::FootprintTable HandTable() {
+  display::FootprintTable table;
+  table.slices = 1;
+  table.width = 2;
+  table.height = 2;
+  table.outer.begin = {0, 2, 3};
+  table.outer.entries = {{1, 2, 0, 255}, {17, 2, 0, 128}, {5, 5, 0, 255}};
+  table.inner.begin = {0, 1, 3};
+  table.inner.entries = {{0, 0, 0, 255}, {0, 0, 0, 255}, {0, 0, 1, 64}};
+  return table;
+}
+
+TileStore HandTiles(uint32_t at_1, uint32_t at_17, uint32_t at_17_above) {
+  TileStore tiles;
+  tiles.Reset(TileGrid::Of(20, 8, 4));
+  std::vector<uint32_t> colors(kTileVoxels, 0);
+  colors[IndexInTile(1, 2, 0)] = Interleave(at_1);
+  EXPECT_TRUE(tiles.Set(0, colors.data(), 1));
+  EXPECT_FALSE(tiles.Set(0, colors.data(), 1));
+  colors.assign(kTileVoxels, 0);
+  colors[IndexInTile(17, 2, 0)] = Interleave(at_17);
+  colors[IndexInTile(17, 2, 1)] = Interleave(at_17_above);
+  EXPECT_TRUE(tiles.Set(1, colors.data(), 2));
+  return tiles;
+}
+
+SlicePixels Sampled(const TileStore& tiles, display::Sampling sampling) {
+  absl::StatusOr<Sampler> sampler = Sampler::Create(HandTable(), tiles.grid(), sampling);
+  EXPECT_TRUE(sampler.ok()) << sampler.status();
+  SlicePixels pixels;
+  pixels.Clear(4);
+  sampler->Sample(tiles, 0, pixels);
+  return pixels;
+}
+
+TEST(Sampler, MaxTakesTheGreatestWordOfTheFootprint) {
+  const SlicePixels pixels =
+      Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kMax);
+  // Grey's word is greater than green's: the highest bits are equal, then red's decides.
+  EXPECT_EQ(pixels.rgb, (std::vector<uint32_t>{0x00FF00, 0, 0x808080, 0}));
+  const SlicePixels other =
+      Sampled(HandTiles(0xFF0000, 0x000001, 0x808080), display::Sampling::kMax);
+  EXPECT_EQ(other.rgb, (std::vector<uint32_t>{0xFF0000, 0, 0x808080, 0}));
+}
+
+// Green at half weight: 128; grey above at (128·64 + 127)/255 = 32, of 0x80: (32·128 + 127)/255
+// = 16.
+TEST(Sampler, WeightedTakesTheGreatestOfEachChannel) {
+  const SlicePixels pixels =
+      Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kWeighted);
+  EXPECT_EQ(pixels.rgb, (std::vector<uint32_t>{0xFF8000, 0, 0xFF8010, 0}));
+}
+
+TEST(Sampler, RefusesATableThatLeavesTheGrid) {
+  EXPECT_EQ(
+      Sampler::Create(HandTable(), TileGrid::Of(17, 8, 4), display::Sampling::kMax).status().code(),
+      absl::StatusCode::kInternal);
+}
+
+}  // namespace
+}  // namespace voxeld::gpu
