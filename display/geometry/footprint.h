@@ -4,7 +4,7 @@
 // A footprint is a product: pixel (u, v) of slice s stands for all voxels o + i with o from the
 // list of (s, u) and i from the list of v, each with weight (wo·wi + 127) / 255. Coordinates add
 // component-wise. A planar stack's lists are (x, z) by y or (x, y) by z; a rotor's are columns (x,
-// y) by z. So a table of a 192-slice projector display with 200 million pixels has 220,000 outer
+// y) by z. So a table of a 192-slice projector display with 200 million pixels has 175,000 outer
 // entries.
 //
 // What every geometry guarantees, and tests prove: each voxel whose centre lies in the solid swept

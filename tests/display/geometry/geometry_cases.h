@@ -1,0 +1,29 @@
+// Geometries of every kind, for tests that must hold for all.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "display/api/geometry.h"
+
+namespace voxeld::display {
+
+struct GeometryCase {
+  std::string name;  // letters and digits
+  Geometry geometry;
+};
+
+std::vector<GeometryCase> StackCases();
+std::vector<GeometryCase> RotorCases();
+std::vector<GeometryCase> AllCases();
+
+// `count` positions, `spacing_mm` apart, about `middle_mm`.
+std::vector<double> EvenPositions(int count, double spacing_mm, double middle_mm = 0);
+
+// The multivox Vortex: two panels of 128×64, back to back, in units of its LED pitch.
+Rotor Vortex(int slices_per_turn);
+
+// A grid of nx·ny·nz cells about the middle of the volume.
+VoxelGrid CentredGrid(int nx, int ny, int nz, Vec3 pitch_mm);
+
+}  // namespace voxeld::display
