@@ -168,8 +168,16 @@ void Core::Impl::EndCommit(Session& session, const Operation& operation) {
   published_ = store_.snapshot();
   const Rider rider{session.id, commit.frame_id, operation.sequence, now};
   for (const auto& slot : displays_) {
-    slot->host->work->Post([pipeline = slot->host->pipeline.get(), snapshot = published_, rider,
-                            hidden = result.hidden] { pipeline->Show(snapshot, rider, hidden); });
+    const bool posted = slot->host->work->Post(
+        [pipeline = slot->host->pipeline.get(), snapshot = published_, rider,
+         hidden = result.hidden] { pipeline->Show(snapshot, rider, hidden); });
+    if (!posted) {  // the daemon is being stopped, and the display already is
+      CommitOutcome outcome;
+      outcome.display = slot->info.name;
+      outcome.kind = CommitOutcome::Kind::kNotShown;
+      outcome.why = CommitOutcome::NotShown::kRemoved;
+      DeliverOutcome(rider, outcome);
+    }
   }
 }
 

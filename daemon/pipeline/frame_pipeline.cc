@@ -313,22 +313,21 @@ absl::Status FramePipeline::Update(const DisplayUpdate& update) {
     if (!made.ok()) return made.status();
     map = *made;
   }
-  // The device's own refusals come before anything that cannot be refused.
+  // The device's own refusals come before anything that cannot be refused; what it refuses is taken
+  // back.
   const double brightness = display_->brightness();
-  if (update.brightness.has_value()) {
-    if (absl::Status s = display_->SetBrightness(*update.brightness); !s.ok()) return s;
-  }
-  if (update.blank.has_value()) {
-    if (absl::Status s = display_->SetBlank(*update.blank); !s.ok()) {
-      if (update.brightness.has_value()) {
-        if (absl::Status back = display_->SetBrightness(brightness); !back.ok()) {
-          return absl::Status(
-              s.code(),
-              absl::StrCat(s.message(), "; and the brightness stays changed: ", back.message()));
-        }
-      }
-      return s;
+  const bool blank = display_->blanked();
+  absl::Status status;
+  if (update.brightness.has_value()) status = display_->SetBrightness(*update.brightness);
+  if (status.ok() && update.blank.has_value()) status = display_->SetBlank(*update.blank);
+  if (!status.ok()) {
+    for (const absl::Status& back :
+         {display_->SetBlank(blank), display_->SetBrightness(brightness)}) {
+      if (back.ok()) continue;
+      status = absl::Status(
+          status.code(), absl::StrCat(status.message(), "; and taking it back: ", back.message()));
     }
+    return status;
   }
   if (update.view.has_value()) {
     view_ = *update.view;
