@@ -1,6 +1,7 @@
 #include "daemon/http/http_server.h"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <boost/asio/basic_socket_acceptor.hpp>
 #include <boost/asio/generic/stream_protocol.hpp>
@@ -186,6 +187,7 @@ class Server::Impl {
       stopping_ = true;
       error_code ignored;
       acceptor_.close(ignored);
+      if (options_.listen.unix_socket) unlink(options_.listen.path.c_str());
       retry_.cancel();
       const std::set<std::shared_ptr<Connection>> connections = connections_;
       for (const auto& connection : connections) connection->Close();

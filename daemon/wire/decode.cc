@@ -1,6 +1,7 @@
 #include "daemon/wire/decode.h"
 
 #include <google/protobuf/arena.h>
+#include <google/protobuf/stubs/logging.h>
 
 #include <string>
 #include <utility>
@@ -99,14 +100,13 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits&
           uint64_t previous_sequence, Decoded* out) {
   out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
   if (out->sequence <= previous_sequence) {
-    const std::string field = FieldPath(path, "sequence").ToString();
     out->issues.push_back(
         {request.sequence(),
          {},
          {},
-         field,
+         FieldPath(path, "sequence").ToString(),
          Reason::kOutOfOrder,
-         absl::StrCat(field, " is ", request.sequence(), " after ", previous_sequence,
+         absl::StrCat("sequence is ", request.sequence(), " after ", previous_sequence,
                       "; numbers ascend, or are 0 to have the server count")});
     out->sequence = previous_sequence;
     if (request.op_case() != v1::StreamRequest::kCommit) return;
@@ -148,6 +148,8 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
   google::protobuf::Arena arena;
   auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
   SliceStream stream(slices);
+  const google::protobuf::LogSilencer
+      silence;  // the status says it all; a client must not fill logs
   if (!request->ParseFromZeroCopyStream(&stream)) {
     return Failed(absl::InvalidArgumentError(absl::StrCat(
         "a message of ", size,

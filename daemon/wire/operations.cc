@@ -231,8 +231,10 @@ MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit
   return {};
 }
 
+// The message names the field alone; the whole path stands beside it.
 void AddIssue(Fault fault, uint64_t sequence, std::string layer, std::string id, const Sinks& out) {
-  std::string message = absl::StrCat(fault.field, " ", fault.message);
+  std::string message =
+      absl::StrCat(fault.field.substr(fault.field.rfind('.') + 1), " ", fault.message);
   out.issues->push_back({sequence, std::move(layer), std::move(id), std::move(fault.field),
                          fault.reason, std::move(message)});
 }

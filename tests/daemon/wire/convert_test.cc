@@ -1,0 +1,262 @@
+#include "daemon/wire/convert.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <set>
+
+#include "daemon/wire/encode.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// Every value there and back; a value beyond the last is refused with the number.
+template <typename Ours, typename Theirs>
+void CheckEnum(int last, int unknown) {
+  for (int value = 0; value <= last; ++value) {
+    const Ours ours = static_cast<Ours>(value);
+    const absl::StatusOr<Ours> back = FromWire(ToWire(ours));
+    ASSERT_TRUE(back.ok()) << back.status();
+    EXPECT_EQ(*back, ours);
+  }
+  const absl::StatusOr<Ours> wrong = FromWire(static_cast<Theirs>(unknown));
+  ASSERT_TRUE(absl::IsInvalidArgument(wrong.status()));
+  EXPECT_THAT(std::string(wrong.status().message()), HasSubstr(std::to_string(unknown)));
+}
+
+TEST(Convert, EnumsBothWays) {
+  CheckEnum<Reason, v1::Reason>(14, 15);
+  CheckEnum<gpu::BlendMode, v1::BlendMode>(2, 0);
+  CheckEnum<display::Evidence, v1::Evidence>(1, 0);
+  CheckEnum<CommitOutcome::NotShown, v1::NotShown::Why>(3, 0);
+  CheckEnum<display::DisplayState, v1::DisplayState>(4, 0);
+  CheckEnum<display::PixelFormat, v1::PixelFormat>(2, 0);
+  CheckEnum<TestPattern, v1::TestPattern>(5, 0);
+  CheckEnum<display::DecodedVolume::Source, v1::VolumeHeader::Source>(1, 0);
+}
+
+TEST(Convert, ReasonsHaveTheWiresNumbers) {
+  for (int value = 0; value <= 14; ++value) {
+    EXPECT_EQ(static_cast<int>(ToWire(static_cast<Reason>(value))), value);
+  }
+}
+
+display::Geometry Stack() {
+  display::PlanarStack stack;
+  stack.normal = display::PlanarStack::Normal::kY;
+  stack.width_px = 3;
+  stack.height_px = 4;
+  stack.pitch_u_mm = 0.5;
+  stack.pitch_v_mm = 0.25;
+  stack.positions_mm = {-1, 0.5, 2};
+  stack.thickness_mm = 7;
+  stack.mirror_v = true;
+  return {stack, {5, 6, 7, {1, 2, 3}, {-1, -2, -3}}};
+}
+
+TEST(Convert, GeometriesBothWays) {
+  v1::Geometry message;
+  ToWire(Stack(), &message);
+  absl::StatusOr<display::Geometry> back = FromWire(message);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(*back, Stack());
+
+  display::Rotor rotor;
+  rotor.slices_per_turn = 360;
+  rotor.width_px = 64;
+  rotor.height_px = 32;
+  rotor.clockwise = true;
+  rotor.panels = {{1, 2, 3, 4, 5, 0.25, true, false}, {0.5, 0.5, -3, 0, 0, 0.75, false, true}};
+  const display::Geometry spinning{rotor, {1, 2, 3, {1, 1, 1}, {0, 0, 0}}};
+  message.Clear();
+  ToWire(spinning, &message);
+  back = FromWire(message);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(*back, spinning);
+
+  EXPECT_TRUE(absl::IsInvalidArgument(FromWire(v1::Geometry()).status()));
+  message.mutable_planar_stack()->set_normal(static_cast<v1::PlanarStack::Normal>(2));
+  EXPECT_THAT(std::string(FromWire(message).status().message()), HasSubstr("planar_stack.normal"));
+
+  v1::FrameLayout layout;
+  const display::FrameLayout ours{3, 4, 5, 6, display::PixelFormat::kBitPlanes3};
+  ToWire(ours, &layout);
+  EXPECT_EQ(*FromWire(layout), ours);
+}
+
+TEST(Convert, ViewsBothWaysAndChecked) {
+  ViewOptions view;
+  view.box.emplace(display::Vec3{-1, -2, -3}, display::Vec3{1, 2, 3});
+  view.transform.m[3] = 5;
+  v1::View message;
+  ToWire(view, &message);
+  const absl::StatusOr<ViewOptions> back = FromWire(message);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(back->mode, ViewOptions::Mode::kFit);
+  EXPECT_EQ(back->box, view.box);
+  EXPECT_EQ(back->transform, view.transform);
+  for (const auto mode : {ViewOptions::Mode::kMillimetres, ViewOptions::Mode::kVoxels}) {
+    v1::View other;
+    ToWire(ViewOptions{.mode = mode}, &other);
+    EXPECT_EQ(FromWire(other)->mode, mode);
+  }
+
+  const auto refusal = [](const v1::View& wrong) {
+    return std::string(FromWire(wrong).status().message());
+  };
+  v1::View wrong = message;
+  wrong.set_mode(v1::View::VOXELS);
+  EXPECT_THAT(refusal(wrong), HasSubstr("view.box is set"));
+  wrong = message;
+  wrong.set_mode(static_cast<v1::View::Mode>(9));
+  EXPECT_THAT(refusal(wrong), HasSubstr("view.mode has the unknown value 9"));
+  wrong = message;
+  wrong.mutable_box()->mutable_max()->set_y(-2);
+  EXPECT_THAT(refusal(wrong), HasSubstr("view.box.max.y is -2"));
+  wrong = message;
+  wrong.mutable_box()->mutable_min()->set_z(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_THAT(refusal(wrong), HasSubstr("view.box.min.z is NaN"));
+  wrong = message;
+  wrong.mutable_transform()->add_m(1);
+  EXPECT_THAT(refusal(wrong), HasSubstr("view.transform.m has 13 values"));
+}
+
+TEST(Convert, DisplayUpdatesHoldWhatIsPresent) {
+  v1::UpdateDisplayRequest request;
+  absl::StatusOr<DisplayUpdate> update = FromWire(request);
+  ASSERT_TRUE(update.ok());
+  EXPECT_FALSE(update->brightness || update->blank || update->pattern || update->view);
+  request.set_brightness(0);
+  request.set_blank(false);
+  request.set_test_pattern(v1::TEST_PATTERN_AXES);
+  request.mutable_view()->set_mode(v1::View::VOXELS);
+  update = FromWire(request);
+  ASSERT_TRUE(update.ok()) << update.status();
+  EXPECT_EQ(update->brightness, 0);
+  EXPECT_EQ(update->blank, false);
+  EXPECT_EQ(update->pattern, TestPattern::kAxes);
+  EXPECT_EQ(update->view->mode, ViewOptions::Mode::kVoxels);
+  for (const double bad : {-0.1, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
+    request.set_brightness(bad);
+    EXPECT_THAT(std::string(FromWire(request).status().message()), HasSubstr("brightness is"));
+  }
+  request.set_brightness(1);
+  request.set_test_pattern(static_cast<v1::TestPattern>(77));
+  EXPECT_THAT(std::string(FromWire(request).status().message()), HasSubstr("test_pattern"));
+}
+
+TEST(Encode, ReceiptsOfEveryKind) {
+  v1::Receipt message;
+  Encode({4, 5, Accepted{6, 7, 8, {"a", "b"}}}, &message);
+  EXPECT_EQ(message.frame_id(), 4u);
+  EXPECT_EQ(message.sequence(), 5u);
+  EXPECT_EQ(message.accepted().snapshot(), 6u);
+  EXPECT_EQ(message.accepted().refused_operations(), 7u);
+  EXPECT_EQ(message.accepted().applied_time_ns(), 8);
+  EXPECT_THAT(message.accepted().displays(), ElementsAre("a", "b"));
+  Encode({4, 5, Refused{9, "why"}}, &message);
+  EXPECT_EQ(message.refused().refused_operations(), 9u);
+  EXPECT_EQ(message.refused().message(), "why");
+
+  CommitOutcome outcome;
+  outcome.display = "d";
+  outcome.kind = CommitOutcome::Kind::kPresented;
+  outcome.volume = 10;
+  outcome.time_ns = 11;
+  outcome.evidence = display::Evidence::kDevice;
+  outcome.last_byte_ns = 12;
+  Encode({4, 5, outcome}, &message);
+  EXPECT_EQ(message.outcome().display(), "d");
+  EXPECT_EQ(message.outcome().presented().volume(), 10u);
+  EXPECT_EQ(message.outcome().presented().time_ns(), 11);
+  EXPECT_EQ(message.outcome().presented().evidence(), v1::EVIDENCE_DEVICE);
+  EXPECT_EQ(message.outcome().presented().last_byte_ns(), 12);
+  outcome.kind = CommitOutcome::Kind::kUnchanged;
+  Encode({4, 5, outcome}, &message);
+  EXPECT_EQ(message.outcome().unchanged().volume(), 10u);
+  outcome.kind = CommitOutcome::Kind::kSuperseded;
+  outcome.by_frame_id = 13;
+  outcome.by_sequence = 14;
+  Encode({4, 5, outcome}, &message);
+  EXPECT_EQ(message.outcome().superseded().by_frame_id(), 13u);
+  EXPECT_EQ(message.outcome().superseded().by_sequence(), 14u);
+  outcome.kind = CommitOutcome::Kind::kLost;
+  outcome.reason = "gone";
+  Encode({4, 5, outcome}, &message);
+  EXPECT_EQ(message.outcome().lost().reason(), "gone");
+  outcome.kind = CommitOutcome::Kind::kNotShown;
+  outcome.why = CommitOutcome::NotShown::kHidden;
+  Encode({4, 5, outcome}, &message);
+  EXPECT_EQ(message.outcome().not_shown().why(), v1::NotShown::HIDDEN);
+}
+
+// The wire's messages of figures and limits have a field for each of ours: give each its own value
+// and see that no two of the message's are alike.
+template <typename Message>
+void ExpectAllDifferent(const Message& message) {
+  std::set<std::string> seen;
+  const auto* reflection = message.GetReflection();
+  const auto* descriptor = message.GetDescriptor();
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    const auto* field = descriptor->field(i);
+    if (field->is_repeated() || field->message_type() != nullptr) continue;
+    EXPECT_TRUE(reflection->HasField(message, field)) << field->full_name();
+    Message alone;
+    google::protobuf::Message* copy = alone.New();
+    copy->CopyFrom(message);
+    std::vector<const google::protobuf::FieldDescriptor*> others;
+    copy->GetReflection()->ListFields(*copy, &others);
+    for (const auto* other : others) {
+      if (other != field) copy->GetReflection()->ClearField(copy, other);
+    }
+    const std::string text = copy->ShortDebugString();
+    EXPECT_TRUE(seen.insert(text.substr(text.find(' '))).second) << text;
+    delete copy;
+  }
+}
+
+TEST(Encode, StatsHaveEveryFigure) {
+  Stats stats;
+  stats.time_ns = 1, stats.version = "v", stats.uptime_ns = 2, stats.sessions = 3;
+  stats.owners = 4, stats.layers = 5, stats.entities = 6, stats.objects = 7, stats.scene_bytes = 8;
+  stats.commits_accepted = 9, stats.commits_refused = 10, stats.operations_applied = 11;
+  stats.operations_refused = 12, stats.bytes_in = 13, stats.outcomes_undelivered = 14;
+  DisplayFigures& d = stats.displays.emplace_back();
+  d.name = "n", d.state = display::DisplayState::kShowing, d.engine = "e", d.engine_device = "d";
+  d.engine_reason = "r", d.lit_voxels = 21, d.volumes_drawn = 22, d.volumes_presented = 23;
+  d.volumes_replaced = 24, d.volumes_lost = 25, d.volumes_per_second = 26, d.bytes_out = 27;
+  d.slices_sent = 28, d.slices_resent = 29, d.underruns = 30, d.attaches = 31;
+  d.commits_owed = 32, d.commits_presented = 33, d.commits_unchanged = 34;
+  d.commits_superseded = 35, d.commits_lost = 36, d.commits_not_shown = 37, d.commits_pending = 38;
+  d.commit_to_last_byte = {41, 42, 43, 44}, d.commit_to_presented = {45, 46, 47, 48};
+  d.assemble = {49, 50, 51, 52}, d.slice = {53, 54, 55, 56};
+  v1::Stats message;
+  Encode(stats, &message);
+  ExpectAllDifferent(message);
+  ASSERT_EQ(message.displays_size(), 1);
+  ExpectAllDifferent(message.displays(0));
+  EXPECT_EQ(message.displays(0).commit_to_last_byte().p99_ns(), 43);
+  EXPECT_EQ(message.displays(0).commit_to_presented().count(), 45u);
+  EXPECT_EQ(message.displays(0).assemble().p50_ns(), 50);
+  EXPECT_EQ(message.displays(0).slice().max_ns(), 56);
+}
+
+TEST(Encode, LimitsHaveEveryField) {
+  Limits limits;
+  limits.max_uncommitted_bytes = 1, limits.max_present_at_horizon_ns = 2;
+  limits.max_operations_per_commit = 3;
+  v1::Limits message;
+  Encode(limits, &message);
+  EXPECT_EQ(message.max_id_bytes(), 256u);
+  const auto* descriptor = message.GetDescriptor();
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    EXPECT_TRUE(message.GetReflection()->HasField(message, descriptor->field(i)))
+        << descriptor->field(i)->name();
+  }
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::wire
