@@ -3,6 +3,7 @@
 // volume is seen.
 
 #include <map>
+#include <ostream>
 #include <set>
 #include <string>
 
@@ -21,6 +22,7 @@ struct Case {
   std::string name;
   std::map<std::string, std::string> options;
 };
+std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
 
 Fault RandomFault(std::mt19937& random) {
   const auto below = [&](uint64_t n) { return random() % n; };
@@ -98,7 +100,7 @@ class Torture : public testing::TestWithParam<Case> {
 
 TEST_P(Torture, NothingTornNothingStaleNothingForgotten) {
   int presented = 0, captured = 0;
-  for (uint32_t seed = 0; seed < 30; ++seed) {
+  for (uint32_t seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     by_light_.clear();
     last_shown_ = nullptr;
