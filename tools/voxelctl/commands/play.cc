@@ -41,6 +41,7 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
                         EscapeForTerminal(options.files[i]));
     absl::StatusOr<Model> model = ImportFile(options.files[i], {.globe = options.globe});
     if (model.ok()) {
+      if (!model->note.empty()) console.Say(EscapeForTerminal(model->note));
       models.push_back(*std::move(model));
     } else {
       errors.emplace_back(model.status().message());

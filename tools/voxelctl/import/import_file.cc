@@ -1,5 +1,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/import/geojson.h"
@@ -8,6 +9,7 @@
 #include "tools/voxelctl/import/mesh_checks.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_points.h"
+#include "tools/voxelctl/import/ply_realign.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -31,7 +33,19 @@ absl::StatusOr<Model> ReadMesh(const SourceFile& file, absl::Status checked) {
 
 absl::StatusOr<Model> ReadPly(const SourceFile& file) {
   const absl::StatusOr<PlyHeader> header = ParsePlyHeader(file);
-  if (!header.ok()) return header.status();
+  if (!header.ok()) {
+    const absl::StatusOr<PlyHeader> unchecked = ParsePlyHeader(file, PlyCounts::kUnchecked);
+    if (!unchecked.ok()) return header.status();
+    const std::optional<RealignedPly> mended = RealignPly(file, *unchecked);
+    if (!mended) return header.status();
+    absl::StatusOr<Model> model = ReadPlyPoints(mended->file, *unchecked);
+    if (model.ok()) {
+      model->note = absl::StrCat(file.path, ": was once copied as text and lost ",
+                                 mended->lost_bytes, " bytes; put in place again by its normals, ",
+                                 mended->lost_entries, " points could not be made out");
+    }
+    return model;
+  }
   const bool surfaces = header->Find("face") != nullptr || header->Find("tristrips") != nullptr;
   return surfaces ? ReadMesh(file, absl::OkStatus()) : ReadPlyPoints(file, *header);
 }

@@ -37,6 +37,7 @@ enum class Up : uint8_t { kAuto, kX, kY, kZ };
 struct Model {
   std::string path;
   std::string format;        // for people: "glTF binary", "PLY points"
+  std::string note;          // what people should know of how it was read; usually empty
   Up up = Up::kZ;            // the format's own; never kAuto
   bool globe = false;        // on the unit sphere about the origin, upright already
   bool lit_already = false;  // its colours carry their light (scans): no shading is baked into them

@@ -176,7 +176,7 @@ const PlyElement* PlyHeader::Find(absl::string_view name) const {
   return nullptr;
 }
 
-absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file) {
+absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts counts) {
   const absl::string_view text = absl::string_view(file.bytes).substr(0, kMaxHeaderBytes);
   PlyHeader header;
   bool formatted = false;
@@ -219,8 +219,10 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file) {
   if (!formatted)
     return FileError(file, "its header has no format", "\"format ascii 1.0\" is expected");
   header.body = at;
-  const absl::Status status = CheckCounts(file, header);
-  if (!status.ok()) return status;
+  if (counts == PlyCounts::kChecked) {
+    const absl::Status status = CheckCounts(file, header);
+    if (!status.ok()) return status;
+  }
   return header;
 }
 

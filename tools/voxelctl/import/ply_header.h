@@ -41,7 +41,9 @@ struct PlyHeader {
 };
 
 // InvalidArgument if it is not a PLY header, has no vertices with x, y and z, or announces more
-// data than the file can hold.
-absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file);
+// data than the file can hold (the last is not asked with kUnchecked).
+enum class PlyCounts : uint8_t { kChecked, kUnchecked };
+absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file,
+                                         PlyCounts counts = PlyCounts::kChecked);
 
 }  // namespace voxeld::voxelctl
