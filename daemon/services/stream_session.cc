@@ -1,5 +1,6 @@
 #include "daemon/services/stream_session.h"
 
+#include <string>
 #include <utility>
 #include <variant>
 
@@ -46,6 +47,7 @@ void StreamSession::TakeOpen(wire::Decoded decoded, uint64_t bytes) {
     if (first) {
       sequence_ = decoded.sequence;
       no_outcomes_ = decoded.open->no_outcomes;
+      client_name_ = decoded.open->client_name;
       state_ = State::kOpening;
     }
   }
@@ -83,6 +85,11 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
       state_ = State::kOpen;
       Queue(response);
       Read();
+      if (context_.log != nullptr) {
+        context_.log->Info("session opened", {{"session", std::to_string(session_)},
+                                              {"owner", std::to_string(info->owner)},
+                                              {"client", client_name_}});
+      }
     }
   }
   if (abandoned) CloseSession();
@@ -202,6 +209,11 @@ void StreamSession::CloseSession() {
   {
     sync::MutexLock lock(mutex_);
     session = session_;
+    if (context_.log != nullptr) {
+      context_.log->Info("session closed", {{"session", std::to_string(session)},
+                                            {"client", client_name_},
+                                            {"why", end_->ToString()}});
+    }
   }
   context_.core.CloseSession(session, [self = shared_from_this()] { self->OnClosed(); });
 }

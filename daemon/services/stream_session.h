@@ -103,6 +103,7 @@ class StreamSession final : public SessionSink,
   StreamPort* port_ VOXELD_GUARDED_BY(mutex_);
   State state_ VOXELD_GUARDED_BY(mutex_) = State::kNew;
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;  // 0: none
+  std::string client_name_ VOXELD_GUARDED_BY(mutex_);
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
   bool reading_ VOXELD_GUARDED_BY(mutex_) = false;
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;

@@ -1,0 +1,98 @@
+// A real daemon in this process: core, simulated displays, the gRPC server on a unix socket.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/core/core.h"
+#include "daemon/services/server.h"
+#include "display/sync/clock.h"
+#include "voxeld/v1/display.grpc.pb.h"
+#include "voxeld/v1/scene.grpc.pb.h"
+
+namespace voxeld::daemon::services {
+
+// No call of a test may take longer.
+inline void SetDeadline(grpc::ClientContext& context) {
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(60));
+}
+
+struct DaemonOptions {
+  Limits limits;
+  std::vector<std::string> displays = {"sim"};
+  sync::TimeNs drain_limit_ns = 30 * sync::kSecond;
+  size_t max_queued_answers = 16384;
+  bool stuck = false;  // displays that take volumes and never show one
+};
+
+class Daemon {
+ public:
+  explicit Daemon(DaemonOptions options = {});
+  ~Daemon();
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  const std::string& target() const { return target_; }
+  std::shared_ptr<grpc::Channel> NewChannel() const;  // a connection of its own
+  v1::SceneService::Stub& scene() { return *scene_; }
+  v1::DisplayService::Stub& displays() { return *displays_; }
+  Server& server() { return *server_; }
+  Core& core() { return *core_; }
+
+  v1::Stats Stats();
+  v1::ListEntitiesResponse Entities();
+  // Until the figures are as `right` wants them; false after a generous time.
+  bool Await(const std::function<bool(const v1::Stats&)>& right);
+
+ private:
+  const std::string folder_;
+  const std::string target_;
+  sync::SystemClock clock_;
+  std::unique_ptr<Core> core_;
+  std::unique_ptr<Server> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::SceneService::Stub> scene_;
+  std::unique_ptr<v1::DisplayService::Stub> displays_;
+};
+
+// One stream, written and read by the test's thread.
+class Client {
+ public:
+  explicit Client(v1::SceneService::Stub& stub) : call_(Begin(stub)) {}
+
+  // Sends Open and expects Opened.
+  v1::Opened Open(const v1::Open& open = {});
+  bool Send(const v1::StreamRequest& request) { return call_->Write(request); }
+  bool Commit(uint64_t frame_id);
+  void HalfClose() { call_->WritesDone(); }
+  void Cancel() { context_.TryCancel(); }
+
+  std::optional<v1::StreamResponse> Read();
+  // Reads until that many outcomes have come (and whatever comes with them).
+  void ReadOutcomes(size_t count);
+  // Reads to the end.
+  grpc::Status Finish();
+
+  // All that has been read.
+  std::vector<v1::Issue> issues;
+  std::vector<v1::Receipt> answers;  // Accepted and Refused
+  std::vector<v1::Receipt> outcomes;
+
+ private:
+  std::unique_ptr<grpc::ClientReaderWriter<v1::StreamRequest, v1::StreamResponse>> Begin(
+      v1::SceneService::Stub& stub);
+
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::StreamRequest, v1::StreamResponse>> call_;
+};
+
+v1::StreamRequest SphereIn(const std::string& layer, const std::string& id, double radius = 0.5);
+
+}  // namespace voxeld::daemon::services

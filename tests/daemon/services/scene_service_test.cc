@@ -1,0 +1,162 @@
+// SceneService's other calls against a real server.
+#include <gmock/gmock.h>
+
+#include "absl/strings/str_cat.h"
+#include "tests/daemon/services/daemon_fixture.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// One call, with its status and answer.
+template <typename Response, typename Method, typename Request>
+std::pair<grpc::Status, Response> Call(v1::SceneService::Stub& stub, Method method,
+                                       const Request& request) {
+  grpc::ClientContext context;
+  SetDeadline(context);
+  Response response;
+  grpc::Status status = (stub.*method)(&context, request, &response);
+  return {std::move(status), std::move(response)};
+}
+
+std::pair<grpc::Status, v1::ApplyUpdateResponse> Apply(Daemon& daemon,
+                                                       const v1::ApplyUpdateRequest& request) {
+  return Call<v1::ApplyUpdateResponse>(daemon.scene(), &v1::SceneService::Stub::ApplyUpdate,
+                                       request);
+}
+
+TEST(ApplyUpdate, IsKeptWithItsIssues) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest request;
+  *request.add_operations() = SphereIn("layer", "good");
+  *request.add_operations() = SphereIn("layer", "bad", -1);
+  const auto [status, response] = Apply(daemon, request);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_GT(response.snapshot(), 0u);
+  ASSERT_EQ(response.issues_size(), 1);
+  EXPECT_EQ(response.issues(0).field(), "operations[1].upsert.entity.primitive.sphere.radius");
+  const v1::ListEntitiesResponse entities = daemon.Entities();
+  ASSERT_EQ(entities.entities_size(), 1);
+  EXPECT_EQ(entities.entities(0).key().id(), "good");
+  EXPECT_EQ(entities.entities(0).kind(), "sphere");
+  ASSERT_EQ(entities.layers_size(), 1);
+  EXPECT_TRUE(entities.layers(0).orphaned());
+  EXPECT_EQ(daemon.Stats().sessions(), 0u);
+}
+
+TEST(ApplyUpdate, StrictIsRefusedWhole) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest request;
+  request.mutable_open()->set_strict(true);
+  *request.add_operations() = SphereIn("layer", "good");
+  *request.add_operations() = SphereIn("layer", "bad", -1);
+  const auto [status, response] = Apply(daemon, request);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("radius is -1"));
+  EXPECT_EQ(daemon.Entities().total(), 0u);
+}
+
+TEST(ApplyUpdate, RefusesWhatIsNoUpdate) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest request;
+  request.add_operations()->mutable_commit();
+  EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  request.Clear();
+  request.mutable_open()->set_flow(v1::FLOW_POLICY_LATEST);
+  EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+}
+
+TEST(ListEntities, InPages) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  for (int i = 0; i < 25; ++i) {
+    *update.add_operations() = SphereIn("layer", absl::StrCat("e", 100 + i));
+  }
+  ASSERT_TRUE(Apply(daemon, update).first.ok());
+  v1::ListEntitiesRequest request;
+  request.set_page_size(10);
+  std::vector<std::string> ids;
+  for (int page = 0; page < 3; ++page) {
+    const auto [status, response] = Call<v1::ListEntitiesResponse>(
+        daemon.scene(), &v1::SceneService::Stub::ListEntities, request);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(response.total(), 25u);
+    EXPECT_EQ(response.layers_size(), page == 0 ? 1 : 0);
+    for (const auto& entity : response.entities()) ids.push_back(entity.key().id());
+    request.set_page_token(response.next_page_token());
+    EXPECT_EQ(response.next_page_token().empty(), page == 2);
+  }
+  EXPECT_EQ(ids.size(), 25u);
+  EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end()));
+  request.Clear();
+  request.set_id_prefix("e12");
+  EXPECT_EQ(
+      Call<v1::ListEntitiesResponse>(daemon.scene(), &v1::SceneService::Stub::ListEntities, request)
+          .second.total(),
+      5u);
+}
+
+TEST(GetEntity, ByKeyOrNotFound) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  *update.add_operations() = SphereIn("layer", "ball");
+  update.mutable_operations(0)->mutable_upsert()->mutable_entity()->set_label("a ball");
+  ASSERT_TRUE(Apply(daemon, update).first.ok());
+  const auto get = [&](const std::string& layer, const std::string& id) {
+    v1::GetEntityRequest request;
+    request.mutable_key()->set_layer(layer);
+    request.mutable_key()->set_id(id);
+    return Call<v1::GetEntityResponse>(daemon.scene(), &v1::SceneService::Stub::GetEntity, request);
+  };
+  const auto found = get("layer", "ball");
+  ASSERT_TRUE(found.first.ok()) << found.first.error_message();
+  EXPECT_EQ(found.second.info().label(), "a ball");
+  const auto lost = get("layer", "cube");
+  EXPECT_EQ(lost.first.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(lost.first.error_message(), HasSubstr("cube"));
+  EXPECT_THAT(get("", "ball").first.error_message(), HasSubstr("key.layer is empty"));
+  EXPECT_THAT(get("layer", "").first.error_message(), HasSubstr("key.id is empty"));
+}
+
+TEST(ClearLayer, RemovesWhatMatches) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  *update.add_operations() = SphereIn("a", "1");
+  *update.add_operations() = SphereIn("a", "2");
+  *update.add_operations() = SphereIn("b", "3");
+  ASSERT_TRUE(Apply(daemon, update).first.ok());
+  v1::ClearLayerRequest request;
+  request.set_layer("a");
+  const auto [status, response] =
+      Call<v1::ClearLayerResponse>(daemon.scene(), &v1::SceneService::Stub::ClearLayer, request);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.entities(), 2u);
+  EXPECT_EQ(response.layers(), 1u);
+  EXPECT_EQ(daemon.Entities().total(), 1u);
+}
+
+TEST(SceneService, WhatIsNotImplementedSaysWhy) {
+  Daemon daemon;
+  grpc::ClientContext watch;
+  SetDeadline(watch);
+  const auto scene = daemon.scene().WatchScene(&watch, {});
+  v1::WatchSceneResponse event;
+  EXPECT_FALSE(scene->Read(&event));
+  grpc::Status status = scene->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("ListEntities"));
+
+  grpc::ClientContext upload;
+  SetDeadline(upload);
+  v1::UploadAssetResponse stored;
+  const auto asset = daemon.scene().UploadAsset(&upload, &stored);
+  asset->WritesDone();
+  status = asset->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("Upsert"));
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::services

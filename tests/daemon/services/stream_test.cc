@@ -1,0 +1,357 @@
+// SceneService.Stream against a real server.
+#include <gmock/gmock.h>
+
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "tests/daemon/services/daemon_fixture.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+TEST(Stream, OpensAppliesAndTellsWhatBecameOfIt) {
+  Daemon daemon({.displays = {"left", "right"}});
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_client_name("test");
+  const v1::Opened opened = client.Open(open);
+  EXPECT_GT(opened.session(), 0u);
+  EXPECT_GT(opened.owner(), 0u);
+  EXPECT_EQ(opened.server_version(), "9.8.7");
+  EXPECT_GT(opened.server_time_ns(), 0);
+  EXPECT_EQ(opened.credit_bytes(), 0u);
+  EXPECT_THAT(opened.displays(), ElementsAre("left", "right"));
+  EXPECT_EQ(opened.limits().max_id_bytes(), Limits().max_id_bytes);
+
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(17);
+  client.ReadOutcomes(2);
+  ASSERT_THAT(client.answers, SizeIs(1));
+  EXPECT_EQ(client.answers[0].frame_id(), 17u);
+  EXPECT_EQ(client.answers[0].sequence(), 3u);  // open, upsert, commit
+  EXPECT_THAT(client.answers[0].accepted().displays(), ElementsAre("left", "right"));
+  std::set<std::string> displays;
+  for (const v1::Receipt& receipt : client.outcomes) {
+    EXPECT_EQ(receipt.frame_id(), 17u);
+    EXPECT_TRUE(receipt.outcome().has_presented()) << receipt.ShortDebugString();
+    EXPECT_EQ(receipt.outcome().presented().evidence(), v1::EVIDENCE_DEVICE);
+    displays.insert(receipt.outcome().display());
+  }
+  EXPECT_THAT(displays, ElementsAre("left", "right"));
+  client.HalfClose();
+  const grpc::Status status = client.Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(daemon.Entities().total(), 0u) << "CLEAR is the default, and done when the call ends";
+  EXPECT_EQ(daemon.Stats().sessions(), 0u);
+}
+
+TEST(Stream, FirstMessageMustBeOpen) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Send(SphereIn("layer", "ball"));
+  const grpc::Status status = client.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_THAT(status.error_message(), HasSubstr("first message of a stream must be open"));
+
+  Client silent(daemon.scene());
+  silent.HalfClose();
+  EXPECT_EQ(silent.Finish().error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+}
+
+TEST(Stream, ASecondOpenIsAnIssue) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  v1::StreamRequest again;
+  again.mutable_open();
+  client.Send(again);
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  ASSERT_THAT(client.issues, SizeIs(1));
+  EXPECT_EQ(client.issues[0].reason(), v1::REASON_OUT_OF_ORDER);
+  EXPECT_EQ(client.issues[0].field(), "open");
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 1u);
+}
+
+TEST(Stream, ARefusedOpenEndsIt) {
+  Daemon daemon;
+  v1::StreamRequest request;
+  request.mutable_open()->set_resume_token("token");
+  Client client(daemon.scene());
+  client.Send(request);
+  grpc::Status status = client.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("open.resume_token is not implemented"));
+
+  Daemon full({.limits = {.max_sessions = 1}});
+  Client first(full.scene());
+  first.Open();
+  Client second(full.scene());
+  request.mutable_open()->Clear();
+  second.Send(request);
+  status = second.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("max_sessions"));
+}
+
+TEST(Stream, BadOperationsAreIssuesAndTheRestIsApplied) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  v1::StreamRequest batch;
+  for (int i = 0; i < 10'000; ++i) {
+    *batch.mutable_batch()->add_upserts() = SphereIn("layer", absl::StrCat(i)).upsert();
+  }
+  batch.mutable_batch()
+      ->mutable_upserts(4321)
+      ->mutable_entity()
+      ->mutable_primitive()
+      ->mutable_sphere()
+      ->set_radius(-1);
+  client.Send(batch);
+  v1::StreamRequest move;
+  move.mutable_set_transform()->set_layer("layer");
+  move.mutable_set_transform()->set_id("nobody");
+  client.Send(move);
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  ASSERT_THAT(client.issues, SizeIs(2));
+  EXPECT_EQ(client.issues[0].field(), "batch.upserts[4321].entity.primitive.sphere.radius");
+  EXPECT_EQ(client.issues[0].id(), "4321");
+  EXPECT_EQ(client.issues[0].sequence(), 2u);
+  EXPECT_EQ(client.issues[1].reason(), v1::REASON_NOT_FOUND);
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 2u);
+  EXPECT_EQ(daemon.Entities().total(), 9'999u);
+}
+
+TEST(Stream, StrictRefusesTheWholeCommit) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_strict(true);
+  client.Open(open);
+  client.Send(SphereIn("layer", "good"));
+  client.Send(SphereIn("layer", "bad", -1));
+  client.Commit(5);
+  client.Send(SphereIn("layer", "good"));
+  client.Commit(6);
+  client.ReadOutcomes(1);
+  ASSERT_THAT(client.answers, SizeIs(2));
+  EXPECT_EQ(client.answers[0].refused().refused_operations(), 1u);
+  EXPECT_THAT(client.answers[0].refused().message(), HasSubstr("radius"));
+  EXPECT_TRUE(client.answers[1].has_accepted());
+  EXPECT_EQ(client.outcomes[0].frame_id(), 6u);
+}
+
+TEST(Stream, OutOfOrderIsAnIssue) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  v1::StreamRequest end;
+  end.mutable_frame_end()->set_layer("layer");
+  client.Send(end);
+  v1::StreamRequest late = SphereIn("layer", "late");
+  late.set_sequence(1);
+  client.Send(late);
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  ASSERT_THAT(client.issues, SizeIs(2));
+  std::set<std::string> fields;
+  for (const v1::Issue& issue : client.issues) {
+    EXPECT_EQ(issue.reason(), v1::REASON_OUT_OF_ORDER) << issue.ShortDebugString();
+    fields.insert(issue.field());
+  }
+  EXPECT_TRUE(fields.contains("sequence"));
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 2u);
+}
+
+TEST(Stream, WhatIsNotImplementedSaysSo) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  v1::StreamRequest layer;
+  layer.mutable_layer_state()->set_layer("layer");
+  layer.mutable_layer_state()->mutable_clip();
+  client.Send(layer);
+  v1::StreamRequest commit;
+  commit.mutable_commit()->set_durable(true);
+  client.Send(commit);
+  client.ReadOutcomes(1);
+  ASSERT_THAT(client.issues, SizeIs(2));
+  EXPECT_EQ(client.issues[0].reason(), v1::REASON_UNIMPLEMENTED);
+  EXPECT_EQ(client.issues[0].field(), "layer_state.clip");
+  EXPECT_EQ(client.issues[1].field(), "commit.durable");
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 2u);
+}
+
+TEST(Stream, BytesThatAreNoRequestEndIt) {
+  Daemon daemon;
+  v1::StreamRequest request = SphereIn("layer", "ball");
+  request.mutable_upsert()->set_id("\xFF not UTF-8");
+  Client client(daemon.scene());
+  client.Open();
+  client.Send(request);
+  const grpc::Status status = client.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("UTF-8"));
+  EXPECT_TRUE(daemon.Await([](const v1::Stats& stats) { return stats.sessions() == 0; }));
+}
+
+TEST(Stream, TooGreatAMessageEndsIt) {
+  Daemon daemon({.limits = {.max_message_bytes = 5000}});
+  Client client(daemon.scene());
+  client.Open();
+  v1::StreamRequest request = SphereIn("layer", "ball");
+  request.mutable_upsert()->mutable_entity()->set_label(std::string(6000, 'x'));
+  client.Send(request);
+  EXPECT_EQ(client.Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(daemon.Await([](const v1::Stats& stats) { return stats.sessions() == 0; }));
+}
+
+TEST(Stream, HalfCloseDeliversWhatIsOwed) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  constexpr int kCommits = 50;
+  for (int i = 0; i < kCommits; ++i) {
+    client.Send(SphereIn("layer", "ball", 0.1 + 0.01 * i));
+    client.Commit(100 + i);
+  }
+  client.HalfClose();
+  const grpc::Status status = client.Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_THAT(client.answers, SizeIs(kCommits));
+  EXPECT_THAT(client.outcomes, SizeIs(kCommits));
+  std::set<uint64_t> frames;
+  for (const v1::Receipt& receipt : client.outcomes) frames.insert(receipt.frame_id());
+  EXPECT_THAT(frames, SizeIs(kCommits));
+  EXPECT_EQ(daemon.Stats().outcomes_undelivered(), 0u);
+}
+
+TEST(Stream, HalfCloseWaitsNoLongerThanItsLimit) {
+  Daemon daemon({.drain_limit_ns = 50 * sync::kMillisecond, .stuck = true});
+  Client client(daemon.scene());
+  client.Open();
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(1);
+  client.HalfClose();
+  const grpc::Status status = client.Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_THAT(client.answers, SizeIs(1));
+  EXPECT_THAT(client.outcomes, SizeIs(0));
+  const v1::Stats stats = daemon.Stats();
+  EXPECT_EQ(stats.sessions(), 0u);
+  EXPECT_EQ(stats.displays(0).commits_pending(), 1u);
+}
+
+TEST(Stream, WithoutOutcomesACommitIsAnsweredAlone) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_no_outcomes(true);
+  client.Open(open);
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(1);
+  client.HalfClose();
+  EXPECT_TRUE(client.Finish().ok());
+  EXPECT_THAT(client.answers, SizeIs(1));
+  EXPECT_THAT(client.outcomes, SizeIs(0));
+}
+
+TEST(Stream, AClientThatVanishesInMidFrameLeavesTheOthersAlone) {
+  Daemon daemon;
+  Client other(daemon.scene());
+  other.Open();
+  other.Send(SphereIn("theirs", "ball"));
+  other.Commit(1);
+  other.ReadOutcomes(1);
+  {
+    Client client(daemon.scene());
+    v1::Open open;
+    open.set_on_disconnect(v1::DISCONNECT_POLICY_KEEP);
+    client.Open(open);
+    client.Send(SphereIn("mine", "kept"));
+    client.Commit(1);
+    client.ReadOutcomes(1);
+    v1::StreamRequest begin;
+    begin.mutable_frame_begin()->set_layer("mine");
+    client.Send(begin);
+    client.Send(SphereIn("mine", "never"));
+    client.Cancel();
+    EXPECT_EQ(client.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+  EXPECT_TRUE(daemon.Await([](const v1::Stats& stats) { return stats.sessions() == 1; }));
+  std::set<std::string> ids;
+  const v1::ListEntitiesResponse entities = daemon.Entities();
+  for (const auto& entity : entities.entities()) {
+    ids.insert(absl::StrCat(entity.key().layer(), "/", entity.key().id()));
+  }
+  EXPECT_THAT(ids, ElementsAre("mine/kept", "theirs/ball"));
+  other.Send(SphereIn("theirs", "second"));
+  other.Commit(2);
+  other.ReadOutcomes(2);
+}
+
+TEST(Stream, SeveralClientsAtOnceAndSumsAreExact) {
+  Daemon daemon;
+  constexpr int kClients = 4, kCommits = 25;
+  std::vector<std::unique_ptr<Client>> clients;
+  for (int c = 0; c < kClients; ++c) {
+    clients.push_back(std::make_unique<Client>(daemon.scene()));
+    clients.back()->Open();
+  }
+  for (int i = 0; i < kCommits; ++i) {
+    for (auto& client : clients) {
+      client->Send(SphereIn("layer", "ball", 0.1 + 0.02 * i));
+      client->Commit(i);
+    }
+  }
+  for (auto& client : clients) client->ReadOutcomes(kCommits);
+  const v1::Stats stats = daemon.Stats();
+  EXPECT_EQ(stats.sessions(), static_cast<uint64_t>(kClients));
+  EXPECT_EQ(stats.entities(), static_cast<uint64_t>(kClients));
+  EXPECT_EQ(stats.commits_accepted(), static_cast<uint64_t>(kClients * kCommits));
+  const v1::DisplayStats& sim = stats.displays(0);
+  EXPECT_EQ(sim.commits_owed(), stats.commits_accepted());
+  EXPECT_EQ(sim.commits_owed(), sim.commits_presented() + sim.commits_unchanged() +
+                                    sim.commits_superseded() + sim.commits_lost() +
+                                    sim.commits_not_shown() + sim.commits_pending());
+  EXPECT_EQ(sim.commits_pending(), 0u);
+}
+
+TEST(Stream, AClientThatDoesNotReadIsEnded) {
+  Daemon daemon({.max_queued_answers = 100});
+  Client client(daemon.scene());
+  client.Open();
+  // Each commit is answered; none is read, until flow control stops the answers and the queue
+  // fills.
+  int sent = 0;
+  while (client.Commit(1) && sent < 1'000'000) ++sent;
+  EXPECT_LT(sent, 1'000'000);
+  EXPECT_EQ(daemon.server().streams_overrun(), 1u);
+  const grpc::Status status = client.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("unread"));
+  EXPECT_TRUE(daemon.Await([](const v1::Stats& stats) { return stats.sessions() == 0; }));
+}
+
+TEST(Stream, EndsWithUnavailableAtShutdown) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  daemon.server().Shutdown(10 * sync::kSecond);
+  const grpc::Status status = client.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(status.error_message(), "shutting down");
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::services
