@@ -19,8 +19,8 @@ bool IsSingular(const Drawable& d) {
 }
 
 // Raises the words of a tile to what its items cover.
-void DrawItems(const Drawable& d, std::span<const uint32_t> items, const Box3& box,
-               uint32_t* words) {
+void DrawItems(const Drawable& d, std::span<const uint32_t> items, const TileGrid& grid,
+               const Box3& box, uint32_t* words) {
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
   uint32_t rgb_before = 0;
@@ -30,12 +30,28 @@ void DrawItems(const Drawable& d, std::span<const uint32_t> items, const Box3& b
       rgb_before = rgb;
       word = MakeWord(priority, erase, rgb);
     }
-    uint32_t& at = words[IndexInTile(x, y, z)];
+    uint32_t& at = words[grid.IndexInTile(x, y, z)];
     at = std::max(at, word);
   };
   WithPrimitive(d.source.record->kind, [&](auto primitive) {
     for (uint32_t item : items) decltype(primitive)::type::EmitVoxels(d.source, item, box, raise);
   });
+}
+
+// Puts a layer's words over the colours of a tile.
+void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
+  if (layer.blend == BlendMode::kOver && layer.opacity == 255) {
+    // The commonest case, without branches.
+    for (size_t v = 0; v < kTileVoxels; ++v) {
+      const uint32_t word = words[v];
+      const uint32_t covered = (word & kEraseBit) != 0 || word == 0 ? 0 : ~uint32_t{0};
+      colors[v] = (word & kColorMask & covered) | (colors[v] & ~covered);
+    }
+    return;
+  }
+  for (size_t v = 0; v < kTileVoxels; ++v) {
+    if (words[v] != 0) colors[v] = BlendLayer(colors[v], words[v], layer.blend, layer.opacity);
+  }
 }
 
 }  // namespace
@@ -211,14 +227,9 @@ uint32_t Volume::DrawTile(uint32_t tile, Scratch& scratch) const {
     scratch.words.assign(kTileVoxels, 0);
     for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
       const Entry& e = scratch.entries[i];
-      DrawItems(*e.drawable, e.drawable->bins.row(e.row), box, scratch.words.data());
+      DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, scratch.words.data());
     }
-    const BlendMode mode = layer.record.blend;
-    const uint32_t opacity = layer.record.opacity;
-    for (size_t v = 0; v < kTileVoxels; ++v) {
-      if (scratch.words[v] == 0) continue;
-      scratch.colors[v] = BlendLayer(scratch.colors[v], scratch.words[v], mode, opacity);
-    }
+    BlendTile(layer.record, scratch.words.data(), scratch.colors.data());
   }
   return static_cast<uint32_t>(kTileVoxels -
                                std::count(scratch.colors.begin(), scratch.colors.end(), 0u));

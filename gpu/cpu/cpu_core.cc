@@ -77,8 +77,8 @@ CpuCore::CpuCore(std::unique_ptr<Executor> executor, SlicePart part)
 absl::Status CpuCore::SetTarget(Target target) {
   if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;
   const display::VoxelGrid& voxels = target.geometry.grid;
-  const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz);
   display::FootprintTable table = display::BuildFootprints(target.geometry, target.tone.sampling);
+  const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz, Sampler::FastestAxis(table));
   display::TileToSlices tile_to_slices(table, voxels, kTileSize, kTileSize, kTileSize);
   absl::StatusOr<Sampler> sampler = Sampler::Create(std::move(table), grid, target.tone.sampling);
   if (!sampler.ok()) return sampler.status();
@@ -174,9 +174,8 @@ absl::Status CpuCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
       for (int32_t x = box.x0; x < box.x1; ++x, ++i) {
         out[i] = 0;
         if (!Contains(volume, x, y, z)) continue;
-        const uint32_t* colors =
-            tiles.colors(grid.Index(x / kTileSize, y / kTileSize, z / kTileSize));
-        if (colors != nullptr) out[i] = Deinterleave(colors[IndexInTile(x, y, z)]);
+        const uint32_t* colors = tiles.colors(grid.TileOf(x, y, z));
+        if (colors != nullptr) out[i] = Deinterleave(colors[grid.IndexInTile(x, y, z)]);
       }
     }
   }

@@ -6,15 +6,24 @@
 
 namespace voxeld::gpu {
 
-inline constexpr int32_t kTileSize = 16;
+inline constexpr uint32_t kTileBits = 4;
+inline constexpr int32_t kTileSize = 1 << kTileBits;
 inline constexpr int32_t kTileVoxels = kTileSize * kTileSize * kTileSize;
 
 struct TileGrid {
   int32_t voxels[3] = {};  // the volume; its last tiles may stand over
   int32_t tiles[3] = {};
+  // Of a tile's memory: an axis' coordinate counts 2^shift words. Whatever walks along an axis is
+  // best off if that one comes first.
+  uint32_t shift[3] = {};
 
-  VOXELD_HD static TileGrid Of(int32_t nx, int32_t ny, int32_t nz) {
+  VOXELD_HD static TileGrid Of(int32_t nx, int32_t ny, int32_t nz, int fastest_axis = 0) {
     TileGrid g;
+    uint32_t next = kTileBits;
+    for (int a = 0; a < 3; ++a) {
+      g.shift[a] = a == fastest_axis ? 0 : next;
+      if (a != fastest_axis) next += kTileBits;
+    }
     const int32_t n[3] = {nx, ny, nz};
     for (int a = 0; a < 3; ++a) {
       g.voxels[a] = n[a];
@@ -36,6 +45,16 @@ struct TileGrid {
     tile /= static_cast<uint32_t>(tiles[0]);
     ijk[1] = static_cast<int32_t>(tile % static_cast<uint32_t>(tiles[1]));
     ijk[2] = static_cast<int32_t>(tile / static_cast<uint32_t>(tiles[1]));
+  }
+  // Where a voxel lies in its tile's memory.
+  VOXELD_HD uint32_t IndexInTile(int32_t x, int32_t y, int32_t z) const {
+    constexpr uint32_t kMask = kTileSize - 1;
+    return (static_cast<uint32_t>(x) & kMask) << shift[0] |
+           (static_cast<uint32_t>(y) & kMask) << shift[1] |
+           (static_cast<uint32_t>(z) & kMask) << shift[2];
+  }
+  VOXELD_HD uint32_t TileOf(int32_t x, int32_t y, int32_t z) const {
+    return Index(x / kTileSize, y / kTileSize, z / kTileSize);
   }
   // Its voxels inside the volume.
   VOXELD_HD Box3 VoxelsOf(uint32_t tile) const {
@@ -59,14 +78,6 @@ struct TileGrid {
     return t;
   }
 };
-
-// A position of a voxel's in a tile's memory.
-VOXELD_HD inline uint32_t IndexInTile(int32_t x, int32_t y, int32_t z) {
-  constexpr uint32_t kMask = kTileSize - 1;
-  return ((static_cast<uint32_t>(z) & kMask) * kTileSize + (static_cast<uint32_t>(y) & kMask)) *
-             kTileSize +
-         (static_cast<uint32_t>(x) & kMask);
-}
 
 // Every tile that `box` touches.
 template <class Emit>

@@ -24,9 +24,8 @@ struct Points {
     const Line point = ItemOf(source, i);
     if (source.radius > 0) return EmitTilesOfLine(point, source.radius, grid, emit);
     const Box3 volume{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
-    EmitVoxelOf(point.s, 0, volume, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
-      emit(grid.Index(x / kTileSize, y / kTileSize, z / kTileSize));
-    });
+    EmitVoxelOf(point.s, 0, volume,
+                [&](int32_t x, int32_t y, int32_t z, uint32_t) { emit(grid.TileOf(x, y, z)); });
   }
 
   template <class Emit>

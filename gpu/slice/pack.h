@@ -15,7 +15,7 @@ struct Levels {
   uint32_t r, g, b;
 };
 
-VOXELD_HD inline Levels LevelsOf(display::PixelFormat format) {
+VOXELD_HD constexpr Levels LevelsOf(display::PixelFormat format) {
   switch (format) {
     case display::PixelFormat::kRgb888:
       return {256, 256, 256};

@@ -41,20 +41,38 @@ void Pictures::MarkSlices(const TileStore& tiles, const Volume::Changes& changes
   }
 }
 
-void Pictures::Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
+template <display::PixelFormat kFormat>
+void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
   const display::FrameLayout& layout = plan_->layout;
   const display::Tone& tone = plan_->tone;
   const uint32_t width = static_cast<uint32_t>(layout.width);
   const uint32_t height = static_cast<uint32_t>(layout.height);
-  const uint32_t sub_frames = static_cast<uint32_t>(layout.sub_frames);
-  const Levels levels = LevelsOf(layout.format);
+  constexpr Levels kLevels = LevelsOf(kFormat);
+  uint32_t thresholds[8][8];  // they repeat every 8 pixels
+  for (uint32_t v = 0; v < 8; ++v) {
+    for (uint32_t u = 0; u < 8; ++u) {
+      thresholds[v][u] =
+          Threshold(tone.dither, u, v, sub, static_cast<uint32_t>(layout.sub_frames));
+    }
+  }
   for (uint32_t i : pixels.lit) {
     const uint32_t u = i % width, v = i / width, rgb = pixels.rgb[i];
-    const uint32_t threshold = Threshold(tone.dither, u, v, sub, sub_frames);
-    const Levels q = {Quantize(tone.lut[rgb >> 16], levels.r, threshold),
-                      Quantize(tone.lut[(rgb >> 8) & 0xFF], levels.g, threshold),
-                      Quantize(tone.lut[rgb & 0xFF], levels.b, threshold)};
-    PackPixel(layout.format, width, height, u, v, q, picture);
+    const uint32_t threshold = thresholds[v % 8][u % 8];
+    const Levels q = {Quantize(tone.lut[rgb >> 16], kLevels.r, threshold),
+                      Quantize(tone.lut[(rgb >> 8) & 0xFF], kLevels.g, threshold),
+                      Quantize(tone.lut[rgb & 0xFF], kLevels.b, threshold)};
+    PackPixel(kFormat, width, height, u, v, q, picture);
+  }
+}
+
+void Pictures::Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
+  switch (plan_->layout.format) {
+    case display::PixelFormat::kRgb888:
+      return PackAs<display::PixelFormat::kRgb888>(pixels, sub, picture);
+    case display::PixelFormat::kRgb332:
+      return PackAs<display::PixelFormat::kRgb332>(pixels, sub, picture);
+    case display::PixelFormat::kBitPlanes3:
+      return PackAs<display::PixelFormat::kBitPlanes3>(pixels, sub, picture);
   }
 }
 

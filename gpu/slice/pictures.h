@@ -54,6 +54,8 @@ class Pictures {
   uint8_t* picture(size_t index) { return bytes_.data() + index * plan_->layout.bytes_per_slice(); }
   void MarkSlices(const TileStore& tiles, const Volume::Changes& changes);
   bool DrawSlice(const TileStore& tiles, int32_t slice, uint64_t frame, Scratch& scratch);
+  template <display::PixelFormat kFormat>
+  void PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
   void Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
 
   Executor& executor_;

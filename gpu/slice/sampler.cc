@@ -27,12 +27,17 @@ Offset Greatest(const display::FootprintLists& lists) {
 }  // namespace
 
 void SlicePixels::Clear(size_t pixels) {
-  if (rgb.size() != pixels) {
+  if (rgb.size() != pixels || lit.size() > pixels / 8) {
     rgb.assign(pixels, 0);
   } else {
     for (uint32_t i : lit) rgb[i] = 0;
   }
   lit.clear();
+}
+
+int Sampler::FastestAxis(const display::FootprintTable& table) {
+  const Offset reach = Greatest(table.inner);
+  return static_cast<int>(std::max_element(reach.begin(), reach.end()) - reach.begin());
 }
 
 absl::StatusOr<Sampler> Sampler::Create(display::FootprintTable table, const TileGrid& grid,
@@ -80,72 +85,81 @@ void Sampler::BuildInner() {
   }
 }
 
+std::span<const display::FootprintEntry> Sampler::Outer(int32_t slice, uint32_t u) const {
+  return table_.outer.list(static_cast<size_t>(slice) * static_cast<size_t>(table_.width) + u);
+}
+
 // Raises line[place] to the colours of the voxels outer + inner; false if none is lit.
 bool Sampler::Gather(const TileStore& tiles, const display::FootprintEntry& outer,
                      uint32_t* line) const {
-  constexpr uint32_t kStride[3] = {1, kTileSize, kTileSize * kTileSize};
   const TileGrid& grid = tiles.grid();
-  bool any = false;
+  uint32_t seen = 0;
   for (const Run& run : runs_) {
     int32_t at[3] = {run.at[0] + outer.x, run.at[1] + outer.y, run.at[2] + outer.z};
-    const uint32_t stride = kStride[run.axis];
+    const uint32_t shift = grid.shift[run.axis];
     uint32_t* to = line + run.place;
     for (int32_t left = run.length; left > 0;) {
       const int32_t count = std::min(left, kTileSize - at[run.axis] % kTileSize);
-      const uint32_t* colors =
-          tiles.colors(grid.Index(at[0] / kTileSize, at[1] / kTileSize, at[2] / kTileSize));
-      if (colors != nullptr) {
-        const uint32_t* from = colors + IndexInTile(at[0], at[1], at[2]);
-        uint32_t seen = 0;
+      if (const uint32_t* colors = tiles.colors(grid.TileOf(at[0], at[1], at[2]))) {
+        const uint32_t* from = colors + grid.IndexInTile(at[0], at[1], at[2]);
         for (int32_t i = 0; i < count; ++i) {
-          const uint32_t c = from[static_cast<uint32_t>(i) * stride];
+          const uint32_t c = from[static_cast<uint32_t>(i) << shift];
           to[i] = std::max(to[i], c);
           seen |= c;
         }
-        any |= seen != 0;
       }
       at[run.axis] += count;
       to += count;
       left -= count;
     }
   }
-  return any;
+  return seen != 0;
 }
 
-// The greatest of a product of lists is the greatest, over the inner list, of the greatest over the
-// outer.
-void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const {
+// Of kColumns columns from u0 on, or as many as there are. The greatest of a product of lists is
+// the greatest, over the inner list, of the greatest over the outer.
+void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
+                        SlicePixels& out) const {
   const uint32_t width = static_cast<uint32_t>(table_.width);
-  bool any = false;
-  std::fill(out.line.begin(), out.line.end(), 0);
-  for (const display::FootprintEntry& outer :
-       table_.outer.list(static_cast<size_t>(slice) * width + u)) {
-    any |= Gather(tiles, outer, out.line.data());
-  }
-  if (!any) return;
-  for (uint32_t v = 0; v < static_cast<uint32_t>(table_.height); ++v) {
-    uint32_t greatest = 0;
-    for (uint32_t i = table_.inner.begin[v]; i < table_.inner.begin[v + 1]; ++i) {
-      greatest = std::max(greatest, out.line[inner_[i].place]);
+  const uint32_t columns = std::min(kColumns, width - u0);
+  uint32_t* const lines = out.lines.data();
+  uint32_t lit[kColumns], lit_count = 0;  // columns that have any light
+  for (uint32_t j = 0; j < columns; ++j) {
+    uint32_t* const line = lines + j * places_;
+    std::fill(line, line + places_, 0);
+    bool any = false;
+    for (const display::FootprintEntry& outer : Outer(slice, u0 + j)) {
+      any |= Gather(tiles, outer, line);
     }
-    if (greatest == 0) continue;
-    out.rgb[v * width + u] = Deinterleave(greatest);
-    out.lit.push_back(v * width + u);
+    if (any) lit[lit_count++] = j;
+  }
+  if (lit_count == 0) return;
+  for (uint32_t v = 0; v < static_cast<uint32_t>(table_.height); ++v) {
+    const std::span<const InnerEntry> inner = std::span(inner_).subspan(
+        table_.inner.begin[v], table_.inner.begin[v + 1] - table_.inner.begin[v]);
+    for (uint32_t n = 0; n < lit_count; ++n) {
+      const uint32_t* line = lines + lit[n] * places_;
+      uint32_t greatest = 0;
+      for (const InnerEntry& e : inner) greatest = std::max(greatest, line[e.place]);
+      if (greatest == 0) continue;
+      const uint32_t pixel = v * width + u0 + lit[n];
+      out.rgb[pixel] = Deinterleave(greatest);
+      out.lit.push_back(pixel);
+    }
   }
 }
 
 void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
                              SlicePixels& out) const {
   const uint32_t width = static_cast<uint32_t>(table_.width);
-  for (const display::FootprintEntry& outer :
-       table_.outer.list(static_cast<size_t>(slice) * width + u)) {
-    std::fill(out.line.begin(), out.line.end(), 0);
-    if (!Gather(tiles, outer, out.line.data())) continue;
+  for (const display::FootprintEntry& outer : Outer(slice, u)) {
+    std::fill(out.lines.begin(), out.lines.end(), 0);
+    if (!Gather(tiles, outer, out.lines.data())) continue;
     for (uint32_t v = 0; v < static_cast<uint32_t>(table_.height); ++v) {
       uint32_t& rgb = out.rgb[v * width + u];
       const uint32_t before = rgb;
       for (uint32_t i = table_.inner.begin[v]; i < table_.inner.begin[v + 1]; ++i) {
-        const uint32_t color = out.line[inner_[i].place];
+        const uint32_t color = out.lines[inner_[i].place];
         if (color == 0) continue;
         rgb = RaiseWeighted(rgb, FootprintWeight(outer.weight, inner_[i].weight),
                             Deinterleave(color));
@@ -156,13 +170,13 @@ void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
 }
 
 void Sampler::Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const {
-  out.line.resize(places_);
-  for (uint32_t u = 0; u < static_cast<uint32_t>(table_.width); ++u) {
-    if (sampling_ == display::Sampling::kWeighted) {
-      SampleWeighted(tiles, slice, u, out);
-    } else {
-      SampleMax(tiles, slice, u, out);
-    }
+  const uint32_t width = static_cast<uint32_t>(table_.width);
+  if (sampling_ == display::Sampling::kWeighted) {
+    out.lines.resize(places_);
+    for (uint32_t u = 0; u < width; ++u) SampleWeighted(tiles, slice, u, out);
+  } else {
+    out.lines.resize(places_ * kColumns);
+    for (uint32_t u = 0; u < width; u += kColumns) SampleMax(tiles, slice, u, out);
   }
 }
 

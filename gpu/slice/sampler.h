@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -14,8 +15,8 @@ namespace voxeld::gpu {
 // A slice's pixels. `rgb` is 0x00RRGGBB, row-major; only pixels in `lit` may differ from 0.
 struct SlicePixels {
   std::vector<uint32_t> rgb;
-  std::vector<uint32_t> lit;   // indices
-  std::vector<uint32_t> line;  // scratch of the sampler's
+  std::vector<uint32_t> lit;    // indices
+  std::vector<uint32_t> lines;  // scratch of the sampler's: kColumns of them
 
   void Clear(size_t pixels);
 };
@@ -23,6 +24,11 @@ struct SlicePixels {
 // Immutable; used by any number of threads.
 class Sampler {
  public:
+  static constexpr uint32_t kColumns = 8;  // sampled together, so that pixels are written in runs
+
+  // The axis along which inner lists run: tiles are best laid out with it first.
+  static int FastestAxis(const display::FootprintTable& table);
+
   // Internal if the table names a voxel outside `grid`.
   static absl::StatusOr<Sampler> Create(display::FootprintTable table, const TileGrid& grid,
                                         display::Sampling sampling);
@@ -47,7 +53,8 @@ class Sampler {
   Sampler() = default;
   void BuildInner();
   bool Gather(const TileStore& tiles, const display::FootprintEntry& outer, uint32_t* line) const;
-  void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
+  std::span<const display::FootprintEntry> Outer(int32_t slice, uint32_t u) const;
+  void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0, SlicePixels& out) const;
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 
   display::FootprintTable table_;

@@ -122,12 +122,12 @@ TileStore HandTiles(uint32_t at_1, uint32_t at_17, uint32_t at_17_above) {
   TileStore tiles;
   tiles.Reset(TileGrid::Of(20, 8, 4));
   std::vector<uint32_t> colors(kTileVoxels, 0);
-  colors[IndexInTile(1, 2, 0)] = Interleave(at_1);
+  colors[tiles.grid().IndexInTile(1, 2, 0)] = Interleave(at_1);
   EXPECT_TRUE(tiles.Set(0, colors.data(), 1));
   EXPECT_FALSE(tiles.Set(0, colors.data(), 1));
   colors.assign(kTileVoxels, 0);
-  colors[IndexInTile(17, 2, 0)] = Interleave(at_17);
-  colors[IndexInTile(17, 2, 1)] = Interleave(at_17_above);
+  colors[tiles.grid().IndexInTile(17, 2, 0)] = Interleave(at_17);
+  colors[tiles.grid().IndexInTile(17, 2, 1)] = Interleave(at_17_above);
   EXPECT_TRUE(tiles.Set(1, colors.data(), 2));
   return tiles;
 }
