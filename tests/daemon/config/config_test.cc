@@ -1,0 +1,334 @@
+#include "daemon/config/config.h"
+
+#include <gmock/gmock.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/config/suggest.h"
+
+namespace voxeld::daemon {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Pair;
+using ::testing::SizeIs;
+using ::testing::UnorderedElementsAre;
+
+Environment Variables(std::map<std::string, std::string> variables) {
+  return [variables = std::move(variables)](const char* name) -> std::optional<std::string> {
+    const auto it = variables.find(name);
+    if (it == variables.end()) return {};
+    return it->second;
+  };
+}
+
+TEST(ConfigText, EverythingCanBeSet) {
+  Config config;
+  const absl::Status status = ReadConfigText(R"(
+[server]
+listen = ["[::1]:7", "unix:/run/x.sock"]
+http = "off"
+max_queued_answers = 100
+max_http_connections = 3
+[engine]
+kind = "cpu"
+threads = 5
+staging_limit_bytes = 2_097_152
+[log]
+level = "warn"
+format = "json"
+[limits]
+max_message_bytes = 0x10000
+max_coordinate_voxels = 1024
+max_id_bytes = 7
+[[display]]
+name = "rotor"
+driver = "simulated"
+geometry = "rotor"
+slices = 360
+eccentricity = [13.5, 0.375]
+mirror = true
+[[display]]
+name = "other"
+driver = "simulated"
+)",
+                                             "test.toml", &config);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(config.file, "test.toml");
+  ASSERT_THAT(config.server.listen, SizeIs(2));
+  EXPECT_EQ(config.server.listen[0].host, "::1");
+  EXPECT_EQ(config.server.listen[1].path, "/run/x.sock");
+  EXPECT_FALSE(config.server.http.has_value());
+  EXPECT_TRUE(config.server.http_asked);
+  EXPECT_EQ(config.server.max_queued_answers, 100u);
+  EXPECT_EQ(config.server.max_http_connections, 3u);
+  EXPECT_EQ(config.engine.kind, gpu::EngineKind::kCpu);
+  EXPECT_EQ(config.engine.threads, 5u);
+  EXPECT_EQ(config.engine.staging_limit_bytes, 2097152u);
+  EXPECT_EQ(config.log.level, "warn");
+  EXPECT_EQ(config.log.format, "json");
+  EXPECT_EQ(config.limits.max_message_bytes, 65536u);
+  EXPECT_EQ(config.limits.max_coordinate_voxels, 1024);
+  EXPECT_EQ(config.limits.max_id_bytes, 7u);
+  EXPECT_EQ(config.limits.max_sessions, Limits().max_sessions);
+  ASSERT_THAT(config.displays, SizeIs(2));
+  EXPECT_EQ(config.displays[0].name, "rotor");
+  EXPECT_EQ(config.displays[0].driver, "simulated");
+  EXPECT_THAT(config.displays[0].options,
+              UnorderedElementsAre(Pair("geometry", "rotor"), Pair("slices", "360"),
+                                   Pair("eccentricity", "13.5;0.375"), Pair("mirror", "true")));
+  EXPECT_EQ(config.displays[0].source, "test.toml:18:1");
+}
+
+struct Case {
+  const char* name;
+  const char* text;
+  const char* where;
+  const char* what;
+};
+
+const Case kCases[] = {
+    {"syntax", "[server\n", "t:1:8: ", ""},
+    {"section", "\n[sever]\n", "t:2:2: ", "unknown key sever; did you mean server?"},
+    {"key", "[limits]\nmax_sesions = 3\n",
+     "t:2:1: ", "unknown key limits.max_sesions; did you mean max_sessions?"},
+    {"key_unlike", "[log]\nzebra = 3\n", "t:2:1: ", "known are level, format"},
+    {"no_table", "log = 3\n", "t:1:7: ", "log is 3; write [log]"},
+    {"integer_type", "[limits]\nmax_sessions = \"3\"\n",
+     "t:2:16: ", "give an integer from 1 to 4294967295"},
+    {"integer_low", "[limits]\n  max_sessions = 0\n", "t:2:18: ", "limits.max_sessions is 0"},
+    {"integer_high", "[limits]\nmax_instance_depth = 9\n", "t:2:22: ", "from 1 to 8"},
+    {"real_type", "[limits]\nmax_coordinate_voxels = true\n", "t:2:25: ", "is true; give a number"},
+    {"real_nan", "[limits]\nmax_coordinate_voxels = nan\n", "t:2:25: ", "is nan; give a number"},
+    {"choice", "[log]\nlevel = \"wran\"\n", "t:2:9: ", "log.level is \"wran\"; did you mean warn?"},
+    {"text_type", "[log]\nformat = 1\n", "t:2:10: ", "log.format is 1; give text in quotes"},
+    {"engine", "[engine]\nkind = \"gpu\"\n", "t:2:8: ", "engine.kind is \"gpu\""},
+    {"listen_type", "[server]\nlisten = \"127.0.0.1:1\"\n", "t:2:10: ", "give an array"},
+    {"listen_empty", "[server]\nlisten = []\n", "t:2:10: ", "give an array"},
+    {"listen_item", "[server]\nlisten = [\"127.0.0.1:1\", 3]\n", "t:2:26: ", "addresses as text"},
+    {"listen_address", "[server]\nlisten = [\"nowhere\"]\n", "t:2:11: ", "has no port"},
+    {"http", "[server]\nhttp = \"127.0.0.1\"\n", "t:2:8: ", "has no port"},
+    {"display_type", "display = 3\n", "t:1:11: ", "write [[display]]"},
+    {"display_table", "[display]\nname = \"a\"\n", "t:1:1: ", "write [[display]]"},
+    {"display_nameless", "\n[[display]]\ndriver = \"d\"\n", "t:2:1: ", "a display without name"},
+    {"display_driverless", "[[display]]\nname = \"a\"\n", "t:1:1: ", "a display without driver"},
+    {"display_name", "[[display]]\nname = \"a b\"\ndriver = \"d\"\n", "t:2:8: ", "\"a b\" is not"},
+    {"display_twice",
+     "[[display]]\nname=\"a\"\ndriver=\"d\"\n[[display]]\nname=\"a\"\ndriver=\"d\"\n",
+     "t:4:1: ", "two displays named \"a\""},
+    {"display_option", "[[display]]\nname=\"a\"\ndriver=\"d\"\nwhen = 2001-01-01\n",
+     "t:4:8: ", "display.when is no text"},
+};
+
+class WrongConfig : public ::testing::TestWithParam<Case> {};
+
+TEST_P(WrongConfig, SaysWhereAndWhat) {
+  Config config;
+  const absl::Status status = ReadConfigText(GetParam().text, "t", &config);
+  ASSERT_TRUE(absl::IsInvalidArgument(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr(GetParam().where));
+  EXPECT_THAT(std::string(status.message()), HasSubstr(GetParam().what));
+}
+
+INSTANTIATE_TEST_SUITE_P(File, WrongConfig, ::testing::ValuesIn(kCases),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST(ConfigText, TellsEveryFault) {
+  Config config;
+  const absl::Status status =
+      ReadConfigText("[log]\nlevel = 1\nformat = 2\n[limits]\nnope = 1\n", "t", &config);
+  const std::string message(status.message());
+  EXPECT_THAT(message, HasSubstr("t:2:9: "));
+  EXPECT_THAT(message, HasSubstr("t:3:10: "));
+  EXPECT_THAT(message, HasSubstr("t:5:1: "));
+}
+
+TEST(ConfigText, PrintsWhatReadsBackTheSame) {
+  Config config;
+  ASSERT_TRUE(ReadConfigText("[limits]\nmax_coordinate_voxels = 0.5e3\n[[display]]\nname = \"a\"\n"
+                             "driver = \"d\"\n\"odd key\" = \"say \\\"x\\\"\"\n",
+                             "t", &config)
+                  .ok());
+  config.server.listen = {*ParseAddress("127.0.0.1:1"), *ParseAddress("unix:/a b")};
+  const std::string text = ToToml(config);
+  Config again;
+  const absl::Status status = ReadConfigText(text, "t", &again);
+  ASSERT_TRUE(status.ok()) << status << "\n" << text;
+  EXPECT_EQ(ToToml(again), text);
+  EXPECT_EQ(again.limits.max_coordinate_voxels, 500);
+  EXPECT_EQ(again.server.listen, config.server.listen);
+  EXPECT_EQ(again.displays[0].options, config.displays[0].options);
+}
+
+TEST(FindConfigFile, PrefersTheUsersOwn) {
+  std::set<std::string> files;
+  const auto exists = [&files](const std::string& path) { return files.contains(path); };
+  const Environment both = Variables({{"XDG_CONFIG_HOME", "/xdg"}, {"HOME", "/home/me"}});
+  EXPECT_EQ(FindConfigFile(both, exists), "");
+  files = {"/etc/voxeld/voxeld.toml"};
+  EXPECT_EQ(FindConfigFile(both, exists), "/etc/voxeld/voxeld.toml");
+  EXPECT_EQ(FindConfigFile(Variables({}), exists), "/etc/voxeld/voxeld.toml");
+  files.insert("/home/me/.config/voxeld/voxeld.toml");
+  EXPECT_EQ(FindConfigFile(both, exists), "/etc/voxeld/voxeld.toml");
+  EXPECT_EQ(FindConfigFile(Variables({{"HOME", "/home/me"}}), exists),
+            "/home/me/.config/voxeld/voxeld.toml");
+  EXPECT_EQ(
+      FindConfigFile(Variables({{"XDG_CONFIG_HOME", "relative"}, {"HOME", "/home/me"}}), exists),
+      "/home/me/.config/voxeld/voxeld.toml");
+  files.insert("/xdg/voxeld/voxeld.toml");
+  EXPECT_EQ(FindConfigFile(both, exists), "/xdg/voxeld/voxeld.toml");
+}
+
+// A file of its own under the test's folder.
+class LoadedConfig : public ::testing::Test {
+ protected:
+  std::string Write(const std::string& text) {
+    const std::string path = absl::StrCat(::testing::TempDir(), "/voxeld-config-", getpid());
+    std::ofstream(path) << text;
+    path_ = path;
+    return path;
+  }
+  ~LoadedConfig() override {
+    if (!path_.empty()) std::remove(path_.c_str());
+  }
+  std::string path_;
+};
+
+TEST_F(LoadedConfig, DefaultsThenFileThenCommandLine) {
+  const Environment environment = Variables({{"XDG_RUNTIME_DIR", "/run/me"}});
+  absl::StatusOr<Config> config = LoadConfig(Write(""), environment);
+  ASSERT_TRUE(config.ok()) << config.status();
+  ASSERT_THAT(config->server.listen, SizeIs(2));
+  EXPECT_EQ(config->server.listen[0].ToString(), "127.0.0.1:50551");
+  EXPECT_EQ(config->server.listen[1].ToString(), "unix:/run/me/voxeld.sock");
+  EXPECT_EQ(config->server.http->ToString(), "127.0.0.1:8088");
+  EXPECT_FALSE(config->server.http_asked);
+  ASSERT_THAT(config->displays, SizeIs(1));
+  EXPECT_EQ(config->displays[0].name, "sim");
+  EXPECT_EQ(config->displays[0].driver, "simulated");
+
+  config = LoadConfig(Write("[server]\nlisten = [\"h:1\"]\n[[display]]\nname=\"a\"\ndriver=\"d\"\n"
+                            "[log]\nlevel = \"error\"\nformat = \"json\"\n"),
+                      environment);
+  ASSERT_TRUE(config.ok()) << config.status();
+  EXPECT_THAT(config->server.listen, SizeIs(1));
+  EXPECT_EQ(config->displays[0].name, "a");
+
+  CommandLine line;
+  line.listen = {"i:2", "i:3"};
+  line.displays = {"b=e,k=v"};
+  line.http = "i:4";
+  line.engine = "cpu";
+  line.log_level = "debug";
+  ASSERT_TRUE(ApplyCommandLine(line, &*config).ok());
+  ASSERT_THAT(config->server.listen, SizeIs(2));
+  EXPECT_EQ(config->server.listen[0].ToString(), "i:2");
+  EXPECT_EQ(config->server.http->ToString(), "i:4");
+  EXPECT_TRUE(config->server.http_asked);
+  ASSERT_THAT(config->displays, SizeIs(1));
+  EXPECT_EQ(config->displays[0].name, "b");
+  EXPECT_EQ(config->engine.kind, gpu::EngineKind::kCpu);
+  EXPECT_EQ(config->log.level, "debug");
+  EXPECT_EQ(config->log.format, "json");
+}
+
+TEST_F(LoadedConfig, ANamedFileMustBeThere) {
+  const auto config = LoadConfig("/nowhere/at/all.toml", Variables({}));
+  EXPECT_TRUE(absl::IsNotFound(config.status())) << config.status();
+  EXPECT_THAT(std::string(config.status().message()), HasSubstr("/nowhere/at/all.toml"));
+}
+
+TEST(ApplyCommandLine, UsageErrorsNameTheOption) {
+  const auto refusal = [](const CommandLine& line) {
+    Config config;
+    return std::string(ApplyCommandLine(line, &config).message());
+  };
+  CommandLine line;
+  line.listen = {"nowhere"};
+  EXPECT_THAT(refusal(line), HasSubstr("--listen: "));
+  line = {};
+  line.http = "nowhere";
+  EXPECT_THAT(refusal(line), HasSubstr("--http: "));
+  line = {};
+  line.displays = {"a=b", "a=c"};
+  EXPECT_THAT(refusal(line), HasSubstr("--display: there are two displays named \"a\""));
+  line = {};
+  line.engine = "cpv";
+  EXPECT_THAT(refusal(line), HasSubstr("--engine is \"cpv\"; did you mean cpu?"));
+  line = {};
+  line.log_level = "loud";
+  EXPECT_THAT(refusal(line), HasSubstr("--log-level is \"loud\"; known are trace"));
+  line = {};
+  line.log_format = "jsn";
+  EXPECT_THAT(refusal(line), HasSubstr("--log-format is \"jsn\"; did you mean json?"));
+}
+
+absl::StatusOr<CommandLine> Parse(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "voxeld");
+  return ParseCommandLine(static_cast<int>(arguments.size()), arguments.data(), "1.2.3");
+}
+
+TEST(CommandLine, HasEveryOption) {
+  const auto line = Parse({"--config", "f", "--listen", "a:1", "--listen=unix:/b", "--http", "off",
+                           "--display", "x=y,z=1;2", "--display", "u=v", "--engine", "cuda",
+                           "--log-level", "debug", "--log-format", "json", "--check-config"});
+  ASSERT_TRUE(line.ok()) << line.status();
+  EXPECT_EQ(line->config, "f");
+  EXPECT_THAT(line->listen, ElementsAre("a:1", "unix:/b"));
+  EXPECT_EQ(line->http, "off");
+  EXPECT_THAT(line->displays, ElementsAre("x=y,z=1;2", "u=v"));
+  EXPECT_EQ(line->engine, "cuda");
+  EXPECT_EQ(line->log_level, "debug");
+  EXPECT_EQ(line->log_format, "json");
+  EXPECT_TRUE(line->check_config);
+  EXPECT_EQ(line->print_and_exit, "");
+}
+
+TEST(CommandLine, NothingIsNothing) {
+  const auto line = Parse({});
+  ASSERT_TRUE(line.ok()) << line.status();
+  EXPECT_FALSE(line->config || line->http || line->engine || line->log_level || line->log_format ||
+               line->check_config);
+  EXPECT_TRUE(line->listen.empty() && line->displays.empty());
+}
+
+TEST(CommandLine, HelpAndVersion) {
+  EXPECT_EQ(Parse({"--version"})->print_and_exit, "voxeld 1.2.3\n");
+  const std::string help = Parse({"--help"})->print_and_exit;
+  for (const char* option : {"--config", "--listen", "--http", "--display", "--engine",
+                             "--log-level", "--log-format", "--check-config", "--version"}) {
+    EXPECT_THAT(help, HasSubstr(option));
+  }
+}
+
+TEST(CommandLine, UsageErrorsSuggest) {
+  EXPECT_THAT(std::string(Parse({"--lisen", "a:1"}).status().message()),
+              HasSubstr("unknown option --lisen; did you mean --listen?"));
+  EXPECT_THAT(std::string(Parse({"--dispaly=a"}).status().message()),
+              HasSubstr("did you mean --display?"));
+  EXPECT_THAT(std::string(Parse({"serve"}).status().message()),
+              HasSubstr("\"serve\" is not expected"));
+  EXPECT_THAT(std::string(Parse({"--listen"}).status().message()), HasSubstr("--listen"));
+  EXPECT_THAT(std::string(Parse({"--http", "a", "--http", "b"}).status().message()),
+              HasSubstr("--http"));
+}
+
+TEST(Suggest, WhatIsLikeAndNothingElse) {
+  const std::vector<std::string> known = {"listen", "http", "display"};
+  EXPECT_EQ(Nearest("lisetn", known), "listen");
+  EXPECT_EQ(Nearest("htp", known), "http");
+  EXPECT_EQ(Nearest("displays", known), "display");
+  EXPECT_EQ(Nearest("zebra", known), "");
+  EXPECT_EQ(Nearest("", known), "");
+  EXPECT_EQ(Nearest(std::string(100'000, 'x'), known), "");
+  EXPECT_THAT(Suggestion("zebra", known), Not(HasSubstr("did you mean")));
+}
+
+}  // namespace
+}  // namespace voxeld::daemon

@@ -1,0 +1,58 @@
+#include "daemon/config/display_config.h"
+
+#include <gmock/gmock.h>
+
+namespace voxeld::daemon {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Pair;
+using ::testing::UnorderedElementsAre;
+
+TEST(DisplayOption, NameAndDriver) {
+  const auto display = ParseDisplayOption("sim=simulated");
+  ASSERT_TRUE(display.ok()) << display.status();
+  EXPECT_EQ(display->name, "sim");
+  EXPECT_EQ(display->driver, "simulated");
+  EXPECT_THAT(display->options, IsEmpty());
+}
+
+TEST(DisplayOption, Options) {
+  const auto display =
+      ParseDisplayOption("r.1=simulated,geometry=rotor,size=128x64,note=a=b,empty=");
+  ASSERT_TRUE(display.ok()) << display.status();
+  EXPECT_EQ(display->name, "r.1");
+  EXPECT_THAT(display->options,
+              UnorderedElementsAre(Pair("geometry", "rotor"), Pair("size", "128x64"),
+                                   Pair("note", "a=b"), Pair("empty", "")));
+}
+
+struct Case {
+  const char* text;
+  const char* why;
+};
+
+class WrongDisplayOption : public ::testing::TestWithParam<Case> {};
+
+TEST_P(WrongDisplayOption, SaysWhatWouldBeRight) {
+  const auto display = ParseDisplayOption(GetParam().text);
+  ASSERT_TRUE(absl::IsInvalidArgument(display.status()));
+  const std::string message(display.status().message());
+  EXPECT_THAT(message, HasSubstr(GetParam().why));
+  EXPECT_THAT(message, HasSubstr("NAME=DRIVER"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Text, WrongDisplayOption,
+    ::testing::Values(Case{"", "names no driver"}, Case{"sim", "names no driver"},
+                      Case{"sim=", "names no driver"}, Case{"=simulated", "display name \"\""},
+                      Case{"-a=simulated", "display name \"-a\""},
+                      Case{"a b=simulated", "display name \"a b\""},
+                      Case{"sim=simulated,size", "\"size\", which is no KEY=VALUE"},
+                      Case{"sim=simulated,", "\"\", which is no KEY=VALUE"},
+                      Case{"sim=simulated,=3", "\"=3\", which is no KEY=VALUE"},
+                      Case{"sim=simulated,a=1,a=2", "gives a twice"}));
+
+}  // namespace
+}  // namespace voxeld::daemon

@@ -1,0 +1,212 @@
+// The server, spoken to in bytes.
+#include "daemon/http/http_server.h"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+#include "display/sync/mutex.h"
+
+namespace voxeld::daemon::http {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// A blocking connection; every read has a deadline of its own.
+class Connection {
+ public:
+  explicit Connection(const Address& address) {
+    const timeval limit = {30, 0};
+    if (address.unix_socket) {
+      fd_ = socket(AF_UNIX, SOCK_STREAM, 0);
+      sockaddr_un name = {};
+      name.sun_family = AF_UNIX;
+      std::memcpy(name.sun_path, address.path.c_str(), address.path.size());
+      EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
+    } else {
+      fd_ = socket(AF_INET, SOCK_STREAM, 0);
+      sockaddr_in name = {};
+      name.sin_family = AF_INET;
+      name.sin_port = htons(address.port);
+      inet_pton(AF_INET, address.host.c_str(), &name.sin_addr);
+      EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
+    }
+    setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
+  }
+  ~Connection() { close(fd_); }
+
+  void Send(const std::string& text) {
+    EXPECT_EQ(send(fd_, text.data(), text.size(), MSG_NOSIGNAL), static_cast<ssize_t>(text.size()));
+  }
+  // Up to and with `end`, or to the end of the connection.
+  std::string ReadTo(const std::string& end) {
+    std::string text;
+    char c = 0;
+    while (!text.ends_with(end) && recv(fd_, &c, 1, 0) == 1) text += c;
+    return text;
+  }
+  std::string ReadAll() {
+    std::string text;
+    char buffer[4096];
+    for (ssize_t n; (n = recv(fd_, buffer, sizeof(buffer), 0)) > 0;) text.append(buffer, n);
+    return text;
+  }
+
+ private:
+  int fd_ = -1;
+};
+
+std::string Get(const std::string& path) {
+  return absl::StrCat("GET ", path, " HTTP/1.1\r\nHost: x\r\n\r\n");
+}
+
+class HttpServer : public ::testing::Test {
+ protected:
+  void Start(ServerOptions options = {}) {
+    if (!options.listen.unix_socket) options.listen = *ParseAddress("127.0.0.1:0");
+    auto server = Server::Start(options, [this](std::string_view path, Done done) {
+      if (path == "/hello") done({.body = "hello\n"});
+      if (path == "/later") {
+        sync::MutexLock lock(mutex_);
+        waiting_.push_back(std::move(done));
+        changed_.NotifyAll();
+      }
+      return path == "/hello" || path == "/later";
+    });
+    ASSERT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+  }
+
+  std::string Ask(const std::string& request) {
+    Connection connection(server_->address());
+    connection.Send(request);
+    const std::string head = connection.ReadTo("\r\n\r\n");
+    return absl::StrCat(head, connection.ReadTo("\n"));
+  }
+
+  Done TakeWaiting() {
+    sync::MutexLock lock(mutex_);
+    while (waiting_.empty()) changed_.Wait(mutex_);
+    Done done = std::move(waiting_.back());
+    waiting_.pop_back();
+    return done;
+  }
+
+  sync::Mutex mutex_;
+  sync::CondVar changed_;
+  std::vector<Done> waiting_ VOXELD_GUARDED_BY(mutex_);
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(HttpServer, AnswersWhatItKnows) {
+  Start();
+  const std::string answer = Ask(Get("/hello?x=1"));
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 200 OK\r\n"));
+  EXPECT_THAT(answer, HasSubstr("Content-Length: 6\r\n"));
+  EXPECT_THAT(answer, EndsWith("\r\n\r\nhello\n"));
+  EXPECT_THAT(Ask(Get("/nothing")), StartsWith("HTTP/1.1 404 "));
+  const std::string refused = Ask("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\nab");
+  EXPECT_THAT(refused, StartsWith("HTTP/1.1 405 "));
+  EXPECT_THAT(refused, HasSubstr("Allow: GET, HEAD\r\n"));
+}
+
+TEST_F(HttpServer, HeadHasNoBodyAndTheConnectionGoesOn) {
+  Start();
+  Connection connection(server_->address());
+  connection.Send("HEAD /hello HTTP/1.1\r\nHost: x\r\n\r\n");
+  EXPECT_THAT(connection.ReadTo("\r\n\r\n"), HasSubstr("Content-Length: 6\r\n"));
+  connection.Send(Get("/hello"));
+  EXPECT_THAT(connection.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_EQ(connection.ReadTo("\n"), "hello\n");
+  connection.Send("GET /hello HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  EXPECT_THAT(connection.ReadAll(), EndsWith("hello\n"));
+}
+
+TEST_F(HttpServer, RefusesWhatIsNoRequest) {
+  Start();
+  Connection garbage(server_->address());
+  garbage.Send("\x16\x03\x01 this is not HTTP\r\n\r\n");
+  EXPECT_THAT(garbage.ReadAll(), StartsWith("HTTP/1.1 400 "));
+  Connection large(server_->address());
+  large.Send(absl::StrCat("GET /hello HTTP/1.1\r\nX: ", std::string(20'000, 'x'), "\r\n\r\n"));
+  EXPECT_THAT(large.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 431 "));
+  Connection body(server_->address());
+  body.Send("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000\r\n\r\n");
+  EXPECT_THAT(body.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
+  EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 ")) << "the others are served";
+}
+
+TEST_F(HttpServer, AnswersMayComeLaterFromAnotherThread) {
+  Start();
+  Connection connection(server_->address());
+  connection.Send(Get("/later"));
+  std::thread thread([this] { TakeWaiting()({.status = 503, .body = "late\n"}); });
+  EXPECT_THAT(connection.ReadTo("late\n"), StartsWith("HTTP/1.1 503 "));
+  thread.join();
+}
+
+TEST_F(HttpServer, DoesNotWaitForAnAnswerForEver) {
+  Start({.answer_limit_ns = 20 * sync::kMillisecond});
+  Connection connection(server_->address());
+  connection.Send(Get("/later"));
+  EXPECT_THAT(connection.ReadTo("in time\n"), StartsWith("HTTP/1.1 503 "));
+  TakeWaiting()({.body = "too late\n"});  // falls on the floor
+  connection.Send(Get("/hello"));
+  EXPECT_THAT(connection.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServer, ClosesIdleConnections) {
+  Start({.idle_limit_ns = 20 * sync::kMillisecond});
+  Connection connection(server_->address());
+  connection.Send("GET /hel");
+  EXPECT_EQ(connection.ReadAll(), "");
+}
+
+TEST_F(HttpServer, FurtherConnectionsWaitForTheirTurn) {
+  Start({.max_connections = 2});
+  auto first = std::make_unique<Connection>(server_->address());
+  Connection second(server_->address());
+  second.Send(Get("/hello"));
+  EXPECT_THAT(second.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  Connection third(server_->address());
+  third.Send(Get("/hello"));
+  first.reset();
+  EXPECT_THAT(third.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServer, MayGoBeforeItsAnswers) {
+  Start();
+  Connection connection(server_->address());
+  connection.Send(Get("/later"));
+  const Done done = TakeWaiting();
+  server_.reset();
+  done({.body = "nobody hears\n"});
+  EXPECT_EQ(connection.ReadAll(), "");
+}
+
+TEST_F(HttpServer, ServesAUnixSocketAndRemovesIt) {
+  const std::string path = absl::StrCat(::testing::TempDir(), "/voxeld-http-", getpid(), ".sock");
+  Start({.listen = *ParseAddress(absl::StrCat("unix:", path))});
+  EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 "));
+  server_.reset();
+  EXPECT_NE(access(path.c_str(), F_OK), 0);
+}
+
+TEST_F(HttpServer, ABusyPortIsAnError) {
+  Start();
+  const auto second =
+      Server::Start({.listen = server_->address()}, [](std::string_view, Done) { return false; });
+  EXPECT_TRUE(absl::IsAlreadyExists(second.status())) << second.status();
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::http

@@ -1,0 +1,93 @@
+#include "daemon/http/metrics.h"
+
+#include <gmock/gmock.h>
+
+#include <set>
+#include <sstream>
+
+#include "daemon/http/monitor.h"
+
+namespace voxeld::daemon::http {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Metrics, EveryFigureStandsThereOnce) {
+  Stats stats;
+  stats.version = "1.2";
+  stats.uptime_ns = 1'500'000'000;
+  stats.commits_accepted = 12345678901;
+  for (const char* name : {"one", "two"}) {
+    DisplayFigures& display = stats.displays.emplace_back();
+    display.name = name;
+    display.state = display::DisplayState::kLost;
+    display.bytes_out = 77;
+    display.commit_to_presented.p99_ns = 250'000'000;
+  }
+  const std::string text = MetricsText(stats);
+  EXPECT_THAT(text, HasSubstr("voxeld_info{version=\"1.2\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_uptime_seconds 1.5\n"));
+  EXPECT_THAT(text, HasSubstr("# TYPE voxeld_commits_accepted_total counter\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_commits_accepted_total 12345678901\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_display_bytes_out_total{display=\"one\"} 77\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_display_bytes_out_total{display=\"two\"} 77\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_display_commit_to_presented_seconds{display=\"one\","
+                              "quantile=\"0.99\"} 0.25\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"lost\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"showing\"} 0\n"));
+
+  // Every line is a comment or a metric of ours, and each family is announced once.
+  std::istringstream lines(text);
+  std::string line;
+  std::set<std::string> families;
+  while (std::getline(lines, line)) {
+    if (line.starts_with("# TYPE ")) {
+      EXPECT_TRUE(families.insert(line.substr(7)).second) << line;
+    }
+    if (!line.starts_with('#')) {
+      EXPECT_TRUE(line.starts_with("voxeld_")) << line;
+    }
+  }
+  EXPECT_GT(families.size(), 35u);
+}
+
+TEST(Metrics, LabelValuesAreEscaped) {
+  Stats stats;
+  stats.displays.emplace_back().engine_reason = "a \"b\"\nvoxeld_evil 1\\";
+  const std::string text = MetricsText(stats);
+  EXPECT_THAT(text, HasSubstr("reason=\"a \\\"b\\\"\\nvoxeld_evil 1\\\\\""));
+  EXPECT_THAT(text, Not(HasSubstr("\nvoxeld_evil")));
+}
+
+TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
+  Stats stats;
+  stats.displays.emplace_back().name = "sim";
+  stats.displays[0].engine = "cpu";
+  std::vector<DisplayDescription> displays(1);
+  displays[0].info.name = "sim";
+  for (const auto state : {display::DisplayState::kAttaching, display::DisplayState::kShowing,
+                           display::DisplayState::kBlanked}) {
+    displays[0].state = state;
+    const Response well = HealthResponse(displays, stats, false);
+    EXPECT_EQ(well.status, 200u);
+    EXPECT_EQ(well.body, "{\"status\":\"ok\",\"reasons\":[]}\n");
+  }
+  displays[0].state = display::DisplayState::kLost;
+  displays[0].state_reason = "it said \"no\"\xFF";
+  const Response lost = HealthResponse(displays, stats, false);
+  EXPECT_EQ(lost.status, 503u);
+  EXPECT_EQ(lost.content_type, "application/json");
+  EXPECT_THAT(lost.body, HasSubstr(R"({"display":"sim","what":"lost","why":"it said \"no\")"));
+
+  displays[0].state = display::DisplayState::kShowing;
+  stats.displays[0].engine = "";
+  stats.displays[0].engine_reason = "gone";
+  EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("\"no engine\""));
+  stats.displays[0].engine = "cpu";
+  EXPECT_EQ(HealthResponse(displays, stats, true).status, 503u);
+  EXPECT_THAT(HealthResponse(displays, stats, true).body, HasSubstr("shutting down"));
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::http

@@ -1,0 +1,75 @@
+#include "daemon/log/logger.h"
+
+#include <gmock/gmock.h>
+#include <spdlog/sinks/ostream_sink.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace voxeld::daemon {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::MatchesRegex;
+
+constexpr const char* kNasty = "a \"b\"\n2026 error fake=1 \x1b[31m\xFF é";
+
+class Lines {
+ public:
+  Lines(Logger::Level level, Logger::Format format)
+      : logger(level, format, std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)) {}
+  std::string Take() {
+    std::string text = text_.str();
+    text_.str("");
+    return text;
+  }
+
+ private:
+  std::ostringstream text_;
+
+ public:
+  Logger logger;
+};
+
+TEST(Logger, TextIsOneLineWhateverIsInIt) {
+  Lines lines(Logger::Level::kInfo, Logger::Format::kText);
+  lines.logger.Info("session opened", {{"session", "3"}, {"client", kNasty}, {"none", ""}});
+  const std::string line = lines.Take();
+  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1);
+  EXPECT_EQ(line.find('\x1b'), std::string::npos);
+  EXPECT_THAT(line, MatchesRegex("[0-9-]+T[0-9:.]+[+-][0-9:]+ info session opened session=3 .*\n"));
+  EXPECT_THAT(line, EndsWith(" none=\"\"\n"));
+}
+
+TEST(Logger, JsonIsAnObjectALine) {
+  Lines lines(Logger::Level::kDebug, Logger::Format::kJson);
+  lines.logger.Error("failed", {{"why", kNasty}});
+  const auto line = nlohmann::json::parse(lines.Take());
+  EXPECT_EQ(line["level"], "error");
+  EXPECT_EQ(line["event"], "failed");
+  EXPECT_EQ(line["why"], "a \"b\"\n2026 error fake=1 \x1b[31m\xEF\xBF\xBD é");
+  EXPECT_TRUE(line.contains("time"));
+}
+
+TEST(Logger, LevelsFilter) {
+  Lines lines(Logger::Level::kWarn, Logger::Format::kText);
+  lines.logger.Debug("no");
+  lines.logger.Info("no");
+  EXPECT_EQ(lines.Take(), "");
+  lines.logger.Warn("yes");
+  EXPECT_THAT(lines.Take(), EndsWith("warning yes\n"));
+  Lines off(Logger::Level::kOff, Logger::Format::kText);
+  off.logger.Error("no");
+  EXPECT_EQ(off.Take(), "");
+}
+
+TEST(Logger, WordsOfLevelsAndFormats) {
+  EXPECT_EQ(*Logger::ParseLevel("trace"), Logger::Level::kTrace);
+  EXPECT_EQ(*Logger::ParseLevel("off"), Logger::Level::kOff);
+  EXPECT_TRUE(absl::IsInvalidArgument(Logger::ParseLevel("loud").status()));
+  EXPECT_EQ(*Logger::ParseFormat("json"), Logger::Format::kJson);
+  EXPECT_TRUE(absl::IsInvalidArgument(Logger::ParseFormat("xml").status()));
+}
+
+}  // namespace
+}  // namespace voxeld::daemon
