@@ -39,6 +39,9 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.tell = [this, loop = loop_](const Rider& rider, const CommitOutcome& outcome) {
     loop->Post([this, rider, outcome] { DeliverOutcome(rider, outcome); });
   };
+  options.retire = [loop = loop_](SnapshotPtr snapshot) {
+    loop->Post([snapshot = std::move(snapshot)] {});
+  };
   auto host = std::make_shared<Host>();
   host->work = options.work;
   absl::StatusOr<std::unique_ptr<FramePipeline>> pipeline =

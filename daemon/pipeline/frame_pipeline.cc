@@ -43,6 +43,7 @@ FramePipeline::FramePipeline(Options options)
       make_engine_(std::move(options.make_engine)),
       engine_options_(options.engine),
       tell_(std::move(options.tell)),
+      retire_(std::move(options.retire)),
       view_(options.view),
       scene_([this] { Breathe(); }),
       pool_(display_->info().layout),
@@ -86,10 +87,16 @@ void FramePipeline::Breathe() {
   if (clock_.Now() >= next_tick_) next_tick_ = display_->Tick();
 }
 
-void FramePipeline::Show(SnapshotPtr snapshot) { newest_ = std::move(snapshot); }
+void FramePipeline::Retire(SnapshotPtr snapshot) {
+  if (snapshot != nullptr && retire_) retire_(std::move(snapshot));
+}
+
+void FramePipeline::Show(SnapshotPtr snapshot) {
+  Retire(std::exchange(newest_, std::move(snapshot)));
+}
 
 void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden) {
-  newest_ = std::move(snapshot);
+  Show(std::move(snapshot));
   switch (display_->state()) {
     case display::DisplayState::kStopped:
       return riders_.NotShown(rider, CommitOutcome::NotShown::kRemoved);
@@ -137,7 +144,9 @@ bool FramePipeline::MaybeDraw() {
     OnEngineFailure(absl::UnavailableError(absl::StrCat("no engine: ", engine_info_.reason)));
     return true;
   }
+  SnapshotPtr held = scene_.held();
   const size_t size = scene_.Plan(pattern_scene_ != nullptr ? pattern_scene_ : newest);
+  Retire(std::move(held));
   if (size == 0 && !target_stale_ && !show_again_ && last_submitted_ != 0) {
     KeepUnchanged(newest->number);
     return true;
@@ -243,13 +252,15 @@ void FramePipeline::ShowAgain(sync::TimeNs delay) {
 }
 
 void FramePipeline::OnEngineFailure(const absl::Status& status) {
+  Retire(scene_.held());
   scene_.Forget();
   target_stale_ = true;
   if (absl::IsDataLoss(status)) {
     engine_ = nullptr;
     pool_.Forget(last_volume_);
-    if (!std::exchange(lost_engine_, true) && HaveEngine()) {
+    if (!std::exchange(lost_engine_, true) && HaveEngine() && showing()) {
       riders_.Redraw();
+      if (pattern_ != TestPattern::kNone) riders_.HideWaiting();
       drawn_snapshot_.reset();
       return ShowAgain(0);
     }

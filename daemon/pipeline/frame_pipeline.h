@@ -68,6 +68,9 @@ class FramePipeline final : private display::Display::Listener {
     sync::Clock* clock = nullptr;  // outlives the pipeline
     // An outcome, inside any call to the pipeline.
     RiderBook::Tell tell;
+    // Takes snapshots that the pipeline has done with: freeing a large one takes longer than its
+    // thread may be busy. Empty: they are freed on the spot.
+    std::function<void(SnapshotPtr)> retire;
   };
 
   // Makes the engine. Its failure, or a view that cannot be, is the answer.
@@ -127,6 +130,7 @@ class FramePipeline final : private display::Display::Listener {
   void ShowAgain(sync::TimeNs delay);
   void ServeCaptures();
   void Breathe();
+  void Retire(SnapshotPtr snapshot);
   void Told(const Rider& rider, const CommitOutcome& outcome);
   // `method` on this thread with what a call of the engine's ended in, unless the drawing that the
   // call was made for is over by then.
@@ -139,6 +143,7 @@ class FramePipeline final : private display::Display::Listener {
   const MakeEngine make_engine_;
   const gpu::EngineOptions engine_options_;
   const RiderBook::Tell tell_;
+  const std::function<void(SnapshotPtr)> retire_;
 
   std::unique_ptr<gpu::Engine> engine_;
   gpu::EngineInfo engine_info_;  // of the engine, or why there is none

@@ -60,8 +60,8 @@ TEST(CoreDisplays, AnUpdateIsWholeOrNothing) {
   EXPECT_EQ(result->brightness, 0.5);
   EXPECT_EQ(result->pattern, TestPattern::kGrid);
   EXPECT_EQ(result->info.name, "main");
-  EXPECT_EQ(result->state,
-            display::DisplayState::kBlanked);  // dark, though the device did not confirm
+  EXPECT_EQ(result->state, display::DisplayState::kShowing);
+  EXPECT_FALSE(result->blank);
 }
 
 TEST(CoreDisplays, UnknownNamesListThoseThereAre) {

@@ -137,6 +137,8 @@ class RandomRun {
         if (Pick(8) == 0) {
           sim_.engine(d).fail = absl::InternalError("the frame failed");
         } else if (Pick(8) == 0) {
+          sim_.engine(0).fail = absl::DataLossError("the engine is gone");
+        } else if (Pick(8) == 0) {
           DisplayUpdate update;
           update.pattern = pattern_[d] ? TestPattern::kNone : TestPattern::kGrid;
           pattern_[d] = !pattern_[d];
