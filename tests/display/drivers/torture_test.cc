@@ -128,6 +128,11 @@ TEST_P(Torture, NothingTornNothingStaleNothingForgotten) {
       ASSERT_TRUE(by_light_.emplace(Key(FrameToRgb(*newest)), newest->volume).second);
       rig.display().Submit(newest);
       rig.RunUntil(step, static_cast<sync::TimeNs>(random() % 100) * kMillisecond);
+      if (random() % 20 == 0) {
+        ASSERT_TRUE(rig.display().SetBlank(true).ok());
+        rig.RunUntil(step, static_cast<sync::TimeNs>(random() % 100) * kMillisecond);
+        ASSERT_TRUE(rig.display().SetBlank(false).ok());
+      }
       if (random() % 10 == 0) {
         rig.display().Capture(kSecond, [&](absl::StatusOr<DecodedVolume> volume) {
           if (!volume.ok()) return;

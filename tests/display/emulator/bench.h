@@ -82,7 +82,6 @@ class Bench {
   std::map<uint64_t, Completed> done_;
   std::vector<uint64_t> reads_;
   bool listening_ = false;
-  size_t event_reads_ = 0;
   std::vector<SeenEvent> events_;
 };
 
