@@ -39,9 +39,12 @@
 
 namespace voxeld::display {
 
+inline constexpr uint16_t kFullWeight = 255;
+inline constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
+
 struct FootprintEntry {
   uint16_t x = 0, y = 0, z = 0;
-  uint16_t weight = 255;  // 1 to 255
+  uint16_t weight = kFullWeight;  // 1 to 255
   bool operator==(const FootprintEntry&) const = default;
 };
 

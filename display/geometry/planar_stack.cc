@@ -8,9 +8,6 @@
 namespace voxeld::display {
 namespace {
 
-constexpr uint16_t kFullWeight = 255;
-constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
-
 struct WeightedCell {
   int32_t cell;
   uint16_t weight;

@@ -10,8 +10,6 @@
 namespace voxeld::display {
 namespace {
 
-constexpr uint16_t kFullWeight = 255;
-constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
 constexpr int kDirectionBits = 30;
 
 // The centres of `cells` cells along x or y, from the axis, in units of 2⁻¹⁶ `unit_mm`.

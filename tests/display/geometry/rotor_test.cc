@@ -219,6 +219,21 @@ TEST(RotorTest, PanelsAlikeAlongVShareTheirLists) {
   EXPECT_THAT(table.inner.entries, Each(testing::Field(&FootprintEntry::weight, 255)));
 }
 
+// FNV-1a. Engines of one display on several machines build their tables apart.
+uint64_t Digest(const FootprintLists& lists) {
+  uint64_t hash = 0xCBF29CE484222325;
+  const auto add = [&](uint64_t value) { hash = (hash ^ value) * 0x100000001B3; };
+  for (const uint32_t begin : lists.begin) add(begin);
+  for (const FootprintEntry& e : lists.entries) add(e.x), add(e.y), add(e.z), add(e.weight);
+  return hash;
+}
+
+TEST(RotorTest, TablesAreTheSameOnEveryMachine) {
+  Geometry geometry{Vortex(360), CentredGrid(128, 128, 64, {1, 1, 1})};
+  EXPECT_EQ(Digest(BuildFootprints(geometry, Sampling::kMax).outer), 9552905415848629579u);
+  EXPECT_EQ(Digest(BuildFootprints(geometry, Sampling::kWeighted).outer), 18055715868846266795u);
+}
+
 TEST(RotorTest, ALargeRotorsTableIsBuilt) {
   Geometry geometry = OnePanel(1024, 512, 64, {.eccentricity_mm = 0.5});
   const FootprintTable table = BuildFootprints(geometry, Sampling::kMax);
