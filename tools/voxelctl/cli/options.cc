@@ -99,8 +99,14 @@ class Parser {
     ParsedCommandLine result;
     try {
       CheckCommand(arguments);
+      // What follows -- is no option whatever it looks like; CLI11 would hand it to the parent
+      // command.
+      const auto end = std::find(arguments.begin(), arguments.end(), "--");
+      if (end != arguments.end()) plain_.assign(end + 1, arguments.end());
       // CLI11 takes them from the back.
-      app_.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+      std::vector<std::string> reversed(arguments.begin(), end);
+      std::reverse(reversed.begin(), reversed.end());
+      app_.parse(std::move(reversed));
       CheckExtras();
       FillIn();
       result.options = options_;
@@ -262,7 +268,11 @@ class Parser {
     if (chosen == &app_)
       throw UsageError{absl::StrCat("a command is expected: ", absl::StrJoin(names_, ", "))};
     const std::string name = chosen->get_name();
-    if (name == "play") return FillInPlay();
+    if (name == "play") {
+      play_.files.insert(play_.files.end(), plain_.begin(), plain_.end());
+      return FillInPlay();
+    }
+    TakePlain(name == "snapshot" ? &snapshot_.file : name == "pattern" ? &pattern_name_ : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "pattern") return FillInPattern();
     if (name == "displays") options_.command = DisplaysOptions();
@@ -276,6 +286,16 @@ class Parser {
         throw UsageError{"--all and --layer do not go together"};
       options_.command = clear_;
     }
+  }
+
+  // The only positional argument of a command, null if it has none.
+  void TakePlain(std::string* argument) {
+    if (plain_.empty()) return;
+    if (argument == nullptr || !argument->empty() || plain_.size() > 1) {
+      throw UsageError{
+          absl::StrCat("\"", EscapeForTerminal(plain_.back()), "\" is one argument too many")};
+    }
+    *argument = plain_.front();
   }
 
   void FillInPlay() {
@@ -327,6 +347,7 @@ class Parser {
 
   CLI::App app_;
   std::vector<std::string> names_;
+  std::vector<std::string> plain_;  // arguments after --
   Options options_;
   PlayOptions play_;
   SnapshotOptions snapshot_;

@@ -31,8 +31,9 @@ std::string ShapeText(const v1::Geometry& geometry) {
 
 std::string Shown(const v1::DisplayDescription& display) {
   const std::string state = Word(v1::DisplayState_Name(display.state()), "DISPLAY_STATE_");
-  return display.state_reason().empty() ? state
-                                        : absl::StrCat(state, " (", display.state_reason(), ")");
+  return display.state_reason().empty() || display.state_reason() == state
+             ? state
+             : absl::StrCat(state, " (", display.state_reason(), ")");
 }
 
 }  // namespace

@@ -204,8 +204,8 @@ class Player {
           models[i], object, stream_->opened().limits(),
           [&](v1::StreamRequest request) { return SendDefinition(std::move(request), total); });
       if (!sizes.ok()) return sizes.status();
-      summary_.files.push_back({models[i].path, models[i].format, sizes->vertices, sizes->indices,
-                                sizes->objects, sizes->bytes});
+      summary_.files.push_back({models[i].path, models[i].format, models[i].note, sizes->vertices,
+                                sizes->indices, sizes->objects, sizes->bytes});
       models[i].parts = {};  // sent; the memory is not needed any more
     }
     if (staged_operations_ > 0) {

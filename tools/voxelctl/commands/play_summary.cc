@@ -35,6 +35,7 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
   for (const PlayedFile& f : s.files) {
     files.push_back({{"path", f.path},
                      {"format", f.format},
+                     {"note", f.note},
                      {"vertices", f.vertices},
                      {"indices", f.indices},
                      {"objects", f.objects},

@@ -11,7 +11,7 @@
 namespace voxeld::voxelctl {
 
 struct PlayedFile {
-  std::string path, format;
+  std::string path, format, note;
   uint64_t vertices = 0, indices = 0, objects = 0, bytes = 0;
 };
 

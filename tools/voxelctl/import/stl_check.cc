@@ -4,6 +4,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "tools/voxelctl/import/mesh_checks.h"
 #include "tools/voxelctl/import/model.h"
@@ -19,10 +20,13 @@ absl::Status CheckAscii(const SourceFile& file) {
   if (text.find("facet") == absl::string_view::npos) {
     return FileError(file, "is ASCII STL without a facet", "at least one triangle is expected");
   }
-  const absl::string_view tail = text.substr(text.size() - std::min<size_t>(text.size(), 512));
-  if (!absl::StrContains(absl::AsciiStrToLower(tail), "endsolid")) {
-    return FileError(file, "ends without \"endsolid\"", "the file is truncated");
+  bool open = false;
+  for (absl::string_view line : absl::StrSplit(text, '\n')) {
+    line = absl::StripLeadingAsciiWhitespace(line);
+    if (absl::StartsWithIgnoreCase(line, "solid")) open = true;
+    if (absl::StartsWithIgnoreCase(line, "endsolid")) open = false;
   }
+  if (open) return FileError(file, "ends without \"endsolid\"", "the file is truncated");
   return absl::OkStatus();
 }
 

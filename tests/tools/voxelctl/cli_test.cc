@@ -1,0 +1,184 @@
+// The command line: what is understood, and what is said about what is not.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_split.h"
+#include "tools/voxelctl/cli/options.h"
+#include "tools/voxelctl/cli/suggest.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::vector<std::string> Split(const std::string& line) {
+  return absl::StrSplit(line, ' ', absl::SkipEmpty());
+}
+
+Options Parse(const std::string& line) {
+  const ParsedCommandLine parsed = ParseCommandLine(Split(line));
+  EXPECT_TRUE(parsed.options.has_value()) << line << "\n" << parsed.err;
+  return parsed.options.value_or(Options());
+}
+
+TEST(CommandLine, GlobalOptionsBeforeAndAfterTheCommand) {
+  for (const char* line : {"--server unix:/a --json displays", "displays --json --server unix:/a",
+                           "--json displays --server=unix:/a"}) {
+    const Options options = Parse(line);
+    EXPECT_EQ(options.server, "unix:/a") << line;
+    EXPECT_TRUE(options.json) << line;
+    EXPECT_TRUE(std::holds_alternative<DisplaysOptions>(options.command));
+  }
+  EXPECT_EQ(Parse("--server a:1 stats --server b:2").server, "b:2");
+  EXPECT_EQ(Parse("displays").server, "");
+}
+
+TEST(CommandLine, Play) {
+  const Options options = Parse(
+      "play a.obj --spin b.glb --up z --fill lines --fps 12.5 --duration 3 --globe --flat --each "
+      "--display d --clear");
+  const auto& play = std::get<PlayOptions>(options.command);
+  EXPECT_THAT(play.files, ElementsAre("a.obj", "b.glb"));
+  EXPECT_TRUE(play.spin && play.globe && play.flat && play.each && play.clear);
+  EXPECT_EQ(play.up, Up::kZ);
+  EXPECT_EQ(play.fill, FillStyle::kLines);
+  EXPECT_EQ(play.fps, 12.5);
+  EXPECT_EQ(play.duration_s, 3);
+  EXPECT_EQ(play.display, "d");
+  const auto plain = std::get<PlayOptions>(Parse("play a.obj").command);
+  EXPECT_FALSE(plain.spin || plain.globe || plain.flat || plain.each || plain.clear);
+  EXPECT_EQ(plain.up, Up::kAuto);
+  EXPECT_EQ(plain.fps, 20);
+  EXPECT_FALSE(plain.duration_s.has_value());
+}
+
+TEST(CommandLine, AFileMayBeCalledLikeACommandOrAnOption) {
+  EXPECT_THAT(std::get<PlayOptions>(Parse("play stats").command).files, ElementsAre("stats"));
+  EXPECT_THAT(std::get<PlayOptions>(Parse("play -- --spin").command).files, ElementsAre("--spin"));
+  EXPECT_THAT(std::get<PlayOptions>(Parse("play a --spin -- -b c").command).files,
+              ElementsAre("a", "-b", "c"));
+  EXPECT_EQ(std::get<SnapshotOptions>(Parse("snapshot -- -a.png").command).file, "-a.png");
+}
+
+TEST(CommandLine, TheOthers) {
+  const auto snapshot =
+      std::get<SnapshotOptions>(Parse("snapshot o.png --display d --size 640x480 --azimuth -30 "
+                                      "--elevation 5.5 --slices --timeout 9")
+                                    .command);
+  EXPECT_EQ(snapshot.file, "o.png");
+  EXPECT_EQ(snapshot.width, 640);
+  EXPECT_EQ(snapshot.height, 480);
+  EXPECT_EQ(snapshot.azimuth_degrees, -30);
+  EXPECT_EQ(snapshot.elevation_degrees, 5.5);
+  EXPECT_TRUE(snapshot.slices);
+  EXPECT_EQ(snapshot.timeout_s, 9);
+  const auto stats = std::get<StatsOptions>(Parse("stats --watch --interval 0.5").command);
+  EXPECT_TRUE(stats.watch);
+  EXPECT_EQ(stats.interval_s, 0.5);
+  const auto entities =
+      std::get<EntitiesOptions>(Parse("entities --layer l --owner 18446744073709551615").command);
+  EXPECT_EQ(entities.layer, "l");
+  EXPECT_EQ(entities.owner, UINT64_MAX);
+  EXPECT_TRUE(std::get<ClearOptions>(Parse("clear --all").command).all);
+  EXPECT_EQ(std::get<ClearOptions>(Parse("clear --layer x").command).layer, "x");
+  EXPECT_EQ(std::get<PatternOptions>(Parse("pattern axes").command).pattern, v1::TEST_PATTERN_AXES);
+  EXPECT_EQ(std::get<PatternOptions>(Parse("pattern none --display d").command).display, "d");
+  EXPECT_TRUE(std::get<PatternOptions>(Parse("pattern list").command).list);
+  EXPECT_THAT(PatternNames(), ElementsAre("axes", "corners", "grid", "ramp", "white"));
+}
+
+struct Wrong {
+  const char* line;
+  std::vector<std::string> words;
+};
+
+class UsageErrors : public testing::TestWithParam<Wrong> {};
+
+TEST_P(UsageErrors, ExitWithTwoAndSuggest) {
+  const ParsedCommandLine parsed = ParseCommandLine(Split(GetParam().line));
+  EXPECT_FALSE(parsed.options.has_value());
+  EXPECT_EQ(parsed.exit_code, 2);
+  EXPECT_EQ(parsed.out, "");
+  for (const std::string& word : GetParam().words)
+    EXPECT_THAT(parsed.err, HasSubstr(word)) << GetParam().line;
+  EXPECT_THAT(parsed.err, HasSubstr("--help"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, UsageErrors,
+    testing::Values(Wrong{"", {"a command is expected", "play", "pattern"}},
+                    Wrong{"--json", {"a command is expected"}},
+                    Wrong{"plya a.obj", {"\"plya\" is no command", "did you mean play?"}},
+                    Wrong{"snap o.png", {"did you mean snapshot?"}},
+                    Wrong{"--json stat", {"did you mean stats?"}},
+                    Wrong{"--server a:1 claer", {"did you mean clear?"}},
+                    Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, snapshot"}},
+                    Wrong{"pl\x1b[31m", {"pl\\u{1b}[31m"}},
+                    Wrong{"play", {"at least one FILE", "voxelctl play --help"}},
+                    Wrong{"play a.obj --sipn", {"--sipn", "did you mean --spin?"}},
+                    Wrong{"play --sipn", {"did you mean --spin?"}},
+                    Wrong{"play a.obj --jsno", {"did you mean --json?"}},
+                    Wrong{"play a.obj --fill=surfaces",
+                          {"--fill surfaces", "did you mean surface?"}},
+                    Wrong{"play a.obj --fill fog", {"known are dots, lines, surface"}},
+                    Wrong{"play a.obj --up w", {"--up w", "known are auto, x, y, z"}},
+                    Wrong{"play a.obj --fps 0", {"--fps is 0", "0.1 to 240"}},
+                    Wrong{"play a.obj --fps nan", {"--fps is nan"}},
+                    Wrong{"play a.obj --fps many", {"fps", "many"}},
+                    Wrong{"play a.obj --duration -1", {"--duration is -1"}},
+                    Wrong{"play a.obj --duration", {"--duration"}}, Wrong{"snapshot", {"OUT.png"}},
+                    Wrong{"snapshot a.png b.png", {"\"b.png\"", "too many"}},
+                    Wrong{"snapshot a.png --size 640", {"--size is 640", "WIDTHxHEIGHT"}},
+                    Wrong{"snapshot a.png --size 99999x10", {"width", "99999", "64 to 8192"}},
+                    Wrong{"snapshot a.png --size 640x1e3", {"--size is 640x1e3"}},
+                    Wrong{"snapshot a.png --elevation 90", {"--elevation is 90"}},
+                    Wrong{"snapshot a.png --timeout 61", {"--timeout is 61"}},
+                    Wrong{"displays all", {"\"all\"", "too many"}},
+                    Wrong{"displays -- all", {"\"all\"", "too many"}},
+                    Wrong{"stats --interval 0", {"--interval is 0"}},
+                    Wrong{"entities --owner me", {"owner", "me"}},
+                    Wrong{"clear --all --layer x", {"do not go together"}},
+                    Wrong{"pattern", {"pattern wants a name", "axes", "list"}},
+                    Wrong{"pattern axs", {"did you mean axes?"}},
+                    Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
+
+TEST(CommandLine, HelpAndVersionAreData) {
+  for (const char* line : {"--help", "-h", "play --help", "--json stats -h"}) {
+    const ParsedCommandLine parsed = ParseCommandLine(Split(line));
+    EXPECT_FALSE(parsed.options.has_value());
+    EXPECT_EQ(parsed.exit_code, 0) << line;
+    EXPECT_THAT(parsed.out, HasSubstr("Usage: voxelctl"));
+    EXPECT_EQ(parsed.err, "");
+  }
+  EXPECT_THAT(ParseCommandLine({"play", "--help"}).out, HasSubstr("--flat"));
+  const ParsedCommandLine version = ParseCommandLine({"--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_THAT(version.out, testing::MatchesRegex("voxelctl [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST(EditDistance, CountsAddDropChangeSwap) {
+  EXPECT_EQ(EditDistance("", ""), 0u);
+  EXPECT_EQ(EditDistance("play", "play"), 0u);
+  EXPECT_EQ(EditDistance("PLAY", "play"), 0u);
+  EXPECT_EQ(EditDistance("ply", "play"), 1u);
+  EXPECT_EQ(EditDistance("plaay", "play"), 1u);
+  EXPECT_EQ(EditDistance("plby", "play"), 1u);
+  EXPECT_EQ(EditDistance("paly", "play"), 1u);
+  EXPECT_EQ(EditDistance("kitten", "sitting"), 3u);
+  EXPECT_EQ(EditDistance("", "abc"), 3u);
+}
+
+TEST(Nearest, OnlyWhatMayBeMeant) {
+  EXPECT_EQ(Nearest("sats", {"stats", "snapshot"}), "stats");
+  EXPECT_EQ(Nearest("disp", {"displays", "stats"}), "displays");
+  EXPECT_EQ(Nearest("q", {"x", "y"}), "");
+  EXPECT_EQ(Nearest("", {"x"}), "");
+  EXPECT_EQ(Nearest(std::string(1000, 'a'), {std::string(1000, 'b')}), "");
+}
+
+}  // namespace
+}  // namespace voxeld::voxelctl

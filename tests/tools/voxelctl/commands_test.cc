@@ -1,0 +1,284 @@
+// The commands against a server in this process.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/tools/voxelctl/fake_server.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/cli/options.h"
+#include "tools/voxelctl/commands/commands.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+struct Result {
+  int code = -1;
+  std::string out, err;
+};
+
+class CommandsTest : public testing::Test {
+ protected:
+  // Runs voxelctl with these arguments, as main would.
+  Result RunTool(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--server", server_.address()});
+    return RunAnywhere(std::move(arguments));
+  }
+
+  Result RunAnywhere(const std::vector<std::string>& arguments) {
+    const ParsedCommandLine parsed = ParseCommandLine(arguments);
+    if (!parsed.options) return {parsed.exit_code, parsed.out, parsed.err};
+    std::ostringstream out, err;
+    Console console(out, err, parsed.options->json, false);
+    const int code = voxelctl::Run(
+        *parsed.options, [](const char*) { return std::string(); }, interrupt_, console);
+    return {code, out.str(), err.str()};
+  }
+
+  // The one document that is all of the data.
+  json RunJson(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "--json");
+    const Result result = RunTool(std::move(arguments));
+    EXPECT_EQ(result.code, 0) << result.err;
+    return json::parse(result.out, nullptr, false);
+  }
+
+  TempFolder folder_;
+  FakeServer server_{folder_.Path("s")};
+  Interrupt interrupt_{Interrupt::Watch::kNothing};
+};
+
+TEST_F(CommandsTest, EveryReportIsOneJsonDocument) {
+  EXPECT_EQ(RunJson({"displays"})["displays"][0]["name"], "fake");
+  EXPECT_EQ(RunJson({"displays"})["displays"][0]["geometry"]["planar_stack"]["positions_mm"].size(),
+            16u);
+
+  const json stats = RunJson({"stats"});
+  EXPECT_EQ(stats["entities"], 3);
+  const json& display = stats["displays"][0];
+  EXPECT_EQ(display["engine"], "cpu");
+  EXPECT_EQ(display["lit_voxels"], 1234567);
+  EXPECT_EQ(display["commit_to_last_byte"]["p50_ns"], 1000000);
+  for (const char* field : {"volumes_per_second", "volumes_presented", "commits_superseded",
+                            "commits_lost", "bytes_out"}) {
+    EXPECT_TRUE(display.contains(field)) << field;
+  }
+
+  const json entities = RunJson({"entities", "--layer", "voxelctl"});
+  EXPECT_EQ(entities["entities"].size(), 2u) << "both pages";
+  EXPECT_EQ(entities["layers"][0]["owner"], 7);
+
+  EXPECT_EQ(RunJson({"clear"})["entities"], 2);
+  EXPECT_EQ(RunJson({"pattern", "list"})["patterns"].size(), 5u);
+  EXPECT_EQ(RunJson({"pattern", "axes"})["displays"][0]["test_pattern"], "TEST_PATTERN_AXES");
+  EXPECT_EQ(RunJson({"snapshot", folder_.Path("a.png")})["lit_pixels"], 256);
+  EXPECT_EQ(RunJson({"play", DataFile("points.ply")})["files"][0]["vertices"], 3);
+}
+
+TEST_F(CommandsTest, TablesAreDataAndNothingFromTheServerReachesTheTerminalRaw) {
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"displays"}, {"stats"}, {"entities"}}) {
+    const Result result = RunTool(command);
+    EXPECT_EQ(result.code, 0);
+    EXPECT_EQ(result.err, "");
+    EXPECT_THAT(result.out, HasSubstr("\\u{1b}")) << command[0];
+    EXPECT_THAT(result.out, Not(HasSubstr("\x1b"))) << command[0];
+  }
+  EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("1,234,567"));
+}
+
+TEST_F(CommandsTest, StatsAreWatchedUntilAnInterrupt) {
+  // The fake sends without pause; the interrupt comes after the first line.
+  std::ostringstream out, err;
+  Console console(out, err, true, false);
+  auto connection = Connection::Connect(server_.address(), interrupt_);
+  ASSERT_TRUE(connection.ok());
+  v1::WatchStatsRequest request;
+  int seen = 0;
+  EXPECT_FALSE((*connection)
+                   ->WatchStats(request,
+                                [&](const v1::Stats&) {
+                                  if (++seen == 3) interrupt_.Request();
+                                  return true;
+                                })
+                   .ok());
+  EXPECT_GE(seen, 3);
+  EXPECT_TRUE(interrupt_.requested());
+}
+
+TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
+  const Result result = RunTool({"play", DataFile("points.ply"), DataFile("quad.topojson")});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("2 entities"));
+  EXPECT_THAT(result.err, HasSubstr("voxelctl clear"));
+  const FakeServer::Log log = server_.log();
+  ASSERT_EQ(log.opens.size(), 1u);
+  EXPECT_EQ(log.opens[0].on_disconnect(), v1::DISCONNECT_POLICY_KEEP);
+  EXPECT_TRUE(log.opens[0].strict());
+  ASSERT_EQ(log.entities.size(), 2u);
+  EXPECT_EQ(log.entities.at("1").label(), "points.ply");
+  for (const auto& [id, entity] : log.entities) {
+    const std::string& object = entity.primitive().instance().object();
+    ASSERT_TRUE(log.objects.contains(object));
+    for (const v1::Object::Part& part : log.objects.at(object).parts())
+      EXPECT_TRUE(log.objects.contains(part.primitive().instance().object()));
+  }
+  // What an earlier play left goes, owner by owner, and nobody else's.
+  ASSERT_EQ(log.clears.size(), 1u);
+  EXPECT_EQ(log.clears[0].owner(), 7u);
+  EXPECT_EQ(log.clears[0].layer(), "voxelctl");
+}
+
+TEST_F(CommandsTest, LargeCloudsGoInManyMessages) {
+  constexpr int kPoints = 100000;
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 100000\nproperty float x\nproperty "
+      "float y\nproperty float z\nend_header\n";
+  bytes.resize(bytes.size() + kPoints * 12, '\1');
+  const json summary = RunJson({"play", folder_.Write("big.ply", bytes)});
+  EXPECT_EQ(summary["files"][0]["vertices"], kPoints);
+  const FakeServer::Log log = server_.log();
+  EXPECT_LE(log.largest_message, 256u << 10);
+  EXPECT_GE(log.objects.size(), 7u);
+  EXPECT_GE(log.commits, 3u) << "no more than max_uncommitted_bytes at a time";
+}
+
+TEST_F(CommandsTest, SpinningSendsTransformsOnly) {
+  const json summary =
+      RunJson({"play", DataFile("points.ply"), "--spin", "--fps", "100", "--duration", "0.5"});
+  const FakeServer::Log log = server_.log();
+  EXPECT_GE(summary["frames"], 5);
+  EXPECT_EQ(log.transforms, summary["frames"]);
+  EXPECT_EQ(log.commits, summary["commits"]);
+  EXPECT_EQ(summary["unanswered"], 0);
+  EXPECT_EQ(summary["displays"][0]["presented"], summary["commits"]);
+  EXPECT_EQ(summary["latency"]["count"], summary["commits"]);
+  EXPECT_TRUE(summary["still_up"]);
+}
+
+TEST_F(CommandsTest, ASlowDisplayMakesNoQueue) {
+  server_.Set({.no_outcomes = true});
+  const Result result =
+      RunTool({"play", DataFile("points.ply"), "--spin", "--fps", "200", "--duration", "0.3"});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_LE(server_.log().most_unanswered, 4u);
+  EXPECT_THAT(result.err, HasSubstr("left out while a display was behind"));
+  EXPECT_THAT(result.err, HasSubstr("no outcome yet"));
+}
+
+TEST_F(CommandsTest, CtrlCEndsASpinCleanlyAndTheSceneStays) {
+  Result result;
+  std::thread player([&] { result = RunTool({"play", DataFile("points.ply"), "--spin"}); });
+  while (server_.log().transforms == 0) std::this_thread::yield();
+  interrupt_.Request();
+  player.join();
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("stays up"));
+  EXPECT_FALSE(server_.log().deleted_all_mine);
+}
+
+TEST_F(CommandsTest, AnInterruptBeforeTheSceneIsUpExitsWith130) {
+  interrupt_.Request();
+  EXPECT_EQ(RunTool({"play", DataFile("points.ply")}).code, 130);
+  EXPECT_EQ(RunTool({"displays"}).code, 130);
+}
+
+TEST_F(CommandsTest, ClearAtTheEnd) {
+  const Result result = RunTool({"play", DataFile("points.ply"), "--clear", "--duration", "0.05"});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_TRUE(server_.log().deleted_all_mine);
+  EXPECT_EQ(server_.log().opens[0].on_disconnect(), v1::DISCONNECT_POLICY_CLEAR);
+  EXPECT_THAT(result.err, Not(HasSubstr("stays up")));
+}
+
+TEST_F(CommandsTest, ASceneTakenDownByAnotherEndsTheSpin) {
+  server_.Set({.lose_entities = true});
+  const Result result = RunTool({"play", DataFile("points.ply"), "--spin", "--fps", "100"});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.err, HasSubstr("taken down by another client"));
+  EXPECT_THAT(result.err, Not(HasSubstr("stays up")));
+}
+
+TEST_F(CommandsTest, NothingIsPutUpIfOneFileIsBad) {
+  const Result result =
+      RunTool({"play", DataFile("points.ply"), folder_.Write("bad.ply", "nonsense")});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("bad.ply: is text that begins with \"nonsense\""));
+  EXPECT_THAT(result.err, HasSubstr("nothing is put up"));
+  EXPECT_TRUE(server_.log().opens.empty());
+}
+
+TEST_F(CommandsTest, RefusalsAreToldWithTheirIssues) {
+  server_.Set({.refuse_commits_with = "quota\x1b exceeded"});
+  const Result result = RunTool({"play", DataFile("points.ply")});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.err, HasSubstr("quota\\u{1b} exceeded"));
+  EXPECT_THAT(result.err, HasSubstr("define_object.definition: of no use"));
+  EXPECT_TRUE(server_.log().clears.empty()) << "the old scene stays";
+}
+
+TEST_F(CommandsTest, GlobeWantsAMap) {
+  EXPECT_THAT(RunTool({"play", DataFile("points.ply"), "--globe"}).err,
+              HasSubstr("--globe is for maps"));
+  EXPECT_EQ(RunTool({"play", DataFile("points.ply"), DataFile("quad.topojson"), "--globe"}).code,
+            0);
+}
+
+TEST_F(CommandsTest, UnknownDisplaysAreToldWithThoseThereAre) {
+  const Result play = RunTool({"play", DataFile("points.ply"), "--display", "fkae"});
+  EXPECT_EQ(play.code, 1);
+  EXPECT_THAT(play.err, HasSubstr("there is no display \"fkae\"; there are fake"));
+  EXPECT_THAT(RunTool({"snapshot", folder_.Path("a.png"), "--display", "x"}).err,
+              HasSubstr("there is fake"));
+  EXPECT_THAT(RunTool({"pattern", "grid", "--display", "x"}).err, HasSubstr("there is fake"));
+}
+
+TEST_F(CommandsTest, SnapshotsAreWrittenWholeOrNotAtAll) {
+  const std::string path = folder_.Path("a.png");
+  EXPECT_EQ(RunTool({"snapshot", path, "--size", "200x100"}).code, 0);
+  EXPECT_EQ(ReadAll(path).substr(1, 3), "PNG");
+  EXPECT_EQ(RunTool({"snapshot", path, "--slices"}).code, 0);
+  const std::string sheet = ReadAll(path);
+  server_.Set({.short_volume = true});
+  const Result result = RunTool({"snapshot", path});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.err, HasSubstr("1 of the volume's 16 slices did not come"));
+  EXPECT_EQ(ReadAll(path), sheet);
+}
+
+TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
+  EXPECT_EQ(RunTool({"pattern", "white"}).code, 0);
+  EXPECT_EQ(RunTool({"clear"}).code, 0);
+  FakeServer::Log log = server_.log();
+  ASSERT_EQ(log.updates.size(), 2u);
+  EXPECT_EQ(log.updates[0].test_pattern(), v1::TEST_PATTERN_WHITE);
+  EXPECT_EQ(log.updates[1].test_pattern(), v1::TEST_PATTERN_NONE);
+  EXPECT_EQ(log.clears.back().layer(), "voxelctl");
+  EXPECT_EQ(log.clears.back().owner(), 0u);
+  EXPECT_EQ(RunTool({"clear", "--all"}).code, 0);
+  EXPECT_EQ(server_.log().clears.back().layer(), "");
+  EXPECT_EQ(RunTool({"clear", "--layer", "absent"}).code, 0);
+}
+
+TEST_F(CommandsTest, NobodyThere) {
+  const Result result = RunAnywhere({"--server", "unix:" + folder_.Path("nobody"), "stats"});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("unix:" + folder_.Path("nobody")));
+  EXPECT_THAT(result.err, HasSubstr("start it with `voxeld`"));
+  EXPECT_EQ(RunAnywhere({"--server", "nonsense", "stats"}).code, 2);
+}
+
+}  // namespace
+}  // namespace voxeld::voxelctl

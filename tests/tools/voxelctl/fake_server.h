@@ -1,0 +1,59 @@
+// A server with just enough of both services: it keeps what it is sent, and can be told to
+// misbehave.
+#pragma once
+
+#include <grpcpp/server.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "display/sync/mutex.h"
+#include "voxeld/v1/display.grpc.pb.h"
+#include "voxeld/v1/scene.grpc.pb.h"
+
+namespace voxeld::voxelctl {
+
+class FakeServer final {
+ public:
+  // Listens on a unix socket at `path`.
+  explicit FakeServer(const std::string& path);
+  ~FakeServer();
+
+  std::string address() const { return address_; }
+
+  // Set before the calls that they are for.
+  struct Behaviour {
+    std::string refuse_commits_with;  // not empty: every commit is refused, with an issue
+    bool lose_entities = false;       // SetTransform is answered by an Issue NOT_FOUND
+    bool no_outcomes = false;         // outcomes are owed for ever
+    bool short_volume = false;        // CaptureVolume leaves out its last slice
+  };
+  void Set(const Behaviour& behaviour);
+
+  struct Log {
+    std::map<std::string, v1::Object> objects;
+    std::map<std::string, v1::Entity> entities;  // those up, by id
+    std::vector<v1::Open> opens;
+    uint64_t commits = 0, transforms = 0, largest_message = 0, most_unanswered = 0;
+    std::vector<v1::ClearLayerRequest> clears;
+    std::vector<v1::UpdateDisplayRequest> updates;
+    bool deleted_all_mine = false;
+  };
+  Log log() const;
+
+ private:
+  class Scene;
+  class Display;
+
+  mutable sync::Mutex mutex_;
+  Behaviour behaviour_ VOXELD_GUARDED_BY(mutex_);
+  Log log_ VOXELD_GUARDED_BY(mutex_);
+  std::string address_;
+  std::unique_ptr<Scene> scene_;
+  std::unique_ptr<Display> display_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace voxeld::voxelctl

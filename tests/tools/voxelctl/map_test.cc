@@ -1,0 +1,252 @@
+// GeoJSON and TopoJSON, flat and on the globe.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include <string>
+
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/import/importer.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using testing::ElementsAre;
+
+// The segments of a part as pairs of ends.
+std::vector<std::pair<Point3, Point3>> Segments(const Part& part) {
+  std::vector<std::pair<Point3, Point3>> segments;
+  for (size_t i = 0; i + 1 < part.indices.size(); i += 2) {
+    segments.emplace_back(part.positions[part.indices[i]], part.positions[part.indices[i + 1]]);
+  }
+  return segments;
+}
+
+absl::StatusOr<Model> ImportText(const std::string& text, bool globe,
+                                 const std::string& name = "map.geojson") {
+  TempFolder folder;
+  return ImportFile(folder.Write(name, text), {.globe = globe});
+}
+
+std::string Line(const std::string& coordinates) {
+  return R"({"type":"LineString","coordinates":)" + coordinates + "}";
+}
+
+double Distance(const Point3& a, const Point3& b) {
+  return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+
+TEST(GeoJson, FlatMap) {
+  const absl::StatusOr<Model> model = ImportFile(DataFile("places.geojson"), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->up, Up::kY);
+  EXPECT_FALSE(model->globe);
+  ASSERT_EQ(model->parts.size(), 2u);
+  EXPECT_THAT(Segments(model->parts[0]),
+              ElementsAre(std::pair(Point3{0, 0, 0}, Point3{10, 0, 0}),
+                          std::pair(Point3{10, 0, 0}, Point3{10, 10, 0}),
+                          std::pair(Point3{10, 10, 0}, Point3{0, 0, 0}),
+                          std::pair(Point3{20, 0, 0}, Point3{30, 5, 0})));
+  EXPECT_EQ(model->parts[1].kind, Kind::kPoints);
+  EXPECT_THAT(model->parts[1].positions, ElementsAre(Point3{-90, 0, 0}, Point3{0, 90, 0}));
+}
+
+TEST(GeoJson, ARingThatIsNotClosedIsClosed) {
+  const absl::StatusOr<Model> model =
+      ImportText(R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[0,4]]]})", false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 3u);
+  EXPECT_EQ(Segments(model->parts[0]).back(), std::pair(Point3({0, 4, 0}), Point3({0, 0, 0})));
+}
+
+TEST(GeoJson, FlatLineOverTheDateLineIsSplit) {
+  const absl::StatusOr<Model> model = ImportText(Line("[[170,0],[-170,10]]"), false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(Segments(model->parts[0]),
+              ElementsAre(std::pair(Point3{170, 0, 0}, Point3{180, 5, 0}),
+                          std::pair(Point3{-180, 5, 0}, Point3{-170, 10, 0})));
+}
+
+TEST(GeoJson, ProjectedMapsAreNotSplit) {
+  const absl::StatusOr<Model> model = ImportText(Line("[[-500000,100],[500000,200]]"), false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 1u);
+}
+
+TEST(Globe, PolesLieOnZAndGreenwichInFront) {
+  const absl::StatusOr<Model> model = ImportText(
+      R"({"type":"MultiPoint","coordinates":[[0,0],[90,0],[180,0],[-90,0],[12,90],[0,-90],[0,45]]})",
+      true);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_TRUE(model->globe);
+  EXPECT_EQ(model->up, Up::kZ);
+  const double half = std::sqrt(0.5);
+  const std::vector<Point3> expected = {{0, -1, 0}, {1, 0, 0},  {0, 1, 0},       {-1, 0, 0},
+                                        {0, 0, 1},  {0, 0, -1}, {0, -half, half}};
+  ASSERT_EQ(model->parts[0].positions.size(), expected.size());
+  for (size_t i = 0; i < expected.size(); ++i)
+    EXPECT_LT(Distance(model->parts[0].positions[i], expected[i]), 1e-12) << i;
+}
+
+TEST(Globe, LongEdgesFollowTheSphere) {
+  const absl::StatusOr<Model> model = ImportText(Line("[[0,60],[90,60]]"), true);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 45u);
+  for (const Point3& p : model->parts[0].positions) {
+    EXPECT_NEAR(std::hypot(p.x, p.y, p.z), 1, 1e-12);
+    EXPECT_NEAR(p.z, std::sin(M_PI / 3), 1e-12);
+  }
+}
+
+TEST(Globe, TheShortWayOverTheDateLine) {
+  const absl::StatusOr<Model> model = ImportText(Line("[[179,0],[-179,0]]"), true);
+  ASSERT_THAT(model, IsOk());
+  for (const Point3& p : model->parts[0].positions) EXPECT_GT(p.y, 0.99);
+}
+
+TEST(Globe, EdgesOfThePaperAreLeftOut) {
+  const absl::StatusOr<Model> model =
+      ImportText(Line("[[-180,-70],[-180,-90],[180,-90],[180,-70],[170,-70]]"), true);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 5u);  // the last edge alone, in steps of 2°
+}
+
+TEST(Globe, WantsDegrees) {
+  EXPECT_THAT(ImportText(Line("[[500000,100],[500100,200]]"), true),
+              Fails(Words{"500000", "projected"}));
+  EXPECT_THAT(ImportText(Line("[[0,91],[0,0]]"), true), Fails(Words{"91"}));
+}
+
+TEST(TopoJson, DecodesDeltasAndTransformAndDrawsSharedArcsOnce) {
+  const absl::StatusOr<Model> model = ImportFile(DataFile("quad.topojson"), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->format, "TopoJSON");
+  ASSERT_EQ(model->parts.size(), 2u);
+  EXPECT_THAT(Segments(model->parts[0]),
+              ElementsAre(std::pair(Point3{-10, 20, 0}, Point3{-10, 21, 0}),  // arc 0, shared
+                          std::pair(Point3{-10, 21, 0}, Point3{-11, 21, 0}),
+                          std::pair(Point3{-11, 21, 0}, Point3{-11, 20, 0}),  // arc 1
+                          std::pair(Point3{-11, 20, 0}, Point3{-10, 20, 0}),
+                          std::pair(Point3{-10, 20, 0}, Point3{-9, 20, 0}),  // arc 2
+                          std::pair(Point3{-9, 20, 0}, Point3{-9, 21, 0}),
+                          std::pair(Point3{-9, 21, 0}, Point3{-10, 21, 0})));
+  EXPECT_THAT(model->parts[1].positions, ElementsAre(Point3{-8, 22, 0}));
+}
+
+TEST(TopoJson, WithoutTransformArcsAreAbsolute) {
+  const absl::StatusOr<Model> good = ImportText(
+      R"({"type":"Topology","objects":{"a":{"type":"LineString","arcs":[-1]}},"arcs":[[[1,2],[3,4]]]})",
+      false, "map.topojson");
+  ASSERT_THAT(good, IsOk());
+  EXPECT_THAT(Segments(good->parts[0]), ElementsAre(std::pair(Point3{1, 2, 0}, Point3{3, 4, 0})));
+}
+
+TEST(WorldAtlas, CountriesOnTheGlobe) {
+  const absl::StatusOr<Model> model =
+      ImportFile(std::string(VOXELD_DATA_DIR) + "/world-atlas/countries-50m.json", {.globe = true});
+  ASSERT_THAT(model, IsOk()) << "tools/setup fetches world-atlas into build/data";
+  ASSERT_EQ(model->parts.size(), 1u);
+  const Part& part = model->parts[0];
+  EXPECT_GT(part.positions.size(), 80000u);
+  double longest = 0;
+  for (const auto& [a, b] : Segments(part)) longest = std::max(longest, Distance(a, b));
+  EXPECT_LT(
+      longest,
+      2 * std::sin(1.5 * M_PI /
+                   180));  // no chord through the Earth: each edge has 2° a coordinate at most
+  // Some point of Africa's west coast, Dakar (14.7 N, 17.5 W), is near, in front and to the left.
+  const Point3 dakar = {std::cos(14.7 * M_PI / 180) * std::sin(-17.5 * M_PI / 180),
+                        -std::cos(14.7 * M_PI / 180) * std::cos(17.5 * M_PI / 180),
+                        std::sin(14.7 * M_PI / 180)};
+  double nearest = 2;
+  for (const Point3& p : part.positions) nearest = std::min(nearest, Distance(p, dakar));
+  EXPECT_LT(nearest, 0.01);
+}
+
+TEST(WorldAtlas, LandOnAFlatMap) {
+  const absl::StatusOr<Model> model =
+      ImportFile(std::string(VOXELD_DATA_DIR) + "/world-atlas/land-110m.json", {});
+  ASSERT_THAT(model, IsOk()) << "tools/setup fetches world-atlas into build/data";
+  // No line runs across the map: what crosses the date line was split.
+  for (const auto& [a, b] : Segments(model->parts[0])) EXPECT_LT(std::abs(a.x - b.x), 60);
+}
+
+struct BadMap {
+  const char* name;
+  std::string text;
+  Words words;
+};
+
+class BadMaps : public testing::TestWithParam<BadMap> {};
+
+TEST_P(BadMaps, AreRefusedWithWords) {
+  TempFolder folder;
+  const std::string path = folder.Write("bad.json", GetParam().text);
+  Words words = GetParam().words;
+  words.push_back(path);
+  EXPECT_THAT(ImportFile(path, {}), Fails(words));
+}
+
+std::string Topology(const std::string& objects, const std::string& arcs) {
+  return R"({"type":"Topology","objects":)" + objects + R"(,"arcs":)" + arcs + "}";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, BadMaps,
+    testing::Values(
+        BadMap{"white", "   \n ", {"nothing but white space"}},
+        BadMap{"picture", "GIF89a", {"a GIF picture", "JSON"}},
+        BadMap{"truncated",
+               R"({"type":"FeatureCollection","features":[{"type":)",
+               {"unfinished", "truncated"}},
+        BadMap{"malformed", R"({"type":"Point" "coordinates":[0,0]})", {"malformed at byte"}},
+        BadMap{"deep",
+               std::string(100000, '[') + std::string(100000, ']'),
+               {"nests 100000 deep", "64"}},
+        BadMap{"deep_unclosed", std::string(1000000, '['), {"nests 1000000 deep"}},
+        BadMap{"huge_number", R"({"type":"Point","coordinates":[1e999,0]})", {"out of range"}},
+        BadMap{"nan", R"({"type":"Point","coordinates":[NaN,0]})", {"malformed"}},
+        BadMap{"no_type", R"({"a":1})", {"without a \"type\""}},
+        BadMap{"type_is_number", R"({"type":3})", {"without a \"type\""}},
+        BadMap{"array", R"([1,2])", {"without a \"type\""}},
+        BadMap{"unknown_type",
+               R"({"type":"Blob\u001b[31m"})",
+               {"Blob\\u{1b}[31m", "FeatureCollection"}},
+        BadMap{"no_coordinates", R"({"type":"LineString"})", {"document.coordinates"}},
+        BadMap{"words_for_numbers",
+               R"({"type":"LineString","coordinates":[[0,0],["a",1]]})",
+               {"document.coordinates[1]", "[longitude, latitude]"}},
+        BadMap{"one_number",
+               R"({"type":"Feature","geometry":{"type":"Point","coordinates":[1]}})",
+               {"document.geometry.coordinates"}},
+        BadMap{"features_no_array",
+               R"({"type":"FeatureCollection","features":{}})",
+               {"document.features"}},
+        BadMap{
+            "nothing", R"({"type":"FeatureCollection","features":[]})", {"no line and no point"}},
+        BadMap{"arc_out_of_range",
+               Topology(R"({"a":{"type":"LineString","arcs":[1]}})", "[[[0,0],[1,1]]]"),
+               {"objects.a.arcs", "arc 1", "there are 1 arcs"}},
+        BadMap{"arc_backwards_out_of_range",
+               Topology(R"({"a":{"type":"Polygon","arcs":[[-3]]}})", "[[[0,0],[1,1]]]"),
+               {"arc -3"}},
+        BadMap{"arc_absurd",
+               Topology(R"({"a":{"type":"LineString","arcs":[9223372036854775807]}})",
+                        "[[[0,0],[1,1]]]"),
+               {"9223372036854775807"}},
+        BadMap{"arc_text",
+               Topology(R"({"a":{"type":"LineString","arcs":["x"]}})", "[[[0,0],[1,1]]]"),
+               {"objects.a.arcs"}},
+        BadMap{"arc_short",
+               Topology(R"({"a":{"type":"LineString","arcs":[0]}})", "[[[0,0]]]"),
+               {"arcs[0]"}},
+        BadMap{"no_arcs", R"({"type":"Topology","objects":{}})", {"arcs"}},
+        BadMap{"no_objects", R"({"type":"Topology","arcs":[]})", {"objects"}},
+        BadMap{"transform",
+               R"({"type":"Topology","objects":{},"arcs":[],"transform":{"scale":[1]}})",
+               {"transform"}}),
+    [](const auto& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace voxeld::voxelctl
