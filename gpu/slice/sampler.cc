@@ -85,8 +85,12 @@ void Sampler::BuildInner() {
   }
 }
 
-std::span<const display::FootprintEntry> Sampler::Outer(int32_t slice, uint32_t u) const {
-  return table_.outer.list(static_cast<size_t>(slice) * static_cast<size_t>(table_.width) + u);
+// Row (slice, v) as table_.inner has it.
+std::span<const Sampler::InnerEntry> Sampler::Inner(int32_t slice, uint32_t v) const {
+  const size_t row =
+      static_cast<size_t>(slice % table_.inner_sets) * static_cast<size_t>(table_.height) + v;
+  const uint32_t begin = table_.inner.begin[row];
+  return std::span(inner_).subspan(begin, table_.inner.begin[row + 1] - begin);
 }
 
 // Raises line[place] to the colours of the voxels outer + inner; false if none is lit.
@@ -128,15 +132,14 @@ void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
     uint32_t* const line = lines + j * places_;
     std::fill(line, line + places_, 0);
     bool any = false;
-    for (const display::FootprintEntry& outer : Outer(slice, u0 + j)) {
+    for (const display::FootprintEntry& outer : table_.Outer(slice, static_cast<int32_t>(u0 + j))) {
       any |= Gather(tiles, outer, line);
     }
     if (any) lit[lit_count++] = j;
   }
   if (lit_count == 0) return;
   for (uint32_t v = 0; v < static_cast<uint32_t>(table_.height); ++v) {
-    const std::span<const InnerEntry> inner = std::span(inner_).subspan(
-        table_.inner.begin[v], table_.inner.begin[v + 1] - table_.inner.begin[v]);
+    const std::span<const InnerEntry> inner = Inner(slice, v);
     for (uint32_t n = 0; n < lit_count; ++n) {
       const uint32_t* line = lines + lit[n] * places_;
       uint32_t greatest = 0;
@@ -152,17 +155,16 @@ void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
 void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
                              SlicePixels& out) const {
   const uint32_t width = static_cast<uint32_t>(table_.width);
-  for (const display::FootprintEntry& outer : Outer(slice, u)) {
+  for (const display::FootprintEntry& outer : table_.Outer(slice, static_cast<int32_t>(u))) {
     std::fill(out.lines.begin(), out.lines.end(), 0);
     if (!Gather(tiles, outer, out.lines.data())) continue;
     for (uint32_t v = 0; v < static_cast<uint32_t>(table_.height); ++v) {
       uint32_t& rgb = out.rgb[v * width + u];
       const uint32_t before = rgb;
-      for (uint32_t i = table_.inner.begin[v]; i < table_.inner.begin[v + 1]; ++i) {
-        const uint32_t color = out.lines[inner_[i].place];
+      for (const InnerEntry& inner : Inner(slice, v)) {
+        const uint32_t color = out.lines[inner.place];
         if (color == 0) continue;
-        rgb = RaiseWeighted(rgb, FootprintWeight(outer.weight, inner_[i].weight),
-                            Deinterleave(color));
+        rgb = RaiseWeighted(rgb, FootprintWeight(outer.weight, inner.weight), Deinterleave(color));
       }
       if (before == 0 && rgb != 0) out.lit.push_back(v * width + u);
     }

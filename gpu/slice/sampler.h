@@ -53,7 +53,7 @@ class Sampler {
   Sampler() = default;
   void BuildInner();
   bool Gather(const TileStore& tiles, const display::FootprintEntry& outer, uint32_t* line) const;
-  std::span<const display::FootprintEntry> Outer(int32_t slice, uint32_t u) const;
+  std::span<const InnerEntry> Inner(int32_t slice, uint32_t v) const;
   void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0, SlicePixels& out) const;
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 

@@ -90,11 +90,11 @@ uint32_t Level(uint32_t channel, uint32_t levels, int u, int v, int sub, const T
                                65535);
 }
 
-uint32_t PixelOf(const DenseVolume& volume, const display::FootprintTable& table, size_t outer_list,
-                 size_t inner_list, display::Sampling sampling) {
+uint32_t PixelOf(const DenseVolume& volume, const display::FootprintTable& table, int32_t slice,
+                 int32_t u, int32_t v, display::Sampling sampling) {
   uint32_t best = 0, red = 0, green = 0, blue = 0;
-  for (const display::FootprintEntry& o : table.outer.list(outer_list)) {
-    for (const display::FootprintEntry& i : table.inner.list(inner_list)) {
+  for (const display::FootprintEntry& o : table.Outer(slice, u)) {
+    for (const display::FootprintEntry& i : table.Inner(slice, v)) {
       const uint32_t rgb = volume.rgb[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)];
       if (Interleaved(rgb) > Interleaved(best)) best = rgb;
       const uint32_t w = (uint32_t{o.weight} * i.weight + 127) / 255;
@@ -180,9 +180,13 @@ std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target)
   const display::FootprintTable table =
       display::BuildFootprints(target.geometry, target.tone.sampling);
   std::vector<uint8_t> seen(volume.rgb.size());
-  for (const display::FootprintEntry& o : table.outer.entries) {
-    for (const display::FootprintEntry& i : table.inner.entries) {
-      seen[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)] = 1;
+  for (int32_t slice = 0; slice < table.slices; ++slice) {
+    for (int32_t pixel = 0; pixel < table.width * table.height; ++pixel) {
+      for (const display::FootprintEntry& o : table.Outer(slice, pixel % table.width)) {
+        for (const display::FootprintEntry& i : table.Inner(slice, pixel / table.width)) {
+          seen[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)] = 1;
+        }
+      }
     }
   }
   return seen;
@@ -199,8 +203,8 @@ std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& t
   for (int32_t slice = 0; slice < layout.slices; ++slice) {
     for (size_t v = 0; v < height; ++v) {
       for (size_t u = 0; u < width; ++u) {
-        const uint32_t rgb =
-            PixelOf(volume, table, static_cast<size_t>(slice) * width + u, v, target.tone.sampling);
+        const uint32_t rgb = PixelOf(volume, table, slice, static_cast<int32_t>(u),
+                                     static_cast<int32_t>(v), target.tone.sampling);
         for (int32_t sub = 0; sub < layout.sub_frames; ++sub) {
           const size_t picture =
               (static_cast<size_t>(slice) * static_cast<size_t>(layout.sub_frames) +

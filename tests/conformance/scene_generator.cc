@@ -51,6 +51,9 @@ Target SceneGenerator::RandomTarget() {
     for (display::Rotor::Panel& panel : rotor.panels) {
       panel.eccentricity_mm = Chance(0.5) ? 0 : Real(-3, 3);
       panel.phase_turns = Chance(0.5) ? 0 : Real(0, 0.99);
+      panel.shift_v_mm = Chance(0.7) ? 0 : Real(-5, 5);
+      panel.mirror_u = Chance(0.2);
+      panel.mirror_v = Chance(0.2);
     }
     rotor.clockwise = Chance(0.3);
     target.geometry.shape = rotor;
