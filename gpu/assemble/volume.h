@@ -22,7 +22,7 @@ class TileStore {
  public:
   void Reset(const TileGrid& grid);
   const TileGrid& grid() const { return grid_; }
-  // kTileVoxels colours (IndexInTile), or nothing if all are black.
+  // kTileVoxels colours (TileGrid::IndexInTile), or nothing if all are black.
   const uint32_t* colors(uint32_t tile) const { return colors_[tile].get(); }
   uint32_t lit(uint32_t tile) const { return lit_[tile]; }
   // Copies `colors`, of which `lit` are not black. False if the tile is as it was.

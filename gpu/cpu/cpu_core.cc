@@ -1,20 +1,14 @@
 #include "gpu/cpu/cpu_core.h"
 
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "display/sync/clock.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
 namespace {
-
-int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 template <typename Value>
 absl::Status Wrong(const char* field, const Value& value, const std::string& right) {
@@ -136,9 +130,10 @@ absl::StatusOr<FrameResult> CpuCore::SubmitFrame(const FrameRequest& request, Fr
   if (absl::Status status = CheckFrame(request, buffer); !status.ok()) return status;
   FrameResult result;
   result.frame = request.frame;
-  const int64_t start = NowNs();
+  const sync::SystemClock clock;
+  const sync::TimeNs start = clock.Now();
   UpdateVolume();
-  const int64_t assembled = NowNs();
+  const sync::TimeNs assembled = clock.Now();
   result.tiles_drawn = unsliced_.tiles_drawn;
   const Volume::Changes changes = std::exchange(unsliced_, {});
   const Pictures::Result drawn = pictures_.Update(volume_.tiles(), changes, request.frame);
@@ -148,7 +143,7 @@ absl::StatusOr<FrameResult> CpuCore::SubmitFrame(const FrameRequest& request, Fr
   result.lit_voxels = volume_.lit_voxels();
   result.singular_drawables = volume_.singular_drawables();
   result.assemble_ns = assembled - start;
-  result.slice_ns = NowNs() - assembled;
+  result.slice_ns = clock.Now() - assembled;
   last_frame_ = request.frame;
   return result;
 }

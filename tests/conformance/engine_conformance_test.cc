@@ -16,7 +16,7 @@ TEST_P(EngineConformance, RandomScenesEqualTheOracle) {
   const uint64_t seed = SeedOr(1);
   EngineDriver engine = Make();
   uint64_t lit = 0;
-  for (uint64_t i = 0; i < 300; ++i) {
+  for (uint64_t i = 0; i < 120; ++i) {
     SCOPED_TRACE("VOXELD_SEED=" + std::to_string(seed + i));
     SceneGenerator generator(seed + i);
     const Target target = generator.RandomTarget();

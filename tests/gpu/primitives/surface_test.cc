@@ -95,7 +95,7 @@ Voxel MiddleOf(const Affine& map) {
 
 TEST(Surface, ClosedMeshesAreNotCrossed) {
   std::mt19937 random(1);
-  for (int i = 0; i < 24; ++i) {
+  for (int i = 0; i < 12; ++i) {
     const Mesh mesh = Icosphere(i % 4);
     const Affine map = RandomMap(random);
     for (SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
@@ -157,7 +157,7 @@ TYPED_TEST_SUITE(SolidSurface, Solids);
 
 TYPED_TEST(SolidSurface, IsNotCrossed) {
   std::mt19937 random(2);
-  for (int i = 0; i < 15; ++i) {
+  for (int i = 0; i < 5; ++i) {
     const Affine map = RandomMap(random);
     for (SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
       const VoxelSet set = DrawnSolid<TypeParam>(map, rule, Fill::kSurface);
