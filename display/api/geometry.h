@@ -1,8 +1,8 @@
 // What a volumetric display is, as data: its voxel grid and how its slices sweep through it. Words
 // only; display/geometry computes with them.
 //
-// Space: right-handed, millimetres, +Z is the display's vertical axis, the origin is the middle of the
-// volume. Voxel (i,j,k) is the half-open cell origin_mm + [i,i+1)×[j,j+1)×[k,k+1) · pitch_mm.
+// Space: right-handed, millimetres, +Z is the display's vertical axis, the origin is the middle of
+// the volume. Voxel (i,j,k) is the half-open cell origin_mm + [i,i+1)×[j,j+1)×[k,k+1) · pitch_mm.
 #pragma once
 
 #include <cstdint>
@@ -34,18 +34,18 @@ struct PlanarStack {
   Normal normal = Normal::kZ;
   int32_t width_px = 0, height_px = 0;    // 1 to 16384
   double pitch_u_mm = 1, pitch_v_mm = 1;  // > 0
-  // Where each slice stands on the normal's axis, mm, strictly ascending; 1 to 16384 of them. Slice s
-  // stands for the slab from half-way to its predecessor to half-way to its successor; the outer two
-  // reach as far outward as inward (a single slice: thickness_mm).
+  // Where each slice stands on the normal's axis, mm, strictly ascending; 1 to 16384 of them. Slice
+  // s stands for the slab from half-way to its predecessor to half-way to its successor; the outer
+  // two reach as far outward as inward (a single slice: thickness_mm).
   std::vector<double> positions_mm;
   double thickness_mm = 1;  // of the slab of a single slice only
   bool mirror_u = false, mirror_v = false;
   bool operator==(const PlanarStack&) const = default;
 };
 
-// LED panels that spin about the vertical axis. At turn angle 0 a panel with phase 0 lies in the plane
-// y = eccentricity_mm with u along +x; v runs up, along +z. Turning is counter-clockwise seen from
-// above, unless `clockwise`.
+// LED panels that spin about the vertical axis. At turn angle 0 a panel with phase 0 lies in the
+// plane y = eccentricity_mm with u along +x; v runs up, along +z. Turning is counter-clockwise seen
+// from above, unless `clockwise`.
 struct Rotor {
   struct Panel {
     double pitch_u_mm = 1, pitch_v_mm = 1;  // > 0
@@ -63,8 +63,9 @@ struct Rotor {
   bool operator==(const Rotor&) const = default;
 };
 
-// Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s]; for a Rotor slice
-// s·panels + p is panel p while the rotor turns through [s−½, s+½) / slices_per_turn of a turn.
+// Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s]; for a Rotor
+// slice s·panels + p is panel p while the rotor turns through [s−½, s+½) / slices_per_turn of a
+// turn.
 struct Geometry {
   std::variant<PlanarStack, Rotor> shape;
   VoxelGrid grid;

@@ -21,12 +21,12 @@ struct VolumeOutcome {
   };
   Kind kind = Kind::kLost;
   uint64_t volume = 0;
-  int64_t time_ns = 0;        // on the display's clock; of presentation, or of the verdict
+  int64_t time_ns = 0;  // on the display's clock; of presentation, or of the verdict
   Evidence evidence = Evidence::kEstimated;
-  uint64_t replaced_by = 0;   // kReplaced: the newer volume
-  int64_t last_byte_ns = 0;   // when the transport took the last byte; 0 if it did not
-  uint64_t bytes_sent = 0;    // on the wire for this volume, re-sent slices included
-  std::string reason;         // kLost: what failed
+  uint64_t replaced_by = 0;  // kReplaced: the newer volume
+  int64_t last_byte_ns = 0;  // when the transport took the last byte; 0 if it did not
+  uint64_t bytes_sent = 0;   // on the wire for this volume, re-sent slices included
+  std::string reason;        // kLost: what failed
 };
 
 enum class DisplayState : uint8_t {

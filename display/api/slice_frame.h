@@ -10,9 +10,10 @@
 namespace voxeld::display {
 
 enum class PixelFormat : uint8_t {
-  kRgb888 = 0,      // R, G, B bytes; row-major
-  kRgb332 = 1,      // one byte: R in bits 7–5, G in 4–2, B in 1–0
-  kBitPlanes3 = 2,  // three planes R, G, B, a bit a pixel; each row padded to a byte, first pixel in bit 7
+  kRgb888 = 0,  // R, G, B bytes; row-major
+  kRgb332 = 1,  // one byte: R in bits 7–5, G in 4–2, B in 1–0
+  // Three planes R, G, B, a bit a pixel; each row padded to a byte, first pixel in bit 7.
+  kBitPlanes3 = 2,
 };
 
 // How a slice pixel takes its colour from the voxels of its footprint.
@@ -36,9 +37,12 @@ struct FrameLayout {
   size_t bytes_per_slice() const {
     const size_t w = static_cast<size_t>(width), h = static_cast<size_t>(height);
     switch (format) {
-      case PixelFormat::kRgb888: return w * h * 3;
-      case PixelFormat::kRgb332: return w * h;
-      case PixelFormat::kBitPlanes3: return (w + 7) / 8 * h * 3;
+      case PixelFormat::kRgb888:
+        return w * h * 3;
+      case PixelFormat::kRgb332:
+        return w * h;
+      case PixelFormat::kBitPlanes3:
+        return (w + 7) / 8 * h * 3;
     }
     return 0;
   }
@@ -60,8 +64,9 @@ struct Tone {
 struct SliceFrame {
   uint64_t volume = 0;  // numbers ascend by one a volume, from 1
   FrameLayout layout;
-  std::vector<std::byte> bytes;      // layout.bytes(): picture after picture
-  std::vector<uint64_t> changed_in;  // layout.pictures(): the volume in which each picture last changed
+  std::vector<std::byte> bytes;  // layout.bytes(): picture after picture
+  // layout.pictures(): the volume in which each picture last changed.
+  std::vector<uint64_t> changed_in;
 };
 
 using SliceFramePtr = std::shared_ptr<const SliceFrame>;

@@ -1,5 +1,5 @@
-// A clock that stands still until it is told to move: for tests and for simulations of whole systems
-// in one thread.
+// A clock that stands still until it is told to move: for tests and for simulations of whole
+// systems in one thread.
 #pragma once
 
 #include <utility>
@@ -16,8 +16,8 @@ class FakeClock final : public Clock {
   TimeNs Now() const override;
   void WaitUntil(Mutex& mutex, CondVar& cv, TimeNs deadline) override VOXELD_REQUIRES(mutex);
 
-  // Moves time forward and wakes every thread that waits on this clock. The caller must hold none of
-  // the waiters' mutexes.
+  // Moves time forward and wakes every thread that waits on this clock. The caller must hold none
+  // of the waiters' mutexes.
   void Advance(TimeNs delta) { AdvanceTo(Now() + delta); }
   void AdvanceTo(TimeNs time);
 
