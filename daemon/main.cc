@@ -145,6 +145,14 @@ int Main(int argc, char** argv) {
   const absl::StatusOr<Logger::Format> format = Logger::ParseFormat(config->log.format);
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
 
+  umask(0007);  // sockets are for the user and the group from the moment that they exist
+  std::signal(SIGPIPE, SIG_IGN);
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays make threads: main alone waits
+
   sync::SystemClock clock;
   absl::StatusOr<Displays> displays = MakeDisplays(*config, clock);
   if (!displays.ok()) {
@@ -155,13 +163,6 @@ int Main(int argc, char** argv) {
     return 0;
   }
 
-  umask(0007);  // sockets are for the user and the group from the moment that they exist
-  std::signal(SIGPIPE, SIG_IGN);
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread is made: main alone waits
   Logger log(*level, *format);
   return Serve(*config, *std::move(displays), signals, clock, log);
 }

@@ -22,6 +22,7 @@ void ActiveCalls::Remove(const ActiveCall* call) {
   if (it == calls_.end()) return;
   last = std::move(it->second);
   calls_.erase(it);
+  removed_.NotifyAll();
 }
 
 void ActiveCalls::EndAll(const absl::Status& status) {
@@ -35,9 +36,9 @@ void ActiveCalls::EndAll(const absl::Status& status) {
   for (const auto& call : calls) call->End(status);
 }
 
-size_t ActiveCalls::size() const {
+void ActiveCalls::AwaitNone(sync::Clock& clock, sync::TimeNs deadline) {
   sync::MutexLock lock(mutex_);
-  return calls_.size();
+  while (!calls_.empty() && clock.Now() < deadline) clock.WaitUntil(mutex_, removed_, deadline);
 }
 
 }  // namespace voxeld::daemon::services

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "absl/status/status.h"
+#include "display/sync/clock.h"
 #include "display/sync/mutex.h"
 
 namespace voxeld::daemon::services {
@@ -26,10 +27,12 @@ class ActiveCalls {
   void Remove(const ActiveCall* call);
 
   void EndAll(const absl::Status& status);
-  size_t size() const;
+  // Until none is left, or `deadline` of `clock`.
+  void AwaitNone(sync::Clock& clock, sync::TimeNs deadline);
 
  private:
-  mutable sync::Mutex mutex_;
+  sync::Mutex mutex_;
+  sync::CondVar removed_;
   std::map<const ActiveCall*, std::shared_ptr<ActiveCall>> calls_ VOXELD_GUARDED_BY(mutex_);
   std::optional<absl::Status> ended_ VOXELD_GUARDED_BY(mutex_);
 };

@@ -29,6 +29,7 @@ constexpr int kKeepaliveMs = 20'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr int kLeastPingIntervalMs = 5'000;
 
+constexpr sync::TimeNs kLastCallsLimit = 200 * sync::kMillisecond;
 constexpr int kStreamsPerConnection = 256;
 constexpr mode_t kSocketMode = 0660;
 
@@ -101,8 +102,14 @@ class Server::Impl {
     if (server_ == nullptr) return;
     server_->GetHealthCheckService()->Shutdown();
     context_.calls.EndAll(absl::UnavailableError("shutting down"));
+    const sync::TimeNs deadline = context_.clock.Now() + limit;
+    context_.calls.AwaitNone(context_.clock, deadline);
+    // What is left are short calls, and clients whose threads do not look at their connections:
+    // gRPC would wait for those to the end.
+    const sync::TimeNs rest =
+        std::clamp<sync::TimeNs>(deadline - context_.clock.Now(), 0, kLastCallsLimit);
     server_->Shutdown(
-        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(limit, GPR_TIMESPAN)));
+        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(rest, GPR_TIMESPAN)));
     server_->Wait();
     server_.reset();
   }

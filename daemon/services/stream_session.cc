@@ -29,7 +29,6 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
   uint64_t previous = 0;
   {
     sync::MutexLock lock(mutex_);
-    reading_ = false;
     if (state_ != State::kNew && state_ != State::kOpen) return;
     previous = sequence_;
   }
@@ -49,6 +48,7 @@ void StreamSession::TakeOpen(wire::Decoded decoded, uint64_t bytes) {
       no_outcomes_ = decoded.open->no_outcomes;
       client_name_ = decoded.open->client_name;
       state_ = State::kOpening;
+      reading_ = false;
     }
   }
   if (!first) {
@@ -117,7 +117,9 @@ void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
   }
   context_.core.Handle(session, std::move(decoded.operations), std::move(decoded.issues), bytes,
                        [self = shared_from_this()] { self->OnProcessed(); });
+  // Only now: a message that came in on another thread would overtake this one.
   sync::MutexLock lock(mutex_);
+  reading_ = false;
   Read();
 }
 

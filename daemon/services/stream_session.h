@@ -105,6 +105,7 @@ class StreamSession final : public SessionSink,
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;  // 0: none
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
+  // A read is pending, or what it brought has not been handed to the core yet.
   bool reading_ VOXELD_GUARDED_BY(mutex_) = false;
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;

@@ -297,6 +297,30 @@ TEST(Stream, AClientThatVanishesInMidFrameLeavesTheOthersAlone) {
   other.ReadOutcomes(2);
 }
 
+TEST(Stream, MessagesKeepTheirOrder) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_no_outcomes(true);
+  client.Open(open);
+  // One that overtook another would leave a frame open, or stand outside it.
+  constexpr int kFrames = 500;
+  for (int i = 1; i <= kFrames; ++i) {
+    v1::StreamRequest request;
+    request.mutable_frame_begin()->set_layer("layer");
+    client.Send(request);
+    client.Send(SphereIn("layer", absl::StrCat(i)));
+    request.mutable_frame_end()->set_layer("layer");
+    client.Send(request);
+    client.Commit(i);
+  }
+  client.HalfClose();
+  EXPECT_TRUE(client.Finish().ok());
+  EXPECT_THAT(client.issues, SizeIs(0));
+  ASSERT_THAT(client.answers, SizeIs(kFrames));
+  for (int i = 0; i < kFrames; ++i) EXPECT_EQ(client.answers[i].frame_id(), i + 1u);
+}
+
 TEST(Stream, SeveralClientsAtOnceAndSumsAreExact) {
   Daemon daemon;
   constexpr int kClients = 4, kCommits = 25;

@@ -1,0 +1,28 @@
+// Just enough HTTP to ask a daemon.
+#pragma once
+
+#include <string>
+
+namespace voxeld::e2e {
+
+// An open TCP connection; `address` is HOST:PORT with a number for a host.
+class HttpConnection {
+ public:
+  explicit HttpConnection(const std::string& address);
+  ~HttpConnection();
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
+
+  // Asks for `path`, and reads to the end of the connection.
+  std::string Get(const std::string& path);
+
+ private:
+  int fd_ = -1;
+};
+
+// Head and body.
+inline std::string HttpGet(const std::string& address, const std::string& path) {
+  return HttpConnection(address).Get(path);
+}
+
+}  // namespace voxeld::e2e

@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# The real programs, end to end: files played into a stack and a rotor, statistics and pictures that must hold light.
+# usage: play_test.sh VOXELD VOXELCTL DATA_DIR
+set -euo pipefail
+voxeld=$1
+voxelctl=$2
+data=$3
+
+work=$(mktemp -d)
+daemon=
+trap '[ -z "$daemon" ] || kill -KILL "$daemon" 2>/dev/null || true; rm -rf "$work"' EXIT
+export VOXELD_SERVER=unix:$work/voxeld.sock
+
+"$voxeld" --listen "$VOXELD_SERVER" --http off --log-level warn \
+  --display stack=simulated,geometry=planar,size=64x64x64 \
+  --display rotor=simulated,geometry=rotor,size=64x64,slices=180,format=rgb332 &
+daemon=$!
+for _ in $(seq 600); do
+  "$voxelctl" displays >/dev/null 2>&1 && break
+  kill -0 "$daemon"
+  sleep 0.1 # the daemon has no other way to say that it listens
+done
+
+# field FILE EXPRESSION: prints what Python makes of the JSON document `d`.
+field() { python3 -c 'import json, sys; d = json.load(open(sys.argv[1])); print(eval(sys.argv[2]))' "$1" "$2"; }
+
+play() {
+  local name=$1
+  shift
+  "$voxelctl" --json play "$@" >"$work/play.json"
+  for display in stack rotor; do
+    "$voxelctl" --json snapshot "$work/$name-$display.png" --display "$display" >"$work/picture.json"
+    [ "$(field "$work/picture.json" 'd["lit_pixels"] > 100')" = True ] ||
+      { echo "$name on $display is dark: $(cat "$work/picture.json")" >&2; exit 1; }
+    [ "$(head -c 8 "$work/$name-$display.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+  done
+  "$voxelctl" snapshot --slices "$work/$name-sheet.png"
+}
+
+models=/usr/share/assimp/models
+play engine "$models/glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"
+play spider "$models/OBJ/spider.obj"
+play stl "$models/STL/Spider_binary.stl"
+play cloud "$models/PLY/pond.0.ply"
+play globe "$data/world-atlas/countries-50m.json" --globe
+play turning "$models/OBJ/spider.obj" --spin --duration 2 --fps 10
+
+"$voxelctl" --json stats >"$work/stats.json"
+python3 - "$work/stats.json" <<'EOT'
+import json, sys
+stats = json.load(open(sys.argv[1]))
+for d in stats["displays"]:
+    n = {k: int(v) for k, v in d.items() if k.startswith("commits_")}
+    given = sum(v for k, v in n.items() if k != "commits_owed")
+    assert n["commits_owed"] == given, (d["name"], n)
+    assert d["engine"] == "cpu" and int(d["lit_voxels"]) > 0 and int(d["bytes_out"]) > 0, d
+    assert int(d["volumes_presented"]) > 0 and int(d["volumes_lost"]) == 0, d
+EOT
+
+"$voxelctl" pattern corners
+"$voxelctl" --json snapshot "$work/corners.png" >"$work/picture.json"
+[ "$(field "$work/picture.json" 'd["lit_pixels"] > 100')" = True ]
+"$voxelctl" pattern none
+"$voxelctl" clear
+"$voxelctl" --json entities >"$work/entities.json"
+[ "$(field "$work/entities.json" 'int(d["total"])')" = 0 ]
+
+kill -TERM "$daemon"
+wait "$daemon"
+daemon=
+echo "played, shown, counted, cleared"

@@ -1,0 +1,225 @@
+// The real binary: command line, configuration, start, stop.
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <signal.h>
+#include <sys/socket.h>
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/version/version.h"
+#include "tests/daemon/services/daemon_fixture.h"
+#include "tests/e2e/http_get.h"
+#include "tests/e2e/voxeld_process.h"
+
+namespace voxeld::e2e {
+namespace {
+
+using daemon::services::Client;
+using daemon::services::SetDeadline;
+using daemon::services::SphereIn;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr std::chrono::seconds kPromised{5};
+
+std::shared_ptr<grpc::Channel> Channel(const std::string& target) {
+  return grpc::CreateChannel(target, grpc::InsecureChannelCredentials());
+}
+
+TEST(CommandLine, Version) {
+  const Ended ended = RunToEnd(Voxeld({"--version"}));
+  EXPECT_EQ(ended.code, 0);
+  EXPECT_EQ(ended.output, absl::StrCat("voxeld ", daemon::Version(), "\n"));
+}
+
+TEST(CommandLine, UsageErrorsExitWith2AndSuggest) {
+  const Folder folder;
+  const auto refusal = [&](const std::vector<std::string>& arguments) {
+    const Ended ended = RunToEnd(Voxeld(arguments), CleanEnvironment(folder));
+    EXPECT_EQ(ended.code, 2) << ended.output;
+    EXPECT_THAT(ended.output, StartsWith("voxeld: "));
+    return ended.output;
+  };
+  EXPECT_THAT(refusal({"--lisen", "a:1"}), HasSubstr("did you mean --listen?"));
+  EXPECT_THAT(refusal({"--listen", "nowhere"}), HasSubstr("HOST:PORT or unix:PATH"));
+  EXPECT_THAT(refusal({"--display", "sim"}), HasSubstr("NAME=DRIVER"));
+  EXPECT_THAT(refusal({"--display", "sim=simulatd"}), HasSubstr("simulated"));
+  EXPECT_THAT(refusal({"--display", "sim=simulated,siz=8x8x8"}), HasSubstr("siz"));
+  EXPECT_THAT(refusal({"--engine", "gpu"}), HasSubstr("--engine is \"gpu\""));
+}
+
+TEST(CheckConfig, PrintsWhatIsInForceOrWhatIsWrong) {
+  const Folder folder;
+  const std::string good = folder.File("good.toml", "[limits]\nmax_sessions = 7\n");
+  Ended ended = RunToEnd(Voxeld({"--config", good, "--check-config", "--http", "off"}),
+                         CleanEnvironment(folder));
+  EXPECT_EQ(ended.code, 0) << ended.output;
+  EXPECT_THAT(ended.output, HasSubstr("max_sessions = 7\n"));
+  EXPECT_THAT(ended.output, HasSubstr("http = 'off'\n"));
+  EXPECT_THAT(ended.output, HasSubstr(absl::StrCat("unix:", folder.path(), "/voxeld.sock")));
+
+  const std::string bad = folder.File("bad.toml", "\n[limits]\n max_sesions = 7\n[log]\nlevel=1\n");
+  ended = RunToEnd(Voxeld({"--config", bad, "--check-config"}), CleanEnvironment(folder));
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.output, HasSubstr(absl::StrCat(bad, ":3:2: ")));
+  EXPECT_THAT(ended.output, HasSubstr("did you mean max_sessions?"));
+  EXPECT_THAT(ended.output, HasSubstr(absl::StrCat(bad, ":5:7: ")));
+
+  const std::string option = folder.File(
+      "option.toml", "[[display]]\nname = \"a\"\ndriver = \"simulated\"\nsize = \"big\"\n");
+  ended = RunToEnd(Voxeld({"--config", option, "--check-config"}), CleanEnvironment(folder));
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.output, HasSubstr(absl::StrCat(option, ":1:1: ")));
+
+  EXPECT_EQ(RunToEnd(Voxeld({"--config", "/nowhere.toml", "--check-config"})).code, 1);
+}
+
+TEST(CheckConfig, FindsTheUsersFile) {
+  const Folder folder;
+  std::filesystem::create_directory(folder.path() + "/voxeld");
+  folder.File("voxeld/voxeld.toml", "[limits]\nmax_sessions = 9\n");
+  const Ended ended = RunToEnd(Voxeld({"--check-config"}), CleanEnvironment(folder));
+  EXPECT_EQ(ended.code, 0);
+  EXPECT_THAT(ended.output, HasSubstr("max_sessions = 9\n"));
+}
+
+TEST(Start, BusyAddressesAreErrors) {
+  Daemon first;
+  const Folder folder;
+  for (const std::string& address : {first.unix_target(), first.tcp_target()}) {
+    const Ended ended =
+        RunToEnd(Voxeld({"--listen", address, "--http", "off"}), CleanEnvironment(folder));
+    EXPECT_EQ(ended.code, 1) << ended.output;
+    EXPECT_THAT(ended.output, HasSubstr(absl::StrCat("somebody listens on ", address)));
+  }
+  const Ended ended = RunToEnd(
+      Voxeld({"--listen", absl::StrCat("unix:", folder.path(), "/b.sock"), "--http", first.http()}),
+      CleanEnvironment(folder));
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.output, HasSubstr(absl::StrCat("somebody listens on ", first.http())));
+}
+
+TEST(Start, ABusyDefaultHttpPortIsAWarning) {
+  // Whoever comes first has it; the other warns.
+  const Folder folder;
+  const auto start = [&](const std::string& name) {
+    return Voxeld(
+        {"--listen", absl::StrCat("unix:", folder.path(), "/", name), "--log-format", "json"});
+  };
+  Process first(start("a.sock"), CleanEnvironment(folder));
+  ASSERT_TRUE(first.ReadLineWith("\"ready\"").has_value()) << first.output();
+  Process second(start("b.sock"), CleanEnvironment(folder));
+  const std::optional<std::string> warning = second.ReadLineWith("no http port");
+  ASSERT_TRUE(warning.has_value()) << second.output();
+  EXPECT_THAT(*warning, HasSubstr("\"level\":\"warning\""));
+  EXPECT_THAT(*warning, HasSubstr("127.0.0.1:8088"));
+  EXPECT_TRUE(second.ReadLineWith("\"http\":\"off\"").has_value());
+}
+
+TEST(Start, SaysWhatItIs) {
+  Daemon daemon;
+  const std::string& output = daemon.process().output();
+  EXPECT_THAT(output, HasSubstr(absl::StrCat("\"version\":\"", daemon::Version(), "\"")));
+  EXPECT_THAT(output, HasSubstr("\"name\":\"sim\""));
+  EXPECT_THAT(output, HasSubstr("\"engine\":\"cpu\""));
+  EXPECT_THAT(output, HasSubstr("\"why\":\""));
+}
+
+TEST(Http, HealthAndMetricsOfTheRunningDaemon) {
+  Daemon daemon;
+  EXPECT_THAT(HttpGet(daemon.http(), "/healthz"), HasSubstr("{\"status\":\"ok\",\"reasons\":[]}"));
+  const std::string metrics = HttpGet(daemon.http(), "/metrics");
+  EXPECT_THAT(metrics, StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(metrics, HasSubstr("voxeld_display_state{display=\"sim\",state=\"showing\"} 1"));
+  EXPECT_THAT(HttpGet(daemon.http(), "/"), StartsWith("HTTP/1.1 404 "));
+}
+
+class Stop : public ::testing::TestWithParam<int> {};
+
+TEST_P(Stop, WithClientsConnectedEndsInTimeAndWell) {
+  Daemon daemon;
+  const auto scene = v1::SceneService::NewStub(Channel(daemon.tcp_target()));
+  Client idle(*scene), busy(*scene), half_open(*scene);
+  idle.Open();
+  busy.Open();
+  busy.Send(SphereIn("layer", "ball"));
+  busy.Commit(1);
+  busy.ReadOutcomes(1);
+  // One that never reads what it is told.
+  Client deaf(*scene);
+  deaf.Open();
+  for (int i = 0; i < 200; ++i) deaf.Commit(i);
+  const auto displays = v1::DisplayService::NewStub(Channel(daemon.unix_target()));
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::WatchStatsRequest request;
+  request.set_interval_ns(3'600'000'000'000);
+  const auto watch = displays->WatchStats(&context, request);
+  v1::Stats stats;
+  ASSERT_TRUE(watch->Read(&stats));
+  HttpConnection kept_open(daemon.http());
+
+  const auto begin = std::chrono::steady_clock::now();
+  daemon.process().Signal(GetParam());
+  const std::optional<int> code = daemon.process().Wait();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kPromised);
+  EXPECT_EQ(code, 0) << daemon.process().output();
+  for (Client* client : {&idle, &busy}) {
+    const grpc::Status status = client->Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
+    EXPECT_EQ(status.error_message(), "shutting down");
+  }
+  EXPECT_FALSE(half_open.Finish().ok());
+  EXPECT_FALSE(deaf.Finish().ok());
+  EXPECT_FALSE(watch->Read(&stats));
+  EXPECT_EQ(watch->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_FALSE(std::filesystem::exists(daemon.folder().path() + "/voxeld.sock"));
+  EXPECT_THAT(daemon.process().output(), HasSubstr("\"event\":\"stopped\""));
+}
+
+INSTANTIATE_TEST_SUITE_P(Signal, Stop, ::testing::Values(SIGTERM, SIGINT), [](const auto& info) {
+  return std::string(info.param == SIGTERM ? "SIGTERM" : "SIGINT");
+});
+
+TEST(Stop, AndStartAgainOnTheSameSocketEvenAfterAKill) {
+  const Folder folder;
+  const std::string target = absl::StrCat("unix:", folder.path(), "/voxeld.sock");
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    Process process(Voxeld({"--listen", target, "--http", "off", "--log-format", "json"}),
+                    CleanEnvironment(folder));
+    ASSERT_TRUE(process.ReadLineWith("\"ready\"").has_value()) << process.output();
+    process.Signal(signal);
+    EXPECT_EQ(process.Wait(), signal == SIGKILL ? -SIGKILL : 0);
+  }
+}
+
+TEST(Logs, AreOneObjectALineWhateverClientsCallThemselves) {
+  Daemon daemon;
+  const auto scene = v1::SceneService::NewStub(Channel(daemon.unix_target()));
+  {
+    Client client(*scene);
+    v1::Open open;
+    open.set_client_name("x\n{\"event\":\"fake\"}\x1b[31m");
+    client.Open(open);
+    client.HalfClose();
+    EXPECT_TRUE(client.Finish().ok());
+  }
+  daemon.process().Signal(SIGTERM);
+  ASSERT_EQ(daemon.process().Wait(), 0);
+  std::istringstream lines(daemon.process().output());
+  std::string line;
+  bool opened = false;
+  while (std::getline(lines, line)) {
+    const auto object = nlohmann::json::parse(line, nullptr, false);
+    ASSERT_TRUE(object.is_object()) << line;
+    EXPECT_NE(object["event"], "fake");
+    opened = opened || object["event"] == "session opened";
+  }
+  EXPECT_TRUE(opened);
+}
+
+}  // namespace
+}  // namespace voxeld::e2e

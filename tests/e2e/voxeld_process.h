@@ -1,0 +1,49 @@
+// The real voxeld, started by a test in a folder of its own.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/process.h"
+
+namespace voxeld::e2e {
+
+// A folder that is removed with all that is in it.
+class Folder {
+ public:
+  Folder();
+  ~Folder();
+  const std::string& path() const { return path_; }
+  std::string File(const std::string& name, const std::string& text) const;
+
+ private:
+  std::string path_;
+};
+
+// Nothing of the machine's own configuration is seen.
+std::map<std::string, std::string> CleanEnvironment(const Folder& folder);
+
+// VOXELD_BINARY and these.
+std::vector<std::string> Voxeld(std::vector<std::string> arguments);
+
+// A running daemon that listens on a unix socket, on a port and on an http port of the system's
+// choice, with a small quick display named "sim".
+class Daemon {
+ public:
+  explicit Daemon(const std::vector<std::string>& more = {});
+
+  Process& process() { return *process_; }
+  const Folder& folder() const { return folder_; }
+  const std::string& unix_target() const { return unix_target_; }
+  const std::string& tcp_target() const { return tcp_target_; }
+  const std::string& http() const { return http_; }  // HOST:PORT
+
+ private:
+  Folder folder_;
+  std::string unix_target_, tcp_target_, http_;
+  std::unique_ptr<Process> process_;
+};
+
+}  // namespace voxeld::e2e
