@@ -152,7 +152,7 @@ bool FramePipeline::MaybeDraw() {
     return true;
   }
 
-  Drawing& drawing = drawing_.emplace();
+  Drawing& drawing = drawing_.emplace(Drawing{});
   drawing.snapshot = newest->number;
   drawing.volume = ++last_volume_;
   drawing.lease = pool_.Acquire();

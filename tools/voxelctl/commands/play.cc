@@ -209,7 +209,7 @@ class Player {
       models[i].parts = {};  // sent; the memory is not needed any more
     }
     if (staged_operations_ > 0) {
-      const absl::Status status = CommitAndWait();
+      absl::Status status = CommitAndWait();
       if (!status.ok()) return status;
     }
     // One frame replaces the layer whole, should this owner have had it before.
@@ -274,7 +274,7 @@ class Player {
         ++summary_.frames_skipped;
         continue;
       }
-      const absl::Status status = Turn(static_cast<double>(now - began) / 1e9 / kSecondsPerTurn);
+      absl::Status status = Turn(static_cast<double>(now - began) / 1e9 / kSecondsPerTurn);
       if (!status.ok()) return status;
       ++summary_.frames;
       if (stream_->tally().not_found > 0) {

@@ -100,7 +100,7 @@ absl::Status ShowStats(const StatsOptions& options, Connection& connection, Inte
   request.set_once(!options.watch);
   if (options.watch) request.set_interval_ns(std::llround(options.interval_s * 1e9));
   bool any = false;
-  const absl::Status status = connection.WatchStats(request, [&](const v1::Stats& stats) {
+  absl::Status status = connection.WatchStats(request, [&](const v1::Stats& stats) {
     any = true;
     if (console.json())
       return console.Data(JsonText(ToJson(stats), options.watch)) && options.watch;

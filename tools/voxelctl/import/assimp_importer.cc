@@ -73,7 +73,7 @@ uint8_t Channel(double value, bool linear) {
   if (!(value > 0)) return 0;
   value = std::min(value, 1.0);
   if (linear) value = value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
-  return static_cast<uint8_t>(value * 255 + 0.5);
+  return static_cast<uint8_t>(std::lround(value * 255));
 }
 
 Rgb ToRgb(const aiColor4D& c, bool linear) {
@@ -190,7 +190,7 @@ absl::Status AddNodes(const aiNode& root, Context* context) {
     const Visit visit = stack.back();
     stack.pop_back();
     for (unsigned m = 0; m < visit.node->mNumMeshes; ++m) {
-      const absl::Status status =
+      absl::Status status =
           AddMesh(*context->scene.mMeshes[visit.node->mMeshes[m]], visit.to_model, context);
       if (!status.ok()) return status;
     }

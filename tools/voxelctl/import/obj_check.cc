@@ -45,7 +45,7 @@ absl::Status ForEachLine(absl::string_view text, Visit visit) {
       absl::StrAppend(&joined, line);
       line = joined;
     }
-    const absl::Status status = visit(number, line);
+    absl::Status status = visit(number, line);
     if (!status.ok()) return status;
     joined.clear();
   }

@@ -16,7 +16,7 @@ constexpr float kLineBehind = 0.25f;
 uint8_t Encode(float linear) {
   const float v = std::clamp(linear, 0.0f, 1.0f);
   const float s = v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1 / 2.4f) - 0.055f;
-  return static_cast<uint8_t>(s * 255 + 0.5f);
+  return static_cast<uint8_t>(std::lround(s * 255));
 }
 
 void AddScaled(Light* sum, const Light& light, float factor) {

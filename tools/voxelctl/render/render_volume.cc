@@ -201,7 +201,7 @@ void DrawAxes(const Camera& camera, int width, int height, Canvas* canvas) {
 }  // namespace
 
 absl::Status CheckVolume(const Volume& volume) {
-  const absl::Status status = display::ValidateGeometry(volume.geometry);
+  absl::Status status = display::ValidateGeometry(volume.geometry);
   if (!status.ok()) return status;
   const int32_t slices = display::SliceCount(volume.geometry);
   int32_t width = 0, height = 0;
