@@ -1,5 +1,6 @@
 // voxeld: wiring only.
 #include <pthread.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <atomic>
@@ -33,6 +34,14 @@ constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
 int Fail(int code, const absl::Status& status) {
   std::fprintf(stderr, "voxeld: %s\n", std::string(status.message()).c_str());
   return code;
+}
+
+// Every client holds a descriptor, and a listener that has once run out of them is deaf for good.
+void RaiseDescriptorLimit() {
+  rlimit limit;
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 using Displays = std::vector<std::unique_ptr<display::Display>>;
@@ -145,6 +154,7 @@ int Main(int argc, char** argv) {
   const absl::StatusOr<Logger::Format> format = Logger::ParseFormat(config->log.format);
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
 
+  RaiseDescriptorLimit();
   umask(0007);  // sockets are for the user and the group from the moment that they exist
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;

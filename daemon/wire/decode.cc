@@ -5,9 +5,11 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/check.h"
+#include "daemon/wire/element_count.h"
 #include "daemon/wire/operations.h"
 #include "daemon/wire/slice_stream.h"
 #include "voxeld/v1/scene.pb.h"
@@ -16,6 +18,7 @@ namespace voxeld::daemon::wire {
 namespace {
 
 constexpr size_t kClientNameBytes = 128;
+constexpr uint64_t kAbsurd = 4;  // times what is allowed
 constexpr int64_t kGreatestLingerNs = 3600 * sync::kSecond;
 
 absl::Status OpenError(const Fault& fault) {
@@ -89,6 +92,30 @@ MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, OpenOptions* out) {
   return {};
 }
 
+// Before anything is parsed. A little too many elements are an Issue, later; so many that to unfold
+// them would be a burden end the stream.
+absl::Status CheckElements(std::span<const std::string_view> slices, const Limits& limits) {
+  struct Row {
+    const char* field;
+    std::vector<int> path;
+    uint64_t limit;
+  };
+  const Row rows[] = {{"batch.upserts",
+                       {v1::StreamRequest::kBatchFieldNumber, v1::Batch::kUpsertsFieldNumber},
+                       limits.max_operations_per_commit},
+                      {"define_object.definition.parts",
+                       {v1::StreamRequest::kDefineObjectFieldNumber,
+                        v1::DefineObject::kDefinitionFieldNumber, v1::Object::kPartsFieldNumber},
+                       limits.max_parts_per_object}};
+  for (const Row& row : rows) {
+    const uint64_t count = CountElements(slices, row.path);
+    if (count / kAbsurd <= row.limit) continue;
+    return absl::ResourceExhaustedError(
+        absl::StrCat(row.field, " has ", count, " elements; ", row.limit, " are allowed"));
+  }
+  return absl::OkStatus();
+}
+
 Decoded Failed(absl::Status status) {
   Decoded failed;
   failed.status = std::move(status);
@@ -145,6 +172,7 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
         absl::StrCat("a message of ", size, " bytes; max_message_bytes allows ",
                      limits.max_message_bytes, ": send more messages that are smaller")));
   }
+  if (absl::Status status = CheckElements(slices, limits); !status.ok()) return Failed(status);
   google::protobuf::Arena arena;
   auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
   SliceStream stream(slices);

@@ -174,6 +174,24 @@ TEST(Decode, LimitsAreQuotas) {
   EXPECT_TRUE(absl::IsResourceExhausted(Decode(MeshRequest(), limits).status));
 }
 
+TEST(Decode, AbsurdlyManyElementsAreNotEvenParsed) {
+  // Two bytes an entity: tag 15, length 0.
+  std::string entities;
+  for (int i = 0; i < 100; ++i) entities += std::string("\x7a\x00", 2);
+  const std::string batch = absl::StrCat("\x7a\xc8\x01", entities);  // 200 bytes of Batch
+  Limits limits;
+  EXPECT_THAT(DecodeBytes(batch, limits).issues, SizeIs(100));
+  limits.max_operations_per_commit = 99;
+  EXPECT_THAT(DecodeBytes(batch, limits).issues, SizeIs(1));
+  limits.max_operations_per_commit = 24;
+  EXPECT_EQ(DecodeBytes(batch, limits).status.message(),
+            "batch.upserts has 100 elements; 24 are allowed");
+  v1::StreamRequest object;
+  for (int i = 0; i < 50; ++i) object.mutable_define_object()->mutable_definition()->add_parts();
+  limits.max_parts_per_object = 10;
+  EXPECT_TRUE(absl::IsResourceExhausted(Decode(object, limits).status));
+}
+
 TEST(Decode, ACommitIsPassedOnWithItsIssue) {
   for (const char* field : {"present_at_ns", "must_show", "durable"}) {
     v1::StreamRequest request;
