@@ -46,6 +46,10 @@ target_link_libraries(voxeld_options INTERFACE Threads::Threads)
 add_library(voxeld_warnings INTERFACE)
 target_compile_options(voxeld_warnings INTERFACE -Wall -Wextra -Wno-unused-parameter
                                                  -Wno-missing-field-initializers)
+if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # GCC's flow analysis cannot see through the checks that a sanitizer inserts.
+  target_compile_options(voxeld_warnings INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
+endif()
 if(VOXELD_WERROR)
   target_compile_options(voxeld_warnings INTERFACE -Werror)
 endif()
