@@ -229,7 +229,7 @@ class FileReader {
 
   // As it would stand on the command line; an array's elements are joined by semicolons.
   static std::optional<std::string> OptionText(const toml::node& node) {
-    if (const auto text = node.value_exact<std::string>()) return text;
+    if (auto text = node.value_exact<std::string>()) return text;
     if (node.is_number() || node.is_boolean()) return Show(node);
     const toml::array* items = node.as_array();
     if (items == nullptr) return {};

@@ -31,6 +31,7 @@ namespace wire = boost::beast::http;
 using Protocol = asio::generic::stream_protocol;
 using Acceptor = asio::basic_socket_acceptor<Protocol, asio::io_context::executor_type>;
 using Stream = beast::basic_stream<Protocol, asio::io_context::executor_type>;
+using Parser = wire::request_parser<wire::string_body>;
 using boost::system::error_code;
 
 constexpr auto kAcceptRetry = std::chrono::milliseconds(100);
@@ -54,7 +55,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
         closed_(std::move(closed)) {}
 
   void Read() {
-    parser_.emplace();
+    parser_ = std::make_unique<Parser>();
     parser_->header_limit(options_.max_header_bytes);
     parser_->body_limit(kGreatestBody);
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
@@ -147,7 +148,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   const Handler& handler_;
   std::function<void(Connection*)> closed_;  // empty once closed
   beast::flat_buffer buffer_;
-  std::optional<wire::request_parser<wire::string_body>> parser_;
+  std::unique_ptr<Parser> parser_;
   std::optional<wire::response<wire::string_body>> response_;
   std::optional<wire::response_serializer<wire::string_body>> serializer_;
   bool head_ = false;

@@ -34,19 +34,22 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
   }
   wire::Decoded decoded = wire::DecodeStreamRequest(slices, context_.core.limits(), previous);
   if (!decoded.status.ok()) return End(decoded.status);
-  if (decoded.open.has_value()) return TakeOpen(std::move(decoded), bytes);
+  if (decoded.open.has_value()) {
+    OpenOptions open = *std::exchange(decoded.open, std::nullopt);
+    return TakeOpen(std::move(open), std::move(decoded), bytes);
+  }
   TakeOperations(std::move(decoded), bytes);
 }
 
-void StreamSession::TakeOpen(wire::Decoded decoded, uint64_t bytes) {
+void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t bytes) {
   bool first = false;
   {
     sync::MutexLock lock(mutex_);
     first = state_ == State::kNew;
     if (first) {
       sequence_ = decoded.sequence;
-      no_outcomes_ = decoded.open->no_outcomes;
-      client_name_ = decoded.open->client_name;
+      no_outcomes_ = open.no_outcomes;
+      client_name_ = open.client_name;
       state_ = State::kOpening;
       reading_ = false;
     }
@@ -61,9 +64,10 @@ void StreamSession::TakeOpen(wire::Decoded decoded, uint64_t bytes) {
                               "message"});
     return TakeOperations(std::move(decoded), bytes);
   }
-  context_.core.OpenSession(
-      *std::move(decoded.open), shared_from_this(),
-      [self = shared_from_this()](absl::StatusOr<SessionInfo> info) { self->OnOpened(info); });
+  context_.core.OpenSession(std::move(open), shared_from_this(),
+                            [self = shared_from_this()](const absl::StatusOr<SessionInfo>& info) {
+                              self->OnOpened(info);
+                            });
 }
 
 void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
@@ -195,7 +199,8 @@ void StreamSession::End(const absl::Status& status) {
 }
 
 bool StreamSession::Close(const absl::Status& status) {
-  if (end_.has_value()) return false;
+  if (ending_) return false;
+  ending_ = true;
   end_ = status;
   // Without a session (also while one is being opened: OnOpened gives it back) nothing is waited
   // for.
@@ -214,7 +219,7 @@ void StreamSession::CloseSession() {
     if (context_.log != nullptr) {
       context_.log->Info("session closed", {{"session", std::to_string(session)},
                                             {"client", client_name_},
-                                            {"why", end_->ToString()}});
+                                            {"why", end_.ToString()}});
     }
   }
   context_.core.CloseSession(session, [self = shared_from_this()] { self->OnClosed(); });
@@ -235,7 +240,7 @@ void StreamSession::Finish() {
   state_ = State::kFinished;
   queue_.clear();
   queued_bytes_ = 0;
-  if (port_ != nullptr) port_->Finish(*end_);
+  if (port_ != nullptr) port_->Finish(end_);
 }
 
 void StreamSession::OnPortDone() {
@@ -289,8 +294,9 @@ bool StreamSession::Overrun() {
     return false;
   }
   ++context_.streams_overrun;
-  const bool close = !end_.has_value();
+  const bool close = !ending_;
   if (close) {
+    ending_ = true;
     end_ = absl::ResourceExhaustedError(
         absl::StrCat("the client left more than ", queue_.size() - 1, " answers (", queued_bytes_,
                      " bytes) unread; read the stream while writing to it"));

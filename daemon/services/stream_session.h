@@ -16,7 +16,6 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -82,7 +81,7 @@ class StreamSession final : public SessionSink,
     kFinished,  // Finish was called
   };
 
-  void TakeOpen(wire::Decoded decoded, uint64_t bytes);
+  void TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t bytes);
   void TakeOperations(wire::Decoded decoded, uint64_t bytes);
   void OnOpened(const absl::StatusOr<SessionInfo>& info);
   void OnProcessed();
@@ -116,7 +115,8 @@ class StreamSession final : public SessionSink,
   std::deque<std::string> queue_ VOXELD_GUARDED_BY(mutex_);
   size_t queued_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
-  std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);  // from kClosing on
+  bool ending_ VOXELD_GUARDED_BY(mutex_) = false;  // from kClosing on, with:
+  absl::Status end_ VOXELD_GUARDED_BY(mutex_);
 };
 
 }  // namespace voxeld::daemon::services
