@@ -15,10 +15,12 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/config/config.h"
+#include "daemon/config/display_view.h"
 #include "daemon/core/core.h"
 #include "daemon/http/http_server.h"
 #include "daemon/http/monitor.h"
 #include "daemon/log/logger.h"
+#include "daemon/pipeline/view.h"
 #include "daemon/services/server.h"
 #include "daemon/version/version.h"
 #include "display/drivers/registry.h"
@@ -44,18 +46,27 @@ void RaiseDescriptorLimit() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-using Displays = std::vector<std::unique_ptr<display::Display>>;
+struct WantedDisplay {
+  std::unique_ptr<display::Display> display;
+  ViewOptions view;
+};
+using Displays = std::vector<WantedDisplay>;
 
 absl::StatusOr<Displays> MakeDisplays(const Config& config, sync::Clock& clock) {
   Displays displays;
   for (const DisplayConfig& wanted : config.displays) {
+    const auto wrong = [&](const absl::Status& status) {
+      return absl::Status(status.code(), absl::StrCat(wanted.source, ": ", status.message()));
+    };
+    const absl::StatusOr<DisplayOptions> options = SplitDisplayOptions(wanted);
+    if (!options.ok()) return wrong(options.status());
     absl::StatusOr<std::unique_ptr<display::Display>> made = display::CreateDisplay(
-        {.name = wanted.name, .driver = wanted.driver, .options = wanted.options}, clock);
-    if (!made.ok()) {
-      return absl::Status(made.status().code(),
-                          absl::StrCat(wanted.source, ": ", made.status().message()));
-    }
-    displays.push_back(*std::move(made));
+        {.name = wanted.name, .driver = wanted.driver, .options = options->driver}, clock);
+    if (!made.ok()) return wrong(made.status());
+    const absl::StatusOr<gpu::Affine> map =
+        SceneToVoxel(options->view, (*made)->info().geometry.grid);
+    if (!map.ok()) return wrong(map.status());
+    displays.push_back({*std::move(made), options->view});
   }
   return displays;
 }
@@ -66,7 +77,9 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
   std::unique_ptr<http::Server> none;
   if (!config.http.has_value()) return none;
   absl::StatusOr<std::unique_ptr<http::Server>> server =
-      http::Server::Start({.listen = *config.http, .max_connections = config.max_http_connections},
+      http::Server::Start({.listen = *config.http,
+                           .max_connections = config.max_http_connections,
+                           .idle_limit_ns = config.http_idle_limit_ns},
                           http::MonitorHandler(core, std::move(draining)));
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
   log.Warn("no http port", {{"why", std::string(server.status().message())},
@@ -96,9 +109,9 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),
                                   .staging_limit_bytes = config.engine.staging_limit_bytes};
-  for (auto& display : displays) {
+  for (auto& [display, view] : displays) {
     const std::string name = display->info().name;
-    if (absl::Status status = core.AddDisplay(std::move(display), engine); !status.ok()) {
+    if (absl::Status status = core.AddDisplay(std::move(display), engine, view); !status.ok()) {
       return Fail(
           1, absl::Status(status.code(), absl::StrCat("display ", name, ": ", status.message())));
     }
@@ -113,7 +126,12 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
       services::Server::Start(core, clock,
                               {.listen = config.server.listen,
                                .version = Version(),
-                               .max_queued_answers = config.server.max_queued_answers,
+                               .streams = {.drain_limit_ns = config.server.drain_limit_ns,
+                                           .max_queued_answers = config.server.max_queued_answers,
+                                           .max_queued_bytes = config.server.max_queued_bytes},
+                               .max_calls_per_connection = config.server.max_calls_per_connection,
+                               .keepalive_interval_ns = config.server.keepalive_interval_ns,
+                               .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
                                .log = &log});
   if (!server.ok()) return Fail(1, server.status());
 

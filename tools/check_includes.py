@@ -25,7 +25,9 @@ ALLOWED = {
     "daemon/scene": ["gpu", "display/api", "display/sync"],
     "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
     "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
-    "tools": ["client", "display/geometry", "display/api", "display/sync", "gpu", "voxeld/v1", "tools"],
+    "tools": ["client", "display/geometry", "display/api", "display/sync", "gpu", "voxeld/v1", "tools",
+              # What an address looks like, and what was meant: alike at both ends.
+              "daemon/address", "daemon/suggest"],
     "client": ["voxeld/v1"],
     "tests": ["daemon", "gpu", "display", "voxeld/v1", "tools", "client"],
 }

@@ -75,6 +75,13 @@ absl::Status PrepareUnix(const Address& address) {
                                       " cannot be made"));
     }
   }
+  // A folder that somebody else made, in /tmp say, is theirs to change under us.
+  struct stat owner;
+  if (stat(folder.c_str(), &owner) == 0 && owner.st_uid != geteuid() && owner.st_uid != 0) {
+    return absl::PermissionDeniedError(absl::StrCat("the folder ", folder.string(), " of ",
+                                                    address.ToString(), " belongs to user ",
+                                                    owner.st_uid, "; it must be yours or root's"));
+  }
   struct stat found;
   if (lstat(address.path.c_str(), &found) != 0) return absl::OkStatus();
   if (!S_ISSOCK(found.st_mode)) {

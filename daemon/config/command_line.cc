@@ -6,7 +6,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "daemon/config/suggest.h"
+#include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "daemon/config/fields.h"
-#include "daemon/config/suggest.h"
+#include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon {
 namespace {

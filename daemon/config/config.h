@@ -15,6 +15,7 @@
 #include "daemon/config/command_line.h"
 #include "daemon/config/display_config.h"
 #include "daemon/scene/operation.h"
+#include "display/sync/clock.h"
 #include "gpu/engine.h"
 
 namespace voxeld::daemon {
@@ -24,8 +25,17 @@ struct ServerConfig {
   // Nothing: no http port. `http_asked`: it was asked for, so that a busy one is an error.
   std::optional<Address> http;
   bool http_asked = false;
-  uint32_t max_queued_answers = 16384;  // that a client of Stream has not read
+  uint32_t max_queued_answers = 16384;      // that a client of Stream has not read
+  uint64_t max_queued_bytes = 16u << 20;    // the same in bytes
+  uint32_t max_calls_per_connection = 256;  // at once
+  // How long a stream that its client has half-closed waits for outcomes, and an ending one for its
+  // client to read what is queued.
+  int64_t drain_limit_ns = 5 * sync::kSecond;
+  // An idle connection is probed this often, and closed when no answer comes.
+  int64_t keepalive_interval_ns = 20 * sync::kSecond;
+  int64_t keepalive_timeout_ns = 10 * sync::kSecond;
   uint32_t max_http_connections = 64;
+  int64_t http_idle_limit_ns = 10 * sync::kSecond;
 };
 
 struct EngineConfig {

@@ -13,7 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "daemon/config/config.h"
 #include "daemon/config/fields.h"
-#include "daemon/config/suggest.h"
+#include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon {
 namespace {

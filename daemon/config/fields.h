@@ -21,13 +21,21 @@ template <typename Visitor, typename ConfigType>
 void VisitFields(ConfigType& config, Visitor& visitor) {
   constexpr int64_t kMost = std::numeric_limits<int64_t>::max();
   constexpr int64_t kGiB = int64_t{1} << 30;
+  constexpr int64_t kSecond = sync::kSecond;
+  constexpr int64_t kHour = 3600 * kSecond;
   constexpr int64_t kMost32 = std::numeric_limits<uint32_t>::max();
 
   visitor.Section("server");
   visitor.Listen("listen", config.server.listen);
   visitor.Http("http", config.server.http, config.server.http_asked);
   visitor.Integer("max_queued_answers", config.server.max_queued_answers, 16, 1 << 24);
+  visitor.Integer("max_queued_bytes", config.server.max_queued_bytes, 4096, kGiB);
+  visitor.Integer("max_calls_per_connection", config.server.max_calls_per_connection, 1, 65536);
+  visitor.Integer("drain_limit_ns", config.server.drain_limit_ns, 0, kHour);
+  visitor.Integer("keepalive_interval_ns", config.server.keepalive_interval_ns, kSecond, kHour);
+  visitor.Integer("keepalive_timeout_ns", config.server.keepalive_timeout_ns, kSecond, kHour);
   visitor.Integer("max_http_connections", config.server.max_http_connections, 1, 4096);
+  visitor.Integer("http_idle_limit_ns", config.server.http_idle_limit_ns, kSecond / 10, kHour);
 
   visitor.Section("engine");
   visitor.Engine("kind", config.engine.kind);
@@ -44,6 +52,9 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_entities_per_owner", limits.max_entities_per_owner, 1, kMost);
   visitor.Integer("max_layers_per_owner", limits.max_layers_per_owner, 1, kMost);
   visitor.Integer("max_bytes_per_owner", limits.max_bytes_per_owner, 1, kMost);
+  visitor.Integer("max_entities", limits.max_entities, 1, kMost);
+  visitor.Integer("max_layers", limits.max_layers, 1, kMost);
+  visitor.Integer("max_scene_bytes", limits.max_scene_bytes, 1, kMost);
   visitor.Integer("max_vertices_per_entity", limits.max_vertices_per_entity, 1, kMost32);
   visitor.Integer("max_indices_per_entity", limits.max_indices_per_entity, 1, kMost32);
   visitor.Integer("max_id_bytes", limits.max_id_bytes, 1, 65536);
@@ -51,11 +62,11 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_uncommitted_bytes", limits.max_uncommitted_bytes, 1, kMost);
   visitor.Integer("max_instance_depth", limits.max_instance_depth, 1, 8);
   visitor.Real("max_coordinate_voxels", limits.max_coordinate_voxels, 1, 1073741824);
-  visitor.Integer("max_timed_commits", limits.max_timed_commits, 1, kMost32);
-  visitor.Integer("max_present_at_horizon_ns", limits.max_present_at_horizon_ns, 1, kMost);
-  visitor.Integer("must_show_timeout_ns", limits.must_show_timeout_ns, 1, kMost);
+  visitor.Real("max_thickness", limits.max_thickness, 0, 1048576);
   visitor.Integer("max_sessions", limits.max_sessions, 1, kMost32);
   visitor.Integer("max_parts_per_object", limits.max_parts_per_object, 1, kMost32);
+  visitor.Integer("max_captures", limits.max_captures, 1, 1024);
+  visitor.Integer("max_linger_ns", limits.max_linger_ns, 0, kMost);
 }
 
 // "auto", "cpu", "cuda".

@@ -69,6 +69,10 @@ void Core::CloseSession(SessionId session, std::function<void()> done) {
       std::move(done));
 }
 
+void Core::CountOverrun() {
+  impl_->loop().Post([impl = impl_.get()] { impl->CountOverrun(); });
+}
+
 void Core::ListEntities(EntityQuery query, Reply<EntityPage> reply) {
   Ask(impl_->loop(), std::move(reply),
       [impl = impl_.get(), query = std::move(query)](const Reply<EntityPage>& answer) {

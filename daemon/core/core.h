@@ -146,6 +146,8 @@ class Core {
               uint64_t bytes, std::function<void()> done);
   // Carries out the session's DisconnectPolicy; unknown sessions are ignored.
   void CloseSession(SessionId session, std::function<void()> done);
+  // A session's stream was ended because its client did not read: for the figures.
+  void CountOverrun();
 
   // ---- queries
   void ListEntities(EntityQuery query, Reply<EntityPage> reply);

@@ -41,6 +41,7 @@ class Core::Impl {
   void Handle(SessionId id, std::vector<Operation> operations, const std::vector<Issue>& issues,
               uint64_t bytes);
   void CloseSession(SessionId id);
+  void CountOverrun() { ++streams_overrun_; }
   void ClearLayer(uint64_t owner, const std::string& layer, bool keep_state,
                   const Reply<Cleared>& reply);
 
@@ -85,6 +86,7 @@ class Core::Impl {
   struct DisplaySlot {
     display::DisplayInfo info;
     gpu::Affine scene_to_voxel;
+    std::vector<gpu::Affine> coming;  // views on their way to the pipeline, in that order
     std::shared_ptr<Host> host;
   };
 
@@ -125,7 +127,10 @@ class Core::Impl {
 
   // ---- displays
   absl::StatusOr<DisplaySlot*> FindDisplay(const std::string& name);
+  // What coordinates must fit: every display's view, and those to come.
   void UpdateViews();
+  // Notes a view to come, unless the scene does not fit it.
+  absl::Status ExpectView(DisplaySlot& slot, const ViewOptions& view);
   // Asks every pipeline and calls `done` with all answers; `absent` stands in for one that has
   // ended.
   template <typename T>
@@ -151,6 +156,7 @@ class Core::Impl {
   uint64_t commits_accepted_ = 0, commits_refused_ = 0;
   uint64_t operations_applied_ = 0, operations_refused_ = 0;
   uint64_t bytes_in_ = 0, outcomes_undelivered_ = 0;
+  uint64_t client_drops_ = 0, streams_overrun_ = 0;
 
   // Of the thread that owns Core.
   enum class Phase : uint8_t { kNew, kRunning, kStopped };

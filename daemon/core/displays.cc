@@ -5,6 +5,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/core/core_impl.h"
+#include "daemon/pipeline/view.h"
+#include "daemon/scene/view_check.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -61,8 +63,23 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
 
 void Core::Impl::UpdateViews() {
   std::vector<DisplayView> views;
-  for (const auto& slot : displays_) views.push_back({slot->info.name, slot->scene_to_voxel});
+  for (const auto& slot : displays_) {
+    views.push_back({slot->info.name, slot->scene_to_voxel});
+    for (const gpu::Affine& map : slot->coming) views.push_back({slot->info.name, map});
+  }
   store_.SetViews(std::move(views));
+}
+
+absl::Status Core::Impl::ExpectView(DisplaySlot& slot, const ViewOptions& view) {
+  const absl::StatusOr<gpu::Affine> map = SceneToVoxel(view, slot.info.geometry.grid);
+  if (!map.ok()) return map.status();
+  const DisplayView coming{slot.info.name, *map};
+  if (absl::Status fits = CheckView(store_.snapshot(), coming, options_.limits); !fits.ok()) {
+    return fits;
+  }
+  slot.coming.push_back(*map);
+  UpdateViews();
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Core::Impl::DisplaySlot*> Core::Impl::FindDisplay(const std::string& name) {
@@ -122,10 +139,8 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   const Snapshot& scene = *store_.snapshot();
   std::set<uint64_t> owners;
   for (const auto& [id, session] : sessions_) owners.insert(session.owner);
-  scene.owners.ForEach([&](uint64_t owner, const OwnerTally& tally) {
-    owners.insert(owner);
-    stats.scene_bytes += tally.bytes;
-  });
+  scene.owners.ForEach([&](uint64_t owner, const OwnerTally&) { owners.insert(owner); });
+  stats.scene_bytes = scene.total.bytes;
   stats.sessions = sessions_.size();
   stats.owners = owners.size();
   stats.layers = scene.layers.size();
@@ -137,6 +152,8 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.operations_refused = operations_refused_;
   stats.bytes_in = bytes_in_;
   stats.outcomes_undelivered = outcomes_undelivered_;
+  stats.client_drops = client_drops_;
+  stats.streams_overrun = streams_overrun_;
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;
@@ -164,16 +181,26 @@ void Core::Impl::UpdateDisplay(const std::string& name, DisplayUpdate update,
   const absl::StatusOr<DisplaySlot*> found = FindDisplay(name);
   if (!found.ok()) return reply(found.status());
   DisplaySlot* slot = *found;
-  const bool posted = slot->host->work->Post([this, slot, reply, update = std::move(update),
-                                              loop = loop_, pipeline = slot->host->pipeline.get()] {
-    if (absl::Status status = pipeline->Update(update); !status.ok()) return reply(status);
-    const bool answered = loop->Post([this, slot, reply, description = pipeline->Describe()] {
-      slot->scene_to_voxel = description.scene_to_voxel;
-      UpdateViews();
-      reply(description);
-    });
-    if (!answered) reply(Ended(pipeline->info().name));
-  });
+  const bool expects = update.view.has_value();
+  if (expects) {
+    if (absl::Status status = ExpectView(*slot, *update.view); !status.ok()) return reply(status);
+  }
+  const bool posted =
+      slot->host->work->Post([this, slot, reply, expects, update = std::move(update), loop = loop_,
+                              pipeline = slot->host->pipeline.get()] {
+        const absl::Status status = pipeline->Update(update);
+        const bool answered =
+            loop->Post([this, slot, reply, expects, status, description = pipeline->Describe()] {
+              if (expects) {
+                slot->coming.erase(slot->coming.begin());
+                slot->scene_to_voxel = description.scene_to_voxel;
+                UpdateViews();
+              }
+              if (!status.ok()) return reply(status);
+              reply(description);
+            });
+        if (!answered) reply(Ended(pipeline->info().name));
+      });
   if (!posted) reply(Ended(slot->info.name));
 }
 

@@ -72,6 +72,7 @@ void Core::Impl::Handle(SessionId id, std::vector<Operation> operations,
 
   // What decoding refused counts for the commit that it came before.
   std::vector<const Issue*> uncounted;
+  uncounted.reserve(issues.size());
   for (const Issue& issue : issues) uncounted.push_back(&issue);
   const auto count_up_to = [&](uint64_t sequence) {
     std::erase_if(uncounted, [&](const Issue* issue) {
@@ -122,6 +123,7 @@ void Core::Impl::Stage(Session& session, Operation operation) {
 
 void Core::Impl::EndCommit(Session& session, const Operation& operation) {
   const Commit& commit = std::get<Commit>(operation.op);
+  client_drops_ += commit.client_drops;
   const sync::TimeNs now = clock_.Now();
   store_.Expire(now);
   CommitResult result =
@@ -166,7 +168,8 @@ void Core::Impl::EndCommit(Session& session, const Operation& operation) {
   session.sink->OnReceipt(receipt);
 
   published_ = store_.snapshot();
-  const Rider rider{session.id, commit.frame_id, operation.sequence, now};
+  const Rider rider{session.id, commit.frame_id, operation.sequence, now,
+                    !session.options.no_outcomes};
   for (const auto& slot : displays_) {
     const bool posted = slot->host->work->Post(
         [pipeline = slot->host->pipeline.get(), snapshot = published_, rider,
@@ -182,12 +185,12 @@ void Core::Impl::EndCommit(Session& session, const Operation& operation) {
 }
 
 void Core::Impl::DeliverOutcome(const Rider& rider, const CommitOutcome& outcome) {
+  if (!rider.asked) return;
   const auto it = sessions_.find(rider.session);
   if (it == sessions_.end()) {
     ++outcomes_undelivered_;
     return;
   }
-  if (it->second.options.no_outcomes) return;
   Receipt receipt;
   receipt.frame_id = rider.frame_id;
   receipt.sequence = rider.sequence;
@@ -217,9 +220,13 @@ void Core::Impl::CloseSession(SessionId id) {
       RemoveLayersOf(id, session.owner);
       break;
     case DisconnectPolicy::kLinger:
-      lingering_.emplace(clock_.Now() + std::max<int64_t>(0, session.options.linger_ns),
-                         Lingering{id, session.owner});
-      break;
+      if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
+          tally != nullptr && tally->layers > 0) {
+        lingering_.emplace(clock_.Now() + std::max<int64_t>(0, session.options.linger_ns),
+                           Lingering{id, session.owner});
+        break;
+      }
+      [[fallthrough]];
     case DisconnectPolicy::kKeep:
       if (!OwnerIsOpen(session.owner)) store_.ForgetOwner(session.owner);
       break;

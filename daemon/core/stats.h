@@ -20,6 +20,7 @@ struct DisplayFigures {
   display::DisplayState state = display::DisplayState::kStopped;
   std::string engine, engine_device, engine_reason;
   uint64_t lit_voxels = 0;
+  uint64_t singular_drawables = 0;  // left out: the product of their transforms has no inverse
   uint64_t volumes_drawn = 0, volumes_presented = 0, volumes_replaced = 0, volumes_lost = 0;
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
@@ -38,6 +39,8 @@ struct Stats {
            operations_refused = 0;
   uint64_t bytes_in = 0;
   uint64_t outcomes_undelivered = 0;
+  uint64_t client_drops = 0;     // frames that clients dropped themselves, by their own word
+  uint64_t streams_overrun = 0;  // ended because their client did not read
   std::vector<DisplayFigures> displays;
 };
 

@@ -44,11 +44,17 @@ constexpr Row<Stats> kDaemonRows[] = {
     {"voxeld_bytes_in_total", &Stats::bytes_in, MetricType::Counter, "Bytes of requests taken in"},
     {"voxeld_outcomes_undelivered_total", &Stats::outcomes_undelivered, MetricType::Counter,
      "Outcomes owed to clients that had gone"},
+    {"voxeld_client_drops_total", &Stats::client_drops, MetricType::Counter,
+     "Frames that clients dropped themselves, by their own word"},
+    {"voxeld_streams_overrun_total", &Stats::streams_overrun, MetricType::Counter,
+     "Streams ended because their client did not read"},
 };
 
 constexpr Row<DisplayFigures> kDisplayRows[] = {
     {"voxeld_display_lit_voxels", &DisplayFigures::lit_voxels, MetricType::Gauge,
      "Voxels that are not black"},
+    {"voxeld_display_singular_drawables", &DisplayFigures::singular_drawables, MetricType::Gauge,
+     "Entities left out, because the product of their transforms has no inverse"},
     {"voxeld_display_volumes_drawn_total", &DisplayFigures::volumes_drawn, MetricType::Counter,
      "Volumes drawn by the engine"},
     {"voxeld_display_volumes_presented_total", &DisplayFigures::volumes_presented,

@@ -214,6 +214,7 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   drawing.lease.frame->volume = drawing.volume;
   ++volumes_drawn_;
   lit_voxels_ = result->lit_voxels;
+  singular_drawables_ = result->singular_drawables;
   const sync::TimeNs now = clock_.Now();
   assemble_.Add(now, result->assemble_ns);
   slice_.Add(now, result->slice_ns);
@@ -332,13 +333,12 @@ absl::Status FramePipeline::Update(const DisplayUpdate& update) {
   if (update.brightness.has_value()) status = display_->SetBrightness(*update.brightness);
   if (status.ok() && update.blank.has_value()) status = display_->SetBlank(*update.blank);
   if (!status.ok()) {
-    for (const absl::Status& back :
-         {display_->SetBlank(blank), display_->SetBrightness(brightness)}) {
-      if (back.ok()) continue;
-      status = absl::Status(
-          status.code(), absl::StrCat(status.message(), "; and taking it back: ", back.message()));
-    }
-    return status;
+    absl::Status back;
+    if (display_->blanked() != blank) back.Update(display_->SetBlank(blank));
+    if (display_->brightness() != brightness) back.Update(display_->SetBrightness(brightness));
+    if (back.ok()) return status;
+    return absl::Status(status.code(),
+                        absl::StrCat(status.message(), "; and taking it back: ", back.message()));
   }
   if (update.view.has_value()) {
     view_ = *update.view;
@@ -381,6 +381,7 @@ DisplayFigures FramePipeline::Figures() const {
   figures.engine_device = engine_info_.device;
   figures.engine_reason = engine_info_.reason;
   figures.lit_voxels = lit_voxels_;
+  figures.singular_drawables = singular_drawables_;
   figures.volumes_drawn = volumes_drawn_;
   figures.volumes_presented = display.volumes_presented;
   figures.volumes_replaced = display.volumes_replaced;

@@ -175,7 +175,7 @@ class FramePipeline final : private display::Display::Listener {
   sync::TimeNs next_tick_ = 0;
 
   RiderBook riders_;
-  uint64_t lit_voxels_ = 0, volumes_drawn_ = 0;
+  uint64_t lit_voxels_ = 0, singular_drawables_ = 0, volumes_drawn_ = 0;
   SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_;
   SlidingRate presented_rate_;
 };

@@ -35,6 +35,7 @@ struct Rider {
   uint64_t frame_id = 0;
   uint64_t sequence = 0;
   sync::TimeNs accepted_ns = 0;
+  bool asked = true;  // its client wants the outcomes
 };
 
 class RiderBook {

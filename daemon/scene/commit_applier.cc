@@ -112,13 +112,57 @@ std::optional<std::string> CommitApplier::OutOfRange(const gpu::Affine& layer_tr
 
 bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::string& layer,
                                     const std::string& field) {
-  const uint64_t layers = draft_.tally(author_.owner).layers;
-  if (draft_.FindLayer(Key(layer)) != nullptr || layers < limits_.max_layers_per_owner)
-    return false;
-  Refuse(operation, layer, "", field, Reason::kQuotaExceeded,
-         absl::StrFormat("layer \"%s\" would be one more than max_layers_per_owner, %d", layer,
-                         limits_.max_layers_per_owner));
-  return true;
+  if (draft_.FindLayer(Key(layer)) != nullptr) return false;
+  const auto refuse = [&](std::string message) {
+    Refuse(operation, layer, "", field, Reason::kQuotaExceeded, std::move(message));
+    return true;
+  };
+  const OwnerTally& tally = draft_.tally(author_.owner);
+  if (tally.layers >= limits_.max_layers_per_owner) {
+    return refuse(absl::StrFormat("layer \"%s\" would be one more than max_layers_per_owner, %d",
+                                  layer, limits_.max_layers_per_owner));
+  }
+  if (draft_.total().layers >= limits_.max_layers) {
+    return refuse(
+        absl::StrFormat("layer \"%s\" would be one more than max_layers, %d, which all "
+                        "owners share; orphaned layers can be cleared",
+                        layer, limits_.max_layers));
+  }
+  auto over = OverQuota(tally.drawables, tally.bytes + Draft::LayerBytes(Key(layer)));
+  return over.has_value() && refuse(*std::move(over));
+}
+
+std::optional<std::string> CommitApplier::OverQuota(uint64_t drawables, uint64_t bytes) const {
+  const OwnerTally& tally = draft_.tally(author_.owner);
+  if (drawables > tally.drawables) {
+    if (drawables > limits_.max_entities_per_owner) {
+      return absl::StrFormat(
+          "its owner would have %d entities (an instance counts as what it draws); "
+          "max_entities_per_owner is %d",
+          drawables, limits_.max_entities_per_owner);
+    }
+    const uint64_t all = draft_.total().drawables - tally.drawables + drawables;
+    if (all > limits_.max_entities) {
+      return absl::StrFormat(
+          "the scene would have %d entities (an instance counts as what it draws); max_entities, "
+          "which all owners share, is %d; orphaned layers can be cleared",
+          all, limits_.max_entities);
+    }
+  }
+  if (bytes > tally.bytes) {
+    if (bytes > limits_.max_bytes_per_owner) {
+      return absl::StrFormat("its owner would hold %d bytes; max_bytes_per_owner is %d", bytes,
+                             limits_.max_bytes_per_owner);
+    }
+    const uint64_t all = draft_.total().bytes - tally.bytes + bytes;
+    if (all > limits_.max_scene_bytes) {
+      return absl::StrFormat(
+          "the scene would hold %d bytes; max_scene_bytes, which all owners share, is %d; orphaned "
+          "layers can be cleared",
+          all, limits_.max_scene_bytes);
+    }
+  }
+  return std::nullopt;
 }
 
 void CommitApplier::Do(Operation& operation, Upsert& upsert) {
@@ -146,19 +190,11 @@ void CommitApplier::Do(Operation& operation, Upsert& upsert) {
   const uint64_t drawables = AddSaturating(
       tally.drawables - (old ? draft_.DrawablesOf(author_.owner, (*old)->data.content) : 0),
       draft_.DrawablesOf(author_.owner, upsert.entity.content));
-  if (drawables > limits_.max_entities_per_owner) {
-    return refuse(
-        "upsert", Reason::kQuotaExceeded,
-        absl::StrFormat("it would be entity %d of its owner (an instance counts as what it "
-                        "draws); max_entities_per_owner is %d",
-                        drawables, limits_.max_entities_per_owner));
-  }
-  const uint64_t bytes =
-      tally.bytes - (old ? (*old)->bytes : 0) + Draft::EntityBytes(key, upsert.id, upsert.entity);
-  if (bytes > limits_.max_bytes_per_owner) {
-    return refuse("upsert", Reason::kQuotaExceeded,
-                  absl::StrFormat("its owner would hold %d bytes; max_bytes_per_owner is %d", bytes,
-                                  limits_.max_bytes_per_owner));
+  const uint64_t bytes = tally.bytes - (old ? (*old)->bytes : 0) +
+                         (layer == nullptr ? Draft::LayerBytes(key) : 0) +
+                         Draft::EntityBytes(key, upsert.id, upsert.entity);
+  if (auto over = OverQuota(drawables, bytes)) {
+    return refuse("upsert", Reason::kQuotaExceeded, *std::move(over));
   }
 
   Entity entity;

@@ -77,6 +77,9 @@ class CommitApplier {
   // What is wrong with `in_layer` on some display; nothing if it is in range on all.
   std::optional<std::string> OutOfRange(const gpu::Affine& layer_transform,
                                         const Bounds& in_layer) const;
+  // What is wrong if the author came to draw `drawables` and hold `bytes`; nothing if quotas allow
+  // it.
+  std::optional<std::string> OverQuota(uint64_t drawables, uint64_t bytes) const;
   bool RefusedNewLayer(const Operation& operation, const std::string& layer,
                        const std::string& field);
 

@@ -45,9 +45,13 @@ const OwnerTally& Draft::tally(uint64_t owner) const {
   return tallies_.emplace(owner, found == nullptr ? OwnerTally() : *found).first->second;
 }
 
-OwnerTally& Draft::EditTally(uint64_t owner) {
+void Draft::Count(uint64_t owner, const OwnerTally& more, const OwnerTally& less) {
   tally(owner);
-  return tallies_.find(owner)->second;
+  for (OwnerTally* counted : {&tallies_.find(owner)->second, &next_.total}) {
+    counted->drawables += more.drawables - less.drawables;
+    counted->layers += more.layers - less.layers;
+    counted->bytes += more.bytes - less.bytes;
+  }
 }
 
 uint64_t Draft::DrawablesOf(uint64_t owner, const Content& content) const {
@@ -80,7 +84,7 @@ Layer& Draft::EditLayer(const OwnedName& key, const WriterPtr& writer) {
     layer.number = next_number_++;
     layer.writer = writer;
     open_.insert_or_assign(key, std::move(layer));
-    ++EditTally(key.owner).layers;
+    Count(key.owner, {.layers = 1, .bytes = LayerBytes(key)}, {});
   }
   Layer& layer = OpenLayer(key);
   if (layer.writer != writer) layer.writer = writer;
@@ -90,7 +94,7 @@ Layer& Draft::EditLayer(const OwnedName& key, const WriterPtr& writer) {
 void Draft::RemoveLayer(const OwnedName& key) {
   ClearLayer(key);
   open_.insert_or_assign(key, std::nullopt);
-  --EditTally(key.owner).layers;
+  Count(key.owner, {}, {.layers = 1, .bytes = LayerBytes(key)});
 }
 
 void Draft::ClearLayer(const OwnedName& key) {
@@ -103,9 +107,8 @@ void Draft::ClearLayer(const OwnedName& key) {
 }
 
 void Draft::Index(const OwnedName& layer, const std::string& id, const Entity& entity) {
-  OwnerTally& tally = EditTally(layer.owner);
-  tally.drawables += DrawablesOf(layer.owner, entity.data.content);
-  tally.bytes += entity.bytes;
+  Count(layer.owner,
+        {.drawables = DrawablesOf(layer.owner, entity.data.content), .bytes = entity.bytes}, {});
   ++next_.entities;
   if (const InstanceRef* instance = InstanceOf(entity.data.content)) {
     next_.uses.Put(UseBy(layer, id, *instance), true);
@@ -116,9 +119,8 @@ void Draft::Index(const OwnedName& layer, const std::string& id, const Entity& e
 }
 
 void Draft::Unindex(const OwnedName& layer, const std::string& id, const Entity& entity) {
-  OwnerTally& tally = EditTally(layer.owner);
-  tally.drawables -= DrawablesOf(layer.owner, entity.data.content);
-  tally.bytes -= entity.bytes;
+  Count(layer.owner, {},
+        {.drawables = DrawablesOf(layer.owner, entity.data.content), .bytes = entity.bytes});
   --next_.entities;
   if (const InstanceRef* instance = InstanceOf(entity.data.content)) {
     next_.uses.Erase(UseBy(layer, id, *instance));
@@ -166,18 +168,17 @@ void Draft::RemoveEntity(const OwnedName& layer, const std::string& id) {
 void Draft::PutObject(const OwnedName& key, Object object) {
   const ObjectPtr* found = next_.objects.Find(key);
   const ObjectPtr old = found == nullptr ? nullptr : *found;
-  OwnerTally& tally = EditTally(key.owner);
 
   object.bytes = ObjectBytes(key.name, *object.data);
   if (old != nullptr) {
-    tally.bytes -= old->bytes;
+    Count(key.owner, {}, {.bytes = old->bytes});
     for (const ObjectPart& part : old->data->parts) {
       if (const InstanceRef* child = InstanceOf(part.content)) {
         next_.uses.Erase({key.owner, child->object, true, key.name, ""});
       }
     }
   }
-  tally.bytes += object.bytes;
+  Count(key.owner, {.bytes = object.bytes}, {});
   for (const ObjectPart& part : object.data->parts) {
     if (const InstanceRef* child = InstanceOf(part.content)) {
       next_.uses.Put({key.owner, child->object, true, key.name, ""}, true);
@@ -194,7 +195,7 @@ void Draft::PutObject(const OwnedName& key, Object object) {
       return true;
     });
     for (const UseKey& use : instances) {
-      tally.drawables += now - before;
+      Count(key.owner, {.drawables = now}, {.drawables = before});
       const OwnedName layer{use.owner, use.layer};
       const gpu::Affine transform = (*FindEntity(layer, use.id))->data.transform;
       OpenLayer(layer).bounds.Include(MapBounds(transform, object.bounds));
@@ -205,7 +206,7 @@ void Draft::PutObject(const OwnedName& key, Object object) {
 
 void Draft::RemoveObject(const OwnedName& key) {
   const ObjectPtr old = *next_.objects.Find(key);
-  EditTally(key.owner).bytes -= old->bytes;
+  Count(key.owner, {}, {.bytes = old->bytes});
   for (const ObjectPart& part : old->data->parts) {
     if (const InstanceRef* child = InstanceOf(part.content)) {
       next_.uses.Erase({key.owner, child->object, true, key.name, ""});

@@ -26,6 +26,7 @@ class Draft {
   const EntityPtr* FindEntity(const OwnedName& layer, const std::string& id) const;
   const Object* FindObject(const OwnedName& key) const { return next_.FindObject(key); }
   const OwnerTally& tally(uint64_t owner) const;
+  const OwnerTally& total() const { return next_.total; }
   const PersistentMap<UseKey, bool>& uses() const { return next_.uses; }
   const PersistentMap<ExpiryKey, EntityPlace>& expiries() const { return next_.expiries; }
   // fn(key, layer) for every layer there is, in no particular order. `fn` must not change the
@@ -52,7 +53,8 @@ class Draft {
   void ClearLayer(const OwnedName& key);
 
   // ---- entities. The layer must exist.
-  // What an entity counts for against max_bytes_per_owner.
+  // What counts against max_bytes_per_owner and max_scene_bytes.
+  static uint64_t LayerBytes(const OwnedName& layer) { return sizeof(Layer) + layer.name.size(); }
   static uint64_t EntityBytes(const OwnedName& layer, const std::string& id,
                               const EntityData& data);
   static uint64_t ObjectBytes(const std::string& name, const ObjectData& data);
@@ -72,7 +74,8 @@ class Draft {
   SnapshotPtr Finish(uint64_t number) &&;
 
  private:
-  OwnerTally& EditTally(uint64_t owner);
+  // Adds `more` to the owner's tally and to the total, and takes `less` away.
+  void Count(uint64_t owner, const OwnerTally& more, const OwnerTally& less);
   Layer& OpenLayer(const OwnedName& key);
   void Index(const OwnedName& layer, const std::string& id, const Entity& entity);
   void Unindex(const OwnedName& layer, const std::string& id, const Entity& entity);

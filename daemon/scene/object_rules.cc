@@ -137,10 +137,7 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
       drawables -= std::max<uint64_t>(1, before->drawables);
       drawables = AddSaturating(drawables, std::max<uint64_t>(1, object.drawables));
       if (drawables > limits_.max_entities_per_owner) {
-        return refuse(Reason::kQuotaExceeded,
-                      absl::StrFormat("with its instances the owner would have %d entities; "
-                                      "max_entities_per_owner is %d",
-                                      drawables, limits_.max_entities_per_owner));
+        return refuse(Reason::kQuotaExceeded, *OverQuota(drawables, tally.bytes));
       }
       const OwnedName layer = Key(use.layer);
       const gpu::Affine& transform = (*draft_.FindEntity(layer, use.id))->data.transform;
@@ -154,12 +151,8 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
   const Object* old = draft_.FindObject(Key(define.object));
   const uint64_t bytes = tally.bytes - (old == nullptr ? 0 : old->bytes) +
                          Draft::ObjectBytes(define.object, *define.data);
-  if (bytes > limits_.max_bytes_per_owner) {
-    return refuse(Reason::kQuotaExceeded,
-                  absl::StrFormat("its owner would hold %d bytes; max_bytes_per_owner is %d", bytes,
-                                  limits_.max_bytes_per_owner));
-  }
-  return false;
+  auto over = OverQuota(drawables, bytes);
+  return over.has_value() && refuse(Reason::kQuotaExceeded, *std::move(over));
 }
 
 void CommitApplier::Do(Operation& operation, DefineObject& define) {

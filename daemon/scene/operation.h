@@ -51,6 +51,10 @@ struct Limits {
   uint64_t max_entities_per_owner = 1'000'000;
   uint64_t max_layers_per_owner = 1024;
   uint64_t max_bytes_per_owner = uint64_t{1} << 30;
+  // Of all owners together, those who have gone included.
+  uint64_t max_entities = 16'000'000;
+  uint64_t max_layers = 65'536;
+  uint64_t max_scene_bytes = uint64_t{8} << 30;
   uint64_t max_vertices_per_entity = 16u << 20;
   uint64_t max_indices_per_entity = 48u << 20;
   uint32_t max_id_bytes = 256;
@@ -58,11 +62,11 @@ struct Limits {
   uint64_t max_uncommitted_bytes = 256u << 20;
   uint32_t max_instance_depth = 8;
   double max_coordinate_voxels = 1073741824.0;  // 2³⁰
-  uint32_t max_timed_commits = 64;
-  int64_t max_present_at_horizon_ns = 10 * sync::kSecond;
-  int64_t must_show_timeout_ns = 2 * sync::kSecond;
+  double max_thickness = 4096;                  // in its own unit
   uint32_t max_sessions = 1024;
   uint32_t max_parts_per_object = 4096;
+  uint32_t max_captures = 16;
+  int64_t max_linger_ns = 3600 * sync::kSecond;
 };
 
 // Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be

@@ -100,7 +100,7 @@ struct EntityPlace {
   auto operator<=>(const EntityPlace&) const = default;
 };
 
-// What counts against an owner's quotas.
+// What counts against quotas: an owner's, or everybody's together.
 struct OwnerTally {
   uint64_t drawables = 0;  // entities, an instance counting as what it draws (at least 1)
   uint64_t layers = 0;
@@ -115,6 +115,7 @@ struct Snapshot {
   PersistentMap<UseKey, bool> uses;
   PersistentMap<ExpiryKey, EntityPlace> expiries;
   PersistentMap<uint64_t, OwnerTally> owners;
+  OwnerTally total;  // of all owners
   uint64_t entities = 0;
 
   const Layer* FindLayer(const OwnedName& key) const {

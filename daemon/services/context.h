@@ -12,21 +12,25 @@
 
 namespace voxeld::daemon::services {
 
-// Outlives the services; the core and the clock outlive it.
-struct ServiceContext {
-  Core& core;
-  sync::Clock& clock;
-  std::string version;
-  Logger* log = nullptr;  // may be none
+struct StreamLimits {
   // How long a stream that was half-closed waits for outcomes that it is still owed, and any ending
   // stream for its client to read what is queued.
   sync::TimeNs drain_limit_ns = 5 * sync::kSecond;
   // Of answers that a client has not read. Beyond, its stream ends with RESOURCE_EXHAUSTED.
   size_t max_queued_answers = 16384;
   size_t max_queued_bytes = 16u << 20;
+};
+
+// Outlives the services; the core and the clock outlive it.
+struct ServiceContext {
+  Core& core;
+  sync::Clock& clock;
+  std::string version;
+  Logger* log = nullptr;  // may be none
+  StreamLimits limits;
 
   ActiveCalls calls;
-  std::atomic<uint64_t> streams_overrun{0};  // ended because their client did not read
+  std::atomic<uint32_t> captures{0};  // under way
 };
 
 }  // namespace voxeld::daemon::services

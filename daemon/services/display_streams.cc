@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/services/services.h"
@@ -51,6 +52,7 @@ class Sender : public grpc::ServerWriteReactor<Message>,
 
   void OnDone() final {
     context_.calls.Remove(this);
+    OnEnded();
     alarm_.reset();
     const std::shared_ptr<Sender> last = std::move(self_);
   }
@@ -58,6 +60,7 @@ class Sender : public grpc::ServerWriteReactor<Message>,
  protected:
   virtual void OnSent() = 0;
   virtual void OnAlarm() {}
+  virtual void OnEnded() {}  // the last of all; Begin was called
 
   void Send(Message message) {
     sync::MutexLock lock(mutex_);
@@ -142,6 +145,12 @@ class Capture final : public Sender<v1::VolumeChunk> {
 
   void Start(const v1::CaptureVolumeRequest& request) {
     Begin();
+    if (const uint32_t most = context_.core.limits().max_captures; ++context_.captures > most) {
+      return End(absl::ResourceExhaustedError(
+          absl::StrCat(most,
+                       " captures are under way, which is max_captures; try again when one "
+                       "has ended")));
+    }
     const int64_t timeout = request.timeout_ns() == 0 ? kDefaultNs : request.timeout_ns();
     if (timeout < 0 || timeout > kGreatestNs) {
       return End(absl::InvalidArgumentError(absl::StrCat("timeout_ns is ", timeout, "; give 1 to ",
@@ -170,6 +179,8 @@ class Capture final : public Sender<v1::VolumeChunk> {
                           });
   }
 
+  void OnEnded() override { --context_.captures; }
+
   // Whole slices, as many as fit into a chunk, but at least one.
   void OnSent() override {
     const display::FrameLayout& layout = volume_.layout;
@@ -182,8 +193,8 @@ class Capture final : public Sender<v1::VolumeChunk> {
     v1::VolumeChunk chunk;
     v1::VolumeSlices* slices = chunk.mutable_slices();
     slices->set_first_slice(next_slice_);
-    slices->set_rgb(volume_.rgb.data() + static_cast<size_t>(next_slice_) * slice_bytes,
-                    static_cast<size_t>(count) * slice_bytes);
+    const std::vector<uint8_t> rgb = volume_.Rgb(next_slice_, count);
+    slices->set_rgb(rgb.data(), rgb.size());
     next_slice_ += count;
     Send(std::move(chunk));
   }

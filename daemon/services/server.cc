@@ -24,26 +24,20 @@ constexpr const char* kServices[] = {"voxeld.v1.SceneService", "voxeld.v1.Displa
 // back-pressure, and with the bandwidth probe it grows to megabytes that wait unseen.
 constexpr int kLookaheadBytes = 256 << 10;
 
-// How a client that vanished without a word is noticed.
-constexpr int kKeepaliveMs = 20'000;
-constexpr int kKeepaliveTimeoutMs = 10'000;
+// Of a client that pings on its own.
 constexpr int kLeastPingIntervalMs = 5'000;
 
 constexpr sync::TimeNs kLastCallsLimit = 200 * sync::kMillisecond;
-constexpr int kStreamsPerConnection = 256;
 constexpr mode_t kSocketMode = 0660;
+
+int Milliseconds(sync::TimeNs time) { return static_cast<int>(time / sync::kMillisecond); }
 
 }  // namespace
 
 class Server::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ServerOptions options)
-      : context_{core,
-                 clock,
-                 options.version,
-                 options.log,
-                 options.drain_limit_ns,
-                 options.max_queued_answers},
+      : context_{core, clock, options.version, options.log, options.streams},
         options_(std::move(options)),
         scene_(MakeSceneService(context_)),
         display_(MakeDisplayService(context_)) {}
@@ -61,11 +55,14 @@ class Server::Impl {
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a busy port is an error
     builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
     builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kLookaheadBytes);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS,
+                               Milliseconds(options_.keepalive_interval_ns));
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
+                               Milliseconds(options_.keepalive_timeout_ns));
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                                kLeastPingIntervalMs);
-    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kStreamsPerConnection);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                               static_cast<int>(options_.max_calls_per_connection));
     builder.RegisterService(scene_.get());
     builder.RegisterService(display_.get());
 
@@ -115,7 +112,6 @@ class Server::Impl {
   }
 
   const std::vector<Address>& addresses() const { return addresses_; }
-  uint64_t streams_overrun() const { return context_.streams_overrun; }
 
  private:
   ServiceContext context_;
@@ -136,7 +132,6 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(Core& core, sync::Clock& c
 }
 
 const std::vector<Address>& Server::addresses() const { return impl_->addresses(); }
-uint64_t Server::streams_overrun() const { return impl_->streams_overrun(); }
 void Server::Shutdown(sync::TimeNs limit) { impl_->Shutdown(limit); }
 
 }  // namespace voxeld::daemon::services

@@ -18,9 +18,12 @@ namespace voxeld::daemon::services {
 struct ServerOptions {
   std::vector<Address> listen;  // at least one
   std::string version;
-  sync::TimeNs drain_limit_ns = 5 * sync::kSecond;
-  size_t max_queued_answers = 16384;  // that a client of Stream has not read
-  Logger* log = nullptr;              // outlives the server; may be none
+  StreamLimits streams;
+  uint32_t max_calls_per_connection = 256;
+  // An idle connection is probed this often, and closed when no answer comes in time.
+  sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
+  sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
+  Logger* log = nullptr;  // outlives the server; may be none
 };
 
 // Thread-safe. The core must run, outlive the server, and be stopped after it.
@@ -36,9 +39,6 @@ class Server {
 
   // Where it listens, with the ports that were chosen.
   const std::vector<Address>& addresses() const;
-
-  // Streams that were ended because their client did not read.
-  uint64_t streams_overrun() const;
 
   // Health answers NOT_SERVING, nothing new is accepted, every long call ends with `Unavailable:
   // shutting down` after what is queued for it. Returns when all calls have ended, after at most

@@ -149,7 +149,7 @@ void StreamSession::OnReadsDone() {
           "the stream ended before its first message, which must be open"));
     } else if (state_ == State::kOpen) {
       state_ = State::kDraining;
-      if (port_ != nullptr) port_->SetAlarm(context_.drain_limit_ns);
+      if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);
       close = Drained();
     }
   }
@@ -206,7 +206,7 @@ bool StreamSession::Close(const absl::Status& status) {
   // for.
   const bool session = session_ != 0;
   state_ = session ? State::kClosing : State::kFlushing;
-  if (port_ != nullptr) port_->SetAlarm(context_.drain_limit_ns);
+  if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);
   if (!session) FinishIfFlushed();
   return session;
 }
@@ -290,10 +290,11 @@ void StreamSession::Queue(const v1::StreamResponse& response) {
 }
 
 bool StreamSession::Overrun() {
-  if (queue_.size() <= context_.max_queued_answers && queued_bytes_ <= context_.max_queued_bytes) {
+  if (queue_.size() <= context_.limits.max_queued_answers &&
+      queued_bytes_ <= context_.limits.max_queued_bytes) {
     return false;
   }
-  ++context_.streams_overrun;
+  context_.core.CountOverrun();
   const bool close = !ending_;
   if (close) {
     ending_ = true;

@@ -19,7 +19,6 @@ namespace {
 
 constexpr size_t kClientNameBytes = 128;
 constexpr uint64_t kAbsurd = 4;  // times what is allowed
-constexpr int64_t kGreatestLingerNs = 3600 * sync::kSecond;
 
 absl::Status OpenError(const Fault& fault) {
   const std::string text = absl::StrCat(fault.field, " ", fault.message);
@@ -27,7 +26,8 @@ absl::Status OpenError(const Fault& fault) {
                                                 : absl::InvalidArgumentError(text);
 }
 
-MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, OpenOptions* out) {
+MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, const Limits& limits,
+                    OpenOptions* out) {
   switch (in.on_disconnect()) {
     case v1::DISCONNECT_POLICY_UNSPECIFIED:
     case v1::DISCONNECT_POLICY_CLEAR:
@@ -44,10 +44,10 @@ MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, OpenOptions* out)
           FieldPath(path, "on_disconnect"), in.on_disconnect(),
           "DISCONNECT_POLICY_CLEAR, DISCONNECT_POLICY_LINGER, DISCONNECT_POLICY_KEEP");
   }
-  if (in.linger_ns() < 0 || in.linger_ns() > kGreatestLingerNs) {
+  if (in.linger_ns() < 0 || in.linger_ns() > limits.max_linger_ns) {
     return Fault{
         FieldPath(path, "linger_ns").ToString(), Reason::kInvalidValue,
-        absl::StrCat("is ", in.linger_ns(), "; give 0 to ", kGreatestLingerNs, " (1 hour)")};
+        absl::StrCat("is ", in.linger_ns(), "; give 0 to max_linger_ns, ", limits.max_linger_ns)};
   }
   if (in.linger_ns() != 0 && out->on_disconnect != DisconnectPolicy::kLinger) {
     return Fault{FieldPath(path, "linger_ns").ToString(), Reason::kInvalidValue,
@@ -76,11 +76,12 @@ MaybeFault CheckFlow(const FieldPath& path, const v1::Open& in) {
                             "; it goes with flow = FLOW_POLICY_DROP_OLDEST only")};
 }
 
-MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, OpenOptions* out) {
+MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, const Limits& limits,
+                  OpenOptions* out) {
   if (auto fault = CheckLabel(FieldPath(path, "client_name"), in.client_name(), kClientNameBytes)) {
     return fault;
   }
-  if (auto fault = ToPolicy(path, in, out)) return fault;
+  if (auto fault = ToPolicy(path, in, limits, out)) return fault;
   if (!in.resume_token().empty()) {
     return Unimplemented(FieldPath(path, "resume_token"),
                          "every stream is a session of its own; leave it empty");
@@ -143,9 +144,9 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits&
 
 }  // namespace
 
-absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open) {
+absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits) {
   OpenOptions options;
-  if (auto fault = ToOpen(FieldPath("open"), open, &options)) return OpenError(*fault);
+  if (auto fault = ToOpen(FieldPath("open"), open, limits, &options)) return OpenError(*fault);
   return options;
 }
 
@@ -153,7 +154,7 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
                             uint64_t previous_sequence) {
   Decoded out;
   if (request.op_case() == v1::StreamRequest::kOpen) {
-    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open());
+    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
     if (!open.ok()) return Failed(open.status());
     out.open = *std::move(open);
     out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
@@ -188,7 +189,7 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
 
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits) {
   Decoded out;
-  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open());
+  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
   if (!open.ok()) return Failed(open.status());
   if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {
     open->on_disconnect = DisconnectPolicy::kKeep;

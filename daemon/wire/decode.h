@@ -53,6 +53,6 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].".
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits);
 
-absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open);
+absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);
 
 }  // namespace voxeld::daemon::wire

@@ -92,11 +92,14 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_uncommitted_bytes(in.max_uncommitted_bytes);
   out->set_max_instance_depth(in.max_instance_depth);
   out->set_max_coordinate_voxels(in.max_coordinate_voxels);
-  out->set_max_timed_commits(in.max_timed_commits);
-  out->set_max_present_at_horizon_ns(in.max_present_at_horizon_ns);
-  out->set_must_show_timeout_ns(in.must_show_timeout_ns);
+  out->set_max_thickness(in.max_thickness);
   out->set_max_sessions(in.max_sessions);
   out->set_max_parts_per_object(in.max_parts_per_object);
+  out->set_max_entities(in.max_entities);
+  out->set_max_layers(in.max_layers);
+  out->set_max_scene_bytes(in.max_scene_bytes);
+  out->set_max_captures(in.max_captures);
+  out->set_max_linger_ns(in.max_linger_ns);
 }
 
 void Encode(const EntityKey& in, v1::EntityKey* out) {

@@ -18,6 +18,7 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_engine_device(in.engine_device);
   out->set_engine_reason(in.engine_reason);
   out->set_lit_voxels(in.lit_voxels);
+  out->set_singular_drawables(in.singular_drawables);
   out->set_volumes_drawn(in.volumes_drawn);
   out->set_volumes_presented(in.volumes_presented);
   out->set_volumes_replaced(in.volumes_replaced);
@@ -59,6 +60,8 @@ void Encode(const Stats& in, v1::Stats* out) {
   out->set_operations_refused(in.operations_refused);
   out->set_bytes_in(in.bytes_in);
   out->set_outcomes_undelivered(in.outcomes_undelivered);
+  out->set_client_drops(in.client_drops);
+  out->set_streams_overrun(in.streams_overrun);
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

@@ -11,15 +11,16 @@
 namespace voxeld::daemon::wire {
 namespace {
 
-constexpr float kGreatestThickness = 4096;
 constexpr uint32_t kGreatestColor = 0xFFFFFF;
 
-MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, gpu::GeometryRecord* out) {
+MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
+                       gpu::GeometryRecord* out) {
   const float value = in.value();
   if (auto fault = CheckFinite(FieldPath(path, "value"), value)) return fault;
-  if (value < 0 || value > kGreatestThickness) {
+  if (value < 0 || value > limits.max_thickness) {
     return Fault{FieldPath(path, "value").ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", Show(value), "; give 0 (one voxel) to 4096")};
+                 absl::StrCat("is ", Show(value), "; give 0 (one voxel) to max_thickness, ",
+                              limits.max_thickness)};
   }
   switch (in.unit()) {
     case v1::Thickness::UNIT_UNSPECIFIED:
@@ -67,7 +68,8 @@ MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) 
 MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const Limits& limits,
                     GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kPoints;
-  if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), &out->record)) {
+  if (auto fault =
+          ToThickness(FieldPath(path, "thickness"), in.thickness(), limits, &out->record)) {
     return fault;
   }
   return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, limits, out);
@@ -117,7 +119,7 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limit
       return UnknownEnum(FieldPath(path, "sampling"), in.sampling(),
                          "LINE_SAMPLING_THIN, LINE_SAMPLING_EUCLIDEAN, LINE_SAMPLING_COVER");
   }
-  if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), &record)) {
+  if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), limits, &record)) {
     return fault;
   }
   if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, out)) {

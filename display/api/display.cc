@@ -4,8 +4,23 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "display/api/pixels.h"
 
 namespace voxeld::display {
+
+std::vector<uint8_t> DecodedVolume::Rgb(int32_t first, int32_t count) const {
+  const size_t per_slice =
+      static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) * 3;
+  const size_t subs = static_cast<size_t>(layout.sub_frames);
+  std::vector<uint8_t> rgb(per_slice * static_cast<size_t>(count));
+  std::vector<std::span<const std::byte>> of_slice(subs);
+  for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
+    const size_t slice = static_cast<size_t>(first) + i;
+    for (size_t sub = 0; sub < subs; ++sub) of_slice[sub] = *pictures[slice * subs + sub];
+    SliceToRgb(layout, of_slice, std::span(rgb).subspan(i * per_slice, per_slice));
+  }
+  return rgb;
+}
 namespace {
 
 // After a lost volume the newest one is sent again: first after this time, then after twice as
@@ -121,8 +136,9 @@ absl::Status Display::SetBrightness(double brightness) {
     return absl::InvalidArgumentError(
         absl::StrCat("brightness is ", brightness, "; it must be from 0 to 1"));
   }
-  brightness_ = brightness;
-  return attached() ? DoSetBrightness(brightness) : absl::OkStatus();
+  const absl::Status status = attached() ? DoSetBrightness(brightness) : absl::OkStatus();
+  if (status.ok()) brightness_ = brightness;
+  return status;
 }
 
 absl::Status Display::SetBlank(bool blank) {

@@ -50,14 +50,18 @@ struct DisplayStats {
   uint64_t attaches = 0;
 };
 
-// What an eye would see: every slice as 8-bit RGB light, sub-frames averaged, rebuilt from wire
-// bytes.
+// A volume rebuilt from wire bytes: what an eye would see. Cheap to copy; the pictures are shared.
 struct DecodedVolume {
   enum class Source : uint8_t { kDecodedFromSent, kReportedByDevice };
   uint64_t volume = 0;
-  FrameLayout layout;        // of the wire; `rgb` is always 8-bit RGB
-  std::vector<uint8_t> rgb;  // slices · height · width · 3, row-major
+  FrameLayout layout;
+  std::vector<Picture> pictures;  // layout.pictures(), none of them null
   Source source = Source::kDecodedFromSent;
+
+  // The light of slices [first, first + count), sub-frames averaged: count · height · width · 3
+  // bytes of 8-bit RGB, row-major (see SliceToRgb).
+  std::vector<uint8_t> Rgb(int32_t first, int32_t count) const;
+  std::vector<uint8_t> Rgb() const { return Rgb(0, layout.slices); }
 };
 
 // Rebuilds volumes from a driver's outgoing wire bytes. Single-threaded.
@@ -114,8 +118,9 @@ class Display {
   sync::TimeNs Tick();
 
   // The device's global brightness, 0 to 1; dark and light again. InvalidArgument for a value
-  // outside. Both are kept while there is no device, and are part of its set-up. What waits or is
-  // in flight when the display is blanked gets kLost; light again brings back the volume before.
+  // outside; what the device refuses is as it was. Both are kept while there is no device, and are
+  // part of its set-up; a device that comes and has no brightness sets it back to 1. What waits or
+  // is in flight when the display is blanked gets kLost; light again brings back the volume before.
   absl::Status SetBrightness(double brightness);
   absl::Status SetBlank(bool blank);
   double brightness() const { return brightness_; }
@@ -150,6 +155,7 @@ class Display {
 
   // For drivers, on the owner's thread.
   void Attached();  // the device is set up: the current frame goes out first
+  void HasNoBrightness() { brightness_ = 1; }  // found while attaching
   // Whatever is in flight (`bytes` of it sent) is lost; DoTick attaches again.
   void DeviceLost(const std::string& reason, uint64_t bytes = 0);
   void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,

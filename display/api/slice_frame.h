@@ -60,9 +60,14 @@ struct Tone {
   bool operator==(const Tone&) const = default;
 };
 
+// One picture's bytes, layout.bytes_per_slice() of them; shared between volumes that have it in
+// common.
+using Picture = std::shared_ptr<const std::vector<std::byte>>;
+
 // One volume. Immutable once handed over.
 struct SliceFrame {
-  uint64_t volume = 0;  // numbers ascend by one a volume, from 1
+  // Numbers ascend from 1; those of volumes that came out unchanged, or to nothing, are left out.
+  uint64_t volume = 0;
   FrameLayout layout;
   std::vector<std::byte> bytes;  // layout.bytes(): picture after picture
   // layout.pictures(): the volume in which each picture last changed.

@@ -439,7 +439,7 @@ std::optional<DecodedVolume> VoxlinkDevice::Seen() const {
   DecodedVolume seen;
   seen.volume = screen_.shown()->number;
   seen.layout = layout_;
-  seen.rgb = voxlink::VolumeToRgb(layout_, *screen_.shown());
+  seen.pictures = screen_.shown()->pictures;
   seen.source = DecodedVolume::Source::kReportedByDevice;
   return seen;
 }

@@ -2,22 +2,7 @@
 
 #include <utility>
 
-#include "display/api/pixels.h"
-
 namespace voxeld::display::voxlink {
-
-std::vector<uint8_t> VolumeToRgb(const FrameLayout& layout, const Volume& volume) {
-  const size_t per_slice =
-      static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) * 3;
-  const size_t subs = static_cast<size_t>(layout.sub_frames);
-  std::vector<uint8_t> rgb(per_slice * static_cast<size_t>(layout.slices));
-  std::vector<std::span<const std::byte>> pictures(subs);
-  for (size_t slice = 0; slice < static_cast<size_t>(layout.slices); ++slice) {
-    for (size_t sub = 0; sub < subs; ++sub) pictures[sub] = *volume.pictures[slice * subs + sub];
-    SliceToRgb(layout, pictures, std::span(rgb).subspan(slice * per_slice, per_slice));
-  }
-  return rgb;
-}
 
 ErrorCode VolumeAssembler::Begin(const PacketHeader& header, std::span<const std::byte> payload,
                                  VolumePtr base) {

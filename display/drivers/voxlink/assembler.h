@@ -16,17 +16,11 @@
 
 namespace voxeld::display::voxlink {
 
-// One picture's bytes; shared between volumes that have it in common.
-using Picture = std::shared_ptr<const std::vector<std::byte>>;
-
 struct Volume {
   uint64_t number = 0;
   std::vector<Picture> pictures;  // layout.pictures()
 };
 using VolumePtr = std::shared_ptr<const Volume>;
-
-// The volume as light: layout.slices · height · width · 3 bytes.
-std::vector<uint8_t> VolumeToRgb(const FrameLayout& layout, const Volume& volume);
 
 class VolumeAssembler {
  public:

@@ -27,7 +27,7 @@ std::optional<DecodedVolume> VoxlinkDecoder::TakeVolume() {
   DecodedVolume decoded;
   decoded.volume = complete_->number;
   decoded.layout = layout_;
-  decoded.rgb = VolumeToRgb(layout_, *complete_);
+  decoded.pictures = complete_->pictures;
   decoded.source = DecodedVolume::Source::kDecodedFromSent;
   return decoded;
 }

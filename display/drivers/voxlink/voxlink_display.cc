@@ -184,6 +184,8 @@ void VoxlinkDisplay::Configure() {
   link_.Write(Request::kSetMode, 0, BytesOf(mode));
   if ((capabilities_.fixed.features & kFeatureBrightness) != 0) {
     link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
+  } else {
+    HasNoBrightness();
   }
   link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   link_.Write(Request::kStart, 0);
@@ -268,9 +270,8 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
     case EventType::kHealth:
     case EventType::kError:  // what an error damaged, VOLUME_END brings to light
     case EventType::kLight:
+    default:  // of a later minor version
       return;
-    default:
-      return;  // of a later minor version
   }
   OnLinkFailed(
       absl::StrCat("event ", static_cast<int>(header.type), " has only ", body.size(), " bytes"));

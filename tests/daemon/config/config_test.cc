@@ -8,7 +8,7 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
-#include "daemon/config/suggest.h"
+#include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon {
 namespace {

@@ -64,6 +64,29 @@ TEST(CoreDisplays, AnUpdateIsWholeOrNothing) {
   EXPECT_FALSE(result->blank);
 }
 
+TEST(CoreDisplays, AViewThatTheSceneDoesNotFitIsRefused) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x", 1));
+  DisplayUpdate update;
+  update.view = ViewOptions{ViewOptions::Mode::kVoxels, {}, {}};
+  for (int axis = 0; axis < 3; ++axis) update.view->transform.m[axis * 5] = 1e12;
+  const absl::Status refused = sim.Update(update).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(refused.message(), HasSubstr("entity \"x\" of layer \"a\""));
+  EXPECT_EQ(sim.engine().targets.size(), 1u);
+  // Nor does a refused view stay behind as something to fit.
+  sim.Send(client, 2, Put("a", "x", 2));
+  EXPECT_TRUE(client.sink->issues.empty());
+  // Once taken, it is what counts.
+  sim.Send(client, 3, testing::DeleteAllMine());
+  ASSERT_TRUE(sim.Update(update).ok());
+  sim.Send(client, 4, Put("a", "x", 1));
+  ASSERT_EQ(client.sink->issues.size(), 1u);
+  EXPECT_EQ(client.sink->issues[0].reason, Reason::kOutOfRange);
+}
+
 TEST(CoreDisplays, UnknownNamesListThoseThereAre) {
   Simulation sim({}, 2);
   sim.Start();

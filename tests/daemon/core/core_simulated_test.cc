@@ -90,7 +90,8 @@ class SimulatedDaemon {
 uint32_t PixelAt(const display::DecodedVolume& volume, int u, int v, int slice) {
   const size_t at =
       ((static_cast<size_t>(slice) * volume.layout.height + v) * volume.layout.width + u) * 3;
-  return uint32_t{volume.rgb[at]} << 16 | uint32_t{volume.rgb[at + 1]} << 8 | volume.rgb[at + 2];
+  const std::vector<uint8_t> rgb = volume.Rgb();
+  return uint32_t{rgb[at]} << 16 | uint32_t{rgb[at + 1]} << 8 | rgb[at + 2];
 }
 
 TEST(CoreSimulated, AVoxelGoesInAndItsPixelComesOut) {

@@ -152,8 +152,9 @@ class RunningCore {
 
 int LitPixels(const display::DecodedVolume& volume) {
   int lit = 0;
-  for (size_t i = 0; i + 2 < volume.rgb.size(); i += 3) {
-    lit += volume.rgb[i] != 0 || volume.rgb[i + 1] != 0 || volume.rgb[i + 2] != 0;
+  const std::vector<uint8_t> rgb = volume.Rgb();
+  for (size_t i = 0; i + 2 < rgb.size(); i += 3) {
+    lit += rgb[i] != 0 || rgb[i + 1] != 0 || rgb[i + 2] != 0;
   }
   return lit;
 }

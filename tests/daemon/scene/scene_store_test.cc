@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "daemon/scene/view_check.h"
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon {
@@ -296,6 +297,53 @@ TEST(SceneStore, QuotasRefuseWhatGoesBeyondThem) {
                 .refused_operations,
             1u);
   EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
+}
+
+TEST(SceneStore, QuotasOverAllOwnersRefuseTheLastToCome) {
+  Limits limits;
+  limits.max_entities = 4;
+  limits.max_layers = 3;
+  limits.max_scene_bytes = 40000;
+  StoreFixture f(limits);
+  const Author other = MakeAuthor(2, 22);
+  EXPECT_EQ(f.Commit(other, Put("a", "1"), Put("b", "2")).refused_operations, 0u);
+  CommitResult result =
+      f.Commit(Put("a", "3"), Put("a", "4"), Put("a", "5"), Put("c", "6"), SetLayer("d", true));
+  ASSERT_EQ(result.issues.size(), 3u);
+  for (const Issue& issue : result.issues) EXPECT_EQ(issue.reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(result.issues[0].message, HasSubstr("5 entities"));
+  EXPECT_THAT(result.issues[0].message, HasSubstr("max_entities, which all owners share, is 4"));
+  EXPECT_THAT(result.issues[1].message, HasSubstr("max_layers, 3"));
+  EXPECT_THAT(result.issues[2].message, HasSubstr("max_layers, 3"));
+  EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
+  // What others let go is there to be had.
+  f.Commit(other, DeleteAllMine());
+  EXPECT_EQ(f.Commit(Put("a", "5"), Put("c", "6")).refused_operations, 0u);
+  EXPECT_EQ(f.Commit(other, Put("z", "big", Entity1(Dots(0, 1, 1)))).refused_operations, 1u);
+  f.Commit(DeleteAllMine());
+  result = f.Commit(other, Put("z", "big", Entity1(Dots(0, 1, 2000))),
+                    Put("z", "bigger", Entity1(Dots(0, 1, 2000))));
+  ASSERT_EQ(result.issues.size(), 1u);
+  EXPECT_THAT(result.issues[0].message,
+              HasSubstr("max_scene_bytes, which all owners share, is 40000"));
+  EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
+}
+
+TEST(SceneStore, AViewIsCheckedAgainstWhatIsThere) {
+  StoreFixture f;
+  f.Commit(Put("a", "near"), Put("a", "far", Entity1(Dots(3, 1, 1))), SetLayer("a", true));
+  Limits limits;
+  limits.max_coordinate_voxels = 100;
+  DisplayView view{"disp", gpu::Affine()};
+  EXPECT_TRUE(CheckView(f.store.snapshot(), view, limits).ok());
+  for (int axis = 0; axis < 3; ++axis) view.scene_to_voxel.m[axis * 5] = 1000;
+  const absl::Status wrong = CheckView(f.store.snapshot(), view, limits);
+  EXPECT_EQ(wrong.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(wrong.message(), HasSubstr("layer \"a\" of owner 1"));
+  EXPECT_THAT(wrong.message(), HasSubstr("must stay within ±100"));
+  // The bounds of a layer stay wide when something in it goes; that refuses nothing.
+  f.Commit(DeleteId("a", "far"));
+  EXPECT_TRUE(CheckView(f.store.snapshot(), view, limits).ok());
 }
 
 TEST(SceneStore, BytesAreCountedAndLimited) {

@@ -31,6 +31,7 @@ std::string CheckIndices(const Snapshot& snapshot) {
 
   snapshot.layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
     ++owners[key.owner].layers;
+    owners[key.owner].bytes += sizeof(Layer) + key.name.size();
     uint64_t bytes = 0;
     layer->entities.ForEach([&](const std::string& id, const EntityPtr& entity) {
       ++entities;
@@ -68,6 +69,13 @@ std::string CheckIndices(const Snapshot& snapshot) {
   if (uses != held_uses) wrong += "uses\n";
   if (expiries != held_expiries) wrong += "expiries\n";
   if (owners != held_owners) wrong += "owners\n";
+  OwnerTally total;
+  for (const auto& [owner, tally] : owners) {
+    total.drawables += tally.drawables;
+    total.layers += tally.layers;
+    total.bytes += tally.bytes;
+  }
+  if (total != snapshot.total) wrong += "total\n";
   if (entities != snapshot.entities) wrong += "entities\n";
   return wrong;
 }

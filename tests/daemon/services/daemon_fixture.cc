@@ -47,8 +47,8 @@ Daemon::Daemon(DaemonOptions options)
   auto server = Server::Start(*core_, clock_,
                               {.listen = {*ParseAddress(target_)},
                                .version = "9.8.7",
-                               .drain_limit_ns = options.drain_limit_ns,
-                               .max_queued_answers = options.max_queued_answers});
+                               .streams = {.drain_limit_ns = options.drain_limit_ns,
+                                           .max_queued_answers = options.max_queued_answers}});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);
   channel_ = NewChannel();

@@ -157,6 +157,35 @@ TEST(Capture, RefusesAndTimesOut) {
   EXPECT_EQ(Capture(daemon, request).status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
 }
 
+TEST(Capture, NoMoreAtOnceThanAllowed) {
+  DaemonOptions options;
+  options.limits.max_captures = 1;
+  Daemon daemon(options);
+  v1::CaptureVolumeRequest request;
+  request.set_timeout_ns(60 * sync::kSecond);
+  request.set_at_least_snapshot(1'000'000);
+  grpc::ClientContext context;
+  SetDeadline(context);
+  const auto first = daemon.displays().CaptureVolume(&context, request);
+  v1::CaptureVolumeRequest second;
+  second.set_timeout_ns(50 * sync::kMillisecond);
+  second.set_at_least_snapshot(1'000'000);
+  // Whichever of the two the server hears first, one is refused and one waits.
+  grpc::Status status = Capture(daemon, second).status;
+  while (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
+    status = Capture(daemon, second).status;
+  }
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), ::testing::HasSubstr("max_captures"));
+  // The place of one that has ended is free again.
+  context.TryCancel();
+  EXPECT_EQ(first->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  do {
+    status = Capture(daemon, second).status;
+  } while (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+}
+
 TEST(Stats, AreWatchedAtAnInterval) {
   Daemon daemon;
   grpc::ClientContext context;

@@ -31,7 +31,11 @@ class PlainDecoder final : public WireDecoder {
   std::optional<DecodedVolume> TakeVolume() override {
     if (bytes_.size() != kLayout.bytes()) return std::nullopt;
     DecodedVolume decoded{.volume = 99, .layout = kLayout};
-    for (const std::byte b : bytes_) decoded.rgb.push_back(std::to_integer<uint8_t>(b));
+    const size_t each = kLayout.bytes_per_slice();
+    for (size_t at = 0; at < bytes_.size(); at += each) {
+      decoded.pictures.push_back(std::make_shared<const std::vector<std::byte>>(
+          bytes_.data() + at, bytes_.data() + at + each));
+    }
     return decoded;
   }
 
@@ -61,7 +65,7 @@ class ScriptedDisplay final : public Display {
   };
   std::vector<Sent> sent;
   std::vector<std::string> calls;
-  absl::Status start_status;
+  absl::Status start_status, brightness_status;
   bool done_at_once = false;
   bool lost_at_once = false;
   size_t tap_bytes = kLayout.bytes();
@@ -82,7 +86,7 @@ class ScriptedDisplay final : public Display {
   }
   absl::Status DoSetBrightness(double brightness) override {
     calls.push_back("brightness " + std::to_string(brightness));
-    return absl::OkStatus();
+    return brightness_status;
   }
   absl::Status DoSetBlank(bool blank) override {
     calls.push_back(blank ? "blank" : "unblank");
@@ -357,6 +361,9 @@ TEST_F(DisplayTest, BrightnessIsCheckedKeptAndPassedOn) {
   display_.Attached();
   ASSERT_TRUE(display_.SetBrightness(0.5).ok());
   EXPECT_EQ(display_.calls, std::vector<std::string>{"brightness 0.500000"});
+  display_.brightness_status = absl::UnimplementedError("has none");
+  EXPECT_EQ(display_.SetBrightness(0.75).message(), "has none");
+  EXPECT_EQ(display_.brightness(), 0.5);
 }
 
 TEST_F(DisplayTest, CaptureTakesTheNextVolumeWhole) {
@@ -377,7 +384,7 @@ TEST_F(DisplayTest, CaptureTakesTheNextVolumeWhole) {
   display_.Done();
   ASSERT_TRUE(captured.has_value() && captured->ok());
   EXPECT_EQ((*captured)->volume, 3u);
-  EXPECT_EQ((*captured)->rgb, FrameToRgb(*Frame(3)));
+  EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*Frame(3)));
   ASSERT_TRUE(second.has_value() && second->ok());
   EXPECT_FALSE(display_.tapped());
   EXPECT_EQ(display_.sent.size(), 3u);
@@ -403,7 +410,7 @@ TEST_F(DisplayTest, CaptureOfADisplayThatNeverHadAVolumeIsBlack) {
   display_.Done();
   ASSERT_TRUE(captured->ok());
   EXPECT_EQ((*captured)->volume, 0u);
-  EXPECT_EQ((*captured)->rgb, std::vector<uint8_t>(12, 0));
+  EXPECT_EQ((*captured)->Rgb(), std::vector<uint8_t>(12, 0));
   display_.Submit(Frame(1));  // black is no base
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
 }

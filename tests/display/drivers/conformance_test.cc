@@ -148,7 +148,7 @@ TEST_P(DriverConformance, CapturesWhatWasSubmitted) {
   ASSERT_TRUE(captured->ok()) << captured->status();
   EXPECT_EQ((*captured)->volume, 3u);
   EXPECT_EQ((*captured)->layout, display_->info().layout);
-  EXPECT_EQ((*captured)->rgb, FrameToRgb(*frame));
+  EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*frame));
   EXPECT_EQ(recorder_.outcomes.size(), 3u);
 }
 

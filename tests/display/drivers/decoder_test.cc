@@ -69,7 +69,7 @@ TEST(Decoder, RebuildsWholeAndChangedVolumes) {
   auto volume = decoder.TakeVolume();
   ASSERT_TRUE(volume.has_value());
   EXPECT_EQ(volume->volume, 4u);
-  EXPECT_EQ(volume->rgb, writer.Light());
+  EXPECT_EQ(volume->Rgb(), writer.Light());
   EXPECT_EQ(volume->source, DecodedVolume::Source::kDecodedFromSent);
   EXPECT_FALSE(decoder.TakeVolume().has_value());
 
@@ -86,7 +86,7 @@ TEST(Decoder, RebuildsWholeAndChangedVolumes) {
   }
   volume = decoder.TakeVolume();
   ASSERT_TRUE(volume.has_value());
-  EXPECT_EQ(volume->rgb, writer.Light());
+  EXPECT_EQ(volume->Rgb(), writer.Light());
 }
 
 TEST(Decoder, SlicesMayComeAgain) {
@@ -97,7 +97,7 @@ TEST(Decoder, SlicesMayComeAgain) {
   writer.Picture(1, 3);
   writer.packets.End(writer.out, 1, true);
   ASSERT_TRUE(Decode(decoder, writer.out).ok());
-  EXPECT_EQ(decoder.TakeVolume()->rgb, writer.Light());
+  EXPECT_EQ(decoder.TakeVolume()->Rgb(), writer.Light());
 }
 
 TEST(Decoder, AnAbortedVolumeIsForgotten) {

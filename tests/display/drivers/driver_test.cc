@@ -42,7 +42,7 @@ class Driver : public testing::Test {
   }
   bool SeesFrame() const {
     const auto seen = rig_->device().Seen();
-    return seen.has_value() && seen->rgb == FrameToRgb(*frame_);
+    return seen.has_value() && seen->Rgb() == FrameToRgb(*frame_);
   }
   const VolumeOutcome& Newest() const { return rig_->recorder().outcomes.back(); }
 
@@ -209,7 +209,7 @@ TEST_F(Driver, AbortsAfterSoManyRoundsAndTriesAgainLater) {
   ASSERT_TRUE(rig_->RunUntilOutcome(2));
   EXPECT_EQ(Newest().kind, Kind::kLost);
   EXPECT_EQ(Newest().reason, "slices did not arrive, though they were sent 4 times again");
-  EXPECT_EQ(rig_->device().Seen()->rgb, FrameToRgb(*before));
+  EXPECT_EQ(rig_->device().Seen()->Rgb(), FrameToRgb(*before));
   ASSERT_TRUE(rig_->RunUntil([&] { return SeesFrame(); }));
   EXPECT_EQ(rig_->recorder().Count(2), 1);
 }
@@ -260,7 +260,7 @@ TEST_F(Driver, CapturesWhatTheDeviceShows) {
   ASSERT_TRUE(captured->ok()) << captured->status().message();
   EXPECT_EQ((*captured)->volume, 1u);
   EXPECT_EQ((*captured)->source, DecodedVolume::Source::kDecodedFromSent);
-  EXPECT_EQ((*captured)->rgb, rig_->device().Seen()->rgb);
+  EXPECT_EQ((*captured)->Rgb(), rig_->device().Seen()->Rgb());
   EXPECT_EQ(rig_->recorder().outcomes.size(), 1u);
 }
 
@@ -276,7 +276,7 @@ TEST_F(Driver, CaptureSurvivesResends) {
   ASSERT_TRUE(rig_->RunUntil([&] { return captured.has_value(); }));
   ASSERT_TRUE(captured->ok()) << captured->status();
   EXPECT_GT(rig_->display().stats().slices_resent, 0u);
-  EXPECT_EQ((*captured)->rgb, rig_->device().Seen()->rgb);
+  EXPECT_EQ((*captured)->Rgb(), rig_->device().Seen()->Rgb());
 }
 
 TEST_F(Driver, BrightnessAndBlankReachTheDeviceAlsoAfterAttach) {

@@ -62,8 +62,8 @@ class Torture : public testing::TestWithParam<Case> {
     const auto& shown = rig.device().screen().shown();
     if (shown != nullptr && shown != last_shown_) {
       last_shown_ = shown;
-      const auto it =
-          by_light_.find(Key(voxlink::VolumeToRgb(rig.display().info().layout, *shown)));
+      const DecodedVolume light{.layout = rig.display().info().layout, .pictures = shown->pictures};
+      const auto it = by_light_.find(Key(light.Rgb()));
       ASSERT_NE(it, by_light_.end()) << "the device shows what nobody submitted";
       seen_volume_ = it->second;
       seen_.insert(it->second);
@@ -136,7 +136,7 @@ TEST_P(Torture, NothingTornNothingStaleNothingForgotten) {
       if (random() % 10 == 0) {
         rig.display().Capture(kSecond, [&](absl::StatusOr<DecodedVolume> volume) {
           if (!volume.ok()) return;
-          const auto it = by_light_.find(Key(volume->rgb));
+          const auto it = by_light_.find(Key(volume->Rgb()));
           ASSERT_NE(it, by_light_.end());
           ASSERT_EQ(it->second, volume->volume);
           ++captured;
@@ -149,7 +149,7 @@ TEST_P(Torture, NothingTornNothingStaleNothingForgotten) {
         [&] {
           if (step()) return true;
           const auto seen = rig.device().Seen();
-          return seen.has_value() && seen->rgb == light &&
+          return seen.has_value() && seen->Rgb() == light &&
                  rig.recorder().Of(newest->volume) != nullptr;
         },
         60 * kSecond))

@@ -159,7 +159,7 @@ void Bench::SendWhole(uint64_t volume, uint8_t value, bool show) {
 int Bench::Seen(size_t slice) const {
   const std::optional<DecodedVolume> seen = device_->Seen();
   if (!seen) return -1;
-  return seen->rgb[slice * seen->rgb.size() / 4];
+  return seen->Rgb(static_cast<int32_t>(slice), 1)[0];
 }
 
 }  // namespace voxeld::display::emulator

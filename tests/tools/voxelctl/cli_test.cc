@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_split.h"
+#include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/cli/options.h"
-#include "tools/voxelctl/cli/suggest.h"
 
 namespace voxeld::voxelctl {
 namespace {

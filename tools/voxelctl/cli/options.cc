@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
-#include "tools/voxelctl/cli/suggest.h"
+#include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -40,12 +40,6 @@ struct UsageError {
 template <typename T>
 using Choices = std::vector<std::pair<std::string, T>>;
 
-std::string DidYouMean(absl::string_view wrong, const std::vector<std::string>& known) {
-  const std::string nearest = Nearest(wrong, known);
-  return nearest.empty() ? absl::StrCat("; known are ", absl::StrJoin(known, ", "))
-                         : absl::StrCat("; did you mean ", nearest, "?");
-}
-
 template <typename T>
 T Choose(const char* option, const std::string& value, const Choices<T>& choices) {
   std::vector<std::string> names;
@@ -54,7 +48,7 @@ T Choose(const char* option, const std::string& value, const Choices<T>& choices
     names.push_back(name);
   }
   throw UsageError{absl::StrCat(option, " ", EscapeForTerminal(value), " is not known",
-                                DidYouMean(value, names))};
+                                Suggestion(value, names))};
 }
 
 void CheckRange(const char* option, double value, double least, double most) {
@@ -229,7 +223,7 @@ class Parser {
       } else if (!absl::StartsWith(word, "-") || word == "-") {
         if (std::find(names_.begin(), names_.end(), word) != names_.end()) return;
         throw UsageError{absl::StrCat("\"", EscapeForTerminal(word), "\" is no command",
-                                      DidYouMean(word, names_))};
+                                      Suggestion(word, names_))};
       } else if (word == "--help" || word == "-h" || word == "--version") {
         return;
       }
@@ -260,7 +254,7 @@ class Parser {
     known.erase(std::unique(known.begin(), known.end()), known.end());
     const std::string name = extra.substr(0, extra.find('='));
     throw UsageError{
-        absl::StrCat(EscapeForTerminal(name), " is no option here", DidYouMean(name, known))};
+        absl::StrCat(EscapeForTerminal(name), " is no option here", Suggestion(name, known))};
   }
 
   void FillIn() {

@@ -4,9 +4,8 @@
 #include <unistd.h>
 
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/strip.h"
+#include "daemon/address/address.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -35,29 +34,19 @@ std::string ChooseServer(const std::string& option, const Environment& environme
 }
 
 absl::StatusOr<std::string> ServerTarget(absl::string_view address) {
-  const auto wrong = [&](absl::string_view what) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the server's address \"", EscapeForTerminal(address), "\" ", what,
-                     "; HOST:PORT or unix:PATH is expected, such as ", kDefaultTcpAddress,
-                     " or unix:/run/voxeld/voxeld.sock"));
-  };
-  absl::string_view rest = address;
-  if (absl::ConsumePrefix(&rest, "unix:")) {
-    if (rest.empty()) return wrong("has no path");
-    return std::string(address);
+  const absl::StatusOr<daemon::Address> parsed =
+      daemon::ParseAddress({address.data(), address.size()});
+  if (!parsed.ok()) {
+    return absl::Status(parsed.status().code(), EscapeForTerminal(parsed.status().message()));
   }
-  const size_t colon = rest.rfind(':');
-  if (colon == absl::string_view::npos || colon == 0) return wrong("has no host or no port");
-  const absl::string_view host = rest.substr(0, colon);
-  const absl::string_view digits = rest.substr(colon + 1);
-  int port = 0;
-  if (!absl::SimpleAtoi(digits, &port) || port < 1 || port > 65535)
-    return wrong("has no port from 1 to 65535");
-  const bool bracketed = absl::StartsWith(host, "[") && absl::EndsWith(host, "]");
-  if (absl::StrContains(host, ":") && !bracketed)
-    return wrong("is an IPv6 number without brackets");
-  if (absl::StrContains(host, "/")) return wrong("has a slash in its host");
-  return absl::StrCat("dns:///", host, ":", port);
+  if (parsed->unix_socket) return parsed->ToString();
+  if (parsed->port == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the address \"", EscapeForTerminal(address),
+                     "\" has the port 0; give HOST:PORT or unix:PATH, the port 1 to "
+                     "65535"));
+  }
+  return absl::StrCat("dns:///", parsed->ToString());
 }
 
 }  // namespace voxeld::voxelctl

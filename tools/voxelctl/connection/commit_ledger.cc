@@ -33,6 +33,7 @@ void CommitLedger::Answered(const v1::Receipt& receipt, sync::TimeNs now) {
       ++tally_.refused;
       tally_.refused_operations += receipt.refused().refused_operations();
       refusals_[receipt.frame_id()] = EscapeForTerminal(receipt.refused().message());
+      if (refusals_.size() > kMostRefusals) refusals_.erase(refusals_.begin());
       open_.erase(it);
       return;
     case v1::Receipt::kOutcome: {

@@ -18,6 +18,7 @@ namespace voxeld::voxelctl {
 class CommitLedger {
  public:
   static constexpr size_t kMostLatencies = 65536;
+  static constexpr size_t kMostRefusals = 1024;  // whose words are kept: the newest
 
   void Sent(uint64_t frame_id, sync::TimeNs now);
   // Answers about commits that it does not know are ignored.

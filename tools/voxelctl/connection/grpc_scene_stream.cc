@@ -19,14 +19,15 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr sync::TimeNs kOpenTime = 15 * sync::kSecond;
-constexpr sync::TimeNs kCloseTime = 5 * sync::kSecond;
+// Longer than a server waits for the outcomes that it still owes.
+constexpr sync::TimeNs kCloseTime = 8 * sync::kSecond;
 
 class GrpcSceneStream final : public SceneStream {
  public:
-  GrpcSceneStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string address,
+  GrpcSceneStream(const std::shared_ptr<grpc::ChannelInterface>& channel, std::string address,
                   Interrupt& interrupt)
       : address_(std::move(address)),
-        stub_(v1::SceneService::NewStub(std::move(channel))),
+        stub_(v1::SceneService::NewStub(channel)),
         interrupt_(interrupt),
         stream_(stub_->Stream(&context_)),
         reader_([this] { ReadAll(); }),

@@ -1,13 +1,15 @@
-#include "tools/voxelctl/cli/suggest.h"
+#include "daemon/suggest/suggest.h"
 
 #include <algorithm>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 
-namespace voxeld::voxelctl {
+namespace voxeld {
 
-size_t EditDistance(absl::string_view a, absl::string_view b) {
+size_t EditDistance(std::string_view a, std::string_view b) {
   std::vector<size_t> before_last, last(b.size() + 1), row(b.size() + 1);
   for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
   for (size_t i = 1; i <= a.size(); ++i) {
@@ -26,7 +28,7 @@ size_t EditDistance(absl::string_view a, absl::string_view b) {
   return row[b.size()];
 }
 
-std::string Nearest(absl::string_view wrong, const std::vector<std::string>& known) {
+std::string Nearest(std::string_view wrong, const std::vector<std::string>& known) {
   std::string nearest;
   size_t least = 1 + wrong.size() / 3;
   if (wrong.size() > 64) return nearest;
@@ -38,10 +40,17 @@ std::string Nearest(absl::string_view wrong, const std::vector<std::string>& kno
     }
   }
   if (!nearest.empty() || wrong.empty()) return nearest;
+  const std::string begin = absl::AsciiStrToLower({wrong.data(), wrong.size()});
   for (const std::string& name : known) {
-    if (absl::StartsWith(name, absl::AsciiStrToLower(wrong))) return name;
+    if (absl::StartsWith(name, begin)) return name;
   }
   return nearest;
 }
 
-}  // namespace voxeld::voxelctl
+std::string Suggestion(std::string_view wrong, const std::vector<std::string>& known) {
+  const std::string nearest = Nearest(wrong, known);
+  if (!nearest.empty()) return absl::StrCat("; did you mean ", nearest, "?");
+  return absl::StrCat("; known are ", absl::StrJoin(known, ", "));
+}
+
+}  // namespace voxeld

@@ -1,0 +1,35 @@
+#include "daemon/scene/view_check.h"
+
+#include <string>
+
+#include "absl/strings/str_format.h"
+#include "daemon/scene/draft.h"
+
+namespace voxeld::daemon {
+
+absl::Status CheckView(const SnapshotPtr& scene, const DisplayView& view, const Limits& limits) {
+  uint64_t none = 0;
+  const Draft whole(scene, none);
+  absl::Status status;
+  whole.ForEachLayer([&](const OwnedName& key, const Layer& layer) {
+    if (!status.ok()) return;
+    const gpu::Affine map = gpu::Compose(view.scene_to_voxel, layer.transform);
+    const auto reach = [&](const Bounds& bounds) {
+      return LargestMagnitude(MapBounds(map, bounds));
+    };
+    // The layer's own bounds may be wider than what is in it.
+    if (reach(layer.bounds) <= limits.max_coordinate_voxels) return;
+    layer.entities.ForEach([&](const std::string& id, const EntityPtr& entity) {
+      const double largest =
+          reach(MapBounds(entity->data.transform, whole.BoundsOf(key.owner, entity->data.content)));
+      if (largest <= limits.max_coordinate_voxels || !status.ok()) return;
+      status = absl::FailedPreconditionError(absl::StrFormat(
+          "through this view entity \"%s\" of layer \"%s\" of owner %d would reach %g voxels on "
+          "display \"%s\"; it must stay within ±%.0f",
+          id, key.name, key.owner, largest, view.display, limits.max_coordinate_voxels));
+    });
+  });
+  return status;
+}
+
+}  // namespace voxeld::daemon

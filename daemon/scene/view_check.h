@@ -1,0 +1,16 @@
+// Whether a scene can be shown through another view.
+#pragma once
+
+#include "absl/status/status.h"
+#include "daemon/scene/commit_applier.h"
+#include "daemon/scene/operation.h"
+#include "daemon/scene/snapshot.h"
+
+namespace voxeld::daemon {
+
+// FailedPrecondition, with the entity and where it would lie, if one of `scene` would be beyond
+// limits.max_coordinate_voxels through `view`. Costs the layers; the entities only of those layers
+// that may not fit.
+absl::Status CheckView(const SnapshotPtr& scene, const DisplayView& view, const Limits& limits);
+
+}  // namespace voxeld::daemon

@@ -1,0 +1,51 @@
+#include "daemon/config/display_view.h"
+
+#include <gmock/gmock.h>
+
+namespace voxeld::daemon {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Pair;
+
+absl::StatusOr<DisplayOptions> Split(const char* text) {
+  return SplitDisplayOptions(*ParseDisplayOption(text));
+}
+
+TEST(DisplayView, IsFitUnlessItSaysOtherwise) {
+  const auto split = Split("sim=simulated,geometry=rotor");
+  ASSERT_TRUE(split.ok()) << split.status();
+  EXPECT_EQ(split->view.mode, ViewOptions::Mode::kFit);
+  EXPECT_FALSE(split->view.box.has_value());
+  EXPECT_THAT(split->driver, ElementsAre(Pair("geometry", "rotor")));
+}
+
+TEST(DisplayView, IsTakenOutOfTheDriversOptions) {
+  const auto split = Split("sim=simulated,view=millimetres,size=8x8");
+  ASSERT_TRUE(split.ok()) << split.status();
+  EXPECT_EQ(split->view.mode, ViewOptions::Mode::kMillimetres);
+  EXPECT_THAT(split->driver, ElementsAre(Pair("size", "8x8")));
+  EXPECT_EQ(Split("sim=simulated,view=voxels")->view.mode, ViewOptions::Mode::kVoxels);
+}
+
+TEST(DisplayView, ABoxIsSixNumbers) {
+  const auto split = Split("sim=simulated,view_box=-1;-2;-3;1;2.5;3e1");
+  ASSERT_TRUE(split.ok()) << split.status();
+  EXPECT_EQ(split->view.box->first, (display::Vec3{-1, -2, -3}));
+  EXPECT_EQ(split->view.box->second, (display::Vec3{1, 2.5, 30}));
+  for (const char* wrong : {"", "1;2;3", "1;2;3;4;5;6;7", "1;2;3;4;5;six", "1,2,3,4,5,6"}) {
+    DisplayConfig config;
+    config.options["view_box"] = wrong;
+    EXPECT_THAT(SplitDisplayOptions(config).status().message(), HasSubstr("x0;y0;z0;x1;y1;z1"))
+        << wrong;
+  }
+}
+
+TEST(DisplayView, AnUnknownOneIsAnsweredWithWhatIsMeant) {
+  EXPECT_THAT(Split("sim=simulated,view=voxel").status().message(),
+              HasSubstr("view is \"voxel\"; did you mean voxels?"));
+}
+
+}  // namespace
+}  // namespace voxeld::daemon
