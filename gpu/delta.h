@@ -4,9 +4,11 @@
 // Little-endian; no pointers; ids are the caller's and unique within their kind. Records apply in
 // order; order between drawables has no influence on what is drawn.
 //
-//   geometry  immutable content: a kind of primitive, its parameters and arrays, in its own
-//   coordinates drawable  puts a geometry into a layer, under a transform, with a priority; several
-//   may share one layer     how its voxels combine with those below
+//   geometry  immutable content: a kind of primitive, its parameters and arrays,
+//             in its own coordinates
+//   drawable  puts a geometry into a layer, under a transform, with a priority; several may
+//             share one
+//   layer     how its voxels combine with those below
 #pragma once
 
 #include <cstddef>
@@ -70,8 +72,8 @@ struct GeometryRecord {
   Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder
   Topology topology = Topology::kList;          // kSegments
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  float thickness =
-      0;  // diameter of points and segments; 0: one voxel. kUnits: scaled by ∛|det| of the map
+  // Diameter of points and segments; 0: one voxel. kUnits: scaled by ∛|det| of the map.
+  float thickness = 0;
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand
   float params[8] = {};
@@ -98,8 +100,8 @@ struct LayerRecord {
   Affine transform;  // layer's coordinates → scene's
 };
 
-// Appends records to a span. Overruns are counted, not written: size the span with the Size
-// functions.
+// Appends records to a span. Overruns are counted, not written:
+// size the span with the Size functions.
 class DeltaWriter {
  public:
   explicit DeltaWriter(std::span<std::byte> out) : out_(out) {}
@@ -151,9 +153,9 @@ struct DeltaVisitor {
   virtual absl::Status OnReset() = 0;
 };
 
-// Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands it to
-// `visitor`. InvalidArgument with the byte offset, the value and what would be right. `delta` is
-// 16-byte aligned.
+// Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands
+// it to `visitor`. InvalidArgument with the byte offset, the value and what would be right.
+// `delta` is 16-byte aligned.
 absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor);
 
 }  // namespace voxeld::gpu

@@ -1,28 +1,27 @@
 // The one door to the volume engine: a scene's deltas in, packed slices out.
 //
 //   StatusOr<unique_ptr<Engine>> engine = CreateEngine({.kind = EngineKind::kAuto});
-//   engine->SetTarget(target, done);                     // which display, which view
-//   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared with a
-//   process DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
+//   engine->SetTarget(target, done);                      // which display, which view
+//   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared
+//                                                         // with a process
+//   DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
 //   engine->Apply(std::move(block), writer.size(), done);
 //   engine->SubmitFrame({.frame = 7}, buffer, done);
 //
 // Contract
 // - Calls are carried out in the order in which they were made; each ends in exactly one call of
-// its
-//   `done`, from a thread of the engine's (or inside the call, with
+//   its `done`, from a thread of the engine's (or inside the call, with
 //   EngineOptions::inline_execution); those not begun when the engine is destroyed end in
 //   Cancelled, before its destructor returns. `done` must only post: it must not call the engine,
 //   block, or throw.
-// - No pointer passes for keeps: the engine owns a staging block from Apply on; a FrameBuffer
-// belongs to
-//   the caller, is written only between SubmitFrame and its `done`, and is not remembered.
-// - For any scene every engine gives the same bytes, in any number of threads, parts and frames
-// between.
+// - No pointer passes for keeps: the engine owns a staging block from Apply on;
+//   a FrameBuffer belongs to the caller, is written only between SubmitFrame and its `done`, and
+//   is not remembered.
+// - For any scene every engine gives the same bytes,
+//   in any number of threads, parts and frames between.
 // - An error leaves the engine as it was before that call, unless the code is DataLoss: then the
-// engine is
-//   gone, every later call ends in DataLoss, and its owner makes a new one and gives it the whole
-//   scene (what an engine holds is always derived).
+//   engine is gone, every later call ends in DataLoss, and its owner makes a new one and gives it
+//   the whole scene (what an engine holds is always derived).
 // - Thread-safe.
 #pragma once
 
@@ -45,9 +44,9 @@ namespace voxeld::gpu {
 enum class EngineKind : uint8_t { kAuto, kCpu, kCuda };
 const char* EngineKindName(EngineKind kind);
 
-// The slices that an engine owns, [begin, end) of the layout's; it draws only the tiles that they
-// look at. Several engines, each with a part, make one display: their slices joined equal the
-// whole's.
+// The slices that an engine owns, [begin, end) of the layout's; it draws only
+// the tiles that they look at. Several engines, each with a part, make one display:
+// their slices joined equal the whole's.
 struct SlicePart {
   int32_t begin = 0;
   int32_t end = -1;  // −1: to the last
@@ -67,8 +66,8 @@ struct EngineInfo {
   std::string reason;                  // why this kind: "no CUDA driver", "asked for", …
 };
 
-// The display that an engine draws for. `view` maps scene units to voxel space (voxel i = [i,
-// i+1)).
+// The display that an engine draws for.
+// `view` maps scene units to voxel space (voxel i = [i, i+1)).
 struct Target {
   display::Geometry geometry;
   display::FrameLayout layout;
@@ -76,8 +75,8 @@ struct Target {
   Affine view;
 };
 
-// Staging memory, written by the caller before it goes to Apply. Movable; given back on
-// destruction.
+// Staging memory, written by the caller before it goes to Apply.
+// Movable; given back on destruction.
 class StagingBlock {
  public:
   struct Memory {
@@ -100,8 +99,8 @@ struct FrameRequest {
   uint64_t buffer_holds = 0;
 };
 
-// Caller's memory. Sizes are the whole layout's, also when the engine owns a part: it writes its
-// slices.
+// Caller's memory. Sizes are the whole layout's, also when the engine owns a part:
+// it writes its slices.
 struct FrameBuffer {
   std::span<std::byte> bytes;      // layout.bytes()
   std::span<uint64_t> changed_in;  // layout.pictures()

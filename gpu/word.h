@@ -4,8 +4,8 @@
 //   bit  24     erase: at one priority an erase wins; its colour is 0
 //   bits 23–0   colour, the bits of green, red and blue interleaved from the top: G7 R7 B7 G6 …
 //
-// A layer's voxel is the maximum of all words that cover it, so neither order nor repetition
-// matters.
+// A layer's voxel is the maximum of all words that cover it,
+// so neither order nor repetition matters.
 #pragma once
 
 #include <cstdint>

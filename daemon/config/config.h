@@ -75,8 +75,8 @@ absl::Status ReadConfigText(std::string_view text, const std::string& name, Conf
 std::string FindConfigFile(const Environment& environment,
                            const std::function<bool(const std::string&)>& exists);
 
-// Defaults, then the file: `file` if one is named, else the one that is found. Errors as of
-// ReadConfigFile.
+// Defaults, then the file: `file` if one is named, else the one that is found.
+// Errors as of ReadConfigFile.
 absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
                                   const Environment& environment);
 

@@ -1,5 +1,5 @@
-// Every field of the configuration, once: its section, its key, its range. Reading and printing
-// walk this list.
+// Every field of the configuration, once: its section, its key, its range.
+// Reading and printing walk this list.
 #pragma once
 
 #include <cstdint>

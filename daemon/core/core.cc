@@ -8,8 +8,8 @@
 namespace voxeld::daemon {
 namespace {
 
-// Posts `work(reply)`; once the core has stopped the reply is the answer instead, in the caller's
-// thread.
+// Posts `work(reply)`; once the core has stopped the reply is the answer instead,
+// in the caller's thread.
 template <typename T, typename Work>
 void Ask(Loop& loop, Core::Reply<T> reply, Work work) {
   auto shared = std::make_shared<const Core::Reply<T>>(std::move(reply));

@@ -1,5 +1,5 @@
-// The daemon below gRPC: sessions, the scene store, one frame pipeline a display. Knows no
-// protobuf.
+// The daemon below gRPC: sessions, the scene store, one frame pipeline a display.
+// Knows no protobuf.
 //
 //   Core core(options, clock);
 //   core.AddDisplay(std::move(display), engine_options);

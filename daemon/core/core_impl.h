@@ -77,8 +77,8 @@ class Core::Impl {
     uint64_t owner = 0;
   };
 
-  // A display's pipeline and the queue of its thread. Shared with the thread, which may outlive
-  // Stop's limit.
+  // A display's pipeline and the queue of its thread. Shared with the thread,
+  // which may outlive Stop's limit.
   struct Host {
     std::shared_ptr<Loop> work;
     std::unique_ptr<FramePipeline> pipeline;
@@ -131,8 +131,8 @@ class Core::Impl {
   void UpdateViews();
   // Notes a view to come, unless the scene does not fit it.
   absl::Status ExpectView(DisplaySlot& slot, const ViewOptions& view);
-  // Asks every pipeline and calls `done` with all answers; `absent` stands in for one that has
-  // ended.
+  // Asks every pipeline and calls `done` with all answers;
+  // `absent` stands in for one that has ended.
   template <typename T>
   void Collect(std::function<T(const FramePipeline&)> ask,
                std::function<T(const DisplaySlot&)> absent,

@@ -32,8 +32,8 @@ const char* KindName(gpu::PrimitiveKind kind) {
   return "?";
 }
 
-// A token names the last entity of its page, so pages stay whole whatever is added or removed in
-// between.
+// A token names the last entity of its page, so pages stay whole
+// whatever is added or removed in between.
 std::string TokenAfter(const EntityKey& key) {
   return absl::StrCat(key.owner, ".", absl::WebSafeBase64Escape(key.layer), ".",
                       absl::WebSafeBase64Escape(key.id));

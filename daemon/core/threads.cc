@@ -129,8 +129,8 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
     return absl::OkStatus();
   }
 
-  // Displays first: the core's thread hands on what they still owe. It gets the last quarter for
-  // itself.
+  // Displays first: the core's thread hands on what they still owe.
+  // It gets the last quarter for itself.
   const sync::TimeNs now = clock_.Now();
   std::set<std::string> displays;
   for (const NamedThread& t : threads_) {

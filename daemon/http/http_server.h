@@ -29,8 +29,8 @@ struct ServerOptions {
   Address listen;
   uint32_t max_connections = 64;     // further ones wait to be accepted
   uint32_t max_header_bytes = 8192;  // 431 beyond
-  sync::TimeNs idle_limit_ns =
-      10 * sync::kSecond;  // for a request to come in, and for an answer to be read
+  // For a request to come in, and for an answer to be read.
+  sync::TimeNs idle_limit_ns = 10 * sync::kSecond;
   sync::TimeNs answer_limit_ns = 5 * sync::kSecond;  // for the handler; then 503
 };
 
@@ -39,8 +39,8 @@ class Server {
  public:
   // AlreadyExists if somebody listens there.
   static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options, Handler handler);
-  ~Server();  // closes every connection and joins the thread; `done` functions may be called later
-              // still
+  // Closes every connection and joins the thread; `done` functions may be called later still.
+  ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 

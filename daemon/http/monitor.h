@@ -16,8 +16,8 @@ namespace voxeld::daemon::http {
 Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
                         bool draining);
 
-// The handler for Server. `core` outlives every call of it; `draining`: from when on /healthz says
-// so.
+// The handler for Server. `core` outlives every call of it;
+// `draining`: from when on /healthz says so.
 Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<bool>> draining);
 
 }  // namespace voxeld::daemon::http

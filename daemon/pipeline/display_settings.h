@@ -17,8 +17,8 @@ namespace voxeld::daemon {
 struct ViewOptions {
   enum class Mode : uint8_t { kFit, kMillimetres, kVoxels };
   Mode mode = Mode::kFit;
-  std::optional<std::pair<display::Vec3, display::Vec3>>
-      box;  // kFit; default ±1 on the longest axis
+  // kFit; default ±1 on the longest axis.
+  std::optional<std::pair<display::Vec3, display::Vec3>> box;
   gpu::Affine transform;
 };
 

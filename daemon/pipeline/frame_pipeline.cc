@@ -114,8 +114,7 @@ void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden) 
   riders_.Board(rider);
 }
 
-// ------------------------------------------------------------------------------------------------
-// drawing
+// ----------------------------------------------------------------------------------- drawing
 
 bool FramePipeline::HaveEngine() {
   if (engine_ != nullptr) return true;
@@ -270,8 +269,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status) {
   ShowAgain(kEngineRetryDelay);
 }
 
-// --------------------------------------------------------------------------------------- from the
-// display
+// -------------------------------------------------------------------------- from the display
 
 void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
   const auto it = in_display_.find(outcome.volume);
@@ -284,8 +282,8 @@ void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
     }
   }
   if (outcome.kind == display::VolumeOutcome::Kind::kLost && outcome.volume == last_submitted_) {
-    // A display that still shows sends what it lost again by itself; when it comes back it gets it
-    // anew.
+    // A display that still shows sends what it lost again by itself;
+    // when it comes back it gets it anew.
     show_again_ = true;
     show_again_at_ = sync::kNever;
   }
@@ -311,8 +309,7 @@ void FramePipeline::Told(const Rider& rider, const CommitOutcome& outcome) {
   tell_(rider, outcome);
 }
 
-// -------------------------------------------------------------------------------------------------
-// requests
+// ---------------------------------------------------------------------------------- requests
 
 absl::Status FramePipeline::Update(const DisplayUpdate& update) {
   if (update.brightness.has_value() && !(*update.brightness >= 0 && *update.brightness <= 1)) {
@@ -325,8 +322,8 @@ absl::Status FramePipeline::Update(const DisplayUpdate& update) {
     if (!made.ok()) return made.status();
     map = *made;
   }
-  // The device's own refusals come before anything that cannot be refused; what it refuses is taken
-  // back.
+  // The device's own refusals come before anything that cannot be refused;
+  // what it refuses is taken back.
   const double brightness = display_->brightness();
   const bool blank = display_->blanked();
   absl::Status status;

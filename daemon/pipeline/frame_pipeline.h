@@ -1,6 +1,6 @@
-// From snapshots to one display: takes the newest snapshot when the display's mailbox is free and
-// something has changed, has the engine draw it, hands the volume over, and tells every commit what
-// became of it.
+// From snapshots to one display: takes the newest snapshot when the display's mailbox
+// is free and something has changed, has the engine draw it, hands the volume over,
+// and tells every commit what became of it.
 //
 //   auto pipeline = FramePipeline::Create({…});
 //   (*pipeline)->Start();
@@ -12,20 +12,18 @@
 //
 // Which volumes are drawn
 // - The first shows whatever the scene is, if only darkness. From then on a volume is drawn only if
-// the scene,
-//   the view or the test pattern has changed, and handed over only if its bytes differ from the one
-//   before.
-// - While the display is absent or blanked nothing is drawn; when it shows again it gets the newest
-// scene.
-// - If the volume handed over last was lost, the next drawn is handed over even if it looks the
-// same.
+//   the scene, the view or the test pattern has changed, and handed over only if its bytes differ
+//   from the one before.
+// - While the display is absent or blanked nothing is drawn; when it shows again
+//   it gets the newest scene.
+// - If the volume handed over last was lost, the next drawn is handed over even if it
+//   looks the same.
 // - While a test pattern is shown, commits are NOT_SHOWN(hidden).
-// - Volumes are numbered as the engine's frames are: ascending, with gaps where one came out the
-// same.
+// - Volumes are numbered as the engine's frames are: ascending, with gaps where one
+//   came out the same.
 // - An engine that is lost (DataLoss) is replaced by a new one, which gets the whole scene; riders
-// stay aboard
-//   the first time. Any other failure is LOST to its riders; the engine gets the whole scene next
-//   time.
+//   stay aboard the first time. Any other failure is LOST to its riders; the engine gets the whole
+//   scene next time.
 #pragma once
 
 #include <cstdint>
@@ -62,8 +60,8 @@ class FramePipeline final : private display::Display::Listener {
     MakeEngine make_engine;
     gpu::EngineOptions engine;
     ViewOptions view;
-    // Where wakes and the engine's completions go: the queue of the thread that this pipeline is
-    // bound to.
+    // Where wakes and the engine's completions go: the queue of the thread
+    // that this pipeline is bound to.
     std::shared_ptr<Loop> work;
     sync::Clock* clock = nullptr;  // outlives the pipeline
     // An outcome, inside any call to the pipeline.
@@ -168,8 +166,8 @@ class FramePipeline final : private display::Display::Listener {
   uint64_t last_submitted_ = 0;  // handed over
   bool show_again_ = false;      // the display may not have what was drawn last
   sync::TimeNs show_again_at_ = 0;
-  std::map<uint64_t, uint64_t>
-      in_display_;  // volume handed over, without outcome → snapshot it contains
+  // Volume handed over, without outcome → snapshot it contains.
+  std::map<uint64_t, uint64_t> in_display_;
   std::optional<uint64_t> shown_snapshot_;
   std::vector<PendingCapture> captures_;
   sync::TimeNs next_tick_ = 0;

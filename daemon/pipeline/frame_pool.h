@@ -1,8 +1,8 @@
 // Buffers for volumes, used again when nobody holds them any more, so that an engine writes only
 // what changed since a buffer's last volume.
 //
-// A pool belongs to one thread; the frames that it gives may be let go of anywhere, also after the
-// pool is gone.
+// A pool belongs to one thread; the frames that it gives may be let go of anywhere,
+// also after the pool is gone.
 #pragma once
 
 #include <cstdint>

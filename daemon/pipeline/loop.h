@@ -1,5 +1,5 @@
-// Work for one thread: a queue of closures that any thread may fill, and a wait that ends when
-// there is more.
+// Work for one thread: a queue of closures that any thread may fill,
+// and a wait that ends when there is more.
 //
 // Post, Wake and Close are thread-safe; RunPosted and Wait belong to the loop's one thread.
 #pragma once

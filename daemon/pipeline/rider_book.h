@@ -2,16 +2,14 @@
 // that was owed one, by the rules in order:
 //
 //   1. absent, removed or blanked when it was applied, or all its operations in hidden layers:
-//   NOT_SHOWN.
+//      NOT_SHOWN.
 //   2. Otherwise it rides in the first volume drawn from a snapshot that contains it. Of one
-//   session's commits
-//      that ride in one volume the newest gets the volume's outcome; the others are SUPERSEDED by
-//      it, at once.
+//      session's commits that ride in one volume the newest gets the volume's outcome; the others
+//      are SUPERSEDED by it, at once.
 //   3. The volume's bytes equal those of the volume before: UNCHANGED(that one) once that was
-//   presented, LOST if
-//      it is lost; if it is replaced, such riders ride in what replaces it.
-//   4. The volume is replaced in the mailbox: its riders ride in the one that replaces it, by
-//   rule 2.
+//      presented, LOST if it is lost; if it is replaced, such riders ride in what replaces it.
+//   4. The volume is replaced in the mailbox: its riders ride in the one that replaces it,
+//      by rule 2.
 //   5. It is lost: LOST(reason). Otherwise PRESENTED.
 //
 // Single-threaded; tells outcomes by the function it is given, inside the calls.
@@ -59,8 +57,8 @@ class RiderBook {
   void Redraw();
   // `volume`, drawn, goes to the display; its outcome comes by OnOutcome.
   void Submit(uint64_t volume);
-  // The volume under way came out the same as `before`, the one submitted last (and not lost
-  // since).
+  // The volume under way came out the same as `before`,
+  // the one submitted last (and not lost since).
   void Unchanged(uint64_t before);
   // Every rider of a volume not submitted yet, and with `waiting` those that wait for one, is LOST.
   void LoseUnsubmitted(const std::string& reason, bool waiting);

@@ -86,8 +86,8 @@ class Pattern {
   }
 
   void Ramp() {
-    // Boxes a voxel thick along x: one for each level, or each voxel where there are fewer of
-    // those.
+    // Boxes a voxel thick along x: one for each level,
+    // or each voxel where there are fewer of those.
     const int steps = int(std::min(256.0, nx_));
     for (int i = 0; i < steps; ++i) {
       const double x0 = double(int64_t(nx_) * i / steps),

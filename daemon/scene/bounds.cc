@@ -66,8 +66,8 @@ bool IsSingular(const gpu::Affine& map) {
     const double length = std::sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
     for (int col = 0; col < 3; ++col) m[col] /= length;
   }
-  // What is drawn takes the determinant of the map as it stands, so that must not vanish or
-  // overflow either.
+  // What is drawn takes the determinant of the map as it stands,
+  // so that must not vanish or overflow either.
   const double determinant = gpu::Determinant(map);
   return !(std::abs(gpu::Determinant(unit)) >= kLeast) || determinant == 0 ||
          !std::isfinite(determinant);

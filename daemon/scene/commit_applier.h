@@ -1,5 +1,5 @@
-// Applies one commit's operations to a draft: the rules of the scene, and every refusal that
-// depends on it.
+// Applies one commit's operations to a draft: the rules of the scene,
+// and every refusal that depends on it.
 //
 // A refused operation leaves its entity, layer or object as it was and gives one Issue. What is
 // upserted between FrameBegin and FrameEnd takes effect at FrameEnd, in place of all that the layer
@@ -77,8 +77,8 @@ class CommitApplier {
   // What is wrong with `in_layer` on some display; nothing if it is in range on all.
   std::optional<std::string> OutOfRange(const gpu::Affine& layer_transform,
                                         const Bounds& in_layer) const;
-  // What is wrong if the author came to draw `drawables` and hold `bytes`; nothing if quotas allow
-  // it.
+  // What is wrong if the author came to draw `drawables` and hold `bytes`;
+  // nothing if quotas allow it.
   std::optional<std::string> OverQuota(uint64_t drawables, uint64_t bytes) const;
   bool RefusedNewLayer(const Operation& operation, const std::string& layer,
                        const std::string& field);
@@ -86,8 +86,8 @@ class CommitApplier {
   // ---- objects (object_rules.cc)
   // Objects that refer to `name`, directly or through others.
   std::set<std::string> ObjectsAbove(const std::string& name) const;
-  // `name` with `data`, and every object above it, with what is derived worked out anew; parts
-  // before wholes.
+  // `name` with `data`, and every object above it, with what is derived worked out anew;
+  // parts before wholes.
   std::vector<std::pair<std::string, Object>> Derive(const std::string& name,
                                                      const ObjectDataPtr& data) const;
   // Entities that are instances of `name`; at most `limit`.
@@ -111,8 +111,8 @@ class CommitApplier {
   uint64_t applied_ = 0, refused_ = 0;
 };
 
-// What can be said of an operation without the scene: singular transforms, counts against the
-// limits.
+// What can be said of an operation without the scene:
+// singular transforms, counts against the limits.
 std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits);
 
 }  // namespace voxeld::daemon

@@ -15,8 +15,8 @@ namespace voxeld::daemon {
 
 class Draft {
  public:
-  // `next_number` gives unique numbers to entities and layers; it lives as long as the draft and is
-  // never set back.
+  // `next_number` gives unique numbers to entities and layers;
+  // it lives as long as the draft and is never set back.
   Draft(SnapshotPtr base, uint64_t& next_number);
 
   const Snapshot& base() const { return *base_; }
@@ -29,8 +29,8 @@ class Draft {
   const OwnerTally& total() const { return next_.total; }
   const PersistentMap<UseKey, bool>& uses() const { return next_.uses; }
   const PersistentMap<ExpiryKey, EntityPlace>& expiries() const { return next_.expiries; }
-  // fn(key, layer) for every layer there is, in no particular order. `fn` must not change the
-  // draft.
+  // fn(key, layer) for every layer there is, in no particular order.
+  // `fn` must not change the draft.
   template <typename Fn>
   void ForEachLayer(Fn&& fn) const {
     next_.layers.ForEach([&](const OwnedName& key, const LayerPtr&) {
@@ -58,8 +58,8 @@ class Draft {
   static uint64_t EntityBytes(const OwnedName& layer, const std::string& id,
                               const EntityData& data);
   static uint64_t ObjectBytes(const std::string& name, const ObjectData& data);
-  // Fills in `bytes`; gives a number unless there is one already (an entity of the same key keeps
-  // its own).
+  // Fills in `bytes`; gives a number unless there is one already
+  // (an entity of the same key keeps its own).
   void PutEntity(const OwnedName& layer, const std::string& id, Entity entity);
   void RemoveEntity(const OwnedName& layer, const std::string& id);
 

@@ -5,9 +5,9 @@
 //   DeltaWriter writer(block.bytes());
 //   scene.Write(writer);                        // writer.size() == size
 //
-// An instance becomes one drawable for each primitive that it draws; all share the primitive's
-// geometry. Maps of nested parts are composed from the outside in: ((entity ∘ part) ∘ part of the
-// part) …
+// An instance becomes one drawable for each primitive that it draws;
+// all share the primitive's geometry. Maps of nested parts are composed from the outside in:
+// ((entity ∘ part) ∘ part of the part) …
 //
 // Single-threaded. Plan takes it that the delta will be applied; if it was not, call Forget.
 #pragma once

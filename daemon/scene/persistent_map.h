@@ -58,8 +58,8 @@ class PersistentMap {
     Visit(root_.get(), fn);
   }
 
-  // fn(const K&, const V&) → whether to go on; ascending from the first key that is not less than
-  // `from`.
+  // fn(const K&, const V&) → whether to go on; ascending
+  // from the first key that is not less than `from`.
   template <typename Fn>
   void ForEachFrom(const K& from, Fn&& fn) const {
     VisitFrom(root_.get(), from, fn);

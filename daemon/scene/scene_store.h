@@ -1,5 +1,5 @@
-// The truth about the scene: applies commits one after another, each making one immutable snapshot
-// or none.
+// The truth about the scene: applies commits one after another,
+// each making one immutable snapshot or none.
 //
 // Single-threaded; the snapshots that it gives away may be used anywhere.
 #pragma once
@@ -33,9 +33,9 @@ class SceneStore {
   // What coordinates are checked against from now on.
   void SetViews(std::vector<DisplayView> views) { views_ = std::move(views); }
 
-  // Applies `operations`, which have passed CheckAlone, as one commit. With `strict` any refusal,
-  // or `refused_before` > 0 (what was refused on arrival), refuses it whole. Call Expire(now)
-  // first.
+  // Applies `operations`, which have passed CheckAlone, as one commit.
+  // With `strict` any refusal, or `refused_before` > 0 (what was refused on arrival),
+  // refuses it whole. Call Expire(now) first.
   CommitResult Apply(const Author& author, std::vector<Operation> operations, sync::TimeNs now,
                      bool strict = false, uint64_t refused_before = 0);
 

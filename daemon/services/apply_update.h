@@ -13,8 +13,8 @@ class ApplyUpdateResponse;
 
 namespace voxeld::daemon::services {
 
-// Fills `response`, which must live until `done` has been called, once, from the core's thread or
-// from within.
+// Fills `response`, which must live until `done` has been called, once,
+// from the core's thread or from within.
 void ApplyUpdate(ServiceContext& context, const v1::ApplyUpdateRequest& request,
                  v1::ApplyUpdateResponse* response, std::function<void(const absl::Status&)> done);
 

@@ -17,8 +17,8 @@
 namespace voxeld::daemon::services {
 namespace {
 
-// A call that sends one message after another. Owns itself until gRPC is done with it; the core may
-// hold it longer.
+// A call that sends one message after another. Owns itself until gRPC is done with it;
+// the core may hold it longer.
 template <typename Message>
 class Sender : public grpc::ServerWriteReactor<Message>,
                public ActiveCall,

@@ -1,5 +1,5 @@
-// The services and their long calls, for the server that binds them. No gRPC header is needed to
-// know them.
+// The services and their long calls, for the server that binds them.
+// No gRPC header is needed to know them.
 #pragma once
 
 #include <memory>
@@ -27,8 +27,8 @@ namespace voxeld::daemon::services {
 std::unique_ptr<grpc::Service> MakeSceneService(ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeDisplayService(ServiceContext& context);
 
-// Reactors that own themselves until gRPC is done with them. Requests are read before the call
-// returns.
+// Reactors that own themselves until gRPC is done with them.
+// Requests are read before the call returns.
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context);
 grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context,
                                                    const v1::WatchStatsRequest& request);

@@ -202,8 +202,8 @@ bool StreamSession::Close(const absl::Status& status) {
   if (ending_) return false;
   ending_ = true;
   end_ = status;
-  // Without a session (also while one is being opened: OnOpened gives it back) nothing is waited
-  // for.
+  // Without a session (also while one is being opened: OnOpened gives it back)
+  // nothing is waited for.
   const bool session = session_ != 0;
   state_ = session ? State::kClosing : State::kFlushing;
   if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);

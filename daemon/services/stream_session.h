@@ -1,14 +1,16 @@
-// One SceneService.Stream, apart from gRPC: what is read, what is owed, what is queued, how it
-// ends.
+// One SceneService.Stream, apart from gRPC:
+// what is read, what is owed, what is queued, how it ends.
 //
-//   first message        Open, answered by Opened
-//   every other          decoded and posted to the core; at most kMaxUnprocessed of them
-//   unprocessed half-close           waits (drain_limit_ns at most) until every commit has its
-//   answer and its outcomes,
-//                        closes the session, writes what is queued, ends with OK
-//   End, bad bytes       closes the session, writes what is queued (drain_limit_ns at most), ends
-//   with the status client gone          closes the session at once client does not read closes the
-//   session and ends with RESOURCE_EXHAUSTED once the queue is full
+//   first message         Open, answered by Opened
+//   every other           decoded and posted to the core; at most kMaxUnprocessed
+//                         of them unprocessed
+//   half-close            waits (drain_limit_ns at most) until every commit has its answer and its
+//                         outcomes, closes the session, writes what is queued, ends with OK
+//   End, bad bytes        closes the session, writes what is queued (drain_limit_ns at most), ends
+//                         with the status
+//   client gone           closes the session at once
+//   client does not read  closes the session and ends with RESOURCE_EXHAUSTED
+//                         once the queue is full
 //
 // Thread-safe. The port's events come one after another for reads and for writes, as gRPC has it.
 #pragma once

@@ -12,8 +12,8 @@ namespace voxeld {
 // case counts not.
 size_t EditDistance(std::string_view a, std::string_view b);
 
-// The one of `known` that `wrong` is nearest to or begins, if it is near enough to be meant; else
-// empty.
+// The one of `known` that `wrong` is nearest to or begins,
+// if it is near enough to be meant; else empty.
 std::string Nearest(std::string_view wrong, const std::vector<std::string>& known);
 
 // "; did you mean X?", or "; known are …" if nothing is near.

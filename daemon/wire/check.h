@@ -1,5 +1,5 @@
-// Checks that every part of the decoder shares. Each answers with nothing, or with the fault that
-// it found.
+// Checks that every part of the decoder shares. Each answers with nothing,
+// or with the fault that it found.
 #pragma once
 
 #include <cstdint>
@@ -32,12 +32,12 @@ using MaybeFault = std::optional<Fault>;
 std::string Show(double value);
 std::string Show(float value);
 
-// Text from a client, quoted, with what is not printable escaped, cut to a length fit for a
-// message.
+// Text from a client, quoted, with what is not printable escaped,
+// cut to a length fit for a message.
 std::string Quote(std::string_view text);
 
-// Names of layers, entities, objects: 1 to `max_bytes` bytes. (That text is UTF-8 is checked by the
-// parser.)
+// Names of layers, entities, objects: 1 to `max_bytes` bytes.
+// (That text is UTF-8 is checked by the parser.)
 MaybeFault CheckName(const FieldPath& path, std::string_view name, uint32_t max_bytes);
 
 // Text for people: at most `max_bytes` bytes.
@@ -60,9 +60,9 @@ Fault UnknownEnum(const FieldPath& path, int value, const char* known);
 // "is not implemented in this version of the server: <reason>".
 Fault Unimplemented(const FieldPath& path, const char* what);
 
-// 0 values: identity. Otherwise 12 finite ones whose linear part is not singular: the rows, each
-// divided by its greatest element, must have a determinant above 1e-12, and their own must be a
-// normal number.
+// 0 values: identity. Otherwise 12 finite ones whose linear part is not singular:
+// the rows, each divided by its greatest element, must have a determinant above 1e-12,
+// and their own must be a normal number.
 MaybeFault ToAffine(const FieldPath& path, const v1::Affine& in, gpu::Affine* out);
 
 }  // namespace voxeld::daemon::wire

@@ -177,8 +177,8 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
   google::protobuf::Arena arena;
   auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
   SliceStream stream(slices);
-  const google::protobuf::LogSilencer
-      silence;  // the status says it all; a client must not fill logs
+  // The status says it all; a client must not fill logs.
+  const google::protobuf::LogSilencer silence;
   if (!request->ParseFromZeroCopyStream(&stream)) {
     return Failed(absl::InvalidArgumentError(absl::StrCat(
         "a message of ", size,

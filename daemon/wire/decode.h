@@ -1,6 +1,6 @@
-// Bytes of the wire into operations of the core: parsed, and checked in all that needs no knowledge
-// of the scene. Apart from gRPC, so that it can be fuzzed, simulated and fed from a file.
-// Reentrant.
+// Bytes of the wire into operations of the core: parsed, and checked in all
+// that needs no knowledge of the scene. Apart from gRPC, so that it can be fuzzed,
+// simulated and fed from a file. Reentrant.
 //
 // A fault refuses the smallest thing that it is in: one operation, or one entity of a Batch. It
 // becomes an Issue with the path of the field, the value and what would be right. Only bytes that
@@ -39,9 +39,9 @@ struct Decoded {
 // A Commit is passed on whatever is wrong with it, after an Issue, so that it is answered like
 // every other: its receipt counts the refusal, or refuses it if the session is strict.
 //
-// Status: InvalidArgument (not a StreamRequest; an Open that cannot be taken), ResourceExhausted
-// (greater than max_message_bytes), Unimplemented (an Open that asks for what this version has
-// not).
+// Status: InvalidArgument (not a StreamRequest; an Open that cannot be taken),
+// ResourceExhausted (greater than max_message_bytes),
+// Unimplemented (an Open that asks for what this version has not).
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
                             uint64_t previous_sequence);
 

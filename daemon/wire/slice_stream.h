@@ -1,5 +1,5 @@
-// Protobuf's input stream over memory in pieces, as gRPC hands a message over: nothing is copied
-// together first.
+// Protobuf's input stream over memory in pieces, as gRPC hands a message over:
+// nothing is copied together first.
 #pragma once
 
 #include <google/protobuf/io/zero_copy_stream.h>

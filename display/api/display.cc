@@ -23,8 +23,8 @@ std::vector<uint8_t> DecodedVolume::Rgb(int32_t first, int32_t count) const {
 }
 namespace {
 
-// After a lost volume the newest one is sent again: first after this time, then after twice as
-// long.
+// After a lost volume the newest one is sent again:
+// first after this time, then after twice as long.
 constexpr sync::TimeNs kFirstResendDelay = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kLongestResendDelay = 5 * sync::kSecond;
 
@@ -145,8 +145,8 @@ absl::Status Display::SetBlank(bool blank) {
   if (blank == blanked_) return absl::OkStatus();
   blanked_ = blank;
   if (blank) {
-    // The verdict falls now; the driver may still finish what it sends, and that is what light
-    // brings back.
+    // The verdict falls now; the driver may still finish what it sends,
+    // and that is what light brings back.
     if (in_flight_ != nullptr && owed_) {
       owed_ = false;
       ReportLost(in_flight_->volume, "blanked", 0);

@@ -26,8 +26,8 @@
 
 namespace voxeld::display {
 
-// Fixed for the lifetime of a Display. Geometry and format are data, from its options or its
-// profile.
+// Fixed for the lifetime of a Display. Geometry and format are data,
+// from its options or its profile.
 struct DisplayInfo {
   std::string name;    // unique in the daemon
   std::string driver;  // "simulated", "voxlink", …
@@ -45,8 +45,8 @@ struct DisplayStats {
   uint64_t bytes_out = 0;
   uint64_t slices_sent = 0;
   uint64_t slices_resent = 0;
-  uint64_t underruns =
-      0;  // sweeps for which the device had to repeat a volume while a newer was on its way
+  // Sweeps for which the device had to repeat a volume while a newer was on its way.
+  uint64_t underruns = 0;
   uint64_t attaches = 0;
 };
 
@@ -98,19 +98,19 @@ class Display {
   // thread-safe, cheap, and asks for a Tick soon. Volumes are counted anew.
   absl::Status Start(Listener* listener, std::function<void()> wake);
 
-  // Ends what is in flight (each volume still owed gets kLost) and goes to kStopped. Safe at any
-  // time.
+  // Ends what is in flight (each volume still owed gets kLost) and goes to kStopped.
+  // Safe at any time.
   void Stop();
 
-  // Takes a volume, in any state between Start and Stop (outside there is no listener to tell: it
-  // is dropped). While one is in flight it waits; one that waited gets kReplaced. A volume
-  // submitted while not kShowing waits for the device to come, unless blanked: then kLost at once.
-  // `frame->volume` must ascend and `frame->layout` must be info().layout: what breaks that is
-  // kLost at once.
+  // Takes a volume, in any state between Start and Stop (outside there is no listener to tell:
+  // it is dropped). While one is in flight it waits; one that waited gets kReplaced.
+  // A volume submitted while not kShowing waits for the device to come, unless blanked:
+  // then kLost at once. `frame->volume` must ascend and `frame->layout` must be info().layout:
+  // what breaks that is kLost at once.
   void Submit(SliceFramePtr frame);
 
-  // True if no volume waits: a pipeline that only draws when this holds never has a volume
-  // replaced.
+  // True if no volume waits:
+  // a pipeline that only draws when this holds never has a volume replaced.
   bool mailbox_free() const { return waiting_ == nullptr; }
 
   // Does what is due, drains completions; returns when it wants to be called again at the latest.
@@ -161,12 +161,13 @@ class Display {
   void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,
                  uint64_t bytes);
   void FrameLost(const std::string& reason, uint64_t bytes);
-  void TapOut(uint8_t endpoint,
-              std::span<const std::byte> bytes);  // every outgoing byte of a volume
+  // Every outgoing byte of a volume.
+  void TapOut(uint8_t endpoint, std::span<const std::byte> bytes);
   bool tapped() const { return decoder_ != nullptr; }
+  // Any thread.
   void Wake() const {
     if (wake_) wake_();
-  }  // any thread
+  }
   DisplayStats& mutable_stats() { return stats_; }
   sync::Clock& clock() const { return clock_; }
   const SliceFramePtr& in_flight() const { return in_flight_; }

@@ -63,9 +63,9 @@ struct Rotor {
   bool operator==(const Rotor&) const = default;
 };
 
-// Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s]; for a Rotor
-// slice s·panels + p is panel p while the rotor turns through [s−½, s+½) / slices_per_turn of a
-// turn.
+// Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s];
+// for a Rotor slice s·panels + p is panel p while the rotor turns
+// through [s−½, s+½) / slices_per_turn of a turn.
 struct Geometry {
   std::variant<PlanarStack, Rotor> shape;
   VoxelGrid grid;

@@ -60,8 +60,8 @@ struct Tone {
   bool operator==(const Tone&) const = default;
 };
 
-// One picture's bytes, layout.bytes_per_slice() of them; shared between volumes that have it in
-// common.
+// One picture's bytes, layout.bytes_per_slice() of them;
+// shared between volumes that have it in common.
 using Picture = std::shared_ptr<const std::vector<std::byte>>;
 
 // One volume. Immutable once handed over.

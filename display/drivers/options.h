@@ -60,7 +60,8 @@ class OptionReader {
 // Everything of DisplayInfo but name and driver:
 //   geometry=planar|rotor   planar
 //   size=WxHxS              planar: pixels by slices, 128x128x128; rotor: WxH pixels a panel,
-//   128x128 pitch_mm=P              distance of pixels, 1
+//                           128x128
+//   pitch_mm=P              distance of pixels, 1
 // planar:
 //   normal=z|y              z
 //   slice_pitch_mm=P        distance of slices, pitch_mm
@@ -74,8 +75,8 @@ class OptionReader {
 // both:
 //   mirror_u= mirror_v=     true|false, false
 //   format=rgb888|rgb332|bitplanes3, sub_frames=1…64, rate=volumes/s (30; a rotor with n panels
-//   still counts turns), gamma=1, brightness=0…1 (1), dither=none|ordered (ordered),
-//   sampling=max|weighted (max)
+//     still counts turns), gamma=1, brightness=0…1 (1), dither=none|ordered (ordered),
+//     sampling=max|weighted (max)
 absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, OptionReader& reader);
 
 // lut[0] = 0, lut[255] = 65535·brightness; between, 65535·brightness·(c/255)^gamma, rounded, at

@@ -209,8 +209,8 @@ bool FaultInjector::Apply(const Urb& original, Urb& urb, Passing& passing) {
     complete_(urb.id, TransferStatus::kDisconnected, 0, {});
     return false;
   }
-  if (now <
-      endpoint.nak_until) {  // a NAK that began with this very transfer, which will come again
+  // A NAK that began with this very transfer, which will come again.
+  if (now < endpoint.nak_until) {
     --endpoint.transfers;
     endpoint.bytes = first_byte;
     endpoint.waiting.push_front(original);

@@ -30,10 +30,10 @@ struct Fault {
     kPartial,  // `amount` bytes pass, then the endpoint halts
     kError,    // `amount` transfers end in a protocol error; nothing passes
     kCorrupt,  // the byte `amount` of the transfer is inverted (kByte: the one at `at`)
-    kDrop,    // `amount` bytes of the transfer vanish, from its middle (kByte: from `at`); reported
-              // as sent
-    kUnplug,  // the cable is out for `amount` ns
-    kDelay,   // completions are held back for `amount` ns
+    kDrop,     // `amount` bytes of the transfer vanish, from its middle (kByte: from `at`);
+               // reported as sent
+    kUnplug,   // the cable is out for `amount` ns
+    kDelay,    // completions are held back for `amount` ns
   };
   When when = When::kTransfer;
   uint64_t at = 1;

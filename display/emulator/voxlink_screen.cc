@@ -15,8 +15,8 @@ using voxlink::PacketType;
 using voxlink::PictureRun;
 using voxlink::Reason;
 
-// §6: at most this many runs are listed; neighbours with the smallest gap between them are joined
-// first.
+// §6: at most this many runs are listed;
+// neighbours with the smallest gap between them are joined first.
 void JoinRuns(std::vector<PictureRun>& runs) {
   constexpr size_t kMostRuns = voxlink::kRunsPerEvent * voxlink::kMostMissingEvents;
   if (runs.size() <= kMostRuns) return;

@@ -21,8 +21,8 @@ struct Direction {
 };
 Direction DirectionOf(Turn turn);
 
-// The angle of (x, y), within 0.51·2⁻³² turn; symmetric under quarter turns. |x|, |y| < 2⁶²; not
-// both 0.
+// The angle of (x, y), within 0.51·2⁻³² turn; symmetric under quarter turns.
+// |x|, |y| < 2⁶²; not both 0.
 Turn TurnOf(int64_t x, int64_t y);
 
 // ⌊√n⌋, exact. n < 2⁶².

@@ -37,8 +37,8 @@ struct PixelRow {
   double CentreMm(int32_t index) const { return PositionMm(2 * Place(index) + 1); }
 };
 
-// Of each pixel of `row`, the cells of an axis of `cells` cells of `pitch_mm` that begins at
-// `origin_mm`.
+// Of each pixel of `row`, the cells of an axis of `cells` cells
+// of `pitch_mm` that begins at `origin_mm`.
 std::vector<CellRange> CellsOfPixels(const PixelRow& row, int32_t cells, double pitch_mm,
                                      double origin_mm);
 

@@ -1,11 +1,11 @@
 // Footprints: for every slice pixel the voxels that it stands for, with weights, as tables that an
 // engine on any machine reads alike.
 //
-// A footprint is a product: pixel (u, v) of slice s stands for all voxels o + i with o from the
-// list of (s, u) and i from the list of v, each with weight (wo·wi + 127) / 255. Coordinates add
-// component-wise. A planar stack's lists are (x, z) by y or (x, y) by z; a rotor's are columns (x,
-// y) by z. So a table of a 192-slice projector display with 200 million pixels has 175,000 outer
-// entries.
+// A footprint is a product: pixel (u, v) of slice s stands for all voxels o + i with o
+// from the list of (s, u) and i from the list of v, each with weight (wo·wi + 127) / 255.
+// Coordinates add component-wise. A planar stack's lists are (x, z) by y or (x, y) by z;
+// a rotor's are columns (x, y) by z. So a table of a 192-slice projector display with 200 million
+// pixels has 175,000 outer entries.
 //
 // What every geometry guarantees, and tests prove: each voxel whose centre lies in the solid swept
 // by the pixels' rectangles is in at least one footprint with weight ≥ 128; each pixel whose centre
@@ -48,8 +48,8 @@ struct FootprintEntry {
   bool operator==(const FootprintEntry&) const = default;
 };
 
-// Compressed rows: list r is entries[begin[r] .. begin[r+1]), ascending by (z, y, x), each voxel
-// once.
+// Compressed rows: list r is entries[begin[r] .. begin[r+1]),
+// ascending by (z, y, x), each voxel once.
 struct FootprintLists {
   std::vector<uint32_t> begin;
   std::vector<FootprintEntry> entries;
@@ -66,8 +66,8 @@ struct FootprintTable {
   // Slices take the inner lists in turn: slice s those of set s % inner_sets. One set, but for a
   // rotor whose panels differ along v: one a panel.
   int32_t inner_sets = 1;
-  // The axis along which inner entries lie; their other coordinates are 0, and outer entries' is 0
-  // here.
+  // The axis along which inner entries lie; their other coordinates are 0,
+  // and outer entries' is 0 here.
   Axis inner_axis = Axis::kZ;
   FootprintLists outer;  // slices·width lists; list (s, u) = s·width + u
   FootprintLists inner;  // inner_sets·height lists; list (set, v) = set·height + v
@@ -94,12 +94,10 @@ int32_t SliceCount(const Geometry& geometry);
 // The grid that suits a shape when none is stated, just around the swept solid. The shape must be
 // valid; the grid may still be too large for ValidateGeometry.
 // - Planar: cells of the pixels' pitch, so across the slices a pixel is a voxel. Along the normal,
-// over
-//   the depth of all slabs: as many as slices if these are evenly spaced (within 10⁻⁶), else as
-//   many as the least spacing goes into the depth, 4096 at the most.
+//   over the depth of all slabs: as many as slices if these are evenly spaced (within 10⁻⁶), else
+//   as many as the least spacing goes into the depth, 4096 at the most.
 // - Rotor: cells of the first panel's pitches (u for x and y, v for z); nx = ny even, over the
-// circle
-//   that the farthest corner describes; nz over the height of all panels.
+//   circle that the farthest corner describes; nz over the height of all panels.
 VoxelGrid DefaultGrid(const Geometry& geometry);
 
 // `geometry` must be valid.

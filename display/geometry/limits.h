@@ -1,5 +1,5 @@
-// What ValidateGeometry allows. Together they keep every integer of display/geometry within 64
-// bits.
+// What ValidateGeometry allows.
+// Together they keep every integer of display/geometry within 64 bits.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ inline constexpr int64_t kMaxPixels = int64_t{1} << 32;  // slices·width·heigh
 inline constexpr int64_t kMaxFootprintEntries = int64_t{1} << 28;
 inline constexpr double kMinPitchMm = 1e-4, kMaxPitchMm = 1e4;
 inline constexpr double kMaxPositionMm = 1e6;  // either side of the middle
-// A rotor's grid and panels lie within this many of the grid's smaller horizontal pitch of the
-// axis.
+// A rotor's grid and panels lie within this many of the grid's
+// smaller horizontal pitch of the axis.
 inline constexpr int64_t kMaxRotorReach = 16384;
 // Neighbouring slices of a stack are at least this fraction of a voxel apart.
 inline constexpr double kMinSpacingVoxels = 1.0 / 1024;

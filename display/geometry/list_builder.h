@@ -18,8 +18,8 @@ class ListBuilder {
     records_.push_back({static_cast<uint32_t>(list), entry});
   }
 
-  // Sorted; of a voxel added several times to a list the greatest weight stays. Empties the
-  // builder.
+  // Sorted; of a voxel added several times to a list the greatest weight stays.
+  // Empties the builder.
   FootprintLists Build();
 
  private:

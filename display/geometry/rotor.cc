@@ -88,8 +88,8 @@ class ColumnScatter {
     for (int32_t place = 0; place <= row.count; ++place) {
       edges.push_back(ToFixed(row.PositionMm(2 * place), unit_mm_));
     }
-    // The pixel with edge ≤ a < next edge; an edge is an integer, so ⌊a⌋ decides as a would. −1:
-    // none.
+    // The pixel with edge ≤ a < next edge; an edge is an integer,
+    // so ⌊a⌋ decides as a would. −1: none.
     const auto pixel_at = [&](Fixed a) {
       const auto above = std::upper_bound(edges.begin(), edges.end(), a);
       if (above == edges.begin() || above == edges.end()) return -1;

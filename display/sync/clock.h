@@ -23,9 +23,9 @@ class Clock {
 
   virtual TimeNs Now() const = 0;
 
-  // Waits until `cv` is notified or Now() >= deadline, whichever is first; may wake without cause.
-  // `mutex` must be held and guards the condition. deadline == kNever waits for a notification
-  // only.
+  // Waits until `cv` is notified or Now() >= deadline, whichever is first;
+  // may wake without cause. `mutex` must be held and guards the condition.
+  // deadline == kNever waits for a notification only.
   virtual void WaitUntil(Mutex& mutex, CondVar& cv, TimeNs deadline) VOXELD_REQUIRES(mutex) = 0;
 };
 

@@ -1,6 +1,6 @@
-// Mutex, lock and condition variable with clang's thread-safety annotations, over the standard
-// library's. std primitives are instrumented by every sanitizer, which a prebuilt third-party mutex
-// is not.
+// Mutex, lock and condition variable with clang's thread-safety annotations,
+// over the standard library's. std primitives are instrumented by every sanitizer,
+// which a prebuilt third-party mutex is not.
 //
 // Thread-safe by definition; none of these is copyable or movable.
 #pragma once

@@ -40,8 +40,8 @@ class UsbDeviceModel {
   // When Tick has something to do at the latest; kNever if nothing.
   virtual sync::TimeNs NextTimeout() const = 0;
 
-  // Plugs the cable, or pulls it: then all URBs complete as kDisconnected and the device forgets
-  // its state.
+  // Plugs the cable, or pulls it: then all URBs complete as kDisconnected
+  // and the device forgets its state.
   virtual void SetPlugged(bool plugged) = 0;
   virtual bool plugged() const = 0;
   // Counts the times that it was plugged in: a handle to an earlier plug is stale.

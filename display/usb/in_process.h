@@ -53,8 +53,8 @@ class InProcessTransport final : public UsbTransport {
   // called again. Any thread; the event thread's loop is this.
   sync::TimeNs Pump();
 
-  // Runs `function` with the device to itself (a test's look at what it shows, or its hand on the
-  // cable).
+  // Runs `function` with the device to itself (a test's look at what it shows,
+  // or its hand on the cable).
   void WithDevice(const std::function<void(UsbDeviceModel&)>& function);
 
  private:
@@ -80,8 +80,8 @@ class InProcessTransport final : public UsbTransport {
 
   // Order of locks: device_mutex_ before mutex_. wake_mutex_ is held alone.
   mutable sync::Mutex device_mutex_;
-  std::unique_ptr<UsbDeviceModel>
-      device_;  // the pointer is fixed; the model belongs to device_mutex_
+  // The pointer is fixed; the model belongs to device_mutex_.
+  std::unique_ptr<UsbDeviceModel> device_;
   std::map<TransferId, Pending> pending_ VOXELD_GUARDED_BY(device_mutex_);
   bool was_plugged_ VOXELD_GUARDED_BY(device_mutex_) = false;
   uint32_t seen_plugs_ VOXELD_GUARDED_BY(device_mutex_) = 0;

@@ -1,7 +1,7 @@
-// The door to a USB device, shaped like libusb: submit, cancel, completion with status and actual
-// length, hotplug, a cap on the bytes in flight. Implementations: in-process (an emulated device in
-// this process), later libusb, recording, replaying and fault-injecting ones. Drivers see nothing
-// else of USB.
+// The door to a USB device, shaped like libusb: submit, cancel, completion with status
+// and actual length, hotplug, a cap on the bytes in flight. Implementations:
+// in-process (an emulated device in this process), later libusb, recording, replaying
+// and fault-injecting ones. Drivers see nothing else of USB.
 //
 // Threads: bound to the owner's thread, but for the wake function, which an implementation may call
 // from any thread. Completions queue up and are handed out by Drain, so no code of ours ever runs
@@ -63,8 +63,8 @@ struct TransferCompletion {
   uint8_t endpoint = 0;
   TransferStatus status = TransferStatus::kOk;
   uint32_t actual_length = 0;
-  std::vector<std::byte>
-      data;  // IN: what came (actual_length bytes). OUT: the buffer, to be used again
+  // IN: what came (actual_length bytes). OUT: the buffer, to be used again.
+  std::vector<std::byte> data;
 };
 
 struct UsbIdentity {
@@ -99,9 +99,9 @@ class UsbTransport {
   virtual size_t bytes_in_flight() const = 0;
   virtual size_t max_bytes_in_flight() const = 0;
 
-  // `wake` is called, from any thread, when Drain has something, or when a device came or went. It
-  // must not call the transport. Once SetWake returns, the function set before is not called any
-  // more.
+  // `wake` is called, from any thread, when Drain has something, or when a device came or went.
+  // It must not call the transport. Once SetWake returns,
+  // the function set before is not called any more.
   virtual void SetWake(std::function<void()> wake) = 0;
 };
 

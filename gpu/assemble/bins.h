@@ -10,8 +10,8 @@
 
 namespace voxeld::gpu {
 
-// Compressed rows: tile tiles[r] has items[begin[r] .. begin[r+1]). Tiles ascend, so do a row's
-// items.
+// Compressed rows: tile tiles[r] has items[begin[r] .. begin[r+1]).
+// Tiles ascend, so do a row's items.
 struct Bins {
   std::vector<uint32_t> tiles;
   std::vector<uint32_t> begin;

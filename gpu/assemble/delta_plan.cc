@@ -65,8 +65,8 @@ class Planner final : public DeltaVisitor {
   }
 
   absl::StatusOr<DeltaPlan> Finish() {
-    absl::flat_hash_map<uint64_t, int64_t> geometry_uses,
-        layer_uses;  // changes to the scene's counts
+    // Changes to the scene's counts.
+    absl::flat_hash_map<uint64_t, int64_t> geometry_uses, layer_uses;
     for (const auto& [id, links] : drawables_) {
       if (const Drawable* before = forgotten_ ? nullptr : scene_.FindDrawable(id)) {
         --geometry_uses[before->record.geometry];

@@ -1,5 +1,5 @@
-// What an engine holds of a scene: geometries, drawables and layers by id, and how a delta changes
-// them.
+// What an engine holds of a scene: geometries, drawables and layers by id,
+// and how a delta changes them.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// The voxel volume on the CPU: tiles, the index of what lies in each, and the drawing of those that
-// changed.
+// The voxel volume on the CPU: tiles, the index of what lies in each,
+// and the drawing of those that changed.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@
 
 namespace voxeld::gpu {
 
-// Blended colours, interleaved (word.h), of the tiles that have any: a tile without light costs
-// nothing.
+// Blended colours, interleaved (word.h), of the tiles that have any:
+// a tile without light costs nothing.
 class TileStore {
  public:
   void Reset(const TileGrid& grid);
@@ -43,8 +43,8 @@ class Volume final : private SceneObserver {
   absl::Status Apply(std::span<const std::byte> delta,
                      const std::shared_ptr<StagingBlock::Memory>& block);
 
-  // Everything is to be drawn anew, in the tiles with owned[tile] != 0. `view`: scene → voxel
-  // space.
+  // Everything is to be drawn anew, in the tiles with owned[tile] != 0.
+  // `view`: scene → voxel space.
   void SetView(const TileGrid& grid, const Affine& view, std::vector<uint8_t> owned);
 
   struct Changes {

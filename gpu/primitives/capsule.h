@@ -1,5 +1,5 @@
-// Thick points and lines: all voxels whose centre lies within a radius of a segment (closed), in
-// voxel space.
+// Thick points and lines: all voxels whose centre lies within a radius
+// of a segment (closed), in voxel space.
 //
 // Evaluated in IEEE double, in the order written here, relative to the voxel that holds the
 // lexicographically smaller end: the same from both ends, and a shift by whole voxels shifts the

@@ -83,8 +83,8 @@ VOXELD_HD constexpr int64_t FloorToInt(double x) {
   return t - static_cast<int64_t>(static_cast<double>(t) > x);
 }
 
-// A coordinate in voxels to the nearest unit, halves up; saturates at ±kMaxUnits (NaN: at
-// −kMaxUnits).
+// A coordinate in voxels to the nearest unit, halves up;
+// saturates at ±kMaxUnits (NaN: at −kMaxUnits).
 VOXELD_HD constexpr int64_t Snap(double voxels) {
   const double x = voxels * 256.0 + 0.5;
   if (!(x > -static_cast<double>(kMaxUnits))) return -kMaxUnits;
@@ -134,8 +134,8 @@ struct Stepper {
   }
 };
 
-// A voxel's colour k parts of n along from c0 to c1 (0x00RRGGBB): (C0·(n−k) + C1·k + ⌊n/2⌋)/n a
-// channel.
+// A voxel's colour k parts of n along from c0 to c1 (0x00RRGGBB):
+// (C0·(n−k) + C1·k + ⌊n/2⌋)/n a channel.
 VOXELD_HD inline uint32_t MixColors(uint32_t c0, uint32_t c1, int64_t k, int64_t n) {
   if (c0 == c1 || n == 0) return c0;
   uint32_t rgb = 0;

@@ -95,8 +95,8 @@ VOXELD_HD void EmitTilesOfBox(const Box3& box, const TileGrid& grid, Emit&& emit
 template <class Emit>
 VOXELD_HD void EmitTilesOfLine(const Line& line, int64_t radius, const TileGrid& grid,
                                Emit&& emit) {
-  // Reach beyond the axis: the radius, half a voxel from a cell to its centre, and room for
-  // rounding.
+  // Reach beyond the axis: the radius, half a voxel from a cell
+  // to its centre, and room for rounding.
   const double reach = radius > 0 ? static_cast<double>(radius) + kHalfVoxel + 2 : 2;
   double s[3], e[3];
   int major = 0;

@@ -6,8 +6,7 @@
 //   Count(source)                    how many items a drawable has
 //   EmitTiles(source, i, grid, f)    f(tile) for every tile that item i may touch
 //   EmitVoxels(source, i, box, f)    f(x, y, z, rgb) for exactly the voxels of item i in a box
-//   inside the
-//                                    volume (repetition is allowed)
+//                                    inside the volume (repetition is allowed)
 //   CanonicalMap(record)             of a solid only
 #pragma once
 

@@ -14,8 +14,8 @@ struct SolidBlock {
   static constexpr int32_t kRows = kInner + 2;
   uint32_t bits[kRows][kRows] = {};  // [z][y]
 
-  // What is inside among voxel (x0, y0, z0) and those up to (x1, y1, z1); at most kRows along each
-  // axis.
+  // What is inside among voxel (x0, y0, z0) and those up to (x1, y1, z1);
+  // at most kRows along each axis.
   template <class Shape>
   VOXELD_HD bool Fill(const Solid& s, const int64_t lo[3], const int64_t hi[3]) {
     float dx[kRows];

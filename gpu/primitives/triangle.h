@@ -64,8 +64,8 @@ struct TriangleSetup {
     return static_cast<I>(voxel - origin[a]) * kUnitsPerVoxel + kHalfVoxel;
   }
 
-  // Twice the signed area of edge i → i+1 with the point (qb, qc), projected along `a`; positive
-  // inside.
+  // Twice the signed area of edge i → i+1 with the point (qb, qc),
+  // projected along `a`; positive inside.
   VOXELD_HD I Edge(int a, int i, I qb, I qc) const {
     const int b = (a + 1) % 3, c = (a + 2) % 3, j = (i + 1) % 3;
     const I area = (p[j][b] - p[i][b]) * (qc - p[i][c]) - (p[j][c] - p[i][c]) * (qb - p[i][b]);

@@ -37,8 +37,8 @@ class Sampler {
   void Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
 
  private:
-  // The inner lists' distinct voxels in a row along an axis; they have consecutive places in a
-  // line.
+  // The inner lists' distinct voxels in a row along an axis;
+  // they have consecutive places in a line.
   struct Run {
     int32_t at[3];
     int axis;

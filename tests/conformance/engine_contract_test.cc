@@ -105,8 +105,8 @@ TEST_P(EngineContract, OnlyChangedTilesAndTheirSlicesAreDrawn) {
   const FrameResult frame = MustFrame();
   EXPECT_TRUE(frame.changed);
   EXPECT_EQ(frame.tiles_drawn, 1u);
-  EXPECT_LE(frame.pictures_drawn,
-            18u);  // those that look at 16 layers of voxels, and a neighbour or two
+  // Those that look at 16 layers of voxels, and a neighbour or two.
+  EXPECT_LE(frame.pictures_drawn, 18u);
   int changed = 0;
   for (uint64_t number : engine_.changed_in()) changed += number == 2;
   EXPECT_EQ(changed, 1);

@@ -19,8 +19,8 @@ Units SnapVertex(const Affine& map, const float* p) {
   return u;
 }
 
-// Half the thickness in units. Tests keep to maps for which a cube root by libm rounds to the same
-// unit.
+// Half the thickness in units.
+// Tests keep to maps for which a cube root by libm rounds to the same unit.
 int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
   double thickness = g.thickness;
   if (g.thickness_unit == ThicknessUnit::kUnits)

@@ -1,5 +1,5 @@
-// What every engine must produce, drawn plainly: dense volumes, direct loops, no code of the
-// engine's.
+// What every engine must produce, drawn plainly: dense volumes,
+// direct loops, no code of the engine's.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +28,8 @@ struct DenseVolume {
 // The blended voxels of a scene.
 DenseVolume OracleVoxels(const SceneModel& scene, const Target& target);
 
-// For each voxel, 1 if it is in some pixel's footprint. An engine may leave out what no slice looks
-// at.
+// For each voxel, 1 if it is in some pixel's footprint.
+// An engine may leave out what no slice looks at.
 std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target);
 
 // All pictures of the volume, as target.layout has them.

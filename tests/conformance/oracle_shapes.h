@@ -1,6 +1,6 @@
-// Which voxels a drawable covers, by formulations other than the engine's: rational arithmetic in
-// 128 bits, voxel by voxel. Only the formulas in floating point are the published ones, written a
-// second time.
+// Which voxels a drawable covers, by formulations other than the engine's:
+// rational arithmetic in 128 bits, voxel by voxel. Only the formulas in floating point are
+// the published ones, written a second time.
 #pragma once
 
 #include <cstdint>

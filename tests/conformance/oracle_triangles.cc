@@ -78,8 +78,8 @@ bool SegmentMeetsBox(const Vec& s, const Vec& e, const Vec& corner) {
   return in_num * out_den <= out_num * in_den;
 }
 
-// Two closed convex sets meet iff an edge of the triangle meets the box or an edge of the box the
-// triangle.
+// Two closed convex sets meet iff an edge of the triangle meets the box
+// or an edge of the box the triangle.
 bool MeetsBox(const Tri& t, const Vec& corner) {
   for (int i = 0; i < 3; ++i) {
     if (SegmentMeetsBox(t.p[i], t.p[(i + 1) % 3], corner)) return true;

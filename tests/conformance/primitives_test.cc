@@ -52,8 +52,8 @@ Voxels FromOracle(const PlotAll& plot_all) {
   return voxels;
 }
 
-// Coordinates that find mistakes: on and just beside faces and centres, inside, around and far
-// away.
+// Coordinates that find mistakes: on and just beside faces and centres,
+// inside, around and far away.
 class HardCoordinates {
  public:
   explicit HardCoordinates(SceneGenerator& generator) : generator_(generator) {}

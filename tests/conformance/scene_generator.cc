@@ -165,8 +165,7 @@ Affine SceneGenerator::RandomTransform(int size) {
         t.m[row * 4 + 3] = Chance(0.5) ? static_cast<double>(Int(-5, 5)) : Real(-5, 5);
       }
       return t;
-    case 2:  // a turn about the middle, with a stretch
-    {
+    case 2: {  // a turn about the middle, with a stretch
       const double angle = Real(0, 7), scale = Real(0.3, 2), middle = size / 2.0;
       const double c = std::cos(angle) * scale, s = std::sin(angle) * scale;
       t.m[0] = c, t.m[1] = -s, t.m[4] = s, t.m[5] = c, t.m[10] = Real(0.3, 2);

@@ -19,8 +19,8 @@ class SceneGenerator {
   // A small display of either kind, any format, sampling, dither, number of sub-frames; any view.
   Target RandomTarget();
 
-  // Layers, geometries (some shared) and drawables of every kind, for a grid of about `size`
-  // voxels.
+  // Layers, geometries (some shared) and drawables of every kind,
+  // for a grid of about `size` voxels.
   SceneModel RandomScene(int size);
 
   // One change to `scene`, written to `delta` as well.

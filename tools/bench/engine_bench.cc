@@ -1,6 +1,6 @@
-// Whole frames through the engine's door: draw list to packed slices. Items are voxels drawn a
-// second; beside each stands what the machine's memory allows for the same bytes (memcpy of the
-// frame).
+// Whole frames through the engine's door: draw list to packed slices.
+// Items are voxels drawn a second; beside each stands what the machine's memory allows
+// for the same bytes (memcpy of the frame).
 #include <benchmark/benchmark.h>
 
 #include <cstring>

@@ -1,6 +1,6 @@
 // Puts a volume together from the packets that carry it (docs/protocols/voxlink.md §5.2 to §5.4).
-// The device model and the decoder both stand on it; they differ in what they do with what it
-// refuses.
+// The device model and the decoder both stand on it;
+// they differ in what they do with what it refuses.
 //
 // Single-threaded.
 #pragma once
@@ -30,8 +30,8 @@ class VolumeAssembler {
   // gone. Refuses (kBadLength, kBadBegin) what does not fit the layout, and then fills nothing.
   ErrorCode Begin(const PacketHeader& header, std::span<const std::byte> payload, VolumePtr base);
 
-  // A fragment of a picture. Fragments of one picture come in order; one at offset 0 begins it
-  // again.
+  // A fragment of a picture. Fragments of one picture come in order;
+  // one at offset 0 begins it again.
   ErrorCode Slice(const PacketHeader& header, std::span<const std::byte> payload);
 
   bool filling() const { return number_ != 0; }
@@ -40,8 +40,8 @@ class VolumeAssembler {
   // Runs of announced pictures that are not whole, ascending.
   std::vector<PictureRun> Missing() const;
 
-  // The volume, if nothing is missing; null otherwise. It goes on filling: pictures that come again
-  // replace theirs.
+  // The volume, if nothing is missing; null otherwise. It goes on filling:
+  // pictures that come again replace theirs.
   VolumePtr Finish() const;
 
   void Clear();

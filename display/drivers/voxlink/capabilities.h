@@ -1,5 +1,5 @@
-// Capabilities of a voxlink device (docs/protocols/voxlink.md §4.1, §4.2) to and from a display's
-// geometry.
+// Capabilities of a voxlink device (docs/protocols/voxlink.md §4.1, §4.2)
+// to and from a display's geometry.
 #pragma once
 
 #include <cstddef>

@@ -8,8 +8,8 @@
 
 namespace voxeld::display::voxlink {
 
-// Of `bytes` after bytes whose CRC was `crc` (0 for none). By the processor's instruction where it
-// has one.
+// Of `bytes` after bytes whose CRC was `crc` (0 for none).
+// By the processor's instruction where it has one.
 uint32_t Crc32c(std::span<const std::byte> bytes, uint32_t crc = 0);
 
 // The same by table, on any machine.

@@ -1,5 +1,5 @@
-// Packets of voxlink (docs/protocols/voxlink.md §5): writing them, and finding them in a stream of
-// bytes.
+// Packets of voxlink (docs/protocols/voxlink.md §5): writing them,
+// and finding them in a stream of bytes.
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,8 @@
 // voxlink 1.0 as numbers and wire structs. Each names its section of docs/protocols/voxlink.md,
 // which says what it means.
 //
-// Everything on the wire is little-endian; these structs are copied to and from it as they lie in
-// memory.
+// Everything on the wire is little-endian;
+// these structs are copied to and from it as they lie in memory.
 #pragma once
 
 #include <bit>

@@ -228,8 +228,8 @@ void VoxlinkLink::OnStatusReply(Kind kind, std::span<const std::byte> data) {
     credit_limit_ = status.credit_limit;
     last_progress_ = clock_.Now();
   }
-  if (kind ==
-      Kind::kRecoveryStatus) {  // asked when nothing was in flight, and nothing was sent since
+  // Asked when nothing was in flight, and nothing was sent since.
+  if (kind == Kind::kRecoveryStatus) {
     sent_ = status.bytes_received;
     recovery_ = Recovery::kNone;
   }

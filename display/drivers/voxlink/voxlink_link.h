@@ -30,16 +30,16 @@ class VoxlinkLink {
     // The answer to Read and Write; a refused or failed one goes to OnLinkFailed.
     virtual void OnReply(Request request, std::span<const std::byte> data) = 0;
     virtual void OnConfiguration(std::span<const std::byte> descriptor) = 0;
-    // The answer to AskStatus and Recover. `settled`: all that was sent has been received and
-    // consumed.
+    // The answer to AskStatus and Recover.
+    // `settled`: all that was sent has been received and consumed.
     virtual void OnStatus(const Status& status, bool settled) = 0;
     // The device is gone, or does not behave. The link must be closed.
     virtual void OnLinkFailed(const std::string& reason) = 0;
   };
 
   struct Options {
-    size_t max_bytes_in_flight = size_t{4}
-                                 << 20;  // of bulk transfers; the transport's limit holds too
+    // Of bulk transfers; the transport's limit holds too.
+    size_t max_bytes_in_flight = size_t{4} << 20;
     sync::TimeNs control_timeout = sync::kSecond;
     sync::TimeNs bulk_timeout = 2 * sync::kSecond;
     int max_recoveries = 6;  // without progress in between

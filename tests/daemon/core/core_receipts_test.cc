@@ -286,8 +286,7 @@ TEST(CoreReceipts, DecodingsRefusalsCountForTheCommitThatTheyComeBefore) {
   EXPECT_EQ(client.sink->Of<Accepted>()[2].second.refused_operations, 1u);
 }
 
-// ------------------------------------------------------------------------------------------ the
-// engine fails
+// -------------------------------------------------------------------------- the engine fails
 
 TEST(CoreReceipts, ALostEngineIsReplacedAndNothingElseIsLost) {
   Simulation sim;

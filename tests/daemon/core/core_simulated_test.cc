@@ -1,6 +1,6 @@
-// A whole daemon in one thread under a clock that stands still: the CPU engine, the voxlink driver,
-// the device model at the other end of its wire. The same run twice gives the same receipts, to the
-// nanosecond.
+// A whole daemon in one thread under a clock that stands still: the CPU engine,
+// the voxlink driver, the device model at the other end of its wire. The same run twice
+// gives the same receipts, to the nanosecond.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,8 +53,8 @@ class SimulatedDaemon {
   void RunFor(sync::TimeNs span) {
     const sync::TimeNs end = clock.Now() + span;
     while (clock.Now() < end) {
-      // Core and device answer each other a few times within one moment, and no later than the next
-      // millisecond.
+      // Core and device answer each other a few times within one moment,
+      // and no later than the next millisecond.
       sync::TimeNs next = clock.Now() + sync::kMillisecond;
       for (int i = 0; i < 4; ++i) next = std::min({next, core->Step(), transport_->Pump()});
       clock.AdvanceTo(std::min(end, std::max(next, clock.Now() + 1000)));

@@ -1,6 +1,6 @@
-// An engine that keeps what deltas tell it, checks every rule of gpu/delta.h, and "draws" by
-// hashing the scene it holds: equal scenes give equal pictures. Calls end when Run is called, or at
-// once.
+// An engine that keeps what deltas tell it, checks every rule of gpu/delta.h,
+// and "draws" by hashing the scene it holds: equal scenes give equal pictures.
+// Calls end when Run is called, or at once.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// A whole core in one thread, under a clock that stands still, with scripted displays and recording
-// engines.
+// A whole core in one thread, under a clock that stands still,
+// with scripted displays and recording engines.
 #pragma once
 
 #include <memory>

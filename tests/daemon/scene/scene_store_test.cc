@@ -386,8 +386,8 @@ TEST(SceneStore, HiddenMeansThatEveryOperationWasInAHiddenLayer) {
   f.Commit(SetLayer("a", false));
   EXPECT_FALSE(f.Commit(testing::Define("o", {})).hidden);
   EXPECT_TRUE(f.Commit(Begin("a"), Put("a", "y"), End("a")).hidden);
-  EXPECT_TRUE(f.Commit(Put("a", "y"), Move("b", "nobody", Shift(1)))
-                  .hidden);  // a refused one does not count
+  // A refused one does not count.
+  EXPECT_TRUE(f.Commit(Put("a", "y"), Move("b", "nobody", Shift(1))).hidden);
 }
 
 TEST(SceneStore, LayersAreRemovedByWhoWroteThemLast) {

@@ -19,8 +19,8 @@ class StoreFixture {
  public:
   explicit StoreFixture(Limits limits = {}) : store(limits), limits_(limits) {}
 
-  // One commit by `author`, operations numbered on; what CheckAlone refuses is left out and listed
-  // first.
+  // One commit by `author`, operations numbered on;
+  // what CheckAlone refuses is left out and listed first.
   template <typename... Ops>
   CommitResult Commit(const Author& author, Ops... ops) {
     std::vector<Operation> all = Sequence(last_sequence, std::move(ops)...);

@@ -352,8 +352,8 @@ TEST(Stream, AClientThatDoesNotReadIsEnded) {
   Daemon daemon({.max_queued_answers = 100});
   Client client(daemon.scene());
   client.Open();
-  // Each commit is answered; none is read, until flow control stops the answers and the queue
-  // fills.
+  // Each commit is answered; none is read,
+  // until flow control stops the answers and the queue fills.
   int sent = 0;
   while (client.Commit(1) && sent < 1'000'000) ++sent;
   EXPECT_LT(sent, 1'000'000);

@@ -1,5 +1,5 @@
-// The voxlink driver with its device at the other end of an in-process cable, in one thread, on a
-// fake clock.
+// The voxlink driver with its device at the other end of an in-process cable,
+// in one thread, on a fake clock.
 
 #include <algorithm>
 #include <map>

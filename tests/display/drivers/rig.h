@@ -38,8 +38,8 @@ struct Recorder final : Display::Listener {
 class FrameSource {
  public:
   FrameSource(const FrameLayout& layout, uint32_t seed);
-  // The next volume, in which each picture changes with probability `share`, at least one if it is
-  // above 0.
+  // The next volume, in which each picture changes with probability `share`,
+  // at least one if it is above 0.
   SliceFramePtr Next(double share);
   std::mt19937& random() { return random_; }
 
@@ -64,8 +64,8 @@ class Rig {
   void Start();
   // Lets device and driver do what is due now, until nothing is left.
   void Settle();
-  // Moves time to what is due next, step by step, until `done` or for `limit`. False: it was not
-  // done.
+  // Moves time to what is due next, step by step, until `done` or for `limit`.
+  // False: it was not done.
   bool RunUntil(const std::function<bool()>& done, sync::TimeNs limit = 10 * sync::kSecond);
   void RunFor(sync::TimeNs duration);
   // Until the volume has its outcome.

@@ -1,6 +1,6 @@
 // Random frames over a cable with random faults: what is seen is always one submitted volume,
-// whole; every volume has exactly one outcome, and it is true; when the faults are over, the newest
-// volume is seen.
+// whole; every volume has exactly one outcome, and it is true; when the faults are over,
+// the newest volume is seen.
 
 #include <map>
 #include <ostream>

@@ -1,5 +1,5 @@
-// A device model on a test's desk: requests and packets by hand, events and completions written
-// down.
+// A device model on a test's desk: requests and packets by hand,
+// events and completions written down.
 #pragma once
 
 #include <cstdint>

@@ -99,8 +99,8 @@ TEST(PlanarStackTest, ListedPositionsStandForTheirSlabs) {
   geometry.grid = {1, 1, 12, {1, 1, 1}, {-0.5, -0.5, -1}};  // voxel k is [k − 1, k)
   const FootprintTable table = BuildFootprints(geometry, Sampling::kMax);
   EXPECT_THAT(ReadFootprint(table, 0, 0, 0), ElementsAre(Voxel(0, 0, 1), Voxel(0, 0, 2)));
-  // The middle of voxel 3 is 2.5; that of voxel 4, 3.5, is the next slice's, but the slice lies in
-  // it.
+  // The middle of voxel 3 is 2.5; that of voxel 4, 3.5, is the next slice's,
+  // but the slice lies in it.
   EXPECT_THAT(ReadFootprint(table, 1, 0, 0), ElementsAre(Voxel(0, 0, 3), Voxel(0, 0, 4)));
   EXPECT_THAT(ReadFootprint(table, 2, 0, 0),
               ElementsAre(Voxel(0, 0, 4), Voxel(0, 0, 5), Voxel(0, 0, 6)));

@@ -141,8 +141,8 @@ class SweptRotor : public SweptSolid {
     bool near = std::abs(rho - std::hypot(u.low, e)) < slack_ ||
                 std::abs(rho - std::hypot(u.high, e)) < slack_ ||
                 std::abs(point.z - v.low) < slack_z_ || std::abs(point.z - v.high) < slack_z_;
-    // The cylinder that the plane touches bounds the solid, unless it is the axis, within the
-    // panel.
+    // The cylinder that the plane touches bounds the solid,
+    // unless it is the axis, within the panel.
     if (e > 0 || u.low >= 0 || u.high <= 0) near = near || std::abs(rho - e) < slack_;
     if (near) return Where::kNearBoundary;
     if (rho < e || point.z < v.low || point.z > v.high) return Where::kOutside;

@@ -27,17 +27,17 @@ class SweptSolid {
   // Does `point` lie in the solid that all pixels' rectangles sweep together?
   virtual Where Locate(const Vec3& point) const = 0;
 
-  // The pixels whose rectangle passes `point`, but for those for which it is nearer than the margin
-  // to a boundary.
+  // The pixels whose rectangle passes `point`,
+  // but for those for which it is nearer than the margin to a boundary.
   virtual std::vector<PixelId> Passing(const Vec3& point) const = 0;
 
   // The middle of a pixel.
   virtual Vec3 Centre(const PixelId& pixel) const = 0;
 
-  // Could an entry of the outer list of (slice, u), or of the inner list of (slice, v), stand
-  // there: does the pixel's rectangle pass its voxel's centre, or the voxel hold the pixel's
-  // centre, give or take the margin? With `reach` 2 the rectangle sweeps to the neighbouring
-  // slices' middles.
+  // Could an entry of the outer list of (slice, u), or of the inner list of (slice, v),
+  // stand there: does the pixel's rectangle pass its voxel's centre, or the voxel hold
+  // the pixel's centre, give or take the margin? With `reach` 2 the rectangle sweeps
+  // to the neighbouring slices' middles.
   virtual bool MayShowOuter(int32_t slice, int32_t u, const FootprintEntry& entry,
                             int reach) const = 0;
   virtual bool MayShowInner(int32_t slice, int32_t v, const FootprintEntry& entry) const = 0;

@@ -1,5 +1,5 @@
-// Surfaces keep what is inside in: no path of face steps crosses a THIN one, no path at all a COVER
-// one.
+// Surfaces keep what is inside in: no path of face steps crosses a THIN one,
+// no path at all a COVER one.
 #include <gtest/gtest.h>
 
 #include <algorithm>

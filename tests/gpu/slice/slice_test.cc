@@ -104,8 +104,8 @@ TEST(Weight, RoundsAsTheDefinitionSays) {
   EXPECT_EQ(RaiseWeighted(0x10FF00, 128, 0xFF0002), 0x80FF01u);
 }
 
-// One slice, two pixels wide, two high. Pixel (0, ·) sees x = 1 and 17 (in the next tile), pixel
-// (1, ·) nothing lit; rows see z = 0 alone, and z = 0 and 1.
+// One slice, two pixels wide, two high. Pixel (0, ·) sees x = 1 and 17 (in the next tile),
+// pixel (1, ·) nothing lit; rows see z = 0 alone, and z = 0 and 1.
 display::FootprintTable HandTable() {
   display::FootprintTable table;
   table.slices = 1;
@@ -151,8 +151,8 @@ TEST(Sampler, MaxTakesTheGreatestWordOfTheFootprint) {
   EXPECT_EQ(other.rgb, (std::vector<uint32_t>{0xFF0000, 0, 0x808080, 0}));
 }
 
-// Green at half weight: 128; grey above at (128·64 + 127)/255 = 32, of 0x80: (32·128 + 127)/255
-// = 16.
+// Green at half weight: 128;
+// grey above at (128·64 + 127)/255 = 32, of 0x80: (32·128 + 127)/255 = 16.
 TEST(Sampler, WeightedTakesTheGreatestOfEachChannel) {
   const SlicePixels pixels =
       Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kWeighted);

@@ -1,5 +1,5 @@
-// A server with just enough of both services: it keeps what it is sent, and can be told to
-// misbehave.
+// A server with just enough of both services: it keeps what it is sent,
+// and can be told to misbehave.
 #pragma once
 
 #include <grpcpp/server.h>

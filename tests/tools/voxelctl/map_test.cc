@@ -151,10 +151,8 @@ TEST(WorldAtlas, CountriesOnTheGlobe) {
   EXPECT_GT(part.positions.size(), 80000u);
   double longest = 0;
   for (const auto& [a, b] : Segments(part)) longest = std::max(longest, Distance(a, b));
-  EXPECT_LT(
-      longest,
-      2 * std::sin(1.5 * M_PI /
-                   180));  // no chord through the Earth: each edge has 2° a coordinate at most
+  // No chord through the Earth: each edge has 2° a coordinate at most.
+  EXPECT_LT(longest, 2 * std::sin(1.5 * M_PI / 180));
   // Some point of Africa's west coast, Dakar (14.7 N, 17.5 W), is near, in front and to the left.
   const Point3 dakar = {std::cos(14.7 * M_PI / 180) * std::sin(-17.5 * M_PI / 180),
                         -std::cos(14.7 * M_PI / 180) * std::cos(17.5 * M_PI / 180),

@@ -46,8 +46,8 @@ Point3 Farthest(const Model& model, const std::function<double(const Point3&)>& 
 
 // ------------------------------------------------------------------------------ which way up
 
-// The arrow has three points: 3, 2 and 1 from its corner. Where each of them goes, by the axis that
-// is up.
+// The arrow has three points: 3, 2 and 1 from its corner.
+// Where each of them goes, by the axis that is up.
 struct Turned {
   const char* file;
   Up up;

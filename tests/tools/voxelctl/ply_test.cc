@@ -170,8 +170,8 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(PlyPoints, SaysWhenACopyAsTextHasDamagedIt) {
   TempFolder folder;
-  // 200 line feeds by chance in what ought to be binary, none after a carriage return, and some
-  // bytes missing.
+  // 200 line feeds by chance in what ought to be binary, none after a carriage return,
+  // and some bytes missing.
   std::string data;
   for (int i = 0; i < 200; ++i) {
     data += '\n';

@@ -93,8 +93,8 @@ class Parser {
     ParsedCommandLine result;
     try {
       CheckCommand(arguments);
-      // What follows -- is no option whatever it looks like; CLI11 would hand it to the parent
-      // command.
+      // What follows -- is no option whatever it looks like;
+      // CLI11 would hand it to the parent command.
       const auto end = std::find(arguments.begin(), arguments.end(), "--");
       if (end != arguments.end()) plain_.assign(end + 1, arguments.end());
       // CLI11 takes them from the back.

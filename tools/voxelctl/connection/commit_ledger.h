@@ -1,5 +1,5 @@
-// The book of one stream's commits: what was sent, what was answered, what is still owed. Knows no
-// gRPC.
+// The book of one stream's commits: what was sent, what was answered, what is still owed.
+// Knows no gRPC.
 #pragma once
 
 #include <cstdint>

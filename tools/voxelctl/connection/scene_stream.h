@@ -62,8 +62,8 @@ class SceneStream {
   // From sending a commit to hearing that it is shown, the last 65,536 of them in no order.
   virtual std::vector<int64_t> latencies_ns() const = 0;
 
-  // Half-closes, reads to the end, and tells how the stream ended; cancels it if that takes over 5
-  // s.
+  // Half-closes, reads to the end, and tells how the stream ended;
+  // cancels it if that takes over 5 s.
   virtual absl::Status Close() = 0;
 };
 

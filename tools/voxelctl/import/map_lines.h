@@ -29,9 +29,9 @@ class MapLines {
   // `file` must outlive it.
   MapLines(const SourceFile& file, bool globe) : file_(file), globe_(globe) {}
 
-  // One strip, or a loop if `closed`: its last point goes on to its first. InvalidArgument if a
-  // coordinate is not finite, or no longitude and latitude on a globe, or the model becomes too
-  // large.
+  // One strip, or a loop if `closed`: its last point goes on to its first.
+  // InvalidArgument if a coordinate is not finite, or no longitude and latitude on a globe,
+  // or the model becomes too large.
   absl::Status AddLine(std::span<const LonLat> line, bool closed);
   absl::Status AddPoint(LonLat point);
 

@@ -7,16 +7,16 @@
 
 namespace voxeld::voxelctl {
 
-// Wavefront OBJ: is text, has vertices, and no face, line or point refers to a vertex that is not
-// there.
+// Wavefront OBJ: is text, has vertices, and no face, line or point
+// refers to a vertex that is not there.
 absl::Status CheckObj(const SourceFile& file);
 
 // STL, ASCII or binary: the facets that it announces are there.
 absl::Status CheckStl(const SourceFile& file);
 
-// glTF text or GLB: well-formed, nested less than 64 deep; nodes form a forest; accessors lie
-// within their views, views within their buffers; extensions that it requires are ones that can be
-// read.
+// glTF text or GLB: well-formed, nested less than 64 deep; nodes form a forest;
+// accessors lie within their views, views within their buffers;
+// extensions that it requires are ones that can be read.
 absl::Status CheckGltf(const SourceFile& file);
 
 }  // namespace voxeld::voxelctl

@@ -26,8 +26,8 @@ struct Part {
   std::vector<Point3> positions;
   std::vector<Point3> normals;  // of unit length, or zero where there is none
   std::vector<Rgb> colors;
-  std::vector<uint32_t>
-      indices;  // two a segment, three a triangle; none for points; all < positions.size()
+  // Two a segment, three a triangle; none for points; all < positions.size().
+  std::vector<uint32_t> indices;
 };
 
 // Which of the file's axes points up. The smallest turn that brings it to +z is applied: +y up

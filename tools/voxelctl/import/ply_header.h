@@ -1,5 +1,5 @@
-// The header of a PLY file, checked against the file's size. (Greg Turk, "The PLY Polygon File
-// Format", 1994.)
+// The header of a PLY file, checked against the file's size.
+// (Greg Turk, "The PLY Polygon File Format", 1994.)
 #pragma once
 
 #include <cstdint>

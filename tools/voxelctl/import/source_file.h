@@ -22,8 +22,8 @@ struct SourceFile {
 // kMaxFileBytes); the message begins with the path.
 absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path);
 
-// What the bytes look like: "a PNG picture", "JSON text", "text that begins with \"hello\"",
-// "binary data".
+// What the bytes look like: "a PNG picture", "JSON text",
+// "text that begins with \"hello\"", "binary data".
 std::string DescribeContents(absl::string_view bytes);
 
 // For binary contents that are too short: a clause that says so if every CR LF was turned into LF

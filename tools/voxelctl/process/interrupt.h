@@ -31,9 +31,9 @@ class Interrupt {
   // Until it is requested or `deadline` (of `clock`) has come. True: it was requested.
   bool WaitUntil(sync::Clock& clock, sync::TimeNs deadline) VOXELD_EXCLUDES(mutex_);
 
-  // `listener` is called at the first request, on whatever thread makes it, or at once if that has
-  // been. It must not call back into this object. RemoveListener returns when no call of it is in
-  // progress.
+  // `listener` is called at the first request, on whatever thread makes it, or at once
+  // if that has been. It must not call back into this object.
+  // RemoveListener returns when no call of it is in progress.
   int AddListener(std::function<void()> listener) VOXELD_EXCLUDES(mutex_);
   void RemoveListener(int id) VOXELD_EXCLUDES(mutex_);
 

@@ -8,8 +8,8 @@
 namespace voxeld::voxelctl {
 
 struct ViewAngles {
-  // The viewer stands in front (towards −y) at 0 and walks to the right, counter-clockwise seen
-  // from above.
+  // The viewer stands in front (towards −y) at 0 and walks to the right,
+  // counter-clockwise seen from above.
   double azimuth_degrees = 24;
   double elevation_degrees = 20;  // above the horizon, −89 to 89
 };
@@ -17,9 +17,9 @@ struct ViewAngles {
 // A pinhole. Camera space: x to the right, y up, z away from the viewer.
 class Camera {
  public:
-  // Looks at the middle of `outline` from a distance in proportion to its size, so near that depth
-  // can be told, and frames all of it in width·height elements with a margin. `outline` is not
-  // empty.
+  // Looks at the middle of `outline` from a distance in proportion to its size,
+  // so near that depth can be told, and frames all of it in width·height elements
+  // with a margin. `outline` is not empty.
   Camera(const ViewAngles& angles, std::span<const display::Vec3> outline, int width, int height);
 
   display::Vec3 ToCamera(const display::Vec3& point) const;

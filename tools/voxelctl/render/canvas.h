@@ -26,12 +26,12 @@ class Canvas {
  public:
   Canvas(int width, int height);
 
-  // The nearest splat of a pixel is its surface; each adds to the glow, with a soft edge, by
-  // `weight`.
+  // The nearest splat of a pixel is its surface; each adds to the glow,
+  // with a soft edge, by `weight`.
   void Splat(const Ellipse& shape, float depth, const Light& light, float weight);
 
-  // `thickness` elements wide, over what lies behind; where a surface is nearer it shines through
-  // faintly.
+  // `thickness` elements wide, over what lies behind;
+  // where a surface is nearer it shines through faintly.
   void Line(double x0, double y0, float depth0, double x1, double y1, float depth1,
             double thickness, const Light& light);
 

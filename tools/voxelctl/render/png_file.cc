@@ -20,8 +20,8 @@ absl::Status SystemError(const std::string& path, const char* what) {
   return absl::PermissionDeniedError(absl::StrCat(path, ": ", what, ": ", std::strerror(error)));
 }
 
-// A new file beside `path`, with the permissions that any new file of the user's has; −1 and errno
-// if none.
+// A new file beside `path`, with the permissions that any new file of the user's has;
+// −1 and errno if none.
 int OpenTemporary(const std::string& path, std::string* temporary) {
   for (int attempt = 0; attempt < 100; ++attempt) {
     *temporary = absl::StrCat(path, ".", ::getpid(), ".", attempt, ".tmp");

@@ -93,8 +93,8 @@ class Painter {
     const display::Geometry& geometry = volume_.geometry;
     const Vec3 base = display::PixelPosition(geometry, slice, u, 0);
     const int32_t beside = Neighbour(geometry, slice, volume_.slices);
-    std::array<Vec3, 3> axes =
-        {};  // half the way to the next pixel along u, along v, and to the next slice
+    // Half the way to the next pixel along u, along v, and to the next slice.
+    std::array<Vec3, 3> axes = {};
     if (volume_.width > 1) {
       const int32_t next = u + 1 < volume_.width ? u + 1 : u - 1;
       axes[0] = Times(Minus(display::PixelPosition(geometry, slice, next, 0), base), 0.5);

@@ -27,8 +27,8 @@ DisplaySpace Intersection(const DisplaySpace& a, const DisplaySpace& b);
 struct PlacementOptions {
   Up up = Up::kAuto;  // kAuto: each format's own
   bool spin = false;  // leaves room to turn about the vertical axis
-  bool each = false;  // every model is fitted by itself; otherwise all share one space, as parts of
-                      // one thing
+  // Every model is fitted by itself; otherwise all share one space, as parts of one thing.
+  bool each = false;
 };
 
 // Turns, centres and scales the models' vertices in place, so that moved to space.center (and

@@ -7,9 +7,9 @@
 
 namespace voxeld::voxelctl {
 
-// Field names as in the .proto file; every field that has a value or a default, unset messages and
-// oneofs left out; 64-bit integers as numbers, enums by name, bytes in base64, what is not finite
-// as null.
+// Field names as in the .proto file; every field that has a value or a default,
+// unset messages and oneofs left out; 64-bit integers as numbers, enums by name,
+// bytes in base64, what is not finite as null.
 nlohmann::ordered_json ToJson(const google::protobuf::Message& message);
 
 // As a document on lines of its own; text that is not UTF-8 is replaced.
