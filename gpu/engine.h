@@ -56,8 +56,9 @@ struct EngineOptions {
   EngineKind kind = EngineKind::kAuto;
   int threads = 0;                // worker threads of the CPU engine; 0: one a core
   bool inline_execution = false;  // every call finishes before it returns, in the caller's thread
+  int device = 0;                 // of the CUDA engine
   SlicePart part;
-  uint64_t staging_limit_bytes = uint64_t{1} << 30;  // held in staging and retained geometry
+  uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
 };
 
 struct EngineInfo {

@@ -41,7 +41,7 @@ struct ServerConfig {
 struct EngineConfig {
   gpu::EngineKind kind = gpu::EngineKind::kAuto;
   uint32_t threads = 0;  // 0: one a core
-  uint64_t staging_limit_bytes = uint64_t{1} << 30;
+  uint64_t staging_limit_bytes = uint64_t{4} << 30;
 };
 
 struct LogConfig {

@@ -54,7 +54,7 @@ struct Limits {
   // Of all owners together, those who have gone included.
   uint64_t max_entities = 16'000'000;
   uint64_t max_layers = 65'536;
-  uint64_t max_scene_bytes = uint64_t{8} << 30;
+  uint64_t max_scene_bytes = uint64_t{2} << 30;
   uint64_t max_vertices_per_entity = 16u << 20;
   uint64_t max_indices_per_entity = 48u << 20;
   uint32_t max_id_bytes = 256;

@@ -120,6 +120,19 @@ class TileToSlices {
   // True if some slice of [begin, end) may show a voxel of tile (i, j, k).
   bool Visible(int32_t i, int32_t j, int32_t k, int32_t begin, int32_t end) const;
 
+  // The same as flat tables, for machines: slice s of slices[begin[p] .. begin[p+1]) looks at tile t
+  // if p = Σ stride·t and seen[(s % inner_sets)·inner_tiles + t along the inner axis] ≠ 0.
+  struct Tables {
+    int32_t stride[3];
+    Axis inner_axis;
+    int32_t inner_sets;
+    int32_t inner_tiles;
+    std::span<const uint32_t> begin;
+    std::span<const int32_t> slices;
+    std::span<const uint8_t> seen;
+  };
+  Tables tables() const;
+
  private:
   // A tile's place on the plane of the outer axes, and along the inner one.
   struct Place {

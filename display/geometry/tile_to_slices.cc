@@ -68,6 +68,17 @@ TileToSlices::TileToSlices(const FootprintTable& table, const VoxelGrid& grid, i
   for (const auto& [place, slice] : seen) slices_[next[place]++] = slice;
 }
 
+TileToSlices::Tables TileToSlices::tables() const {
+  const OuterPlane plane = PlaneOf(inner_axis_, tiles_x_, tiles_y_);
+  return {{plane.stride_x, plane.stride_y, plane.stride_z},
+          inner_axis_,
+          inner_sets_,
+          Along(inner_axis_, tiles_x_, tiles_y_, tiles_z_),
+          begin_,
+          slices_,
+          inner_seen_};
+}
+
 TileToSlices::Place TileToSlices::PlaceOf(int32_t i, int32_t j, int32_t k) const {
   const OuterPlane plane = PlaneOf(inner_axis_, tiles_x_, tiles_y_);
   return {static_cast<size_t>(i) * static_cast<size_t>(plane.stride_x) +

@@ -1,11 +1,34 @@
 #include "gpu/assemble/scene.h"
 
 #include <algorithm>
+#include <cstring>
+#include <type_traits>
 #include <utility>
 
 #include "gpu/assemble/delta_plan.h"
 
 namespace voxeld::gpu {
+
+RetainedGeometry SceneObserver::Retain(const GeometryView& view) {
+  const size_t positions = view.positions.size_bytes(), indices = view.indices.size_bytes(),
+               colors = view.colors.size_bytes();
+  RetainedGeometry kept{view, nullptr};
+  if (positions + indices + colors == 0) return kept;
+  std::shared_ptr<std::byte[]> memory =
+      std::make_shared_for_overwrite<std::byte[]>(positions + indices + colors);
+  std::byte* at = memory.get();
+  const auto copy = [&at](auto& array) {
+    using Value = typename std::remove_reference_t<decltype(array)>::element_type;
+    std::memcpy(at, array.data(), array.size_bytes());
+    array = {reinterpret_cast<Value*>(at), array.size()};
+    at += array.size_bytes();
+  };
+  copy(kept.view.positions);
+  if (indices > 0) copy(kept.view.indices);
+  if (colors > 0) copy(kept.view.colors);
+  kept.memory = std::move(memory);
+  return kept;
+}
 
 int64_t Scene::GeometryUses(uint64_t id) const {
   const auto it = geometries_.find(id);
@@ -22,14 +45,9 @@ const Drawable* Scene::FindDrawable(uint64_t id) const {
   return it == drawables_.end() ? nullptr : it->second.get();
 }
 
-void Scene::PutGeometry(const GeometryView& view,
-                        const std::shared_ptr<StagingBlock::Memory>& block,
-                        SceneObserver& observer) {
-  auto geometry = std::make_shared<RetainedGeometry>();
-  geometry->view = view;
-  if (!view.positions.empty()) geometry->block = block;
+void Scene::PutGeometry(const GeometryView& view, SceneObserver& observer) {
   GeometryEntry& entry = geometries_[view.record.id];
-  entry.geometry = std::move(geometry);
+  entry.geometry = std::make_shared<const RetainedGeometry>(observer.Retain(view));
   // Only after a drop in the same delta can it have users already.
   for (Drawable* drawable : entry.users) {
     observer.OnLeave(*drawable);
@@ -93,11 +111,11 @@ void Scene::RankLayers() {
   for (size_t i = 0; i < layers.size(); ++i) layers[i]->rank = static_cast<int>(i);
 }
 
-absl::Status Scene::Apply(std::span<const std::byte> delta,
-                          const std::shared_ptr<StagingBlock::Memory>& block,
-                          SceneObserver& observer, std::vector<std::unique_ptr<Drawable>>& gone) {
+absl::Status Scene::Apply(std::span<const std::byte> delta, SceneObserver& observer,
+                          std::vector<std::unique_ptr<Drawable>>& gone) {
   absl::StatusOr<DeltaPlan> plan = PlanDelta(delta, *this);
   if (!plan.ok()) return plan.status();
+  if (absl::Status status = observer.OnPlan(*plan); !status.ok()) return status;
   // A record may name a geometry or layer that comes later in the delta.
   for (const DeltaStep& step : plan->steps) {
     if (std::holds_alternative<ResetStep>(step)) {
@@ -111,7 +129,7 @@ absl::Status Scene::Apply(std::span<const std::byte> delta,
       layers_.clear();
       geometries_.clear();
     } else if (const auto* geometry = std::get_if<GeometryView>(&step)) {
-      PutGeometry(*geometry, block, observer);
+      PutGeometry(*geometry, observer);
     } else if (const auto* layer = std::get_if<LayerRecord>(&step)) {
       PutLayer(*layer, observer);
     }

@@ -16,10 +16,10 @@
 
 namespace voxeld::gpu {
 
-// Immutable. Its arrays lie in the staging block in which they came, which it keeps.
+// Immutable.
 struct RetainedGeometry {
   GeometryView view;
-  std::shared_ptr<StagingBlock::Memory> block;  // none if there are no arrays
+  std::shared_ptr<void> memory;  // what its arrays lie in; none if there are none
 };
 
 struct Layer;
@@ -43,9 +43,16 @@ struct Layer {
   int rank = 0;  // in the order of combination
 };
 
+struct DeltaPlan;
+
 // Told of changes while a delta is applied, before they are made.
 struct SceneObserver {
   virtual ~SceneObserver() = default;
+  // The delta is in order. An error here refuses it whole.
+  virtual absl::Status OnPlan(const DeltaPlan&) { return absl::OkStatus(); }
+  // What is kept of a new geometry: a copy of its arrays, unless an engine has them elsewhere. The
+  // delta is gone after Apply.
+  virtual RetainedGeometry Retain(const GeometryView& view);
   // It goes, or what it is drawn from changes.
   virtual void OnLeave(Drawable& drawable) = 0;
   // It is new, or has changed (after OnLeave); `layer` and `geometry` are set.
@@ -57,14 +64,14 @@ struct SceneObserver {
 class Scene {
  public:
   // Applies a delta, all of it or, if it is malformed, nothing (InvalidArgument). Drawables that
-  // left and do not come back are moved to `gone`. `delta` lies in `block`.
-  absl::Status Apply(std::span<const std::byte> delta,
-                     const std::shared_ptr<StagingBlock::Memory>& block, SceneObserver& observer,
+  // left and do not come back are moved to `gone`.
+  absl::Status Apply(std::span<const std::byte> delta, SceneObserver& observer,
                      std::vector<std::unique_ptr<Drawable>>& gone);
 
   const absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>>& drawables() const {
     return drawables_;
   }
+  const absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>>& layers() const { return layers_; }
   // How many drawables use it; −1 if there is no such id.
   int64_t GeometryUses(uint64_t id) const;
   int64_t LayerUses(uint64_t id) const;
@@ -76,8 +83,7 @@ class Scene {
     absl::flat_hash_set<Drawable*> users;
   };
 
-  void PutGeometry(const GeometryView& view, const std::shared_ptr<StagingBlock::Memory>& block,
-                   SceneObserver& observer);
+  void PutGeometry(const GeometryView& view, SceneObserver& observer);
   void PutDrawable(const DrawableRecord& record, SceneObserver& observer);
   void PutLayer(const LayerRecord& record, SceneObserver& observer);
   std::unique_ptr<Drawable> TakeDrawable(uint64_t id, SceneObserver& observer);

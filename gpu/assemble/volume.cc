@@ -132,10 +132,9 @@ void Volume::TakeOutLeaving() {
   left_.clear();
 }
 
-absl::Status Volume::Apply(std::span<const std::byte> delta,
-                           const std::shared_ptr<StagingBlock::Memory>& block) {
+absl::Status Volume::Apply(std::span<const std::byte> delta) {
   std::vector<std::unique_ptr<Drawable>> gone;
-  absl::Status status = scene_.Apply(delta, block, *this, gone);
+  absl::Status status = scene_.Apply(delta, *this, gone);
   TakeOutLeaving();
   if (!gone.empty()) {
     std::erase_if(pending_, [](const Drawable* d) { return d->layer == nullptr; });

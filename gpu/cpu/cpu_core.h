@@ -26,7 +26,6 @@ class CpuCore {
   absl::Status ReadVoxels(VoxelBox box, std::span<uint32_t> out);
 
  private:
-  absl::Status CheckFrame(const FrameRequest& request, const FrameBuffer& buffer) const;
   void UpdateVolume();
 
   const std::unique_ptr<Executor> executor_;

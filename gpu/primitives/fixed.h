@@ -97,7 +97,13 @@ VOXELD_HD constexpr int32_t ToVoxel32(int64_t v) {
 }
 
 // IEEE, correctly rounded on both machines.
-VOXELD_HD inline double SquareRoot(double x) { return __builtin_sqrt(x); }
+VOXELD_HD inline double SquareRoot(double x) {
+#if defined(__CUDA_ARCH__)
+  return __dsqrt_rn(x);
+#else
+  return __builtin_sqrt(x);
+#endif
+}
 
 // ⌊√x⌋ for x ≥ 0.
 VOXELD_HD inline int64_t FloorSqrt(Wide x) {

@@ -23,7 +23,7 @@ namespace voxeld::gpu {
 
 // Calls f(std::type_identity<Primitive>{}) for the primitive of `kind`.
 template <class F>
-decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
+VOXELD_HD decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
   switch (kind) {
     case PrimitiveKind::kPoints:
       return f(std::type_identity<Points>{});

@@ -15,7 +15,8 @@ struct Points {
   VOXELD_HD static Line ItemOf(const Source& source, uint32_t i) {
     const uint32_t vertex = source.VertexOf(i);
     const uint32_t rgb = source.ColorOf(vertex);
-    return {source.vertices[vertex], source.vertices[vertex], rgb, rgb};
+    const Int3 at = source.Vertex(vertex);
+    return {at, at, rgb, rgb};
   }
 
   template <class Emit>

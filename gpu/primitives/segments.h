@@ -24,7 +24,7 @@ struct Segments {
     const uint32_t first = list ? i * 2 : i;
     const uint32_t second = first + 1 == source.corners() ? 0 : first + 1;
     const uint32_t a = source.VertexOf(first), b = source.VertexOf(second);
-    return {source.vertices[a], source.vertices[b], source.ColorOf(a), source.ColorOf(b),
+    return {source.Vertex(a), source.Vertex(b), source.ColorOf(a), source.ColorOf(b),
             source.record->sampling};
   }
 

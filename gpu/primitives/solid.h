@@ -8,7 +8,8 @@
 // for the rounding of q.)
 //
 // A voxel is inside if it lies in `bounds` (a little more than the shape's, in double; part of the
-// definition) and the shape's test of q holds; the voxel of the origin is always covered.
+// definition) and the shape's test of q holds. If that leaves out the voxel of the origin (of a shape
+// that misses every centre around it), it is covered all the same.
 #pragma once
 
 #include "gpu/affine.h"

@@ -18,28 +18,29 @@ struct SolidBlock {
   // at most kRows along each axis.
   template <class Shape>
   VOXELD_HD bool Fill(const Solid& s, const int64_t lo[3], const int64_t hi[3]) {
-    float dx[kRows];
-    for (int64_t x = lo[0]; x < hi[0]; ++x) dx[x - lo[0]] = s.Distance(0, x);
     uint32_t any = 0;
     for (int64_t z = lo[2]; z < hi[2]; ++z) {
-      const float dz = s.Distance(2, z);
-      for (int64_t y = lo[1]; y < hi[1]; ++y) {
-        uint32_t row = 0;
-        if (z >= s.bounds.lo[2] && z < s.bounds.hi[2] && y >= s.bounds.lo[1] &&
-            y < s.bounds.hi[1]) {
-          const float dy = s.Distance(1, y);
-          const int64_t x1 = Min<int64_t>(hi[0], s.bounds.hi[0]);
-          for (int64_t x = Max<int64_t>(lo[0], s.bounds.lo[0]); x < x1; ++x) {
-            float q[3];
-            s.Canonical(dx[x - lo[0]], dy, dz, q);
-            row |= static_cast<uint32_t>(Shape::Contains(q)) << (x - lo[0]);
-          }
-        }
-        bits[z - lo[2]][y - lo[1]] = row;
-        any |= row;
-      }
+      for (int64_t y = lo[1]; y < hi[1]; ++y) any |= FillRow<Shape>(s, lo, hi, y, z);
     }
     return any != 0;
+  }
+
+  // One row of it; any number of rows at once.
+  template <class Shape>
+  VOXELD_HD uint32_t FillRow(const Solid& s, const int64_t lo[3], const int64_t hi[3], int64_t y,
+                             int64_t z) {
+    uint32_t row = 0;
+    if (z >= s.bounds.lo[2] && z < s.bounds.hi[2] && y >= s.bounds.lo[1] && y < s.bounds.hi[1]) {
+      const float dy = s.Distance(1, y), dz = s.Distance(2, z);
+      const int64_t x1 = Min<int64_t>(hi[0], s.bounds.hi[0]);
+      for (int64_t x = Max<int64_t>(lo[0], s.bounds.lo[0]); x < x1; ++x) {
+        float q[3];
+        s.Canonical(s.Distance(0, x), dy, dz, q);
+        row |= static_cast<uint32_t>(Shape::Contains(q)) << (x - lo[0]);
+      }
+    }
+    bits[z - lo[2]][y - lo[1]] = row;
+    return row;
   }
 
   // Of row (y, z), the voxels whose neighbours are all inside.
@@ -97,7 +98,8 @@ struct SolidPrimitive {
   VOXELD_HD static void EmitVoxels(const Source& source, uint32_t, const Box3& box, Emit&& emit) {
     const Solid& s = source.solid;
     const uint32_t rgb = source.record->color & 0x00FFFFFF;
-    if (Contains(box, s.origin[0], s.origin[1], s.origin[2])) {
+    if (Contains(box, s.origin[0], s.origin[1], s.origin[2]) &&
+        !IsInside<Shape>(s, s.origin[0], s.origin[1], s.origin[2])) {
       emit(static_cast<int32_t>(s.origin[0]), static_cast<int32_t>(s.origin[1]),
            static_cast<int32_t>(s.origin[2]), rgb);
     }

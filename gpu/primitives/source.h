@@ -1,15 +1,31 @@
 // A drawable in voxel space, as flat arrays: what every primitive takes its items from.
 #pragma once
 
+#include <cstring>
+
 #include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/solid.h"
 
 namespace voxeld::gpu {
 
+VOXELD_HD inline Int3 SnapPoint(const Affine& map, const float* p) {
+  const Point3d q =
+      Map(map, static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+  Int3 r;
+  r[0] = Snap(q.x);
+  r[1] = Snap(q.y);
+  r[2] = Snap(q.z);
+  return r;
+}
+
 struct Source {
   const GeometryRecord* record = nullptr;
-  const Int3* vertices = nullptr;     // record->vertex_count, mapped and snapped
+  // record->vertex_count, mapped and snapped; null: made of `positions` by `map` as they are asked
+  // for.
+  const Int3* vertices = nullptr;
+  const float* positions = nullptr;
+  Affine map;                         // the geometry's coordinates → voxel space
   const uint32_t* indices = nullptr;  // record->index_count
   const uint32_t* colors = nullptr;   // record->vertex_count, with kPerVertex
   int64_t radius = 0;                 // of points and segments, units; 0: one voxel
@@ -21,6 +37,10 @@ struct Source {
   }
   VOXELD_HD uint32_t VertexOf(uint32_t corner) const {
     return record->index_count != 0 ? indices[corner] : corner;
+  }
+  VOXELD_HD Int3 Vertex(uint32_t vertex) const {
+    return vertices != nullptr ? vertices[vertex]
+                               : SnapPoint(map, positions + static_cast<size_t>(vertex) * 3);
   }
   VOXELD_HD uint32_t ColorOf(uint32_t vertex) const {
     return (record->color_mode == ColorMode::kPerVertex ? colors[vertex] : record->color) &
@@ -49,16 +69,6 @@ VOXELD_HD inline int64_t RadiusOf(const GeometryRecord& g, const Affine& map) {
     thickness = thickness * CubeRoot(det < 0 ? -det : det);
   }
   return Max<int64_t>(0, Snap(thickness / 2.0));
-}
-
-VOXELD_HD inline Int3 SnapPoint(const Affine& map, const float* p) {
-  const Point3d q =
-      Map(map, static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
-  Int3 r;
-  r[0] = Snap(q.x);
-  r[1] = Snap(q.y);
-  r[2] = Snap(q.z);
-  return r;
 }
 
 }  // namespace voxeld::gpu

@@ -45,7 +45,7 @@ struct Triangles {
     Triangle t;
     for (uint32_t corner = 0; corner < 3; ++corner) {
       const uint32_t vertex = source.VertexOf(i * 3 + corner);
-      t.v[corner] = source.vertices[vertex];
+      t.v[corner] = source.Vertex(vertex);
       t.color[corner] = source.ColorOf(vertex);
     }
     t.rule = source.record->rule;

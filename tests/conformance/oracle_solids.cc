@@ -92,7 +92,8 @@ void PlotSolid(const GeometryRecord& g, const Affine& map, const DenseVolume& gr
   OracleSolid s;
   if (!Set(g, map, s)) return;
   const uint32_t rgb = g.color & 0xFFFFFF;
-  if (grid.Has(s.origin[0], s.origin[1], s.origin[2])) {
+  const bool missed = !s.Inside(s.origin[0], s.origin[1], s.origin[2]);
+  if (missed && grid.Has(s.origin[0], s.origin[1], s.origin[2])) {
     plot(s.origin[0], s.origin[1], s.origin[2], rgb);
   }
   for (int64_t z = 0; z < grid.nz; ++z) {

@@ -4,9 +4,9 @@
 #include <atomic>
 #include <vector>
 
-#include "gpu/cpu/call_queue.h"
+#include "gpu/call_queue.h"
 #include "gpu/cpu/executor.h"
-#include "gpu/cpu/staging.h"
+#include "gpu/staging.h"
 
 namespace voxeld::gpu {
 namespace {

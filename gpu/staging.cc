@@ -1,4 +1,4 @@
-#include "gpu/cpu/staging.h"
+#include "gpu/staging.h"
 
 #include <new>
 #include <utility>
@@ -37,7 +37,7 @@ absl::StatusOr<StagingBlock> StagingPool::Acquire(size_t size) {
     if (size > limit_bytes_ || held > limit_bytes_ - size) {
       return absl::ResourceExhaustedError(absl::StrCat("staging: ", size, " bytes asked for, ",
                                                        held, " held, limit ", limit_bytes_,
-                                                       "; drop geometries or raise the limit"));
+                                                       "; send less at once or raise the limit"));
     }
   } while (!held_->compare_exchange_weak(held, held + size));
   void* data = ::operator new(size, kAlign, std::nothrow);

@@ -1,4 +1,4 @@
-#include "gpu/cpu/call_queue.h"
+#include "gpu/call_queue.h"
 
 #include <utility>
 

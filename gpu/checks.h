@@ -1,0 +1,35 @@
+// What every engine refuses alike: calls whose arguments do not hold together.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/engine.h"
+#include "gpu/primitives/grid.h"
+
+namespace voxeld::gpu {
+
+// InvalidArgument with the field, its value and what would be right.
+absl::Status CheckTarget(const Target& target, SlicePart part);
+
+// The first `size` bytes of `block`, if it has them.
+absl::StatusOr<std::span<std::byte>> CheckDelta(const StagingBlock& block, size_t size);
+
+// Which tiles the slices [begin, end) look at: 1 for each that they do.
+std::vector<uint8_t> OwnedTiles(const display::TileToSlices& tile_to_slices, const TileGrid& grid,
+                                int32_t begin, int32_t end);
+
+// `layout` is the target's; none: FailedPrecondition.
+absl::Status CheckFrame(const FrameRequest& request, const FrameBuffer& buffer,
+                        const std::optional<display::FrameLayout>& layout, uint64_t last_frame);
+absl::Status CheckBox(const VoxelBox& box, size_t out,
+                      const std::optional<display::FrameLayout>& layout);
+
+}  // namespace voxeld::gpu
