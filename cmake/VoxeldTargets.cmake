@@ -6,6 +6,10 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+# Programs find the libraries that tools/bundle puts beside them, and those find theirs (which the newer
+# tag, RUNPATH, would not do).
+set(CMAKE_BUILD_RPATH "$ORIGIN/../lib;$ORIGIN/../../lib")
+add_link_options(-Wl,--disable-new-dtags)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 
 if(NOT CMAKE_BUILD_TYPE)
@@ -74,7 +78,7 @@ function(voxeld_library name)
 endfunction()
 
 # voxeld_test(NAME LABELS … SOURCES … LINK …): an executable `NAME` in bin/tests; each of its cases is a
-# ctest test. LABELS: host (default), gpu, hil, e2e.
+# ctest test. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
 function(voxeld_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
@@ -87,6 +91,10 @@ function(voxeld_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} voxeld_options voxeld_warnings
                                         GTest::gmock GTest::gtest_main)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
-  gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+  set(prefix "${name}.")
+  if("gpu" IN_LIST ARG_LABELS)
+    set(prefix "gpu.${name}.")
+  endif()
+  gtest_discover_tests(${name} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
 endfunction()

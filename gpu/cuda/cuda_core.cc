@@ -1,0 +1,88 @@
+#include "gpu/cuda/cuda_core.h"
+
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "display/sync/clock.h"
+#include "gpu/checks.h"
+#include "gpu/cuda/kernels.h"
+#include "gpu/slice/sampler.h"
+
+namespace voxeld::gpu::cuda {
+
+CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part)
+    : device_(std::move(device)), part_(part), volume_(*device_) {}
+
+absl::Status CudaCore::SetTarget(const Target& target) {
+  if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
+  const display::VoxelGrid& voxels = target.geometry.grid;
+  const display::FootprintTable table =
+      display::BuildFootprints(target.geometry, target.tone.sampling);
+  const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz, Sampler::FastestAxis(table));
+  const display::TileToSlices tile_to_slices(table, voxels, kTileSize, kTileSize, kTileSize);
+  const int32_t end = part_.end == -1 ? target.layout.slices : part_.end;
+  absl::StatusOr<std::unique_ptr<CudaPictures>> pictures =
+      CudaPictures::Make(*device_, {target.layout, target.tone, part_.begin, end}, table,
+                         tile_to_slices, pictures_.get());
+  if (!pictures.ok()) return pictures.status();
+  absl::StatusOr<DeviceTiles> tiles =
+      DeviceTiles::Make(*device_, grid, OwnedTiles(tile_to_slices, grid, part_.begin, end));
+  if (!tiles.ok()) return tiles.status();
+  // The tables have been copied from memory that is about to go.
+  if (absl::Status status = device_->Wait(); !status.ok()) return status;
+  volume_.SetView(*std::move(tiles), target.view);
+  pictures_ = *std::move(pictures);
+  layout_ = target.layout;
+  return absl::OkStatus();
+}
+
+absl::Status CudaCore::Apply(const StagingBlock& block, size_t size) {
+  const absl::StatusOr<std::span<std::byte>> delta = CheckDelta(block, size);
+  if (!delta.ok()) return delta.status();
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
+  return volume_.Apply(*delta);
+}
+
+absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, FrameBuffer buffer) {
+  if (absl::Status status = CheckFrame(request, buffer, layout_, last_frame_); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
+  FrameResult result;
+  result.frame = request.frame;
+  const sync::SystemClock clock;
+  const sync::TimeNs start = clock.Now();
+  if (absl::Status status = volume_.Update(pictures_->index()); !status.ok()) return status;
+  if (absl::Status status = device_->Wait(); !status.ok()) return status;
+  const sync::TimeNs assembled = clock.Now();
+  absl::Status status =
+      pictures_->Draw(volume_.view(), request.frame, buffer, request.buffer_holds, result);
+  if (!status.ok()) return status;
+  result.singular_drawables = volume_.singular_drawables();
+  result.assemble_ns = assembled - start;
+  result.slice_ns = clock.Now() - assembled;
+  last_frame_ = request.frame;
+  return result;
+}
+
+absl::Status CudaCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
+  if (absl::Status status = CheckBox(box, out.size(), layout_); !status.ok()) return status;
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
+  if (absl::Status status = volume_.Update(pictures_->index()); !status.ok()) return status;
+  if (out.empty()) return device_->Wait();
+  const int32_t lo[3] = {box.x0, box.y0, box.z0};
+  const int32_t size[3] = {box.x1 - box.x0, box.y1 - box.y0, box.z1 - box.z0};
+  absl::StatusOr<Block> voxels = device_->pool().Acquire(out.size() * sizeof(uint32_t));
+  if (!voxels.ok()) return voxels.status();
+  absl::Status status = device_->Run("ReadBox", [&] {
+    return ReadBox(volume_.view(), lo, size, voxels->as<uint32_t>(), device_->stream());
+  });
+  if (status.ok()) {
+    status = device_->ToHost(out.data(), voxels->as<uint32_t>(), out.size() * sizeof(uint32_t));
+  }
+  return status.ok() ? device_->Wait() : status;
+}
+
+}  // namespace voxeld::gpu::cuda

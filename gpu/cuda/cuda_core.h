@@ -1,0 +1,37 @@
+// The CUDA engine's work, without its threads of control: what each call of gpu/engine.h does.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/cuda/cuda_pictures.h"
+#include "gpu/cuda/cuda_volume.h"
+#include "gpu/cuda/device.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu::cuda {
+
+// Thread-bound, but for where it was made. An error leaves it as it was, unless it is DataLoss.
+class CudaCore {
+ public:
+  CudaCore(std::unique_ptr<Device> device, SlicePart part);
+
+  absl::Status SetTarget(const Target& target);
+  absl::Status Apply(const StagingBlock& block, size_t size);
+  absl::StatusOr<FrameResult> SubmitFrame(const FrameRequest& request, FrameBuffer buffer);
+  absl::Status ReadVoxels(VoxelBox box, std::span<uint32_t> out);
+
+ private:
+  const std::unique_ptr<Device> device_;
+  const SlicePart part_;
+  std::optional<display::FrameLayout> layout_;  // the target's
+  CudaVolume volume_;
+  std::unique_ptr<CudaPictures> pictures_;
+  uint64_t last_frame_ = 0;
+};
+
+}  // namespace voxeld::gpu::cuda

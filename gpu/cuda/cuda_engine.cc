@@ -1,0 +1,22 @@
+#include "gpu/cuda/cuda_engine.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "gpu/core_engine.h"
+#include "gpu/cuda/cuda_core.h"
+
+namespace voxeld::gpu {
+
+absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& options,
+                                                         std::string reason,
+                                                         const cuda::FaultPlan& faults) {
+  absl::StatusOr<std::unique_ptr<cuda::Device>> device = cuda::Device::Open(options.device);
+  if (!device.ok()) return device.status();
+  (*device)->api().SetFaults(faults);
+  const EngineInfo info = {EngineKind::kCuda, (*device)->api().device().name, std::move(reason)};
+  auto core = std::make_unique<cuda::CudaCore>(*std::move(device), options.part);
+  return std::make_unique<CoreEngine<cuda::CudaCore>>(options, info, std::move(core));
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,18 @@
+// The engine on a CUDA device, in this process.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "gpu/cuda/api.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu {
+
+// `reason`: for EngineInfo. FailedPrecondition if there is no device that can be used.
+absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& options,
+                                                         std::string reason,
+                                                         const cuda::FaultPlan& faults = {});
+
+}  // namespace voxeld::gpu

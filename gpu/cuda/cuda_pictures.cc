@@ -1,0 +1,208 @@
+#include "gpu/cuda/cuda_pictures.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "gpu/cuda/kernels.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+// Slices are drawn in so many groups, so that one's pictures are on their way while the next is
+// drawn.
+constexpr size_t kGroups = 4;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CudaPictures>> CudaPictures::Make(
+    Device& device, const PicturesPlan& plan, const display::FootprintTable& table,
+    const display::TileToSlices& tile_to_slices, const CudaPictures* before) {
+  std::unique_ptr<CudaPictures> made(new CudaPictures(device, plan));
+  if (absl::Status status = made->PutTables(table, tile_to_slices); !status.ok()) return status;
+  if (absl::Status status = made->PutPictures(before); !status.ok()) return status;
+  return made;
+}
+
+CudaPictures::~CudaPictures() {
+  for (cudaEvent_t event : events_) cudaEventDestroy(event);
+  if (numbers_ != nullptr) cudaFreeHost(numbers_);
+  if (counters_ != nullptr) cudaFreeHost(counters_);
+}
+
+absl::Status CudaPictures::PutTables(const display::FootprintTable& table,
+                                     const display::TileToSlices& tile_to_slices) {
+  absl::Status status;
+  const auto put = [&](const auto* data, size_t count) {
+    using Value = std::remove_cvref_t<decltype(*data)>;
+    if (!status.ok()) return static_cast<const Value*>(nullptr);
+    absl::StatusOr<Block> block = device_.Upload(data, count);
+    if (!block.ok()) {
+      status = block.status();
+      return static_cast<const Value*>(nullptr);
+    }
+    tables_.push_back(*std::move(block));
+    return static_cast<const Value*>(tables_.back().as<Value>());
+  };
+  const display::TileToSlices::Tables tiles = tile_to_slices.tables();
+  for (int axis = 0; axis < 3; ++axis) {
+    index_.stride[axis] = static_cast<uint32_t>(tiles.stride[axis]);
+  }
+  index_.inner_axis = static_cast<uint32_t>(tiles.inner_axis);
+  index_.inner_sets = static_cast<uint32_t>(tiles.inner_sets);
+  index_.inner_tiles = static_cast<uint32_t>(tiles.inner_tiles);
+  index_.begin = put(tiles.begin.data(), tiles.begin.size());
+  index_.slices = put(tiles.slices.data(), tiles.slices.size());
+  index_.inner_seen = put(tiles.seen.data(), tiles.seen.size());
+  index_.first = plan_.begin;
+  index_.last = plan_.end;
+
+  view_.outer.begin = put(table.outer.begin.data(), table.outer.begin.size());
+  view_.outer.entries = put(table.outer.entries.data(), table.outer.entries.size());
+  view_.inner.begin = put(table.inner.begin.data(), table.inner.begin.size());
+  view_.inner.entries = put(table.inner.entries.data(), table.inner.entries.size());
+  view_.width = static_cast<uint32_t>(table.width);
+  view_.height = static_cast<uint32_t>(table.height);
+  view_.inner_sets = static_cast<uint32_t>(table.inner_sets);
+  view_.inner_axis = static_cast<uint32_t>(table.inner_axis);
+  for (const display::FootprintEntry& entry : table.inner.entries) {
+    view_.line = std::max<uint32_t>(view_.line, std::max({entry.x, entry.y, entry.z}) + 1u);
+  }
+  view_.sampling = plan_.tone.sampling;
+  view_.dither = plan_.tone.dither;
+  view_.format = plan_.layout.format;
+  view_.sub_frames = static_cast<uint32_t>(plan_.layout.sub_frames);
+  view_.bytes_per_picture = static_cast<uint32_t>(plan_.layout.bytes_per_slice());
+  view_.lut = put(plan_.tone.lut.data(), plan_.tone.lut.size());
+  return status;
+}
+
+absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
+  const size_t slices = static_cast<size_t>(plan_.end - plan_.begin);
+  const size_t pictures = slices * view_.sub_frames;
+  const std::vector<uint32_t> ones(slices, 1);
+  struct Wanted {
+    Block* block;
+    size_t bytes;
+    const Block* before;  // what it begins with, instead of zeros
+  };
+  const bool same = before != nullptr && before->plan_.layout == plan_.layout &&
+                    before->plan_.begin == plan_.begin && before->plan_.end == plan_.end;
+  for (const Wanted& wanted :
+       {Wanted{&lit_tiles_, slices * sizeof(uint32_t), nullptr},
+        {&differs_, pictures * sizeof(uint32_t), nullptr},
+        {&bytes_, pictures * view_.bytes_per_picture, same ? &before->bytes_ : nullptr},
+        {&changed_in_, pictures * sizeof(uint64_t), same ? &before->changed_in_ : nullptr},
+        {&blank_, slices * sizeof(uint32_t), same ? &before->blank_ : nullptr}}) {
+    absl::StatusOr<Block> block = device_.Zeros(wanted.bytes);
+    if (!block.ok()) return block.status();
+    *wanted.block = *std::move(block);
+    if (wanted.before == nullptr) continue;
+    absl::Status status = device_.Run("cudaMemcpyAsync", [&] {
+      return cudaMemcpyAsync(wanted.block->as<void>(), wanted.before->as<void>(), wanted.bytes,
+                             cudaMemcpyDeviceToDevice, device_.stream());
+    });
+    if (!status.ok()) return status;
+  }
+  absl::StatusOr<Block> dirty = device_.Upload(ones.data(), slices);
+  if (!dirty.ok()) return dirty.status();
+  dirty_ = *std::move(dirty);
+  if (!same) {
+    absl::Status status =
+        device_.ToDevice(blank_.as<uint32_t>(), ones.data(), slices * sizeof(uint32_t));
+    if (!status.ok()) return status;
+  }
+  index_.dirty = dirty_.as<uint32_t>();
+  index_.lit_tiles = lit_tiles_.as<uint32_t>();
+  view_.bytes = bytes_.as<uint8_t>();
+  view_.changed_in = changed_in_.as<uint64_t>();
+  view_.differs = differs_.as<uint32_t>();
+  view_.blank = blank_.as<uint32_t>();
+
+  absl::Status status = device_.Run("cudaHostAlloc", [&] {
+    return cudaHostAlloc(reinterpret_cast<void**>(&numbers_),
+                         std::max<size_t>(1, pictures) * sizeof(uint64_t), cudaHostAllocDefault);
+  });
+  if (!status.ok()) return status;
+  status = device_.Run("cudaHostAlloc", [&] {
+    return cudaHostAlloc(reinterpret_cast<void**>(&counters_), sizeof(Counters),
+                         cudaHostAllocDefault);
+  });
+  for (size_t i = 0; i < kGroups && status.ok(); ++i) {
+    cudaEvent_t event = nullptr;
+    status = device_.Run("cudaEventCreateWithFlags", [&] {
+      return cudaEventCreateWithFlags(&event, cudaEventDisableTiming | cudaEventBlockingSync);
+    });
+    if (status.ok()) events_.push_back(event);
+  }
+  return status;
+}
+
+// Pictures that are newer than what the buffer holds, in runs of neighbours.
+absl::Status CudaPictures::CopyPictures(size_t first, size_t count, FrameBuffer buffer,
+                                        uint64_t buffer_holds) {
+  const size_t size = view_.bytes_per_picture;
+  const size_t offset = static_cast<size_t>(plan_.begin) * view_.sub_frames;
+  std::copy_n(numbers_ + first, count,
+              buffer.changed_in.begin() + static_cast<ptrdiff_t>(offset + first));
+  for (size_t p = first; p < first + count;) {
+    if (numbers_[p] <= buffer_holds) {
+      ++p;
+      continue;
+    }
+    size_t end = p + 1;
+    while (end < first + count && numbers_[end] > buffer_holds) ++end;
+    absl::Status status = device_.Run("cudaMemcpyAsync", [&] {
+      return cudaMemcpyAsync(buffer.bytes.data() + (offset + p) * size, view_.bytes + p * size,
+                             (end - p) * size, cudaMemcpyDeviceToHost, device_.copies());
+    });
+    if (!status.ok()) return status;
+    p = end;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
+                                uint64_t buffer_holds, FrameResult& result) {
+  const size_t slices = static_cast<size_t>(plan_.end - plan_.begin);
+  const auto slice_of = [&](size_t group) { return group * slices / kGroups; };
+  for (size_t group = 0; group < kGroups; ++group) {
+    const size_t begin = slice_of(group), count = slice_of(group + 1) - begin;
+    if (count > 0) {
+      absl::Status status = device_.Run("DrawSlices", [&] {
+        return DrawSlices(volume, index_, view_, static_cast<uint32_t>(begin),
+                          static_cast<uint32_t>(count), frame, device_.stream());
+      });
+      if (!status.ok()) return status;
+      const size_t first = begin * view_.sub_frames;
+      status = device_.ToHost(numbers_ + first, view_.changed_in + first,
+                              count * view_.sub_frames * sizeof(uint64_t));
+      if (!status.ok()) return status;
+    }
+    if (group + 1 == kGroups) {
+      absl::Status status = device_.ToHost(counters_, volume.counters, sizeof(Counters));
+      if (!status.ok()) return status;
+    }
+    absl::Status status = device_.Run(
+        "cudaEventRecord", [&] { return cudaEventRecord(events_[group], device_.stream()); });
+    if (!status.ok()) return status;
+  }
+  for (size_t group = 0; group < kGroups; ++group) {
+    absl::Status status =
+        device_.Run("cudaEventSynchronize", [&] { return cudaEventSynchronize(events_[group]); });
+    if (!status.ok()) return status;
+    const size_t begin = slice_of(group) * view_.sub_frames;
+    status =
+        CopyPictures(begin, slice_of(group + 1) * view_.sub_frames - begin, buffer, buffer_holds);
+    if (!status.ok()) return status;
+  }
+  absl::Status status =
+      device_.Run("cudaStreamSynchronize", [&] { return cudaStreamSynchronize(device_.copies()); });
+  if (!status.ok()) return status;
+  result.tiles_drawn = counters_->tiles_drawn;
+  result.pictures_drawn = counters_->slices_drawn * view_.sub_frames;
+  result.changed = counters_->pictures_changed > 0;
+  result.lit_voxels = counters_->lit_voxels;
+  return device_.Zero(volume.counters, 3 * sizeof(uint32_t));
+}
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,63 @@
+// The packed pictures of the slices that an engine owns, on the device: footprints, tone, and since
+// which frame each picture has its bytes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/cuda/device.h"
+#include "gpu/cuda/types.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu::cuda {
+
+struct PicturesPlan {
+  display::FrameLayout layout;
+  display::Tone tone;
+  int32_t begin = 0, end = 0;  // the slices owned
+};
+
+// Thread-bound. Its calls queue work in the device's stream.
+class CudaPictures {
+ public:
+  // Everything is to be sliced anew. With the layout of `before` (may be null) pictures that come
+  // out the same keep the frame of their last change.
+  static absl::StatusOr<std::unique_ptr<CudaPictures>> Make(
+      Device& device, const PicturesPlan& plan, const display::FootprintTable& table,
+      const display::TileToSlices& tile_to_slices, const CudaPictures* before);
+  ~CudaPictures();
+  CudaPictures(const CudaPictures&) = delete;
+  CudaPictures& operator=(const CudaPictures&) = delete;
+
+  const SliceIndexView& index() const { return index_; }
+
+  // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
+  // all is there. `result` gets what was counted.
+  absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
+                    uint64_t buffer_holds, FrameResult& result);
+
+ private:
+  CudaPictures(Device& device, const PicturesPlan& plan) : device_(device), plan_(plan) {}
+  absl::Status PutTables(const display::FootprintTable& table,
+                         const display::TileToSlices& tile_to_slices);
+  absl::Status PutPictures(const CudaPictures* before);
+  absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);
+
+  Device& device_;
+  const PicturesPlan plan_;
+  SliceIndexView index_;
+  SliceView view_;
+  std::vector<Block> tables_;
+  Block dirty_, lit_tiles_, blank_, bytes_, changed_in_, differs_;
+  uint64_t* numbers_ = nullptr;   // pinned: changed_in as the host has it
+  Counters* counters_ = nullptr;  // pinned
+  std::vector<cudaEvent_t> events_;
+};
+
+}  // namespace voxeld::gpu::cuda

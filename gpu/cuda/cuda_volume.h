@@ -1,0 +1,106 @@
+// The voxel volume on the device: the scene's table of drawables, the index of what may lie in which
+// tile, and the drawing of the tiles that changed.
+//
+// The index is a few batches of pairs, each sorted by tile: a change adds a batch, batches of like
+// size are merged, and pairs of drawables that have gone are dropped on the way; so an index of n
+// pairs costs O(log n) a pair, and what has gone never costs more than what is there.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/affine.h"
+#include "gpu/assemble/scene.h"
+#include "gpu/cuda/device.h"
+#include "gpu/cuda/pair_index.h"
+#include "gpu/cuda/pool.h"
+#include "gpu/cuda/types.h"
+
+namespace voxeld::gpu::cuda {
+
+// The tiles of a target, dark and clean.
+struct DeviceTiles {
+  TileGrid grid;
+  Block owned, dirty, dirty_list, lit, colors, counters;
+  VolumeView view() const;
+
+  static absl::StatusOr<DeviceTiles> Make(Device& device, const TileGrid& grid,
+                                          std::span<const uint8_t> owned);
+};
+
+// Thread-bound. Its calls queue work in the device's stream. An error leaves the scene as it was,
+// and what could not be drawn is drawn with the next Update.
+class CudaVolume final : private SceneObserver {
+ public:
+  explicit CudaVolume(Device& device) : device_(device), index_(device) {}
+
+  // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
+  // fit the device.
+  absl::Status Apply(std::span<const std::byte> delta);
+
+  // Everything is to be drawn anew.
+  void SetView(DeviceTiles tiles, const Affine& view);
+
+  // Draws what is dirty; marks the slices that look at it.
+  absl::Status Update(const SliceIndexView& slices);
+
+  VolumeView view() const { return tiles_.view(); }
+  uint32_t singular_drawables() const { return singular_; }
+
+ private:
+  // What the host knows of a slot of the table.
+  struct Slot {
+    uint32_t items = 0;
+    bool singular = false;
+  };
+
+  absl::Status OnPlan(const DeltaPlan& plan) override;
+  RetainedGeometry Retain(const GeometryView& view) override;
+  void OnLeave(Drawable& drawable) override;
+  void OnEnter(Drawable& drawable) override;
+  void OnLayerLook(Layer& layer, const LayerRecord& next) override;
+
+  absl::Status PutLayers();
+  absl::Status MarkLeft();
+  absl::Status Enter();
+  absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
+  TableEntry EntryOf(const Drawable& drawable) const;
+  uint32_t TakeSlot();
+
+  Device& device_;
+  Scene scene_;
+  DeviceTiles tiles_;
+  Affine view_;
+  PairIndex index_;
+
+  Block table_;
+  std::vector<Slot> slots_;
+  std::vector<uint32_t> free_slots_;
+  std::vector<uint32_t> dead_slots_;  // not free before the index has forgotten them
+  uint64_t live_items_ = 0, dead_items_ = 0;
+  absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
+  absl::flat_hash_set<const Drawable*> pending_;
+
+  Block looks_;
+  std::vector<LayerLook> looks_now_, looks_there_;  // by slot; what the device has
+  absl::flat_hash_map<uint64_t, uint32_t> layer_slots_;
+  std::vector<uint32_t> free_layer_slots_;
+
+  std::vector<uint32_t> marks_;  // slots whose tiles are to be drawn anew
+  std::vector<uint32_t> left_;   // slots that have left
+  // Memory of geometries that have left, until their tiles are marked.
+  std::vector<std::shared_ptr<const RetainedGeometry>> kept_;
+
+  // The arrays of the delta under way: host addresses from `arrays_begin_` on lie at `arrays_`.
+  const std::byte* arrays_begin_ = nullptr;
+  std::shared_ptr<Block> arrays_;
+  uint32_t singular_ = 0;
+};
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,69 @@
+// What runs on the device. Each function queues its kernels in `stream` and answers whether that
+// could be done; what goes wrong in them shows at the next synchronisation.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gpu/cuda/types.h"
+
+namespace voxeld::gpu::cuda {
+
+// ---- the table (kernels_index.cu)
+// table[slots[i]] = entries[i].
+cudaError_t PutEntries(TableEntry* table, const TableEntry* entries, const uint32_t* slots,
+                       uint32_t count, cudaStream_t stream);
+// The table has moved: every record's address is set anew.
+cudaError_t Rebase(TableEntry* table, uint32_t count, cudaStream_t stream);
+cudaError_t Kill(TableEntry* table, const uint32_t* slots, uint32_t count, cudaStream_t stream);
+
+// ---- the index of tiles (kernels_index.cu)
+// Marks every owned tile that items of the list may touch.
+cudaError_t MarkTiles(const TableEntry* table, const ItemList& list, uint64_t items,
+                      const VolumeView& volume, cudaStream_t stream);
+// counts[i]: owned tiles that item `begin` + i may touch.
+cudaError_t CountTiles(const TableEntry* table, const ItemList& list, uint64_t begin,
+                       uint32_t items, const VolumeView& volume, uint32_t* counts,
+                       cudaStream_t stream);
+// offsets[i]: sum of counts[0..i), and of all at offsets[items]. `temp` null: only its size.
+cudaError_t SumCounts(void* temp, size_t& temp_bytes, const uint32_t* counts, uint64_t* offsets,
+                      uint32_t items, cudaStream_t stream);
+// The pairs themselves; marks the tiles of drawables in visible layers.
+cudaError_t FillPairs(const TableEntry* table, const LayerLook* layers, const ItemList& list,
+                      uint64_t begin, uint32_t items, const uint64_t* offsets,
+                      const VolumeView& volume, uint64_t* keys, uint64_t* values,
+                      cudaStream_t stream);
+// flags[i] is 1 if pair i is of a drawable that is alive; then they can be summed by SumCounts.
+cudaError_t FlagLive(const TableEntry* table, const uint64_t* values, uint32_t pairs,
+                     uint32_t* flags, cudaStream_t stream);
+// Those with a flag, to their places.
+cudaError_t PickLive(const uint64_t* keys, const uint64_t* values, const uint32_t* flags,
+                     const uint64_t* offsets, uint32_t pairs, uint64_t* keys_out,
+                     uint64_t* values_out, cudaStream_t stream);
+// Sorts by key; the result is in the arrays that `swapped` names (true: the second ones). `temp`
+// null: only its size.
+cudaError_t SortPairs(void* temp, size_t& temp_bytes, uint64_t* keys, uint64_t* keys2,
+                      uint64_t* values, uint64_t* values2, uint32_t pairs, int key_bits,
+                      bool& swapped, cudaStream_t stream);
+cudaError_t FindRows(const uint64_t* keys, uint32_t pairs, uint32_t tiles, uint32_t* row_begin,
+                     cudaStream_t stream);
+
+// ---- drawing (kernels_raster.cu)
+// Lists the dirty tiles, and they are clean.
+cudaError_t ListDirty(const VolumeView& volume, cudaStream_t stream);
+// Draws the tiles listed; marks the slices that look at those whose colours changed.
+cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers, const BatchList& batches,
+                      const VolumeView& volume, const SliceIndexView& slices, uint32_t blocks,
+                      cudaStream_t stream);
+cudaError_t ReadBox(const VolumeView& volume, const int32_t lo[3], const int32_t size[3],
+                    uint32_t* out, cudaStream_t stream);
+
+// ---- slicing (kernels_slice.cu)
+// Owned slices [begin, begin + count), those that are dirty; they are clean afterwards, and their
+// pictures carry `frame` if their bytes are not what they were.
+cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
+                       uint32_t begin, uint32_t count, uint64_t frame, cudaStream_t stream);
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,212 @@
+// The pictures of dirty slices: sampled through footprints, toned, dithered, packed, and compared
+// with what they were, in one pass.
+#include "gpu/cuda/kernels.h"
+#include "gpu/slice/pack.h"
+#include "gpu/slice/weight.h"
+#include "gpu/word.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+constexpr uint32_t kThreads = 256;
+constexpr uint32_t kColumns = 8;           // of a slice, to a block: the pixels of a byte of bits
+constexpr uint32_t kLineBytes = 48 << 10;  // of shared memory, for columns of voxels
+constexpr uint32_t kAll = 0xFFFFFFFFu;
+
+__device__ uint32_t ColorAt(const VolumeView& volume, int32_t x, int32_t y, int32_t z) {
+  const uint32_t tile = volume.grid.TileOf(x, y, z);
+  if (volume.lit[tile] == 0) return 0;
+  return volume.colors[static_cast<size_t>(tile) * kTileVoxels + volume.grid.IndexInTile(x, y, z)];
+}
+
+// The voxel `along` further on the inner axis.
+__device__ uint32_t ColorAlong(const VolumeView& volume, uint32_t axis,
+                               const display::FootprintEntry& outer, int32_t along) {
+  return ColorAt(volume, outer.x + (axis == 0 ? along : 0), outer.y + (axis == 1 ? along : 0),
+                 outer.z + (axis == 2 ? along : 0));
+}
+
+__device__ int32_t Along(uint32_t axis, const display::FootprintEntry& inner) {
+  return axis == 0 ? inner.x : axis == 1 ? inner.y : inner.z;
+}
+
+struct Rows {
+  const display::FootprintEntry* begin;
+  const display::FootprintEntry* end;
+};
+
+__device__ Rows OuterOf(const SliceView& view, uint32_t slice, uint32_t u) {
+  const uint32_t* row = view.outer.begin + static_cast<size_t>(slice) * view.width + u;
+  return {view.outer.entries + row[0], view.outer.entries + row[1]};
+}
+
+__device__ Rows InnerOf(const SliceView& view, uint32_t slice, uint32_t v) {
+  const uint32_t* row =
+      view.inner.begin + static_cast<size_t>(slice % view.inner_sets) * view.height + v;
+  return {view.inner.entries + row[0], view.inner.entries + row[1]};
+}
+
+// 0x00RRGGBB. The greatest of a product of lists is the greatest, over the inner list, of the
+// greatest over the outer: `line`, if there is one, has those.
+__device__ uint32_t SampleMax(const VolumeView& volume, const SliceView& view, uint32_t slice,
+                              uint32_t u, uint32_t v, const uint32_t* line) {
+  uint32_t greatest = 0;
+  const Rows inner = InnerOf(view, slice, v);
+  for (const display::FootprintEntry* i = inner.begin; i != inner.end; ++i) {
+    const int32_t along = Along(view.inner_axis, *i);
+    if (line != nullptr) {
+      greatest = Max(greatest, line[along]);
+      continue;
+    }
+    const Rows outer = OuterOf(view, slice, u);
+    for (const display::FootprintEntry* o = outer.begin; o != outer.end; ++o) {
+      greatest = Max(greatest, ColorAlong(volume, view.inner_axis, *o, along));
+    }
+  }
+  return Deinterleave(greatest);
+}
+
+__device__ uint32_t SampleWeighted(const VolumeView& volume, const SliceView& view, uint32_t slice,
+                                   uint32_t u, uint32_t v) {
+  uint32_t rgb = 0;
+  const Rows outer = OuterOf(view, slice, u), inner = InnerOf(view, slice, v);
+  for (const display::FootprintEntry* o = outer.begin; o != outer.end; ++o) {
+    for (const display::FootprintEntry* i = inner.begin; i != inner.end; ++i) {
+      const uint32_t color = ColorAlong(volume, view.inner_axis, *o, Along(view.inner_axis, *i));
+      if (color == 0) continue;
+      rgb = RaiseWeighted(rgb, FootprintWeight(o->weight, i->weight), Deinterleave(color));
+    }
+  }
+  return rgb;
+}
+
+// Writes a byte; true if it was another.
+__device__ bool PutByte(uint8_t* at, uint32_t value) {
+  if (*at == value) return false;
+  *at = static_cast<uint8_t>(value);
+  return true;
+}
+
+// A pixel's levels into its picture, by 8 neighbouring lanes at once (bit planes: a byte of each
+// plane is theirs together).
+__device__ bool PutPixel(const SliceView& view, uint32_t u, uint32_t v, bool inside, Levels q,
+                         uint8_t* picture) {
+  switch (view.format) {
+    case display::PixelFormat::kRgb888: {
+      if (!inside) return false;
+      uint8_t* at = picture + (static_cast<size_t>(v) * view.width + u) * 3;
+      bool differs = PutByte(at, q.r);
+      differs |= PutByte(at + 1, q.g);
+      differs |= PutByte(at + 2, q.b);
+      return differs;
+    }
+    case display::PixelFormat::kRgb332:
+      return inside &&
+             PutByte(picture + static_cast<size_t>(v) * view.width + u, q.r << 5 | q.g << 2 | q.b);
+    case display::PixelFormat::kBitPlanes3: {
+      const size_t row = (view.width + 7) / 8, plane = row * view.height;
+      const uint32_t first = threadIdx.x % 32 & ~7u;
+      bool differs = false;
+      const uint32_t levels[3] = {q.r, q.g, q.b};
+      for (size_t p = 0; p < 3; ++p) {
+        const uint32_t lanes = __ballot_sync(kAll, inside && levels[p] != 0);
+        const uint32_t byte = __brev(lanes >> first & 0xFF) >> 24;
+        if (inside && u % 8 == 0) differs |= PutByte(picture + p * plane + v * row + u / 8, byte);
+      }
+      return differs;
+    }
+  }
+  return false;
+}
+
+__global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceView view,
+                                 uint32_t begin, bool with_line) {
+  extern __shared__ uint32_t lines[];  // kColumns of view.line voxels
+  const uint32_t s = begin + blockIdx.y;
+  if (index.dirty[s] == 0) return;
+  const bool blank = index.lit_tiles[s] == 0;
+  if (blank && view.blank[s] != 0) return;
+  const uint32_t slice = static_cast<uint32_t>(index.first) + s;
+  const uint32_t u0 = blockIdx.x * kColumns;
+  if (with_line && !blank) {
+    for (uint32_t i = threadIdx.x; i < kColumns * view.line; i += kThreads) {
+      const uint32_t u = u0 + i / view.line;
+      uint32_t greatest = 0;
+      if (u < view.width) {
+        const Rows outer = OuterOf(view, slice, u);
+        for (const display::FootprintEntry* o = outer.begin; o != outer.end; ++o) {
+          greatest = Max(greatest, ColorAlong(volume, view.inner_axis, *o,
+                                              static_cast<int32_t>(i % view.line)));
+        }
+      }
+      lines[i] = greatest;
+    }
+    __syncthreads();
+  }
+  const Levels levels = LevelsOf(view.format);
+  const uint32_t pixels = kColumns * view.height;
+  for (uint32_t p = threadIdx.x; p < (pixels + kThreads - 1) / kThreads * kThreads; p += kThreads) {
+    const uint32_t column = p % kColumns, u = u0 + column, v = p / kColumns;
+    const bool inside = v < view.height && u < view.width;
+    uint32_t rgb = 0;
+    if (inside && !blank) {
+      rgb = view.sampling == display::Sampling::kWeighted
+                ? SampleWeighted(volume, view, slice, u, v)
+                : SampleMax(volume, view, slice, u, v,
+                            with_line ? lines + column * view.line : nullptr);
+    }
+    for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
+      // A pixel without light is at the lowest level whatever the threshold.
+      const uint32_t threshold = Threshold(view.dither, u, v, sub, view.sub_frames);
+      Levels q = {0, 0, 0};
+      if (rgb != 0) {
+        q = {Quantize(view.lut[rgb >> 16], levels.r, threshold),
+             Quantize(view.lut[rgb >> 8 & 0xFF], levels.g, threshold),
+             Quantize(view.lut[rgb & 0xFF], levels.b, threshold)};
+      }
+      const uint32_t picture = s * view.sub_frames + sub;
+      if (PutPixel(view, u, v, inside, q,
+                   view.bytes + static_cast<size_t>(picture) * view.bytes_per_picture)) {
+        view.differs[picture] = 1;
+      }
+    }
+  }
+}
+
+__global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t begin,
+                                uint32_t count, uint64_t frame, Counters* counters) {
+  const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= count) return;
+  const uint32_t s = begin + i;
+  if (index.dirty[s] == 0) return;
+  index.dirty[s] = 0;
+  view.blank[s] = index.lit_tiles[s] == 0 ? 1 : 0;
+  uint32_t changed = 0;
+  for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
+    const uint32_t picture = s * view.sub_frames + sub;
+    if (view.differs[picture] != 0 || view.changed_in[picture] == 0) {
+      view.differs[picture] = 0;
+      view.changed_in[picture] = frame;
+      ++changed;
+    }
+  }
+  atomicAdd(&counters->slices_drawn, 1u);
+  if (changed != 0) atomicAdd(&counters->pictures_changed, changed);
+}
+
+}  // namespace
+
+cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
+                       uint32_t begin, uint32_t count, uint64_t frame, cudaStream_t stream) {
+  const size_t line_bytes = sizeof(uint32_t) * kColumns * view.line;
+  const bool with_line = view.sampling == display::Sampling::kMax && line_bytes <= kLineBytes;
+  const dim3 grid((view.width + kColumns - 1) / kColumns, count);
+  DrawSlicesKernel<<<grid, kThreads, with_line ? line_bytes : 0, stream>>>(volume, index, view,
+                                                                           begin, with_line);
+  if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
+  EndSlicesKernel<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(
+      index, view, begin, count, frame, volume.counters);
+  return cudaGetLastError();
+}
+
+}  // namespace voxeld::gpu::cuda

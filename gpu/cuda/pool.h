@@ -1,0 +1,93 @@
+// Device memory that is kept: blocks come from a pool of those given back, so a loop of frames that
+// needs what the one before needed allocates nothing.
+//
+// All work on the blocks is ordered by one stream: a block given back may be handed out again at
+// once.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/cuda/api.h"
+
+namespace voxeld::gpu::cuda {
+
+class Pool;
+
+// A block of device memory; goes back to its pool.
+class Block {
+ public:
+  Block() = default;
+  Block(Pool* pool, void* data, size_t size) : pool_(pool), data_(data), size_(size) {}
+  Block(Block&& other) noexcept { *this = std::move(other); }
+  Block& operator=(Block&& other) noexcept {
+    std::swap(pool_, other.pool_);
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    return *this;
+  }
+  ~Block();
+
+  template <typename T>
+  T* as() const {
+    return static_cast<T*>(data_);
+  }
+  size_t size() const { return size_; }
+
+ private:
+  Pool* pool_ = nullptr;
+  void* data_ = nullptr;
+  size_t size_ = 0;
+};
+
+// Thread-bound. Outlives its blocks.
+class Pool {
+ public:
+  explicit Pool(Api& api) : api_(api) {}
+  ~Pool();
+  Pool(const Pool&) = delete;
+  Pool& operator=(const Pool&) = delete;
+
+  // At least `size` bytes, 256-byte aligned. ResourceExhausted if the device has none left, even
+  // after what is kept has been freed.
+  absl::StatusOr<Block> Acquire(size_t size);
+  // The same for `count` values, with room to grow: a block that is too small is replaced, and its
+  // first `keep` values are copied over in `stream`.
+  template <typename T>
+  absl::Status Grow(Block& block, size_t count, size_t keep, cudaStream_t stream) {
+    if (count * sizeof(T) <= block.size()) return absl::OkStatus();
+    absl::StatusOr<Block> next = Acquire(count * sizeof(T) + count * sizeof(T) / 2);
+    if (!next.ok()) next = Acquire(count * sizeof(T));
+    if (!next.ok()) return next.status();
+    if (keep > 0) {
+      absl::Status copied = api_.Call("cudaMemcpyAsync", [&] {
+        return cudaMemcpyAsync(next->as<T>(), block.as<T>(), keep * sizeof(T),
+                               cudaMemcpyDeviceToDevice, stream);
+      });
+      if (!copied.ok()) return copied;
+    }
+    block = *std::move(next);
+    return absl::OkStatus();
+  }
+
+  size_t held() const { return held_; }
+
+ private:
+  friend class Block;
+  void GiveBack(void* data, size_t size) { free_.emplace(size, data); }
+  void FreeKept();
+
+  Api& api_;
+  std::multimap<size_t, void*> free_;  // by size
+  size_t held_ = 0;                    // bytes, handed out or kept
+};
+
+inline Block::~Block() {
+  if (data_ != nullptr) pool_->GiveBack(data_, size_);
+}
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,123 @@
+// What lies in device memory, as host and device see it. Plain data.
+#pragma once
+
+#include <cstdint>
+
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/primitives/grid.h"
+#include "gpu/primitives/source.h"
+
+namespace voxeld::gpu::cuda {
+
+// A drawable in the table, by slot. `source.record` points to `record`, its arrays into device
+// memory; vertices are mapped and snapped where they are needed.
+struct TableEntry {
+  Source source;
+  GeometryRecord record;
+  uint32_t priority = 0;
+  uint32_t erase = 0;
+  uint32_t layer = 0;  // its slot
+  uint32_t alive = 0;
+};
+
+// A layer, by slot.
+struct LayerLook {
+  int32_t rank = -1;  // in the order of combination; none: the slot is free
+  uint32_t visible = 0;
+  uint32_t opacity = 255;
+  BlendMode blend = BlendMode::kOver;
+  bool operator==(const LayerLook&) const = default;
+};
+
+// Some drawables' items in one row: those of slots[i] are the items from first[i] on, up to
+// first[i + 1].
+struct ItemList {
+  const uint32_t* slots = nullptr;
+  const uint64_t* first = nullptr;  // count + 1
+  uint32_t count = 0;
+};
+
+// A pair says that an item may lie in a tile. Key: the tile and, in the lower kLayerBits, the
+// layer's slot. Value: the drawable's slot and, in the lower half, the item.
+inline constexpr uint32_t kLayerBits = 16;
+inline constexpr uint32_t kMaxLayers = 1u << kLayerBits;
+VOXELD_HD constexpr uint64_t PairKey(uint32_t tile, uint32_t layer) {
+  return static_cast<uint64_t>(tile) << kLayerBits | layer;
+}
+VOXELD_HD constexpr uint64_t PairValue(uint32_t slot, uint32_t item) {
+  return static_cast<uint64_t>(slot) << 32 | item;
+}
+
+// Pairs, ascending by key; those of a tile are the row [row_begin[tile], row_begin[tile + 1]).
+struct BatchView {
+  const uint64_t* keys = nullptr;
+  const uint64_t* values = nullptr;
+  const uint32_t* row_begin = nullptr;
+};
+
+inline constexpr uint32_t kMaxBatches = 32;  // a lane looks after one
+struct BatchList {
+  BatchView batches[kMaxBatches];
+  uint32_t count = 0;
+};
+
+// What kernels count. The first three begin at 0 with every frame.
+struct Counters {
+  uint32_t tiles_drawn = 0;
+  uint32_t slices_drawn = 0;
+  uint32_t pictures_changed = 0;
+  uint32_t dirty = 0;      // tiles in the list
+  uint32_t next_tile = 0;  // of the list, to be drawn
+  uint32_t reserved = 0;
+  uint64_t lit_voxels = 0;
+};
+
+// The volume: colours, interleaved, kTileVoxels a tile.
+struct VolumeView {
+  TileGrid grid;
+  const uint8_t* owned = nullptr;  // of each tile
+  uint8_t* dirty = nullptr;
+  uint32_t* dirty_list = nullptr;
+  uint32_t* lit = nullptr;  // voxels of each tile
+  uint32_t* colors = nullptr;
+  Counters* counters = nullptr;
+};
+
+// Which slices look at which tiles (display::TileToSlices), and what is known of each owned slice.
+struct SliceIndexView {
+  uint32_t stride[3] = {};  // of the outer plane of tiles
+  uint32_t inner_axis = 2;  // 0 to 2
+  uint32_t inner_sets = 1;
+  uint32_t inner_tiles = 0;  // along the inner axis
+  const uint32_t* begin = nullptr;
+  const int32_t* slices = nullptr;
+  const uint8_t* inner_seen = nullptr;
+  int32_t first = 0, last = 0;    // the slices owned, half-open
+  uint32_t* dirty = nullptr;      // by slice − first
+  uint32_t* lit_tiles = nullptr;  // by slice − first
+};
+
+struct ListsView {
+  const uint32_t* begin = nullptr;
+  const display::FootprintEntry* entries = nullptr;
+};
+
+// Everything about slicing.
+struct SliceView {
+  ListsView outer, inner;
+  uint32_t width = 0, height = 0, inner_sets = 1, inner_axis = 2;
+  uint32_t line = 0;  // voxels along the inner axis that inner lists reach
+  display::Sampling sampling = display::Sampling::kMax;
+  display::Dither dither = display::Dither::kNone;
+  display::PixelFormat format = display::PixelFormat::kRgb888;
+  uint32_t sub_frames = 1;
+  uint32_t bytes_per_picture = 0;
+  const uint16_t* lut = nullptr;  // 256
+  uint8_t* bytes = nullptr;       // pictures of the owned slices
+  uint64_t* changed_in = nullptr;
+  uint32_t* differs = nullptr;  // of each picture: its bytes are not what they were
+  uint32_t* blank = nullptr;    // of each owned slice: all its pictures are zeros
+};
+
+}  // namespace voxeld::gpu::cuda
