@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Packs the build and runs it with an empty library path: everything but glibc must come from the bundle.
+# usage: bundle_test.sh SOURCE BUILD
+set -euo pipefail
+source=$1
+build=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+"$source/tools/bundle" --no-build --build "$build" --out "$work/packed" >"$work/said"
+archive=$(tail -n 1 "$work/said")
+mkdir "$work/bundle"
+tar -C "$work/bundle" -xzf "$archive"
+
+outside=$(for program in "$work"/bundle/bin/voxel* "$work"/bundle/bin/tests/*; do
+  env -i LD_LIBRARY_PATH= ldd "$program"
+done | awk -v own="$work/bundle/" '$2 == "=>" && index($3, own) != 1 { print $1, $3 } /not found/ { print }' | sort -u)
+echo "from outside the bundle:"
+echo "$outside"
+if echo "$outside" | grep -vE '^(libc|libm|libdl|librt|libpthread|libresolv|libutil|libanl)\.so\.[0-9]+ ' | grep -q .; then
+  echo "bundle_test: more than glibc comes from outside" >&2
+  exit 1
+fi
+env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxeld" --version
+env -i LD_LIBRARY_PATH= "$work/bundle/bin/tests/gpu_conformance_test" --gtest_brief=1 --gtest_filter='*RandomScenes*'
