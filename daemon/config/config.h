@@ -25,7 +25,9 @@ struct ServerConfig {
   // Nothing: no http port. `http_asked`: it was asked for, so that a busy one is an error.
   std::optional<Address> http;
   bool http_asked = false;
-  uint32_t max_queued_answers = 16384;      // that a client of Stream has not read
+  // That a client of Stream has not read. A commit's issues come at once: well above
+  // max_issues_per_commit, or clients that do read may be ended.
+  uint32_t max_queued_answers = 16384;
   uint64_t max_queued_bytes = 16u << 20;    // the same in bytes
   uint32_t max_calls_per_connection = 256;  // at once
   // How long a stream that its client has half-closed waits for outcomes, and an ending one for its

@@ -59,7 +59,9 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_indices_per_entity", limits.max_indices_per_entity, 1, kMost32);
   visitor.Integer("max_id_bytes", limits.max_id_bytes, 1, 65536);
   visitor.Integer("max_operations_per_commit", limits.max_operations_per_commit, 1, kMost32);
+  visitor.Integer("max_issues_per_commit", limits.max_issues_per_commit, 1, kMost32);
   visitor.Integer("max_uncommitted_bytes", limits.max_uncommitted_bytes, 1, kMost);
+  visitor.Integer("max_uncommitted_bytes_total", limits.max_uncommitted_bytes_total, 1, kMost);
   visitor.Integer("max_instance_depth", limits.max_instance_depth, 1, 8);
   visitor.Real("max_coordinate_voxels", limits.max_coordinate_voxels, 1, 1073741824);
   visitor.Real("max_thickness", limits.max_thickness, 0, 1048576);

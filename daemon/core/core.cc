@@ -54,12 +54,13 @@ void Core::OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
       });
 }
 
-void Core::Handle(SessionId session, std::vector<Operation> operations, std::vector<Issue> issues,
+void Core::Handle(SessionId session, std::vector<Operation> operations, Refusals refused,
                   uint64_t bytes, std::function<void()> done) {
   PostThen(
       impl_->loop(),
-      [impl = impl_.get(), session, operations = std::move(operations), issues = std::move(issues),
-       bytes]() mutable { impl->Handle(session, std::move(operations), issues, bytes); },
+      [impl = impl_.get(), session, operations = std::move(operations),
+       refused = std::move(refused),
+       bytes]() mutable { impl->Handle(session, std::move(operations), refused, bytes); },
       std::move(done));
 }
 
@@ -118,13 +119,21 @@ void Core::UpdateDisplay(std::string name, DisplayUpdate update, Reply<DisplayDe
           const Reply<DisplayDescription>& answer) { impl->UpdateDisplay(name, update, answer); });
 }
 
-void Core::Capture(std::string name, sync::TimeNs timeout, uint64_t at_least_snapshot,
-                   Reply<display::DecodedVolume> reply) {
+CaptureId Core::Capture(std::string name, sync::TimeNs timeout, uint64_t at_least_snapshot,
+                        Reply<display::DecodedVolume> reply) {
+  const CaptureId id = impl_->NewCapture();
   Ask(impl_->loop(), std::move(reply),
-      [impl = impl_.get(), name = std::move(name), timeout,
+      [impl = impl_.get(), name = std::move(name), id, timeout,
        at_least_snapshot](const Reply<display::DecodedVolume>& answer) {
-        impl->Capture(name, timeout, at_least_snapshot, answer);
+        impl->Capture(name, id, timeout, at_least_snapshot, answer);
       });
+  return id;
+}
+
+void Core::CancelCapture(std::string name, CaptureId id) {
+  impl_->loop().Post([impl = impl_.get(), name = std::move(name), id] {  // stopped: it has ended
+    impl->CancelCapture(name, id);
+  });
 }
 
 }  // namespace voxeld::daemon

@@ -5,7 +5,7 @@
 //   core.AddDisplay(std::move(display), engine_options);
 //   core.Start();                                   // or, in a simulation, Step() by hand
 //   SessionId id = *core.OpenSession(open, sink);
-//   core.Handle(id, std::move(operations), issues, bytes);
+//   core.Handle(id, std::move(operations), std::move(refused), bytes, done);
 //   core.CloseSession(id);
 //   core.Stop(deadline);
 //
@@ -36,6 +36,7 @@
 namespace voxeld::daemon {
 
 using SessionId = uint64_t;
+using display::CaptureId;
 
 // Where a session's answers go. Thread-safe; called on the core's thread; must only post.
 class SessionSink {
@@ -129,8 +130,9 @@ class Core {
                           const gpu::EngineOptions& engine, const ViewOptions& view = {});
   absl::Status Start();
 
-  // Ends displays and threads; what is owed by then counts as lost or undelivered. Returns after at
-  // most `limit`, with an error that names what had not ended.
+  // Ends displays and threads; what is owed by then counts as lost or undelivered, and a commit
+  // under way is refused. Returns after at most `limit`, with an error that names what had not
+  // ended.
   absl::Status Stop(sync::TimeNs limit);
 
   // threads = false only: does all that is due and returns when more is.
@@ -140,9 +142,11 @@ class Core {
   // ResourceExhausted past max_sessions.
   void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
                    Reply<SessionInfo> reply);
-  // `issues` are what decoding refused; `bytes` is what the message weighed. `done` (may be empty)
-  // runs when the message has been taken in: the time to read the next.
-  void Handle(SessionId session, std::vector<Operation> operations, std::vector<Issue> issues,
+  // `refused` is what decoding refused; `bytes` is what the message weighed. `done` (may be empty)
+  // runs when the message has been taken in: the time to read the next. By then each of its commits
+  // has been answered, unless there is no such session, or the core has stopped: in that case the
+  // message is dropped, and `done` runs in the caller's thread.
+  void Handle(SessionId session, std::vector<Operation> operations, Refusals refused,
               uint64_t bytes, std::function<void()> done);
   // Carries out the session's DisconnectPolicy; unknown sessions are ignored.
   void CloseSession(SessionId session, std::function<void()> done);
@@ -159,8 +163,10 @@ class Core {
   void GetDisplay(std::string name, Reply<DisplayDescription> reply);
   void UpdateDisplay(std::string name, DisplayUpdate update, Reply<DisplayDescription> reply);
   // The next volume shown that contains at least `at_least_snapshot`.
-  void Capture(std::string name, sync::TimeNs timeout, uint64_t at_least_snapshot,
-               Reply<display::DecodedVolume> reply);
+  CaptureId Capture(std::string name, sync::TimeNs timeout, uint64_t at_least_snapshot,
+                    Reply<display::DecodedVolume> reply);
+  // Nobody waits for it any more: its reply gets Cancelled, unless it has had its answer.
+  void CancelCapture(std::string name, CaptureId id);
 
  private:
   class Impl;

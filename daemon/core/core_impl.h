@@ -2,6 +2,7 @@
 // it says otherwise.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -28,6 +29,7 @@ class Core::Impl {
   // ---- any thread
   const CoreOptions& options() const { return options_; }
   Loop& loop() { return *loop_; }
+  CaptureId NewCapture() { return next_capture_++; }
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
                           const gpu::EngineOptions& engine, const ViewOptions& view);
   // `self` keeps this alive while the core's thread runs.
@@ -38,7 +40,7 @@ class Core::Impl {
   // ---- sessions (sessions.cc)
   void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
                    const Reply<SessionInfo>& reply);
-  void Handle(SessionId id, std::vector<Operation> operations, const std::vector<Issue>& issues,
+  void Handle(SessionId id, std::vector<Operation> operations, const Refusals& refused,
               uint64_t bytes);
   void CloseSession(SessionId id);
   void CountOverrun() { ++streams_overrun_; }
@@ -55,8 +57,9 @@ class Core::Impl {
   void GetDisplay(const std::string& name, Reply<DisplayDescription> reply);
   void UpdateDisplay(const std::string& name, DisplayUpdate update,
                      Reply<DisplayDescription> reply);
-  void Capture(const std::string& name, sync::TimeNs timeout, uint64_t at_least_snapshot,
-               Reply<display::DecodedVolume> reply);
+  void Capture(const std::string& name, CaptureId id, sync::TimeNs timeout,
+               uint64_t at_least_snapshot, Reply<display::DecodedVolume> reply);
+  void CancelCapture(const std::string& name, CaptureId id);
 
  private:
   struct Session {
@@ -70,6 +73,7 @@ class Core::Impl {
     uint64_t staged_bytes = 0;
     uint64_t refused = 0;
     std::string first_refusal;
+    uint64_t issues_told = 0, issues_left_out = 0;
   };
 
   struct Lingering {
@@ -112,6 +116,10 @@ class Core::Impl {
   // ---- sessions
   void Stage(Session& session, Operation operation);
   void Refuse(Session& session, const Issue& issue);
+  // Tells the session's client, unless it has been told max_issues_per_commit since the last commit.
+  void Tell(Session& session, const Issue& issue);
+  // Says how many Issues were left out, if any were, and counts anew.
+  void TellOfThoseLeftOut(Session& session, uint64_t sequence);
   void EndCommit(Session& session, const Operation& operation);
   void DeliverOutcome(const Rider& rider, const CommitOutcome& outcome);
   void RemoveLayersOf(SessionId session, uint64_t owner);
@@ -152,6 +160,8 @@ class Core::Impl {
   std::multimap<sync::TimeNs, Lingering> lingering_;
   SessionId next_session_ = 1;
   uint64_t next_owner_ = 1;
+  std::atomic<CaptureId> next_capture_ = 1;
+  uint64_t staged_bytes_ = 0;  // of all sessions
 
   uint64_t commits_accepted_ = 0, commits_refused_ = 0;
   uint64_t operations_applied_ = 0, operations_refused_ = 0;

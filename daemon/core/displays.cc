@@ -99,22 +99,36 @@ void Core::Impl::Collect(std::function<T(const FramePipeline&)> ask,
                          std::function<T(const DisplaySlot&)> absent,
                          std::function<void(std::vector<T>)> done) {
   struct Answers {
-    std::vector<T> values;
-    size_t left;
+    sync::Mutex mutex;
+    std::vector<T> values VOXELD_GUARDED_BY(mutex);
+    size_t left VOXELD_GUARDED_BY(mutex) = 0;
     std::function<void(std::vector<T>)> done;
   };
   if (displays_.empty()) return done({});
-  auto answers = std::make_shared<Answers>(
-      Answers{std::vector<T>(displays_.size()), displays_.size(), std::move(done)});
+  auto answers = std::make_shared<Answers>();
+  answers->done = std::move(done);
+  {
+    sync::MutexLock lock(answers->mutex);
+    answers->values.resize(displays_.size());
+    answers->left = displays_.size();
+  }
   const auto arrived = [answers](size_t i, T value) {
-    answers->values[i] = std::move(value);
-    if (--answers->left == 0) answers->done(std::move(answers->values));
+    std::vector<T> all;
+    {
+      sync::MutexLock lock(answers->mutex);
+      answers->values[i] = std::move(value);
+      if (--answers->left > 0) return;
+      all = std::move(answers->values);
+    }
+    answers->done(std::move(all));
   };
   for (size_t i = 0; i < displays_.size(); ++i) {
     const Host& host = *displays_[i]->host;
     const bool posted =
         host.work->Post([i, ask, arrived, loop = loop_, pipeline = host.pipeline.get()] {
-          loop->Post([i, arrived, value = ask(*pipeline)] { arrived(i, value); });
+          const T value = ask(*pipeline);
+          // The core may have ended before its display: then this thread answers.
+          if (!loop->Post([i, arrived, value] { arrived(i, value); })) arrived(i, value);
         });
     if (!posted) arrived(i, absent(*displays_[i]));
   }
@@ -204,16 +218,23 @@ void Core::Impl::UpdateDisplay(const std::string& name, DisplayUpdate update,
   if (!posted) reply(Ended(slot->info.name));
 }
 
-void Core::Impl::Capture(const std::string& name, sync::TimeNs timeout, uint64_t at_least_snapshot,
-                         Reply<display::DecodedVolume> reply) {
+void Core::Impl::Capture(const std::string& name, CaptureId id, sync::TimeNs timeout,
+                         uint64_t at_least_snapshot, Reply<display::DecodedVolume> reply) {
   const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
   if (!slot.ok()) return reply(slot.status());
   const Host& host = *(*slot)->host;
   const bool posted =
-      host.work->Post([reply, timeout, at_least_snapshot, pipeline = host.pipeline.get()] {
-        pipeline->Capture(timeout, at_least_snapshot, reply);
+      host.work->Post([reply, id, timeout, at_least_snapshot, pipeline = host.pipeline.get()] {
+        pipeline->Capture(timeout, at_least_snapshot, reply, id);
       });
   if (!posted) reply(Ended((*slot)->info.name));
+}
+
+void Core::Impl::CancelCapture(const std::string& name, CaptureId id) {
+  const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
+  if (!slot.ok()) return;
+  const Host& host = *(*slot)->host;
+  host.work->Post([id, pipeline = host.pipeline.get()] { pipeline->CancelCapture(id); });
 }
 
 }  // namespace voxeld::daemon

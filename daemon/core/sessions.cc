@@ -32,6 +32,18 @@ std::pair<std::string, std::string> NamesIn(const Operation& operation) {
   return {};
 }
 
+struct FieldName {
+  const char* operator()(const Upsert&) const { return "upsert"; }
+  const char* operator()(const Delete&) const { return "delete"; }
+  const char* operator()(const SetTransform&) const { return "set_transform"; }
+  const char* operator()(const LayerState&) const { return "layer_state"; }
+  const char* operator()(const FrameBegin&) const { return "frame_begin"; }
+  const char* operator()(const FrameEnd&) const { return "frame_end"; }
+  const char* operator()(const DefineObject&) const { return "define_object"; }
+  const char* operator()(const DeleteObject&) const { return "delete_object"; }
+  const char* operator()(const Commit&) const { return "commit"; }
+};
+
 }  // namespace
 
 void Core::Impl::OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
@@ -62,18 +74,44 @@ void Core::Impl::Refuse(Session& session, const Issue& issue) {
   }
 }
 
-void Core::Impl::Handle(SessionId id, std::vector<Operation> operations,
-                        const std::vector<Issue>& issues, uint64_t bytes) {
+void Core::Impl::Tell(Session& session, const Issue& issue) {
+  if (session.issues_told >= options_.limits.max_issues_per_commit) {
+    ++session.issues_left_out;
+    return;
+  }
+  ++session.issues_told;
+  session.sink->OnIssue(issue);
+}
+
+void Core::Impl::TellOfThoseLeftOut(Session& session, uint64_t sequence) {
+  session.issues_told = 0;
+  const uint64_t left_out = std::exchange(session.issues_left_out, 0);
+  if (left_out == 0) return;
+  session.sink->OnIssue({sequence,
+                         {},
+                         {},
+                         "commit",
+                         Reason::kQuotaExceeded,
+                         absl::StrFormat("%d more issues are left out, beyond the %d of "
+                                         "max_issues_per_commit; the receipt counts them; commit "
+                                         "fewer operations at a time to be told of each",
+                                         left_out, options_.limits.max_issues_per_commit)});
+}
+
+void Core::Impl::Handle(SessionId id, std::vector<Operation> operations, const Refusals& refused,
+                        uint64_t bytes) {
   bytes_in_ += bytes;
   const auto it = sessions_.find(id);
   if (it == sessions_.end()) return;
   Session& session = it->second;
-  for (const Issue& issue : issues) session.sink->OnIssue(issue);
+  for (const Issue& issue : refused.issues) Tell(session, issue);
+  session.issues_left_out += refused.more;
+  session.refused += refused.more;
 
   // What decoding refused counts for the commit that it came before.
   std::vector<const Issue*> uncounted;
-  uncounted.reserve(issues.size());
-  for (const Issue& issue : issues) uncounted.push_back(&issue);
+  uncounted.reserve(refused.issues.size());
+  for (const Issue& issue : refused.issues) uncounted.push_back(&issue);
   const auto count_up_to = [&](uint64_t sequence) {
     std::erase_if(uncounted, [&](const Issue* issue) {
       if (issue->sequence > sequence) return false;
@@ -98,7 +136,8 @@ void Core::Impl::Stage(Session& session, Operation operation) {
   const uint64_t bytes = StagedBytes(operation);
   const auto over = [&](std::string message) {
     auto [layer, id] = NamesIn(operation);
-    issue = Issue{operation.sequence,     std::move(layer),  std::move(id), "",
+    issue = Issue{operation.sequence,     std::move(layer),
+                  std::move(id),          std::visit(FieldName(), operation.op),
                   Reason::kQuotaExceeded, std::move(message)};
   };
   if (session.staged.size() >= limits.max_operations_per_commit) {
@@ -110,13 +149,19 @@ void Core::Impl::Stage(Session& session, Operation operation) {
     over(absl::StrFormat(
         "%d bytes would wait for a commit; max_uncommitted_bytes is %d; commit first",
         session.staged_bytes + bytes, limits.max_uncommitted_bytes));
+  } else if (staged_bytes_ + bytes > limits.max_uncommitted_bytes_total) {
+    over(absl::StrFormat(
+        "%d bytes of all sessions would wait for their commits; max_uncommitted_bytes_total is %d; "
+        "commit first, or try again when others have committed",
+        staged_bytes_ + bytes, limits.max_uncommitted_bytes_total));
   } else {
     issue = CheckAlone(operation, limits);
   }
   if (issue.has_value()) {
     Refuse(session, *issue);
-    return session.sink->OnIssue(*issue);
+    return Tell(session, *issue);
   }
+  staged_bytes_ += bytes;
   session.staged_bytes += bytes;
   session.staged.push_back(std::move(operation));
 }
@@ -129,13 +174,15 @@ void Core::Impl::EndCommit(Session& session, const Operation& operation) {
   CommitResult result =
       store_.Apply({session.owner, session.writer}, std::exchange(session.staged, {}), now,
                    session.options.strict, std::exchange(session.refused, 0));
-  session.staged_bytes = 0;
+  staged_bytes_ -= std::exchange(session.staged_bytes, 0);
   std::string first_refusal = std::exchange(session.first_refusal, "");
   if (first_refusal.empty() && !result.issues.empty()) {
     const Issue& first = result.issues.front();
     first_refusal = absl::StrFormat("%s: %s", first.field, first.message);
   }
-  for (const Issue& issue : result.issues) session.sink->OnIssue(issue);
+  for (const Issue& issue : result.issues) Tell(session, issue);
+  session.issues_left_out += result.more_issues;
+  TellOfThoseLeftOut(session, operation.sequence);
   operations_refused_ += result.refused_operations;
 
   Receipt receipt;
@@ -145,11 +192,17 @@ void Core::Impl::EndCommit(Session& session, const Operation& operation) {
     ++commits_refused_;
     Refused refused;
     refused.refused_operations = result.refused_operations;
-    refused.message = absl::StrFormat(
-        "the session is strict and %d operations were refused, so nothing of the commit was "
-        "applied; "
-        "the first: %s",
-        result.refused_operations, first_refusal);
+    if (result.abandoned) {
+      refused.message =
+          "the daemon is being stopped, so nothing of the commit was applied; send it again to one "
+          "that runs";
+    } else {
+      refused.message = absl::StrFormat(
+          "the session is strict and %d operations were refused, so nothing of the commit was "
+          "applied; "
+          "the first: %s",
+          result.refused_operations, first_refusal);
+    }
     receipt.what = std::move(refused);
     session.sink->OnReceipt(receipt);
     return Publish();  // what had expired
@@ -215,6 +268,7 @@ void Core::Impl::CloseSession(SessionId id) {
   if (it == sessions_.end()) return;
   const Session session = std::move(it->second);
   sessions_.erase(it);
+  staged_bytes_ -= session.staged_bytes;
   switch (session.options.on_disconnect) {
     case DisconnectPolicy::kClear:
       RemoveLayersOf(id, session.owner);
@@ -222,7 +276,9 @@ void Core::Impl::CloseSession(SessionId id) {
     case DisconnectPolicy::kLinger:
       if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
           tally != nullptr && tally->layers > 0) {
-        lingering_.emplace(clock_.Now() + std::max<int64_t>(0, session.options.linger_ns),
+        const sync::TimeNs now = clock_.Now();
+        const int64_t linger = std::max<int64_t>(0, session.options.linger_ns);
+        lingering_.emplace(linger < sync::kNever - now ? now + linger : sync::kNever,
                            Lingering{id, session.owner});
         break;
       }

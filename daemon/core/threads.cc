@@ -137,6 +137,7 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
     if (t.name != "core") displays.insert(t.name);
   }
   std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
+  store_.Abandon();
   loop_->Close();
   left.merge(AwaitEnd({"core"}, now + limit));
   for (NamedThread& t : threads_) {

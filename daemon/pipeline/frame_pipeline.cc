@@ -405,10 +405,24 @@ DisplayFigures FramePipeline::Figures() const {
 }
 
 void FramePipeline::Capture(sync::TimeNs timeout, uint64_t at_least_snapshot,
-                            display::Display::CaptureDone done) {
+                            display::Display::CaptureDone done, display::CaptureId id) {
   const sync::TimeNs now = clock_.Now();
   captures_.push_back({timeout < sync::kNever - now ? now + timeout : sync::kNever,
-                       at_least_snapshot, std::move(done)});
+                       at_least_snapshot, std::move(done), id});
+  if (!started_) ServeCaptures();  // no Step will
+}
+
+void FramePipeline::CancelCapture(display::CaptureId id) {
+  std::vector<PendingCapture> waiting;
+  for (PendingCapture& capture : std::exchange(captures_, {})) {
+    if (capture.id == id) {
+      capture.done(absl::CancelledError("the capture was cancelled"));
+    } else {
+      waiting.push_back(std::move(capture));
+    }
+  }
+  captures_ = std::move(waiting);
+  display_->CancelCapture(id);
 }
 
 void FramePipeline::ServeCaptures() {
@@ -432,7 +446,7 @@ void FramePipeline::ServeCaptures() {
       continue;
     }
     display_->Capture(capture.deadline == sync::kNever ? sync::kNever : capture.deadline - now,
-                      std::move(capture.done));
+                      std::move(capture.done), capture.id);
   }
   captures_.insert(captures_.end(), std::make_move_iterator(waiting.begin()),
                    std::make_move_iterator(waiting.end()));

@@ -95,8 +95,10 @@ class FramePipeline final : private display::Display::Listener {
 
   // The next volume shown that contains at least this snapshot. DeadlineExceeded, or Unavailable
   // while the display does not show.
-  void Capture(sync::TimeNs timeout, uint64_t at_least_snapshot,
-               display::Display::CaptureDone done);
+  void Capture(sync::TimeNs timeout, uint64_t at_least_snapshot, display::Display::CaptureDone done,
+               display::CaptureId id = 0);
+  // Ends the captures of that name with Cancelled.
+  void CancelCapture(display::CaptureId id);
 
  private:
   struct Drawing {
@@ -109,6 +111,7 @@ class FramePipeline final : private display::Display::Listener {
     sync::TimeNs deadline = 0;
     uint64_t at_least = 0;
     display::Display::CaptureDone done;
+    display::CaptureId id = 0;
   };
 
   explicit FramePipeline(Options options);

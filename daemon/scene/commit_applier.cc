@@ -56,7 +56,7 @@ void CommitApplier::End() {
         "and "
         "the layer is as it was; send FrameEnd before Commit",
         layer, frame.operations.size());
-    issues_.push_back(std::move(issue));
+    refusals_.Add(std::move(issue), limits_.max_issues_per_commit);
   }
   frames_.clear();
 }
@@ -89,8 +89,9 @@ void CommitApplier::Applied(const std::string& layer) {
 void CommitApplier::Refuse(const Operation& operation, std::string layer, std::string id,
                            std::string field, Reason reason, std::string message) {
   ++refused_;
-  issues_.push_back({operation.sequence, std::move(layer), std::move(id), std::move(field), reason,
-                     std::move(message)});
+  refusals_.Add({operation.sequence, std::move(layer), std::move(id), std::move(field), reason,
+                 std::move(message)},
+                limits_.max_issues_per_commit);
 }
 
 std::optional<std::string> CommitApplier::OutOfRange(const gpu::Affine& layer_transform,

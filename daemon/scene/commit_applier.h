@@ -41,7 +41,7 @@ class CommitApplier {
   void Apply(Operation& operation);
   void End();
 
-  const std::vector<Issue>& issues() const { return issues_; }
+  const Refusals& refusals() const { return refusals_; }
   uint64_t applied() const { return applied_; }
   uint64_t refused() const { return refused_; }
 
@@ -107,7 +107,7 @@ class CommitApplier {
   EntityMap replaced_;  // what the layer held whose frame is being applied
   std::set<std::string> touched_;
   bool objects_touched_ = false;
-  std::vector<Issue> issues_;
+  Refusals refusals_;
   uint64_t applied_ = 0, refused_ = 0;
 };
 

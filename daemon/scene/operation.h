@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -45,6 +46,21 @@ struct Issue {
   std::string message;  // what was wrong, the value, what would be right
 };
 
+// Operations that were refused together: the first max_issues_per_commit one by one, of the others
+// their number.
+struct Refusals {
+  std::vector<Issue> issues;
+  uint64_t more = 0;
+
+  void Add(Issue issue, uint64_t most) {
+    if (issues.size() < most) {
+      issues.push_back(std::move(issue));
+    } else {
+      ++more;
+    }
+  }
+};
+
 // The limits in force. One field each, here, in the configuration and on the wire.
 struct Limits {
   uint64_t max_message_bytes = 16u << 20;
@@ -59,7 +75,9 @@ struct Limits {
   uint64_t max_indices_per_entity = 48u << 20;
   uint32_t max_id_bytes = 256;
   uint32_t max_operations_per_commit = 1'000'000;
+  uint32_t max_issues_per_commit = 1000;  // beyond, one Issue gives the number of those left out
   uint64_t max_uncommitted_bytes = 256u << 20;
+  uint64_t max_uncommitted_bytes_total = uint64_t{4} << 30;  // of all sessions together
   uint32_t max_instance_depth = 8;
   double max_coordinate_voxels = 1073741824.0;  // 2³⁰
   double max_thickness = 4096;                  // in its own unit

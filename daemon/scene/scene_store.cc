@@ -16,13 +16,18 @@ CommitResult SceneStore::Apply(const Author& author, std::vector<Operation> oper
                                sync::TimeNs now, bool strict, uint64_t refused_before) {
   Draft draft(snapshot_, next_number_);
   CommitApplier applier(draft, limits_, views_, author, now);
-  for (Operation& operation : operations) applier.Apply(operation);
+  CommitResult result;
+  for (Operation& operation : operations) {
+    if (abandoned_) break;
+    applier.Apply(operation);
+  }
   applier.End();
 
-  CommitResult result;
-  result.issues = applier.issues();
+  result.issues = applier.refusals().issues;
+  result.more_issues = applier.refusals().more;
   result.refused_operations = applier.refused() + refused_before;
-  if (strict && result.refused_operations > 0) return result;
+  result.abandoned = abandoned_;
+  if (result.abandoned || (strict && result.refused_operations > 0)) return result;
   result.applied = true;
   result.applied_operations = applier.applied();
   result.hidden = applier.hidden();

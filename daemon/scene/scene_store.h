@@ -1,9 +1,10 @@
 // The truth about the scene: applies commits one after another,
 // each making one immutable snapshot or none.
 //
-// Single-threaded; the snapshots that it gives away may be used anywhere.
+// Single-threaded but for Abandon; the snapshots that it gives away may be used anywhere.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -15,10 +16,12 @@
 namespace voxeld::daemon {
 
 struct CommitResult {
-  bool applied = false;  // false: a strict commit with a refusal; nothing was changed
+  bool applied = false;    // false: a strict commit with a refusal; nothing was changed
+  bool abandoned = false;  // not applied because of Abandon
   uint64_t applied_operations = 0, refused_operations = 0;
-  std::vector<Issue> issues;
-  bool hidden = false;  // see CommitApplier::hidden
+  std::vector<Issue> issues;  // the first max_issues_per_commit
+  uint64_t more_issues = 0;   // that there would have been beyond them
+  bool hidden = false;        // see CommitApplier::hidden
 };
 
 class SceneStore {
@@ -38,6 +41,10 @@ class SceneStore {
   // refuses it whole. Call Expire(now) first.
   CommitResult Apply(const Author& author, std::vector<Operation> operations, sync::TimeNs now,
                      bool strict = false, uint64_t refused_before = 0);
+
+  // Any thread. From now on no commit is applied, and one under way is given up between two of its
+  // operations: for a daemon that must end in time.
+  void Abandon() { abandoned_ = true; }
 
   // Removes what has outlived its lifetime by `now`; one snapshot for each moment at which
   // something ended, in order of time. True if there is a new snapshot.
@@ -62,6 +69,7 @@ class SceneStore {
 
   const Limits limits_;
   std::vector<DisplayView> views_;
+  std::atomic<bool> abandoned_ = false;
   uint64_t next_number_ = 1;
   SnapshotPtr snapshot_;
 };

@@ -1,4 +1,4 @@
-// The long calls that are open: streams, watches, captures. At shutdown each is told to end.
+// Calls that are open. At shutdown each is told to end.
 #pragma once
 
 #include <map>

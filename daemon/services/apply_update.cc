@@ -17,30 +17,28 @@ namespace {
 
 class Update final : public SessionSink, public std::enable_shared_from_this<Update> {
  public:
-  Update(ServiceContext& context, v1::ApplyUpdateResponse* response,
-         std::function<void(const absl::Status&)> done)
-      : context_(context), response_(response), done_(std::move(done)) {}
+  Update(Core& core, UpdateDone done) : core_(core), done_(std::move(done)) {}
 
   void Start(OpenOptions open, wire::Decoded decoded, uint64_t bytes) {
-    context_.core.OpenSession(std::move(open), shared_from_this(),
-                              [self = shared_from_this(), decoded = std::move(decoded),
-                               bytes](absl::StatusOr<SessionInfo> info) mutable {
-                                if (!info.ok()) return self->done_(info.status());
-                                {
-                                  sync::MutexLock lock(self->mutex_);
-                                  self->session_ = info->session;
-                                }
-                                self->context_.core.Handle(
-                                    info->session, std::move(decoded.operations),
-                                    std::move(decoded.issues), bytes, nullptr);
-                              });
+    core_.OpenSession(std::move(open), shared_from_this(),
+                      [self = shared_from_this(), decoded = std::move(decoded),
+                       bytes](absl::StatusOr<SessionInfo> info) mutable {
+                        if (!info.ok()) return self->End(info.status());
+                        {
+                          sync::MutexLock lock(self->mutex_);
+                          self->session_ = info->session;
+                        }
+                        self->core_.Handle(info->session, std::move(decoded.operations),
+                                           std::move(decoded.refused), bytes,
+                                           [self] { self->OnHandled(); });
+                      });
   }
 
   void OnIssue(const Issue& issue) override {
     sync::MutexLock lock(mutex_);
     if (answered_) return;
     if (first_issue_.empty()) first_issue_ = issue.message;
-    wire::Encode(issue, response_->add_issues());
+    wire::Encode(issue, response_.add_issues());
   }
 
   void OnReceipt(const Receipt& receipt) override {
@@ -50,7 +48,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
       sync::MutexLock lock(mutex_);
       if (answered_) return;
       if (const auto* accepted = std::get_if<Accepted>(&receipt.what)) {
-        response_->set_snapshot(accepted->snapshot);
+        response_.set_snapshot(accepted->snapshot);
       } else if (const auto* refused = std::get_if<Refused>(&receipt.what)) {
         status = absl::InvalidArgumentError(
             absl::StrCat(refused->message, first_issue_.empty() ? "" : ": ", first_issue_));
@@ -60,15 +58,29 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
       answered_ = true;
       session = session_;
     }
-    context_.core.CloseSession(session,
-                               [self = shared_from_this(), status] { self->done_(status); });
+    core_.CloseSession(session, [self = shared_from_this(), status] { self->Answer(status); });
   }
 
  private:
-  ServiceContext& context_;
-  v1::ApplyUpdateResponse* const response_;  // the sink's until `answered_`
-  const std::function<void(const absl::Status&)> done_;
+  // The commit has been answered by now, unless the core has stopped.
+  void OnHandled() { End(absl::UnavailableError("the daemon has stopped; nothing was applied")); }
+
+  void End(const absl::Status& status) {
+    {
+      sync::MutexLock lock(mutex_);
+      if (answered_) return;
+      answered_ = true;
+    }
+    Answer(status);
+  }
+
+  // Once, and only after `answered_`: nobody else touches the response then.
+  void Answer(const absl::Status& status) { done_(status, response_); }
+
+  Core& core_;
+  const UpdateDone done_;
   sync::Mutex mutex_;
+  v1::ApplyUpdateResponse response_;  // grows until `answered_`
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool answered_ VOXELD_GUARDED_BY(mutex_) = false;
   std::string first_issue_ VOXELD_GUARDED_BY(mutex_);
@@ -76,13 +88,15 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
 
 }  // namespace
 
-void ApplyUpdate(ServiceContext& context, const v1::ApplyUpdateRequest& request,
-                 v1::ApplyUpdateResponse* response, std::function<void(const absl::Status&)> done) {
-  wire::Decoded decoded = wire::DecodeUpdate(request, context.core.limits());
-  if (!decoded.open.has_value()) return done(decoded.status);
+void ApplyUpdate(ServiceContext& context, std::span<const std::string_view> slices,
+                 UpdateDone done) {
+  wire::Decoded decoded = wire::DecodeUpdate(slices, context.core.limits());
+  if (!decoded.open.has_value()) return done(decoded.status, v1::ApplyUpdateResponse());
+  uint64_t bytes = 0;
+  for (const std::string_view slice : slices) bytes += slice.size();
   OpenOptions open = *std::move(decoded.open);
-  std::make_shared<Update>(context, response, std::move(done))
-      ->Start(std::move(open), std::move(decoded), request.ByteSizeLong());
+  std::make_shared<Update>(context.core, std::move(done))
+      ->Start(std::move(open), std::move(decoded), bytes);
 }
 
 }  // namespace voxeld::daemon::services

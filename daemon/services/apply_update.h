@@ -2,20 +2,24 @@
 #pragma once
 
 #include <functional>
+#include <span>
+#include <string_view>
 
-#include "absl/status/statusor.h"
+#include "absl/status/status.h"
 #include "daemon/services/context.h"
 
 namespace voxeld::v1 {
-class ApplyUpdateRequest;
 class ApplyUpdateResponse;
 }  // namespace voxeld::v1
 
 namespace voxeld::daemon::services {
 
-// Fills `response`, which must live until `done` has been called, once,
-// from the core's thread or from within.
-void ApplyUpdate(ServiceContext& context, const v1::ApplyUpdateRequest& request,
-                 v1::ApplyUpdateResponse* response, std::function<void(const absl::Status&)> done);
+// Called once, whatever becomes of the core; from the core's thread or from within. The response
+// holds if the status is OK.
+using UpdateDone = std::function<void(const absl::Status&, const v1::ApplyUpdateResponse&)>;
+
+// `slices` are an ApplyUpdateRequest, read before the call returns.
+void ApplyUpdate(ServiceContext& context, std::span<const std::string_view> slices,
+                 UpdateDone done);
 
 }  // namespace voxeld::daemon::services

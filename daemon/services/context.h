@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "daemon/core/core.h"
@@ -29,8 +30,11 @@ struct ServiceContext {
   Logger* log = nullptr;  // may be none
   StreamLimits limits;
 
-  ActiveCalls calls;
-  std::atomic<uint32_t> captures{0};  // under way
+  ActiveCalls calls;        // streams, watches, captures
+  ActiveCalls short_calls;  // all others
+  // Captures under way, those included whose client is gone and that the core has not let go of.
+  // Shared, as the core may hold them longer than the server lives.
+  std::shared_ptr<std::atomic<uint32_t>> captures = std::make_shared<std::atomic<uint32_t>>(0);
 };
 
 }  // namespace voxeld::daemon::services

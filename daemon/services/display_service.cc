@@ -7,6 +7,7 @@
 
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
+#include "daemon/services/unary_call.h"
 #include "daemon/wire/convert.h"
 #include "daemon/wire/encode.h"
 #include "voxeld/v1/display.grpc.pb.h"
@@ -26,11 +27,12 @@ class RefusedWatch final : public grpc::ServerWriteReactor<v1::VolumeChunk> {
   void OnDone() override { delete this; }
 };
 
-Core::Reply<DisplayDescription> Answer(ServerUnaryReactor* reactor,
+Core::Reply<DisplayDescription> Answer(std::shared_ptr<UnaryCall> call,
                                        v1::DisplayDescription* response) {
-  return [reactor, response](absl::StatusOr<DisplayDescription> result) {
-    if (result.ok()) wire::Encode(*result, response);
-    reactor->Finish(ToGrpc(result.status()));
+  return [call = std::move(call), response](const absl::StatusOr<DisplayDescription>& result) {
+    call->Answer(result.status(), [&] {
+      if (result.ok()) wire::Encode(*result, response);
+    });
   };
 }
 
@@ -73,13 +75,14 @@ class DisplayService final : public v1::DisplayService::CallbackService {
   ServerUnaryReactor* DoListDisplays(ServerUnaryReactor* reactor,
                                      v1::ListDisplaysResponse* response) {
     context_.core.ListDisplays(
-        [reactor, response](absl::StatusOr<std::vector<DisplayDescription>> displays) {
-          if (displays.ok()) {
+        [call = UnaryCall::Begin(context_.short_calls, reactor),
+         response](const absl::StatusOr<std::vector<DisplayDescription>>& displays) {
+          call->Answer(displays.status(), [&] {
+            if (!displays.ok()) return;
             for (const DisplayDescription& display : *displays) {
               wire::Encode(display, response->add_displays());
             }
-          }
-          reactor->Finish(ToGrpc(displays.status()));
+          });
         });
     return reactor;
   }
@@ -87,7 +90,8 @@ class DisplayService final : public v1::DisplayService::CallbackService {
   ServerUnaryReactor* DoGetDisplay(ServerUnaryReactor* reactor,
                                    const v1::GetDisplayRequest& request,
                                    v1::DisplayDescription* response) {
-    context_.core.GetDisplay(request.name(), Answer(reactor, response));
+    context_.core.GetDisplay(request.name(),
+                             Answer(UnaryCall::Begin(context_.short_calls, reactor), response));
     return reactor;
   }
 
@@ -99,7 +103,8 @@ class DisplayService final : public v1::DisplayService::CallbackService {
       reactor->Finish(ToGrpc(update.status()));
       return reactor;
     }
-    context_.core.UpdateDisplay(request.name(), *std::move(update), Answer(reactor, response));
+    context_.core.UpdateDisplay(request.name(), *std::move(update),
+                                Answer(UnaryCall::Begin(context_.short_calls, reactor), response));
     return reactor;
   }
 

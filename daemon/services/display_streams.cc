@@ -3,6 +3,7 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -141,11 +142,13 @@ class Capture final : public Sender<v1::VolumeChunk> {
   static constexpr int64_t kGreatestNs = 60 * sync::kSecond;
   static constexpr size_t kChunkBytes = 1u << 20;
 
-  using Sender::Sender;
+  explicit Capture(ServiceContext& context)
+      : Sender(context), core_(context.core), captures_(context.captures) {}
+  ~Capture() override { --*captures_; }
 
   void Start(const v1::CaptureVolumeRequest& request) {
     Begin();
-    if (const uint32_t most = context_.core.limits().max_captures; ++context_.captures > most) {
+    if (const uint32_t most = core_.limits().max_captures; ++*captures_ > most) {
       return End(absl::ResourceExhaustedError(
           absl::StrCat(most,
                        " captures are under way, which is max_captures; try again when one "
@@ -157,8 +160,8 @@ class Capture final : public Sender<v1::VolumeChunk> {
                                                          kGreatestNs, " (60 s), or 0 for 5 s")));
     }
     const uint64_t snapshot = request.at_least_snapshot();
-    context_.core.GetDisplay(request.name(), [self = Self(), timeout, snapshot](
-                                                 absl::StatusOr<DisplayDescription> display) {
+    core_.GetDisplay(request.name(), [self = Self(), timeout,
+                                      snapshot](absl::StatusOr<DisplayDescription> display) {
       if (!display.ok()) return self->End(display.status());
       self->display_ = *std::move(display);
       self->Ask(timeout, snapshot);
@@ -169,17 +172,34 @@ class Capture final : public Sender<v1::VolumeChunk> {
   std::shared_ptr<Capture> Self() { return std::static_pointer_cast<Capture>(shared_from_this()); }
 
   void Ask(sync::TimeNs timeout, uint64_t snapshot) {
-    context_.core.Capture(display_.info.name, timeout, snapshot,
-                          [self = Self()](absl::StatusOr<display::DecodedVolume> volume) {
-                            if (!volume.ok()) return self->End(volume.status());
-                            self->volume_ = *std::move(volume);
-                            v1::VolumeChunk chunk;
-                            wire::Encode(self->display_, self->volume_, chunk.mutable_header());
-                            self->Send(std::move(chunk));
-                          });
+    const CaptureId id =
+        core_.Capture(display_.info.name, timeout, snapshot,
+                      [self = Self()](absl::StatusOr<display::DecodedVolume> volume) {
+                        if (!volume.ok()) return self->End(volume.status());
+                        self->volume_ = *std::move(volume);
+                        v1::VolumeChunk chunk;
+                        wire::Encode(self->display_, self->volume_, chunk.mutable_header());
+                        self->Send(std::move(chunk));
+                      });
+    bool over = false;
+    {
+      sync::MutexLock lock(asking_);
+      asked_ = id;
+      over = over_;
+    }
+    if (over) core_.CancelCapture(display_.info.name, id);
   }
 
-  void OnEnded() override { --context_.captures; }
+  // A client that is gone must not keep the display at work, nor the place of another.
+  void OnEnded() override {
+    std::optional<CaptureId> asked;
+    {
+      sync::MutexLock lock(asking_);
+      over_ = true;
+      asked = asked_;
+    }
+    if (asked.has_value()) core_.CancelCapture(display_.info.name, *asked);
+  }
 
   // Whole slices, as many as fit into a chunk, but at least one.
   void OnSent() override {
@@ -198,6 +218,12 @@ class Capture final : public Sender<v1::VolumeChunk> {
     next_slice_ += count;
     Send(std::move(chunk));
   }
+
+  Core& core_;
+  const std::shared_ptr<std::atomic<uint32_t>> captures_;
+  sync::Mutex asking_;
+  std::optional<CaptureId> asked_ VOXELD_GUARDED_BY(asking_);
+  bool over_ VOXELD_GUARDED_BY(asking_) = false;
 
   // Set before the first message goes out, then touched by one reaction after another.
   DisplayDescription display_;

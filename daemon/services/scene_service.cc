@@ -1,14 +1,19 @@
 // SceneService: every method one line over what it does.
+#include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
+#include <grpcpp/support/slice.h>
 
 #include <algorithm>
 #include <memory>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/services/apply_update.h"
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
+#include "daemon/services/unary_call.h"
 #include "daemon/wire/encode.h"
 #include "voxeld/v1/scene.grpc.pb.h"
 
@@ -37,18 +42,20 @@ class RefusedWrites final : public grpc::ServerWriteReactor<Response> {
 
 // The core's answer into `response`, which gRPC keeps until the call is finished.
 template <typename T, typename Response>
-Core::Reply<T> Answer(ServerUnaryReactor* reactor, Response* response) {
-  return [reactor, response](absl::StatusOr<T> result) {
-    if (result.ok()) wire::Encode(*result, response);
-    reactor->Finish(ToGrpc(result.status()));
+Core::Reply<T> Answer(std::shared_ptr<UnaryCall> call, Response* response) {
+  return [call = std::move(call), response](const absl::StatusOr<T>& result) {
+    call->Answer(result.status(), [&] {
+      if (result.ok()) wire::Encode(*result, response);
+    });
   };
 }
 
 using SceneStub = v1::SceneService;
-using SceneBase = SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithCallbackMethod_ApplyUpdate<
-    SceneStub::WithCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
-        SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
-            SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>;
+using SceneBase =
+    SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithRawCallbackMethod_ApplyUpdate<
+        SceneStub::WithCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
+            SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
+                SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>;
 
 class SceneService final : public SceneBase {
  public:
@@ -59,9 +66,8 @@ class SceneService final : public SceneBase {
     return NewStream(context_);
   }
 
-  ServerUnaryReactor* ApplyUpdate(CallbackServerContext* call,
-                                  const v1::ApplyUpdateRequest* request,
-                                  v1::ApplyUpdateResponse* response) override {
+  ServerUnaryReactor* ApplyUpdate(CallbackServerContext* call, const grpc::ByteBuffer* request,
+                                  grpc::ByteBuffer* response) override {
     return DoApplyUpdate(call->DefaultReactor(), *request, response);
   }
 
@@ -95,12 +101,27 @@ class SceneService final : public SceneBase {
   }
 
  private:
-  ServerUnaryReactor* DoApplyUpdate(ServerUnaryReactor* reactor,
-                                    const v1::ApplyUpdateRequest& request,
-                                    v1::ApplyUpdateResponse* response) {
-    services::ApplyUpdate(context_, request, response, [reactor](const absl::Status& status) {
-      reactor->Finish(ToGrpc(status));
-    });
+  ServerUnaryReactor* DoApplyUpdate(ServerUnaryReactor* reactor, const grpc::ByteBuffer& request,
+                                    grpc::ByteBuffer* response) {
+    const auto call = UnaryCall::Begin(context_.short_calls, reactor);
+    std::vector<grpc::Slice> slices;
+    if (!request.Dump(&slices).ok()) {
+      call->End(absl::InternalError("a message could not be decompressed"));
+      return reactor;
+    }
+    std::vector<std::string_view> views;
+    views.reserve(slices.size());
+    for (const grpc::Slice& slice : slices) {
+      views.emplace_back(reinterpret_cast<const char*>(slice.begin()), slice.size());
+    }
+    services::ApplyUpdate(
+        context_, views,
+        [call, response](const absl::Status& status, const v1::ApplyUpdateResponse& answer) {
+          call->Answer(status, [&] {
+            const grpc::Slice slice(answer.SerializeAsString());
+            *response = grpc::ByteBuffer(&slice, 1);
+          });
+        });
     return reactor;
   }
 
@@ -111,7 +132,9 @@ class SceneService final : public SceneBase {
         request.owner(), request.layer(), request.id_prefix(),
         request.page_size() == 0 ? kPageSize : std::min(request.page_size(), kPageSize),
         request.page_token()};
-    context_.core.ListEntities(std::move(query), Answer<EntityPage>(reactor, response));
+    context_.core.ListEntities(
+        std::move(query),
+        Answer<EntityPage>(UnaryCall::Begin(context_.short_calls, reactor), response));
     return reactor;
   }
 
@@ -125,15 +148,17 @@ class SceneService final : public SceneBase {
       return reactor;
     }
     context_.core.GetEntity({key.owner(), key.layer(), key.id()},
-                            Answer<EntityInfo>(reactor, response->mutable_info()));
+                            Answer<EntityInfo>(UnaryCall::Begin(context_.short_calls, reactor),
+                                               response->mutable_info()));
     return reactor;
   }
 
   ServerUnaryReactor* DoClearLayer(ServerUnaryReactor* reactor,
                                    const v1::ClearLayerRequest& request,
                                    v1::ClearLayerResponse* response) {
-    context_.core.ClearLayer(request.owner(), request.layer(), request.keep_state(),
-                             Answer<Cleared>(reactor, response));
+    context_.core.ClearLayer(
+        request.owner(), request.layer(), request.keep_state(),
+        Answer<Cleared>(UnaryCall::Begin(context_.short_calls, reactor), response));
     return reactor;
   }
 

@@ -101,7 +101,11 @@ class Server::Impl {
     context_.calls.EndAll(absl::UnavailableError("shutting down"));
     const sync::TimeNs deadline = context_.clock.Now() + limit;
     context_.calls.AwaitNone(context_.clock, deadline);
-    // What is left are short calls, and clients whose threads do not look at their connections:
+    context_.short_calls.AwaitNone(context_.clock, deadline);
+    // gRPC waits until every call has finished, and the core may be busy for longer than that.
+    context_.short_calls.EndAll(
+        absl::UnavailableError("shutting down; whether the call was carried out is not known"));
+    // What is left are clients whose threads do not look at their connections:
     // gRPC would wait for those to the end.
     const sync::TimeNs rest =
         std::clamp<sync::TimeNs>(deadline - context_.clock.Now(), 0, kLastCallsLimit);

@@ -42,7 +42,8 @@ class Server {
 
   // Health answers NOT_SERVING, nothing new is accepted, every long call ends with
   // `Unavailable: shutting down` after what is queued for it. Returns when all calls have ended,
-  // after at most `limit`: then those left are cancelled.
+  // after at most `limit`: then those left are cancelled, and short ones are Unavailable, whatever
+  // the core is busy with. What it answers later is dropped.
   void Shutdown(sync::TimeNs limit);
 
  private:

@@ -32,7 +32,7 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
     if (state_ != State::kNew && state_ != State::kOpen) return;
     previous = sequence_;
   }
-  wire::Decoded decoded = wire::DecodeStreamRequest(slices, context_.core.limits(), previous);
+  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous);
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
     OpenOptions open = *std::exchange(decoded.open, std::nullopt);
@@ -55,19 +55,19 @@ void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t b
     }
   }
   if (!first) {
-    decoded.issues.push_back({decoded.sequence,
-                              {},
-                              {},
-                              "open",
-                              Reason::kOutOfOrder,
-                              "open came a second time; a stream is opened once, by its first "
-                              "message"});
+    decoded.refused.Add({decoded.sequence,
+                         {},
+                         {},
+                         "open",
+                         Reason::kOutOfOrder,
+                         "open came a second time; a stream is opened once, by its first message"},
+                        core_.limits().max_issues_per_commit);
     return TakeOperations(std::move(decoded), bytes);
   }
-  context_.core.OpenSession(std::move(open), shared_from_this(),
-                            [self = shared_from_this()](const absl::StatusOr<SessionInfo>& info) {
-                              self->OnOpened(info);
-                            });
+  core_.OpenSession(std::move(open), shared_from_this(),
+                    [self = shared_from_this()](const absl::StatusOr<SessionInfo>& info) {
+                      self->OnOpened(info);
+                    });
 }
 
 void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
@@ -84,7 +84,7 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
       opened->set_owner(info->owner);
       opened->set_server_version(context_.version);
       opened->set_server_time_ns(context_.clock.Now());
-      wire::Encode(context_.core.limits(), opened->mutable_limits());
+      wire::Encode(core_.limits(), opened->mutable_limits());
       opened->mutable_displays()->Assign(info->displays.begin(), info->displays.end());
       state_ = State::kOpen;
       Queue(response);
@@ -119,8 +119,8 @@ void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
     return End(absl::FailedPreconditionError(
         "the first message of a stream must be open; the operation was not carried out"));
   }
-  context_.core.Handle(session, std::move(decoded.operations), std::move(decoded.issues), bytes,
-                       [self = shared_from_this()] { self->OnProcessed(); });
+  core_.Handle(session, std::move(decoded.operations), std::move(decoded.refused), bytes,
+               [self = shared_from_this()] { self->OnProcessed(); });
   // Only now: a message that came in on another thread would overtake this one.
   sync::MutexLock lock(mutex_);
   reading_ = false;
@@ -184,9 +184,11 @@ void StreamSession::OnCancel() {
     queue_.clear();
     queued_bytes_ = 0;
     close = Close(absl::CancelledError("the client is gone"));
-    FinishIfFlushed();
   }
   if (close) CloseSession();
+  sync::MutexLock lock(mutex_);
+  if (state_ == State::kClosing) state_ = State::kFlushing;  // nobody is there to wait with
+  FinishIfFlushed();
 }
 
 void StreamSession::End(const absl::Status& status) {
@@ -216,13 +218,13 @@ void StreamSession::CloseSession() {
   {
     sync::MutexLock lock(mutex_);
     session = session_;
-    if (context_.log != nullptr) {
+    if (port_ != nullptr && context_.log != nullptr) {
       context_.log->Info("session closed", {{"session", std::to_string(session)},
                                             {"client", client_name_},
                                             {"why", end_.ToString()}});
     }
   }
-  context_.core.CloseSession(session, [self = shared_from_this()] { self->OnClosed(); });
+  core_.CloseSession(session, [self = shared_from_this()] { self->OnClosed(); });
 }
 
 void StreamSession::OnClosed() {
@@ -290,11 +292,12 @@ void StreamSession::Queue(const v1::StreamResponse& response) {
 }
 
 bool StreamSession::Overrun() {
+  if (port_ == nullptr) return false;
   if (queue_.size() <= context_.limits.max_queued_answers &&
       queued_bytes_ <= context_.limits.max_queued_bytes) {
     return false;
   }
-  context_.core.CountOverrun();
+  core_.CountOverrun();
   const bool close = !ending_;
   if (close) {
     ending_ = true;

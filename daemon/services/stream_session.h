@@ -8,7 +8,7 @@
 //                         outcomes, closes the session, writes what is queued, ends with OK
 //   End, bad bytes        closes the session, writes what is queued (drain_limit_ns at most), ends
 //                         with the status
-//   client gone           closes the session at once
+//   client gone           closes the session and ends at once
 //   client does not read  closes the session and ends with RESOURCE_EXHAUSTED
 //                         once the queue is full
 //
@@ -53,7 +53,8 @@ class StreamSession final : public SessionSink,
   static constexpr int kMaxUnprocessed = 4;
 
   // `context` outlives the session; `port` lives until OnPortDone.
-  StreamSession(ServiceContext& context, StreamPort* port) : context_(context), port_(port) {}
+  StreamSession(ServiceContext& context, StreamPort* port)
+      : context_(context), core_(context.core), port_(port) {}
 
   void Start();
 
@@ -99,7 +100,8 @@ class StreamSession final : public SessionSink,
   void FinishIfFlushed() VOXELD_REQUIRES(mutex_);
   void Finish() VOXELD_REQUIRES(mutex_);
 
-  ServiceContext& context_;
+  ServiceContext& context_;  // there as long as the port is
+  Core& core_;
   sync::Mutex mutex_;
   StreamPort* port_ VOXELD_GUARDED_BY(mutex_);
   State state_ VOXELD_GUARDED_BY(mutex_) = State::kNew;

@@ -3,6 +3,8 @@
 #include <google/protobuf/arena.h>
 #include <google/protobuf/stubs/logging.h>
 
+#include <algorithm>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -93,28 +95,71 @@ MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, const Limits& limit
   return {};
 }
 
+absl::Status TooManyOperations(uint64_t count, const Limits& limits) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("operations has ", count, " elements; max_operations_per_commit allows ",
+                   limits.max_operations_per_commit, ": send more updates that are smaller"));
+}
+
+struct ElementRow {
+  const char* field;
+  std::span<const int> path;
+  uint64_t limit;
+};
+
+// Of an ApplyUpdateRequest; those of a StreamRequest leave out the first.
+constexpr int kUpsertsPath[] = {v1::ApplyUpdateRequest::kOperationsFieldNumber,
+                                v1::StreamRequest::kBatchFieldNumber,
+                                v1::Batch::kUpsertsFieldNumber};
+constexpr int kPartsPath[] = {
+    v1::ApplyUpdateRequest::kOperationsFieldNumber, v1::StreamRequest::kDefineObjectFieldNumber,
+    v1::DefineObject::kDefinitionFieldNumber, v1::Object::kPartsFieldNumber};
+
 // Before anything is parsed. A little too many elements are an Issue, later; so many that to unfold
-// them would be a burden end the stream.
-absl::Status CheckElements(std::span<const std::string_view> slices, const Limits& limits) {
-  struct Row {
-    const char* field;
-    std::vector<int> path;
-    uint64_t limit;
-  };
-  const Row rows[] = {{"batch.upserts",
-                       {v1::StreamRequest::kBatchFieldNumber, v1::Batch::kUpsertsFieldNumber},
-                       limits.max_operations_per_commit},
-                      {"define_object.definition.parts",
-                       {v1::StreamRequest::kDefineObjectFieldNumber,
-                        v1::DefineObject::kDefinitionFieldNumber, v1::Object::kPartsFieldNumber},
-                       limits.max_parts_per_object}};
-  for (const Row& row : rows) {
+// them would be a burden end the stream, or refuse the update.
+absl::Status CheckElements(std::span<const std::string_view> slices,
+                           std::span<const ElementRow> rows) {
+  for (const ElementRow& row : rows) {
     const uint64_t count = CountElements(slices, row.path);
     if (count / kAbsurd <= row.limit) continue;
     return absl::ResourceExhaustedError(
         absl::StrCat(row.field, " has ", count, " elements; ", row.limit, " are allowed"));
   }
   return absl::OkStatus();
+}
+
+absl::Status CheckUpdateElements(std::span<const std::string_view> slices, const Limits& limits) {
+  if (const uint64_t count = CountElements(slices, std::span(kUpsertsPath).first(1));
+      count > limits.max_operations_per_commit) {
+    return TooManyOperations(count, limits);
+  }
+  // Together they may be as many as are allowed of entities, or of one object's parts.
+  const ElementRow rows[] = {
+      {"operations[].batch.upserts", kUpsertsPath, limits.max_operations_per_commit},
+      {"operations[].define_object.definition.parts", kPartsPath,
+       std::max(limits.max_operations_per_commit, limits.max_parts_per_object)}};
+  return CheckElements(slices, rows);
+}
+
+absl::Status CheckSize(std::span<const std::string_view> slices, const Limits& limits,
+                       uint64_t* size) {
+  *size = 0;
+  for (const std::string_view slice : slices) *size += slice.size();
+  if (*size <= limits.max_message_bytes) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrCat("a message of ", *size, " bytes; max_message_bytes allows ",
+                   limits.max_message_bytes, ": send more messages that are smaller"));
+}
+
+absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, const char* type,
+                   google::protobuf::Message* out) {
+  SliceStream stream(slices);
+  // The status says it all; a client must not fill logs.
+  const google::protobuf::LogSilencer silence;
+  if (out->ParseFromZeroCopyStream(&stream)) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("a message of ", size, " bytes is not a voxeld.v1.", type,
+                   ": malformed protobuf, or text that is not UTF-8"));
 }
 
 Decoded Failed(absl::Status status) {
@@ -128,18 +173,18 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits&
           uint64_t previous_sequence, Decoded* out) {
   out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
   if (out->sequence <= previous_sequence) {
-    out->issues.push_back(
-        {request.sequence(),
-         {},
-         {},
-         FieldPath(path, "sequence").ToString(),
-         Reason::kOutOfOrder,
-         absl::StrCat("sequence is ", request.sequence(), " after ", previous_sequence,
-                      "; numbers ascend, or are 0 to have the server count")});
+    out->refused.Add({request.sequence(),
+                      {},
+                      {},
+                      FieldPath(path, "sequence").ToString(),
+                      Reason::kOutOfOrder,
+                      absl::StrCat("sequence is ", request.sequence(), " after ", previous_sequence,
+                                   "; numbers ascend, or are 0 to have the server count")},
+                     limits.max_issues_per_commit);
     out->sequence = previous_sequence;
     if (request.op_case() != v1::StreamRequest::kCommit) return;
   }
-  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->issues});
+  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->refused});
 }
 
 }  // namespace
@@ -167,28 +212,40 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
                             uint64_t previous_sequence) {
   uint64_t size = 0;
-  for (const std::string_view slice : slices) size += slice.size();
-  if (size > limits.max_message_bytes) {
-    return Failed(absl::ResourceExhaustedError(
-        absl::StrCat("a message of ", size, " bytes; max_message_bytes allows ",
-                     limits.max_message_bytes, ": send more messages that are smaller")));
-  }
-  if (absl::Status status = CheckElements(slices, limits); !status.ok()) return Failed(status);
+  if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
+  const ElementRow rows[] = {
+      {"batch.upserts", std::span(kUpsertsPath).subspan(1), limits.max_operations_per_commit},
+      {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
+       limits.max_parts_per_object}};
+  if (absl::Status status = CheckElements(slices, rows); !status.ok()) return Failed(status);
   google::protobuf::Arena arena;
   auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
-  SliceStream stream(slices);
-  // The status says it all; a client must not fill logs.
-  const google::protobuf::LogSilencer silence;
-  if (!request->ParseFromZeroCopyStream(&stream)) {
-    return Failed(absl::InvalidArgumentError(absl::StrCat(
-        "a message of ", size,
-        " bytes is not a voxeld.v1.StreamRequest: malformed protobuf, or text that is not UTF-8")));
+  if (absl::Status status = Parse(slices, size, "StreamRequest", request); !status.ok()) {
+    return Failed(status);
   }
   return DecodeStreamRequest(*request, limits, previous_sequence);
 }
 
+Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits) {
+  uint64_t size = 0;
+  if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
+  if (absl::Status status = CheckUpdateElements(slices, limits); !status.ok()) {
+    return Failed(status);
+  }
+  google::protobuf::Arena arena;
+  auto* request = google::protobuf::Arena::CreateMessage<v1::ApplyUpdateRequest>(&arena);
+  if (absl::Status status = Parse(slices, size, "ApplyUpdateRequest", request); !status.ok()) {
+    return Failed(status);
+  }
+  return DecodeUpdate(*request, limits);
+}
+
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits) {
   Decoded out;
+  if (const auto count = static_cast<uint64_t>(request.operations_size());
+      count > limits.max_operations_per_commit) {
+    return Failed(TooManyOperations(count, limits));
+  }
   absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
   if (!open.ok()) return Failed(open.status());
   if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {

@@ -29,8 +29,8 @@ struct Decoded {
   absl::Status status;              // not OK: nothing else is set, and the stream cannot go on
   std::optional<OpenOptions> open;  // the message was an Open
   std::vector<Operation> operations;
-  std::vector<Issue> issues;  // one for each operation refused
-  uint64_t sequence = 0;      // of the last request
+  Refusals refused;
+  uint64_t sequence = 0;  // of the last request
 };
 
 // One StreamRequest. `previous_sequence` is that of the request before (0: none): a request without
@@ -51,6 +51,11 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
 
 // An ApplyUpdateRequest: `open` is always set (KEEP unless it says otherwise), the operations end
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].".
+//
+// Status: as above, and InvalidArgument for more than max_operations_per_commit operations.
+Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits);
+
+// The same for a request that is parsed already.
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits);
 
 absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);

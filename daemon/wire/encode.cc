@@ -100,6 +100,8 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_scene_bytes(in.max_scene_bytes);
   out->set_max_captures(in.max_captures);
   out->set_max_linger_ns(in.max_linger_ns);
+  out->set_max_issues_per_commit(in.max_issues_per_commit);
+  out->set_max_uncommitted_bytes_total(in.max_uncommitted_bytes_total);
 }
 
 void Encode(const EntityKey& in, v1::EntityKey* out) {

@@ -232,11 +232,13 @@ MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit
 }
 
 // The message names the field alone; the whole path stands beside it.
-void AddIssue(Fault fault, uint64_t sequence, std::string layer, std::string id, const Sinks& out) {
+void AddIssue(Fault fault, uint64_t sequence, std::string layer, std::string id,
+              const Limits& limits, const Sinks& out) {
   std::string message =
       absl::StrCat(fault.field.substr(fault.field.rfind('.') + 1), " ", fault.message);
-  out.issues->push_back({sequence, std::move(layer), std::move(id), std::move(fault.field),
-                         fault.reason, std::move(message)});
+  out.refused->Add({sequence, std::move(layer), std::move(id), std::move(fault.field), fault.reason,
+                    std::move(message)},
+                   limits.max_issues_per_commit);
 }
 
 template <typename In>
@@ -257,7 +259,7 @@ void Add(const FieldPath& path, const In& in, uint64_t sequence, const Limits& l
          const Sinks& out) {
   Out op;
   if (auto fault = To(path, in, limits, &op)) {
-    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), out);
+    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), limits, out);
     if (!std::is_same_v<Out, Commit>) return;
   }
   out.operations->push_back({sequence, std::move(op)});
@@ -271,7 +273,7 @@ void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence, con
         {upserts.ToString(), Reason::kQuotaExceeded,
          absl::StrCat("has ", in.upserts_size(), " entities; max_operations_per_commit allows ",
                       limits.max_operations_per_commit)},
-        sequence, {}, {}, out);
+        sequence, {}, {}, limits, out);
     return;
   }
   out.operations->reserve(out.operations->size() + static_cast<size_t>(in.upserts_size()));
@@ -319,7 +321,7 @@ void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, ui
             "is not set, or not known to this version of the server; give one of upsert, delete, "
             "set_transform, layer_state, frame_begin, frame_end, commit, define_object, "
             "delete_object, batch"},
-           sequence, {}, {}, out);
+           sequence, {}, {}, limits, out);
 }
 
 }  // namespace voxeld::daemon::wire

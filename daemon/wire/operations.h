@@ -13,7 +13,7 @@ namespace voxeld::daemon::wire {
 
 struct Sinks {
   std::vector<Operation>* operations;
-  std::vector<Issue>* issues;
+  Refusals* refused;
 };
 
 // Appends what `request` asks for (anything but an Open) to `out`, under `sequence`. `path` is that

@@ -143,6 +143,9 @@ absl::Status Display::SetBrightness(double brightness) {
 
 absl::Status Display::SetBlank(bool blank) {
   if (blank == blanked_) return absl::OkStatus();
+  if (attached()) {
+    if (absl::Status status = DoSetBlank(blank); !status.ok()) return status;
+  }
   blanked_ = blank;
   if (blank) {
     // The verdict falls now; the driver may still finish what it sends,
@@ -155,8 +158,6 @@ absl::Status Display::SetBlank(bool blank) {
     FinishCaptures(absl::UnavailableError("the display was blanked"));
   }
   if (!attached()) return absl::OkStatus();
-  const absl::Status status = DoSetBlank(blank);
-  if (!attached()) return status;
   if (blank) {
     SetState(DisplayState::kBlanked, "blanked");
   } else {
@@ -164,18 +165,34 @@ absl::Status Display::SetBlank(bool blank) {
     if (full_next_ && newest_ != nullptr) resend_at_ = clock_.Now();
     SendNext();
   }
-  return status;
+  return absl::OkStatus();
 }
 
-void Display::Capture(sync::TimeNs timeout, CaptureDone done) {
+template <typename Goes>
+std::vector<Display::PendingCapture> Display::TakeCaptures(Goes goes) {
+  std::vector<PendingCapture> taken;
+  std::copy_if(captures_.begin(), captures_.end(), std::back_inserter(taken), goes);
+  std::erase_if(captures_, goes);
+  if (captures_.empty()) decoder_ = nullptr;
+  return taken;
+}
+
+void Display::Capture(sync::TimeNs timeout, CaptureDone done, CaptureId id) {
   if (state_ != DisplayState::kShowing && state_ != DisplayState::kAttaching) {
     return done(absl::UnavailableError(absl::StrCat(
         "display \"", info_.name, "\" is ", DisplayStateName(state_), ": ", state_reason_)));
   }
   const sync::TimeNs now = clock_.Now();
   captures_.push_back(
-      {timeout < sync::kNever - now ? now + timeout : sync::kNever, std::move(done)});
+      {timeout < sync::kNever - now ? now + timeout : sync::kNever, std::move(done), id});
   SendNext();
+}
+
+void Display::CancelCapture(CaptureId id) {
+  for (const PendingCapture& capture :
+       TakeCaptures([id](const PendingCapture& pending) { return pending.id == id; })) {
+    capture.done(absl::CancelledError("the capture was cancelled"));
+  }
 }
 
 void Display::Attached() {
@@ -325,12 +342,8 @@ void Display::FinishCaptures(const absl::StatusOr<DecodedVolume>& result) {
 }
 
 void Display::ExpireCaptures(sync::TimeNs now) {
-  std::vector<PendingCapture> late;
-  const auto due = [now](const PendingCapture& capture) { return capture.deadline <= now; };
-  std::copy_if(captures_.begin(), captures_.end(), std::back_inserter(late), due);
-  std::erase_if(captures_, due);
-  if (captures_.empty()) decoder_ = nullptr;
-  for (const PendingCapture& capture : late) {
+  for (const PendingCapture& capture :
+       TakeCaptures([now](const PendingCapture& pending) { return pending.deadline <= now; })) {
     capture.done(absl::DeadlineExceededError(
         absl::StrCat("no volume was shown in time; display \"", info_.name, "\" is ",
                      DisplayStateName(state_), ": ", state_reason_)));

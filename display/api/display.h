@@ -74,6 +74,9 @@ class WireDecoder {
   virtual std::optional<DecodedVolume> TakeVolume() = 0;
 };
 
+// Names a capture to whoever asked for it; 0: it has no name.
+using CaptureId = uint64_t;
+
 class Display {
  public:
   // Called inside Start, Submit, Tick, Stop, SetBlank on the owner's thread; must not call back.
@@ -130,7 +133,9 @@ class Display {
   // re-sends the current one whole for it, or a black one (number 0) if it never had any; such a
   // volume has no outcome. `done` gets DeadlineExceeded after `timeout`, Unavailable when the
   // display stops, is blanked or is lost (at once, if it is already).
-  void Capture(sync::TimeNs timeout, CaptureDone done);
+  void Capture(sync::TimeNs timeout, CaptureDone done, CaptureId id = 0);
+  // Ends the captures of that name, inside the call, with Cancelled.
+  void CancelCapture(CaptureId id);
 
   // Predicted starts of coming sweeps (owner's clock), nearest first; empty if not known.
   virtual std::vector<sync::TimeNs> ComingSweeps(int /*count*/) const { return {}; }
@@ -179,6 +184,7 @@ class Display {
   struct PendingCapture {
     sync::TimeNs deadline;
     CaptureDone done;
+    CaptureId id;
   };
 
   void SetState(DisplayState state, const std::string& reason);
@@ -191,6 +197,9 @@ class Display {
   // The capture's volume is in `decoder_`, or an error is to be told; ends the tap.
   void FinishCaptures(const absl::StatusOr<DecodedVolume>& result);
   void ExpireCaptures(sync::TimeNs now);
+  // Takes out those for which `goes` holds; without any left the tap ends.
+  template <typename Goes>
+  std::vector<PendingCapture> TakeCaptures(Goes goes);
 
   const DisplayInfo info_;
   sync::Clock& clock_;

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <future>
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/str_cat.h"
@@ -183,6 +184,48 @@ TEST_P(Stop, WithClientsConnectedEndsInTimeAndWell) {
 INSTANTIATE_TEST_SUITE_P(Signal, Stop, ::testing::Values(SIGTERM, SIGINT), [](const auto& info) {
   return std::string(info.param == SIGTERM ? "SIGTERM" : "SIGINT");
 });
+
+TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
+  Daemon daemon;
+  const auto scene = v1::SceneService::NewStub(Channel(daemon.tcp_target()));
+  v1::ApplyUpdateRequest request;
+  const v1::Entity ball = SphereIn("", "").upsert().entity();
+  const auto define = [&] {
+    v1::DefineObject* define = request.add_operations()->mutable_define_object();
+    define->set_object("object");
+    *define->mutable_definition()->add_parts()->mutable_primitive() = ball.primitive();
+  };
+  define();
+  constexpr int kMany = 20'000;
+  for (int i = 0; i < kMany; ++i) {
+    v1::Upsert* upsert = request.add_operations()->mutable_upsert();
+    upsert->set_layer("layer");
+    upsert->set_id(absl::StrCat(i));
+    upsert->mutable_entity()->mutable_primitive()->mutable_instance()->set_object("object");
+  }
+  for (int i = 0; i < kMany; ++i) define();  // each looks at every instance
+  grpc::ClientContext update;
+  SetDeadline(update);
+  v1::ApplyUpdateResponse response;
+  std::promise<grpc::Status> updated;
+  scene->async()->ApplyUpdate(&update, &request, &response,
+                              [&](grpc::Status status) { updated.set_value(std::move(status)); });
+  grpc::Status listed;
+  do {  // until the commit keeps the core from answering
+    grpc::ClientContext list;
+    list.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
+    v1::ListEntitiesResponse entities;
+    listed = scene->ListEntities(&list, {}, &entities);
+  } while (listed.ok());
+  ASSERT_EQ(listed.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+
+  const auto begin = std::chrono::steady_clock::now();
+  daemon.process().Signal(SIGTERM);
+  const std::optional<int> code = daemon.process().Wait();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kPromised);
+  EXPECT_EQ(code, 0) << daemon.process().output();
+  EXPECT_EQ(updated.get_future().get().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
 
 TEST(Stop, AndStartAgainOnTheSameSocketEvenAfterAKill) {
   const Folder folder;

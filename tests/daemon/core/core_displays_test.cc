@@ -202,6 +202,25 @@ TEST(CoreDisplays, ACaptureEndsInTimeAndWithTheDisplay) {
   EXPECT_EQ(Capture(sim, sync::kSecond, 0)->result.status().code(), absl::StatusCode::kUnavailable);
 }
 
+TEST(CoreDisplays, ACancelledCaptureHoldsNothingUp) {
+  Simulation sim;
+  sim.Start();
+  const sync::TimeNs idle = sim.core->Step();
+  // One that waits for its snapshot, and one that waits for the device.
+  for (const uint64_t at_least : {uint64_t{9}, uint64_t{0}}) {
+    absl::Status status = absl::UnknownError("no answer");
+    const CaptureId id = sim.core->Capture("main", 60 * sync::kSecond, at_least,
+                                           [&](auto r) { status = r.status(); });
+    sim.core->CancelCapture("main", id + 1);
+    sim.core->Step();
+    EXPECT_TRUE(absl::IsUnknown(status));
+    sim.core->CancelCapture("main", id);
+    sim.core->CancelCapture("nobody", id);
+    EXPECT_EQ(sim.core->Step(), idle);
+    EXPECT_TRUE(absl::IsCancelled(status)) << status;
+  }
+}
+
 TEST(CoreDisplays, NothingIsOwedAfterStop) {
   Simulation sim;
   sim.Start();

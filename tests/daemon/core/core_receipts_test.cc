@@ -275,7 +275,7 @@ TEST(CoreReceipts, DecodingsRefusalsCountForTheCommitThatTheyComeBefore) {
   issues[0].sequence = 2;
   issues[1].sequence = 7;
   issues[2].sequence = 10;
-  sim.core->Handle(client.info.session, std::move(all), std::move(issues), 1, nullptr);
+  sim.core->Handle(client.info.session, std::move(all), {std::move(issues)}, 1, nullptr);
   sim.core->Step();
   EXPECT_EQ(client.sink->issues.size(), 3u);
   const auto accepted = client.sink->Of<Accepted>();

@@ -70,6 +70,17 @@ TEST(CoreSessions, LingeringLayersGoAfterTheirTime) {
   EXPECT_TRUE(sim.engine().scene->drawables().empty());
 }
 
+TEST(CoreSessions, TheLongestLingerIsForEver) {
+  Simulation sim;
+  sim.Start();
+  sim.clock.Advance(sync::kSecond);
+  auto client = sim.Open(Policy(DisconnectPolicy::kLinger, INT64_MAX));
+  sim.Send(client, 1, Put("a", "x"));
+  sim.Close(client);
+  sim.Advance(3600 * sync::kSecond);
+  EXPECT_EQ(sim.List().total, 1u);
+}
+
 TEST(CoreSessions, KeptLayersStayAsOrphansUntilCleared) {
   Simulation sim;
   sim.Start();
@@ -168,6 +179,7 @@ TEST(CoreSessions, WhatWaitsForACommitIsLimited) {
   ASSERT_EQ(client.sink->issues.size(), 1u);  // at once, before the commit
   EXPECT_EQ(client.sink->issues[0].reason, Reason::kQuotaExceeded);
   EXPECT_EQ(client.sink->issues[0].id, "4");
+  EXPECT_EQ(client.sink->issues[0].field, "upsert");
   EXPECT_EQ(client.sink->issues[0].sequence, 4u);
   sim.Send(client, 1);
   EXPECT_EQ(client.sink->Of<Accepted>()[0].second.refused_operations, 1u);
@@ -179,6 +191,77 @@ TEST(CoreSessions, WhatWaitsForACommitIsLimited) {
   sim.Send(client, 2, Put("a", "5"), Put("a", "6"), Put("a", "7"));
   EXPECT_EQ(client.sink->Of<Accepted>()[1].second.refused_operations, 1u);
   EXPECT_EQ(sim.List().total, 6u);
+}
+
+TEST(CoreSessions, AStrictSessionIsToldWhichOperationWasOneTooMany) {
+  Limits limits;
+  limits.max_operations_per_commit = 1;
+  Simulation sim(limits);
+  sim.Start();
+  OpenOptions options;
+  options.strict = true;
+  auto client = sim.Open(options);
+  sim.Send(client, 1, Put("a", "1"), testing::Begin("a"));
+  ASSERT_EQ(client.sink->Of<Refused>().size(), 1u);
+  EXPECT_THAT(client.sink->Of<Refused>()[0].second.message,
+              HasSubstr("the first: frame_begin: 1 operations wait for a commit"));
+}
+
+TEST(CoreSessions, WhatWaitsForACommitIsLimitedOverAllSessions) {
+  Limits limits;
+  limits.max_uncommitted_bytes_total = 10000;
+  Simulation sim(limits);
+  sim.Start();
+  auto one = sim.Open(), other = sim.Open(), third = sim.Open();
+  const auto put = [] { return Put("a", "big", Entity1(Dots(0, 1, 500))); };  // 6000 bytes
+  sim.Send(one, 0, put());
+  sim.Send(other, 0, put());
+  EXPECT_TRUE(one.sink->issues.empty());
+  ASSERT_EQ(other.sink->issues.size(), 1u);
+  EXPECT_EQ(other.sink->issues[0].reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(other.sink->issues[0].message, HasSubstr("max_uncommitted_bytes_total is 10000"));
+  sim.Send(one, 1);  // makes room,
+  sim.Send(other, 0, put());
+  EXPECT_EQ(other.sink->issues.size(), 1u);
+  sim.Close(other);  // and so does one who goes
+  sim.Send(third, 2, put());
+  EXPECT_TRUE(third.sink->issues.empty());
+}
+
+TEST(CoreSessions, OfManyRefusalsTheFirstAreToldAndTheOthersCounted) {
+  Limits limits;
+  limits.max_issues_per_commit = 3;
+  Simulation sim(limits);
+  sim.Start();
+  auto client = sim.Open();
+  const auto singular = [] { return Put("a", "x", Entity1(Dots(0), testing::Scale(1, 0, 1))); };
+  const auto unknown = [] { return testing::Move("a", "nobody", testing::Shift(1)); };
+  // Two on arrival, three at the commit.
+  sim.Send(client, 1, singular(), singular(), unknown(), unknown(), unknown(), Put("a", "good"));
+  ASSERT_EQ(client.sink->issues.size(), 4u);
+  EXPECT_EQ(client.sink->issues[2].reason, Reason::kNotFound);
+  EXPECT_EQ(client.sink->issues[3].field, "commit");
+  EXPECT_EQ(client.sink->issues[3].sequence, 7u);
+  EXPECT_EQ(client.sink->issues[3].reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(client.sink->issues[3].message, HasSubstr("2 more issues are left out"));
+  EXPECT_THAT(client.sink->issues[3].message, HasSubstr("the 3 of max_issues_per_commit"));
+  EXPECT_EQ(client.sink->Of<Accepted>()[0].second.refused_operations, 5u);
+  EXPECT_EQ(sim.List().total, 1u);
+
+  // Each commit begins anew; what decoding left out is counted too.
+  Refusals refused;
+  for (int i = 0; i < 5; ++i)
+    refused.Add({8, "a", "y", "upsert", Reason::kInvalidValue, "wrong"}, 2);
+  sim.core->Handle(client.info.session, {}, refused, 100, nullptr);
+  sim.core->Step();
+  EXPECT_EQ(client.sink->issues.size(), 6u);
+  client.last_sequence = 8;
+  sim.Send(client, 2, unknown(), unknown());
+  ASSERT_EQ(client.sink->issues.size(), 8u);
+  EXPECT_THAT(client.sink->issues[7].message, HasSubstr("4 more issues are left out"));
+  EXPECT_EQ(client.sink->Of<Accepted>()[1].second.refused_operations, 7u);
+  sim.Send(client, 3, Put("a", "good"));
+  EXPECT_EQ(client.sink->issues.size(), 8u);
 }
 
 TEST(CoreSessions, WhatIsWrongInItselfIsRefusedOnArrival) {

@@ -305,6 +305,9 @@ class StuckDisplay final : public display::Display {
     sync::CondVar changed;
     bool open VOXELD_GUARDED_BY(mutex) = false;
     bool ended VOXELD_GUARDED_BY(mutex) = false;
+    // Ticks wait for the gate too, the first of them in here.
+    bool stops_ticks VOXELD_GUARDED_BY(mutex) = false;
+    bool in_tick VOXELD_GUARDED_BY(mutex) = false;
   };
   StuckDisplay(std::shared_ptr<Gate> gate, sync::Clock& clock)
       : Display(testing::SmallDisplay("stuck"), clock), gate_(std::move(gate)) {}
@@ -321,7 +324,13 @@ class StuckDisplay final : public display::Display {
     while (!gate_->open) gate_->changed.Wait(gate_->mutex);
   }
   void DoSend(const display::SliceFramePtr&, bool) override {}
-  sync::TimeNs DoTick(sync::TimeNs) override { return sync::kNever; }
+  sync::TimeNs DoTick(sync::TimeNs) override {
+    sync::MutexLock lock(gate_->mutex);
+    gate_->in_tick = gate_->stops_ticks;
+    gate_->changed.NotifyAll();
+    while (gate_->stops_ticks && !gate_->open) gate_->changed.Wait(gate_->mutex);
+    return sync::kNever;
+  }
   absl::Status DoSetBrightness(double) override { return absl::OkStatus(); }
   absl::Status DoSetBlank(bool) override { return absl::OkStatus(); }
   std::unique_ptr<display::WireDecoder> DoMakeDecoder() const override { return nullptr; }
@@ -340,7 +349,7 @@ TEST(CoreThreads, StopNamesWhatHadNotEndedAndLeavesItAlone) {
     Core core(std::move(options), TheClock());
     ASSERT_TRUE(core.AddDisplay(std::make_unique<StuckDisplay>(gate, TheClock()), {}).ok());
     ASSERT_TRUE(core.Start().ok());
-    const absl::Status status = core.Stop(40 * sync::kMillisecond);
+    const absl::Status status = core.Stop(400 * sync::kMillisecond);
     EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded);
     EXPECT_THAT(status.message(), HasSubstr("display \"stuck\""));
     EXPECT_THAT(status.message(), ::testing::Not(HasSubstr("core")));
@@ -350,6 +359,44 @@ TEST(CoreThreads, StopNamesWhatHadNotEndedAndLeavesItAlone) {
   gate->open = true;
   gate->changed.NotifyAll();
   while (!gate->ended) gate->changed.Wait(gate->mutex);
+}
+
+TEST(CoreThreads, WhatADisplayWasAskedIsAnsweredAlsoWhenTheCoreHasGone) {
+  auto gate = std::make_shared<StuckDisplay::Gate>();
+  Answer<Stats> stats;
+  Answer<std::vector<DisplayDescription>> displays;
+  {
+    CoreOptions options;
+    options.make_engine = [](const gpu::EngineOptions&) {
+      return std::make_unique<testing::RecordingEngine>(std::make_shared<testing::EngineScript>());
+    };
+    Core core(std::move(options), TheClock());
+    ASSERT_TRUE(core.AddDisplay(std::make_unique<StuckDisplay>(gate, TheClock()), {}).ok());
+    ASSERT_TRUE(core.Start().ok());
+    {
+      sync::MutexLock lock(gate->mutex);
+      gate->stops_ticks = true;
+    }
+    core.GetDisplay("stuck", [](const absl::StatusOr<DisplayDescription>&) {});  // makes it tick
+    {
+      sync::MutexLock lock(gate->mutex);
+      while (!gate->in_tick) gate->changed.Wait(gate->mutex);
+    }
+    core.GetStats(stats.reply());
+    core.ListDisplays(displays.reply());
+    Answer<EntityPage> asked;  // once this is answered, the display has been asked
+    core.ListEntities({}, asked.reply());
+    ASSERT_TRUE(asked.Await().ok());
+    EXPECT_FALSE(core.Stop(400 * sync::kMillisecond).ok());
+  }
+  {
+    sync::MutexLock lock(gate->mutex);
+    gate->open = true;
+    gate->changed.NotifyAll();
+    while (!gate->ended) gate->changed.Wait(gate->mutex);
+  }
+  EXPECT_TRUE(stats.Await().ok());
+  EXPECT_TRUE(displays.Await().ok());
 }
 
 }  // namespace

@@ -408,6 +408,29 @@ TEST(SceneStore, LayersAreRemovedByWhoWroteThemLast) {
   EXPECT_EQ(f.store.snapshot()->number, number);  // nothing to do, no snapshot
 }
 
+TEST(SceneStore, OnceAbandonedItAppliesNothing) {
+  StoreFixture f;
+  f.Commit(Put("a", "x"));
+  f.store.Abandon();
+  const CommitResult result = f.Commit(Put("a", "y"));
+  EXPECT_FALSE(result.applied);
+  EXPECT_TRUE(result.abandoned);
+  EXPECT_EQ(f.Scene(), "a: x");
+}
+
+TEST(SceneStore, OfManyIssuesTheFirstAreKept) {
+  Limits limits;
+  limits.max_issues_per_commit = 2;
+  StoreFixture f(limits);
+  const CommitResult result =
+      f.Commit(Begin("b"), Move("a", "1", Shift(1)), Move("a", "2", Shift(1)),
+               Move("a", "3", Shift(1)), Put("a", "x"));
+  EXPECT_EQ(result.issues.size(), 2u);
+  EXPECT_EQ(result.more_issues, 2u) << "a third move, and the frame without its end";
+  EXPECT_EQ(result.refused_operations, 4u);
+  EXPECT_EQ(f.Scene(), "a: x");
+}
+
 TEST(SceneStore, TenThousandEntitiesWithOneBad) {
   StoreFixture f;
   f.store.SetViews({{"d", gpu::Affine()}});

@@ -1,7 +1,12 @@
 // SceneService's other calls against a real server.
 #include <gmock/gmock.h>
 
+#include <span>
+#include <string_view>
+
 #include "absl/strings/str_cat.h"
+#include "daemon/services/apply_update.h"
+#include "display/sync/fake_clock.h"
 #include "tests/daemon/services/daemon_fixture.h"
 
 namespace voxeld::daemon::services {
@@ -66,6 +71,53 @@ TEST(ApplyUpdate, RefusesWhatIsNoUpdate) {
   request.Clear();
   request.mutable_open()->set_flow(v1::FLOW_POLICY_LATEST);
   EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+}
+
+TEST(ApplyUpdate, HasAsManyOperationsAndIssuesAsAllowed) {
+  DaemonOptions options;
+  options.limits.max_operations_per_commit = 5;
+  options.limits.max_issues_per_commit = 2;
+  Daemon daemon(options);
+  v1::ApplyUpdateRequest request;
+  *request.add_operations() = SphereIn("layer", "good");
+  for (int i = 0; i < 4; ++i) request.add_operations();
+  const auto [status, response] = Apply(daemon, request);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  ASSERT_EQ(response.issues_size(), 3);
+  EXPECT_EQ(response.issues(1).field(), "operations[2].op");
+  EXPECT_EQ(response.issues(2).field(), "commit");
+  EXPECT_EQ(response.issues(2).reason(), v1::REASON_QUOTA_EXCEEDED);
+  EXPECT_THAT(response.issues(2).message(), HasSubstr("2 more issues are left out"));
+
+  request.add_operations();
+  const grpc::Status refused = Apply(daemon, request).first;
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(refused.error_message(), HasSubstr("operations has 6 elements"));
+}
+
+TEST(ApplyUpdate, IsAnsweredAlsoByACoreThatStops) {
+  for (const bool opened : {true, false}) {
+    sync::FakeClock clock;
+    Core core({.version = "1", .threads = false}, clock);
+    ASSERT_TRUE(core.Start().ok());
+    ServiceContext context{core, clock, "1"};
+    v1::ApplyUpdateRequest request;
+    *request.add_operations() = SphereIn("layer", "ball");
+    const std::string bytes = request.SerializeAsString();
+    const std::string_view view = bytes;
+    std::vector<absl::Status> answers;
+    if (!opened) {
+      ASSERT_TRUE(core.Stop(sync::kSecond).ok());
+    }
+    ApplyUpdate(context, std::span(&view, 1),
+                [&](const absl::Status& status, const v1::ApplyUpdateResponse&) {
+                  answers.push_back(status);
+                });
+    // Opens the session, and has no place for its operations any more.
+    ASSERT_TRUE(core.Stop(sync::kSecond).ok());
+    ASSERT_EQ(answers.size(), 1u);
+    EXPECT_TRUE(absl::IsUnavailable(answers[0])) << answers[0];
+  }
 }
 
 TEST(ListEntities, InPages) {

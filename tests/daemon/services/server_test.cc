@@ -134,6 +134,48 @@ TEST(Health, IsNotServingWhileDraining) {
   EXPECT_THAT(watch.AwaitDone(), ElementsAre(kServing, kNotServing));
 }
 
+// Keeps the core's thread busy until it is let go.
+class BusyCore {
+ public:
+  explicit BusyCore(Core& core) {
+    core.GetStats([busy = &busy_, go = go_.get_future().share()](const absl::StatusOr<Stats>&) {
+      busy->set_value();
+      go.wait();
+    });
+    busy_.get_future().wait();
+  }
+  void LetGo() { go_.set_value(); }
+
+ private:
+  std::promise<void> busy_, go_;
+};
+
+TEST(Shutdown, DoesNotWaitForABusyCore) {
+  Daemon daemon({.drain_limit_ns = 3600 * sync::kSecond});
+  Client client(daemon.scene());
+  client.Open();
+  BusyCore busy(daemon.core());
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(1);
+  const std::shared_ptr<grpc::Channel> channel = daemon.NewChannel();
+  const auto scene = v1::SceneService::NewStub(channel);
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::ApplyUpdateRequest request;
+  *request.add_operations() = SphereIn("layer", "ball");
+  v1::ApplyUpdateResponse response;
+  std::promise<grpc::Status> updated;
+  scene->async()->ApplyUpdate(&context, &request, &response,
+                              [&](grpc::Status status) { updated.set_value(std::move(status)); });
+  std::string answer;  // on the same connection, so the update is there too
+  ASSERT_TRUE(RawCall(channel, "/grpc.health.v1.Health/Check", HealthRequest(""), &answer).ok());
+
+  daemon.server().Shutdown(100 * sync::kMillisecond);
+  EXPECT_EQ(updated.get_future().get().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_FALSE(client.Finish().ok());
+  busy.LetGo();
+}
+
 TEST(Reflection, ListsTheServices) {
   Daemon daemon;
   std::string answer;

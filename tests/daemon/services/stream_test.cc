@@ -129,6 +129,28 @@ TEST(Stream, BadOperationsAreIssuesAndTheRestIsApplied) {
   EXPECT_EQ(daemon.Entities().total(), 9'999u);
 }
 
+TEST(Stream, ABatchOfNothingButBadOnesIsCutShortAndTheStreamGoesOn) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  constexpr int kBad = 50'000;  // more than the answers that may wait for a client
+  v1::StreamRequest batch;
+  for (int i = 0; i < kBad; ++i) batch.mutable_batch()->add_upserts();
+  *batch.mutable_batch()->add_upserts() = SphereIn("layer", "good").upsert();
+  client.Send(batch);
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  const size_t told = Limits().max_issues_per_commit;
+  ASSERT_THAT(client.issues, SizeIs(told + 1));
+  EXPECT_EQ(client.issues[told - 1].field(), absl::StrCat("batch.upserts[", told - 1, "].layer"));
+  EXPECT_EQ(client.issues[told].field(), "commit");
+  EXPECT_THAT(client.issues[told].message(), HasSubstr("49000 more issues are left out"));
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), static_cast<uint64_t>(kBad));
+  EXPECT_EQ(daemon.Entities().total(), 1u);
+  client.HalfClose();
+  EXPECT_TRUE(client.Finish().ok());
+}
+
 TEST(Stream, StrictRefusesTheWholeCommit) {
   Daemon daemon;
   Client client(daemon.scene());

@@ -39,7 +39,7 @@ TEST(Decode, MeshWithEverything) {
 
   const Decoded decoded = Decode(request);
   ASSERT_TRUE(decoded.status.ok());
-  EXPECT_THAT(decoded.issues, IsEmpty());
+  EXPECT_THAT(decoded.refused.issues, IsEmpty());
   ASSERT_THAT(decoded.operations, SizeIs(1));
   EXPECT_EQ(decoded.operations[0].sequence, 7u);
   const auto& upsert = std::get<Upsert>(decoded.operations[0].op);
@@ -143,32 +143,32 @@ TEST(Decode, BadItemsOfABatchAreRefusedAlone) {
           Packed<float>({0, 0, 0, 0, 0, 0, 0, std::numeric_limits<float>::infinity(), 0}));
   const Decoded decoded = Decode(request);
   EXPECT_THAT(decoded.operations, SizeIs(9'998));
-  ASSERT_THAT(decoded.issues, SizeIs(2));
-  EXPECT_EQ(decoded.issues[0].field,
+  ASSERT_THAT(decoded.refused.issues, SizeIs(2));
+  EXPECT_EQ(decoded.refused.issues[0].field,
             "batch.upserts[137].entity.primitive.points.vertices.positions[2].y");
-  EXPECT_EQ(decoded.issues[0].id, "e137");
-  EXPECT_EQ(decoded.issues[0].layer, "layer");
-  EXPECT_EQ(decoded.issues[0].sequence, 3u);
-  EXPECT_EQ(decoded.issues[1].field, "batch.upserts[9999].entity.priority");
+  EXPECT_EQ(decoded.refused.issues[0].id, "e137");
+  EXPECT_EQ(decoded.refused.issues[0].layer, "layer");
+  EXPECT_EQ(decoded.refused.issues[0].sequence, 3u);
+  EXPECT_EQ(decoded.refused.issues[1].field, "batch.upserts[9999].entity.priority");
 }
 
 TEST(Decode, LimitsAreQuotas) {
   Limits limits;
   limits.max_vertices_per_entity = 2;
-  EXPECT_EQ(Decode(MeshRequest(), limits).issues.at(0).reason, Reason::kQuotaExceeded);
+  EXPECT_EQ(Decode(MeshRequest(), limits).refused.issues.at(0).reason, Reason::kQuotaExceeded);
   limits = {};
   limits.max_operations_per_commit = 1;
   v1::StreamRequest batch;
   *batch.mutable_batch()->add_upserts() = MeshRequest().upsert();
   EXPECT_THAT(Decode(batch, limits).operations, SizeIs(1));
   *batch.mutable_batch()->add_upserts() = MeshRequest().upsert();
-  EXPECT_EQ(Decode(batch, limits).issues.at(0).field, "batch.upserts");
+  EXPECT_EQ(Decode(batch, limits).refused.issues.at(0).field, "batch.upserts");
   limits = {};
   limits.max_parts_per_object = 1;
   v1::StreamRequest object;
   object.mutable_define_object()->set_object("o");
   for (int i = 0; i < 2; ++i) object.mutable_define_object()->mutable_definition()->add_parts();
-  EXPECT_EQ(Decode(object, limits).issues.at(0).field, "define_object.definition.parts");
+  EXPECT_EQ(Decode(object, limits).refused.issues.at(0).field, "define_object.definition.parts");
   limits = {};
   limits.max_message_bytes = 10;
   EXPECT_TRUE(absl::IsResourceExhausted(Decode(MeshRequest(), limits).status));
@@ -180,9 +180,9 @@ TEST(Decode, AbsurdlyManyElementsAreNotEvenParsed) {
   for (int i = 0; i < 100; ++i) entities += std::string("\x7a\x00", 2);
   const std::string batch = absl::StrCat("\x7a\xc8\x01", entities);  // 200 bytes of Batch
   Limits limits;
-  EXPECT_THAT(DecodeBytes(batch, limits).issues, SizeIs(100));
+  EXPECT_THAT(DecodeBytes(batch, limits).refused.issues, SizeIs(100));
   limits.max_operations_per_commit = 99;
-  EXPECT_THAT(DecodeBytes(batch, limits).issues, SizeIs(1));
+  EXPECT_THAT(DecodeBytes(batch, limits).refused.issues, SizeIs(1));
   limits.max_operations_per_commit = 24;
   EXPECT_EQ(DecodeBytes(batch, limits).status.message(),
             "batch.upserts has 100 elements; 24 are allowed");
@@ -190,6 +190,16 @@ TEST(Decode, AbsurdlyManyElementsAreNotEvenParsed) {
   for (int i = 0; i < 50; ++i) object.mutable_define_object()->mutable_definition()->add_parts();
   limits.max_parts_per_object = 10;
   EXPECT_TRUE(absl::IsResourceExhausted(Decode(object, limits).status));
+}
+
+TEST(Decode, OfManyFaultsTheFirstAreToldAndTheOthersCounted) {
+  v1::StreamRequest batch;
+  for (int i = 0; i < 10; ++i) batch.mutable_batch()->add_upserts();
+  Limits limits;
+  limits.max_issues_per_commit = 4;
+  const Decoded decoded = Decode(batch, limits);
+  EXPECT_THAT(decoded.refused.issues, SizeIs(4));
+  EXPECT_EQ(decoded.refused.more, 6u);
 }
 
 TEST(Decode, ACommitIsPassedOnWithItsIssue) {
@@ -200,9 +210,9 @@ TEST(Decode, ACommitIsPassedOnWithItsIssue) {
     if (std::string(field) == "must_show") request.mutable_commit()->set_must_show(true);
     if (std::string(field) == "durable") request.mutable_commit()->set_durable(true);
     const Decoded decoded = Decode(request);
-    ASSERT_THAT(decoded.issues, SizeIs(1)) << field;
-    EXPECT_EQ(decoded.issues[0].field, std::string("commit.") + field);
-    EXPECT_EQ(decoded.issues[0].reason, Reason::kUnimplemented);
+    ASSERT_THAT(decoded.refused.issues, SizeIs(1)) << field;
+    EXPECT_EQ(decoded.refused.issues[0].field, std::string("commit.") + field);
+    EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kUnimplemented);
     ASSERT_THAT(decoded.operations, SizeIs(1));
     EXPECT_EQ(std::get<Commit>(decoded.operations[0].op).frame_id, 9u);
   }
@@ -215,17 +225,17 @@ TEST(Decode, SequencesAscendOrAreCounted) {
   request.set_sequence(41);
   Decoded decoded = Decode(request, {}, 41);
   EXPECT_THAT(decoded.operations, IsEmpty());
-  ASSERT_THAT(decoded.issues, SizeIs(1));
-  EXPECT_EQ(decoded.issues[0].reason, Reason::kOutOfOrder);
-  EXPECT_EQ(decoded.issues[0].field, "sequence");
+  ASSERT_THAT(decoded.refused.issues, SizeIs(1));
+  EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kOutOfOrder);
+  EXPECT_EQ(decoded.refused.issues[0].field, "sequence");
   EXPECT_EQ(decoded.sequence, 41u);
   request.mutable_commit();
   decoded = Decode(request, {}, 41);
-  EXPECT_THAT(decoded.issues, SizeIs(1));
+  EXPECT_THAT(decoded.refused.issues, SizeIs(1));
   EXPECT_THAT(decoded.operations, SizeIs(1)) << "a commit is answered whatever is wrong with it";
   // Nothing comes after the greatest number.
   request.set_sequence(0);
-  EXPECT_THAT(Decode(request, {}, UINT64_MAX).issues, SizeIs(1));
+  EXPECT_THAT(Decode(request, {}, UINT64_MAX).refused.issues, SizeIs(1));
 }
 
 TEST(Decode, LayerStateKeepsWhatIsNotSet) {
@@ -285,9 +295,9 @@ TEST(Decode, MessagesAreValidUtf8WhateverTheyQuote) {
   while (id.size() < 300) id += "é";
   request.mutable_upsert()->set_id(id);
   const Decoded decoded = Decode(request);
-  ASSERT_THAT(decoded.issues, SizeIs(1));
+  ASSERT_THAT(decoded.refused.issues, SizeIs(1));
   v1::Issue issue;
-  issue.set_message(decoded.issues[0].message);
+  issue.set_message(decoded.refused.issues[0].message);
   EXPECT_TRUE(v1::Issue().ParseFromString(issue.SerializeAsString()));
 }
 
@@ -373,9 +383,9 @@ TEST(DecodeUpdate, IsOpenedOperatedAndCommitted) {
   ASSERT_THAT(decoded.operations, SizeIs(2));
   EXPECT_TRUE(std::holds_alternative<Commit>(decoded.operations[1].op));
   EXPECT_EQ(decoded.operations[1].sequence, 9u);
-  ASSERT_THAT(decoded.issues, SizeIs(2));
-  EXPECT_EQ(decoded.issues[0].field, "operations[1].sequence");
-  EXPECT_EQ(decoded.issues[1].field, "operations[2].frame_begin.layer");
+  ASSERT_THAT(decoded.refused.issues, SizeIs(2));
+  EXPECT_EQ(decoded.refused.issues[0].field, "operations[1].sequence");
+  EXPECT_EQ(decoded.refused.issues[1].field, "operations[2].frame_begin.layer");
 
   request.mutable_open()->set_on_disconnect(v1::DISCONNECT_POLICY_CLEAR);
   EXPECT_EQ(DecodeUpdate(request, {}).open->on_disconnect, DisconnectPolicy::kClear);
@@ -383,6 +393,40 @@ TEST(DecodeUpdate, IsOpenedOperatedAndCommitted) {
   decoded = DecodeUpdate(request, {});
   EXPECT_TRUE(absl::IsInvalidArgument(decoded.status));
   EXPECT_THAT(std::string(decoded.status.message()), HasSubstr("operations[3].commit"));
+}
+
+TEST(DecodeUpdate, IsLimitedBeforeItIsParsed) {
+  const auto decode = [](const v1::ApplyUpdateRequest& request, const Limits& limits) {
+    const std::string bytes = request.SerializeAsString();
+    const std::string_view view = bytes;
+    return DecodeUpdate(std::span(&view, 1), limits);
+  };
+  Limits limits;
+  limits.max_operations_per_commit = 10;
+  limits.max_issues_per_commit = 4;
+  v1::ApplyUpdateRequest request;
+  for (int i = 0; i < 10; ++i) request.add_operations();
+  const Decoded most = decode(request, limits);
+  EXPECT_TRUE(most.status.ok()) << most.status;
+  EXPECT_THAT(most.refused.issues, SizeIs(4));
+  EXPECT_EQ(most.refused.more, 6u);
+
+  request.add_operations();
+  for (const Decoded& more : {decode(request, limits), DecodeUpdate(request, limits)}) {
+    EXPECT_TRUE(absl::IsInvalidArgument(more.status)) << more.status;
+    EXPECT_THAT(std::string(more.status.message()),
+                HasSubstr("operations has 11 elements; max_operations_per_commit allows 10"));
+  }
+  request.Clear();
+  for (int i = 0; i < 10; ++i) request.add_operations()->mutable_batch()->add_upserts();
+  EXPECT_TRUE(decode(request, limits).status.ok());
+  for (int j = 0; j < 40; ++j) request.mutable_operations(0)->mutable_batch()->add_upserts();
+  EXPECT_TRUE(absl::IsResourceExhausted(decode(request, limits).status));
+  limits = {};
+  limits.max_message_bytes = 10;
+  EXPECT_TRUE(absl::IsResourceExhausted(decode(request, limits).status));
+  const std::string_view text = "not a message";
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeUpdate(std::span(&text, 1), Limits()).status));
 }
 
 }  // namespace

@@ -458,11 +458,11 @@ TEST_P(Refusals, NamesFieldReasonAndValue) {
   const Decoded decoded = Decode(wrong.make());
   ASSERT_TRUE(decoded.status.ok()) << decoded.status;
   EXPECT_THAT(decoded.operations, IsEmpty());
-  ASSERT_THAT(decoded.issues, SizeIs(1));
-  EXPECT_EQ(decoded.issues[0].field, wrong.field);
-  EXPECT_EQ(decoded.issues[0].reason, wrong.reason);
-  EXPECT_THAT(decoded.issues[0].message, HasSubstr(wrong.value));
-  EXPECT_EQ(decoded.issues[0].sequence, decoded.sequence);
+  ASSERT_THAT(decoded.refused.issues, SizeIs(1));
+  EXPECT_EQ(decoded.refused.issues[0].field, wrong.field);
+  EXPECT_EQ(decoded.refused.issues[0].reason, wrong.reason);
+  EXPECT_THAT(decoded.refused.issues[0].message, HasSubstr(wrong.value));
+  EXPECT_EQ(decoded.refused.issues[0].sequence, decoded.sequence);
 }
 
 INSTANTIATE_TEST_SUITE_P(Field, Refusals, ::testing::ValuesIn(kCases),

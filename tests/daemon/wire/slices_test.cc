@@ -78,7 +78,7 @@ TEST(Slices, CutAnywhereDecodeTheSame) {
       const Decoded cut = DecodeStreamRequest(Cut(bytes, random), {}, 0);
       ASSERT_TRUE(cut.status.ok());
       ASSERT_THAT(cut.operations, SizeIs(whole.operations.size()));
-      ASSERT_THAT(cut.issues, SizeIs(whole.issues.size()));
+      ASSERT_THAT(cut.refused.issues, SizeIs(whole.refused.issues.size()));
       ASSERT_EQ(cut.open.has_value(), whole.open.has_value());
       for (size_t i = 0; i < cut.operations.size(); ++i) {
         ASSERT_EQ(cut.operations[i].op.index(), whole.operations[i].op.index());
@@ -139,10 +139,10 @@ void Mutate(std::string& bytes, std::mt19937& random) {
 // Whatever comes in: a status, issues that can be sent, operations that hold what they state.
 void CheckSound(const Decoded& decoded) {
   if (!decoded.status.ok()) {
-    ASSERT_TRUE(decoded.operations.empty() && decoded.issues.empty() && !decoded.open);
+    ASSERT_TRUE(decoded.operations.empty() && decoded.refused.issues.empty() && !decoded.open);
     return;
   }
-  for (const Issue& issue : decoded.issues) {
+  for (const Issue& issue : decoded.refused.issues) {
     ASSERT_FALSE(issue.field.empty());
     ASSERT_NE(issue.reason, Reason::kUnspecified);
     v1::Issue message;

@@ -65,7 +65,7 @@ class ScriptedDisplay final : public Display {
   };
   std::vector<Sent> sent;
   std::vector<std::string> calls;
-  absl::Status start_status, brightness_status;
+  absl::Status start_status, brightness_status, blank_status;
   bool done_at_once = false;
   bool lost_at_once = false;
   size_t tap_bytes = kLayout.bytes();
@@ -90,7 +90,7 @@ class ScriptedDisplay final : public Display {
   }
   absl::Status DoSetBlank(bool blank) override {
     calls.push_back(blank ? "blank" : "unblank");
-    return absl::OkStatus();
+    return blank_status;
   }
   std::unique_ptr<WireDecoder> DoMakeDecoder() const override {
     return std::make_unique<PlainDecoder>();
@@ -321,6 +321,31 @@ TEST_F(DisplayTest, BlankLosesAllAndRefusesMore) {
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{4, false}));
 }
 
+TEST_F(DisplayTest, ARefusedBlankLeavesAllAsItWas) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Submit(Frame(2));
+  Captured captured;
+  Capture(captured);
+  display_.blank_status = absl::UnavailableError("no answer");
+  EXPECT_EQ(display_.SetBlank(true).message(), "no answer");
+  EXPECT_FALSE(display_.blanked());
+  EXPECT_EQ(display_.state(), DisplayState::kShowing);
+  EXPECT_TRUE(log_.outcomes.empty());
+  EXPECT_FALSE(captured.has_value());
+  display_.Done();
+  display_.Done();
+  ExpectOutcome(0, 1, Kind::kPresented);
+  ExpectOutcome(1, 2, Kind::kPresented);
+
+  display_.blank_status = absl::OkStatus();
+  ASSERT_TRUE(display_.SetBlank(true).ok());
+  display_.blank_status = absl::UnavailableError("no answer");
+  EXPECT_FALSE(display_.SetBlank(false).ok());
+  EXPECT_TRUE(display_.blanked());
+  EXPECT_EQ(display_.state(), DisplayState::kBlanked);
+}
+
 TEST_F(DisplayTest, BlankedWhileAwayItComesBackDarkAndThenWithTheCurrentFrame) {
   StartAttached();
   display_.Submit(Frame(1));
@@ -429,6 +454,27 @@ TEST_F(DisplayTest, CaptureWaitsForTheDeviceAndGivesUp) {
   display_.Done();
   ASSERT_TRUE(late.has_value());
   EXPECT_TRUE(late->ok());
+}
+
+TEST_F(DisplayTest, ACancelledCaptureGoesAndOthersStay) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  Captured gone, stays;
+  display_.Capture(
+      kSecond, [&gone](absl::StatusOr<DecodedVolume> v) { gone = std::move(v); }, 7);
+  display_.CancelCapture(8);
+  EXPECT_FALSE(gone.has_value());
+  display_.CancelCapture(7);
+  ASSERT_TRUE(gone.has_value());
+  EXPECT_TRUE(absl::IsCancelled(gone->status()));
+  EXPECT_EQ(display_.Tick(), clock_.Now() + kSecond) << "nothing but the driver's own";
+  Capture(stays);
+  display_.Done();
+  EXPECT_TRUE(display_.tapped());
+  display_.CancelCapture(7);
+  display_.Done();
+  ASSERT_TRUE(stays.has_value());
+  EXPECT_TRUE(stays->ok());
 }
 
 TEST_F(DisplayTest, CaptureEndsWithTheDeviceOrTheLight) {
