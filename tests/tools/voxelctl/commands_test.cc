@@ -139,6 +139,33 @@ TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
   EXPECT_EQ(log.clears[0].layer(), "voxelctl");
 }
 
+TEST_F(CommandsTest, PlayEndsATestPatternThatIsUp) {
+  EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
+  const Result result = RunTool({"play", DataFile("points.ply")});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("ended the test pattern on fake"));
+  ASSERT_EQ(server_.log().updates.size(), 2u);
+  EXPECT_EQ(server_.log().updates[1].name(), "fake");
+  EXPECT_EQ(server_.log().updates[1].test_pattern(), v1::TEST_PATTERN_NONE);
+  EXPECT_FALSE(server_.log().updates[1].has_brightness());
+
+  EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err, Not(HasSubstr("pattern")));
+  EXPECT_EQ(server_.log().updates.size(), 2u) << "none was up";
+}
+
+TEST_F(CommandsTest, ARefusedSceneLeavesTheTestPatternUp) {
+  EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
+  server_.Set({.refuse_commits_with = "quota exceeded"});
+  EXPECT_EQ(RunTool({"play", DataFile("points.ply")}).code, 1);
+  EXPECT_EQ(server_.log().updates.size(), 1u);
+}
+
+TEST_F(CommandsTest, ClearEndsATestPatternThatIsUp) {
+  EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
+  EXPECT_THAT(RunTool({"clear"}).err, HasSubstr("ended 1 test patterns"));
+  EXPECT_EQ(server_.log().updates.back().test_pattern(), v1::TEST_PATTERN_NONE);
+}
+
 TEST_F(CommandsTest, LargeCloudsGoInManyMessages) {
   constexpr int kPoints = 100000;
   std::string bytes =
