@@ -37,12 +37,49 @@ GRPC = ("daemon/services/", "tools/voxelctl/connection", "client/cpp/")
 GRPC_TESTS = ("tests/daemon/services/", "tests/e2e/", "tests/tools/", "tests/integration/")
 PROTOBUF_FREE = ("gpu/", "display/", "daemon/scene/", "daemon/core/", "daemon/pipeline/", "daemon/config/")
 
+# What is written from the repository root, or from where protobuf's files are made.
+OURS = re.compile(r"(display|gpu|daemon|tools|client|tests|voxeld)/")
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^">]+)[">]')
 
 
 def rule_of(path):
     best = max((f for f in ALLOWED if path.startswith(f + "/")), key=len, default=None)
     return best
+
+
+def wrong_includes(path, lines):
+    """What is wrong with the includes of a file, whose path is from the repository root."""
+    folder = rule_of(path)
+    if folder is None:
+        return [f"{path}: lies in no folder that has a rule"]
+    wrong = []
+    for number, line in enumerate(lines, 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        kind, target = match.groups()
+        where = f"{path}:{number}"
+        if target.startswith(("grpc/", "grpcpp/", "grpc++/")) or target.endswith(".grpc.pb.h"):
+            if path.endswith(".h") and not path.startswith("tests/"):
+                wrong.append(f"{where}: a header includes gRPC's {target}")
+            elif not path.startswith(GRPC + GRPC_TESTS):
+                wrong.append(f"{where}: only {', '.join(GRPC)} may include gRPC's headers")
+            continue
+        if target.startswith("google/protobuf/") and path.startswith(PROTOBUF_FREE):
+            wrong.append(f"{where}: {folder} knows no protobuf")
+        if not OURS.match(target):
+            if kind == '"' and os.path.exists(os.path.join(os.path.dirname(path), target)):
+                wrong.append(f'{where}: "{target}" is not written from the repository root')
+            continue
+        if kind == "<":
+            wrong.append(f'{where}: <{target}> is one of ours; it must be written "{target}"')
+        if target.startswith("tests/") and not path.startswith("tests/"):
+            wrong.append(f"{where}: product code includes a test's header")
+        ok = target.startswith(folder + "/") or any(
+            target.startswith(a) for a in ALLOWED[folder]) or path.startswith("tests/")
+        if not ok:
+            wrong.append(f"{where}: {folder} must not include {target}")
+    return wrong
 
 
 def main():
@@ -52,38 +89,8 @@ def main():
         capture_output=True, text=True, check=True).stdout.split()
     wrong = []
     for path in files:
-        folder = rule_of(path)
-        if folder is None:
-            wrong.append(f"{path}: lies in no folder that has a rule")
-            continue
         with open(path, encoding="utf-8") as file:
-            lines = file.readlines()
-        for number, line in enumerate(lines, 1):
-            match = INCLUDE.match(line)
-            if not match:
-                continue
-            kind, target = match.groups()
-            where = f"{path}:{number}"
-            if target.startswith(("grpc/", "grpcpp/", "grpc++/")) or target.endswith(".grpc.pb.h"):
-                if path.endswith(".h") and not path.startswith("tests/"):
-                    wrong.append(f"{where}: a header includes gRPC's {target}")
-                elif not path.startswith(GRPC + GRPC_TESTS):
-                    wrong.append(f"{where}: only {', '.join(GRPC)} may include gRPC's headers")
-                continue
-            if target.startswith("google/protobuf/") and path.startswith(PROTOBUF_FREE):
-                wrong.append(f"{where}: {folder} knows no protobuf")
-            if kind != '"':
-                continue
-            if not re.match(r"(display|gpu|daemon|tools|client|tests|voxeld)/", target):
-                if os.path.exists(os.path.join(os.path.dirname(path), target)):
-                    wrong.append(f'{where}: "{target}" is not written from the repository root')
-                continue
-            if target.startswith("tests/") and not path.startswith("tests/"):
-                wrong.append(f"{where}: product code includes a test's header")
-            ok = target.startswith(folder + "/") or any(
-                target.startswith(a) for a in ALLOWED[folder]) or path.startswith("tests/")
-            if not ok:
-                wrong.append(f"{where}: {folder} must not include {target}")
+            wrong += wrong_includes(path, file.readlines())
     print(f"include directions: {len(files)} files, {len(wrong)} wrong")
     for line in wrong:
         print(line, file=sys.stderr)

@@ -46,6 +46,25 @@ std::vector<std::byte> MakeCapabilities(const VoxlinkDeviceConfig& config) {
   return voxlink::EncodeCapabilities(device);
 }
 
+// Are an OUT request's wValue and length those of the table of §4?
+bool FitsTable(const UsbSetup& setup, size_t length) {
+  switch (static_cast<Request>(setup.request)) {
+    case Request::kSetMode:
+      return setup.value == 0 && length == sizeof(voxlink::Mode);
+    case Request::kStart:
+    case Request::kStop:
+      return setup.value == 0 && length == 0;
+    case Request::kSetBrightness:
+      return length == 0;
+    case Request::kSetPowerLimit:
+      return setup.value == 0 && length == sizeof(uint32_t);
+    case Request::kSetBlank:
+      return setup.value <= 1 && length == 0;
+    default:
+      return false;
+  }
+}
+
 }  // namespace
 
 VoxlinkDevice::VoxlinkDevice(VoxlinkDeviceConfig config, sync::Clock& clock)
@@ -312,8 +331,10 @@ std::optional<std::vector<std::byte>> VoxlinkDevice::ReadRequest(const UsbSetup&
                                     capabilities_.begin() + static_cast<ptrdiff_t>(end));
     }
     case Request::kGetStatus:
+      if (setup.value != 0) return std::nullopt;
       return StatusBytes();
     case Request::kGetMode:
+      if (setup.value != 0) return std::nullopt;
       return BytesOf(voxlink::Mode{.format = static_cast<uint8_t>(layout_.format),
                                    .sub_frames = static_cast<uint8_t>(layout_.sub_frames),
                                    .reserved0 = 0,
@@ -349,6 +370,7 @@ bool VoxlinkDevice::WriteRequest(const UsbSetup& setup, std::span<const std::byt
       break;
   }
   if (setup.request_type != voxlink::kRequestOut || setup.index != 0) return false;
+  if (!FitsTable(setup, data.size())) return false;
   switch (static_cast<Request>(setup.request)) {
     case Request::kSetMode:
       return SetMode(data);
@@ -362,11 +384,9 @@ bool VoxlinkDevice::WriteRequest(const UsbSetup& setup, std::span<const std::byt
       brightness_ = setup.value;
       return true;
     case Request::kSetPowerLimit:
-      if (data.size() != sizeof(uint32_t)) return false;
       power_limit_mw_ = voxlink::Load<uint32_t>(data);
       return true;
     case Request::kSetBlank:
-      if (setup.value > 1) return false;
       screen_.SetBlank(setup.value == 1);
       return true;
     default:
@@ -375,12 +395,11 @@ bool VoxlinkDevice::WriteRequest(const UsbSetup& setup, std::span<const std::byt
 }
 
 bool VoxlinkDevice::SetMode(std::span<const std::byte> data) {
-  if (screen_.running() || data.size() != sizeof(voxlink::Mode)) return false;
+  if (screen_.running()) return false;
   auto mode = voxlink::Load<voxlink::Mode>(data);
   const auto fixed = voxlink::Load<voxlink::Capabilities>(capabilities_);
-  if (mode.sub_frames == 0) mode.sub_frames = 1;
   if (mode.rate_mhz == 0) mode.rate_mhz = fixed.nominal_rate_mhz;
-  if (mode.format > 7 || (fixed.formats >> mode.format & 1) == 0 ||
+  if (mode.format > 7 || (fixed.formats >> mode.format & 1) == 0 || mode.sub_frames < 1 ||
       mode.sub_frames > fixed.max_sub_frames || mode.rate_mhz < fixed.min_rate_mhz ||
       mode.rate_mhz > fixed.max_rate_mhz) {
     return false;

@@ -8,9 +8,10 @@
 // pixels has 175,000 outer entries.
 //
 // What every geometry guarantees, and tests prove: each voxel whose centre lies in the solid swept
-// by the pixels' rectangles is in at least one footprint with weight ≥ 128; each pixel whose centre
-// lies in the grid has that voxel in its footprint, with weight ≥ 128, so no pixel stays dark
-// inside a lit solid.
+// by the pixels' rectangles is in at least one footprint with weight 255, so that a lit voxel of
+// full white lights a pixel in every format, under any tone and dither, in a single sub-frame; each
+// pixel whose centre lies in the grid has that voxel in its footprint, with weight ≥ 128, so no
+// pixel stays dark inside a lit solid.
 //
 // Which voxels. Of a planar stack: those whose centre lies in the pixel's half-open rectangle and
 // in the half-open slab that the slice stands for. Of a rotor: those whose centre the pixel's
@@ -20,9 +21,10 @@
 // at the slice's own position or at the middle of its interval.
 //
 // Which weights. kMax: 255. kWeighted: a voxel between the positions (or middle angles) of two
-// neighbouring slices is in the footprints of both, weighted by its distance d from each:
-// ⌊255·(1 − d/spacing) + ½⌋, 0 left out; outside the outer positions of a stack 255, the slab's own
-// voxels only. The voxel that holds the pixel's centre has at least 128.
+// neighbouring slices is in the footprints of both: 255 in the nearer one's, at distance d, and
+// ⌊255·d/(spacing − d) + ½⌋ in the farther one's, 0 left out (docs/adr/0006-full-weights.md);
+// outside the outer positions of a stack 255, the slab's own voxels only. The voxel that holds the
+// pixel's centre has at least 128.
 //
 // Decisions are in integers (positions in 2⁻¹⁶ voxel, angles in 2⁻³² turn, directions in 2⁻³⁰),
 // sines, cosines and arc tangents by integer CORDIC: the same table on every machine.

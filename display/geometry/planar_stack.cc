@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "display/geometry/fixed_point.h"
+#include "display/geometry/weight_between.h"
 
 namespace voxeld::display {
 namespace {
@@ -83,7 +84,8 @@ class Slabs {
                                        : positions_[slice + 1] - positions_[slice];
     const Fixed left = spacing - (distance < 0 ? -distance : distance);
     if (left <= 0) return 0;
-    return static_cast<uint16_t>((2 * kFullWeight * left + spacing) / (2 * spacing));
+    return WeightBetween(static_cast<uint64_t>(distance < 0 ? -distance : distance),
+                         static_cast<uint64_t>(left));
   }
 
   const GridAxis axis_;

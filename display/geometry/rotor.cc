@@ -6,6 +6,7 @@
 
 #include "display/geometry/fixed_point.h"
 #include "display/geometry/list_builder.h"
+#include "display/geometry/weight_between.h"
 
 namespace voxeld::display {
 namespace {
@@ -127,11 +128,8 @@ class ColumnScatter {
     // From the middle of the step, in 2⁻³² step: −½ to ½.
     const int64_t offset = static_cast<int64_t>(progress & 0xFFFFFFFF) - (int64_t{1} << 31);
     const uint64_t distance = static_cast<uint64_t>(offset < 0 ? -offset : offset);
-    const auto weight_of = [](uint64_t share) {
-      return static_cast<uint16_t>((kFullWeight * share + (uint64_t{1} << 31)) >> 32);
-    };
-    Add(step, u, i, j, weight_of((uint64_t{1} << 32) - distance));
-    const uint16_t beside = weight_of(distance);
+    Add(step, u, i, j, kFullWeight);
+    const uint16_t beside = WeightBetween((uint64_t{1} << 32) - distance, distance);
     if (beside > 0) Add((step + (offset < 0 ? steps - 1 : 1)) % steps, u, i, j, beside);
   }
 

@@ -9,22 +9,11 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-Units SnapVertex(const Affine& map, const float* p) {
-  const Point3d q = Map(map, p[0], p[1], p[2]);
-  const double v[3] = {q.x, q.y, q.z};
-  Units u;
-  for (int a = 0; a < 3; ++a) {
-    u.v[a] = static_cast<int64_t>(std::clamp(std::floor(v[a] * 256 + 0.5), -0x1p38, 0x1p38));
-  }
-  return u;
-}
-
 // Half the thickness in units.
 // Tests keep to maps for which a cube root by libm rounds to the same unit.
 int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
   double thickness = g.thickness;
-  if (g.thickness_unit == ThicknessUnit::kUnits)
-    thickness *= std::cbrt(std::fabs(Determinant(map)));
+  if (g.thickness_unit == ThicknessUnit::kUnits) thickness *= OracleScale(map);
   return static_cast<int64_t>(std::min(std::floor(thickness / 2 * 256 + 0.5), 0x1p38));
 }
 
@@ -120,7 +109,7 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
   const size_t corners = record.index_count ? record.index_count : record.vertex_count;
   for (size_t corner = 0; corner < corners; ++corner) {
     const size_t vertex = record.index_count ? g.indices[corner] : corner;
-    at.push_back(SnapVertex(map, &g.positions[vertex * 3]));
+    at.push_back(OracleSnap(map, &g.positions[vertex * 3]));
     colors.push_back(record.color_mode == ColorMode::kPerVertex ? g.colors[vertex] : record.color);
   }
   const int64_t radius = OracleRadius(record, map);
@@ -163,7 +152,8 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
     std::vector<LayerVoxel> voxels(volume.rgb.size());
     for (const auto& [id, drawable] : scene.drawables) {
       if (drawable.layer != layer->id) continue;
-      const Affine map = Compose(Compose(target.view, layer->transform), drawable.transform);
+      const Affine map =
+          OracleCompose(OracleCompose(target.view, layer->transform), drawable.transform);
       PlotGeometry(scene.geometries.at(drawable.geometry), map, volume,
                    [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
                      voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);

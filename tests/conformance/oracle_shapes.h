@@ -1,6 +1,7 @@
 // Which voxels a drawable covers, by formulations other than the engine's:
 // rational arithmetic in 128 bits, voxel by voxel. Only the formulas in floating point are
-// the published ones, written a second time.
+// the published ones, written a second time;
+// for solids solids_test.cc says in closed form that they mean the shape.
 #pragma once
 
 #include <cstdint>
@@ -31,6 +32,13 @@ struct OracleTriangle {
   uint32_t color[3];
   SurfaceRule rule;
 };
+
+// outer ∘ inner in double precision.
+Affine OracleCompose(const Affine& outer, const Affine& inner);
+// Where a vertex comes to, to the nearest unit, half up.
+Units OracleSnap(const Affine& map, const float* p);
+// The cube root of how a map changes volumes.
+double OracleScale(const Affine& map);
 
 void PlotLine(const OracleLine& line, const DenseVolume& grid, const Plot& plot);
 // Centres within `radius` units of the segment.

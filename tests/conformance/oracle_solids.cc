@@ -47,7 +47,7 @@ bool Set(const GeometryRecord& g, const Affine& map, OracleSolid& s) {
   local.m[0] = box ? p3 / 2 : p3;
   local.m[5] = box ? p4 / 2 : p3;
   local.m[10] = box ? p5 / 2 : sphere ? p3 : p4 / 2;
-  const Affine m = Compose(map, local);
+  const Affine m = OracleCompose(map, local);
   const auto at = [&](int row, int column) { return m.m[row * 4 + column]; };
   double reach[3] = {0, 0, 0};
   const auto minor = [&](int r0, int c0, int r1, int c1) {

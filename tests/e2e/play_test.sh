@@ -60,8 +60,16 @@ EOT
 "$voxelctl" pattern corners
 "$voxelctl" --json snapshot "$work/corners.png" >"$work/picture.json"
 [ "$(field "$work/picture.json" 'd["lit_pixels"] > 100')" = True ]
-"$voxelctl" pattern none
+# What is played is seen: it ends the pattern.
+play unveiled "$models/OBJ/spider.obj"
+[ "$(field "$work/play.json" 'all(d2["presented"] > 0 for d2 in d["displays"]) and len(d["displays"]) == 2')" = True ] ||
+  { echo "a pattern hid what was played: $(cat "$work/play.json")" >&2; exit 1; }
+"$voxelctl" --json displays >"$work/displays.json"
+[ "$(field "$work/displays.json" '{x["test_pattern"] for x in d["displays"]}')" = "{'TEST_PATTERN_NONE'}" ]
+"$voxelctl" pattern corners
 "$voxelctl" clear
+"$voxelctl" --json displays >"$work/displays.json"
+[ "$(field "$work/displays.json" '{x["test_pattern"] for x in d["displays"]}')" = "{'TEST_PATTERN_NONE'}" ]
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" 'int(d["total"])')" = 0 ]
 

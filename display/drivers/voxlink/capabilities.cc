@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "display/sync/clock.h"
 
 namespace voxeld::display::voxlink {
 namespace {
@@ -12,6 +13,8 @@ namespace {
 constexpr uint32_t kMostSlices = 16384 * 16;
 constexpr uint32_t kMostPixels = 16384;
 constexpr uint32_t kLeastPayload = 1024;
+constexpr int64_t kKeepaliveMs = kKeepaliveNs / sync::kMillisecond;
+constexpr int64_t kWatchdogMs = kWatchdogNs / sync::kMillisecond;
 
 uint8_t MirrorBits(bool u, bool v) { return static_cast<uint8_t>((u ? 1 : 0) | (v ? 2 : 0)); }
 
@@ -202,7 +205,23 @@ absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> 
                "4 packets of max_payload and their headers, or more");
   }
   if (fixed.volume_buffers < 3) return Bad("volume_buffers", fixed.volume_buffers, "3 or more");
+  if (fixed.formats == 0) return Bad("formats", 0, "a bit or more, one for each pixel format");
   if (fixed.nominal_rate_mhz < 1) return Bad("nominal_rate", fixed.nominal_rate_mhz, "above 0");
+  if (fixed.nominal_rate_mhz < fixed.min_rate_mhz || fixed.nominal_rate_mhz > fixed.max_rate_mhz) {
+    return Bad("nominal_rate", fixed.nominal_rate_mhz,
+               absl::StrCat("from min_rate (", fixed.min_rate_mhz, ") to max_rate (",
+                            fixed.max_rate_mhz, ")"));
+  }
+  if (fixed.keepalive_ms != kKeepaliveMs) {
+    return Bad("keepalive_ms", fixed.keepalive_ms, absl::StrCat(kKeepaliveMs));
+  }
+  const bool watchdog = (fixed.features & kFeatureWatchdog) != 0;
+  const int64_t watchdog_ms = watchdog ? kWatchdogMs : 0;
+  if (fixed.watchdog_ms != watchdog_ms) {
+    return Bad(
+        "watchdog_ms", fixed.watchdog_ms,
+        absl::StrCat(watchdog_ms, watchdog ? " with" : " without", " feature bit 0 (watchdog)"));
+  }
   const std::span<const std::byte> shape = block.subspan(sizeof(Capabilities));
   absl::StatusOr<Geometry> geometry;
   switch (std::to_integer<uint8_t>(shape[0])) {

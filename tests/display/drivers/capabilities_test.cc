@@ -20,6 +20,7 @@ DeviceCapabilities Planar() {
   device.fixed.volume_buffers = 3;
   device.fixed.min_rate_mhz = 1000;
   device.fixed.nominal_rate_mhz = device.fixed.max_rate_mhz = 30'000;
+  device.fixed.keepalive_ms = 100;
   PlanarStack planar;
   planar.normal = PlanarStack::Normal::kY;
   planar.width_px = 1024;
@@ -140,6 +141,38 @@ TEST(Capabilities, RefusalsNameFieldAndValue) {
   EXPECT_EQ(refusal([](Capabilities& c) { c.receive_buffer = 4 * 65536; }),
             "the device's capabilities: receive_buffer is 262144; it must be 4 packets of "
             "max_payload and their headers, or more");
+}
+
+TEST(Capabilities, RatesAndTimesMustAgree) {
+  const auto refusal = [](auto change) {
+    auto block = EncodeCapabilities(Planar());
+    auto fixed = Load<Capabilities>(block);
+    change(fixed);
+    std::memcpy(block.data(), &fixed, sizeof(fixed));
+    return std::string(ParseCapabilities(block).status().message());
+  };
+  EXPECT_EQ(refusal([](Capabilities& c) { c.nominal_rate_mhz = 999; }),
+            "the device's capabilities: nominal_rate is 999; it must be from min_rate (1000) to "
+            "max_rate (30000)");
+  EXPECT_EQ(refusal([](Capabilities& c) { c.nominal_rate_mhz = 30'001; }),
+            "the device's capabilities: nominal_rate is 30001; it must be from min_rate (1000) to "
+            "max_rate (30000)");
+  EXPECT_EQ(refusal([](Capabilities& c) { c.formats = 0; }),
+            "the device's capabilities: formats is 0; it must be a bit or more, one for each pixel "
+            "format");
+  EXPECT_EQ(refusal([](Capabilities& c) { c.keepalive_ms = 101; }),
+            "the device's capabilities: keepalive_ms is 101; it must be 100");
+  EXPECT_EQ(refusal([](Capabilities& c) { c.watchdog_ms = 250; }),
+            "the device's capabilities: watchdog_ms is 250; it must be 0 without feature bit 0 "
+            "(watchdog)");
+  EXPECT_EQ(refusal([](Capabilities& c) { c.features = kFeatureWatchdog; }),
+            "the device's capabilities: watchdog_ms is 0; it must be 250 with feature bit 0 "
+            "(watchdog)");
+  EXPECT_EQ(refusal([](Capabilities& c) {
+              c.features = kFeatureWatchdog;
+              c.watchdog_ms = 250;
+            }),
+            "");
 }
 
 TEST(Capabilities, TheDeviceMustBeAsConfigured) {

@@ -108,29 +108,33 @@ TEST(PlanarStackTest, ListedPositionsStandForTheirSlabs) {
               ElementsAre(Voxel(0, 0, 7), Voxel(0, 0, 8), Voxel(0, 0, 9), Voxel(0, 0, 10)));
 }
 
-TEST(PlanarStackTest, WeightsFallLinearlyToTheNeighbours) {
+TEST(PlanarStackTest, WeightsAreFullInTheNearerSliceAndPlaceTheVoxelBetweenBoth) {
   // Slices at 0 and 4; voxel k's middle is at k − 2.
   Geometry geometry = Stack(1, 1, {0, 4});
   geometry.grid = {1, 1, 10, {1, 1, 1}, {-0.5, -0.5, -2.5}};
   const FootprintTable table = BuildFootprints(geometry, Sampling::kWeighted);
-  // The slab begins at −2, in the middle of voxel 0. 255·¾ = 191.25; 127.5 goes up; 63.75.
+  // The slab begins at −2, in the middle of voxel 0. Voxel 3 is 1 from it and 3 from the other:
+  // ratio 3 to 1; voxel 4 is half-way.
   EXPECT_THAT(ReadFootprint(table, 0, 0, 0),
-              ElementsAre(Voxel(0, 0, 0), Voxel(0, 0, 1), Voxel(0, 0, 2), Voxel(0, 0, 3, 191),
-                          Voxel(0, 0, 4, 128), Voxel(0, 0, 5, 64)));
+              ElementsAre(Voxel(0, 0, 0), Voxel(0, 0, 1), Voxel(0, 0, 2), Voxel(0, 0, 3),
+                          Voxel(0, 0, 4), Voxel(0, 0, 5, 85)));
   // It ends at 6, in the middle of voxel 8, which is left out.
   EXPECT_THAT(ReadFootprint(table, 1, 0, 0),
-              ElementsAre(Voxel(0, 0, 3, 64), Voxel(0, 0, 4, 128), Voxel(0, 0, 5, 191),
-                          Voxel(0, 0, 6), Voxel(0, 0, 7)));
+              ElementsAre(Voxel(0, 0, 3, 85), Voxel(0, 0, 4), Voxel(0, 0, 5), Voxel(0, 0, 6),
+                          Voxel(0, 0, 7)));
 }
 
 TEST(PlanarStackTest, AVoxelOnAPixelsCentreHasHalfTheWeightAtLeast) {
-  // Four slices in each voxel: but for the two next to its middle, their linear weight is nothing.
+  // Four slices in each voxel: the two next to its middle have it in full, of the
+  // others it is beyond a neighbour.
   Geometry geometry = Stack(1, 1, {0.125, 0.375, 0.625, 0.875});
   geometry.grid = {1, 1, 1, {1, 1, 1}, {-0.5, -0.5, 0}};
   const FootprintTable weighted = BuildFootprints(geometry, Sampling::kWeighted);
   const FootprintTable plain = BuildFootprints(geometry, Sampling::kMax);
   for (int32_t s = 0; s < 4; ++s) {
-    EXPECT_THAT(ReadFootprint(weighted, s, 0, 0), ElementsAre(Voxel(0, 0, 0, 128))) << s;
+    EXPECT_THAT(ReadFootprint(weighted, s, 0, 0),
+                ElementsAre(Voxel(0, 0, 0, s == 1 || s == 2 ? 255 : 128)))
+        << s;
     EXPECT_THAT(ReadFootprint(plain, s, 0, 0), ElementsAre(Voxel(0, 0, 0))) << s;
   }
 }

@@ -85,7 +85,7 @@ TEST_P(ReachabilityTest, EveryReachableVoxelLightsAPixel) {
     undecided += where == Where::kNearBoundary;
     if (where != Where::kInside) return;
     ++reachable;
-    if (weight >= 128) return;
+    if (weight == 255) return;
     if (++dark <= 5) {
       ADD_FAILURE() << "voxel (" << i << ", " << j << ", " << k << ") has weight " << weight;
     }
@@ -114,7 +114,7 @@ TEST_P(ReachabilityTest, PixelsThatPassAVoxelShowIt) {
       for (const FootprintEntry& e : table_.Outer(pixel.slice, pixel.u)) {
         outer = outer || ((e.x == i || table_.inner_axis == Axis::kX) &&
                           (e.y == j || table_.inner_axis == Axis::kY) &&
-                          (e.z == k || table_.inner_axis == Axis::kZ) && e.weight >= 128);
+                          (e.z == k || table_.inner_axis == Axis::kZ) && e.weight == 255);
       }
       const int32_t along = table_.inner_axis == Axis::kY ? j : k;
       for (const FootprintEntry& e : table_.Inner(pixel.slice, pixel.v)) {

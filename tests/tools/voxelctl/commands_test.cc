@@ -1,5 +1,7 @@
 // The commands against a server in this process.
 #include <gmock/gmock.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -13,6 +15,7 @@
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/cli/options.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/connection/grpc_scene_stream.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -137,6 +140,33 @@ TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
   ASSERT_EQ(log.clears.size(), 1u);
   EXPECT_EQ(log.clears[0].owner(), 7u);
   EXPECT_EQ(log.clears[0].layer(), "voxelctl");
+}
+
+TEST_F(CommandsTest, PlayEndsATestPatternThatIsUp) {
+  EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
+  const Result result = RunTool({"play", DataFile("points.ply")});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("ended the test pattern on fake"));
+  ASSERT_EQ(server_.log().updates.size(), 2u);
+  EXPECT_EQ(server_.log().updates[1].name(), "fake");
+  EXPECT_EQ(server_.log().updates[1].test_pattern(), v1::TEST_PATTERN_NONE);
+  EXPECT_FALSE(server_.log().updates[1].has_brightness());
+
+  EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err, Not(HasSubstr("pattern")));
+  EXPECT_EQ(server_.log().updates.size(), 2u) << "none was up";
+}
+
+TEST_F(CommandsTest, ARefusedSceneLeavesTheTestPatternUp) {
+  EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
+  server_.Set({.refuse_commits_with = "quota exceeded"});
+  EXPECT_EQ(RunTool({"play", DataFile("points.ply")}).code, 1);
+  EXPECT_EQ(server_.log().updates.size(), 1u);
+}
+
+TEST_F(CommandsTest, ClearEndsATestPatternThatIsUp) {
+  EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
+  EXPECT_THAT(RunTool({"clear"}).err, HasSubstr("ended 1 test patterns"));
+  EXPECT_EQ(server_.log().updates.back().test_pattern(), v1::TEST_PATTERN_NONE);
 }
 
 TEST_F(CommandsTest, LargeCloudsGoInManyMessages) {
@@ -269,6 +299,15 @@ TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
   EXPECT_EQ(RunTool({"clear", "--all"}).code, 0);
   EXPECT_EQ(server_.log().clears.back().layer(), "");
   EXPECT_EQ(RunTool({"clear", "--layer", "absent"}).code, 0);
+}
+
+TEST_F(CommandsTest, AStreamThatIsNotEndedIsToldWithTheTimeWaited) {
+  server_.Set({.hold_streams = true});
+  const auto stream = OpenGrpcSceneStream(
+      grpc::CreateChannel(server_.address(), grpc::InsecureChannelCredentials()), "there", {},
+      interrupt_, 20 * sync::kMillisecond);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  EXPECT_EQ((*stream)->Close().message(), "voxeld at there did not end the stream in 20.00 ms");
 }
 
 TEST_F(CommandsTest, NobodyThere) {

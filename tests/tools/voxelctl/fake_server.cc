@@ -109,6 +109,10 @@ class FakeServer::Scene final : public v1::SceneService::Service {
           break;
       }
     }
+    sync::MutexLock lock(server_.mutex_);
+    while (server_.behaviour_.hold_streams && !server_.closing_) {
+      server_.closing_changed_.Wait(server_.mutex_);
+    }
     return grpc::Status::OK;
   }
 
@@ -258,7 +262,14 @@ FakeServer::FakeServer(const std::string& path)
   server_ = builder.BuildAndStart();
 }
 
-FakeServer::~FakeServer() { server_->Shutdown(std::chrono::system_clock::now()); }
+FakeServer::~FakeServer() {
+  {
+    sync::MutexLock lock(mutex_);
+    closing_ = true;
+    closing_changed_.NotifyAll();
+  }
+  server_->Shutdown(std::chrono::system_clock::now());
+}
 
 void FakeServer::Set(const Behaviour& behaviour) {
   sync::MutexLock lock(mutex_);

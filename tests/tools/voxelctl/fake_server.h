@@ -29,6 +29,7 @@ class FakeServer final {
     bool lose_entities = false;       // SetTransform is answered by an Issue NOT_FOUND
     bool no_outcomes = false;         // outcomes are owed for ever
     bool short_volume = false;        // CaptureVolume leaves out its last slice
+    bool hold_streams = false;        // a stream whose client is done is not ended
   };
   void Set(const Behaviour& behaviour);
 
@@ -50,6 +51,8 @@ class FakeServer final {
   mutable sync::Mutex mutex_;
   Behaviour behaviour_ VOXELD_GUARDED_BY(mutex_);
   Log log_ VOXELD_GUARDED_BY(mutex_);
+  sync::CondVar closing_changed_;
+  bool closing_ VOXELD_GUARDED_BY(mutex_) = false;  // streams that are held end now
   std::string address_;
   std::unique_ptr<Scene> scene_;
   std::unique_ptr<Display> display_;

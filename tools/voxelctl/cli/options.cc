@@ -27,7 +27,8 @@ constexpr const char* kPlayAbout =
     "colours by the\n"
     "direction of each surface, so that shape can be read on a display that only glows (--flat: "
     "not).\n"
-    "What is up stays when this ends, in the layer \"voxelctl\", until the next play, or clear.";
+    "What is up stays when this ends, in the layer \"voxelctl\", until the next play, or clear.\n"
+    "A test pattern that is up ends.";
 constexpr const char* kSnapshotAbout =
     "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
     "perspective, dimmer with\n"

@@ -1,32 +1,11 @@
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
-namespace {
-
-absl::StatusOr<uint64_t> EndPatterns(Connection& connection) {
-  const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
-  if (!displays.ok()) return displays.status();
-  uint64_t ended = 0;
-  for (const v1::DisplayDescription& display : displays->displays()) {
-    if (display.test_pattern() == v1::TEST_PATTERN_NONE ||
-        display.test_pattern() == v1::TEST_PATTERN_UNSPECIFIED)
-      continue;
-    v1::UpdateDisplayRequest request;
-    request.set_name(display.name());
-    request.set_test_pattern(v1::TEST_PATTERN_NONE);
-    const absl::StatusOr<v1::DisplayDescription> updated = connection.UpdateDisplay(request);
-    if (!updated.ok()) return updated.status();
-    ++ended;
-  }
-  return ended;
-}
-
-}  // namespace
-
 absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console) {
   v1::ClearLayerRequest request;
   if (!options.all) request.set_layer(options.layer.empty() ? kLayer : options.layer);
@@ -34,18 +13,19 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
   // A layer that is not there is as clear as can be.
   if (absl::IsNotFound(cleared.status())) cleared = v1::ClearLayerResponse();
   if (!cleared.ok()) return cleared.status();
-  absl::StatusOr<uint64_t> patterns = uint64_t{0};
+  absl::StatusOr<std::vector<std::string>> patterns = std::vector<std::string>();
   if (options.layer.empty()) patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
   if (console.json()) {
     nlohmann::ordered_json json = ToJson(*cleared);
-    json["patterns"] = *patterns;
+    json["patterns"] = patterns->size();
     console.Data(JsonText(json, false));
     return absl::OkStatus();
   }
   console.Say(absl::StrCat(
       "cleared ", Grouped(cleared->entities()), " entities in ", Grouped(cleared->layers()),
-      " layers", *patterns > 0 ? absl::StrCat(", ended ", *patterns, " test patterns") : ""));
+      " layers",
+      patterns->empty() ? "" : absl::StrCat(", ended ", patterns->size(), " test patterns")));
   return absl::OkStatus();
 }
 

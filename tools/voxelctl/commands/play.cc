@@ -10,6 +10,7 @@
 #include "absl/strings/str_join.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/commands/play_summary.h"
 #include "tools/voxelctl/connection/scene_stream.h"
 #include "tools/voxelctl/import/importer.h"
@@ -212,17 +213,29 @@ class Player {
       absl::Status status = CommitAndWait();
       if (!status.ok()) return status;
     }
+    absl::Status status = TakePatternsDown();
+    if (!status.ok()) return status;
     // One frame replaces the layer whole, should this owner have had it before.
     v1::StreamRequest begin, end;
     begin.mutable_frame_begin()->set_layer(kLayer);
     end.mutable_frame_end()->set_layer(kLayer);
-    absl::Status status = stream_->Send(std::move(begin));
+    status = stream_->Send(std::move(begin));
     for (size_t i = 0; status.ok() && i < models.size(); ++i) {
       status = stream_->Send(InstanceRequest(kLayer, Id(i), absl::StrCat("voxelctl/", i + 1),
                                              Label(models[i].path), InstanceTransform(space_, 0)));
     }
     if (status.ok()) status = stream_->Send(std::move(end));
     return status.ok() ? CommitAndWait() : status;
+  }
+
+  // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
+  absl::Status TakePatternsDown() {
+    const absl::StatusOr<std::vector<std::string>> ended = EndPatterns(connection_);
+    if (!ended.ok()) return ended.status();
+    for (const std::string& display : *ended) {
+      console_.Say(absl::StrCat("ended the test pattern on ", EscapeForTerminal(display)));
+    }
+    return absl::OkStatus();
   }
 
   static std::string Id(size_t file) { return absl::StrCat(file + 1); }

@@ -13,22 +13,22 @@
 #include "tools/voxelctl/connection/commit_ledger.h"
 #include "tools/voxelctl/connection/status.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 #include "voxeld/v1/scene.grpc.pb.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
 constexpr sync::TimeNs kOpenTime = 15 * sync::kSecond;
-// Longer than a server waits for the outcomes that it still owes.
-constexpr sync::TimeNs kCloseTime = 8 * sync::kSecond;
 
 class GrpcSceneStream final : public SceneStream {
  public:
   GrpcSceneStream(const std::shared_ptr<grpc::ChannelInterface>& channel, std::string address,
-                  Interrupt& interrupt)
+                  Interrupt& interrupt, sync::TimeNs close_time)
       : address_(std::move(address)),
         stub_(v1::SceneService::NewStub(channel)),
         interrupt_(interrupt),
+        close_time_(close_time),
         stream_(stub_->Stream(&context_)),
         reader_([this] { ReadAll(); }),
         listener_(interrupt.AddListener([this] {
@@ -59,7 +59,7 @@ class GrpcSceneStream final : public SceneStream {
     request.set_sequence(++sequence_);
     if (stream_->Write(request)) return absl::OkStatus();
     // The stream has ended: the reader will learn why.
-    return Wait(clock_.Now() + kCloseTime, "the end of the stream", []() { return false; });
+    return Wait(clock_.Now() + close_time_, "the end of the stream", []() { return false; });
   }
 
   absl::Status Commit(uint64_t* frame_id) override {
@@ -128,12 +128,12 @@ class GrpcSceneStream final : public SceneStream {
 
   absl::Status Close() override {
     stream_->WritesDone();
-    const sync::TimeNs deadline = clock_.Now() + kCloseTime;
+    const sync::TimeNs deadline = clock_.Now() + close_time_;
     sync::MutexLock lock(mutex_);
     while (!ended_ && clock_.Now() < deadline) clock_.WaitUntil(mutex_, changed_, deadline);
     if (!ended_)
-      return absl::DeadlineExceededError(
-          absl::StrCat("voxeld at ", address_, " did not end the stream in 5 s"));
+      return absl::DeadlineExceededError(absl::StrCat(
+          "voxeld at ", address_, " did not end the stream in ", Duration(close_time_)));
     return *ended_;
   }
 
@@ -187,6 +187,7 @@ class GrpcSceneStream final : public SceneStream {
   mutable sync::SystemClock clock_;
   std::unique_ptr<v1::SceneService::Stub> stub_;
   Interrupt& interrupt_;
+  const sync::TimeNs close_time_;
   grpc::ClientContext context_;
   uint64_t sequence_ = 0, frames_ = 0;
 
@@ -205,8 +206,9 @@ class GrpcSceneStream final : public SceneStream {
 
 absl::StatusOr<std::unique_ptr<SceneStream>> OpenGrpcSceneStream(
     std::shared_ptr<grpc::ChannelInterface> channel, const std::string& address,
-    const v1::Open& open, Interrupt& interrupt) {
-  auto stream = std::make_unique<GrpcSceneStream>(std::move(channel), address, interrupt);
+    const v1::Open& open, Interrupt& interrupt, sync::TimeNs close_time) {
+  auto stream =
+      std::make_unique<GrpcSceneStream>(std::move(channel), address, interrupt, close_time);
   const absl::Status status = stream->Open(open);
   if (!status.ok()) return status;
   return stream;
