@@ -108,9 +108,10 @@ class ClosedForm {
 // Is the voxel drawn? Nothing where a centre near the surface decides.
 std::optional<bool> Drawn(const ClosedForm& shape, const GeometryRecord& g, int32_t x, int32_t y,
                           int32_t z) {
-  if (shape.Centre(x, y, z)) return true;
   const Side side = shape.SideOf(x, y, z);
   if (side == Side::kNearSurface) return std::nullopt;
+  // A shape that misses its own centre's voxel has it all the same.
+  if (side == Side::kOutside && shape.Centre(x, y, z)) return true;
   if (side == Side::kOutside || g.fill == Fill::kSolid) return side == Side::kInside;
   bool near = false;
   for (int32_t dz = -1; dz <= 1; ++dz) {
