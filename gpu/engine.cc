@@ -1,6 +1,7 @@
 #include "gpu/engine.h"
 
 #include "gpu/cpu/cpu_engine.h"
+#include "gpu/worker/worker_engine.h"
 
 namespace voxeld::gpu {
 
@@ -19,11 +20,20 @@ const char* EngineKindName(EngineKind kind) {
 absl::StatusOr<std::unique_ptr<Engine>> CreateEngine(const EngineOptions& options) {
   switch (options.kind) {
     case EngineKind::kCpu:
-      return CreateCpuEngine(options, "asked for");
+      return options.in_worker ? CreateWorkerEngine(options, "asked for")
+                               : CreateCpuEngine(options, "asked for");
     case EngineKind::kCuda:
-      return absl::FailedPreconditionError("this build has no CUDA engine");
-    case EngineKind::kAuto:
-      return CreateCpuEngine(options, "this build has no CUDA engine");
+      return CreateWorkerEngine(options, "asked for");
+    case EngineKind::kAuto: {
+      EngineOptions cuda = options;
+      cuda.kind = EngineKind::kCuda;
+      absl::StatusOr<std::unique_ptr<Engine>> engine =
+          CreateWorkerEngine(cuda, "there is a GPU that it can use");
+      if (engine.ok()) return engine;
+      EngineOptions cpu = options;
+      cpu.kind = EngineKind::kCpu;
+      return CreateCpuEngine(cpu, std::string(engine.status().message()));
+    }
   }
   return absl::InvalidArgumentError("engine: the kind must be auto, cpu or cuda");
 }

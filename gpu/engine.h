@@ -57,6 +57,11 @@ struct EngineOptions {
   int threads = 0;                // worker threads of the CPU engine; 0: one a core
   bool inline_execution = false;  // every call finishes before it returns, in the caller's thread
   int device = 0;                 // of the CUDA engine
+  // The CPU engine too runs in a process of its own (the CUDA engine always does).
+  bool in_worker = false;
+  std::string worker;  // the program of that process; empty: voxeld-engine, beside this one
+  // After which a worker that does not answer is given up.
+  int64_t worker_deadline_ns = 5'000'000'000;
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
 };

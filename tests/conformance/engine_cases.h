@@ -10,15 +10,23 @@
 
 namespace voxeld::gpu::conformance {
 
+// Of CreateEngine; with `in_worker` in a process of its own.
+inline EngineCase CaseOf(const char* name, EngineKind kind, bool in_worker) {
+  return {name, [kind, in_worker](EngineOptions options) {
+            options.kind = kind;
+            options.in_worker = in_worker;
+            return CreateEngine(options);
+          }};
+}
+
 inline std::vector<EngineCase> EngineCases() {
   return {
 #if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
-    {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
+      {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
+      CaseOf("cuda_worker", EngineKind::kCuda, true),
 #else
-    {"cpu", [](EngineOptions options) {
-       options.kind = EngineKind::kCpu;
-       return CreateEngine(options);
-     }},
+      CaseOf("cpu", EngineKind::kCpu, false),
+      CaseOf("cpu_worker", EngineKind::kCpu, true),
 #endif
   };
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "display/drivers/voxlink/crc32c.h"
+#include "display/crc/crc32c.h"
 
 namespace voxeld::display::voxlink {
 namespace {

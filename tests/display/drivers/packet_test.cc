@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "display/drivers/voxlink/crc32c.h"
+#include "display/crc/crc32c.h"
 #include "gtest/gtest.h"
 
 namespace voxeld::display::voxlink {

@@ -1,4 +1,4 @@
-#include "display/drivers/voxlink/crc32c.h"
+#include "display/crc/crc32c.h"
 
 #include <array>
 #include <cstring>
@@ -7,7 +7,7 @@
 #include <nmmintrin.h>
 #endif
 
-namespace voxeld::display::voxlink {
+namespace voxeld::display {
 namespace {
 
 constexpr uint32_t kPolynomial = 0x82F63B78;  // 0x1EDC6F41 reflected
@@ -59,4 +59,4 @@ uint32_t Crc32c(std::span<const std::byte> bytes, uint32_t crc) {
   return Crc32cPortable(bytes, crc);
 }
 
-}  // namespace voxeld::display::voxlink
+}  // namespace voxeld::display

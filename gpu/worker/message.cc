@@ -1,0 +1,113 @@
+#include "gpu/worker/message.h"
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "absl/strings/str_cat.h"
+#include "display/crc/crc32c.h"
+
+namespace voxeld::gpu {
+namespace {
+
+constexpr size_t kMostBody = 4096;
+
+struct Header {
+  MessageType type;
+  uint32_t reserved = 0;
+  uint64_t call = 0;
+};
+
+}  // namespace
+
+Message MakeDone(uint64_t call, const absl::Status& status) {
+  const absl::string_view text = status.message().substr(0, 2048);
+  return MakeMessage(MessageType::kDone, call, DoneMessage{static_cast<int32_t>(status.code())},
+                     {text.data(), text.size()});
+}
+
+absl::Status StatusOf(const Message& done) {
+  const auto body = done.As<DoneMessage>();
+  if (!body.has_value()) return absl::DataLossError("the worker's answer is too short");
+  return absl::Status(
+      static_cast<absl::StatusCode>(body->code),
+      absl::string_view(reinterpret_cast<const char*>(done.body.data()) + sizeof(DoneMessage),
+                        done.body.size() - sizeof(DoneMessage)));
+}
+
+absl::Status SendMessage(int socket, const Message& message) {
+  const Header header{message.type, 0, message.call};
+  iovec parts[2] = {{const_cast<Header*>(&header), sizeof(header)},
+                    {const_cast<std::byte*>(message.body.data()), message.body.size()}};
+  msghdr out = {};
+  out.msg_iov = parts;
+  out.msg_iovlen = 2;
+  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
+  if (message.fd >= 0) {
+    out.msg_control = control;
+    out.msg_controllen = sizeof(control);
+    cmsghdr* rights = CMSG_FIRSTHDR(&out);
+    rights->cmsg_level = SOL_SOCKET;
+    rights->cmsg_type = SCM_RIGHTS;
+    rights->cmsg_len = CMSG_LEN(sizeof(int));
+    std::memcpy(CMSG_DATA(rights), &message.fd, sizeof(int));
+  }
+  ssize_t sent = 0;
+  do {
+    sent = sendmsg(socket, &out, MSG_NOSIGNAL);
+  } while (sent < 0 && errno == EINTR);
+  if (sent >= 0) return absl::OkStatus();
+  if (errno == EAGAIN || errno == EWOULDBLOCK) {
+    return absl::ResourceExhaustedError("the other process does not read");
+  }
+  return absl::UnavailableError(
+      absl::StrCat("the other process is gone: ", absl::ErrnoToStatus(errno, "").message()));
+}
+
+absl::StatusOr<Message> ReceiveMessage(int socket) {
+  Header header;
+  Message message;
+  message.body.resize(kMostBody);
+  iovec parts[2] = {{&header, sizeof(header)}, {message.body.data(), message.body.size()}};
+  msghdr in = {};
+  in.msg_iov = parts;
+  in.msg_iovlen = 2;
+  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
+  in.msg_control = control;
+  in.msg_controllen = sizeof(control);
+  ssize_t got = 0;
+  do {
+    got = recvmsg(socket, &in, MSG_CMSG_CLOEXEC);
+  } while (got < 0 && errno == EINTR);
+  if (got < static_cast<ssize_t>(sizeof(header)) || (in.msg_flags & MSG_TRUNC) != 0) {
+    return absl::UnavailableError("the other process has ended");
+  }
+  for (cmsghdr* c = CMSG_FIRSTHDR(&in); c != nullptr; c = CMSG_NXTHDR(&in, c)) {
+    if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_RIGHTS) {
+      std::memcpy(&message.fd, CMSG_DATA(c), sizeof(int));
+    }
+  }
+  message.type = header.type;
+  message.call = header.call;
+  message.body.resize(static_cast<size_t>(got) - sizeof(header));
+  return message;
+}
+
+FrameBuffer FrameSlot::In(std::span<std::byte> segment) const {
+  return {segment.subspan(pictures * sizeof(uint64_t), bytes),
+          {reinterpret_cast<uint64_t*>(segment.data()), pictures}};
+}
+
+uint32_t FrameCrc(const display::FrameLayout& layout, const FrameBuffer& buffer, uint64_t holds) {
+  uint32_t crc = display::Crc32c(std::as_bytes(buffer.changed_in));
+  const size_t size = layout.bytes_per_slice();
+  for (size_t p = 0; p < buffer.changed_in.size(); ++p) {
+    if (buffer.changed_in[p] > holds)
+      crc = display::Crc32c(buffer.bytes.subspan(p * size, size), crc);
+  }
+  return crc;
+}
+
+}  // namespace voxeld::gpu

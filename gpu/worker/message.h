@@ -1,0 +1,136 @@
+// What passes between an engine's owner and its worker: small messages over a pair of
+// SOCK_SEQPACKET sockets. Bulk data lies in segments; messages name them.
+//
+// Both ends are of the same build: kProtocol says so, and a worker of another is refused.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu {
+
+inline constexpr uint32_t kWorkerProtocol = 1;
+
+enum class MessageType : uint32_t {
+  // To the worker. Each but the segments' is answered once, under its own call number.
+  kOpen = 1,         // OpenMessage; answered by kReady or kDone
+  kSegment = 2,      // SegmentMessage, with its descriptor
+  kDropSegment = 3,  // SegmentMessage
+  kTarget = 4,       // BulkMessage; kDone
+  kApply = 5,        // BulkMessage; kDone
+  kFrame = 6,        // FrameMessage; kFrameDone or kDone
+  kVoxels = 7,       // VoxelsMessage; kDone
+  // From the worker.
+  kReady = 32,      // ReadyMessage
+  kDone = 33,       // DoneMessage, then the text of the status
+  kFrameDone = 34,  // FrameDoneMessage
+};
+
+struct OpenMessage {
+  uint32_t protocol = kWorkerProtocol;
+  EngineKind kind = EngineKind::kCpu;
+  int32_t threads = 0;
+  int32_t device = 0;
+  SlicePart part;
+};
+
+struct SegmentMessage {
+  uint32_t segment = 0;
+  uint64_t size = 0;
+};
+
+// The first `size` bytes of a segment.
+struct BulkMessage {
+  uint32_t segment = 0;
+  uint32_t crc = 0;  // CRC-32C of them
+  uint64_t size = 0;
+};
+
+// The segment takes the frame as FrameSlot lays it out.
+struct FrameMessage {
+  uint32_t segment = 0;
+  uint64_t frame = 0;
+  uint64_t holds = 0;                // what the segment holds
+  uint64_t buffer_holds = 0;         // what the caller's buffer holds
+  uint64_t pictures = 0, bytes = 0;  // sizes of the caller's buffer
+};
+
+struct VoxelsMessage {
+  uint32_t segment = 0;
+  VoxelBox box;
+  uint64_t count = 0;
+};
+
+struct ReadyMessage {
+  EngineKind kind = EngineKind::kCpu;
+  char device[128] = {};
+};
+
+struct DoneMessage {
+  int32_t code = 0;
+};
+
+struct FrameDoneMessage {
+  FrameResult result;
+  uint32_t crc = 0;  // of the numbers, then of each picture that is newer than `holds`
+};
+
+struct Message {
+  MessageType type = MessageType::kDone;
+  uint64_t call = 0;
+  std::vector<std::byte> body;
+  int fd = -1;  // the receiver's to close
+
+  // The struct at the body's beginning; nothing if it is too short.
+  template <typename T>
+  std::optional<T> As() const {
+    static_assert(std::is_trivially_copyable_v<T>);
+    if (body.size() < sizeof(T)) return std::nullopt;
+    T value;
+    std::memcpy(static_cast<void*>(&value), body.data(), sizeof(T));
+    return value;
+  }
+};
+
+template <typename T>
+Message MakeMessage(MessageType type, uint64_t call, const T& body, std::string_view text = {}) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  Message message;
+  message.type = type;
+  message.call = call;
+  message.body.resize(sizeof(T) + text.size());
+  std::memcpy(message.body.data(), &body, sizeof(T));
+  std::memcpy(message.body.data() + sizeof(T), text.data(), text.size());
+  return message;
+}
+
+Message MakeDone(uint64_t call, const absl::Status& status);
+absl::Status StatusOf(const Message& done);
+
+// Of a socket of a pair. Send: Unavailable if the other end is gone, ResourceExhausted if it does
+// not read (only where the socket does not block). Receive: waits, Unavailable at the end.
+absl::Status SendMessage(int socket, const Message& message);
+absl::StatusOr<Message> ReceiveMessage(int socket);
+
+// How a frame lies in its segment: the pictures' numbers, then their bytes.
+struct FrameSlot {
+  size_t pictures = 0, bytes = 0;
+  size_t size() const { return pictures * sizeof(uint64_t) + bytes; }
+  FrameBuffer In(std::span<std::byte> segment) const;
+};
+
+// See FrameDoneMessage.
+uint32_t FrameCrc(const display::FrameLayout& layout, const FrameBuffer& buffer, uint64_t holds);
+
+}  // namespace voxeld::gpu

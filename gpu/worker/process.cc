@@ -1,0 +1,62 @@
+#include "gpu/worker/process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+
+extern char** environ;
+
+namespace voxeld::gpu {
+
+absl::StatusOr<std::unique_ptr<WorkerProcess>> WorkerProcess::Start(const std::string& program) {
+  int sockets[2];
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, sockets) != 0) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("no sockets for ", program, ": ", absl::ErrnoToStatus(errno, "").message()));
+  }
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_adddup2(&files, sockets[1], kWorkerSocket);
+  posix_spawn_file_actions_addclosefrom_np(&files, kWorkerSocket + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none, all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  std::string name = program;
+  char* arguments[] = {name.data(), nullptr};
+  pid_t pid = 0;
+  const int error = posix_spawn(&pid, program.c_str(), &files, &attributes, arguments, environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&files);
+  close(sockets[1]);
+  if (error != 0) {
+    close(sockets[0]);
+    return absl::FailedPreconditionError(
+        absl::StrCat(program, " cannot be started: ", absl::ErrnoToStatus(error, "").message()));
+  }
+  return std::unique_ptr<WorkerProcess>(new WorkerProcess(pid, sockets[0]));
+}
+
+WorkerProcess::~WorkerProcess() {
+  close(socket_);
+  kill(pid_, SIGKILL);
+  // One that hangs in its driver dies when that lets go of it.
+  std::thread([pid = pid_] {
+    while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }).detach();
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,17 @@
+// A Target as flat bytes, for another process.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu {
+
+std::vector<std::byte> EncodeTarget(const Target& target);
+// InvalidArgument for bytes that are none; whether the target holds together is not asked.
+absl::StatusOr<Target> DecodeTarget(std::span<const std::byte> bytes);
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,30 @@
+// An engine in a process of its own, as its owner sees it: the ordinary door, across which calls go
+// by messages and bulk data by shared memory. What goes wrong over there, a fault of the GPU say,
+// ends in DataLoss here.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu {
+
+// Starts the program and waits until its engine is there, at most options.worker_deadline_ns (for
+// the first CUDA context, ten times that). `reason`: for EngineInfo. FailedPrecondition if the
+// program or the engine cannot be had.
+//
+// Contract, beyond gpu/engine.h's: a call whose answer does not come within worker_deadline_ns, and
+// every call after the process has ended, ends in DataLoss; the process is killed and never waited
+// for. Answers come on a thread of the engine's.
+absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
+                                                           std::string reason);
+
+// The program that is started unless the options name another: voxeld-engine, in the folder of the
+// running program or in the one above.
+std::string DefaultWorkerProgram();
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,230 @@
+#include "gpu/worker/worker_server.h"
+
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "display/crc/crc32c.h"
+#include "gpu/worker/message.h"
+#include "gpu/worker/segment.h"
+#include "gpu/worker/target_codec.h"
+
+namespace voxeld::gpu {
+namespace {
+
+constexpr int kLostEngine = 3;
+
+// A block of staging that lies in a segment.
+class SegmentMemory final : public StagingBlock::Memory {
+ public:
+  explicit SegmentMemory(std::shared_ptr<Segment> segment) : segment_(std::move(segment)) {}
+  std::span<std::byte> bytes() override { return segment_->bytes(); }
+
+ private:
+  const std::shared_ptr<Segment> segment_;
+};
+
+class Server {
+ public:
+  Server(int socket, const WorkerHooks& hooks) : socket_(socket), hooks_(hooks) {}
+  ~Server() {
+    engine_ = nullptr;
+    for (const auto& [id, segment] : segments_) {
+      if (hooks_.unpin) hooks_.unpin(segment->bytes());
+    }
+  }
+
+  int Run() {
+    for (;;) {
+      absl::StatusOr<Message> message = ReceiveMessage(socket_);
+      if (!message.ok()) return 0;
+      const absl::Status status = Handle(*message);
+      if (absl::IsUnavailable(status)) return 0;
+      if (absl::IsDataLoss(status)) return kLostEngine;
+      if (!status.ok()) return 1;
+    }
+  }
+
+ private:
+  // What is not OK ends the worker.
+  absl::Status Handle(Message& message) {
+    switch (message.type) {
+      case MessageType::kOpen:
+        return Open(message);
+      case MessageType::kSegment:
+        return TakeSegment(message);
+      case MessageType::kDropSegment:
+        return DropSegment(message);
+      case MessageType::kTarget:
+      case MessageType::kApply:
+      case MessageType::kFrame:
+      case MessageType::kVoxels:
+        break;
+      default:
+        return absl::InvalidArgumentError("a message of an unknown type");
+    }
+    if (engine_ == nullptr) return absl::InvalidArgumentError("a call before kOpen");
+    switch (message.type) {
+      case MessageType::kTarget:
+        return SetTarget(message);
+      case MessageType::kApply:
+        return Apply(message);
+      case MessageType::kFrame:
+        return Frame(message);
+      default:
+        return Voxels(message);
+    }
+  }
+
+  absl::Status Answer(uint64_t call, const absl::Status& status) {
+    const absl::Status sent = SendMessage(socket_, MakeDone(call, status));
+    return absl::IsDataLoss(status) ? status : sent;
+  }
+
+  absl::Status Open(const Message& message) {
+    const auto open = message.As<OpenMessage>();
+    if (!open.has_value() || open->protocol != kWorkerProtocol) {
+      return Answer(message.call,
+                    absl::FailedPreconditionError("the worker is of another build than its owner"));
+    }
+    EngineOptions options;
+    options.kind = open->kind;
+    options.threads = open->threads;
+    options.device = open->device;
+    options.part = open->part;
+    options.inline_execution = true;
+    absl::StatusOr<std::unique_ptr<Engine>> engine = hooks_.make_engine(options);
+    if (!engine.ok()) return Answer(message.call, engine.status());
+    engine_ = *std::move(engine);
+    ReadyMessage ready;
+    ready.kind = engine_->info().kind;
+    std::strncpy(ready.device, engine_->info().device.c_str(), sizeof(ready.device) - 1);
+    return SendMessage(socket_, MakeMessage(MessageType::kReady, message.call, ready));
+  }
+
+  absl::Status TakeSegment(Message& message) {
+    const auto named = message.As<SegmentMessage>();
+    const int fd = std::exchange(message.fd, -1);
+    if (!named.has_value() || fd < 0) return absl::InvalidArgumentError("a segment without memory");
+    absl::StatusOr<std::shared_ptr<Segment>> segment = Segment::Adopt(fd, named->size);
+    if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
+    if (hooks_.pin) hooks_.pin((*segment)->bytes());
+    segments_[named->segment] = *std::move(segment);
+    return absl::OkStatus();
+  }
+
+  absl::Status DropSegment(const Message& message) {
+    const auto named = message.As<SegmentMessage>();
+    const auto it = named.has_value() ? segments_.find(named->segment) : segments_.end();
+    if (it == segments_.end()) return absl::InvalidArgumentError("an unknown segment is dropped");
+    if (hooks_.unpin) hooks_.unpin(it->second->bytes());
+    segments_.erase(it);
+    return absl::OkStatus();
+  }
+
+  std::shared_ptr<Segment> Find(uint32_t id, uint64_t size) const {
+    const auto it = segments_.find(id);
+    if (it == segments_.end() || it->second->bytes().size() < size) return nullptr;
+    return it->second;
+  }
+
+  // The segment of a bulk message, if its bytes are as they were sent.
+  absl::StatusOr<std::shared_ptr<Segment>> Bulk(const BulkMessage& bulk) const {
+    std::shared_ptr<Segment> segment = Find(bulk.segment, bulk.size);
+    if (segment == nullptr) return absl::InvalidArgumentError("bulk data in an unknown segment");
+    if (display::Crc32c(segment->bytes().first(bulk.size)) != bulk.crc) {
+      return absl::DataLossError("bulk data was damaged on its way to the worker");
+    }
+    return segment;
+  }
+
+  absl::Status SetTarget(const Message& message) {
+    const auto bulk = message.As<BulkMessage>();
+    if (!bulk.has_value()) return absl::InvalidArgumentError("kTarget is too short");
+    const absl::StatusOr<std::shared_ptr<Segment>> segment = Bulk(*bulk);
+    if (!segment.ok()) return Answer(message.call, segment.status());
+    absl::StatusOr<Target> target = DecodeTarget((*segment)->bytes().first(bulk->size));
+    if (!target.ok()) return Answer(message.call, target.status());
+    const display::FrameLayout layout = target->layout;
+    absl::Status status;
+    engine_->SetTarget(*std::move(target), [&](const absl::Status& done) { status = done; });
+    if (status.ok()) layout_ = layout;
+    return Answer(message.call, status);
+  }
+
+  absl::Status Apply(const Message& message) {
+    const auto bulk = message.As<BulkMessage>();
+    if (!bulk.has_value()) return absl::InvalidArgumentError("kApply is too short");
+    absl::StatusOr<std::shared_ptr<Segment>> segment = Bulk(*bulk);
+    if (!segment.ok()) return Answer(message.call, segment.status());
+    absl::Status status;
+    engine_->Apply(StagingBlock(std::make_shared<SegmentMemory>(*std::move(segment))), bulk->size,
+                   [&](const absl::Status& done) { status = done; });
+    return Answer(message.call, status);
+  }
+
+  absl::Status Frame(const Message& message) {
+    const auto frame = message.As<FrameMessage>();
+    if (!frame.has_value()) return absl::InvalidArgumentError("kFrame is too short");
+    if (hooks_.before_frame) hooks_.before_frame(++frames_);
+    if (frame->buffer_holds >= frame->frame) {
+      return Answer(message.call, absl::InvalidArgumentError(
+                                      absl::StrCat("frame: buffer_holds is ", frame->buffer_holds,
+                                                   ", must be less than ", frame->frame)));
+    }
+    constexpr uint64_t kMost = uint64_t{1} << 48;  // sums do not overflow
+    const FrameSlot slot{frame->pictures, frame->bytes};
+    const std::shared_ptr<Segment> segment =
+        slot.pictures < kMost && slot.bytes < kMost ? Find(frame->segment, slot.size()) : nullptr;
+    if (segment == nullptr) return absl::InvalidArgumentError("a frame for an unknown segment");
+    const FrameBuffer buffer = slot.In(segment->bytes());
+    absl::StatusOr<FrameResult> result = absl::InternalError("no answer");
+    engine_->SubmitFrame({frame->frame, frame->holds}, buffer,
+                         [&](const absl::StatusOr<FrameResult>& done) { result = done; });
+    if (!result.ok()) return Answer(message.call, result.status());
+    const FrameDoneMessage done{*result, FrameCrc(*layout_, buffer, frame->holds)};
+    return SendMessage(socket_, MakeMessage(MessageType::kFrameDone, message.call, done));
+  }
+
+  absl::Status Voxels(const Message& message) {
+    const auto voxels = message.As<VoxelsMessage>();
+    if (!voxels.has_value()) return absl::InvalidArgumentError("kVoxels is too short");
+    const std::shared_ptr<Segment> segment =
+        Find(voxels->segment, voxels->count * sizeof(uint32_t));
+    if (segment == nullptr) return absl::InvalidArgumentError("voxels for an unknown segment");
+    const std::span<uint32_t> out(reinterpret_cast<uint32_t*>(segment->bytes().data()),
+                                  voxels->count);
+    absl::Status status;
+    engine_->ReadVoxels(voxels->box, out, [&](const absl::Status& done) { status = done; });
+    return Answer(message.call, status);
+  }
+
+  const int socket_;
+  const WorkerHooks& hooks_;
+  std::unique_ptr<Engine> engine_;
+  std::map<uint32_t, std::shared_ptr<Segment>> segments_;
+  std::optional<display::FrameLayout> layout_;
+  uint64_t frames_ = 0;
+};
+
+}  // namespace
+
+int ServeEngine(int socket, const WorkerHooks& hooks) { return Server(socket, hooks).Run(); }
+
+void BecomeWorker() {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // A terminal's Ctrl-C is for the owner, who ends its worker by closing the socket.
+  std::signal(SIGINT, SIG_IGN);
+  std::signal(SIGTERM, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+}  // namespace voxeld::gpu
