@@ -62,7 +62,7 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, sync::Clock& clock) 
     if (!options.ok()) return wrong(options.status());
     absl::StatusOr<std::unique_ptr<display::Display>> made = display::CreateDisplay(
         {.name = wanted.name, .driver = wanted.driver, .options = options->driver}, clock);
-    if (!made.ok()) return wrong(made.status());
+    if (!made.ok()) return wrong(made.status());  // view and view_box are every display's
     const absl::StatusOr<gpu::Affine> map =
         SceneToVoxel(options->view, (*made)->info().geometry.grid);
     if (!map.ok()) return wrong(map.status());
@@ -110,10 +110,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                   .threads = static_cast<int>(config.engine.threads),
                                   .staging_limit_bytes = config.engine.staging_limit_bytes};
   for (auto& [display, view] : displays) {
-    const std::string name = display->info().name;
     if (absl::Status status = core.AddDisplay(std::move(display), engine, view); !status.ok()) {
-      return Fail(
-          1, absl::Status(status.code(), absl::StrCat("display ", name, ": ", status.message())));
+      return Fail(1, status);
     }
   }
   if (absl::Status status = core.Start(); !status.ok()) return Fail(1, status);

@@ -21,7 +21,8 @@ struct DisplayFigures {
   std::string engine, engine_device, engine_reason;
   uint64_t lit_voxels = 0;
   uint64_t singular_drawables = 0;  // left out: the product of their transforms has no inverse
-  uint64_t volumes_drawn = 0, volumes_presented = 0, volumes_replaced = 0, volumes_lost = 0;
+  uint64_t volumes_drawn = 0, volumes_unchanged = 0, volumes_presented = 0, volumes_replaced = 0,
+           volumes_lost = 0;
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice;

@@ -3,6 +3,7 @@
 #include <prometheus/metric_family.h>
 #include <prometheus/text_serializer.h>
 
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -57,6 +58,8 @@ constexpr Row<DisplayFigures> kDisplayRows[] = {
      "Entities left out, because the product of their transforms has no inverse"},
     {"voxeld_display_volumes_drawn_total", &DisplayFigures::volumes_drawn, MetricType::Counter,
      "Volumes drawn by the engine"},
+    {"voxeld_display_volumes_unchanged_total", &DisplayFigures::volumes_unchanged,
+     MetricType::Counter, "Volumes drawn that looked like the one before, and were not sent"},
     {"voxeld_display_volumes_presented_total", &DisplayFigures::volumes_presented,
      MetricType::Counter, "Volumes shown whole"},
     {"voxeld_display_volumes_replaced_total", &DisplayFigures::volumes_replaced,
@@ -152,7 +155,8 @@ void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
       for (const auto& [quantile, ns] :
            {std::pair("0.5", latency.p50_ns), {"0.99", latency.p99_ns}, {"1", latency.max_ns}}) {
         Add(family, {{"display", display.name}, {"quantile", quantile}},
-            static_cast<double>(ns) / kNsPerSecond);
+            latency.count == 0 ? std::numeric_limits<double>::quiet_NaN()
+                               : static_cast<double>(ns) / kNsPerSecond);
       }
     }
   }

@@ -125,6 +125,7 @@ bool FramePipeline::HaveEngine() {
   }
   engine_ = *std::move(engine);
   engine_info_ = engine_->info();
+  if (!takeover_.empty()) engine_info_.reason = takeover_;
   return true;
 }
 
@@ -147,12 +148,12 @@ bool FramePipeline::MaybeDraw() {
   const size_t size = scene_.Plan(pattern_scene_ != nullptr ? pattern_scene_ : newest);
   Retire(std::move(held));
   if (size == 0 && !target_stale_ && !show_again_ && last_submitted_ != 0) {
-    KeepUnchanged(newest->number);
+    KeepUnchanged({newest->number, settings_});
     return true;
   }
 
   Drawing& drawing = drawing_.emplace(Drawing{});
-  drawing.snapshot = newest->number;
+  drawing.contents = {newest->number, settings_};
   drawing.volume = ++last_volume_;
   drawing.lease = pool_.Acquire();
   if (target_stale_) {
@@ -223,17 +224,18 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
     return ShowAgain(0);
   }
   if (!result->changed && !show_again_ && last_submitted_ != 0) {
-    return KeepUnchanged(drawing.snapshot);
+    ++volumes_unchanged_;
+    return KeepUnchanged(drawing.contents);
   }
   SubmitDrawn(std::move(drawing));
 }
 
-void FramePipeline::KeepUnchanged(uint64_t snapshot) {
+void FramePipeline::KeepUnchanged(const Contents& contents) {
   const auto it = in_display_.find(last_submitted_);
   if (it != in_display_.end()) {
-    it->second = snapshot;
+    it->second = contents;
   } else {
-    shown_snapshot_ = snapshot;
+    shown_ = contents;
   }
   riders_.Unchanged(last_submitted_);
 }
@@ -241,7 +243,7 @@ void FramePipeline::KeepUnchanged(uint64_t snapshot) {
 void FramePipeline::SubmitDrawn(Drawing drawing) {
   show_again_ = false;
   last_submitted_ = drawing.volume;
-  in_display_[drawing.volume] = drawing.snapshot;
+  in_display_[drawing.volume] = drawing.contents;
   riders_.Submit(drawing.volume);
   display_->Submit(std::move(drawing.lease.frame));
 }
@@ -258,6 +260,11 @@ void FramePipeline::OnEngineFailure(const absl::Status& status) {
   if (absl::IsDataLoss(status)) {
     engine_ = nullptr;
     pool_.Forget(last_volume_);
+    // Whatever it was, the next is on the CPU, in this process: made at once, with the same bytes.
+    engine_options_.kind = gpu::EngineKind::kCpu;
+    engine_options_.in_worker = false;
+    takeover_ = absl::StrCat("took over from ", gpu::EngineKindName(engine_info_.kind), ": ",
+                             status.message());
     if (!std::exchange(lost_engine_, true) && HaveEngine() && showing()) {
       riders_.Redraw();
       if (pattern_ != TestPattern::kNone) riders_.HideWaiting();
@@ -274,11 +281,11 @@ void FramePipeline::OnEngineFailure(const absl::Status& status) {
 void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
   const auto it = in_display_.find(outcome.volume);
   if (it != in_display_.end()) {
-    const uint64_t snapshot = it->second;
+    const Contents contents = it->second;
     in_display_.erase(it);
     if (outcome.kind == display::VolumeOutcome::Kind::kPresented) {
       presented_rate_.Add(clock_.Now());
-      shown_snapshot_ = std::max(shown_snapshot_.value_or(0), snapshot);
+      if (!shown_ || contents.snapshot >= shown_->snapshot) shown_ = contents;
     }
   }
   if (outcome.kind == display::VolumeOutcome::Kind::kLost && outcome.volume == last_submitted_) {
@@ -339,7 +346,10 @@ absl::Status FramePipeline::Update(const DisplayUpdate& update) {
   }
   if (update.view.has_value()) {
     view_ = *update.view;
-    if (map != scene_to_voxel_) target_stale_ = settings_changed_ = true;
+    if (map != scene_to_voxel_) {
+      target_stale_ = settings_changed_ = true;
+      ++settings_;
+    }
     scene_to_voxel_ = map;
   }
   if (update.pattern.has_value() && *update.pattern != pattern_) {
@@ -347,10 +357,11 @@ absl::Status FramePipeline::Update(const DisplayUpdate& update) {
     if (pattern_ == TestPattern::kNone) {
       pattern_scene_ = nullptr;
     } else {
-      pattern_scene_ = MakePattern(pattern_, info().geometry.grid, 0);
+      pattern_scene_ = MakePattern(pattern_, info().geometry, 0);
       riders_.HideWaiting();
     }
     target_stale_ = settings_changed_ = true;
+    ++settings_;
   }
   return absl::OkStatus();
 }
@@ -380,6 +391,7 @@ DisplayFigures FramePipeline::Figures() const {
   figures.lit_voxels = lit_voxels_;
   figures.singular_drawables = singular_drawables_;
   figures.volumes_drawn = volumes_drawn_;
+  figures.volumes_unchanged = volumes_unchanged_;
   figures.volumes_presented = display.volumes_presented;
   figures.volumes_replaced = display.volumes_replaced;
   figures.volumes_lost = display.volumes_lost;
@@ -408,7 +420,9 @@ void FramePipeline::Capture(sync::TimeNs timeout, uint64_t at_least_snapshot,
                             display::Display::CaptureDone done, display::CaptureId id) {
   const sync::TimeNs now = clock_.Now();
   captures_.push_back({timeout < sync::kNever - now ? now + timeout : sync::kNever,
-                       at_least_snapshot, std::move(done), id});
+                       {at_least_snapshot, settings_},
+                       std::move(done),
+                       id});
   if (!started_) ServeCaptures();  // no Step will
 }
 
@@ -430,14 +444,15 @@ void FramePipeline::ServeCaptures() {
   std::vector<PendingCapture> waiting;
   for (PendingCapture& capture : std::exchange(captures_, {})) {
     const display::DisplayState state = display_->state();
-    if (state == display::DisplayState::kAttaching || (showing() && !shown_snapshot_) ||
-        (showing() && *shown_snapshot_ < capture.at_least)) {
+    if (state == display::DisplayState::kAttaching || (showing() && !shown_) ||
+        (showing() && (shown_->snapshot < capture.at_least.snapshot ||
+                       shown_->settings < capture.at_least.settings))) {
       if (now < capture.deadline) {
         waiting.push_back(std::move(capture));
       } else {
         capture.done(absl::DeadlineExceededError(absl::StrFormat(
             "no volume with snapshot %d or a newer one was shown in time; the newest has %d",
-            capture.at_least, shown_snapshot_.value_or(0))));
+            capture.at_least.snapshot, shown_ ? shown_->snapshot : 0)));
       }
       continue;
     }

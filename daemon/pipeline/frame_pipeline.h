@@ -101,15 +101,21 @@ class FramePipeline final : private display::Display::Listener {
   void CancelCapture(display::CaptureId id);
 
  private:
+  // What a volume shows: a snapshot, through the view or pattern that was set last but `settings`
+  // changes from the beginning.
+  struct Contents {
+    uint64_t snapshot = 0;
+    uint64_t settings = 0;
+  };
   struct Drawing {
     uint64_t volume = 0;
-    uint64_t snapshot = 0;
+    Contents contents;
     FramePool::Lease lease;
     absl::Status status;  // of what went before SubmitFrame
   };
   struct PendingCapture {
     sync::TimeNs deadline = 0;
-    uint64_t at_least = 0;
+    Contents at_least;
     display::Display::CaptureDone done;
     display::CaptureId id = 0;
   };
@@ -127,7 +133,7 @@ class FramePipeline final : private display::Display::Listener {
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
   void OnEngineFailure(const absl::Status& status);
   void SubmitDrawn(Drawing drawing);
-  void KeepUnchanged(uint64_t snapshot);
+  void KeepUnchanged(const Contents& contents);
   void ShowAgain(sync::TimeNs delay);
   void ServeCaptures();
   void Breathe();
@@ -142,7 +148,8 @@ class FramePipeline final : private display::Display::Listener {
   const std::shared_ptr<Loop> work_;
   const std::unique_ptr<display::Display> display_;
   const MakeEngine make_engine_;
-  const gpu::EngineOptions engine_options_;
+  gpu::EngineOptions engine_options_;
+  std::string takeover_;  // why the engine is not the one that was asked for
   const RiderBook::Tell tell_;
   const std::function<void(SnapshotPtr)> retire_;
 
@@ -163,20 +170,21 @@ class FramePipeline final : private display::Display::Listener {
   std::optional<uint64_t> drawn_snapshot_;  // the newest that a draw was begun for
   bool target_stale_ = true;       // the engine has not been told the target that there is now
   bool settings_changed_ = false;  // view or pattern, since a draw was last begun
+  uint64_t settings_ = 0;          // changes of them, counted
   bool lost_engine_ = false;       // and no frame has come out since
 
   uint64_t last_volume_ = 0;     // numbered
   uint64_t last_submitted_ = 0;  // handed over
   bool show_again_ = false;      // the display may not have what was drawn last
   sync::TimeNs show_again_at_ = 0;
-  // Volume handed over, without outcome → snapshot it contains.
-  std::map<uint64_t, uint64_t> in_display_;
-  std::optional<uint64_t> shown_snapshot_;
+  std::map<uint64_t, Contents> in_display_;  // by volume handed over, without outcome
+  std::optional<Contents> shown_;
   std::vector<PendingCapture> captures_;
   sync::TimeNs next_tick_ = 0;
 
   RiderBook riders_;
-  uint64_t lit_voxels_ = 0, singular_drawables_ = 0, volumes_drawn_ = 0;
+  uint64_t lit_voxels_ = 0, singular_drawables_ = 0;
+  uint64_t volumes_drawn_ = 0, volumes_unchanged_ = 0;
   SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_;
   SlidingRate presented_rate_;
 };

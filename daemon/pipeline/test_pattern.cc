@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -12,6 +13,20 @@ namespace voxeld::daemon {
 namespace {
 
 constexpr uint64_t kFirstPatternNumber = uint64_t{1} << 63;
+
+// How far the corners lie from the grid's edge, in voxels: in the edge voxels, but in a rotor on the
+// box that stands in the cylinder that its panels sweep.
+double CornerInset(const display::Geometry& geometry, double cells, double pitch_mm) {
+  constexpr double kEdge = 0.5;
+  const auto* rotor = std::get_if<display::Rotor>(&geometry.shape);
+  if (rotor == nullptr) return kEdge;
+  double radius_mm = 0;
+  for (const display::Rotor::Panel& panel : rotor->panels) {
+    radius_mm = std::max(radius_mm, rotor->width_px * panel.pitch_u_mm / 2);
+  }
+  constexpr double kHalfDiagonal = 0.70710678;
+  return std::max(kEdge, cells / 2 - radius_mm * kHalfDiagonal / pitch_mm + 1);
+}
 
 // A geometry under construction.
 struct Shape {
@@ -39,10 +54,12 @@ struct Shape {
 class Pattern {
  public:
   // No two patterns share a number.
-  Pattern(TestPattern pattern, const display::VoxelGrid& grid)
-      : nx_(grid.nx),
-        ny_(grid.ny),
-        nz_(grid.nz),
+  Pattern(TestPattern pattern, const display::Geometry& geometry)
+      : nx_(geometry.grid.nx),
+        ny_(geometry.grid.ny),
+        nz_(geometry.grid.nz),
+        inset_x_(CornerInset(geometry, nx_, geometry.grid.pitch_mm.x)),
+        inset_y_(CornerInset(geometry, ny_, geometry.grid.pitch_mm.y)),
         first_number_(kFirstPatternNumber + (uint64_t(pattern) << 32)) {}
 
   void Axes() {
@@ -115,7 +132,7 @@ class Pattern {
   static double Phase(double cells) { return std::min(4.5, double(int64_t(cells) / 2) + 0.5); }
 
   display::Vec3 Corner(int corner) const {
-    return {corner & 1 ? nx_ - 0.5 : 0.5, corner & 2 ? ny_ - 0.5 : 0.5,
+    return {corner & 1 ? nx_ - inset_x_ : inset_x_, corner & 2 ? ny_ - inset_y_ : inset_y_,
             corner & 4 ? nz_ - 0.5 : 0.5};
   }
 
@@ -148,14 +165,15 @@ class Pattern {
   }
 
   const double nx_, ny_, nz_;
+  const double inset_x_, inset_y_;  // of the corners, voxels
   const uint64_t first_number_;
   Layer layer_;
 };
 
 }  // namespace
 
-SnapshotPtr MakePattern(TestPattern pattern, const display::VoxelGrid& grid, uint64_t number) {
-  Pattern made(pattern, grid);
+SnapshotPtr MakePattern(TestPattern pattern, const display::Geometry& geometry, uint64_t number) {
+  Pattern made(pattern, geometry);
   switch (pattern) {
     case TestPattern::kNone:
       break;

@@ -15,6 +15,6 @@ namespace voxeld::daemon {
 //   kGrid     dots of one voxel, eight apart on every axis
 //   kRamp     brightness from 0 to 255 along x, on three middle planes
 //   kWhite    every voxel
-SnapshotPtr MakePattern(TestPattern pattern, const display::VoxelGrid& grid, uint64_t number);
+SnapshotPtr MakePattern(TestPattern pattern, const display::Geometry& geometry, uint64_t number);
 
 }  // namespace voxeld::daemon

@@ -20,6 +20,7 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_lit_voxels(in.lit_voxels);
   out->set_singular_drawables(in.singular_drawables);
   out->set_volumes_drawn(in.volumes_drawn);
+  out->set_volumes_unchanged(in.volumes_unchanged);
   out->set_volumes_presented(in.volumes_presented);
   out->set_volumes_replaced(in.volumes_replaced);
   out->set_volumes_lost(in.volumes_lost);

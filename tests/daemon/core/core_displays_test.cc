@@ -13,6 +13,18 @@ using testing::Simulation;
 using Kind = CommitOutcome::Kind;
 using NotShown = CommitOutcome::NotShown;
 
+struct Captured {
+  absl::StatusOr<display::DecodedVolume> result = absl::UnknownError("no answer");
+  bool done() const { return !absl::IsUnknown(result.status()); }
+};
+
+std::shared_ptr<Captured> Capture(Simulation& sim, sync::TimeNs timeout, uint64_t at_least) {
+  auto captured = std::make_shared<Captured>();
+  sim.core->Capture("", timeout, at_least, [captured](auto r) { captured->result = std::move(r); });
+  sim.core->Step();
+  return captured;
+}
+
 TEST(CoreDisplays, NamesAreUniqueAndDisplaysComeBeforeStart) {
   Simulation sim;
   const auto add = [&](std::string name, const ViewOptions& view = {}) {
@@ -87,6 +99,24 @@ TEST(CoreDisplays, AViewThatTheSceneDoesNotFitIsRefused) {
   EXPECT_EQ(client.sink->issues[0].reason, Reason::kOutOfRange);
 }
 
+TEST(CoreDisplays, ACaptureWaitsForThePatternThatWasSetBeforeIt) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x", 1));
+  while (sim.Show()) {
+  }
+  DisplayUpdate update;
+  update.pattern = TestPattern::kWhite;
+  ASSERT_TRUE(sim.Update(update).ok());
+  const auto captured = Capture(sim, sync::kSecond, 0);
+  EXPECT_TRUE(sim.Show());  // the pattern, on its way when the capture came
+  EXPECT_FALSE(captured->done());
+  EXPECT_TRUE(sim.Show());  // sent again, whole
+  ASSERT_TRUE(captured->done());
+  EXPECT_TRUE(captured->result.ok()) << captured->result.status();
+}
+
 TEST(CoreDisplays, UnknownNamesListThoseThereAre) {
   Simulation sim({}, 2);
   sim.Start();
@@ -146,18 +176,6 @@ TEST(CoreDisplays, APatternTakesTheScenesPlaceForAWhile) {
   EXPECT_EQ(sim.engine().scene->geometries().begin()->second.positions[0], 4);
   EXPECT_EQ(sim.engine().targets.back().view.m[0], 4);
   EXPECT_EQ(sim.GetStats().displays[0].volumes_lost, 0u);
-}
-
-struct Captured {
-  absl::StatusOr<display::DecodedVolume> result = absl::UnknownError("no answer");
-  bool done() const { return !absl::IsUnknown(result.status()); }
-};
-
-std::shared_ptr<Captured> Capture(Simulation& sim, sync::TimeNs timeout, uint64_t at_least) {
-  auto captured = std::make_shared<Captured>();
-  sim.core->Capture("", timeout, at_least, [captured](auto r) { captured->result = std::move(r); });
-  sim.core->Step();
-  return captured;
 }
 
 TEST(CoreDisplays, ACaptureWaitsForTheSnapshotThatItAsksFor) {

@@ -23,6 +23,7 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
     display.name = name;
     display.state = display::DisplayState::kLost;
     display.bytes_out = 77;
+    display.commit_to_presented.count = 3;
     display.commit_to_presented.p99_ns = 250'000'000;
   }
   const std::string text = MetricsText(stats);
@@ -34,6 +35,9 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   EXPECT_THAT(text, HasSubstr("voxeld_display_bytes_out_total{display=\"two\"} 77\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_commit_to_presented_seconds{display=\"one\","
                               "quantile=\"0.99\"} 0.25\n"));
+  // Without a value there is none.
+  EXPECT_THAT(text,
+              HasSubstr("voxeld_display_assemble_seconds{display=\"one\",quantile=\"0.5\"} Nan"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"lost\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"showing\"} 0\n"));
 

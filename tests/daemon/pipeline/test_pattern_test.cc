@@ -34,7 +34,7 @@ class Drawn {
     const auto ok = [](const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; };
     engine->SetTarget(target, ok);
     EngineScene scene;
-    const size_t size = scene.Plan(MakePattern(pattern, target.geometry.grid, 1));
+    const size_t size = scene.Plan(MakePattern(pattern, target.geometry, 1));
     gpu::StagingBlock block = *engine->AcquireStaging(size);
     gpu::DeltaWriter writer(block.bytes());
     scene.Write(writer);

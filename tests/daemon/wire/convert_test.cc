@@ -228,7 +228,7 @@ TEST(Encode, StatsHaveEveryFigure) {
   DisplayFigures& d = stats.displays.emplace_back();
   d.name = "n", d.state = display::DisplayState::kShowing, d.engine = "e", d.engine_device = "d";
   d.engine_reason = "r", d.lit_voxels = 21, d.singular_drawables = 20, d.volumes_drawn = 22,
-  d.volumes_presented = 23;
+  d.volumes_unchanged = 19, d.volumes_presented = 23;
   d.volumes_replaced = 24, d.volumes_lost = 25, d.volumes_per_second = 26, d.bytes_out = 27;
   d.slices_sent = 28, d.slices_resent = 29, d.underruns = 30, d.attaches = 31;
   d.commits_owed = 32, d.commits_presented = 33, d.commits_unchanged = 34;

@@ -3,6 +3,7 @@
 #include "absl/strings/strip.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/text/proto_json.h"
+#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
@@ -66,7 +67,9 @@ absl::Status Entities(const EntitiesOptions& options, Connection& connection, Co
     return absl::OkStatus();
   }
   if (response->layers().empty() && response->entities().empty()) {
-    console.Say("nothing is up");
+    console.Say(options.layer.empty() ? "nothing is up"
+                                      : absl::StrCat("nothing is up in the layer ",
+                                                     EscapeForTerminal(options.layer)));
     return absl::OkStatus();
   }
   console.Data(absl::StrCat(LayersText(*response), "\n", EntitiesText(*response)));

@@ -64,7 +64,10 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
       EscapeForTerminal(options.file), ": ", image.width, "x", image.height, ", volume ",
       volume->number, " of display ", EscapeForTerminal(volume->display), ", ", Grouped(lit),
       " slice pixels lit, ", decoded ? "decoded from the bytes sent" : "reported by the device"));
-  if (lit == 0) console.Say("nothing is lit: is anything up? see `voxelctl entities`");
+  if (lit == 0)
+    console.Say(
+        "no pixel is lit: see `voxelctl entities` for what is up, `voxelctl stats` for where it "
+        "went");
   return absl::OkStatus();
 }
 

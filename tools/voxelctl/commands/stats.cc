@@ -48,6 +48,7 @@ std::string Full(const v1::Stats& stats) {
   row("voxels lit", [](const D& d) { return Grouped(d.lit_voxels()); });
   row("volumes/s", [](const D& d) { return absl::StrFormat("%.1f", d.volumes_per_second()); });
   row("volumes drawn", [](const D& d) { return Grouped(d.volumes_drawn()); });
+  row("  unchanged", [](const D& d) { return Grouped(d.volumes_unchanged()); });
   row("  presented", [](const D& d) { return Grouped(d.volumes_presented()); });
   row("  replaced", [](const D& d) { return Grouped(d.volumes_replaced()); });
   row("  lost", [](const D& d) { return Grouped(d.volumes_lost()); });

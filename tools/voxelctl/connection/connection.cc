@@ -114,7 +114,7 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Connect(const std::strin
        state = channel->GetState(true)) {
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) {
-      return Unreachable(address, "nobody listens there");
+      return Unreachable(address, "nobody listens there, or what does is no voxeld");
     }
     if (system_clock::now() >= deadline) return Unreachable(address, "no answer in 5 s");
     channel->WaitForStateChange(state, system_clock::now() + kConnectStep);
