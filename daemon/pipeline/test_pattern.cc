@@ -1,6 +1,7 @@
 #include "daemon/pipeline/test_pattern.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <variant>
@@ -107,11 +108,10 @@ class Pattern {
     // or each voxel where there are fewer of those.
     const int steps = int(std::min(256.0, nx_));
     for (int i = 0; i < steps; ++i) {
-      const double x0 = double(int64_t(nx_) * i / steps),
-                   x1 = double(int64_t(nx_) * (i + 1) / steps);
+      const double x0 = std::floor(nx_ * i / steps), x1 = std::floor(nx_ * (i + 1) / steps);
       const auto level = uint32_t(steps == 1 ? 255 : i * 255 / (steps - 1));
       const uint32_t grey = level << 16 | level << 8 | level;
-      const double y = double(int64_t(ny_) / 2), z = double(int64_t(nz_) / 2);
+      const double y = std::floor(ny_ / 2), z = std::floor(nz_ / 2);
       Box(absl::StrCat("z", i), {x0, 0, z}, {x1, ny_, z + 1}, grey);
       Box(absl::StrCat("y", i), {x0, y, 0}, {x1, y + 1, nz_}, grey);
     }
@@ -129,7 +129,7 @@ class Pattern {
   }
 
  private:
-  static double Phase(double cells) { return std::min(4.5, double(int64_t(cells) / 2) + 0.5); }
+  static double Phase(double cells) { return std::min(4.5, std::floor(cells / 2) + 0.5); }
 
   display::Vec3 Corner(int corner) const {
     return {corner & 1 ? nx_ - inset_x_ : inset_x_, corner & 2 ? ny_ - inset_y_ : inset_y_,

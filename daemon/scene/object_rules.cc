@@ -61,7 +61,8 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
   const auto derive = [&](const auto& self, const std::string& at) -> void {
     if (done.contains(at)) return;
     Object object;
-    object.data = at == name ? data : draft_.FindObject(Key(at))->data;
+    const Object* there = draft_.FindObject(Key(at));
+    object.data = at == name || there == nullptr ? data : there->data;
     for (const ObjectPart& part : object.data->parts) {
       const std::string* child_name = InstanceName(part);
       Bounds bounds;
@@ -71,11 +72,12 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
       } else {
         if (affected.contains(*child_name)) self(self, *child_name);
         const auto it = done.find(*child_name);
-        const Object& child =
-            it != done.end() ? derived[it->second].second : *draft_.FindObject(Key(*child_name));
-        object.drawables = AddSaturating(object.drawables, child.drawables);
-        object.depth = std::max(object.depth, child.depth + 1);
-        bounds = child.bounds;
+        const Object* child =
+            it != done.end() ? &derived[it->second].second : draft_.FindObject(Key(*child_name));
+        if (child == nullptr) continue;  // refused before
+        object.drawables = AddSaturating(object.drawables, child->drawables);
+        object.depth = std::max(object.depth, child->depth + 1);
+        bounds = child->bounds;
       }
       object.bounds.Include(MapBounds(part.transform, bounds));
     }

@@ -111,7 +111,7 @@ Message MakeMessage(MessageType type, uint64_t call, const T& body, std::string_
   message.call = call;
   message.body.resize(sizeof(T) + text.size());
   std::memcpy(message.body.data(), &body, sizeof(T));
-  std::memcpy(message.body.data() + sizeof(T), text.data(), text.size());
+  if (!text.empty()) std::memcpy(message.body.data() + sizeof(T), text.data(), text.size());
   return message;
 }
 

@@ -22,11 +22,10 @@ inline EngineCase CaseOf(const char* name, EngineKind kind, bool in_worker) {
 inline std::vector<EngineCase> EngineCases() {
   return {
 #if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
-      {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
-      CaseOf("cuda_worker", EngineKind::kCuda, true),
+    {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
+        CaseOf("cuda_worker", EngineKind::kCuda, true),
 #else
-      CaseOf("cpu", EngineKind::kCpu, false),
-      CaseOf("cpu_worker", EngineKind::kCpu, true),
+    CaseOf("cpu", EngineKind::kCpu, false), CaseOf("cpu_worker", EngineKind::kCpu, true),
 #endif
   };
 }
