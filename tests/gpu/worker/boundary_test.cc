@@ -1,0 +1,55 @@
+// What crosses the boundary: segments and targets.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstddef>
+
+#include "gpu/worker/segment.h"
+#include "gpu/worker/target_codec.h"
+#include "tests/conformance/scene_generator.h"
+
+namespace voxeld::gpu {
+namespace {
+
+TEST(Segment, IsTheSameMemoryAtBothEnds) {
+  const auto made = Segment::Create(100'000);
+  ASSERT_TRUE(made.ok()) << made.status();
+  (*made)->bytes()[99'999] = std::byte{7};
+  const auto adopted = Segment::Adopt(dup((*made)->fd()), 100'000);
+  ASSERT_TRUE(adopted.ok()) << adopted.status();
+  EXPECT_EQ((*adopted)->bytes()[99'999], std::byte{7});
+  (*adopted)->bytes()[0] = std::byte{9};
+  EXPECT_EQ((*made)->bytes()[0], std::byte{9});
+  EXPECT_NE(ftruncate((*made)->fd(), 1), 0);  // sealed
+}
+
+TEST(Segment, OfAnotherSizeOrWithoutSealsIsRefused) {
+  const auto made = Segment::Create(4096);
+  ASSERT_TRUE(made.ok());
+  EXPECT_EQ(Segment::Adopt(dup((*made)->fd()), 8192).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  const int open = memfd_create("open", MFD_CLOEXEC);
+  ASSERT_EQ(ftruncate(open, 4096), 0);
+  EXPECT_EQ(Segment::Adopt(open, 4096).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(TargetCodec, BringsEveryTargetThrough) {
+  for (uint64_t seed = 0; seed < 200; ++seed) {
+    const Target target = conformance::SceneGenerator(seed).RandomTarget();
+    const auto bytes = EncodeTarget(target);
+    const auto decoded = DecodeTarget(bytes);
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->geometry, target.geometry);
+    EXPECT_EQ(decoded->layout, target.layout);
+    EXPECT_EQ(decoded->tone, target.tone);
+    EXPECT_EQ(decoded->view, target.view);
+    for (size_t cut = 0; cut < bytes.size(); cut += 1 + bytes.size() / 50) {
+      EXPECT_FALSE(DecodeTarget(std::span(bytes).first(cut)).ok()) << cut;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace voxeld::gpu
