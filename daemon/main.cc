@@ -62,7 +62,7 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, sync::Clock& clock) 
     if (!options.ok()) return wrong(options.status());
     absl::StatusOr<std::unique_ptr<display::Display>> made = display::CreateDisplay(
         {.name = wanted.name, .driver = wanted.driver, .options = options->driver}, clock);
-    if (!made.ok()) return wrong(made.status());  // view and view_box are every display's
+    if (!made.ok()) return wrong(made.status());
     const absl::StatusOr<gpu::Affine> map =
         SceneToVoxel(options->view, (*made)->info().geometry.grid);
     if (!map.ok()) return wrong(map.status());

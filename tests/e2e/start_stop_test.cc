@@ -131,10 +131,17 @@ TEST(Start, SaysWhatItIs) {
 
 TEST(Http, HealthAndMetricsOfTheRunningDaemon) {
   Daemon daemon;
+  // The daemon is ready before its display has attached.
+  constexpr const char* kShowing = "voxeld_display_state{display=\"sim\",state=\"showing\"} 1";
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  std::string metrics;
+  do {
+    metrics = HttpGet(daemon.http(), "/metrics");
+  } while (metrics.find(kShowing) == std::string::npos &&
+           std::chrono::steady_clock::now() < deadline);
   EXPECT_THAT(HttpGet(daemon.http(), "/healthz"), HasSubstr("{\"status\":\"ok\",\"reasons\":[]}"));
-  const std::string metrics = HttpGet(daemon.http(), "/metrics");
   EXPECT_THAT(metrics, StartsWith("HTTP/1.1 200 "));
-  EXPECT_THAT(metrics, HasSubstr("voxeld_display_state{display=\"sim\",state=\"showing\"} 1"));
+  EXPECT_THAT(metrics, HasSubstr(kShowing));
   EXPECT_THAT(HttpGet(daemon.http(), "/"), StartsWith("HTTP/1.1 404 "));
 }
 
