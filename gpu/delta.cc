@@ -90,6 +90,7 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
                   check.Enum("fill", static_cast<uint32_t>(g.fill), 0, 1),
                   check.Enum("topology", static_cast<uint32_t>(g.topology), 0, 2),
                   check.Enum("thickness_unit", static_cast<uint32_t>(g.thickness_unit), 0, 1),
+                  check.Enum("drawn_by", static_cast<uint32_t>(g.drawn_by), 0, 1),
                   check.Finite("thickness", &g.thickness, 1), check.Finite("params", g.params, 8)});
   if (!status.ok()) return status;
   if (g.thickness < 0) return check.Wrong("thickness", g.thickness, "0 or greater");

@@ -47,6 +47,8 @@ enum class Fill : uint32_t { kSurface = 0, kSolid = 1 };
 enum class Topology : uint32_t { kList = 0, kStrip = 1, kLoop = 2 };
 enum class ColorMode : uint32_t { kUniform = 0, kPerVertex = 1 };
 enum class ThicknessUnit : uint32_t { kVoxels = 0, kUnits = 1 };
+// What covers the voxels: whatever the engine has, or its CPU even where it has a GPU.
+enum class DrawnBy : uint32_t { kEngine = 0, kCpu = 1 };
 enum class BlendMode : uint32_t { kOver = 0, kAdd = 1, kErase = 2 };
 
 struct RecordHeader {
@@ -77,7 +79,8 @@ struct GeometryRecord {
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand
   float params[8] = {};
-  uint32_t reserved[3] = {};
+  DrawnBy drawn_by = DrawnBy::kEngine;  // the same voxels
+  uint32_t reserved[2] = {};
 };
 
 struct DrawableRecord {

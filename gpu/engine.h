@@ -41,6 +41,8 @@
 
 namespace voxeld::gpu {
 
+class WorkerPool;
+
 enum class EngineKind : uint8_t { kAuto, kCpu, kCuda };
 const char* EngineKindName(EngineKind kind);
 
@@ -60,8 +62,16 @@ struct EngineOptions {
   // The CPU engine too runs in a process of its own (the CUDA engine always does).
   bool in_worker = false;
   std::string worker;  // the program of that process; empty: voxeld-engine, beside this one
+  // Where engines of one GPU find the process that they share; null: this one has its own.
+  std::shared_ptr<WorkerPool> workers;
   // After which a worker that does not answer is given up.
-  int64_t worker_deadline_ns = 5'000'000'000;
+  int64_t worker_deadline_ns = 2'000'000'000;
+  // False, of an engine in a process of its own: CreateEngine only begins; if the engine cannot be
+  // had its calls end in DataLoss that says why. info() is for after the first call that succeeded.
+  bool wait_until_ready = true;
+  // Called once, from a thread of the engine's, when an engine in a process of its own is lost, also
+  // between calls. It must only post.
+  std::function<void(const absl::Status&)> lost;
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
 };

@@ -5,38 +5,12 @@
 #include <utility>
 
 #include "gpu/assemble/blend.h"
+#include "gpu/assemble/draw.h"
 
 namespace voxeld::gpu {
 namespace {
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
-constexpr size_t kVertexRun = 1024;
-
-bool IsSingular(const Drawable& d) {
-  return WithPrimitive(d.geometry->view.record.kind, [&](auto primitive) {
-    return kIsSolid<typename decltype(primitive)::type> && !d.source.solid.drawable;
-  });
-}
-
-// Raises the words of a tile to what its items cover.
-void DrawItems(const Drawable& d, std::span<const uint32_t> items, const TileGrid& grid,
-               const Box3& box, uint32_t* words) {
-  const uint32_t priority = d.record.priority;
-  const bool erase = d.record.erase != 0;
-  uint32_t rgb_before = 0;
-  uint32_t word = MakeWord(priority, erase, rgb_before);
-  const auto raise = [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
-    if (rgb != rgb_before) {
-      rgb_before = rgb;
-      word = MakeWord(priority, erase, rgb);
-    }
-    uint32_t& at = words[grid.IndexInTile(x, y, z)];
-    at = std::max(at, word);
-  };
-  WithPrimitive(d.source.record->kind, [&](auto primitive) {
-    for (uint32_t item : items) decltype(primitive)::type::EmitVoxels(d.source, item, box, raise);
-  });
-}
 
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
@@ -162,30 +136,7 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
 }
 
 void Volume::Prepare(Drawable& d, Executor& executor) const {
-  const GeometryView& view = d.geometry->view;
-  const Affine map = Compose(Compose(view_, d.layer->record.transform), d.record.transform);
-  d.source = {};
-  d.source.record = &view.record;
-  WithPrimitive(view.record.kind, [&](auto primitive) {
-    using Primitive = typename decltype(primitive)::type;
-    if constexpr (kIsSolid<Primitive>) {
-      d.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
-    } else {
-      d.vertices.resize(view.record.vertex_count);
-      const size_t runs = (d.vertices.size() + kVertexRun - 1) / kVertexRun;
-      executor.For(runs, 1, [&](size_t run, int) {
-        const size_t end = std::min(d.vertices.size(), (run + 1) * kVertexRun);
-        for (size_t i = run * kVertexRun; i < end; ++i) {
-          d.vertices[i] = SnapPoint(map, &view.positions[i * 3]);
-        }
-      });
-      d.source.vertices = d.vertices.data();
-      d.source.indices = view.indices.data();
-      d.source.colors = view.colors.data();
-      d.source.radius = RadiusOf(view.record, map);
-    }
-  });
-  d.bins = BinItems(d.source, grid_, owned_, executor);
+  PrepareDrawable(d, view_, grid_, owned_, executor);
 }
 
 void Volume::PreparePending() {

@@ -1,11 +1,13 @@
 #include "gpu/cuda/cuda_volume.h"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "gpu/assemble/delta_plan.h"
+#include "gpu/cuda/cpu_voxels.h"
 #include "gpu/cuda/kernels.h"
 #include "gpu/primitives/list.h"
 
@@ -44,6 +46,7 @@ absl::StatusOr<DeviceTiles> DeviceTiles::Make(Device& device, const TileGrid& gr
   absl::StatusOr<Block> uploaded = device.Upload(owned.data(), owned.size());
   if (!uploaded.ok()) return uploaded.status();
   tiles.owned = *std::move(uploaded);
+  tiles.owned_here.assign(owned.begin(), owned.end());
   return tiles;
 }
 
@@ -96,7 +99,7 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
   };
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
-    if (geometry == nullptr) continue;
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu) continue;
     include(geometry->positions);
     include(geometry->indices);
     include(geometry->colors);
@@ -112,6 +115,7 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
 }
 
 RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
+  if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
   RetainedGeometry kept{view, nullptr};
   if (view.positions.empty()) return kept;
   std::byte* const device = arrays_->as<std::byte>();
@@ -255,6 +259,7 @@ absl::Status CudaVolume::MarkLeft() {
     live_items_ -= slots_[slot].items;
     dead_items_ += slots_[slot].items;
     dead_slots_.push_back(slot);
+    slots_[slot] = {.items = slots_[slot].items};
   }
   left_.clear();
   // Their memory may be handed out again: in the stream, after what has just been queued.
@@ -304,6 +309,29 @@ TableEntry CudaVolume::EntryOf(const Drawable& d) const {
   return entry;
 }
 
+absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot) {
+  if (executor_ == nullptr) {
+    executor_ = MakeExecutor(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+  }
+  const CpuVoxels drawn = DrawOnCpu(drawable, view_, tiles_.grid, tiles_.owned_here, *executor_);
+  absl::StatusOr<Block> block = device_.Upload(drawn.tiles.data(), drawn.tiles.size());
+  if (!block.ok()) return block.status();
+  slot.tiles = *std::move(block);
+  block = device_.Upload(drawn.begin.data(), drawn.begin.size());
+  if (!block.ok()) return block.status();
+  slot.begin = *std::move(block);
+  block = device_.Upload(drawn.voxels.data(), drawn.voxels.size());
+  if (!block.ok()) return block.status();
+  slot.voxels = *std::move(block);
+  // What goes over lies in memory that is about to go.
+  if (absl::Status status = device_.Wait(); !status.ok()) return status;
+  slot.items = static_cast<uint32_t>(drawn.tiles.size());
+  slot.singular = drawn.singular;
+  entry.record.kind = kDrawnByCpu;
+  entry.drawn = {slot.tiles.as<uint32_t>(), slot.begin.as<uint64_t>(), slot.voxels.as<uint64_t>()};
+  return absl::OkStatus();
+}
+
 absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
                                       std::span<const TableEntry> entries) {
   const void* before = table_.as<TableEntry>();
@@ -339,13 +367,22 @@ absl::Status CudaVolume::Enter() {
     const uint32_t slot = TakeSlot();
     TableEntry entry = EntryOf(*drawable);
     entry.source.record = &entry.record;
-    WithPrimitive(entry.record.kind, [&](auto primitive) {
-      using Primitive = typename decltype(primitive)::type;
-      slots_[slot] = {Primitive::Count(entry.source),
-                      kIsSolid<Primitive> && !entry.source.solid.drawable};
-    });
-    singular += slots_[slot].singular ? 1 : 0;
     slots.push_back(slot);
+    slots_[slot] = {};
+    if (entry.record.drawn_by == DrawnBy::kCpu) {
+      if (absl::Status status = DrawInto(entry, *drawable, slots_[slot]); !status.ok()) {
+        for (const uint32_t taken : slots) slots_[taken] = {};
+        free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
+        return status;
+      }
+    } else {
+      WithPrimitive(entry.record.kind, [&](auto primitive) {
+        using Primitive = typename decltype(primitive)::type;
+        slots_[slot].items = Primitive::Count(entry.source);
+        slots_[slot].singular = kIsSolid<Primitive> && !entry.source.solid.drawable;
+      });
+    }
+    singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);
   }
   absl::Status status = PutDrawables(slots, entries);
@@ -359,6 +396,7 @@ absl::Status CudaVolume::Enter() {
     }
     for (const uint32_t slot : slots) live_items_ += slots_[slot].items;
   } else {
+    for (const uint32_t taken : slots) slots_[taken] = {};
     free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
     return status;
   }

@@ -17,6 +17,7 @@
 #include "absl/status/statusor.h"
 #include "gpu/affine.h"
 #include "gpu/assemble/scene.h"
+#include "gpu/cpu/executor.h"
 #include "gpu/cuda/device.h"
 #include "gpu/cuda/pair_index.h"
 #include "gpu/cuda/pool.h"
@@ -27,6 +28,7 @@ namespace voxeld::gpu::cuda {
 // The tiles of a target, dark and clean.
 struct DeviceTiles {
   TileGrid grid;
+  std::vector<uint8_t> owned_here;  // as the device has it
   Block owned, dirty, dirty_list, lit, colors, counters;
   VolumeView view() const;
 
@@ -58,6 +60,7 @@ class CudaVolume final : private SceneObserver {
   struct Slot {
     uint32_t items = 0;
     bool singular = false;
+    Block tiles, begin, voxels;  // of what the CPU has drawn
   };
 
   absl::Status OnPlan(const DeltaPlan& plan) override;
@@ -71,6 +74,8 @@ class CudaVolume final : private SceneObserver {
   absl::Status Enter();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
   TableEntry EntryOf(const Drawable& drawable) const;
+  // Has the CPU draw it; the result goes over, and into `slot`.
+  absl::Status DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot);
   uint32_t TakeSlot();
 
   Device& device_;
@@ -101,6 +106,7 @@ class CudaVolume final : private SceneObserver {
   const std::byte* arrays_begin_ = nullptr;
   std::shared_ptr<Block> arrays_;
   uint32_t singular_ = 0;
+  std::unique_ptr<Executor> executor_;  // for what the CPU draws; made when it is asked for
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -40,6 +40,7 @@ __device__ void ForTiles(const TableEntry* table, const ItemList& list, uint64_t
   const uint32_t slot = list.slots[d];
   const uint32_t item = static_cast<uint32_t>(i - list.first[d]);
   const TableEntry& entry = table[slot];
+  if (entry.record.kind == kDrawnByCpu) return f(slot, entry, item, entry.drawn.tiles[item]);
   WithPrimitive(entry.record.kind, [&](auto primitive) {
     decltype(primitive)::type::EmitTiles(entry.source, item, volume.grid, [&](uint32_t tile) {
       if (volume.owned[tile] != 0) f(slot, entry, item, tile);

@@ -108,9 +108,18 @@ __device__ void DrawSolid(const TableEntry& entry, const Box3& box, const TileGr
   __syncthreads();
 }
 
+// What the CPU has drawn, by a warp.
+__device__ void RaiseDrawn(const CpuVoxelsView& drawn, uint32_t item, TileScratch& scratch) {
+  for (uint64_t v = drawn.begin[item] + threadIdx.x % 32; v < drawn.begin[item + 1]; v += 32) {
+    const uint64_t voxel = drawn.voxels[v];
+    atomicMax(&scratch.words[voxel >> 32], static_cast<uint32_t>(voxel));
+  }
+}
+
 // Every other heavy item, by a warp: each lane draws it in boxes of its own.
 __device__ void DrawByWarp(const TableEntry& entry, uint32_t item, const Box3& box,
                            const TileGrid& grid, TileScratch& scratch) {
+  if (entry.record.kind == kDrawnByCpu) return RaiseDrawn(entry.drawn, item, scratch);
   constexpr int32_t kBlock = 4;
   constexpr uint32_t kBlocks = kTileSize / kBlock;
   for (uint32_t b = threadIdx.x % 32; b < kBlocks * kBlocks * kBlocks; b += 32) {

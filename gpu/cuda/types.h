@@ -10,11 +10,23 @@
 
 namespace voxeld::gpu::cuda {
 
+// In place of a primitive's kind: the CPU has drawn it, and its items are what it covers of a tile
+// each.
+inline constexpr PrimitiveKind kDrawnByCpu = PrimitiveKind{0};
+
+// As CpuVoxels has them, in device memory.
+struct CpuVoxelsView {
+  const uint32_t* tiles = nullptr;
+  const uint64_t* begin = nullptr;
+  const uint64_t* voxels = nullptr;
+};
+
 // A drawable in the table, by slot. `source.record` points to `record`, its arrays into device
 // memory; vertices are mapped and snapped where they are needed.
 struct TableEntry {
   Source source;
   GeometryRecord record;
+  CpuVoxelsView drawn;  // of kDrawnByCpu, which has no source
   uint32_t priority = 0;
   uint32_t erase = 0;
   uint32_t layer = 0;  // its slot

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,13 +13,14 @@
 
 namespace voxeld::gpu {
 
-CallChannel::CallChannel(std::unique_ptr<WorkerProcess> process, int64_t deadline_ns,
-                         int64_t first_deadline_ns)
+CallChannel::CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int64_t deadline_ns,
+                         int64_t first_deadline_ns, std::function<void(const absl::Status&)> lost)
     : deadline_ns_(deadline_ns),
       wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       process_(std::move(process)),
+      socket_(socket),
+      lost_(std::move(lost)),
       allowed_ns_(first_deadline_ns) {
-  fcntl(process_->socket(), F_SETFL, O_NONBLOCK);
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -30,6 +32,7 @@ void CallChannel::Close() {
   }
   Wake();
   thread_.join();
+  close(socket_);
   close(wake_);
 }
 
@@ -46,15 +49,16 @@ void CallChannel::Wake() const {
   [[maybe_unused]] const ssize_t written = write(wake_, &one, sizeof(one));
 }
 
-void CallChannel::Call(Message message, std::function<void(Message&)> ready, Answered answered) {
+void CallChannel::Call(Message message, std::function<void(Message&)> ready, Answered answered,
+                       int64_t more_ns) {
   absl::Status ended;
   {
     sync::MutexLock lock(mutex_);
     ended = ended_;
     if (ended.ok()) {
       message.call = next_call_++;
-      if (owed_.empty()) give_up_at_ = clock_.Now() + allowed_ns_;
-      owed_[message.call] = std::move(answered);
+      if (owed_.empty()) give_up_at_ = clock_.Now() + allowed_ns_ + more_ns;
+      owed_[message.call] = {std::move(answered), more_ns};
       outgoing_.push_back({std::move(message), std::move(ready), nullptr, nullptr});
     }
   }
@@ -102,7 +106,7 @@ absl::Status CallChannel::SendSome() {
       continue;
     }
     if (next.ready) std::exchange(next.ready, nullptr)(next.message);
-    const absl::Status sent = SendMessage(process_->socket(), next.message);
+    const absl::Status sent = SendMessage(socket_, next.message);
     if (absl::IsResourceExhausted(sent)) {
       sync::MutexLock lock(mutex_);
       outgoing_.push_front(std::move(next));
@@ -114,7 +118,7 @@ absl::Status CallChannel::SendSome() {
 }
 
 absl::Status CallChannel::ReceiveOne() {
-  absl::StatusOr<Message> message = ReceiveMessage(process_->socket());
+  absl::StatusOr<Message> message = ReceiveMessage(socket_);
   if (!message.ok()) return message.status();
   if (message->fd >= 0) close(message->fd);
   Answered answered;
@@ -125,17 +129,18 @@ absl::Status CallChannel::ReceiveOne() {
       return absl::DataLossError(
           absl::StrCat("the worker answered call ", message->call, ", of which no answer is owed"));
     }
-    answered = std::move(it->second);
+    answered = std::move(it->second.answered);
     owed_.erase(it);
     allowed_ns_ = deadline_ns_;
-    give_up_at_ = owed_.empty() ? sync::kNever : clock_.Now() + allowed_ns_;
+    give_up_at_ =
+        owed_.empty() ? sync::kNever : clock_.Now() + allowed_ns_ + owed_.begin()->second.more_ns;
   }
   answered(*std::move(message));
   return absl::OkStatus();
 }
 
 void CallChannel::End(const absl::Status& status) {
-  std::map<uint64_t, Answered> owed;
+  std::map<uint64_t, Owed> owed;
   std::deque<Outgoing> left;
   {
     sync::MutexLock lock(mutex_);
@@ -143,11 +148,14 @@ void CallChannel::End(const absl::Status& status) {
     owed.swap(owed_);
     left.swap(outgoing_);
   }
+  if (absl::IsDataLoss(status)) process_->Kill();
   process_ = nullptr;
-  for (auto& [call, answered] : owed) answered(status);
+  shutdown(socket_, SHUT_RDWR);
+  for (auto& [call, one] : owed) one.answered(status);
   for (Outgoing& outgoing : left) {
     if (outgoing.work) outgoing.work();
   }
+  if (lost_ && absl::IsDataLoss(status)) lost_(status);
 }
 
 void CallChannel::Run() {
@@ -164,9 +172,8 @@ void CallChannel::Run() {
     if (now >= give_up_at) {
       return End(absl::DataLossError("the worker did not answer in time and was ended"));
     }
-    pollfd waiting[2] = {
-        {process_->socket(), static_cast<short>(POLLIN | (HasOutgoing() ? POLLOUT : 0)), 0},
-        {wake_, POLLIN, 0}};
+    pollfd waiting[2] = {{socket_, static_cast<short>(POLLIN | (HasOutgoing() ? POLLOUT : 0)), 0},
+                         {wake_, POLLIN, 0}};
     const int64_t wait_ms =
         give_up_at == sync::kNever ? -1 : (give_up_at - now) / sync::kMillisecond + 1;
     poll(waiting, 2, static_cast<int>(std::min<int64_t>(wait_ms, 1 << 30)));

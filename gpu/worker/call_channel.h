@@ -26,21 +26,25 @@ class CallChannel {
   using Answered = std::function<void(absl::StatusOr<Message>)>;
 
   // `deadline_ns`: the longest time between answers while any is owed; for the first answer of all
-  // `first_deadline_ns`.
-  CallChannel(std::unique_ptr<WorkerProcess> process, int64_t deadline_ns,
-              int64_t first_deadline_ns);
+  // `first_deadline_ns`. When it has passed, or the process has ended, that is killed.
+  // `socket`: a connection to `process`, closed at the end. `lost` (may be empty) is called once,
+  // on the channel's thread, with the DataLoss that ends it, after all that was owed is answered.
+  CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int64_t deadline_ns,
+              int64_t first_deadline_ns, std::function<void(const absl::Status&)> lost);
   ~CallChannel() { Close(); }
   CallChannel(const CallChannel&) = delete;
   CallChannel& operator=(const CallChannel&) = delete;
 
-  // Ends the worker and answers all that is owed, Cancelled, before it returns.
+  // Ends the connection and answers all that is owed, Cancelled, before it returns.
   void Close();
   // The same with `status`, soon: what the worker says is not to be believed.
   void Fail(const absl::Status& status);
 
   // Sends a message, in the order of the calls of this function. `message.call` is filled in.
   // `ready` (may be empty) completes the message just before it goes, on the channel's thread.
-  void Call(Message message, std::function<void(Message&)> ready, Answered answered);
+  // `more_ns`: what this call may take beyond the deadline.
+  void Call(Message message, std::function<void(Message&)> ready, Answered answered,
+            int64_t more_ns = 0);
   // Runs `work` on the channel's thread, after all that was sent before; at once when the worker is
   // gone.
   void Later(std::function<void()> work);
@@ -63,10 +67,17 @@ class CallChannel {
   void End(const absl::Status& status);
   bool HasOutgoing();
 
+  struct Owed {
+    Answered answered;
+    int64_t more_ns = 0;
+  };
+
   const int64_t deadline_ns_;
   const sync::SystemClock clock_;
   const int wake_;  // an eventfd
-  std::unique_ptr<WorkerProcess> process_;
+  std::shared_ptr<WorkerProcess> process_;
+  const int socket_;
+  const std::function<void(const absl::Status&)> lost_;
 
   sync::Mutex mutex_;
   bool closing_ VOXELD_GUARDED_BY(mutex_) = false;
@@ -74,7 +85,7 @@ class CallChannel {
   absl::Status ended_ VOXELD_GUARDED_BY(mutex_);  // not OK: nothing goes or comes any more
   uint64_t next_call_ VOXELD_GUARDED_BY(mutex_) = 1;
   std::deque<Outgoing> outgoing_ VOXELD_GUARDED_BY(mutex_);
-  std::map<uint64_t, Answered> owed_ VOXELD_GUARDED_BY(mutex_);
+  std::map<uint64_t, Owed> owed_ VOXELD_GUARDED_BY(mutex_);
   sync::TimeNs give_up_at_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   int64_t allowed_ns_ VOXELD_GUARDED_BY(mutex_);
   std::thread thread_;

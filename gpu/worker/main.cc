@@ -38,7 +38,7 @@ int Main() {
   hooks.pin = cuda::PinMemory;
   hooks.unpin = cuda::UnpinMemory;
 #endif
-  return ServeEngine(kWorkerSocket, hooks);
+  ServeEngines(kWorkerSocket, hooks);
 }
 
 }  // namespace

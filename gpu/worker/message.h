@@ -1,5 +1,5 @@
 // What passes between an engine's owner and its worker: small messages over a pair of
-// SOCK_SEQPACKET sockets. Bulk data lies in segments; messages name them.
+// SOCK_SEQPACKET sockets, a pair for each engine and one for control. Bulk data lies in segments; messages name them.
 //
 // Both ends are of the same build: kProtocol says so, and a worker of another is refused.
 #pragma once
@@ -20,7 +20,7 @@
 
 namespace voxeld::gpu {
 
-inline constexpr uint32_t kWorkerProtocol = 1;
+inline constexpr uint32_t kWorkerProtocol = 2;
 
 enum class MessageType : uint32_t {
   // To the worker. Each but the segments' is answered once, under its own call number.
@@ -31,6 +31,7 @@ enum class MessageType : uint32_t {
   kApply = 5,        // BulkMessage; kDone
   kFrame = 6,        // FrameMessage; kFrameDone or kDone
   kVoxels = 7,       // VoxelsMessage; kDone
+  kConnect = 8,      // a descriptor, the other end of a connection; over the control socket alone
   // From the worker.
   kReady = 32,      // ReadyMessage
   kDone = 33,       // DoneMessage, then the text of the status

@@ -1,6 +1,7 @@
 #include "gpu/worker/process.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
@@ -11,12 +12,13 @@
 #include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "gpu/worker/message.h"
 
 extern char** environ;
 
 namespace voxeld::gpu {
 
-absl::StatusOr<std::unique_ptr<WorkerProcess>> WorkerProcess::Start(const std::string& program) {
+absl::StatusOr<std::shared_ptr<WorkerProcess>> WorkerProcess::Start(const std::string& program) {
   int sockets[2];
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, sockets) != 0) {
     return absl::FailedPreconditionError(
@@ -46,17 +48,48 @@ absl::StatusOr<std::unique_ptr<WorkerProcess>> WorkerProcess::Start(const std::s
     return absl::FailedPreconditionError(
         absl::StrCat(program, " cannot be started: ", absl::ErrnoToStatus(error, "").message()));
   }
-  return std::unique_ptr<WorkerProcess>(new WorkerProcess(pid, sockets[0]));
+  fcntl(sockets[0], F_SETFL, O_NONBLOCK);
+  return std::shared_ptr<WorkerProcess>(new WorkerProcess(pid, sockets[0]));
 }
 
 WorkerProcess::~WorkerProcess() {
-  close(socket_);
+  Kill();
+  close(control_);
+}
+
+absl::StatusOr<int> WorkerProcess::Connect() {
+  int sockets[2];
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, sockets) != 0) {
+    return absl::UnavailableError(
+        absl::StrCat("no sockets for a worker: ", absl::ErrnoToStatus(errno, "").message()));
+  }
+  Message message;
+  message.type = MessageType::kConnect;
+  message.fd = sockets[1];
+  const absl::Status sent = SendMessage(control_, message);
+  close(sockets[1]);
+  if (!sent.ok()) {
+    close(sockets[0]);
+    return absl::UnavailableError(sent.message());
+  }
+  fcntl(sockets[0], F_SETFL, O_NONBLOCK);
+  return sockets[0];
+}
+
+void WorkerProcess::Kill() {
+  if (killed_.exchange(true)) return;
   kill(pid_, SIGKILL);
   // One that hangs in its driver dies when that lets go of it.
   std::thread([pid = pid_] {
     while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
     }
   }).detach();
+}
+
+bool WorkerProcess::lost() const {
+  if (killed_) return true;
+  pollfd end{control_, POLLIN, 0};
+  return poll(&end, 1, 0) > 0 && (end.revents & (POLLHUP | POLLERR)) != 0;
 }
 
 }  // namespace voxeld::gpu

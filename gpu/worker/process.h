@@ -1,8 +1,9 @@
-// A worker's process.
+// A worker's process: one for all engines of a GPU, each with a connection of its own.
 #pragma once
 
 #include <sys/types.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -15,19 +16,26 @@ class WorkerProcess {
  public:
   // Starts `program` with its end of a socket pair as descriptor 3, and nothing else open but the
   // standard streams. FailedPrecondition if it cannot be started.
-  static absl::StatusOr<std::unique_ptr<WorkerProcess>> Start(const std::string& program);
+  static absl::StatusOr<std::shared_ptr<WorkerProcess>> Start(const std::string& program);
   ~WorkerProcess();
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  int socket() const { return socket_; }  // this end; blocks
+  // A connection for one engine: this end of it, the caller's to close; it does not block. The
+  // other is on its way to the process. Unavailable if that is gone.
+  absl::StatusOr<int> Connect();
+  // Ends the process, whatever it does; nobody waits for it. Its connections end with it.
+  void Kill();
+  // It has ended, or been killed.
+  bool lost() const;
   pid_t pid() const { return pid_; }
 
  private:
-  WorkerProcess(pid_t pid, int socket) : pid_(pid), socket_(socket) {}
+  WorkerProcess(pid_t pid, int control) : pid_(pid), control_(control) {}
 
   const pid_t pid_;
-  const int socket_;
+  const int control_;  // connections go over this
+  std::atomic<bool> killed_{false};
 };
 
 inline constexpr int kWorkerSocket = 3;

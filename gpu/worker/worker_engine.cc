@@ -19,12 +19,15 @@
 #include "gpu/worker/process.h"
 #include "gpu/worker/segment_pool.h"
 #include "gpu/worker/target_codec.h"
+#include "gpu/worker/worker_pool.h"
 
 namespace voxeld::gpu {
 namespace {
 
 // The first answer comes once there is a CUDA context, which can take seconds.
 constexpr int64_t kFirstAnswerFactor = 10;
+// What a byte that goes with a call may take: checked and copied twice, on a slow host.
+constexpr int64_t kNsPerByte = 4;
 
 class LeasedMemory final : public StagingBlock::Memory {
  public:
@@ -54,35 +57,37 @@ std::function<void(Message&)> NameBulk(SegmentPool::Lease lease, size_t size) {
 
 class WorkerEngine final : public Engine {
  public:
-  WorkerEngine(const EngineOptions& options, std::unique_ptr<WorkerProcess> process)
+  WorkerEngine(const EngineOptions& options, std::string reason,
+               std::shared_ptr<WorkerProcess> process, int socket)
       : options_(options),
-        channel_(std::make_shared<CallChannel>(std::move(process), options.worker_deadline_ns,
-                                               options.worker_deadline_ns * kFirstAnswerFactor)),
+        channel_(std::make_shared<CallChannel>(
+            std::move(process), socket, options.worker_deadline_ns,
+            options.worker_deadline_ns * kFirstAnswerFactor, options.lost)),
         staging_(options.staging_limit_bytes, ids_, Added(), Dropped()),
-        results_(UINT64_MAX, ids_, Added(), Dropped()) {}
+        results_(UINT64_MAX, ids_, Added(), Dropped()) {
+    info_.kind = options.kind;
+    info_.reason = std::move(reason);
+  }
 
   ~WorkerEngine() override { channel_->Close(); }
 
-  absl::Status Open(std::string reason) {
+  // Asks for the engine; `options_.wait_until_ready` says whether the answer is waited for.
+  absl::Status Open() {
     OpenMessage open;
     open.kind = options_.kind;
     open.threads = options_.threads;
     open.device = options_.device;
     open.part = options_.part;
-    absl::StatusOr<Message> answer =
-        Await<absl::StatusOr<Message>>([&](CallChannel::Answered answered) {
-          channel_->Call(MakeMessage(MessageType::kOpen, 0, open), nullptr, std::move(answered));
-        });
-    if (!answer.ok()) return absl::FailedPreconditionError(answer.status().message());
-    if (answer->type != MessageType::kReady) {
-      const absl::Status status = PlainStatus(answer);
-      return status.ok() ? absl::FailedPreconditionError("the worker has no engine") : status;
-    }
-    const auto ready = answer->As<ReadyMessage>();
-    if (!ready.has_value())
-      return absl::FailedPreconditionError("the worker's answer is too short");
-    info_ = {ready->kind, std::string(ready->device, strnlen(ready->device, sizeof(ready->device))),
-             std::move(reason)};
+    const auto ask = [&](std::function<void(absl::Status)> opened) {
+      channel_->Call(MakeMessage(MessageType::kOpen, 0, open), nullptr,
+                     [this, opened = std::move(opened)](const absl::StatusOr<Message>& answer) {
+                       opened(OnOpened(answer));
+                     });
+    };
+    if (options_.wait_until_ready) return Await<absl::Status>(ask);
+    ask([this](const absl::Status& status) {
+      if (!status.ok()) channel_->Fail(absl::DataLossError(status.message()));
+    });
     return absl::OkStatus();
   }
 
@@ -127,11 +132,13 @@ class WorkerEngine final : public Engine {
     SegmentPool::Lease lease = memory->lease();
     block = {};
     Ask<absl::Status>(std::move(done), [&](auto answer) {
-      channel_->Call(MakeMessage(MessageType::kApply, 0, BulkMessage{}), NameBulk(lease, size),
-                     [lease, answer](const absl::StatusOr<Message>& message) mutable {
-                       lease = nullptr;  // given back before the answer
-                       answer(PlainStatus(message));
-                     });
+      channel_->Call(
+          MakeMessage(MessageType::kApply, 0, BulkMessage{}), NameBulk(lease, size),
+          [lease, answer](const absl::StatusOr<Message>& message) mutable {
+            lease = nullptr;  // given back before the answer
+            answer(PlainStatus(message));
+          },
+          static_cast<int64_t>(size) * kNsPerByte);
     });
   }
 
@@ -170,6 +177,20 @@ class WorkerEngine final : public Engine {
   }
 
  private:
+  absl::Status OnOpened(const absl::StatusOr<Message>& answer) {
+    if (!answer.ok()) return absl::FailedPreconditionError(answer.status().message());
+    if (answer->type != MessageType::kReady) {
+      const absl::Status status = PlainStatus(answer);
+      return status.ok() ? absl::FailedPreconditionError("the worker has no engine") : status;
+    }
+    const auto ready = answer->As<ReadyMessage>();
+    if (!ready.has_value())
+      return absl::FailedPreconditionError("the worker's answer is too short");
+    info_.kind = ready->kind;
+    info_.device = std::string(ready->device, strnlen(ready->device, sizeof(ready->device)));
+    return absl::OkStatus();
+  }
+
   SegmentPool::Told Added() {
     return [channel = std::weak_ptr<CallChannel>(channel_)](const SegmentPool::Item& item) {
       const std::shared_ptr<CallChannel> open = channel.lock();
@@ -325,11 +346,19 @@ std::string DefaultWorkerProgram() {
 
 absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
                                                            std::string reason) {
-  absl::StatusOr<std::unique_ptr<WorkerProcess>> process =
-      WorkerProcess::Start(options.worker.empty() ? DefaultWorkerProgram() : options.worker);
+  const std::string program = options.worker.empty() ? DefaultWorkerProgram() : options.worker;
+  absl::StatusOr<std::shared_ptr<WorkerProcess>> process =
+      options.workers == nullptr ? WorkerProcess::Start(program)
+                                 : options.workers->Acquire(program, options.kind, options.device);
   if (!process.ok()) return process.status();
-  auto engine = std::make_unique<WorkerEngine>(options, *std::move(process));
-  if (absl::Status status = engine->Open(std::move(reason)); !status.ok()) return status;
+  const absl::StatusOr<int> socket = (*process)->Connect();
+  if (!socket.ok()) {
+    (*process)->Kill();
+    return absl::FailedPreconditionError(socket.status().message());
+  }
+  auto engine =
+      std::make_unique<WorkerEngine>(options, std::move(reason), *std::move(process), *socket);
+  if (absl::Status status = engine->Open(); !status.ok()) return status;
   return engine;
 }
 

@@ -13,13 +13,13 @@
 
 namespace voxeld::gpu {
 
-// Starts the program and waits until its engine is there, at most options.worker_deadline_ns (for
-// the first CUDA context, ten times that). `reason`: for EngineInfo. FailedPrecondition if the
-// program or the engine cannot be had.
+// Starts the program, unless options.workers has one for that GPU, and waits until its engine is
+// there, at most options.worker_deadline_ns (for the first CUDA context, ten times that). `reason`:
+// for EngineInfo. FailedPrecondition if the program or the engine cannot be had.
 //
-// Contract, beyond gpu/engine.h's: a call whose answer does not come within worker_deadline_ns, and
-// every call after the process has ended, ends in DataLoss; the process is killed and never waited
-// for. Answers come on a thread of the engine's.
+// Contract, beyond gpu/engine.h's: a call whose answer does not come within worker_deadline_ns (and
+// 4 ns for each byte that goes with it), and every call after the process has ended, ends in
+// DataLoss; the process is killed and never waited for. Answers come on a thread of the engine's.
 absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
                                                            std::string reason);
 

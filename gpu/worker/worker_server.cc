@@ -1,6 +1,5 @@
 #include "gpu/worker/worker_server.h"
 
-#include <sys/prctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -217,10 +217,19 @@ class Server {
 
 }  // namespace
 
-int ServeEngine(int socket, const WorkerHooks& hooks) { return Server(socket, hooks).Run(); }
+void ServeEngines(int control, const WorkerHooks& hooks) {
+  for (;;) {
+    const absl::StatusOr<Message> message = ReceiveMessage(control);
+    if (!message.ok()) _exit(0);
+    if (message->type != MessageType::kConnect || message->fd < 0) _exit(1);
+    std::thread([connection = message->fd, &hooks] {
+      if (const int code = Server(connection, hooks).Run(); code != 0) _exit(code);
+      close(connection);
+    }).detach();
+  }
+}
 
 void BecomeWorker() {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
   // A terminal's Ctrl-C is for the owner, who ends its worker by closing the socket.
   std::signal(SIGINT, SIG_IGN);
   std::signal(SIGTERM, SIG_IGN);

@@ -1,5 +1,5 @@
-// The worker's side: carries out what comes over the socket, one call after another, until the
-// socket ends.
+// The worker's side: an engine for each connection, on a thread of its own, which carries out what
+// comes over that, one call after another, until it ends.
 #pragma once
 
 #include <functional>
@@ -11,20 +11,22 @@
 
 namespace voxeld::gpu {
 
+// Called by all connections' threads.
 struct WorkerHooks {
   // Makes the engine; must carry out calls inline.
   std::function<absl::StatusOr<std::unique_ptr<Engine>>(const EngineOptions&)> make_engine;
   // A segment came, or goes: to be pinned. May be empty.
   std::function<void(std::span<std::byte>)> pin, unpin;
-  // Before the n-th frame, from 1. May be empty.
+  // Before a connection's n-th frame, from 1. May be empty.
   std::function<void(uint64_t)> before_frame;
 };
 
-// Returns the process' exit code: 0 when the socket ended, 1 if what came was no protocol, 3 when
-// the engine was lost (which has been told).
-int ServeEngine(int socket, const WorkerHooks& hooks);
+// Serves the connections that come over `control`. Ends the process, at once and whatever its
+// engines do: with 0 when `control` ends, with 1 if what came was no protocol, with 3 when an engine
+// was lost (its owner has been told; a GPU's fault is all its engines').
+[[noreturn]] void ServeEngines(int control, const WorkerHooks& hooks);
 
-// What a worker's main does first: outlives no parent, leaves signals to it.
+// What a worker's main does first: leaves signals to its owner.
 void BecomeWorker();
 
 }  // namespace voxeld::gpu

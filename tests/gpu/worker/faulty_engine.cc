@@ -33,7 +33,7 @@ int Main() {
       if (frame == at) Fail(what);
     };
   }
-  return ServeEngine(kWorkerSocket, hooks);
+  ServeEngines(kWorkerSocket, hooks);
 }
 
 }  // namespace

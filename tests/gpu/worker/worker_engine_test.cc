@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <future>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "gpu/worker/worker_pool.h"
 #include "tests/conformance/engine_driver.h"
 #include "tests/conformance/scene_generator.h"
 
@@ -75,6 +77,79 @@ TEST_F(FaultyWorker, ThatHangsDoesNotHoldUpItsOwnersEnd) {
     });
   }
   EXPECT_EQ(answer.get_future().get().code(), absl::StatusCode::kCancelled);
+}
+
+// ---- several engines of one process
+
+class SharedWorker : public FaultyWorker {
+ protected:
+  EngineOptions Options() {
+    EngineOptions options;
+    options.kind = EngineKind::kCpu;
+    options.threads = 1;
+    options.in_worker = true;
+    options.worker = FAULTY_ENGINE;
+    options.worker_deadline_ns = 20'000'000'000;
+    options.workers = pool_;
+    return options;
+  }
+  static conformance::EngineDriver Drive(const EngineOptions& options) {
+    return {{"shared", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
+  }
+  pid_t Process() { return (*pool_->Acquire(FAULTY_ENGINE, EngineKind::kCpu, 0))->pid(); }
+
+  const std::shared_ptr<WorkerPool> pool_ = std::make_shared<WorkerPool>();
+};
+
+TEST_F(SharedWorker, ServesAllEnginesAndOutlivesEach) {
+  conformance::EngineDriver a = Drive(Options());
+  const pid_t process = Process();
+  {
+    conformance::EngineDriver b = Drive(Options());
+    EXPECT_EQ(Process(), process);
+    ASSERT_TRUE(a.SetTarget(target_).ok());
+    ASSERT_TRUE(b.SetTarget(target_).ok());
+    ASSERT_TRUE(a.Frame().ok());
+    ASSERT_TRUE(b.Frame().ok());
+  }
+  EXPECT_TRUE(a.Frame().ok());
+  EXPECT_EQ(Process(), process);
+}
+
+TEST_F(SharedWorker, ThatIsLostIsLostToAllAndTheNextEngineHasANewOne) {
+  std::promise<absl::Status> told;
+  EngineOptions idle = Options();
+  idle.lost = [&](const absl::Status& status) { told.set_value(status); };
+  conformance::EngineDriver a = Drive(idle);
+  conformance::EngineDriver b = Drive(Options());
+  const pid_t process = Process();
+  ASSERT_TRUE(b.SetTarget(target_).ok());
+  ASSERT_EQ(kill(process, SIGKILL), 0);
+  // Also to the one that was not asking for anything.
+  EXPECT_EQ(told.get_future().get().code(), absl::StatusCode::kDataLoss);
+  EXPECT_EQ(b.Frame().status().code(), absl::StatusCode::kDataLoss);
+  conformance::EngineDriver c = Drive(Options());
+  EXPECT_NE(Process(), process);
+  ASSERT_TRUE(c.SetTarget(target_).ok());
+  EXPECT_TRUE(c.Frame().ok());
+}
+
+TEST_F(SharedWorker, ThatIsNotWaitedForAnswersWhenItIsThere) {
+  EngineOptions options = Options();
+  options.wait_until_ready = false;
+  conformance::EngineDriver a = Drive(options);
+  ASSERT_TRUE(a.SetTarget(target_).ok());
+  ASSERT_TRUE(a.Frame().ok());
+  EXPECT_EQ(a.engine().info().device, "CPU, 1 thread");
+}
+
+TEST_F(SharedWorker, ThatIsNotWaitedForAndCannotServeSaysWhy) {
+  EngineOptions options = Options();
+  options.wait_until_ready = false;
+  options.workers = nullptr;
+  options.worker = "/bin/true";
+  conformance::EngineDriver a = Drive(options);
+  EXPECT_EQ(a.SetTarget(target_).code(), absl::StatusCode::kDataLoss);
 }
 
 TEST(WorkerEngine, APromisedProgramMustBeThereAndBeAWorker) {
