@@ -28,6 +28,7 @@
 #include "daemon/core/receipt.h"
 #include "daemon/core/stats.h"
 #include "daemon/pipeline/display_settings.h"
+#include "daemon/pipeline/engine_event.h"
 #include "daemon/scene/operation.h"
 #include "display/api/display.h"
 #include "display/sync/clock.h"
@@ -54,6 +55,8 @@ struct CoreOptions {
   // when its engine was lost.
   std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>
       make_engine;
+  // What becomes of engines in processes of their own; on the core's thread. May be empty.
+  std::function<void(const EngineEvent&)> engine_event;
 };
 
 struct SessionInfo {

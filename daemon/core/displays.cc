@@ -41,9 +41,16 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.tell = [this, loop = loop_](const Rider& rider, const CommitOutcome& outcome) {
     loop->Post([this, rider, outcome] { DeliverOutcome(rider, outcome); });
   };
-  options.retire = [loop = loop_](SnapshotPtr snapshot) {
-    loop->Post([snapshot = std::move(snapshot)] {});
+  options.retire = [loop = loop_](std::shared_ptr<const void> what) {
+    loop->Post([what = std::move(what)] {});
   };
+  if (options_.engine_event) {
+    options.tell_engine = [loop = loop_, tell = options_.engine_event,
+                           name = info.name](EngineEvent event) {
+      event.display = name;
+      loop->Post([tell, event = std::move(event)] { tell(event); });
+    };
+  }
   auto host = std::make_shared<Host>();
   host->work = options.work;
   absl::StatusOr<std::unique_ptr<FramePipeline>> pipeline =

@@ -26,6 +26,15 @@ struct DisplayFigures {
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice;
+  // Of an engine in a process of its own. Empty: it is as was asked for; else what is not, and why.
+  std::string engine_degraded;
+  bool volume_held = false;  // the engine was lost, and nothing has been drawn since
+  uint64_t engine_faults = 0, engine_returns = 0;
+  uint64_t engine_mismatches = 0;  // it came back with other bytes than the CPU's, and was sent away
+  // From the beginning of the volume that the loss interrupted to the CPU's in its place; from the
+  // loss to the engine's return. 0: not yet.
+  int64_t takeover_last_ns = 0, takeover_max_ns = 0, return_last_ns = 0, return_max_ns = 0;
+  std::vector<std::string> pinned_entities;  // drawn by the CPU: they made the GPU fault
   // commits_owed = presented + unchanged + superseded + lost + not_shown + pending, always.
   uint64_t commits_owed = 0, commits_presented = 0, commits_unchanged = 0, commits_superseded = 0,
            commits_lost = 0, commits_not_shown = 0, commits_pending = 0;

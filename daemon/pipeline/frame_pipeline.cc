@@ -15,24 +15,16 @@ namespace {
 // After a failure of the engine, without a new commit.
 constexpr sync::TimeNs kEngineRetryDelay = sync::kSecond;
 
-std::string WhyNotShowing(const display::Display& display) {
-  return absl::StrCat("the display was ", display::DisplayStateName(display.state()), ": ",
-                      display.state_reason());
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<FramePipeline>> FramePipeline::Create(Options options) {
   const absl::StatusOr<gpu::Affine> map =
       SceneToVoxel(options.view, options.display->info().geometry.grid);
   if (!map.ok()) return map.status();
+  const auto tell_engine = options.tell_engine;
   std::unique_ptr<FramePipeline> pipeline(new FramePipeline(std::move(options)));
   pipeline->scene_to_voxel_ = *map;
-  absl::StatusOr<std::unique_ptr<gpu::Engine>> engine =
-      pipeline->make_engine_(pipeline->engine_options_);
-  if (!engine.ok()) return engine.status();
-  pipeline->engine_ = *std::move(engine);
-  pipeline->engine_info_ = pipeline->engine_->info();
+  if (absl::Status status = pipeline->Open(tell_engine); !status.ok()) return status;
   return pipeline;
 }
 
@@ -45,12 +37,34 @@ FramePipeline::FramePipeline(Options options)
       tell_(std::move(options.tell)),
       retire_(std::move(options.retire)),
       view_(options.view),
-      scene_([this] { Breathe(); }),
+      scene_(std::make_unique<EngineScene>([this] { Breathe(); })),
       pool_(display_->info().layout),
       riders_(display_->info().name,
               [this](const Rider& rider, const CommitOutcome& outcome) { Told(rider, outcome); }) {}
 
 FramePipeline::~FramePipeline() { Stop(); }
+
+absl::Status FramePipeline::Open(std::function<void(EngineEvent)> tell) {
+  absl::StatusOr<EngineCare::Made> made = Make(engine_options_);
+  if (!made.ok()) return made.status();
+  made_ = *std::move(made);
+  engine_info_ = made_.engine->info();
+  reason_ = engine_info_.reason;
+  if (engine_info_.kind == gpu::EngineKind::kCpu && !engine_options_.in_worker) {
+    return absl::OkStatus();
+  }
+  EngineCare::Options care;
+  care.make_engine = [this](const gpu::EngineOptions& options) { return Make(options); };
+  care.engine = engine_options_;
+  care.engine.kind = engine_info_.kind;
+  care.work = work_;
+  care.clock = &clock_;
+  care.breathe = [this] { Breathe(); };
+  care.retire = [this](std::shared_ptr<const void> what) { Retire(std::move(what)); };
+  care.tell = std::move(tell);
+  care_ = std::make_unique<EngineCare>(std::move(care));
+  return absl::OkStatus();
+}
 
 absl::Status FramePipeline::Start() {
   const absl::Status status = display_->Start(this, [work = work_] { work->Wake(); });
@@ -64,7 +78,8 @@ void FramePipeline::Stop() {
   riders_.LoseUnsubmitted("the display was stopped", true);
   // The engine's end comes before the buffer that it may be writing into is let go.
   alive_ = nullptr;
-  engine_ = nullptr;
+  if (care_ != nullptr) care_->Stop();
+  made_.engine = nullptr;
   drawing_.reset();
   ServeCaptures();
 }
@@ -76,6 +91,7 @@ sync::TimeNs FramePipeline::Step() {
     ServeCaptures();
   } while (MaybeDraw());
   sync::TimeNs next = next_tick_;
+  if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
   if (show_again_ && !drawing_.has_value() && showing() && display_->mailbox_free()) {
     next = std::min(next, show_again_at_);
@@ -87,8 +103,8 @@ void FramePipeline::Breathe() {
   if (clock_.Now() >= next_tick_) next_tick_ = display_->Tick();
 }
 
-void FramePipeline::Retire(SnapshotPtr snapshot) {
-  if (snapshot != nullptr && retire_) retire_(std::move(snapshot));
+void FramePipeline::Retire(std::shared_ptr<const void> what) {
+  if (what != nullptr && retire_) retire_(std::move(what));
 }
 
 void FramePipeline::Show(SnapshotPtr snapshot) {
@@ -116,36 +132,77 @@ void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden) 
 
 // ----------------------------------------------------------------------------------- drawing
 
+absl::StatusOr<EngineCare::Made> FramePipeline::Make(gpu::EngineOptions options) {
+  const uint64_t id = ++engines_made_;
+  options.lost = [this, id, work = work_,
+                  alive = std::weak_ptr<bool>(alive_)](const absl::Status& status) {
+    work->Post([this, id, alive, status] {
+      if (alive.lock() != nullptr) OnEngineLost(id, status);
+    });
+  };
+  absl::StatusOr<std::unique_ptr<gpu::Engine>> engine = make_engine_(options);
+  if (!engine.ok()) return engine.status();
+  return EngineCare::Made{*std::move(engine), id};
+}
+
 bool FramePipeline::HaveEngine() {
-  if (engine_ != nullptr) return true;
-  absl::StatusOr<std::unique_ptr<gpu::Engine>> engine = make_engine_(engine_options_);
-  if (!engine.ok()) {
-    engine_info_.reason = std::string(engine.status().message());
+  if (made_.engine != nullptr) return true;
+  gpu::EngineOptions options = engine_options_;
+  options.kind = gpu::EngineKind::kCpu;
+  options.in_worker = false;
+  absl::StatusOr<EngineCare::Made> made = Make(options);
+  if (!made.ok()) {
+    engine_info_.reason = std::string(made.status().message());
     return false;
   }
-  engine_ = *std::move(engine);
-  engine_info_ = engine_->info();
+  made_ = *std::move(made);
+  engine_info_ = made_.engine->info();
   if (!takeover_.empty()) engine_info_.reason = takeover_;
   return true;
 }
 
+void FramePipeline::TakeReturned() {
+  Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
+  Retire(scene_->held());
+  EngineCare::Returned returned = care_->Take();
+  made_ = std::move(returned.made);
+  scene_ = std::move(returned.scene);
+  engine_info_ = made_.engine->info();
+  engine_info_.reason = reason_;
+  takeover_.clear();
+  // What it has drawn so far no display has seen: buffers are new to it, and its pictures to the
+  // display.
+  target_stale_ = true;
+  pool_.Forget(last_volume_);
+  first_volume_ = last_volume_ + 1;
+  engine_is_new_ = true;
+}
+
+gpu::Target FramePipeline::CurrentTarget() const {
+  const display::DisplayInfo& info = display_->info();
+  return {info.geometry, info.layout, info.tone,
+          pattern_ == TestPattern::kNone ? scene_to_voxel_ : gpu::Affine()};
+}
+
 bool FramePipeline::MaybeDraw() {
-  if (drawing_.has_value() || newest_ == nullptr || !showing() || !display_->mailbox_free()) {
-    return false;
-  }
+  if (drawing_.has_value()) return false;
+  if (care_ != nullptr && care_->ready()) TakeReturned();
+  if (newest_ == nullptr || !showing() || !display_->mailbox_free()) return false;
   const bool changed = newest_->number != drawn_snapshot_ || settings_changed_;
   if (!changed && !(show_again_ && clock_.Now() >= show_again_at_)) return false;
 
   const SnapshotPtr newest = newest_;
+  if (care_ != nullptr) care_->Prune(*newest);
   drawn_snapshot_ = newest->number;
   settings_changed_ = false;
   riders_.Draw();
   if (!HaveEngine()) {
-    OnEngineFailure(absl::UnavailableError(absl::StrCat("no engine: ", engine_info_.reason)));
+    OnEngineFailure(absl::UnavailableError(absl::StrCat("no engine: ", engine_info_.reason)),
+                    clock_.Now());
     return true;
   }
-  SnapshotPtr held = scene_.held();
-  const size_t size = scene_.Plan(pattern_scene_ != nullptr ? pattern_scene_ : newest);
+  SnapshotPtr held = scene_->held();
+  const size_t size = scene_->Plan(pattern_scene_ != nullptr ? pattern_scene_ : newest);
   Retire(std::move(held));
   if (size == 0 && !target_stale_ && !show_again_ && last_submitted_ != 0) {
     KeepUnchanged({newest->number, settings_});
@@ -153,38 +210,38 @@ bool FramePipeline::MaybeDraw() {
   }
 
   Drawing& drawing = drawing_.emplace(Drawing{});
+  drawing.began = clock_.Now();
   drawing.contents = {newest->number, settings_};
   drawing.volume = ++last_volume_;
   drawing.lease = pool_.Acquire();
   if (target_stale_) {
     target_stale_ = false;
-    const display::DisplayInfo& info = display_->info();
-    engine_->SetTarget({info.geometry, info.layout, info.tone,
-                        pattern_ == TestPattern::kNone ? scene_to_voxel_ : gpu::Affine()},
-                       Completion(&FramePipeline::OnCallDone));
+    target_ = CurrentTarget();
+    made_.engine->SetTarget(target_, Completion(&FramePipeline::OnCallDone));
   }
   if (const absl::Status status = ApplyDelta(size); !status.ok()) {
+    const sync::TimeNs began = drawing.began;
     drawing_.reset();
-    OnEngineFailure(status);
+    OnEngineFailure(status, began);
     return true;
   }
   display::SliceFrame& frame = *drawing.lease.frame;
-  engine_->SubmitFrame({drawing.volume, drawing.lease.holds}, {frame.bytes, frame.changed_in},
-                       Completion(&FramePipeline::OnFrame));
+  made_.engine->SubmitFrame({drawing.volume, drawing.lease.holds}, {frame.bytes, frame.changed_in},
+                            Completion(&FramePipeline::OnFrame));
   return true;
 }
 
 absl::Status FramePipeline::ApplyDelta(size_t size) {
   if (size == 0) return absl::OkStatus();
-  absl::StatusOr<gpu::StagingBlock> block = engine_->AcquireStaging(size);
+  absl::StatusOr<gpu::StagingBlock> block = made_.engine->AcquireStaging(size);
   if (!block.ok()) return block.status();
   gpu::DeltaWriter writer(block->bytes());
-  scene_.Write(writer);
+  scene_->Write(writer);
   if (writer.overrun() || writer.size() != size) {
     return absl::InternalError(
         absl::StrFormat("a delta planned as %d bytes came out as %d", size, writer.size()));
   }
-  engine_->Apply(*std::move(block), size, Completion(&FramePipeline::OnCallDone));
+  made_.engine->Apply(*std::move(block), size, Completion(&FramePipeline::OnCallDone));
   return absl::OkStatus();
 }
 
@@ -207,8 +264,8 @@ void FramePipeline::OnCallDone(const absl::Status& status) {
 void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   Drawing drawing = *std::move(drawing_);
   drawing_.reset();
-  if (!drawing.status.ok()) return OnEngineFailure(drawing.status);
-  if (!result.ok()) return OnEngineFailure(result.status());
+  if (!drawing.status.ok()) return OnEngineFailure(drawing.status, drawing.began);
+  if (!result.ok()) return OnEngineFailure(result.status(), drawing.began);
 
   lost_engine_ = false;
   drawing.lease.frame->volume = drawing.volume;
@@ -218,12 +275,19 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   const sync::TimeNs now = clock_.Now();
   assemble_.Add(now, result->assemble_ns);
   slice_.Add(now, result->slice_ns);
+  if (care_ != nullptr && care_->away()) {
+    care_->OnDrawn({scene_->held(), target_, drawing.lease.frame});
+  } else if (care_ != nullptr) {
+    care_->OnFrame();
+  }
 
   if (!showing()) {
-    riders_.LoseUnsubmitted(WhyNotShowing(*display_), false);
+    riders_.LoseUnsubmitted(WhyNotShowing(), false);
     return ShowAgain(0);
   }
-  if (!result->changed && !show_again_ && last_submitted_ != 0) {
+  for (uint64_t& number : drawing.lease.frame->changed_in) number = std::max(number, first_volume_);
+  const bool changed = std::exchange(engine_is_new_, false) || result->changed;
+  if (!changed && !show_again_ && last_submitted_ != 0) {
     ++volumes_unchanged_;
     return KeepUnchanged(drawing.contents);
   }
@@ -253,16 +317,22 @@ void FramePipeline::ShowAgain(sync::TimeNs delay) {
   show_again_at_ = clock_.Now() + delay;
 }
 
-void FramePipeline::OnEngineFailure(const absl::Status& status) {
-  Retire(scene_.held());
-  scene_.Forget();
+void FramePipeline::OnEngineLost(uint64_t id, const absl::Status& status) {
+  // A call under way has told it already, and there is another engine.
+  if (id == made_.id && made_.engine != nullptr && !drawing_.has_value()) {
+    OnEngineFailure(status, clock_.Now());
+  }
+}
+
+void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs since) {
+  Retire(scene_->held());
+  scene_->Forget();
   target_stale_ = true;
   if (absl::IsDataLoss(status)) {
-    engine_ = nullptr;
+    Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
     pool_.Forget(last_volume_);
+    if (care_ != nullptr && !care_->away()) care_->OnLost(status, since);
     // Whatever it was, the next is on the CPU, in this process: made at once, with the same bytes.
-    engine_options_.kind = gpu::EngineKind::kCpu;
-    engine_options_.in_worker = false;
     takeover_ = absl::StrCat("took over from ", gpu::EngineKindName(engine_info_.kind), ": ",
                              status.message());
     if (!std::exchange(lost_engine_, true) && HaveEngine() && showing()) {
@@ -302,7 +372,7 @@ void FramePipeline::OnState(display::DisplayState state, const std::string&) {
     if (show_again_) show_again_at_ = std::min(show_again_at_, clock_.Now());
     return;
   }
-  riders_.LoseUnsubmitted(WhyNotShowing(*display_), true);
+  riders_.LoseUnsubmitted(WhyNotShowing(), true);
 }
 
 void FramePipeline::Told(const Rider& rider, const CommitOutcome& outcome) {
@@ -314,157 +384,6 @@ void FramePipeline::Told(const Rider& rider, const CommitOutcome& outcome) {
     }
   }
   tell_(rider, outcome);
-}
-
-// ---------------------------------------------------------------------------------- requests
-
-absl::Status FramePipeline::Update(const DisplayUpdate& update) {
-  if (update.brightness.has_value() && !(*update.brightness >= 0 && *update.brightness <= 1)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("brightness is ", *update.brightness, "; it must be from 0 to 1"));
-  }
-  gpu::Affine map = scene_to_voxel_;
-  if (update.view.has_value()) {
-    const absl::StatusOr<gpu::Affine> made = SceneToVoxel(*update.view, info().geometry.grid);
-    if (!made.ok()) return made.status();
-    map = *made;
-  }
-  // The device's own refusals come before anything that cannot be refused;
-  // what it refuses is taken back.
-  const double brightness = display_->brightness();
-  const bool blank = display_->blanked();
-  absl::Status status;
-  if (update.brightness.has_value()) status = display_->SetBrightness(*update.brightness);
-  if (status.ok() && update.blank.has_value()) status = display_->SetBlank(*update.blank);
-  if (!status.ok()) {
-    absl::Status back;
-    if (display_->blanked() != blank) back.Update(display_->SetBlank(blank));
-    if (display_->brightness() != brightness) back.Update(display_->SetBrightness(brightness));
-    if (back.ok()) return status;
-    return absl::Status(status.code(),
-                        absl::StrCat(status.message(), "; and taking it back: ", back.message()));
-  }
-  if (update.view.has_value()) {
-    view_ = *update.view;
-    if (map != scene_to_voxel_) {
-      target_stale_ = settings_changed_ = true;
-      ++settings_;
-    }
-    scene_to_voxel_ = map;
-  }
-  if (update.pattern.has_value() && *update.pattern != pattern_) {
-    pattern_ = *update.pattern;
-    if (pattern_ == TestPattern::kNone) {
-      pattern_scene_ = nullptr;
-    } else {
-      pattern_scene_ = MakePattern(pattern_, info().geometry, 0);
-      riders_.HideWaiting();
-    }
-    target_stale_ = settings_changed_ = true;
-    ++settings_;
-  }
-  return absl::OkStatus();
-}
-
-DisplayDescription FramePipeline::Describe() const {
-  DisplayDescription description;
-  description.info = info();
-  description.state = display_->state();
-  description.state_reason = display_->state_reason();
-  description.brightness = display_->brightness();
-  description.blank = display_->blanked();
-  description.pattern = pattern_;
-  description.view = view_;
-  description.scene_to_voxel = scene_to_voxel_;
-  return description;
-}
-
-DisplayFigures FramePipeline::Figures() const {
-  const sync::TimeNs now = clock_.Now();
-  const display::DisplayStats& display = display_->stats();
-  DisplayFigures figures;
-  figures.name = info().name;
-  figures.state = display_->state();
-  figures.engine = gpu::EngineKindName(engine_info_.kind);
-  figures.engine_device = engine_info_.device;
-  figures.engine_reason = engine_info_.reason;
-  figures.lit_voxels = lit_voxels_;
-  figures.singular_drawables = singular_drawables_;
-  figures.volumes_drawn = volumes_drawn_;
-  figures.volumes_unchanged = volumes_unchanged_;
-  figures.volumes_presented = display.volumes_presented;
-  figures.volumes_replaced = display.volumes_replaced;
-  figures.volumes_lost = display.volumes_lost;
-  figures.volumes_per_second = presented_rate_.PerSecond(now);
-  figures.bytes_out = display.bytes_out;
-  figures.slices_sent = display.slices_sent;
-  figures.slices_resent = display.slices_resent;
-  figures.underruns = display.underruns;
-  figures.attaches = display.attaches;
-  figures.commit_to_last_byte = commit_to_last_byte_.Summary(now);
-  figures.commit_to_presented = commit_to_presented_.Summary(now);
-  figures.assemble = assemble_.Summary(now);
-  figures.slice = slice_.Summary(now);
-  const RiderBook::Counts& counts = riders_.counts();
-  figures.commits_owed = counts.owed;
-  figures.commits_presented = counts.presented;
-  figures.commits_unchanged = counts.unchanged;
-  figures.commits_superseded = counts.superseded;
-  figures.commits_lost = counts.lost;
-  figures.commits_not_shown = counts.not_shown;
-  figures.commits_pending = riders_.pending();
-  return figures;
-}
-
-void FramePipeline::Capture(sync::TimeNs timeout, uint64_t at_least_snapshot,
-                            display::Display::CaptureDone done, display::CaptureId id) {
-  const sync::TimeNs now = clock_.Now();
-  captures_.push_back({timeout < sync::kNever - now ? now + timeout : sync::kNever,
-                       {at_least_snapshot, settings_},
-                       std::move(done),
-                       id});
-  if (!started_) ServeCaptures();  // no Step will
-}
-
-void FramePipeline::CancelCapture(display::CaptureId id) {
-  std::vector<PendingCapture> waiting;
-  for (PendingCapture& capture : std::exchange(captures_, {})) {
-    if (capture.id == id) {
-      capture.done(absl::CancelledError("the capture was cancelled"));
-    } else {
-      waiting.push_back(std::move(capture));
-    }
-  }
-  captures_ = std::move(waiting);
-  display_->CancelCapture(id);
-}
-
-void FramePipeline::ServeCaptures() {
-  const sync::TimeNs now = clock_.Now();
-  std::vector<PendingCapture> waiting;
-  for (PendingCapture& capture : std::exchange(captures_, {})) {
-    const display::DisplayState state = display_->state();
-    if (state == display::DisplayState::kAttaching || (showing() && !shown_) ||
-        (showing() && (shown_->snapshot < capture.at_least.snapshot ||
-                       shown_->settings < capture.at_least.settings))) {
-      if (now < capture.deadline) {
-        waiting.push_back(std::move(capture));
-      } else {
-        capture.done(absl::DeadlineExceededError(absl::StrFormat(
-            "no volume with snapshot %d or a newer one was shown in time; the newest has %d",
-            capture.at_least.snapshot, shown_ ? shown_->snapshot : 0)));
-      }
-      continue;
-    }
-    if (!showing()) {
-      capture.done(absl::UnavailableError(WhyNotShowing(*display_)));
-      continue;
-    }
-    display_->Capture(capture.deadline == sync::kNever ? sync::kNever : capture.deadline - now,
-                      std::move(capture.done), capture.id);
-  }
-  captures_.insert(captures_.end(), std::make_move_iterator(waiting.begin()),
-                   std::make_move_iterator(waiting.end()));
 }
 
 }  // namespace voxeld::daemon

@@ -21,9 +21,10 @@
 // - While a test pattern is shown, commits are NOT_SHOWN(hidden).
 // - Volumes are numbered as the engine's frames are: ascending, with gaps where one
 //   came out the same.
-// - An engine that is lost (DataLoss) is replaced by a new one, which gets the whole scene; riders
-//   stay aboard the first time. Any other failure is LOST to its riders; the engine gets the whole
-//   scene next time.
+// - An engine that is lost (DataLoss) is replaced by the CPU's in this process, which gets the whole
+//   scene; riders stay aboard the first time. One that had a process of its own comes back by
+//   EngineCare. The first volume of another engine is handed over even if it looks the same. Any
+//   other failure is LOST to its riders; the engine gets the whole scene next time.
 #pragma once
 
 #include <cstdint>
@@ -38,6 +39,8 @@
 #include "absl/status/statusor.h"
 #include "daemon/core/stats.h"
 #include "daemon/pipeline/display_settings.h"
+#include "daemon/pipeline/engine_care.h"
+#include "daemon/pipeline/engine_event.h"
 #include "daemon/pipeline/frame_pool.h"
 #include "daemon/pipeline/loop.h"
 #include "daemon/pipeline/rider_book.h"
@@ -66,9 +69,10 @@ class FramePipeline final : private display::Display::Listener {
     sync::Clock* clock = nullptr;  // outlives the pipeline
     // An outcome, inside any call to the pipeline.
     RiderBook::Tell tell;
-    // Takes snapshots that the pipeline has done with: freeing a large one takes longer than its
-    // thread may be busy. Empty: they are freed on the spot.
-    std::function<void(SnapshotPtr)> retire;
+    // Takes what the pipeline has done with: freeing a large scene takes longer than its thread may
+    // be busy. Empty: it is freed on the spot.
+    std::function<void(std::shared_ptr<const void>)> retire;
+    std::function<void(EngineEvent)> tell_engine;  // what becomes of the engine; may be empty
   };
 
   // Makes the engine. Its failure, or a view that cannot be, is the answer.
@@ -109,6 +113,7 @@ class FramePipeline final : private display::Display::Listener {
   };
   struct Drawing {
     uint64_t volume = 0;
+    sync::TimeNs began = 0;
     Contents contents;
     FramePool::Lease lease;
     absl::Status status;  // of what went before SubmitFrame
@@ -122,22 +127,29 @@ class FramePipeline final : private display::Display::Listener {
 
   explicit FramePipeline(Options options);
 
+  absl::Status Open(std::function<void(EngineEvent)> tell);
+
   void OnOutcome(const display::VolumeOutcome& outcome) override;
   void OnState(display::DisplayState state, const std::string& reason) override;
 
   bool showing() const { return display_->state() == display::DisplayState::kShowing; }
+  std::string WhyNotShowing() const;
   bool MaybeDraw();
+  absl::StatusOr<EngineCare::Made> Make(gpu::EngineOptions options);
   bool HaveEngine();
+  void TakeReturned();
+  gpu::Target CurrentTarget() const;
   absl::Status ApplyDelta(size_t size);
   void OnCallDone(const absl::Status& status);
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
-  void OnEngineFailure(const absl::Status& status);
+  void OnEngineFailure(const absl::Status& status, sync::TimeNs since);
+  void OnEngineLost(uint64_t id, const absl::Status& status);
   void SubmitDrawn(Drawing drawing);
   void KeepUnchanged(const Contents& contents);
   void ShowAgain(sync::TimeNs delay);
   void ServeCaptures();
   void Breathe();
-  void Retire(SnapshotPtr snapshot);
+  void Retire(std::shared_ptr<const void> what);
   void Told(const Rider& rider, const CommitOutcome& outcome);
   // `method` on this thread with what a call of the engine's ended in, unless the drawing that the
   // call was made for is over by then.
@@ -148,13 +160,18 @@ class FramePipeline final : private display::Display::Listener {
   const std::shared_ptr<Loop> work_;
   const std::unique_ptr<display::Display> display_;
   const MakeEngine make_engine_;
-  gpu::EngineOptions engine_options_;
+  const gpu::EngineOptions engine_options_;
   std::string takeover_;  // why the engine is not the one that was asked for
   const RiderBook::Tell tell_;
-  const std::function<void(SnapshotPtr)> retire_;
+  const std::function<void(std::shared_ptr<const void>)> retire_;
 
-  std::unique_ptr<gpu::Engine> engine_;
-  gpu::EngineInfo engine_info_;  // of the engine, or why there is none
+  uint64_t engines_made_ = 0;
+  EngineCare::Made made_;
+  std::unique_ptr<EngineCare> care_;  // of an engine in a process of its own
+  std::string reason_;                // why that kind, while it is there
+  uint64_t first_volume_ = 0;         // of one that came back
+  bool engine_is_new_ = false;        // it came back, and has drawn nothing yet
+  gpu::EngineInfo engine_info_;       // of the engine, or why there is none
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   bool started_ = false;
 
@@ -164,10 +181,11 @@ class FramePipeline final : private display::Display::Listener {
   SnapshotPtr pattern_scene_;
 
   SnapshotPtr newest_;
-  EngineScene scene_;
+  std::unique_ptr<EngineScene> scene_;  // that the engine holds
   FramePool pool_;
   std::optional<Drawing> drawing_;
   std::optional<uint64_t> drawn_snapshot_;  // the newest that a draw was begun for
+  gpu::Target target_;                      // that the engine was told last
   bool target_stale_ = true;       // the engine has not been told the target that there is now
   bool settings_changed_ = false;  // view or pattern, since a draw was last begun
   uint64_t settings_ = 0;          // changes of them, counted

@@ -39,7 +39,8 @@ bool LooksSame(const Entity& a, const Entity& b) {
 
 }  // namespace
 
-EngineScene::EngineScene(std::function<void()> breathe) : breathe_(std::move(breathe)) {}
+EngineScene::EngineScene(std::function<void()> breathe, Choose choose)
+    : breathe_(std::move(breathe)), choose_(std::move(choose)) {}
 
 void EngineScene::Breathe() {
   if (++since_breath_ < kRecordsPerBreath) return;
@@ -80,24 +81,25 @@ size_t EngineScene::Plan(SnapshotPtr next) {
         PlanLayer(key, old_layer, new_layer);
       });
   for (const auto& [number, place] : redraw_) {
-    Draw(place.layer.owner, *next_->FindLayer(place.layer),
+    Draw(place.layer, *next_->FindLayer(place.layer), place.id,
          *next_->FindEntity(place.layer, place.id));
   }
   redraw_.clear();
 
   size_t size = put_reset_ ? gpu::DeltaWriter::kSizeOfReset : 0;
-  for (const GeometryPtr& geometry : unused_) {
-    const auto it = geometries_.find(geometry.get());
+  for (const HeldGeometry& geometry : unused_) {
+    const auto it = geometries_.find(geometry.key());
     if (it == geometries_.end() || it->second.uses > 0) continue;
     // What this very delta would put and drop it leaves out.
     if (!it->second.fresh) drop_geometries_.push_back(it->second.id);
     geometries_.erase(it);
   }
-  std::erase_if(put_geometries_,
-                [&](const GeometryPtr& geometry) { return !geometries_.contains(geometry.get()); });
-  for (const GeometryPtr& geometry : put_geometries_) {
-    geometries_.find(geometry.get())->second.fresh = false;
-    size += gpu::DeltaWriter::SizeOf(geometry->record);
+  std::erase_if(put_geometries_, [&](const HeldGeometry& geometry) {
+    return !geometries_.contains(geometry.key());
+  });
+  for (const HeldGeometry& geometry : put_geometries_) {
+    geometries_.find(geometry.key())->second.fresh = false;
+    size += gpu::DeltaWriter::SizeOf(geometry.geometry->record);
   }
   size += put_layers_.size() * gpu::DeltaWriter::SizeOf(gpu::LayerRecord());
   size += put_drawables_.size() * gpu::DeltaWriter::SizeOf(gpu::DrawableRecord());
@@ -110,12 +112,14 @@ size_t EngineScene::Plan(SnapshotPtr next) {
 void EngineScene::Write(gpu::DeltaWriter& writer) {
   if (put_reset_) writer.Reset();
   size_t since = 0;
-  for (const GeometryPtr& geometry : put_geometries_) {
-    gpu::GeometryRecord record = geometry->record;
-    record.id = geometries_.find(geometry.get())->second.id;
-    writer.PutGeometry(record, geometry->positions, geometry->indices, geometry->colors);
+  for (const HeldGeometry& held : put_geometries_) {
+    const GeometryData& geometry = *held.geometry;
+    gpu::GeometryRecord record = geometry.record;
+    record.id = geometries_.find(held.key())->second.id;
+    record.drawn_by = held.by_cpu ? gpu::DrawnBy::kCpu : gpu::DrawnBy::kEngine;
+    writer.PutGeometry(record, geometry.positions, geometry.indices, geometry.colors);
     Breathe();
-    since += geometry->bytes();
+    since += geometry.bytes();
     if (since >= kBytesPerBreath) {
       since = 0;
       if (breathe_) breathe_();
@@ -157,18 +161,22 @@ void EngineScene::PlanLayer(const OwnedName& key, const Layer* before, const Lay
   }
   if (before == nullptr || !LooksSame(*before, *now)) put_layers_.push_back(RecordOf(*now));
   EntityMap::Diff(before == nullptr ? EntityMap() : before->entities, now->entities,
-                  [&](const std::string&, const EntityPtr* was, const EntityPtr* is) {
+                  [&](const std::string& id, const EntityPtr* was, const EntityPtr* is) {
                     if (is == nullptr) return Undraw(**was);
                     if (was != nullptr && (*was)->number != (*is)->number) Undraw(**was);
                     if (was != nullptr && LooksSame(**was, **is)) return;
                     redraw_.erase((*is)->number);
-                    Draw(key.owner, *now, **is);
+                    Draw(key, *now, id, **is);
                   });
 }
 
-void EngineScene::Draw(uint64_t owner, const Layer& layer, const Entity& entity) {
+void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::string& id,
+                       const Entity& entity) {
+  const DrawnWhere where = choose_ ? choose_(key, id, entity) : DrawnWhere::kEngine;
   flat_.clear();
-  Flatten(owner, entity.data.content, entity.data.transform);
+  if (where != DrawnWhere::kNowhere) {
+    Flatten(key.owner, entity.data.content, entity.data.transform);
+  }
   std::vector<Part>& parts = drawn_[entity.number];
   // Old geometries are let go only when the new ones are held: what stays is not sent again.
   const std::vector<Part> old = std::move(parts);
@@ -177,13 +185,14 @@ void EngineScene::Draw(uint64_t owner, const Layer& layer, const Entity& entity)
   for (size_t i = 0; i < flat_.size(); ++i) {
     gpu::DrawableRecord record;
     record.id = i < old.size() ? old[i].drawable : next_id_++;
-    record.geometry = Use(flat_[i].geometry);
+    HeldGeometry geometry{std::move(flat_[i].geometry), where == DrawnWhere::kCpu};
+    record.geometry = Use(geometry);
     record.layer = layer.number;
     record.priority = entity.data.priority;
     record.erase = entity.data.erase ? 1 : 0;
     record.transform = flat_[i].transform;
     put_drawables_.push_back(record);
-    parts.push_back({record.id, std::move(flat_[i].geometry)});
+    parts.push_back({record.id, std::move(geometry)});
     Breathe();
   }
   for (size_t i = 0; i < old.size(); ++i) {
@@ -214,8 +223,8 @@ void EngineScene::Flatten(uint64_t owner, const Content& content, const gpu::Aff
   }
 }
 
-uint64_t EngineScene::Use(const GeometryPtr& geometry) {
-  const auto [it, fresh] = geometries_.try_emplace(geometry.get());
+uint64_t EngineScene::Use(const HeldGeometry& geometry) {
+  const auto [it, fresh] = geometries_.try_emplace(geometry.key());
   if (fresh) {
     it->second.id = next_id_++;
     it->second.fresh = true;
@@ -225,8 +234,8 @@ uint64_t EngineScene::Use(const GeometryPtr& geometry) {
   return it->second.id;
 }
 
-void EngineScene::Release(const GeometryPtr& geometry) {
-  if (--geometries_.find(geometry.get())->second.uses == 0) unused_.push_back(geometry);
+void EngineScene::Release(const HeldGeometry& geometry) {
+  if (--geometries_.find(geometry.key())->second.uses == 0) unused_.push_back(geometry);
 }
 
 }  // namespace voxeld::daemon

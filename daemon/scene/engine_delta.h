@@ -9,6 +9,9 @@
 // all share the primitive's geometry. Maps of nested parts are composed from the outside in:
 // ((entity ∘ part) ∘ part of the part) …
 //
+// Some entities may be drawn by the CPU of an engine that has a GPU, or left out: `choose` says so
+// when they are drawn.
+//
 // Single-threaded. Plan takes it that the delta will be applied; if it was not, call Forget.
 #pragma once
 
@@ -19,16 +22,23 @@
 #include <unordered_map>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "daemon/scene/snapshot.h"
 #include "gpu/delta.h"
 
 namespace voxeld::daemon {
 
+enum class DrawnWhere : uint8_t { kEngine, kCpu, kNowhere };
+
 class EngineScene {
  public:
+  // Asked for each entity that is drawn or drawn anew.
+  using Choose = std::function<DrawnWhere(const OwnedName& layer, const std::string& id,
+                                          const Entity& entity)>;
+
   // `breathe` (may be empty) is called now and then during long work, so that its owner can do what
-  // will not wait. It must not call back.
-  explicit EngineScene(std::function<void()> breathe = nullptr);
+  // will not wait. It must not call back. `choose` empty: everything by the engine.
+  explicit EngineScene(std::function<void()> breathe = nullptr, Choose choose = nullptr);
 
   // Of what is held (since the last Plan); null: nothing.
   const SnapshotPtr& held() const { return held_; }
@@ -46,9 +56,24 @@ class EngineScene {
   size_t geometries() const { return geometries_.size(); }
 
  private:
+  // A geometry that is drawn in both ways is two to the engine.
+  struct GeometryKey {
+    const GeometryData* geometry = nullptr;
+    bool by_cpu = false;
+    bool operator==(const GeometryKey&) const = default;
+    template <typename H>
+    friend H AbslHashValue(H h, const GeometryKey& k) {
+      return H::combine(std::move(h), k.geometry, k.by_cpu);
+    }
+  };
+  struct HeldGeometry {
+    GeometryPtr geometry;
+    bool by_cpu = false;
+    GeometryKey key() const { return {geometry.get(), by_cpu}; }
+  };
   struct Part {
     uint64_t drawable = 0;
-    GeometryPtr geometry;
+    HeldGeometry geometry;
   };
   struct GeometryUse {
     uint64_t id = 0;
@@ -62,20 +87,21 @@ class EngineScene {
 
   void PlanLayer(const OwnedName& key, const Layer* before, const Layer* now);
   void PlanInstances(const Snapshot& before, const Snapshot& next);
-  void Draw(uint64_t owner, const Layer& layer, const Entity& entity);
+  void Draw(const OwnedName& key, const Layer& layer, const std::string& id, const Entity& entity);
   void Undraw(const Entity& entity);
   void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map);
-  uint64_t Use(const GeometryPtr& geometry);
-  void Release(const GeometryPtr& geometry);
+  uint64_t Use(const HeldGeometry& geometry);
+  void Release(const HeldGeometry& geometry);
   void Breathe();
 
   const std::function<void()> breathe_;
+  const Choose choose_;
   uint32_t since_breath_ = 0;
 
   SnapshotPtr held_;
   bool reset_ = true;  // the next delta begins with one
   uint64_t next_id_ = 1;
-  std::unordered_map<const GeometryData*, GeometryUse> geometries_;
+  absl::flat_hash_map<GeometryKey, GeometryUse> geometries_;
   std::unordered_map<uint64_t, std::vector<Part>> drawn_;  // by number of entity
 
   // The plan.
@@ -83,8 +109,8 @@ class EngineScene {
   std::vector<Flat> flat_;
   // Entities to draw anew though they have not changed: objects that they draw have. By number.
   std::map<uint64_t, EntityPlace> redraw_;
-  std::vector<GeometryPtr> put_geometries_;
-  std::vector<GeometryPtr> unused_;  // dropped to no use at some time; may be in use again
+  std::vector<HeldGeometry> put_geometries_;
+  std::vector<HeldGeometry> unused_;  // dropped to no use at some time; may be in use again
   std::vector<uint64_t> drop_geometries_, drop_drawables_, drop_layers_;
   std::vector<gpu::LayerRecord> put_layers_;
   std::vector<gpu::DrawableRecord> put_drawables_;

@@ -51,14 +51,22 @@ class Simulation {
     uint64_t last_sequence = 0;
   };
 
-  explicit Simulation(Limits limits = {}, int displays = 1) {
+  // `make_engine` empty: recording engines, each with its script.
+  using MakeEngine =
+      std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>;
+
+  explicit Simulation(Limits limits = {}, int displays = 1, MakeEngine make_engine = nullptr,
+                      const gpu::EngineOptions& engine_options = {}) {
     CoreOptions options;
     options.limits = limits;
     options.version = "test";
     options.threads = false;
+    options.engine_event = [this](const EngineEvent& event) { engine_events.push_back(event); };
     options.make_engine =
-        [this](const gpu::EngineOptions&) -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
+        [this, make_engine](
+            const gpu::EngineOptions& wanted) -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
       if (!make_engine_fails.ok()) return make_engine_fails;
+      if (make_engine) return make_engine(wanted);
       return std::make_unique<RecordingEngine>(engine_script(engines_made_++));
     };
     core.emplace(std::move(options), clock);
@@ -66,7 +74,7 @@ class Simulation {
       auto display = std::make_unique<ScriptedDisplay>(
           SmallDisplay(i == 0 ? "main" : absl::StrCat("display", i)), clock);
       display_.push_back(display.get());
-      const absl::Status status = core->AddDisplay(std::move(display), {});
+      const absl::Status status = core->AddDisplay(std::move(display), engine_options);
       if (!status.ok()) std::abort();
     }
     displays_ = displays;
@@ -144,6 +152,7 @@ class Simulation {
 
   sync::FakeClock clock;
   absl::Status make_engine_fails;
+  std::vector<EngineEvent> engine_events;
   std::optional<Core> core;
 
  private:

@@ -1,0 +1,168 @@
+// What FramePipeline is asked: settings, figures, captures.
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "daemon/pipeline/frame_pipeline.h"
+#include "daemon/pipeline/test_pattern.h"
+#include "daemon/pipeline/view.h"
+
+namespace voxeld::daemon {
+
+std::string FramePipeline::WhyNotShowing() const {
+  return absl::StrCat("the display was ", display::DisplayStateName(display_->state()), ": ",
+                      display_->state_reason());
+}
+
+absl::Status FramePipeline::Update(const DisplayUpdate& update) {
+  if (update.brightness.has_value() && !(*update.brightness >= 0 && *update.brightness <= 1)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("brightness is ", *update.brightness, "; it must be from 0 to 1"));
+  }
+  gpu::Affine map = scene_to_voxel_;
+  if (update.view.has_value()) {
+    const absl::StatusOr<gpu::Affine> made = SceneToVoxel(*update.view, info().geometry.grid);
+    if (!made.ok()) return made.status();
+    map = *made;
+  }
+  // The device's own refusals come before anything that cannot be refused;
+  // what it refuses is taken back.
+  const double brightness = display_->brightness();
+  const bool blank = display_->blanked();
+  absl::Status status;
+  if (update.brightness.has_value()) status = display_->SetBrightness(*update.brightness);
+  if (status.ok() && update.blank.has_value()) status = display_->SetBlank(*update.blank);
+  if (!status.ok()) {
+    absl::Status back;
+    if (display_->blanked() != blank) back.Update(display_->SetBlank(blank));
+    if (display_->brightness() != brightness) back.Update(display_->SetBrightness(brightness));
+    if (back.ok()) return status;
+    return absl::Status(status.code(),
+                        absl::StrCat(status.message(), "; and taking it back: ", back.message()));
+  }
+  if (update.view.has_value()) {
+    view_ = *update.view;
+    if (map != scene_to_voxel_) {
+      target_stale_ = settings_changed_ = true;
+      ++settings_;
+    }
+    scene_to_voxel_ = map;
+  }
+  if (update.pattern.has_value() && *update.pattern != pattern_) {
+    pattern_ = *update.pattern;
+    if (pattern_ == TestPattern::kNone) {
+      pattern_scene_ = nullptr;
+    } else {
+      pattern_scene_ = MakePattern(pattern_, info().geometry, 0);
+      riders_.HideWaiting();
+    }
+    target_stale_ = settings_changed_ = true;
+    ++settings_;
+  }
+  return absl::OkStatus();
+}
+
+DisplayDescription FramePipeline::Describe() const {
+  DisplayDescription description;
+  description.info = info();
+  description.state = display_->state();
+  description.state_reason = display_->state_reason();
+  description.brightness = display_->brightness();
+  description.blank = display_->blanked();
+  description.pattern = pattern_;
+  description.view = view_;
+  description.scene_to_voxel = scene_to_voxel_;
+  return description;
+}
+
+DisplayFigures FramePipeline::Figures() const {
+  const sync::TimeNs now = clock_.Now();
+  const display::DisplayStats& display = display_->stats();
+  DisplayFigures figures;
+  figures.name = info().name;
+  figures.state = display_->state();
+  figures.engine = gpu::EngineKindName(engine_info_.kind);
+  figures.engine_device = engine_info_.device;
+  figures.engine_reason = engine_info_.reason;
+  figures.lit_voxels = lit_voxels_;
+  figures.singular_drawables = singular_drawables_;
+  figures.volumes_drawn = volumes_drawn_;
+  figures.volumes_unchanged = volumes_unchanged_;
+  figures.volumes_presented = display.volumes_presented;
+  figures.volumes_replaced = display.volumes_replaced;
+  figures.volumes_lost = display.volumes_lost;
+  figures.volumes_per_second = presented_rate_.PerSecond(now);
+  figures.bytes_out = display.bytes_out;
+  figures.slices_sent = display.slices_sent;
+  figures.slices_resent = display.slices_resent;
+  figures.underruns = display.underruns;
+  figures.attaches = display.attaches;
+  figures.commit_to_last_byte = commit_to_last_byte_.Summary(now);
+  figures.commit_to_presented = commit_to_presented_.Summary(now);
+  if (care_ != nullptr) care_->AddTo(figures);
+  figures.assemble = assemble_.Summary(now);
+  figures.slice = slice_.Summary(now);
+  const RiderBook::Counts& counts = riders_.counts();
+  figures.commits_owed = counts.owed;
+  figures.commits_presented = counts.presented;
+  figures.commits_unchanged = counts.unchanged;
+  figures.commits_superseded = counts.superseded;
+  figures.commits_lost = counts.lost;
+  figures.commits_not_shown = counts.not_shown;
+  figures.commits_pending = riders_.pending();
+  return figures;
+}
+
+void FramePipeline::Capture(sync::TimeNs timeout, uint64_t at_least_snapshot,
+                            display::Display::CaptureDone done, display::CaptureId id) {
+  const sync::TimeNs now = clock_.Now();
+  captures_.push_back({timeout < sync::kNever - now ? now + timeout : sync::kNever,
+                       {at_least_snapshot, settings_},
+                       std::move(done),
+                       id});
+  if (!started_) ServeCaptures();  // no Step will
+}
+
+void FramePipeline::CancelCapture(display::CaptureId id) {
+  std::vector<PendingCapture> waiting;
+  for (PendingCapture& capture : std::exchange(captures_, {})) {
+    if (capture.id == id) {
+      capture.done(absl::CancelledError("the capture was cancelled"));
+    } else {
+      waiting.push_back(std::move(capture));
+    }
+  }
+  captures_ = std::move(waiting);
+  display_->CancelCapture(id);
+}
+
+void FramePipeline::ServeCaptures() {
+  const sync::TimeNs now = clock_.Now();
+  std::vector<PendingCapture> waiting;
+  for (PendingCapture& capture : std::exchange(captures_, {})) {
+    const display::DisplayState state = display_->state();
+    if (state == display::DisplayState::kAttaching || (showing() && !shown_) ||
+        (showing() && (shown_->snapshot < capture.at_least.snapshot ||
+                       shown_->settings < capture.at_least.settings))) {
+      if (now < capture.deadline) {
+        waiting.push_back(std::move(capture));
+      } else {
+        capture.done(absl::DeadlineExceededError(absl::StrFormat(
+            "no volume with snapshot %d or a newer one was shown in time; the newest has %d",
+            capture.at_least.snapshot, shown_ ? shown_->snapshot : 0)));
+      }
+      continue;
+    }
+    if (!showing()) {
+      capture.done(absl::UnavailableError(WhyNotShowing()));
+      continue;
+    }
+    display_->Capture(capture.deadline == sync::kNever ? sync::kNever : capture.deadline - now,
+                      std::move(capture.done), capture.id);
+  }
+  captures_.insert(captures_.end(), std::make_move_iterator(waiting.begin()),
+                   std::make_move_iterator(waiting.end()));
+}
+
+}  // namespace voxeld::daemon
