@@ -8,11 +8,13 @@
 #include <cstdio>
 #include <future>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "daemon/config/config.h"
 #include "daemon/config/display_view.h"
@@ -25,6 +27,8 @@
 #include "daemon/version/version.h"
 #include "display/drivers/registry.h"
 #include "display/sync/clock.h"
+#include "display/sync/mutex.h"
+#include "gpu/worker/worker_pool.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -87,6 +91,41 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
   return none;
 }
 
+// Logs what becomes of engines, and has health say so while a display's last volume is held.
+class EngineWatch {
+ public:
+  explicit EngineWatch(Logger& log) : log_(log) {}
+
+  // Null: nobody is to be told. Thread-safe, as is OnEvent.
+  void Tell(services::Server* server) {
+    sync::MutexLock lock(mutex_);
+    server_ = server;
+    if (server_ != nullptr) server_->SetServing(held_.empty());
+  }
+
+  void OnEvent(const EngineEvent& event) {
+    const char* what = EngineEventName(event.what);
+    if (event.what == EngineEvent::What::kTookOver || event.what == EngineEvent::What::kReturned) {
+      const double ms = static_cast<double>(event.took_ns) / sync::kMillisecond;
+      log_.Info(what, {{"display", event.display},
+                       {"took_ms", absl::StrFormat("%.1f", ms)},
+                       {"was_lost", event.why}});
+    } else {
+      log_.Warn(what, {{"display", event.display}, {"why", event.why}});
+    }
+    sync::MutexLock lock(mutex_);
+    if (event.what == EngineEvent::What::kHolding) held_.insert(event.display);
+    if (event.what == EngineEvent::What::kTookOver) held_.erase(event.display);
+    if (server_ != nullptr) server_->SetServing(held_.empty());
+  }
+
+ private:
+  Logger& log_;
+  sync::Mutex mutex_;
+  std::set<std::string> held_ VOXELD_GUARDED_BY(mutex_);
+  services::Server* server_ VOXELD_GUARDED_BY(mutex_) = nullptr;
+};
+
 void LogDisplays(Core& core, Logger& log) {
   std::promise<absl::StatusOr<Stats>> promise;
   core.GetStats([&promise](absl::StatusOr<Stats> stats) { promise.set_value(std::move(stats)); });
@@ -105,9 +144,17 @@ void LogDisplays(Core& core, Logger& log) {
 
 int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
           Logger& log) {
-  Core core({.limits = config.limits, .version = Version()}, clock);
+  EngineWatch watch(log);
+  Core core({.limits = config.limits,
+             .version = Version(),
+             .engine_event = [&watch](const EngineEvent& event) { watch.OnEvent(event); }},
+            clock);
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),
+                                  .in_worker = config.engine.in_worker,
+                                  .worker = config.engine.worker,
+                                  .workers = std::make_shared<gpu::WorkerPool>(),
+                                  .worker_deadline_ns = config.engine.worker_deadline_ns,
                                   .staging_limit_bytes = config.engine.staging_limit_bytes};
   for (auto& [display, view] : displays) {
     if (absl::Status status = core.AddDisplay(std::move(display), engine, view); !status.ok()) {
@@ -133,6 +180,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                .log = &log});
   if (!server.ok()) return Fail(1, server.status());
 
+  watch.Tell(server->get());
+
   log.Info("voxeld",
            {{"version", Version()}, {"config", config.file.empty() ? "defaults" : config.file}});
   LogDisplays(core, log);
@@ -146,6 +195,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   }
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
   *draining = true;
+  watch.Tell(nullptr);
   (*server)->Shutdown(kServerLimit);
   const absl::Status stopped = core.Stop(kCoreLimit);
   http->reset();

@@ -110,6 +110,8 @@ struct ChoiceSetter {
   template <typename T>
   void Integer(const char*, T&, int64_t, int64_t) {}
   void Real(const char*, double&, double, double) {}
+  void Flag(const char*, bool&) {}
+  void Text(const char*, std::string&) {}
 };
 
 absl::Status ApplyChoice(const char* key, const char* option,

@@ -92,7 +92,7 @@ class FileReader {
   }
 
   void Http(const char* key, std::optional<Address>& out, bool& asked) {
-    const std::optional<std::string> text = Text(key);
+    const std::optional<std::string> text = QuotedText(key);
     if (!text.has_value()) return;
     absl::StatusOr<std::optional<Address>> address = ParseHttp(*text);
     if (!address.ok()) {
@@ -103,7 +103,7 @@ class FileReader {
   }
 
   void Choice(const char* key, std::string& out, std::initializer_list<const char*> values) {
-    const std::optional<std::string> text = Text(key);
+    const std::optional<std::string> text = QuotedText(key);
     if (!text.has_value()) return;
     const std::vector<std::string> known(values.begin(), values.end());
     if (std::find(known.begin(), known.end(), *text) == known.end()) {
@@ -113,7 +113,7 @@ class FileReader {
   }
 
   void Engine(const char* key, gpu::EngineKind& out) {
-    const std::optional<std::string> text = Text(key);
+    const std::optional<std::string> text = QuotedText(key);
     if (!text.has_value()) return;
     const absl::StatusOr<gpu::EngineKind> kind = ParseEngineKind(*text);
     if (!kind.ok()) return Wrong(*Find(key), key, std::string(kind.status().message()));
@@ -145,6 +145,20 @@ class FileReader {
     out = *value;
   }
 
+  void Flag(const char* key, bool& out) {
+    const toml::node* node = Find(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<bool>();
+    if (!value.has_value()) {
+      return Wrong(*node, key, absl::StrCat("is ", Show(*node), "; give true or false"));
+    }
+    out = *value;
+  }
+
+  void Text(const char* key, std::string& out) {
+    if (std::optional<std::string> text = QuotedText(key)) out = *std::move(text);
+  }
+
  private:
   const toml::node* Find(const char* key) {
     if (std::find(known_keys_.begin(), known_keys_.end(), key) == known_keys_.end()) {
@@ -153,7 +167,7 @@ class FileReader {
     return table_ == nullptr ? nullptr : table_->get(key);
   }
 
-  std::optional<std::string> Text(const char* key) {
+  std::optional<std::string> QuotedText(const char* key) {
     const toml::node* node = Find(key);
     if (node == nullptr) return {};
     auto text = node->value_exact<std::string>();
@@ -288,6 +302,8 @@ class Printer {
     Line(key, absl::StrCat(value));
   }
   void Real(const char* key, double value, double, double) { Line(key, Plain(value)); }
+  void Flag(const char* key, bool value) { Line(key, value ? "true" : "false"); }
+  void Text(const char* key, const std::string& value) { Line(key, Quoted(value)); }
 
   void Display(const DisplayConfig& display) {
     absl::StrAppend(&out_, "\n[[display]]\n");

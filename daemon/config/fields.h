@@ -17,6 +17,8 @@ namespace voxeld::daemon {
 //   Engine(key, kind&)
 //   Integer(key, integer&, least, greatest)
 //   Real(key, double&, least, greatest)
+//   Flag(key, bool&)
+//   Text(key, string&)                    any
 template <typename Visitor, typename ConfigType>
 void VisitFields(ConfigType& config, Visitor& visitor) {
   constexpr int64_t kMost = std::numeric_limits<int64_t>::max();
@@ -41,6 +43,9 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Engine("kind", config.engine.kind);
   visitor.Integer("threads", config.engine.threads, 0, 1024);
   visitor.Integer("staging_limit_bytes", config.engine.staging_limit_bytes, 1 << 20, 1024 * kGiB);
+  visitor.Flag("in_worker", config.engine.in_worker);
+  visitor.Text("worker", config.engine.worker);
+  visitor.Integer("worker_deadline_ns", config.engine.worker_deadline_ns, kSecond / 100, kHour);
 
   visitor.Section("log");
   visitor.Choice("level", config.log.level, {"trace", "debug", "info", "warn", "error", "off"});

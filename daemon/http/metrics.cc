@@ -88,6 +88,12 @@ constexpr Row<DisplayFigures> kDisplayRows[] = {
      "Commits whose volume was lost"},
     {"voxeld_display_commits_not_shown_total", &DisplayFigures::commits_not_shown,
      MetricType::Counter, "Commits on an absent or blanked display, or in hidden layers"},
+    {"voxeld_display_engine_faults_total", &DisplayFigures::engine_faults, MetricType::Counter,
+     "Times that the engine was lost, or faulted when it was tried again"},
+    {"voxeld_display_engine_returns_total", &DisplayFigures::engine_returns, MetricType::Counter,
+     "Times that it came back"},
+    {"voxeld_display_engine_mismatches_total", &DisplayFigures::engine_mismatches,
+     MetricType::Counter, "Times that it drew other bytes than the CPU, and was sent away again"},
     {"voxeld_display_commits_pending", &DisplayFigures::commits_pending, MetricType::Gauge,
      "Commits that wait for their outcome"},
 };
@@ -164,6 +170,25 @@ void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
                                 "Volumes presented, over 2 s");
   for (const DisplayFigures& display : displays) {
     Add(rate, {{"display", display.name}}, display.volumes_per_second);
+  }
+  MetricFamily* degraded =
+      out->New("voxeld_display_engine_degraded", MetricType::Gauge,
+               "1 while the engine is not as was asked for; 2 while the last volume is held");
+  for (const DisplayFigures& display : displays) {
+    Add(degraded, {{"display", display.name}},
+        display.volume_held               ? 2
+        : display.engine_degraded.empty() ? 0
+                                          : 1);
+  }
+  MetricFamily* times = out->New("voxeld_display_engine_recovery_seconds", MetricType::Gauge,
+                                 "Of the last loss of the engine: until the CPU had drawn in its "
+                                 "place, and until it came back; 0: not yet");
+  for (const DisplayFigures& display : displays) {
+    for (const auto& [what, ns] :
+         {std::pair("takeover", display.takeover_last_ns), {"return", display.return_last_ns}}) {
+      Add(times, {{"display", display.name}, {"what", what}},
+          static_cast<double>(ns) / kNsPerSecond);
+    }
   }
   MetricFamily* states =
       out->New("voxeld_display_state", MetricType::Gauge, "1 for the state that the display is in");

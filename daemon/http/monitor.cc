@@ -31,13 +31,22 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
                        {"why", display.state_reason}});
   }
   for (const DisplayFigures& figures : stats.displays) {
-    if (!figures.engine.empty()) continue;
-    reasons.push_back(
-        {{"display", figures.name}, {"what", "no engine"}, {"why", figures.engine_reason}});
+    const char* what = figures.engine.empty() ? "no engine" : "the last volume is held";
+    if (!figures.engine.empty() && !figures.volume_held) continue;
+    reasons.push_back({{"display", figures.name}, {"what", what}, {"why", figures.engine_reason}});
   }
-  const bool well = reasons.empty();
-  const Json answer = {{"status", well ? "ok" : "failing"}, {"reasons", std::move(reasons)}};
-  return {well ? 200u : 503u, "application/json",
+  const bool serves = reasons.empty();
+  for (const DisplayFigures& figures : stats.displays) {
+    if (figures.engine_degraded.empty()) continue;
+    Json reason = {{"display", figures.name},
+                   {"what", "the engine is degraded"},
+                   {"why", figures.engine_degraded}};
+    if (!figures.pinned_entities.empty()) reason["pinned"] = figures.pinned_entities;
+    reasons.push_back(std::move(reason));
+  }
+  const char* status = !serves ? "failing" : reasons.empty() ? "ok" : "degraded";
+  const Json answer = {{"status", status}, {"reasons", std::move(reasons)}};
+  return {serves ? 200u : 503u, "application/json",
           answer.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
 }
 

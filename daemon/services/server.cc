@@ -95,7 +95,20 @@ class Server::Impl {
     return absl::OkStatus();
   }
 
+  void SetServing(bool serving) {
+    sync::MutexLock lock(serving_mutex_);
+    if (down_) return;
+    for (const char* service : kServices) {
+      server_->GetHealthCheckService()->SetServingStatus(service, serving);
+    }
+    server_->GetHealthCheckService()->SetServingStatus("", serving);
+  }
+
   void Shutdown(sync::TimeNs limit) {
+    {
+      sync::MutexLock lock(serving_mutex_);
+      if (std::exchange(down_, true)) return;
+    }
     if (server_ == nullptr) return;
     server_->GetHealthCheckService()->Shutdown();
     context_.calls.EndAll(absl::UnavailableError("shutting down"));
@@ -122,6 +135,8 @@ class Server::Impl {
   const ServerOptions options_;
   const std::unique_ptr<grpc::Service> scene_, display_;
   std::unique_ptr<grpc::Server> server_;
+  sync::Mutex serving_mutex_;
+  bool down_ VOXELD_GUARDED_BY(serving_mutex_) = false;
   std::vector<Address> addresses_;
 };
 
@@ -136,6 +151,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(Core& core, sync::Clock& c
 }
 
 const std::vector<Address>& Server::addresses() const { return impl_->addresses(); }
+void Server::SetServing(bool serving) { impl_->SetServing(serving); }
 void Server::Shutdown(sync::TimeNs limit) { impl_->Shutdown(limit); }
 
 }  // namespace voxeld::daemon::services

@@ -40,6 +40,9 @@ class Server {
   // Where it listens, with the ports that were chosen.
   const std::vector<Address>& addresses() const;
 
+  // What health answers, for every service, until Shutdown.
+  void SetServing(bool serving);
+
   // Health answers NOT_SERVING, nothing new is accepted, every long call ends with
   // `Unavailable: shutting down` after what is queued for it. Returns when all calls have ended,
   // after at most `limit`: then those left are cancelled, and short ones are Unavailable, whatever

@@ -17,6 +17,16 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_engine(in.engine);
   out->set_engine_device(in.engine_device);
   out->set_engine_reason(in.engine_reason);
+  out->set_engine_degraded(in.engine_degraded);
+  out->set_volume_held(in.volume_held);
+  out->set_engine_faults(in.engine_faults);
+  out->set_engine_returns(in.engine_returns);
+  out->set_engine_mismatches(in.engine_mismatches);
+  out->set_takeover_last_ns(in.takeover_last_ns);
+  out->set_takeover_max_ns(in.takeover_max_ns);
+  out->set_return_last_ns(in.return_last_ns);
+  out->set_return_max_ns(in.return_max_ns);
+  for (const std::string& entity : in.pinned_entities) out->add_pinned_entities(entity);
   out->set_lit_voxels(in.lit_voxels);
   out->set_singular_drawables(in.singular_drawables);
   out->set_volumes_drawn(in.volumes_drawn);

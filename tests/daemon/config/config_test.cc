@@ -40,6 +40,9 @@ max_http_connections = 3
 kind = "cpu"
 threads = 5
 staging_limit_bytes = 2_097_152
+in_worker = true
+worker = "/opt/engine"
+worker_deadline_ns = 500_000_000
 [log]
 level = "warn"
 format = "json"
@@ -71,6 +74,9 @@ driver = "simulated"
   EXPECT_EQ(config.engine.kind, gpu::EngineKind::kCpu);
   EXPECT_EQ(config.engine.threads, 5u);
   EXPECT_EQ(config.engine.staging_limit_bytes, 2097152u);
+  EXPECT_TRUE(config.engine.in_worker);
+  EXPECT_EQ(config.engine.worker, "/opt/engine");
+  EXPECT_EQ(config.engine.worker_deadline_ns, sync::kSecond / 2);
   EXPECT_EQ(config.log.level, "warn");
   EXPECT_EQ(config.log.format, "json");
   EXPECT_EQ(config.limits.max_message_bytes, 65536u);

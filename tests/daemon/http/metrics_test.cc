@@ -89,6 +89,19 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   stats.displays[0].engine_reason = "gone";
   EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("\"no engine\""));
   stats.displays[0].engine = "cpu";
+  stats.displays[0].engine_degraded = "a fault";
+  stats.displays[0].pinned_entities = {"x"};
+  const Response degraded = HealthResponse(displays, stats, false);
+  EXPECT_EQ(degraded.status, 200u);
+  EXPECT_EQ(degraded.body,
+            R"({"status":"degraded","reasons":[{"display":"sim","what":"the engine is degraded",)"
+            R"("why":"a fault","pinned":["x"]}]})"
+            "\n");
+  stats.displays[0].volume_held = true;
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
+  EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("the last volume is held"));
+  stats.displays[0].volume_held = false;
+  stats.displays[0].engine_degraded = "";
   EXPECT_EQ(HealthResponse(displays, stats, true).status, 503u);
   EXPECT_THAT(HealthResponse(displays, stats, true).body, HasSubstr("shutting down"));
 }

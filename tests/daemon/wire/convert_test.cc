@@ -235,6 +235,9 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.commits_superseded = 35, d.commits_lost = 36, d.commits_not_shown = 37, d.commits_pending = 38;
   d.commit_to_last_byte = {41, 42, 43, 44}, d.commit_to_presented = {45, 46, 47, 48};
   d.assemble = {49, 50, 51, 52}, d.slice = {53, 54, 55, 56};
+  d.engine_degraded = "w", d.volume_held = true, d.engine_faults = 57, d.engine_returns = 58;
+  d.engine_mismatches = 59, d.takeover_last_ns = 60, d.takeover_max_ns = 61;
+  d.return_last_ns = 62, d.return_max_ns = 63, d.pinned_entities = {"p"};
   v1::Stats message;
   Encode(stats, &message);
   ExpectAllDifferent(message);

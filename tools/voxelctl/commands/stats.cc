@@ -71,7 +71,20 @@ std::string Full(const v1::Stats& stats) {
   row("slices sent", [](const D& d) { return Grouped(d.slices_sent()); });
   row("  again", [](const D& d) { return Grouped(d.slices_resent()); });
   row("underruns", [](const D& d) { return Grouped(d.underruns()); });
-  return absl::StrCat(Server(stats), "\n", table.Text());
+  row("engine faults", [](const D& d) { return Grouped(d.engine_faults()); });
+  row("  returns", [](const D& d) { return Grouped(d.engine_returns()); });
+  std::string text = absl::StrCat(Server(stats), "\n", table.Text());
+  for (const D& d : stats.displays()) {
+    if (!d.engine_degraded().empty()) {
+      absl::StrAppend(&text, "\n", EscapeForTerminal(d.name()), ": ",
+                      d.volume_held() ? "the last volume is held" : "degraded", ": ",
+                      EscapeForTerminal(d.engine_degraded()), "\n");
+    }
+    for (const std::string& entity : d.pinned_entities()) {
+      absl::StrAppend(&text, "  drawn by the CPU: ", EscapeForTerminal(entity), "\n");
+    }
+  }
+  return text;
 }
 
 std::string Brief(const v1::Stats& stats) {
