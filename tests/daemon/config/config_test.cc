@@ -261,6 +261,10 @@ TEST(ApplyCommandLine, UsageErrorsNameTheOption) {
   line = {};
   line.engine = "cpv";
   EXPECT_THAT(refusal(line), HasSubstr("--engine is \"cpv\"; did you mean cpu?"));
+  for (const char* graphics : {"gpu", "GPU"}) {
+    line.engine = graphics;
+    EXPECT_THAT(refusal(line), HasSubstr("\"; did you mean cuda?")) << "not cpu";
+  }
   line = {};
   line.log_level = "loud";
   EXPECT_THAT(refusal(line), HasSubstr("--log-level is \"loud\"; known are trace"));
