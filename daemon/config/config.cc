@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "daemon/config/fields.h"
 #include "daemon/suggest/suggest.h"
@@ -130,8 +131,12 @@ absl::StatusOr<gpu::EngineKind> ParseEngineKind(std::string_view text) {
     known.push_back(EngineKindText(kind));
     if (known.back() == text) return kind;
   }
-  return absl::InvalidArgumentError(absl::StrCat(
-      "is \"", absl::string_view(text.data(), text.size()), "\"", Suggestion(text, known)));
+  // By the letters alone gpu would be near cpu.
+  const std::string suggestion = absl::EqualsIgnoreCase({text.data(), text.size()}, "gpu")
+                                     ? "; did you mean cuda?"
+                                     : Suggestion(text, known);
+  return absl::InvalidArgumentError(
+      absl::StrCat("is \"", absl::string_view(text.data(), text.size()), "\"", suggestion));
 }
 
 std::string EngineKindText(gpu::EngineKind kind) {

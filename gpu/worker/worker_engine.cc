@@ -331,22 +331,28 @@ class WorkerEngine final : public Engine {
   std::vector<SegmentPool::Lease> slots_ VOXELD_GUARDED_BY(mutex_);       // for frames, newest last
 };
 
-}  // namespace
-
-std::string DefaultWorkerProgram() {
+std::filesystem::path RunningProgram() {
   char path[PATH_MAX];
   const ssize_t size = readlink("/proc/self/exe", path, sizeof(path));
-  const std::filesystem::path own(
-      std::string(path, static_cast<size_t>(std::max<ssize_t>(0, size))));
-  const std::filesystem::path beside = own.parent_path() / "voxeld-engine";
-  std::error_code error;
-  if (std::filesystem::exists(beside, error)) return beside.string();
-  return (own.parent_path().parent_path() / "voxeld-engine").string();
+  return std::string(path, static_cast<size_t>(std::max<ssize_t>(0, size)));
+}
+
+}  // namespace
+
+std::string DefaultWorkerProgram(const std::filesystem::path& running) {
+  const std::filesystem::path folder = running.parent_path();
+  const std::filesystem::path above = folder.parent_path();
+  for (const std::filesystem::path& place : {folder, above}) {
+    std::error_code error;
+    if (std::filesystem::exists(place / "voxeld-engine", error)) return place / "voxeld-engine";
+  }
+  return above / "libexec/voxeld/voxeld-engine";
 }
 
 absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
                                                            std::string reason) {
-  const std::string program = options.worker.empty() ? DefaultWorkerProgram() : options.worker;
+  const std::string program =
+      options.worker.empty() ? DefaultWorkerProgram(RunningProgram()) : options.worker;
   absl::StatusOr<std::shared_ptr<WorkerProcess>> process =
       options.workers == nullptr ? WorkerProcess::Start(program)
                                  : options.workers->Acquire(program, options.kind, options.device);

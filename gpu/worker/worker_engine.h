@@ -3,6 +3,7 @@
 // ends in DataLoss here.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -24,7 +25,8 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& 
                                                            std::string reason);
 
 // The program that is started unless the options name another: voxeld-engine, in the folder of the
-// running program or in the one above.
-std::string DefaultWorkerProgram();
+// program `running`, in the one above (a build's tests), or in ../libexec/voxeld (installed); the
+// first that is there, the last if none is.
+std::string DefaultWorkerProgram(const std::filesystem::path& running);
 
 }  // namespace voxeld::gpu

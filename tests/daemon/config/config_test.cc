@@ -89,7 +89,7 @@ driver = "simulated"
   EXPECT_THAT(config.displays[0].options,
               UnorderedElementsAre(Pair("geometry", "rotor"), Pair("slices", "360"),
                                    Pair("eccentricity", "13.5;0.375"), Pair("mirror", "true")));
-  EXPECT_EQ(config.displays[0].source, "test.toml:18:1");
+  EXPECT_EQ(config.displays[0].source, "test.toml:21:1");
 }
 
 struct Case {
@@ -267,6 +267,10 @@ TEST(ApplyCommandLine, UsageErrorsNameTheOption) {
   line = {};
   line.engine = "cpv";
   EXPECT_THAT(refusal(line), HasSubstr("--engine is \"cpv\"; did you mean cpu?"));
+  for (const char* graphics : {"gpu", "GPU"}) {
+    line.engine = graphics;
+    EXPECT_THAT(refusal(line), HasSubstr("\"; did you mean cuda?")) << "not cpu";
+  }
   line = {};
   line.log_level = "loud";
   EXPECT_THAT(refusal(line), HasSubstr("--log-level is \"loud\"; known are trace"));

@@ -2,9 +2,12 @@
 #include "gpu/worker/worker_engine.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <future>
 #include <memory>
 #include <string>
@@ -162,6 +165,22 @@ TEST(WorkerEngine, APromisedProgramMustBeThereAndBeAWorker) {
   options.worker = "/bin/true";
   status = CreateWorkerEngine(options, "").status();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST(DefaultWorkerProgram, IsTheNearestThatIsThere) {
+  namespace fs = std::filesystem;
+  const fs::path root =
+      fs::path(::testing::TempDir()) / ("voxeld_worker_program_" + std::to_string(getpid()));
+  const fs::path running = root / "usr/bin/voxeld";
+  const fs::path installed = root / "usr/libexec/voxeld/voxeld-engine";
+  EXPECT_EQ(DefaultWorkerProgram(running), installed) << "what a message names if none is there";
+  for (const fs::path& nearer :
+       {installed, root / "usr/voxeld-engine", root / "usr/bin/voxeld-engine"}) {
+    fs::create_directories(nearer.parent_path());
+    std::ofstream(nearer) << "a program";
+    EXPECT_EQ(DefaultWorkerProgram(running), nearer);
+  }
+  fs::remove_all(root);
 }
 
 }  // namespace

@@ -67,15 +67,17 @@ TEST(CommandLine, AFileMayBeCalledLikeACommandOrAnOption) {
 TEST(CommandLine, TheOthers) {
   const auto snapshot =
       std::get<SnapshotOptions>(Parse("snapshot o.png --display d --size 640x480 --azimuth -30 "
-                                      "--elevation 5.5 --slices --timeout 9")
+                                      "--elevation 5.5 --timeout 9")
                                     .command);
   EXPECT_EQ(snapshot.file, "o.png");
   EXPECT_EQ(snapshot.width, 640);
   EXPECT_EQ(snapshot.height, 480);
   EXPECT_EQ(snapshot.azimuth_degrees, -30);
   EXPECT_EQ(snapshot.elevation_degrees, 5.5);
-  EXPECT_TRUE(snapshot.slices);
+  EXPECT_FALSE(snapshot.slices);
   EXPECT_EQ(snapshot.timeout_s, 9);
+  EXPECT_TRUE(std::get<SnapshotOptions>(Parse("snapshot o.PNG --slices").command).slices);
+  EXPECT_EQ(std::get<SnapshotOptions>(Parse("snapshot picture").command).file, "picture");
   const auto stats = std::get<StatsOptions>(Parse("stats --watch --interval 0.5").command);
   EXPECT_TRUE(stats.watch);
   EXPECT_EQ(stats.interval_s, 0.5);
@@ -110,41 +112,62 @@ TEST_P(UsageErrors, ExitWithTwoAndSuggest) {
 
 INSTANTIATE_TEST_SUITE_P(
     Table, UsageErrors,
-    testing::Values(Wrong{"", {"a command is expected", "play", "pattern"}},
-                    Wrong{"--json", {"a command is expected"}},
-                    Wrong{"plya a.obj", {"\"plya\" is no command", "did you mean play?"}},
-                    Wrong{"snap o.png", {"did you mean snapshot?"}},
-                    Wrong{"--json stat", {"did you mean stats?"}},
-                    Wrong{"--server a:1 claer", {"did you mean clear?"}},
-                    Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, snapshot"}},
-                    Wrong{"pl\x1b[31m", {"pl\\u{1b}[31m"}},
-                    Wrong{"play", {"at least one FILE", "voxelctl play --help"}},
-                    Wrong{"play a.obj --sipn", {"--sipn", "did you mean --spin?"}},
-                    Wrong{"play --sipn", {"did you mean --spin?"}},
-                    Wrong{"play a.obj --jsno", {"did you mean --json?"}},
-                    Wrong{"play a.obj --fill=surfaces",
-                          {"--fill surfaces", "did you mean surface?"}},
-                    Wrong{"play a.obj --fill fog", {"known are dots, lines, surface"}},
-                    Wrong{"play a.obj --up w", {"--up w", "known are auto, x, y, z"}},
-                    Wrong{"play a.obj --fps 0", {"--fps is 0", "0.1 to 240"}},
-                    Wrong{"play a.obj --fps nan", {"--fps is nan"}},
-                    Wrong{"play a.obj --fps many", {"fps", "many"}},
-                    Wrong{"play a.obj --duration -1", {"--duration is -1"}},
-                    Wrong{"play a.obj --duration", {"--duration"}}, Wrong{"snapshot", {"OUT.png"}},
-                    Wrong{"snapshot a.png b.png", {"\"b.png\"", "too many"}},
-                    Wrong{"snapshot a.png --size 640", {"--size is 640", "WIDTHxHEIGHT"}},
-                    Wrong{"snapshot a.png --size 99999x10", {"width", "99999", "64 to 8192"}},
-                    Wrong{"snapshot a.png --size 640x1e3", {"--size is 640x1e3"}},
-                    Wrong{"snapshot a.png --elevation 90", {"--elevation is 90"}},
-                    Wrong{"snapshot a.png --timeout 61", {"--timeout is 61"}},
-                    Wrong{"displays all", {"\"all\"", "too many"}},
-                    Wrong{"displays -- all", {"\"all\"", "too many"}},
-                    Wrong{"stats --interval 0", {"--interval is 0"}},
-                    Wrong{"entities --owner me", {"owner", "me"}},
-                    Wrong{"clear --all --layer x", {"do not go together"}},
-                    Wrong{"pattern", {"pattern wants a name", "axes", "list"}},
-                    Wrong{"pattern axs", {"did you mean axes?"}},
-                    Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
+    testing::Values(
+        Wrong{"", {"a command is expected", "play", "pattern"}},
+        Wrong{"--json", {"a command is expected"}},
+        Wrong{"plya a.obj", {"\"plya\" is no command", "did you mean play?"}},
+        Wrong{"snap o.png", {"did you mean snapshot?"}},
+        Wrong{"--json stat", {"did you mean stats?"}},
+        Wrong{"--server a:1 claer", {"did you mean clear?"}},
+        Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, snapshot"}},
+        Wrong{"pl\x1b[31m", {"pl\\u{1b}[31m"}},
+        Wrong{"play", {"at least one FILE", "voxelctl play --help"}},
+        Wrong{"play a.obj --sipn", {"--sipn", "did you mean --spin?"}},
+        Wrong{"play --sipn", {"did you mean --spin?"}},
+        Wrong{"play a.obj --jsno", {"did you mean --json?"}},
+        Wrong{"play a.obj --fill=surfaces", {"--fill surfaces", "did you mean surface?"}},
+        Wrong{"play a.obj --fill fog", {"known are dots, lines, surface"}},
+        Wrong{"play a.obj --up w", {"--up w", "known are auto, x, y, z"}},
+        Wrong{"play a.obj --fps 0", {"--fps is 0", "0.1 to 240"}},
+        Wrong{"play a.obj --fps nan", {"--fps is nan"}},
+        Wrong{"play a.obj --fps many",
+              {"voxelctl: --fps is many; a number from 0.1 to 240 is expected\n"}},
+        Wrong{"play a.obj --fps 9fps", {"--fps is 9fps; a number"}},
+        Wrong{"play a.obj --fps 1e999", {"--fps is 1e999; a number"}},
+        Wrong{"play a.obj --duration long",
+              {"--duration is long; a number from 0 to 1e+09 is expected"}},
+        Wrong{"play a.obj --duration -1", {"--duration is -1"}},
+        Wrong{"play a.obj --duration", {"--duration"}}, Wrong{"snapshot", {"OUT.png"}},
+        Wrong{"snapshot a.png b.png", {"\"b.png\"", "too many"}},
+        Wrong{"snapshot a.png --size 640", {"--size is 640", "WIDTHxHEIGHT"}},
+        Wrong{"snapshot a.png --size 99999x10", {"width", "99999", "64 to 8192"}},
+        Wrong{"snapshot a.png --size 640x1e3", {"--size is 640x1e3"}},
+        Wrong{"snapshot a.png --elevation 90", {"--elevation is 90"}},
+        Wrong{"snapshot a.png --timeout 61", {"--timeout is 61"}},
+        Wrong{"snapshot a.png --timeout soon",
+              {"--timeout is soon; a number from 0.01 to 60 is expected"}},
+        Wrong{"snapshot a.png --azimuth left",
+              {"--azimuth is left; a number from -3600 to 3600 is expected"}},
+        Wrong{"snapshot a.png --elevation up",
+              {"--elevation is up; a number from -89 to 89 is expected"}},
+        Wrong{"snapshot a.png --slices --size 640x480", {"--size does not go with --slices"}},
+        Wrong{"snapshot a.png --elevation 5 --slices", {"--elevation does not go with --slices"}},
+        Wrong{"snapshot b/a.jpg", {"b/a.jpg ends in .jpg", "writes PNG", "name it b/a.png"}},
+        Wrong{"snapshot a.b\x1b", {"ends in .b\\u{1b}"}},
+        Wrong{"displays all", {"\"all\"", "too many"}},
+        Wrong{"displays -- all", {"\"all\"", "too many"}},
+        Wrong{"stats --interval 0", {"--interval is 0"}},
+        Wrong{"stats --interval often",
+              {"--interval is often; a number from 0.01 to 3600 is expected"}},
+        Wrong{"entities --owner me", {"--owner is me; an owner's number is expected"}},
+        Wrong{"entities --owner -1", {"--owner is -1; an owner's number"}},
+        Wrong{"entities --owner 010", {"--owner is 010; an owner's number"}},
+        Wrong{"entities --owner 18446744073709551616",
+              {"--owner is 18446744073709551616; an owner's number"}},
+        Wrong{"clear --all --layer x", {"do not go together"}},
+        Wrong{"pattern", {"pattern wants a name", "axes", "list"}},
+        Wrong{"pattern axs", {"did you mean axes?"}},
+        Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
 
 TEST(CommandLine, HelpAndVersionAreData) {
   for (const char* line : {"--help", "-h", "play --help", "--json stats -h"}) {

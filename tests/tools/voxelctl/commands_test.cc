@@ -99,6 +99,15 @@ TEST_F(CommandsTest, TablesAreDataAndNothingFromTheServerReachesTheTerminalRaw) 
   EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("1,234,567"));
 }
 
+TEST_F(CommandsTest, OneIsSingular) {
+  const std::string one = folder_.Write(
+      "one.ply",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+      "float z\nend_header\n1 2 3\n");
+  EXPECT_THAT(RunTool({"play", one}).err, HasSubstr("1 entity, 1 vertex, "));
+  EXPECT_THAT(RunTool({"stats"}).out, HasSubstr(": 1 session, 0 layers, 3 entities, 0 objects, "));
+}
+
 TEST_F(CommandsTest, StatsAreWatchedUntilAnInterrupt) {
   // The fake sends without pause; the interrupt comes after the first line.
   std::ostringstream out, err;
@@ -165,7 +174,8 @@ TEST_F(CommandsTest, ARefusedSceneLeavesTheTestPatternUp) {
 
 TEST_F(CommandsTest, ClearEndsATestPatternThatIsUp) {
   EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
-  EXPECT_THAT(RunTool({"clear"}).err, HasSubstr("ended 1 test patterns"));
+  EXPECT_THAT(RunTool({"clear"}).err,
+              HasSubstr("cleared 2 entities in 1 layer, ended 1 test pattern\n"));
   EXPECT_EQ(server_.log().updates.back().test_pattern(), v1::TEST_PATTERN_NONE);
 }
 

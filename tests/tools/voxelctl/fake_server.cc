@@ -205,6 +205,7 @@ class FakeServer::Display final : public v1::DisplayService::Service {
                           grpc::ServerWriter<v1::Stats>* writer) override {
     v1::Stats stats;
     stats.set_version("9.9\x1b");
+    stats.set_sessions(1);
     stats.set_entities(3);
     v1::DisplayStats* display = stats.add_displays();
     display->set_name(kDisplay);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -280,6 +281,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "a.obj",
                 "v 0 0 0\nf 1 1 99999999999999999999\n",
                 {"line 2", "99999999999999999999"}},
+        BadFile{"obj_one_coordinate", "a.obj", "v 1\n", {"has 1 coordinate;"}},
         BadFile{
             "obj_index_back", "a.obj", "v 0 0 0\nf -1 -1 -2\nv 0 0 0\n", {"line 2", "vertex -2"}},
         BadFile{"obj_nan", "a.obj", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", {"finite"}},
@@ -287,6 +289,7 @@ INSTANTIATE_TEST_SUITE_P(
             "stl_is_text", "a.stl", "hello, this is not a mesh\n", {"hello", "solid", "84 bytes"}},
         BadFile{
             "stl_short", "a.stl", BinaryStl(100, 4999), {"100 triangles", "5084 bytes", "5083"}},
+        BadFile{"stl_one", "a.stl", BinaryStl(1, 49), {"announces 1 triangle (134 bytes)"}},
         BadFile{"stl_absurd",
                 "a.stl",
                 BinaryStl(0xffffffff, 50),
@@ -297,7 +300,10 @@ INSTANTIATE_TEST_SUITE_P(
                 "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0",
                 {"endsolid", "truncated"}},
         BadFile{"stl_ascii_empty", "a.stl", "solid a\nendsolid a\n", {"without a facet"}},
-        BadFile{"glb_cut", "a.glb", Glb(Gltf(Positions("3")), 1000), {"announces", "truncated"}},
+        BadFile{"glb_cut_in_header",
+                "a.glb",
+                Glb("{}").substr(0, 19),
+                {"ends early: it has 19 bytes", "headers alone have 20"}},
         BadFile{"glb_is_text", "a.glb", "{}", {"JSON text", "glTF"}},
         BadFile{"gltf_is_glb", "a.gltf", Glb(Gltf(Positions("3"))), {"name it .glb"}},
         BadFile{"gltf_deep", "a.gltf", std::string(100000, '['), {"nests 100000 deep"}},
@@ -336,6 +342,20 @@ INSTANTIATE_TEST_SUITE_P(
             "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 77\n",
             {"a.ply"}}),
     [](const auto& info) { return info.param.name; });
+
+TEST(BadMeshes, ACutGlbIsSaidToEndEarlyWithBothSizes) {
+  TempFolder folder;
+  const std::string whole =
+      ReadAll(ModelFile("glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"));
+  ASSERT_GT(whole.size(), 1000000u);
+  // With no CR LF in it, and many LF, as any file that long may be.
+  std::string cut = whole.substr(0, whole.size() / 2);
+  for (size_t at = 0; (at = cut.find("\r\n", at)) != std::string::npos;) cut[at] = ' ';
+  const std::string path = folder.Write("a.glb", cut);
+  const std::string message(ImportFile(path, {}).status().message());
+  EXPECT_EQ(message, absl::StrCat(path, ": ends early: it has ", cut.size(),
+                                  " bytes; its header announces ", whole.size()));
+}
 
 TEST(BadMeshes, TruncatedAnywhereNeverCrashes) {
   TempFolder folder;

@@ -43,6 +43,11 @@ TEST(Table, AlignsAndEscapes) {
 
 TEST(Figures, ForPeople) {
   EXPECT_EQ(Grouped(0), "0");
+  EXPECT_EQ(Counted(0, "volume"), "0 volumes");
+  EXPECT_EQ(Counted(1, "volume"), "1 volume");
+  EXPECT_EQ(Counted(1234, "volume"), "1,234 volumes");
+  EXPECT_EQ(Counted(1, "entity", "entities"), "1 entity");
+  EXPECT_EQ(Counted(2, "entity", "entities"), "2 entities");
   EXPECT_EQ(Grouped(999), "999");
   EXPECT_EQ(Grouped(1234567), "1,234,567");
   EXPECT_EQ(Grouped(UINT64_MAX), "18,446,744,073,709,551,615");

@@ -3,9 +3,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <utility>
 
+#include "absl/algorithm/container.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -55,6 +58,27 @@ T Choose(const char* option, const std::string& value, const Choices<T>& choices
 void CheckRange(const char* option, double value, double least, double most) {
   if (value >= least && value <= most) return;
   throw UsageError{absl::StrCat(option, " is ", value, "; ", least, " to ", most, " is expected")};
+}
+
+// Has CLI11 refuse, before it converts, a text that is no number from `least` to `most`.
+void WantNumber(CLI::Option* option, double least, double most) {
+  option->check([option, least, most](const std::string& text) {
+    double value = 0;
+    const bool spaced = text != absl::StripAsciiWhitespace(text);
+    if (!spaced && absl::SimpleAtod(text, &value) && value >= least && value <= most) return "";
+    throw UsageError{absl::StrCat(option->get_name(), " is ", EscapeForTerminal(text),
+                                  "; a number from ", least, " to ", most, " is expected")};
+  });
+}
+
+// A name that promises another format than PNG would be a lie.
+void CheckPictureName(const std::string& file) {
+  std::filesystem::path path(file);
+  const std::string extension = path.extension().string();
+  if (extension.empty() || absl::EqualsIgnoreCase(extension, ".png")) return;
+  throw UsageError{absl::StrCat("the picture's name ", EscapeForTerminal(file), " ends in ",
+                                EscapeForTerminal(extension), "; snapshot writes PNG: name it ",
+                                EscapeForTerminal(path.replace_extension(".png").string()))};
 }
 
 const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
@@ -131,6 +155,14 @@ class Parser {
     return command;
   }
 
+  // A number and its range; what it holds now is the default.
+  static void AddNumber(CLI::App* command, const char* name, double* value, double least,
+                        double most, const char* about, const char* unit) {
+    CLI::Option* option = command->add_option(name, *value, about);
+    option->type_name(unit)->capture_default_str();
+    WantNumber(option, least, most);
+  }
+
   void AddPlay() {
     CLI::App* c = Add("play", kPlayAbout);
     c->add_option("FILE", play_.files,
@@ -147,10 +179,9 @@ class Parser {
     c->add_option("--fill", fill_, "Draw meshes as dots, lines or surface")
         ->type_name("STYLE")
         ->capture_default_str();
-    c->add_option("--fps", play_.fps, "Frames a second while spinning, 0.1 to 240")
-        ->type_name("N")
-        ->capture_default_str();
+    AddNumber(c, "--fps", &play_.fps, 0.1, 240, "Frames a second while spinning, 0.1 to 240", "N");
     c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
+    WantNumber(c->get_option("--duration"), 0, 1e9);
     c->add_flag("--globe", play_.globe,
                 "Put maps on a sphere by longitude and latitude, poles on the vertical axis");
     c->add_flag("--flat", play_.flat, "Colours as they are in the file, without shading");
@@ -169,32 +200,37 @@ class Parser {
     c->add_option("--size", size_, "Size of the picture, 64x64 to 8192x8192")
         ->type_name("WxH")
         ->capture_default_str();
-    c->add_option("--azimuth", snapshot_.azimuth_degrees,
-                  "Degrees that the viewer has walked to the right from the front")
-        ->type_name("DEG")
-        ->capture_default_str();
-    c->add_option("--elevation", snapshot_.elevation_degrees,
-                  "Degrees that the viewer stands above the middle, -89 to 89")
-        ->type_name("DEG")
-        ->capture_default_str();
-    c->add_flag("--slices", snapshot_.slices, "A contact sheet of all slices instead");
-    c->add_option("--timeout", snapshot_.timeout_s, "Seconds to wait for a volume, up to 60")
-        ->type_name("S")
-        ->capture_default_str();
+    AddNumber(c, "--azimuth", &snapshot_.azimuth_degrees, -3600, 3600,
+              "Degrees that the viewer has walked to the right from the front", "DEG");
+    AddNumber(c, "--elevation", &snapshot_.elevation_degrees, -89, 89,
+              "Degrees that the viewer stands above the middle, -89 to 89", "DEG");
+    c->add_flag("--slices", snapshot_.slices,
+                "A contact sheet of all slices instead, as large as they make it");
+    AddNumber(c, "--timeout", &snapshot_.timeout_s, 0.01, 60,
+              "Seconds to wait for a volume, up to 60", "S");
   }
 
   void AddStats() {
     CLI::App* c = Add("stats", "Shows the server's and the displays' figures");
     c->add_flag("--watch", stats_.watch, "Again and again, until Ctrl-C");
-    c->add_option("--interval", stats_.interval_s, "Seconds between, 0.01 to 3600")
-        ->type_name("S")
-        ->capture_default_str();
+    AddNumber(c, "--interval", &stats_.interval_s, 0.01, 3600, "Seconds between, 0.01 to 3600",
+              "S");
   }
 
   void AddEntities() {
     CLI::App* c = Add("entities", "Lists layers and entities");
     c->add_option("--layer", entities_.layer, "Only this layer's")->type_name("NAME");
-    c->add_option("--owner", entities_.owner, "Only this owner's")->type_name("N");
+    c->add_option("--owner", entities_.owner, "Only this owner's")
+        ->type_name("N")
+        ->check([](const std::string& text) {
+          uint64_t owner = 0;
+          const bool plain =
+              absl::c_all_of(text, absl::ascii_isdigit) && !absl::StartsWith(text, "0");
+          if (plain && absl::SimpleAtoi(text, &owner)) return "";
+          throw UsageError{absl::StrCat("--owner is ", EscapeForTerminal(text),
+                                        "; an owner's number is expected, such as 7 (voxelctl "
+                                        "entities lists them)")};
+        });
   }
 
   void AddClear() {
@@ -273,7 +309,6 @@ class Parser {
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "stats") {
-      CheckRange("--interval", stats_.interval_s, 0.01, 3600);
       options_.command = stats_;
     }
     if (name == "clear") {
@@ -297,16 +332,20 @@ class Parser {
     if (play_.files.empty()) throw UsageError{"play wants at least one FILE"};
     play_.up = Choose("--up", up_, kUps);
     play_.fill = Choose("--fill", fill_, kFills);
-    CheckRange("--fps", play_.fps, 0.1, 240);
-    if (!std::isnan(duration_)) {
-      CheckRange("--duration", duration_, 0, 1e9);
-      play_.duration_s = duration_;
-    }
+    if (!std::isnan(duration_)) play_.duration_s = duration_;
     options_.command = play_;
   }
 
   void FillInSnapshot() {
     if (snapshot_.file.empty()) throw UsageError{"snapshot wants the name of a file, OUT.png"};
+    CheckPictureName(snapshot_.file);
+    for (const char* option : {"--size", "--azimuth", "--elevation"}) {
+      if (snapshot_.slices && Chosen()->count(option) > 0) {
+        throw UsageError{absl::StrCat(option,
+                                      " does not go with --slices: a contact sheet has no "
+                                      "viewer, and its size follows from the slices")};
+      }
+    }
     const std::vector<std::string> sides = absl::StrSplit(size_, absl::ByAnyChar("xX"));
     if (sides.size() != 2 || !absl::SimpleAtoi(sides[0], &snapshot_.width) ||
         !absl::SimpleAtoi(sides[1], &snapshot_.height)) {
@@ -315,9 +354,6 @@ class Parser {
     }
     CheckRange("the width in --size", snapshot_.width, 64, 8192);
     CheckRange("the height in --size", snapshot_.height, 64, 8192);
-    CheckRange("--azimuth", snapshot_.azimuth_degrees, -3600, 3600);
-    CheckRange("--elevation", snapshot_.elevation_degrees, -89, 89);
-    CheckRange("--timeout", snapshot_.timeout_s, 0.01, 60);
     options_.command = snapshot_;
   }
 

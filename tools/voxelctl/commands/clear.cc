@@ -23,9 +23,10 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
     return absl::OkStatus();
   }
   console.Say(absl::StrCat(
-      "cleared ", Grouped(cleared->entities()), " entities in ", Grouped(cleared->layers()),
-      " layers",
-      patterns->empty() ? "" : absl::StrCat(", ended ", patterns->size(), " test patterns")));
+      "cleared ", Counted(cleared->entities(), "entity", "entities"), " in ",
+      Counted(cleared->layers(), "layer"),
+      patterns->empty() ? ""
+                        : absl::StrCat(", ended ", Counted(patterns->size(), "test pattern"))));
   return absl::OkStatus();
 }
 

@@ -312,7 +312,7 @@ class Player {
 
   void ShowLine(double seconds) {
     std::string line =
-        absl::StrFormat("spinning %.0f s, %s frames", seconds, Grouped(summary_.frames));
+        absl::StrFormat("spinning %.0f s, %s", seconds, Counted(summary_.frames, "frame"));
     for (const auto& [name, counts] : stream_->tally().displays) {
       absl::StrAppend(&line, ", ", EscapeForTerminal(name), " ", Grouped(counts.presented),
                       " presented ", Grouped(counts.lost), " lost");

@@ -86,11 +86,10 @@ void Report(PlaySummary summary, Console& console) {
     vertices += file.vertices;
     bytes += file.bytes;
   }
-  std::string line =
-      absl::StrCat(summary.files.size(), summary.files.size() == 1 ? " entity, " : " entities, ",
-                   Grouped(vertices), " vertices, ", Bytes(bytes));
+  std::string line = absl::StrCat(Counted(summary.files.size(), "entity", "entities"), ", ",
+                                  Counted(vertices, "vertex", "vertices"), ", ", Bytes(bytes));
   if (summary.frames > 0) {
-    absl::StrAppendFormat(&line, "; %s frames in %s", Grouped(summary.frames),
+    absl::StrAppendFormat(&line, "; %s in %s", Counted(summary.frames, "frame"),
                           Duration(summary.duration_ns));
     if (summary.frames_skipped > 0)
       absl::StrAppend(&line, " (", Grouped(summary.frames_skipped),

@@ -60,10 +60,11 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
                           false));
     return absl::OkStatus();
   }
-  console.Say(absl::StrCat(
-      EscapeForTerminal(options.file), ": ", image.width, "x", image.height, ", volume ",
-      volume->number, " of display ", EscapeForTerminal(volume->display), ", ", Grouped(lit),
-      " slice pixels lit, ", decoded ? "decoded from the bytes sent" : "reported by the device"));
+  console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", image.width, "x", image.height,
+                           ", volume ", volume->number, " of display ",
+                           EscapeForTerminal(volume->display), ", ", Counted(lit, "slice pixel"),
+                           " lit, ",
+                           decoded ? "decoded from the bytes sent" : "reported by the device"));
   if (lit == 0)
     console.Say(
         "no pixel is lit: see `voxelctl entities` for what is up, `voxelctl stats` for where it "

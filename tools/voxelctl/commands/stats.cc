@@ -15,13 +15,13 @@ namespace {
 using Align = Table::Align;
 
 std::string Server(const v1::Stats& s) {
-  return absl::StrCat("voxeld ", EscapeForTerminal(s.version()), ", up ", Duration(s.uptime_ns()),
-                      ": ", Grouped(s.sessions()), " sessions, ", Grouped(s.layers()), " layers, ",
-                      Grouped(s.entities()), " entities, ", Grouped(s.objects()), " objects, ",
-                      Bytes(s.scene_bytes()), " of scene\ncommits ", Grouped(s.commits_accepted()),
-                      " accepted, ", Grouped(s.commits_refused()), " refused; operations ",
-                      Grouped(s.operations_applied()), " applied, ",
-                      Grouped(s.operations_refused()), " refused; ", Bytes(s.bytes_in()), " in\n");
+  return absl::StrCat(
+      "voxeld ", EscapeForTerminal(s.version()), ", up ", Duration(s.uptime_ns()), ": ",
+      Counted(s.sessions(), "session"), ", ", Counted(s.layers(), "layer"), ", ",
+      Counted(s.entities(), "entity", "entities"), ", ", Counted(s.objects(), "object"), ", ",
+      Bytes(s.scene_bytes()), " of scene\ncommits ", Grouped(s.commits_accepted()), " accepted, ",
+      Grouped(s.commits_refused()), " refused; operations ", Grouped(s.operations_applied()),
+      " applied, ", Grouped(s.operations_refused()), " refused; ", Bytes(s.bytes_in()), " in\n");
 }
 
 std::string Engine(const v1::DisplayStats& d) {

@@ -112,8 +112,8 @@ class GrpcSceneStream final : public SceneStream {
     }
     if (ledger_.unanswered() == 0) return absl::OkStatus();
     if (ended_) return *ended_;
-    return absl::DeadlineExceededError(
-        absl::StrCat(ledger_.unanswered(), " commits have no outcome yet"));
+    return absl::DeadlineExceededError(absl::StrCat(
+        Counted(ledger_.unanswered(), "commit has", "commits have"), " no outcome yet"));
   }
 
   StreamTally tally() const override {

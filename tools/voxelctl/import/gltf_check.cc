@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr uint32_t kGlbMagic = 0x46546c67;   // "glTF"
+constexpr uint32_t kGlbHeader = 20;          // of the file and of its first chunk
 constexpr uint32_t kChunkJson = 0x4e4f534a;  // "JSON"
 
 // Thrown and caught within this file: a check that fails deep in a document.
@@ -230,7 +230,8 @@ void Document::CheckAccessors() {
       const uint64_t offset = Unsigned(item, "byteOffset", where, 0);
       if (accessor.stride > uint64_t{1} << 16 ||
           offset + accessor.stride * (accessor.count - 1) + element > views_[view].size()) {
-        throw Failure{absl::StrCat(where, " announces ", accessor.count, " elements of ",
+        throw Failure{absl::StrCat(where, " announces ", accessor.count,
+                                   accessor.count == 1 ? " element of " : " elements of ",
                                    accessor.stride, " bytes from byte ", offset),
                       absl::StrCat("bufferViews[", view, "] has ", views_[view].size(), " bytes")};
       }
@@ -360,23 +361,27 @@ absl::Status CheckGltf(const SourceFile& file) {
   absl::string_view text = file.bytes;
   absl::string_view binary_chunk;
   if (file.extension == "glb") {
-    if (text.size() < 20 || ReadU32(text, 0) != kGlbMagic) {
+    const bool is_glb = absl::StartsWith(text, "glTF");
+    if (is_glb && text.size() < kGlbHeader) {
+      return FileError(file, absl::StrCat("ends early: it has ", text.size(), " bytes"),
+                       absl::StrCat("a GLB's headers alone have ", kGlbHeader));
+    }
+    if (!is_glb) {
       return FileError(file, absl::StrCat("is ", DescribeContents(text)),
-                       "a GLB begins with \"glTF\" and 20 bytes of header");
+                       "a GLB begins with \"glTF\"");
     }
     const uint32_t version = ReadU32(text, 4), length = ReadU32(text, 8), chunk = ReadU32(text, 12);
     if (version != 2)
       return FileError(file, absl::StrCat("is GLB of version ", version), "2 is read; convert it");
     if (length > text.size()) {
-      return FileError(file,
-                       absl::StrCat("as GLB it announces ", length, " bytes but has ", text.size()),
-                       absl::StrCat("the file is truncated", TextModeHint(text)));
+      return FileError(file, absl::StrCat("ends early: it has ", text.size(), " bytes"),
+                       absl::StrCat("its header announces ", length));
     }
-    if (length < 20 || chunk > length - 20 || ReadU32(text, 16) != kChunkJson) {
+    if (length < kGlbHeader || chunk > length - kGlbHeader || ReadU32(text, 16) != kChunkJson) {
       return FileError(file, absl::StrCat("its first chunk announces ", chunk, " bytes"),
                        absl::StrCat("JSON is expected, within the ", length, " bytes of the file"));
     }
-    const absl::string_view rest = text.substr(0, length).substr(20 + chunk);
+    const absl::string_view rest = text.substr(0, length).substr(kGlbHeader + chunk);
     if (rest.size() >= 8) {
       const uint32_t size = ReadU32(rest, 0);
       if (size > rest.size() - 8) {
@@ -385,7 +390,7 @@ absl::Status CheckGltf(const SourceFile& file) {
       }
       binary_chunk = rest.substr(8, size);
     }
-    text = text.substr(20, chunk);
+    text = text.substr(kGlbHeader, chunk);
   } else if (absl::StartsWith(text, "glTF")) {
     return FileError(file, "is glTF binary", "name it .glb");
   }

@@ -90,7 +90,7 @@ absl::Status CheckObj(const SourceFile& file) {
           if (TakeWord(&line).empty()) {
             return FileError(file,
                              absl::StrCat("vertex ", vertices + 1, " in line ", number, " has ", i,
-                                          " coordinates"),
+                                          i == 1 ? " coordinate" : " coordinates"),
                              "three are expected: the file is truncated or damaged");
           }
         }

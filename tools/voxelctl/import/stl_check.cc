@@ -57,7 +57,8 @@ absl::Status CheckStl(const SourceFile& file) {
     return FileError(file, "is binary STL with no triangle", "at least one is expected");
   if (bytes.size() < announced) {
     return FileError(file,
-                     absl::StrCat("as binary STL it announces ", facets, " triangles (", announced,
+                     absl::StrCat("as binary STL it announces ", facets,
+                                  facets == 1 ? " triangle (" : " triangles (", announced,
                                   " bytes) but has ", bytes.size(), " bytes"),
                      "the file is truncated, or not an STL");
   }

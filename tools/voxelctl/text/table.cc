@@ -64,6 +64,11 @@ std::string Grouped(uint64_t value) {
   return digits;
 }
 
+std::string Counted(uint64_t count, const std::string& one, const std::string& many) {
+  if (count == 1) return absl::StrCat("1 ", one);
+  return absl::StrCat(Grouped(count), " ", many.empty() ? absl::StrCat(one, "s") : many);
+}
+
 std::string Bytes(uint64_t value) {
   if (value < 1000) return absl::StrCat(value, " B");
   static constexpr absl::string_view kUnits[] = {"kB", "MB", "GB", "TB", "PB", "EB"};

@@ -28,6 +28,9 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+// A number with its noun: "1 volume", "1,234 volumes"; `many` where an s is not enough.
+std::string Counted(uint64_t count, const std::string& one, const std::string& many = "");
+
 // "1,234,567"; "12.3 MB"; "4.56 ms", "–" for 0; "1 h 02 min".
 std::string Grouped(uint64_t value);
 std::string Bytes(uint64_t value);

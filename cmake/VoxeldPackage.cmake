@@ -1,0 +1,36 @@
+# What `cmake --install` installs, and the Debian package (cpack --preset release) that is made of it. The paths in
+# packaging/ are those of the prefix /usr.
+include(GNUInstallDirs)
+set(VOXELD_MAINTAINER "voxeld maintainers <maintainers@voxeld.invalid>" CACHE STRING "Maintainer of the package")
+
+set(doc ${CMAKE_INSTALL_DATADIR}/doc/voxeld)
+set(packaging ${CMAKE_SOURCE_DIR}/packaging)
+install(TARGETS voxeld voxelctl RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+# Where voxeld looks for it: gpu/worker/worker_engine.h.
+install(TARGETS voxeld-engine RUNTIME DESTINATION libexec/voxeld)
+install(FILES ${packaging}/voxeld.service DESTINATION lib/systemd/system)
+install(FILES ${packaging}/voxeld.sysusers DESTINATION lib/sysusers.d RENAME voxeld.conf)
+install(FILES ${packaging}/70-voxeld.rules DESTINATION lib/udev/rules.d)
+install(FILES ${packaging}/voxeld.toml DESTINATION ${doc}/examples)
+install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
+install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md DESTINATION ${doc})
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME voxeld)
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "driver service for volumetric displays")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
+                                                WORLD_READ WORLD_EXECUTE)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_MAINTAINER "${VOXELD_MAINTAINER}")
+set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
+    "Networked clients stream 3D primitives in over gRPC; voxeld assembles the voxel\nscene, slices it, and pushes whole volumes of light to the display. With the\nclient voxelctl, udev rules and a systemd service.")
+set(CPACK_DEBIAN_PACKAGE_DEPENDS passwd)  # for postinst
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)
+include(CPack)

@@ -1,0 +1,229 @@
+#!/usr/bin/env bash
+# Makes the Debian package of the build and looks at it as dpkg, udev and systemd would; runs what it holds from an
+# empty folder. Nothing is installed.
+# usage: package_test.sh CPACK BUILD VERSION
+set -euo pipefail
+cpack=$1
+build=$2
+version=$3
+
+work=$(mktemp -d)
+daemon=
+trap '[ -z "$daemon" ] || kill -KILL "$daemon" 2>/dev/null || true; rm -rf "$work"' EXIT
+fail() {
+  echo "package_test: $*" >&2
+  exit 1
+}
+
+"$cpack" -G DEB -B "$work/made" --config "$build/CPackConfig.cmake" >"$work/said" || { cat "$work/said"; fail "no package"; }
+deb=$(ls "$work"/made/*.deb)
+root=$work/root
+mkdir "$root"
+dpkg-deb -x "$deb" "$root"
+dpkg-deb -e "$deb" "$work/control"
+
+# ---- control fields, contents
+field() { dpkg-deb -f "$deb" "$1"; }
+[ "$(basename "$deb")" = "voxeld_${version}_$(dpkg --print-architecture).deb" ] || fail "its name is $deb"
+[ "$(field Package) $(field Version) $(field Section)" = "voxeld $version graphics" ] || fail "control: $(field Package Version Section)"
+[ "$(field Architecture)" = "$(dpkg --print-architecture)" ] || fail "architecture $(field Architecture)"
+[[ $(field Maintainer) =~ ^[^\<]+\ \<[^@]+@[^@]+\>$ ]] || fail "maintainer: $(field Maintainer)"
+[ "$(field Description | wc -l)" -ge 2 ] || fail "description: $(field Description)"
+
+dpkg-deb -c "$deb" | awk '$1 !~ /^d/ { print $1, $2, $6 }' >"$work/contents"
+cat >"$work/expected" <<'EOT'
+-rwxr-xr-x root/root ./usr/bin/voxelctl
+-rwxr-xr-x root/root ./usr/bin/voxeld
+-rw-r--r-- root/root ./usr/lib/systemd/system/voxeld.service
+-rw-r--r-- root/root ./usr/lib/sysusers.d/voxeld.conf
+-rw-r--r-- root/root ./usr/lib/udev/rules.d/70-voxeld.rules
+-rwxr-xr-x root/root ./usr/libexec/voxeld/voxeld-engine
+-rw-r--r-- root/root ./usr/share/doc/voxeld/CHANGELOG.md
+-rw-r--r-- root/root ./usr/share/doc/voxeld/README.md
+-rw-r--r-- root/root ./usr/share/doc/voxeld/copyright
+-rw-r--r-- root/root ./usr/share/doc/voxeld/examples/voxeld.toml
+EOT
+diff <(sort -k3 "$work/expected") <(sort -k3 "$work/contents") || fail "its contents differ (>)"
+grep -q 'Apache License' "$root/usr/share/doc/voxeld/copyright" || fail "no licence in copyright"
+
+# ---- programs: the system's libraries, each from a package that is depended on
+programs=("$root/usr/bin/voxeld" "$root/usr/bin/voxelctl" "$root/usr/libexec/voxeld/voxeld-engine")
+depends=$(field Depends | tr ',' '\n' | awk '{ print $1 }')
+for program in "${programs[@]}"; do
+  if readelf -d "$program" | grep -E 'RPATH|RUNPATH'; then fail "$program has a path of its own to libraries"; fi
+  if readelf -S "$program" | grep -q '\.symtab'; then fail "$program is not stripped"; fi
+  for name in $(readelf -d "$program" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
+    path=$(ldd "$program" | awk -v name="$name" '$1 == name { print $3 } index($1, "/" name) { print $1 }' | head -n 1)
+    [ -n "$path" ] || fail "$program: $name is not found"
+    file=$(realpath "$path")
+    owner=$(dpkg-query -S "$file" 2>/dev/null || dpkg-query -S "${file#/usr}") || fail "$file is of no package"
+    owner=${owner%%:*}
+    # A package may be depended on by a name that it provides.
+    names=$(dpkg-query -W -f '${Package}\n${Provides}\n' "$owner" | tr ',' '\n' | awk '{ print $1 }')
+    grep -qxF "$names" <<<"$depends" || fail "$program needs $name of $owner, which is not among:" $depends
+  done
+done
+if grep -e '-dev$' <<<"$depends"; then fail "what only building needs is depended on"; fi
+
+# ---- voxeld and its engine's program, from where they lie
+unset LD_LIBRARY_PATH VOXELD_SERVER XDG_CONFIG_HOME
+export HOME=$work
+voxeld=$root/usr/bin/voxeld
+voxelctl=$root/usr/bin/voxelctl
+[ "$("$voxeld" --version)" = "voxeld $version" ] || fail "voxeld --version: $("$voxeld" --version)"
+[ "$("$voxelctl" --version)" = "voxelctl $version" ] || fail "voxelctl --version: $("$voxelctl" --version)"
+
+example=$root/usr/share/doc/voxeld/examples/voxeld.toml
+export VOXELD_SERVER=unix:$work/s
+"$voxeld" --config "$example" --listen "$VOXELD_SERVER" --http off --log-format text 2>"$work/log" >&2 &
+daemon=$!
+for _ in $(seq 600); do
+  grep -q ' ready ' "$work/log" && break
+  kill -0 "$daemon" 2>/dev/null || { cat "$work/log" >&2; fail "voxeld ended"; }
+  sleep 0.1 # its log is how it says that it listens
+done
+cat "$work/log"
+"$voxelctl" --json pattern white >/dev/null
+"$voxelctl" --json snapshot "$work/white.png" >"$work/picture.json"
+python3 -c 'import json, sys; d = json.load(open(sys.argv[1])); assert d["display"] == "stack" and d["lit_pixels"] == 128**3, d' \
+  "$work/picture.json"
+kill -TERM "$daemon"
+wait "$daemon" || fail "voxeld did not end in peace"
+daemon=
+# An engine's program that is found answers, if only that there is no GPU for it; one that is not is named.
+grep -q ' display name=stack ' "$work/log" || fail "no line of the display"
+if grep 'cannot be started' "$work/log"; then fail "voxeld does not find its engine's program"; fi
+mv "$root/usr/libexec/voxeld/voxeld-engine" "$work/engine"
+if "$voxeld" --engine cuda --listen "$VOXELD_SERVER" --http off 2>"$work/log"; then fail "an engine without its program"; fi
+grep -qF "$root/usr/libexec/voxeld/voxeld-engine cannot be started" "$work/log" || fail "looked elsewhere: $(cat "$work/log")"
+mv "$work/engine" "$root/usr/libexec/voxeld/voxeld-engine"
+
+# ---- udev
+rules=$root/usr/lib/udev/rules.d/70-voxeld.rules
+first=$(printf '%s\n' "$(basename "$rules")" 73-seat-late.rules | LC_ALL=C sort | head -n 1)
+[ "$first" = 70-voxeld.rules ] || fail "uaccess is handed out before these rules are read"
+python3 - "$rules" <<'EOT'
+import fnmatch, re, sys
+
+TOKEN = re.compile(r'\s*([A-Z_]+)(?:\{([^}]+)\})?\s*(==|!=|\+=|=)\s*"([^"]*)"\s*(?:,|$)')
+rules = []
+for line in open(sys.argv[1]):
+    line = line.strip()
+    if not line or line.startswith("#"):
+        continue
+    tokens, at = [], 0
+    while at < len(line):
+        token = TOKEN.match(line, at)
+        assert token, f"no rule: {line[at:]!r} in {line!r}"
+        tokens.append(token.groups())
+        at = token.end()
+    rules.append(tokens)
+
+
+def node(device):
+    """What these rules make of a device's node."""
+    given, label = {}, None
+    for tokens in rules:
+        if label is not None:
+            if ("LABEL", None, "=", label) in tokens:
+                label = None
+            continue
+        matches = True
+        for key, name, operator, value in tokens:
+            if operator in ("==", "!="):
+                have = device.get(f"{key}{{{name}}}" if name else key, "")
+                matches &= fnmatch.fnmatchcase(have, value) == (operator == "==")
+        if not matches:
+            continue
+        for key, _, operator, value in tokens:
+            if key == "GOTO":
+                label = value
+            elif operator in ("=", "+=") and key != "LABEL":
+                given[key] = value
+    assert label is None, f"GOTO {label}: no such label"
+    return given
+
+
+def usb(vendor, product, interfaces, **more):
+    return {"ACTION": "add", "SUBSYSTEM": "usb", "ENV{DEVTYPE}": "usb_device", "ATTR{idVendor}": vendor,
+            "ATTR{idProduct}": product, "ENV{ID_USB_INTERFACES}": interfaces, **more}
+
+
+ours = {"GROUP": "voxeld", "MODE": "0660", "TAG": "uaccess"}
+assert node(usb("1d50", "607a", ":ff0000:fe0101:")) == ours, "Fadecandy"
+assert node(usb("1209", "0001", ":ff5601:")) == ours, "voxlink"
+assert node(usb("abcd", "1234", ":030101:ff5601:")) == ours, "voxlink beside another interface"
+assert node(usb("1d50", "607b", ":ff0000:")) == {}, "another product"
+assert node(usb("abcd", "607a", ":ff0000:")) == {}, "another vendor"
+assert node(usb("1209", "0001", ":ff5602:")) == {}, "another protocol"
+assert node({**usb("1d50", "607a", ":ff5601:"), "ACTION": "remove"}) == {}
+assert node({**usb("1d50", "607a", ":ff5601:"), "ENV{DEVTYPE}": "usb_interface"}) == {}
+assert node({**usb("1d50", "607a", ":ff5601:"), "SUBSYSTEM": "tty"}) == {}
+EOT
+if udevadm verify --help >/dev/null 2>&1; then
+  udevadm verify --resolve-names=never "$rules" || fail "udevadm refuses the rules"
+else
+  echo "left out: udevadm verify (comes with systemd 254)"
+fi
+
+# ---- systemd: nothing to say about the unit, a user that is in the GPU's group
+mkdir "$root/etc"
+systemd-sysusers --root="$root" voxeld.conf 2>/dev/null
+grep -q '^voxeld:.*:/usr/sbin/nologin$' "$root/etc/passwd" || fail "no user voxeld: $(cat "$root/etc/passwd")"
+grep -q '^video:.*:voxeld$' "$root/etc/group" || fail "not in video: $(cat "$root/etc/group")"
+cp -an /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/" # the targets that every unit has around it
+said=$(systemd-analyze verify --root="$root" voxeld.service 2>&1) || fail "systemd-analyze verify: $said"
+[ -z "$said" ] || fail "systemd-analyze verify: $said"
+systemd-analyze security --offline=true --root="$root" --threshold=30 voxeld.service >"$work/security" ||
+  fail "exposed: $(cat "$work/security")"
+tail -n 1 "$work/security"
+
+# ---- maintainer scripts: on a machine with everything, where commands fail, and with nothing
+commands=$work/commands
+run() { env -i PATH="$commands" CALLS="$work/calls" /bin/sh -e "$work/control/$1" "${@:2}" >"$work/said" 2>&1; }
+calls() {
+  rm -rf "$commands" "$work/calls"
+  mkdir "$commands"
+  : >"$work/calls"
+  local result=$1 name
+  shift
+  for name in "$@"; do
+    printf '#!/bin/sh\necho "%s $*" >>"$CALLS"\nexit %s\n' "$name" "$result" >"$commands/$name"
+    chmod +x "$commands/$name"
+  done
+}
+called() { diff - "$work/calls" || fail "called (>) instead of expected (<)"; }
+
+calls 0 systemd-sysusers udevadm systemctl
+run postinst configure || fail "postinst: $(cat "$work/said")"
+called <<'EOT'
+systemd-sysusers voxeld.conf
+udevadm control --reload
+udevadm trigger --action=change --subsystem-match=usb
+systemctl daemon-reload
+systemctl try-restart voxeld.service
+EOT
+calls 0 udevadm systemctl
+run prerm upgrade 9 && run postrm upgrade 9 && run postinst abort-upgrade 9 || fail "an upgrade: $(cat "$work/said")"
+called </dev/null
+run prerm remove && run postrm remove || fail "a removal: $(cat "$work/said")"
+called <<'EOT'
+systemctl disable --now voxeld.service
+udevadm control --reload
+systemctl daemon-reload
+EOT
+calls 1 udevadm systemctl
+printf '#!/bin/sh\n' >"$commands/systemd-sysusers"
+chmod +x "$commands/systemd-sysusers"
+run postinst configure && run prerm remove && run postrm remove || fail "where nothing runs: $(cat "$work/said")"
+calls 0 groupadd useradd
+printf '#!/bin/sh\nexit 2\n' >"$commands/getent"
+chmod +x "$commands/getent"
+run postinst configure && run prerm remove && run postrm remove || fail "where nothing is: $(cat "$work/said")"
+called <<'EOT'
+groupadd --system voxeld
+useradd --system --gid voxeld --groups video --no-create-home --home-dir / --shell /usr/sbin/nologin voxeld
+EOT
+calls 1 systemd-sysusers
+if run postinst configure; then fail "no user, and not a word"; fi
+echo "packed, looked at, run: $(basename "$deb"), $(stat -c %s "$deb") bytes"
