@@ -37,12 +37,6 @@ absl::Status Api::Enter() const {
   return error == cudaSuccess ? absl::OkStatus() : Failed("cudaSetDevice", error);
 }
 
-cudaError_t Api::Injected() {
-  const uint64_t call = ++calls_;
-  if (plan_.call == 0 || call < plan_.call) return cudaSuccess;
-  return call == plan_.call || plan_.sticky ? plan_.error : cudaSuccess;
-}
-
 absl::Status Api::Failed(const char* what, cudaError_t error) {
   cudaGetLastError();  // what is not sticky is told once
   return ToStatus(what, error);

@@ -27,6 +27,12 @@ struct FaultPlan {
   uint64_t call = 0;  // the n-th from the plan's setting on, 1 the next; 0: none
   cudaError_t error = cudaSuccess;
   bool sticky = false;  // so does every later one
+
+  // What the n-th call ends in; cudaSuccess: as it would without a plan.
+  cudaError_t At(uint64_t n) const {
+    const bool fails = call != 0 && (n == call || (sticky && n > call));
+    return fails ? error : cudaSuccess;
+  }
 };
 
 // Thread-safe, but for SetFaults.
@@ -41,7 +47,7 @@ class Api {
 
   template <typename Function>
   absl::Status Call(const char* what, Function&& function) {
-    if (const cudaError_t injected = Injected(); injected != cudaSuccess) {
+    if (const cudaError_t injected = plan_.At(++calls_); injected != cudaSuccess) {
       return ToStatus(what, injected);
     }
     const cudaError_t error = function();
@@ -56,7 +62,6 @@ class Api {
 
  private:
   Api(int device, const cudaDeviceProp& properties) : device_(device), properties_(properties) {}
-  cudaError_t Injected();
   static absl::Status Failed(const char* what, cudaError_t error);
   static absl::Status ToStatus(const char* what, cudaError_t error);
 

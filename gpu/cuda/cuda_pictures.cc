@@ -161,8 +161,8 @@ absl::Status CudaPictures::CopyPictures(size_t first, size_t count, FrameBuffer 
   return absl::OkStatus();
 }
 
-absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                                uint64_t buffer_holds, FrameResult& result) {
+absl::Status CudaPictures::DrawGroups(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
+                                      uint64_t buffer_holds) {
   const size_t slices = static_cast<size_t>(plan_.end - plan_.begin);
   const auto slice_of = [&](size_t group) { return group * slices / kGroups; };
   for (size_t group = 0; group < kGroups; ++group) {
@@ -195,9 +195,17 @@ absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameB
         CopyPictures(begin, slice_of(group + 1) * view_.sub_frames - begin, buffer, buffer_holds);
     if (!status.ok()) return status;
   }
-  absl::Status status =
-      device_.Run("cudaStreamSynchronize", [&] { return cudaStreamSynchronize(device_.copies()); });
-  if (!status.ok()) return status;
+  return device_.Run("cudaStreamSynchronize",
+                     [&] { return cudaStreamSynchronize(device_.copies()); });
+}
+
+absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
+                                uint64_t buffer_holds, FrameResult& result) {
+  absl::Status status = DrawGroups(volume, frame, buffer, buffer_holds);
+  if (!status.ok()) {
+    cudaStreamSynchronize(device_.copies());
+    return status;
+  }
   result.tiles_drawn = counters_->tiles_drawn;
   result.pictures_drawn = counters_->slices_drawn * view_.sub_frames;
   result.changed = counters_->pictures_changed > 0;

@@ -38,7 +38,8 @@ class CudaPictures {
   const SliceIndexView& index() const { return index_; }
 
   // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
-  // all is there. `result` gets what was counted.
+  // all is there. `result` gets what was counted. After an error nothing writes to `buffer` any
+  // more, whose pictures may be of this frame or older; what was drawn is told with the next one.
   absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
                     uint64_t buffer_holds, FrameResult& result);
 
@@ -47,6 +48,8 @@ class CudaPictures {
   absl::Status PutTables(const display::FootprintTable& table,
                          const display::TileToSlices& tile_to_slices);
   absl::Status PutPictures(const CudaPictures* before);
+  absl::Status DrawGroups(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
+                          uint64_t buffer_holds);
   absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);
 
   Device& device_;

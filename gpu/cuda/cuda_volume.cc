@@ -63,6 +63,7 @@ VolumeView DeviceTiles::view() const {
 void CudaVolume::SetView(DeviceTiles tiles, const Affine& view) {
   tiles_ = std::move(tiles);
   view_ = view;
+  listed_ = false;
   index_.Clear();
   slots_.clear();
   free_slots_.clear();
@@ -332,19 +333,30 @@ absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, S
   return absl::OkStatus();
 }
 
+// The old table stays until all is right in the new one.
+absl::Status CudaVolume::GrowTable() {
+  if (slots_.size() * sizeof(TableEntry) <= table_.size()) return absl::OkStatus();
+  const size_t entries = table_.size() / sizeof(TableEntry);
+  Block grown;
+  absl::Status status = device_.pool().Grow<TableEntry>(grown, slots_.size(), 0, device_.stream());
+  if (status.ok() && entries > 0) {
+    status = device_.Run("cudaMemcpyAsync", [&] {
+      return cudaMemcpyAsync(grown.as<void>(), table_.as<void>(), entries * sizeof(TableEntry),
+                             cudaMemcpyDeviceToDevice, device_.stream());
+    });
+    if (status.ok()) {
+      status = device_.Run("Rebase", [&] {
+        return Rebase(grown.as<TableEntry>(), static_cast<uint32_t>(entries), device_.stream());
+      });
+    }
+  }
+  if (status.ok()) table_ = std::move(grown);
+  return status;
+}
+
 absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
                                       std::span<const TableEntry> entries) {
-  const void* before = table_.as<TableEntry>();
-  absl::Status status = device_.pool().Grow<TableEntry>(
-      table_, slots_.size(), table_.size() / sizeof(TableEntry), device_.stream());
-  if (!status.ok()) return status;
-  if (before != nullptr && before != table_.as<TableEntry>()) {
-    status = device_.Run("Rebase", [&] {
-      return Rebase(table_.as<TableEntry>(), static_cast<uint32_t>(slots_.size()),
-                    device_.stream());
-    });
-    if (!status.ok()) return status;
-  }
+  if (absl::Status status = GrowTable(); !status.ok()) return status;
   const absl::StatusOr<Block> uploaded = device_.Upload(entries.data(), entries.size());
   if (!uploaded.ok()) return uploaded.status();
   const absl::StatusOr<Block> places = device_.Upload(slots.data(), slots.size());
@@ -416,16 +428,26 @@ absl::Status CudaVolume::Update(const SliceIndexView& slices) {
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
   const VolumeView view = tiles_.view();
-  absl::Status status = device_.Zero(&view.counters->dirty, 2 * sizeof(uint32_t));
+  absl::Status status;
+  if (listed_) {
+    status = device_.Run("cudaMemcpyAsync", [&] {
+      return cudaMemcpyAsync(view.dirty, view.owned, view.grid.count(), cudaMemcpyDeviceToDevice,
+                             device_.stream());
+    });
+    if (!status.ok()) return status;
+  }
+  status = device_.Zero(&view.counters->dirty, 2 * sizeof(uint32_t));
   if (!status.ok()) return status;
   status = device_.Run("ListDirty", [&] { return ListDirty(view, device_.stream()); });
   if (!status.ok()) return status;
   const uint32_t blocks = std::min<uint32_t>(
       view.grid.count(), 2 * static_cast<uint32_t>(device_.api().device().multiProcessorCount));
-  return device_.Run("DrawTiles", [&] {
+  status = device_.Run("DrawTiles", [&] {
     return DrawTiles(table_.as<TableEntry>(), looks_.as<LayerLook>(), index_.view(), view, slices,
                      blocks, device_.stream());
   });
+  listed_ = !status.ok();
+  return status;
 }
 
 }  // namespace voxeld::gpu::cuda

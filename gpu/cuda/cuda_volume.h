@@ -72,6 +72,7 @@ class CudaVolume final : private SceneObserver {
   absl::Status PutLayers();
   absl::Status MarkLeft();
   absl::Status Enter();
+  absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
   TableEntry EntryOf(const Drawable& drawable) const;
   // Has the CPU draw it; the result goes over, and into `slot`.
@@ -82,6 +83,7 @@ class CudaVolume final : private SceneObserver {
   Scene scene_;
   DeviceTiles tiles_;
   Affine view_;
+  bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
   PairIndex index_;
 
   Block table_;

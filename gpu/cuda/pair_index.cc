@@ -187,9 +187,8 @@ absl::Status PairIndex::Merge(const TableEntry* table, uint32_t tiles) {
   while (first > 0 && batches_[first - 1].pairs <= 2 * pairs) pairs += batches_[--first].pairs;
   if (first + 1 == batches_.size()) return absl::OkStatus();
   const absl::Status status = MergeFrom(first, table, tiles);
-  // As many batches as there is room for are in order.
-  if (absl::IsResourceExhausted(status) && batches_.size() < kMaxBatches) return absl::OkStatus();
-  return status;
+  // As many batches as there is room for are in order; the next pass makes room or is refused.
+  return absl::IsResourceExhausted(status) ? absl::OkStatus() : status;
 }
 
 absl::Status PairIndex::DropDead(const TableEntry* table, uint32_t tiles) {

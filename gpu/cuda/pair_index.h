@@ -28,8 +28,7 @@ class PairIndex {
   // Drops the pairs of drawables that are not alive. An error leaves all as it was.
   absl::Status DropDead(const TableEntry* table, uint32_t tiles);
 
-  // Merges batches of like size. An error leaves all as it was, and matters only if there are too
-  // many.
+  // Merges batches of like size; an error leaves all as it was, and want of memory is none.
   absl::Status Merge(const TableEntry* table, uint32_t tiles);
 
   BatchList view() const;

@@ -61,7 +61,7 @@ class Pool {
   absl::Status Grow(Block& block, size_t count, size_t keep, cudaStream_t stream) {
     if (count * sizeof(T) <= block.size()) return absl::OkStatus();
     absl::StatusOr<Block> next = Acquire(count * sizeof(T) + count * sizeof(T) / 2);
-    if (!next.ok()) next = Acquire(count * sizeof(T));
+    if (absl::IsResourceExhausted(next.status())) next = Acquire(count * sizeof(T));
     if (!next.ok()) return next.status();
     if (keep > 0) {
       absl::Status copied = api_.Call("cudaMemcpyAsync", [&] {
