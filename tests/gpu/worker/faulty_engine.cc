@@ -1,38 +1,43 @@
-// A worker that fails as VOXELD_TEST_FAULT says: WHAT:N, at the n-th frame; crash, exit or hang.
+// A stand-in for voxeld-engine that fails when faults.h says so, without a GPU: asked for CUDA, it
+// is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss.
 #include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
 #include <string>
+#include <utility>
 
 #include "gpu/cpu/cpu_engine.h"
 #include "gpu/worker/process.h"
 #include "gpu/worker/worker_server.h"
+#include "tests/gpu/worker/faults.h"
 
 namespace voxeld::gpu {
 namespace {
 
-void Fail(const std::string& what) {
-  if (what == "crash") std::raise(SIGSEGV);
+absl::Status Fail() {
+  const char* kind = std::getenv("VOXELD_FAULT_KIND");
+  const std::string what = kind == nullptr ? "crash" : kind;
+  if (what == "dataloss") return absl::DataLossError("a fault that was asked for");
   if (what == "exit") _exit(0);
-  for (;;) pause();
+  if (what == "hang") {
+    for (;;) pause();
+  }
+  std::raise(SIGSEGV);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const EngineOptions& options) {
+  std::unique_ptr<Engine> engine = CreateCpuEngine(options, "");
+  EngineInfo info = engine->info();
+  if (options.kind == EngineKind::kCuda) info = {EngineKind::kCuda, "a GPU that faults", ""};
+  return MakeFaulty(std::move(engine), std::move(info), FaultTrigger::FromEnvironment(), Fail);
 }
 
 int Main() {
   BecomeWorker();
-  const char* fault = std::getenv("VOXELD_TEST_FAULT");
-  const std::string text = fault == nullptr ? "" : fault;
-  const size_t colon = text.find(':');
   WorkerHooks hooks;
-  hooks.make_engine = [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
-    return CreateCpuEngine(options, "");
-  };
-  if (colon != std::string::npos) {
-    hooks.before_frame = [what = text.substr(0, colon),
-                          at = std::stoull(text.substr(colon + 1))](uint64_t frame) {
-      if (frame == at) Fail(what);
-    };
-  }
+  hooks.make_engine = MakeEngine;
   ServeEngines(kWorkerSocket, hooks);
 }
 

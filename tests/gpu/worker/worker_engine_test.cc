@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -17,6 +16,7 @@
 #include "gpu/worker/worker_pool.h"
 #include "tests/conformance/engine_driver.h"
 #include "tests/conformance/scene_generator.h"
+#include "tests/gpu/worker/fault_environment.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -25,10 +25,11 @@ using ::testing::HasSubstr;
 
 class FaultyWorker : public ::testing::Test {
  protected:
-  ~FaultyWorker() override { unsetenv("VOXELD_TEST_FAULT"); }
-
-  conformance::EngineDriver Make(const char* fault, int64_t deadline_ns = 20'000'000'000) {
-    setenv("VOXELD_TEST_FAULT", fault, 1);
+  // `fault`: its kind and, behind a colon, its frame.
+  conformance::EngineDriver Make(const std::string& fault, int64_t deadline_ns = 20'000'000'000) {
+    const size_t colon = fault.find(':');
+    const FaultEnvironment environment(
+        {.frame = fault.substr(colon + 1), .kind = fault.substr(0, colon)});
     EngineOptions options;
     options.kind = EngineKind::kCpu;
     options.threads = 1;

@@ -1,0 +1,111 @@
+#include "tests/gpu/worker/faults.h"
+
+#include <cstdlib>
+#include <set>
+#include <utility>
+
+#include "gpu/delta.h"
+
+namespace voxeld::gpu {
+namespace {
+
+// Follows which geometries of a colour there are.
+class ColorWatch final : public DeltaVisitor {
+ public:
+  explicit ColorWatch(uint32_t color) : color_(color) {}
+  bool seen() const { return !ids_.empty(); }
+
+ private:
+  absl::Status OnGeometry(const GeometryView& g) override {
+    const GeometryRecord& r = g.record;
+    if (r.color_mode == ColorMode::kUniform && (r.color & 0xFFFFFF) == color_ &&
+        r.drawn_by == DrawnBy::kEngine) {
+      ids_.insert(r.id);
+    }
+    return absl::OkStatus();
+  }
+  absl::Status OnDrawable(const DrawableRecord& d) override { return absl::OkStatus(); }
+  absl::Status OnLayer(const LayerRecord& l) override { return absl::OkStatus(); }
+  absl::Status OnDrop(Op op, uint64_t id) override {
+    if (op == Op::kDropGeometry) ids_.erase(id);
+    return absl::OkStatus();
+  }
+  absl::Status OnReset() override {
+    ids_.clear();
+    return absl::OkStatus();
+  }
+
+  uint32_t color_;
+  std::set<uint64_t> ids_;
+};
+
+class FaultyEngine final : public Engine {
+ public:
+  FaultyEngine(std::unique_ptr<Engine> engine, EngineInfo info, const FaultTrigger& trigger,
+               std::function<absl::Status()> fault)
+      : engine_(std::move(engine)),
+        info_(std::move(info)),
+        frame_(trigger.frame),
+        fault_(std::move(fault)) {
+    if (trigger.color) watch_.emplace(*trigger.color);
+  }
+
+  const EngineInfo& info() const override { return info_; }
+  void SetTarget(Target target, Done done) override {
+    engine_->SetTarget(std::move(target), std::move(done));
+  }
+  absl::StatusOr<StagingBlock> AcquireStaging(size_t size) override {
+    return engine_->AcquireStaging(size);
+  }
+  void Apply(StagingBlock block, size_t size, Done done) override {
+    std::optional<ColorWatch> next = watch_;
+    // What is malformed is for the engine to refuse.
+    if (next && size <= block.bytes().size()) {
+      (void)ReadDelta(block.bytes().first(size), *next);
+    }
+    engine_->Apply(std::move(block), size, [&](const absl::Status& status) {
+      if (status.ok()) watch_ = std::move(next);
+      done(status);
+    });
+  }
+  void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) override {
+    ++frames_;
+    if (frames_ == frame_ || (watch_ && watch_->seen())) {
+      if (absl::Status status = fault_(); !status.ok()) return done(status);
+    }
+    engine_->SubmitFrame(request, buffer, std::move(done));
+  }
+  void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) override {
+    engine_->ReadVoxels(box, out, std::move(done));
+  }
+
+ private:
+  const std::unique_ptr<Engine> engine_;
+  const EngineInfo info_;
+  const uint64_t frame_;
+  const std::function<absl::Status()> fault_;
+  uint64_t frames_ = 0;
+  std::optional<ColorWatch> watch_;
+};
+
+}  // namespace
+
+FaultTrigger FaultTrigger::FromEnvironment() {
+  FaultTrigger trigger;
+  if (const char* frame = std::getenv("VOXELD_FAULT_FRAME"); frame != nullptr) {
+    trigger.frame = std::strtoull(frame, nullptr, 10);
+  }
+  if (const char* color = std::getenv("VOXELD_FAULT_COLOR"); color != nullptr && *color != '\0') {
+    trigger.color = static_cast<uint32_t>(std::strtoul(color, nullptr, 16)) & 0xFFFFFF;
+  }
+  return trigger;
+}
+
+std::unique_ptr<Engine> MakeFaulty(std::unique_ptr<Engine> engine, EngineInfo info,
+                                   const FaultTrigger& trigger,
+                                   std::function<absl::Status()> fault) {
+  return std::make_unique<FaultyEngine>(std::move(engine), std::move(info), trigger,
+                                        std::move(fault));
+}
+
+}  // namespace voxeld::gpu
