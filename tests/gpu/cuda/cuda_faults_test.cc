@@ -1,0 +1,204 @@
+// What gpu/engine.h promises about errors, with each of the CUDA engine's calls of CUDA failing in
+// its turn.
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpu/core_engine.h"
+#include "gpu/cuda/cuda_core.h"
+#include "gpu/cuda/device.h"
+#include "tests/conformance/engine_cases.h"
+#include "tests/gpu/cuda/fault_scenario.h"
+
+namespace voxeld::gpu {
+namespace {
+
+using ::testing::HasSubstr;
+
+// The CUDA engine playing the scenario, and what it calls CUDA through.
+class CudaPlayer {
+ public:
+  explicit CudaPlayer(const cuda::FaultPlan& faults)
+      : fails_at_(faults.call),
+        player_({"cuda", [&](const EngineOptions& options) { return Make(options, faults); }}) {}
+
+  absl::Status Do(const FaultStep& step) { return player_.Do(step); }
+  const Seen& seen() const { return player_.seen(); }
+  cuda::Api& api() { return *api_; }
+  bool has_failed() const { return api_->calls() >= fails_at_; }
+
+ private:
+  absl::StatusOr<std::unique_ptr<Engine>> Make(const EngineOptions& options,
+                                               const cuda::FaultPlan& faults) {
+    absl::StatusOr<std::unique_ptr<cuda::Device>> device = cuda::Device::Open(0);
+    if (!device.ok()) return device.status();
+    api_ = &(*device)->api();
+    api_->SetFaults(faults);
+    return std::make_unique<CoreEngine<cuda::CudaCore>>(
+        options, EngineInfo{EngineKind::kCuda, api_->device().name, "a test"},
+        std::make_unique<cuda::CudaCore>(*std::move(device), SlicePart{}));
+  }
+
+  const uint64_t fails_at_;
+  cuda::Api* api_ = nullptr;  // before the player, whose making sets it
+  FaultPlayer player_;
+};
+
+class CudaFaults : public ::testing::Test {
+ protected:
+  // What the CPU engine leaves after each step, and how many calls the CUDA engine makes of CUDA
+  // when none fails.
+  void SetUp() override {
+    FaultPlayer cpu(conformance::CaseOf("cpu", EngineKind::kCpu, false));
+    for (const FaultStep& step : steps_) {
+      ASSERT_TRUE(cpu.Do(step).ok()) << step.name;
+      wanted_.push_back(cpu.seen());
+    }
+    CudaPlayer cuda({});
+    for (size_t s = 0; s < steps_.size(); ++s) {
+      const absl::Status status = cuda.Do(steps_[s]);
+      ASSERT_TRUE(status.ok()) << steps_[s].name << ": " << status;
+      ExpectSeen(cuda, s, true);
+    }
+    calls_ = cuda.api().calls();
+    std::cout << calls_ << " calls of CUDA, each of which fails once\n";
+    ASSERT_GT(calls_, 100u);
+    ASSERT_LT(calls_, 3000u) << "too many to fail each of them";
+  }
+
+  void ExpectSeen(const CudaPlayer& cuda, size_t step, bool with_numbers) const {
+    const Seen &got = cuda.seen(), &want = wanted_[step];
+    if (steps_[step].kind == FaultStep::Kind::kVoxels) {
+      EXPECT_TRUE(got.voxels == want.voxels) << steps_[step].name;
+    }
+    if (steps_[step].kind != FaultStep::Kind::kFrame) return;
+    EXPECT_TRUE(got.pictures == want.pictures) << steps_[step].name;
+    EXPECT_EQ(got.lit_voxels, want.lit_voxels) << steps_[step].name;
+    EXPECT_EQ(got.singular_drawables, want.singular_drawables) << steps_[step].name;
+    if (with_numbers) {
+      EXPECT_TRUE(got.changed_in == want.changed_in) << steps_[step].name;
+    }
+  }
+
+  // Runs `play` with each call failing in its turn, until a test has failed.
+  void ForEachCall(const cuda::FaultPlan& plan, const std::function<void(CudaPlayer&)>& play) {
+    for (uint64_t call = 1; call <= calls_ && !HasFailure(); ++call) {
+      SCOPED_TRACE("call " + std::to_string(call) + " of CUDA fails");
+      cuda::FaultPlan faults = plan;
+      faults.call = call;
+      CudaPlayer cuda(faults);
+      play(cuda);
+    }
+  }
+
+  // The last scene, from nothing, in an engine of whatever past.
+  void ExpectUsable(CudaPlayer& cuda) const {
+    FaultStep target = steps_.back(), whole = steps_.back();
+    target.kind = FaultStep::Kind::kTarget;
+    whole.kind = FaultStep::Kind::kApply;
+    whole.delta.PutWhole(whole.scene);
+    for (const FaultStep& step : {target, whole, steps_.back()}) {
+      const absl::Status status = cuda.Do(step);
+      ASSERT_TRUE(status.ok()) << status;
+    }
+    ExpectSeen(cuda, steps_.size() - 1, false);
+  }
+
+  const std::vector<FaultStep> steps_ = FaultScenario();
+  std::vector<Seen> wanted_;
+  uint64_t calls_ = 0;
+};
+
+constexpr cuda::FaultPlan kNoMemoryOnce = {1, cudaErrorMemoryAllocation, false};
+constexpr cuda::FaultPlan kNoMemoryFromThen = {1, cudaErrorMemoryAllocation, true};
+constexpr cuda::FaultPlan kIllegalFromThen = {1, cudaErrorIllegalAddress, true};
+
+TEST_F(CudaFaults, WantOfMemoryRefusesACallThatSucceedsWhenItIsMadeAgain) {
+  int refused = 0;
+  ForEachCall(kNoMemoryOnce, [&](CudaPlayer& cuda) {
+    int refused_here = 0;
+    for (size_t s = 0; s < steps_.size(); ++s) {
+      absl::Status status = cuda.Do(steps_[s]);
+      if (!status.ok()) {
+        ++refused_here;
+        EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+        EXPECT_THAT(status.message(), HasSubstr("out of memory"));
+        status = cuda.Do(steps_[s]);
+      }
+      ASSERT_TRUE(status.ok()) << steps_[s].name << ": " << status;
+      ExpectSeen(cuda, s, true);
+    }
+    EXPECT_TRUE(cuda.has_failed());
+    EXPECT_LE(refused_here, 1);
+    refused += refused_here;
+  });
+  EXPECT_GT(refused, 50);
+}
+
+// A frame that is refused is left out; what it would have shown comes with the next.
+TEST_F(CudaFaults, WantOfMemoryCostsAFrameNotTheNext) {
+  int left_out = 0;
+  ForEachCall(kNoMemoryOnce, [&](CudaPlayer& cuda) {
+    for (size_t s = 0; s < steps_.size(); ++s) {
+      absl::Status status = cuda.Do(steps_[s]);
+      const bool looks =
+          steps_[s].kind == FaultStep::Kind::kFrame || steps_[s].kind == FaultStep::Kind::kVoxels;
+      if (!status.ok() && looks && s + 1 < steps_.size()) {
+        EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+        ++left_out;
+        continue;
+      }
+      if (!status.ok()) status = cuda.Do(steps_[s]);
+      ASSERT_TRUE(status.ok()) << steps_[s].name << ": " << status;
+      ExpectSeen(cuda, s, false);
+    }
+    EXPECT_TRUE(cuda.has_failed());
+  });
+  EXPECT_GT(left_out, 50);
+}
+
+TEST_F(CudaFaults, WantOfMemoryThatLastsRefusesAndEndsWithIt) {
+  ForEachCall(kNoMemoryFromThen, [&](CudaPlayer& cuda) {
+    int refused = 0;
+    for (const FaultStep& step : steps_) {
+      const absl::Status status = cuda.Do(step);
+      if (status.ok()) continue;
+      ++refused;
+      // After a delta or a target that was refused, later steps may not fit the scene.
+      EXPECT_TRUE(
+          absl::IsResourceExhausted(status) ||
+          (refused > 1 && (absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status))))
+          << step.name << ": " << status;
+    }
+    EXPECT_GT(refused, 0);
+    cuda.api().SetFaults({});
+    ExpectUsable(cuda);
+  });
+}
+
+TEST_F(CudaFaults, AnIllegalAddressLosesTheEngineForGood) {
+  ForEachCall(kIllegalFromThen, [&](CudaPlayer& cuda) {
+    bool lost = false;
+    for (const FaultStep& step : steps_) {
+      const uint64_t before = cuda.api().calls();
+      const absl::Status status = cuda.Do(step);
+      if (lost) {
+        EXPECT_EQ(cuda.api().calls(), before) << "a lost engine calls CUDA: " << step.name;
+      } else if (status.ok()) {
+        continue;
+      }
+      lost = true;
+      EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << step.name << ": " << status;
+      EXPECT_THAT(status.message(), HasSubstr("cudaErrorIllegalAddress"));
+    }
+    EXPECT_TRUE(lost);
+  });
+}
+
+}  // namespace
+}  // namespace voxeld::gpu

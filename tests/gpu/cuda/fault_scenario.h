@@ -1,0 +1,50 @@
+// A short life of an engine in which every kind of its work happens, and what each step leaves.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "gpu/engine.h"
+#include "tests/conformance/engine_driver.h"
+#include "tests/conformance/scene_model.h"
+
+namespace voxeld::gpu {
+
+struct FaultStep {
+  enum class Kind { kTarget, kApply, kFrame, kVoxels };
+  Kind kind = Kind::kFrame;
+  std::string name;
+  Target target;                   // the one in force
+  conformance::DeltaBuffer delta;  // of kApply
+  conformance::SceneModel scene;   // after the step
+};
+
+// Targets, among them one of the same layout; deltas that add, replace, drop, hide, and outgrow
+// tables; more that goes than an index keeps; frames between; voxels read. Ends in a frame.
+std::vector<FaultStep> FaultScenario();
+
+// What can be seen of an engine after a step.
+struct Seen {
+  std::vector<std::byte> pictures;
+  std::vector<uint64_t> changed_in;
+  std::vector<uint32_t> voxels;
+  uint64_t lit_voxels = 0;
+  uint32_t singular_drawables = 0;
+};
+
+class FaultPlayer {
+ public:
+  explicit FaultPlayer(const conformance::EngineCase& engine);
+
+  absl::Status Do(const FaultStep& step);
+  const Seen& seen() const { return seen_; }
+  Engine& engine() { return driver_.engine(); }
+
+ private:
+  conformance::EngineDriver driver_;
+  Seen seen_;
+};
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,36 @@
+// The scenario in which CUDA's calls are made to fail, played by the CPU engine.
+#include "tests/gpu/cuda/fault_scenario.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/conformance/conformance_test.h"
+
+namespace voxeld::gpu {
+namespace {
+
+TEST(FaultScenario, DrawsWhatItSaysAndSomethingNewWithEveryFrame) {
+  FaultPlayer player(conformance::CaseOf("cpu", EngineKind::kCpu, false));
+  std::vector<std::byte> before;
+  int frames = 0;
+  for (const FaultStep& step : FaultScenario()) {
+    SCOPED_TRACE(step.name);
+    const absl::Status status = player.Do(step);
+    ASSERT_TRUE(status.ok()) << status;
+    if (step.kind == FaultStep::Kind::kApply || step.kind == FaultStep::Kind::kTarget) continue;
+    const conformance::DenseVolume want = conformance::OracleVoxels(step.scene, step.target);
+    if (step.kind == FaultStep::Kind::kVoxels) {
+      EXPECT_EQ(conformance::FirstDifference(player.seen().voxels, want, step.target), "");
+      continue;
+    }
+    ++frames;
+    EXPECT_TRUE(player.seen().pictures == conformance::OraclePictures(want, step.target));
+    EXPECT_GT(player.seen().lit_voxels, 1000u);
+    EXPECT_EQ(player.seen().singular_drawables, frames == 1 ? 0u : 1u);
+    EXPECT_FALSE(player.seen().pictures == before);
+    before = player.seen().pictures;
+  }
+  EXPECT_EQ(frames, 6);
+}
+
+}  // namespace
+}  // namespace voxeld::gpu
