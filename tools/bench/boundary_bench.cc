@@ -8,10 +8,10 @@
 // worker's times are compared with those of the engine of its kind in this process, when both are
 // measured. Engines take turns within each repetition, whose first is not counted, and only one
 // works at a time. A change is written to staging, applied and drawn without waiting between, as
-// the daemon does it: either all lines, or the hundredth part of them, which is one geometry of a hundred.
+// the daemon does it: either all lines, or one of the hundred geometries that they lie in.
 //
-// In this process staging is memory that CUDA has to copy first; a worker's is registered with
-// CUDA. The frame's buffer is registered for both.
+// A worker's segments are registered with CUDA. In this process the frame's buffer is, staging is
+// not.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
