@@ -2,6 +2,7 @@
 // worker is as good as new.
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <string>
 
 #include "tests/conformance/engine_driver.h"
@@ -27,7 +28,10 @@ class IllegalAccess : public ::testing::Test {
     const FaultEnvironment environment(fault);
     EngineOptions options;
     options.kind = EngineKind::kCuda;
-    options.worker = FAULTY_CUDA_ENGINE;
+    // Beside this program, also where both were copied to.
+    options.worker =
+        (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "faulty_cuda_engine")
+            .string();
     options.worker_deadline_ns = 30'000'000'000;
     return {{"faulty", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
   }
