@@ -12,7 +12,7 @@ constexpr size_t kLeast = 4096;
 size_t RoundUp(size_t size) {
   size = std::max(size, kLeast);
   const size_t step = std::bit_floor(size) / 8;
-  return (size + step - 1) / step * step;
+  return (size + step - 1) & ~(step - 1);
 }
 
 }  // namespace

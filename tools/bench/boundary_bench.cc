@@ -204,6 +204,7 @@ class Subject {
 std::vector<Row> Measure(const std::vector<std::unique_ptr<Subject>>& subjects, const Scene& scene,
                          const std::string& name, int parts, int repetitions) {
   std::vector<Row> rows;
+  rows.reserve(subjects.size());
   for (const auto& subject : subjects) rows.push_back({name, subject->name(), subject->baseline()});
   for (int repetition = 0; repetition <= repetitions; ++repetition) {
     for (size_t i = 0; i < subjects.size(); ++i) {
@@ -265,6 +266,7 @@ int Main(int argc, char** argv) {
   for (const int lines : options.lines) {
     const Scene scene(lines, options.size);
     std::vector<std::unique_ptr<Subject>> subjects;
+    subjects.reserve(options.engines.size());
     for (const std::string& engine : options.engines) {
       subjects.push_back(std::make_unique<Subject>(engine, target, options.threads));
     }
