@@ -119,6 +119,9 @@ std::vector<FaultStep> FaultScenario() {
   script.Put(Vertices(1, PrimitiveKind::kSegments, 2 * kLines, 1), 1);
   script.Put(Vertices(2, PrimitiveKind::kTriangles, 60, 2), 1);
   script.Put(Ball(3, 20, 20, 16, 9, 0xFF4000), 2);
+  ModelGeometry by_cpu = Vertices(4, PrimitiveKind::kSegments, 40, 5);
+  by_cpu.record.drawn_by = DrawnBy::kCpu;
+  script.Put(by_cpu, 2);
   script.Apply("first scene");
   script.Frame("first frame");
 

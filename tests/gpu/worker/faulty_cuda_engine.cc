@@ -30,7 +30,7 @@ int Main() {
   hooks.make_engine = MakeEngine;
   hooks.pin = cuda::PinMemory;
   hooks.unpin = cuda::UnpinMemory;
-  return ServeEngine(kWorkerSocket, hooks);
+  ServeEngines(kWorkerSocket, hooks);
 }
 
 }  // namespace

@@ -29,11 +29,12 @@ class FaultyEngineProgram : public ::testing::Test {
     return {{"faulty", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
   }
 
-  static conformance::DeltaBuffer Poison() {
+  static conformance::DeltaBuffer Poison(DrawnBy drawn_by = DrawnBy::kEngine) {
     conformance::ModelGeometry dot;
     dot.record.id = 1'000'000;
     dot.record.color = kPoison;
     dot.record.vertex_count = 1;
+    dot.record.drawn_by = drawn_by;
     dot.positions = {1.5, 1.5, 1.5};
     conformance::DeltaBuffer delta;
     delta.Put(dot);
@@ -95,6 +96,9 @@ TEST_F(FaultyEngineProgram, DrawsOnOnceTheColourHasGone) {
   conformance::DeltaBuffer refused = Poison();
   refused.Drop(Op::kDropDrawable, 77);
   EXPECT_EQ(engine.Apply(refused).code(), absl::StatusCode::kInvalidArgument);
+  ASSERT_TRUE(engine.Frame().ok());
+  // Nor does the GPU draw what the CPU is to draw.
+  ASSERT_TRUE(engine.Apply(Poison(DrawnBy::kCpu)).ok());
   EXPECT_TRUE(engine.Frame().ok());
 }
 
