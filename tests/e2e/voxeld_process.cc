@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -30,8 +31,13 @@ std::map<std::string, std::string> CleanEnvironment(const Folder& folder) {
           {"XDG_RUNTIME_DIR", folder.path()}};
 }
 
+std::string VoxeldBinary() {
+  const char* other = std::getenv("VOXELD_TEST_BINARY");
+  return other == nullptr ? VOXELD_BINARY : other;
+}
+
 std::vector<std::string> Voxeld(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), VOXELD_BINARY);
+  arguments.insert(arguments.begin(), VoxeldBinary());
   return arguments;
 }
 

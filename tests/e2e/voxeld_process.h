@@ -25,7 +25,9 @@ class Folder {
 // Nothing of the machine's own configuration is seen.
 std::map<std::string, std::string> CleanEnvironment(const Folder& folder);
 
-// VOXELD_BINARY and these.
+// The program: VOXELD_TEST_BINARY of the environment, or the one of this build.
+std::string VoxeldBinary();
+// It and these.
 std::vector<std::string> Voxeld(std::vector<std::string> arguments);
 
 // A running daemon that listens on a unix socket, on a port and on an http port of the system's

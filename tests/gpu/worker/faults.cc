@@ -1,6 +1,11 @@
 #include "tests/gpu/worker/faults.h"
 
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <set>
 #include <utility>
 
@@ -42,10 +47,10 @@ class ColorWatch final : public DeltaVisitor {
 class FaultyEngine final : public Engine {
  public:
   FaultyEngine(std::unique_ptr<Engine> engine, EngineInfo info, const FaultTrigger& trigger,
-               std::function<absl::Status()> fault)
+               std::function<absl::Status(const std::string&)> fault)
       : engine_(std::move(engine)),
         info_(std::move(info)),
-        frame_(trigger.frame),
+        trigger_(trigger),
         fault_(std::move(fault)) {
     if (trigger.color) watch_.emplace(*trigger.color);
   }
@@ -70,8 +75,9 @@ class FaultyEngine final : public Engine {
   }
   void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) override {
     ++frames_;
-    if (frames_ == frame_ || (watch_ && watch_->seen())) {
-      if (absl::Status status = fault_(); !status.ok()) return done(status);
+    std::string kind = trigger_.kind;
+    if (frames_ == trigger_.frame || (watch_ && watch_->seen()) || TakeFile(kind)) {
+      if (absl::Status status = fault_(kind); !status.ok()) return done(status);
     }
     engine_->SubmitFrame(request, buffer, std::move(done));
   }
@@ -80,10 +86,19 @@ class FaultyEngine final : public Engine {
   }
 
  private:
+  // Whether the file was there, for this engine.
+  bool TakeFile(std::string& kind) const {
+    if (trigger_.file.empty()) return false;
+    std::ifstream in(trigger_.file);
+    if (!in || std::remove(trigger_.file.c_str()) != 0) return false;
+    std::getline(in, kind);
+    return true;
+  }
+
   const std::unique_ptr<Engine> engine_;
   const EngineInfo info_;
-  const uint64_t frame_;
-  const std::function<absl::Status()> fault_;
+  const FaultTrigger trigger_;
+  const std::function<absl::Status(const std::string&)> fault_;
   uint64_t frames_ = 0;
   std::optional<ColorWatch> watch_;
 };
@@ -98,12 +113,24 @@ FaultTrigger FaultTrigger::FromEnvironment() {
   if (const char* color = std::getenv("VOXELD_FAULT_COLOR"); color != nullptr && *color != '\0') {
     trigger.color = static_cast<uint32_t>(std::strtoul(color, nullptr, 16)) & 0xFFFFFF;
   }
+  if (const char* file = std::getenv("VOXELD_FAULT_FILE"); file != nullptr) trigger.file = file;
+  if (const char* kind = std::getenv("VOXELD_FAULT_KIND"); kind != nullptr) trigger.kind = kind;
   return trigger;
+}
+
+absl::Status Fail(const std::string& kind) {
+  if (kind == "dataloss") return absl::DataLossError("a fault that was asked for");
+  if (kind == "exit") _exit(0);
+  if (kind == "hang") {
+    for (;;) pause();
+  }
+  std::raise(SIGSEGV);
+  return absl::OkStatus();
 }
 
 std::unique_ptr<Engine> MakeFaulty(std::unique_ptr<Engine> engine, EngineInfo info,
                                    const FaultTrigger& trigger,
-                                   std::function<absl::Status()> fault) {
+                                   std::function<absl::Status(const std::string&)> fault) {
   return std::make_unique<FaultyEngine>(std::move(engine), std::move(info), trigger,
                                         std::move(fault));
 }

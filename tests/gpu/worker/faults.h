@@ -3,7 +3,9 @@
 //   VOXELD_FAULT_FRAME=n       at the n-th frame of each of its engines, from 1; 0 or none: never
 //   VOXELD_FAULT_COLOR=RRGGBB  at every frame while a geometry of that uniform colour is in the
 //                              scene, unless the CPU is to draw it (DrawnBy); none: never
-//   VOXELD_FAULT_KIND=…        how, where a program knows several ways
+//   VOXELD_FAULT_FILE=path     at the next frame once that file is there; it is removed first, and
+//                              says how
+//   VOXELD_FAULT_KIND=…        how, where a program knows several ways and no file says it
 //
 // Until then such a worker is like any other.
 #pragma once
@@ -12,6 +14,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "absl/status/status.h"
 #include "gpu/engine.h"
@@ -21,14 +24,20 @@ namespace voxeld::gpu {
 struct FaultTrigger {
   uint64_t frame = 0;             // 0: none
   std::optional<uint32_t> color;  // 0x00RRGGBB
+  std::string file;               // empty: none
+  std::string kind;
 
   static FaultTrigger FromEnvironment();
 };
 
+// How a process fails: "crash" (as for any other word), "exit", "hang", "dataloss".
+absl::Status Fail(const std::string& kind);
+
 // `engine`, which must carry out calls inline, under the name `info`. Before a frame that the
-// trigger names `fault` is called: an error is the frame's answer, after OK the engine gets it.
+// trigger names `fault` is called with the kind: an error is the frame's answer, after OK the engine
+// gets it.
 std::unique_ptr<Engine> MakeFaulty(std::unique_ptr<Engine> engine, EngineInfo info,
                                    const FaultTrigger& trigger,
-                                   std::function<absl::Status()> fault);
+                                   std::function<absl::Status(const std::string& kind)> fault);
 
 }  // namespace voxeld::gpu

@@ -1,5 +1,7 @@
 // voxeld-engine with the real CUDA engine, whose GPU really faults when faults.h says so: what CUDA
-// then reports goes the way of any error of the device.
+// then reports goes the way of any error of the device. VOXELD_FAULT_KIND: illegal (the default), or
+// as faulty_engine's.
+#include <string>
 #include <utility>
 
 #include "gpu/cuda/cuda_engine.h"
@@ -12,7 +14,8 @@
 namespace voxeld::gpu {
 namespace {
 
-absl::Status Fail() {
+absl::Status FailOnGpu(const std::string& kind) {
+  if (!kind.empty() && kind != "illegal") return Fail(kind);
   WriteToAnIllegalAddress();
   return absl::OkStatus();
 }
@@ -21,7 +24,8 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const EngineOptions& options)
   absl::StatusOr<std::unique_ptr<Engine>> engine = CreateCudaEngine(options, "");
   if (!engine.ok()) return engine;
   EngineInfo info = (*engine)->info();
-  return MakeFaulty(*std::move(engine), std::move(info), FaultTrigger::FromEnvironment(), Fail);
+  return MakeFaulty(*std::move(engine), std::move(info), FaultTrigger::FromEnvironment(),
+                    FailOnGpu);
 }
 
 int Main() {

@@ -1,9 +1,5 @@
 // A stand-in for voxeld-engine that fails when faults.h says so, without a GPU: asked for CUDA, it
 // is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss.
-#include <unistd.h>
-
-#include <csignal>
-#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -14,18 +10,6 @@
 
 namespace voxeld::gpu {
 namespace {
-
-absl::Status Fail() {
-  const char* kind = std::getenv("VOXELD_FAULT_KIND");
-  const std::string what = kind == nullptr ? "crash" : kind;
-  if (what == "dataloss") return absl::DataLossError("a fault that was asked for");
-  if (what == "exit") _exit(0);
-  if (what == "hang") {
-    for (;;) pause();
-  }
-  std::raise(SIGSEGV);
-  return absl::OkStatus();
-}
 
 absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const EngineOptions& options) {
   std::unique_ptr<Engine> engine = CreateCpuEngine(options, "");

@@ -152,8 +152,14 @@ TEST_F(SharedWorker, ThatIsNotWaitedForAndCannotServeSaysWhy) {
   options.wait_until_ready = false;
   options.workers = nullptr;
   options.worker = "/bin/true";
-  conformance::EngineDriver a = Drive(options);
-  EXPECT_EQ(a.SetTarget(target_).code(), absl::StatusCode::kDataLoss);
+  const absl::StatusOr<std::unique_ptr<Engine>> engine = CreateEngine(options);
+  if (!engine.ok()) {  // it has ended already
+    EXPECT_EQ(engine.status().code(), absl::StatusCode::kFailedPrecondition);
+    return;
+  }
+  std::promise<absl::Status> answer;
+  (*engine)->SetTarget(target_, [&](const absl::Status& status) { answer.set_value(status); });
+  EXPECT_EQ(answer.get_future().get().code(), absl::StatusCode::kDataLoss);
 }
 
 TEST(WorkerEngine, APromisedProgramMustBeThereAndBeAWorker) {

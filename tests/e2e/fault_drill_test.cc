@@ -1,0 +1,292 @@
+// Faults of the GPU while a client streams: the real voxeld, with an engine's program that faults
+// when it finds a file. Every volume is what an unfaulted daemon shows, nobody loses a commit, and
+// the engine comes back each time. Prints how long the CPU took to take over, and the GPU to return.
+//
+//   VOXELD_DRILL_FAULTS   how many; default 6
+//   VOXELD_DRILL_ENGINE   the program; default: the one that faults without a GPU
+//   VOXELD_DRILL_KINDS    how, in turn; default crash,dataloss,exit,hang
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "tests/daemon/services/daemon_fixture.h"
+#include "tests/e2e/voxeld_process.h"
+
+namespace voxeld::e2e {
+namespace {
+
+using daemon::services::Client;
+using daemon::services::SetDeadline;
+using daemon::services::SphereIn;
+
+constexpr const char* kDisplays[] = {"stack", "rotor"};
+// Between two faults; an engine that has drawn so many frames is well again.
+constexpr int kCommitsBetween = 60;
+
+std::string FromEnvironment(const char* name, const char* otherwise) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? otherwise : value;
+}
+
+// Commit i, the same whoever asks.
+void SendScene(Client& client, int i) {
+  const double t = 0.07 * i;
+  client.Send(SphereIn("a", "ball", 0.3 + 0.2 * std::sin(t)));
+  v1::StreamRequest box = SphereIn("a", "box");
+  v1::Entity& entity = *box.mutable_upsert()->mutable_entity();
+  entity.mutable_primitive()->mutable_box()->mutable_size()->set_x(0.5);
+  entity.mutable_primitive()->mutable_box()->mutable_size()->set_y(0.4);
+  entity.mutable_primitive()->mutable_box()->mutable_size()->set_z(0.3);
+  entity.mutable_primitive()->mutable_color()->set_rgb(0x4080FF);
+  for (const double m : {std::cos(t), -std::sin(t), 0.0, 0.4 * std::cos(t), std::sin(t),
+                         std::cos(t), 0.0, 0.4 * std::sin(t), 0.0, 0.0, 1.0, 0.2}) {
+    entity.mutable_transform()->add_m(m);
+  }
+  client.Send(box);
+  if (i % 5 != 0) return;
+  v1::StreamRequest lines = SphereIn("b", "lines");
+  v1::Primitive& primitive = *lines.mutable_upsert()->mutable_entity()->mutable_primitive();
+  v1::Vertices& vertices = *primitive.mutable_segments()->mutable_vertices();
+  primitive.mutable_color()->set_rgb(0x20FF20);
+  constexpr uint32_t kVertices = 400;
+  std::vector<float> positions;
+  uint32_t random = 12345 + static_cast<uint32_t>(i);
+  for (uint32_t v = 0; v < 3 * kVertices; ++v) {
+    random = random * 1664525 + 1013904223;
+    positions.push_back(static_cast<float>(random >> 8) / 8388608.0f - 1.0f);
+  }
+  vertices.set_count(kVertices);
+  vertices.set_position_type(v1::ELEMENT_TYPE_F32);
+  vertices.set_positions(positions.data(), positions.size() * sizeof(float));
+  client.Send(lines);
+}
+
+class Drilled {
+ public:
+  // `engine`: the program; empty: the CPU in the daemon's own process. `fault_color`: of geometries
+  // that fault.
+  explicit Drilled(const std::string& engine, const std::string& fault_color = "") {
+    std::string config = "[engine]\n";
+    if (engine.empty()) {
+      config += "kind = \"cpu\"\n";
+    } else {
+      config += absl::StrCat("kind = \"cuda\"\nworker = \"", engine,
+                             "\"\nworker_deadline_ns = 1_000_000_000\n");
+    }
+    target_ = absl::StrCat("unix:", folder_.path(), "/voxeld.sock");
+    fault_file_ = absl::StrCat(folder_.path(), "/fault");
+    std::map<std::string, std::string> environment = CleanEnvironment(folder_);
+    environment["VOXELD_FAULT_FILE"] = fault_file_;
+    environment["VOXELD_FAULT_COLOR"] = fault_color;
+    process_ = std::make_unique<Process>(
+        std::vector<std::string>{VoxeldBinary(), "--config", folder_.File("voxeld.toml", config),
+                                 "--listen", target_, "--http", "off", "--log-format", "json",
+                                 "--display", "stack=simulated,size=48x48x24,rate=100", "--display",
+                                 "rotor=simulated,geometry=rotor,slices=60,size=48x32,rate=100"},
+        environment);
+    const std::optional<std::string> ready = process_->ReadLineWith("\"event\":\"ready\"");
+    EXPECT_TRUE(ready.has_value()) << process_->output();
+    channel_ = grpc::CreateChannel(target_, grpc::InsecureChannelCredentials());
+    scene_ = v1::SceneService::NewStub(channel_);
+    displays_ = v1::DisplayService::NewStub(channel_);
+    client_ = std::make_unique<Client>(*scene_);
+    client_->Open();
+  }
+
+  bool Send(const v1::StreamRequest& request) { return client_->Send(request); }
+
+  // Sends commit i, waits until every display has shown it, and answers what they show.
+  std::vector<std::string> Commit(int i) {
+    SendScene(*client_, i);
+    EXPECT_TRUE(client_->Commit(static_cast<uint64_t>(i)));
+    const size_t outcomes = client_->outcomes.size();
+    client_->ReadOutcomes(outcomes + std::size(kDisplays));
+    for (size_t o = outcomes; o < client_->outcomes.size(); ++o) {
+      EXPECT_TRUE(client_->outcomes[o].outcome().has_presented())
+          << client_->outcomes[o].DebugString();
+    }
+    std::vector<std::string> volumes;
+    for (const char* display : kDisplays) volumes.push_back(Volume(display));
+    return volumes;
+  }
+
+  v1::Stats Stats() {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::WatchStatsRequest request;
+    request.set_once(true);
+    const auto call = displays_->WatchStats(&context, request);
+    v1::Stats stats;
+    EXPECT_TRUE(call->Read(&stats));
+    return stats;
+  }
+
+  void Fault(const std::string& kind) {
+    const std::string next = fault_file_ + ".next";
+    std::ofstream(next) << kind;
+    std::filesystem::rename(next, fault_file_);
+  }
+  bool faulted() const { return !std::filesystem::exists(fault_file_); }
+  const Client& client() const { return *client_; }
+  std::string output() { return process_->output(); }
+
+ private:
+  std::string Volume(const std::string& display) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::CaptureVolumeRequest request;
+    request.set_name(display);
+    request.set_at_least_snapshot(client_->answers.back().accepted().snapshot());
+    const auto call = displays_->CaptureVolume(&context, request);
+    v1::VolumeChunk chunk;
+    std::string rgb;
+    while (call->Read(&chunk)) rgb += chunk.slices().rgb();
+    EXPECT_TRUE(call->Finish().ok());
+    EXPECT_FALSE(rgb.empty());
+    return rgb;
+  }
+
+  Folder folder_;
+  std::string target_, fault_file_;
+  std::unique_ptr<Process> process_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::SceneService::Stub> scene_;
+  std::unique_ptr<v1::DisplayService::Stub> displays_;
+  std::unique_ptr<Client> client_;
+};
+
+// Both get the same commits; what they show is compared.
+class Pair {
+ public:
+  explicit Pair(const std::string& fault_color = "")
+      : faulted(FromEnvironment("VOXELD_DRILL_ENGINE", FAULTY_ENGINE), fault_color),
+        unfaulted("") {}
+
+  void Commit() {
+    ++commits;
+    const std::vector<std::string> got = faulted.Commit(commits);
+    const std::vector<std::string> want = unfaulted.Commit(commits);
+    for (size_t d = 0; d < want.size(); ++d) {
+      EXPECT_TRUE(got[d] == want[d]) << kDisplays[d] << " differs at commit " << commits;
+    }
+  }
+  // With the next commit.
+  void Send(const v1::StreamRequest& request) {
+    faulted.Send(request);
+    unfaulted.Send(request);
+  }
+  // Commits until all displays' figures are so.
+  void CommitUntil(const std::function<bool(const v1::DisplayStats&)>& so) {
+    const auto all = [&] {
+      const v1::Stats stats = faulted.Stats();
+      return std::all_of(stats.displays().begin(), stats.displays().end(), so);
+    };
+    for (int waited = 0; waited < 3000 && !all(); ++waited) Commit();
+    ASSERT_TRUE(all()) << faulted.Stats().DebugString();
+  }
+  static bool OnCuda(const v1::DisplayStats& d) { return d.engine() == "cuda"; }
+
+  Drilled faulted, unfaulted;
+  int commits = 0;
+};
+
+void Print(const char* what, std::vector<double> ms) {
+  ASSERT_FALSE(ms.empty());
+  std::sort(ms.begin(), ms.end());
+  std::printf("%s: p50 %.1f ms, max %.1f ms, of %zu\n", what, ms[(ms.size() - 1) / 2], ms.back(),
+              ms.size());
+}
+
+TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
+  int faults = 0;
+  ASSERT_TRUE(absl::SimpleAtoi(FromEnvironment("VOXELD_DRILL_FAULTS", "6"), &faults));
+  const std::vector<std::string> kinds =
+      absl::StrSplit(FromEnvironment("VOXELD_DRILL_KINDS", "crash,dataloss,exit,hang"), ',');
+  Pair pair;
+  std::map<std::string, std::vector<double>> takeovers;  // ms
+  std::vector<double> returns;
+  for (int i = 0; i < kCommitsBetween; ++i) pair.Commit();
+  pair.CommitUntil(Pair::OnCuda);
+  for (int fault = 0; fault < faults && !::testing::Test::HasFailure(); ++fault) {
+    const std::string kind = kinds[static_cast<size_t>(fault) % kinds.size()];
+    pair.faulted.Fault(kind);
+    pair.Commit();
+    ASSERT_TRUE(pair.faulted.faulted());
+    // All displays share the process, so all have lost their engine.
+    pair.CommitUntil([&](const v1::DisplayStats& d) {
+      return d.engine_faults() == static_cast<uint64_t>(fault) + 1;
+    });
+    const v1::Stats lost = pair.faulted.Stats();
+    for (const v1::DisplayStats& d : lost.displays()) {
+      takeovers[kind].push_back(static_cast<double>(d.takeover_last_ns()) / 1e6);
+    }
+    pair.CommitUntil(Pair::OnCuda);
+    const v1::Stats back = pair.faulted.Stats();
+    for (const v1::DisplayStats& d : back.displays()) {
+      returns.push_back(static_cast<double>(d.return_last_ns()) / 1e6);
+    }
+    for (int i = 0; i < kCommitsBetween; ++i) pair.Commit();
+  }
+
+  const v1::Stats stats = pair.faulted.Stats();
+  for (const v1::DisplayStats& d : stats.displays()) {
+    EXPECT_EQ(d.volumes_lost(), 0u) << d.name();
+    EXPECT_EQ(d.commits_lost(), 0u) << d.name();
+    EXPECT_EQ(d.commits_presented(), static_cast<uint64_t>(pair.commits)) << d.name();
+    EXPECT_EQ(d.engine_returns(), static_cast<uint64_t>(faults)) << d.name();
+    EXPECT_EQ(d.engine_mismatches(), 0u) << d.name();
+    EXPECT_EQ(d.pinned_entities_size(), 0) << d.name();
+  }
+  EXPECT_EQ(stats.sessions(), 1u);
+  EXPECT_TRUE(pair.faulted.client().issues.empty());
+  std::printf("%d faults, %d commits on %zu displays, every volume as without\n", faults,
+              pair.commits, std::size(kDisplays));
+  for (const auto& [kind, ms] : takeovers) Print(absl::StrCat("takeover, ", kind).c_str(), ms);
+  Print("return", returns);
+}
+
+TEST(FaultDrill, AnEntityThatFaultsIsDrawnByTheCpuUntilItGoes) {
+  Pair pair("BADBAD");
+  for (int i = 0; i < kCommitsBetween; ++i) pair.Commit();
+  pair.CommitUntil(Pair::OnCuda);
+  v1::StreamRequest bad = SphereIn("a", "the bad one", 0.7);
+  bad.mutable_upsert()->mutable_entity()->mutable_primitive()->mutable_color()->set_rgb(0xBADBAD);
+  pair.Send(bad);
+  pair.CommitUntil([](const v1::DisplayStats& d) {
+    return d.engine() == "cuda" && d.pinned_entities_size() == 1;
+  });
+  const v1::Stats pinned = pair.faulted.Stats();
+  for (const v1::DisplayStats& d : pinned.displays()) {
+    EXPECT_THAT(d.pinned_entities(0), ::testing::HasSubstr("\"the bad one\" of layer \"a\""));
+    EXPECT_THAT(d.engine_degraded(), ::testing::Not(::testing::IsEmpty()));
+    EXPECT_EQ(d.volumes_lost() + d.commits_lost(), 0u);
+    std::printf("%s: found after %.0f ms, %d faults\n", d.name().c_str(),
+                static_cast<double>(d.return_last_ns()) / 1e6, static_cast<int>(d.engine_faults()));
+  }
+  for (int i = 0; i < kCommitsBetween; ++i) pair.Commit();
+  v1::StreamRequest gone;
+  gone.mutable_delete_()->set_layer("a");
+  gone.mutable_delete_()->set_id("the bad one");
+  pair.Send(gone);
+  pair.CommitUntil([](const v1::DisplayStats& d) {
+    return d.engine() == "cuda" && d.pinned_entities_size() == 0 && d.engine_degraded().empty();
+  });
+}
+
+}  // namespace
+}  // namespace voxeld::e2e
