@@ -30,11 +30,13 @@ struct DisplayFigures {
   std::string engine_degraded;
   bool volume_held = false;  // the engine was lost, and nothing has been drawn since
   uint64_t engine_faults = 0, engine_returns = 0;
-  uint64_t engine_mismatches = 0;  // it came back with other bytes than the CPU's, and was sent away
+  uint64_t engine_mismatches =
+      0;  // it came back with other bytes than the CPU's, and was sent away
   // From the beginning of the volume that the loss interrupted to the CPU's in its place; from the
   // loss to the engine's return. 0: not yet.
   int64_t takeover_last_ns = 0, takeover_max_ns = 0, return_last_ns = 0, return_max_ns = 0;
-  std::vector<std::string> pinned_entities;  // drawn by the CPU: they made the GPU fault
+  int64_t redraw_last_ns = 0, redraw_max_ns = 0;  // of the takeover, from when the loss was known
+  std::vector<std::string> pinned_entities;       // drawn by the CPU: they made the GPU fault
   // commits_owed = presented + unchanged + superseded + lost + not_shown + pending, always.
   uint64_t commits_owed = 0, commits_presented = 0, commits_unchanged = 0, commits_superseded = 0,
            commits_lost = 0, commits_not_shown = 0, commits_pending = 0;

@@ -182,10 +182,12 @@ void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
   }
   MetricFamily* times = out->New("voxeld_display_engine_recovery_seconds", MetricType::Gauge,
                                  "Of the last loss of the engine: until the CPU had drawn in its "
-                                 "place, and until it came back; 0: not yet");
+                                 "place (redraw: from when the loss was known), and until it came "
+                                 "back; 0: not yet");
   for (const DisplayFigures& display : displays) {
-    for (const auto& [what, ns] :
-         {std::pair("takeover", display.takeover_last_ns), {"return", display.return_last_ns}}) {
+    for (const auto& [what, ns] : {std::pair("takeover", display.takeover_last_ns),
+                                   {"redraw", display.redraw_last_ns},
+                                   {"return", display.return_last_ns}}) {
       Add(times, {{"display", display.name}, {"what", what}},
           static_cast<double>(ns) / kNsPerSecond);
     }

@@ -94,6 +94,8 @@ void EngineCare::OnDrawn(Drawn drawn) {
   if (!holding_since_.has_value()) return;
   takeover_last_ns_ = clock_.Now() - *holding_since_;
   takeover_max_ns_ = std::max(takeover_max_ns_, takeover_last_ns_);
+  redraw_last_ns_ = clock_.Now() - lost_at_;
+  redraw_max_ns_ = std::max(redraw_max_ns_, redraw_last_ns_);
   holding_since_.reset();
   Tell(EngineEvent::What::kTookOver, why_, takeover_last_ns_);
 }
@@ -313,6 +315,8 @@ void EngineCare::AddTo(DisplayFigures& figures) const {
   figures.engine_mismatches = mismatches_;
   figures.takeover_last_ns = takeover_last_ns_;
   figures.takeover_max_ns = takeover_max_ns_;
+  figures.redraw_last_ns = redraw_last_ns_;
+  figures.redraw_max_ns = redraw_max_ns_;
   figures.return_last_ns = return_last_ns_;
   figures.return_max_ns = return_max_ns_;
   for (const Pin& pin : pins_) {

@@ -24,6 +24,8 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_engine_mismatches(in.engine_mismatches);
   out->set_takeover_last_ns(in.takeover_last_ns);
   out->set_takeover_max_ns(in.takeover_max_ns);
+  out->set_redraw_last_ns(in.redraw_last_ns);
+  out->set_redraw_max_ns(in.redraw_max_ns);
   out->set_return_last_ns(in.return_last_ns);
   out->set_return_max_ns(in.return_max_ns);
   for (const std::string& entity : in.pinned_entities) out->add_pinned_entities(entity);

@@ -219,7 +219,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
       absl::StrSplit(FromEnvironment("VOXELD_DRILL_KINDS", "crash,dataloss,exit,hang"), ',');
   Pair pair;
   std::map<std::string, std::vector<double>> takeovers;  // ms
-  std::vector<double> returns;
+  std::vector<double> redraws, returns;
   for (int i = 0; i < kCommitsBetween; ++i) pair.Commit();
   pair.CommitUntil(Pair::OnCuda);
   for (int fault = 0; fault < faults && !::testing::Test::HasFailure(); ++fault) {
@@ -234,6 +234,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
     const v1::Stats lost = pair.faulted.Stats();
     for (const v1::DisplayStats& d : lost.displays()) {
       takeovers[kind].push_back(static_cast<double>(d.takeover_last_ns()) / 1e6);
+      redraws.push_back(static_cast<double>(d.redraw_last_ns()) / 1e6);
     }
     pair.CommitUntil(Pair::OnCuda);
     const v1::Stats back = pair.faulted.Stats();
@@ -257,6 +258,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
   std::printf("%d faults, %d commits on %zu displays, every volume as without\n", faults,
               pair.commits, std::size(kDisplays));
   for (const auto& [kind, ms] : takeovers) Print(absl::StrCat("takeover, ", kind).c_str(), ms);
+  Print("of which the CPU's drawing, once the loss was known", redraws);
   Print("return", returns);
 }
 

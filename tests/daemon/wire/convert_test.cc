@@ -237,7 +237,8 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.assemble = {49, 50, 51, 52}, d.slice = {53, 54, 55, 56};
   d.engine_degraded = "w", d.volume_held = true, d.engine_faults = 57, d.engine_returns = 58;
   d.engine_mismatches = 59, d.takeover_last_ns = 60, d.takeover_max_ns = 61;
-  d.return_last_ns = 62, d.return_max_ns = 63, d.pinned_entities = {"p"};
+  d.redraw_last_ns = 64, d.redraw_max_ns = 65, d.return_last_ns = 62, d.return_max_ns = 63,
+  d.pinned_entities = {"p"};
   v1::Stats message;
   Encode(stats, &message);
   ExpectAllDifferent(message);

@@ -53,7 +53,7 @@ TEST(Crc32c, KnownAnswers) {
 TEST(Crc32c, BothWaysAreEqualInAnyPieces) {
   std::mt19937 random(1);
   for (int round = 0; round < 200; ++round) {
-    Bytes bytes(random() % 300);
+    Bytes bytes(random() % (round % 2 == 0 ? 300 : 20000));
     for (std::byte& b : bytes) b = static_cast<std::byte>(random());
     const size_t cut = bytes.empty() ? 0 : random() % bytes.size();
     const std::span<const std::byte> all(bytes);
