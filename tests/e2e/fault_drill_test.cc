@@ -96,8 +96,8 @@ class Drilled {
     process_ = std::make_unique<Process>(
         std::vector<std::string>{VoxeldBinary(), "--config", folder_.File("voxeld.toml", config),
                                  "--listen", target_, "--http", "off", "--log-format", "json",
-                                 "--display", "stack=simulated,size=48x48x24,rate=100", "--display",
-                                 "rotor=simulated,geometry=rotor,slices=60,size=48x32,rate=100"},
+                                 "--display", "stack=simulated,size=48x48x24,rate=240", "--display",
+                                 "rotor=simulated,geometry=rotor,slices=60,size=48x32,rate=240"},
         environment);
     const std::optional<std::string> ready = process_->ReadLineWith("\"event\":\"ready\"");
     EXPECT_TRUE(ready.has_value()) << process_->output();
