@@ -115,7 +115,9 @@ class EngineWatch {
     }
     sync::MutexLock lock(mutex_);
     if (event.what == EngineEvent::What::kHolding) held_.insert(event.display);
-    if (event.what == EngineEvent::What::kTookOver) held_.erase(event.display);
+    if (event.what == EngineEvent::What::kTookOver || event.what == EngineEvent::What::kNotHeld) {
+      held_.erase(event.display);
+    }
     if (server_ != nullptr) server_->SetServing(held_.empty());
   }
 

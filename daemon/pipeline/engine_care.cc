@@ -1,6 +1,7 @@
 #include "daemon/pipeline/engine_care.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -16,6 +17,7 @@ constexpr uint64_t kWellFrames = 50;
 // From when on the last volume counts as held.
 constexpr sync::TimeNs kHolding = sync::kSecond / 4;
 constexpr size_t kMostPins = 16;
+constexpr size_t kBytesPerBreath = size_t{4} << 20;
 constexpr uint64_t kEverything = UINT64_MAX;
 
 std::string NameOf(const EntityPlace& place) {
@@ -33,6 +35,8 @@ const char* EngineEventName(EngineEvent::What what) {
       return "the last volume is held";
     case EngineEvent::What::kTookOver:
       return "the CPU has taken over";
+    case EngineEvent::What::kNotHeld:
+      return "no volume is held: the display does not show";
     case EngineEvent::What::kFaulted:
       return "engine faulted again";
     case EngineEvent::What::kPinned:
@@ -84,6 +88,11 @@ void EngineCare::OnLost(const absl::Status& why, sync::TimeNs since) {
   next_try_ = now + pause_;
   pause_ = std::min(2 * pause_, kLongestPause);
   Tell(EngineEvent::What::kLost, why_);
+}
+
+void EngineCare::OnHidden() {
+  if (holding_since_.has_value() && holding_told_) Tell(EngineEvent::What::kNotHeld, why_);
+  holding_since_.reset();
 }
 
 void EngineCare::OnFrame() { ++frames_since_return_; }
@@ -167,10 +176,10 @@ absl::Status EngineCare::Begin(Attempt& attempt) {
   gpu::DeltaWriter writer(block->bytes());
   attempt.scene->Write(writer);
   engine.Apply(*std::move(block), size, Completion(&EngineCare::OnCall));
-  attempt.frame = std::make_unique<display::SliceFrame>();
-  attempt.frame->bytes.resize(attempt.drawn.frame->bytes.size());
-  attempt.frame->changed_in.resize(attempt.drawn.frame->changed_in.size());
-  engine.SubmitFrame({.frame = 1}, {attempt.frame->bytes, attempt.frame->changed_in},
+  const size_t bytes = attempt.drawn.frame->bytes.size();
+  attempt.bytes = std::make_unique_for_overwrite<std::byte[]>(bytes);
+  attempt.changed_in.resize(attempt.drawn.frame->changed_in.size());
+  engine.SubmitFrame({.frame = 1}, {{attempt.bytes.get(), bytes}, attempt.changed_in},
                      Completion(&EngineCare::OnResult));
   return absl::OkStatus();
 }
@@ -182,6 +191,16 @@ std::function<void(Result)> EngineCare::Completion(void (EngineCare::*method)(co
       if (alive.lock() != nullptr) (this->*method)(result);
     });
   };
+}
+
+bool EngineCare::SameBytes(const Attempt& attempt) const {
+  const std::vector<std::byte>& want = attempt.drawn.frame->bytes;
+  for (size_t at = 0; at < want.size(); at += kBytesPerBreath) {
+    const size_t size = std::min(kBytesPerBreath, want.size() - at);
+    if (std::memcmp(attempt.bytes.get() + at, want.data() + at, size) != 0) return false;
+    if (options_.breathe) options_.breathe();
+  }
+  return true;
 }
 
 void EngineCare::OnCall(const absl::Status& status) {
@@ -201,7 +220,7 @@ void EngineCare::OnResult(const absl::StatusOr<gpu::FrameResult>& result) {
     if (!std::exchange(search_->nothing_is_well, true)) search_->faults = seen.least - 1;
     return SearchOn();
   }
-  if (attempt->frame->bytes != attempt->drawn.frame->bytes) {
+  if (!SameBytes(*attempt)) {
     ++mismatches_;
     return StayAway("it draws other bytes than the CPU does");
   }

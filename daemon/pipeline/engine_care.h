@@ -67,6 +67,8 @@ class EngineCare {
 
   // The wanted engine is lost; what the pipeline was drawing, if anything, was begun at `since`.
   void OnLost(const absl::Status& why, sync::TimeNs since);
+  // The display does not show: nobody waits for a volume.
+  void OnHidden();
   bool away() const { return phase_ != Phase::kThere; }
   // The wanted engine has drawn a frame.
   void OnFrame();
@@ -111,7 +113,8 @@ class EngineCare {
     std::shared_ptr<Seen> seen;
     Made made;
     std::unique_ptr<EngineScene> scene;
-    std::unique_ptr<display::SliceFrame> frame;
+    std::unique_ptr<std::byte[]> bytes;  // as many as the drawn frame's
+    std::vector<uint64_t> changed_in;
     bool there = false;   // a call has succeeded
     absl::Status status;  // of what went before the frame
   };
@@ -128,6 +131,7 @@ class EngineCare {
   EngineScene::Choose Chooser(std::shared_ptr<Seen> seen);
   void PruneBy(const Snapshot& scene);
   void Keep(std::optional<Drawn> drawn);
+  bool SameBytes(const Attempt& attempt) const;
   void Tell(EngineEvent::What what, std::string text, sync::TimeNs took = 0) const;
 
   const Options options_;

@@ -12,6 +12,7 @@ struct EngineEvent {
     kLost,      // the CPU takes over
     kHolding,   // the CPU has not drawn yet: the last volume is held
     kTookOver,  // after `took_ns`
+    kNotHeld,   // nothing is held any more: the display does not show
     kFaulted,   // it was tried, and faulted again
     kPinned,    // an entity is drawn by the CPU from now on
     kAway,      // it stays away for now

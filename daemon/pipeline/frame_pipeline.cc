@@ -332,6 +332,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs sin
     Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
     pool_.Forget(last_volume_);
     if (care_ != nullptr && !care_->away()) care_->OnLost(status, since);
+    if (care_ != nullptr && !showing()) care_->OnHidden();
     // Whatever it was, the next is on the CPU, in this process: made at once, with the same bytes.
     takeover_ = absl::StrCat("took over from ", gpu::EngineKindName(engine_info_.kind), ": ",
                              status.message());
@@ -372,6 +373,7 @@ void FramePipeline::OnState(display::DisplayState state, const std::string&) {
     if (show_again_) show_again_at_ = std::min(show_again_at_, clock_.Now());
     return;
   }
+  if (care_ != nullptr) care_->OnHidden();
   riders_.LoseUnsubmitted(WhyNotShowing(), true);
 }
 

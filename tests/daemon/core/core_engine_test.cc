@@ -283,6 +283,20 @@ TEST_F(CoreEngine, WhileTheCpuHasNotDrawnTheLastVolumeIsHeldAndCommitsWait) {
   EXPECT_EQ(Outcome(), Kind::kPresented);
 }
 
+TEST_F(CoreEngine, OfADisplayThatDoesNotShowHoldsNothing) {
+  Draw("one", -0.5f);
+  script_->faults = 1;
+  script_->slow_cpu = true;
+  Draw("two", 0.5f);
+  Advance(sync::kSecond / 2);
+  EXPECT_TRUE(Figures().volume_held);
+  DisplayUpdate blank;
+  blank.blank = true;
+  ASSERT_TRUE(sim_->Update(blank).ok());
+  EXPECT_FALSE(Figures().volume_held);
+  EXPECT_THAT(Events(), ElementsAre(What::kLost, What::kHolding, What::kNotHeld));
+}
+
 TEST_F(CoreEngine, OfOneDisplayDoesNotTouchTheOthers) {
   Begin(2);
   Draw("one", -0.5f);
