@@ -153,6 +153,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
             clock);
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),
+                                  .device = static_cast<int>(config.engine.device),
                                   .in_worker = config.engine.in_worker,
                                   .worker = config.engine.worker,
                                   .workers = std::make_shared<gpu::WorkerPool>(),

@@ -44,6 +44,7 @@ struct EngineConfig {
   gpu::EngineKind kind = gpu::EngineKind::kAuto;
   uint32_t threads = 0;  // 0: one a core
   uint64_t staging_limit_bytes = uint64_t{4} << 30;
+  uint32_t device = 0;  // which GPU
   // A CUDA engine always has a process of its own; the CPU's may have one too.
   bool in_worker = false;
   std::string worker;  // the program of that process; empty: voxeld-engine

@@ -43,6 +43,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Engine("kind", config.engine.kind);
   visitor.Integer("threads", config.engine.threads, 0, 1024);
   visitor.Integer("staging_limit_bytes", config.engine.staging_limit_bytes, 1 << 20, 1024 * kGiB);
+  visitor.Integer("device", config.engine.device, 0, 1023);
   visitor.Flag("in_worker", config.engine.in_worker);
   visitor.Text("worker", config.engine.worker);
   visitor.Integer("worker_deadline_ns", config.engine.worker_deadline_ns, kSecond / 100, kHour);

@@ -26,9 +26,8 @@ struct DisplayFigures {
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice;
-  // Of an engine in a process of its own. Empty: it is as was asked for; else what is not, and why.
-  std::string engine_degraded;
-  bool volume_held = false;  // the engine was lost, and nothing has been drawn since
+  std::string engine_degraded;  // empty: the engine is as was asked for; else what is not, and why
+  bool volume_held = false;     // the engine was lost or failed, and nothing has been drawn since
   uint64_t engine_faults = 0, engine_returns = 0;
   uint64_t engine_mismatches =
       0;  // it came back with other bytes than the CPU's, and was sent away

@@ -20,6 +20,7 @@ Response Unavailable(const absl::Status& status) {
 Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
                         bool draining) {
   Json reasons = Json::array();
+  bool held = false;
   if (draining) reasons.push_back({{"what", "shutting down"}});
   for (const DisplayDescription& display : displays) {
     if (display.state != display::DisplayState::kLost &&
@@ -31,22 +32,24 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
                        {"why", display.state_reason}});
   }
   for (const DisplayFigures& figures : stats.displays) {
-    const char* what = figures.engine.empty() ? "no engine" : "the last volume is held";
-    if (!figures.engine.empty() && !figures.volume_held) continue;
-    reasons.push_back({{"display", figures.name}, {"what", what}, {"why", figures.engine_reason}});
+    if (!figures.engine.empty()) continue;
+    reasons.push_back(
+        {{"display", figures.name}, {"what", "no engine"}, {"why", figures.engine_reason}});
   }
-  const bool serves = reasons.empty();
+  const bool fails = !reasons.empty();
   for (const DisplayFigures& figures : stats.displays) {
+    held = held || figures.volume_held;
     if (figures.engine_degraded.empty()) continue;
-    Json reason = {{"display", figures.name},
-                   {"what", "the engine is degraded"},
-                   {"why", figures.engine_degraded}};
+    Json reason = {
+        {"display", figures.name},
+        {"what", figures.volume_held ? "the last volume is held" : "the engine is degraded"},
+        {"why", figures.engine_degraded}};
     if (!figures.pinned_entities.empty()) reason["pinned"] = figures.pinned_entities;
     reasons.push_back(std::move(reason));
   }
-  const char* status = !serves ? "failing" : reasons.empty() ? "ok" : "degraded";
+  const char* status = fails ? "failing" : reasons.empty() ? "ok" : "degraded";
   const Json answer = {{"status", status}, {"reasons", std::move(reasons)}};
-  return {serves ? 200u : 503u, "application/json",
+  return {fails || held ? 503u : 200u, "application/json",
           answer.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
 }
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gpu/delta.h"
+#include "gpu/worker/worker_engine.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -67,15 +68,19 @@ void EngineCare::Tell(EngineEvent::What what, std::string text, sync::TimeNs too
 }
 
 void EngineCare::Keep(std::optional<Drawn> drawn) {
-  if (drawn_.has_value() && options_.retire) options_.retire(std::move(drawn_->scene));
+  if (drawn_.has_value()) Retire(std::move(drawn_->scene));
   drawn_ = std::move(drawn);
+}
+
+void EngineCare::Retire(std::shared_ptr<const void> what) const {
+  if (what != nullptr && options_.retire) options_.retire(std::move(what));
 }
 
 // ------------------------------------------------------------------------ what the pipeline tells
 
 void EngineCare::OnLost(const absl::Status& why, sync::TimeNs since) {
   const sync::TimeNs now = clock_.Now();
-  ++faults_;
+  if (absl::IsDataLoss(why)) ++faults_;
   if (frames_since_return_ >= kWellFrames) pause_ = kFirstPause;
   why_ = std::string(why.message());
   away_because_.clear();
@@ -88,6 +93,13 @@ void EngineCare::OnLost(const absl::Status& why, sync::TimeNs since) {
   next_try_ = now + pause_;
   pause_ = std::min(2 * pause_, kLongestPause);
   Tell(EngineEvent::What::kLost, why_);
+}
+
+void EngineCare::OnEngineLost(uint64_t id, const absl::Status& why) {
+  if (!ready() || attempt_->made.id != id) return;
+  Retire(std::move(attempt_));
+  whole_passed_ = false;
+  StayAway(std::string(why.message()));
 }
 
 void EngineCare::OnHidden() {
@@ -122,7 +134,6 @@ sync::TimeNs EngineCare::Step() {
   }
   if (phase_ != Phase::kWaiting || !drawn_.has_value()) return next;
   if (now < next_try_) return std::min(next, next_try_);
-  PruneBy(*drawn_->scene);
   if (search_.has_value()) {
     SearchOn();
   } else {
@@ -133,7 +144,7 @@ sync::TimeNs EngineCare::Step() {
 
 EngineCare::Returned EngineCare::Take() {
   Returned returned{std::move(attempt_->made), std::move(attempt_->scene)};
-  attempt_ = nullptr;
+  Retire(std::move(attempt_));
   Keep(std::nullopt);
   phase_ = Phase::kThere;
   frames_since_return_ = 0;
@@ -148,15 +159,20 @@ EngineCare::Returned EngineCare::Take() {
 
 void EngineCare::Try(Test test, Drawn drawn, uint64_t left_out) {
   phase_ = Phase::kTrying;
-  attempt_ = std::make_unique<Attempt>();
+  attempt_ = std::make_shared<Attempt>();
   attempt_->test = test;
   attempt_->drawn = std::move(drawn);
   attempt_->seen = std::make_shared<Seen>();
   attempt_->seen->left_out = left_out;
   alive_ = std::make_shared<bool>(true);
   if (const absl::Status status = Begin(*attempt_); !status.ok()) {
-    attempt_ = nullptr;
-    StayAway(std::string(status.message()));
+    alive_ = nullptr;
+    Retire(std::move(attempt_));
+    return StayAway(std::string(status.message()));
+  }
+  // What was to blame is not in this scene.
+  if (test == Test::kWhole) {
+    std::erase_if(pins_, [](const Pin& pin) { return !pin.place.has_value(); });
   }
 }
 
@@ -210,12 +226,19 @@ void EngineCare::OnCall(const absl::Status& status) {
 
 void EngineCare::OnResult(const absl::StatusOr<gpu::FrameResult>& result) {
   alive_ = nullptr;
-  std::unique_ptr<Attempt> attempt = std::move(attempt_);
+  const std::shared_ptr<Attempt> attempt = std::exchange(attempt_, nullptr);
+  Retire(attempt);
   const absl::Status status = attempt->status.ok() ? result.status() : attempt->status;
-  if (absl::IsDataLoss(status) && attempt->there) return OnFault(*attempt, status);
+  if (absl::IsDataLoss(status) && attempt->there && !gpu::IsLate(status)) {
+    return OnFault(*attempt, status);
+  }
   if (!status.ok()) return StayAway(std::string(status.message()));
   if (attempt->test == Test::kSearch) {
     const Seen& seen = *attempt->seen;
+    if (search_->well == search_->faults + 1 && search_->nothing_is_well) {
+      search_.reset();
+      return StayAway("the scene faulted, but does so no more");
+    }
     search_->well = seen.below;
     if (!std::exchange(search_->nothing_is_well, true)) search_->faults = seen.least - 1;
     return SearchOn();
@@ -226,9 +249,9 @@ void EngineCare::OnResult(const absl::StatusOr<gpu::FrameResult>& result) {
   }
   if (attempt->test == Test::kWhole && options_.engine.workers != nullptr) {
     whole_passed_ = true;
-    return Try(Test::kShared, *drawn_, 0);
+    return Try(Test::kShared, attempt->drawn, 0);
   }
-  attempt_ = std::move(attempt);
+  attempt_ = attempt;
   phase_ = Phase::kReady;
 }
 
@@ -251,6 +274,7 @@ void EngineCare::OnFault(const Attempt& attempt, const absl::Status& why) {
     pause_ = kLongestPause;
     return StayAway(absl::StrCat("the GPU faults even when it draws nothing: ", why.message()));
   }
+  search_->fault_seen = true;
   search_->faults = attempt.seen->above - 1;
   SearchOn();
 }
@@ -262,6 +286,8 @@ void EngineCare::SearchOn() {
     return Try(Test::kSearch, search.drawn, search.faults + (search.well - search.faults) / 2);
   }
   const bool found = search.well == search.faults + 1;
+  // That the scene faults with it may still be hearsay.
+  if (found && !search.fault_seen) return Try(Test::kSearch, search.drawn, search.faults);
   Drawn drawn = std::move(search_->drawn);
   const uint64_t number = search.well;
   search_.reset();
@@ -288,9 +314,9 @@ EngineScene::Choose EngineCare::Chooser(std::shared_ptr<Seen> seen) {
   return [this, seen = std::move(seen)](const OwnedName& layer, const std::string& id,
                                         const Entity& entity) {
     for (Pin& pin : pins_) {
-      if (entity.number != pin.number && (!pin.place || *pin.place != EntityPlace{layer, id})) {
-        continue;
-      }
+      const bool same = entity.number == pin.number ||
+                        (pin.place.has_value() && pin.place->id == id && pin.place->layer == layer);
+      if (!same) continue;
       if (!pin.place.has_value()) {
         pin.place = EntityPlace{layer, id};
         Tell(EngineEvent::What::kPinned, NameOf(*pin.place));
@@ -308,13 +334,12 @@ EngineScene::Choose EngineCare::Chooser(std::shared_ptr<Seen> seen) {
   };
 }
 
-void EngineCare::Prune(const Snapshot& newest) {
-  if (!away()) PruneBy(newest);
-}
-
-void EngineCare::PruneBy(const Snapshot& scene) {
+void EngineCare::Prune(const Snapshot& newest, const Snapshot* pattern) {
   std::erase_if(pins_, [&](const Pin& pin) {
-    return pin.place.has_value() && scene.FindEntity(pin.place->layer, pin.place->id) == nullptr;
+    if (!pin.place.has_value()) return false;
+    const auto [layer, id] = *pin.place;
+    return newest.FindEntity(layer, id) == nullptr &&
+           (pattern == nullptr || pattern->FindEntity(layer, id) == nullptr);
   });
 }
 

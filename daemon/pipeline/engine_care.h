@@ -6,10 +6,12 @@
 // process that nobody else uses:
 //
 //   whole    it draws, whole, the scene that was drawn last. The bytes match: on to `shared`. They
-//            do not: it stays away, longer. It faults: the scene has faulted twice, on to `search`.
+//            do not, or it is late: it stays away, longer. It faults: the scene has faulted twice, on
+//            to `search`.
 //   search   by halves, with entities left out: the newest without which the scene does not fault
-//            is to blame and pinned, that is, its voxels are covered on the CPU from then on; then
-//            `whole` again. If nothing at all faults too, the GPU is to blame: it stays away.
+//            is to blame and, if the scene does fault with it, pinned: its voxels are covered on the
+//            CPU from then on. Then `whole` again. If nothing at all faults too, the GPU is to blame: it
+//            stays away.
 //   shared   the same as `whole`, in the process that the GPU's engines share. Then it is ready, and
 //            the pipeline takes it with what it holds.
 //
@@ -65,8 +67,11 @@ class EngineCare {
   explicit EngineCare(Options options);
   ~EngineCare();
 
-  // The wanted engine is lost; what the pipeline was drawing, if anything, was begun at `since`.
+  // The wanted engine is lost (DataLoss), or has no memory for the scene, which is no fault; what
+  // the pipeline was drawing, if anything, was begun at `since`.
   void OnLost(const absl::Status& why, sync::TimeNs since);
+  // An engine is lost that may be the one that is ready.
+  void OnEngineLost(uint64_t id, const absl::Status& why);
   // The display does not show: nobody waits for a volume.
   void OnHidden();
   bool away() const { return phase_ != Phase::kThere; }
@@ -80,8 +85,9 @@ class EngineCare {
   // Once, when ready().
   Returned Take();
 
-  // Pins of entities that have gone are let go.
-  void Prune(const Snapshot& newest);
+  // Pins of entities that have gone from the newest scene and from the pattern, if there is one, are
+  // let go.
+  void Prune(const Snapshot& newest, const Snapshot* pattern);
   // Neither tried nor taken any more.
   void Stop();
 
@@ -98,6 +104,7 @@ class EngineCare {
   struct Search {
     Drawn drawn;
     bool nothing_is_well = false;  // without any entity it does not fault
+    bool fault_seen = false;       // with `faults` it has faulted
     uint64_t faults = 0, well = 0;
   };
   // Numbers of the entities that are not pinned, as a plan came by them.
@@ -111,12 +118,12 @@ class EngineCare {
     Test test = Test::kWhole;
     Drawn drawn;
     std::shared_ptr<Seen> seen;
-    Made made;
     std::unique_ptr<EngineScene> scene;
     std::unique_ptr<std::byte[]> bytes;  // as many as the drawn frame's
     std::vector<uint64_t> changed_in;
     bool there = false;   // a call has succeeded
     absl::Status status;  // of what went before the frame
+    Made made;            // last: its end comes before that of what it writes into
   };
 
   void Try(Test test, Drawn drawn, uint64_t left_out);
@@ -129,8 +136,8 @@ class EngineCare {
   void SearchOn();
   void StayAway(const std::string& why);
   EngineScene::Choose Chooser(std::shared_ptr<Seen> seen);
-  void PruneBy(const Snapshot& scene);
   void Keep(std::optional<Drawn> drawn);
+  void Retire(std::shared_ptr<const void> what) const;
   bool SameBytes(const Attempt& attempt) const;
   void Tell(EngineEvent::What what, std::string text, sync::TimeNs took = 0) const;
 
@@ -146,7 +153,7 @@ class EngineCare {
   std::optional<Drawn> drawn_;
   std::optional<Search> search_;
   bool whole_passed_ = false;
-  std::unique_ptr<Attempt> attempt_;
+  std::shared_ptr<Attempt> attempt_;
   std::shared_ptr<bool> alive_;  // of the attempt
   std::vector<Pin> pins_;
 

@@ -163,7 +163,7 @@ bool FramePipeline::HaveEngine() {
 
 void FramePipeline::TakeReturned() {
   Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
-  Retire(scene_->held());
+  Retire(std::shared_ptr<EngineScene>(std::move(scene_)));
   EngineCare::Returned returned = care_->Take();
   made_ = std::move(returned.made);
   scene_ = std::move(returned.scene);
@@ -192,7 +192,7 @@ bool FramePipeline::MaybeDraw() {
   if (!changed && !(show_again_ && clock_.Now() >= show_again_at_)) return false;
 
   const SnapshotPtr newest = newest_;
-  if (care_ != nullptr) care_->Prune(*newest);
+  if (care_ != nullptr) care_->Prune(*newest, pattern_scene_.get());
   drawn_snapshot_ = newest->number;
   settings_changed_ = false;
   riders_.Draw();
@@ -268,6 +268,7 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   if (!result.ok()) return OnEngineFailure(result.status(), drawing.began);
 
   lost_engine_ = false;
+  refused_.clear();
   drawing.lease.frame->volume = drawing.volume;
   ++volumes_drawn_;
   lit_voxels_ = result->lit_voxels;
@@ -321,14 +322,18 @@ void FramePipeline::OnEngineLost(uint64_t id, const absl::Status& status) {
   // A call under way has told it already, and there is another engine.
   if (id == made_.id && made_.engine != nullptr && !drawing_.has_value()) {
     OnEngineFailure(status, clock_.Now());
+  } else if (care_ != nullptr) {
+    care_->OnEngineLost(id, status);
   }
 }
 
 void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs since) {
-  Retire(scene_->held());
-  scene_->Forget();
+  Retire(std::shared_ptr<EngineScene>(std::move(scene_)));
+  scene_ = std::make_unique<EngineScene>([this] { Breathe(); });
   target_stale_ = true;
-  if (absl::IsDataLoss(status)) {
+  // A device that has no memory for the scene gives way too.
+  const bool gives_way = absl::IsResourceExhausted(status) && care_ != nullptr && !care_->away();
+  if (absl::IsDataLoss(status) || gives_way) {
     Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
     pool_.Forget(last_volume_);
     if (care_ != nullptr && !care_->away()) care_->OnLost(status, since);
@@ -343,6 +348,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs sin
       return ShowAgain(0);
     }
   }
+  refused_ = std::string(status.message());
   riders_.LoseUnsubmitted(absl::StrCat("the engine failed: ", status.ToString()), false);
   ShowAgain(kEngineRetryDelay);
 }

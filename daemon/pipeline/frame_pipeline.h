@@ -190,6 +190,7 @@ class FramePipeline final : private display::Display::Listener {
   bool settings_changed_ = false;  // view or pattern, since a draw was last begun
   uint64_t settings_ = 0;          // changes of them, counted
   bool lost_engine_ = false;       // and no frame has come out since
+  std::string refused_;            // why the engine did not draw last time; empty: it did
 
   uint64_t last_volume_ = 0;     // numbered
   uint64_t last_submitted_ = 0;  // handed over

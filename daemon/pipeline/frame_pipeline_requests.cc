@@ -82,7 +82,7 @@ DisplayFigures FramePipeline::Figures() const {
   DisplayFigures figures;
   figures.name = info().name;
   figures.state = display_->state();
-  figures.engine = gpu::EngineKindName(engine_info_.kind);
+  if (made_.engine != nullptr) figures.engine = gpu::EngineKindName(engine_info_.kind);
   figures.engine_device = engine_info_.device;
   figures.engine_reason = engine_info_.reason;
   figures.lit_voxels = lit_voxels_;
@@ -101,6 +101,10 @@ DisplayFigures FramePipeline::Figures() const {
   figures.commit_to_last_byte = commit_to_last_byte_.Summary(now);
   figures.commit_to_presented = commit_to_presented_.Summary(now);
   if (care_ != nullptr) care_->AddTo(figures);
+  if (!refused_.empty()) {
+    figures.engine_degraded = refused_;
+    figures.volume_held = true;
+  }
   figures.assemble = assemble_.Summary(now);
   figures.slice = slice_.Summary(now);
   const RiderBook::Counts& counts = riders_.counts();

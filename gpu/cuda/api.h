@@ -1,5 +1,6 @@
 // The one layer through which CUDA is called: counts the calls, turns their errors into Status, and
-// can make any of them fail.
+// can make any of them fail. (Not through it go the end of things, where an error changes nothing,
+// and the pinning of memory, where it costs speed.)
 //
 //   api.Call("cudaMemcpyAsync", [&] { return cudaMemcpyAsync(…); });
 //

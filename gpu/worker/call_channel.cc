@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -13,15 +12,22 @@
 
 namespace voxeld::gpu {
 
-CallChannel::CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int64_t deadline_ns,
-                         int64_t first_deadline_ns, std::function<void(const absl::Status&)> lost)
+CallChannel::CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int wake,
+                         int64_t deadline_ns, int64_t first_deadline_ns,
+                         std::function<void(const absl::Status&)> lost)
     : deadline_ns_(deadline_ns),
-      wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      wake_(wake),
       process_(std::move(process)),
       socket_(socket),
       lost_(std::move(lost)),
       allowed_ns_(first_deadline_ns) {
   thread_ = std::thread([this] { Run(); });
+}
+
+CallChannel::~CallChannel() {
+  Close();
+  close(socket_);
+  close(wake_);
 }
 
 void CallChannel::Close() {
@@ -32,8 +38,6 @@ void CallChannel::Close() {
   }
   Wake();
   thread_.join();
-  close(socket_);
-  close(wake_);
 }
 
 void CallChannel::Fail(const absl::Status& status) {
@@ -169,21 +173,28 @@ void CallChannel::Run() {
     }
     if (!failed.ok()) return End(failed);
     const sync::TimeNs now = clock_.Now();
-    if (now >= give_up_at) {
-      return End(absl::DataLossError("the worker did not answer in time and was ended"));
-    }
     pollfd waiting[2] = {{socket_, static_cast<short>(POLLIN | (HasOutgoing() ? POLLOUT : 0)), 0},
                          {wake_, POLLIN, 0}};
-    const int64_t wait_ms =
-        give_up_at == sync::kNever ? -1 : (give_up_at - now) / sync::kMillisecond + 1;
+    const int64_t wait_ms = give_up_at == sync::kNever
+                                ? -1
+                                : std::max<int64_t>(0, (give_up_at - now) / sync::kMillisecond + 1);
     poll(waiting, 2, static_cast<int>(std::min<int64_t>(wait_ms, 1 << 30)));
     if ((waiting[1].revents & POLLIN) != 0) {
       uint64_t count = 0;
       [[maybe_unused]] const ssize_t got = read(wake_, &count, sizeof(count));
     }
     absl::Status status;
-    if ((waiting[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0) status = ReceiveOne();
+    const bool answers = (waiting[0].revents & (POLLIN | POLLHUP | POLLERR)) != 0;
+    if (!answers && now >= give_up_at) {
+      absl::Status late = absl::DataLossError("the worker did not answer in time and was ended");
+      late.SetPayload(kLatePayload, absl::Cord());
+      return End(late);
+    }
+    if (answers) status = ReceiveOne();
     if (status.ok()) status = SendSome();
+    // What it said last comes before its end.
+    while (absl::IsUnavailable(status) && ReceiveOne().ok()) {
+    }
     if (!status.ok()) {
       return End(absl::DataLossError(absl::StrCat("the worker was lost: ", status.message())));
     }

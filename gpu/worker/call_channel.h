@@ -18,6 +18,9 @@
 
 namespace voxeld::gpu {
 
+// Marks the DataLoss of a worker that did not answer in time.
+inline constexpr char kLatePayload[] = "voxeld.dev/late";
+
 // Thread-safe.
 class CallChannel {
  public:
@@ -27,11 +30,12 @@ class CallChannel {
 
   // `deadline_ns`: the longest time between answers while any is owed; for the first answer of all
   // `first_deadline_ns`. When it has passed, or the process has ended, that is killed.
-  // `socket`: a connection to `process`, closed at the end. `lost` (may be empty) is called once,
+  // `socket`: a connection to `process`; `wake`: an eventfd that does not block; both are closed at
+  // the end. `lost` (may be empty) is called once,
   // on the channel's thread, with the DataLoss that ends it, after all that was owed is answered.
-  CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int64_t deadline_ns,
+  CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int wake, int64_t deadline_ns,
               int64_t first_deadline_ns, std::function<void(const absl::Status&)> lost);
-  ~CallChannel() { Close(); }
+  ~CallChannel();
   CallChannel(const CallChannel&) = delete;
   CallChannel& operator=(const CallChannel&) = delete;
 
@@ -74,7 +78,7 @@ class CallChannel {
 
   const int64_t deadline_ns_;
   const sync::SystemClock clock_;
-  const int wake_;  // an eventfd
+  const int wake_;
   std::shared_ptr<WorkerProcess> process_;
   const int socket_;
   const std::function<void(const absl::Status&)> lost_;

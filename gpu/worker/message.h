@@ -1,7 +1,7 @@
 // What passes between an engine's owner and its worker: small messages over a pair of
 // SOCK_SEQPACKET sockets, a pair for each engine and one for control. Bulk data lies in segments; messages name them.
 //
-// Both ends are of the same build: kProtocol says so, and a worker of another is refused.
+// Both ends are of the same build: kWorkerProtocol says so, and a worker of another is refused.
 #pragma once
 
 #include <cstddef>

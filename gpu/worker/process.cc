@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <system_error>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
@@ -80,10 +81,14 @@ void WorkerProcess::Kill() {
   if (killed_.exchange(true)) return;
   kill(pid_, SIGKILL);
   // One that hangs in its driver dies when that lets go of it.
-  std::thread([pid = pid_] {
-    while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
-    }
-  }).detach();
+  try {
+    std::thread([pid = pid_] {
+      while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
+      }
+    }).detach();
+  } catch (const std::system_error&) {
+    waitpid(pid_, nullptr, WNOHANG);  // no thread: it may stay a zombie
+  }
 }
 
 bool WorkerProcess::lost() const {

@@ -12,7 +12,12 @@ namespace {
 constexpr size_t kLeast = 64 << 10;
 constexpr uint64_t kMostKept = 512ull << 20;  // given back and not let go
 
-size_t RoundUp(size_t size) { return std::bit_ceil(std::max(size, kLeast)); }
+// In eighths of a power of two: what a segment has is pinned, used or not.
+size_t RoundUp(size_t size) {
+  size = std::max(size, kLeast);
+  const size_t step = std::bit_floor(size) / 8;
+  return (size + step - 1) & ~(step - 1);
+}
 
 }  // namespace
 

@@ -1,11 +1,14 @@
 #include "gpu/worker/worker_engine.h"
 
+#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <climits>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -58,10 +61,10 @@ std::function<void(Message&)> NameBulk(SegmentPool::Lease lease, size_t size) {
 class WorkerEngine final : public Engine {
  public:
   WorkerEngine(const EngineOptions& options, std::string reason,
-               std::shared_ptr<WorkerProcess> process, int socket)
+               std::shared_ptr<WorkerProcess> process, int socket, int wake)
       : options_(options),
         channel_(std::make_shared<CallChannel>(
-            std::move(process), socket, options.worker_deadline_ns,
+            std::move(process), socket, wake, options.worker_deadline_ns,
             options.worker_deadline_ns * kFirstAnswerFactor, options.lost)),
         staging_(options.staging_limit_bytes, ids_, Added(), Dropped()),
         results_(UINT64_MAX, ids_, Added(), Dropped()) {
@@ -296,6 +299,9 @@ class WorkerEngine final : public Engine {
     if (FrameCrc(*layout, from, sent.holds) != done->crc) {
       return absl::DataLossError("a frame was damaged on its way from the worker");
     }
+    if (done->result.frame != request.frame) {
+      return absl::DataLossError("the worker answered with another frame");
+    }
     CopyFrame(*layout, from, buffer, request.buffer_holds);
     sync::MutexLock lock(mutex_);
     if (slot.target == target_) {
@@ -339,6 +345,8 @@ std::filesystem::path RunningProgram() {
 
 }  // namespace
 
+bool IsLate(const absl::Status& status) { return status.GetPayload(kLatePayload).has_value(); }
+
 std::string DefaultWorkerProgram(const std::filesystem::path& running) {
   const std::filesystem::path folder = running.parent_path();
   const std::filesystem::path above = folder.parent_path();
@@ -358,12 +366,22 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& 
                                  : options.workers->Acquire(program, options.kind, options.device);
   if (!process.ok()) return process.status();
   const absl::StatusOr<int> socket = (*process)->Connect();
-  if (!socket.ok()) {
-    (*process)->Kill();
-    return absl::FailedPreconditionError(socket.status().message());
+  if (!socket.ok()) return absl::FailedPreconditionError(socket.status().message());
+  const int wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (wake < 0) {
+    close(*socket);
+    return absl::FailedPreconditionError(
+        absl::StrCat("no event for a worker: ", absl::ErrnoToStatus(errno, "").message()));
   }
-  auto engine =
-      std::make_unique<WorkerEngine>(options, std::move(reason), *std::move(process), *socket);
+  std::unique_ptr<WorkerEngine> engine;
+  try {
+    engine = std::make_unique<WorkerEngine>(options, std::move(reason), *std::move(process),
+                                            *socket, wake);
+  } catch (const std::exception& e) {
+    close(*socket);
+    close(wake);
+    return absl::FailedPreconditionError(absl::StrCat("no thread for a worker: ", e.what()));
+  }
   if (absl::Status status = engine->Open(); !status.ok()) return status;
   return engine;
 }

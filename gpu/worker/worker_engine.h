@@ -24,6 +24,9 @@ namespace voxeld::gpu {
 absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
                                                            std::string reason);
 
+// Whether a DataLoss says that no answer came in time: the engine may have been slow, not faulty.
+bool IsLate(const absl::Status& status);
+
 // The program that is started unless the options name another: voxeld-engine, in the folder of the
 // program `running`, in the one above (a build's tests), or in ../libexec/voxeld (installed); the
 // first that is there, the last if none is.

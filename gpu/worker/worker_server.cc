@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -174,7 +175,6 @@ class Server {
   absl::Status Frame(const Message& message) {
     const auto frame = message.As<FrameMessage>();
     if (!frame.has_value()) return absl::InvalidArgumentError("kFrame is too short");
-    if (hooks_.before_frame) hooks_.before_frame(++frames_);
     if (frame->buffer_holds >= frame->frame) {
       return Answer(message.call, absl::InvalidArgumentError(
                                       absl::StrCat("frame: buffer_holds is ", frame->buffer_holds,
@@ -212,7 +212,6 @@ class Server {
   std::unique_ptr<Engine> engine_;
   std::map<uint32_t, std::shared_ptr<Segment>> segments_;
   std::optional<display::FrameLayout> layout_;
-  uint64_t frames_ = 0;
 };
 
 }  // namespace
@@ -230,6 +229,7 @@ void ServeEngines(int control, const WorkerHooks& hooks) {
 }
 
 void BecomeWorker() {
+  setenv("CUDA_MODULE_LOADING", "EAGER", 0);
   // A terminal's Ctrl-C is for the owner, who ends its worker by closing the socket.
   std::signal(SIGINT, SIG_IGN);
   std::signal(SIGTERM, SIG_IGN);

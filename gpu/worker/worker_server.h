@@ -17,8 +17,6 @@ struct WorkerHooks {
   std::function<absl::StatusOr<std::unique_ptr<Engine>>(const EngineOptions&)> make_engine;
   // A segment came, or goes: to be pinned. May be empty.
   std::function<void(std::span<std::byte>)> pin, unpin;
-  // Before a connection's n-th frame, from 1. May be empty.
-  std::function<void(uint64_t)> before_frame;
 };
 
 // Serves the connections that come over `control`. Ends the process, at once and whatever its
@@ -26,7 +24,8 @@ struct WorkerHooks {
 // was lost (its owner has been told; a GPU's fault is all its engines').
 [[noreturn]] void ServeEngines(int control, const WorkerHooks& hooks);
 
-// What a worker's main does first: leaves signals to its owner.
+// What a worker's main does first: leaves signals to its owner, and has a GPU's code made ready, and
+// compiled if need be, before the first answer, for which there is more time.
 void BecomeWorker();
 
 }  // namespace voxeld::gpu

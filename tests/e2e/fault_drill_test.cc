@@ -3,13 +3,15 @@
 // the engine comes back each time. Prints how long the CPU took to take over, and the GPU to return.
 //
 //   VOXELD_DRILL_FAULTS   how many; default 6
-//   VOXELD_DRILL_ENGINE   the program; default: the one that faults without a GPU
+//   VOXELD_DRILL_ENGINE   the program, beside this one; default faulty_engine, which needs no GPU
 //   VOXELD_DRILL_KINDS    how, in turn; default crash,dataloss,exit,hang
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -18,7 +20,9 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "absl/strings/numbers.h"
@@ -26,6 +30,7 @@
 #include "absl/strings/str_split.h"
 #include "tests/daemon/services/daemon_fixture.h"
 #include "tests/e2e/voxeld_process.h"
+#include "tests/programs.h"
 
 namespace voxeld::e2e {
 namespace {
@@ -143,6 +148,12 @@ class Drilled {
   }
   bool faulted() const { return !std::filesystem::exists(fault_file_); }
   const Client& client() const { return *client_; }
+  // Its exit code.
+  std::optional<int> End() {
+    client_->Cancel();
+    process_->Signal(SIGTERM);
+    return process_->Wait();
+  }
   std::string output() { return process_->output(); }
 
  private:
@@ -174,7 +185,8 @@ class Drilled {
 class Pair {
  public:
   explicit Pair(const std::string& fault_color = "")
-      : faulted(FromEnvironment("VOXELD_DRILL_ENGINE", FAULTY_ENGINE), fault_color),
+      : faulted(ProgramBeside(FromEnvironment("VOXELD_DRILL_ENGINE", "faulty_engine")),
+                fault_color),
         unfaulted("") {}
 
   void Commit() {
@@ -260,6 +272,18 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
   for (const auto& [kind, ms] : takeovers) Print(absl::StrCat("takeover, ", kind).c_str(), ms);
   Print("of which the CPU's drawing, once the loss was known", redraws);
   Print("return", returns);
+}
+
+// Whatever is under way: the engine's end comes before that of what it writes into.
+TEST(FaultDrill, TheDaemonEndsWellWhileTheEngineComesBack) {
+  for (int tenth = 0; tenth < 10; ++tenth) {
+    Drilled drilled(ProgramBeside(FromEnvironment("VOXELD_DRILL_ENGINE", "faulty_engine")));
+    drilled.Commit(1);
+    drilled.Fault("crash");
+    drilled.Commit(2);
+    std::this_thread::sleep_for(std::chrono::milliseconds(230 + 5 * tenth));
+    EXPECT_EQ(drilled.End(), 0) << drilled.output();
+  }
 }
 
 TEST(FaultDrill, AnEntityThatFaultsIsDrawnByTheCpuUntilItGoes) {

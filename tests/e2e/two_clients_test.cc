@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "tests/daemon/services/daemon_fixture.h"
 #include "tests/e2e/voxeld_process.h"
+#include "tests/programs.h"
 
 namespace voxeld::e2e {
 namespace {
@@ -66,8 +67,8 @@ class TwoClients : public ::testing::Test {
   // Starts the other client, lets both commit, kills it, goes on committing; then checks all that
   // must hold whatever the policy was.
   void KillTheOther(const std::string& policy, int64_t linger_ns) {
-    Process victim(
-        {E2E_CLIENT_BINARY, daemon_.unix_target(), "theirs", policy, std::to_string(linger_ns)});
+    Process victim({ProgramBeside("e2e_client"), daemon_.unix_target(), "theirs", policy,
+                    std::to_string(linger_ns)});
     ASSERT_EQ(victim.ReadLine(), "up") << victim.output();
     Client client(*scene_);
     client.Open();

@@ -3,10 +3,11 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "tests/programs.h"
 
 namespace voxeld::e2e {
 
@@ -31,10 +32,7 @@ std::map<std::string, std::string> CleanEnvironment(const Folder& folder) {
           {"XDG_RUNTIME_DIR", folder.path()}};
 }
 
-std::string VoxeldBinary() {
-  const char* other = std::getenv("VOXELD_TEST_BINARY");
-  return other == nullptr ? VOXELD_BINARY : other;
-}
+std::string VoxeldBinary() { return ProgramBeside("voxeld"); }
 
 std::vector<std::string> Voxeld(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), VoxeldBinary());

@@ -25,7 +25,7 @@ class Folder {
 // Nothing of the machine's own configuration is seen.
 std::map<std::string, std::string> CleanEnvironment(const Folder& folder);
 
-// The program: VOXELD_TEST_BINARY of the environment, or the one of this build.
+// The program.
 std::string VoxeldBinary();
 // It and these.
 std::vector<std::string> Voxeld(std::vector<std::string> arguments);

@@ -40,6 +40,7 @@ max_http_connections = 3
 kind = "cpu"
 threads = 5
 staging_limit_bytes = 2_097_152
+device = 3
 in_worker = true
 worker = "/opt/engine"
 worker_deadline_ns = 500_000_000
@@ -74,6 +75,7 @@ driver = "simulated"
   EXPECT_EQ(config.engine.kind, gpu::EngineKind::kCpu);
   EXPECT_EQ(config.engine.threads, 5u);
   EXPECT_EQ(config.engine.staging_limit_bytes, 2097152u);
+  EXPECT_EQ(config.engine.device, 3u);
   EXPECT_TRUE(config.engine.in_worker);
   EXPECT_EQ(config.engine.worker, "/opt/engine");
   EXPECT_EQ(config.engine.worker_deadline_ns, sync::kSecond / 2);
@@ -89,7 +91,7 @@ driver = "simulated"
   EXPECT_THAT(config.displays[0].options,
               UnorderedElementsAre(Pair("geometry", "rotor"), Pair("slices", "360"),
                                    Pair("eccentricity", "13.5;0.375"), Pair("mirror", "true")));
-  EXPECT_EQ(config.displays[0].source, "test.toml:21:1");
+  EXPECT_EQ(config.displays[0].source, "test.toml:22:1");
 }
 
 struct Case {

@@ -209,6 +209,64 @@ TEST_F(CoreEngine, OfABrokenGpuStaysAwayAndNoEntityIsBlamed) {
   EXPECT_EQ(Figures().engine, "cuda");
 }
 
+TEST_F(CoreEngine, ThatFaultedTwiceByAccidentIsNoEntitysFault) {
+  for (int i = 0; i < 5; ++i) Draw(std::to_string(i), static_cast<float>(i) / 8 - 0.75f);
+  script_->faults = 2;
+  Draw("more", 0.9f);
+  Advance(3 * sync::kSecond);
+  const DisplayFigures figures = Figures();
+  EXPECT_EQ(figures.engine, "cuda");
+  EXPECT_EQ(figures.engine_faults, 2u);
+  EXPECT_THAT(figures.pinned_entities, IsEmpty());
+  EXPECT_THAT(Events(), ElementsAre(What::kLost, What::kTookOver, What::kFaulted, What::kAway,
+                                    What::kReturned));
+}
+
+TEST_F(CoreEngine, ThatIsLateIsNoFaultOfTheScene) {
+  Draw("one", -0.5f);
+  script_->late = 2;
+  Draw("two", 0.5f);
+  EXPECT_EQ(Outcome(), Kind::kPresented);
+  Advance(3 * sync::kSecond);
+  EXPECT_EQ(Figures().engine, "cuda");
+  EXPECT_THAT(Figures().pinned_entities, IsEmpty());
+  // At the start; late; whole and shared.
+  EXPECT_THAT(script_->shared, ElementsAre(true, false, false, true));
+}
+
+TEST_F(CoreEngine, WithoutMemoryForTheSceneGivesWayToTheCpu) {
+  Draw("one", -0.5f);
+  script_->full = true;
+  Draw("two", 0.5f);
+  EXPECT_EQ(Outcome(), Kind::kPresented);
+  DisplayFigures figures = Figures();
+  EXPECT_EQ(figures.engine, "cpu");
+  EXPECT_EQ(figures.engine_faults, 0u);
+  EXPECT_EQ(figures.commits_lost, 0u);
+  EXPECT_THAT(figures.engine_degraded, HasSubstr("out of memory"));
+  Advance(2 * sync::kSecond);
+  EXPECT_EQ(Figures().engine, "cpu");
+  script_->full = false;
+  Advance(4 * sync::kSecond);
+  EXPECT_EQ(Figures().engine, "cuda");
+  EXPECT_EQ(Figures().engine_degraded, "");
+}
+
+TEST(CoreHealth, AnEngineThatRefusesHoldsTheLastVolumeAndSaysWhy) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.engine().fail_staging = true;
+  sim.Send(client, 1, Put("a", "x"));
+  DisplayFigures figures = sim.GetStats().displays[0];
+  EXPECT_TRUE(figures.volume_held);
+  EXPECT_THAT(figures.engine_degraded, HasSubstr("no staging memory"));
+  sim.Advance(sync::kSecond);
+  figures = sim.GetStats().displays[0];
+  EXPECT_FALSE(figures.volume_held);
+  EXPECT_EQ(figures.engine_degraded, "");
+}
+
 TEST_F(CoreEngine, ThatDrawsOtherBytesIsNotTaken) {
   Draw("one", -0.5f);
   script_->faults = 1;

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "gpu/cpu/cpu_engine.h"
 #include "gpu/engine.h"
+#include "gpu/worker/call_channel.h"
 #include "tests/daemon/fakes/recording_engine.h"
 
 namespace voxeld::daemon::testing {
@@ -21,6 +22,8 @@ struct GpuScript {
   std::set<uint32_t> bad_colors;  // whose geometries fault, unless the CPU draws them
   int faults = 0;                 // the next frames fault, whatever they draw
   bool broken = false;            // every frame faults
+  int late = 0;                   // the next frames' answers do not come in time
+  bool full = false;              // frames are refused for want of memory
   absl::Status absent;            // not OK: engines come, and then cannot be had
   bool wrong = false;             // frames have other bytes than they should
   bool slow_cpu = false;          // the CPU's frames wait for RunCpu
@@ -81,6 +84,14 @@ class FaultyGpu final : public gpu::Engine {
       return;
     }
     if (!gpu_) return engine_->SubmitFrame(request, buffer, std::move(done));
+    if (script_->full) return done(absl::ResourceExhaustedError("the device is out of memory"));
+    if (script_->late > 0) {
+      --script_->late;
+      gone_ = true;
+      absl::Status status = absl::DataLossError("the worker did not answer in time");
+      status.SetPayload(gpu::kLatePayload, absl::Cord());
+      return done(status);
+    }
     if (Faults()) gone_ = true;
     if (gone_) return done(absl::DataLossError("cudaErrorIllegalAddress"));
     engine_->SubmitFrame(request, buffer, std::move(done));

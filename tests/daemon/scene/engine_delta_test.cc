@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <set>
 
 #include "tests/daemon/fakes/recording_engine.h"
 #include "tests/daemon/scene/random_scene.h"
@@ -210,6 +211,42 @@ TEST(EngineDelta, AnyPathLeadsToTheSameScene) {
     EXPECT_EQ(walker.scene.geometries(), 0u);
     EXPECT_TRUE(walker.model.geometries().empty());
   }
+}
+
+TEST(EngineDelta, EntitiesAreDrawnWhereTheyAreChosenToBe) {
+  StoreFixture f;
+  const GeometryPtr shared = Dots(3);
+  f.Commit(Put("a", "cpu", Entity1(shared)), Put("a", "gpu", Entity1(shared)), Put("a", "none", 7));
+  DrawnWhere cpu = DrawnWhere::kCpu;
+  Pair pair{EngineScene(nullptr,
+                        [&](const OwnedName& layer, const std::string& id, const Entity&) {
+                          EXPECT_EQ(layer.name, "a");
+                          return id == "cpu"    ? cpu
+                                 : id == "none" ? DrawnWhere::kNowhere
+                                                : DrawnWhere::kEngine;
+                        }),
+            {},
+            0};
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  const auto ways = [&] {
+    std::multiset<gpu::DrawnBy> all;
+    for (const auto& [id, drawable] : pair.model.drawables()) {
+      all.insert(pair.model.geometries().at(drawable.geometry).record.drawn_by);
+    }
+    return all;
+  };
+  // What is drawn in both ways is there twice.
+  EXPECT_EQ(ways(), (std::multiset<gpu::DrawnBy>{gpu::DrawnBy::kEngine, gpu::DrawnBy::kCpu}));
+  EXPECT_EQ(pair.model.geometries().size(), 2u);
+  cpu = DrawnWhere::kEngine;
+  f.Commit(Move("a", "cpu", Shift(1)));
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_EQ(ways(), (std::multiset<gpu::DrawnBy>{gpu::DrawnBy::kEngine, gpu::DrawnBy::kEngine}));
+  EXPECT_EQ(pair.model.geometries().size(), 1u);
+  f.Commit(DeleteId("a", "cpu"), DeleteId("a", "gpu"), DeleteId("a", "none"));
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_TRUE(pair.model.drawables().empty());
+  EXPECT_EQ(pair.scene.geometries(), 0u);
 }
 
 }  // namespace

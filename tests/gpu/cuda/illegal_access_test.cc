@@ -2,13 +2,13 @@
 // worker is as good as new.
 #include <gmock/gmock.h>
 
-#include <filesystem>
 #include <string>
 
 #include "tests/conformance/engine_driver.h"
 #include "tests/conformance/oracle.h"
 #include "tests/conformance/scene_generator.h"
 #include "tests/gpu/worker/fault_environment.h"
+#include "tests/programs.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -28,10 +28,7 @@ class IllegalAccess : public ::testing::Test {
     const FaultEnvironment environment(fault);
     EngineOptions options;
     options.kind = EngineKind::kCuda;
-    // Beside this program, also where both were copied to.
-    options.worker =
-        (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "faulty_cuda_engine")
-            .string();
+    options.worker = ProgramBeside("faulty_cuda_engine");
     options.worker_deadline_ns = 30'000'000'000;
     return {{"faulty", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
   }

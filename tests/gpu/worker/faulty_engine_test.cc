@@ -7,6 +7,7 @@
 #include "tests/conformance/oracle.h"
 #include "tests/conformance/scene_generator.h"
 #include "tests/gpu/worker/fault_environment.h"
+#include "tests/programs.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -24,7 +25,7 @@ class FaultyEngineProgram : public ::testing::Test {
     options.kind = kind;
     options.threads = 1;
     options.in_worker = true;
-    options.worker = FAULTY_ENGINE;
+    options.worker = ProgramBeside("faulty_engine");
     options.worker_deadline_ns = 20'000'000'000;
     return {{"faulty", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
   }

@@ -17,6 +17,7 @@
 #include "tests/conformance/engine_driver.h"
 #include "tests/conformance/scene_generator.h"
 #include "tests/gpu/worker/fault_environment.h"
+#include "tests/programs.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -34,7 +35,7 @@ class FaultyWorker : public ::testing::Test {
     options.kind = EngineKind::kCpu;
     options.threads = 1;
     options.in_worker = true;
-    options.worker = FAULTY_ENGINE;
+    options.worker = ProgramBeside("faulty_engine");
     options.worker_deadline_ns = deadline_ns;
     return {{"faulty", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
   }
@@ -92,7 +93,7 @@ class SharedWorker : public FaultyWorker {
     options.kind = EngineKind::kCpu;
     options.threads = 1;
     options.in_worker = true;
-    options.worker = FAULTY_ENGINE;
+    options.worker = ProgramBeside("faulty_engine");
     options.worker_deadline_ns = 20'000'000'000;
     options.workers = pool_;
     return options;
@@ -100,7 +101,9 @@ class SharedWorker : public FaultyWorker {
   static conformance::EngineDriver Drive(const EngineOptions& options) {
     return {{"shared", [](const EngineOptions& o) { return CreateEngine(o); }}, options};
   }
-  pid_t Process() { return (*pool_->Acquire(FAULTY_ENGINE, EngineKind::kCpu, 0))->pid(); }
+  pid_t Process() {
+    return (*pool_->Acquire(ProgramBeside("faulty_engine"), EngineKind::kCpu, 0))->pid();
+  }
 
   const std::shared_ptr<WorkerPool> pool_ = std::make_shared<WorkerPool>();
 };
