@@ -109,7 +109,7 @@ class Drilled {
     channel_ = grpc::CreateChannel(target_, grpc::InsecureChannelCredentials());
     scene_ = v1::SceneService::NewStub(channel_);
     displays_ = v1::DisplayService::NewStub(channel_);
-    client_ = std::make_unique<Client>(*scene_);
+    client_ = std::make_unique<Client>(*scene_, std::chrono::hours(1));
     client_->Open();
   }
 
@@ -241,7 +241,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
     ASSERT_TRUE(pair.faulted.faulted());
     // All displays share the process, so all have lost their engine.
     pair.CommitUntil([&](const v1::DisplayStats& d) {
-      return d.engine_faults() == static_cast<uint64_t>(fault) + 1;
+      return d.engine_faults() > static_cast<uint64_t>(fault);
     });
     const v1::Stats lost = pair.faulted.Stats();
     for (const v1::DisplayStats& d : lost.displays()) {
@@ -254,6 +254,11 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
       returns.push_back(static_cast<double>(d.return_last_ns()) / 1e6);
     }
     for (int i = 0; i < kCommitsBetween; ++i) pair.Commit();
+    if ((fault + 1) % 10 == 0) {
+      std::printf("%d faults, %d commits, return %.0f ms\n", fault + 1, pair.commits,
+                  returns.back());
+      std::fflush(stdout);
+    }
   }
 
   const v1::Stats stats = pair.faulted.Stats();
@@ -261,6 +266,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
     EXPECT_EQ(d.volumes_lost(), 0u) << d.name();
     EXPECT_EQ(d.commits_lost(), 0u) << d.name();
     EXPECT_EQ(d.commits_presented(), static_cast<uint64_t>(pair.commits)) << d.name();
+    EXPECT_EQ(d.engine_faults(), static_cast<uint64_t>(faults)) << d.name();
     EXPECT_EQ(d.engine_returns(), static_cast<uint64_t>(faults)) << d.name();
     EXPECT_EQ(d.engine_mismatches(), 0u) << d.name();
     EXPECT_EQ(d.pinned_entities_size(), 0) << d.name();

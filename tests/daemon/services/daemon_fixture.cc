@@ -112,8 +112,8 @@ bool Daemon::Await(const std::function<bool(const v1::Stats&)>& right) {
 }
 
 std::unique_ptr<grpc::ClientReaderWriter<v1::StreamRequest, v1::StreamResponse>> Client::Begin(
-    v1::SceneService::Stub& stub) {
-  SetDeadline(context_);
+    v1::SceneService::Stub& stub, std::chrono::seconds patience) {
+  SetDeadline(context_, patience);
   return stub.Stream(&context_);
 }
 

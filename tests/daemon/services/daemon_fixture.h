@@ -20,8 +20,9 @@
 namespace voxeld::daemon::services {
 
 // No call of a test may take longer.
-inline void SetDeadline(grpc::ClientContext& context) {
-  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(60));
+inline void SetDeadline(grpc::ClientContext& context,
+                        std::chrono::seconds patience = std::chrono::seconds(60)) {
+  context.set_deadline(std::chrono::system_clock::now() + patience);
 }
 
 struct DaemonOptions {
@@ -65,7 +66,10 @@ class Daemon {
 // One stream, written and read by the test's thread.
 class Client {
  public:
-  explicit Client(v1::SceneService::Stub& stub) : call_(Begin(stub)) {}
+  // `patience`: for the whole stream.
+  explicit Client(v1::SceneService::Stub& stub,
+                  std::chrono::seconds patience = std::chrono::seconds(60))
+      : call_(Begin(stub, patience)) {}
 
   // Sends Open and expects Opened.
   v1::Opened Open(const v1::Open& open = {});
@@ -87,7 +91,7 @@ class Client {
 
  private:
   std::unique_ptr<grpc::ClientReaderWriter<v1::StreamRequest, v1::StreamResponse>> Begin(
-      v1::SceneService::Stub& stub);
+      v1::SceneService::Stub& stub, std::chrono::seconds patience);
 
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::StreamRequest, v1::StreamResponse>> call_;
