@@ -36,9 +36,10 @@ void ActiveCalls::EndAll(const absl::Status& status) {
   for (const auto& call : calls) call->End(status);
 }
 
-void ActiveCalls::AwaitNone(sync::Clock& clock, sync::TimeNs deadline) {
+size_t ActiveCalls::AwaitNone(sync::Clock& clock, sync::TimeNs deadline) {
   sync::MutexLock lock(mutex_);
   while (!calls_.empty() && clock.Now() < deadline) clock.WaitUntil(mutex_, removed_, deadline);
+  return calls_.size();
 }
 
 }  // namespace voxeld::daemon::services

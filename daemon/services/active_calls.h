@@ -27,8 +27,8 @@ class ActiveCalls {
   void Remove(const ActiveCall* call);
 
   void EndAll(const absl::Status& status);
-  // Until none is left, or `deadline` of `clock`.
-  void AwaitNone(sync::Clock& clock, sync::TimeNs deadline);
+  // Until none is left, or `deadline` of `clock`. Answers how many are.
+  size_t AwaitNone(sync::Clock& clock, sync::TimeNs deadline);
 
  private:
   sync::Mutex mutex_;

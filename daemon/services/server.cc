@@ -113,8 +113,12 @@ class Server::Impl {
     server_->GetHealthCheckService()->Shutdown();
     context_.calls.EndAll(absl::UnavailableError("shutting down"));
     const sync::TimeNs deadline = context_.clock.Now() + limit;
-    context_.calls.AwaitNone(context_.clock, deadline);
-    context_.short_calls.AwaitNone(context_.clock, deadline);
+    const size_t calls = context_.calls.AwaitNone(context_.clock, deadline);
+    const size_t short_calls = context_.short_calls.AwaitNone(context_.clock, deadline);
+    if (options_.log != nullptr && calls + short_calls > 0) {
+      options_.log->Warn("calls are cut off, their clients do not read or the core is busy",
+                         {{"streams", absl::StrCat(calls)}, {"calls", absl::StrCat(short_calls)}});
+    }
     // gRPC waits until every call has finished, and the core may be busy for longer than that.
     context_.short_calls.EndAll(
         absl::UnavailableError("shutting down; whether the call was carried out is not known"));

@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -125,8 +126,13 @@ class Drilled {
       EXPECT_TRUE(client_->outcomes[o].outcome().has_presented())
           << client_->outcomes[o].DebugString();
     }
+    std::vector<std::future<std::string>> captures;
+    for (const char* display : kDisplays) {
+      captures.push_back(
+          std::async(std::launch::async, [this, display] { return Volume(display); }));
+    }
     std::vector<std::string> volumes;
-    for (const char* display : kDisplays) volumes.push_back(Volume(display));
+    for (std::future<std::string>& capture : captures) volumes.push_back(capture.get());
     return volumes;
   }
 
@@ -191,8 +197,10 @@ class Pair {
 
   void Commit() {
     ++commits;
+    std::future<std::vector<std::string>> without =
+        std::async(std::launch::async, [this] { return unfaulted.Commit(commits); });
     const std::vector<std::string> got = faulted.Commit(commits);
-    const std::vector<std::string> want = unfaulted.Commit(commits);
+    const std::vector<std::string> want = without.get();
     for (size_t d = 0; d < want.size(); ++d) {
       EXPECT_TRUE(got[d] == want[d]) << kDisplays[d] << " differs at commit " << commits;
     }
