@@ -1,7 +1,6 @@
 #include "daemon/log/logger.h"
 
 #include <spdlog/logger.h>
-#include <spdlog/sinks/stdout_sinks.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "daemon/log/descriptor_sink.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -56,10 +56,29 @@ std::string TextValue(std::string_view text) {
   return absl::StrCat("\"", absl::CHexEscape(View(text)), "\"");
 }
 
+std::string LineOf(Logger::Format format, std::string_view event, Logger::Fields fields) {
+  std::string line;
+  if (format == Logger::Format::kJson) {
+    line = absl::StrCat("\"event\":", JsonText(event));
+    for (const LogField& field : fields) {
+      absl::StrAppend(&line, ",", JsonText(field.key), ":", JsonText(field.value));
+    }
+  } else {
+    line = std::string(event);
+    for (const LogField& field : fields) {
+      absl::StrAppend(&line, " ", View(field.key), "=", TextValue(field.value));
+    }
+  }
+  return line;
+}
+
 }  // namespace
 
-Logger::Logger(Level level, Format format)
-    : Logger(level, format, std::make_shared<spdlog::sinks::stderr_sink_mt>()) {}
+Logger::Logger(Level level, Format format, int descriptor)
+    : Logger(level, format, std::make_shared<DescriptorSink>(descriptor, [format](uint64_t lines) {
+               return LineOf(format, "lines of the log were left out, nobody read them",
+                             {{"lines", absl::StrCat(lines)}});
+             })) {}
 
 Logger::Logger(Level level, Format format, std::shared_ptr<spdlog::sinks::sink> sink)
     : format_(format), logger_(std::make_unique<spdlog::logger>("voxeld", std::move(sink))) {
@@ -87,18 +106,7 @@ absl::StatusOr<Logger::Format> Logger::ParseFormat(std::string_view text) {
 
 void Logger::Log(Level level, std::string_view event, Fields fields) {
   if (!logger_->should_log(ToSpdlog(level))) return;
-  std::string line;
-  if (format_ == Format::kJson) {
-    line = absl::StrCat("\"event\":", JsonText(event));
-    for (const LogField& field : fields) {
-      absl::StrAppend(&line, ",", JsonText(field.key), ":", JsonText(field.value));
-    }
-  } else {
-    line = std::string(event);
-    for (const LogField& field : fields) {
-      absl::StrAppend(&line, " ", View(field.key), "=", TextValue(field.value));
-    }
-  }
+  const std::string line = LineOf(format_, event, fields);
   logger_->log(ToSpdlog(level), spdlog::string_view_t(line.data(), line.size()));
 }
 

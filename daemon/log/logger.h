@@ -1,5 +1,6 @@
 // Structured logs on stderr: an event and its fields, as text or as a JSON object, one a line.
-// Whatever comes from clients and devices is escaped, so that a line is always one line.
+// Whatever comes from clients and devices is escaped, so that a line is always one line. A reader
+// that does not read holds nobody up: lines are left out then, and a later one says how many.
 //
 //   text  2026-01-31T12:00:00.000+0000 info session opened session=3 client="a \"b\""
 //   json  {"time":"…","level":"info","event":"session opened","session":"3","client":"a \"b\""}
@@ -32,8 +33,8 @@ class Logger {
   enum class Level : uint8_t { kTrace, kDebug, kInfo, kWarn, kError, kOff };
   enum class Format : uint8_t { kText, kJson };
 
-  // To stderr.
-  Logger(Level level, Format format);
+  // To stderr, or another descriptor, which outlives the logger.
+  Logger(Level level, Format format, int descriptor = 2);
   // To `sink`, whose pattern is set.
   Logger(Level level, Format format, std::shared_ptr<spdlog::sinks::sink> sink);
   ~Logger();

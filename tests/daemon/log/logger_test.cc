@@ -1,7 +1,9 @@
 #include "daemon/log/logger.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <spdlog/sinks/ostream_sink.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -69,6 +71,39 @@ TEST(Logger, WordsOfLevelsAndFormats) {
   EXPECT_TRUE(absl::IsInvalidArgument(Logger::ParseLevel("loud").status()));
   EXPECT_EQ(*Logger::ParseFormat("json"), Logger::Format::kJson);
   EXPECT_TRUE(absl::IsInvalidArgument(Logger::ParseFormat("xml").status()));
+}
+
+TEST(Logger, AReaderThatDoesNotReadHoldsNobodyUp) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  fcntl(ends[0], F_SETFL, O_NONBLOCK);
+  constexpr uint64_t kLines = 5000;
+  Logger log(Logger::Level::kInfo, Logger::Format::kJson, ends[1]);
+  for (uint64_t i = 0; i < kLines; ++i) log.Info("a line", {{"text", std::string(100, 'x')}});
+  std::string text;
+  const auto read_all = [&] {
+    char some[4096];
+    for (ssize_t got = 0; (got = read(ends[0], some, sizeof(some))) > 0;) {
+      text.append(some, static_cast<size_t>(got));
+    }
+  };
+  read_all();
+  log.Info("again");
+  read_all();
+  close(ends[0]);
+  close(ends[1]);
+
+  uint64_t lines = 0, left_out = 0;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    const auto object = nlohmann::json::parse(line);
+    if (object["event"] == "a line") ++lines;
+    if (object.contains("lines")) left_out = std::stoull(object["lines"].get<std::string>());
+  }
+  EXPECT_GT(lines, 0u);
+  EXPECT_GT(left_out, 0u);
+  EXPECT_EQ(lines + left_out, kLines);
+  EXPECT_THAT(text, ::testing::HasSubstr("\"again\""));
 }
 
 }  // namespace

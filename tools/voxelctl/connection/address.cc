@@ -11,11 +11,15 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// A socket that somebody else put into a shared directory is not to be trusted.
+constexpr char kServiceSocket[] = "/run/voxeld/voxeld.sock";
+
+// A socket that somebody else put into a shared directory is not to be trusted. The service's own
+// folder only root can make, for whatever user the service runs as.
 bool IsTrustedSocket(const std::string& path) {
   struct stat info {};
   return ::lstat(path.c_str(), &info) == 0 && S_ISSOCK(info.st_mode) &&
-         (info.st_uid == ::geteuid() || info.st_uid == 0);
+         (info.st_uid == ::geteuid() || info.st_uid == 0 || path == kServiceSocket) &&
+         ::access(path.c_str(), R_OK | W_OK) == 0;
 }
 
 }  // namespace
@@ -25,8 +29,8 @@ std::string ChooseServer(const std::string& option, const Environment& environme
   if (std::string variable = environment("VOXELD_SERVER"); !variable.empty()) return variable;
   const std::string folder = environment("XDG_RUNTIME_DIR");
   const std::string candidates[] = {
-      absl::StartsWith(folder, "/") ? absl::StrCat(folder, "/voxeld.sock") : "",
-      "/run/voxeld/voxeld.sock", absl::StrCat("/tmp/voxeld-", ::geteuid(), "/voxeld.sock")};
+      absl::StartsWith(folder, "/") ? absl::StrCat(folder, "/voxeld.sock") : "", kServiceSocket,
+      absl::StrCat("/tmp/voxeld-", ::geteuid(), "/voxeld.sock")};
   for (const std::string& path : candidates) {
     if (!path.empty() && IsTrustedSocket(path)) return absl::StrCat("unix:", path);
   }
