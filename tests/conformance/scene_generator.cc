@@ -13,6 +13,11 @@ uint64_t SeedOr(uint64_t fallback) {
   return seed == nullptr ? fallback : std::strtoull(seed, nullptr, 0);
 }
 
+int DeltasWanted() {
+  const char* deltas = std::getenv("VOXELD_DELTAS");
+  return deltas == nullptr ? 1000 : std::atoi(deltas);
+}
+
 int64_t SceneGenerator::Int(int64_t low, int64_t high) {
   return std::uniform_int_distribution<int64_t>(low, high)(engine_);
 }

@@ -12,6 +12,10 @@ namespace voxeld::gpu::conformance {
 // VOXELD_SEED, or `fallback`. Every test that draws on chance prints what it used.
 uint64_t SeedOr(uint64_t fallback);
 
+// VOXELD_DELTAS, or 1000: how many frames are drawn after changes. For tools that slow a GPU down a
+// hundredfold.
+int DeltasWanted();
+
 class SceneGenerator {
  public:
   explicit SceneGenerator(uint64_t seed) : engine_(seed) {}
