@@ -1,5 +1,6 @@
 #include "daemon/services/server.h"
 
+#include <grpc/grpc.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/service_type.h>
@@ -30,6 +31,13 @@ constexpr int kLeastPingIntervalMs = 5'000;
 constexpr sync::TimeNs kLastCallsLimit = 200 * sync::kMillisecond;
 constexpr mode_t kSocketMode = 0660;
 
+// gRPC's threads stay until the process ends. Else the last server to go joins them, and one that
+// polls for a connection whose client read slowly returns only after up to ten seconds.
+void KeepGrpcUp() {
+  static const bool up = (grpc_init(), true);
+  (void)up;
+}
+
 int Milliseconds(sync::TimeNs time) { return static_cast<int>(time / sync::kMillisecond); }
 
 }  // namespace
@@ -45,6 +53,7 @@ class Server::Impl {
   ~Impl() { Shutdown(0); }
 
   absl::Status Start() {
+    KeepGrpcUp();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
