@@ -65,7 +65,7 @@ absl::Status PrepareUnix(const Address& address) {
   const std::filesystem::path folder = std::filesystem::path(address.path).parent_path();
   std::error_code error;
   if (!std::filesystem::exists(folder, error)) {
-    std::filesystem::create_directories(folder, error);
+    std::filesystem::create_directory(folder, error);
     if (!error) {
       std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
     }

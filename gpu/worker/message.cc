@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <system_error>
 
 #include "absl/strings/str_cat.h"
 #include "display/crc/crc32c.h"
@@ -63,7 +64,7 @@ absl::Status SendMessage(int socket, const Message& message) {
     return absl::ResourceExhaustedError("the other process does not read");
   }
   return absl::UnavailableError(
-      absl::StrCat("the other process is gone: ", absl::ErrnoToStatus(errno, "").message()));
+      absl::StrCat("the other process is gone: ", std::generic_category().message(errno)));
 }
 
 absl::StatusOr<Message> ReceiveMessage(int socket) {

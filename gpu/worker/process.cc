@@ -23,7 +23,7 @@ absl::StatusOr<std::shared_ptr<WorkerProcess>> WorkerProcess::Start(const std::s
   int sockets[2];
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, sockets) != 0) {
     return absl::FailedPreconditionError(
-        absl::StrCat("no sockets for ", program, ": ", absl::ErrnoToStatus(errno, "").message()));
+        absl::StrCat("no sockets for ", program, ": ", std::generic_category().message(errno)));
   }
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
@@ -47,7 +47,7 @@ absl::StatusOr<std::shared_ptr<WorkerProcess>> WorkerProcess::Start(const std::s
   if (error != 0) {
     close(sockets[0]);
     return absl::FailedPreconditionError(
-        absl::StrCat(program, " cannot be started: ", absl::ErrnoToStatus(error, "").message()));
+        absl::StrCat(program, " cannot be started: ", std::generic_category().message(error)));
   }
   fcntl(sockets[0], F_SETFL, O_NONBLOCK);
   return std::shared_ptr<WorkerProcess>(new WorkerProcess(pid, sockets[0]));
@@ -62,7 +62,7 @@ absl::StatusOr<int> WorkerProcess::Connect() {
   int sockets[2];
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, sockets) != 0) {
     return absl::UnavailableError(
-        absl::StrCat("no sockets for a worker: ", absl::ErrnoToStatus(errno, "").message()));
+        absl::StrCat("no sockets for a worker: ", std::generic_category().message(errno)));
   }
   Message message;
   message.type = MessageType::kConnect;

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <system_error>
 
 #include "absl/strings/str_cat.h"
 
@@ -16,7 +17,7 @@ constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
 
 absl::Status Failed(const char* what, size_t size) {
   return absl::ResourceExhaustedError(absl::StrCat("shared memory of ", size, " bytes: ", what,
-                                                   ": ", absl::ErrnoToStatus(errno, "").message()));
+                                                   ": ", std::generic_category().message(errno)));
 }
 
 }  // namespace

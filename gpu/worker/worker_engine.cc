@@ -11,6 +11,7 @@
 #include <exception>
 #include <filesystem>
 #include <optional>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -191,6 +192,7 @@ class WorkerEngine final : public Engine {
       return absl::FailedPreconditionError("the worker's answer is too short");
     info_.kind = ready->kind;
     info_.device = std::string(ready->device, strnlen(ready->device, sizeof(ready->device)));
+    if (info_.kind == EngineKind::kCpu) info_.device += ", in a process of its own";
     return absl::OkStatus();
   }
 
@@ -371,7 +373,7 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& 
   if (wake < 0) {
     close(*socket);
     return absl::FailedPreconditionError(
-        absl::StrCat("no event for a worker: ", absl::ErrnoToStatus(errno, "").message()));
+        absl::StrCat("no event for a worker: ", std::generic_category().message(errno)));
   }
   std::unique_ptr<WorkerEngine> engine;
   try {

@@ -22,6 +22,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -36,6 +37,8 @@
 namespace voxeld::e2e {
 namespace {
 
+using daemon::services::AllShowing;
+using daemon::services::AwaitStats;
 using daemon::services::Client;
 using daemon::services::SetDeadline;
 using daemon::services::SphereIn;
@@ -107,10 +110,11 @@ class Drilled {
                                  "rotor=simulated,geometry=rotor,slices=60,size=48x32,rate=240"},
         environment);
     const std::optional<std::string> ready = process_->ReadLineWith("\"event\":\"ready\"");
-    EXPECT_TRUE(ready.has_value()) << process_->output();
+    if (!ready.has_value()) throw std::runtime_error("voxeld: " + process_->output());
     channel_ = grpc::CreateChannel(target_, grpc::InsecureChannelCredentials());
     scene_ = v1::SceneService::NewStub(channel_);
     displays_ = v1::DisplayService::NewStub(channel_);
+    if (!AwaitStats(*displays_, AllShowing)) throw std::runtime_error("no displays");
     client_ = std::make_unique<Client>(*scene_, std::chrono::hours(1));
     client_->Open();
   }
@@ -258,6 +262,10 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
   ASSERT_TRUE(absl::SimpleAtoi(FromEnvironment("VOXELD_DRILL_FAULTS", "6"), &faults));
   const std::vector<std::string> kinds =
       absl::StrSplit(FromEnvironment("VOXELD_DRILL_KINDS", "crash,dataloss,exit,hang"), ',');
+  for (const std::string& kind : kinds) {
+    ASSERT_THAT(kind, ::testing::AnyOf("crash", "dataloss", "exit", "hang", "illegal"))
+        << "of VOXELD_DRILL_KINDS";
+  }
   Pair pair;
   std::map<std::string, std::vector<double>> takeovers;  // ms
   std::vector<double> redraws, returns;

@@ -15,6 +15,7 @@
 namespace voxeld::e2e {
 namespace {
 
+using daemon::services::AwaitStats;
 using daemon::services::Client;
 using daemon::services::SetDeadline;
 using daemon::services::SphereIn;
@@ -48,20 +49,8 @@ class TwoClients : public ::testing::Test {
     return scene;
   }
 
-  // The first figures that are as `right` wants them.
   v1::Stats Await(const std::function<bool(const v1::Stats&)>& right) {
-    grpc::ClientContext context;
-    SetDeadline(context);
-    v1::WatchStatsRequest request;
-    request.set_interval_ns(10'000'000);
-    const auto call = displays_->WatchStats(&context, request);
-    v1::Stats stats;
-    bool found = false;
-    while (!found && call->Read(&stats)) found = right(stats);
-    EXPECT_TRUE(found) << stats.DebugString();
-    context.TryCancel();
-    call->Finish();
-    return stats;
+    return AwaitStats(*displays_, right).value_or(v1::Stats());
   }
 
   // Starts the other client, lets both commit, kills it, goes on committing; then checks all that

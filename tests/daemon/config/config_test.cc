@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <set>
+#include <sstream>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/suggest/suggest.h"
@@ -26,6 +28,20 @@ Environment Variables(std::map<std::string, std::string> variables) {
     if (it == variables.end()) return {};
     return it->second;
   };
+}
+
+TEST(ConfigText, EveryFieldStandsInTheManual) {
+  std::ifstream file(VOXELD_SOURCE_DIR "/docs/configuration.md");
+  const std::string manual{std::istreambuf_iterator<char>(file), {}};
+  std::istringstream printed(ToToml(Config{}));
+  int keys = 0;
+  for (std::string line; std::getline(printed, line);) {
+    const size_t equals = line.find(" = ");
+    if (equals == std::string::npos) continue;
+    ++keys;
+    EXPECT_THAT(manual, HasSubstr("`" + line.substr(0, equals) + "`"));
+  }
+  EXPECT_GE(keys, 40);
 }
 
 TEST(ConfigText, EverythingCanBeSet) {

@@ -88,6 +88,29 @@ v1::Stats Daemon::Stats() {
   return stats;
 }
 
+std::optional<v1::Stats> AwaitStats(v1::DisplayService::Stub& displays,
+                                    const std::function<bool(const v1::Stats&)>& right) {
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::WatchStatsRequest request;
+  request.set_interval_ns(10 * sync::kMillisecond);
+  const auto call = displays.WatchStats(&context, request);
+  v1::Stats stats;
+  bool found = false;
+  while (!found && call->Read(&stats)) found = right(stats);
+  EXPECT_TRUE(found) << stats.DebugString();
+  context.TryCancel();
+  call->Finish();
+  if (!found) return std::nullopt;
+  return stats;
+}
+
+bool AllShowing(const v1::Stats& stats) {
+  return std::all_of(stats.displays().begin(), stats.displays().end(), [](const auto& display) {
+    return display.state() == v1::DISPLAY_STATE_SHOWING;
+  });
+}
+
 v1::ListEntitiesResponse Daemon::Entities() {
   grpc::ClientContext context;
   SetDeadline(context);
@@ -95,20 +118,6 @@ v1::ListEntitiesResponse Daemon::Entities() {
   const grpc::Status status = scene_->ListEntities(&context, {}, &response);
   EXPECT_TRUE(status.ok()) << status.error_message();
   return response;
-}
-
-bool Daemon::Await(const std::function<bool(const v1::Stats&)>& right) {
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::WatchStatsRequest request;
-  request.set_interval_ns(10 * sync::kMillisecond);
-  const auto call = displays_->WatchStats(&context, request);
-  v1::Stats stats;
-  bool found = false;
-  while (!found && call->Read(&stats)) found = right(stats);
-  context.TryCancel();
-  call->Finish();
-  return found;
 }
 
 std::unique_ptr<grpc::ClientReaderWriter<v1::StreamRequest, v1::StreamResponse>> Client::Begin(

@@ -25,6 +25,12 @@ inline void SetDeadline(grpc::ClientContext& context,
   context.set_deadline(std::chrono::system_clock::now() + patience);
 }
 
+// Until the figures are as `right` wants them; the last ones, or nothing after a generous time.
+std::optional<v1::Stats> AwaitStats(v1::DisplayService::Stub& displays,
+                                    const std::function<bool(const v1::Stats&)>& right);
+// Every display has attached: what is committed before has no display to be shown on.
+bool AllShowing(const v1::Stats& stats);
+
 struct DaemonOptions {
   Limits limits;
   std::vector<std::string> displays = {"sim"};
@@ -50,7 +56,9 @@ class Daemon {
   v1::Stats Stats();
   v1::ListEntitiesResponse Entities();
   // Until the figures are as `right` wants them; false after a generous time.
-  bool Await(const std::function<bool(const v1::Stats&)>& right);
+  bool Await(const std::function<bool(const v1::Stats&)>& right) {
+    return AwaitStats(*displays_, right).has_value();
+  }
 
  private:
   const std::string folder_;

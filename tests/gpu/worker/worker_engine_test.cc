@@ -147,7 +147,7 @@ TEST_F(SharedWorker, ThatIsNotWaitedForAnswersWhenItIsThere) {
   conformance::EngineDriver a = Drive(options);
   ASSERT_TRUE(a.SetTarget(target_).ok());
   ASSERT_TRUE(a.Frame().ok());
-  EXPECT_EQ(a.engine().info().device, "CPU, 1 thread");
+  EXPECT_EQ(a.engine().info().device, "CPU, 1 thread, in a process of its own");
 }
 
 TEST_F(SharedWorker, ThatIsNotWaitedForAndCannotServeSaysWhy) {
