@@ -59,16 +59,16 @@ void CallChannel::Call(Message message, std::function<void(Message&)> ready, Ans
   absl::Status ended;
   {
     sync::MutexLock lock(mutex_);
-    ended = ended_;
-    if (ended.ok()) {
+    if (ended_.ok()) {
       message.call = next_call_++;
       if (owed_.empty()) give_up_at_ = clock_.Now() + allowed_ns_ + more_ns;
       owed_[message.call] = {std::move(answered), more_ns};
       outgoing_.push_back({std::move(message), std::move(ready), nullptr, nullptr});
+      return Wake();
     }
+    ended = ended_;
   }
-  if (!ended.ok()) return answered(ended);
-  Wake();
+  answered(ended);
 }
 
 void CallChannel::Later(std::function<void()> work) {
