@@ -23,11 +23,6 @@ std::vector<uint8_t> DecodedVolume::Rgb(int32_t first, int32_t count) const {
 }
 namespace {
 
-// After a lost volume the newest one is sent again:
-// first after this time, then after twice as long.
-constexpr sync::TimeNs kFirstResendDelay = 100 * sync::kMillisecond;
-constexpr sync::TimeNs kLongestResendDelay = 5 * sync::kSecond;
-
 SliceFramePtr BlackFrame(const FrameLayout& layout) {
   auto frame = std::make_shared<SliceFrame>();
   frame->layout = layout;
@@ -68,7 +63,7 @@ absl::Status Display::Start(Listener* listener, std::function<void()> wake) {
   full_next_ = true;
   last_volume_ = 0;
   resend_at_ = sync::kNever;
-  resend_delay_ = 0;
+  resend_.Reset();
   SetState(DisplayState::kAttaching, "looking for the device");
   const absl::Status status = DoStart();
   if (!status.ok()) {
@@ -197,7 +192,7 @@ void Display::CancelCapture(CaptureId id) {
 
 void Display::Attached() {
   full_next_ = true;
-  resend_delay_ = 0;
+  resend_.Reset();
   if (newest_ != nullptr) resend_at_ = clock_.Now();
   if (blanked_) {
     SetState(DisplayState::kBlanked, "blanked");
@@ -220,7 +215,7 @@ void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs l
   if (in_flight_ == nullptr) return;
   const SliceFramePtr frame = std::move(in_flight_);
   in_flight_ = nullptr;
-  resend_delay_ = 0;
+  resend_.Reset();
   full_next_ = frame->volume == 0;  // a black one of our own is no base for what the engine counts
   if (owed_) {
     owed_ = false;
@@ -252,9 +247,7 @@ void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs l
 void Display::FrameLost(const std::string& reason, uint64_t bytes) {
   if (in_flight_ == nullptr) return;
   full_next_ = true;
-  resend_delay_ =
-      resend_delay_ == 0 ? kFirstResendDelay : std::min(2 * resend_delay_, kLongestResendDelay);
-  resend_at_ = clock_.Now() + resend_delay_;
+  resend_at_ = clock_.Now() + resend_.Next();
   decoder_ = nullptr;
   LoseInFlight(reason, bytes);
   SendNext();
@@ -270,7 +263,7 @@ void Display::SetState(DisplayState state, const std::string& reason) {
   state_ = state;
   state_reason_ = reason;
   if (state == DisplayState::kShowing || state == DisplayState::kBlanked) {
-    resend_delay_ = 0;
+    resend_.Reset();
   }
   if (listener_ != nullptr) listener_->OnState(state_, state_reason_);
 }

@@ -22,6 +22,7 @@
 #include "display/api/geometry.h"
 #include "display/api/outcome.h"
 #include "display/api/slice_frame.h"
+#include "display/sync/backoff.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::display {
@@ -218,7 +219,7 @@ class Display {
   bool sending_ = false;      // inside SendNext
   uint64_t last_volume_ = 0;  // newest number submitted
   sync::TimeNs resend_at_ = sync::kNever;  // newest_ goes out again, if nothing newer did before
-  sync::TimeNs resend_delay_ = 0;          // doubles with each loss
+  sync::Backoff resend_{100 * sync::kMillisecond, 5 * sync::kSecond};
 
   std::unique_ptr<WireDecoder> decoder_;
   absl::Status decoder_status_;

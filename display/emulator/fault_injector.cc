@@ -26,15 +26,16 @@ constexpr uint64_t kMs = sync::kMillisecond;
 constexpr Kind kKinds[] = {
     {"stall", What::kStall, false, 1},    {"nak", What::kNak, true, kMs},
     {"partial", What::kPartial, true, 1}, {"error", What::kError, true, 1},
-    {"corrupt", What::kCorrupt, true, 1}, {"drop", What::kDrop, true, 1},
-    {"unplug", What::kUnplug, true, kMs}, {"delay", What::kDelay, true, kMs},
+    {"babble", What::kBabble, true, 1},   {"corrupt", What::kCorrupt, true, 1},
+    {"drop", What::kDrop, true, 1},       {"unplug", What::kUnplug, true, kMs},
+    {"delay", What::kDelay, true, kMs},
 };
 constexpr uint64_t kMostNumber = 1'000'000'000'000;
 
 // Faults that happen to the cable, and need no transfer.
 bool ActsAlone(What what) {
   return what == What::kStall || what == What::kNak || what == What::kUnplug ||
-         what == What::kDelay || what == What::kError;
+         what == What::kDelay || what == What::kError || what == What::kBabble;
 }
 
 absl::StatusOr<Fault> ParseFault(std::string_view text) {
@@ -51,8 +52,8 @@ absl::StatusOr<Fault> ParseFault(std::string_view text) {
                                   [&](const Kind& k) { return k.name == head[0]; });
   if (kind == std::end(kKinds)) {
     return bad(
-        "there is no such fault; there are stall, nak, partial, error, corrupt, drop, unplug, "
-        "delay");
+        "there is no such fault; there are stall, nak, partial, error, babble, corrupt, drop, "
+        "unplug, delay");
   }
   fault.what = kind->what;
   if (kind->has_amount != (head.size() == 2)) {
@@ -132,6 +133,9 @@ void FaultInjector::Act(const Fault& fault, sync::TimeNs now) {
       return;
     case What::kError:
       endpoint.errors_left += fault.amount;
+      return;
+    case What::kBabble:
+      endpoint.babbles_left += fault.amount;
       return;
     case What::kUnplug:
       SetPlugged(false);
@@ -219,6 +223,11 @@ bool FaultInjector::Apply(const Urb& original, Urb& urb, Passing& passing) {
   if (endpoint.errors_left > 0) {
     --endpoint.errors_left;
     complete_(urb.id, TransferStatus::kError, 0, {});
+    return false;
+  }
+  if (endpoint.babbles_left > 0) {
+    --endpoint.babbles_left;
+    complete_(urb.id, TransferStatus::kOverflow, 0, {});
     return false;
   }
   if (passing.halts) endpoint.halted = true;
@@ -329,21 +338,30 @@ sync::TimeNs FaultInjector::NextTimeout() const {
   return next;
 }
 
+void FaultInjector::EndAll(TransferStatus status) {
+  for (auto& [address, endpoint] : endpoints_) {
+    endpoint.halted = false;
+    std::deque<Urb> waiting;
+    waiting.swap(endpoint.waiting);
+    for (const Urb& urb : waiting) complete_(urb.id, status, 0, {});
+  }
+  std::deque<Held> held;
+  held.swap(held_);
+  for (const Held& completion : held) complete_(completion.id, status, 0, {});
+}
+
+void FaultInjector::Reset() {
+  EndAll(TransferStatus::kCancelled);
+  device_->Reset();
+}
+
 void FaultInjector::SetPlugged(bool plugged) {
   if (!plugged) {
     for (auto& [address, endpoint] : endpoints_) {
-      endpoint.halted = false;
-      endpoint.errors_left = 0;
+      endpoint.errors_left = endpoint.babbles_left = 0;
       endpoint.nak_until = endpoint.hold_until = 0;
-      std::deque<Urb> waiting;
-      waiting.swap(endpoint.waiting);
-      for (const Urb& urb : waiting) complete_(urb.id, TransferStatus::kDisconnected, 0, {});
     }
-    std::deque<Held> held;
-    held.swap(held_);
-    for (const Held& completion : held) {
-      complete_(completion.id, TransferStatus::kDisconnected, 0, {});
-    }
+    EndAll(TransferStatus::kDisconnected);
   }
   device_->SetPlugged(plugged);
 }

@@ -29,6 +29,7 @@ struct Fault {
     kNak,      // transfers wait for `amount` ns
     kPartial,  // `amount` bytes pass, then the endpoint halts
     kError,    // `amount` transfers end in a protocol error; nothing passes
+    kBabble,   // `amount` transfers end in an overflow, as if the device sent more than was asked
     kCorrupt,  // the byte `amount` of the transfer is inverted (kByte: the one at `at`)
     kDrop,     // `amount` bytes of the transfer vanish, from its middle (kByte: from `at`);
                // reported as sent
@@ -45,7 +46,7 @@ struct Fault {
 using FaultPlan = std::vector<Fault>;
 
 // "WHAT[:AMOUNT]@WHEN[/in]", several with ';' between. WHAT: stall, nak:MS, partial:BYTES,
-// error:COUNT, corrupt:BYTE, drop:BYTES, unplug:MS, delay:MS. WHEN: tN (transfer N), bN (byte N),
+// error:COUNT, babble:COUNT, corrupt:BYTE, drop:BYTES, unplug:MS, delay:MS. WHEN: tN (transfer N), bN (byte N),
 // Nms. "/in": on the interrupt endpoint. InvalidArgument with what is wrong.
 absl::StatusOr<FaultPlan> ParseFaultPlan(std::string_view text);
 
@@ -62,6 +63,8 @@ class FaultInjector final : public UsbDeviceModel {
   bool Unlink(uint64_t id) override;
   void Tick() override;
   sync::TimeNs NextTimeout() const override;
+  UsbSpeed speed() const override { return device_->speed(); }
+  void Reset() override;
   void SetPlugged(bool plugged) override;
   bool plugged() const override { return device_->plugged(); }
   uint32_t plugs() const override { return device_->plugs(); }
@@ -70,7 +73,7 @@ class FaultInjector final : public UsbDeviceModel {
   struct Endpoint {
     uint64_t transfers = 0, bytes = 0;
     bool halted = false;
-    uint64_t errors_left = 0;
+    uint64_t errors_left = 0, babbles_left = 0;
     sync::TimeNs nak_until = 0;
     sync::TimeNs hold_until = 0;
     std::deque<Urb> waiting;  // while NAKed
@@ -90,6 +93,8 @@ class FaultInjector final : public UsbDeviceModel {
   };
 
   void Pass(const Urb& urb);
+  // Ends what waits or is held back.
+  void EndAll(TransferStatus status);
   // Applies the faults that fall on this URB; false if it does not go to the device now.
   bool Apply(const Urb& original, Urb& urb, Passing& passing);
   void Act(const Fault& fault, sync::TimeNs now);

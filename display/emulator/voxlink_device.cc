@@ -88,22 +88,28 @@ void VoxlinkDevice::ResetMode() {
 void VoxlinkDevice::SetPlugged(bool plugged) {
   if (plugged == plugged_) return;
   plugged_ = plugged;
-  StopSession();
-  halted_.clear();
-  configuration_ = 0;
-  brightness_ = 65535;
-  power_limit_mw_ = 0;
-  screen_.SetBlank(false);
-  ResetMode();
   if (plugged) {
     ++plugs_;
     boot_ = clock_.Now();
   }
+  configuration_ = 0;
+  Forget(TransferStatus::kDisconnected);
+}
+
+void VoxlinkDevice::Reset() { Forget(TransferStatus::kCancelled); }
+
+void VoxlinkDevice::Forget(TransferStatus status) {
+  StopSession();
+  halted_.clear();
+  brightness_ = 65535;
+  power_limit_mw_ = 0;
+  screen_.SetBlank(false);
+  ResetMode();
   std::deque<Waiting> pending;
   pending.swap(bulk_);
   pending.insert(pending.end(), interrupt_.begin(), interrupt_.end());
   interrupt_.clear();
-  for (const Waiting& urb : pending) complete_(urb.id, TransferStatus::kDisconnected, 0, {});
+  for (const Waiting& urb : pending) complete_(urb.id, status, 0, {});
 }
 
 void VoxlinkDevice::Submit(const Urb& urb) {

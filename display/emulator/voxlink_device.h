@@ -44,6 +44,10 @@ class VoxlinkDevice final : public UsbDeviceModel {
   bool Unlink(uint64_t id) override;
   void Tick() override;
   sync::TimeNs NextTimeout() const override;
+  UsbSpeed speed() const override {
+    return config_.super_speed ? UsbSpeed::kSuper : UsbSpeed::kHigh;
+  }
+  void Reset() override;
   void SetPlugged(bool plugged) override;
   bool plugged() const override { return plugged_; }
   uint32_t plugs() const override { return plugs_; }
@@ -79,6 +83,8 @@ class VoxlinkDevice final : public UsbDeviceModel {
   std::optional<std::vector<std::byte>> Descriptor(uint16_t value) const;
   bool WriteRequest(const UsbSetup& setup, std::span<const std::byte> data);
   void ResetMode();
+  // Ends the session and forgets what was set; pending URBs end as `status`.
+  void Forget(TransferStatus status);
   bool SetMode(std::span<const std::byte> data);
   void StartSession();
   void StopSession();

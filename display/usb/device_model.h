@@ -20,7 +20,10 @@ struct Urb {
   UsbSetup setup;                  // control only
   std::span<const std::byte> out;  // valid until the URB is complete or unlinked
   uint32_t length = 0;             // IN: bytes asked for
+  bool zero_packet = false;        // an empty packet follows `out`
 };
+
+enum class UsbSpeed : uint8_t { kFull, kHigh, kSuper };  // 12, 480, 5000 Mbit/s
 
 class UsbDeviceModel {
  public:
@@ -39,6 +42,12 @@ class UsbDeviceModel {
   virtual void Tick() = 0;
   // When Tick has something to do at the latest; kNever if nothing.
   virtual sync::TimeNs NextTimeout() const = 0;
+
+  // At which it enumerates; fixed.
+  virtual UsbSpeed speed() const = 0;
+  // The port is reset: all URBs complete as kCancelled and the device forgets its state; handles to
+  // it stay good.
+  virtual void Reset() = 0;
 
   // Plugs the cable, or pulls it: then all URBs complete as kDisconnected
   // and the device forgets its state.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "display/usb/slab_memory.h"
 
 namespace voxeld::display {
 namespace {
@@ -16,11 +17,33 @@ size_t SizeOf(const Transfer& transfer) {
 constexpr uint8_t kToEndpoint = 0x02;
 constexpr uint8_t kClearFeature = 0x01;
 
+constexpr size_t kSlabBytes = size_t{256} << 10;
+constexpr size_t kSlabs = 16;
+
+// Slabs of ordinary memory, made at once and touched as they are used.
+class HeapSlabs final : public SlabMemory {
+ public:
+  static std::shared_ptr<TransferMemory> Make() {
+    auto memory = std::make_unique_for_overwrite<std::byte[]>(kSlabs * kSlabBytes);
+    std::vector<void*> slabs;
+    for (size_t i = 0; i < kSlabs; ++i) slabs.push_back(memory.get() + i * kSlabBytes);
+    return std::make_shared<HeapSlabs>(std::move(memory), std::move(slabs));
+  }
+  HeapSlabs(std::unique_ptr<std::byte[]> memory, std::vector<void*> slabs)
+      : SlabMemory(std::move(slabs), kSlabBytes), memory_(std::move(memory)) {}
+
+ private:
+  const std::unique_ptr<std::byte[]> memory_;
+};
+
 }  // namespace
 
 InProcessTransport::InProcessTransport(std::unique_ptr<UsbDeviceModel> device, sync::Clock& clock,
                                        Options options)
-    : clock_(clock), options_(std::move(options)), device_(std::move(device)) {
+    : clock_(clock),
+      options_(std::move(options)),
+      device_(std::move(device)),
+      memory_(HeapSlabs::Make()) {
   device_->SetComplete([this](uint64_t id, TransferStatus status, uint32_t actual,
                               std::span<const std::byte> in) VOXELD_NO_THREAD_SAFETY_ANALYSIS {
     OnComplete(id, status, actual, in);  // inside a call of the model: device_mutex_ is held
@@ -48,6 +71,7 @@ absl::Status InProcessTransport::Open() {
   seen_plugs_ = device_->plugs();
   open_ = true;
   gone_ = false;
+  arrived_ = false;
   return absl::OkStatus();
 }
 
@@ -68,7 +92,7 @@ bool InProcessTransport::is_open() const {
   return open_;
 }
 
-absl::StatusOr<TransferId> InProcessTransport::Queue(Transfer transfer) {
+absl::StatusOr<TransferId> InProcessTransport::Queue(Transfer&& transfer, bool reset) {
   sync::MutexLock lock(mutex_);
   if (!open_) return absl::FailedPreconditionError("the device is not open");
   if (gone_) return absl::UnavailableError("the device was unplugged");
@@ -80,12 +104,12 @@ absl::StatusOr<TransferId> InProcessTransport::Queue(Transfer transfer) {
   }
   bytes_in_flight_ += size;
   const TransferId id = next_id_++;
-  requests_.emplace_back(Request{id, std::move(transfer)});
+  requests_.emplace_back(Request{id, std::move(transfer), reset});
   work_.NotifyAll();
   return id;
 }
 
-absl::StatusOr<TransferId> InProcessTransport::Submit(Transfer transfer) {
+absl::StatusOr<TransferId> InProcessTransport::Submit(Transfer&& transfer) {
   return Queue(std::move(transfer));
 }
 
@@ -98,6 +122,23 @@ absl::StatusOr<TransferId> InProcessTransport::ClearHalt(uint8_t endpoint) {
                     .index = endpoint,
                     .length = 0};
   return Queue(std::move(transfer));
+}
+
+absl::StatusOr<TransferId> InProcessTransport::Reset() {
+  Transfer transfer;
+  transfer.type = TransferType::kControl;
+  return Queue(std::move(transfer), true);
+}
+
+TransferBytes InProcessTransport::TakeBuffer(size_t capacity) {
+  TransferBytes buffer(memory_);
+  buffer.reserve(capacity);
+  return buffer;
+}
+
+bool InProcessTransport::TakeArrival() {
+  sync::MutexLock lock(mutex_);
+  return std::exchange(arrived_, false);
 }
 
 void InProcessTransport::Cancel(TransferId id) {
@@ -140,8 +181,12 @@ void InProcessTransport::Give(Request request) {
   urb.setup = transfer.setup;
   urb.out = transfer.data;
   urb.length = transfer.length;
+  urb.zero_packet = transfer.zero_packet;
   if (!device_->plugged() || device_->plugs() != seen_plugs_) {
     OnComplete(urb.id, TransferStatus::kDisconnected, 0, {});
+  } else if (request.reset) {
+    device_->Reset();
+    OnComplete(urb.id, TransferStatus::kOk, 0, {});
   } else {
     device_->Submit(urb);
   }
@@ -161,7 +206,7 @@ void InProcessTransport::OnComplete(uint64_t id, TransferStatus status, uint32_t
   completion.status = status;
   completion.actual_length = actual;
   completion.data = std::move(transfer.data);
-  if (transfer.length > 0) completion.data.assign(in.begin(), in.end());
+  if (transfer.length > 0) completion.data = TransferBytes(in);
   sync::MutexLock lock(mutex_);
   bytes_in_flight_ -= size;
   completions_.push_back(std::move(completion));
@@ -204,6 +249,7 @@ sync::TimeNs InProcessTransport::Pump() {
     was_plugged_ = plugged;
     sync::MutexLock lock(mutex_);
     if (open_ && stale) gone_ = true;
+    if (!open_ && changed && plugged) arrived_ = true;
     wake = !completions_.empty() || changed;
   }
   if (wake) CallWake();

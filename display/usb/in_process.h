@@ -41,13 +41,16 @@ class InProcessTransport final : public UsbTransport {
   void Close() override;
   bool is_open() const override;
   UsbIdentity identity() const override { return options_.identity; }
-  absl::StatusOr<TransferId> Submit(Transfer transfer) override;
+  absl::StatusOr<TransferId> Submit(Transfer&& transfer) override;
   void Cancel(TransferId id) override;
   absl::StatusOr<TransferId> ClearHalt(uint8_t endpoint) override;
+  absl::StatusOr<TransferId> Reset() override;
+  TransferBytes TakeBuffer(size_t capacity) override;
   size_t Drain(std::vector<TransferCompletion>& out) override;
   size_t bytes_in_flight() const override;
   size_t max_bytes_in_flight() const override { return options_.max_bytes_in_flight; }
   void SetWake(std::function<void()> wake) override;
+  bool TakeArrival() override;
 
   // Gives the device what was submitted, lets it do what is due, and returns when it wants to be
   // called again. Any thread; the event thread's loop is this.
@@ -61,6 +64,7 @@ class InProcessTransport final : public UsbTransport {
   struct Request {
     TransferId id = 0;
     Transfer transfer;
+    bool reset = false;  // instead of a transfer
   };
   struct Pending {
     Transfer transfer;
@@ -73,7 +77,7 @@ class InProcessTransport final : public UsbTransport {
   void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
                   std::span<const std::byte> in) VOXELD_REQUIRES(device_mutex_);
   void CallWake();
-  absl::StatusOr<TransferId> Queue(Transfer transfer);
+  absl::StatusOr<TransferId> Queue(Transfer&& transfer, bool reset = false);
 
   sync::Clock& clock_;
   const Options options_;
@@ -92,10 +96,13 @@ class InProcessTransport final : public UsbTransport {
   bool gone_ VOXELD_GUARDED_BY(mutex_) = false;  // the device that was opened is no more
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
   bool poked_ VOXELD_GUARDED_BY(mutex_) = false;  // the device's next time may have changed
+  bool arrived_ VOXELD_GUARDED_BY(mutex_) = false;
   TransferId next_id_ VOXELD_GUARDED_BY(mutex_) = 1;
   std::deque<std::variant<Request, TransferId>> requests_ VOXELD_GUARDED_BY(mutex_);  // id: cancel
   std::vector<TransferCompletion> completions_ VOXELD_GUARDED_BY(mutex_);
   size_t bytes_in_flight_ VOXELD_GUARDED_BY(mutex_) = 0;
+
+  const std::shared_ptr<TransferMemory> memory_;
 
   sync::Mutex wake_mutex_;
   std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);

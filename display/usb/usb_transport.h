@@ -1,7 +1,7 @@
 // The door to a USB device, shaped like libusb: submit, cancel, completion with status
 // and actual length, hotplug, a cap on the bytes in flight. Implementations:
-// in-process (an emulated device in this process), later libusb, recording, replaying
-// and fault-injecting ones. Drivers see nothing else of USB.
+// in-process (an emulated device in this process), libusb, and wrappers of either that record,
+// replay and inject faults. Drivers see nothing else of USB.
 //
 // Threads: bound to the owner's thread, but for the wake function, which an implementation may call
 // from any thread. Completions queue up and are handed out by Drain, so no code of ours ever runs
@@ -19,6 +19,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "display/sync/clock.h"
+#include "display/usb/transfer_bytes.h"
 
 namespace voxeld::display {
 
@@ -50,11 +51,14 @@ using TransferId = uint64_t;
 
 struct Transfer {
   TransferType type = TransferType::kBulk;
-  uint8_t endpoint = 0;         // with bit 7 for IN
-  UsbSetup setup;               // kControl only
-  std::vector<std::byte> data;  // OUT: what to send; moved in, handed back in the completion
-  uint32_t length = 0;          // IN: bytes asked for
-  sync::TimeNs timeout = 0;     // 0: none
+  uint8_t endpoint = 0;      // with bit 7 for IN
+  UsbSetup setup;            // kControl only
+  TransferBytes data;        // OUT: what to send; moved in, handed back in the completion
+  uint32_t length = 0;       // IN: bytes asked for
+  sync::TimeNs timeout = 0;  // 0: none
+  // Bulk OUT of whole packets: an empty packet follows, for protocols that end messages by a short
+  // one.
+  bool zero_packet = false;
 };
 
 struct TransferCompletion {
@@ -63,8 +67,8 @@ struct TransferCompletion {
   uint8_t endpoint = 0;
   TransferStatus status = TransferStatus::kOk;
   uint32_t actual_length = 0;
-  // IN: what came (actual_length bytes). OUT: the buffer, to be used again.
-  std::vector<std::byte> data;
+  // IN: what came (actual_length bytes). OUT: the buffer.
+  TransferBytes data;
 };
 
 struct UsbIdentity {
@@ -85,13 +89,21 @@ class UsbTransport {
   virtual bool is_open() const = 0;
   virtual UsbIdentity identity() const = 0;
 
-  // Queues a transfer. ResourceExhausted when max_bytes_in_flight() would be passed (submit again
-  // after a completion), Unavailable when the device is gone.
-  virtual absl::StatusOr<TransferId> Submit(Transfer transfer) = 0;
+  // Queues a transfer; after an error `transfer` is as it was. ResourceExhausted when
+  // max_bytes_in_flight(), or what all devices together may have, would be passed: submit again
+  // after a wake. Unavailable when the device is gone.
+  virtual absl::StatusOr<TransferId> Submit(Transfer&& transfer) = 0;
   // The transfer completes as kCancelled, or as it would have; unknown ids are ignored.
   virtual void Cancel(TransferId id) = 0;
   // Clears the halt of an endpoint; completes as a control transfer with the id returned.
   virtual absl::StatusOr<TransferId> ClearHalt(uint8_t endpoint) = 0;
+  // Resets the device's port; what is in flight is cancelled before. Completes as a control
+  // transfer with the id returned: as kDisconnected if the device came back as another.
+  virtual absl::StatusOr<TransferId> Reset() = 0;
+
+  // An empty buffer for OUT transfers with memory for `capacity` bytes: where the kernel offers it,
+  // memory that it reads in place.
+  virtual TransferBytes TakeBuffer(size_t capacity) = 0;
 
   // Moves all completions into `out`, in the order in which they happened. Returns how many.
   virtual size_t Drain(std::vector<TransferCompletion>& out) = 0;
@@ -103,6 +115,8 @@ class UsbTransport {
   // It must not call the transport. Once SetWake returns,
   // the function set before is not called any more.
   virtual void SetWake(std::function<void()> wake) = 0;
+  // True once after a device came that Open may find, while none is open.
+  virtual bool TakeArrival() = 0;
 };
 
 }  // namespace voxeld::display

@@ -15,8 +15,9 @@ size_t PacketSize(std::span<const std::byte> header) {
 
 }  // namespace
 
-void PacketWriter::Put(std::vector<std::byte>& out, PacketHeader header,
-                       std::span<const std::byte> head, std::span<const std::byte> tail) {
+template <typename Bytes>
+void PacketWriter::Put(Bytes& out, PacketHeader header, std::span<const std::byte> head,
+                       std::span<const std::byte> tail) {
   header.magic = kMagic;
   header.sequence = sequence_++;
   header.length = static_cast<uint32_t>(head.size() + tail.size());
@@ -27,8 +28,9 @@ void PacketWriter::Put(std::vector<std::byte>& out, PacketHeader header,
   AppendBytes(out, tail);
 }
 
-void PacketWriter::Slice(std::vector<std::byte>& out, uint64_t volume, uint32_t slice,
-                         uint16_t sub_frame, uint32_t offset, std::span<const std::byte> payload) {
+template <typename Bytes>
+void PacketWriter::Slice(Bytes& out, uint64_t volume, uint32_t slice, uint16_t sub_frame,
+                         uint32_t offset, std::span<const std::byte> payload) {
   PacketHeader header{};
   header.type = static_cast<uint8_t>(PacketType::kSlice);
   header.volume = volume;
@@ -38,8 +40,9 @@ void PacketWriter::Slice(std::vector<std::byte>& out, uint64_t volume, uint32_t 
   Put(out, header, payload, {});
 }
 
-void PacketWriter::Begin(std::vector<std::byte>& out, uint64_t volume, uint64_t base,
-                         uint32_t pictures, std::span<const std::byte> bitmap) {
+template <typename Bytes>
+void PacketWriter::Begin(Bytes& out, uint64_t volume, uint64_t base, uint32_t pictures,
+                         std::span<const std::byte> bitmap) {
   PacketHeader header{};
   header.type = static_cast<uint8_t>(PacketType::kBegin);
   header.volume = volume;
@@ -47,7 +50,8 @@ void PacketWriter::Begin(std::vector<std::byte>& out, uint64_t volume, uint64_t 
   Put(out, header, std::as_bytes(std::span(&begin, 1)), bitmap);
 }
 
-void PacketWriter::End(std::vector<std::byte>& out, uint64_t volume, bool show) {
+template <typename Bytes>
+void PacketWriter::End(Bytes& out, uint64_t volume, bool show) {
   PacketHeader header{};
   header.type = static_cast<uint8_t>(PacketType::kEnd);
   header.flags = show ? kEndShow : 0;
@@ -55,7 +59,8 @@ void PacketWriter::End(std::vector<std::byte>& out, uint64_t volume, bool show) 
   Put(out, header, {}, {});
 }
 
-void PacketWriter::Show(std::vector<std::byte>& out, uint64_t volume, uint64_t sweep) {
+template <typename Bytes>
+void PacketWriter::Show(Bytes& out, uint64_t volume, uint64_t sweep) {
   PacketHeader header{};
   header.type = static_cast<uint8_t>(PacketType::kShow);
   header.volume = volume;
@@ -63,12 +68,25 @@ void PacketWriter::Show(std::vector<std::byte>& out, uint64_t volume, uint64_t s
   Put(out, header, std::as_bytes(std::span(&show, 1)), {});
 }
 
-void PacketWriter::Plain(std::vector<std::byte>& out, PacketType type, uint64_t volume) {
+template <typename Bytes>
+void PacketWriter::Plain(Bytes& out, PacketType type, uint64_t volume) {
   PacketHeader header{};
   header.type = static_cast<uint8_t>(type);
   header.volume = volume;
   Put(out, header, {}, {});
 }
+
+#define VOXELD_PACKETS_INTO(Bytes)                                                  \
+  template void PacketWriter::Slice(Bytes&, uint64_t, uint32_t, uint16_t, uint32_t, \
+                                    std::span<const std::byte>);                    \
+  template void PacketWriter::Begin(Bytes&, uint64_t, uint64_t, uint32_t,           \
+                                    std::span<const std::byte>);                    \
+  template void PacketWriter::End(Bytes&, uint64_t, bool);                          \
+  template void PacketWriter::Show(Bytes&, uint64_t, uint64_t);                     \
+  template void PacketWriter::Plain(Bytes&, PacketType, uint64_t);
+VOXELD_PACKETS_INTO(TransferBytes)
+VOXELD_PACKETS_INTO(std::vector<std::byte>)
+#undef VOXELD_PACKETS_INTO
 
 void PacketParser::Reset() {
   partial_.clear();

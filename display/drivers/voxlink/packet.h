@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "display/drivers/voxlink/protocol.h"
+#include "display/usb/transfer_bytes.h"
 
 namespace voxeld::display::voxlink {
 
-// Appends packets to a buffer and numbers them.
+// Appends packets to a buffer and numbers them. Bytes: TransferBytes or std::vector<std::byte>.
 class PacketWriter {
  public:
   // The next packet's number.
@@ -19,19 +20,25 @@ class PacketWriter {
   // The stream begins anew (START).
   void Restart() { sequence_ = 0; }
 
-  void Slice(std::vector<std::byte>& out, uint64_t volume, uint32_t slice, uint16_t sub_frame,
-             uint32_t offset, std::span<const std::byte> payload);
+  template <typename Bytes>
+  void Slice(Bytes& out, uint64_t volume, uint32_t slice, uint16_t sub_frame, uint32_t offset,
+             std::span<const std::byte> payload);
   // `bitmap` is empty for base 0.
-  void Begin(std::vector<std::byte>& out, uint64_t volume, uint64_t base, uint32_t pictures,
+  template <typename Bytes>
+  void Begin(Bytes& out, uint64_t volume, uint64_t base, uint32_t pictures,
              std::span<const std::byte> bitmap);
-  void End(std::vector<std::byte>& out, uint64_t volume, bool show);
-  void Show(std::vector<std::byte>& out, uint64_t volume, uint64_t sweep);
+  template <typename Bytes>
+  void End(Bytes& out, uint64_t volume, bool show);
+  template <typename Bytes>
+  void Show(Bytes& out, uint64_t volume, uint64_t sweep);
   // ABORT, DROP and KEEPALIVE carry nothing (volume 0 for the last).
-  void Plain(std::vector<std::byte>& out, PacketType type, uint64_t volume);
+  template <typename Bytes>
+  void Plain(Bytes& out, PacketType type, uint64_t volume);
 
  private:
   // Fills in what all packets share; sequence and sums included.
-  void Put(std::vector<std::byte>& out, PacketHeader header, std::span<const std::byte> head,
+  template <typename Bytes>
+  void Put(Bytes& out, PacketHeader header, std::span<const std::byte> head,
            std::span<const std::byte> tail);
 
   uint32_t sequence_ = 0;

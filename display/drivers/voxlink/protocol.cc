@@ -6,6 +6,8 @@ void AppendBytes(std::vector<std::byte>& out, std::span<const std::byte> bytes) 
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
+void AppendBytes(TransferBytes& out, std::span<const std::byte> bytes) { out.Append(bytes); }
+
 const char* PacketTypeName(uint8_t type) {
   switch (static_cast<PacketType>(type)) {
     case PacketType::kBegin:

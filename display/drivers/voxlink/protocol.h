@@ -12,6 +12,8 @@
 #include <span>
 #include <vector>
 
+#include "display/usb/transfer_bytes.h"
+
 namespace voxeld::display::voxlink {
 
 static_assert(std::endian::native == std::endian::little, "the wire structs are little-endian");
@@ -328,9 +330,10 @@ T Load(std::span<const std::byte> bytes) {
 }
 
 void AppendBytes(std::vector<std::byte>& out, std::span<const std::byte> bytes);
+void AppendBytes(TransferBytes& out, std::span<const std::byte> bytes);
 
-template <typename T>
-void Append(std::vector<std::byte>& out, const T& value) {
+template <typename Bytes, typename T>
+void Append(Bytes& out, const T& value) {
   AppendBytes(out, std::as_bytes(std::span(&value, 1)));
 }
 

@@ -10,8 +10,8 @@
 namespace voxeld::display::voxlink {
 namespace {
 
-constexpr sync::TimeNs kFirstRetry = 100 * sync::kMillisecond;
-constexpr sync::TimeNs kLongestRetry = 5 * sync::kSecond;
+// A device whose set-up failed this often in a row has its port reset.
+constexpr int kFailuresToReset = 3;
 constexpr sync::TimeNs kReadyLimit = sync::kSecond;
 // Earlier than the protocol's 100 ms, for the jitter of the owner's thread.
 constexpr sync::TimeNs kKeepaliveAfter = 70 * sync::kMillisecond;
@@ -72,7 +72,9 @@ absl::Status VoxlinkDisplay::DoStart() {
   link_.transport().SetWake([this] { Wake(); });
   phase_ = Phase::kDetached;
   attach_at_ = clock().Now();
-  retry_delay_ = 0;
+  failed_at_ = 0;
+  retry_.Reset();
+  failed_setups_ = 0;
   Wake();
   return absl::OkStatus();
 }
@@ -86,10 +88,10 @@ void VoxlinkDisplay::DoStop() {
 }
 
 void VoxlinkDisplay::OnLinkFailed(const std::string& reason) {
+  if (phase_ == Phase::kSettingUp || phase_ == Phase::kWaitingReady) ++failed_setups_;
   link_.Close();
   phase_ = Phase::kDetached;
-  retry_delay_ = retry_delay_ == 0 ? kFirstRetry : std::min(2 * retry_delay_, kLongestRetry);
-  attach_at_ = clock().Now() + retry_delay_;
+  RetryLater(clock().Now());
   const uint64_t bytes = sending_.bytes;
   sending_ = Sending{};
   sweep_.reset();
@@ -98,6 +100,10 @@ void VoxlinkDisplay::OnLinkFailed(const std::string& reason) {
 
 sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
   link_.Poll();
+  if (phase_ == Phase::kDetached && link_.transport().TakeArrival()) {
+    // A device that comes and goes is tried no faster than one that fails.
+    attach_at_ = std::min(attach_at_, failed_at_ + retry_.first());
+  }
   if (phase_ == Phase::kDetached && now >= attach_at_) TryAttach(now);
   const sync::TimeNs next = Advance(now);
   return link_.failed() ? now : next;
@@ -122,7 +128,7 @@ sync::TimeNs VoxlinkDisplay::KeepAlive(sync::TimeNs now) {
   const sync::TimeNs due = link_.last_sent() + kKeepaliveAfter;
   if (now < due) return due;
   if (link_.Room() < sizeof(PacketHeader)) return now + kKeepaliveAfter;
-  std::vector<std::byte> buffer = link_.TakeBuffer();
+  TransferBytes buffer = link_.TakeBuffer();
   writer_.Plain(buffer, PacketType::kKeepalive, 0);
   mutable_stats().bytes_out += buffer.size();
   TapOut(kBulkOut, buffer);
@@ -132,16 +138,24 @@ sync::TimeNs VoxlinkDisplay::KeepAlive(sync::TimeNs now) {
 
 // ---- attach: docs/protocols/voxlink.md §9
 
+void VoxlinkDisplay::RetryLater(sync::TimeNs now) {
+  failed_at_ = now;
+  attach_at_ = now + retry_.Next();
+}
+
 void VoxlinkDisplay::TryAttach(sync::TimeNs now) {
   const absl::Status status = link_.Open();
   if (!status.ok()) {
-    retry_delay_ = retry_delay_ == 0 ? kFirstRetry : std::min(2 * retry_delay_, kLongestRetry);
-    attach_at_ = now + retry_delay_;
+    RetryLater(now);
     if (!absl::IsNotFound(status)) DeviceLost(std::string(status.message()));
     return;
   }
   phase_ = Phase::kSettingUp;
   capability_bytes_.clear();
+  if (failed_setups_ >= kFailuresToReset) {
+    failed_setups_ = 0;
+    link_.ResetDevice();
+  }
   link_.ReadConfiguration();
 }
 
@@ -240,6 +254,7 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
     case EventType::kReady:
       if (phase_ != Phase::kWaitingReady) return;
       phase_ = Phase::kReady;
+      failed_setups_ = 0;
       ++mutable_stats().attaches;
       return Attached();
     case EventType::kSweep:

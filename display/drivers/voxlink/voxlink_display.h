@@ -12,6 +12,7 @@
 #include "display/drivers/voxlink/capabilities.h"
 #include "display/drivers/voxlink/packet.h"
 #include "display/drivers/voxlink/voxlink_link.h"
+#include "display/sync/backoff.h"
 
 namespace voxeld::display::voxlink {
 
@@ -76,6 +77,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
 
   // Attach.
   void TryAttach(sync::TimeNs now);
+  void RetryLater(sync::TimeNs now);
   void OnCapabilities(std::span<const std::byte> page);
   void Configure();
 
@@ -83,7 +85,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   void Begin(const SliceFramePtr& frame, bool full);
   void Pump();
   size_t NextPacketSize() const;
-  void WritePacket(std::vector<std::byte>& out);
+  void WritePacket(TransferBytes& out);
   void OnMissing(const EventHeader& header, const MissingEvent& event);
   void OnComplete(uint64_t volume);
   void OnShown(uint64_t volume, uint64_t start_ns, bool dark);
@@ -97,7 +99,9 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   VoxlinkLink link_;
   Phase phase_ = Phase::kDetached;
   sync::TimeNs attach_at_ = 0;
-  sync::TimeNs retry_delay_ = 0;
+  sync::TimeNs failed_at_ = 0;
+  sync::Backoff retry_{100 * sync::kMillisecond, 5 * sync::kSecond};
+  int failed_setups_ = 0;  // in a row
   sync::TimeNs ready_by_ = 0;
   std::vector<std::byte> capability_bytes_;
   DeviceCapabilities capabilities_;

@@ -12,7 +12,6 @@ constexpr int kEventReads = 8;  // interrupt transfers that wait at any time
 constexpr int kMostEventFailures = 16;
 constexpr uint16_t kMostConfiguration = 1024;
 constexpr size_t kTransferBytes = size_t{256} << 10;
-constexpr size_t kMostPooled = 64;
 constexpr size_t kKeptFree = 8192;  // of the transport's limit, for requests and events
 
 }  // namespace
@@ -28,6 +27,7 @@ absl::Status VoxlinkLink::Open() {
 }
 
 void VoxlinkLink::Close() {
+  held_.reset();
   transport_->Close();
   ++generation_;
   failed_ = false;
@@ -64,6 +64,8 @@ void VoxlinkLink::SendControl() {
   absl::StatusOr<TransferId> id;
   if (request.kind == Kind::kClearHalt) {
     id = transport_->ClearHalt(request.endpoint);
+  } else if (request.kind == Kind::kReset) {
+    id = transport_->Reset();
   } else {
     Transfer transfer;
     transfer.type = TransferType::kControl;
@@ -75,6 +77,12 @@ void VoxlinkLink::SendControl() {
   }
   if (!id.ok()) return Fail(std::string(id.status().message()));
   control_id_ = *id;
+}
+
+void VoxlinkLink::ResetDevice() {
+  ControlRequest request;
+  request.kind = Kind::kReset;
+  Enqueue(std::move(request));
 }
 
 void VoxlinkLink::ReadConfiguration() {
@@ -98,14 +106,14 @@ void VoxlinkLink::Read(Request request, uint16_t value, uint16_t length) {
   Enqueue(std::move(control));
 }
 
-void VoxlinkLink::Write(Request request, uint16_t value, std::vector<std::byte> data) {
+void VoxlinkLink::Write(Request request, uint16_t value, std::span<const std::byte> data) {
   ControlRequest control;
   control.setup = {.request_type = kRequestOut,
                    .request = static_cast<uint8_t>(request),
                    .value = value,
                    .index = 0,
                    .length = static_cast<uint16_t>(data.size())};
-  control.data = std::move(data);
+  control.data.Append(data);
   Enqueue(std::move(control));
 }
 
@@ -146,6 +154,7 @@ void VoxlinkLink::OnControlDone(TransferCompletion& completion) {
     case Kind::kRecoveryStatus:
       return OnStatusReply(request.kind, completion.data);
     case Kind::kClearHalt:
+    case Kind::kReset:
       return;
   }
 }
@@ -247,24 +256,21 @@ size_t VoxlinkLink::bulk_limit() const {
 }
 
 size_t VoxlinkLink::Room() const {
-  if (!session_ || failed_ || recovering()) return 0;
+  if (!session_ || failed_ || recovering() || held_.has_value()) return 0;
   const size_t limit = bulk_limit();
   const uint64_t credit = credit_limit_ > sent_ ? credit_limit_ - sent_ : 0;
   return std::min<uint64_t>(credit, limit > bulk_bytes_ ? limit - bulk_bytes_ : 0);
 }
 
-std::vector<std::byte> VoxlinkLink::TakeBuffer() {
-  if (pool_.empty()) {
-    std::vector<std::byte> buffer;
-    buffer.reserve(kTransferBytes);
-    return buffer;
-  }
-  std::vector<std::byte> buffer = std::move(pool_.back());
-  pool_.pop_back();
-  return buffer;
+TransferBytes VoxlinkLink::TakeBuffer() { return transport_->TakeBuffer(kTransferBytes); }
+
+void VoxlinkLink::Send(TransferBytes buffer) {
+  sent_ += buffer.size();
+  last_sent_ = clock_.Now();
+  SubmitBulk(std::move(buffer));
 }
 
-void VoxlinkLink::Send(std::vector<std::byte> buffer) {
+void VoxlinkLink::SubmitBulk(TransferBytes buffer) {
   const size_t size = buffer.size();
   Transfer transfer;
   transfer.type = TransferType::kBulk;
@@ -272,11 +278,13 @@ void VoxlinkLink::Send(std::vector<std::byte> buffer) {
   transfer.data = std::move(buffer);
   transfer.timeout = options_.bulk_timeout;
   const absl::StatusOr<TransferId> id = transport_->Submit(std::move(transfer));
+  if (absl::IsResourceExhausted(id.status())) {
+    held_ = std::move(transfer.data);
+    return;
+  }
   if (!id.ok()) return Fail(std::string(id.status().message()));
   bulk_.emplace(*id, size);
   bulk_bytes_ += size;
-  sent_ += size;
-  last_sent_ = clock_.Now();
 }
 
 void VoxlinkLink::NoteProgress() {
@@ -288,10 +296,7 @@ void VoxlinkLink::OnBulkDone(TransferCompletion& completion) {
   const auto it = bulk_.find(completion.id);
   bulk_bytes_ -= it->second;
   bulk_.erase(it);
-  if (pool_.size() < kMostPooled) {
-    completion.data.clear();
-    pool_.push_back(std::move(completion.data));
-  }
+  completion.data = {};
   switch (completion.status) {
     case TransferStatus::kOk:
       break;
@@ -318,6 +323,7 @@ void VoxlinkLink::Recover() {
 
 void VoxlinkLink::StepRecovery() {
   if (recovery_ != Recovery::kDraining || !bulk_.empty()) return;
+  held_.reset();  // lost with what was before it
   if (std::exchange(halted_, false)) {
     ControlRequest clear;
     clear.kind = Kind::kClearHalt;
@@ -345,6 +351,10 @@ void VoxlinkLink::Poll() {
   }
   completions.clear();
   drained_ = std::move(completions);
+  if (held_.has_value() && generation == generation_) {
+    TransferBytes held = *std::exchange(held_, std::nullopt);
+    SubmitBulk(std::move(held));
+  }
   if (failed_ && generation == generation_) {
     const std::string reason = std::move(failure_);
     client_->OnLinkFailed(reason);

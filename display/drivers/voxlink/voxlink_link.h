@@ -11,6 +11,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,9 +56,10 @@ class VoxlinkLink {
   bool is_open() const { return transport_->is_open(); }
 
   // Requests are queued and sent one after another.
+  void ResetDevice();
   void ReadConfiguration();
   void Read(Request request, uint16_t value, uint16_t length);
-  void Write(Request request, uint16_t value, std::vector<std::byte> data = {});
+  void Write(Request request, uint16_t value, std::span<const std::byte> data = {});
 
   // Begins to listen for events of a new session: credit, counts and numbers start anew.
   void BeginSession(uint32_t receive_buffer);
@@ -67,9 +69,10 @@ class VoxlinkLink {
   // Bytes that may be handed over now: 0 while recovering or without a session.
   size_t Room() const;
   // An empty buffer with memory for a transfer.
-  std::vector<std::byte> TakeBuffer();
-  // Whole packets; at most Room().
-  void Send(std::vector<std::byte> buffer);
+  TransferBytes TakeBuffer();
+  // Whole packets; at most Room(). What the transport has no room for, because other devices took
+  // it, waits here.
+  void Send(TransferBytes buffer);
   bool recovering() const { return recovery_ != Recovery::kNone; }
   size_t bulk_in_flight() const { return bulk_bytes_; }
   // The most bytes that may ever be in flight.
@@ -90,11 +93,18 @@ class VoxlinkLink {
 
  private:
   enum class Recovery : uint8_t { kNone, kDraining, kAsking };
-  enum class Kind : uint8_t { kConfiguration, kRequest, kStatus, kRecoveryStatus, kClearHalt };
+  enum class Kind : uint8_t {
+    kConfiguration,
+    kRequest,
+    kStatus,
+    kRecoveryStatus,
+    kClearHalt,
+    kReset
+  };
   struct ControlRequest {
     Kind kind = Kind::kRequest;
     UsbSetup setup;
-    std::vector<std::byte> data;
+    TransferBytes data;
     uint8_t endpoint = 0;  // kClearHalt
   };
 
@@ -107,6 +117,7 @@ class VoxlinkLink {
   void EnqueueStatus(Kind kind);
   void OnStatusReply(Kind kind, std::span<const std::byte> data);
   void StepRecovery();
+  void SubmitBulk(TransferBytes buffer);
   void Fail(const std::string& reason);
 
   const std::unique_ptr<UsbTransport> transport_;
@@ -128,7 +139,7 @@ class VoxlinkLink {
   int event_failures_ = 0;
   bool status_asked_ = false;
 
-  std::vector<std::vector<std::byte>> pool_;
+  std::optional<TransferBytes> held_;  // counted in sent_, not yet submitted
   size_t bulk_bytes_ = 0;
   std::map<TransferId, size_t> bulk_;
   uint64_t sent_ = 0, credit_limit_ = 0;  // bytes since START

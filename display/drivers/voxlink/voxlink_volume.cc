@@ -56,7 +56,7 @@ size_t VoxlinkDisplay::NextPacketSize() const {
   }
 }
 
-void VoxlinkDisplay::WritePacket(std::vector<std::byte>& out) {
+void VoxlinkDisplay::WritePacket(TransferBytes& out) {
   const FrameLayout& layout = info().layout;
   switch (sending_.stage) {
     case Stage::kBegin: {
@@ -98,7 +98,7 @@ void VoxlinkDisplay::WritePacket(std::vector<std::byte>& out) {
 
 void VoxlinkDisplay::Pump() {
   while (!to_abort_.empty() && link_.Room() >= sizeof(PacketHeader)) {
-    std::vector<std::byte> buffer = link_.TakeBuffer();
+    TransferBytes buffer = link_.TakeBuffer();
     writer_.Plain(buffer, PacketType::kAbort, to_abort_.front());
     to_abort_.erase(to_abort_.begin());
     mutable_stats().bytes_out += buffer.size();
@@ -111,7 +111,7 @@ void VoxlinkDisplay::Pump() {
   };
   while (has_packet() && NextPacketSize() <= link_.Room()) {
     const size_t limit = std::min(link_.Room(), std::max(kTransferBytes, NextPacketSize()));
-    std::vector<std::byte> buffer = link_.TakeBuffer();
+    TransferBytes buffer = link_.TakeBuffer();
     while (has_packet() && buffer.size() + NextPacketSize() <= limit) WritePacket(buffer);
     sending_.bytes += buffer.size();
     sending_.last_byte_ns = clock().Now();
@@ -142,7 +142,7 @@ void VoxlinkDisplay::OnComplete(uint64_t volume) {
 void VoxlinkDisplay::OnShown(uint64_t volume, uint64_t start_ns, bool dark) {
   if (volume != sending_.number || sending_.stage == Stage::kIdle) return;
   OnComplete(volume);  // its own event may have been lost
-  retry_delay_ = 0;
+  retry_.Reset();
   if (dark && !blanked()) return Lose("the device was dark when the volume's sweep began");
   const Sending done = std::exchange(sending_, Sending{});
   FrameDone(clock_map_.ToHost(start_ns), Evidence::kDevice, done.last_byte_ns, done.bytes);

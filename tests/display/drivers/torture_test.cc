@@ -28,7 +28,7 @@ Fault RandomFault(std::mt19937& random) {
   const auto below = [&](uint64_t n) { return random() % n; };
   Fault fault;
   fault.when = static_cast<Fault::When>(below(3));
-  fault.what = static_cast<Fault::What>(below(8));
+  fault.what = static_cast<Fault::What>(below(9));
   fault.endpoint = below(5) == 0 ? 0x82 : 0x01;
   fault.at = fault.when == Fault::When::kTransfer ? 1 + below(300)
              : fault.when == Fault::When::kByte   ? below(200'000)
@@ -44,6 +44,7 @@ Fault RandomFault(std::mt19937& random) {
       fault.amount = below(800) * kMillisecond;
       break;
     case Fault::What::kError:
+    case Fault::What::kBabble:
       fault.amount = 1 + below(4);
       break;
     case Fault::What::kPartial:

@@ -32,6 +32,8 @@ class Sink final : public UsbDeviceModel {
   bool Unlink(uint64_t id) override { return std::erase(waiting_, id) > 0; }
   void Tick() override {}
   sync::TimeNs NextTimeout() const override { return sync::kNever; }
+  UsbSpeed speed() const override { return UsbSpeed::kHigh; }
+  void Reset() override {}
   void SetPlugged(bool plugged) override {
     plugged_ = plugged;
     if (plugged) ++plugs_;

@@ -160,7 +160,7 @@ class TransportConformance : public testing::TestWithParam<CarrierCase> {
                       .request = static_cast<uint8_t>(request)};
     return Must(usb().Submit(std::move(transfer)));
   }
-  TransferId SubmitBulk(std::vector<std::byte> data, sync::TimeNs timeout = 0) {
+  TransferId SubmitBulk(TransferBytes data, sync::TimeNs timeout = 0) {
     Transfer transfer;
     transfer.endpoint = voxlink::kBulkOut;
     transfer.data = std::move(data);
@@ -241,7 +241,7 @@ TEST_P(TransportConformance, BulkBytesArriveAndTheBufferComesBack) {
   Wait(SubmitRequest(voxlink::Request::kStart));
   const TransferId ready = SubmitEvent();
   EXPECT_EQ(Wait(ready).status, TransferStatus::kShort);
-  std::vector<std::byte> packet;
+  TransferBytes packet;
   voxlink::PacketWriter writer;
   writer.Plain(packet, voxlink::PacketType::kAbort, 77);
   const std::byte* const memory = packet.data();
@@ -265,7 +265,7 @@ TEST_P(TransportConformance, BulkBytesArriveAndTheBufferComesBack) {
 TEST_P(TransportConformance, CompletionsOfAnEndpointKeepTheirOrder) {
   Open();
   std::vector<TransferId> sent;
-  for (int i = 0; i < 50; ++i) sent.push_back(SubmitBulk(std::vector<std::byte>(100)));
+  for (int i = 0; i < 50; ++i) sent.push_back(SubmitBulk(TransferBytes(100)));
   Wait(sent.back());
   EXPECT_EQ(order_, sent);
 }
@@ -279,7 +279,7 @@ TEST_P(TransportConformance, BytesInFlightAreCountedAndCapped) {
   Transfer big;
   big.endpoint = voxlink::kBulkOut;
   big.data.resize(kInFlight);
-  EXPECT_TRUE(absl::IsResourceExhausted(usb().Submit(big).status()));
+  EXPECT_TRUE(absl::IsResourceExhausted(usb().Submit(std::move(big)).status()));
   usb().Cancel(read);
   EXPECT_EQ(Wait(read).status, TransferStatus::kCancelled);
   EXPECT_EQ(usb().bytes_in_flight(), 0u);
@@ -289,7 +289,7 @@ TEST_P(TransportConformance, BytesInFlightAreCountedAndCapped) {
 TEST_P(TransportConformance, CancelOfUnknownAndFinishedTransfersIsNothing) {
   Open();
   usb().Cancel(999);
-  const TransferId id = SubmitBulk(std::vector<std::byte>(10));
+  const TransferId id = SubmitBulk(TransferBytes(10));
   EXPECT_EQ(Wait(id).status, TransferStatus::kOk);
   usb().Cancel(id);
   EXPECT_EQ(Wait(SubmitIn(kDeviceDescriptor)).status, TransferStatus::kOk);
@@ -299,25 +299,25 @@ TEST_P(TransportConformance, CancelOfUnknownAndFinishedTransfersIsNothing) {
 TEST_P(TransportConformance, TransfersTimeOut) {
   carrier_->AddFault({.what = Fault::What::kNak, .amount = 5 * kSecond});
   Open();
-  EXPECT_EQ(Wait(SubmitBulk(std::vector<std::byte>(10), 20 * kMillisecond)).status,
+  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10), 20 * kMillisecond)).status,
             TransferStatus::kTimedOut);
 }
 
 TEST_P(TransportConformance, AHaltLastsUntilItIsCleared) {
   carrier_->AddFault({.what = Fault::What::kStall});
   Open();
-  EXPECT_EQ(Wait(SubmitBulk(std::vector<std::byte>(10))).status, TransferStatus::kStall);
-  EXPECT_EQ(Wait(SubmitBulk(std::vector<std::byte>(10))).status, TransferStatus::kStall);
+  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kStall);
+  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kStall);
   EXPECT_EQ(Wait(Must(usb().ClearHalt(voxlink::kBulkOut))).status, TransferStatus::kOk);
-  EXPECT_EQ(Wait(SubmitBulk(std::vector<std::byte>(10))).status, TransferStatus::kOk);
+  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kOk);
 }
 
 TEST_P(TransportConformance, ErrorsPassAndPartialTransfersTell) {
   carrier_->AddFault({.what = Fault::What::kError, .amount = 1});
   carrier_->AddFault({.at = 2, .what = Fault::What::kPartial, .amount = 4});
   Open();
-  EXPECT_EQ(Wait(SubmitBulk(std::vector<std::byte>(10))).status, TransferStatus::kError);
-  const TransferCompletion partial = Wait(SubmitBulk(std::vector<std::byte>(10)));
+  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kError);
+  const TransferCompletion partial = Wait(SubmitBulk(TransferBytes(10)));
   EXPECT_EQ(partial.status, TransferStatus::kStall);
   EXPECT_EQ(partial.actual_length, 4u);
 }
@@ -342,7 +342,7 @@ TEST_P(TransportConformance, CloseDiscardsWhatIsPending) {
   carrier_->AddFault({.what = Fault::What::kNak, .amount = 5 * kSecond});
   Open();
   SubmitEvent();
-  SubmitBulk(std::vector<std::byte>(10));
+  SubmitBulk(TransferBytes(10));
   usb().Close();
   std::vector<TransferCompletion> drained;
   EXPECT_EQ(usb().Drain(drained), 0u);
@@ -364,6 +364,64 @@ TEST_P(TransportConformance, CloseLetsARequestGoOut) {
                      .request = static_cast<uint8_t>(voxlink::Request::kGetStatus),
                      .length = sizeof(voxlink::Status)}));
   EXPECT_EQ(voxlink::Load<voxlink::Status>(status.data).running, 0);
+}
+
+TEST_P(TransportConformance, ResetCancelsWhatIsInFlightAndTheDeviceStartsAnew) {
+  Open();
+  Wait(SubmitRequest(voxlink::Request::kStart));
+  EXPECT_EQ(Wait(SubmitEvent()).status, TransferStatus::kShort);
+  const TransferId read = SubmitEvent();
+  EXPECT_EQ(Wait(Must(usb().Reset())).status, TransferStatus::kOk);
+  EXPECT_EQ(Wait(read).status, TransferStatus::kCancelled);
+  const TransferCompletion status =
+      Wait(SubmitIn({.request_type = voxlink::kRequestIn,
+                     .request = static_cast<uint8_t>(voxlink::Request::kGetStatus),
+                     .length = sizeof(voxlink::Status)}));
+  EXPECT_EQ(voxlink::Load<voxlink::Status>(status.data).running, 0);
+}
+
+TEST_P(TransportConformance, AnArrivalIsToldOnceWhileNothingIsOpen) {
+  Open();
+  EXPECT_FALSE(usb().TakeArrival());
+  carrier_->SetPlugged(false);
+  EXPECT_TRUE(carrier_->RunUntil([&] { return !usb().Submit(Transfer{}).ok(); }));
+  usb().Close();
+  carrier_->SetPlugged(true);
+  EXPECT_TRUE(carrier_->RunUntil([&] { return usb().TakeArrival(); }));
+  EXPECT_FALSE(usb().TakeArrival());
+  Open();
+}
+
+TEST_P(TransportConformance, OverflowsAreTold) {
+  carrier_->AddFault(
+      {.endpoint = voxlink::kInterruptIn, .what = Fault::What::kBabble, .amount = 1});
+  Open();
+  Wait(SubmitRequest(voxlink::Request::kStart));
+  EXPECT_EQ(Wait(SubmitEvent()).status, TransferStatus::kOverflow);
+  EXPECT_EQ(Wait(SubmitEvent()).status, TransferStatus::kShort);
+}
+
+TEST_P(TransportConformance, BuffersHaveMemoryAndOutliveTheirDevice) {
+  Open();
+  TransferBytes buffer = usb().TakeBuffer(4096);
+  EXPECT_TRUE(buffer.empty());
+  EXPECT_GE(buffer.capacity(), 4096u);
+  std::vector<TransferBytes> many;
+  for (int i = 0; i < 40; ++i) {
+    many.push_back(usb().TakeBuffer(size_t{256} << 10));
+    many.back().resize(size_t{256} << 10);
+  }
+  usb().Close();
+  buffer.resize(4096);
+  many[39][5] = std::byte{7};
+  EXPECT_EQ(many[39][5], std::byte{7});
+}
+
+TEST_P(TransportConformance, WhatIsRefusedIsAsItWas) {
+  Transfer transfer;
+  transfer.data.resize(77);
+  EXPECT_FALSE(usb().Submit(std::move(transfer)).ok());
+  EXPECT_EQ(transfer.data.size(), 77u);
 }
 
 TEST_P(TransportConformance, StatusesHaveNames) {
