@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -61,6 +62,18 @@ struct Rotor {
   std::vector<Panel> panels;            // 1 to 16
   bool clockwise = false;
   bool operator==(const Rotor&) const = default;
+};
+
+// Lights at points, in whatever arrangement: an LED lattice. A slice is what goes out together (a
+// controller's lights), its pixels in one row, height_px = 1.
+struct Lattice {
+  int32_t width_px = 0;   // lights a slice, 1 to 16384
+  int32_t height_px = 1;  // always
+  // Slice after slice, width_px each; nothing: no light is there, the pixel stays dark.
+  std::vector<std::optional<Vec3>> points_mm;
+  // The box around each point for which its light stands, half-open; > 0.
+  Vec3 cell_mm{1, 1, 1};
+  bool operator==(const Lattice&) const = default;
 };
 
 // Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s];
