@@ -28,6 +28,7 @@
 #include "display/drivers/registry.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
+#include "display/usb/libusb/libusb_bus.h"
 #include "gpu/worker/worker_pool.h"
 
 namespace voxeld::daemon {
@@ -56,7 +57,7 @@ struct WantedDisplay {
 };
 using Displays = std::vector<WantedDisplay>;
 
-absl::StatusOr<Displays> MakeDisplays(const Config& config, sync::Clock& clock) {
+absl::StatusOr<Displays> MakeDisplays(const Config& config, const display::DriverContext& context) {
   Displays displays;
   for (const DisplayConfig& wanted : config.displays) {
     const auto wrong = [&](const absl::Status& status) {
@@ -65,7 +66,7 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, sync::Clock& clock) 
     const absl::StatusOr<DisplayOptions> options = SplitDisplayOptions(wanted);
     if (!options.ok()) return wrong(options.status());
     absl::StatusOr<std::unique_ptr<display::Display>> made = display::CreateDisplay(
-        {.name = wanted.name, .driver = wanted.driver, .options = options->driver}, clock);
+        {.name = wanted.name, .driver = wanted.driver, .options = options->driver}, context);
     if (!made.ok()) return wrong(made.status());
     const absl::StatusOr<gpu::Affine> map =
         SceneToVoxel(options->view, (*made)->info().geometry.grid);
@@ -233,7 +234,16 @@ int Main(int argc, char** argv) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays make threads: main alone waits
 
   sync::SystemClock clock;
-  absl::StatusOr<Displays> displays = MakeDisplays(*config, clock);
+  std::unique_ptr<display::LibusbBus> usb;  // made for the first display that asks for it
+  const auto shared_usb = [&]() -> absl::StatusOr<display::UsbBus*> {
+    if (usb == nullptr) {
+      absl::StatusOr<std::unique_ptr<display::LibusbBus>> made = display::LibusbBus::Make(clock);
+      if (!made.ok()) return made.status();
+      usb = *std::move(made);
+    }
+    return usb.get();
+  };
+  absl::StatusOr<Displays> displays = MakeDisplays(*config, {clock, shared_usb});
   if (!displays.ok()) {
     return Fail(command_line->displays.empty() ? 1 : kUsageError, displays.status());
   }

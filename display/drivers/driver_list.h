@@ -7,15 +7,15 @@
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
-#include "display/sync/clock.h"
 
 namespace voxeld::display {
 
 struct Driver {
   std::string_view name;
   absl::StatusOr<std::unique_ptr<Display>> (*create)(const DisplayOptions& options,
-                                                     sync::Clock& clock);
+                                                     const DriverContext& context);
 };
 
 // Ascending by name.

@@ -7,9 +7,9 @@
 namespace voxeld::display {
 
 absl::StatusOr<std::unique_ptr<Display>> CreateDisplay(const DisplayOptions& options,
-                                                       sync::Clock& clock) {
+                                                       const DriverContext& context) {
   for (const Driver& driver : DriverList()) {
-    if (options.driver == driver.name) return driver.create(options, clock);
+    if (options.driver == driver.name) return driver.create(options, context);
   }
   return absl::InvalidArgumentError(
       absl::StrCat("display \"", options.name, "\": there is no driver \"", options.driver,

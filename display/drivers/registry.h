@@ -7,15 +7,15 @@
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
-#include "display/sync/clock.h"
 
 namespace voxeld::display {
 
 // A stopped display. InvalidArgument for an unknown driver, an unknown option or a bad value, with
-// what would be right. `clock` outlives the display.
+// what would be right; whatever context.usb says, of a driver that needs it.
 absl::StatusOr<std::unique_ptr<Display>> CreateDisplay(const DisplayOptions& options,
-                                                       sync::Clock& clock);
+                                                       const DriverContext& context);
 
 // Ascending.
 std::vector<std::string> DriverNames();

@@ -52,8 +52,9 @@ absl::StatusOr<Parts> CreateParts(const DisplayOptions& options, sync::Clock& cl
   return parts;
 }
 
-absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options, sync::Clock& clock) {
-  absl::StatusOr<Parts> parts = CreateParts(options, clock, true);
+absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
+                                                const DriverContext& context) {
+  absl::StatusOr<Parts> parts = CreateParts(options, context.clock, true);
   if (!parts.ok()) return parts.status();
   return std::move(parts->display);
 }

@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
 #include "display/sync/clock.h"
 
@@ -20,7 +21,8 @@ class VoxlinkDevice;
 namespace voxeld::display::simulated {
 
 // README.md lists the options.
-absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options, sync::Clock& clock);
+absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
+                                                const DriverContext& context);
 
 // The same with its insides, which belong to `display`. The device and the faults may be touched
 // within transport->WithDevice only.

@@ -1,0 +1,176 @@
+#include "display/usb/libusb/libusb_bus.h"
+
+#include <libusb-1.0/libusb.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "display/usb/libusb/libusb_transport.h"
+
+namespace voxeld::display {
+namespace {
+
+// Of Close: for requests to go out, and for all that was cancelled to come back. What takes longer
+// ends without its owner.
+constexpr sync::TimeNs kPatience = 100 * sync::kMillisecond;
+constexpr sync::TimeNs kCloseLimit = 500 * sync::kMillisecond;
+constexpr int kGraveIntervalMs = 20;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<LibusbBus>> LibusbBus::Make(sync::Clock& clock) {
+  absl::StatusOr<std::shared_ptr<LibusbContext>> context = LibusbContext::Make();
+  if (!context.ok()) return context.status();
+  absl::StatusOr<std::unique_ptr<DeviceList>> list = DeviceList::Make();
+  if (!list.ok()) return list.status();
+  // Without it devices are found all the same, only later: by the next look.
+  absl::StatusOr<std::unique_ptr<DeviceWatch>> watch = DeviceWatch::Make();
+  const int poke = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (poke < 0) {
+    return absl::UnavailableError(
+        absl::StrCat("no event for USB: ", std::generic_category().message(errno)));
+  }
+  return std::unique_ptr<LibusbBus>(new LibusbBus(*std::move(context), *std::move(list),
+                                                  watch.ok() ? *std::move(watch) : nullptr, poke,
+                                                  clock));
+}
+
+LibusbBus::LibusbBus(std::shared_ptr<LibusbContext> context, std::unique_ptr<DeviceList> list,
+                     std::unique_ptr<DeviceWatch> watch, int poke, sync::Clock& clock)
+    : context_(std::move(context)),
+      watch_(std::move(watch)),
+      poke_(poke),
+      clock_(clock),
+      budget_(ReadUsbfsLimit(), [this] { WakeAll(false); }),
+      list_(std::move(list)) {
+  // Devices that open and close change what has to be polled.
+  libusb_set_pollfd_notifiers(
+      context_->get(), [](int, short, void* bus) { static_cast<LibusbBus*>(bus)->Poke(); },
+      [](int, void* bus) { static_cast<LibusbBus*>(bus)->Poke(); }, this);
+  thread_ = std::thread([this] { Run(); });
+}
+
+LibusbBus::~LibusbBus() {
+  {
+    sync::MutexLock lock(graves_mutex_);
+    stop_ = true;
+  }
+  Poke();
+  thread_.join();
+  libusb_set_pollfd_notifiers(context_->get(), nullptr, nullptr, nullptr);
+  close(poke_);
+}
+
+std::unique_ptr<UsbTransport> LibusbBus::MakeTransport(UsbMatch match) {
+  auto transport = std::make_unique<LibusbTransport>(*this, std::move(match));
+  sync::MutexLock lock(transports_mutex_);
+  transports_.insert(transport.get());
+  return transport;
+}
+
+void LibusbBus::Forget(LibusbTransport* transport) {
+  sync::MutexLock lock(transports_mutex_);
+  transports_.erase(transport);
+}
+
+absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& match,
+                                                            std::function<void()> wake) {
+  sync::MutexLock lock(list_mutex_);
+  absl::StatusOr<std::vector<UsbDeviceEntry>> devices = list_->Devices();
+  if (!devices.ok()) return devices.status();
+  absl::Status last =
+      absl::NotFoundError(absl::StrCat("no USB device ", match.ToString(), " is attached"));
+  for (const UsbDeviceEntry& entry : *devices) {
+    if (!Matches(match, entry)) continue;
+    if (open_nodes_.contains(entry.node)) {
+      if (absl::IsNotFound(last)) {
+        last = absl::NotFoundError(absl::StrCat("the USB device at ", entry.identity.path,
+                                                " belongs to another display, and no other ",
+                                                match.ToString(), " is attached"));
+      }
+      continue;
+    }
+    absl::StatusOr<std::unique_ptr<OpenDevice>> device =
+        OpenDevice::Open(context_, entry, *ChooseInterface(entry.interfaces, match.interface),
+                         budget_, clock_, wake);
+    if (device.ok()) {
+      open_nodes_.insert(entry.node);
+      return device;
+    }
+    last = device.status();
+  }
+  return last;
+}
+
+void LibusbBus::Close(std::unique_ptr<OpenDevice> device) {
+  const std::string node = device->entry().node;
+  const bool ended = device->End(kPatience, kCloseLimit);
+  {
+    sync::MutexLock lock(list_mutex_);
+    open_nodes_.erase(node);
+  }
+  if (ended) {
+    device = nullptr;
+  } else {
+    sync::MutexLock lock(graves_mutex_);
+    graves_.push_back(std::move(device));
+  }
+  Poke();
+}
+
+void LibusbBus::Poke() const {
+  const uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = write(poke_, &one, sizeof(one));
+}
+
+void LibusbBus::WakeAll(bool arrival) {
+  sync::MutexLock lock(transports_mutex_);
+  for (LibusbTransport* transport : transports_) transport->Wake(arrival);
+}
+
+bool LibusbBus::Bury() {
+  std::vector<std::unique_ptr<OpenDevice>> ended;
+  sync::MutexLock lock(graves_mutex_);
+  for (std::unique_ptr<OpenDevice>& device : graves_) {
+    if (device->Ended()) ended.push_back(std::move(device));
+  }
+  std::erase(graves_, nullptr);
+  return !graves_.empty();
+}
+
+void LibusbBus::Run() {
+  while (true) {
+    const bool graves = Bury();
+    {
+      sync::MutexLock lock(graves_mutex_);
+      if (stop_ && !graves) return;
+    }
+    std::vector<pollfd> fds = {{poke_, POLLIN, 0}};
+    if (watch_ != nullptr) fds.push_back({watch_->fd(), POLLIN, 0});
+    const size_t own = fds.size();
+    if (const libusb_pollfd** theirs = libusb_get_pollfds(context_->get())) {
+      for (const libusb_pollfd** fd = theirs; *fd != nullptr; ++fd) {
+        fds.push_back({(*fd)->fd, (*fd)->events, 0});
+      }
+      libusb_free_pollfds(theirs);
+    }
+    if (poll(fds.data(), fds.size(), graves ? kGraveIntervalMs : -1) < 0 && errno != EINTR)
+      continue;
+    uint64_t pokes = 0;
+    [[maybe_unused]] const ssize_t got = read(poke_, &pokes, sizeof(pokes));
+    if (watch_ != nullptr && fds[1].revents != 0 && watch_->TakeArrivals()) WakeAll(true);
+    if (std::any_of(fds.begin() + static_cast<ptrdiff_t>(own), fds.end(),
+                    [](const pollfd& fd) { return fd.revents != 0; })) {
+      timeval none{0, 0};
+      libusb_handle_events_timeout_completed(context_->get(), &none, nullptr);
+    }
+  }
+}
+
+}  // namespace voxeld::display

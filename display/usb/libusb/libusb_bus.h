@@ -1,0 +1,68 @@
+// The machine's USB through libusb 1.0 and udev: one context, one event thread for all devices.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "display/sync/clock.h"
+#include "display/sync/mutex.h"
+#include "display/usb/libusb/open_device.h"
+#include "display/usb/usb_bus.h"
+
+struct pollfd;
+
+namespace voxeld::display {
+
+class LibusbTransport;
+
+class LibusbBus final : public UsbBus {
+ public:
+  // Unavailable where the system has no USB at all. `clock` outlives the bus and is a real one.
+  static absl::StatusOr<std::unique_ptr<LibusbBus>> Make(sync::Clock& clock);
+  // All transports are gone; ends the event thread when all that they had open has ended.
+  ~LibusbBus() override;
+
+  std::unique_ptr<UsbTransport> MakeTransport(UsbMatch match) override;
+
+  // For LibusbTransport.
+  absl::StatusOr<std::unique_ptr<OpenDevice>> Open(const UsbMatch& match,
+                                                   std::function<void()> wake);
+  void Close(std::unique_ptr<OpenDevice> device);
+  void Forget(LibusbTransport* transport);
+  size_t max_bytes_in_flight() const { return budget_.limit(); }
+
+ private:
+  LibusbBus(std::shared_ptr<LibusbContext> context, std::unique_ptr<DeviceList> list,
+            std::unique_ptr<DeviceWatch> watch, int poke, sync::Clock& clock);
+
+  void Run();
+  void Poke() const;
+  void WakeAll(bool arrival);
+  // Destroys what has ended since; true if something is left.
+  bool Bury();
+
+  const std::shared_ptr<LibusbContext> context_;
+  const std::unique_ptr<DeviceWatch> watch_;  // the event thread's; null: no news, only looks
+  const int poke_;                            // eventfd
+  sync::Clock& clock_;
+  UsbfsBudget budget_;
+
+  sync::Mutex list_mutex_;
+  const std::unique_ptr<DeviceList> list_;  // belongs to list_mutex_
+  std::set<std::string> open_nodes_ VOXELD_GUARDED_BY(list_mutex_);
+
+  sync::Mutex transports_mutex_;
+  std::set<LibusbTransport*> transports_ VOXELD_GUARDED_BY(transports_mutex_);
+
+  sync::Mutex graves_mutex_;
+  std::vector<std::unique_ptr<OpenDevice>> graves_ VOXELD_GUARDED_BY(graves_mutex_);
+  bool stop_ VOXELD_GUARDED_BY(graves_mutex_) = false;
+
+  std::thread thread_;
+};
+
+}  // namespace voxeld::display

@@ -1,0 +1,473 @@
+#include "display/usb/libusb/open_device.h"
+
+#include <fcntl.h>
+#include <libusb-1.0/libusb.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::display {
+namespace {
+
+constexpr size_t kSlabBytes = size_t{256} << 10;
+constexpr size_t kSlabs = 16;
+constexpr size_t kTransfers = 64;  // made at once; more as they are needed
+// Of a reset: what is in flight is waited for this long after its cancellation.
+constexpr sync::TimeNs kCancelLimit = sync::kSecond;
+
+TransferStatus StatusOf(const libusb_transfer& done) {
+  const bool in =
+      (done.endpoint & LIBUSB_ENDPOINT_IN) != 0 ||
+      (done.type == LIBUSB_TRANSFER_TYPE_CONTROL && (done.buffer[0] & LIBUSB_ENDPOINT_IN) != 0);
+  const int whole = done.type == LIBUSB_TRANSFER_TYPE_CONTROL
+                        ? done.length - static_cast<int>(LIBUSB_CONTROL_SETUP_SIZE)
+                        : done.length;
+  switch (done.status) {
+    case LIBUSB_TRANSFER_COMPLETED:
+      if (done.actual_length >= whole) return TransferStatus::kOk;
+      return in ? TransferStatus::kShort : TransferStatus::kError;
+    case LIBUSB_TRANSFER_TIMED_OUT:
+      return TransferStatus::kTimedOut;
+    case LIBUSB_TRANSFER_CANCELLED:
+      return TransferStatus::kCancelled;
+    case LIBUSB_TRANSFER_STALL:
+      return TransferStatus::kStall;
+    case LIBUSB_TRANSFER_NO_DEVICE:
+      return TransferStatus::kDisconnected;
+    case LIBUSB_TRANSFER_OVERFLOW:
+      return TransferStatus::kOverflow;
+    case LIBUSB_TRANSFER_ERROR:
+      break;
+  }
+  return TransferStatus::kError;
+}
+
+TransferStatus StatusOf(int result) {
+  switch (result) {
+    case 0:
+      return TransferStatus::kOk;
+    case LIBUSB_ERROR_NO_DEVICE:
+    case LIBUSB_ERROR_NOT_FOUND:  // after a reset: it came back as another
+      return TransferStatus::kDisconnected;
+    case LIBUSB_ERROR_TIMEOUT:
+      return TransferStatus::kTimedOut;
+    case LIBUSB_ERROR_PIPE:
+      return TransferStatus::kStall;
+    default:
+      return TransferStatus::kError;
+  }
+}
+
+std::string NameOf(const UsbDeviceEntry& entry) {
+  return absl::StrCat(entry.node, " (at ", entry.identity.path, ")");
+}
+
+// libusb counts in milliseconds; 0 means for ever.
+unsigned Milliseconds(sync::TimeNs timeout) {
+  if (timeout <= 0) return 0;
+  return static_cast<unsigned>(std::max<sync::TimeNs>(timeout / sync::kMillisecond, 1));
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<LibusbContext>> LibusbContext::Make() {
+  libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
+  libusb_context* context = nullptr;
+  if (const int result = libusb_init(&context); result != 0) {
+    return absl::UnavailableError(absl::StrCat("libusb: ", libusb_error_name(result)));
+  }
+  return std::shared_ptr<LibusbContext>(new LibusbContext(context));
+}
+
+LibusbContext::~LibusbContext() { libusb_exit(context_); }
+
+class OpenDevice::Handle {
+ public:
+  Handle(std::shared_ptr<LibusbContext> context, libusb_device_handle* handle, int node)
+      : context_(std::move(context)), handle_(handle), node_(node) {}
+  ~Handle() {
+    libusb_close(handle_);
+    close(node_);
+  }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  libusb_device_handle* get() const { return handle_; }
+
+ private:
+  const std::shared_ptr<LibusbContext> context_;
+  libusb_device_handle* const handle_;
+  const int node_;
+};
+
+// Slabs of memory that the kernel reads in place, as many as it gives, the rest ordinary.
+class OpenDevice::DeviceSlabs final : public SlabMemory {
+ public:
+  static std::shared_ptr<SlabMemory> Make(std::shared_ptr<Handle> handle, UsbfsBudget& budget) {
+    std::vector<void*> slabs;
+    // The kernel counts them for as long as they are there: never more than half of what there is.
+    while (slabs.size() < kSlabs && (slabs.size() + 1) * kSlabBytes <= budget.limit() / 2) {
+      if (!budget.Take(kSlabBytes)) break;
+      void* const slab = libusb_dev_mem_alloc(handle->get(), kSlabBytes);
+      if (slab == nullptr) {
+        budget.Release(kSlabBytes);
+        break;
+      }
+      slabs.push_back(slab);
+    }
+    return std::make_shared<DeviceSlabs>(std::move(handle), budget, std::move(slabs));
+  }
+  DeviceSlabs(std::shared_ptr<Handle> handle, UsbfsBudget& budget, std::vector<void*> slabs)
+      : SlabMemory(slabs, kSlabBytes),
+        handle_(std::move(handle)),
+        budget_(budget),
+        slabs_(std::move(slabs)) {}
+  ~DeviceSlabs() override {
+    for (void* slab : slabs_) {
+      libusb_dev_mem_free(handle_->get(), static_cast<unsigned char*>(slab), kSlabBytes);
+    }
+    budget_.Release(slabs_.size() * kSlabBytes);
+  }
+
+ private:
+  const std::shared_ptr<Handle> handle_;
+  UsbfsBudget& budget_;
+  const std::vector<void*> slabs_;
+};
+
+struct OpenDevice::Pending {
+  Pending() : transfer(libusb_alloc_transfer(0)) {}
+  ~Pending() { libusb_free_transfer(transfer); }
+  Pending(const Pending&) = delete;
+  Pending& operator=(const Pending&) = delete;
+
+  libusb_transfer* const transfer;
+  OpenDevice* device = nullptr;
+  TransferId id = 0;
+  Transfer asked;
+  std::vector<unsigned char> bytes;  // of requests, and what comes in
+  size_t counted = 0;                // of the budget
+};
+
+absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(std::shared_ptr<LibusbContext> context,
+                                                             const UsbDeviceEntry& entry,
+                                                             uint8_t interface, UsbfsBudget& budget,
+                                                             sync::Clock& clock,
+                                                             std::function<void()> wake) {
+  const int node = open(entry.node.c_str(), O_RDWR | O_CLOEXEC);
+  if (node < 0) {
+    const int error = errno;
+    const std::string what =
+        absl::StrCat(NameOf(entry), " cannot be opened: ", std::generic_category().message(error));
+    if (error != EACCES && error != EPERM) return absl::UnavailableError(what);
+    return absl::PermissionDeniedError(
+        absl::StrCat(what,
+                     "; the udev rules of voxeld let in the group voxeld and whoever sits at "
+                     "the machine (packaging/70-voxeld.rules)"));
+  }
+  libusb_device_handle* raw = nullptr;
+  if (const int result = libusb_wrap_sys_device(context->get(), node, &raw); result != 0) {
+    close(node);
+    return absl::UnavailableError(
+        absl::StrCat(NameOf(entry), " cannot be used: ", libusb_error_name(result)));
+  }
+  auto handle = std::make_shared<Handle>(std::move(context), raw, node);
+  libusb_set_auto_detach_kernel_driver(raw, 1);
+  int configuration = 0;
+  if (libusb_get_configuration(raw, &configuration) == 0 && configuration == 0) {
+    if (const int result = libusb_set_configuration(raw, 1); result != 0) {
+      return absl::UnavailableError(
+          absl::StrCat(NameOf(entry), " cannot be configured: ", libusb_error_name(result)));
+    }
+  }
+  if (const int result = libusb_claim_interface(raw, interface); result != 0) {
+    return absl::UnavailableError(absl::StrCat(
+        "interface ", interface, " of ", NameOf(entry), " cannot be claimed: ",
+        result == LIBUSB_ERROR_BUSY ? "another program has it" : libusb_error_name(result)));
+  }
+  return std::unique_ptr<OpenDevice>(
+      new OpenDevice(std::move(handle), entry, interface, budget, clock, std::move(wake)));
+}
+
+OpenDevice::OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& entry,
+                       uint8_t interface, UsbfsBudget& budget, sync::Clock& clock,
+                       std::function<void()> wake)
+    : handle_(std::move(handle)),
+      entry_(entry),
+      interface_(interface),
+      budget_(budget),
+      clock_(clock),
+      memory_(DeviceSlabs::Make(handle_, budget)),
+      wake_(std::move(wake)) {
+  for (size_t i = 0; i < kTransfers; ++i) {
+    all_.push_back(std::make_unique<Pending>());
+    free_.push_back(all_.back().get());
+  }
+}
+
+OpenDevice::~OpenDevice() {
+  {
+    sync::MutexLock lock(mutex_);
+    ending_ = true;
+    changed_.NotifyAll();
+  }
+  if (blocking_thread_.joinable()) blocking_thread_.join();
+  libusb_release_interface(handle_->get(), interface_);
+}
+
+// ---- transfers
+
+absl::Status OpenDevice::Refusal() const {
+  if (ending_) return absl::FailedPreconditionError("the device is not open");
+  if (gone_) return absl::UnavailableError("the device was unplugged");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<TransferId> OpenDevice::Submit(Transfer&& transfer) {
+  sync::MutexLock lock(mutex_);
+  if (absl::Status refusal = Refusal(); !refusal.ok()) return refusal;
+  const size_t size = std::max<size_t>(transfer.data.size(), transfer.length);
+  const bool in_place = transfer.length == 0 && !transfer.data.empty() &&
+                        transfer.type != TransferType::kControl &&
+                        memory_->Owns(transfer.data.data());
+  const size_t counted = in_place ? 0 : size;
+  if (!budget_.Take(counted)) {
+    return absl::ResourceExhaustedError(absl::StrCat(size, " bytes more do not fit into the ",
+                                                     budget_.limit(), " that may be in flight; ",
+                                                     UsbfsLimitHint()));
+  }
+  if (free_.empty()) {
+    all_.push_back(std::make_unique<Pending>());
+    free_.push_back(all_.back().get());
+  }
+  Pending& pending = *free_.back();
+  pending.device = this;
+  pending.id = next_id_;
+  pending.asked = std::move(transfer);
+  pending.counted = counted;
+  if (absl::Status status = SubmitLocked(pending); !status.ok()) {
+    transfer = std::move(pending.asked);
+    budget_.Release(counted);
+    return status;
+  }
+  free_.pop_back();
+  bytes_in_flight_ += size;
+  pending_[next_id_] = &pending;
+  return next_id_++;
+}
+
+absl::Status OpenDevice::SubmitLocked(Pending& pending) {
+  const Transfer& asked = pending.asked;
+  libusb_transfer* const transfer = pending.transfer;
+  transfer->flags = 0;
+  const auto callback = [](libusb_transfer* done) { OnDone(done); };
+  const unsigned timeout = Milliseconds(asked.timeout);
+  if (asked.type == TransferType::kControl) {
+    const bool in = (asked.setup.request_type & LIBUSB_ENDPOINT_IN) != 0;
+    const size_t length = in ? asked.length : asked.data.size();
+    pending.bytes.resize(LIBUSB_CONTROL_SETUP_SIZE + length);
+    libusb_fill_control_setup(pending.bytes.data(), asked.setup.request_type, asked.setup.request,
+                              asked.setup.value, asked.setup.index, static_cast<uint16_t>(length));
+    if (!in && length > 0) {
+      std::memcpy(pending.bytes.data() + LIBUSB_CONTROL_SETUP_SIZE, asked.data.data(), length);
+    }
+    libusb_fill_control_transfer(transfer, handle_->get(), pending.bytes.data(), callback, &pending,
+                                 timeout);
+  } else {
+    unsigned char* bytes = nullptr;
+    size_t length = asked.data.size();
+    if ((asked.endpoint & LIBUSB_ENDPOINT_IN) != 0) {
+      length = asked.length;
+      pending.bytes.resize(length);
+      bytes = pending.bytes.data();
+    } else {
+      bytes = reinterpret_cast<unsigned char*>(pending.asked.data.data());
+      if (asked.zero_packet) transfer->flags |= LIBUSB_TRANSFER_ADD_ZERO_PACKET;
+    }
+    libusb_fill_bulk_transfer(transfer, handle_->get(), asked.endpoint, bytes,
+                              static_cast<int>(length), callback, &pending, timeout);
+    if (asked.type == TransferType::kInterrupt) transfer->type = LIBUSB_TRANSFER_TYPE_INTERRUPT;
+  }
+  const int result = libusb_submit_transfer(transfer);
+  switch (result) {
+    case 0:
+      return absl::OkStatus();
+    case LIBUSB_ERROR_NO_DEVICE:
+      gone_ = true;
+      return absl::UnavailableError("the device was unplugged");
+    case LIBUSB_ERROR_NO_MEM:
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the kernel takes no more transfers; ", UsbfsLimitHint()));
+    default:
+      return absl::InternalError(absl::StrCat("a transfer of ", transfer->length,
+                                              " bytes on endpoint ", asked.endpoint, ": ",
+                                              libusb_error_name(result)));
+  }
+}
+
+void OpenDevice::OnDone(libusb_transfer* done) {
+  auto& pending = *static_cast<Pending*>(done->user_data);
+  pending.device->Complete(pending);
+}
+
+void OpenDevice::Complete(Pending& pending) {
+  const libusb_transfer& done = *pending.transfer;
+  TransferCompletion completion;
+  completion.id = pending.id;
+  completion.type = pending.asked.type;
+  completion.endpoint = pending.asked.endpoint;
+  completion.status = StatusOf(done);
+  completion.actual_length = static_cast<uint32_t>(std::max(done.actual_length, 0));
+  if (pending.asked.length > 0) {
+    const size_t head =
+        pending.asked.type == TransferType::kControl ? LIBUSB_CONTROL_SETUP_SIZE : 0;
+    completion.data = TransferBytes(
+        std::as_bytes(std::span(pending.bytes))
+            .subspan(head, std::min<size_t>(completion.actual_length, pending.asked.length)));
+  } else {
+    completion.data = std::move(pending.asked.data);
+    // What went out before its time was over is not known: host controllers differ.
+    if (completion.status == TransferStatus::kTimedOut) completion.actual_length = 0;
+  }
+  const size_t size = std::max<size_t>(pending.asked.length, completion.data.size());
+  const size_t counted = std::exchange(pending.counted, 0);
+  pending.asked = Transfer{};
+  {
+    sync::MutexLock lock(mutex_);
+    if (completion.status == TransferStatus::kDisconnected) gone_ = true;
+    pending_.erase(completion.id);
+    free_.push_back(&pending);
+    bytes_in_flight_ -= size;
+    completions_.push_back(std::move(completion));
+    changed_.NotifyAll();
+  }
+  budget_.Release(counted);
+  Wake();
+}
+
+void OpenDevice::Wake() {
+  sync::MutexLock lock(wake_mutex_);
+  if (wake_) wake_();
+}
+
+void OpenDevice::Cancel(TransferId id) {
+  sync::MutexLock lock(mutex_);
+  const auto it = pending_.find(id);
+  if (it != pending_.end()) libusb_cancel_transfer(it->second->transfer);
+}
+
+size_t OpenDevice::Drain(std::vector<TransferCompletion>& out) {
+  sync::MutexLock lock(mutex_);
+  const size_t count = completions_.size();
+  std::move(completions_.begin(), completions_.end(), std::back_inserter(out));
+  completions_.clear();
+  return count;
+}
+
+size_t OpenDevice::bytes_in_flight() const {
+  sync::MutexLock lock(mutex_);
+  return bytes_in_flight_;
+}
+
+TransferBytes OpenDevice::TakeBuffer(size_t capacity) {
+  TransferBytes buffer(memory_);
+  buffer.reserve(capacity);
+  return buffer;
+}
+
+// ---- what waits
+
+absl::StatusOr<TransferId> OpenDevice::ClearHalt(uint8_t endpoint) {
+  return QueueBlocking({.endpoint = endpoint});
+}
+
+absl::StatusOr<TransferId> OpenDevice::Reset() { return QueueBlocking({.reset = true}); }
+
+absl::StatusOr<TransferId> OpenDevice::QueueBlocking(Blocking blocking) {
+  sync::MutexLock lock(mutex_);
+  if (absl::Status refusal = Refusal(); !refusal.ok()) return refusal;
+  blocking.id = next_id_++;
+  blocking_.push_back(blocking);
+  if (!blocking_thread_.joinable()) {
+    blocking_thread_ = std::thread([this] { RunBlocking(); });
+  }
+  changed_.NotifyAll();
+  return blocking.id;
+}
+
+void OpenDevice::RunBlocking() {
+  while (true) {
+    Blocking blocking;
+    {
+      sync::MutexLock lock(mutex_);
+      while (blocking_.empty() && !ending_) changed_.Wait(mutex_);
+      if (blocking_.empty()) return;
+      blocking = blocking_.front();
+    }
+    TransferCompletion completion;
+    completion.id = blocking.id;
+    completion.type = TransferType::kControl;
+    completion.status = Carry(blocking);
+    {
+      sync::MutexLock lock(mutex_);
+      blocking_.pop_front();
+      if (ending_) blocking_.clear();
+      if (completion.status == TransferStatus::kDisconnected) gone_ = true;
+      completions_.push_back(std::move(completion));
+      changed_.NotifyAll();
+    }
+    Wake();
+  }
+}
+
+TransferStatus OpenDevice::Carry(const Blocking& blocking) {
+  if (!blocking.reset) return StatusOf(libusb_clear_halt(handle_->get(), blocking.endpoint));
+  {
+    sync::MutexLock lock(mutex_);
+    CancelAll();
+    const sync::TimeNs end = clock_.Now() + kCancelLimit;
+    while (!pending_.empty() && clock_.Now() < end) clock_.WaitUntil(mutex_, changed_, end);
+  }
+  return StatusOf(libusb_reset_device(handle_->get()));
+}
+
+void OpenDevice::CancelAll() {
+  for (const auto& [id, pending] : pending_) libusb_cancel_transfer(pending->transfer);
+}
+
+// ---- the end
+
+bool OpenDevice::Idle() const { return pending_.empty() && blocking_.empty(); }
+
+bool OpenDevice::End(sync::TimeNs patience, sync::TimeNs limit) {
+  {
+    sync::MutexLock lock(wake_mutex_);
+    wake_ = nullptr;
+  }
+  sync::MutexLock lock(mutex_);
+  ending_ = true;
+  const auto requests = [this]() VOXELD_REQUIRES(mutex_) {
+    return std::any_of(pending_.begin(), pending_.end(), [](const auto& item) {
+      return item.second->asked.type == TransferType::kControl;
+    });
+  };
+  const sync::TimeNs now = clock_.Now();
+  while (requests() && clock_.Now() < now + patience) {
+    clock_.WaitUntil(mutex_, changed_, now + patience);
+  }
+  CancelAll();
+  while (!Idle() && clock_.Now() < now + limit) clock_.WaitUntil(mutex_, changed_, now + limit);
+  return Idle();
+}
+
+bool OpenDevice::Ended() const {
+  sync::MutexLock lock(mutex_);
+  return ending_ && Idle();
+}
+
+}  // namespace voxeld::display

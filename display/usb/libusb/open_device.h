@@ -1,0 +1,129 @@
+// A device that libusb has open: its transfers, its memory, its way to close.
+//
+// libusb calls back on the bus's event thread; completions wait here until their owner drains them.
+// What libusb can only do by waiting (clearing a halt, a reset) is done by a thread of the device's
+// own, so that no device holds up another.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/sync/clock.h"
+#include "display/sync/mutex.h"
+#include "display/usb/libusb/device_list.h"
+#include "display/usb/libusb/usbfs_budget.h"
+#include "display/usb/slab_memory.h"
+#include "display/usb/usb_transport.h"
+
+struct libusb_context;
+struct libusb_device_handle;
+struct libusb_transfer;
+
+namespace voxeld::display {
+
+// libusb's context, without its own discovery of devices: it would parse the descriptors of every
+// one that is attached.
+class LibusbContext {
+ public:
+  static absl::StatusOr<std::shared_ptr<LibusbContext>> Make();
+  ~LibusbContext();
+  LibusbContext(const LibusbContext&) = delete;
+  LibusbContext& operator=(const LibusbContext&) = delete;
+  libusb_context* get() const { return context_; }
+
+ private:
+  explicit LibusbContext(libusb_context* context) : context_(context) {}
+  libusb_context* const context_;
+};
+
+class OpenDevice {
+ public:
+  // Opens the device's node, and claims the interface; a kernel's driver that has it is detached
+  // until the close. PermissionDenied, Unavailable (somebody else has it; it went away) or Internal,
+  // each with what would help. `wake` is called on the event thread when there are completions;
+  // `budget` outlives the device.
+  static absl::StatusOr<std::unique_ptr<OpenDevice>> Open(std::shared_ptr<LibusbContext> context,
+                                                          const UsbDeviceEntry& entry,
+                                                          uint8_t interface, UsbfsBudget& budget,
+                                                          sync::Clock& clock,
+                                                          std::function<void()> wake);
+  // Everything must have ended.
+  ~OpenDevice();
+  OpenDevice(const OpenDevice&) = delete;
+  OpenDevice& operator=(const OpenDevice&) = delete;
+
+  const UsbDeviceEntry& entry() const { return entry_; }
+
+  // As UsbTransport's.
+  absl::StatusOr<TransferId> Submit(Transfer&& transfer);
+  void Cancel(TransferId id);
+  absl::StatusOr<TransferId> ClearHalt(uint8_t endpoint);
+  absl::StatusOr<TransferId> Reset();
+  size_t Drain(std::vector<TransferCompletion>& out);
+  size_t bytes_in_flight() const;
+  TransferBytes TakeBuffer(size_t capacity);
+
+  // No transfer is taken any more, and `wake` is not called again. Requests get `patience` to end by
+  // themselves, then all is cancelled, and waited for until `limit`. True: it has ended and may be
+  // destroyed.
+  bool End(sync::TimeNs patience, sync::TimeNs limit);
+  // After End: has all ended by now?
+  bool Ended() const;
+
+ private:
+  class Handle;
+  class DeviceSlabs;
+  struct Pending;
+  struct Blocking {
+    TransferId id = 0;
+    bool reset = false;
+    uint8_t endpoint = 0;
+  };
+
+  OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& entry, uint8_t interface,
+             UsbfsBudget& budget, sync::Clock& clock, std::function<void()> wake);
+
+  static void OnDone(libusb_transfer* done);
+  void Complete(Pending& pending);
+  void Wake();
+  absl::Status Refusal() const VOXELD_REQUIRES(mutex_);
+  absl::Status SubmitLocked(Pending& pending) VOXELD_REQUIRES(mutex_);
+  absl::StatusOr<TransferId> QueueBlocking(Blocking blocking);
+  void RunBlocking();
+  TransferStatus Carry(const Blocking& blocking);
+  void CancelAll() VOXELD_REQUIRES(mutex_);
+  bool Idle() const VOXELD_REQUIRES(mutex_);
+
+  const std::shared_ptr<Handle> handle_;
+  const UsbDeviceEntry entry_;
+  const uint8_t interface_;
+  UsbfsBudget& budget_;
+  sync::Clock& clock_;
+  const std::shared_ptr<SlabMemory> memory_;
+
+  sync::Mutex wake_mutex_;
+  std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);
+
+  mutable sync::Mutex mutex_;
+  sync::CondVar changed_;  // pending_ or blocking_ got shorter, or blocking_ longer, or ending_
+  bool ending_ VOXELD_GUARDED_BY(mutex_) = false;
+  bool gone_ VOXELD_GUARDED_BY(mutex_) = false;
+  TransferId next_id_ VOXELD_GUARDED_BY(mutex_) = 1;
+  std::map<TransferId, Pending*> pending_ VOXELD_GUARDED_BY(mutex_);
+  std::vector<std::unique_ptr<Pending>> all_ VOXELD_GUARDED_BY(mutex_);  // made once, used again
+  std::vector<Pending*> free_ VOXELD_GUARDED_BY(mutex_);
+  size_t bytes_in_flight_ VOXELD_GUARDED_BY(mutex_) = 0;
+  std::vector<TransferCompletion> completions_ VOXELD_GUARDED_BY(mutex_);
+  std::deque<Blocking> blocking_ VOXELD_GUARDED_BY(mutex_);  // the first is being carried out
+  std::thread blocking_thread_;
+};
+
+}  // namespace voxeld::display
