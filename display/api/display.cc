@@ -202,6 +202,10 @@ void Display::Attached() {
   }
 }
 
+void Display::NoDevice(const std::string& reason) {
+  if (state_ == DisplayState::kAttaching) SetState(state_, reason);
+}
+
 void Display::DeviceLost(const std::string& reason, uint64_t bytes) {
   SetState(DisplayState::kLost, reason);
   full_next_ = true;

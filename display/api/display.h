@@ -162,6 +162,8 @@ class Display {
   // For drivers, on the owner's thread.
   void Attached();  // the device is set up: the current frame goes out first
   void HasNoBrightness() { brightness_ = 1; }  // found while attaching
+  // What it is that is looked for, while there is none.
+  void NoDevice(const std::string& reason);
   // Whatever is in flight (`bytes` of it sent) is lost; DoTick attaches again.
   void DeviceLost(const std::string& reason, uint64_t bytes = 0);
   void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,

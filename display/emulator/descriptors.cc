@@ -39,11 +39,11 @@ Bytes String(std::string_view ascii) {
   return out;
 }
 
-Bytes Device(bool super_speed) {
+Bytes Device(UsbSpeed speed) {
   Bytes out;
   Put8(out, {18, 1});
-  Put16(out, super_speed ? 0x0300 : 0x0210);
-  Put8(out, {0, 0, 0, super_speed ? 9 : 64});
+  Put16(out, speed == UsbSpeed::kSuper ? 0x0300 : 0x0210);
+  Put8(out, {0, 0, 0, speed == UsbSpeed::kSuper ? 9 : 64});
   Put16(out, kVendorId);
   Put16(out, kProductId);
   Put16(out, 0x0100);
@@ -51,22 +51,26 @@ Bytes Device(bool super_speed) {
   return out;
 }
 
-void Endpoint(Bytes& out, bool super_speed, int address, int attributes, uint16_t packet,
+void Endpoint(Bytes& out, UsbSpeed speed, int address, int attributes, uint16_t packet,
               int interval, int burst) {
   Put8(out, {7, 5, address, attributes});
   Put16(out, packet);
   Put8(out, {interval});
-  if (!super_speed) return;
+  if (speed != UsbSpeed::kSuper) return;
   Put8(out, {6, 48, burst, 0});
   Put16(out, attributes == 3 ? packet : 0);  // bytes per interval
 }
 
-Bytes Configuration(bool super_speed) {
+uint16_t BulkPacketSize(UsbSpeed speed) {
+  return speed == UsbSpeed::kFull ? 64 : speed == UsbSpeed::kHigh ? 512 : 1024;
+}
+
+Bytes Configuration(UsbSpeed speed) {
   Bytes rest;
   Put8(rest, {9, 4, 0, 0, 2, voxlink::kInterfaceClass, voxlink::kInterfaceSubclass,
               voxlink::kInterfaceProtocol, 0});
-  Endpoint(rest, super_speed, kBulkOut, 2, super_speed ? 1024 : 512, 0, 15);
-  Endpoint(rest, super_speed, kInterruptIn, 3, voxlink::kEventSize, 1, 0);
+  Endpoint(rest, speed, kBulkOut, 2, BulkPacketSize(speed), 0, 15);
+  Endpoint(rest, speed, kInterruptIn, 3, voxlink::kEventSize, 1, 0);
   Bytes out;
   Put8(out, {9, 2});
   Put16(out, static_cast<uint16_t>(9 + rest.size()));
@@ -96,11 +100,11 @@ Bytes MsOs20() {
   return out;
 }
 
-Bytes Bos(bool super_speed, size_t ms_length) {
+Bytes Bos(UsbSpeed speed, size_t ms_length) {
   Bytes capabilities;
   int count = 2;
   Put8(capabilities, {7, 16, 2, 2, 0, 0, 0});  // USB 2.0 extension: LPM
-  if (super_speed) {
+  if (speed == UsbSpeed::kSuper) {
     Put8(capabilities, {10, 16, 3, 0, 0x0E, 0, 1, 10, 0xFF, 0x07});
     ++count;
   }
@@ -120,12 +124,12 @@ Bytes Bos(bool super_speed, size_t ms_length) {
 
 }  // namespace
 
-DescriptorSet MakeDescriptors(bool super_speed, const std::string& serial) {
+DescriptorSet MakeDescriptors(UsbSpeed speed, const std::string& serial) {
   DescriptorSet set;
-  set.device = Device(super_speed);
-  set.configuration = Configuration(super_speed);
+  set.device = Device(speed);
+  set.configuration = Configuration(speed);
   set.ms_os_20 = MsOs20();
-  set.bos = Bos(super_speed, set.ms_os_20.size());
+  set.bos = Bos(speed, set.ms_os_20.size());
   Bytes languages;
   Put8(languages, {4, 3, 0x09, 0x04});
   set.strings = {languages, String("voxeld"), String("Simulated volumetric display"),

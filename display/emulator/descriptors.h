@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "display/usb/device_model.h"
+
 namespace voxeld::display::emulator {
 
 struct DescriptorSet {
@@ -16,7 +18,8 @@ struct DescriptorSet {
   std::vector<std::vector<std::byte>> strings;  // 0: languages
 };
 
-// `super_speed`: USB 3.0, packets of 1024 bytes and bursts; else USB 2.1 at high speed.
-DescriptorSet MakeDescriptors(bool super_speed, const std::string& serial);
+// Super speed: USB 3.0, bulk packets of 1024 bytes and bursts; else USB 2.1 with packets of 512 or, at
+// full speed, 64.
+DescriptorSet MakeDescriptors(UsbSpeed speed, const std::string& serial);
 
 }  // namespace voxeld::display::emulator

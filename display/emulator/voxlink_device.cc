@@ -69,7 +69,7 @@ bool FitsTable(const UsbSetup& setup, size_t length) {
 
 VoxlinkDevice::VoxlinkDevice(VoxlinkDeviceConfig config, sync::Clock& clock)
     : config_(std::move(config)),
-      descriptors_(MakeDescriptors(config_.super_speed, config_.serial)),
+      descriptors_(MakeDescriptors(config_.speed, config_.serial)),
       capabilities_(MakeCapabilities(config_)),
       clock_(clock),
       boot_(clock.Now()),

@@ -30,7 +30,7 @@ struct VoxlinkDeviceConfig {
   uint32_t max_payload = 65536;
   uint64_t bytes_per_second = 0;  // at which the receive buffer is emptied; 0: at once
   bool watchdog = true;
-  bool super_speed = true;
+  UsbSpeed speed = UsbSpeed::kSuper;
   int16_t temperature = 300;  // 0.1 °C
   std::string serial = "simulated";
 };
@@ -44,9 +44,7 @@ class VoxlinkDevice final : public UsbDeviceModel {
   bool Unlink(uint64_t id) override;
   void Tick() override;
   sync::TimeNs NextTimeout() const override;
-  UsbSpeed speed() const override {
-    return config_.super_speed ? UsbSpeed::kSuper : UsbSpeed::kHigh;
-  }
+  UsbSpeed speed() const override { return config_.speed; }
   void Reset() override;
   void SetPlugged(bool plugged) override;
   bool plugged() const override { return plugged_; }

@@ -25,6 +25,12 @@ struct Urb {
 
 enum class UsbSpeed : uint8_t { kFull, kHigh, kSuper };  // 12, 480, 5000 Mbit/s
 
+// What bulk transfers get of it at the most, in bytes a second (USB 2.0, §5.8.4: 19 packets of 64
+// bytes a frame, 13 of 512 a microframe; USB 3.0: what hosts are known to reach).
+constexpr uint64_t BulkBytesPerSecond(UsbSpeed speed) {
+  return speed == UsbSpeed::kFull ? 1'216'000 : speed == UsbSpeed::kHigh ? 53'248'000 : 400'000'000;
+}
+
 class UsbDeviceModel {
  public:
   // `in` is valid during the call; `actual` counts OUT bytes as well. Must not call the model.

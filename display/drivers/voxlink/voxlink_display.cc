@@ -147,7 +147,12 @@ void VoxlinkDisplay::TryAttach(sync::TimeNs now) {
   const absl::Status status = link_.Open();
   if (!status.ok()) {
     RetryLater(now);
-    if (!absl::IsNotFound(status)) DeviceLost(std::string(status.message()));
+    const std::string reason(status.message());
+    if (absl::IsNotFound(status)) {
+      NoDevice(reason);
+    } else {
+      DeviceLost(reason);
+    }
     return;
   }
   phase_ = Phase::kSettingUp;

@@ -1,0 +1,36 @@
+// The devices that the emulator plays, each behind its fault plan, and what can be asked of one while
+// it runs.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "display/drivers/options.h"
+#include "display/emulator/fault_injector.h"
+#include "display/sync/clock.h"
+
+namespace voxeld::emulator {
+
+struct Emulated {
+  std::unique_ptr<display::UsbDeviceModel> model;      // with its faults
+  display::emulator::FaultInjector* faults = nullptr;  // within model
+  // What it saw and shows, as one line of JSON.
+  std::function<std::string()> status;
+};
+
+// "voxlink[,key=value…]" (the simulated driver's options; docs: display/drivers/simulated/README.md).
+// InvalidArgument with what is wrong. `clock` outlives what comes back.
+absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock);
+
+// One line of the control socket, and the answer to it, without its newline:
+//   fault WHAT[:AMOUNT]@WHEN[/in]   a fault more, counted from now      ok
+//   unplug, plug                    the cable                           ok
+//   status                                                              JSON
+// What is wrong is answered "error: …".
+std::string Control(Emulated& device, std::string_view line);
+
+}  // namespace voxeld::emulator
