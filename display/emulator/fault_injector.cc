@@ -100,6 +100,26 @@ absl::StatusOr<FaultPlan> ParseFaultPlan(std::string_view text) {
   return plan;
 }
 
+std::string ToText(const Fault& fault) {
+  const auto* kind = std::find_if(std::begin(kKinds), std::end(kKinds),
+                                  [&](const Kind& k) { return k.what == fault.what; });
+  std::string text(kind->name);
+  if (kind->has_amount) absl::StrAppend(&text, ":", fault.amount / kind->unit);
+  switch (fault.when) {
+    case When::kTransfer:
+      absl::StrAppend(&text, "@t", fault.at);
+      break;
+    case When::kByte:
+      absl::StrAppend(&text, "@b", fault.at);
+      break;
+    case When::kTime:
+      absl::StrAppend(&text, "@", fault.at / kMs, "ms");
+      break;
+  }
+  if (fault.endpoint == kIn) absl::StrAppend(&text, "/in");
+  return text;
+}
+
 FaultInjector::FaultInjector(std::unique_ptr<UsbDeviceModel> device, FaultPlan plan,
                              sync::Clock& clock)
     : device_(std::move(device)), clock_(clock) {
@@ -116,6 +136,13 @@ void FaultInjector::Add(Fault fault) {
     planned.time = clock_.Now() + static_cast<sync::TimeNs>(fault.at);
   }
   plan_.push_back(planned);
+}
+
+void FaultInjector::Clear() {
+  plan_.clear();
+  replug_at_ = sync::kNever;
+  EndAll(TransferStatus::kCancelled);
+  endpoints_.clear();
 }
 
 void FaultInjector::Act(const Fault& fault, sync::TimeNs now) {

@@ -9,6 +9,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -50,6 +51,9 @@ using FaultPlan = std::vector<Fault>;
 // Nms. "/in": on the interrupt endpoint. InvalidArgument with what is wrong.
 absl::StatusOr<FaultPlan> ParseFaultPlan(std::string_view text);
 
+// The same as text, as ParseFaultPlan reads it; amounts and times of faults by time in whole ms.
+std::string ToText(const Fault& fault);
+
 class FaultInjector final : public UsbDeviceModel {
  public:
   FaultInjector(std::unique_ptr<UsbDeviceModel> device, FaultPlan plan, sync::Clock& clock);
@@ -57,6 +61,8 @@ class FaultInjector final : public UsbDeviceModel {
   // More faults; times count from now on.
   void Add(Fault fault);
   size_t faults_left() const { return plan_.size(); }
+  // Takes back all that was planned and all that still lasts, and starts to count anew.
+  void Clear();
 
   void SetComplete(Complete complete) override { complete_ = std::move(complete); }
   void Submit(const Urb& urb) override;

@@ -75,6 +75,10 @@ std::string Control(Emulated& device, std::string_view line) {
     device.model->SetPlugged(words.first == "plug");
     return "ok";
   }
+  if (words.first == "clear") {
+    device.faults->Clear();
+    return "ok";
+  }
   if (words.first == "fault") {
     const absl::StatusOr<display::emulator::FaultPlan> plan =
         display::emulator::ParseFaultPlan(words.second);
@@ -82,7 +86,7 @@ std::string Control(Emulated& device, std::string_view line) {
     for (const display::emulator::Fault& fault : *plan) device.faults->Add(fault);
     return "ok";
   }
-  return absl::StrCat("error: \"", words.first, "\" is none of fault, plug, unplug, status");
+  return absl::StrCat("error: \"", words.first, "\" is none of fault, clear, plug, unplug, status");
 }
 
 }  // namespace voxeld::emulator

@@ -28,6 +28,7 @@ absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock)
 
 // One line of the control socket, and the answer to it, without its newline:
 //   fault WHAT[:AMOUNT]@WHEN[/in]   a fault more, counted from now      ok
+//   clear                           no fault any more                   ok
 //   unplug, plug                    the cable                           ok
 //   status                                                              JSON
 // What is wrong is answered "error: …".

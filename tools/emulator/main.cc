@@ -255,7 +255,7 @@ int Main(int argc, char** argv) {
   attach->excludes(usbip)->excludes(usbredir);
   usbip->excludes(usbredir);
   app.add_option("--control", options.control,
-                 "unix socket for lines: fault WHAT@WHEN, unplug, plug, status");
+                 "unix socket for lines: fault WHAT@WHEN, clear, unplug, plug, status");
   CLI11_PARSE(app, argc, argv);
   const auto fail = [](int code, const absl::Status& status) {
     std::fprintf(stderr, "voxeld-emulator: %s\n", std::string(status.message()).c_str());

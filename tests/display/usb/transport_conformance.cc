@@ -1,23 +1,9 @@
-// What every UsbTransport keeps to, whatever carries it: to hold one to it, add a line at the end.
-// The far end of each is the emulated voxlink device.
+#include "tests/display/usb/transport_conformance.h"
 
-#include <functional>
-#include <map>
-#include <memory>
 #include <optional>
-#include <ostream>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "display/drivers/voxlink/packet.h"
-#include "display/drivers/voxlink/protocol.h"
-#include "display/emulator/fault_injector.h"
-#include "display/emulator/voxlink_device.h"
-#include "display/sync/clock.h"
-#include "display/sync/fake_clock.h"
-#include "display/usb/in_process.h"
-#include "gtest/gtest.h"
 
 namespace voxeld::display {
 namespace {
@@ -25,180 +11,6 @@ namespace {
 using emulator::Fault;
 using sync::kMillisecond;
 using sync::kSecond;
-
-// A transport, its device and its time.
-class Carrier {
- public:
-  virtual ~Carrier() = default;
-  virtual UsbTransport& transport() = 0;
-  virtual void AddFault(const Fault& fault) = 0;
-  virtual void SetPlugged(bool plugged) = 0;
-  // Lets things happen until `done`; false: they did not within a generous limit.
-  virtual bool RunUntil(const std::function<bool()>& done) = 0;
-};
-
-emulator::VoxlinkDeviceConfig SmallDevice() {
-  PlanarStack planar;
-  planar.width_px = planar.height_px = 4;
-  planar.positions_mm = {0, 1};
-  emulator::VoxlinkDeviceConfig config;
-  config.geometry.shape = planar;
-  config.volumes_per_second = 100;
-  return config;
-}
-
-constexpr size_t kInFlight = size_t{1} << 20;
-
-class PumpedCarrier final : public Carrier {
- public:
-  PumpedCarrier() {
-    auto faults = std::make_unique<emulator::FaultInjector>(
-        std::make_unique<emulator::VoxlinkDevice>(SmallDevice(), clock_), emulator::FaultPlan{},
-        clock_);
-    faults_ = faults.get();
-    InProcessTransport::Options options;
-    options.own_thread = false;
-    options.max_bytes_in_flight = kInFlight;
-    transport_ = std::make_unique<InProcessTransport>(std::move(faults), clock_, options);
-  }
-  UsbTransport& transport() override { return *transport_; }
-  void AddFault(const Fault& fault) override {
-    transport_->WithDevice([&](UsbDeviceModel&) { faults_->Add(fault); });
-  }
-  void SetPlugged(bool plugged) override {
-    transport_->WithDevice([&](UsbDeviceModel& device) { device.SetPlugged(plugged); });
-  }
-  bool RunUntil(const std::function<bool()>& done) override {
-    const sync::TimeNs end = clock_.Now() + 10 * kSecond;
-    while (clock_.Now() < end) {
-      const sync::TimeNs next = transport_->Pump();
-      if (done()) return true;
-      clock_.AdvanceTo(std::min(next, end));
-    }
-    return false;
-  }
-
- private:
-  sync::FakeClock clock_;
-  emulator::FaultInjector* faults_ = nullptr;
-  std::unique_ptr<InProcessTransport> transport_;
-};
-
-class ThreadedCarrier final : public Carrier {
- public:
-  ThreadedCarrier() {
-    auto faults = std::make_unique<emulator::FaultInjector>(
-        std::make_unique<emulator::VoxlinkDevice>(SmallDevice(), clock_), emulator::FaultPlan{},
-        clock_);
-    faults_ = faults.get();
-    InProcessTransport::Options options;
-    options.max_bytes_in_flight = kInFlight;
-    transport_ = std::make_unique<InProcessTransport>(std::move(faults), clock_, options);
-    transport_->SetWake([this] {
-      sync::MutexLock lock(mutex_);
-      woken_ = true;
-      wake_.NotifyAll();
-    });
-  }
-  ~ThreadedCarrier() override { transport_->SetWake(nullptr); }
-  UsbTransport& transport() override { return *transport_; }
-  void AddFault(const Fault& fault) override {
-    transport_->WithDevice([&](UsbDeviceModel&) { faults_->Add(fault); });
-  }
-  void SetPlugged(bool plugged) override {
-    transport_->WithDevice([&](UsbDeviceModel& device) { device.SetPlugged(plugged); });
-  }
-  bool RunUntil(const std::function<bool()>& done) override {
-    const sync::TimeNs end = clock_.Now() + 20 * kSecond;
-    while (!done()) {
-      sync::MutexLock lock(mutex_);
-      while (!woken_ && clock_.Now() < end) clock_.WaitUntil(mutex_, wake_, end);
-      if (!std::exchange(woken_, false)) return false;
-    }
-    return true;
-  }
-
- private:
-  sync::SystemClock clock_;
-  sync::Mutex mutex_;
-  sync::CondVar wake_;
-  bool woken_ VOXELD_GUARDED_BY(mutex_) = false;
-  emulator::FaultInjector* faults_ = nullptr;
-  std::unique_ptr<InProcessTransport> transport_;
-};
-
-struct CarrierCase {
-  std::string name;
-  std::function<std::unique_ptr<Carrier>()> make;
-};
-std::ostream& operator<<(std::ostream& out, const CarrierCase& c) { return out << c.name; }
-
-class TransportConformance : public testing::TestWithParam<CarrierCase> {
- protected:
-  void SetUp() override { carrier_ = GetParam().make(); }
-  UsbTransport& usb() { return carrier_->transport(); }
-  void Open() {
-    const absl::Status status = usb().Open();
-    ASSERT_TRUE(status.ok()) << status;
-  }
-
-  TransferId Must(absl::StatusOr<TransferId> id) {
-    EXPECT_TRUE(id.ok()) << id.status();
-    return id.ok() ? *id : 0;
-  }
-  TransferId SubmitIn(UsbSetup setup) {
-    Transfer transfer;
-    transfer.type = TransferType::kControl;
-    transfer.setup = setup;
-    transfer.length = setup.length;
-    return Must(usb().Submit(std::move(transfer)));
-  }
-  TransferId SubmitRequest(voxlink::Request request) {
-    Transfer transfer;
-    transfer.type = TransferType::kControl;
-    transfer.setup = {.request_type = voxlink::kRequestOut,
-                      .request = static_cast<uint8_t>(request)};
-    return Must(usb().Submit(std::move(transfer)));
-  }
-  TransferId SubmitBulk(TransferBytes data, sync::TimeNs timeout = 0) {
-    Transfer transfer;
-    transfer.endpoint = voxlink::kBulkOut;
-    transfer.data = std::move(data);
-    transfer.timeout = timeout;
-    return Must(usb().Submit(std::move(transfer)));
-  }
-  TransferId SubmitEvent() {
-    Transfer transfer;
-    transfer.type = TransferType::kInterrupt;
-    transfer.endpoint = voxlink::kInterruptIn;
-    transfer.length = voxlink::kEventSize;
-    return Must(usb().Submit(std::move(transfer)));
-  }
-  // The completion of one transfer; others' are kept in order.
-  TransferCompletion Wait(TransferId id) {
-    const TransferCompletion* found = nullptr;
-    carrier_->RunUntil([&] {
-      std::vector<TransferCompletion> drained;
-      usb().Drain(drained);
-      for (TransferCompletion& completion : drained) {
-        order_.push_back(completion.id);
-        done_[completion.id] = std::move(completion);
-      }
-      const auto it = done_.find(id);
-      found = it == done_.end() ? nullptr : &it->second;
-      return found != nullptr;
-    });
-    EXPECT_NE(found, nullptr) << "transfer " << id << " did not complete";
-    return found == nullptr ? TransferCompletion{} : *found;
-  }
-
-  std::unique_ptr<Carrier> carrier_;
-  std::map<TransferId, TransferCompletion> done_;
-  std::vector<TransferId> order_;
-};
-
-constexpr UsbSetup kDeviceDescriptor{
-    .request_type = 0x80, .request = 6, .value = 0x0100, .index = 0, .length = 18};
 
 TEST_P(TransportConformance, OpensOnceClosesAndOpensAgain) {
   EXPECT_FALSE(usb().is_open());
@@ -272,17 +84,21 @@ TEST_P(TransportConformance, CompletionsOfAnEndpointKeepTheirOrder) {
 
 TEST_P(TransportConformance, BytesInFlightAreCountedAndCapped) {
   Open();
-  EXPECT_EQ(usb().max_bytes_in_flight(), kInFlight);
+  const size_t told = carrier_->limits().max_bytes_in_flight;
+  if (told != 0) {
+    EXPECT_EQ(usb().max_bytes_in_flight(), told);
+  }
   EXPECT_EQ(usb().bytes_in_flight(), 0u);
   const TransferId read = SubmitEvent();  // no session: nothing comes
   EXPECT_EQ(usb().bytes_in_flight(), voxlink::kEventSize);
   Transfer big;
   big.endpoint = voxlink::kBulkOut;
-  big.data.resize(kInFlight);
+  big.data.resize(usb().max_bytes_in_flight());
   EXPECT_TRUE(absl::IsResourceExhausted(usb().Submit(std::move(big)).status()));
   usb().Cancel(read);
   EXPECT_EQ(Wait(read).status, TransferStatus::kCancelled);
   EXPECT_EQ(usb().bytes_in_flight(), 0u);
+  if (told == 0) big.data.resize(size_t{1} << 20);  // the transport's own memory counts as well
   EXPECT_EQ(Wait(Must(usb().Submit(std::move(big)))).status, TransferStatus::kOk);
 }
 
@@ -316,7 +132,9 @@ TEST_P(TransportConformance, ErrorsPassAndPartialTransfersTell) {
   carrier_->AddFault({.what = Fault::What::kError, .amount = 1});
   carrier_->AddFault({.at = 2, .what = Fault::What::kPartial, .amount = 4});
   Open();
-  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kError);
+  const TransferStatus first = Wait(SubmitBulk(TransferBytes(10))).status;
+  if (carrier_->limits().errors_are_retried && first == TransferStatus::kOk) return;
+  EXPECT_EQ(first, TransferStatus::kError);
   const TransferCompletion partial = Wait(SubmitBulk(TransferBytes(10)));
   EXPECT_EQ(partial.status, TransferStatus::kStall);
   EXPECT_EQ(partial.actual_length, 4u);
@@ -332,9 +150,13 @@ TEST_P(TransportConformance, AnUnpluggedDeviceIsGoneForGoodAndANewOneOpens) {
   EXPECT_FALSE(usb().Submit(Transfer{}).ok());  // a stale handle stays stale
   usb().Close();
   carrier_->SetPlugged(false);
-  EXPECT_TRUE(absl::IsNotFound(usb().Open()));
+  EXPECT_TRUE(carrier_->RunUntil([&] {
+    const bool gone = absl::IsNotFound(usb().Open());
+    usb().Close();
+    return gone;
+  }));
   carrier_->SetPlugged(true);
-  Open();
+  EXPECT_TRUE(carrier_->RunUntil([&] { return usb().Open().ok(); }));
   EXPECT_EQ(Wait(SubmitIn(kDeviceDescriptor)).status, TransferStatus::kOk);
 }
 
@@ -428,13 +250,6 @@ TEST_P(TransportConformance, StatusesHaveNames) {
   EXPECT_STREQ(TransferStatusName(TransferStatus::kDisconnected), "disconnected");
   EXPECT_FALSE(usb().identity().path.empty());
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    Carriers, TransportConformance,
-    testing::Values(
-        CarrierCase{"InProcessPumped", [] { return std::make_unique<PumpedCarrier>(); }},
-        CarrierCase{"InProcessThreaded", [] { return std::make_unique<ThreadedCarrier>(); }}),
-    [](const testing::TestParamInfo<CarrierCase>& param) { return param.param.name; });
 
 }  // namespace
 }  // namespace voxeld::display
