@@ -29,6 +29,8 @@ ALLOWED = {
     "tools": ["client", "display/geometry", "display/api", "display/sync", "gpu", "voxeld/v1", "tools",
               # What an address looks like, and what was meant: alike at both ends.
               "daemon/address", "daemon/suggest"],
+    # Emulated devices are of display; this is their program.
+    "tools/emulator": ["display", "tools/emulator"],
     "client": ["voxeld/v1"],
     "tests": ["daemon", "gpu", "display", "voxeld/v1", "tools", "client"],
 }
