@@ -47,7 +47,7 @@ class SystemCarrier final : public Carrier {
       return gone;
     });
     control_.Ask("plug");
-    Require([&] { return transport_->Open().ok(); });
+    Require([&] { return (opened_ = transport_->Open()).ok(); });
     transport_->Close();
   }
   ~SystemCarrier() override { transport_->SetWake(nullptr); }
@@ -72,10 +72,13 @@ class SystemCarrier final : public Carrier {
 
  private:
   void Require(const std::function<bool()>& done) {
-    if (!RunUntil(done)) throw std::runtime_error("the emulated device does not come and go");
+    if (RunUntil(done)) return;
+    throw std::runtime_error("the emulated device does not come and go: " +
+                             std::string(opened_.message()));
   }
 
   sync::SystemClock clock_;
+  absl::Status opened_;
   hil::ControlClient control_;
   sync::Mutex mutex_;
   sync::CondVar wake_;

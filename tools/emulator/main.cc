@@ -52,7 +52,7 @@ class Session {
   virtual ~Session() = default;
   virtual display::emulator::ByteStream& stream() = 0;
   virtual absl::Status Receive() = 0;
-  // The cable was pulled or plugged in. False: the connection is the cable, and ends.
+  // Tells that the device came or went. False: the connection is the cable, and has to end.
   virtual bool Plugged(bool plugged) = 0;
 };
 
@@ -141,24 +141,36 @@ class Player {
     attach_at_ = sync::kNever;
     absl::StatusOr<int> fd = display::emulator::AttachToKernel(device_.model->speed());
     if (!fd.ok()) return fd.status();
-    session_ = std::make_unique<UsbipCarrier>(*fd, *device_.model);
+    BeginSession(std::make_unique<UsbipCarrier>(*fd, *device_.model));
     return absl::OkStatus();
   }
 
+  // The cable may have been pulled and plugged in again since the last look.
   absl::Status FollowCable() {
     const bool plugged = device_.model->plugged();
-    if (plugged != was_plugged_) {
-      was_plugged_ = plugged;
-      std::fprintf(stderr, "%s\n", plugged ? "plugged in" : "unplugged");
-      if (session_ != nullptr && !session_->Plugged(plugged)) session_->stream().Shutdown();
-      if (session_ != nullptr && !session_->stream().open()) EndSession();
-      if (plugged && options_.attach) attach_at_ = clock_.Now() + kReattach;
+    const uint32_t plugs = device_.model->plugs();
+    if (session_ != nullptr && (!plugged || plugs != session_plugs_)) {
+      const bool was_there = std::exchange(session_plugs_, plugs) != 0;
+      if (was_there && !session_->Plugged(false)) EndSession();
+      if (session_ != nullptr && plugged) session_->Plugged(true);
+      if (!plugged) session_plugs_ = 0;
     }
-    if (attach_at_ <= clock_.Now()) return Attach();
+    if (plugged && session_ == nullptr && options_.attach && attach_at_ == sync::kNever) {
+      attach_at_ = clock_.Now() + kReattach;
+    }
+    if (plugged && attach_at_ <= clock_.Now()) return Attach();
     return absl::OkStatus();
   }
 
-  void EndSession() { session_ = nullptr; }
+  void BeginSession(std::unique_ptr<Session> session) {
+    session_ = std::move(session);
+    session_plugs_ = device_.model->plugged() ? device_.model->plugs() : 0;
+  }
+
+  void EndSession() {
+    session_->stream().Shutdown();
+    session_ = nullptr;
+  }
 
   void Serve() {
     session_->stream().SendWaiting();
@@ -166,11 +178,10 @@ class Player {
     if (status.ok() && session_->stream().open()) return;
     std::fprintf(stderr, "connection ended: %s\n", std::string(status.message()).c_str());
     EndSession();
-    // The kernel let go of the device (or its port was reset): it is as if pulled and plugged in.
-    if (options_.attach && device_.model->plugged()) {
+    // The other side let go of the device: for the device that is the cable.
+    if (device_.model->plugged()) {
       device_.model->SetPlugged(false);
       device_.model->SetPlugged(true);
-      attach_at_ = clock_.Now() + kReattach;
     }
   }
 
@@ -214,13 +225,12 @@ class Player {
     const int one = 1;
     setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof(one));
     if (!options_.usbip_port.has_value()) {
-      session_ = std::make_unique<UsbredirCarrier>(fd, *device_.model);
-      return;
+      return BeginSession(std::make_unique<UsbredirCarrier>(fd, *device_.model));
     }
     const absl::StatusOr<bool> urbs =
         display::emulator::AnswerUsbipHandshake(fd, *device_.model, kHandshakeMs);
     if (urbs.ok() && *urbs) {
-      session_ = std::make_unique<UsbipCarrier>(fd, *device_.model);
+      BeginSession(std::make_unique<UsbipCarrier>(fd, *device_.model));
     } else {
       if (!urbs.ok()) std::fprintf(stderr, "%s\n", std::string(urbs.status().message()).c_str());
       close(fd);
@@ -233,7 +243,8 @@ class Player {
   std::unique_ptr<ControlSocket> control_;
   int listener_ = -1;
   std::unique_ptr<Session> session_;
-  bool was_plugged_ = true;
+  uint32_t session_plugs_ =
+      0;  // of the device, when the other side was told of it; 0: it is not there
   sync::TimeNs attach_at_ = sync::kNever;
 };
 

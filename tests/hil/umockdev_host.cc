@@ -1,0 +1,395 @@
+// A faked kernel for one emulated device: runs a program that sees a USB device in /sys and /dev and
+// talks to it through usbfs, which in truth is a device model here. Run it under umockdev-wrapper.
+//
+//   umockdev_host DEVICE CONTROL PROGRAM [ARGUMENT…]     DEVICE as voxeld-emulator's
+//
+// Ends with the program's exit status.
+
+#include <linux/usbdevice_fs.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/wait.h>
+#include <umockdev.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <deque>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "display/emulator/carriers/model_facts.h"
+#include "display/sync/clock.h"
+#include "tools/emulator/control_socket.h"
+#include "tools/emulator/emulated.h"
+
+namespace voxeld::hil {
+namespace {
+
+using display::TransferStatus;
+using display::emulator::ModelFacts;
+using display::emulator::ParseSetup;
+
+constexpr const char* kFolder = "/devices/pci0000:00/usb1/1-1";
+// As the kernel's usbfs_memory_mb.
+constexpr size_t kMostInFlight = size_t{16} << 20;
+// The node is always ready to be written, so libusb asks all the time: an answer of "nothing yet" is
+// kept this long.
+constexpr sync::TimeNs kPark = 2 * sync::kMillisecond;
+
+int KernelStatus(TransferStatus status) {
+  switch (status) {
+    case TransferStatus::kOk:
+    case TransferStatus::kShort:
+      return 0;
+    case TransferStatus::kStall:
+      return -EPIPE;
+    case TransferStatus::kOverflow:
+      return -EOVERFLOW;
+    case TransferStatus::kCancelled:
+      return -ENOENT;
+    case TransferStatus::kDisconnected:
+      return -ESHUTDOWN;
+    default:
+      return -EPROTO;
+  }
+}
+
+class Host {
+ public:
+  Host(emulator::Emulated device, const std::string& control, sync::Clock& clock)
+      : device_(std::move(device)),
+        facts_(display::emulator::ReadFacts(*device_.model)),
+        clock_(clock),
+        testbed_(umockdev_testbed_new()),
+        handler_(umockdev_ioctl_base_new()) {
+    device_.model->SetComplete(
+        [this](uint64_t id, TransferStatus status, uint32_t actual, std::span<const std::byte> in) {
+          OnComplete(id, status, actual, in);
+        });
+    g_signal_connect(
+        handler_, "handle-ioctl",
+        G_CALLBACK(+[](UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer host) {
+          return static_cast<Host*>(host)->OnIoctl(client);
+        }),
+        this);
+    absl::StatusOr<std::unique_ptr<emulator::ControlSocket>> made =
+        emulator::ControlSocket::Listen(control);
+    if (!made.ok()) Die(std::string(made.status().message()));
+    control_ = *std::move(made);
+    AddDevice();
+  }
+  ~Host() {
+    g_object_unref(handler_);
+    g_object_unref(testbed_);
+  }
+
+  int Run(char** program) {
+    const pid_t child = fork();
+    if (child == 0) {
+      execv(program[0], program);
+      _exit(127);
+    }
+    int status = 0;
+    while (waitpid(child, &status, WNOHANG) == 0) {
+      while (g_main_context_iteration(nullptr, FALSE)) {
+      }
+      std::vector<pollfd> fds;
+      control_->AddTo(fds);
+      poll(fds.data(), fds.size(), 1);
+      FollowCable();
+    }
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+ private:
+  struct InFlight {
+    UMockdevIoctlData* urb = nullptr;
+    UMockdevIoctlData* buffer = nullptr;
+    size_t bytes = 0;
+    std::vector<std::byte> out;
+  };
+  struct Parked {
+    UMockdevIoctlClient* client;
+    sync::TimeNs until;
+  };
+
+  [[noreturn]] static void Die(const std::string& what) {
+    std::fprintf(stderr, "umockdev_host: %s\n", what.c_str());
+    std::exit(125);
+  }
+
+  std::string Node() const { return absl::StrFormat("bus/usb/001/%03d", number_); }
+
+  void AddDevice() {
+    const std::string path = "/dev/" + Node();
+    GError* error = nullptr;
+    if (!umockdev_testbed_attach_ioctl(testbed_, path.c_str(), handler_, &error)) {
+      Die(error->message);
+    }
+    std::string hex;
+    for (const auto* bytes : {&facts_.device, &facts_.configuration}) {
+      for (const std::byte b : *bytes)
+        absl::StrAppend(&hex, absl::StrFormat("%02X", std::to_integer<int>(b)));
+    }
+    const std::string text = absl::StrCat(
+        "P: ", kFolder, "\nN: ", Node(), "=", hex, "\nE: SUBSYSTEM=usb\nE: DRIVER=usb\n",
+        absl::StrFormat("E: BUSNUM=001\nE: DEVNUM=%03d\n", number_), "E: DEVNAME=", path,
+        "\nE: DEVTYPE=usb_device\nE: MAJOR=189\nE: MINOR=", number_ - 1,
+        "\nA: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum=", number_,
+        "\\n\nA: speed=480\\n\n",
+        absl::StrFormat("A: idVendor=%04x\\n\nA: idProduct=%04x\\n\nA: bcdDevice=%04x\\n\n",
+                        facts_.vendor_id, facts_.product_id, facts_.bcd_device),
+        "A: serial=", facts_.serial, "\\n\nH: descriptors=", hex, "\n");
+    if (!umockdev_testbed_add_from_string(testbed_, text.c_str(), &error)) Die(error->message);
+    umockdev_testbed_uevent(testbed_, (std::string("/sys") + kFolder).c_str(), "add");
+  }
+
+  void RemoveDevice(const std::string& node) {
+    const std::string folder = std::string("/sys") + kFolder;
+    umockdev_testbed_uevent(testbed_, folder.c_str(), "remove");
+    umockdev_testbed_remove_device(testbed_, folder.c_str());
+    umockdev_testbed_detach_ioctl(testbed_, ("/dev/" + node).c_str(), nullptr);
+  }
+
+  void FollowCable() {
+    std::unique_lock lock(mutex_);
+    control_->Serve([this](std::string_view line) { return emulator::Control(device_, line); });
+    device_.model->Tick();
+    ReleaseParked();
+    // It may have been pulled and plugged in again since the last look.
+    const uint32_t plugs = device_.model->plugged() ? device_.model->plugs() : 0;
+    const uint32_t had = std::exchange(plugs_, plugs);
+    if (plugs == had) return;
+    const std::string old = Node();
+    if (plugs != 0) {
+      done_.clear();
+      ++number_;  // as the kernel does: an old handle does not come back to life
+    }
+    lock.unlock();
+    if (had != 0) RemoveDevice(old);
+    if (plugs != 0) AddDevice();
+  }
+
+  void ReleaseParked() {
+    for (auto it = parked_.begin(); it != parked_.end();) {
+      if (clock_.Now() < it->until && done_.empty()) {
+        ++it;
+        continue;
+      }
+      umockdev_ioctl_client_complete(it->client, -1, Stale(it->client) ? ENODEV : EAGAIN);
+      g_object_unref(it->client);
+      it = parked_.erase(it);
+    }
+  }
+
+  bool Stale(UMockdevIoctlClient* client) const {
+    return !device_.model->plugged() ||
+           "/dev/" + Node() != umockdev_ioctl_client_get_devnode(client);
+  }
+
+  void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
+                  std::span<const std::byte> in) {
+    const auto it = in_flight_.find(id);
+    if (it == in_flight_.end()) return;
+    auto* const urb = reinterpret_cast<usbdevfs_urb*>(it->second.urb->data);
+    urb->status = KernelStatus(status);
+    urb->actual_length = static_cast<int>(in.empty() ? actual : in.size());
+    if (!in.empty()) {
+      const size_t head = urb->type == USBDEVFS_URB_TYPE_CONTROL ? 8 : 0;
+      umockdev_ioctl_data_update(it->second.buffer, head,
+                                 reinterpret_cast<guint8*>(const_cast<std::byte*>(in.data())),
+                                 in.size());
+    }
+    bytes_in_flight_ -= it->second.bytes;
+    done_.push_back(it->second.urb);
+    in_flight_.erase(it);
+  }
+
+  gboolean Answer(UMockdevIoctlClient* client, int error) {
+    umockdev_ioctl_client_complete(client, error == 0 ? 0 : -1, error);
+    return TRUE;
+  }
+
+  gboolean OnIoctl(UMockdevIoctlClient* client) {
+    const std::lock_guard lock(mutex_);
+    device_.model->Tick();
+    UMockdevIoctlData* const argument = umockdev_ioctl_client_get_arg(client);
+    const bool stale = Stale(client);
+    switch (umockdev_ioctl_client_get_request(client)) {
+      case USBDEVFS_GET_CAPABILITIES: {
+        uint32_t capabilities = USBDEVFS_CAP_BULK_SCATTER_GATHER | USBDEVFS_CAP_BULK_CONTINUATION |
+                                USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
+                                USBDEVFS_CAP_REAP_AFTER_DISCONNECT | USBDEVFS_CAP_ZERO_PACKET;
+        return Give(client, argument, capabilities);
+      }
+      case USBDEVFS_CONNECTINFO: {
+        usbdevfs_connectinfo info{};
+        info.devnum = static_cast<unsigned>(number_);
+        return Give(client, argument, info);
+      }
+      case USBDEVFS_CONTROL:
+        return stale ? Answer(client, ENODEV) : SynchronousControl(client, argument);
+      case USBDEVFS_CLAIMINTERFACE:
+      case USBDEVFS_RELEASEINTERFACE:
+      case USBDEVFS_SETINTERFACE:
+      case USBDEVFS_SETCONFIGURATION:
+        return Answer(client, stale ? ENODEV : 0);
+      case USBDEVFS_RESET:
+        if (!stale) device_.model->Reset();
+        return Answer(client, stale ? ENODEV : 0);
+      case USBDEVFS_CLEAR_HALT: {
+        if (stale) return Answer(client, ENODEV);
+        g_autoptr(UMockdevIoctlData) data = umockdev_ioctl_data_resolve(argument, 0, 4, nullptr);
+        uint32_t endpoint = 0;
+        std::memcpy(&endpoint, data->data, sizeof(endpoint));
+        display::Urb urb;
+        urb.id = next_++;
+        urb.setup = {.request_type = 2, .request = 1, .index = static_cast<uint16_t>(endpoint)};
+        device_.model->Submit(urb);
+        return Answer(client, 0);
+      }
+      case USBDEVFS_SUBMITURB:
+        return stale ? Answer(client, ENODEV) : SubmitUrb(client, argument);
+      case USBDEVFS_REAPURB:
+      case USBDEVFS_REAPURBNDELAY: {
+        if (done_.empty()) {
+          if (stale) return Answer(client, ENODEV);
+          g_object_ref(client);
+          parked_.push_back({client, clock_.Now() + kPark});
+          return TRUE;
+        }
+        g_autoptr(UMockdevIoctlData) data =
+            umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
+        umockdev_ioctl_data_set_ptr(data, 0, done_.front());
+        done_.pop_front();
+        return Answer(client, 0);
+      }
+      case USBDEVFS_DISCARDURB: {
+        const auto address = *reinterpret_cast<gulong*>(argument->data);
+        for (const auto& [id, urb] : in_flight_) {
+          if (urb.urb->client_addr != address) continue;
+          const uint64_t victim = id;
+          device_.model->Unlink(victim);
+          OnComplete(victim, TransferStatus::kCancelled, 0, {});
+          return Answer(client, 0);
+        }
+        return Answer(client, EINVAL);
+      }
+      case USBDEVFS_IOCTL:  // to detach a driver: there is none
+      case USBDEVFS_GETDRIVER:
+        return Answer(client, ENODATA);
+      default:
+        return FALSE;
+    }
+  }
+
+  template <typename T>
+  gboolean Give(UMockdevIoctlClient* client, UMockdevIoctlData* argument, T value) {
+    g_autoptr(UMockdevIoctlData) data =
+        umockdev_ioctl_data_resolve(argument, 0, sizeof(value), nullptr);
+    umockdev_ioctl_data_update(data, 0, reinterpret_cast<guint8*>(&value), sizeof(value));
+    return Answer(client, 0);
+  }
+
+  gboolean SynchronousControl(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
+    UMockdevIoctlData* const data =
+        umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_ctrltransfer), nullptr);
+    usbdevfs_ctrltransfer control;
+    std::memcpy(&control, data->data, sizeof(control));
+    // The only one that libusb sends in this way: GET_CONFIGURATION.
+    if (control.bRequestType != 0x80 || control.bRequest != 8 || control.wLength < 1) {
+      return Answer(client, EPIPE);
+    }
+    UMockdevIoctlData* const bytes = umockdev_ioctl_data_resolve(
+        data, G_STRUCT_OFFSET(usbdevfs_ctrltransfer, data), control.wLength, nullptr);
+    guint8 configuration = 1;
+    umockdev_ioctl_data_update(bytes, 0, &configuration, 1);
+    umockdev_ioctl_client_complete(client, 1, 0);
+    return TRUE;
+  }
+
+  gboolean SubmitUrb(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
+    UMockdevIoctlData* const data =
+        umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr);
+    const auto& asked = *reinterpret_cast<usbdevfs_urb*>(data->data);
+    const auto length = static_cast<size_t>(asked.buffer_length);
+    if (length > kMostInFlight - bytes_in_flight_) return Answer(client, ENOMEM);
+    InFlight urb{.urb = data, .buffer = nullptr, .bytes = length, .out = {}};
+    if (length > 0) {
+      urb.buffer =
+          umockdev_ioctl_data_resolve(data, G_STRUCT_OFFSET(usbdevfs_urb, buffer), length, nullptr);
+    }
+    display::Urb out;
+    out.id = next_++;
+    const auto* bytes =
+        urb.buffer == nullptr ? nullptr : reinterpret_cast<const std::byte*>(urb.buffer->data);
+    size_t head = 0;
+    bool in = (asked.endpoint & 0x80) != 0;
+    if (asked.type == USBDEVFS_URB_TYPE_CONTROL) {
+      if (length < 8) return Answer(client, EINVAL);
+      uint8_t setup[8];
+      std::memcpy(setup, bytes, sizeof(setup));
+      out.setup = ParseSetup(setup);
+      in = (out.setup.request_type & 0x80) != 0;
+      head = 8;
+    } else {
+      out.endpoint = asked.endpoint;
+    }
+    if (in) {
+      out.length = static_cast<uint32_t>(length - head);
+    } else if (length > head) {
+      urb.out.assign(bytes + head, bytes + length);
+    }
+    out.zero_packet = (asked.flags & USBDEVFS_URB_ZERO_PACKET) != 0;
+    bytes_in_flight_ += length;
+    InFlight& kept = in_flight_[out.id] = std::move(urb);
+    out.out = kept.out;
+    device_.model->Submit(out);
+    return Answer(client, 0);
+  }
+
+  std::mutex mutex_;  // handlers may run in umockdev's thread
+  emulator::Emulated device_;
+  const ModelFacts facts_;
+  sync::Clock& clock_;
+  UMockdevTestbed* const testbed_;
+  UMockdevIoctlBase* const handler_;
+  std::unique_ptr<emulator::ControlSocket> control_;
+  int number_ = 2;
+  uint32_t plugs_ = 1;  // of the device as it is in the testbed; 0: it is not there
+  uint64_t next_ = 1;
+  std::map<uint64_t, InFlight> in_flight_;
+  size_t bytes_in_flight_ = 0;
+  std::deque<UMockdevIoctlData*> done_;
+  std::list<Parked> parked_;
+};
+
+int Main(int argc, char** argv) {
+  if (argc < 4) {
+    std::fprintf(stderr, "usage: umockdev_host DEVICE CONTROL PROGRAM [ARGUMENT…]\n");
+    return 2;
+  }
+  sync::SystemClock clock;
+  absl::StatusOr<emulator::Emulated> device = emulator::MakeEmulated(argv[1], clock);
+  if (!device.ok()) {
+    std::fprintf(stderr, "umockdev_host: %s\n", std::string(device.status().message()).c_str());
+    return 2;
+  }
+  Host host(*std::move(device), argv[2], clock);
+  setenv("VOXELD_EMULATOR_CONTROL", argv[2], 1);
+  return host.Run(argv + 3);
+}
+
+}  // namespace
+}  // namespace voxeld::hil
+
+int main(int argc, char** argv) { return voxeld::hil::Main(argc, argv); }
