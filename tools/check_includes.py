@@ -37,7 +37,7 @@ ALLOWED = {
 
 # The only places that may include gRPC's headers: one on each side of the wire. No header does.
 GRPC = ("daemon/services/", "tools/voxelctl/connection", "client/cpp/")
-GRPC_TESTS = ("tests/daemon/services/", "tests/e2e/", "tests/tools/", "tests/integration/")
+GRPC_TESTS = ("tests/daemon/services/", "tests/e2e/", "tests/hil/", "tests/tools/", "tests/integration/")
 PROTOBUF_FREE = ("gpu/", "display/", "daemon/scene/", "daemon/core/", "daemon/pipeline/", "daemon/config/")
 
 # What is written from the repository root, or from where protobuf's files are made.

@@ -47,6 +47,7 @@ enum class TransferStatus : uint8_t {
 
 const char* TransferStatusName(TransferStatus status);
 
+// Ascending; a transport uses none twice, however often it is opened.
 using TransferId = uint64_t;
 
 struct Transfer {

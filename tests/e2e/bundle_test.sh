@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 "$source/tools/bundle" --no-build --build "$build" --out "$work/packed" >"$work/said"
 archive=$(tail -n 1 "$work/said")
 mkdir "$work/bundle"
-tar -C "$work/bundle" -xzf "$archive"
+tar -C "$work/bundle" -xJf "$archive"
 
 outside=$(for program in "$work"/bundle/bin/voxel* "$work"/bundle/bin/tests/*; do
   env -i LD_LIBRARY_PATH= ldd "$program"

@@ -80,6 +80,7 @@ void LibusbBus::Forget(LibusbTransport* transport) {
 }
 
 absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& match,
+                                                            TransferId first_id,
                                                             std::function<void()> wake) {
   sync::MutexLock lock(list_mutex_);
   absl::StatusOr<std::vector<UsbDeviceEntry>> devices = list_->Devices();
@@ -98,7 +99,7 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& matc
     }
     absl::StatusOr<std::unique_ptr<OpenDevice>> device =
         OpenDevice::Open(context_, entry, *ChooseInterface(entry.interfaces, match.interface),
-                         budget_, clock_, wake);
+                         budget_, clock_, first_id, wake);
     if (device.ok()) {
       open_nodes_.insert(entry.node);
       return device;

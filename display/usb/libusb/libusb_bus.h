@@ -29,7 +29,7 @@ class LibusbBus final : public UsbBus {
   std::unique_ptr<UsbTransport> MakeTransport(UsbMatch match) override;
 
   // For LibusbTransport.
-  absl::StatusOr<std::unique_ptr<OpenDevice>> Open(const UsbMatch& match,
+  absl::StatusOr<std::unique_ptr<OpenDevice>> Open(const UsbMatch& match, TransferId first_id,
                                                    std::function<void()> wake);
   void Close(std::unique_ptr<OpenDevice> device);
   void Forget(LibusbTransport* transport);

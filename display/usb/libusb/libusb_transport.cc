@@ -18,14 +18,17 @@ absl::Status LibusbTransport::Open() {
     sync::MutexLock lock(wake_mutex_);
     arrived_ = false;
   }
-  absl::StatusOr<std::unique_ptr<OpenDevice>> device = bus_.Open(match_, [this] { Wake(false); });
+  absl::StatusOr<std::unique_ptr<OpenDevice>> device =
+      bus_.Open(match_, next_id_, [this] { Wake(false); });
   if (!device.ok()) return device.status();
   device_ = *std::move(device);
   return absl::OkStatus();
 }
 
 void LibusbTransport::Close() {
-  if (device_ != nullptr) bus_.Close(std::move(device_));
+  if (device_ == nullptr) return;
+  next_id_ = device_->next_id();
+  bus_.Close(std::move(device_));
 }
 
 UsbIdentity LibusbTransport::identity() const {

@@ -39,6 +39,7 @@ class LibusbTransport final : public UsbTransport {
   LibusbBus& bus_;
   const UsbMatch match_;
   std::unique_ptr<OpenDevice> device_;  // the owner's thread's
+  TransferId next_id_ = 1;
 
   sync::Mutex wake_mutex_;
   std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);

@@ -154,11 +154,9 @@ struct OpenDevice::Pending {
   size_t counted = 0;                // of the budget
 };
 
-absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(std::shared_ptr<LibusbContext> context,
-                                                             const UsbDeviceEntry& entry,
-                                                             uint8_t interface, UsbfsBudget& budget,
-                                                             sync::Clock& clock,
-                                                             std::function<void()> wake) {
+absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
+    std::shared_ptr<LibusbContext> context, const UsbDeviceEntry& entry, uint8_t interface,
+    UsbfsBudget& budget, sync::Clock& clock, TransferId first_id, std::function<void()> wake) {
   const int node = open(entry.node.c_str(), O_RDWR | O_CLOEXEC);
   if (node < 0) {
     const int error = errno;
@@ -190,20 +188,21 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(std::shared_ptr<Lib
         "interface ", interface, " of ", NameOf(entry), " cannot be claimed: ",
         result == LIBUSB_ERROR_BUSY ? "another program has it" : libusb_error_name(result)));
   }
-  return std::unique_ptr<OpenDevice>(
-      new OpenDevice(std::move(handle), entry, interface, budget, clock, std::move(wake)));
+  return std::unique_ptr<OpenDevice>(new OpenDevice(std::move(handle), entry, interface, budget,
+                                                    clock, first_id, std::move(wake)));
 }
 
 OpenDevice::OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& entry,
                        uint8_t interface, UsbfsBudget& budget, sync::Clock& clock,
-                       std::function<void()> wake)
+                       TransferId first_id, std::function<void()> wake)
     : handle_(std::move(handle)),
       entry_(entry),
       interface_(interface),
       budget_(budget),
       clock_(clock),
       memory_(DeviceSlabs::Make(handle_, budget)),
-      wake_(std::move(wake)) {
+      wake_(std::move(wake)),
+      next_id_(first_id) {
   for (size_t i = 0; i < kTransfers; ++i) {
     all_.push_back(std::make_unique<Pending>());
     free_.push_back(all_.back().get());
@@ -367,6 +366,11 @@ size_t OpenDevice::Drain(std::vector<TransferCompletion>& out) {
   std::move(completions_.begin(), completions_.end(), std::back_inserter(out));
   completions_.clear();
   return count;
+}
+
+TransferId OpenDevice::next_id() const {
+  sync::MutexLock lock(mutex_);
+  return next_id_;
 }
 
 size_t OpenDevice::bytes_in_flight() const {

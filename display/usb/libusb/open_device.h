@@ -48,12 +48,12 @@ class OpenDevice {
  public:
   // Opens the device's node, and claims the interface; a kernel's driver that has it is detached
   // until the close. PermissionDenied, Unavailable (somebody else has it; it went away) or Internal,
-  // each with what would help. `wake` is called on the event thread when there are completions;
+  // each with what would help. Ids begin at `first_id`. `wake` is called on the event thread when there are completions;
   // `budget` outlives the device.
   static absl::StatusOr<std::unique_ptr<OpenDevice>> Open(std::shared_ptr<LibusbContext> context,
                                                           const UsbDeviceEntry& entry,
                                                           uint8_t interface, UsbfsBudget& budget,
-                                                          sync::Clock& clock,
+                                                          sync::Clock& clock, TransferId first_id,
                                                           std::function<void()> wake);
   // Everything must have ended.
   ~OpenDevice();
@@ -61,6 +61,7 @@ class OpenDevice {
   OpenDevice& operator=(const OpenDevice&) = delete;
 
   const UsbDeviceEntry& entry() const { return entry_; }
+  TransferId next_id() const;
 
   // As UsbTransport's.
   absl::StatusOr<TransferId> Submit(Transfer&& transfer);
@@ -89,7 +90,8 @@ class OpenDevice {
   };
 
   OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& entry, uint8_t interface,
-             UsbfsBudget& budget, sync::Clock& clock, std::function<void()> wake);
+             UsbfsBudget& budget, sync::Clock& clock, TransferId first_id,
+             std::function<void()> wake);
 
   static void OnDone(libusb_transfer* done);
   void Complete(Pending& pending);
@@ -116,7 +118,7 @@ class OpenDevice {
   sync::CondVar changed_;  // pending_ or blocking_ got shorter, or blocking_ longer, or ending_
   bool ending_ VOXELD_GUARDED_BY(mutex_) = false;
   bool gone_ VOXELD_GUARDED_BY(mutex_) = false;
-  TransferId next_id_ VOXELD_GUARDED_BY(mutex_) = 1;
+  TransferId next_id_ VOXELD_GUARDED_BY(mutex_);
   std::map<TransferId, Pending*> pending_ VOXELD_GUARDED_BY(mutex_);
   std::vector<std::unique_ptr<Pending>> all_ VOXELD_GUARDED_BY(mutex_);  // made once, used again
   std::vector<Pending*> free_ VOXELD_GUARDED_BY(mutex_);
