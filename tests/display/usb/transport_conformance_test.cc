@@ -16,6 +16,7 @@
 #include "display/emulator/voxlink_device.h"
 #include "display/sync/clock.h"
 #include "display/sync/fake_clock.h"
+#include "display/usb/faulty_transport.h"
 #include "display/usb/in_process.h"
 #include "display/usb/recording_transport.h"
 #include "gtest/gtest.h"
@@ -60,6 +61,11 @@ std::unique_ptr<UsbTransport> Bare(std::unique_ptr<UsbTransport> inner, sync::Cl
 std::unique_ptr<UsbTransport> Recorded(std::unique_ptr<UsbTransport> inner, sync::Clock& clock) {
   return std::make_unique<RecordingTransport>(std::move(inner), MemoryRecording().MakeRecorder(),
                                               clock, RecordingTransport::Options{});
+}
+
+std::unique_ptr<UsbTransport> Faultless(std::unique_ptr<UsbTransport> inner, sync::Clock& clock) {
+  return std::make_unique<FaultyTransport>(std::move(inner), std::vector<TransportFault>{}, clock,
+                                           FaultyTransport::Options{});
 }
 
 class PumpedCarrier final : public Carrier {
@@ -454,8 +460,10 @@ INSTANTIATE_TEST_SUITE_P(
         CarrierCase{"InProcessPumped", [] { return std::make_unique<PumpedCarrier>(); }},
         CarrierCase{"InProcessThreaded", [] { return std::make_unique<ThreadedCarrier>(); }},
         CarrierCase{"RecordedPumped", [] { return std::make_unique<PumpedCarrier>(Recorded); }},
-        CarrierCase{"RecordedThreaded",
-                    [] { return std::make_unique<ThreadedCarrier>(Recorded); }}),
+        CarrierCase{"RecordedThreaded", [] { return std::make_unique<ThreadedCarrier>(Recorded); }},
+        CarrierCase{"FaultlessPumped", [] { return std::make_unique<PumpedCarrier>(Faultless); }},
+        CarrierCase{"FaultlessThreaded",
+                    [] { return std::make_unique<ThreadedCarrier>(Faultless); }}),
     [](const testing::TestParamInfo<CarrierCase>& param) { return param.param.name; });
 
 }  // namespace
