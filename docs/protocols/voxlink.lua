@@ -44,139 +44,252 @@ local LIGHTS = {
 }
 local SUMS = { [0] = "wrong", [1] = "right", [2] = "not checked" }
 
--- ---- fields
+-- ---- layouts: fields that lie at fixed places
 
-local fields = {}
+local fields, by_name = {}, {}
 local function field(make, name, label, ...)
-  local made = make("voxlink." .. name, label, ...)
-  fields[#fields + 1] = made
-  return made
+  if by_name[name] == nil then
+    by_name[name] = make("voxlink." .. name, label, ...)
+    fields[#fields + 1] = by_name[name]
+  end
+  return by_name[name]
 end
 
 local P = ProtoField
-local DEC, HEX = base.DEC, base.HEX
+local KINDS = {  -- what makes the field, how it is shown, how many bytes it has
+  u8 = { P.uint8, base.DEC, 1 }, u16 = { P.uint16, base.DEC, 2 }, u32 = { P.uint32, base.DEC, 4 },
+  x8 = { P.uint8, base.HEX, 1 }, x16 = { P.uint16, base.HEX, 2 }, x32 = { P.uint32, base.HEX, 4 },
+  u64 = { P.uint64, base.DEC, 8 }, i16 = { P.int16, base.DEC, 2 }, f64 = { P.double, nil, 8 },
+}
+
+-- Of { offset, kind, name, label, words for values, bits = { { mask, name, label }… } }….
+local function layout(entries)
+  local made = { size = 0 }
+  for _, entry in ipairs(entries) do
+    local offset, name, label, words = entry[1], entry[3], entry[4], entry[5]
+    local make, shown, size = table.unpack(KINDS[entry[2]])
+    local one = { offset = offset, size = size, bits = {} }
+    one.field = shown and field(make, name, label, shown, words) or field(make, name, label)
+    for _, bit_of in ipairs(entry.bits or {}) do
+      one.bits[#one.bits + 1] = field(P.bool, bit_of[2], bit_of[3], 8 * size, nil, bit_of[1])
+    end
+    made[#made + 1] = one
+    made.size = math.max(made.size, offset + size)
+  end
+  return made
+end
+
+local function add(tree, how, bytes, at)
+  for _, one in ipairs(how) do
+    local range = bytes((at or 0) + one.offset, one.size)
+    local item = tree:add_le(one.field, range)
+    for _, flag in ipairs(one.bits) do item:add_le(flag, range) end
+  end
+end
+
+local function first_u64(bytes) return tostring(bytes(0, 8):le_uint64()) end
+
+-- §5.1
+local PACKET = layout({
+  { 0, "x32", "magic", "Magic" },
+  { 4, "u8", "type", "Type", PACKETS },
+  { 5, "x8", "flags", "Flags", bits = {
+    { 0x01, "flags.show", "VOLUME_END: show it from the next sweep on" },
+  } },
+  { 6, "u16", "sub_frame", "Sub-frame" },
+  { 8, "u64", "volume", "Volume" },
+  { 16, "u32", "sequence", "Sequence" },
+  { 20, "u32", "slice", "Slice" },
+  { 24, "u32", "offset", "Offset in the picture" },
+  { 28, "u32", "length", "Length of the payload" },
+})
+-- §5.2, §5.5
+local BEGIN = layout({
+  { 0, "u64", "begin.base", "Base" },
+  { 8, "u32", "begin.pictures", "Pictures" },
+})
+local SHOW = layout({ { 0, "u64", "show.sweep", "From sweep" } })
+
+-- §6
+local EVENT = layout({
+  { 0, "u8", "event.type", "Type", EVENTS },
+  { 1, "x8", "event.flags", "Flags", bits = {
+    { 0x01, "event.flags.bit0", "MISSING: the list ends here; SHOWN: the device was dark" },
+  } },
+  { 2, "u16", "event.length", "Length" },
+  { 4, "u32", "event.sequence", "Sequence" },
+  { 8, "u64", "event.time_ns", "Device's time (ns)" },
+  { 16, "u64", "event.credit_limit", "Credit limit (bytes)" },
+})
+local VOLUME = { 0, "u64", "event.volume", "Volume" }
+local REFUSED = layout({ VOLUME, { 8, "u32", "event.reason", "Reason", REASONS } })
+local BODIES = {
+  [1] = layout({
+    { 0, "x16", "version", "Version" },
+    { 4, "u32", "receive_buffer", "Receive buffer (bytes)" },
+  }),
+  [3] = layout({
+    { 0, "u64", "event.sweep", "Sweep" },
+    { 8, "u64", "event.start_ns", "Start of the sweep (ns)" },
+    { 16, "u64", "event.shown", "Volume shown" },
+    { 24, "u32", "event.period_ns", "Period (ns)" },
+    { 28, "u32", "event.underruns", "Underruns" },
+  }),
+  [4] = layout({ VOLUME }),
+  [5] = layout({ VOLUME, { 8, "u32", "event.runs", "Runs" } }),
+  [6] = REFUSED,
+  [7] = layout({
+    VOLUME,
+    { 8, "u64", "event.sweep", "Sweep" },
+    { 16, "u64", "event.start_ns", "Start of the sweep (ns)" },
+  }),
+  [8] = REFUSED,
+  [9] = layout({
+    { 0, "u64", "event.sweep", "Sweep" },
+    { 8, "u32", "event.underruns", "Underruns" },
+  }),
+  [10] = layout({
+    { 0, "i16", "temperature", "Temperature (0.1 °C)" },
+    { 4, "u32", "event.power_mw", "Power (mW)" },
+  }),
+  [11] = layout({
+    { 0, "u32", "event.error", "Error", ERRORS },
+    { 4, "u32", "event.error.sequence", "Sequence of the packet" },
+    { 8, "u64", "event.volume", "Volume" },
+    { 16, "u32", "event.error.picture", "Picture" },
+    { 20, "u32", "event.error.detail", "Detail" },
+  }),
+  [12] = layout({
+    { 0, "u32", "event.lit", "Lit" },
+    { 4, "u32", "event.light_cause", "Cause", LIGHTS },
+  }),
+}
+local RUN = layout({
+  { 0, "u32", "event.run.first", "First picture" },
+  { 4, "u32", "event.run.count", "Pictures" },
+})
+-- By type: what else to say of an event in a line.
+local SAYS = {
+  [3] = first_u64, [4] = first_u64, [5] = first_u64, [7] = first_u64,
+  [11] = function(body) return ERRORS[body(0, 4):le_uint()] or "?" end,
+  [12] = function(body) return LIGHTS[body(4, 4):le_uint()] or "?" end,
+}
+SAYS[6] = function(body)
+  return first_u64(body) .. ", " .. (REASONS[body(8, 4):le_uint()] or "?")
+end
+SAYS[8] = SAYS[6]
+
+-- §4; a request's value has a name of its own where it means something
+local VALUES = {
+  [1] = layout({ { 1, "u16", "request.page", "Page" } }),
+  [7] = layout({ { 1, "u16", "request.brightness", "Brightness (65535: full)" } }),
+  [9] = layout({ { 1, "u16", "request.blank", "Blank", { [0] = "light", [1] = "dark" } } }),
+}
+local VALUE = layout({ { 1, "u16", "request.value", "Value" } })
+local REQUEST = layout({
+  { 0, "u8", "request", "Request", REQUESTS },
+  { 3, "u16", "request.index", "Index" },
+  { 5, "u16", "request.length", "Length" },
+})
+local POWER_LIMIT = layout({ { 0, "u32", "request.power_limit_mw", "Power limit (mW)" } })
+
+-- §4.1
+local CAPABILITIES = layout({
+  { 0, "u32", "capabilities.total_length", "Length of the block" },
+  { 4, "x16", "version", "Version" },
+  { 6, "x8", "capabilities.formats", "Pixel formats" },
+  { 7, "u8", "capabilities.max_sub_frames", "Most sub-frames" },
+  { 8, "x32", "capabilities.features", "Features", bits = {
+    { 0x1, "capabilities.features.watchdog", "Watchdog" },
+    { 0x2, "capabilities.features.brightness", "Brightness" },
+    { 0x4, "capabilities.features.power_limit", "Power limit" },
+    { 0x8, "capabilities.features.temperature", "Temperature" },
+  } },
+  { 12, "u32", "receive_buffer", "Receive buffer (bytes)" },
+  { 16, "u32", "capabilities.max_payload", "Largest payload" },
+  { 20, "u32", "capabilities.slices", "Slices" },
+  { 24, "u32", "capabilities.width", "Width" },
+  { 28, "u32", "capabilities.height", "Height" },
+  { 32, "u32", "capabilities.volume_buffers", "Volume buffers" },
+  { 36, "u32", "capabilities.min_rate", "Least sweeps in 1,000 s" },
+  { 40, "u32", "capabilities.max_rate", "Most sweeps in 1,000 s" },
+  { 44, "u32", "capabilities.nominal_rate", "Nominal sweeps in 1,000 s" },
+  { 48, "u32", "capabilities.max_power_mw", "Most power (mW)" },
+  { 52, "u16", "capabilities.keepalive_ms", "Keepalive (ms)" },
+  { 54, "u16", "capabilities.watchdog_ms", "Watchdog (ms)" },
+})
+local SHAPE_OFFSET = 64
+
+-- §4.2
+local MIRROR_BITS = {
+  { 0x01, "shape.mirror.rows", "Along rows" }, { 0x02, "shape.mirror.columns", "Along columns" },
+}
+local KIND = layout({ { 0, "u8", "shape.kind", "Shape", SHAPES } })
+local PLANAR = layout({
+  { 1, "u8", "shape.normal", "Normal", { [0] = "slices lie flat", [1] = "slices stand" } },
+  { 2, "x8", "shape.mirror", "Mirrored", bits = MIRROR_BITS },
+  { 4, "u32", "shape.positions", "Positions" },
+  { 8, "f64", "shape.pitch_u_mm", "Pitch along rows (mm)" },
+  { 16, "f64", "shape.pitch_v_mm", "Pitch along columns (mm)" },
+  { 24, "f64", "shape.thickness_mm", "Thickness of the only slice (mm)" },
+})
+local POSITION = layout({ { 0, "f64", "shape.position_mm", "Position (mm)" } })
+local ROTOR = layout({
+  { 1, "u8", "shape.clockwise", "Clockwise" },
+  { 2, "u8", "shape.panels", "Panels" },
+  { 4, "u32", "shape.slices_per_turn", "Slices a turn" },
+})
+local PANEL = layout({
+  { 0, "f64", "shape.pitch_u_mm", "Pitch along rows (mm)" },
+  { 8, "f64", "shape.pitch_v_mm", "Pitch along columns (mm)" },
+  { 16, "f64", "shape.eccentricity_mm", "Eccentricity (mm)" },
+  { 24, "f64", "shape.shift_u_mm", "Shift along rows (mm)" },
+  { 32, "f64", "shape.shift_v_mm", "Shift along Z (mm)" },
+  { 40, "f64", "shape.phase_turns", "Phase (turns)" },
+  { 48, "x8", "shape.mirror", "Mirrored", bits = MIRROR_BITS },
+})
+local PANEL_SIZE = 56
+
+-- §4.3, §4.4
+local MODE = layout({
+  { 0, "u8", "mode.format", "Pixel format", FORMATS },
+  { 1, "u8", "mode.sub_frames", "Sub-frames" },
+  { 4, "u32", "mode.rate", "Sweeps in 1,000 s" },
+})
+local STATUS = layout({
+  { 0, "u8", "status.running", "In a session" },
+  { 1, "x8", "status.flags", "Flags", bits = {
+    { 0x01, "status.flags.blanked", "Blanked" },
+    { 0x02, "status.flags.watchdog", "Dark by the watchdog" },
+  } },
+  { 4, "u32", "status.event_sequence", "Number of the next event" },
+  { 8, "u64", "status.time_ns", "Device's time (ns)" },
+  { 16, "u64", "status.bytes_received", "Bytes received" },
+  { 24, "u64", "status.credit_limit", "Credit limit (bytes)" },
+  { 32, "u64", "status.filling", "Volume being filled" },
+  { 40, "u64", "status.last_complete", "Last complete volume" },
+  { 48, "u64", "status.shown", "Volume shown" },
+  { 56, "u64", "status.shown_sweep", "First shown with sweep" },
+  { 64, "u64", "status.shown_start_ns", "which began at (ns)" },
+  { 72, "u32", "status.underruns", "Underruns" },
+  { 76, "i16", "temperature", "Temperature (0.1 °C)" },
+})
+
+-- What has no fixed place.
 local f = {
-  -- §5.1 the packet
-  magic = field(P.uint32, "magic", "Magic", HEX),
-  type = field(P.uint8, "type", "Type", DEC, PACKETS),
-  flags = field(P.uint8, "flags", "Flags", HEX),
-  flag_show = field(P.bool, "flags.show", "Show from the next sweep on", 8, nil, 0x01),
-  sub_frame = field(P.uint16, "sub_frame", "Sub-frame", DEC),
-  volume = field(P.uint64, "volume", "Volume", DEC),
-  sequence = field(P.uint32, "sequence", "Sequence", DEC),
-  slice = field(P.uint32, "slice", "Slice", DEC),
-  offset = field(P.uint32, "offset", "Offset in the picture", DEC),
-  length = field(P.uint32, "length", "Length of the payload", DEC),
-  payload_crc = field(P.uint32, "payload_crc", "CRC-32C of the payload", HEX),
-  payload_crc_status = field(P.uint8, "payload_crc.status", "CRC of the payload", DEC, SUMS),
-  header_crc = field(P.uint32, "header_crc", "CRC-32C of the header", HEX),
-  header_crc_status = field(P.uint8, "header_crc.status", "CRC of the header", DEC, SUMS),
+  payload_crc = field(P.uint32, "payload_crc", "CRC-32C of the payload", base.HEX),
+  payload_crc_status = field(P.uint8, "payload_crc.status", "CRC of the payload", base.DEC, SUMS),
+  header_crc = field(P.uint32, "header_crc", "CRC-32C of the header", base.HEX),
+  header_crc_status = field(P.uint8, "header_crc.status", "CRC of the header", base.DEC, SUMS),
   payload = field(P.bytes, "payload", "Payload"),
   skipped = field(P.bytes, "skipped", "Bytes that belong to no packet"),
   fragment = field(P.bytes, "fragment", "Part of a packet"),
   begun_in = field(P.framenum, "begun_in", "Packet begins in frame"),
-  -- §5.2, §5.5
-  base = field(P.uint64, "begin.base", "Base", DEC),
-  pictures = field(P.uint32, "begin.pictures", "Pictures", DEC),
   bitmap = field(P.bytes, "begin.bitmap", "Bitmap"),
-  announced = field(P.uint32, "begin.announced", "Pictures that follow", DEC),
-  show_sweep = field(P.uint64, "show.sweep", "From sweep", DEC),
-  -- §6 events
-  event = field(P.uint8, "event.type", "Type", DEC, EVENTS),
-  event_flags = field(P.uint8, "event.flags", "Flags", HEX),
-  event_last = field(P.bool, "event.flags.last", "The list ends here", 8, nil, 0x01),
-  event_dark = field(P.bool, "event.flags.dark", "The device was dark", 8, nil, 0x01),
-  event_length = field(P.uint16, "event.length", "Length", DEC),
-  event_sequence = field(P.uint32, "event.sequence", "Sequence", DEC),
-  event_time = field(P.uint64, "event.time_ns", "Device's time (ns)", DEC),
-  event_credit = field(P.uint64, "event.credit_limit", "Credit limit (bytes)", DEC),
+  announced = field(P.uint32, "begin.announced", "Pictures that follow", base.DEC),
   event_body = field(P.bytes, "event.body", "Body"),
-  version = field(P.uint16, "version", "Version", HEX),
-  receive_buffer = field(P.uint32, "receive_buffer", "Receive buffer (bytes)", DEC),
-  sweep = field(P.uint64, "event.sweep", "Sweep", DEC),
-  start_ns = field(P.uint64, "event.start_ns", "Start of the sweep (ns)", DEC),
-  event_volume = field(P.uint64, "event.volume", "Volume", DEC),
-  shown = field(P.uint64, "event.shown", "Volume shown", DEC),
-  period_ns = field(P.uint32, "event.period_ns", "Period (ns)", DEC),
-  underruns = field(P.uint32, "event.underruns", "Underruns", DEC),
-  runs = field(P.uint32, "event.runs", "Runs", DEC),
-  run_first = field(P.uint32, "event.run.first", "First picture", DEC),
-  run_count = field(P.uint32, "event.run.count", "Pictures", DEC),
-  reason = field(P.uint32, "event.reason", "Reason", DEC, REASONS),
-  temperature = field(P.int16, "temperature", "Temperature (0.1 °C)", DEC),
-  power_mw = field(P.uint32, "event.power_mw", "Power (mW)", DEC),
-  error = field(P.uint32, "event.error", "Error", DEC, ERRORS),
-  error_sequence = field(P.uint32, "event.error.sequence", "Sequence of the packet", DEC),
-  error_picture = field(P.uint32, "event.error.picture", "Picture", DEC),
-  error_detail = field(P.uint32, "event.error.detail", "Detail", DEC),
-  lit = field(P.uint32, "event.lit", "Lit", DEC),
-  light_cause = field(P.uint32, "event.light_cause", "Cause", DEC, LIGHTS),
-  -- §4 requests
-  request = field(P.uint8, "request", "Request", DEC, REQUESTS),
-  page = field(P.uint16, "request.page", "Page", DEC),
-  brightness = field(P.uint16, "request.brightness", "Brightness (65535: full)", DEC),
-  dark = field(P.uint16, "request.blank", "Blank", DEC, { [0] = "light", [1] = "dark" }),
-  value = field(P.uint16, "request.value", "Value", DEC),
-  index = field(P.uint16, "request.index", "Index", DEC),
-  wlength = field(P.uint16, "request.length", "Length", DEC),
-  power_limit = field(P.uint32, "request.power_limit_mw", "Power limit (mW)", DEC),
-  -- §4.1
-  caps_length = field(P.uint32, "capabilities.total_length", "Length of the block", DEC),
-  caps_formats = field(P.uint8, "capabilities.formats", "Pixel formats", HEX),
-  caps_sub_frames = field(P.uint8, "capabilities.max_sub_frames", "Most sub-frames", DEC),
-  caps_features = field(P.uint32, "capabilities.features", "Features", HEX),
-  caps_watchdog = field(P.bool, "capabilities.features.watchdog", "Watchdog", 32, nil, 0x1),
-  caps_brightness = field(P.bool, "capabilities.features.brightness", "Brightness", 32, nil, 0x2),
-  caps_power = field(P.bool, "capabilities.features.power_limit", "Power limit", 32, nil, 0x4),
-  caps_temp = field(P.bool, "capabilities.features.temperature", "Temperature", 32, nil, 0x8),
-  caps_payload = field(P.uint32, "capabilities.max_payload", "Largest payload", DEC),
-  caps_slices = field(P.uint32, "capabilities.slices", "Slices", DEC),
-  caps_width = field(P.uint32, "capabilities.width", "Width", DEC),
-  caps_height = field(P.uint32, "capabilities.height", "Height", DEC),
-  caps_buffers = field(P.uint32, "capabilities.volume_buffers", "Volume buffers", DEC),
-  caps_min_rate = field(P.uint32, "capabilities.min_rate", "Least sweeps in 1,000 s", DEC),
-  caps_max_rate = field(P.uint32, "capabilities.max_rate", "Most sweeps in 1,000 s", DEC),
-  caps_rate = field(P.uint32, "capabilities.nominal_rate", "Nominal sweeps in 1,000 s", DEC),
-  caps_power_mw = field(P.uint32, "capabilities.max_power_mw", "Most power (mW)", DEC),
-  caps_keepalive = field(P.uint16, "capabilities.keepalive_ms", "Keepalive (ms)", DEC),
-  caps_watchdog_ms = field(P.uint16, "capabilities.watchdog_ms", "Watchdog (ms)", DEC),
+  request = by_name["request"],
   caps_more = field(P.bytes, "capabilities.more", "Bytes of the block"),
-  -- §4.2
-  shape = field(P.uint8, "shape.kind", "Shape", DEC, SHAPES),
-  shape_normal = field(P.uint8, "shape.normal", "Normal", DEC,
-                       { [0] = "slices lie flat", [1] = "slices stand" }),
-  mirror_rows = field(P.bool, "shape.mirror.rows", "Mirrored along rows", 8, nil, 0x01),
-  mirror_columns = field(P.bool, "shape.mirror.columns", "Mirrored along columns", 8, nil, 0x02),
-  shape_positions = field(P.uint32, "shape.positions", "Positions", DEC),
-  pitch_u = field(P.double, "shape.pitch_u_mm", "Pitch along rows (mm)"),
-  pitch_v = field(P.double, "shape.pitch_v_mm", "Pitch along columns (mm)"),
-  thickness = field(P.double, "shape.thickness_mm", "Thickness of the only slice (mm)"),
-  position = field(P.double, "shape.position_mm", "Position (mm)"),
-  clockwise = field(P.uint8, "shape.clockwise", "Clockwise", DEC),
-  panels = field(P.uint8, "shape.panels", "Panels", DEC),
-  turn = field(P.uint32, "shape.slices_per_turn", "Slices a turn", DEC),
-  eccentricity = field(P.double, "shape.eccentricity_mm", "Eccentricity (mm)"),
-  shift_u = field(P.double, "shape.shift_u_mm", "Shift along rows (mm)"),
-  shift_v = field(P.double, "shape.shift_v_mm", "Shift along Z (mm)"),
-  phase = field(P.double, "shape.phase_turns", "Phase (turns)"),
-  -- §4.3
-  format = field(P.uint8, "mode.format", "Pixel format", DEC, FORMATS),
-  sub_frames = field(P.uint8, "mode.sub_frames", "Sub-frames", DEC),
-  rate = field(P.uint32, "mode.rate", "Sweeps in 1,000 s", DEC),
-  -- §4.4
-  running = field(P.uint8, "status.running", "In a session", DEC),
-  blanked = field(P.bool, "status.flags.blanked", "Blanked", 8, nil, 0x01),
-  watchdog = field(P.bool, "status.flags.watchdog", "Dark by the watchdog", 8, nil, 0x02),
-  next_event = field(P.uint32, "status.event_sequence", "Number of the next event", DEC),
-  time = field(P.uint64, "status.time_ns", "Device's time (ns)", DEC),
-  received = field(P.uint64, "status.bytes_received", "Bytes received", DEC),
-  credit = field(P.uint64, "status.credit_limit", "Credit limit (bytes)", DEC),
-  filling = field(P.uint64, "status.filling", "Volume being filled", DEC),
-  complete = field(P.uint64, "status.last_complete", "Last complete volume", DEC),
-  status_shown = field(P.uint64, "status.shown", "Volume shown", DEC),
-  shown_sweep = field(P.uint64, "status.shown_sweep", "First shown with sweep", DEC),
-  shown_start = field(P.uint64, "status.shown_start_ns", "which began at (ns)", DEC),
-  status_underruns = field(P.uint32, "status.underruns", "Underruns", DEC),
 }
 voxlink.fields = fields
 
@@ -276,8 +389,7 @@ local function add_begin(tree, payload)
     tree:add_proto_expert_info(e.short)
     return
   end
-  tree:add_le(f.base, payload(0, 8))
-  tree:add_le(f.pictures, payload(8, 4))
+  add(tree, BEGIN, payload)
   if payload:len() == 16 then return end
   local bitmap = payload(16)
   tree:add(f.bitmap, bitmap)
@@ -305,23 +417,14 @@ local function add_packet(buffer, tree)
   local length = buffer(28, 4):le_uint()
   local name = PACKETS[kind] or ("type " .. kind)
   local says = name
-  if kind ~= 7 then says = says .. " " .. tostring(buffer(8, 8):le_uint64()) end
+  if kind ~= 7 then says = says .. " " .. first_u64(buffer(8)) end
   if kind == 2 then
     says = says .. "/" .. buffer(20, 4):le_uint() .. "." .. buffer(6, 2):le_uint()
   elseif kind == 3 then
     says = says .. (buffer(5, 1):uint() % 2 == 1 and " show" or " hold")
   end
   local packet = tree:add(voxlink, buffer, "voxlink packet: " .. says)
-  packet:add_le(f.magic, buffer(0, 4))
-  packet:add(f.type, buffer(4, 1))
-  local flags = packet:add(f.flags, buffer(5, 1))
-  if kind == 3 then flags:add(f.flag_show, buffer(5, 1)) end
-  packet:add_le(f.sub_frame, buffer(6, 2))
-  packet:add_le(f.volume, buffer(8, 8))
-  packet:add_le(f.sequence, buffer(16, 4))
-  packet:add_le(f.slice, buffer(20, 4))
-  packet:add_le(f.offset, buffer(24, 4))
-  packet:add_le(f.length, buffer(28, 4))
+  add(packet, PACKET, buffer)
   local right = 2
   if length == 0 then
     right = buffer(32, 4):le_uint() == 0 and 1 or 0
@@ -336,7 +439,7 @@ local function add_packet(buffer, tree)
     if kind == 1 then
       add_begin(packet, payload)
     elseif kind == 5 and length >= 8 then
-      packet:add_le(f.show_sweep, payload(0, 8))
+      add(packet, SHOW, payload)
     elseif kind ~= 2 then
       item:add_proto_expert_info(e.short)
     end
@@ -436,94 +539,31 @@ end
 
 -- ---- events, §6
 
--- By type: how many bytes the body has, what is in it, and what to say in a line.
-local BODIES = {
-  [1] = { 8, function(t, b)
-    t:add_le(f.version, b(0, 2))
-    t:add_le(f.receive_buffer, b(4, 4))
-  end },
-  [3] = { 32, function(t, b)
-    t:add_le(f.sweep, b(0, 8))
-    t:add_le(f.start_ns, b(8, 8))
-    t:add_le(f.shown, b(16, 8))
-    t:add_le(f.period_ns, b(24, 4))
-    t:add_le(f.underruns, b(28, 4))
-    return tostring(b(0, 8):le_uint64())
-  end },
-  [4] = { 8, function(t, b)
-    t:add_le(f.event_volume, b(0, 8))
-    return tostring(b(0, 8):le_uint64())
-  end },
-  [5] = { 40, function(t, b)
-    t:add_le(f.event_volume, b(0, 8))
-    t:add_le(f.runs, b(8, 4))
-    for i = 0, math.min(b(8, 4):le_uint(), 3) - 1 do
-      t:add_le(f.run_first, b(16 + 8 * i, 4))
-      t:add_le(f.run_count, b(20 + 8 * i, 4))
-    end
-    return tostring(b(0, 8):le_uint64())
-  end },
-  [7] = { 24, function(t, b)
-    t:add_le(f.event_volume, b(0, 8))
-    t:add_le(f.sweep, b(8, 8))
-    t:add_le(f.start_ns, b(16, 8))
-    return tostring(b(0, 8):le_uint64())
-  end },
-  [9] = { 16, function(t, b)
-    t:add_le(f.sweep, b(0, 8))
-    t:add_le(f.underruns, b(8, 4))
-  end },
-  [10] = { 8, function(t, b)
-    t:add_le(f.temperature, b(0, 2))
-    t:add_le(f.power_mw, b(4, 4))
-  end },
-  [11] = { 24, function(t, b)
-    t:add_le(f.error, b(0, 4))
-    t:add_le(f.error_sequence, b(4, 4))
-    t:add_le(f.event_volume, b(8, 8))
-    t:add_le(f.error_picture, b(16, 4))
-    t:add_le(f.error_detail, b(20, 4))
-    return ERRORS[b(0, 4):le_uint()]
-  end },
-  [12] = { 8, function(t, b)
-    t:add_le(f.lit, b(0, 4))
-    t:add_le(f.light_cause, b(4, 4))
-    return LIGHTS[b(4, 4):le_uint()]
-  end },
-}
-BODIES[6] = { 16, function(t, b)
-  t:add_le(f.event_volume, b(0, 8))
-  t:add_le(f.reason, b(8, 4))
-  return tostring(b(0, 8):le_uint64()) .. ", " .. (REASONS[b(8, 4):le_uint()] or "?")
-end }
-BODIES[8] = BODIES[6]
-
 local EVENT_HEADER = 24
+
+local function add_body(tree, kind, body)
+  local how = BODIES[kind]
+  if how == nil or body:len() < how.size then
+    local item = tree:add(f.event_body, body)
+    if how then item:add_proto_expert_info(e.short) end
+    return nil
+  end
+  add(tree, how, body)
+  if kind == 5 then
+    for at = 16, 8 + 8 * math.min(body(8, 4):le_uint(), 3), 8 do
+      if at + 8 <= body:len() then add(tree, RUN, body, at) end
+    end
+  end
+  return SAYS[kind] and SAYS[kind](body)
+end
 
 local function dissect_event(buffer, pinfo, root)
   if buffer:len() < EVENT_HEADER or buffer(2, 2):le_uint() ~= buffer:len() then return 0 end
   local kind = buffer(0, 1):uint()
   local name = EVENTS[kind] or ("event " .. kind)
   local tree = root:add(voxlink, buffer(), "voxlink event: " .. name)
-  tree:add(f.event, buffer(0, 1))
-  local flags = tree:add(f.event_flags, buffer(1, 1))
-  if kind == 5 then flags:add(f.event_last, buffer(1, 1)) end
-  if kind == 7 then flags:add(f.event_dark, buffer(1, 1)) end
-  tree:add_le(f.event_length, buffer(2, 2))
-  tree:add_le(f.event_sequence, buffer(4, 4))
-  tree:add_le(f.event_time, buffer(8, 8))
-  tree:add_le(f.event_credit, buffer(16, 8))
-  local says
-  if buffer:len() > EVENT_HEADER then
-    local body = buffer(EVENT_HEADER)
-    local how = BODIES[kind]
-    if how and body:len() >= how[1] then
-      says = how[2](tree, body)
-    else
-      local item = tree:add(f.event_body, body)
-      if how then item:add_proto_expert_info(e.short) end
-    end
-  end
+  add(tree, EVENT, buffer)
+  local says = buffer:len() > EVENT_HEADER and add_body(tree, kind, buffer(EVENT_HEADER))
   pinfo.cols.protocol = "voxlink"
   pinfo.cols.info = says and name .. " " .. says or name
   return buffer:len()
@@ -531,89 +571,35 @@ end
 
 -- ---- requests, §4
 
-local function add_mirror(tree, range)
-  tree:add(f.mirror_rows, range)
-  tree:add(f.mirror_columns, range)
-end
-
-local function add_shape(tree, b)
-  local kind = b(0, 1):uint()
-  tree:add(f.shape, b(0, 1))
-  if kind == 1 and b:len() >= 32 then
-    tree:add(f.shape_normal, b(1, 1))
-    add_mirror(tree, b(2, 1))
-    tree:add_le(f.shape_positions, b(4, 4))
-    tree:add_le(f.pitch_u, b(8, 8))
-    tree:add_le(f.pitch_v, b(16, 8))
-    tree:add_le(f.thickness, b(24, 8))
-    for at = 32, b:len() - 8, 8 do tree:add_le(f.position, b(at, 8)) end
-  elseif kind == 2 and b:len() >= 8 then
-    tree:add(f.clockwise, b(1, 1))
-    tree:add(f.panels, b(2, 1))
-    tree:add_le(f.turn, b(4, 4))
-    for at = 8, b:len() - 56, 56 do
-      local panel = tree:add(voxlink, b(at, 56), "Panel")
-      panel:add_le(f.pitch_u, b(at, 8))
-      panel:add_le(f.pitch_v, b(at + 8, 8))
-      panel:add_le(f.eccentricity, b(at + 16, 8))
-      panel:add_le(f.shift_u, b(at + 24, 8))
-      panel:add_le(f.shift_v, b(at + 32, 8))
-      panel:add_le(f.phase, b(at + 40, 8))
-      add_mirror(panel, b(at + 48, 1))
+local function add_shape(tree, bytes)
+  local kind = bytes(0, 1):uint()
+  add(tree, KIND, bytes)
+  if kind == 1 and bytes:len() >= PLANAR.size then
+    add(tree, PLANAR, bytes)
+    for at = PLANAR.size, bytes:len() - 8, 8 do add(tree, POSITION, bytes, at) end
+  elseif kind == 2 and bytes:len() >= ROTOR.size then
+    add(tree, ROTOR, bytes)
+    for at = ROTOR.size, bytes:len() - PANEL_SIZE, PANEL_SIZE do
+      add(tree:add(voxlink, bytes(at, PANEL_SIZE), "Panel"), PANEL, bytes, at)
     end
   end
 end
 
-local function add_capabilities(tree, b, page)
-  if page > 0 or b:len() < 64 then
-    tree:add(f.caps_more, b)
+local function add_capabilities(tree, bytes, page)
+  if page > 0 or bytes:len() < SHAPE_OFFSET then
+    tree:add(f.caps_more, bytes)
     return
   end
-  tree:add_le(f.caps_length, b(0, 4))
-  tree:add_le(f.version, b(4, 2))
-  tree:add(f.caps_formats, b(6, 1))
-  tree:add(f.caps_sub_frames, b(7, 1))
-  local features = tree:add_le(f.caps_features, b(8, 4))
-  for _, feature in ipairs({ f.caps_watchdog, f.caps_brightness, f.caps_power, f.caps_temp }) do
-    features:add_le(feature, b(8, 4))
-  end
-  tree:add_le(f.receive_buffer, b(12, 4))
-  local at = 16
-  for _, field32 in ipairs({
-    f.caps_payload, f.caps_slices, f.caps_width, f.caps_height, f.caps_buffers, f.caps_min_rate,
-    f.caps_max_rate, f.caps_rate, f.caps_power_mw,
-  }) do
-    tree:add_le(field32, b(at, 4))
-    at = at + 4
-  end
-  tree:add_le(f.caps_keepalive, b(52, 2))
-  tree:add_le(f.caps_watchdog_ms, b(54, 2))
-  if b:len() > 64 then add_shape(tree, b(64)) end
+  add(tree, CAPABILITIES, bytes)
+  if bytes:len() > SHAPE_OFFSET then add_shape(tree, bytes(SHAPE_OFFSET)) end
 end
 
-local function add_mode(tree, b)
-  if b:len() < 16 then return tree:add_proto_expert_info(e.short) end
-  tree:add(f.format, b(0, 1))
-  tree:add(f.sub_frames, b(1, 1))
-  tree:add_le(f.rate, b(4, 4))
-end
-
-local function add_status(tree, b)
-  if b:len() < 80 then return tree:add_proto_expert_info(e.short) end
-  tree:add(f.running, b(0, 1))
-  tree:add(f.blanked, b(1, 1))
-  tree:add(f.watchdog, b(1, 1))
-  tree:add_le(f.next_event, b(4, 4))
-  local at = 8
-  for _, field64 in ipairs({
-    f.time, f.received, f.credit, f.filling, f.complete, f.status_shown, f.shown_sweep,
-    f.shown_start,
-  }) do
-    tree:add_le(field64, b(at, 8))
-    at = at + 8
+local function add_or_short(tree, how, bytes)
+  if bytes:len() < how.size then
+    tree:add_proto_expert_info(e.short)
+  else
+    add(tree, how, bytes)
   end
-  tree:add_le(f.status_underruns, b(72, 4))
-  tree:add_le(f.temperature, b(76, 2))
 end
 
 -- wLength of each request; true: any but 0.
@@ -635,16 +621,10 @@ local function dissect_request(buffer, pinfo, root, device)
     if number == 5 then streams[device] = nil end
   end
   local tree = root:add(voxlink, buffer(), "voxlink request: " .. name)
-  tree:add(f.request, buffer(0, 1))
-  local named = { [1] = f.page, [7] = f.brightness, [9] = f.dark }
-  tree:add_le(named[number] or f.value, buffer(1, 2))
-  tree:add_le(f.index, buffer(3, 2))
-  tree:add_le(f.wlength, buffer(5, 2))
-  if number == 3 and buffer:len() > SETUP then
-    add_mode(tree, buffer(SETUP))
-  elseif number == 8 and buffer:len() >= SETUP + 4 then
-    tree:add_le(f.power_limit, buffer(SETUP, 4))
-  end
+  add(tree, REQUEST, buffer)
+  add(tree, VALUES[number] or VALUE, buffer)
+  if number == 3 then add_or_short(tree, MODE, buffer(SETUP)) end
+  if number == 8 then add_or_short(tree, POWER_LIMIT, buffer(SETUP)) end
   pinfo.cols.protocol = "voxlink"
   pinfo.cols.info = name
   return buffer:len()
@@ -666,9 +646,9 @@ local function dissect_answer(buffer, pinfo, root, device)
   if request.number == 1 then
     add_capabilities(tree, buffer(), request.page)
   elseif request.number == 2 then
-    add_status(tree, buffer())
+    add_or_short(tree, STATUS, buffer())
   elseif request.number == 4 then
-    add_mode(tree, buffer())
+    add_or_short(tree, MODE, buffer())
   end
   return buffer:len()
 end

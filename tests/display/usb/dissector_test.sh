@@ -74,7 +74,7 @@ expect "$first" voxlink.type=1,2,2,2,2,2,2,3 \
   voxlink.payload_crc.status=1,1,1,1,1,1,1,1 \
   voxlink.header_crc.status=1,1,1,1,1,1,1,1 \
   voxlink.begin.pictures=6 \
-  voxlink.flags.show=1
+  voxlink.flags.show=0,0,0,0,0,0,0,1
 expect "$driver && voxlink.begin.base>0" voxlink.begin.base=1,2 \
   voxlink.begin.announced=3,3
 expect "$driver && voxlink.type==7" voxlink.volume=0,0,0
@@ -95,10 +95,10 @@ expect "$hand && voxlink.type==5" voxlink.show.sweep=77
 expect "$driver && voxlink.event.type==1" voxlink.receive_buffer=4194304
 expect "$driver && voxlink.event.type==4" voxlink.event.volume=1,2,3
 expect "$driver && voxlink.event.type==7" voxlink.event.sweep=1,2,3 \
-  voxlink.event.flags.dark=0,0,0
+  voxlink.event.flags.bit0=0,0,0
 expect "$driver && voxlink.event.type==3 && voxlink.event.sweep==2" voxlink.event.period_ns=33333333 \
   voxlink.event.shown=2
-expect "$hand && voxlink.event.type==5" voxlink.event.flags.last=1 \
+expect "$hand && voxlink.event.type==5" voxlink.event.flags.bit0=1 \
   voxlink.event.run.first=0 \
   voxlink.event.run.count=1
 expect "$hand && voxlink.event.type==6" voxlink.event.reason=1,3
