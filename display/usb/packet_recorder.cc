@@ -12,6 +12,7 @@
 namespace voxeld::display {
 namespace {
 
+constexpr size_t kChunkBytes = size_t{1} << 20;
 constexpr size_t kRoomForStatistics = 512;  // at the end of a file of limited size
 
 absl::Status SystemError(const char* what, const std::string& path, int error) {
@@ -63,8 +64,9 @@ absl::StatusOr<std::unique_ptr<ByteSink>> OpenFileSink(const std::string& path) 
 
 PacketRecorder::PacketRecorder(std::unique_ptr<ByteSink> sink, Options options)
     : sink_(std::move(sink)), options_(std::move(options)) {
-  AppendRecordingStart(options_.info, waiting_);
-  accepted_bytes_ = waiting_.size();
+  std::vector<std::byte>& start = waiting_.emplace_back().bytes;
+  AppendRecordingStart(options_.info, start);
+  accepted_bytes_ = queued_bytes_ = start.size();
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -82,49 +84,53 @@ void PacketRecorder::Add(const UsbPacket& packet) {
                      "it would pass its limit of ", options_.max_file_bytes));
   }
   if (stop_ || !status_.ok() || packet.data.size() > kMostPacketData ||
-      waiting_.size() + writing_bytes_ + size > options_.max_queued_bytes) {
+      queued_bytes_ + size > options_.max_queued_bytes) {
     ++counts_.left_out;
     ++left_out_now_;
     return;
   }
   UsbPacket numbered = packet;
   numbered.left_out_before = std::exchange(left_out_now_, 0);
-  const size_t before = waiting_.size();
-  AppendUsbPacket(numbered, waiting_);
-  accepted_bytes_ += waiting_.size() - before;
-  ++waiting_packets_;
+  if (waiting_.empty() || waiting_.back().bytes.size() >= kChunkBytes) waiting_.emplace_back();
+  Chunk& chunk = waiting_.back();
+  const size_t before = chunk.bytes.size();
+  AppendUsbPacket(numbered, chunk.bytes);
+  ++chunk.packets;
+  accepted_bytes_ += chunk.bytes.size() - before;
+  queued_bytes_ += chunk.bytes.size() - before;
   work_.NotifyOne();
 }
 
 void PacketRecorder::Run() {
-  std::vector<std::byte> writing;
   while (true) {
-    uint64_t packets = 0;
+    Chunk chunk;
     {
       sync::MutexLock lock(mutex_);
       while (waiting_.empty() && !stop_) work_.Wait(mutex_);
       if (waiting_.empty()) return;
-      writing.clear();
-      writing.swap(waiting_);
-      writing_bytes_ = writing.size();
-      packets = std::exchange(waiting_packets_, 0);
+      chunk = std::move(waiting_.front());
+      waiting_.pop_front();
       if (sink_failed_) {
-        counts_.left_out += packets;
-        writing_bytes_ = 0;
+        counts_.left_out += chunk.packets;
+        queued_bytes_ -= chunk.bytes.size();
         continue;
       }
     }
-    const absl::Status status = sink_->Write(writing);
-    sync::MutexLock lock(mutex_);
-    writing_bytes_ = 0;
-    if (status.ok()) {
-      counts_.file_bytes += writing.size();
-    } else {
-      counts_.left_out += packets;
-      sink_failed_ = true;
-      status_ = status;
-    }
+    Write(chunk);
   }
+}
+
+void PacketRecorder::Write(const Chunk& chunk) {
+  const absl::Status status = sink_->Write(chunk.bytes);
+  sync::MutexLock lock(mutex_);
+  queued_bytes_ -= chunk.bytes.size();
+  if (status.ok()) {
+    counts_.file_bytes += chunk.bytes.size();
+    return;
+  }
+  counts_.left_out += chunk.packets;
+  sink_failed_ = true;
+  status_ = status;
 }
 
 void PacketRecorder::Finish() {

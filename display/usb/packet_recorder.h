@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <string>
@@ -63,7 +64,14 @@ class PacketRecorder {
   Counts counts() const;
 
  private:
+  // Whole blocks that are written at once; small, so that one that grows is cheap to move.
+  struct Chunk {
+    std::vector<std::byte> bytes;
+    uint64_t packets = 0;
+  };
+
   void Run();
+  void Write(const Chunk& chunk);
   void WriteStatistics();
 
   const std::unique_ptr<ByteSink> sink_;  // the thread's, and then Finish's
@@ -74,9 +82,8 @@ class PacketRecorder {
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
   absl::Status status_ VOXELD_GUARDED_BY(mutex_);
   bool sink_failed_ VOXELD_GUARDED_BY(mutex_) = false;
-  std::vector<std::byte> waiting_ VOXELD_GUARDED_BY(mutex_);  // whole blocks
-  uint64_t waiting_packets_ VOXELD_GUARDED_BY(mutex_) = 0;
-  size_t writing_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;  // with the thread
+  std::deque<Chunk> waiting_ VOXELD_GUARDED_BY(mutex_);
+  size_t queued_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;  // waiting, and with the thread
   uint64_t accepted_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t left_out_now_ VOXELD_GUARDED_BY(mutex_) = 0;  // since the last packet accepted
   Counts counts_ VOXELD_GUARDED_BY(mutex_);
