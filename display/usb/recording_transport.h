@@ -1,0 +1,92 @@
+// A transport that records what goes over it, for Wireshark and for ReplayTransport, and otherwise
+// is the one that it wraps.
+//
+// In the file: every submission with its OUT bytes, every completion, when it was drained, with its
+// IN bytes, refused submissions, ClearHalt and Reset as the requests that they are. Each Open is a
+// device address of its own, as it would be on a bus, and its first packet has the device's identity
+// as a comment. Transfers that Close ended are recorded as cancelled, with a comment.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "display/sync/clock.h"
+#include "display/usb/packet_recorder.h"
+#include "display/usb/usb_transport.h"
+
+namespace voxeld::display {
+
+class RecordingTransport final : public UsbTransport {
+ public:
+  struct Options {
+    // Added to the clock's time: with the real time of day less the clock's at some moment, times in
+    // the file are times of day.
+    int64_t wall_offset_ns = 0;
+    uint16_t bus = 1;  // as the file names it
+  };
+
+  RecordingTransport(std::unique_ptr<UsbTransport> inner, std::unique_ptr<PacketRecorder> recorder,
+                     sync::Clock& clock, Options options);
+  // Finishes the recording, which waits for the disk.
+  ~RecordingTransport() override;
+
+  // Whether the recording goes on, and what it lost. Its functions are thread-safe.
+  const PacketRecorder& recorder() const { return *recorder_; }
+
+  absl::Status Open() override;
+  void Close() override;
+  bool is_open() const override { return inner_->is_open(); }
+  UsbIdentity identity() const override { return inner_->identity(); }
+  absl::StatusOr<TransferId> Submit(Transfer&& transfer) override;
+  void Cancel(TransferId id) override { inner_->Cancel(id); }
+  absl::StatusOr<TransferId> ClearHalt(uint8_t endpoint) override;
+  absl::StatusOr<TransferId> Reset() override;
+  TransferBytes TakeBuffer(size_t capacity) override { return inner_->TakeBuffer(capacity); }
+  size_t Drain(std::vector<TransferCompletion>& out) override;
+  size_t bytes_in_flight() const override { return inner_->bytes_in_flight(); }
+  size_t max_bytes_in_flight() const override { return inner_->max_bytes_in_flight(); }
+  void SetWake(std::function<void()> wake) override { inner_->SetWake(std::move(wake)); }
+  bool TakeArrival() override { return inner_->TakeArrival(); }
+
+ private:
+  // What a transfer's packets have in common, of a transfer in flight.
+  struct Recorded {
+    uint64_t id = 0;  // in the file
+    uint8_t xfer_type = 0;
+    uint8_t epnum = 0;
+  };
+
+  UsbPacket PacketOf(const Recorded& recorded, UsbmonHeader::Type type) const;
+  Recorded RecordSubmission(const Transfer& transfer, std::string comment);
+  // Notes that the inner transport took it, or records that it did not.
+  absl::StatusOr<TransferId> Answered(const Recorded& recorded, absl::StatusOr<TransferId> id);
+  void RecordCompletion(const TransferCompletion& completion);
+
+  const std::unique_ptr<UsbTransport> inner_;
+  const std::unique_ptr<PacketRecorder> recorder_;
+  sync::Clock& clock_;
+  const Options options_;
+
+  uint8_t address_ = 0;
+  std::string opened_;  // comment that the next packet has
+  uint64_t next_id_ = 1;
+  std::map<TransferId, Recorded> in_flight_;
+};
+
+struct RecordingFileOptions {
+  std::string application = "voxeld";
+  std::string name;                // of the display, as Wireshark's interface
+  PacketRecorder::Options limits;  // `info` is made from the two above
+  RecordingTransport::Options transport;
+};
+
+// `inner` recorded into the file `path`. The error names the path.
+absl::StatusOr<std::unique_ptr<RecordingTransport>> RecordToFile(
+    const std::string& path, std::unique_ptr<UsbTransport> inner, sync::Clock& clock,
+    RecordingFileOptions options = {});
+
+}  // namespace voxeld::display
