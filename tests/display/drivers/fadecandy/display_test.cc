@@ -1,0 +1,516 @@
+// The Fadecandy driver with its boards at the other ends of in-process cables, in one thread, on a
+// fake clock.
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "display/api/pixels.h"
+#include "gtest/gtest.h"
+#include "tests/display/drivers/fadecandy/fadecandy_rig.h"
+
+namespace voxeld::display::fadecandy {
+namespace {
+
+using emulator::Fault;
+using sync::kMillisecond;
+using sync::kSecond;
+using Kind = VolumeOutcome::Kind;
+
+class Fadecandy : public testing::Test {
+ protected:
+  void Make(size_t boards, FadecandyDisplay::Settings settings = FadecandyRig::Straight()) {
+    rig_ = std::make_unique<FadecandyRig>(boards, settings);
+    source_ = std::make_unique<FrameSource>(rig_->display().info().layout, 1);
+  }
+  void Start(size_t boards, FadecandyDisplay::Settings settings = FadecandyRig::Straight()) {
+    Make(boards, settings);
+    rig_->Start();
+    ASSERT_TRUE(rig_->RunUntil([&] { return state() == DisplayState::kShowing; }))
+        << rig_->display().state_reason();
+  }
+  DisplayState state() const { return rig_->display().state(); }
+  const DisplayStats& stats() const { return rig_->display().stats(); }
+  void Submit(double share = 1) {
+    frame_ = source_->Next(share);
+    rig_->display().Submit(frame_);
+  }
+  // Submits a volume and runs until it is presented and lit.
+  void Show(double share = 1) {
+    Submit(share);
+    ASSERT_TRUE(rig_->RunUntilOutcome(frame_->volume));
+    ASSERT_EQ(Newest().kind, Kind::kPresented) << Newest().reason;
+    rig_->RunFor(2 * kRefresh);
+    ASSERT_TRUE(rig_->Sees(*frame_));
+  }
+  const VolumeOutcome& Newest() const { return rig_->recorder().outcomes.back(); }
+  void Break(size_t board, Fault::What what, uint64_t amount = 0) {
+    rig_->faults(board).Add({.when = Fault::When::kTime, .at = 0, .what = what, .amount = amount});
+  }
+
+  std::unique_ptr<FadecandyRig> rig_;
+  std::unique_ptr<FrameSource> source_;
+  SliceFramePtr frame_;
+};
+
+TEST_F(Fadecandy, IsDarkUntilThereAreTableAndFrame) {
+  Make(2);
+  bool lit = false;
+  rig_->SetObserver([&] { lit |= !rig_->IsDark(0) || !rig_->IsDark(1); });
+  rig_->Start();
+  rig_->RunFor(kSecond);
+  EXPECT_EQ(state(), DisplayState::kShowing);
+  EXPECT_EQ(stats().attaches, 1u);
+  for (size_t b = 0; b < 2; ++b) {
+    EXPECT_EQ(rig_->device(b).light().flags(), kNoDither | kNoInterpolation);
+    EXPECT_EQ(rig_->device(b).light().frames(), 2u);  // black
+  }
+  EXPECT_FALSE(lit);
+  rig_->SetObserver(nullptr);
+  Show();
+}
+
+TEST_F(Fadecandy, PresentsAVolumeWhenAllBoardsHaveIt) {
+  Start(3);
+  Submit();
+  ASSERT_TRUE(rig_->RunUntilOutcome(1));
+  EXPECT_EQ(Newest().kind, Kind::kPresented) << Newest().reason;
+  EXPECT_EQ(Newest().evidence, Evidence::kEstimated);
+  EXPECT_EQ(Newest().time_ns, rig_->clock().Now());
+  EXPECT_LE(Newest().last_byte_ns, Newest().time_ns);
+  EXPECT_EQ(Newest().bytes_sent, 3 * 1600u);
+  EXPECT_EQ(stats().slices_sent, 3u);
+  EXPECT_EQ(stats().slices_resent, 0u);
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+}
+
+TEST_F(Fadecandy, SendsOnlyToBoardsThatChange) {
+  Start(3);
+  Show();
+  SliceFrame next = *frame_;
+  next.volume = 2;
+  next.changed_in[1] = 2;
+  next.bytes[kFrameBytes] ^= std::byte{1};
+  const uint32_t frames[] = {rig_->device(0).light().frames(), rig_->device(1).light().frames()};
+  frame_ = std::make_shared<SliceFrame>(next);
+  rig_->display().Submit(frame_);
+  ASSERT_TRUE(rig_->RunUntilOutcome(2));
+  EXPECT_EQ(Newest().bytes_sent, 1600u);
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+  EXPECT_EQ(rig_->device(0).light().frames(), frames[0]);
+  EXPECT_EQ(rig_->device(1).light().frames(), frames[1] + 1);
+  // Nothing at all.
+  next.volume = 3;
+  rig_->display().Submit(std::make_shared<SliceFrame>(next));
+  ASSERT_TRUE(rig_->RunUntilOutcome(3));
+  EXPECT_EQ(Newest().kind, Kind::kPresented);
+  EXPECT_EQ(Newest().bytes_sent, 0u);
+}
+
+TEST_F(Fadecandy, NoBoardShowsAVolumeBeforeAllHaveMostOfIt) {
+  Start(3);
+  Show();
+  const SliceFramePtr before = frame_;
+  Break(1, Fault::What::kNak, 200 * kMillisecond);
+  Submit();
+  rig_->RunFor(150 * kMillisecond);
+  EXPECT_TRUE(rig_->Sees(*before));
+  ASSERT_TRUE(rig_->RunUntilOutcome(2));
+  EXPECT_EQ(Newest().kind, Kind::kPresented);
+  // Two refreshes later all show it: the last packets went out together.
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+}
+
+TEST_F(Fadecandy, APixelIsTheLedThatItsNumberSays) {
+  Start(2);
+  for (const auto& [slice, pixel, strip, led] : {std::array<size_t, 4>{0, 0, 0, 0},
+                                                 {0, 63, 0, 63},
+                                                 {0, 64, 1, 0},
+                                                 {1, 197, 3, 5},
+                                                 {1, 504, 7, 56},
+                                                 {1, 511, 7, 63}}) {
+    auto frame = std::make_shared<SliceFrame>();
+    frame->volume = stats().volumes_submitted + 1;
+    frame->layout = rig_->display().info().layout;
+    frame->bytes.resize(frame->layout.bytes());
+    frame->changed_in = {frame->volume, frame->volume};
+    for (size_t c = 0; c < 3; ++c) {
+      frame->bytes[slice * kFrameBytes + pixel * 3 + c] = static_cast<std::byte>(10 * (c + 1));
+    }
+    rig_->display().Submit(frame);
+    ASSERT_TRUE(rig_->RunUntilOutcome(frame->volume));
+    rig_->RunFor(2 * kRefresh);
+    for (size_t b = 0; b < 2; ++b) {
+      for (size_t s = 0; s < kStrips; ++s) {
+        const auto out = rig_->device(b).light().Strip(s);
+        for (size_t i = 0; i < out.size(); ++i) {
+          const bool here = b == slice && s == strip && i / 3 == led;
+          const int grb[] = {20, 10, 30};
+          ASSERT_EQ(out[i], here ? grb[i % 3] : 0)
+              << "board " << b << " strip " << s << " LED " << i / 3;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(Fadecandy, KeepsUpWithTheRefreshAndNotMore) {
+  Start(2);
+  Show();
+  const uint32_t frames = rig_->device(0).light().frames();
+  const sync::TimeNs begin = rig_->clock().Now();
+  for (int i = 0; i < 40; ++i) {
+    Submit();
+    ASSERT_TRUE(rig_->RunUntilOutcome(frame_->volume));
+  }
+  EXPECT_NEAR(static_cast<double>(rig_->clock().Now() - begin), 40.0 * kRefresh, 2.0 * kRefresh);
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_EQ(rig_->device(0).light().frames(), frames + 40);
+  EXPECT_EQ(stats().volumes_presented, 41u);
+}
+
+// ---- brightness, darkness
+
+TEST_F(Fadecandy, BrightnessIsTheBoardsTable) {
+  Make(2);
+  ASSERT_TRUE(rig_->display().SetBrightness(0.5).ok());
+  rig_->Start();
+  frame_ = source_->Next(1);
+  rig_->display().Submit(frame_);
+  ASSERT_TRUE(rig_->RunUntilOutcome(1));
+  rig_->RunFor(2 * kRefresh);
+  const auto light = [&](size_t board, size_t i) {
+    return static_cast<double>(rig_->device(board).Output()[i]);
+  };
+  const auto wanted = [&](size_t i) { return std::to_integer<int>(frame_->bytes[i]); };
+  for (size_t i = 0; i < kFrameBytes; ++i) ASSERT_NEAR(light(0, i), wanted(i) / 2.0, 1);
+  const uint32_t frames = rig_->device(0).light().frames();
+  ASSERT_TRUE(rig_->display().SetBrightness(0.25).ok());
+  rig_->RunFor(2 * kRefresh);
+  for (size_t i = 0; i < kFrameBytes; ++i) ASSERT_NEAR(light(0, i), wanted(i) / 4.0, 1);
+  EXPECT_EQ(rig_->device(0).light().frames(), frames);
+  // It is part of the set-up.
+  rig_->SetPlugged(1, false);
+  rig_->RunFor(kSecond);
+  rig_->SetPlugged(1, true);
+  rig_->RunFor(6 * kSecond);
+  for (size_t i = 0; i < kFrameBytes; ++i) {
+    ASSERT_NEAR(light(1, i), wanted(kFrameBytes + i) / 4.0, 1);
+  }
+}
+
+TEST_F(Fadecandy, ASliderForBrightnessDoesNotHoldFramesUp) {
+  Start(1);
+  for (int i = 0; i < 50; ++i) {
+    Submit();
+    for (int k = 0; k < 20; ++k) {
+      ASSERT_TRUE(rig_->display().SetBrightness(0.01 * (k + 1)).ok());
+      rig_->display().Tick();
+      rig_->transport(0).Pump();
+    }
+    rig_->RunFor(kRefresh);
+  }
+  EXPECT_GT(stats().volumes_presented, 30u);
+  ASSERT_TRUE(rig_->display().SetBrightness(1).ok());
+  ASSERT_TRUE(rig_->RunUntil([&] { return rig_->Sees(*frame_); }));
+}
+
+TEST_F(Fadecandy, BlankIsDarkAtOnceAndLightComesBackWhole) {
+  Start(2);
+  Show();
+  const uint32_t frames = rig_->device(0).light().frames();
+  ASSERT_TRUE(rig_->display().SetBlank(true).ok());
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->IsDark(0) && rig_->IsDark(1));
+  EXPECT_EQ(state(), DisplayState::kBlanked);
+  ASSERT_TRUE(rig_->display().SetBrightness(0.5).ok());
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->IsDark(0) && rig_->IsDark(1));
+  ASSERT_TRUE(rig_->display().SetBrightness(1).ok());
+  ASSERT_TRUE(rig_->display().SetBlank(false).ok());
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+  EXPECT_EQ(rig_->device(0).light().frames(), frames);
+}
+
+TEST_F(Fadecandy, BlankedInMidVolume) {
+  Start(2);
+  Show();
+  Break(1, Fault::What::kNak, 50 * kMillisecond);
+  Submit();
+  rig_->Settle();
+  ASSERT_TRUE(rig_->display().SetBlank(true).ok());
+  EXPECT_EQ(Newest().reason, "blanked");
+  rig_->RunFor(100 * kMillisecond);
+  EXPECT_EQ(rig_->recorder().Count(2), 1);
+  ASSERT_TRUE(rig_->display().SetBlank(false).ok());
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+}
+
+// A board that stayed lights what it had: it stays dark until all have the volume again.
+TEST_F(Fadecandy, LightAfterALossInTheDarkIsWhole) {
+  Start(2);
+  Show();
+  ASSERT_TRUE(rig_->display().SetBlank(true).ok());
+  rig_->RunFor(kSecond);
+  rig_->SetPlugged(1, false);
+  rig_->RunFor(kSecond);
+  EXPECT_EQ(state(), DisplayState::kLost);
+  rig_->SetPlugged(1, true);
+  rig_->RunFor(6 * kSecond);
+  EXPECT_EQ(state(), DisplayState::kBlanked);
+  EXPECT_TRUE(rig_->IsDark(0) && rig_->IsDark(1));
+  bool torn = false;
+  rig_->SetObserver([&] { torn |= rig_->IsDark(0) != rig_->IsDark(1); });
+  ASSERT_TRUE(rig_->display().SetBlank(false).ok());
+  rig_->RunFor(kSecond);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+  EXPECT_FALSE(torn);
+}
+
+TEST_F(Fadecandy, StopDarkens) {
+  Start(2);
+  Show();
+  rig_->display().Stop();
+  rig_->clock().Advance(2 * kRefresh);
+  for (size_t b = 0; b < 2; ++b) {
+    EXPECT_FALSE(rig_->transport(b).is_open());
+    rig_->transport(b).Pump();
+    EXPECT_TRUE(rig_->IsDark(b));
+  }
+  // What was shown before does not come back.
+  bool lit = false;
+  rig_->SetObserver([&] { lit |= !rig_->IsDark(0) || !rig_->IsDark(1); });
+  rig_->recorder().outcomes.clear();
+  rig_->Start();
+  rig_->RunFor(kSecond);
+  EXPECT_FALSE(lit);
+  EXPECT_EQ(state(), DisplayState::kShowing);
+}
+
+// ---- boards that come and go
+
+TEST_F(Fadecandy, AMissingBoardIsNamed) {
+  Make(3);
+  rig_->SetPlugged(1, false);
+  rig_->Start();
+  Submit();
+  rig_->RunFor(3 * kSecond);
+  EXPECT_EQ(state(), DisplayState::kLost);
+  EXPECT_EQ(rig_->display().state_reason(), "board 2 (serial B): the emulated device is unplugged");
+  EXPECT_TRUE(rig_->recorder().outcomes.empty());
+  EXPECT_FALSE(rig_->transport(0).is_open());
+  rig_->SetPlugged(1, true);
+  ASSERT_TRUE(rig_->RunUntilOutcome(1, 50 * kMillisecond));
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+}
+
+TEST_F(Fadecandy, OneOfThreeUnpluggedInMidFrame) {
+  Start(3);
+  Show();
+  const SliceFramePtr before = frame_;
+  Break(2, Fault::What::kNak, 20 * kMillisecond);
+  Submit();
+  rig_->RunFor(5 * kMillisecond);
+  rig_->SetPlugged(2, false);
+  ASSERT_TRUE(rig_->RunUntilOutcome(2));
+  EXPECT_EQ(Newest().kind, Kind::kLost);
+  EXPECT_EQ(Newest().reason, "board 3 (serial C): it was unplugged");
+  EXPECT_EQ(state(), DisplayState::kLost);
+  rig_->RunFor(kSecond);
+  // The others keep what they showed.
+  EXPECT_TRUE(rig_->Sees(0, *before));
+  EXPECT_TRUE(rig_->Sees(1, *before));
+  EXPECT_TRUE(rig_->IsDark(2));
+  // The board that comes back shows nothing but black and the newest volume; the others nothing but
+  // what they had and that.
+  bool stale = false;
+  rig_->SetObserver([&] {
+    stale |= !rig_->IsDark(2) && !rig_->Sees(2, *frame_);
+    for (size_t b = 0; b < 2; ++b) stale |= !rig_->Sees(b, *before) && !rig_->Sees(b, *frame_);
+  });
+  rig_->SetPlugged(2, true);
+  ASSERT_TRUE(rig_->RunUntil([&] { return rig_->Sees(*frame_); }, kSecond));
+  EXPECT_FALSE(stale);
+  EXPECT_EQ(rig_->recorder().Count(2), 1);
+  EXPECT_EQ(stats().attaches, 2u);
+}
+
+TEST_F(Fadecandy, AnIdleBoardIsMissedAsWell) {
+  Start(2);
+  Show();
+  rig_->RunFor(10 * kSecond);
+  EXPECT_EQ(state(), DisplayState::kShowing);
+  rig_->SetPlugged(0, false);
+  rig_->RunFor(550 * kMillisecond);
+  EXPECT_EQ(state(), DisplayState::kLost);
+  EXPECT_EQ(rig_->display().state_reason(), "board 1 (serial A): it was unplugged");
+}
+
+TEST_F(Fadecandy, SurvivesReplugsInQuickSuccession) {
+  Start(3);
+  Show();
+  for (int i = 0; i < 20; ++i) {
+    const size_t board = static_cast<size_t>(i) % 3;
+    rig_->SetPlugged(board, false);
+    rig_->RunFor((i % 5) * 7 * kMillisecond);
+    rig_->SetPlugged(board, true);
+    rig_->RunFor((i % 7) * 11 * kMillisecond);
+    Submit();
+  }
+  ASSERT_TRUE(rig_->RunUntil([&] { return rig_->Sees(*frame_); }, 20 * kSecond));
+  for (uint64_t volume = 1; volume <= frame_->volume; ++volume) {
+    EXPECT_EQ(rig_->recorder().Count(volume), 1);
+  }
+}
+
+// ---- transfers that fail
+
+TEST_F(Fadecandy, AStallIsClearedAndTheFrameGoesAgain) {
+  Start(2);
+  Show();
+  Break(1, Fault::What::kStall);
+  Show();
+  EXPECT_EQ(Newest().bytes_sent, 2 * 1600u + 24 * 64);
+  EXPECT_EQ(stats().slices_resent, 1u);
+  // The last packet of a board that has all others.
+  Break(0, Fault::What::kNak, 20 * kMillisecond);
+  Submit();
+  rig_->RunFor(5 * kMillisecond);
+  Break(1, Fault::What::kStall);
+  ASSERT_TRUE(rig_->RunUntilOutcome(3));
+  EXPECT_EQ(Newest().kind, Kind::kPresented);
+  EXPECT_EQ(Newest().bytes_sent, 2 * 1600u + 64 + 1536);
+  rig_->RunFor(2 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+  EXPECT_EQ(stats().slices_resent, 2u);
+  EXPECT_EQ(stats().attaches, 1u);
+  EXPECT_EQ(stats().volumes_lost, 0u);
+}
+
+TEST_F(Fadecandy, SurvivesErrorsPartialTransfersAndDelays) {
+  Start(2);
+  Show();
+  for (const auto& [what, amount] : {std::pair{Fault::What::kStall, 0},
+                                     {Fault::What::kError, 3},
+                                     {Fault::What::kBabble, 2},
+                                     {Fault::What::kPartial, 100},
+                                     {Fault::What::kPartial, 1024},
+                                     {Fault::What::kNak, 300'000'000},
+                                     {Fault::What::kDelay, 300'000'000}}) {
+    Break(0, what, static_cast<uint64_t>(amount));
+    Show(0.5);
+    Break(1, what, static_cast<uint64_t>(amount));
+    Show();
+  }
+  EXPECT_EQ(stats().attaches, 1u);
+  EXPECT_EQ(stats().volumes_lost, 0u);
+}
+
+TEST_F(Fadecandy, AFaultDuringSetUp) {
+  for (const auto what : {Fault::What::kStall, Fault::What::kPartial, Fault::What::kError}) {
+    Make(2);
+    rig_->faults(1).Add({.at = 1, .what = what, .amount = 2});
+    rig_->Start();
+    Show();
+    EXPECT_EQ(stats().attaches, 1u);
+  }
+}
+
+TEST_F(Fadecandy, ABoardThatTakesNothingIsResetAndAttachedAnew) {
+  Start(2);
+  Show();
+  Break(1, Fault::What::kNak, 3 * kSecond);
+  Submit();
+  ASSERT_TRUE(rig_->RunUntilOutcome(2));
+  EXPECT_EQ(Newest().kind, Kind::kLost);
+  EXPECT_EQ(Newest().reason, "board 2 (serial B): it took no bytes for 1000 ms");
+  ASSERT_TRUE(rig_->RunUntil([&] { return rig_->Sees(*frame_); }, 20 * kSecond));
+  EXPECT_EQ(rig_->recorder().Count(2), 1);
+}
+
+TEST_F(Fadecandy, BacksOffFromABoardThatKeepsFailing) {
+  Start(2);
+  Break(0, Fault::What::kError, 1'000'000);
+  Submit();
+  rig_->RunFor(60 * kSecond);
+  EXPECT_EQ(state(), DisplayState::kLost);
+  EXPECT_EQ(rig_->display().state_reason(),
+            "board 1 (serial A): transfers failed 6 times in a row, the last one: protocol error");
+  EXPECT_EQ(Newest().kind, Kind::kLost);
+  EXPECT_EQ(rig_->recorder().Count(1), 1);
+  int losses = 0;
+  for (const auto& [state, reason] : rig_->recorder().states) {
+    losses += state == DisplayState::kLost ? 1 : 0;
+  }
+  EXPECT_LT(losses, 25);
+}
+
+// ---- fades
+
+TEST_F(Fadecandy, AFadeDoesNotLastAsLongAsThePauseBeforeIt) {
+  Start(2, {.curve = {.gamma = 1}, .flags = kNoDither});
+  Submit();
+  ASSERT_TRUE(rig_->RunUntilOutcome(1));
+  rig_->RunFor(5 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+  rig_->RunFor(30 * kSecond);
+  Submit();
+  ASSERT_TRUE(rig_->RunUntilOutcome(2));
+  EXPECT_EQ(Newest().bytes_sent, 2 * 3200u);
+  rig_->RunFor(5 * kRefresh);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+  // Frame by frame: 25 ms from one to the other.
+  rig_->RunFor(10 * kMillisecond);
+  Submit();
+  ASSERT_TRUE(rig_->RunUntilOutcome(3));
+  EXPECT_EQ(Newest().bytes_sent, 2 * 1600u);
+  rig_->RunFor(3 * kRefresh);
+  EXPECT_FALSE(rig_->Sees(*frame_));
+  rig_->RunFor(40 * kMillisecond);
+  EXPECT_TRUE(rig_->Sees(*frame_));
+}
+
+// ---- captures
+
+TEST_F(Fadecandy, CapturesWhatIsSent) {
+  Start(3);
+  Show();
+  Show(0.3);
+  std::optional<absl::StatusOr<DecodedVolume>> captured;
+  const auto capture = [&] {
+    captured.reset();
+    rig_->display().Capture(kSecond,
+                            [&](absl::StatusOr<DecodedVolume> v) { captured = std::move(v); });
+    ASSERT_TRUE(rig_->RunUntil([&] { return captured.has_value(); }));
+    ASSERT_TRUE(captured->ok()) << captured->status();
+    EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*frame_));
+    EXPECT_EQ((*captured)->volume, frame_->volume);
+  };
+  capture();
+  Break(1, Fault::What::kStall);
+  capture();
+  EXPECT_EQ(stats().slices_resent, 1u);
+  Break(2, Fault::What::kPartial, 640);
+  Submit(0.2);
+  capture();
+}
+
+TEST_F(Fadecandy, CapturesBlackBeforeTheFirstVolume) {
+  Start(2);
+  std::optional<absl::StatusOr<DecodedVolume>> captured;
+  rig_->display().Capture(kSecond,
+                          [&](absl::StatusOr<DecodedVolume> v) { captured = std::move(v); });
+  ASSERT_TRUE(rig_->RunUntil([&] { return captured.has_value(); }));
+  ASSERT_TRUE(captured->ok()) << captured->status();
+  EXPECT_EQ((*captured)->Rgb(), std::vector<uint8_t>(2 * kFrameBytes));
+  Show();
+}
+
+}  // namespace
+}  // namespace voxeld::display::fadecandy
