@@ -1,7 +1,10 @@
 #include "daemon/pipeline/test_pattern.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -27,6 +30,24 @@ double CornerInset(const display::Geometry& geometry, double cells, double pitch
   }
   constexpr double kHalfDiagonal = 0.70710678;
   return std::max(kEdge, cells / 2 - radius_mm * kHalfDiagonal / pitch_mm + 1);
+}
+
+// The middles of the voxels that hold a lattice's lights, by pixel; nothing for other geometries.
+std::vector<std::optional<display::Vec3>> LightsOf(const display::Geometry& geometry) {
+  const auto* lattice = std::get_if<display::Lattice>(&geometry.shape);
+  if (lattice == nullptr) return {};
+  const display::VoxelGrid& grid = geometry.grid;
+  std::vector<std::optional<display::Vec3>> lights = lattice->points_mm;
+  for (std::optional<display::Vec3>& light : lights) {
+    if (!light.has_value()) continue;
+    light = {std::floor((light->x - grid.origin_mm.x) / grid.pitch_mm.x) + 0.5,
+             std::floor((light->y - grid.origin_mm.y) / grid.pitch_mm.y) + 0.5,
+             std::floor((light->z - grid.origin_mm.z) / grid.pitch_mm.z) + 0.5};
+    const bool inside = light->x > 0 && light->x < grid.nx && light->y > 0 && light->y < grid.ny &&
+                        light->z > 0 && light->z < grid.nz;
+    if (!inside) light.reset();
+  }
+  return lights;
 }
 
 // A geometry under construction.
@@ -61,6 +82,9 @@ class Pattern {
         nz_(geometry.grid.nz),
         inset_x_(CornerInset(geometry, nx_, geometry.grid.pitch_mm.x)),
         inset_y_(CornerInset(geometry, ny_, geometry.grid.pitch_mm.y)),
+        lights_(LightsOf(geometry)),
+        lights_a_slice_(
+            lights_.empty() ? 1 : size_t(std::get<display::Lattice>(geometry.shape).width_px)),
         first_number_(kFirstPatternNumber + (uint64_t(pattern) << 32)) {}
 
   void Axes() {
@@ -81,11 +105,13 @@ class Pattern {
     balls.data.record.thickness = float(std::max(1.0, std::min({nx_, ny_, nz_}) / 8));
     static constexpr uint32_t kColors[8] = {0xFFFFFF, 0xFF0000, 0x00FF00, 0xFFFF00,
                                             0x0000FF, 0xFF00FF, 0x00FFFF, 0xFF8000};
-    for (int corner = 0; corner < 8; ++corner) {
-      const display::Vec3 at = Corner(corner);
+    std::array<display::Vec3, 8> corners;
+    for (int corner = 0; corner < 8; ++corner) corners[size_t(corner)] = Corner(corner);
+    for (size_t corner = 0; corner < 8; ++corner) {
+      const display::Vec3 at = corners[corner];
       balls.Vertex(at.x, at.y, at.z, kColors[corner]);
-      for (const int axis : {1, 2, 4}) {
-        if ((corner & axis) == 0) Segment(edges, at, Corner(corner | axis), 0x808080);
+      for (const size_t axis : {1u, 2u, 4u}) {
+        if ((corner & axis) == 0) Segment(edges, at, corners[corner | axis], 0x808080);
       }
     }
     Add("edges", std::move(edges), 0);
@@ -95,6 +121,14 @@ class Pattern {
   void Grid() {
     Shape dots;
     dots.data.record.kind = gpu::PrimitiveKind::kPoints;
+    if (!lights_.empty()) {
+      for (size_t pixel = 0; pixel < lights_.size(); ++pixel) {
+        const std::optional<display::Vec3>& at = lights_[pixel];
+        if (pixel % lights_a_slice_ % 8 != 0 || !at.has_value()) continue;
+        dots.Vertex(at->x, at->y, at->z, 0xFFFFFF);
+      }
+      return Add("dots", std::move(dots), 0);
+    }
     for (double z = Phase(nz_); z < nz_; z += 8) {
       for (double y = Phase(ny_); y < ny_; y += 8) {
         for (double x = Phase(nx_); x < nx_; x += 8) dots.Vertex(x, y, z, 0xFFFFFF);
@@ -111,6 +145,10 @@ class Pattern {
       const double x0 = std::floor(nx_ * i / steps), x1 = std::floor(nx_ * (i + 1) / steps);
       const auto level = uint32_t(steps == 1 ? 255 : i * 255 / (steps - 1));
       const uint32_t grey = level << 16 | level << 8 | level;
+      if (!lights_.empty()) {
+        Box(absl::StrCat("x", i), {x0, 0, 0}, {x1, ny_, nz_}, grey);
+        continue;
+      }
       const double y = std::floor(ny_ / 2), z = std::floor(nz_ / 2);
       Box(absl::StrCat("z", i), {x0, 0, z}, {x1, ny_, z + 1}, grey);
       Box(absl::StrCat("y", i), {x0, y, 0}, {x1, y + 1, nz_}, grey);
@@ -132,8 +170,17 @@ class Pattern {
   static double Phase(double cells) { return std::min(4.5, std::floor(cells / 2) + 0.5); }
 
   display::Vec3 Corner(int corner) const {
-    return {corner & 1 ? nx_ - inset_x_ : inset_x_, corner & 2 ? ny_ - inset_y_ : inset_y_,
-            corner & 4 ? nz_ - 0.5 : 0.5};
+    const display::Vec3 at = {corner & 1 ? nx_ - inset_x_ : inset_x_,
+                              corner & 2 ? ny_ - inset_y_ : inset_y_, corner & 4 ? nz_ - 0.5 : 0.5};
+    display::Vec3 nearest = at;
+    double least = std::numeric_limits<double>::max();
+    for (const std::optional<display::Vec3>& light : lights_) {
+      if (!light.has_value()) continue;
+      const double dx = light->x - at.x, dy = light->y - at.y, dz = light->z - at.z;
+      const double square = dx * dx + dy * dy + dz * dz;
+      if (square < least) nearest = *light, least = square;
+    }
+    return nearest;
   }
 
   static void Segment(Shape& shape, display::Vec3 a, display::Vec3 b, uint32_t color) {
@@ -166,6 +213,8 @@ class Pattern {
 
   const double nx_, ny_, nz_;
   const double inset_x_, inset_y_;  // of the corners, voxels
+  const std::vector<std::optional<display::Vec3>> lights_;
+  const size_t lights_a_slice_;
   const uint64_t first_number_;
   Layer layer_;
 };

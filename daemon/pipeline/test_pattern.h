@@ -15,6 +15,10 @@ namespace voxeld::daemon {
 //   kGrid     dots of one voxel, eight apart on every axis
 //   kRamp     brightness from 0 to 255 along x, on three middle planes
 //   kWhite    every voxel
+// In a lattice three of them keep to where lights are:
+//   kCorners  each corner moves to the light that is nearest to it
+//   kGrid     every eighth pixel of each slice, where it has a light
+//   kRamp     in the whole volume
 SnapshotPtr MakePattern(TestPattern pattern, const display::Geometry& geometry, uint64_t number);
 
 }  // namespace voxeld::daemon

@@ -1,11 +1,14 @@
 #include "daemon/wire/convert.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <utility>
 #include <variant>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/check.h"
+#include "display/geometry/limits.h"
 
 namespace voxeld::daemon::wire {
 namespace {
@@ -44,6 +47,21 @@ void ShapeToWire(const display::Rotor& in, v1::Geometry* geometry) {
     to->set_phase_turns(panel.phase_turns);
     to->set_mirror_u(panel.mirror_u);
     to->set_mirror_v(panel.mirror_v);
+  }
+}
+
+void ShapeToWire(const display::Lattice& in, v1::Geometry* geometry) {
+  v1::Lattice* out = geometry->mutable_lattice();
+  const size_t width = static_cast<size_t>(std::max(1, in.width_px));
+  out->set_width_px(in.width_px);
+  out->set_slices(static_cast<int32_t>(in.points_mm.size() / width));
+  ToWire(in.cell_mm, out->mutable_cell_mm());
+  for (size_t pixel = 0; pixel < in.points_mm.size(); ++pixel) {
+    if (!in.points_mm[pixel].has_value()) continue;
+    out->add_pixels(static_cast<uint32_t>(pixel));
+    out->add_x_mm(in.points_mm[pixel]->x);
+    out->add_y_mm(in.points_mm[pixel]->y);
+    out->add_z_mm(in.points_mm[pixel]->z);
   }
 }
 
@@ -87,6 +105,39 @@ display::Rotor ShapeFromWire(const v1::Rotor& in) {
     to.mirror_u = panel.mirror_u();
     to.mirror_v = panel.mirror_v();
     out.panels.push_back(to);
+  }
+  return out;
+}
+
+// Looks at sizes before it takes memory: a short message may name many pixels without a light.
+absl::StatusOr<display::Lattice> ShapeFromWire(const v1::Lattice& in) {
+  const int64_t pixels = int64_t{in.slices()} * in.width_px();
+  if (in.width_px() < 1 || in.slices() < 1 || pixels > display::kMaxLatticePixels) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "lattice.slices·width_px is ", in.slices(), "·", in.width_px(),
+        "; both must be 1 at least, and their product at most ", display::kMaxLatticePixels));
+  }
+  const int lights = in.pixels_size();
+  if (in.x_mm_size() != lights || in.y_mm_size() != lights || in.z_mm_size() != lights) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("lattice.pixels, x_mm, y_mm and z_mm have ", lights, ", ", in.x_mm_size(),
+                     ", ", in.y_mm_size(), " and ", in.z_mm_size(),
+                     " values; each must have as many as there are lights"));
+  }
+  display::Lattice out;
+  out.width_px = in.width_px();
+  out.cell_mm = FromWire(in.cell_mm());
+  out.points_mm.resize(static_cast<size_t>(pixels));
+  int64_t least = 0;
+  for (int n = 0; n < lights; ++n) {
+    const int64_t pixel = in.pixels(n);
+    if (pixel < least || pixel >= pixels) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("lattice.pixels[", n, "] is ", pixel,
+                       "; pixels must ascend strictly and be below slices·width_px, ", pixels));
+    }
+    out.points_mm[static_cast<size_t>(pixel)] = {in.x_mm(n), in.y_mm(n), in.z_mm(n)};
+    least = pixel + 1;
   }
   return out;
 }
@@ -144,9 +195,16 @@ absl::StatusOr<display::Geometry> FromWire(const v1::Geometry& in) {
     case v1::Geometry::kRotor:
       out.shape = ShapeFromWire(in.rotor());
       break;
+    case v1::Geometry::kLattice: {
+      absl::StatusOr<display::Lattice> shape = ShapeFromWire(in.lattice());
+      if (!shape.ok()) return shape.status();
+      out.shape = *std::move(shape);
+      break;
+    }
     default:
       return absl::InvalidArgumentError(
-          "the geometry's shape is not set, or not known here; known are planar_stack, rotor");
+          "the geometry's shape is not set, or not known here; known are planar_stack, rotor, "
+          "lattice");
   }
   out.grid = {in.grid().nx(), in.grid().ny(), in.grid().nz(), FromWire(in.grid().pitch_mm()),
               FromWire(in.grid().origin_mm())};

@@ -69,18 +69,20 @@ struct Rotor {
 struct Lattice {
   int32_t width_px = 0;   // lights a slice, 1 to 16384
   int32_t height_px = 1;  // always
-  // Slice after slice, width_px each; nothing: no light is there, the pixel stays dark.
+  // Slice after slice, width_px each; 1 to 16384 slices, 2²⁴ pixels in all at the most. Nothing: no
+  // light is there, the pixel stays dark; one light at least.
   std::vector<std::optional<Vec3>> points_mm;
-  // The box around each point for which its light stands, half-open; > 0.
+  // The size of the half-open box for which a light stands; the light is in its middle. > 0.
   Vec3 cell_mm{1, 1, 1};
   bool operator==(const Lattice&) const = default;
 };
 
 // Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s];
 // for a Rotor slice s·panels + p is panel p while the rotor turns
-// through [s−½, s+½) / slices_per_turn of a turn.
+// through [s−½, s+½) / slices_per_turn of a turn; for a Lattice pixel u of slice s is
+// points_mm[s·width_px + u].
 struct Geometry {
-  std::variant<PlanarStack, Rotor> shape;
+  std::variant<PlanarStack, Rotor, Lattice> shape;
   VoxelGrid grid;
   bool operator==(const Geometry&) const = default;
 };

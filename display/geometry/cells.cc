@@ -14,8 +14,12 @@ int32_t FirstCell(Fixed twice_low, int32_t cells) {
 
 }  // namespace
 
+CellRange CellsBetween(Fixed twice_low, Fixed twice_high, int32_t cells) {
+  return {FirstCell(twice_low, cells), FirstCell(twice_high, cells)};
+}
+
 CellRange CellsBetween(Fixed twice_low, Fixed twice_high, Fixed inside, int32_t cells) {
-  CellRange range{FirstCell(twice_low, cells), FirstCell(twice_high, cells)};
+  const CellRange range = CellsBetween(twice_low, twice_high, cells);
   const Fixed own = inside >> kFixedBits;
   if (own < 0 || own >= cells) return range;
   const int32_t cell = static_cast<int32_t>(own);

@@ -14,9 +14,11 @@ struct CellRange {
   bool empty() const { return begin >= end; }
 };
 
-// The cells of [0, cells) whose centre lies in [twice_low / 2, twice_high / 2), and the one that
-// holds `inside`, a position between the two. Halves, so that the middle between two positions is
-// exact. They are neighbours: a stretch of which a point lies beyond half a cell from a centre of
+// The cells of [0, cells) whose centre lies in [twice_low / 2, twice_high / 2). Halves, so that the
+// middle between two positions is exact.
+CellRange CellsBetween(Fixed twice_low, Fixed twice_high, int32_t cells);
+
+// These, and the one that holds `inside`, a position between the two. They are neighbours: a stretch of which a point lies beyond half a cell from a centre of
 // its own is longer than a cell.
 CellRange CellsBetween(Fixed twice_low, Fixed twice_high, Fixed inside, int32_t cells);
 

@@ -6,6 +6,7 @@
 
 #include "display/geometry/fixed_point.h"
 #include "display/geometry/footprint.h"
+#include "display/geometry/lattice.h"
 #include "display/geometry/planar_stack.h"
 #include "display/geometry/rotor.h"
 
@@ -81,10 +82,22 @@ VoxelGrid RotorGrid(const Rotor& rotor) {
           {-0.5 * across * pitch_u, -0.5 * across * pitch_u, low}};
 }
 
+VoxelGrid LatticeGrid(const Lattice& lattice) {
+  const LightBounds lights = BoundsOf(lattice);
+  const Vec3& cell = lattice.cell_mm;
+  return {CellsOver(lights.high_mm.x - lights.low_mm.x + cell.x, cell.x),
+          CellsOver(lights.high_mm.y - lights.low_mm.y + cell.y, cell.y),
+          CellsOver(lights.high_mm.z - lights.low_mm.z + cell.z, cell.z),
+          cell,
+          {lights.low_mm.x - 0.5 * cell.x, lights.low_mm.y - 0.5 * cell.y,
+           lights.low_mm.z - 0.5 * cell.z}};
+}
+
 }  // namespace
 
 VoxelGrid DefaultGrid(const Geometry& geometry) {
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) return StackGrid(*stack);
+  if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) return LatticeGrid(*lattice);
   return RotorGrid(std::get<Rotor>(geometry.shape));
 }
 

@@ -4,27 +4,29 @@
 // A footprint is a product: pixel (u, v) of slice s stands for all voxels o + i with o
 // from the list of (s, u) and i from the list of v, each with weight (wo·wi + 127) / 255.
 // Coordinates add component-wise. A planar stack's lists are (x, z) by y or (x, y) by z;
-// a rotor's are columns (x, y) by z. So a table of a 192-slice projector display with 200 million
-// pixels has 175,000 outer entries.
+// a rotor's are columns (x, y) by z; a lattice's are (x, y, z) by nothing. So a table of a 192-slice
+// projector display with 200 million pixels has 175,000 outer entries.
 //
 // What every geometry guarantees, and tests prove: each voxel whose centre lies in the solid swept
-// by the pixels' rectangles is in at least one footprint with weight 255, so that a lit voxel of
-// full white lights a pixel in every format, under any tone and dither, in a single sub-frame; each
-// pixel whose centre lies in the grid has that voxel in its footprint, with weight ≥ 128, so no
-// pixel stays dark inside a lit solid.
+// by the pixels' rectangles (of a lattice: in a light's box) is in at least one footprint with weight
+// 255, so that a lit voxel of full white lights a pixel in every format, under any tone and dither,
+// in a single sub-frame; each pixel whose centre lies in the grid has that voxel in its footprint,
+// with weight ≥ 128, so no pixel stays dark inside a lit solid.
 //
 // Which voxels. Of a planar stack: those whose centre lies in the pixel's half-open rectangle and
 // in the half-open slab that the slice stands for. Of a rotor: those whose centre the pixel's
 // rectangle passes while the rotor turns through the slice's half-open interval; a panel passes a
 // voxel nearer to the axis than its plane never, one on the axis (when its plane contains the axis)
 // in every slice, any other twice a turn. And on each axis the voxel that holds the pixel's centre,
-// at the slice's own position or at the middle of its interval.
+// at the slice's own position or at the middle of its interval. Of a lattice: those whose centre
+// lies in the light's half-open box, and the one that holds the light; a pixel without a light has
+// none (docs/adr/0010-lattice-footprints.md).
 //
 // Which weights. kMax: 255. kWeighted: a voxel between the positions (or middle angles) of two
 // neighbouring slices is in the footprints of both: 255 in the nearer one's, at distance d, and
 // ⌊255·d/(spacing − d) + ½⌋ in the farther one's, 0 left out (docs/adr/0006-full-weights.md);
 // outside the outer positions of a stack 255, the slab's own voxels only. The voxel that holds the
-// pixel's centre has at least 128.
+// pixel's centre has at least 128. A lattice's slices are not neighbours in space: 255.
 //
 // Decisions are in integers (positions in 2⁻¹⁶ voxel, angles in 2⁻³² turn, directions in 2⁻³⁰),
 // sines, cosines and arc tangents by integer CORDIC: the same table on every machine.
@@ -68,8 +70,8 @@ struct FootprintTable {
   // Slices take the inner lists in turn: slice s those of set s % inner_sets. One set, but for a
   // rotor whose panels differ along v: one a panel.
   int32_t inner_sets = 1;
-  // The axis along which inner entries lie; their other coordinates are 0,
-  // and outer entries' is 0 here.
+  // The axis along which inner entries lie; their other coordinates are 0, and outer entries' is 0
+  // here; but where no inner entry is other than (0, 0, 0), outer entries lie along all three.
   Axis inner_axis = Axis::kZ;
   FootprintLists outer;  // slices·width lists; list (s, u) = s·width + u
   FootprintLists inner;  // inner_sets·height lists; list (set, v) = set·height + v
@@ -100,13 +102,16 @@ int32_t SliceCount(const Geometry& geometry);
 //   as many as the least spacing goes into the depth, 4096 at the most.
 // - Rotor: cells of the first panel's pitches (u for x and y, v for z); nx = ny even, over the
 //   circle that the farthest corner describes; nz over the height of all panels.
+// - Lattice: cells of cell_mm, from the lowest corner of all lights' boxes to their highest; so of
+//   a regular lattice whose cell is its pitch a light is a voxel.
 VoxelGrid DefaultGrid(const Geometry& geometry);
 
 // `geometry` must be valid.
 FootprintTable BuildFootprints(const Geometry& geometry, Sampling sampling);
 
 // The centre of pixel (u, v) of `slice` in display millimetres (a rotor's at the middle of its
-// sweep). `geometry` must be valid and the pixel one of its own. The grid plays no part.
+// sweep; of a lattice's pixel without a light: NaN). `geometry` must be valid and the pixel one of
+// its own. The grid plays no part.
 Vec3 PixelPosition(const Geometry& geometry, int32_t slice, int32_t u, int32_t v);
 
 // Which slices look at which tiles: a slice is named if and only if some pixel of it has a voxel of
@@ -123,7 +128,8 @@ class TileToSlices {
   bool Visible(int32_t i, int32_t j, int32_t k, int32_t begin, int32_t end) const;
 
   // The same as flat tables, for machines: slice s of slices[begin[p] .. begin[p+1]) looks at tile t
-  // if p = Σ stride·t and seen[(s % inner_sets)·inner_tiles + t along the inner axis] ≠ 0.
+  // if p = Σ stride·t and seen[(s % inner_sets)·inner_tiles + t along the inner axis] ≠ 0. The
+  // stride along the inner axis is 0, unless outer entries lie along all three.
   struct Tables {
     int32_t stride[3];
     Axis inner_axis;
@@ -136,7 +142,7 @@ class TileToSlices {
   Tables tables() const;
 
  private:
-  // A tile's place on the plane of the outer axes, and along the inner one.
+  // A tile's place on the outer axes, two or all three, and along the inner one.
   struct Place {
     size_t outer, inner;
   };
@@ -147,7 +153,8 @@ class TileToSlices {
   int32_t tiles_x_, tiles_y_, tiles_z_;
   Axis inner_axis_;
   int32_t inner_sets_;
-  std::vector<uint32_t> begin_;      // a place on the outer plane → its range of slices_
+  int32_t stride_[3];
+  std::vector<uint32_t> begin_;      // a place on the outer axes → its range of slices_
   std::vector<int32_t> slices_;      // ascending within a place
   std::vector<uint8_t> inner_seen_;  // set · tiles on the inner axis + place along it
 };

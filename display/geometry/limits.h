@@ -14,6 +14,8 @@ inline constexpr int64_t kMaxCells = int64_t{1} << 36;   // nx·ny·nz
 inline constexpr int64_t kMaxPixels = int64_t{1} << 32;  // slices·width·height
 // Entries of a footprint table as bounded before it is built: 8 bytes each.
 inline constexpr int64_t kMaxFootprintEntries = int64_t{1} << 28;
+// slices·width_px of a lattice, each of which has its place in memory (32 bytes), light or no light.
+inline constexpr int64_t kMaxLatticePixels = int64_t{1} << 24;
 inline constexpr double kMinPitchMm = 1e-4, kMaxPitchMm = 1e4;
 inline constexpr double kMaxPositionMm = 1e6;  // either side of the middle
 // A rotor's grid and panels lie within this many of the grid's

@@ -6,25 +6,14 @@
 namespace voxeld::display {
 namespace {
 
-// Without the inner axis; a plane of tiles in row-major order.
-struct OuterPlane {
-  int32_t stride_x, stride_y, stride_z;
-};
-
-OuterPlane PlaneOf(Axis inner, int32_t tiles_x, int32_t tiles_y) {
-  switch (inner) {
-    case Axis::kX:
-      return {0, 1, tiles_y};
-    case Axis::kY:
-      return {1, 0, tiles_x};
-    case Axis::kZ:
-      break;
-  }
-  return {1, tiles_x, 0};
-}
-
 int32_t Along(Axis axis, int32_t x, int32_t y, int32_t z) {
   return axis == Axis::kX ? x : axis == Axis::kY ? y : z;
+}
+
+// Inner lists that add nothing: outer entries may lie along all axes.
+bool InnerIsPoint(const FootprintTable& table) {
+  return std::all_of(table.inner.entries.begin(), table.inner.entries.end(),
+                     [](const FootprintEntry& e) { return e.x == 0 && e.y == 0 && e.z == 0; });
 }
 
 }  // namespace
@@ -36,20 +25,32 @@ TileToSlices::TileToSlices(const FootprintTable& table, const VoxelGrid& grid, i
       tiles_z_((grid.nz + tz - 1) / tz),
       inner_axis_(table.inner_axis),
       inner_sets_(table.inner_sets) {
+  // Row-major, without the inner axis where the outer entries are.
+  const bool whole = InnerIsPoint(table);
+  const int32_t tiles[3] = {tiles_x_, tiles_y_, tiles_z_};
+  size_t places = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool counts = whole || axis != static_cast<int>(inner_axis_);
+    stride_[axis] = counts ? static_cast<int32_t>(places) : 0;
+    if (counts) places *= static_cast<size_t>(tiles[axis]);
+  }
+
   const size_t along = static_cast<size_t>(Along(inner_axis_, tiles_x_, tiles_y_, tiles_z_));
   inner_seen_.assign(static_cast<size_t>(inner_sets_) * along, 0);
   for (int32_t set = 0; set < inner_sets_; ++set) {
+    uint8_t* const of_set = inner_seen_.data() + static_cast<size_t>(set) * along;
     for (int32_t v = 0; v < table.height; ++v) {
       for (const FootprintEntry& entry : table.Inner(set, v)) {
-        const Place place = PlaceOf(entry.x / tx, entry.y / ty, entry.z / tz);
-        inner_seen_[static_cast<size_t>(set) * along + place.inner] = 1;
+        if (whole) {
+          std::fill_n(of_set, along, 1);
+        } else {
+          of_set[Along(inner_axis_, entry.x / tx, entry.y / ty, entry.z / tz)] = 1;
+        }
       }
     }
   }
 
   // Slices ascend as they are visited, so a repetition is one of the slice visited last.
-  const size_t places = static_cast<size_t>(tiles_x_) * static_cast<size_t>(tiles_y_) *
-                        static_cast<size_t>(tiles_z_) / along;
   std::vector<int32_t> last(places, -1);
   std::vector<std::pair<size_t, int32_t>> seen;
   for (int32_t slice = 0; slice < table.slices; ++slice) {
@@ -69,8 +70,7 @@ TileToSlices::TileToSlices(const FootprintTable& table, const VoxelGrid& grid, i
 }
 
 TileToSlices::Tables TileToSlices::tables() const {
-  const OuterPlane plane = PlaneOf(inner_axis_, tiles_x_, tiles_y_);
-  return {{plane.stride_x, plane.stride_y, plane.stride_z},
+  return {{stride_[0], stride_[1], stride_[2]},
           inner_axis_,
           inner_sets_,
           Along(inner_axis_, tiles_x_, tiles_y_, tiles_z_),
@@ -80,10 +80,9 @@ TileToSlices::Tables TileToSlices::tables() const {
 }
 
 TileToSlices::Place TileToSlices::PlaceOf(int32_t i, int32_t j, int32_t k) const {
-  const OuterPlane plane = PlaneOf(inner_axis_, tiles_x_, tiles_y_);
-  return {static_cast<size_t>(i) * static_cast<size_t>(plane.stride_x) +
-              static_cast<size_t>(j) * static_cast<size_t>(plane.stride_y) +
-              static_cast<size_t>(k) * static_cast<size_t>(plane.stride_z),
+  return {static_cast<size_t>(i) * static_cast<size_t>(stride_[0]) +
+              static_cast<size_t>(j) * static_cast<size_t>(stride_[1]) +
+              static_cast<size_t>(k) * static_cast<size_t>(stride_[2]),
           static_cast<size_t>(Along(inner_axis_, i, j, k))};
 }
 

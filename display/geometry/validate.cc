@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -97,9 +99,38 @@ void CheckRotor(Checker& check, const Rotor& rotor) {
                 rotor.width_px, rotor.height_px);
 }
 
+void CheckLattice(Checker& check, const Lattice& lattice) {
+  check.Count("width_px", lattice.width_px, kMaxPixelsPerAxis);
+  check.Require(lattice.height_px == 1, "height_px", lattice.height_px,
+                "1: a lattice's slices are rows");
+  const std::vector<std::optional<Vec3>>& points = lattice.points_mm;
+  if (!check.ok()) return;
+  const int64_t width = lattice.width_px, pixels = static_cast<int64_t>(points.size());
+  check.Require(pixels % width == 0, "the number of points_mm", pixels,
+                absl::StrCat("a multiple of width_px, ", width));
+  check.Count("the number of points_mm / width_px", pixels / width, kMaxSliceSteps);
+  check.Require(pixels <= kMaxLatticePixels, "the number of points_mm", pixels,
+                absl::StrCat("at most ", kMaxLatticePixels));
+  int64_t lights = 0;
+  for (size_t n = 0; check.ok() && n < points.size(); ++n) {
+    if (!points[n].has_value()) continue;
+    ++lights;
+    const std::string name = absl::StrCat("points_mm[", n, "].");
+    check.Position(name + "x", points[n]->x);
+    check.Position(name + "y", points[n]->y);
+    check.Position(name + "z", points[n]->z);
+  }
+  check.Require(lights > 0, "the number of points_mm that have a light", lights, "1 at least");
+  check.Pitch("cell_mm.x", lattice.cell_mm.x);
+  check.Pitch("cell_mm.y", lattice.cell_mm.y);
+  check.Pitch("cell_mm.z", lattice.cell_mm.z);
+}
+
 void CheckShape(Checker& check, const Geometry& geometry) {
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
     CheckStack(check, *stack);
+  } else if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) {
+    CheckLattice(check, *lattice);
   } else {
     CheckRotor(check, std::get<Rotor>(geometry.shape));
   }
@@ -165,6 +196,21 @@ void CheckRotorInGrid(Checker& check, const Rotor& rotor, const VoxelGrid& grid)
                               int64_t{rotor.slices_per_turn} * (int64_t{rotor.width_px} + 1)));
 }
 
+void CheckLatticeInGrid(Checker& check, const Lattice& lattice, const VoxelGrid& grid) {
+  // So many centres of voxels lie in a box at the most; and the voxel that holds the light.
+  const auto centres = [](double cell_mm, double pitch_mm, int32_t cells) {
+    const double most = std::min(cell_mm / pitch_mm, static_cast<double>(cells));
+    return std::min(static_cast<int64_t>(most) + 1, int64_t{cells});
+  };
+  const int64_t box = centres(lattice.cell_mm.x, grid.pitch_mm.x, grid.nx) *
+                      centres(lattice.cell_mm.y, grid.pitch_mm.y, grid.ny) *
+                      centres(lattice.cell_mm.z, grid.pitch_mm.z, grid.nz);
+  const int64_t lights =
+      std::count_if(lattice.points_mm.begin(), lattice.points_mm.end(),
+                    [](const std::optional<Vec3>& point) { return point.has_value(); });
+  CheckTable(check, lights * (box + 1));
+}
+
 }  // namespace
 
 absl::Status ValidateShape(const Geometry& geometry) {
@@ -180,6 +226,8 @@ absl::Status ValidateGeometry(const Geometry& geometry) {
   if (!check.ok()) return check.status();
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
     CheckStackInGrid(check, *stack, geometry.grid);
+  } else if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) {
+    CheckLatticeInGrid(check, *lattice, geometry.grid);
   } else {
     CheckRotorInGrid(check, std::get<Rotor>(geometry.shape), geometry.grid);
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -10,8 +11,6 @@
 
 namespace voxeld::gpu {
 namespace {
-
-constexpr uint64_t kMostItems = 1 << 20;
 
 class Writer {
  public:
@@ -25,6 +24,11 @@ class Writer {
   void List(const Items& items, F&& each) {
     Value<uint64_t>(items.size());
     for (const auto& item : items) each(item);
+  }
+  template <typename Item, typename F>
+  void Optional(const std::optional<Item>& item, F&& each) {
+    Value<uint8_t>(item.has_value() ? 1 : 0);
+    if (item.has_value()) each(*item);
   }
   std::vector<std::byte> out;
 };
@@ -45,8 +49,15 @@ class Reader {
   void List(Items& items, F&& each) {
     uint64_t count = 0;
     Value(count);
-    if (count > kMostItems) ok_ = false;
+    if (count > in_.size()) ok_ = false;  // an item has a byte at least
     for (uint64_t i = 0; i < count && ok_; ++i) each(items.emplace_back());
+  }
+  template <typename Item, typename F>
+  void Optional(std::optional<Item>& item, F&& each) {
+    uint8_t has = 0;
+    Value(has);
+    if (has > 1) ok_ = false;
+    if (has == 1) each(item.emplace());
   }
   bool ok() const { return ok_; }
   bool done() const { return ok_ && in_.empty(); }
@@ -86,6 +97,16 @@ void Fields(Io& io, R& r)
   });
 }
 
+template <typename Io, typename L>
+void Fields(Io& io, L& l)
+  requires std::is_same_v<std::remove_const_t<L>, display::Lattice>
+{
+  io.Value(l.width_px), io.Value(l.height_px);
+  io.List(l.points_mm,
+          [&](auto& light) { io.Optional(light, [&](auto& point) { Fields(io, point); }); });
+  Fields(io, l.cell_mm);
+}
+
 // All but the shape.
 template <typename Io, typename T>
 void Fields(Io& io, T& t)
@@ -118,7 +139,9 @@ absl::StatusOr<Target> DecodeTarget(std::span<const std::byte> bytes) {
   Target target;
   uint64_t shape = 0;
   reader.Value(shape);
-  if (shape == 1) {
+  if (shape == 2) {
+    Fields(reader, target.geometry.shape.emplace<display::Lattice>());
+  } else if (shape == 1) {
     Fields(reader, target.geometry.shape.emplace<display::Rotor>());
   } else if (shape == 0) {
     Fields(reader, target.geometry.shape.emplace<display::PlanarStack>());

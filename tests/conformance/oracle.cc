@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "display/geometry/footprint.h"
+#include "tests/conformance/oracle_footprints.h"
 #include "tests/conformance/oracle_shapes.h"
 
 namespace voxeld::gpu::conformance {
@@ -79,18 +79,15 @@ uint32_t Level(uint32_t channel, uint32_t levels, int u, int v, int sub, const T
                                65535);
 }
 
-uint32_t PixelOf(const DenseVolume& volume, const display::FootprintTable& table, int32_t slice,
+uint32_t PixelOf(const DenseVolume& volume, const OracleFootprints& footprints, int32_t slice,
                  int32_t u, int32_t v, display::Sampling sampling) {
   uint32_t best = 0, red = 0, green = 0, blue = 0;
-  for (const display::FootprintEntry& o : table.Outer(slice, u)) {
-    for (const display::FootprintEntry& i : table.Inner(slice, v)) {
-      const uint32_t rgb = volume.rgb[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)];
-      if (Interleaved(rgb) > Interleaved(best)) best = rgb;
-      const uint32_t w = (uint32_t{o.weight} * i.weight + 127) / 255;
-      red = std::max(red, (w * (rgb >> 16) + 127) / 255);
-      green = std::max(green, (w * (rgb >> 8 & 255) + 127) / 255);
-      blue = std::max(blue, (w * (rgb & 255) + 127) / 255);
-    }
+  for (const OracleVoxel& voxel : footprints.Of(slice, u, v)) {
+    const uint32_t rgb = volume.rgb[volume.Index(voxel.x, voxel.y, voxel.z)], w = voxel.weight;
+    if (Interleaved(rgb) > Interleaved(best)) best = rgb;
+    red = std::max(red, (w * (rgb >> 16) + 127) / 255);
+    green = std::max(green, (w * (rgb >> 8 & 255) + 127) / 255);
+    blue = std::max(blue, (w * (rgb & 255) + 127) / 255);
   }
   return sampling == display::Sampling::kMax ? best : red << 16 | green << 8 | blue;
 }
@@ -167,15 +164,14 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
 }
 
 std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target) {
-  const display::FootprintTable table =
-      display::BuildFootprints(target.geometry, target.tone.sampling);
+  const OracleFootprints footprints(target);
+  const display::FrameLayout& layout = target.layout;
   std::vector<uint8_t> seen(volume.rgb.size());
-  for (int32_t slice = 0; slice < table.slices; ++slice) {
-    for (int32_t pixel = 0; pixel < table.width * table.height; ++pixel) {
-      for (const display::FootprintEntry& o : table.Outer(slice, pixel % table.width)) {
-        for (const display::FootprintEntry& i : table.Inner(slice, pixel / table.width)) {
-          seen[volume.Index(o.x + i.x, o.y + i.y, o.z + i.z)] = 1;
-        }
+  for (int32_t slice = 0; slice < layout.slices; ++slice) {
+    for (int32_t pixel = 0; pixel < layout.width * layout.height; ++pixel) {
+      for (const OracleVoxel& voxel :
+           footprints.Of(slice, pixel % layout.width, pixel / layout.width)) {
+        seen[volume.Index(voxel.x, voxel.y, voxel.z)] = 1;
       }
     }
   }
@@ -183,8 +179,7 @@ std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target)
 }
 
 std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& target) {
-  const display::FootprintTable table =
-      display::BuildFootprints(target.geometry, target.tone.sampling);
+  const OracleFootprints footprints(target);
   const display::FrameLayout& layout = target.layout;
   std::vector<std::byte> bytes(layout.bytes());
   const size_t width = static_cast<size_t>(layout.width);
@@ -193,7 +188,7 @@ std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& t
   for (int32_t slice = 0; slice < layout.slices; ++slice) {
     for (size_t v = 0; v < height; ++v) {
       for (size_t u = 0; u < width; ++u) {
-        const uint32_t rgb = PixelOf(volume, table, slice, static_cast<int32_t>(u),
+        const uint32_t rgb = PixelOf(volume, footprints, slice, static_cast<int32_t>(u),
                                      static_cast<int32_t>(v), target.tone.sampling);
         for (int32_t sub = 0; sub < layout.sub_frames; ++sub) {
           const size_t picture =

@@ -20,7 +20,7 @@ class SceneGenerator {
  public:
   explicit SceneGenerator(uint64_t seed) : engine_(seed) {}
 
-  // A small display of either kind, any format, sampling, dither, number of sub-frames; any view.
+  // A small display of every kind, any format, sampling, dither, number of sub-frames; any view.
   Target RandomTarget();
 
   // Layers, geometries (some shared) and drawables of every kind,
@@ -35,6 +35,10 @@ class SceneGenerator {
   bool Chance(double probability);
 
  private:
+  display::PlanarStack RandomStack();
+  display::Rotor RandomRotor();
+  display::Lattice RandomLattice();
+  display::VoxelGrid RandomGrid(const display::Geometry& geometry);
   LayerRecord RandomLayer(uint64_t id);
   ModelGeometry RandomGeometry(uint64_t id, int size);
   DrawableRecord RandomDrawable(uint64_t id, const SceneModel& scene, int size);

@@ -1,5 +1,6 @@
 #include "display/drivers/voxlink/capabilities.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -141,9 +142,9 @@ absl::StatusOr<Geometry> ParseRotor(std::span<const std::byte> block, const Capa
 }
 
 std::string Describe(const Geometry& geometry, const FrameLayout& layout) {
-  return absl::StrCat(std::holds_alternative<Rotor>(geometry.shape) ? "a rotor" : "a planar stack",
-                      " of ", layout.slices, " slices of ", layout.width, "x", layout.height,
-                      " pixels");
+  const char* const kinds[] = {"a planar stack", "a rotor", "a lattice"};
+  return absl::StrCat(kinds[geometry.shape.index()], " of ", layout.slices, " slices of ",
+                      layout.width, "x", layout.height, " pixels");
 }
 
 }  // namespace
@@ -156,6 +157,11 @@ std::vector<std::byte> EncodeCapabilities(const DeviceCapabilities& capabilities
     fixed.slices = static_cast<uint32_t>(planar->positions_mm.size());
     fixed.width = static_cast<uint32_t>(planar->width_px);
     fixed.height = static_cast<uint32_t>(planar->height_px);
+  } else if (const auto* lattice = std::get_if<Lattice>(&capabilities.geometry.shape)) {
+    Append(shape, RotorShape{});  // as long as the shortest shape, of kind 0: none
+    fixed.width = static_cast<uint32_t>(std::max(lattice->width_px, 1));
+    fixed.height = 1;
+    fixed.slices = static_cast<uint32_t>(lattice->points_mm.size()) / fixed.width;
   } else {
     const Rotor& rotor = std::get<Rotor>(capabilities.geometry.shape);
     EncodeRotor(shape, rotor);
@@ -242,6 +248,11 @@ absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> 
 absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
                                const FrameLayout& layout) {
   const Capabilities& fixed = device.fixed;
+  if (std::holds_alternative<Lattice>(geometry.shape)) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the display is configured as ", Describe(geometry, layout),
+                     ", which voxlink cannot describe; it must be a planar stack or a rotor"));
+  }
   FrameLayout theirs = layout;
   theirs.slices = static_cast<int32_t>(fixed.slices);
   theirs.width = static_cast<int32_t>(fixed.width);

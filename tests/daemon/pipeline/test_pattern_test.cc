@@ -4,11 +4,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <map>
+#include <numbers>
+#include <optional>
 #include <set>
+#include <variant>
 #include <vector>
 
 #include "daemon/scene/engine_delta.h"
+#include "display/geometry/footprint.h"
 #include "gpu/engine.h"
 
 namespace voxeld::daemon {
@@ -16,21 +23,32 @@ namespace {
 
 constexpr int kNx = 20, kNy = 12, kNz = 10;
 
+display::Geometry Stack() {
+  display::PlanarStack stack;
+  stack.width_px = kNx;
+  stack.height_px = kNy;
+  for (int i = 0; i < kNz; ++i) stack.positions_mm.push_back(i + 0.5 - kNz / 2.0);
+  return {stack, {kNx, kNy, kNz, {1, 1, 1}, {-kNx / 2.0, -kNy / 2.0, -kNz / 2.0}}};
+}
+
 class Drawn {
  public:
-  explicit Drawn(TestPattern pattern) {
+  explicit Drawn(TestPattern pattern, const display::Geometry& geometry = Stack()) {
     gpu::EngineOptions options;
     options.kind = gpu::EngineKind::kCpu;
     options.threads = 1;
     options.inline_execution = true;
     auto engine = *gpu::CreateEngine(options);
     gpu::Target target;
-    display::PlanarStack stack;
-    stack.width_px = kNx;
-    stack.height_px = kNy;
-    for (int i = 0; i < kNz; ++i) stack.positions_mm.push_back(i + 0.5 - kNz / 2.0);
-    target.geometry = {stack, {kNx, kNy, kNz, {1, 1, 1}, {-kNx / 2.0, -kNy / 2.0, -kNz / 2.0}}};
-    target.layout = {kNz, kNx, kNy, 1, display::PixelFormat::kRgb888};
+    target.geometry = geometry;
+    for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = uint16_t(c * 257);
+    target.layout.slices = display::SliceCount(geometry);
+    std::visit(
+        [&](const auto& shape) {
+          target.layout.width = shape.width_px;
+          target.layout.height = shape.height_px;
+        },
+        geometry.shape);
     const auto ok = [](const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; };
     engine->SetTarget(target, ok);
     EngineScene scene;
@@ -41,6 +59,10 @@ class Drawn {
     engine->Apply(std::move(block), size, ok);
     voxels_.resize(kNx * kNy * kNz);
     engine->ReadVoxels({0, 0, 0, kNx, kNy, kNz}, voxels_, ok);
+    pictures_.resize(target.layout.bytes());
+    std::vector<uint64_t> changed_in(target.layout.pictures());
+    engine->SubmitFrame({.frame = 1}, {pictures_, changed_in},
+                        [&](const auto& result) { ok(result.status()); });
   }
   uint32_t At(int x, int y, int z) const { return voxels_[(z * kNy + y) * kNx + x]; }
   std::map<uint32_t, int> Colors() const {
@@ -49,9 +71,32 @@ class Drawn {
     return colors;
   }
 
+  // Of a lattice's lights, by pixel.
+  std::vector<uint32_t> Lights() const {
+    std::vector<uint32_t> lights;
+    for (size_t i = 0; i < pictures_.size(); i += 3) {
+      lights.push_back(uint32_t(pictures_[i]) << 16 | uint32_t(pictures_[i + 1]) << 8 |
+                       uint32_t(pictures_[i + 2]));
+    }
+    return lights;
+  }
+
  private:
   std::vector<uint32_t> voxels_;
+  std::vector<std::byte> pictures_;
 };
+
+// Lights on a ring that stands in the grid, none in its middle or at its corners; two slices.
+display::Geometry Ring() {
+  display::Lattice lattice;
+  lattice.width_px = 20;
+  for (int n = 0; n < 39; ++n) {
+    const double turn = n * 2 * std::numbers::pi / 39;
+    lattice.points_mm.push_back(display::Vec3{9 * std::cos(turn), 0.3, 4.5 * std::sin(turn)});
+  }
+  lattice.points_mm.insert(lattice.points_mm.begin() + 7, std::nullopt);
+  return {lattice, Stack().grid};
+}
 
 TEST(TestPattern, WhiteIsEveryVoxel) {
   EXPECT_THAT(Drawn(TestPattern::kWhite).Colors(),
@@ -103,6 +148,48 @@ TEST(TestPattern, RampRisesAlongX) {
     last = level;
   }
   EXPECT_EQ(last, 255u);
+}
+
+TEST(TestPattern, ALatticesCornersAreLights) {
+  const Drawn drawn(TestPattern::kCorners, Ring());
+  const std::vector<uint32_t> lights = drawn.Lights();
+  ASSERT_EQ(lights.size(), 40u);
+  EXPECT_EQ(lights[7], 0u);  // there is none
+  std::set<uint32_t> colors(lights.begin(), lights.end());
+  // The ring is flat: a corner in front and one behind have one light, and the greater colour.
+  for (const uint32_t color : {0xFFFFFFu, 0xFFFF00u, 0x00FFFFu, 0xFF8000u}) {
+    EXPECT_TRUE(colors.contains(color)) << std::hex << color;
+  }
+}
+
+TEST(TestPattern, ALatticesGridIsEveryEighthPixelOfEachSlice) {
+  const std::vector<uint32_t> lights = Drawn(TestPattern::kGrid, Ring()).Lights();
+  for (size_t pixel = 0; pixel < lights.size(); ++pixel) {
+    if (pixel % 20 % 8 == 0) {
+      EXPECT_EQ(lights[pixel], 0xFFFFFFu) << pixel;
+    }
+  }
+  EXPECT_LT(std::count(lights.begin(), lights.end(), 0xFFFFFFu), 12);  // some share a voxel
+}
+
+TEST(TestPattern, ALatticesRampReachesEveryLight) {
+  const display::Geometry ring = Ring();
+  const std::vector<uint32_t> lights = Drawn(TestPattern::kRamp, ring).Lights();
+  const auto& points = std::get<display::Lattice>(ring.shape).points_mm;
+  for (size_t a = 0; a < points.size(); ++a) {
+    if (!points[a].has_value()) continue;
+    EXPECT_NE(lights[a], 0u) << a;
+    for (size_t b = 0; b < points.size(); ++b) {
+      if (points[b].has_value() && points[a]->x + 1 < points[b]->x) {
+        EXPECT_LT(lights[a], lights[b]) << a << " " << b;
+      }
+    }
+  }
+}
+
+TEST(TestPattern, ALatticeIsAllWhite) {
+  std::vector<uint32_t> lights = Drawn(TestPattern::kWhite, Ring()).Lights();
+  EXPECT_EQ(std::count(lights.begin(), lights.end(), 0xFFFFFFu), 39);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "daemon/wire/encode.h"
@@ -85,6 +86,52 @@ TEST(Convert, GeometriesBothWays) {
   const display::FrameLayout ours{3, 4, 5, 6, display::PixelFormat::kBitPlanes3};
   ToWire(ours, &layout);
   EXPECT_EQ(*FromWire(layout), ours);
+}
+
+display::Geometry Lights() {
+  const display::Lattice lattice{
+      .width_px = 3,
+      .points_mm = {std::nullopt, display::Vec3{1, 2, 3}, display::Vec3{-1, 0, 1e6},
+                    display::Vec3{0.1, 0.2, 0.3}, std::nullopt, std::nullopt},
+      .cell_mm = {1, 2, 0.5}};
+  return {lattice, {5, 6, 7, {1, 2, 3}, {-1, -2, -3}}};
+}
+
+TEST(Convert, LatticesBothWays) {
+  v1::Geometry message;
+  ToWire(Lights(), &message);
+  EXPECT_EQ(message.lattice().slices(), 2);
+  EXPECT_THAT(message.lattice().pixels(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(message.lattice().y_mm(), ElementsAre(2, 0, 0.2));
+  const absl::StatusOr<display::Geometry> back = FromWire(message);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(*back, Lights());
+}
+
+TEST(Convert, LatticesThatDoNotHoldTogether) {
+  v1::Geometry good;
+  ToWire(Lights(), &good);
+  const auto refusal = [&](auto spoil) {
+    v1::Geometry wrong = good;
+    spoil(*wrong.mutable_lattice());
+    const absl::Status status = FromWire(wrong).status();
+    EXPECT_TRUE(absl::IsInvalidArgument(status));
+    return std::string(status.message());
+  };
+  EXPECT_THAT(refusal([](v1::Lattice& l) { l.set_width_px(0); }),
+              HasSubstr("slices·width_px is 2·0; both must be 1 at least"));
+  EXPECT_THAT(refusal([](v1::Lattice& l) { l.set_slices(-2); }), HasSubstr("is -2·3"));
+  EXPECT_THAT(refusal([](v1::Lattice& l) {
+                l.set_slices(2147483647);
+                l.set_width_px(2147483647);
+              }),
+              HasSubstr("at most 16777216"));
+  EXPECT_THAT(refusal([](v1::Lattice& l) { l.add_z_mm(1); }), HasSubstr("3, 3, 3 and 4 values"));
+  EXPECT_THAT(refusal([](v1::Lattice& l) { l.set_pixels(1, 1); }),
+              HasSubstr("lattice.pixels[1] is 1; pixels must ascend strictly"));
+  EXPECT_THAT(refusal([](v1::Lattice& l) { l.set_pixels(2, 6); }),
+              HasSubstr("lattice.pixels[2] is 6; pixels must ascend strictly and be below "
+                        "slices·width_px, 6"));
 }
 
 TEST(Convert, ViewsBothWaysAndChecked) {

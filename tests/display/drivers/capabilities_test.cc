@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <random>
 #include <string>
 
@@ -51,6 +52,10 @@ DeviceCapabilities RotorDevice() {
                   {.eccentricity_mm = -0.375}};
   device.geometry.shape = rotor;
   return *ParseCapabilities(EncodeCapabilities(device));
+}
+
+Geometry LatticeGeometry() {
+  return {.shape = Lattice{.width_px = 2, .points_mm = {Vec3{1, 2, 3}, std::nullopt}}, .grid = {}};
 }
 
 FrameLayout LayoutOf(const DeviceCapabilities& device) {
@@ -196,6 +201,24 @@ TEST(Capabilities, TheDeviceMustBeAsConfigured) {
   EXPECT_FALSE(CheckCapabilities(device, geometry, other).ok());
   std::get<PlanarStack>(geometry.shape).positions_mm[1] = 0.01;
   EXPECT_FALSE(CheckCapabilities(device, geometry, layout).ok());
+}
+
+TEST(CapabilitiesTest, ALatticeCannotBeDescribed) {
+  DeviceCapabilities device = Planar();
+  device.geometry = LatticeGeometry();
+  const absl::Status parsed = ParseCapabilities(EncodeCapabilities(device)).status();
+  EXPECT_EQ(parsed.code(), absl::StatusCode::kDataLoss);
+  EXPECT_NE(parsed.message().find("shape is 0; it must be 1 (planar stack) or 2 (rotor)"),
+            std::string::npos)
+      << parsed;
+  const FrameLayout layout{.slices = 1, .width = 2, .height = 1};
+  const absl::Status fits = CheckCapabilities(Planar(), LatticeGeometry(), layout);
+  EXPECT_EQ(fits.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_NE(fits.message().find("a lattice of 1 slices of 2x1 pixels, which voxlink cannot"),
+            std::string::npos)
+      << fits;
+  // Nor is a device ever taken for one.
+  EXPECT_FALSE(CheckCapabilities(device, Planar().geometry, LayoutOf(Planar())).ok());
 }
 
 }  // namespace

@@ -77,6 +77,28 @@ TEST(DefaultGridTest, ARotorsGridCoversAllPanelsHeights) {
   EXPECT_DOUBLE_EQ(grid.origin_mm.z, -31.75);
 }
 
+TEST(DefaultGridTest, ARegularLatticeHasAVoxelALight) {
+  // Pitches that no double holds exactly.
+  const Lattice lattice = RegularLattice(7, 5, 4, {0.1, 0.3, 1.7});
+  const VoxelGrid grid = DefaultGrid({lattice, {}});
+  EXPECT_EQ(grid.nx, 7);
+  EXPECT_EQ(grid.ny, 5);
+  EXPECT_EQ(grid.nz, 4);
+  EXPECT_EQ(grid.pitch_mm, lattice.cell_mm);
+  EXPECT_DOUBLE_EQ(grid.origin_mm.x, -0.35);
+  EXPECT_DOUBLE_EQ(grid.origin_mm.y, -0.75);
+  EXPECT_DOUBLE_EQ(grid.origin_mm.z, -3.4);
+}
+
+TEST(DefaultGridTest, ALatticesGridCoversAllBoxes) {
+  Lattice lattice;
+  lattice.width_px = 3;
+  lattice.points_mm = {Vec3{-1, 5, 2}, std::nullopt, Vec3{2.25, 5, 3}};
+  lattice.cell_mm = {1, 2, 0.75};
+  // Along x 4.25 mm of cells of 1; along y one box; along z 1.75 of cells of 0.75.
+  EXPECT_EQ(DefaultGrid({lattice, {}}), (VoxelGrid{5, 1, 3, {1, 2, 0.75}, {-1.5, 4, 1.625}}));
+}
+
 TEST(DefaultGridTest, SuitsItsShape) {
   for (const GeometryCase& c : AllCases()) {
     Geometry geometry = c.geometry;
@@ -90,6 +112,15 @@ TEST(DefaultGridTest, AbsurdButValidShapesGiveAGridThatValidationRefuses) {
   rotor.panels[0].eccentricity_mm = 1e6;
   rotor.panels[0].pitch_u_mm = 1e-4;
   Geometry geometry{rotor, {}};
+  ASSERT_TRUE(ValidateShape(geometry).ok());
+  geometry.grid = DefaultGrid(geometry);
+  EXPECT_FALSE(ValidateGeometry(geometry).ok());
+
+  Lattice lattice;
+  lattice.width_px = 2;
+  lattice.points_mm = {Vec3{-1e6, -1e6, -1e6}, Vec3{1e6, 1e6, 1e6}};
+  lattice.cell_mm = {1e-4, 1e-4, 1e-4};
+  geometry = {lattice, {}};
   ASSERT_TRUE(ValidateShape(geometry).ok());
   geometry.grid = DefaultGrid(geometry);
   EXPECT_FALSE(ValidateGeometry(geometry).ok());

@@ -158,6 +158,7 @@ std::vector<GeometryCase> RotorCases() {
 std::vector<GeometryCase> AllCases() {
   std::vector<GeometryCase> cases = StackCases();
   for (GeometryCase& c : RotorCases()) cases.push_back(std::move(c));
+  for (GeometryCase& c : LatticeCases()) cases.push_back(std::move(c));
   return cases;
 }
 

@@ -15,6 +15,7 @@ struct GeometryCase {
 
 std::vector<GeometryCase> StackCases();
 std::vector<GeometryCase> RotorCases();
+std::vector<GeometryCase> LatticeCases();  // lattice_cases.cc
 std::vector<GeometryCase> AllCases();
 
 // `count` positions, `spacing_mm` apart, about `middle_mm`.
@@ -22,6 +23,10 @@ std::vector<double> EvenPositions(int count, double spacing_mm, double middle_mm
 
 // The multivox Vortex: two panels of 128×64, back to back, in units of its LED pitch.
 Rotor Vortex(int slices_per_turn);
+
+// nx·ny·nz lights in rows, `pitch_mm` apart, about the middle of the volume, x fastest; a slice is
+// what lies at one height. Their cell is the pitch.
+Lattice RegularLattice(int nx, int ny, int nz, Vec3 pitch_mm);
 
 // A grid of nx·ny·nz cells about the middle of the volume.
 VoxelGrid CentredGrid(int nx, int ny, int nz, Vec3 pitch_mm);

@@ -191,6 +191,9 @@ std::unique_ptr<SweptSolid> MakeSweptSolid(const Geometry& geometry) {
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
     return MakeSweptStack(*stack, geometry.grid);
   }
+  if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) {
+    return MakeSweptLattice(*lattice, geometry.grid);
+  }
   return MakeSweptRotor(std::get<Rotor>(geometry.shape), geometry.grid);
 }
 

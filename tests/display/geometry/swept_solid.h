@@ -24,14 +24,15 @@ class SweptSolid {
 
   virtual ~SweptSolid() = default;
 
-  // Does `point` lie in the solid that all pixels' rectangles sweep together?
+  // Does `point` lie in the solid that all pixels' rectangles sweep together (a lattice's lights'
+  // boxes)?
   virtual Where Locate(const Vec3& point) const = 0;
 
   // The pixels whose rectangle passes `point`,
   // but for those for which it is nearer than the margin to a boundary.
   virtual std::vector<PixelId> Passing(const Vec3& point) const = 0;
 
-  // The middle of a pixel.
+  // The middle of a pixel; NaN: a lattice has no light there.
   virtual Vec3 Centre(const PixelId& pixel) const = 0;
 
   // Could an entry of the outer list of (slice, u), or of the inner list of (slice, v),
@@ -45,6 +46,7 @@ class SweptSolid {
 
 std::unique_ptr<SweptSolid> MakeSweptStack(const PlanarStack& stack, const VoxelGrid& grid);
 std::unique_ptr<SweptSolid> MakeSweptRotor(const Rotor& rotor, const VoxelGrid& grid);
+std::unique_ptr<SweptSolid> MakeSweptLattice(const Lattice& lattice, const VoxelGrid& grid);
 std::unique_ptr<SweptSolid> MakeSweptSolid(const Geometry& geometry);
 
 inline Vec3 VoxelCentre(const VoxelGrid& grid, int32_t i, int32_t j, int32_t k) {

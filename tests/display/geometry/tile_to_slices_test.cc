@@ -1,3 +1,4 @@
+#include <optional>
 #include <random>
 #include <set>
 
@@ -38,6 +39,21 @@ std::vector<int32_t> SlicesByLooking(const FootprintTable& table, const Tiles& s
   return slices;
 }
 
+// The same from the flat tables, as a machine reads them.
+std::vector<int32_t> SlicesFromTables(const TileToSlices& map, int32_t i, int32_t j, int32_t k) {
+  const TileToSlices::Tables tables = map.tables();
+  const auto place =
+      static_cast<size_t>(tables.stride[0] * i + tables.stride[1] * j + tables.stride[2] * k);
+  const int32_t along = tables.inner_axis == Axis::kX ? i : tables.inner_axis == Axis::kY ? j : k;
+  std::vector<int32_t> slices;
+  for (uint32_t n = tables.begin[place]; n < tables.begin[place + 1]; ++n) {
+    const int32_t slice = tables.slices[n];
+    const int32_t row = slice % tables.inner_sets * tables.inner_tiles;
+    if (tables.seen[static_cast<size_t>(row + along)] != 0) slices.push_back(slice);
+  }
+  return slices;
+}
+
 class TileToSlicesTest : public testing::TestWithParam<GeometryCase> {};
 
 TEST_P(TileToSlicesTest, NamesTheSlicesThatSeeATile) {
@@ -55,6 +71,7 @@ TEST_P(TileToSlicesTest, NamesTheSlicesThatSeeATile) {
                     k = below(grid.nz) / size.z;
       const std::vector<int32_t> slices = SlicesByLooking(table, size, i, j, k);
       ASSERT_EQ(map.Slices(i, j, k), slices) << i << " " << j << " " << k;
+      ASSERT_EQ(SlicesFromTables(map, i, j, k), slices) << i << " " << j << " " << k;
       for (int range = 0; range < 8; ++range) {
         const int32_t begin = below(table.slices), end = begin + below(table.slices - begin + 1);
         const bool visible = std::any_of(slices.begin(), slices.end(),
@@ -85,6 +102,43 @@ TEST(TileToSlicesByHandTest, AStackWhosePixelsAreVoxels) {
   EXPECT_TRUE(map.Visible(0, 0, 1, 7, 10));
   EXPECT_FALSE(map.Visible(0, 0, 1, 8, 10));
   EXPECT_FALSE(map.Visible(0, 0, 1, 5, 5));
+}
+
+// Every tile, both ways: none too many, none too few.
+TEST(TileToSlicesByHandTest, EveryTileOfEveryLattice) {
+  for (const GeometryCase& c : LatticeCases()) {
+    const VoxelGrid& grid = c.geometry.grid;
+    const FootprintTable table = BuildFootprints(c.geometry, Sampling::kMax);
+    for (const int32_t size : {4, 9}) {
+      const TileToSlices map(table, grid, size, size, size);
+      for (int32_t k = 0; k * size < grid.nz; ++k) {
+        for (int32_t j = 0; j * size < grid.ny; ++j) {
+          for (int32_t i = 0; i * size < grid.nx; ++i) {
+            const std::vector<int32_t> slices = SlicesByLooking(table, {size, size, size}, i, j, k);
+            ASSERT_EQ(map.Slices(i, j, k), slices) << c.name << i << " " << j << " " << k;
+            ASSERT_EQ(SlicesFromTables(map, i, j, k), slices) << c.name;
+          }
+        }
+      }
+    }
+  }
+}
+
+// Slices that see tiles at one height in one place and at another in another.
+TEST(TileToSlicesByHandTest, ALatticesSlicesGoWhereTheyLike) {
+  Lattice lattice;
+  lattice.width_px = 2;
+  lattice.points_mm = {Vec3{0.5, 0.5, 0.5}, Vec3{7.5, 0.5, 7.5},   // slice 0: below, then above
+                       Vec3{0.5, 0.5, 7.5}, Vec3{7.5, 0.5, 0.5},   // slice 1: above, then below
+                       std::nullopt,        Vec3{0.5, 0.5, 1.5}};  // slice 2: below
+  const Geometry geometry{lattice, {8, 1, 8, {1, 1, 1}, {0, 0, 0}}};
+  const TileToSlices map(BuildFootprints(geometry, Sampling::kMax), geometry.grid, 4, 4, 4);
+  EXPECT_EQ(map.Slices(0, 0, 0), (std::vector<int32_t>{0, 2}));
+  EXPECT_EQ(map.Slices(1, 0, 0), (std::vector<int32_t>{1}));
+  EXPECT_EQ(map.Slices(0, 0, 1), (std::vector<int32_t>{1}));
+  EXPECT_EQ(map.Slices(1, 0, 1), (std::vector<int32_t>{0}));
+  EXPECT_FALSE(map.Visible(0, 0, 0, 1, 2));
+  EXPECT_TRUE(map.Visible(0, 0, 0, 1, 3));
 }
 
 TEST(TileToSlicesByHandTest, TilesThatNoPixelSees) {

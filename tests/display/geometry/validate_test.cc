@@ -1,6 +1,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,13 @@ Geometry GoodStack() {
 
 Geometry GoodRotor() {
   Geometry geometry{Vortex(360), {}};
+  geometry.grid = DefaultGrid(geometry);
+  return geometry;
+}
+
+Geometry GoodLattice() {
+  Geometry geometry{RegularLattice(4, 3, 2, {1, 1, 1}), {}};
+  std::get<Lattice>(geometry.shape).points_mm[5] = std::nullopt;
   geometry.grid = DefaultGrid(geometry);
   return geometry;
 }
@@ -140,6 +148,47 @@ TEST(ValidateTest, Rotors) {
       });
 }
 
+TEST(ValidateTest, Lattices) {
+  using G = VoxelGrid;
+  using L = Lattice;
+  ExpectRefused<L>(
+      GoodLattice(),
+      {
+          {[](L& l, G&) { l.width_px = 0; }, {"width_px is 0", "1 to 16384"}},
+          {[](L& l, G&) { l.width_px = -1; }, {"width_px is -1"}},
+          {[](L& l, G&) { l.width_px = 16385; }, {"width_px is 16385"}},
+          {[](L& l, G&) { l.height_px = 2; }, {"height_px is 2", "must be 1"}},
+          {[](L& l, G&) { l.height_px = 0; }, {"height_px is 0"}},
+          {[](L& l, G&) { l.points_mm.pop_back(); },
+           {"the number of points_mm is 23", "a multiple of width_px, 12"}},
+          {[](L& l, G&) { l.points_mm.clear(); }, {"points_mm / width_px is 0", "1 to 16384"}},
+          {[](L& l, G&) {
+             l.width_px = 1;
+             l.points_mm.resize(16385);
+           },
+           {"points_mm / width_px is 16385"}},
+          {[](L& l, G&) {
+             l.width_px = 16384;
+             l.points_mm.resize(1025 * 16384);
+           },
+           {"the number of points_mm is 16793600", "at most 16777216"}},
+          {[](L& l, G&) { l.points_mm.assign(24, std::nullopt); },
+           {"points_mm that have a light is 0", "1 at least"}},
+          {[](L& l, G&) { l.points_mm[3]->x = kNan; }, {"points_mm[3].x is nan", "1e+06 mm"}},
+          {[](L& l, G&) { l.points_mm[4]->y = kInfinity; }, {"points_mm[4].y is inf"}},
+          {[](L& l, G&) { l.points_mm[23]->z = -2e6; }, {"points_mm[23].z is -2e+06"}},
+          {[](L& l, G&) { l.cell_mm.x = 0; }, {"cell_mm.x is 0", "0.0001 to 10000 mm"}},
+          {[](L& l, G&) { l.cell_mm.y = kNan; }, {"cell_mm.y is nan"}},
+          {[](L& l, G&) { l.cell_mm.z = -1; }, {"cell_mm.z is -1"}},
+          {[](L&, G& g) { g.nz = 0; }, {"grid.nz is 0"}},
+          {[](L& l, G& g) {
+             l.cell_mm = {1e4, 1e4, 1e4};
+             g.nx = g.ny = g.nz = 1024;
+           },
+           {"footprint table is 24696061975", "at most 268435456"}},
+      });
+}
+
 TEST(ValidateTest, TheShapeAloneNeedsNoGrid) {
   Geometry geometry = GoodRotor();
   geometry.grid = {};
@@ -176,6 +225,12 @@ TEST(ValidateTest, WhatIsAtTheLimitsIsBuilt) {
   ASSERT_TRUE(ValidateGeometry(rotor).ok()) << ValidateGeometry(rotor);
   const FootprintTable table = BuildFootprints(rotor, Sampling::kWeighted);
   EXPECT_FALSE(table.outer.entries.empty());
+
+  Geometry lattice{Lattice{.width_px = 2, .points_mm = {Vec3{1e6, -1e6, 1e6}, Vec3{-1e6, 1e6, 0}}},
+                   {4, 4, 16384, {1e-4, 1e-4, 1e-4}, {1e6, -1e6, 1e6 - 1}}};
+  std::get<Lattice>(lattice.shape).cell_mm = {1e4, 1e-4, 1e4};
+  ASSERT_TRUE(ValidateGeometry(lattice).ok()) << ValidateGeometry(lattice);
+  EXPECT_FALSE(BuildFootprints(lattice, Sampling::kMax).outer.entries.empty());
 }
 
 }  // namespace

@@ -5,6 +5,9 @@
 #include <unistd.h>
 
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
 
 #include "gpu/worker/segment.h"
 #include "gpu/worker/target_codec.h"
@@ -49,6 +52,47 @@ TEST(TargetCodec, BringsEveryTargetThrough) {
       EXPECT_FALSE(DecodeTarget(std::span(bytes).first(cut)).ok()) << cut;
     }
   }
+}
+
+Target LatticeTarget() {
+  Target target;
+  target.geometry.shape = display::Lattice{.width_px = 2,
+                                           .points_mm = {display::Vec3{1, 2, 3}, std::nullopt,
+                                                         std::nullopt, display::Vec3{-4, 5.5, 1e6}},
+                                           .cell_mm = {0.5, 0.25, 2}};
+  return target;
+}
+
+TEST(TargetCodec, BringsALatticeThrough) {
+  const Target target = LatticeTarget();
+  const auto bytes = EncodeTarget(target);
+  const auto decoded = DecodeTarget(bytes);
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(decoded->geometry, target.geometry);
+  for (size_t cut = 0; cut < bytes.size(); ++cut) {
+    EXPECT_FALSE(DecodeTarget(std::span(bytes).first(cut)).ok()) << cut;
+  }
+}
+
+TEST(TargetCodec, RefusesALatticeOfMoreLightsThanBytes) {
+  // The number of lights follows the kind of shape and the picture's two sides.
+  constexpr size_t kCount = sizeof(uint64_t) + 2 * sizeof(int32_t);
+  const auto good = EncodeTarget(LatticeTarget());
+  uint64_t count = 0;
+  std::memcpy(&count, good.data() + kCount, sizeof(count));
+  ASSERT_EQ(count, 4u);
+  for (const uint64_t hostile : {uint64_t{3}, uint64_t{5}, uint64_t{good.size()}, uint64_t{1} << 28,
+                                 uint64_t{1} << 63, ~uint64_t{0}}) {
+    auto bytes = good;
+    std::memcpy(bytes.data() + kCount, &hostile, sizeof(hostile));
+    EXPECT_FALSE(DecodeTarget(bytes).ok()) << hostile;
+  }
+  auto bytes = good;
+  bytes[kCount + sizeof(count)] = std::byte{2};  // neither a light nor none
+  EXPECT_FALSE(DecodeTarget(bytes).ok());
+  bytes = good;
+  bytes[0] = std::byte{3};  // the kind of shape
+  EXPECT_FALSE(DecodeTarget(bytes).ok());
 }
 
 }  // namespace

@@ -99,6 +99,15 @@ TEST_F(CommandsTest, TablesAreDataAndNothingFromTheServerReachesTheTerminalRaw) 
   EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("1,234,567"));
 }
 
+TEST_F(CommandsTest, ALatticeIsListedAndPictured) {
+  server_.Set({.lattice = true});
+  EXPECT_THAT(RunTool({"displays"}).out, HasSubstr("lattice, 5 lights"));
+  EXPECT_EQ(RunJson({"displays"})["displays"][0]["geometry"]["lattice"]["pixels"].size(), 5u);
+  // A pixel without a light has bytes too; what the server puts there is counted, not drawn.
+  EXPECT_EQ(RunJson({"snapshot", folder_.Path("a.png")})["lit_pixels"], 6);
+  EXPECT_EQ(RunTool({"snapshot", folder_.Path("a.png"), "--slices"}).code, 0);
+}
+
 TEST_F(CommandsTest, OneIsSingular) {
   const std::string one = folder_.Write(
       "one.ply",

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <map>
+#include <optional>
 #include <string>
 
 #include "display/geometry/footprint.h"
@@ -248,6 +249,42 @@ TEST(GeometryFromWire, TakesARotorWhole) {
   expected.clockwise = true;
   expected.panels.push_back({1, 2, 3, 4, 5, 0.5, false, true});
   EXPECT_EQ(std::get<display::Rotor>(geometry->shape), expected);
+}
+
+TEST(GeometryFromWire, TakesALatticeWhole) {
+  v1::Geometry wire;
+  v1::Lattice* lattice = wire.mutable_lattice();
+  lattice->set_width_px(2);
+  lattice->set_slices(2);
+  lattice->mutable_cell_mm()->set_x(1);
+  lattice->mutable_cell_mm()->set_y(2);
+  lattice->mutable_cell_mm()->set_z(3);
+  for (const uint32_t pixel : {1u, 2u}) {
+    lattice->add_pixels(pixel);
+    lattice->add_x_mm(pixel);
+    lattice->add_y_mm(pixel * 10.0);
+    lattice->add_z_mm(pixel * -0.5);
+  }
+  const absl::StatusOr<display::Geometry> geometry = GeometryFromWire(wire);
+  ASSERT_THAT(geometry, IsOk());
+  const display::Lattice expected{.width_px = 2,
+                                  .points_mm = {std::nullopt, display::Vec3{1, 10, -0.5},
+                                                display::Vec3{2, 20, -1}, std::nullopt},
+                                  .cell_mm = {1, 2, 3}};
+  EXPECT_EQ(std::get<display::Lattice>(geometry->shape), expected);
+
+  v1::Geometry wrong = wire;
+  wrong.mutable_lattice()->add_x_mm(0);
+  EXPECT_THAT(GeometryFromWire(wrong), Fails(Words{"2 lights with 3, 2 and 2 coordinates"}));
+  wrong = wire;
+  wrong.mutable_lattice()->set_pixels(1, 4);
+  EXPECT_THAT(GeometryFromWire(wrong), Fails(Words{"4 pixels with a light in pixel 4"}));
+  wrong = wire;
+  wrong.mutable_lattice()->set_slices(1 << 30);
+  wrong.mutable_lattice()->set_width_px(1 << 30);
+  EXPECT_THAT(GeometryFromWire(wrong), Fails(Words{"1073741824 slices", "at most 16777216"}));
+  wrong.mutable_lattice()->set_slices(0);
+  EXPECT_THAT(GeometryFromWire(wrong), Fails(Words{"0 slices"}));
 }
 
 }  // namespace

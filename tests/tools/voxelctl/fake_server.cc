@@ -34,6 +34,20 @@ void FillGeometry(v1::Geometry* geometry) {
   }
 }
 
+// Two slices of three lights, of which one is missing, in a row along x.
+void FillLattice(v1::Geometry* geometry) {
+  v1::Lattice* lattice = geometry->mutable_lattice();
+  lattice->set_width_px(3);
+  lattice->set_slices(2);
+  for (const uint32_t pixel : {0u, 1u, 3u, 4u, 5u}) {
+    lattice->add_pixels(pixel);
+    lattice->add_x_mm(pixel - kSide / 2.0 + 0.5);
+    lattice->add_y_mm(0.5);
+    lattice->add_z_mm(0.5);
+  }
+  *lattice->mutable_cell_mm() = geometry->grid().pitch_mm();
+}
+
 void FillDisplay(v1::TestPattern pattern, v1::DisplayDescription* display) {
   display->set_name(kDisplay);
   display->set_driver("none\x1b");
@@ -187,6 +201,9 @@ class FakeServer::Display final : public v1::DisplayService::Service {
                             v1::ListDisplaysResponse* response) override {
     sync::MutexLock lock(server_.mutex_);
     FillDisplay(pattern_, response->add_displays());
+    if (server_.behaviour_.lattice) {
+      FillLattice(response->mutable_displays(0)->mutable_geometry());
+    }
     return grpc::Status::OK;
   }
 
@@ -224,10 +241,11 @@ class FakeServer::Display final : public v1::DisplayService::Service {
                              grpc::ServerWriter<v1::VolumeChunk>* writer) override {
     if (!request->name().empty() && request->name() != kDisplay)
       return {grpc::StatusCode::NOT_FOUND, "no display of that name; there is fake"};
-    bool short_volume = false;
+    bool short_volume = false, lattice = false;
     {
       sync::MutexLock lock(server_.mutex_);
       short_volume = server_.behaviour_.short_volume;
+      lattice = server_.behaviour_.lattice;
     }
     v1::VolumeChunk chunk;
     v1::VolumeHeader* header = chunk.mutable_header();
@@ -238,6 +256,16 @@ class FakeServer::Display final : public v1::DisplayService::Service {
     header->mutable_layout()->set_slices(kSide);
     header->mutable_layout()->set_width(kSide);
     header->mutable_layout()->set_height(kSide);
+    if (lattice) {
+      FillLattice(header->mutable_geometry());
+      header->mutable_layout()->set_slices(2);
+      header->mutable_layout()->set_width(3);
+      header->mutable_layout()->set_height(1);
+      writer->Write(chunk);
+      chunk.mutable_slices()->set_rgb(std::string(2 * 3 * 3, '\x80'));
+      writer->Write(chunk);
+      return grpc::Status::OK;
+    }
     writer->Write(chunk);
     for (int slice = 0; slice < kSide - (short_volume ? 1 : 0); slice += 1) {
       chunk.mutable_slices()->set_first_slice(slice);

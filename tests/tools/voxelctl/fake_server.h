@@ -30,6 +30,7 @@ class FakeServer final {
     bool no_outcomes = false;         // outcomes are owed for ever
     bool short_volume = false;        // CaptureVolume leaves out its last slice
     bool hold_streams = false;        // a stream whose client is done is not ended
+    bool lattice = false;  // the display is one of two slices of three lights, one absent
   };
   void Set(const Behaviour& behaviour);
 

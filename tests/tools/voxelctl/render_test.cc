@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <filesystem>
+#include <string>
+#include <variant>
 
 #include "display/geometry/footprint.h"
 #include "tests/tools/voxelctl/status_matchers.h"
@@ -43,6 +45,17 @@ Volume Spinner() {
   return Empty({.shape = rotor, .grid = {}}, 32, 32);
 }
 
+// The same lights as the stack's, 1024 a slice; every fifth is missing.
+Volume Lights() {
+  display::Lattice lattice;
+  lattice.width_px = 32 * 32;
+  for (int n = 0; n < 32 * 32 * 32; ++n) {
+    lattice.points_mm.push_back(display::Vec3{n % 32 - 15.5, n / 32 % 32 - 15.5, n / 1024 - 15.5});
+    if (n % 5 == 4) lattice.points_mm.back().reset();
+  }
+  return Empty({.shape = lattice, .grid = {}}, 1024, 1);
+}
+
 uint8_t* PixelOf(Volume* volume, int slice, int u, int v) {
   return volume->rgb.data() + (volume->pixel(slice, u, v) - volume->rgb.data());
 }
@@ -54,7 +67,7 @@ void Light(Volume* volume, display::Vec3 at, double radius, uint8_t r, uint8_t g
     for (int u = 0; u < volume->width; ++u) {
       for (int v = 0; v < volume->height; ++v) {
         const display::Vec3 p = display::PixelPosition(volume->geometry, s, u, v);
-        if (std::hypot(p.x - at.x, p.y - at.y, p.z - at.z) > radius) continue;
+        if (!(std::hypot(p.x - at.x, p.y - at.y, p.z - at.z) <= radius)) continue;
         uint8_t* pixel = PixelOf(volume, s, u, v);
         pixel[0] = r, pixel[1] = g, pixel[2] = b;
         ++lit;
@@ -95,14 +108,21 @@ Spot Find(const Image& image, int channel) {
   return spot;
 }
 
-class RenderTest : public testing::TestWithParam<bool> {
+enum class Kind { kStack, kRotor, kLattice };
+
+class RenderTest : public testing::TestWithParam<Kind> {
  protected:
-  Volume NewVolume() const { return GetParam() ? Spinner() : Stack(); }
+  Volume NewVolume() const {
+    return GetParam() == Kind::kStack ? Stack() : GetParam() == Kind::kRotor ? Spinner() : Lights();
+  }
   Image Draw(const Volume& volume, ViewAngles angles) const {
     EXPECT_THAT(CheckVolume(volume), IsOk());
     return RenderVolume(volume, {.width = 320, .height = 320, .angles = angles});
   }
 };
+
+// Of displays whose pixels are no points with gaps between.
+class SurfaceTest : public RenderTest {};
 
 TEST_P(RenderTest, RightIsRightAndUpIsUp) {
   Volume volume = NewVolume();
@@ -145,7 +165,7 @@ TEST_P(RenderTest, FromAboveTheFrontIsLow) {
   EXPECT_GT(Find(Draw(volume, {0, 40}), 0).y, 190);
 }
 
-TEST_P(RenderTest, WhatIsInFrontCoversWhatIsBehind) {
+TEST_P(SurfaceTest, WhatIsInFrontCoversWhatIsBehind) {
   Volume volume = NewVolume();
   Light(&volume, {0, -9, 0}, 3, 255, 0, 0);
   Light(&volume, {0, 9, 0}, 2, 0, 255, 0);
@@ -155,7 +175,7 @@ TEST_P(RenderTest, WhatIsInFrontCoversWhatIsBehind) {
   EXPECT_LT(middle[1], middle[0] / 2);
 }
 
-TEST_P(RenderTest, SurfacesClose) {
+TEST_P(SurfaceTest, SurfacesClose) {
   Volume volume = NewVolume();
   // A wall across the middle: no dark gaps between its pixels.
   for (int s = 0; s < volume.slices; ++s) {
@@ -185,8 +205,26 @@ TEST_P(RenderTest, ADarkVolumeShowsItsOutline) {
   EXPECT_LT(lit, 320 * 320 / 10);
 }
 
-INSTANTIATE_TEST_SUITE_P(Displays, RenderTest, testing::Bool(),
-                         [](const auto& info) { return info.param ? "rotor" : "stack"; });
+std::string NameOf(const testing::TestParamInfo<Kind>& info) {
+  return info.param == Kind::kStack ? "stack" : info.param == Kind::kRotor ? "rotor" : "lattice";
+}
+INSTANTIATE_TEST_SUITE_P(Displays, RenderTest,
+                         testing::Values(Kind::kStack, Kind::kRotor, Kind::kLattice), NameOf);
+INSTANTIATE_TEST_SUITE_P(Displays, SurfaceTest, testing::Values(Kind::kStack, Kind::kRotor),
+                         NameOf);
+
+TEST(RenderLattice, APixelWithoutALightIsNotDrawn) {
+  Volume volume = Lights();
+  uint8_t* absent = PixelOf(&volume, 16, 16 * 32 + 14, 0);
+  const auto& points = std::get<display::Lattice>(volume.geometry.shape).points_mm;
+  while (points[static_cast<size_t>((absent - volume.rgb.data()) / 3)].has_value()) absent += 3;
+  const RenderOptions options{.width = 320, .height = 320, .angles = kFront};
+  const Image dark = RenderVolume(volume, options);
+  absent[0] = absent[1] = absent[2] = 255;
+  EXPECT_EQ(RenderVolume(volume, options).rgb, dark.rgb);
+  absent[3] = absent[4] = absent[5] = 255;  // its neighbour is there
+  EXPECT_NE(RenderVolume(volume, options).rgb, dark.rgb);
+}
 
 TEST(CheckVolume, RefusesWhatDoesNotFit) {
   Volume volume = Stack();
@@ -215,6 +253,50 @@ TEST(ContactSheet, ShowsEverySliceUpright) {
     const uint8_t* p = sheet.rgb.data() + (static_cast<size_t>(y) * sheet.width + x) * 3;
     EXPECT_EQ(p[0], 255) << s;
     EXPECT_EQ(p[1], s + 1);
+  }
+}
+
+TEST(ContactSheet, FoldsALatticesRowsIntoSquares) {
+  // 6 slices of 10 lights: rows of 4, 4 and 2, each light 8·8 pixels.
+  display::Lattice lattice;
+  lattice.width_px = 10;
+  for (int n = 0; n < 60; ++n) lattice.points_mm.push_back(display::Vec3{n * 1.0, 0, 0});
+  Volume volume = Empty({.shape = lattice, .grid = {}}, 10, 1);
+  ASSERT_THAT(CheckVolume(volume), IsOk());
+  for (int s = 0; s < 6; ++s) PixelOf(&volume, s, 6, 0)[1] = static_cast<uint8_t>(100 + s);
+  const Image sheet = ContactSheet(volume);
+  ASSERT_EQ(sheet.rgb.size(), static_cast<size_t>(sheet.width) * sheet.height * 3);
+  const int columns = (sheet.width - 2) / 34;
+  ASSERT_EQ(sheet.width, 2 + columns * 34);
+  for (int s = 0; s < 6; ++s) {
+    int lit = 0;
+    for (int y = 0; y < 24; ++y) {
+      for (int x = 0; x < 32; ++x) {
+        const int left = 2 + s % columns * 34 + x, top = 2 + s / columns * 26 + y;
+        const uint8_t* p = sheet.rgb.data() + (static_cast<size_t>(top) * sheet.width + left) * 3;
+        // Light 6 is the third of the middle row.
+        const bool of_light = x / 8 == 2 && y / 8 == 1;
+        EXPECT_EQ(p[1], of_light ? 100 + s : 0) << s << ": " << x << ", " << y;
+        lit += p[1] > 0 ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(lit, 64);
+  }
+}
+
+TEST(ContactSheet, OfALargeLatticeStaysInBounds) {
+  display::Lattice lattice;
+  lattice.width_px = 1;
+  for (int n = 0; n < 16384; ++n) lattice.points_mm.push_back(display::Vec3{n * 1.0, 0, 0});
+  for (const int width : {1, 16384}) {
+    lattice.width_px = width;
+    Volume volume = Empty({.shape = lattice, .grid = {}}, width, 1);
+    ASSERT_THAT(CheckVolume(volume), IsOk());
+    const Image sheet = ContactSheet(volume);
+    EXPECT_LE(sheet.width, 2048);
+    EXPECT_LE(sheet.height, 2048);
+    EXPECT_GE(sheet.width, 512);
+    EXPECT_GE(sheet.height, 512);
   }
 }
 

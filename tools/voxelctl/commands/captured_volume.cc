@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "display/geometry/limits.h"
 #include "tools/voxelctl/render/render_volume.h"
 
 namespace voxeld::voxelctl {
@@ -41,6 +42,34 @@ display::Rotor FromWire(const v1::Rotor& in) {
   return out;
 }
 
+// Looks at sizes before it takes memory: a short message may name many pixels without a light.
+absl::StatusOr<display::Lattice> FromWire(const v1::Lattice& in) {
+  const int64_t pixels = int64_t{in.slices()} * in.width_px();
+  const int lights = in.pixels_size();
+  if (in.width_px() < 1 || in.slices() < 1 || pixels > display::kMaxLatticePixels) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the server sent a lattice of ", in.slices(), " slices of ", in.width_px(),
+                     " pixels; at most ", display::kMaxLatticePixels, " together are taken"));
+  }
+  if (in.x_mm_size() != lights || in.y_mm_size() != lights || in.z_mm_size() != lights) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the server sent a lattice of ", lights, " lights with ", in.x_mm_size(), ", ",
+        in.y_mm_size(), " and ", in.z_mm_size(), " coordinates; each has one along x, y and z"));
+  }
+  display::Lattice out;
+  out.width_px = in.width_px();
+  out.cell_mm = FromWire(in.cell_mm());
+  out.points_mm.resize(static_cast<size_t>(pixels));
+  for (int n = 0; n < lights; ++n) {
+    if (in.pixels(n) >= pixels) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "the server sent a lattice of ", pixels, " pixels with a light in pixel ", in.pixels(n)));
+    }
+    out.points_mm[in.pixels(n)] = {in.x_mm(n), in.y_mm(n), in.z_mm(n)};
+  }
+  return out;
+}
+
 }  // namespace
 
 absl::StatusOr<display::Geometry> GeometryFromWire(const v1::Geometry& in) {
@@ -52,6 +81,12 @@ absl::StatusOr<display::Geometry> GeometryFromWire(const v1::Geometry& in) {
     case v1::Geometry::kRotor:
       out.shape = FromWire(in.rotor());
       break;
+    case v1::Geometry::kLattice: {
+      absl::StatusOr<display::Lattice> lattice = FromWire(in.lattice());
+      if (!lattice.ok()) return lattice.status();
+      out.shape = *std::move(lattice);
+      break;
+    }
     case v1::Geometry::SHAPE_NOT_SET:
       return absl::InvalidArgumentError(
           "the display's geometry is of a kind that this voxelctl does not know");

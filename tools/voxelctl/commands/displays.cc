@@ -23,6 +23,9 @@ std::string ShapeText(const v1::Geometry& geometry) {
     case v1::Geometry::kRotor:
       return absl::StrCat("rotor, ", geometry.rotor().panels_size(),
                           geometry.rotor().panels_size() == 1 ? " panel" : " panels");
+    case v1::Geometry::kLattice:
+      return absl::StrCat("lattice, ", geometry.lattice().pixels_size(),
+                          geometry.lattice().pixels_size() == 1 ? " light" : " lights");
     case v1::Geometry::SHAPE_NOT_SET:
       return "unknown";
   }

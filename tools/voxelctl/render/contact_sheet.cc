@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <variant>
 
 #include "tools/voxelctl/render/render_volume.h"
 
@@ -16,9 +19,30 @@ int Columns(const Volume& volume, int cell_width, int cell_height) {
   return std::clamp(static_cast<int>(std::lround(columns)), 1, volume.slices);
 }
 
-}  // namespace
+// A lattice's slices as pictures that are about square, each light a square too.
+Volume Folded(const Volume& volume) {
+  constexpr double kPixelsWanted = 1 << 20;
+  const double lights = static_cast<double>(volume.slices) * volume.width;
+  const int side = std::clamp(static_cast<int>(std::sqrt(kPixelsWanted / lights)), 1, 8);
+  const int columns = static_cast<int>(std::ceil(std::sqrt(volume.width)));
+  Volume folded;
+  folded.slices = volume.slices;
+  folded.width = columns * side;
+  folded.height = (volume.width + columns - 1) / columns * side;
+  folded.rgb.resize(folded.slice_bytes() * static_cast<size_t>(folded.slices));
+  uint8_t* out = folded.rgb.data();
+  for (int slice = 0; slice < folded.slices; ++slice) {
+    for (int v = 0; v < folded.height; ++v) {
+      for (int u = 0; u < folded.width; ++u, out += 3) {
+        const int light = v / side * columns + u / side;
+        if (light < volume.width) std::copy_n(volume.pixel(slice, light, 0), 3, out);
+      }
+    }
+  }
+  return folded;
+}
 
-Image ContactSheet(const Volume& volume) {
+Image SheetOf(const Volume& volume) {
   int shrink = 1, cell_width = 0, cell_height = 0, columns = 0, rows = 0;
   Image image;
   for (;; ++shrink) {
@@ -54,6 +78,13 @@ Image ContactSheet(const Volume& volume) {
     }
   }
   return image;
+}
+
+}  // namespace
+
+Image ContactSheet(const Volume& volume) {
+  const bool lattice = std::holds_alternative<display::Lattice>(volume.geometry.shape);
+  return lattice ? SheetOf(Folded(volume)) : SheetOf(volume);
 }
 
 }  // namespace voxeld::voxelctl

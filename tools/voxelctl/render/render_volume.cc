@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -18,6 +20,7 @@ using display::Vec3;
 constexpr int kSupersampling = 2;
 constexpr double kFarBrightness = 0.22;  // at depth 1; 1 at depth 0
 constexpr double kCellSize = 1.30;       // so that neighbouring cells close up
+constexpr double kBallSize = 0.30;       // a lattice's light, in the least side of its cell
 constexpr double kLeastRadius = 1.1;     // of a splat, in elements
 constexpr Light kOutline = {0.050f, 0.075f, 0.115f};
 constexpr int kRingSteps = 96;
@@ -83,6 +86,23 @@ class Painter {
       const double s = static_cast<double>(i) / 255;
       linear_[i] =
           static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
+    }
+  }
+
+  // Lights of a lattice are points: each a small ball, whatever lies beside it.
+  void PaintLights(const display::Lattice& lattice) {
+    const double radius =
+        kBallSize * std::min({lattice.cell_mm.x, lattice.cell_mm.y, lattice.cell_mm.z});
+    const std::array<Vec3, 3> axes = {camera_.Rotate({radius, 0, 0}),
+                                      camera_.Rotate({0, radius, 0}),
+                                      camera_.Rotate({0, 0, radius})};
+    for (int32_t slice = 0; slice < volume_.slices; ++slice) {
+      for (int32_t u = 0; u < volume_.width; ++u) {
+        const uint8_t* pixel = volume_.pixel(slice, u, 0);
+        const Vec3 at = display::PixelPosition(volume_.geometry, slice, u, 0);
+        if ((pixel[0] | pixel[1] | pixel[2]) == 0 || std::isnan(at.x)) continue;
+        PaintCell(camera_.ToCamera(at), axes, pixel, 1);
+      }
     }
   }
 
@@ -204,15 +224,9 @@ absl::Status CheckVolume(const Volume& volume) {
   absl::Status status = display::ValidateGeometry(volume.geometry);
   if (!status.ok()) return status;
   const int32_t slices = display::SliceCount(volume.geometry);
-  int32_t width = 0, height = 0;
-  if (const auto* rotor = std::get_if<display::Rotor>(&volume.geometry.shape)) {
-    width = rotor->width_px;
-    height = rotor->height_px;
-  } else {
-    const auto& stack = std::get<display::PlanarStack>(volume.geometry.shape);
-    width = stack.width_px;
-    height = stack.height_px;
-  }
+  const auto [width, height] =
+      std::visit([](const auto& shape) { return std::pair(shape.width_px, shape.height_px); },
+                 volume.geometry.shape);
   if (volume.slices != slices || volume.width != width || volume.height != height) {
     return absl::InvalidArgumentError(absl::StrCat(
         "the volume has ", volume.slices, " slices of ", volume.width, "x", volume.height,
@@ -234,8 +248,12 @@ Image RenderVolume(const Volume& volume, const RenderOptions& options) {
   const Camera camera(options.angles, corners, width, height);
   Canvas canvas(width, height);
   Painter painter(volume, camera, &canvas);
-  for (int32_t slice = 0; slice < volume.slices; ++slice) {
-    for (int32_t u = 0; u < volume.width; ++u) painter.PaintColumn(slice, u);
+  if (const auto* lattice = std::get_if<display::Lattice>(&volume.geometry.shape)) {
+    painter.PaintLights(*lattice);
+  } else {
+    for (int32_t slice = 0; slice < volume.slices; ++slice) {
+      for (int32_t u = 0; u < volume.width; ++u) painter.PaintColumn(slice, u);
+    }
   }
   DrawOutline(outline, camera, &canvas);
   DrawAxes(camera, width, height, &canvas);

@@ -1,0 +1,30 @@
+// What the oracle's pixels stand for. A stack's and a rotor's footprints are display/geometry's, which
+// has an oracle of its own; a lattice's are found here once more, voxel by voxel.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "display/geometry/footprint.h"
+#include "gpu/engine.h"
+
+namespace voxeld::gpu::conformance {
+
+struct OracleVoxel {
+  int32_t x, y, z;
+  uint32_t weight;
+};
+
+class OracleFootprints {
+ public:
+  explicit OracleFootprints(const Target& target);
+  std::vector<OracleVoxel> Of(int32_t slice, int32_t u, int32_t v) const;
+
+ private:
+  std::vector<OracleVoxel> OfLight(int32_t slice, int32_t u) const;
+
+  const Target& target_;
+  display::FootprintTable table_;  // empty for a lattice
+};
+
+}  // namespace voxeld::gpu::conformance
