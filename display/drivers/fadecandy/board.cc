@@ -21,18 +21,17 @@ constexpr char kUnplugged[] = "it was unplugged";
 
 }  // namespace
 
-Board::Board(std::unique_ptr<UsbTransport> transport, std::string serial, size_t number,
-             sync::Clock& clock, OnBytes on_bytes)
+Board::Board(std::unique_ptr<UsbTransport> transport, std::string serial, sync::Clock& clock,
+             OnBytes on_bytes)
     : transport_(std::move(transport)),
       serial_(std::move(serial)),
-      number_(number),
       clock_(clock),
       on_bytes_(std::move(on_bytes)) {}
 
 std::string Board::Name() const {
-  const std::string serial = serial_.empty() ? transport_->identity().serial : serial_;
-  if (serial.empty()) return absl::StrCat("board ", number_);
-  return absl::StrCat("board ", number_, " (serial ", absl::CHexEscape(serial), ")");
+  const std::string serial = Serial();
+  if (serial.empty()) return absl::StrCat("board ", slice_ + 1);
+  return absl::StrCat("board ", slice_ + 1, " (serial ", absl::CHexEscape(serial), ")");
 }
 
 absl::Status Board::Open() {
@@ -126,7 +125,7 @@ void Board::Compose() {
     }
     if (in_flight_.lut) AppendLut(buffer_, *lut_);
   }
-  on_bytes_(buffer_, video);
+  on_bytes_(*this, buffer_, video);
 }
 
 void Board::SubmitBulk() {

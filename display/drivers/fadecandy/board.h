@@ -23,13 +23,20 @@ namespace voxeld::display::fadecandy {
 class Board {
  public:
   // Every byte that is handed to the transport, just before it is; `video`: of Load and Show.
-  using OnBytes = std::function<void(std::span<const std::byte> bytes, bool video)>;
+  using OnBytes =
+      std::function<void(const Board& board, std::span<const std::byte> bytes, bool video)>;
 
-  // `number` counts the display's boards from 1.
-  Board(std::unique_ptr<UsbTransport> transport, std::string serial, size_t number,
-        sync::Clock& clock, OnBytes on_bytes);
+  // `serial`: the number that `transport` looks for; empty: any.
+  Board(std::unique_ptr<UsbTransport> transport, std::string serial, sync::Clock& clock,
+        OnBytes on_bytes);
 
   UsbTransport& transport() { return *transport_; }
+  // As asked for, or as the board that was opened says it.
+  std::string Serial() const { return serial_.empty() ? transport_->identity().serial : serial_; }
+  bool any_serial() const { return serial_.empty(); }
+  // Its place among the display's boards, from 0.
+  size_t slice() const { return slice_; }
+  void set_slice(size_t slice) { slice_ = slice; }
   // "board 2 (serial ENICCULV)"; safe to print.
   std::string Name() const;
 
@@ -89,7 +96,7 @@ class Board {
 
   const std::unique_ptr<UsbTransport> transport_;
   const std::string serial_;
-  const size_t number_;
+  size_t slice_ = 0;
   sync::Clock& clock_;
   const OnBytes on_bytes_;
   std::string failure_;

@@ -17,10 +17,12 @@ constexpr double kLongestFade = 2;
 FadecandyDisplay::FadecandyDisplay(DisplayInfo info, Settings settings, std::vector<Wire> wires,
                                    sync::Clock& clock)
     : Display(std::move(info), clock), settings_(settings) {
-  for (size_t i = 0; i < wires.size(); ++i) {
-    boards_.push_back(std::make_unique<Board>(
-        std::move(wires[i].transport), std::move(wires[i].serial), i + 1, clock,
-        [this, i](std::span<const std::byte> bytes, bool video) { OnBytes(i, bytes, video); }));
+  for (Wire& wire : wires) {
+    boards_.push_back(
+        std::make_unique<Board>(std::move(wire.transport), std::move(wire.serial), clock,
+                                [this](const Board& board, std::span<const std::byte> bytes,
+                                       bool video) { OnBytes(board, bytes, video); }));
+    boards_.back()->set_slice(boards_.size() - 1);
   }
 }
 
@@ -92,11 +94,11 @@ sync::TimeNs FadecandyDisplay::Pump() {
   return next;
 }
 
-void FadecandyDisplay::OnBytes(size_t board, std::span<const std::byte> bytes, bool video) {
+void FadecandyDisplay::OnBytes(const Board& board, std::span<const std::byte> bytes, bool video) {
   mutable_stats().bytes_out += bytes.size();
   if (!video) return;
   sending_.bytes += bytes.size();
-  TapOut(kBulkOut, bytes, board);
+  TapOut(kBulkOut, bytes, board.slice());
 }
 
 // ---- attach: docs/protocols/fadecandy.md §10
@@ -106,6 +108,7 @@ void FadecandyDisplay::TryAttach(sync::TimeNs now) {
     const absl::Status status = board->Open();
     if (!status.ok()) return Detach(now, absl::StrCat(board->Name(), ": ", status.message()));
   }
+  Sort();
   phase_ = Phase::kSettingUp;
   complete_frame_ = 0;
   whole_ = !had_frame_;
@@ -115,6 +118,14 @@ void FadecandyDisplay::TryAttach(sync::TimeNs now) {
     if (!had_frame_) board->Blacken();
   }
   SetLuts(brightness());
+}
+
+void FadecandyDisplay::Sort() {
+  const auto any = [](const auto& board) { return board->any_serial(); };
+  if (!std::all_of(boards_.begin(), boards_.end(), any)) return;
+  std::stable_sort(boards_.begin(), boards_.end(),
+                   [](const auto& a, const auto& b) { return a->Serial() < b->Serial(); });
+  for (size_t b = 0; b < boards_.size(); ++b) boards_[b]->set_slice(b);
 }
 
 void FadecandyDisplay::SetLuts(double brightness) {

@@ -51,8 +51,11 @@ class FadecandyDisplay final : public Display {
   absl::Status DoSetBlank(bool blank) override;
   std::unique_ptr<WireDecoder> DoMakeDecoder() const override;
 
-  void OnBytes(size_t board, std::span<const std::byte> bytes, bool video);
+  void OnBytes(const Board& board, std::span<const std::byte> bytes, bool video);
   void TryAttach(sync::TimeNs now);
+  // Boards of which any would do are slices in ascending order of serial number, however the bus
+  // handed them out.
+  void Sort();
   void Detach(sync::TimeNs now, const std::string& reason);
   // A failed board takes the display along.
   void CheckBoards(sync::TimeNs now);
@@ -63,7 +66,7 @@ class FadecandyDisplay final : public Display {
   void SetLuts(double brightness);
 
   const Settings settings_;
-  std::vector<std::unique_ptr<Board>> boards_;
+  std::vector<std::unique_ptr<Board>> boards_;  // a slice each
   Phase phase_ = Phase::kDetached;
   sync::TimeNs attach_at_ = 0;
   sync::TimeNs failed_at_ = 0;

@@ -208,10 +208,11 @@ absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, int32_t boards, do
   };
   const auto pixels = static_cast<int64_t>(lattice.points_mm.size());
   if (pixel_of(lights - 1) >= pixels) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "a cube of ", wiring.size[0], "x", wiring.size[1], "x", wiring.size[2], " lights, ",
-        wiring.per_strip, " on a strip, from pixel ", wiring.first, " on, ends at pixel ",
-        pixel_of(lights - 1), "; ", boards, " boards have pixels 0 to ", pixels - 1));
+    return absl::InvalidArgumentError(
+        absl::StrCat("a cube of ", wiring.size[0], "x", wiring.size[1], "x", wiring.size[2],
+                     " lights, ", wiring.per_strip, " on a strip, from pixel ", wiring.first,
+                     " on, ends at pixel ", pixel_of(lights - 1), "; the last one there is, with ",
+                     kPixels, " a board, is ", pixels - 1));
   }
   for (int64_t light = 0; light < lights; ++light) {
     const int64_t index = wiring.reverse ? lights - 1 - light : light;
@@ -230,9 +231,9 @@ absl::StatusOr<Lattice> ParseLayout(std::string_view json, int32_t boards, doubl
   }
   Lattice lattice = EmptyLattice(boards, pitch_mm);
   if (entries.size() > lattice.points_mm.size()) {
-    return absl::InvalidArgumentError(absl::StrCat("it has ", entries.size(), " entries; ", boards,
-                                                   " boards have ", lattice.points_mm.size(),
-                                                   " pixels"));
+    return absl::InvalidArgumentError(absl::StrCat("it has ", entries.size(),
+                                                   " entries; there are ", lattice.points_mm.size(),
+                                                   " pixels, ", kPixels, " a board"));
   }
   for (size_t i = 0; i < entries.size(); ++i) {
     absl::StatusOr<std::optional<Vec3>> point = ParsePoint(i, entries[i], pitch_mm);

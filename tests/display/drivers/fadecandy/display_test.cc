@@ -369,6 +369,29 @@ TEST_F(Fadecandy, SurvivesReplugsInQuickSuccession) {
   }
 }
 
+// Whichever the bus hands out first: slices are in ascending order of serial.
+TEST_F(Fadecandy, BoardsWithoutAnOrderOfTheirOwnAreSorted) {
+  rig_ = std::make_unique<FadecandyRig>(3, FadecandyRig::Straight(), true);
+  source_ = std::make_unique<FrameSource>(rig_->display().info().layout, 1);
+  rig_->Start();
+  Submit();
+  ASSERT_TRUE(rig_->RunUntilOutcome(1));
+  rig_->RunFor(2 * kRefresh);
+  for (size_t device = 0; device < 3; ++device) {  // Z, Y, X
+    const int lit = rig_->device(device).Output()[0];
+    const int wanted = std::to_integer<int>(frame_->bytes[(2 - device) * kFrameBytes]);
+    EXPECT_EQ(lit, wanted < 128 ? wanted : wanted + 1);
+  }
+  std::optional<absl::StatusOr<DecodedVolume>> captured;
+  rig_->display().Capture(kSecond,
+                          [&](absl::StatusOr<DecodedVolume> v) { captured = std::move(v); });
+  ASSERT_TRUE(rig_->RunUntil([&] { return captured.has_value(); }));
+  EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*frame_));
+  rig_->SetPlugged(2, false);
+  rig_->RunFor(550 * kMillisecond);
+  EXPECT_EQ(rig_->display().state_reason(), "board 1 (serial X): it was unplugged");
+}
+
 // ---- transfers that fail
 
 TEST_F(Fadecandy, AStallIsClearedAndTheFrameGoesAgain) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "display/drivers/fadecandy/fadecandy.h"
 #include "gtest/gtest.h"
 
 namespace voxeld::display::fadecandy {
@@ -11,7 +13,7 @@ FadecandyDisplay::Settings FadecandyRig::Straight() {
   return {.curve = {.gamma = 1}, .flags = kNoDither | kNoInterpolation};
 }
 
-FadecandyRig::FadecandyRig(size_t boards, FadecandyDisplay::Settings settings) {
+FadecandyRig::FadecandyRig(size_t boards, FadecandyDisplay::Settings settings, bool any_serial) {
   DisplayInfo info;
   info.name = "rig";
   info.driver = "fadecandy";
@@ -19,7 +21,8 @@ FadecandyRig::FadecandyRig(size_t boards, FadecandyDisplay::Settings settings) {
   info.volumes_per_second = 60;
   std::vector<FadecandyDisplay::Wire> wires;
   for (size_t i = 0; i < boards; ++i) {
-    const std::string serial(1, static_cast<char>('A' + i));
+    const auto step = static_cast<int>(i);
+    const std::string serial(1, static_cast<char>(any_serial ? 'Z' - step : 'A' + step));
     auto device = std::make_unique<emulator::FadecandyDevice>(
         emulator::FadecandyDeviceConfig{.serial = serial, .refresh_ns = kRefresh}, clock_);
     BoardParts parts{.device = device.get()};
@@ -31,7 +34,7 @@ FadecandyRig::FadecandyRig(size_t boards, FadecandyDisplay::Settings settings) {
     options.identity.serial = serial;
     auto transport = std::make_unique<InProcessTransport>(std::move(faults), clock_, options);
     parts.transport = transport.get();
-    wires.push_back({std::move(transport), serial});
+    wires.push_back({std::move(transport), any_serial ? "" : serial});
     boards_.push_back(parts);
   }
   display_ =
@@ -103,6 +106,18 @@ bool FadecandyRig::Sees(const SliceFrame& frame) const {
 bool FadecandyRig::IsDark(size_t board) const {
   const auto output = boards_[board].device->Output();
   return std::all_of(output.begin(), output.end(), [](uint8_t value) { return value == 0; });
+}
+
+absl::StatusOr<std::unique_ptr<Display>> CreateEmulated(const DisplayOptions& options,
+                                                        sync::Clock& clock) {
+  return CreateOver(options, clock, [&](const std::string& serial, size_t index) {
+    InProcessTransport::Options carrier;
+    carrier.identity.serial = serial.empty() ? absl::StrCat("SIMULATED", index) : serial;
+    return std::make_unique<InProcessTransport>(
+        std::make_unique<emulator::FadecandyDevice>(
+            emulator::FadecandyDeviceConfig{.serial = carrier.identity.serial}, clock),
+        clock, carrier);
+  });
 }
 
 }  // namespace voxeld::display::fadecandy

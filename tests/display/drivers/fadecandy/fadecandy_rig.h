@@ -22,8 +22,9 @@ class FadecandyRig {
   // Light as straight as it can be: no gamma, no dither, no interpolation.
   static FadecandyDisplay::Settings Straight();
 
-  // Boards with serials "A", "B", … and displays of 60 volumes/s.
-  explicit FadecandyRig(size_t boards = 1, FadecandyDisplay::Settings settings = Straight());
+  // Boards with serials "A", "B", … in a display of 60 volumes/s; or, if it takes any, "Z", "Y", ….
+  explicit FadecandyRig(size_t boards = 1, FadecandyDisplay::Settings settings = Straight(),
+                        bool any_serial = false);
   ~FadecandyRig();
 
   Display& display() { return *display_; }
@@ -65,5 +66,9 @@ class FadecandyRig {
   sync::TimeNs next_tick_ = 0;
   sync::TimeNs next_pump_ = 0;
 };
+
+// A display from options, and its boards, with threads of their own.
+absl::StatusOr<std::unique_ptr<Display>> CreateEmulated(const DisplayOptions& options,
+                                                        sync::Clock& clock);
 
 }  // namespace voxeld::display::fadecandy

@@ -172,8 +172,8 @@ TEST(FadecandyLayout, ACubeOverTwoBoards) {
   EXPECT_EQ(lattice->points_mm.size(), 1024u);
   EXPECT_EQ(Points(*lattice, 512, 1), "-3.5,-3.5,0.5");
   EXPECT_EQ(Refusal({{"cube", "8x8x17"}}, 2),
-            "a cube of 8x8x17 lights, 64 on a strip, from pixel 0 on, ends at pixel 1087; 2 boards "
-            "have pixels 0 to 1023");
+            "a cube of 8x8x17 lights, 64 on a strip, from pixel 0 on, ends at pixel 1087; the last "
+            "one there is, with 512 a board, is 1023");
   EXPECT_NE(Refusal({{"first", "1"}}).find("ends at pixel 512"), std::string::npos);
   EXPECT_NE(Refusal({{"cube", "16384x16384x16384"}}).find("16384x16384"), std::string::npos);
 }
@@ -231,7 +231,7 @@ TEST(FadecandyLayout, BadFilesAreToldWhatIsRight) {
             "entries 0 and 2 are both at 1, 2, 3 mm; each light must have a place of its own");
   std::string many = "[null";
   for (int i = 0; i < 512; ++i) many += ",null";
-  EXPECT_EQ(Wrong(many + "]"), "it has 513 entries; 1 boards have 512 pixels");
+  EXPECT_EQ(Wrong(many + "]"), "it has 513 entries; there are 512 pixels, 512 a board");
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
   EXPECT_NE(Wrong("[" + deep + "]").find("entry 0 is nested"), std::string::npos);
 }
