@@ -20,12 +20,17 @@ namespace {
 
 using Kind = VolumeOutcome::Kind;
 
+absl::StatusOr<std::unique_ptr<Display>> CreateByName(const DisplayOptions& options,
+                                                      sync::Clock& clock) {
+  return CreateDisplay(options, clock);
+}
+
 struct DriverCase {
   std::string name;
   DisplayOptions options;
   bool predicts_sweeps = true;
   absl::StatusOr<std::unique_ptr<Display>> (*create)(const DisplayOptions&,
-                                                     sync::Clock&) = &CreateDisplay;
+                                                     sync::Clock&) = &CreateByName;
 };
 std::ostream& operator<<(std::ostream& out, const DriverCase& c) { return out << c.name; }
 
