@@ -129,6 +129,7 @@ void FadecandyDisplay::Sort() {
 }
 
 void FadecandyDisplay::SetLuts(double brightness) {
+  lut_brightness_ = brightness;
   const auto lut = std::make_shared<const Lut>(
       MakeLut(settings_.curve, dark_ ? 0 : brightness * settings_.full_brightness));
   for (const auto& board : boards_) board->SetLut(lut);
@@ -180,6 +181,11 @@ void FadecandyDisplay::Advance() {
       std::all_of(boards_.begin(), boards_.end(), [](const auto& b) { return b->set_up(); })) {
     phase_ = Phase::kReady;
     ++mutable_stats().attaches;
+    // What was asked for while the boards were set up.
+    if (brightness() != lut_brightness_ || blanked() != dark_) {
+      dark_ = blanked() || !whole_;
+      SetLuts(brightness());
+    }
     Attached();
   }
   if (sending_.frame == nullptr) return;

@@ -77,7 +77,8 @@ class FadecandyDisplay final : public Display {
   bool had_frame_ = false;       // a volume was begun since Start
   // All boards hold one picture: a volume of this session, or black.
   bool whole_ = false;
-  bool dark_ = false;  // the boards' table is that of darkness
+  bool dark_ = false;          // the boards' table is that of darkness
+  double lut_brightness_ = 1;  // for which it was made
 };
 
 }  // namespace voxeld::display::fadecandy

@@ -209,6 +209,38 @@ TEST_F(Fadecandy, BlankedInMidVolume) {
   EXPECT_TRUE(rig_->Sees(*frame_));
 }
 
+TEST_F(Fadecandy, WhatIsAskedForDuringSetUpHolds) {
+  Start(2);
+  Show();
+  for (const bool blank : {true, false}) {
+    rig_->SetPlugged(1, false);
+    rig_->RunFor(kSecond);
+    Break(1, Fault::What::kNak, 200 * kMillisecond);
+    rig_->SetPlugged(1, true);
+    rig_->RunFor(100 * kMillisecond);
+    EXPECT_EQ(state(), DisplayState::kLost);  // being set up
+    ASSERT_TRUE(rig_->display().SetBlank(blank).ok());
+    rig_->RunFor(2 * kSecond);
+    EXPECT_EQ(rig_->transport(0).is_open(), true);
+    if (blank) {
+      EXPECT_EQ(state(), DisplayState::kBlanked);
+      EXPECT_TRUE(rig_->IsDark(0) && rig_->IsDark(1));
+    } else {
+      EXPECT_EQ(state(), DisplayState::kShowing);
+      EXPECT_TRUE(rig_->Sees(*frame_));
+    }
+  }
+  rig_->SetPlugged(1, false);
+  rig_->RunFor(kSecond);
+  Break(1, Fault::What::kNak, 200 * kMillisecond);
+  rig_->SetPlugged(1, true);
+  rig_->RunFor(100 * kMillisecond);
+  ASSERT_TRUE(rig_->display().SetBrightness(0).ok());
+  rig_->RunFor(2 * kSecond);
+  EXPECT_EQ(state(), DisplayState::kShowing);
+  EXPECT_TRUE(rig_->IsDark(0) && rig_->IsDark(1));
+}
+
 // A board that stayed lights what it had: it stays dark until all have the volume again.
 TEST_F(Fadecandy, LightAfterALossInTheDarkIsWhole) {
   Start(2);
