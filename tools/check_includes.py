@@ -17,7 +17,8 @@ ALLOWED = {
                          # The protocol's words, shared by both ends; never the driver.
                          "display/drivers/voxlink/protocol", "display/drivers/voxlink/packet",
                          "display/drivers/voxlink/assembler", "display/drivers/voxlink/capabilities",
-                         "display/drivers/voxlink/decoder"],
+                         "display/drivers/voxlink/decoder",
+                         "display/drivers/fadecandy/protocol"],
     "display/drivers": ["display/api", "display/crc", "display/sync", "display/usb", "display/geometry"],
     # The one driver whose device is not on a bus: it brings its model and carrier along.
     "display/drivers/simulated": ["display"],

@@ -257,9 +257,9 @@ void Display::FrameLost(const std::string& reason, uint64_t bytes) {
   SendNext();
 }
 
-void Display::TapOut(uint8_t endpoint, std::span<const std::byte> bytes) {
+void Display::TapOut(uint8_t endpoint, std::span<const std::byte> bytes, size_t device) {
   if (decoder_ == nullptr || !decoder_status_.ok()) return;
-  decoder_status_ = decoder_->OnBytes(endpoint, bytes);
+  decoder_status_ = decoder_->OnBytes(endpoint, bytes, device);
 }
 
 void Display::SetState(DisplayState state, const std::string& reason) {

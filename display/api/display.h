@@ -9,6 +9,7 @@
 // driver implements the protected Do… functions.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -69,8 +70,10 @@ struct DecodedVolume {
 class WireDecoder {
  public:
   virtual ~WireDecoder() = default;
-  // `endpoint` as on the wire. An error means that the bytes break the protocol.
-  virtual absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes) = 0;
+  // `endpoint` as on the wire; `device` counts those of a display that has several, else 0. An error
+  // means that the bytes break the protocol.
+  virtual absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes,
+                               size_t device) = 0;
   // The newest complete volume, once; nothing if none was completed since the last call.
   virtual std::optional<DecodedVolume> TakeVolume() = 0;
 };
@@ -170,7 +173,7 @@ class Display {
                  uint64_t bytes);
   void FrameLost(const std::string& reason, uint64_t bytes);
   // Every outgoing byte of a volume.
-  void TapOut(uint8_t endpoint, std::span<const std::byte> bytes);
+  void TapOut(uint8_t endpoint, std::span<const std::byte> bytes, size_t device = 0);
   bool tapped() const { return decoder_ != nullptr; }
   // Any thread.
   void Wake() const {

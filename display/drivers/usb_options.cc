@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/strings/numbers.h"
+#include "display/usb/recording_transport.h"
 
 namespace voxeld::display {
 namespace {
@@ -31,6 +35,23 @@ UsbMatch ReadUsbMatch(OptionReader& reader) {
   match.serial = reader.Text("serial", "");
   match.path = reader.Text("path", "");
   return match;
+}
+
+std::string ReadUsbRecord(OptionReader& reader) { return reader.Text("record", ""); }
+
+absl::StatusOr<std::unique_ptr<UsbTransport>> MakeUsbTransport(const UsbOptions& options,
+                                                               const std::string& display,
+                                                               const DriverContext& context) {
+  const absl::StatusOr<UsbBus*> usb = context.usb();
+  if (!usb.ok()) return usb.status();
+  std::unique_ptr<UsbTransport> transport = (*usb)->MakeTransport(options.match);
+  if (options.record.empty()) return transport;
+  const auto wall = std::chrono::system_clock::now().time_since_epoch();
+  return RecordToFile(options.record, std::move(transport), context.clock,
+                      {.name = display,
+                       .limits = {},
+                       .transport = {.wall_offset_ns = std::chrono::nanoseconds(wall).count() -
+                                                       context.clock.Now()}});
 }
 
 }  // namespace voxeld::display

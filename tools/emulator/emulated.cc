@@ -1,8 +1,10 @@
 #include "tools/emulator/emulated.h"
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -10,11 +12,13 @@
 #include "absl/strings/str_split.h"
 #include "display/crc/crc32c.h"
 #include "display/drivers/simulated/emulated_device.h"
+#include "display/emulator/fadecandy_device.h"
 #include "display/emulator/voxlink_device.h"
 
 namespace voxeld::emulator {
 namespace {
 
+using display::emulator::FadecandyDevice;
 using display::emulator::FaultInjector;
 using display::emulator::VoxlinkDevice;
 
@@ -40,6 +44,51 @@ std::string VoxlinkStatus(const VoxlinkDevice& device) {
   return json.dump();
 }
 
+std::string FadecandyStatus(const FadecandyDevice& device) {
+  const std::span<const uint8_t> light = device.Output();
+  return nlohmann::json{
+      {"plugged", device.plugged()},
+      {"plugs", device.plugs()},
+      {"lit", std::any_of(light.begin(), light.end(), [](uint8_t value) { return value != 0; })},
+      {"packets", device.packets()},
+      {"short_packets", device.short_packets()},
+      {"light_crc32c", absl::StrFormat("%08x", display::Crc32c(std::as_bytes(light)))},
+  }
+      .dump();
+}
+
+template <typename Device>
+Emulated Wrapped(std::unique_ptr<Device> device, std::string (*status)(const Device&),
+                 const display::emulator::FaultPlan& plan, sync::Clock& clock) {
+  Emulated emulated;
+  emulated.status = [inner = device.get(), status] { return status(*inner); };
+  auto faults = std::make_unique<FaultInjector>(std::move(device), plan, clock);
+  emulated.faults = faults.get();
+  emulated.model = std::move(faults);
+  return emulated;
+}
+
+absl::StatusOr<Emulated> MakeVoxlink(const display::DisplayOptions& options, sync::Clock& clock) {
+  absl::StatusOr<display::simulated::EmulatedDevice> read =
+      display::simulated::ReadEmulatedDevice(options);
+  if (!read.ok()) return read.status();
+  return Wrapped(std::make_unique<VoxlinkDevice>(read->config, clock), &VoxlinkStatus, read->plan,
+                 clock);
+}
+
+absl::StatusOr<Emulated> MakeFadecandy(const display::DisplayOptions& options, sync::Clock& clock) {
+  display::OptionReader reader(options);
+  display::emulator::FadecandyDeviceConfig config;
+  config.serial = reader.Text("serial", config.serial);
+  config.refresh_ns =
+      static_cast<sync::TimeNs>(sync::kSecond / reader.Number("refresh", 400, 1, 1000));
+  const absl::StatusOr<display::emulator::FaultPlan> plan =
+      display::emulator::ParseFaultPlan(reader.Text("faults", ""));
+  if (!plan.ok()) reader.Refuse("faults", std::string(plan.status().message()));
+  if (absl::Status status = reader.Finish(); !status.ok()) return status;
+  return Wrapped(std::make_unique<FadecandyDevice>(config, clock), &FadecandyStatus, *plan, clock);
+}
+
 }  // namespace
 
 absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock) {
@@ -50,21 +99,10 @@ absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock)
         absl::StrSplit(parts[i], absl::MaxSplits('=', 1));
     options.options[option.first] = option.second;
   }
-  if (parts[0] != "voxlink") {
-    return absl::InvalidArgumentError(
-        absl::StrCat("there is no emulated \"", parts[0], "\"; there is voxlink"));
-  }
-  absl::StatusOr<display::simulated::EmulatedDevice> read =
-      display::simulated::ReadEmulatedDevice(options);
-  if (!read.ok()) return read.status();
-  auto device = std::make_unique<VoxlinkDevice>(read->config, clock);
-  const VoxlinkDevice* const inner = device.get();
-  auto faults = std::make_unique<FaultInjector>(std::move(device), read->plan, clock);
-  Emulated emulated;
-  emulated.faults = faults.get();
-  emulated.model = std::move(faults);
-  emulated.status = [inner] { return VoxlinkStatus(*inner); };
-  return emulated;
+  if (parts[0] == "voxlink") return MakeVoxlink(options, clock);
+  if (parts[0] == "fadecandy") return MakeFadecandy(options, clock);
+  return absl::InvalidArgumentError(
+      absl::StrCat("there is no emulated \"", parts[0], "\"; there are fadecandy and voxlink"));
 }
 
 std::string Control(Emulated& device, std::string_view line) {

@@ -22,8 +22,8 @@ struct Emulated {
   std::function<std::string()> status;
 };
 
-// "voxlink[,key=value…]" (the simulated driver's options; docs: display/drivers/simulated/README.md).
-// InvalidArgument with what is wrong. `clock` outlives what comes back.
+// "voxlink[,key=value…]" (the simulated driver's options; docs: display/drivers/simulated/README.md),
+// "fadecandy[,serial=TEXT,refresh=TIMES_A_SECOND,faults=PLAN]". InvalidArgument with what is wrong. `clock` outlives what comes back.
 absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock);
 
 // One line of the control socket, and the answer to it, without its newline:

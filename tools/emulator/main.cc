@@ -255,7 +255,8 @@ int Main(int argc, char** argv) {
   Options options;
   app.add_option("device", options.device,
                  "voxlink[,key=value…]: the simulated driver's options, such as\n"
-                 "voxlink,size=64x64x32,speed=high,pacing=link,serial=A1,faults=stall@t100")
+                 "voxlink,size=64x64x32,speed=high,pacing=link,serial=A1,faults=stall@t100; or\n"
+                 "fadecandy[,serial=TEXT,refresh=TIMES_A_SECOND,faults=PLAN]: one board")
       ->required();
   auto* attach = app.add_flag("--attach", options.attach,
                               "to this kernel's vhci_hcd; needs root and `modprobe vhci-hcd`");

@@ -10,7 +10,8 @@ namespace voxeld::display::voxlink {
 VoxlinkDecoder::VoxlinkDecoder(const FrameLayout& layout, uint32_t max_payload)
     : layout_(layout), parser_(max_payload), assembler_(layout) {}
 
-absl::Status VoxlinkDecoder::OnBytes(uint8_t endpoint, std::span<const std::byte> bytes) {
+absl::Status VoxlinkDecoder::OnBytes(uint8_t endpoint, std::span<const std::byte> bytes,
+                                     size_t /*device*/) {
   if (!status_.ok()) return status_;
   if (endpoint != kBulkOut) {
     status_ = absl::DataLossError(

@@ -19,7 +19,7 @@ class VoxlinkDecoder final : public WireDecoder, private PacketParser::Sink {
 
   // DataLoss at the first byte that breaks the protocol, and from then on. Slices may be sent again
   // after VOLUME_END (the device had lost them), and a volume may be begun again.
-  absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes) override;
+  absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes, size_t device) override;
   std::optional<DecodedVolume> TakeVolume() override;
 
  private:

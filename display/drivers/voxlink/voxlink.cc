@@ -10,14 +10,14 @@ namespace voxeld::display::voxlink {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context) {
   OptionReader reader(options);
-  UsbMatch match = ReadUsbMatch(reader);
-  match.interface = {kInterfaceClass, kInterfaceSubclass, kInterfaceProtocol};
+  UsbOptions usb{ReadUsbMatch(reader), ReadUsbRecord(reader)};
+  usb.match.interface = {kInterfaceClass, kInterfaceSubclass, kInterfaceProtocol};
   absl::StatusOr<DisplayInfo> info = ReadDisplayInfo(options, reader);
   if (!info.ok()) return info.status();
-  const absl::StatusOr<UsbBus*> usb = context.usb();
-  if (!usb.ok()) return usb.status();
-  return std::make_unique<VoxlinkDisplay>(*std::move(info), (*usb)->MakeTransport(std::move(match)),
-                                          context.clock);
+  absl::StatusOr<std::unique_ptr<UsbTransport>> transport =
+      MakeUsbTransport(usb, options.name, context);
+  if (!transport.ok()) return transport.status();
+  return std::make_unique<VoxlinkDisplay>(*std::move(info), *std::move(transport), context.clock);
 }
 
 }  // namespace voxeld::display::voxlink

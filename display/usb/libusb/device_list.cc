@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "absl/strings/numbers.h"
@@ -50,6 +51,8 @@ absl::Status Errno(const char* what) {
 
 }  // namespace
 
+namespace {
+
 bool Matches(const UsbMatch& match, const UsbDeviceEntry& device) {
   const UsbIdentity& identity = device.identity;
   return match.vendor_id.value_or(identity.vendor_id) == identity.vendor_id &&
@@ -57,6 +60,28 @@ bool Matches(const UsbMatch& match, const UsbDeviceEntry& device) {
          (match.serial.empty() || match.serial == identity.serial) &&
          (match.path.empty() || match.path == identity.path) &&
          ChooseInterface(device.interfaces, match.interface).has_value();
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<UsbDeviceEntry>> Matching(const UsbMatch& match,
+                                                     std::vector<UsbDeviceEntry> devices) {
+  std::erase_if(devices, [&](const UsbDeviceEntry& device) { return !Matches(match, device); });
+  if (devices.empty()) {
+    return absl::NotFoundError(absl::StrCat("no USB device ", match.ToString(), " is attached"));
+  }
+  if (!match.member.has_value()) return devices;
+  const auto [index, count] = *match.member;
+  if (devices.size() < count) {
+    return absl::NotFoundError(absl::StrCat("of ", count, " USB devices ", match.ToString(), ", ",
+                                            devices.size(), " are attached"));
+  }
+  const auto order = [](const UsbDeviceEntry& device) {
+    return std::tie(device.identity.serial, device.identity.path);
+  };
+  std::sort(devices.begin(), devices.end(),
+            [&](const UsbDeviceEntry& a, const UsbDeviceEntry& b) { return order(a) < order(b); });
+  return std::vector<UsbDeviceEntry>{devices[index]};
 }
 
 absl::StatusOr<std::unique_ptr<DeviceList>> DeviceList::Make() {

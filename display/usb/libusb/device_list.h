@@ -23,7 +23,9 @@ struct UsbDeviceEntry {
   std::vector<UsbInterface> interfaces;
 };
 
-bool Matches(const UsbMatch& match, const UsbDeviceEntry& device);
+// Those of `devices` that `match` means. NotFound, with what there is, if none is.
+absl::StatusOr<std::vector<UsbDeviceEntry>> Matching(const UsbMatch& match,
+                                                     std::vector<UsbDeviceEntry> devices);
 
 // Bound to no thread, but used by one at a time.
 class DeviceList {

@@ -85,12 +85,12 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& matc
   sync::MutexLock lock(list_mutex_);
   absl::StatusOr<std::vector<UsbDeviceEntry>> devices = list_->Devices();
   if (!devices.ok()) return devices.status();
-  absl::Status last =
-      absl::NotFoundError(absl::StrCat("no USB device ", match.ToString(), " is attached"));
+  devices = Matching(match, *std::move(devices));
+  if (!devices.ok()) return devices.status();
+  absl::Status last;
   for (const UsbDeviceEntry& entry : *devices) {
-    if (!Matches(match, entry)) continue;
     if (open_nodes_.contains(entry.node)) {
-      if (absl::IsNotFound(last)) {
+      if (last.ok()) {
         last = absl::NotFoundError(absl::StrCat("the USB device at ", entry.identity.path,
                                                 " belongs to another display, and no other ",
                                                 match.ToString(), " is attached"));

@@ -2,6 +2,8 @@
 
 #include <fcntl.h>
 #include <libusb-1.0/libusb.h>
+#include <linux/usbdevice_fs.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -98,6 +100,12 @@ class OpenDevice::Handle {
   Handle(const Handle&) = delete;
   Handle& operator=(const Handle&) = delete;
   libusb_device_handle* get() const { return handle_; }
+  // libusb maps the node without asking.
+  bool gives_memory() const {
+    uint32_t capabilities = 0;
+    return ioctl(node_, USBDEVFS_GET_CAPABILITIES, &capabilities) == 0 &&
+           (capabilities & USBDEVFS_CAP_MMAP) != 0;
+  }
 
  private:
   const std::shared_ptr<LibusbContext> context_;
@@ -110,6 +118,9 @@ class OpenDevice::DeviceSlabs final : public SlabMemory {
  public:
   static std::shared_ptr<SlabMemory> Make(std::shared_ptr<Handle> handle, UsbfsBudget& budget) {
     std::vector<void*> slabs;
+    if (!handle->gives_memory()) {
+      return std::make_shared<DeviceSlabs>(std::move(handle), budget, std::move(slabs));
+    }
     // The kernel counts them for as long as they are there: never more than half of what there is.
     while (slabs.size() < kSlabs && (slabs.size() + 1) * kSlabBytes <= budget.limit() / 2) {
       if (!budget.Take(kSlabBytes)) break;

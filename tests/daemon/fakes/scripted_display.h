@@ -76,7 +76,7 @@ class ScriptedDisplay final : public display::Display {
   absl::Status DoSetBlank(bool) override { return refuse_blank; }
   std::unique_ptr<display::WireDecoder> DoMakeDecoder() const override {
     struct Decoder final : display::WireDecoder {
-      absl::Status OnBytes(uint8_t, std::span<const std::byte>) override {
+      absl::Status OnBytes(uint8_t, std::span<const std::byte>, size_t) override {
         return absl::OkStatus();
       }
       std::optional<display::DecodedVolume> TakeVolume() override {

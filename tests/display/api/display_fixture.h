@@ -24,7 +24,7 @@ inline constexpr FrameLayout kLayout{.slices = 2, .width = 2, .height = 1};
 // The whole of a volume is its bytes.
 class PlainDecoder final : public WireDecoder {
  public:
-  absl::Status OnBytes(uint8_t, std::span<const std::byte> bytes) override {
+  absl::Status OnBytes(uint8_t, std::span<const std::byte> bytes, size_t) override {
     if (bytes.empty()) return absl::DataLossError("nothing");
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
     return absl::OkStatus();

@@ -12,6 +12,7 @@
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
 #include "gtest/gtest.h"
+#include "tests/display/drivers/fadecandy/fadecandy_rig.h"
 #include "tests/display/drivers/rig.h"
 
 namespace voxeld::display {
@@ -19,10 +20,17 @@ namespace {
 
 using Kind = VolumeOutcome::Kind;
 
+absl::StatusOr<std::unique_ptr<Display>> CreateByName(const DisplayOptions& options,
+                                                      sync::Clock& clock) {
+  return CreateDisplay(options, clock);
+}
+
 struct DriverCase {
   std::string name;
   DisplayOptions options;
   bool predicts_sweeps = true;
+  absl::StatusOr<std::unique_ptr<Display>> (*create)(const DisplayOptions&,
+                                                     sync::Clock&) = &CreateByName;
 };
 std::ostream& operator<<(std::ostream& out, const DriverCase& c) { return out << c.name; }
 
@@ -32,7 +40,8 @@ class DriverConformance : public testing::TestWithParam<DriverCase> {
   static constexpr sync::TimeNs kLimit = 20 * sync::kSecond;
 
   void SetUp() override {
-    absl::StatusOr<std::unique_ptr<Display>> display = CreateDisplay(GetParam().options, clock_);
+    absl::StatusOr<std::unique_ptr<Display>> display =
+        GetParam().create(GetParam().options, clock_);
     ASSERT_TRUE(display.ok()) << display.status();
     display_ = *std::move(display);
   }
@@ -199,32 +208,40 @@ TEST_P(DriverConformance, SweepsArePredicted) {
   EXPECT_NEAR(phase, std::round(phase), 0.25);
 }
 
-INSTANTIATE_TEST_SUITE_P(Drivers, DriverConformance,
-                         testing::Values(DriverCase{"SimulatedPlanar",
-                                                    {.name = "planar",
-                                                     .driver = "simulated",
-                                                     .options = {{"size", "32x32x32"}}}},
-                                         DriverCase{"SimulatedRotor",
-                                                    {.name = "rotor",
-                                                     .driver = "simulated",
-                                                     .options = {{"geometry", "rotor"},
-                                                                 {"size", "32x16"},
-                                                                 {"slices", "60"},
-                                                                 {"eccentricity", "0.5;4"},
-                                                                 {"format", "bitplanes3"},
-                                                                 {"sub_frames", "2"},
-                                                                 {"rate", "60"}}}},
-                                         DriverCase{"SimulatedSlow",
-                                                    {.name = "slow",
-                                                     .driver = "simulated",
-                                                     .options = {{"size", "32x32x16"},
-                                                                 {"pacing", "4000000"},
-                                                                 {"rate", "100"},
-                                                                 {"max_payload", "2048"},
-                                                                 {"receive_buffer", "65536"}}}}),
-                         [](const testing::TestParamInfo<DriverCase>& param) {
-                           return param.param.name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Drivers, DriverConformance,
+    testing::Values(
+        DriverCase{"SimulatedPlanar",
+                   {.name = "planar", .driver = "simulated", .options = {{"size", "32x32x32"}}}},
+        DriverCase{"SimulatedRotor",
+                   {.name = "rotor",
+                    .driver = "simulated",
+                    .options = {{"geometry", "rotor"},
+                                {"size", "32x16"},
+                                {"slices", "60"},
+                                {"eccentricity", "0.5;4"},
+                                {"format", "bitplanes3"},
+                                {"sub_frames", "2"},
+                                {"rate", "60"}}}},
+        DriverCase{"SimulatedSlow",
+                   {.name = "slow",
+                    .driver = "simulated",
+                    .options = {{"size", "32x32x16"},
+                                {"pacing", "4000000"},
+                                {"rate", "100"},
+                                {"max_payload", "2048"},
+                                {"receive_buffer", "65536"}}}},
+        DriverCase{"Fadecandy",
+                   {.name = "cube",
+                    .driver = "fadecandy",
+                    .options = {{"cube", "8x8x16"}, {"boards", "2"}, {"serpentine", "rows"}}},
+                   false,
+                   &fadecandy::CreateEmulated},
+        DriverCase{"FadecandyFading",
+                   {.name = "cube", .driver = "fadecandy", .options = {{"interpolate", "true"}}},
+                   false,
+                   &fadecandy::CreateEmulated}),
+    [](const testing::TestParamInfo<DriverCase>& param) { return param.param.name; });
 
 }  // namespace
 }  // namespace voxeld::display

@@ -57,7 +57,7 @@ class Writer {
 };
 
 absl::Status Decode(VoxlinkDecoder& decoder, const Bytes& bytes) {
-  return decoder.OnBytes(kBulkOut, bytes);
+  return decoder.OnBytes(kBulkOut, bytes, 0);
 }
 
 TEST(Decoder, RebuildsWholeAndChangedVolumes) {
@@ -82,7 +82,7 @@ TEST(Decoder, RebuildsWholeAndChangedVolumes) {
   }
   writer.packets.End(writer.out, 5, true);
   for (const std::byte b : writer.out) {
-    ASSERT_TRUE(decoder.OnBytes(kBulkOut, std::span(&b, 1)).ok());
+    ASSERT_TRUE(decoder.OnBytes(kBulkOut, std::span(&b, 1), 0).ok());
   }
   volume = decoder.TakeVolume();
   ASSERT_TRUE(volume.has_value());
@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(Decoder, RefusesOtherEndpoints) {
   VoxlinkDecoder decoder(kLayout, kMaxPayload);
-  EXPECT_TRUE(absl::IsDataLoss(decoder.OnBytes(2, {})));
+  EXPECT_TRUE(absl::IsDataLoss(decoder.OnBytes(2, {}, 0)));
 }
 
 TEST(Decoder, EveryTruncationGivesNothing) {
@@ -203,7 +203,7 @@ TEST(Decoder, EveryTruncationGivesNothing) {
   writer.Whole(1);
   for (size_t size = 0; size < writer.out.size(); ++size) {
     VoxlinkDecoder decoder(kLayout, kMaxPayload);
-    ASSERT_TRUE(decoder.OnBytes(kBulkOut, std::span(writer.out).first(size)).ok());
+    ASSERT_TRUE(decoder.OnBytes(kBulkOut, std::span(writer.out).first(size), 0).ok());
     ASSERT_FALSE(decoder.TakeVolume().has_value());
   }
 }

@@ -120,11 +120,12 @@ TEST(Options, ToneCurve) {
 }
 
 TEST(Registry, KnowsItsDrivers) {
-  EXPECT_EQ(DriverNames(), (std::vector<std::string>{"simulated", "voxlink"}));
+  EXPECT_EQ(DriverNames(), (std::vector<std::string>{"fadecandy", "simulated", "voxlink"}));
   sync::FakeClock clock;
   const auto unknown = CreateDisplay({.name = "d", .driver = "hologram"}, clock);
-  EXPECT_EQ(unknown.status().message(),
-            "display \"d\": there is no driver \"hologram\"; there are simulated, voxlink");
+  EXPECT_EQ(
+      unknown.status().message(),
+      "display \"d\": there is no driver \"hologram\"; there are fadecandy, simulated, voxlink");
   const auto bad = CreateDisplay(
       {.name = "d", .driver = "simulated", .options = {{"faults", "fire@t1"}}}, clock);
   EXPECT_EQ(bad.status().code(), absl::StatusCode::kInvalidArgument);

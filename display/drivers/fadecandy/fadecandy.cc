@@ -1,0 +1,114 @@
+#include "display/drivers/fadecandy/fadecandy.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "display/drivers/fadecandy/fadecandy_display.h"
+#include "display/drivers/fadecandy/layout.h"
+#include "display/drivers/fadecandy/protocol.h"
+#include "display/drivers/usb_options.h"
+#include "display/geometry/footprint.h"
+
+namespace voxeld::display::fadecandy {
+namespace {
+
+// Boards refresh some 400 times a second.
+constexpr double kMostVolumesPerSecond = 400;
+
+ColorCurve ReadCurve(OptionReader& reader) {
+  ColorCurve curve;
+  curve.gamma = reader.Number("gamma", curve.gamma, 0.1, 10);
+  curve.slope = reader.Number("slope", curve.slope, 0, 100);
+  curve.cutoff = reader.Number("cutoff", curve.cutoff, 0, 0.999);
+  if (const std::vector<double> white = reader.Numbers("white"); !white.empty()) {
+    if (white.size() != 3 ||
+        !std::all_of(white.begin(), white.end(), [](double w) { return w >= 0 && w <= 2; })) {
+      reader.Refuse("white", "three numbers from 0 to 2 with ';' between them");
+    } else {
+      std::copy(white.begin(), white.end(), curve.white.begin());
+    }
+  }
+  return curve;
+}
+
+uint8_t ReadFlags(OptionReader& reader) {
+  const bool dithers = reader.Choice("dither", {"temporal", "none"}, 0) == 0;
+  const bool fades = reader.Flag("interpolate", false);
+  constexpr uint8_t kLeds[] = {0, kManualLed, kManualLed | kLedOn};
+  const uint8_t led = kLeds[reader.Choice("led", {"traffic", "off", "on"}, 0)];
+  return static_cast<uint8_t>((dithers ? 0 : kNoDither) | (fades ? 0 : kNoInterpolation) | led);
+}
+
+// Boards record into files of their own: "cube.pcapng" becomes "cube-0.pcapng", "cube-1.pcapng", ….
+std::string RecordOf(const std::string& path, size_t board, size_t boards) {
+  if (path.empty() || boards == 1) return path;
+  const std::filesystem::path file(path);
+  return file.parent_path() /
+         absl::StrCat(file.stem().string(), "-", board, file.extension().string());
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
+                                                const DriverContext& context) {
+  return CreateOver(options, context.clock, [&](const BoardPlace& board) {
+    UsbOptions usb;
+    usb.match.vendor_id = kVendorId;
+    usb.match.product_id = kProductId;
+    usb.match.serial = board.serial;
+    if (board.serial.empty()) usb.match.member = {board.index, board.count};
+    usb.record = board.record;
+    return MakeUsbTransport(usb, options.name, context);
+  });
+}
+
+absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& options,
+                                                    sync::Clock& clock,
+                                                    const MakeTransport& make_transport) {
+  OptionReader reader(options);
+  const Boards boards = ReadBoards(reader);
+  const auto count = static_cast<int32_t>(boards.serials.size());
+  FadecandyDisplay::Settings settings;
+  settings.curve = ReadCurve(reader);
+  settings.full_brightness = reader.Number("brightness", 1, 1e-3, 1);
+  settings.flags = ReadFlags(reader);
+  DisplayInfo info;
+  info.name = options.name;
+  info.driver = options.driver;
+  info.layout = {.slices = count, .width = kPixels, .height = 1};
+  info.volumes_per_second = reader.Number("rate", 60, 0.5, kMostVolumesPerSecond);
+  // The curve is the board's.
+  info.tone = MakeTone(1, 1, Dither::kNone, Sampling::kMax);
+  absl::StatusOr<Lattice> lattice = ReadLattice(reader, count);
+  const std::string record = ReadUsbRecord(reader);
+  if (absl::Status status = reader.Finish(); !status.ok()) return status;
+  absl::Status status = lattice.status();
+  if (status.ok()) {
+    info.geometry.shape = *std::move(lattice);
+    status = ValidateShape(info.geometry);
+  }
+  if (status.ok()) {
+    info.geometry.grid = DefaultGrid(info.geometry);
+    status = ValidateGeometry(info.geometry);
+  }
+  if (!status.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("display \"", options.name, "\": ", status.message()));
+  }
+  std::vector<FadecandyDisplay::Wire> wires;
+  for (size_t i = 0; i < boards.serials.size(); ++i) {
+    absl::StatusOr<std::unique_ptr<UsbTransport>> transport =
+        make_transport({.serial = boards.serials[i],
+                        .index = i,
+                        .count = boards.serials.size(),
+                        .record = RecordOf(record, i, boards.serials.size())});
+    if (!transport.ok()) return transport.status();
+    wires.push_back({*std::move(transport), boards.serials[i]});
+  }
+  return std::make_unique<FadecandyDisplay>(std::move(info), settings, std::move(wires), clock);
+}
+
+}  // namespace voxeld::display::fadecandy

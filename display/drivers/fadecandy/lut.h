@@ -1,0 +1,20 @@
+// The colour table that the host gives a board (docs/protocols/fadecandy.md §9).
+#pragma once
+
+#include <array>
+
+#include "display/drivers/fadecandy/protocol.h"
+
+namespace voxeld::display::fadecandy {
+
+struct ColorCurve {
+  double gamma = 2.5;                       // > 0
+  std::array<double, 3> white = {1, 1, 1};  // of red, green, blue; 0 to 1 and a little above
+  double slope = 1;                         // of the linear part, ≥ 0
+  double cutoff = 0;                        // where the linear part ends: 0 to below 1
+};
+
+// `brightness` 0 to 1 scales the light; 0: all dark.
+Lut MakeLut(const ColorCurve& curve, double brightness);
+
+}  // namespace voxeld::display::fadecandy
