@@ -32,6 +32,7 @@ ALLOWED = {
               "daemon/address", "daemon/suggest"],
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "tools/emulator"],
+    "tools/bench": ["gpu", "display", "tools/bench"],
     "client": ["voxeld/v1"],
     "tests": ["daemon", "gpu", "display", "voxeld/v1", "tools", "client"],
 }

@@ -15,6 +15,8 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -133,6 +135,30 @@ class OnUsb : public ::testing::Test {
     return false;
   }
 
+  // Where the daemon's threads are, if gdb is there to tell.
+  std::string WhatItDoes() {
+    std::string text = process_->output();
+    for (const auto& pid : std::filesystem::directory_iterator("/proc")) {
+      std::error_code none;
+      for (const auto& task : std::filesystem::directory_iterator(pid.path() / "task", none)) {
+        text += task.path().string() + " ";
+        for (const char* file : {"comm", "wchan", "syscall", "stack", "status"}) {
+          std::ifstream in(task.path() / file);
+          for (std::string line; std::getline(in, line);) {
+            if (std::string(file) != "status" || line.starts_with("State")) text += line + "\n";
+          }
+        }
+      }
+    }
+    const std::string command =
+        absl::StrCat("timeout 60 gdb -q -batch -p ", process_->pid(), " -ex 'thread apply all bt 20' 2>&1");
+    FILE* const gdb = popen(command.c_str(), "r");
+    char part[4096];
+    while (gdb != nullptr && std::fgets(part, sizeof(part), gdb) != nullptr) text += part;
+    if (gdb != nullptr) pclose(gdb);
+    return text;
+  }
+
   nlohmann::json Device() { return nlohmann::json::parse(control_.Ask("status")); }
 
   std::string LightOfOther() {
@@ -226,6 +252,7 @@ INSTANTIATE_TEST_SUITE_P(OfThePlan, EachFault,
                                            "nak:1000@t9/in", "corrupt:3@t9/in", "drop:4@t9/in"));
 
 TEST_F(OnUsb, PulledAndPluggedInUnderLoad) {
+  setvbuf(stdout, nullptr, _IOLBF, 0);
   int unplugs = 0;
   ASSERT_TRUE(absl::SimpleAtoi(FromEnvironment("VOXELD_HIL_UNPLUGS", "5"), &unplugs));
   Plug();
@@ -243,7 +270,7 @@ TEST_F(OnUsb, PulledAndPluggedInUnderLoad) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20 + 7 * (i % 13)));
     const auto pulled = steady_clock::now();
     control_.Ask("unplug");
-    EXPECT_TRUE(AwaitState(v1::DISPLAY_STATE_LOST));
+    EXPECT_TRUE(AwaitState(v1::DISPLAY_STATE_LOST)) << WhatItDoes();
     lost_ms.push_back(Milliseconds(steady_clock::now() - pulled));
     (*watch)->TakeArrivals();
     control_.Ask("plug");
