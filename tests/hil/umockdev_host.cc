@@ -67,14 +67,10 @@ class Host {
  public:
   Host(emulator::Emulated device, const std::string& control, sync::Clock& clock)
       : device_(std::move(device)),
-        facts_(display::emulator::ReadFacts(*device_.model)),
         clock_(clock),
         testbed_(umockdev_testbed_new()),
         handler_(umockdev_ioctl_base_new()) {
-    device_.model->SetComplete(
-        [this](uint64_t id, TransferStatus status, uint32_t actual, std::span<const std::byte> in) {
-          OnComplete(id, status, actual, in);
-        });
+    Enumerate();
     g_signal_connect(
         handler_, "handle-ioctl",
         G_CALLBACK(+[](UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer host) {
@@ -112,6 +108,7 @@ class Host {
 
  private:
   struct InFlight {
+    std::string node;
     UMockdevIoctlData* urb = nullptr;
     UMockdevIoctlData* buffer = nullptr;
     size_t bytes = 0;
@@ -129,7 +126,22 @@ class Host {
 
   std::string Node() const { return absl::StrFormat("bus/usb/001/%03d", number_); }
 
+  // Asks the device what it is.
+  void Enumerate() {
+    facts_ = display::emulator::ReadFacts(*device_.model);
+    for (char& c : facts_.serial) {
+      if (c < ' ' || c > '~' || c == '\\') c = '?';
+    }
+    device_.model->SetComplete(
+        [this](uint64_t id, TransferStatus status, uint32_t actual, std::span<const std::byte> in) {
+          OnComplete(id, status, actual, in);
+        });
+  }
+
   void AddDevice() {
+    // A kernel does not take it otherwise.
+    listed_ = facts_.device.size() >= 18 && facts_.configuration.size() >= 9;
+    if (!listed_) return;
     const std::string path = "/dev/" + Node();
     GError* error = nullptr;
     if (!umockdev_testbed_attach_ioctl(testbed_, path.c_str(), handler_, &error)) {
@@ -153,11 +165,12 @@ class Host {
     umockdev_testbed_uevent(testbed_, (std::string("/sys") + kFolder).c_str(), "add");
   }
 
-  void RemoveDevice(const std::string& node) {
+  // The node stays, and tells those who have it open that their device is gone.
+  void RemoveDevice() {
+    if (!listed_) return;
     const std::string folder = std::string("/sys") + kFolder;
     umockdev_testbed_uevent(testbed_, folder.c_str(), "remove");
     umockdev_testbed_remove_device(testbed_, folder.c_str());
-    umockdev_testbed_detach_ioctl(testbed_, ("/dev/" + node).c_str(), nullptr);
   }
 
   void FollowCable() {
@@ -169,19 +182,18 @@ class Host {
     const uint32_t plugs = device_.model->plugged() ? device_.model->plugs() : 0;
     const uint32_t had = std::exchange(plugs_, plugs);
     if (plugs == had) return;
-    const std::string old = Node();
     if (plugs != 0) {
-      done_.clear();
       ++number_;  // as the kernel does: an old handle does not come back to life
+      Enumerate();
     }
     lock.unlock();
-    if (had != 0) RemoveDevice(old);
+    if (had != 0) RemoveDevice();
     if (plugs != 0) AddDevice();
   }
 
   void ReleaseParked() {
     for (auto it = parked_.begin(); it != parked_.end();) {
-      if (clock_.Now() < it->until && done_.empty()) {
+      if (clock_.Now() < it->until && DoneOf(it->client).empty()) {
         ++it;
         continue;
       }
@@ -189,6 +201,10 @@ class Host {
       g_object_unref(it->client);
       it = parked_.erase(it);
     }
+  }
+
+  std::deque<UMockdevIoctlData*>& DoneOf(UMockdevIoctlClient* client) {
+    return done_[umockdev_ioctl_client_get_devnode(client)];
   }
 
   bool Stale(UMockdevIoctlClient* client) const {
@@ -210,7 +226,7 @@ class Host {
                                  in.size());
     }
     bytes_in_flight_ -= it->second.bytes;
-    done_.push_back(it->second.urb);
+    done_[it->second.node].push_back(it->second.urb);
     in_flight_.erase(it);
   }
 
@@ -261,7 +277,8 @@ class Host {
         return stale ? Answer(client, ENODEV) : SubmitUrb(client, argument);
       case USBDEVFS_REAPURB:
       case USBDEVFS_REAPURBNDELAY: {
-        if (done_.empty()) {
+        std::deque<UMockdevIoctlData*>& done = DoneOf(client);
+        if (done.empty()) {
           if (stale) return Answer(client, ENODEV);
           g_object_ref(client);
           parked_.push_back({client, clock_.Now() + kPark});
@@ -269,8 +286,8 @@ class Host {
         }
         g_autoptr(UMockdevIoctlData) data =
             umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
-        umockdev_ioctl_data_set_ptr(data, 0, done_.front());
-        done_.pop_front();
+        umockdev_ioctl_data_set_ptr(data, 0, done.front());
+        done.pop_front();
         return Answer(client, 0);
       }
       case USBDEVFS_DISCARDURB: {
@@ -323,7 +340,11 @@ class Host {
     const auto& asked = *reinterpret_cast<usbdevfs_urb*>(data->data);
     const auto length = static_cast<size_t>(asked.buffer_length);
     if (length > kMostInFlight - bytes_in_flight_) return Answer(client, ENOMEM);
-    InFlight urb{.urb = data, .buffer = nullptr, .bytes = length, .out = {}};
+    InFlight urb{.node = umockdev_ioctl_client_get_devnode(client),
+                 .urb = data,
+                 .buffer = nullptr,
+                 .bytes = length,
+                 .out = {}};
     if (length > 0) {
       urb.buffer =
           umockdev_ioctl_data_resolve(data, G_STRUCT_OFFSET(usbdevfs_urb, buffer), length, nullptr);
@@ -359,7 +380,8 @@ class Host {
 
   std::mutex mutex_;  // handlers may run in umockdev's thread
   emulator::Emulated device_;
-  const ModelFacts facts_;
+  ModelFacts facts_;
+  bool listed_ = false;  // the system has it
   sync::Clock& clock_;
   UMockdevTestbed* const testbed_;
   UMockdevIoctlBase* const handler_;
@@ -369,7 +391,7 @@ class Host {
   uint64_t next_ = 1;
   std::map<uint64_t, InFlight> in_flight_;
   size_t bytes_in_flight_ = 0;
-  std::deque<UMockdevIoctlData*> done_;
+  std::map<std::string, std::deque<UMockdevIoctlData*>> done_;  // by node
   std::list<Parked> parked_;
 };
 

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
@@ -62,7 +63,9 @@ Emulated Wrapped(std::unique_ptr<Device> device, std::string (*status)(const Dev
                  const display::emulator::FaultPlan& plan, sync::Clock& clock) {
   Emulated emulated;
   emulated.status = [inner = device.get(), status] { return status(*inner); };
-  auto faults = std::make_unique<FaultInjector>(std::move(device), plan, clock);
+  auto hostile = std::make_unique<display::emulator::HostileDevice>(std::move(device));
+  emulated.hostile = hostile.get();
+  auto faults = std::make_unique<FaultInjector>(std::move(hostile), plan, clock);
   emulated.faults = faults.get();
   emulated.model = std::move(faults);
   return emulated;
@@ -115,6 +118,15 @@ std::string Control(Emulated& device, std::string_view line) {
   }
   if (words.first == "clear") {
     device.faults->Clear();
+    device.hostile->SetSeed(std::nullopt);
+    return "ok";
+  }
+  if (words.first == "hostile") {
+    uint64_t seed = 0;
+    if (!absl::SimpleAtoi(words.second, &seed)) {
+      return absl::StrCat("error: \"", words.second, "\" is no seed; give a number from 0 on");
+    }
+    device.hostile->SetSeed(seed);
     return "ok";
   }
   if (words.first == "fault") {
@@ -124,7 +136,8 @@ std::string Control(Emulated& device, std::string_view line) {
     for (const display::emulator::Fault& fault : *plan) device.faults->Add(fault);
     return "ok";
   }
-  return absl::StrCat("error: \"", words.first, "\" is none of fault, clear, plug, unplug, status");
+  return absl::StrCat("error: \"", words.first,
+                      "\" is none of fault, clear, hostile, plug, unplug, status");
 }
 
 }  // namespace voxeld::emulator

@@ -11,13 +11,15 @@
 #include "absl/status/statusor.h"
 #include "display/drivers/options.h"
 #include "display/emulator/fault_injector.h"
+#include "display/emulator/hostile_device.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::emulator {
 
 struct Emulated {
-  std::unique_ptr<display::UsbDeviceModel> model;      // with its faults
-  display::emulator::FaultInjector* faults = nullptr;  // within model
+  std::unique_ptr<display::UsbDeviceModel> model;       // with its faults
+  display::emulator::FaultInjector* faults = nullptr;   // within model
+  display::emulator::HostileDevice* hostile = nullptr;  // within faults
   // What it saw and shows, as one line of JSON.
   std::function<std::string()> status;
 };
@@ -28,7 +30,8 @@ absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock)
 
 // One line of the control socket, and the answer to it, without its newline:
 //   fault WHAT[:AMOUNT]@WHEN[/in]   a fault more, counted from now      ok
-//   clear                           no fault any more                   ok
+//   clear                           no fault and no lie any more        ok
+//   hostile SEED                    answers and reports are damaged     ok
 //   unplug, plug                    the cable                           ok
 //   status                                                              JSON
 // What is wrong is answered "error: …".

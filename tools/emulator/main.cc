@@ -266,8 +266,9 @@ int Main(int argc, char** argv) {
                                   "listen on this unix socket, for QEMU's usb-redir");
   attach->excludes(usbip)->excludes(usbredir);
   usbip->excludes(usbredir);
-  app.add_option("--control", options.control,
-                 "unix socket for lines: fault WHAT@WHEN, clear, unplug, plug, status");
+  app.add_option(
+      "--control", options.control,
+      "unix socket for lines: fault WHAT@WHEN, clear, hostile SEED, unplug, plug, status");
   CLI11_PARSE(app, argc, argv);
   const auto fail = [](int code, const absl::Status& status) {
     std::fprintf(stderr, "voxeld-emulator: %s\n", std::string(status.message()).c_str());

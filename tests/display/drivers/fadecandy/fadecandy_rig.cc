@@ -26,8 +26,10 @@ FadecandyRig::FadecandyRig(size_t boards, FadecandyDisplay::Settings settings, b
     auto device = std::make_unique<emulator::FadecandyDevice>(
         emulator::FadecandyDeviceConfig{.serial = serial, .refresh_ns = kRefresh}, clock_);
     BoardParts parts{.device = device.get()};
-    auto faults =
-        std::make_unique<emulator::FaultInjector>(std::move(device), emulator::FaultPlan{}, clock_);
+    auto hostile = std::make_unique<emulator::HostileDevice>(std::move(device));
+    parts.hostile = hostile.get();
+    auto faults = std::make_unique<emulator::FaultInjector>(std::move(hostile),
+                                                            emulator::FaultPlan{}, clock_);
     parts.faults = faults.get();
     InProcessTransport::Options options;
     options.own_thread = false;

@@ -9,6 +9,7 @@
 #include "display/drivers/fadecandy/fadecandy_display.h"
 #include "display/emulator/fadecandy_device.h"
 #include "display/emulator/fault_injector.h"
+#include "display/emulator/hostile_device.h"
 #include "display/sync/fake_clock.h"
 #include "display/usb/in_process.h"
 #include "tests/display/drivers/rig.h"
@@ -33,6 +34,7 @@ class FadecandyRig {
   size_t boards() const { return boards_.size(); }
   emulator::FadecandyDevice& device(size_t board) { return *boards_[board].device; }
   emulator::FaultInjector& faults(size_t board) { return *boards_[board].faults; }
+  emulator::HostileDevice& hostile(size_t board) { return *boards_[board].hostile; }
   InProcessTransport& transport(size_t board) { return *boards_[board].transport; }
 
   void Start();
@@ -53,6 +55,7 @@ class FadecandyRig {
  private:
   struct BoardParts {
     emulator::FadecandyDevice* device;
+    emulator::HostileDevice* hostile;
     emulator::FaultInjector* faults;
     InProcessTransport* transport;
   };
