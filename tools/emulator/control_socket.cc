@@ -17,6 +17,17 @@ namespace {
 
 constexpr size_t kMostLine = 4096;
 
+// The socket of somebody who is no more.
+bool Stale(const sockaddr_un& address) {
+  const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (probe < 0) return false;
+  const bool refused =
+      connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 &&
+      errno == ECONNREFUSED;
+  close(probe);
+  return refused;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ControlSocket>> ControlSocket::Listen(const std::string& path) {
@@ -29,7 +40,12 @@ absl::StatusOr<std::unique_ptr<ControlSocket>> ControlSocket::Listen(const std::
   }
   std::memcpy(address.sun_path, path.data(), path.size());
   const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd < 0 || bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0 ||
+  const auto bound = [&] {
+    return bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
+  };
+  if (fd < 0 ||
+      (!bound() &&
+       !(errno == EADDRINUSE && Stale(address) && unlink(path.c_str()) == 0 && bound())) ||
       listen(fd, 8) != 0) {
     const int error = errno;
     if (fd >= 0) close(fd);
