@@ -25,7 +25,6 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   void Signal(int signal);
-  pid_t pid() const { return pid_; }
 
   // The next line of its standard output or error, without the newline; nothing at the end, or when
   // patience has run out.

@@ -169,6 +169,12 @@ void UsbipSession::OnComplete(uint64_t id, TransferStatus status, uint32_t actua
                               std::span<const std::byte> in) {
   const auto it = submitted_.find(id);
   if (it == submitted_.end()) return;
+  // A cable that was pulled says nothing. (Linux's virtual controller can lose a transfer that is cancelled
+  // while the connection ends, and whoever cancelled waits for ever: so let nobody have cause to.)
+  if (status == TransferStatus::kDisconnected) {
+    submitted_.erase(it);
+    return;
+  }
   const bool reads = it->second.in;
   Header reply{};
   reply.command = htonl(kSubmitReply);

@@ -21,6 +21,7 @@ namespace {
 constexpr sync::TimeNs kPatience = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kCloseLimit = 500 * sync::kMillisecond;
 constexpr int kGraveIntervalMs = 20;
+constexpr sync::TimeNs kGraveLimit = 5 * sync::kSecond;  // of the bus's end
 
 }  // namespace
 
@@ -146,11 +147,19 @@ bool LibusbBus::Bury() {
 }
 
 void LibusbBus::Run() {
+  sync::TimeNs give_up = 0;
   while (true) {
     const bool graves = Bury();
     {
       sync::MutexLock lock(graves_mutex_);
       if (stop_ && !graves) return;
+      if (stop_ && give_up == 0) give_up = clock_.Now() + kGraveLimit;
+      if (stop_ && clock_.Now() >= give_up) {
+        // The kernel does not let go of them. They are lost, and their memory with them.
+        for (std::unique_ptr<OpenDevice>& device : graves_) (void)device.release();
+        graves_.clear();
+        return;
+      }
     }
     std::vector<pollfd> fds = {{poke_, POLLIN, 0}};
     if (watch_ != nullptr) fds.push_back({watch_->fd(), POLLIN, 0});

@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <libusb-1.0/libusb.h>
-#include <linux/usbdevice_fs.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,8 +15,6 @@
 namespace voxeld::display {
 namespace {
 
-constexpr size_t kSlabBytes = size_t{256} << 10;
-constexpr size_t kSlabs = 16;
 constexpr size_t kTransfers = 64;  // made at once; more as they are needed
 // Of a reset: what is in flight is waited for this long after its cancellation.
 constexpr sync::TimeNs kCancelLimit = sync::kSecond;
@@ -78,79 +74,6 @@ unsigned Milliseconds(sync::TimeNs timeout) {
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<LibusbContext>> LibusbContext::Make() {
-  libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
-  libusb_context* context = nullptr;
-  if (const int result = libusb_init(&context); result != 0) {
-    return absl::UnavailableError(absl::StrCat("libusb: ", libusb_error_name(result)));
-  }
-  return std::shared_ptr<LibusbContext>(new LibusbContext(context));
-}
-
-LibusbContext::~LibusbContext() { libusb_exit(context_); }
-
-class OpenDevice::Handle {
- public:
-  Handle(std::shared_ptr<LibusbContext> context, libusb_device_handle* handle, int node)
-      : context_(std::move(context)), handle_(handle), node_(node) {}
-  ~Handle() {
-    libusb_close(handle_);
-    close(node_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  libusb_device_handle* get() const { return handle_; }
-  // libusb maps the node without asking.
-  bool gives_memory() const {
-    uint32_t capabilities = 0;
-    return ioctl(node_, USBDEVFS_GET_CAPABILITIES, &capabilities) == 0 &&
-           (capabilities & USBDEVFS_CAP_MMAP) != 0;
-  }
-
- private:
-  const std::shared_ptr<LibusbContext> context_;
-  libusb_device_handle* const handle_;
-  const int node_;
-};
-
-// Slabs of memory that the kernel reads in place, as many as it gives, the rest ordinary.
-class OpenDevice::DeviceSlabs final : public SlabMemory {
- public:
-  static std::shared_ptr<SlabMemory> Make(std::shared_ptr<Handle> handle, UsbfsBudget& budget) {
-    std::vector<void*> slabs;
-    if (!handle->gives_memory()) {
-      return std::make_shared<DeviceSlabs>(std::move(handle), budget, std::move(slabs));
-    }
-    // The kernel counts them for as long as they are there: never more than half of what there is.
-    while (slabs.size() < kSlabs && (slabs.size() + 1) * kSlabBytes <= budget.limit() / 2) {
-      if (!budget.Take(kSlabBytes)) break;
-      void* const slab = libusb_dev_mem_alloc(handle->get(), kSlabBytes);
-      if (slab == nullptr) {
-        budget.Release(kSlabBytes);
-        break;
-      }
-      slabs.push_back(slab);
-    }
-    return std::make_shared<DeviceSlabs>(std::move(handle), budget, std::move(slabs));
-  }
-  DeviceSlabs(std::shared_ptr<Handle> handle, UsbfsBudget& budget, std::vector<void*> slabs)
-      : SlabMemory(slabs, kSlabBytes),
-        handle_(std::move(handle)),
-        budget_(budget),
-        slabs_(std::move(slabs)) {}
-  ~DeviceSlabs() override {
-    for (void* slab : slabs_) {
-      libusb_dev_mem_free(handle_->get(), static_cast<unsigned char*>(slab), kSlabBytes);
-    }
-    budget_.Release(slabs_.size() * kSlabBytes);
-  }
-
- private:
-  const std::shared_ptr<Handle> handle_;
-  UsbfsBudget& budget_;
-  const std::vector<void*> slabs_;
-};
-
 struct OpenDevice::Pending {
   Pending() : transfer(libusb_alloc_transfer(0)) {}
   ~Pending() { libusb_free_transfer(transfer); }
@@ -163,6 +86,8 @@ struct OpenDevice::Pending {
   Transfer asked;
   std::vector<unsigned char> bytes;  // of requests, and what comes in
   size_t counted = 0;                // of the budget
+  // While libusb is asked to cancel it, it must not be used again.
+  bool cancelling = false, done = false;
 };
 
 absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
@@ -185,7 +110,7 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
     return absl::UnavailableError(
         absl::StrCat(NameOf(entry), " cannot be used: ", libusb_error_name(result)));
   }
-  auto handle = std::make_shared<Handle>(std::move(context), raw, node);
+  auto handle = std::make_shared<DeviceHandle>(std::move(context), raw, node);
   libusb_set_auto_detach_kernel_driver(raw, 1);
   int configuration = 0;
   if (libusb_get_configuration(raw, &configuration) == 0 && configuration == 0) {
@@ -203,7 +128,7 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
                                                     clock, first_id, std::move(wake)));
 }
 
-OpenDevice::OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& entry,
+OpenDevice::OpenDevice(std::shared_ptr<DeviceHandle> handle, const UsbDeviceEntry& entry,
                        uint8_t interface, UsbfsBudget& budget, sync::Clock& clock,
                        TransferId first_id, std::function<void()> wake)
     : handle_(std::move(handle)),
@@ -211,13 +136,14 @@ OpenDevice::OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& ent
       interface_(interface),
       budget_(budget),
       clock_(clock),
-      memory_(DeviceSlabs::Make(handle_, budget)),
+      memory_(BorrowSlabs(handle_, budget)),
       wake_(std::move(wake)),
       next_id_(first_id) {
   for (size_t i = 0; i < kTransfers; ++i) {
     all_.push_back(std::make_unique<Pending>());
     free_.push_back(all_.back().get());
   }
+  thread_ = std::thread([this] { Work(); });
 }
 
 OpenDevice::~OpenDevice() {
@@ -226,8 +152,7 @@ OpenDevice::~OpenDevice() {
     ending_ = true;
     changed_.NotifyAll();
   }
-  if (blocking_thread_.joinable()) blocking_thread_.join();
-  libusb_release_interface(handle_->get(), interface_);
+  thread_.join();
 }
 
 // ---- transfers
@@ -260,7 +185,10 @@ absl::StatusOr<TransferId> OpenDevice::Submit(Transfer&& transfer) {
   pending.id = next_id_;
   pending.asked = std::move(transfer);
   pending.counted = counted;
-  if (absl::Status status = SubmitLocked(pending); !status.ok()) {
+  pending.transfer->actual_length = 0;
+  if (!jobs_.empty() || !deferred_.empty()) {
+    deferred_.push_back(&pending);
+  } else if (absl::Status status = SubmitLocked(pending); !status.ok()) {
     transfer = std::move(pending.asked);
     budget_.Release(counted);
     return status;
@@ -322,18 +250,20 @@ absl::Status OpenDevice::SubmitLocked(Pending& pending) {
 
 void OpenDevice::OnDone(libusb_transfer* done) {
   auto& pending = *static_cast<Pending*>(done->user_data);
-  pending.device->Complete(pending);
+  pending.device->Complete(pending, StatusOf(*done));
 }
 
-void OpenDevice::Complete(Pending& pending) {
+void OpenDevice::Complete(Pending& pending, TransferStatus status) {
   const libusb_transfer& done = *pending.transfer;
   TransferCompletion completion;
   completion.id = pending.id;
   completion.type = pending.asked.type;
   completion.endpoint = pending.asked.endpoint;
-  completion.status = StatusOf(done);
+  completion.status = status;
   completion.actual_length = static_cast<uint32_t>(std::max(done.actual_length, 0));
-  if (pending.asked.length > 0) {
+  if (pending.asked.length > 0 && completion.actual_length == 0) {
+    // Nothing came, or it never went out.
+  } else if (pending.asked.length > 0) {
     const size_t head =
         pending.asked.type == TransferType::kControl ? LIBUSB_CONTROL_SETUP_SIZE : 0;
     completion.data = TransferBytes(
@@ -351,7 +281,11 @@ void OpenDevice::Complete(Pending& pending) {
     sync::MutexLock lock(mutex_);
     if (completion.status == TransferStatus::kDisconnected) gone_ = true;
     pending_.erase(completion.id);
-    free_.push_back(&pending);
+    if (pending.cancelling) {
+      pending.done = true;
+    } else {
+      free_.push_back(&pending);
+    }
     bytes_in_flight_ -= size;
     completions_.push_back(std::move(completion));
     changed_.NotifyAll();
@@ -367,8 +301,9 @@ void OpenDevice::Wake() {
 
 void OpenDevice::Cancel(TransferId id) {
   sync::MutexLock lock(mutex_);
-  const auto it = pending_.find(id);
-  if (it != pending_.end()) libusb_cancel_transfer(it->second->transfer);
+  if (!pending_.contains(id)) return;
+  jobs_.push_back({.what = Job::What::kCancel, .id = id});
+  changed_.NotifyAll();
 }
 
 size_t OpenDevice::Drain(std::vector<TransferCompletion>& out) {
@@ -395,69 +330,126 @@ TransferBytes OpenDevice::TakeBuffer(size_t capacity) {
   return buffer;
 }
 
-// ---- what waits
+// ---- what may wait in the kernel
 
 absl::StatusOr<TransferId> OpenDevice::ClearHalt(uint8_t endpoint) {
-  return QueueBlocking({.endpoint = endpoint});
+  return Queue({.what = Job::What::kClearHalt, .endpoint = endpoint});
 }
 
-absl::StatusOr<TransferId> OpenDevice::Reset() { return QueueBlocking({.reset = true}); }
+absl::StatusOr<TransferId> OpenDevice::Reset() { return Queue({.what = Job::What::kReset}); }
 
-absl::StatusOr<TransferId> OpenDevice::QueueBlocking(Blocking blocking) {
+absl::StatusOr<TransferId> OpenDevice::Queue(Job job) {
   sync::MutexLock lock(mutex_);
   if (absl::Status refusal = Refusal(); !refusal.ok()) return refusal;
-  blocking.id = next_id_++;
-  blocking_.push_back(blocking);
-  if (!blocking_thread_.joinable()) {
-    blocking_thread_ = std::thread([this] { RunBlocking(); });
-  }
+  job.id = next_id_++;
+  jobs_.push_back(job);
   changed_.NotifyAll();
-  return blocking.id;
+  return job.id;
 }
 
-void OpenDevice::RunBlocking() {
+void OpenDevice::Work() {
   while (true) {
-    Blocking blocking;
+    Job job;
     {
       sync::MutexLock lock(mutex_);
-      while (blocking_.empty() && !ending_) changed_.Wait(mutex_);
-      if (blocking_.empty()) return;
-      blocking = blocking_.front();
+      while (jobs_.empty() && !ending_) changed_.Wait(mutex_);
+      if (jobs_.empty() || ending_) break;
+      job = jobs_.front();
     }
-    TransferCompletion completion;
-    completion.id = blocking.id;
-    completion.type = TransferType::kControl;
-    completion.status = Carry(blocking);
-    {
-      sync::MutexLock lock(mutex_);
-      blocking_.pop_front();
-      if (ending_) blocking_.clear();
-      if (completion.status == TransferStatus::kDisconnected) gone_ = true;
-      completions_.push_back(std::move(completion));
-      changed_.NotifyAll();
-    }
-    Wake();
+    CarryOut(job);
   }
+  GiveBack();
 }
 
-TransferStatus OpenDevice::Carry(const Blocking& blocking) {
-  if (!blocking.reset) return StatusOf(libusb_clear_halt(handle_->get(), blocking.endpoint));
+void OpenDevice::CarryOut(const Job& job) {
+  TransferCompletion completion;
+  completion.id = job.id;
+  completion.type = TransferType::kControl;
+  switch (job.what) {
+    case Job::What::kClearHalt:
+      completion.status = StatusOf(libusb_clear_halt(handle_->get(), job.endpoint));
+      break;
+    case Job::What::kReset:
+      completion.status = ResetPort();
+      break;
+    case Job::What::kCancel:
+      CancelOne(job.id);
+      break;
+  }
   {
     sync::MutexLock lock(mutex_);
-    CancelAll();
+    if (job.what != Job::What::kCancel) {
+      if (completion.status == TransferStatus::kDisconnected) gone_ = true;
+      completions_.push_back(std::move(completion));
+    }
+    changed_.NotifyAll();
+  }
+  SubmitDeferred();
+  Wake();
+}
+
+TransferStatus OpenDevice::ResetPort() {
+  CancelAll();
+  {
+    sync::MutexLock lock(mutex_);
     const sync::TimeNs end = clock_.Now() + kCancelLimit;
-    while (!pending_.empty() && clock_.Now() < end) clock_.WaitUntil(mutex_, changed_, end);
+    while (pending_.size() > deferred_.size() && clock_.Now() < end) {
+      clock_.WaitUntil(mutex_, changed_, end);
+    }
   }
   return StatusOf(libusb_reset_device(handle_->get()));
 }
 
+void OpenDevice::CancelOne(TransferId id) {
+  Pending* pending = nullptr;
+  bool deferred = false;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto it = pending_.find(id);
+    if (it == pending_.end()) return;
+    pending = it->second;
+    deferred = std::erase(deferred_, pending) > 0;
+    pending->cancelling = !deferred;
+  }
+  if (deferred) return Complete(*pending, TransferStatus::kCancelled);
+  libusb_cancel_transfer(pending->transfer);
+  sync::MutexLock lock(mutex_);
+  pending->cancelling = false;
+  if (std::exchange(pending->done, false)) free_.push_back(pending);
+}
+
 void OpenDevice::CancelAll() {
-  for (const auto& [id, pending] : pending_) libusb_cancel_transfer(pending->transfer);
+  std::vector<TransferId> ids;
+  {
+    sync::MutexLock lock(mutex_);
+    for (const auto& [id, pending] : pending_) ids.push_back(id);
+  }
+  for (const TransferId id : ids) CancelOne(id);
+}
+
+// The job that was carried out is taken off the queue in the same breath as the last transfer that
+// waited for it goes out: what is submitted from then on comes after these.
+void OpenDevice::SubmitDeferred() {
+  std::vector<std::pair<Pending*, TransferStatus>> failed;
+  {
+    sync::MutexLock lock(mutex_);
+    if (jobs_.size() == 1) {
+      for (Pending* pending : deferred_) {
+        // The last requests of a device that is closed still go out.
+        const bool late = ending_ && pending->asked.type != TransferType::kControl;
+        if (!late && SubmitLocked(*pending).ok()) continue;
+        failed.emplace_back(pending, ending_ ? TransferStatus::kCancelled
+                                     : gone_ ? TransferStatus::kDisconnected
+                                             : TransferStatus::kError);
+      }
+      deferred_.clear();
+    }
+    jobs_.pop_front();
+  }
+  for (const auto& [pending, status] : failed) Complete(*pending, status);
 }
 
 // ---- the end
-
-bool OpenDevice::Idle() const { return pending_.empty() && blocking_.empty(); }
 
 bool OpenDevice::End(sync::TimeNs patience, sync::TimeNs limit) {
   {
@@ -465,24 +457,41 @@ bool OpenDevice::End(sync::TimeNs patience, sync::TimeNs limit) {
     wake_ = nullptr;
   }
   sync::MutexLock lock(mutex_);
-  ending_ = true;
-  const auto requests = [this]() VOXELD_REQUIRES(mutex_) {
-    return std::any_of(pending_.begin(), pending_.end(), [](const auto& item) {
-      return item.second->asked.type == TransferType::kControl;
-    });
-  };
   const sync::TimeNs now = clock_.Now();
-  while (requests() && clock_.Now() < now + patience) {
-    clock_.WaitUntil(mutex_, changed_, now + patience);
-  }
-  CancelAll();
-  while (!Idle() && clock_.Now() < now + limit) clock_.WaitUntil(mutex_, changed_, now + limit);
-  return Idle();
+  patient_until_ = now + patience;
+  ending_ = true;
+  changed_.NotifyAll();
+  while (!ended_ && clock_.Now() < now + limit) clock_.WaitUntil(mutex_, changed_, now + limit);
+  return ended_;
 }
 
 bool OpenDevice::Ended() const {
   sync::MutexLock lock(mutex_);
-  return ending_ && Idle();
+  return ended_;
+}
+
+void OpenDevice::GiveBack() {
+  {
+    sync::MutexLock lock(mutex_);
+    jobs_.clear();
+    const auto requests = [this]() VOXELD_REQUIRES(mutex_) {
+      return std::any_of(pending_.begin(), pending_.end(), [](const auto& item) {
+        return item.second->asked.type == TransferType::kControl;
+      });
+    };
+    while (requests() && clock_.Now() < patient_until_) {
+      clock_.WaitUntil(mutex_, changed_, patient_until_);
+    }
+  }
+  CancelAll();
+  {
+    sync::MutexLock lock(mutex_);
+    while (!pending_.empty()) changed_.Wait(mutex_);
+  }
+  libusb_release_interface(handle_->get(), interface_);
+  sync::MutexLock lock(mutex_);
+  ended_ = true;
+  changed_.NotifyAll();
 }
 
 }  // namespace voxeld::display

@@ -1,8 +1,10 @@
 // A device that libusb has open: its transfers, its memory, its way to close.
 //
 // libusb calls back on the bus's event thread; completions wait here until their owner drains them.
-// What libusb can only do by waiting (clearing a halt, a reset) is done by a thread of the device's
-// own, so that no device holds up another.
+// Whatever may wait in the kernel for the device (clearing a halt, a reset, cancelling a transfer,
+// giving the interface back) is done by a thread of the device's own: neither its owner nor
+// another device waits for it. Transfers that are submitted meanwhile go out when it is done, for the
+// kernel would have their owner wait too.
 #pragma once
 
 #include <cstddef>
@@ -18,31 +20,15 @@
 #include "absl/status/statusor.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
+#include "display/usb/libusb/device_handle.h"
 #include "display/usb/libusb/device_list.h"
 #include "display/usb/libusb/usbfs_budget.h"
 #include "display/usb/slab_memory.h"
 #include "display/usb/usb_transport.h"
 
-struct libusb_context;
-struct libusb_device_handle;
 struct libusb_transfer;
 
 namespace voxeld::display {
-
-// libusb's context, without its own discovery of devices: it would parse the descriptors of every
-// one that is attached.
-class LibusbContext {
- public:
-  static absl::StatusOr<std::shared_ptr<LibusbContext>> Make();
-  ~LibusbContext();
-  LibusbContext(const LibusbContext&) = delete;
-  LibusbContext& operator=(const LibusbContext&) = delete;
-  libusb_context* get() const { return context_; }
-
- private:
-  explicit LibusbContext(libusb_context* context) : context_(context) {}
-  libusb_context* const context_;
-};
 
 class OpenDevice {
  public:
@@ -73,38 +59,43 @@ class OpenDevice {
   TransferBytes TakeBuffer(size_t capacity);
 
   // No transfer is taken any more, and `wake` is not called again. Requests get `patience` to end by
-  // themselves, then all is cancelled, and waited for until `limit`. True: it has ended and may be
-  // destroyed.
+  // themselves, then all is cancelled, and the interface is given back. Waits for that until `limit`;
+  // true: it has ended and may be destroyed.
   bool End(sync::TimeNs patience, sync::TimeNs limit);
-  // After End: has all ended by now?
+  // After End: has it ended by now?
   bool Ended() const;
 
  private:
-  class Handle;
-  class DeviceSlabs;
   struct Pending;
-  struct Blocking {
-    TransferId id = 0;
-    bool reset = false;
-    uint8_t endpoint = 0;
+  struct Job {
+    enum class What : uint8_t { kClearHalt, kReset, kCancel };
+    What what = What::kClearHalt;
+    TransferId id = 0;     // its own, or of the transfer to cancel
+    uint8_t endpoint = 0;  // kClearHalt
   };
 
-  OpenDevice(std::shared_ptr<Handle> handle, const UsbDeviceEntry& entry, uint8_t interface,
+  OpenDevice(std::shared_ptr<DeviceHandle> handle, const UsbDeviceEntry& entry, uint8_t interface,
              UsbfsBudget& budget, sync::Clock& clock, TransferId first_id,
              std::function<void()> wake);
 
   static void OnDone(libusb_transfer* done);
-  void Complete(Pending& pending);
+  // Of a transfer that libusb is done with, or never had.
+  void Complete(Pending& pending, TransferStatus status);
   void Wake();
   absl::Status Refusal() const VOXELD_REQUIRES(mutex_);
   absl::Status SubmitLocked(Pending& pending) VOXELD_REQUIRES(mutex_);
-  absl::StatusOr<TransferId> QueueBlocking(Blocking blocking);
-  void RunBlocking();
-  TransferStatus Carry(const Blocking& blocking);
-  void CancelAll() VOXELD_REQUIRES(mutex_);
-  bool Idle() const VOXELD_REQUIRES(mutex_);
+  absl::StatusOr<TransferId> Queue(Job job);
 
-  const std::shared_ptr<Handle> handle_;
+  // The device's thread.
+  void Work();
+  void CarryOut(const Job& job);
+  TransferStatus ResetPort();
+  void CancelOne(TransferId id);
+  void CancelAll();
+  void SubmitDeferred();
+  void GiveBack();
+
+  const std::shared_ptr<DeviceHandle> handle_;
   const UsbDeviceEntry entry_;
   const uint8_t interface_;
   UsbfsBudget& budget_;
@@ -115,17 +106,20 @@ class OpenDevice {
   std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);
 
   mutable sync::Mutex mutex_;
-  sync::CondVar changed_;  // pending_ or blocking_ got shorter, or blocking_ longer, or ending_
+  sync::CondVar changed_;  // something of what follows
   bool ending_ VOXELD_GUARDED_BY(mutex_) = false;
+  bool ended_ VOXELD_GUARDED_BY(mutex_) = false;
+  sync::TimeNs patient_until_ VOXELD_GUARDED_BY(mutex_) = 0;  // once ending_
   bool gone_ VOXELD_GUARDED_BY(mutex_) = false;
   TransferId next_id_ VOXELD_GUARDED_BY(mutex_);
   std::map<TransferId, Pending*> pending_ VOXELD_GUARDED_BY(mutex_);
+  std::deque<Pending*> deferred_ VOXELD_GUARDED_BY(mutex_);  // of these, those not submitted yet
   std::vector<std::unique_ptr<Pending>> all_ VOXELD_GUARDED_BY(mutex_);  // made once, used again
   std::vector<Pending*> free_ VOXELD_GUARDED_BY(mutex_);
   size_t bytes_in_flight_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::vector<TransferCompletion> completions_ VOXELD_GUARDED_BY(mutex_);
-  std::deque<Blocking> blocking_ VOXELD_GUARDED_BY(mutex_);  // the first is being carried out
-  std::thread blocking_thread_;
+  std::deque<Job> jobs_ VOXELD_GUARDED_BY(mutex_);  // the first is being carried out
+  std::thread thread_;
 };
 
 }  // namespace voxeld::display
