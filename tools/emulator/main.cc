@@ -52,6 +52,8 @@ class Session {
   virtual ~Session() = default;
   virtual display::emulator::ByteStream& stream() = 0;
   virtual absl::Status Receive() = 0;
+  // The model has done something.
+  virtual void ReadOn() {}
   // Tells that the device came or went. False: the connection is the cable, and has to end.
   virtual bool Plugged(bool plugged) = 0;
 };
@@ -72,6 +74,7 @@ class UsbredirCarrier final : public Session {
   UsbredirCarrier(int fd, display::UsbDeviceModel& model) : session_(fd, model) {}
   display::emulator::ByteStream& stream() override { return session_.stream(); }
   absl::Status Receive() override { return session_.Receive(); }
+  void ReadOn() override { session_.ReadOn(); }
   bool Plugged(bool plugged) override {
     session_.SetPlugged(plugged);
     return true;
@@ -111,6 +114,7 @@ class Player {
     while (true) {
       device_.model->Tick();
       if (absl::Status status = FollowCable(); !status.ok()) return status;
+      if (session_ != nullptr) session_->ReadOn();
       std::vector<pollfd> fds = {{signals, POLLIN, 0}};
       if (listener_ >= 0 && session_ == nullptr) fds.push_back({listener_, POLLIN, 0});
       if (session_ != nullptr) {
