@@ -94,7 +94,8 @@ class Player {
       : device_(std::move(device)), clock_(clock), options_(options) {}
   ~Player() {
     session_ = nullptr;
-    if (listener_ >= 0) close(listener_);
+    if (listener_ < 0) return;
+    close(listener_);
     if (!options_.usbredir.empty()) unlink(options_.usbredir.c_str());
   }
 
@@ -215,10 +216,12 @@ class Player {
     }
     std::memcpy(address.sun_path, options_.usbredir.data(), options_.usbredir.size());
     listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0 ||
-        listen(listener_, 4) != 0) {
-      return Errno(options_.usbredir);
+    if (bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0) {
+      const absl::Status taken = Errno(options_.usbredir);
+      close(std::exchange(listener_, -1));  // the path is another's
+      return taken;
     }
+    if (listen(listener_, 4) != 0) return Errno(options_.usbredir);
     std::printf("usbredir on %s\n", options_.usbredir.c_str());
     return absl::OkStatus();
   }

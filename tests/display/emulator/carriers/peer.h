@@ -15,7 +15,10 @@ Bytes Hex(std::string_view text);
 
 class Peer {
  public:
+  // One end of a socketpair.
   Peer();
+  // A connection; takes it. There is no device end to take.
+  explicit Peer(int fd) : fd_(fd) {}
   ~Peer();
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
