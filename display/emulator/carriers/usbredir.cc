@@ -70,7 +70,10 @@ struct UsbredirSession::Callbacks {
     self.greeted_ = true;
     if (self.model_.plugged()) self.Connect();
   }
-  static void Reset(void* session) { Of(session).model_.Reset(); }
+  static void Reset(void* session) {
+    Of(session).model_.Reset();
+    Of(session).ReadHaltedAgain();
+  }
 
   static std::vector<std::byte> TakeData(UsbredirSession& self, uint8_t* data, int size) {
     std::vector<std::byte> bytes;
@@ -155,7 +158,8 @@ struct UsbredirSession::Callbacks {
     usb_redir_interrupt_receiving_status_header status{};
     status.endpoint = header->endpoint;
     usbredirparser_send_interrupt_receiving_status(self.parser_.get(), id, &status);
-    if (!std::exchange(self.reading_[header->endpoint], true)) {
+    const bool idle = self.reading_.insert(header->endpoint).second;
+    if (self.halted_.erase(header->endpoint) > 0 || idle) {
       self.to_read_.push_back(header->endpoint);
     }
   }
@@ -163,6 +167,7 @@ struct UsbredirSession::Callbacks {
                              usb_redir_stop_interrupt_receiving_header* header) {
     UsbredirSession& self = Of(session);
     self.reading_.erase(header->endpoint);
+    self.halted_.erase(header->endpoint);
     std::erase(self.to_read_, header->endpoint);
     std::erase_if(self.submitted_, [&](const auto& item) {
       const Submitted& read = item.second;
@@ -287,6 +292,7 @@ void UsbredirSession::SetPlugged(bool plugged) {
   submitted_.clear();
   pending_bytes_ = 0;
   reading_.clear();
+  halted_.clear();
   to_read_.clear();
   usbredirparser_send_device_disconnect(parser_.get());
   usbredirparser_do_write(parser_.get());
@@ -337,6 +343,11 @@ void UsbredirSession::Request(UsbSetup setup) {
   Submit({.kind = Submitted::Kind::kInternal, .endpoint = 0, .setup = setup}, 0);
 }
 
+void UsbredirSession::ReadHaltedAgain() {
+  to_read_.insert(to_read_.end(), halted_.begin(), halted_.end());
+  halted_.clear();
+}
+
 void UsbredirSession::ReadOn() {
   while (!to_read_.empty()) {
     for (const uint8_t endpoint : std::exchange(to_read_, {})) {
@@ -353,6 +364,12 @@ void UsbredirSession::OnComplete(uint64_t id, TransferStatus status, uint32_t ac
   const Submitted& submitted = node.mapped();
   pending_bytes_ -= submitted.length;
   if (status == TransferStatus::kDisconnected) return;
+  const bool clears_halt = submitted.setup.request_type == 0x02 && submitted.setup.request == 1;
+  const auto halt = halted_.find(static_cast<uint8_t>(submitted.setup.index));
+  if (clears_halt && status == TransferStatus::kOk && halt != halted_.end()) {
+    to_read_.push_back(*halt);
+    halted_.erase(halt);
+  }
   auto* const data = reinterpret_cast<uint8_t*>(const_cast<std::byte*>(in.data()));
   const auto size = static_cast<int>(in.size());
   switch (submitted.kind) {
@@ -387,6 +404,7 @@ void UsbredirSession::OnComplete(uint64_t id, TransferStatus status, uint32_t ac
       AnswerInterrupt(submitted, status, actual, in);
       break;
     case Submitted::Kind::kInternal:
+      ReadHaltedAgain();
       return;
   }
   usbredirparser_do_write(parser_.get());
@@ -395,16 +413,15 @@ void UsbredirSession::OnComplete(uint64_t id, TransferStatus status, uint32_t ac
 void UsbredirSession::AnswerInterrupt(const Submitted& submitted, TransferStatus status,
                                       uint32_t actual, std::span<const std::byte> in) {
   const bool reads = submitted.kind == Submitted::Kind::kInterruptIn;
-  if (reads && status == TransferStatus::kStall) {
-    // The other side asks anew, once its host has cleared the halt.
-    reading_.erase(submitted.endpoint);
-    usb_redir_interrupt_receiving_status_header header{};
-    header.status = usb_redir_stall;
-    header.endpoint = submitted.endpoint;
-    usbredirparser_send_interrupt_receiving_status(parser_.get(), 0, &header);
-    return;
+  if (reads && reading_.contains(submitted.endpoint)) {
+    // A halted endpoint stalls at once, as often as it is read. QEMU would not look at a status of the receiving
+    // until something else wakes it: the stall goes as a packet.
+    if (status == TransferStatus::kStall) {
+      halted_.insert(submitted.endpoint);
+    } else {
+      to_read_.push_back(submitted.endpoint);
+    }
   }
-  if (reads && reading_.contains(submitted.endpoint)) to_read_.push_back(submitted.endpoint);
   if (reads && status == TransferStatus::kCancelled) return;
   usb_redir_interrupt_packet_header header{};
   header.endpoint = submitted.endpoint;

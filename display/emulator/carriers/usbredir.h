@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -50,6 +51,7 @@ class UsbredirSession {
   void Submit(Submitted submitted, uint32_t length);
   // The host controller's own requests (configuration, interface), carried to the model.
   void Request(UsbSetup setup);
+  void ReadHaltedAgain();
   void AnswerInterrupt(const Submitted& submitted, TransferStatus status, uint32_t actual,
                        std::span<const std::byte> in);
   void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
@@ -60,13 +62,14 @@ class UsbredirSession {
   const std::unique_ptr<usbredirparser, void (*)(usbredirparser*)> parser_;
   uint64_t next_ = 1;  // the model's ids
   std::map<uint64_t, Submitted> submitted_;
-  size_t pending_bytes_ = 0;         // of submitted_
-  size_t budget_ = 0;                // bytes to read until others have their turn
-  bool greeted_ = false;             // the other side has said which protocol it speaks
-  bool connected_ = false;           // it has been told of the device
-  bool overrun_ = false;             // it let more wait than is allowed
-  std::map<uint8_t, bool> reading_;  // interrupt endpoints that the other side listens to
-  std::vector<uint8_t> to_read_;     // of them, those that no read waits on
+  size_t pending_bytes_ = 0;      // of submitted_
+  size_t budget_ = 0;             // bytes to read until others have their turn
+  bool greeted_ = false;          // the other side has said which protocol it speaks
+  bool connected_ = false;        // it has been told of the device
+  bool overrun_ = false;          // it let more wait than is allowed
+  std::set<uint8_t> reading_;     // interrupt endpoints that the other side listens to
+  std::set<uint8_t> halted_;      // of them, those that stalled and were not cleared since
+  std::vector<uint8_t> to_read_;  // of them, those that no read waits on
   std::map<uint8_t, uint16_t> packets_;
 };
 

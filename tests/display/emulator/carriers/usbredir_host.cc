@@ -102,12 +102,13 @@ UsbredirHost::UsbredirHost(Peer& peer)
 }
 
 void UsbredirHost::Control(uint64_t id, uint8_t type, uint8_t request, uint16_t value,
-                           uint16_t length, Bytes data) {
+                           uint16_t length, Bytes data, uint16_t index) {
   usb_redir_control_packet_header header{};
   header.endpoint = type & 0x80;
   header.requesttype = type;
   header.request = request;
   header.value = value;
+  header.index = index;
   header.length = length;
   usbredirparser_send_control_packet(parser(), id, &header, reinterpret_cast<uint8_t*>(data.data()),
                                      static_cast<int>(data.size()));

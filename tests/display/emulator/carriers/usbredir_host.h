@@ -31,7 +31,7 @@ class UsbredirHost {
 
   // Requests, sent at once.
   void Control(uint64_t id, uint8_t type, uint8_t request, uint16_t value, uint16_t length,
-               Bytes data = {});
+               Bytes data = {}, uint16_t index = 0);
   void BulkOut(uint64_t id, uint8_t endpoint, Bytes data);
   void StartInterrupts(uint64_t id, uint8_t endpoint);
   void StopInterrupts(uint64_t id, uint8_t endpoint);

@@ -150,20 +150,37 @@ TEST_F(Usbredir, InterruptsAreReadOnAndOn) {
 }
 
 // An endpoint that stalls does so at once, as often as it is read.
-TEST_F(Usbredir, AStallEndsTheReadingUntilItIsAskedForAnew) {
+TEST_F(Usbredir, AStallIsToldOnceAndReadingGoesOnWhenItIsCleared) {
   Greet();
   host_.StartInterrupts(3, 0x82);
   ASSERT_TRUE(Receive().ok());
   EndOnly(0x82, TransferStatus::kStall);
-  ASSERT_EQ(host_.receiving.size(), 2u);
-  EXPECT_EQ(host_.receiving[1].status, usb_redir_stall);
-  EXPECT_EQ(host_.receiving[1].endpoint, 0x82);
+  ASSERT_EQ(host_.interrupts.size(), 1u);
+  EXPECT_EQ(host_.interrupts[0].status, usb_redir_stall);
   EXPECT_TRUE(puppet_.pending.empty());
-  EXPECT_TRUE(host_.interrupts.empty());
+  host_.Control(4, 0x02, 1, 0, 0, {}, 0x01);  // another endpoint's halt
+  ASSERT_TRUE(Receive().ok());
+  EndOnly(0, TransferStatus::kOk);
+  EXPECT_TRUE(puppet_.pending.empty());
+  host_.Control(5, 0x02, 1, 0, 0, {}, 0x82);
+  ASSERT_TRUE(Receive().ok());
+  EndOnly(0, TransferStatus::kOk);
+  EndOnly(0x82, TransferStatus::kShort, 1, Hex("01"));
+  EXPECT_EQ(host_.interrupts.size(), 2u);
+}
+
+TEST_F(Usbredir, AHaltEndsWithAResetAndWhenReadingIsAskedForAnew) {
+  Greet();
+  host_.StartInterrupts(3, 0x82);
+  ASSERT_TRUE(Receive().ok());
+  EndOnly(0x82, TransferStatus::kStall);
+  usbredirparser_send_reset(host_.parser());
+  host_.Write();
+  ASSERT_TRUE(Receive().ok());
+  EndOnly(0x82, TransferStatus::kStall);
   host_.StartInterrupts(4, 0x82);
   ASSERT_TRUE(Receive().ok());
-  EndOnly(0x82, TransferStatus::kShort, 1, Hex("01"));
-  EXPECT_EQ(host_.interrupts.size(), 1u);
+  EXPECT_NE(puppet_.Only(0x82), 0u);
 }
 
 TEST_F(Usbredir, ErrorsAndCancelledReadsDoNotEndTheReading) {
