@@ -132,8 +132,17 @@ FaultInjector::FaultInjector(std::unique_ptr<UsbDeviceModel> device, FaultPlan p
 
 void FaultInjector::Add(Fault fault) {
   Planned planned{fault, sync::kNever};
-  if (fault.when == When::kTime) {
-    planned.time = clock_.Now() + static_cast<sync::TimeNs>(fault.at);
+  const Endpoint& passed = endpoints_[fault.endpoint];
+  switch (fault.when) {
+    case When::kTransfer:
+      planned.fault.at += passed.transfers;
+      break;
+    case When::kByte:
+      planned.fault.at += passed.bytes;
+      break;
+    case When::kTime:
+      planned.time = clock_.Now() + static_cast<sync::TimeNs>(fault.at);
+      break;
   }
   plan_.push_back(planned);
 }

@@ -58,7 +58,7 @@ class FaultInjector final : public UsbDeviceModel {
  public:
   FaultInjector(std::unique_ptr<UsbDeviceModel> device, FaultPlan plan, sync::Clock& clock);
 
-  // More faults; times count from now on.
+  // More faults; transfers, bytes and times count from now on.
   void Add(Fault fault);
   size_t faults_left() const { return plan_.size(); }
   // Takes back all that was planned and all that still lasts, and starts to count anew.

@@ -1,6 +1,7 @@
 // libusb's transport on this system's USB, whatever that is: a real kernel's with an emulated device, or
 // one that is faked. VOXELD_EMULATOR_CONTROL: the control socket of the emulator that plays
-// "voxlink,size=4x4x2,rate=100,serial=hil".
+// "voxlink,size=4x4x2,rate=100,serial=hil". VOXELD_HIL_RETRIES, if it is set: the host controller tries again after
+// a protocol error, as xhci does.
 
 #include <cstdlib>
 #include <memory>
@@ -52,7 +53,9 @@ class SystemCarrier final : public Carrier {
   }
   ~SystemCarrier() override { transport_->SetWake(nullptr); }
 
-  Limits limits() const override { return {}; }
+  Limits limits() const override {
+    return {.errors_are_retried = std::getenv("VOXELD_HIL_RETRIES") != nullptr};
+  }
   UsbTransport& transport() override { return *transport_; }
   void AddFault(const emulator::Fault& fault) override {
     control_.Ask("fault " + emulator::ToText(fault));

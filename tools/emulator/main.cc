@@ -52,6 +52,8 @@ class Session {
   virtual ~Session() = default;
   virtual display::emulator::ByteStream& stream() = 0;
   virtual absl::Status Receive() = 0;
+  // The model has done something.
+  virtual void ReadOn() {}
   // Tells that the device came or went. False: the connection is the cable, and has to end.
   virtual bool Plugged(bool plugged) = 0;
 };
@@ -72,6 +74,7 @@ class UsbredirCarrier final : public Session {
   UsbredirCarrier(int fd, display::UsbDeviceModel& model) : session_(fd, model) {}
   display::emulator::ByteStream& stream() override { return session_.stream(); }
   absl::Status Receive() override { return session_.Receive(); }
+  void ReadOn() override { session_.ReadOn(); }
   bool Plugged(bool plugged) override {
     session_.SetPlugged(plugged);
     return true;
@@ -91,7 +94,8 @@ class Player {
       : device_(std::move(device)), clock_(clock), options_(options) {}
   ~Player() {
     session_ = nullptr;
-    if (listener_ >= 0) close(listener_);
+    if (listener_ < 0) return;
+    close(listener_);
     if (!options_.usbredir.empty()) unlink(options_.usbredir.c_str());
   }
 
@@ -111,6 +115,7 @@ class Player {
     while (true) {
       device_.model->Tick();
       if (absl::Status status = FollowCable(); !status.ok()) return status;
+      if (session_ != nullptr) session_->ReadOn();
       std::vector<pollfd> fds = {{signals, POLLIN, 0}};
       if (listener_ >= 0 && session_ == nullptr) fds.push_back({listener_, POLLIN, 0});
       if (session_ != nullptr) {
@@ -211,10 +216,12 @@ class Player {
     }
     std::memcpy(address.sun_path, options_.usbredir.data(), options_.usbredir.size());
     listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0 ||
-        listen(listener_, 4) != 0) {
-      return Errno(options_.usbredir);
+    if (bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0) {
+      const absl::Status taken = Errno(options_.usbredir);
+      close(std::exchange(listener_, -1));  // the path is another's
+      return taken;
     }
+    if (listen(listener_, 4) != 0) return Errno(options_.usbredir);
     std::printf("usbredir on %s\n", options_.usbredir.c_str());
     return absl::OkStatus();
   }

@@ -44,7 +44,12 @@ size_t ByteStream::Write(std::span<const std::byte> bytes) {
 
 void ByteStream::Send(std::span<const std::byte> bytes) {
   if (!wants_to_send()) bytes = bytes.subspan(Write(bytes));
-  if (open_) out_.insert(out_.end(), bytes.begin(), bytes.end());
+  if (!open_ || bytes.empty()) return;
+  if (sent_ > out_.size() / 2) {
+    out_.erase(out_.begin(), out_.begin() + static_cast<ptrdiff_t>(sent_));
+    sent_ = 0;
+  }
+  out_.insert(out_.end(), bytes.begin(), bytes.end());
 }
 
 void ByteStream::SendWaiting() {

@@ -17,7 +17,9 @@ class ByteStream {
 
   int fd() const { return fd_; }
   bool open() const { return open_; }
-  bool wants_to_send() const { return open_ && sent_ < out_.size(); }
+  bool wants_to_send() const { return open_ && waiting() > 0; }
+  // Bytes that the other side has not taken yet.
+  size_t waiting() const { return out_.size() - sent_; }
   void Shutdown();
 
   // Sends at once what the socket takes.

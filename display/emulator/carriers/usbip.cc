@@ -8,12 +8,15 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <sstream>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "display/emulator/carriers/limits.h"
 #include "display/emulator/carriers/model_facts.h"
 
 namespace voxeld::display::emulator {
@@ -22,6 +25,8 @@ namespace {
 constexpr uint32_t kSubmit = 1, kUnlink = 2, kSubmitReply = 3, kUnlinkReply = 4;
 constexpr uint32_t kZeroPacket = 0x40;  // URB_ZERO_PACKET
 constexpr uint32_t kMostBytes = 64u << 20;
+constexpr uint32_t kNotIsochronous = 0xFFFFFFFF;  // of `packets`; older kernels: 0
+constexpr int kMostCommands = 256;                // in one call: others want their turn
 constexpr uint16_t kVersion = 0x0111;
 constexpr uint16_t kDeviceListRequest = 0x8005, kDeviceListReply = 0x0005;
 constexpr uint16_t kImportRequest = 0x8003, kImportReply = 0x0003;
@@ -99,10 +104,13 @@ UsbipSession::~UsbipSession() {
 }
 
 absl::Status UsbipSession::Receive() {
-  while (true) {
+  for (int i = 0; i < kMostCommands; ++i) {
     const absl::StatusOr<bool> one = ReceiveOne();
     if (!one.ok()) return one.status();
     if (!*one) break;
+  }
+  if (stream_.waiting() > kMostWaiting) {
+    return absl::ResourceExhaustedError("the other side does not take its answers");
   }
   if (!stream_.open()) return absl::UnavailableError("the other side has gone");
   return absl::OkStatus();
@@ -120,9 +128,9 @@ absl::StatusOr<bool> UsbipSession::ReceiveOne() {
   const bool in = ntohl(header.direction) != 0;
   if (command == kUnlink) {
     have_ = 0;
-    const uint32_t victim = ntohl(header.flags);
-    const bool pending = model_.Unlink(victim);
-    submitted_.erase(victim);
+    const auto victim = submitted_.find(ntohl(header.flags));
+    const bool pending = victim != submitted_.end() && model_.Unlink(victim->first);
+    if (pending) Forget(victim);
     Header reply{};
     reply.command = htonl(kUnlinkReply);
     reply.number = header.number;
@@ -130,10 +138,20 @@ absl::StatusOr<bool> UsbipSession::ReceiveOne() {
     stream_.Send(BytesOf(reply));
     return true;
   }
-  const uint32_t length = ntohl(header.length);
+  const uint32_t length = ntohl(header.length), packets = ntohl(header.packets);
   if (command != kSubmit || length > kMostBytes || ntohl(header.endpoint) > 15) {
     return absl::InvalidArgumentError(absl::StrCat("USB/IP command ", command, " of ", length,
                                                    " bytes on endpoint ", ntohl(header.endpoint)));
+  }
+  if (packets != 0 && packets != kNotIsochronous) {
+    return absl::UnimplementedError("an isochronous USB/IP transfer");
+  }
+  if (submitted_.contains(number)) {
+    return absl::InvalidArgumentError(absl::StrCat("USB/IP number ", number, " is in use"));
+  }
+  if (submitted_.size() >= kMostPending || pending_bytes_ + length > kMostPendingBytes) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(submitted_.size(), " USB/IP transfers wait, of ", pending_bytes_, " bytes"));
   }
   const size_t follows = in ? 0 : length;
   if (have_ == sizeof(Header)) payload_.resize(follows);
@@ -153,16 +171,23 @@ void UsbipSession::Submit(uint32_t number, bool in) {
   const uint32_t endpoint = ntohl(header.endpoint);
   Submitted& submitted = submitted_[number];
   submitted.in = in;
+  submitted.length = ntohl(header.length);
+  pending_bytes_ += submitted.length;
   submitted.out = std::move(payload_);
   payload_ = {};
   Urb urb;
   urb.id = number;
   urb.endpoint = static_cast<uint8_t>(endpoint == 0 ? 0 : endpoint | (in ? 0x80u : 0u));
   urb.out = submitted.out;
-  urb.length = in ? ntohl(header.length) : 0;
+  urb.length = in ? submitted.length : 0;
   urb.zero_packet = (ntohl(header.flags) & kZeroPacket) != 0;
   if (endpoint == 0) urb.setup = ParseSetup(header.setup);
   model_.Submit(urb);
+}
+
+void UsbipSession::Forget(std::map<uint64_t, Submitted>::iterator which) {
+  pending_bytes_ -= which->second.length;
+  submitted_.erase(which);
 }
 
 void UsbipSession::OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
@@ -176,22 +201,26 @@ void UsbipSession::OnComplete(uint64_t id, TransferStatus status, uint32_t actua
     return;
   }
   const bool reads = it->second.in;
+  in = in.first(std::min<size_t>(in.size(), it->second.length));
   Header reply{};
   reply.command = htonl(kSubmitReply);
   reply.number = htonl(static_cast<uint32_t>(id));
   reply.flags = htonl(KernelStatus(status));
   reply.length = htonl(reads ? static_cast<uint32_t>(in.size()) : actual);
-  submitted_.erase(it);
+  Forget(it);
   stream_.Send(BytesOf(reply));
   if (reads) stream_.Send(in);
 }
 
 absl::StatusOr<bool> AnswerUsbipHandshake(int fd, UsbDeviceModel& model, int limit_ms) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(limit_ms);
   const auto receive = [&](void* into, size_t size) {
     auto* at = static_cast<char*>(into);
     while (size > 0) {
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
       pollfd ready{fd, POLLIN, 0};
-      if (poll(&ready, 1, limit_ms) <= 0) return false;
+      if (left.count() <= 0 || poll(&ready, 1, static_cast<int>(left.count())) <= 0) return false;
       const ssize_t n = recv(fd, at, size, 0);
       if (n <= 0) return false;
       at += n;
@@ -203,7 +232,13 @@ absl::StatusOr<bool> AnswerUsbipHandshake(int fd, UsbDeviceModel& model, int lim
     return send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size());
   };
   Operation request{};
-  if (!receive(&request, sizeof(request))) return Errno("no USB/IP request");
+  if (!receive(&request, sizeof(request))) {
+    return absl::UnavailableError("no whole USB/IP request came");
+  }
+  if (ntohs(request.version) != kVersion) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("USB/IP version 0x%04x; this is 0x%04x", ntohs(request.version), kVersion));
+  }
   const ModelFacts facts = ReadFacts(model);
   DeviceRecord record{};
   std::snprintf(record.path, sizeof(record.path), "/sys/devices/emulated/%s", kBusId);
@@ -218,9 +253,10 @@ absl::StatusOr<bool> AnswerUsbipHandshake(int fd, UsbDeviceModel& model, int lim
   record.interfaces = static_cast<uint8_t>(facts.interfaces.size());
   const uint16_t code = ntohs(request.code);
   if (code == kDeviceListRequest) {
-    const uint32_t count = htonl(1);
+    const bool plugged = model.plugged();
+    const uint32_t count = htonl(plugged ? 1 : 0);
     bool sent = reply(BytesOf(Operation{htons(kVersion), htons(kDeviceListReply), 0})) &&
-                reply(BytesOf(count)) && reply(BytesOf(record));
+                reply(BytesOf(count)) && (!plugged || reply(BytesOf(record)));
     for (const std::array<uint8_t, 3>& triple : facts.interfaces) {
       const uint8_t interface[4] = {triple[0], triple[1], triple[2], 0};
       sent = sent && reply(BytesOf(interface));
@@ -229,8 +265,11 @@ absl::StatusOr<bool> AnswerUsbipHandshake(int fd, UsbDeviceModel& model, int lim
     return false;
   }
   char bus_id[32];
-  if (code != kImportRequest || !receive(bus_id, sizeof(bus_id))) {
-    return absl::InvalidArgumentError(absl::StrCat("USB/IP request ", code));
+  if (code != kImportRequest) {
+    return absl::InvalidArgumentError(absl::StrFormat("USB/IP request 0x%04x", code));
+  }
+  if (!receive(bus_id, sizeof(bus_id))) {
+    return absl::UnavailableError("no whole USB/IP request came");
   }
   const bool known = model.plugged() && strncmp(bus_id, kBusId, sizeof(bus_id)) == 0;
   const Operation answer{htons(kVersion), htons(kImportReply), htonl(known ? 0 : 1)};

@@ -25,12 +25,15 @@ class UsbipSession {
   UsbipSession& operator=(const UsbipSession&) = delete;
 
   ByteStream& stream() { return stream_; }
-  // Reads commands and carries them out. What breaks the protocol ends the session.
+  // Reads commands and carries them out. Anything but OK ends the session: InvalidArgument for what is not
+  // the protocol, Unimplemented for isochronous transfers, ResourceExhausted for more than any host lets wait,
+  // Unavailable if the other side has gone.
   absl::Status Receive();
 
  private:
   struct Submitted {
     bool in = false;
+    uint32_t length = 0;
     std::vector<std::byte> out;
   };
 
@@ -39,6 +42,7 @@ class UsbipSession {
   void Submit(uint32_t number, bool in);
   void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
                   std::span<const std::byte> in);
+  void Forget(std::map<uint64_t, Submitted>::iterator which);
 
   ByteStream stream_;
   UsbDeviceModel& model_;
@@ -46,11 +50,13 @@ class UsbipSession {
   std::vector<std::byte> payload_;  // and what follows it
   size_t have_ = 0;                 // of both
   std::map<uint64_t, Submitted> submitted_;
+  size_t pending_bytes_ = 0;  // of submitted_
 };
 
 // Answers the handshake of one connection (OP_REQ_DEVLIST, OP_REQ_IMPORT for bus id "1-1"), which may
 // wait for the other side for at most `limit_ms`. True: the URBs follow; false: it asked only for the
-// list.
+// list. InvalidArgument for what is not the protocol, NotFound for another device or one that is not
+// plugged in, Unavailable if the other side has gone or keeps silent.
 absl::StatusOr<bool> AnswerUsbipHandshake(int fd, UsbDeviceModel& model, int limit_ms);
 
 // Attaches to this kernel's vhci_hcd through sysfs; needs root. The descriptor is the device's end.

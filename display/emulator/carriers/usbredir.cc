@@ -8,10 +8,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "display/emulator/carriers/limits.h"
 #include "display/emulator/carriers/model_facts.h"
 
 namespace voxeld::display::emulator {
 namespace {
+
+constexpr size_t kBytesPerTurn = 4u << 20;
 
 int Status(TransferStatus status) {
   switch (status) {
@@ -49,9 +52,12 @@ struct UsbredirSession::Callbacks {
 
   static void Log(void*, int, const char*) {}
   static int Read(void* session, uint8_t* data, int count) {
-    ByteStream& stream = Of(session).stream_;
-    const size_t got =
-        stream.Receive({reinterpret_cast<std::byte*>(data), static_cast<size_t>(count)});
+    UsbredirSession& self = Of(session);
+    ByteStream& stream = self.stream_;
+    const size_t most = std::min(static_cast<size_t>(count), self.budget_);
+    if (most == 0) return 0;
+    const size_t got = stream.Receive({reinterpret_cast<std::byte*>(data), most});
+    self.budget_ -= got;
     return got == 0 && !stream.open() ? -1 : static_cast<int>(got);
   }
   static int Write(void* session, uint8_t* data, int count) {
@@ -61,9 +67,13 @@ struct UsbredirSession::Callbacks {
   }
   static void Hello(void* session, usb_redir_hello_header*) {
     UsbredirSession& self = Of(session);
+    self.greeted_ = true;
     if (self.model_.plugged()) self.Connect();
   }
-  static void Reset(void* session) { Of(session).model_.Reset(); }
+  static void Reset(void* session) {
+    Of(session).model_.Reset();
+    Of(session).ReadHaltedAgain();
+  }
 
   static std::vector<std::byte> TakeData(UsbredirSession& self, uint8_t* data, int size) {
     std::vector<std::byte> bytes;
@@ -111,9 +121,9 @@ struct UsbredirSession::Callbacks {
           return item.second.id == id && item.second.kind != Submitted::Kind::kInterruptIn &&
                  item.second.kind != Submitted::Kind::kInternal;
         });
-    if (it != self.submitted_.end() && self.model_.Unlink(it->first)) {
-      self.OnComplete(it->first, TransferStatus::kCancelled, 0, {});
-    }
+    if (it == self.submitted_.end()) return;
+    const uint64_t ours = it->first;
+    if (self.model_.Unlink(ours)) self.OnComplete(ours, TransferStatus::kCancelled, 0, {});
   }
   static void SetConfiguration(void* session, uint64_t id,
                                usb_redir_set_configuration_header* header) {
@@ -148,22 +158,46 @@ struct UsbredirSession::Callbacks {
     usb_redir_interrupt_receiving_status_header status{};
     status.endpoint = header->endpoint;
     usbredirparser_send_interrupt_receiving_status(self.parser_.get(), id, &status);
-    if (!std::exchange(self.reading_[header->endpoint], true)) {
-      self.ReadInterrupts(header->endpoint);
+    const bool idle = self.reading_.insert(header->endpoint).second;
+    if (self.halted_.erase(header->endpoint) > 0 || idle) {
+      self.to_read_.push_back(header->endpoint);
     }
   }
   static void StopInterrupts(void* session, uint64_t id,
                              usb_redir_stop_interrupt_receiving_header* header) {
     UsbredirSession& self = Of(session);
-    self.reading_[header->endpoint] = false;
-    for (auto it = self.submitted_.begin(); it != self.submitted_.end();) {
-      const bool reads = it->second.kind == Submitted::Kind::kInterruptIn &&
-                         it->second.endpoint == header->endpoint;
-      it = reads && self.model_.Unlink(it->first) ? self.submitted_.erase(it) : std::next(it);
-    }
+    self.reading_.erase(header->endpoint);
+    self.halted_.erase(header->endpoint);
+    std::erase(self.to_read_, header->endpoint);
+    std::erase_if(self.submitted_, [&](const auto& item) {
+      const Submitted& read = item.second;
+      if (read.kind != Submitted::Kind::kInterruptIn || read.endpoint != header->endpoint ||
+          !self.model_.Unlink(item.first)) {
+        return false;
+      }
+      self.pending_bytes_ -= read.length;
+      return true;
+    });
     usb_redir_interrupt_receiving_status_header status{};
     status.endpoint = header->endpoint;
     usbredirparser_send_interrupt_receiving_status(self.parser_.get(), id, &status);
+  }
+  // Isochronous streams; there is no device that has such endpoints.
+  static void StartStream(void* session, uint64_t id, usb_redir_start_iso_stream_header* header) {
+    RefuseStream(session, id, header->endpoint);
+  }
+  static void StopStream(void* session, uint64_t id, usb_redir_stop_iso_stream_header* header) {
+    RefuseStream(session, id, header->endpoint);
+  }
+  static void RefuseStream(void* session, uint64_t id, uint8_t endpoint) {
+    usb_redir_iso_stream_status_header status{};
+    status.status = usb_redir_inval;
+    status.endpoint = endpoint;
+    usbredirparser_send_iso_stream_status(Of(session).parser_.get(), id, &status);
+  }
+  static void StreamPacket(void* session, uint64_t, usb_redir_iso_packet_header*, uint8_t* data,
+                           int size) {
+    TakeData(Of(session), data, size);
   }
   static void DisconnectAck(void*) {}
   static void FilterReject(void*) {}
@@ -189,6 +223,9 @@ UsbredirSession::UsbredirSession(int fd, UsbDeviceModel& model)
   parser.get_alt_setting_func = &Callbacks::GetAlternate;
   parser.start_interrupt_receiving_func = &Callbacks::StartInterrupts;
   parser.stop_interrupt_receiving_func = &Callbacks::StopInterrupts;
+  parser.start_iso_stream_func = &Callbacks::StartStream;
+  parser.stop_iso_stream_func = &Callbacks::StopStream;
+  parser.iso_packet_func = &Callbacks::StreamPacket;
   parser.device_disconnect_ack_func = &Callbacks::DisconnectAck;
   parser.filter_reject_func = &Callbacks::FilterReject;
   parser.filter_filter_func = &Callbacks::Filter;
@@ -210,6 +247,8 @@ UsbredirSession::~UsbredirSession() {
 }
 
 void UsbredirSession::Connect() {
+  connected_ = true;
+  packets_.clear();
   const ModelFacts facts = ReadFacts(model_);
   model_.SetComplete([this](uint64_t id, TransferStatus status, uint32_t actual,
                             std::span<const std::byte> in) { OnComplete(id, status, actual, in); });
@@ -246,23 +285,48 @@ void UsbredirSession::Connect() {
 }
 
 void UsbredirSession::SetPlugged(bool plugged) {
+  // Before the greeting nobody can be told; then Hello looks.
+  if (!greeted_ || plugged == connected_) return;
   if (plugged) return Connect();
+  connected_ = false;
   submitted_.clear();
+  pending_bytes_ = 0;
   reading_.clear();
+  halted_.clear();
+  to_read_.clear();
   usbredirparser_send_device_disconnect(parser_.get());
   usbredirparser_do_write(parser_.get());
 }
 
 absl::Status UsbredirSession::Receive() {
+  budget_ = kBytesPerTurn;
   const int result = usbredirparser_do_read(parser_.get());
+  ReadOn();
   if (usbredirparser_has_data_to_write(parser_.get()) > 0) usbredirparser_do_write(parser_.get());
-  if (result == 0) return absl::OkStatus();
-  return stream_.open() ? absl::InvalidArgumentError("what came is not usbredir")
-                        : absl::UnavailableError("the other side has gone");
+  if (overrun_) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(submitted_.size(), " usbredir transfers wait, of ", pending_bytes_, " bytes"));
+  }
+  if (stream_.waiting() > kMostWaiting) {
+    return absl::ResourceExhaustedError("the other side does not take its answers");
+  }
+  if (result != 0 && stream_.open()) {
+    return absl::InvalidArgumentError("what came is not usbredir");
+  }
+  if (!stream_.open()) return absl::UnavailableError("the other side has gone");
+  return absl::OkStatus();
 }
 
 void UsbredirSession::Submit(Submitted submitted, uint32_t length) {
+  // To a device that is not there any more, as far as the other side can know.
+  if (!connected_) return;
+  if (submitted_.size() >= kMostPending || pending_bytes_ + length > kMostPendingBytes) {
+    overrun_ = true;
+    return;
+  }
   const uint64_t id = next_++;
+  submitted.length = length;
+  pending_bytes_ += length;
   const Submitted& kept = submitted_[id] = std::move(submitted);
   Urb urb;
   urb.id = id;
@@ -279,16 +343,33 @@ void UsbredirSession::Request(UsbSetup setup) {
   Submit({.kind = Submitted::Kind::kInternal, .endpoint = 0, .setup = setup}, 0);
 }
 
-void UsbredirSession::ReadInterrupts(uint8_t endpoint) {
-  Submit({.kind = Submitted::Kind::kInterruptIn, .endpoint = endpoint, .setup = {}},
-         packets_[endpoint]);
+void UsbredirSession::ReadHaltedAgain() {
+  to_read_.insert(to_read_.end(), halted_.begin(), halted_.end());
+  halted_.clear();
+}
+
+void UsbredirSession::ReadOn() {
+  while (!to_read_.empty()) {
+    for (const uint8_t endpoint : std::exchange(to_read_, {})) {
+      Submit({.kind = Submitted::Kind::kInterruptIn, .endpoint = endpoint, .setup = {}, .out = {}},
+             packets_[endpoint]);
+    }
+  }
 }
 
 void UsbredirSession::OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
                                  std::span<const std::byte> in) {
   auto node = submitted_.extract(id);
-  if (node.empty() || status == TransferStatus::kDisconnected) return;
+  if (node.empty()) return;
   const Submitted& submitted = node.mapped();
+  pending_bytes_ -= submitted.length;
+  if (status == TransferStatus::kDisconnected) return;
+  const bool clears_halt = submitted.setup.request_type == 0x02 && submitted.setup.request == 1;
+  const auto halt = halted_.find(static_cast<uint8_t>(submitted.setup.index));
+  if (clears_halt && status == TransferStatus::kOk && halt != halted_.end()) {
+    to_read_.push_back(*halt);
+    halted_.erase(halt);
+  }
   auto* const data = reinterpret_cast<uint8_t*>(const_cast<std::byte*>(in.data()));
   const auto size = static_cast<int>(in.size());
   switch (submitted.kind) {
@@ -319,23 +400,37 @@ void UsbredirSession::OnComplete(uint64_t id, TransferStatus status, uint32_t ac
       break;
     }
     case Submitted::Kind::kInterruptOut:
-    case Submitted::Kind::kInterruptIn: {
-      usb_redir_interrupt_packet_header header{};
-      header.endpoint = submitted.endpoint;
-      header.status = static_cast<uint8_t>(Status(status));
-      header.length = static_cast<uint16_t>(in.empty() ? actual : in.size());
-      usbredirparser_send_interrupt_packet(parser_.get(), submitted.id, &header,
-                                           in.empty() ? nullptr : data, size);
-      if (submitted.kind == Submitted::Kind::kInterruptIn && reading_[submitted.endpoint] &&
-          status != TransferStatus::kCancelled) {
-        ReadInterrupts(submitted.endpoint);
-      }
+    case Submitted::Kind::kInterruptIn:
+      AnswerInterrupt(submitted, status, actual, in);
       break;
-    }
     case Submitted::Kind::kInternal:
+      ReadHaltedAgain();
       return;
   }
   usbredirparser_do_write(parser_.get());
+}
+
+void UsbredirSession::AnswerInterrupt(const Submitted& submitted, TransferStatus status,
+                                      uint32_t actual, std::span<const std::byte> in) {
+  const bool reads = submitted.kind == Submitted::Kind::kInterruptIn;
+  if (reads && reading_.contains(submitted.endpoint)) {
+    // A halted endpoint stalls at once, as often as it is read. QEMU would not look at a status of the receiving
+    // until something else wakes it: the stall goes as a packet.
+    if (status == TransferStatus::kStall) {
+      halted_.insert(submitted.endpoint);
+    } else {
+      to_read_.push_back(submitted.endpoint);
+    }
+  }
+  if (reads && status == TransferStatus::kCancelled) return;
+  usb_redir_interrupt_packet_header header{};
+  header.endpoint = submitted.endpoint;
+  header.status = static_cast<uint8_t>(Status(status));
+  header.length = static_cast<uint16_t>(reads ? in.size() : actual);
+  usbredirparser_send_interrupt_packet(
+      parser_.get(), submitted.id, &header,
+      in.empty() ? nullptr : reinterpret_cast<uint8_t*>(const_cast<std::byte*>(in.data())),
+      static_cast<int>(in.size()));
 }
 
 }  // namespace voxeld::display::emulator

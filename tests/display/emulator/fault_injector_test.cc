@@ -117,6 +117,23 @@ constexpr TransferStatus kStall = TransferStatus::kStall;
 constexpr TransferStatus kError = TransferStatus::kError;
 constexpr TransferStatus kDisconnected = TransferStatus::kDisconnected;
 
+TEST_F(Injector, TransfersAndBytesCountFromWhenAFaultIsAdded) {
+  Send(1);
+  Send(2);
+  Plan("stall@t2");
+  Send(3);
+  Send(4);
+  ASSERT_EQ(done_.size(), 4u);
+  EXPECT_EQ(done_[2].status, TransferStatus::kOk);
+  EXPECT_EQ(done_[3].status, TransferStatus::kStall);
+  ClearHalt(5, 1);
+  bytes_.clear();
+  Plan("corrupt:1@b12");
+  Send(6);
+  Send(7);
+  EXPECT_EQ(Received(), "6061626364656667686970718d73747576777879");
+}
+
 TEST_F(Injector, WithoutAPlanAllPasses) {
   Send(1);
   EXPECT_EQ(done_, (std::vector<Done>{{1, kOk, 10}}));

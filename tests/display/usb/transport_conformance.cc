@@ -128,13 +128,17 @@ TEST_P(TransportConformance, AHaltLastsUntilItIsCleared) {
   EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kOk);
 }
 
-TEST_P(TransportConformance, ErrorsPassAndPartialTransfersTell) {
-  carrier_->AddFault({.what = Fault::What::kError, .amount = 1});
-  carrier_->AddFault({.at = 2, .what = Fault::What::kPartial, .amount = 4});
+TEST_P(TransportConformance, ErrorsPass) {
+  // More than any host controller tries again.
+  const uint64_t count = carrier_->limits().errors_are_retried ? 40 : 1;
+  carrier_->AddFault({.what = Fault::What::kError, .amount = count});
   Open();
-  const TransferStatus first = Wait(SubmitBulk(TransferBytes(10))).status;
-  if (carrier_->limits().errors_are_retried && first == TransferStatus::kOk) return;
-  EXPECT_EQ(first, TransferStatus::kError);
+  EXPECT_EQ(Wait(SubmitBulk(TransferBytes(10))).status, TransferStatus::kError);
+}
+
+TEST_P(TransportConformance, PartialTransfersTell) {
+  carrier_->AddFault({.what = Fault::What::kPartial, .amount = 4});
+  Open();
   const TransferCompletion partial = Wait(SubmitBulk(TransferBytes(10)));
   EXPECT_EQ(partial.status, TransferStatus::kStall);
   EXPECT_EQ(partial.actual_length, 4u);
@@ -189,22 +193,23 @@ TEST_P(TransportConformance, CloseLetsARequestGoOut) {
 }
 
 TEST_P(TransportConformance, ResetCancelsWhatIsInFlightAndTheDeviceStartsAnew) {
-  // No event comes in time for the second read.
-  carrier_->AddFault({.at = 2,
-                      .endpoint = voxlink::kInterruptIn,
-                      .what = Fault::What::kNak,
-                      .amount = 5 * kSecond});
+  // No event comes between.
+  carrier_->AddFault(
+      {.endpoint = voxlink::kInterruptIn, .what = Fault::What::kNak, .amount = 60 * kSecond});
   Open();
+  const auto running = [&] {
+    const TransferCompletion status =
+        Wait(SubmitIn({.request_type = voxlink::kRequestIn,
+                       .request = static_cast<uint8_t>(voxlink::Request::kGetStatus),
+                       .length = sizeof(voxlink::Status)}));
+    return voxlink::Load<voxlink::Status>(status.data).running;
+  };
   Wait(SubmitRequest(voxlink::Request::kStart));
-  EXPECT_EQ(Wait(SubmitEvent()).status, TransferStatus::kShort);
+  EXPECT_EQ(running(), 1);
   const TransferId read = SubmitEvent();
   EXPECT_EQ(Wait(Must(usb().Reset())).status, TransferStatus::kOk);
   EXPECT_EQ(Wait(read).status, TransferStatus::kCancelled);
-  const TransferCompletion status =
-      Wait(SubmitIn({.request_type = voxlink::kRequestIn,
-                     .request = static_cast<uint8_t>(voxlink::Request::kGetStatus),
-                     .length = sizeof(voxlink::Status)}));
-  EXPECT_EQ(voxlink::Load<voxlink::Status>(status.data).running, 0);
+  EXPECT_EQ(running(), 0);
 }
 
 TEST_P(TransportConformance, AnArrivalIsToldOnceWhileNothingIsOpen) {

@@ -23,7 +23,7 @@ class Carrier {
   // What a carrier cannot show as the device does it.
   struct Limits {
     size_t max_bytes_in_flight = 0;   // 0: the system's
-    bool errors_are_retried = false;  // a single protocol error may not be seen
+    bool errors_are_retried = false;  // a few protocol errors in a row may not be seen
   };
 
   virtual ~Carrier() = default;
