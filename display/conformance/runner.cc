@@ -58,13 +58,15 @@ class Desk {
     absl::Status status = subject_.transport->is_open() ? Rest() : absl::UnavailableError("");
     if (status.ok()) return status;
     subject_.transport->Close();
-    const sync::TimeNs deadline = clock_.Now() + kComeBack;
+    // The next case need not wait as long again.
+    const sync::TimeNs deadline = clock_.Now() + (gone_ ? 0 : kComeBack);
     while (true) {
       status = subject_.transport->Open();
       if (status.ok() || clock_.Now() >= deadline || cancelled()) break;
       const sync::TimeNs next = std::min(deadline, clock_.Now() + kLook);
       while (clock_.Now() < next) waiter_.Wait(next);
     }
+    gone_ = !status.ok();
     return status.ok() ? Rest() : status;
   }
 
@@ -72,6 +74,7 @@ class Desk {
   sync::Clock& clock_;
   Waiter& waiter_;
   const RunOptions& options_;
+  bool gone_ = false;  // it did not come back when it was waited for
 };
 
 }  // namespace

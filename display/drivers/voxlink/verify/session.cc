@@ -34,8 +34,9 @@ void Session::Start() { Start(SmallestMode()); }
 
 void Session::Start(const Mode& mode) {
   if (!ok()) return;
-  layout_ = LayoutOf(mode);
+  const FrameLayout layout = LayoutOf(mode);
   if (!ok()) return;
+  layout_ = layout;
   if (layout_.bytes() > kLargestVolume) {
     return check().NotApplicable(absl::StrCat("a volume has ", layout_.bytes(), " bytes; at most ",
                                               kLargestVolume, " are sent for a case"));
@@ -44,7 +45,7 @@ void Session::Start(const Mode& mode) {
   const uint32_t rate = GetMode().rate_mhz;
   if (!ok()) return;
   if (rate == 0) return check().Fail("GET_MODE gives the rate in use", "a rate of 0", "4.3");
-  period_ = 1000 * kSecond / static_cast<sync::TimeNs>(rate);
+  period_ = std::max<sync::TimeNs>(1000 * kSecond / static_cast<sync::TimeNs>(rate), 1);
   if (period_ > kLongestPeriod) {
     return check().NotApplicable(
         absl::StrCat("a sweep takes ", period_ / kMillisecond, " ms; at most 5000 are waited for"));
@@ -170,7 +171,8 @@ size_t Session::WaitForCredit() {
                    "7");
       return 0;
     }
-    Step(begin + kStuck + kMillisecond);
+    if (!listening_) GetStatus();  // it gives credit as events do
+    Step(std::min(begin + kStuck, probe_.Now() + kStatusInterval) + kMillisecond);
   }
   return ok() ? static_cast<size_t>(credit_limit_ - sent_) : 0;
 }

@@ -154,8 +154,9 @@ class Session {
   std::optional<DeviceCapabilities> capabilities_;
 
   bool running_ = false, keepalive_ = true, listening_ = true;
-  FrameLayout layout_;
-  sync::TimeNs period_ = 0;
+  // Never nothing, so that a case may reckon with them although START failed.
+  FrameLayout layout_{.slices = 1, .width = 1, .height = 1};
+  sync::TimeNs period_ = sync::kSecond;
   PacketWriter writer_;
   std::vector<std::byte> gathered_;
   std::function<size_t()> split_;

@@ -53,9 +53,11 @@ void OddSizes(Probe& probe) {
   session.Start();
   static constexpr uint32_t kSizes[] = {1, 3, 39, 40, 41, 63, 64, 65, 511, 512, 513, 1023, 1025};
   // Short ones where the packets begin, longer ones through the pixels.
+  const auto most =
+      static_cast<uint32_t>(std::clamp<size_t>(session.layout().bytes() / 16, 64, 30'000));
   session.SetSplit([&]() -> size_t {
     const uint32_t choice = probe.Random(32);
-    return choice < std::size(kSizes) ? kSizes[choice] : 1 + probe.Random(30'000);
+    return choice < std::size(kSizes) ? kSizes[choice] : 1 + probe.Random(most);
   });
   session.Whole(1);
   session.ExpectComplete(1);
