@@ -57,14 +57,16 @@ TEST(CommandLine, Play) {
 }
 
 TEST(CommandLine, Verify) {
-  const auto verify = std::get<VerifyOptions>(
-      Parse("verify lab=voxlink,serial=A1 --filter volume.* --junit out.xml --seed 42 --list")
-          .command);
+  const auto verify =
+      std::get<VerifyOptions>(Parse("verify lab=voxlink,serial=A1 --filter volume.* --junit "
+                                    "out.xml --seed 42 --list --wait 2.5")
+                                  .command);
   EXPECT_EQ(verify.display, "lab=voxlink,serial=A1");
   EXPECT_EQ(verify.filter, "volume.*");
   EXPECT_EQ(verify.junit, "out.xml");
   EXPECT_EQ(verify.seed, 42u);
   EXPECT_TRUE(verify.list);
+  EXPECT_EQ(verify.wait_s, 2.5);
   const auto plain = std::get<VerifyOptions>(Parse("verify simulated").command);
   EXPECT_EQ(plain.filter + plain.junit, "");
   EXPECT_EQ(plain.seed, 1u);

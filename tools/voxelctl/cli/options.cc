@@ -260,7 +260,7 @@ class Parser {
     CLI::App* c = Add("verify", kVerifyAbout);
     c->add_option("DISPLAY", verify_.display, "[NAME=]DRIVER[,KEY=VALUE…]");
     c->add_option("--filter", verify_.filter,
-                  "Only the cases whose names match, such as 'volume.*'")
+                  "Only the cases whose names match: 'volume.*', '@(volume|end).*', '!(usb.*)'")
         ->type_name("GLOB");
     c->add_flag("--list", verify_.list, "Name the cases and end; no device is needed");
     c->add_option("--junit", verify_.junit, "Write JUnit's XML too, for build servers")
@@ -270,6 +270,8 @@ class Parser {
         ->type_name("N")
         ->capture_default_str();
     WantNumber(c->get_option("--seed"), 0, 4294967295.0);
+    AddNumber(c, "--wait", &verify_.wait_s, 0, 3600,
+              "Seconds to wait for the device, such as after its firmware was written", "S");
   }
 
   // CLI11 says nothing useful about a command that is not there.

@@ -65,6 +65,7 @@ struct VerifyOptions {
   std::string junit;    // a file to write, or nothing
   bool list = false;
   uint64_t seed = 1;
+  double wait_s = 0;  // for the device to be attached
 };
 
 struct Options {

@@ -2,6 +2,7 @@
 
 #include <fnmatch.h>
 
+#include <algorithm>
 #include <fstream>
 #include <memory>
 #include <utility>
@@ -118,7 +119,8 @@ class Command {
   }
 
   bool Wanted(const Case& what) const {
-    return options_.filter.empty() || fnmatch(options_.filter.c_str(), what.id.c_str(), 0) == 0;
+    return options_.filter.empty() ||
+           fnmatch(options_.filter.c_str(), what.id.c_str(), FNM_EXTMATCH) == 0;
   }
 
   absl::Status CheckFilter(const std::vector<Subject>& subjects) const {
@@ -150,11 +152,22 @@ class Command {
     return absl::OkStatus();
   }
 
+  // Waits for a device that is not there yet as long as it was asked to.
+  absl::Status Open(Subject& subject) {
+    constexpr sync::TimeNs kLook = 100 * sync::kMillisecond;
+    const auto wait = static_cast<sync::TimeNs>(options_.wait_s * sync::kSecond);
+    const sync::TimeNs deadline = clock_.Now() + wait;
+    absl::Status status = subject.transport->Open();
+    while (absl::IsNotFound(status) && clock_.Now() < deadline &&
+           !interrupt_.WaitUntil(clock_, std::min(deadline, clock_.Now() + kLook))) {
+      status = subject.transport->Open();
+    }
+    return status;
+  }
+
   absl::StatusOr<RunResult> RunOne(Subject& subject) {
     // Opening tells what is wrong; running would as well, but not what helps.
-    if (absl::Status status = subject.transport->Open(); !status.ok()) {
-      return CannotOpen(subject, status);
-    }
+    if (absl::Status status = Open(subject); !status.ok()) return CannotOpen(subject, status);
     if (!console_.json()) Announce(subject);
     subject.transport->Close();
 

@@ -166,9 +166,9 @@ void SendMoreThanTheBuffer(Session& session) {
   const uint32_t buffer = session.capabilities().fixed.receive_buffer;
   session.Begin(1);
   for (uint32_t i = 0; session.ok() && session.sent() < uint64_t{buffer} * 3 / 2; ++i) {
-    session.Picture(1, i % std::max(session.pictures(), 1u));
-    session.Flush();
+    session.Picture(1, i % std::max(session.pictures(), 1u));  // sent as they fill a transfer
   }
+  session.Flush();
 }
 
 void CreditIsTold(Probe& probe) {
