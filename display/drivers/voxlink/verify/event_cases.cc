@@ -44,6 +44,13 @@ void Unread(Probe& probe) {
   for (int i = 0; i < 500; ++i) session.End(static_cast<uint64_t>(100 + i));
   session.Settle();
   session.SetListening(true);
+  // Each takes an interval of the bus: all that there are, as long as they go on coming.
+  const sync::TimeNs deadline = probe.Now() + 10 * kSecond;
+  for (size_t before = 1, now = 0; session.ok() && now != before && probe.Now() < deadline;) {
+    before = now;
+    session.Pause(200 * kMillisecond);
+    now = session.Count(EventType::kAborted);
+  }
   session.RoundTrip();
   const std::vector<Event>& log = session.log();
   if (!session.ok()) return;
