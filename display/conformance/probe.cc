@@ -79,6 +79,7 @@ void Probe::Pause(sync::TimeNs duration) {
 std::optional<TransferId> Probe::Post(Transfer&& transfer) {
   const sync::TimeNs deadline = clock_.Now() + kGrace;
   while (true) {
+    // What is refused is as it was. NOLINTNEXTLINE(bugprone-use-after-move)
     const absl::StatusOr<TransferId> id = transport_.Submit(std::move(transfer));
     if (id.ok()) {
       posted_.insert(*id);

@@ -16,7 +16,7 @@ constexpr uint64_t kLargestBuffer = uint64_t{64} << 20;
 void Numbering(Probe& probe) {
   Session session(probe);
   session.Start();
-  for (int i = 0; i < 40; ++i) session.End(static_cast<uint64_t>(100 + i));
+  for (uint64_t i = 0; i < 40; ++i) session.End(100 + i);
   session.Settle();
   session.Pause(std::max<sync::TimeNs>(10 * session.period(), 100 * kMillisecond));
   session.RoundTrip();
@@ -41,7 +41,7 @@ void Unread(Probe& probe) {
   Session session(probe);
   session.SetListening(false);
   session.Start();
-  for (int i = 0; i < 500; ++i) session.End(static_cast<uint64_t>(100 + i));
+  for (uint64_t i = 0; i < 500; ++i) session.End(100 + i);
   session.Settle();
   session.SetListening(true);
   // Each takes an interval of the bus: all that there are, as long as they go on coming.

@@ -6,7 +6,6 @@
 namespace voxeld::display::voxlink {
 namespace {
 
-using sync::kMillisecond;
 using sync::kSecond;
 
 constexpr sync::TimeNs kAnswerLimit = kSecond;
