@@ -184,8 +184,7 @@ class Command {
         console_.Data(CaseText(result, subject.suite.page));
       };
     }
-    absl::StatusOr<RunResult> result =
-        display::conformance::Run(subject, clock_, waiter, std::move(run));
+    absl::StatusOr<RunResult> result = display::conformance::Run(subject, clock_, waiter, run);
     if (result.ok() || absl::IsCancelled(result.status())) return result;
     return CannotOpen(subject, result.status());
   }
