@@ -13,13 +13,15 @@ ALLOWED = {
     "display/api": ["display/sync"],
     "display/geometry": ["display/api"],
     "display/usb": ["display/api", "display/sync"],
+    "display/conformance": ["display/sync", "display/usb"],
     "display/emulator": ["display/api", "display/sync", "display/usb", "display/geometry",
                          # The protocol's words, shared by both ends; never the driver.
                          "display/drivers/voxlink/protocol", "display/drivers/voxlink/packet",
                          "display/drivers/voxlink/assembler", "display/drivers/voxlink/capabilities",
                          "display/drivers/voxlink/decoder",
                          "display/drivers/fadecandy/protocol"],
-    "display/drivers": ["display/api", "display/crc", "display/sync", "display/usb", "display/geometry"],
+    "display/drivers": ["display/api", "display/conformance", "display/crc", "display/sync", "display/usb",
+                        "display/geometry"],
     # The one driver whose device is not on a bus: it brings its model and carrier along.
     "display/drivers/simulated": ["display"],
     "gpu": ["display/api", "display/crc", "display/geometry", "display/sync"],
@@ -33,6 +35,10 @@ ALLOWED = {
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "tools/emulator"],
     "tools/bench": ["gpu", "display", "tools/bench"],
+    # The one command that opens displays itself; it reads them as the daemon does.
+    "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
+                              "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",
+                              "daemon/config/display_view", "tools/voxelctl"],
     "client": ["voxeld/v1"],
     "tests": ["daemon", "gpu", "display", "voxeld/v1", "tools", "client"],
 }

@@ -4,9 +4,11 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/conformance/suite.h"
 #include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
 
@@ -16,6 +18,8 @@ struct Driver {
   std::string_view name;
   absl::StatusOr<std::unique_ptr<Display>> (*create)(const DisplayOptions& options,
                                                      const DriverContext& context);
+  absl::StatusOr<std::vector<conformance::Subject>> (*verify)(const DisplayOptions& options,
+                                                              const DriverContext& context);
 };
 
 // Ascending by name.

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/conformance/suite.h"
 #include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
 
@@ -16,6 +17,11 @@ namespace voxeld::display {
 // what would be right; whatever context.usb says, of a driver that needs it.
 absl::StatusOr<std::unique_ptr<Display>> CreateDisplay(const DisplayOptions& options,
                                                        const DriverContext& context);
+
+// The devices that a display with these options would drive, each with its protocol's conformance
+// suite. Nothing is opened. Errors as CreateDisplay's.
+absl::StatusOr<std::vector<conformance::Subject>> VerifySubjects(const DisplayOptions& options,
+                                                                 const DriverContext& context);
 
 // Ascending.
 std::vector<std::string> DriverNames();

@@ -9,6 +9,7 @@
 #include "display/drivers/fadecandy/fadecandy_display.h"
 #include "display/drivers/fadecandy/layout.h"
 #include "display/drivers/fadecandy/protocol.h"
+#include "display/drivers/fadecandy/verify/suite.h"
 #include "display/drivers/usb_options.h"
 #include "display/geometry/footprint.h"
 
@@ -52,9 +53,10 @@ std::string RecordOf(const std::string& path, size_t board, size_t boards) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
-                                                const DriverContext& context) {
-  return CreateOver(options, context.clock, [&](const BoardPlace& board) {
+namespace {
+
+MakeTransport OnBus(const DisplayOptions& options, const DriverContext& context) {
+  return [&options, &context](const BoardPlace& board) {
     UsbOptions usb;
     usb.match.vendor_id = kVendorId;
     usb.match.product_id = kProductId;
@@ -62,7 +64,34 @@ absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
     if (board.serial.empty()) usb.match.member = {board.index, board.count};
     usb.record = board.record;
     return MakeUsbTransport(usb, options.name, context);
-  });
+  };
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
+                                                const DriverContext& context) {
+  return CreateOver(options, context.clock, OnBus(options, context));
+}
+
+absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
+                                                         const DriverContext& context) {
+  std::vector<conformance::Subject> subjects;
+  const MakeTransport make = OnBus(options, context);
+  // Reads and checks the options as for a display; of its transports none is opened.
+  const absl::StatusOr<std::unique_ptr<Display>> checked =
+      CreateOver(options, context.clock, [&](const BoardPlace& board) {
+        absl::StatusOr<std::unique_ptr<UsbTransport>> transport = make(board);
+        if (transport.ok()) {
+          subjects.push_back(
+              {board.serial.empty() ? absl::StrCat("board ", board.index + 1) : board.serial,
+               *std::move(transport), MakeSuite()});
+          return make({.serial = board.serial, .index = board.index, .count = board.count});
+        }
+        return transport;
+      });
+  if (!checked.ok()) return checked.status();
+  return subjects;
 }
 
 absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& options,

@@ -5,9 +5,11 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/conformance/suite.h"
 #include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
 #include "display/sync/clock.h"
@@ -19,8 +21,13 @@ namespace voxeld::display::fadecandy {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
 
+// Each board that the display would drive is a subject.
+absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
+                                                         const DriverContext& context);
+
 struct BoardPlace {
-  std::string serial;  // if empty: of `count` boards the one that is number `index` by serial number
+  std::string
+      serial;  // if empty: of `count` boards the one that is number `index` by serial number
   size_t index = 0, count = 1;
   std::string record;  // where its traffic goes, or nothing
 };

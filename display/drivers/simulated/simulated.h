@@ -3,9 +3,11 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/conformance/suite.h"
 #include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
 #include "display/sync/clock.h"
@@ -24,7 +26,11 @@ namespace voxeld::display::simulated {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
 
-// The same with its insides, which belong to `display`. The device and the faults may be touched
+// voxlink's conformance suite and the emulated device, in this process: to try it without a device.
+absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
+                                                         const DriverContext& context);
+
+// A display with its insides, which belong to `display`. The device and the faults may be touched
 // within transport->WithDevice only.
 struct Parts {
   std::unique_ptr<Display> display;

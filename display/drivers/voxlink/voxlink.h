@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "display/api/display.h"
+#include "display/conformance/suite.h"
 #include "display/drivers/driver_context.h"
 #include "display/drivers/options.h"
 
@@ -13,5 +15,10 @@ namespace voxeld::display::voxlink {
 // README.md lists the options.
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
+
+// The device that `options` mean and its conformance suite. Where they say more than which device it
+// is, a case holds it to them.
+absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
+                                                         const DriverContext& context);
 
 }  // namespace voxeld::display::voxlink

@@ -56,6 +56,26 @@ TEST(CommandLine, Play) {
   EXPECT_FALSE(plain.duration_s.has_value());
 }
 
+TEST(CommandLine, Verify) {
+  const auto verify =
+      std::get<VerifyOptions>(Parse("verify lab=voxlink,serial=A1 --filter volume.* --junit "
+                                    "out.xml --seed 42 --list --wait 2.5")
+                                  .command);
+  EXPECT_EQ(verify.display, "lab=voxlink,serial=A1");
+  EXPECT_EQ(verify.filter, "volume.*");
+  EXPECT_EQ(verify.junit, "out.xml");
+  EXPECT_EQ(verify.seed, 42u);
+  EXPECT_TRUE(verify.list);
+  EXPECT_EQ(verify.wait_s, 2.5);
+  const auto plain = std::get<VerifyOptions>(Parse("verify simulated").command);
+  EXPECT_EQ(plain.filter + plain.junit, "");
+  EXPECT_EQ(plain.seed, 1u);
+  EXPECT_FALSE(plain.list);
+  const ParsedCommandLine none = ParseCommandLine({"verify"});
+  EXPECT_EQ(none.exit_code, kExitUsage);
+  EXPECT_THAT(none.err, HasSubstr("voxlink,serial=A1"));
+}
+
 TEST(CommandLine, AFileMayBeCalledLikeACommandOrAnOption) {
   EXPECT_THAT(std::get<PlayOptions>(Parse("play stats").command).files, ElementsAre("stats"));
   EXPECT_THAT(std::get<PlayOptions>(Parse("play -- --spin").command).files, ElementsAre("--spin"));

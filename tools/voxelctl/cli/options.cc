@@ -36,6 +36,12 @@ constexpr const char* kSnapshotAbout =
     "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
     "perspective, dimmer with\n"
     "distance, with the outline of its volume; with --slices all its slices side by side.";
+constexpr const char* kVerifyAbout =
+    "Holds a display's device to its protocol, case by case, and says what is not as it must be. "
+    "Opens the device\n"
+    "itself: no voxeld may have it. DISPLAY is what voxeld's --display takes, such as\n"
+    "voxlink,serial=A1 or fadecandy; simulated,size=32x32x16 is the emulated device, to try it.\n"
+    "Ends with 0 if no case failed, 1 if one did, 3 if there is no device.";
 
 struct UsageError {
   std::string message;
@@ -112,6 +118,7 @@ class Parser {
     AddEntities();
     AddClear();
     AddPattern();
+    AddVerify();
   }
 
   ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
@@ -249,6 +256,24 @@ class Parser {
         ->type_name("NAME");
   }
 
+  void AddVerify() {
+    CLI::App* c = Add("verify", kVerifyAbout);
+    c->add_option("DISPLAY", verify_.display, "[NAME=]DRIVER[,KEY=VALUE…]");
+    c->add_option("--filter", verify_.filter,
+                  "Only the cases whose names match: 'volume.*', '@(volume|end).*', '!(usb.*)'")
+        ->type_name("GLOB");
+    c->add_flag("--list", verify_.list, "Name the cases and end; no device is needed");
+    c->add_option("--junit", verify_.junit, "Write JUnit's XML too, for build servers")
+        ->type_name("FILE");
+    c->add_option("--seed", verify_.seed,
+                  "What the cases choose by chance: sizes of transfers, order of pictures")
+        ->type_name("N")
+        ->capture_default_str();
+    WantNumber(c->get_option("--seed"), 0, 4294967295.0);
+    AddNumber(c, "--wait", &verify_.wait_s, 0, 3600,
+              "Seconds to wait for the device, such as after its firmware was written", "S");
+  }
+
   // CLI11 says nothing useful about a command that is not there.
   void CheckCommand(const std::vector<std::string>& arguments) const {
     if (arguments.empty())
@@ -303,9 +328,13 @@ class Parser {
       play_.files.insert(play_.files.end(), plain_.begin(), plain_.end());
       return FillInPlay();
     }
-    TakePlain(name == "snapshot" ? &snapshot_.file : name == "pattern" ? &pattern_name_ : nullptr);
+    TakePlain(name == "snapshot"  ? &snapshot_.file
+              : name == "pattern" ? &pattern_name_
+              : name == "verify"  ? &verify_.display
+                                  : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "pattern") return FillInPattern();
+    if (name == "verify") return FillInVerify();
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "stats") {
@@ -370,6 +399,15 @@ class Parser {
     options_.command = pattern_;
   }
 
+  void FillInVerify() {
+    if (verify_.display.empty()) {
+      throw UsageError{
+          "verify wants a DISPLAY: [NAME=]DRIVER[,KEY=VALUE…], such as voxlink,serial=A1 or "
+          "simulated"};
+    }
+    options_.command = verify_;
+  }
+
   std::string Usage(absl::string_view message) const {
     const CLI::App* chosen = Chosen();
     return absl::StrCat("voxelctl: ", message, "\nTry `voxelctl ",
@@ -386,6 +424,7 @@ class Parser {
   EntitiesOptions entities_;
   ClearOptions clear_;
   PatternOptions pattern_;
+  VerifyOptions verify_;
   std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
   double duration_ = std::nan("");
 };

@@ -59,11 +59,20 @@ struct PatternOptions {
   std::string display;  // empty: all
 };
 
+struct VerifyOptions {
+  std::string display;  // "[NAME=]DRIVER[,KEY=VALUE…]"
+  std::string filter;   // of cases' ids, as file names are matched; empty: all
+  std::string junit;    // a file to write, or nothing
+  bool list = false;
+  uint64_t seed = 1;
+  double wait_s = 0;  // for the device to be attached
+};
+
 struct Options {
   std::string server;  // empty: see ChooseServer
   bool json = false;
   std::variant<PlayOptions, SnapshotOptions, DisplaysOptions, StatsOptions, EntitiesOptions,
-               ClearOptions, PatternOptions>
+               ClearOptions, PatternOptions, VerifyOptions>
       command;
 };
 
@@ -71,6 +80,7 @@ struct Options {
 inline constexpr int kExitOk = 0;
 inline constexpr int kExitFailure = 1;
 inline constexpr int kExitUsage = 2;
+inline constexpr int kExitNoDevice = 3;  // of verify: nothing was verified
 inline constexpr int kExitInterrupted = 130;
 
 // Either what to do, or what to print and the code to end with (help, version, a usage error).

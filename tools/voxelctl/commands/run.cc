@@ -2,6 +2,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/verify/verify.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -15,6 +16,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
     ListPatterns(console);
     return absl::OkStatus();
   }
+  if (const auto* verify = std::get_if<VerifyOptions>(&options.command))
+    return Verify(*verify, interrupt, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
   if (!connected.ok()) return connected.status();
   Connection& connection = **connected;
@@ -38,6 +41,14 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
       options.command);
 }
 
+int ExitCode(const Options& options, const absl::Status& status) {
+  if (std::holds_alternative<VerifyOptions>(options.command)) {
+    if (absl::IsInvalidArgument(status)) return kExitUsage;
+    if (absl::IsUnavailable(status)) return kExitNoDevice;
+  }
+  return kExitFailure;
+}
+
 }  // namespace
 
 int Run(const Options& options, const Environment& environment, Interrupt& interrupt,
@@ -56,7 +67,7 @@ int Run(const Options& options, const Environment& environment, Interrupt& inter
     return kExitInterrupted;
   }
   console.Say(absl::StrCat("voxelctl: ", status.message()));
-  return kExitFailure;
+  return ExitCode(options, status);
 }
 
 }  // namespace voxeld::voxelctl
