@@ -301,6 +301,7 @@ int Main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   sync::SystemClock clock;
   display::DisplayOptions what = DisplayOptionsOf(options.device, "simulated");
+  what.options.erase("record");
   const display::FrameLayout layout =
       Must(display::simulated::ReadEmulatedDevice(what)).info.layout;
   Result result;

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "display/crc/crc32c.h"
 #include "display/drivers/voxlink/packet.h"
 #include "display/drivers/voxlink/protocol.h"
@@ -61,15 +63,15 @@ class Packets {
 
   const std::vector<std::byte>& bytes() const { return bytes_; }
 
-  // Sets the headers of volume `number` that begin in [from, to).
-  void Number(uint64_t number, size_t from, size_t to) {
+  // Sets the headers of volume `number` that begin in [from, to), and numbers them from `sequence` on.
+  void Number(uint64_t number, uint32_t& sequence, size_t from, size_t to) {
     if (from == 0) next_ = 0;
     for (; next_ < headers_.size() && headers_[next_] < to; ++next_) {
       std::byte* const at = bytes_.data() + headers_[next_];
       PacketHeader header;
       std::memcpy(&header, at, sizeof(header));
       header.volume = number;
-      header.sequence = sequence_++;
+      header.sequence = sequence++;
       std::memcpy(at, &header, sizeof(header));
       const uint32_t crc = display::Crc32c(std::span(at, display::voxlink::kHeaderCrcOffset));
       std::memcpy(at + display::voxlink::kHeaderCrcOffset, &crc, sizeof(crc));
@@ -88,7 +90,6 @@ class Packets {
   std::vector<std::byte> bytes_;
   std::vector<size_t> headers_;
   size_t next_ = 0;
-  uint32_t sequence_ = 0;
 };
 
 class PlainLink {
@@ -109,8 +110,10 @@ class PlainLink {
     if (absl::Status status = Begin(); !status.ok()) return status;
     const auto start = steady_clock::now();
     const auto end = start + std::chrono::nanoseconds(static_cast<int64_t>(seconds * 1e9));
-    while (error_.empty() && (shown_ < sent_ || !Over(end))) {
-      while (error_.empty() && !idle_.empty() && !(offset_ == 0 && Over(end))) SendNext();
+    // The last volume that is begun is sent to its end.
+    const auto more = [&] { return offset_ > 0 || !Over(end); };
+    while (error_.empty() && (shown_ < sent_ || more())) {
+      while (error_.empty() && !idle_.empty() && more()) SendNext();
       Handle();
     }
     const std::chrono::duration<double> took = steady_clock::now() - start;
@@ -176,7 +179,7 @@ class PlainLink {
   void SendNext() {
     Packets& packets = *volumes_[sent_ % volumes_.size()];
     const size_t end = std::min(offset_ + kTransferBytes, packets.bytes().size());
-    packets.Number(sent_ + 1, offset_, end);
+    packets.Number(sent_ + 1, sequence_, offset_, end);
     libusb_transfer* const transfer = idle_.back();
     idle_.pop_back();
     auto* const bytes = const_cast<std::byte*>(packets.bytes().data());
@@ -200,6 +203,7 @@ class PlainLink {
     auto& self = *static_cast<PlainLink*>(transfer->user_data);
     --self.in_flight_;
     self.idle_.push_back(transfer);
+    if (self.ending_) return;
     if (transfer->status != LIBUSB_TRANSFER_COMPLETED ||
         transfer->actual_length != transfer->length) {
       self.error_ = absl::StrCat("a transfer ended with status ", transfer->status);
@@ -230,7 +234,11 @@ class PlainLink {
       case EventType::kAborted:
       case EventType::kDropped:
       case EventType::kError:
-        self.error_ = absl::StrCat("the device sent an event of type ", header.type);
+        self.error_ = absl::StrCat("the device sent an event of type ", header.type, " in volume ",
+                                   self.sent_ + 1, " at ", self.offset_, ": ",
+                                   absl::BytesToHexString(absl::string_view(
+                                       reinterpret_cast<const char*>(transfer->buffer),
+                                       static_cast<size_t>(transfer->actual_length))));
         return;
       default:
         break;
@@ -257,6 +265,7 @@ class PlainLink {
   bool ready_ = false, ending_ = false;
   uint64_t sent_ = 0, shown_ = 0;
   size_t offset_ = 0;  // in volume sent_ + 1
+  uint32_t sequence_ = 0;
   std::string error_;
 };
 

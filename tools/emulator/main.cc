@@ -1,6 +1,7 @@
 // voxeld-emulator: plays a display's USB device to this machine's kernel, to another machine's, or to
 // a virtual machine.
 
+#include <malloc.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -255,7 +256,15 @@ class Player {
   sync::TimeNs attach_at_ = sync::kNever;
 };
 
+// Pictures and transfers come and go by the hundred kilobytes: their pages are kept, or each would be
+// faulted in anew, which is most of the time in a guest.
+void KeepPages() {
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+}
+
 int Main(int argc, char** argv) {
+  KeepPages();
   CLI::App app(
       "Plays a display's USB device: to this machine's kernel, over USB/IP, or over usbredir.",
       "voxeld-emulator");

@@ -196,10 +196,7 @@ void UsbipSession::OnComplete(uint64_t id, TransferStatus status, uint32_t actua
   if (it == submitted_.end()) return;
   // A cable that was pulled says nothing. (Linux's virtual controller can lose a transfer that is cancelled
   // while the connection ends, and whoever cancelled waits for ever: so let nobody have cause to.)
-  if (status == TransferStatus::kDisconnected) {
-    submitted_.erase(it);
-    return;
-  }
+  if (status == TransferStatus::kDisconnected) return Forget(it);
   const bool reads = it->second.in;
   in = in.first(std::min<size_t>(in.size(), it->second.length));
   Header reply{};

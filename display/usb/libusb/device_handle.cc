@@ -17,7 +17,7 @@ namespace voxeld::display {
 namespace {
 
 constexpr size_t kSlabBytes = size_t{256} << 10;
-constexpr size_t kSlabs = 16;
+constexpr size_t kSlabs = 24;  // more than a driver has in flight, so that it fills some meanwhile
 
 class DeviceSlabs final : public SlabMemory {
  public:

@@ -21,6 +21,7 @@ namespace {
 constexpr sync::TimeNs kPatience = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kCloseLimit = 500 * sync::kMillisecond;
 constexpr int kGraveIntervalMs = 20;
+enum PollIndex : size_t { kPoke, kNews, kTheirs };
 constexpr sync::TimeNs kGraveLimit = 5 * sync::kSecond;  // of the bus's end
 
 }  // namespace
@@ -52,8 +53,8 @@ LibusbBus::LibusbBus(std::shared_ptr<LibusbContext> context, std::unique_ptr<Dev
       list_(std::move(list)) {
   // Devices that open and close change what has to be polled.
   libusb_set_pollfd_notifiers(
-      context_->get(), [](int, short, void* bus) { static_cast<LibusbBus*>(bus)->Poke(); },
-      [](int, void* bus) { static_cast<LibusbBus*>(bus)->Poke(); }, this);
+      context_->get(), [](int, short, void* bus) { static_cast<LibusbBus*>(bus)->FdsChanged(); },
+      [](int, void* bus) { static_cast<LibusbBus*>(bus)->FdsChanged(); }, this);
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -82,7 +83,7 @@ void LibusbBus::Forget(LibusbTransport* transport) {
 
 absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& match,
                                                             TransferId first_id,
-                                                            std::function<void()> wake) {
+                                                            std::function<void(bool)> wake) {
   sync::MutexLock lock(list_mutex_);
   absl::StatusOr<std::vector<UsbDeviceEntry>> devices = list_->Devices();
   if (!devices.ok()) return devices.status();
@@ -101,6 +102,7 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& matc
     absl::StatusOr<std::unique_ptr<OpenDevice>> device =
         OpenDevice::Open(context_, entry, *ChooseInterface(entry.interfaces, match.interface),
                          budget_, clock_, first_id, wake);
+    Poke();  // libusb may have handled others' events in here
     if (device.ok()) {
       open_nodes_.insert(entry.node);
       return device;
@@ -131,9 +133,19 @@ void LibusbBus::Poke() const {
   [[maybe_unused]] const ssize_t written = write(poke_, &one, sizeof(one));
 }
 
+void LibusbBus::FdsChanged() {
+  fds_changed_ = true;
+  Poke();
+}
+
 void LibusbBus::WakeAll(bool arrival) {
   sync::MutexLock lock(transports_mutex_);
   for (LibusbTransport* transport : transports_) transport->Wake(arrival);
+}
+
+void LibusbBus::WakeDue() {
+  sync::MutexLock lock(transports_mutex_);
+  for (LibusbTransport* transport : transports_) transport->WakeIfDue();
 }
 
 bool LibusbBus::Bury() {
@@ -146,8 +158,21 @@ bool LibusbBus::Bury() {
   return !graves_.empty();
 }
 
+std::vector<pollfd> LibusbBus::PollFds() const {
+  std::vector<pollfd> fds = {{poke_, POLLIN, 0},
+                             {watch_ != nullptr ? watch_->fd() : -1, POLLIN, 0}};
+  if (const libusb_pollfd** theirs = libusb_get_pollfds(context_->get())) {
+    for (const libusb_pollfd** fd = theirs; *fd != nullptr; ++fd) {
+      fds.push_back({(*fd)->fd, (*fd)->events, 0});
+    }
+    libusb_free_pollfds(theirs);
+  }
+  return fds;
+}
+
 void LibusbBus::Run() {
   sync::TimeNs give_up = 0;
+  std::vector<pollfd> fds;
   while (true) {
     const bool graves = Bury();
     {
@@ -161,25 +186,20 @@ void LibusbBus::Run() {
         return;
       }
     }
-    std::vector<pollfd> fds = {{poke_, POLLIN, 0}};
-    if (watch_ != nullptr) fds.push_back({watch_->fd(), POLLIN, 0});
-    const size_t own = fds.size();
-    if (const libusb_pollfd** theirs = libusb_get_pollfds(context_->get())) {
-      for (const libusb_pollfd** fd = theirs; *fd != nullptr; ++fd) {
-        fds.push_back({(*fd)->fd, (*fd)->events, 0});
-      }
-      libusb_free_pollfds(theirs);
+    if (fds_changed_.exchange(false)) fds = PollFds();
+    const int ready = poll(fds.data(), fds.size(), graves ? kGraveIntervalMs : -1);
+    if (ready < 0 && errno != EINTR) continue;
+    if (fds[kPoke].revents != 0) {
+      uint64_t pokes = 0;
+      [[maybe_unused]] const ssize_t got = read(poke_, &pokes, sizeof(pokes));
     }
-    if (poll(fds.data(), fds.size(), graves ? kGraveIntervalMs : -1) < 0 && errno != EINTR)
-      continue;
-    uint64_t pokes = 0;
-    [[maybe_unused]] const ssize_t got = read(poke_, &pokes, sizeof(pokes));
-    if (watch_ != nullptr && fds[1].revents != 0 && watch_->TakeArrivals()) WakeAll(true);
-    if (std::any_of(fds.begin() + static_cast<ptrdiff_t>(own), fds.end(),
+    if (fds[kNews].revents != 0 && watch_->TakeArrivals()) WakeAll(true);
+    if (std::any_of(fds.begin() + kTheirs, fds.end(),
                     [](const pollfd& fd) { return fd.revents != 0; })) {
       timeval none{0, 0};
       libusb_handle_events_timeout_completed(context_->get(), &none, nullptr);
     }
+    WakeDue();
   }
 }
 

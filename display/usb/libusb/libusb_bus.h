@@ -1,6 +1,7 @@
 // The machine's USB through libusb 1.0 and udev: one context, one event thread for all devices.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <set>
 #include <string>
@@ -30,7 +31,7 @@ class LibusbBus final : public UsbBus {
 
   // For LibusbTransport.
   absl::StatusOr<std::unique_ptr<OpenDevice>> Open(const UsbMatch& match, TransferId first_id,
-                                                   std::function<void()> wake);
+                                                   std::function<void(bool)> wake);
   void Close(std::unique_ptr<OpenDevice> device);
   void Forget(LibusbTransport* transport);
   size_t max_bytes_in_flight() const { return budget_.limit(); }
@@ -40,8 +41,13 @@ class LibusbBus final : public UsbBus {
             std::unique_ptr<DeviceWatch> watch, int poke, sync::Clock& clock);
 
   void Run();
+  // Ours (PollIndex), then libusb's.
+  std::vector<pollfd> PollFds() const;
+  void FdsChanged();
   void Poke() const;
   void WakeAll(bool arrival);
+  // Those whose completions came in since.
+  void WakeDue();
   // Destroys what has ended since; true if something is left.
   bool Bury();
 
@@ -49,6 +55,7 @@ class LibusbBus final : public UsbBus {
   const std::unique_ptr<DeviceWatch> watch_;  // the event thread's; null: no news, only looks
   const int poke_;                            // eventfd
   sync::Clock& clock_;
+  std::atomic<bool> fds_changed_ = true;  // which descriptors libusb wants polled
   UsbfsBudget budget_;
 
   sync::Mutex list_mutex_;

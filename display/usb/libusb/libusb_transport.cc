@@ -19,7 +19,13 @@ absl::Status LibusbTransport::Open() {
     arrived_ = false;
   }
   absl::StatusOr<std::unique_ptr<OpenDevice>> device =
-      bus_.Open(match_, next_id_, [this] { Wake(false); });
+      bus_.Open(match_, next_id_, [this](bool more) {
+        if (more) {
+          due_ = true;
+        } else {
+          Wake(false);
+        }
+      });
   if (!device.ok()) return device.status();
   device_ = *std::move(device);
   return absl::OkStatus();
@@ -87,6 +93,10 @@ void LibusbTransport::Wake(bool arrival) {
   sync::MutexLock lock(wake_mutex_);
   arrived_ = arrived_ || arrival;
   if (wake_) wake_();
+}
+
+void LibusbTransport::WakeIfDue() {
+  if (due_.exchange(false)) Wake(false);
 }
 
 }  // namespace voxeld::display

@@ -1,6 +1,7 @@
 // One device through libusb. Made by LibusbBus.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -34,12 +35,15 @@ class LibusbTransport final : public UsbTransport {
 
   // For the bus, from any thread.
   void Wake(bool arrival);
+  // For its event thread: wakes whoever has completions that were not told yet.
+  void WakeIfDue();
 
  private:
   LibusbBus& bus_;
   const UsbMatch match_;
   std::unique_ptr<OpenDevice> device_;  // the owner's thread's
   TransferId next_id_ = 1;
+  std::atomic<bool> due_ = false;
 
   sync::Mutex wake_mutex_;
   std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);

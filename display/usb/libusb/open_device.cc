@@ -92,7 +92,7 @@ struct OpenDevice::Pending {
 
 absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
     std::shared_ptr<LibusbContext> context, const UsbDeviceEntry& entry, uint8_t interface,
-    UsbfsBudget& budget, sync::Clock& clock, TransferId first_id, std::function<void()> wake) {
+    UsbfsBudget& budget, sync::Clock& clock, TransferId first_id, std::function<void(bool)> wake) {
   const int node = open(entry.node.c_str(), O_RDWR | O_CLOEXEC);
   if (node < 0) {
     const int error = errno;
@@ -130,7 +130,7 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
 
 OpenDevice::OpenDevice(std::shared_ptr<DeviceHandle> handle, const UsbDeviceEntry& entry,
                        uint8_t interface, UsbfsBudget& budget, sync::Clock& clock,
-                       TransferId first_id, std::function<void()> wake)
+                       TransferId first_id, std::function<void(bool)> wake)
     : handle_(std::move(handle)),
       entry_(entry),
       interface_(interface),
@@ -291,12 +291,12 @@ void OpenDevice::Complete(Pending& pending, TransferStatus status) {
     changed_.NotifyAll();
   }
   budget_.Release(counted);
-  Wake();
+  Wake(true);
 }
 
-void OpenDevice::Wake() {
+void OpenDevice::Wake(bool more) {
   sync::MutexLock lock(wake_mutex_);
-  if (wake_) wake_();
+  if (wake_) wake_(more);
 }
 
 void OpenDevice::Cancel(TransferId id) {
@@ -385,7 +385,7 @@ void OpenDevice::CarryOut(const Job& job) {
     changed_.NotifyAll();
   }
   SubmitDeferred();
-  Wake();
+  Wake(false);
 }
 
 TransferStatus OpenDevice::ResetPort() {

@@ -34,13 +34,14 @@ class OpenDevice {
  public:
   // Opens the device's node, and claims the interface; a kernel's driver that has it is detached
   // until the close. PermissionDenied, Unavailable (somebody else has it; it went away) or Internal,
-  // each with what would help. Ids begin at `first_id`. `wake` is called on the event thread when there are completions;
-  // `budget` outlives the device.
+  // each with what would help. Ids begin at `first_id`. `wake`
+  // is called when there are completions: with true while libusb handles events, when more may follow
+  // at once, with false by the device's own thread. `budget` outlives the device.
   static absl::StatusOr<std::unique_ptr<OpenDevice>> Open(std::shared_ptr<LibusbContext> context,
                                                           const UsbDeviceEntry& entry,
                                                           uint8_t interface, UsbfsBudget& budget,
                                                           sync::Clock& clock, TransferId first_id,
-                                                          std::function<void()> wake);
+                                                          std::function<void(bool)> wake);
   // Everything must have ended.
   ~OpenDevice();
   OpenDevice(const OpenDevice&) = delete;
@@ -76,12 +77,12 @@ class OpenDevice {
 
   OpenDevice(std::shared_ptr<DeviceHandle> handle, const UsbDeviceEntry& entry, uint8_t interface,
              UsbfsBudget& budget, sync::Clock& clock, TransferId first_id,
-             std::function<void()> wake);
+             std::function<void(bool)> wake);
 
   static void OnDone(libusb_transfer* done);
   // Of a transfer that libusb is done with, or never had.
   void Complete(Pending& pending, TransferStatus status);
-  void Wake();
+  void Wake(bool more);
   absl::Status Refusal() const VOXELD_REQUIRES(mutex_);
   absl::Status SubmitLocked(Pending& pending) VOXELD_REQUIRES(mutex_);
   absl::StatusOr<TransferId> Queue(Job job);
@@ -103,7 +104,7 @@ class OpenDevice {
   const std::shared_ptr<SlabMemory> memory_;
 
   sync::Mutex wake_mutex_;
-  std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);
+  std::function<void(bool)> wake_ VOXELD_GUARDED_BY(wake_mutex_);
 
   mutable sync::Mutex mutex_;
   sync::CondVar changed_;  // something of what follows
