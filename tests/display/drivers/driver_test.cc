@@ -68,6 +68,16 @@ TEST_F(Driver, AttachesAndShowsAVolume) {
   EXPECT_EQ(rig_->display().stats().attaches, 1u);
 }
 
+TEST_F(Driver, OnePictureInAHundredCostsATwentiethAtMost) {
+  Start({{"size", "64x64x100"}});
+  Show();
+  const uint64_t whole = Newest().bytes_sent;
+  EXPECT_EQ(whole, 56u + 100 * (40 + 12288) + 40);
+  Show(1e-9);  // one
+  EXPECT_EQ(Newest().bytes_sent, 56u + 13 + (40 + 12288) + 40);
+  EXPECT_GE(whole, 20 * Newest().bytes_sent);
+}
+
 TEST_F(Driver, SendsOnlyWhatChanged) {
   Start();
   Show();
