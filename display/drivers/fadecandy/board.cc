@@ -139,7 +139,8 @@ void Board::SubmitBulk() {
     bulk_ = *id;
     return;
   }
-  buffer_ = std::move(transfer.data);
+  // What is refused was not moved.
+  buffer_ = std::move(transfer.data);  // NOLINT(bugprone-use-after-move)
   Refused(id.status());
 }
 

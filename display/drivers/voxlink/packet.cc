@@ -76,17 +76,21 @@ void PacketWriter::Plain(Bytes& out, PacketType type, uint64_t volume) {
   Put(out, header, {}, {});
 }
 
-#define VOXELD_PACKETS_INTO(Bytes)                                                  \
-  template void PacketWriter::Slice(Bytes&, uint64_t, uint32_t, uint16_t, uint32_t, \
-                                    std::span<const std::byte>);                    \
-  template void PacketWriter::Begin(Bytes&, uint64_t, uint64_t, uint32_t,           \
-                                    std::span<const std::byte>);                    \
-  template void PacketWriter::End(Bytes&, uint64_t, bool);                          \
-  template void PacketWriter::Show(Bytes&, uint64_t, uint64_t);                     \
-  template void PacketWriter::Plain(Bytes&, PacketType, uint64_t);
-VOXELD_PACKETS_INTO(TransferBytes)
-VOXELD_PACKETS_INTO(std::vector<std::byte>)
-#undef VOXELD_PACKETS_INTO
+using Vector = std::vector<std::byte>;
+template void PacketWriter::Slice(TransferBytes&, uint64_t, uint32_t, uint16_t, uint32_t,
+                                  std::span<const std::byte>);
+template void PacketWriter::Begin(TransferBytes&, uint64_t, uint64_t, uint32_t,
+                                  std::span<const std::byte>);
+template void PacketWriter::End(TransferBytes&, uint64_t, bool);
+template void PacketWriter::Show(TransferBytes&, uint64_t, uint64_t);
+template void PacketWriter::Plain(TransferBytes&, PacketType, uint64_t);
+template void PacketWriter::Slice(Vector&, uint64_t, uint32_t, uint16_t, uint32_t,
+                                  std::span<const std::byte>);
+template void PacketWriter::Begin(Vector&, uint64_t, uint64_t, uint32_t,
+                                  std::span<const std::byte>);
+template void PacketWriter::End(Vector&, uint64_t, bool);
+template void PacketWriter::Show(Vector&, uint64_t, uint64_t);
+template void PacketWriter::Plain(Vector&, PacketType, uint64_t);
 
 void PacketParser::Reset() {
   partial_.clear();

@@ -279,7 +279,8 @@ void VoxlinkLink::SubmitBulk(TransferBytes buffer) {
   transfer.timeout = options_.bulk_timeout;
   const absl::StatusOr<TransferId> id = transport_->Submit(std::move(transfer));
   if (absl::IsResourceExhausted(id.status())) {
-    held_ = std::move(transfer.data);
+    // What is refused was not moved.
+    held_ = std::move(transfer.data);  // NOLINT(bugprone-use-after-move)
     return;
   }
   if (!id.ok()) return Fail(std::string(id.status().message()));
