@@ -303,6 +303,12 @@ void FramePipeline::KeepUnchanged(const Contents& contents) {
     shown_ = contents;
   }
   riders_.Unchanged(last_submitted_);
+  display_->ShowCurrent();
+}
+
+bool FramePipeline::HasNewer() const {
+  if (newest_ == nullptr) return false;
+  return drawing_.has_value() || newest_->number != drawn_snapshot_ || settings_changed_;
 }
 
 void FramePipeline::SubmitDrawn(Drawing drawing) {
@@ -350,6 +356,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs sin
   }
   refused_ = std::string(status.message());
   riders_.LoseUnsubmitted(absl::StrCat("the engine failed: ", status.ToString()), false);
+  display_->ShowCurrent();
   ShowAgain(kEngineRetryDelay);
 }
 

@@ -131,6 +131,7 @@ class FramePipeline final : private display::Display::Listener {
 
   void OnOutcome(const display::VolumeOutcome& outcome) override;
   void OnState(display::DisplayState state, const std::string& reason) override;
+  bool HasNewer() const override;
 
   bool showing() const { return display_->state() == display::DisplayState::kShowing; }
   std::string WhyNotShowing() const;

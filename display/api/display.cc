@@ -193,13 +193,20 @@ void Display::CancelCapture(CaptureId id) {
 void Display::Attached() {
   full_next_ = true;
   resend_.Reset();
-  if (newest_ != nullptr) resend_at_ = clock_.Now();
+  held_ = waiting_ == nullptr && listener_->HasNewer();
+  if (newest_ != nullptr && !held_) resend_at_ = clock_.Now();
   if (blanked_) {
     SetState(DisplayState::kBlanked, "blanked");
   } else {
     SetState(DisplayState::kShowing, "showing");
     SendNext();
   }
+}
+
+void Display::ShowCurrent() {
+  if (!std::exchange(held_, false)) return;
+  if (newest_ != nullptr) resend_at_ = clock_.Now();
+  SendNext();
 }
 
 void Display::NoDevice(const std::string& reason) {
@@ -317,7 +324,9 @@ void Display::SendNext() {
     if (owed) {
       newest_ = std::move(waiting_);
       waiting_ = nullptr;
+      held_ = false;
     } else {
+      if (held_) break;
       const bool due = resend_at_ == sync::kNever ? !captures_.empty() : resend_at_ <= clock_.Now();
       if (!due || (newest_ == nullptr && captures_.empty())) break;
     }

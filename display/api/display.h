@@ -88,6 +88,9 @@ class Display {
     virtual ~Listener() = default;
     virtual void OnOutcome(const VolumeOutcome& outcome) = 0;
     virtual void OnState(DisplayState state, const std::string& reason) = 0;
+    // Asked when the device is set up: true if the volume that the display had last is not the newest
+    // that there is to show. Then nothing is shown before a Submit, or ShowCurrent: no stale picture.
+    virtual bool HasNewer() const { return false; }
   };
   // Called where a listener's functions are; must not call back.
   using CaptureDone = std::function<void(absl::StatusOr<DecodedVolume>)>;
@@ -115,6 +118,9 @@ class Display {
   // then kLost at once. `frame->volume` must ascend and `frame->layout` must be info().layout:
   // what breaks that is kLost at once.
   void Submit(SliceFramePtr frame);
+
+  // After the listener said that it has a newer one: it turned out to be the same, or cannot be had.
+  void ShowCurrent();
 
   // True if no volume waits:
   // a pipeline that only draws when this holds never has a volume replaced.
@@ -220,6 +226,7 @@ class Display {
   SliceFramePtr in_flight_, waiting_;
   SliceFramePtr newest_;      // the newest volume given to DoSend: what belongs on the display
   bool owed_ = false;         // in_flight_ still owes its outcome (false: a re-send of our own)
+  bool held_ = false;         // since the attach, until there is the newest volume
   bool full_next_ = true;     // the next volume may leave out nothing
   bool sending_ = false;      // inside SendNext
   uint64_t last_volume_ = 0;  // newest number submitted

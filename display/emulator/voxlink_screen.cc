@@ -66,6 +66,7 @@ void VoxlinkScreen::Stop() {
   last_begun_ = refused_ = complained_ = 0;
   sequence_ = 0;
   sweep_ = 0;
+  volumes_shown_ = 0;
   underruns_ = 0;
   watchdog_dark_ = false;
 }
@@ -125,6 +126,7 @@ sync::TimeNs VoxlinkScreen::NextTimeout() const {
 void VoxlinkScreen::BeginSweep(uint64_t sweep, sync::TimeNs start) {
   if (waiting_ && waiting_->show && waiting_->sweep <= sweep) {
     shown_ = std::move(waiting_->volume);
+    ++volumes_shown_;
     waiting_.reset();
     shown_sweep_ = sweep;
     shown_start_ = start;

@@ -51,6 +51,7 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
   uint64_t last_complete() const { return base_ ? base_->number : 0; }
   uint64_t shown_sweep() const { return shown_sweep_; }
   sync::TimeNs shown_start() const { return shown_start_; }
+  uint64_t volumes_shown() const { return volumes_shown_; }  // since START
   uint32_t underruns() const { return underruns_; }
   uint64_t errors() const { return errors_; }  // ERROR events
 
@@ -103,6 +104,7 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
   sync::TimeNs period_ = sync::kSecond;
   sync::TimeNs epoch_ = 0;  // sweep n begins at epoch_ + n·period_
   uint64_t sweep_ = 0;      // the last one begun
+  uint64_t volumes_shown_ = 0;
   uint32_t underruns_ = 0;
 
   sync::TimeNs heard_ = 0;

@@ -19,10 +19,12 @@ struct UsbMatch {
   std::string path;  // its place: bus, then ports, "1-2.4"
   // Class, subclass and protocol of the interface that is claimed; without it interface 0 is.
   std::optional<std::array<uint8_t, 3>> interface;
-  // Of `count` devices that match all the rest, number `index` by ascending serial number, then by
-  // place. None is there before all are: which is which would depend on the order of arrival.
+  // Of `count` devices that match all the rest and belong to nobody outside `group`, number `index` by
+  // ascending serial number, then by place. None is there before all are: which is which would depend
+  // on the order of arrival.
   struct Member {
     size_t index = 0, count = 1;
+    std::string group;  // not empty; the bus's transports of one group share its devices
   };
   std::optional<Member> member;
 

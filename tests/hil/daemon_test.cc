@@ -69,6 +69,8 @@ const v1::DisplayStats* Find(const v1::Stats& stats, const std::string& name) {
 
 class OnUsb : public ::testing::Test {
  protected:
+  class Load;
+
   OnUsb() : control_(FromEnvironment("VOXELD_EMULATOR_CONTROL", "")) {
     control_.Ask("unplug");
     control_.Ask("clear");
@@ -204,6 +206,29 @@ TEST_F(OnUsb, StreamsAndEveryByteIsRight) {
   EXPECT_EQ(Device()["errors"], 0);
 }
 
+// Commits one after the other, in a thread of its own, until it is told to end.
+class OnUsb::Load {
+ public:
+  explicit Load(OnUsb& test)
+      : thread_([this, &test] {
+          while (!end_ && !HasFatalFailure()) {
+            test.Commit();
+            ++commits_;
+          }
+        }) {}
+  ~Load() { End(); }
+  uint64_t commits() const { return commits_; }
+  void End() {
+    end_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  std::atomic<bool> end_ = false;
+  std::atomic<uint64_t> commits_ = 0;
+  std::thread thread_;
+};
+
 class EachFault : public OnUsb, public ::testing::WithParamInterface<const char*> {};
 
 // Nobody loses a stream, every commit has its outcomes, the other display misses nothing, and the
@@ -215,6 +240,7 @@ TEST_P(EachFault, IsOvercome) {
   ASSERT_TRUE(CommitUntilShown());
   control_.Ask(absl::StrCat("fault ", GetParam()));
   for (int i = 0; i < 30 && !HasFatalFailure(); ++i) Commit();
+  EXPECT_EQ(Device()["faults_left"], 0);
   ASSERT_TRUE(AwaitAllShowing());
   ASSERT_TRUE(CommitUntilShown());
   ExpectSameLight();
@@ -241,6 +267,7 @@ TEST_F(OnUsb, LiesHurtNobody) {
     Plug();
     for (int i = 0; i < 10 && !HasFatalFailure(); ++i) Commit();
   }
+  EXPECT_GT(Device()["lies"], 20);
   control_.Ask("unplug");
   control_.Ask("clear");
   Plug();
@@ -261,16 +288,17 @@ TEST_F(OnUsb, PulledAndPluggedInUnderLoad) {
   ASSERT_TRUE(watch.ok());
   std::vector<double> lost_ms, right_ms;
   for (int i = 0; i < unplugs && !HasFailure(); ++i) {
-    std::atomic<bool> stop = false;
-    std::thread load([&] {
-      while (!stop && !HasFatalFailure()) Commit();
-    });
+    Load load(*this);
     // At a place in the stream that differs each time.
-    std::this_thread::sleep_for(std::chrono::milliseconds(20 + 7 * (i % 13)));
+    while (load.commits() < static_cast<uint64_t>(1 + i % 7)) std::this_thread::yield();
     const auto pulled = steady_clock::now();
     control_.Ask("unplug");
     EXPECT_TRUE(AwaitState(v1::DISPLAY_STATE_LOST));
     lost_ms.push_back(Milliseconds(steady_clock::now() - pulled));
+    // Every other time the scene stands still: then its light is the only one that may be seen.
+    const bool still = i % 2 == 0;
+    if (still) load.End();
+    const std::string expected = still ? LightOfOther() : "";
     (*watch)->TakeArrivals();
     control_.Ask("plug");
     while (!(*watch)->TakeArrivals()) {
@@ -281,13 +309,18 @@ TEST_F(OnUsb, PulledAndPluggedInUnderLoad) {
       }
     }
     const auto enumerated = steady_clock::now();
-    while (!Device().contains("light_crc32c") &&
-           steady_clock::now() - enumerated < std::chrono::seconds(20)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
+    nlohmann::json device;
+    do {
+      device = Device();
+    } while (!device.contains("light_crc32c") &&
+             steady_clock::now() - enumerated < std::chrono::seconds(20));
     right_ms.push_back(Milliseconds(steady_clock::now() - enumerated));
-    stop = true;
-    load.join();
+    EXPECT_TRUE(device.contains("light_crc32c")) << "no light after 20 s";
+    if (still) {
+      EXPECT_EQ(device.value("light_crc32c", ""), expected);
+      EXPECT_EQ(device["volumes_shown"], 1) << "something else was lit before";
+    }
+    load.End();
     ASSERT_TRUE(CommitUntilShown());
     ExpectSameLight();
     if ((i + 1) % 20 == 0)

@@ -23,7 +23,7 @@ using display::emulator::FadecandyDevice;
 using display::emulator::FaultInjector;
 using display::emulator::VoxlinkDevice;
 
-std::string VoxlinkStatus(const VoxlinkDevice& device) {
+nlohmann::json VoxlinkStatus(const VoxlinkDevice& device) {
   const display::emulator::VoxlinkScreen& screen = device.screen();
   nlohmann::json json = {
       {"plugged", device.plugged()},
@@ -35,6 +35,7 @@ std::string VoxlinkStatus(const VoxlinkDevice& device) {
       {"errors", screen.errors()},
       {"underruns", screen.underruns()},
       {"brightness", device.brightness()},
+      {"volumes_shown", screen.volumes_shown()},
       {"volume", screen.lit() ? screen.shown()->number : 0},
   };
   if (const std::optional<display::DecodedVolume> seen = device.Seen()) {
@@ -42,10 +43,10 @@ std::string VoxlinkStatus(const VoxlinkDevice& device) {
     json["light_crc32c"] =
         absl::StrFormat("%08x", display::Crc32c(std::as_bytes(std::span(light))));
   }
-  return json.dump();
+  return json;
 }
 
-std::string FadecandyStatus(const FadecandyDevice& device) {
+nlohmann::json FadecandyStatus(const FadecandyDevice& device) {
   const std::span<const uint8_t> light = device.Output();
   return nlohmann::json{
       {"plugged", device.plugged()},
@@ -54,19 +55,24 @@ std::string FadecandyStatus(const FadecandyDevice& device) {
       {"packets", device.packets()},
       {"short_packets", device.short_packets()},
       {"light_crc32c", absl::StrFormat("%08x", display::Crc32c(std::as_bytes(light)))},
-  }
-      .dump();
+  };
 }
 
 template <typename Device>
-Emulated Wrapped(std::unique_ptr<Device> device, std::string (*status)(const Device&),
+Emulated Wrapped(std::unique_ptr<Device> device, nlohmann::json (*status)(const Device&),
                  const display::emulator::FaultPlan& plan, sync::Clock& clock) {
   Emulated emulated;
-  emulated.status = [inner = device.get(), status] { return status(*inner); };
+  const Device* const inner = device.get();
   auto hostile = std::make_unique<display::emulator::HostileDevice>(std::move(device));
   emulated.hostile = hostile.get();
   auto faults = std::make_unique<FaultInjector>(std::move(hostile), plan, clock);
   emulated.faults = faults.get();
+  emulated.status = [inner, status, faults = emulated.faults, hostile = emulated.hostile] {
+    nlohmann::json json = status(*inner);
+    json["faults_left"] = faults->faults_left();
+    json["lies"] = hostile->lies();
+    return json.dump();
+  };
   emulated.model = std::move(faults);
   return emulated;
 }

@@ -12,7 +12,7 @@ namespace {
 // A board takes a frame at each refresh, some milliseconds apart.
 constexpr sync::TimeNs kTimeout = sync::kSecond;
 // Of silence, after which the board is asked for a counter: an idle one is not missed otherwise.
-constexpr sync::TimeNs kAskAfter = 500 * sync::kMillisecond;
+constexpr sync::TimeNs kAskAfter = 60 * sync::kMillisecond;
 constexpr sync::TimeNs kRoomAfter = 10 * sync::kMillisecond;
 constexpr int kMostFailures = 5;
 constexpr size_t kFrameOnWire = kFramePackets * kPacketBytes;
@@ -49,7 +49,7 @@ void Board::Close() {
   rgb_ = {};
   shown_ns_ = 0;
   bulk_ = request_id_ = 0;
-  buffer_.clear();
+  buffer_ = {};  // its memory may be the device's
   request_ = Request::kNone;
   halted_ = false;
   failures_ = 0;

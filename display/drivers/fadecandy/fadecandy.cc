@@ -61,7 +61,9 @@ MakeTransport OnBus(const DisplayOptions& options, const DriverContext& context)
     usb.match.vendor_id = kVendorId;
     usb.match.product_id = kProductId;
     usb.match.serial = board.serial;
-    if (board.serial.empty()) usb.match.member = {board.index, board.count};
+    if (board.serial.empty() && board.count > 1) {
+      usb.match.member = {board.index, board.count, options.name};
+    }
     usb.record = board.record;
     return MakeUsbTransport(usb, options.name, context);
   };

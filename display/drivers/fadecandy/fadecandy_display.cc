@@ -183,7 +183,7 @@ void FadecandyDisplay::Advance() {
     ++mutable_stats().attaches;
     // What was asked for while the boards were set up.
     if (brightness() != lut_brightness_ || blanked() != dark_) {
-      dark_ = blanked() || !whole_;
+      dark_ = blanked() || (dark_ && !whole_);  // as in SetBlank
       SetLuts(brightness());
     }
     Attached();

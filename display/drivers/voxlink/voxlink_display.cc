@@ -106,7 +106,7 @@ sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
   }
   if (phase_ == Phase::kDetached && now >= attach_at_) TryAttach(now);
   const sync::TimeNs next = Advance(now);
-  return link_.failed() ? now : next;
+  return link_.failed() ? now : std::min(next, link_.NextTry());
 }
 
 sync::TimeNs VoxlinkDisplay::Advance(sync::TimeNs now) {
@@ -202,12 +202,27 @@ void VoxlinkDisplay::Configure() {
   mode.rate_mhz = static_cast<uint32_t>(std::lround(info().volumes_per_second * 1000));
   link_.Write(Request::kSetMode, 0, BytesOf(mode));
   if ((capabilities_.fixed.features & kFeatureBrightness) != 0) {
+    configured_brightness_ = brightness();
     link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
   } else {
     HasNoBrightness();
   }
+  configured_blank_ = blanked();
   link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   link_.Write(Request::kStart, 0);
+}
+
+void VoxlinkDisplay::Ready() {
+  phase_ = Phase::kReady;
+  failed_setups_ = 0;
+  ++mutable_stats().attaches;
+  // What was asked for since the device was configured.
+  if ((capabilities_.fixed.features & kFeatureBrightness) != 0 &&
+      brightness() != configured_brightness_) {
+    link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
+  }
+  if (blanked() != configured_blank_) link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
+  Attached();
 }
 
 void VoxlinkDisplay::OnReply(Request request, std::span<const std::byte> data) {
@@ -258,10 +273,7 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
   switch (static_cast<EventType>(header.type)) {
     case EventType::kReady:
       if (phase_ != Phase::kWaitingReady) return;
-      phase_ = Phase::kReady;
-      failed_setups_ = 0;
-      ++mutable_stats().attaches;
-      return Attached();
+      return Ready();
     case EventType::kSweep:
       if (!fits(sizeof(SweepEvent))) break;
       sweep_ = Load<SweepEvent>(body);

@@ -80,6 +80,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   void RetryLater(sync::TimeNs now);
   void OnCapabilities(std::span<const std::byte> page);
   void Configure();
+  void Ready();
 
   // Volumes.
   void Begin(const SliceFramePtr& frame, bool full);
@@ -103,6 +104,8 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   sync::Backoff retry_{100 * sync::kMillisecond, 5 * sync::kSecond};
   int failed_setups_ = 0;  // in a row
   sync::TimeNs ready_by_ = 0;
+  double configured_brightness_ = 1;  // what the device was given
+  bool configured_blank_ = false;
   std::vector<std::byte> capability_bytes_;
   DeviceCapabilities capabilities_;
 

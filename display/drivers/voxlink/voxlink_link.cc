@@ -12,6 +12,7 @@ constexpr int kEventReads = 8;  // interrupt transfers that wait at any time
 constexpr int kMostEventFailures = 16;
 constexpr uint16_t kMostConfiguration = 1024;
 constexpr size_t kTransferBytes = size_t{256} << 10;
+constexpr sync::TimeNs kTryAgain = 10 * sync::kMillisecond;  // where there was no room
 constexpr size_t kKeptFree = 8192;  // of the transport's limit, for requests and events
 
 }  // namespace
@@ -36,6 +37,8 @@ void VoxlinkLink::Close() {
   control_id_ = 0;
   session_ = false;
   event_reads_ = 0;
+  events_held_ = false;
+  refused_since_ = 0;
   event_failures_ = 0;
   status_asked_ = false;
   bulk_.clear();
@@ -49,6 +52,17 @@ void VoxlinkLink::Fail(const std::string& reason) {
   if (failed_) return;
   failed_ = true;
   failure_ = reason;
+}
+
+// Poll tries again, for as long as an answer would be waited for.
+void VoxlinkLink::NoRoom(const absl::Status& status) {
+  const sync::TimeNs now = clock_.Now();
+  if (refused_since_ == 0) refused_since_ = now;
+  if (now - refused_since_ >= options_.control_timeout) Fail(std::string(status.message()));
+}
+
+sync::TimeNs VoxlinkLink::NextTry() const {
+  return refused_since_ != 0 || held_.has_value() ? clock_.Now() + kTryAgain : sync::kNever;
 }
 
 // ---- control
@@ -74,7 +88,11 @@ void VoxlinkLink::SendControl() {
     if ((request.setup.request_type & 0x80) != 0) transfer.length = request.setup.length;
     transfer.timeout = options_.control_timeout;
     id = transport_->Submit(std::move(transfer));
+    // What is refused was not moved.
+    if (!id.ok()) request.data = std::move(transfer.data);  // NOLINT(bugprone-use-after-move)
   }
+  if (absl::IsResourceExhausted(id.status())) return NoRoom(id.status());
+  refused_since_ = 0;
   if (!id.ok()) return Fail(std::string(id.status().message()));
   control_id_ = *id;
 }
@@ -178,6 +196,9 @@ void VoxlinkLink::PostEventReads() {
     transfer.endpoint = kInterruptIn;
     transfer.length = kEventSize;
     const absl::StatusOr<TransferId> id = transport_->Submit(std::move(transfer));
+    events_held_ = absl::IsResourceExhausted(id.status());
+    if (events_held_) return NoRoom(id.status());
+    refused_since_ = 0;
     if (!id.ok()) return Fail(std::string(id.status().message()));
     ++event_reads_;
   }
@@ -352,7 +373,12 @@ void VoxlinkLink::Poll() {
   }
   completions.clear();
   drained_ = std::move(completions);
-  if (held_.has_value() && generation == generation_) {
+  // What there was no room for.
+  if (generation == generation_) {
+    SendControl();
+    if (events_held_) PostEventReads();
+  }
+  if (held_.has_value() && generation == generation_ && !recovering()) {
     TransferBytes held = *std::exchange(held_, std::nullopt);
     SubmitBulk(std::move(held));
   }

@@ -66,6 +66,9 @@ class VoxlinkLink {
   void AskStatus();
   void Recover();
 
+  // When Poll has something to try again; kNever if nothing.
+  sync::TimeNs NextTry() const;
+
   // Bytes that may be handed over now: 0 while recovering or without a session.
   size_t Room() const;
   // An empty buffer with memory for a transfer.
@@ -110,6 +113,7 @@ class VoxlinkLink {
 
   void Enqueue(ControlRequest request);
   void SendControl();
+  void NoRoom(const absl::Status& status);
   void PostEventReads();
   void OnControlDone(TransferCompletion& completion);
   void OnBulkDone(TransferCompletion& completion);
@@ -136,6 +140,8 @@ class VoxlinkLink {
   uint32_t receive_buffer_ = 0;
   uint32_t next_event_ = 0;
   int event_reads_ = 0;
+  bool events_held_ = false;        // there was no room for a read
+  sync::TimeNs refused_since_ = 0;  // there is no room for a request or a read; 0: there is
   int event_failures_ = 0;
   bool status_asked_ = false;
 

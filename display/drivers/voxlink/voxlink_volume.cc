@@ -198,9 +198,7 @@ void VoxlinkDisplay::Lose(const std::string& reason) {
 void VoxlinkDisplay::OnStatus(const Status& status, bool settled) {
   NoteUnderruns(status.underruns);
   if (phase_ == Phase::kWaitingReady && status.running != 0) {
-    phase_ = Phase::kReady;  // READY itself was lost
-    ++mutable_stats().attaches;
-    return Attached();
+    return Ready();  // READY itself was lost
   }
   if (sending_.stage == Stage::kIdle) return;
   sending_.end_mark = std::min(sending_.end_mark, link_.sent());  // what was lost is not counted

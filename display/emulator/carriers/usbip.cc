@@ -72,8 +72,7 @@ uint32_t KernelStatus(TransferStatus status) {
       return static_cast<uint32_t>(-EOVERFLOW);
     case TransferStatus::kCancelled:
       return static_cast<uint32_t>(-ENOENT);
-    case TransferStatus::kDisconnected:
-      return static_cast<uint32_t>(-ESHUTDOWN);
+    case TransferStatus::kDisconnected:  // is not said
     case TransferStatus::kTimedOut:
     case TransferStatus::kError:
       break;

@@ -253,8 +253,10 @@ void UsbredirSession::Connect() {
   model_.SetComplete([this](uint64_t id, TransferStatus status, uint32_t actual,
                             std::span<const std::byte> in) { OnComplete(id, status, actual, in); });
   usb_redir_interface_info_header interfaces{};
-  interfaces.interface_count = static_cast<uint32_t>(facts.interfaces.size());
-  for (size_t i = 0; i < facts.interfaces.size() && i < 32; ++i) {
+  constexpr size_t kMostInterfaces = std::size(decltype(interfaces.interface){});
+  const size_t count = std::min(facts.interfaces.size(), kMostInterfaces);
+  interfaces.interface_count = static_cast<uint32_t>(count);
+  for (size_t i = 0; i < count; ++i) {
     interfaces.interface[i] = static_cast<uint8_t>(i);
     interfaces.interface_class[i] = facts.interfaces[i][0];
     interfaces.interface_subclass[i] = facts.interfaces[i][1];

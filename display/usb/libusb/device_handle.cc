@@ -16,7 +16,6 @@
 namespace voxeld::display {
 namespace {
 
-constexpr size_t kSlabBytes = size_t{256} << 10;
 constexpr size_t kSlabs = 24;  // more than a driver has in flight, so that it fills some meanwhile
 
 class DeviceSlabs final : public SlabMemory {
@@ -30,7 +29,7 @@ class DeviceSlabs final : public SlabMemory {
     for (void* slab : slabs_) {
       libusb_dev_mem_free(handle_->get(), static_cast<unsigned char*>(slab), kSlabBytes);
     }
-    budget_.Release(slabs_.size() * kSlabBytes);
+    budget_.ReleaseLent(slabs_.size() * kSlabBytes);
   }
 
  private:
@@ -70,12 +69,10 @@ bool DeviceHandle::gives_memory() const {
 std::shared_ptr<SlabMemory> BorrowSlabs(std::shared_ptr<DeviceHandle> handle, UsbfsBudget& budget) {
   std::vector<void*> slabs;
   // The kernel counts them for as long as they are there.
-  while (handle->gives_memory() && slabs.size() < kSlabs &&
-         (slabs.size() + 1) * kSlabBytes <= budget.limit() / 2) {
-    if (!budget.Take(kSlabBytes)) break;
+  while (handle->gives_memory() && slabs.size() < kSlabs && budget.TakeLent(kSlabBytes)) {
     void* const slab = libusb_dev_mem_alloc(handle->get(), kSlabBytes);
     if (slab == nullptr) {
-      budget.Release(kSlabBytes);
+      budget.ReleaseLent(kSlabBytes);
       break;
     }
     slabs.push_back(slab);

@@ -1,6 +1,7 @@
 // libusb's context, and its handle of a device with the memory that the kernel lends for its transfers.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 
 #include "absl/status/statusor.h"
@@ -46,8 +47,10 @@ class DeviceHandle {
   const int node_;
 };
 
-// Slabs of memory that the kernel reads in place, as many as it gives within half of `budget`, the rest
-// ordinary. Keeps the handle; `budget` outlives what comes back.
+inline constexpr size_t kSlabBytes = size_t{256} << 10;
+
+// Slabs of memory that the kernel reads in place, as many as kernel and budget give, the rest ordinary.
+// Keeps the handle; `budget` outlives what comes back.
 std::shared_ptr<SlabMemory> BorrowSlabs(std::shared_ptr<DeviceHandle> handle, UsbfsBudget& budget);
 
 }  // namespace voxeld::display

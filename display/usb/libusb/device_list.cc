@@ -71,7 +71,7 @@ absl::StatusOr<std::vector<UsbDeviceEntry>> Matching(const UsbMatch& match,
     return absl::NotFoundError(absl::StrCat("no USB device ", match.ToString(), " is attached"));
   }
   if (!match.member.has_value()) return devices;
-  const auto [index, count] = *match.member;
+  const size_t index = match.member->index, count = match.member->count;
   if (devices.size() < count) {
     return absl::NotFoundError(absl::StrCat("of ", count, " USB devices ", match.ToString(), ", ",
                                             devices.size(), " are attached"));

@@ -81,35 +81,51 @@ void LibusbBus::Forget(LibusbTransport* transport) {
   transports_.erase(transport);
 }
 
-absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& match,
-                                                            TransferId first_id,
-                                                            std::function<void(bool)> wake) {
+absl::StatusOr<UsbDeviceEntry> LibusbBus::Reserve(const UsbMatch& match,
+                                                  const std::set<std::string>& tried) {
   sync::MutexLock lock(list_mutex_);
   absl::StatusOr<std::vector<UsbDeviceEntry>> devices = list_->Devices();
   if (!devices.ok()) return devices.status();
-  devices = Matching(match, *std::move(devices));
-  if (!devices.ok()) return devices.status();
+  const std::string group = match.member.has_value() ? match.member->group : "";
+  const auto taken = [&](const UsbDeviceEntry& entry) VOXELD_REQUIRES(list_mutex_) {
+    const auto it = open_nodes_.find(entry.node);
+    return it != open_nodes_.end() && (group.empty() || it->second != group);
+  };
+  const absl::StatusOr<std::vector<UsbDeviceEntry>> all = Matching(match, *devices);
+  std::erase_if(*devices, taken);
+  const absl::StatusOr<std::vector<UsbDeviceEntry>> left = Matching(match, *std::move(devices));
+  if (!left.ok() && all.ok()) {
+    return absl::NotFoundError(
+        absl::StrCat(left.status().message(), ", but for what belongs to other displays"));
+  }
+  if (!left.ok()) return left.status();
+  for (const UsbDeviceEntry& entry : *left) {
+    if (open_nodes_.contains(entry.node) || tried.contains(entry.node)) continue;
+    open_nodes_.emplace(entry.node, group);
+    return entry;
+  }
+  return absl::NotFoundError(absl::StrCat("no other ", match.ToString(), " is attached"));
+}
+
+absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& match,
+                                                            TransferId first_id,
+                                                            std::function<void(bool)> wake) {
+  std::set<std::string> tried;
   absl::Status last;
-  for (const UsbDeviceEntry& entry : *devices) {
-    if (open_nodes_.contains(entry.node)) {
-      if (last.ok()) {
-        last = absl::NotFoundError(absl::StrCat("the USB device at ", entry.identity.path,
-                                                " belongs to another display, and no other ",
-                                                match.ToString(), " is attached"));
-      }
-      continue;
-    }
+  while (true) {
+    const absl::StatusOr<UsbDeviceEntry> entry = Reserve(match, tried);
+    if (!entry.ok()) return last.ok() ? entry.status() : last;
+    // A device may take its time to answer: nobody else waits for it.
     absl::StatusOr<std::unique_ptr<OpenDevice>> device =
-        OpenDevice::Open(context_, entry, *ChooseInterface(entry.interfaces, match.interface),
+        OpenDevice::Open(context_, *entry, *ChooseInterface(entry->interfaces, match.interface),
                          budget_, clock_, first_id, wake);
     Poke();  // libusb may have handled others' events in here
-    if (device.ok()) {
-      open_nodes_.insert(entry.node);
-      return device;
-    }
+    if (device.ok()) return device;
     last = device.status();
+    tried.insert(entry->node);
+    sync::MutexLock lock(list_mutex_);
+    open_nodes_.erase(entry->node);
   }
-  return last;
 }
 
 void LibusbBus::Close(std::unique_ptr<OpenDevice> device) {
@@ -187,8 +203,9 @@ void LibusbBus::Run() {
       }
     }
     if (fds_changed_.exchange(false)) fds = PollFds();
-    const int ready = poll(fds.data(), fds.size(), graves ? kGraveIntervalMs : -1);
-    if (ready < 0 && errno != EINTR) continue;
+    if (poll(fds.data(), fds.size(), graves ? kGraveIntervalMs : -1) < 0) {
+      for (pollfd& fd : fds) fd.revents = 0;
+    }
     if (fds[kPoke].revents != 0) {
       uint64_t pokes = 0;
       [[maybe_unused]] const ssize_t got = read(poke_, &pokes, sizeof(pokes));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -40,6 +41,9 @@ class LibusbBus final : public UsbBus {
   LibusbBus(std::shared_ptr<LibusbContext> context, std::unique_ptr<DeviceList> list,
             std::unique_ptr<DeviceWatch> watch, int poke, sync::Clock& clock);
 
+  // A device that matches, is nobody's, and is not among the nodes `tried`: from now on the caller's.
+  absl::StatusOr<UsbDeviceEntry> Reserve(const UsbMatch& match, const std::set<std::string>& tried);
+
   void Run();
   // Ours (PollIndex), then libusb's.
   std::vector<pollfd> PollFds() const;
@@ -60,7 +64,8 @@ class LibusbBus final : public UsbBus {
 
   sync::Mutex list_mutex_;
   const std::unique_ptr<DeviceList> list_;  // belongs to list_mutex_
-  std::set<std::string> open_nodes_ VOXELD_GUARDED_BY(list_mutex_);
+  // And the group that each belongs to (UsbMatch::Member), if any.
+  std::map<std::string, std::string> open_nodes_ VOXELD_GUARDED_BY(list_mutex_);
 
   sync::Mutex transports_mutex_;
   std::set<LibusbTransport*> transports_ VOXELD_GUARDED_BY(transports_mutex_);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -136,7 +137,6 @@ OpenDevice::OpenDevice(std::shared_ptr<DeviceHandle> handle, const UsbDeviceEntr
       interface_(interface),
       budget_(budget),
       clock_(clock),
-      memory_(BorrowSlabs(handle_, budget)),
       wake_(std::move(wake)),
       next_id_(first_id) {
   for (size_t i = 0; i < kTransfers; ++i) {
@@ -168,7 +168,7 @@ absl::StatusOr<TransferId> OpenDevice::Submit(Transfer&& transfer) {
   if (absl::Status refusal = Refusal(); !refusal.ok()) return refusal;
   const size_t size = std::max<size_t>(transfer.data.size(), transfer.length);
   const bool in_place = transfer.length == 0 && !transfer.data.empty() &&
-                        transfer.type != TransferType::kControl &&
+                        transfer.type != TransferType::kControl && memory_ != nullptr &&
                         memory_->Owns(transfer.data.data());
   const size_t counted = in_place ? 0 : size;
   if (!budget_.Take(counted)) {
@@ -288,10 +288,13 @@ void OpenDevice::Complete(Pending& pending, TransferStatus status) {
     }
     bytes_in_flight_ -= size;
     completions_.push_back(std::move(completion));
-    changed_.NotifyAll();
+    ++finishing_;
   }
   budget_.Release(counted);
   Wake(true);
+  sync::MutexLock lock(mutex_);
+  --finishing_;
+  changed_.NotifyAll();
 }
 
 void OpenDevice::Wake(bool more) {
@@ -325,6 +328,8 @@ size_t OpenDevice::bytes_in_flight() const {
 }
 
 TransferBytes OpenDevice::TakeBuffer(size_t capacity) {
+  // Nobody borrows for buffers that would not lie in a slab.
+  if (memory_ == nullptr && capacity > kSlabBytes / 2) memory_ = BorrowSlabs(handle_, budget_);
   TransferBytes buffer(memory_);
   buffer.reserve(capacity);
   return buffer;
@@ -370,7 +375,7 @@ void OpenDevice::CarryOut(const Job& job) {
       completion.status = StatusOf(libusb_clear_halt(handle_->get(), job.endpoint));
       break;
     case Job::What::kReset:
-      completion.status = ResetPort();
+      completion.status = ResetPort(job.id);
       break;
     case Job::What::kCancel:
       CancelOne(job.id);
@@ -388,8 +393,8 @@ void OpenDevice::CarryOut(const Job& job) {
   Wake(false);
 }
 
-TransferStatus OpenDevice::ResetPort() {
-  CancelAll();
+TransferStatus OpenDevice::ResetPort(TransferId id) {
+  CancelBefore(id);
   {
     sync::MutexLock lock(mutex_);
     const sync::TimeNs end = clock_.Now() + kCancelLimit;
@@ -418,11 +423,13 @@ void OpenDevice::CancelOne(TransferId id) {
   if (std::exchange(pending->done, false)) free_.push_back(pending);
 }
 
-void OpenDevice::CancelAll() {
+void OpenDevice::CancelBefore(TransferId end) {
   std::vector<TransferId> ids;
   {
     sync::MutexLock lock(mutex_);
-    for (const auto& [id, pending] : pending_) ids.push_back(id);
+    for (const auto& [id, pending] : pending_) {
+      if (id < end) ids.push_back(id);
+    }
   }
   for (const TransferId id : ids) CancelOne(id);
 }
@@ -433,7 +440,7 @@ void OpenDevice::SubmitDeferred() {
   std::vector<std::pair<Pending*, TransferStatus>> failed;
   {
     sync::MutexLock lock(mutex_);
-    if (jobs_.size() == 1) {
+    if (jobs_.size() <= 1 || ending_) {
       for (Pending* pending : deferred_) {
         // The last requests of a device that is closed still go out.
         const bool late = ending_ && pending->asked.type != TransferType::kControl;
@@ -444,7 +451,7 @@ void OpenDevice::SubmitDeferred() {
       }
       deferred_.clear();
     }
-    jobs_.pop_front();
+    if (!jobs_.empty()) jobs_.pop_front();
   }
   for (const auto& [pending, status] : failed) Complete(*pending, status);
 }
@@ -471,6 +478,7 @@ bool OpenDevice::Ended() const {
 }
 
 void OpenDevice::GiveBack() {
+  SubmitDeferred();
   {
     sync::MutexLock lock(mutex_);
     jobs_.clear();
@@ -483,10 +491,10 @@ void OpenDevice::GiveBack() {
       clock_.WaitUntil(mutex_, changed_, patient_until_);
     }
   }
-  CancelAll();
+  CancelBefore(std::numeric_limits<TransferId>::max());
   {
     sync::MutexLock lock(mutex_);
-    while (!pending_.empty()) changed_.Wait(mutex_);
+    while (!pending_.empty() || finishing_ > 0) changed_.Wait(mutex_);
   }
   libusb_release_interface(handle_->get(), interface_);
   sync::MutexLock lock(mutex_);

@@ -90,9 +90,9 @@ class OpenDevice {
   // The device's thread.
   void Work();
   void CarryOut(const Job& job);
-  TransferStatus ResetPort();
+  TransferStatus ResetPort(TransferId id);
   void CancelOne(TransferId id);
-  void CancelAll();
+  void CancelBefore(TransferId end);
   void SubmitDeferred();
   void GiveBack();
 
@@ -101,7 +101,7 @@ class OpenDevice {
   const uint8_t interface_;
   UsbfsBudget& budget_;
   sync::Clock& clock_;
-  const std::shared_ptr<SlabMemory> memory_;
+  std::shared_ptr<SlabMemory> memory_;  // the owner's; borrowed when it is first of use
 
   sync::Mutex wake_mutex_;
   std::function<void(bool)> wake_ VOXELD_GUARDED_BY(wake_mutex_);
@@ -118,6 +118,7 @@ class OpenDevice {
   std::vector<std::unique_ptr<Pending>> all_ VOXELD_GUARDED_BY(mutex_);  // made once, used again
   std::vector<Pending*> free_ VOXELD_GUARDED_BY(mutex_);
   size_t bytes_in_flight_ VOXELD_GUARDED_BY(mutex_) = 0;
+  int finishing_ VOXELD_GUARDED_BY(mutex_) = 0;  // completions that are not told of yet
   std::vector<TransferCompletion> completions_ VOXELD_GUARDED_BY(mutex_);
   std::deque<Job> jobs_ VOXELD_GUARDED_BY(mutex_);  // the first is being carried out
   std::thread thread_;

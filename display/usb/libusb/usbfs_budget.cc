@@ -51,4 +51,20 @@ void UsbfsBudget::Release(size_t bytes) {
   room_();
 }
 
+bool UsbfsBudget::TakeLent(size_t bytes) {
+  sync::MutexLock lock(mutex_);
+  if (bytes > limit_ / 2 - lent_ || bytes > limit_ - taken_) return false;
+  lent_ += bytes;
+  taken_ += bytes;
+  return true;
+}
+
+void UsbfsBudget::ReleaseLent(size_t bytes) {
+  {
+    sync::MutexLock lock(mutex_);
+    lent_ -= bytes;
+  }
+  Release(bytes);
+}
+
 }  // namespace voxeld::display

@@ -26,12 +26,17 @@ class UsbfsBudget {
   size_t limit() const { return limit_; }
   bool Take(size_t bytes);
   void Release(size_t bytes);
+  // For memory that is kept: all of it together gets half of the limit, so that transfers always find
+  // some. No room is told of. Given back by ReleaseLent.
+  bool TakeLent(size_t bytes);
+  void ReleaseLent(size_t bytes);
 
  private:
   const size_t limit_;
   const std::function<void()> room_;
   sync::Mutex mutex_;
   size_t taken_ VOXELD_GUARDED_BY(mutex_) = 0;
+  size_t lent_ VOXELD_GUARDED_BY(mutex_) = 0;  // of taken_
   bool refused_ VOXELD_GUARDED_BY(mutex_) = false;
 };
 

@@ -68,6 +68,47 @@ TEST_F(Driver, AttachesAndShowsAVolume) {
   EXPECT_EQ(rig_->display().stats().attaches, 1u);
 }
 
+TEST_F(Driver, AnAttachedDeviceStaysDarkUntilThereIsTheNewestVolume) {
+  Start();
+  Show();
+  rig_->recorder().has_newer = true;
+  for (const bool same : {false, true}) {
+    rig_->SetPlugged(false);
+    rig_->RunFor(10 * kMillisecond);
+    EXPECT_EQ(rig_->display().state(), DisplayState::kLost);
+    rig_->SetPlugged(true);
+    rig_->RunFor(2 * kSecond);
+    EXPECT_EQ(rig_->display().state(), DisplayState::kShowing);
+    EXPECT_FALSE(rig_->device().Seen().has_value());
+    if (same) {
+      rig_->display().ShowCurrent();
+      EXPECT_TRUE(rig_->RunUntil([&] { return SeesFrame(); }, kSecond));
+    } else {
+      Show();
+    }
+  }
+}
+
+TEST_F(Driver, BlankAndBrightnessSetWhileTheDeviceIsSetUpHold) {
+  Start();
+  Show();
+  for (const bool blank : {true, false}) {
+    rig_->SetPlugged(false);
+    rig_->RunFor(10 * kMillisecond);
+    rig_->faults().Add(
+        {.endpoint = 0x82, .what = emulator::Fault::What::kNak, .amount = 400 * kMillisecond});
+    rig_->SetPlugged(true);
+    rig_->RunFor(150 * kMillisecond);
+    ASSERT_EQ(rig_->display().state(), DisplayState::kLost);  // READY is on its way
+    ASSERT_TRUE(rig_->display().SetBlank(blank).ok());
+    ASSERT_TRUE(rig_->display().SetBrightness(blank ? 0.25 : 0.5).ok());
+    rig_->RunFor(3 * kSecond);
+    EXPECT_EQ(rig_->display().state(), blank ? DisplayState::kBlanked : DisplayState::kShowing);
+    EXPECT_EQ(SeesFrame(), !blank);
+    EXPECT_NEAR(rig_->device().brightness(), blank ? 0.25 : 0.5, 1e-4);
+  }
+}
+
 TEST_F(Driver, OnePictureInAHundredCostsATwentiethAtMost) {
   Start({{"size", "64x64x100"}});
   Show();

@@ -26,10 +26,12 @@ struct Recorder final : Display::Listener {
   void OnState(DisplayState state, const std::string& reason) override {
     states.emplace_back(state, reason);
   }
+  bool HasNewer() const override { return has_newer; }
   // Outcomes of one volume.
   int Count(uint64_t volume) const;
   const VolumeOutcome* Of(uint64_t volume) const;
 
+  bool has_newer = false;
   std::vector<VolumeOutcome> outcomes;
   std::vector<std::pair<DisplayState, std::string>> states;
 };

@@ -212,6 +212,36 @@ TEST_P(TransportConformance, ResetCancelsWhatIsInFlightAndTheDeviceStartsAnew) {
   EXPECT_EQ(running(), 0);
 }
 
+TEST_P(TransportConformance, WhatIsSubmittedBehindAResetGoesOutAfterIt) {
+  Open();
+  Wait(SubmitRequest(voxlink::Request::kStart));
+  const TransferId reset = Must(usb().Reset());
+  const TransferId status = SubmitIn({.request_type = voxlink::kRequestIn,
+                                      .request = static_cast<uint8_t>(voxlink::Request::kGetStatus),
+                                      .length = sizeof(voxlink::Status)});
+  const TransferId bulk = SubmitBulk(TransferBytes(10));
+  EXPECT_EQ(Wait(reset).status, TransferStatus::kOk);
+  const TransferCompletion answer = Wait(status);
+  ASSERT_EQ(answer.status, TransferStatus::kOk);
+  EXPECT_EQ(voxlink::Load<voxlink::Status>(answer.data).running, 0);
+  EXPECT_EQ(Wait(bulk).status, TransferStatus::kOk);
+}
+
+TEST_P(TransportConformance, WhatIsSubmittedBehindAClearedHaltGoesOutBeforeClose) {
+  Open();
+  Wait(SubmitRequest(voxlink::Request::kStart));
+  Must(usb().ClearHalt(voxlink::kBulkOut));
+  Must(usb().ClearHalt(voxlink::kInterruptIn));
+  SubmitRequest(voxlink::Request::kStop);
+  usb().Close();
+  Open();
+  const TransferCompletion status =
+      Wait(SubmitIn({.request_type = voxlink::kRequestIn,
+                     .request = static_cast<uint8_t>(voxlink::Request::kGetStatus),
+                     .length = sizeof(voxlink::Status)}));
+  EXPECT_EQ(voxlink::Load<voxlink::Status>(status.data).running, 0);
+}
+
 TEST_P(TransportConformance, AnArrivalIsToldOnceWhileNothingIsOpen) {
   Open();
   EXPECT_FALSE(usb().TakeArrival());

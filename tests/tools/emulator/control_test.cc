@@ -71,7 +71,7 @@ TEST_P(ControlLines, WhatIsWrongIsAnsweredAndDoesNothing) {
   EXPECT_TRUE(Ask("fault stall").starts_with("error: ")) << Ask("fault stall");
   EXPECT_TRUE(Ask("fault boom@t1").starts_with("error: ")) << Ask("fault boom@t1");
   EXPECT_TRUE(Ask("fault stall@t1;nonsense").starts_with("error: "));
-  EXPECT_EQ(Ask("jump"), "error: \"jump\" is none of fault, clear, plug, unplug, status");
+  EXPECT_EQ(Ask("jump"), "error: \"jump\" is none of fault, clear, hostile, plug, unplug, status");
   EXPECT_TRUE(Ask("").starts_with("error: "));
   EXPECT_EQ(device_.faults->faults_left(), 0u);
   EXPECT_EQ(Status()["plugged"], true);

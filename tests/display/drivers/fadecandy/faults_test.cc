@@ -65,7 +65,7 @@ TEST_F(Fadecandy, AnIdleBoardIsMissedAsWell) {
   rig_->RunFor(10 * kSecond);
   EXPECT_EQ(state(), DisplayState::kShowing);
   rig_->SetPlugged(0, false);
-  rig_->RunFor(550 * kMillisecond);
+  rig_->RunFor(80 * kMillisecond);
   EXPECT_EQ(state(), DisplayState::kLost);
   EXPECT_EQ(rig_->display().state_reason(), "board 1 (serial A): it was unplugged");
 }
@@ -106,7 +106,7 @@ TEST_F(Fadecandy, BoardsWithoutAnOrderOfTheirOwnAreSorted) {
   ASSERT_TRUE(rig_->RunUntil([&] { return captured.has_value(); }));
   EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*frame_));
   rig_->SetPlugged(2, false);
-  rig_->RunFor(550 * kMillisecond);
+  rig_->RunFor(80 * kMillisecond);
   EXPECT_EQ(rig_->display().state_reason(), "board 1 (serial X): it was unplugged");
 }
 

@@ -51,14 +51,15 @@ TEST(Matching, OneOfSeveralAlikeBySerialThenPlace) {
   const std::vector<UsbDeviceEntry> devices = {Device("Z", "1-1"), Device("A", "1-3"),
                                                Device("A", "1-2")};
   const auto number = [&](size_t index) {
-    return PathsOf({.member = {{.index = index, .count = 3}}}, devices);
+    return PathsOf({.member = {{.index = index, .count = 3, .group = "g"}}}, devices);
   };
   EXPECT_EQ(number(0), "1-2 ");
   EXPECT_EQ(number(1), "1-3 ");
   EXPECT_EQ(number(2), "1-1 ");
   // Which is which is not known before all are there.
-  EXPECT_EQ(PathsOf({.vendor_id = 0x1209, .member = {{.index = 0, .count = 4}}}, devices),
-            "of 4 USB devices 1209:*, 3 are attached");
+  EXPECT_EQ(
+      PathsOf({.vendor_id = 0x1209, .member = {{.index = 0, .count = 4, .group = "g"}}}, devices),
+      "of 4 USB devices 1209:*, 3 are attached");
 }
 
 }  // namespace
