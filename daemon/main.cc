@@ -139,9 +139,10 @@ void LogDisplays(Core& core, Logger& log) {
   for (const DisplayFigures& display : stats->displays) {
     log.Info("display", {{"name", display.name},
                          {"state", DisplayStateName(display.state)},
+                         {"state_why", display.state_reason},
                          {"engine", display.engine},
                          {"device", display.engine_device},
-                         {"why", display.engine_reason}});
+                         {"engine_why", display.engine_reason}});
   }
 }
 
@@ -150,7 +151,14 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   EngineWatch watch(log);
   Core core({.limits = config.limits,
              .version = Version(),
-             .engine_event = [&watch](const EngineEvent& event) { watch.OnEvent(event); }},
+             .engine_event = [&watch](const EngineEvent& event) { watch.OnEvent(event); },
+             .state_event =
+                 [&log](const std::string& display, display::DisplayState state,
+                        const std::string& reason) {
+                   const bool lost = state == display::DisplayState::kLost;
+                   log.Log(lost ? Logger::Level::kWarn : Logger::Level::kInfo,
+                           DisplayStateName(state), {{"display", display}, {"why", reason}});
+                 }},
             clock);
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),

@@ -57,6 +57,10 @@ struct CoreOptions {
       make_engine;
   // What becomes of engines in processes of their own; on the core's thread. May be empty.
   std::function<void(const EngineEvent&)> engine_event;
+  // A display's state, whenever it or its reason changes; on the core's thread. May be empty.
+  std::function<void(const std::string& display, display::DisplayState state,
+                     const std::string& reason)>
+      state_event;
 };
 
 struct SessionInfo {

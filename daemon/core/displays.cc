@@ -51,6 +51,12 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
       loop->Post([tell, event = std::move(event)] { tell(event); });
     };
   }
+  if (options_.state_event) {
+    options.tell_state = [loop = loop_, tell = options_.state_event, name = info.name](
+                             display::DisplayState state, const std::string& reason) {
+      loop->Post([tell, name, state, reason] { tell(name, state, reason); });
+    };
+  }
   auto host = std::make_shared<Host>();
   host->work = options.work;
   absl::StatusOr<std::unique_ptr<FramePipeline>> pipeline =

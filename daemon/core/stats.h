@@ -18,6 +18,7 @@ struct LatencyStats {
 struct DisplayFigures {
   std::string name;
   display::DisplayState state = display::DisplayState::kStopped;
+  std::string state_reason;
   std::string engine, engine_device, engine_reason;
   uint64_t lit_voxels = 0;
   uint64_t singular_drawables = 0;  // left out: the product of their transforms has no inverse

@@ -36,6 +36,7 @@ FramePipeline::FramePipeline(Options options)
       engine_options_(options.engine),
       tell_(std::move(options.tell)),
       retire_(std::move(options.retire)),
+      tell_state_(std::move(options.tell_state)),
       view_(options.view),
       scene_(std::make_unique<EngineScene>([this] { Breathe(); })),
       pool_(display_->info().layout),
@@ -381,7 +382,8 @@ void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
   riders_.OnOutcome(outcome);
 }
 
-void FramePipeline::OnState(display::DisplayState state, const std::string&) {
+void FramePipeline::OnState(display::DisplayState state, const std::string& reason) {
+  if (tell_state_) tell_state_(state, reason);
   if (state == display::DisplayState::kShowing) {
     if (show_again_) show_again_at_ = std::min(show_again_at_, clock_.Now());
     return;

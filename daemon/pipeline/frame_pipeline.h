@@ -73,6 +73,8 @@ class FramePipeline final : private display::Display::Listener {
     // be busy. Empty: it is freed on the spot.
     std::function<void(std::shared_ptr<const void>)> retire;
     std::function<void(EngineEvent)> tell_engine;  // what becomes of the engine; may be empty
+    // The display's state, whenever it or its reason changes; may be empty.
+    std::function<void(display::DisplayState, const std::string&)> tell_state;
   };
 
   // Makes the engine. Its failure, or a view that cannot be, is the answer.
@@ -165,6 +167,7 @@ class FramePipeline final : private display::Display::Listener {
   std::string takeover_;  // why the engine is not the one that was asked for
   const RiderBook::Tell tell_;
   const std::function<void(std::shared_ptr<const void>)> retire_;
+  const std::function<void(display::DisplayState, const std::string&)> tell_state_;
 
   uint64_t engines_made_ = 0;
   EngineCare::Made made_;

@@ -82,6 +82,7 @@ DisplayFigures FramePipeline::Figures() const {
   DisplayFigures figures;
   figures.name = info().name;
   figures.state = display_->state();
+  figures.state_reason = display_->state_reason();
   if (made_.engine != nullptr) figures.engine = gpu::EngineKindName(engine_info_.kind);
   figures.engine_device = engine_info_.device;
   figures.engine_reason = engine_info_.reason;

@@ -14,6 +14,7 @@ void EncodeLatency(const LatencyStats& in, v1::Latency* out) {
 void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_name(in.name);
   out->set_state(ToWire(in.state));
+  out->set_state_reason(in.state_reason);
   out->set_engine(in.engine);
   out->set_engine_device(in.engine_device);
   out->set_engine_reason(in.engine_reason);

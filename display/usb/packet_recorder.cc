@@ -1,6 +1,7 @@
 #include "display/usb/packet_recorder.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -56,9 +57,21 @@ class FileSink final : public ByteSink {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ByteSink>> OpenFileSink(const std::string& path) {
-  constexpr mode_t kMode = 0644;
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+  constexpr mode_t kMode = 0640;  // it has all that was shown
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, kMode);
   if (descriptor < 0) return SystemError("opening the recording", path, errno);
+  // Nobody else's that is being written.
+  if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    ::close(descriptor);
+    return absl::FailedPreconditionError(
+        absl::StrCat("the recording ", path, " is being written already; choose another file"));
+  }
+  // What is no file (a pipe, a device) cannot be emptied, and need not be.
+  if (ftruncate(descriptor, 0) != 0 && errno != EINVAL) {
+    const int error = errno;
+    ::close(descriptor);
+    return SystemError("emptying the recording", path, error);
+  }
   return std::make_unique<FileSink>(path, descriptor);
 }
 

@@ -1,5 +1,10 @@
 #include "display/usb/recording_transport.h"
 
+#include <unistd.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/escaping.h"
@@ -27,14 +32,27 @@ RecordingTransport::RecordingTransport(std::unique_ptr<UsbTransport> inner,
                                        Options options)
     : inner_(std::move(inner)), recorder_(std::move(recorder)), clock_(clock), options_(options) {}
 
+RecordingTransport::RecordingTransport(std::unique_ptr<UsbTransport> inner, MakeRecorder make,
+                                       sync::Clock& clock, Options options)
+    : inner_(std::move(inner)), make_recorder_(std::move(make)), clock_(clock), options_(options) {}
+
 RecordingTransport::~RecordingTransport() {
   Close();
-  recorder_->Finish();
+  if (recorder_ != nullptr) recorder_->Finish();
 }
 
 absl::Status RecordingTransport::Open() {
   absl::Status status = inner_->Open();
   if (!status.ok()) return status;
+  if (recorder_ == nullptr) {
+    absl::StatusOr<std::unique_ptr<PacketRecorder>> recorder = make_recorder_();
+    if (!recorder.ok()) {
+      inner_->Close();
+      return recorder.status();
+    }
+    recorder_ = *std::move(recorder);
+    make_recorder_ = nullptr;
+  }
   address_ = address_ == kMostAddress ? 1 : address_ + 1;
   opened_ = Described(inner_->identity());
   return status;
@@ -163,12 +181,19 @@ size_t RecordingTransport::Drain(std::vector<TransferCompletion>& out) {
 absl::StatusOr<std::unique_ptr<RecordingTransport>> RecordToFile(
     const std::string& path, std::unique_ptr<UsbTransport> inner, sync::Clock& clock,
     RecordingFileOptions options) {
-  absl::StatusOr<std::unique_ptr<ByteSink>> sink = OpenFileSink(path);
-  if (!sink.ok()) return sink.status();
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  if (access(folder.c_str(), W_OK) != 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the recording ", path, " cannot be written: ", std::generic_category().message(errno)));
+  }
   options.limits.info = {.application = options.application, .interface_name = options.name};
-  return std::make_unique<RecordingTransport>(
-      std::move(inner), std::make_unique<PacketRecorder>(*std::move(sink), options.limits), clock,
-      options.transport);
+  const auto make = [path,
+                     limits = options.limits]() -> absl::StatusOr<std::unique_ptr<PacketRecorder>> {
+    absl::StatusOr<std::unique_ptr<ByteSink>> sink = OpenFileSink(path);
+    if (!sink.ok()) return sink.status();
+    return std::make_unique<PacketRecorder>(*std::move(sink), limits);
+  };
+  return std::make_unique<RecordingTransport>(std::move(inner), make, clock, options.transport);
 }
 
 }  // namespace voxeld::display

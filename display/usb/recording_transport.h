@@ -31,10 +31,15 @@ class RecordingTransport final : public UsbTransport {
 
   RecordingTransport(std::unique_ptr<UsbTransport> inner, std::unique_ptr<PacketRecorder> recorder,
                      sync::Clock& clock, Options options);
+  // Begins its recording when a device is opened for the first time; what `make` says is then the
+  // answer of Open.
+  using MakeRecorder = std::function<absl::StatusOr<std::unique_ptr<PacketRecorder>>()>;
+  RecordingTransport(std::unique_ptr<UsbTransport> inner, MakeRecorder make, sync::Clock& clock,
+                     Options options);
   // Finishes the recording, which waits for the disk.
   ~RecordingTransport() override;
 
-  // Whether the recording goes on, and what it lost. Its functions are thread-safe.
+  // Whether the recording goes on, and what it lost; once it has begun. Its functions are thread-safe.
   const PacketRecorder& recorder() const { return *recorder_; }
 
   absl::Status Open() override;
@@ -67,7 +72,8 @@ class RecordingTransport final : public UsbTransport {
   void RecordCompletion(const TransferCompletion& completion);
 
   const std::unique_ptr<UsbTransport> inner_;
-  const std::unique_ptr<PacketRecorder> recorder_;
+  MakeRecorder make_recorder_;  // empty once there is one
+  std::unique_ptr<PacketRecorder> recorder_;
   sync::Clock& clock_;
   const Options options_;
 
@@ -84,7 +90,8 @@ struct RecordingFileOptions {
   RecordingTransport::Options transport;
 };
 
-// `inner` recorded into the file `path`. The error names the path.
+// `inner` recorded into the file `path`, which is begun anew when a device is opened for the first
+// time. Errors, then and now (a folder that is not there or cannot be written), name the path.
 absl::StatusOr<std::unique_ptr<RecordingTransport>> RecordToFile(
     const std::string& path, std::unique_ptr<UsbTransport> inner, sync::Clock& clock,
     RecordingFileOptions options = {});

@@ -11,7 +11,7 @@ std::string UsbMatch::ToString() const {
   };
   std::string text = vendor_id.has_value() || product_id.has_value()
                          ? absl::StrCat(id(vendor_id), ":", id(product_id))
-                         : std::string("any");
+                         : std::string("of any kind");
   if (interface.has_value()) {
     absl::StrAppend(&text, absl::StrFormat(" with an interface of class %02X:%02X:%02X",
                                            (*interface)[0], (*interface)[1], (*interface)[2]));

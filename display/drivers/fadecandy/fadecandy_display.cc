@@ -106,7 +106,16 @@ void FadecandyDisplay::OnBytes(const Board& board, std::span<const std::byte> by
 void FadecandyDisplay::TryAttach(sync::TimeNs now) {
   for (const auto& board : boards_) {
     const absl::Status status = board->Open();
-    if (!status.ok()) return Detach(now, absl::StrCat(board->Name(), ": ", status.message()));
+    if (status.ok()) continue;
+    const std::string reason = absl::StrCat(board->Name(), ": ", status.message());
+    // As long as there never was a device, it is looked for.
+    if (!absl::IsNotFound(status) || state() != DisplayState::kAttaching)
+      return Detach(now, reason);
+    NoDevice(reason);
+    for (const auto& other : boards_) other->Close();
+    failed_at_ = now;
+    attach_at_ = now + retry_.Next();
+    return;
   }
   Sort();
   phase_ = Phase::kSettingUp;

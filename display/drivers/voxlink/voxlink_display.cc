@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -51,7 +53,8 @@ VoxlinkDisplay::VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> t
 VoxlinkDisplay::~VoxlinkDisplay() { Stop(); }
 
 void VoxlinkDisplay::ClockMap::Note(uint64_t device_ns, sync::TimeNs host_ns) {
-  const int64_t difference = host_ns - static_cast<int64_t>(device_ns);
+  // A device may say anything: it wraps.
+  const auto difference = static_cast<int64_t>(static_cast<uint64_t>(host_ns) - device_ns);
   if (!known) {
     known = true;
     offset = coming = difference;
@@ -314,6 +317,7 @@ std::vector<sync::TimeNs> VoxlinkDisplay::ComingSweeps(int count) const {
   if (!sweep_ || sweep_->period_ns == 0 || count <= 0) return starts;
   const sync::TimeNs period = sweep_->period_ns;
   const sync::TimeNs last = clock_map_.ToHost(sweep_->start_ns);
+  if (std::abs(last / 2) > std::numeric_limits<sync::TimeNs>::max() / 4) return starts;
   const sync::TimeNs since = std::max<sync::TimeNs>(clock().Now() - last, 0);
   sync::TimeNs next = last + (since / period + 1) * period;
   for (int i = 0; i < count; ++i, next += period) starts.push_back(next);

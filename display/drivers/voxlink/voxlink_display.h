@@ -55,7 +55,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
     sync::TimeNs window_end = 0;
     void Note(uint64_t device_ns, sync::TimeNs host_ns);
     sync::TimeNs ToHost(uint64_t device_ns) const {
-      return static_cast<int64_t>(device_ns) + offset;
+      return static_cast<int64_t>(device_ns + static_cast<uint64_t>(offset));
     }
   };
 

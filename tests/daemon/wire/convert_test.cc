@@ -273,7 +273,8 @@ TEST(Encode, StatsHaveEveryFigure) {
   stats.operations_refused = 12, stats.bytes_in = 13, stats.outcomes_undelivered = 14;
   stats.client_drops = 15, stats.streams_overrun = 16;
   DisplayFigures& d = stats.displays.emplace_back();
-  d.name = "n", d.state = display::DisplayState::kShowing, d.engine = "e", d.engine_device = "d";
+  d.name = "n", d.state = display::DisplayState::kShowing, d.state_reason = "s", d.engine = "e",
+  d.engine_device = "d";
   d.engine_reason = "r", d.lit_voxels = 21, d.singular_drawables = 20, d.volumes_drawn = 22,
   d.volumes_unchanged = 19, d.volumes_presented = 23;
   d.volumes_replaced = 24, d.volumes_lost = 25, d.volumes_per_second = 26, d.bytes_out = 27;

@@ -137,7 +137,8 @@ TEST(Pcapng, WhatIsWrittenIsRead) {
 TEST(Pcapng, OtherWritersFilesAreRead) {
   Bytes file;
   const auto put = [&](uint64_t value, int bytes) {
-    for (int i = bytes - 1; i >= 0; --i) file.push_back(static_cast<std::byte>(value >> (8 * i)));
+    for (int i = bytes - 1; i >= 0; --i)
+      file.push_back(static_cast<std::byte>(i < 8 ? value >> (8 * i) : 0));
   };
   put(0x0A0D0D0A, 4), put(28, 4), put(0x1A2B3C4D, 4), put(1, 2), put(0, 2), put(~0ull, 8);
   put(28, 4);

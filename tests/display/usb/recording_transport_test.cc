@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -197,7 +199,23 @@ TEST_F(Recording, IntoAFileThatCannotBeMadeIsRefused) {
   EmulatedCable cable(clock_);
   const auto recorded =
       RecordToFile("/nonexistent/folder/a.pcapng", std::move(cable.transport), clock_);
-  EXPECT_TRUE(absl::IsNotFound(recorded.status())) << recorded.status();
+  EXPECT_TRUE(absl::IsInvalidArgument(recorded.status())) << recorded.status();
+}
+
+TEST_F(Recording, AFileIsBegunWithTheDeviceAndBelongsToOne) {
+  const std::string path = testing::TempDir() + "begun.pcapng";
+  std::ofstream(path) << "kept";
+  const auto size = [&] { return std::filesystem::file_size(path); };
+  EmulatedCable cable(clock_), other(clock_);
+  const auto first = RecordToFile(path, std::move(cable.transport), clock_);
+  const auto second = RecordToFile(path, std::move(other.transport), clock_);
+  ASSERT_TRUE(first.ok() && second.ok());
+  EXPECT_EQ(size(), 4u);
+  ASSERT_TRUE((*first)->Open().ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition((*second)->Open()));
+  EXPECT_FALSE((*second)->is_open());
+  (*first)->Close();
+  std::filesystem::remove(path);
 }
 
 }  // namespace

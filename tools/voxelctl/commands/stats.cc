@@ -75,6 +75,10 @@ std::string Full(const v1::Stats& stats) {
   row("  returns", [](const D& d) { return Grouped(d.engine_returns()); });
   std::string text = absl::StrCat(Server(stats), "\n", table.Text());
   for (const D& d : stats.displays()) {
+    if (d.state() != v1::DISPLAY_STATE_SHOWING) {
+      absl::StrAppend(&text, "\n", EscapeForTerminal(d.name()), ": ",
+                      EscapeForTerminal(d.state_reason()), "\n");
+    }
     if (!d.engine_degraded().empty()) {
       absl::StrAppend(&text, "\n", EscapeForTerminal(d.name()), ": ",
                       d.volume_held() ? "the last volume is held" : "degraded", ": ",

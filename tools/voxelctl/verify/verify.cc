@@ -51,7 +51,7 @@ absl::Status CannotOpen(const Subject& subject, const absl::Status& status) {
   std::string help;
   if (absl::IsNotFound(status)) {
     help =
-        "; plug it in and switch it on, or say which is meant with serial= or path= "
+        "; plug it in and switch it on, or say which is meant by its options "
         "(`lsusb` lists what is attached)";
   } else if (absl::IsUnavailable(status)) {
     help =

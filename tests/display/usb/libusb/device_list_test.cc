@@ -44,7 +44,7 @@ TEST(Matching, ByEverythingThatIsGiven) {
   EXPECT_EQ(PathsOf({.vendor_id = 0x1209, .serial = "C"}, devices),
             "no USB device 1209:* with serial \"C\" is attached");
   EXPECT_EQ(PathsOf({.interface = {{3, 1, 1}}}, devices),
-            "no USB device any with an interface of class 03:01:01 is attached");
+            "no USB device of any kind with an interface of class 03:01:01 is attached");
 }
 
 TEST(Matching, OneOfSeveralAlikeBySerialThenPlace) {
