@@ -254,6 +254,11 @@ void OpenDevice::OnDone(libusb_transfer* done) {
 }
 
 void OpenDevice::Complete(Pending& pending, TransferStatus status) {
+  {
+    sync::MutexLock lock(mutex_);
+    pending_.erase(pending.id);
+    ++finishing_;
+  }
   const libusb_transfer& done = *pending.transfer;
   TransferCompletion completion;
   completion.id = pending.id;
@@ -280,7 +285,6 @@ void OpenDevice::Complete(Pending& pending, TransferStatus status) {
   {
     sync::MutexLock lock(mutex_);
     if (completion.status == TransferStatus::kDisconnected) gone_ = true;
-    pending_.erase(completion.id);
     if (pending.cancelling) {
       pending.done = true;
     } else {
@@ -288,7 +292,6 @@ void OpenDevice::Complete(Pending& pending, TransferStatus status) {
     }
     bytes_in_flight_ -= size;
     completions_.push_back(std::move(completion));
-    ++finishing_;
   }
   budget_.Release(counted);
   Wake(true);
@@ -398,7 +401,7 @@ TransferStatus OpenDevice::ResetPort(TransferId id) {
   {
     sync::MutexLock lock(mutex_);
     const sync::TimeNs end = clock_.Now() + kCancelLimit;
-    while (pending_.size() > deferred_.size() && clock_.Now() < end) {
+    while ((pending_.size() > deferred_.size() || finishing_ > 0) && clock_.Now() < end) {
       clock_.WaitUntil(mutex_, changed_, end);
     }
   }
