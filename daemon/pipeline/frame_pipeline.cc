@@ -309,7 +309,8 @@ void FramePipeline::KeepUnchanged(const Contents& contents) {
 
 bool FramePipeline::HasNewer() const {
   if (newest_ == nullptr) return false;
-  return drawing_.has_value() || newest_->number != drawn_snapshot_ || settings_changed_;
+  return drawing_.has_value() || show_again_ || newest_->number != drawn_snapshot_ ||
+         settings_changed_;
 }
 
 void FramePipeline::SubmitDrawn(Drawing drawing) {
