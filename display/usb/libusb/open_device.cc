@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "display/usb/libusb/transfer_status.h"
 
 namespace voxeld::display {
 namespace {
@@ -19,49 +20,6 @@ namespace {
 constexpr size_t kTransfers = 64;  // made at once; more as they are needed
 // Of a reset: what is in flight is waited for this long after its cancellation.
 constexpr sync::TimeNs kCancelLimit = sync::kSecond;
-
-TransferStatus StatusOf(const libusb_transfer& done) {
-  const bool in =
-      (done.endpoint & LIBUSB_ENDPOINT_IN) != 0 ||
-      (done.type == LIBUSB_TRANSFER_TYPE_CONTROL && (done.buffer[0] & LIBUSB_ENDPOINT_IN) != 0);
-  const int whole = done.type == LIBUSB_TRANSFER_TYPE_CONTROL
-                        ? done.length - static_cast<int>(LIBUSB_CONTROL_SETUP_SIZE)
-                        : done.length;
-  switch (done.status) {
-    case LIBUSB_TRANSFER_COMPLETED:
-      if (done.actual_length >= whole) return TransferStatus::kOk;
-      return in ? TransferStatus::kShort : TransferStatus::kError;
-    case LIBUSB_TRANSFER_TIMED_OUT:
-      return TransferStatus::kTimedOut;
-    case LIBUSB_TRANSFER_CANCELLED:
-      return TransferStatus::kCancelled;
-    case LIBUSB_TRANSFER_STALL:
-      return TransferStatus::kStall;
-    case LIBUSB_TRANSFER_NO_DEVICE:
-      return TransferStatus::kDisconnected;
-    case LIBUSB_TRANSFER_OVERFLOW:
-      return TransferStatus::kOverflow;
-    case LIBUSB_TRANSFER_ERROR:
-      break;
-  }
-  return TransferStatus::kError;
-}
-
-TransferStatus StatusOf(int result) {
-  switch (result) {
-    case 0:
-      return TransferStatus::kOk;
-    case LIBUSB_ERROR_NO_DEVICE:
-    case LIBUSB_ERROR_NOT_FOUND:  // after a reset: it came back as another
-      return TransferStatus::kDisconnected;
-    case LIBUSB_ERROR_TIMEOUT:
-      return TransferStatus::kTimedOut;
-    case LIBUSB_ERROR_PIPE:
-      return TransferStatus::kStall;
-    default:
-      return TransferStatus::kError;
-  }
-}
 
 std::string NameOf(const UsbDeviceEntry& entry) {
   return absl::StrCat(entry.node, " (at ", entry.identity.path, ")");
