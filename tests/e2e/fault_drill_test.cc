@@ -324,6 +324,7 @@ TEST(FaultDrill, TheDaemonEndsWellWhileTheEngineComesBack) {
     drilled.Commit(1);
     drilled.Fault("crash");
     drilled.Commit(2);
+    // Waits for nothing: it spreads the ends over the moments in which the engine comes back.
     std::this_thread::sleep_for(std::chrono::milliseconds(230 + 5 * tenth));
     EXPECT_EQ(drilled.End(), 0) << drilled.output();
   }
