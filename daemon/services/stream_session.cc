@@ -255,7 +255,7 @@ void StreamSession::OnPortDone() {
 
 void StreamSession::OnIssue(const Issue& issue) {
   v1::StreamResponse response;
-  wire::Encode(issue, response.mutable_issue());
+  wire::Encode(issue, response.add_issues());
   bool close = false;
   {
     sync::MutexLock lock(mutex_);
@@ -267,7 +267,7 @@ void StreamSession::OnIssue(const Issue& issue) {
 
 void StreamSession::OnReceipt(const Receipt& receipt) {
   v1::StreamResponse response;
-  wire::Encode(receipt, response.mutable_receipt());
+  wire::Encode(receipt, response.add_receipts());
   bool close = false;
   {
     sync::MutexLock lock(mutex_);

@@ -314,6 +314,7 @@ void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, ui
     case v1::StreamRequest::kBatch:
       return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, limits, out);
     case v1::StreamRequest::kOpen:
+    case v1::StreamRequest::kPing:
     case v1::StreamRequest::OP_NOT_SET:
       break;
   }

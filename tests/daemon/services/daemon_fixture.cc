@@ -144,9 +144,9 @@ bool Client::Commit(uint64_t frame_id) {
 std::optional<v1::StreamResponse> Client::Read() {
   v1::StreamResponse response;
   if (!call_->Read(&response)) return {};
-  if (response.has_issue()) issues.push_back(response.issue());
-  if (response.has_receipt()) {
-    (response.receipt().has_outcome() ? outcomes : answers).push_back(response.receipt());
+  for (const v1::Issue& issue : response.issues()) issues.push_back(issue);
+  for (const v1::Receipt& receipt : response.receipts()) {
+    (receipt.has_outcome() ? outcomes : answers).push_back(receipt);
   }
   return response;
 }

@@ -97,8 +97,9 @@ class FakeServer::Scene final : public v1::SceneService::Service {
         case v1::StreamRequest::kSetTransform:
           ++log.transforms;
           if (server_.behaviour_.lose_entities) {
-            response.mutable_issue()->set_reason(v1::REASON_NOT_FOUND);
-            response.mutable_issue()->set_id(request.set_transform().id());
+            v1::Issue* issue = response.add_issues();
+            issue->set_reason(v1::REASON_NOT_FOUND);
+            issue->set_id(request.set_transform().id());
             stream->Write(response);
           }
           break;
@@ -165,27 +166,28 @@ class FakeServer::Scene final : public v1::SceneService::Service {
   void Accept(const v1::Commit& commit, bool no_outcomes,
               grpc::ServerReaderWriter<v1::StreamResponse, v1::StreamRequest>* stream) {
     v1::StreamResponse response;
-    response.mutable_receipt()->set_frame_id(commit.frame_id());
-    response.mutable_receipt()->mutable_accepted()->add_displays(kDisplay);
+    v1::Receipt* receipt = response.add_receipts();
+    receipt->set_frame_id(commit.frame_id());
+    receipt->mutable_accepted()->add_displays(kDisplay);
     stream->Write(response);
     if (no_outcomes) {
       ++owed_;
       return;
     }
-    response.mutable_receipt()->mutable_outcome()->set_display(kDisplay);
-    response.mutable_receipt()->mutable_outcome()->mutable_presented()->set_volume(
-        commit.frame_id());
+    receipt->mutable_outcome()->set_display(kDisplay);
+    receipt->mutable_outcome()->mutable_presented()->set_volume(commit.frame_id());
     stream->Write(response);
   }
 
   static void Refuse(const v1::Commit& commit, const std::string& why,
                      grpc::ServerReaderWriter<v1::StreamResponse, v1::StreamRequest>* stream) {
     v1::StreamResponse response;
-    response.mutable_issue()->set_field("define_object.definition");
-    response.mutable_issue()->set_message("of no use");
-    stream->Write(response);
-    response.mutable_receipt()->set_frame_id(commit.frame_id());
-    response.mutable_receipt()->mutable_refused()->set_message(why);
+    v1::Issue* issue = response.add_issues();
+    issue->set_field("define_object.definition");
+    issue->set_message("of no use");
+    v1::Receipt* receipt = response.add_receipts();
+    receipt->set_frame_id(commit.frame_id());
+    receipt->mutable_refused()->set_message(why);
     stream->Write(response);
   }
 

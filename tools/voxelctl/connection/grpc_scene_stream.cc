@@ -142,19 +142,10 @@ class GrpcSceneStream final : public SceneStream {
     v1::StreamResponse response;
     while (stream_->Read(&response)) {
       sync::MutexLock lock(mutex_);
-      switch (response.event_case()) {
-        case v1::StreamResponse::kOpened:
-          if (!opened_) opened_ = response.opened();
-          break;
-        case v1::StreamResponse::kReceipt:
-          ledger_.Answered(response.receipt(), clock_.Now());
-          break;
-        case v1::StreamResponse::kIssue:
-          ledger_.Told(response.issue());
-          break;
-        case v1::StreamResponse::kCredit:
-        case v1::StreamResponse::EVENT_NOT_SET:
-          break;
+      if (response.has_opened() && !opened_) opened_ = response.opened();
+      for (const v1::Issue& issue : response.issues()) ledger_.Told(issue);
+      for (const v1::Receipt& receipt : response.receipts()) {
+        ledger_.Answered(receipt, clock_.Now());
       }
       changed_.NotifyAll();
     }
