@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "absl/status/status.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
 namespace voxeld::bench {
@@ -13,6 +14,17 @@ namespace {
 
 constexpr double kMostSeconds = 86'400;
 constexpr int kMostRounds = 1000;
+
+// NaN is in no range.
+CLI::Validator Between(double least, double most) {
+  return CLI::Validator(
+      [least, most](const std::string& text) -> std::string {
+        double value = 0;
+        if (absl::SimpleAtod(text, &value) && value >= least && value <= most) return {};
+        return absl::StrCat("is ", text, "; give a number from ", least, " to ", most);
+      },
+      "NUMBER");
+}
 
 void AddRounds(CLI::App& app, int& rounds) {
   app.add_option("--rounds", rounds, "How often, in turns")
@@ -22,7 +34,7 @@ void AddRounds(CLI::App& app, int& rounds) {
 
 void AddSeconds(CLI::App& app, double& seconds, const char* what) {
   app.add_option("--seconds", seconds, what)
-      ->check(CLI::Range(0.01, kMostSeconds))
+      ->check(Between(0.01, kMostSeconds))
       ->capture_default_str();
 }
 
@@ -31,7 +43,7 @@ void AddCount(CLI::App& app, const char* name, int& count, const char* what, int
 }
 
 void AddRate(CLI::App& app, const char* name, double& rate, const char* what) {
-  app.add_option(name, rate, what)->check(CLI::Range(0.1, 100'000.0))->capture_default_str();
+  app.add_option(name, rate, what)->check(Between(0.1, 100'000))->capture_default_str();
 }
 
 void AddDisplay(CLI::App& app, std::string& display) {

@@ -1,6 +1,8 @@
 // What streams cost that do nothing, and what a normal client notices of those that do not read.
 #include <algorithm>
+#include <functional>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -19,6 +21,7 @@ constexpr double kVoxels = 20, kDisplayVoxels = 64;
 constexpr int kShared = 100;  // streams on one connection, where they share it
 constexpr sync::TimeNs kFastStats = 10 * sync::kMillisecond;
 constexpr sync::TimeNs kSlowRead = sync::kSecond;
+constexpr sync::TimeNs kOpenLimit = 30 * sync::kSecond;
 
 v1::Open OpenAsked(const char* name) {
   v1::Open open;
@@ -26,24 +29,33 @@ v1::Open OpenAsked(const char* name) {
   return open;
 }
 
-// Commits and commits, and reads nothing after Opened. Where the daemon ends it, another follows.
+// Commits and commits, heeding no credit, and reads nothing after Opened. Where the daemon ends it,
+// another follows.
 class DeafClient {
  public:
   DeafClient(Loop& loop, const std::string& target) : loop_(loop), connection_(target) {}
 
   absl::Status Begin() {
-    session_ = std::make_unique<Session>(loop_, connection_, OpenAsked("voxel-bench deaf"));
-    if (absl::Status opened = session_->WaitOpened(); !opened.ok()) return opened;
-    session_->call().set_read_on(false);
-    session_->OnReady([this] { Send(); });
-    Send();
-    return absl::OkStatus();
+    asked_ = opened_ = false;
+    call_ = std::make_unique<Call>(loop_, connection_, "/voxeld.v1.SceneService/Stream",
+                                   CallEvents{.writable = [this] { Send(); },
+                                              .message =
+                                                  [this](std::string_view) {
+                                                    if (std::exchange(opened_, true)) return;
+                                                    if (call_->writable()) Send();
+                                                  },
+                                              .ended = {}},
+                                   false);
+    const absl::Status ran =
+        loop_.RunUntil(Now() + kOpenLimit, [this] { return opened_ || call_->ended(); });
+    if (!ran.ok()) return ran;
+    return opened_ ? absl::OkStatus() : absl::UnavailableError("the deaf client was not let in");
   }
-  void End() { session_.reset(); }
+  void End() { call_.reset(); }
 
   // To be called now and then.
   absl::Status Renew() {
-    if (session_ == nullptr || !session_->call().ended()) return absl::OkStatus();
+    if (call_ == nullptr || !call_->ended()) return absl::OkStatus();
     ++ends_;
     return Begin();
   }
@@ -51,12 +63,20 @@ class DeafClient {
 
  private:
   void Send() {
-    if (session_->Ready()) session_->Commit(Now());
+    if (!std::exchange(asked_, true)) {
+      v1::StreamRequest request;
+      *request.mutable_open() = OpenAsked("voxel-bench deaf");
+      call_->Write(Message(request));
+    } else if (opened_) {
+      call_->Write(commit_);
+    }
   }
 
   Loop& loop_;
   Connection connection_;
-  std::unique_ptr<Session> session_;
+  const Message commit_ = Session::CommitMessage(1, 0);
+  std::unique_ptr<Call> call_;
+  bool asked_ = false, opened_ = false;
   uint64_t ends_ = 0;
 };
 

@@ -22,7 +22,7 @@ namespace {
 
 constexpr sync::TimeNs kSampleEvery = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kSettleLimit = 30 * sync::kSecond;
-constexpr int kVariants = 8;
+constexpr int kVariants = 31;
 constexpr double kLength = 0.6;  // 20 voxels of 64
 
 // Immediate mode: each replaces the layer whole.
