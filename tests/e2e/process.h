@@ -24,6 +24,7 @@ class Process {
   Process(const std::vector<std::string>& arguments,
           const std::map<std::string, std::string>& environment = {});
 
+  pid_t pid() const { return child_->pid(); }
   void Signal(int signal) { child_->Signal(signal); }
 
   // The next line of its standard output or error, without the newline; nothing at the end, or when
