@@ -49,12 +49,14 @@ std::vector<std::string> Environment(const std::map<std::string, std::string>& o
   }
   for (const auto& [name, value] : over) all[name] = value;
   std::vector<std::string> out;
+  out.reserve(all.size());
   for (const auto& [name, value] : all) out.push_back(absl::StrCat(name, "=", value));
   return out;
 }
 
 std::vector<char*> Pointers(std::vector<std::string>& texts) {
   std::vector<char*> out;
+  out.reserve(texts.size() + 1);
   for (std::string& text : texts) out.push_back(text.data());
   out.push_back(nullptr);
   return out;

@@ -27,7 +27,7 @@ Frames LayerFrames(int layers) {
                       "line",
                       {.count = 1,
                        .form = LineForm::k24Bytes,
-                       .seed = static_cast<uint64_t>(variant * layers + layer)}});
+                       .seed = static_cast<uint64_t>(variant) * layers + layer}});
     }
     frames.push_back({Message(BatchOf(puts))});
   }

@@ -40,7 +40,7 @@ constexpr Case kCases[] = {{"batch_unix", Shape::kBatch, false, false},
 v1::StreamRequest Batch(int variant, int first, int count, LineForm form) {
   std::vector<Put> puts;
   for (int i = first; i < std::min(first + count, kEntities); ++i) {
-    const auto seed = static_cast<uint64_t>(variant * kEntities + i);
+    const auto seed = uint64_t{kEntities} * variant + i;
     puts.push_back({"bench",
                     absl::StrCat("entity-", i),
                     {.count = kLinesAnEntity, .form = form, .seed = seed}});
@@ -66,7 +66,7 @@ Frames UpsertFrames(LineForm form) {
   for (int variant = 0; variant < kVariants; ++variant) {
     std::vector<Message> frame;
     for (int i = 0; i < kEntities; ++i) {
-      const auto seed = static_cast<uint64_t>(variant * kEntities + i);
+      const auto seed = uint64_t{kEntities} * variant + i;
       frame.emplace_back(UpsertOf("bench", absl::StrCat("entity-", i),
                                   EntityOf({.count = 1, .form = form, .seed = seed})));
     }
@@ -153,6 +153,7 @@ class Ingest {
       return FeedDaemon(loop_, target, frames);
     }
     std::vector<v1::StreamRequest> whole;
+    whole.reserve(kVariants);
     for (int variant = 0; variant < kVariants; ++variant) {
       whole.push_back(Batch(variant, 0, kEntities, form()));
     }

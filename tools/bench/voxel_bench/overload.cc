@@ -30,7 +30,7 @@ Frames ImmediateFrames(int client, int lines) {
   const std::string layer = absl::StrCat("layer-", client);
   Frames frames;
   for (int variant = 0; variant < kVariants; ++variant) {
-    const auto seed = static_cast<uint64_t>(client * kVariants + variant + 1);
+    const auto seed = uint64_t{kVariants} * client + variant + 1;
     frames.push_back({Message(FrameBeginOf(layer)),
                       Message(UpsertOf(layer, "lines",
                                        EntityOf({.count = static_cast<uint32_t>(lines),

@@ -98,7 +98,7 @@ Frames LineFrames(const std::string& layer, int lines, int entities, double voxe
                       {.count = static_cast<uint32_t>(count),
                        .form = LineForm::k24Bytes,
                        .length = 2 * voxels / size_voxels,
-                       .seed = static_cast<uint64_t>(variant * entities + i + 1)}});
+                       .seed = static_cast<uint64_t>(variant) * entities + i + 1}});
     }
     frames.push_back({Message(BatchOf(puts))});
   }
