@@ -18,7 +18,7 @@ gpu::LayerRecord RecordOf(const Layer& layer) {
   gpu::LayerRecord record;
   record.id = layer.number;
   record.order = layer.order;
-  record.visible = layer.visible ? 1 : 0;
+  record.visible = layer.shown() ? 1 : 0;
   record.opacity = layer.opacity;
   record.blend = layer.blend;
   record.transform = layer.transform;
@@ -26,7 +26,7 @@ gpu::LayerRecord RecordOf(const Layer& layer) {
 }
 
 bool LooksSame(const Layer& a, const Layer& b) {
-  return a.order == b.order && a.visible == b.visible && a.opacity == b.opacity &&
+  return a.order == b.order && a.shown() == b.shown() && a.opacity == b.opacity &&
          a.blend == b.blend && a.transform == b.transform;
 }
 

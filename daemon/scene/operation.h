@@ -35,6 +35,7 @@ enum class Reason : uint8_t {
   kOutOfOrder = 12,
   kPermissionDenied = 13,
   kUnimplemented = 14,
+  kTimedOut = 15,
 };
 
 // One refused operation. Not fatal.
@@ -85,6 +86,15 @@ struct Limits {
   uint32_t max_parts_per_object = 4096;
   uint32_t max_captures = 16;
   int64_t max_linger_ns = 3600 * sync::kSecond;
+  uint64_t credit_bytes = 8u << 20;  // sent by one session and not yet applied
+  // Held for all clients together; the parts are core/budget.h's.
+  uint64_t max_memory_bytes = uint64_t{8} << 30;
+  uint32_t max_riding_commits = 4096;  // of one session, without all outcomes; or waiting to apply
+  uint32_t max_timed_commits = 256;    // of one session, waiting for their time
+  int64_t max_present_at_horizon_ns = 60 * sync::kSecond;
+  int64_t must_show_timeout_ns = 2 * sync::kSecond;
+  uint32_t max_drop_oldest_frames = 64;
+  uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session's sealed memory
 };
 
 // Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be
@@ -129,12 +139,18 @@ struct ObjectData {
 
 enum class DisconnectPolicy : uint8_t { kClear, kLinger, kKeep };
 
+// Which immediate frames are given up while commits wait for their turn.
+enum class FlowPolicy : uint8_t { kReliable, kLatest, kDropOldest };
+
 struct OpenOptions {
   std::string client_name;
   DisconnectPolicy on_disconnect = DisconnectPolicy::kClear;
   int64_t linger_ns = 0;
   bool strict = false;
   bool no_outcomes = false;
+  FlowPolicy flow = FlowPolicy::kReliable;
+  uint32_t drop_oldest_frames = 0;        // kDropOldest: how many stay
+  std::string resume_token, owner_token;  // empty: a new session, a new owner
 };
 
 struct Upsert {
@@ -175,8 +191,10 @@ struct DeleteObject {
 };
 struct Commit {
   uint64_t frame_id = 0;
-  int64_t send_time_ns = 0;
+  int64_t send_time_ns = 0;  // the client's clock; 0: not known
   uint64_t client_drops = 0;
+  sync::TimeNs present_at_ns = 0;  // 0: at once
+  bool must_show = false;
 };
 
 struct Operation {

@@ -274,6 +274,16 @@ absl::StatusOr<ViewOptions> FromWire(const v1::View& in) {
   return out;
 }
 
+OwnerControl FromWire(const v1::ControlOwnerRequest& in) {
+  OwnerControl out;
+  out.owner = in.owner();
+  if (in.has_hidden()) out.hidden = in.hidden();
+  if (in.has_max_bytes()) out.max_bytes = in.max_bytes();
+  if (in.has_max_entities()) out.max_entities = in.max_entities();
+  out.evict = in.evict();
+  return out;
+}
+
 absl::StatusOr<DisplayUpdate> FromWire(const v1::UpdateDisplayRequest& in) {
   DisplayUpdate out;
   if (in.has_brightness()) {

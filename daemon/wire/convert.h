@@ -43,5 +43,6 @@ absl::StatusOr<display::Geometry> FromWire(const v1::Geometry& in);
 absl::StatusOr<display::FrameLayout> FromWire(const v1::FrameLayout& in);
 absl::StatusOr<ViewOptions> FromWire(const v1::View& in);
 absl::StatusOr<DisplayUpdate> FromWire(const v1::UpdateDisplayRequest& in);
+OwnerControl FromWire(const v1::ControlOwnerRequest& in);
 
 }  // namespace voxeld::daemon::wire

@@ -215,15 +215,14 @@ MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& l
 
 // What a Commit asks for that this version has not; the commit itself is carried out.
 MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
-  *out = {in.frame_id(), in.send_time_ns(), in.client_drops()};
-  if (in.present_at_ns() != 0) {
-    return Unimplemented(FieldPath(path, "present_at_ns"),
-                         "a commit is applied when it arrives; leave it 0");
+  *out = {in.frame_id(), in.send_time_ns(), in.client_drops(), 0, in.must_show()};
+  if (in.present_at_ns() < 0) {
+    return Fault{FieldPath(path, "present_at_ns").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.present_at_ns(),
+                              "; give a time by the server's clock (Opened.server_time_ns), or 0 "
+                              "for at once")};
   }
-  if (in.must_show()) {
-    return Unimplemented(FieldPath(path, "must_show"),
-                         "a newer commit may supersede this one; leave it false");
-  }
+  out->present_at_ns = in.present_at_ns();
   if (in.durable()) {
     return Unimplemented(FieldPath(path, "durable"),
                          "the scene is kept in memory only; leave it false");

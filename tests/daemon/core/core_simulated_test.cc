@@ -45,7 +45,7 @@ class SimulatedDaemon {
     EXPECT_TRUE(added.ok()) << added;
     EXPECT_TRUE(core->Start().ok());
     RunFor(sync::kSecond);
-    core->OpenSession({}, sink, [this](auto info) { session_ = info->session; });
+    core->OpenSession({}, 0, sink, [this](auto info) { session_ = *info; });
     RunFor(0);
   }
 
@@ -66,7 +66,7 @@ class SimulatedDaemon {
   void Send(Ops... ops) {
     std::vector<Operation> all = testing::Sequence(sequence_, std::move(ops)...);
     sequence_ += all.size();
-    core->Handle(session_, std::move(all), {}, 100, nullptr);
+    session_.intake->Take({std::move(all), {}, 100});
     core->Step();
   }
 
@@ -83,7 +83,7 @@ class SimulatedDaemon {
 
  private:
   display::InProcessTransport* transport_ = nullptr;
-  SessionId session_ = 0;
+  SessionInfo session_;
   uint64_t sequence_ = 0;
 };
 
