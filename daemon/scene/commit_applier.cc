@@ -308,6 +308,8 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
   layer.order = state.order.value_or(layer.order);
   layer.blend = state.blend.value_or(layer.blend);
   layer.transform = state.transform.value_or(layer.transform);
+  layer.clip = state.clip.value_or(layer.clip);
+  layer.region = state.region.value_or(layer.region);
   Applied(state.layer);
 }
 
@@ -388,6 +390,11 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
   } else if (const auto* state = std::get_if<LayerState>(&operation.op)) {
     if (state->transform.has_value()) {
       check_map(*state->transform, state->layer, "", "layer_state.transform");
+    }
+    if (state->clip.has_value() && state->clip->count > limits.max_clip_planes) {
+      refuse(state->layer, "", "layer_state.clip.planes", Reason::kQuotaExceeded,
+             absl::StrFormat("%d planes; max_clip_planes is %d", state->clip->count,
+                             limits.max_clip_planes));
     }
   } else if (const auto* define = std::get_if<DefineObject>(&operation.op)) {
     const std::vector<ObjectPart>& parts = define->data->parts;

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -52,6 +53,8 @@ struct Layer {
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
   WriterPtr writer;
   EntityMap entities;
   uint64_t bytes = 0;
