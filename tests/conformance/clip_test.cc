@@ -208,8 +208,8 @@ TEST_P(EngineClip, ClippedVoxelsAreNotCoveredSoThatBelowShows) {
 
 TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   SceneModel scene = BoxScene();
-  scene.geometries[1] = SolidBox(1, {16, 16, 16}, {28, 28, 28}, 0xFFFFFF);  // in 8 tiles
-  constexpr uint64_t kThin = 28 * 28;
+  scene.geometries[1] = SolidBox(1, {16, 16, 16}, {20, 20, 20}, 0xFFFFFF);  // in 8 tiles
+  constexpr uint64_t kThin = 20 * 20;
   scene.layers[2].id = 2;
   scene.geometries[2] = SolidBox(2, {40, 40, 8}, {4, 4, 4}, 0x00FF00);
   scene.drawables[2] = {.id = 2, .geometry = 2, .layer = 2};
@@ -231,34 +231,34 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   SetPlanes(layer, {{1, 0, 0, -10}});
   FrameResult frame = put(layer);
   EXPECT_EQ(frame.tiles_drawn, 8u);
-  EXPECT_EQ(frame.lit_voxels, 20 * kThin + 64);
+  EXPECT_EQ(frame.lit_voxels, 16 * kThin + 64);
   EXPECT_EQ(put(layer).tiles_drawn, 0u);  // the same again
   layer.planes[0].d = -12;
   frame = put(layer);
   EXPECT_EQ(frame.tiles_drawn, 8u);
-  EXPECT_EQ(frame.lit_voxels, 18 * kThin + 64);
+  EXPECT_EQ(frame.lit_voxels, 14 * kThin + 64);
   layer.planes[1] = {9, 9, 9, 9};  // beyond plane_count: means nothing
   EXPECT_EQ(put(layer).tiles_drawn, 0u);
   layer.has_region = 1;
   layer.region = {{0, 0, 0}, {16, 16, 16}};
   frame = put(layer);
   EXPECT_EQ(frame.tiles_drawn, 8u);
-  EXPECT_EQ(frame.lit_voxels, 4u * 14 * 14 + 64);
+  EXPECT_EQ(frame.lit_voxels, 4u * 10 * 10 + 64);
   layer.region.max[2] = 8;
-  EXPECT_EQ(put(layer).lit_voxels, 4u * 14 * 6 + 64);
+  EXPECT_EQ(put(layer).lit_voxels, 4u * 10 * 2 + 64);
   // Hidden, it costs nothing however it changes.
   layer.visible = 0;
   EXPECT_EQ(put(layer).lit_voxels, 64u);
   layer.plane_count = 0;
   EXPECT_EQ(put(layer).tiles_drawn, 0u);
   layer.visible = 1;
-  EXPECT_EQ(put(layer).lit_voxels, 14u * 14 * 6 + 64);
+  EXPECT_EQ(put(layer).lit_voxels, 10u * 10 * 2 + 64);
   layer.has_region = 0;
   frame = put(layer);
   EXPECT_EQ(frame.tiles_drawn, 8u);
-  EXPECT_EQ(frame.lit_voxels, 28 * kThin + 64);
+  EXPECT_EQ(frame.lit_voxels, 20 * kThin + 64);
   // Entities that come later are cut as well.
-  SetPlanes(layer, {{0, 0, 1, -29}});
+  SetPlanes(layer, {{0, 0, 1, -25}});
   EXPECT_EQ(put(layer).lit_voxels, kThin + 64);
   DeltaBuffer moved;
   scene.drawables[1].transform.m[11] = 15;
