@@ -19,7 +19,7 @@ struct TileScratch {
   uint64_t heavy[kMostHeavy];                             // pairs for many threads
   uint32_t heavy_count;
   uint32_t tile;
-  uint32_t layer;  // its slot; kAll: no more
+  uint32_t layer;    // its slot; kAll: no more
   uint32_t cutting;  // bits: which of its half-spaces cut the tile
   uint32_t outside;  // not 0: all of the tile lies outside one of them
   uint32_t lit, differs;
@@ -417,8 +417,8 @@ cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers,
                       const VoxelHalfSpace* half_spaces, const BatchList& batches,
                       const VolumeView& volume, const SliceIndexView& slices, uint32_t blocks,
                       cudaStream_t stream) {
-  DrawTilesKernel<<<blocks, kThreads, sizeof(TileScratch), stream>>>(
-      table, layers, half_spaces, batches, volume, slices);
+  DrawTilesKernel<<<blocks, kThreads, sizeof(TileScratch), stream>>>(table, layers, half_spaces,
+                                                                     batches, volume, slices);
   return cudaGetLastError();
 }
 
