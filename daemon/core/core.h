@@ -114,6 +114,8 @@ struct LayerInfo {
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
   uint64_t entities = 0, bytes = 0;
   bool orphaned = false;
   std::string client_name;

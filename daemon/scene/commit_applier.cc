@@ -316,6 +316,8 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
   layer.order = state.order.value_or(layer.order);
   layer.blend = state.blend.value_or(layer.blend);
   layer.transform = state.transform.value_or(layer.transform);
+  layer.clip = state.clip.value_or(layer.clip);
+  layer.region = state.region.value_or(layer.region);
   Applied(state.layer);
 }
 
@@ -387,6 +389,32 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
                              limits.max_indices_per_entity));
     }
   };
+  const auto check_clip = [&](const Clip& clip, const std::string& layer) {
+    if (clip.count > limits.max_clip_planes) {
+      return refuse(
+          layer, "", "layer_state.clip.planes", Reason::kQuotaExceeded,
+          absl::StrFormat("%d planes; max_clip_planes is %d", clip.count, limits.max_clip_planes));
+    }
+    for (uint32_t i = 0; i < clip.count; ++i) {
+      const gpu::ClipPlane& p = clip.planes[i];
+      const bool finite =
+          std::isfinite(p.a) && std::isfinite(p.b) && std::isfinite(p.c) && std::isfinite(p.d);
+      if (finite && (p.a != 0 || p.b != 0 || p.c != 0)) continue;
+      refuse(layer, "", absl::StrFormat("layer_state.clip.planes[%d]", i), Reason::kInvalidValue,
+             absl::StrFormat("the plane is (%g, %g, %g, %g); it must be finite, its normal not 0",
+                             p.a, p.b, p.c, p.d));
+    }
+  };
+  const auto check_region = [&](const gpu::Region& region, const std::string& layer) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double min = region.min[axis], max = region.max[axis];
+      if (min < max && std::isfinite(min) && std::isfinite(max)) continue;
+      refuse(layer, "", "layer_state.region", Reason::kInvalidValue,
+             absl::StrFormat("the region goes from %g to %g along %c; both must be finite, the "
+                             "first less than the second",
+                             min, max, "xyz"[axis]));
+    }
+  };
 
   if (const auto* upsert = std::get_if<Upsert>(&operation.op)) {
     check_map(upsert->entity.transform, upsert->layer, upsert->id, "upsert.entity.transform");
@@ -396,6 +424,10 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
   } else if (const auto* state = std::get_if<LayerState>(&operation.op)) {
     if (state->transform.has_value()) {
       check_map(*state->transform, state->layer, "", "layer_state.transform");
+    }
+    if (state->clip.has_value()) check_clip(*state->clip, state->layer);
+    if (state->region.has_value() && state->region->has_value()) {
+      check_region(**state->region, state->layer);
     }
   } else if (const auto* define = std::get_if<DefineObject>(&operation.op)) {
     const std::vector<ObjectPart>& parts = define->data->parts;

@@ -4,6 +4,7 @@
 // (existence, quotas, cycles, range on the displays) is the core's to check.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -84,6 +85,7 @@ struct Limits {
   double max_thickness = 4096;                  // in its own unit
   uint32_t max_sessions = 1024;
   uint32_t max_parts_per_object = 4096;
+  uint32_t max_clip_planes = gpu::kMaxClipPlanes;  // the most there can be
   uint32_t max_captures = 16;
   int64_t max_linger_ns = 3600 * sync::kSecond;
   uint64_t credit_bytes = 8u << 20;  // sent by one session and not yet applied
@@ -167,6 +169,14 @@ struct SetTransform {
   std::string layer, id;
   gpu::Affine transform;
 };
+// Half-spaces of the scene, 0 to gpu::kMaxClipPlanes: only what lies in all of them is drawn.
+struct Clip {
+  uint32_t count = 0;
+  gpu::ClipPlane planes[gpu::kMaxClipPlanes];
+  bool operator==(const Clip& other) const {
+    return std::equal(planes, planes + count, other.planes, other.planes + other.count);
+  }
+};
 struct LayerState {
   std::string layer;
   std::optional<bool> visible;
@@ -174,6 +184,8 @@ struct LayerState {
   std::optional<int32_t> order;
   std::optional<gpu::BlendMode> blend;
   std::optional<gpu::Affine> transform;
+  std::optional<Clip> clip;                          // no planes: none any more
+  std::optional<std::optional<gpu::Region>> region;  // holds nothing: none any more
 };
 struct FrameBegin {
   std::string layer;

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -53,6 +54,8 @@ struct Layer {
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
   bool shown() const { return visible && !suppressed; }
   WriterPtr writer;
   EntityMap entities;

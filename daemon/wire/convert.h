@@ -23,6 +23,8 @@ v1::VolumeHeader::Source ToWire(display::DecodedVolume::Source source);
 
 void ToWire(const display::Vec3& in, v1::Vec3* out);
 void ToWire(const gpu::Affine& in, v1::Affine* out);  // always 12 values
+void ToWire(const Clip& in, v1::Clip* out);
+void ToWire(const gpu::Region& in, v1::Box3* out);
 void ToWire(const display::Geometry& in, v1::Geometry* out);
 void ToWire(const display::FrameLayout& in, v1::FrameLayout* out);
 void ToWire(const ViewOptions& in, v1::View* out);

@@ -76,6 +76,8 @@ void EncodeLayer(const LayerInfo& in, v1::LayerInfo* out) {
   out->set_order(in.order);
   out->set_blend(ToWire(in.blend));
   ToWire(in.transform, out->mutable_transform());
+  if (in.clip.count > 0) ToWire(in.clip, out->mutable_clip());
+  if (in.region.has_value()) ToWire(*in.region, out->mutable_region());
   out->set_entities(in.entities);
   out->set_bytes(in.bytes);
   out->set_orphaned(in.orphaned);
@@ -143,6 +145,7 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_thickness(in.max_thickness);
   out->set_max_sessions(in.max_sessions);
   out->set_max_parts_per_object(in.max_parts_per_object);
+  out->set_max_clip_planes(in.max_clip_planes);
   out->set_max_entities(in.max_entities);
   out->set_max_layers(in.max_layers);
   out->set_max_scene_bytes(in.max_scene_bytes);

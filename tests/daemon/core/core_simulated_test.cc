@@ -133,6 +133,30 @@ TEST(CoreSimulated, AnInstanceAFrameAndALayersStateAreSeen) {
   EXPECT_EQ(PixelAt(*hidden, 0, 0, 0), 0x00FF00u);
 }
 
+TEST(CoreSimulated, OnlyWhatLiesWithinAClipAndARegionIsSeen) {
+  SimulatedDaemon daemon;
+  daemon.Send(Put("a", "1", Entity1(Dots(0, 0xFF0000), testing::Shift(2.5, 3.5, 1.5))),
+              Put("a", "2", Entity1(Dots(0, 0x00FF00), testing::Shift(8.5, 3.5, 1.5))),
+              Put("b", "3", Entity1(Dots(0, 0x0000FF), testing::Shift(2.5, 7.5, 1.5))),
+              testing::SetClip("a", {{1, 0, 0, -5}}), testing::EndCommit(1));
+  const auto clipped = daemon.Capture(1);
+  ASSERT_TRUE(clipped.ok()) << clipped.status();
+  EXPECT_EQ(PixelAt(*clipped, 2, 3, 1), 0u);
+  EXPECT_EQ(PixelAt(*clipped, 8, 3, 1), 0x00FF00u);
+  EXPECT_EQ(PixelAt(*clipped, 2, 7, 1), 0x0000FFu);  // another layer's
+  daemon.Send(testing::SetClip("a", {}), testing::SetRegion("a", gpu::Region{{0, 0, 0}, {5, 5, 5}}),
+              testing::EndCommit(2));
+  const auto region = daemon.Capture(2);
+  ASSERT_TRUE(region.ok()) << region.status();
+  EXPECT_EQ(PixelAt(*region, 2, 3, 1), 0xFF0000u);
+  EXPECT_EQ(PixelAt(*region, 8, 3, 1), 0u);
+  daemon.Send(testing::SetRegion("a", std::nullopt), testing::EndCommit(3));
+  const auto whole = daemon.Capture(3);
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_EQ(PixelAt(*whole, 2, 3, 1), 0xFF0000u);
+  EXPECT_EQ(PixelAt(*whole, 8, 3, 1), 0x00FF00u);
+}
+
 std::string Describe(const Receipt& receipt) {
   if (const auto* a = std::get_if<Accepted>(&receipt.what)) {
     return absl::StrCat(receipt.frame_id, " accepted ", a->snapshot, " at ", a->applied_time_ns);

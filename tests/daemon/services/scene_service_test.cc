@@ -153,6 +153,27 @@ TEST(ListEntities, InPages) {
       5u);
 }
 
+TEST(ListEntities, LayersHaveTheirClipAndRegion) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  v1::LayerState* state = update.add_operations()->mutable_layer_state();
+  state->set_layer("layer");
+  v1::Clip::Plane* plane = state->mutable_clip()->add_planes();
+  plane->set_c(-2);
+  plane->set_d(7);
+  state->mutable_region()->mutable_min()->set_x(-1);
+  state->mutable_region()->mutable_max()->set_x(1);
+  state->mutable_region()->mutable_max()->set_y(1);
+  state->mutable_region()->mutable_max()->set_z(1);
+  const auto [status, response] = Apply(daemon, update);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.issues_size(), 0);
+  const v1::ListEntitiesResponse listed = daemon.Entities();
+  ASSERT_EQ(listed.layers_size(), 1);
+  EXPECT_EQ(listed.layers(0).clip().SerializeAsString(), state->clip().SerializeAsString());
+  EXPECT_EQ(listed.layers(0).region().ShortDebugString(), "min { x: -1 } max { x: 1 y: 1 z: 1 }");
+}
+
 TEST(GetEntity, ByKeyOrNotFound) {
   Daemon daemon;
   v1::ApplyUpdateRequest update;

@@ -278,6 +278,25 @@ TEST(Encode, ReceiptsOfEveryKind) {
   EXPECT_EQ(message.outcome().not_shown().why(), v1::NotShown::HIDDEN);
 }
 
+TEST(Encode, LayersSayWhereTheyAreDrawn) {
+  EntityPage page;
+  page.layers.resize(2);
+  LayerInfo& layer = page.layers[1];
+  layer.clip.count = 2;
+  layer.clip.planes[0] = {1, 2, 3, 4};
+  layer.clip.planes[1] = {0, 0, -1, 0.5};
+  layer.region = {{-1, -2, -3}, {0, 5, 6}};
+  v1::ListEntitiesResponse message;
+  Encode(page, &message);
+  ASSERT_EQ(message.layers_size(), 2);
+  EXPECT_FALSE(message.layers(0).has_clip() || message.layers(0).has_region());
+  ASSERT_EQ(message.layers(1).clip().planes_size(), 2);
+  EXPECT_EQ(message.layers(1).clip().planes(0).ShortDebugString(), "a: 1 b: 2 c: 3 d: 4");
+  EXPECT_EQ(message.layers(1).clip().planes(1).ShortDebugString(), "c: -1 d: 0.5");
+  EXPECT_EQ(message.layers(1).region().ShortDebugString(),
+            "min { x: -1 y: -2 z: -3 } max { y: 5 z: 6 }");
+}
+
 TEST(Encode, StatsHaveEveryFigure) {
   Stats stats;
   stats.time_ns = 1, stats.version = "v", stats.uptime_ns = 2, stats.sessions = 3;

@@ -244,7 +244,7 @@ TEST(Decode, LayerStateKeepsWhatIsNotSet) {
   Decoded decoded = Decode(request);
   const auto* state = &std::get<LayerState>(decoded.operations.at(0).op);
   EXPECT_FALSE(state->visible || state->opacity || state->order || state->blend ||
-               state->transform);
+               state->transform || state->clip || state->region);
   request.mutable_layer_state()->set_visible(false);
   request.mutable_layer_state()->set_opacity(0);
   request.mutable_layer_state()->set_order(-3);
@@ -257,6 +257,40 @@ TEST(Decode, LayerStateKeepsWhatIsNotSet) {
   EXPECT_EQ(state->order, -3);
   EXPECT_EQ(state->blend, gpu::BlendMode::kAdd);
   EXPECT_EQ(state->transform, gpu::Affine());
+}
+
+TEST(Decode, ClipsAndRegions) {
+  v1::StreamRequest request;
+  request.mutable_layer_state()->set_layer("l");
+  v1::Clip* clip = request.mutable_layer_state()->mutable_clip();
+  const auto decode = [&] { return std::get<LayerState>(Decode(request).operations.at(0).op); };
+  // Nothing in it: there is to be none any more.
+  ASSERT_TRUE(decode().clip.has_value());
+  EXPECT_EQ(decode().clip->count, 0u);
+  EXPECT_FALSE(decode().region.has_value());
+  for (int i = 0; i < 8; ++i) {
+    v1::Clip::Plane* plane = clip->add_planes();
+    plane->set_a(i == 0 ? 1e300 : 0);
+    plane->set_b(i);
+    plane->set_d(-i / 2.0);
+  }
+  clip->mutable_planes(7)->set_c(-3);
+  ASSERT_EQ(decode().clip->count, 8u);
+  EXPECT_EQ(decode().clip->planes[0], (gpu::ClipPlane{1e300, 0, 0, 0}));
+  EXPECT_EQ(decode().clip->planes[5], (gpu::ClipPlane{0, 5, 0, -2.5}));
+  EXPECT_EQ(decode().clip->planes[7], (gpu::ClipPlane{0, 7, -3, -3.5}));
+
+  request.mutable_layer_state()->clear_clip();
+  v1::Box3* region = request.mutable_layer_state()->mutable_region();
+  EXPECT_FALSE(decode().clip.has_value());
+  ASSERT_TRUE(decode().region.has_value());
+  EXPECT_EQ(*decode().region, std::nullopt);
+  region->mutable_min()->set_x(-1);
+  region->mutable_max()->set_x(1);
+  region->mutable_max()->set_y(2);
+  region->mutable_max()->set_z(0.5);
+  ASSERT_TRUE(decode().region.has_value());
+  EXPECT_EQ(*decode().region, (gpu::Region{{-1, 0, 0}, {1, 2, 0.5}}));
 }
 
 TEST(Decode, Deletes) {
