@@ -90,6 +90,8 @@ CLI::App* AddFairness(CLI::App& app, FairnessOptions& options) {
   AddCount(*command, "--clients", options.clients, "Each on a connection of its own", 10'000);
   AddCount(*command, "--layers", options.layers, "Of each, one entity in each replaced a commit",
            1000);
+  AddCount(*command, "--credit-bytes", options.credit_bytes, "The daemon's, of each client",
+           1 << 30);
   AddDisplay(*command, options.display);
   return command;
 }

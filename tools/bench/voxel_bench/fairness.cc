@@ -59,8 +59,11 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
                                                 {"seconds", options.seconds},
                                                 {"clients", options.clients},
                                                 {"layers", options.layers},
+                                                {"credit_bytes", options.credit_bytes},
                                                 {"display", options.display}});
-  DaemonOptions wanted{.program = with.daemon};
+  DaemonOptions wanted{
+      .program = with.daemon,
+      .config = absl::StrCat("[limits]\ncredit_bytes = ", options.credit_bytes, "\n")};
   if (!options.display.empty()) {
     wanted.displays = {absl::StrCat("sim=simulated,", options.display)};
   }

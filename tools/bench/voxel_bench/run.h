@@ -43,6 +43,9 @@ struct FairnessOptions {
   int rounds = 3;
   double seconds = 10;
   int clients = 200, layers = 50;
+  // The daemon's limits.credit_bytes: what each may have on its way. Its default for one client is
+  // far more than many can have applied in a short run.
+  int credit_bytes = 65'536;
   std::string display;  // empty: none
 };
 absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
