@@ -4,9 +4,17 @@
 #include <utility>
 
 namespace voxeld::daemon {
+namespace {
 
-SceneStore::SceneStore(const Limits& limits)
-    : limits_(limits), snapshot_(std::make_shared<const Snapshot>()) {}
+SnapshotPtr FirstSnapshot() {
+  Snapshot empty;
+  empty.number = 1;
+  return std::make_shared<const Snapshot>(std::move(empty));
+}
+
+}  // namespace
+
+SceneStore::SceneStore(const Limits& limits) : limits_(limits), snapshot_(FirstSnapshot()) {}
 
 void SceneStore::Publish(Draft draft) {
   snapshot_ = std::move(draft).Finish(snapshot_->number + 1);
@@ -86,6 +94,22 @@ SceneStore::Removed SceneStore::RemoveLayers(
   Publish(std::move(draft));
   removed.owners.assign(owners.begin(), owners.end());
   return removed;
+}
+
+void SceneStore::OrphanLayers(uint64_t session) {
+  std::vector<OwnedName> keys;
+  WriterPtr writer;
+  snapshot_->layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
+    if (layer->writer->session != session || layer->writer->ended) return;
+    keys.push_back(key);
+    writer = layer->writer;
+  });
+  if (keys.empty()) return;
+  const auto ended =
+      std::make_shared<const Writer>(Writer{writer->session, writer->client_name, true});
+  Draft draft(snapshot_, next_number_);
+  for (const OwnedName& key : keys) draft.EditLayer(key, ended);
+  Publish(std::move(draft));
 }
 
 void SceneStore::ForgetOwner(uint64_t owner) {

@@ -30,7 +30,7 @@ class SceneStore {
   SceneStore(const SceneStore&) = delete;
   SceneStore& operator=(const SceneStore&) = delete;
 
-  // The newest; number 0 is the empty scene.
+  // The newest; number 1 is the empty scene (0 is none).
   const SnapshotPtr& snapshot() const { return snapshot_; }
 
   // What coordinates are checked against from now on.
@@ -60,6 +60,10 @@ class SceneStore {
   // keep_state. A new snapshot only if that changed something.
   Removed RemoveLayers(const std::function<bool(const OwnedName&, const Layer&)>& matches,
                        bool keep_state);
+
+  // Marks the layers that `session` last wrote: it has ended, and they stay.
+  // A new snapshot only if there are any.
+  void OrphanLayers(uint64_t session);
 
   // Drops the objects of an owner who has no session any more, unless layers of theirs are left.
   void ForgetOwner(uint64_t owner);
