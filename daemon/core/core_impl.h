@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "daemon/core/core.h"
+#include "daemon/core/scene_watch.h"
 #include "daemon/pipeline/frame_pipeline.h"
 #include "daemon/pipeline/loop.h"
 #include "daemon/scene/scene_store.h"
@@ -29,6 +30,7 @@ class Core::Impl {
   // ---- any thread
   const CoreOptions& options() const { return options_; }
   Loop& loop() { return *loop_; }
+  SceneWatch& scene_watch() { return scene_watch_; }
   CaptureId NewCapture() { return next_capture_++; }
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
                           const gpu::EngineOptions& engine, const ViewOptions& view);
@@ -129,10 +131,6 @@ class Core::Impl {
   // Hands the newest snapshot to every display, unless they have it.
   void Publish();
 
-  // ---- queries
-  EntityInfo InfoOf(const OwnedName& layer, const std::string& id, const Entity& entity) const;
-  LayerInfo InfoOf(const OwnedName& key, const Layer& layer) const;
-
   // ---- displays
   absl::StatusOr<DisplaySlot*> FindDisplay(const std::string& name);
   // What coordinates must fit: every display's view, and those to come.
@@ -152,6 +150,7 @@ class Core::Impl {
   const std::shared_ptr<Loop> loop_;
   SceneStore store_;
   SnapshotPtr published_;
+  SceneWatch scene_watch_;
 
   // Grows before Start only; a slot's scene_to_voxel is the core thread's.
   std::vector<std::unique_ptr<DisplaySlot>> displays_;

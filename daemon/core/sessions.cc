@@ -218,6 +218,7 @@ void Core::Impl::EndCommit(Session& session, const Operation& operation) {
     for (const auto& slot : displays_) accepted.displays.push_back(slot->info.name);
   }
   receipt.what = std::move(accepted);
+  scene_watch_.Publish(store_.snapshot());  // who has the receipt sees the commit
   session.sink->OnReceipt(receipt);
 
   published_ = store_.snapshot();
@@ -269,6 +270,7 @@ void Core::Impl::CloseSession(SessionId id) {
   const Session session = std::move(it->second);
   sessions_.erase(it);
   staged_bytes_ -= session.staged_bytes;
+  if (session.options.on_disconnect != DisconnectPolicy::kClear) store_.OrphanLayers(id);
   switch (session.options.on_disconnect) {
     case DisconnectPolicy::kClear:
       RemoveLayersOf(id, session.owner);
@@ -320,6 +322,7 @@ sync::TimeNs Core::Impl::RunDue() {
 void Core::Impl::Publish() {
   if (published_ == store_.snapshot()) return;
   published_ = store_.snapshot();
+  scene_watch_.Publish(published_);
   for (const auto& slot : displays_) {
     slot->host->work->Post([pipeline = slot->host->pipeline.get(), snapshot = published_] {
       pipeline->Show(snapshot);

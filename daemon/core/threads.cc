@@ -14,7 +14,8 @@ Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
       started_ns_(clock.Now()),
       loop_(std::make_shared<Loop>(clock)),
       store_(options_.limits),
-      published_(store_.snapshot()) {}
+      published_(store_.snapshot()),
+      scene_watch_(published_) {}
 
 void Core::Impl::Launch(std::string name, std::function<void()> body) {
   {
