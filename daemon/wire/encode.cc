@@ -48,21 +48,6 @@ struct ReceiptEncoder {
   void operator()(const CommitOutcome& in) const { EncodeOutcome(in, out->mutable_outcome()); }
 };
 
-void EncodeLayer(const LayerInfo& in, v1::LayerInfo* out) {
-  out->set_owner(in.owner);
-  out->set_layer(in.layer);
-  out->set_number(in.number);
-  out->set_visible(in.visible);
-  out->set_opacity(in.opacity);
-  out->set_order(in.order);
-  out->set_blend(ToWire(in.blend));
-  ToWire(in.transform, out->mutable_transform());
-  out->set_entities(in.entities);
-  out->set_bytes(in.bytes);
-  out->set_orphaned(in.orphaned);
-  out->set_client_name(in.client_name);
-}
-
 }  // namespace
 
 void Encode(const Issue& in, v1::Issue* out) {
@@ -124,9 +109,24 @@ void Encode(const EntityInfo& in, v1::EntityInfo* out) {
   out->mutable_color()->set_rgb(in.color);
 }
 
+void Encode(const LayerInfo& in, v1::LayerInfo* out) {
+  out->set_owner(in.owner);
+  out->set_layer(in.layer);
+  out->set_number(in.number);
+  out->set_visible(in.visible);
+  out->set_opacity(in.opacity);
+  out->set_order(in.order);
+  out->set_blend(ToWire(in.blend));
+  ToWire(in.transform, out->mutable_transform());
+  out->set_entities(in.entities);
+  out->set_bytes(in.bytes);
+  out->set_orphaned(in.orphaned);
+  out->set_client_name(in.client_name);
+}
+
 void Encode(const EntityPage& in, v1::ListEntitiesResponse* out) {
   for (const EntityInfo& entity : in.entities) Encode(entity, out->add_entities());
-  for (const LayerInfo& layer : in.layers) EncodeLayer(layer, out->add_layers());
+  for (const LayerInfo& layer : in.layers) Encode(layer, out->add_layers());
   out->set_next_page_token(in.next_page_token);
   out->set_total(in.total);
 }
