@@ -24,9 +24,10 @@ class SceneWatch {
 
   // Calls `newer` once when there is a snapshot beyond `number`: in the thread that publishes it,
   // or in this one, before it returns, if there is already. `newer` must only post.
+  // Answers are ascending, from 1.
   SnapshotWaitId Await(uint64_t number, std::function<void()> newer);
-  // Drops what waits under `id`; a call that is under way in another thread may still end after
-  // this.
+  // Drops what waits under `id`, if anything does; a call that is under way in another thread may
+  // still end after this.
   void Cancel(SnapshotWaitId id);
 
   // `newest` is beyond the one before.

@@ -4,6 +4,7 @@
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -61,14 +62,14 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void OnCancel() override { End(absl::CancelledError("the client is gone")); }
 
   void OnDone() override {
-    std::optional<SnapshotWaitId> waiting;
+    SnapshotWaitId waiting = 0;
     std::unique_ptr<grpc::Alarm> alarm;
     {
       sync::MutexLock lock(mutex_);
       waiting = waiting_;
       alarm = std::move(alarm_);
     }
-    if (waiting.has_value()) scene_.Cancel(*waiting);
+    scene_.Cancel(waiting);
     if (counted_) --context_.scene_watches;
     context_.calls.Remove(this);
     alarm.reset();
@@ -110,7 +111,7 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     });
     {
       sync::MutexLock lock(mutex_);
-      waiting_ = id;
+      waiting_ = std::max(waiting_, id);  // the next turn may have waited already
       if (!end_.has_value()) return;
     }
     scene_.Cancel(id);
@@ -136,7 +137,7 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   grpc::ByteBuffer outgoing_ VOXELD_GUARDED_BY(mutex_);
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);
-  std::optional<SnapshotWaitId> waiting_ VOXELD_GUARDED_BY(mutex_);
+  SnapshotWaitId waiting_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<grpc::Alarm> alarm_ VOXELD_GUARDED_BY(mutex_);
 };
 
