@@ -187,6 +187,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                            .max_queued_answers = config.server.max_queued_answers,
                                            .max_queued_bytes = config.server.max_queued_bytes},
                                .max_calls_per_connection = config.server.max_calls_per_connection,
+                               .max_scene_watches = config.server.max_scene_watches,
                                .keepalive_interval_ns = config.server.keepalive_interval_ns,
                                .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
                                .log = &log});

@@ -30,6 +30,7 @@ struct ServerConfig {
   uint32_t max_queued_answers = 16384;
   uint64_t max_queued_bytes = 16u << 20;    // the same in bytes
   uint32_t max_calls_per_connection = 256;  // at once
+  uint32_t max_scene_watches = 64;          // WatchScene calls at once, of all connections
   // How long a stream that its client has half-closed waits for outcomes, and an ending one for its
   // client to read what is queued.
   int64_t drain_limit_ns = 5 * sync::kSecond;

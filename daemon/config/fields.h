@@ -33,6 +33,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_queued_answers", config.server.max_queued_answers, 16, 1 << 24);
   visitor.Integer("max_queued_bytes", config.server.max_queued_bytes, 4096, kGiB);
   visitor.Integer("max_calls_per_connection", config.server.max_calls_per_connection, 1, 65536);
+  visitor.Integer("max_scene_watches", config.server.max_scene_watches, 1, 65536);
   visitor.Integer("drain_limit_ns", config.server.drain_limit_ns, 0, kHour);
   visitor.Integer("keepalive_interval_ns", config.server.keepalive_interval_ns, kSecond, kHour);
   visitor.Integer("keepalive_timeout_ns", config.server.keepalive_timeout_ns, kSecond, kHour);

@@ -45,7 +45,8 @@ int Milliseconds(sync::TimeNs time) { return static_cast<int>(time / sync::kMill
 class Server::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ServerOptions options)
-      : context_{core, clock, options.version, options.log, options.streams},
+      : context_{core,        clock,           options.version,
+                 options.log, options.streams, options.max_scene_watches},
         options_(std::move(options)),
         scene_(MakeSceneService(context_)),
         display_(MakeDisplayService(context_)) {}

@@ -20,6 +20,7 @@ struct ServerOptions {
   std::string version;
   StreamLimits streams;
   uint32_t max_calls_per_connection = 256;
+  uint32_t max_scene_watches = 64;
   // An idle connection is probed this often, and closed when no answer comes in time.
   sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
