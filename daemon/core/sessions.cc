@@ -76,8 +76,7 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& option
   session.id = id;
   session.incarnation = dormant.incarnation + 1;
   session.owner = dormant.owner;
-  session.writer =
-      std::make_shared<const Writer>(Writer{id, options.client_name});
+  session.writer = std::make_shared<const Writer>(Writer{id, options.client_name});
   store_.HandOver(id, session.writer);
   Publish();
   session.owed_outcomes = dormant.owed_outcomes;
@@ -173,8 +172,8 @@ void Core::Impl::FinishClose(SessionId id) {
       break;
   }
   if (layers_until > now) {
-    store_.HandOver(id, std::make_shared<const Writer>(
-                            Writer{id, session.writer->client_name, true}));
+    store_.HandOver(id,
+                    std::make_shared<const Writer>(Writer{id, session.writer->client_name, true}));
   }
   KeepDormant(session, layers_until);
   ForgetOwner(session.owner);
