@@ -181,6 +181,7 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.outcomes_undelivered = outcomes_undelivered_;
   stats.client_drops = client_drops_;
   stats.streams_overrun = streams_overrun_;
+  if (options_.connections) stats.connections = options_.connections();
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;

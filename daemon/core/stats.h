@@ -42,6 +42,18 @@ struct DisplayFigures {
            commits_lost = 0, commits_not_shown = 0, commits_pending = 0;
 };
 
+// Connections over gRPC's addresses; the daemon's own (its probe) are in none of these.
+struct ListenFigures {
+  uint64_t open = 0, accepted = 0;
+  // Closed at once: max_connections, max_connections_per_address.
+  uint64_t refused_in_all = 0, refused_by_address = 0;
+  // By the guard: too many bytes, too long, before a call was answered; too many calls cancelled.
+  uint64_t cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
+  uint64_t accept_failures = 0;  // out of descriptors, say; tried again until it works
+  uint64_t probe_failures = 0;   // of connections to itself
+  std::string unreachable;       // empty: they work; else why they do not
+};
+
 struct Stats {
   int64_t time_ns = 0;
   std::string version;
@@ -53,6 +65,7 @@ struct Stats {
   uint64_t outcomes_undelivered = 0;
   uint64_t client_drops = 0;     // frames that clients dropped themselves, by their own word
   uint64_t streams_overrun = 0;  // ended because their client did not read
+  ListenFigures connections;
   std::vector<DisplayFigures> displays;
 };
 

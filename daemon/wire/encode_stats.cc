@@ -56,6 +56,19 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_commits_pending(in.commits_pending);
 }
 
+void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
+  out->set_open(in.open);
+  out->set_accepted(in.accepted);
+  out->set_refused_in_all(in.refused_in_all);
+  out->set_refused_by_address(in.refused_by_address);
+  out->set_cut_for_bytes(in.cut_for_bytes);
+  out->set_cut_for_time(in.cut_for_time);
+  out->set_cut_for_cancelling(in.cut_for_cancelling);
+  out->set_accept_failures(in.accept_failures);
+  out->set_probe_failures(in.probe_failures);
+  out->set_unreachable(in.unreachable);
+}
+
 }  // namespace
 
 void Encode(const Stats& in, v1::Stats* out) {
@@ -76,6 +89,7 @@ void Encode(const Stats& in, v1::Stats* out) {
   out->set_outcomes_undelivered(in.outcomes_undelivered);
   out->set_client_drops(in.client_drops);
   out->set_streams_overrun(in.streams_overrun);
+  EncodeConnections(in.connections, out->mutable_connections());
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 
