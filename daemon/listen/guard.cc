@@ -63,6 +63,7 @@ void Guard::Leave(ConnectionId id) {
   Connection& connection = it->second;
   wire = std::move(connection.wire);
   watched_.erase(id);
+  authorised_.erase(id);
   if (const auto named = by_name_.find(connection.name);
       named != by_name_.end() && named->second == id) {
     by_name_.erase(named);
@@ -111,27 +112,39 @@ void Guard::OnAuthorised(const std::string& peer) {
   if (connection == nullptr || !connection->watched || BytesAreMany(*connection)) return;
   connection->watched = false;
   watched_.erase(connection->id);
+  authorised_.emplace(connection->id, connection);
 }
 
-void Guard::OnCallEnd(const std::string& peer, bool waited, bool cancelled) {
+void Guard::OnCallEnd(const std::string& peer) {
   sync::MutexLock lock(mutex_);
   Connection* connection = Find(peer);
-  if (connection == nullptr) return;
+  if (connection == nullptr || connection->waiting == 0) return;
+  if (--connection->waiting == 0) connection->since = clock_.Now();
+}
+
+std::vector<std::string> Guard::Busy() {
+  std::vector<std::string> out;
+  sync::MutexLock lock(mutex_);
+  for (const auto& [id, connection] : authorised_) {
+    const uint64_t bytes = connection->wire->BytesReceived();
+    if (std::exchange(connection->bytes, bytes) != bytes) out.push_back(connection->name);
+  }
+  return out;
+}
+
+void Guard::OnCancelled(const std::string& peer, uint64_t in_all) {
+  sync::MutexLock lock(mutex_);
+  Connection* connection = Find(peer);
+  if (connection == nullptr || limits_.max_cancelled_calls_per_second == 0) return;
   const sync::TimeNs now = clock_.Now();
-  // What began to wait after the authorisation was not counted, nor is it of interest.
-  if (waited && connection->watched && connection->waiting > 0 && --connection->waiting == 0) {
-    connection->since = now;
-  }
-  if (!cancelled || limits_.max_cancelled_calls_per_second == 0) return;
-  if (now - connection->cancelled_since >= sync::kSecond) {
-    connection->cancelled_since = now;
-    connection->cancelled = 0;
-  }
-  if (++connection->cancelled > limits_.max_cancelled_calls_per_second) {
+  if (in_all > connection->cancelled_before + limits_.max_cancelled_calls_per_second) {
     Cut(*connection, counters_.cut_for_cancelling,
-        absl::StrCat("more than ", limits_.max_cancelled_calls_per_second,
-                     " calls were cancelled within a second, which is "
-                     "max_cancelled_calls_per_second"));
+        absl::StrCat(in_all - connection->cancelled_before,
+                     " calls were cancelled within a second, and ",
+                     limits_.max_cancelled_calls_per_second, " is max_cancelled_calls_per_second"));
+  } else if (now - connection->cancelled_since >= sync::kSecond) {
+    connection->cancelled_since = now;
+    connection->cancelled_before = in_all;
   }
 }
 
@@ -154,12 +167,11 @@ bool Guard::BytesAreMany(Connection& connection) {
 
 void Guard::Cut(Connection& connection, Counters::Count& counter, const std::string& why) {
   if (std::exchange(connection.cut, true)) return;
-  connection.wire->Cut();
   ++counter;
-  if (connection.watched) {
-    connection.watched = false;
-    watched_.erase(connection.id);
-  }
+  connection.wire->Cut();
+  connection.watched = false;
+  watched_.erase(connection.id);
+  authorised_.erase(connection.id);
   gate_.Log(Logger::Level::kWarn, "connection cut", connection.name, why);
 }
 

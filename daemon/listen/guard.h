@@ -8,8 +8,8 @@
 //                 request beyond the limit never passes, however fast it was
 //   time          unauthorised_limit_ns went by: cut. It stands still while a call waits for the
 //                 daemon's answer, as a core that is busy is no fault of the client's
-//   cancelling    more calls than max_cancelled_calls_per_second ended cancelled within a second:
-//                 cut, whether authorised or not
+//   cancelling    after that too: more calls than max_cancelled_calls_per_second ended without an
+//                 answer within a second: cut
 //
 // Unix sockets, whose users the kernel names, are free of bytes and time. Times are the clock's.
 #pragma once
@@ -19,6 +19,7 @@
 #include <memory>
 #include <string>
 #include <unordered_map>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -72,8 +73,12 @@ class Guard {
   // A call got its first message, and will answer it or end.
   void OnMessage(const std::string& peer);
   void OnAuthorised(const std::string& peer);
-  // `waited`: OnMessage was called for it.
-  void OnCallEnd(const std::string& peer, bool waited, bool cancelled);
+  // Of a call for which OnMessage was called.
+  void OnCallEnd(const std::string& peer);
+  // Authorised connections over TCP that have got some bytes since the last time.
+  std::vector<std::string> Busy();
+  // How many calls of the connection have ended without an answer since it was accepted.
+  void OnCancelled(const std::string& peer, uint64_t in_all);
 
  private:
   struct Connection {
@@ -85,8 +90,10 @@ class Guard {
     uint32_t waiting = 0;    // calls that the daemon has yet to answer
     bool watched = false;    // not authorised yet
     bool cut = false;
+    uint64_t bytes = 0;  // when Busy last asked
+    // The second in which cancelled calls are counted, and those before it.
     sync::TimeNs cancelled_since = 0;
-    uint32_t cancelled = 0;
+    uint64_t cancelled_before = 0;
   };
 
   Connection* Find(const std::string& peer) VOXELD_REQUIRES(mutex_);
@@ -103,6 +110,7 @@ class Guard {
   ConnectionId next_ VOXELD_GUARDED_BY(mutex_) = 1;
   std::unordered_map<ConnectionId, Connection> connections_ VOXELD_GUARDED_BY(mutex_);
   std::map<ConnectionId, Connection*> watched_ VOXELD_GUARDED_BY(mutex_);  // oldest first
+  std::map<ConnectionId, Connection*> authorised_ VOXELD_GUARDED_BY(mutex_);
   std::unordered_map<std::string, ConnectionId> by_name_ VOXELD_GUARDED_BY(mutex_);
   // Of those that count against limits.
   std::unordered_map<std::string, uint32_t> by_address_ VOXELD_GUARDED_BY(mutex_);

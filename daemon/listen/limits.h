@@ -15,7 +15,7 @@ struct ConnectionLimits {
   // Over TCP, until a message of the connection has been authorised (guard.h).
   uint64_t unauthorised_bytes = 64u << 10;
   int64_t unauthorised_limit_ns = 5 * sync::kSecond;
-  // Calls that end cancelled, in any second; 0: any number.
+  // Calls of one connection that end without an answer, in a second; 0: any number.
   uint32_t max_cancelled_calls_per_second = 100;
 
   // The listener connects to itself this often; 0: never.

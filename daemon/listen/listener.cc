@@ -12,23 +12,17 @@
 #include <cerrno>
 #include <cstring>
 #include <thread>
-#include <unordered_map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/listen/watcher.h"
 
 namespace voxeld::daemon::listen {
 namespace {
 
-constexpr uint64_t kWake = 0;
-// epoll's words: listening sockets from 1 on, connections from here on.
-constexpr uint64_t kFirstConnection = 1u << 16;
+constexpr uint64_t kWake = 0;  // epoll's word; listening sockets have those from 1 on
 constexpr int kEvents = 64;
 constexpr int kAcceptsAtOnce = 64;  // of one address, before others have their turn
-
-bool OutOfMeans(int error) {
-  return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
-}
 
 // What one connection's failure before it was accepted looks like; the next one may be well.
 bool OfOneConnection(int error) {
@@ -72,10 +66,12 @@ class Listener::Impl {
     }
     Wake();
     if (thread_.joinable()) thread_.join();
-    for (const auto& [id, descriptor] : wires_) guard_.Leave(id);
   }
 
   absl::Status Start() {
+    absl::StatusOr<std::unique_ptr<Watcher>> watcher = Watcher::Start(guard_, clock_);
+    if (!watcher.ok()) return watcher.status();
+    watcher_ = *std::move(watcher);
     epoll_.Reset(epoll_create1(EPOLL_CLOEXEC));
     wake_.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
     if (!epoll_.ok() || !wake_.ok()) return absl::ErrnoToStatus(errno, "the listener");
@@ -113,7 +109,6 @@ class Listener::Impl {
   }
 
   void Run() {
-    sync::TimeNs look = sync::kNever;
     std::array<epoll_event, kEvents> events;
     for (;;) {
       {
@@ -122,17 +117,15 @@ class Listener::Impl {
         if (sockets_.empty() && !std::exchange(sockets_closed_, true)) closed_.NotifyAll();
         if (stop_) return;
       }
-      const int n = epoll_wait(epoll_.get(), events.data(), kEvents, Timeout(look));
+      const int n = epoll_wait(epoll_.get(), events.data(), kEvents, Timeout());
       for (int i = 0; i < n; ++i) Handle(events[static_cast<size_t>(i)]);
       if (retry_ <= clock_.Now()) Resume();
-      if (look <= clock_.Now() || std::exchange(entered_, false)) look = guard_.Look();
     }
   }
 
-  int Timeout(sync::TimeNs look) const {
-    const sync::TimeNs due = std::min(look, retry_);
-    if (due == sync::kNever) return -1;
-    const sync::TimeNs left = std::max<sync::TimeNs>(0, due - clock_.Now());
+  int Timeout() const {
+    if (retry_ == sync::kNever) return -1;
+    const sync::TimeNs left = std::max<sync::TimeNs>(0, retry_ - clock_.Now());
     return static_cast<int>((left + sync::kMillisecond - 1) / sync::kMillisecond);
   }
 
@@ -143,19 +136,7 @@ class Listener::Impl {
       [[maybe_unused]] const ssize_t n = read(wake_.get(), &count, sizeof(count));
       return;
     }
-    if (word < kFirstConnection) {
-      if (word - 1 < sockets_.size()) Accept(sockets_[word - 1]);
-      return;
-    }
-    const ConnectionId id = word - kFirstConnection;
-    const auto wire = wires_.find(id);
-    if (wire == wires_.end()) return;
-    if ((event.events & EPOLLHUP) != 0) {
-      wires_.erase(wire);
-      guard_.Leave(id);
-    } else if (!guard_.OnBytes(id)) {
-      Change(wire->second, EPOLLET, word);  // the end alone, of which epoll always tells
-    }
+    if (word - 1 < sockets_.size()) Accept(sockets_[word - 1]);
   }
 
   void Accept(const ListeningSocket& socket) {
@@ -166,7 +147,7 @@ class Listener::Impl {
       if (!connection.ok()) {
         if (errno == EAGAIN || errno == EWOULDBLOCK) return;
         if (OfOneConnection(errno)) continue;
-        return Pause(errno);
+        return Pause(std::strerror(errno));
       }
       if (!Take(socket, name, std::move(connection))) return;
     }
@@ -192,40 +173,29 @@ class Listener::Impl {
     }
     if (!own && !guard_.MayEnter(peer).ok()) return true;
 
-    auto wire =
-        std::make_unique<SocketWire>(Descriptor(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0)));
-    const int descriptor = wire->descriptor();
-    if (descriptor < 0) {  // unguarded it would be worse than refused
-      Pause(errno);
-      return false;
-    }
-    const ConnectionId id = guard_.Enter(peer, own, std::move(wire));
-    wires_.emplace(id, descriptor);
-    entered_ = true;
-    if (!Watch(descriptor, peer.unix_socket ? EPOLLET : EPOLLET | EPOLLIN, kFirstConnection + id)) {
-      const int error = errno;
-      wires_.erase(id);
-      guard_.Leave(id);
-      Pause(error);
+    Descriptor second(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0));
+    absl::Status added = absl::ErrnoToStatus(errno, "a second descriptor");
+    if (second.ok()) added = watcher_->Add(peer, own, std::move(second));
+    if (!added.ok()) {  // unguarded it would be worse than refused
+      Pause(std::string(added.message()));
       return false;
     }
     serve_(socket.descriptor(), std::move(connection));
     return true;
   }
 
-  void Pause(int error) {
+  void Pause(const std::string& why) {
     ++counters_.accept_failures;
     if (retry_ == sync::kNever && options_.log != nullptr) {
       rlimit limit = {};
       getrlimit(RLIMIT_NOFILE, &limit);
       options_.log->Warn(
           "no connection can be accepted",
-          {{"why", std::strerror(error)},
+          {{"why", why},
            {"connections", absl::StrCat(counters_.open.load())},
            {"descriptors", absl::StrCat(limit.rlim_cur)},
-           {"hint", OutOfMeans(error) ? "each connection takes two descriptors: raise LimitNOFILE "
-                                        "or lower max_connections"
-                                      : "tried again"}});
+           {"hint",
+            "each connection takes two descriptors: raise LimitNOFILE or lower max_connections"}});
     }
     paused_ = true;
     retry_ = clock_.Now() + kRetry;
@@ -250,6 +220,7 @@ class Listener::Impl {
   const Serve serve_;
   const ListenerOptions options_;
   LogGate gate_;
+  std::unique_ptr<Watcher> watcher_;
   Descriptor epoll_, wake_;
   sync::Mutex mutex_;
   sync::CondVar closed_;
@@ -259,10 +230,8 @@ class Listener::Impl {
 
   // The thread's own.
   std::vector<ListeningSocket> sockets_;
-  std::unordered_map<ConnectionId, int> wires_;  // descriptors of what the guard keeps
   sync::TimeNs retry_ = sync::kNever;
-  bool paused_ = false;   // during Resume: again
-  bool entered_ = false;  // since the last look
+  bool paused_ = false;  // during Resume: again
   std::thread thread_;
 };
 

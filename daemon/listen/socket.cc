@@ -144,6 +144,9 @@ uint64_t SocketWire::BytesReceived() {
 }
 
 void SocketWire::Cut() {
+  // The last to close it resets it: no waiting for a client that still sends.
+  const linger reset = {.l_onoff = 1, .l_linger = 0};
+  setsockopt(descriptor_.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
   shutdown(descriptor_.get(), SHUT_RDWR);
   // Else whoever serves the connection would still read and parse what is here.
   while (recv(descriptor_.get(), nullptr, kDiscardBytes, MSG_TRUNC | MSG_DONTWAIT) > 0) {

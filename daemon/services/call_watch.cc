@@ -4,7 +4,6 @@
 #include <grpcpp/support/server_interceptor.h>
 
 #include <array>
-#include <atomic>
 #include <string>
 #include <string_view>
 
@@ -38,7 +37,9 @@ class CallWatch final : public grpc::experimental::Interceptor {
         raw_(IsRaw(info->method())),
         peer_(listen::PeerName(info->server_context()->peer())) {}
 
-  ~CallWatch() override { guard_.OnCallEnd(peer_, heard_, cancelled_); }
+  ~CallWatch() override {
+    if (heard_) guard_.OnCallEnd(peer_);
+  }
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (!heard_ && methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_MESSAGE) &&
@@ -52,13 +53,6 @@ class CallWatch final : public grpc::experimental::Interceptor {
       answered_ = true;
       guard_.OnAuthorised(peer_);
     }
-    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
-      finished_ = true;
-    }
-    // The context may not be asked from here whether the call was cancelled: it would ask us.
-    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_CLOSE)) {
-      cancelled_ = !finished_;
-    }
     methods->Proceed();
   }
 
@@ -66,10 +60,8 @@ class CallWatch final : public grpc::experimental::Interceptor {
   listen::Guard& guard_;
   const bool raw_;
   const std::string peer_;
-  bool heard_ = false;                  // by reads
-  bool answered_ = false;               // by writes
-  std::atomic<bool> finished_ = false;  // the daemon has given the call's status
-  bool cancelled_ = false;              // it had not when the call was over
+  bool heard_ = false;     // by reads
+  bool answered_ = false;  // by writes
 };
 
 class Factory final : public grpc::experimental::ServerInterceptorFactoryInterface {

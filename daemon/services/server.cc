@@ -17,6 +17,7 @@
 #include "daemon/listen/listener.h"
 #include "daemon/listen/probe.h"
 #include "daemon/listen/socket.h"
+#include "daemon/services/call_meter.h"
 #include "daemon/services/call_watch.h"
 #include "daemon/services/services.h"
 
@@ -86,6 +87,10 @@ class Server::Impl {
         {.send_limit_ns = options_.keepalive_timeout_ns, .log = options_.log});
     if (!listener.ok()) return listener.status();
     listener_ = *std::move(listener);
+    if (options_.connections.max_cancelled_calls_per_second > 0) {
+      meter_ =
+          std::make_unique<CallMeter>(guard_, options_.max_calls_per_connection, context_.clock);
+    }
     if (options_.connections.probe_interval_ns > 0) {
       probe_ = std::make_unique<listen::Probe>(
           targets_, options_.connections.probe_interval_ns,
@@ -109,6 +114,7 @@ class Server::Impl {
     builder.SetMaxSendMessageSize(-1);
     for (const auto& [name, value] : {
              std::pair(GRPC_ARG_HTTP2_BDP_PROBE, 0),
+             {GRPC_ARG_ENABLE_CHANNELZ, 1},  // what call_meter.h reads
              {GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kLookaheadBytes},
              {GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(options_.keepalive_interval_ns)},
              {GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(options_.keepalive_timeout_ns)},
@@ -191,6 +197,7 @@ class Server::Impl {
         gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(rest, GPR_TIMESPAN)));
     server_->Wait();
     server_.reset();
+    meter_.reset();
     listener_.reset();
     probe_.reset();  // what it may still have asked was ended with the server
   }
@@ -208,6 +215,7 @@ class Server::Impl {
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<listen::Listener> listener_;
+  std::unique_ptr<CallMeter> meter_;
   std::unique_ptr<listen::Probe> probe_;
   sync::Mutex serving_mutex_;
   bool down_ VOXELD_GUARDED_BY(serving_mutex_) = false;

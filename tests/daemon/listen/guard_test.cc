@@ -13,7 +13,9 @@
 namespace voxeld::daemon::listen {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 // A connection, as the test sees it: it outlives the guard's wire.
 struct Line {
@@ -122,7 +124,7 @@ TEST_F(GuardTest, TimeStandsStillWhileTheDaemonOwesAnAnswerBytesDoNot) {
   guard_.OnMessage(Tcp(1).name);
   Pass(60 * sync::kSecond);
   EXPECT_EQ(line_.cuts, 0);
-  guard_.OnCallEnd(Tcp(1).name, true, false);  // refused: it begins anew
+  guard_.OnCallEnd(Tcp(1).name);  // refused: it begins anew
   Pass(kLimits.unauthorised_limit_ns - 1);
   EXPECT_EQ(line_.cuts, 0);
   Pass(1);
@@ -139,15 +141,30 @@ TEST_F(GuardTest, TimeStandsStillWhileTheDaemonOwesAnAnswerBytesDoNot) {
 TEST_F(GuardTest, CancelledCallsAreCountedASecondAlsoOfTheAuthorised) {
   Enter(Tcp(1), line_);
   guard_.OnAuthorised(Tcp(1).name);
+  uint64_t cancelled = 0;
   for (int second = 0; second < 5; ++second) {
-    for (int i = 0; i < 10; ++i) guard_.OnCallEnd(Tcp(1).name, true, true);
-    for (int i = 0; i < 100; ++i) guard_.OnCallEnd(Tcp(1).name, true, false);
+    for (int i = 0; i < 10; ++i) guard_.OnCancelled(Tcp(1).name, ++cancelled);
     clock_.Advance(sync::kSecond);
+    guard_.OnCancelled(Tcp(1).name, cancelled);
   }
   EXPECT_EQ(line_.cuts, 0);
-  for (int i = 0; i < 11; ++i) guard_.OnCallEnd(Tcp(1).name, false, true);
+  guard_.OnCancelled(Tcp(1).name, cancelled + 10);
+  EXPECT_EQ(line_.cuts, 0);
+  guard_.OnCancelled(Tcp(1).name, cancelled + 11);
   EXPECT_EQ(line_.cuts, 1);
   EXPECT_EQ(counters_.Read().cut_for_cancelling, 1u);
+}
+
+TEST_F(GuardTest, BusyAreTheAuthorisedThatGotBytesSinceItWasAsked) {
+  Enter(Tcp(1), line_);
+  Enter(Tcp(2), lines_[0]);
+  line_.bytes = lines_[0].bytes = 100;
+  EXPECT_THAT(guard_.Busy(), IsEmpty());
+  guard_.OnAuthorised(Tcp(1).name);
+  EXPECT_THAT(guard_.Busy(), ElementsAre(Tcp(1).name));
+  EXPECT_THAT(guard_.Busy(), IsEmpty());
+  line_.bytes = 101;
+  EXPECT_THAT(guard_.Busy(), ElementsAre(Tcp(1).name));
 }
 
 TEST_F(GuardTest, UnixSocketsAreFreeOfBytesAndTime) {
@@ -197,7 +214,7 @@ TEST_F(GuardTest, ANameThatComesAgainIsTheNewConnections) {
   fresh.bytes = 1 << 20;
   guard_.Look();
   EXPECT_EQ(fresh.cuts, 0);
-  for (int i = 0; i < 11; ++i) guard_.OnCallEnd(Tcp(1).name, true, true);
+  guard_.OnCancelled(Tcp(1).name, 11);
   EXPECT_EQ(fresh.cuts, 1) << "it is still known by its name";
   EXPECT_EQ(line_.cuts, 0);
 }
@@ -205,7 +222,8 @@ TEST_F(GuardTest, ANameThatComesAgainIsTheNewConnections) {
 TEST_F(GuardTest, NobodysCallsAreIgnored) {
   guard_.OnMessage("ipv4:203.0.113.1:1");
   guard_.OnAuthorised("ipv4:203.0.113.1:1");
-  guard_.OnCallEnd("ipv4:203.0.113.1:1", true, true);
+  guard_.OnCallEnd("ipv4:203.0.113.1:1");
+  guard_.OnCancelled("ipv4:203.0.113.1:1", 1000);
   EXPECT_EQ(guard_.Look(), sync::kNever);
 }
 
