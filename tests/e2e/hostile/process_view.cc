@@ -33,9 +33,7 @@ bool LeaveDescriptors(pid_t process, size_t spare) {
     used.insert(std::stoul(entry.path().filename().string()));
   }
   size_t most = 0;
-  for (; spare > 0; ++most) {
-    if (!used.contains(most)) --spare;
-  }
+  while (used.contains(most) || spare-- > 0) ++most;
 
   rlimit limit = {};
   if (prlimit(process, RLIMIT_NOFILE, nullptr, &limit) != 0) return false;
