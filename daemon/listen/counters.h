@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "daemon/core/stats.h"
 #include "display/sync/mutex.h"

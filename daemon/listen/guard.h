@@ -51,7 +51,7 @@ class Guard {
 
   // All outlive the guard; `log` may be none.
   Guard(const ConnectionLimits& limits, sync::Clock& clock, Counters& counters, Logger* log)
-      : limits_(limits), clock_(clock), counters_(counters), log_(log), gate_(clock, log) {}
+      : limits_(limits), clock_(clock), counters_(counters), gate_(clock, log) {}
 
   // ---- from the listener
 
@@ -104,7 +104,6 @@ class Guard {
   const ConnectionLimits limits_;
   sync::Clock& clock_;
   Counters& counters_;
-  Logger* const log_;
   LogGate gate_;
   sync::Mutex mutex_;
   ConnectionId next_ VOXELD_GUARDED_BY(mutex_) = 1;
