@@ -211,7 +211,7 @@ TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
     upsert->mutable_entity()->mutable_primitive()->mutable_instance()->set_object("object");
   }
   for (int i = 0; i < kMany; ++i) define();  // each looks at every instance
-  grpc::ClientContext small;  // a first call over TCP may not be large
+  grpc::ClientContext small;                 // a first call over TCP may not be large
   SetDeadline(small);
   v1::ListEntitiesResponse nothing;
   ASSERT_TRUE(scene->ListEntities(&small, {}, &nothing).ok());
