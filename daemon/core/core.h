@@ -57,6 +57,8 @@ struct CoreOptions {
   std::function<void(const std::string& display, display::DisplayState state,
                      const std::string& reason)>
       state_event;
+  // The listener's figures, for Stats; from any thread. May be empty.
+  std::function<ListenFigures()> connections;
 };
 
 struct SessionInfo {
