@@ -61,9 +61,9 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
                                                 {"layers", options.layers},
                                                 {"credit_bytes", options.credit_bytes},
                                                 {"display", options.display}});
-  DaemonOptions wanted{
-      .program = with.daemon,
-      .config = absl::StrCat("[limits]\ncredit_bytes = ", options.credit_bytes, "\n")};
+  DaemonOptions wanted{.program = with.daemon,
+                       .config = absl::StrCat(RoomFor(options.clients),
+                                              "credit_bytes = ", options.credit_bytes, "\n")};
   if (!options.display.empty()) {
     wanted.displays = {absl::StrCat("sim=simulated,", options.display)};
   }

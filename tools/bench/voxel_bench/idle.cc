@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kLines = 100, kEntities = 10, kVariants = 16;
 constexpr double kVoxels = 20, kDisplayVoxels = 64;
-constexpr int kShared = 100;  // streams on one connection, where they share it
+constexpr int kShared = 50;  // streams on one connection, where they share it
 constexpr sync::TimeNs kFastStats = 10 * sync::kMillisecond;
 constexpr sync::TimeNs kSlowRead = sync::kSecond;
 constexpr sync::TimeNs kOpenLimit = 30 * sync::kSecond;
@@ -105,10 +105,10 @@ class Idle {
 
  private:
   absl::Status WithDaemon(const std::function<absl::Status(ServerProcess&)>& measure) {
-    absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(
-        {.program = with_.daemon,
-         .displays = {absl::StrCat("sim=simulated,", options_.display)},
-         .config = absl::StrCat("[limits]\nmax_sessions = ", options_.streams + 64, "\n")});
+    absl::StatusOr<std::unique_ptr<ServerProcess>> daemon =
+        ServerProcess::StartDaemon({.program = with_.daemon,
+                                    .displays = {absl::StrCat("sim=simulated,", options_.display)},
+                                    .config = RoomFor(options_.streams)});
     if (!daemon.ok()) return daemon.status();
     return measure(**daemon);
   }

@@ -83,7 +83,8 @@ class Overload {
     absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(
         {.program = with_.daemon,
          .displays = {absl::StrCat("sim=simulated,rate=", options_.volumes_per_second, ",",
-                                   options_.display)}});
+                                   options_.display)},
+         .config = RoomFor(options_.clients)});
     if (!daemon.ok()) return daemon.status();
     daemon_ = *std::move(daemon);
     for (int i = 0; i < options_.clients; ++i) {

@@ -112,6 +112,13 @@ absl::StatusOr<int64_t> ServerProcess::ProcessorNs() const {
   return (user + system) * (1'000'000'000 / sysconf(_SC_CLK_TCK));
 }
 
+std::string RoomFor(int clients) {
+  const int room = clients + 64;
+  return absl::StrCat("[server]\nmax_connections = ", room,
+                      "\nmax_connections_per_address = ", room, "\n[limits]\nmax_sessions = ", room,
+                      "\n");
+}
+
 uint64_t StatusBytes(const std::string& text, const std::string& name) {
   for (absl::string_view line : absl::StrSplit(text, '\n')) {
     if (!absl::ConsumePrefix(&line, absl::StrCat(name, ":"))) continue;

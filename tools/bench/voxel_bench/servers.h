@@ -41,6 +41,9 @@ class ServerProcess {
   std::unique_ptr<child::ChildProcess> process_;
 };
 
+// Configuration that lets in so many clients, each on a connection of its own, and a few more.
+std::string RoomFor(int clients);
+
 // The value of "NAME:   123 kB" in the text of /proc/PID/status, in bytes; 0 if it is not there.
 uint64_t StatusBytes(const std::string& text, const std::string& name);
 
