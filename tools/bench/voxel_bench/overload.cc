@@ -120,7 +120,7 @@ class Overload {
     sync::TimeNs tell = begin + sync::kSecond;
     while (pace.due() < end) {
       if (absl::Status ran = loop_.RunTo(pace.due()); !ran.ok()) return ran;
-      for (uint64_t i = pace.Take(Now()); i > 0; --i) {
+      for (uint64_t i = pace.Take(std::min(Now(), end - 1)); i > 0; --i) {
         clients_[frames_due_++ % clients_.size()]->sender.Due();
       }
       if (absl::Status failed = Failure(); !failed.ok()) return failed;
