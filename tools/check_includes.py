@@ -35,7 +35,7 @@ ALLOWED = {
               "daemon/address", "daemon/suggest"],
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "tools/emulator"],
-    "tools/bench": ["gpu", "display", "tools/bench"],
+    "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
     # The one command that opens displays itself; it reads them as the daemon does.
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",

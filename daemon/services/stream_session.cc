@@ -44,7 +44,8 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
     if (state_ != State::kNew && state_ != State::kOpen) return;
     previous = sequence_;
   }
-  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous);
+  wire::Decoded decoded =
+      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk());
   arrival.decoded_ns = context_.clock.Now();
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
