@@ -175,7 +175,11 @@ void Core::Impl::FinishClose(SessionId id) {
     store_.HandOver(id,
                     std::make_shared<const Writer>(Writer{id, session.writer->client_name, true}));
   }
-  KeepDormant(session, layers_until);
+  if (session.options.resumable) {
+    KeepDormant(session, layers_until);
+  } else {
+    resume_tokens_.erase(session.resume_token);
+  }
   ForgetOwner(session.owner);
   Publish();
   for (const std::function<void()>& done : session.when_closed) done();

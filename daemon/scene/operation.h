@@ -153,6 +153,7 @@ struct OpenOptions {
   FlowPolicy flow = FlowPolicy::kReliable;
   uint32_t drop_oldest_frames = 0;        // kDropOldest: how many stay
   std::string resume_token, owner_token;  // empty: a new session, a new owner
+  bool resumable = true;                  // false: nobody is told its token
 };
 
 struct Upsert {

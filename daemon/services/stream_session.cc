@@ -180,6 +180,7 @@ void StreamSession::OnAlarm() {
       close = Close(absl::OkStatus());
     } else if (state_ == State::kClosing || state_ == State::kFlushing) {
       Finish();
+      close = true;  // again: what its client did not take is given back
     }
   }
   if (close) CloseSession();
@@ -307,8 +308,7 @@ bool StreamSession::Overrun(bool added) {
     return false;
   }
   core_.CountOverrun();
-  const bool close = !ending_;
-  if (close) {
+  if (!ending_) {
     ending_ = true;
     end_ = absl::ResourceExhaustedError(absl::StrCat(
         "the client left more than ", answers_.size() - 1, " answers (", answers_.bytes(),
@@ -316,7 +316,7 @@ bool StreamSession::Overrun(bool added) {
         "; read the stream while writing to it"));
   }
   Finish();
-  return close;
+  return true;
 }
 
 void StreamSession::WriteNext() {
@@ -331,7 +331,10 @@ void StreamSession::OnWritten(bool ok) {
     sync::MutexLock lock(mutex_);
     writing_ = false;
     const bool crowded = HalfFull();
-    if (ok) WriteNext();
+    if (ok) {
+      answers_.Written();
+      WriteNext();
+    }
     if (crowded && !HalfFull()) wake = intake_;
     Read();
     FinishIfFlushed();

@@ -266,6 +266,7 @@ Decoded Decode(const v1::ApplyUpdateRequest& request, const DecodeContext& conte
         "give owner_token to join an owner"));
   }
   open->no_outcomes = true;  // the answer has no place for them
+  open->resumable = false;   // nor for tokens
   for (int i = 0; i < request.operations_size(); ++i) {
     const v1::StreamRequest& operation = request.operations(i);
     const FieldPath path("operations", i);
