@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <cstdlib>
 
 #include "absl/strings/str_cat.h"
 #include "tests/daemon/services/daemon_fixture.h"
@@ -22,8 +22,10 @@ constexpr auto kPatience = 60s;
 
 class WithDaemon : public testing::Test {
  protected:
+  // Without pings: every message is the test's own.
   std::unique_ptr<Session> Open(Options options = {}) {
     options.address = daemon_.target();
+    options.ping_interval = Duration(0);
     auto session = Session::Open(std::move(options));
     EXPECT_TRUE(session.ok()) << session.status();
     EXPECT_TRUE((*session)->WaitOpened(kPatience).ok());
@@ -31,7 +33,8 @@ class WithDaemon : public testing::Test {
   }
   std::vector<std::string> Entities() {
     std::vector<std::string> keys;
-    for (const v1::EntityInfo& entity : daemon_.Entities().entities())
+    const v1::ListEntitiesResponse all = daemon_.Entities();
+    for (const v1::EntityInfo& entity : all.entities())
       keys.push_back(absl::StrCat(entity.key().layer(), "/", entity.key().id()));
     return keys;
   }
@@ -123,7 +126,7 @@ TEST_F(WithDaemon, RefusalsNameTheirCommitAndEntity) {
 }
 
 TEST_F(WithDaemon, AHundredThousandSmallEntitiesGoInBatches) {
-  auto session = Open({.strict = true, .ping_interval = Duration(0)});
+  auto session = Open({.strict = true});
   const Layer layer = session->GetLayer("many");
   constexpr uint64_t kCommits = 10, kEach = 2000;
   for (uint64_t c = 0; c < kCommits; ++c) {
@@ -137,6 +140,55 @@ TEST_F(WithDaemon, AHundredThousandSmallEntitiesGoInBatches) {
   EXPECT_EQ(daemon_.Entities().total(), kCommits * kEach);
   // Open; a commit and at most two batches each.
   EXPECT_LE(tally.messages_sent, 1 + 3 * kCommits);
+}
+
+// What needs the clock, credit and tokens of the server.
+TEST_F(WithDaemon, TheClockIsThatOfThisMachine) {
+  auto session = Session::Open({.address = daemon_.target(), .ping_interval = 1ms});
+  ASSERT_TRUE(session.ok());
+  ASSERT_TRUE((*session)->WaitOpened(kPatience).ok());
+  const Layer layer = (*session)->GetLayer("l");
+  // Answers come in turn: when this one is there, pongs are.
+  while (!(*session)->clock().has_value()) {
+    ASSERT_TRUE(layer.Put("a", Box{}).ok());
+    const auto frame = (*session)->Commit();
+    ASSERT_TRUE((*session)->WaitAccepted(*frame, kPatience).ok());
+  }
+  // One machine has one monotonic clock.
+  const ClockEstimate clock = *(*session)->clock();
+  EXPECT_LE(std::abs(clock.offset_ns), clock.round_trip_ns / 2 + 2);
+  EXPECT_EQ((*session)->GetTally().issue_count, 0u);
+}
+
+TEST_F(WithDaemon, CreditComesBackForAllThatIsApplied) {
+  // Much more than any credit, in many commits.
+  auto session = Open({.strict = true});
+  const Layer layer = session->GetLayer("l");
+  for (int i = 0; i < 200; ++i) {
+    Frame frame = layer.BeginFrame();
+    frame.Draw(Points{.vertices = {.positions = std::vector<float>(3 * 30'000)}});
+    while (!frame.Commit().ok()) ASSERT_TRUE(session->WaitForRoom(kPatience).ok());
+  }
+  ASSERT_TRUE(session->WaitSettled(kPatience).ok());
+  EXPECT_EQ(session->GetTally().accepted, 200u);
+  EXPECT_GT(session->GetTally().bytes_sent, 70'000'000u);
+}
+
+TEST_F(WithDaemon, SessionsOfOneOwnerShareItsLayers) {
+  auto first = Open(), other = Open();
+  auto second = Open({.owner_token = first->server()->owner_token});
+  EXPECT_EQ(first->server()->owner, second->server()->owner);
+  EXPECT_NE(first->server()->owner, other->server()->owner);
+  ASSERT_TRUE(first->GetLayer("l").Put("a", Box{}).ok());
+  auto frame = first->Commit();
+  ASSERT_TRUE(first->WaitAccepted(*frame, kPatience).ok());
+  ASSERT_TRUE(second->GetLayer("l").SetTransform("a", Affine::Scale(0.5)).ok());
+  frame = second->Commit();
+  const auto moved = second->WaitAccepted(*frame, kPatience);
+  ASSERT_TRUE(moved.ok());
+  EXPECT_EQ(moved->refused_operations, 0u);
+  auto lost = Session::Open({.address = daemon_.target(), .owner_token = "none such"});
+  EXPECT_TRUE(absl::IsNotFound((*lost)->WaitOpened(kPatience)));
 }
 
 TEST(WithoutServer, CallsReturnAtOnceAndWaitsSayWhy) {
