@@ -93,8 +93,8 @@ TEST(Reconnect, TheServerIsKilledAndAnotherComes) {
   const Folder folder;
   const std::string target = "unix:" + folder.path() + "/voxeld.sock";
   const std::vector<std::string> arguments =
-      Voxeld({"--listen", target, "--http", "", "--display", "sim=simulated,size=16x16x8,rate=100",
-              "--engine", "cpu", "--log-format", "json"});
+      Voxeld({"--listen", target, "--http", "127.0.0.1:0", "--display",
+              "sim=simulated,size=16x16x8,rate=100", "--engine", "cpu", "--log-format", "json"});
   auto daemon = std::make_unique<Process>(arguments, CleanEnvironment(folder));
   ASSERT_TRUE(daemon->ReadLineWith("\"event\":\"ready\"").has_value()) << daemon->output();
   Process example({Example("08_reconnect"), target});
