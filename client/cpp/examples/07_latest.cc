@@ -13,12 +13,12 @@ absl::Status Run(const std::string& address) {
   const Layer layer = (*session)->GetLayer("flood");
   constexpr uint64_t kFrames = 300, kPoints = 30'000;
   std::vector<float> xyz(3 * kPoints);
+  for (size_t i = 0; i < xyz.size(); ++i) xyz[i] = static_cast<float>(i * 31 % 2000) / 1000 - 1;
   uint64_t newest = 0;
   for (uint64_t f = 0; f < kFrames; ++f) {
-    for (size_t i = 0; i < xyz.size(); ++i)
-      xyz[i] = static_cast<float>((i * 31 + f * 97) % 2000) / 1000 - 1;
     Frame frame = layer.BeginFrame();
-    frame.Draw(Points{.vertices = {.positions = xyz}});
+    frame.Draw(Points{.vertices = {.positions = xyz}},
+               {.transform = Affine::Rotate({0, 0, 1}, 0.01 * static_cast<double>(f))});
     auto number = frame.Commit();  // never blocks, and never fails for want of room
     if (!number.ok()) return number.status();
     newest = *number;

@@ -236,6 +236,26 @@ struct OperationEncoder {
       AppendUnsigned(v1::LayerState::kBlendFieldNumber, AfterUnspecified(*look.blend), &fields);
     if (look.transform)
       AppendAffine(v1::LayerState::kTransformFieldNumber, *look.transform, &fields);
+    if (look.clip) {
+      std::string planes;
+      for (const HalfSpace& half : *look.clip) {
+        std::string plane;
+        AppendDouble(v1::Clip::Plane::kAFieldNumber, half.a, &plane);
+        AppendDouble(v1::Clip::Plane::kBFieldNumber, half.b, &plane);
+        AppendDouble(v1::Clip::Plane::kCFieldNumber, half.c, &plane);
+        AppendDouble(v1::Clip::Plane::kDFieldNumber, half.d, &plane);
+        AppendPresentBytes(v1::Clip::kPlanesFieldNumber, plane, &planes);
+      }
+      AppendPresentBytes(v1::LayerState::kClipFieldNumber, planes, &fields);
+    }
+    if (look.region) {
+      std::string corners;
+      if (!look.region->everything) {
+        AppendVec3(v1::Box3::kMinFieldNumber, look.region->min, &corners);
+        AppendVec3(v1::Box3::kMaxFieldNumber, look.region->max, &corners);
+      }
+      AppendPresentBytes(v1::LayerState::kRegionFieldNumber, corners, &fields);
+    }
     return Request(StreamRequest::kLayerStateFieldNumber, std::move(fields));
   }
   Rope operator()(const DefineOperation& define) const {

@@ -73,6 +73,8 @@ struct RetainedBook::Applier {
     take(operation.look.order, &look.order);
     take(operation.look.blend, &look.blend);
     take(operation.look.transform, &look.transform);
+    take(operation.look.clip, &look.clip);
+    take(operation.look.region, &look.region);
   }
   void operator()(const DefineOperation& define) const {
     if (!refused.contains({"", define.object})) book.objects_[define.object] = define;

@@ -97,6 +97,7 @@ class SessionCore {
   void Written(Link* link) VOXELD_EXCLUDES(mutex_);
   void End(Link* link, const absl::Status& status) VOXELD_EXCLUDES(mutex_);
   void TakeOpened(const v1::Opened& opened) VOXELD_REQUIRES(mutex_);
+  void TakeIssue(const v1::Issue& issue) VOXELD_REQUIRES(mutex_);
   void TakeReceipt(const v1::Receipt& receipt) VOXELD_REQUIRES(mutex_);
   void SendRetained() VOXELD_REQUIRES(mutex_);
   void Lose(const absl::Status& why) VOXELD_REQUIRES(mutex_);
@@ -149,6 +150,7 @@ class SessionCore {
   sync::Backoff backoff_ VOXELD_GUARDED_BY(mutex_);
   sync::TimeNs retry_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs open_deadline_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
+  sync::TimeNs last_heard_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs ping_at_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   bool ping_due_ VOXELD_GUARDED_BY(mutex_) = false;
   uint64_t pings_ VOXELD_GUARDED_BY(mutex_) = 0;  // of this stream

@@ -139,14 +139,29 @@ void SessionCore::Written(Link* link) {
   if (outbox_.empty()) Changed();
 }
 
+void SessionCore::TakeIssue(const v1::Issue& issue) {
+  const Issue& told = receipts_.Told(issue);
+  if (options_.on_issue) events_.push_back(told);
+}
+
 void SessionCore::TakeReceipt(const v1::Receipt& receipt) {
   const sync::TimeNs now = clock_.Now();
   receipts_.Told(receipt, now);
   if (receipt.has_scheduled()) outbox_.Scheduled(receipt.frame_id());
   if (!receipt.has_accepted() && !receipt.has_refused()) return;
   const std::shared_ptr<const Transaction> done = outbox_.Answered(receipt.frame_id());
-  if (done == nullptr || !receipt.has_accepted() || !options_.restore) return;
+  if (done == nullptr) return;
   const Receipt* told = receipts_.Find(receipt.frame_id());
+  if (told == nullptr && receipt.has_refused()) {
+    // Nobody asked for this commit, so nobody reads its receipt.
+    v1::Issue issue;
+    issue.set_sequence(receipt.sequence());
+    issue.set_message(
+        absl::StrCat("what was up before the connection was lost is not put up again: ",
+                     receipt.refused().message()));
+    TakeIssue(issue);
+  }
+  if (!receipt.has_accepted() || !options_.restore) return;
   retained_.Apply(done->operations, told == nullptr ? std::vector<Issue>() : told->issues, now);
 }
 
@@ -160,15 +175,13 @@ void SessionCore::Read(Link* link, const v1::StreamResponse& response) {
     TakeOpened(response.opened());
   }
   if (!link->opened) return;
+  last_heard_ = now;
   if (response.has_pong()) {
     pong_seen_ = true;
     estimator_.Add(response.pong().client_time_ns(), response.pong().received_time_ns(),
                    response.pong().server_time_ns(), now);
   }
-  for (const v1::Issue& issue : response.issues()) {
-    const Issue& told = receipts_.Told(issue);
-    if (options_.on_issue) events_.push_back(told);
-  }
+  for (const v1::Issue& issue : response.issues()) TakeIssue(issue);
   for (const v1::Receipt& receipt : response.receipts()) TakeReceipt(receipt);
   if (response.credit_bytes() != 0) outbox_.Credit(response.credit_bytes());
   Pump();
@@ -199,13 +212,20 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
     resumed_at_ = now;
     outcomes_until_ = now + kOwedOutcomes;
   } else if (!first) {
-    change.kind = ConnectionChange::Kind::kRestored;
-    ++receipts_.tally().restored;
     estimator_.Reset();
     change.lost_outcomes = receipts_.OutcomesLost(
         sync::kNever, "the connection was lost, and the server did not keep the session");
+  }
+  // A session may be kept, for its outcomes, longer than its layers.
+  const bool layers_kept = options_.on_disconnect == OnDisconnect::kKeep ||
+                           (options_.on_disconnect == OnDisconnect::kLinger &&
+                            now - last_heard_ < options_.linger.count());
+  if (!first && !(resumed && layers_kept)) {
+    change.kind = ConnectionChange::Kind::kRestored;
+    ++receipts_.tally().restored;
     if (options_.restore) SendRetained();
   }
+  last_heard_ = now;
   outbox_.StreamOpened(link_->open_bytes, opened.credit_bytes());
   NoteDrops();
   events_.push_back(std::move(change));

@@ -60,7 +60,7 @@ enum class Flow : uint8_t {
 struct ConnectionChange {
   enum class Kind : uint8_t {
     kOpened,    // for the first time
-    kResumed,   // the server had kept the session
+    kResumed,   // the server had kept the session and its layers
     kRestored,  // it had not: the retained state was sent again
     kLost,      // `status` says why; it is tried again
     kEnded,     // for good

@@ -158,6 +158,17 @@ struct Part {
 
 enum class Blend : uint8_t { kOver, kAdd, kErase };
 
+// A half-space of scene space: a·x + b·y + c·z + d ≥ 0.
+struct HalfSpace {
+  double a = 0, b = 0, c = 0, d = 0;
+};
+
+// A part of scene space, its faces included; `everything`: all of it, whatever the corners.
+struct Region {
+  Vec3 min, max;
+  bool everything = false;
+};
+
 // What is set is changed; the rest stays as it was.
 struct LayerLook {
   std::optional<bool> visible;
@@ -165,6 +176,9 @@ struct LayerLook {
   std::optional<int32_t> order;  // layers combine in ascending (order, creation)
   std::optional<Blend> blend;
   std::optional<Affine> transform;
+  // Only what lies in all of these and in the region is drawn. An empty list takes the former away.
+  std::optional<std::vector<HalfSpace>> clip;
+  std::optional<Region> region;
 };
 
 }  // namespace voxeld::client

@@ -199,6 +199,22 @@ TEST(Encode, Operations) {
     EXPECT_TRUE(request.layer_state().has_transform());
   }
 
+  request = Parse(
+      EncodeOperation(LayerOperation{"l",
+                                     {.clip = std::vector<HalfSpace>{{1, 0, 0, 0.5}, {0, -2, 3, 0}},
+                                      .region = Region{.min = {-1, -2, -3}, .max = {1, 0, 3}}}}));
+  ASSERT_EQ(request.layer_state().clip().planes_size(), 2);
+  EXPECT_EQ(request.layer_state().clip().planes(0).d(), 0.5);
+  EXPECT_EQ(request.layer_state().clip().planes(1).b(), -2);
+  EXPECT_EQ(request.layer_state().region().min().y(), -2);
+  EXPECT_TRUE(request.layer_state().region().has_max());
+  request = Parse(EncodeOperation(LayerOperation{
+      "l", {.clip = std::vector<HalfSpace>(), .region = Region{.everything = true}}}));
+  EXPECT_TRUE(request.layer_state().has_clip());
+  EXPECT_EQ(request.layer_state().clip().planes_size(), 0);
+  EXPECT_TRUE(request.layer_state().has_region());
+  EXPECT_FALSE(request.layer_state().region().has_min());
+
   const absl::StatusOr<DefineOperation> define =
       EncodeDefinition("tree", {{.shape = Sphere{}, .color = {1, 0, 0}, .transform = {}},
                                 {.shape = Instance{"leaf"}, .color = {}, .transform = transform}});

@@ -3,9 +3,8 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include <filesystem>
-
 #include "tests/e2e/voxeld_process.h"
+#include "tests/programs.h"
 
 namespace voxeld::e2e {
 namespace {
@@ -14,10 +13,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
-std::string Example(const std::string& name) {
-  return (std::filesystem::path(VoxeldBinary()).parent_path() / "examples" / ("example_" + name))
-      .string();
-}
+std::string Example(const std::string& name) { return ProgramBeside("example_" + name); }
 
 class Examples : public ::testing::Test {
  protected:

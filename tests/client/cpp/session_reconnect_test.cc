@@ -21,6 +21,8 @@ class Reconnect : public testing::Test {
   Options Make() {
     Options options;
     options.ping_interval = Duration(0);
+    options.on_disconnect = OnDisconnect::kLinger;
+    options.linger = std::chrono::seconds(5);
     options.on_connection = [this](const ConnectionChange& change) {
       changes_.push_back(change.kind);
       last_ = change;
@@ -163,6 +165,36 @@ TEST_F(Reconnect, WhatCannotBeResumedIsSentAgain) {
               ElementsAre("layer l", "l/a l/b l/c", "layer m", "layer f", "f/x", "commit 7"));
 }
 
+TEST_F(Reconnect, ASessionThatIsResumedMayHaveLostItsLayers) {
+  for (const auto& [policy, away_s, kept] :
+       {std::tuple(OnDisconnect::kLinger, 4, true), std::tuple(OnDisconnect::kLinger, 5, false),
+        std::tuple(OnDisconnect::kClear, 1, false), std::tuple(OnDisconnect::kKeep, 9, true)}) {
+    Options options = Make();
+    options.on_disconnect = policy;
+    SessionUnderTest session(options);
+    session.SayOpened();
+    for (const char* id : {"a", "b", "c"}) session.Put(id);
+    session.SayAccepted(1, {"sim"});
+    const uint64_t second_commit = session.stream().written[4].sequence();
+    session.End(kGone);
+    session.Advance(away_s * sync::kSecond);
+    session.TakeWords();
+    session.SayOpened(OpenedAgain(second_commit));
+    // What was applied unheard is of the state as well.
+    if (kept) {
+      EXPECT_THAT(session.TakeWords(), ElementsAre("l/c", "commit 3"));
+      EXPECT_EQ(changes_.back(), Kind::kResumed);
+    } else {
+      EXPECT_THAT(session.TakeWords(),
+                  ElementsAre("layer l", "l/a l/b", "commit 4", "l/c", "commit 3"));
+      EXPECT_EQ(changes_.back(), Kind::kRestored);
+      EXPECT_EQ(last_.lost_outcomes, 0u);
+    }
+    EXPECT_EQ(session->GetTally().resumed, 1u);
+    EXPECT_FALSE(session->FindReceipt(1)->settled) << "its outcome may still come";
+  }
+}
+
 TEST_F(Reconnect, TheOwnerIsJoinedAgainIfItIsStillThere) {
   SessionUnderTest session(Make());
   v1::Opened opened;
@@ -175,6 +207,28 @@ TEST_F(Reconnect, TheOwnerIsJoinedAgainIfItIsStillThere) {
   EXPECT_THAT(session.TakeWords(), ElementsAre("open owner o"));
   session.End(absl::NotFoundError(""));
   EXPECT_THAT(session.TakeWords(), ElementsAre("open"));
+}
+
+TEST_F(Reconnect, WhatTheServerWillNotTakeAgainIsAnIssue) {
+  std::vector<Issue> issues;
+  Options options = Make();
+  options.on_issue = [&](const Issue& issue) { issues.push_back(issue); };
+  SessionUnderTest session(options);
+  session.SayOpened();
+  session.Put("a");
+  session.SayAccepted(1);
+  session.End(kGone);
+  session.Advance(sync::kSecond);
+  session.End(absl::NotFoundError(""));
+  session.SayOpened(OpenedAgain());
+  v1::StreamResponse response;
+  v1::Receipt* receipt = response.add_receipts();
+  receipt->set_frame_id(2);
+  receipt->mutable_refused()->set_message("no room");
+  session.Say(response);
+  ASSERT_EQ(issues.size(), 1u);
+  EXPECT_EQ(issues[0].message,
+            "what was up before the connection was lost is not put up again: no room");
 }
 
 TEST_F(Reconnect, RestoringKeepsToTheLimits) {

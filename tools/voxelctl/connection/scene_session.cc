@@ -23,6 +23,7 @@ absl::StatusOr<std::unique_ptr<SceneSession>> SceneSession::Open(client::Options
   // What the tool says at its end is of one stream.
   options.reconnect = false;
   options.restore = false;
+  options.ping_interval = client::Duration(0);
   absl::StatusOr<std::unique_ptr<client::Session>> opened =
       client::Session::Open(std::move(options));
   if (!opened.ok()) return Escaped(opened.status());
