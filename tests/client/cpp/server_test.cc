@@ -3,9 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/src/grpc_transport.h"
+#include "client/cpp/src/session_core.h"
+#include "display/sync/clock.h"
 #include "tests/daemon/services/daemon_fixture.h"
 #include "tests/tools/voxelctl/fake_server.h"
 #include "tests/tools/voxelctl/temp_folder.h"
@@ -209,8 +214,74 @@ TEST_F(WithDaemon, SessionsOfOneOwnerShareItsLayers) {
   const auto moved = second->WaitAccepted(*frame, kPatience);
   ASSERT_TRUE(moved.ok());
   EXPECT_EQ(moved->refused_operations, 0u);
-  auto lost = Session::Open({.address = daemon_.target(), .owner_token = "none such"});
+  std::string wrong = first->server()->owner_token;
+  wrong[0] = static_cast<char>(wrong[0] ^ 1);
+  auto lost = Session::Open({.address = daemon_.target(), .owner_token = wrong});
   EXPECT_TRUE(absl::IsNotFound((*lost)->WaitOpened(kPatience)));
+}
+
+// A transport whose streams the test can cut.
+class CutTransport final : public Transport {
+ public:
+  explicit CutTransport(const std::string& target) : inner_(MakeGrpcTransport(target)) {}
+  std::unique_ptr<Stream> Start(Stream::Events* events) override {
+    std::unique_ptr<Stream> stream = inner_->Start(events);
+    newest_ = stream.get();
+    return stream;
+  }
+  void Cut() { newest_.load()->Cancel(); }
+
+ private:
+  const std::unique_ptr<Transport> inner_;
+  std::atomic<Stream*> newest_ = nullptr;
+};
+
+TEST_F(WithDaemon, ACutConnectionIsResumed) {
+  sync::SystemClock clock;
+  sync::Mutex mutex;
+  sync::CondVar changed;
+  std::vector<ConnectionChange::Kind> changes;
+  Options options{.address = daemon_.target(),
+                  .on_disconnect = OnDisconnect::kLinger,
+                  .linger = 60s,
+                  .first_pause = 1ms};
+  options.on_connection = [&](const ConnectionChange& change) {
+    sync::MutexLock lock(mutex);
+    changes.push_back(change.kind);
+    changed.NotifyAll();
+  };
+  auto transport = std::make_unique<CutTransport>(daemon_.target());
+  CutTransport& cut = *transport;
+  SessionCore core(options, std::move(transport), clock);
+  std::thread thread([&core] { core.Run(); });
+  ASSERT_TRUE(core.WaitOpened(kPatience).ok());
+  const uint64_t session = core.server()->session;
+  ASSERT_TRUE(core.StageUpsert("l", "a", Box{}, {}).ok());
+  uint64_t frame = *core.Commit(nullptr, {});
+  ASSERT_TRUE(core.WaitAccepted(frame, kPatience).ok());
+  for (size_t round = 1; round <= 5; ++round) {
+    cut.Cut();
+    // Some before it is noticed, some after.
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_TRUE(core.Stage(TransformOperation{"l", "a", Affine::Scale(1 + 0.1 * i)}).ok());
+      frame = *core.Commit(nullptr, {});
+    }
+    sync::MutexLock lock(mutex);
+    while (changes.size() < 1 + 2 * round) changed.Wait(mutex);
+    EXPECT_EQ(changes.back(), ConnectionChange::Kind::kResumed);
+  }
+  EXPECT_TRUE(core.WaitSettled(kPatience).ok());
+  EXPECT_EQ(core.server()->session, session);
+  const Tally tally = core.GetTally();
+  EXPECT_EQ(tally.resumed, 5u);
+  EXPECT_EQ(tally.restored, 0u);
+  EXPECT_EQ(tally.accepted, 101u);
+  EXPECT_EQ(tally.refused_operations + tally.lost + tally.issue_count, 0u);
+  const v1::ListEntitiesResponse all = daemon_.Entities();
+  ASSERT_EQ(all.entities_size(), 1);
+  EXPECT_EQ(all.entities(0).transform().m(0), 1 + 0.1 * 19) << "the last one";
+  core.Stop();
+  thread.join();
 }
 
 TEST(WithoutServer, CallsReturnAtOnceAndWaitsSayWhy) {
