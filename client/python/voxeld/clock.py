@@ -26,11 +26,14 @@ class ClockEstimate:
         Impossible times are passed over."""
         inside = answered_ns - received_ns
         trip = back_ns - sent_ns - inside
-        if inside < 0 or trip < 0:
+        drifted = int(DRIFT * (back_ns - sent_ns)) + 1
+        if inside < 0 or trip < -drifted:
             return
-        # The server received between sent_ns and back_ns − inside: the middle is off by half the trip at the most.
+        trip = max(trip, 0)
+        # The server received between sent_ns and back_ns − inside: the middle is off by half the trip at the most,
+        # and by what the clocks drifted meanwhile.
         offset = ((received_ns - sent_ns) + (answered_ns - back_ns)) // 2
-        self._samples.append(Sample(offset, trip // 2 + 1, back_ns))
+        self._samples.append(Sample(offset, trip // 2 + 1 + drifted, back_ns))
 
     def _best(self, now_ns: int) -> Optional[Sample]:
         if not self._samples:

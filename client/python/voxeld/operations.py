@@ -114,6 +114,10 @@ class Immediate:
 Operation = Union[Puts, Request, Immediate]
 
 
+def weigh(operations: Iterable[Operation]) -> int:
+    return 64 + sum(o.size() for o in operations)
+
+
 class Unit:
     """A commit and the operations before it. `bytes` is what it weighs in the buffer."""
 
@@ -127,7 +131,7 @@ class Unit:
         self.weigh()
 
     def weigh(self) -> None:
-        self.bytes = 64 + sum(o.size() for o in self.operations)
+        self.bytes = weigh(self.operations)
 
     def requests(self) -> Iterator[bytes]:
         """All but the commit. Puts side by side share batches."""

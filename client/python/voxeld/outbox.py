@@ -2,9 +2,9 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Deque, Optional
+from typing import Deque, Optional, Sequence
 
-from .operations import ClearAll, ClearLayer, DeleteId, Immediate, Move, Operation, Puts, Unit
+from .operations import ClearAll, ClearLayer, DeleteId, Immediate, Move, Operation, Puts, Unit, weigh
 
 RELIABLE, LATEST, DROP_OLDEST = "reliable", "latest", "drop_oldest"
 
@@ -33,16 +33,16 @@ class Outbox:
         return list(self._units)
 
     def push(self, unit: Unit, newest_only: bool = False) -> Optional[list[Unit]]:
-        """Takes `unit`, and gives back the units that went for it. None: there is no room, and nothing has changed,
-        but that what newer operations had made needless is gone. `newest_only` (there is no connection): if room is
-        wanted, of each layer's frames the newest alone are kept, whatever the policy."""
+        """Takes `unit`, and gives back the units that went for it. None: there is no room, and nothing has changed.
+        `newest_only` (there is no connection): if room is wanted, of each layer's frames the newest alone are kept,
+        whatever the policy."""
         room = self._limit - unit.bytes
         keep = {layer: 1 for layer in self._frames} if newest_only and self.bytes > room else {}
         for operation in unit.operations:
             if isinstance(operation, Immediate) and (self._keep or operation.layer in keep):
                 keep[operation.layer] = max(self._keep - 1, 0)
         if self.bytes - self._given_up(keep) > room:
-            self._merge(unit)
+            self._merge(unit, room + self._given_up(keep))
         if self.bytes - self._given_up(keep) > room and self._units:
             return None
         gone: list[Unit] = []
@@ -50,7 +50,7 @@ class Outbox:
             gone += self._leave(layer, most)
         self._units.append(unit)
         self.bytes += unit.bytes
-        for operation in unit.operations:
+        for operation in list(unit.operations):
             if isinstance(operation, Immediate):
                 self._frames.setdefault(operation.layer, deque()).append((unit, operation))
                 if self._keep:
@@ -108,28 +108,33 @@ class Outbox:
         unit.weigh()
         self.bytes += unit.bytes - before
 
-    def _merge(self, newest: Unit) -> None:
-        """Takes out retained puts and moves that something later replaces whole. What the scene comes to is the same."""
+    def _merged(self, newest: Unit) -> list[tuple[Unit, list[Operation]]]:
+        """The units that can do without some retained puts and moves, since something later, `newest` perhaps, replaces
+        those whole; and what is left of each. What the scene comes to is the same."""
+        result: list[tuple[Unit, list[Operation]]] = []
         seen: set[tuple[str, str]] = set()
         whole_layers: set[str] = set()
         everything = False
+
+        def needless(layer: str, id: str) -> bool:
+            return everything or layer in whole_layers or (layer, id) in seen
+
         for unit in (newest, *reversed(self._units)):
             kept: list[Operation] = []
+            changed = False
             for operation in reversed(unit.operations):
                 if isinstance(operation, Puts):
-                    left = [p for p in operation.puts
-                            if not everything and p.layer not in whole_layers and (p.layer, p.id) not in seen]
+                    left = [p for p in operation.puts if not needless(p.layer, p.id)]
                     seen.update((p.layer, p.id) for p in operation.puts)
-                    if unit is not newest and len(left) < len(operation.puts):
-                        self.merged_operations += len(operation.puts) - len(left)
+                    if len(left) < len(operation.puts):
+                        changed = True
                         operation = Puts(left, operation.lifetime_ns)
                         if not left:
                             continue
                 elif isinstance(operation, Move):
-                    if everything or operation.layer in whole_layers or (operation.layer, operation.id) in seen:
-                        if unit is not newest:
-                            self.merged_operations += 1
-                            continue
+                    if needless(operation.layer, operation.id):
+                        changed = True
+                        continue
                 elif isinstance(operation, DeleteId):
                     seen.add((operation.layer, operation.id))
                 elif isinstance(operation, (ClearLayer, Immediate)):
@@ -137,6 +142,24 @@ class Outbox:
                 elif isinstance(operation, ClearAll):
                     everything = True
                 kept.append(operation)
-            if unit is not newest:
-                unit.operations = kept[::-1]
+            if changed:
+                result.append((unit, kept[::-1]))
+        return result
+
+    def _merge(self, newest: Unit, room: int) -> None:
+        """If that makes enough room."""
+        merged = self._merged(newest)
+        weight = sum(weigh(operations) - unit.bytes for unit, operations in merged if unit is not newest)
+        if self.bytes + weight > room:
+            return
+        for unit, operations in merged:
+            self.merged_operations += _count(unit.operations) - _count(operations)
+            unit.operations = operations
+            if unit is newest:
+                unit.weigh()
+            else:
                 self._reweigh(unit)
+
+
+def _count(operations: Sequence[Operation]) -> int:
+    return sum(len(o.puts) if isinstance(o, Puts) else 1 for o in operations)
