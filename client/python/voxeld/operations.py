@@ -121,12 +121,13 @@ def weigh(operations: Iterable[Operation]) -> int:
 class Unit:
     """A commit and the operations before it. `bytes` is what it weighs in the buffer."""
 
-    __slots__ = ("frame", "operations", "commit", "bytes")
+    __slots__ = ("frame", "operations", "commit", "bytes", "drops")
 
     def __init__(self, frame: Frame, operations: Iterable[Operation], commit: pb.Commit) -> None:
         self.frame = frame
         self.operations = list(operations)
         self.commit = commit
+        self.drops = 0  # frames given up before it was sent: what its commit reports
         self.bytes = 0
         self.weigh()
 

@@ -57,6 +57,8 @@ class Session:
         self._on_way: Deque[Unit] = deque()   # sent whole, not answered
         self._again: Deque[Unit] = deque()    # to be sent again, before anything else
         self._current: Optional[Unit] = None  # being sent
+        self._rebuilding = False              # the server's session began with the mirror
+        self._unsure: list[Frame] = []        # accepted before a resume; whether an outcome comes is not known
 
     def _begin_stream(self) -> None:
         self._sent = 0       # bytes since this stream's Open, with it
@@ -139,7 +141,8 @@ class Session:
         commit.CopyFrom(self._current.commit)
         commit.frame_id = self._current.frame.id
         commit.send_time_ns = now_ns
-        commit.client_drops = self.outbox.take_unreported()
+        self._current.drops += self.outbox.take_unreported()
+        commit.client_drops = self._current.drops
         self._on_way.append(self._current)
         self._current = None
         return self._count(pb.StreamRequest(commit=commit).SerializeToString())
@@ -170,6 +173,10 @@ class Session:
             frame = self.book.receipt(receipt)
             if frame is not None and frame.answered:
                 self._answered(frame)
+            if frame is not None and frame.complete and self._unsure and frame.id > self._unsure[-1].id:
+                # Outcomes come in the order of commits: those of before the resume that have not come were lost.
+                self.book.give_up([f for f in self._unsure if not f.complete], "its outcome was lost with a connection")
+                self._unsure = []
 
     def _answered(self, frame: Frame) -> None:
         # Mostly the oldest; timed commits are answered when they are due, and others pass them.
@@ -194,11 +201,16 @@ class Session:
                     self.book.applied_unseen(unit.frame, opened.displays)
                 else:
                     self._again.append(unit)
+            if self._rebuilding and not opened.HasField("last_frame_id"):
+                self._replay = self._mirrored(now_ns)  # the last try did not come to its commit
+            self._unsure = [frame for frame in self.book.open_frames() if frame.answered]
             return
         if self.streams_opened == 1:
             return
         self.clock.forget()
         lost = [unit.frame for unit in (*self._on_way, *self._again)]
+        # Whether these were counted is not known; the server that did is another one now.
+        self.outbox.unreported_drops += sum(unit.drops for unit in (*self._on_way, *self._again))
         self._on_way.clear()
         self._again.clear()
         still = {id(unit.frame) for unit in self.outbox.units()}
@@ -206,6 +218,7 @@ class Session:
             [f for f in self.book.open_frames() if f.answered and id(f) not in still] + lost,
             "the connection was lost and the server did not know its session any more; the scene was sent anew")
         self._replay = self._mirrored(now_ns)
+        self._rebuilding = True
 
     def _mirrored(self, now_ns: int) -> Iterator[bytes]:
         if len(self.mirror) == 0 and not self.mirror.stateful():

@@ -112,7 +112,7 @@ class PlainServer:
         self.client_drops += commit.client_drops
         if commit.frame_id:
             self.commits.append(commit.frame_id)
-            self.session.last_frame_id, self.session.last_sequence = commit.frame_id, self.sequence
+        self.session.last_frame_id, self.session.last_sequence = commit.frame_id, self.sequence
         response = pb.StreamResponse()
         accepted = pb.Accepted(snapshot=len(self.commits), displays=self.displays)
         response.receipts.add(frame_id=commit.frame_id, sequence=self.sequence, accepted=accepted)
