@@ -89,7 +89,3 @@ class Mirror:
             for entity in alive:
                 if entity.moved is not None:
                     yield entity.moved
-
-    def stateful(self) -> bool:
-        """There is something to tell beside entities."""
-        return bool(self._objects) or any(layer.state is not None for layer in self._layers.values())

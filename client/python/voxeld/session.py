@@ -3,7 +3,7 @@ time is an argument, in ns of any steady clock. The transport calls it under one
 
 A connection outlives its streams. When one ends, what was sent on it and not answered is sent again where the server knows
 the session still (resume), from the first commit that it had not applied. Where it does not, a new session gets the mirror's
-whole scene first, and what was on its way is in that.
+whole scene first, and what was on its way is in that and gets its receipts.
 """
 from __future__ import annotations
 
@@ -58,6 +58,7 @@ class Session:
         self._again: Deque[Unit] = deque()    # to be sent again, before anything else
         self._current: Optional[Unit] = None  # being sent
         self._rebuilding = False              # the server's session began with the mirror
+        self._rebuilt: list[Frame] = []       # were on their way then: the commit of the mirror is theirs
         self._unsure: list[Frame] = []        # accepted before a resume; whether an outcome comes is not known
 
     def _begin_stream(self) -> None:
@@ -170,6 +171,9 @@ class Session:
                 continue
             self.on_issue(self.book.issue(issue))
         for receipt in response.receipts:
+            if receipt.frame_id == 0:
+                self._rebuilt_receipt(receipt)
+                continue
             frame = self.book.receipt(receipt)
             if frame is not None and frame.answered:
                 self._answered(frame)
@@ -177,6 +181,17 @@ class Session:
                 # Outcomes come in the order of commits: those of before the resume that have not come were lost.
                 self.book.give_up([f for f in self._unsure if not f.complete], "its outcome was lost with a connection")
                 self._unsure = []
+
+    def _rebuilt_receipt(self, receipt: pb.Receipt) -> None:
+        """Of the commit that sent the scene anew: it stands for those that were on their way and are in it."""
+        if not self._rebuilt:
+            self.book.receipt(receipt)  # for the issues before it
+        for frame in self._rebuilt:
+            own = pb.Receipt()
+            own.CopyFrom(receipt)
+            own.frame_id = frame.id
+            self.book.receipt(own)
+        self._rebuilt = [frame for frame in self._rebuilt if not frame.complete]
 
     def _answered(self, frame: Frame) -> None:
         # Mostly the oldest; timed commits are answered when they are due, and others pass them.
@@ -203,26 +218,26 @@ class Session:
                     self._again.append(unit)
             if self._rebuilding and not opened.HasField("last_frame_id"):
                 self._replay = self._mirrored(now_ns)  # the last try did not come to its commit
+            else:
+                for frame in self._rebuilt:
+                    self.book.applied_unseen(frame, opened.displays)
+                self._rebuilt = []
             self._unsure = [frame for frame in self.book.open_frames() if frame.answered]
             return
         if self.streams_opened == 1:
             return
         self.clock.forget()
-        lost = [unit.frame for unit in (*self._on_way, *self._again)]
+        self._rebuilt = [f for f in self._rebuilt if not f.answered] + [unit.frame for unit in (*self._on_way, *self._again)]
         # Whether these were counted is not known; the server that did is another one now.
         self.outbox.unreported_drops += sum(unit.drops for unit in (*self._on_way, *self._again))
         self._on_way.clear()
         self._again.clear()
-        still = {id(unit.frame) for unit in self.outbox.units()}
-        self.book.give_up(
-            [f for f in self.book.open_frames() if f.answered and id(f) not in still] + lost,
-            "the connection was lost and the server did not know its session any more; the scene was sent anew")
+        self.book.give_up([f for f in self.book.open_frames() if f.answered], "its outcome was lost with a connection")
+        self._unsure = []
         self._replay = self._mirrored(now_ns)
         self._rebuilding = True
 
     def _mirrored(self, now_ns: int) -> Iterator[bytes]:
-        if len(self.mirror) == 0 and not self.mirror.stateful():
-            return
         yield from self.mirror.requests(now_ns)
         yield pb.StreamRequest(commit=pb.Commit(send_time_ns=now_ns)).SerializeToString()
 
@@ -250,6 +265,7 @@ class Session:
         self._on_way.clear()
         self._again.clear()
         self._current = None
+        self._rebuilt = []
         self.book.give_up(self.book.open_frames(), reason)
 
     @property
