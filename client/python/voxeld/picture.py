@@ -25,7 +25,7 @@ def axes(azimuth: float, elevation: float) -> tuple[Floats, Floats, Floats]:
 def splat(at: Floats, colors: Bytes, corners: Floats, pitch: float, width: int, height: int, azimuth: float,
           elevation: float) -> Bytes:
     """Points as discs of the size of their pitch, without perspective. What lies behind something is added at half its
-    light for every point before it on the same spot; so a picture keeps the glow of a volume and its front stands out."""
+    light for every point before it on the same spot; so a picture keeps the glow of a volume and its front stands out; what is far is dimmer."""
     right, up, away = axes(azimuth, elevation)
     middle = corners.mean(axis=0)
     flat = np.stack([(corners - middle) @ right, (corners - middle) @ up], axis=1)
@@ -45,7 +45,9 @@ def splat(at: Floats, colors: Bytes, corners: Floats, pitch: float, width: int, 
     if len(at):
         x, y = project(at)
         order = np.argsort((at - middle) @ away)  # the nearest first
-        x, y, light = x[order], y[order], colors[order].astype(np.float64)
+        depth = ((at - middle) @ away)[order]
+        dim = 1 - 0.5 * (depth - depth[0]) / max(float(np.ptp((corners - middle) @ away)), 1e-9)
+        x, y, light = x[order], y[order], colors[order] * np.clip(dim, 0, 1)[:, None]
         radius = max(scale * pitch / 2, 0.5)
         reach = int(np.ceil(radius - 0.5))
         left = np.ones(height * width)  # what passes to those behind

@@ -70,8 +70,7 @@ class Session:
         self._held: Optional[bytes] = None          # a message that was made and waits for credit
         self._pings = 0
         self._next_ping_ns = 0
-        self._ping_sequences: set[int] = set()
-        self._pings_known = True
+        self._pings_known = False
 
     # ------------------------------------------------------------------------------------------------ what is sent
 
@@ -120,7 +119,6 @@ class Session:
         if self._pings_known and now_ns >= self._next_ping_ns:
             self._pings += 1
             self._next_ping_ns = now_ns + (_QUICK_NS if self._pings < _QUICK_PINGS else _SLOW_NS)
-            self._ping_sequences.add(self._sequence + 1)
             return self._count(pb.StreamRequest(ping=pb.Ping(client_time_ns=now_ns)).SerializeToString())
         for message in self._replay:
             return self._count(message)
@@ -166,9 +164,6 @@ class Session:
             pong = response.pong
             self.clock.add(pong.client_time_ns, pong.received_time_ns, pong.server_time_ns or response.server_time_ns, now_ns)
         for issue in response.issues:
-            if issue.sequence in self._ping_sequences:
-                self._pings_known = False  # a server from before there were any
-                continue
             self.on_issue(self.book.issue(issue))
         for receipt in response.receipts:
             if receipt.frame_id == 0:
@@ -207,6 +202,7 @@ class Session:
         self.streams_opened += 1
         self._resume_token = opened.resume_token
         self._credit = opened.credit_bytes
+        self._pings_known = opened.credit_bytes != 0  # a server without the one is from before there was either
         if resumed:
             self.resumed += 1
             applied = opened.last_frame_id if opened.HasField("last_frame_id") else 0

@@ -214,19 +214,29 @@ class Words(unittest.TestCase):
         link.settle()
         self.assertEqual(len(server.commits), 10)
 
-    def test_a_server_without_pings_is_not_pinged_again(self) -> None:
+    def test_pings_come_at_once_and_then_seldom(self) -> None:
+        session, server = Session(Settings()), PlainServer(window=1 << 20)
+        link = Wire(session, server)
+        link.connect()
+        link.deliver()
+        times = []
+        for now in range(0, 100 * 10**9, 10**7):
+            message = session.next_request(now)
+            if message is not None:
+                self.assertTrue(pb.StreamRequest.FromString(message).HasField("ping"))
+                times.append(now)
+                for answer in server.receive(message):
+                    session.answer(answer, now + 10)
+        self.assertEqual(times[0], 0)
+        self.assertTrue(session.clock.known())
+        self.assertTrue(8 < len(times) < 20, times)
+
+    def test_a_server_without_pings_is_not_pinged(self) -> None:
         session = Session(Settings())
         session.open_request()
         session.answer(pb.StreamResponse(opened=pb.Opened()), 0)
-        told = []
-        session.on_issue = told.append
-        ping = session.next_request(0)
-        assert ping is not None
-        self.assertTrue(pb.StreamRequest.FromString(ping).HasField("ping"))
-        refused = pb.StreamResponse(issues=[pb.Issue(sequence=2, field="op")])
-        session.answer(refused, 1)
         self.assertIsNone(session.next_request(10**12))
-        self.assertEqual(told, [])
+        self.assertIsNone(session.next_ping_ns())
 
     def test_what_expired_is_not_sent_anew(self) -> None:
         session, server = Session(Settings()), PlainServer()

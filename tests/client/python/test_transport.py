@@ -361,7 +361,7 @@ class Drawing(Case):
         self.assertIn("no picture: unimplemented", bundle["text/plain"])
 
     def test_the_servers_clock_is_known(self) -> None:
-        served = self.serve()
+        served = self.serve(PlainServer(window=1 << 20))
         v = self.connect()
         v._transport.wait_until(v._session.clock.known, LONG)
         self.assertLess(abs(v.server_time_ns() - served.plain.now_ns), LONG * 1e9)
