@@ -17,19 +17,22 @@ class Galaxy:
 
     def __init__(self, stars: int) -> None:
         random = np.random.default_rng(7)
-        bulge = random.random(stars) < 0.25
-        self.radius = np.where(bulge, np.abs(random.normal(0, 0.12, stars)), random.uniform(0.12, 0.95, stars))
+        kind = random.random(stars)
+        bulge, disc = kind < 0.12, kind > 0.75
+        self.radius = np.where(bulge, np.abs(random.normal(0, 0.09, stars)), 0.1 + 0.87 * random.random(stars) ** 0.8)
         arm = np.where(random.random(stars) < 0.5, 0, np.pi)
-        spread = random.normal(0, 0.16, stars) / (0.35 + self.radius)
-        self.angle = np.where(bulge, random.uniform(0, 2 * np.pi, stars), arm + 3.2 * np.log(self.radius + 0.1) + spread)
-        self.height = random.normal(0, 1, stars) * np.where(bulge, 0.07, 0.025)
-        heat = np.clip(1 - 1.1 * self.radius + random.normal(0, 0.12, stars), 0, 1)
-        cold, warm = np.array([70, 110, 255]), np.array([255, 205, 120])
+        spread = random.normal(0, 0.09, stars) / (0.25 + self.radius)
+        free = random.uniform(0, 2 * np.pi, stars)
+        self.angle = np.where(bulge | disc, free, arm + 3.6 * np.log(self.radius + 0.08) + spread)
+        self.height = random.normal(0, 1, stars) * np.where(bulge, 0.06, 0.02)
+        heat = np.clip(1.15 - 1.5 * self.radius + random.normal(0, 0.15, stars), 0, 1)
+        cold, warm = np.array([40, 90, 255]), np.array([255, 170, 60])
         self.colors = np.zeros((stars, 4), np.uint8)  # the fourth byte is not looked at
-        self.colors[:, :3] = (cold + heat[:, None] * (warm - cold)) * random.uniform(0.4, 1, (stars, 1))
+        bright = np.where(disc, 0.25, 1.0) * random.uniform(0.15, 1, stars) ** 2
+        self.colors[:, :3] = (cold + heat[:, None] * (warm - cold)) * bright[:, None]
 
     def at(self, seconds: float) -> npt.NDArray[np.float32]:
-        angle = self.angle + 0.35 * seconds / (0.2 + self.radius)
+        angle = self.angle + 0.15 * seconds / (0.3 + self.radius)
         at: npt.NDArray[np.float32] = np.empty((len(angle), 3), np.float32)
         at[:, 0], at[:, 1], at[:, 2] = self.radius * np.cos(angle), self.radius * np.sin(angle), self.height
         return at

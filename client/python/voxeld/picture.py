@@ -10,7 +10,7 @@ import numpy.typing as npt
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
 
-BACKGROUND, EDGE = 6, 70
+BACKGROUND, EDGE, KNEE = 6, 70, 150.0
 _EDGES = [(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7)]
 
 
@@ -57,7 +57,10 @@ def splat(at: Floats, colors: Bytes, corners: Floats, pitch: float, width: int, 
                 if dx * dx + dy * dy > radius * radius + 0.5:
                     continue
                 _add(glow, left, np.floor(x).astype(int) + dx, np.floor(y).astype(int) + dy, light, width, height)
-        picture += glow
+        # Where much light meets, its strength is pressed below 255 and its hue kept.
+        peak = np.maximum(glow.max(axis=1), 1e-9)
+        pressed = np.where(peak > KNEE, KNEE + (255 - KNEE) * (1 - np.exp((KNEE - peak) / (255 - KNEE))), peak)
+        picture = np.maximum(picture, glow * (pressed / peak)[:, None])
     result: Bytes = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
     return result.reshape(height, width, 3)
 
