@@ -55,6 +55,7 @@ class Connection(BaseConnection):
     async def close(self, timeout: float = 5.0) -> None:
         _open.discard(self)
         await asyncio.to_thread(self._transport.close, timeout)
+        self._queries.close()
 
     async def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
         return await asyncio.to_thread(self._queries.displays, timeout)

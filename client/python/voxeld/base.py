@@ -47,8 +47,8 @@ def settings(name: Optional[str], flow: str, keep_frames: int, on_disconnect: Un
 class BaseConnection(Draw[Handle]):
     """What is drawn on the connection itself lands in the layer "main".
 
-    Any thread may draw. Autocommit: outside of `with v.batch()`, every call is a commit of its own (a frame or an object is one call, made at
-    the end of its `with`). With `autocommit` off nothing takes effect until commit().
+    Any thread may draw. Autocommit: outside of `with v.batch()`, every call is a commit of its own (a frame or an object
+    is one call, made at the end of its `with`). With `autocommit` off nothing takes effect until commit().
     """
 
     def __init__(self, server: Optional[str], options: Settings, autocommit: bool, when_full: str,
@@ -63,9 +63,8 @@ class BaseConnection(Draw[Handle]):
         self._staged: list[operations.Operation] = []
         self._pieces: dict[tuple[str, str], int] = {}  # how many a name stands for, if not one
         self._session = Session(options)
-        self._session.on_issue = on_issue or (lambda issue: log.warning("%s", issue))
-        self._transport = Transport(self.server, self._session)
-        self._queries = Queries(lambda: self._transport.channel)
+        self._transport = Transport(self.server, self._session, on_issue or (lambda issue: log.warning("%s", issue)))
+        self._queries = Queries(self.server)
 
     def __repr__(self) -> str:
         state = "connected" if self.connected else "not connected"
@@ -203,7 +202,8 @@ class BaseConnection(Draw[Handle]):
         info = self._session.info
         most = info.limits.max_message_bytes if info is not None else 0
         if most and definition.size() > most:
-            raise InvalidValue(f"the object {name!r} has {definition.size()} bytes and the server takes {most}; make several")
+            raise InvalidValue(
+                f"the object {name!r} has {definition.size()} bytes and the server takes {most}; make several")
         return self._stage([definition])
 
     def _forget_pieces(self, layer: Optional[str]) -> None:

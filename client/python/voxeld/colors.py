@@ -33,7 +33,8 @@ def _from_text(text: str) -> Rgb:
             return int(digits[:6], 16)
         raise InvalidColor(f"the colour {text!r} is no hex code; give #rgb or #rrggbb, such as #ff8800")
     near = difflib.get_close_matches(name, NAMES, n=3)
-    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else "give a CSS name, 'tab:orange', '#ff8800' or (1.0, 0.5, 0.0)"
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else (
+        "give a CSS name, 'tab:orange', '#ff8800' or (1.0, 0.5, 0.0)")
     raise InvalidColor(f"there is no colour {text!r}; {hint}")
 
 
@@ -75,7 +76,8 @@ def rgb_of(colors: Sequence[Rgb]) -> npt.NDArray[np.uint8]:
     return result
 
 
-def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None, high: Optional[float] = None) -> npt.NDArray[np.uint8]:
+def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None,
+           high: Optional[float] = None) -> npt.NDArray[np.uint8]:
     """A colour for each number: `low` (default: the least) is the map's first, `high` its last."""
     if cmap not in MAPS:
         raise InvalidColor(f"there is no colour map {cmap!r}; there are {', '.join(MAPS)}")

@@ -40,6 +40,7 @@ class Connection(BaseConnection):
         """Sends what waits, within `timeout`, and ends the session; what becomes of its layers is `on_disconnect`."""
         _open.discard(self)
         self._transport.close(timeout)
+        self._queries.close()
 
     def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
         return self._queries.displays(timeout)

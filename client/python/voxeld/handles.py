@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Type
 import numpy.typing as npt
 
 from . import operations, transforms, wire
-from .arrays import number, vector
+from .arrays import as_array, number, vector
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue
 from .receipts import Accepted, Frame, Issue, Outcome
@@ -115,9 +115,11 @@ class Layer(Draw[Handle]):
         if clip is not None:
             state.clip.CopyFrom(pb.Clip())
             for plane in clip:
-                *normal, distance = [float(x) for x in plane] if len(plane) == 4 else (0.0,)  # type: ignore[arg-type,union-attr]
-                a, b, c = vector(normal, "the clip plane's normal")
-                state.clip.planes.add(a=a, b=b, c=c, d=number(distance, "the clip plane's distance"))
+                four = as_array(plane, "clip")
+                if four.shape != (4,):
+                    raise InvalidValue(f"a clip plane is four numbers (a, b, c, d), got shape {four.shape}")
+                a, b, c = vector(four[:3], "the clip plane's normal")
+                state.clip.planes.add(a=a, b=b, c=c, d=number(four[3], "the clip plane's distance"))
         if region is not None:
             low, high = vector(region[0], "region[0]"), vector(region[1], "region[1]")
             state.region.min.CopyFrom(types_pb2.Vec3(x=low[0], y=low[1], z=low[2]))

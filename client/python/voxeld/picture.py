@@ -25,7 +25,8 @@ def axes(azimuth: float, elevation: float) -> tuple[Floats, Floats, Floats]:
 def splat(at: Floats, colors: Bytes, corners: Floats, pitch: float, width: int, height: int, azimuth: float,
           elevation: float) -> Bytes:
     """Points as discs of the size of their pitch, without perspective. What lies behind something is added at half its
-    light for every point before it on the same spot; so a picture keeps the glow of a volume and its front stands out; what is far is dimmer."""
+    light for every point before it on the same spot; so a picture keeps the glow of a volume and its front stands out.
+    What is far is dimmer."""
     right, up, away = axes(azimuth, elevation)
     middle = corners.mean(axis=0)
     flat = np.stack([(corners - middle) @ right, (corners - middle) @ up], axis=1)

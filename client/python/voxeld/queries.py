@@ -6,7 +6,8 @@ from typing import Any, Callable, Iterator, Optional, Sequence
 import grpc
 from google.protobuf.message import Message
 
-from .errors import VoxelError
+from . import address
+from .errors import ConnectionLost, VoxelError
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
 
@@ -19,18 +20,34 @@ def _failed(error: grpc.RpcError) -> VoxelError:
 
 
 class Queries:
-    def __init__(self, channel: Callable[[], grpc.Channel]) -> None:
-        self._channel = channel
+    """On a channel of their own, so that they neither wait for the stream's bulk nor end with it."""
+
+    def __init__(self, server: str) -> None:
+        self._channel = grpc.insecure_channel(address.target(server), options=[
+            ("grpc.max_receive_message_length", -1), ("grpc.use_local_subchannel_pool", 1),
+            ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.min_reconnect_backoff_ms", 100),
+            ("grpc.max_reconnect_backoff_ms", 1000)])
+        self._closed = False
+
+    def close(self) -> None:
+        self._closed = True
+        self._channel.close()
+
+    def _usable(self) -> grpc.Channel:
+        if self._closed:
+            raise ConnectionLost("the connection is closed")
+        return self._channel
 
     def _one(self, method: str, request: Message, answer: Callable[[bytes], Any], timeout: Optional[float]) -> Any:
-        call = self._channel().unary_unary(method, type(request).SerializeToString, answer)
+        call = self._usable().unary_unary(method, type(request).SerializeToString, answer)
         try:
             return call(request, timeout=timeout)
         except grpc.RpcError as error:
             raise _failed(error) from None
 
-    def _stream(self, method: str, request: Message, answer: Callable[[bytes], Any], timeout: Optional[float]) -> Iterator[Any]:
-        call = self._channel().unary_stream(method, type(request).SerializeToString, answer)(request, timeout=timeout)
+    def _stream(self, method: str, request: Message, answer: Callable[[bytes], Any],
+                timeout: Optional[float]) -> Iterator[Any]:
+        call = self._usable().unary_stream(method, type(request).SerializeToString, answer)(request, timeout=timeout)
         try:
             yield from call
         except grpc.RpcError as error:

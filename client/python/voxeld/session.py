@@ -51,7 +51,7 @@ class Session:
         self.open = False                      # a stream stands, and its Opened has come
         self.streams_opened = 0
         self.resumed = 0
-        self.on_issue: Callable[[Issue], None] = lambda issue: None
+        self.on_issue: Callable[[Issue], None] = lambda issue: None  # called from answer()
         self._next_frame = settings.first_frame
         self._begin_stream()
         self._on_way: Deque[Unit] = deque()   # sent whole, not answered
@@ -162,7 +162,8 @@ class Session:
         self._credit = max(self._credit, response.credit_bytes)
         if response.HasField("pong"):
             pong = response.pong
-            self.clock.add(pong.client_time_ns, pong.received_time_ns, pong.server_time_ns or response.server_time_ns, now_ns)
+            answered = pong.server_time_ns or response.server_time_ns
+            self.clock.add(pong.client_time_ns, pong.received_time_ns, answered, now_ns)
         for issue in response.issues:
             self.on_issue(self.book.issue(issue))
         for receipt in response.receipts:

@@ -6,19 +6,23 @@ anew after a pause that grows from BACKOFF_FIRST_S to BACKOFF_MOST_S, drawn at r
 """
 from __future__ import annotations
 
+import logging
 import random
 import threading
 import time
-from typing import Callable, Iterator, Optional
+from collections import deque
+from typing import Callable, Deque, Iterator, Optional
 
 import grpc
 
 from . import address
 from .errors import BufferFull, ConnectionLost
 from .operations import Unit
-from .receipts import Frame
+from .receipts import Frame, Issue
 from .session import Session
 from .v1 import scene_pb2 as pb
+
+log = logging.getLogger("voxeld")
 
 STREAM = "/voxeld.v1.SceneService/Stream"
 BACKOFF_FIRST_S, BACKOFF_MOST_S = 0.1, 5.0
@@ -45,12 +49,18 @@ def backoff_s(attempt: int, draw: Callable[[], float]) -> float:
 
 
 class Transport:
-    def __init__(self, server: str, session: Session) -> None:
+    """`on_issue` is called on the reading thread, without any lock; it may draw, but not wait."""
+
+    def __init__(self, server: str, session: Session, on_issue: Callable[[Issue], None]) -> None:
         self.server = server
-        self.channel: grpc.Channel = self._new_channel()
         self.last_error = ""
+        self._target = address.target(server)
         self._session = session
-        self._lock = threading.Lock()
+        self._issues: Deque[Issue] = deque()
+        self._on_issue = on_issue
+        session.on_issue = self._issues.append
+        # Reentrant, for whoever draws from a future's callback.
+        self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)
         self._closing = False   # send what is there, then half-close
         self._stopped = False   # nothing more
@@ -62,7 +72,7 @@ class Transport:
     # ------------------------------------------------------------------------------------------- callers' threads
 
     @property
-    def lock(self) -> threading.Lock:
+    def lock(self) -> threading.RLock:
         """Of the session."""
         return self._lock
 
@@ -96,15 +106,16 @@ class Transport:
         """Sends what waits and half-closes, within `timeout`; then ends whatever is left. May be called again."""
         end = time.monotonic() + timeout
         with self._changed:
-            if not self._session.open and not self._stopped:
-                self._stop("the connection was closed before what waited could be sent")
+            # What waits for a connection to come back may still go.
+            self._changed.wait_for(lambda: self._stopped or self._session.open or self._session.idle(), timeout)
             self._closing = True
+            if not self._session.open:
+                self._stop("the connection was closed before what waited could be sent")
             self._changed.notify_all()
         self._thread.join(max(end - time.monotonic(), 0))
         with self._changed:
             self._stop("the connection was closed")
         self._thread.join(5)
-        self.channel.close()
 
     def _stop(self, reason: str) -> None:
         if not self._stopped:
@@ -116,9 +127,6 @@ class Transport:
         self._changed.notify_all()
 
     # ------------------------------------------------------------------------------------------------ our threads
-
-    def _new_channel(self) -> grpc.Channel:
-        return grpc.insecure_channel(address.target(self.server), options=CHANNEL_OPTIONS)
 
     def _requests(self, stream: int) -> Iterator[bytes]:
         """On gRPC's thread: what to send, as it may be sent. Nothing after Open before its answer."""
@@ -156,7 +164,7 @@ class Transport:
                 if self._session.streams_opened > opened_before:
                     attempt = 0
                 code = error.code() if error is not None else grpc.StatusCode.UNAVAILABLE
-                self.last_error = _words(self.server, error)
+                self.last_error = _words(self.server, error, self._session.streams_opened > opened_before)
                 if code == grpc.StatusCode.NOT_FOUND and self._session.forget_resume():
                     self._changed.notify_all()
                     continue
@@ -165,37 +173,51 @@ class Transport:
                     return
                 self._changed.notify_all()
                 pause = backoff_s(attempt, random.random)
+                if attempt == 0 and self._session.streams_opened:
+                    log.warning("%s; connecting again", self.last_error)
                 attempt += 1
                 self._changed.wait_for(lambda: self._stopped or self._closing, pause)
                 if self._stopped or self._closing:
                     self._stop("the connection was closed")
                     return
-            old, self.channel = self.channel, self._new_channel()
-            old.close()
 
     def _one_stream(self) -> Optional[grpc.RpcError]:
         """Reads one stream to its end."""
-        stream_call: grpc.StreamStreamMultiCallable[bytes, pb.StreamResponse] = self.channel.stream_stream(
-            STREAM, request_serializer=None, response_deserializer=pb.StreamResponse.FromString)
-        with self._changed:
-            if self._stopped:
-                return None
-            call = self._call = stream_call(self._requests(self._stream))
+        channel = grpc.insecure_channel(self._target, options=CHANNEL_OPTIONS)
         try:
+            stream_call: grpc.StreamStreamMultiCallable[bytes, pb.StreamResponse] = channel.stream_stream(
+                STREAM, request_serializer=None, response_deserializer=pb.StreamResponse.FromString)
+            with self._changed:
+                if self._stopped:
+                    return None
+                call = self._call = stream_call(self._requests(self._stream))
             for response in call:
                 now = time.monotonic_ns()
                 with self._changed:
                     self._session.answer(response, now)
                     self._changed.notify_all()
+                while self._issues:
+                    self._tell(self._issues.popleft())
         except grpc.RpcError as error:
             return error
+        finally:
+            channel.close()
         return None
 
+    def _tell(self, issue: Issue) -> None:
+        try:
+            self._on_issue(issue)
+        except Exception:  # whatever it is, it must not end the stream
+            log.exception("on_issue failed with %s", issue)
 
-def _words(server: str, error: Optional[grpc.RpcError]) -> str:
+
+def _words(server: str, error: Optional[grpc.RpcError], stood: bool) -> str:
     if error is None:
-        return f"the server at {server} ended the stream"
+        return f"voxeld at {server} ended the stream"
     code, details = error.code(), error.details()
+    if code == grpc.StatusCode.UNAVAILABLE and stood:
+        return f"the connection to voxeld at {server} was lost ({details})"
     if code == grpc.StatusCode.UNAVAILABLE:
-        return f"no voxeld answers at {server} ({details}); is it running? Where it listens is said by connect('…') or VOXELD_SERVER"
+        return (f"no voxeld answers at {server} ({details}); is it running? Where it listens is said by connect('…') or "
+                "VOXELD_SERVER")
     return f"voxeld at {server}: {code.name}: {details}"

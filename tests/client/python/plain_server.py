@@ -5,6 +5,8 @@ from typing import Any, Iterator, Optional
 
 from voxeld.v1 import scene_pb2 as pb
 
+REFUSED = "refuse this"  # the label of an entity that is to be refused
+
 Scene = dict[str, dict[str, bytes]]  # layer → id → Entity, serialised
 
 
@@ -95,8 +97,12 @@ class PlainServer:
     def _commit(self, commit: pb.Commit) -> pb.StreamResponse:
         assert self.session is not None
         frame: Optional[str] = None
+        refused = []
         for request in self.staged:
             what = request.WhichOneof("op")
+            if any(upsert.entity.label == REFUSED for upsert in upserts(request)):
+                refused.append(request.upsert.id)
+                continue
             if what == "frame_begin":
                 assert frame is None
                 frame = request.frame_begin.layer
@@ -113,8 +119,8 @@ class PlainServer:
         if commit.frame_id:
             self.commits.append(commit.frame_id)
         self.session.last_frame_id, self.session.last_sequence = commit.frame_id, self.sequence
-        response = pb.StreamResponse()
-        accepted = pb.Accepted(snapshot=len(self.commits), displays=self.displays)
+        response = pb.StreamResponse(issues=[pb.Issue(id=id, message="refused") for id in refused])
+        accepted = pb.Accepted(snapshot=len(self.commits), displays=self.displays, refused_operations=len(refused))
         response.receipts.add(frame_id=commit.frame_id, sequence=self.sequence, accepted=accepted)
         for display in self.displays:
             outcome = pb.Outcome(display=display, presented=pb.Presented(volume=1))

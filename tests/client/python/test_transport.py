@@ -9,7 +9,7 @@ from typing import Any, Iterator, Optional
 
 import grpc
 import numpy as np
-from plain_server import PlainServer
+from plain_server import REFUSED, PlainServer
 
 import voxeld as voxel
 from voxeld import transport
@@ -177,6 +177,41 @@ class Streams(Case):
         v.commit().wait(LONG)
         self.assertEqual(len(self.ids(served)), 160)
         self.assertEqual(len(served.plain.commits), 81)
+
+    def test_who_is_told_may_draw(self) -> None:
+        served = self.serve()
+        drawn: list[voxel.Handle] = []
+        v = self.connect(on_issue=lambda issue: drawn.append(v.sphere("instead of " + issue.id)))
+        frame = v.sphere("a", label=REFUSED).frame
+        assert frame is not None
+        frame.future().add_done_callback(lambda _: drawn.append(v.sphere("after it")))
+        self.assertEqual([issue.id for issue in frame.wait(LONG).issues], ["a"])
+        v._transport.wait_until(lambda: len(drawn) == 2, LONG)
+        v.commit().wait(LONG)
+        self.assertEqual(self.ids(served), ["after it", "instead of a"])
+        self.assertEqual([issue.message for issue in v.issues], ["refused"])
+
+    def test_a_broken_on_issue_ends_nothing(self) -> None:
+        self.serve()
+        v = self.connect(on_issue=lambda issue: 1 / 0)
+        with self.assertLogs("voxeld") as logs:
+            v.sphere("a", label=REFUSED)
+            v.commit().wait(LONG)
+            v.commit().wait(LONG)
+        self.assertIn("ZeroDivisionError", logs.output[0])
+        self.assertEqual(v.counts["streams_opened"], 1)
+
+    def test_closing_waits_for_a_connection_that_comes_back(self) -> None:
+        first = self.serve()
+        v = self.connect()
+        first.stop()
+        v._transport.wait_until(lambda: not v.connected, LONG)
+        v.sphere("a")
+        closing = threading.Thread(target=v.close, args=(LONG,))
+        closing.start()
+        second = self.serve()
+        closing.join(LONG)
+        self.assertEqual(self.ids(second), ["a"])
 
     def test_pauses_grow_to_a_bound(self) -> None:
         for draw in (0.0, 1.0):
