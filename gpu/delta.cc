@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 #include <type_traits>
 
 #include "absl/status/statusor.h"
@@ -170,14 +171,39 @@ absl::Status ReadDrawable(uint64_t offset, std::span<const std::byte> body, Delt
   return status.ok() ? visitor.OnDrawable(*d) : status;
 }
 
+absl::Status CheckClip(const Checker& check, const LayerRecord& l) {
+  absl::Status status = FirstError({check.Enum("plane_count", l.plane_count, 0, kMaxClipPlanes),
+                                    check.Enum("has_region", l.has_region, 0, 1)});
+  if (!status.ok()) return status;
+  for (uint32_t i = 0; i < l.plane_count; ++i) {
+    const ClipPlane& p = l.planes[i];
+    const std::string field = absl::StrCat("planes[", i, "]");
+    const double values[4] = {p.a, p.b, p.c, p.d};
+    status = check.Finite(field.c_str(), values, 4);
+    if (!status.ok()) return status;
+    if (p.a == 0 && p.b == 0 && p.c == 0) {
+      return check.Wrong(field.c_str(), "(0, 0, 0)", "a plane with a normal other than zero");
+    }
+  }
+  if (l.has_region == 0) return absl::OkStatus();
+  status = FirstError(
+      {check.Finite("region.min", l.region.min, 3), check.Finite("region.max", l.region.max, 3)});
+  for (int a = 0; a < 3 && status.ok(); ++a) {
+    if (l.region.min[a] < l.region.max[a]) continue;
+    status = check.Wrong(absl::StrCat("region.max[", a, "]").c_str(), l.region.max[a],
+                         absl::StrCat("greater than min's ", l.region.min[a]).c_str());
+  }
+  return status;
+}
+
 absl::Status ReadLayer(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
   const Checker check(offset, "layer");
   absl::StatusOr<LayerRecord> l = Fixed<LayerRecord>(check, body);
   if (!l.ok()) return l.status();
-  absl::Status status = FirstError({check.Enum("visible", l->visible, 0, 1),
-                                    check.Enum("opacity", l->opacity, 0, 255),
-                                    check.Enum("blend", static_cast<uint32_t>(l->blend), 0, 2),
-                                    check.Finite("transform", l->transform.m, 12)});
+  absl::Status status = FirstError(
+      {check.Enum("visible", l->visible, 0, 1), check.Enum("opacity", l->opacity, 0, 255),
+       check.Enum("blend", static_cast<uint32_t>(l->blend), 0, 2),
+       check.Finite("transform", l->transform.m, 12), CheckClip(check, *l)});
   return status.ok() ? visitor.OnLayer(*l) : status;
 }
 

@@ -8,9 +8,10 @@
 //             in its own coordinates
 //   drawable  puts a geometry into a layer, under a transform, with a priority; several may
 //             share one
-//   layer     how its voxels combine with those below
+//   layer     how its voxels combine with those below, and where it is drawn
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -92,16 +93,39 @@ struct DrawableRecord {
   Affine transform;       // geometry's coordinates → layer's
 };
 
-// Layers combine in ascending (order, id).
+// A half-space of the scene: a·x + b·y + c·z + d ≥ 0. Its normal is not zero.
+struct ClipPlane {
+  double a = 0, b = 0, c = 0, d = 0;
+  bool operator==(const ClipPlane&) const = default;
+};
+inline constexpr uint32_t kMaxClipPlanes = 8;
+
+// A box of the scene, its faces included; min < max.
+struct Region {
+  double min[3] = {}, max[3] = {};
+  bool operator==(const Region&) const = default;
+};
+
+// Layers combine in ascending (order, id). Where there are planes or a region, only voxels that lie
+// inside all of them (gpu/clip.h) are the layer's: the others it does not cover.
 struct LayerRecord {
   uint64_t id = 0;  // the number of creation
   int32_t order = 0;
   uint32_t visible = 1;
   uint32_t opacity = 255;  // 0 to 255
   BlendMode blend = BlendMode::kOver;
-  uint64_t reserved = 0;
-  Affine transform;  // layer's coordinates → scene's
+  uint32_t plane_count = 0;  // 0 to kMaxClipPlanes
+  uint32_t has_region = 0;   // 1: `region` holds
+  Affine transform;          // layer's coordinates → scene's
+  ClipPlane planes[kMaxClipPlanes];
+  Region region;
 };
+
+// Whether two layers are drawn in the same part of the scene, as it is written.
+inline bool SameClip(const LayerRecord& a, const LayerRecord& b) {
+  return std::equal(a.planes, a.planes + a.plane_count, b.planes, b.planes + b.plane_count) &&
+         a.has_region == b.has_region && (a.has_region == 0 || a.region == b.region);
+}
 
 // Appends records to a span. Overruns are counted, not written:
 // size the span with the Size functions.

@@ -73,8 +73,17 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Real("max_thickness", limits.max_thickness, 0, 1048576);
   visitor.Integer("max_sessions", limits.max_sessions, 1, kMost32);
   visitor.Integer("max_parts_per_object", limits.max_parts_per_object, 1, kMost32);
+  visitor.Integer("max_clip_planes", limits.max_clip_planes, 1, gpu::kMaxClipPlanes);
   visitor.Integer("max_captures", limits.max_captures, 1, 1024);
   visitor.Integer("max_linger_ns", limits.max_linger_ns, 0, kMost);
+  visitor.Integer("credit_bytes", limits.credit_bytes, 4096, kMost);
+  visitor.Integer("max_memory_bytes", limits.max_memory_bytes, 1 << 20, kMost);
+  visitor.Integer("max_riding_commits", limits.max_riding_commits, 1, kMost32);
+  visitor.Integer("max_timed_commits", limits.max_timed_commits, 0, kMost32);
+  visitor.Integer("max_present_at_horizon_ns", limits.max_present_at_horizon_ns, 0, kMost / 4);
+  visitor.Integer("must_show_timeout_ns", limits.must_show_timeout_ns, 0, kHour);
+  visitor.Integer("max_drop_oldest_frames", limits.max_drop_oldest_frames, 1, kMost32);
+  visitor.Integer("max_local_bytes", limits.max_local_bytes, 0, kMost);
 }
 
 // "auto", "cpu", "cuda".

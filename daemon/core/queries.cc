@@ -88,6 +88,8 @@ LayerInfo Core::Impl::InfoOf(const OwnedName& key, const Layer& layer) const {
   info.order = layer.order;
   info.blend = layer.blend;
   info.transform = layer.transform;
+  info.clip = layer.clip;
+  info.region = layer.region;
   info.entities = layer.entities.size();
   info.bytes = layer.bytes;
   info.orphaned = !sessions_.contains(layer.writer->session);

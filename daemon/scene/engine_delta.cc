@@ -18,16 +18,21 @@ gpu::LayerRecord RecordOf(const Layer& layer) {
   gpu::LayerRecord record;
   record.id = layer.number;
   record.order = layer.order;
-  record.visible = layer.visible ? 1 : 0;
+  record.visible = layer.shown() ? 1 : 0;
   record.opacity = layer.opacity;
   record.blend = layer.blend;
   record.transform = layer.transform;
+  record.plane_count = layer.clip.count;
+  std::copy_n(layer.clip.planes, layer.clip.count, record.planes);
+  record.has_region = layer.region.has_value() ? 1 : 0;
+  record.region = layer.region.value_or(gpu::Region());
   return record;
 }
 
 bool LooksSame(const Layer& a, const Layer& b) {
-  return a.order == b.order && a.visible == b.visible && a.opacity == b.opacity &&
-         a.blend == b.blend && a.transform == b.transform;
+  return a.order == b.order && a.shown() == b.shown() && a.opacity == b.opacity &&
+         a.blend == b.blend && a.transform == b.transform && a.clip == b.clip &&
+         a.region == b.region;
 }
 
 // Nothing that an engine sees: label, sequence and expiry may differ.

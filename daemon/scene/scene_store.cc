@@ -88,6 +88,19 @@ SceneStore::Removed SceneStore::RemoveLayers(
   return removed;
 }
 
+void SceneStore::Suppress(uint64_t owner, bool suppressed) {
+  std::vector<std::pair<OwnedName, WriterPtr>> layers;
+  snapshot_->layers.ForEachFrom({owner, ""}, [&](const OwnedName& key, const LayerPtr& layer) {
+    if (key.owner != owner) return false;
+    if (layer->suppressed != suppressed) layers.emplace_back(key, layer->writer);
+    return true;
+  });
+  if (layers.empty()) return;
+  Draft draft(snapshot_, next_number_);
+  for (const auto& [key, writer] : layers) draft.EditLayer(key, writer).suppressed = suppressed;
+  Publish(std::move(draft));
+}
+
 void SceneStore::ForgetOwner(uint64_t owner) {
   const OwnerTally* tally = snapshot_->owners.Find(owner);
   if (tally == nullptr || tally->layers > 0) return;

@@ -61,6 +61,10 @@ class SceneStore {
   Removed RemoveLayers(const std::function<bool(const OwnedName&, const Layer&)>& matches,
                        bool keep_state);
 
+  // Hides all layers of an owner, or shows them as they say of themselves. A new snapshot only if that changed
+  // something.
+  void Suppress(uint64_t owner, bool suppressed);
+
   // Drops the objects of an owner who has no session any more, unless layers of theirs are left.
   void ForgetOwner(uint64_t owner);
 

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -48,10 +49,14 @@ using EntityMap = PersistentMap<std::string, EntityPtr>;
 struct Layer {
   uint64_t number = 0;  // of creation; the engine's id
   bool visible = true;
+  bool suppressed = false;  // its owner is hidden by an operator
   uint32_t opacity = 255;
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
+  bool shown() const { return visible && !suppressed; }
   WriterPtr writer;
   EntityMap entities;
   uint64_t bytes = 0;

@@ -14,6 +14,7 @@
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/services/unary_call.h"
+#include "daemon/wire/convert.h"
 #include "daemon/wire/encode.h"
 #include "voxeld/v1/scene.grpc.pb.h"
 
@@ -55,7 +56,8 @@ using SceneBase =
     SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithRawCallbackMethod_ApplyUpdate<
         SceneStub::WithCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
             SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
-                SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>;
+                SceneStub::WithCallbackMethod_ListOwners<SceneStub::WithCallbackMethod_ControlOwner<
+                    SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>>>;
 
 class SceneService final : public SceneBase {
  public:
@@ -91,6 +93,24 @@ class SceneService final : public SceneBase {
   ServerUnaryReactor* ClearLayer(CallbackServerContext* call, const v1::ClearLayerRequest* request,
                                  v1::ClearLayerResponse* response) override {
     return DoClearLayer(call->DefaultReactor(), *request, response);
+  }
+
+  ServerUnaryReactor* ListOwners(CallbackServerContext* call, const v1::ListOwnersRequest*,
+                                 v1::ListOwnersResponse* response) override {
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    context_.core.ListOwners(
+        Answer<std::vector<OwnerInfo>>(UnaryCall::Begin(context_.short_calls, reactor), response));
+    return reactor;
+  }
+
+  ServerUnaryReactor* ControlOwner(CallbackServerContext* call,
+                                   const v1::ControlOwnerRequest* request,
+                                   v1::OwnerInfo* response) override {
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    context_.core.ControlOwner(
+        wire::FromWire(*request),
+        Answer<OwnerInfo>(UnaryCall::Begin(context_.short_calls, reactor), response));
+    return reactor;
   }
 
   grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(CallbackServerContext*,

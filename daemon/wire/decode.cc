@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/core/token.h"
 #include "daemon/wire/check.h"
 #include "daemon/wire/element_count.h"
 #include "daemon/wire/operations.h"
@@ -60,22 +61,41 @@ MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, const Limits& lim
   return {};
 }
 
-MaybeFault CheckFlow(const FieldPath& path, const v1::Open& in) {
+MaybeFault ToFlow(const FieldPath& path, const v1::Open& in, const Limits& limits,
+                  OpenOptions* out) {
   switch (in.flow()) {
     case v1::FLOW_POLICY_UNSPECIFIED:
     case v1::FLOW_POLICY_RELIABLE:
+      out->flow = FlowPolicy::kReliable;
       break;
     case v1::FLOW_POLICY_LATEST:
+      out->flow = FlowPolicy::kLatest;
+      break;
     case v1::FLOW_POLICY_DROP_OLDEST:
-      return Unimplemented(FieldPath(path, "flow"),
-                           "every frame waits its turn; use FLOW_POLICY_RELIABLE");
+      out->flow = FlowPolicy::kDropOldest;
+      break;
     default:
-      return UnknownEnum(FieldPath(path, "flow"), in.flow(), "FLOW_POLICY_RELIABLE");
+      return UnknownEnum(FieldPath(path, "flow"), in.flow(),
+                         "FLOW_POLICY_RELIABLE, FLOW_POLICY_LATEST, FLOW_POLICY_DROP_OLDEST");
   }
-  if (in.drop_oldest_frames() == 0) return {};
+  const uint32_t frames = in.drop_oldest_frames();
+  out->drop_oldest_frames = frames;
+  if (out->flow != FlowPolicy::kDropOldest) {
+    if (frames == 0) return {};
+    return Fault{FieldPath(path, "drop_oldest_frames").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", frames, "; it goes with flow = FLOW_POLICY_DROP_OLDEST only")};
+  }
+  if (frames >= 1 && frames <= limits.max_drop_oldest_frames) return {};
   return Fault{FieldPath(path, "drop_oldest_frames").ToString(), Reason::kInvalidValue,
-               absl::StrCat("is ", in.drop_oldest_frames(),
-                            "; it goes with flow = FLOW_POLICY_DROP_OLDEST only")};
+               absl::StrCat("is ", frames, "; give 1 to max_drop_oldest_frames, ",
+                            limits.max_drop_oldest_frames)};
+}
+
+MaybeFault CheckToken(const FieldPath& path, const std::string& token) {
+  if (token.empty() || token.size() == kTokenBytes) return {};
+  return Fault{path.ToString(), Reason::kInvalidValue,
+               absl::StrCat("has ", token.size(), " bytes; give the ", kTokenBytes,
+                            " bytes of an Opened, or none")};
 }
 
 MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, const Limits& limits,
@@ -84,11 +104,15 @@ MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, const Limits& limit
     return fault;
   }
   if (auto fault = ToPolicy(path, in, limits, out)) return fault;
-  if (!in.resume_token().empty()) {
-    return Unimplemented(FieldPath(path, "resume_token"),
-                         "every stream is a session of its own; leave it empty");
+  if (auto fault = CheckToken(FieldPath(path, "resume_token"), in.resume_token())) return fault;
+  if (auto fault = CheckToken(FieldPath(path, "owner_token"), in.owner_token())) return fault;
+  if (!in.resume_token().empty() && !in.owner_token().empty()) {
+    return Fault{FieldPath(path, "owner_token").ToString(), Reason::kInvalidValue,
+                 "is set beside resume_token, whose session has its owner; give one of them"};
   }
-  if (auto fault = CheckFlow(path, in)) return fault;
+  if (auto fault = ToFlow(path, in, limits, out)) return fault;
+  out->resume_token = in.resume_token();
+  out->owner_token = in.owner_token();
   out->client_name = in.client_name();
   out->strict = in.strict();
   out->no_outcomes = in.no_outcomes();
@@ -205,6 +229,11 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
     out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
     return out;
   }
+  if (request.op_case() == v1::StreamRequest::kPing) {
+    out.ping_client_time_ns = request.ping().client_time_ns();
+    out.sequence = std::max(request.sequence(), previous_sequence);
+    return out;
+  }
   Take(FieldPath(""), request, limits, previous_sequence, &out);
   return out;
 }
@@ -251,14 +280,23 @@ Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits
   if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {
     open->on_disconnect = DisconnectPolicy::kKeep;
   }
+  if (!open->resume_token.empty()) {
+    return Failed(absl::InvalidArgumentError(
+        "open.resume_token is set; an update is a session of its own, which takes up no other: "
+        "give owner_token to join an owner"));
+  }
   open->no_outcomes = true;  // the answer has no place for them
   for (int i = 0; i < request.operations_size(); ++i) {
     const v1::StreamRequest& operation = request.operations(i);
     const FieldPath path("operations", i);
-    if (operation.has_open() || operation.has_commit()) {
+    if (operation.has_open() || operation.has_commit() || operation.has_ping()) {
+      const char* field = operation.has_open()     ? "open"
+                          : operation.has_commit() ? "commit"
+                                                   : "ping";
       return Failed(absl::InvalidArgumentError(
-          absl::StrCat(FieldPath(path, operation.has_open() ? "open" : "commit").ToString(),
-                       " is set; an update is opened by its own field and committed by itself")));
+          absl::StrCat(FieldPath(path, field).ToString(),
+                       " is set; an update is opened by its own field and committed by itself, and "
+                       "has no clock to compare")));
     }
     Take(path, operation, limits, out.sequence, &out);
   }

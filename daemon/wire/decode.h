@@ -30,7 +30,8 @@ struct Decoded {
   std::optional<OpenOptions> open;  // the message was an Open
   std::vector<Operation> operations;
   Refusals refused;
-  uint64_t sequence = 0;  // of the last request
+  std::optional<int64_t> ping_client_time_ns;  // the message was a Ping
+  uint64_t sequence = 0;                       // of the last request
 };
 
 // One StreamRequest. `previous_sequence` is that of the request before (0: none): a request without

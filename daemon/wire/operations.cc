@@ -1,6 +1,8 @@
 #include "daemon/wire/operations.h"
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -113,6 +115,40 @@ MaybeFault To(const FieldPath& path, const v1::SetTransform& in, const Limits& l
   return ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform);
 }
 
+MaybeFault ToClip(const FieldPath& path, const v1::Clip& in, const Limits& limits, Clip* out) {
+  // Never more than there is room for, whatever the limit says.
+  const uint32_t most = std::min(limits.max_clip_planes, gpu::kMaxClipPlanes);
+  if (static_cast<uint32_t>(in.planes_size()) > most) {
+    return Fault{FieldPath(path, "planes").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("has ", in.planes_size(), " planes; max_clip_planes allows ", most)};
+  }
+  for (const v1::Clip::Plane& plane : in.planes()) {
+    const FieldPath at(path, "planes", out->count);
+    if (auto fault = CheckFinite(FieldPath(at, "a"), plane.a())) return fault;
+    if (auto fault = CheckFinite(FieldPath(at, "b"), plane.b())) return fault;
+    if (auto fault = CheckFinite(FieldPath(at, "c"), plane.c())) return fault;
+    if (auto fault = CheckFinite(FieldPath(at, "d"), plane.d())) return fault;
+    if (plane.a() == 0 && plane.b() == 0 && plane.c() == 0) {
+      return Fault{at.ToString(), Reason::kInvalidValue,
+                   "has the normal (0, 0, 0); one of a, b, c must not be 0"};
+    }
+    out->planes[out->count++] = {plane.a(), plane.b(), plane.c(), plane.d()};
+  }
+  return {};
+}
+
+MaybeFault ToRegion(const FieldPath& path, const v1::Box3& in, std::optional<gpu::Region>* out) {
+  if (!in.has_min() && !in.has_max()) return {};
+  if (!in.has_min() || !in.has_max()) {
+    return Fault{FieldPath(path, in.has_min() ? "max" : "min").ToString(), Reason::kInvalidValue,
+                 "is not set; give both corners, or neither for all of the scene"};
+  }
+  if (auto fault = CheckBox(path, in)) return fault;
+  *out = gpu::Region{{in.min().x(), in.min().y(), in.min().z()},
+                     {in.max().x(), in.max().y(), in.max().z()}};
+  return {};
+}
+
 MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& limits,
               LayerState* out) {
   if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
@@ -146,13 +182,18 @@ MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& lim
     out->transform = transform;
   }
   if (in.has_clip()) {
-    return Unimplemented(FieldPath(path, "clip"), "layers are drawn whole; leave it unset");
+    if (auto fault = ToClip(FieldPath(path, "clip"), in.clip(), limits, &out->clip.emplace())) {
+      return fault;
+    }
   }
   if (in.has_region()) {
-    return Unimplemented(FieldPath(path, "region"), "layers are drawn whole; leave it unset");
+    if (auto fault = ToRegion(FieldPath(path, "region"), in.region(), &out->region.emplace())) {
+      return fault;
+    }
   }
   if (!in.mask_layer().empty()) {
-    return Unimplemented(FieldPath(path, "mask_layer"), "layers are drawn whole; leave it empty");
+    return Unimplemented(FieldPath(path, "mask_layer"),
+                         "layers are not masked by others; leave it empty");
   }
   out->layer = in.layer();
   if (in.has_visible()) out->visible = in.visible();
@@ -215,15 +256,14 @@ MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& l
 
 // What a Commit asks for that this version has not; the commit itself is carried out.
 MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
-  *out = {in.frame_id(), in.send_time_ns(), in.client_drops()};
-  if (in.present_at_ns() != 0) {
-    return Unimplemented(FieldPath(path, "present_at_ns"),
-                         "a commit is applied when it arrives; leave it 0");
+  *out = {in.frame_id(), in.send_time_ns(), in.client_drops(), 0, in.must_show()};
+  if (in.present_at_ns() < 0) {
+    return Fault{FieldPath(path, "present_at_ns").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.present_at_ns(),
+                              "; give a time by the server's clock (Opened.server_time_ns), or 0 "
+                              "for at once")};
   }
-  if (in.must_show()) {
-    return Unimplemented(FieldPath(path, "must_show"),
-                         "a newer commit may supersede this one; leave it false");
-  }
+  out->present_at_ns = in.present_at_ns();
   if (in.durable()) {
     return Unimplemented(FieldPath(path, "durable"),
                          "the scene is kept in memory only; leave it false");

@@ -30,6 +30,17 @@ RetainedGeometry SceneObserver::Retain(const GeometryView& view) {
   return kept;
 }
 
+bool LooksSame(const LayerRecord& a, const LayerRecord& b) {
+  return a.visible == b.visible && a.opacity == b.opacity && a.order == b.order &&
+         a.blend == b.blend && SameClip(a, b);
+}
+
+void Scene::MapClips(const Affine& view, bool anew) {
+  for (const auto& [id, layer] : layers_) {
+    if (anew || !layer->clip.has_value()) layer->clip = MapClip(layer->record, view);
+  }
+}
+
 int64_t Scene::GeometryUses(uint64_t id) const {
   const auto it = geometries_.find(id);
   return it == geometries_.end() ? -1 : static_cast<int64_t>(it->second.users.size());
@@ -97,6 +108,7 @@ void Scene::PutLayer(const LayerRecord& record, SceneObserver& observer) {
     for (Drawable* drawable : slot->drawables) observer.OnLeave(*drawable);
   }
   slot->record = record;
+  slot->clip.reset();
   if (moved) {
     for (Drawable* drawable : slot->drawables) observer.OnEnter(*drawable);
   }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
 #include "gpu/assemble/bins.h"
+#include "gpu/clip.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
 
@@ -39,9 +41,13 @@ struct Drawable {
 
 struct Layer {
   LayerRecord record;
+  std::optional<VoxelClip> clip;  // derived, in voxel space; none: to be mapped anew
   absl::flat_hash_set<Drawable*> drawables;
   int rank = 0;  // in the order of combination
 };
+
+// Whether what is drawn in a layer of this record comes out as in one of the other, if nothing moves.
+bool LooksSame(const LayerRecord& a, const LayerRecord& b);
 
 struct DeltaPlan;
 
@@ -57,7 +63,7 @@ struct SceneObserver {
   virtual void OnLeave(Drawable& drawable) = 0;
   // It is new, or has changed (after OnLeave); `layer` and `geometry` are set.
   virtual void OnEnter(Drawable& drawable) = 0;
-  // Its drawables stay as they are, but combine otherwise (visibility, opacity, order, blend).
+  // Its drawables stay as they are, but combine otherwise (LooksSame is false, or it moves).
   virtual void OnLayerLook(Layer& layer, const LayerRecord& next) = 0;
 };
 
@@ -72,6 +78,8 @@ class Scene {
     return drawables_;
   }
   const absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>>& layers() const { return layers_; }
+  // Sees to it that every layer has its `clip`. `anew`: the view has changed.
+  void MapClips(const Affine& view, bool anew);
   // How many drawables use it; −1 if there is no such id.
   int64_t GeometryUses(uint64_t id) const;
   int64_t LayerUses(uint64_t id) const;

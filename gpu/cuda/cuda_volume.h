@@ -94,8 +94,9 @@ class CudaVolume final : private SceneObserver {
   absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
   absl::flat_hash_set<const Drawable*> pending_;
 
-  Block looks_;
+  Block looks_, half_spaces_;
   std::vector<LayerLook> looks_now_, looks_there_;  // by slot; what the device has
+  std::vector<VoxelHalfSpace> half_spaces_now_, half_spaces_there_;
   absl::flat_hash_map<uint64_t, uint32_t> layer_slots_;
   std::vector<uint32_t> free_layer_slots_;
 

@@ -119,7 +119,7 @@ TEST(Delta, SizesAreAsCountedByHand) {
   EXPECT_EQ(DeltaWriter::SizeOf(Mesh()), 208u);
   EXPECT_EQ(DeltaWriter::SizeOf(GeometryRecord{}), 112u);
   EXPECT_EQ(DeltaWriter::SizeOf(DrawableRecord{}), 144u);
-  EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 144u);
+  EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 448u);
   EXPECT_EQ(DeltaWriter::kSizeOfId, 32u);
   EXPECT_EQ(DeltaWriter::kSizeOfReset, 16u);
 }
@@ -130,7 +130,7 @@ TEST(Delta, AnOverrunIsCountedAndNotWritten) {
   DeltaWriter writer(block.bytes().first(32));
   writer.PutLayer({.id = 1});
   EXPECT_TRUE(writer.overrun());
-  EXPECT_EQ(writer.size(), 144u);
+  EXPECT_EQ(writer.size(), 448u);
   for (std::byte b : block.bytes().last(16)) EXPECT_EQ(b, std::byte{0xEE});
 }
 
@@ -250,6 +250,25 @@ TEST(Delta, RefusesBadDrawablesAndLayers) {
   EXPECT_THAT(layer({.visible = 2}), HasSubstr("layer.visible is 2"));
   EXPECT_THAT(layer({.opacity = 256}), HasSubstr("layer.opacity is 256, must be 0 to 255"));
   EXPECT_THAT(layer({.blend = static_cast<BlendMode>(3)}), HasSubstr("layer.blend is 3"));
+  EXPECT_THAT(layer({.plane_count = 9}), HasSubstr("layer.plane_count is 9, must be 0 to 8"));
+  EXPECT_THAT(layer({.has_region = 2}), HasSubstr("layer.has_region is 2, must be 0 to 1"));
+  LayerRecord clipped{.plane_count = 2};
+  clipped.planes[0] = {0, 0, 1, -7};
+  EXPECT_THAT(layer(clipped),
+              HasSubstr("layer.planes[1] is (0, 0, 0), must be a plane with a normal"));
+  clipped.planes[1] = {1, 0, 0, INFINITY};
+  EXPECT_THAT(layer(clipped), HasSubstr("layer.planes[1][3] is inf, must be finite"));
+  clipped.planes[1].d = 0;
+  clipped.planes[2].a = NAN;  // beyond plane_count
+  EXPECT_EQ(layer(clipped), "");
+  clipped.region = {{0, 0, 5}, {1, 1, 5}};
+  EXPECT_EQ(layer(clipped), "");
+  clipped.has_region = 1;
+  EXPECT_THAT(layer(clipped), HasSubstr("layer.region.max[2] is 5, must be greater than min's 5"));
+  clipped.region.max[2] = NAN;
+  EXPECT_THAT(layer(clipped), HasSubstr("layer.region.max[2] is nan, must be finite"));
+  clipped.region.max[2] = 6;
+  EXPECT_EQ(layer(clipped), "");
 }
 
 }  // namespace

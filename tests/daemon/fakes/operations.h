@@ -1,6 +1,7 @@
 // Short ways to write operations in tests.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -77,6 +78,19 @@ inline Operation SetLayer(std::string layer, std::optional<bool> visible,
   state.layer = std::move(layer);
   state.visible = visible;
   state.transform = transform;
+  return {0, std::move(state)};
+}
+inline Operation SetClip(std::string layer, const std::vector<gpu::ClipPlane>& planes) {
+  LayerState state;
+  state.layer = std::move(layer);
+  state.clip.emplace().count = static_cast<uint32_t>(planes.size());
+  std::copy(planes.begin(), planes.end(), state.clip->planes);
+  return {0, std::move(state)};
+}
+inline Operation SetRegion(std::string layer, std::optional<gpu::Region> region) {
+  LayerState state;
+  state.layer = std::move(layer);
+  state.region = region;
   return {0, std::move(state)};
 }
 inline Operation Begin(std::string layer) { return {0, FrameBegin{std::move(layer)}}; }

@@ -100,6 +100,37 @@ TEST(EngineDelta, WhatAnEngineDoesNotSeeIsNotSent) {
   EXPECT_EQ(pair.size, 0u);
 }
 
+TEST(EngineDelta, ALayersClipAndRegionGoWithTheLayerAlone) {
+  StoreFixture f;
+  f.Commit(Put("a", "x"), Put("b", "y"));
+  Pair pair;
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  const gpu::ClipPlane floor{0, 0, 1, 0}, wall{1, 0, 0, -2};
+  const gpu::Region box{{0, 0, 0}, {1, 2, 3}};
+  const auto layer = [&] { return pair.model.layers().at(f.GetLayer("a")->number); };
+  const auto bring = [&](Operation operation) {
+    f.Commit(std::move(operation));
+    EXPECT_TRUE(pair.Bring(f.store.snapshot()).ok());
+    return pair.model.puts() + pair.model.drops();
+  };
+  EXPECT_EQ(bring(testing::SetClip("a", {floor, wall})), 1);
+  EXPECT_EQ(layer().plane_count, 2u);
+  EXPECT_EQ(layer().planes[0], floor);
+  EXPECT_EQ(layer().planes[1], wall);
+  EXPECT_EQ(layer().has_region, 0u);
+  EXPECT_EQ(bring(testing::SetRegion("a", box)), 1);
+  EXPECT_EQ(layer().plane_count, 2u);
+  EXPECT_EQ(layer().has_region, 1u);
+  EXPECT_EQ(layer().region, box);
+  f.Commit(testing::SetClip("a", {floor, wall}), testing::SetRegion("a", box));
+  EXPECT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_EQ(pair.size, 0u);  // the same again
+  EXPECT_EQ(bring(testing::SetClip("a", {})), 1);
+  EXPECT_EQ(layer().plane_count, 0u);
+  EXPECT_EQ(bring(testing::SetRegion("a", std::nullopt)), 1);
+  EXPECT_EQ(layer().has_region, 0u);
+}
+
 TEST(EngineDelta, InstancesShareGeometriesAndComposeFromTheOutside) {
   StoreFixture f;
   gpu::Affine turn;  // a quarter about z
