@@ -18,4 +18,4 @@ with voxel.connect(name="painter") as painter, voxel.connect(name="watcher") as 
         else:
             break
     print(seen)
-    assert seen == ["ball at []", "ball at [0.5, 0.0, 0.0]", "ball gone"]
+    assert seen == ["ball at [0.0, 0.0, 0.0]", "ball at [0.5, 0.0, 0.0]", "ball gone"]
