@@ -29,6 +29,7 @@ ALLOWED = {
     "daemon/scene": ["gpu", "display/api", "display/sync"],
     "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
     "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
+    "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["client", "display/geometry", "display/api", "display/sync", "gpu", "voxeld/v1", "tools",
               # What an address looks like, and what was meant: alike at both ends.
               "daemon/address", "daemon/suggest"],

@@ -254,6 +254,7 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   if (!session.options.no_outcomes) {
     for (const auto& slot : displays_) accepted.displays.push_back(slot->info.name);
   }
+  scene_watch_.Publish(store_.snapshot());  // who has the receipt sees the commit
   if (session.sink != nullptr) {
     session.sink->OnReceipt({commit.commit.frame_id, commit.sequence, std::move(accepted)});
   }

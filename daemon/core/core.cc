@@ -67,6 +67,8 @@ void Core::CountOverrun() {
   impl_->loop().Post([impl = impl_.get()] { impl->CountOverrun(); });
 }
 
+SceneWatch& Core::scene_watch() { return impl_->scene_watch(); }
+
 void Core::ListEntities(EntityQuery query, Reply<EntityPage> reply) {
   Ask(impl_->loop(), std::move(reply),
       [impl = impl_.get(), query = std::move(query)](const Reply<EntityPage>& answer) {

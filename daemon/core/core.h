@@ -39,6 +39,7 @@
 
 namespace voxeld::daemon {
 
+class SceneWatch;
 using SessionId = uint64_t;
 using display::CaptureId;
 
@@ -56,6 +57,8 @@ struct CoreOptions {
   std::function<void(const std::string& display, display::DisplayState state,
                      const std::string& reason)>
       state_event;
+  // The listener's figures, for Stats; from any thread. May be empty.
+  std::function<ListenFigures()> connections;
 };
 
 struct SessionInfo {
@@ -182,6 +185,9 @@ class Core {
   void CountOverrun();
 
   // ---- queries
+  // The newest snapshot, and word of the next; at once, in any thread, whatever the core is busy
+  // with. A commit is in it before its Accepted is told. As long as the core.
+  SceneWatch& scene_watch();
   void ListEntities(EntityQuery query, Reply<EntityPage> reply);
   void GetEntity(EntityKey key, Reply<EntityInfo> reply);
   void ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<Cleared> reply);

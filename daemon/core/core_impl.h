@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "daemon/core/core.h"
+#include "daemon/core/scene_watch.h"
 #include "daemon/core/token.h"
 #include "daemon/pipeline/frame_pipeline.h"
 #include "daemon/pipeline/loop.h"
@@ -32,6 +33,7 @@ class Core::Impl {
   // ---- any thread
   const CoreOptions& options() const { return options_; }
   Loop& loop() { return *loop_; }
+  SceneWatch& scene_watch() { return scene_watch_; }
   const std::shared_ptr<Budget>& budget() const { return budget_; }
   CaptureId NewCapture() { return next_capture_++; }
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
@@ -106,7 +108,6 @@ class Core::Impl {
   // A session without a stream, that can be taken up.
   struct Dormant {
     uint64_t incarnation = 0, owner = 0;
-    WriterPtr writer;
     std::string resume_token;
     std::optional<uint64_t> last_frame_id, last_sequence;
     std::deque<Receipt> outcomes;  // charged to kOwed
@@ -206,10 +207,6 @@ class Core::Impl {
   // Hands the newest snapshot to every display, unless they have it.
   void Publish();
 
-  // ---- queries
-  EntityInfo InfoOf(const OwnedName& layer, const std::string& id, const Entity& entity) const;
-  LayerInfo InfoOf(const OwnedName& key, const Layer& layer) const;
-
   // ---- displays
   absl::StatusOr<DisplaySlot*> FindDisplay(const std::string& name);
   // What coordinates must fit: every display's view, and those to come.
@@ -234,6 +231,7 @@ class Core::Impl {
   std::vector<std::unique_ptr<DisplaySlot>> displays_;
 
   const std::shared_ptr<Budget> budget_;
+  SceneWatch scene_watch_;
   std::map<SessionId, Session> sessions_;
   std::map<SessionId, Dormant> dormant_;
   std::map<std::string, SessionId> resume_tokens_;  // of sessions and dormant ones

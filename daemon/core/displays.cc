@@ -204,6 +204,7 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.decoding = decoding_.Summary(stats.time_ns);
   stats.applying = applying_.Summary(stats.time_ns);
   stats.memory = MemoryOf(*budget_);
+  if (options_.connections) stats.connections = options_.connections();
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;

@@ -39,7 +39,7 @@ std::vector<OwnerInfo> Core::Impl::ListOwners() const {
     OwnerInfo& info = infos[key.owner];
     ++info.layers;
     info.entities += layer->entities.size();
-    if (!sessions_.contains(layer->writer->session)) ++info.orphaned_layers;
+    if (layer->writer->ended) ++info.orphaned_layers;
   });
   scene.objects.ForEach(
       [&](const OwnedName& key, const ObjectPtr&) { ++infos[key.owner].objects; });

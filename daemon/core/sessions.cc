@@ -76,7 +76,9 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& option
   session.id = id;
   session.incarnation = dormant.incarnation + 1;
   session.owner = dormant.owner;
-  session.writer = dormant.writer;
+  session.writer = std::make_shared<const Writer>(Writer{id, options.client_name});
+  store_.HandOver(id, session.writer);
+  Publish();
   session.owed_outcomes = dormant.owed_outcomes;
   session.last_frame_id = dormant.last_frame_id;
   session.last_sequence = dormant.last_sequence;
@@ -169,6 +171,10 @@ void Core::Impl::FinishClose(SessionId id) {
       }
       break;
   }
+  if (layers_until > now) {
+    store_.HandOver(id,
+                    std::make_shared<const Writer>(Writer{id, session.writer->client_name, true}));
+  }
   KeepDormant(session, layers_until);
   ForgetOwner(session.owner);
   Publish();
@@ -180,7 +186,6 @@ void Core::Impl::KeepDormant(Session& session, sync::TimeNs layers_until) {
   Dormant dormant;
   dormant.incarnation = session.incarnation;
   dormant.owner = session.owner;
-  dormant.writer = session.writer;
   dormant.resume_token = session.resume_token;
   dormant.last_frame_id = session.last_frame_id;
   dormant.last_sequence = session.last_sequence;
@@ -265,6 +270,7 @@ sync::TimeNs Core::Impl::RunDue() {
 void Core::Impl::Publish() {
   if (published_ == store_.snapshot()) return;
   published_ = store_.snapshot();
+  scene_watch_.Publish(published_);
   budget_->Set(Budget::Use::kScene, published_->total.bytes);
   for (const auto& slot : displays_) {
     slot->host->work->Post([pipeline = slot->host->pipeline.get(), snapshot = published_] {

@@ -50,6 +50,18 @@ struct MemoryFigures {
            local = 0, arriving = 0;
 };
 
+// Connections over gRPC's addresses; the daemon's own (its probe) are in none of these.
+struct ListenFigures {
+  uint64_t open = 0, accepted = 0;
+  // Closed at once: max_connections, max_connections_per_address.
+  uint64_t refused_in_all = 0, refused_by_address = 0;
+  // By the guard: too many bytes, too long, before a call was answered; too many calls cancelled.
+  uint64_t cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
+  uint64_t accept_failures = 0;  // out of descriptors, say; tried again until it works
+  uint64_t probe_failures = 0;   // of connections to itself
+  std::string unreachable;       // empty: they work; else why they do not
+};
+
 struct Stats {
   int64_t time_ns = 0;
   std::string version;
@@ -70,6 +82,7 @@ struct Stats {
   // By stage, of commits: sent to received, to decoded, to applied.
   LatencyStats sending, decoding, applying;
   MemoryFigures memory;
+  ListenFigures connections;
   std::vector<DisplayFigures> displays;
 };
 

@@ -15,7 +15,8 @@ Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
       loop_(std::make_shared<Loop>(clock)),
       store_(options_.limits),
       published_(store_.snapshot()),
-      budget_(std::make_shared<Budget>(options_.limits.max_memory_bytes)) {}
+      budget_(std::make_shared<Budget>(options_.limits.max_memory_bytes)),
+      scene_watch_(published_) {}
 
 void Core::Impl::Launch(std::string name, std::function<void()> body) {
   {

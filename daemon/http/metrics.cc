@@ -75,6 +75,26 @@ constexpr MemoryRow kMemoryRows[] = {
     {"local", &MemoryFigures::local},     {"arriving", &MemoryFigures::arriving},
 };
 
+constexpr Row<ListenFigures> kConnectionRows[] = {
+    {"voxeld_connections", &ListenFigures::open, MetricType::Gauge, "Open connections over gRPC"},
+    {"voxeld_connections_accepted_total", &ListenFigures::accepted, MetricType::Counter,
+     "Connections accepted"},
+    {"voxeld_connections_refused_in_all_total", &ListenFigures::refused_in_all, MetricType::Counter,
+     "Connections closed at once: max_connections were open"},
+    {"voxeld_connections_refused_by_address_total", &ListenFigures::refused_by_address,
+     MetricType::Counter, "Connections closed at once: max_connections_per_address were open"},
+    {"voxeld_connections_cut_for_bytes_total", &ListenFigures::cut_for_bytes, MetricType::Counter,
+     "Connections cut: too many bytes before a call was answered"},
+    {"voxeld_connections_cut_for_time_total", &ListenFigures::cut_for_time, MetricType::Counter,
+     "Connections cut: too long without an answered call"},
+    {"voxeld_connections_cut_for_cancelling_total", &ListenFigures::cut_for_cancelling,
+     MetricType::Counter, "Connections cut: too many cancelled calls within a second"},
+    {"voxeld_accept_failures_total", &ListenFigures::accept_failures, MetricType::Counter,
+     "Times that no connection could be accepted, out of descriptors say"},
+    {"voxeld_probe_failures_total", &ListenFigures::probe_failures, MetricType::Counter,
+     "Connections of the daemon to itself that failed"},
+};
+
 constexpr Row<DisplayFigures> kDisplayRows[] = {
     {"voxeld_display_lit_voxels", &DisplayFigures::lit_voxels, MetricType::Gauge,
      "Voxels that are not black"},
@@ -275,6 +295,10 @@ std::string MetricsText(const Stats& stats) {
                                       "What is held for clients, by what it is for");
   for (const MemoryRow& row : kMemoryRows) {
     Add(memory, {{"use", row.use}}, static_cast<double>(stats.memory.*row.figure));
+  }
+  for (const auto& row : kConnectionRows) {
+    Add(families.New(row.name, row.type, row.help), {},
+        static_cast<double>(stats.connections.*row.figure));
   }
   AddDisplays(stats.displays, &families);
   return families.Text();

@@ -22,6 +22,7 @@ namespace voxeld::daemon {
 struct Writer {
   uint64_t session = 0;
   std::string client_name;
+  bool ended = false;  // its layers are orphaned
 };
 using WriterPtr = std::shared_ptr<const Writer>;
 
@@ -114,7 +115,7 @@ struct OwnerTally {
 };
 
 struct Snapshot {
-  uint64_t number = 0;  // ascending
+  uint64_t number = 0;  // ascending; 0: of no store
   PersistentMap<OwnedName, LayerPtr> layers;
   PersistentMap<OwnedName, ObjectPtr> objects;
   PersistentMap<UseKey, bool> uses;

@@ -54,7 +54,7 @@ Core::Reply<T> Answer(std::shared_ptr<UnaryCall> call, Response* response) {
 using SceneStub = v1::SceneService;
 using SceneBase =
     SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithRawCallbackMethod_ApplyUpdate<
-        SceneStub::WithCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
+        SceneStub::WithRawCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
             SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
                 SceneStub::WithCallbackMethod_ListOwners<SceneStub::WithCallbackMethod_ControlOwner<
                     SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>>>;
@@ -73,10 +73,9 @@ class SceneService final : public SceneBase {
     return DoApplyUpdate(call->DefaultReactor(), *request, response);
   }
 
-  grpc::ServerWriteReactor<v1::WatchSceneResponse>* WatchScene(
-      CallbackServerContext*, const v1::WatchSceneRequest*) override {
-    return new RefusedWrites<v1::WatchSceneResponse>(absl::UnimplementedError(
-        "WatchScene is not implemented in this version of the server: use ListEntities"));
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* WatchScene(CallbackServerContext*,
+                                                         const grpc::ByteBuffer* request) override {
+    return DoWatchScene(*request);
   }
 
   ServerUnaryReactor* ListEntities(CallbackServerContext* call,
@@ -143,6 +142,17 @@ class SceneService final : public SceneBase {
           });
         });
     return reactor;
+  }
+
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* DoWatchScene(grpc::ByteBuffer request) {
+    v1::WatchSceneRequest parsed;
+    const grpc::Status status =
+        grpc::SerializationTraits<v1::WatchSceneRequest>::Deserialize(&request, &parsed);
+    if (!status.ok()) {
+      return new RefusedWrites<grpc::ByteBuffer>(
+          absl::InvalidArgumentError("the message is no WatchSceneRequest"));
+    }
+    return NewSceneWatch(context_, parsed);
   }
 
   ServerUnaryReactor* DoListEntities(ServerUnaryReactor* reactor,

@@ -67,23 +67,6 @@ struct ReceiptEncoder {
   }
 };
 
-void EncodeLayer(const LayerInfo& in, v1::LayerInfo* out) {
-  out->set_owner(in.owner);
-  out->set_layer(in.layer);
-  out->set_number(in.number);
-  out->set_visible(in.visible);
-  out->set_opacity(in.opacity);
-  out->set_order(in.order);
-  out->set_blend(ToWire(in.blend));
-  ToWire(in.transform, out->mutable_transform());
-  if (in.clip.count > 0) ToWire(in.clip, out->mutable_clip());
-  if (in.region.has_value()) ToWire(*in.region, out->mutable_region());
-  out->set_entities(in.entities);
-  out->set_bytes(in.bytes);
-  out->set_orphaned(in.orphaned);
-  out->set_client_name(in.client_name);
-}
-
 }  // namespace
 
 void Encode(const SessionInfo& in, v1::Opened* out) {
@@ -183,9 +166,26 @@ void Encode(const EntityInfo& in, v1::EntityInfo* out) {
   out->mutable_color()->set_rgb(in.color);
 }
 
+void Encode(const LayerInfo& in, v1::LayerInfo* out) {
+  out->set_owner(in.owner);
+  out->set_layer(in.layer);
+  out->set_number(in.number);
+  out->set_visible(in.visible);
+  out->set_opacity(in.opacity);
+  out->set_order(in.order);
+  out->set_blend(ToWire(in.blend));
+  ToWire(in.transform, out->mutable_transform());
+  if (in.clip.count > 0) ToWire(in.clip, out->mutable_clip());
+  if (in.region.has_value()) ToWire(*in.region, out->mutable_region());
+  out->set_entities(in.entities);
+  out->set_bytes(in.bytes);
+  out->set_orphaned(in.orphaned);
+  out->set_client_name(in.client_name);
+}
+
 void Encode(const EntityPage& in, v1::ListEntitiesResponse* out) {
   for (const EntityInfo& entity : in.entities) Encode(entity, out->add_entities());
-  for (const LayerInfo& layer : in.layers) EncodeLayer(layer, out->add_layers());
+  for (const LayerInfo& layer : in.layers) Encode(layer, out->add_layers());
   out->set_next_page_token(in.next_page_token);
   out->set_total(in.total);
 }

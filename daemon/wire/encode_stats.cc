@@ -71,6 +71,19 @@ void EncodeMemory(const MemoryFigures& in, v1::MemoryUse* out) {
   out->set_arriving_bytes(in.arriving);
 }
 
+void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
+  out->set_open(in.open);
+  out->set_accepted(in.accepted);
+  out->set_refused_in_all(in.refused_in_all);
+  out->set_refused_by_address(in.refused_by_address);
+  out->set_cut_for_bytes(in.cut_for_bytes);
+  out->set_cut_for_time(in.cut_for_time);
+  out->set_cut_for_cancelling(in.cut_for_cancelling);
+  out->set_accept_failures(in.accept_failures);
+  out->set_probe_failures(in.probe_failures);
+  out->set_unreachable(in.unreachable);
+}
+
 }  // namespace
 
 void Encode(const Stats& in, v1::Stats* out) {
@@ -101,6 +114,7 @@ void Encode(const Stats& in, v1::Stats* out) {
   EncodeLatency(in.decoding, out->mutable_decoding());
   EncodeLatency(in.applying, out->mutable_applying());
   EncodeMemory(in.memory, out->mutable_memory());
+  EncodeConnections(in.connections, out->mutable_connections());
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

@@ -39,7 +39,8 @@ CHANNEL_OPTIONS = [
 
 # To begin again would bring the same answer.
 _FINAL = (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.PERMISSION_DENIED, grpc.StatusCode.UNAUTHENTICATED,
-          grpc.StatusCode.UNIMPLEMENTED, grpc.StatusCode.FAILED_PRECONDITION, grpc.StatusCode.NOT_FOUND)
+          grpc.StatusCode.UNIMPLEMENTED, grpc.StatusCode.FAILED_PRECONDITION, grpc.StatusCode.NOT_FOUND,
+          grpc.StatusCode.ABORTED)  # another stream has taken the session up
 
 
 def backoff_s(attempt: int, draw: Callable[[], float]) -> float:

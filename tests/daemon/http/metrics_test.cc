@@ -106,6 +106,13 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("the last volume is held"));
   stats.displays[0].volume_held = false;
   stats.displays[0].engine_degraded = "";
+  stats.connections.unreachable = "127.0.0.1:1: no answer came in time";
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
+  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+            R"({"status":"failing","reasons":[{"what":"not reachable",)"
+            R"("why":"127.0.0.1:1: no answer came in time"}]})"
+            "\n");
+  stats.connections.unreachable = "";
   EXPECT_EQ(HealthResponse(displays, stats, true).status, 503u);
   EXPECT_THAT(HealthResponse(displays, stats, true).body, HasSubstr("shutting down"));
 }

@@ -37,10 +37,10 @@ using testing::StoreFixture;
 TEST(SceneStore, ACommitMakesOneSnapshotAndLeavesTheOldOneAsItWas) {
   StoreFixture f;
   const SnapshotPtr empty = f.store.snapshot();
-  EXPECT_EQ(empty->number, 0u);
+  EXPECT_EQ(empty->number, 1u);
   EXPECT_TRUE(f.Commit(Put("a", "x"), Put("b", "y")).applied);
   const SnapshotPtr first = f.store.snapshot();
-  EXPECT_EQ(first->number, 1u);
+  EXPECT_EQ(first->number, 2u);
   EXPECT_EQ(f.Scene(), "a: x; b: y");
   EXPECT_EQ(f.Commit(DeleteId("a", "x"), Put("a", "z")).applied_operations, 2u);
   EXPECT_EQ(f.Scene(), "a: z; b: y");

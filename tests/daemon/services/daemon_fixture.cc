@@ -48,7 +48,8 @@ Daemon::Daemon(DaemonOptions options)
                               {.listen = {*ParseAddress(target_)},
                                .version = "9.8.7",
                                .streams = {.drain_limit_ns = options.drain_limit_ns,
-                                           .max_queued_answers = options.max_queued_answers}});
+                                           .max_queued_answers = options.max_queued_answers},
+                               .max_scene_watches = options.max_scene_watches});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);
   channel_ = NewChannel();
