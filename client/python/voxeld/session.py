@@ -1,9 +1,9 @@
 """The client's side of a stream as a state machine: what to send next, and what answers mean. Pure: no threads, no sockets;
 time is an argument, in ns of any steady clock. The transport calls it under one lock.
 
-A connection outlives its streams. When one ends, what was sent on it and not answered is sent again where the server knows
-the session still (resume), from the first commit that it had not applied. Where it does not, a new session gets the mirror's
-whole scene first, and what was on its way is in that and gets its receipts.
+A connection outlives its streams. When one ends, the next takes its session up. Where the server kept the session's layers
+(KEEP), what was sent and not applied is sent again. Where they went with the stream, or the server does not know the session
+any more, the mirror's whole scene comes first, in one commit; what was on its way is in that and gets its receipts.
 """
 from __future__ import annotations
 
@@ -213,28 +213,30 @@ class Session:
                     self.book.applied_unseen(unit.frame, opened.displays)
                 else:
                     self._again.append(unit)
-            if self._rebuilding and not opened.HasField("last_frame_id"):
-                self._replay = self._mirrored(now_ns)  # the last try did not come to its commit
-            else:
+            if self._settings.on_disconnect == "keep" and not (self._rebuilding and not opened.HasField("last_frame_id")):
                 for frame in self._rebuilt:
                     self.book.applied_unseen(frame, opened.displays)
                 self._rebuilt = []
+                self._unsure = [frame for frame in self.book.open_frames() if frame.answered]
+                return
             self._unsure = [frame for frame in self.book.open_frames() if frame.answered]
-            return
         if self.streams_opened == 1:
             return
-        self.clock.forget()
-        self._rebuilt = [f for f in self._rebuilt if not f.answered] + [unit.frame for unit in (*self._on_way, *self._again)]
-        # Whether these were counted is not known; the server that did is another one now.
-        self.outbox.unreported_drops += sum(unit.drops for unit in (*self._on_way, *self._again))
+        if not resumed:
+            self.clock.forget()
+            self.book.give_up([f for f in self.book.open_frames() if f.answered], "its outcome was lost with a connection")
+            self._unsure = []
+        # The layers are gone, or may be: what was on its way is in the mirror.
+        folded = (*self._on_way, *self._again)
+        self._rebuilt = [f for f in self._rebuilt if not f.answered] + [unit.frame for unit in folded]
+        self.outbox.unreported_drops += sum(unit.drops for unit in folded)
         self._on_way.clear()
         self._again.clear()
-        self.book.give_up([f for f in self.book.open_frames() if f.answered], "its outcome was lost with a connection")
-        self._unsure = []
         self._replay = self._mirrored(now_ns)
         self._rebuilding = True
 
     def _mirrored(self, now_ns: int) -> Iterator[bytes]:
+        yield pb.StreamRequest(delete=pb.Delete(all_mine=True)).SerializeToString()  # of what lingers
         yield from self.mirror.requests(now_ns)
         yield pb.StreamRequest(commit=pb.Commit(send_time_ns=now_ns)).SerializeToString()
 

@@ -13,6 +13,7 @@ Scene = dict[str, dict[str, bytes]]  # layer → id → Entity, serialised
 class Session:
     def __init__(self, token: bytes) -> None:
         self.token = token
+        self.keeps = False
         self.scene: Scene = {}
         self.objects: dict[str, bytes] = {}
         self.states: dict[str, Any] = {}
@@ -79,8 +80,11 @@ class PlainServer:
             if request.resume_token not in self.sessions:
                 raise LookupError("no such session")
             self.session = self.sessions.pop(request.resume_token)
+            if not self.session.keeps:  # its layers went with its stream
+                self.session.scene, self.session.states, self.session.objects = {}, {}, {}
         else:
             self.session = Session(b"")
+        self.session.keeps = request.on_disconnect == pb.DISCONNECT_POLICY_KEEP
         self.tokens += 1
         self.session.token = f"token{self.tokens}".encode()
         self.sessions[self.session.token] = self.session

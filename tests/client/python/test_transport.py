@@ -92,7 +92,7 @@ class Streams(Case):
 
     def test_a_lost_stream_is_resumed(self) -> None:
         served = self.serve()
-        v = self.connect()
+        v = self.connect(on_disconnect="keep")
         v.sphere("a").frame.wait(LONG)  # type: ignore[union-attr]
         served.cut.set()
         frame = v.sphere("b").frame
