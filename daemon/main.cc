@@ -192,7 +192,6 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                .connections = config.server.connections,
                                .counters = counters,
                                .max_calls_per_connection = config.server.max_calls_per_connection,
-                               .max_scene_watches = config.server.max_scene_watches,
                                .max_metadata_bytes = config.server.max_metadata_bytes,
                                .handshake_limit_ns = config.server.handshake_limit_ns,
                                .ping_interval_min_ns = config.server.ping_interval_min_ns,
@@ -200,6 +199,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                .connection_idle_limit_ns = config.server.connection_idle_limit_ns,
                                .connection_age_limit_ns = config.server.connection_age_limit_ns,
                                .connection_age_grace_ns = config.server.connection_age_grace_ns,
+                               .max_scene_watches = config.server.max_scene_watches,
                                .keepalive_interval_ns = config.server.keepalive_interval_ns,
                                .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
                                .log = &log});
