@@ -1,17 +1,10 @@
-// Where tests find the programs that they start: beside themselves, also where they were copied to.
+// Where tests find the programs that they start.
 #pragma once
 
-#include <filesystem>
-#include <string>
+#include "tools/child/programs.h"
 
 namespace voxeld {
 
-// `name` in the running program's folder, else in the one above.
-inline std::string ProgramBeside(const std::string& name) {
-  const std::filesystem::path folder =
-      std::filesystem::read_symlink("/proc/self/exe").parent_path();
-  const std::filesystem::path beside = folder / name;
-  return (std::filesystem::exists(beside) ? beside : folder.parent_path() / name).string();
-}
+using child::ProgramBeside;
 
 }  // namespace voxeld

@@ -198,8 +198,10 @@ class FileReader {
     if (node == nullptr) return;
     section_ = "display";
     const toml::array* tables = node->as_array();
-    if (tables == nullptr || !tables->is_homogeneous<toml::table>()) {
-      return Error(node->source(), "display is no list of tables; write [[display]] for each");
+    if (tables == nullptr || (!tables->empty() && !tables->is_homogeneous<toml::table>())) {
+      return Error(node->source(),
+                   "display is no list of tables; write [[display]] for each, or display = [] for "
+                   "none");
     }
     config->displays.clear();
     std::set<std::string> names;
@@ -350,6 +352,7 @@ absl::Status ReadConfigText(std::string_view text, const std::string& name, Conf
 std::string ToToml(const Config& config) {
   std::string out = config.file.empty() ? "# voxeld: no file was read\n"
                                         : absl::StrCat("# voxeld: from ", config.file, "\n");
+  if (config.displays.empty()) out += "display = []\n";
   Printer printer(&out);
   VisitFields(config, printer);
   for (const DisplayConfig& display : config.displays) printer.Display(display);

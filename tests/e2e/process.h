@@ -1,13 +1,16 @@
-// A child process with its output, for tests.
+// A child process with its output, for tests: what cannot be started or does not end is a failure.
 #pragma once
 
 #include <sys/types.h>
 
 #include <chrono>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "tools/child/child_process.h"
 
 namespace voxeld::e2e {
 
@@ -20,33 +23,28 @@ class Process {
   // `environment` goes over the test's own.
   Process(const std::vector<std::string>& arguments,
           const std::map<std::string, std::string>& environment = {});
-  ~Process();
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
 
-  pid_t pid() const { return pid_; }
-  void Signal(int signal);
+  pid_t pid() const { return child_->pid(); }
+  void Signal(int signal) { child_->Signal(signal); }
 
   // The next line of its standard output or error, without the newline; nothing at the end, or when
   // patience has run out.
-  std::optional<std::string> ReadLine();
+  std::optional<std::string> ReadLine() { return child_->ReadLine(); }
   // The first further line that has `text` in it.
-  std::optional<std::string> ReadLineWith(const std::string& text);
+  std::optional<std::string> ReadLineWith(const std::string& text) {
+    return child_->ReadLineWith(text);
+  }
 
   // Waits for its end. The exit code, or −signal; nothing if it did not end in `limit`.
-  std::optional<int> Wait(std::chrono::milliseconds limit = kPatience);
+  std::optional<int> Wait(std::chrono::milliseconds limit = kPatience) {
+    return child_->Wait(limit);
+  }
 
   // All that it has said so far (after Wait: all).
-  const std::string& output() const { return output_; }
+  const std::string& output() const { return child_->output(); }
 
  private:
-  bool ReadSome(std::chrono::steady_clock::time_point deadline);
-
-  pid_t pid_ = -1;
-  int pidfd_ = -1, pipe_ = -1;
-  std::optional<int> code_;
-  std::string output_;
-  size_t read_ = 0;  // of output_, by ReadLine
+  std::unique_ptr<child::ChildProcess> child_;
 };
 
 struct Ended {

@@ -27,9 +27,7 @@ std::string Folder::File(const std::string& name, const std::string& text) const
 }
 
 std::map<std::string, std::string> CleanEnvironment(const Folder& folder) {
-  return {{"HOME", folder.path()},
-          {"XDG_CONFIG_HOME", folder.path()},
-          {"XDG_RUNTIME_DIR", folder.path()}};
+  return child::CleanEnvironment(folder.path());
 }
 
 std::string VoxeldBinary() { return ProgramBeside("voxeld"); }

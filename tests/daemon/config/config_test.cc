@@ -110,6 +110,20 @@ driver = "simulated"
   EXPECT_EQ(config.displays[0].source, "test.toml:22:1");
 }
 
+TEST(ConfigText, NoDisplaysAtAllCanBeAskedForAndReadsBack) {
+  Config config;
+  config.displays.push_back({"sim", "simulated", {}, "the default"});
+  const char* text = "display = []\n[server]\nlisten = [\"unix:/x\"]\n[limits]\nmax_sessions = 3\n";
+  ASSERT_TRUE(ReadConfigText(text, "t", &config).ok());
+  EXPECT_THAT(config.displays, SizeIs(0));
+  Config again;
+  again.displays.push_back({"sim", "simulated", {}, "the default"});
+  const absl::Status status = ReadConfigText(ToToml(config), "again", &again);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_THAT(again.displays, SizeIs(0));
+  EXPECT_EQ(again.limits.max_sessions, 3u);
+}
+
 struct Case {
   const char* name;
   const char* text;

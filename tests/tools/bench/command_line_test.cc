@@ -1,0 +1,71 @@
+#include "tools/bench/voxel_bench/command_line.h"
+
+#include <gmock/gmock.h>
+
+namespace voxeld::bench {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+template <typename Options>
+Options Parsed(const std::vector<std::string>& arguments) {
+  const absl::StatusOr<CommandLine> line = ParseCommandLine(arguments);
+  EXPECT_TRUE(line.ok()) << line.status();
+  EXPECT_TRUE(std::holds_alternative<Options>(line->command));
+  return std::get<Options>(line->command);
+}
+
+std::string Refusal(const std::vector<std::string>& arguments) {
+  const absl::StatusOr<CommandLine> line = ParseCommandLine(arguments);
+  EXPECT_FALSE(line.ok());
+  return std::string(line.status().message());
+}
+
+TEST(CommandLine, EachSubcommandHasItsOptions) {
+  const auto ingest = Parsed<IngestOptions>(
+      {"ingest", "--case", "batch_tcp", "--case", "upsert_unix", "--rounds", "2", "--batch", "4"});
+  EXPECT_THAT(ingest.cases, ElementsAre("batch_tcp", "upsert_unix"));
+  EXPECT_EQ(ingest.rounds, 2);
+  EXPECT_EQ(ingest.batch, 4);
+  EXPECT_EQ(Parsed<LatencyOptions>({"latency", "--rate", "50"}).rate, 50);
+  EXPECT_EQ(Parsed<FairnessOptions>({"fairness", "--clients", "7"}).clients, 7);
+  EXPECT_EQ(Parsed<OverloadOptions>({"overload", "--csv", "a.csv"}).csv, "a.csv");
+  EXPECT_EQ(Parsed<IdleOptions>({"idle", "--streams", "9"}).streams, 9);
+  EXPECT_THAT(Parsed<SinkOptions>({"sink", "--listen", "unix:/x"}).listen, ElementsAre("unix:/x"));
+}
+
+TEST(CommandLine, JsonMayStandBeforeAndAfter) {
+  EXPECT_TRUE(ParseCommandLine({"--json", "idle"})->json);
+  EXPECT_TRUE(ParseCommandLine({"idle", "--json"})->json);
+  EXPECT_FALSE(ParseCommandLine({"idle"})->json);
+}
+
+TEST(CommandLine, WhatIsWrongIsSaid) {
+  EXPECT_THAT(Refusal({}), HasSubstr("subcommand"));
+  EXPECT_THAT(Refusal({"ingest", "--case", "none"}), HasSubstr("none"));
+  EXPECT_THAT(Refusal({"ingest", "--line-bytes", "26"}), HasSubstr("26"));
+  EXPECT_THAT(Refusal({"latency", "--seconds", "0"}), HasSubstr("--seconds"));
+  EXPECT_THAT(Refusal({"latency", "--rate", "nan"}), HasSubstr("--rate"));
+  EXPECT_THAT(Refusal({"overload", "--rounds", "3"}), HasSubstr("--rounds"));
+}
+
+TEST(CommandLine, HelpNamesThemAll) {
+  const std::string help = ParseCommandLine({"--help"})->print_and_exit;
+  for (const char* name : {"ingest", "latency", "fairness", "overload", "idle"}) {
+    EXPECT_THAT(help, HasSubstr(name));
+  }
+}
+
+TEST(CommandLine, TheDefaultsOfEachFitIntoTwoMinutes) {
+  const auto total = [](const auto& options) { return options.rounds * options.seconds; };
+  // Both sides of each case; the normal client three times a round.
+  EXPECT_LE(2 * total(IngestOptions()) * static_cast<double>(IngestCases().size()), 90);
+  EXPECT_LE(total(LatencyOptions()), 90);
+  EXPECT_LE(total(FairnessOptions()), 90);
+  EXPECT_LE(OverloadOptions().seconds, 90);
+  EXPECT_LE(3 * total(IdleOptions()), 90);
+}
+
+}  // namespace
+}  // namespace voxeld::bench

@@ -1,0 +1,240 @@
+// How much of what bare gRPC takes in the daemon takes in: the same bytes to both, in turns.
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "tools/bench/voxel_bench/content.h"
+#include "tools/bench/voxel_bench/feed.h"
+#include "tools/bench/voxel_bench/memory_feed.h"
+#include "tools/bench/voxel_bench/report.h"
+#include "tools/bench/voxel_bench/run.h"
+#include "tools/bench/voxel_bench/servers.h"
+
+namespace voxeld::bench {
+namespace {
+
+constexpr int kEntities = 64;  // replaced in each frame
+constexpr uint32_t kLinesAnEntity = 4096;
+constexpr int kVariants = 2;  // of each frame, so that something changes
+constexpr double kTrySeconds = 0.3;
+constexpr int kTryRounds = 3;
+
+enum class Shape : uint8_t { kBatch, kUpsert, kMemory, kMemoryAgain };
+
+struct Case {
+  const char* name;
+  Shape shape;
+  bool tcp, display;
+};
+constexpr Case kCases[] = {{"batch_unix", Shape::kBatch, false, false},
+                           {"batch_tcp", Shape::kBatch, true, false},
+                           {"batch_unix_display", Shape::kBatch, false, true},
+                           {"upsert_unix", Shape::kUpsert, false, false},
+                           {"memfd", Shape::kMemory, false, false},
+                           {"memfd_again", Shape::kMemoryAgain, false, false}};
+
+// All of a frame's entities, or some of them.
+v1::StreamRequest Batch(int variant, int first, int count, LineForm form) {
+  std::vector<Put> puts;
+  for (int i = first; i < std::min(first + count, kEntities); ++i) {
+    const auto seed = uint64_t{kEntities} * variant + i;
+    puts.push_back({"bench",
+                    absl::StrCat("entity-", i),
+                    {.count = kLinesAnEntity, .form = form, .seed = seed}});
+  }
+  return BatchOf(puts);
+}
+
+Frames BatchFrames(int batch, LineForm form) {
+  Frames frames;
+  for (int variant = 0; variant < kVariants; ++variant) {
+    std::vector<Message> frame;
+    for (int first = 0; first < kEntities; first += batch) {
+      frame.emplace_back(Batch(variant, first, batch, form));
+    }
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+// One line each.
+Frames UpsertFrames(LineForm form) {
+  Frames frames;
+  for (int variant = 0; variant < kVariants; ++variant) {
+    std::vector<Message> frame;
+    for (int i = 0; i < kEntities; ++i) {
+      const auto seed = uint64_t{kEntities} * variant + i;
+      frame.emplace_back(UpsertOf("bench", absl::StrCat("entity-", i),
+                                  EntityOf({.count = 1, .form = form, .seed = seed})));
+    }
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+// Both ends' rates of one case, a second.
+struct Rates {
+  std::vector<double> daemon, sink, daemon_cores;
+  double bytes_an_item = 0;
+};
+
+class Ingest {
+ public:
+  Ingest(const IngestOptions& options, const Surroundings& with)
+      : options_(options), with_(with), loop_(with.interrupted) {}
+
+  absl::StatusOr<nlohmann::json> Run() {
+    absl::StatusOr<std::unique_ptr<ServerProcess>> sink = ServerProcess::StartSink();
+    if (!sink.ok()) return sink.status();
+    sink_ = *std::move(sink);
+    nlohmann::json report = ReportOf("ingest", {{"rounds", options_.rounds},
+                                                {"seconds", options_.seconds},
+                                                {"line_bytes", options_.line_bytes},
+                                                {"lines_an_entity", kLinesAnEntity},
+                                                {"entities_a_commit", kEntities},
+                                                {"display", options_.display}});
+    for (const Case& item : kCases) {
+      const std::vector<std::string>& wanted = options_.cases;
+      if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), item.name) == wanted.end()) {
+        continue;
+      }
+      if (absl::Status ran = RunCase(item, report); !ran.ok()) return ran;
+    }
+    return report;
+  }
+
+ private:
+  LineForm form() const { return static_cast<LineForm>(options_.line_bytes); }
+
+  absl::Status RunCase(const Case& item, nlohmann::json& report) {
+    DaemonOptions wanted{.program = with_.daemon};
+    if (item.display) wanted.displays = {absl::StrCat("sim=simulated,", options_.display)};
+    absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(wanted);
+    if (!daemon.ok()) return daemon.status();
+    const bool upserts = item.shape == Shape::kUpsert;
+    int batch = options_.batch;
+    if (!upserts && batch == 0) {
+      if (best_batch_ == 0) {
+        if (absl::Status tried = TryBatches(**daemon, report); !tried.ok()) return tried;
+      }
+      batch = best_batch_;
+    }
+    // For memory the sink gets what the daemon would without it.
+    const Frames frames = upserts ? UpsertFrames(form()) : BatchFrames(batch, form());
+    const size_t message = frames[0][0].bytes();
+    with_.progress(absl::StrFormat("ingest %s: messages of %d bytes", item.name, message));
+    const absl::StatusOr<Rates> rates =
+        Alternate(item, **daemon, frames, options_.rounds, options_.seconds);
+    if (absl::IsUnimplemented(rates.status())) {
+      with_.progress(absl::StrCat("ingest ", item.name, ": ", rates.status().message()));
+      report["left_out"][item.name] = std::string(rates.status().message());
+      return absl::OkStatus();
+    }
+    if (!rates.ok()) return rates.status();
+    const std::string unit = upserts ? "upserts/s" : "lines/s", name = item.name;
+    const Spread daemon_rate = SpreadOf(rates->daemon);
+    AddFigure(report, name + ".ratio", "of the bare sink", RatiosOf(rates->daemon, rates->sink));
+    AddFigure(report, name + ".daemon", unit, daemon_rate);
+    AddFigure(report, name + ".sink", unit, SpreadOf(rates->sink));
+    AddFigure(report, name + ".daemon_bytes", "MB/s",
+              daemon_rate.median * rates->bytes_an_item / 1e6);
+    AddFigure(report, name + ".daemon_cores", "cores", SpreadOf(rates->daemon_cores));
+    report["message_bytes"][name] = message;
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<std::unique_ptr<Feed>> ToDaemon(const Case& item, const ServerProcess& daemon,
+                                                 const Frames& frames) {
+    const std::string& target = item.tcp ? daemon.tcp_target() : daemon.unix_target();
+    if (item.shape == Shape::kBatch || item.shape == Shape::kUpsert) {
+      return FeedDaemon(loop_, target, frames);
+    }
+    std::vector<v1::StreamRequest> whole;
+    whole.reserve(kVariants);
+    for (int variant = 0; variant < kVariants; ++variant) {
+      whole.push_back(Batch(variant, 0, kEntities, form()));
+    }
+    const MemoryUse use = item.shape == Shape::kMemory ? MemoryUse::kFresh : MemoryUse::kAgain;
+    return FeedMemory(loop_, target, whole, use);
+  }
+
+  // Fills best_batch_; what it was chosen from is in the report, the sink's rates beside.
+  absl::Status TryBatches(ServerProcess& daemon, nlohmann::json& report) {
+    double best = 0;
+    for (const int batch : {1, 2, 4, 8}) {
+      const Frames frames = BatchFrames(batch, form());
+      const double seconds = std::min(kTrySeconds, options_.seconds);
+      const absl::StatusOr<Rates> rates = Alternate(kCases[0], daemon, frames, kTryRounds, seconds);
+      if (!rates.ok()) return rates.status();
+      const double rate = SpreadOf(rates->daemon).median;
+      with_.progress(absl::StrFormat("ingest: %d bytes a message, %.3g M lines/s",
+                                     frames[0][0].bytes(), rate / 1e6));
+      report["batch_tried"].push_back({{"entities", batch},
+                                       {"message_bytes", frames[0][0].bytes()},
+                                       {"daemon_lines_per_s", rate},
+                                       {"sink_lines_per_s", SpreadOf(rates->sink).median}});
+      if (rate > best) {
+        best = rate;
+        best_batch_ = batch;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<Rates> Alternate(const Case& item, ServerProcess& daemon, const Frames& frames,
+                                  int rounds, double seconds) {
+    const auto duration = static_cast<sync::TimeNs>(seconds * sync::kSecond);
+    const double items =
+        item.shape == Shape::kUpsert ? double{kEntities} : double{kEntities} * kLinesAnEntity;
+    const absl::StatusOr<std::unique_ptr<Feed>> to_daemon = ToDaemon(item, daemon, frames);
+    if (!to_daemon.ok()) return to_daemon.status();
+    const std::unique_ptr<Feed> to_sink =
+        FeedSink(loop_, item.tcp ? sink_->tcp_target() : sink_->unix_target(), frames);
+    Rates rates;
+    const auto round = [&](Feed& feed, std::vector<double>& out) -> absl::StatusOr<Fed> {
+      const absl::StatusOr<Fed> fed = feed.Round(duration);
+      if (!fed.ok()) return fed.status();
+      out.push_back(static_cast<double>(fed->frames) * items * sync::kSecond /
+                    static_cast<double>(fed->took_ns));
+      rates.bytes_an_item =
+          static_cast<double>(fed->bytes) / (static_cast<double>(fed->frames) * items);
+      return fed;
+    };
+    std::vector<double> warm;
+    if (auto fed = round(**to_daemon, warm); !fed.ok()) return fed.status();
+    for (int i = 0; i < rounds; ++i) {
+      if (auto fed = round(*to_sink, rates.sink); !fed.ok()) return fed.status();
+      const absl::StatusOr<int64_t> before = daemon.ProcessorNs();
+      const absl::StatusOr<Fed> fed = round(**to_daemon, rates.daemon);
+      if (!fed.ok()) return fed.status();
+      const absl::StatusOr<int64_t> after = daemon.ProcessorNs();
+      if (!before.ok() || !after.ok()) return after.status();
+      rates.daemon_cores.push_back(static_cast<double>(*after - *before) /
+                                   static_cast<double>(fed->took_ns));
+    }
+    return rates;
+  }
+
+  const IngestOptions& options_;
+  const Surroundings& with_;
+  Loop loop_;
+  std::unique_ptr<ServerProcess> sink_;
+  int best_batch_ = 0;
+};
+
+}  // namespace
+
+std::vector<std::string> IngestCases() {
+  std::vector<std::string> names;
+  for (const Case& item : kCases) names.emplace_back(item.name);
+  return names;
+}
+
+absl::StatusOr<nlohmann::json> RunIngest(const IngestOptions& options, const Surroundings& with) {
+  return Ingest(options, with).Run();
+}
+
+}  // namespace voxeld::bench

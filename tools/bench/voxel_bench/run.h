@@ -1,0 +1,74 @@
+// The benchmarks: what each is asked, and where its figures go.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace voxeld::bench {
+
+struct Surroundings {
+  const std::atomic<bool>* interrupted = nullptr;
+  std::function<void(const std::string&)> progress;  // a line for people
+  std::string daemon;                                // program; empty: voxeld beside this one
+};
+
+struct IngestOptions {
+  std::vector<std::string> cases;  // of IngestCases(); empty: all
+  int rounds = 5;                  // daemon and sink in turns
+  double seconds = 1;              // of each
+  int line_bytes = 28;             // 24, 28, 30
+  int batch = 0;                   // entities a message; 0: the best of 1, 2, 4, 8, tried before
+  std::string display = "size=64x64x64,format=rgb888,rate=60";
+};
+std::vector<std::string> IngestCases();
+absl::StatusOr<nlohmann::json> RunIngest(const IngestOptions& options, const Surroundings& with);
+
+struct LatencyOptions {
+  int rounds = 5;
+  double seconds = 10;
+  double rate = 200;  // commits a second
+  int lines = 1000, entities = 10;
+  double voxels = 20;  // a line's length
+  std::string display = "size=64x64x64,format=rgb888,rate=400";
+};
+absl::StatusOr<nlohmann::json> RunLatency(const LatencyOptions& options, const Surroundings& with);
+
+struct FairnessOptions {
+  int rounds = 3;
+  double seconds = 10;
+  int clients = 200, layers = 50;
+  // The daemon's limits.credit_bytes: what each may have on its way. Its default for one client is
+  // far more than many can have applied in a short run.
+  int credit_bytes = 65'536;
+  std::string display;  // empty: none
+};
+absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
+                                           const Surroundings& with);
+
+struct OverloadOptions {
+  double seconds = 60;
+  double factor = 10;  // times what the display takes, all clients together
+  double volumes_per_second = 60;
+  int clients = 1, lines = 1000;
+  std::string display = "size=64x64x64,format=rgb888";
+  std::string csv, svg;  // files to write; empty: none
+};
+absl::StatusOr<nlohmann::json> RunOverload(const OverloadOptions& options,
+                                           const Surroundings& with);
+
+struct IdleOptions {
+  int streams = 2000;
+  int rounds = 3;
+  double seconds = 4;  // of the normal client, each time
+  double rate = 200;   // its commits a second
+  std::string display = "size=64x64x64,format=rgb888,rate=400";
+};
+absl::StatusOr<nlohmann::json> RunIdle(const IdleOptions& options, const Surroundings& with);
+
+}  // namespace voxeld::bench

@@ -1,0 +1,104 @@
+// A stream to the scene: opened, obeying its credit, keeping account of its commits; and what feeds
+// it with frames.
+//
+// Bound to its loop's thread.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "tools/bench/voxel_bench/credit.h"
+#include "tools/bench/voxel_bench/tally.h"
+#include "tools/bench/voxel_bench/wire.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::bench {
+
+class Session {
+ public:
+  Session(Loop& loop, const Connection& connection, const v1::Open& open);
+
+  // Called whenever something may be sent, and for each receipt. To be set before WaitOpened.
+  void OnReady(std::function<void()> ready) { ready_ = std::move(ready); }
+  void OnReceipt(std::function<void(const v1::Receipt&)> receipt) { receipt_ = std::move(receipt); }
+
+  // FailedPrecondition if the daemon's clock is not this process's: then no time of its could be
+  // compared.
+  absl::Status WaitOpened();
+  // Until every commit has its answer and its outcomes.
+  absl::Status WaitSettled(sync::TimeNs limit);
+
+  bool Ready() const { return opened_ && call_.writable() && credit_.MaySend(); }
+  // Must be ready. With `more`, another Send follows as soon as this one is written.
+  void Send(const Message& message, bool more = false);
+  // A commit; its number, from 1. Must be ready.
+  uint64_t Commit(sync::TimeNs sent_ns, uint64_t client_drops = 0);
+  // The same bytes as any other of that number and time.
+  static Message CommitMessage(uint64_t frame_id, sync::TimeNs sent_ns, uint64_t client_drops = 0);
+
+  const v1::Opened& opened() const { return *opened_; }
+  const Tally& tally() const { return tally_; }
+  const Credit& credit() const { return credit_; }
+  // Why it ended, or the first that was refused; Ok while all is well.
+  const absl::Status& status() const { return status_; }
+  Call& call() { return call_; }
+
+ private:
+  void OnMessage(std::string_view bytes);
+  void OnWritable();
+
+  Loop& loop_;
+  const v1::Open open_;
+  std::function<void()> ready_;
+  std::function<void(const v1::Receipt&)> receipt_;
+  std::optional<v1::Opened> opened_;
+  sync::TimeNs asked_ns_ = 0, opened_ns_ = 0;
+  bool asked_ = false;
+  Credit credit_;
+  Tally tally_;
+  absl::Status status_;
+  Call call_;
+};
+
+// Sends frames: each is some messages and a commit.
+class FrameSender {
+ public:
+  enum class WhenBehind : uint8_t {
+    kWait,    // every frame is sent, in order
+    kLatest,  // of those that have not begun only the newest; the others are dropped and told
+  };
+
+  // `frames`: what goes out, in turns; not empty. Feeds `session` whenever that is ready. Both live
+  // as long as events may come.
+  FrameSender(Session& session, std::vector<std::vector<Message>> frames, WhenBehind when_behind);
+
+  // A frame is due (or `count` of them).
+  void Due(uint64_t count = 1);
+  // From now on one is due whenever the one before has gone out; or no longer.
+  void SetEndless(bool endless);
+
+  bool idle() const { return waiting_ == 0 && part_ == 0; }
+  uint64_t dropped() const { return dropped_; }
+  uint64_t begun() const { return begun_; }
+  // When the first byte of a frame was handed over.
+  sync::TimeNs SentAt(uint64_t frame_id) const { return sent_ns_[frame_id - 1]; }
+
+ private:
+  void Pump();
+
+  Session& session_;
+  const std::vector<std::vector<Message>> frames_;
+  const WhenBehind when_behind_;
+  bool endless_ = false;
+  uint64_t waiting_ = 0;  // due, not begun
+  size_t part_ = 0;       // of the frame that has begun; 0: none has
+  uint64_t begun_ = 0, dropped_ = 0, untold_ = 0;
+  std::vector<sync::TimeNs> sent_ns_;  // by frame id - 1
+};
+
+}  // namespace voxeld::bench
