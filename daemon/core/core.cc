@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/core/core_impl.h"
+#include "daemon/scene/draft.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -17,14 +18,25 @@ void Ask(Loop& loop, Core::Reply<T> reply, Work work) {
   if (!loop.Post(std::move(task))) (*shared)(absl::UnavailableError("the daemon has stopped"));
 }
 
+// The scene and what is staged, and a quarter for places between blocks.
+CoreOptions WithBulk(CoreOptions options) {
+  if (options.bulk != nullptr) return options;
+  const Limits& limits = options.limits;
+  const uint64_t kept = AddSaturating(limits.max_scene_bytes, limits.max_uncommitted_bytes_total);
+  options.bulk = gpu::BulkPool::Create({.limit_bytes = AddSaturating(kept, kept / 4)});
+  return options;
+}
+
 }  // namespace
 
 Core::Core(CoreOptions options, sync::Clock& clock)
-    : impl_(std::make_shared<Impl>(std::move(options), clock)) {}
+    : impl_(std::make_shared<Impl>(WithBulk(std::move(options)), clock)) {}
 
 Core::~Core() { Stop(5 * sync::kSecond).IgnoreError(); }
 
 const Limits& Core::limits() const { return impl_->options().limits; }
+
+gpu::BulkPool& Core::bulk() const { return *impl_->options().bulk; }
 
 absl::Status Core::AddDisplay(std::unique_ptr<display::Display> display,
                               const gpu::EngineOptions& engine, const ViewOptions& view) {

@@ -35,6 +35,7 @@
 #include "daemon/scene/operation.h"
 #include "display/api/display.h"
 #include "display/sync/clock.h"
+#include "gpu/bulk/bulk_pool.h"
 #include "gpu/engine.h"
 
 namespace voxeld::daemon {
@@ -45,6 +46,9 @@ using display::CaptureId;
 
 struct CoreOptions {
   Limits limits;
+  // Where clients' large arrays are decoded to, and engines read them. Empty: a pool of its own, with
+  // room for what the limits allow.
+  std::shared_ptr<gpu::BulkPool> bulk;
   std::string version;
   bool threads = true;
   // Makes every engine; empty: gpu::CreateEngine. Called from AddDisplay, and on a display's thread
@@ -153,6 +157,7 @@ class Core {
   Core& operator=(const Core&) = delete;
 
   const Limits& limits() const;
+  gpu::BulkPool& bulk() const;  // thread-safe
 
   // Before Start. The name must be new. The engine is made here; its failure is the answer.
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,

@@ -274,6 +274,7 @@ bool Intake::Room() const {
 
 bool Intake::HasRoom() {
   sync::MutexLock lock(mutex_);
+  if (sink_ == nullptr) return false;  // and the core may be gone
   const bool room = Room();
   asked_for_room_ = !room;
   return room;
@@ -281,7 +282,7 @@ bool Intake::HasRoom() {
 
 void Intake::Wake() {
   sync::MutexLock lock(mutex_);
-  if (sink_ != nullptr && !queue_.empty()) schedule_();
+  if (sink_ != nullptr) schedule_();
 }
 
 void Intake::ReturnStaged() {

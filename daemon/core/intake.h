@@ -96,7 +96,7 @@ class Intake {
   void Take(IncomingMessage message);
   // Whether the next message should be read. Once false, the sink gets OnRoom when that changes.
   bool HasRoom();
-  // Asks for a turn, if something waits.
+  // Asks for a turn: the sink is not crowded any more.
   void Wake();
 
   // The next commit in its turn, and whether more wait. Once none does, the next Take schedules again.

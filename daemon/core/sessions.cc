@@ -155,7 +155,6 @@ void Core::Impl::FinishClose(SessionId id) {
   sync::TimeNs layers_until = now;
   switch (session.options.on_disconnect) {
     case DisconnectPolicy::kClear:
-      RemoveLayersOf(id, session.owner);
       break;
     case DisconnectPolicy::kLinger:
       if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
@@ -175,8 +174,17 @@ void Core::Impl::FinishClose(SessionId id) {
     store_.HandOver(id,
                     std::make_shared<const Writer>(Writer{id, session.writer->client_name, true}));
   }
-  KeepDormant(session, layers_until);
-  ForgetOwner(session.owner);
+  // Before its layers go: while it can be taken up its owner is remembered.
+  if (session.options.resumable) {
+    KeepDormant(session, layers_until);
+  } else {
+    resume_tokens_.erase(session.resume_token);
+  }
+  if (session.options.on_disconnect == DisconnectPolicy::kClear) {
+    RemoveLayersOf(id, session.owner);
+  } else {
+    ForgetOwner(session.owner);
+  }
   Publish();
   for (const std::function<void()>& done : session.when_closed) done();
 }

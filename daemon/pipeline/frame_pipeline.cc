@@ -245,6 +245,7 @@ absl::Status FramePipeline::ApplyDelta(size_t size) {
     return absl::InternalError(
         absl::StrFormat("a delta planned as %d bytes came out as %d", size, writer.size()));
   }
+  block->Refer(writer.TakeReferred());
   made_.engine->Apply(*std::move(block), size, Completion(&FramePipeline::OnCallDone));
   return absl::OkStatus();
 }

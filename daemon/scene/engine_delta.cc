@@ -104,7 +104,8 @@ size_t EngineScene::Plan(SnapshotPtr next) {
   });
   for (const HeldGeometry& geometry : put_geometries_) {
     geometries_.find(geometry.key())->second.fresh = false;
-    size += gpu::DeltaWriter::SizeOf(geometry.geometry->record);
+    size += geometry.geometry->arrays.block() ? gpu::DeltaWriter::kSizeOfBulkGeometry
+                                              : gpu::DeltaWriter::SizeOf(geometry.geometry->record);
   }
   size += put_layers_.size() * gpu::DeltaWriter::SizeOf(gpu::LayerRecord());
   size += put_drawables_.size() * gpu::DeltaWriter::SizeOf(gpu::DrawableRecord());
@@ -122,8 +123,13 @@ void EngineScene::Write(gpu::DeltaWriter& writer) {
     gpu::GeometryRecord record = geometry.record;
     record.id = geometries_.find(held.key())->second.id;
     record.drawn_by = held.by_cpu ? gpu::DrawnBy::kCpu : gpu::DrawnBy::kEngine;
-    writer.PutGeometry(record, geometry.positions, geometry.indices, geometry.colors);
+    const gpu::GeometryArrays& arrays = geometry.arrays;
     Breathe();
+    if (arrays.block()) {
+      writer.PutGeometry(record, arrays.block());
+      continue;
+    }
+    writer.PutGeometry(record, arrays.positions(), arrays.indices(), arrays.colors());
     since += geometry.bytes();
     if (since >= kBytesPerBreath) {
       since = 0;

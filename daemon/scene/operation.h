@@ -16,6 +16,7 @@
 #include "display/sync/clock.h"
 #include "gpu/affine.h"
 #include "gpu/delta.h"
+#include "gpu/geometry_arrays.h"
 
 namespace voxeld::daemon {
 
@@ -99,17 +100,16 @@ struct Limits {
   uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session's sealed memory
 };
 
-// Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be
-// copied into staging. Shared by snapshots.
+// Immutable content of a primitive: the engine's record (its id unused) and arrays, which engines
+// read where they lie, or, if they are small, get by a delta. Shared by snapshots.
 struct GeometryData {
   gpu::GeometryRecord record;
-  std::vector<float> positions;   // 3 · vertex_count
-  std::vector<uint32_t> indices;  // index_count
-  std::vector<uint32_t> colors;   // 0x00RRGGBB, vertex_count or none
+  gpu::GeometryArrays arrays;  // of the lengths that the record states
   // Bounds in its own coordinates, thickness left out.
   double min[3] = {}, max[3] = {};
   uint64_t bytes() const {
-    return sizeof(*this) + positions.size() * 4 + indices.size() * 4 + colors.size() * 4;
+    return sizeof(*this) + arrays.positions().size_bytes() + arrays.indices().size_bytes() +
+           arrays.colors().size_bytes();
   }
 };
 using GeometryPtr = std::shared_ptr<const GeometryData>;
@@ -153,6 +153,7 @@ struct OpenOptions {
   FlowPolicy flow = FlowPolicy::kReliable;
   uint32_t drop_oldest_frames = 0;        // kDropOldest: how many stay
   std::string resume_token, owner_token;  // empty: a new session, a new owner
+  bool resumable = true;                  // false: nobody is told its token
 };
 
 struct Upsert {

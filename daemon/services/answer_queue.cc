@@ -59,8 +59,10 @@ std::string AnswerQueue::Pop(sync::TimeNs now) {
       wire::Encode(*issue, message->add_issues());
       bytes += BytesOf(*issue);
     } else {
-      wire::Encode(std::get<Receipt>(answer), message->add_receipts());
-      bytes += BytesOf(std::get<Receipt>(answer));
+      const Receipt& receipt = std::get<Receipt>(answer);
+      wire::Encode(receipt, message->add_receipts());
+      bytes += BytesOf(receipt);
+      if (std::holds_alternative<CommitOutcome>(receipt.what)) popped_.push_back(receipt);
     }
     PopFront();
   }
@@ -76,7 +78,7 @@ std::string AnswerQueue::Pop(sync::TimeNs now) {
 }
 
 std::vector<Receipt> AnswerQueue::TakeOutcomes() {
-  std::vector<Receipt> outcomes;
+  std::vector<Receipt> outcomes = std::exchange(popped_, {});
   while (!answers_.empty()) {
     if (auto* receipt = std::get_if<Receipt>(&answers_.front());
         receipt != nullptr && std::holds_alternative<CommitOutcome>(receipt->what)) {
@@ -90,6 +92,7 @@ std::vector<Receipt> AnswerQueue::TakeOutcomes() {
 
 void AnswerQueue::Clear() {
   while (!answers_.empty()) PopFront();
+  popped_.clear();
   opened_.reset();
   pongs_.clear();
   credit_ = 0;

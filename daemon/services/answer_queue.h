@@ -40,10 +40,13 @@ class AnswerQueue {
   size_t size() const { return answers_.size(); }  // issues and receipts
   size_t bytes() const { return bytes_; }          // that they hold here
 
-  // The next message, serialised, of about kMessageBytes at most; the queue is not empty. `now` becomes its server
-  // time.
+  // The next message, serialised, of about kMessageBytes at most; the queue is not empty, and what was popped before
+  // has been written. `now` becomes its server time.
   std::string Pop(sync::TimeNs now);
-  // Nobody will be told: the outcomes among what waits, in order; the rest goes.
+  // What was popped is on its way.
+  void Written() { popped_.clear(); }
+  // Nobody will be told: the outcomes among what waits or was popped and not written, in order; the
+  // rest goes.
   std::vector<Receipt> TakeOutcomes();
   void Clear();
 
@@ -65,6 +68,7 @@ class AnswerQueue {
   const std::shared_ptr<Budget> budget_;
   std::optional<std::string> opened_;
   std::deque<Answer> answers_;
+  std::vector<Receipt> popped_;  // outcomes
   std::deque<PongDue> pongs_;
   uint64_t credit_ = 0;
   size_t bytes_ = 0;

@@ -44,7 +44,8 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
     if (state_ != State::kNew && state_ != State::kOpen) return;
     previous = sequence_;
   }
-  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous);
+  wire::Decoded decoded =
+      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk());
   arrival.decoded_ns = context_.clock.Now();
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
@@ -179,6 +180,7 @@ void StreamSession::OnAlarm() {
       close = Close(absl::OkStatus());
     } else if (state_ == State::kClosing || state_ == State::kFlushing) {
       Finish();
+      close = true;  // again: what its client did not take is given back
     }
   }
   if (close) CloseSession();
@@ -306,8 +308,7 @@ bool StreamSession::Overrun(bool added) {
     return false;
   }
   core_.CountOverrun();
-  const bool close = !ending_;
-  if (close) {
+  if (!ending_) {
     ending_ = true;
     end_ = absl::ResourceExhaustedError(absl::StrCat(
         "the client left more than ", answers_.size() - 1, " answers (", answers_.bytes(),
@@ -315,7 +316,7 @@ bool StreamSession::Overrun(bool added) {
         "; read the stream while writing to it"));
   }
   Finish();
-  return close;
+  return true;
 }
 
 void StreamSession::WriteNext() {
@@ -330,7 +331,10 @@ void StreamSession::OnWritten(bool ok) {
     sync::MutexLock lock(mutex_);
     writing_ = false;
     const bool crowded = HalfFull();
-    if (ok) WriteNext();
+    if (ok) {
+      answers_.Written();
+      WriteNext();
+    }
     if (crowded && !HalfFull()) wake = intake_;
     Read();
     FinishIfFlushed();

@@ -12,8 +12,10 @@
 #include "absl/strings/str_cat.h"
 #include "daemon/core/token.h"
 #include "daemon/wire/check.h"
+#include "daemon/wire/context.h"
 #include "daemon/wire/element_count.h"
 #include "daemon/wire/operations.h"
+#include "daemon/wire/skeleton.h"
 #include "daemon/wire/slice_stream.h"
 #include "voxeld/v1/scene.pb.h"
 
@@ -175,16 +177,33 @@ absl::Status CheckSize(std::span<const std::string_view> slices, const Limits& l
                    limits.max_message_bytes, ": send more messages that are smaller"));
 }
 
-absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, const char* type,
-                   google::protobuf::Message* out) {
-  SliceStream stream(slices);
-  // The status says it all; a client must not fill logs.
-  const google::protobuf::LogSilencer silence;
-  if (out->ParseFromZeroCopyStream(&stream)) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("a message of ", size, " bytes is not a voxeld.v1.", type,
-                   ": malformed protobuf, or text that is not UTF-8"));
-}
+// A message, parsed; its payloads stay in the slices where that is worth while.
+template <typename Message>
+class Parsed {
+ public:
+  absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, Root root) {
+    // The status says it all; a client must not fill logs.
+    const google::protobuf::LogSilencer silence;
+    bare_ = MakeSkeleton(slices, root, &skeleton_);
+    SliceStream stream(slices);
+    if (bare_ ? message_->ParseFromString(skeleton_.bytes)
+              : message_->ParseFromZeroCopyStream(&stream)) {
+      return absl::OkStatus();
+    }
+    return absl::InvalidArgumentError(
+        absl::StrCat("a message of ", size, " bytes is not a ", message_->GetTypeName(),
+                     ": malformed protobuf, or text that is not UTF-8"));
+  }
+
+  const Message& message() const { return *message_; }
+  const PayloadTable* payloads() const { return bare_ ? &skeleton_.payloads : nullptr; }
+
+ private:
+  google::protobuf::Arena arena_;
+  Message* const message_ = google::protobuf::Arena::CreateMessage<Message>(&arena_);
+  Skeleton skeleton_;
+  bool bare_ = false;  // payloads are left out
+};
 
 Decoded Failed(absl::Status status) {
   Decoded failed;
@@ -193,7 +212,7 @@ Decoded Failed(absl::Status status) {
 }
 
 // Numbers the request and takes its operation. An Open has been dealt with.
-void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits& limits,
+void Take(const FieldPath& path, const v1::StreamRequest& request, const DecodeContext& context,
           uint64_t previous_sequence, Decoded* out) {
   out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
   if (out->sequence <= previous_sequence) {
@@ -204,26 +223,18 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits&
                       Reason::kOutOfOrder,
                       absl::StrCat("sequence is ", request.sequence(), " after ", previous_sequence,
                                    "; numbers ascend, or are 0 to have the server count")},
-                     limits.max_issues_per_commit);
+                     context.limits.max_issues_per_commit);
     out->sequence = previous_sequence;
     if (request.op_case() != v1::StreamRequest::kCommit) return;
   }
-  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->refused});
+  DecodeOperation(path, request, out->sequence, context, {&out->operations, &out->refused});
 }
 
-}  // namespace
-
-absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits) {
-  OpenOptions options;
-  if (auto fault = ToOpen(FieldPath("open"), open, limits, &options)) return OpenError(*fault);
-  return options;
-}
-
-Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence) {
+Decoded Decode(const v1::StreamRequest& request, const DecodeContext& context,
+               uint64_t previous_sequence) {
   Decoded out;
   if (request.op_case() == v1::StreamRequest::kOpen) {
-    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
+    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), context);
     if (!open.ok()) return Failed(open.status());
     out.open = *std::move(open);
     out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
@@ -234,48 +245,17 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
     out.sequence = std::max(request.sequence(), previous_sequence);
     return out;
   }
-  Take(FieldPath(""), request, limits, previous_sequence, &out);
+  Take(FieldPath(""), request, context, previous_sequence, &out);
   return out;
 }
 
-Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence) {
-  uint64_t size = 0;
-  if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
-  const ElementRow rows[] = {
-      {"batch.upserts", std::span(kUpsertsPath).subspan(1), limits.max_operations_per_commit},
-      {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
-       limits.max_parts_per_object}};
-  if (absl::Status status = CheckElements(slices, rows); !status.ok()) return Failed(status);
-  google::protobuf::Arena arena;
-  auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
-  if (absl::Status status = Parse(slices, size, "StreamRequest", request); !status.ok()) {
-    return Failed(status);
-  }
-  return DecodeStreamRequest(*request, limits, previous_sequence);
-}
-
-Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits) {
-  uint64_t size = 0;
-  if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
-  if (absl::Status status = CheckUpdateElements(slices, limits); !status.ok()) {
-    return Failed(status);
-  }
-  google::protobuf::Arena arena;
-  auto* request = google::protobuf::Arena::CreateMessage<v1::ApplyUpdateRequest>(&arena);
-  if (absl::Status status = Parse(slices, size, "ApplyUpdateRequest", request); !status.ok()) {
-    return Failed(status);
-  }
-  return DecodeUpdate(*request, limits);
-}
-
-Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits) {
+Decoded Decode(const v1::ApplyUpdateRequest& request, const DecodeContext& context) {
   Decoded out;
   if (const auto count = static_cast<uint64_t>(request.operations_size());
-      count > limits.max_operations_per_commit) {
-    return Failed(TooManyOperations(count, limits));
+      count > context.limits.max_operations_per_commit) {
+    return Failed(TooManyOperations(count, context));
   }
-  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
+  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), context);
   if (!open.ok()) return Failed(open.status());
   if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {
     open->on_disconnect = DisconnectPolicy::kKeep;
@@ -286,6 +266,7 @@ Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits
         "give owner_token to join an owner"));
   }
   open->no_outcomes = true;  // the answer has no place for them
+  open->resumable = false;   // nor for tokens
   for (int i = 0; i < request.operations_size(); ++i) {
     const v1::StreamRequest& operation = request.operations(i);
     const FieldPath path("operations", i);
@@ -298,11 +279,59 @@ Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits
                        " is set; an update is opened by its own field and committed by itself, and "
                        "has no clock to compare")));
     }
-    Take(path, operation, limits, out.sequence, &out);
+    Take(path, operation, context, out.sequence, &out);
   }
   out.open = *std::move(open);
   out.operations.push_back({++out.sequence, Commit{}});
   return out;
+}
+
+}  // namespace
+
+absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits) {
+  OpenOptions options;
+  if (auto fault = ToOpen(FieldPath("open"), open, limits, &options)) return OpenError(*fault);
+  return options;
+}
+
+Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
+                            uint64_t previous_sequence, gpu::BulkPool* pool) {
+  return Decode(request, {limits, pool}, previous_sequence);
+}
+
+Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
+                            uint64_t previous_sequence, gpu::BulkPool* pool) {
+  uint64_t size = 0;
+  if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
+  const ElementRow rows[] = {
+      {"batch.upserts", std::span(kUpsertsPath).subspan(1), limits.max_operations_per_commit},
+      {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
+       limits.max_parts_per_object}};
+  if (absl::Status status = CheckElements(slices, rows); !status.ok()) return Failed(status);
+  Parsed<v1::StreamRequest> parsed;
+  if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {
+    return Failed(status);
+  }
+  return Decode(parsed.message(), {limits, pool, parsed.payloads()}, previous_sequence);
+}
+
+Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
+                     gpu::BulkPool* pool) {
+  uint64_t size = 0;
+  if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
+  if (absl::Status status = CheckUpdateElements(slices, limits); !status.ok()) {
+    return Failed(status);
+  }
+  Parsed<v1::ApplyUpdateRequest> parsed;
+  if (absl::Status status = parsed.Parse(slices, size, Root::kApplyUpdateRequest); !status.ok()) {
+    return Failed(status);
+  }
+  return Decode(parsed.message(), {limits, pool, parsed.payloads()});
+}
+
+Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
+                     gpu::BulkPool* pool) {
+  return Decode(request, {limits, pool});
 }
 
 }  // namespace voxeld::daemon::wire

@@ -17,6 +17,10 @@
 #include "absl/status/statusor.h"
 #include "daemon/scene/operation.h"
 
+namespace voxeld::gpu {
+class BulkPool;
+}
+
 namespace voxeld::v1 {
 class ApplyUpdateRequest;
 class Open;
@@ -34,7 +38,8 @@ struct Decoded {
   uint64_t sequence = 0;                       // of the last request
 };
 
-// One StreamRequest. `previous_sequence` is that of the request before (0: none): a request without
+// One StreamRequest. The large arrays of primitives go to `pool` (null: ordinary memory), copied
+// once, from the slices. `previous_sequence` is that of the request before (0: none): a request without
 // a number gets the next one, and one that does not ascend is refused.
 //
 // A Commit is passed on whatever is wrong with it, after an Issue, so that it is answered like
@@ -44,20 +49,22 @@ struct Decoded {
 // ResourceExhausted (greater than max_message_bytes),
 // Unimplemented (an Open that asks for what this version has not).
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence);
+                            uint64_t previous_sequence, gpu::BulkPool* pool = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence);
+                            uint64_t previous_sequence, gpu::BulkPool* pool = nullptr);
 
 // An ApplyUpdateRequest: `open` is always set (KEEP unless it says otherwise), the operations end
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].".
 //
 // Status: as above, and InvalidArgument for more than max_operations_per_commit operations.
-Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits);
+Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
+                     gpu::BulkPool* pool = nullptr);
 
 // The same for a request that is parsed already.
-Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits);
+Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
+                     gpu::BulkPool* pool = nullptr);
 
 absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);
 

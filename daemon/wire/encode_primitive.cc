@@ -21,9 +21,9 @@ constexpr uint64_t kFixedBytes = 128;
 constexpr uint64_t kTransformBytes = 104;
 
 // The arrays, however they are kept.
-std::span<const float> PositionsOf(const GeometryData& in) { return in.positions; }
-std::span<const uint32_t> IndicesOf(const GeometryData& in) { return in.indices; }
-std::span<const uint32_t> ColorsOf(const GeometryData& in) { return in.colors; }
+std::span<const float> PositionsOf(const GeometryData& in) { return in.arrays.positions(); }
+std::span<const uint32_t> IndicesOf(const GeometryData& in) { return in.arrays.indices(); }
+std::span<const uint32_t> ColorsOf(const GeometryData& in) { return in.arrays.colors(); }
 
 template <typename T>
 void Pack(std::span<const T> in, std::string* out) {

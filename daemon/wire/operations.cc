@@ -18,7 +18,7 @@ constexpr uint32_t kGreatestPriority = 126;
 constexpr uint32_t kGreatestOpacity = 255;
 constexpr size_t kLabelBytes = 256;
 
-MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& limits,
+MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const DecodeContext& context,
                     EntityData* out) {
   if (in.priority() > kGreatestPriority) {
     return Fault{FieldPath(path, "priority").ToString(), Reason::kInvalidValue,
@@ -33,7 +33,8 @@ MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& l
   if (auto fault = ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform)) {
     return fault;
   }
-  if (auto fault = ToContent(FieldPath(path, "primitive"), in.primitive(), limits, &out->content)) {
+  if (auto fault =
+          ToContent(FieldPath(path, "primitive"), in.primitive(), context, &out->content)) {
     return fault;
   }
   out->priority = in.priority();
@@ -43,12 +44,14 @@ MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& l
   return {};
 }
 
-MaybeFault To(const FieldPath& path, const v1::Upsert& in, const Limits& limits, Upsert* out) {
+MaybeFault To(const FieldPath& path, const v1::Upsert& in, const DecodeContext& context,
+              Upsert* out) {
+  const Limits& limits = context.limits;
   if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
     return fault;
   }
   if (auto fault = CheckName(FieldPath(path, "id"), in.id(), limits.max_id_bytes)) return fault;
-  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), limits, &out->entity)) {
+  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), context, &out->entity)) {
     return fault;
   }
   out->layer = in.layer();
@@ -213,8 +216,9 @@ MaybeFault To(const FieldPath& path, const v1::FrameEnd& in, const Limits& limit
   return CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes);
 }
 
-MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& limits,
+MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const DecodeContext& context,
               DefineObject* out) {
+  const Limits& limits = context.limits;
   if (auto fault = CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes)) {
     return fault;
   }
@@ -238,7 +242,7 @@ MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& l
       return fault;
     }
     if (auto fault =
-            ToContent(FieldPath(part, "primitive"), parts[i].primitive(), limits, &to.content)) {
+            ToContent(FieldPath(part, "primitive"), parts[i].primitive(), context, &to.content)) {
       return fault;
     }
   }
@@ -295,64 +299,64 @@ std::string IdOf(const In& in) {
 }
 
 template <typename Out, typename In>
-void Add(const FieldPath& path, const In& in, uint64_t sequence, const Limits& limits,
+void Add(const FieldPath& path, const In& in, uint64_t sequence, const DecodeContext& context,
          const Sinks& out) {
   Out op;
-  if (auto fault = To(path, in, limits, &op)) {
-    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), limits, out);
+  if (auto fault = To(path, in, context, &op)) {
+    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), context, out);
     if (!std::is_same_v<Out, Commit>) return;
   }
   out.operations->push_back({sequence, std::move(op)});
 }
 
-void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence, const Limits& limits,
-              const Sinks& out) {
-  if (static_cast<uint32_t>(in.upserts_size()) > limits.max_operations_per_commit) {
+void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence,
+              const DecodeContext& context, const Sinks& out) {
+  if (static_cast<uint32_t>(in.upserts_size()) > context.limits.max_operations_per_commit) {
     const FieldPath upserts(path, "upserts");
     AddIssue(
         {upserts.ToString(), Reason::kQuotaExceeded,
          absl::StrCat("has ", in.upserts_size(), " entities; max_operations_per_commit allows ",
-                      limits.max_operations_per_commit)},
-        sequence, {}, {}, limits, out);
+                      context.limits.max_operations_per_commit)},
+        sequence, {}, {}, context, out);
     return;
   }
   out.operations->reserve(out.operations->size() + static_cast<size_t>(in.upserts_size()));
   for (int i = 0; i < in.upserts_size(); ++i) {
-    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, limits, out);
+    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, context, out);
   }
 }
 
 }  // namespace
 
 void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
-                     const Limits& limits, const Sinks& out) {
+                     const DecodeContext& context, const Sinks& out) {
   switch (request.op_case()) {
     case v1::StreamRequest::kUpsert:
-      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, limits, out);
+      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, context, out);
     case v1::StreamRequest::kDelete:
-      return Add<Delete>(FieldPath(path, "delete"), request.delete_(), sequence, limits, out);
+      return Add<Delete>(FieldPath(path, "delete"), request.delete_(), sequence, context, out);
     case v1::StreamRequest::kSetTransform:
       return Add<SetTransform>(FieldPath(path, "set_transform"), request.set_transform(), sequence,
-                               limits, out);
+                               context, out);
     case v1::StreamRequest::kLayerState:
       return Add<LayerState>(FieldPath(path, "layer_state"), request.layer_state(), sequence,
-                             limits, out);
+                             context, out);
     case v1::StreamRequest::kFrameBegin:
       return Add<FrameBegin>(FieldPath(path, "frame_begin"), request.frame_begin(), sequence,
-                             limits, out);
+                             context, out);
     case v1::StreamRequest::kFrameEnd:
-      return Add<FrameEnd>(FieldPath(path, "frame_end"), request.frame_end(), sequence, limits,
+      return Add<FrameEnd>(FieldPath(path, "frame_end"), request.frame_end(), sequence, context,
                            out);
     case v1::StreamRequest::kCommit:
-      return Add<Commit>(FieldPath(path, "commit"), request.commit(), sequence, limits, out);
+      return Add<Commit>(FieldPath(path, "commit"), request.commit(), sequence, context, out);
     case v1::StreamRequest::kDefineObject:
       return Add<DefineObject>(FieldPath(path, "define_object"), request.define_object(), sequence,
-                               limits, out);
+                               context, out);
     case v1::StreamRequest::kDeleteObject:
       return Add<DeleteObject>(FieldPath(path, "delete_object"), request.delete_object(), sequence,
-                               limits, out);
+                               context, out);
     case v1::StreamRequest::kBatch:
-      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, limits, out);
+      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, context, out);
     case v1::StreamRequest::kOpen:
     case v1::StreamRequest::kPing:
     case v1::StreamRequest::OP_NOT_SET:
@@ -362,7 +366,7 @@ void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, ui
             "is not set, or not known to this version of the server; give one of upsert, delete, "
             "set_transform, layer_state, frame_begin, frame_end, commit, define_object, "
             "delete_object, batch"},
-           sequence, {}, {}, limits, out);
+           sequence, {}, {}, context, out);
 }
 
 }  // namespace voxeld::daemon::wire

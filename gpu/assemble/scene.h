@@ -21,7 +21,7 @@ namespace voxeld::gpu {
 // Immutable.
 struct RetainedGeometry {
   GeometryView view;
-  std::shared_ptr<void> memory;  // what its arrays lie in; none if there are none
+  std::shared_ptr<const void> memory;  // what its arrays lie in; none if there are none
 };
 
 struct Layer;
@@ -56,8 +56,8 @@ struct SceneObserver {
   virtual ~SceneObserver() = default;
   // The delta is in order. An error here refuses it whole.
   virtual absl::Status OnPlan(const DeltaPlan&) { return absl::OkStatus(); }
-  // What is kept of a new geometry: a copy of its arrays, unless an engine has them elsewhere. The
-  // delta is gone after Apply.
+  // What is kept of a new geometry: bulk memory as it is, else a copy of its arrays, unless an engine
+  // has them elsewhere. The delta is gone after Apply.
   virtual RetainedGeometry Retain(const GeometryView& view);
   // It goes, or what it is drawn from changes.
   virtual void OnLeave(Drawable& drawable) = 0;
@@ -71,7 +71,8 @@ class Scene {
  public:
   // Applies a delta, all of it or, if it is malformed, nothing (InvalidArgument). Drawables that
   // left and do not come back are moved to `gone`.
-  absl::Status Apply(std::span<const std::byte> delta, SceneObserver& observer,
+  // `bulk` finds what the delta refers to.
+  absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk, SceneObserver& observer,
                      std::vector<std::unique_ptr<Drawable>>& gone);
 
   const absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>>& drawables() const {

@@ -141,9 +141,9 @@ void Volume::TakeOutLeaving() {
   left_.clear();
 }
 
-absl::Status Volume::Apply(std::span<const std::byte> delta) {
+absl::Status Volume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
   std::vector<std::unique_ptr<Drawable>> gone;
-  absl::Status status = scene_.Apply(delta, *this, gone);
+  absl::Status status = scene_.Apply(delta, bulk, *this, gone);
   TakeOutLeaving();
   scene_.MapClips(view_, false);
   if (!gone.empty()) {

@@ -9,6 +9,7 @@
 #include "gpu/assemble/delta_plan.h"
 #include "gpu/cuda/cpu_voxels.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/cuda/upload_plan.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
@@ -81,38 +82,45 @@ void CudaVolume::SetView(DeviceTiles tiles, const Affine& view) {
 
 // ------------------------------------------------------------------------------------------- deltas
 
-absl::Status CudaVolume::Apply(std::span<const std::byte> delta) {
+absl::Status CudaVolume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
   std::vector<std::unique_ptr<Drawable>> gone;
-  const absl::Status status = scene_.Apply(delta, *this, gone);
+  const absl::Status status = scene_.Apply(delta, bulk, *this, gone);
   arrays_ = nullptr;
   scene_.MapClips(view_, false);
+  bulk_.clear();
   return status;
 }
 
-// The arrays of all geometries go over in one piece.
+// The arrays of all geometries go over into one piece of memory.
 absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
-  const std::byte* begin = nullptr;
-  const std::byte* end = nullptr;
-  const auto include = [&](auto array) {
-    if (array.empty()) return;
-    const auto* first = reinterpret_cast<const std::byte*>(array.data());
-    const std::byte* last = first + array.size_bytes();
-    if (begin == nullptr || first < begin) begin = first;
-    if (end == nullptr || last > end) end = last;
-  };
+  UploadPlan uploads;
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
-    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu) continue;
-    include(geometry->positions);
-    include(geometry->indices);
-    include(geometry->colors);
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
+        geometry->positions.empty() || geometry->bulk != nullptr) {
+      continue;
+    }
+    uploads.AddInline(*geometry);
   }
-  if (begin == nullptr) return absl::OkStatus();
-  absl::StatusOr<Block> block = device_.Upload(begin, static_cast<size_t>(end - begin));
+  arrays_begin_ = uploads.inline_begin();
+  for (const DeltaStep& step : plan.steps) {
+    const auto* geometry = std::get_if<GeometryView>(&step);
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
+        geometry->positions.empty() || geometry->bulk == nullptr) {
+      continue;
+    }
+    const float* const positions = geometry->positions.data();
+    if (!bulk_.contains(positions)) bulk_[positions] = uploads.AddBulk(*geometry);
+  }
+  if (uploads.size() == 0) return absl::OkStatus();
+  absl::StatusOr<Block> block = device_.pool().Acquire(uploads.size());
   if (!block.ok()) return block.status();
-  // The delta's memory is given back when Apply returns.
+  for (const UploadPlan::Copy& copy : uploads.copies()) {
+    absl::Status status = device_.ToDevice(block->as<std::byte>() + copy.to, copy.from, copy.size);
+    if (!status.ok()) return status;
+  }
+  // The delta's memory is given back when Apply returns, and so may bulk memory be.
   if (absl::Status status = device_.Wait(); !status.ok()) return status;
-  arrays_begin_ = begin;
   arrays_ = std::make_shared<Block>(*std::move(block));
   return absl::OkStatus();
 }
@@ -120,11 +128,16 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
 RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
   RetainedGeometry kept{view, nullptr};
+  kept.view.bulk = nullptr;
   if (view.positions.empty()) return kept;
-  std::byte* const device = arrays_->as<std::byte>();
-  kept.view.positions = Moved(view.positions, arrays_begin_, device);
-  kept.view.indices = Moved(view.indices, arrays_begin_, device);
-  kept.view.colors = Moved(view.colors, arrays_begin_, device);
+  const bool in_bulk = view.bulk != nullptr;
+  const std::byte* const host =
+      in_bulk ? reinterpret_cast<const std::byte*>(view.positions.data()) : arrays_begin_;
+  std::byte* const device =
+      arrays_->as<std::byte>() + (in_bulk ? bulk_.at(view.positions.data()) : 0);
+  kept.view.positions = Moved(view.positions, host, device);
+  kept.view.indices = Moved(view.indices, host, device);
+  kept.view.colors = Moved(view.colors, host, device);
   kept.memory = arrays_;
   return kept;
 }

@@ -44,7 +44,7 @@ class CudaVolume final : private SceneObserver {
 
   // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
   // fit the device.
-  absl::Status Apply(std::span<const std::byte> delta);
+  absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
 
   // Everything is to be drawn anew.
   void SetView(DeviceTiles tiles, const Affine& view);
@@ -105,9 +105,12 @@ class CudaVolume final : private SceneObserver {
   // Memory of geometries that have left, until their tiles are marked.
   std::vector<std::shared_ptr<const RetainedGeometry>> kept_;
 
-  // The arrays of the delta under way: host addresses from `arrays_begin_` on lie at `arrays_`.
+  // The arrays of the delta under way, all at `arrays_`: those that lie in the delta, from
+  // `arrays_begin_` on, at its beginning; those in bulk memory, by where their positions lie on the
+  // host, where `bulk_` says.
   const std::byte* arrays_begin_ = nullptr;
   std::shared_ptr<Block> arrays_;
+  absl::flat_hash_map<const float*, size_t> bulk_;
   uint32_t singular_ = 0;
   std::unique_ptr<Executor> executor_;  // for what the CPU draws; made when it is asked for
 };

@@ -19,8 +19,9 @@ inline GeometryPtr Dots(float x, uint32_t color = 0xFFFFFF, uint32_t count = 1) 
   data->record.kind = gpu::PrimitiveKind::kPoints;
   data->record.color = color;
   data->record.vertex_count = count;
-  data->positions.resize(size_t{3} * count);
-  for (uint32_t i = 0; i < count; ++i) data->positions[3 * i] = x + static_cast<float>(i);
+  std::vector<float> positions(size_t{3} * count);
+  for (uint32_t i = 0; i < count; ++i) positions[3 * i] = x + static_cast<float>(i);
+  data->arrays = gpu::GeometryArrays::Of(data->record, positions);
   data->min[0] = x;
   data->max[0] = x + count - 1;
   return data;

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -42,7 +44,8 @@ struct Pair {
     scene.Write(writer);
     EXPECT_FALSE(writer.overrun());
     EXPECT_EQ(writer.size(), size);
-    return model.Apply(std::span(bytes, size));
+    const std::vector<gpu::BulkBlock> referred = writer.TakeReferred();
+    return model.Apply(std::span(bytes, size), referred);
   }
 };
 
@@ -205,6 +208,27 @@ TEST(EngineDelta, ItBreathesDuringLongWork) {
   gpu::DeltaWriter writer(std::as_writable_bytes(std::span(words)));
   scene.Write(writer);
   EXPECT_GE(breaths, 30);
+}
+
+TEST(EngineDelta, ArraysInBulkMemoryAreReferredTo) {
+  const auto pool = gpu::BulkPool::Create();
+  auto large = std::make_shared<GeometryData>();
+  large->record.kind = gpu::PrimitiveKind::kPoints;
+  large->record.vertex_count = 1000;
+  large->arrays = *gpu::GeometryArrays::Allocate(large->record, pool.get());
+  const std::span<float> positions = large->arrays.writable_positions();
+  std::iota(positions.begin(), positions.end(), 0.0f);
+  StoreFixture f;
+  Pair pair;
+  f.Commit(Put("a", "large", Entity1(GeometryPtr(std::move(large)))), Put("a", "small", 2));
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_LT(pair.size, 1000u);
+  size_t seen = 0;
+  for (const auto& [id, geometry] : pair.model.geometries()) {
+    seen = std::max(seen, geometry.positions.size());
+    EXPECT_EQ(geometry.positions.back(), geometry.positions.size() == 3000 ? 2999 : 0);
+  }
+  EXPECT_EQ(seen, 3000u);
 }
 
 // Along random paths over random snapshots: what the engine holds is what a new engine would.

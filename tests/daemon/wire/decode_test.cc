@@ -56,9 +56,9 @@ TEST(Decode, MeshWithEverything) {
   EXPECT_EQ(data.record.color_mode, gpu::ColorMode::kPerVertex);
   EXPECT_EQ(data.record.vertex_count, 3u);
   EXPECT_EQ(data.record.index_count, 3u);
-  EXPECT_THAT(data.positions, ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
-  EXPECT_THAT(data.indices, ElementsAre(2, 1, 0));
-  EXPECT_THAT(data.colors, ElementsAre(0x010203, 0x040506, 0x070809));
+  EXPECT_THAT(data.arrays.positions(), ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
+  EXPECT_THAT(data.arrays.indices(), ElementsAre(2, 1, 0));
+  EXPECT_THAT(data.arrays.colors(), ElementsAre(0x010203, 0x040506, 0x070809));
   EXPECT_THAT(data.min, ElementsAre(0, 0, 0));
   EXPECT_THAT(data.max, ElementsAre(1, 1, 0));
 }
@@ -74,7 +74,7 @@ TEST(Decode, IntegerPositions) {
   PrimitiveOf(request)->mutable_color()->set_rgb(0xABCDEF);
   Decoded decoded = Decode(request);
   ASSERT_THAT(decoded.operations, SizeIs(1));
-  EXPECT_THAT(GeometryOf(decoded).positions, ElementsAre(-32768, 0, 7, 32767, -1, 5));
+  EXPECT_THAT(GeometryOf(decoded).arrays.positions(), ElementsAre(-32768, 0, 7, 32767, -1, 5));
   EXPECT_THAT(GeometryOf(decoded).min, ElementsAre(-32768, -1, 5));
   EXPECT_THAT(GeometryOf(decoded).max, ElementsAre(32767, 0, 7));
   EXPECT_EQ(GeometryOf(decoded).record.color, 0xABCDEFu);
@@ -86,7 +86,7 @@ TEST(Decode, IntegerPositions) {
   points->mutable_vertices()->set_positions(Packed<int32_t>({-16777216, 0, 16777216, 1, 2, 3}));
   decoded = Decode(request);
   ASSERT_THAT(decoded.operations, SizeIs(1));
-  EXPECT_THAT(GeometryOf(decoded).positions, ElementsAre(-16777216, 0, 16777216, 1, 2, 3));
+  EXPECT_THAT(GeometryOf(decoded).arrays.positions(), ElementsAre(-16777216, 0, 16777216, 1, 2, 3));
 }
 
 TEST(Decode, ShapesAndTheirBounds) {

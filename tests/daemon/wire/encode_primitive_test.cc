@@ -12,7 +12,7 @@ namespace {
 
 Content Decoded1(const v1::Primitive& primitive) {
   Content content;
-  const MaybeFault fault = ToContent(FieldPath("primitive"), primitive, Limits(), &content);
+  const MaybeFault fault = ToContent(FieldPath("primitive"), primitive, {Limits()}, &content);
   EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message << "\n"
                                   << primitive.DebugString().substr(0, 2000);
   return content;

@@ -113,7 +113,7 @@ class RandomWatches {
   Content SomeContent() {
     Content content;
     EXPECT_FALSE(ToContent(FieldPath("primitive"),
-                           primitives_.Next(random_() % 6 == 0 ? 3000 : 10, false), Limits(),
+                           primitives_.Next(random_() % 6 == 0 ? 3000 : 10, false), {Limits()},
                            &content)
                      .has_value());
     return content;
@@ -229,7 +229,7 @@ TEST(WatchMessages, HoldsTwoSnapshotsAtMost) {
 TEST(WatchMessages, ContentsBeyondAMessageAreRefused) {
   auto part = std::make_shared<GeometryData>(*std::get<GeometryPtr>(Content(Dots(0))));
   part->record.vertex_count = 4 << 20;
-  part->positions.resize(size_t{12} << 20);
+  part->arrays = gpu::GeometryArrays::Of(part->record, std::vector<float>(size_t{12} << 20));
   std::vector<ObjectPart> parts(45, {GeometryPtr(std::move(part)), {}});
   Limits limits;
   limits.max_bytes_per_owner = limits.max_scene_bytes = uint64_t{1} << 40;

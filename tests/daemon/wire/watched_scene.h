@@ -38,9 +38,9 @@ inline std::string InWords(const Content& content) {
     text += ") (";
     text.append(reinterpret_cast<const char*>(array.data()), array.size() * 4);
   };
-  bytes(g.positions);
-  bytes(g.indices);
-  bytes(g.colors);
+  bytes(g.arrays.positions());
+  bytes(g.arrays.indices());
+  bytes(g.arrays.colors());
   return text + ")";
 }
 
@@ -58,7 +58,7 @@ inline std::string InWords(const v1::Affine& map) {
 
 inline std::string InWords(const v1::Primitive& primitive) {
   Content content;
-  const MaybeFault fault = ToContent(FieldPath("primitive"), primitive, Limits(), &content);
+  const MaybeFault fault = ToContent(FieldPath("primitive"), primitive, {Limits()}, &content);
   EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
   return fault.has_value() ? "" : InWords(content);
 }

@@ -1,7 +1,5 @@
 // The commands against a server in this process.
 #include <gmock/gmock.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +13,6 @@
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/cli/options.h"
 #include "tools/voxelctl/commands/commands.h"
-#include "tools/voxelctl/connection/grpc_scene_stream.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -349,15 +346,6 @@ TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
   EXPECT_EQ(RunTool({"clear", "--all"}).code, 0);
   EXPECT_EQ(server_.log().clears.back().layer(), "");
   EXPECT_EQ(RunTool({"clear", "--layer", "absent"}).code, 0);
-}
-
-TEST_F(CommandsTest, AStreamThatIsNotEndedIsToldWithTheTimeWaited) {
-  server_.Set({.hold_streams = true});
-  const auto stream = OpenGrpcSceneStream(
-      grpc::CreateChannel(server_.address(), grpc::InsecureChannelCredentials()), "there", {},
-      interrupt_, 20 * sync::kMillisecond);
-  ASSERT_TRUE(stream.ok()) << stream.status();
-  EXPECT_EQ((*stream)->Close().message(), "voxeld at there did not end the stream in 20.00 ms");
 }
 
 TEST_F(CommandsTest, NobodyThere) {

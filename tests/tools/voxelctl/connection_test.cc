@@ -1,4 +1,4 @@
-// What needs no server: addresses, the book of commits, captured volumes.
+// What needs no server: addresses, issues, captured volumes.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -13,7 +13,7 @@
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/commands/captured_volume.h"
 #include "tools/voxelctl/connection/address.h"
-#include "tools/voxelctl/connection/commit_ledger.h"
+#include "tools/voxelctl/connection/scene_session.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -56,107 +56,17 @@ TEST(ChooseServer, OptionThenVariableThenSocketThenPort) {
   EXPECT_EQ(ChooseServer("here:2", environment), "here:2");
 }
 
-// ------------------------------------------------------------------------------------ ledger
+// ------------------------------------------------------------------------------------- issues
 
-v1::Receipt Accepted(uint64_t frame, const std::vector<std::string>& displays) {
-  v1::Receipt receipt;
-  receipt.set_frame_id(frame);
-  receipt.mutable_accepted();
-  for (const std::string& name : displays) receipt.mutable_accepted()->add_displays(name);
-  return receipt;
-}
-
-v1::Receipt Outcome(uint64_t frame, const std::string& display) {
-  v1::Receipt receipt;
-  receipt.set_frame_id(frame);
-  receipt.mutable_outcome()->set_display(display);
-  return receipt;
-}
-
-TEST(CommitLedger, IsSettledByEveryOutcome) {
-  CommitLedger ledger;
-  ledger.Sent(1, 1000);
-  ledger.Sent(2, 2000);
-  EXPECT_EQ(ledger.unanswered(), 2u);
-  EXPECT_FALSE(ledger.Accepted(1));
-  EXPECT_FALSE(ledger.Accepted(9));
-  ledger.Answered(Accepted(1, {"a", "b"}), 1100);
-  EXPECT_TRUE(ledger.Accepted(1));
-  EXPECT_EQ(ledger.unanswered(), 2u);
-  v1::Receipt outcome = Outcome(1, "a");
-  outcome.mutable_outcome()->mutable_presented();
-  ledger.Answered(outcome, 1500);
-  outcome = Outcome(1, "b");
-  outcome.mutable_outcome()->mutable_superseded()->set_by_frame_id(2);
-  ledger.Answered(outcome, 1600);
-  EXPECT_EQ(ledger.unanswered(), 1u);
-  // An outcome may overtake Accepted.
-  outcome = Outcome(2, "a");
-  outcome.mutable_outcome()->mutable_lost()->set_reason("unplugged");
-  ledger.Answered(outcome, 2500);
-  EXPECT_EQ(ledger.unanswered(), 1u);
-  ledger.Answered(Accepted(2, {"a"}), 2600);
-  EXPECT_EQ(ledger.unanswered(), 0u);
-  EXPECT_TRUE(ledger.Accepted(2));
-  // Answers to what it does not know change nothing.
-  ledger.Answered(Outcome(2, "a"), 2700);
-  ledger.Answered(Accepted(77, {"a"}), 2700);
-
-  const StreamTally tally = ledger.Tally();
-  EXPECT_EQ(tally.commits, 2u);
-  EXPECT_EQ(tally.accepted, 2u);
-  EXPECT_EQ(tally.displays.at("a").presented, 1u);
-  EXPECT_EQ(tally.displays.at("a").lost, 1u);
-  EXPECT_EQ(tally.displays.at("a").last_lost_reason, "unplugged");
-  EXPECT_EQ(tally.displays.at("b").superseded, 1u);
-  EXPECT_EQ(ledger.latencies_ns(), std::vector<int64_t>{500});
-}
-
-TEST(CommitLedger, ServersWithoutDisplaysSettleAtOnceAndRefusalsAreKept) {
-  CommitLedger ledger;
-  ledger.Sent(1, 0);
-  ledger.Answered(Accepted(1, {}), 1);
-  EXPECT_EQ(ledger.unanswered(), 0u);
-  ledger.Sent(2, 0);
-  v1::Receipt refused;
-  refused.set_frame_id(2);
-  refused.mutable_refused()->set_message("no\x1b room");
-  ledger.Answered(refused, 1);
-  EXPECT_EQ(ledger.unanswered(), 0u);
-  EXPECT_FALSE(ledger.Accepted(2));
-  EXPECT_EQ(ledger.Refusal(2), "no\\u{1b} room");
-  EXPECT_EQ(ledger.Refusal(1), std::nullopt);
-}
-
-TEST(CommitLedger, IssuesAndLatenciesAreBounded) {
-  CommitLedger ledger;
-  v1::Issue issue;
-  issue.set_reason(v1::REASON_NOT_FOUND);
-  for (int i = 0; i < 100; ++i) ledger.Told(issue);
-  EXPECT_EQ(ledger.Tally().issue_count, 100u);
-  EXPECT_EQ(ledger.Tally().not_found, 100u);
-  EXPECT_EQ(ledger.Tally().issues.size(), SceneStream::kMostIssues);
-  for (uint64_t frame = 1; frame <= CommitLedger::kMostLatencies + 10; ++frame) {
-    ledger.Sent(frame, 0);
-    v1::Receipt outcome = Outcome(frame, "a");
-    outcome.mutable_outcome()->mutable_presented();
-    ledger.Answered(outcome, static_cast<int64_t>(frame));
-    ledger.Answered(Accepted(frame, {"a"}), 0);
-  }
-  EXPECT_EQ(ledger.latencies_ns().size(), CommitLedger::kMostLatencies);
-  EXPECT_EQ(ledger.latencies_ns()[9], static_cast<int64_t>(CommitLedger::kMostLatencies + 10));
-}
-
-TEST(DescribeIssue, IsOneLineForPeople) {
-  v1::Issue issue;
-  issue.set_layer("l");
-  issue.set_id("i\n");
-  issue.set_field("upsert.entity");
-  issue.set_message("is 3; 2 is right");
-  EXPECT_EQ(DescribeIssue(issue), "l/i\\u{a}, upsert.entity: is 3; 2 is right");
-  issue.clear_layer();
-  issue.clear_id();
-  EXPECT_EQ(DescribeIssue(issue), "upsert.entity: is 3; 2 is right");
+TEST(IssueForTerminal, IsOneLineForPeople) {
+  client::Issue issue;
+  issue.layer = "l";
+  issue.id = "i\n";
+  issue.field = "upsert.entity";
+  issue.message = "is 3; 2 is right";
+  EXPECT_EQ(IssueForTerminal(issue), "l/i\\u{a}, upsert.entity: is 3; 2 is right");
+  issue.layer = issue.id = "";
+  EXPECT_EQ(IssueForTerminal(issue), "upsert.entity: is 3; 2 is right");
 }
 
 // --------------------------------------------------------------------------- captured volumes

@@ -94,6 +94,10 @@ class FakeServer::Scene final : public v1::SceneService::Service {
         case v1::StreamRequest::kUpsert:
           entities[request.upsert().id()] = request.upsert().entity();
           break;
+        case v1::StreamRequest::kBatch:
+          for (const v1::Upsert& upsert : request.batch().upserts())
+            entities[upsert.id()] = upsert.entity();
+          break;
         case v1::StreamRequest::kSetTransform:
           ++log.transforms;
           if (server_.behaviour_.lose_entities) {

@@ -7,10 +7,12 @@
 #include <map>
 #include <set>
 
+#include "client/cpp/src/encode.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/pack.h"
 #include "tools/voxelctl/scene/placement.h"
+#include "voxeld/v1/scene.pb.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -213,12 +215,18 @@ struct Packed {
   std::vector<v1::StreamRequest> requests;
 };
 
-Packed Pack(const Model& model, const v1::Limits& limits) {
+Packed Pack(const Model& model, const client::Limits& limits) {
   Packed packed{absl::UnknownError("not run"), {}};
-  packed.sizes = PackObject(model, "thing", limits, [&](v1::StreamRequest request) {
-    packed.requests.push_back(std::move(request));
-    return absl::OkStatus();
-  });
+  packed.sizes =
+      PackObject(model, "thing", limits,
+                 [&](const std::string& object, const std::vector<client::Part>& parts, uint64_t) {
+                   const absl::StatusOr<client::DefineOperation> define =
+                       client::EncodeDefinition(object, parts);
+                   EXPECT_THAT(define, IsOk());
+                   EXPECT_TRUE(packed.requests.emplace_back().ParseFromString(
+                       client::EncodeOperation(*define).Flat()));
+                   return absl::OkStatus();
+                 });
   return packed;
 }
 
@@ -229,10 +237,10 @@ struct LimitsCase {
 class PackWithin : public testing::TestWithParam<LimitsCase> {};
 
 TEST_P(PackWithin, LimitsLosesNothing) {
-  v1::Limits limits;
-  limits.set_max_message_bytes(GetParam().message_bytes);
-  limits.set_max_vertices_per_entity(GetParam().vertices);
-  limits.set_max_indices_per_entity(GetParam().indices);
+  client::Limits limits;
+  limits.max_message_bytes = GetParam().message_bytes;
+  limits.max_vertices_per_entity = GetParam().vertices;
+  limits.max_indices_per_entity = GetParam().indices;
   const Model model = Strip(100000);
   const Packed packed = Pack(model, limits);
   ASSERT_THAT(packed.sizes, IsOk());
@@ -336,21 +344,22 @@ TEST(PackObject, KindsGoIntoPiecesOfTheirOwn) {
 }
 
 TEST(PackObject, SaysWhatIsTooSmall) {
-  v1::Limits limits;
-  limits.set_max_parts_per_object(2);
-  limits.set_max_vertices_per_entity(100);
+  client::Limits limits;
+  limits.max_parts_per_object = 2;
+  limits.max_vertices_per_entity = 100;
   EXPECT_THAT(Pack(Strip(1000), limits).sizes,
               Fails(Words{"over 2 pieces", "max_parts_per_object"}));
-  limits.set_max_vertices_per_entity(2);
+  limits.max_vertices_per_entity = 2;
   EXPECT_THAT(Pack(Strip(1), limits).sizes, Fails(Words{"no room"}));
 }
 
 TEST(PackObject, StopsWhereTheSinkFails) {
   int calls = 0;
-  const auto result = PackObject(Strip(10), "thing", {}, [&](const v1::StreamRequest&) {
-    ++calls;
-    return absl::UnavailableError("gone");
-  });
+  const auto result = PackObject(
+      Strip(10), "thing", {}, [&](const std::string&, const std::vector<client::Part>&, uint64_t) {
+        ++calls;
+        return absl::UnavailableError("gone");
+      });
   EXPECT_THAT(result, Fails(Words{"gone"}));
   EXPECT_EQ(calls, 1);
 }

@@ -12,7 +12,7 @@
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/commands/play_summary.h"
-#include "tools/voxelctl/connection/scene_stream.h"
+#include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/pack.h"
@@ -29,6 +29,7 @@ constexpr sync::TimeNs kOutcomeTime = 10 * sync::kSecond;  // for a still scene 
 constexpr sync::TimeNs kLastOutcomeTime = 2 * sync::kSecond;
 constexpr sync::TimeNs kLiveLineTime = 200 * sync::kMillisecond;
 constexpr uint64_t kStagedBytes = 8 << 20;
+constexpr uint64_t kDefinitionBytes = 256;  // of a definition, beside its vertices, about
 constexpr size_t kLabelBytes = 200;
 
 absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
@@ -125,12 +126,12 @@ class Player {
     status = Stay();
     if (status.ok() && options_.clear) status = ClearMine();
     const absl::Status settled =
-        stream_->WaitSettled(clock_.Now() + (options_.spin ? kLastOutcomeTime : kOutcomeTime));
-    const absl::Status closed = stream_->Close();
+        session_->WaitSettled(options_.spin ? kLastOutcomeTime : kOutcomeTime);
+    const absl::Status closed = session_->Close();
     summary_.duration_ns = clock_.Now() - start_;
     summary_.still_up = status.ok() && !options_.clear && !taken_down_;
-    summary_.tally = stream_->tally();
-    summary_.latencies_ns = stream_->latencies_ns();
+    summary_.tally = session_->client().GetTally();
+    summary_.latencies_ns = session_->client().latencies_ns();
     Report(std::move(summary_), console_);
     if (!settled.ok() && status.ok()) console_.Say(settled.message());
     return status.ok() ? closed : status;
@@ -149,37 +150,37 @@ class Player {
   }
 
   absl::Status Open() {
-    v1::Open open;
-    open.set_client_name("voxelctl play");
-    open.set_on_disconnect(options_.clear ? v1::DISCONNECT_POLICY_CLEAR
-                                          : v1::DISCONNECT_POLICY_KEEP);
-    open.set_strict(true);
-    absl::StatusOr<std::unique_ptr<SceneStream>> stream = connection_.OpenStream(open);
-    if (!stream.ok()) return stream.status();
-    stream_ = *std::move(stream);
+    client::Options open;
+    open.client_name = "voxelctl play";
+    open.on_disconnect =
+        options_.clear ? client::OnDisconnect::kClear : client::OnDisconnect::kKeep;
+    open.strict = true;
+    absl::StatusOr<std::unique_ptr<SceneSession>> session =
+        connection_.OpenSession(std::move(open));
+    if (!session.ok()) return session.status();
+    session_ = *std::move(session);
+    layer_ = session_->client().GetLayer(kLayer);
     start_ = clock_.Now();
     summary_.layer = kLayer;
-    summary_.owner = stream_->opened().owner();
+    summary_.owner = session_->server().owner;
     return absl::OkStatus();
   }
 
   absl::Status CommitAndWait() {
-    uint64_t frame = 0;
-    absl::Status status = stream_->Commit(&frame);
-    if (status.ok()) status = stream_->WaitAccepted(frame, clock_.Now() + kAnswerTime);
     staged_bytes_ = staged_operations_ = 0;
-    return status;
+    return session_->CommitAndWait(kAnswerTime);
   }
 
   // Definitions draw nothing, so they may be committed in as many steps as the limits want.
-  absl::Status SendDefinition(v1::StreamRequest request, uint64_t total) {
-    const v1::Limits& limits = stream_->opened().limits();
-    const uint64_t bytes = request.ByteSizeLong();
+  absl::Status SendDefinition(const std::string& object, std::vector<client::Part> parts,
+                              uint64_t bytes, uint64_t total) {
+    const client::Limits& limits = session_->server().limits;
     uint64_t most_bytes = kStagedBytes;
-    if (limits.max_uncommitted_bytes() > 0)
-      most_bytes = std::min(most_bytes, limits.max_uncommitted_bytes());
-    uint64_t most_operations = limits.max_operations_per_commit();
+    if (limits.max_uncommitted_bytes > 0)
+      most_bytes = std::min(most_bytes, limits.max_uncommitted_bytes);
+    uint64_t most_operations = limits.max_operations_per_commit;
     if (most_operations == 0) most_operations = UINT64_MAX;
+    bytes += kDefinitionBytes;
     if (staged_operations_ > 0 &&
         (staged_bytes_ + bytes > most_bytes || staged_operations_ + 1 > most_operations)) {
       absl::Status status = CommitAndWait();
@@ -190,7 +191,7 @@ class Player {
     sent_bytes_ += bytes;
     console_.ProgressBar("sending", static_cast<double>(sent_bytes_) / static_cast<double>(total),
                          absl::StrCat(Bytes(sent_bytes_), " of about ", Bytes(total)));
-    return stream_->Send(std::move(request));
+    return session_->client().DefineObject(object, std::move(parts));
   }
 
   absl::Status PutUp(std::vector<Model> models) {
@@ -200,10 +201,11 @@ class Player {
         total += part.positions.size() * 15 + part.indices.size() * 2;
     }
     for (size_t i = 0; i < models.size(); ++i) {
-      const std::string object = absl::StrCat("voxelctl/", i + 1);
       const absl::StatusOr<PackedSizes> sizes = PackObject(
-          models[i], object, stream_->opened().limits(),
-          [&](v1::StreamRequest request) { return SendDefinition(std::move(request), total); });
+          models[i], Object(i), session_->server().limits,
+          [&](const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
+            return SendDefinition(object, std::move(parts), bytes, total);
+          });
       if (!sizes.ok()) return sizes.status();
       summary_.files.push_back({models[i].path, models[i].format, models[i].note, sizes->vertices,
                                 sizes->indices, sizes->objects, sizes->bytes});
@@ -216,15 +218,13 @@ class Player {
     absl::Status status = TakePatternsDown();
     if (!status.ok()) return status;
     // One frame replaces the layer whole, should this owner have had it before.
-    v1::StreamRequest begin, end;
-    begin.mutable_frame_begin()->set_layer(kLayer);
-    end.mutable_frame_end()->set_layer(kLayer);
-    status = stream_->Send(std::move(begin));
-    for (size_t i = 0; status.ok() && i < models.size(); ++i) {
-      status = stream_->Send(InstanceRequest(kLayer, Id(i), absl::StrCat("voxelctl/", i + 1),
-                                             Label(models[i].path), InstanceTransform(space_, 0)));
+    client::Frame frame = layer_->BeginFrame();
+    for (size_t i = 0; i < models.size(); ++i) {
+      frame.Draw(
+          Id(i), client::Instance{Object(i)},
+          {.transform = ToClient(InstanceTransform(space_, 0)), .label = Label(models[i].path)});
     }
-    if (status.ok()) status = stream_->Send(std::move(end));
+    status = frame.End();
     return status.ok() ? CommitAndWait() : status;
   }
 
@@ -239,11 +239,18 @@ class Player {
   }
 
   static std::string Id(size_t file) { return absl::StrCat(file + 1); }
+  static std::string Object(size_t file) { return absl::StrCat("voxelctl/", file + 1); }
+
+  static client::Affine ToClient(const gpu::Affine& transform) {
+    client::Affine out;
+    std::copy(std::begin(transform.m), std::end(transform.m), out.m.begin());
+    return out;
+  }
 
   // After the new scene is in: for a moment both may be up, but never neither.
   absl::Status TakeDown(const std::vector<uint64_t>& owners) {
     for (const uint64_t owner : owners) {
-      if (owner == stream_->opened().owner() || owner == 0) continue;
+      if (owner == session_->server().owner || owner == 0) continue;
       v1::ClearLayerRequest request;
       request.set_owner(owner);
       request.set_layer(kLayer);
@@ -283,14 +290,14 @@ class Player {
       // Frames whose time has passed are not made up for.
       frame =
           std::max(frame, static_cast<int64_t>(static_cast<double>(now - began) / period_ns)) + 1;
-      if (!stream_->HasRoom()) {
+      if (!session_->client().HasRoom()) {
         ++summary_.frames_skipped;
         continue;
       }
       absl::Status status = Turn(static_cast<double>(now - began) / 1e9 / kSecondsPerTurn);
       if (!status.ok()) return status;
       ++summary_.frames;
-      if (stream_->tally().not_found > 0) {
+      if (session_->client().GetTally().not_found > 0) {
         console_.Say("the scene was taken down by another client");
         taken_down_ = true;
         return absl::OkStatus();
@@ -303,17 +310,18 @@ class Player {
   }
 
   absl::Status Turn(double turns) {
-    absl::Status status;
-    for (size_t i = 0; status.ok() && i < summary_.files.size(); ++i) {
-      status = stream_->Send(TransformRequest(kLayer, Id(i), InstanceTransform(space_, turns)));
+    for (size_t i = 0; i < summary_.files.size(); ++i) {
+      const absl::Status status =
+          layer_->SetTransform(Id(i), ToClient(InstanceTransform(space_, turns)));
+      if (!status.ok()) return status;
     }
-    return status.ok() ? stream_->Commit(nullptr) : status;
+    return session_->Commit();
   }
 
   void ShowLine(double seconds) {
     std::string line =
         absl::StrFormat("spinning %.0f s, %s", seconds, Counted(summary_.frames, "frame"));
-    for (const auto& [name, counts] : stream_->tally().displays) {
+    for (const auto& [name, counts] : session_->client().GetTally().displays) {
       absl::StrAppend(&line, ", ", EscapeForTerminal(name), " ", Grouped(counts.presented),
                       " presented ", Grouped(counts.lost), " lost");
     }
@@ -321,10 +329,8 @@ class Player {
   }
 
   absl::Status ClearMine() {
-    v1::StreamRequest request;
-    request.mutable_delete_()->set_all_mine(true);
-    const absl::Status status = stream_->Send(std::move(request));
-    return status.ok() ? stream_->Commit(nullptr) : status;
+    const absl::Status status = session_->client().RemoveAll();
+    return status.ok() ? session_->Commit() : status;
   }
 
   const PlayOptions& options_;
@@ -333,7 +339,8 @@ class Player {
   Console& console_;
   sync::SystemClock clock_;
   DisplaySpace space_;
-  std::unique_ptr<SceneStream> stream_;
+  std::unique_ptr<SceneSession> session_;
+  std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
   bool taken_down_ = false;

@@ -49,7 +49,14 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
                         {"lost", counts.lost},
                         {"not_shown", counts.not_shown}});
   }
-  for (const v1::Issue& issue : s.tally.issues) issues.push_back(ToJson(issue));
+  for (const client::Issue& issue : s.tally.issues) {
+    issues.push_back({{"sequence", issue.sequence},
+                      {"layer", issue.layer},
+                      {"id", issue.id},
+                      {"field", issue.field},
+                      {"reason", client::ReasonName(issue.reason)},
+                      {"message", issue.message}});
+  }
   return {{"layer", s.layer},
           {"owner", s.owner},
           {"entities", s.files.size()},
@@ -62,7 +69,7 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
           {"accepted", s.tally.accepted},
           {"refused", s.tally.refused},
           {"refused_operations", s.tally.refused_operations},
-          {"unanswered", s.tally.unanswered},
+          {"unanswered", s.tally.unsettled + s.tally.lost},
           {"displays", displays},
           {"latency",
            {{"count", latency.count},
@@ -112,8 +119,8 @@ void Report(PlaySummary summary, Console& console) {
                                " lost a volume: ", EscapeForTerminal(counts.last_lost_reason)));
     }
   }
-  for (const v1::Issue& issue : summary.tally.issues)
-    console.Say(absl::StrCat("issue: ", DescribeIssue(issue)));
+  for (const client::Issue& issue : summary.tally.issues)
+    console.Say(absl::StrCat("issue: ", IssueForTerminal(issue)));
   if (summary.still_up)
     console.Say(
         absl::StrCat("it stays up in the layer ", summary.layer, " until `voxelctl clear`"));

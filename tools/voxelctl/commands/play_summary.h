@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tools/voxelctl/commands/console.h"
-#include "tools/voxelctl/connection/scene_stream.h"
+#include "tools/voxelctl/connection/scene_session.h"
 
 namespace voxeld::voxelctl {
 
@@ -22,7 +22,7 @@ struct PlaySummary {
   int64_t duration_ns = 0;
   uint64_t frames = 0, frames_skipped = 0;  // of a spin; skipped while the displays were behind
   bool still_up = false;
-  StreamTally tally;
+  client::Tally tally;
   std::vector<int64_t> latencies_ns;
 };
 

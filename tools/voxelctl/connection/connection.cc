@@ -13,8 +13,6 @@
 #include "absl/strings/match.h"
 #include "display/sync/mutex.h"
 #include "tools/voxelctl/connection/address.h"
-#include "tools/voxelctl/connection/grpc_scene_stream.h"
-#include "tools/voxelctl/connection/scene_stream.h"
 #include "tools/voxelctl/connection/status.h"
 #include "voxeld/v1/display.grpc.pb.h"
 #include "voxeld/v1/scene.grpc.pb.h"
@@ -95,7 +93,6 @@ class Connection::Impl {
 
   v1::DisplayService::Stub& displays() { return *displays_; }
   v1::SceneService::Stub& scene() { return *scene_; }
-  std::shared_ptr<grpc::ChannelInterface> channel() { return channel_; }
   const std::string& address() const { return address_; }
   Interrupt& interrupt() { return interrupt_; }
 
@@ -211,8 +208,9 @@ absl::Status Connection::CaptureVolume(
   return refused.ok() ? status : refused;
 }
 
-absl::StatusOr<std::unique_ptr<SceneStream>> Connection::OpenStream(const v1::Open& open) {
-  return OpenGrpcSceneStream(impl_->channel(), impl_->address(), open, impl_->interrupt());
+absl::StatusOr<std::unique_ptr<SceneSession>> Connection::OpenSession(client::Options options) {
+  options.address = impl_->address();
+  return SceneSession::Open(std::move(options), impl_->interrupt());
 }
 
 }  // namespace voxeld::voxelctl

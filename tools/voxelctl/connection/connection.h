@@ -8,13 +8,12 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/process/interrupt.h"
 #include "voxeld/v1/display.pb.h"
 #include "voxeld/v1/scene.pb.h"
 
 namespace voxeld::voxelctl {
-
-class SceneStream;
 
 // One channel. Calls block until their answer, a deadline of seconds, or an interrupt: then
 // Cancelled. Statuses are the server's, their messages made fit for a terminal; Unavailable names
@@ -42,8 +41,8 @@ class Connection {
   absl::Status CaptureVolume(const v1::CaptureVolumeRequest& request,
                              const std::function<absl::Status(const v1::VolumeChunk&)>& each);
 
-  // A session that is open: the server has answered Opened.
-  absl::StatusOr<std::unique_ptr<SceneStream>> OpenStream(const v1::Open& open);
+  // A session with this server, over a connection of its own.
+  absl::StatusOr<std::unique_ptr<SceneSession>> OpenSession(client::Options options);
 
  private:
   class Impl;

@@ -1,0 +1,368 @@
+#include "client/cpp/src/encode.h"
+
+#include <cstring>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "voxeld/v1/primitives.pb.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::client {
+namespace {
+
+// Numbers of fields are those of the generated code, so that there is one place for each.
+using v1::Batch;
+using v1::StreamRequest;
+
+// Smaller payloads are not worth a piece of their own.
+constexpr size_t kSharedBytes = 4096;
+
+template <typename T>
+std::string_view Bytes(std::span<const T> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
+}
+
+template <typename T>
+void AppendPayload(int field, const Array<T>& values, Rope* out) {
+  if (values.empty()) return;
+  const std::string_view bytes = Bytes(values.view());
+  std::string tag;
+  AppendVarint(static_cast<uint64_t>(field) << 3 | 2, &tag);
+  AppendVarint(bytes.size(), &tag);
+  out->Append(tag);
+  if (bytes.size() < kSharedBytes) {
+    out->Append(bytes);
+  } else if (values.owner() != nullptr) {
+    out->AppendShared(values.owner(), bytes);
+  } else {
+    auto copy = std::make_shared<const std::string>(bytes);
+    const std::string_view view = *copy;
+    out->AppendShared(std::move(copy), view);
+  }
+}
+
+absl::StatusOr<Rope> EncodeVertices(const Vertices& v) {
+  const size_t count = v.positions.size() / 3;
+  if (count == 0 || v.positions.size() % 3 != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("positions has ", v.positions.size(),
+                     " numbers; x y z of each vertex and at least one vertex is right"));
+  }
+  if (!v.colors.empty() && v.colors.size() != 3 * count) {
+    return absl::InvalidArgumentError(absl::StrCat("colors has ", v.colors.size(), " bytes for ",
+                                                   count, " vertices; ", 3 * count,
+                                                   " or none is right"));
+  }
+  if (!v.indices.empty() && !v.short_indices.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat("indices has ", v.indices.size(),
+                                                   " and short_indices ", v.short_indices.size(),
+                                                   " numbers; one of them must be empty"));
+  }
+  std::string head;
+  AppendUnsigned(v1::Vertices::kCountFieldNumber, count, &head);
+  AppendUnsigned(v1::Vertices::kPositionTypeFieldNumber, v1::ELEMENT_TYPE_F32, &head);
+  if (!v.colors.empty())
+    AppendUnsigned(v1::Vertices::kColorTypeFieldNumber, v1::ELEMENT_TYPE_RGB8, &head);
+  const size_t indices = v.indices.size() + v.short_indices.size();
+  if (indices > 0) {
+    AppendUnsigned(v1::Vertices::kIndexTypeFieldNumber,
+                   v.indices.empty() ? v1::ELEMENT_TYPE_U16 : v1::ELEMENT_TYPE_U32, &head);
+    AppendUnsigned(v1::Vertices::kIndexCountFieldNumber, indices, &head);
+  }
+  Rope rope(std::move(head));
+  AppendPayload(v1::Vertices::kIndicesFieldNumber, v.indices, &rope);
+  AppendPayload(v1::Vertices::kIndicesFieldNumber, v.short_indices, &rope);
+  AppendPayload(v1::Vertices::kColorsFieldNumber, v.colors, &rope);
+  AppendPayload(v1::Vertices::kPositionsFieldNumber, v.positions, &rope);
+  return rope;
+}
+
+void AppendVec3(int field, const Vec3& vec, std::string* out) {
+  std::string inner;
+  AppendDouble(v1::Vec3::kXFieldNumber, vec.x, &inner);
+  AppendDouble(v1::Vec3::kYFieldNumber, vec.y, &inner);
+  AppendDouble(v1::Vec3::kZFieldNumber, vec.z, &inner);
+  AppendPresentBytes(field, inner, out);
+}
+
+void AppendAffine(int field, const Affine& affine, std::string* out) {
+  std::string packed, inner;
+  packed.resize(sizeof affine.m);
+  std::memcpy(packed.data(), affine.m.data(), sizeof affine.m);
+  AppendPresentBytes(v1::Affine::kMFieldNumber, packed, &inner);
+  AppendPresentBytes(field, inner, out);
+}
+
+void AppendThickness(int field, const Thickness& thickness, std::string* out) {
+  std::string inner;
+  AppendFloat(v1::Thickness::kValueFieldNumber, thickness.value, &inner);
+  AppendUnsigned(
+      v1::Thickness::kUnitFieldNumber,
+      thickness.unit == Thickness::Unit::kUnits ? v1::Thickness::UNITS : v1::Thickness::VOXELS,
+      &inner);
+  AppendPresentBytes(field, inner, out);
+}
+
+// The wire's enumerations begin with UNSPECIFIED and go on as ours.
+template <typename Enum>
+uint64_t AfterUnspecified(Enum value) {
+  return static_cast<uint64_t>(value) + 1;
+}
+
+struct ShapeEncoder {
+  std::string before;  // what precedes the shape within the primitive: its colour
+
+  absl::StatusOr<Rope> operator()(const Points& points) const {
+    if (!points.vertices.indices.empty() || !points.vertices.short_indices.empty()) {
+      return absl::InvalidArgumentError("points have indices; none is right");
+    }
+    std::string fields;
+    AppendThickness(v1::Points::kThicknessFieldNumber, points.thickness, &fields);
+    return OverVertices(points.vertices, v1::Points::kVerticesFieldNumber, fields,
+                        v1::Primitive::kPointsFieldNumber);
+  }
+  absl::StatusOr<Rope> operator()(const Segments& segments) const {
+    std::string fields;
+    AppendUnsigned(v1::Segments::kTopologyFieldNumber, AfterUnspecified(segments.topology),
+                   &fields);
+    AppendUnsigned(v1::Segments::kSamplingFieldNumber, AfterUnspecified(segments.sampling),
+                   &fields);
+    AppendThickness(v1::Segments::kThicknessFieldNumber, segments.thickness, &fields);
+    return OverVertices(segments.vertices, v1::Segments::kVerticesFieldNumber, fields,
+                        v1::Primitive::kSegmentsFieldNumber);
+  }
+  absl::StatusOr<Rope> operator()(const Mesh& mesh) const {
+    std::string fields;
+    AppendUnsigned(v1::Mesh::kRuleFieldNumber, AfterUnspecified(mesh.rule), &fields);
+    return OverVertices(mesh.vertices, v1::Mesh::kVerticesFieldNumber, fields,
+                        v1::Primitive::kMeshFieldNumber);
+  }
+  absl::StatusOr<Rope> operator()(const Box& box) const {
+    std::string fields;
+    AppendVec3(v1::Box::kCenterFieldNumber, box.center, &fields);
+    AppendVec3(v1::Box::kSizeFieldNumber, box.size, &fields);
+    AppendUnsigned(v1::Box::kFillFieldNumber, AfterUnspecified(box.fill), &fields);
+    AppendUnsigned(v1::Box::kRuleFieldNumber, AfterUnspecified(box.rule), &fields);
+    return Wrap(before, v1::Primitive::kBoxFieldNumber, Rope(std::move(fields)));
+  }
+  absl::StatusOr<Rope> operator()(const Sphere& sphere) const {
+    std::string fields;
+    AppendVec3(v1::Sphere::kCenterFieldNumber, sphere.center, &fields);
+    AppendDouble(v1::Sphere::kRadiusFieldNumber, sphere.radius, &fields);
+    AppendUnsigned(v1::Sphere::kFillFieldNumber, AfterUnspecified(sphere.fill), &fields);
+    AppendUnsigned(v1::Sphere::kRuleFieldNumber, AfterUnspecified(sphere.rule), &fields);
+    return Wrap(before, v1::Primitive::kSphereFieldNumber, Rope(std::move(fields)));
+  }
+  absl::StatusOr<Rope> operator()(const Cylinder& cylinder) const {
+    std::string fields;
+    AppendVec3(v1::Cylinder::kCenterFieldNumber, cylinder.center, &fields);
+    AppendDouble(v1::Cylinder::kRadiusFieldNumber, cylinder.radius, &fields);
+    AppendDouble(v1::Cylinder::kHeightFieldNumber, cylinder.height, &fields);
+    AppendUnsigned(v1::Cylinder::kFillFieldNumber, AfterUnspecified(cylinder.fill), &fields);
+    AppendUnsigned(v1::Cylinder::kRuleFieldNumber, AfterUnspecified(cylinder.rule), &fields);
+    return Wrap(before, v1::Primitive::kCylinderFieldNumber, Rope(std::move(fields)));
+  }
+  absl::StatusOr<Rope> operator()(const Instance& instance) const {
+    std::string fields;
+    AppendBytes(v1::Instance::kObjectFieldNumber, instance.object, &fields);
+    return Wrap(before, v1::Primitive::kInstanceFieldNumber, Rope(std::move(fields)));
+  }
+
+ private:
+  absl::StatusOr<Rope> OverVertices(const Vertices& vertices, int vertices_field,
+                                    const std::string& fields, int primitive_field) const {
+    absl::StatusOr<Rope> encoded = EncodeVertices(vertices);
+    if (!encoded.ok()) return encoded.status();
+    return Wrap(before, primitive_field, Wrap(fields, vertices_field, *std::move(encoded)));
+  }
+};
+
+Rope EncodeUpsert(const UpsertOperation& upsert) {
+  std::string key, fields;
+  AppendBytes(v1::Upsert::kLayerFieldNumber, upsert.layer, &key);
+  AppendBytes(v1::Upsert::kIdFieldNumber, upsert.id, &key);
+  if (upsert.transform != Affine())
+    AppendAffine(v1::Entity::kTransformFieldNumber, upsert.transform, &fields);
+  AppendUnsigned(v1::Entity::kPriorityFieldNumber, upsert.priority, &fields);
+  AppendUnsigned(v1::Entity::kEraseFieldNumber, upsert.erase ? 1 : 0, &fields);
+  AppendSigned(v1::Entity::kLifetimeNsFieldNumber, upsert.lifetime_ns, &fields);
+  AppendBytes(v1::Entity::kLabelFieldNumber, upsert.label, &fields);
+  return Wrap(key, v1::Upsert::kEntityFieldNumber,
+              Wrap(fields, v1::Entity::kPrimitiveFieldNumber, upsert.primitive));
+}
+
+Rope Request(int field, std::string fields) { return Wrap("", field, Rope(std::move(fields))); }
+
+struct OperationEncoder {
+  Rope operator()(const UpsertOperation& upsert) const {
+    return Wrap("", StreamRequest::kUpsertFieldNumber, EncodeUpsert(upsert));
+  }
+  Rope operator()(const DeleteOperation& removal) const {
+    std::string fields;
+    AppendBytes(v1::Delete::kLayerFieldNumber, removal.layer, &fields);
+    switch (removal.what) {
+      case DeleteOperation::What::kId:
+        AppendPresentBytes(v1::Delete::kIdFieldNumber, removal.text, &fields);
+        break;
+      case DeleteOperation::What::kPrefix:
+        AppendPresentBytes(v1::Delete::kPrefixFieldNumber, removal.text, &fields);
+        break;
+      case DeleteOperation::What::kLayer:
+        AppendPresentUnsigned(v1::Delete::kAllOfLayerFieldNumber, 1, &fields);
+        break;
+      case DeleteOperation::What::kAllMine:
+        AppendPresentUnsigned(v1::Delete::kAllMineFieldNumber, 1, &fields);
+        break;
+    }
+    return Request(StreamRequest::kDeleteFieldNumber, std::move(fields));
+  }
+  Rope operator()(const TransformOperation& move) const {
+    std::string fields;
+    AppendBytes(v1::SetTransform::kLayerFieldNumber, move.layer, &fields);
+    AppendBytes(v1::SetTransform::kIdFieldNumber, move.id, &fields);
+    AppendAffine(v1::SetTransform::kTransformFieldNumber, move.transform, &fields);
+    return Request(StreamRequest::kSetTransformFieldNumber, std::move(fields));
+  }
+  Rope operator()(const LayerOperation& layer) const {
+    const LayerLook& look = layer.look;
+    std::string fields;
+    AppendBytes(v1::LayerState::kLayerFieldNumber, layer.layer, &fields);
+    if (look.visible)
+      AppendPresentUnsigned(v1::LayerState::kVisibleFieldNumber, *look.visible ? 1 : 0, &fields);
+    if (look.opacity)
+      AppendPresentUnsigned(v1::LayerState::kOpacityFieldNumber, *look.opacity, &fields);
+    if (look.order) AppendPresentZigzag(v1::LayerState::kOrderFieldNumber, *look.order, &fields);
+    if (look.blend)
+      AppendUnsigned(v1::LayerState::kBlendFieldNumber, AfterUnspecified(*look.blend), &fields);
+    if (look.transform)
+      AppendAffine(v1::LayerState::kTransformFieldNumber, *look.transform, &fields);
+    if (look.clip) {
+      std::string planes;
+      for (const HalfSpace& half : *look.clip) {
+        std::string plane;
+        AppendDouble(v1::Clip::Plane::kAFieldNumber, half.a, &plane);
+        AppendDouble(v1::Clip::Plane::kBFieldNumber, half.b, &plane);
+        AppendDouble(v1::Clip::Plane::kCFieldNumber, half.c, &plane);
+        AppendDouble(v1::Clip::Plane::kDFieldNumber, half.d, &plane);
+        AppendPresentBytes(v1::Clip::kPlanesFieldNumber, plane, &planes);
+      }
+      AppendPresentBytes(v1::LayerState::kClipFieldNumber, planes, &fields);
+    }
+    if (look.region) {
+      std::string corners;
+      if (!look.region->everything) {
+        AppendVec3(v1::Box3::kMinFieldNumber, look.region->min, &corners);
+        AppendVec3(v1::Box3::kMaxFieldNumber, look.region->max, &corners);
+      }
+      AppendPresentBytes(v1::LayerState::kRegionFieldNumber, corners, &fields);
+    }
+    return Request(StreamRequest::kLayerStateFieldNumber, std::move(fields));
+  }
+  Rope operator()(const DefineOperation& define) const {
+    std::string fields;
+    AppendBytes(v1::DefineObject::kObjectFieldNumber, define.object, &fields);
+    return Wrap("", StreamRequest::kDefineObjectFieldNumber,
+                Wrap(fields, v1::DefineObject::kDefinitionFieldNumber, define.definition));
+  }
+  Rope operator()(const RemoveObjectOperation& remove) const {
+    std::string fields;
+    AppendBytes(v1::DeleteObject::kObjectFieldNumber, remove.object, &fields);
+    AppendUnsigned(v1::DeleteObject::kCascadeFieldNumber, remove.cascade ? 1 : 0, &fields);
+    return Request(StreamRequest::kDeleteObjectFieldNumber, std::move(fields));
+  }
+  // Frames are several messages.
+  Rope operator()(const FrameOperation&) const { return Rope(); }
+};
+
+}  // namespace
+
+absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color) {
+  std::string before;
+  // An instance has the colours of its object. Black is present and empty, unlike the default, white.
+  if (!std::holds_alternative<Instance>(shape)) {
+    std::string rgb;
+    AppendFixed32(
+        v1::Color::kRgbFieldNumber,
+        static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 | color.b, &rgb);
+    AppendPresentBytes(v1::Primitive::kColorFieldNumber, rgb, &before);
+  }
+  return std::visit(ShapeEncoder{std::move(before)}, shape);
+}
+
+absl::StatusOr<DefineOperation> EncodeDefinition(std::string object,
+                                                 const std::vector<Part>& parts) {
+  DefineOperation define{.object = std::move(object), .definition = {}, .uses = {}};
+  for (size_t i = 0; i < parts.size(); ++i) {
+    absl::StatusOr<Rope> primitive = EncodePrimitive(parts[i].shape, parts[i].color);
+    if (!primitive.ok()) {
+      return absl::Status(primitive.status().code(),
+                          absl::StrCat("part ", i, " of the object \"", define.object,
+                                       "\": ", primitive.status().message()));
+    }
+    std::string fields;
+    if (parts[i].transform != Affine())
+      AppendAffine(v1::Object::Part::kTransformFieldNumber, parts[i].transform, &fields);
+    define.definition.Append(
+        Wrap("", v1::Object::kPartsFieldNumber,
+             Wrap(fields, v1::Object::Part::kPrimitiveFieldNumber, *std::move(primitive))));
+    if (const auto* instance = std::get_if<Instance>(&parts[i].shape))
+      define.uses.push_back(instance->object);
+  }
+  return define;
+}
+
+Rope EncodeOperation(const Operation& operation) {
+  return std::visit(OperationEncoder(), operation);
+}
+
+Rope EncodeFrameBegin(std::string_view layer) {
+  std::string fields;
+  AppendBytes(v1::FrameBegin::kLayerFieldNumber, layer, &fields);
+  return Request(StreamRequest::kFrameBeginFieldNumber, std::move(fields));
+}
+
+Rope EncodeFrameEnd(std::string_view layer) {
+  std::string fields;
+  AppendBytes(v1::FrameEnd::kLayerFieldNumber, layer, &fields);
+  return Request(StreamRequest::kFrameEndFieldNumber, std::move(fields));
+}
+
+void Batcher::Add(const UpsertOperation& upsert) {
+  const Rope encoded = Wrap("", Batch::kUpsertsFieldNumber, EncodeUpsert(upsert));
+  if (open_.size() > 0 && open_.size() + encoded.size() > kBatchBytes) Flush();
+  open_.Append(encoded);
+}
+
+void Batcher::Flush() {
+  if (open_.size() == 0) return;
+  messages_.push_back(Wrap("", StreamRequest::kBatchFieldNumber, std::exchange(open_, Rope())));
+}
+
+std::vector<Rope> Batcher::Take() {
+  Flush();
+  return std::exchange(messages_, {});
+}
+
+Rope EncodeCommit(const CommitRecord& commit) {
+  std::string fields;
+  AppendUnsigned(v1::Commit::kFrameIdFieldNumber, commit.frame_id, &fields);
+  AppendSigned(v1::Commit::kSendTimeNsFieldNumber, commit.send_time_ns, &fields);
+  AppendSigned(v1::Commit::kPresentAtNsFieldNumber, commit.present_at_ns, &fields);
+  AppendUnsigned(v1::Commit::kMustShowFieldNumber, commit.must_show ? 1 : 0, &fields);
+  AppendUnsigned(v1::Commit::kClientDropsFieldNumber, commit.client_drops, &fields);
+  return Request(StreamRequest::kCommitFieldNumber, std::move(fields));
+}
+
+Rope EncodePing(int64_t client_time_ns) {
+  std::string fields;
+  AppendSigned(v1::Ping::kClientTimeNsFieldNumber, client_time_ns, &fields);
+  return Request(StreamRequest::kPingFieldNumber, std::move(fields));
+}
+
+void AddSequence(uint64_t sequence, Rope* request) {
+  std::string field;
+  AppendUnsigned(StreamRequest::kSequenceFieldNumber, sequence, &field);
+  request->Prepend(field);
+}
+
+}  // namespace voxeld::client

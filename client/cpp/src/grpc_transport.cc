@@ -1,0 +1,129 @@
+#include "client/cpp/src/grpc_transport.h"
+
+#include <grpc/grpc.h>
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/channel_arguments.h>
+#include <grpcpp/support/client_callback.h>
+#include <grpcpp/support/slice.h>
+
+#include <utility>
+#include <vector>
+
+#include "display/sync/mutex.h"
+#include "voxeld/v1/scene.grpc.pb.h"  // how gRPC reads answers
+
+namespace voxeld::client {
+namespace {
+
+constexpr char kMethod[] = "/voxeld.v1.SceneService/Stream";
+constexpr int kMostAnswerBytes = 64 << 20;
+
+// Payloads are referenced, and let go when gRPC has sent them.
+grpc::ByteBuffer ToByteBuffer(const Rope& message) {
+  std::vector<grpc::Slice> slices;
+  slices.emplace_back(message.head());
+  for (const Rope::Chunk& chunk : message.tail()) {
+    if (chunk.owner == nullptr) {
+      slices.emplace_back(chunk.text);
+      continue;
+    }
+    slices.emplace_back(
+        const_cast<char*>(chunk.shared.data()), chunk.shared.size(),
+        [](void* owner) { delete static_cast<std::shared_ptr<const void>*>(owner); },
+        new std::shared_ptr<const void>(chunk.owner));
+  }
+  return grpc::ByteBuffer(slices.data(), slices.size());
+}
+
+class GrpcStream final : public Stream,
+                         private grpc::ClientBidiReactor<grpc::ByteBuffer, v1::StreamResponse> {
+ public:
+  GrpcStream(const std::shared_ptr<grpc::Channel>& channel, Events* events)
+      : events_(events), stub_(channel) {
+    stub_.PrepareBidiStreamingCall(&context_, kMethod, {}, this);
+    // Writes come from outside of reactions.
+    AddHold();
+    StartRead(&response_);
+    StartCall();
+  }
+
+  void Write(const Rope& message) override {
+    sync::MutexLock lock(mutex_);
+    if (ending_) return;
+    request_ = ToByteBuffer(message);
+    StartWrite(&request_);
+  }
+
+  void WritesDone() override {
+    sync::MutexLock lock(mutex_);
+    if (!ending_) StartWritesDone();
+  }
+
+  void Cancel() override { context_.TryCancel(); }
+
+ private:
+  void OnReadDone(bool ok) override {
+    if (ok) {
+      events_->OnRead(response_);
+      StartRead(&response_);
+      return;
+    }
+    {
+      sync::MutexLock lock(mutex_);
+      if (std::exchange(ending_, true)) return;
+    }
+    RemoveHold();
+  }
+
+  void OnWriteDone(bool ok) override {
+    if (ok) events_->OnWritten();
+  }
+
+  void OnDone(const grpc::Status& status) override {
+    events_->OnEnd({static_cast<absl::StatusCode>(status.error_code()), status.error_message()});
+  }
+
+  Events* const events_;
+  grpc::ClientContext context_;
+  grpc::TemplatedGenericStub<grpc::ByteBuffer, v1::StreamResponse> stub_;
+  v1::StreamResponse response_;
+  grpc::ByteBuffer request_;
+  sync::Mutex mutex_;
+  bool ending_ VOXELD_GUARDED_BY(mutex_) = false;
+};
+
+class GrpcTransport final : public Transport {
+ public:
+  explicit GrpcTransport(std::string target) : target_(std::move(target)) {}
+
+  std::unique_ptr<Stream> Start(Stream::Events* events) override {
+    grpc::ChannelArguments arguments;
+    arguments.SetMaxReceiveMessageSize(kMostAnswerBytes);
+    // The server is near; what a web proxy is set for is not meant for it.
+    arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+    // Pauses between attempts are the session's, not those that gRPC's pool remembers.
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    return std::make_unique<GrpcStream>(
+        grpc::CreateCustomChannel(target_, grpc::InsecureChannelCredentials(), arguments), events);
+  }
+
+ private:
+  const std::string target_;
+};
+
+}  // namespace
+
+std::unique_ptr<Transport> MakeGrpcTransport(std::string target) {
+  // gRPC stays up from now on: shutting it down waits, up to 10 s, for sockets that it is still taking
+  // down, and it would be at the end of whichever session happened to be the last.
+  static const bool up = (grpc_init(), true);
+  static_cast<void>(up);
+  return std::make_unique<GrpcTransport>(std::move(target));
+}
+
+}  // namespace voxeld::client

@@ -1,0 +1,352 @@
+#include "client/cpp/src/session_core.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/src/encode.h"
+
+namespace voxeld::client {
+namespace {
+
+// An upsert's names and fields, about.
+constexpr size_t kFieldBytes = 256;
+
+uint64_t KeepFrames(const Options& options) {
+  switch (options.flow) {
+    case Flow::kReliable:
+      return 0;
+    case Flow::kLatest:
+      return 1;
+    case Flow::kDropOldest:
+      return std::max(1u, options.drop_oldest_frames);
+  }
+  return 0;
+}
+
+struct OperationBytes {
+  size_t operator()(const UpsertOperation& upsert) const {
+    return upsert.primitive.size() + upsert.layer.size() + upsert.id.size() + upsert.label.size() +
+           kFieldBytes;
+  }
+  size_t operator()(const DefineOperation& define) const {
+    return define.definition.size() + define.object.size();
+  }
+  size_t operator()(const FrameOperation& frame) const {
+    size_t bytes = kFieldBytes;
+    for (const UpsertOperation& upsert : frame.upserts) bytes += (*this)(upsert);
+    return bytes;
+  }
+  template <typename Small>
+  size_t operator()(const Small&) const {
+    return kFieldBytes;
+  }
+};
+
+std::string Words(sync::TimeNs time) { return absl::StrCat(static_cast<double>(time) / 1e9, " s"); }
+
+}  // namespace
+
+SessionCore::SessionCore(Options options, std::unique_ptr<Transport> transport, sync::Clock& clock)
+    : options_(std::move(options)),
+      transport_(std::move(transport)),
+      clock_(clock),
+      outbox_(KeepFrames(options_), options_.buffer_bytes),
+      receipts_(options_.outcomes),
+      backoff_(options_.first_pause.count(), options_.longest_pause.count()) {}
+
+SessionCore::~SessionCore() = default;
+
+std::string SessionCore::Where() const { return "voxeld at " + options_.address; }
+
+sync::TimeNs SessionCore::Step() {
+  std::deque<Event> events;
+  std::vector<std::unique_ptr<Link>> ended;
+  sync::TimeNs next = sync::kNever;
+  {
+    sync::MutexLock lock(mutex_);
+    next = DoDue(clock_.Now());
+    events.swap(events_);
+    ended.swap(ended_links_);
+  }
+  for (const Event& event : events) {
+    if (const auto* receipt = std::get_if<Receipt>(&event)) {
+      if (options_.on_receipt) options_.on_receipt(*receipt);
+    } else if (const auto* issue = std::get_if<Issue>(&event)) {
+      if (options_.on_issue) options_.on_issue(*issue);
+    } else if (options_.on_connection) {
+      options_.on_connection(std::get<ConnectionChange>(event));
+    }
+  }
+  return next;
+}
+
+void SessionCore::Run() {
+  for (;;) {
+    Step();
+    sync::MutexLock lock(mutex_);
+    if (stop_ && link_ == nullptr && events_.empty()) return;
+    // Anew: a deadline may have come nearer since.
+    const sync::TimeNs next = DoDue(clock_.Now());
+    if (events_.empty() && ended_links_.empty() && next > clock_.Now())
+      clock_.WaitUntil(mutex_, work_, next);
+  }
+}
+
+void SessionCore::Stop() {
+  sync::MutexLock lock(mutex_);
+  stop_ = true;
+  if (link_ != nullptr) CancelLink(absl::CancelledError("the session was closed"));
+  while (link_ != nullptr) changed_.Wait(mutex_);
+  if (state_ != State::kEnded) EndSession(absl::CancelledError("the session was closed"));
+  work_.NotifyAll();
+}
+
+bool SessionCore::TakesEvents() const {
+  return options_.on_receipt || options_.on_issue || options_.on_connection;
+}
+
+void SessionCore::Changed() {
+  for (const uint64_t frame : receipts_.TakeChanged()) {
+    const Receipt* receipt = receipts_.Find(frame);
+    if (options_.on_receipt && receipt != nullptr) events_.push_back(*receipt);
+  }
+  if (!TakesEvents()) events_.clear();
+  if (!events_.empty() || !ended_links_.empty()) work_.NotifyAll();
+  changed_.NotifyAll();
+}
+
+void SessionCore::NoteDrops() {
+  for (const Drop& drop : outbox_.TakeDrops())
+    receipts_.Dropped(drop.frame_id, drop.frames, drop.whole);
+}
+
+absl::Status SessionCore::Stage(Operation operation) {
+  const size_t bytes = std::visit(OperationBytes(), operation);
+  sync::MutexLock lock(mutex_);
+  if (state_ == State::kEnded || closing_)
+    return absl::FailedPreconditionError("the session is closed");
+  const uint64_t most = server_ ? server_->limits.max_message_bytes : 0;
+  // Frames are several messages.
+  if (most > 0 && bytes > most + kFieldBytes &&
+      !std::holds_alternative<FrameOperation>(operation)) {
+    return absl::InvalidArgumentError(absl::StrCat("what is to be put up has ", bytes,
+                                                   " bytes, and the server's max_message_bytes is ",
+                                                   most, "; put it up in pieces"));
+  }
+  staged_.push_back(std::move(operation));
+  staged_bytes_ += bytes;
+  return absl::OkStatus();
+}
+
+absl::Status SessionCore::StageUpsert(std::string layer, std::string id, const Shape& shape,
+                                      const Look& look) {
+  if (layer.empty()) return absl::InvalidArgumentError("the layer has no name");
+  if (id.empty()) return absl::InvalidArgumentError("the entity has no id");
+  absl::StatusOr<Rope> primitive = EncodePrimitive(shape, look.color);
+  if (!primitive.ok()) return primitive.status();
+  return Stage(UpsertOperation{.layer = std::move(layer),
+                               .id = std::move(id),
+                               .primitive = *std::move(primitive),
+                               .transform = look.transform,
+                               .priority = look.priority,
+                               .erase = look.erase,
+                               .lifetime_ns = look.lifetime.count(),
+                               .label = look.label});
+}
+
+absl::StatusOr<uint64_t> SessionCore::Commit(FrameOperation* frame, const CommitOptions& options) {
+  sync::MutexLock lock(mutex_);
+  if (state_ == State::kEnded) {
+    return ended_.ok() ? absl::FailedPreconditionError("the session is closed") : ended_;
+  }
+  if (closing_) return absl::FailedPreconditionError("the session is closed");
+  std::vector<Operation> operations = std::exchange(staged_, {});
+  if (frame != nullptr) operations.emplace_back(std::move(*frame));
+  std::shared_ptr<Transaction> transaction = MakeTransaction(std::move(operations), options);
+  transaction->frame_id = next_frame_;
+  const absl::Status added = outbox_.Add(transaction);
+  if (!added.ok()) {
+    if (frame != nullptr) {
+      *frame = std::move(std::get<FrameOperation>(transaction->operations.back()));
+      transaction->operations.pop_back();
+    }
+    staged_ = std::move(transaction->operations);
+    return added;
+  }
+  if (!options_.restore) transaction->operations.clear();
+  staged_bytes_ = 0;
+  receipts_.Queued(next_frame_);
+  NoteDrops();
+  Pump();
+  Changed();
+  return next_frame_++;
+}
+
+size_t SessionCore::staged_bytes() const {
+  sync::MutexLock lock(mutex_);
+  return staged_bytes_;
+}
+
+bool SessionCore::HasRoom() const {
+  sync::MutexLock lock(mutex_);
+  return state_ == State::kOpen && outbox_.empty() && outbox_.has_credit() &&
+         receipts_.unsettled() < options_.most_unsettled;
+}
+
+template <typename Done>
+absl::Status SessionCore::Wait(Duration timeout, bool interruptible, const char* what, Done done) {
+  const sync::TimeNs now = clock_.Now();
+  const sync::TimeNs deadline =
+      timeout.count() > sync::kNever - now ? sync::kNever : now + timeout.count();
+  sync::MutexLock lock(mutex_);
+  while (!done()) {
+    if (state_ == State::kEnded) {
+      return ended_.ok() ? absl::UnavailableError(Where() + " ended the stream") : ended_;
+    }
+    if (interruptible && interrupted_) return absl::CancelledError("interrupted");
+    if (clock_.Now() >= deadline) {
+      std::string why = absl::StrCat("waited in vain for ", what, " from ", Where());
+      if (state_ != State::kOpen && !last_loss_.ok())
+        absl::StrAppend(&why, ": ", last_loss_.message());
+      return absl::DeadlineExceededError(why);
+    }
+    clock_.WaitUntil(mutex_, changed_, deadline);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SessionCore::WaitOpened(Duration timeout) {
+  return Wait(timeout, true, "Opened",
+              [this]() VOXELD_REQUIRES(mutex_) { return state_ == State::kOpen; });
+}
+
+absl::Status SessionCore::WaitForRoom(Duration timeout) {
+  return Wait(timeout, true, "room", [this]() VOXELD_REQUIRES(mutex_) {
+    return state_ == State::kOpen && outbox_.empty() && outbox_.has_credit() &&
+           receipts_.unsettled() < options_.most_unsettled;
+  });
+}
+
+absl::StatusOr<Receipt> SessionCore::AnswerOf(uint64_t frame) const {
+  const Receipt* receipt = receipts_.Find(frame);
+  if (receipt == nullptr) {
+    return absl::NotFoundError(absl::StrCat(
+        "the commit ", frame, " is not known (any more); the newest is ", next_frame_ - 1));
+  }
+  switch (receipt->state) {
+    case Receipt::State::kRefused: {
+      std::string text = absl::StrCat("the server refused commit ", frame, ": ", receipt->message);
+      const std::vector<Issue>& issues = receipt->issues;
+      constexpr size_t kMost = 20;
+      for (size_t i = 0; i < issues.size() && i < kMost; ++i)
+        absl::StrAppend(&text, "\n  ", DescribeIssue(issues[i]));
+      if (issues.size() > kMost) absl::StrAppend(&text, "\n  and ", issues.size() - kMost, " more");
+      return absl::FailedPreconditionError(text);
+    }
+    case Receipt::State::kDropped:
+      return absl::AbortedError(
+          absl::StrCat("the commit ", frame, " was not sent: newer frames replaced its own"));
+    case Receipt::State::kLost:
+      return absl::AbortedError(absl::StrCat("the commit ", frame, " is lost: ", receipt->message));
+    default:
+      return *receipt;
+  }
+}
+
+absl::StatusOr<Receipt> SessionCore::WaitAccepted(uint64_t frame, Duration timeout) {
+  const absl::Status waited =
+      Wait(timeout, true, "Accepted", [this, frame]() VOXELD_REQUIRES(mutex_) {
+        const Receipt* receipt = receipts_.Find(frame);
+        return receipt == nullptr || receipt->settled ||
+               receipt->state == Receipt::State::kAccepted;
+      });
+  if (!waited.ok()) return waited;
+  sync::MutexLock lock(mutex_);
+  return AnswerOf(frame);
+}
+
+absl::StatusOr<Receipt> SessionCore::WaitShown(uint64_t frame, Duration timeout) {
+  const absl::Status waited =
+      Wait(timeout, true, "outcomes", [this, frame]() VOXELD_REQUIRES(mutex_) {
+        const Receipt* receipt = receipts_.Find(frame);
+        return receipt == nullptr || receipt->settled;
+      });
+  if (!waited.ok()) return waited;
+  sync::MutexLock lock(mutex_);
+  return AnswerOf(frame);
+}
+
+absl::Status SessionCore::WaitSettled(Duration timeout) {
+  const absl::Status waited = Wait(timeout, false, "outcomes", [this]() VOXELD_REQUIRES(mutex_) {
+    return receipts_.unsettled() == 0;
+  });
+  if (!absl::IsDeadlineExceeded(waited)) return waited;
+  sync::MutexLock lock(mutex_);
+  const uint64_t left = receipts_.unsettled();
+  if (left == 0) return absl::OkStatus();
+  return absl::DeadlineExceededError(
+      absl::StrCat(left, left == 1 ? " commit has" : " commits have", " no outcome yet"));
+}
+
+absl::Status SessionCore::Close(Duration timeout) {
+  {
+    sync::MutexLock lock(mutex_);
+    closing_ = true;
+    staged_.clear();
+    staged_bytes_ = 0;
+    Pump();
+  }
+  const sync::TimeNs deadline = clock_.Now() + timeout.count();
+  sync::MutexLock lock(mutex_);
+  while (state_ != State::kEnded && clock_.Now() < deadline)
+    clock_.WaitUntil(mutex_, changed_, deadline);
+  if (state_ == State::kEnded) return ended_;
+  std::string why = absl::StrCat(Where(), " did not end the stream in ", Words(timeout.count()));
+  if (!outbox_.empty())
+    absl::StrAppend(&why, "; ", outbox_.waiting_bytes(), " bytes were not sent");
+  if (state_ != State::kOpen && !last_loss_.ok()) absl::StrAppend(&why, ": ", last_loss_.message());
+  return absl::DeadlineExceededError(why);
+}
+
+void SessionCore::Interrupt() {
+  sync::MutexLock lock(mutex_);
+  interrupted_ = true;
+  changed_.NotifyAll();
+}
+
+std::optional<Receipt> SessionCore::FindReceipt(uint64_t frame) const {
+  sync::MutexLock lock(mutex_);
+  const Receipt* receipt = receipts_.Find(frame);
+  if (receipt == nullptr) return std::nullopt;
+  return *receipt;
+}
+
+Tally SessionCore::GetTally() const {
+  sync::MutexLock lock(mutex_);
+  return receipts_.GetTally();
+}
+
+std::vector<int64_t> SessionCore::latencies_ns() const {
+  sync::MutexLock lock(mutex_);
+  return receipts_.latencies_ns();
+}
+
+std::optional<ServerInfo> SessionCore::server() const {
+  sync::MutexLock lock(mutex_);
+  return server_;
+}
+
+std::optional<ClockEstimate> SessionCore::clock_estimate() const {
+  sync::MutexLock lock(mutex_);
+  return estimator_.Get();
+}
+
+std::optional<int64_t> SessionCore::ServerNow() const {
+  sync::MutexLock lock(mutex_);
+  const std::optional<ClockEstimate> estimate = estimator_.Get();
+  if (!estimate) return std::nullopt;
+  return clock_.Now() + estimate->offset_ns;
+}
+
+}  // namespace voxeld::client

@@ -1,0 +1,184 @@
+// What can be drawn, and how it looks. Words only: nothing here talks to a server.
+//
+// Coordinates are in the entity's own space: its transform, its layer's and the display's view
+// follow. Everything must be finite.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace voxeld::client {
+
+struct Vec3 {
+  double x = 0, y = 0, z = 0;
+};
+
+struct Color {
+  uint8_t r = 255, g = 255, b = 255;
+};
+
+// Row-major 3×4: p ↦ (m0·x + m1·y + m2·z + m3, m4·x + …, m8·x + …). The linear part must not be
+// singular.
+struct Affine {
+  std::array<double, 12> m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+  static Affine Translate(const Vec3& by);
+  static Affine Scale(const Vec3& by);
+  static Affine Scale(double by) { return Scale({by, by, by}); }
+  // Right-handed, about an axis through the origin, of any length but 0.
+  static Affine Rotate(const Vec3& axis, double radians);
+
+  bool operator==(const Affine&) const = default;
+};
+
+// `second` after `first`.
+Affine operator*(const Affine& second, const Affine& first);
+
+// A packed array of numbers. Made of an lvalue or a span it is a view, which must stay until the
+// call that it is given to returns; that call copies it once. Made of an rvalue vector or a list it
+// owns what it holds, and large ones go to the wire without another copy.
+template <typename T>
+class Array {
+ public:
+  Array() = default;
+  Array(std::span<const T> view) : view_(view) {}                         // NOLINT: implicit
+  Array(std::span<T> view) : view_(view) {}                               // NOLINT: implicit
+  Array(const std::vector<T>& view) : view_(view.data(), view.size()) {}  // NOLINT: implicit
+  template <size_t n>
+  Array(const std::array<T, n>& view) : view_(view.data(), n) {}  // NOLINT: implicit
+  Array(std::vector<T>&& whole)                                   // NOLINT: implicit
+      : owner_(std::make_shared<const std::vector<T>>(std::move(whole))), view_(*owner_) {}
+  Array(std::initializer_list<T> list) : Array(std::vector<T>(list)) {}
+
+  size_t size() const { return view_.size(); }
+  bool empty() const { return view_.empty(); }
+  std::span<const T> view() const { return view_; }
+  // Null for a view.
+  const std::shared_ptr<const std::vector<T>>& owner() const { return owner_; }
+
+ private:
+  std::shared_ptr<const std::vector<T>> owner_;
+  std::span<const T> view_;
+};
+
+// Diameter of a curve or point; 0: one voxel wide.
+struct Thickness {
+  enum class Unit : uint8_t { kVoxels, kUnits };  // of the display, or the entity's own
+  float value = 0;
+  Unit unit = Unit::kVoxels;
+};
+
+enum class LineSampling : uint8_t { kThin, kEuclidean, kCover };
+enum class SurfaceRule : uint8_t { kThin, kCover };
+enum class Fill : uint8_t { kSurface, kSolid };
+
+// Vertices as they lie in memory. At most one of the two index arrays.
+struct Vertices {
+  Array<float> positions;         // x y z of each
+  Array<uint8_t> colors;          // r g b of each; empty: Look::color
+  Array<uint32_t> indices;        // empty: vertices are used as they stand
+  Array<uint16_t> short_indices;  // the same in less room
+};
+
+struct Points {
+  Vertices vertices;  // without indices
+  Thickness thickness;
+};
+
+struct Segments {
+  enum class Topology : uint8_t { kList, kStrip, kLoop };
+  Vertices vertices;
+  Topology topology = Topology::kList;
+  LineSampling sampling = LineSampling::kThin;
+  Thickness thickness;
+};
+
+// Indexed triangles, or vertices three by three.
+struct Mesh {
+  Vertices vertices;
+  SurfaceRule rule = SurfaceRule::kThin;
+};
+
+struct Box {
+  Vec3 center;
+  Vec3 size = {1, 1, 1};  // full edge lengths
+  Fill fill = Fill::kSurface;
+  SurfaceRule rule = SurfaceRule::kThin;
+};
+
+struct Sphere {
+  Vec3 center;
+  double radius = 1;
+  Fill fill = Fill::kSurface;
+  SurfaceRule rule = SurfaceRule::kThin;
+};
+
+// Along its own z axis, centred.
+struct Cylinder {
+  Vec3 center;
+  double radius = 1;
+  double height = 1;
+  Fill fill = Fill::kSurface;
+  SurfaceRule rule = SurfaceRule::kThin;
+};
+
+// Draws an object that Session::DefineObject defined.
+struct Instance {
+  std::string object;
+};
+
+using Shape = std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance>;
+
+// Everything about an entity but its shape.
+struct Look {
+  Color color;  // of what has no colours of its own; black covers. Instances have their object's
+  Affine transform;
+  uint32_t priority = 0;  // 0 to 126: within its layer the higher wins
+  bool erase = false;     // removes what is of lower or equal priority within its layer
+  std::chrono::nanoseconds lifetime{0};  // it goes that long after it was applied; 0: it stays
+  std::string label;                     // for people
+};
+
+// A piece of an object.
+struct Part {
+  Shape shape;
+  Color color;
+  Affine transform;  // part → object
+};
+
+enum class Blend : uint8_t { kOver, kAdd, kErase };
+
+// A half-space of scene space: a·x + b·y + c·z + d ≥ 0.
+struct HalfSpace {
+  double a = 0, b = 0, c = 0, d = 0;
+};
+
+// A part of scene space, its faces included; `everything`: all of it, whatever the corners.
+struct Region {
+  Vec3 min, max;
+  bool everything = false;
+};
+
+// What is set is changed; the rest stays as it was.
+struct LayerLook {
+  std::optional<bool> visible;
+  std::optional<uint8_t> opacity;
+  std::optional<int32_t> order;  // layers combine in ascending (order, creation)
+  std::optional<Blend> blend;
+  std::optional<Affine> transform;
+  // Only what lies in all of these and in the region is drawn. An empty list takes the former away.
+  std::optional<std::vector<HalfSpace>> clip;
+  std::optional<Region> region;
+};
+
+}  // namespace voxeld::client

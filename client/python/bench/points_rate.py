@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""How many clouds of so many points (16 bytes each: float32 × 3 and RGBX) go through a second. Prints JSON.
+
+usage: points_rate.py [--server ADDRESS] [--points N] [--frames N] [--flow POLICY]
+The daemon is to run with no display, or the display's own rate is in the figure: voxeld --listen unix:/tmp/v.sock --http off
+"""
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import time
+
+import numpy as np
+
+import voxeld as voxel
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="frames of points a second")
+    parser.add_argument("--server", help="HOST:PORT or unix:PATH (default: as voxelctl)")
+    parser.add_argument("--points", type=int, default=1_000_000)
+    parser.add_argument("--frames", type=int, default=90)
+    parser.add_argument("--warm-up", type=int, default=10, help="frames before the clock starts")
+    parser.add_argument("--flow", default="reliable", choices=["reliable", "latest", "drop_oldest"])
+    parser.add_argument("--ahead", type=int, default=3, help="frames drawn before the first of them is accepted")
+    options = parser.parse_args()
+
+    random = np.random.default_rng(1)
+    clouds = [random.uniform(-1, 1, (options.points, 3)).astype(np.float32) for _ in range(2)]
+    colors = random.integers(0, 256, (options.points, 4), dtype=np.uint8)
+    with voxel.connect(options.server, name="points_rate", outcomes=False, flow=options.flow) as v:
+        tickets: list[voxel.Frame] = []
+        began, used, draw_s = 0.0, resource.getrusage(resource.RUSAGE_SELF), 0.0
+        for number in range(options.warm_up + options.frames):
+            if number == options.warm_up:
+                for ticket in tickets:
+                    ticket.wait(60)
+                tickets, draw_s = [], 0.0
+                began, used = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF)
+            start = time.perf_counter()
+            with v.frame("cloud") as frame:
+                frame.points("points", clouds[number % 2], colors=colors)
+            draw_s += time.perf_counter() - start
+            tickets.append(frame.ticket)
+            if options.flow == "reliable" and len(tickets) > options.ahead:
+                tickets[-1 - options.ahead].wait(60)
+        for ticket in tickets:
+            if ticket.state != "dropped":
+                ticket.future().result(60)
+        seconds = time.perf_counter() - began
+        now = resource.getrusage(resource.RUSAGE_SELF)
+        arrived = sum(ticket.state == "accepted" for ticket in tickets)
+        print(json.dumps({
+            "points": options.points, "frames": options.frames, "accepted": arrived, "flow": options.flow,
+            "seconds": round(seconds, 3), "frames_per_second": round(arrived / seconds, 2),
+            "megabytes_per_second": round(arrived * options.points * 16 / seconds / 1e6, 1),
+            "draw_ms": round(1000 * draw_s / options.frames, 2),
+            "client_cores": round((now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime) / seconds, 2),
+            "counts": v.counts}))
+
+
+if __name__ == "__main__":
+    main()

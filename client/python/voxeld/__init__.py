@@ -1,0 +1,22 @@
+"""voxeld: draw in volumetric displays.
+
+    import voxeld as voxel
+    v = voxel.connect()
+    v.lines("axes", [[-1, 0, 0], [1, 0, 0]], colors="tab:orange")
+"""
+from . import aio
+from .connection import Connection, connect
+from .errors import (BufferFull, CommitDropped, CommitRefused, ConnectionLost, InvalidArray, InvalidColor, InvalidValue,
+                     VoxelError)
+from .handles import FrameBlock, Handle, Layer, ObjectBlock
+from .queries import ChangeSet
+from .receipts import Accepted, Frame, Issue, Outcome, Stages
+from .transforms import identity, rotate, scale, translate
+from .volumes import Volume
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Accepted", "BufferFull", "ChangeSet", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Frame",
+    "FrameBlock", "Handle", "InvalidArray", "InvalidColor", "InvalidValue", "Issue", "Layer", "ObjectBlock", "Outcome",
+    "Stages", "VoxelError", "Volume", "aio", "connect", "identity", "rotate", "scale", "translate"]

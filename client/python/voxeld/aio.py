@@ -1,0 +1,89 @@
+"""The same for asyncio: drawing calls are the same and never wait; what waits is awaited.
+
+    v = await voxeld.aio.connect()
+    v.points("cloud", cloud)
+    outcomes = await shown(v.commit(), timeout=1.0)
+"""
+from __future__ import annotations
+
+import asyncio
+from concurrent.futures import Future
+from types import TracebackType
+from typing import Callable, Optional, Type, Union
+
+from .base import BaseConnection, settings
+from .connection import _open
+from .errors import ConnectionLost
+from .handles import FrameBlock
+from .receipts import Frame, Issue, Outcome
+from .v1 import display_pb2, scene_pb2
+from .volumes import Volume
+
+
+async def _within(future: "Future[Frame]", timeout: Optional[float]) -> Frame:
+    return await asyncio.wait_for(asyncio.wrap_future(future), timeout)
+
+
+async def accepted(frame: Union[Frame, FrameBlock], timeout: Optional[float] = None) -> Frame:
+    """Until the commit is answered. Raises as Frame.wait() does, or asyncio.TimeoutError."""
+    ticket = frame if isinstance(frame, Frame) else frame.ticket
+    return (await _within(ticket.future(), timeout)).raise_if_failed()
+
+
+async def shown(frame: Union[Frame, FrameBlock], timeout: Optional[float] = None) -> dict[str, Outcome]:
+    """Until every display has said what became of the commit: that, by the display's name."""
+    ticket = frame if isinstance(frame, Frame) else frame.ticket
+    return (await _within(ticket.future(shown=True), timeout)).raise_if_failed().outcomes
+
+
+class Connection(BaseConnection):
+    async def __aenter__(self) -> "Connection":
+        return self
+
+    async def __aexit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
+                        trace: Optional[TracebackType]) -> None:
+        await self.close()
+
+    async def wait_connected(self, timeout: Optional[float] = None) -> None:
+        if not await asyncio.to_thread(self._transport.wait_until, lambda: self._session.open, timeout):
+            raise ConnectionLost(self._transport.last_error or f"no voxeld answered at {self.server} in {timeout} s")
+
+    async def flush(self, timeout: Optional[float] = None) -> None:
+        if not await asyncio.to_thread(self._transport.wait_until, self._session.idle, timeout):
+            raise asyncio.TimeoutError(f"after {timeout} s {self.counts['waiting_commits']} commits still wait to be sent")
+
+    async def close(self, timeout: float = 5.0) -> None:
+        _open.discard(self)
+        await asyncio.to_thread(self._transport.close, timeout)
+        self._queries.close()
+
+    async def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
+        return await asyncio.to_thread(self._queries.displays, timeout)
+
+    async def stats(self, timeout: Optional[float] = 5.0) -> display_pb2.Stats:
+        return await asyncio.to_thread(self._queries.stats, timeout)
+
+    async def capture(self, display: str = "", *, at_least_snapshot: int = 0, timeout: float = 10.0) -> Volume:
+        return await asyncio.to_thread(self._queries.capture, display, at_least_snapshot, timeout)
+
+    async def entities(self, layer: str = "", prefix: str = "", owner: int = 0,
+                       timeout: Optional[float] = 5.0) -> list[scene_pb2.EntityInfo]:
+        return await asyncio.to_thread(self._queries.entities, layer, prefix, owner, timeout)
+
+
+async def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout: float = 5.0, wait: bool = True,
+                  autocommit: bool = True, flow: str = "reliable", keep_frames: int = 1,
+                  on_disconnect: Union[str, float] = "clear", strict: bool = False, outcomes: bool = True,
+                  buffer_bytes: int = 256 << 20, owner_token: bytes = b"", resume_token: bytes = b"",
+                  on_issue: Optional[Callable[[Issue], None]] = None) -> Connection:
+    """As voxeld.connect(). A full buffer raises BufferFull; flush() waits for room."""
+    options = settings(name, flow, keep_frames, on_disconnect, strict, outcomes, buffer_bytes, owner_token, resume_token)
+    connection = Connection(server, options, autocommit, "raise", on_issue)
+    _open.add(connection)
+    if wait:
+        try:
+            await connection.wait_connected(timeout)
+        except BaseException:
+            await connection.close(0)
+            raise
+    return connection

@@ -1,0 +1,126 @@
+"""Colours: one for all, or one each.
+
+One colour is a name ("orange", "tab:orange"), a hex code ("#f80", "#ff8800"), or three or four numbers: floats from 0 to 1
+or whole numbers from 0 to 255. Many are an (n, 3) or (n, 4) array, uint8 or floats from 0 to 1, or a list of names. With a
+map, n numbers are a colour each. A fourth number is ignored: there is no transparency below a layer's.
+"""
+from __future__ import annotations
+
+import difflib
+import string
+from typing import Any, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Array, as_array, require_finite
+from .color_names import MAPS, NAMES
+from .errors import InvalidColor
+
+Rgb = int  # 0xRRGGBB
+Colors = Union[str, Sequence[Any], Array]
+
+
+def _from_text(text: str) -> Rgb:
+    name = text.strip().lower()
+    if name in NAMES:
+        return NAMES[name]
+    if name.startswith("#"):
+        digits = name[1:]
+        if len(digits) in (3, 4):
+            digits = "".join(2 * d for d in digits)
+        if len(digits) in (6, 8) and all(d in string.hexdigits for d in digits):
+            return int(digits[:6], 16)
+        raise InvalidColor(f"the colour {text!r} is no hex code; give #rgb or #rrggbb, such as #ff8800")
+    near = difflib.get_close_matches(name, NAMES, n=3)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else (
+        "give a CSS name, 'tab:orange', '#ff8800' or (1.0, 0.5, 0.0)")
+    raise InvalidColor(f"there is no colour {text!r}; {hint}")
+
+
+def _bytes_of(array: Array, what: str) -> npt.NDArray[np.uint8]:
+    """Channels as uint8, from uint8, other whole numbers from 0 to 255 or floats from 0 to 1."""
+    if array.dtype == np.uint8:
+        return array
+    if array.dtype.kind in "iu":
+        if array.size and (array.min() < 0 or array.max() > 255):
+            raise InvalidColor(f"{what}: whole numbers are 0 to 255, got {array.min()} to {array.max()}")
+        return array.astype(np.uint8)
+    if array.dtype.kind != "f":
+        raise InvalidColor(f"{what}: got elements of type {array.dtype}; give uint8, or floats from 0 to 1")
+    require_finite(array, what)
+    if array.size and (array.min() < 0 or array.max() > 1):
+        hint = "; are they 0 to 255? then p.astype(np.uint8)" if array.min() >= 0 and array.max() <= 255 else ""
+        raise InvalidColor(f"{what}: floats are 0 to 1, got {array.min():g} to {array.max():g}{hint}")
+    result: npt.NDArray[np.uint8] = np.rint(array * 255).astype(np.uint8)
+    return result
+
+
+def one(value: Colors, what: str = "color") -> Rgb:
+    """One colour."""
+    if isinstance(value, str):
+        return _from_text(value)
+    array = as_array(value, what)
+    if array.shape not in ((3,), (4,)):
+        raise InvalidColor(f"{what} must be one colour: a name, a hex code or three numbers; got shape {array.shape}")
+    if array.dtype.kind in "iu" and array.dtype != np.uint8 and array.max() == 1:
+        raise InvalidColor(f"{what} is {array.tolist()}: whole numbers are 0 to 255; for 0 to 1 give floats, such as 1.0")
+    r, g, b = (int(c) for c in _bytes_of(array, what)[:3])
+    return r << 16 | g << 8 | b
+
+
+def rgb_of(colors: Sequence[Rgb]) -> npt.NDArray[np.uint8]:
+    """(n, 3) of colours as numbers."""
+    words = np.array(colors, dtype=np.uint32)
+    result: npt.NDArray[np.uint8] = np.stack([words >> 16 & 255, words >> 8 & 255, words & 255], axis=-1).astype(np.uint8)
+    return result
+
+
+def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None,
+           high: Optional[float] = None) -> npt.NDArray[np.uint8]:
+    """A colour for each number: `low` (default: the least) is the map's first, `high` its last."""
+    if cmap not in MAPS:
+        raise InvalidColor(f"there is no colour map {cmap!r}; there are {', '.join(MAPS)}")
+    array = as_array(values, "colors").astype(np.float64)
+    require_finite(array, "colors")
+    if array.size == 0:
+        return np.zeros((*array.shape, 3), np.uint8)
+    first = float(array.min()) if low is None else float(low)
+    last = float(array.max()) if high is None else float(high)
+    at = np.clip((array - first) / (last - first), 0, 1) if last > first else np.zeros_like(array)
+    stops = rgb_of(MAPS[cmap]).astype(np.float64)
+    place = np.linspace(0, 1, len(stops))
+    channels = np.stack([np.interp(at, place, stops[:, c]) for c in range(3)], axis=-1)
+    result: npt.NDArray[np.uint8] = np.rint(channels).astype(np.uint8)
+    return result
+
+
+def many(value: Optional[Colors], count: int, cmap: Optional[str] = None) -> Union[None, Rgb, Array]:
+    """None (the default colour), one colour, or a C-contiguous (count, 3) or (count, 4) uint8 array. Such an array is
+    taken without a copy."""
+    if value is None:
+        if cmap is not None:
+            raise InvalidColor(f"cmap is {cmap!r}, but there are no colors to map; give one number for each of {count}")
+        return None
+    if cmap is not None:
+        values = as_array(value, "colors")
+        if values.shape != (count,):
+            raise InvalidColor(f"colors with a cmap must be of shape ({count},), one number each, got {values.shape}")
+        return np.ascontiguousarray(mapped(values, cmap))
+    if isinstance(value, str):
+        return _from_text(value)
+    if len(value) and all(isinstance(v, str) for v in value):
+        if len(value) != count:
+            raise InvalidColor(f"colors are {len(value)} names for {count} vertices")
+        return rgb_of([_from_text(str(v)) for v in value])
+    array = as_array(value, "colors")
+    if array.ndim == 1 and len(array) in (3, 4):
+        return one(value, "colors")
+    if array.ndim == 1 and len(array) == count and count:
+        raise InvalidColor(f"colors is one number for each of {count} vertices; say how they become colours: cmap='viridis'")
+    if array.ndim != 2 or array.shape[1] not in (3, 4):
+        hint = ", did you mean .T?" if array.ndim == 2 and array.shape[0] in (3, 4) else ""
+        raise InvalidColor(f"colors must be one colour or of shape ({count}, 3) or ({count}, 4), got {array.shape}{hint}")
+    if len(array) != count:
+        raise InvalidColor(f"colors are {len(array)} for {count} vertices")
+    return np.ascontiguousarray(_bytes_of(array, "colors"))

@@ -1,0 +1,130 @@
+"""The drawing calls, alike wherever something can be drawn: the connection, a layer, a frame, an object."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Callable, Generic, Optional, TypeVar
+
+import numpy.typing as npt
+
+from . import shapes, transforms, wire
+from .arrays import number
+from .colors import Colors
+from .errors import InvalidValue
+from .transforms import Matrix
+from .v1 import scene_pb2 as pb
+
+Drawn = TypeVar("Drawn", covariant=True)
+Make = Callable[..., list[wire.Packed]]
+
+
+@dataclass(frozen=True)
+class Look:
+    """What every entity has beside its shape."""
+
+    transform: Optional[Matrix] = None
+    priority: int = 0
+    erase: bool = False
+    lifetime: Optional[float] = None  # s
+    label: str = ""
+
+    @staticmethod
+    def of(transform: Optional[npt.ArrayLike], priority: int, erase: bool, lifetime: Optional[float], label: str) -> "Look":
+        if not (isinstance(priority, int) and 0 <= priority <= 126):
+            raise InvalidValue(f"priority is {priority!r}; give a whole number from 0 to 126, the higher wins")
+        if lifetime is not None:
+            number(lifetime, "lifetime", above=0)
+        return Look(None if transform is None else transforms.as_matrix(transform), priority, bool(erase), lifetime, label)
+
+    def changed(self, **new: Any) -> "Look":
+        look = replace(self, **new)
+        return Look.of(look.transform, look.priority, look.erase, look.lifetime, look.label)
+
+    @property
+    def lifetime_ns(self) -> int:
+        return 0 if self.lifetime is None else max(int(self.lifetime * 1e9), 1)
+
+    def to_bytes(self) -> bytes:
+        return pb.Entity(
+            transform=None if self.transform is None else transforms.to_wire(self.transform), priority=self.priority,
+            erase=self.erase, lifetime_ns=self.lifetime_ns, label=self.label).SerializeToString()
+
+
+def checked_name(name: str, what: str) -> str:
+    if not isinstance(name, str) or not name:
+        raise InvalidValue(f"the {what} is {name!r}; give a text that is not empty")
+    return name
+
+
+class Draw(Generic[Drawn]):
+    """Each call puts up one thing under a name; the same name again replaces it. All take `transform` (4×4 or 3×4),
+    `priority` (0 to 126, the higher wins within its layer), `erase` (takes away what is of lower or equal priority),
+    `lifetime` in seconds and `label`, a text for people. Arguments are checked before anything is sent; arrays may be
+    changed again as soon as the call is back."""
+
+    def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> Drawn:
+        raise NotImplementedError
+
+    def points(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
+               width: Optional[float] = None, unit: str = "voxels", transform: Optional[npt.ArrayLike] = None,
+               priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """A cloud, (n, 3). `width`: each point's diameter, in "voxels" or "units"; by default one voxel."""
+        return self._draw(name, shapes.points, (positions,), dict(colors=colors, cmap=cmap, width=width, unit=unit),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def lines(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
+              mode: Optional[str] = None, width: Optional[float] = None, unit: str = "voxels", sampling: str = "thin",
+              transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+              lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """(n, 3): a "strip", a "loop" or "pairs"; or (m, k, 3): m strips (or loops) of k vertices each. Colours run from
+        vertex to vertex."""
+        return self._draw(name, shapes.lines, (positions,),
+                          dict(colors=colors, cmap=cmap, mode=mode, width=width, unit=unit, sampling=sampling),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def mesh(self, name: str, vertices: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *,
+             colors: Optional[Colors] = None, cmap: Optional[str] = None, rule: str = "thin",
+             transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+             lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover"."""
+        return self._draw(name, shapes.mesh, (vertices, faces), dict(colors=colors, cmap=cmap, rule=rule),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def box(self, name: str, center: npt.ArrayLike = (0, 0, 0), size: npt.ArrayLike = 1.0, *, color: Optional[Colors] = None,
+            fill: str = "surface", rule: str = "thin", transform: Optional[npt.ArrayLike] = None, priority: int = 0,
+            erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """`size`: three edge lengths or one. `fill`: "surface" or "solid"."""
+        return self._draw(name, shapes.box, (center, size), dict(color=color, fill=fill, rule=rule),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def sphere(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, *, color: Optional[Colors] = None,
+               fill: str = "surface", rule: str = "thin", transform: Optional[npt.ArrayLike] = None, priority: int = 0,
+               erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """An ellipsoid under a transform. `fill`: "surface" or "solid"."""
+        return self._draw(name, shapes.sphere, (center, radius), dict(color=color, fill=fill, rule=rule),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def cylinder(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, height: float = 1.0, *,
+                 color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin",
+                 transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+                 lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """Along z, centred. `fill`: "surface" or "solid"."""
+        return self._draw(name, shapes.cylinder, (center, radius, height), dict(color=color, fill=fill, rule=rule),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def volume(self, name: str, array: npt.ArrayLike, *, threshold: Optional[float] = None, cmap: str = "viridis",
+               low: Optional[float] = None, high: Optional[float] = None,
+               extent: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, transform: Optional[npt.ArrayLike] = None,
+               priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """A field, (nx, ny, nz) of numbers or (nx, ny, nz, 3) of colours, drawn as points at the centres of its cells:
+        those above `threshold` (default: half-way from least to greatest; of colours the brightest channel, 0 to 1).
+        Numbers are coloured by `cmap` from `low` to `high`. `extent`: the field's two corners; by default it fills [-1, 1]
+        on its longest axis. A field coarser than the display leaves gaps between its points."""
+        return self._draw(name, shapes.volume, (array,),
+                          dict(threshold=threshold, cmap=cmap, low=low, high=high, extent=extent),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def instance(self, name: str, of: str, *, color: Optional[Colors] = None, transform: Optional[npt.ArrayLike] = None,
+                 priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """Draws the object `of` here."""
+        return self._draw(name, shapes.instance, (checked_name(of, "object"),), dict(color=color),
+                          Look.of(transform, priority, erase, lifetime, label))

@@ -1,0 +1,227 @@
+"""What drawing calls give back, and the places to draw in."""
+from __future__ import annotations
+
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Optional, Sequence, Type
+
+import numpy.typing as npt
+
+from . import operations, transforms, wire
+from .arrays import as_array, number, vector
+from .draw import Draw, Look, Make, checked_name
+from .errors import InvalidValue
+from .receipts import Accepted, Frame, Issue, Outcome
+from .shapes import choice
+from .transforms import Matrix
+from .v1 import primitives_pb2, types_pb2
+from .v1 import scene_pb2 as pb
+
+if TYPE_CHECKING:
+    from .base import BaseConnection
+
+_BLENDS = {"over": types_pb2.BLEND_MODE_OVER, "add": types_pb2.BLEND_MODE_ADD, "erase": types_pb2.BLEND_MODE_ERASE}
+
+
+class Handle:
+    """One thing in the scene. Setting `transform`, update() and remove() each send what changed, and nothing else. What it
+    was made of is kept, for update(); arrays are not copied for that."""
+
+    def __init__(self, connection: "BaseConnection", layer: str, name: str, make: Make, args: tuple[Any, ...],
+                 options: dict[str, Any], look: Look) -> None:
+        self._connection = connection
+        self._make, self._args, self._options, self._look = make, args, options, look
+        self.layer = layer
+        self.name = name
+        self.frame: Optional[Frame] = None  # of the last commit, when calls are commits of their own
+
+    def __repr__(self) -> str:
+        return f"<{self._make.__name__} {self.name!r} in layer {self.layer!r}>"
+
+    def _put(self) -> "Handle":
+        self.frame = self._connection._put(self.layer, self.name, self._make(*self._args, **self._options), self._look)
+        return self
+
+    @property
+    def transform(self) -> Matrix:
+        """4×4. Set it whole; changing the array that this gives does nothing."""
+        return transforms.identity() if self._look.transform is None else self._look.transform.copy()
+
+    @transform.setter
+    def transform(self, matrix: npt.ArrayLike) -> None:
+        self._look = self._look.changed(transform=matrix)
+        assert self._look.transform is not None
+        self.frame = self._connection._move(self.layer, self.name, self._look.transform)
+
+    def update(self, *args: Any, **changes: Any) -> Optional[Frame]:
+        """Puts it up anew with some arguments changed, as they were named when it was made: h.update(positions),
+        h.update(colors="red")."""
+        looks = {key: changes.pop(key) for key in ("transform", "priority", "erase", "lifetime", "label") if key in changes}
+        unknown = [key for key in changes if key not in self._options]
+        if unknown or len(args) > len(self._args):
+            raise InvalidValue(f"{self._make.__name__} has no {unknown[0]!r}" if unknown else
+                               f"{self._make.__name__} takes {len(self._args)} arguments, got {len(args)}")
+        before = self._args, self._options, self._look
+        self._args = (*args, *self._args[len(args):])
+        self._options = {**self._options, **changes}
+        try:
+            self._look = self._look.changed(**looks)
+            self._put()
+        except Exception:
+            self._args, self._options, self._look = before
+            raise
+        return self.frame
+
+    def remove(self) -> Optional[Frame]:
+        """Takes it out of the scene. update() would bring it back."""
+        self.frame = self._connection._remove(self.layer, self.name)
+        return self.frame
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
+        return {**self._connection._repr_mimebundle_(include, exclude), "text/plain": repr(self)}
+
+
+class Layer(Draw[Handle]):
+    """Layers are drawn over one another, each with an opacity and a way to blend."""
+
+    def __init__(self, connection: "BaseConnection", name: str) -> None:
+        self._connection = connection
+        self.name = checked_name(name, "layer")
+
+    def __repr__(self) -> str:
+        return f"<Layer {self.name!r}>"
+
+    def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> Handle:
+        return Handle(self._connection, self.name, checked_name(name, "name"), make, args, options, look)._put()
+
+    def set(self, *, visible: Optional[bool] = None, opacity: Optional[float] = None, order: Optional[int] = None,
+            blend: Optional[str] = None, transform: Optional[npt.ArrayLike] = None,
+            clip: Optional[Sequence[npt.ArrayLike]] = None,
+            region: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, mask: Optional[str] = None) -> Optional[Frame]:
+        """Sets what is given. `opacity`: 0 to 1. `order`: the higher is drawn over the lower. `blend`: "over", "add" or
+        "erase". `clip`: half-spaces (a, b, c, d) that keep a·x + b·y + c·z + d ≥ 0. `region`: two corners of a box."""
+        state = pb.LayerState(layer=self.name)
+        if visible is not None:
+            state.visible = visible
+        if opacity is not None:
+            if number(opacity, "opacity", least=0) > 1:
+                raise InvalidValue(f"opacity is {opacity}; give 0 to 1")
+            state.opacity = round(opacity * 255)
+        if order is not None:
+            state.order = order
+        if blend is not None:
+            state.blend = choice(_BLENDS, blend, "blend")
+        if transform is not None:
+            state.transform.CopyFrom(transforms.to_wire(transforms.as_matrix(transform)))
+        if clip is not None:
+            state.clip.CopyFrom(pb.Clip())
+            for plane in clip:
+                four = as_array(plane, "clip")
+                if four.shape != (4,):
+                    raise InvalidValue(f"a clip plane is four numbers (a, b, c, d), got shape {four.shape}")
+                a, b, c = vector(four[:3], "the clip plane's normal")
+                state.clip.planes.add(a=a, b=b, c=c, d=number(four[3], "the clip plane's distance"))
+        if region is not None:
+            low, high = vector(region[0], "region[0]"), vector(region[1], "region[1]")
+            state.region.min.CopyFrom(types_pb2.Vec3(x=low[0], y=low[1], z=low[2]))
+            state.region.max.CopyFrom(types_pb2.Vec3(x=high[0], y=high[1], z=high[2]))
+        if mask is not None:
+            state.mask_layer = mask
+        return self._connection._stage([operations.layer_state(state)])
+
+    def frame(self, *, present_in: Optional[float] = None, must_show: bool = False) -> "FrameBlock":
+        return self._connection.frame(self.name, present_in=present_in, must_show=must_show)
+
+    def remove(self, name: str) -> Optional[Frame]:
+        return self._connection._remove(self.name, name)
+
+    def clear(self) -> Optional[Frame]:
+        return self._connection.clear(self.name)
+
+
+def put_parts(layer: str, name: str, shape: Sequence[wire.Packed], look: Look) -> operations.Puts:
+    """A shape under its name; one of several pieces under name/0, name/1, …"""
+    entity = look.to_bytes()
+    ids = [name] if len(shape) == 1 else [f"{name}/{i}" for i in range(len(shape))]
+    return operations.Puts([wire.put(layer, id, entity, one) for id, one in zip(ids, shape)], look.lifetime_ns)
+
+
+class FrameBlock(Draw[None]):
+    """Immediate mode: what is drawn in the `with` replaces everything that the layer held, at its end and at once. If the
+    block raises, nothing is sent. Afterwards it is that commit's Frame in all but name."""
+
+    def __init__(self, connection: "BaseConnection", layer: str, present_in: Optional[float], must_show: bool) -> None:
+        self._connection = connection
+        self._layer = checked_name(layer, "layer")
+        self._parts: list[tuple[str, operations.Puts]] = []
+        self._present_in, self._must_show = present_in, must_show
+        self._frame: Optional[Frame] = None
+
+    def __enter__(self) -> "FrameBlock":
+        self._parts = []
+        return self
+
+    def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
+                 trace: Optional[TracebackType]) -> None:
+        if kind is None:
+            self._frame = self._connection._immediate(self._layer, self._parts, self._present_in, self._must_show)
+
+    def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> None:
+        puts = put_parts(self._layer, checked_name(name, "name"), make(*args, **options), look)
+        self._parts.append((name, puts))
+
+    @property
+    def ticket(self) -> Frame:
+        """The commit's Frame."""
+        if self._frame is None:
+            raise InvalidValue("this frame has no commit yet: it is not at its end, or waits for v.commit()")
+        return self._frame
+
+    @property
+    def accepted(self) -> Optional[Accepted]:
+        return self.ticket.accepted
+
+    @property
+    def outcomes(self) -> dict[str, Outcome]:
+        return self.ticket.outcomes
+
+    @property
+    def issues(self) -> tuple[Issue, ...]:
+        return self.ticket.issues
+
+    def wait(self, timeout: Optional[float] = None) -> Frame:
+        return self.ticket.wait(timeout)
+
+    def wait_shown(self, timeout: Optional[float] = None) -> dict[str, Outcome]:
+        return self.ticket.wait_shown(timeout)
+
+
+class ObjectBlock(Draw[None]):
+    """A group that draws nothing itself; instances draw it. What is drawn in the `with` defines it whole. Its parts have
+    no looks of their own but a transform."""
+
+    def __init__(self, connection: "BaseConnection", name: str) -> None:
+        self._connection = connection
+        self.name = checked_name(name, "object")
+        self._parts: list[wire.Packed] = []
+        self.frame: Optional[Frame] = None
+
+    def __enter__(self) -> "ObjectBlock":
+        self._parts = []
+        return self
+
+    def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
+                 trace: Optional[TracebackType]) -> None:
+        if kind is None:
+            self.frame = self._connection._define(self.name, self._parts)
+
+    def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> None:
+        if look != Look(look.transform):
+            raise InvalidValue(f"the part {name!r} of an object has only a transform; give the rest to the instances")
+        before = primitives_pb2.Object.Part(
+            transform=None if look.transform is None else transforms.to_wire(look.transform)).SerializeToString()
+        for one in make(*args, **options):
+            self._parts.append(_copied(one.inside(wire.Field.PART_PRIMITIVE, before)))
+
+
+def _copied(packed: wire.Packed) -> wire.Packed:
+    return wire.Packed(packed.to_bytes())

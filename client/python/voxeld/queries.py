@@ -1,0 +1,121 @@
+"""Calls beside the stream: displays, statistics, pictures, what is in the scene. They block."""
+from __future__ import annotations
+
+from typing import Any, Callable, Iterator, Optional, Sequence
+
+import grpc
+from google.protobuf.message import Message
+
+from . import address
+from .errors import ConnectionLost, VoxelError
+from .v1 import display_pb2, scene_pb2
+from .volumes import Volume
+
+_DISPLAYS = "/voxeld.v1.DisplayService/"
+_SCENE = "/voxeld.v1.SceneService/"
+
+
+def _failed(error: grpc.RpcError) -> VoxelError:
+    return VoxelError(f"{error.code().name.lower()}: {error.details()}")
+
+
+class Queries:
+    """On a channel of their own, so that they neither wait for the stream's bulk nor end with it."""
+
+    def __init__(self, server: str) -> None:
+        self._channel = grpc.insecure_channel(address.target(server), options=[
+            ("grpc.max_receive_message_length", -1), ("grpc.use_local_subchannel_pool", 1),
+            ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.min_reconnect_backoff_ms", 100),
+            ("grpc.max_reconnect_backoff_ms", 1000)])
+        self._closed = False
+
+    def close(self) -> None:
+        self._closed = True
+        self._channel.close()
+
+    def _usable(self) -> grpc.Channel:
+        if self._closed:
+            raise ConnectionLost("the connection is closed")
+        return self._channel
+
+    def _one(self, method: str, request: Message, answer: Callable[[bytes], Any], timeout: Optional[float]) -> Any:
+        call = self._usable().unary_unary(method, type(request).SerializeToString, answer)
+        try:
+            return call(request, timeout=timeout)
+        except grpc.RpcError as error:
+            raise _failed(error) from None
+
+    def _stream(self, method: str, request: Message, answer: Callable[[bytes], Any],
+                timeout: Optional[float]) -> Iterator[Any]:
+        call = self._usable().unary_stream(method, type(request).SerializeToString, answer)(request, timeout=timeout)
+        try:
+            yield from call
+        except grpc.RpcError as error:
+            raise _failed(error) from None
+        finally:
+            call.cancel()
+
+    def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
+        answer: display_pb2.ListDisplaysResponse = self._one(
+            _DISPLAYS + "ListDisplays", display_pb2.ListDisplaysRequest(),
+            display_pb2.ListDisplaysResponse.FromString, timeout)
+        return list(answer.displays)
+
+    def stats(self, timeout: Optional[float] = 5.0) -> display_pb2.Stats:
+        for stats in self._stream(_DISPLAYS + "WatchStats", display_pb2.WatchStatsRequest(once=True),
+                                  display_pb2.Stats.FromString, timeout):
+            assert isinstance(stats, display_pb2.Stats)
+            return stats
+        raise VoxelError("the server gave no statistics")
+
+    def capture(self, display: str = "", at_least_snapshot: int = 0, timeout: float = 10.0) -> Volume:
+        request = display_pb2.CaptureVolumeRequest(
+            name=display, timeout_ns=int(timeout * 1e9), at_least_snapshot=at_least_snapshot)
+        return Volume.of(self._stream(_DISPLAYS + "CaptureVolume", request, display_pb2.VolumeChunk.FromString, timeout + 1))
+
+    def entities(self, layer: str = "", prefix: str = "", owner: int = 0,
+                 timeout: Optional[float] = 5.0) -> list[scene_pb2.EntityInfo]:
+        result: list[scene_pb2.EntityInfo] = []
+        token = ""
+        while True:
+            answer: scene_pb2.ListEntitiesResponse = self._one(
+                _SCENE + "ListEntities",
+                scene_pb2.ListEntitiesRequest(owner=owner, layer=layer, id_prefix=prefix, page_token=token),
+                scene_pb2.ListEntitiesResponse.FromString, timeout)
+            result += answer.entities
+            token = answer.next_page_token
+            if not token:
+                return result
+
+    def layers(self, owner: int = 0, timeout: Optional[float] = 5.0) -> list[scene_pb2.LayerInfo]:
+        answer: scene_pb2.ListEntitiesResponse = self._one(
+            _SCENE + "ListEntities", scene_pb2.ListEntitiesRequest(owner=owner, page_size=1),
+            scene_pb2.ListEntitiesResponse.FromString, timeout)
+        return list(answer.layers)
+
+    def watch(self, layer: str = "", owner: int = 0, contents: bool = False,
+              timeout: Optional[float] = None) -> Iterator["ChangeSet"]:
+        request = scene_pb2.WatchSceneRequest(owner=owner, layer=layer, contents=contents)
+        parts: list[scene_pb2.WatchSceneResponse] = []
+        for answer in self._stream(_SCENE + "WatchScene", request, scene_pb2.WatchSceneResponse.FromString, timeout):
+            parts.append(answer)
+            if answer.in_sync:
+                yield ChangeSet(parts)
+                parts = []
+
+
+class ChangeSet:
+    """What is new or gone in the scene, from one snapshot to another; the first has all there is."""
+
+    def __init__(self, parts: Sequence[scene_pb2.WatchSceneResponse]) -> None:
+        self.snapshot = parts[-1].in_sync
+        self.layers = [one for part in parts for one in part.layers]
+        self.entities = [one for part in parts for one in part.entities]
+        self.objects = [one for part in parts for one in part.objects]
+        self.removed_layers = [one for part in parts for one in part.removed_layers]
+        self.removed_entities = [one for part in parts for one in part.removed_entities]
+        self.removed_objects = [one for part in parts for one in part.removed_objects]
+
+    def __repr__(self) -> str:
+        return (f"<snapshot {self.snapshot}: {len(self.entities)} entities, {len(self.layers)} layers new or changed; "
+                f"{len(self.removed_entities)} entities, {len(self.removed_layers)} layers gone>")

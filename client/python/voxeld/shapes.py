@@ -1,0 +1,205 @@
+"""What can be drawn, as wire bytes: each function checks its arguments and gives the primitives that stand for them.
+
+Clouds, lines and meshes beyond PIECE_BYTES come as several primitives, so that no message is large; who draws them gives
+each an id.
+"""
+from __future__ import annotations
+
+from typing import Any, Iterator, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from . import colors as colors_
+from . import wire
+from .arrays import Array, as_array, indices, number, positions, require_finite, vector
+from .colors import Colors
+from .errors import InvalidArray, InvalidValue
+from .v1 import primitives_pb2 as pb
+from .v1 import types_pb2
+
+# A piece's payload at most; with its head a message stays below 1 MiB.
+PIECE_BYTES = (1 << 20) - (2 << 10)
+
+_MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segments.LIST}
+_SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
+_RULES = {"thin": pb.SURFACE_RULE_THIN, "cover": pb.SURFACE_RULE_COVER}
+_FILLS = {"surface": pb.FILL_SURFACE, "solid": pb.FILL_SOLID}
+_UNITS = {"voxels": pb.Thickness.VOXELS, "units": pb.Thickness.UNITS}
+
+
+def choice(table: dict[str, Any], value: str, what: str) -> Any:
+    if value not in table:
+        raise InvalidValue(f"{what} is {value!r}; give one of {', '.join(map(repr, table))}")
+    return table[value]
+
+
+def _thickness(value: Optional[float], unit: str) -> Optional[pb.Thickness]:
+    word = choice(_UNITS, unit, "unit")
+    return None if value is None else pb.Thickness(value=number(value, "width", least=0), unit=word)
+
+
+def _primitive(key: bytes, kind: str, head: bytes, vertices: wire.Packed, color: Optional[int]) -> wire.Packed:
+    before = b"" if color is None else pb.Primitive(color=pb.Color(rgb=color)).SerializeToString()
+    return vertices.inside(wire.Field.VERTICES[kind], head).inside(key, before)
+
+
+def _split_colors(color: object) -> tuple[Optional[int], Optional[Array]]:
+    return (None, color) if isinstance(color, np.ndarray) else (color if isinstance(color, int) else None, None)
+
+
+def _pieces(count: int, vertex_bytes: int, whole: int = 1, overlap: int = 0) -> Iterator[slice]:
+    """Ranges of vertices, each a multiple of `whole`, `overlap` of them in common with the next."""
+    most = PIECE_BYTES // vertex_bytes // whole * whole
+    begin = 0
+    while begin + overlap < count:
+        yield slice(begin, min(begin + most, count))
+        begin += most - overlap
+
+
+def points(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
+           width: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
+    array, element = positions(at, "points")
+    color, each = _split_colors(colors_.many(colors, len(array), cmap))
+    thickness = _thickness(width, unit)
+    head = pb.Points(thickness=thickness).SerializeToString() if thickness else b""
+    size = array.itemsize * 3 + (0 if each is None else each.shape[1])
+    return [_primitive(wire.Field.POINTS, "points", head,
+                       wire.vertices(array[r], element, None if each is None else each[r]), color)
+            for r in _pieces(len(array), size)]
+
+
+def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None, mode: Optional[str] = None,
+          width: Optional[float] = None, unit: str = "voxels", sampling: str = "thin") -> list[wire.Packed]:
+    """`at`: (n, 3), by default a strip; or (m, k, 3), m strips of k vertices each."""
+    array = as_array(at, "lines")
+    many = array.ndim == 3 and array.shape[2] == 3
+    if many and array.shape[1] < 2:
+        raise InvalidArray(f"lines of shape {array.shape} have {array.shape[1]} vertices each; a line has at least 2")
+    strips, each_strip = (array.shape[0], array.shape[1]) if many else (1, len(array))
+    array, element = positions(array.reshape(-1, 3) if many else at, "lines")
+    topology = choice(_MODES, mode or ("strip"), "mode")
+    color, each = _split_colors(colors_.many(colors, len(array), cmap))
+    if many and each_strip > 2 or many and topology == pb.Segments.LOOP:
+        # Strips side by side, as pairs.
+        start = np.arange(len(array)).reshape(strips, each_strip)
+        end = np.roll(start, -1, axis=1)
+        if topology != pb.Segments.LOOP:
+            start, end = start[:, :-1], end[:, :-1]
+        order = np.stack([start, end], axis=-1).reshape(-1)
+        array, each = array[order], None if each is None else each[order]
+    if many:
+        topology = pb.Segments.LIST
+    if 0 < len(array) < 2 or topology == pb.Segments.LIST and len(array) % 2:
+        need = "pairs need an even number" if topology == pb.Segments.LIST else "a line needs at least 2"
+        raise InvalidArray(f"lines: got {len(array)} vertices; {need}")
+    size = array.itemsize * 3 + (0 if each is None else each.shape[1])
+    if topology == pb.Segments.LOOP and len(array) * size > PIECE_BYTES:
+        array = np.concatenate([array, array[:1]])
+        each = None if each is None else np.concatenate([each, each[:1]])
+        topology = pb.Segments.STRIP
+    head = pb.Segments(topology=topology, sampling=choice(_SAMPLINGS, sampling, "sampling"),
+                       thickness=_thickness(width, unit)).SerializeToString()
+    whole, overlap = (2, 0) if topology == pb.Segments.LIST else (1, 1)
+    return [_primitive(wire.Field.SEGMENTS, "segments", head,
+                       wire.vertices(array[r], element, None if each is None else each[r]), color)
+            for r in _pieces(len(array), size, whole, overlap)]
+
+
+def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Optional[Colors] = None,
+         cmap: Optional[str] = None, rule: str = "thin") -> list[wire.Packed]:
+    """Triangles: of `faces`, or of the vertices three by three."""
+    array, element = positions(at, "vertices")
+    color, each = _split_colors(colors_.many(colors, len(array), cmap))
+    head = pb.Mesh(rule=choice(_RULES, rule, "rule")).SerializeToString()
+    size = array.itemsize * 3 + (0 if each is None else each.shape[1])
+
+    def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
+        return _primitive(wire.Field.MESH, "mesh", head, wire.vertices(vertices, element, own, index), color)
+
+    if faces is None:
+        if len(array) % 3:
+            raise InvalidArray(f"vertices: got {len(array)} without faces; triangles need a multiple of 3")
+        return [one(array[r], None if each is None else each[r], None) for r in _pieces(len(array), size, 3)]
+    index = indices(faces, len(array))
+    if len(index) == 0:
+        return []
+    if index.nbytes + len(array) * size <= PIECE_BYTES:
+        return [one(array, each, index)]
+    # Each piece has the vertices of its own faces, at most three each.
+    result = []
+    for r in _pieces(len(index), 12 + 3 * size):
+        used, own = np.unique(index[r], return_inverse=True)
+        result.append(one(array[used], None if each is None else each[used], own.reshape(-1, 3).astype(np.uint32)))
+    return result
+
+
+def _solid(color: Optional[Colors], **kind: Any) -> list[wire.Packed]:
+    rgb = None if color is None else pb.Color(rgb=colors_.one(color))
+    return [wire.message(pb.Primitive(color=rgb, **kind))]
+
+
+def _vec(values: npt.ArrayLike, what: str) -> types_pb2.Vec3:
+    x, y, z = vector(values, what)
+    return types_pb2.Vec3(x=x, y=y, z=z)
+
+
+def box(center: npt.ArrayLike, size: npt.ArrayLike, *, color: Optional[Colors] = None, fill: str = "surface",
+        rule: str = "thin") -> list[wire.Packed]:
+    """`size`: three edge lengths, or one for all."""
+    edges = np.broadcast_to(as_array(size, "size"), (3,)) if np.ndim(size) == 0 else size
+    for edge, axis in zip(vector(edges, "size"), "xyz"):
+        number(edge, f"the size along {axis}", above=0)
+    return _solid(color, box=pb.Box(center=_vec(center, "center"), size=_vec(edges, "size"),
+                                    fill=choice(_FILLS, fill, "fill"), rule=choice(_RULES, rule, "rule")))
+
+
+def sphere(center: npt.ArrayLike, radius: float, *, color: Optional[Colors] = None, fill: str = "surface",
+           rule: str = "thin") -> list[wire.Packed]:
+    return _solid(color, sphere=pb.Sphere(center=_vec(center, "center"), radius=number(radius, "radius", above=0),
+                                          fill=choice(_FILLS, fill, "fill"), rule=choice(_RULES, rule, "rule")))
+
+
+def cylinder(center: npt.ArrayLike, radius: float, height: float, *, color: Optional[Colors] = None,
+             fill: str = "surface", rule: str = "thin") -> list[wire.Packed]:
+    return _solid(color, cylinder=pb.Cylinder(
+        center=_vec(center, "center"), radius=number(radius, "radius", above=0), height=number(height, "height", above=0),
+        fill=choice(_FILLS, fill, "fill"), rule=choice(_RULES, rule, "rule")))
+
+
+def instance(of: str, *, color: Optional[Colors] = None) -> list[wire.Packed]:
+    return _solid(color, instance=pb.Instance(object=of))
+
+
+def volume(array: npt.ArrayLike, *, threshold: Optional[float] = None, cmap: str = "viridis",
+           low: Optional[float] = None, high: Optional[float] = None,
+           extent: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None) -> list[wire.Packed]:
+    """A field of numbers, (nx, ny, nz), or of colours, (nx, ny, nz, 3), as points at the cells' centres: those whose
+    number, or whose brightest channel from 0 to 1, is above `threshold` (default: half-way between least and greatest).
+    Points, not voxels: a field coarser than the display has gaps. `extent`: the field's corners; by default it fills
+    [-1, 1] on its longest axis."""
+    field = as_array(array, "volume")
+    colored = field.ndim == 4 and field.shape[3] in (3, 4)
+    if field.ndim != 3 and not colored:
+        raise InvalidArray(f"volume must be of shape (nx, ny, nz), or (nx, ny, nz, 3) for colours, got {field.shape}")
+    require_finite(field, "volume")
+    if field.size == 0:
+        return []
+    shape = np.array(field.shape[:3])
+    values = field
+    if colored:
+        values = field[..., :3].max(axis=3) / (1.0 if field.dtype.kind == "f" else 255.0)
+    least, most = float(values.min()), float(values.max())
+    above = (least + most) / 2 if threshold is None else number(threshold, "threshold")
+    where = np.argwhere(values > above)
+    if extent is None:
+        half = shape / shape.max()
+        first, last = -half, half
+    else:
+        first, last = np.array(vector(extent[0], "extent[0]")), np.array(vector(extent[1], "extent[1]"))
+        if not (first < last).all():
+            raise InvalidArray(f"extent goes from {first.tolist()} to {last.tolist()}; the first must be less on every axis")
+    at = (first + (where + 0.5) / shape * (last - first)).astype(np.float32)
+    picked = field[tuple(where.T)]
+    each = picked if colored else colors_.mapped(picked, cmap, above if low is None else low, most if high is None else high)
+    return points(at, colors=each)

@@ -1,0 +1,169 @@
+"""Wire bytes of bulk content without protobuf's copies.
+
+A message whose payloads lie last at every level is a short head, known once the sizes are, and then the arrays
+themselves: `Packed`. Wrapping it into the next outer message only makes the head longer; one join at the end copies
+everything once. Heads are made of generated messages, so the field numbers of what is inside them stand in the .proto
+files alone; those that wrap are below.
+"""
+from __future__ import annotations
+
+from typing import Optional, Sequence, Union
+
+import numpy as np
+from google.protobuf.message import Message
+
+from .arrays import Array
+from .v1 import primitives_pb2, scene_pb2
+
+Buffer = Union[bytes, memoryview]
+
+_BYTES = 2  # the wire type of everything that has a length
+
+
+def varint(value: int) -> bytes:
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def _key(number: int) -> bytes:
+    return varint(number << 3 | _BYTES)
+
+
+class Field:
+    """Keys of the fields that wrap payloads, by the generated messages' own numbers."""
+
+    UPSERT = _key(scene_pb2.StreamRequest.UPSERT_FIELD_NUMBER)
+    BATCH = _key(scene_pb2.StreamRequest.BATCH_FIELD_NUMBER)
+    UPSERTS = _key(scene_pb2.Batch.UPSERTS_FIELD_NUMBER)
+    ENTITY = _key(scene_pb2.Upsert.ENTITY_FIELD_NUMBER)
+    PRIMITIVE = _key(scene_pb2.Entity.PRIMITIVE_FIELD_NUMBER)
+    PART = _key(primitives_pb2.Object.PARTS_FIELD_NUMBER)
+    PART_PRIMITIVE = _key(primitives_pb2.Object.Part.PRIMITIVE_FIELD_NUMBER)
+    DEFINE_OBJECT = _key(scene_pb2.StreamRequest.DEFINE_OBJECT_FIELD_NUMBER)
+    DEFINITION = _key(scene_pb2.DefineObject.DEFINITION_FIELD_NUMBER)
+    POINTS = _key(primitives_pb2.Primitive.POINTS_FIELD_NUMBER)
+    SEGMENTS = _key(primitives_pb2.Primitive.SEGMENTS_FIELD_NUMBER)
+    MESH = _key(primitives_pb2.Primitive.MESH_FIELD_NUMBER)
+    INDICES = _key(primitives_pb2.Vertices.INDICES_FIELD_NUMBER)
+    COLORS = _key(primitives_pb2.Vertices.COLORS_FIELD_NUMBER)
+    POSITIONS = _key(primitives_pb2.Vertices.POSITIONS_FIELD_NUMBER)
+    VERTICES = {
+        "points": _key(primitives_pb2.Points.VERTICES_FIELD_NUMBER),
+        "segments": _key(primitives_pb2.Segments.VERTICES_FIELD_NUMBER),
+        "mesh": _key(primitives_pb2.Mesh.VERTICES_FIELD_NUMBER),
+    }
+
+
+class Packed:
+    """A message: `head`, then `tail` as it lies in memory. Of no use once an array in the tail has changed."""
+
+    __slots__ = ("head", "tail", "tail_size")
+
+    def __init__(self, head: bytes, tail: Sequence[Buffer] = (), tail_size: int = 0) -> None:
+        self.head = head
+        self.tail = tail
+        self.tail_size = tail_size
+
+    def __len__(self) -> int:
+        return len(self.head) + self.tail_size
+
+    def inside(self, key: bytes, before: bytes = b"") -> "Packed":
+        """The message that has this one as its field `key`, after the fields in `before`."""
+        return Packed(before + key + varint(len(self)) + self.head, self.tail, self.tail_size)
+
+    def to_bytes(self) -> bytes:
+        """The one copy."""
+        return b"".join((self.head, *self.tail)) if self.tail else self.head
+
+
+def payload(array: Array) -> memoryview:
+    """The bytes of a C-contiguous array, without a copy."""
+    return np.ravel(array).view(np.uint8).data
+
+
+def vertices(positions: Array, position_type: primitives_pb2.ElementType,
+             colors: Optional[Array] = None, indices: Optional[Array] = None) -> Packed:
+    """Vertices. `colors` is (n, 3) or (n, 4) uint8, `indices` uint32."""
+    head = primitives_pb2.Vertices(count=len(positions), position_type=position_type)
+    parts: list[tuple[bytes, memoryview]] = []
+    if indices is not None:
+        head.index_type = primitives_pb2.ELEMENT_TYPE_U32
+        head.index_count = indices.size
+        parts.append((Field.INDICES, payload(indices)))
+    if colors is not None:
+        wide = colors.shape[1] == 4
+        head.color_type = primitives_pb2.ELEMENT_TYPE_RGBX8 if wide else primitives_pb2.ELEMENT_TYPE_RGB8
+        parts.append((Field.COLORS, payload(colors)))
+    parts.append((Field.POSITIONS, payload(positions)))
+    tail: list[Buffer] = []
+    size = 0
+    for key, data in parts:
+        prefix = key + varint(len(data))
+        tail += (prefix, data)
+        size += len(prefix) + len(data)
+    return Packed(head.SerializeToString(), tail, size)
+
+
+def message(content: Message) -> Packed:
+    return Packed(content.SerializeToString())
+
+
+class Put:
+    """An upsert as a whole StreamRequest; its Upsert begins at `start`."""
+
+    __slots__ = ("layer", "id", "request", "start")
+
+    def __init__(self, layer: str, id: str, request: bytes, start: int) -> None:
+        self.layer = layer
+        self.id = id
+        self.request = request
+        self.start = start
+
+
+def put(layer: str, id: str, entity: bytes, primitive: Packed) -> Put:
+    """Upsert of `primitive` under (layer, id). `entity`: an Entity's other fields, serialised."""
+    upsert = primitive.inside(Field.PRIMITIVE, entity).inside(
+        Field.ENTITY, scene_pb2.Upsert(layer=layer, id=id).SerializeToString())
+    request = upsert.inside(Field.UPSERT)
+    return Put(layer, id, request.to_bytes(), len(request) - len(upsert))
+
+
+# Upserts of at least this size travel alone, as they are; smaller ones side by side fill a batch up to the other.
+ALONE_BYTES = 64 << 10
+BATCH_BYTES = 1 << 20
+
+
+def batched(puts: Sequence[Put]) -> list[bytes]:
+    """Requests that put up `puts` in their order, no batch above BATCH_BYTES."""
+    requests: list[bytes] = []
+    waiting: list[Put] = []
+    size = 0
+
+    def flush() -> None:
+        nonlocal size
+        if len(waiting) == 1:
+            requests.append(waiting[0].request)
+        elif waiting:
+            tail: list[Buffer] = []
+            for one in waiting:
+                content = memoryview(one.request)[one.start:]
+                tail += (Field.UPSERTS + varint(len(content)), content)
+            total = sum(len(part) for part in tail)
+            requests.append(Packed(Field.BATCH + varint(total), tail, total).to_bytes())
+        waiting.clear()
+        size = 0
+
+    for one in puts:
+        length = len(one.request) + 8
+        if size + length > BATCH_BYTES or length >= ALONE_BYTES:
+            flush()
+        waiting.append(one)
+        size += length
+        if length >= ALONE_BYTES:
+            flush()
+    flush()
+    return requests

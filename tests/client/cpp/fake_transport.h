@@ -1,0 +1,83 @@
+// A transport whose other end is the test, in one thread: what is written is kept, and what the server
+// says is said by the test.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/cpp/src/session_core.h"
+#include "client/cpp/src/transport.h"
+#include "display/sync/fake_clock.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::client {
+
+class FakeStream final : public Stream {
+ public:
+  explicit FakeStream(Stream::Events* events, std::vector<FakeStream*>* list)
+      : events(events), list_(list) {}
+  ~FakeStream() override;
+  void Write(const Rope& message) override;
+  void WritesDone() override { half_closed = true; }
+  void Cancel() override { cancelled = true; }
+
+  Stream::Events* const events;
+  std::vector<v1::StreamRequest> written;
+  uint64_t bytes = 0;
+  bool writing = false, half_closed = false, cancelled = false;
+
+ private:
+  std::vector<FakeStream*>* const list_;
+};
+
+class FakeTransport final : public Transport {
+ public:
+  std::unique_ptr<Stream> Start(Stream::Events* events) override;
+  // Of streams that still are: in the order of their starts.
+  std::vector<FakeStream*> streams;
+  uint64_t started = 0;
+};
+
+// A session over it, under a clock that stands still.
+class SessionUnderTest {
+ public:
+  explicit SessionUnderTest(Options options = {});
+  ~SessionUnderTest();
+
+  SessionCore& operator*() { return *core_; }
+  SessionCore* operator->() { return core_.get(); }
+  FakeStream& stream() { return *transport_->streams.back(); }
+  bool connected() const { return !transport_->streams.empty(); }
+  uint64_t started() const { return transport_->started; }
+  sync::FakeClock& clock() { return clock_; }
+
+  // Steps, and lets writes through, until nothing more happens.
+  void Settle();
+  void Advance(sync::TimeNs by) {
+    clock_.Advance(by);
+    Settle();
+  }
+  void Say(const v1::StreamResponse& response);
+  void SayOpened(uint64_t credit_bytes = 0, const std::string& token = "token");
+  void SayOpened(const v1::Opened& opened);
+  void SayAccepted(uint64_t frame, const std::vector<std::string>& displays = {});
+  void End(const absl::Status& status);
+
+  // Puts up a sphere of this id and commits it.
+  uint64_t Put(const std::string& id);
+  // Commits an immediate frame of one sphere.
+  absl::StatusOr<uint64_t> DrawFrame(const std::string& layer);
+
+  // Of the newest stream: "open", "layer/id …", "begin layer", "commit 3" and so on, since the last call.
+  std::vector<std::string> TakeWords();
+
+ private:
+  sync::FakeClock clock_;
+  FakeTransport* transport_;
+  std::unique_ptr<SessionCore> core_;
+  uint64_t told_ = 0;  // the stream whose words were taken
+  size_t told_count_ = 0;
+};
+
+}  // namespace voxeld::client

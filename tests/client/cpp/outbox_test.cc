@@ -1,0 +1,429 @@
+// The outbox against a plain model: a server that applies what it is sent, and lists of what was asked
+// for.
+#include "client/cpp/src/outbox.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/src/encode.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// A server's end of one stream after the other: it decodes with protobuf, and applies whole commits.
+class ModelServer {
+ public:
+  void Lose() {
+    staged_.clear();
+    frame_.reset();
+  }
+
+  // Returns the frame id if it was a Commit.
+  std::optional<uint64_t> Take(const Rope& message) {
+    v1::StreamRequest request;
+    EXPECT_TRUE(request.ParseFromString(message.Flat()));
+    EXPECT_GT(request.sequence(), last_sequence);
+    last_sequence = request.sequence();
+    if (request.has_commit()) {
+      EXPECT_FALSE(frame_.has_value()) << "a commit within a frame";
+      for (const auto& apply : staged_) apply();
+      staged_.clear();
+      client_drops += request.commit().client_drops();
+      commits.push_back(request.commit().frame_id());
+      last_commit = request.sequence();
+      return commits.back();
+    }
+    if (request.has_frame_begin()) {
+      EXPECT_FALSE(frame_.has_value());
+      frame_.emplace(request.frame_begin().layer(), std::set<std::string>());
+    } else if (request.has_frame_end()) {
+      EXPECT_TRUE(frame_.has_value());
+      staged_.push_back([this, frame = *frame_] {
+        layers[frame.first] = frame.second;
+        ++frames_applied;
+      });
+      frame_.reset();
+    } else if (request.has_batch()) {
+      for (const v1::Upsert& upsert : request.batch().upserts()) {
+        if (frame_.has_value()) {
+          EXPECT_EQ(upsert.layer(), frame_->first);
+          frame_->second.insert(upsert.id());
+        } else {
+          staged_.push_back([this, upsert] { retained.push_back(upsert.id()); });
+        }
+      }
+    } else {
+      ADD_FAILURE() << request.DebugString();
+    }
+    return std::nullopt;
+  }
+
+  uint64_t last_sequence = 0, last_commit = 0, client_drops = 0, frames_applied = 0;
+  std::vector<uint64_t> commits;
+  std::vector<std::string> retained;  // in the order of application
+  std::map<std::string, std::set<std::string>> layers;
+
+ private:
+  std::vector<std::function<void()>> staged_;
+  std::optional<std::pair<std::string, std::set<std::string>>> frame_;
+};
+
+UpsertOperation UpsertOf(const std::string& layer, const std::string& id, size_t vertices) {
+  return {.layer = layer,
+          .id = id,
+          .primitive = *EncodePrimitive(
+              Points{.vertices = {.positions = std::vector<float>(vertices * 3)}}, {}),
+          .label = {}};
+}
+
+std::shared_ptr<Transaction> Retained(uint64_t frame, const std::string& id, size_t vertices = 1) {
+  auto transaction = MakeTransaction({UpsertOf("kept", id, vertices)}, {});
+  transaction->frame_id = frame;
+  return transaction;
+}
+
+std::shared_ptr<Transaction> FrameOf(uint64_t frame, const std::string& layer,
+                                     size_t vertices = 1) {
+  auto transaction = MakeTransaction(
+      {FrameOperation{layer, {UpsertOf(layer, absl::StrCat("f", frame), vertices)}}}, {});
+  transaction->frame_id = frame;
+  return transaction;
+}
+
+std::vector<uint64_t> Drain(Outbox* outbox, ModelServer* server) {
+  std::vector<uint64_t> committed;
+  while (auto next = outbox->Next(0)) {
+    if (const auto frame = server->Take(next->message)) committed.push_back(*frame);
+  }
+  return committed;
+}
+
+TEST(Outbox, SendsNothingBeforeTheStreamIsOpen) {
+  Outbox outbox(0, 1 << 20);
+  ASSERT_TRUE(outbox.Add(Retained(1, "a")).ok());
+  EXPECT_FALSE(outbox.Next(0).has_value());
+  EXPECT_FALSE(outbox.Ping(0).has_value());
+  outbox.StreamOpened(10, 0);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1));
+  EXPECT_TRUE(outbox.empty());
+  EXPECT_EQ(outbox.waiting_bytes(), 0u);
+}
+
+TEST(Outbox, AMessageMayExceedTheCreditOnlyByBeingSentWhileSomeIsLeft) {
+  Outbox outbox(0, 1 << 20);
+  ASSERT_TRUE(outbox.Add(Retained(1, "a", 1000)).ok());
+  outbox.StreamOpened(100, 100);
+  EXPECT_FALSE(outbox.has_credit());
+  EXPECT_FALSE(outbox.Next(0).has_value());
+  EXPECT_FALSE(outbox.Ping(0).has_value()) << "pings are requests as well";
+  outbox.Credit(101);
+  EXPECT_TRUE(outbox.Next(0).has_value()) << "all of it, for one byte";
+  EXPECT_GT(outbox.sent_bytes(), 12'000u);
+  EXPECT_FALSE(outbox.Next(0).has_value());
+  outbox.Credit(50);  // never less than it was
+  outbox.Credit(outbox.sent_bytes());
+  EXPECT_FALSE(outbox.Next(0).has_value());
+  outbox.Credit(outbox.sent_bytes() + 1);
+  const auto commit = outbox.Next(0);
+  ASSERT_TRUE(commit.has_value());
+  EXPECT_NE(commit->committed, nullptr);
+}
+
+TEST(Outbox, LatestKeepsTheNewestFrameOfEachLayerAndAllThatIsRetained) {
+  Outbox outbox(1, 1 << 20);
+  outbox.StreamOpened(1, 1);
+  ASSERT_TRUE(outbox.Add(FrameOf(1, "a")).ok());
+  ASSERT_TRUE(outbox.Add(FrameOf(2, "b")).ok());
+  auto both = MakeTransaction({UpsertOf("kept", "x", 1), FrameOperation{"a", {}}}, {});
+  both->frame_id = 3;
+  ASSERT_TRUE(outbox.Add(both).ok());
+  ASSERT_TRUE(outbox.Add(FrameOf(4, "a")).ok());
+  const std::vector<Drop> drops = outbox.TakeDrops();
+  ASSERT_EQ(drops.size(), 2u);
+  EXPECT_EQ(drops[0].frame_id, 1u);
+  EXPECT_TRUE(drops[0].whole);
+  EXPECT_EQ(drops[1].frame_id, 3u);
+  EXPECT_FALSE(drops[1].whole) << "it holds something retained";
+  outbox.Credit(1 << 20);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(2, 3, 4));
+  EXPECT_THAT(server.retained, ElementsAre("x"));
+  EXPECT_EQ(server.frames_applied, 2u);
+  EXPECT_THAT(server.layers["a"], ElementsAre("f4"));
+  EXPECT_EQ(server.client_drops, 2u);
+}
+
+TEST(Outbox, AFrameThatIsBeingSentIsSentWhole) {
+  Outbox outbox(1, 1 << 20);
+  outbox.StreamOpened(1, 2);
+  ModelServer server;
+  ASSERT_TRUE(outbox.Add(FrameOf(1, "a")).ok());
+  server.Take(outbox.Next(0)->message);  // FrameBegin is out
+  for (uint64_t frame = 2; frame < 10; ++frame) ASSERT_TRUE(outbox.Add(FrameOf(frame, "a")).ok());
+  outbox.Credit(1 << 20);
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 9));
+  EXPECT_EQ(server.client_drops, 7u);
+}
+
+TEST(Outbox, TimedFramesAreNotGivenUp) {
+  Outbox outbox(1, 1 << 20);
+  for (uint64_t frame = 1; frame <= 3; ++frame) {
+    auto timed = FrameOf(frame, "a");
+    timed->present_at_ns = 1000 * static_cast<int64_t>(frame);
+    ASSERT_TRUE(outbox.Add(timed).ok());
+  }
+  ASSERT_TRUE(outbox.Add(FrameOf(4, "a")).ok());
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 2, 3, 4));
+  outbox.Scheduled(1);
+  outbox.Scheduled(3);
+  // The first one's time has passed: whether it was shown nobody knows. The third is sent again, and
+  // so is the second, of which nothing was heard.
+  EXPECT_THAT(outbox.StreamLost(2000), ElementsAre(1));
+  server.Lose();
+  outbox.StreamOpened(1, 0);
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(2, 3, 4));
+}
+
+TEST(Outbox, AFullBufferRefusesWhatIsRetainedAndLosesNothing) {
+  Outbox outbox(1, 10'000);
+  ASSERT_TRUE(outbox.Add(Retained(1, "a", 700)).ok());
+  ASSERT_TRUE(outbox.Add(FrameOf(2, "l", 10)).ok());
+  const absl::Status refused = outbox.Add(Retained(3, "b", 700));
+  EXPECT_TRUE(absl::IsResourceExhausted(refused));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("of 10000 (buffer_bytes)"));
+  EXPECT_THAT(outbox.TakeDrops(), IsEmpty()) << "the newest frame of a layer stays";
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 2));
+  // Alone in an empty outbox anything may come.
+  ASSERT_TRUE(outbox.Add(Retained(4, "huge", 10'000)).ok());
+}
+
+TEST(Outbox, ReliableGivesUpFramesOnlyWithoutAConnection) {
+  Outbox outbox(0, 10'000);
+  outbox.StreamOpened(1, 1);  // no credit
+  ASSERT_TRUE(outbox.Add(FrameOf(1, "a", 300)).ok());
+  ASSERT_TRUE(outbox.Add(FrameOf(2, "a", 300)).ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(outbox.Add(FrameOf(3, "a", 300))));
+  outbox.StreamLost(std::nullopt);
+  ASSERT_TRUE(outbox.Add(FrameOf(4, "a", 300)).ok());
+  const std::vector<Drop> drops = outbox.TakeDrops();
+  ASSERT_EQ(drops.size(), 1u);
+  EXPECT_EQ(drops[0].frame_id, 1u) << "the oldest";
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(2, 4));
+}
+
+TEST(Outbox, WhatWasAppliedIsNotSentAgain) {
+  Outbox outbox(0, 1 << 20);
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  for (uint64_t frame = 1; frame <= 4; ++frame)
+    ASSERT_TRUE(outbox.Add(Retained(frame, absl::StrCat(frame))).ok());
+  Drain(&outbox, &server);
+  EXPECT_NE(outbox.Answered(1), nullptr);
+  EXPECT_EQ(outbox.Answered(1), nullptr);
+  const uint64_t second_commit = 4;  // a batch and a commit each
+  ASSERT_TRUE(outbox.Add(Retained(5, "5")).ok());
+  outbox.StreamLost(std::nullopt);
+  server.Lose();
+  const auto applied = outbox.Applied(second_commit);
+  ASSERT_EQ(applied.size(), 1u);
+  EXPECT_EQ(applied[0]->frame_id, 2u);
+  EXPECT_EQ(applied[0]->operations.size(), 1u);
+  outbox.StreamOpened(1, 0);
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(3, 4, 5));
+  EXPECT_THAT(server.retained, ElementsAre("1", "2", "3", "4", "3", "4", "5"));
+}
+
+TEST(Outbox, WhatIsPutFirstGoesFirst) {
+  Outbox outbox(0, 1 << 20);
+  ASSERT_TRUE(outbox.Add(Retained(1, "a")).ok());
+  outbox.AddFirst({Retained(10, "x"), Retained(11, "y")});
+  outbox.AddFirst({Retained(20, "z")});
+  ASSERT_TRUE(outbox.Add(Retained(2, "b")).ok());
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(20, 10, 11, 1, 2));
+}
+
+// Everything at random: commits of all sorts, credit in small pieces, answers late, streams lost and
+// resumed or not.
+class OutboxAtRandom : public testing::TestWithParam<std::tuple<int, int>> {};
+
+TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
+  const auto [keep_frames, seed] = GetParam();
+  std::mt19937 random(static_cast<unsigned>(seed));
+  const auto below = [&random](size_t n) { return static_cast<size_t>(random() % n); };
+  constexpr size_t kBuffer = 40'000;
+  Outbox outbox(static_cast<uint64_t>(keep_frames), kBuffer);
+  ModelServer server;
+
+  std::vector<std::string> retained;       // asked for and taken
+  std::map<std::string, uint64_t> newest;  // of each layer, that was taken
+  std::map<uint64_t, size_t> frames_of;    // commit → frames
+  std::set<uint64_t> answered_set;
+  std::vector<uint64_t> unanswered;
+  std::set<uint64_t> dropped_whole;
+  uint64_t frames = 0, drops = 0, credit = 0, sent = 0, frame_id = 0;
+  bool open = false, lost_ever = false;
+
+  const auto note_drops = [&] {
+    for (const Drop& drop : outbox.TakeDrops()) {
+      drops += drop.frames;
+      if (drop.whole) dropped_whole.insert(drop.frame_id);
+    }
+  };
+  const auto send = [&] {
+    const auto next = outbox.Next(0);
+    if (!next.has_value()) return false;
+    EXPECT_TRUE(open);
+    EXPECT_TRUE(credit == 0 || sent < credit) << sent << " of " << credit;
+    sent += next->message.size();
+    EXPECT_EQ(outbox.sent_bytes(), sent);
+    if (const auto frame = server.Take(next->message)) {
+      EXPECT_FALSE(answered_set.contains(*frame));
+      EXPECT_FALSE(dropped_whole.contains(*frame));
+      unanswered.push_back(*frame);
+    }
+    return true;
+  };
+  const auto connect = [&] {
+    outbox.StreamOpened(50, credit = 51 + below(5000));
+    sent = 50;
+    open = true;
+    note_drops();
+  };
+
+  for (int step = 0; step < 3000; ++step) {
+    switch (below(8)) {
+      case 0:
+      case 1:
+      case 2: {
+        std::vector<Operation> operations;
+        std::vector<std::string> ids;
+        std::set<std::string> layers;
+        ++frame_id;
+        if (below(2) == 0) {
+          ids.push_back(absl::StrCat("r", frame_id));
+          operations.emplace_back(UpsertOf("kept", ids.back(), 1 + below(50)));
+        }
+        for (const char* layer : {"a", "b", "c"}) {
+          if (below(3) != 0) continue;
+          layers.insert(layer);
+          operations.emplace_back(
+              FrameOperation{layer, {UpsertOf(layer, absl::StrCat("f", frame_id), 1 + below(50))}});
+        }
+        const bool was_empty = outbox.empty();
+        auto transaction = MakeTransaction(std::move(operations), {});
+        transaction->frame_id = frame_id;
+        const absl::Status added = outbox.Add(transaction);
+        note_drops();
+        EXPECT_TRUE(added.ok() || !was_empty);
+        if (!added.ok()) break;
+        if (!was_empty) {
+          EXPECT_LE(outbox.waiting_bytes(), kBuffer);
+        }
+        retained.insert(retained.end(), ids.begin(), ids.end());
+        for (const std::string& layer : layers) newest[layer] = frame_id;
+        frames += layers.size();
+        frames_of[frame_id] = layers.size();
+        break;
+      }
+      case 3:
+      case 4:
+        for (size_t i = below(6); i > 0 && send(); --i) {
+        }
+        break;
+      case 5:
+        if (open) outbox.Credit(credit += below(3000));
+        break;
+      case 6:
+        for (size_t i = below(4); i > 0 && !unanswered.empty(); --i) {
+          EXPECT_NE(outbox.Answered(unanswered.front()), nullptr);
+          answered_set.insert(unanswered.front());
+          unanswered.erase(unanswered.begin());
+        }
+        break;
+      default:
+        if (below(20) != 0) break;
+        if (open) {
+          EXPECT_THAT(outbox.StreamLost(std::nullopt), IsEmpty());
+          server.Lose();
+          open = false;
+          lost_ever = true;
+          if (below(2) == 0) {
+            // It is resumed: what was applied is known.
+            EXPECT_EQ(outbox.Applied(server.last_commit).size(), unanswered.size());
+            answered_set.insert(unanswered.begin(), unanswered.end());
+          } else {
+            // It is not, and what was not answered is as if it had not arrived.
+            std::erase_if(server.commits, [&](uint64_t frame) {
+              return std::count(unanswered.begin(), unanswered.end(), frame) > 0;
+            });
+          }
+          unanswered.clear();
+        } else {
+          connect();
+        }
+    }
+  }
+  if (!open) connect();
+  // One last commit tells of all drops.
+  auto last = Retained(++frame_id, "last");
+  while (!outbox.Add(last).ok()) {
+    outbox.Credit(credit += 1000);
+    while (send()) {
+    }
+  }
+  note_drops();
+  retained.push_back("last");
+  outbox.Credit(credit += 1'000'000'000);
+  while (send()) {
+  }
+  EXPECT_TRUE(outbox.empty());
+  EXPECT_EQ(outbox.waiting_bytes(), 0u);
+
+  // Retained operations are never lost, and first come in the order in which they were asked for.
+  std::vector<std::string> first_time;
+  std::set<std::string> seen;
+  for (const std::string& id : server.retained) {
+    if (seen.insert(id).second) first_time.push_back(id);
+  }
+  EXPECT_EQ(first_time, retained);
+  // The newest frame of each layer is there.
+  for (const auto& [layer, frame] : newest)
+    EXPECT_THAT(server.layers[layer], ElementsAre(absl::StrCat("f", frame)));
+  // What is dropped is said, and nothing else is missing.
+  EXPECT_GE(server.client_drops, drops) << "those of commits that were lost are told again";
+  std::set<uint64_t> arrived(server.commits.begin(), server.commits.end());
+  for (const auto& [frame, count] : frames_of)
+    EXPECT_NE(arrived.contains(frame), dropped_whole.contains(frame)) << frame;
+  if (!lost_ever) {
+    EXPECT_EQ(server.frames_applied + drops, frames);
+    EXPECT_EQ(server.client_drops, drops);
+  }
+  if (keep_frames > 0) {
+    EXPECT_GT(drops, 0u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Policies, OutboxAtRandom,
+                         testing::Combine(testing::Values(0, 1, 3), testing::Range(1, 9)));
+
+}  // namespace
+}  // namespace voxeld::client

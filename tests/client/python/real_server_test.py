@@ -1,0 +1,216 @@
+"""The client against the real daemon, where it matters that it is real. The daemon's path is in VOXELD."""
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+from typing import Any, Optional
+
+import voxeld as voxel
+
+LONG = 60.0
+
+
+class Daemon:
+    def __init__(self, folder: str, *options: str) -> None:
+        self.path = f"{folder}/voxeld.sock"
+        self.server = f"unix:{self.path}"
+        self._command = [os.environ["VOXELD"], "--listen", self.server, "--http", "off", "--log-level", "warn",
+                         "--display", "stack=simulated,geometry=planar,size=24x24x24", *options]
+        self.start()
+
+    def start(self) -> None:
+        self._process = subprocess.Popen(self._command)
+        with voxel.connect(self.server, timeout=LONG):
+            pass  # it listens
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait(LONG)
+
+
+class Relay:
+    """A socket in front of the daemon's whose connections can be cut."""
+
+    def __init__(self, path: str, behind: str) -> None:
+        self._behind = behind
+        self._listener = socket.socket(socket.AF_UNIX)
+        self._listener.bind(path)
+        self._listener.listen()
+        self._lock = threading.Lock()
+        self._ends: list[socket.socket] = []
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                near, _ = self._listener.accept()
+            except OSError:
+                return
+            far = socket.socket(socket.AF_UNIX)
+            try:
+                far.connect(self._behind)
+            except OSError:
+                near.close()
+                far.close()
+                continue
+            with self._lock:
+                self._ends += [near, far]
+            for a, b in ((near, far), (far, near)):
+                threading.Thread(target=self._copy, args=(a, b), daemon=True).start()
+
+    @staticmethod
+    def _copy(source: socket.socket, sink: socket.socket) -> None:
+        try:
+            while data := source.recv(1 << 16):
+                sink.sendall(data)
+        except OSError:
+            pass
+
+    def cut(self) -> None:
+        with self._lock:
+            for end in self._ends:
+                try:
+                    end.shutdown(socket.SHUT_RDWR)
+                except OSError:
+                    pass
+                end.close()
+            self._ends = []
+
+    def close(self) -> None:
+        self._listener.close()
+        self.cut()
+
+
+class RealServer(unittest.TestCase):
+    def setUp(self) -> None:
+        self.folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.daemon = Daemon(self.folder)
+        self.addCleanup(self.daemon.kill)
+
+    def connect(self, server: Optional[str] = None, **options: Any) -> voxel.Connection:
+        v = voxel.connect(server or self.daemon.server, timeout=LONG, **options)
+        self.addCleanup(v.close)
+        return v
+
+    def ids(self, v: voxel.Connection) -> list[str]:
+        return sorted(entity.key.id for entity in v.entities(timeout=LONG))
+
+    def test_a_cut_connection_is_resumed_and_nothing_is_lost(self) -> None:
+        for policy in ("clear", "keep", 30.0):
+            with self.subTest(policy):
+                self.cut_and_resume(policy)
+
+    def cut_and_resume(self, policy: Any) -> None:
+        path = f"{self.folder}/relay.{policy}.sock"
+        relay = Relay(path, self.daemon.path)
+        self.addCleanup(relay.close)
+        v = self.connect(f"unix:{path}", on_disconnect=policy)
+        owner = v.info.owner
+        frames = []
+        for number in range(60):
+            frames.append(v.sphere(f"s{number:02}", radius=0.01 * (number + 1)).frame)
+            if number % 20 == 10:
+                relay.cut()
+        for frame in frames:
+            assert frame is not None
+            self.assertEqual(frame.wait(LONG).state, "accepted")
+        v.commit().wait_shown(LONG)
+        observer = self.connect()
+        self.assertEqual([e.key.id for e in observer.entities(owner=owner, timeout=LONG)], [f"s{n:02}" for n in range(60)])
+        self.assertEqual((v.info.owner, v.counts["accepted"]), (owner, 61))
+        self.assertGreater(v.counts["resumed"], 0)
+        self.assertEqual(v.counts["streams_opened"], v.counts["resumed"] + 1, "every stream but the first is a resumed one")
+        self.assertEqual(v.issues, [])
+
+    def test_a_restarted_daemon_gets_the_scene_anew(self) -> None:
+        v = self.connect()
+        handle = v.layer("l", opacity=0.5).box("box", size=0.5)
+        handle.transform = voxel.translate(0.25, 0, 0)
+        with v.frame("live") as frame:
+            frame.sphere("ball")
+        frame.wait(LONG)
+        self.daemon.kill()
+        self.daemon.start()
+        v.sphere("after")
+        v.commit().wait(LONG)
+        self.assertEqual(self.ids(v), ["after", "ball", "box"])
+        (box,) = v.entities("l")
+        self.assertEqual(box.transform.m[3], 0.25)
+        self.assertEqual({layer.layer: layer.opacity for layer in v.layers()}, {"l": 128, "live": 255, "main": 255})
+
+    def test_a_session_may_be_taken_up_by_another(self) -> None:
+        first = self.connect(on_disconnect="keep")
+        first.sphere("a").frame.wait(LONG)  # type: ignore[union-attr]
+        second = self.connect(resume_token=first.resume_token, on_disconnect="keep")
+        self.assertEqual((second.info.owner, second.counts["resumed"]), (first.info.owner, 1))
+        with self.assertRaisesRegex(voxel.ConnectionLost, "taken up"):
+            first._transport.wait_until(lambda: False, LONG)
+        second.sphere("b").frame.wait(LONG)  # type: ignore[union-attr]
+        self.assertEqual(self.ids(second), ["a", "b"])
+
+    def test_an_owner_may_have_two_connections(self) -> None:
+        first = self.connect()
+        with first.object("ball") as ball:
+            ball.sphere("s", radius=0.2)
+        first.commit().wait(LONG)
+        second = self.connect(owner_token=first.owner_token)
+        frame = second.instance("i", "ball").frame
+        assert frame is not None
+        self.assertEqual((second.info.owner, frame.wait(LONG).issues), (first.info.owner, ()))
+
+    def test_the_clock_is_the_machines(self) -> None:
+        v = self.connect()
+        v._transport.wait_until(v._session.clock.known, LONG)
+        before = time.monotonic_ns()
+        told, error = v.server_time_ns(), v.clock_error_ns
+        after = time.monotonic_ns()
+        assert error is not None
+        self.assertLessEqual(before - error, told)
+        self.assertLessEqual(told, after + error)
+
+    def test_a_timed_commit_is_shown_when_it_was_asked_for(self) -> None:
+        v = self.connect()
+        v._transport.wait_until(v._session.clock.known, LONG)
+        due = v.server_time_ns() + 300_000_000
+        v.autocommit = False
+        v.sphere("later")
+        outcome = v.commit(present_at_ns=due).wait_shown(LONG)["stack"]
+        self.assertEqual(outcome.kind, "presented")
+        self.assertGreaterEqual(outcome.time_ns, due)
+        v.sphere("soon")
+        frame = v.commit(present_in=0.1, must_show=True)
+        frame.wait_shown(LONG)
+        self.assertGreater(frame.scheduled_ns, due)
+
+    def test_latest_shows_the_newest_and_every_frame_is_accounted_for(self) -> None:
+        v = self.connect(flow="latest", when_full="wait")
+        frames = []
+        for number in range(150):
+            with v.frame("live") as frame:
+                frame.points(f"p{number}", [[0.001 * number, 0, 0]] * 20_000)
+            frames.append(frame.ticket)
+        v.commit().wait_shown(LONG)
+        self.assertEqual(frames[-1].state, "accepted")
+        self.assertEqual(self.ids(v), ["p149"])
+        stats, counts = v.stats(LONG), v.counts
+        self.assertEqual({f.state for f in frames} - {"accepted", "dropped"}, set())
+        self.assertEqual(counts["client_drops"], sum(f.state == "dropped" for f in frames))
+        self.assertEqual(stats.client_drops, counts["client_drops"])
+        self.assertEqual(stats.frames_dropped, counts["server_drops"])
+        self.assertEqual(counts["accepted"] + counts["dropped"], 151)
+
+    def test_a_picture_for_notebooks(self) -> None:
+        v = self.connect()
+        handle = v.box("b", fill="solid", color="red")
+        handle.frame.wait_shown(LONG)  # type: ignore[union-attr]
+        for shown in (v, handle, v.capture(timeout=LONG / 2)):
+            self.assertEqual(shown._repr_mimebundle_()["image/png"][:8], b"\x89PNG\r\n\x1a\n")  # type: ignore[index]
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,131 @@
+import random
+import threading
+import unittest
+
+from voxeld import CommitDropped, CommitRefused, ConnectionLost
+from voxeld.receipts import Book, Frame, Stages
+from voxeld.v1 import scene_pb2 as pb
+from voxeld.v1 import types_pb2
+
+
+def outcome(frame_id: int, display: str, rng: random.Random) -> pb.Receipt:
+    kinds = [pb.Outcome(display=display, presented=pb.Presented(volume=3, time_ns=9, evidence=pb.EVIDENCE_DEVICE)),
+             pb.Outcome(display=display, unchanged=pb.Unchanged(volume=3)),
+             pb.Outcome(display=display, superseded=pb.Superseded(by_frame_id=frame_id + 1)),
+             pb.Outcome(display=display, lost=pb.Lost(reason="unplugged")),
+             pb.Outcome(display=display, not_shown=pb.NotShown(why=pb.NotShown.BLANKED))]
+    return pb.Receipt(frame_id=frame_id, outcome=rng.choice(kinds))
+
+
+class Sums(unittest.TestCase):
+    def test_every_commit_ends_once_and_the_sums_are_right(self) -> None:
+        rng = random.Random(1)
+        for _ in range(100):
+            book, frames, owed = Book(), [], []
+            for number in range(1, 30):
+                frames.append(Frame(number))
+                book.add(frames[-1])
+                ending = rng.random()
+                if ending < 0.1:
+                    book.drop(frames[-1], "policy")
+                elif ending < 0.2:
+                    owed.append([pb.Receipt(frame_id=number, refused=pb.Refused(message="no", refused_operations=2))])
+                else:
+                    displays = rng.sample("abc", rng.randrange(4))
+                    accepted = pb.Accepted(displays=displays, refused_operations=1, dropped_frames=1)
+                    rest = [outcome(number, d, rng) for d in displays]
+                    rng.shuffle(rest)
+                    owed.append([pb.Receipt(frame_id=number, accepted=accepted), *rest])
+            given: list[pb.Receipt] = []
+            while owed:
+                mine = rng.choice(owed)
+                given.append(mine.pop(0))
+                book.receipt(given[-1])
+                owed = [o for o in owed if o]
+            self.assertTrue(all(f.complete and f.answered for f in frames))
+            self.assertEqual(len(book), 0)
+            c = book.counts
+            self.assertEqual(c["commits"], 29)
+            self.assertEqual(c["accepted"] + c["refused"] + c["dropped"], 29)
+            kinds = [r.outcome.WhichOneof("what") for r in given if r.HasField("outcome")]
+            for kind in ("presented", "unchanged", "superseded", "lost", "not_shown"):
+                self.assertEqual(c[kind], kinds.count(kind))
+            self.assertEqual(c["refused_operations"], c["accepted"] + 2 * c["refused"])
+            self.assertEqual(c["server_drops"], c["accepted"])
+            for frame in frames:
+                self.assertEqual(frame.accepted is not None, frame.state == "accepted")
+                if frame.accepted is not None:
+                    self.assertEqual(set(frame.outcomes), set(frame.accepted.displays))
+
+    def test_the_book_has_an_end(self) -> None:
+        from voxeld import receipts
+        book = Book()
+        first = Frame(1)
+        book.add(first)
+        for number in range(2, receipts.MAX_OPEN + 2):
+            book.add(Frame(number))
+        self.assertEqual(len(book), receipts.MAX_OPEN)
+        self.assertEqual(first.state, "lost")
+
+
+class Waiting(unittest.TestCase):
+    def test_issues_belong_to_the_commit_that_they_come_before(self) -> None:
+        book, first, second = Book(), Frame(1), Frame(2)
+        book.add(first)
+        book.add(second)
+        book.issue(pb.Issue(layer="l", id="i", field="upsert.entity", reason=types_pb2.REASON_INVALID_VALUE, message="is NaN"))
+        book.receipt(pb.Receipt(frame_id=1, refused=pb.Refused(message="strict")))
+        book.receipt(pb.Receipt(frame_id=2, accepted=pb.Accepted()))
+        self.assertEqual([str(i) for i in first.issues], ["l/i: upsert.entity is NaN (invalid_value)"])
+        self.assertEqual(second.issues, ())
+        with self.assertRaisesRegex(CommitRefused, "strict.*NaN") as caught:
+            first.wait(0)
+        self.assertEqual(caught.exception.issues, first.issues)
+
+    def test_what_waits_is_told(self) -> None:
+        book, frame = Book(), Frame(1)
+        book.add(frame)
+        results = []
+        threads = [threading.Thread(target=lambda: results.append(frame.wait(60).id)),
+                   threading.Thread(target=lambda: results.append(len(frame.wait_shown(60))))]
+        for thread in threads:
+            thread.start()
+        book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted(displays=["d"])))
+        threads[0].join(60)
+        self.assertEqual(results, [1])
+        book.receipt(outcome(1, "d", random.Random(1)))
+        threads[1].join(60)
+        self.assertEqual(results, [1, 1])
+
+    def test_ends_are_raised(self) -> None:
+        book = Book()
+        dropped, lost, late = Frame(1), Frame(2), Frame(3)
+        for frame in (dropped, lost, late):
+            book.add(frame)
+        book.drop(dropped, "newer came")
+        book.receipt(pb.Receipt(frame_id=3, accepted=pb.Accepted(displays=["d", "e"])))
+        with self.assertRaisesRegex(TimeoutError, "frame 3 is accepted and the outcome on d, e has not come in 0"):
+            late.wait_shown(0)
+        book.give_up(book.open_frames(), "gone")
+        for frame, error in ((dropped, CommitDropped), (lost, ConnectionLost)):
+            with self.assertRaises(error):
+                frame.wait_shown(0)
+        self.assertEqual(late.wait_shown(0), {}, "it was accepted, and no more will be known")
+
+    def test_without_outcomes_accepted_is_all(self) -> None:
+        book, frame = Book(), Frame(1, wants_outcomes=False)
+        book.add(frame)
+        book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted(displays=["d"])))
+        self.assertTrue(frame.complete)
+
+
+class Latency(unittest.TestCase):
+    def test_stages_take_what_passed_since_the_one_before(self) -> None:
+        stages = Stages.of(pb.Stages(sent_ns=1_000_000, received_ns=3_000_000, applied_ns=3_500_000, shown_ns=10_000_000))
+        self.assertEqual(stages.durations_ms(), {"received": 2.0, "applied": 0.5, "shown": 6.5})
+        self.assertEqual(stages.total_ms(), 9.0)
+        self.assertIsNone(Stages(received_ns=1).total_ms())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,279 @@
+"""The client's state machine against a plain server, with connections that end at any moment."""
+import random
+import unittest
+
+from plain_server import PlainServer, Scene, Session as ServerSession, apply
+from test_outbox import frame, puts  # the same makers
+
+from voxeld import operations, wire
+from voxeld.receipts import Frame
+from voxeld.session import Session, Settings
+from voxeld.v1 import primitives_pb2, types_pb2
+from voxeld.v1 import scene_pb2 as pb
+
+
+class Wire:
+    """A connection between the two, pumped by hand. What is on its way when it ends is gone."""
+
+    def __init__(self, session: Session, server: PlainServer) -> None:
+        self.session, self.server = session, server
+        self.up = False
+        self.token_lost = False
+        self.answers: list[pb.StreamResponse] = []
+        self.now = 0
+
+    def connect(self) -> None:
+        self.server.begin()
+        first = self.session.open_request()
+        try:
+            self.answers = self.server.receive(first)
+        except LookupError:
+            assert self.session.forget_resume()
+            self.session.lost()
+            return self.connect()
+        self.up = True
+        assert self.session.next_request(self.now) is None, "nothing is sent before Opened"
+
+    def cut(self) -> None:
+        if self.up:
+            # A token serves once, and with Opened the next one is lost.
+            self.token_lost = self.token_lost or not self.session.open
+            self.up = False
+            self.answers = []
+            self.session.lost()
+
+    def send(self) -> bool:
+        self.now += 1_000_000
+        message = self.session.next_request(self.now)
+        if message is None:
+            return False
+        self.answers += self.server.receive(message)
+        return True
+
+    def deliver(self, credit: bool = True) -> None:
+        if credit:
+            self.answers += self.server.give_credit()
+        for answer in self.answers:
+            self.session.answer(answer, self.now)
+        self.answers = []
+
+    def settle(self) -> None:
+        """Until nothing is left to do."""
+        while True:
+            self.deliver()
+            if not self.send() and not self.answers:
+                return
+
+
+class Expected:
+    """What the scene is to come to: every operation applied as it was made."""
+
+    def __init__(self) -> None:
+        self.session = ServerSession(b"")
+
+    def add(self, operation: operations.Operation) -> None:
+        if isinstance(operation, operations.Puts):
+            for put in operation.puts:
+                apply(self.session, pb.StreamRequest.FromString(put.request))
+        elif isinstance(operation, operations.Immediate):
+            self.session.scene[operation.layer] = {}
+            for part in operation.parts:
+                self.add(part)
+        else:
+            apply(self.session, pb.StreamRequest.FromString(operation.request))
+
+    def random_operation(self, rng: random.Random, number: int) -> operations.Operation:
+        layer, one, kind = rng.choice("ab"), rng.choice("xyz"), rng.random()
+        size = rng.choice([0, 100, number])
+        if kind < 0.35:
+            return puts(layer, one, size=size)
+        if kind < 0.45 and one in self.session.scene.get(layer, {}) and one != "a":
+            return operations.move(layer, one, [1, 0, 0, number, 0, 1, 0, 0, 0, 0, 1, 0])
+        if kind < 0.55:
+            return operations.delete_id(layer, one)
+        if kind < 0.85:
+            return frame(layer, size=size)
+        if kind < 0.88:
+            return operations.clear_layer(layer)
+        if kind < 0.9:
+            return operations.clear_all()
+        if kind < 0.95:
+            blend = rng.choice([types_pb2.BLEND_MODE_ADD, types_pb2.BLEND_MODE_OVER])
+            return operations.layer_state(rng.choice([
+                pb.LayerState(layer=layer, opacity=number % 256), pb.LayerState(layer=layer, visible=number % 2 == 0),
+                pb.LayerState(layer=layer, blend=blend, order=-number)]))
+        if kind < 0.98:
+            part = wire.message(primitives_pb2.Object.Part())
+            return operations.define(one, [part] * (number % 3))
+        return operations.undefine(one, True)
+
+
+def filled(scene: Scene) -> Scene:
+    return {layer: held for layer, held in scene.items() if held}
+
+
+class Run:
+    """Commits, losses and restarts at random; then everything that must hold."""
+
+    def __init__(self, test: unittest.TestCase, seed: object, flow: str, window: int, losses: float, restarts: float) -> None:
+        rng = random.Random(f"{seed}")
+        keep = 2
+        kept = rng.random() < 0.5
+        session = Session(Settings(flow=flow, keep_frames=keep, on_disconnect="keep" if kept else "clear"))
+        server = PlainServer(window)
+        wire_, expected = Wire(session, server), Expected()
+        frames: list[Frame] = []
+        restarted = False
+        for number in range(1, 80):
+            ops = []
+            for _ in range(rng.choice([0, 1, 1, 1, 3])):
+                ops.append(expected.random_operation(rng, number))
+                expected.add(ops[-1])
+            made = operations.Unit(session.new_frame(), ops, pb.Commit())
+            test.assertTrue(session.submit(made))
+            frames.append(made.frame)
+            if not wire_.up and rng.random() < 0.4:
+                wire_.connect()
+            for _ in range(rng.randrange(6)):
+                if wire_.up and not wire_.send():
+                    break
+            if wire_.up and rng.random() < 0.7:
+                wire_.deliver(rng.random() < 0.5)
+            if rng.random() < losses:
+                wire_.cut()
+                if rng.random() < restarts:
+                    restarted = True
+                    server.forget()
+        if not wire_.up:
+            wire_.connect()
+        wire_.settle()
+        last = operations.Unit(session.new_frame(), [], pb.Commit())  # after it, what has not been told was lost
+        session.submit(last)
+        frames.append(last.frame)
+        wire_.settle()
+        assert server.session is not None
+        test.assertEqual(filled(server.session.scene), filled(expected.session.scene))
+        test.assertEqual(server.session.states, expected.session.states)
+        test.assertEqual(server.session.objects, expected.session.objects)
+        test.assertTrue(session.idle())
+        test.assertTrue(all(f.complete for f in frames), [f for f in frames if not f.complete])
+        test.assertEqual(len(session.book), 0)
+        states = {f.id: f.state for f in frames}
+        test.assertEqual(server.commits, sorted(set(server.commits)), "no commit is applied twice, and they keep their order")
+        restarted = restarted or wire_.token_lost
+        test.assertNotIn("lost", states.values())
+        if not restarted:
+            accepted = [f for f, state in states.items() if state == "accepted"]
+            if kept or not losses:
+                test.assertEqual(server.commits, accepted)
+            test.assertEqual(server.client_drops, session.outbox.dropped_frames - session.outbox.unreported_drops)
+        if flow == "reliable":
+            test.assertEqual(session.outbox.dropped_frames, 0)
+        self.drops, self.resumed, self.streams = session.outbox.dropped_frames, session.resumed, session.streams_opened
+        self.restarted = restarted
+
+
+class Any(unittest.TestCase):
+    def runs(self, losses: float, restarts: float) -> list[Run]:
+        return [Run(self, (seed, flow, window), flow, window, losses, restarts)
+                for flow in ("reliable", "latest", "drop_oldest") for window in (0, 60, 400, 10_000) for seed in range(15)]
+
+    def test_without_losses(self) -> None:
+        runs = self.runs(0, 0)
+        self.assertTrue(any(run.drops for run in runs))
+
+    def test_with_losses_that_are_resumed(self) -> None:
+        runs = self.runs(0.2, 0)
+        self.assertGreater(sum(run.resumed for run in runs), 500)
+
+    def test_with_servers_that_forget(self) -> None:
+        runs = self.runs(0.2, 0.5)
+        self.assertGreater(sum(run.restarted for run in runs), 100)
+        self.assertGreater(sum(run.resumed for run in runs), 100)
+
+
+class Words(unittest.TestCase):
+    def test_open_says_what_was_asked_for(self) -> None:
+        opened = pb.StreamRequest.FromString(Session(Settings(
+            client_name="c", on_disconnect=2.5, strict=True, flow="drop_oldest", keep_frames=3, outcomes=False,
+            owner_token=b"o")).open_request()).open
+        self.assertEqual(opened, pb.Open(
+            client_name="c", on_disconnect=pb.DISCONNECT_POLICY_LINGER, linger_ns=2_500_000_000, strict=True,
+            flow=pb.FLOW_POLICY_DROP_OLDEST, drop_oldest_frames=3, no_outcomes=True, owner_token=b"o"))
+
+    def test_credit_is_kept_to(self) -> None:
+        session, server = Session(Settings()), PlainServer(window=300)
+        link = Wire(session, server)
+        link.connect()
+        link.deliver(credit=False)
+        for _ in range(10):
+            session.submit(operations.Unit(session.new_frame(), [puts("l", "x", size=100)], pb.Commit()))
+        while link.send():
+            pass
+        self.assertGreaterEqual(server.received, 300, "all credit is used")
+        self.assertLess(server.received, 300 + 200, "and one message may go beyond")
+        self.assertFalse(session.idle())
+        link.settle()
+        self.assertEqual(len(server.commits), 10)
+
+    def test_pings_come_at_once_and_then_seldom(self) -> None:
+        session, server = Session(Settings()), PlainServer(window=1 << 20)
+        link = Wire(session, server)
+        link.connect()
+        link.deliver()
+        times = []
+        for now in range(0, 100 * 10**9, 10**7):
+            message = session.next_request(now)
+            if message is not None:
+                self.assertTrue(pb.StreamRequest.FromString(message).HasField("ping"))
+                times.append(now)
+                for answer in server.receive(message):
+                    session.answer(answer, now + 10)
+        self.assertEqual(times[0], 0)
+        self.assertTrue(session.clock.known())
+        self.assertTrue(8 < len(times) < 20, times)
+
+    def test_a_server_without_pings_is_not_pinged(self) -> None:
+        session = Session(Settings())
+        session.open_request()
+        session.answer(pb.StreamResponse(opened=pb.Opened()), 0)
+        self.assertIsNone(session.next_request(10**12))
+        self.assertIsNone(session.next_ping_ns())
+
+    def test_what_expired_is_not_sent_anew(self) -> None:
+        session, server = Session(Settings()), PlainServer()
+        link = Wire(session, server)
+        link.connect()
+        link.deliver()
+        short, long = puts("l", "short"), puts("l", "long")
+        short.lifetime_ns, long.lifetime_ns = 10**9, 10**12
+        session.submit(operations.Unit(session.new_frame(), [short, long], pb.Commit()))
+        link.settle()
+        link.cut()
+        server.forget()
+        link.now += 2 * 10**9
+        link.connect()
+        link.settle()
+        assert server.session is not None
+        self.assertEqual(list(server.session.scene["l"]), ["long"])
+
+    def test_an_end_for_good_answers_everything(self) -> None:
+        session = Session(Settings())
+        frames = [session.new_frame() for _ in range(3)]
+        for one in frames:
+            session.submit(operations.Unit(one, [puts("l", "x")], pb.Commit()))
+        session.fail("refused")
+        self.assertEqual([f.state for f in frames], ["lost"] * 3)
+        self.assertTrue(session.idle())
+
+    def test_sequences_are_counted_as_the_server_does(self) -> None:
+        session, server = Session(Settings()), PlainServer()
+        link = Wire(session, server)
+        link.connect()
+        session.submit(operations.Unit(session.new_frame(), [puts("l", "x"), operations.delete_id("l", "x")], pb.Commit()))
+        link.settle()
+        self.assertEqual(session._sequence, server.sequence)
+
+
+if __name__ == "__main__":
+    unittest.main()
