@@ -112,7 +112,8 @@ void SceneStore::Suppress(uint64_t owner, bool suppressed) {
 void SceneStore::HandOver(uint64_t session, const WriterPtr& writer) {
   std::vector<OwnedName> keys;
   snapshot_->layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
-    if (layer->writer->session == session) keys.push_back(key);
+    const Writer& now = *layer->writer;
+    if (now.session == session && now != *writer) keys.push_back(key);
   });
   if (keys.empty()) return;
   Draft draft(snapshot_, next_number_);

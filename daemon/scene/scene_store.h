@@ -65,7 +65,7 @@ class SceneStore {
   // something.
   void Suppress(uint64_t owner, bool suppressed);
   // The layers that `session` last wrote get `writer` in the place of theirs: it has ended, or was taken up. A new
-  // snapshot only if there are any.
+  // snapshot only if that changed something.
   void HandOver(uint64_t session, const WriterPtr& writer);
 
   // Drops the objects of an owner who has no session any more, unless layers of theirs are left.

@@ -243,8 +243,8 @@ TEST(CoreFlow, SessionsTakeTurnsCommitByCommit) {
   for (const auto& [receipt, accepted] : two.sink->Of<Accepted>()) {
     second.push_back(accepted.snapshot);
   }
-  EXPECT_EQ(first, (std::vector<uint64_t>{1, 3, 5, 7, 9}));
-  EXPECT_EQ(second, (std::vector<uint64_t>{2, 4, 6, 8, 10}));
+  EXPECT_EQ(first, (std::vector<uint64_t>{2, 4, 6, 8, 10}));
+  EXPECT_EQ(second, (std::vector<uint64_t>{3, 5, 7, 9, 11}));
 }
 
 TEST(CoreFlow, AFrameGivenUpIsCountedAndItsCommitAnswered) {

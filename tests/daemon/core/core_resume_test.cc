@@ -150,6 +150,36 @@ TEST(CoreResume, ATokenIsVoidWhenItsLayersAreGoneAndItsTimeIsOver) {
   EXPECT_EQ(sim.GetStats().sessions_dormant, 0u);
 }
 
+TEST(CoreResume, AClearedSessionIsTakenUpWithItsOwner) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();  // CLEAR
+  sim.Send(client, 9, Put("a", "x", 1));
+  sim.Close(client);
+  EXPECT_EQ(sim.List().total, 0u);
+  auto again = sim.Open(Resuming(client, {}));
+  EXPECT_EQ(again.info.session, client.info.session);
+  EXPECT_EQ(again.info.owner, client.info.owner);
+  EXPECT_EQ(again.info.owner_token, client.info.owner_token);
+  EXPECT_EQ(again.info.last_frame_id, 9u);
+  sim.Send(again, 10, Put("a", "x", 1));
+  EXPECT_EQ(sim.List().total, 1u);
+}
+
+TEST(CoreResume, WhoIsToldNoTokenLeavesNothingBehind) {
+  Simulation sim;
+  sim.Start();
+  OpenOptions once;
+  once.on_disconnect = DisconnectPolicy::kKeep;
+  once.resumable = false;
+  auto client = sim.Open(once);
+  sim.Send(client, 1, Put("a", "x", 1));
+  sim.Close(client);
+  EXPECT_EQ(sim.GetStats().sessions_dormant, 0u);
+  EXPECT_EQ(sim.List().total, 1u);
+  EXPECT_EQ(TryOpen(sim, Resuming(client)).code(), absl::StatusCode::kNotFound);
+}
+
 TEST(CoreResume, KeptLayersKeepTheirToken) {
   Simulation sim;
   sim.Start();

@@ -196,7 +196,10 @@ TEST(CoreThreads, WhatACommitPutsUpComesOutOfTheDisplay) {
   EXPECT_EQ(stats.displays[0].commits_presented, 1u);
 
   // Gone with its session.
-  running.core->CloseSession(session.session, session.incarnation, true, nullptr);
+  Answer<bool> closed;
+  running.core->CloseSession(session.session, session.incarnation, true,
+                             [reply = closed.reply()] { reply(true); });
+  EXPECT_TRUE(*closed.Await());
   Answer<EntityPage> list;
   running.core->ListEntities({}, list.reply());
   EXPECT_EQ(list.Await()->layers.size(), 0u);

@@ -11,6 +11,11 @@
 
 namespace voxeld::daemon::testing {
 
+// The session's layers stay without it.
+inline void Orphan(SceneStore& store, uint64_t session) {
+  store.HandOver(session, std::make_shared<const Writer>(Writer{session, "client", true}));
+}
+
 inline Author MakeAuthor(uint64_t owner, uint64_t session) {
   return {owner, std::make_shared<const Writer>(Writer{session, "client"})};
 }
