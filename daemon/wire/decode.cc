@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/check.h"
 #include "daemon/wire/element_count.h"
+#include "daemon/wire/local_ranges.h"
 #include "daemon/wire/operations.h"
 #include "daemon/wire/slice_stream.h"
 #include "voxeld/v1/scene.pb.h"
@@ -170,7 +171,7 @@ Decoded Failed(absl::Status status) {
 
 // Numbers the request and takes its operation. An Open has been dealt with.
 void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits& limits,
-          uint64_t previous_sequence, Decoded* out) {
+          uint64_t previous_sequence, LocalRanges& ranges, Decoded* out) {
   out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
   if (out->sequence <= previous_sequence) {
     out->refused.Add({request.sequence(),
@@ -184,7 +185,7 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits&
     out->sequence = previous_sequence;
     if (request.op_case() != v1::StreamRequest::kCommit) return;
   }
-  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->refused});
+  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->refused}, ranges);
 }
 
 }  // namespace
@@ -196,7 +197,7 @@ absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limit
 }
 
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence) {
+                            uint64_t previous_sequence, const MemorySource* memory) {
   Decoded out;
   if (request.op_case() == v1::StreamRequest::kOpen) {
     absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
@@ -205,12 +206,14 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
     out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
     return out;
   }
-  Take(FieldPath(""), request, limits, previous_sequence, &out);
+  LocalRanges ranges(memory, limits);
+  Take(FieldPath(""), request, limits, previous_sequence, ranges, &out);
+  out.local_bytes = ranges.bytes_read();
   return out;
 }
 
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence) {
+                            uint64_t previous_sequence, const MemorySource* memory) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   const ElementRow rows[] = {
@@ -223,7 +226,7 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
   if (absl::Status status = Parse(slices, size, "StreamRequest", request); !status.ok()) {
     return Failed(status);
   }
-  return DecodeStreamRequest(*request, limits, previous_sequence);
+  return DecodeStreamRequest(*request, limits, previous_sequence, memory);
 }
 
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits) {
@@ -252,6 +255,7 @@ Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits
     open->on_disconnect = DisconnectPolicy::kKeep;
   }
   open->no_outcomes = true;  // the answer has no place for them
+  LocalRanges no_ranges(nullptr, limits);
   for (int i = 0; i < request.operations_size(); ++i) {
     const v1::StreamRequest& operation = request.operations(i);
     const FieldPath path("operations", i);
@@ -260,7 +264,7 @@ Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits
           absl::StrCat(FieldPath(path, operation.has_open() ? "open" : "commit").ToString(),
                        " is set; an update is opened by its own field and committed by itself")));
     }
-    Take(path, operation, limits, out.sequence, &out);
+    Take(path, operation, limits, out.sequence, no_ranges, &out);
   }
   out.open = *std::move(open);
   out.operations.push_back({++out.sequence, Commit{}});

@@ -102,6 +102,7 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_linger_ns(in.max_linger_ns);
   out->set_max_issues_per_commit(in.max_issues_per_commit);
   out->set_max_uncommitted_bytes_total(in.max_uncommitted_bytes_total);
+  out->set_max_local_bytes(in.max_local_bytes);
 }
 
 void Encode(const EntityKey& in, v1::EntityKey* out) {

@@ -17,7 +17,7 @@ constexpr uint32_t kGreatestOpacity = 255;
 constexpr size_t kLabelBytes = 256;
 
 MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& limits,
-                    EntityData* out) {
+                    LocalRanges& ranges, EntityData* out) {
   if (in.priority() > kGreatestPriority) {
     return Fault{FieldPath(path, "priority").ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", in.priority(), "; give 0 to ", kGreatestPriority)};
@@ -31,7 +31,8 @@ MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& l
   if (auto fault = ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform)) {
     return fault;
   }
-  if (auto fault = ToContent(FieldPath(path, "primitive"), in.primitive(), limits, &out->content)) {
+  if (auto fault =
+          ToContent(FieldPath(path, "primitive"), in.primitive(), limits, ranges, &out->content)) {
     return fault;
   }
   out->priority = in.priority();
@@ -41,12 +42,13 @@ MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& l
   return {};
 }
 
-MaybeFault To(const FieldPath& path, const v1::Upsert& in, const Limits& limits, Upsert* out) {
+MaybeFault To(const FieldPath& path, const v1::Upsert& in, const Limits& limits,
+              LocalRanges& ranges, Upsert* out) {
   if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
     return fault;
   }
   if (auto fault = CheckName(FieldPath(path, "id"), in.id(), limits.max_id_bytes)) return fault;
-  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), limits, &out->entity)) {
+  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), limits, ranges, &out->entity)) {
     return fault;
   }
   out->layer = in.layer();
@@ -173,7 +175,7 @@ MaybeFault To(const FieldPath& path, const v1::FrameEnd& in, const Limits& limit
 }
 
 MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& limits,
-              DefineObject* out) {
+              LocalRanges& ranges, DefineObject* out) {
   if (auto fault = CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes)) {
     return fault;
   }
@@ -196,8 +198,8 @@ MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& l
     if (auto fault = ToAffine(FieldPath(part, "transform"), parts[i].transform(), &to.transform)) {
       return fault;
     }
-    if (auto fault =
-            ToContent(FieldPath(part, "primitive"), parts[i].primitive(), limits, &to.content)) {
+    if (auto fault = ToContent(FieldPath(part, "primitive"), parts[i].primitive(), limits, ranges,
+                               &to.content)) {
       return fault;
     }
   }
@@ -254,11 +256,12 @@ std::string IdOf(const In& in) {
   return {};
 }
 
-template <typename Out, typename In>
+// `ranges`: of operations with content, a LocalRanges&.
+template <typename Out, typename In, typename... Ranges>
 void Add(const FieldPath& path, const In& in, uint64_t sequence, const Limits& limits,
-         const Sinks& out) {
+         const Sinks& out, Ranges&... ranges) {
   Out op;
-  if (auto fault = To(path, in, limits, &op)) {
+  if (auto fault = To(path, in, limits, ranges..., &op)) {
     AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), limits, out);
     if (!std::is_same_v<Out, Commit>) return;
   }
@@ -266,7 +269,7 @@ void Add(const FieldPath& path, const In& in, uint64_t sequence, const Limits& l
 }
 
 void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence, const Limits& limits,
-              const Sinks& out) {
+              const Sinks& out, LocalRanges& ranges) {
   if (static_cast<uint32_t>(in.upserts_size()) > limits.max_operations_per_commit) {
     const FieldPath upserts(path, "upserts");
     AddIssue(
@@ -278,17 +281,18 @@ void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence, con
   }
   out.operations->reserve(out.operations->size() + static_cast<size_t>(in.upserts_size()));
   for (int i = 0; i < in.upserts_size(); ++i) {
-    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, limits, out);
+    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, limits, out, ranges);
   }
 }
 
 }  // namespace
 
 void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
-                     const Limits& limits, const Sinks& out) {
+                     const Limits& limits, const Sinks& out, LocalRanges& ranges) {
   switch (request.op_case()) {
     case v1::StreamRequest::kUpsert:
-      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, limits, out);
+      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, limits, out,
+                         ranges);
     case v1::StreamRequest::kDelete:
       return Add<Delete>(FieldPath(path, "delete"), request.delete_(), sequence, limits, out);
     case v1::StreamRequest::kSetTransform:
@@ -307,12 +311,12 @@ void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, ui
       return Add<Commit>(FieldPath(path, "commit"), request.commit(), sequence, limits, out);
     case v1::StreamRequest::kDefineObject:
       return Add<DefineObject>(FieldPath(path, "define_object"), request.define_object(), sequence,
-                               limits, out);
+                               limits, out, ranges);
     case v1::StreamRequest::kDeleteObject:
       return Add<DeleteObject>(FieldPath(path, "delete_object"), request.delete_object(), sequence,
                                limits, out);
     case v1::StreamRequest::kBatch:
-      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, limits, out);
+      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, limits, out, ranges);
     case v1::StreamRequest::kOpen:
     case v1::StreamRequest::kPing:
     case v1::StreamRequest::OP_NOT_SET:

@@ -66,13 +66,13 @@ MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) 
 }
 
 MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const Limits& limits,
-                    GeometryData* out) {
+                    LocalRanges& ranges, GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kPoints;
   if (auto fault =
           ToThickness(FieldPath(path, "thickness"), in.thickness(), limits, &out->record)) {
     return fault;
   }
-  return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, limits, out);
+  return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, limits, ranges, out);
 }
 
 // How many corners the primitive has: its indices, or its vertices as they stand.
@@ -87,7 +87,7 @@ Fault BadCorners(const FieldPath& path, const gpu::GeometryRecord& record, const
 }
 
 MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limits& limits,
-                      GeometryData* out) {
+                      LocalRanges& ranges, GeometryData* out) {
   gpu::GeometryRecord& record = out->record;
   record.kind = gpu::PrimitiveKind::kSegments;
   switch (in.topology()) {
@@ -122,7 +122,8 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limit
   if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), limits, &record)) {
     return fault;
   }
-  if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, out)) {
+  if (auto fault =
+          ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, ranges, out)) {
     return fault;
   }
   if (record.topology == gpu::Topology::kList && Corners(record) % 2 != 0) {
@@ -133,10 +134,11 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limit
 }
 
 MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const Limits& limits,
-                  GeometryData* out) {
+                  LocalRanges& ranges, GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kTriangles;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, out)) {
+  if (auto fault =
+          ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, ranges, out)) {
     return fault;
   }
   if (Corners(out->record) % 3 != 0) {
@@ -212,14 +214,14 @@ MaybeFault ToInstance(const FieldPath& path, const v1::Primitive& in, const Limi
 }
 
 MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
-                      GeometryData* out) {
+                      LocalRanges& ranges, GeometryData* out) {
   switch (in.kind_case()) {
     case v1::Primitive::kPoints:
-      return ToPoints(FieldPath(path, "points"), in.points(), limits, out);
+      return ToPoints(FieldPath(path, "points"), in.points(), limits, ranges, out);
     case v1::Primitive::kSegments:
-      return ToSegments(FieldPath(path, "segments"), in.segments(), limits, out);
+      return ToSegments(FieldPath(path, "segments"), in.segments(), limits, ranges, out);
     case v1::Primitive::kMesh:
-      return ToMesh(FieldPath(path, "mesh"), in.mesh(), limits, out);
+      return ToMesh(FieldPath(path, "mesh"), in.mesh(), limits, ranges, out);
     case v1::Primitive::kBox:
       return ToBox(FieldPath(path, "box"), in.box(), out);
     case v1::Primitive::kSphere:
@@ -238,7 +240,7 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Limi
 }  // namespace
 
 MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
-                     Content* out) {
+                     LocalRanges& ranges, Content* out) {
   if (in.kind_case() == v1::Primitive::kInstance) return ToInstance(path, in, limits, out);
   auto data = std::make_shared<GeometryData>();
   if (in.has_color()) {
@@ -250,7 +252,7 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limit
     }
     data->record.color = in.color().rgb();
   }
-  if (auto fault = ToGeometry(path, in, limits, data.get())) return fault;
+  if (auto fault = ToGeometry(path, in, limits, ranges, data.get())) return fault;
   *out = GeometryPtr(std::move(data));
   return {};
 }

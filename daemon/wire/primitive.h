@@ -2,6 +2,7 @@
 #pragma once
 
 #include "daemon/wire/check.h"
+#include "daemon/wire/local_ranges.h"
 
 namespace voxeld::v1 {
 class Primitive;
@@ -10,6 +11,6 @@ class Primitive;
 namespace voxeld::daemon::wire {
 
 MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
-                     Content* out);
+                     LocalRanges& ranges, Content* out);
 
 }  // namespace voxeld::daemon::wire

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "absl/strings/str_cat.h"
@@ -59,14 +60,42 @@ uint64_t ColorBytes(v1::ElementType type) {
   }
 }
 
-MaybeFault CheckPayload(const FieldPath& path, const char* name, const std::string& payload,
-                        uint64_t count, uint64_t element_bytes) {
+// One of the arrays: its field, the one that may stand in its place, and where the bytes are.
+struct Payload {
+  const char* name;
+  const std::string& sent;
+  const char* range_name;
+  const v1::MemoryRange* range;  // null: none
+  MappedRange mapped = {};       // of the range, once it is checked
+
+  std::string_view bytes() const { return range != nullptr ? mapped.bytes : sent; }
+  bool given() const { return range != nullptr || !sent.empty(); }
+  uint64_t size() const { return range != nullptr ? range->size() : sent.size(); }
+};
+
+// Finds the bytes, and holds their number against what is wanted.
+MaybeFault CheckPayload(const FieldPath& path, uint64_t count, uint64_t element_bytes,
+                        LocalRanges& ranges, Payload* payload) {
   // count < 2³² and element_bytes ≤ 12: no overflow.
   const uint64_t want = count * element_bytes;
-  if (payload.size() == want) return {};
-  return Fault{FieldPath(path, name).ToString(), Reason::kSizeMismatch,
-               absl::StrCat("has ", payload.size(), " bytes; ", count, " elements of ",
-                            element_bytes, " bytes need ", want)};
+  if (payload->range == nullptr) {
+    if (payload->sent.size() == want) return {};
+    return Fault{FieldPath(path, payload->name).ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", payload->sent.size(), " bytes; ", count, " elements of ",
+                              element_bytes, " bytes need ", want)};
+  }
+  const FieldPath in(path, payload->range_name);
+  if (!payload->sent.empty()) {
+    return Fault{in.ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is set, and ", payload->name, " has ", payload->sent.size(),
+                              " bytes; give one of them")};
+  }
+  if (payload->size() != want) {
+    return Fault{FieldPath(in, "size").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("is ", payload->size(), "; ", count, " elements of ", element_bytes,
+                              " bytes need ", want)};
+  }
+  return ranges.Read(in, *payload->range, &payload->mapped);
 }
 
 MaybeFault CheckCount(const FieldPath& path, const char* name, uint64_t count, uint64_t limit,
@@ -83,7 +112,7 @@ MaybeFault BadPosition(const FieldPath& path, size_t at, const std::string& valu
                absl::StrCat("is ", value, "; ", right)};
 }
 
-MaybeFault ToFloatPositions(const FieldPath& path, const std::string& payload,
+MaybeFault ToFloatPositions(const FieldPath& path, std::string_view payload,
                             std::vector<float>* out) {
   std::memcpy(out->data(), payload.data(), payload.size());
   for (size_t i = 0; i < out->size(); ++i) {
@@ -95,7 +124,7 @@ MaybeFault ToFloatPositions(const FieldPath& path, const std::string& payload,
 }
 
 template <typename T>
-MaybeFault ToIntegerPositions(const FieldPath& path, const std::string& payload,
+MaybeFault ToIntegerPositions(const FieldPath& path, std::string_view payload,
                               std::vector<float>* out) {
   const char* in = payload.data();
   for (size_t i = 0; i < out->size(); ++i, in += sizeof(T)) {
@@ -112,18 +141,19 @@ MaybeFault ToIntegerPositions(const FieldPath& path, const std::string& payload,
   return {};
 }
 
-MaybeFault ToPositions(const FieldPath& path, const v1::Vertices& in, GeometryData* out) {
+MaybeFault ToPositions(const FieldPath& path, const v1::Vertices& in, std::string_view payload,
+                       GeometryData* out) {
   out->positions.resize(size_t{in.count()} * 3);
   MaybeFault fault;
   switch (in.position_type()) {
     case v1::ELEMENT_TYPE_I16:
-      fault = ToIntegerPositions<int16_t>(path, in.positions(), &out->positions);
+      fault = ToIntegerPositions<int16_t>(path, payload, &out->positions);
       break;
     case v1::ELEMENT_TYPE_I32:
-      fault = ToIntegerPositions<int32_t>(path, in.positions(), &out->positions);
+      fault = ToIntegerPositions<int32_t>(path, payload, &out->positions);
       break;
     default:
-      fault = ToFloatPositions(path, in.positions(), &out->positions);
+      fault = ToFloatPositions(path, payload, &out->positions);
       break;
   }
   if (fault) return fault;
@@ -142,7 +172,7 @@ MaybeFault ToPositions(const FieldPath& path, const v1::Vertices& in, GeometryDa
 }
 
 template <typename T>
-MaybeFault ToIndices(const FieldPath& path, const std::string& payload, uint32_t vertex_count,
+MaybeFault ToIndices(const FieldPath& path, std::string_view payload, uint32_t vertex_count,
                      std::vector<uint32_t>* out) {
   const char* in = payload.data();
   for (size_t i = 0; i < out->size(); ++i, in += sizeof(T)) {
@@ -159,7 +189,7 @@ MaybeFault ToIndices(const FieldPath& path, const std::string& payload, uint32_t
   return {};
 }
 
-void ToColors(const std::string& payload, size_t element_bytes, std::vector<uint32_t>* out) {
+void ToColors(std::string_view payload, size_t element_bytes, std::vector<uint32_t>* out) {
   const auto* in = reinterpret_cast<const unsigned char*>(payload.data());
   for (size_t i = 0; i < out->size(); ++i, in += element_bytes) {
     (*out)[i] = uint32_t{in[0]} << 16 | uint32_t{in[1]} << 8 | uint32_t{in[2]};
@@ -186,6 +216,10 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, bool with_i
                  absl::StrCat("is not empty (", in.index_count(), " indices, ", in.indices().size(),
                               " bytes); points take no indices")};
   }
+  if (!with_indices && in.has_indices_in()) {
+    return Fault{FieldPath(path, "indices_in").ToString(), Reason::kInvalidValue,
+                 "is set; points take no indices"};
+  }
   if (in.index_type() != v1::ELEMENT_TYPE_UNSPECIFIED && in.index_count() == 0) {
     return Fault{FieldPath(path, "index_type").ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", static_cast<int>(in.index_type()),
@@ -197,7 +231,7 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, bool with_i
 }  // namespace
 
 MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_indices,
-                      const Limits& limits, GeometryData* out) {
+                      const Limits& limits, LocalRanges& ranges, GeometryData* out) {
   if (auto fault = CheckTypes(path, in, with_indices)) return fault;
   if (in.count() == 0) {
     return Fault{FieldPath(path, "count").ToString(), Reason::kInvalidValue,
@@ -211,34 +245,39 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
                               "max_indices_per_entity")) {
     return fault;
   }
-  const bool colored = !in.colors().empty() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
-  if (auto fault = CheckPayload(path, "positions", in.positions(), in.count(),
-                                PositionBytes(in.position_type()))) {
+  Payload positions{"positions", in.positions(), "positions_in",
+                    in.has_positions_in() ? &in.positions_in() : nullptr};
+  Payload indices{"indices", in.indices(), "indices_in",
+                  in.has_indices_in() ? &in.indices_in() : nullptr};
+  Payload colors{"colors", in.colors(), "colors_in",
+                 in.has_colors_in() ? &in.colors_in() : nullptr};
+  const bool colored = colors.given() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
+  if (auto fault =
+          CheckPayload(path, in.count(), PositionBytes(in.position_type()), ranges, &positions)) {
     return fault;
   }
-  if (auto fault = CheckPayload(path, "indices", in.indices(), in.index_count(),
-                                IndexBytes(in.index_type()))) {
+  if (auto fault =
+          CheckPayload(path, in.index_count(), IndexBytes(in.index_type()), ranges, &indices)) {
     return fault;
   }
   if (colored) {
-    if (auto fault =
-            CheckPayload(path, "colors", in.colors(), in.count(), ColorBytes(in.color_type()))) {
+    if (auto fault = CheckPayload(path, in.count(), ColorBytes(in.color_type()), ranges, &colors)) {
       return fault;
     }
   }
 
   out->record.vertex_count = in.count();
   out->record.index_count = in.index_count();
-  if (auto fault = ToPositions(path, in, out)) return fault;
+  if (auto fault = ToPositions(path, in, positions.bytes(), out)) return fault;
   out->indices.resize(in.index_count());
   auto fault = in.index_type() == v1::ELEMENT_TYPE_U16
-                   ? ToIndices<uint16_t>(path, in.indices(), in.count(), &out->indices)
-                   : ToIndices<uint32_t>(path, in.indices(), in.count(), &out->indices);
+                   ? ToIndices<uint16_t>(path, indices.bytes(), in.count(), &out->indices)
+                   : ToIndices<uint32_t>(path, indices.bytes(), in.count(), &out->indices);
   if (fault) return fault;
   if (colored) {
     out->record.color_mode = gpu::ColorMode::kPerVertex;
     out->colors.resize(in.count());
-    ToColors(in.colors(), ColorBytes(in.color_type()), &out->colors);
+    ToColors(colors.bytes(), ColorBytes(in.color_type()), &out->colors);
   }
   return {};
 }
