@@ -25,6 +25,10 @@ struct ServerConfig {
   // Nothing: no http port. `http_asked`: it was asked for, so that a busy one is an error.
   std::optional<Address> http;
   bool http_asked = false;
+  // Where producers on this machine hand over memory: "auto" (beside the first unix socket of
+  // `listen`, with ".local" after its name), a path, or empty for nowhere.
+  std::string local_socket = "auto";
+  uint32_t max_local_memories = 256;  // of one session, held at once
   // That a client of Stream has not read. A commit's issues come at once: well above
   // max_issues_per_commit, or clients that do read may be ended.
   uint32_t max_queued_answers = 16384;
@@ -90,6 +94,10 @@ absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
 
 // What the command line says goes over it. InvalidArgument is a usage error.
 absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config);
+
+// Where the local socket is, by what is in force; nothing: there is none. InvalidArgument for what
+// CheckLocalSocket refuses.
+absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& config);
 
 // As a file that would read back the same.
 std::string ToToml(const Config& config);

@@ -84,6 +84,12 @@ class Server::Impl {
       if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
       builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &ports[i]);
     }
+    if (options_.local.has_value()) {  // there before the first stream that is told of it
+      absl::StatusOr<std::unique_ptr<local::LocalSocket>> local =
+          local::LocalSocket::Start(context_.clock, *options_.local);
+      if (!local.ok()) return local.status();
+      context_.local = *std::move(local);
+    }
     server_ = builder.BuildAndStart();
     for (size_t i = 0; i < options_.listen.size(); ++i) {
       Address address = options_.listen[i];

@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
 #include "daemon/core/core.h"
+#include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/context.h"
 #include "display/sync/clock.h"
@@ -23,6 +25,8 @@ struct ServerOptions {
   // An idle connection is probed this often, and closed when no answer comes in time.
   sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
+  // Where producers on this machine hand over memory; nothing: nowhere.
+  std::optional<local::LocalSocketOptions> local;
   Logger* log = nullptr;  // outlives the server; may be none
 };
 

@@ -18,6 +18,7 @@ void StreamSession::Start() {
 
 void StreamSession::Read() {
   if (port_ == nullptr || reading_ || reads_done_ || unprocessed_ >= kMaxUnprocessed) return;
+  if (unprocessed_local_ >= kMaxUnprocessed * core_.limits().max_message_bytes) return;
   if (state_ != State::kNew && state_ != State::kOpen) return;
   reading_ = true;
   port_->Read();
@@ -27,12 +28,14 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
   uint64_t bytes = 0;
   for (const std::string_view slice : slices) bytes += slice.size();
   uint64_t previous = 0;
+  std::shared_ptr<const wire::MemorySource> memory;
   {
     sync::MutexLock lock(mutex_);
     if (state_ != State::kNew && state_ != State::kOpen) return;
     previous = sequence_;
+    memory = local_.memory();
   }
-  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous);
+  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous, memory.get());
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
     OpenOptions open = *std::exchange(decoded.open, std::nullopt);
@@ -86,6 +89,9 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
       opened->set_server_time_ns(context_.clock.Now());
       wire::Encode(core_.limits(), opened->mutable_limits());
       opened->mutable_displays()->Assign(info->displays.begin(), info->displays.end());
+      local_ = local::LocalSession(context_.local.get(), session_);
+      opened->set_local_socket(local_.path());
+      opened->set_local_token(local_.token());
       state_ = State::kOpen;
       Queue(response);
       Read();
@@ -110,6 +116,7 @@ void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
       sequence_ = decoded.sequence;
       session = session_;
       ++unprocessed_;
+      unprocessed_local_ += decoded.local_bytes;
       for (const Operation& operation : decoded.operations) {
         if (std::holds_alternative<Commit>(operation.op)) ++unanswered_;
       }
@@ -120,18 +127,21 @@ void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
         "the first message of a stream must be open; the operation was not carried out"));
   }
   core_.Handle(session, std::move(decoded.operations), std::move(decoded.refused), bytes,
-               [self = shared_from_this()] { self->OnProcessed(); });
+               [self = shared_from_this(), local_bytes = decoded.local_bytes] {
+                 self->OnProcessed(local_bytes);
+               });
   // Only now: a message that came in on another thread would overtake this one.
   sync::MutexLock lock(mutex_);
   reading_ = false;
   Read();
 }
 
-void StreamSession::OnProcessed() {
+void StreamSession::OnProcessed(uint64_t local_bytes) {
   bool close = false;
   {
     sync::MutexLock lock(mutex_);
     --unprocessed_;
+    unprocessed_local_ -= local_bytes;
     Read();
     close = Drained();
   }
@@ -215,9 +225,11 @@ bool StreamSession::Close(const absl::Status& status) {
 
 void StreamSession::CloseSession() {
   SessionId session = 0;
+  local::LocalSession local;  // ends without the lock
   {
     sync::MutexLock lock(mutex_);
     session = session_;
+    std::swap(local, local_);
     if (port_ != nullptr && context_.log != nullptr) {
       context_.log->Info("session closed", {{"session", std::to_string(session)},
                                             {"client", client_name_},

@@ -24,6 +24,7 @@
 
 #include "absl/status/status.h"
 #include "daemon/core/core.h"
+#include "daemon/local/local_session.h"
 #include "daemon/services/active_calls.h"
 #include "daemon/services/context.h"
 #include "daemon/wire/decode.h"
@@ -87,7 +88,7 @@ class StreamSession final : public SessionSink,
   void TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t bytes);
   void TakeOperations(wire::Decoded decoded, uint64_t bytes);
   void OnOpened(const absl::StatusOr<SessionInfo>& info);
-  void OnProcessed();
+  void OnProcessed(uint64_t local_bytes);
   void Read() VOXELD_REQUIRES(mutex_);
   void Queue(const v1::StreamResponse& response) VOXELD_REQUIRES(mutex_);
   void WriteNext() VOXELD_REQUIRES(mutex_);
@@ -107,12 +108,16 @@ class StreamSession final : public SessionSink,
   State state_ VOXELD_GUARDED_BY(mutex_) = State::kNew;
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;  // 0: none
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
+  local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until the session is closed
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
   // A read is pending, or what it brought has not been handed to the core yet.
   bool reading_ VOXELD_GUARDED_BY(mutex_) = false;
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;
-  int unprocessed_ VOXELD_GUARDED_BY(mutex_) = 0;      // messages that the core has not taken in
+  int unprocessed_ VOXELD_GUARDED_BY(mutex_) = 0;  // messages that the core has not taken in
+  // And what they copied from local memory. It is not read on while that is as much as as many
+  // messages could have brought themselves.
+  uint64_t unprocessed_local_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t unanswered_ VOXELD_GUARDED_BY(mutex_) = 0;  // commits without Accepted or Refused
   uint64_t outcomes_owed_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t sequence_ VOXELD_GUARDED_BY(mutex_) = 0;  // of the last request
