@@ -173,6 +173,12 @@ absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& co
     absl::StatusOr<Address> address =
         ParseAddress(absl::StrCat(prefixed ? "" : "unix:", config.local_socket));
     if (!address.ok()) return address.status();
+    for (const Address& listen : config.listen) {
+      if (listen != *address) continue;
+      return absl::InvalidArgumentError(absl::StrCat("local_socket is ", address->ToString(),
+                                                     ", and so is one of listen; each needs its "
+                                                     "own"));
+    }
     return std::optional<Address>(*std::move(address));
   }
   for (const Address& listen : config.listen) {

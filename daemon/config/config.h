@@ -96,7 +96,7 @@ absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
 absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config);
 
 // Where the local socket is, by what is in force; nothing: there is none. InvalidArgument for what
-// CheckLocalSocket refuses.
+// CheckLocalSocket refuses, and for an address of `listen`.
 absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& config);
 
 // As a file that would read back the same.

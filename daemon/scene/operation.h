@@ -85,8 +85,7 @@ struct Limits {
   uint32_t max_parts_per_object = 4096;
   uint32_t max_captures = 16;
   int64_t max_linger_ns = 3600 * sync::kSecond;
-  uint64_t max_local_bytes = uint64_t{1}
-                             << 30;  // of one session's memory that its local socket holds
+  uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session, held by its local socket
 };
 
 // Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be

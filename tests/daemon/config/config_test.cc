@@ -189,6 +189,10 @@ TEST(ConfigText, WhereTheLocalSocketIs) {
   EXPECT_EQ(where({"unix:/a"}, "[server]\nlocal_socket = \"auto\"\n"), "unix:/a.local");
   EXPECT_EQ(where({tcp}, "[server]\nlocal_socket = \"/run/c\"\n"), "unix:/run/c");
   EXPECT_EQ(where({tcp}, "[server]\nlocal_socket = \"unix:/run/c\"\n"), "unix:/run/c");
+  ServerConfig same;
+  same.listen = {*ParseAddress("unix:/a")};
+  same.local_socket = "/a";
+  EXPECT_TRUE(absl::IsInvalidArgument(LocalSocketAddress(same).status()));
 }
 
 TEST(ConfigText, TellsEveryFault) {
