@@ -17,7 +17,12 @@
 namespace voxeld::daemon::local {
 namespace {
 
-constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE;
+struct Seal {
+  int flag;
+  const char* name;
+};
+constexpr Seal kSeals[] = {
+    {F_SEAL_SHRINK, "F_SEAL_SHRINK"}, {F_SEAL_GROW, "F_SEAL_GROW"}, {F_SEAL_WRITE, "F_SEAL_WRITE"}};
 constexpr const char* kSealNames = "F_SEAL_SHRINK, F_SEAL_GROW and F_SEAL_WRITE";
 
 std::string ErrorText() { return std::generic_category().message(errno); }
@@ -32,9 +37,9 @@ absl::Status CheckSeals(uint64_t id, int fd) {
                      "); make it with memfd_create and MFD_ALLOW_SEALING, and add ", kSealNames));
   }
   std::vector<const char*> missing;
-  if ((seals & F_SEAL_SHRINK) == 0) missing.push_back("F_SEAL_SHRINK");
-  if ((seals & F_SEAL_GROW) == 0) missing.push_back("F_SEAL_GROW");
-  if ((seals & F_SEAL_WRITE) == 0) missing.push_back("F_SEAL_WRITE");
+  for (const Seal& seal : kSeals) {
+    if ((seals & seal.flag) == 0) missing.push_back(seal.name);
+  }
   if (missing.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("memory ", id, " is not sealed with ",
                                                  absl::StrJoin(missing, ", "), "; fill it, add ",
