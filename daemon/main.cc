@@ -22,6 +22,7 @@
 #include "daemon/core/core.h"
 #include "daemon/http/http_server.h"
 #include "daemon/http/monitor.h"
+#include "daemon/listen/counters.h"
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/view.h"
@@ -45,7 +46,7 @@ int Fail(int code, const absl::Status& status) {
   return code;
 }
 
-// Every client holds a descriptor, and a listener that has once run out of them is deaf for good.
+// Every client holds two descriptors: what serves it, and what guards it.
 void RaiseDescriptorLimit() {
   rlimit limit;
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
@@ -151,6 +152,7 @@ void LogDisplays(Core& core, Logger& log) {
 int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
           Logger& log) {
   EngineWatch watch(log);
+  const auto counters = std::make_shared<listen::Counters>();
   Core core({.limits = config.limits,
              .version = Version(),
              .engine_event = [&watch](const EngineEvent& event) { watch.OnEvent(event); },
@@ -160,7 +162,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                    const bool lost = state == display::DisplayState::kLost;
                    log.Log(lost ? Logger::Level::kWarn : Logger::Level::kInfo,
                            DisplayStateName(state), {{"display", display}, {"why", reason}});
-                 }},
+                 },
+             .connections = [counters] { return counters->Read(); }},
             clock);
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),
@@ -197,7 +200,17 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                .streams = {.drain_limit_ns = config.server.drain_limit_ns,
                                            .max_queued_answers = config.server.max_queued_answers,
                                            .max_queued_bytes = config.server.max_queued_bytes},
+                               .connections = config.server.connections,
+                               .counters = counters,
                                .max_calls_per_connection = config.server.max_calls_per_connection,
+                               .max_metadata_bytes = config.server.max_metadata_bytes,
+                               .handshake_limit_ns = config.server.handshake_limit_ns,
+                               .ping_interval_min_ns = config.server.ping_interval_min_ns,
+                               .max_ping_strikes = config.server.max_ping_strikes,
+                               .connection_idle_limit_ns = config.server.connection_idle_limit_ns,
+                               .connection_age_limit_ns = config.server.connection_age_limit_ns,
+                               .connection_age_grace_ns = config.server.connection_age_grace_ns,
+                               .max_scene_watches = config.server.max_scene_watches,
                                .keepalive_interval_ns = config.server.keepalive_interval_ns,
                                .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
                                .local = local,

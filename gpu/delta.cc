@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 #include <type_traits>
+#include <utility>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -15,18 +17,13 @@ constexpr size_t kAlign = 16;
 static_assert(std::is_trivially_copyable_v<GeometryRecord> && sizeof(GeometryRecord) % kAlign == 0);
 static_assert(std::is_trivially_copyable_v<DrawableRecord> && sizeof(DrawableRecord) % kAlign == 0);
 static_assert(std::is_trivially_copyable_v<LayerRecord> && sizeof(LayerRecord) % kAlign == 0);
+static_assert(std::is_trivially_copyable_v<BulkRef> && sizeof(BulkRef) % kAlign == 0);
 static_assert(sizeof(RecordHeader) == kAlign && sizeof(IdRecord) == kAlign);
 
 constexpr uint64_t Padded(uint64_t size) { return (size + kAlign - 1) / kAlign * kAlign; }
 
 uint64_t ColorCount(const GeometryRecord& g) {
   return g.color_mode == ColorMode::kPerVertex ? g.vertex_count : 0;
-}
-
-// Of the three arrays, padding included. Counts are 32-bit, so the sum fits.
-uint64_t ArrayBytes(const GeometryRecord& g) {
-  return Padded(uint64_t{g.vertex_count} * 12) + Padded(uint64_t{g.index_count} * 4) +
-         Padded(ColorCount(g) * 4);
 }
 
 // Builds messages that say where, what, and what would be right.
@@ -114,6 +111,20 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   return absl::OkStatus();
 }
 
+// The geometry's arrays at `at`, which has room for them.
+void SetArrays(const std::byte* at, GeometryView& view) {
+  const GeometryRecord& g = view.record;
+  const ArrayLayout layout = ArrayLayout::Of(g);
+  view.positions = {reinterpret_cast<const float*>(at), size_t{g.vertex_count} * 3};
+  view.indices = {reinterpret_cast<const uint32_t*>(at + layout.indices), g.index_count};
+  view.colors = {reinterpret_cast<const uint32_t*>(at + layout.colors), ColorCount(g)};
+}
+
+std::string ForCounts(uint64_t size, const GeometryRecord& g) {
+  return absl::StrCat(size, " for ", g.vertex_count, " vertices, ", g.index_count, " indices and ",
+                      ColorCount(g), " colours");
+}
+
 // `body`: what follows the header.
 absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
   const Checker check(offset, "geometry");
@@ -124,20 +135,12 @@ absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, Delt
   std::memcpy(&view.record, body.data(), sizeof(GeometryRecord));
   const GeometryRecord& g = view.record;
   if (absl::Status status = CheckGeometry(check, g); !status.ok()) return status;
-  const uint64_t expected = sizeof(GeometryRecord) + ArrayBytes(g);
+  const uint64_t expected = sizeof(GeometryRecord) + ArrayLayout::Of(g).size;
   if (body.size() != expected) {
-    return check.Wrong(
-        "size", body.size() + sizeof(RecordHeader),
-        absl::StrCat(expected + sizeof(RecordHeader), " for ", g.vertex_count, " vertices, ",
-                     g.index_count, " indices and ", ColorCount(g), " colours")
-            .c_str());
+    return check.Wrong("size", body.size() + sizeof(RecordHeader),
+                       ForCounts(expected + sizeof(RecordHeader), g).c_str());
   }
-  const std::byte* at = body.data() + sizeof(GeometryRecord);
-  view.positions = {reinterpret_cast<const float*>(at), size_t{g.vertex_count} * 3};
-  at += Padded(uint64_t{g.vertex_count} * 12);
-  view.indices = {reinterpret_cast<const uint32_t*>(at), g.index_count};
-  at += Padded(uint64_t{g.index_count} * 4);
-  view.colors = {reinterpret_cast<const uint32_t*>(at), ColorCount(g)};
+  SetArrays(body.data() + sizeof(GeometryRecord), view);
   absl::Status status = check.Finite("positions", view.positions.data(), view.positions.size());
   if (!status.ok()) return status;
   for (size_t i = 0; i < view.indices.size(); ++i) {
@@ -146,6 +149,36 @@ absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, Delt
                          absl::StrCat("less than vertex_count ", g.vertex_count).c_str());
     }
   }
+  return visitor.OnGeometry(view);
+}
+
+absl::Status ReadBulkGeometry(uint64_t offset, std::span<const std::byte> body,
+                              DeltaVisitor& visitor, BulkSource* bulk) {
+  const Checker check(offset, "bulk geometry");
+  GeometryView view;
+  BulkRef ref;
+  if (body.size() != sizeof(GeometryRecord) + sizeof(BulkRef)) {
+    return check.Wrong("size", body.size() + sizeof(RecordHeader),
+                       absl::StrCat(DeltaWriter::kSizeOfBulkGeometry).c_str());
+  }
+  std::memcpy(&view.record, body.data(), sizeof(GeometryRecord));
+  std::memcpy(&ref, body.data() + sizeof(GeometryRecord), sizeof(BulkRef));
+  const GeometryRecord& g = view.record;
+  if (absl::Status status = CheckGeometry(check, g); !status.ok()) return status;
+  const uint64_t expected = ArrayLayout::Of(g).size;
+  if (ref.size < expected) {
+    return check.Wrong("bulk.size", ref.size, ForCounts(expected, g).append(" at least").c_str());
+  }
+  if (ref.offset % kAlign != 0) return check.Wrong("bulk.offset", ref.offset, "a multiple of 16");
+  absl::StatusOr<BulkView> found =
+      bulk != nullptr ? bulk->Find(ref) : absl::InvalidArgumentError("bulk memory: there is none");
+  if (!found.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("delta, record at byte ", offset, ": ", found.status().message()));
+  }
+  SetArrays(found->bytes.data(), view);
+  view.bulk = std::move(found->owner);
+  view.bulk_segment = ref.segment;
   return visitor.OnGeometry(view);
 }
 
@@ -170,22 +203,49 @@ absl::Status ReadDrawable(uint64_t offset, std::span<const std::byte> body, Delt
   return status.ok() ? visitor.OnDrawable(*d) : status;
 }
 
+absl::Status CheckClip(const Checker& check, const LayerRecord& l) {
+  absl::Status status = FirstError({check.Enum("plane_count", l.plane_count, 0, kMaxClipPlanes),
+                                    check.Enum("has_region", l.has_region, 0, 1)});
+  if (!status.ok()) return status;
+  for (uint32_t i = 0; i < l.plane_count; ++i) {
+    const ClipPlane& p = l.planes[i];
+    const std::string field = absl::StrCat("planes[", i, "]");
+    const double values[4] = {p.a, p.b, p.c, p.d};
+    status = check.Finite(field.c_str(), values, 4);
+    if (!status.ok()) return status;
+    if (p.a == 0 && p.b == 0 && p.c == 0) {
+      return check.Wrong(field.c_str(), "(0, 0, 0)", "a plane with a normal other than zero");
+    }
+  }
+  if (l.has_region == 0) return absl::OkStatus();
+  status = FirstError(
+      {check.Finite("region.min", l.region.min, 3), check.Finite("region.max", l.region.max, 3)});
+  for (int a = 0; a < 3 && status.ok(); ++a) {
+    if (l.region.min[a] < l.region.max[a]) continue;
+    status = check.Wrong(absl::StrCat("region.max[", a, "]").c_str(), l.region.max[a],
+                         absl::StrCat("greater than min's ", l.region.min[a]).c_str());
+  }
+  return status;
+}
+
 absl::Status ReadLayer(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
   const Checker check(offset, "layer");
   absl::StatusOr<LayerRecord> l = Fixed<LayerRecord>(check, body);
   if (!l.ok()) return l.status();
-  absl::Status status = FirstError({check.Enum("visible", l->visible, 0, 1),
-                                    check.Enum("opacity", l->opacity, 0, 255),
-                                    check.Enum("blend", static_cast<uint32_t>(l->blend), 0, 2),
-                                    check.Finite("transform", l->transform.m, 12)});
+  absl::Status status = FirstError(
+      {check.Enum("visible", l->visible, 0, 1), check.Enum("opacity", l->opacity, 0, 255),
+       check.Enum("blend", static_cast<uint32_t>(l->blend), 0, 2),
+       check.Finite("transform", l->transform.m, 12), CheckClip(check, *l)});
   return status.ok() ? visitor.OnLayer(*l) : status;
 }
 
 absl::Status ReadRecord(Op op, uint64_t offset, std::span<const std::byte> body,
-                        DeltaVisitor& visitor) {
+                        DeltaVisitor& visitor, BulkSource* bulk) {
   switch (op) {
     case Op::kPutGeometry:
       return ReadGeometry(offset, body, visitor);
+    case Op::kPutBulkGeometry:
+      return ReadBulkGeometry(offset, body, visitor, bulk);
     case Op::kPutDrawable:
       return ReadDrawable(offset, body, visitor);
     case Op::kPutLayer:
@@ -202,13 +262,22 @@ absl::Status ReadRecord(Op op, uint64_t offset, std::span<const std::byte> body,
       }
       return visitor.OnReset();
   }
-  return Checker(offset, "header").Wrong("op", static_cast<uint32_t>(op), "1 to 7");
+  return Checker(offset, "header").Wrong("op", static_cast<uint32_t>(op), "1 to 8");
 }
 
 }  // namespace
 
+// Counts are 32-bit, so the sums fit.
+ArrayLayout ArrayLayout::Of(const GeometryRecord& g) {
+  ArrayLayout layout;
+  layout.indices = Padded(uint64_t{g.vertex_count} * 12);
+  layout.colors = layout.indices + Padded(uint64_t{g.index_count} * 4);
+  layout.size = layout.colors + Padded(ColorCount(g) * 4);
+  return layout;
+}
+
 size_t DeltaWriter::SizeOf(const GeometryRecord& g) {
-  return sizeof(RecordHeader) + sizeof(GeometryRecord) + ArrayBytes(g);
+  return sizeof(RecordHeader) + sizeof(GeometryRecord) + ArrayLayout::Of(g).size;
 }
 
 void DeltaWriter::Append(const void* data, size_t size) {
@@ -240,6 +309,14 @@ void DeltaWriter::PutGeometry(const GeometryRecord& g, std::span<const float> po
   Pad();
 }
 
+void DeltaWriter::PutGeometry(const GeometryRecord& g, BulkBlock arrays) {
+  const BulkRef ref = RefOf(arrays);
+  Begin(Op::kPutBulkGeometry, kSizeOfBulkGeometry);
+  Append(&g, sizeof(g));
+  Append(&ref, sizeof(ref));
+  referred_.push_back(std::move(arrays));
+}
+
 void DeltaWriter::PutDrawable(const DrawableRecord& d) {
   Begin(Op::kPutDrawable, SizeOf(d));
   Append(&d, sizeof(d));
@@ -258,7 +335,7 @@ void DeltaWriter::Drop(Op op, uint64_t id) {
 
 void DeltaWriter::Reset() { Begin(Op::kReset, kSizeOfReset); }
 
-absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor) {
+absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor, BulkSource* bulk) {
   if (reinterpret_cast<uintptr_t>(delta.data()) % kAlign != 0) {
     return absl::InvalidArgumentError("delta: its memory must be 16-byte aligned");
   }
@@ -275,9 +352,10 @@ absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor) 
           "size", header.size,
           absl::StrCat("a multiple of 16 from 16 to ", left, ", what is left").c_str());
     }
-    absl::Status status = ReadRecord(
-        header.op, offset,
-        delta.subspan(offset + sizeof(RecordHeader), header.size - sizeof(RecordHeader)), visitor);
+    absl::Status status =
+        ReadRecord(header.op, offset,
+                   delta.subspan(offset + sizeof(RecordHeader), header.size - sizeof(RecordHeader)),
+                   visitor, bulk);
     if (!status.ok()) return status;
     offset += header.size;
   }

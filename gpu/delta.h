@@ -8,28 +8,36 @@
 //             in its own coordinates
 //   drawable  puts a geometry into a layer, under a transform, with a priority; several may
 //             share one
-//   layer     how its voxels combine with those below
+//   layer     how its voxels combine with those below, and where it is drawn
+//
+// A geometry's arrays lie in its record, or in bulk memory that the record refers to.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "gpu/affine.h"
+#include "gpu/bulk/bulk_block.h"
 
 namespace voxeld::gpu {
 
 enum class Op : uint32_t {
-  kPutGeometry = 1,   // GeometryRecord, positions, indices, colors. The id must be new
-  kDropGeometry = 2,  // IdRecord; no drawable may use it any more at the end of the delta
-  kPutDrawable = 3,   // DrawableRecord; replaces one of the same id
-  kDropDrawable = 4,  // IdRecord
-  kPutLayer = 5,      // LayerRecord; replaces one of the same id
-  kDropLayer = 6,     // IdRecord; no drawable may be in it any more at the end of the delta
-  kReset = 7,         // nothing follows: forget everything
+  kPutGeometry = 1,      // GeometryRecord, positions, indices, colors. The id must be new
+  kDropGeometry = 2,     // IdRecord; no drawable may use it any more at the end of the delta
+  kPutDrawable = 3,      // DrawableRecord; replaces one of the same id
+  kDropDrawable = 4,     // IdRecord
+  kPutLayer = 5,         // LayerRecord; replaces one of the same id
+  kDropLayer = 6,        // IdRecord; no drawable may be in it any more at the end of the delta
+  kReset = 7,            // nothing follows: forget everything
+  kPutBulkGeometry = 8,  // GeometryRecord, BulkRef: as kPutGeometry, its arrays in bulk memory
 };
 
 enum class PrimitiveKind : uint32_t {
@@ -83,6 +91,15 @@ struct GeometryRecord {
   uint32_t reserved[2] = {};
 };
 
+// Where a geometry's arrays lie, in a record or in bulk memory: positions at the beginning, each
+// array padded to 16 bytes.
+struct ArrayLayout {
+  uint64_t indices = 0, colors = 0;  // offsets
+  uint64_t size = 0;                 // of all, padding included
+
+  static ArrayLayout Of(const GeometryRecord& g);
+};
+
 struct DrawableRecord {
   uint64_t id = 0;
   uint64_t geometry = 0;
@@ -92,16 +109,39 @@ struct DrawableRecord {
   Affine transform;       // geometry's coordinates → layer's
 };
 
-// Layers combine in ascending (order, id).
+// A half-space of the scene: a·x + b·y + c·z + d ≥ 0. Its normal is not zero.
+struct ClipPlane {
+  double a = 0, b = 0, c = 0, d = 0;
+  bool operator==(const ClipPlane&) const = default;
+};
+inline constexpr uint32_t kMaxClipPlanes = 8;
+
+// A box of the scene, its faces included; min < max.
+struct Region {
+  double min[3] = {}, max[3] = {};
+  bool operator==(const Region&) const = default;
+};
+
+// Layers combine in ascending (order, id). Where there are planes or a region, only voxels that lie
+// inside all of them (gpu/clip.h) are the layer's: the others it does not cover.
 struct LayerRecord {
   uint64_t id = 0;  // the number of creation
   int32_t order = 0;
   uint32_t visible = 1;
   uint32_t opacity = 255;  // 0 to 255
   BlendMode blend = BlendMode::kOver;
-  uint64_t reserved = 0;
-  Affine transform;  // layer's coordinates → scene's
+  uint32_t plane_count = 0;  // 0 to kMaxClipPlanes
+  uint32_t has_region = 0;   // 1: `region` holds
+  Affine transform;          // layer's coordinates → scene's
+  ClipPlane planes[kMaxClipPlanes];
+  Region region;
 };
+
+// Whether two layers are drawn in the same part of the scene, as it is written.
+inline bool SameClip(const LayerRecord& a, const LayerRecord& b) {
+  return std::equal(a.planes, a.planes + a.plane_count, b.planes, b.planes + b.plane_count) &&
+         a.has_region == b.has_region && (a.has_region == 0 || a.region == b.region);
+}
 
 // Appends records to a span. Overruns are counted, not written:
 // size the span with the Size functions.
@@ -109,7 +149,9 @@ class DeltaWriter {
  public:
   explicit DeltaWriter(std::span<std::byte> out) : out_(out) {}
 
-  static size_t SizeOf(const GeometryRecord& g);
+  static size_t SizeOf(const GeometryRecord& g);  // with its arrays
+  static constexpr size_t kSizeOfBulkGeometry =
+      sizeof(RecordHeader) + sizeof(GeometryRecord) + sizeof(BulkRef);
   static size_t SizeOf(const DrawableRecord&) {
     return sizeof(RecordHeader) + sizeof(DrawableRecord);
   }
@@ -121,6 +163,9 @@ class DeltaWriter {
   // with kPerVertex, else empty).
   void PutGeometry(const GeometryRecord& g, std::span<const float> positions,
                    std::span<const uint32_t> indices, std::span<const uint32_t> colors);
+  // `arrays` holds them as ArrayLayout says; what they contain has been checked as ReadDelta checks
+  // those in records.
+  void PutGeometry(const GeometryRecord& g, BulkBlock arrays);
   void PutDrawable(const DrawableRecord& d);
   void PutLayer(const LayerRecord& l);
   void Drop(Op op, uint64_t id);  // kDropGeometry, kDropDrawable, kDropLayer
@@ -128,6 +173,8 @@ class DeltaWriter {
 
   size_t size() const { return size_; }
   bool overrun() const { return size_ > out_.size(); }
+  // The blocks that the delta refers to, which go to the engine with it (StagingBlock::Refer).
+  std::vector<BulkBlock> TakeReferred() { return std::move(referred_); }
 
  private:
   void Append(const void* data, size_t size);
@@ -136,14 +183,17 @@ class DeltaWriter {
 
   std::span<std::byte> out_;
   size_t size_ = 0;
+  std::vector<BulkBlock> referred_;
 };
 
-// A geometry as it lies in a delta: views into the block.
+// A geometry as it lies in a delta: views into the block, or into bulk memory.
 struct GeometryView {
   GeometryRecord record;
   std::span<const float> positions;  // 3 · vertex_count
   std::span<const uint32_t> indices;
   std::span<const uint32_t> colors;
+  std::shared_ptr<const void> bulk;  // keeps bulk memory; null if the arrays lie in the delta
+  uint64_t bulk_segment = 0;         // in which they lie
 };
 
 // What ReadDelta calls, in order. An error from any ends the reading.
@@ -158,7 +208,9 @@ struct DeltaVisitor {
 
 // Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands
 // it to `visitor`. InvalidArgument with the byte offset, the value and what would be right.
-// `delta` is 16-byte aligned.
-absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor);
+// `delta` is 16-byte aligned. `bulk` finds what lies in bulk memory: that its arrays are there, whole,
+// is checked; what they contain was, by who wrote them. Null: there is none.
+absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor,
+                       BulkSource* bulk = nullptr);
 
 }  // namespace voxeld::gpu

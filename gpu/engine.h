@@ -5,6 +5,7 @@
 //   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared
 //                                                         // with a process
 //   DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
+//   block.Refer(writer.TakeReferred());                   // if arrays lie in bulk memory
 //   engine->Apply(std::move(block), writer.size(), done);
 //   engine->SubmitFrame({.frame = 7}, buffer, done);
 //
@@ -38,6 +39,7 @@
 #include "display/api/geometry.h"
 #include "display/api/slice_frame.h"
 #include "gpu/affine.h"
+#include "gpu/bulk/bulk_block.h"
 
 namespace voxeld::gpu {
 
@@ -98,14 +100,26 @@ class StagingBlock {
   struct Memory {
     virtual ~Memory() = default;
     virtual std::span<std::byte> bytes() = 0;
+    // Finds what the delta refers to, where that is not blocks that came along.
+    virtual BulkSource* bulk() { return nullptr; }
   };
   StagingBlock() = default;
   explicit StagingBlock(std::shared_ptr<Memory> memory) : memory_(std::move(memory)) {}
   std::span<std::byte> bytes() const { return memory_ ? memory_->bytes() : std::span<std::byte>(); }
   const std::shared_ptr<Memory>& memory() const { return memory_; }
+  BulkSource* bulk() const { return memory_ ? memory_->bulk() : nullptr; }
+
+  // The bulk memory that the delta in it refers to. The engine holds it for as long as it reads it.
+  void Refer(std::vector<BulkBlock> blocks) {
+    referred_ = std::make_shared<const std::vector<BulkBlock>>(std::move(blocks));
+  }
+  std::span<const BulkBlock> referred() const {
+    return referred_ ? std::span(*referred_) : std::span<const BulkBlock>();
+  }
 
  private:
   std::shared_ptr<Memory> memory_;
+  std::shared_ptr<const std::vector<BulkBlock>> referred_;
 };
 
 struct FrameRequest {

@@ -29,12 +29,13 @@ ALLOWED = {
     "daemon/scene": ["gpu", "display/api", "display/sync"],
     "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
     "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
+    "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["client", "display/geometry", "display/api", "display/sync", "gpu", "voxeld/v1", "tools",
               # What an address looks like, and what was meant: alike at both ends.
               "daemon/address", "daemon/suggest"],
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "tools/emulator"],
-    "tools/bench": ["gpu", "display", "tools/bench"],
+    "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
     # The one command that opens displays itself; it reads them as the daemon does.
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",

@@ -14,6 +14,7 @@
 #include "daemon/address/address.h"
 #include "daemon/config/command_line.h"
 #include "daemon/config/display_config.h"
+#include "daemon/listen/limits.h"
 #include "daemon/scene/operation.h"
 #include "display/sync/clock.h"
 #include "gpu/engine.h"
@@ -32,8 +33,21 @@ struct ServerConfig {
   // That a client of Stream has not read. A commit's issues come at once: well above
   // max_issues_per_commit, or clients that do read may be ended.
   uint32_t max_queued_answers = 16384;
-  uint64_t max_queued_bytes = 16u << 20;    // the same in bytes
-  uint32_t max_calls_per_connection = 256;  // at once
+  uint64_t max_queued_bytes = 16u << 20;  // the same in bytes
+  listen::ConnectionLimits connections;
+  uint32_t max_calls_per_connection = 100;  // at once; further ones wait in the client
+  uint32_t max_metadata_bytes = 8u << 10;   // of one call
+  // From accept until HTTP/2's settings have come.
+  int64_t handshake_limit_ns = 2 * sync::kSecond;
+  // A client that pings more often without data, so many times, is sent away.
+  int64_t ping_interval_min_ns = 5 * sync::kSecond;
+  uint32_t max_ping_strikes = 2;
+  // A connection without calls is closed after it; one that is so old is asked to go, and closed
+  // after the grace, with what is left on it. 0: never.
+  int64_t connection_idle_limit_ns = 0;
+  int64_t connection_age_limit_ns = 0;
+  int64_t connection_age_grace_ns = 60 * sync::kSecond;
+  uint32_t max_scene_watches = 64;  // WatchScene calls at once, of all connections
   // How long a stream that its client has half-closed waits for outcomes, and an ending one for its
   // client to read what is queued.
   int64_t drain_limit_ns = 5 * sync::kSecond;

@@ -36,6 +36,24 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_queued_answers", config.server.max_queued_answers, 16, 1 << 24);
   visitor.Integer("max_queued_bytes", config.server.max_queued_bytes, 4096, kGiB);
   visitor.Integer("max_calls_per_connection", config.server.max_calls_per_connection, 1, 65536);
+  visitor.Integer("max_scene_watches", config.server.max_scene_watches, 1, 65536);
+  auto& connections = config.server.connections;
+  visitor.Integer("max_connections", connections.max_connections, 1, 1 << 20);
+  visitor.Integer("max_connections_per_address", connections.max_connections_per_address, 1,
+                  1 << 20);
+  visitor.Integer("unauthorised_bytes", connections.unauthorised_bytes, 4096, kGiB);
+  visitor.Integer("unauthorised_limit_ns", connections.unauthorised_limit_ns, kSecond / 10, kHour);
+  visitor.Integer("max_cancelled_calls_per_second", connections.max_cancelled_calls_per_second, 0,
+                  kMost32);
+  visitor.Integer("probe_interval_ns", connections.probe_interval_ns, 0, kHour);
+  visitor.Integer("max_metadata_bytes", config.server.max_metadata_bytes, 1024, 1 << 20);
+  visitor.Integer("handshake_limit_ns", config.server.handshake_limit_ns, kSecond / 10, kHour);
+  visitor.Integer("ping_interval_min_ns", config.server.ping_interval_min_ns, 0, kHour);
+  visitor.Integer("max_ping_strikes", config.server.max_ping_strikes, 1, 1000);
+  visitor.Integer("connection_idle_limit_ns", config.server.connection_idle_limit_ns, 0,
+                  24 * kHour);
+  visitor.Integer("connection_age_limit_ns", config.server.connection_age_limit_ns, 0, 24 * kHour);
+  visitor.Integer("connection_age_grace_ns", config.server.connection_age_grace_ns, 0, kHour);
   visitor.Integer("drain_limit_ns", config.server.drain_limit_ns, 0, kHour);
   visitor.Integer("keepalive_interval_ns", config.server.keepalive_interval_ns, kSecond, kHour);
   visitor.Integer("keepalive_timeout_ns", config.server.keepalive_timeout_ns, kSecond, kHour);
@@ -76,9 +94,17 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Real("max_thickness", limits.max_thickness, 0, 1048576);
   visitor.Integer("max_sessions", limits.max_sessions, 1, kMost32);
   visitor.Integer("max_parts_per_object", limits.max_parts_per_object, 1, kMost32);
+  visitor.Integer("max_clip_planes", limits.max_clip_planes, 1, gpu::kMaxClipPlanes);
   visitor.Integer("max_captures", limits.max_captures, 1, 1024);
   visitor.Integer("max_linger_ns", limits.max_linger_ns, 0, kMost);
-  visitor.Integer("max_local_bytes", limits.max_local_bytes, 1, kMost);
+  visitor.Integer("credit_bytes", limits.credit_bytes, 4096, kMost);
+  visitor.Integer("max_memory_bytes", limits.max_memory_bytes, 1 << 20, kMost);
+  visitor.Integer("max_riding_commits", limits.max_riding_commits, 1, kMost32);
+  visitor.Integer("max_timed_commits", limits.max_timed_commits, 0, kMost32);
+  visitor.Integer("max_present_at_horizon_ns", limits.max_present_at_horizon_ns, 0, kMost / 4);
+  visitor.Integer("must_show_timeout_ns", limits.must_show_timeout_ns, 0, kHour);
+  visitor.Integer("max_drop_oldest_frames", limits.max_drop_oldest_frames, 1, kMost32);
+  visitor.Integer("max_local_bytes", limits.max_local_bytes, 0, kMost);
 }
 
 // "auto", "cpu", "cuda".

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/core/core_impl.h"
+#include "daemon/scene/draft.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -17,22 +18,25 @@ void Ask(Loop& loop, Core::Reply<T> reply, Work work) {
   if (!loop.Post(std::move(task))) (*shared)(absl::UnavailableError("the daemon has stopped"));
 }
 
-void PostThen(Loop& loop, std::function<void()> work, std::function<void()> done) {
-  const bool posted = loop.Post([work = std::move(work), done] {
-    work();
-    if (done) done();
-  });
-  if (!posted && done) done();
+// The scene and what is staged, and a quarter for places between blocks.
+CoreOptions WithBulk(CoreOptions options) {
+  if (options.bulk != nullptr) return options;
+  const Limits& limits = options.limits;
+  const uint64_t kept = AddSaturating(limits.max_scene_bytes, limits.max_uncommitted_bytes_total);
+  options.bulk = gpu::BulkPool::Create({.limit_bytes = AddSaturating(kept, kept / 4)});
+  return options;
 }
 
 }  // namespace
 
 Core::Core(CoreOptions options, sync::Clock& clock)
-    : impl_(std::make_shared<Impl>(std::move(options), clock)) {}
+    : impl_(std::make_shared<Impl>(WithBulk(std::move(options)), clock)) {}
 
 Core::~Core() { Stop(5 * sync::kSecond).IgnoreError(); }
 
 const Limits& Core::limits() const { return impl_->options().limits; }
+
+gpu::BulkPool& Core::bulk() const { return *impl_->options().bulk; }
 
 absl::Status Core::AddDisplay(std::unique_ptr<display::Display> display,
                               const gpu::EngineOptions& engine, const ViewOptions& view) {
@@ -45,34 +49,37 @@ absl::Status Core::Stop(sync::TimeNs limit) { return impl_->Stop(limit); }
 
 sync::TimeNs Core::Step() { return impl_->Step(); }
 
-void Core::OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
+const std::shared_ptr<Budget>& Core::budget() const { return impl_->budget(); }
+
+void Core::OpenSession(OpenOptions options, uint64_t open_bytes, std::shared_ptr<SessionSink> sink,
                        Reply<SessionInfo> reply) {
   Ask(impl_->loop(), std::move(reply),
-      [impl = impl_.get(), options = std::move(options),
+      [impl = impl_.get(), options = std::move(options), open_bytes,
        sink = std::move(sink)](const Reply<SessionInfo>& answer) mutable {
-        impl->OpenSession(std::move(options), std::move(sink), answer);
+        answer(impl->OpenSession(std::move(options), open_bytes, std::move(sink)));
       });
 }
 
-void Core::Handle(SessionId session, std::vector<Operation> operations, Refusals refused,
-                  uint64_t bytes, std::function<void()> done) {
-  PostThen(
-      impl_->loop(),
-      [impl = impl_.get(), session, operations = std::move(operations),
-       refused = std::move(refused),
-       bytes]() mutable { impl->Handle(session, std::move(operations), refused, bytes); },
-      std::move(done));
+void Core::CloseSession(SessionId session, uint64_t incarnation, bool gone,
+                        std::function<void()> done) {
+  auto shared = std::make_shared<std::function<void()>>(std::move(done));
+  const bool posted = impl_->loop().Post([impl = impl_.get(), session, incarnation, gone, shared] {
+    impl->CloseSession(session, incarnation, gone, std::move(*shared));
+  });
+  if (!posted && *shared) (*shared)();
 }
 
-void Core::CloseSession(SessionId session, std::function<void()> done) {
-  PostThen(
-      impl_->loop(), [impl = impl_.get(), session] { impl->CloseSession(session); },
-      std::move(done));
+void Core::GiveBack(SessionId session, std::vector<Receipt> receipts) {
+  impl_->loop().Post([impl = impl_.get(), session, receipts = std::move(receipts)] {
+    for (const Receipt& receipt : receipts) impl->GiveBack(session, receipt);
+  });
 }
 
 void Core::CountOverrun() {
   impl_->loop().Post([impl = impl_.get()] { impl->CountOverrun(); });
 }
+
+SceneWatch& Core::scene_watch() { return impl_->scene_watch(); }
 
 void Core::ListEntities(EntityQuery query, Reply<EntityPage> reply) {
   Ask(impl_->loop(), std::move(reply),
@@ -92,6 +99,20 @@ void Core::ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<
   Ask(impl_->loop(), std::move(reply),
       [impl = impl_.get(), owner, layer = std::move(layer), keep_state](
           const Reply<Cleared>& answer) { impl->ClearLayer(owner, layer, keep_state, answer); });
+}
+
+void Core::ListOwners(Reply<std::vector<OwnerInfo>> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get()](const Reply<std::vector<OwnerInfo>>& answer) {
+        answer(impl->ListOwners());
+      });
+}
+
+void Core::ControlOwner(OwnerControl control, Reply<OwnerInfo> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), control](const Reply<OwnerInfo>& answer) {
+        answer(impl->ControlOwner(control));
+      });
 }
 
 void Core::GetStats(Reply<Stats> reply) {

@@ -5,8 +5,8 @@
 //   core.AddDisplay(std::move(display), engine_options);
 //   core.Start();                                   // or, in a simulation, Step() by hand
 //   SessionId id = *core.OpenSession(open, sink);
-//   core.Handle(id, std::move(operations), std::move(refused), bytes, done);
-//   core.CloseSession(id);
+//   info.intake->Take({operations, refused, bytes});  // from here on
+//   core.CloseSession(info);
 //   core.Stop(deadline);
 //
 // Threads: the public functions are thread-safe and only post to the core's thread (queries post
@@ -25,30 +25,30 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "daemon/core/budget.h"
+#include "daemon/core/intake.h"
 #include "daemon/core/receipt.h"
+#include "daemon/core/session_sink.h"
 #include "daemon/core/stats.h"
 #include "daemon/pipeline/display_settings.h"
 #include "daemon/pipeline/engine_event.h"
 #include "daemon/scene/operation.h"
 #include "display/api/display.h"
 #include "display/sync/clock.h"
+#include "gpu/bulk/bulk_pool.h"
 #include "gpu/engine.h"
 
 namespace voxeld::daemon {
 
+class SceneWatch;
 using SessionId = uint64_t;
 using display::CaptureId;
 
-// Where a session's answers go. Thread-safe; called on the core's thread; must only post.
-class SessionSink {
- public:
-  virtual ~SessionSink() = default;
-  virtual void OnIssue(const Issue& issue) = 0;
-  virtual void OnReceipt(const Receipt& receipt) = 0;
-};
-
 struct CoreOptions {
   Limits limits;
+  // Where clients' large arrays are decoded to, and engines read them. Empty: a pool of its own, with
+  // room for what the limits allow.
+  std::shared_ptr<gpu::BulkPool> bulk;
   std::string version;
   bool threads = true;
   // Makes every engine; empty: gpu::CreateEngine. Called from AddDisplay, and on a display's thread
@@ -61,12 +61,36 @@ struct CoreOptions {
   std::function<void(const std::string& display, display::DisplayState state,
                      const std::string& reason)>
       state_event;
+  // The listener's figures, for Stats; from any thread. May be empty.
+  std::function<ListenFigures()> connections;
 };
 
 struct SessionInfo {
   SessionId session = 0;
   uint64_t owner = 0;
   std::vector<std::string> displays;
+  std::shared_ptr<Intake> intake;  // takes its messages
+  uint64_t incarnation = 0;        // of the session: a resume makes the next
+  std::string resume_token, owner_token;
+  uint64_t credit_bytes = 0;  // the first
+  // After a resume: of the last commit applied, if there was one.
+  std::optional<uint64_t> last_frame_id, last_sequence;
+};
+
+struct OwnerInfo {
+  uint64_t owner = 0;
+  std::vector<std::string> client_names;
+  uint64_t sessions = 0, layers = 0, orphaned_layers = 0, entities = 0, objects = 0, bytes = 0;
+  bool hidden = false;
+  uint64_t max_bytes = 0, max_entities = 0;
+};
+
+// What an operator asks of an owner; absent: as it was. A quota of 0 is back to Limits'.
+struct OwnerControl {
+  uint64_t owner = 0;
+  std::optional<bool> hidden;
+  std::optional<uint64_t> max_bytes, max_entities;
+  bool evict = false;
 };
 
 struct EntityKey {
@@ -97,6 +121,8 @@ struct LayerInfo {
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
   uint64_t entities = 0, bytes = 0;
   bool orphaned = false;
   std::string client_name;
@@ -131,6 +157,7 @@ class Core {
   Core& operator=(const Core&) = delete;
 
   const Limits& limits() const;
+  gpu::BulkPool& bulk() const;  // thread-safe
 
   // Before Start. The name must be new. The engine is made here; its failure is the answer.
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
@@ -145,25 +172,34 @@ class Core {
   // threads = false only: does all that is due and returns when more is.
   sync::TimeNs Step();
 
-  // ---- sessions. `sink` is kept until after the answer to CloseSession.
-  // ResourceExhausted past max_sessions.
-  void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
+  // What is held for clients. Lives as long as anybody has it.
+  const std::shared_ptr<Budget>& budget() const;
+
+  // ---- sessions. `sink` is kept until after the answer to CloseSession, or OnEnded.
+  // `open_bytes`: of the Open, which counts against the credit. ResourceExhausted past max_sessions; NotFound for a
+  // token that names nothing any more. A resume ends the stream that the session had.
+  void OpenSession(OpenOptions options, uint64_t open_bytes, std::shared_ptr<SessionSink> sink,
                    Reply<SessionInfo> reply);
-  // `refused` is what decoding refused; `bytes` is what the message weighed. `done` (may be empty)
-  // runs when the message has been taken in: the time to read the next. By then each of its commits
-  // has been answered, unless there is no such session, or the core has stopped: in that case the
-  // message is dropped, and `done` runs in the caller's thread.
-  void Handle(SessionId session, std::vector<Operation> operations, Refusals refused,
-              uint64_t bytes, std::function<void()> done);
-  // Carries out the session's DisconnectPolicy; unknown sessions are ignored.
-  void CloseSession(SessionId session, std::function<void()> done);
+  // Applies what its intake still holds, carries out the DisconnectPolicy, and keeps the session for a resume.
+  // `gone`: its client hears nothing any more; outcomes from now on are kept for the resume. Ignored, but for
+  // `done`, for a session that there is not, or that was taken up by a later incarnation.
+  void CloseSession(SessionId session, uint64_t incarnation, bool gone, std::function<void()> done);
+  // Outcomes that the session's sink was given and could not deliver: for a resume, else counted as undelivered.
+  void GiveBack(SessionId session, std::vector<Receipt> receipts);
   // A session's stream was ended because its client did not read: for the figures.
   void CountOverrun();
 
   // ---- queries
+  // The newest snapshot, and word of the next; at once, in any thread, whatever the core is busy
+  // with. A commit is in it before its Accepted is told. As long as the core.
+  SceneWatch& scene_watch();
   void ListEntities(EntityQuery query, Reply<EntityPage> reply);
   void GetEntity(EntityKey key, Reply<EntityInfo> reply);
   void ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<Cleared> reply);
+  // Ascending.
+  void ListOwners(Reply<std::vector<OwnerInfo>> reply);
+  // NotFound, InvalidArgument for a quota above the limits'. After `evict` the answer is what was.
+  void ControlOwner(OwnerControl control, Reply<OwnerInfo> reply);
   void GetStats(Reply<Stats> reply);
   void ListDisplays(Reply<std::vector<DisplayDescription>> reply);
   // An empty name is the first display; NotFound lists those there are.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -14,8 +15,11 @@
 #include <vector>
 
 #include "daemon/core/core.h"
+#include "daemon/core/scene_watch.h"
+#include "daemon/core/token.h"
 #include "daemon/pipeline/frame_pipeline.h"
 #include "daemon/pipeline/loop.h"
+#include "daemon/pipeline/sliding_window.h"
 #include "daemon/scene/scene_store.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
@@ -29,6 +33,8 @@ class Core::Impl {
   // ---- any thread
   const CoreOptions& options() const { return options_; }
   Loop& loop() { return *loop_; }
+  SceneWatch& scene_watch() { return scene_watch_; }
+  const std::shared_ptr<Budget>& budget() const { return budget_; }
   CaptureId NewCapture() { return next_capture_++; }
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
                           const gpu::EngineOptions& engine, const ViewOptions& view);
@@ -38,14 +44,19 @@ class Core::Impl {
   sync::TimeNs Step();
 
   // ---- sessions (sessions.cc)
-  void OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
-                   const Reply<SessionInfo>& reply);
-  void Handle(SessionId id, std::vector<Operation> operations, const Refusals& refused,
-              uint64_t bytes);
-  void CloseSession(SessionId id);
+  absl::StatusOr<SessionInfo> OpenSession(OpenOptions options, uint64_t open_bytes,
+                                          std::shared_ptr<SessionSink> sink);
+  void CloseSession(SessionId id, uint64_t incarnation, bool gone, std::function<void()> done);
   void CountOverrun() { ++streams_overrun_; }
+
+  // ---- outcomes (outcomes.cc)
+  void GiveBack(SessionId id, const Receipt& receipt);
+
+  // ---- owners (owners.cc)
   void ClearLayer(uint64_t owner, const std::string& layer, bool keep_state,
                   const Reply<Cleared>& reply);
+  std::vector<OwnerInfo> ListOwners() const;
+  absl::StatusOr<OwnerInfo> ControlOwner(const OwnerControl& control);
 
   // ---- queries (queries.cc)
   void ListEntities(const EntityQuery& query, const Reply<EntityPage>& reply) const;
@@ -62,18 +73,58 @@ class Core::Impl {
   void CancelCapture(const std::string& name, CaptureId id);
 
  private:
+  // What an outcome weighs that is to come, or is kept.
+  static constexpr uint64_t kOwedBytes = 256;
+
+  // A commit with must_show holds back the session's later ones.
+  struct Hold {
+    uint64_t sequence = 0;
+    std::set<std::string> displays;  // without an outcome yet
+    sync::TimeNs deadline = 0;
+  };
+
   struct Session {
     SessionId id = 0;
+    uint64_t incarnation = 0;  // counts who took it up
     uint64_t owner = 0;
     OpenOptions options;
     WriterPtr writer;
-    std::shared_ptr<SessionSink> sink;
-    // Since the last commit.
-    std::vector<Operation> staged;
-    uint64_t staged_bytes = 0;
-    uint64_t refused = 0;
-    std::string first_refusal;
-    uint64_t issues_told = 0, issues_left_out = 0;
+    std::shared_ptr<SessionSink> sink;  // null: its client is gone
+    std::shared_ptr<Intake> intake;
+    std::string resume_token;
+    std::deque<WaitingCommit> due;  // timed ones whose time has come
+    std::optional<Hold> hold;
+    uint64_t owed_outcomes = 0;
+    uint64_t timed = 0;  // commits in timed_
+    // The server's clock less the client's, by the fastest of its messages.
+    std::optional<int64_t> clock_offset_ns;
+    sync::TimeNs clock_offset_at = 0;
+    std::optional<uint64_t> last_frame_id, last_sequence;  // applied
+    bool closing = false;
+    std::deque<Receipt> undelivered;  // outcomes for whom its client is gone; charged to kOwed
+    std::vector<std::function<void()>> when_closed;
+  };
+
+  // A session without a stream, that can be taken up.
+  struct Dormant {
+    uint64_t incarnation = 0, owner = 0;
+    std::string resume_token;
+    std::optional<uint64_t> last_frame_id, last_sequence;
+    std::deque<Receipt> outcomes;  // charged to kOwed
+    uint64_t owed_outcomes = 0;
+    sync::TimeNs outcomes_until = 0;
+    sync::TimeNs until = 0;
+  };
+
+  struct Owner {
+    std::string token;
+    bool hidden = false;
+    uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;  // as an operator set them
+  };
+
+  struct Timed {
+    SessionId session = 0;
+    WaitingCommit commit;
   };
 
   struct Lingering {
@@ -111,27 +162,50 @@ class Core::Impl {
   std::set<std::string> AwaitEnd(const std::set<std::string>& names, sync::TimeNs deadline);
   absl::Status StartPipelines();
   void RunCore();
+  void EndSessions();  // the core ends; whoever waits for an answer is told
   static void RunPipeline(Host& host);
 
   // ---- sessions
-  void Stage(Session& session, Operation operation);
-  void Refuse(Session& session, const Issue& issue);
-  // Tells the session's client, unless it has been told max_issues_per_commit since the last commit.
-  void Tell(Session& session, const Issue& issue);
-  // Says how many Issues were left out, if any were, and counts anew.
-  void TellOfThoseLeftOut(Session& session, uint64_t sequence);
-  void EndCommit(Session& session, const Operation& operation);
-  void DeliverOutcome(const Rider& rider, const CommitOutcome& outcome);
+  absl::StatusOr<Session> NewSession(const OpenOptions& options);
+  // The session that `options.resume_token` names, without what its stream left.
+  absl::StatusOr<Session> TakeUp(const OpenOptions& options, std::deque<Receipt>* outcomes);
+  void FinishClose(SessionId id);
+  void KeepDormant(Session& session, sync::TimeNs layers_until);
+  void EndDormant(SessionId id);
   void RemoveLayersOf(SessionId session, uint64_t owner);
+  // Drops the objects of an owner who has neither session nor layers, and the owner when nothing is left at all.
+  void ForgetOwner(uint64_t owner);
   bool OwnerIsOpen(uint64_t owner) const;
+
+  // ---- commits (commits.cc)
+  // Applies one commit of the session's, if it may have one, and asks for the next turn.
+  void Turn(SessionId id);
+  void PostTurn(SessionId id);
+  bool MustWait(const Session& session) const;
+  // A timed commit that is not due yet is told Scheduled and waits; one that cannot wait is refused. False: neither,
+  // apply it now.
+  bool PutAside(Session& session, WaitingCommit& commit);
+  sync::TimeNs DueTime(sync::TimeNs present_at) const;
+  void Apply(Session& session, WaitingCommit commit);
+  void RefuseCommit(Session& session, const WaitingCommit& commit, uint64_t refused,
+                    std::string message);
+  void Ride(Session& session, const WaitingCommit& commit, const Stages& stages, bool hidden);
+  Stages StagesOf(Session& session, const WaitingCommit& commit);
+  void DropTimed(Session& session);
+  void ReleaseHold(Session& session);
+  sync::TimeNs RunTimed(sync::TimeNs now);
+
+  // ---- owners
+  void Evict(uint64_t owner);
+
+  // ---- outcomes
+  void DeliverOutcome(const Rider& rider, const CommitOutcome& outcome);
+  void Deliver(SessionId id, const Receipt& receipt);
+
   // Expiries and lingering layers that are due; answers when more are.
   sync::TimeNs RunDue();
   // Hands the newest snapshot to every display, unless they have it.
   void Publish();
-
-  // ---- queries
-  EntityInfo InfoOf(const OwnedName& layer, const std::string& id, const Entity& entity) const;
-  LayerInfo InfoOf(const OwnedName& key, const Layer& layer) const;
 
   // ---- displays
   absl::StatusOr<DisplaySlot*> FindDisplay(const std::string& name);
@@ -156,17 +230,28 @@ class Core::Impl {
   // Grows before Start only; a slot's scene_to_voxel is the core thread's.
   std::vector<std::unique_ptr<DisplaySlot>> displays_;
 
+  const std::shared_ptr<Budget> budget_;
+  SceneWatch scene_watch_;
   std::map<SessionId, Session> sessions_;
+  std::map<SessionId, Dormant> dormant_;
+  std::map<std::string, SessionId> resume_tokens_;  // of sessions and dormant ones
+  std::map<uint64_t, Owner> owners_;
+  std::map<std::string, uint64_t> owner_tokens_;
+  std::multimap<sync::TimeNs, Timed> timed_;  // by the time at which they are due
+  std::set<SessionId> holding_;
   std::multimap<sync::TimeNs, Lingering> lingering_;
   SessionId next_session_ = 1;
   uint64_t next_owner_ = 1;
   std::atomic<CaptureId> next_capture_ = 1;
-  uint64_t staged_bytes_ = 0;  // of all sessions
 
   uint64_t commits_accepted_ = 0, commits_refused_ = 0;
   uint64_t operations_applied_ = 0, operations_refused_ = 0;
-  uint64_t bytes_in_ = 0, outcomes_undelivered_ = 0;
-  uint64_t client_drops_ = 0, streams_overrun_ = 0;
+  const std::shared_ptr<std::atomic<uint64_t>> bytes_in_ =
+      std::make_shared<std::atomic<uint64_t>>(0);
+  uint64_t outcomes_undelivered_ = 0;
+  uint64_t client_drops_ = 0, streams_overrun_ = 0, frames_dropped_ = 0;
+  uint64_t timed_dropped_ = 0, must_show_timeouts_ = 0, sessions_resumed_ = 0;
+  SlidingLatency sending_, decoding_, applying_;
 
   // Of the thread that owns Core.
   enum class Phase : uint8_t { kNew, kRunning, kStopped };

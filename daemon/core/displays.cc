@@ -15,6 +15,19 @@ absl::Status Ended(const std::string& name) {
   return absl::UnavailableError(absl::StrCat("display \"", name, "\" has been stopped"));
 }
 
+MemoryFigures MemoryOf(const Budget& budget) {
+  using Use = Budget::Use;
+  return {budget.limit_bytes(),
+          budget.used_bytes(Use::kScene),
+          budget.used_bytes(Use::kStaged),
+          budget.used_bytes(Use::kWaiting),
+          budget.used_bytes(Use::kAnswers),
+          budget.used_bytes(Use::kOwed),
+          budget.used_bytes(Use::kEngines),
+          budget.used_bytes(Use::kLocal),
+          budget.used_bytes(Use::kArriving)};
+}
+
 }  // namespace
 
 absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
@@ -177,10 +190,21 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.commits_refused = commits_refused_;
   stats.operations_applied = operations_applied_;
   stats.operations_refused = operations_refused_;
-  stats.bytes_in = bytes_in_;
+  stats.bytes_in = bytes_in_->load(std::memory_order_relaxed);
   stats.outcomes_undelivered = outcomes_undelivered_;
   stats.client_drops = client_drops_;
   stats.streams_overrun = streams_overrun_;
+  stats.frames_dropped = frames_dropped_;
+  stats.timed_pending = timed_.size();
+  stats.timed_dropped = timed_dropped_;
+  stats.must_show_timeouts = must_show_timeouts_;
+  stats.sessions_dormant = dormant_.size();
+  stats.sessions_resumed = sessions_resumed_;
+  stats.sending = sending_.Summary(stats.time_ns);
+  stats.decoding = decoding_.Summary(stats.time_ns);
+  stats.applying = applying_.Summary(stats.time_ns);
+  stats.memory = MemoryOf(*budget_);
+  if (options_.connections) stats.connections = options_.connections();
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;

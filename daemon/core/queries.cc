@@ -8,29 +8,12 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 #include "daemon/core/core_impl.h"
+#include "daemon/core/scene_info.h"
 
 namespace voxeld::daemon {
 namespace {
 
 constexpr uint32_t kMostPerPage = 1000;
-
-const char* KindName(gpu::PrimitiveKind kind) {
-  switch (kind) {
-    case gpu::PrimitiveKind::kPoints:
-      return "points";
-    case gpu::PrimitiveKind::kSegments:
-      return "segments";
-    case gpu::PrimitiveKind::kTriangles:
-      return "mesh";
-    case gpu::PrimitiveKind::kBox:
-      return "box";
-    case gpu::PrimitiveKind::kSphere:
-      return "sphere";
-    case gpu::PrimitiveKind::kCylinder:
-      return "cylinder";
-  }
-  return "?";
-}
 
 // A token names the last entity of its page, so pages stay whole
 // whatever is added or removed in between.
@@ -56,44 +39,6 @@ bool HasPrefix(const std::string& text, const std::string& prefix) {
 }
 
 }  // namespace
-
-EntityInfo Core::Impl::InfoOf(const OwnedName& layer, const std::string& id,
-                              const Entity& entity) const {
-  EntityInfo info;
-  info.key = {layer.owner, layer.name, id};
-  if (const auto* geometry = std::get_if<GeometryPtr>(&entity.data.content)) {
-    info.kind = KindName((*geometry)->record.kind);
-    info.vertices = (*geometry)->record.vertex_count;
-    info.color = (*geometry)->record.color;
-  } else {
-    info.kind = "instance";
-  }
-  info.bytes = entity.bytes;
-  info.priority = entity.data.priority;
-  info.erase = entity.data.erase;
-  info.transform = entity.data.transform;
-  info.sequence = entity.sequence;
-  info.expires_ns = entity.expires_ns == sync::kNever ? 0 : entity.expires_ns;
-  info.label = entity.data.label;
-  return info;
-}
-
-LayerInfo Core::Impl::InfoOf(const OwnedName& key, const Layer& layer) const {
-  LayerInfo info;
-  info.owner = key.owner;
-  info.layer = key.name;
-  info.number = layer.number;
-  info.visible = layer.visible;
-  info.opacity = layer.opacity;
-  info.order = layer.order;
-  info.blend = layer.blend;
-  info.transform = layer.transform;
-  info.entities = layer.entities.size();
-  info.bytes = layer.bytes;
-  info.orphaned = !sessions_.contains(layer.writer->session);
-  info.client_name = layer.writer->client_name;
-  return info;
-}
 
 void Core::Impl::ListEntities(const EntityQuery& query, const Reply<EntityPage>& reply) const {
   std::optional<EntityKey> after;

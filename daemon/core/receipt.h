@@ -11,11 +11,26 @@
 
 namespace voxeld::daemon {
 
+// When a commit passed what, by the core's clock; 0: not known.
+struct Stages {
+  sync::TimeNs sent_ns = 0;  // by the client's word, in the core's clock as well as is known
+  sync::TimeNs received_ns = 0, decoded_ns = 0, applied_ns = 0;
+  sync::TimeNs drawing_ns = 0, assembled_ns = 0, sliced_ns = 0, transferred_ns = 0, shown_ns = 0;
+};
+
 struct Accepted {
   uint64_t snapshot = 0;
   uint64_t refused_operations = 0;
   sync::TimeNs applied_time_ns = 0;
   std::vector<std::string> displays;  // each gives exactly one outcome
+  bool late = false;                  // its present_at had passed when it came
+  uint64_t dropped_frames = 0;        // of its own, given up by the session's FlowPolicy
+  Stages stages;                      // up to applied_ns
+};
+
+// A timed commit waits.
+struct Scheduled {
+  sync::TimeNs present_at_ns = 0;
 };
 
 struct Refused {
@@ -33,6 +48,7 @@ struct CommitOutcome {
   sync::TimeNs time_ns = 0;  // presented
   display::Evidence evidence = display::Evidence::kEstimated;
   sync::TimeNs last_byte_ns = 0;  // presented
+  Stages stages;                  // presented
   uint64_t by_frame_id = 0;       // superseded
   uint64_t by_sequence = 0;       // superseded
   std::string reason;             // lost
@@ -42,7 +58,7 @@ struct CommitOutcome {
 struct Receipt {
   uint64_t frame_id = 0;
   uint64_t sequence = 0;
-  std::variant<Accepted, Refused, CommitOutcome> what;
+  std::variant<Accepted, Refused, CommitOutcome, Scheduled> what;
 };
 
 }  // namespace voxeld::daemon

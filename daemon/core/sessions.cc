@@ -1,4 +1,4 @@
-// Core's sessions: operations in, commits, receipts out.
+// Core's sessions: how they open, are taken up again, and end.
 #include <algorithm>
 #include <utility>
 
@@ -8,247 +8,209 @@
 namespace voxeld::daemon {
 namespace {
 
-// What an operation holds while it waits for its commit.
-uint64_t StagedBytes(const Operation& operation) {
-  uint64_t bytes = sizeof(Operation);
-  if (const auto* upsert = std::get_if<Upsert>(&operation.op)) {
-    bytes += upsert->layer.size() + upsert->id.size() + upsert->entity.label.size() +
-             BytesOf(upsert->entity.content);
-  } else if (const auto* define = std::get_if<DefineObject>(&operation.op)) {
-    bytes += Draft::ObjectBytes(define->object, *define->data);
-  }
-  return bytes;
-}
+// How long outcomes are kept for whoever takes the session up.
+constexpr sync::TimeNs kOutcomesKept = 10 * sync::kSecond;
 
-std::pair<std::string, std::string> NamesIn(const Operation& operation) {
-  if (const auto* o = std::get_if<Upsert>(&operation.op)) return {o->layer, o->id};
-  if (const auto* o = std::get_if<SetTransform>(&operation.op)) return {o->layer, o->id};
-  if (const auto* o = std::get_if<Delete>(&operation.op)) return {o->layer, o->id_or_prefix};
-  if (const auto* o = std::get_if<LayerState>(&operation.op)) return {o->layer, ""};
-  if (const auto* o = std::get_if<FrameBegin>(&operation.op)) return {o->layer, ""};
-  if (const auto* o = std::get_if<FrameEnd>(&operation.op)) return {o->layer, ""};
-  if (const auto* o = std::get_if<DefineObject>(&operation.op)) return {"", o->object};
-  if (const auto* o = std::get_if<DeleteObject>(&operation.op)) return {"", o->object};
-  return {};
+sync::TimeNs After(sync::TimeNs now, sync::TimeNs delay) {
+  return delay < sync::kNever - now ? now + delay : sync::kNever;
 }
-
-struct FieldName {
-  const char* operator()(const Upsert&) const { return "upsert"; }
-  const char* operator()(const Delete&) const { return "delete"; }
-  const char* operator()(const SetTransform&) const { return "set_transform"; }
-  const char* operator()(const LayerState&) const { return "layer_state"; }
-  const char* operator()(const FrameBegin&) const { return "frame_begin"; }
-  const char* operator()(const FrameEnd&) const { return "frame_end"; }
-  const char* operator()(const DefineObject&) const { return "define_object"; }
-  const char* operator()(const DeleteObject&) const { return "delete_object"; }
-  const char* operator()(const Commit&) const { return "commit"; }
-};
 
 }  // namespace
 
-void Core::Impl::OpenSession(OpenOptions options, std::shared_ptr<SessionSink> sink,
-                             const Reply<SessionInfo>& reply) {
+absl::StatusOr<Core::Impl::Session> Core::Impl::NewSession(const OpenOptions& options) {
   if (sessions_.size() >= options_.limits.max_sessions) {
-    return reply(absl::ResourceExhaustedError(
+    return absl::ResourceExhaustedError(
         absl::StrFormat("%d sessions are open, which is max_sessions; close one first",
-                        options_.limits.max_sessions)));
+                        options_.limits.max_sessions));
   }
   Session session;
+  if (options.owner_token.empty()) {
+    absl::StatusOr<std::string> token = NewToken();
+    if (!token.ok()) return token.status();
+    session.owner = next_owner_++;
+    owner_tokens_.emplace(*token, session.owner);
+    owners_[session.owner].token = *std::move(token);
+  } else {
+    const auto owner = owner_tokens_.find(options.owner_token);
+    if (owner == owner_tokens_.end()) {
+      return absl::NotFoundError(
+          "open.owner_token names no owner: it is wrong, or the owner has left and nothing of it "
+          "is "
+          "left in the scene; open without it to be a new one");
+    }
+    session.owner = owner->second;
+  }
   session.id = next_session_++;
-  session.owner = next_owner_++;
   session.writer = std::make_shared<const Writer>(Writer{session.id, options.client_name});
+  return session;
+}
+
+absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& options,
+                                                       std::deque<Receipt>* outcomes) {
+  const auto token = resume_tokens_.find(options.resume_token);
+  if (token == resume_tokens_.end()) {
+    return absl::NotFoundError(
+        "open.resume_token names no session: it has been used, or the session's time is over; open "
+        "without it, and send again what should be in the scene");
+  }
+  const SessionId id = token->second;
+  if (const auto live = sessions_.find(id); live != sessions_.end()) {
+    // Whatever its stream had sent counts first.
+    Session& session = live->second;
+    if (session.sink != nullptr) {
+      session.sink->OnEnded(absl::AbortedError("the session was taken up by another stream"));
+    }
+    CloseSession(id, session.incarnation, true, nullptr);
+    while (sessions_.contains(id)) Turn(id);
+  }
+  const auto it = dormant_.find(id);
+  if (it == dormant_.end()) {
+    return absl::NotFoundError("open.resume_token names a session that could not be kept");
+  }
+  Dormant dormant = std::move(it->second);
+  *outcomes = std::exchange(dormant.outcomes, {});
+  dormant_.erase(it);
+  resume_tokens_.erase(dormant.resume_token);
+  std::erase_if(lingering_, [id](const auto& entry) { return entry.second.session == id; });
+  Session session;
+  session.id = id;
+  session.incarnation = dormant.incarnation + 1;
+  session.owner = dormant.owner;
+  session.writer = std::make_shared<const Writer>(Writer{id, options.client_name});
+  store_.HandOver(id, session.writer);
+  Publish();
+  session.owed_outcomes = dormant.owed_outcomes;
+  session.last_frame_id = dormant.last_frame_id;
+  session.last_sequence = dormant.last_sequence;
+  ++sessions_resumed_;
+  return session;
+}
+
+absl::StatusOr<SessionInfo> Core::Impl::OpenSession(OpenOptions options, uint64_t open_bytes,
+                                                    std::shared_ptr<SessionSink> sink) {
+  absl::StatusOr<std::string> token = NewToken();
+  if (!token.ok()) return token.status();
+  std::deque<Receipt> outcomes;
+  absl::StatusOr<Session> made =
+      options.resume_token.empty() ? NewSession(options) : TakeUp(options, &outcomes);
+  if (!made.ok()) return made.status();
+  Session& session = *made;
   session.options = std::move(options);
-  session.sink = std::move(sink);
+  session.options.resume_token.clear();
+  session.options.owner_token.clear();
+  session.sink = sink;
+  session.resume_token = *std::move(token);
+  resume_tokens_.emplace(session.resume_token, session.id);
+  session.intake = std::make_shared<Intake>(
+      options_.limits, budget_, bytes_in_, session.options, open_bytes, sink,
+      [this, loop = loop_, id = session.id] { loop->Post([this, id] { Turn(id); }); });
+
   SessionInfo info;
   info.session = session.id;
+  info.incarnation = session.incarnation;
   info.owner = session.owner;
   for (const auto& slot : displays_) info.displays.push_back(slot->info.name);
-  sessions_.emplace(session.id, std::move(session));
-  reply(std::move(info));
-}
-
-void Core::Impl::Refuse(Session& session, const Issue& issue) {
-  ++session.refused;
-  if (session.first_refusal.empty()) {
-    session.first_refusal = absl::StrFormat("%s: %s", issue.field, issue.message);
-  }
-}
-
-void Core::Impl::Tell(Session& session, const Issue& issue) {
-  if (session.issues_told >= options_.limits.max_issues_per_commit) {
-    ++session.issues_left_out;
-    return;
-  }
-  ++session.issues_told;
-  session.sink->OnIssue(issue);
-}
-
-void Core::Impl::TellOfThoseLeftOut(Session& session, uint64_t sequence) {
-  session.issues_told = 0;
-  const uint64_t left_out = std::exchange(session.issues_left_out, 0);
-  if (left_out == 0) return;
-  session.sink->OnIssue({sequence,
-                         {},
-                         {},
-                         "commit",
-                         Reason::kQuotaExceeded,
-                         absl::StrFormat("%d more issues are left out, beyond the %d of "
-                                         "max_issues_per_commit; the receipt counts them; commit "
-                                         "fewer operations at a time to be told of each",
-                                         left_out, options_.limits.max_issues_per_commit)});
-}
-
-void Core::Impl::Handle(SessionId id, std::vector<Operation> operations, const Refusals& refused,
-                        uint64_t bytes) {
-  bytes_in_ += bytes;
-  const auto it = sessions_.find(id);
-  if (it == sessions_.end()) return;
-  Session& session = it->second;
-  for (const Issue& issue : refused.issues) Tell(session, issue);
-  session.issues_left_out += refused.more;
-  session.refused += refused.more;
-
-  // What decoding refused counts for the commit that it came before.
-  std::vector<const Issue*> uncounted;
-  uncounted.reserve(refused.issues.size());
-  for (const Issue& issue : refused.issues) uncounted.push_back(&issue);
-  const auto count_up_to = [&](uint64_t sequence) {
-    std::erase_if(uncounted, [&](const Issue* issue) {
-      if (issue->sequence > sequence) return false;
-      Refuse(session, *issue);
-      return true;
+  info.intake = session.intake;
+  info.resume_token = session.resume_token;
+  info.owner_token = owners_.at(session.owner).token;
+  info.credit_bytes = session.intake->first_credit();
+  info.last_frame_id = session.last_frame_id;
+  info.last_sequence = session.last_sequence;
+  const SessionId id = session.id;
+  sessions_.emplace(id, *std::move(made));
+  if (!outcomes.empty()) {
+    // After the answer.
+    loop_->Post([this, id, outcomes = std::move(outcomes)] {
+      for (const Receipt& receipt : outcomes) {
+        budget_->Release(Budget::Use::kOwed, kOwedBytes);
+        Deliver(id, receipt);
+      }
     });
-  };
-  for (Operation& operation : operations) {
-    if (std::holds_alternative<Commit>(operation.op)) {
-      count_up_to(operation.sequence);
-      EndCommit(session, operation);
-    } else {
-      Stage(session, std::move(operation));
-    }
   }
-  count_up_to(UINT64_MAX);
+  return info;
 }
 
-void Core::Impl::Stage(Session& session, Operation operation) {
-  const Limits& limits = options_.limits;
-  std::optional<Issue> issue;
-  const uint64_t bytes = StagedBytes(operation);
-  const auto over = [&](std::string message) {
-    auto [layer, id] = NamesIn(operation);
-    issue = Issue{operation.sequence,     std::move(layer),
-                  std::move(id),          std::visit(FieldName(), operation.op),
-                  Reason::kQuotaExceeded, std::move(message)};
-  };
-  if (session.staged.size() >= limits.max_operations_per_commit) {
-    over(
-        absl::StrFormat("%d operations wait for a commit, which is max_operations_per_commit; "
-                        "commit first",
-                        session.staged.size()));
-  } else if (session.staged_bytes + bytes > limits.max_uncommitted_bytes) {
-    over(absl::StrFormat(
-        "%d bytes would wait for a commit; max_uncommitted_bytes is %d; commit first",
-        session.staged_bytes + bytes, limits.max_uncommitted_bytes));
-  } else if (staged_bytes_ + bytes > limits.max_uncommitted_bytes_total) {
-    over(absl::StrFormat(
-        "%d bytes of all sessions would wait for their commits; max_uncommitted_bytes_total is %d; "
-        "commit first, or try again when others have committed",
-        staged_bytes_ + bytes, limits.max_uncommitted_bytes_total));
-  } else {
-    issue = CheckAlone(operation, limits);
-  }
-  if (issue.has_value()) {
-    Refuse(session, *issue);
-    return Tell(session, *issue);
-  }
-  staged_bytes_ += bytes;
-  session.staged_bytes += bytes;
-  session.staged.push_back(std::move(operation));
-}
-
-void Core::Impl::EndCommit(Session& session, const Operation& operation) {
-  const Commit& commit = std::get<Commit>(operation.op);
-  client_drops_ += commit.client_drops;
-  const sync::TimeNs now = clock_.Now();
-  store_.Expire(now);
-  CommitResult result =
-      store_.Apply({session.owner, session.writer}, std::exchange(session.staged, {}), now,
-                   session.options.strict, std::exchange(session.refused, 0));
-  staged_bytes_ -= std::exchange(session.staged_bytes, 0);
-  std::string first_refusal = std::exchange(session.first_refusal, "");
-  if (first_refusal.empty() && !result.issues.empty()) {
-    const Issue& first = result.issues.front();
-    first_refusal = absl::StrFormat("%s: %s", first.field, first.message);
-  }
-  for (const Issue& issue : result.issues) Tell(session, issue);
-  session.issues_left_out += result.more_issues;
-  TellOfThoseLeftOut(session, operation.sequence);
-  operations_refused_ += result.refused_operations;
-
-  Receipt receipt;
-  receipt.frame_id = commit.frame_id;
-  receipt.sequence = operation.sequence;
-  if (!result.applied) {
-    ++commits_refused_;
-    Refused refused;
-    refused.refused_operations = result.refused_operations;
-    if (result.abandoned) {
-      refused.message =
-          "the daemon is being stopped, so nothing of the commit was applied; send it again to one "
-          "that runs";
-    } else {
-      refused.message = absl::StrFormat(
-          "the session is strict and %d operations were refused, so nothing of the commit was "
-          "applied; "
-          "the first: %s",
-          result.refused_operations, first_refusal);
-    }
-    receipt.what = std::move(refused);
-    session.sink->OnReceipt(receipt);
-    return Publish();  // what had expired
-  }
-
-  ++commits_accepted_;
-  operations_applied_ += result.applied_operations;
-  Accepted accepted;
-  accepted.snapshot = store_.snapshot()->number;
-  accepted.refused_operations = result.refused_operations;
-  accepted.applied_time_ns = now;
-  if (!session.options.no_outcomes) {
-    for (const auto& slot : displays_) accepted.displays.push_back(slot->info.name);
-  }
-  receipt.what = std::move(accepted);
-  session.sink->OnReceipt(receipt);
-
-  published_ = store_.snapshot();
-  const Rider rider{session.id, commit.frame_id, operation.sequence, now,
-                    !session.options.no_outcomes};
-  for (const auto& slot : displays_) {
-    const bool posted = slot->host->work->Post(
-        [pipeline = slot->host->pipeline.get(), snapshot = published_, rider,
-         hidden = result.hidden] { pipeline->Show(snapshot, rider, hidden); });
-    if (!posted) {  // the daemon is being stopped, and the display already is
-      CommitOutcome outcome;
-      outcome.display = slot->info.name;
-      outcome.kind = CommitOutcome::Kind::kNotShown;
-      outcome.why = CommitOutcome::NotShown::kRemoved;
-      DeliverOutcome(rider, outcome);
-    }
-  }
-}
-
-void Core::Impl::DeliverOutcome(const Rider& rider, const CommitOutcome& outcome) {
-  if (!rider.asked) return;
-  const auto it = sessions_.find(rider.session);
-  if (it == sessions_.end()) {
-    ++outcomes_undelivered_;
+void Core::Impl::CloseSession(SessionId id, uint64_t incarnation, bool gone,
+                              std::function<void()> done) {
+  const auto it = sessions_.find(id);
+  if (it == sessions_.end() || it->second.incarnation != incarnation) {
+    if (done) done();
     return;
   }
-  Receipt receipt;
-  receipt.frame_id = rider.frame_id;
-  receipt.sequence = rider.sequence;
-  receipt.what = outcome;
-  it->second.sink->OnReceipt(receipt);
+  Session& session = it->second;
+  if (done) session.when_closed.push_back(std::move(done));
+  if (gone) session.sink = nullptr;
+  if (std::exchange(session.closing, true)) return;
+  session.intake->Close();
+  ReleaseHold(session);
+  PostTurn(id);  // what waits is applied first, each commit in its turn
+}
+
+void Core::Impl::FinishClose(SessionId id) {
+  const auto it = sessions_.find(id);
+  Session session = std::move(it->second);
+  sessions_.erase(it);
+  DropTimed(session);
+  const sync::TimeNs now = clock_.Now();
+  sync::TimeNs layers_until = now;
+  switch (session.options.on_disconnect) {
+    case DisconnectPolicy::kClear:
+      RemoveLayersOf(id, session.owner);
+      break;
+    case DisconnectPolicy::kLinger:
+      if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
+          tally != nullptr && tally->layers > 0) {
+        layers_until = After(now, std::max<int64_t>(0, session.options.linger_ns));
+        lingering_.emplace(layers_until, Lingering{id, session.owner});
+      }
+      break;
+    case DisconnectPolicy::kKeep:
+      if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
+          tally != nullptr && tally->layers > 0) {
+        layers_until = sync::kNever;
+      }
+      break;
+  }
+  if (layers_until > now) {
+    store_.HandOver(id,
+                    std::make_shared<const Writer>(Writer{id, session.writer->client_name, true}));
+  }
+  KeepDormant(session, layers_until);
+  ForgetOwner(session.owner);
+  Publish();
+  for (const std::function<void()>& done : session.when_closed) done();
+}
+
+void Core::Impl::KeepDormant(Session& session, sync::TimeNs layers_until) {
+  const sync::TimeNs now = clock_.Now();
+  Dormant dormant;
+  dormant.incarnation = session.incarnation;
+  dormant.owner = session.owner;
+  dormant.resume_token = session.resume_token;
+  dormant.last_frame_id = session.last_frame_id;
+  dormant.last_sequence = session.last_sequence;
+  dormant.owed_outcomes = session.owed_outcomes;
+  dormant.outcomes = std::exchange(session.undelivered, {});
+  dormant.outcomes_until = After(now, kOutcomesKept);
+  dormant.until = std::max(dormant.outcomes_until, layers_until);
+  if (dormant_.size() >= options_.limits.max_sessions) {
+    const auto soonest =
+        std::min_element(dormant_.begin(), dormant_.end(), [](const auto& a, const auto& b) {
+          return std::pair(a.second.until, a.first) < std::pair(b.second.until, b.first);
+        });
+    EndDormant(soonest->first);
+  }
+  dormant_.emplace(session.id, std::move(dormant));
+}
+
+void Core::Impl::EndDormant(SessionId id) {
+  const auto it = dormant_.find(id);
+  const Dormant dormant = std::move(it->second);
+  dormant_.erase(it);
+  outcomes_undelivered_ += dormant.outcomes.size();
+  budget_->Release(Budget::Use::kOwed, dormant.outcomes.size() * kOwedBytes);
+  resume_tokens_.erase(dormant.resume_token);
+  ForgetOwner(dormant.owner);
 }
 
 bool Core::Impl::OwnerIsOpen(uint64_t owner) const {
@@ -260,48 +222,21 @@ void Core::Impl::RemoveLayersOf(SessionId session, uint64_t owner) {
   store_.RemoveLayers(
       [session](const OwnedName&, const Layer& layer) { return layer.writer->session == session; },
       false);
-  if (!OwnerIsOpen(owner)) store_.ForgetOwner(owner);
+  ForgetOwner(owner);
 }
 
-void Core::Impl::CloseSession(SessionId id) {
-  const auto it = sessions_.find(id);
-  if (it == sessions_.end()) return;
-  const Session session = std::move(it->second);
-  sessions_.erase(it);
-  staged_bytes_ -= session.staged_bytes;
-  switch (session.options.on_disconnect) {
-    case DisconnectPolicy::kClear:
-      RemoveLayersOf(id, session.owner);
-      break;
-    case DisconnectPolicy::kLinger:
-      if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
-          tally != nullptr && tally->layers > 0) {
-        const sync::TimeNs now = clock_.Now();
-        const int64_t linger = std::max<int64_t>(0, session.options.linger_ns);
-        lingering_.emplace(linger < sync::kNever - now ? now + linger : sync::kNever,
-                           Lingering{id, session.owner});
-        break;
-      }
-      [[fallthrough]];
-    case DisconnectPolicy::kKeep:
-      if (!OwnerIsOpen(session.owner)) store_.ForgetOwner(session.owner);
-      break;
+void Core::Impl::ForgetOwner(uint64_t owner) {
+  if (OwnerIsOpen(owner)) return;
+  store_.ForgetOwner(owner);
+  const OwnerTally* tally = store_.snapshot()->owners.Find(owner);
+  if (tally != nullptr && *tally != OwnerTally()) return;
+  for (const auto& [id, dormant] : dormant_) {
+    if (dormant.owner == owner) return;
   }
-  Publish();
-}
-
-void Core::Impl::ClearLayer(uint64_t owner, const std::string& layer, bool keep_state,
-                            const Reply<Cleared>& reply) {
-  const SceneStore::Removed removed = store_.RemoveLayers(
-      [&](const OwnedName& key, const Layer&) {
-        return (owner == 0 || key.owner == owner) && (layer.empty() || key.name == layer);
-      },
-      keep_state);
-  for (const uint64_t affected : removed.owners) {
-    if (!OwnerIsOpen(affected)) store_.ForgetOwner(affected);
-  }
-  Publish();
-  reply(Cleared{removed.entities, removed.layers});
+  const auto it = owners_.find(owner);
+  if (it == owners_.end()) return;
+  owner_tokens_.erase(it->second.token);
+  owners_.erase(it);
 }
 
 sync::TimeNs Core::Impl::RunDue() {
@@ -312,14 +247,31 @@ sync::TimeNs Core::Impl::RunDue() {
     lingering_.erase(lingering_.begin());
     RemoveLayersOf(over.session, over.owner);
   }
+  sync::TimeNs next = RunTimed(now);
+  for (auto it = dormant_.begin(); it != dormant_.end();) {
+    const SessionId id = it->first;
+    Dormant& dormant = it->second;
+    ++it;
+    if (dormant.outcomes_until <= now) {
+      outcomes_undelivered_ += dormant.outcomes.size();
+      budget_->Release(Budget::Use::kOwed, dormant.outcomes.size() * kOwedBytes);
+      dormant.outcomes.clear();
+    } else if (!dormant.outcomes.empty()) {
+      next = std::min(next, dormant.outcomes_until);
+    }
+    next = std::min(next, dormant.until <= now ? sync::kNever : dormant.until);
+    if (dormant.until <= now) EndDormant(id);
+  }
   Publish();
-  return std::min(store_.next_expiry(),
-                  lingering_.empty() ? sync::kNever : lingering_.begin()->first);
+  next = std::min(next, store_.next_expiry());
+  return lingering_.empty() ? next : std::min(next, lingering_.begin()->first);
 }
 
 void Core::Impl::Publish() {
   if (published_ == store_.snapshot()) return;
   published_ = store_.snapshot();
+  scene_watch_.Publish(published_);
+  budget_->Set(Budget::Use::kScene, published_->total.bytes);
   for (const auto& slot : displays_) {
     slot->host->work->Post([pipeline = slot->host->pipeline.get(), snapshot = published_] {
       pipeline->Show(snapshot);

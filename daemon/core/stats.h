@@ -27,6 +27,8 @@ struct DisplayFigures {
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice;
+  // Of commits presented: applied to drawing, sliced to transferred, transferred to shown.
+  LatencyStats waiting, transferring, showing;
   std::string engine_degraded;  // empty: the engine is as was asked for; else what is not, and why
   bool volume_held = false;     // the engine was lost or failed, and nothing has been drawn since
   uint64_t engine_faults = 0, engine_returns = 0;
@@ -42,6 +44,24 @@ struct DisplayFigures {
            commits_lost = 0, commits_not_shown = 0, commits_pending = 0;
 };
 
+// What is held for clients, in bytes: core/budget.h.
+struct MemoryFigures {
+  uint64_t limit = 0, scene = 0, staged = 0, waiting = 0, answers = 0, owed = 0, engines = 0,
+           local = 0, arriving = 0;
+};
+
+// Connections over gRPC's addresses; the daemon's own (its probe) are in none of these.
+struct ListenFigures {
+  uint64_t open = 0, accepted = 0;
+  // Closed at once: max_connections, max_connections_per_address.
+  uint64_t refused_in_all = 0, refused_by_address = 0;
+  // By the guard: too many bytes, too long, before a call was answered; too many calls cancelled.
+  uint64_t cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
+  uint64_t accept_failures = 0;  // out of descriptors, say; tried again until it works
+  uint64_t probe_failures = 0;   // of connections to itself
+  std::string unreachable;       // empty: they work; else why they do not
+};
+
 struct Stats {
   int64_t time_ns = 0;
   std::string version;
@@ -53,6 +73,16 @@ struct Stats {
   uint64_t outcomes_undelivered = 0;
   uint64_t client_drops = 0;     // frames that clients dropped themselves, by their own word
   uint64_t streams_overrun = 0;  // ended because their client did not read
+  uint64_t frames_dropped = 0;   // immediate frames given up by FlowPolicy
+  uint64_t timed_pending = 0;    // commits that wait for their present_at
+  uint64_t timed_dropped = 0;    // waiting still when their session ended
+  uint64_t must_show_timeouts = 0;
+  uint64_t sessions_dormant = 0;  // gone, can be resumed
+  uint64_t sessions_resumed = 0;
+  // By stage, of commits: sent to received, to decoded, to applied.
+  LatencyStats sending, decoding, applying;
+  MemoryFigures memory;
+  ListenFigures connections;
   std::vector<DisplayFigures> displays;
 };
 

@@ -14,7 +14,9 @@ Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
       started_ns_(clock.Now()),
       loop_(std::make_shared<Loop>(clock)),
       store_(options_.limits),
-      published_(store_.snapshot()) {}
+      published_(store_.snapshot()),
+      budget_(std::make_shared<Budget>(options_.limits.max_memory_bytes)),
+      scene_watch_(published_) {}
 
 void Core::Impl::Launch(std::string name, std::function<void()> body) {
   {
@@ -49,6 +51,17 @@ void Core::Impl::RunCore() {
     loop_->Wait(RunDue());
   }
   while (loop_->RunPosted()) {
+  }
+  EndSessions();
+}
+
+void Core::Impl::EndSessions() {
+  for (auto& [id, session] : sessions_) {
+    if (session.sink != nullptr) {
+      session.sink->OnEnded(absl::UnavailableError(
+          "the daemon has stopped; what it had not answered was not applied"));
+    }
+    session.intake->Close();
   }
 }
 
@@ -126,6 +139,7 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
     loop_->Close();
     while (loop_->RunPosted()) {
     }
+    EndSessions();
     return absl::OkStatus();
   }
 

@@ -49,6 +49,50 @@ constexpr Row<Stats> kDaemonRows[] = {
      "Frames that clients dropped themselves, by their own word"},
     {"voxeld_streams_overrun_total", &Stats::streams_overrun, MetricType::Counter,
      "Streams ended because their client did not read"},
+    {"voxeld_frames_dropped_total", &Stats::frames_dropped, MetricType::Counter,
+     "Immediate frames given up, as their clients' flow policy says"},
+    {"voxeld_timed_commits_pending", &Stats::timed_pending, MetricType::Gauge,
+     "Commits that wait for their time"},
+    {"voxeld_timed_commits_dropped_total", &Stats::timed_dropped, MetricType::Counter,
+     "Commits whose session ended before their time"},
+    {"voxeld_must_show_timeouts_total", &Stats::must_show_timeouts, MetricType::Counter,
+     "Commits that had to be shown, without an outcome in time"},
+    {"voxeld_sessions_dormant", &Stats::sessions_dormant, MetricType::Gauge,
+     "Sessions without a stream that can be taken up"},
+    {"voxeld_sessions_resumed_total", &Stats::sessions_resumed, MetricType::Counter,
+     "Sessions taken up"},
+};
+
+struct MemoryRow {
+  const char* use;
+  uint64_t MemoryFigures::*figure;
+};
+
+constexpr MemoryRow kMemoryRows[] = {
+    {"scene", &MemoryFigures::scene},     {"staged", &MemoryFigures::staged},
+    {"waiting", &MemoryFigures::waiting}, {"answers", &MemoryFigures::answers},
+    {"owed", &MemoryFigures::owed},       {"engines", &MemoryFigures::engines},
+    {"local", &MemoryFigures::local},     {"arriving", &MemoryFigures::arriving},
+};
+
+constexpr Row<ListenFigures> kConnectionRows[] = {
+    {"voxeld_connections", &ListenFigures::open, MetricType::Gauge, "Open connections over gRPC"},
+    {"voxeld_connections_accepted_total", &ListenFigures::accepted, MetricType::Counter,
+     "Connections accepted"},
+    {"voxeld_connections_refused_in_all_total", &ListenFigures::refused_in_all, MetricType::Counter,
+     "Connections closed at once: max_connections were open"},
+    {"voxeld_connections_refused_by_address_total", &ListenFigures::refused_by_address,
+     MetricType::Counter, "Connections closed at once: max_connections_per_address were open"},
+    {"voxeld_connections_cut_for_bytes_total", &ListenFigures::cut_for_bytes, MetricType::Counter,
+     "Connections cut: too many bytes before a call was answered"},
+    {"voxeld_connections_cut_for_time_total", &ListenFigures::cut_for_time, MetricType::Counter,
+     "Connections cut: too long without an answered call"},
+    {"voxeld_connections_cut_for_cancelling_total", &ListenFigures::cut_for_cancelling,
+     MetricType::Counter, "Connections cut: too many cancelled calls within a second"},
+    {"voxeld_accept_failures_total", &ListenFigures::accept_failures, MetricType::Counter,
+     "Times that no connection could be accepted, out of descriptors say"},
+    {"voxeld_probe_failures_total", &ListenFigures::probe_failures, MetricType::Counter,
+     "Connections of the daemon to itself that failed"},
 };
 
 constexpr Row<DisplayFigures> kDisplayRows[] = {
@@ -98,13 +142,28 @@ constexpr Row<DisplayFigures> kDisplayRows[] = {
      "Commits that wait for their outcome"},
 };
 
+template <typename Owner>
 struct LatencyRow {
   const char* name;
-  LatencyStats DisplayFigures::*figure;
+  LatencyStats Owner::*figure;
   const char* help;
 };
 
-constexpr LatencyRow kLatencyRows[] = {
+constexpr LatencyRow<Stats> kDaemonLatencyRows[] = {
+    {"voxeld_commit_sending_seconds", &Stats::sending,
+     "From a commit's sending, by its client's word, to its receipt, over 10 s"},
+    {"voxeld_commit_decoding_seconds", &Stats::decoding, "Of a commit's last message, over 10 s"},
+    {"voxeld_commit_applying_seconds", &Stats::applying,
+     "From decoded to its snapshot, its turn included, over 10 s"},
+};
+
+constexpr LatencyRow<DisplayFigures> kLatencyRows[] = {
+    {"voxeld_display_waiting_seconds", &DisplayFigures::waiting,
+     "From a commit's snapshot to the drawing of its volume, over 10 s"},
+    {"voxeld_display_transferring_seconds", &DisplayFigures::transferring,
+     "From a volume's slices to its last byte handed to the transport, over 10 s"},
+    {"voxeld_display_showing_seconds", &DisplayFigures::showing,
+     "From a volume's last byte to its presentation, over 10 s"},
     {"voxeld_display_commit_to_last_byte_seconds", &DisplayFigures::commit_to_last_byte,
      "From a commit to its last byte handed to the transport, over 10 s"},
     {"voxeld_display_commit_to_presented_seconds", &DisplayFigures::commit_to_presented,
@@ -147,6 +206,17 @@ class Families {
   std::vector<MetricFamily> all_;
 };
 
+void AddLatency(MetricFamily* family, const Labels& labels, const LatencyStats& latency) {
+  for (const auto& [quantile, ns] :
+       {std::pair("0.5", latency.p50_ns), {"0.99", latency.p99_ns}, {"1", latency.max_ns}}) {
+    Labels all = labels;
+    all.emplace_back("quantile", quantile);
+    Add(family, all,
+        latency.count == 0 ? std::numeric_limits<double>::quiet_NaN()
+                           : static_cast<double>(ns) / kNsPerSecond);
+  }
+}
+
 void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
   for (const auto& row : kDisplayRows) {
     MetricFamily* family = out->New(row.name, row.type, row.help);
@@ -154,16 +224,10 @@ void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
       Add(family, {{"display", display.name}}, static_cast<double>(display.*row.figure));
     }
   }
-  for (const LatencyRow& row : kLatencyRows) {
+  for (const auto& row : kLatencyRows) {
     MetricFamily* family = out->New(row.name, MetricType::Gauge, row.help);
     for (const DisplayFigures& display : displays) {
-      const LatencyStats& latency = display.*row.figure;
-      for (const auto& [quantile, ns] :
-           {std::pair("0.5", latency.p50_ns), {"0.99", latency.p99_ns}, {"1", latency.max_ns}}) {
-        Add(family, {{"display", display.name}, {"quantile", quantile}},
-            latency.count == 0 ? std::numeric_limits<double>::quiet_NaN()
-                               : static_cast<double>(ns) / kNsPerSecond);
-      }
+      AddLatency(family, {{"display", display.name}}, display.*row.figure);
     }
   }
   MetricFamily* rate = out->New("voxeld_display_volumes_per_second", MetricType::Gauge,
@@ -221,6 +285,20 @@ std::string MetricsText(const Stats& stats) {
                  static_cast<double>(stats.uptime_ns) / kNsPerSecond);
   for (const auto& row : kDaemonRows) {
     Add(families.New(row.name, row.type, row.help), {}, static_cast<double>(stats.*row.figure));
+  }
+  for (const auto& row : kDaemonLatencyRows) {
+    AddLatency(families.New(row.name, MetricType::Gauge, row.help), {}, stats.*row.figure);
+  }
+  families.Gauge("voxeld_memory_limit_bytes", "What may be held for clients, together", {},
+                 static_cast<double>(stats.memory.limit));
+  MetricFamily* memory = families.New("voxeld_memory_bytes", MetricType::Gauge,
+                                      "What is held for clients, by what it is for");
+  for (const MemoryRow& row : kMemoryRows) {
+    Add(memory, {{"use", row.use}}, static_cast<double>(stats.memory.*row.figure));
+  }
+  for (const auto& row : kConnectionRows) {
+    Add(families.New(row.name, row.type, row.help), {},
+        static_cast<double>(stats.connections.*row.figure));
   }
   AddDisplays(stats.displays, &families);
   return families.Text();

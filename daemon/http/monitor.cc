@@ -36,6 +36,9 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
     reasons.push_back(
         {{"display", figures.name}, {"what", "no engine"}, {"why", figures.engine_reason}});
   }
+  if (!stats.connections.unreachable.empty()) {
+    reasons.push_back({{"what", "not reachable"}, {"why", stats.connections.unreachable}});
+  }
   const bool fails = !reasons.empty();
   for (const DisplayFigures& figures : stats.displays) {
     held = held || figures.volume_held;

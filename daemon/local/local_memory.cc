@@ -67,20 +67,33 @@ absl::Status CheckSize(uint64_t id, uint64_t size, int fd) {
 
 }  // namespace
 
+// Counted and charged for as long as it lives.
 class LocalMemory::Mapping {
  public:
+  // `budget` may be none.
   static absl::StatusOr<std::shared_ptr<const Mapping>> Make(
-      uint64_t size, int fd, std::shared_ptr<std::atomic<uint32_t>> mapped) {
+      uint64_t size, int fd, std::shared_ptr<std::atomic<uint32_t>> mapped,
+      std::shared_ptr<Budget> budget) {
+    if (budget != nullptr && !budget->Charge(Budget::Use::kLocal, size)) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("would be held beside ", budget->used_bytes(),
+                       " of all clients; max_memory_bytes allows ", budget->limit_bytes(),
+                       ": release some, or try again when others have"));
+    }
     void* data = mmap(nullptr, size, PROT_READ, MAP_SHARED, fd, 0);
     if (data == MAP_FAILED) {
-      return absl::ResourceExhaustedError(absl::StrCat("cannot be mapped: ", ErrorText()));
+      const std::string why = ErrorText();
+      if (budget != nullptr) budget->Release(Budget::Use::kLocal, size);
+      return absl::ResourceExhaustedError(absl::StrCat("cannot be mapped: ", why));
     }
-    return std::shared_ptr<const Mapping>(new Mapping(data, size, std::move(mapped)));
+    return std::shared_ptr<const Mapping>(
+        new Mapping(data, size, std::move(mapped), std::move(budget)));
   }
 
   ~Mapping() {
     munmap(data_, size_);
     mapped_->fetch_sub(1);
+    if (budget_ != nullptr) budget_->Release(Budget::Use::kLocal, size_);
   }
   Mapping(const Mapping&) = delete;
   Mapping& operator=(const Mapping&) = delete;
@@ -107,14 +120,16 @@ class LocalMemory::Mapping {
   }
 
  private:
-  Mapping(void* data, uint64_t size, std::shared_ptr<std::atomic<uint32_t>> mapped)
-      : data_(data), size_(size), mapped_(std::move(mapped)) {
+  Mapping(void* data, uint64_t size, std::shared_ptr<std::atomic<uint32_t>> mapped,
+          std::shared_ptr<Budget> budget)
+      : data_(data), size_(size), mapped_(std::move(mapped)), budget_(std::move(budget)) {
     mapped_->fetch_add(1);
   }
 
   void* const data_;
   const uint64_t size_;
   const std::shared_ptr<std::atomic<uint32_t>> mapped_;
+  const std::shared_ptr<Budget> budget_;
 };
 
 absl::Status LocalMemory::Hold(uint64_t id, uint64_t size, int fd) {
@@ -141,7 +156,8 @@ absl::Status LocalMemory::Hold(uint64_t id, uint64_t size, int fd) {
         absl::StrCat("memory ", id, ": all sessions together hold ", mapped_->load(), " memories; ",
                      limits_.max_memories_total, " are possible: use fewer that are larger"));
   }
-  absl::StatusOr<std::shared_ptr<const Mapping>> mapping = Mapping::Make(size, fd, mapped_);
+  absl::StatusOr<std::shared_ptr<const Mapping>> mapping =
+      Mapping::Make(size, fd, mapped_, budget_);
   if (!mapping.ok()) {
     return absl::ResourceExhaustedError(
         absl::StrCat("memory ", id, " of ", size, " bytes ", mapping.status().message()));

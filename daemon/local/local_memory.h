@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "daemon/core/budget.h"
 #include "daemon/wire/memory_source.h"
 #include "display/sync/mutex.h"
 
@@ -23,16 +24,18 @@ struct LocalLimits {
 };
 
 // Thread-safe. What Find gave stays mapped until it is let go, also when it is released meanwhile;
-// but only what is held counts against the limits.
+// only what is held counts against the session's limits, but all that is mapped is charged to the
+// budget.
 class LocalMemory final : public wire::MemorySource {
  public:
-  // `mapped` counts the mappings of all sessions.
-  LocalMemory(const LocalLimits& limits, std::shared_ptr<std::atomic<uint32_t>> mapped)
-      : limits_(limits), mapped_(std::move(mapped)) {}
+  // `mapped` counts the mappings of all sessions. `budget` may be none.
+  LocalMemory(const LocalLimits& limits, std::shared_ptr<std::atomic<uint32_t>> mapped,
+              std::shared_ptr<Budget> budget)
+      : limits_(limits), mapped_(std::move(mapped)), budget_(std::move(budget)) {}
 
   // Maps `fd`, which stays the caller's: sealed against shrinking, growing and writing, of `size`
-  // bytes. Else InvalidArgument; AlreadyExists if `id` is in use; ResourceExhausted beyond a limit,
-  // or if it cannot be mapped; FailedPrecondition once the session has ended.
+  // bytes. Else InvalidArgument; AlreadyExists if `id` is in use; ResourceExhausted beyond a limit
+  // or the budget, or if it cannot be mapped; FailedPrecondition once the session has ended.
   absl::Status Hold(uint64_t id, uint64_t size, int fd);
 
   absl::Status Release(uint64_t id);  // NotFound
@@ -54,6 +57,7 @@ class LocalMemory final : public wire::MemorySource {
 
   const LocalLimits limits_;
   const std::shared_ptr<std::atomic<uint32_t>> mapped_;
+  const std::shared_ptr<Budget> budget_;
   mutable sync::Mutex mutex_;
   Mappings held_ VOXELD_GUARDED_BY(mutex_);
   uint64_t bytes_ VOXELD_GUARDED_BY(mutex_) = 0;

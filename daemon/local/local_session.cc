@@ -4,7 +4,7 @@
 
 namespace voxeld::daemon::local {
 
-LocalSession::LocalSession(const LocalSocket* socket, SessionId session) : session_(session) {
+LocalSession::LocalSession(const LocalSocket* socket, SessionId session) {
   if (socket == nullptr) return;
   absl::StatusOr<Tokens::Registered> registered = socket->tokens()->Register(session);
   if (!registered.ok()) return;
@@ -15,7 +15,7 @@ LocalSession::LocalSession(const LocalSocket* socket, SessionId session) : sessi
 }
 
 void LocalSession::Close() {
-  if (const auto tokens = std::exchange(tokens_, nullptr)) tokens->Unregister(session_);
+  if (const auto tokens = std::exchange(tokens_, nullptr)) tokens->Unregister(token_);
 }
 
 }  // namespace voxeld::daemon::local

@@ -1,4 +1,4 @@
-// What a stream holds of the local socket: its session's token and memory.
+// What a stream holds of the local socket: its token and memory.
 #pragma once
 
 #include <memory>
@@ -32,20 +32,18 @@ class LocalSession {
   // For DecodeStreamRequest; null: nothing is offered. After Close it finds nothing.
   std::shared_ptr<const wire::MemorySource> memory() const { return memory_; }
 
-  // The session has ended: so does its connection, and its memory is let go.
+  // The stream has let its session go: so its connection ends, and its memory is let go.
   void Close();
 
  private:
   void Swap(LocalSession& other) {
     std::swap(tokens_, other.tokens_);
-    std::swap(session_, other.session_);
     std::swap(path_, other.path_);
     std::swap(token_, other.token_);
     std::swap(memory_, other.memory_);
   }
 
   std::shared_ptr<Tokens> tokens_;  // null: nothing is registered
-  SessionId session_ = 0;
   std::string path_, token_;
   std::shared_ptr<LocalMemory> memory_;
 };

@@ -66,7 +66,7 @@ class LocalSocket::Impl {
       : clock_(clock),
         options_(std::move(options)),
         bell_(std::move(bell)),
-        tokens_(std::make_shared<Tokens>(options_.limits, bell_)) {}
+        tokens_(std::make_shared<Tokens>(options_.limits, bell_, options_.budget)) {}
 
   ~Impl() {
     if (!thread_.joinable()) return;

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
+#include "daemon/core/budget.h"
 #include "daemon/local/local_memory.h"
 #include "daemon/local/tokens.h"
 #include "daemon/log/logger.h"
@@ -21,7 +22,8 @@ struct LocalSocketOptions {
   // of each session: a newer one takes the place of the older, which ends.
   uint32_t max_without_hello = 64;
   sync::TimeNs hello_limit_ns = 2 * sync::kSecond;
-  Logger* log = nullptr;  // may be none
+  std::shared_ptr<Budget> budget;  // charged for what is held; may be none
+  Logger* log = nullptr;           // may be none
 };
 
 class LocalSocket {

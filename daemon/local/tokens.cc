@@ -23,7 +23,8 @@ bool Same(std::string_view a, std::string_view b) {
 }  // namespace
 
 absl::StatusOr<Tokens::Registered> Tokens::Register(SessionId session) {
-  Registered made{std::string(kBytes, '\0'), std::make_shared<LocalMemory>(limits_, mapped_)};
+  Registered made{std::string(kBytes, '\0'),
+                  std::make_shared<LocalMemory>(limits_, mapped_, budget_)};
   ssize_t got = 0;
   while ((got = getrandom(made.token.data(), kBytes, 0)) < 0 && errno == EINTR) {
   }
@@ -32,18 +33,18 @@ absl::StatusOr<Tokens::Registered> Tokens::Register(SessionId session) {
         absl::StrCat("no random bytes: ", std::generic_category().message(errno)));
   }
   sync::MutexLock lock(mutex_);
-  sessions_.insert_or_assign(session, made);
+  by_token_.insert_or_assign(made.token, Found{session, made.memory});
   return made;
 }
 
-void Tokens::Unregister(SessionId session) {
+void Tokens::Unregister(const std::string& token) {
   std::shared_ptr<LocalMemory> memory;
   {
     sync::MutexLock lock(mutex_);
-    const auto found = sessions_.find(session);
-    if (found == sessions_.end()) return;
+    const auto found = by_token_.find(token);
+    if (found == by_token_.end()) return;
     memory = std::move(found->second.memory);
-    sessions_.erase(found);
+    by_token_.erase(found);
   }
   memory->End();
   ended_->Ring();
@@ -55,10 +56,8 @@ Tokens::Found Tokens::Find(std::string_view token) const {
   padded.resize(kBytes, '\0');
   Found found;
   sync::MutexLock lock(mutex_);
-  for (const auto& [session, registered] : sessions_) {
-    if (Same(registered.token, padded) && token.size() == kBytes) {
-      found = {session, registered.memory};
-    }
+  for (const auto& [right, registered] : by_token_) {
+    if (Same(right, padded) && token.size() == kBytes) found = registered;
   }
   return found;
 }

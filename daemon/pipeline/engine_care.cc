@@ -191,6 +191,7 @@ absl::Status EngineCare::Begin(Attempt& attempt) {
   if (!block.ok()) return block.status();
   gpu::DeltaWriter writer(block->bytes());
   attempt.scene->Write(writer);
+  block->Refer(writer.TakeReferred());
   engine.Apply(*std::move(block), size, Completion(&EngineCare::OnCall));
   const size_t bytes = attempt.drawn.frame->bytes.size();
   attempt.bytes = std::make_unique_for_overwrite<std::byte[]>(bytes);

@@ -91,6 +91,7 @@ sync::TimeNs FramePipeline::Step() {
     next_tick_ = display_->Tick();
     ServeCaptures();
   } while (MaybeDraw());
+  sweeps_->Set(showing() ? display_->ComingSweeps(2) : std::vector<sync::TimeNs>());
   sync::TimeNs next = next_tick_;
   if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
@@ -112,7 +113,7 @@ void FramePipeline::Show(SnapshotPtr snapshot) {
   Retire(std::exchange(newest_, std::move(snapshot)));
 }
 
-void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden) {
+void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden, bool urgent) {
   Show(std::move(snapshot));
   switch (display_->state()) {
     case display::DisplayState::kStopped:
@@ -129,6 +130,7 @@ void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden) 
     return riders_.NotShown(rider, CommitOutcome::NotShown::kHidden);
   }
   riders_.Board(rider);
+  urgent_ = urgent_ || urgent;
 }
 
 // ----------------------------------------------------------------------------------- drawing
@@ -188,10 +190,11 @@ gpu::Target FramePipeline::CurrentTarget() const {
 bool FramePipeline::MaybeDraw() {
   if (drawing_.has_value()) return false;
   if (care_ != nullptr && care_->ready()) TakeReturned();
-  if (newest_ == nullptr || !showing() || !display_->mailbox_free()) return false;
+  if (newest_ == nullptr || !showing() || !(display_->mailbox_free() || urgent_)) return false;
   const bool changed = newest_->number != drawn_snapshot_ || settings_changed_;
   if (!changed && !(show_again_ && clock_.Now() >= show_again_at_)) return false;
 
+  urgent_ = false;
   const SnapshotPtr newest = newest_;
   if (care_ != nullptr) care_->Prune(*newest, pattern_scene_.get());
   drawn_snapshot_ = newest->number;
@@ -242,6 +245,7 @@ absl::Status FramePipeline::ApplyDelta(size_t size) {
     return absl::InternalError(
         absl::StrFormat("a delta planned as %d bytes came out as %d", size, writer.size()));
   }
+  block->Refer(writer.TakeReferred());
   made_.engine->Apply(*std::move(block), size, Completion(&FramePipeline::OnCallDone));
   return absl::OkStatus();
 }
@@ -275,6 +279,9 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   lit_voxels_ = result->lit_voxels;
   singular_drawables_ = result->singular_drawables;
   const sync::TimeNs now = clock_.Now();
+  drawing.stages.drawing_ns = drawing.began;
+  drawing.stages.sliced_ns = now;
+  drawing.stages.assembled_ns = std::max(drawing.began, now - result->slice_ns);
   assemble_.Add(now, result->assemble_ns);
   slice_.Add(now, result->slice_ns);
   if (care_ != nullptr && care_->away()) {
@@ -317,7 +324,7 @@ void FramePipeline::SubmitDrawn(Drawing drawing) {
   show_again_ = false;
   last_submitted_ = drawing.volume;
   in_display_[drawing.volume] = drawing.contents;
-  riders_.Submit(drawing.volume);
+  riders_.Submit(drawing.volume, drawing.stages);
   display_->Submit(std::move(drawing.lease.frame));
 }
 
@@ -396,9 +403,13 @@ void FramePipeline::OnState(display::DisplayState state, const std::string& reas
 void FramePipeline::Told(const Rider& rider, const CommitOutcome& outcome) {
   if (outcome.kind == CommitOutcome::Kind::kPresented) {
     const sync::TimeNs now = clock_.Now();
-    commit_to_presented_.Add(now, outcome.time_ns - rider.accepted_ns);
-    if (outcome.last_byte_ns != 0) {
-      commit_to_last_byte_.Add(now, outcome.last_byte_ns - rider.accepted_ns);
+    const Stages& at = outcome.stages;
+    commit_to_presented_.Add(now, at.shown_ns - at.applied_ns);
+    waiting_.Add(now, at.drawing_ns - at.applied_ns);
+    if (at.transferred_ns != 0) {
+      commit_to_last_byte_.Add(now, at.transferred_ns - at.applied_ns);
+      transferring_.Add(now, at.transferred_ns - at.sliced_ns);
+      showing_.Add(now, at.shown_ns - at.transferred_ns);
     }
   }
   tell_(rider, outcome);

@@ -45,6 +45,7 @@
 #include "daemon/pipeline/loop.h"
 #include "daemon/pipeline/rider_book.h"
 #include "daemon/pipeline/sliding_window.h"
+#include "daemon/pipeline/sweep_outlook.h"
 #include "daemon/scene/engine_delta.h"
 #include "daemon/scene/snapshot.h"
 #include "display/api/display.h"
@@ -92,7 +93,11 @@ class FramePipeline final : private display::Display::Listener {
   // A newer snapshot, of a commit or of something internal. Drawn by a later Step.
   void Show(SnapshotPtr snapshot);
   // `hidden`: all the commit's operations were in hidden layers.
-  void Show(SnapshotPtr snapshot, const Rider& rider, bool hidden);
+  // `urgent`: it must not wait for the volume in the mailbox to begin, but take its place.
+  void Show(SnapshotPtr snapshot, const Rider& rider, bool hidden, bool urgent = false);
+
+  // When the display's coming sweeps begin, as of the last Step.
+  std::shared_ptr<const SweepOutlook> sweeps() const { return sweeps_; }
 
   // Checks every field first, and changes nothing if one is refused.
   absl::Status Update(const DisplayUpdate& update);
@@ -117,6 +122,7 @@ class FramePipeline final : private display::Display::Listener {
     uint64_t volume = 0;
     sync::TimeNs began = 0;
     Contents contents;
+    Stages stages;  // from drawing_ns to sliced_ns
     FramePool::Lease lease;
     absl::Status status;  // of what went before SubmitFrame
   };
@@ -188,6 +194,7 @@ class FramePipeline final : private display::Display::Listener {
   std::unique_ptr<EngineScene> scene_;  // that the engine holds
   FramePool pool_;
   std::optional<Drawing> drawing_;
+  bool urgent_ = false;                     // draw, though a volume waits in the mailbox
   std::optional<uint64_t> drawn_snapshot_;  // the newest that a draw was begun for
   gpu::Target target_;                      // that the engine was told last
   bool target_stale_ = true;       // the engine has not been told the target that there is now
@@ -209,6 +216,8 @@ class FramePipeline final : private display::Display::Listener {
   uint64_t lit_voxels_ = 0, singular_drawables_ = 0;
   uint64_t volumes_drawn_ = 0, volumes_unchanged_ = 0;
   SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_;
+  SlidingLatency waiting_, transferring_, showing_;
+  const std::shared_ptr<SweepOutlook> sweeps_ = std::make_shared<SweepOutlook>();
   SlidingRate presented_rate_;
 };
 

@@ -108,6 +108,9 @@ DisplayFigures FramePipeline::Figures() const {
   }
   figures.assemble = assemble_.Summary(now);
   figures.slice = slice_.Summary(now);
+  figures.waiting = waiting_.Summary(now);
+  figures.transferring = transferring_.Summary(now);
+  figures.showing = showing_.Summary(now);
   const RiderBook::Counts& counts = riders_.counts();
   figures.commits_owed = counts.owed;
   figures.commits_presented = counts.presented;

@@ -85,7 +85,9 @@ void RiderBook::Redraw() {
   drawing_.clear();
 }
 
-void RiderBook::Submit(uint64_t volume) { submitted_[volume].riders = std::exchange(drawing_, {}); }
+void RiderBook::Submit(uint64_t volume, const Stages& drawn) {
+  submitted_[volume] = {std::exchange(drawing_, {}), {}, drawn};
+}
 
 void RiderBook::Unchanged(uint64_t before) {
   const auto it = submitted_.find(before);
@@ -130,7 +132,15 @@ void RiderBook::OnOutcome(const display::VolumeOutcome& outcome) {
       given.time_ns = outcome.time_ns;
       given.evidence = outcome.evidence;
       given.last_byte_ns = outcome.last_byte_ns;
-      for (const Rider& rider : volume.riders) Give(rider, given);
+      for (const Rider& rider : volume.riders) {
+        given.stages = rider.stages;
+        given.stages.drawing_ns = volume.drawn.drawing_ns;
+        given.stages.assembled_ns = volume.drawn.assembled_ns;
+        given.stages.sliced_ns = volume.drawn.sliced_ns;
+        given.stages.transferred_ns = outcome.last_byte_ns;
+        given.stages.shown_ns = outcome.time_ns;
+        Give(rider, given);
+      }
       given = {};
       given.kind = CommitOutcome::Kind::kUnchanged;
       given.volume = outcome.volume;

@@ -32,8 +32,8 @@ struct Rider {
   uint64_t session = 0;
   uint64_t frame_id = 0;
   uint64_t sequence = 0;
-  sync::TimeNs accepted_ns = 0;
   bool asked = true;  // its client wants the outcomes
+  Stages stages;      // up to applied_ns
 };
 
 class RiderBook {
@@ -55,8 +55,9 @@ class RiderBook {
   void Draw();
   // The volume under way comes to nothing: its riders wait again, before those who came later.
   void Redraw();
-  // `volume`, drawn, goes to the display; its outcome comes by OnOutcome.
-  void Submit(uint64_t volume);
+  // `volume`, drawn, goes to the display; its outcome comes by OnOutcome. Of `drawn`: from drawing_ns
+  // to sliced_ns.
+  void Submit(uint64_t volume, const Stages& drawn = {});
   // The volume under way came out the same as `before`,
   // the one submitted last (and not lost since).
   void Unchanged(uint64_t before);
@@ -74,6 +75,7 @@ class RiderBook {
   struct Volume {
     std::vector<Rider> riders;     // at most one a session
     std::vector<Rider> unchanged;  // drawn later, with the same bytes
+    Stages drawn;
   };
 
   void Give(const Rider& rider, CommitOutcome outcome);

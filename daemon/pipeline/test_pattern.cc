@@ -53,6 +53,8 @@ std::vector<std::optional<display::Vec3>> LightsOf(const display::Geometry& geom
 // A geometry under construction.
 struct Shape {
   GeometryData data;
+  std::vector<float> positions;
+  std::vector<uint32_t> colors;
   bool any = false;
 
   void Extend(double x, double y, double z) {
@@ -65,8 +67,8 @@ struct Shape {
   }
 
   void Vertex(double x, double y, double z, uint32_t color) {
-    data.positions.insert(data.positions.end(), {float(x), float(y), float(z)});
-    data.colors.push_back(color);
+    positions.insert(positions.end(), {float(x), float(y), float(z)});
+    colors.push_back(color);
     ++data.record.vertex_count;
     data.record.color_mode = gpu::ColorMode::kPerVertex;
     Extend(x, y, z);
@@ -204,6 +206,8 @@ class Pattern {
   }
 
   void Add(const std::string& id, Shape shape, uint32_t priority) {
+    shape.data.arrays =
+        gpu::GeometryArrays::Of(shape.data.record, shape.positions, {}, shape.colors);
     auto entity = std::make_shared<Entity>();
     entity->number = first_number_ + layer_.entities.size();
     entity->data.content = std::make_shared<const GeometryData>(std::move(shape.data));

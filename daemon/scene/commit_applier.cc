@@ -24,6 +24,11 @@ const std::string* LayerOf(const Operation& operation) {
   return nullptr;
 }
 
+// What it is that gives an owner its quota.
+const char* MostOf(uint64_t by_operator, uint64_t limit, const char* name) {
+  return by_operator < limit ? "what an operator has set for it" : name;
+}
+
 }  // namespace
 
 CommitApplier::CommitApplier(Draft& draft, const Limits& limits,
@@ -67,7 +72,7 @@ bool CommitApplier::hidden() const {
   for (const std::string& name : touched_) {
     const Layer* before = draft_.base().FindLayer(Key(name));
     const Layer* after = draft_.FindLayer(Key(name));
-    if ((before != nullptr && before->visible) || (after != nullptr && after->visible))
+    if ((before != nullptr && before->shown()) || (after != nullptr && after->shown()))
       return false;
     any = any || before != nullptr || after != nullptr;
   }
@@ -136,11 +141,12 @@ bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::strin
 std::optional<std::string> CommitApplier::OverQuota(uint64_t drawables, uint64_t bytes) const {
   const OwnerTally& tally = draft_.tally(author_.owner);
   if (drawables > tally.drawables) {
-    if (drawables > limits_.max_entities_per_owner) {
+    if (drawables > limits_.max_entities_per_owner || drawables > author_.max_entities) {
       return absl::StrFormat(
-          "its owner would have %d entities (an instance counts as what it draws); "
-          "max_entities_per_owner is %d",
-          drawables, limits_.max_entities_per_owner);
+          "its owner would have %d entities (an instance counts as what it draws); %s is %d",
+          drawables,
+          MostOf(author_.max_entities, limits_.max_entities_per_owner, "max_entities_per_owner"),
+          std::min(author_.max_entities, limits_.max_entities_per_owner));
     }
     const uint64_t all = draft_.total().drawables - tally.drawables + drawables;
     if (all > limits_.max_entities) {
@@ -151,9 +157,11 @@ std::optional<std::string> CommitApplier::OverQuota(uint64_t drawables, uint64_t
     }
   }
   if (bytes > tally.bytes) {
-    if (bytes > limits_.max_bytes_per_owner) {
-      return absl::StrFormat("its owner would hold %d bytes; max_bytes_per_owner is %d", bytes,
-                             limits_.max_bytes_per_owner);
+    if (bytes > limits_.max_bytes_per_owner || bytes > author_.max_bytes) {
+      return absl::StrFormat(
+          "its owner would hold %d bytes; %s is %d", bytes,
+          MostOf(author_.max_bytes, limits_.max_bytes_per_owner, "max_bytes_per_owner"),
+          std::min(author_.max_bytes, limits_.max_bytes_per_owner));
     }
     const uint64_t all = draft_.total().bytes - tally.bytes + bytes;
     if (all > limits_.max_scene_bytes) {
@@ -203,7 +211,7 @@ void CommitApplier::Do(Operation& operation, Upsert& upsert) {
   entity.expires_ns = ExpiryTime(now_, upsert.entity.lifetime_ns);
   if (const EntityPtr* replaced = replaced_.Find(upsert.id)) entity.number = (*replaced)->number;
   entity.data = std::move(upsert.entity);
-  draft_.EditLayer(key, author_.writer);
+  EditLayer(key);
   draft_.PutEntity(key, upsert.id, std::move(entity));
   Applied(upsert.layer);
 }
@@ -256,7 +264,7 @@ void CommitApplier::Do(Operation& operation, Delete& del) {
   } else {
     remove_from(key, del.what == Delete::What::kPrefix ? del.id_or_prefix : "");
   }
-  draft_.EditLayer(key, author_.writer);
+  EditLayer(key);
   Applied(del.layer);
 }
 
@@ -276,7 +284,7 @@ void CommitApplier::Do(Operation& operation, SetTransform& set) {
   }
   Entity entity = **found;
   entity.data.transform = set.transform;
-  draft_.EditLayer(key, author_.writer);
+  EditLayer(key);
   draft_.PutEntity(key, set.id, std::move(entity));
   Applied(set.layer);
 }
@@ -302,12 +310,14 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
                     *std::move(wrong));
     }
   }
-  Layer& layer = draft_.EditLayer(key, author_.writer);
+  Layer& layer = EditLayer(key);
   layer.visible = state.visible.value_or(layer.visible);
   layer.opacity = state.opacity.value_or(layer.opacity);
   layer.order = state.order.value_or(layer.order);
   layer.blend = state.blend.value_or(layer.blend);
   layer.transform = state.transform.value_or(layer.transform);
+  layer.clip = state.clip.value_or(layer.clip);
+  layer.region = state.region.value_or(layer.region);
   Applied(state.layer);
 }
 
@@ -335,7 +345,7 @@ void CommitApplier::Do(Operation& operation, FrameEnd& end) {
     return;
   }
   const OwnedName key = Key(end.layer);
-  replaced_ = draft_.EditLayer(key, author_.writer).entities;
+  replaced_ = EditLayer(key).entities;
   draft_.ClearLayer(key);
   for (Operation* inner : frame.operations) Dispatch(*inner);
   replaced_ = {};
@@ -379,6 +389,32 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
                              limits.max_indices_per_entity));
     }
   };
+  const auto check_clip = [&](const Clip& clip, const std::string& layer) {
+    if (clip.count > limits.max_clip_planes) {
+      return refuse(
+          layer, "", "layer_state.clip.planes", Reason::kQuotaExceeded,
+          absl::StrFormat("%d planes; max_clip_planes is %d", clip.count, limits.max_clip_planes));
+    }
+    for (uint32_t i = 0; i < clip.count; ++i) {
+      const gpu::ClipPlane& p = clip.planes[i];
+      const bool finite =
+          std::isfinite(p.a) && std::isfinite(p.b) && std::isfinite(p.c) && std::isfinite(p.d);
+      if (finite && (p.a != 0 || p.b != 0 || p.c != 0)) continue;
+      refuse(layer, "", absl::StrFormat("layer_state.clip.planes[%d]", i), Reason::kInvalidValue,
+             absl::StrFormat("the plane is (%g, %g, %g, %g); it must be finite, its normal not 0",
+                             p.a, p.b, p.c, p.d));
+    }
+  };
+  const auto check_region = [&](const gpu::Region& region, const std::string& layer) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double min = region.min[axis], max = region.max[axis];
+      if (min < max && std::isfinite(min) && std::isfinite(max)) continue;
+      refuse(layer, "", "layer_state.region", Reason::kInvalidValue,
+             absl::StrFormat("the region goes from %g to %g along %c; both must be finite, the "
+                             "first less than the second",
+                             min, max, "xyz"[axis]));
+    }
+  };
 
   if (const auto* upsert = std::get_if<Upsert>(&operation.op)) {
     check_map(upsert->entity.transform, upsert->layer, upsert->id, "upsert.entity.transform");
@@ -388,6 +424,10 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
   } else if (const auto* state = std::get_if<LayerState>(&operation.op)) {
     if (state->transform.has_value()) {
       check_map(*state->transform, state->layer, "", "layer_state.transform");
+    }
+    if (state->clip.has_value()) check_clip(*state->clip, state->layer);
+    if (state->region.has_value() && state->region->has_value()) {
+      check_region(**state->region, state->layer);
     }
   } else if (const auto* define = std::get_if<DefineObject>(&operation.op)) {
     const std::vector<ObjectPart>& parts = define->data->parts;

@@ -23,6 +23,9 @@ namespace voxeld::daemon {
 struct Author {
   uint64_t owner = 0;
   WriterPtr writer;
+  bool suppressed = false;  // hidden by an operator
+  // The owner's quotas, if an operator set any.
+  uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;
 };
 
 // A display's map from the scene to its voxels, for range checks.
@@ -69,6 +72,11 @@ class CommitApplier {
   void Do(Operation& operation, Commit& commit);
 
   OwnedName Key(const std::string& name) const { return {author_.owner, name}; }
+  Layer& EditLayer(const OwnedName& key) {
+    Layer& layer = draft_.EditLayer(key, author_.writer);
+    layer.suppressed = author_.suppressed;
+    return layer;
+  }
   // The layer whose open frame takes this operation; null: none does.
   Frame* FrameOf(const Operation& operation);
   void Applied(const std::string& layer);

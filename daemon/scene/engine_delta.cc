@@ -18,16 +18,21 @@ gpu::LayerRecord RecordOf(const Layer& layer) {
   gpu::LayerRecord record;
   record.id = layer.number;
   record.order = layer.order;
-  record.visible = layer.visible ? 1 : 0;
+  record.visible = layer.shown() ? 1 : 0;
   record.opacity = layer.opacity;
   record.blend = layer.blend;
   record.transform = layer.transform;
+  record.plane_count = layer.clip.count;
+  std::copy_n(layer.clip.planes, layer.clip.count, record.planes);
+  record.has_region = layer.region.has_value() ? 1 : 0;
+  record.region = layer.region.value_or(gpu::Region());
   return record;
 }
 
 bool LooksSame(const Layer& a, const Layer& b) {
-  return a.order == b.order && a.visible == b.visible && a.opacity == b.opacity &&
-         a.blend == b.blend && a.transform == b.transform;
+  return a.order == b.order && a.shown() == b.shown() && a.opacity == b.opacity &&
+         a.blend == b.blend && a.transform == b.transform && a.clip == b.clip &&
+         a.region == b.region;
 }
 
 // Nothing that an engine sees: label, sequence and expiry may differ.
@@ -99,7 +104,8 @@ size_t EngineScene::Plan(SnapshotPtr next) {
   });
   for (const HeldGeometry& geometry : put_geometries_) {
     geometries_.find(geometry.key())->second.fresh = false;
-    size += gpu::DeltaWriter::SizeOf(geometry.geometry->record);
+    size += geometry.geometry->arrays.block() ? gpu::DeltaWriter::kSizeOfBulkGeometry
+                                              : gpu::DeltaWriter::SizeOf(geometry.geometry->record);
   }
   size += put_layers_.size() * gpu::DeltaWriter::SizeOf(gpu::LayerRecord());
   size += put_drawables_.size() * gpu::DeltaWriter::SizeOf(gpu::DrawableRecord());
@@ -117,8 +123,13 @@ void EngineScene::Write(gpu::DeltaWriter& writer) {
     gpu::GeometryRecord record = geometry.record;
     record.id = geometries_.find(held.key())->second.id;
     record.drawn_by = held.by_cpu ? gpu::DrawnBy::kCpu : gpu::DrawnBy::kEngine;
-    writer.PutGeometry(record, geometry.positions, geometry.indices, geometry.colors);
+    const gpu::GeometryArrays& arrays = geometry.arrays;
     Breathe();
+    if (arrays.block()) {
+      writer.PutGeometry(record, arrays.block());
+      continue;
+    }
+    writer.PutGeometry(record, arrays.positions(), arrays.indices(), arrays.colors());
     since += geometry.bytes();
     if (since >= kBytesPerBreath) {
       since = 0;

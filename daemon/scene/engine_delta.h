@@ -4,6 +4,7 @@
 //   size_t size = scene.Plan(snapshot);         // what differs; 0: nothing
 //   DeltaWriter writer(block.bytes());
 //   scene.Write(writer);                        // writer.size() == size
+//   block.Refer(writer.TakeReferred());         // what lies in bulk memory is not copied
 //
 // An instance becomes one drawable for each primitive that it draws;
 // all share the primitive's geometry. Maps of nested parts are composed from the outside in:

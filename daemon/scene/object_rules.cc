@@ -183,7 +183,7 @@ void CommitApplier::Do(Operation& operation, DeleteObject& del) {
                         del.object, instances.size(), users.size()));
   }
   for (const UseKey& use : instances) {
-    draft_.EditLayer(Key(use.layer), author_.writer);
+    EditLayer(Key(use.layer));
     draft_.RemoveEntity(Key(use.layer), use.id);
     touched_.insert(use.layer);
   }

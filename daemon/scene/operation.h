@@ -4,6 +4,7 @@
 // (existence, quotas, cycles, range on the displays) is the core's to check.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "display/sync/clock.h"
 #include "gpu/affine.h"
 #include "gpu/delta.h"
+#include "gpu/geometry_arrays.h"
 
 namespace voxeld::daemon {
 
@@ -35,6 +37,7 @@ enum class Reason : uint8_t {
   kOutOfOrder = 12,
   kPermissionDenied = 13,
   kUnimplemented = 14,
+  kTimedOut = 15,
 };
 
 // One refused operation. Not fatal.
@@ -83,22 +86,30 @@ struct Limits {
   double max_thickness = 4096;                  // in its own unit
   uint32_t max_sessions = 1024;
   uint32_t max_parts_per_object = 4096;
+  uint32_t max_clip_planes = gpu::kMaxClipPlanes;  // the most there can be
   uint32_t max_captures = 16;
   int64_t max_linger_ns = 3600 * sync::kSecond;
-  uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session, held by its local socket
+  uint64_t credit_bytes = 8u << 20;  // sent by one session and not yet applied
+  // Held for all clients together; the parts are core/budget.h's.
+  uint64_t max_memory_bytes = uint64_t{8} << 30;
+  uint32_t max_riding_commits = 4096;  // of one session, without all outcomes; or waiting to apply
+  uint32_t max_timed_commits = 256;    // of one session, waiting for their time
+  int64_t max_present_at_horizon_ns = 60 * sync::kSecond;
+  int64_t must_show_timeout_ns = 2 * sync::kSecond;
+  uint32_t max_drop_oldest_frames = 64;
+  uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session's sealed memory
 };
 
-// Immutable content of a primitive: the engine's record (its id unused) and arrays, ready to be
-// copied into staging. Shared by snapshots.
+// Immutable content of a primitive: the engine's record (its id unused) and arrays, which engines
+// read where they lie, or, if they are small, get by a delta. Shared by snapshots.
 struct GeometryData {
   gpu::GeometryRecord record;
-  std::vector<float> positions;   // 3 · vertex_count
-  std::vector<uint32_t> indices;  // index_count
-  std::vector<uint32_t> colors;   // 0x00RRGGBB, vertex_count or none
+  gpu::GeometryArrays arrays;  // of the lengths that the record states
   // Bounds in its own coordinates, thickness left out.
   double min[3] = {}, max[3] = {};
   uint64_t bytes() const {
-    return sizeof(*this) + positions.size() * 4 + indices.size() * 4 + colors.size() * 4;
+    return sizeof(*this) + arrays.positions().size_bytes() + arrays.indices().size_bytes() +
+           arrays.colors().size_bytes();
   }
 };
 using GeometryPtr = std::shared_ptr<const GeometryData>;
@@ -130,12 +141,18 @@ struct ObjectData {
 
 enum class DisconnectPolicy : uint8_t { kClear, kLinger, kKeep };
 
+// Which immediate frames are given up while commits wait for their turn.
+enum class FlowPolicy : uint8_t { kReliable, kLatest, kDropOldest };
+
 struct OpenOptions {
   std::string client_name;
   DisconnectPolicy on_disconnect = DisconnectPolicy::kClear;
   int64_t linger_ns = 0;
   bool strict = false;
   bool no_outcomes = false;
+  FlowPolicy flow = FlowPolicy::kReliable;
+  uint32_t drop_oldest_frames = 0;        // kDropOldest: how many stay
+  std::string resume_token, owner_token;  // empty: a new session, a new owner
 };
 
 struct Upsert {
@@ -152,6 +169,14 @@ struct SetTransform {
   std::string layer, id;
   gpu::Affine transform;
 };
+// Half-spaces of the scene, 0 to gpu::kMaxClipPlanes: only what lies in all of them is drawn.
+struct Clip {
+  uint32_t count = 0;
+  gpu::ClipPlane planes[gpu::kMaxClipPlanes];
+  bool operator==(const Clip& other) const {
+    return std::equal(planes, planes + count, other.planes, other.planes + other.count);
+  }
+};
 struct LayerState {
   std::string layer;
   std::optional<bool> visible;
@@ -159,6 +184,8 @@ struct LayerState {
   std::optional<int32_t> order;
   std::optional<gpu::BlendMode> blend;
   std::optional<gpu::Affine> transform;
+  std::optional<Clip> clip;                          // no planes: none any more
+  std::optional<std::optional<gpu::Region>> region;  // holds nothing: none any more
 };
 struct FrameBegin {
   std::string layer;
@@ -176,8 +203,10 @@ struct DeleteObject {
 };
 struct Commit {
   uint64_t frame_id = 0;
-  int64_t send_time_ns = 0;
+  int64_t send_time_ns = 0;  // the client's clock; 0: not known
   uint64_t client_drops = 0;
+  sync::TimeNs present_at_ns = 0;  // 0: at once
+  bool must_show = false;
 };
 
 struct Operation {

@@ -69,7 +69,19 @@ class PersistentMap {
   // null where a map has none.
   template <typename Fn>
   static void Diff(const PersistentMap& before, const PersistentMap& after, Fn&& fn) {
-    DiffAt(before.root_, after.root_, fn);
+    const auto always = [&fn](const K& key, const V* was, const V* is) {
+      fn(key, was, is);
+      return true;
+    };
+    DiffAt(before.root_, after.root_, nullptr, always);
+  }
+
+  // The same for keys that are not less than `from`, until `fn` answers false: then the answer is
+  // false. Taking it up again at the next key costs O(log² n).
+  template <typename Fn>
+  static bool DiffFrom(const PersistentMap& before, const PersistentMap& after, const K& from,
+                       Fn&& fn) {
+    return DiffAt(before.root_, after.root_, &from, fn);
   }
 
  private:
@@ -213,25 +225,27 @@ class PersistentMap {
                                VisitAll(node->right.get(), fn));
   }
 
+  // `from` null: all. Everything right of a key that is not less than `from` is beyond it too.
   template <typename Fn>
-  static void DiffAt(const Ref& a, const Ref& b, Fn& fn) {
-    if (a.get() == b.get()) return;
+  static bool DiffAt(const Ref& a, const Ref& b, const K* from, Fn& fn) {
+    if (a.get() == b.get()) return true;
     if (!a || (b && Above(b->priority, b->key, a->priority, a->key))) {
       // b's root is not in a: it would stand at the top.
       const auto [less, greater] = Split(a, b->key);
-      DiffAt(less, b->left, fn);
-      fn(b->key, nullptr, &b->value);
-      DiffAt(greater, b->right, fn);
-    } else if (!b || Above(a->priority, a->key, b->priority, b->key)) {
-      const auto [less, greater] = Split(b, a->key);
-      DiffAt(a->left, less, fn);
-      fn(a->key, &a->value, nullptr);
-      DiffAt(a->right, greater, fn);
-    } else {
-      DiffAt(a->left, b->left, fn);
-      if (!(a->value == b->value)) fn(a->key, &a->value, &b->value);
-      DiffAt(a->right, b->right, fn);
+      if (from != nullptr && b->key < *from) return DiffAt(greater, b->right, from, fn);
+      return DiffAt(less, b->left, from, fn) && fn(b->key, nullptr, &b->value) &&
+             DiffAt(greater, b->right, nullptr, fn);
     }
+    if (!b || Above(a->priority, a->key, b->priority, b->key)) {
+      const auto [less, greater] = Split(b, a->key);
+      if (from != nullptr && a->key < *from) return DiffAt(a->right, greater, from, fn);
+      return DiffAt(a->left, less, from, fn) && fn(a->key, &a->value, nullptr) &&
+             DiffAt(a->right, greater, nullptr, fn);
+    }
+    if (from != nullptr && a->key < *from) return DiffAt(a->right, b->right, from, fn);
+    return DiffAt(a->left, b->left, from, fn) &&
+           (a->value == b->value || fn(a->key, &a->value, &b->value)) &&
+           DiffAt(a->right, b->right, nullptr, fn);
   }
 
   Ref root_;

@@ -4,9 +4,17 @@
 #include <utility>
 
 namespace voxeld::daemon {
+namespace {
 
-SceneStore::SceneStore(const Limits& limits)
-    : limits_(limits), snapshot_(std::make_shared<const Snapshot>()) {}
+SnapshotPtr FirstSnapshot() {
+  Snapshot empty;
+  empty.number = 1;
+  return std::make_shared<const Snapshot>(std::move(empty));
+}
+
+}  // namespace
+
+SceneStore::SceneStore(const Limits& limits) : limits_(limits), snapshot_(FirstSnapshot()) {}
 
 void SceneStore::Publish(Draft draft) {
   snapshot_ = std::move(draft).Finish(snapshot_->number + 1);
@@ -86,6 +94,30 @@ SceneStore::Removed SceneStore::RemoveLayers(
   Publish(std::move(draft));
   removed.owners.assign(owners.begin(), owners.end());
   return removed;
+}
+
+void SceneStore::Suppress(uint64_t owner, bool suppressed) {
+  std::vector<std::pair<OwnedName, WriterPtr>> layers;
+  snapshot_->layers.ForEachFrom({owner, ""}, [&](const OwnedName& key, const LayerPtr& layer) {
+    if (key.owner != owner) return false;
+    if (layer->suppressed != suppressed) layers.emplace_back(key, layer->writer);
+    return true;
+  });
+  if (layers.empty()) return;
+  Draft draft(snapshot_, next_number_);
+  for (const auto& [key, writer] : layers) draft.EditLayer(key, writer).suppressed = suppressed;
+  Publish(std::move(draft));
+}
+
+void SceneStore::HandOver(uint64_t session, const WriterPtr& writer) {
+  std::vector<OwnedName> keys;
+  snapshot_->layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
+    if (layer->writer->session == session) keys.push_back(key);
+  });
+  if (keys.empty()) return;
+  Draft draft(snapshot_, next_number_);
+  for (const OwnedName& key : keys) draft.EditLayer(key, writer);
+  Publish(std::move(draft));
 }
 
 void SceneStore::ForgetOwner(uint64_t owner) {

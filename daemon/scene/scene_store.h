@@ -30,7 +30,7 @@ class SceneStore {
   SceneStore(const SceneStore&) = delete;
   SceneStore& operator=(const SceneStore&) = delete;
 
-  // The newest; number 0 is the empty scene.
+  // The newest; number 1 is the empty scene (0 is none).
   const SnapshotPtr& snapshot() const { return snapshot_; }
 
   // What coordinates are checked against from now on.
@@ -60,6 +60,13 @@ class SceneStore {
   // keep_state. A new snapshot only if that changed something.
   Removed RemoveLayers(const std::function<bool(const OwnedName&, const Layer&)>& matches,
                        bool keep_state);
+
+  // Hides all layers of an owner, or shows them as they say of themselves. A new snapshot only if that changed
+  // something.
+  void Suppress(uint64_t owner, bool suppressed);
+  // The layers that `session` last wrote get `writer` in the place of theirs: it has ended, or was taken up. A new
+  // snapshot only if there are any.
+  void HandOver(uint64_t session, const WriterPtr& writer);
 
   // Drops the objects of an owner who has no session any more, unless layers of theirs are left.
   void ForgetOwner(uint64_t owner);

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -21,6 +22,7 @@ namespace voxeld::daemon {
 struct Writer {
   uint64_t session = 0;
   std::string client_name;
+  bool ended = false;  // its layers are orphaned
 };
 using WriterPtr = std::shared_ptr<const Writer>;
 
@@ -48,10 +50,14 @@ using EntityMap = PersistentMap<std::string, EntityPtr>;
 struct Layer {
   uint64_t number = 0;  // of creation; the engine's id
   bool visible = true;
+  bool suppressed = false;  // its owner is hidden by an operator
   uint32_t opacity = 255;
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
+  bool shown() const { return visible && !suppressed; }
   WriterPtr writer;
   EntityMap entities;
   uint64_t bytes = 0;
@@ -109,7 +115,7 @@ struct OwnerTally {
 };
 
 struct Snapshot {
-  uint64_t number = 0;  // ascending
+  uint64_t number = 0;  // ascending; 0: of no store
   PersistentMap<OwnedName, LayerPtr> layers;
   PersistentMap<OwnedName, ObjectPtr> objects;
   PersistentMap<UseKey, bool> uses;

@@ -20,18 +20,18 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   Update(Core& core, UpdateDone done) : core_(core), done_(std::move(done)) {}
 
   void Start(OpenOptions open, wire::Decoded decoded, uint64_t bytes) {
-    core_.OpenSession(std::move(open), shared_from_this(),
-                      [self = shared_from_this(), decoded = std::move(decoded),
-                       bytes](absl::StatusOr<SessionInfo> info) mutable {
-                        if (!info.ok()) return self->End(info.status());
-                        {
-                          sync::MutexLock lock(self->mutex_);
-                          self->session_ = info->session;
-                        }
-                        self->core_.Handle(info->session, std::move(decoded.operations),
-                                           std::move(decoded.refused), bytes,
-                                           [self] { self->OnHandled(); });
-                      });
+    core_.OpenSession(
+        std::move(open), bytes, shared_from_this(),
+        [self = shared_from_this(),
+         decoded = std::move(decoded)](absl::StatusOr<SessionInfo> info) mutable {
+          if (!info.ok()) return self->End(info.status());
+          {
+            sync::MutexLock lock(self->mutex_);
+            self->session_ = info->session;
+            self->incarnation_ = info->incarnation;
+          }
+          info->intake->Take({std::move(decoded.operations), std::move(decoded.refused)});
+        });
   }
 
   void OnIssue(const Issue& issue) override {
@@ -44,6 +44,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   void OnReceipt(const Receipt& receipt) override {
     absl::Status status;
     SessionId session = 0;
+    uint64_t incarnation = 0;
     {
       sync::MutexLock lock(mutex_);
       if (answered_) return;
@@ -57,14 +58,15 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
       }
       answered_ = true;
       session = session_;
+      incarnation = incarnation_;
     }
-    core_.CloseSession(session, [self = shared_from_this(), status] { self->Answer(status); });
+    core_.CloseSession(session, incarnation, true,
+                       [self = shared_from_this(), status] { self->Answer(status); });
   }
 
- private:
-  // The commit has been answered by now, unless the core has stopped.
-  void OnHandled() { End(absl::UnavailableError("the daemon has stopped; nothing was applied")); }
+  void OnEnded(const absl::Status& why) override { End(why); }
 
+ private:
   void End(const absl::Status& status) {
     {
       sync::MutexLock lock(mutex_);
@@ -82,6 +84,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   sync::Mutex mutex_;
   v1::ApplyUpdateResponse response_;  // grows until `answered_`
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;
+  uint64_t incarnation_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool answered_ VOXELD_GUARDED_BY(mutex_) = false;
   std::string first_issue_ VOXELD_GUARDED_BY(mutex_);
 };
@@ -90,7 +93,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
 
 void ApplyUpdate(ServiceContext& context, std::span<const std::string_view> slices,
                  UpdateDone done) {
-  wire::Decoded decoded = wire::DecodeUpdate(slices, context.core.limits());
+  wire::Decoded decoded = wire::DecodeUpdate(slices, context.core.limits(), &context.core.bulk());
   if (!decoded.open.has_value()) return done(decoded.status, v1::ApplyUpdateResponse());
   uint64_t bytes = 0;
   for (const std::string_view slice : slices) bytes += slice.size();

@@ -14,6 +14,7 @@
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/services/unary_call.h"
+#include "daemon/wire/convert.h"
 #include "daemon/wire/encode.h"
 #include "voxeld/v1/scene.grpc.pb.h"
 
@@ -53,9 +54,10 @@ Core::Reply<T> Answer(std::shared_ptr<UnaryCall> call, Response* response) {
 using SceneStub = v1::SceneService;
 using SceneBase =
     SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithRawCallbackMethod_ApplyUpdate<
-        SceneStub::WithCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
+        SceneStub::WithRawCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
             SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
-                SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>;
+                SceneStub::WithCallbackMethod_ListOwners<SceneStub::WithCallbackMethod_ControlOwner<
+                    SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>>>;
 
 class SceneService final : public SceneBase {
  public:
@@ -71,10 +73,9 @@ class SceneService final : public SceneBase {
     return DoApplyUpdate(call->DefaultReactor(), *request, response);
   }
 
-  grpc::ServerWriteReactor<v1::WatchSceneResponse>* WatchScene(
-      CallbackServerContext*, const v1::WatchSceneRequest*) override {
-    return new RefusedWrites<v1::WatchSceneResponse>(absl::UnimplementedError(
-        "WatchScene is not implemented in this version of the server: use ListEntities"));
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* WatchScene(CallbackServerContext*,
+                                                         const grpc::ByteBuffer* request) override {
+    return DoWatchScene(*request);
   }
 
   ServerUnaryReactor* ListEntities(CallbackServerContext* call,
@@ -91,6 +92,24 @@ class SceneService final : public SceneBase {
   ServerUnaryReactor* ClearLayer(CallbackServerContext* call, const v1::ClearLayerRequest* request,
                                  v1::ClearLayerResponse* response) override {
     return DoClearLayer(call->DefaultReactor(), *request, response);
+  }
+
+  ServerUnaryReactor* ListOwners(CallbackServerContext* call, const v1::ListOwnersRequest*,
+                                 v1::ListOwnersResponse* response) override {
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    context_.core.ListOwners(
+        Answer<std::vector<OwnerInfo>>(UnaryCall::Begin(context_.short_calls, reactor), response));
+    return reactor;
+  }
+
+  ServerUnaryReactor* ControlOwner(CallbackServerContext* call,
+                                   const v1::ControlOwnerRequest* request,
+                                   v1::OwnerInfo* response) override {
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    context_.core.ControlOwner(
+        wire::FromWire(*request),
+        Answer<OwnerInfo>(UnaryCall::Begin(context_.short_calls, reactor), response));
+    return reactor;
   }
 
   grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(CallbackServerContext*,
@@ -123,6 +142,17 @@ class SceneService final : public SceneBase {
           });
         });
     return reactor;
+  }
+
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* DoWatchScene(grpc::ByteBuffer request) {
+    v1::WatchSceneRequest parsed;
+    const grpc::Status status =
+        grpc::SerializationTraits<v1::WatchSceneRequest>::Deserialize(&request, &parsed);
+    if (!status.ok()) {
+      return new RefusedWrites<grpc::ByteBuffer>(
+          absl::InvalidArgumentError("the message is no WatchSceneRequest"));
+    }
+    return NewSceneWatch(context_, parsed);
   }
 
   ServerUnaryReactor* DoListEntities(ServerUnaryReactor* reactor,

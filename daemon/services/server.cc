@@ -7,13 +7,18 @@
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/listen/guard.h"
+#include "daemon/listen/listener.h"
+#include "daemon/listen/probe.h"
+#include "daemon/listen/socket.h"
+#include "daemon/services/call_meter.h"
+#include "daemon/services/call_watch.h"
 #include "daemon/services/services.h"
 
 namespace voxeld::daemon::services {
@@ -25,11 +30,7 @@ constexpr const char* kServices[] = {"voxeld.v1.SceneService", "voxeld.v1.Displa
 // back-pressure, and with the bandwidth probe it grows to megabytes that wait unseen.
 constexpr int kLookaheadBytes = 256 << 10;
 
-// Of a client that pings on its own.
-constexpr int kLeastPingIntervalMs = 5'000;
-
 constexpr sync::TimeNs kLastCallsLimit = 200 * sync::kMillisecond;
-constexpr mode_t kSocketMode = 0660;
 
 // gRPC's threads stay until the process ends. Else the last server to go joins them, and one that
 // polls for a connection whose client read slowly returns only after up to ten seconds.
@@ -40,19 +41,77 @@ void KeepGrpcUp() {
 
 int Milliseconds(sync::TimeNs time) { return static_cast<int>(time / sync::kMillisecond); }
 
+// gRPC's word for never is its greatest.
+int MillisecondsOrNever(sync::TimeNs time) {
+  return time == 0 ? std::numeric_limits<int>::max() : Milliseconds(time);
+}
+
 }  // namespace
 
 class Server::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ServerOptions options)
-      : context_{core, clock, options.version, options.log, options.streams},
+      : context_{core,        clock,           options.version,
+                 options.log, options.streams, options.max_scene_watches},
         options_(std::move(options)),
+        counters_(options_.counters != nullptr ? options_.counters
+                                               : std::make_shared<listen::Counters>()),
+        guard_(options_.connections, clock, *counters_, options_.log),
         scene_(MakeSceneService(context_)),
         display_(MakeDisplayService(context_)) {}
 
   ~Impl() { Shutdown(0); }
 
   absl::Status Start() {
+    if (options_.listen.empty()) {
+      return absl::InvalidArgumentError("no address to listen on; give at least one");
+    }
+    std::vector<listen::ListeningSocket> sockets;
+    for (const Address& address : options_.listen) {
+      auto made = listen::ListeningSocket::Listen(address);
+      if (!made.ok()) return made.status();
+      addresses_.push_back(made->front().address());
+      for (listen::ListeningSocket& socket : *made) {
+        targets_.push_back({socket.name(), socket.address().ToString()});
+        sockets.push_back(std::move(socket));
+      }
+    }
+    if (options_.local.has_value()) {  // there before the first stream that is told of it
+      local::LocalSocketOptions local = *options_.local;
+      local.budget = context_.core.budget();
+      auto socket = local::LocalSocket::Start(context_.clock, std::move(local));
+      if (!socket.ok()) return socket.status();
+      context_.local = *std::move(socket);
+    }
+    if (absl::Status status = Build(); !status.ok()) return status;
+    auto listener = listen::Listener::Start(
+        std::move(sockets), guard_, *counters_, own_, context_.clock,
+        [this](int listening, listen::Descriptor connection) {
+          grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+          parameters.listener_fd = listening;
+          parameters.fd = connection.Release();
+          acceptor_->HandleNewConnection(&parameters);
+        },
+        {.send_limit_ns = options_.keepalive_timeout_ns, .log = options_.log});
+    if (!listener.ok()) return listener.status();
+    listener_ = *std::move(listener);
+    if (options_.connections.max_cancelled_calls_per_second > 0) {
+      meter_ =
+          std::make_unique<CallMeter>(guard_, options_.max_calls_per_connection, context_.clock);
+    }
+    if (options_.connections.probe_interval_ns > 0) {
+      probe_ = std::make_unique<listen::Probe>(
+          targets_, options_.connections.probe_interval_ns,
+          [this](const listen::ProbeTarget& target) {
+            return listen::Reach(target, own_, listen::Probe::kLimit);
+          },
+          [this](bool reachable) { SetReachable(reachable); }, *counters_, context_.clock,
+          options_.log);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Build() {
     KeepGrpcUp();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -61,48 +120,35 @@ class Server::Impl {
     builder.SetMaxReceiveMessageSize(
         static_cast<int>(std::min(context_.core.limits().max_message_bytes, greatest)));
     builder.SetMaxSendMessageSize(-1);
-    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // a busy port is an error
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kLookaheadBytes);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS,
-                               Milliseconds(options_.keepalive_interval_ns));
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
-                               Milliseconds(options_.keepalive_timeout_ns));
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
-                               kLeastPingIntervalMs);
-    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
-                               static_cast<int>(options_.max_calls_per_connection));
+    for (const auto& [name, value] : {
+             std::pair(GRPC_ARG_HTTP2_BDP_PROBE, 0),
+             {GRPC_ARG_ENABLE_CHANNELZ, 1},  // what call_meter.h reads
+             {GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kLookaheadBytes},
+             {GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(options_.keepalive_interval_ns)},
+             {GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(options_.keepalive_timeout_ns)},
+             {GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+              Milliseconds(options_.ping_interval_min_ns)},
+             {GRPC_ARG_HTTP2_MAX_PING_STRIKES, static_cast<int>(options_.max_ping_strikes)},
+             {GRPC_ARG_MAX_CONCURRENT_STREAMS, static_cast<int>(options_.max_calls_per_connection)},
+             {GRPC_ARG_MAX_METADATA_SIZE, static_cast<int>(options_.max_metadata_bytes)},
+             {GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, Milliseconds(options_.handshake_limit_ns)},
+             {GRPC_ARG_MAX_CONNECTION_IDLE_MS,
+              MillisecondsOrNever(options_.connection_idle_limit_ns)},
+             {GRPC_ARG_MAX_CONNECTION_AGE_MS,
+              MillisecondsOrNever(options_.connection_age_limit_ns)},
+             {GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, Milliseconds(options_.connection_age_grace_ns)},
+         }) {
+      builder.AddChannelArgument(name, value);
+    }
     builder.RegisterService(scene_.get());
     builder.RegisterService(display_.get());
-
-    if (options_.listen.empty()) {
-      return absl::InvalidArgumentError("no address to listen on; give at least one");
-    }
-    std::vector<int> ports(options_.listen.size(), 0);
-    for (size_t i = 0; i < options_.listen.size(); ++i) {
-      const Address& address = options_.listen[i];
-      if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
-      builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &ports[i]);
-    }
-    if (options_.local.has_value()) {  // there before the first stream that is told of it
-      absl::StatusOr<std::unique_ptr<local::LocalSocket>> local =
-          local::LocalSocket::Start(context_.clock, *options_.local);
-      if (!local.ok()) return local.status();
-      context_.local = *std::move(local);
-    }
+    std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> watches;
+    watches.push_back(MakeCallWatch(guard_));
+    builder.experimental().SetInterceptorCreators(std::move(watches));
+    acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+        grpc::InsecureServerCredentials());
     server_ = builder.BuildAndStart();
-    for (size_t i = 0; i < options_.listen.size(); ++i) {
-      Address address = options_.listen[i];
-      if (ports[i] == 0) {
-        return absl::UnavailableError(absl::StrCat(address.ToString(), " cannot be listened on"));
-      }
-      if (address.unix_socket) {
-        chmod(address.path.c_str(), kSocketMode);
-      } else {
-        address.port = static_cast<uint16_t>(ports[i]);
-      }
-      addresses_.push_back(std::move(address));
-    }
     if (server_ == nullptr) return absl::InternalError("the gRPC server could not be started");
     for (const char* service : kServices) {
       server_->GetHealthCheckService()->SetServingStatus(service, true);
@@ -112,7 +158,19 @@ class Server::Impl {
 
   void SetServing(bool serving) {
     sync::MutexLock lock(serving_mutex_);
+    wanted_ = serving;
+    TellHealth();
+  }
+
+  void SetReachable(bool reachable) {
+    sync::MutexLock lock(serving_mutex_);
+    reachable_ = reachable;
+    TellHealth();
+  }
+
+  void TellHealth() VOXELD_REQUIRES(serving_mutex_) {
     if (down_) return;
+    const bool serving = wanted_ && reachable_;
     for (const char* service : kServices) {
       server_->GetHealthCheckService()->SetServingStatus(service, serving);
     }
@@ -125,6 +183,8 @@ class Server::Impl {
       if (std::exchange(down_, true)) return;
     }
     if (server_ == nullptr) return;
+    if (probe_ != nullptr) probe_->Stop();
+    if (listener_ != nullptr) listener_->StopAccepting();
     server_->GetHealthCheckService()->Shutdown();
     context_.calls.EndAll(absl::UnavailableError("shutting down"));
     const sync::TimeNs deadline = context_.clock.Now() + limit;
@@ -145,6 +205,9 @@ class Server::Impl {
         gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(rest, GPR_TIMESPAN)));
     server_->Wait();
     server_.reset();
+    meter_.reset();
+    listener_.reset();
+    probe_.reset();  // what it may still have asked was ended with the server
   }
 
   const std::vector<Address>& addresses() const { return addresses_; }
@@ -152,10 +215,20 @@ class Server::Impl {
  private:
   ServiceContext context_;
   const ServerOptions options_;
+  const std::shared_ptr<listen::Counters> counters_;
+  listen::Guard guard_;
+  listen::OwnPeers own_;
+  std::vector<listen::ProbeTarget> targets_;
   const std::unique_ptr<grpc::Service> scene_, display_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<listen::Listener> listener_;
+  std::unique_ptr<CallMeter> meter_;
+  std::unique_ptr<listen::Probe> probe_;
   sync::Mutex serving_mutex_;
   bool down_ VOXELD_GUARDED_BY(serving_mutex_) = false;
+  bool wanted_ VOXELD_GUARDED_BY(serving_mutex_) = true;
+  bool reachable_ VOXELD_GUARDED_BY(serving_mutex_) = true;
   std::vector<Address> addresses_;
 };
 

@@ -1,4 +1,5 @@
-// The gRPC server: both services, health and reflection, on any number of addresses.
+// The gRPC server: both services, health and reflection, on any number of addresses, behind a
+// listener of our own (daemon/listen).
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,8 @@
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
 #include "daemon/core/core.h"
+#include "daemon/listen/counters.h"
+#include "daemon/listen/limits.h"
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/context.h"
@@ -21,11 +24,22 @@ struct ServerOptions {
   std::vector<Address> listen;  // at least one
   std::string version;
   StreamLimits streams;
-  uint32_t max_calls_per_connection = 256;
+  listen::ConnectionLimits connections;
+  // Where the listener counts; none: nobody asks.
+  std::shared_ptr<listen::Counters> counters;
+  uint32_t max_calls_per_connection = 100;
+  uint32_t max_metadata_bytes = 8u << 10;
+  sync::TimeNs handshake_limit_ns = 2 * sync::kSecond;
+  sync::TimeNs ping_interval_min_ns = 5 * sync::kSecond;
+  uint32_t max_ping_strikes = 2;
+  // 0: never.
+  sync::TimeNs connection_idle_limit_ns = 0, connection_age_limit_ns = 0;
+  sync::TimeNs connection_age_grace_ns = 60 * sync::kSecond;
+  uint32_t max_scene_watches = 64;
   // An idle connection is probed this often, and closed when no answer comes in time.
   sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
-  // Where producers on this machine hand over memory; nothing: nowhere.
+  // Where producers on this machine hand over memory, charged to the core's budget; nothing: nowhere.
   std::optional<local::LocalSocketOptions> local;
   Logger* log = nullptr;  // outlives the server; may be none
 };
@@ -44,7 +58,8 @@ class Server {
   // Where it listens, with the ports that were chosen.
   const std::vector<Address>& addresses() const;
 
-  // What health answers, for every service, until Shutdown.
+  // What health answers, for every service, until Shutdown: also while the server cannot be reached,
+  // by its own probe's word, it is NOT_SERVING.
   void SetServing(bool serving);
 
   // Health answers NOT_SERVING, nothing new is accepted, every long call ends with

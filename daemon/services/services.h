@@ -19,6 +19,7 @@ namespace voxeld::v1 {
 class CaptureVolumeRequest;
 class Stats;
 class VolumeChunk;
+class WatchSceneRequest;
 class WatchStatsRequest;
 }  // namespace voxeld::v1
 
@@ -30,6 +31,8 @@ std::unique_ptr<grpc::Service> MakeDisplayService(ServiceContext& context);
 // Reactors that own themselves until gRPC is done with them.
 // Requests are read before the call returns.
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context);
+grpc::ServerWriteReactor<grpc::ByteBuffer>* NewSceneWatch(ServiceContext& context,
+                                                          const v1::WatchSceneRequest& request);
 grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context,
                                                    const v1::WatchStatsRequest& request);
 grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,

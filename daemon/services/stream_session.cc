@@ -1,6 +1,7 @@
 #include "daemon/services/stream_session.h"
 
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -17,16 +18,26 @@ void StreamSession::Start() {
 }
 
 void StreamSession::Read() {
-  if (port_ == nullptr || reading_ || reads_done_ || unprocessed_ >= kMaxUnprocessed) return;
-  if (unprocessed_local_ >= kMaxUnprocessed * core_.limits().max_message_bytes) return;
+  if (port_ == nullptr || reading_ || reads_done_ || HalfFull()) return;
   if (state_ != State::kNew && state_ != State::kOpen) return;
   reading_ = true;
   port_->Read();
 }
 
+bool StreamSession::HalfFull() const {
+  return answers_.size() > context_.limits.max_queued_answers / 2 ||
+         answers_.bytes() > context_.limits.max_queued_bytes / 2;
+}
+
+bool StreamSession::Crowded() const {
+  sync::MutexLock lock(mutex_);
+  return Listening() && HalfFull();
+}
+
 void StreamSession::OnMessage(std::span<const std::string_view> slices) {
-  uint64_t bytes = 0;
-  for (const std::string_view slice : slices) bytes += slice.size();
+  Arrival arrival;
+  arrival.received_ns = context_.clock.Now();
+  for (const std::string_view slice : slices) arrival.bytes += slice.size();
   uint64_t previous = 0;
   std::shared_ptr<const wire::MemorySource> memory;
   {
@@ -35,16 +46,18 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
     previous = sequence_;
     memory = local_.memory();
   }
-  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous, memory.get());
+  wire::Decoded decoded =
+      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(), memory.get());
+  arrival.decoded_ns = context_.clock.Now();
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
     OpenOptions open = *std::exchange(decoded.open, std::nullopt);
-    return TakeOpen(std::move(open), std::move(decoded), bytes);
+    return TakeOpen(std::move(open), std::move(decoded), arrival);
   }
-  TakeOperations(std::move(decoded), bytes);
+  TakeOperations(std::move(decoded), arrival);
 }
 
-void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t bytes) {
+void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, const Arrival& arrival) {
   bool first = false;
   {
     sync::MutexLock lock(mutex_);
@@ -65,9 +78,9 @@ void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t b
                          Reason::kOutOfOrder,
                          "open came a second time; a stream is opened once, by its first message"},
                         core_.limits().max_issues_per_commit);
-    return TakeOperations(std::move(decoded), bytes);
+    return TakeOperations(std::move(decoded), arrival);
   }
-  core_.OpenSession(std::move(open), shared_from_this(),
+  core_.OpenSession(std::move(open), arrival.bytes, shared_from_this(),
                     [self = shared_from_this()](const absl::StatusOr<SessionInfo>& info) {
                       self->OnOpened(info);
                     });
@@ -79,21 +92,22 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
   {
     sync::MutexLock lock(mutex_);
     session_ = info->session;
+    incarnation_ = info->incarnation;
     abandoned = state_ != State::kOpening;  // ended meanwhile
     if (!abandoned) {
       v1::StreamResponse response;
+      wire::Encode(*info, response.mutable_opened());
       v1::Opened* opened = response.mutable_opened();
-      opened->set_session(info->session);
-      opened->set_owner(info->owner);
       opened->set_server_version(context_.version);
       opened->set_server_time_ns(context_.clock.Now());
       wire::Encode(core_.limits(), opened->mutable_limits());
-      opened->mutable_displays()->Assign(info->displays.begin(), info->displays.end());
+      intake_ = info->intake;
       local_ = local::LocalSession(context_.local.get(), session_);
       opened->set_local_socket(local_.path());
       opened->set_local_token(local_.token());
       state_ = State::kOpen;
-      Queue(response);
+      answers_.AddOpened(response.SerializeAsString());
+      WriteNext();
       Read();
       if (context_.log != nullptr) {
         context_.log->Info("session opened", {{"session", std::to_string(session_)},
@@ -105,8 +119,8 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
   if (abandoned) CloseSession();
 }
 
-void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
-  SessionId session = 0;
+void StreamSession::TakeOperations(wire::Decoded decoded, const Arrival& arrival) {
+  std::shared_ptr<Intake> intake;
   bool early = false;
   {
     sync::MutexLock lock(mutex_);
@@ -114,11 +128,13 @@ void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
     if (!early && state_ != State::kOpen) return;
     if (!early) {
       sequence_ = decoded.sequence;
-      session = session_;
-      ++unprocessed_;
-      unprocessed_local_ += decoded.local_bytes;
+      intake = intake_;
       for (const Operation& operation : decoded.operations) {
         if (std::holds_alternative<Commit>(operation.op)) ++unanswered_;
+      }
+      if (decoded.ping_client_time_ns.has_value()) {
+        answers_.AddPong(*decoded.ping_client_time_ns, arrival.received_ns);
+        WriteNext();
       }
     }
   }
@@ -126,26 +142,20 @@ void StreamSession::TakeOperations(wire::Decoded decoded, uint64_t bytes) {
     return End(absl::FailedPreconditionError(
         "the first message of a stream must be open; the operation was not carried out"));
   }
-  core_.Handle(session, std::move(decoded.operations), std::move(decoded.refused), bytes,
-               [self = shared_from_this(), local_bytes = decoded.local_bytes] {
-                 self->OnProcessed(local_bytes);
-               });
+  intake->Take({.operations = std::move(decoded.operations),
+                .refused = std::move(decoded.refused),
+                .bytes = arrival.bytes,
+                .received_ns = arrival.received_ns,
+                .decoded_ns = arrival.decoded_ns,
+                .local_bytes = decoded.local_bytes});
   // Only now: a message that came in on another thread would overtake this one.
+  if (intake->HasRoom()) OnRoom();
+}
+
+void StreamSession::OnRoom() {
   sync::MutexLock lock(mutex_);
   reading_ = false;
   Read();
-}
-
-void StreamSession::OnProcessed(uint64_t local_bytes) {
-  bool close = false;
-  {
-    sync::MutexLock lock(mutex_);
-    --unprocessed_;
-    unprocessed_local_ -= local_bytes;
-    Read();
-    close = Drained();
-  }
-  if (close) CloseSession();
 }
 
 void StreamSession::OnReadsDone() {
@@ -167,9 +177,7 @@ void StreamSession::OnReadsDone() {
 }
 
 bool StreamSession::Drained() {
-  if (state_ != State::kDraining || unprocessed_ > 0 || unanswered_ > 0 || outcomes_owed_ > 0) {
-    return false;
-  }
+  if (state_ != State::kDraining || unanswered_ > 0 || outcomes_owed_ > 0) return false;
   return Close(absl::OkStatus());
 }
 
@@ -187,15 +195,12 @@ void StreamSession::OnAlarm() {
 }
 
 void StreamSession::OnCancel() {
-  bool close = false;
   {
     sync::MutexLock lock(mutex_);
     cancelled_ = true;
-    queue_.clear();
-    queued_bytes_ = 0;
-    close = Close(absl::CancelledError("the client is gone"));
+    (void)Close(absl::CancelledError("the client is gone"));
   }
-  if (close) CloseSession();
+  CloseSession();  // also when that was done before: nobody is there to be told any more
   sync::MutexLock lock(mutex_);
   if (state_ == State::kClosing) state_ = State::kFlushing;  // nobody is there to wait with
   FinishIfFlushed();
@@ -225,18 +230,26 @@ bool StreamSession::Close(const absl::Status& status) {
 
 void StreamSession::CloseSession() {
   SessionId session = 0;
+  uint64_t incarnation = 0;
+  bool gone = false;
+  std::vector<Receipt> undelivered;
   local::LocalSession local;  // ends without the lock
   {
     sync::MutexLock lock(mutex_);
-    session = session_;
     std::swap(local, local_);
-    if (port_ != nullptr && context_.log != nullptr) {
+    session = session_;
+    incarnation = incarnation_;
+    gone = cancelled_ || state_ == State::kFinished;
+    if (gone) undelivered = answers_.TakeOutcomes();
+    if (!std::exchange(logged_end_, true) && session != 0 && context_.log != nullptr) {
       context_.log->Info("session closed", {{"session", std::to_string(session)},
                                             {"client", client_name_},
                                             {"why", end_.ToString()}});
     }
   }
-  core_.CloseSession(session, [self = shared_from_this()] { self->OnClosed(); });
+  if (session == 0) return;
+  core_.CloseSession(session, incarnation, gone, [self = shared_from_this()] { self->OnClosed(); });
+  if (!undelivered.empty()) core_.GiveBack(session, std::move(undelivered));
 }
 
 void StreamSession::OnClosed() {
@@ -246,14 +259,12 @@ void StreamSession::OnClosed() {
 }
 
 void StreamSession::FinishIfFlushed() {
-  if (state_ == State::kFlushing && queue_.empty() && !writing_) Finish();
+  if (state_ == State::kFlushing && (cancelled_ || (answers_.empty() && !writing_))) Finish();
 }
 
 void StreamSession::Finish() {
   if (state_ == State::kFinished) return;
   state_ = State::kFinished;
-  queue_.clear();
-  queued_bytes_ = 0;
   if (port_ != nullptr) port_->Finish(end_);
 }
 
@@ -265,80 +276,78 @@ void StreamSession::OnPortDone() {
   context_.calls.Remove(this);
 }
 
-void StreamSession::OnIssue(const Issue& issue) {
-  v1::StreamResponse response;
-  wire::Encode(issue, response.add_issues());
-  bool close = false;
-  {
-    sync::MutexLock lock(mutex_);
-    Queue(response);
-    close = Overrun();
-  }
-  if (close) CloseSession();
+bool StreamSession::Listening() const {
+  return port_ != nullptr && !cancelled_ && state_ != State::kFinished;
 }
 
-void StreamSession::OnReceipt(const Receipt& receipt) {
-  v1::StreamResponse response;
-  wire::Encode(receipt, response.add_receipts());
+template <typename Answer>
+void StreamSession::Tell(const Answer& answer) {
   bool close = false;
   {
     sync::MutexLock lock(mutex_);
-    if (std::holds_alternative<CommitOutcome>(receipt.what)) {
-      if (outcomes_owed_ > 0) --outcomes_owed_;
-    } else {
-      if (unanswered_ > 0) --unanswered_;
-      const auto* accepted = std::get_if<Accepted>(&receipt.what);
-      if (accepted != nullptr && !no_outcomes_) outcomes_owed_ += accepted->displays.size();
+    if constexpr (std::is_same_v<Answer, Receipt>) {
+      if (std::holds_alternative<CommitOutcome>(answer.what)) {
+        if (outcomes_owed_ > 0) --outcomes_owed_;
+      } else if (!std::holds_alternative<Scheduled>(answer.what)) {
+        if (unanswered_ > 0) --unanswered_;
+        const auto* accepted = std::get_if<Accepted>(&answer.what);
+        if (accepted != nullptr) outcomes_owed_ += accepted->displays.size();
+      }
     }
-    Queue(response);
-    close = Overrun() || Drained();
+    const bool added = !Listening() || answers_.Add(answer);
+    WriteNext();
+    close = Overrun(added) || Drained();
   }
   if (close) CloseSession();
 }
 
-void StreamSession::Queue(const v1::StreamResponse& response) {
-  if (port_ == nullptr || cancelled_ || state_ == State::kFinished) return;
-  queue_.push_back(response.SerializeAsString());
-  queued_bytes_ += queue_.back().size();
+void StreamSession::OnIssue(const Issue& issue) { Tell(issue); }
+void StreamSession::OnReceipt(const Receipt& receipt) { Tell(receipt); }
+
+void StreamSession::OnCredit(uint64_t total_bytes) {
+  sync::MutexLock lock(mutex_);
+  if (!Listening()) return;
+  answers_.SetCredit(total_bytes);
   WriteNext();
 }
 
-bool StreamSession::Overrun() {
-  if (port_ == nullptr) return false;
-  if (queue_.size() <= context_.limits.max_queued_answers &&
-      queued_bytes_ <= context_.limits.max_queued_bytes) {
+bool StreamSession::Overrun(bool added) {
+  if (!Listening()) return false;
+  if (added && answers_.size() <= context_.limits.max_queued_answers &&
+      answers_.bytes() <= context_.limits.max_queued_bytes) {
     return false;
   }
   core_.CountOverrun();
   const bool close = !ending_;
   if (close) {
     ending_ = true;
-    end_ = absl::ResourceExhaustedError(
-        absl::StrCat("the client left more than ", queue_.size() - 1, " answers (", queued_bytes_,
-                     " bytes) unread; read the stream while writing to it"));
+    end_ = absl::ResourceExhaustedError(absl::StrCat(
+        "the client left more than ", answers_.size() - 1, " answers (", answers_.bytes(),
+        " bytes) unread", added ? "" : ", and max_memory_bytes is used up",
+        "; read the stream while writing to it"));
   }
   Finish();
   return close;
 }
 
 void StreamSession::WriteNext() {
-  if (writing_ || queue_.empty() || port_ == nullptr) return;
-  const std::string message = std::move(queue_.front());
-  queue_.pop_front();
-  queued_bytes_ -= message.size();
+  if (writing_ || !Listening() || answers_.empty()) return;
   writing_ = true;
-  port_->Write(message);
+  port_->Write(answers_.Pop(context_.clock.Now()));
 }
 
 void StreamSession::OnWritten(bool ok) {
-  sync::MutexLock lock(mutex_);
-  writing_ = false;
-  if (!ok) {
-    queue_.clear();
-    queued_bytes_ = 0;
+  std::shared_ptr<Intake> wake;
+  {
+    sync::MutexLock lock(mutex_);
+    writing_ = false;
+    const bool crowded = HalfFull();
+    if (ok) WriteNext();
+    if (crowded && !HalfFull()) wake = intake_;
+    Read();
+    FinishIfFlushed();
   }
-  if (state_ != State::kFinished) WriteNext();
-  FinishIfFlushed();
+  if (wake != nullptr) wake->Wake();
 }
 
 }  // namespace voxeld::daemon::services

@@ -2,21 +2,23 @@
 // what is read, what is owed, what is queued, how it ends.
 //
 //   first message         Open, answered by Opened
-//   every other           decoded and posted to the core; at most kMaxUnprocessed
-//                         of them unprocessed
+//   Ping                  answered at once
+//   every other           decoded and handed to the session's intake; the next is read while that has
+//                         room and the client reads its answers
 //   half-close            waits (drain_limit_ns at most) until every commit has its answer and its
 //                         outcomes, closes the session, writes what is queued, ends with OK
 //   End, bad bytes        closes the session, writes what is queued (drain_limit_ns at most), ends
 //                         with the status
-//   client gone           closes the session and ends at once
-//   client does not read  closes the session and ends with RESOURCE_EXHAUSTED
-//                         once the queue is full
+//   client gone           closes the session, gives back the outcomes that wait, and ends at once
+//   client does not read  nothing more is read or applied once the queue is half full; should it get
+//                         full all the same, closes the session and ends with RESOURCE_EXHAUSTED
+//   taken up by another   ends with ABORTED; likewise when an operator evicts its owner
 //
-// Thread-safe. The port's events come one after another for reads and for writes, as gRPC has it.
+// Thread-safe. Lock order: the intake's, then the session's; so the intake is not called with the session's lock
+// held. The port's events come one after another for reads and for writes, as gRPC has it.
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <span>
 #include <string>
@@ -26,13 +28,10 @@
 #include "daemon/core/core.h"
 #include "daemon/local/local_session.h"
 #include "daemon/services/active_calls.h"
+#include "daemon/services/answer_queue.h"
 #include "daemon/services/context.h"
 #include "daemon/wire/decode.h"
 #include "display/sync/mutex.h"
-
-namespace voxeld::v1 {
-class StreamResponse;
-}
 
 namespace voxeld::daemon::services {
 
@@ -51,11 +50,9 @@ class StreamSession final : public SessionSink,
                             public ActiveCall,
                             public std::enable_shared_from_this<StreamSession> {
  public:
-  static constexpr int kMaxUnprocessed = 4;
-
   // `context` outlives the session; `port` lives until OnPortDone.
   StreamSession(ServiceContext& context, StreamPort* port)
-      : context_(context), core_(context.core), port_(port) {}
+      : context_(context), core_(context.core), port_(port), answers_(core_.budget()) {}
 
   void Start();
 
@@ -70,6 +67,10 @@ class StreamSession final : public SessionSink,
   // ---- from the core
   void OnIssue(const Issue& issue) override;
   void OnReceipt(const Receipt& receipt) override;
+  void OnCredit(uint64_t total_bytes) override;
+  void OnRoom() override;
+  void OnEnded(const absl::Status& why) override { End(why); }
+  bool Crowded() const override;
 
   // ---- at shutdown
   void End(const absl::Status& status) override;
@@ -85,15 +86,24 @@ class StreamSession final : public SessionSink,
     kFinished,  // Finish was called
   };
 
-  void TakeOpen(OpenOptions open, wire::Decoded decoded, uint64_t bytes);
-  void TakeOperations(wire::Decoded decoded, uint64_t bytes);
+  // When and how large the message was.
+  struct Arrival {
+    uint64_t bytes = 0;
+    sync::TimeNs received_ns = 0, decoded_ns = 0;
+  };
+
+  void TakeOpen(OpenOptions open, wire::Decoded decoded, const Arrival& arrival);
+  void TakeOperations(wire::Decoded decoded, const Arrival& arrival);
   void OnOpened(const absl::StatusOr<SessionInfo>& info);
-  void OnProcessed(uint64_t local_bytes);
   void Read() VOXELD_REQUIRES(mutex_);
-  void Queue(const v1::StreamResponse& response) VOXELD_REQUIRES(mutex_);
+  bool HalfFull() const VOXELD_REQUIRES(mutex_);
+  // Whether there is anybody to be told.
+  bool Listening() const VOXELD_REQUIRES(mutex_);
   void WriteNext() VOXELD_REQUIRES(mutex_);
+  template <typename Answer>
+  void Tell(const Answer& answer);
   // These return whether the caller must call CloseSession() once it has released the lock.
-  [[nodiscard]] bool Overrun() VOXELD_REQUIRES(mutex_);
+  [[nodiscard]] bool Overrun(bool added) VOXELD_REQUIRES(mutex_);
   [[nodiscard]] bool Drained() VOXELD_REQUIRES(mutex_);
   [[nodiscard]] bool Close(const absl::Status& status) VOXELD_REQUIRES(mutex_);
   void CloseSession();
@@ -103,29 +113,27 @@ class StreamSession final : public SessionSink,
 
   ServiceContext& context_;  // there as long as the port is
   Core& core_;
-  sync::Mutex mutex_;
+  mutable sync::Mutex mutex_;
   StreamPort* port_ VOXELD_GUARDED_BY(mutex_);
   State state_ VOXELD_GUARDED_BY(mutex_) = State::kNew;
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;  // 0: none
+  uint64_t incarnation_ VOXELD_GUARDED_BY(mutex_) = 0;
+  std::shared_ptr<Intake> intake_ VOXELD_GUARDED_BY(mutex_);  // from kOpen on
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
-  local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until the session is closed
+  local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until CloseSession
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
-  // A read is pending, or what it brought has not been handed to the core yet.
+  // A read is pending, or what it brought has not been handed to the intake, or that has no room.
   bool reading_ VOXELD_GUARDED_BY(mutex_) = false;
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;
-  int unprocessed_ VOXELD_GUARDED_BY(mutex_) = 0;  // messages that the core has not taken in
-  // And what they copied from local memory. It is not read on while that is as much as as many
-  // messages could have brought themselves.
-  uint64_t unprocessed_local_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t unanswered_ VOXELD_GUARDED_BY(mutex_) = 0;  // commits without Accepted or Refused
   uint64_t outcomes_owed_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t sequence_ VOXELD_GUARDED_BY(mutex_) = 0;  // of the last request
-  std::deque<std::string> queue_ VOXELD_GUARDED_BY(mutex_);
-  size_t queued_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
+  AnswerQueue answers_ VOXELD_GUARDED_BY(mutex_);
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
   bool ending_ VOXELD_GUARDED_BY(mutex_) = false;  // from kClosing on, with:
   absl::Status end_ VOXELD_GUARDED_BY(mutex_);
+  bool logged_end_ VOXELD_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace voxeld::daemon::services

@@ -100,6 +100,25 @@ MaybeFault CheckSize(const FieldPath& path, const v1::Vec3& vec) {
   return CheckPositive(FieldPath(path, "z"), vec.z());
 }
 
+MaybeFault CheckBox(const FieldPath& path, const v1::Box3& in) {
+  if (auto fault = CheckVec3(FieldPath(path, "min"), in.min())) return fault;
+  if (auto fault = CheckVec3(FieldPath(path, "max"), in.max())) return fault;
+  const double min[3] = {in.min().x(), in.min().y(), in.min().z()};
+  const double max[3] = {in.max().x(), in.max().y(), in.max().z()};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (min[axis] < max[axis]) continue;
+    const FieldPath corner(path, "max");
+    return Fault{FieldPath(corner, axis == 0   ? "x"
+                                   : axis == 1 ? "y"
+                                               : "z")
+                     .ToString(),
+                 Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(max[axis]), "; it must be greater than that of min, ",
+                              Show(min[axis]))};
+  }
+  return {};
+}
+
 Fault UnknownEnum(const FieldPath& path, int value, const char* known) {
   return {path.ToString(), Reason::kInvalidValue,
           absl::StrCat("has the unknown value ", value, "; use one of ", known)};

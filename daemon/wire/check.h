@@ -14,6 +14,7 @@
 
 namespace voxeld::v1 {
 class Affine;
+class Box3;
 class Vec3;
 }  // namespace voxeld::v1
 
@@ -53,6 +54,9 @@ MaybeFault CheckPositive(const FieldPath& path, double value);
 
 MaybeFault CheckVec3(const FieldPath& path, const v1::Vec3& vec);  // CheckFloat of each
 MaybeFault CheckSize(const FieldPath& path, const v1::Vec3& vec);  // CheckPositive of each
+
+// CheckVec3 of both corners, and min < max in every component.
+MaybeFault CheckBox(const FieldPath& path, const v1::Box3& box);
 
 // "has the unknown value 7; use one of FIRST, SECOND".
 Fault UnknownEnum(const FieldPath& path, int value, const char* known);

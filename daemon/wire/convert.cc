@@ -142,25 +142,6 @@ absl::StatusOr<display::Lattice> ShapeFromWire(const v1::Lattice& in) {
   return out;
 }
 
-MaybeFault CheckBox(const FieldPath& path, const v1::Box3& in) {
-  if (auto fault = CheckVec3(FieldPath(path, "min"), in.min())) return fault;
-  if (auto fault = CheckVec3(FieldPath(path, "max"), in.max())) return fault;
-  const double min[3] = {in.min().x(), in.min().y(), in.min().z()};
-  const double max[3] = {in.max().x(), in.max().y(), in.max().z()};
-  for (int axis = 0; axis < 3; ++axis) {
-    if (min[axis] < max[axis]) continue;
-    const FieldPath corner(path, "max");
-    return Fault{FieldPath(corner, axis == 0   ? "x"
-                                   : axis == 1 ? "y"
-                                               : "z")
-                     .ToString(),
-                 Reason::kInvalidValue,
-                 absl::StrCat("is ", Show(max[axis]), "; it must be greater than that of min, ",
-                              Show(min[axis]))};
-  }
-  return {};
-}
-
 }  // namespace
 
 void ToWire(const display::Vec3& in, v1::Vec3* out) {
@@ -172,6 +153,21 @@ void ToWire(const display::Vec3& in, v1::Vec3* out) {
 display::Vec3 FromWire(const v1::Vec3& in) { return {in.x(), in.y(), in.z()}; }
 
 void ToWire(const gpu::Affine& in, v1::Affine* out) { out->mutable_m()->Assign(in.m, in.m + 12); }
+
+void ToWire(const Clip& in, v1::Clip* out) {
+  for (uint32_t i = 0; i < in.count; ++i) {
+    v1::Clip::Plane* plane = out->add_planes();
+    plane->set_a(in.planes[i].a);
+    plane->set_b(in.planes[i].b);
+    plane->set_c(in.planes[i].c);
+    plane->set_d(in.planes[i].d);
+  }
+}
+
+void ToWire(const gpu::Region& in, v1::Box3* out) {
+  ToWire(display::Vec3{in.min[0], in.min[1], in.min[2]}, out->mutable_min());
+  ToWire(display::Vec3{in.max[0], in.max[1], in.max[2]}, out->mutable_max());
+}
 
 void ToWire(const display::Geometry& in, v1::Geometry* out) {
   std::visit([out](const auto& shape) { ShapeToWire(shape, out); }, in.shape);
@@ -271,6 +267,16 @@ absl::StatusOr<ViewOptions> FromWire(const v1::View& in) {
   if (auto fault = ToAffine(FieldPath(path, "transform"), in.transform(), &out.transform)) {
     return Refused(*fault);
   }
+  return out;
+}
+
+OwnerControl FromWire(const v1::ControlOwnerRequest& in) {
+  OwnerControl out;
+  out.owner = in.owner();
+  if (in.has_hidden()) out.hidden = in.hidden();
+  if (in.has_max_bytes()) out.max_bytes = in.max_bytes();
+  if (in.has_max_entities()) out.max_entities = in.max_entities();
+  out.evict = in.evict();
   return out;
 }
 

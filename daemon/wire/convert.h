@@ -23,6 +23,8 @@ v1::VolumeHeader::Source ToWire(display::DecodedVolume::Source source);
 
 void ToWire(const display::Vec3& in, v1::Vec3* out);
 void ToWire(const gpu::Affine& in, v1::Affine* out);  // always 12 values
+void ToWire(const Clip& in, v1::Clip* out);
+void ToWire(const gpu::Region& in, v1::Box3* out);
 void ToWire(const display::Geometry& in, v1::Geometry* out);
 void ToWire(const display::FrameLayout& in, v1::FrameLayout* out);
 void ToWire(const ViewOptions& in, v1::View* out);
@@ -43,5 +45,6 @@ absl::StatusOr<display::Geometry> FromWire(const v1::Geometry& in);
 absl::StatusOr<display::FrameLayout> FromWire(const v1::FrameLayout& in);
 absl::StatusOr<ViewOptions> FromWire(const v1::View& in);
 absl::StatusOr<DisplayUpdate> FromWire(const v1::UpdateDisplayRequest& in);
+OwnerControl FromWire(const v1::ControlOwnerRequest& in);
 
 }  // namespace voxeld::daemon::wire

@@ -13,7 +13,7 @@ namespace {
 template <typename Ours, typename Theirs, size_t n>
 using Table = std::array<std::pair<Ours, Theirs>, n>;
 
-constexpr Table<Reason, v1::Reason, 15> kReasons = {{
+constexpr Table<Reason, v1::Reason, 16> kReasons = {{
     {Reason::kUnspecified, v1::REASON_UNSPECIFIED},
     {Reason::kInvalidValue, v1::REASON_INVALID_VALUE},
     {Reason::kSizeMismatch, v1::REASON_SIZE_MISMATCH},
@@ -29,6 +29,7 @@ constexpr Table<Reason, v1::Reason, 15> kReasons = {{
     {Reason::kOutOfOrder, v1::REASON_OUT_OF_ORDER},
     {Reason::kPermissionDenied, v1::REASON_PERMISSION_DENIED},
     {Reason::kUnimplemented, v1::REASON_UNIMPLEMENTED},
+    {Reason::kTimedOut, v1::REASON_TIMED_OUT},
 }};
 
 constexpr Table<gpu::BlendMode, v1::BlendMode, 3> kBlendModes = {{

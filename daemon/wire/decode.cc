@@ -4,16 +4,20 @@
 #include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/core/token.h"
 #include "daemon/wire/check.h"
+#include "daemon/wire/context.h"
 #include "daemon/wire/element_count.h"
 #include "daemon/wire/local_ranges.h"
 #include "daemon/wire/operations.h"
+#include "daemon/wire/skeleton.h"
 #include "daemon/wire/slice_stream.h"
 #include "voxeld/v1/scene.pb.h"
 
@@ -61,22 +65,41 @@ MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, const Limits& lim
   return {};
 }
 
-MaybeFault CheckFlow(const FieldPath& path, const v1::Open& in) {
+MaybeFault ToFlow(const FieldPath& path, const v1::Open& in, const Limits& limits,
+                  OpenOptions* out) {
   switch (in.flow()) {
     case v1::FLOW_POLICY_UNSPECIFIED:
     case v1::FLOW_POLICY_RELIABLE:
+      out->flow = FlowPolicy::kReliable;
       break;
     case v1::FLOW_POLICY_LATEST:
+      out->flow = FlowPolicy::kLatest;
+      break;
     case v1::FLOW_POLICY_DROP_OLDEST:
-      return Unimplemented(FieldPath(path, "flow"),
-                           "every frame waits its turn; use FLOW_POLICY_RELIABLE");
+      out->flow = FlowPolicy::kDropOldest;
+      break;
     default:
-      return UnknownEnum(FieldPath(path, "flow"), in.flow(), "FLOW_POLICY_RELIABLE");
+      return UnknownEnum(FieldPath(path, "flow"), in.flow(),
+                         "FLOW_POLICY_RELIABLE, FLOW_POLICY_LATEST, FLOW_POLICY_DROP_OLDEST");
   }
-  if (in.drop_oldest_frames() == 0) return {};
+  const uint32_t frames = in.drop_oldest_frames();
+  out->drop_oldest_frames = frames;
+  if (out->flow != FlowPolicy::kDropOldest) {
+    if (frames == 0) return {};
+    return Fault{FieldPath(path, "drop_oldest_frames").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", frames, "; it goes with flow = FLOW_POLICY_DROP_OLDEST only")};
+  }
+  if (frames >= 1 && frames <= limits.max_drop_oldest_frames) return {};
   return Fault{FieldPath(path, "drop_oldest_frames").ToString(), Reason::kInvalidValue,
-               absl::StrCat("is ", in.drop_oldest_frames(),
-                            "; it goes with flow = FLOW_POLICY_DROP_OLDEST only")};
+               absl::StrCat("is ", frames, "; give 1 to max_drop_oldest_frames, ",
+                            limits.max_drop_oldest_frames)};
+}
+
+MaybeFault CheckToken(const FieldPath& path, const std::string& token) {
+  if (token.empty() || token.size() == kTokenBytes) return {};
+  return Fault{path.ToString(), Reason::kInvalidValue,
+               absl::StrCat("has ", token.size(), " bytes; give the ", kTokenBytes,
+                            " bytes of an Opened, or none")};
 }
 
 MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, const Limits& limits,
@@ -85,11 +108,15 @@ MaybeFault ToOpen(const FieldPath& path, const v1::Open& in, const Limits& limit
     return fault;
   }
   if (auto fault = ToPolicy(path, in, limits, out)) return fault;
-  if (!in.resume_token().empty()) {
-    return Unimplemented(FieldPath(path, "resume_token"),
-                         "every stream is a session of its own; leave it empty");
+  if (auto fault = CheckToken(FieldPath(path, "resume_token"), in.resume_token())) return fault;
+  if (auto fault = CheckToken(FieldPath(path, "owner_token"), in.owner_token())) return fault;
+  if (!in.resume_token().empty() && !in.owner_token().empty()) {
+    return Fault{FieldPath(path, "owner_token").ToString(), Reason::kInvalidValue,
+                 "is set beside resume_token, whose session has its owner; give one of them"};
   }
-  if (auto fault = CheckFlow(path, in)) return fault;
+  if (auto fault = ToFlow(path, in, limits, out)) return fault;
+  out->resume_token = in.resume_token();
+  out->owner_token = in.owner_token();
   out->client_name = in.client_name();
   out->strict = in.strict();
   out->no_outcomes = in.no_outcomes();
@@ -152,16 +179,33 @@ absl::Status CheckSize(std::span<const std::string_view> slices, const Limits& l
                    limits.max_message_bytes, ": send more messages that are smaller"));
 }
 
-absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, const char* type,
-                   google::protobuf::Message* out) {
-  SliceStream stream(slices);
-  // The status says it all; a client must not fill logs.
-  const google::protobuf::LogSilencer silence;
-  if (out->ParseFromZeroCopyStream(&stream)) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("a message of ", size, " bytes is not a voxeld.v1.", type,
-                   ": malformed protobuf, or text that is not UTF-8"));
-}
+// A message, parsed; its payloads stay in the slices where that is worth while.
+template <typename Message>
+class Parsed {
+ public:
+  absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, Root root) {
+    // The status says it all; a client must not fill logs.
+    const google::protobuf::LogSilencer silence;
+    bare_ = MakeSkeleton(slices, root, &skeleton_);
+    SliceStream stream(slices);
+    if (bare_ ? message_->ParseFromString(skeleton_.bytes)
+              : message_->ParseFromZeroCopyStream(&stream)) {
+      return absl::OkStatus();
+    }
+    return absl::InvalidArgumentError(
+        absl::StrCat("a message of ", size, " bytes is not a ", message_->GetTypeName(),
+                     ": malformed protobuf, or text that is not UTF-8"));
+  }
+
+  const Message& message() const { return *message_; }
+  const PayloadTable* payloads() const { return bare_ ? &skeleton_.payloads : nullptr; }
+
+ private:
+  google::protobuf::Arena arena_;
+  Message* const message_ = google::protobuf::Arena::CreateMessage<Message>(&arena_);
+  Skeleton skeleton_;
+  bool bare_ = false;  // payloads are left out
+};
 
 Decoded Failed(absl::Status status) {
   Decoded failed;
@@ -170,8 +214,8 @@ Decoded Failed(absl::Status status) {
 }
 
 // Numbers the request and takes its operation. An Open has been dealt with.
-void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits& limits,
-          uint64_t previous_sequence, LocalRanges& ranges, Decoded* out) {
+void Take(const FieldPath& path, const v1::StreamRequest& request, const DecodeContext& context,
+          uint64_t previous_sequence, Decoded* out) {
   out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
   if (out->sequence <= previous_sequence) {
     out->refused.Add({request.sequence(),
@@ -181,11 +225,70 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const Limits&
                       Reason::kOutOfOrder,
                       absl::StrCat("sequence is ", request.sequence(), " after ", previous_sequence,
                                    "; numbers ascend, or are 0 to have the server count")},
-                     limits.max_issues_per_commit);
+                     context.limits.max_issues_per_commit);
     out->sequence = previous_sequence;
     if (request.op_case() != v1::StreamRequest::kCommit) return;
   }
-  DecodeOperation(path, request, out->sequence, limits, {&out->operations, &out->refused}, ranges);
+  DecodeOperation(path, request, out->sequence, context, {&out->operations, &out->refused});
+}
+
+// `memory` is what the context's ranges are of; null: it has none.
+Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t previous_sequence,
+               const MemorySource* memory) {
+  Decoded out;
+  if (request.op_case() == v1::StreamRequest::kOpen) {
+    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), context);
+    if (!open.ok()) return Failed(open.status());
+    out.open = *std::move(open);
+    out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
+    return out;
+  }
+  if (request.op_case() == v1::StreamRequest::kPing) {
+    out.ping_client_time_ns = request.ping().client_time_ns();
+    out.sequence = std::max(request.sequence(), previous_sequence);
+    return out;
+  }
+  std::optional<LocalRanges> ranges;
+  if (memory != nullptr) context.ranges = &ranges.emplace(*memory, context.limits);
+  Take(FieldPath(""), request, context, previous_sequence, &out);
+  if (ranges.has_value()) out.local_bytes = ranges->bytes_read();
+  return out;
+}
+
+Decoded Decode(const v1::ApplyUpdateRequest& request, const DecodeContext& context) {
+  Decoded out;
+  if (const auto count = static_cast<uint64_t>(request.operations_size());
+      count > context.limits.max_operations_per_commit) {
+    return Failed(TooManyOperations(count, context));
+  }
+  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), context);
+  if (!open.ok()) return Failed(open.status());
+  if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {
+    open->on_disconnect = DisconnectPolicy::kKeep;
+  }
+  if (!open->resume_token.empty()) {
+    return Failed(absl::InvalidArgumentError(
+        "open.resume_token is set; an update is a session of its own, which takes up no other: "
+        "give owner_token to join an owner"));
+  }
+  open->no_outcomes = true;  // the answer has no place for them
+  for (int i = 0; i < request.operations_size(); ++i) {
+    const v1::StreamRequest& operation = request.operations(i);
+    const FieldPath path("operations", i);
+    if (operation.has_open() || operation.has_commit() || operation.has_ping()) {
+      const char* field = operation.has_open()     ? "open"
+                          : operation.has_commit() ? "commit"
+                                                   : "ping";
+      return Failed(absl::InvalidArgumentError(
+          absl::StrCat(FieldPath(path, field).ToString(),
+                       " is set; an update is opened by its own field and committed by itself, and "
+                       "has no clock to compare")));
+    }
+    Take(path, operation, context, out.sequence, &out);
+  }
+  out.open = *std::move(open);
+  out.operations.push_back({++out.sequence, Commit{}});
+  return out;
 }
 
 }  // namespace
@@ -197,23 +300,14 @@ absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limit
 }
 
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence, const MemorySource* memory) {
-  Decoded out;
-  if (request.op_case() == v1::StreamRequest::kOpen) {
-    absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
-    if (!open.ok()) return Failed(open.status());
-    out.open = *std::move(open);
-    out.sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
-    return out;
-  }
-  LocalRanges ranges(memory, limits);
-  Take(FieldPath(""), request, limits, previous_sequence, ranges, &out);
-  out.local_bytes = ranges.bytes_read();
-  return out;
+                            uint64_t previous_sequence, gpu::BulkPool* pool,
+                            const MemorySource* memory) {
+  return Decode(request, {limits, pool}, previous_sequence, memory);
 }
 
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence, const MemorySource* memory) {
+                            uint64_t previous_sequence, gpu::BulkPool* pool,
+                            const MemorySource* memory) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   const ElementRow rows[] = {
@@ -221,54 +315,30 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
       {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
        limits.max_parts_per_object}};
   if (absl::Status status = CheckElements(slices, rows); !status.ok()) return Failed(status);
-  google::protobuf::Arena arena;
-  auto* request = google::protobuf::Arena::CreateMessage<v1::StreamRequest>(&arena);
-  if (absl::Status status = Parse(slices, size, "StreamRequest", request); !status.ok()) {
+  Parsed<v1::StreamRequest> parsed;
+  if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {
     return Failed(status);
   }
-  return DecodeStreamRequest(*request, limits, previous_sequence, memory);
+  return Decode(parsed.message(), {limits, pool, parsed.payloads()}, previous_sequence, memory);
 }
 
-Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits) {
+Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
+                     gpu::BulkPool* pool) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   if (absl::Status status = CheckUpdateElements(slices, limits); !status.ok()) {
     return Failed(status);
   }
-  google::protobuf::Arena arena;
-  auto* request = google::protobuf::Arena::CreateMessage<v1::ApplyUpdateRequest>(&arena);
-  if (absl::Status status = Parse(slices, size, "ApplyUpdateRequest", request); !status.ok()) {
+  Parsed<v1::ApplyUpdateRequest> parsed;
+  if (absl::Status status = parsed.Parse(slices, size, Root::kApplyUpdateRequest); !status.ok()) {
     return Failed(status);
   }
-  return DecodeUpdate(*request, limits);
+  return Decode(parsed.message(), {limits, pool, parsed.payloads()});
 }
 
-Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits) {
-  Decoded out;
-  if (const auto count = static_cast<uint64_t>(request.operations_size());
-      count > limits.max_operations_per_commit) {
-    return Failed(TooManyOperations(count, limits));
-  }
-  absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), limits);
-  if (!open.ok()) return Failed(open.status());
-  if (request.open().on_disconnect() == v1::DISCONNECT_POLICY_UNSPECIFIED) {
-    open->on_disconnect = DisconnectPolicy::kKeep;
-  }
-  open->no_outcomes = true;  // the answer has no place for them
-  LocalRanges no_ranges(nullptr, limits);
-  for (int i = 0; i < request.operations_size(); ++i) {
-    const v1::StreamRequest& operation = request.operations(i);
-    const FieldPath path("operations", i);
-    if (operation.has_open() || operation.has_commit()) {
-      return Failed(absl::InvalidArgumentError(
-          absl::StrCat(FieldPath(path, operation.has_open() ? "open" : "commit").ToString(),
-                       " is set; an update is opened by its own field and committed by itself")));
-    }
-    Take(path, operation, limits, out.sequence, no_ranges, &out);
-  }
-  out.open = *std::move(open);
-  out.operations.push_back({++out.sequence, Commit{}});
-  return out;
+Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
+                     gpu::BulkPool* pool) {
+  return Decode(request, {limits, pool});
 }
 
 }  // namespace voxeld::daemon::wire

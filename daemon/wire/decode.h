@@ -18,6 +18,10 @@
 #include "daemon/scene/operation.h"
 #include "daemon/wire/memory_source.h"
 
+namespace voxeld::gpu {
+class BulkPool;
+}
+
 namespace voxeld::v1 {
 class ApplyUpdateRequest;
 class Open;
@@ -31,12 +35,13 @@ struct Decoded {
   std::optional<OpenOptions> open;  // the message was an Open
   std::vector<Operation> operations;
   Refusals refused;
-  uint64_t sequence = 0;  // of the last request
-  // Copied from local memory, beside the message's own bytes.
-  uint64_t local_bytes = 0;
+  std::optional<int64_t> ping_client_time_ns;  // the message was a Ping
+  uint64_t sequence = 0;                       // of the last request
+  uint64_t local_bytes = 0;  // copied from local memory, beside the message's own bytes
 };
 
-// One StreamRequest. `previous_sequence` is that of the request before (0: none): a request without
+// One StreamRequest. The large arrays of primitives go to `pool` (null: ordinary memory), copied
+// once, from the slices. `previous_sequence` is that of the request before (0: none): a request without
 // a number gets the next one, and one that does not ascend is refused.
 //
 // A Commit is passed on whatever is wrong with it, after an Issue, so that it is answered like
@@ -49,21 +54,25 @@ struct Decoded {
 // ResourceExhausted (greater than max_message_bytes),
 // Unimplemented (an Open that asks for what this version has not).
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence, const MemorySource* memory = nullptr);
+                            uint64_t previous_sequence, gpu::BulkPool* pool = nullptr,
+                            const MemorySource* memory = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence, const MemorySource* memory = nullptr);
+                            uint64_t previous_sequence, gpu::BulkPool* pool = nullptr,
+                            const MemorySource* memory = nullptr);
 
 // An ApplyUpdateRequest: `open` is always set (KEEP unless it says otherwise), the operations end
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].". It has no local
 // memory.
 //
 // Status: as above, and InvalidArgument for more than max_operations_per_commit operations.
-Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits);
+Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
+                     gpu::BulkPool* pool = nullptr);
 
 // The same for a request that is parsed already.
-Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits);
+Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
+                     gpu::BulkPool* pool = nullptr);
 
 absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);
 

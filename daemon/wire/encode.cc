@@ -7,6 +7,18 @@
 namespace voxeld::daemon::wire {
 namespace {
 
+void EncodeStages(const Stages& in, v1::Stages* out) {
+  out->set_sent_ns(in.sent_ns);
+  out->set_received_ns(in.received_ns);
+  out->set_decoded_ns(in.decoded_ns);
+  out->set_applied_ns(in.applied_ns);
+  out->set_drawing_ns(in.drawing_ns);
+  out->set_assembled_ns(in.assembled_ns);
+  out->set_sliced_ns(in.sliced_ns);
+  out->set_transferred_ns(in.transferred_ns);
+  out->set_shown_ns(in.shown_ns);
+}
+
 void EncodeOutcome(const CommitOutcome& in, v1::Outcome* out) {
   out->set_display(in.display);
   switch (in.kind) {
@@ -15,6 +27,7 @@ void EncodeOutcome(const CommitOutcome& in, v1::Outcome* out) {
       out->mutable_presented()->set_time_ns(in.time_ns);
       out->mutable_presented()->set_evidence(ToWire(in.evidence));
       out->mutable_presented()->set_last_byte_ns(in.last_byte_ns);
+      EncodeStages(in.stages, out->mutable_presented()->mutable_stages());
       return;
     case CommitOutcome::Kind::kUnchanged:
       out->mutable_unchanged()->set_volume(in.volume);
@@ -40,30 +53,50 @@ struct ReceiptEncoder {
     to->set_refused_operations(in.refused_operations);
     to->set_applied_time_ns(in.applied_time_ns);
     to->mutable_displays()->Assign(in.displays.begin(), in.displays.end());
+    to->set_late(in.late);
+    to->set_dropped_frames(in.dropped_frames);
+    EncodeStages(in.stages, to->mutable_stages());
   }
   void operator()(const Refused& in) const {
     out->mutable_refused()->set_refused_operations(in.refused_operations);
     out->mutable_refused()->set_message(in.message);
   }
   void operator()(const CommitOutcome& in) const { EncodeOutcome(in, out->mutable_outcome()); }
+  void operator()(const Scheduled& in) const {
+    out->mutable_scheduled()->set_present_at_ns(in.present_at_ns);
+  }
 };
 
-void EncodeLayer(const LayerInfo& in, v1::LayerInfo* out) {
+}  // namespace
+
+void Encode(const SessionInfo& in, v1::Opened* out) {
+  out->set_session(in.session);
+  out->set_resume_token(in.resume_token);
   out->set_owner(in.owner);
-  out->set_layer(in.layer);
-  out->set_number(in.number);
-  out->set_visible(in.visible);
-  out->set_opacity(in.opacity);
-  out->set_order(in.order);
-  out->set_blend(ToWire(in.blend));
-  ToWire(in.transform, out->mutable_transform());
-  out->set_entities(in.entities);
-  out->set_bytes(in.bytes);
-  out->set_orphaned(in.orphaned);
-  out->set_client_name(in.client_name);
+  out->set_owner_token(in.owner_token);
+  out->mutable_displays()->Assign(in.displays.begin(), in.displays.end());
+  out->set_credit_bytes(in.credit_bytes);
+  if (in.last_frame_id.has_value()) out->set_last_frame_id(*in.last_frame_id);
+  if (in.last_sequence.has_value()) out->set_last_sequence(*in.last_sequence);
 }
 
-}  // namespace
+void Encode(const OwnerInfo& in, v1::OwnerInfo* out) {
+  out->set_owner(in.owner);
+  out->mutable_client_names()->Assign(in.client_names.begin(), in.client_names.end());
+  out->set_sessions(in.sessions);
+  out->set_layers(in.layers);
+  out->set_orphaned_layers(in.orphaned_layers);
+  out->set_entities(in.entities);
+  out->set_objects(in.objects);
+  out->set_bytes(in.bytes);
+  out->set_hidden(in.hidden);
+  out->set_max_bytes(in.max_bytes);
+  out->set_max_entities(in.max_entities);
+}
+
+void Encode(const std::vector<OwnerInfo>& in, v1::ListOwnersResponse* out) {
+  for (const OwnerInfo& owner : in) Encode(owner, out->add_owners());
+}
 
 void Encode(const Issue& in, v1::Issue* out) {
   out->set_sequence(in.sequence);
@@ -95,6 +128,7 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_thickness(in.max_thickness);
   out->set_max_sessions(in.max_sessions);
   out->set_max_parts_per_object(in.max_parts_per_object);
+  out->set_max_clip_planes(in.max_clip_planes);
   out->set_max_entities(in.max_entities);
   out->set_max_layers(in.max_layers);
   out->set_max_scene_bytes(in.max_scene_bytes);
@@ -102,6 +136,13 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_linger_ns(in.max_linger_ns);
   out->set_max_issues_per_commit(in.max_issues_per_commit);
   out->set_max_uncommitted_bytes_total(in.max_uncommitted_bytes_total);
+  out->set_credit_bytes(in.credit_bytes);
+  out->set_max_memory_bytes(in.max_memory_bytes);
+  out->set_max_riding_commits(in.max_riding_commits);
+  out->set_max_timed_commits(in.max_timed_commits);
+  out->set_max_present_at_horizon_ns(in.max_present_at_horizon_ns);
+  out->set_must_show_timeout_ns(in.must_show_timeout_ns);
+  out->set_max_drop_oldest_frames(in.max_drop_oldest_frames);
   out->set_max_local_bytes(in.max_local_bytes);
 }
 
@@ -125,9 +166,26 @@ void Encode(const EntityInfo& in, v1::EntityInfo* out) {
   out->mutable_color()->set_rgb(in.color);
 }
 
+void Encode(const LayerInfo& in, v1::LayerInfo* out) {
+  out->set_owner(in.owner);
+  out->set_layer(in.layer);
+  out->set_number(in.number);
+  out->set_visible(in.visible);
+  out->set_opacity(in.opacity);
+  out->set_order(in.order);
+  out->set_blend(ToWire(in.blend));
+  ToWire(in.transform, out->mutable_transform());
+  if (in.clip.count > 0) ToWire(in.clip, out->mutable_clip());
+  if (in.region.has_value()) ToWire(*in.region, out->mutable_region());
+  out->set_entities(in.entities);
+  out->set_bytes(in.bytes);
+  out->set_orphaned(in.orphaned);
+  out->set_client_name(in.client_name);
+}
+
 void Encode(const EntityPage& in, v1::ListEntitiesResponse* out) {
   for (const EntityInfo& entity : in.entities) Encode(entity, out->add_entities());
-  for (const LayerInfo& layer : in.layers) EncodeLayer(layer, out->add_layers());
+  for (const LayerInfo& layer : in.layers) Encode(layer, out->add_layers());
   out->set_next_page_token(in.next_page_token);
   out->set_total(in.total);
 }

@@ -1,6 +1,8 @@
 // What the core says as messages of the wire. Reentrant.
 #pragma once
 
+#include <vector>
+
 #include "daemon/core/core.h"
 
 namespace voxeld::v1 {
@@ -9,8 +11,12 @@ class DisplayDescription;
 class EntityInfo;
 class EntityKey;
 class Issue;
+class LayerInfo;
 class Limits;
 class ListEntitiesResponse;
+class ListOwnersResponse;
+class Opened;
+class OwnerInfo;
 class Receipt;
 class Stats;
 class VolumeHeader;
@@ -18,11 +24,16 @@ class VolumeHeader;
 
 namespace voxeld::daemon::wire {
 
+// All but the server's own words: version, time, limits.
+void Encode(const SessionInfo& in, v1::Opened* out);
+void Encode(const OwnerInfo& in, v1::OwnerInfo* out);
+void Encode(const std::vector<OwnerInfo>& in, v1::ListOwnersResponse* out);
 void Encode(const Issue& in, v1::Issue* out);
 void Encode(const Receipt& in, v1::Receipt* out);
 void Encode(const Limits& in, v1::Limits* out);
 void Encode(const EntityKey& in, v1::EntityKey* out);
 void Encode(const EntityInfo& in, v1::EntityInfo* out);
+void Encode(const LayerInfo& in, v1::LayerInfo* out);
 void Encode(const EntityPage& in, v1::ListEntitiesResponse* out);
 void Encode(const Cleared& in, v1::ClearLayerResponse* out);
 void Encode(const Stats& in, v1::Stats* out);

@@ -47,6 +47,9 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   EncodeLatency(in.commit_to_presented, out->mutable_commit_to_presented());
   EncodeLatency(in.assemble, out->mutable_assemble());
   EncodeLatency(in.slice, out->mutable_slice());
+  EncodeLatency(in.waiting, out->mutable_waiting());
+  EncodeLatency(in.transferring, out->mutable_transferring());
+  EncodeLatency(in.showing, out->mutable_showing());
   out->set_commits_owed(in.commits_owed);
   out->set_commits_presented(in.commits_presented);
   out->set_commits_unchanged(in.commits_unchanged);
@@ -54,6 +57,31 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_commits_lost(in.commits_lost);
   out->set_commits_not_shown(in.commits_not_shown);
   out->set_commits_pending(in.commits_pending);
+}
+
+void EncodeMemory(const MemoryFigures& in, v1::MemoryUse* out) {
+  out->set_limit_bytes(in.limit);
+  out->set_scene_bytes(in.scene);
+  out->set_staged_bytes(in.staged);
+  out->set_waiting_bytes(in.waiting);
+  out->set_answers_bytes(in.answers);
+  out->set_owed_bytes(in.owed);
+  out->set_engine_bytes(in.engines);
+  out->set_local_bytes(in.local);
+  out->set_arriving_bytes(in.arriving);
+}
+
+void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
+  out->set_open(in.open);
+  out->set_accepted(in.accepted);
+  out->set_refused_in_all(in.refused_in_all);
+  out->set_refused_by_address(in.refused_by_address);
+  out->set_cut_for_bytes(in.cut_for_bytes);
+  out->set_cut_for_time(in.cut_for_time);
+  out->set_cut_for_cancelling(in.cut_for_cancelling);
+  out->set_accept_failures(in.accept_failures);
+  out->set_probe_failures(in.probe_failures);
+  out->set_unreachable(in.unreachable);
 }
 
 }  // namespace
@@ -76,6 +104,17 @@ void Encode(const Stats& in, v1::Stats* out) {
   out->set_outcomes_undelivered(in.outcomes_undelivered);
   out->set_client_drops(in.client_drops);
   out->set_streams_overrun(in.streams_overrun);
+  out->set_frames_dropped(in.frames_dropped);
+  out->set_timed_pending(in.timed_pending);
+  out->set_timed_dropped(in.timed_dropped);
+  out->set_must_show_timeouts(in.must_show_timeouts);
+  out->set_sessions_dormant(in.sessions_dormant);
+  out->set_sessions_resumed(in.sessions_resumed);
+  EncodeLatency(in.sending, out->mutable_sending());
+  EncodeLatency(in.decoding, out->mutable_decoding());
+  EncodeLatency(in.applying, out->mutable_applying());
+  EncodeMemory(in.memory, out->mutable_memory());
+  EncodeConnections(in.connections, out->mutable_connections());
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

@@ -15,12 +15,6 @@ constexpr uint64_t kAlignment = 4;
 
 MaybeFault LocalRanges::Read(const FieldPath& path, const v1::MemoryRange& range,
                              MappedRange* out) {
-  if (source_ == nullptr) {
-    return Fault{path.ToString(), Reason::kNotFound,
-                 absl::StrCat("names memory ", range.memory(),
-                              ", and this call has no local socket to bring any; send the bytes "
-                              "themselves (Stream tells of its socket in Opened.local_socket)")};
-  }
   if (range.offset() % kAlignment != 0) {
     return Fault{FieldPath(path, "offset").ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", range.offset(), "; give a multiple of ", kAlignment)};
@@ -32,7 +26,7 @@ MaybeFault LocalRanges::Read(const FieldPath& path, const v1::MemoryRange& range
                               "max_uncommitted_bytes allows ",
                               limit_, " in one: spread them over requests with commits between")};
   }
-  absl::StatusOr<MappedRange> found = source_->Find(range.memory(), range.offset(), range.size());
+  absl::StatusOr<MappedRange> found = source_.Find(range.memory(), range.offset(), range.size());
   if (!found.ok()) {
     const bool beyond = absl::IsOutOfRange(found.status());
     const FieldPath field(path, beyond ? "size" : "memory");
@@ -43,6 +37,13 @@ MaybeFault LocalRanges::Read(const FieldPath& path, const v1::MemoryRange& range
   bytes_read_ += range.size();
   *out = *std::move(found);
   return {};
+}
+
+Fault NoLocalMemory(const FieldPath& path, const v1::MemoryRange& range) {
+  return {path.ToString(), Reason::kNotFound,
+          absl::StrCat("names memory ", range.memory(),
+                       ", and this call has no local socket to bring any; send the bytes "
+                       "themselves (Stream tells of its socket in Opened.local_socket)")};
 }
 
 }  // namespace voxeld::daemon::wire

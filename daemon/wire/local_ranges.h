@@ -16,8 +16,8 @@ namespace voxeld::daemon::wire {
 // request may name, whatever it names twice counted twice.
 class LocalRanges {
  public:
-  // `source` outlives it; null: ranges are refused.
-  LocalRanges(const MemorySource* source, const Limits& limits)
+  // `source` outlives it.
+  LocalRanges(const MemorySource& source, const Limits& limits)
       : source_(source), limit_(limits.max_uncommitted_bytes) {}
   LocalRanges(const LocalRanges&) = delete;
   LocalRanges& operator=(const LocalRanges&) = delete;
@@ -28,9 +28,12 @@ class LocalRanges {
   uint64_t bytes_read() const { return bytes_read_; }
 
  private:
-  const MemorySource* const source_;
+  const MemorySource& source_;
   const uint64_t limit_;
   uint64_t bytes_read_ = 0;
 };
+
+// What is wrong with a range where there is no local memory.
+Fault NoLocalMemory(const FieldPath& path, const v1::MemoryRange& range);
 
 }  // namespace voxeld::daemon::wire

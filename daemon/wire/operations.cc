@@ -1,6 +1,8 @@
 #include "daemon/wire/operations.h"
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -16,8 +18,8 @@ constexpr uint32_t kGreatestPriority = 126;
 constexpr uint32_t kGreatestOpacity = 255;
 constexpr size_t kLabelBytes = 256;
 
-MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& limits,
-                    LocalRanges& ranges, EntityData* out) {
+MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const DecodeContext& context,
+                    EntityData* out) {
   if (in.priority() > kGreatestPriority) {
     return Fault{FieldPath(path, "priority").ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", in.priority(), "; give 0 to ", kGreatestPriority)};
@@ -32,7 +34,7 @@ MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& l
     return fault;
   }
   if (auto fault =
-          ToContent(FieldPath(path, "primitive"), in.primitive(), limits, ranges, &out->content)) {
+          ToContent(FieldPath(path, "primitive"), in.primitive(), context, &out->content)) {
     return fault;
   }
   out->priority = in.priority();
@@ -42,13 +44,14 @@ MaybeFault ToEntity(const FieldPath& path, const v1::Entity& in, const Limits& l
   return {};
 }
 
-MaybeFault To(const FieldPath& path, const v1::Upsert& in, const Limits& limits,
-              LocalRanges& ranges, Upsert* out) {
+MaybeFault To(const FieldPath& path, const v1::Upsert& in, const DecodeContext& context,
+              Upsert* out) {
+  const Limits& limits = context.limits;
   if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
     return fault;
   }
   if (auto fault = CheckName(FieldPath(path, "id"), in.id(), limits.max_id_bytes)) return fault;
-  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), limits, ranges, &out->entity)) {
+  if (auto fault = ToEntity(FieldPath(path, "entity"), in.entity(), context, &out->entity)) {
     return fault;
   }
   out->layer = in.layer();
@@ -115,6 +118,40 @@ MaybeFault To(const FieldPath& path, const v1::SetTransform& in, const Limits& l
   return ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform);
 }
 
+MaybeFault ToClip(const FieldPath& path, const v1::Clip& in, const Limits& limits, Clip* out) {
+  // Never more than there is room for, whatever the limit says.
+  const uint32_t most = std::min(limits.max_clip_planes, gpu::kMaxClipPlanes);
+  if (static_cast<uint32_t>(in.planes_size()) > most) {
+    return Fault{FieldPath(path, "planes").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("has ", in.planes_size(), " planes; max_clip_planes allows ", most)};
+  }
+  for (const v1::Clip::Plane& plane : in.planes()) {
+    const FieldPath at(path, "planes", out->count);
+    if (auto fault = CheckFinite(FieldPath(at, "a"), plane.a())) return fault;
+    if (auto fault = CheckFinite(FieldPath(at, "b"), plane.b())) return fault;
+    if (auto fault = CheckFinite(FieldPath(at, "c"), plane.c())) return fault;
+    if (auto fault = CheckFinite(FieldPath(at, "d"), plane.d())) return fault;
+    if (plane.a() == 0 && plane.b() == 0 && plane.c() == 0) {
+      return Fault{at.ToString(), Reason::kInvalidValue,
+                   "has the normal (0, 0, 0); one of a, b, c must not be 0"};
+    }
+    out->planes[out->count++] = {plane.a(), plane.b(), plane.c(), plane.d()};
+  }
+  return {};
+}
+
+MaybeFault ToRegion(const FieldPath& path, const v1::Box3& in, std::optional<gpu::Region>* out) {
+  if (!in.has_min() && !in.has_max()) return {};
+  if (!in.has_min() || !in.has_max()) {
+    return Fault{FieldPath(path, in.has_min() ? "max" : "min").ToString(), Reason::kInvalidValue,
+                 "is not set; give both corners, or neither for all of the scene"};
+  }
+  if (auto fault = CheckBox(path, in)) return fault;
+  *out = gpu::Region{{in.min().x(), in.min().y(), in.min().z()},
+                     {in.max().x(), in.max().y(), in.max().z()}};
+  return {};
+}
+
 MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& limits,
               LayerState* out) {
   if (auto fault = CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes)) {
@@ -148,13 +185,18 @@ MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& lim
     out->transform = transform;
   }
   if (in.has_clip()) {
-    return Unimplemented(FieldPath(path, "clip"), "layers are drawn whole; leave it unset");
+    if (auto fault = ToClip(FieldPath(path, "clip"), in.clip(), limits, &out->clip.emplace())) {
+      return fault;
+    }
   }
   if (in.has_region()) {
-    return Unimplemented(FieldPath(path, "region"), "layers are drawn whole; leave it unset");
+    if (auto fault = ToRegion(FieldPath(path, "region"), in.region(), &out->region.emplace())) {
+      return fault;
+    }
   }
   if (!in.mask_layer().empty()) {
-    return Unimplemented(FieldPath(path, "mask_layer"), "layers are drawn whole; leave it empty");
+    return Unimplemented(FieldPath(path, "mask_layer"),
+                         "layers are not masked by others; leave it empty");
   }
   out->layer = in.layer();
   if (in.has_visible()) out->visible = in.visible();
@@ -174,8 +216,9 @@ MaybeFault To(const FieldPath& path, const v1::FrameEnd& in, const Limits& limit
   return CheckName(FieldPath(path, "layer"), in.layer(), limits.max_id_bytes);
 }
 
-MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& limits,
-              LocalRanges& ranges, DefineObject* out) {
+MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const DecodeContext& context,
+              DefineObject* out) {
+  const Limits& limits = context.limits;
   if (auto fault = CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes)) {
     return fault;
   }
@@ -198,8 +241,8 @@ MaybeFault To(const FieldPath& path, const v1::DefineObject& in, const Limits& l
     if (auto fault = ToAffine(FieldPath(part, "transform"), parts[i].transform(), &to.transform)) {
       return fault;
     }
-    if (auto fault = ToContent(FieldPath(part, "primitive"), parts[i].primitive(), limits, ranges,
-                               &to.content)) {
+    if (auto fault =
+            ToContent(FieldPath(part, "primitive"), parts[i].primitive(), context, &to.content)) {
       return fault;
     }
   }
@@ -217,15 +260,14 @@ MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& l
 
 // What a Commit asks for that this version has not; the commit itself is carried out.
 MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
-  *out = {in.frame_id(), in.send_time_ns(), in.client_drops()};
-  if (in.present_at_ns() != 0) {
-    return Unimplemented(FieldPath(path, "present_at_ns"),
-                         "a commit is applied when it arrives; leave it 0");
+  *out = {in.frame_id(), in.send_time_ns(), in.client_drops(), 0, in.must_show()};
+  if (in.present_at_ns() < 0) {
+    return Fault{FieldPath(path, "present_at_ns").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", in.present_at_ns(),
+                              "; give a time by the server's clock (Opened.server_time_ns), or 0 "
+                              "for at once")};
   }
-  if (in.must_show()) {
-    return Unimplemented(FieldPath(path, "must_show"),
-                         "a newer commit may supersede this one; leave it false");
-  }
+  out->present_at_ns = in.present_at_ns();
   if (in.durable()) {
     return Unimplemented(FieldPath(path, "durable"),
                          "the scene is kept in memory only; leave it false");
@@ -256,67 +298,65 @@ std::string IdOf(const In& in) {
   return {};
 }
 
-// `ranges`: of operations with content, a LocalRanges&.
-template <typename Out, typename In, typename... Ranges>
-void Add(const FieldPath& path, const In& in, uint64_t sequence, const Limits& limits,
-         const Sinks& out, Ranges&... ranges) {
+template <typename Out, typename In>
+void Add(const FieldPath& path, const In& in, uint64_t sequence, const DecodeContext& context,
+         const Sinks& out) {
   Out op;
-  if (auto fault = To(path, in, limits, ranges..., &op)) {
-    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), limits, out);
+  if (auto fault = To(path, in, context, &op)) {
+    AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), context, out);
     if (!std::is_same_v<Out, Commit>) return;
   }
   out.operations->push_back({sequence, std::move(op)});
 }
 
-void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence, const Limits& limits,
-              const Sinks& out, LocalRanges& ranges) {
-  if (static_cast<uint32_t>(in.upserts_size()) > limits.max_operations_per_commit) {
+void AddBatch(const FieldPath& path, const v1::Batch& in, uint64_t sequence,
+              const DecodeContext& context, const Sinks& out) {
+  if (static_cast<uint32_t>(in.upserts_size()) > context.limits.max_operations_per_commit) {
     const FieldPath upserts(path, "upserts");
     AddIssue(
         {upserts.ToString(), Reason::kQuotaExceeded,
          absl::StrCat("has ", in.upserts_size(), " entities; max_operations_per_commit allows ",
-                      limits.max_operations_per_commit)},
-        sequence, {}, {}, limits, out);
+                      context.limits.max_operations_per_commit)},
+        sequence, {}, {}, context, out);
     return;
   }
   out.operations->reserve(out.operations->size() + static_cast<size_t>(in.upserts_size()));
   for (int i = 0; i < in.upserts_size(); ++i) {
-    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, limits, out, ranges);
+    Add<Upsert>(FieldPath(path, "upserts", i), in.upserts(i), sequence, context, out);
   }
 }
 
 }  // namespace
 
 void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
-                     const Limits& limits, const Sinks& out, LocalRanges& ranges) {
+                     const DecodeContext& context, const Sinks& out) {
   switch (request.op_case()) {
     case v1::StreamRequest::kUpsert:
-      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, limits, out,
-                         ranges);
+      return Add<Upsert>(FieldPath(path, "upsert"), request.upsert(), sequence, context, out);
     case v1::StreamRequest::kDelete:
-      return Add<Delete>(FieldPath(path, "delete"), request.delete_(), sequence, limits, out);
+      return Add<Delete>(FieldPath(path, "delete"), request.delete_(), sequence, context, out);
     case v1::StreamRequest::kSetTransform:
       return Add<SetTransform>(FieldPath(path, "set_transform"), request.set_transform(), sequence,
-                               limits, out);
+                               context, out);
     case v1::StreamRequest::kLayerState:
       return Add<LayerState>(FieldPath(path, "layer_state"), request.layer_state(), sequence,
-                             limits, out);
+                             context, out);
     case v1::StreamRequest::kFrameBegin:
       return Add<FrameBegin>(FieldPath(path, "frame_begin"), request.frame_begin(), sequence,
-                             limits, out);
+                             context, out);
     case v1::StreamRequest::kFrameEnd:
-      return Add<FrameEnd>(FieldPath(path, "frame_end"), request.frame_end(), sequence, limits,
+      return Add<FrameEnd>(FieldPath(path, "frame_end"), request.frame_end(), sequence, context,
                            out);
     case v1::StreamRequest::kCommit:
-      return Add<Commit>(FieldPath(path, "commit"), request.commit(), sequence, limits, out);
+      return Add<Commit>(FieldPath(path, "commit"), request.commit(), sequence, context, out);
     case v1::StreamRequest::kDefineObject:
       return Add<DefineObject>(FieldPath(path, "define_object"), request.define_object(), sequence,
-                               limits, out, ranges);
+                               context, out);
     case v1::StreamRequest::kDeleteObject:
       return Add<DeleteObject>(FieldPath(path, "delete_object"), request.delete_object(), sequence,
-                               limits, out);
+                               context, out);
     case v1::StreamRequest::kBatch:
-      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, limits, out, ranges);
+      return AddBatch(FieldPath(path, "batch"), request.batch(), sequence, context, out);
     case v1::StreamRequest::kOpen:
     case v1::StreamRequest::kPing:
     case v1::StreamRequest::OP_NOT_SET:
@@ -326,7 +366,7 @@ void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, ui
             "is not set, or not known to this version of the server; give one of upsert, delete, "
             "set_transform, layer_state, frame_begin, frame_end, commit, define_object, "
             "delete_object, batch"},
-           sequence, {}, {}, limits, out);
+           sequence, {}, {}, context, out);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "daemon/wire/check.h"
-#include "daemon/wire/local_ranges.h"
+#include "daemon/wire/context.h"
 
 namespace voxeld::v1 {
 class StreamRequest;
@@ -20,6 +20,6 @@ struct Sinks {
 // Appends what `request` asks for (anything but an Open) to `out`, under `sequence`. `path` is that
 // of the request itself.
 void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
-                     const Limits& limits, const Sinks& out, LocalRanges& ranges);
+                     const DecodeContext& context, const Sinks& out);
 
 }  // namespace voxeld::daemon::wire

@@ -65,14 +65,14 @@ MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) 
   }
 }
 
-MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const Limits& limits,
-                    LocalRanges& ranges, GeometryData* out) {
+MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const DecodeContext& context,
+                    GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kPoints;
   if (auto fault =
-          ToThickness(FieldPath(path, "thickness"), in.thickness(), limits, &out->record)) {
+          ToThickness(FieldPath(path, "thickness"), in.thickness(), context, &out->record)) {
     return fault;
   }
-  return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, limits, ranges, out);
+  return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, context, out);
 }
 
 // How many corners the primitive has: its indices, or its vertices as they stand.
@@ -86,8 +86,8 @@ Fault BadCorners(const FieldPath& path, const gpu::GeometryRecord& record, const
           Reason::kSizeMismatch, absl::StrCat("is ", Corners(record), "; ", right)};
 }
 
-MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limits& limits,
-                      LocalRanges& ranges, GeometryData* out) {
+MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const DecodeContext& context,
+                      GeometryData* out) {
   gpu::GeometryRecord& record = out->record;
   record.kind = gpu::PrimitiveKind::kSegments;
   switch (in.topology()) {
@@ -119,11 +119,10 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limit
       return UnknownEnum(FieldPath(path, "sampling"), in.sampling(),
                          "LINE_SAMPLING_THIN, LINE_SAMPLING_EUCLIDEAN, LINE_SAMPLING_COVER");
   }
-  if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), limits, &record)) {
+  if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), context, &record)) {
     return fault;
   }
-  if (auto fault =
-          ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, ranges, out)) {
+  if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out)) {
     return fault;
   }
   if (record.topology == gpu::Topology::kList && Corners(record) % 2 != 0) {
@@ -133,12 +132,11 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Limit
   return {};
 }
 
-MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const Limits& limits,
-                  LocalRanges& ranges, GeometryData* out) {
+MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext& context,
+                  GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kTriangles;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  if (auto fault =
-          ToVertices(FieldPath(path, "vertices"), in.vertices(), true, limits, ranges, out)) {
+  if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out)) {
     return fault;
   }
   if (Corners(out->record) % 3 != 0) {
@@ -213,15 +211,15 @@ MaybeFault ToInstance(const FieldPath& path, const v1::Primitive& in, const Limi
   return {};
 }
 
-MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
-                      LocalRanges& ranges, GeometryData* out) {
+MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                      GeometryData* out) {
   switch (in.kind_case()) {
     case v1::Primitive::kPoints:
-      return ToPoints(FieldPath(path, "points"), in.points(), limits, ranges, out);
+      return ToPoints(FieldPath(path, "points"), in.points(), context, out);
     case v1::Primitive::kSegments:
-      return ToSegments(FieldPath(path, "segments"), in.segments(), limits, ranges, out);
+      return ToSegments(FieldPath(path, "segments"), in.segments(), context, out);
     case v1::Primitive::kMesh:
-      return ToMesh(FieldPath(path, "mesh"), in.mesh(), limits, ranges, out);
+      return ToMesh(FieldPath(path, "mesh"), in.mesh(), context, out);
     case v1::Primitive::kBox:
       return ToBox(FieldPath(path, "box"), in.box(), out);
     case v1::Primitive::kSphere:
@@ -239,9 +237,9 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Limi
 
 }  // namespace
 
-MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
-                     LocalRanges& ranges, Content* out) {
-  if (in.kind_case() == v1::Primitive::kInstance) return ToInstance(path, in, limits, out);
+MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                     Content* out) {
+  if (in.kind_case() == v1::Primitive::kInstance) return ToInstance(path, in, context, out);
   auto data = std::make_shared<GeometryData>();
   if (in.has_color()) {
     if (in.color().rgb() > kGreatestColor) {
@@ -252,7 +250,7 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limit
     }
     data->record.color = in.color().rgb();
   }
-  if (auto fault = ToGeometry(path, in, limits, ranges, data.get())) return fault;
+  if (auto fault = ToGeometry(path, in, context, data.get())) return fault;
   *out = GeometryPtr(std::move(data));
   return {};
 }

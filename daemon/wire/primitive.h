@@ -2,7 +2,7 @@
 #pragma once
 
 #include "daemon/wire/check.h"
-#include "daemon/wire/local_ranges.h"
+#include "daemon/wire/context.h"
 
 namespace voxeld::v1 {
 class Primitive;
@@ -10,7 +10,7 @@ class Primitive;
 
 namespace voxeld::daemon::wire {
 
-MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Limits& limits,
-                     LocalRanges& ranges, Content* out);
+MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                     Content* out);
 
 }  // namespace voxeld::daemon::wire

@@ -2,23 +2,20 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
+#include <memory>
+#include <span>
 #include <string>
-#include <string_view>
-#include <type_traits>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/payload.h"
+#include "daemon/wire/vertex_copy.h"
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
 namespace {
-
-static_assert(std::endian::native == std::endian::little,
-              "payloads are little-endian and read by memcpy");
-
-constexpr int32_t kGreatestI32 = 1 << 24;  // beyond it floats skip integers
 
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 
@@ -61,41 +58,45 @@ uint64_t ColorBytes(v1::ElementType type) {
 }
 
 // One of the arrays: its field, the one that may stand in its place, and where the bytes are.
-struct Payload {
+struct Array {
   const char* name;
-  const std::string& sent;
   const char* range_name;
   const v1::MemoryRange* range;  // null: none
-  MappedRange mapped = {};       // of the range, once it is checked
+  Payload payload;               // of a range, once that has been checked
+  std::shared_ptr<const void> mapping = {};
 
-  std::string_view bytes() const { return range != nullptr ? mapped.bytes : sent; }
-  bool given() const { return range != nullptr || !sent.empty(); }
-  uint64_t size() const { return range != nullptr ? range->size() : sent.size(); }
+  bool given() const { return range != nullptr || !payload.empty(); }
 };
 
 // Finds the bytes, and holds their number against what is wanted.
-MaybeFault CheckPayload(const FieldPath& path, uint64_t count, uint64_t element_bytes,
-                        LocalRanges& ranges, Payload* payload) {
+MaybeFault CheckArray(const FieldPath& path, uint64_t count, uint64_t element_bytes,
+                      LocalRanges* ranges, Array* array) {
   // count < 2³² and element_bytes ≤ 12: no overflow.
   const uint64_t want = count * element_bytes;
-  if (payload->range == nullptr) {
-    if (payload->sent.size() == want) return {};
-    return Fault{FieldPath(path, payload->name).ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", payload->sent.size(), " bytes; ", count, " elements of ",
-                              element_bytes, " bytes need ", want)};
-  }
-  const FieldPath in(path, payload->range_name);
-  if (!payload->sent.empty()) {
-    return Fault{in.ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is set, and ", payload->name, " has ", payload->sent.size(),
-                              " bytes; give one of them")};
-  }
-  if (payload->size() != want) {
-    return Fault{FieldPath(in, "size").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("is ", payload->size(), "; ", count, " elements of ", element_bytes,
+  const uint64_t sent = array->payload.size();
+  if (array->range == nullptr) {
+    if (sent == want) return {};
+    return Fault{FieldPath(path, array->name).ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", sent, " bytes; ", count, " elements of ", element_bytes,
                               " bytes need ", want)};
   }
-  return ranges.Read(in, *payload->range, &payload->mapped);
+  const FieldPath in(path, array->range_name);
+  if (sent != 0) {
+    return Fault{
+        in.ToString(), Reason::kInvalidValue,
+        absl::StrCat("is set, and ", array->name, " has ", sent, " bytes; give one of them")};
+  }
+  if (array->range->size() != want) {
+    return Fault{FieldPath(in, "size").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("is ", array->range->size(), "; ", count, " elements of ",
+                              element_bytes, " bytes need ", want)};
+  }
+  if (ranges == nullptr) return NoLocalMemory(in, *array->range);
+  MappedRange mapped;
+  if (auto fault = ranges->Read(in, *array->range, &mapped)) return fault;
+  array->payload = Payload(mapped.bytes);
+  array->mapping = std::move(mapped.mapping);
+  return {};
 }
 
 MaybeFault CheckCount(const FieldPath& path, const char* name, uint64_t count, uint64_t limit,
@@ -112,92 +113,84 @@ MaybeFault BadPosition(const FieldPath& path, size_t at, const std::string& valu
                absl::StrCat("is ", value, "; ", right)};
 }
 
-MaybeFault ToFloatPositions(const FieldPath& path, std::string_view payload,
-                            std::vector<float>* out) {
-  std::memcpy(out->data(), payload.data(), payload.size());
-  for (size_t i = 0; i < out->size(); ++i) {
-    if (!std::isfinite((*out)[i])) {
-      return BadPosition(path, i, Show((*out)[i]), "give a finite number");
+// The fault in positions that were found to have one.
+MaybeFault FindFloat(const FieldPath& path, std::span<const float> positions) {
+  for (size_t i = 0; i < positions.size(); ++i) {
+    if (!std::isfinite(positions[i])) {
+      return BadPosition(path, i, Show(positions[i]), "give a finite number");
     }
   }
   return {};
 }
 
-template <typename T>
-MaybeFault ToIntegerPositions(const FieldPath& path, std::string_view payload,
-                              std::vector<float>* out) {
-  const char* in = payload.data();
-  for (size_t i = 0; i < out->size(); ++i, in += sizeof(T)) {
-    T value;
-    std::memcpy(&value, in, sizeof(T));
-    if constexpr (std::is_same_v<T, int32_t>) {
-      if (value > kGreatestI32 || value < -kGreatestI32) {
-        return BadPosition(path, i, std::to_string(value),
-                           "I32 positions lie within ±16777216 (2²⁴)");
-      }
-    }
-    (*out)[i] = static_cast<float>(value);
-  }
-  return {};
-}
-
-MaybeFault ToPositions(const FieldPath& path, const v1::Vertices& in, std::string_view payload,
-                       GeometryData* out) {
-  out->positions.resize(size_t{in.count()} * 3);
+MaybeFault FindInt32(const FieldPath& path, const Payload& payload) {
   MaybeFault fault;
-  switch (in.position_type()) {
+  size_t i = 0;
+  payload.ForEachRun(sizeof(int32_t), [&](const char* data, size_t count) {
+    for (size_t k = 0; k < count && !fault; ++k, ++i) {
+      int32_t value;
+      std::memcpy(&value, data + k * sizeof(value), sizeof(value));
+      if (value <= kGreatestI32 && value >= -kGreatestI32) continue;
+      fault =
+          BadPosition(path, i, std::to_string(value), "I32 positions lie within ±16777216 (2²⁴)");
+    }
+  });
+  return fault;
+}
+
+MaybeFault ToPositions(const FieldPath& path, v1::ElementType type, const Payload& payload,
+                       GeometryData* out) {
+  const std::span<float> to = out->arrays.writable_positions();
+  PositionBounds bounds;
+  switch (type) {
     case v1::ELEMENT_TYPE_I16:
-      fault = ToIntegerPositions<int16_t>(path, payload, &out->positions);
+      CopyInt16Positions(payload, to, &bounds);
       break;
     case v1::ELEMENT_TYPE_I32:
-      fault = ToIntegerPositions<int32_t>(path, payload, &out->positions);
+      if (!CopyInt32Positions(payload, to, &bounds)) return FindInt32(path, payload);
       break;
     default:
-      fault = ToFloatPositions(path, payload, &out->positions);
+      if (!CopyFloatPositions(payload, to, &bounds)) return FindFloat(path, to);
       break;
   }
-  if (fault) return fault;
-
-  std::array<float, 3> least = {out->positions[0], out->positions[1], out->positions[2]};
-  std::array<float, 3> greatest = least;
-  for (size_t i = 0; i < out->positions.size(); i += 3) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      least[axis] = std::min(least[axis], out->positions[i + axis]);
-      greatest[axis] = std::max(greatest[axis], out->positions[i + axis]);
-    }
-  }
-  std::copy(least.begin(), least.end(), out->min);
-  std::copy(greatest.begin(), greatest.end(), out->max);
+  std::copy(bounds.least, bounds.least + 3, out->min);
+  std::copy(bounds.greatest, bounds.greatest + 3, out->max);
   return {};
 }
 
-template <typename T>
-MaybeFault ToIndices(const FieldPath& path, std::string_view payload, uint32_t vertex_count,
-                     std::vector<uint32_t>* out) {
-  const char* in = payload.data();
-  for (size_t i = 0; i < out->size(); ++i, in += sizeof(T)) {
-    T value;
-    std::memcpy(&value, in, sizeof(T));
-    if (value >= vertex_count) {
-      return Fault{FieldPath(path, "indices", static_cast<int64_t>(i)).ToString(),
-                   Reason::kIndexOutOfRange,
-                   absl::StrCat("is ", value, "; there are ", vertex_count, " vertices, so 0 to ",
-                                vertex_count - 1, " are possible")};
-    }
-    (*out)[i] = value;
+MaybeFault ToIndices(const FieldPath& path, v1::ElementType type, const Payload& payload,
+                     uint32_t vertex_count, std::span<uint32_t> out) {
+  if (type == v1::ELEMENT_TYPE_U16 ? CopyIndices16(payload, vertex_count, out)
+                                   : CopyIndices32(payload, vertex_count, out)) {
+    return {};
   }
-  return {};
+  const auto bad =
+      std::find_if(out.begin(), out.end(), [&](uint32_t i) { return i >= vertex_count; });
+  return Fault{FieldPath(path, "indices", bad - out.begin()).ToString(), Reason::kIndexOutOfRange,
+               absl::StrCat("is ", *bad, "; there are ", vertex_count, " vertices, so 0 to ",
+                            vertex_count - 1, " are possible")};
 }
 
-void ToColors(std::string_view payload, size_t element_bytes, std::vector<uint32_t>* out) {
-  const auto* in = reinterpret_cast<const unsigned char*>(payload.data());
-  for (size_t i = 0; i < out->size(); ++i, in += element_bytes) {
-    (*out)[i] = uint32_t{in[0]} << 16 | uint32_t{in[1]} << 8 | uint32_t{in[2]};
-  }
+// The arrays of a message, wherever they lie.
+struct Arrays {
+  Array positions, indices, colors;
+};
+
+Arrays ArraysOf(const v1::Vertices& in, const DecodeContext& context) {
+  const auto find = [&](const std::string& field) {
+    return context.payloads != nullptr ? context.payloads->Find(field) : Payload(field);
+  };
+  return {
+      {"positions", "positions_in", in.has_positions_in() ? &in.positions_in() : nullptr,
+       find(in.positions())},
+      {"indices", "indices_in", in.has_indices_in() ? &in.indices_in() : nullptr,
+       find(in.indices())},
+      {"colors", "colors_in", in.has_colors_in() ? &in.colors_in() : nullptr, find(in.colors())}};
 }
 
 // Types that fit their arrays, and arrays that are there where a type or count speaks of them.
-MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, bool with_indices) {
+MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, const Payload& indices,
+                      bool with_indices) {
   if (PositionBytes(in.position_type()) == 0) {
     return UnknownEnum(FieldPath(path, "position_type"), in.position_type(),
                        "ELEMENT_TYPE_F32, ELEMENT_TYPE_I16, ELEMENT_TYPE_I32");
@@ -210,10 +203,10 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, bool with_i
     return UnknownEnum(FieldPath(path, "index_type"), in.index_type(),
                        "ELEMENT_TYPE_U16, ELEMENT_TYPE_U32");
   }
-  if (!with_indices && (in.index_count() != 0 || !in.indices().empty())) {
+  if (!with_indices && (in.index_count() != 0 || !indices.empty())) {
     return Fault{FieldPath(path, in.index_count() != 0 ? "index_count" : "indices").ToString(),
                  Reason::kInvalidValue,
-                 absl::StrCat("is not empty (", in.index_count(), " indices, ", in.indices().size(),
+                 absl::StrCat("is not empty (", in.index_count(), " indices, ", indices.size(),
                               " bytes); points take no indices")};
   }
   if (!with_indices && in.has_indices_in()) {
@@ -231,8 +224,10 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, bool with_i
 }  // namespace
 
 MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_indices,
-                      const Limits& limits, LocalRanges& ranges, GeometryData* out) {
-  if (auto fault = CheckTypes(path, in, with_indices)) return fault;
+                      const DecodeContext& context, GeometryData* out) {
+  const Limits& limits = context.limits;
+  Arrays arrays = ArraysOf(in, context);
+  if (auto fault = CheckTypes(path, in, arrays.indices.payload, with_indices)) return fault;
   if (in.count() == 0) {
     return Fault{FieldPath(path, "count").ToString(), Reason::kInvalidValue,
                  "is 0; give at least 1 vertex"};
@@ -245,39 +240,41 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
                               "max_indices_per_entity")) {
     return fault;
   }
-  Payload positions{"positions", in.positions(), "positions_in",
-                    in.has_positions_in() ? &in.positions_in() : nullptr};
-  Payload indices{"indices", in.indices(), "indices_in",
-                  in.has_indices_in() ? &in.indices_in() : nullptr};
-  Payload colors{"colors", in.colors(), "colors_in",
-                 in.has_colors_in() ? &in.colors_in() : nullptr};
-  const bool colored = colors.given() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
-  if (auto fault =
-          CheckPayload(path, in.count(), PositionBytes(in.position_type()), ranges, &positions)) {
+  const bool colored = arrays.colors.given() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
+  if (auto fault = CheckArray(path, in.count(), PositionBytes(in.position_type()), context.ranges,
+                              &arrays.positions)) {
     return fault;
   }
-  if (auto fault =
-          CheckPayload(path, in.index_count(), IndexBytes(in.index_type()), ranges, &indices)) {
+  if (auto fault = CheckArray(path, in.index_count(), IndexBytes(in.index_type()), context.ranges,
+                              &arrays.indices)) {
     return fault;
   }
   if (colored) {
-    if (auto fault = CheckPayload(path, in.count(), ColorBytes(in.color_type()), ranges, &colors)) {
+    if (auto fault = CheckArray(path, in.count(), ColorBytes(in.color_type()), context.ranges,
+                                &arrays.colors)) {
       return fault;
     }
   }
 
   out->record.vertex_count = in.count();
   out->record.index_count = in.index_count();
-  if (auto fault = ToPositions(path, in, positions.bytes(), out)) return fault;
-  out->indices.resize(in.index_count());
-  auto fault = in.index_type() == v1::ELEMENT_TYPE_U16
-                   ? ToIndices<uint16_t>(path, indices.bytes(), in.count(), &out->indices)
-                   : ToIndices<uint32_t>(path, indices.bytes(), in.count(), &out->indices);
-  if (fault) return fault;
+  if (colored) out->record.color_mode = gpu::ColorMode::kPerVertex;
+  absl::StatusOr<gpu::GeometryArrays> kept =
+      gpu::GeometryArrays::Allocate(out->record, context.pool);
+  if (!kept.ok()) {
+    return Fault{FieldPath(path, "positions").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("cannot be kept: ", kept.status().message())};
+  }
+  out->arrays = *std::move(kept);
+  if (auto fault = ToPositions(path, in.position_type(), arrays.positions.payload, out)) {
+    return fault;
+  }
+  if (auto fault = ToIndices(path, in.index_type(), arrays.indices.payload, in.count(),
+                             out->arrays.writable_indices())) {
+    return fault;
+  }
   if (colored) {
-    out->record.color_mode = gpu::ColorMode::kPerVertex;
-    out->colors.resize(in.count());
-    ToColors(colors.bytes(), ColorBytes(in.color_type()), &out->colors);
+    CopyColors(arrays.colors.payload, ColorBytes(in.color_type()), out->arrays.writable_colors());
   }
   return {};
 }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "daemon/wire/check.h"
-#include "daemon/wire/local_ranges.h"
+#include "daemon/wire/context.h"
 
 namespace voxeld::v1 {
 class Vertices;
@@ -11,8 +11,10 @@ class Vertices;
 namespace voxeld::daemon::wire {
 
 // Fills counts, arrays, colour mode and bounds of `out`. Every size is compared in 64 bits before a
-// byte is read. `with_indices` false: indices are refused. Payloads may lie in `ranges` instead.
+// byte is read; then each payload is read once, converted and checked on its way into
+// `context.pool`. `with_indices` false: indices are refused. Payloads may lie in
+// `context.ranges` instead.
 MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_indices,
-                      const Limits& limits, LocalRanges& ranges, GeometryData* out);
+                      const DecodeContext& context, GeometryData* out);
 
 }  // namespace voxeld::daemon::wire

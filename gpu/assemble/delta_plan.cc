@@ -137,9 +137,10 @@ class Planner final : public DeltaVisitor {
 
 }  // namespace
 
-absl::StatusOr<DeltaPlan> PlanDelta(std::span<const std::byte> delta, const Scene& scene) {
+absl::StatusOr<DeltaPlan> PlanDelta(std::span<const std::byte> delta, const Scene& scene,
+                                    BulkSource* bulk) {
   Planner planner(scene);
-  if (absl::Status status = ReadDelta(delta, planner); !status.ok()) return status;
+  if (absl::Status status = ReadDelta(delta, planner, bulk); !status.ok()) return status;
   return planner.Finish();
 }
 

@@ -27,6 +27,7 @@ struct DeltaPlan {
 
 // InvalidArgument for what ReadDelta refuses, for an id that is not new where it must be or does
 // not exist where it must, and for drawables left without their geometry or layer.
-absl::StatusOr<DeltaPlan> PlanDelta(std::span<const std::byte> delta, const Scene& scene);
+absl::StatusOr<DeltaPlan> PlanDelta(std::span<const std::byte> delta, const Scene& scene,
+                                    BulkSource* bulk);
 
 }  // namespace voxeld::gpu

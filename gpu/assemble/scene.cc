@@ -12,8 +12,8 @@ namespace voxeld::gpu {
 RetainedGeometry SceneObserver::Retain(const GeometryView& view) {
   const size_t positions = view.positions.size_bytes(), indices = view.indices.size_bytes(),
                colors = view.colors.size_bytes();
-  RetainedGeometry kept{view, nullptr};
-  if (positions + indices + colors == 0) return kept;
+  RetainedGeometry kept{view, view.bulk};
+  if (view.bulk != nullptr || positions + indices + colors == 0) return kept;
   std::shared_ptr<std::byte[]> memory =
       std::make_shared_for_overwrite<std::byte[]>(positions + indices + colors);
   std::byte* at = memory.get();
@@ -28,6 +28,17 @@ RetainedGeometry SceneObserver::Retain(const GeometryView& view) {
   if (colors > 0) copy(kept.view.colors);
   kept.memory = std::move(memory);
   return kept;
+}
+
+bool LooksSame(const LayerRecord& a, const LayerRecord& b) {
+  return a.visible == b.visible && a.opacity == b.opacity && a.order == b.order &&
+         a.blend == b.blend && SameClip(a, b);
+}
+
+void Scene::MapClips(const Affine& view, bool anew) {
+  for (const auto& [id, layer] : layers_) {
+    if (anew || !layer->clip.has_value()) layer->clip = MapClip(layer->record, view);
+  }
 }
 
 int64_t Scene::GeometryUses(uint64_t id) const {
@@ -97,6 +108,7 @@ void Scene::PutLayer(const LayerRecord& record, SceneObserver& observer) {
     for (Drawable* drawable : slot->drawables) observer.OnLeave(*drawable);
   }
   slot->record = record;
+  slot->clip.reset();
   if (moved) {
     for (Drawable* drawable : slot->drawables) observer.OnEnter(*drawable);
   }
@@ -111,9 +123,9 @@ void Scene::RankLayers() {
   for (size_t i = 0; i < layers.size(); ++i) layers[i]->rank = static_cast<int>(i);
 }
 
-absl::Status Scene::Apply(std::span<const std::byte> delta, SceneObserver& observer,
-                          std::vector<std::unique_ptr<Drawable>>& gone) {
-  absl::StatusOr<DeltaPlan> plan = PlanDelta(delta, *this);
+absl::Status Scene::Apply(std::span<const std::byte> delta, BulkSource* bulk,
+                          SceneObserver& observer, std::vector<std::unique_ptr<Drawable>>& gone) {
+  absl::StatusOr<DeltaPlan> plan = PlanDelta(delta, *this, bulk);
   if (!plan.ok()) return plan.status();
   if (absl::Status status = observer.OnPlan(*plan); !status.ok()) return status;
   // A record may name a geometry or layer that comes later in the delta.

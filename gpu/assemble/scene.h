@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
 #include "gpu/assemble/bins.h"
+#include "gpu/clip.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
 
@@ -19,7 +21,7 @@ namespace voxeld::gpu {
 // Immutable.
 struct RetainedGeometry {
   GeometryView view;
-  std::shared_ptr<void> memory;  // what its arrays lie in; none if there are none
+  std::shared_ptr<const void> memory;  // what its arrays lie in; none if there are none
 };
 
 struct Layer;
@@ -39,9 +41,13 @@ struct Drawable {
 
 struct Layer {
   LayerRecord record;
+  std::optional<VoxelClip> clip;  // derived, in voxel space; none: to be mapped anew
   absl::flat_hash_set<Drawable*> drawables;
   int rank = 0;  // in the order of combination
 };
+
+// Whether what is drawn in a layer of this record comes out as in one of the other, if nothing moves.
+bool LooksSame(const LayerRecord& a, const LayerRecord& b);
 
 struct DeltaPlan;
 
@@ -50,14 +56,14 @@ struct SceneObserver {
   virtual ~SceneObserver() = default;
   // The delta is in order. An error here refuses it whole.
   virtual absl::Status OnPlan(const DeltaPlan&) { return absl::OkStatus(); }
-  // What is kept of a new geometry: a copy of its arrays, unless an engine has them elsewhere. The
-  // delta is gone after Apply.
+  // What is kept of a new geometry: bulk memory as it is, else a copy of its arrays, unless an engine
+  // has them elsewhere. The delta is gone after Apply.
   virtual RetainedGeometry Retain(const GeometryView& view);
   // It goes, or what it is drawn from changes.
   virtual void OnLeave(Drawable& drawable) = 0;
   // It is new, or has changed (after OnLeave); `layer` and `geometry` are set.
   virtual void OnEnter(Drawable& drawable) = 0;
-  // Its drawables stay as they are, but combine otherwise (visibility, opacity, order, blend).
+  // Its drawables stay as they are, but combine otherwise (LooksSame is false, or it moves).
   virtual void OnLayerLook(Layer& layer, const LayerRecord& next) = 0;
 };
 
@@ -65,13 +71,16 @@ class Scene {
  public:
   // Applies a delta, all of it or, if it is malformed, nothing (InvalidArgument). Drawables that
   // left and do not come back are moved to `gone`.
-  absl::Status Apply(std::span<const std::byte> delta, SceneObserver& observer,
+  // `bulk` finds what the delta refers to.
+  absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk, SceneObserver& observer,
                      std::vector<std::unique_ptr<Drawable>>& gone);
 
   const absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>>& drawables() const {
     return drawables_;
   }
   const absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>>& layers() const { return layers_; }
+  // Sees to it that every layer has its `clip`. `anew`: the view has changed.
+  void MapClips(const Affine& view, bool anew);
   // How many drawables use it; −1 if there is no such id.
   int64_t GeometryUses(uint64_t id) const;
   int64_t LayerUses(uint64_t id) const;

@@ -28,6 +28,43 @@ void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors
   }
 }
 
+// Uncovers what lies outside a half-space, in the order in which the tile of `box` lies in memory.
+void UncoverOutside(const VoxelHalfSpace& half_space, const TileGrid& grid, const Box3& box,
+                    uint32_t* words) {
+  int axis[3];  // from the fastest
+  for (int a = 0; a < 3; ++a) axis[grid.shift[a] / kTileBits] = a;
+  const auto size = [&](int n) { return box.hi[axis[n]] - box.lo[axis[n]]; };
+  const int64_t step = 2 * half_space.normal[axis[0]];
+  int32_t voxel[3] = {box.lo[0], box.lo[1], box.lo[2]};
+  for (int32_t k = 0; k < size(2); ++k) {
+    for (int32_t j = 0; j < size(1); ++j) {
+      voxel[axis[1]] = box.lo[axis[1]] + j;
+      voxel[axis[2]] = box.lo[axis[2]] + k;
+      int64_t value = ClipValue(half_space, voxel[0], voxel[1], voxel[2]);
+      uint32_t* row = words + (static_cast<size_t>(k) * kTileSize + static_cast<size_t>(j)) *
+                                  static_cast<size_t>(kTileSize);
+      for (int32_t i = 0; i < size(0); ++i, value += step) {
+        if (value < 0) row[i] = 0;
+      }
+    }
+  }
+}
+
+// The half-spaces that cut a tile; `outside`: all of it lies outside one of them.
+struct TileClip {
+  bool outside = false;
+  uint32_t count = 0;
+  const VoxelHalfSpace* cutting[kMaxHalfSpaces];
+
+  TileClip(const VoxelClip& clip, const Box3& box) {
+    for (uint32_t i = 0; i < clip.count; ++i) {
+      const ClipSide side = SideOf(clip.half_spaces[i], box);
+      if (side == ClipSide::kOutside) outside = true;
+      if (side == ClipSide::kCut) cutting[count++] = &clip.half_spaces[i];
+    }
+  }
+};
+
 }  // namespace
 
 void TileStore::Reset(const TileGrid& grid) {
@@ -82,9 +119,7 @@ void Volume::OnEnter(Drawable& drawable) {
 
 void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const LayerRecord& now = layer.record;
-  const bool same = now.visible == next.visible && now.opacity == next.opacity &&
-                    now.order == next.order && now.blend == next.blend;
-  if (same || (now.visible == 0 && next.visible == 0)) return;
+  if (LooksSame(now, next) || (now.visible == 0 && next.visible == 0)) return;
   // Nothing of it was to be seen, and where it will be is not known yet.
   if (now.visible == 0 && !(now.transform == next.transform)) return;
   for (Drawable* drawable : layer.drawables) {
@@ -106,10 +141,11 @@ void Volume::TakeOutLeaving() {
   left_.clear();
 }
 
-absl::Status Volume::Apply(std::span<const std::byte> delta) {
+absl::Status Volume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
   std::vector<std::unique_ptr<Drawable>> gone;
-  absl::Status status = scene_.Apply(delta, *this, gone);
+  absl::Status status = scene_.Apply(delta, bulk, *this, gone);
   TakeOutLeaving();
+  scene_.MapClips(view_, false);
   if (!gone.empty()) {
     std::erase_if(pending_, [](const Drawable* d) { return d->layer == nullptr; });
   }
@@ -119,6 +155,7 @@ absl::Status Volume::Apply(std::span<const std::byte> delta) {
 void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8_t> owned) {
   grid_ = grid;
   view_ = view;
+  scene_.MapClips(view_, true);
   owned_ = std::move(owned);
   index_.clear();
   index_.resize(grid.count());
@@ -174,10 +211,16 @@ uint32_t Volume::DrawTile(uint32_t tile, Scratch& scratch) const {
   scratch.colors.assign(kTileVoxels, 0);
   for (size_t i = 0; i < scratch.entries.size();) {
     const Layer& layer = *scratch.entries[i].drawable->layer;
-    scratch.words.assign(kTileVoxels, 0);
+    const TileClip clip(*layer.clip, box);
+    if (!clip.outside) scratch.words.assign(kTileVoxels, 0);
     for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
       const Entry& e = scratch.entries[i];
+      if (clip.outside) continue;
       DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, scratch.words.data());
+    }
+    if (clip.outside) continue;
+    for (uint32_t c = 0; c < clip.count; ++c) {
+      UncoverOutside(*clip.cutting[c], grid_, box, scratch.words.data());
     }
     BlendTile(layer.record, scratch.words.data(), scratch.colors.data());
   }

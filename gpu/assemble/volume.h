@@ -40,7 +40,7 @@ class Volume final : private SceneObserver {
   explicit Volume(Executor& executor) : executor_(executor) {}
 
   // All or nothing; InvalidArgument for a malformed delta.
-  absl::Status Apply(std::span<const std::byte> delta);
+  absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
 
   // Everything is to be drawn anew, in the tiles with owned[tile] != 0.
   // `view`: scene → voxel space.

@@ -31,7 +31,9 @@ absl::Status CpuCore::SetTarget(Target target) {
 
 absl::Status CpuCore::Apply(const StagingBlock& block, size_t size) {
   const absl::StatusOr<std::span<std::byte>> delta = CheckDelta(block, size);
-  return delta.ok() ? volume_.Apply(*delta) : delta.status();
+  if (!delta.ok()) return delta.status();
+  BlockSource referred(block.referred());
+  return volume_.Apply(*delta, block.bulk() != nullptr ? block.bulk() : &referred);
 }
 
 void CpuCore::UpdateVolume() {

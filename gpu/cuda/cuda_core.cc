@@ -42,7 +42,8 @@ absl::Status CudaCore::Apply(const StagingBlock& block, size_t size) {
   const absl::StatusOr<std::span<std::byte>> delta = CheckDelta(block, size);
   if (!delta.ok()) return delta.status();
   if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
-  return volume_.Apply(*delta);
+  BlockSource referred(block.referred());
+  return volume_.Apply(*delta, block.bulk() != nullptr ? block.bulk() : &referred);
 }
 
 absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, FrameBuffer buffer) {

@@ -9,6 +9,7 @@
 #include "gpu/assemble/delta_plan.h"
 #include "gpu/cuda/cpu_voxels.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/cuda/upload_plan.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
@@ -63,6 +64,7 @@ VolumeView DeviceTiles::view() const {
 void CudaVolume::SetView(DeviceTiles tiles, const Affine& view) {
   tiles_ = std::move(tiles);
   view_ = view;
+  scene_.MapClips(view_, true);
   listed_ = false;
   index_.Clear();
   slots_.clear();
@@ -80,37 +82,45 @@ void CudaVolume::SetView(DeviceTiles tiles, const Affine& view) {
 
 // ------------------------------------------------------------------------------------------- deltas
 
-absl::Status CudaVolume::Apply(std::span<const std::byte> delta) {
+absl::Status CudaVolume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
   std::vector<std::unique_ptr<Drawable>> gone;
-  const absl::Status status = scene_.Apply(delta, *this, gone);
+  const absl::Status status = scene_.Apply(delta, bulk, *this, gone);
   arrays_ = nullptr;
+  scene_.MapClips(view_, false);
+  bulk_.clear();
   return status;
 }
 
-// The arrays of all geometries go over in one piece.
+// The arrays of all geometries go over into one piece of memory.
 absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
-  const std::byte* begin = nullptr;
-  const std::byte* end = nullptr;
-  const auto include = [&](auto array) {
-    if (array.empty()) return;
-    const auto* first = reinterpret_cast<const std::byte*>(array.data());
-    const std::byte* last = first + array.size_bytes();
-    if (begin == nullptr || first < begin) begin = first;
-    if (end == nullptr || last > end) end = last;
-  };
+  UploadPlan uploads;
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
-    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu) continue;
-    include(geometry->positions);
-    include(geometry->indices);
-    include(geometry->colors);
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
+        geometry->positions.empty() || geometry->bulk != nullptr) {
+      continue;
+    }
+    uploads.AddInline(*geometry);
   }
-  if (begin == nullptr) return absl::OkStatus();
-  absl::StatusOr<Block> block = device_.Upload(begin, static_cast<size_t>(end - begin));
+  arrays_begin_ = uploads.inline_begin();
+  for (const DeltaStep& step : plan.steps) {
+    const auto* geometry = std::get_if<GeometryView>(&step);
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
+        geometry->positions.empty() || geometry->bulk == nullptr) {
+      continue;
+    }
+    const float* const positions = geometry->positions.data();
+    if (!bulk_.contains(positions)) bulk_[positions] = uploads.AddBulk(*geometry);
+  }
+  if (uploads.size() == 0) return absl::OkStatus();
+  absl::StatusOr<Block> block = device_.pool().Acquire(uploads.size());
   if (!block.ok()) return block.status();
-  // The delta's memory is given back when Apply returns.
+  for (const UploadPlan::Copy& copy : uploads.copies()) {
+    absl::Status status = device_.ToDevice(block->as<std::byte>() + copy.to, copy.from, copy.size);
+    if (!status.ok()) return status;
+  }
+  // The delta's memory is given back when Apply returns, and so may bulk memory be.
   if (absl::Status status = device_.Wait(); !status.ok()) return status;
-  arrays_begin_ = begin;
   arrays_ = std::make_shared<Block>(*std::move(block));
   return absl::OkStatus();
 }
@@ -118,11 +128,16 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
 RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
   RetainedGeometry kept{view, nullptr};
+  kept.view.bulk = nullptr;
   if (view.positions.empty()) return kept;
-  std::byte* const device = arrays_->as<std::byte>();
-  kept.view.positions = Moved(view.positions, arrays_begin_, device);
-  kept.view.indices = Moved(view.indices, arrays_begin_, device);
-  kept.view.colors = Moved(view.colors, arrays_begin_, device);
+  const bool in_bulk = view.bulk != nullptr;
+  const std::byte* const host =
+      in_bulk ? reinterpret_cast<const std::byte*>(view.positions.data()) : arrays_begin_;
+  std::byte* const device =
+      arrays_->as<std::byte>() + (in_bulk ? bulk_.at(view.positions.data()) : 0);
+  kept.view.positions = Moved(view.positions, host, device);
+  kept.view.indices = Moved(view.indices, host, device);
+  kept.view.colors = Moved(view.colors, host, device);
   kept.memory = arrays_;
   return kept;
 }
@@ -143,9 +158,7 @@ void CudaVolume::OnEnter(Drawable& drawable) { pending_.insert(&drawable); }
 
 void CudaVolume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const LayerRecord& now = layer.record;
-  const bool same = now.visible == next.visible && now.opacity == next.opacity &&
-                    now.order == next.order && now.blend == next.blend;
-  if (same || (now.visible == 0 && next.visible == 0)) return;
+  if (LooksSame(now, next) || (now.visible == 0 && next.visible == 0)) return;
   // Nothing of it was to be seen, and it enters anew.
   if (now.visible == 0 && !(now.transform == next.transform)) return;
   for (const Drawable* drawable : layer.drawables) {
@@ -156,13 +169,40 @@ void CudaVolume::OnLayerLook(Layer& layer, const LayerRecord& next) {
 
 // ------------------------------------------------------------------------------------------- frames
 
+namespace {
+
+// Brings an array on the device up to date; `there` is what it holds.
+template <typename T>
+absl::Status PutArray(Device& device, Block& block, const std::vector<T>& now,
+                      std::vector<T>& there) {
+  if (now == there) return absl::OkStatus();
+  there.clear();  // not known while it is being written
+  if (now.empty()) return absl::OkStatus();
+  absl::Status status = device.pool().Grow<T>(block, now.size(), 0, device.stream());
+  if (!status.ok()) return status;
+  status = device.ToDevice(block.as<T>(), now.data(), now.size() * sizeof(T));
+  if (status.ok()) there = now;
+  return status;
+}
+
+}  // namespace
+
 absl::Status CudaVolume::PutLayers() {
   absl::flat_hash_map<uint64_t, uint32_t> slots;
   std::vector<const Layer*> fresh;
   std::fill(looks_now_.begin(), looks_now_.end(), LayerLook());
+  half_spaces_now_.clear();
   const auto put = [&](const Layer& layer, uint32_t slot) {
     const LayerRecord& record = layer.record;
-    looks_now_[slot] = {layer.rank, record.visible, record.opacity, record.blend};
+    const VoxelClip& clip = *layer.clip;
+    looks_now_[slot] = {layer.rank,
+                        record.visible,
+                        record.opacity,
+                        record.blend,
+                        static_cast<uint32_t>(half_spaces_now_.size()),
+                        clip.count};
+    half_spaces_now_.insert(half_spaces_now_.end(), clip.half_spaces,
+                            clip.half_spaces + clip.count);
     slots[record.id] = slot;
   };
   for (const auto& [id, layer] : scene_.layers()) {
@@ -191,14 +231,8 @@ absl::Status CudaVolume::PutLayers() {
     free_layer_slots_.pop_back();
   }
   layer_slots_ = std::move(slots);
-  if (looks_now_ == looks_there_) return absl::OkStatus();
-  looks_there_.clear();  // not known while it is being written
-  absl::Status status =
-      device_.pool().Grow<LayerLook>(looks_, looks_now_.size(), 0, device_.stream());
-  if (!status.ok()) return status;
-  status = device_.ToDevice(looks_.as<LayerLook>(), looks_now_.data(),
-                            looks_now_.size() * sizeof(LayerLook));
-  if (status.ok()) looks_there_ = looks_now_;
+  absl::Status status = PutArray(device_, looks_, looks_now_, looks_there_);
+  if (status.ok()) status = PutArray(device_, half_spaces_, half_spaces_now_, half_spaces_there_);
   return status;
 }
 
@@ -443,8 +477,9 @@ absl::Status CudaVolume::Update(const SliceIndexView& slices) {
   const uint32_t blocks = std::min<uint32_t>(
       view.grid.count(), 2 * static_cast<uint32_t>(device_.api().device().multiProcessorCount));
   status = device_.Run("DrawTiles", [&] {
-    return DrawTiles(table_.as<TableEntry>(), looks_.as<LayerLook>(), index_.view(), view, slices,
-                     blocks, device_.stream());
+    return DrawTiles(table_.as<TableEntry>(), looks_.as<LayerLook>(),
+                     half_spaces_.as<VoxelHalfSpace>(), index_.view(), view, slices, blocks,
+                     device_.stream());
   });
   listed_ = !status.ok();
   return status;

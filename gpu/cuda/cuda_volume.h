@@ -44,7 +44,7 @@ class CudaVolume final : private SceneObserver {
 
   // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
   // fit the device.
-  absl::Status Apply(std::span<const std::byte> delta);
+  absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
 
   // Everything is to be drawn anew.
   void SetView(DeviceTiles tiles, const Affine& view);
@@ -94,8 +94,9 @@ class CudaVolume final : private SceneObserver {
   absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
   absl::flat_hash_set<const Drawable*> pending_;
 
-  Block looks_;
+  Block looks_, half_spaces_;
   std::vector<LayerLook> looks_now_, looks_there_;  // by slot; what the device has
+  std::vector<VoxelHalfSpace> half_spaces_now_, half_spaces_there_;
   absl::flat_hash_map<uint64_t, uint32_t> layer_slots_;
   std::vector<uint32_t> free_layer_slots_;
 
@@ -104,9 +105,12 @@ class CudaVolume final : private SceneObserver {
   // Memory of geometries that have left, until their tiles are marked.
   std::vector<std::shared_ptr<const RetainedGeometry>> kept_;
 
-  // The arrays of the delta under way: host addresses from `arrays_begin_` on lie at `arrays_`.
+  // The arrays of the delta under way, all at `arrays_`: those that lie in the delta, from
+  // `arrays_begin_` on, at its beginning; those in bulk memory, by where their positions lie on the
+  // host, where `bulk_` says.
   const std::byte* arrays_begin_ = nullptr;
   std::shared_ptr<Block> arrays_;
+  absl::flat_hash_map<const float*, size_t> bulk_;
   uint32_t singular_ = 0;
   std::unique_ptr<Executor> executor_;  // for what the CPU draws; made when it is asked for
 };

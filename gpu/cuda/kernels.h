@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "gpu/clip.h"
 #include "gpu/cuda/types.h"
 
 namespace voxeld::gpu::cuda {
@@ -54,7 +55,9 @@ cudaError_t FindRows(const uint64_t* keys, uint32_t pairs, uint32_t tiles, uint3
 // Lists the dirty tiles, and they are clean.
 cudaError_t ListDirty(const VolumeView& volume, cudaStream_t stream);
 // Draws the tiles listed; marks the slices that look at those whose colours changed.
-cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers, const BatchList& batches,
+// `half_spaces`: what the layers' looks refer to.
+cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers,
+                      const VoxelHalfSpace* half_spaces, const BatchList& batches,
                       const VolumeView& volume, const SliceIndexView& slices, uint32_t blocks,
                       cudaStream_t stream);
 cudaError_t ReadBox(const VolumeView& volume, const int32_t lo[3], const int32_t size[3],

@@ -19,7 +19,9 @@ struct TileScratch {
   uint64_t heavy[kMostHeavy];                             // pairs for many threads
   uint32_t heavy_count;
   uint32_t tile;
-  uint32_t layer;  // its slot; kAll: no more
+  uint32_t layer;    // its slot; kAll: no more
+  uint32_t cutting;  // bits: which of its half-spaces cut the tile
+  uint32_t outside;  // not 0: all of the tile lies outside one of them
   uint32_t lit, differs;
   SolidBlock solid;
 };
@@ -223,10 +225,44 @@ __device__ int32_t NextLayer(const LayerLook* layers, const BatchList& batches, 
   return least;
 }
 
+// How the layer found lies to the tile. By the first warp: a lane looks after a half-space.
+static_assert(kMaxHalfSpaces <= 32);
+__device__ void ClipTile(const LayerLook* layers, const VoxelHalfSpace* half_spaces,
+                         const Box3& box, TileScratch& scratch) {
+  const uint32_t lane = threadIdx.x % 32;
+  ClipSide side = ClipSide::kInside;
+  __syncwarp();
+  if (scratch.layer != kAll) {
+    const LayerLook& look = layers[scratch.layer];
+    if (lane < look.half_spaces) side = SideOf(half_spaces[look.first_half_space + lane], box);
+  }
+  const uint32_t cutting = __ballot_sync(kAll, side == ClipSide::kCut);
+  const uint32_t outside = __ballot_sync(kAll, side == ClipSide::kOutside);
+  if (lane == 0) {
+    scratch.cutting = cutting;
+    scratch.outside = outside;
+  }
+}
+
+// Whether a voxel of the tile lies inside all half-spaces that cut it. `v`: its place in memory.
+__device__ bool IsInsideAll(const VoxelHalfSpace* half_spaces, uint32_t cutting, const Box3& box,
+                            const TileGrid& grid, uint32_t v) {
+  int64_t at[3];
+  for (int a = 0; a < 3; ++a) {
+    at[a] = box.lo[a] + static_cast<int32_t>((v >> grid.shift[a]) % kTileSize);
+  }
+  for (; cutting != 0; cutting &= cutting - 1) {
+    if (!IsInside(half_spaces[__ffs(static_cast<int>(cutting)) - 1], at[0], at[1], at[2])) {
+      return false;
+    }
+  }
+  return true;
+}
+
 __global__ void __launch_bounds__(kThreads, 2)
     DrawTilesKernel(const TableEntry* table, const LayerLook* layers,
-                    const __grid_constant__ BatchList batches, VolumeView volume,
-                    SliceIndexView slices) {
+                    const VoxelHalfSpace* half_spaces, const __grid_constant__ BatchList batches,
+                    VolumeView volume, SliceIndexView slices) {
   extern __shared__ __align__(16) unsigned char memory[];
   TileScratch& scratch = *reinterpret_cast<TileScratch*>(memory);
   Counters& counters = *volume.counters;
@@ -245,12 +281,19 @@ __global__ void __launch_bounds__(kThreads, 2)
 
     int32_t rank = -1;
     for (;;) {
-      if (threadIdx.x < 32) rank = NextLayer(layers, batches, tile, rank, scratch);
+      if (threadIdx.x < 32) {
+        rank = NextLayer(layers, batches, tile, rank, scratch);
+        ClipTile(layers, half_spaces, box, scratch);
+      }
       if (threadIdx.x == 0) scratch.heavy_count = 0;
       for (uint32_t v = threadIdx.x; v < kTileVoxels; v += kThreads) scratch.words[v] = 0;
       __syncthreads();
       const uint32_t layer = scratch.layer;
       if (layer == kAll) break;
+      if (scratch.outside != 0) {
+        __syncthreads();  // all have seen it
+        continue;
+      }
       for (uint32_t b = 0; b < batches.count; ++b) {
         const uint32_t end = scratch.row_end[b];
         // In rounds of the block's size, so that what is heavy is drawn before its list is full.
@@ -282,9 +325,12 @@ __global__ void __launch_bounds__(kThreads, 2)
       }
       __syncthreads();
       const LayerLook look = layers[layer];
+      const uint32_t cutting = scratch.cutting;
+      const VoxelHalfSpace* const cut_by = half_spaces + look.first_half_space;
       for (uint32_t v = threadIdx.x; v < kTileVoxels; v += kThreads) {
         const uint32_t word = scratch.words[v];
         if (word == 0) continue;
+        if (cutting != 0 && !IsInsideAll(cut_by, cutting, box, volume.grid, v)) continue;
         scratch.colors[v] = BlendLayer(scratch.colors[v], word, look.blend, look.opacity);
       }
       __syncthreads();
@@ -367,11 +413,12 @@ cudaError_t ListDirty(const VolumeView& volume, cudaStream_t stream) {
   return cudaGetLastError();
 }
 
-cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers, const BatchList& batches,
+cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers,
+                      const VoxelHalfSpace* half_spaces, const BatchList& batches,
                       const VolumeView& volume, const SliceIndexView& slices, uint32_t blocks,
                       cudaStream_t stream) {
-  DrawTilesKernel<<<blocks, kThreads, sizeof(TileScratch), stream>>>(table, layers, batches, volume,
-                                                                     slices);
+  DrawTilesKernel<<<blocks, kThreads, sizeof(TileScratch), stream>>>(table, layers, half_spaces,
+                                                                     batches, volume, slices);
   return cudaGetLastError();
 }
 

@@ -12,9 +12,9 @@
 #include "absl/status/statusor.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
+#include "gpu/bulk/segment.h"
 #include "gpu/worker/message.h"
 #include "gpu/worker/process.h"
-#include "gpu/worker/segment.h"
 
 namespace voxeld::gpu {
 

@@ -37,6 +37,7 @@ int Main() {
 #if defined(VOXELD_HAVE_CUDA)
   hooks.pin = cuda::PinMemory;
   hooks.unpin = cuda::UnpinMemory;
+  hooks.pin_read_only = cuda::PinReadOnlyMemory;
 #endif
   ServeEngines(kWorkerSocket, hooks);
 }

@@ -20,7 +20,7 @@
 
 namespace voxeld::gpu {
 
-inline constexpr uint32_t kWorkerProtocol = 2;
+inline constexpr uint32_t kWorkerProtocol = 3;
 
 enum class MessageType : uint32_t {
   // To the worker. Each but the segments' is answered once, under its own call number.
@@ -32,6 +32,8 @@ enum class MessageType : uint32_t {
   kFrame = 6,        // FrameMessage; kFrameDone or kDone
   kVoxels = 7,       // VoxelsMessage; kDone
   kConnect = 8,      // a descriptor, the other end of a connection; over the control socket alone
+  kBulkSegment = 9,  // BulkSegmentMessage, with its descriptor
+  kDropBulkSegment = 10,  // BulkSegmentMessage
   // From the worker.
   kReady = 32,      // ReadyMessage
   kDone = 33,       // DoneMessage, then the text of the status
@@ -48,6 +50,12 @@ struct OpenMessage {
 
 struct SegmentMessage {
   uint32_t segment = 0;
+  uint64_t size = 0;
+};
+
+// A segment of bulk memory, to be read only.
+struct BulkSegmentMessage {
+  uint64_t segment = 0;
   uint64_t size = 0;
 };
 

@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "display/sync/mutex.h"
-#include "gpu/worker/segment.h"
+#include "gpu/bulk/segment.h"
 
 namespace voxeld::gpu {
 

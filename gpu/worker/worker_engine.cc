@@ -15,10 +15,12 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 #include "display/crc/crc32c.h"
 #include "display/sync/mutex.h"
 #include "gpu/checks.h"
+#include "gpu/worker/bulk_ledger.h"
 #include "gpu/worker/call_channel.h"
 #include "gpu/worker/process.h"
 #include "gpu/worker/segment_pool.h"
@@ -132,15 +134,25 @@ class WorkerEngine final : public Engine {
     if (const auto delta = CheckDelta(block, size); !delta.ok()) {
       return Refuse(std::move(done), delta.status());
     }
+    absl::StatusOr<BulkLedger::Change> change =
+        BulkLedger::ChangeOf(block.bytes().first(size), block.referred());
+    if (change.ok()) {
+      if (absl::Status status = Show(block.referred()); !status.ok()) change = status;
+    }
+    if (!change.ok()) return Refuse(std::move(done), change.status());
     const auto* memory = static_cast<const LeasedMemory*>(block.memory().get());
     SegmentPool::Lease lease = memory->lease();
     block = {};
     Ask<absl::Status>(std::move(done), [&](auto answer) {
       channel_->Call(
           MakeMessage(MessageType::kApply, 0, BulkMessage{}), NameBulk(lease, size),
-          [lease, answer](const absl::StatusOr<Message>& message) mutable {
+          [this, lease, change = *std::move(change),
+           answer](const absl::StatusOr<Message>& message) mutable {
             lease = nullptr;  // given back before the answer
-            answer(PlainStatus(message));
+            const absl::Status status = PlainStatus(message);
+            if (status.ok()) ledger_.Apply(std::move(change), info_.kind == EngineKind::kCuda);
+            change = {};
+            answer(status);
           },
           static_cast<int64_t>(size) * kNsPerByte);
     });
@@ -212,6 +224,32 @@ class WorkerEngine final : public Engine {
         open->Tell(MakeMessage(MessageType::kDropSegment, 0, SegmentMessage{item.id, 0}), nullptr);
       }
     };
+  }
+
+  // Has the worker know the segments of these blocks, before what is sent next.
+  absl::Status Show(std::span<const BulkBlock> blocks) {
+    sync::MutexLock lock(mutex_);
+    for (const BulkBlock& block : blocks) {
+      const std::shared_ptr<BulkSegment>& segment = block.segment();
+      if (shown_.contains(segment->id())) continue;
+      if (segment->memory()->fd() < 0) {
+        return absl::InvalidArgumentError(
+            "the delta refers to bulk memory of this process alone; an engine in another one takes "
+            "blocks of a pool that is shared");
+      }
+      absl::erase_if(shown_, [](const auto& entry) { return entry.second.expired(); });
+      shown_[segment->id()] = segment;
+      const BulkSegmentMessage named{segment->id(), segment->memory()->bytes().size()};
+      Message message = MakeMessage(MessageType::kBulkSegment, 0, named);
+      message.fd = segment->memory()->fd();
+      channel_->Tell(std::move(message), segment->memory());
+      segment->WhenGone(channel_, [channel = std::weak_ptr<CallChannel>(channel_), named] {
+        if (const std::shared_ptr<CallChannel> open = channel.lock()) {
+          open->Tell(MakeMessage(MessageType::kDropBulkSegment, 0, named), nullptr);
+        }
+      });
+    }
+    return absl::OkStatus();
   }
 
   // Waits for what `ask` is answered.
@@ -337,6 +375,9 @@ class WorkerEngine final : public Engine {
   std::optional<display::FrameLayout> layout_ VOXELD_GUARDED_BY(mutex_);  // that the worker has
   uint64_t target_ VOXELD_GUARDED_BY(mutex_) = 0;                         // sent, counted
   std::vector<SegmentPool::Lease> slots_ VOXELD_GUARDED_BY(mutex_);       // for frames, newest last
+  // The segments of bulk memory that the worker knows, by number.
+  absl::flat_hash_map<uint64_t, std::weak_ptr<BulkSegment>> shown_ VOXELD_GUARDED_BY(mutex_);
+  BulkLedger ledger_;  // on the channel's thread
 };
 
 std::filesystem::path RunningProgram() {

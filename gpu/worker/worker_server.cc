@@ -14,8 +14,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "display/crc/crc32c.h"
+#include "gpu/bulk/segment.h"
 #include "gpu/worker/message.h"
-#include "gpu/worker/segment.h"
 #include "gpu/worker/target_codec.h"
 
 namespace voxeld::gpu {
@@ -26,11 +26,35 @@ constexpr int kLostEngine = 3;
 // A block of staging that lies in a segment.
 class SegmentMemory final : public StagingBlock::Memory {
  public:
-  explicit SegmentMemory(std::shared_ptr<Segment> segment) : segment_(std::move(segment)) {}
+  SegmentMemory(std::shared_ptr<Segment> segment, BulkSource* bulk)
+      : segment_(std::move(segment)), bulk_(bulk) {}
   std::span<std::byte> bytes() override { return segment_->bytes(); }
+  BulkSource* bulk() override { return bulk_; }
 
  private:
   const std::shared_ptr<Segment> segment_;
+  BulkSource* const bulk_;
+};
+
+// The bulk memory that the owner has shown. What a piece holds is the owner's to keep as it is.
+class BulkSegments final : public BulkSource {
+ public:
+  absl::StatusOr<BulkView> Find(const BulkRef& ref) override {
+    const auto it = segments.find(ref.segment);
+    if (it == segments.end()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("bulk memory: segment ", ref.segment, " is not known"));
+    }
+    const size_t has = it->second->bytes().size();
+    if (ref.offset > has || ref.size > has - ref.offset) {
+      return absl::InvalidArgumentError(absl::StrCat("bulk memory: ", ref.size, " bytes at byte ",
+                                                     ref.offset, " of segment ", ref.segment,
+                                                     ", which has ", has));
+    }
+    return BulkView{it->second->bytes().subspan(ref.offset, ref.size), it->second};
+  }
+
+  std::map<uint64_t, std::shared_ptr<Segment>> segments;
 };
 
 class Server {
@@ -38,9 +62,9 @@ class Server {
   Server(int socket, const WorkerHooks& hooks) : socket_(socket), hooks_(hooks) {}
   ~Server() {
     engine_ = nullptr;
-    for (const auto& [id, segment] : segments_) {
-      if (hooks_.unpin) hooks_.unpin(segment->bytes());
-    }
+    if (!hooks_.unpin) return;
+    for (const auto& [id, segment] : segments_) hooks_.unpin(segment->bytes());
+    for (const auto& [id, segment] : bulk_.segments) hooks_.unpin(segment->bytes());
   }
 
   int Run() {
@@ -64,6 +88,10 @@ class Server {
         return TakeSegment(message);
       case MessageType::kDropSegment:
         return DropSegment(message);
+      case MessageType::kBulkSegment:
+        return TakeBulkSegment(message);
+      case MessageType::kDropBulkSegment:
+        return DropBulkSegment(message);
       case MessageType::kTarget:
       case MessageType::kApply:
       case MessageType::kFrame:
@@ -131,6 +159,28 @@ class Server {
     return absl::OkStatus();
   }
 
+  absl::Status TakeBulkSegment(Message& message) {
+    const auto named = message.As<BulkSegmentMessage>();
+    const int fd = std::exchange(message.fd, -1);
+    if (!named.has_value() || fd < 0) return absl::InvalidArgumentError("a segment without memory");
+    absl::StatusOr<std::shared_ptr<Segment>> segment = Segment::AdoptReadOnly(fd, named->size);
+    if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
+    if (hooks_.pin_read_only) hooks_.pin_read_only((*segment)->bytes());
+    bulk_.segments[named->segment] = *std::move(segment);
+    return absl::OkStatus();
+  }
+
+  absl::Status DropBulkSegment(const Message& message) {
+    const auto named = message.As<BulkSegmentMessage>();
+    const auto it = named.has_value() ? bulk_.segments.find(named->segment) : bulk_.segments.end();
+    if (it == bulk_.segments.end()) {
+      return absl::InvalidArgumentError("an unknown segment of bulk memory is dropped");
+    }
+    if (hooks_.unpin) hooks_.unpin(it->second->bytes());
+    bulk_.segments.erase(it);
+    return absl::OkStatus();
+  }
+
   std::shared_ptr<Segment> Find(uint32_t id, uint64_t size) const {
     const auto it = segments_.find(id);
     if (it == segments_.end() || it->second->bytes().size() < size) return nullptr;
@@ -167,8 +217,8 @@ class Server {
     absl::StatusOr<std::shared_ptr<Segment>> segment = Bulk(*bulk);
     if (!segment.ok()) return Answer(message.call, segment.status());
     absl::Status status;
-    engine_->Apply(StagingBlock(std::make_shared<SegmentMemory>(*std::move(segment))), bulk->size,
-                   [&](const absl::Status& done) { status = done; });
+    engine_->Apply(StagingBlock(std::make_shared<SegmentMemory>(*std::move(segment), &bulk_)),
+                   bulk->size, [&](const absl::Status& done) { status = done; });
     return Answer(message.call, status);
   }
 
@@ -211,6 +261,7 @@ class Server {
   const WorkerHooks& hooks_;
   std::unique_ptr<Engine> engine_;
   std::map<uint32_t, std::shared_ptr<Segment>> segments_;
+  BulkSegments bulk_;
   std::optional<display::FrameLayout> layout_;
 };
 

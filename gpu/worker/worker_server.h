@@ -17,6 +17,8 @@ struct WorkerHooks {
   std::function<absl::StatusOr<std::unique_ptr<Engine>>(const EngineOptions&)> make_engine;
   // A segment came, or goes: to be pinned. May be empty.
   std::function<void(std::span<std::byte>)> pin, unpin;
+  // The same of bulk memory, which cannot be written; `unpin` undoes it.
+  std::function<void(std::span<std::byte>)> pin_read_only;
 };
 
 // Serves the connections that come over `control`. Ends the process, at once and whatever its

@@ -233,7 +233,7 @@ TEST_P(EngineContract, AMalformedDeltaChangesNothing) {
   const DeltaBuffer whole = Whole(TwoDots());
   for (size_t size = 1; size < whole.bytes().size(); size += 8) {
     if (size % 16 == 0) continue;
-    EXPECT_EQ(engine_.ApplyBytes(std::span(whole.bytes()).first(size)).code(),
+    EXPECT_EQ(engine_.ApplyBytes(std::span(whole.bytes()).first(size), whole.referred()).code(),
               absl::StatusCode::kInvalidArgument)
         << size;
   }

@@ -51,16 +51,20 @@ absl::Status EngineDriver::SetTarget(const Target& target) {
   return status;
 }
 
-absl::Status EngineDriver::ApplyBytes(std::span<const std::byte> delta) {
+absl::Status EngineDriver::ApplyBytes(std::span<const std::byte> delta,
+                                      std::vector<BulkBlock> referred) {
   absl::StatusOr<StagingBlock> block = engine_->AcquireStaging(delta.size());
   if (!block.ok()) return block.status();
   if (!delta.empty()) std::memcpy(block->bytes().data(), delta.data(), delta.size());
+  block->Refer(std::move(referred));
   Answer<absl::Status> answer;
   engine_->Apply(*std::move(block), delta.size(), answer.Taker());
   return answer.Wait();
 }
 
-absl::Status EngineDriver::Apply(const DeltaBuffer& delta) { return ApplyBytes(delta.bytes()); }
+absl::Status EngineDriver::Apply(const DeltaBuffer& delta) {
+  return ApplyBytes(delta.bytes(), delta.referred());
+}
 
 absl::StatusOr<FrameResult> EngineDriver::Frame(const FrameRequest& request, FrameBuffer buffer) {
   Answer<absl::StatusOr<FrameResult>> answer;

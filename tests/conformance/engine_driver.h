@@ -29,7 +29,7 @@ class EngineDriver {
   Engine& engine() { return *engine_; }
   absl::Status SetTarget(const Target& target);
   absl::Status Apply(const DeltaBuffer& delta);
-  absl::Status ApplyBytes(std::span<const std::byte> delta);
+  absl::Status ApplyBytes(std::span<const std::byte> delta, std::vector<BulkBlock> referred = {});
 
   // A frame in a buffer of its own, which holds the frame before.
   absl::StatusOr<FrameResult> Frame();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/conformance/oracle_clip.h"
 #include "tests/conformance/oracle_footprints.h"
 #include "tests/conformance/oracle_shapes.h"
 
@@ -156,8 +157,15 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
                      voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
                    });
     }
-    for (size_t i = 0; i < voxels.size(); ++i) {
-      if (voxels[i].covered) volume.rgb[i] = Blended(volume.rgb[i], voxels[i].rgb, *layer);
+    const OracleClip clip(*layer, target);
+    for (int32_t z = 0; z < volume.nz; ++z) {
+      for (int32_t y = 0; y < volume.ny; ++y) {
+        for (int32_t x = 0; x < volume.nx; ++x) {
+          const size_t i = volume.Index(x, y, z);
+          if (!voxels[i].covered || !clip.Has(x, y, z)) continue;
+          volume.rgb[i] = Blended(volume.rgb[i], voxels[i].rgb, *layer);
+        }
+      }
     }
   }
   return volume;

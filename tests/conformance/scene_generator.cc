@@ -242,6 +242,38 @@ Affine SceneGenerator::RandomTransform(int size) {
   }
 }
 
+// Through some place of interest, in any direction and of any length.
+ClipPlane SceneGenerator::RandomPlane(int size) {
+  double n[3], at[3];
+  for (double& p : at) p = RandomCoordinate(size);
+  for (double& c : n) c = Chance(0.3) ? static_cast<double>(Int(-3, 3)) : Real(-1, 1);
+  if (Chance(0.3)) n[Int(0, 2)] = n[Int(0, 2)] = 0;
+  if (n[0] == 0 && n[1] == 0 && n[2] == 0) n[Int(0, 2)] = Chance(0.5) ? 1 : -1;
+  if (Chance(0.2)) {
+    const double length = std::ldexp(Real(1, 2), static_cast<int>(Int(-300, 300)));
+    for (double& c : n) c *= length;
+  }
+  double d = -(n[0] * at[0] + n[1] * at[1] + n[2] * at[2]);
+  if (Chance(0.05)) d = Real(-1, 1) * std::ldexp(1.0, static_cast<int>(Int(-100, 1000)));
+  return {n[0], n[1], n[2], d};
+}
+
+void SceneGenerator::RandomClip(LayerRecord& l, int size) {
+  if (Chance(0.35)) {
+    l.plane_count = static_cast<uint32_t>(Chance(0.8) ? Int(1, 2) : Int(1, kMaxClipPlanes));
+    for (uint32_t i = 0; i < l.plane_count; ++i) l.planes[i] = RandomPlane(size);
+  }
+  if (!Chance(0.25)) return;
+  l.has_region = 1;
+  for (int a = 0; a < 3; ++a) {
+    double& min = l.region.min[a];
+    double& max = l.region.max[a];
+    min = RandomCoordinate(size);
+    max = min + (Chance(0.5) ? static_cast<double>(Int(1, 2 * size)) : Real(0.01, 2 * size));
+    if (Chance(0.2)) min = -0x1p100, max = Chance(0.5) ? 0x1p90 : max;
+  }
+}
+
 LayerRecord SceneGenerator::RandomLayer(uint64_t id) {
   LayerRecord l;
   l.id = id;
@@ -250,6 +282,7 @@ LayerRecord SceneGenerator::RandomLayer(uint64_t id) {
   l.opacity = Chance(0.5) ? 255 : static_cast<uint32_t>(Int(0, 255));
   l.blend = Chance(0.5) ? BlendMode::kOver : static_cast<BlendMode>(Int(0, 2));
   if (Chance(0.3)) l.transform = RandomTransform(20);
+  RandomClip(l, 20);
   return l;
 }
 
@@ -310,7 +343,12 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
     }
     case 4: {
       const uint64_t id = Chance(0.2) ? next_id_++ : RandomId(scene.layers);
-      scene.layers[id] = RandomLayer(id);
+      if (scene.layers.contains(id) && Chance(0.4)) {  // where it is drawn, alone
+        scene.layers[id].plane_count = scene.layers[id].has_region = 0;
+        RandomClip(scene.layers[id], 20);
+      } else {
+        scene.layers[id] = RandomLayer(id);
+      }
       delta.Put(scene.layers[id]);
       break;
     }

@@ -40,6 +40,8 @@ class SceneGenerator {
   display::Lattice RandomLattice();
   display::VoxelGrid RandomGrid(const display::Geometry& geometry);
   LayerRecord RandomLayer(uint64_t id);
+  ClipPlane RandomPlane(int size);
+  void RandomClip(LayerRecord& layer, int size);
   ModelGeometry RandomGeometry(uint64_t id, int size);
   DrawableRecord RandomDrawable(uint64_t id, const SceneModel& scene, int size);
   Affine RandomTransform(int size);

@@ -1,6 +1,43 @@
 #include "tests/conformance/scene_model.h"
 
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "gpu/bulk/bulk_pool.h"
+
 namespace voxeld::gpu::conformance {
+
+namespace {
+
+// Segments so small that they come and go while the tests run.
+BulkPool& Bulk() {
+  static const std::shared_ptr<BulkPool> pool =
+      BulkPool::Create({.segment_bytes = 4096, .keep_bytes = 0});
+  return *pool;
+}
+
+// By chance, but the same for the same geometry.
+bool InBulk(const ModelGeometry& g) {
+  return !g.positions.empty() &&
+         std::hash<uint64_t>()(g.record.id * 0x9E3779B97F4A7C15u >> 17) % 2 == 0;
+}
+
+BulkBlock BlockOf(const ModelGeometry& g) {
+  const ArrayLayout layout = ArrayLayout::Of(g.record);
+  BulkPool::Fresh fresh = Bulk().Allocate(layout.size).value();
+  const auto put = [&](uint64_t at, const auto& values) {
+    std::ranges::copy(std::as_bytes(std::span(values)),
+                      fresh.bytes.begin() + static_cast<ptrdiff_t>(at));
+  };
+  put(0, g.positions);
+  put(layout.indices, g.indices);
+  put(layout.colors, g.colors);
+  return fresh.block;
+}
+
+}  // namespace
 
 std::span<std::byte> DeltaBuffer::Grow(size_t size) {
   const size_t before = bytes_.size();
@@ -9,6 +46,12 @@ std::span<std::byte> DeltaBuffer::Grow(size_t size) {
 }
 
 void DeltaBuffer::Put(const ModelGeometry& g) {
+  if (InBulk(g)) {
+    DeltaWriter writer(Grow(DeltaWriter::kSizeOfBulkGeometry));
+    writer.PutGeometry(g.record, BlockOf(g));
+    for (BulkBlock& block : writer.TakeReferred()) referred_.push_back(std::move(block));
+    return;
+  }
   DeltaWriter writer(Grow(DeltaWriter::SizeOf(g.record)));
   writer.PutGeometry(g.record, g.positions, g.indices, g.colors);
 }

@@ -35,10 +35,13 @@ class DeltaBuffer {
   void PutWhole(const SceneModel& scene);
 
   const std::vector<std::byte>& bytes() const { return bytes_; }
+  // What it refers to: of some geometries, by chance, the arrays lie in bulk memory.
+  const std::vector<BulkBlock>& referred() const { return referred_; }
 
  private:
   std::span<std::byte> Grow(size_t size);
   std::vector<std::byte> bytes_;
+  std::vector<BulkBlock> referred_;
 };
 
 }  // namespace voxeld::gpu::conformance

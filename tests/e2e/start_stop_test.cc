@@ -211,6 +211,10 @@ TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
     upsert->mutable_entity()->mutable_primitive()->mutable_instance()->set_object("object");
   }
   for (int i = 0; i < kMany; ++i) define();  // each looks at every instance
+  grpc::ClientContext small;                 // a first call over TCP may not be large
+  SetDeadline(small);
+  v1::ListEntitiesResponse nothing;
+  ASSERT_TRUE(scene->ListEntities(&small, {}, &nothing).ok());
   grpc::ClientContext update;
   SetDeadline(update);
   v1::ApplyUpdateResponse response;

@@ -37,6 +37,7 @@ class Daemon {
   explicit Daemon(const std::vector<std::string>& more = {});
 
   Process& process() { return *process_; }
+  pid_t process_id() const { return process_->pid(); }
   const Folder& folder() const { return folder_; }
   const std::string& unix_target() const { return unix_target_; }
   const std::string& tcp_target() const { return tcp_target_; }

@@ -9,6 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "gpu/bulk/bulk_pool.h"
+#include "gpu/geometry_arrays.h"
+
 namespace voxeld::gpu {
 namespace {
 
@@ -88,6 +91,86 @@ absl::Status ReadGeometryWith(const std::function<void(GeometryRecord&)>& change
   return Read(block.bytes());
 }
 
+// A delta that refers to its one geometry's arrays.
+struct BulkDelta {
+  BulkDelta() : block(DeltaWriter::kSizeOfBulkGeometry) {
+    GeometryArrays arrays = *GeometryArrays::Allocate(Mesh(), nullptr);
+    EXPECT_FALSE(arrays.block());  // it is small
+    const ArrayLayout layout = ArrayLayout::Of(Mesh());
+    BulkPool::Fresh fresh = *pool->Allocate(layout.size);
+    const auto put = [&](uint64_t at, const auto& values) {
+      std::memcpy(fresh.bytes.data() + at, values.data(), values.size() * 4);
+    };
+    put(0, kPositions);
+    put(layout.indices, kIndices);
+    put(layout.colors, kColors);
+    DeltaWriter writer(block.bytes());
+    writer.PutGeometry(Mesh(), fresh.block);
+    EXPECT_EQ(writer.size(), block.size);
+    referred = writer.TakeReferred();
+  }
+  absl::Status Read(Recorder& recorder) {
+    BlockSource source(referred);
+    return ReadDelta(block.bytes(), recorder, &source);
+  }
+  BulkRef* ref() {
+    return reinterpret_cast<BulkRef*>(block.bytes().data() + block.size - sizeof(BulkRef));
+  }
+
+  std::shared_ptr<BulkPool> pool = BulkPool::Create();
+  Block block;
+  std::vector<BulkBlock> referred;
+};
+
+TEST(Delta, ArraysMayLieInBulkMemory) {
+  BulkDelta delta;
+  Recorder recorder;
+  ASSERT_TRUE(delta.Read(recorder).ok());
+  EXPECT_EQ(recorder.positions, kPositions);
+  EXPECT_EQ(recorder.indices, kIndices);
+  EXPECT_EQ(recorder.colors, kColors);
+}
+
+TEST(Delta, BulkMemoryMustBeThereAndLargeEnough) {
+  const auto refusal = [](const std::function<void(BulkDelta&)>& spoil) {
+    BulkDelta delta;
+    spoil(delta);
+    Recorder recorder;
+    const absl::Status status = delta.Read(recorder);
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_TRUE(recorder.log.empty());
+    return std::string(status.message());
+  };
+  EXPECT_THAT(refusal([](BulkDelta& d) { d.referred.clear(); }), HasSubstr("no block"));
+  EXPECT_THAT(refusal([](BulkDelta& d) { ++d.ref()->segment; }), HasSubstr("no block"));
+  EXPECT_THAT(refusal([](BulkDelta& d) { d.ref()->offset += 64; }), HasSubstr("no block"));
+  EXPECT_THAT(refusal([](BulkDelta& d) { d.ref()->offset += 8; }), HasSubstr("multiple of 16"));
+  EXPECT_THAT(refusal([](BulkDelta& d) { d.ref()->size = 80; }), HasSubstr("bulk.size is 80"));
+  EXPECT_THAT(refusal([](BulkDelta& d) { d.ref()->size = 1 << 20; }), HasSubstr("has 128 bytes"));
+  BulkDelta delta;
+  EXPECT_THAT(std::string(Read(delta.block.bytes()).message()), HasSubstr("there is none"));
+}
+
+TEST(GeometryArrays, LargeOnesLieInBulkMemory) {
+  const auto pool = BulkPool::Create({.limit_bytes = 4096, .segment_bytes = 4096});
+  GeometryRecord record;
+  record.vertex_count = 100;
+  GeometryArrays arrays = *GeometryArrays::Allocate(record, pool.get());
+  ASSERT_TRUE(arrays.block());
+  EXPECT_EQ(static_cast<const void*>(arrays.positions().data()),
+            static_cast<const void*>(arrays.block().bytes().data()));
+  EXPECT_EQ(arrays.positions().size(), 300u);
+  EXPECT_TRUE(arrays.indices().empty() && arrays.colors().empty());
+  record.vertex_count = 1000;
+  EXPECT_EQ(GeometryArrays::Allocate(record, pool.get()).status().code(),
+            absl::StatusCode::kResourceExhausted);
+  record.vertex_count = 2;
+  record.color_mode = ColorMode::kPerVertex;
+  arrays = *GeometryArrays::Allocate(record, pool.get());
+  EXPECT_FALSE(arrays.block());
+  EXPECT_EQ(arrays.colors().size(), 2u);
+}
+
 TEST(Delta, WritesEveryRecordAndReadsItBack) {
   const GeometryRecord mesh = Mesh();
   const DrawableRecord drawable{.id = 5, .geometry = 4, .layer = 6};
@@ -119,7 +202,7 @@ TEST(Delta, SizesAreAsCountedByHand) {
   EXPECT_EQ(DeltaWriter::SizeOf(Mesh()), 208u);
   EXPECT_EQ(DeltaWriter::SizeOf(GeometryRecord{}), 112u);
   EXPECT_EQ(DeltaWriter::SizeOf(DrawableRecord{}), 144u);
-  EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 144u);
+  EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 448u);
   EXPECT_EQ(DeltaWriter::kSizeOfId, 32u);
   EXPECT_EQ(DeltaWriter::kSizeOfReset, 16u);
 }
@@ -130,7 +213,7 @@ TEST(Delta, AnOverrunIsCountedAndNotWritten) {
   DeltaWriter writer(block.bytes().first(32));
   writer.PutLayer({.id = 1});
   EXPECT_TRUE(writer.overrun());
-  EXPECT_EQ(writer.size(), 144u);
+  EXPECT_EQ(writer.size(), 448u);
   for (std::byte b : block.bytes().last(16)) EXPECT_EQ(b, std::byte{0xEE});
 }
 
@@ -146,7 +229,7 @@ TEST(Delta, RefusesBrokenHeadersWithOffsetAndValue) {
     std::memcpy(copy.bytes().data() + at, &value, sizeof(value));
     return std::string(Read(copy.bytes()).message());
   };
-  EXPECT_THAT(with(16, uint32_t{8}), HasSubstr("record at byte 16: header.op is 8"));
+  EXPECT_THAT(with(16, uint32_t{9}), HasSubstr("record at byte 16: header.op is 9"));
   EXPECT_THAT(with(24, uint64_t{0}), HasSubstr("record at byte 16: header.size is 0"));
   EXPECT_THAT(with(24, uint64_t{24}), HasSubstr("header.size is 24"));
   EXPECT_THAT(with(24, uint64_t{48}), HasSubstr("header.size is 48, must be a multiple of 16 from "
@@ -250,6 +333,25 @@ TEST(Delta, RefusesBadDrawablesAndLayers) {
   EXPECT_THAT(layer({.visible = 2}), HasSubstr("layer.visible is 2"));
   EXPECT_THAT(layer({.opacity = 256}), HasSubstr("layer.opacity is 256, must be 0 to 255"));
   EXPECT_THAT(layer({.blend = static_cast<BlendMode>(3)}), HasSubstr("layer.blend is 3"));
+  EXPECT_THAT(layer({.plane_count = 9}), HasSubstr("layer.plane_count is 9, must be 0 to 8"));
+  EXPECT_THAT(layer({.has_region = 2}), HasSubstr("layer.has_region is 2, must be 0 to 1"));
+  LayerRecord clipped{.plane_count = 2};
+  clipped.planes[0] = {0, 0, 1, -7};
+  EXPECT_THAT(layer(clipped),
+              HasSubstr("layer.planes[1] is (0, 0, 0), must be a plane with a normal"));
+  clipped.planes[1] = {1, 0, 0, INFINITY};
+  EXPECT_THAT(layer(clipped), HasSubstr("layer.planes[1][3] is inf, must be finite"));
+  clipped.planes[1].d = 0;
+  clipped.planes[2].a = NAN;  // beyond plane_count
+  EXPECT_EQ(layer(clipped), "");
+  clipped.region = {{0, 0, 5}, {1, 1, 5}};
+  EXPECT_EQ(layer(clipped), "");
+  clipped.has_region = 1;
+  EXPECT_THAT(layer(clipped), HasSubstr("layer.region.max[2] is 5, must be greater than min's 5"));
+  clipped.region.max[2] = NAN;
+  EXPECT_THAT(layer(clipped), HasSubstr("layer.region.max[2] is nan, must be finite"));
+  clipped.region.max[2] = 6;
+  EXPECT_EQ(layer(clipped), "");
 }
 
 }  // namespace

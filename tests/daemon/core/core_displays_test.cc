@@ -182,10 +182,10 @@ TEST(CoreDisplays, ACaptureWaitsForTheSnapshotThatItAsksFor) {
   Simulation sim;
   sim.Start();
   auto client = sim.Open();
-  const auto captured = Capture(sim, sync::kSecond, 2);
+  const auto captured = Capture(sim, sync::kSecond, 3);
   sim.Send(client, 1, Put("a", "x", 1));
   EXPECT_TRUE(sim.Show());
-  EXPECT_FALSE(sim.Show());  // snapshot 1: nothing is sent again for the capture yet
+  EXPECT_FALSE(sim.Show());  // snapshot 2: nothing is sent again for the capture yet
   sim.Send(client, 2, Put("a", "x", 2));
   EXPECT_TRUE(sim.Show());
   EXPECT_FALSE(captured->done());
@@ -195,7 +195,7 @@ TEST(CoreDisplays, ACaptureWaitsForTheSnapshotThatItAsksFor) {
   EXPECT_EQ(captured->result->volume, 3u);
   // A snapshot that looks the same is shown by the volume before.
   sim.Send(client, 3, Put("a", "x", 2));
-  const auto same = Capture(sim, sync::kSecond, 3);
+  const auto same = Capture(sim, sync::kSecond, 4);
   EXPECT_TRUE(sim.Show());
   ASSERT_TRUE(same->result.ok()) << same->result.status();
   EXPECT_EQ(same->result->volume, 3u);

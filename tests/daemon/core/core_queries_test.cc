@@ -116,7 +116,7 @@ TEST(CoreQueries, APageHoldsAThousandAtMost) {
     all.back().sequence = i + 1;
   }
   all.push_back(testing::EndCommit(1));
-  sim.core->Handle(client.info.session, std::move(all), {}, 1, nullptr);
+  client.info.intake->Take({std::move(all), {}, 1});
   sim.core->Step();
   for (const uint32_t size : {0, 5000}) {
     EntityQuery query;

@@ -255,6 +255,8 @@ TEST(CoreReceipts, OutcomesOwedToAVanishedClientAreCounted) {
   while (sim.Show()) {
   }
   EXPECT_EQ(client.sink->receipts.size(), receipts);
+  EXPECT_EQ(sim.GetStats().outcomes_undelivered, 0u) << "kept for a while";
+  sim.Advance(10 * sync::kSecond);
   const Stats stats = sim.GetStats();
   EXPECT_EQ(stats.outcomes_undelivered, 1u);
   EXPECT_EQ(stats.displays[0].commits_presented, 1u);
@@ -275,7 +277,7 @@ TEST(CoreReceipts, DecodingsRefusalsCountForTheCommitThatTheyComeBefore) {
   issues[0].sequence = 2;
   issues[1].sequence = 7;
   issues[2].sequence = 10;
-  sim.core->Handle(client.info.session, std::move(all), {std::move(issues)}, 1, nullptr);
+  client.info.intake->Take({std::move(all), {std::move(issues)}, 1});
   sim.core->Step();
   EXPECT_EQ(client.sink->issues.size(), 3u);
   const auto accepted = client.sink->Of<Accepted>();

@@ -159,7 +159,7 @@ TEST(CoreSessions, NoMoreThanMaxSessions) {
   auto first = sim.Open();
   sim.Open();
   absl::Status status;
-  sim.core->OpenSession({}, std::make_shared<testing::RecordingSink>(),
+  sim.core->OpenSession({}, 0, std::make_shared<testing::RecordingSink>(),
                         [&](absl::StatusOr<SessionInfo> info) { status = info.status(); });
   sim.core->Step();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
@@ -252,7 +252,7 @@ TEST(CoreSessions, OfManyRefusalsTheFirstAreToldAndTheOthersCounted) {
   Refusals refused;
   for (int i = 0; i < 5; ++i)
     refused.Add({8, "a", "y", "upsert", Reason::kInvalidValue, "wrong"}, 2);
-  sim.core->Handle(client.info.session, {}, refused, 100, nullptr);
+  client.info.intake->Take({{}, refused, 100});
   sim.core->Step();
   EXPECT_EQ(client.sink->issues.size(), 6u);
   client.last_sequence = 8;
@@ -293,15 +293,13 @@ TEST(CoreSessions, UnknownSessionsAreIgnoredAndDoneAlwaysComes) {
   Simulation sim;
   sim.Start();
   int done = 0;
-  sim.core->Handle(99, testing::Sequence(0, Put("a", "x")), {}, 10, [&] { ++done; });
-  sim.core->CloseSession(99, [&] { ++done; });
+  sim.core->CloseSession(99, 0, false, [&] { ++done; });
   sim.core->Step();
-  EXPECT_EQ(done, 2);
+  EXPECT_EQ(done, 1);
   EXPECT_EQ(sim.List().total, 0u);
   EXPECT_TRUE(sim.core->Stop(sync::kSecond).ok());
-  sim.core->Handle(99, {}, {}, 0, [&] { ++done; });
-  sim.core->CloseSession(99, [&] { ++done; });
-  EXPECT_EQ(done, 4);
+  sim.core->CloseSession(99, 0, false, [&] { ++done; });
+  EXPECT_EQ(done, 2);
 }
 
 }  // namespace

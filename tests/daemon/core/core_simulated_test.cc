@@ -45,7 +45,7 @@ class SimulatedDaemon {
     EXPECT_TRUE(added.ok()) << added;
     EXPECT_TRUE(core->Start().ok());
     RunFor(sync::kSecond);
-    core->OpenSession({}, sink, [this](auto info) { session_ = info->session; });
+    core->OpenSession({}, 0, sink, [this](auto info) { session_ = *info; });
     RunFor(0);
   }
 
@@ -66,7 +66,7 @@ class SimulatedDaemon {
   void Send(Ops... ops) {
     std::vector<Operation> all = testing::Sequence(sequence_, std::move(ops)...);
     sequence_ += all.size();
-    core->Handle(session_, std::move(all), {}, 100, nullptr);
+    session_.intake->Take({std::move(all), {}, 100});
     core->Step();
   }
 
@@ -83,7 +83,7 @@ class SimulatedDaemon {
 
  private:
   display::InProcessTransport* transport_ = nullptr;
-  SessionId session_ = 0;
+  SessionInfo session_;
   uint64_t sequence_ = 0;
 };
 
@@ -131,6 +131,30 @@ TEST(CoreSimulated, AnInstanceAFrameAndALayersStateAreSeen) {
   ASSERT_TRUE(hidden.ok()) << hidden.status();
   EXPECT_EQ(PixelAt(*hidden, 3, 1, 1), 0u);
   EXPECT_EQ(PixelAt(*hidden, 0, 0, 0), 0x00FF00u);
+}
+
+TEST(CoreSimulated, OnlyWhatLiesWithinAClipAndARegionIsSeen) {
+  SimulatedDaemon daemon;
+  daemon.Send(Put("a", "1", Entity1(Dots(0, 0xFF0000), testing::Shift(2.5, 3.5, 1.5))),
+              Put("a", "2", Entity1(Dots(0, 0x00FF00), testing::Shift(8.5, 3.5, 1.5))),
+              Put("b", "3", Entity1(Dots(0, 0x0000FF), testing::Shift(2.5, 7.5, 1.5))),
+              testing::SetClip("a", {{1, 0, 0, -5}}), testing::EndCommit(1));
+  const auto clipped = daemon.Capture(1);
+  ASSERT_TRUE(clipped.ok()) << clipped.status();
+  EXPECT_EQ(PixelAt(*clipped, 2, 3, 1), 0u);
+  EXPECT_EQ(PixelAt(*clipped, 8, 3, 1), 0x00FF00u);
+  EXPECT_EQ(PixelAt(*clipped, 2, 7, 1), 0x0000FFu);  // another layer's
+  daemon.Send(testing::SetClip("a", {}), testing::SetRegion("a", gpu::Region{{0, 0, 0}, {5, 5, 5}}),
+              testing::EndCommit(2));
+  const auto region = daemon.Capture(2);
+  ASSERT_TRUE(region.ok()) << region.status();
+  EXPECT_EQ(PixelAt(*region, 2, 3, 1), 0xFF0000u);
+  EXPECT_EQ(PixelAt(*region, 8, 3, 1), 0u);
+  daemon.Send(testing::SetRegion("a", std::nullopt), testing::EndCommit(3));
+  const auto whole = daemon.Capture(3);
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_EQ(PixelAt(*whole, 2, 3, 1), 0xFF0000u);
+  EXPECT_EQ(PixelAt(*whole, 8, 3, 1), 0x00FF00u);
 }
 
 std::string Describe(const Receipt& receipt) {

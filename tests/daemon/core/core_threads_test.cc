@@ -138,7 +138,7 @@ class RunningCore {
   }
   SessionInfo Open(const std::shared_ptr<SessionSink>& sink, OpenOptions options = {}) {
     Answer<SessionInfo> answer;
-    core->OpenSession(std::move(options), sink, answer.reply());
+    core->OpenSession(std::move(options), 0, sink, answer.reply());
     return *answer.Await();
   }
   Stats GetStats() {
@@ -174,7 +174,7 @@ TEST(CoreThreads, WhatACommitPutsUpComesOutOfTheDisplay) {
   }
   std::vector<Operation> all =
       testing::Sequence(0, Put("a", "ball", Entity1(GeometryPtr(sphere))), testing::EndCommit(5));
-  running.core->Handle(session.session, std::move(all), {}, 100, nullptr);
+  session.intake->Take({std::move(all), {}, 100});
   ASSERT_TRUE(sink->Await(2));
   EXPECT_TRUE(sink->issues().empty());
   const std::vector<Receipt> receipts = sink->receipts();
@@ -196,7 +196,7 @@ TEST(CoreThreads, WhatACommitPutsUpComesOutOfTheDisplay) {
   EXPECT_EQ(stats.displays[0].commits_presented, 1u);
 
   // Gone with its session.
-  running.core->CloseSession(session.session, nullptr);
+  running.core->CloseSession(session.session, session.incarnation, true, nullptr);
   Answer<EntityPage> list;
   running.core->ListEntities({}, list.reply());
   EXPECT_EQ(list.Await()->layers.size(), 0u);
@@ -226,7 +226,7 @@ TEST(CoreThreads, ManyClientsAtOnceAndEverySumIsExact) {
                                   testing::EndCommit(i));
         }
         sequence += all.size();
-        running.core->Handle(session.session, std::move(all), {}, 100, nullptr);
+        session.intake->Take({std::move(all), {}, 100});
         if (i % 10 == 0) {
           running.GetStats();
           DisplayUpdate update;
@@ -240,7 +240,7 @@ TEST(CoreThreads, ManyClientsAtOnceAndEverySumIsExact) {
       if (c % 2 == 0) {
         EXPECT_TRUE(sink->Await(kCommits * 3));
       }
-      running.core->CloseSession(session.session, nullptr);
+      running.core->CloseSession(session.session, session.incarnation, true, nullptr);
     });
   }
   for (std::thread& client : clients) client.join();
@@ -259,7 +259,8 @@ TEST(CoreThreads, ManyClientsAtOnceAndEverySumIsExact) {
   // Until all is told, also what nobody hears any more.
   const sync::TimeNs deadline = TheClock().Now() + kGenerous;
   Stats stats = running.GetStats();
-  while (stats.displays[0].commits_pending + stats.displays[1].commits_pending > 0 &&
+  while ((stats.sessions > 0 ||
+          stats.displays[0].commits_pending + stats.displays[1].commits_pending > 0) &&
          TheClock().Now() < deadline) {
     stats = running.GetStats();
   }
@@ -279,10 +280,10 @@ TEST(CoreThreads, StopWithWorkOnItsWayEndsInTime) {
     auto sink = std::make_shared<WaitingSink>();
     const SessionInfo session = running.Open(sink);
     for (uint64_t i = 1; i <= 10; ++i) {
-      running.core->Handle(session.session,
-                           testing::Sequence(i * 2, Put("a", "x", static_cast<float>(i) / 20),
-                                             testing::EndCommit(i)),
-                           {}, 100, nullptr);
+      session.intake->Take({testing::Sequence(i * 2, Put("a", "x", static_cast<float>(i) / 20),
+                                              testing::EndCommit(i)),
+                            {},
+                            100});
     }
     ASSERT_TRUE(sink->Await(1));
     const sync::TimeNs before = TheClock().Now();

@@ -71,7 +71,7 @@ class FaultyGpu final : public gpu::Engine {
   }
   void Apply(gpu::StagingBlock block, size_t size, Done done) override {
     if (gone_) return done(absl::DataLossError("gone"));
-    const absl::Status status = model_.Apply(block.bytes().first(size));
+    const absl::Status status = model_.Apply(block.bytes().first(size), block.referred());
     if (!status.ok()) return done(status);
     engine_->Apply(std::move(block), size, std::move(done));
   }

@@ -1,6 +1,7 @@
 // Short ways to write operations in tests.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -18,8 +19,9 @@ inline GeometryPtr Dots(float x, uint32_t color = 0xFFFFFF, uint32_t count = 1) 
   data->record.kind = gpu::PrimitiveKind::kPoints;
   data->record.color = color;
   data->record.vertex_count = count;
-  data->positions.resize(size_t{3} * count);
-  for (uint32_t i = 0; i < count; ++i) data->positions[3 * i] = x + static_cast<float>(i);
+  std::vector<float> positions(size_t{3} * count);
+  for (uint32_t i = 0; i < count; ++i) positions[3 * i] = x + static_cast<float>(i);
+  data->arrays = gpu::GeometryArrays::Of(data->record, positions);
   data->min[0] = x;
   data->max[0] = x + count - 1;
   return data;
@@ -77,6 +79,19 @@ inline Operation SetLayer(std::string layer, std::optional<bool> visible,
   state.layer = std::move(layer);
   state.visible = visible;
   state.transform = transform;
+  return {0, std::move(state)};
+}
+inline Operation SetClip(std::string layer, const std::vector<gpu::ClipPlane>& planes) {
+  LayerState state;
+  state.layer = std::move(layer);
+  state.clip.emplace().count = static_cast<uint32_t>(planes.size());
+  std::copy(planes.begin(), planes.end(), state.clip->planes);
+  return {0, std::move(state)};
+}
+inline Operation SetRegion(std::string layer, std::optional<gpu::Region> region) {
+  LayerState state;
+  state.layer = std::move(layer);
+  state.region = region;
   return {0, std::move(state)};
 }
 inline Operation Begin(std::string layer) { return {0, FrameBegin{std::move(layer)}}; }

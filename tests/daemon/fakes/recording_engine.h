@@ -30,9 +30,11 @@ class SceneModel : public gpu::DeltaVisitor {
     std::vector<uint32_t> indices, colors;
   };
 
-  absl::Status Apply(std::span<const std::byte> delta) {
+  absl::Status Apply(std::span<const std::byte> delta,
+                     std::span<const gpu::BulkBlock> referred = {}) {
     puts_ = drops_ = 0;
-    if (absl::Status status = gpu::ReadDelta(delta, *this); !status.ok()) return status;
+    gpu::BlockSource bulk(referred);
+    if (absl::Status status = gpu::ReadDelta(delta, *this, &bulk); !status.ok()) return status;
     for (const auto& [id, drawable] : drawables_) {
       if (!geometries_.contains(drawable.geometry)) {
         return absl::InvalidArgumentError("a drawable's geometry is not there");
@@ -184,7 +186,8 @@ class RecordingEngine final : public gpu::Engine {
 
   void Apply(gpu::StagingBlock block, size_t size, Done done) override {
     Call([this, block = std::move(block), size, done = std::move(done)] {
-      done(gone_ ? absl::DataLossError("gone") : scene_.Apply(block.bytes().first(size)));
+      done(gone_ ? absl::DataLossError("gone")
+                 : scene_.Apply(block.bytes().first(size), block.referred()));
     });
   }
 

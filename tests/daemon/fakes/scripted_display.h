@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "display/api/display.h"
@@ -53,6 +54,16 @@ class ScriptedDisplay final : public display::Display {
     return true;
   }
   using Display::in_flight;
+  // The sweeps that it announces, if their period is not 0.
+  sync::TimeNs sweep_start_ns = 0, sweep_period_ns = 0;
+  std::vector<sync::TimeNs> ComingSweeps(int count) const override {
+    std::vector<sync::TimeNs> coming;
+    if (sweep_period_ns == 0) return coming;
+    sync::TimeNs next = sweep_start_ns;
+    while (next <= now_.Now()) next += sweep_period_ns;
+    for (int i = 0; i < count; ++i) coming.push_back(next + i * sweep_period_ns);
+    return coming;
+  }
 
   int sent = 0;  // volumes begun, of any cause
 

@@ -21,9 +21,17 @@ namespace voxeld::daemon::testing {
 struct RecordingSink final : SessionSink {
   void OnIssue(const Issue& issue) override { issues.push_back(issue); }
   void OnReceipt(const Receipt& receipt) override { receipts.push_back(receipt); }
+  void OnCredit(uint64_t total_bytes) override { credits.push_back(total_bytes); }
+  void OnRoom() override { ++rooms; }
+  void OnEnded(const absl::Status& why) override { ended = why; }
+  bool Crowded() const override { return crowded; }
 
   std::vector<Issue> issues;
   std::vector<Receipt> receipts;
+  std::vector<uint64_t> credits;
+  int rooms = 0;
+  std::optional<absl::Status> ended;
+  bool crowded = false;
 
   template <typename T>
   std::vector<std::pair<Receipt, T>> Of() const {
@@ -90,7 +98,7 @@ class Simulation {
 
   Client Open(OpenOptions options = {}) {
     Client client;
-    core->OpenSession(std::move(options), client.sink,
+    core->OpenSession(std::move(options), 0, client.sink,
                       [&](absl::StatusOr<SessionInfo> info) { client.info = *info; });
     core->Step();
     return client;
@@ -105,12 +113,12 @@ class Simulation {
       all.push_back(EndCommit(frame_id));
       all.back().sequence = ++client.last_sequence;
     }
-    core->Handle(client.info.session, std::move(all), {}, 100, nullptr);
+    client.info.intake->Take({std::move(all), {}, 100});
     core->Step();
   }
 
   void Close(const Client& client) {
-    core->CloseSession(client.info.session, nullptr);
+    core->CloseSession(client.info.session, client.info.incarnation, true, nullptr);
     core->Step();
   }
 

@@ -26,7 +26,11 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
     display.commit_to_presented.count = 3;
     display.commit_to_presented.p99_ns = 250'000'000;
   }
+  stats.memory.answers = 88;
+  stats.applying = {3, 1'000'000, 2, 3};
   const std::string text = MetricsText(stats);
+  EXPECT_THAT(text, HasSubstr("voxeld_memory_bytes{use=\"answers\"} 88\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_commit_applying_seconds{quantile=\"0.5\"} 0.001\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_info{version=\"1.2\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_uptime_seconds 1.5\n"));
   EXPECT_THAT(text, HasSubstr("# TYPE voxeld_commits_accepted_total counter\n"));
@@ -102,6 +106,13 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("the last volume is held"));
   stats.displays[0].volume_held = false;
   stats.displays[0].engine_degraded = "";
+  stats.connections.unreachable = "127.0.0.1:1: no answer came in time";
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
+  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+            R"({"status":"failing","reasons":[{"what":"not reachable",)"
+            R"("why":"127.0.0.1:1: no answer came in time"}]})"
+            "\n");
+  stats.connections.unreachable = "";
   EXPECT_EQ(HealthResponse(displays, stats, true).status, 503u);
   EXPECT_THAT(HealthResponse(displays, stats, true).body, HasSubstr("shutting down"));
 }

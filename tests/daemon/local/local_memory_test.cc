@@ -20,7 +20,8 @@ using ::testing::Not;
 constexpr uint64_t kMost = std::numeric_limits<uint64_t>::max();
 
 struct Held {
-  explicit Held(const LocalLimits& limits = {}) : memory(limits, mapped) {}
+  explicit Held(const LocalLimits& limits = {}, std::shared_ptr<Budget> budget = nullptr)
+      : memory(limits, mapped, std::move(budget)) {}
 
   absl::Status Hold(uint64_t id, std::string_view bytes) {
     return memory.Hold(id, bytes.size(), MakeMemfd(bytes).get());
@@ -185,7 +186,7 @@ TEST(LocalMemory, CountsAndBytesAreLimited) {
 TEST(LocalMemory, AllSessionsTogetherAreLimited) {
   const LocalLimits limits{.max_memories_total = 3};
   const auto mapped = std::make_shared<std::atomic<uint32_t>>(0);
-  LocalMemory one(limits, mapped), other(limits, mapped);
+  LocalMemory one(limits, mapped, nullptr), other(limits, mapped, nullptr);
   const Descriptor fd = MakeMemfd("four");
   EXPECT_TRUE(one.Hold(1, 4, fd.get()).ok());
   EXPECT_TRUE(one.Hold(2, 4, fd.get()).ok());
@@ -193,6 +194,44 @@ TEST(LocalMemory, AllSessionsTogetherAreLimited) {
   EXPECT_TRUE(absl::IsResourceExhausted(other.Hold(2, 4, fd.get())));
   one.End();
   EXPECT_TRUE(other.Hold(2, 4, fd.get()).ok());
+}
+
+TEST(LocalMemory, WhatIsMappedIsChargedToTheBudget) {
+  constexpr Budget::Use kLocal = Budget::Use::kLocal;
+  const auto budget = std::make_shared<Budget>(100);
+  ASSERT_TRUE(budget->Charge(Budget::Use::kScene, 30));
+  {
+    Held one({}, budget), other({}, budget);
+    ASSERT_TRUE(one.Hold(1, std::string(40, 'a')).ok());
+    ASSERT_TRUE(other.Hold(1, std::string(20, 'b')).ok());
+    EXPECT_EQ(budget->used_bytes(kLocal), 60u);
+    const absl::Status status = other.Hold(2, std::string(11, 'c'));
+    EXPECT_TRUE(absl::IsResourceExhausted(status));
+    EXPECT_THAT(std::string(status.message()),
+                HasSubstr("memory 2 of 11 bytes would be held beside 90 of all clients; "
+                          "max_memory_bytes allows 100"));
+    EXPECT_EQ(budget->used_bytes(kLocal), 60u) << "what is refused costs nothing";
+    EXPECT_EQ(other.memory.memories(), 1u);
+    EXPECT_TRUE(absl::IsAlreadyExists(other.Hold(1, "b")));
+    EXPECT_TRUE(absl::IsInvalidArgument(other.memory.Hold(3, 4, MakeMemfd("four", 0).get())));
+    EXPECT_EQ(budget->used_bytes(kLocal), 60u);
+
+    auto found = one.memory.Find(1, 0, 4);
+    ASSERT_TRUE(found.ok());
+    ASSERT_TRUE(one.memory.Release(1).ok());
+    EXPECT_EQ(budget->used_bytes(kLocal), 60u) << "it is still mapped";
+    found = absl::CancelledError();
+    EXPECT_EQ(budget->used_bytes(kLocal), 20u);
+    EXPECT_TRUE(other.Hold(2, std::string(50, 'c')).ok());
+    other.memory.ReleaseAll();
+    EXPECT_EQ(budget->used_bytes(kLocal), 0u);
+    ASSERT_TRUE(one.Hold(1, std::string(70, 'd')).ok());
+    one.memory.End();
+    EXPECT_EQ(budget->used_bytes(kLocal), 0u);
+    ASSERT_TRUE(other.Hold(1, "e").ok());
+  }
+  EXPECT_EQ(budget->used_bytes(kLocal), 0u);
+  EXPECT_EQ(budget->used_bytes(), 30u);
 }
 
 TEST(LocalMemory, TakesNothingOnceEnded) {

@@ -17,7 +17,7 @@ bool Rung(const Doorbell& bell) {
 
 TEST(Tokens, TellSessionsApart) {
   const auto bell = *Doorbell::Make();
-  Tokens tokens({}, bell);
+  Tokens tokens({}, bell, nullptr);
   const auto one = tokens.Register(1), two = tokens.Register(2);
   ASSERT_TRUE(one.ok() && two.ok());
   EXPECT_EQ(one->token.size(), 16u);
@@ -27,7 +27,7 @@ TEST(Tokens, TellSessionsApart) {
   EXPECT_EQ(tokens.Find(two->token).memory, two->memory);
   EXPECT_EQ(tokens.Find(two->token).session, 2u);
   EXPECT_FALSE(Rung(*bell));
-  tokens.Unregister(1);
+  tokens.Unregister(one->token);
   EXPECT_TRUE(Rung(*bell));
   bell->Quiet();
   EXPECT_FALSE(Rung(*bell));
@@ -35,12 +35,25 @@ TEST(Tokens, TellSessionsApart) {
   EXPECT_FALSE(two->memory->ended());
   EXPECT_EQ(tokens.Find(one->token).memory, nullptr);
   EXPECT_EQ(tokens.Find(two->token).session, 2u);
-  tokens.Unregister(1);
+  tokens.Unregister(one->token);
   EXPECT_FALSE(Rung(*bell)) << "nothing ended";
 }
 
+TEST(Tokens, AStreamThatTakesASessionUpHasItsOwn) {
+  Tokens tokens({}, *Doorbell::Make(), nullptr);
+  const auto older = tokens.Register(1), newer = tokens.Register(1);
+  ASSERT_TRUE(older.ok() && newer.ok());
+  EXPECT_NE(older->token, newer->token);
+  tokens.Unregister(older->token);
+  EXPECT_TRUE(older->memory->ended());
+  EXPECT_EQ(tokens.Find(older->token).memory, nullptr);
+  EXPECT_FALSE(newer->memory->ended());
+  EXPECT_EQ(tokens.Find(newer->token).memory, newer->memory);
+  EXPECT_EQ(tokens.Find(newer->token).session, 1u);
+}
+
 TEST(Tokens, OnlyTheWholeTokenIsRight) {
-  Tokens tokens({}, *Doorbell::Make());
+  Tokens tokens({}, *Doorbell::Make(), nullptr);
   const std::string token = tokens.Register(1)->token;
   EXPECT_EQ(tokens.Find("").memory, nullptr);
   EXPECT_EQ(tokens.Find(std::string(16, '\0')).memory, nullptr);
@@ -58,7 +71,7 @@ TEST(Tokens, OnlyTheWholeTokenIsRight) {
 }
 
 TEST(Tokens, AreRandom) {
-  Tokens tokens({}, *Doorbell::Make());
+  Tokens tokens({}, *Doorbell::Make(), nullptr);
   std::set<std::string> seen;
   std::array<int, 128> ones = {};
   constexpr int kMany = 4000;

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -42,7 +44,8 @@ struct Pair {
     scene.Write(writer);
     EXPECT_FALSE(writer.overrun());
     EXPECT_EQ(writer.size(), size);
-    return model.Apply(std::span(bytes, size));
+    const std::vector<gpu::BulkBlock> referred = writer.TakeReferred();
+    return model.Apply(std::span(bytes, size), referred);
   }
 };
 
@@ -98,6 +101,37 @@ TEST(EngineDelta, WhatAnEngineDoesNotSeeIsNotSent) {
   f.Commit(Put("a", "x", data), Define("unused", {{Dots(1), {}}}));
   ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
   EXPECT_EQ(pair.size, 0u);
+}
+
+TEST(EngineDelta, ALayersClipAndRegionGoWithTheLayerAlone) {
+  StoreFixture f;
+  f.Commit(Put("a", "x"), Put("b", "y"));
+  Pair pair;
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  const gpu::ClipPlane floor{0, 0, 1, 0}, wall{1, 0, 0, -2};
+  const gpu::Region box{{0, 0, 0}, {1, 2, 3}};
+  const auto layer = [&] { return pair.model.layers().at(f.GetLayer("a")->number); };
+  const auto bring = [&](Operation operation) {
+    f.Commit(std::move(operation));
+    EXPECT_TRUE(pair.Bring(f.store.snapshot()).ok());
+    return pair.model.puts() + pair.model.drops();
+  };
+  EXPECT_EQ(bring(testing::SetClip("a", {floor, wall})), 1);
+  EXPECT_EQ(layer().plane_count, 2u);
+  EXPECT_EQ(layer().planes[0], floor);
+  EXPECT_EQ(layer().planes[1], wall);
+  EXPECT_EQ(layer().has_region, 0u);
+  EXPECT_EQ(bring(testing::SetRegion("a", box)), 1);
+  EXPECT_EQ(layer().plane_count, 2u);
+  EXPECT_EQ(layer().has_region, 1u);
+  EXPECT_EQ(layer().region, box);
+  f.Commit(testing::SetClip("a", {floor, wall}), testing::SetRegion("a", box));
+  EXPECT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_EQ(pair.size, 0u);  // the same again
+  EXPECT_EQ(bring(testing::SetClip("a", {})), 1);
+  EXPECT_EQ(layer().plane_count, 0u);
+  EXPECT_EQ(bring(testing::SetRegion("a", std::nullopt)), 1);
+  EXPECT_EQ(layer().has_region, 0u);
 }
 
 TEST(EngineDelta, InstancesShareGeometriesAndComposeFromTheOutside) {
@@ -174,6 +208,27 @@ TEST(EngineDelta, ItBreathesDuringLongWork) {
   gpu::DeltaWriter writer(std::as_writable_bytes(std::span(words)));
   scene.Write(writer);
   EXPECT_GE(breaths, 30);
+}
+
+TEST(EngineDelta, ArraysInBulkMemoryAreReferredTo) {
+  const auto pool = gpu::BulkPool::Create();
+  auto large = std::make_shared<GeometryData>();
+  large->record.kind = gpu::PrimitiveKind::kPoints;
+  large->record.vertex_count = 1000;
+  large->arrays = *gpu::GeometryArrays::Allocate(large->record, pool.get());
+  const std::span<float> positions = large->arrays.writable_positions();
+  std::iota(positions.begin(), positions.end(), 0.0f);
+  StoreFixture f;
+  Pair pair;
+  f.Commit(Put("a", "large", Entity1(GeometryPtr(std::move(large)))), Put("a", "small", 2));
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_LT(pair.size, 1000u);
+  size_t seen = 0;
+  for (const auto& [id, geometry] : pair.model.geometries()) {
+    seen = std::max(seen, geometry.positions.size());
+    EXPECT_EQ(geometry.positions.back(), geometry.positions.size() == 3000 ? 2999 : 0);
+  }
+  EXPECT_EQ(seen, 3000u);
 }
 
 // Along random paths over random snapshots: what the engine holds is what a new engine would.

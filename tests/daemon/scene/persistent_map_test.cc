@@ -90,6 +90,49 @@ TEST(PersistentMap, RandomPathsAgreeWithStdMap) {
   }
 }
 
+TEST(PersistentMap, ADifferenceCanBeTakenUpAnywhere) {
+  std::mt19937 random(7);
+  for (int round = 0; round < 300; ++round) {
+    Map a;
+    for (uint32_t n = random() % 60; n > 0; --n) a.Put(absl::StrCat("k", random() % 80), n);
+    Map b = random() % 8 == 0 ? Map() : a;
+    for (uint32_t n = random() % 60; n > 0; --n) {
+      const std::string key = absl::StrCat("k", random() % 80);
+      if (random() % 2 == 0) {
+        b.Erase(key);
+      } else {
+        b.Put(key, static_cast<int>(random() % 5));
+      }
+    }
+    const std::vector<Change> whole = Diff(ToModel(a), ToModel(b));
+    // In pieces: each as many as chance says, the next from just beyond the last key.
+    std::vector<Change> pieces;
+    std::string from;
+    size_t left = 0;
+    while (!Map::DiffFrom(a, b, from, [&](const std::string& key, const int* was, const int* is) {
+      pieces.push_back(
+          {key, was ? std::optional(*was) : std::nullopt, is ? std::optional(*is) : std::nullopt});
+      from = key + '\0';
+      if (left == 0) left = 1 + random() % 5;
+      return --left > 0;
+    })) {
+    }
+    ASSERT_EQ(pieces, whole) << "round " << round;
+    // From a key that neither may have.
+    from = absl::StrCat("k", random() % 80, "x");
+    pieces.clear();
+    EXPECT_TRUE(
+        Map::DiffFrom(a, b, from, [&](const std::string& key, const int* was, const int* is) {
+          pieces.push_back({key, was ? std::optional(*was) : std::nullopt,
+                            is ? std::optional(*is) : std::nullopt});
+          return true;
+        }));
+    std::vector<Change> beyond = whole;
+    std::erase_if(beyond, [&](const Change& change) { return change.key < from; });
+    ASSERT_EQ(pieces, beyond) << "round " << round;
+  }
+}
+
 TEST(PersistentMap, FindsAndWalksFromAKey) {
   Map map;
   for (const char* key : {"d", "a", "c", "f"}) map.Put(key, key[0]);

@@ -51,6 +51,14 @@ inline std::vector<Operation> RandomOperations(std::mt19937& random, uint32_t mo
         break;
       case 7:
         all.push_back(SetLayer(layer, random() % 2 == 0, transform()));
+        if (random() % 2 == 0) {
+          const gpu::ClipPlane plane{1, 0, 0, -static_cast<double>(random() % 3)};
+          all.push_back(SetClip(layer, std::vector(random() % 3, plane)));
+        } else if (random() % 2 == 0) {
+          std::optional<gpu::Region> region;
+          if (random() % 3 != 0) region = {{0, 0, 0}, {1, 1, 1.0 + random() % 3}};
+          all.push_back(SetRegion(layer, region));
+        }
         break;
       case 8:
         all.push_back(random() % 2 == 0 ? Begin(layer) : End(layer));

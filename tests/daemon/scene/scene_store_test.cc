@@ -28,17 +28,19 @@ using testing::MakeAuthor;
 using testing::Move;
 using testing::Put;
 using testing::Scale;
+using testing::SetClip;
 using testing::SetLayer;
+using testing::SetRegion;
 using testing::Shift;
 using testing::StoreFixture;
 
 TEST(SceneStore, ACommitMakesOneSnapshotAndLeavesTheOldOneAsItWas) {
   StoreFixture f;
   const SnapshotPtr empty = f.store.snapshot();
-  EXPECT_EQ(empty->number, 0u);
+  EXPECT_EQ(empty->number, 1u);
   EXPECT_TRUE(f.Commit(Put("a", "x"), Put("b", "y")).applied);
   const SnapshotPtr first = f.store.snapshot();
-  EXPECT_EQ(first->number, 1u);
+  EXPECT_EQ(first->number, 2u);
   EXPECT_EQ(f.Scene(), "a: x; b: y");
   EXPECT_EQ(f.Commit(DeleteId("a", "x"), Put("a", "z")).applied_operations, 2u);
   EXPECT_EQ(f.Scene(), "a: z; b: y");
@@ -151,6 +153,60 @@ TEST(SceneStore, SingularTransformsAreRefusedOnSight) {
   // Stretching and shrinking alone are never singular.
   EXPECT_EQ(f.Commit(Put("a", "x", Entity1(Dots(0), Scale(1e-9, 1e6, 1e-12)))).issues.size(), 0u);
   EXPECT_EQ(f.Scene(), "a: x");
+}
+
+TEST(SceneStore, ClipAndRegionStayUntilTheyAreReplacedOrRemoved) {
+  StoreFixture f;
+  const gpu::ClipPlane floor{0, 0, 1, 0}, wall{1, 0, 0, -2};
+  const gpu::Region box{{0, 0, 0}, {1, 2, 3}};
+  EXPECT_TRUE(f.Commit(SetClip("a", {floor, wall}), SetRegion("a", box)).applied);
+  const SnapshotPtr clipped = f.store.snapshot();
+  f.Commit(SetLayer("a", false), Put("a", "x"));
+  EXPECT_EQ(f.GetLayer("a")->clip.count, 2u);
+  EXPECT_EQ(f.GetLayer("a")->clip.planes[1], wall);
+  EXPECT_EQ(f.GetLayer("a")->region, box);
+  f.Commit(SetClip("a", {wall}));
+  ASSERT_EQ(f.GetLayer("a")->clip.count, 1u);
+  EXPECT_EQ(f.GetLayer("a")->clip.planes[0], wall);
+  EXPECT_EQ(f.GetLayer("a")->region, box);
+  f.Commit(SetClip("a", {}));
+  EXPECT_EQ(f.GetLayer("a")->clip, Clip());
+  EXPECT_EQ(f.GetLayer("a")->region, box);
+  f.Commit(SetRegion("a", std::nullopt));
+  EXPECT_EQ(f.GetLayer("a")->region, std::nullopt);
+  EXPECT_EQ(clipped->FindLayer({1, "a"})->clip.count, 2u);
+  EXPECT_EQ(f.Tally().bytes, f.GetLayer("a")->bytes + Draft::LayerBytes({1, "a"}));
+}
+
+TEST(SceneStore, ClipsAndRegionsThatAreNoneAreRefusedOnSight) {
+  StoreFixture f({.max_clip_planes = 2});
+  const gpu::ClipPlane good{0, 0, 1, 0};
+  const double nan = std::nan("");
+  f.Commit(SetClip("a", {good, good}), SetRegion("a", gpu::Region{{0, 0, 0}, {1, 1, 1}}));
+  const auto refused = [&](Operation operation) {
+    const CommitResult result = f.Commit(std::move(operation));
+    EXPECT_EQ(result.issues.size(), 1u);
+    return result.issues.empty() ? Issue() : result.issues[0];
+  };
+  Issue issue = refused(SetClip("a", {good, good, good}));
+  EXPECT_EQ(issue.reason, Reason::kQuotaExceeded);
+  EXPECT_EQ(issue.field, "layer_state.clip.planes");
+  EXPECT_EQ(issue.message, "3 planes; max_clip_planes is 2");
+  for (const gpu::ClipPlane& bad : {gpu::ClipPlane{0, 0, 0, 1}, gpu::ClipPlane{1, 0, 0, nan},
+                                    gpu::ClipPlane{1, nan, 0, 0}, gpu::ClipPlane{HUGE_VAL}}) {
+    issue = refused(SetClip("a", {good, bad}));
+    EXPECT_EQ(issue.reason, Reason::kInvalidValue);
+    EXPECT_EQ(issue.field, "layer_state.clip.planes[1]");
+  }
+  for (const gpu::Region& bad :
+       {gpu::Region{{0, 0, 1}, {1, 1, 1}}, gpu::Region{{0, 2, 0}, {1, 1, 1}},
+        gpu::Region{{nan, 0, 0}, {1, 1, 1}}, gpu::Region{{0, 0, 0}, {1, 1, HUGE_VAL}}}) {
+    issue = refused(SetRegion("a", bad));
+    EXPECT_EQ(issue.reason, Reason::kInvalidValue);
+    EXPECT_EQ(issue.field, "layer_state.region");
+  }
+  EXPECT_EQ(f.GetLayer("a")->clip.count, 2u);
+  EXPECT_EQ(f.GetLayer("a")->region, (gpu::Region{{0, 0, 0}, {1, 1, 1}}));
 }
 
 TEST(SceneStore, StrictRefusesTheWholeCommit) {

@@ -31,6 +31,10 @@ class StoreFixture {
   CommitResult Commit(Ops... ops) {
     return Commit(me, std::move(ops)...);
   }
+  // As when a session has ended: the layers that it last wrote are orphaned.
+  void Orphan(uint64_t session) {
+    store.HandOver(session, std::make_shared<const Writer>(Writer{session, "client", true}));
+  }
   CommitResult CommitAll(const Author& author, std::vector<Operation> all) {
     std::vector<Issue> alone;
     std::vector<Operation> passed;

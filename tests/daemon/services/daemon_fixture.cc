@@ -54,6 +54,7 @@ Daemon::Daemon(DaemonOptions options)
                                .version = "9.8.7",
                                .streams = {.drain_limit_ns = options.drain_limit_ns,
                                            .max_queued_answers = options.max_queued_answers},
+                               .max_scene_watches = options.max_scene_watches,
                                .local = local});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);

@@ -196,6 +196,75 @@ TEST(LocalSocket, EndsWithItsStream) {
   }
 }
 
+TEST(LocalSocket, AStreamThatTakesUpASessionHasItsOwn) {
+  Daemon daemon({.local_socket = true});
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_on_disconnect(v1::DISCONNECT_POLICY_KEEP);
+  const v1::Opened opened = client.Open(open);
+  LocalClient older(opened.local_socket());
+  ASSERT_TRUE(older.Hello(opened.local_token()).has_welcome());
+  const Lines lines = RandomLines(7);
+  const local::Descriptor positions = MakeMemfd(lines.positions);
+  const v1::LocalMessage memory = MemoryMessage(1, lines.positions.size());
+  ASSERT_TRUE(older.Call(memory, {positions.get()}).has_held());
+
+  open.set_resume_token(opened.resume_token());
+  Client again(daemon.scene());
+  const v1::Opened resumed = again.Open(open);
+  ASSERT_EQ(resumed.session(), opened.session());
+  EXPECT_EQ(client.Finish().error_code(), grpc::StatusCode::ABORTED);
+  const std::optional<v1::LocalAnswer> last = older.Read();
+  ASSERT_TRUE(last.has_value());
+  EXPECT_THAT(last->refused().message(), HasSubstr("the session has ended"));
+
+  // The older stream is gone, and took nothing along that is not its own.
+  EXPECT_NE(resumed.local_token(), opened.local_token());
+  LocalClient newer(resumed.local_socket());
+  ASSERT_TRUE(newer.Hello(resumed.local_token()).has_welcome());
+  v1::StreamRequest request;
+  v1::Vertices* vertices = LinesIn(&request);
+  vertices->clear_index_count();
+  vertices->clear_index_type();
+  Set(vertices->mutable_positions_in(), 1, 0, lines.positions.size());
+  again.Send(request);
+  again.Commit(1);
+  again.ReadOutcomes(1);
+  ASSERT_THAT(again.issues, SizeIs(1));
+  EXPECT_EQ(again.issues[0].reason(), v1::REASON_NOT_FOUND);
+  ASSERT_TRUE(newer.Call(memory, {positions.get()}).has_held());
+  again.Send(request);
+  again.Commit(2);
+  again.ReadOutcomes(2);
+  EXPECT_THAT(again.issues, SizeIs(1));
+  EXPECT_EQ(daemon.Entities().total(), 1u);
+}
+
+TEST(LocalSocket, WhatItHoldsCountsForTheMemoryOfAll) {
+  constexpr uint64_t kLimit = 8 << 20;
+  Daemon daemon({.limits = {.max_memory_bytes = kLimit}, .local_socket = true});
+  Client client(daemon.scene());
+  const v1::Opened opened = client.Open();
+  LocalClient local(opened.local_socket());
+  ASSERT_TRUE(local.Hello(opened.local_token()).has_welcome());
+  const std::string large(kLimit + 1, 'x'), small(100'000, 'x');
+  EXPECT_THAT(
+      local.Call(MemoryMessage(1, large.size()), {MakeMemfd(large).get()}).refused().message(),
+      HasSubstr("max_memory_bytes allows 8388608"));
+  ASSERT_TRUE(local.Call(MemoryMessage(1, small.size()), {MakeMemfd(small).get()}).has_held());
+  const auto holds = [&](uint64_t bytes) {
+    return daemon.Await(
+        [bytes](const v1::Stats& stats) { return stats.memory().local_bytes() == bytes; });
+  };
+  EXPECT_TRUE(holds(small.size()));
+  ASSERT_TRUE(local.Call(ReleaseMessage(1)).has_released());
+  EXPECT_TRUE(holds(0));
+  ASSERT_TRUE(local.Call(MemoryMessage(2, small.size()), {MakeMemfd(small).get()}).has_held());
+  EXPECT_TRUE(holds(small.size()));
+  client.Cancel();
+  EXPECT_TRUE(holds(0));
+}
+
 TEST(LocalSocket, MuchMemoryGoesThroughFewBytes) {
   Daemon daemon({.limits = {.max_message_bytes = 64 << 10}, .local_socket = true});
   Client client(daemon.scene());

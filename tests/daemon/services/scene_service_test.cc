@@ -69,8 +69,11 @@ TEST(ApplyUpdate, RefusesWhatIsNoUpdate) {
   request.add_operations()->mutable_commit();
   EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   request.Clear();
-  request.mutable_open()->set_flow(v1::FLOW_POLICY_LATEST);
-  EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  request.mutable_open()->set_resume_token("0123456789abcdef");
+  EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  request.Clear();
+  request.add_operations()->mutable_ping();
+  EXPECT_EQ(Apply(daemon, request).first.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
 TEST(ApplyUpdate, HasAsManyOperationsAndIssuesAsAllowed) {
@@ -150,6 +153,27 @@ TEST(ListEntities, InPages) {
       5u);
 }
 
+TEST(ListEntities, LayersHaveTheirClipAndRegion) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  v1::LayerState* state = update.add_operations()->mutable_layer_state();
+  state->set_layer("layer");
+  v1::Clip::Plane* plane = state->mutable_clip()->add_planes();
+  plane->set_c(-2);
+  plane->set_d(7);
+  state->mutable_region()->mutable_min()->set_x(-1);
+  state->mutable_region()->mutable_max()->set_x(1);
+  state->mutable_region()->mutable_max()->set_y(1);
+  state->mutable_region()->mutable_max()->set_z(1);
+  const auto [status, response] = Apply(daemon, update);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.issues_size(), 0);
+  const v1::ListEntitiesResponse listed = daemon.Entities();
+  ASSERT_EQ(listed.layers_size(), 1);
+  EXPECT_EQ(listed.layers(0).clip().SerializeAsString(), state->clip().SerializeAsString());
+  EXPECT_EQ(listed.layers(0).region().ShortDebugString(), "min { x: -1 } max { x: 1 y: 1 z: 1 }");
+}
+
 TEST(GetEntity, ByKeyOrNotFound) {
   Daemon daemon;
   v1::ApplyUpdateRequest update;
@@ -189,23 +213,61 @@ TEST(ClearLayer, RemovesWhatMatches) {
   EXPECT_EQ(daemon.Entities().total(), 1u);
 }
 
+TEST(SceneService, OwnersAreListedAndControlled) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_client_name("artist");
+  const v1::Opened opened = client.Open(open);
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  const auto list = [&] {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::ListOwnersResponse response;
+    EXPECT_TRUE(daemon.scene().ListOwners(&context, {}, &response).ok());
+    return response;
+  };
+  const auto control = [&](const v1::ControlOwnerRequest& request) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::OwnerInfo info;
+    const grpc::Status status = daemon.scene().ControlOwner(&context, request, &info);
+    return std::pair(status, info);
+  };
+  ASSERT_EQ(list().owners_size(), 1);
+  EXPECT_EQ(list().owners(0).owner(), opened.owner());
+  EXPECT_EQ(list().owners(0).client_names(0), "artist");
+  EXPECT_EQ(list().owners(0).entities(), 1u);
+  EXPECT_EQ(list().owners(0).max_entities(), Limits().max_entities_per_owner);
+
+  v1::ControlOwnerRequest request;
+  request.set_owner(opened.owner());
+  request.set_hidden(true);
+  request.set_max_entities(7);
+  auto [status, info] = control(request);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_TRUE(info.hidden());
+  EXPECT_EQ(info.max_entities(), 7u);
+  request.Clear();
+  request.set_owner(opened.owner());
+  request.set_evict(true);
+  EXPECT_TRUE(control(request).first.ok());
+  const grpc::Status ended = client.Finish();
+  EXPECT_EQ(ended.error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(daemon.Entities().total(), 0u);
+  EXPECT_EQ(control(request).first.error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
 TEST(SceneService, WhatIsNotImplementedSaysWhy) {
   Daemon daemon;
-  grpc::ClientContext watch;
-  SetDeadline(watch);
-  const auto scene = daemon.scene().WatchScene(&watch, {});
-  v1::WatchSceneResponse event;
-  EXPECT_FALSE(scene->Read(&event));
-  grpc::Status status = scene->Finish();
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("ListEntities"));
-
   grpc::ClientContext upload;
   SetDeadline(upload);
   v1::UploadAssetResponse stored;
   const auto asset = daemon.scene().UploadAsset(&upload, &stored);
   asset->WritesDone();
-  status = asset->Finish();
+  const grpc::Status status = asset->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
   EXPECT_THAT(status.error_message(), HasSubstr("Upsert"));
 }

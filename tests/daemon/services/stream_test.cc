@@ -23,7 +23,9 @@ TEST(Stream, OpensAppliesAndTellsWhatBecameOfIt) {
   EXPECT_GT(opened.owner(), 0u);
   EXPECT_EQ(opened.server_version(), "9.8.7");
   EXPECT_GT(opened.server_time_ns(), 0);
-  EXPECT_EQ(opened.credit_bytes(), 0u);
+  EXPECT_GT(opened.credit_bytes(), Limits().credit_bytes) << "Open's own bytes included";
+  EXPECT_EQ(opened.resume_token().size(), 16u);
+  EXPECT_EQ(opened.owner_token().size(), 16u);
   EXPECT_THAT(opened.displays(), ElementsAre("left", "right"));
   EXPECT_EQ(opened.limits().max_id_bytes(), Limits().max_id_bytes);
 
@@ -81,12 +83,12 @@ TEST(Stream, ASecondOpenIsAnIssue) {
 TEST(Stream, ARefusedOpenEndsIt) {
   Daemon daemon;
   v1::StreamRequest request;
-  request.mutable_open()->set_resume_token("token");
+  request.mutable_open()->set_resume_token("0123456789abcdef");
   Client client(daemon.scene());
   client.Send(request);
   grpc::Status status = client.Finish();
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("open.resume_token is not implemented"));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(status.error_message(), HasSubstr("open.resume_token names no session"));
 
   Daemon full({.limits = {.max_sessions = 1}});
   Client first(full.scene());
@@ -198,7 +200,7 @@ TEST(Stream, WhatIsNotImplementedSaysSo) {
   client.Open();
   v1::StreamRequest layer;
   layer.mutable_layer_state()->set_layer("layer");
-  layer.mutable_layer_state()->mutable_clip();
+  layer.mutable_layer_state()->set_mask_layer("other");
   client.Send(layer);
   v1::StreamRequest commit;
   commit.mutable_commit()->set_durable(true);
@@ -206,9 +208,69 @@ TEST(Stream, WhatIsNotImplementedSaysSo) {
   client.ReadOutcomes(1);
   ASSERT_THAT(client.issues, SizeIs(2));
   EXPECT_EQ(client.issues[0].reason(), v1::REASON_UNIMPLEMENTED);
-  EXPECT_EQ(client.issues[0].field(), "layer_state.clip");
+  EXPECT_EQ(client.issues[0].field(), "layer_state.mask_layer");
   EXPECT_EQ(client.issues[1].field(), "commit.durable");
   EXPECT_EQ(client.answers[0].accepted().refused_operations(), 2u);
+}
+
+TEST(Stream, PingsAreAnsweredOutOfTurn) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  client.Open();
+  v1::StreamRequest request;
+  request.mutable_ping()->set_client_time_ns(1234);
+  client.Send(request);
+  const std::optional<v1::StreamResponse> response = client.Read();
+  ASSERT_TRUE(response.has_value() && response->has_pong());
+  EXPECT_EQ(response->pong().client_time_ns(), 1234);
+  EXPECT_GT(response->pong().received_time_ns(), 0);
+  EXPECT_GE(response->pong().server_time_ns(), response->pong().received_time_ns());
+}
+
+TEST(Stream, CreditComesForWhatIsApplied) {
+  Limits limits;
+  limits.credit_bytes = 4096;
+  Daemon daemon({.limits = limits, .displays = {}});
+  Client client(daemon.scene());
+  uint64_t credit = client.Open().credit_bytes();
+  const uint64_t first = credit;
+  uint64_t sent = 0;
+  // Never more than the credit, and yet it goes on.
+  for (uint64_t frame = 1; sent < 10 * limits.credit_bytes; ++frame) {
+    const v1::StreamRequest upsert = SphereIn("layer", "ball");
+    v1::StreamRequest commit;
+    commit.mutable_commit()->set_frame_id(frame);
+    const uint64_t bytes = upsert.ByteSizeLong() + commit.ByteSizeLong();
+    while (sent + bytes > credit - 64) {
+      const std::optional<v1::StreamResponse> response = client.Read();
+      ASSERT_TRUE(response.has_value());
+      credit = std::max(credit, response->credit_bytes());
+    }
+    ASSERT_TRUE(client.Send(upsert) && client.Send(commit));
+    sent += bytes;
+  }
+  EXPECT_GT(credit, first);
+  EXPECT_LE(credit, first + sent);
+}
+
+TEST(Stream, IsTakenUpByItsToken) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  v1::Open open;
+  open.set_on_disconnect(v1::DISCONNECT_POLICY_KEEP);
+  const v1::Opened opened = client.Open(open);
+  client.Send(SphereIn("layer", "ball"));
+  client.Commit(5);
+  client.ReadOutcomes(1);
+  open.set_resume_token(opened.resume_token());
+  Client again(daemon.scene());
+  const v1::Opened resumed = again.Open(open);
+  EXPECT_EQ(resumed.session(), opened.session());
+  EXPECT_EQ(resumed.last_frame_id(), 5u);
+  EXPECT_EQ(resumed.last_sequence(), 3u);
+  EXPECT_EQ(client.Finish().error_code(), grpc::StatusCode::ABORTED);
+  EXPECT_EQ(daemon.Entities().total(), 1u);
+  EXPECT_FALSE(daemon.Entities().layers(0).orphaned());
 }
 
 TEST(Stream, BytesThatAreNoRequestEndIt) {

@@ -29,7 +29,7 @@ void CheckEnum(int last, int unknown) {
 }
 
 TEST(Convert, EnumsBothWays) {
-  CheckEnum<Reason, v1::Reason>(14, 15);
+  CheckEnum<Reason, v1::Reason>(15, 16);
   CheckEnum<gpu::BlendMode, v1::BlendMode>(2, 0);
   CheckEnum<display::Evidence, v1::Evidence>(1, 0);
   CheckEnum<CommitOutcome::NotShown, v1::NotShown::Why>(3, 0);
@@ -195,6 +195,31 @@ TEST(Convert, DisplayUpdatesHoldWhatIsPresent) {
   EXPECT_THAT(std::string(FromWire(request).status().message()), HasSubstr("test_pattern"));
 }
 
+// The wire's messages of figures and limits have a field for each of ours: give each its own value
+// and see that no two of the message's are alike.
+template <typename Message>
+void ExpectAllDifferent(const Message& message) {
+  std::set<std::string> seen;
+  const auto* reflection = message.GetReflection();
+  const auto* descriptor = message.GetDescriptor();
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    const auto* field = descriptor->field(i);
+    if (field->is_repeated() || field->message_type() != nullptr) continue;
+    EXPECT_TRUE(reflection->HasField(message, field)) << field->full_name();
+    Message alone;
+    google::protobuf::Message* copy = alone.New();
+    copy->CopyFrom(message);
+    std::vector<const google::protobuf::FieldDescriptor*> others;
+    copy->GetReflection()->ListFields(*copy, &others);
+    for (const auto* other : others) {
+      if (other != field) copy->GetReflection()->ClearField(copy, other);
+    }
+    const std::string text = copy->ShortDebugString();
+    EXPECT_TRUE(seen.insert(text.substr(text.find(' '))).second) << text;
+    delete copy;
+  }
+}
+
 TEST(Encode, ReceiptsOfEveryKind) {
   v1::Receipt message;
   Encode({4, 5, Accepted{6, 7, 8, {"a", "b"}}}, &message);
@@ -204,6 +229,19 @@ TEST(Encode, ReceiptsOfEveryKind) {
   EXPECT_EQ(message.accepted().refused_operations(), 7u);
   EXPECT_EQ(message.accepted().applied_time_ns(), 8);
   EXPECT_THAT(message.accepted().displays(), ElementsAre("a", "b"));
+  EXPECT_FALSE(message.accepted().late());
+  Accepted late;
+  late.late = true;
+  late.dropped_frames = 3;
+  late.stages = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+  Encode({4, 5, late}, &message);
+  EXPECT_TRUE(message.accepted().late());
+  EXPECT_EQ(message.accepted().dropped_frames(), 3u);
+  ExpectAllDifferent(message.accepted().stages());
+  EXPECT_EQ(message.accepted().stages().sent_ns(), 1);
+  EXPECT_EQ(message.accepted().stages().shown_ns(), 9);
+  Encode({4, 5, Scheduled{77}}, &message);
+  EXPECT_EQ(message.scheduled().present_at_ns(), 77);
   Encode({4, 5, Refused{9, "why"}}, &message);
   EXPECT_EQ(message.refused().refused_operations(), 9u);
   EXPECT_EQ(message.refused().message(), "why");
@@ -240,29 +278,23 @@ TEST(Encode, ReceiptsOfEveryKind) {
   EXPECT_EQ(message.outcome().not_shown().why(), v1::NotShown::HIDDEN);
 }
 
-// The wire's messages of figures and limits have a field for each of ours: give each its own value
-// and see that no two of the message's are alike.
-template <typename Message>
-void ExpectAllDifferent(const Message& message) {
-  std::set<std::string> seen;
-  const auto* reflection = message.GetReflection();
-  const auto* descriptor = message.GetDescriptor();
-  for (int i = 0; i < descriptor->field_count(); ++i) {
-    const auto* field = descriptor->field(i);
-    if (field->is_repeated() || field->message_type() != nullptr) continue;
-    EXPECT_TRUE(reflection->HasField(message, field)) << field->full_name();
-    Message alone;
-    google::protobuf::Message* copy = alone.New();
-    copy->CopyFrom(message);
-    std::vector<const google::protobuf::FieldDescriptor*> others;
-    copy->GetReflection()->ListFields(*copy, &others);
-    for (const auto* other : others) {
-      if (other != field) copy->GetReflection()->ClearField(copy, other);
-    }
-    const std::string text = copy->ShortDebugString();
-    EXPECT_TRUE(seen.insert(text.substr(text.find(' '))).second) << text;
-    delete copy;
-  }
+TEST(Encode, LayersSayWhereTheyAreDrawn) {
+  EntityPage page;
+  page.layers.resize(2);
+  LayerInfo& layer = page.layers[1];
+  layer.clip.count = 2;
+  layer.clip.planes[0] = {1, 2, 3, 4};
+  layer.clip.planes[1] = {0, 0, -1, 0.5};
+  layer.region = {{-1, -2, -3}, {0, 5, 6}};
+  v1::ListEntitiesResponse message;
+  Encode(page, &message);
+  ASSERT_EQ(message.layers_size(), 2);
+  EXPECT_FALSE(message.layers(0).has_clip() || message.layers(0).has_region());
+  ASSERT_EQ(message.layers(1).clip().planes_size(), 2);
+  EXPECT_EQ(message.layers(1).clip().planes(0).ShortDebugString(), "a: 1 b: 2 c: 3 d: 4");
+  EXPECT_EQ(message.layers(1).clip().planes(1).ShortDebugString(), "c: -1 d: 0.5");
+  EXPECT_EQ(message.layers(1).region().ShortDebugString(),
+            "min { x: -1 y: -2 z: -3 } max { y: 5 z: 6 }");
 }
 
 TEST(Encode, StatsHaveEveryFigure) {
@@ -272,6 +304,11 @@ TEST(Encode, StatsHaveEveryFigure) {
   stats.commits_accepted = 9, stats.commits_refused = 10, stats.operations_applied = 11;
   stats.operations_refused = 12, stats.bytes_in = 13, stats.outcomes_undelivered = 14;
   stats.client_drops = 15, stats.streams_overrun = 16;
+  stats.frames_dropped = 101, stats.timed_pending = 102, stats.timed_dropped = 103;
+  stats.must_show_timeouts = 104, stats.sessions_dormant = 105, stats.sessions_resumed = 106;
+  stats.sending = {107, 108, 109, 110}, stats.decoding = {111, 112, 113, 114};
+  stats.applying = {115, 116, 117, 118};
+  stats.memory = {121, 122, 123, 124, 125, 126, 127, 128, 129};
   DisplayFigures& d = stats.displays.emplace_back();
   d.name = "n", d.state = display::DisplayState::kShowing, d.state_reason = "s", d.engine = "e",
   d.engine_device = "d";
@@ -287,6 +324,7 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.engine_mismatches = 59, d.takeover_last_ns = 60, d.takeover_max_ns = 61;
   d.redraw_last_ns = 64, d.redraw_max_ns = 65, d.return_last_ns = 62, d.return_max_ns = 63,
   d.pinned_entities = {"p"};
+  d.waiting = {71, 72, 73, 74}, d.transferring = {75, 76, 77, 78}, d.showing = {79, 80, 81, 82};
   v1::Stats message;
   Encode(stats, &message);
   ExpectAllDifferent(message);
@@ -296,6 +334,13 @@ TEST(Encode, StatsHaveEveryFigure) {
   EXPECT_EQ(message.displays(0).commit_to_presented().count(), 45u);
   EXPECT_EQ(message.displays(0).assemble().p50_ns(), 50);
   EXPECT_EQ(message.displays(0).slice().max_ns(), 56);
+  EXPECT_EQ(message.displays(0).waiting().p50_ns(), 72);
+  EXPECT_EQ(message.displays(0).transferring().p50_ns(), 76);
+  EXPECT_EQ(message.displays(0).showing().p50_ns(), 80);
+  EXPECT_EQ(message.sending().count(), 107u);
+  EXPECT_EQ(message.decoding().p50_ns(), 112);
+  EXPECT_EQ(message.applying().max_ns(), 118);
+  ExpectAllDifferent(message.memory());
 }
 
 TEST(Encode, LimitsHaveEveryField) {
@@ -306,13 +351,9 @@ TEST(Encode, LimitsHaveEveryField) {
   Encode(limits, &message);
   EXPECT_EQ(message.max_id_bytes(), 256u);
   const auto* descriptor = message.GetDescriptor();
-  const std::set<std::string> of_features_to_come = {
-      "max_timed_commits", "max_present_at_horizon_ns", "must_show_timeout_ns"};
   for (int i = 0; i < descriptor->field_count(); ++i) {
     const auto* field = descriptor->field(i);
-    EXPECT_NE(message.GetReflection()->HasField(message, field),
-              of_features_to_come.contains(field->name()))
-        << field->name();
+    EXPECT_TRUE(message.GetReflection()->HasField(message, field)) << field->name();
   }
 }
 

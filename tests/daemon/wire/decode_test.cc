@@ -56,9 +56,9 @@ TEST(Decode, MeshWithEverything) {
   EXPECT_EQ(data.record.color_mode, gpu::ColorMode::kPerVertex);
   EXPECT_EQ(data.record.vertex_count, 3u);
   EXPECT_EQ(data.record.index_count, 3u);
-  EXPECT_THAT(data.positions, ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
-  EXPECT_THAT(data.indices, ElementsAre(2, 1, 0));
-  EXPECT_THAT(data.colors, ElementsAre(0x010203, 0x040506, 0x070809));
+  EXPECT_THAT(data.arrays.positions(), ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
+  EXPECT_THAT(data.arrays.indices(), ElementsAre(2, 1, 0));
+  EXPECT_THAT(data.arrays.colors(), ElementsAre(0x010203, 0x040506, 0x070809));
   EXPECT_THAT(data.min, ElementsAre(0, 0, 0));
   EXPECT_THAT(data.max, ElementsAre(1, 1, 0));
 }
@@ -74,7 +74,7 @@ TEST(Decode, IntegerPositions) {
   PrimitiveOf(request)->mutable_color()->set_rgb(0xABCDEF);
   Decoded decoded = Decode(request);
   ASSERT_THAT(decoded.operations, SizeIs(1));
-  EXPECT_THAT(GeometryOf(decoded).positions, ElementsAre(-32768, 0, 7, 32767, -1, 5));
+  EXPECT_THAT(GeometryOf(decoded).arrays.positions(), ElementsAre(-32768, 0, 7, 32767, -1, 5));
   EXPECT_THAT(GeometryOf(decoded).min, ElementsAre(-32768, -1, 5));
   EXPECT_THAT(GeometryOf(decoded).max, ElementsAre(32767, 0, 7));
   EXPECT_EQ(GeometryOf(decoded).record.color, 0xABCDEFu);
@@ -86,7 +86,7 @@ TEST(Decode, IntegerPositions) {
   points->mutable_vertices()->set_positions(Packed<int32_t>({-16777216, 0, 16777216, 1, 2, 3}));
   decoded = Decode(request);
   ASSERT_THAT(decoded.operations, SizeIs(1));
-  EXPECT_THAT(GeometryOf(decoded).positions, ElementsAre(-16777216, 0, 16777216, 1, 2, 3));
+  EXPECT_THAT(GeometryOf(decoded).arrays.positions(), ElementsAre(-16777216, 0, 16777216, 1, 2, 3));
 }
 
 TEST(Decode, ShapesAndTheirBounds) {
@@ -203,16 +203,16 @@ TEST(Decode, OfManyFaultsTheFirstAreToldAndTheOthersCounted) {
 }
 
 TEST(Decode, ACommitIsPassedOnWithItsIssue) {
-  for (const char* field : {"present_at_ns", "must_show", "durable"}) {
+  for (const char* field : {"present_at_ns", "durable"}) {
     v1::StreamRequest request;
     request.mutable_commit()->set_frame_id(9);
     if (std::string(field) == "present_at_ns") request.mutable_commit()->set_present_at_ns(-1);
-    if (std::string(field) == "must_show") request.mutable_commit()->set_must_show(true);
     if (std::string(field) == "durable") request.mutable_commit()->set_durable(true);
     const Decoded decoded = Decode(request);
     ASSERT_THAT(decoded.refused.issues, SizeIs(1)) << field;
     EXPECT_EQ(decoded.refused.issues[0].field, std::string("commit.") + field);
-    EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kUnimplemented);
+    EXPECT_EQ(decoded.refused.issues[0].reason,
+              std::string(field) == "durable" ? Reason::kUnimplemented : Reason::kInvalidValue);
     ASSERT_THAT(decoded.operations, SizeIs(1));
     EXPECT_EQ(std::get<Commit>(decoded.operations[0].op).frame_id, 9u);
   }
@@ -244,7 +244,7 @@ TEST(Decode, LayerStateKeepsWhatIsNotSet) {
   Decoded decoded = Decode(request);
   const auto* state = &std::get<LayerState>(decoded.operations.at(0).op);
   EXPECT_FALSE(state->visible || state->opacity || state->order || state->blend ||
-               state->transform);
+               state->transform || state->clip || state->region);
   request.mutable_layer_state()->set_visible(false);
   request.mutable_layer_state()->set_opacity(0);
   request.mutable_layer_state()->set_order(-3);
@@ -257,6 +257,40 @@ TEST(Decode, LayerStateKeepsWhatIsNotSet) {
   EXPECT_EQ(state->order, -3);
   EXPECT_EQ(state->blend, gpu::BlendMode::kAdd);
   EXPECT_EQ(state->transform, gpu::Affine());
+}
+
+TEST(Decode, ClipsAndRegions) {
+  v1::StreamRequest request;
+  request.mutable_layer_state()->set_layer("l");
+  v1::Clip* clip = request.mutable_layer_state()->mutable_clip();
+  const auto decode = [&] { return std::get<LayerState>(Decode(request).operations.at(0).op); };
+  // Nothing in it: there is to be none any more.
+  ASSERT_TRUE(decode().clip.has_value());
+  EXPECT_EQ(decode().clip->count, 0u);
+  EXPECT_FALSE(decode().region.has_value());
+  for (int i = 0; i < 8; ++i) {
+    v1::Clip::Plane* plane = clip->add_planes();
+    plane->set_a(i == 0 ? 1e300 : 0);
+    plane->set_b(i);
+    plane->set_d(-i / 2.0);
+  }
+  clip->mutable_planes(7)->set_c(-3);
+  ASSERT_EQ(decode().clip->count, 8u);
+  EXPECT_EQ(decode().clip->planes[0], (gpu::ClipPlane{1e300, 0, 0, 0}));
+  EXPECT_EQ(decode().clip->planes[5], (gpu::ClipPlane{0, 5, 0, -2.5}));
+  EXPECT_EQ(decode().clip->planes[7], (gpu::ClipPlane{0, 7, -3, -3.5}));
+
+  request.mutable_layer_state()->clear_clip();
+  v1::Box3* region = request.mutable_layer_state()->mutable_region();
+  EXPECT_FALSE(decode().clip.has_value());
+  ASSERT_TRUE(decode().region.has_value());
+  EXPECT_EQ(*decode().region, std::nullopt);
+  region->mutable_min()->set_x(-1);
+  region->mutable_max()->set_x(1);
+  region->mutable_max()->set_y(2);
+  region->mutable_max()->set_z(0.5);
+  ASSERT_TRUE(decode().region.has_value());
+  EXPECT_EQ(*decode().region, (gpu::Region{{-1, 0, 0}, {1, 2, 0.5}}));
 }
 
 TEST(Decode, Deletes) {
@@ -327,12 +361,24 @@ const OpenCase kOpenCases[] = {
      absl::StatusCode::kInvalidArgument, "open.linger_ns is 3600000000001"},
     {"linger_without", [](v1::Open& o) { o.set_linger_ns(1); }, absl::StatusCode::kInvalidArgument,
      "goes with on_disconnect"},
-    {"token", [](v1::Open& o) { o.set_resume_token("t"); }, absl::StatusCode::kUnimplemented,
-     "open.resume_token is not implemented"},
-    {"latest", [](v1::Open& o) { o.set_flow(v1::FLOW_POLICY_LATEST); },
-     absl::StatusCode::kUnimplemented, "open.flow is not implemented"},
+    {"token", [](v1::Open& o) { o.set_resume_token("t"); }, absl::StatusCode::kInvalidArgument,
+     "open.resume_token has 1 bytes"},
+    {"owner_token", [](v1::Open& o) { o.set_owner_token("to"); },
+     absl::StatusCode::kInvalidArgument, "open.owner_token has 2 bytes"},
+    {"both_tokens",
+     [](v1::Open& o) {
+       o.set_resume_token("0123456789abcdef");
+       o.set_owner_token("0123456789abcdef");
+     },
+     absl::StatusCode::kInvalidArgument, "beside resume_token"},
     {"oldest", [](v1::Open& o) { o.set_flow(v1::FLOW_POLICY_DROP_OLDEST); },
-     absl::StatusCode::kUnimplemented, "FLOW_POLICY_RELIABLE"},
+     absl::StatusCode::kInvalidArgument, "open.drop_oldest_frames is 0"},
+    {"oldest_many",
+     [](v1::Open& o) {
+       o.set_flow(v1::FLOW_POLICY_DROP_OLDEST);
+       o.set_drop_oldest_frames(65);
+     },
+     absl::StatusCode::kInvalidArgument, "open.drop_oldest_frames is 65"},
     {"flow", [](v1::Open& o) { o.set_flow(static_cast<v1::FlowPolicy>(9)); },
      absl::StatusCode::kInvalidArgument, "open.flow has the unknown value 9"},
     {"frames", [](v1::Open& o) { o.set_drop_oldest_frames(2); }, absl::StatusCode::kInvalidArgument,
@@ -352,6 +398,48 @@ TEST_P(Opens, AreRefusedWithAStatus) {
 
 INSTANTIATE_TEST_SUITE_P(Field, Opens, ::testing::ValuesIn(kOpenCases),
                          [](const auto& info) { return std::string(info.param.name); });
+
+TEST(Decode, OpenWithAPolicyAndTokens) {
+  v1::StreamRequest request;
+  request.mutable_open()->set_flow(v1::FLOW_POLICY_DROP_OLDEST);
+  request.mutable_open()->set_drop_oldest_frames(64);
+  request.mutable_open()->set_owner_token("0123456789abcdef");
+  Decoded decoded = Decode(request);
+  ASSERT_TRUE(decoded.open.has_value()) << decoded.status;
+  EXPECT_EQ(decoded.open->flow, FlowPolicy::kDropOldest);
+  EXPECT_EQ(decoded.open->drop_oldest_frames, 64u);
+  EXPECT_EQ(decoded.open->owner_token, "0123456789abcdef");
+  request.mutable_open()->Clear();
+  request.mutable_open()->set_flow(v1::FLOW_POLICY_LATEST);
+  request.mutable_open()->set_resume_token("0123456789abcdef");
+  decoded = Decode(request);
+  ASSERT_TRUE(decoded.open.has_value()) << decoded.status;
+  EXPECT_EQ(decoded.open->flow, FlowPolicy::kLatest);
+  EXPECT_EQ(decoded.open->resume_token, "0123456789abcdef");
+}
+
+TEST(Decode, APingIsNoOperationAndTakesNoNumber) {
+  v1::StreamRequest request;
+  request.mutable_ping()->set_client_time_ns(-5);
+  const Decoded decoded = Decode(request, {}, 41);
+  EXPECT_EQ(decoded.ping_client_time_ns, -5);
+  EXPECT_THAT(decoded.operations, IsEmpty());
+  EXPECT_THAT(decoded.refused.issues, IsEmpty());
+  EXPECT_EQ(decoded.sequence, 41u);
+}
+
+TEST(Decode, ACommitWithItsTime) {
+  v1::StreamRequest request;
+  request.mutable_commit()->set_present_at_ns(77);
+  request.mutable_commit()->set_must_show(true);
+  request.mutable_commit()->set_send_time_ns(-3);
+  const Decoded decoded = Decode(request);
+  EXPECT_THAT(decoded.refused.issues, IsEmpty());
+  const Commit& commit = std::get<Commit>(decoded.operations.at(0).op);
+  EXPECT_EQ(commit.present_at_ns, 77);
+  EXPECT_TRUE(commit.must_show);
+  EXPECT_EQ(commit.send_time_ns, -3);
+}
 
 TEST(Decode, Open) {
   v1::StreamRequest request;

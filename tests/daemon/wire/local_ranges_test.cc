@@ -2,6 +2,7 @@
 // is refused.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <random>
@@ -55,7 +56,7 @@ Decoded DecodeWith(const v1::StreamRequest& request, const MemorySource* source,
                    const Limits& limits = {}) {
   const std::string bytes = request.SerializeAsString();
   const std::string_view slice = bytes;
-  return DecodeStreamRequest(std::span(&slice, 1), limits, 0, source);
+  return DecodeStreamRequest(std::span(&slice, 1), limits, 0, nullptr, source);
 }
 
 v1::Vertices* VerticesOf(v1::StreamRequest& request) {
@@ -94,9 +95,9 @@ void ExpectSame(const Decoded& got, const Decoded& want) {
   ASSERT_THAT(got.refused.issues, IsEmpty()) << got.refused.issues[0].message;
   const GeometryData &a = GeometryOf(got), &b = GeometryOf(want);
   EXPECT_EQ(std::memcmp(&a.record, &b.record, sizeof(a.record)), 0);
-  EXPECT_EQ(a.positions, b.positions);
-  EXPECT_EQ(a.indices, b.indices);
-  EXPECT_EQ(a.colors, b.colors);
+  EXPECT_TRUE(std::ranges::equal(a.arrays.positions(), b.arrays.positions()));
+  EXPECT_TRUE(std::ranges::equal(a.arrays.indices(), b.arrays.indices()));
+  EXPECT_TRUE(std::ranges::equal(a.arrays.colors(), b.arrays.colors()));
   EXPECT_TRUE(std::equal(a.min, a.min + 3, b.min));
   EXPECT_TRUE(std::equal(a.max, a.max + 3, b.max));
 }
@@ -179,7 +180,7 @@ TEST(LocalRanges, AnObjectsPartsMayLieThere) {
   const Decoded decoded = DecodeWith(request, &memory);
   ASSERT_THAT(decoded.operations, SizeIs(1));
   const auto& parts = std::get<DefineObject>(decoded.operations[0].op).data->parts;
-  EXPECT_THAT(std::get<GeometryPtr>(parts.at(0).content)->positions,
+  EXPECT_THAT(std::get<GeometryPtr>(parts.at(0).content)->arrays.positions(),
               ::testing::ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
   EXPECT_EQ(decoded.local_bytes, 36u);
 }

@@ -65,6 +65,31 @@ v1::StreamRequest LayerRequest() {
   return request;
 }
 
+// Two planes, of which the second has only a b.
+v1::StreamRequest ClipRequest() {
+  v1::StreamRequest request = LayerRequest();
+  request.mutable_layer_state()->mutable_clip()->add_planes()->set_a(1);
+  request.mutable_layer_state()->mutable_clip()->add_planes()->set_b(1);
+  return request;
+}
+v1::Clip::Plane* PlaneOf(v1::StreamRequest& request) {
+  return request.mutable_layer_state()->mutable_clip()->mutable_planes(1);
+}
+
+// From (0, 0, 0) to (1, 1, 1).
+v1::StreamRequest RegionRequest() {
+  v1::StreamRequest request = LayerRequest();
+  v1::Box3* region = request.mutable_layer_state()->mutable_region();
+  region->mutable_min();
+  region->mutable_max()->set_x(1);
+  region->mutable_max()->set_y(1);
+  region->mutable_max()->set_z(1);
+  return request;
+}
+v1::Box3* RegionOf(v1::StreamRequest& request) {
+  return request.mutable_layer_state()->mutable_region();
+}
+
 v1::StreamRequest DeleteRequest() {
   v1::StreamRequest request;
   request.mutable_delete_()->set_layer("layer");
@@ -411,12 +436,37 @@ const Case kCases[] = {
      With(LayerRequest,
           [](R& r) { r.mutable_layer_state()->set_blend(static_cast<v1::BlendMode>(8)); }),
      "layer_state.blend", Reason::kInvalidValue, "value 8"},
-    {"clip", With(LayerRequest, [](R& r) { r.mutable_layer_state()->mutable_clip(); }),
-     "layer_state.clip", Reason::kUnimplemented, "drawn whole"},
-    {"region", With(LayerRequest, [](R& r) { r.mutable_layer_state()->mutable_region(); }),
-     "layer_state.region", Reason::kUnimplemented, "drawn whole"},
+    {"clip_planes",
+     With(ClipRequest,
+          [](R& r) {
+            for (int i = 0; i < 7; ++i) {
+              *r.mutable_layer_state()->mutable_clip()->add_planes() = *PlaneOf(r);
+            }
+          }),
+     "layer_state.clip.planes", Reason::kQuotaExceeded, "has 9 planes; max_clip_planes allows 8"},
+    {"clip_normal", With(ClipRequest, [](R& r) { PlaneOf(r)->set_b(0); }),
+     "layer_state.clip.planes[1]", Reason::kInvalidValue, "normal (0, 0, 0)"},
+    {"clip_a", With(ClipRequest, [](R& r) { PlaneOf(r)->set_a(kNaN); }),
+     "layer_state.clip.planes[1].a", Reason::kInvalidValue, "is NaN"},
+    {"clip_b", With(ClipRequest, [](R& r) { PlaneOf(r)->set_b(-kInfinity); }),
+     "layer_state.clip.planes[1].b", Reason::kInvalidValue, "-infinity"},
+    {"clip_c", With(ClipRequest, [](R& r) { PlaneOf(r)->set_c(kNaN); }),
+     "layer_state.clip.planes[1].c", Reason::kInvalidValue, "is NaN"},
+    {"clip_d", With(ClipRequest, [](R& r) { PlaneOf(r)->set_d(kInfinity); }),
+     "layer_state.clip.planes[1].d", Reason::kInvalidValue, "infinity"},
+    {"region_min", With(RegionRequest, [](R& r) { RegionOf(r)->clear_min(); }),
+     "layer_state.region.min", Reason::kInvalidValue, "give both corners, or neither"},
+    {"region_max", With(RegionRequest, [](R& r) { RegionOf(r)->clear_max(); }),
+     "layer_state.region.max", Reason::kInvalidValue, "give both corners, or neither"},
+    {"region_nan", With(RegionRequest, [](R& r) { RegionOf(r)->mutable_min()->set_y(kNaN); }),
+     "layer_state.region.min.y", Reason::kInvalidValue, "is NaN"},
+    {"region_flat", With(RegionRequest, [](R& r) { RegionOf(r)->mutable_max()->set_z(0); }),
+     "layer_state.region.max.z", Reason::kInvalidValue,
+     "is 0; it must be greater than that of min"},
+    {"region_inverted", With(RegionRequest, [](R& r) { RegionOf(r)->mutable_max()->set_x(-3); }),
+     "layer_state.region.max.x", Reason::kInvalidValue, "is -3"},
     {"mask", With(LayerRequest, [](R& r) { r.mutable_layer_state()->set_mask_layer("other"); }),
-     "layer_state.mask_layer", Reason::kUnimplemented, "drawn whole"},
+     "layer_state.mask_layer", Reason::kUnimplemented, "not masked"},
 
     // objects
     {"object_empty", With(ObjectRequest, [](R& r) { r.mutable_define_object()->set_object(""); }),

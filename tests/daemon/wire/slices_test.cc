@@ -11,6 +11,7 @@
 namespace voxeld::daemon::wire {
 namespace {
 
+using ::testing::ElementsAreArray;
 using ::testing::SizeIs;
 
 // One of everything that a stream can carry.
@@ -87,9 +88,9 @@ TEST(Slices, CutAnywhereDecodeTheSame) {
         if (a == nullptr || !std::holds_alternative<GeometryPtr>(a->entity.content)) continue;
         const GeometryData& x = *std::get<GeometryPtr>(a->entity.content);
         const GeometryData& y = *std::get<GeometryPtr>(b->entity.content);
-        ASSERT_EQ(x.positions, y.positions);
-        ASSERT_EQ(x.indices, y.indices);
-        ASSERT_EQ(x.colors, y.colors);
+        ASSERT_THAT(x.arrays.positions(), ElementsAreArray(y.arrays.positions()));
+        ASSERT_THAT(x.arrays.indices(), ElementsAreArray(y.arrays.indices()));
+        ASSERT_THAT(x.arrays.colors(), ElementsAreArray(y.arrays.colors()));
       }
     }
   }
@@ -153,9 +154,9 @@ void CheckSound(const Decoded& decoded) {
     const auto* upsert = std::get_if<Upsert>(&operation.op);
     if (upsert == nullptr || !std::holds_alternative<GeometryPtr>(upsert->entity.content)) continue;
     const GeometryData& data = *std::get<GeometryPtr>(upsert->entity.content);
-    ASSERT_EQ(data.positions.size(), size_t{data.record.vertex_count} * 3);
-    ASSERT_EQ(data.indices.size(), data.record.index_count);
-    for (const uint32_t index : data.indices) ASSERT_LT(index, data.record.vertex_count);
+    ASSERT_EQ(data.arrays.positions().size(), size_t{data.record.vertex_count} * 3);
+    ASSERT_EQ(data.arrays.indices().size(), data.record.index_count);
+    for (const uint32_t index : data.arrays.indices()) ASSERT_LT(index, data.record.vertex_count);
     for (int axis = 0; axis < 3; ++axis) ASSERT_LE(data.min[axis], data.max[axis]);
     ASSERT_LE(upsert->entity.priority, 126u);
   }

@@ -145,8 +145,9 @@ std::vector<FaultStep> FaultScenario() {
   script.Voxels("with the cloud, voxels");
 
   script.Drop(500);
-  script.Put(LayerRecord{.id = 2, .order = -1, .opacity = 255});
-  script.Apply("the cloud has gone");
+  script.Put(LayerRecord{
+      .id = 2, .order = -1, .opacity = 255, .plane_count = 1, .planes = {{0.5, 0, 1, -20}}});
+  script.Apply("the cloud has gone, its layer is clipped");
   script.Frame("without the cloud");
 
   Target darker = StackTarget();

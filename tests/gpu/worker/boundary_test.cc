@@ -9,7 +9,7 @@
 #include <cstring>
 #include <optional>
 
-#include "gpu/worker/segment.h"
+#include "gpu/bulk/segment.h"
 #include "gpu/worker/target_codec.h"
 #include "tests/conformance/scene_generator.h"
 

@@ -66,7 +66,9 @@ class FaultyEngine final : public Engine {
     std::optional<ColorWatch> next = watch_;
     // What is malformed is for the engine to refuse.
     if (next && size <= block.bytes().size()) {
-      (void)ReadDelta(block.bytes().first(size), *next);
+      BlockSource referred(block.referred());
+      (void)ReadDelta(block.bytes().first(size), *next,
+                      block.bulk() != nullptr ? block.bulk() : &referred);
     }
     engine_->Apply(std::move(block), size, [&](const absl::Status& status) {
       if (status.ok()) watch_ = std::move(next);

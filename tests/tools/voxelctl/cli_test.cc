@@ -105,6 +105,9 @@ TEST(CommandLine, TheOthers) {
       std::get<EntitiesOptions>(Parse("entities --layer l --owner 18446744073709551615").command);
   EXPECT_EQ(entities.layer, "l");
   EXPECT_EQ(entities.owner, UINT64_MAX);
+  const auto watch = std::get<WatchOptions>(Parse("watch --layer l --owner 7").command);
+  EXPECT_EQ(watch.layer, "l");
+  EXPECT_EQ(watch.owner, 7u);
   EXPECT_TRUE(std::get<ClearOptions>(Parse("clear --all").command).all);
   EXPECT_EQ(std::get<ClearOptions>(Parse("clear --layer x").command).layer, "x");
   EXPECT_EQ(std::get<PatternOptions>(Parse("pattern axes").command).pattern, v1::TEST_PATTERN_AXES);
@@ -180,6 +183,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"stats --interval often",
               {"--interval is often; a number from 0.01 to 3600 is expected"}},
         Wrong{"entities --owner me", {"--owner is me; an owner's number is expected"}},
+        Wrong{"watch --owner 0x7", {"--owner is 0x7; an owner's number is expected"}},
         Wrong{"entities --owner -1", {"--owner is -1; an owner's number"}},
         Wrong{"entities --owner 010", {"--owner is 010; an owner's number"}},
         Wrong{"entities --owner 18446744073709551616",

@@ -136,6 +136,37 @@ TEST_F(CommandsTest, StatsAreWatchedUntilAnInterrupt) {
   EXPECT_TRUE(interrupt_.requested());
 }
 
+TEST_F(CommandsTest, WatchTellsWhatComesChangesAndGoes) {
+  const Result result = RunTool({"watch", "--layer", "the\nother"});
+  EXPECT_EQ(result.code, kExitFailure);  // the server went
+  EXPECT_EQ(result.out,
+            "+ 7 voxelctl  of some\\u{1b}one\n"
+            "+ 7 voxelctl a  sphere\n"
+            "~ 7 voxelctl a  sphere\n"
+            "+ 7 voxelctl b  mesh\n"
+            "- 8 the\\u{a}other\n"
+            "- 7 voxelctl b\n"
+            "~ 7 voxelctl, hidden\n");
+  EXPECT_THAT(result.err, HasSubstr("that is all there is"));
+  EXPECT_THAT(result.err, HasSubstr("shutting down"));
+}
+
+TEST_F(CommandsTest, WatchAsJsonIsALineAChangeSet) {
+  std::istringstream lines(RunTool({"--json", "watch"}).out);
+  std::vector<json> sets;
+  for (std::string line; std::getline(lines, line);) {
+    sets.push_back(json::parse(line, nullptr, false));
+  }
+  ASSERT_EQ(sets.size(), 3u);
+  EXPECT_EQ(sets[0]["in_sync"], 4);
+  EXPECT_EQ(sets[0]["layers"].size(), 1u) << "of the message before";
+  EXPECT_EQ(sets[0]["entities"][0]["info"]["key"]["id"], "a");
+  EXPECT_EQ(sets[1]["in_sync"], 5);
+  EXPECT_EQ(sets[1]["layers"].size(), 0u);
+  EXPECT_EQ(sets[1]["entities"].size(), 2u);
+  EXPECT_EQ(sets[2]["removed_entities"][0]["id"], "b");
+}
+
 TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
   const Result result = RunTool({"play", DataFile("points.ply"), DataFile("quad.topojson")});
   EXPECT_EQ(result.code, 0) << result.err;

@@ -131,6 +131,50 @@ class FakeServer::Scene final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
+  // Three change sets, the first in two messages; then it fails.
+  grpc::Status WatchScene(grpc::ServerContext*, const v1::WatchSceneRequest* request,
+                          grpc::ServerWriter<v1::WatchSceneResponse>* writer) override {
+    const auto key = [](const char* id) {
+      v1::EntityKey k;
+      k.set_owner(7);
+      k.set_layer("voxelctl");
+      k.set_id(id);
+      return k;
+    };
+    v1::WatchSceneResponse message;
+    v1::LayerInfo* layer = message.add_layers();
+    layer->set_owner(7);
+    layer->set_layer("voxelctl");
+    layer->set_visible(true);
+    layer->set_client_name(
+        "some\x1b"
+        "one");
+    writer->Write(message);
+    message.Clear();
+    *message.add_entities()->mutable_info()->mutable_key() = key("a");
+    message.mutable_entities(0)->mutable_info()->set_kind("sphere");
+    message.set_in_sync(4);
+    writer->Write(message);
+    *message.add_entities()->mutable_info()->mutable_key() = key("b");
+    message.mutable_entities(1)->mutable_info()->set_kind("mesh");
+    message.set_in_sync(5);
+    writer->Write(message);
+    message.Clear();
+    *message.add_removed_entities() = key("b");
+    *message.add_layers() = [] {
+      v1::LayerInfo hidden;
+      hidden.set_owner(7);
+      hidden.set_layer("voxelctl");
+      return hidden;
+    }();
+    v1::LayerKey* gone = message.add_removed_layers();
+    gone->set_owner(8);
+    gone->set_layer(request->layer());
+    message.set_in_sync(7);
+    writer->Write(message);
+    return {grpc::StatusCode::UNAVAILABLE, "shutting down"};
+  }
+
   grpc::Status ListEntities(grpc::ServerContext*, const v1::ListEntitiesRequest* request,
                             v1::ListEntitiesResponse* response) override {
     sync::MutexLock lock(server_.mutex_);

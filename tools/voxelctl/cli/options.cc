@@ -107,7 +107,7 @@ class Parser {
                     "socket, else 127.0.0.1:50551)")
         ->type_name("ADDR");
     app_.add_flag("--json", options_.json,
-                  "Write data as one JSON document (a line each with stats --watch)");
+                  "Write data as one JSON document (a line each with stats --watch and watch)");
     app_.require_subcommand(0, 1);
     app_.fallthrough();
     app_.allow_extras();
@@ -116,6 +116,7 @@ class Parser {
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
     AddEntities();
+    AddWatch();
     AddClear();
     AddPattern();
     AddVerify();
@@ -224,20 +225,32 @@ class Parser {
               "S");
   }
 
-  void AddEntities() {
-    CLI::App* c = Add("entities", "Lists layers and entities");
-    c->add_option("--layer", entities_.layer, "Only this layer's")->type_name("NAME");
-    c->add_option("--owner", entities_.owner, "Only this owner's")
+  // Only some layers: of that name, of that owner.
+  static void AddFilter(CLI::App* command, std::string* layer, uint64_t* owner) {
+    command->add_option("--layer", *layer, "Only this layer's")->type_name("NAME");
+    command->add_option("--owner", *owner, "Only this owner's")
         ->type_name("N")
         ->check([](const std::string& text) {
-          uint64_t owner = 0;
+          uint64_t number = 0;
           const bool plain =
               absl::c_all_of(text, absl::ascii_isdigit) && !absl::StartsWith(text, "0");
-          if (plain && absl::SimpleAtoi(text, &owner)) return "";
+          if (plain && absl::SimpleAtoi(text, &number)) return "";
           throw UsageError{absl::StrCat("--owner is ", EscapeForTerminal(text),
                                         "; an owner's number is expected, such as 7 (voxelctl "
                                         "entities lists them)")};
         });
+  }
+
+  void AddEntities() {
+    AddFilter(Add("entities", "Lists layers and entities"), &entities_.layer, &entities_.owner);
+  }
+
+  void AddWatch() {
+    AddFilter(Add("watch",
+                  "Lists layers and entities, then what comes (+), changes (~) and goes (-), until "
+                  "Ctrl-C; with --json one object a change set, each the scene's step to the next "
+                  "state that the server told"),
+              &watch_.layer, &watch_.owner);
   }
 
   void AddClear() {
@@ -337,6 +350,7 @@ class Parser {
     if (name == "verify") return FillInVerify();
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
+    if (name == "watch") options_.command = watch_;
     if (name == "stats") {
       options_.command = stats_;
     }
@@ -422,6 +436,7 @@ class Parser {
   SnapshotOptions snapshot_;
   StatsOptions stats_;
   EntitiesOptions entities_;
+  WatchOptions watch_;
   ClearOptions clear_;
   PatternOptions pattern_;
   VerifyOptions verify_;

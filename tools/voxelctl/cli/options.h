@@ -48,6 +48,11 @@ struct EntitiesOptions {
   uint64_t owner = 0;  // 0: all
 };
 
+struct WatchOptions {
+  std::string layer;   // empty: all
+  uint64_t owner = 0;  // 0: all
+};
+
 struct ClearOptions {
   std::string layer;  // empty: what voxelctl put up
   bool all = false;
@@ -72,7 +77,7 @@ struct Options {
   std::string server;  // empty: see ChooseServer
   bool json = false;
   std::variant<PlayOptions, SnapshotOptions, DisplaysOptions, StatsOptions, EntitiesOptions,
-               ClearOptions, PatternOptions, VerifyOptions>
+               WatchOptions, ClearOptions, PatternOptions, VerifyOptions>
       command;
 };
 

@@ -74,6 +74,25 @@ class Connection::Impl {
     return response;
   }
 
+  // Calls `each` with every answer until that returns false, or the stream ends.
+  template <typename Response, typename Call>
+  absl::Status Watch(milliseconds limit, const std::function<bool(const Response&)>& each,
+                     Call call) {
+    bool stopped = false;
+    const absl::Status status = Invoke(limit, [&](grpc::ClientContext* context) {
+      const auto reader = call(context);
+      Response response;
+      while (reader->Read(&response)) {
+        if (each(response)) continue;
+        stopped = true;
+        context->TryCancel();
+        break;
+      }
+      return reader->Finish();
+    });
+    return stopped ? absl::OkStatus() : status;
+  }
+
   v1::DisplayService::Stub& displays() { return *displays_; }
   v1::SceneService::Stub& scene() { return *scene_; }
   std::shared_ptr<grpc::ChannelInterface> channel() { return channel_; }
@@ -163,20 +182,17 @@ absl::StatusOr<v1::ClearLayerResponse> Connection::ClearLayer(
 
 absl::Status Connection::WatchStats(const v1::WatchStatsRequest& request,
                                     const std::function<bool(const v1::Stats&)>& each) {
-  bool stopped = false;
-  const milliseconds limit = request.once() ? kCallTime : milliseconds::zero();
-  absl::Status status = impl_->Invoke(limit, [&](grpc::ClientContext* context) {
-    auto reader = impl_->displays().WatchStats(context, request);
-    v1::Stats stats;
-    while (reader->Read(&stats)) {
-      if (each(stats)) continue;
-      stopped = true;
-      context->TryCancel();
-      break;
-    }
-    return reader->Finish();
-  });
-  return stopped ? absl::OkStatus() : status;
+  return impl_->Watch<v1::Stats>(
+      request.once() ? kCallTime : milliseconds::zero(), each,
+      [&](grpc::ClientContext* context) { return impl_->displays().WatchStats(context, request); });
+}
+
+absl::Status Connection::WatchScene(
+    const v1::WatchSceneRequest& request,
+    const std::function<bool(const v1::WatchSceneResponse&)>& each) {
+  return impl_->Watch<v1::WatchSceneResponse>(
+      milliseconds::zero(), each,
+      [&](grpc::ClientContext* context) { return impl_->scene().WatchScene(context, request); });
 }
 
 absl::Status Connection::CaptureVolume(

@@ -37,6 +37,8 @@ class Connection {
   // Calls `each` with every answer until that returns false, or the stream ends.
   absl::Status WatchStats(const v1::WatchStatsRequest& request,
                           const std::function<bool(const v1::Stats&)>& each);
+  absl::Status WatchScene(const v1::WatchSceneRequest& request,
+                          const std::function<bool(const v1::WatchSceneResponse&)>& each);
   absl::Status CaptureVolume(const v1::CaptureVolumeRequest& request,
                              const std::function<absl::Status(const v1::VolumeChunk&)>& each);
 

@@ -1,0 +1,240 @@
+#include "daemon/listen/probe.h"
+
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <string_view>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
+namespace voxeld::daemon::listen {
+namespace {
+
+using std::chrono::steady_clock;
+
+// HTTP/2 (RFC 9113): a frame's head is 24 bits of length, type, flags, 31 bits of stream.
+constexpr size_t kHeadBytes = 9;
+constexpr char kData = 0, kHeaders = 1, kSettings = 4, kGoAway = 7;
+constexpr char kEndStream = 1, kEndHeaders = 4;
+constexpr std::string_view kPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
+void AddFrame(char type, char flags, char stream, std::string_view payload, std::string* out) {
+  const size_t size = payload.size();
+  const char head[kHeadBytes] = {static_cast<char>(size >> 16),
+                                 static_cast<char>(size >> 8),
+                                 static_cast<char>(size),
+                                 type,
+                                 flags,
+                                 0,
+                                 0,
+                                 0,
+                                 stream};
+  out->append(head, sizeof(head));
+  out->append(payload);
+}
+
+// A field as a literal that is not kept (RFC 7541, 6.2.2); both texts are short.
+void AddField(std::string_view name, std::string_view value, std::string* out) {
+  out->push_back('\0');
+  for (const std::string_view text : {name, value}) {
+    out->push_back(static_cast<char>(text.size()));
+    out->append(text);
+  }
+}
+
+// grpc.health.v1.Health/Check with an empty request, on stream 1.
+std::string HealthCheck() {
+  std::string fields;
+  AddField(":method", "POST", &fields);
+  AddField(":scheme", "http", &fields);
+  AddField(":path", "/grpc.health.v1.Health/Check", &fields);
+  AddField(":authority", "voxeld", &fields);
+  AddField("content-type", "application/grpc", &fields);
+  AddField("te", "trailers", &fields);
+  std::string out(kPreface);
+  AddFrame(kSettings, 0, 0, "", &out);
+  AddFrame(kHeaders, kEndHeaders, 1, fields, &out);
+  AddFrame(kData, kEndStream, 1, std::string_view("\0\0\0\0\0", 5), &out);
+  return out;
+}
+
+class Attempt {
+ public:
+  Attempt(int descriptor, sync::TimeNs limit)
+      : descriptor_(descriptor), end_(steady_clock::now() + std::chrono::nanoseconds(limit)) {}
+
+  absl::Status Connect(const SocketName& name) {
+    if (connect(descriptor_, name.get(), name.length) == 0) return absl::OkStatus();
+    if (errno != EINPROGRESS) return absl::ErrnoToStatus(errno, "connect");
+    if (absl::Status status = Await(POLLOUT); !status.ok()) return status;
+    int error = 0;
+    socklen_t length = sizeof(error);
+    getsockopt(descriptor_, SOL_SOCKET, SO_ERROR, &error, &length);
+    return error == 0 ? absl::OkStatus() : absl::ErrnoToStatus(error, "connect");
+  }
+
+  absl::Status Ask() {
+    const std::string request = HealthCheck();
+    const ssize_t sent = send(descriptor_, request.data(), request.size(), MSG_NOSIGNAL);
+    if (sent != static_cast<ssize_t>(request.size())) return absl::ErrnoToStatus(errno, "send");
+    std::string got;
+    for (;;) {
+      while (got.size() >= kHeadBytes) {
+        const auto byte = [&](size_t i) {
+          return static_cast<size_t>(static_cast<uint8_t>(got[i]));
+        };
+        const size_t size = byte(0) << 16 | byte(1) << 8 | byte(2);
+        if (got[3] == kHeaders && got[8] == 1) return absl::OkStatus();
+        if (got[3] == kGoAway) return absl::UnavailableError("it was sent away");
+        if (got.size() < kHeadBytes + size) break;
+        got.erase(0, kHeadBytes + size);
+      }
+      if (absl::Status status = Await(POLLIN); !status.ok()) return status;
+      char buffer[4096];
+      const ssize_t n = recv(descriptor_, buffer, sizeof(buffer), 0);
+      if (n == 0) return absl::UnavailableError("the connection was closed without an answer");
+      if (n < 0 && errno != EAGAIN) return absl::ErrnoToStatus(errno, "recv");
+      if (n > 0) got.append(buffer, static_cast<size_t>(n));
+    }
+  }
+
+ private:
+  absl::Status Await(short events) {
+    for (;;) {
+      const auto left =
+          std::chrono::duration_cast<std::chrono::milliseconds>(end_ - steady_clock::now());
+      pollfd poll_fd = {descriptor_, events, 0};
+      const int n = poll(&poll_fd, 1, static_cast<int>(std::max<int64_t>(0, left.count())));
+      if (n > 0) return absl::OkStatus();
+      if (n == 0) return absl::DeadlineExceededError("no answer came in time");
+      if (errno != EINTR) return absl::ErrnoToStatus(errno, "poll");
+    }
+  }
+
+  const int descriptor_;
+  const steady_clock::time_point end_;
+};
+
+// Where a client of this machine finds what listens on `name`.
+SocketName Near(SocketName name) {
+  if (name.address.ss_family == AF_INET) {
+    auto* v4 = reinterpret_cast<sockaddr_in*>(&name.address);
+    if (v4->sin_addr.s_addr == htonl(INADDR_ANY)) v4->sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  } else if (name.address.ss_family == AF_INET6) {
+    auto* v6 = reinterpret_cast<sockaddr_in6*>(&name.address);
+    if (IN6_IS_ADDR_UNSPECIFIED(&v6->sin6_addr)) v6->sin6_addr = in6addr_loopback;
+  }
+  return name;
+}
+
+// A name of the socket's own, so that the listener knows it: any port, or any name of a unix socket
+// that the kernel chooses.
+absl::StatusOr<std::string> BindAnywhere(int descriptor, const SocketName& target) {
+  SocketName name = target;
+  if (name.address.ss_family == AF_INET) {
+    reinterpret_cast<sockaddr_in*>(&name.address)->sin_port = 0;
+  } else if (name.address.ss_family == AF_INET6) {
+    reinterpret_cast<sockaddr_in6*>(&name.address)->sin6_port = 0;
+  } else {
+    name.length = sizeof(sa_family_t);
+  }
+  if (bind(descriptor, name.get(), name.length) != 0) return absl::ErrnoToStatus(errno, "bind");
+  name.length = sizeof(name.address);
+  if (getsockname(descriptor, name.get(), &name.length) != 0) {
+    return absl::ErrnoToStatus(errno, "getsockname");
+  }
+  return PeerOf(name.address, name.length).name;
+}
+
+}  // namespace
+
+absl::Status Reach(const ProbeTarget& target, OwnPeers& own, sync::TimeNs limit) {
+  const SocketName name = Near(target.name);
+  const Descriptor descriptor(
+      socket(name.address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!descriptor.ok()) return absl::ErrnoToStatus(errno, "socket");
+  const absl::StatusOr<std::string> peer = BindAnywhere(descriptor.get(), name);
+  if (!peer.ok()) return peer.status();
+  own.Add(*peer);
+  Attempt attempt(descriptor.get(), limit);
+  absl::Status status = attempt.Connect(name);
+  if (status.ok()) status = attempt.Ask();
+  own.Remove(*peer);
+  return status;
+}
+
+Probe::Probe(std::vector<ProbeTarget> targets, sync::TimeNs interval, Try attempt,
+             OnChange on_change, Counters& counters, sync::Clock& clock, Logger* log)
+    : targets_(std::move(targets)),
+      interval_(interval),
+      attempt_(std::move(attempt)),
+      on_change_(std::move(on_change)),
+      counters_(counters),
+      clock_(clock),
+      log_(log),
+      failures_(targets_.size(), 0),
+      thread_([this] { Run(); }) {}
+
+Probe::~Probe() {
+  Stop();
+  thread_.join();
+}
+
+void Probe::Stop() {
+  sync::MutexLock lock(mutex_);
+  stop_ = true;
+  changed_.NotifyAll();
+}
+
+bool Probe::Stopped() {
+  sync::MutexLock lock(mutex_);
+  return stop_;
+}
+
+void Probe::Run() {
+  for (;;) {
+    {
+      sync::MutexLock lock(mutex_);
+      const sync::TimeNs due = clock_.Now() + interval_;
+      while (!stop_ && clock_.Now() < due) clock_.WaitUntil(mutex_, changed_, due);
+      if (stop_) return;
+    }
+    Round();
+  }
+}
+
+void Probe::Round() {
+  std::vector<std::string> reasons;
+  for (size_t i = 0; i < targets_.size(); ++i) {
+    const absl::Status status = attempt_(targets_[i]);
+    if (Stopped()) return;
+    if (status.ok()) {
+      failures_[i] = 0;
+      continue;
+    }
+    ++counters_.probe_failures;
+    if (++failures_[i] < kFailures) continue;
+    reasons.push_back(absl::StrCat(targets_[i].text, ": ", status.message()));
+  }
+  const std::string why = absl::StrJoin(reasons, "; ");
+  counters_.SetUnreachable(why);
+  const bool reachable = reasons.empty();
+  if (std::exchange(reachable_, reachable) == reachable) return;
+  if (log_ != nullptr) {
+    if (reachable) {
+      log_->Info("reachable again");
+    } else {
+      log_->Error("not reachable: a connection to itself fails", {{"why", why}});
+    }
+  }
+  on_change_(reachable);
+}
+
+}  // namespace voxeld::daemon::listen

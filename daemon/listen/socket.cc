@@ -1,0 +1,165 @@
+#include "daemon/listen/socket.h"
+
+#include <linux/tcp.h>  // tcp_info with bytes_received, which glibc's has not
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon::listen {
+namespace {
+
+constexpr mode_t kSocketMode = 0660;
+constexpr size_t kDiscardBytes = 1u << 20;
+
+absl::Status Failed(int error, const Address& address) {
+  if (error == EADDRINUSE) {
+    return absl::AlreadyExistsError(
+        absl::StrCat("somebody listens on ", address.ToString(), " already"));
+  }
+  return absl::ErrnoToStatus(error, absl::StrCat(address.ToString(), " cannot be listened on"));
+}
+
+void Set(int descriptor, int level, int option, int value) {
+  setsockopt(descriptor, level, option, &value, sizeof(value));
+}
+
+void SetPort(SocketName& name, uint16_t port) {
+  if (name.address.ss_family == AF_INET) {
+    reinterpret_cast<sockaddr_in*>(&name.address)->sin_port = htons(port);
+  } else {
+    reinterpret_cast<sockaddr_in6*>(&name.address)->sin6_port = htons(port);
+  }
+}
+
+uint16_t PortOf(const SocketName& name) {
+  return ntohs(name.address.ss_family == AF_INET
+                   ? reinterpret_cast<const sockaddr_in*>(&name.address)->sin_port
+                   : reinterpret_cast<const sockaddr_in6*>(&name.address)->sin6_port);
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Listen(const Address& address) {
+  if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
+  return address.unix_socket ? ListenUnix(address) : ListenTcp(address);
+}
+
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const Address& address) {
+  ListeningSocket made;
+  made.descriptor_.Reset(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!made.descriptor_.ok()) return Failed(errno, address);
+  auto* name = reinterpret_cast<sockaddr_un*>(&made.name_.address);
+  name->sun_family = AF_UNIX;
+  std::memcpy(name->sun_path, address.path.data(), address.path.size());
+  made.name_.length = sizeof(sockaddr_un);
+  if (bind(made.descriptor(), made.name_.get(), made.name_.length) != 0) {
+    return Failed(errno, address);
+  }
+  struct stat found;
+  if (stat(address.path.c_str(), &found) == 0) {
+    made.device_ = found.st_dev;
+    made.inode_ = found.st_ino;
+  }
+  made.address_ = address;
+  // Nobody can connect before listen().
+  if (chmod(address.path.c_str(), kSocketMode) != 0 ||
+      ::listen(made.descriptor(), SOMAXCONN) != 0) {
+    return Failed(errno, address);
+  }
+  std::vector<ListeningSocket> out;
+  out.push_back(std::move(made));
+  return out;
+}
+
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenTcp(const Address& address) {
+  addrinfo hints = {};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int code =
+      getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
+  if (code != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the host of ", address.ToString(), " is not known: ", gai_strerror(code)));
+  }
+  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> list(found, freeaddrinfo);
+  std::vector<ListeningSocket> out;
+  uint16_t port = address.port;
+  int first_error = 0;
+  for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
+    ListeningSocket made;
+    made.descriptor_.Reset(
+        socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol));
+    if (!made.descriptor_.ok()) continue;  // no IPv6 here, say
+    const int descriptor = made.descriptor();
+    Set(descriptor, SOL_SOCKET, SO_REUSEADDR, 1);
+    if (at->ai_family == AF_INET6) {
+      // [::] is every address of this machine, as everywhere.
+      Set(descriptor, IPPROTO_IPV6, IPV6_V6ONLY,
+          IN6_IS_ADDR_UNSPECIFIED(&reinterpret_cast<sockaddr_in6*>(at->ai_addr)->sin6_addr) ? 0
+                                                                                            : 1);
+    }
+    std::memcpy(&made.name_.address, at->ai_addr, at->ai_addrlen);
+    made.name_.length = at->ai_addrlen;
+    SetPort(made.name_, port);
+    if (bind(descriptor, made.name_.get(), made.name_.length) != 0 ||
+        ::listen(descriptor, SOMAXCONN) != 0) {
+      if (first_error == 0 || errno == EADDRINUSE) first_error = errno;
+      if (errno == EADDRINUSE) return Failed(errno, address);
+      continue;
+    }
+    made.name_.length = sizeof(made.name_.address);
+    getsockname(descriptor, made.name_.get(), &made.name_.length);
+    port = PortOf(made.name_);
+    made.address_ = address;
+    made.address_.port = port;
+    out.push_back(std::move(made));
+  }
+  if (out.empty()) return Failed(first_error == 0 ? EADDRNOTAVAIL : first_error, address);
+  return out;
+}
+
+ListeningSocket::~ListeningSocket() {
+  struct stat found;
+  if (inode_ == 0 || !descriptor_.ok() || stat(address_.path.c_str(), &found) != 0) return;
+  if (found.st_dev == device_ && found.st_ino == inode_) unlink(address_.path.c_str());
+}
+
+uint64_t SocketWire::BytesReceived() {
+  tcp_info info = {};
+  socklen_t length = sizeof(info);
+  // A unix socket has none.
+  if (getsockopt(descriptor_.get(), IPPROTO_TCP, TCP_INFO, &info, &length) != 0) return 0;
+  return info.tcpi_bytes_received;
+}
+
+void SocketWire::Cut() {
+  // The last to close it resets it: no waiting for a client that still sends.
+  const linger reset = {.l_onoff = 1, .l_linger = 0};
+  setsockopt(descriptor_.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
+  shutdown(descriptor_.get(), SHUT_RDWR);
+  // Else whoever serves the connection would still read and parse what is here.
+  while (recv(descriptor_.get(), nullptr, kDiscardBytes, MSG_TRUNC | MSG_DONTWAIT) > 0) {
+  }
+}
+
+absl::StatusOr<PeerCredentials> CredentialsOf(int descriptor) {
+  ucred found = {};
+  socklen_t length = sizeof(found);
+  if (getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &found, &length) != 0) {
+    return absl::ErrnoToStatus(errno, "who is at the other end of a unix socket is not known");
+  }
+  return PeerCredentials{.user = found.uid, .process = found.pid};
+}
+
+}  // namespace voxeld::daemon::listen

@@ -1,0 +1,122 @@
+#include "daemon/services/call_meter.h"
+
+#include <grpc/grpc.h>
+#include <grpc/support/alloc.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <vector>
+
+#include "daemon/listen/peer.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+// What follows `key` in `json`, up to the next quote; `at` moves behind it. Our keys stand for one
+// thing each, and no text of a client's is among them.
+std::string_view TextAfter(std::string_view json, std::string_view key, size_t* at) {
+  const size_t found = json.find(key, *at);
+  if (found == std::string_view::npos) return {};
+  const size_t begin = found + key.size();
+  const size_t end = std::min(json.find('"', begin), json.size());
+  *at = end;
+  return json.substr(begin, end - begin);
+}
+
+template <typename T>
+T NumberOf(std::string_view text) {
+  T out = 0;
+  std::from_chars(text.data(), text.data() + text.size(), out);
+  return out;
+}
+
+uint64_t Figure(std::string_view json, std::string_view key) {
+  size_t at = 0;
+  return NumberOf<uint64_t>(TextAfter(json, key, &at));
+}
+
+std::string Take(char* text) {
+  const std::unique_ptr<char, void (*)(void*)> owned(text, gpr_free);
+  return text == nullptr ? std::string() : std::string(text);
+}
+
+}  // namespace
+
+uint64_t CallTotals::Cancelled(uint64_t at_once) const {
+  const uint64_t ended = succeeded + failed;
+  const uint64_t open = started > ended ? started - ended : 0;
+  return failed + (open > at_once ? open - at_once : 0);
+}
+
+CallTotals CallTotals::FromJson(std::string_view json) {
+  return {.started = Figure(json, "\"streamsStarted\":\""),
+          .succeeded = Figure(json, "\"streamsSucceeded\":\""),
+          .failed = Figure(json, "\"streamsFailed\":\"")};
+}
+
+CallMeter::CallMeter(listen::Guard& guard, uint64_t at_once, sync::Clock& clock)
+    : guard_(guard), at_once_(at_once), clock_(clock), thread_([this] { Run(); }) {}
+
+CallMeter::~CallMeter() {
+  {
+    sync::MutexLock lock(mutex_);
+    stop_ = true;
+    changed_.NotifyAll();
+  }
+  thread_.join();
+}
+
+void CallMeter::Run() {
+  for (;;) {
+    {
+      sync::MutexLock lock(mutex_);
+      const sync::TimeNs due = clock_.Now() + kInterval;
+      while (!stop_ && clock_.Now() < due) clock_.WaitUntil(mutex_, changed_, due);
+      if (stop_) return;
+    }
+    Look();
+  }
+}
+
+void CallMeter::Look() {
+  bool listed = false;
+  for (const std::string& peer : guard_.Busy()) {
+    // A number that was another connection's of the same name has nothing to say any more.
+    for (;;) {
+      const auto known = sockets_.find(peer);
+      const std::string json =
+          known == sockets_.end() ? "" : Take(grpc_channelz_get_socket(known->second));
+      if (!json.empty()) {
+        guard_.OnCancelled(peer, CallTotals::FromJson(json).Cancelled(at_once_));
+        break;
+      }
+      if (std::exchange(listed, true)) break;  // it has gone meanwhile
+      ListSockets();
+    }
+  }
+}
+
+void CallMeter::ListSockets() {
+  sockets_.clear();
+  const std::string servers = Take(grpc_channelz_get_servers(0));
+  for (size_t at = 0;;) {
+    const std::string_view server = TextAfter(servers, "\"serverId\":\"", &at);
+    if (server.empty()) return;
+    for (int64_t first = 0;;) {
+      const std::string json =
+          Take(grpc_channelz_get_server_sockets(NumberOf<intptr_t>(server), first, 0));
+      // {"name":"chttp2 ipv4:127.0.0.1:40000","socketId":"5"}, in ascending order of numbers
+      for (size_t ref = 0;;) {
+        const std::string_view name = TextAfter(json, "\"name\":\"chttp2 ", &ref);
+        if (name.empty()) break;
+        const auto number = NumberOf<int64_t>(TextAfter(json, "\"socketId\":\"", &ref));
+        sockets_[listen::PeerName(name)] = number;
+        first = number + 1;
+      }
+      if (json.empty() || json.find("\"end\":true") != std::string::npos) break;
+    }
+  }
+}
+
+}  // namespace voxeld::daemon::services

@@ -1,0 +1,153 @@
+// SceneService.WatchScene: each message is made when gRPC has taken the last one, so that a client
+// that does not read holds one message and two snapshots, and nothing waits for it.
+#include <grpcpp/alarm.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/core/scene_watch.h"
+#include "daemon/services/services.h"
+#include "daemon/services/status.h"
+#include "daemon/wire/watch_messages.h"
+#include "voxeld/v1/scene.grpc.pb.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+// Owns itself until gRPC is done with it. Its turns (a start, a written message, an alarm) come one
+// after another, in gRPC's threads; End and Wake may come at any time.
+class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
+                             public ActiveCall,
+                             public std::enable_shared_from_this<SceneWatchCall> {
+ public:
+  SceneWatchCall(ServiceContext& context, const v1::WatchSceneRequest& request)
+      : context_(context), scene_(context.core.scene_watch()), messages_(request) {}
+
+  void Start() {
+    self_ = shared_from_this();
+    context_.calls.Add(self_);
+    counted_ = Count();
+    if (!counted_) {
+      return End(absl::ResourceExhaustedError(
+          absl::StrCat(context_.max_scene_watches,
+                       " watches of the scene are open, which is max_scene_watches; try again when "
+                       "one has ended")));
+    }
+    TakeTurn();
+  }
+
+  void End(const absl::Status& status) override {
+    sync::MutexLock lock(mutex_);
+    if (end_.has_value()) return;
+    end_ = status;
+    if (!writing_) Finish(ToGrpc(*end_));
+  }
+
+  void OnWriteDone(bool ok) override {
+    {
+      sync::MutexLock lock(mutex_);
+      writing_ = false;
+      outgoing_.Clear();
+      if (end_.has_value()) return Finish(ToGrpc(*end_));
+    }
+    if (!ok) return End(absl::CancelledError("the client is gone"));
+    TakeTurn();
+  }
+
+  void OnCancel() override { End(absl::CancelledError("the client is gone")); }
+
+  void OnDone() override {
+    SnapshotWaitId waiting = 0;
+    std::unique_ptr<grpc::Alarm> alarm;
+    {
+      sync::MutexLock lock(mutex_);
+      waiting = waiting_;
+      alarm = std::move(alarm_);
+    }
+    scene_.Cancel(waiting);
+    if (counted_) --context_.scene_watches;
+    context_.calls.Remove(this);
+    alarm.reset();
+    const std::shared_ptr<SceneWatchCall> last = std::move(self_);
+  }
+
+ private:
+  bool Count() {
+    uint32_t open = context_.scene_watches;
+    while (open < context_.max_scene_watches) {
+      if (context_.scene_watches.compare_exchange_weak(open, open + 1)) return true;
+    }
+    return false;
+  }
+
+  void TakeTurn() {
+    if (messages_.in_sync()) {
+      SnapshotPtr newest = scene_.newest();
+      if (newest->number == messages_.told()) return AwaitNewer();
+      messages_.Begin(std::move(newest));
+    }
+    v1::WatchSceneResponse message;
+    if (absl::Status made = messages_.Next(&message); !made.ok()) return End(made);
+    grpc::ByteBuffer bytes;
+    bool owned = false;
+    const grpc::Status packed =
+        grpc::SerializationTraits<v1::WatchSceneResponse>::Serialize(message, &bytes, &owned);
+    if (!packed.ok()) return End(absl::InternalError("a message could not be put into bytes"));
+    sync::MutexLock lock(mutex_);
+    if (end_.has_value()) return;
+    outgoing_.Swap(&bytes);
+    writing_ = true;
+    StartWrite(&outgoing_);
+  }
+
+  void AwaitNewer() {
+    const SnapshotWaitId id = scene_.Await(messages_.told(), [weak = weak_from_this()] {
+      if (const std::shared_ptr<SceneWatchCall> self = weak.lock()) self->Wake();
+    });
+    {
+      sync::MutexLock lock(mutex_);
+      waiting_ = std::max(waiting_, id);  // the next turn may have waited already
+      if (!end_.has_value()) return;
+    }
+    scene_.Cancel(id);
+  }
+
+  // The next turn, in a thread of gRPC's.
+  void Wake() {
+    sync::MutexLock lock(mutex_);
+    if (end_.has_value()) return;
+    alarm_ = std::make_unique<grpc::Alarm>();
+    alarm_->Set(gpr_now(GPR_CLOCK_MONOTONIC), [self = shared_from_this()](bool due) {
+      if (due) self->TakeTurn();
+    });
+  }
+
+  ServiceContext& context_;
+  SceneWatch& scene_;  // the core's
+  std::shared_ptr<SceneWatchCall> self_;
+  bool counted_ = false;
+  wire::WatchMessages messages_;  // of whoever has the turn
+
+  sync::Mutex mutex_;
+  grpc::ByteBuffer outgoing_ VOXELD_GUARDED_BY(mutex_);
+  bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
+  std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);
+  SnapshotWaitId waiting_ VOXELD_GUARDED_BY(mutex_) = 0;
+  std::unique_ptr<grpc::Alarm> alarm_ VOXELD_GUARDED_BY(mutex_);
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<grpc::ByteBuffer>* NewSceneWatch(ServiceContext& context,
+                                                          const v1::WatchSceneRequest& request) {
+  const auto call = std::make_shared<SceneWatchCall>(context, request);
+  call->Start();
+  return call.get();
+}
+
+}  // namespace voxeld::daemon::services

@@ -1,0 +1,203 @@
+#include "daemon/wire/skeleton.h"
+
+#include <google/protobuf/wire_format_lite.h>
+
+#include <algorithm>
+
+#include "voxeld/v1/primitives.pb.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using google::protobuf::internal::WireFormatLite;
+
+// Beyond, a skeleton that is not far smaller than the message costs more than it saves.
+constexpr uint64_t kSpareBytes = 16 << 10;
+constexpr uint64_t kLeastFactor = 4;
+
+constexpr int kMostVarint = 10, kMostTag = 5, kMostLength = 5;
+
+// A message on the way to payloads: its fields that lead there.
+struct Node {
+  struct Step {
+    int field = 0;
+    const Node* to = nullptr;  // null: a payload
+  };
+  Step steps[3];  // field 0: none
+};
+
+constexpr Node kVertices = {{{v1::Vertices::kIndicesFieldNumber},
+                             {v1::Vertices::kColorsFieldNumber},
+                             {v1::Vertices::kPositionsFieldNumber}}};
+constexpr Node kPoints = {{{v1::Points::kVerticesFieldNumber, &kVertices}}};
+constexpr Node kSegments = {{{v1::Segments::kVerticesFieldNumber, &kVertices}}};
+constexpr Node kMesh = {{{v1::Mesh::kVerticesFieldNumber, &kVertices}}};
+constexpr Node kPrimitive = {{{v1::Primitive::kPointsFieldNumber, &kPoints},
+                              {v1::Primitive::kSegmentsFieldNumber, &kSegments},
+                              {v1::Primitive::kMeshFieldNumber, &kMesh}}};
+constexpr Node kEntity = {{{v1::Entity::kPrimitiveFieldNumber, &kPrimitive}}};
+constexpr Node kUpsert = {{{v1::Upsert::kEntityFieldNumber, &kEntity}}};
+constexpr Node kBatch = {{{v1::Batch::kUpsertsFieldNumber, &kUpsert}}};
+constexpr Node kPart = {{{v1::Object::Part::kPrimitiveFieldNumber, &kPrimitive}}};
+constexpr Node kObject = {{{v1::Object::kPartsFieldNumber, &kPart}}};
+constexpr Node kDefineObject = {{{v1::DefineObject::kDefinitionFieldNumber, &kObject}}};
+constexpr Node kStreamRequest = {{{v1::StreamRequest::kBatchFieldNumber, &kBatch},
+                                  {v1::StreamRequest::kUpsertFieldNumber, &kUpsert},
+                                  {v1::StreamRequest::kDefineObjectFieldNumber, &kDefineObject}}};
+constexpr Node kApplyUpdateRequest = {
+    {{v1::ApplyUpdateRequest::kOperationsFieldNumber, &kStreamRequest}}};
+
+class Walker {
+ public:
+  Walker(std::span<const std::string_view> slices, Skeleton* out) : slices_(slices), out_(*out) {
+    for (const std::string_view slice : slices_) left_ += slice.size();
+    Advance();
+  }
+
+  uint64_t left() const { return left_; }
+
+  // The next `size` bytes, which are there, are a message of that kind. Every function answers false
+  // if what it finds is not plain.
+  bool Message(const Node& node, uint64_t size) {
+    const uint64_t end = left_ - size;  // what is left then
+    while (left_ > end) {
+      if (!Field(node, end)) return false;
+    }
+    return left_ == end;
+  }
+
+ private:
+  bool Field(const Node& node, uint64_t end) {
+    uint64_t tag = 0;
+    if (!Varint(kMostTag, end, &tag) || tag > UINT32_MAX) return false;
+    const int field = WireFormatLite::GetTagFieldNumber(static_cast<uint32_t>(tag));
+    if (field == 0 || out_.bytes.size() > kSpareBytes + consumed_ / kLeastFactor) return false;
+    PutVarint(tag);
+    switch (WireFormatLite::GetTagWireType(static_cast<uint32_t>(tag))) {
+      case WireFormatLite::WIRETYPE_VARINT:
+        return CopyVarint(end);
+      case WireFormatLite::WIRETYPE_FIXED64:
+        return Copy(8, end);
+      case WireFormatLite::WIRETYPE_FIXED32:
+        return Copy(4, end);
+      case WireFormatLite::WIRETYPE_LENGTH_DELIMITED:
+        return Delimited(node, field, end);
+      default:
+        return false;
+    }
+  }
+
+  bool Delimited(const Node& node, int field, uint64_t end) {
+    uint64_t size = 0;
+    if (!Varint(kMostLength, end, &size) || size > left_ - end) return false;
+    const auto step = std::find_if(std::begin(node.steps), std::end(node.steps),
+                                   [&](const Node::Step& s) { return s.field == field; });
+    if (step == std::end(node.steps)) {
+      PutVarint(size);
+      return Copy(size, end);
+    }
+    if (step->to != nullptr) {
+      const size_t at = out_.bytes.size();
+      out_.bytes.append(kMostLength, '\0');
+      if (!Message(*step->to, size)) return false;
+      PatchLength(at);
+      return true;
+    }
+    if (size == 0) {  // as good as absent, but it may undo one that came before
+      PutVarint(0);
+      return true;
+    }
+    out_.payloads.Begin();
+    Take(size, [&](std::string_view piece) { out_.payloads.Add(piece); });
+    const std::string token = out_.payloads.Token();
+    PutVarint(token.size());
+    out_.bytes += token;
+    return true;
+  }
+
+  // To the next byte that there is.
+  void Advance() {
+    while (next_ < slices_.size() && piece_.empty()) piece_ = slices_[next_++];
+  }
+
+  // Has `take(piece)` called for the next `size` bytes, which are there.
+  template <typename TakePiece>
+  void Take(uint64_t size, TakePiece&& take) {
+    left_ -= size;
+    consumed_ += size;
+    while (size > 0) {
+      const std::string_view piece = piece_.substr(0, size);
+      take(piece);
+      size -= piece.size();
+      piece_.remove_prefix(piece.size());
+      Advance();
+    }
+  }
+
+  bool Byte(uint64_t end, uint8_t* byte) {
+    if (left_ <= end) return false;
+    *byte = static_cast<uint8_t>(piece_.front());
+    piece_.remove_prefix(1);
+    --left_;
+    ++consumed_;
+    Advance();
+    return true;
+  }
+
+  bool Copy(uint64_t size, uint64_t end) {
+    if (size > left_ - end) return false;
+    Take(size, [&](std::string_view piece) { out_.bytes += piece; });
+    return true;
+  }
+
+  bool Varint(int most, uint64_t end, uint64_t* value) {
+    *value = 0;
+    for (int i = 0; i < most; ++i) {
+      uint8_t byte = 0;
+      if (!Byte(end, &byte)) return false;
+      *value |= uint64_t{byte & 0x7Fu} << (7 * i);
+      if (byte < 0x80) return true;
+    }
+    return false;
+  }
+
+  bool CopyVarint(uint64_t end) {
+    for (int i = 0; i < kMostVarint; ++i) {
+      uint8_t byte = 0;
+      if (!Byte(end, &byte)) return false;
+      out_.bytes.push_back(static_cast<char>(byte));
+      if (byte < 0x80) return true;
+    }
+    return false;
+  }
+
+  void PutVarint(uint64_t value) {
+    for (; value >= 0x80; value >>= 7) out_.bytes.push_back(static_cast<char>(value | 0x80));
+    out_.bytes.push_back(static_cast<char>(value));
+  }
+
+  // The length of what follows the room at `at`, in as many bytes as were left for it.
+  void PatchLength(size_t at) {
+    uint64_t size = out_.bytes.size() - at - kMostLength;
+    for (int i = 0; i < kMostLength; ++i, size >>= 7) {
+      out_.bytes[at++] = static_cast<char>((size & 0x7F) | (i + 1 < kMostLength ? 0x80 : 0));
+    }
+  }
+
+  const std::span<const std::string_view> slices_;
+  Skeleton& out_;
+  size_t next_ = 0;         // slice after the one that is read
+  std::string_view piece_;  // what is left of that; empty at the end only
+  uint64_t left_ = 0, consumed_ = 0;
+};
+
+}  // namespace
+
+bool MakeSkeleton(std::span<const std::string_view> slices, Root root, Skeleton* out) {
+  Walker walker(slices, out);
+  return walker.Message(root == Root::kStreamRequest ? kStreamRequest : kApplyUpdateRequest,
+                        walker.left());
+}
+
+}  // namespace voxeld::daemon::wire

@@ -1,0 +1,77 @@
+// Where a layer is drawn: its clip planes and its region (gpu/delta.h), as half-spaces of voxel
+// space in whole numbers, so that every machine gives each voxel the same verdict.
+//
+// Definition. A voxel (x, y, z) belongs to the layer if for each half-space
+//
+//   normal · (2x+1, 2y+1, 2z+1) + offset ≥ 0          in integers, exactly
+//
+// which is its centre, in half voxels, on the inner side of the plane or on it. A plane of scene
+// space becomes a half-space of the view's voxel space in double precision, in the order in which
+// it is written in clip.cc, and is rounded once, after a scaling by a power of two that puts the
+// greatest component of its normal into [2³⁷, 2³⁸). A region is six planes, its faces inside.
+//
+// Error. In a grid of nx × ny × nz voxels rounding shifts a plane, measured along the axis nearest
+// to its normal, by at most (nx + ny + nz + 1) · 2⁻³⁸ voxel: 2⁻²² in the greatest grid there can
+// be. Double precision before that adds what it adds to vertices: 2⁻⁵⁰ of the terms that are
+// summed.
+//
+// A plane and its opposite are rounded to exact opposites: each voxel is in one of them at least,
+// and in both only if its centre lies in the rounded plane.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/delta.h"
+#include "gpu/primitives/fixed.h"
+
+namespace voxeld::gpu {
+
+struct VoxelHalfSpace {
+  int64_t normal[3] = {};  // at most 2³⁸ each way
+  int64_t offset = 0;      // at most 2⁶¹ each way
+  bool operator==(const VoxelHalfSpace&) const = default;
+};
+
+inline constexpr int64_t kMaxClipNormal = int64_t{1} << 38;
+inline constexpr int64_t kMaxClipOffset = int64_t{1} << 61;
+
+// What is nowhere: a layer under a view that has no inverse shows none of what is clipped.
+VOXELD_HD inline VoxelHalfSpace NowhereInside() { return {{0, 0, 0}, -1}; }
+
+// Coordinates of a grid's voxels: 0 to 2¹⁸, so that nothing overflows.
+VOXELD_HD inline int64_t ClipValue(const VoxelHalfSpace& h, int64_t x, int64_t y, int64_t z) {
+  return h.normal[0] * (2 * x + 1) + h.normal[1] * (2 * y + 1) + h.normal[2] * (2 * z + 1) +
+         h.offset;
+}
+
+VOXELD_HD inline bool IsInside(const VoxelHalfSpace& h, int64_t x, int64_t y, int64_t z) {
+  return ClipValue(h, x, y, z) >= 0;
+}
+
+enum class ClipSide : uint8_t { kInside, kCut, kOutside };
+
+// Of all voxels of a box, which is not empty.
+VOXELD_HD inline ClipSide SideOf(const VoxelHalfSpace& h, const Box3& box) {
+  int64_t least = h.offset, greatest = h.offset;
+  for (int a = 0; a < 3; ++a) {
+    const int64_t first = h.normal[a] * (2 * static_cast<int64_t>(box.lo[a]) + 1);
+    const int64_t last = h.normal[a] * (2 * static_cast<int64_t>(box.hi[a]) - 1);
+    least += Min(first, last);
+    greatest += Max(first, last);
+  }
+  return least >= 0 ? ClipSide::kInside : greatest < 0 ? ClipSide::kOutside : ClipSide::kCut;
+}
+
+// Planes and the region's six faces.
+inline constexpr uint32_t kMaxHalfSpaces = kMaxClipPlanes + 6;
+
+// All of a layer's, under one view.
+struct VoxelClip {
+  uint32_t count = 0;  // none: drawn everywhere
+  VoxelHalfSpace half_spaces[kMaxHalfSpaces];
+};
+
+// `view`: scene → voxel space. Host.
+VoxelClip MapClip(const LayerRecord& layer, const Affine& view);
+
+}  // namespace voxeld::gpu

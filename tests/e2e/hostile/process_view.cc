@@ -1,0 +1,44 @@
+#include "tests/e2e/hostile/process_view.h"
+
+#include <sys/resource.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <string>
+
+namespace voxeld::e2e {
+namespace {
+
+std::filesystem::path Folder(pid_t process) {
+  return std::filesystem::path("/proc") / std::to_string(process);
+}
+
+}  // namespace
+
+uint64_t ResidentKib(pid_t process) {
+  std::ifstream status(Folder(process) / "status");
+  std::string word;
+  while (status >> word) {
+    uint64_t kib = 0;
+    if (word == "VmRSS:" && status >> kib) return kib;
+  }
+  return 0;
+}
+
+bool LeaveDescriptors(pid_t process, size_t spare) {
+  std::set<size_t> used;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(Folder(process) / "fd", error)) {
+    used.insert(std::stoul(entry.path().filename().string()));
+  }
+  size_t most = 0;
+  while (used.contains(most) || spare-- > 0) ++most;
+
+  rlimit limit = {};
+  if (prlimit(process, RLIMIT_NOFILE, nullptr, &limit) != 0) return false;
+  limit.rlim_cur = most;
+  return prlimit(process, RLIMIT_NOFILE, &limit, nullptr) == 0;
+}
+
+}  // namespace voxeld::e2e
