@@ -79,10 +79,13 @@ function(voxeld_library name)
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
 endfunction()
 
-# voxeld_test(NAME LABELS … SOURCES … LINK …): an executable `NAME` in bin/tests; each of its cases is a
-# ctest test. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
+# voxeld_test(NAME [SINGLE_THREADED] LABELS … SOURCES … LINK …): an executable `NAME` in bin/tests; each of its cases is a
+# ctest test. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
 function(voxeld_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
+    return()
+  endif()
   if(NOT ARG_LABELS)
     set(ARG_LABELS host)
   endif()

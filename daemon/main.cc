@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <future>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -22,6 +23,7 @@
 #include "daemon/http/http_server.h"
 #include "daemon/http/monitor.h"
 #include "daemon/listen/counters.h"
+#include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/view.h"
 #include "daemon/services/server.h"
@@ -182,6 +184,15 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   absl::StatusOr<std::unique_ptr<http::Server>> http =
       StartHttp(config.server, core, draining, log);
   if (!http.ok()) return Fail(1, http.status());
+  const absl::StatusOr<std::optional<Address>> local_address = LocalSocketAddress(config.server);
+  if (!local_address.ok()) return Fail(1, local_address.status());
+  std::optional<local::LocalSocketOptions> local;
+  if (local_address->has_value()) {
+    local = {.listen = **local_address,
+             .limits = {.max_memories = config.server.max_local_memories,
+                        .max_bytes = config.limits.max_local_bytes},
+             .log = &log};
+  }
   absl::StatusOr<std::unique_ptr<services::Server>> server =
       services::Server::Start(core, clock,
                               {.listen = config.server.listen,
@@ -202,6 +213,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                .max_scene_watches = config.server.max_scene_watches,
                                .keepalive_interval_ns = config.server.keepalive_interval_ns,
                                .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
+                               .local = local,
                                .log = &log});
   if (!server.ok()) return Fail(1, server.status());
 
@@ -213,6 +225,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   std::vector<std::string> addresses;
   for (const Address& address : (*server)->addresses()) addresses.push_back(address.ToString());
   log.Info("ready", {{"listen", absl::StrJoin(addresses, " ")},
+                     {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
   int signal = 0;

@@ -92,8 +92,9 @@ absl::Status PrepareUnix(const Address& address) {
   sockaddr_un name = {};
   name.sun_family = AF_UNIX;
   std::memcpy(name.sun_path, address.path.data(), address.path.size());
+  // EPROTOTYPE: not in streams, but somebody does.
   if (connect(probe.get(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0 ||
-      errno == EAGAIN || errno == EINPROGRESS) {
+      errno == EAGAIN || errno == EINPROGRESS || errno == EPROTOTYPE) {
     return absl::AlreadyExistsError(
         absl::StrCat("somebody listens on ", address.ToString(), " already"));
   }

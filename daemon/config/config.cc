@@ -23,6 +23,7 @@ constexpr const char* kDefaultListen = "127.0.0.1:50551";
 constexpr const char* kDefaultHttp = "127.0.0.1:8088";
 constexpr const char* kSystemFile = "/etc/voxeld/voxeld.toml";
 constexpr const char* kSystemRunFolder = "/run/voxeld";
+constexpr const char* kLocalSuffix = ".local";
 constexpr uintmax_t kGreatestFileBytes = 16u << 20;
 
 std::string DefaultSocket(const Environment& environment) {
@@ -107,6 +108,7 @@ struct ChoiceSetter {
   }
   void Listen(const char*, std::vector<Address>&) {}
   void Http(const char*, std::optional<Address>&, bool&) {}
+  void LocalSocket(const char*, std::string&) {}
   void Engine(const char*, gpu::EngineKind&) {}
   template <typename T>
   void Integer(const char*, T&, int64_t, int64_t) {}
@@ -156,6 +158,42 @@ absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text) {
   absl::StatusOr<Address> address = ParseAddress(text);
   if (!address.ok()) return address.status();
   return std::optional<Address>(*std::move(address));
+}
+
+absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& config) {
+  if (config.local_socket.empty()) return std::optional<Address>();
+  if (config.local_socket != "auto") {
+    const bool prefixed = config.local_socket.starts_with("unix:");
+    if (!prefixed && !config.local_socket.starts_with('/')) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "\"", config.local_socket,
+          "\" is no path of a unix socket; give an absolute path, \"auto\" (beside the "
+          "unix socket of listen), or \"\" for none"));
+    }
+    absl::StatusOr<Address> address =
+        ParseAddress(absl::StrCat(prefixed ? "" : "unix:", config.local_socket));
+    if (!address.ok()) return address.status();
+    for (const Address& listen : config.listen) {
+      if (listen != *address) continue;
+      return absl::InvalidArgumentError(absl::StrCat("local_socket is ", address->ToString(),
+                                                     ", and so is one of listen; each needs its "
+                                                     "own"));
+    }
+    return std::optional<Address>(*std::move(address));
+  }
+  for (const Address& listen : config.listen) {
+    if (!listen.unix_socket) continue;
+    // A path too long for its suffix: none, as nobody asked for it by name.
+    absl::StatusOr<Address> address = ParseAddress(absl::StrCat(listen.ToString(), kLocalSuffix));
+    if (address.ok()) return std::optional<Address>(*std::move(address));
+  }
+  return std::optional<Address>();
+}
+
+absl::Status CheckLocalSocket(std::string_view text) {
+  ServerConfig config;
+  config.local_socket = std::string(text);
+  return LocalSocketAddress(config).status();
 }
 
 Environment ProcessEnvironment() {

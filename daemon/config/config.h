@@ -26,6 +26,10 @@ struct ServerConfig {
   // Nothing: no http port. `http_asked`: it was asked for, so that a busy one is an error.
   std::optional<Address> http;
   bool http_asked = false;
+  // Where producers on this machine hand over memory: "auto" (beside the first unix socket of
+  // `listen`, with ".local" after its name), a path, or empty for nowhere.
+  std::string local_socket = "auto";
+  uint32_t max_local_memories = 256;  // of one session, held at once
   // That a client of Stream has not read. A commit's issues come at once: well above
   // max_issues_per_commit, or clients that do read may be ended.
   uint32_t max_queued_answers = 16384;
@@ -43,7 +47,7 @@ struct ServerConfig {
   int64_t connection_idle_limit_ns = 0;
   int64_t connection_age_limit_ns = 0;
   int64_t connection_age_grace_ns = 60 * sync::kSecond;
-  uint32_t max_scene_watches = 64;          // WatchScene calls at once, of all connections
+  uint32_t max_scene_watches = 64;  // WatchScene calls at once, of all connections
   // How long a stream that its client has half-closed waits for outcomes, and an ending one for its
   // client to read what is queued.
   int64_t drain_limit_ns = 5 * sync::kSecond;
@@ -104,6 +108,10 @@ absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
 
 // What the command line says goes over it. InvalidArgument is a usage error.
 absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config);
+
+// Where the local socket is, by what is in force; nothing: there is none. InvalidArgument for what
+// CheckLocalSocket refuses, and for an address of `listen`.
+absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& config);
 
 // As a file that would read back the same.
 std::string ToToml(const Config& config);

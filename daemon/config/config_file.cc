@@ -102,6 +102,15 @@ class FileReader {
     asked = true;
   }
 
+  void LocalSocket(const char* key, std::string& out) {
+    std::optional<std::string> text = QuotedText(key);
+    if (!text.has_value()) return;
+    if (absl::Status status = CheckLocalSocket(*text); !status.ok()) {
+      return Wrong(*Find(key), key, absl::StrCat("is refused: ", status.message()));
+    }
+    out = *std::move(text);
+  }
+
   void Choice(const char* key, std::string& out, std::initializer_list<const char*> values) {
     const std::optional<std::string> text = QuotedText(key);
     if (!text.has_value()) return;
@@ -295,6 +304,7 @@ class Printer {
   void Http(const char* key, const std::optional<Address>& address, bool) {
     Line(key, Quoted(address.has_value() ? address->ToString() : "off"));
   }
+  void LocalSocket(const char* key, const std::string& value) { Line(key, Quoted(value)); }
   void Choice(const char* key, const std::string& value, std::initializer_list<const char*>) {
     Line(key, Quoted(value));
   }

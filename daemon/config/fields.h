@@ -13,6 +13,7 @@ namespace voxeld::daemon {
 //   Section(name)                         what follows belongs to it
 //   Listen(key, addresses&)
 //   Http(key, optional<Address>&, asked&)
+//   LocalSocket(key, string&)
 //   Choice(key, string&, {values…})
 //   Engine(key, kind&)
 //   Integer(key, integer&, least, greatest)
@@ -30,6 +31,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Section("server");
   visitor.Listen("listen", config.server.listen);
   visitor.Http("http", config.server.http, config.server.http_asked);
+  visitor.LocalSocket("local_socket", config.server.local_socket);
+  visitor.Integer("max_local_memories", config.server.max_local_memories, 1, 4096);
   visitor.Integer("max_queued_answers", config.server.max_queued_answers, 16, 1 << 24);
   visitor.Integer("max_queued_bytes", config.server.max_queued_bytes, 4096, kGiB);
   visitor.Integer("max_calls_per_connection", config.server.max_calls_per_connection, 1, 65536);
@@ -110,5 +113,8 @@ std::string EngineKindText(gpu::EngineKind kind);
 
 // An address, or "off".
 absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text);
+
+// "auto", nothing, an absolute path, or that as unix:PATH.
+absl::Status CheckLocalSocket(std::string_view text);
 
 }  // namespace voxeld::daemon

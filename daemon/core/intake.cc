@@ -119,6 +119,8 @@ void Intake::Take(IncomingMessage message) {
   received_ += message.bytes;
   bytes_in_->fetch_add(message.bytes, std::memory_order_relaxed);
   staged_.credit += message.bytes;
+  staged_.local_bytes += message.local_bytes;
+  local_bytes_ += message.local_bytes;
 
   for (const Issue& issue : message.refused.issues) {
     staged_.refusals.Tell(issue, sink_.get(), limits_.max_issues_per_commit);
@@ -265,11 +267,13 @@ void Intake::DropFrame(const std::string& layer, const FrameRef& frame) {
   commit.credit -= credit;
   ++commit.dropped_frames;
   budget_->Release(Budget::Use::kWaiting, bytes);
-  Return(credit);
+  Return(credit, 0);
 }
 
 bool Intake::Room() const {
-  return received_ - returned_ < limits_.credit_bytes && queue_.size() < limits_.max_riding_commits;
+  return received_ - returned_ < limits_.credit_bytes &&
+         local_bytes_ / kLocalMessages < limits_.max_message_bytes &&
+         queue_.size() < limits_.max_riding_commits;
 }
 
 bool Intake::HasRoom() {
@@ -288,11 +292,12 @@ void Intake::Wake() {
 void Intake::ReturnStaged() {
   if (!queue_.empty() || under_way_ > 0) return;
   staged_returned_ = staged_.operations.size();
-  Return(std::exchange(staged_.credit, 0));
+  Return(std::exchange(staged_.credit, 0), std::exchange(staged_.local_bytes, 0));
 }
 
-void Intake::Return(uint64_t credit) {
+void Intake::Return(uint64_t credit, uint64_t local_bytes) {
   returned_ += credit;
+  local_bytes_ -= local_bytes;
   if (sink_ == nullptr) return;
   const uint64_t total = returned_ + limits_.credit_bytes;
   if (total - told_credit_ >= limits_.credit_bytes / 4 && total > told_credit_) {
@@ -335,7 +340,7 @@ void Intake::Detach(WaitingCommit& commit) {
   detached_bytes_ += commit.bytes;
   commit.costs.clear();
   commit.detached = true;
-  Return(std::exchange(commit.credit, 0));
+  Return(std::exchange(commit.credit, 0), std::exchange(commit.local_bytes, 0));
   ReturnStaged();
 }
 
@@ -348,7 +353,7 @@ void Intake::Done(WaitingCommit commit) {
   } else {
     --under_way_;
   }
-  Return(commit.credit);
+  Return(commit.credit, commit.local_bytes);
   ReturnStaged();
 }
 

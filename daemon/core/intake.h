@@ -10,6 +10,10 @@
 // of the session waits, until it is staged: what is staged for a commit that has not come waits for the client, and
 // max_uncommitted_bytes is its limit.
 //
+// Local memory that messages name costs their client nothing to send, and so no credit; what was copied of it is
+// outstanding in the same way, and nothing is read on while that is as much as kLocalMessages of the greatest messages
+// could have brought themselves.
+//
 // Threads: Take and HasRoom belong to one thread at a time, Pop and Done to the core's; all are thread-safe
 // against each other. `schedule` and the sink are called with the intake's lock held.
 #pragma once
@@ -38,6 +42,7 @@ struct IncomingMessage {
   Refusals refused;  // what decoding refused
   uint64_t bytes = 0;
   sync::TimeNs received_ns = 0, decoded_ns = 0;
+  uint64_t local_bytes = 0;  // copied from local memory, beside its own bytes
 };
 
 // A commit's refusals so far, and how many of them its session was told one by one. Single-threaded.
@@ -68,8 +73,9 @@ struct WaitingCommit {
   RefusalTally refusals;
   uint64_t dropped_frames = 0;
   sync::TimeNs received_ns = 0, decoded_ns = 0;
-  uint64_t bytes = 0;   // charged to kWaiting
-  uint64_t credit = 0;  // of its messages, not given back yet
+  uint64_t bytes = 0;  // charged to kWaiting
+  // Of its messages, not given back yet.
+  uint64_t credit = 0, local_bytes = 0;
   bool detached = false;
   bool late = false;  // its time had passed when it came
 
@@ -81,6 +87,8 @@ struct WaitingCommit {
 
 class Intake {
  public:
+  static constexpr uint64_t kLocalMessages = 4;
+
   // `open_bytes`: of the Open, which counts against the credit.
   // `bytes_in` counts what all sessions have sent.
   Intake(const Limits& limits, std::shared_ptr<Budget> budget,
@@ -120,7 +128,7 @@ class Intake {
   void GiveUpFrames(uint64_t commit) VOXELD_REQUIRES(mutex_);
   void DropFrame(const std::string& layer, const FrameRef& frame) VOXELD_REQUIRES(mutex_);
   void ReturnStaged() VOXELD_REQUIRES(mutex_);
-  void Return(uint64_t credit) VOXELD_REQUIRES(mutex_);
+  void Return(uint64_t credit, uint64_t local_bytes) VOXELD_REQUIRES(mutex_);
   bool Room() const VOXELD_REQUIRES(mutex_);
 
   const Limits& limits_;
@@ -144,6 +152,7 @@ class Intake {
   uint64_t received_ VOXELD_GUARDED_BY(mutex_);
   uint64_t returned_ VOXELD_GUARDED_BY(mutex_);
   uint64_t told_credit_ VOXELD_GUARDED_BY(mutex_);
+  uint64_t local_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;  // outstanding
 };
 
 }  // namespace voxeld::daemon

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "daemon/core/core.h"
+#include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/active_calls.h"
 #include "display/sync/clock.h"
@@ -37,6 +38,7 @@ struct ServiceContext {
   // Captures under way, those included whose client is gone and that the core has not let go of.
   // Shared, as the core may hold them longer than the server lives.
   std::shared_ptr<std::atomic<uint32_t>> captures = std::make_shared<std::atomic<uint32_t>>(0);
+  std::unique_ptr<local::LocalSocket> local;  // may be none
 };
 
 }  // namespace voxeld::daemon::services

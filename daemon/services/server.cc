@@ -76,6 +76,13 @@ class Server::Impl {
         sockets.push_back(std::move(socket));
       }
     }
+    if (options_.local.has_value()) {  // there before the first stream that is told of it
+      local::LocalSocketOptions local = *options_.local;
+      local.budget = context_.core.budget();
+      auto socket = local::LocalSocket::Start(context_.clock, std::move(local));
+      if (!socket.ok()) return socket.status();
+      context_.local = *std::move(socket);
+    }
     if (absl::Status status = Build(); !status.ok()) return status;
     auto listener = listen::Listener::Start(
         std::move(sockets), guard_, *counters_, own_, context_.clock,

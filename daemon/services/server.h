@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "daemon/core/core.h"
 #include "daemon/listen/counters.h"
 #include "daemon/listen/limits.h"
+#include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/context.h"
 #include "display/sync/clock.h"
@@ -37,6 +39,8 @@ struct ServerOptions {
   // An idle connection is probed this often, and closed when no answer comes in time.
   sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
+  // Where producers on this machine hand over memory, charged to the core's budget; nothing: nowhere.
+  std::optional<local::LocalSocketOptions> local;
   Logger* log = nullptr;  // outlives the server; may be none
 };
 

@@ -39,13 +39,15 @@ void StreamSession::OnMessage(std::span<const std::string_view> slices) {
   arrival.received_ns = context_.clock.Now();
   for (const std::string_view slice : slices) arrival.bytes += slice.size();
   uint64_t previous = 0;
+  std::shared_ptr<const wire::MemorySource> memory;
   {
     sync::MutexLock lock(mutex_);
     if (state_ != State::kNew && state_ != State::kOpen) return;
     previous = sequence_;
+    memory = local_.memory();
   }
   wire::Decoded decoded =
-      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk());
+      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(), memory.get());
   arrival.decoded_ns = context_.clock.Now();
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
@@ -100,6 +102,9 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
       opened->set_server_time_ns(context_.clock.Now());
       wire::Encode(core_.limits(), opened->mutable_limits());
       intake_ = info->intake;
+      local_ = local::LocalSession(context_.local.get(), session_);
+      opened->set_local_socket(local_.path());
+      opened->set_local_token(local_.token());
       state_ = State::kOpen;
       answers_.AddOpened(response.SerializeAsString());
       WriteNext();
@@ -137,8 +142,12 @@ void StreamSession::TakeOperations(wire::Decoded decoded, const Arrival& arrival
     return End(absl::FailedPreconditionError(
         "the first message of a stream must be open; the operation was not carried out"));
   }
-  intake->Take({std::move(decoded.operations), std::move(decoded.refused), arrival.bytes,
-                arrival.received_ns, arrival.decoded_ns});
+  intake->Take({.operations = std::move(decoded.operations),
+                .refused = std::move(decoded.refused),
+                .bytes = arrival.bytes,
+                .received_ns = arrival.received_ns,
+                .decoded_ns = arrival.decoded_ns,
+                .local_bytes = decoded.local_bytes});
   // Only now: a message that came in on another thread would overtake this one.
   if (intake->HasRoom()) OnRoom();
 }
@@ -225,8 +234,10 @@ void StreamSession::CloseSession() {
   uint64_t incarnation = 0;
   bool gone = false;
   std::vector<Receipt> undelivered;
+  local::LocalSession local;  // ends without the lock
   {
     sync::MutexLock lock(mutex_);
+    std::swap(local, local_);
     session = session_;
     incarnation = incarnation_;
     gone = cancelled_ || state_ == State::kFinished;

@@ -26,6 +26,7 @@
 
 #include "absl/status/status.h"
 #include "daemon/core/core.h"
+#include "daemon/local/local_session.h"
 #include "daemon/services/active_calls.h"
 #include "daemon/services/answer_queue.h"
 #include "daemon/services/context.h"
@@ -119,6 +120,7 @@ class StreamSession final : public SessionSink,
   uint64_t incarnation_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::shared_ptr<Intake> intake_ VOXELD_GUARDED_BY(mutex_);  // from kOpen on
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
+  local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until CloseSession
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
   // A read is pending, or what it brought has not been handed to the intake, or that has no room.
   bool reading_ VOXELD_GUARDED_BY(mutex_) = false;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "daemon/scene/operation.h"
+#include "daemon/wire/local_ranges.h"
 #include "daemon/wire/payload.h"
 #include "gpu/bulk/bulk_pool.h"
 
@@ -12,6 +13,7 @@ struct DecodeContext {
   gpu::BulkPool* pool = nullptr;  // where large arrays go; null: ordinary memory
   // What the bytes fields of Vertices name; null: they hold it themselves.
   const PayloadTable* payloads = nullptr;
+  LocalRanges* ranges = nullptr;  // in place of payloads; null: they are refused
 
   // Most parts ask for no more.
   operator const Limits&() const { return limits; }

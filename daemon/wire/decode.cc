@@ -4,6 +4,7 @@
 #include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "daemon/wire/check.h"
 #include "daemon/wire/context.h"
 #include "daemon/wire/element_count.h"
+#include "daemon/wire/local_ranges.h"
 #include "daemon/wire/operations.h"
 #include "daemon/wire/skeleton.h"
 #include "daemon/wire/slice_stream.h"
@@ -230,8 +232,9 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const DecodeC
   DecodeOperation(path, request, out->sequence, context, {&out->operations, &out->refused});
 }
 
-Decoded Decode(const v1::StreamRequest& request, const DecodeContext& context,
-               uint64_t previous_sequence) {
+// `memory` is what the context's ranges are of; null: it has none.
+Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t previous_sequence,
+               const MemorySource* memory) {
   Decoded out;
   if (request.op_case() == v1::StreamRequest::kOpen) {
     absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), context);
@@ -245,7 +248,10 @@ Decoded Decode(const v1::StreamRequest& request, const DecodeContext& context,
     out.sequence = std::max(request.sequence(), previous_sequence);
     return out;
   }
+  std::optional<LocalRanges> ranges;
+  if (memory != nullptr) context.ranges = &ranges.emplace(*memory, context.limits);
   Take(FieldPath(""), request, context, previous_sequence, &out);
+  if (ranges.has_value()) out.local_bytes = ranges->bytes_read();
   return out;
 }
 
@@ -295,12 +301,14 @@ absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limit
 }
 
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence, gpu::BulkPool* pool) {
-  return Decode(request, {limits, pool}, previous_sequence);
+                            uint64_t previous_sequence, gpu::BulkPool* pool,
+                            const MemorySource* memory) {
+  return Decode(request, {limits, pool}, previous_sequence, memory);
 }
 
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence, gpu::BulkPool* pool) {
+                            uint64_t previous_sequence, gpu::BulkPool* pool,
+                            const MemorySource* memory) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   const ElementRow rows[] = {
@@ -312,7 +320,7 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
   if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {
     return Failed(status);
   }
-  return Decode(parsed.message(), {limits, pool, parsed.payloads()}, previous_sequence);
+  return Decode(parsed.message(), {limits, pool, parsed.payloads()}, previous_sequence, memory);
 }
 
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -56,14 +57,46 @@ uint64_t ColorBytes(v1::ElementType type) {
   }
 }
 
-MaybeFault CheckPayload(const FieldPath& path, const char* name, const Payload& payload,
-                        uint64_t count, uint64_t element_bytes) {
+// One of the arrays: its field, the one that may stand in its place, and where the bytes are.
+struct Array {
+  const char* name;
+  const char* range_name;
+  const v1::MemoryRange* range;  // null: none
+  Payload payload;               // of a range, once that has been checked
+  std::shared_ptr<const void> mapping = {};
+
+  bool given() const { return range != nullptr || !payload.empty(); }
+};
+
+// Finds the bytes, and holds their number against what is wanted.
+MaybeFault CheckArray(const FieldPath& path, uint64_t count, uint64_t element_bytes,
+                      LocalRanges* ranges, Array* array) {
   // count < 2³² and element_bytes ≤ 12: no overflow.
   const uint64_t want = count * element_bytes;
-  if (payload.size() == want) return {};
-  return Fault{FieldPath(path, name).ToString(), Reason::kSizeMismatch,
-               absl::StrCat("has ", payload.size(), " bytes; ", count, " elements of ",
-                            element_bytes, " bytes need ", want)};
+  const uint64_t sent = array->payload.size();
+  if (array->range == nullptr) {
+    if (sent == want) return {};
+    return Fault{FieldPath(path, array->name).ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", sent, " bytes; ", count, " elements of ", element_bytes,
+                              " bytes need ", want)};
+  }
+  const FieldPath in(path, array->range_name);
+  if (sent != 0) {
+    return Fault{
+        in.ToString(), Reason::kInvalidValue,
+        absl::StrCat("is set, and ", array->name, " has ", sent, " bytes; give one of them")};
+  }
+  if (array->range->size() != want) {
+    return Fault{FieldPath(in, "size").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("is ", array->range->size(), "; ", count, " elements of ",
+                              element_bytes, " bytes need ", want)};
+  }
+  if (ranges == nullptr) return NoLocalMemory(in, *array->range);
+  MappedRange mapped;
+  if (auto fault = ranges->Read(in, *array->range, &mapped)) return fault;
+  array->payload = Payload(mapped.bytes);
+  array->mapping = std::move(mapped.mapping);
+  return {};
 }
 
 MaybeFault CheckCount(const FieldPath& path, const char* name, uint64_t count, uint64_t limit,
@@ -139,15 +172,20 @@ MaybeFault ToIndices(const FieldPath& path, v1::ElementType type, const Payload&
 }
 
 // The arrays of a message, wherever they lie.
-struct Payloads {
-  Payload positions, indices, colors;
+struct Arrays {
+  Array positions, indices, colors;
 };
 
-Payloads PayloadsOf(const v1::Vertices& in, const DecodeContext& context) {
+Arrays ArraysOf(const v1::Vertices& in, const DecodeContext& context) {
   const auto find = [&](const std::string& field) {
     return context.payloads != nullptr ? context.payloads->Find(field) : Payload(field);
   };
-  return {find(in.positions()), find(in.indices()), find(in.colors())};
+  return {
+      {"positions", "positions_in", in.has_positions_in() ? &in.positions_in() : nullptr,
+       find(in.positions())},
+      {"indices", "indices_in", in.has_indices_in() ? &in.indices_in() : nullptr,
+       find(in.indices())},
+      {"colors", "colors_in", in.has_colors_in() ? &in.colors_in() : nullptr, find(in.colors())}};
 }
 
 // Types that fit their arrays, and arrays that are there where a type or count speaks of them.
@@ -171,6 +209,10 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, const Paylo
                  absl::StrCat("is not empty (", in.index_count(), " indices, ", indices.size(),
                               " bytes); points take no indices")};
   }
+  if (!with_indices && in.has_indices_in()) {
+    return Fault{FieldPath(path, "indices_in").ToString(), Reason::kInvalidValue,
+                 "is set; points take no indices"};
+  }
   if (in.index_type() != v1::ELEMENT_TYPE_UNSPECIFIED && in.index_count() == 0) {
     return Fault{FieldPath(path, "index_type").ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", static_cast<int>(in.index_type()),
@@ -184,8 +226,8 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, const Paylo
 MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_indices,
                       const DecodeContext& context, GeometryData* out) {
   const Limits& limits = context.limits;
-  const Payloads payloads = PayloadsOf(in, context);
-  if (auto fault = CheckTypes(path, in, payloads.indices, with_indices)) return fault;
+  Arrays arrays = ArraysOf(in, context);
+  if (auto fault = CheckTypes(path, in, arrays.indices.payload, with_indices)) return fault;
   if (in.count() == 0) {
     return Fault{FieldPath(path, "count").ToString(), Reason::kInvalidValue,
                  "is 0; give at least 1 vertex"};
@@ -198,18 +240,18 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
                               "max_indices_per_entity")) {
     return fault;
   }
-  const bool colored = !payloads.colors.empty() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
-  if (auto fault = CheckPayload(path, "positions", payloads.positions, in.count(),
-                                PositionBytes(in.position_type()))) {
+  const bool colored = arrays.colors.given() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
+  if (auto fault = CheckArray(path, in.count(), PositionBytes(in.position_type()), context.ranges,
+                              &arrays.positions)) {
     return fault;
   }
-  if (auto fault = CheckPayload(path, "indices", payloads.indices, in.index_count(),
-                                IndexBytes(in.index_type()))) {
+  if (auto fault = CheckArray(path, in.index_count(), IndexBytes(in.index_type()), context.ranges,
+                              &arrays.indices)) {
     return fault;
   }
   if (colored) {
-    if (auto fault = CheckPayload(path, "colors", payloads.colors, in.count(),
-                                  ColorBytes(in.color_type()))) {
+    if (auto fault = CheckArray(path, in.count(), ColorBytes(in.color_type()), context.ranges,
+                                &arrays.colors)) {
       return fault;
     }
   }
@@ -217,20 +259,22 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
   out->record.vertex_count = in.count();
   out->record.index_count = in.index_count();
   if (colored) out->record.color_mode = gpu::ColorMode::kPerVertex;
-  absl::StatusOr<gpu::GeometryArrays> arrays =
+  absl::StatusOr<gpu::GeometryArrays> kept =
       gpu::GeometryArrays::Allocate(out->record, context.pool);
-  if (!arrays.ok()) {
+  if (!kept.ok()) {
     return Fault{FieldPath(path, "positions").ToString(), Reason::kQuotaExceeded,
-                 absl::StrCat("cannot be kept: ", arrays.status().message())};
+                 absl::StrCat("cannot be kept: ", kept.status().message())};
   }
-  out->arrays = *std::move(arrays);
-  if (auto fault = ToPositions(path, in.position_type(), payloads.positions, out)) return fault;
-  if (auto fault = ToIndices(path, in.index_type(), payloads.indices, in.count(),
+  out->arrays = *std::move(kept);
+  if (auto fault = ToPositions(path, in.position_type(), arrays.positions.payload, out)) {
+    return fault;
+  }
+  if (auto fault = ToIndices(path, in.index_type(), arrays.indices.payload, in.count(),
                              out->arrays.writable_indices())) {
     return fault;
   }
   if (colored) {
-    CopyColors(payloads.colors, ColorBytes(in.color_type()), out->arrays.writable_colors());
+    CopyColors(arrays.colors.payload, ColorBytes(in.color_type()), out->arrays.writable_colors());
   }
   return {};
 }

@@ -12,7 +12,8 @@ namespace voxeld::daemon::wire {
 
 // Fills counts, arrays, colour mode and bounds of `out`. Every size is compared in 64 bits before a
 // byte is read; then each payload is read once, converted and checked on its way into
-// `context.pool`. `with_indices` false: indices are refused.
+// `context.pool`. `with_indices` false: indices are refused. Payloads may lie in
+// `context.ranges` instead.
 MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_indices,
                       const DecodeContext& context, GeometryData* out);
 

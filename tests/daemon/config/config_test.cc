@@ -152,6 +152,11 @@ const Case kCases[] = {
     {"listen_item", "[server]\nlisten = [\"127.0.0.1:1\", 3]\n", "t:2:26: ", "addresses as text"},
     {"listen_address", "[server]\nlisten = [\"nowhere\"]\n", "t:2:11: ", "has no port"},
     {"http", "[server]\nhttp = \"127.0.0.1\"\n", "t:2:8: ", "has no port"},
+    {"local_type", "[server]\nlocal_socket = false\n", "t:2:16: ", "give text in quotes"},
+    {"local_tcp", "[server]\nlocal_socket = \"127.0.0.1:1\"\n",
+     "t:2:16: ", "server.local_socket is refused: \"127.0.0.1:1\" is no path of a unix socket"},
+    {"local_relative", "[server]\nlocal_socket = \"unix:here\"\n", "t:2:16: ", "absolute path"},
+    {"local_word", "[server]\nlocal_socket = \"off\"\n", "t:2:16: ", "\"\" for none"},
     {"display_type", "display = 3\n", "t:1:11: ", "write [[display]]"},
     {"display_table", "[display]\nname = \"a\"\n", "t:1:1: ", "write [[display]]"},
     {"display_nameless", "\n[[display]]\ndriver = \"d\"\n", "t:2:1: ", "a display without name"},
@@ -176,6 +181,33 @@ TEST_P(WrongConfig, SaysWhereAndWhat) {
 
 INSTANTIATE_TEST_SUITE_P(File, WrongConfig, ::testing::ValuesIn(kCases),
                          [](const auto& info) { return std::string(info.param.name); });
+
+TEST(ConfigText, WhereTheLocalSocketIs) {
+  const auto where = [](std::vector<std::string> listen, const std::string& text) -> std::string {
+    Config config;
+    const absl::Status status = ReadConfigText(text, "t", &config);
+    EXPECT_TRUE(status.ok()) << status;
+    for (const std::string& address : listen) {
+      config.server.listen.push_back(*ParseAddress(address));
+    }
+    const auto local = LocalSocketAddress(config.server);
+    EXPECT_TRUE(local.ok()) << local.status();
+    return local.ok() && local->has_value() ? (*local)->ToString() : "";
+  };
+  const std::string tcp = "127.0.0.1:1";
+  EXPECT_EQ(where({tcp, "unix:/run/a.sock", "unix:/run/b.sock"}, ""), "unix:/run/a.sock.local");
+  EXPECT_EQ(where({tcp}, ""), "");
+  EXPECT_EQ(where({"unix:/" + std::string(102, 'x')}, ""), "") << "too long with its suffix";
+  EXPECT_EQ(where({"unix:/" + std::string(102, 'x'), "unix:/b"}, ""), "unix:/b.local");
+  EXPECT_EQ(where({"unix:/a"}, "[server]\nlocal_socket = \"\"\n"), "");
+  EXPECT_EQ(where({"unix:/a"}, "[server]\nlocal_socket = \"auto\"\n"), "unix:/a.local");
+  EXPECT_EQ(where({tcp}, "[server]\nlocal_socket = \"/run/c\"\n"), "unix:/run/c");
+  EXPECT_EQ(where({tcp}, "[server]\nlocal_socket = \"unix:/run/c\"\n"), "unix:/run/c");
+  ServerConfig same;
+  same.listen = {*ParseAddress("unix:/a")};
+  same.local_socket = "/a";
+  EXPECT_TRUE(absl::IsInvalidArgument(LocalSocketAddress(same).status()));
+}
 
 TEST(ConfigText, TellsEveryFault) {
   Config config;

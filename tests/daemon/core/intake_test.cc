@@ -33,7 +33,7 @@ class IntakeTest : public ::testing::Test {
   void Take(uint64_t bytes, Ops... ops) {
     std::vector<Operation> all = testing::Sequence(sequence, std::move(ops)...);
     sequence += all.size();
-    intake->Take({std::move(all), {}, bytes, 1, 2});
+    intake->Take({std::move(all), {}, bytes, 1, 2, local_bytes});
   }
 
   // The layers and ids of what a commit would put.
@@ -60,6 +60,7 @@ class IntakeTest : public ::testing::Test {
   std::shared_ptr<testing::RecordingSink> sink = std::make_shared<testing::RecordingSink>();
   std::optional<Intake> intake;
   uint64_t sequence = 0;
+  uint64_t local_bytes = 0;  // that Take's messages name
   int scheduled = 0;
 };
 
@@ -232,6 +233,63 @@ TEST_F(IntakeTest, ATimedCommitHoldsNoCreditButMemory) {
   EXPECT_GT(budget->used_bytes(Budget::Use::kWaiting), 0u);
   intake->Done(std::move(commit));
   EXPECT_EQ(budget->used_bytes(), 0u);
+}
+
+TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
+  limits.max_message_bytes = 100;
+  local_bytes = 150;
+  Make();
+  for (int i = 0; i < 10; ++i) {
+    Take(1, Put("a", "x"));
+    EXPECT_TRUE(intake->HasRoom()) << "nothing waits before it";
+  }
+  Take(1, EndCommit(1));
+  Take(1, Put("a", "y"), EndCommit(2));
+  local_bytes = 99;
+  Take(1, Put("a", "z"));
+  EXPECT_TRUE(intake->HasRoom()) << "399 bytes of 400";
+  local_bytes = 1;
+  Take(1, Put("a", "z"));
+  EXPECT_FALSE(intake->HasRoom()) << "400 bytes of 400";
+  EXPECT_THAT(sink->credits, IsEmpty()) << "it is no credit";
+
+  WaitingCommit one = Pop();
+  EXPECT_EQ(sink->rooms, 0);
+  intake->Done(std::move(one));
+  EXPECT_EQ(sink->rooms, 1);
+  EXPECT_TRUE(intake->HasRoom());
+  local_bytes = 1000;
+  Take(1, EndCommit(3));
+  EXPECT_FALSE(intake->HasRoom());
+  WaitingCommit two = Pop(), three = Pop();
+  intake->Done(std::move(two));
+  EXPECT_FALSE(intake->HasRoom());
+  // One that waits elsewhere for its time gives it back at once, and not a second time.
+  intake->Detach(three);
+  EXPECT_EQ(sink->rooms, 2);
+  intake->Done(std::move(three));
+  local_bytes = 399;
+  Take(1, EndCommit(4));
+  EXPECT_TRUE(intake->HasRoom());
+  local_bytes = 1;
+  Take(1, EndCommit(5));
+  EXPECT_FALSE(intake->HasRoom());
+  EXPECT_EQ(sink->rooms, 2);
+}
+
+TEST_F(IntakeTest, AFrameGivenUpKeepsItsLocalBytesUntilItsCommitIsDone) {
+  limits.max_message_bytes = 100;
+  local_bytes = 200;
+  Make(FlowPolicy::kLatest);
+  for (int i = 0; i < 2; ++i) {
+    Take(1, Begin("a"), Put("a", "x"), End("a"), EndCommit(i));
+  }
+  EXPECT_FALSE(intake->HasRoom());
+  WaitingCommit commit = Pop();
+  EXPECT_EQ(commit.dropped_frames, 1u);
+  EXPECT_FALSE(intake->HasRoom());
+  intake->Done(std::move(commit));
+  EXPECT_EQ(sink->rooms, 1);
 }
 
 TEST_F(IntakeTest, CommitsThatWaitAreLimitedInNumber) {

@@ -183,7 +183,7 @@ TEST(SceneChanges, AnyWatcherComesToAnySnapshot) {
         f.store.RemoveLayers([&](const OwnedName& key, const Layer&) { return key.owner == owner; },
                              random() % 3 == 0);
       } else if (what == 1) {
-        testing::Orphan(f.store, 11 + random() % 4);
+        f.Orphan(11 + random() % 4);
       } else if (what == 2) {
         f.now += random() % 10;
         f.store.Expire(f.now);
@@ -232,12 +232,12 @@ TEST(SceneChanges, CountsAreNoNewsButOrphansAre) {
   watcher.Bring({}, before, f.store.snapshot(), 100, random);
   EXPECT_EQ(watcher.changes_told, 1);  // the entity
   const SnapshotPtr deleted = f.store.snapshot();
-  testing::Orphan(f.store, 11);
+  f.Orphan(11);
   watcher.Bring({}, deleted, f.store.snapshot(), 100, random);
   EXPECT_EQ(watcher.changes_told, 1);
   EXPECT_TRUE((watcher.layers[{1, "a"}].look.orphaned));
   const SnapshotPtr orphaned = f.store.snapshot();
-  testing::Orphan(f.store, 11);
+  f.Orphan(11);
   EXPECT_EQ(f.store.snapshot(), orphaned);
   // Who writes it next makes it theirs.
   f.Commit(MakeAuthor(1, 12), Move("a", "y", Shift(3)));

@@ -11,11 +11,6 @@
 
 namespace voxeld::daemon::testing {
 
-// The session's layers stay without it.
-inline void Orphan(SceneStore& store, uint64_t session) {
-  store.HandOver(session, std::make_shared<const Writer>(Writer{session, "client", true}));
-}
-
 inline Author MakeAuthor(uint64_t owner, uint64_t session) {
   return {owner, std::make_shared<const Writer>(Writer{session, "client"})};
 }
@@ -35,6 +30,10 @@ class StoreFixture {
   template <typename... Ops>
   CommitResult Commit(Ops... ops) {
     return Commit(me, std::move(ops)...);
+  }
+  // As when a session has ended: the layers that it last wrote are orphaned.
+  void Orphan(uint64_t session) {
+    store.HandOver(session, std::make_shared<const Writer>(Writer{session, "client", true}));
   }
   CommitResult CommitAll(const Author& author, std::vector<Operation> all) {
     std::vector<Issue> alone;

@@ -44,12 +44,18 @@ Daemon::Daemon(DaemonOptions options)
   }
   const absl::Status started = core_->Start();
   EXPECT_TRUE(started.ok()) << started;
+  std::optional<local::LocalSocketOptions> local;
+  if (options.local_socket) {
+    local = {.listen = *ParseAddress(target_ + ".local"),
+             .limits = {.max_bytes = options.limits.max_local_bytes}};
+  }
   auto server = Server::Start(*core_, clock_,
                               {.listen = {*ParseAddress(target_)},
                                .version = "9.8.7",
                                .streams = {.drain_limit_ns = options.drain_limit_ns,
                                            .max_queued_answers = options.max_queued_answers},
-                               .max_scene_watches = options.max_scene_watches});
+                               .max_scene_watches = options.max_scene_watches,
+                               .local = local});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);
   channel_ = NewChannel();

@@ -89,7 +89,7 @@ class RandomWatches {
         f_.store.Expire(f_.now);
         break;
       case 2:
-        testing::Orphan(f_.store, 11 + random_() % 2);
+        f_.Orphan(11 + random_() % 2);
         break;
       default:
         Commit();

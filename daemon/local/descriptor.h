@@ -1,0 +1,29 @@
+// A file descriptor that is closed by whoever owns it.
+#pragma once
+
+#include <unistd.h>
+
+#include <utility>
+
+namespace voxeld::daemon::local {
+
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+
+  int get() const { return fd_; }  // negative: none
+
+ private:
+  int fd_ = -1;
+};
+
+}  // namespace voxeld::daemon::local
