@@ -25,7 +25,14 @@ std::optional<int64_t> LeastOffset(std::optional<int64_t> before, sync::TimeNs e
 }  // namespace
 
 void Core::Impl::PostTurn(SessionId id) {
-  loop_->Post([this, id] { Turn(id); });
+  const auto it = sessions_.find(id);
+  if (it == sessions_.end() || std::exchange(it->second.turn_posted, true)) return;
+  loop_->Post([this, id] {
+    if (const auto session = sessions_.find(id); session != sessions_.end()) {
+      session->second.turn_posted = false;
+    }
+    Turn(id);
+  });
 }
 
 bool Core::Impl::MustWait(const Session& session) const {
@@ -72,13 +79,14 @@ bool Core::Impl::PutAside(Session& session, WaitingCommit& commit) {
   const Limits& limits = options_.limits;
   const sync::TimeNs now = clock_.Now();
   commit.late = at < now;
-  const sync::TimeNs due = DueTime(at);
+  const bool beyond = at > now && at - now > limits.max_present_at_horizon_ns;
+  const sync::TimeNs due = beyond ? at : DueTime(at);
   if (due <= now) return false;
 
   Issue issue;
   issue.sequence = commit.sequence;
   issue.field = "commit.present_at_ns";
-  if (at - now > limits.max_present_at_horizon_ns) {
+  if (beyond) {
     issue.reason = Reason::kOutOfRange;
     issue.message = absl::StrFormat(
         "present_at_ns is %d, which is %d ns ahead by the server's clock; "
@@ -95,6 +103,8 @@ bool Core::Impl::PutAside(Session& session, WaitingCommit& commit) {
   }
   if (!issue.message.empty()) {
     commit.refusals.Tell(issue, session.sink.get(), limits.max_issues_per_commit);
+    commit.refusals.TellOfThoseLeftOut(commit.sequence, session.sink.get(),
+                                       limits.max_issues_per_commit);
     RefuseCommit(session, commit, commit.refusals.refused() + commit.operations.size(),
                  absl::StrFormat("nothing of the commit was applied: %s", issue.message));
     session.intake->Done(std::move(commit));
@@ -236,8 +246,12 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   operations_refused_ += result.refused_operations;
   ++commits_accepted_;
   operations_applied_ += result.applied_operations;
-  session.last_frame_id = commit.commit.frame_id;
-  session.last_sequence = commit.sequence;
+  // Timed ones may come after later ones.
+  if (!session.applied_any || commit.sequence > session.last_sequence) {
+    session.last_frame_id = commit.commit.frame_id;
+    session.last_sequence = commit.sequence;
+  }
+  session.applied_any = true;
   stages.applied_ns = clock_.Now();
   if (stages.received_ns != 0) {
     if (stages.sent_ns != 0) sending_.Add(now, stages.received_ns - stages.sent_ns);
@@ -267,14 +281,15 @@ void Core::Impl::Ride(Session& session, const WaitingCommit& commit, const Stage
   published_ = store_.snapshot();
   budget_->Set(Budget::Use::kScene, published_->total.bytes);
   if (commit.commit.must_show && !displays_.empty() && !session.closing) {
-    Hold& hold = session.hold.emplace();
+    session.hold = Hold();
+    Hold& hold = *session.hold;
     hold.sequence = commit.sequence;
     hold.deadline = clock_.Now() + options_.limits.must_show_timeout_ns;
     for (const auto& slot : displays_) hold.displays.insert(slot->info.name);
     holding_.insert(session.id);
   }
-  const Rider rider{session.id, commit.commit.frame_id, commit.sequence,
-                    !session.options.no_outcomes, stages};
+  const Rider rider{session.id,          commit.commit.frame_id,       commit.sequence,
+                    session.incarnation, !session.options.no_outcomes, stages};
   session.owed_outcomes += displays_.size();
   budget_->ChargeAnyway(Budget::Use::kOwed, displays_.size() * kOwedBytes);
   for (const auto& slot : displays_) {

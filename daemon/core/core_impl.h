@@ -100,6 +100,8 @@ class Core::Impl {
     std::optional<int64_t> clock_offset_ns;
     sync::TimeNs clock_offset_at = 0;
     std::optional<uint64_t> last_frame_id, last_sequence;  // applied
+    bool applied_any = false;                              // by this incarnation
+    bool turn_posted = false;
     bool closing = false;
     std::deque<Receipt> undelivered;  // outcomes for whom its client is gone; charged to kOwed
     std::vector<std::function<void()>> when_closed;
@@ -176,6 +178,8 @@ class Core::Impl {
   // Drops the objects of an owner who has neither session nor layers, and the owner when nothing is left at all.
   void ForgetOwner(uint64_t owner);
   bool OwnerIsOpen(uint64_t owner) const;
+  bool HasLayers(SessionId session) const;  // that it last wrote
+  absl::Status TooManySessions() const;
 
   // ---- commits (commits.cc)
   // Applies one commit of the session's, if it may have one, and asks for the next turn.

@@ -214,7 +214,7 @@ void Intake::GiveUpFrames(uint64_t number) {
   std::vector<std::pair<std::string, FrameRef>> ended;
   for (const Operation& operation : commit.operations) {
     if (const auto* begin = std::get_if<FrameBegin>(&operation.op)) {
-      begun[begin->layer] = operation.sequence;
+      begun.try_emplace(begin->layer, operation.sequence);  // the applier keeps the first, too
     } else if (const auto* end = std::get_if<FrameEnd>(&operation.op)) {
       const auto it = begun.find(end->layer);
       if (it == begun.end()) continue;
@@ -243,7 +243,9 @@ void Intake::DropFrame(const std::string& layer, const FrameRef& frame) {
   uint64_t bytes = 0, credit = 0;
   for (size_t i = 0; i < commit.operations.size(); ++i) {
     Operation& operation = commit.operations[i];
-    const bool of_layer = NamesIn(operation).first == layer;
+    // What a layer is like stays, wherever it is said.
+    const bool of_layer =
+        !std::holds_alternative<LayerState>(operation.op) && NamesIn(operation).first == layer;
     if (!over && operation.sequence == frame.begin_sequence &&
         std::holds_alternative<FrameBegin>(operation.op)) {
       inside = true;

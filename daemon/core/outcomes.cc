@@ -12,7 +12,8 @@ void Core::Impl::DeliverOutcome(const Rider& rider, const CommitOutcome& outcome
     Session& session = it->second;
     const bool waited = MustWait(session);
     --session.owed_outcomes;
-    if (session.hold.has_value() && session.hold->sequence == rider.sequence) {
+    if (session.hold.has_value() && session.incarnation == rider.incarnation &&
+        session.hold->sequence == rider.sequence) {
       session.hold->displays.erase(outcome.display);
       if (session.hold->displays.empty()) ReleaseHold(session);
     }
@@ -25,6 +26,7 @@ void Core::Impl::DeliverOutcome(const Rider& rider, const CommitOutcome& outcome
   receipt.frame_id = rider.frame_id;
   receipt.sequence = rider.sequence;
   receipt.what = outcome;
+  receipt.incarnation = rider.incarnation;
   Deliver(rider.session, receipt);
 }
 
@@ -39,7 +41,9 @@ void Core::Impl::Deliver(SessionId id, const Receipt& receipt) {
 void Core::Impl::GiveBack(SessionId id, const Receipt& receipt) {
   if (!std::holds_alternative<CommitOutcome>(receipt.what)) return;
   const auto live = sessions_.find(id);
-  if (live != sessions_.end() && live->second.sink != nullptr) {  // taken up meanwhile
+  // Taken up meanwhile; its own stream's end may still be on its way, and would bounce it back.
+  if (live != sessions_.end() && live->second.sink != nullptr &&
+      live->second.incarnation != receipt.incarnation) {
     return live->second.sink->OnReceipt(receipt);
   }
   const auto kept = dormant_.find(id);

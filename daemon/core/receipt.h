@@ -59,6 +59,7 @@ struct Receipt {
   uint64_t frame_id = 0;
   uint64_t sequence = 0;
   std::variant<Accepted, Refused, CommitOutcome, Scheduled> what;
+  uint64_t incarnation = 0;  // of the session that sent the commit
 };
 
 }  // namespace voxeld::daemon

@@ -17,11 +17,15 @@ sync::TimeNs After(sync::TimeNs now, sync::TimeNs delay) {
 
 }  // namespace
 
+absl::Status Core::Impl::TooManySessions() const {
+  return absl::ResourceExhaustedError(
+      absl::StrFormat("%d sessions are open, which is max_sessions; close one first",
+                      options_.limits.max_sessions));
+}
+
 absl::StatusOr<Core::Impl::Session> Core::Impl::NewSession(const OpenOptions& options) {
   if (sessions_.size() >= options_.limits.max_sessions) {
-    return absl::ResourceExhaustedError(
-        absl::StrFormat("%d sessions are open, which is max_sessions; close one first",
-                        options_.limits.max_sessions));
+    return TooManySessions();
   }
   Session session;
   if (options.owner_token.empty()) {
@@ -54,6 +58,9 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& option
         "without it, and send again what should be in the scene");
   }
   const SessionId id = token->second;
+  if (!sessions_.contains(id) && sessions_.size() >= options_.limits.max_sessions) {
+    return TooManySessions();
+  }
   if (const auto live = sessions_.find(id); live != sessions_.end()) {
     // Whatever its stream had sent counts first.
     Session& session = live->second;
@@ -103,7 +110,7 @@ absl::StatusOr<SessionInfo> Core::Impl::OpenSession(OpenOptions options, uint64_
   resume_tokens_.emplace(session.resume_token, session.id);
   session.intake = std::make_shared<Intake>(
       options_.limits, budget_, bytes_in_, session.options, open_bytes, sink,
-      [this, loop = loop_, id = session.id] { loop->Post([this, id] { Turn(id); }); });
+      [this, loop = loop_, id = session.id] { loop->Post([this, id] { PostTurn(id); }); });
 
   SessionInfo info;
   info.session = session.id;
@@ -157,17 +164,15 @@ void Core::Impl::FinishClose(SessionId id) {
     case DisconnectPolicy::kClear:
       break;
     case DisconnectPolicy::kLinger:
-      if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
-          tally != nullptr && tally->layers > 0) {
+      if (HasLayers(id)) {
+        std::erase_if(lingering_,
+                      [this](const auto& entry) { return !HasLayers(entry.second.session); });
         layers_until = After(now, std::max<int64_t>(0, session.options.linger_ns));
         lingering_.emplace(layers_until, Lingering{id, session.owner});
       }
       break;
     case DisconnectPolicy::kKeep:
-      if (const OwnerTally* tally = store_.snapshot()->owners.Find(session.owner);
-          tally != nullptr && tally->layers > 0) {
-        layers_until = sync::kNever;
-      }
+      if (HasLayers(id)) layers_until = sync::kNever;
       break;
   }
   if (layers_until > now) {
@@ -219,6 +224,14 @@ void Core::Impl::EndDormant(SessionId id) {
   budget_->Release(Budget::Use::kOwed, dormant.outcomes.size() * kOwedBytes);
   resume_tokens_.erase(dormant.resume_token);
   ForgetOwner(dormant.owner);
+}
+
+bool Core::Impl::HasLayers(SessionId session) const {
+  bool any = false;
+  store_.snapshot()->layers.ForEach([&](const OwnedName&, const LayerPtr& layer) {
+    any = any || layer->writer->session == session;
+  });
+  return any;
 }
 
 bool Core::Impl::OwnerIsOpen(uint64_t owner) const {

@@ -62,6 +62,7 @@ void Core::Impl::EndSessions() {
           "the daemon has stopped; what it had not answered was not applied"));
     }
     session.intake->Close();
+    for (const std::function<void()>& done : std::exchange(session.when_closed, {})) done();
   }
 }
 

@@ -32,8 +32,9 @@ struct Rider {
   uint64_t session = 0;
   uint64_t frame_id = 0;
   uint64_t sequence = 0;
-  bool asked = true;  // its client wants the outcomes
-  Stages stages;      // up to applied_ns
+  uint64_t incarnation = 0;  // of the session; sequences begin anew with each
+  bool asked = true;         // its client wants the outcomes
+  Stages stages;             // up to applied_ns
 };
 
 class RiderBook {

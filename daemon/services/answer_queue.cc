@@ -28,7 +28,11 @@ size_t AnswerQueue::BytesOf(const Receipt& receipt) {
 template <typename T>
 bool AnswerQueue::AddAnswer(T answer) {
   const size_t bytes = BytesOf(answer);
-  if (!budget_->Charge(Budget::Use::kAnswers, bytes)) return false;
+  if (bytes_ + bytes <= kAlwaysBytes) {
+    budget_->ChargeAnyway(Budget::Use::kAnswers, bytes);
+  } else if (!budget_->Charge(Budget::Use::kAnswers, bytes)) {
+    return false;
+  }
   bytes_ += bytes;
   answers_.emplace_back(std::move(answer));
   return true;

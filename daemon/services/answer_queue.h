@@ -28,7 +28,7 @@ class AnswerQueue {
 
   // A serialised StreamResponse with nothing but Opened; it goes alone and first.
   void AddOpened(std::string message) { opened_ = std::move(message); }
-  // False: the budget is used up, and the answer is dropped.
+  // False: the budget is used up, much waits here already, and the answer is dropped.
   [[nodiscard]] bool Add(Issue issue);
   [[nodiscard]] bool Add(Receipt receipt);
   // Replaces what was there before: both only grow, or are asked for anew.
@@ -53,6 +53,8 @@ class AnswerQueue {
  private:
   static constexpr size_t kMessageBytes = 64u << 10;
   static constexpr size_t kMostPongs = 16;
+  // A client that reads is told, whatever others have used up.
+  static constexpr size_t kAlwaysBytes = 64u << 10;
   using Answer = std::variant<Issue, Receipt>;
   struct PongDue {
     int64_t client_time_ns = 0;

@@ -242,7 +242,9 @@ void StreamSession::CloseSession() {
     incarnation = incarnation_;
     gone = cancelled_ || state_ == State::kFinished;
     if (gone) undelivered = answers_.TakeOutcomes();
-    if (!std::exchange(logged_end_, true) && session != 0 && context_.log != nullptr) {
+    // Without a port the context may be gone.
+    if (!std::exchange(logged_end_, true) && session != 0 && port_ != nullptr &&
+        context_.log != nullptr) {
       context_.log->Info("session closed", {{"session", std::to_string(session)},
                                             {"client", client_name_},
                                             {"why", end_.ToString()}});
@@ -283,23 +285,31 @@ bool StreamSession::Listening() const {
 
 template <typename Answer>
 void StreamSession::Tell(const Answer& answer) {
-  bool close = false;
+  bool close = false, lost = false;
+  SessionId session = 0;
   {
     sync::MutexLock lock(mutex_);
+    session = session_;
     if constexpr (std::is_same_v<Answer, Receipt>) {
       if (std::holds_alternative<CommitOutcome>(answer.what)) {
-        if (outcomes_owed_ > 0) --outcomes_owed_;
+        // One of a former stream's was never counted here.
+        if (answer.incarnation == incarnation_ && outcomes_owed_ > 0) --outcomes_owed_;
       } else if (!std::holds_alternative<Scheduled>(answer.what)) {
         if (unanswered_ > 0) --unanswered_;
         const auto* accepted = std::get_if<Accepted>(&answer.what);
         if (accepted != nullptr) outcomes_owed_ += accepted->displays.size();
       }
     }
-    const bool added = !Listening() || answers_.Add(answer);
+    const bool listening = Listening();
+    const bool added = !listening || answers_.Add(answer);
+    lost = !listening || !added;
     WriteNext();
     close = Overrun(added) || Drained();
   }
   if (close) CloseSession();
+  if constexpr (std::is_same_v<Answer, Receipt>) {
+    if (lost && session != 0) core_.GiveBack(session, {answer});
+  }
 }
 
 void StreamSession::OnIssue(const Issue& issue) { Tell(issue); }
@@ -322,9 +332,8 @@ bool StreamSession::Overrun(bool added) {
   if (!ending_) {
     ending_ = true;
     end_ = absl::ResourceExhaustedError(absl::StrCat(
-        "the client left more than ", answers_.size() - 1, " answers (", answers_.bytes(),
-        " bytes) unread", added ? "" : ", and max_memory_bytes is used up",
-        "; read the stream while writing to it"));
+        "the client left ", answers_.size(), " answers (", answers_.bytes(), " bytes) unread",
+        added ? "" : ", and max_memory_bytes is used up", "; read the stream while writing to it"));
   }
   Finish();
   return true;

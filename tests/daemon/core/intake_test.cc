@@ -131,6 +131,16 @@ TEST_F(IntakeTest, LatestKeepsTheNewestFrameOfEachLayerAndAllElse) {
   EXPECT_EQ(four.dropped_frames, 0u);
 }
 
+TEST_F(IntakeTest, WhatALayerIsLikeStaysWhereverItIsSaid) {
+  Make(FlowPolicy::kLatest);
+  Take(10, Begin("f"), testing::SetLayer("f", false), Put("f", "1"), End("f"), EndCommit(1));
+  Take(10, Begin("f"), Put("f", "2"), End("f"), EndCommit(2));
+  const WaitingCommit one = Pop();
+  ASSERT_EQ(one.operations.size(), 1u);
+  EXPECT_TRUE(std::holds_alternative<LayerState>(one.operations[0].op));
+  EXPECT_THAT(Puts(Pop()), ElementsAre("f/2"));
+}
+
 TEST_F(IntakeTest, CreditOfAFrameGivenUpReturnsAtOnce) {
   Make(FlowPolicy::kLatest);
   Take(900, Begin("f"), Put("f", "1"), End("f"), EndCommit(1));
