@@ -52,6 +52,7 @@ std::vector<double> TimeCalls(v1::DisplayService::Stub& stub, steady_clock::time
       continue;
     }
     times.push_back(std::chrono::duration<double, std::milli>(steady_clock::now() - begin).count());
+    // The measured client's pace; nothing is waited for.
     std::this_thread::sleep_until(begin + kBetweenCalls);
   }
   std::sort(times.begin(), times.end());
@@ -87,6 +88,7 @@ Json RunOne(Attack attack, const Options& options) {
   std::thread watch([&] {
     while (!done) {
       most_kib = std::max(most_kib, ResidentKib(daemon.process().pid()));
+      // Between two samples of the memory; nothing is waited for.
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   });
