@@ -226,21 +226,15 @@ class FewDescriptors {
 TEST_F(ListenerTest, AcceptsAgainWhenDescriptorsComeBack) {
   const std::vector<SocketName> names = Start("127.0.0.1:0");
   constexpr size_t kClients = 6;
-  std::vector<Descriptor> clients;
-  for (size_t i = 0; i < kClients; ++i) {
-    clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  }
   for (int cycle = 1; cycle <= 3; ++cycle) {
+    std::vector<Descriptor> clients;
+    for (size_t i = 0; i < kClients; ++i) {
+      clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    }
     {
       const FewDescriptors few(5);  // two connections of two, and an odd one
       const uint64_t failures = counters_.Read().accept_failures;
       for (Descriptor& client : clients) {
-        if (cycle > 1) {
-          const int number = client.get();
-          client.Reset(-1);
-          client.Reset(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-          ASSERT_EQ(client.get(), number);
-        }
         connect(client.get(), names[0].get(), names[0].length);
       }
       ASSERT_TRUE(Await([&] { return counters_.Read().accept_failures > failures; }));
