@@ -17,6 +17,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "absl/synchronization/mutex.h"
 #include "daemon/config/config.h"
 #include "daemon/config/display_view.h"
 #include "daemon/core/core.h"
@@ -259,6 +260,8 @@ int Main(int argc, char** argv) {
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
 
   RaiseDescriptorLimit();
+  // Distributions build Abseil with its search for deadlocks on, which gRPC would do for each message.
+  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   umask(0007);  // sockets are for the user and the group from the moment that they exist
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;

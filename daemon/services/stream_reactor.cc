@@ -7,14 +7,38 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "absl/container/inlined_vector.h"
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/services/stream_session.h"
 
 namespace voxeld::daemon::services {
 namespace {
+
+class Received final : public ReceivedMessage {
+ public:
+  // False if it cannot be decompressed. `bytes` is left empty.
+  bool Take(grpc::ByteBuffer& bytes) {
+    slices_.resize(1);
+    const bool single = bytes.TrySingleSlice(&slices_[0]).ok();
+    if (!single && !bytes.Dump(&slices_).ok()) return false;
+    bytes.Clear();
+    views_.reserve(slices_.size());
+    for (const grpc::Slice& slice : slices_) {
+      views_.emplace_back(reinterpret_cast<const char*>(slice.begin()), slice.size());
+    }
+    return true;
+  }
+
+  std::span<const std::string_view> slices() const override { return views_; }
+
+ private:
+  std::vector<grpc::Slice> slices_;
+  absl::InlinedVector<std::string_view, 2> views_;
+};
 
 class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                             public StreamPort {
@@ -47,18 +71,11 @@ class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grp
 
   void OnReadDone(bool ok) override {
     if (!ok) return session_->OnReadsDone();
-    std::vector<grpc::Slice> slices;
-    const grpc::Status dumped = incoming_.Dump(&slices);
-    incoming_.Clear();
-    if (!dumped.ok()) {
+    auto message = std::make_unique<Received>();
+    if (!message->Take(incoming_)) {
       return session_->End(absl::InternalError("a message could not be decompressed"));
     }
-    std::vector<std::string_view> views;
-    views.reserve(slices.size());
-    for (const grpc::Slice& slice : slices) {
-      views.emplace_back(reinterpret_cast<const char*>(slice.begin()), slice.size());
-    }
-    session_->OnMessage(views);
+    session_->OnMessage(std::move(message));
   }
 
   void OnWriteDone(bool ok) override {

@@ -18,8 +18,11 @@ void StreamSession::Start() {
 }
 
 void StreamSession::Read() {
-  if (port_ == nullptr || reading_ || reads_done_ || HalfFull()) return;
-  if (state_ != State::kNew && state_ != State::kOpen) return;
+  if (port_ == nullptr || reading_ || reads_done_ || !arrived_.empty() || !room_ || HalfFull()) {
+    return;
+  }
+  // Nothing is read beyond the Open before that is dealt with.
+  if (state_ != State::kOpen && (state_ != State::kNew || taking_)) return;
   reading_ = true;
   port_->Read();
 }
@@ -34,10 +37,46 @@ bool StreamSession::Crowded() const {
   return Listening() && HalfFull();
 }
 
-void StreamSession::OnMessage(std::span<const std::string_view> slices) {
+void StreamSession::OnMessage(std::unique_ptr<const ReceivedMessage> message) {
   Arrival arrival;
   arrival.received_ns = context_.clock.Now();
-  for (const std::string_view slice : slices) arrival.bytes += slice.size();
+  for (const std::string_view slice : message->slices()) arrival.bytes += slice.size();
+  core_.budget()->ChargeAnyway(Budget::Use::kArriving, arrival.bytes);
+  {
+    sync::MutexLock lock(mutex_);
+    reading_ = false;
+    arrived_.push_back({std::move(message), arrival});
+    if (std::exchange(taking_, true)) return;
+  }
+  TakeArrived();
+}
+
+void StreamSession::TakeArrived() {
+  for (;;) {
+    Arrived next;
+    bool close = false;
+    {
+      sync::MutexLock lock(mutex_);
+      taking_ = !arrived_.empty();
+      if (taking_) {
+        next = std::move(arrived_.front());
+        arrived_.pop_front();
+      } else {
+        close = EndOfReads();
+      }
+      Read();
+    }
+    if (next.message == nullptr) {
+      if (close) CloseSession();
+      return;
+    }
+    TakeMessage(next.message->slices(), next.arrival);
+    next.message.reset();
+    core_.budget()->Release(Budget::Use::kArriving, next.arrival.bytes);
+  }
+}
+
+void StreamSession::TakeMessage(std::span<const std::string_view> slices, Arrival arrival) {
   uint64_t previous = 0;
   std::shared_ptr<const wire::MemorySource> memory;
   {
@@ -67,7 +106,6 @@ void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, const Arri
       no_outcomes_ = open.no_outcomes;
       client_name_ = open.client_name;
       state_ = State::kOpening;
-      reading_ = false;
     }
   }
   if (!first) {
@@ -142,19 +180,19 @@ void StreamSession::TakeOperations(wire::Decoded decoded, const Arrival& arrival
     return End(absl::FailedPreconditionError(
         "the first message of a stream must be open; the operation was not carried out"));
   }
+  room_ = false;  // until it is known; a call of OnRoom from now on is the last word
   intake->Take({.operations = std::move(decoded.operations),
                 .refused = std::move(decoded.refused),
                 .bytes = arrival.bytes,
                 .received_ns = arrival.received_ns,
                 .decoded_ns = arrival.decoded_ns,
                 .local_bytes = decoded.local_bytes});
-  // Only now: a message that came in on another thread would overtake this one.
-  if (intake->HasRoom()) OnRoom();
+  if (intake->HasRoom()) room_ = true;
 }
 
 void StreamSession::OnRoom() {
+  room_ = true;
   sync::MutexLock lock(mutex_);
-  reading_ = false;
   Read();
 }
 
@@ -164,16 +202,21 @@ void StreamSession::OnReadsDone() {
     sync::MutexLock lock(mutex_);
     reading_ = false;
     reads_done_ = true;
-    if (state_ == State::kNew) {
-      close = Close(absl::FailedPreconditionError(
-          "the stream ended before its first message, which must be open"));
-    } else if (state_ == State::kOpen) {
-      state_ = State::kDraining;
-      if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);
-      close = Drained();
-    }
+    close = EndOfReads();
   }
   if (close) CloseSession();
+}
+
+bool StreamSession::EndOfReads() {
+  if (!reads_done_ || taking_) return false;
+  if (state_ == State::kNew) {
+    return Close(absl::FailedPreconditionError(
+        "the stream ended before its first message, which must be open"));
+  }
+  if (state_ != State::kOpen) return false;
+  state_ = State::kDraining;
+  if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);
+  return Drained();
 }
 
 bool StreamSession::Drained() {

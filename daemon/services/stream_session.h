@@ -3,8 +3,8 @@
 //
 //   first message         Open, answered by Opened
 //   Ping                  answered at once
-//   every other           decoded and handed to the session's intake; the next is read while that has
-//                         room and the client reads its answers
+//   every other           decoded and handed to the session's intake, one after another; meanwhile the next
+//                         is read, if that has room and the client reads its answers
 //   half-close            waits (drain_limit_ns at most) until every commit has its answer and its
 //                         outcomes, closes the session, writes what is queued, ends with OK
 //   End, bad bytes        closes the session, writes what is queued (drain_limit_ns at most), ends
@@ -15,10 +15,13 @@
 //   taken up by another   ends with ABORTED; likewise when an operator evicts its owner
 //
 // Thread-safe. Lock order: the intake's, then the session's; so the intake is not called with the session's lock
-// held. The port's events come one after another for reads and for writes, as gRPC has it.
+// held. The port's events come one after another for reads and for writes, as gRPC has it; that for the next read
+// may come on another thread while this one's message is still being decoded.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <string>
@@ -35,12 +38,19 @@
 
 namespace voxeld::daemon::services {
 
+// One message, as long as this lives.
+class ReceivedMessage {
+ public:
+  virtual ~ReceivedMessage() = default;
+  virtual std::span<const std::string_view> slices() const = 0;
+};
+
 // The transport of one stream. No call answers from within itself. Called with the session's lock
 // held, and never after OnPortDone.
 class StreamPort {
  public:
   virtual ~StreamPort() = default;
-  virtual void Read() = 0;  // then OnMessage, OnReadsDone or OnCancel; one at a time
+  virtual void Read() = 0;  // then OnMessage or OnReadsDone; one at a time
   virtual void Write(const std::string& message) = 0;   // then OnWritten; one at a time
   virtual void Finish(const absl::Status& status) = 0;  // once, and last
   virtual void SetAlarm(sync::TimeNs delay) = 0;  // then OnAlarm; replaces one that was set before
@@ -57,7 +67,7 @@ class StreamSession final : public SessionSink,
   void Start();
 
   // ---- from the port
-  void OnMessage(std::span<const std::string_view> slices);
+  void OnMessage(std::unique_ptr<const ReceivedMessage> message);
   void OnReadsDone();  // half-closed, or broken: then OnCancel comes too
   void OnWritten(bool ok);
   void OnCancel();
@@ -91,7 +101,14 @@ class StreamSession final : public SessionSink,
     uint64_t bytes = 0;
     sync::TimeNs received_ns = 0, decoded_ns = 0;
   };
+  struct Arrived {
+    std::unique_ptr<const ReceivedMessage> message;
+    Arrival arrival;
+  };
 
+  // Decodes what has arrived, in order, until nothing is left. On one thread at a time.
+  void TakeArrived();
+  void TakeMessage(std::span<const std::string_view> slices, Arrival arrival);
   void TakeOpen(OpenOptions open, wire::Decoded decoded, const Arrival& arrival);
   void TakeOperations(wire::Decoded decoded, const Arrival& arrival);
   void OnOpened(const absl::StatusOr<SessionInfo>& info);
@@ -103,6 +120,7 @@ class StreamSession final : public SessionSink,
   template <typename Answer>
   void Tell(const Answer& answer);
   // These return whether the caller must call CloseSession() once it has released the lock.
+  [[nodiscard]] bool EndOfReads() VOXELD_REQUIRES(mutex_);
   [[nodiscard]] bool Overrun(bool added) VOXELD_REQUIRES(mutex_);
   [[nodiscard]] bool Drained() VOXELD_REQUIRES(mutex_);
   [[nodiscard]] bool Close(const absl::Status& status) VOXELD_REQUIRES(mutex_);
@@ -113,6 +131,7 @@ class StreamSession final : public SessionSink,
 
   ServiceContext& context_;  // there as long as the port is
   Core& core_;
+  std::atomic<bool> room_ = true;  // in the intake; false also while that is being found out
   mutable sync::Mutex mutex_;
   StreamPort* port_ VOXELD_GUARDED_BY(mutex_);
   State state_ VOXELD_GUARDED_BY(mutex_) = State::kNew;
@@ -122,8 +141,9 @@ class StreamSession final : public SessionSink,
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
   local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until CloseSession
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
-  // A read is pending, or what it brought has not been handed to the intake, or that has no room.
-  bool reading_ VOXELD_GUARDED_BY(mutex_) = false;
+  bool reading_ VOXELD_GUARDED_BY(mutex_) = false;         // a read is pending
+  std::deque<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, not decoded
+  bool taking_ VOXELD_GUARDED_BY(mutex_) = false;          // a thread is in TakeArrived
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;
   uint64_t unanswered_ VOXELD_GUARDED_BY(mutex_) = 0;  // commits without Accepted or Refused

@@ -11,11 +11,12 @@ constexpr sync::TimeNs kTakeLimit = 60 * sync::kSecond;
 
 class DaemonFeed final : public Feed {
  public:
-  DaemonFeed(Loop& loop, const std::string& target, Frames frames)
+  DaemonFeed(Loop& loop, const std::string& target, Frames frames, Flush flush)
       : loop_(loop),
         connection_(target),
         session_(loop, connection_, OpenAsked()),
-        sender_(session_, std::move(frames), FrameSender::WhenBehind::kWait) {}
+        sender_(session_, std::move(frames), FrameSender::WhenBehind::kWait,
+                flush == Flush::kEachFrame) {}
 
   absl::Status WaitOpened() { return session_.WaitOpened(); }
 
@@ -59,8 +60,8 @@ class DaemonFeed final : public Feed {
 
 class SinkFeed final : public Feed {
  public:
-  SinkFeed(Loop& loop, const std::string& target, Frames frames)
-      : loop_(loop), connection_(target), frames_(std::move(frames)) {}
+  SinkFeed(Loop& loop, const std::string& target, Frames frames, Flush flush)
+      : loop_(loop), connection_(target), frames_(std::move(frames)), flush_(flush) {}
 
   absl::StatusOr<Fed> Round(sync::TimeNs duration) override {
     Fed fed;
@@ -78,7 +79,7 @@ class SinkFeed final : public Feed {
       part = commit ? 0 : part + 1;
       if (commit) ++fed.frames;
       fed.bytes += message.bytes();
-      call->Write(message, !commit);
+      call->Write(message, !commit && flush_ == Flush::kEachFrame);
     };
     call = std::make_unique<Call>(
         loop_, connection_, "/voxeld.v1.SceneService/Stream",
@@ -106,19 +107,20 @@ class SinkFeed final : public Feed {
   Loop& loop_;
   Connection connection_;
   const Frames frames_;
+  const Flush flush_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const std::string& target,
-                                                 Frames frames) {
-  auto feed = std::make_unique<DaemonFeed>(loop, target, std::move(frames));
+                                                 Frames frames, Flush flush) {
+  auto feed = std::make_unique<DaemonFeed>(loop, target, std::move(frames), flush);
   if (absl::Status opened = feed->WaitOpened(); !opened.ok()) return opened;
   return feed;
 }
 
-std::unique_ptr<Feed> FeedSink(Loop& loop, const std::string& target, Frames frames) {
-  return std::make_unique<SinkFeed>(loop, target, std::move(frames));
+std::unique_ptr<Feed> FeedSink(Loop& loop, const std::string& target, Frames frames, Flush flush) {
+  return std::make_unique<SinkFeed>(loop, target, std::move(frames), flush);
 }
 
 }  // namespace voxeld::bench

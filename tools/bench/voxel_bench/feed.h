@@ -24,6 +24,12 @@ struct Fed {
 
 using Frames = std::vector<std::vector<Message>>;
 
+// When what is written goes to the transport.
+enum class Flush : uint8_t {
+  kEachFrame,  // with the commit, or once gRPC's buffers are full: all but the last say that more follows
+  kEachMessage,  // at once, as gRPC writes when it is not told otherwise
+};
+
 class Feed {
  public:
   virtual ~Feed() = default;
@@ -33,8 +39,8 @@ class Feed {
 
 // One session for all rounds, so that after the first frame everything is replaced.
 absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const std::string& target,
-                                                 Frames frames);
+                                                 Frames frames, Flush flush);
 // One call a round.
-std::unique_ptr<Feed> FeedSink(Loop& loop, const std::string& target, Frames frames);
+std::unique_ptr<Feed> FeedSink(Loop& loop, const std::string& target, Frames frames, Flush flush);
 
 }  // namespace voxeld::bench

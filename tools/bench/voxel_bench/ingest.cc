@@ -22,7 +22,7 @@ constexpr int kVariants = 2;  // of each frame, so that something changes
 constexpr double kTrySeconds = 0.3;
 constexpr int kTryRounds = 3;
 
-enum class Shape : uint8_t { kBatch, kUpsert, kMemory, kMemoryAgain };
+enum class Shape : uint8_t { kBatch, kUpsert, kUpsertGathered, kMemory, kMemoryAgain };
 
 struct Case {
   const char* name;
@@ -33,8 +33,11 @@ constexpr Case kCases[] = {{"batch_unix", Shape::kBatch, false, false},
                            {"batch_tcp", Shape::kBatch, true, false},
                            {"batch_unix_display", Shape::kBatch, false, true},
                            {"upsert_unix", Shape::kUpsert, false, false},
+                           {"upsert_unix_gathered", Shape::kUpsertGathered, false, false},
                            {"memfd", Shape::kMemory, false, false},
                            {"memfd_again", Shape::kMemoryAgain, false, false}};
+
+bool IsUpsert(Shape shape) { return shape == Shape::kUpsert || shape == Shape::kUpsertGathered; }
 
 // All of a frame's entities, or some of them.
 v1::StreamRequest Batch(int variant, int first, int count, LineForm form) {
@@ -114,7 +117,7 @@ class Ingest {
     if (item.display) wanted.displays = {absl::StrCat("sim=simulated,", options_.display)};
     absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(wanted);
     if (!daemon.ok()) return daemon.status();
-    const bool upserts = item.shape == Shape::kUpsert;
+    const bool upserts = IsUpsert(item.shape);
     int batch = options_.batch;
     if (!upserts && batch == 0) {
       if (best_batch_ == 0) {
@@ -146,11 +149,15 @@ class Ingest {
     return absl::OkStatus();
   }
 
+  static Flush FlushOf(const Case& item) {
+    return item.shape == Shape::kUpsert ? Flush::kEachMessage : Flush::kEachFrame;
+  }
+
   absl::StatusOr<std::unique_ptr<Feed>> ToDaemon(const Case& item, const ServerProcess& daemon,
                                                  const Frames& frames) {
     const std::string& target = item.tcp ? daemon.tcp_target() : daemon.unix_target();
-    if (item.shape == Shape::kBatch || item.shape == Shape::kUpsert) {
-      return FeedDaemon(loop_, target, frames);
+    if (item.shape == Shape::kBatch || IsUpsert(item.shape)) {
+      return FeedDaemon(loop_, target, frames, FlushOf(item));
     }
     std::vector<v1::StreamRequest> whole;
     whole.reserve(kVariants);
@@ -188,11 +195,11 @@ class Ingest {
                                   int rounds, double seconds) {
     const auto duration = static_cast<sync::TimeNs>(seconds * sync::kSecond);
     const double items =
-        item.shape == Shape::kUpsert ? double{kEntities} : double{kEntities} * kLinesAnEntity;
+        IsUpsert(item.shape) ? double{kEntities} : double{kEntities} * kLinesAnEntity;
     const absl::StatusOr<std::unique_ptr<Feed>> to_daemon = ToDaemon(item, daemon, frames);
     if (!to_daemon.ok()) return to_daemon.status();
-    const std::unique_ptr<Feed> to_sink =
-        FeedSink(loop_, item.tcp ? sink_->tcp_target() : sink_->unix_target(), frames);
+    const std::unique_ptr<Feed> to_sink = FeedSink(
+        loop_, item.tcp ? sink_->tcp_target() : sink_->unix_target(), frames, FlushOf(item));
     Rates rates;
     const auto round = [&](Feed& feed, std::vector<double>& out) -> absl::StatusOr<Fed> {
       const absl::StatusOr<Fed> fed = feed.Round(duration);

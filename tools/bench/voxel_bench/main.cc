@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "absl/synchronization/mutex.h"
 #include "tools/bench/voxel_bench/command_line.h"
 #include "tools/bench/voxel_bench/report.h"
 #include "tools/bench/voxel_bench/run.h"
@@ -56,6 +57,8 @@ int Main(int argc, char** argv) {
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     std::signal(number, [](int) { interrupted.store(true); });
   }
+  absl::SetMutexDeadlockDetectionMode(
+      absl::OnDeadlockCycle::kIgnore);  // as the daemon; for the sink too
   const GrpcCore core;
   RaiseDescriptorLimit();
   if (const auto* sink = std::get_if<SinkOptions>(&line->command)) {

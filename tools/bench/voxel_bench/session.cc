@@ -114,8 +114,8 @@ uint64_t Session::Commit(sync::TimeNs sent_ns, uint64_t client_drops) {
 // ------------------------------------------------------------------------------------ frame sender
 
 FrameSender::FrameSender(Session& session, std::vector<std::vector<Message>> frames,
-                         WhenBehind when_behind)
-    : session_(session), frames_(std::move(frames)), when_behind_(when_behind) {
+                         WhenBehind when_behind, bool gather)
+    : session_(session), frames_(std::move(frames)), when_behind_(when_behind), gather_(gather) {
   session_.OnReady([this] { Pump(); });
 }
 
@@ -144,7 +144,7 @@ void FrameSender::Pump() {
     }
     const std::vector<Message>& frame = frames_[(begun_ - 1) % frames_.size()];
     if (part_ < frame.size()) {
-      session_.Send(frame[part_++], true);
+      session_.Send(frame[part_++], gather_);
     } else {
       part_ = 0;
       session_.Commit(sent_ns_.back(), std::exchange(untold_, 0));

@@ -74,8 +74,9 @@ class FrameSender {
   };
 
   // `frames`: what goes out, in turns; not empty. Feeds `session` whenever that is ready. Both live
-  // as long as events may come.
-  FrameSender(Session& session, std::vector<std::vector<Message>> frames, WhenBehind when_behind);
+  // as long as events may come. `gather`: a frame's messages may go out with its commit.
+  FrameSender(Session& session, std::vector<std::vector<Message>> frames, WhenBehind when_behind,
+              bool gather = true);
 
   // A frame is due (or `count` of them).
   void Due(uint64_t count = 1);
@@ -94,6 +95,7 @@ class FrameSender {
   Session& session_;
   const std::vector<std::vector<Message>> frames_;
   const WhenBehind when_behind_;
+  const bool gather_;
   bool endless_ = false;
   uint64_t waiting_ = 0;  // due, not begun
   size_t part_ = 0;       // of the frame that has begun; 0: none has
