@@ -113,9 +113,9 @@ uint64_t Intake::first_credit() const {
   return told_credit_;
 }
 
-void Intake::Take(IncomingMessage message) {
+bool Intake::Take(IncomingMessage message) {
   sync::MutexLock lock(mutex_);
-  if (sink_ == nullptr) return;
+  if (sink_ == nullptr) return false;
   received_ += message.bytes;
   bytes_in_->fetch_add(message.bytes, std::memory_order_relaxed);
   staged_.credit += message.bytes;
@@ -147,6 +147,7 @@ void Intake::Take(IncomingMessage message) {
   count_up_to(UINT64_MAX);
   ReturnStaged();
   if (!queue_.empty() && !std::exchange(scheduled_, true)) schedule_();
+  return !Room() && !std::exchange(asked_for_room_, true);
 }
 
 void Intake::Stage(Operation operation, uint64_t credit) {
@@ -276,14 +277,6 @@ bool Intake::Room() const {
   return received_ - returned_ < limits_.credit_bytes &&
          local_bytes_ / kLocalMessages < limits_.max_message_bytes &&
          queue_.size() < limits_.max_riding_commits;
-}
-
-bool Intake::HasRoom() {
-  sync::MutexLock lock(mutex_);
-  if (sink_ == nullptr) return false;  // and the core may be gone
-  const bool room = Room();
-  asked_for_room_ = !room;
-  return room;
 }
 
 void Intake::Wake() {

@@ -4,7 +4,7 @@
 //
 //   reading thread                       core's thread
 //   Take(message)  ── schedule ────────▶ while ((commit = Pop(&more))) { apply; Done(*commit); }
-//   HasRoom()?     ◀─ sink: OnRoom ─────
+//   filled?        ◀─ sink: OnRoom ─────
 //
 // Credit. Each message's bytes are outstanding until what it brought is applied, given up or refused, or, if no commit
 // of the session waits, until it is staged: what is staged for a commit that has not come waits for the client, and
@@ -14,7 +14,7 @@
 // outstanding in the same way, and nothing is read on while that is as much as kLocalMessages of the greatest messages
 // could have brought themselves.
 //
-// Threads: Take and HasRoom belong to one thread at a time, Pop and Done to the core's; all are thread-safe
+// Threads: Take belongs to one thread at a time, Pop and Done to the core's; all are thread-safe
 // against each other. `schedule` and the sink are called with the intake's lock held.
 #pragma once
 
@@ -100,10 +100,10 @@ class Intake {
 
   uint64_t first_credit() const;
 
-  // Stages the operations, and queues a commit for each Commit among them. Refusals are told at once.
-  void Take(IncomingMessage message);
-  // Whether the next message should be read. Once false, the sink gets OnRoom when that changes.
-  bool HasRoom();
+  // Stages the operations, and queues a commit for each Commit among them. Refusals are told at once. Whether
+  // this filled it: then nothing more should be read until the sink gets OnRoom, which comes once for each time;
+  // what has been read may still be handed over.
+  bool Take(IncomingMessage message);
   // Asks for a turn: the sink is not crowded any more.
   void Wake();
 

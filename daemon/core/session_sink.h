@@ -18,7 +18,7 @@ class SessionSink {
   virtual void OnReceipt(const Receipt& receipt) = 0;
   // Bytes that the client may have sent in all. Never less than before.
   virtual void OnCredit(uint64_t /*total_bytes*/) {}
-  // After Intake::HasRoom was false: it is true again.
+  // After Intake::Take filled the intake: there is room again.
   virtual void OnRoom() {}
   // The session is being ended by somebody else: an operator, a stream that took it up, the daemon's end. Nothing
   // more will be answered.

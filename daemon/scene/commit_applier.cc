@@ -316,7 +316,7 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
   layer.order = state.order.value_or(layer.order);
   layer.blend = state.blend.value_or(layer.blend);
   layer.transform = state.transform.value_or(layer.transform);
-  layer.clip = state.clip.value_or(layer.clip);
+  if (state.clip != nullptr) layer.clip = *state.clip;
   layer.region = state.region.value_or(layer.region);
   Applied(state.layer);
 }
@@ -425,7 +425,7 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
     if (state->transform.has_value()) {
       check_map(*state->transform, state->layer, "", "layer_state.transform");
     }
-    if (state->clip.has_value()) check_clip(*state->clip, state->layer);
+    if (state->clip != nullptr) check_clip(*state->clip, state->layer);
     if (state->region.has_value() && state->region->has_value()) {
       check_region(**state->region, state->layer);
     }

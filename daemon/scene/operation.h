@@ -185,7 +185,7 @@ struct LayerState {
   std::optional<int32_t> order;
   std::optional<gpu::BlendMode> blend;
   std::optional<gpu::Affine> transform;
-  std::optional<Clip> clip;                          // no planes: none any more
+  std::shared_ptr<const Clip> clip;                  // null: as it is; no planes: none any more
   std::optional<std::optional<gpu::Region>> region;  // holds nothing: none any more
 };
 struct FrameBegin {

@@ -18,13 +18,15 @@ void StreamSession::Start() {
 }
 
 void StreamSession::Read() {
-  if (port_ == nullptr || reading_ || reads_done_ || !arrived_.empty() || !room_ || HalfFull()) {
-    return;
-  }
+  if (port_ == nullptr || reading_ || reads_done_ || FarAhead() || full_ > 0 || HalfFull()) return;
   // Nothing is read beyond the Open before that is dealt with.
   if (state_ != State::kOpen && (state_ != State::kNew || taking_)) return;
   reading_ = true;
   port_->Read();
+}
+
+bool StreamSession::FarAhead() const {
+  return arrived_.size() >= kAheadMessages || arrived_bytes_ >= kAheadBytes;
 }
 
 bool StreamSession::HalfFull() const {
@@ -46,33 +48,34 @@ void StreamSession::OnMessage(std::unique_ptr<const ReceivedMessage> message) {
     sync::MutexLock lock(mutex_);
     reading_ = false;
     arrived_.push_back({std::move(message), arrival});
-    if (std::exchange(taking_, true)) return;
+    arrived_bytes_ += arrival.bytes;
+    if (std::exchange(taking_, true)) return Read();
   }
   TakeArrived();
 }
 
 void StreamSession::TakeArrived() {
+  std::vector<Arrived> taken;
   for (;;) {
-    Arrived next;
     bool close = false;
     {
       sync::MutexLock lock(mutex_);
-      taking_ = !arrived_.empty();
-      if (taking_) {
-        next = std::move(arrived_.front());
-        arrived_.pop_front();
-      } else {
-        close = EndOfReads();
-      }
+      taken.clear();
+      taken.swap(arrived_);
+      arrived_bytes_ = 0;
+      taking_ = !taken.empty();
+      if (!taking_) close = EndOfReads();
       Read();
     }
-    if (next.message == nullptr) {
+    if (taken.empty()) {
       if (close) CloseSession();
       return;
     }
-    TakeMessage(next.message->slices(), next.arrival);
-    next.message.reset();
-    core_.budget()->Release(Budget::Use::kArriving, next.arrival.bytes);
+    for (Arrived& next : taken) {
+      TakeMessage(next.message->slices(), next.arrival);
+      next.message.reset();
+      core_.budget()->Release(Budget::Use::kArriving, next.arrival.bytes);
+    }
   }
 }
 
@@ -180,19 +183,20 @@ void StreamSession::TakeOperations(wire::Decoded decoded, const Arrival& arrival
     return End(absl::FailedPreconditionError(
         "the first message of a stream must be open; the operation was not carried out"));
   }
-  room_ = false;  // until it is known; a call of OnRoom from now on is the last word
-  intake->Take({.operations = std::move(decoded.operations),
-                .refused = std::move(decoded.refused),
-                .bytes = arrival.bytes,
-                .received_ns = arrival.received_ns,
-                .decoded_ns = arrival.decoded_ns,
-                .local_bytes = decoded.local_bytes});
-  if (intake->HasRoom()) room_ = true;
+  const bool filled = intake->Take({.operations = std::move(decoded.operations),
+                                    .refused = std::move(decoded.refused),
+                                    .bytes = arrival.bytes,
+                                    .received_ns = arrival.received_ns,
+                                    .decoded_ns = arrival.decoded_ns,
+                                    .local_bytes = decoded.local_bytes});
+  if (!filled) return;
+  sync::MutexLock lock(mutex_);
+  ++full_;
 }
 
 void StreamSession::OnRoom() {
-  room_ = true;
   sync::MutexLock lock(mutex_);
+  --full_;
   Read();
 }
 

@@ -4,7 +4,8 @@
 //   first message         Open, answered by Opened
 //   Ping                  answered at once
 //   every other           decoded and handed to the session's intake, one after another; meanwhile the next
-//                         is read, if that has room and the client reads its answers
+//                         are read, kAheadBytes or kAheadMessages of them, if that has room and the client
+//                         reads its answers
 //   half-close            waits (drain_limit_ns at most) until every commit has its answer and its
 //                         outcomes, closes the session, writes what is queued, ends with OK
 //   End, bad bytes        closes the session, writes what is queued (drain_limit_ns at most), ends
@@ -19,13 +20,12 @@
 // may come on another thread while this one's message is still being decoded.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "daemon/core/core.h"
@@ -55,6 +55,11 @@ class StreamPort {
   virtual void Finish(const absl::Status& status) = 0;  // once, and last
   virtual void SetAlarm(sync::TimeNs delay) = 0;  // then OnAlarm; replaces one that was set before
 };
+
+// What is read of a stream while something else of it is decoded: enough that neither waits for the
+// other, of small messages and of large ones.
+inline constexpr size_t kAheadMessages = 64;
+inline constexpr uint64_t kAheadBytes = 256 << 10;
 
 class StreamSession final : public SessionSink,
                             public ActiveCall,
@@ -113,6 +118,7 @@ class StreamSession final : public SessionSink,
   void TakeOperations(wire::Decoded decoded, const Arrival& arrival);
   void OnOpened(const absl::StatusOr<SessionInfo>& info);
   void Read() VOXELD_REQUIRES(mutex_);
+  bool FarAhead() const VOXELD_REQUIRES(mutex_);
   bool HalfFull() const VOXELD_REQUIRES(mutex_);
   // Whether there is anybody to be told.
   bool Listening() const VOXELD_REQUIRES(mutex_);
@@ -131,7 +137,6 @@ class StreamSession final : public SessionSink,
 
   ServiceContext& context_;  // there as long as the port is
   Core& core_;
-  std::atomic<bool> room_ = true;  // in the intake; false also while that is being found out
   mutable sync::Mutex mutex_;
   StreamPort* port_ VOXELD_GUARDED_BY(mutex_);
   State state_ VOXELD_GUARDED_BY(mutex_) = State::kNew;
@@ -141,9 +146,13 @@ class StreamSession final : public SessionSink,
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
   local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until CloseSession
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
-  bool reading_ VOXELD_GUARDED_BY(mutex_) = false;         // a read is pending
-  std::deque<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, not decoded
-  bool taking_ VOXELD_GUARDED_BY(mutex_) = false;          // a thread is in TakeArrived
+  bool reading_ VOXELD_GUARDED_BY(mutex_) = false;          // a read is pending
+  std::vector<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, not decoded
+  uint64_t arrived_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
+  bool taking_ VOXELD_GUARDED_BY(mutex_) = false;  // a thread is in TakeArrived
+  // How often the intake was filled and has not had room since; negative while it had sooner than it is known here
+  // that it was filled.
+  int full_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;
   uint64_t unanswered_ VOXELD_GUARDED_BY(mutex_) = 0;  // commits without Accepted or Refused

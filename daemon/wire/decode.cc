@@ -4,6 +4,7 @@
 #include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
@@ -25,7 +26,11 @@ namespace voxeld::daemon::wire {
 namespace {
 
 constexpr size_t kClientNameBytes = 128;
-constexpr uint64_t kAbsurd = 4;  // times what is allowed
+constexpr uint64_t kAbsurd = 4;             // times what is allowed
+constexpr uint64_t kLeastElementBytes = 2;  // its tag and its length
+// Up to here payloads are not worth looking for; and what a message of so many bytes is unfolded to, as a rule.
+constexpr uint64_t kSmallBytes = 2048;
+constexpr size_t kArenaBytes = 4096;
 
 absl::Status OpenError(const Fault& fault) {
   const std::string text = absl::StrCat(fault.field, " ", fault.message);
@@ -145,9 +150,10 @@ constexpr int kPartsPath[] = {
 
 // Before anything is parsed. A little too many elements are an Issue, later; so many that to unfold
 // them would be a burden end the stream, or refuse the update.
-absl::Status CheckElements(std::span<const std::string_view> slices,
+absl::Status CheckElements(std::span<const std::string_view> slices, uint64_t size,
                            std::span<const ElementRow> rows) {
   for (const ElementRow& row : rows) {
+    if (size / kLeastElementBytes / kAbsurd <= row.limit) continue;
     const uint64_t count = CountElements(slices, row.path);
     if (count / kAbsurd <= row.limit) continue;
     return absl::ResourceExhaustedError(
@@ -156,7 +162,8 @@ absl::Status CheckElements(std::span<const std::string_view> slices,
   return absl::OkStatus();
 }
 
-absl::Status CheckUpdateElements(std::span<const std::string_view> slices, const Limits& limits) {
+absl::Status CheckUpdateElements(std::span<const std::string_view> slices, uint64_t size,
+                                 const Limits& limits) {
   if (const uint64_t count = CountElements(slices, std::span(kUpsertsPath).first(1));
       count > limits.max_operations_per_commit) {
     return TooManyOperations(count, limits);
@@ -166,7 +173,7 @@ absl::Status CheckUpdateElements(std::span<const std::string_view> slices, const
       {"operations[].batch.upserts", kUpsertsPath, limits.max_operations_per_commit},
       {"operations[].define_object.definition.parts", kPartsPath,
        std::max(limits.max_operations_per_commit, limits.max_parts_per_object)}};
-  return CheckElements(slices, rows);
+  return CheckElements(slices, size, rows);
 }
 
 absl::Status CheckSize(std::span<const std::string_view> slices, const Limits& limits,
@@ -186,7 +193,7 @@ class Parsed {
   absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, Root root) {
     // The status says it all; a client must not fill logs.
     const google::protobuf::LogSilencer silence;
-    bare_ = MakeSkeleton(slices, root, &skeleton_);
+    bare_ = size > kSmallBytes && MakeSkeleton(slices, root, &skeleton_);
     SliceStream stream(slices);
     if (bare_ ? message_->ParseFromString(skeleton_.bytes)
               : message_->ParseFromZeroCopyStream(&stream)) {
@@ -201,7 +208,15 @@ class Parsed {
   const PayloadTable* payloads() const { return bare_ ? &skeleton_.payloads : nullptr; }
 
  private:
-  google::protobuf::Arena arena_;
+  static google::protobuf::ArenaOptions In(std::span<char> block) {
+    google::protobuf::ArenaOptions options;
+    options.initial_block = block.data();
+    options.initial_block_size = block.size();
+    return options;
+  }
+
+  alignas(std::max_align_t) char block_[kArenaBytes];  // not initialised
+  google::protobuf::Arena arena_{In(block_)};
   Message* const message_ = google::protobuf::Arena::CreateMessage<Message>(&arena_);
   Skeleton skeleton_;
   bool bare_ = false;  // payloads are left out
@@ -315,7 +330,7 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
       {"batch.upserts", std::span(kUpsertsPath).subspan(1), limits.max_operations_per_commit},
       {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
        limits.max_parts_per_object}};
-  if (absl::Status status = CheckElements(slices, rows); !status.ok()) return Failed(status);
+  if (absl::Status status = CheckElements(slices, size, rows); !status.ok()) return Failed(status);
   Parsed<v1::StreamRequest> parsed;
   if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {
     return Failed(status);
@@ -327,7 +342,7 @@ Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& lim
                      gpu::BulkPool* pool) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
-  if (absl::Status status = CheckUpdateElements(slices, limits); !status.ok()) {
+  if (absl::Status status = CheckUpdateElements(slices, size, limits); !status.ok()) {
     return Failed(status);
   }
   Parsed<v1::ApplyUpdateRequest> parsed;

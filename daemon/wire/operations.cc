@@ -185,9 +185,9 @@ MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& lim
     out->transform = transform;
   }
   if (in.has_clip()) {
-    if (auto fault = ToClip(FieldPath(path, "clip"), in.clip(), limits, &out->clip.emplace())) {
-      return fault;
-    }
+    auto clip = std::make_shared<Clip>();
+    if (auto fault = ToClip(FieldPath(path, "clip"), in.clip(), limits, clip.get())) return fault;
+    out->clip = std::move(clip);
   }
   if (in.has_region()) {
     if (auto fault = ToRegion(FieldPath(path, "region"), in.region(), &out->region.emplace())) {

@@ -84,8 +84,10 @@ inline Operation SetLayer(std::string layer, std::optional<bool> visible,
 inline Operation SetClip(std::string layer, const std::vector<gpu::ClipPlane>& planes) {
   LayerState state;
   state.layer = std::move(layer);
-  state.clip.emplace().count = static_cast<uint32_t>(planes.size());
-  std::copy(planes.begin(), planes.end(), state.clip->planes);
+  auto clip = std::make_shared<Clip>();
+  clip->count = static_cast<uint32_t>(planes.size());
+  std::copy(planes.begin(), planes.end(), clip->planes);
+  state.clip = std::move(clip);
   return {0, std::move(state)};
 }
 inline Operation SetRegion(std::string layer, std::optional<gpu::Region> region) {

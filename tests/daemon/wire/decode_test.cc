@@ -265,7 +265,7 @@ TEST(Decode, ClipsAndRegions) {
   v1::Clip* clip = request.mutable_layer_state()->mutable_clip();
   const auto decode = [&] { return std::get<LayerState>(Decode(request).operations.at(0).op); };
   // Nothing in it: there is to be none any more.
-  ASSERT_TRUE(decode().clip.has_value());
+  ASSERT_NE(decode().clip, nullptr);
   EXPECT_EQ(decode().clip->count, 0u);
   EXPECT_FALSE(decode().region.has_value());
   for (int i = 0; i < 8; ++i) {
@@ -282,7 +282,7 @@ TEST(Decode, ClipsAndRegions) {
 
   request.mutable_layer_state()->clear_clip();
   v1::Box3* region = request.mutable_layer_state()->mutable_region();
-  EXPECT_FALSE(decode().clip.has_value());
+  EXPECT_EQ(decode().clip, nullptr);
   ASSERT_TRUE(decode().region.has_value());
   EXPECT_EQ(*decode().region, std::nullopt);
   region->mutable_min()->set_x(-1);
