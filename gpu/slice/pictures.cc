@@ -55,8 +55,8 @@ void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture)
           Threshold(tone.dither, u, v, sub, static_cast<uint32_t>(layout.sub_frames));
     }
   }
-  for (uint32_t i : pixels.lit) {
-    const uint32_t u = i % width, v = i / width, rgb = pixels.rgb[i];
+  for (const auto& [index, u, v] : pixels.lit) {
+    const uint32_t rgb = pixels.rgb[index];
     const uint32_t threshold = thresholds[v % 8][u % 8];
     const Levels q = {Quantize(tone.lut[rgb >> 16], kLevels.r, threshold),
                       Quantize(tone.lut[(rgb >> 8) & 0xFF], kLevels.g, threshold),

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <map>
 #include <utility>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 #include "absl/strings/str_cat.h"
 #include "gpu/slice/weight.h"
@@ -24,13 +28,33 @@ Offset Greatest(const display::FootprintLists& lists) {
   return most;
 }
 
+// Bit i: the i-th of `count` colours (kTileSize at most), each 2^shift words behind the last, is not black.
+uint32_t LitBits(const uint32_t* from, int32_t count, uint32_t shift) {
+#ifdef __SSE2__
+  if (shift == 0 && count == kTileSize) {  // as a rule
+    const auto black = [&](int32_t i) {
+      return _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from + i)),
+                             _mm_setzero_si128());
+    };
+    const __m128i words =
+        _mm_packs_epi16(_mm_packs_epi32(black(0), black(4)), _mm_packs_epi32(black(8), black(12)));
+    return static_cast<uint32_t>(_mm_movemask_epi8(words)) ^ 0xFFFF;
+  }
+#endif
+  uint32_t bits = 0;
+  for (int32_t i = 0; i < count; ++i) {
+    bits |= static_cast<uint32_t>(from[static_cast<uint32_t>(i) << shift] != 0) << i;
+  }
+  return bits;
+}
+
 }  // namespace
 
 void SlicePixels::Clear(size_t pixels) {
   if (rgb.size() != pixels || lit.size() > pixels / 8) {
     rgb.assign(pixels, 0);
   } else {
-    for (uint32_t i : lit) rgb[i] = 0;
+    for (const Pixel& pixel : lit) rgb[pixel.index] = 0;
   }
   lit.clear();
 }
@@ -82,6 +106,17 @@ void Sampler::BuildInner() {
   }
   for (const display::FootprintEntry& e : table_.inner.entries) {
     inner_.push_back({places[OffsetOf(e)], e.weight});
+  }
+  const uint32_t height = static_cast<uint32_t>(table_.height);
+  single_ = runs_.size() == 1 && runs_[0].length == table_.height;
+  for (int32_t set = 0; set < table_.inner_sets; ++set) {
+    for (uint32_t v = 0; v < height; ++v) {
+      const std::span<const InnerEntry> inner = Inner(set, v);
+      single_ = single_ && inner.size() == 1 && inner[0].place == v;
+    }
+  }
+  for (size_t row = 1; row < table_.outer.begin.size(); ++row) {
+    single_ = single_ && table_.outer.begin[row] - table_.outer.begin[row - 1] <= 1;
   }
 }
 
@@ -145,9 +180,36 @@ void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
       uint32_t greatest = 0;
       for (const InnerEntry& e : inner) greatest = std::max(greatest, line[e.place]);
       if (greatest == 0) continue;
-      const uint32_t pixel = v * width + u0 + lit[n];
+      const uint32_t u = u0 + lit[n], pixel = v * width + u;
       out.rgb[pixel] = Deinterleave(greatest);
-      out.lit.push_back(pixel);
+      out.lit.push_back({pixel, u, v});
+    }
+  }
+}
+
+// What SampleMax comes to where single_ holds.
+void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& out) const {
+  const TileGrid& grid = tiles.grid();
+  const Run& run = runs_[0];
+  const uint32_t width = static_cast<uint32_t>(table_.width), shift = grid.shift[run.axis];
+  for (uint32_t u = 0; u < width; ++u) {
+    for (const display::FootprintEntry& outer : table_.Outer(slice, static_cast<int32_t>(u))) {
+      int32_t at[3] = {run.at[0] + outer.x, run.at[1] + outer.y, run.at[2] + outer.z};
+      for (int32_t v = 0; v < run.length;) {
+        const int32_t count = std::min(run.length - v, kTileSize - at[run.axis] % kTileSize);
+        const uint32_t* colors = tiles.colors(grid.TileOf(at[0], at[1], at[2]));
+        if (colors != nullptr) {
+          const uint32_t* from = colors + grid.IndexInTile(at[0], at[1], at[2]);
+          for (uint32_t lit = LitBits(from, count, shift); lit != 0; lit &= lit - 1) {
+            const int i = std::countr_zero(lit);
+            const uint32_t row = static_cast<uint32_t>(v + i), index = row * width + u;
+            out.rgb[index] = Deinterleave(from[static_cast<uint32_t>(i) << shift]);
+            out.lit.push_back({index, u, row});
+          }
+        }
+        at[run.axis] += count;
+        v += count;
+      }
     }
   }
 }
@@ -166,7 +228,7 @@ void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
         if (color == 0) continue;
         rgb = RaiseWeighted(rgb, FootprintWeight(outer.weight, inner.weight), Deinterleave(color));
       }
-      if (before == 0 && rgb != 0) out.lit.push_back(v * width + u);
+      if (before == 0 && rgb != 0) out.lit.push_back({v * width + u, u, v});
     }
   }
 }
@@ -176,6 +238,8 @@ void Sampler::Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) co
   if (sampling_ == display::Sampling::kWeighted) {
     out.lines.resize(places_);
     for (uint32_t u = 0; u < width; ++u) SampleWeighted(tiles, slice, u, out);
+  } else if (single_) {
+    SampleSingle(tiles, slice, out);
   } else {
     out.lines.resize(places_ * kColumns);
     for (uint32_t u = 0; u < width; u += kColumns) SampleMax(tiles, slice, u, out);

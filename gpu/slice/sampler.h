@@ -14,8 +14,11 @@ namespace voxeld::gpu {
 
 // A slice's pixels. `rgb` is 0x00RRGGBB, row-major; only pixels in `lit` may differ from 0.
 struct SlicePixels {
+  struct Pixel {
+    uint32_t index, u, v;  // index: v * width + u
+  };
   std::vector<uint32_t> rgb;
-  std::vector<uint32_t> lit;    // indices
+  std::vector<Pixel> lit;
   std::vector<uint32_t> lines;  // scratch of the sampler's: kColumns of them
 
   void Clear(size_t pixels);
@@ -55,6 +58,7 @@ class Sampler {
   bool Gather(const TileStore& tiles, const display::FootprintEntry& outer, uint32_t* line) const;
   std::span<const InnerEntry> Inner(int32_t slice, uint32_t v) const;
   void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0, SlicePixels& out) const;
+  void SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 
   display::FootprintTable table_;
@@ -62,6 +66,8 @@ class Sampler {
   std::vector<Run> runs_;
   std::vector<InnerEntry> inner_;  // rows as table_.inner.begin has them
   size_t places_ = 0;
+  bool single_ =
+      false;  // one voxel a pixel, those of a column in a row: a stack of the lattice's own resolution
 };
 
 }  // namespace voxeld::gpu
