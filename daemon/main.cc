@@ -1,6 +1,5 @@
 // voxeld: wiring only.
 #include <pthread.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <atomic>
@@ -17,7 +16,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "absl/synchronization/mutex.h"
 #include "daemon/config/config.h"
 #include "daemon/config/display_view.h"
 #include "daemon/core/core.h"
@@ -27,6 +25,7 @@
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/view.h"
+#include "daemon/process/process.h"
 #include "daemon/services/server.h"
 #include "daemon/version/version.h"
 #include "display/drivers/registry.h"
@@ -45,14 +44,6 @@ constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
 int Fail(int code, const absl::Status& status) {
   std::fprintf(stderr, "voxeld: %s\n", std::string(status.message()).c_str());
   return code;
-}
-
-// Every client holds two descriptors: what serves it, and what guards it.
-void RaiseDescriptorLimit() {
-  rlimit limit;
-  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
-  limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 struct WantedDisplay {
@@ -260,8 +251,7 @@ int Main(int argc, char** argv) {
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
 
   RaiseDescriptorLimit();
-  // Distributions build Abseil with its search for deadlocks on, which gRPC would do for each message.
-  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
+  TuneProcess();
   umask(0007);  // sockets are for the user and the group from the moment that they exist
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;

@@ -23,15 +23,18 @@ class LocalSocket {
 
   // Puts `bytes` into new memory, seals it and hands it over. This process keeps nothing of it.
   absl::Status Hold(uint64_t id, std::string_view bytes);
+  // Said at once; what the daemon answers is read by the next Hold, which fails if that is an error.
   absl::Status Release(uint64_t id);
 
  private:
   explicit LocalSocket(int fd) : fd_(fd) {}
-  // Sends a LocalMessage, with a descriptor unless that is below 0, and waits for the answer; an
-  // error with what it said if that is Refused.
-  absl::Status Ask(const std::string& packet, int descriptor);
+  // Sends a LocalMessage, with a descriptor unless that is below 0.
+  absl::Status Say(const std::string& packet, int descriptor);
+  // Waits for the answers to all that was said; an error with what it said if one is Refused.
+  absl::Status Answered();
 
   const int fd_;
+  int unanswered_ = 0;
 };
 
 }  // namespace voxeld::bench

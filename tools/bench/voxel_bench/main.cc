@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "absl/synchronization/mutex.h"
+#include "daemon/process/process.h"
 #include "tools/bench/voxel_bench/command_line.h"
 #include "tools/bench/voxel_bench/report.h"
 #include "tools/bench/voxel_bench/run.h"
@@ -57,10 +57,9 @@ int Main(int argc, char** argv) {
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     std::signal(number, [](int) { interrupted.store(true); });
   }
-  absl::SetMutexDeadlockDetectionMode(
-      absl::OnDeadlockCycle::kIgnore);  // as the daemon; for the sink too
+  daemon::TuneProcess();  // the sink's process too: what a ratio compares has the same settings
+  daemon::RaiseDescriptorLimit();
   const GrpcCore core;
-  RaiseDescriptorLimit();
   if (const auto* sink = std::get_if<SinkOptions>(&line->command)) {
     const absl::Status status = RunSink(sink->listen);
     return status.ok() ? 0 : Fail(1, status);

@@ -1,7 +1,6 @@
 #include "tools/bench/voxel_bench/servers.h"
 
 #include <signal.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -127,14 +126,6 @@ uint64_t StatusBytes(const std::string& text, const std::string& name) {
     if (absl::SimpleAtoi(line, &kilobytes)) return kilobytes * 1024;
   }
   return 0;
-}
-
-uint64_t RaiseDescriptorLimit() {
-  rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return 0;
-  limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_NOFILE, &limit);
-  return limit.rlim_cur;
 }
 
 }  // namespace voxeld::bench

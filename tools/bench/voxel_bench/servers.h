@@ -47,7 +47,4 @@ std::string RoomFor(int clients);
 // The value of "NAME:   123 kB" in the text of /proc/PID/status, in bytes; 0 if it is not there.
 uint64_t StatusBytes(const std::string& text, const std::string& name);
 
-// Lets this process have as many descriptors as the system allows; how many those are.
-uint64_t RaiseDescriptorLimit();
-
 }  // namespace voxeld::bench
