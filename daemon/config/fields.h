@@ -54,6 +54,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
                   24 * kHour);
   visitor.Integer("connection_age_limit_ns", config.server.connection_age_limit_ns, 0, 24 * kHour);
   visitor.Integer("connection_age_grace_ns", config.server.connection_age_grace_ns, 0, kHour);
+  visitor.Integer("open_limit_ns", config.server.open_limit_ns, kSecond / 10, kHour);
   visitor.Integer("drain_limit_ns", config.server.drain_limit_ns, 0, kHour);
   visitor.Integer("keepalive_interval_ns", config.server.keepalive_interval_ns, kSecond, kHour);
   visitor.Integer("keepalive_timeout_ns", config.server.keepalive_timeout_ns, kSecond, kHour);

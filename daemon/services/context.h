@@ -15,6 +15,8 @@
 namespace voxeld::daemon::services {
 
 struct StreamLimits {
+  // How long a new stream waits for its Open.
+  sync::TimeNs open_limit_ns = 5 * sync::kSecond;
   // How long a stream that was half-closed waits for outcomes that it is still owed, and any ending
   // stream for its client to read what is queued.
   sync::TimeNs drain_limit_ns = 5 * sync::kSecond;

@@ -10,11 +10,24 @@
 #include "voxeld/v1/scene.pb.h"
 
 namespace voxeld::daemon::services {
+namespace {
+
+// gRPC's alarms are due to the millisecond.
+constexpr sync::TimeNs kAlarmSlack = 10 * sync::kMillisecond;
+
+}  // namespace
 
 void StreamSession::Start() {
   context_.calls.Add(shared_from_this());
   sync::MutexLock lock(mutex_);
+  SetAlarm(context_.limits.open_limit_ns);
   Read();
+}
+
+void StreamSession::SetAlarm(sync::TimeNs delay) {
+  if (port_ == nullptr) return;
+  alarm_ns_ = context_.clock.Now() + delay;
+  port_->SetAlarm(delay);
 }
 
 void StreamSession::Read() {
@@ -81,12 +94,19 @@ void StreamSession::TakeArrived() {
 
 void StreamSession::TakeMessage(std::span<const std::string_view> slices, Arrival arrival) {
   uint64_t previous = 0;
+  bool first = false;
   std::shared_ptr<const wire::MemorySource> memory;
   {
     sync::MutexLock lock(mutex_);
     if (state_ != State::kNew && state_ != State::kOpen) return;
+    first = state_ == State::kNew;
     previous = sequence_;
     memory = local_.memory();
+  }
+  if (first && arrival.bytes > kOpenBytes) {
+    return End(absl::ResourceExhaustedError(absl::StrCat("the first message of a stream has ",
+                                                         arrival.bytes, " bytes; open has at most ",
+                                                         kOpenBytes, ": send it alone")));
   }
   wire::Decoded decoded =
       wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(), memory.get());
@@ -219,7 +239,7 @@ bool StreamSession::EndOfReads() {
   }
   if (state_ != State::kOpen) return false;
   state_ = State::kDraining;
-  if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);
+  SetAlarm(context_.limits.drain_limit_ns);
   return Drained();
 }
 
@@ -232,7 +252,13 @@ void StreamSession::OnAlarm() {
   bool close = false;
   {
     sync::MutexLock lock(mutex_);
-    if (state_ == State::kDraining) {
+    // Of one that has been replaced meanwhile.
+    if (context_.clock.Now() < alarm_ns_ - kAlarmSlack) return;
+    if (state_ == State::kNew) {
+      close = Close(absl::DeadlineExceededError(
+          absl::StrCat("no open came within ", context_.limits.open_limit_ns / sync::kMillisecond,
+                       " ms; begin a stream with it")));
+    } else if (state_ == State::kDraining) {
       close = Close(absl::OkStatus());
     } else if (state_ == State::kClosing || state_ == State::kFlushing) {
       Finish();
@@ -271,7 +297,7 @@ bool StreamSession::Close(const absl::Status& status) {
   // nothing is waited for.
   const bool session = session_ != 0;
   state_ = session ? State::kClosing : State::kFlushing;
-  if (port_ != nullptr) port_->SetAlarm(context_.limits.drain_limit_ns);
+  SetAlarm(context_.limits.drain_limit_ns);
   if (!session) FinishIfFlushed();
   return session;
 }

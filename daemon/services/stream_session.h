@@ -1,7 +1,7 @@
 // One SceneService.Stream, apart from gRPC:
 // what is read, what is owed, what is queued, how it ends.
 //
-//   first message         Open, answered by Opened
+//   first message         Open, of kOpenBytes at most and within open_limit_ns, answered by Opened
 //   Ping                  answered at once
 //   every other           decoded and handed to the session's intake, one after another; meanwhile the next
 //                         are read, kAheadBytes or kAheadMessages of them, if that has room and the client
@@ -58,6 +58,7 @@ class StreamPort {
 
 // What is read of a stream while something else of it is decoded: enough that neither waits for the
 // other, of small messages and of large ones.
+inline constexpr uint64_t kOpenBytes = 48 << 10;
 inline constexpr size_t kAheadMessages = 64;
 inline constexpr uint64_t kAheadBytes = 256 << 10;
 
@@ -120,6 +121,7 @@ class StreamSession final : public SessionSink,
   void Read() VOXELD_REQUIRES(mutex_);
   bool FarAhead() const VOXELD_REQUIRES(mutex_);
   bool HalfFull() const VOXELD_REQUIRES(mutex_);
+  void SetAlarm(sync::TimeNs delay) VOXELD_REQUIRES(mutex_);
   // Whether there is anybody to be told.
   bool Listening() const VOXELD_REQUIRES(mutex_);
   void WriteNext() VOXELD_REQUIRES(mutex_);
@@ -160,6 +162,7 @@ class StreamSession final : public SessionSink,
   uint64_t sequence_ VOXELD_GUARDED_BY(mutex_) = 0;  // of the last request
   AnswerQueue answers_ VOXELD_GUARDED_BY(mutex_);
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
+  sync::TimeNs alarm_ns_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   bool ending_ VOXELD_GUARDED_BY(mutex_) = false;  // from kClosing on, with:
   absl::Status end_ VOXELD_GUARDED_BY(mutex_);
   bool logged_end_ VOXELD_GUARDED_BY(mutex_) = false;

@@ -52,7 +52,8 @@ Daemon::Daemon(DaemonOptions options)
   auto server = Server::Start(*core_, clock_,
                               {.listen = {*ParseAddress(target_)},
                                .version = "9.8.7",
-                               .streams = {.drain_limit_ns = options.drain_limit_ns,
+                               .streams = {.open_limit_ns = options.open_limit_ns,
+                                           .drain_limit_ns = options.drain_limit_ns,
                                            .max_queued_answers = options.max_queued_answers},
                                .max_scene_watches = options.max_scene_watches,
                                .local = local});

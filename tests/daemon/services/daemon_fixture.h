@@ -34,6 +34,7 @@ bool AllShowing(const v1::Stats& stats);
 struct DaemonOptions {
   Limits limits;
   std::vector<std::string> displays = {"sim"};
+  sync::TimeNs open_limit_ns = 30 * sync::kSecond;
   sync::TimeNs drain_limit_ns = 30 * sync::kSecond;
   size_t max_queued_answers = 16384;
   uint32_t max_scene_watches = 64;

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/services/stream_session.h"
 #include "tests/daemon/services/daemon_fixture.h"
 
 namespace voxeld::daemon::services {
@@ -49,6 +50,29 @@ TEST(Stream, OpensAppliesAndTellsWhatBecameOfIt) {
   EXPECT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(daemon.Entities().total(), 0u) << "CLEAR is the default, and done when the call ends";
   EXPECT_EQ(daemon.Stats().sessions(), 0u);
+}
+
+TEST(Stream, OpenMustComeInTime) {
+  Daemon daemon({.open_limit_ns = 50 * sync::kMillisecond});
+  Client open(daemon.scene());
+  open.Open();
+  Client silent(daemon.scene());
+  const grpc::Status status = silent.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_THAT(status.error_message(), HasSubstr("no open came within 50 ms"));
+  open.Commit(1);  // later than that, and of no concern to it
+  open.ReadOutcomes(1);
+}
+
+TEST(Stream, OpenMustBeSmall) {
+  Daemon daemon;
+  Client client(daemon.scene());
+  v1::StreamRequest request;
+  request.mutable_open()->set_client_name(std::string(kOpenBytes, 'n'));
+  client.Send(request);
+  const grpc::Status status = client.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("open has at most 49152: send it alone"));
 }
 
 TEST(Stream, FirstMessageMustBeOpen) {
@@ -318,7 +342,7 @@ TEST(Stream, HalfCloseDeliversWhatIsOwed) {
 }
 
 TEST(Stream, HalfCloseWaitsNoLongerThanItsLimit) {
-  Daemon daemon({.drain_limit_ns = 50 * sync::kMillisecond, .stuck = true});
+  Daemon daemon({.drain_limit_ns = 500 * sync::kMillisecond, .stuck = true});
   Client client(daemon.scene());
   client.Open();
   client.Send(SphereIn("layer", "ball"));

@@ -64,8 +64,8 @@ CLI::App* AddIngest(CLI::App& app, IngestOptions& options) {
                    "Two F32 ends (24), with U16 indices (28), with RGB8 colours (30)")
       ->check(CLI::IsMember({24, 28, 30}))
       ->capture_default_str();
-  command->add_option("--batch", options.batch, "Entities a message; 0: the best that is found")
-      ->check(CLI::Range(0, 64))
+  command->add_option("--batch", options.batch, "Entities a message, of 4,096 lines each")
+      ->check(CLI::Range(1, 64))
       ->capture_default_str();
   AddDisplay(*command, options.display);
   return command;

@@ -19,8 +19,6 @@ namespace {
 constexpr int kEntities = 64;  // replaced in each frame
 constexpr uint32_t kLinesAnEntity = 4096;
 constexpr int kVariants = 2;  // of each frame, so that something changes
-constexpr double kTrySeconds = 0.3;
-constexpr int kTryRounds = 3;
 
 enum class Shape : uint8_t { kBatch, kUpsert, kUpsertGathered, kMemory, kMemoryAgain };
 
@@ -98,6 +96,7 @@ class Ingest {
                                                 {"line_bytes", options_.line_bytes},
                                                 {"lines_an_entity", kLinesAnEntity},
                                                 {"entities_a_commit", kEntities},
+                                                {"entities_a_message", options_.batch},
                                                 {"display", options_.display}});
     for (const Case& item : kCases) {
       const std::vector<std::string>& wanted = options_.cases;
@@ -118,15 +117,8 @@ class Ingest {
     absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(wanted);
     if (!daemon.ok()) return daemon.status();
     const bool upserts = IsUpsert(item.shape);
-    int batch = options_.batch;
-    if (!upserts && batch == 0) {
-      if (best_batch_ == 0) {
-        if (absl::Status tried = TryBatches(**daemon, report); !tried.ok()) return tried;
-      }
-      batch = best_batch_;
-    }
     // For memory the sink gets what the daemon would without it.
-    const Frames frames = upserts ? UpsertFrames(form()) : BatchFrames(batch, form());
+    const Frames frames = upserts ? UpsertFrames(form()) : BatchFrames(options_.batch, form());
     const size_t message = frames[0][0].bytes();
     with_.progress(absl::StrFormat("ingest %s: messages of %d bytes", item.name, message));
     const absl::StatusOr<Rates> rates =
@@ -168,29 +160,6 @@ class Ingest {
     return FeedMemory(loop_, target, whole, use);
   }
 
-  // Fills best_batch_; what it was chosen from is in the report, the sink's rates beside.
-  absl::Status TryBatches(ServerProcess& daemon, nlohmann::json& report) {
-    double best = 0;
-    for (const int batch : {1, 2, 4, 8}) {
-      const Frames frames = BatchFrames(batch, form());
-      const double seconds = std::min(kTrySeconds, options_.seconds);
-      const absl::StatusOr<Rates> rates = Alternate(kCases[0], daemon, frames, kTryRounds, seconds);
-      if (!rates.ok()) return rates.status();
-      const double rate = SpreadOf(rates->daemon).median;
-      with_.progress(absl::StrFormat("ingest: %d bytes a message, %.3g M lines/s",
-                                     frames[0][0].bytes(), rate / 1e6));
-      report["batch_tried"].push_back({{"entities", batch},
-                                       {"message_bytes", frames[0][0].bytes()},
-                                       {"daemon_lines_per_s", rate},
-                                       {"sink_lines_per_s", SpreadOf(rates->sink).median}});
-      if (rate > best) {
-        best = rate;
-        best_batch_ = batch;
-      }
-    }
-    return absl::OkStatus();
-  }
-
   absl::StatusOr<Rates> Alternate(const Case& item, ServerProcess& daemon, const Frames& frames,
                                   int rounds, double seconds) {
     const auto duration = static_cast<sync::TimeNs>(seconds * sync::kSecond);
@@ -229,7 +198,6 @@ class Ingest {
   const Surroundings& with_;
   Loop loop_;
   std::unique_ptr<ServerProcess> sink_;
-  int best_batch_ = 0;
 };
 
 }  // namespace

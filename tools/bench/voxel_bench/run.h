@@ -23,7 +23,7 @@ struct IngestOptions {
   int rounds = 5;                  // daemon and sink in turns
   double seconds = 1;              // of each
   int line_bytes = 28;             // 24, 28, 30
-  int batch = 0;                   // entities a message; 0: the best of 1, 2, 4, 8, tried before
+  int batch = 1;                   // entities a message
   std::string display = "size=64x64x64,format=rgb888,rate=60";
 };
 std::vector<std::string> IngestCases();
