@@ -206,14 +206,15 @@ void Core::Impl::KeepDormant(Session& session, sync::TimeNs layers_until) {
   dormant.outcomes = std::exchange(session.undelivered, {});
   dormant.outcomes_until = After(now, kOutcomesKept);
   dormant.until = std::max(dormant.outcomes_until, layers_until);
-  if (dormant_.size() >= options_.limits.max_sessions) {
-    const auto soonest =
-        std::min_element(dormant_.begin(), dormant_.end(), [](const auto& a, const auto& b) {
-          return std::pair(a.second.until, a.first) < std::pair(b.second.until, b.first);
-        });
-    EndDormant(soonest->first);
-  }
+  // First, so that its owner stays though the one that makes room is of the same.
   dormant_.emplace(session.id, std::move(dormant));
+  if (dormant_.size() <= options_.limits.max_sessions) return;
+  auto soonest = dormant_.end();
+  for (auto it = dormant_.begin(); it != dormant_.end(); ++it) {
+    if (it->first == session.id) continue;
+    if (soonest == dormant_.end() || it->second.until < soonest->second.until) soonest = it;
+  }
+  if (soonest != dormant_.end()) EndDormant(soonest->first);
 }
 
 void Core::Impl::EndDormant(SessionId id) {

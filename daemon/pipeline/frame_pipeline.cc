@@ -381,9 +381,10 @@ void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
       if (!shown_ || contents.snapshot >= shown_->snapshot) shown_ = contents;
     }
   }
-  if (outcome.kind == display::VolumeOutcome::Kind::kLost && outcome.volume == last_submitted_) {
-    // A display that still shows sends what it lost again by itself;
-    // when it comes back it gets it anew.
+  if (outcome.kind == display::VolumeOutcome::Kind::kLost && outcome.volume == last_submitted_ &&
+      !show_again_) {
+    // A display that still shows sends what it lost again by itself; when it comes back it gets it
+    // anew. What is to be drawn again sooner, since the engine failed, stays so.
     show_again_ = true;
     show_again_at_ = sync::kNever;
   }

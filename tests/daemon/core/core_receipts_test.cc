@@ -343,6 +343,25 @@ TEST(CoreReceipts, AFailedFrameIsLostAndTheEngineGetsTheWholeSceneNextTime) {
   EXPECT_EQ(sim.engine().engines, 1);
 }
 
+TEST(CoreReceipts, AVolumeThatIsLostDoesNotPutOffTheRetryOfAFailedFrame) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x", 1));  // in flight
+  sim.engine().fail = absl::InternalError("a kernel failed");
+  sim.Send(client, 2, Put("a", "x", 2));
+  EXPECT_EQ(Only(*client.sink, 2).kind, Kind::kLost);
+  ASSERT_TRUE(sim.display().Abort("three slices missing"));
+  sim.core->Step();
+  const size_t drawn = sim.engine().frames.size();
+  sim.Advance(sync::kSecond);
+  EXPECT_EQ(sim.engine().frames.size(), drawn + 1)
+      << "nobody commits, and still the newest is drawn";
+  while (sim.Show()) {
+  }
+  EXPECT_EQ(sim.GetStats().displays[0].volumes_lost, 1u);
+}
+
 TEST(CoreReceipts, ASlowEngineNeverHoldsTheDisplayUp) {
   Simulation sim;
   sim.Start();

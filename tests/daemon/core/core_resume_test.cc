@@ -210,5 +210,24 @@ TEST(CoreResume, DormantSessionsAreLimitedInNumber) {
   EXPECT_TRUE(TryOpen(sim, Resuming(clients[2])).ok());
 }
 
+TEST(CoreResume, ADormantSessionThatMakesRoomForOneOfItsOwnerLeavesTheOwner) {
+  Limits limits;
+  limits.max_sessions = 2;
+  Simulation sim(limits);
+  sim.Start();
+  auto one = sim.Open();
+  OpenOptions joining;
+  joining.owner_token = one.info.owner_token;
+  auto two = sim.Open(joining);
+  sim.Close(one);
+  auto other = sim.Open();
+  sim.Close(other);
+  sim.Close(two);  // in the place of `one`
+  auto again = sim.Open(Resuming(two, {}));
+  EXPECT_EQ(again.info.session, two.info.session);
+  EXPECT_EQ(again.info.owner, one.info.owner);
+  EXPECT_EQ(again.info.owner_token, one.info.owner_token);
+}
+
 }  // namespace
 }  // namespace voxeld::daemon

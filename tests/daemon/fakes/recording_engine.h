@@ -131,7 +131,8 @@ struct EngineScript {
   std::vector<gpu::Target> targets;  // set so far
   std::vector<uint64_t> frames;      // drawn so far
   std::deque<std::function<void()>> calls;
-  SceneModel* scene = nullptr;  // of the newest engine; null when there is none
+  SceneModel* scene = nullptr;                    // of the newest engine; null when there is none
+  std::function<void(uint64_t frame)> on_submit;  // as it is asked for
   std::function<void(uint64_t frame, const SceneModel& scene)> on_frame;  // as it is drawn
 
   // Carries out what waits. False if nothing did.
@@ -193,6 +194,7 @@ class RecordingEngine final : public gpu::Engine {
 
   void SubmitFrame(const gpu::FrameRequest& request, gpu::FrameBuffer buffer,
                    FrameDone done) override {
+    if (script_->on_submit) script_->on_submit(request.frame);
     Call([this, request, buffer, done = std::move(done)] {
       if (script_->fail.has_value()) {
         const absl::Status status = *std::exchange(script_->fail, std::nullopt);

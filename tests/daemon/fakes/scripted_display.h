@@ -1,6 +1,7 @@
 // A display whose device does what a test says. Time passes only when the test moves it.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -66,6 +67,7 @@ class ScriptedDisplay final : public display::Display {
   }
 
   int sent = 0;  // volumes begun, of any cause
+  std::function<void(uint64_t volume)> on_send;
 
  protected:
   absl::Status DoStart() override {
@@ -73,8 +75,9 @@ class ScriptedDisplay final : public display::Display {
     return absl::OkStatus();
   }
   void DoStop() override {}
-  void DoSend(const display::SliceFramePtr&, bool) override {
+  void DoSend(const display::SliceFramePtr& frame, bool) override {
     ++sent;
+    if (on_send) on_send(frame->volume);
     sent_at_ = now_.Now();
   }
   sync::TimeNs DoTick(sync::TimeNs now) override {
