@@ -63,7 +63,7 @@ class Session:
         self.streams_opened = 0
         self.resumed = 0
         self.restored = 0                      # how often the scene was sent anew
-        self.answered = 0                      # commits
+        self.answered = 0                      # commits; those that send the scene anew do not count
         self.on_issue: Callable[[Issue], None] = lambda issue: None  # called from answer()
         self.done: Done = resolve              # resolves the futures that others have of frames
         self._next_frame = settings.first_frame
@@ -250,11 +250,11 @@ class Session:
         what = receipt.WhichOneof("what")
         unit = self._answered(receipt.sequence) if what in ("accepted", "refused") else None
         if unit is not None:
-            self.answered += 1
             if unit.restores:
                 if what == "refused":
                     self._tell_of_restore(receipt.refused.message)
                 return
+            self.answered += 1
             if what == "accepted":
                 unit.apply(self.mirror, now_ns)
                 if unit.on_accepted is not None:
