@@ -153,7 +153,8 @@ class Session:
 
     def _count(self, message: bytes) -> bytes:
         self._sent += len(message)
-        self._sequence += 1  # requests are sent without numbers, and the server counts
+        # Pings and commits are sent with their numbers; from there the server counts for itself, which spares bulk a copy.
+        self._sequence += 1
         return message
 
     def _has_credit(self) -> bool:
@@ -167,7 +168,8 @@ class Session:
         if self._pings_known and now_ns >= self._next_ping_ns:
             self._pings += 1
             self._next_ping_ns = now_ns + (_QUICK_NS if self._pings < _QUICK_PINGS else _SLOW_NS)
-            return self._count(pb.StreamRequest(ping=pb.Ping(client_time_ns=now_ns)).SerializeToString())
+            return self._count(pb.StreamRequest(
+                sequence=self._sequence + 1, ping=pb.Ping(client_time_ns=now_ns)).SerializeToString())
         unit = self._current
         if unit is None:
             unit = self._next_unit()
@@ -186,7 +188,7 @@ class Session:
         commit.send_time_ns = now_ns
         unit.drops += self.outbox.take_unreported()
         commit.client_drops = unit.drops
-        message = self._count(pb.StreamRequest(commit=commit).SerializeToString())
+        message = self._count(pb.StreamRequest(sequence=self._sequence + 1, commit=commit).SerializeToString())
         unit.commit_sequence = self._sequence
         self._on_way.append(unit)
         self._current = None

@@ -93,9 +93,11 @@ class PlainServer:
         if len(message) > self.limits.max_message_bytes:
             raise TooLarge(len(message))
         self.received += len(message)
-        self.sequence += 1
         request = pb.StreamRequest.FromString(message)
         what = request.WhichOneof("op")
+        # A ping counts if it says so.
+        assert not request.sequence or request.sequence > self.sequence
+        self.sequence = request.sequence or self.sequence + (what != "ping")
         if not self.opened:
             assert what == "open", f"{what} before Opened"
             return [self._open(request.open)]
