@@ -305,6 +305,10 @@ def _all(steps: Sequence[Step], draft: Draft) -> Sequence[operations.Operation]:
 
 
 def _abandon(transport: Transport, queries: Queries) -> None:
-    # On any thread, in the middle of anything.
-    _transports.discard(transport)
-    transport.abandon(queries.close)
+    # On any thread, in the middle of anything; perhaps while the program ends, when all are closed already.
+    def closed() -> None:
+        queries.close()
+        _transports.discard(transport)
+
+    if not transport.stopped:
+        transport.abandon(closed)

@@ -115,9 +115,9 @@ class Mirror:
     def __len__(self) -> int:
         return sum(len(layer.entities) for layer in self._layers.values())
 
-    def restore(self, now_ns: int) -> Iterator[Union[bytes, wire.Put]]:
+    def restore(self, now_ns: int) -> Iterator[Union[bytes, wire.Put, None]]:
         """What makes an empty scene this one: objects before those that use them, then layer after layer in the order of
-        their creation, and at last instances of objects that were not defined here."""
+        their creation; at last, after None, instances of objects that were not defined here, which may be refused."""
         self.purge(now_ns)
         yield from self._definitions()
         unknown: list[_Entity] = []
@@ -130,6 +130,8 @@ class Mirror:
                     unknown.append(entity)
                 else:
                     yield from _again(entity, now_ns)
+        if unknown:
+            yield None
         for entity in unknown:
             yield from _again(entity, now_ns)
 

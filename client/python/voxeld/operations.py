@@ -294,22 +294,23 @@ def undefine(name: str, cascade: bool) -> Undefine:
         pb.StreamRequest(delete_object=pb.DeleteObject(object=name, cascade=cascade)).SerializeToString(), name, cascade)
 
 
-def restoring(mirror: Mirror, now_ns: int) -> Iterator[Operation]:
-    """What makes the mirror's scene of whatever is left of it."""
+def restoring(mirror: Mirror, now_ns: int) -> Iterator[Optional[Operation]]:
+    """What makes the mirror's scene of whatever is left of it. None: what follows is to be a commit of its own."""
     yield clear_all()
     for one in mirror.restore(now_ns):
-        yield Request(one) if isinstance(one, bytes) else Puts([one])
+        yield one if one is None else Request(one) if isinstance(one, bytes) else Puts([one])
 
 
-def parted(all_of_it: Iterable[Operation], most_bytes: int, most_operations: int) -> Iterator[list[Operation]]:
+def parted(all_of_it: Iterable[Optional[Operation]], most_bytes: int, most_operations: int) -> Iterator[list[Operation]]:
     """As commits of at most so much each; none of them empty."""
     commit: list[Operation] = []
     size = 0
     for operation in all_of_it:
-        if commit and (size + operation.size() > most_bytes or len(commit) >= most_operations):
+        if commit and (operation is None or size + operation.size() > most_bytes or len(commit) >= most_operations):
             yield commit
             commit, size = [], 0
-        commit.append(operation)
-        size += operation.size()
+        if operation is not None:
+            commit.append(operation)
+            size += operation.size()
     if commit:
         yield commit

@@ -267,7 +267,7 @@ class Session:
         self.book.receipt(receipt, () if unit is None else unit.issues)
 
     def _tell_of_restore(self, why: str) -> None:
-        issue = Issue("", "", "commit", "QUOTA_EXCEEDED", f"what was up before the connection was lost is not put up again: {why}")
+        issue = Issue("", "", "commit", "REFUSED", f"what was up before the connection was lost is not put up again: {why}")
         self.book.recent_issues.append(issue)
         self.on_issue(issue)
 
@@ -337,9 +337,9 @@ class Session:
 
     def _restore(self, limits: types_pb2.Limits, now_ns: int) -> None:
         self.restored += 1
-        scene = []
+        scene: list[Optional[operations.Operation]] = []
         for operation in operations.restoring(self.mirror, now_ns):
-            if operation.largest() <= self.most_bytes:
+            if operation is None or operation.largest() <= self.most_bytes:
                 scene.append(operation)
             else:
                 self._tell_of_restore(f"it has {operation.largest()} bytes, and the server takes messages of at most "

@@ -79,6 +79,11 @@ class Transport:
         """Of the session."""
         return self._lock
 
+    @property
+    def stopped(self) -> bool:
+        """Nothing more will be sent."""
+        return self._stopped
+
     def submit(self, make: Callable[[Frame], tuple[Unit, Callable[[], None]]], wait_for_room: bool) -> Frame:
         """`make` is called under the lock with the commit's frame, and gives the commit and what is to be done, under the
         lock too, once it was taken. BufferFull unless `wait_for_room`."""

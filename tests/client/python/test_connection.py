@@ -216,12 +216,26 @@ class Callbacks(Case):
 
     def test_all_is_told_before_close_is_back(self) -> None:
         self.serve()
-        told: list[str] = []
-        v = self.connect(on_issue=lambda issue: told.append(issue.id))
+        go, told = threading.Event(), []
+
+        def on_issue(issue: voxel.Issue) -> None:
+            go.wait(LONG)
+            told.append(issue.id)
+
+        v = self.connect(on_issue=on_issue)
         for number in range(20):
             v.sphere(f"s{number}", label=REFUSED)
         v.commit().wait(LONG)
-        v.close(LONG)
+        waiting = v._transport._callbacks
+        drain = waiting.drain
+
+        def close_waits(timeout: float) -> None:
+            self.assertEqual(told, [])
+            go.set()
+            drain(timeout)
+
+        with mock.patch.object(waiting, "drain", close_waits):
+            v.close(LONG)
         self.assertEqual(len(told), 20)
 
     def test_a_slow_one_has_no_endless_queue(self) -> None:

@@ -117,18 +117,19 @@ class Accepted(Case):
         self.start(PlainServer())
         self.commit(puts("plain", "x"))
         self.commit(operations.layer_state(pb.LayerState(layer="stated", opacity=9)), puts("stated", "x"))
-        self.commit(operations.delete_id("never made", "x"), puts("last", "x"))
+        self.commit(operations.delete_id("never made", "x"), puts("emptied", "x"), puts("last", "x"))
+        self.commit(operations.delete_id("emptied", "x"))
         self.link.settle()
         self.again(forget=True)
         assert self.server.session is not None
-        self.assertEqual(list(self.server.session.scene), ["plain", "stated", "last"])
+        self.assertEqual(list(self.server.session.scene), ["plain", "stated", "emptied", "last"])
 
     def test_instances_of_others_objects_take_nothing_along(self) -> None:
-        self.start(PlainServer(max_uncommitted_bytes=400), strict=True)
+        self.start(PlainServer(), strict=True)
         assert self.server.session is not None
         self.server.session.objects["another's"] = b""
         self.commit(puts_of("l", "i", uses="another's"))
-        self.commit(puts("l", "x", size=200))
+        self.commit(puts("l", "x"))
         self.link.settle()
         self.again(forget=True)
         self.assertEqual(self.ids(), ["x"])
@@ -149,6 +150,9 @@ class Accepted(Case):
         self.assertEqual(self.ids(), ["after", "long"])
         self.assertLessEqual(self.entity("long").lifetime_ns, 98 * SECOND, "what is left of it")
         self.assertGreater(self.entity("long").lifetime_ns, 90 * SECOND)
+        self.link.now += 100 * SECOND
+        self.again(forget=True)
+        self.assertEqual(self.ids(), ["after"], "nor if nothing was committed since")
 
     def test_what_is_renewed_for_ever_is_held_once(self) -> None:
         mirror = self.start(PlainServer()) or self.session.mirror
