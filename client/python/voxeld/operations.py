@@ -152,9 +152,6 @@ class Refused:
         self._where = {(issue.sequence, issue.layer, issue.id) for issue in issues}
         self._sequences = {issue.sequence for issue in issues}
 
-    def __bool__(self) -> bool:
-        return bool(self._sequences)
-
     def has(self, sequence: int) -> bool:
         return sequence in self._sequences
 
@@ -165,9 +162,10 @@ class Refused:
 
 
 class Unit:
-    """A commit and the operations before it. `bytes` is what it weighs in the buffer."""
+    """A commit and the operations before it. `bytes` is what it weighs in the buffer, `largest` the greatest of its messages
+    that cannot be made smaller."""
 
-    __slots__ = ("frame", "operations", "commit", "bytes", "drops", "sequences", "commit_sequence", "issues", "restores",
+    __slots__ = ("frame", "operations", "commit", "bytes", "largest", "drops", "sequences", "commit_sequence", "issues", "restores",
                  "on_accepted", "_most")
 
     def __init__(self, frame: Frame, operations: Iterable[Operation], commit: pb.Commit,
@@ -178,7 +176,6 @@ class Unit:
         self.on_accepted = on_accepted
         self.restores = restores  # it sends anew what had been accepted
         self.drops = 0            # frames given up before it was sent: what its commit reports
-        self.bytes = 0
         self.weigh()
         self.forget_sending()
 
@@ -191,6 +188,7 @@ class Unit:
 
     def weigh(self) -> None:
         self.bytes = weigh(self.operations)
+        self.largest = max((operation.largest() for operation in self.operations), default=0)
 
     @property
     def timed(self) -> bool:
@@ -200,10 +198,6 @@ class Unit:
     def droppable(self) -> bool:
         """A flow policy may give up its frames."""
         return not self.commit.must_show and not self.timed
-
-    def largest(self) -> int:
-        """The greatest of its messages that cannot be made smaller, in bytes."""
-        return max((operation.largest() for operation in self.operations), default=0)
 
     def _messages(self) -> Iterator[Union[Sequence[wire.Put], Request]]:
         """All but the commit. Puts side by side share messages."""
@@ -231,11 +225,11 @@ class Unit:
     def apply(self, mirror: Mirror, now_ns: int) -> None:
         """It was accepted; less what its issues say was refused."""
         mirror.purge(now_ns)
-        refused = Refused(self.issues)
-        if not refused:
+        if not self.issues:
             for operation in self.operations:
                 operation.apply(mirror, now_ns)
             return
+        refused = Refused(self.issues)
         frame: Optional[Immediate] = None  # that has begun, with what was taken of it
         for message, sequence in zip(self._messages(), self.sequences):
             if isinstance(message, _Begin):

@@ -36,23 +36,26 @@ class Stages:
 
     @staticmethod
     def of(stages: pb.Stages) -> "Stages":
-        return Stages(*(getattr(stages, f.name) for f in fields(Stages)))
+        return Stages(*(getattr(stages, name) for name in _STAGES))
 
     def durations_ms(self) -> dict[str, float]:
         """How long each stage took, from the stage before that is known: {"received": 0.1, …}."""
         result: dict[str, float] = {}
         last = 0
-        for field in fields(self):
-            at = int(getattr(self, field.name))
+        for name in _STAGES:
+            at = int(getattr(self, name))
             if at and last:
-                result[field.name[:-3]] = (at - last) / 1e6
+                result[name[:-3]] = (at - last) / 1e6
             last = at or last
         return result
 
     def total_ms(self) -> Optional[float]:
         """From the first stage known to the last; None if fewer than two are."""
-        known = [at for at in (int(getattr(self, f.name)) for f in fields(self)) if at]
+        known = [at for at in (int(getattr(self, name)) for name in _STAGES) if at]
         return (known[-1] - known[0]) / 1e6 if len(known) > 1 else None
+
+
+_STAGES = tuple(field.name for field in fields(Stages))
 
 
 @dataclass(frozen=True)

@@ -119,10 +119,9 @@ class Session:
 
     def _too_large(self, unit: Unit) -> str:
         """Why the server would end the stream at it; empty: it would not."""
-        largest = unit.largest()
-        if largest <= self.most_bytes:
+        if unit.largest <= self.most_bytes:
             return ""
-        return (f"an operation of the commit has {largest} bytes and the server takes messages of at most {self.most_bytes} "
+        return (f"an operation of the commit has {unit.largest} bytes and the server takes messages of at most {self.most_bytes} "
                 "(max_message_bytes); nothing of the commit was sent; make several things of it")
 
     def open_request(self) -> bytes:
@@ -182,13 +181,12 @@ class Session:
             self._count(message)
             unit.sequences.append(self._sequence)
             return message
-        commit = pb.Commit()
-        commit.CopyFrom(unit.commit)
-        commit.frame_id = unit.frame.id
-        commit.send_time_ns = now_ns
         unit.drops += self.outbox.take_unreported()
-        commit.client_drops = unit.drops
-        message = self._count(pb.StreamRequest(sequence=self._sequence + 1, commit=commit).SerializeToString())
+        request = pb.StreamRequest(sequence=self._sequence + 1, commit=unit.commit)
+        request.commit.frame_id = unit.frame.id
+        request.commit.send_time_ns = now_ns
+        request.commit.client_drops = unit.drops
+        message = self._count(request.SerializeToString())
         unit.commit_sequence = self._sequence
         self._on_way.append(unit)
         self._current = None
