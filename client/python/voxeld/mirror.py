@@ -1,7 +1,8 @@
-"""The scene as the server has accepted it from this client, as wire bytes: what a server that knows nothing of it any more is
-told again.
+"""The scene as the server has accepted it from this client, as wire bytes: what a server that knows nothing of it any more
+is told again.
 
-It shares its bytes with what was sent; of each entity, layer and object it keeps the newest alone, and none whose time is over.
+It shares its bytes with what was sent; of each entity, layer and object it keeps the newest alone, and none whose time is
+over.
 """
 from __future__ import annotations
 

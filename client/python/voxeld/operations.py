@@ -162,11 +162,11 @@ class Refused:
 
 
 class Unit:
-    """A commit and the operations before it. `bytes` is what it weighs in the buffer, `largest` the greatest of its messages
-    that cannot be made smaller."""
+    """A commit and the operations before it. `bytes` is what it weighs in the buffer, `largest` the greatest of its
+    messages that cannot be made smaller."""
 
-    __slots__ = ("frame", "operations", "commit", "bytes", "largest", "drops", "sequences", "commit_sequence", "issues", "restores",
-                 "on_accepted", "_most")
+    __slots__ = ("frame", "operations", "commit", "bytes", "largest", "drops", "sequences", "commit_sequence", "issues",
+                 "restores", "on_accepted", "_most")
 
     def __init__(self, frame: Frame, operations: Iterable[Operation], commit: pb.Commit,
                  on_accepted: Optional[Callable[[], None]] = None, restores: bool = False) -> None:

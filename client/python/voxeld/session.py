@@ -121,8 +121,8 @@ class Session:
         """Why the server would end the stream at it; empty: it would not."""
         if unit.largest <= self.most_bytes:
             return ""
-        return (f"an operation of the commit has {unit.largest} bytes and the server takes messages of at most {self.most_bytes} "
-                "(max_message_bytes); nothing of the commit was sent; make several things of it")
+        return (f"an operation of the commit has {unit.largest} bytes and the server takes messages of at most "
+                f"{self.most_bytes} (max_message_bytes); nothing of the commit was sent; make several things of it")
 
     def open_request(self) -> bytes:
         """The first message of a stream."""
@@ -265,7 +265,8 @@ class Session:
         self.book.receipt(receipt, () if unit is None else unit.issues)
 
     def _tell_of_restore(self, why: str) -> None:
-        issue = Issue("", "", "commit", "REFUSED", f"what was up before the connection was lost is not put up again: {why}")
+        issue = Issue("", "", "commit", "REFUSED",
+                      f"what was up before the connection was lost is not put up again: {why}")
         self.book.recent_issues.append(issue)
         self.on_issue(issue)
 
@@ -322,7 +323,8 @@ class Session:
                 if unit.commit.present_at_ns > opened.server_time_ns:
                     yield unit
                 else:
-                    self.book.unknown(frame, "the connection was lost about when its time came; whether it was shown is not known")
+                    self.book.unknown(
+                        frame, "the connection was lost about when its time came; whether it was shown is not known")
             elif frame.id != applied and self._settings.strict:
                 self.book.unknown(
                     frame, "the connection was lost before its answer came; whether the server refused it is not known")

@@ -133,6 +133,7 @@ class Streams(Case):
         with self.assertLogs("voxeld") as logs:
             v.sphere("a", label=REFUSED)
             v.commit().wait(LONG)
+            v._transport._callbacks.drain(LONG)
             v.commit().wait(LONG)
         self.assertIn("ZeroDivisionError", logs.output[0])
         self.assertEqual(v.counts["streams_opened"], 1)
