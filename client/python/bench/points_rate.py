@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""How many clouds of so many points (16 bytes each: float32 × 3 and RGBX) go through a second. Prints JSON.
+"""How many clouds of so many points (16 bytes each: float32 × 3 and RGBX) go through a second, and what that costs here.
+Prints JSON; ends with 1 if some were not accepted, or one cost more than --most-cpu-ms.
 
-usage: points_rate.py [--server ADDRESS] [--points N] [--frames N] [--flow POLICY]
-The daemon is to run with no display, or the display's own rate is in the figure: voxeld --listen unix:/tmp/v.sock --http off
+usage: points_rate.py [--server ADDRESS] [--points N] [--frames N] [--flow POLICY] [--most-cpu-ms T]
+The daemon is to run with no display, or the display's own rate is in the figure; there is one by default:
+    echo 'display = []' >none.toml; voxeld --config none.toml --listen unix:/tmp/v.sock --http off
 """
 from __future__ import annotations
 
 import argparse
 import json
 import resource
+import sys
 import time
 
 import numpy as np
@@ -16,7 +19,7 @@ import numpy as np
 import voxeld as voxel
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description="frames of points a second")
     parser.add_argument("--server", help="HOST:PORT or unix:PATH (default: as voxelctl)")
     parser.add_argument("--points", type=int, default=1_000_000)
@@ -24,6 +27,7 @@ def main() -> None:
     parser.add_argument("--warm-up", type=int, default=10, help="frames before the clock starts")
     parser.add_argument("--flow", default="reliable", choices=["reliable", "latest", "drop_oldest"])
     parser.add_argument("--ahead", type=int, default=3, help="frames drawn before the first of them is accepted")
+    parser.add_argument("--most-cpu-ms", type=float, help="of processor time that a frame may take this process")
     options = parser.parse_args()
 
     random = np.random.default_rng(1)
@@ -50,15 +54,23 @@ def main() -> None:
                 ticket.future().result(60)
         seconds = time.perf_counter() - began
         now = resource.getrusage(resource.RUSAGE_SELF)
+        cpu_s = now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime
         arrived = sum(ticket.state == "accepted" for ticket in tickets)
         print(json.dumps({
             "points": options.points, "frames": options.frames, "accepted": arrived, "flow": options.flow,
             "seconds": round(seconds, 3), "frames_per_second": round(arrived / seconds, 2),
             "megabytes_per_second": round(arrived * options.points * 16 / seconds / 1e6, 1),
             "draw_ms": round(1000 * draw_s / options.frames, 2),
-            "client_cores": round((now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime) / seconds, 2),
+            "client_cores": round(cpu_s / seconds, 2), "client_cpu_ms": round(1000 * cpu_s / options.frames, 2),
             "counts": v.counts}))
+    faults = []
+    if options.flow == "reliable" and arrived != options.frames:
+        faults.append(f"{options.frames - arrived} of {options.frames} frames were not accepted")
+    if options.most_cpu_ms is not None and 1000 * cpu_s / options.frames > options.most_cpu_ms:
+        faults.append(f"a frame took {1000 * cpu_s / options.frames:.2f} ms of processor time, more than {options.most_cpu_ms}")
+    print("; ".join(faults), file=sys.stderr, end="\n" if faults else "")
+    return 1 if faults else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

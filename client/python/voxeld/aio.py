@@ -9,12 +9,12 @@ from __future__ import annotations
 import asyncio
 from concurrent.futures import Future
 from types import TracebackType
-from typing import Callable, Optional, Type, Union
+from typing import AsyncIterator, Callable, Optional, Type, Union
 
 from .base import BaseConnection, settings
-from .connection import _open
 from .errors import ConnectionLost
 from .handles import FrameBlock
+from .queries import ChangeSet
 from .receipts import Frame, Issue, Outcome
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
@@ -53,9 +53,7 @@ class Connection(BaseConnection):
             raise asyncio.TimeoutError(f"after {timeout} s {self.counts['waiting_commits']} commits still wait to be sent")
 
     async def close(self, timeout: float = 5.0) -> None:
-        _open.discard(self)
-        await asyncio.to_thread(self._transport.close, timeout)
-        self._queries.close()
+        await asyncio.to_thread(self._close, timeout)
 
     async def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
         return await asyncio.to_thread(self._queries.displays, timeout)
@@ -70,6 +68,19 @@ class Connection(BaseConnection):
                        timeout: Optional[float] = 5.0) -> list[scene_pb2.EntityInfo]:
         return await asyncio.to_thread(self._queries.entities, layer, prefix, owner, timeout)
 
+    async def layers(self, owner: int = 0, timeout: Optional[float] = 5.0) -> list[scene_pb2.LayerInfo]:
+        return await asyncio.to_thread(self._queries.layers, owner, timeout)
+
+    async def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
+                          timeout: Optional[float] = None) -> AsyncIterator[ChangeSet]:
+        """The scene's changes as they come; the first has all there is. `async for`; the end of the loop ends the call."""
+        changes = self._queries.watch(layer, owner, contents, timeout)
+        try:
+            while (change := await asyncio.to_thread(changes.next)) is not None:
+                yield change
+        finally:
+            changes.close()
+
 
 async def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout: float = 5.0, wait: bool = True,
                   autocommit: bool = True, flow: str = "reliable", keep_frames: int = 1,
@@ -79,7 +90,6 @@ async def connect(server: Optional[str] = None, *, name: Optional[str] = None, t
     """As voxeld.connect(). A full buffer raises BufferFull; flush() waits for room."""
     options = settings(name, flow, keep_frames, on_disconnect, strict, outcomes, buffer_bytes, owner_token, resume_token)
     connection = Connection(server, options, autocommit, "raise", on_issue)
-    _open.add(connection)
     if wait:
         try:
             await connection.wait_connected(timeout)

@@ -1,20 +1,24 @@
 """A connection as far as nothing blocks: drawing, layers, commits. connection.py and aio.py add what waits."""
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import sys
 import threading
 import time
+import weakref
 from contextlib import contextmanager
-from typing import Any, Callable, Iterator, Optional, Sequence, Union
+from contextvars import ContextVar
+from typing import Any, Callable, Iterator, Mapping, Optional, Sequence, Union
 
 import numpy.typing as npt
 
-from . import address, operations, picture, transforms, wire
+from . import address, operations, picture, transforms
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue, VoxelError
-from .handles import FrameBlock, Handle, Layer, ObjectBlock, put_parts
+from .handles import FrameBlock, Handle, Layer, ObjectBlock
+from .pieces import Draft, Pieces
 from .queries import Queries
 from .receipts import Frame, Issue
 from .session import FLOWS, Session, Settings
@@ -25,6 +29,27 @@ from .v1 import scene_pb2 as pb
 log = logging.getLogger("voxeld")
 
 DEFAULT_LAYER = "main"
+
+# What a call comes to, once its turn has come: by then it is known what there is.
+Step = Callable[[Draft], Sequence[operations.Operation]]
+
+
+class _Batch:
+    def __init__(self, connection: "BaseConnection") -> None:
+        self.connection: Optional[BaseConnection] = connection  # None: it is at its end
+        self.steps: list[Step] = []
+
+
+# Of this thread or task, the innermost last. A task that is made within a batch draws in it while that lasts.
+_batches: ContextVar[tuple[_Batch, ...]] = ContextVar("voxeld_batches", default=())
+
+_transports: set[Transport] = set()
+
+
+@atexit.register
+def _close_all() -> None:
+    for transport in list(_transports):
+        transport.close(2.0)
 
 
 def settings(name: Optional[str], flow: str, keep_frames: int, on_disconnect: Union[str, float], strict: bool,
@@ -59,12 +84,21 @@ class BaseConnection(Draw[Handle]):
         self.autocommit = autocommit
         self._waits = when_full == "wait"
         self._staging = threading.Lock()
-        self._local = threading.local()
-        self._staged: list[operations.Operation] = []
-        self._pieces: dict[tuple[str, str], int] = {}  # how many a name stands for, if not one
+        self._staged: list[Step] = []
+        self._pieces = Pieces()  # under the transport's lock
         self._session = Session(options)
         self._transport = Transport(self.server, self._session, on_issue or (lambda issue: log.warning("%s", issue)))
         self._queries = Queries(self.server)
+        _transports.add(self._transport)
+        # Its threads would go on without it, and what it drew stay lit.
+        self._abandoned = weakref.finalize(self, _abandon, self._transport, self._queries)
+        self._abandoned.atexit = False
+
+    def _close(self, timeout: float) -> None:
+        self._abandoned.detach()
+        self._transport.close(timeout)
+        _transports.discard(self._transport)
+        self._queries.close()
 
     def __repr__(self) -> str:
         state = "connected" if self.connected else "not connected"
@@ -97,43 +131,44 @@ class BaseConnection(Draw[Handle]):
 
     def remove_object(self, name: str, *, cascade: bool = False) -> Optional[Frame]:
         """`cascade`: its instances too; else having some is an issue."""
-        return self._stage([operations.undefine(checked_name(name, "object"), cascade)])
+        return self._stage_ready([operations.undefine(checked_name(name, "object"), cascade)])
 
     def clear(self, layer: Optional[str] = None) -> Optional[Frame]:
         """Takes out everything of this connection's, or of one layer."""
-        with self._staging:
-            self._forget_pieces(layer)
-        return self._stage([operations.clear_all() if layer is None else operations.clear_layer(layer)])
+        clear = operations.clear_all() if layer is None else operations.clear_layer(layer)
+
+        def step(draft: Draft) -> Sequence[operations.Operation]:
+            draft.clear(layer)
+            return [clear]
+
+        return self._stage(step)
 
     # --------------------------------------------------------------------------------------------------- commits
 
     @contextmanager
     def batch(self, *, present_in: Optional[float] = None, must_show: bool = False) -> Iterator[list[Frame]]:
-        """This thread's calls within take effect together, at the end: one commit, whose Frame is then in the list that
-        the `with` gives. If the block raises, none does. Inside another batch it is part of that one."""
+        """The calls within, of this thread or asyncio task, take effect together, at the end: one commit, whose Frame is then
+        in the list that the `with` gives. If the block raises, none does. Inside another batch it is part of that one."""
         if self._batched() is not None:
             yield []
             return
-        with self._staging:
-            pieces = dict(self._pieces)
-        operations_: list[operations.Operation] = []
+        batch = _Batch(self)
         frames: list[Frame] = []
-        self._local.batch = operations_
+        _batches.set((*_batches.get(), batch))
         try:
             yield frames
-        except BaseException:
-            with self._staging:
-                self._pieces = pieces
-            raise
         finally:
-            self._local.batch = None
-        frame = self._stage(operations_, present_in, must_show)
+            batch.connection = None
+            _batches.set(tuple(one for one in _batches.get() if one is not batch))
+        frame = self._stage(lambda draft: _all(batch.steps, draft), present_in, must_show)
         if frame is not None:
             frames.append(frame)
 
-    def _batched(self) -> Optional[list[operations.Operation]]:
-        batch: Optional[list[operations.Operation]] = getattr(self._local, "batch", None)
-        return batch
+    def _batched(self) -> Optional[_Batch]:
+        for batch in _batches.get():
+            if batch.connection is self:
+                return batch
+        return None
 
     def commit(self, *, present_in: Optional[float] = None, present_at_ns: int = 0, must_show: bool = False) -> Frame:
         """Everything drawn since the last one takes effect together. Without anything drawn it tells when all that came
@@ -144,80 +179,62 @@ class BaseConnection(Draw[Handle]):
         with self._staging:
             staged, self._staged = self._staged, []
         try:
-            return self._submit(staged, present_in, present_at_ns, must_show)
+            return self._submit(lambda draft: _all(staged, draft), present_in, present_at_ns, must_show)
         except VoxelError:
             with self._staging:
                 self._staged = staged + self._staged  # to be tried again
             raise
 
-    def _submit(self, staged: Sequence[operations.Operation], present_in: Optional[float], present_at_ns: int,
-                must_show: bool) -> Frame:
+    def _submit(self, step: Step, present_in: Optional[float], present_at_ns: int, must_show: bool) -> Frame:
         options = pb.Commit(present_at_ns=present_at_ns, must_show=must_show)
         if present_in is not None:
             options.present_at_ns = self.server_time_ns() + int(present_in * 1e9)
-        return self._transport.submit(lambda frame: operations.Unit(frame, staged, options), self._waits)
 
-    def _stage(self, added: Sequence[operations.Operation], present_in: Optional[float] = None,
-               must_show: bool = False) -> Optional[Frame]:
+        def make(frame: Frame) -> tuple[operations.Unit, Callable[[], None]]:
+            draft = self._pieces.draft()
+            unit = operations.Unit(frame, step(draft), options)
+
+            def taken() -> None:
+                unit.on_accepted = draft.keep()
+
+            return unit, taken
+
+        return self._transport.submit(make, self._waits)
+
+    def _stage(self, step: Step, present_in: Optional[float] = None, must_show: bool = False) -> Optional[Frame]:
         batch = self._batched()
         if batch is not None:
-            batch += added
+            batch.steps.append(step)
         elif self.autocommit:
-            return self._submit(added, present_in, 0, must_show)
+            return self._submit(step, present_in, 0, must_show)
         else:
             with self._staging:
-                self._staged += added
+                self._staged.append(step)
         return None
 
-    def _put(self, layer: str, name: str, shape: Sequence[wire.Packed], look: Look) -> Optional[Frame]:
-        puts = put_parts(layer, name, shape, look)
-        stay = {put.id for put in puts.puts}
-        with self._staging:
-            gone = [operations.delete_id(layer, id) for id in self._ids(layer, name) if id not in stay]
-            self._count(layer, name, len(shape))
-        return self._stage([*gone, puts])
+    def _stage_ready(self, ready: Sequence[operations.Operation]) -> Optional[Frame]:
+        return self._stage(lambda draft: ready)
 
-    def _immediate(self, layer: str, puts: Sequence[tuple[str, operations.Puts]], present_in: Optional[float],
+    def _put(self, layer: str, name: str, puts: operations.Puts) -> Optional[Frame]:
+        return self._stage(lambda draft: [
+            *(operations.delete_id(layer, id) for id in draft.put(layer, name, len(puts.puts))), puts])
+
+    def _immediate(self, layer: str, puts: Mapping[str, operations.Puts], present_in: Optional[float],
                    must_show: bool) -> Optional[Frame]:
-        with self._staging:
-            self._forget_pieces(layer)
-            for name, one in puts:
-                self._count(layer, name, len(one.puts))
-        return self._stage([operations.Immediate(layer, [one for _, one in puts])], present_in, must_show)
+        def step(draft: Draft) -> Sequence[operations.Operation]:
+            draft.clear(layer)
+            for name, one in puts.items():
+                draft.put(layer, name, len(one.puts))
+            return [operations.Immediate(layer, list(puts.values()))]
+
+        return self._stage(step, present_in, must_show)
 
     def _move(self, layer: str, name: str, matrix: Matrix) -> Optional[Frame]:
         numbers = list(transforms.to_wire(matrix).m)
-        with self._staging:
-            ids = self._ids(layer, name)
-        return self._stage([operations.move(layer, id, numbers) for id in ids])
+        return self._stage(lambda draft: [operations.move(layer, id, numbers) for id in draft.now(layer, name)])
 
     def _remove(self, layer: str, name: str) -> Optional[Frame]:
-        with self._staging:
-            ids = self._ids(layer, name)
-            self._count(layer, name, 1)
-        return self._stage([operations.delete_id(layer, id) for id in ids])
-
-    def _define(self, name: str, parts: Sequence[wire.Packed]) -> Optional[Frame]:
-        definition = operations.define(name, parts)
-        info = self._session.info
-        most = info.limits.max_message_bytes if info is not None else 0
-        if most and definition.size() > most:
-            raise InvalidValue(
-                f"the object {name!r} has {definition.size()} bytes and the server takes {most}; make several")
-        return self._stage([definition])
-
-    def _forget_pieces(self, layer: Optional[str]) -> None:
-        self._pieces = {k: n for k, n in self._pieces.items() if layer is not None and k[0] != layer}
-
-    def _ids(self, layer: str, name: str) -> list[str]:
-        pieces = self._pieces.get((layer, name), 1)
-        return [name] if pieces == 1 else [f"{name}/{i}" for i in range(pieces)]
-
-    def _count(self, layer: str, name: str, pieces: int) -> None:
-        if pieces == 1:
-            self._pieces.pop((layer, name), None)
-        else:
-            self._pieces[layer, name] = pieces
+        return self._stage(lambda draft: [operations.delete_id(layer, id) for id in draft.remove(layer, name)])
 
     # ------------------------------------------------------------------------------------------------- what is so
 
@@ -256,7 +273,7 @@ class BaseConnection(Draw[Handle]):
             return {**session.book.counts, "client_drops": session.outbox.dropped_frames,
                     "merged_operations": session.outbox.merged_operations, "waiting_commits": len(session.outbox),
                     "waiting_bytes": session.outbox.bytes, "streams_opened": session.streams_opened,
-                    "resumed": session.resumed}
+                    "resumed": session.resumed, "restored": session.restored}
 
     def server_time_ns(self) -> int:
         """The server's monotonic clock, now, by the last pings. VoxelError before the first answer."""
@@ -281,3 +298,17 @@ class BaseConnection(Draw[Handle]):
         except VoxelError as error:
             bundle["text/plain"] = f"{self!r}\n(no picture: {error})"
         return bundle
+
+
+def _all(steps: Sequence[Step], draft: Draft) -> Sequence[operations.Operation]:
+    return [operation for step in steps for operation in step(draft)]
+
+
+def _abandon(transport: Transport, queries: Queries) -> None:
+    # On any thread, in the middle of anything; perhaps while the program ends, when all are closed already.
+    def closed() -> None:
+        queries.close()
+        _transports.discard(transport)
+
+    if not transport.stopped:
+        transport.abandon(closed)

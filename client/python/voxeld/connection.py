@@ -1,8 +1,6 @@
 """connect(), and the calls that wait when asked to."""
 from __future__ import annotations
 
-import atexit
-import weakref
 from types import TracebackType
 from typing import Callable, Iterator, Optional, Type, Union
 
@@ -12,9 +10,6 @@ from .queries import ChangeSet
 from .receipts import Issue
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
-
-_open: "weakref.WeakSet[BaseConnection]" = weakref.WeakSet()
-
 
 class Connection(BaseConnection):
     """Drawing never waits; what is below does."""
@@ -38,9 +33,7 @@ class Connection(BaseConnection):
 
     def close(self, timeout: float = 5.0) -> None:
         """Sends what waits, within `timeout`, and ends the session; what becomes of its layers is `on_disconnect`."""
-        _open.discard(self)
-        self._transport.close(timeout)
-        self._queries.close()
+        self._close(timeout)
 
     def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
         return self._queries.displays(timeout)
@@ -84,11 +77,11 @@ def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout
     owner_token    joins that owner; resume_token takes up that session, if the server knows it still
     on_issue       is called with each refused operation, on a thread of its own; by default it is logged ("voxeld")
 
-    A lost connection is tried again for ever, at growing intervals; the session is resumed, or the scene sent anew.
+    A lost connection is tried again for ever, at growing intervals; the session is resumed, or the scene sent anew. It is
+    closed by close(), at the end of a `with`, or when nothing holds it or one of its handles any more.
     """
     options = settings(name, flow, keep_frames, on_disconnect, strict, outcomes, buffer_bytes, owner_token, resume_token)
     connection = Connection(server, options, autocommit, when_full, on_issue)
-    _open.add(connection)
     if wait:
         try:
             connection.wait_connected(timeout)
@@ -96,9 +89,3 @@ def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout
             connection.close(0)
             raise
     return connection
-
-
-@atexit.register
-def _close_all() -> None:
-    for connection in list(_open):
-        connection._transport.close(2.0)

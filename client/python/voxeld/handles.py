@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Type
 
 import numpy.typing as npt
 
-from . import operations, transforms, wire
+from . import operations, shapes, transforms, wire
 from .arrays import as_array, number, vector
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue
+from .pieces import free_name, ids
 from .receipts import Accepted, Frame, Issue, Outcome
 from .shapes import choice
 from .transforms import Matrix
@@ -38,7 +39,9 @@ class Handle:
         return f"<{self._make.__name__} {self.name!r} in layer {self.layer!r}>"
 
     def _put(self) -> "Handle":
-        self.frame = self._connection._put(self.layer, self.name, self._make(*self._args, **self._options), self._look)
+        shape = self._make(*self._args, **self._options)
+        puts = put_parts(self.layer, self.name, shape, self._look, _uses(self._make, self._args))
+        self.frame = self._connection._put(self.layer, self.name, puts)
         return self
 
     @property
@@ -126,7 +129,7 @@ class Layer(Draw[Handle]):
             state.region.max.CopyFrom(types_pb2.Vec3(x=high[0], y=high[1], z=high[2]))
         if mask is not None:
             state.mask_layer = mask
-        return self._connection._stage([operations.layer_state(state)])
+        return self._connection._stage_ready([operations.layer_state(state)])
 
     def frame(self, *, present_in: Optional[float] = None, must_show: bool = False) -> "FrameBlock":
         return self._connection.frame(self.name, present_in=present_in, must_show=must_show)
@@ -138,11 +141,15 @@ class Layer(Draw[Handle]):
         return self._connection.clear(self.name)
 
 
-def put_parts(layer: str, name: str, shape: Sequence[wire.Packed], look: Look) -> operations.Puts:
-    """A shape under its name; one of several pieces under name/0, name/1, …"""
+def put_parts(layer: str, name: str, shape: Sequence[wire.Packed], look: Look, uses: str = "") -> operations.Puts:
+    """A shape under its name; if it is of several pieces, under an id for each. `uses`: the object that it draws."""
     entity = look.to_bytes()
-    ids = [name] if len(shape) == 1 else [f"{name}/{i}" for i in range(len(shape))]
-    return operations.Puts([wire.put(layer, id, entity, one) for id, one in zip(ids, shape)], look.lifetime_ns)
+    return operations.Puts([wire.put(layer, id, entity, one, uses, look.lifetime_ns)
+                            for id, one in zip(ids(free_name(name), len(shape)), shape)])
+
+
+def _uses(make: Make, args: tuple[Any, ...]) -> str:
+    return str(args[0]) if make is shapes.instance else ""
 
 
 class FrameBlock(Draw[None]):
@@ -152,12 +159,12 @@ class FrameBlock(Draw[None]):
     def __init__(self, connection: "BaseConnection", layer: str, present_in: Optional[float], must_show: bool) -> None:
         self._connection = connection
         self._layer = checked_name(layer, "layer")
-        self._parts: list[tuple[str, operations.Puts]] = []
+        self._parts: dict[str, operations.Puts] = {}
         self._present_in, self._must_show = present_in, must_show
         self._frame: Optional[Frame] = None
 
     def __enter__(self) -> "FrameBlock":
-        self._parts = []
+        self._parts = {}
         return self
 
     def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
@@ -166,8 +173,8 @@ class FrameBlock(Draw[None]):
             self._frame = self._connection._immediate(self._layer, self._parts, self._present_in, self._must_show)
 
     def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> None:
-        puts = put_parts(self._layer, checked_name(name, "name"), make(*args, **options), look)
-        self._parts.append((name, puts))
+        checked_name(name, "name")
+        self._parts[name] = put_parts(self._layer, name, make(*args, **options), look, _uses(make, args))
 
     @property
     def ticket(self) -> Frame:
@@ -203,22 +210,25 @@ class ObjectBlock(Draw[None]):
         self._connection = connection
         self.name = checked_name(name, "object")
         self._parts: list[wire.Packed] = []
+        self._uses: set[str] = set()
         self.frame: Optional[Frame] = None
 
     def __enter__(self) -> "ObjectBlock":
-        self._parts = []
+        self._parts, self._uses = [], set()
         return self
 
     def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
                  trace: Optional[TracebackType]) -> None:
         if kind is None:
-            self.frame = self._connection._define(self.name, self._parts)
+            self.frame = self._connection._stage_ready([operations.define(self.name, self._parts, self._uses)])
 
     def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> None:
         if look != Look(look.transform):
             raise InvalidValue(f"the part {name!r} of an object has only a transform; give the rest to the instances")
         before = primitives_pb2.Object.Part(
             transform=None if look.transform is None else transforms.to_wire(look.transform)).SerializeToString()
+        if make is shapes.instance:
+            self._uses.add(str(args[0]))
         for one in make(*args, **options):
             self._parts.append(_copied(one.inside(wire.Field.PART_PRIMITIVE, before)))
 

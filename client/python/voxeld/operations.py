@@ -2,12 +2,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Iterable, Iterator, Sequence, Union
+from typing import AbstractSet, Callable, Iterable, Iterator, Optional, Sequence, Union
 
 from . import wire
 from .mirror import Mirror
-from .receipts import Frame
+from .receipts import Frame, Issue
 from .v1 import scene_pb2 as pb
+
+# What a commit weighs beside its operations, here and there.
+COMMIT_BYTES = 64
 
 
 @dataclass
@@ -15,23 +18,28 @@ class Puts:
     """Entities put up, or replaced."""
 
     puts: Sequence[wire.Put]
-    lifetime_ns: int = 0
 
     def size(self) -> int:
         return sum(len(p.request) for p in self.puts)
 
+    def largest(self) -> int:
+        return max((len(p.request) for p in self.puts), default=0)
+
     def apply(self, mirror: Mirror, now_ns: int) -> None:
         for one in self.puts:
-            mirror.put(one, now_ns + self.lifetime_ns if self.lifetime_ns else 0)
+            mirror.put(one, now_ns + one.lifetime_ns if one.lifetime_ns else 0)
 
 
 @dataclass
 class Request:
-    """Anything small that the mirror need not know of, or knows by a subclass."""
+    """Anything that is one request; the mirror need not know of it, or knows it by a subclass."""
 
     request: bytes
 
     def size(self) -> int:
+        return len(self.request)
+
+    def largest(self) -> int:
         return len(self.request)
 
     def apply(self, mirror: Mirror, now_ns: int) -> None:
@@ -80,17 +88,19 @@ class LayerState(Request):
 @dataclass
 class Define(Request):
     name: str
+    uses: AbstractSet[str]
 
     def apply(self, mirror: Mirror, now_ns: int) -> None:
-        mirror.define(self.name, self.request)
+        mirror.define(self.name, self.request, self.uses)
 
 
 @dataclass
 class Undefine(Request):
     name: str
+    cascade: bool
 
     def apply(self, mirror: Mirror, now_ns: int) -> None:
-        mirror.undefine(self.name)
+        mirror.undefine(self.name, self.cascade)
 
 
 class Immediate:
@@ -105,8 +115,11 @@ class Immediate:
     def size(self) -> int:
         return sum(p.size() for p in self.parts) + 64
 
+    def largest(self) -> int:
+        return max((p.largest() for p in self.parts), default=0)
+
     def apply(self, mirror: Mirror, now_ns: int) -> None:
-        mirror.clear_layer(self.layer)
+        mirror.clear_layer(self.layer, make=True)
         for part in self.parts:
             part.apply(mirror, now_ns)
 
@@ -114,42 +127,126 @@ class Immediate:
 Operation = Union[Puts, Request, Immediate]
 
 
+class _Begin(Request):
+    """FrameBegin and FrameEnd of a layer, which know it."""
+
+    def __init__(self, layer: str) -> None:
+        super().__init__(pb.StreamRequest(frame_begin=pb.FrameBegin(layer=layer)).SerializeToString())
+        self.layer = layer
+
+
+class _End(Request):
+    def __init__(self, layer: str) -> None:
+        super().__init__(pb.StreamRequest(frame_end=pb.FrameEnd(layer=layer)).SerializeToString())
+        self.layer = layer
+
+
 def weigh(operations: Iterable[Operation]) -> int:
-    return 64 + sum(o.size() for o in operations)
+    return COMMIT_BYTES + sum(o.size() for o in operations)
+
+
+class Refused:
+    """Which operations of a commit were refused, as its issues tell."""
+
+    def __init__(self, issues: Iterable[Issue]) -> None:
+        self._where = {(issue.sequence, issue.layer, issue.id) for issue in issues}
+        self._sequences = {issue.sequence for issue in issues}
+
+    def has(self, sequence: int) -> bool:
+        return sequence in self._sequences
+
+    def has_put(self, sequence: int, put: wire.Put) -> bool:
+        """Of a batch, each entity may be refused alone; what names none means all, what names a layer alone all of it."""
+        return sequence in self._sequences and any(
+            (sequence, layer, id) in self._where for layer, id in ((put.layer, put.id), (put.layer, ""), ("", "")))
 
 
 class Unit:
-    """A commit and the operations before it. `bytes` is what it weighs in the buffer."""
+    """A commit and the operations before it. `bytes` is what it weighs in the buffer, `largest` the greatest of its
+    messages that cannot be made smaller."""
 
-    __slots__ = ("frame", "operations", "commit", "bytes", "drops")
+    __slots__ = ("frame", "operations", "commit", "bytes", "largest", "drops", "sequences", "commit_sequence", "issues",
+                 "restores", "on_accepted", "_most")
 
-    def __init__(self, frame: Frame, operations: Iterable[Operation], commit: pb.Commit) -> None:
+    def __init__(self, frame: Frame, operations: Iterable[Operation], commit: pb.Commit,
+                 on_accepted: Optional[Callable[[], None]] = None, restores: bool = False) -> None:
         self.frame = frame
         self.operations = list(operations)
         self.commit = commit
-        self.drops = 0  # frames given up before it was sent: what its commit reports
-        self.bytes = 0
+        self.on_accepted = on_accepted
+        self.restores = restores  # it sends anew what had been accepted
+        self.drops = 0            # frames given up before it was sent: what its commit reports
         self.weigh()
+        self.forget_sending()
+
+    def forget_sending(self) -> None:
+        """It will be sent from the beginning."""
+        self.sequences: list[int] = []  # of its requests, as sent
+        self.commit_sequence = 0        # not 0: it was sent whole
+        self.issues: list[Issue] = []
+        self._most = wire.BATCH_BYTES
 
     def weigh(self) -> None:
         self.bytes = weigh(self.operations)
+        self.largest = max((operation.largest() for operation in self.operations), default=0)
 
-    def requests(self) -> Iterator[bytes]:
-        """All but the commit. Puts side by side share batches."""
+    @property
+    def timed(self) -> bool:
+        return self.commit.present_at_ns != 0
+
+    @property
+    def droppable(self) -> bool:
+        """A flow policy may give up its frames."""
+        return not self.commit.must_show and not self.timed
+
+    def _messages(self) -> Iterator[Union[Sequence[wire.Put], Request]]:
+        """All but the commit. Puts side by side share messages."""
         run: list[wire.Put] = []
         for operation in self.operations:
             if isinstance(operation, Puts):
                 run += operation.puts
                 continue
-            yield from wire.batched(run)
+            yield from wire.runs(run, self._most)
             run = []
             if isinstance(operation, Request):
-                yield operation.request
+                yield operation
                 continue
-            yield pb.StreamRequest(frame_begin=pb.FrameBegin(layer=operation.layer)).SerializeToString()
-            yield from wire.batched([p for part in operation.parts for p in part.puts])
-            yield pb.StreamRequest(frame_end=pb.FrameEnd(layer=operation.layer)).SerializeToString()
-        yield from wire.batched(run)
+            yield _Begin(operation.layer)
+            yield from wire.runs([p for part in operation.parts for p in part.puts], self._most)
+            yield _End(operation.layer)
+        yield from wire.runs(run, self._most)
+
+    def requests(self, most_bytes: int = wire.BATCH_BYTES) -> Iterator[bytes]:
+        """All but the commit; batches of at most `most_bytes`."""
+        self._most = most_bytes
+        for message in self._messages():
+            yield message.request if isinstance(message, Request) else wire.together(message)
+
+    def apply(self, mirror: Mirror, now_ns: int) -> None:
+        """It was accepted; less what its issues say was refused."""
+        mirror.purge(now_ns)
+        if not self.issues:
+            for operation in self.operations:
+                operation.apply(mirror, now_ns)
+            return
+        refused = Refused(self.issues)
+        frame: Optional[Immediate] = None  # that has begun, with what was taken of it
+        for message, sequence in zip(self._messages(), self.sequences):
+            if isinstance(message, _Begin):
+                frame = None if refused.has(sequence) else Immediate(message.layer, [])
+            elif isinstance(message, _End):
+                if frame is not None and not refused.has(sequence):
+                    frame.apply(mirror, now_ns)
+                frame = None
+            elif isinstance(message, Request):
+                if not refused.has(sequence):
+                    message.apply(mirror, now_ns)
+            else:
+                taken = Puts([put for put in message if not refused.has_put(sequence, put)])
+                if frame is not None:
+                    frame.parts = [*frame.parts, taken]
+                else:
+                    taken.apply(mirror, now_ns)
 
 
 def delete_id(layer: str, id: str) -> DeleteId:
@@ -174,8 +271,8 @@ def layer_state(state: pb.LayerState) -> LayerState:
     return LayerState(pb.StreamRequest(layer_state=state).SerializeToString(), state)
 
 
-def define(name: str, parts: Iterable[wire.Packed]) -> Define:
-    """`parts` are Object.Part messages."""
+def define(name: str, parts: Iterable[wire.Packed], uses: AbstractSet[str] = frozenset()) -> Define:
+    """`parts` are Object.Part messages; `uses`: the objects that some of them are instances of."""
     tail: list[wire.Buffer] = []
     for part in parts:
         wrapped = part.inside(wire.Field.PART)
@@ -183,9 +280,31 @@ def define(name: str, parts: Iterable[wire.Packed]) -> Define:
     content = wire.Packed(b"", tail, sum(len(t) for t in tail))
     whole = content.inside(wire.Field.DEFINITION, pb.DefineObject(object=name).SerializeToString()).inside(
         wire.Field.DEFINE_OBJECT)
-    return Define(whole.to_bytes(), name)
+    return Define(whole.to_bytes(), name, uses)
 
 
 def undefine(name: str, cascade: bool) -> Undefine:
     return Undefine(
-        pb.StreamRequest(delete_object=pb.DeleteObject(object=name, cascade=cascade)).SerializeToString(), name)
+        pb.StreamRequest(delete_object=pb.DeleteObject(object=name, cascade=cascade)).SerializeToString(), name, cascade)
+
+
+def restoring(mirror: Mirror, now_ns: int) -> Iterator[Optional[Operation]]:
+    """What makes the mirror's scene of whatever is left of it. None: what follows is to be a commit of its own."""
+    yield clear_all()
+    for one in mirror.restore(now_ns):
+        yield one if one is None else Request(one) if isinstance(one, bytes) else Puts([one])
+
+
+def parted(all_of_it: Iterable[Optional[Operation]], most_bytes: int, most_operations: int) -> Iterator[list[Operation]]:
+    """As commits of at most so much each; none of them empty."""
+    commit: list[Operation] = []
+    size = 0
+    for operation in all_of_it:
+        if commit and (operation is None or size + operation.size() > most_bytes or len(commit) >= most_operations):
+            yield commit
+            commit, size = [], 0
+        if operation is not None:
+            commit.append(operation)
+            size += operation.size()
+    if commit:
+        yield commit

@@ -13,7 +13,8 @@ class Outbox:
     """First in, first out. Of the immediate frames of one layer that wait here, LATEST keeps the newest and DROP_OLDEST
     the `keep` newest; RELIABLE keeps all. What is retained always waits.
 
-    A unit that a policy leaves without any operation goes as a whole; one that holds something else keeps its commit.
+    A unit that a policy leaves without any operation goes as a whole; one that holds something else keeps its commit. What
+    is to be shown at its time, or in any case (must_show), is not given up.
     """
 
     def __init__(self, policy: str = RELIABLE, keep: int = 1, limit_bytes: int = 256 << 20) -> None:
@@ -38,7 +39,7 @@ class Outbox:
         whatever the policy."""
         room = self._limit - unit.bytes
         keep = {layer: 1 for layer in self._frames} if newest_only and self.bytes > room else {}
-        for operation in unit.operations:
+        for operation in unit.operations if unit.droppable else ():
             if isinstance(operation, Immediate) and (self._keep or operation.layer in keep):
                 keep[operation.layer] = max(self._keep - 1, 0)
         if self.bytes - self._given_up(keep) > room:
@@ -50,7 +51,7 @@ class Outbox:
             gone += self._leave(layer, most)
         self._units.append(unit)
         self.bytes += unit.bytes
-        for operation in list(unit.operations):
+        for operation in list(unit.operations) if unit.droppable else ():
             if isinstance(operation, Immediate):
                 self._frames.setdefault(operation.layer, deque()).append((unit, operation))
                 if self._keep:
@@ -64,7 +65,7 @@ class Outbox:
             return None
         unit = self._units.popleft()
         self.bytes -= unit.bytes
-        for operation in unit.operations:
+        for operation in unit.operations if unit.droppable else ():
             if isinstance(operation, Immediate):
                 waiting = self._frames[operation.layer]
                 waiting.popleft()
@@ -110,7 +111,8 @@ class Outbox:
 
     def _merged(self, newest: Unit) -> list[tuple[Unit, list[Operation]]]:
         """The units that can do without some retained puts and moves, since something later, `newest` perhaps, replaces
-        those whole; and what is left of each. What the scene comes to is the same."""
+        those whole; and what is left of each. What the scene comes to is the same. Timed ones take effect elsewhere: they
+        stay as they are, and nothing goes for them; of those that must be shown nothing goes."""
         result: list[tuple[Unit, list[Operation]]] = []
         seen: set[tuple[str, str]] = set()
         whole_layers: set[str] = set()
@@ -120,6 +122,8 @@ class Outbox:
             return everything or layer in whole_layers or (layer, id) in seen
 
         for unit in (newest, *reversed(self._units)):
+            if unit.timed:
+                continue
             kept: list[Operation] = []
             changed = False
             for operation in reversed(unit.operations):
@@ -128,7 +132,7 @@ class Outbox:
                     seen.update((p.layer, p.id) for p in operation.puts)
                     if len(left) < len(operation.puts):
                         changed = True
-                        operation = Puts(left, operation.lifetime_ns)
+                        operation = Puts(left)
                         if not left:
                             continue
                 elif isinstance(operation, Move):
@@ -142,7 +146,7 @@ class Outbox:
                 elif isinstance(operation, ClearAll):
                     everything = True
                 kept.append(operation)
-            if changed:
+            if changed and unit.droppable:
                 result.append((unit, kept[::-1]))
         return result
 

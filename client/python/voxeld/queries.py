@@ -94,14 +94,42 @@ class Queries:
         return list(answer.layers)
 
     def watch(self, layer: str = "", owner: int = 0, contents: bool = False,
-              timeout: Optional[float] = None) -> Iterator["ChangeSet"]:
+              timeout: Optional[float] = None) -> "Watch":
         request = scene_pb2.WatchSceneRequest(owner=owner, layer=layer, contents=contents)
+        return Watch(self._usable().unary_stream(
+            _SCENE + "WatchScene", scene_pb2.WatchSceneRequest.SerializeToString,
+            scene_pb2.WatchSceneResponse.FromString)(request, timeout=timeout))
+
+
+class Watch(Iterator["ChangeSet"]):
+    """Change sets as they come. close() ends the call, from any thread, and with it who waits for the next."""
+
+    def __init__(self, call: Any) -> None:
+        self._call = call
+        self._closed = False
+
+    def __next__(self) -> "ChangeSet":
         parts: list[scene_pb2.WatchSceneResponse] = []
-        for answer in self._stream(_SCENE + "WatchScene", request, scene_pb2.WatchSceneResponse.FromString, timeout):
-            parts.append(answer)
-            if answer.in_sync:
-                yield ChangeSet(parts)
-                parts = []
+        try:
+            for answer in self._call:
+                parts.append(answer)
+                if answer.in_sync:
+                    return ChangeSet(parts)
+        except grpc.RpcError as error:
+            if not self._closed:
+                raise _failed(error) from None
+        raise StopIteration
+
+    def next(self) -> Optional["ChangeSet"]:
+        """None at the end."""
+        return next(self, None)
+
+    def close(self) -> None:
+        self._closed = True
+        self._call.cancel()
+
+    def __del__(self) -> None:
+        self.close()
 
 
 class ChangeSet:

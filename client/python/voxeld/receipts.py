@@ -1,6 +1,7 @@
 """What becomes of commits: a Frame for each, and the book that the answers are entered into."""
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict, deque
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
@@ -11,8 +12,12 @@ from .errors import CommitDropped, CommitRefused, ConnectionLost
 from .v1 import scene_pb2 as pb
 from .v1 import types_pb2
 
-# Frames kept open at once. A server owes fewer (Limits.max_riding_commits); beyond, the oldest are given up.
-MAX_OPEN = 65536
+# Accepted commits whose outcomes are waited for. A server owes fewer (Limits.max_riding_commits); beyond, the oldest are
+# given up.
+MAX_OWED = 65536
+
+# An outcome that nobody tells, and one of a kind that this client does not know.
+UNTOLD = "untold"
 
 
 @dataclass(frozen=True)
@@ -31,23 +36,26 @@ class Stages:
 
     @staticmethod
     def of(stages: pb.Stages) -> "Stages":
-        return Stages(*(getattr(stages, f.name) for f in fields(Stages)))
+        return Stages(*(getattr(stages, name) for name in _STAGES))
 
     def durations_ms(self) -> dict[str, float]:
         """How long each stage took, from the stage before that is known: {"received": 0.1, …}."""
         result: dict[str, float] = {}
         last = 0
-        for field in fields(self):
-            at = int(getattr(self, field.name))
+        for name in _STAGES:
+            at = int(getattr(self, name))
             if at and last:
-                result[field.name[:-3]] = (at - last) / 1e6
+                result[name[:-3]] = (at - last) / 1e6
             last = at or last
         return result
 
     def total_ms(self) -> Optional[float]:
         """From the first stage known to the last; None if fewer than two are."""
-        known = [at for at in (int(getattr(self, f.name)) for f in fields(self)) if at]
+        known = [at for at in (int(getattr(self, name)) for name in _STAGES) if at]
         return (known[-1] - known[0]) / 1e6 if len(known) > 1 else None
+
+
+_STAGES = tuple(field.name for field in fields(Stages))
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,8 @@ class Accepted:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a commit on one display. `kind`: "presented", "unchanged", "superseded", "lost" or "not_shown"."""
+    """What became of a commit on one display. `kind`: "presented", "unchanged", "superseded", "lost" or "not_shown"; or
+    "untold", when that is not known and will not be."""
 
     display: str
     kind: str
@@ -73,7 +82,7 @@ class Outcome:
     time_ns: int = 0            # presented: the server's monotonic clock
     reported: bool = False      # presented: the device said so; else it is an estimate
     by_frame_id: int = 0        # superseded
-    reason: str = ""            # lost, not_shown
+    reason: str = ""            # lost, not_shown, untold
     stages: Stages = Stages()   # presented
 
     @property
@@ -83,7 +92,7 @@ class Outcome:
 
     @staticmethod
     def of(outcome: pb.Outcome) -> "Outcome":
-        kind = outcome.WhichOneof("what") or "lost"
+        kind = outcome.WhichOneof("what")
         if kind == "presented":
             p = outcome.presented
             return Outcome(outcome.display, kind, p.volume, p.time_ns, p.evidence == pb.EVIDENCE_DEVICE,
@@ -93,8 +102,17 @@ class Outcome:
         if kind == "superseded":
             return Outcome(outcome.display, kind, by_frame_id=outcome.superseded.by_frame_id)
         if kind == "not_shown":
-            return Outcome(outcome.display, kind, reason=pb.NotShown.Why.Name(outcome.not_shown.why).lower())
-        return Outcome(outcome.display, kind, reason=outcome.lost.reason)
+            return Outcome(outcome.display, kind, reason=_why(outcome.not_shown.why))
+        if kind == "lost":
+            return Outcome(outcome.display, kind, reason=outcome.lost.reason)
+        return Outcome(outcome.display, UNTOLD, reason="the server is newer, and told it in words that are not known here")
+
+
+def _why(why: int) -> str:
+    try:
+        return pb.NotShown.Why.Name(why).lower()
+    except ValueError:
+        return str(why)
 
 
 @dataclass(frozen=True)
@@ -121,22 +139,36 @@ class Issue:
         return Issue(issue.layer, issue.id, issue.field, reason, issue.message, issue.sequence)
 
 
-class Frame:
-    """One commit on its way. Its fields fill as answers come; nothing here blocks but the methods that wait."""
+Done = Callable[["Future[Frame]", "Frame"], None]
 
-    def __init__(self, frame_id: int, wants_outcomes: bool = True) -> None:
+# Of all frames' lists of who waits; held for a few instructions.
+_waiting = threading.Lock()
+
+
+def resolve(future: "Future[Frame]", frame: "Frame") -> None:
+    if future.set_running_or_notify_cancel():
+        future.set_result(frame)
+
+
+class Frame:
+    """One commit on its way. Its fields fill as answers come; nothing here blocks but the methods that wait. `done` resolves
+    the futures that others have."""
+
+    def __init__(self, frame_id: int, wants_outcomes: bool = True, done: Done = resolve) -> None:
         self.id = frame_id
-        # "waiting" (here), "sent", "accepted", "refused", "dropped" (by the flow policy, unsent) or "lost"
+        # "waiting" (here), "sent", "accepted", "refused", "dropped" (by the flow policy, unsent), "lost" (it will not be
+        # applied) or "unknown" (the connection was lost before its answer, and the server cannot be asked)
         self.state = "waiting"
         self.accepted: Optional[Accepted] = None
         self.issues: tuple[Issue, ...] = ()
         self.outcomes: dict[str, Outcome] = {}
         self.client_dropped_frames = 0  # immediate frames of it that the flow policy gave up unsent
-        self.reason = ""                # refused, dropped, lost: why
+        self.reason = ""                # refused, dropped, lost, unknown: why
         self.scheduled_ns = 0           # a timed commit: when it will be applied, by the server's clock
         self._wants_outcomes = wants_outcomes
         self._done = False
-        self._watchers: list[tuple[Callable[[Frame], bool], Future[Frame]]] = []
+        self._resolve = done
+        self._futures: list[tuple[bool, Future[Frame], Done]] = []  # for outcomes?, what waits, who resolves it
 
     def __repr__(self) -> str:
         told = ", ".join(f"{o.display}: {o.kind}" for o in self.outcomes.values())
@@ -169,15 +201,23 @@ class Frame:
             raise CommitRefused("; ".join([self.reason, *map(str, self.issues)]), self.issues)
         if self.state == "dropped":
             raise CommitDropped(self.reason)
-        if self.state == "lost":
+        if self.state in ("lost", "unknown"):
             raise ConnectionLost(self.reason)
         return self
 
     def future(self, *, shown: bool = False) -> "Future[Frame]":
-        """Is done when the commit is answered, or with `shown` when every display has said what became of it."""
+        """Is done when the commit is answered, or with `shown` when every display has said what became of it. Its callbacks
+        run on a thread of the connection's that does nothing else; they may draw and wait."""
+        return self._future(shown, self._resolve)
+
+    def _future(self, shown: bool, done: Done) -> "Future[Frame]":
         future: Future[Frame] = Future()
-        self._watchers.append(((lambda f: f._done) if shown else (lambda f: f.answered), future))
-        self._tell()
+        with _waiting:
+            ready = self._done if shown else self.answered
+            if not ready:
+                self._futures.append((shown, future, done))
+        if ready:
+            resolve(future, self)  # nobody has it yet
         return future
 
     def wait(self, timeout: Optional[float] = None) -> "Frame":
@@ -190,7 +230,7 @@ class Frame:
 
     def _wait(self, timeout: Optional[float], shown: bool) -> "Frame":
         try:
-            return self.future(shown=shown).result(timeout)
+            return self._future(shown, resolve).result(timeout)
         except FutureTimeout:
             missing = "an answer"
             if self.accepted is not None:
@@ -198,16 +238,12 @@ class Frame:
             raise TimeoutError(f"frame {self.id} is {self.state} and {missing} has not come in {timeout} s") from None
 
     def _tell(self) -> None:
-        # Lists are replaced whole, so that a thread that asks and one that answers never undo each other's change.
-        for watcher in list(self._watchers):
-            ready, future = watcher
-            if ready(self):
-                try:
-                    self._watchers.remove(watcher)
-                except ValueError:
-                    continue  # the other thread has it
-                if future.set_running_or_notify_cancel():
-                    future.set_result(self)
+        """Something has changed."""
+        with _waiting:
+            ready = [one for one in self._futures if self._done or not one[0] and self.answered]
+            self._futures = [one for one in self._futures if one not in ready]
+        for _, future, done in ready:
+            done(future, self)
 
 
 class Book:
@@ -215,11 +251,11 @@ class Book:
 
     def __init__(self) -> None:
         self._open: OrderedDict[int, Frame] = OrderedDict()
+        self._owed: OrderedDict[int, Frame] = OrderedDict()  # of these, the accepted
         self.counts = {name: 0 for name in (
-            "commits", "accepted", "refused", "dropped", "given_up", "refused_operations", "server_drops",
-            "presented", "unchanged", "superseded", "lost", "not_shown")}
+            "commits", "accepted", "refused", "dropped", "given_up", "unknown", "refused_operations", "server_drops",
+            "presented", "unchanged", "superseded", "lost", "not_shown", UNTOLD)}
         self.recent_issues: Deque[Issue] = deque(maxlen=100)
-        self._issues: list[Issue] = []  # of the commit whose receipt has not come
 
     def __len__(self) -> int:
         return len(self._open)
@@ -227,74 +263,84 @@ class Book:
     def add(self, frame: Frame) -> None:
         self.counts["commits"] += 1
         self._open[frame.id] = frame
-        while len(self._open) > MAX_OPEN:
-            self.give_up([next(iter(self._open.values()))], "too many commits without an outcome")
 
     def _close(self, frame: Frame) -> None:
         frame._done = True
         self._open.pop(frame.id, None)
+        self._owed.pop(frame.id, None)
 
-    def drop(self, frame: Frame, reason: str) -> None:
-        """The flow policy gave it up unsent."""
-        frame.reason, frame.state = reason, "dropped"
-        self.counts["dropped"] += 1
+    def _end(self, frame: Frame, state: str, reason: str, count: str) -> None:
+        frame.reason, frame.state = reason, state
+        self.counts[count] += 1
         self._close(frame)
         frame._tell()
 
+    def drop(self, frame: Frame, reason: str) -> None:
+        """The flow policy gave it up unsent."""
+        self._end(frame, "dropped", reason, "dropped")
+
+    def unknown(self, frame: Frame, reason: str) -> None:
+        """It may have been applied or not."""
+        self._end(frame, "unknown", reason, "unknown")
+
+    def refuse(self, frame: Frame, reason: str, issues: Iterable[Issue] = (), operations: int = 0) -> None:
+        frame.issues = tuple(issues)
+        self.counts["refused_operations"] += operations
+        self._end(frame, "refused", reason, "refused")
+
     def give_up(self, frames: Iterable[Frame], reason: str) -> None:
-        """No more will be known of these. One that was accepted stays so."""
+        """No more will be known of these. One that was accepted stays so, and its outcomes are untold."""
         for frame in list(frames):
             if not frame.answered:
-                frame.reason, frame.state = reason, "lost"
-                self.counts["given_up"] += 1
+                self._end(frame, "lost", reason, "given_up")
+                continue
+            if frame.accepted is not None and not frame._done:
+                for display in frame.accepted.displays:
+                    if display not in frame.outcomes:
+                        frame.outcomes[display] = Outcome(display, UNTOLD, reason=reason)
+                        self.counts[UNTOLD] += 1
             self._close(frame)
             frame._tell()
 
     def open_frames(self) -> list[Frame]:
         return list(self._open.values())
 
+    def owed(self) -> list[Frame]:
+        """Those accepted that have not all their outcomes."""
+        return list(self._owed.values())
+
     def applied_unseen(self, frame: Frame, displays: Iterable[str]) -> None:
         """It was applied, though its receipt was lost with a connection."""
-        self.enter_accepted(frame, Accepted(0, 0, 0, tuple(displays), False, 0, Stages()))
+        self.accept(frame, Accepted(0, 0, 0, tuple(displays), False, 0, Stages()))
 
-    def enter_accepted(self, frame: Frame, accepted: Accepted) -> None:
+    def accept(self, frame: Frame, accepted: Accepted, issues: Iterable[Issue] = ()) -> None:
         if frame.answered:
             return
-        frame.issues, self._issues = tuple(self._issues), []
+        frame.issues = tuple(issues)
         frame.accepted, frame.state = accepted, "accepted"
         self.counts["accepted"] += 1
         self.counts["refused_operations"] += accepted.refused_operations
         self.counts["server_drops"] += accepted.dropped_frames
         if not frame._wants_outcomes or all(d in frame.outcomes for d in accepted.displays):
             self._close(frame)
+        else:
+            self._owed[frame.id] = frame
+            while len(self._owed) > MAX_OWED:
+                self.give_up([next(iter(self._owed.values()))], "too many commits wait for outcomes")
         frame._tell()
 
-    def issue(self, issue: pb.Issue) -> Issue:
-        told = Issue.of(issue)
-        self._issues.append(told)
-        del self._issues[:-1000]
-        self.recent_issues.append(told)
-        return told
-
-    def receipt(self, receipt: pb.Receipt) -> Optional[Frame]:
-        """Enters it. The frame it belongs to, if that is open."""
+    def receipt(self, receipt: pb.Receipt, issues: Iterable[Issue] = ()) -> Optional[Frame]:
+        """Enters it, with the issues of its commit. The frame it belongs to, if that is open."""
         frame = self._open.get(receipt.frame_id)
-        what = receipt.WhichOneof("what")
         if frame is None:
-            if what in ("accepted", "refused"):
-                self._issues = []
             return None
+        what = receipt.WhichOneof("what")
         if what == "accepted":
             a = receipt.accepted
-            self.enter_accepted(frame, Accepted(a.snapshot, a.refused_operations, a.applied_time_ns, tuple(a.displays),
-                                                a.late, a.dropped_frames, Stages.of(a.stages)))
+            self.accept(frame, Accepted(a.snapshot, a.refused_operations, a.applied_time_ns, tuple(a.displays), a.late,
+                                        a.dropped_frames, Stages.of(a.stages)), issues)
         elif what == "refused":
-            frame.issues, self._issues = tuple(self._issues), []
-            frame.reason, frame.state = receipt.refused.message, "refused"
-            self.counts["refused"] += 1
-            self.counts["refused_operations"] += receipt.refused.refused_operations
-            self._close(frame)
-            frame._tell()
+            self.refuse(frame, receipt.refused.message, issues, receipt.refused.refused_operations)
         elif what == "outcome":
             outcome = Outcome.of(receipt.outcome)
             if outcome.display not in frame.outcomes:

@@ -1,8 +1,9 @@
 """Streams over gRPC: connecting, connecting again, and the two threads that feed and read a stream.
 
 The caller's threads only put commits into the session's outbox and wake whoever sends. gRPC takes requests from an iterator
-of ours on a thread of its own, as bytes that go out as they are; another thread reads answers. A stream that ends is begun
-anew after a pause that grows from BACKOFF_FIRST_S to BACKOFF_MOST_S, drawn at random from its upper half.
+of ours on a thread of its own, as bytes that go out as they are; another thread reads answers, and users' functions are called
+on a third. A stream that ends is begun anew after a pause that grows from BACKOFF_FIRST_S to BACKOFF_MOST_S, drawn at random
+from its upper half; it is short again once a commit was answered, or a stream has stood for as long as the longest pause.
 """
 from __future__ import annotations
 
@@ -10,12 +11,12 @@ import logging
 import random
 import threading
 import time
-from collections import deque
-from typing import Callable, Deque, Iterator, Optional
+from typing import Callable, Iterator, Optional
 
 import grpc
 
 from . import address
+from .callbacks import Callbacks
 from .errors import BufferFull, ConnectionLost
 from .operations import Unit
 from .receipts import Frame, Issue
@@ -26,6 +27,8 @@ log = logging.getLogger("voxeld")
 
 STREAM = "/voxeld.v1.SceneService/Stream"
 BACKOFF_FIRST_S, BACKOFF_MOST_S = 0.1, 5.0
+# How long what waits may still be sent when nobody holds the connection any more.
+ABANDONED_S = 2.0
 
 CHANNEL_OPTIONS = [
     ("grpc.max_send_message_length", -1),
@@ -50,17 +53,16 @@ def backoff_s(attempt: int, draw: Callable[[], float]) -> float:
 
 
 class Transport:
-    """`on_issue` is called on the reading thread, without any lock; it may draw, but not wait."""
+    """`on_issue` is called on a thread that does nothing else, without any lock; it may draw and wait."""
 
     def __init__(self, server: str, session: Session, on_issue: Callable[[Issue], None]) -> None:
         self.server = server
         self.last_error = ""
         self._target = address.target(server)
         self._session = session
-        self._issues: Deque[Issue] = deque()
-        self._on_issue = on_issue
-        session.on_issue = self._issues.append
-        # Reentrant, for whoever draws from a future's callback.
+        self._callbacks = Callbacks(on_issue)
+        session.on_issue, session.done = self._callbacks.issue, self._callbacks.done
+        # Reentrant: a signal handler or a finaliser may draw in the middle of anything.
         self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)
         self._closing = False   # send what is there, then half-close
@@ -77,14 +79,21 @@ class Transport:
         """Of the session."""
         return self._lock
 
-    def submit(self, make: Callable[[Frame], Unit], wait_for_room: bool) -> Frame:
-        """`make` gets the commit's frame. BufferFull unless `wait_for_room`."""
+    @property
+    def stopped(self) -> bool:
+        """Nothing more will be sent."""
+        return self._stopped
+
+    def submit(self, make: Callable[[Frame], tuple[Unit, Callable[[], None]]], wait_for_room: bool) -> Frame:
+        """`make` is called under the lock with the commit's frame, and gives the commit and what is to be done, under the
+        lock too, once it was taken. BufferFull unless `wait_for_room`."""
         with self._changed:
             while True:
                 if self._stopped:
                     raise ConnectionLost(self.last_error or "the connection is closed")
-                unit = make(self._session.new_frame())
+                unit, taken = make(self._session.new_frame())
                 if self._session.submit(unit):
+                    taken()
                     self._changed.notify_all()
                     return unit.frame
                 if not wait_for_room:
@@ -117,6 +126,17 @@ class Transport:
         with self._changed:
             self._stop("the connection was closed")
         self._thread.join(5)
+        self._callbacks.drain(max(end - time.monotonic(), 1.0))
+
+    def abandon(self, closed: Callable[[], None]) -> None:
+        """Nobody draws any more: as close(), and then `closed`, without waiting for it. For finalisers: no lock is taken
+        here."""
+
+        def close() -> None:
+            self.close(ABANDONED_S)
+            closed()
+
+        threading.Thread(target=close, name="voxeld close", daemon=True).start()
 
     def _stop(self, reason: str) -> None:
         if not self._stopped:
@@ -146,14 +166,23 @@ class Transport:
                         self._changed.notify_all()  # whoever flushes
                         if self._closing:
                             return
-                    ping = self._session.next_ping_ns()
-                    self._changed.wait(None if ping is None else max(ping - time.monotonic_ns(), 0) / 1e9 + 1e-4)
+                    due = self._session.next_due_ns()
+                    self._changed.wait(None if due is None else max(due - time.monotonic_ns(), 0) / 1e9 + 1e-4)
             yield message
 
     def _run(self) -> None:
+        try:
+            self._streams()
+        except BaseException as error:
+            log.exception("voxeld's thread failed")
+            with self._changed:
+                self._stop(f"the connection failed: {error!r}")
+
+    def _streams(self) -> None:
         attempt = 0
         while True:
-            opened_before = self._session.streams_opened
+            opened_before, answered_before = self._session.streams_opened, self._session.answered
+            began = time.monotonic()
             error = self._one_stream()
             with self._changed:
                 self._stream += 1
@@ -162,17 +191,17 @@ class Transport:
                 if self._closing or self._stopped:
                     self._stop("the connection was closed")
                     return
-                if self._session.streams_opened > opened_before:
+                stood = self._session.streams_opened > opened_before
+                if self._session.answered > answered_before or stood and time.monotonic() - began >= BACKOFF_MOST_S:
                     attempt = 0
-                code = error.code() if error is not None else grpc.StatusCode.UNAVAILABLE
-                self.last_error = _words(self.server, error, self._session.streams_opened > opened_before)
-                if code == grpc.StatusCode.NOT_FOUND and self._session.forget_resume():
-                    self._changed.notify_all()
+                self.last_error = _words(self.server, error, stood)
+                code = error.code() if isinstance(error, grpc.RpcError) else None
+                self._changed.notify_all()
+                if code == grpc.StatusCode.NOT_FOUND and not stood and self._session.forget_token():
                     continue
                 if code in _FINAL:
                     self._stop(self.last_error)
                     return
-                self._changed.notify_all()
                 pause = backoff_s(attempt, random.random)
                 if attempt == 0 and self._session.streams_opened:
                     log.warning("%s; connecting again", self.last_error)
@@ -182,7 +211,7 @@ class Transport:
                     self._stop("the connection was closed")
                     return
 
-    def _one_stream(self) -> Optional[grpc.RpcError]:
+    def _one_stream(self) -> Optional[Exception]:
         """Reads one stream to its end."""
         channel = grpc.insecure_channel(self._target, options=CHANNEL_OPTIONS)
         try:
@@ -197,24 +226,21 @@ class Transport:
                 with self._changed:
                     self._session.answer(response, now)
                     self._changed.notify_all()
-                while self._issues:
-                    self._tell(self._issues.popleft())
         except grpc.RpcError as error:
+            return error
+        except Exception as error:  # an answer that cannot be understood ends its stream, and no more
+            log.exception("an answer of voxeld at %s could not be taken", self.server)
             return error
         finally:
             channel.close()
         return None
 
-    def _tell(self, issue: Issue) -> None:
-        try:
-            self._on_issue(issue)
-        except Exception:  # whatever it is, it must not end the stream
-            log.exception("on_issue failed with %s", issue)
 
-
-def _words(server: str, error: Optional[grpc.RpcError], stood: bool) -> str:
+def _words(server: str, error: Optional[Exception], stood: bool) -> str:
     if error is None:
         return f"voxeld at {server} ended the stream"
+    if not isinstance(error, grpc.RpcError):
+        return f"an answer of voxeld at {server} could not be taken: {error!r}"
     code, details = error.code(), error.details()
     if code == grpc.StatusCode.UNAVAILABLE and stood:
         return f"the connection to voxeld at {server} was lost ({details})"

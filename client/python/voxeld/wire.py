@@ -7,7 +7,7 @@ files alone; those that wrap are below.
 """
 from __future__ import annotations
 
-from typing import Optional, Sequence, Union
+from typing import Iterator, Optional, Sequence, Union
 
 import numpy as np
 from google.protobuf.message import Message
@@ -113,23 +113,34 @@ def message(content: Message) -> Packed:
 
 
 class Put:
-    """An upsert as a whole StreamRequest; its Upsert begins at `start`."""
+    """An upsert as a whole StreamRequest; its Upsert begins at `start`. `uses`: the object that it is an instance of.
+    `lifetime_ns`: how long it stays, as the request says; 0: for ever."""
 
-    __slots__ = ("layer", "id", "request", "start")
+    __slots__ = ("layer", "id", "request", "start", "uses", "lifetime_ns")
 
-    def __init__(self, layer: str, id: str, request: bytes, start: int) -> None:
+    def __init__(self, layer: str, id: str, request: bytes, start: int, uses: str = "", lifetime_ns: int = 0) -> None:
         self.layer = layer
         self.id = id
         self.request = request
         self.start = start
+        self.uses = uses
+        self.lifetime_ns = lifetime_ns
+
+    def with_lifetime(self, lifetime_ns: int) -> "Put":
+        """The same, but for how long it stays."""
+        request = scene_pb2.StreamRequest.FromString(self.request)
+        request.upsert.entity.lifetime_ns = lifetime_ns
+        content = Packed(request.upsert.SerializeToString())
+        whole = content.inside(Field.UPSERT)
+        return Put(self.layer, self.id, whole.to_bytes(), len(whole) - len(content), self.uses, lifetime_ns)
 
 
-def put(layer: str, id: str, entity: bytes, primitive: Packed) -> Put:
+def put(layer: str, id: str, entity: bytes, primitive: Packed, uses: str = "", lifetime_ns: int = 0) -> Put:
     """Upsert of `primitive` under (layer, id). `entity`: an Entity's other fields, serialised."""
     upsert = primitive.inside(Field.PRIMITIVE, entity).inside(
         Field.ENTITY, scene_pb2.Upsert(layer=layer, id=id).SerializeToString())
     request = upsert.inside(Field.UPSERT)
-    return Put(layer, id, request.to_bytes(), len(request) - len(upsert))
+    return Put(layer, id, request.to_bytes(), len(request) - len(upsert), uses, lifetime_ns)
 
 
 # Upserts of at least this size travel alone, as they are; smaller ones side by side fill a batch up to the other.
@@ -137,33 +148,31 @@ ALONE_BYTES = 64 << 10
 BATCH_BYTES = 1 << 20
 
 
-def batched(puts: Sequence[Put]) -> list[bytes]:
-    """Requests that put up `puts` in their order, no batch above BATCH_BYTES."""
-    requests: list[bytes] = []
+def runs(puts: Sequence[Put], most_bytes: int = BATCH_BYTES) -> Iterator[Sequence[Put]]:
+    """`puts` in their order, parted as messages: none above `most_bytes` but a put that is so by itself."""
     waiting: list[Put] = []
     size = 0
-
-    def flush() -> None:
-        nonlocal size
-        if len(waiting) == 1:
-            requests.append(waiting[0].request)
-        elif waiting:
-            tail: list[Buffer] = []
-            for one in waiting:
-                content = memoryview(one.request)[one.start:]
-                tail += (Field.UPSERTS + varint(len(content)), content)
-            total = sum(len(part) for part in tail)
-            requests.append(Packed(Field.BATCH + varint(total), tail, total).to_bytes())
-        waiting.clear()
-        size = 0
-
     for one in puts:
         length = len(one.request) + 8
-        if size + length > BATCH_BYTES or length >= ALONE_BYTES:
-            flush()
+        if waiting and (size + length + 8 > most_bytes or length >= ALONE_BYTES):
+            yield waiting
+            waiting, size = [], 0
         waiting.append(one)
         size += length
         if length >= ALONE_BYTES:
-            flush()
-    flush()
-    return requests
+            yield waiting
+            waiting, size = [], 0
+    if waiting:
+        yield waiting
+
+
+def together(puts: Sequence[Put]) -> bytes:
+    """One request that puts them up."""
+    if len(puts) == 1:
+        return puts[0].request
+    tail: list[Buffer] = []
+    for one in puts:
+        content = memoryview(one.request)[one.start:]
+        tail += (Field.UPSERTS + varint(len(content)), content)
+    total = sum(len(part) for part in tail)
+    return Packed(Field.BATCH + varint(total), tail, total).to_bytes()

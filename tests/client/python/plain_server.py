@@ -3,48 +3,86 @@ from __future__ import annotations
 
 from typing import Any, Iterator, Optional
 
+from voxeld.v1 import primitives_pb2, types_pb2
 from voxeld.v1 import scene_pb2 as pb
 
 REFUSED = "refuse this"  # the label of an entity that is to be refused
 
-Scene = dict[str, dict[str, bytes]]  # layer → id → Entity, serialised
+Scene = dict[str, dict[str, bytes]]  # layer → id → Entity, serialised; layers in the order of their creation
+
+
+class Refusal(Exception):
+    """Of one operation."""
+
+    def __init__(self, layer: str, id: str, reason: Any, message: str = "refused") -> None:
+        super().__init__(message)
+        self.layer, self.id, self.reason, self.message = layer, id, reason, message
+
+
+class TooLarge(Exception):
+    """A message: a real server ends the stream with RESOURCE_EXHAUSTED."""
 
 
 class Session:
-    def __init__(self, token: bytes) -> None:
-        self.token = token
+    """What one session has in the scene, and what it is told after it was taken up."""
+
+    def __init__(self, owner: int = 0) -> None:
+        self.owner = owner
+        self.token = b""
         self.keeps = False
+        self.strict = False
         self.scene: Scene = {}
         self.objects: dict[str, bytes] = {}
         self.states: dict[str, Any] = {}
         self.last_frame_id: Optional[int] = None
         self.last_sequence: Optional[int] = None
+        self.owed: list[pb.Receipt] = []
+
+    def clear(self) -> None:
+        self.scene, self.states, self.objects = {}, {}, {}
+
+    def state(self) -> tuple[Scene, dict[str, bytes], dict[str, Any]]:
+        return {layer: dict(held) for layer, held in self.scene.items()}, dict(self.objects), dict(self.states)
+
+    def set_state(self, state: tuple[Scene, dict[str, bytes], dict[str, Any]]) -> None:
+        self.scene, self.objects, self.states = state
 
 
 class PlainServer:
-    """Sessions and streams. `window`: how many bytes may be sent and not applied; 0: credit is not spoken of."""
+    """Sessions and streams. `window`: how many bytes may be sent and not applied; 0: credit is not spoken of. `owes`: after
+    a resume, whether outcomes are sent that were not."""
 
-    def __init__(self, window: int = 0, displays: tuple[str, ...] = ("d",)) -> None:
+    def __init__(self, window: int = 0, displays: tuple[str, ...] = ("d",), max_message_bytes: int = 16 << 20,
+                 max_uncommitted_bytes: int = 256 << 20, max_operations: int = 1_000_000, outcomes: bool = True) -> None:
         self.window = window
         self.displays = displays
+        self.limits = types_pb2.Limits(max_message_bytes=max_message_bytes, max_uncommitted_bytes=max_uncommitted_bytes,
+                                       max_operations_per_commit=max_operations)
+        self.outcomes = outcomes  # whether they come at once; else they are owed
         self.sessions: dict[bytes, Session] = {}
+        self.owners: dict[bytes, int] = {}
         self.tokens = 0
         self.now_ns = 1000
         self.commits: list[int] = []  # every frame id that was applied, in order
+        self.commit_bytes: list[int] = []
         self.client_drops = 0
         self.frames_seen = 0
         self.session: Optional[Session] = None
+        self.timed: list[tuple[pb.Commit, int, list[tuple[int, pb.StreamRequest]]]] = []
 
     def forget(self) -> None:
         """As after a restart."""
         self.sessions.clear()
+        self.owners.clear()
+        self.timed = []
 
     def begin(self) -> None:
-        """A new stream."""
+        """A new stream; the one before has ended."""
         self.session = None
+        self.timed = []
         self.received = self.applied = 0
         self.credit = 0
-        self.staged: list[pb.StreamRequest] = []
+        self.staged: list[tuple[int, pb.StreamRequest]] = []
         self.sequence = 0
         self.opened = False
 
@@ -52,10 +90,14 @@ class PlainServer:
         """Takes one request; raises LookupError where a real server ends the stream with NOT_FOUND."""
         # A message may exceed what is left only by being sent while some is left.
         assert not self.opened or not self.window or self.received < self.credit, (self.received, self.credit)
+        if len(message) > self.limits.max_message_bytes:
+            raise TooLarge(len(message))
         self.received += len(message)
-        self.sequence += 1
         request = pb.StreamRequest.FromString(message)
         what = request.WhichOneof("op")
+        # A ping counts if it says so.
+        assert not request.sequence or request.sequence > self.sequence
+        self.sequence = request.sequence or self.sequence + (what != "ping")
         if not self.opened:
             assert what == "open", f"{what} before Opened"
             return [self._open(request.open)]
@@ -64,9 +106,23 @@ class PlainServer:
             return [pb.StreamResponse(pong=pb.Pong(client_time_ns=request.ping.client_time_ns,
                                                    received_time_ns=self.now_ns, server_time_ns=self.now_ns))]
         if what != "commit":
-            self.staged.append(request)
+            self.staged.append((self.sequence, request))
             return []
-        return [self._commit(request.commit)]
+        staged, self.staged = self.staged, []
+        if request.commit.present_at_ns > self.now_ns:
+            self.timed.append((request.commit, self.sequence, staged))
+            response = pb.StreamResponse()
+            response.receipts.add(frame_id=request.commit.frame_id, sequence=self.sequence,
+                                  scheduled=pb.Scheduled(present_at_ns=request.commit.present_at_ns))
+            return [response]
+        return [self._commit(request.commit, self.sequence, staged)]
+
+    def advance(self, now_ns: int) -> list[pb.StreamResponse]:
+        """Time passes; commits whose time comes are applied."""
+        self.now_ns = now_ns
+        due = [one for one in self.timed if one[0].present_at_ns <= now_ns]
+        self.timed = [one for one in self.timed if one[0].present_at_ns > now_ns]
+        return [self._commit(*one) for one in due]
 
     def give_credit(self) -> list[pb.StreamResponse]:
         """For everything that has come: applied, or staged for a commit that has not."""
@@ -75,98 +131,194 @@ class PlainServer:
         self.credit = self.received + self.window
         return [pb.StreamResponse(credit_bytes=self.credit)]
 
+    def pay(self) -> list[pb.StreamResponse]:
+        """The outcomes that are owed."""
+        assert self.session is not None
+        owed, self.session.owed = self.session.owed, []
+        return [pb.StreamResponse(receipts=[receipt]) for receipt in owed]
+
     def _open(self, request: pb.Open) -> pb.StreamResponse:
         if request.resume_token:
             if request.resume_token not in self.sessions:
                 raise LookupError("no such session")
             self.session = self.sessions.pop(request.resume_token)
             if not self.session.keeps:  # its layers went with its stream
-                self.session.scene, self.session.states, self.session.objects = {}, {}, {}
+                self.session.clear()
+        elif request.owner_token:
+            if request.owner_token not in self.owners:
+                raise LookupError("no such owner")
+            self.session = Session(self.owners[request.owner_token])
         else:
-            self.session = Session(b"")
+            self.session = Session(len(self.owners) + 1)
+            self.owners[f"owner{self.tokens}".encode()] = self.session.owner
         self.session.keeps = request.on_disconnect == pb.DISCONNECT_POLICY_KEEP
+        self.session.strict = request.strict
         self.tokens += 1
         self.session.token = f"token{self.tokens}".encode()
         self.sessions[self.session.token] = self.session
         self.opened = True
         self.credit = self.window
-        opened = pb.Opened(session=self.tokens, resume_token=self.session.token, credit_bytes=self.window,
-                           displays=self.displays, server_time_ns=self.now_ns)
-        opened.limits.max_message_bytes = 16 << 20
+        (owner_token,) = (token for token, owner in self.owners.items() if owner == self.session.owner)
+        opened = pb.Opened(session=self.tokens, resume_token=self.session.token, credit_bytes=self.window, limits=self.limits,
+                           displays=self.displays, server_time_ns=self.now_ns, owner=self.session.owner,
+                           owner_token=owner_token)
         if request.resume_token and self.session.last_frame_id is not None:
             opened.last_frame_id = self.session.last_frame_id
             opened.last_sequence = self.session.last_sequence or 0
         return pb.StreamResponse(opened=opened)
 
-    def _commit(self, commit: pb.Commit) -> pb.StreamResponse:
+    def _commit(self, commit: pb.Commit, sequence: int, staged: list[tuple[int, pb.StreamRequest]]) -> pb.StreamResponse:
         assert self.session is not None
+        issues: list[pb.Issue] = []
+        before = self.session.state()
+        frames_before = self.frames_seen
         frame: Optional[str] = None
-        refused = []
-        for request in self.staged:
+        held: Optional[dict[str, bytes]] = None
+        size = 0
+
+        def refuse(at: int, refusal: Refusal) -> None:
+            issues.append(pb.Issue(sequence=at, layer=refusal.layer, id=refusal.id, reason=refusal.reason,
+                                   message=refusal.message))
+
+        for count, (at, request) in enumerate(staged):
             what = request.WhichOneof("op")
-            if any(upsert.entity.label == REFUSED for upsert in upserts(request)):
-                refused.append(request.upsert.id)
-                continue
-            if what == "frame_begin":
+            size += request.ByteSize()
+            if count >= self.limits.max_operations_per_commit or size > self.limits.max_uncommitted_bytes:
+                refuse(at, Refusal("", "", types_pb2.REASON_QUOTA_EXCEEDED, "too much waits for a commit"))
+            elif what == "frame_begin":
                 assert frame is None
-                frame = request.frame_begin.layer
+                frame, held = request.frame_begin.layer, self.session.scene.get(request.frame_begin.layer)
                 self.session.scene[frame] = {}
             elif what == "frame_end":
                 assert frame == request.frame_end.layer
                 frame = None
                 self.frames_seen += 1
             else:
-                apply(self.session, request)
-        assert frame is None
-        self.staged = []
+                for one in alone(request):
+                    try:
+                        apply(self.session, one)
+                    except Refusal as refusal:
+                        refuse(at, refusal)
+        if frame is not None:  # it has no end, and its layer is as it was
+            if held is None:
+                del self.session.scene[frame]
+            else:
+                self.session.scene[frame] = held
+        self.commit_bytes.append(size)
+        response = pb.StreamResponse(issues=issues)
+        if issues and self.session.strict:
+            self.session.set_state(before)
+            self.frames_seen = frames_before
+            refused = pb.Refused(refused_operations=len(issues), message="the session is strict")
+            response.receipts.add(frame_id=commit.frame_id, sequence=sequence, refused=refused)
+            return response
         self.client_drops += commit.client_drops
         if commit.frame_id:
             self.commits.append(commit.frame_id)
-        self.session.last_frame_id, self.session.last_sequence = commit.frame_id, self.sequence
-        response = pb.StreamResponse(issues=[pb.Issue(id=id, message="refused") for id in refused])
-        accepted = pb.Accepted(snapshot=len(self.commits), displays=self.displays, refused_operations=len(refused))
-        response.receipts.add(frame_id=commit.frame_id, sequence=self.sequence, accepted=accepted)
+        if self.session.last_sequence is None or sequence > self.session.last_sequence or sequence == self.sequence:
+            self.session.last_frame_id, self.session.last_sequence = commit.frame_id, sequence
+        accepted = pb.Accepted(snapshot=len(self.commits), displays=self.displays, refused_operations=len(issues),
+                               late=0 < commit.present_at_ns < self.now_ns)
+        response.receipts.add(frame_id=commit.frame_id, sequence=sequence, accepted=accepted)
         for display in self.displays:
             outcome = pb.Outcome(display=display, presented=pb.Presented(volume=1))
-            response.receipts.add(frame_id=commit.frame_id, sequence=self.sequence, outcome=outcome)
+            receipt = pb.Receipt(frame_id=commit.frame_id, sequence=sequence, outcome=outcome)
+            (response.receipts if self.outcomes else self.session.owed).append(receipt)
         return response
 
 
-def upserts(request: pb.StreamRequest) -> Iterator[pb.Upsert]:
-    if request.HasField("upsert"):
-        yield request.upsert
-    yield from request.batch.upserts
+def alone(request: pb.StreamRequest) -> Iterator[pb.StreamRequest]:
+    """A batch's upserts one by one."""
+    if request.WhichOneof("op") != "batch":
+        yield request
+    for upsert in request.batch.upserts:
+        yield pb.StreamRequest(upsert=upsert)
+
+
+def used_by(definition: bytes) -> set[str]:
+    parts = primitives_pb2.Object.FromString(definition).parts
+    return {part.primitive.instance.object for part in parts if part.primitive.HasField("instance")}
+
+
+def reached(session: Session, start: str) -> set[str]:
+    """The objects in `start`, and in those."""
+    seen: set[str] = set()
+    ahead = [start]
+    while ahead:
+        for used in used_by(session.objects.get(ahead.pop(), b"")) - seen:
+            seen.add(used)
+            ahead.append(used)
+    return seen
+
+
+def drawn_by(entity: bytes) -> str:
+    primitive = pb.Entity.FromString(entity).primitive
+    return str(primitive.instance.object) if primitive.HasField("instance") else ""
 
 
 def apply(session: Session, request: pb.StreamRequest) -> None:
-    """A retained operation. An entity's transform is kept apart, as SetTransform changes it."""
+    """An operation outside of frames, one upsert at a time; raises Refusal."""
     what = request.WhichOneof("op")
-    if what in ("upsert", "batch"):
-        for upsert in upserts(request):
-            session.scene.setdefault(upsert.layer, {})[upsert.id] = upsert.entity.SerializeToString()
+    if what == "upsert":
+        upsert = request.upsert
+        used = upsert.entity.primitive.instance.object
+        if upsert.entity.label == REFUSED:
+            raise Refusal(upsert.layer, upsert.id, types_pb2.REASON_INVALID_VALUE)
+        if used and used not in session.objects:
+            raise Refusal(upsert.layer, upsert.id, types_pb2.REASON_NOT_FOUND, f"object {used} is not defined")
+        session.scene.setdefault(upsert.layer, {})[upsert.id] = upsert.entity.SerializeToString(deterministic=True)
     elif what == "delete":
-        layer = session.scene.setdefault(request.delete.layer, {}) if request.delete.layer else {}
         kind = request.delete.WhichOneof("what")
-        if kind == "id":
-            layer.pop(request.delete.id, None)
-        elif kind == "all_of_layer":
-            layer.clear()
+        if kind == "all_mine":
+            session.scene.clear()
+            session.states.clear()
         else:
-            assert kind == "all_mine"
-            for one in session.scene.values():
-                one.clear()
+            layer = session.scene.get(request.delete.layer, {})
+            if kind == "id":
+                layer.pop(request.delete.id, None)
+            else:
+                assert kind == "all_of_layer"
+                layer.clear()
     elif what == "set_transform":
         move = request.set_transform
-        entity = pb.Entity.FromString(session.scene[move.layer][move.id])  # KeyError: an Issue
+        if move.id not in session.scene.get(move.layer, {}):
+            raise Refusal(move.layer, move.id, types_pb2.REASON_NOT_FOUND, "upsert it first")
+        entity = pb.Entity.FromString(session.scene[move.layer][move.id])
         entity.transform.CopyFrom(move.transform)
-        session.scene[move.layer][move.id] = entity.SerializeToString()
+        session.scene[move.layer][move.id] = entity.SerializeToString(deterministic=True)
     elif what == "layer_state":
+        session.scene.setdefault(request.layer_state.layer, {})
         for field, value in request.layer_state.ListFields():
             if field.name != "layer":
                 session.states[f"{request.layer_state.layer}.{field.name}"] = value
     elif what == "define_object":
-        session.objects[request.define_object.object] = request.define_object.definition.SerializeToString()
+        name = request.define_object.object
+        definition = request.define_object.definition.SerializeToString(deterministic=True)
+        for used in used_by(definition):
+            if used not in session.objects:
+                raise Refusal("", name, types_pb2.REASON_NOT_FOUND, f"object {used} is not defined")
+            if name == used or name in reached(session, used):
+                raise Refusal("", name, types_pb2.REASON_CYCLE)
+        session.objects[name] = definition
     elif what == "delete_object":
-        session.objects.pop(request.delete_object.object, None)
+        _delete_object(session, request.delete_object)
     else:
         raise AssertionError(what)
+
+
+def _delete_object(session: Session, request: pb.DeleteObject) -> None:
+    name = request.object
+    if name not in session.objects:
+        raise Refusal("", name, types_pb2.REASON_NOT_FOUND)
+    instances = [(layer, id) for layer, held in session.scene.items() for id, entity in held.items()
+                 if drawn_by(entity) == name]
+    users = [user for user, definition in session.objects.items() if name in used_by(definition)]
+    if not request.cascade and (instances or users):
+        raise Refusal("", name, types_pb2.REASON_IN_USE)
+    for layer, id in instances:
+        del session.scene[layer][id]
+    for user in users:
+        parts = primitives_pb2.Object.FromString(session.objects[user]).parts
+        left = primitives_pb2.Object(parts=[part for part in parts if part.primitive.instance.object != name])
+        session.objects[user] = left.SerializeToString(deterministic=True)
+    del session.objects[name]

@@ -1,5 +1,7 @@
 """The client against the real daemon, where it matters that it is real. The daemon's path is in VOXELD."""
+import asyncio
 import os
+import random
 import shutil
 import socket
 import subprocess
@@ -8,6 +10,8 @@ import threading
 import time
 import unittest
 from typing import Any, Optional
+
+import numpy as np
 
 import voxeld as voxel
 
@@ -86,6 +90,8 @@ class Relay:
 
 
 class RealServer(unittest.TestCase):
+    maxDiff = None
+
     def setUp(self) -> None:
         self.folder = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, self.folder)
@@ -142,6 +148,138 @@ class RealServer(unittest.TestCase):
         (box,) = v.entities("l")
         self.assertEqual(box.transform.m[3], 0.25)
         self.assertEqual({layer.layer: layer.opacity for layer in v.layers()}, {"l": 128, "live": 255, "main": 255})
+
+    def scene(self, v: voxel.Connection) -> Any:
+        """All that says what is drawn; not when, nor by whom."""
+        layers = []
+        for layer in sorted(v.layers(), key=lambda one: one.number):
+            for field in ("owner", "number", "bytes", "client_name"):
+                layer.ClearField(field)
+            layers.append(str(layer))
+        entities = []
+        for entity in v.entities(timeout=LONG):
+            entity.key.owner = 0
+            for field in ("sequence", "expires_ns"):
+                entity.ClearField(field)
+            entities.append(str(entity))
+        return layers, entities
+
+    def draw_at_random(self, v: voxel.Connection, rng: random.Random) -> None:
+        layer, name = v.layer(rng.choice("abc")), rng.choice("xyz")
+        kind = rng.randrange(11)
+        if kind < 2:
+            layer.sphere(name, radius=rng.choice([0.1, 1e12]), color=rng.choice(["red", "lime"]))  # the one too large
+        elif kind < 4:
+            layer.instance(name, rng.choice("xyz"), transform=voxel.translate(rng.random(), 0, 0))
+        elif kind == 4:
+            with layer.frame() as frame:
+                frame.box("b", size=rng.random() + 0.1)
+                frame.instance(name, rng.choice("xyz"))
+        elif kind == 5:
+            layer.remove(name)
+        elif kind == 6:
+            layer.set(order=rng.randrange(3), opacity=rng.choice([0.5, 1]))
+        elif kind == 7:
+            layer.sphere(name).transform = rng.choice([voxel.translate(0.1, 0, 0), voxel.translate(1e12, 0, 0)])
+        elif kind == 8 and rng.random() < 0.2:
+            v.clear()
+        elif kind == 9 and rng.random() < 0.5:
+            v.remove_object(name, cascade=rng.random() < 0.5)
+        else:
+            with v.object(name) as block:
+                block.cylinder("c", radius=0.1 + rng.random())
+                if rng.random() < 0.4:
+                    block.instance("i", rng.choice("xyz"))
+
+    def test_what_was_accepted_comes_back_and_nothing_else(self) -> None:
+        for strict in (False, True):
+            rng = random.Random(f"{strict}")
+            v = self.connect(strict=strict, on_issue=lambda issue: None)
+            for turn in range(4):
+                for _ in range(60):
+                    with v.batch():
+                        for _ in range(rng.choice([1, 1, 3])):
+                            self.draw_at_random(v, rng)
+                v.sphere("last of the turn").frame.wait(LONG)  # type: ignore[union-attr]
+                before, counts = self.scene(v), v.counts
+                self.daemon.kill()
+                self.daemon.start()
+                v.commit().wait(LONG)
+                self.assertEqual(self.scene(v), before)
+                self.assertEqual(v.counts["refused_operations"], counts["refused_operations"])
+            self.assertGreater(v.counts["refused" if strict else "refused_operations"], 20)
+            v.close()
+
+    def test_a_scene_beyond_the_limits_of_a_commit_comes_back(self) -> None:
+        self.daemon.kill()
+        folder = tempfile.mkdtemp(dir=self.folder)
+        with open(f"{folder}/small.toml", "w", encoding="utf-8") as file:
+            file.write("[limits]\nmax_uncommitted_bytes = 3000000\nmax_operations_per_commit = 50\n")
+        small = Daemon(folder, "--config", f"{folder}/small.toml")
+        self.addCleanup(small.kill)
+        v = self.connect(small.server)
+        for number in range(200):
+            v.sphere(f"s{number:03}", radius=0.1)
+        for number in range(9):
+            v.points(f"p{number}", np.full((60_000, 3), 0.01 * number, np.float32))
+        v.commit().wait(LONG)
+        before = self.scene(v)
+        small.kill()
+        small.start()
+        v.commit().wait(LONG)
+        self.assertEqual(self.scene(v), before)
+        self.assertEqual(v.issues, [])
+
+    def test_a_timed_commit_outlives_its_stream(self) -> None:
+        for policy in ("clear", "keep"):
+            path = f"{self.folder}/relay.{policy}.sock"
+            relay = Relay(path, self.daemon.path)
+            self.addCleanup(relay.close)
+            v = self.connect(f"unix:{path}", on_disconnect=policy)
+            v._transport.wait_until(v._session.clock.known, LONG)
+            observer = self.connect()
+            v.sphere("now").frame.wait(LONG)  # type: ignore[union-attr]
+            due = v.server_time_ns() + 2_000_000_000
+            v.autocommit = False
+            v.sphere("later", radius=0.9)
+            later = v.commit(present_at_ns=due)
+            v._transport.wait_until(lambda: later.scheduled_ns != 0, LONG)
+            relay.cut()
+            v._transport.wait_until(lambda: v._session.resumed == 1, LONG)
+            outcome = later.wait_shown(LONG)["stack"]
+            self.assertEqual((outcome.kind, outcome.time_ns >= due, self.ids(observer)), ("presented", True, ["later", "now"]))
+            observer.close()
+            v.close()
+            self.daemon.kill()
+            self.daemon.start()
+
+    def test_asyncio_sees_layers_and_changes(self) -> None:
+        async def main() -> None:
+            async with await voxel.aio.connect(self.daemon.server, timeout=LONG) as v:
+                v.layer("a", opacity=0.5).sphere("s")
+                await voxel.aio.accepted(v.commit(), LONG)
+                self.assertEqual([layer.layer for layer in await v.layers(timeout=LONG)], ["a"])
+                seen: list[str] = []
+                async for change in v.watch_scene(timeout=LONG):
+                    seen += [entity.info.key.id for entity in change.entities]
+                    if len(seen) == 1:
+                        v.sphere("t")
+                    else:
+                        break
+                self.assertEqual(seen, ["s", "t"])
+
+                async def watch() -> None:
+                    async for _ in v.watch_scene():
+                        ready.set()
+
+                ready = asyncio.Event()
+                task = asyncio.create_task(watch())
+                await ready.wait()
+                task.cancel()
+                with self.assertRaises(asyncio.CancelledError):
+                    await task
+
+        asyncio.run(main())
 
     def test_a_session_may_be_taken_up_by_another(self) -> None:
         first = self.connect(on_disconnect="keep")

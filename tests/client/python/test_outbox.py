@@ -24,6 +24,14 @@ def unit(number: int, *ops: operations.Operation) -> operations.Unit:
     return operations.Unit(Frame(number), ops, pb.Commit())
 
 
+def timed(number: int, *ops: operations.Operation) -> operations.Unit:
+    return operations.Unit(Frame(number), ops, pb.Commit(present_at_ns=1 << 62))
+
+
+def must_show(number: int, *ops: operations.Operation) -> operations.Unit:
+    return operations.Unit(Frame(number), ops, pb.Commit(must_show=True))
+
+
 class Model:
     """Units as lists of labels: ("frame", layer, number) or ("put", …). The policy is applied by looking at everything."""
 
@@ -96,6 +104,26 @@ class Policies(unittest.TestCase):
         self.assertEqual(box.dropped_frames, 0)
 
 
+    def test_what_has_a_time_or_must_be_shown_is_not_given_up(self) -> None:
+        for policy in (LATEST, DROP_OLDEST):
+            box = Outbox(policy)
+            for number, make in enumerate((timed, unit, must_show, unit, timed, must_show, unit)):
+                box.push(make(number, frame("a")))
+            self.assertEqual([u.frame.id for u in box.units()], [0, 2, 4, 5, 6])
+            self.assertEqual(box.dropped_frames, 2)
+            while box.pop():
+                pass
+            self.assertEqual(box.bytes, 0)
+
+    def test_unconnected_they_are_kept_too(self) -> None:
+        box = Outbox(RELIABLE, limit_bytes=10_000)
+        box.push(timed(0, frame("a", size=3000)), newest_only=True)
+        box.push(must_show(1, frame("a", size=3000)), newest_only=True)
+        for number in range(2, 5):
+            self.assertIsNotNone(box.push(unit(number, frame("a", size=3000)), newest_only=True))
+        self.assertEqual([u.frame.id for u in box.units()], [0, 1, 4])
+
+
 class Room(unittest.TestCase):
     def test_without_room_nothing_is_taken(self) -> None:
         box = Outbox(RELIABLE, limit_bytes=10_000)
@@ -135,6 +163,15 @@ class Room(unittest.TestCase):
         self.assertIsNotNone(left)
         self.assertIsNotNone(box.units()[-1].operations, "the newest is there")
         self.assertEqual([u.frame.id for u in box.units()], list(range(100)), "every commit still has its receipt")
+
+    def test_what_comes_later_replaces_nothing_now(self) -> None:
+        box = Outbox(RELIABLE, limit_bytes=10_000)
+        for number, make in enumerate((must_show, timed, unit)):
+            self.assertIsNotNone(box.push(make(number, puts("a", "x", size=3000))))
+        self.assertIsNone(box.push(timed(3, puts("a", "x", size=3000))), "it takes effect later")
+        self.assertEqual([len(u.operations) for u in box.units()], [1, 1, 1])
+        self.assertIsNotNone(box.push(unit(4, puts("a", "x", size=3000))))
+        self.assertEqual([len(u.operations) for u in box.units()], [1, 1, 0, 1])
 
     def test_merging_leaves_the_scene_as_it_would_be(self) -> None:
         from plain_server import PlainServer

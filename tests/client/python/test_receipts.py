@@ -1,9 +1,10 @@
+import concurrent.futures
 import random
 import threading
 import unittest
 
-from voxeld import CommitDropped, CommitRefused, ConnectionLost
-from voxeld.receipts import Book, Frame, Stages
+from voxeld import CommitDropped, CommitRefused, ConnectionLost, receipts
+from voxeld.receipts import Book, Frame, Issue, Stages
 from voxeld.v1 import scene_pb2 as pb
 from voxeld.v1 import types_pb2
 
@@ -57,30 +58,51 @@ class Sums(unittest.TestCase):
                 if frame.accepted is not None:
                     self.assertEqual(set(frame.outcomes), set(frame.accepted.displays))
 
-    def test_the_book_has_an_end(self) -> None:
-        from voxeld import receipts
+    def test_only_owed_outcomes_are_given_up_for_being_many(self) -> None:
         book = Book()
-        first = Frame(1)
-        book.add(first)
-        for number in range(2, receipts.MAX_OPEN + 2):
-            book.add(Frame(number))
-        self.assertEqual(len(book), receipts.MAX_OPEN)
-        self.assertEqual(first.state, "lost")
+        frames = [Frame(number) for number in range(1, receipts.MAX_OWED + 100)]
+        for frame in frames:
+            book.add(frame)
+        self.assertEqual({f.state for f in frames}, {"waiting"}, "what waits to be sent is bounded by its bytes")
+        for frame in frames:
+            book.receipt(pb.Receipt(frame_id=frame.id, accepted=pb.Accepted(displays=["d"])))
+        self.assertEqual(len(book), receipts.MAX_OWED)
+        self.assertEqual((frames[0].state, frames[0].outcomes["d"].kind), ("accepted", "untold"))
+        self.assertEqual(frames[-1].outcomes, {})
 
 
 class Waiting(unittest.TestCase):
-    def test_issues_belong_to_the_commit_that_they_come_before(self) -> None:
-        book, first, second = Book(), Frame(1), Frame(2)
+    def test_issues_are_told_with_the_refusal(self) -> None:
+        book, first = Book(), Frame(1)
         book.add(first)
-        book.add(second)
-        book.issue(pb.Issue(layer="l", id="i", field="upsert.entity", reason=types_pb2.REASON_INVALID_VALUE, message="is NaN"))
-        book.receipt(pb.Receipt(frame_id=1, refused=pb.Refused(message="strict")))
-        book.receipt(pb.Receipt(frame_id=2, accepted=pb.Accepted()))
+        issue = Issue.of(pb.Issue(layer="l", id="i", field="upsert.entity", reason=types_pb2.REASON_INVALID_VALUE,
+                                  message="is NaN"))
+        book.receipt(pb.Receipt(frame_id=1, refused=pb.Refused(message="strict")), [issue])
         self.assertEqual([str(i) for i in first.issues], ["l/i: upsert.entity is NaN (invalid_value)"])
-        self.assertEqual(second.issues, ())
         with self.assertRaisesRegex(CommitRefused, "strict.*NaN") as caught:
             first.wait(0)
         self.assertEqual(caught.exception.issues, first.issues)
+
+    def test_words_of_newer_servers_are_borne(self) -> None:
+        book, frame = Book(), Frame(1)
+        book.add(frame)
+        why = pb.Receipt(frame_id=1, outcome=pb.Outcome(display="d"))
+        why.outcome.not_shown.ParseFromString(b"\x08\x63")  # a Why that nobody knows
+        book.receipt(why)
+        book.receipt(pb.Receipt(frame_id=1, outcome=pb.Outcome(display="e")))
+        book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted(displays=["d", "e"])))
+        self.assertEqual({d: (o.kind, o.reason[:13]) for d, o in frame.wait_shown(0).items()},
+                         {"d": ("not_shown", "99"), "e": ("untold", "the server is")})
+
+    def test_others_futures_are_resolved_by_who_was_asked_to(self) -> None:
+        asked: list[concurrent.futures.Future[Frame]] = []
+        book, frame = Book(), Frame(1, done=lambda future, frame: asked.append(future))
+        book.add(frame)
+        future = frame.future()
+        future.add_done_callback(lambda _: self.fail("called by the book"))
+        book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted()))
+        self.assertEqual(asked, [future])
+        self.assertEqual(frame.wait(0), frame)
 
     def test_what_waits_is_told(self) -> None:
         book, frame = Book(), Frame(1)
@@ -110,7 +132,8 @@ class Waiting(unittest.TestCase):
         for frame, error in ((dropped, CommitDropped), (lost, ConnectionLost)):
             with self.assertRaises(error):
                 frame.wait_shown(0)
-        self.assertEqual(late.wait_shown(0), {}, "it was accepted, and no more will be known")
+        self.assertEqual({d: o.kind for d, o in late.wait_shown(0).items()}, {"d": "untold", "e": "untold"})
+        self.assertFalse(late.seen)
 
     def test_without_outcomes_accepted_is_all(self) -> None:
         book, frame = Book(), Frame(1, wants_outcomes=False)

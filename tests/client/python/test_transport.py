@@ -1,82 +1,18 @@
 """Connections over real gRPC, to the plain server behind a real socket."""
 import asyncio
-import os
-import tempfile
 import threading
 import unittest
-from concurrent import futures
-from typing import Any, Iterator, Optional
+from typing import Any
 
 import grpc
 import numpy as np
 from plain_server import REFUSED, PlainServer
+from served import LONG, Case, Served
 
 import voxeld as voxel
 from voxeld import transport
 from voxeld.v1 import primitives_pb2
 from voxeld.v1 import scene_pb2 as pb
-
-LONG = 60.0
-
-
-class Served:
-    """The plain server at a unix socket."""
-
-    def __init__(self, path: str, plain: Optional[PlainServer] = None) -> None:
-        self.plain = plain or PlainServer()
-        self.address = f"unix:{path}"
-        self.cut = threading.Event()           # the next request ends its stream
-        self.refuse: Optional[grpc.StatusCode] = None
-        self.credit = threading.Event()        # cleared: no more credit than there is
-        self.credit.set()
-        self._server = grpc.server(futures.ThreadPoolExecutor(4))
-        handler = grpc.stream_stream_rpc_method_handler(self._stream)
-        self._server.add_generic_rpc_handlers(
-            [grpc.method_handlers_generic_handler("voxeld.v1.SceneService", {"Stream": handler})])
-        self._server.add_insecure_port(self.address)
-        self._server.start()
-
-    def stop(self) -> None:
-        self._server.stop(None).wait(LONG)
-
-    def _stream(self, requests: Iterator[bytes], context: Any) -> Iterator[bytes]:
-        if self.refuse is not None:
-            context.abort(self.refuse, "not you")
-        self.plain.begin()
-        for message in requests:
-            if self.cut.is_set():
-                self.cut.clear()
-                context.abort(grpc.StatusCode.UNAVAILABLE, "cut")
-            try:
-                answers = self.plain.receive(message)
-            except LookupError:
-                context.abort(grpc.StatusCode.NOT_FOUND, "no such session")
-            if self.plain.window and self.plain.received >= self.plain.credit:
-                self.credit.wait(LONG)
-            for answer in answers + self.plain.give_credit():
-                yield answer.SerializeToString()
-
-
-class Case(unittest.TestCase):
-    def setUp(self) -> None:
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = os.path.join(folder.name, "v.sock")
-
-    def serve(self, plain: Optional[PlainServer] = None) -> Served:
-        served = Served(self.path, plain)
-        self.addCleanup(served.stop)
-        return served
-
-    def connect(self, **options: Any) -> voxel.Connection:
-        connection = voxel.connect(f"unix:{self.path}", timeout=LONG, **options)
-        self.addCleanup(connection.close)
-        return connection
-
-    def ids(self, served: Served, layer: str = "main") -> list[str]:
-        assert served.plain.session is not None
-        return sorted(served.plain.session.scene.get(layer, {}))
-
 
 class Streams(Case):
     def test_what_is_drawn_arrives(self) -> None:
@@ -197,6 +133,7 @@ class Streams(Case):
         with self.assertLogs("voxeld") as logs:
             v.sphere("a", label=REFUSED)
             v.commit().wait(LONG)
+            v._transport._callbacks.drain(LONG)
             v.commit().wait(LONG)
         self.assertIn("ZeroDivisionError", logs.output[0])
         self.assertEqual(v.counts["streams_opened"], 1)
@@ -222,17 +159,6 @@ class Streams(Case):
 
 
 class Flow(Case):
-    def stuck(self, **options: Any) -> tuple[Served, voxel.Connection]:
-        """A server that has no more credit to give, and one message on its way."""
-        served = self.serve(PlainServer(window=64))
-        v = self.connect(**options)
-        served.credit.clear()
-        self.addCleanup(served.credit.set)
-        with v.frame("filler") as frame:
-            frame.sphere("s", label="x" * 200)
-        v._transport.wait_until(lambda: frame.ticket.state == "sent", LONG)
-        return served, v
-
     def test_latest_keeps_the_newest_of_each_layer_and_counts(self) -> None:
         served, v = self.stuck(flow="latest")
         frames = []
@@ -283,7 +209,8 @@ class Flow(Case):
 
         thread = threading.Thread(target=draw)
         thread.start()
-        self.assertFalse(done.wait(0.05))
+        v._transport.wait_until(lambda: v._session.outbox.bytes > 700_000, LONG)
+        self.assertFalse(done.is_set())
         served.credit.set()
         thread.join(LONG)
         v.commit().wait(LONG)

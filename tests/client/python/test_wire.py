@@ -96,7 +96,7 @@ class Writer(unittest.TestCase):
                 puts.append(wire.put("layer", f"id{number}", look.to_bytes(), case.packed))
                 expected.append(expected_upsert("layer", f"id{number}", look, case.message))
             got = []
-            for message in wire.batched(puts):
+            for message in map(wire.together, wire.runs(puts)):
                 request = pb.StreamRequest.FromString(message)
                 if request.WhichOneof("op") == "batch":
                     self.assertLessEqual(len(message), wire.BATCH_BYTES + 16)
@@ -111,7 +111,26 @@ class Writer(unittest.TestCase):
         puts = [wire.put("l", f"i{n}", Look(label="x" * 200).to_bytes(), sphere) for n in range(20_000)]
         total = sum(len(p.request) for p in puts)
         self.assertGreater(total, 4 << 20)
-        self.assertLessEqual(len(wire.batched(puts)), total // (wire.BATCH_BYTES - wire.ALONE_BYTES) + 1)
+        self.assertLessEqual(len(list(wire.runs(puts))), total // (wire.BATCH_BYTES - wire.ALONE_BYTES) + 1)
+
+    def test_a_servers_limit_bounds_batches(self) -> None:
+        sphere = wire.message(primitives_pb2.Primitive(sphere=primitives_pb2.Sphere(radius=1)))
+        puts = [wire.put("l", f"i{n}", Look(label="x" * (n % 200)).to_bytes(), sphere) for n in range(500)]
+        for most in (400, 1024, 5000):
+            messages = [wire.together(run) for run in wire.runs(puts, most)]
+            self.assertLessEqual(max(map(len, messages)), most)
+            self.assertGreater(max(map(len, messages)), most - 400)
+
+    def test_a_lifetime_can_be_changed(self) -> None:
+        rng = random.Random(3)
+        for _ in range(50):
+            case, look = Expected(rng), random_look(rng)
+            changed = wire.put("l", "i", look.to_bytes(), case.packed, "o", look.lifetime_ns).with_lifetime(77)
+            expected = expected_upsert("l", "i", look, case.message)
+            expected.entity.lifetime_ns = 77
+            self.assertEqual(pb.StreamRequest.FromString(changed.request), pb.StreamRequest(upsert=expected))
+            self.assertEqual(pb.Upsert.FromString(changed.request[changed.start:]), expected)
+            self.assertEqual((changed.uses, changed.lifetime_ns), ("o", 77))
 
     def test_objects_are_what_protobuf_would_have_written(self) -> None:
         rng = random.Random(4)
