@@ -28,6 +28,9 @@ namespace voxeld::client {
 // Thread-safe.
 class SessionCore {
  public:
+  static constexpr size_t kMostUntold =
+      65536;  // receipts, and issues, that wait for their callbacks
+
   // `clock` must outlive it. Nothing begins before the first Step.
   SessionCore(Options options, std::unique_ptr<Transport> transport, sync::Clock& clock);
   // After Stop.
@@ -89,7 +92,7 @@ class SessionCore {
     SessionCore* const core_;
     const Take take_;
   };
-  using Event = std::variant<Receipt, Issue, ConnectionChange>;
+  using Event = std::variant<Issue, ConnectionChange>;
 
   // Streams: session_link.cc.
   void Connect() VOXELD_REQUIRES(mutex_);
@@ -99,7 +102,10 @@ class SessionCore {
   void TakeOpened(const v1::Opened& opened) VOXELD_REQUIRES(mutex_);
   void TakeIssue(const v1::Issue& issue) VOXELD_REQUIRES(mutex_);
   void TakeReceipt(const v1::Receipt& receipt) VOXELD_REQUIRES(mutex_);
+  // What was sent on the stream before and has no answer, of a session that was taken up.
+  void TakeUnheard(uint64_t last_sequence) VOXELD_REQUIRES(mutex_);
   void SendRetained() VOXELD_REQUIRES(mutex_);
+  void TellNotRestored(const std::string& why) VOXELD_REQUIRES(mutex_);
   void Lose(const absl::Status& why) VOXELD_REQUIRES(mutex_);
   void EndSession(const absl::Status& status) VOXELD_REQUIRES(mutex_);
   void CancelLink(const absl::Status& why) VOXELD_REQUIRES(mutex_);
@@ -107,6 +113,14 @@ class SessionCore {
   sync::TimeNs DoDue(sync::TimeNs now) VOXELD_REQUIRES(mutex_);
   std::string OpenBytes(Take take) VOXELD_REQUIRES(mutex_);
 
+  absl::Status GiveUpOversized(std::vector<Operation> operations, FrameOperation* frame)
+      VOXELD_REQUIRES(mutex_);
+  // 0: not known.
+  size_t most_message_bytes() const VOXELD_REQUIRES(mutex_);
+  // on_receipt keeps too much waiting.
+  bool Behind() const VOXELD_REQUIRES(mutex_);
+  bool Room() const VOXELD_REQUIRES(mutex_);
+  bool HasEvents() const VOXELD_REQUIRES(mutex_);
   void NoteDrops() VOXELD_REQUIRES(mutex_);
   // Events for the callbacks, and everybody who waits is woken.
   void Changed() VOXELD_REQUIRES(mutex_);
@@ -148,6 +162,7 @@ class SessionCore {
   std::string resume_token_ VOXELD_GUARDED_BY(mutex_);
   std::string own_token_ VOXELD_GUARDED_BY(mutex_);  // of our owner, from the last Opened
   sync::Backoff backoff_ VOXELD_GUARDED_BY(mutex_);
+  sync::TimeNs opened_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs retry_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs open_deadline_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   sync::TimeNs last_heard_ VOXELD_GUARDED_BY(mutex_) = 0;

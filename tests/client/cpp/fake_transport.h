@@ -62,6 +62,10 @@ class SessionUnderTest {
   void SayOpened(uint64_t credit_bytes = 0, const std::string& token = "token");
   void SayOpened(const v1::Opened& opened);
   void SayAccepted(uint64_t frame, const std::vector<std::string>& displays = {});
+  void SayRefused(uint64_t frame, const std::string& message);
+  void SayPresented(uint64_t frame, const std::string& display);
+  // An Issue of the newest stream's request `index`, Open being the first.
+  void SayIssue(size_t index, const std::string& layer, const std::string& id);
   void End(const absl::Status& status);
 
   // Puts up a sphere of this id and commits it.
