@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/cpp/src/local_socket.h"
 #include "display/sync/mutex.h"
 #include "voxeld/v1/scene.grpc.pb.h"  // how gRPC reads answers
 
@@ -115,6 +116,12 @@ class GrpcTransport final : public Transport {
     arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
     return std::make_unique<GrpcStream>(
         grpc::CreateCustomChannel(target_, grpc::InsecureChannelCredentials(), arguments), events);
+  }
+
+  std::unique_ptr<MemoryChannel> OpenMemory(const std::string& path, const std::string& token,
+                                            MemoryChannel::Events* events) override {
+    if (!target_.starts_with("unix:")) return nullptr;
+    return ConnectLocalSocket(path, token, events);
   }
 
  private:

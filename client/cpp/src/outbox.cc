@@ -397,6 +397,7 @@ std::optional<Outbox::Outgoing> Outbox::Next(int64_t now_ns) {
   Transaction& t = *transaction;
   while (t.next_piece < t.pieces.size() && t.pieces[t.next_piece].dropped) ++t.next_piece;
   Outgoing out;
+  out.frame_id = t.frame_id;
   if (t.next_piece < t.pieces.size()) {
     Transaction::Piece& piece = t.pieces[t.next_piece];
     if (t.next_message == 0 && piece.frame) Begin(order, t, t.next_piece);

@@ -106,11 +106,14 @@ class Outbox {
 
   struct Outgoing {
     Rope message;
+    uint64_t frame_id = 0;
     uint64_t sequence = 0;
     std::shared_ptr<const Transaction> committed;  // not null: this is its Commit
   };
   // What is to be written now, which counts as sent; nothing if nothing may be.
   std::optional<Outgoing> Next(int64_t now_ns);
+  // What was to be written had so many bytes less.
+  void Saved(uint64_t bytes) { sent_ -= bytes; }
   // The same for a ping, which goes before everything.
   std::optional<Rope> Ping(int64_t now_ns);
 

@@ -44,7 +44,8 @@ class ReceiptBook {
   void RefusedHere(uint64_t frame, const std::string& why);
   // No answer will come.
   void Lost(uint64_t frame, const std::string& why);
-  // Outcomes of what had been sent on an earlier stream and accepted before `accepted_before_ns` will not come. How many commits.
+  // Outcomes of what had been accepted before `accepted_before_ns`, or was not heard of, will not come. How many
+  // commits.
   uint64_t OutcomesLost(int64_t accepted_before_ns, const std::string& why);
   // No answer will come to anything. What was accepted keeps what it has.
   void Ended(const std::string& why);

@@ -18,6 +18,8 @@ constexpr uint64_t kMostUnansweredPings = 4;
 // The server sends owed outcomes for 10 s after a resume.
 constexpr sync::TimeNs kOwedOutcomes = 12 * sync::kSecond;
 constexpr size_t kRestoreBytes = 4 << 20;
+// One after the other, and no more is offered on that stream.
+constexpr uint64_t kMostMemoriesRefused = 3;
 
 // No other attempt would end differently.
 bool IsFinal(const absl::Status& status) {
@@ -88,9 +90,14 @@ void SessionCore::Connect() {
   link_->stream = transport_->Start(link_.get());
   const Rope open(OpenBytes(take));
   link_->open_bytes = open.size();
+  Write(open);
+}
+
+void SessionCore::Write(const Rope& message) {
+  link_->writing = true;
   ++receipts_.tally().messages_sent;
-  receipts_.tally().bytes_sent += open.size();
-  link_->stream->Write(open);
+  receipts_.tally().bytes_sent += message.size();
+  link_->stream->Write(message);
 }
 
 void SessionCore::CancelLink(const absl::Status& why) {
@@ -99,7 +106,8 @@ void SessionCore::CancelLink(const absl::Status& why) {
 }
 
 void SessionCore::Pump() {
-  if (state_ != State::kOpen || link_ == nullptr || link_->writing || half_closed_) return;
+  if (state_ != State::kOpen || link_ == nullptr || half_closed_) return;
+  if (link_->writing || link_->handing) return;
   const sync::TimeNs now = clock_.Now();
   std::optional<Rope> message;
   if (ping_due_) {
@@ -113,6 +121,7 @@ void SessionCore::Pump() {
   if (!message) {
     std::optional<Outbox::Outgoing> next = outbox_.Next(now);
     if (next) {
+      if (HandOver(*next)) return;
       message = std::move(next->message);
       if (next->committed != nullptr) {
         receipts_.Sent(next->committed->frame_id, next->committed->first_sequence,
@@ -121,14 +130,48 @@ void SessionCore::Pump() {
     }
   }
   if (message) {
-    link_->writing = true;
-    ++receipts_.tally().messages_sent;
-    receipts_.tally().bytes_sent += message->size();
-    link_->stream->Write(*message);
+    Write(*message);
   } else if (closing_ && outbox_.empty()) {
     half_closed_ = true;
     link_->stream->WritesDone();
   }
+}
+
+bool SessionCore::HandOver(const Outbox::Outgoing& next) {
+  if (link_->memory == nullptr || link_->memories_refused >= kMostMemoriesRefused) return false;
+  std::optional<InMemory> moved = MoveToMemory(next.message, link_->memories + 1);
+  if (!moved) return false;
+  Rope content = moved->memory;
+  link_->handing = Link::Handing{next.message, *std::move(moved), next.frame_id};
+  link_->memory->Hold(++link_->memories, std::move(content));
+  return true;
+}
+
+void SessionCore::Held(Link* link, MemoryChannel::Answer answer) {
+  sync::MutexLock lock(mutex_);
+  if (link != link_.get() || !link->handing) return;
+  const Link::Handing handed = *std::exchange(link->handing, std::nullopt);
+  if (answer == MemoryChannel::Answer::kGone) {
+    link->memories_refused = kMostMemoriesRefused;
+  } else if (answer == MemoryChannel::Answer::kRefused) {
+    ++link->memories_refused;
+  }
+  if (answer == MemoryChannel::Answer::kHeld) {
+    link->memories_refused = 0;
+    link->in_use[handed.frame_id].push_back(link->memories);
+    outbox_.Saved(handed.whole.size() - handed.moved.request.size());
+    receipts_.tally().memory_bytes += handed.moved.memory.size();
+    Write(handed.moved.request);
+  } else {
+    Write(handed.whole);
+  }
+}
+
+void SessionCore::ReleaseMemory(uint64_t frame_id) {
+  const auto it = link_->in_use.find(frame_id);
+  if (it == link_->in_use.end()) return;
+  for (const uint64_t memory : it->second) link_->memory->Release(memory);
+  link_->in_use.erase(it);
 }
 
 void SessionCore::Written(Link* link) {
@@ -162,6 +205,8 @@ void SessionCore::TakeReceipt(const v1::Receipt& receipt) {
   const sync::TimeNs now = clock_.Now();
   receipts_.Told(receipt, now);
   if (receipt.has_scheduled()) outbox_.Scheduled(receipt.frame_id());
+  // It was read then, whatever became of it.
+  if (!receipt.has_outcome()) ReleaseMemory(receipt.frame_id());
   if (receipt.has_outcome()) retained_.WasApplied(receipt.frame_id());
   if (!receipt.has_accepted() && !receipt.has_refused()) return;
   backoff_.Reset();
@@ -242,6 +287,10 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
       receipts_.RefusedHere(transaction->frame_id, "it was not sent: " + why);
   }
   last_heard_ = now;
+  if (options_.local_memory && !opened.local_socket().empty()) {
+    link_->memory =
+        transport_->OpenMemory(opened.local_socket(), opened.local_token(), link_.get());
+  }
   outbox_.StreamOpened(link_->open_bytes, opened.credit_bytes());
   NoteDrops();
   events_.push_back(std::move(change));

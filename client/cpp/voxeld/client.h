@@ -83,6 +83,10 @@ struct Options {
   // before it was opened: later, as after the server's restart, it goes on as a new owner (server()).
   std::string owner_token;
 
+  // Over a unix socket, to a server that offers it: content of at least 64 KiB is handed over in sealed memory
+  // instead of being sent. Where that fails it is sent.
+  bool local_memory = true;
+
   Flow flow = Flow::kReliable;
   uint32_t drop_oldest_frames = 1;
   // Of commits that wait here. When it is full: while there is a connection, kReliable refuses the

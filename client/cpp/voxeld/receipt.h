@@ -115,6 +115,7 @@ struct Tally {
   uint64_t server_dropped_frames = 0;                   // and there
   uint64_t connections = 0, resumed = 0, restored = 0;  // opened; taken up again; sent again
   uint64_t bytes_sent = 0, messages_sent = 0;
+  uint64_t memory_bytes = 0;  // handed over in sealed memory, beside bytes_sent
   std::map<std::string, OutcomeCounts> displays;
   uint64_t issue_count = 0, not_found = 0;  // issues; those with Reason::kNotFound
   uint64_t untold_issues = 0;               // that on_issue was not called for, being too slow
