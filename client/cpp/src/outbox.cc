@@ -187,7 +187,9 @@ void Outbox::NoteFrames(int64_t order, const Transaction& transaction) {
 
 size_t Outbox::DroppableBytes(const Transaction& coming) const {
   size_t bytes = 0;
-  for (const auto& [layer, waiting] : frames_) {
+  for (const auto& entry : frames_) {
+    const std::string& layer = entry.first;
+    const std::deque<WaitingFrame>& waiting = entry.second;
     const bool has_newer = std::any_of(
         coming.pieces.begin(), coming.pieces.end(),
         [&](const auto& piece) { return Droppable(coming, piece) && piece.layer == layer; });
@@ -281,6 +283,7 @@ void Outbox::StreamOpened(uint64_t open_bytes, uint64_t credit_bytes) {
   }
   if (keep_frames_ == 0) return;
   std::vector<std::string> layers;
+  layers.reserve(frames_.size());
   for (const auto& [layer, waiting] : frames_) layers.push_back(layer);
   for (const std::string& layer : layers) KeepNewest(layer, keep_frames_);
 }

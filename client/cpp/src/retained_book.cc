@@ -203,6 +203,7 @@ std::vector<Operation> RetainedBook::Restore(int64_t now_ns) const {
   std::map<std::string, bool> added;
   for (const auto& [name, definition] : objects_) AddObject(name, &added, &out);
   std::vector<std::pair<uint64_t, std::string>> order;
+  order.reserve(layers_.size());
   for (const auto& [name, layer] : layers_) order.push_back({layer.number, name});
   std::sort(order.begin(), order.end());
   for (const auto& [number, name] : order) {
