@@ -4,14 +4,18 @@
 using namespace voxeld::client;        // NOLINT
 using namespace std::chrono_literals;  // NOLINT
 
-// Commits and waits; how many bytes went over the wire for it.
+// Commits and waits; how many bytes the server was given for it: over the wire, and in sealed memory.
 static absl::StatusOr<uint64_t> CommitAndCount(Session& session) {
-  const uint64_t before = session.GetTally().bytes_sent;
+  const auto given = [&session] {
+    const Tally tally = session.GetTally();
+    return tally.bytes_sent + tally.memory_bytes;
+  };
+  const uint64_t before = given();
   auto frame = session.Commit();
   if (!frame.ok()) return frame.status();
   auto receipt = session.WaitAccepted(*frame, 10s);
   if (!receipt.ok()) return receipt.status();
-  return session.GetTally().bytes_sent - before;
+  return given() - before;
 }
 
 absl::Status Run(const std::string& address) {

@@ -1,6 +1,7 @@
 #include "client/cpp/src/encode.h"
 
 #include <cstring>
+#include <functional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -329,16 +330,24 @@ Rope EncodeFrameEnd(std::string_view layer) {
 
 void Batcher::Add(const UpsertOperation& upsert) {
   const Rope encoded = Wrap("", Batch::kUpsertsFieldNumber, EncodeUpsert(upsert));
-  if (open_.size() > 0 && open_.size() + encoded.size() > kBatchBytes) Flush();
+  // Equal hashes of two entities cost a message, and nothing else.
+  const std::hash<std::string_view> hash;
+  const size_t entity = hash(upsert.layer) * 31 + hash(upsert.id);
+  const bool fits = open_.size() + encoded.size() <= most_bytes_ && !entities_.contains(entity);
+  if (upserts_ > 0 && !fits) Flush();
   open_.Append(encoded);
+  entities_.insert(entity);
+  ++upserts_;
 }
 
 void Batcher::Flush() {
-  if (open_.size() == 0) return;
-  messages_.push_back(Wrap("", StreamRequest::kBatchFieldNumber, std::exchange(open_, Rope())));
+  if (upserts_ == 0) return;
+  messages_.push_back({Wrap("", StreamRequest::kBatchFieldNumber, std::exchange(open_, Rope())),
+                       std::exchange(upserts_, 0)});
+  entities_.clear();
 }
 
-std::vector<Rope> Batcher::Take() {
+std::vector<Batcher::Message> Batcher::Take() {
   Flush();
   return std::exchange(messages_, {});
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <unordered_set>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -29,17 +30,26 @@ Rope EncodeOperation(const Operation& operation);
 Rope EncodeFrameBegin(std::string_view layer);
 Rope EncodeFrameEnd(std::string_view layer);
 
-// Upserts in their order, as batches.
+// Upserts in their order, as batches. Of one entity there is one in each, so that (sequence, layer, id)
+// names it.
 class Batcher {
  public:
+  struct Message {
+    Rope bytes;
+    size_t upserts = 0;
+  };
+  explicit Batcher(size_t most_bytes = kBatchBytes) : most_bytes_(most_bytes) {}
   void Add(const UpsertOperation& upsert);
   // All messages; it is empty again.
-  std::vector<Rope> Take();
+  std::vector<Message> Take();
 
  private:
   void Flush();
+  const size_t most_bytes_;
   Rope open_;
-  std::vector<Rope> messages_;
+  std::unordered_set<size_t> entities_;  // in `open_`, by their hashes
+  size_t upserts_ = 0;                   // in `open_`
+  std::vector<Message> messages_;
 };
 
 struct CommitRecord {

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/cpp/src/local_socket.h"
 #include "display/sync/mutex.h"
 #include "voxeld/v1/scene.grpc.pb.h"  // how gRPC reads answers
 
@@ -99,7 +100,8 @@ class GrpcStream final : public Stream,
 
 class GrpcTransport final : public Transport {
  public:
-  explicit GrpcTransport(std::string target) : target_(std::move(target)) {}
+  GrpcTransport(std::string target, Keepalive keepalive)
+      : target_(std::move(target)), keepalive_(keepalive) {}
 
   std::unique_ptr<Stream> Start(Stream::Events* events) override {
     grpc::ChannelArguments arguments;
@@ -108,22 +110,33 @@ class GrpcTransport final : public Transport {
     arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
     // Pauses between attempts are the session's, not those that gRPC's pool remembers.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, static_cast<int>(keepalive_.interval.count()));
+    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(keepalive_.timeout.count()));
+    // Else it asks twice, and then no more until data goes out.
+    arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
     return std::make_unique<GrpcStream>(
         grpc::CreateCustomChannel(target_, grpc::InsecureChannelCredentials(), arguments), events);
   }
 
+  std::unique_ptr<MemoryChannel> OpenMemory(const std::string& path, const std::string& token,
+                                            MemoryChannel::Events* events) override {
+    if (!target_.starts_with("unix:")) return nullptr;
+    return ConnectLocalSocket(path, token, events);
+  }
+
  private:
   const std::string target_;
+  const Keepalive keepalive_;
 };
 
 }  // namespace
 
-std::unique_ptr<Transport> MakeGrpcTransport(std::string target) {
+std::unique_ptr<Transport> MakeGrpcTransport(std::string target, Keepalive keepalive) {
   // gRPC stays up from now on: shutting it down waits, up to 10 s, for sockets that it is still taking
   // down, and it would be at the end of whichever session happened to be the last.
   static const bool up = (grpc_init(), true);
   static_cast<void>(up);
-  return std::make_unique<GrpcTransport>(std::move(target));
+  return std::make_unique<GrpcTransport>(std::move(target), keepalive);
 }
 
 }  // namespace voxeld::client

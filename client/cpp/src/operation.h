@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -57,5 +59,16 @@ struct FrameOperation {
 
 using Operation = std::variant<UpsertOperation, DeleteOperation, TransformOperation, LayerOperation,
                                DefineOperation, RemoveObjectOperation, FrameOperation>;
+
+// What the server refused of one commit. Operations are counted one by one, those of a frame too: its
+// begin, each upsert, its end; none for a frame that was given up.
+struct Refusals {
+  struct Request {
+    uint64_t sequence = 0;
+    size_t operations = 0;
+  };
+  std::vector<Request> requests;  // in their order, Commit left out
+  std::set<std::tuple<uint64_t, std::string, std::string>> refused;  // sequence, layer, id
+};
 
 }  // namespace voxeld::client

@@ -11,6 +11,10 @@ namespace {
 
 // About what a Commit has on the wire.
 constexpr size_t kCommitBytes = 48;
+// At most, of AddSequence.
+constexpr size_t kSequenceBytes = 11;
+// Issues that are kept of one commit; the server's default is a thousand.
+constexpr size_t kMostRefused = 65536;
 
 size_t BytesOf(const Transaction& transaction) {
   size_t bytes = kCommitBytes;
@@ -22,15 +26,55 @@ size_t BytesOf(const Transaction& transaction) {
 
 // The operation that the frame piece stands for is as if it had not been asked for.
 void ForgetFrame(size_t piece, Transaction* transaction) {
-  const auto nth = std::count_if(transaction->pieces.begin(),
-                                 transaction->pieces.begin() + static_cast<ptrdiff_t>(piece),
-                                 [](const Transaction::Piece& before) { return before.frame; });
+  const auto nth = std::count_if(
+      transaction->pieces.begin(), transaction->pieces.begin() + static_cast<ptrdiff_t>(piece),
+      [](const auto& before) { return before.frame && !before.dropped; });
   ptrdiff_t seen = 0;
   for (Operation& operation : transaction->operations) {
     auto* frame = std::get_if<FrameOperation>(&operation);
-    if (frame != nullptr && seen++ == nth) *frame = {};
+    if (frame != nullptr && !frame->layer.empty() && seen++ == nth) {
+      *frame = {};
+      return;
+    }
   }
 }
+
+// Of the upserts in one batch, for its message to have `most_bytes`.
+size_t BatchBytes(size_t most_bytes) {
+  constexpr size_t kWrapping = kSequenceBytes + 6;
+  return most_bytes > kWrapping ? most_bytes - kWrapping : 1;
+}
+
+struct NameParts {
+  std::string operator()(const UpsertOperation& upsert) const {
+    return absl::StrCat(upsert.layer, "/", upsert.id);
+  }
+  std::string operator()(const DefineOperation& define) const {
+    return absl::StrCat("the object \"", define.object, "\"");
+  }
+  template <typename Small>
+  std::string operator()(const Small&) const {
+    return "an operation";
+  }
+};
+
+// Never less than the message that it takes alone; SIZE_MAX: encode it.
+struct AtMostBytes {
+  static constexpr size_t kFields = 512;
+  size_t operator()(const UpsertOperation& upsert) const {
+    return upsert.primitive.size() + upsert.layer.size() + upsert.id.size() + upsert.label.size() +
+           kFields;
+  }
+  size_t operator()(const DefineOperation& define) const {
+    return define.definition.size() + define.object.size() + kFields;
+  }
+  template <typename Other>
+  size_t operator()(const Other&) const {
+    return SIZE_MAX;
+  }
+};
+
+std::string NameOf(const Operation& operation) { return std::visit(NameParts(), operation); }
 
 bool Droppable(const Transaction& transaction, const Transaction::Piece& piece) {
   return piece.frame && !piece.dropped && transaction.present_at_ns == 0;
@@ -39,21 +83,19 @@ bool Droppable(const Transaction& transaction, const Transaction::Piece& piece) 
 }  // namespace
 
 std::shared_ptr<Transaction> MakeTransaction(std::vector<Operation> operations,
-                                             const CommitOptions& options) {
+                                             const CommitOptions& options, size_t most_bytes) {
   auto transaction = std::make_shared<Transaction>();
   transaction->present_at_ns = options.present_at_ns;
   transaction->must_show = options.must_show;
-  Batcher batcher;
+  Batcher batcher(most_bytes == 0 ? kBatchBytes : std::min(kBatchBytes, BatchBytes(most_bytes)));
   Transaction::Piece plain;
-  const auto take_batches = [&batcher](Transaction::Piece* piece) {
-    for (Rope& message : batcher.Take()) {
-      piece->bytes += message.size();
-      piece->messages.push_back(std::move(message));
-    }
-  };
-  const auto add = [](Rope message, Transaction::Piece* piece) {
+  const auto add = [](Rope message, size_t count, Transaction::Piece* piece) {
     piece->bytes += message.size();
-    piece->messages.push_back(std::move(message));
+    piece->messages.push_back({std::move(message), count});
+  };
+  const auto take_batches = [&batcher, &add](Transaction::Piece* piece) {
+    for (Batcher::Message& message : batcher.Take())
+      add(std::move(message.bytes), message.upserts, piece);
   };
   for (const Operation& operation : operations) {
     if (const auto* upsert = std::get_if<UpsertOperation>(&operation)) {
@@ -63,23 +105,71 @@ std::shared_ptr<Transaction> MakeTransaction(std::vector<Operation> operations,
     take_batches(&plain);
     const auto* frame = std::get_if<FrameOperation>(&operation);
     if (frame == nullptr) {
-      add(EncodeOperation(operation), &plain);
+      add(EncodeOperation(operation), 1, &plain);
       continue;
     }
+    if (frame->layer.empty()) continue;  // given up
     if (!plain.messages.empty()) transaction->pieces.push_back(std::exchange(plain, {}));
     Transaction::Piece piece;
     piece.frame = true;
     piece.layer = frame->layer;
-    add(EncodeFrameBegin(frame->layer), &piece);
+    add(EncodeFrameBegin(frame->layer), 1, &piece);
     for (const UpsertOperation& upsert : frame->upserts) batcher.Add(upsert);
     take_batches(&piece);
-    add(EncodeFrameEnd(frame->layer), &piece);
+    add(EncodeFrameEnd(frame->layer), 1, &piece);
     transaction->pieces.push_back(std::move(piece));
   }
   take_batches(&plain);
   if (!plain.messages.empty()) transaction->pieces.push_back(std::move(plain));
   transaction->operations = std::move(operations);
   return transaction;
+}
+
+std::vector<Oversized> TakeOversized(size_t most_bytes, std::vector<Operation>* operations) {
+  std::vector<Oversized> oversized;
+  std::erase_if(*operations, [&](Operation& operation) {
+    // A frame's upserts one by one, and its begin.
+    const auto* frame = std::get_if<FrameOperation>(&operation);
+    const auto too_large = [&](const Operation& one) {
+      if (std::visit(AtMostBytes(), one) <= most_bytes) return false;
+      const size_t bytes = MakeTransaction({one}, {}, most_bytes)->LargestMessage();
+      if (bytes <= most_bytes) return false;
+      oversized.push_back({{},
+                           absl::StrCat(NameOf(one), " takes a message of ", bytes,
+                                        " bytes, and the server's max_message_bytes is ",
+                                        most_bytes, "; put it up in pieces")});
+      return true;
+    };
+    const bool takes_more =
+        frame == nullptr
+            ? too_large(operation)
+            : too_large(FrameOperation{frame->layer, {}}) ||
+                  std::any_of(frame->upserts.begin(), frame->upserts.end(),
+                              [&](const UpsertOperation& upsert) { return too_large(upsert); });
+    if (takes_more) oversized.back().operation = std::move(operation);
+    return takes_more;
+  });
+  return oversized;
+}
+
+Refusals Transaction::GetRefusals() const {
+  Refusals refusals;
+  if (refused.empty()) return refusals;
+  refusals.refused = refused;
+  for (const Piece& piece : pieces) {
+    for (const Piece::Message& message : piece.messages)
+      refusals.requests.push_back({message.sequence, message.operations});
+  }
+  return refusals;
+}
+
+size_t Transaction::LargestMessage() const {
+  size_t largest = 0;
+  for (const Piece& piece : pieces) {
+    for (const Piece::Message& message : piece.messages)
+      largest = std::max(largest, message.bytes.size() + kSequenceBytes);
+  }
+  return largest;
 }
 
 void Outbox::Wait(int64_t order, const std::shared_ptr<Transaction>& transaction) {
@@ -97,7 +187,9 @@ void Outbox::NoteFrames(int64_t order, const Transaction& transaction) {
 
 size_t Outbox::DroppableBytes(const Transaction& coming) const {
   size_t bytes = 0;
-  for (const auto& [layer, waiting] : frames_) {
+  for (const auto& entry : frames_) {
+    const std::string& layer = entry.first;
+    const std::deque<WaitingFrame>& waiting = entry.second;
     const bool has_newer = std::any_of(
         coming.pieces.begin(), coming.pieces.end(),
         [&](const auto& piece) { return Droppable(coming, piece) && piece.layer == layer; });
@@ -136,6 +228,48 @@ void Outbox::AddFirst(const std::vector<std::shared_ptr<Transaction>>& transacti
   for (const auto& transaction : transactions) Wait(order++, transaction);
 }
 
+std::vector<std::pair<std::shared_ptr<const Transaction>, std::string>> Outbox::KeepTo(
+    size_t most_bytes) {
+  std::vector<std::pair<std::shared_ptr<const Transaction>, std::string>> refused;
+  for (auto it = queue_.begin(); it != queue_.end();) {
+    const std::shared_ptr<Transaction> transaction = it->second;
+    if (transaction->LargestMessage() <= most_bytes) {
+      ++it;
+      continue;
+    }
+    waiting_bytes_ -= BytesOf(*transaction);
+    std::vector<Operation> operations = transaction->operations;
+    const std::vector<Oversized> oversized = TakeOversized(most_bytes, &operations);
+    if (oversized.empty() && !operations.empty()) {
+      const std::shared_ptr<Transaction> anew =
+          MakeTransaction(std::move(operations), {}, most_bytes);
+      transaction->pieces = std::move(anew->pieces);
+      waiting_bytes_ += BytesOf(*transaction);
+      ++it;
+      continue;
+    }
+    refused.emplace_back(
+        transaction,
+        !oversized.empty()
+            ? oversized.front().what
+            : absl::StrCat("it takes a message of ", transaction->LargestMessage(),
+                           " bytes, and the server's max_message_bytes is ", most_bytes));
+    it = queue_.erase(it);
+  }
+  return refused;
+}
+
+void Outbox::DropRestores() {
+  for (auto it = queue_.begin(); it != queue_.end();) {
+    if (!it->second->restores) {
+      ++it;
+      continue;
+    }
+    waiting_bytes_ -= BytesOf(*it->second);
+    it = queue_.erase(it);
+  }
+}
+
 void Outbox::StreamOpened(uint64_t open_bytes, uint64_t credit_bytes) {
   open_ = true;
   sent_ = open_bytes;
@@ -144,10 +278,12 @@ void Outbox::StreamOpened(uint64_t open_bytes, uint64_t credit_bytes) {
   frames_.clear();
   for (const auto& [order, transaction] : queue_) {
     transaction->first_sequence = transaction->commit_sequence = 0;
+    transaction->refused.clear();
     NoteFrames(order, *transaction);
   }
   if (keep_frames_ == 0) return;
   std::vector<std::string> layers;
+  layers.reserve(frames_.size());
   for (const auto& [layer, waiting] : frames_) layers.push_back(layer);
   for (const std::string& layer : layers) KeepNewest(layer, keep_frames_);
 }
@@ -169,6 +305,7 @@ std::vector<uint64_t> Outbox::StreamLost(std::optional<int64_t> server_now) {
   }
   unanswered_.clear();
   orders_.clear();
+  by_commit_sequence_.clear();
   frames_.clear();
   waiting_bytes_ = 0;
   for (const auto& [order, transaction] : all) {
@@ -263,16 +400,18 @@ std::optional<Outbox::Outgoing> Outbox::Next(int64_t now_ns) {
   Transaction& t = *transaction;
   while (t.next_piece < t.pieces.size() && t.pieces[t.next_piece].dropped) ++t.next_piece;
   Outgoing out;
+  out.frame_id = t.frame_id;
   if (t.next_piece < t.pieces.size()) {
-    const Transaction::Piece& piece = t.pieces[t.next_piece];
+    Transaction::Piece& piece = t.pieces[t.next_piece];
     if (t.next_message == 0 && piece.frame) Begin(order, t, t.next_piece);
-    out.message = piece.messages[t.next_message];
+    Transaction::Piece::Message& message = piece.messages[t.next_message];
+    out.message = message.bytes;
     if (++t.next_message == piece.messages.size()) {
       ++t.next_piece;
       t.next_message = 0;
     }
     Sent(&out.message);
-    out.sequence = sequence_;
+    out.sequence = message.sequence = sequence_;
     if (t.first_sequence == 0) t.first_sequence = sequence_;
     return out;
   }
@@ -290,6 +429,7 @@ std::optional<Outbox::Outgoing> Outbox::Next(int64_t now_ns) {
   queue_.erase(queue_.begin());
   unanswered_.emplace(order, transaction);
   orders_[t.frame_id] = order;
+  by_commit_sequence_[t.commit_sequence] = order;
   out.committed = transaction;
   return out;
 }
@@ -306,11 +446,29 @@ void Outbox::Scheduled(uint64_t frame_id) {
   if (it != orders_.end()) unanswered_.at(it->second)->scheduled = true;
 }
 
+std::shared_ptr<const Transaction> Outbox::Refused(uint64_t sequence, const std::string& layer,
+                                                   const std::string& id) {
+  std::shared_ptr<Transaction> transaction;
+  if (const auto it = by_commit_sequence_.lower_bound(sequence); it != by_commit_sequence_.end()) {
+    transaction = unanswered_.at(it->second);
+  } else if (!queue_.empty()) {
+    transaction = queue_.begin()->second;
+  }
+  if (transaction == nullptr || transaction->first_sequence == 0 ||
+      sequence < transaction->first_sequence) {
+    return nullptr;
+  }
+  if (transaction->refused.size() < kMostRefused)
+    transaction->refused.insert({sequence, layer, id});
+  return transaction;
+}
+
 std::shared_ptr<const Transaction> Outbox::Answered(uint64_t frame_id) {
   const auto it = orders_.find(frame_id);
   if (it == orders_.end()) return nullptr;
   const auto at = unanswered_.find(it->second);
   std::shared_ptr<const Transaction> transaction = at->second;
+  by_commit_sequence_.erase(transaction->commit_sequence);
   unanswered_.erase(at);
   orders_.erase(it);
   return transaction;

@@ -8,7 +8,10 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -23,7 +26,12 @@ struct Transaction {
   // Whole messages without sequences; `frame`: they are an immediate frame of `layer`, which may be
   // given up as long as none of them was sent.
   struct Piece {
-    std::vector<Rope> messages;
+    struct Message {
+      Rope bytes;
+      size_t operations = 0;  // that it carries, as Refusals counts them
+      uint64_t sequence = 0;  // that it was sent with
+    };
+    std::vector<Message> messages;
     bool frame = false;
     std::string layer;
     size_t bytes = 0;
@@ -32,6 +40,7 @@ struct Transaction {
   uint64_t frame_id = 0;
   int64_t present_at_ns = 0;
   bool must_show = false;
+  bool restores = false;  // puts up what was there before, and nothing that anybody asked for
   std::vector<Operation> operations;  // for the book of what is retained; given up frames are empty
   std::vector<Piece> pieces;
 
@@ -40,11 +49,25 @@ struct Transaction {
   uint64_t first_sequence = 0, commit_sequence = 0;
   uint64_t reported_drops = 0;
   bool scheduled = false;  // the server keeps it for its time
+  // (sequence, layer, id) as the server told them.
+  std::set<std::tuple<uint64_t, std::string, std::string>> refused;
+
+  Refusals GetRefusals() const;
+  size_t LargestMessage() const;  // of what is not given up, with its sequence
 };
 
-// Encodes `operations` in their order.
+// Encodes `operations` in their order. Messages have at most `most_bytes`, but for operations that take
+// more alone; 0: any number.
 std::shared_ptr<Transaction> MakeTransaction(std::vector<Operation> operations,
-                                             const CommitOptions& options);
+                                             const CommitOptions& options, size_t most_bytes = 0);
+
+// An operation that takes a message of more than the server reads.
+struct Oversized {
+  Operation operation;
+  std::string what;  // "layer/id takes a message of 20000000 bytes; the server's max_…"
+};
+// Takes them out of `operations`.
+std::vector<Oversized> TakeOversized(size_t most_bytes, std::vector<Operation>* operations);
 
 // Frames given up of one commit; `whole`: nothing else was in it, and it will not be sent.
 struct Drop {
@@ -65,6 +88,12 @@ class Outbox {
   // Puts them before everything else, in their order, whatever their size.
   void AddFirst(const std::vector<std::shared_ptr<Transaction>>& transactions);
 
+  // Between StreamLost and StreamOpened: what waits is encoded anew for messages of at most `most_bytes`.
+  // What holds an operation that takes more alone is taken out and returned, with the reason.
+  std::vector<std::pair<std::shared_ptr<const Transaction>, std::string>> KeepTo(size_t most_bytes);
+  // The same time: restoring begins anew.
+  void DropRestores();
+
   // A stream was opened with an Open of `open_bytes`; `credit_bytes`: 0 means that there is no pacing.
   void StreamOpened(uint64_t open_bytes, uint64_t credit_bytes);
   void Credit(uint64_t credit_bytes);
@@ -77,15 +106,22 @@ class Outbox {
 
   struct Outgoing {
     Rope message;
+    uint64_t frame_id = 0;
     uint64_t sequence = 0;
     std::shared_ptr<const Transaction> committed;  // not null: this is its Commit
   };
   // What is to be written now, which counts as sent; nothing if nothing may be.
   std::optional<Outgoing> Next(int64_t now_ns);
+  // What was to be written had so many bytes less.
+  void Saved(uint64_t bytes) { sent_ -= bytes; }
   // The same for a ping, which goes before everything.
   std::optional<Rope> Ping(int64_t now_ns);
 
   void Scheduled(uint64_t frame_id);
+  // An operation of the request `sequence` was refused. Of which commit: null if it is not known (any
+  // more). Its frame id is all that is known of one that is being sent.
+  std::shared_ptr<const Transaction> Refused(uint64_t sequence, const std::string& layer,
+                                             const std::string& id);
   // Accepted or refused: it is forgotten. Null if it is not known.
   std::shared_ptr<const Transaction> Answered(uint64_t frame_id);
 
@@ -125,9 +161,10 @@ class Outbox {
   int64_t next_order_ = 1;
   uint64_t unreported_drops_ = 0;
   size_t waiting_bytes_ = 0;
-  Queue queue_;                         // by their order; the first may be sent in part
-  Queue unanswered_;                    // sent whole
-  std::map<uint64_t, int64_t> orders_;  // of the unanswered, by frame id
+  Queue queue_;                                     // by their order; the first may be sent in part
+  Queue unanswered_;                                // sent whole
+  std::map<uint64_t, int64_t> orders_;              // of the unanswered, by frame id
+  std::map<uint64_t, int64_t> by_commit_sequence_;  // of the unanswered → their order
   // Whole frames that wait and may be dropped, oldest first.
   std::map<std::string, std::deque<WaitingFrame>> frames_;
   std::vector<Drop> drops_;

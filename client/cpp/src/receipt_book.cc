@@ -7,6 +7,13 @@
 
 namespace voxeld::client {
 
+namespace {
+
+constexpr std::string_view kUnheard =
+    "the answer was lost with its connection; the server applied it or refused it whole";
+
+}  // namespace
+
 void ReceiptBook::Queued(uint64_t frame) {
   entries_[frame].receipt.frame = frame;
   unsettled_.insert(frame);
@@ -29,6 +36,10 @@ void ReceiptBook::Sent(uint64_t frame, uint64_t first_sequence, uint64_t commit_
   entry->commit_sequence = commit_sequence;
   entry->sent_ns = now_ns;
   entry->receipt.state = Receipt::State::kSent;
+  // What was told of an earlier sending goes for nothing.
+  entry->receipt.outcomes.clear();
+  std::erase_if(entry->receipt.issues,
+                [&](const Issue& issue) { return issue.sequence < first_sequence; });
   ++entry->receipt.sendings;
   by_commit_sequence_[commit_sequence] = frame;
   changed_.insert(frame);
@@ -48,9 +59,11 @@ void ReceiptBook::Dropped(uint64_t frame, uint64_t frames, bool whole) {
 
 void ReceiptBook::StreamLost() {
   for (const uint64_t frame : unsettled_) {
-    Receipt& receipt = entries_.at(frame).receipt;
-    if (receipt.state != Receipt::State::kSent && receipt.state != Receipt::State::kScheduled)
-      continue;
+    Entry& entry = entries_.at(frame);
+    Receipt& receipt = entry.receipt;
+    const bool waits_for_answer =
+        receipt.state == Receipt::State::kSent || receipt.state == Receipt::State::kScheduled;
+    if (!waits_for_answer || entry.unheard) continue;
     receipt.state = Receipt::State::kQueued;
     changed_.insert(frame);
   }
@@ -107,6 +120,7 @@ void ReceiptBook::TellOutcome(const v1::Outcome& wire, int64_t now_ns, Entry* en
       break;
   }
   if (entry == nullptr) return;
+  if (std::exchange(entry->unheard, false)) TakeAsAccepted(entry);
   entry->receipt.outcomes.push_back(std::move(outcome));
 }
 
@@ -119,6 +133,14 @@ void ReceiptBook::Told(const v1::Receipt& wire, int64_t now_ns) {
     return;
   }
   Receipt& receipt = entry->receipt;
+  // It was sent again since: what became of the earlier sending is not its outcome.
+  const bool of_another_sending =
+      receipt.state == Receipt::State::kQueued ||
+      (wire.sequence() != 0 && wire.sequence() != entry->commit_sequence);
+  if (wire.has_outcome() && of_another_sending) {
+    TellOutcome(wire.outcome(), now_ns, nullptr);
+    return;
+  }
   changed_.insert(receipt.frame);
   switch (wire.what_case()) {
     case v1::Receipt::kAccepted: {
@@ -159,30 +181,58 @@ void ReceiptBook::Told(const v1::Receipt& wire, int64_t now_ns) {
   SettleIfComplete(entry);
 }
 
-const Issue& ReceiptBook::Told(const v1::Issue& wire) {
+const Issue& ReceiptBook::Told(const v1::Issue& wire, uint64_t frame) {
   last_issue_ = FromWire(wire);
   ++tally_.issue_count;
   if (last_issue_.reason == Reason::kNotFound) ++tally_.not_found;
+  Entry* entry = Open(frame);
   const auto it = by_commit_sequence_.lower_bound(last_issue_.sequence);
   if (it != by_commit_sequence_.end()) {
-    Entry& entry = entries_.at(it->second);
-    if (last_issue_.sequence >= entry.first_sequence) {
-      last_issue_.frame = it->second;
-      if (entry.receipt.issues.size() < kMostIssuesOfCommit)
-        entry.receipt.issues.push_back(last_issue_);
-      changed_.insert(it->second);
-    }
+    Entry& sent = entries_.at(it->second);
+    if (last_issue_.sequence >= sent.first_sequence) entry = &sent;
+  }
+  if (entry != nullptr) {
+    last_issue_.frame = entry->receipt.frame;
+    if (entry->receipt.issues.size() < kMostIssuesOfCommit)
+      entry->receipt.issues.push_back(last_issue_);
+    changed_.insert(last_issue_.frame);
   }
   if (tally_.issues.size() < kMostIssues) tally_.issues.push_back(last_issue_);
   return last_issue_;
 }
 
-void ReceiptBook::Applied(uint64_t frame) {
-  Entry* entry = Open(frame);
-  if (entry == nullptr) return;
+void ReceiptBook::TakeAsAccepted(Entry* entry) {
   entry->receipt.state = Receipt::State::kAccepted;
   entry->receipt.message = "applied; the answer that said so was lost with its connection";
+  entry->accepted_ns = INT64_MIN;  // on an earlier stream, whenever it was
   ++tally_.accepted;
+  changed_.insert(entry->receipt.frame);
+}
+
+void ReceiptBook::Applied(uint64_t frame, const std::vector<std::string>& displays) {
+  Entry* entry = Open(frame);
+  if (entry == nullptr) return;
+  TakeAsAccepted(entry);
+  if (outcomes_) entry->receipt.displays = displays;
+  SettleIfComplete(entry);
+}
+
+void ReceiptBook::Unheard(uint64_t frame, const std::vector<std::string>& displays) {
+  Entry* entry = Open(frame);
+  if (entry == nullptr) return;
+  entry->receipt.state = Receipt::State::kSent;
+  if (!outcomes_ || displays.empty()) return Lost(frame, std::string(kUnheard));
+  entry->unheard = true;
+  entry->receipt.displays = displays;
+  changed_.insert(frame);
+}
+
+void ReceiptBook::RefusedHere(uint64_t frame, const std::string& why) {
+  Entry* entry = Open(frame);
+  if (entry == nullptr) return;
+  entry->receipt.state = Receipt::State::kRefused;
+  entry->receipt.message = why;
+  ++tally_.refused;
   Settle(entry);
 }
 
@@ -216,11 +266,10 @@ uint64_t ReceiptBook::OutcomesLost(int64_t accepted_before_ns, const std::string
   const std::set<uint64_t> unsettled = unsettled_;
   for (const uint64_t frame : unsettled) {
     const Entry& entry = entries_.at(frame);
-    if (entry.receipt.state != Receipt::State::kAccepted ||
-        entry.accepted_ns >= accepted_before_ns) {
-      continue;
-    }
-    Lost(frame, why);
+    const bool accepted =
+        entry.receipt.state == Receipt::State::kAccepted && entry.accepted_ns < accepted_before_ns;
+    if (!accepted && !entry.unheard) continue;
+    Lost(frame, entry.unheard ? std::string(kUnheard) : why);
     ++count;
   }
   return count;

@@ -32,19 +32,27 @@ class ReceiptBook {
 
   // Of what it does not know, only the sums are kept.
   void Told(const v1::Receipt& receipt, int64_t now_ns);
-  const Issue& Told(const v1::Issue& issue);
+  // `frame`: the commit that it is of, if that is being sent; 0: not known.
+  const Issue& Told(const v1::Issue& issue, uint64_t frame = 0);
 
-  // It was applied, and the answer that said so is lost. Nothing more is owed.
-  void Applied(uint64_t frame);
+  // It was applied, and the answer that said so is lost; the outcomes of `displays` are still owed.
+  void Applied(uint64_t frame, const std::vector<std::string>& displays);
+  // It was applied or refused, and the answer that said which is lost. An outcome will tell that it was
+  // applied; OutcomesLost ends the waiting.
+  void Unheard(uint64_t frame, const std::vector<std::string>& displays);
+  // It was not sent, because the server would not take it.
+  void RefusedHere(uint64_t frame, const std::string& why);
   // No answer will come.
   void Lost(uint64_t frame, const std::string& why);
-  // Outcomes of what had been accepted before `accepted_before_ns` will not come. How many commits.
+  // Outcomes of what had been accepted before `accepted_before_ns`, or was not heard of, will not come. How many
+  // commits.
   uint64_t OutcomesLost(int64_t accepted_before_ns, const std::string& why);
   // No answer will come to anything. What was accepted keeps what it has.
   void Ended(const std::string& why);
 
   const Receipt* Find(uint64_t frame) const;
   uint64_t unsettled() const { return unsettled_.size(); }
+  size_t changed() const { return changed_.size(); }
   // Frames whose receipts changed since the last call, ascending.
   std::vector<uint64_t> TakeChanged();
 
@@ -57,10 +65,12 @@ class ReceiptBook {
     Receipt receipt;
     uint64_t first_sequence = 0, commit_sequence = 0;
     int64_t sent_ns = 0, accepted_ns = 0;
+    bool unheard = false;
   };
   Entry* Open(uint64_t frame);
   void Settle(Entry* entry);
   void SettleIfComplete(Entry* entry);
+  void TakeAsAccepted(Entry* entry);
   void TellOutcome(const v1::Outcome& outcome, int64_t now_ns, Entry* entry);
 
   const bool outcomes_;

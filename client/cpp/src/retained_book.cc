@@ -1,7 +1,8 @@
 #include "client/cpp/src/retained_book.h"
 
 #include <algorithm>
-#include <set>
+#include <functional>
+#include <tuple>
 #include <utility>
 
 #include "voxeld/v1/primitives.pb.h"
@@ -32,18 +33,65 @@ void RetainedBook::Put(const UpsertOperation& upsert, int64_t now_ns) {
   entity.upsert = upsert;
   entity.number = next_number_++;
   entity.expires_ns = upsert.lifetime_ns > 0 ? now_ns + upsert.lifetime_ns : 0;
+  if (entity.expires_ns == 0) return;
+  if (expiries_.size() >= most_expiries_) {
+    std::erase_if(expiries_, [this](const Expiry& expiry) { return !IsThere(expiry); });
+    std::make_heap(expiries_.begin(), expiries_.end(), std::greater<>());
+    most_expiries_ = std::max<size_t>(64, 2 * expiries_.size());
+  }
+  expiries_.push_back({entity.expires_ns, entity.number, upsert.layer, upsert.id});
+  std::push_heap(expiries_.begin(), expiries_.end(), std::greater<>());
+}
+
+bool RetainedBook::IsThere(const Expiry& expiry) const {
+  const auto layer = layers_.find(expiry.layer);
+  if (layer == layers_.end()) return false;
+  const auto entity = layer->second.entities.find(expiry.id);
+  return entity != layer->second.entities.end() && entity->second.number == expiry.number;
+}
+
+void RetainedBook::Expire(int64_t now_ns) {
+  while (!expiries_.empty() && expiries_.front().expires_ns <= now_ns) {
+    std::pop_heap(expiries_.begin(), expiries_.end(), std::greater<>());
+    if (IsThere(expiries_.back()))
+      layers_.at(expiries_.back().layer).entities.erase(expiries_.back().id);
+    expiries_.pop_back();
+  }
+}
+
+size_t RetainedBook::entities() const {
+  size_t count = 0;
+  for (const auto& [name, layer] : layers_) count += layer.entities.size();
+  return count;
 }
 
 struct RetainedBook::Applier {
   RetainedBook& book;
-  const std::set<std::pair<std::string, std::string>>& refused;  // (layer, id); ("", object)
+  const Refusals& refusals;
   int64_t now_ns;
+  size_t request = 0, operation = 0;  // the next
 
-  void operator()(const UpsertOperation& upsert) const {
-    if (!refused.contains({upsert.layer, upsert.id})) book.Put(upsert, now_ns);
+  // Whether the next operation was refused, which is called `id` in `layer`.
+  bool Refused(const std::string& layer, const std::string& id) {
+    while (request < refusals.requests.size() &&
+           operation >= refusals.requests[request].operations) {
+      ++request;
+      operation = 0;
+    }
+    if (request == refusals.requests.size()) return false;
+    ++operation;
+    const auto& [sequence, operations] = refusals.requests[request];
+    if (operations > 1) return refusals.refused.contains({sequence, layer, id});
+    const auto first = refusals.refused.lower_bound({sequence, "", ""});
+    return first != refusals.refused.end() && std::get<0>(*first) == sequence;
   }
-  void operator()(const DeleteOperation& removal) const {
+
+  void operator()(const UpsertOperation& upsert) {
+    if (!Refused(upsert.layer, upsert.id)) book.Put(upsert, now_ns);
+  }
+  void operator()(const DeleteOperation& removal) {
     using What = DeleteOperation::What;
+    if (Refused(removal.layer, removal.text)) return;
     if (removal.what == What::kAllMine) {
       for (auto& [name, layer] : book.layers_) layer.entities.clear();
       return;
@@ -56,14 +104,14 @@ struct RetainedBook::Applier {
              (removal.what == What::kPrefix && entity.first.starts_with(removal.text));
     });
   }
-  void operator()(const TransformOperation& move) const {
+  void operator()(const TransformOperation& move) {
     const auto layer = book.layers_.find(move.layer);
-    if (layer == book.layers_.end() || refused.contains({move.layer, move.id})) return;
+    if (Refused(move.layer, move.id) || layer == book.layers_.end()) return;
     const auto entity = layer->second.entities.find(move.id);
     if (entity != layer->second.entities.end()) entity->second.upsert.transform = move.transform;
   }
-  void operator()(const LayerOperation& operation) const {
-    if (refused.contains({operation.layer, ""})) return;
+  void operator()(const LayerOperation& operation) {
+    if (Refused(operation.layer, "")) return;
     LayerLook& look = book.LayerOf(operation.layer).look;
     const auto take = [](const auto& from, auto* to) {
       if (from.has_value()) *to = from;
@@ -76,18 +124,25 @@ struct RetainedBook::Applier {
     take(operation.look.clip, &look.clip);
     take(operation.look.region, &look.region);
   }
-  void operator()(const DefineOperation& define) const {
-    if (!refused.contains({"", define.object})) book.objects_[define.object] = define;
+  void operator()(const DefineOperation& define) {
+    if (!Refused("", define.object)) book.objects_[define.object] = define;
   }
-  void operator()(const RemoveObjectOperation& removal) const {
-    if (refused.contains({"", removal.object})) return;
+  void operator()(const RemoveObjectOperation& removal) {
+    if (Refused("", removal.object)) return;
     book.objects_.erase(removal.object);
     if (removal.cascade) book.RemoveInstancesOf(removal.object);
   }
-  void operator()(const FrameOperation& frame) const {
+  void operator()(const FrameOperation& frame) {
     if (frame.layer.empty()) return;  // given up
+    const bool begins = !Refused(frame.layer, "");
+    std::vector<const UpsertOperation*> taken;
+    for (const UpsertOperation& upsert : frame.upserts) {
+      if (!Refused(upsert.layer, upsert.id)) taken.push_back(&upsert);
+    }
+    const bool ends = !Refused(frame.layer, "");
+    if (!begins || !ends) return;
     book.LayerOf(frame.layer).entities.clear();
-    for (const UpsertOperation& upsert : frame.upserts) (*this)(upsert);
+    for (const UpsertOperation* upsert : taken) book.Put(*upsert, now_ns);
   }
 };
 
@@ -99,12 +154,40 @@ void RetainedBook::RemoveInstancesOf(const std::string& object) {
   }
 }
 
-void RetainedBook::Apply(const std::vector<Operation>& operations, const std::vector<Issue>& issues,
-                         int64_t now_ns) {
-  std::set<std::pair<std::string, std::string>> refused;
-  for (const Issue& issue : issues) refused.insert({issue.layer, issue.id});
-  const Applier applier{*this, refused, now_ns};
+void RetainedBook::ApplyNow(const std::vector<Operation>& operations, const Refusals& refusals,
+                            int64_t now_ns) {
+  Expire(now_ns);
+  Applier applier{*this, refusals, now_ns};
   for (const Operation& operation : operations) std::visit(applier, operation);
+}
+
+void RetainedBook::Apply(const std::vector<Operation>& operations, const Refusals& refusals,
+                         int64_t now_ns) {
+  if (waiting_.empty()) return ApplyNow(operations, refusals, now_ns);
+  waiting_.push_back({0, false, operations, refusals, now_ns});
+}
+
+void RetainedBook::Doubt(uint64_t frame, const std::vector<Operation>& operations, int64_t now_ns) {
+  waiting_.push_back({frame, true, operations, {}, now_ns});
+}
+
+void RetainedBook::WasApplied(uint64_t frame) {
+  for (Waiting& waiting : waiting_) {
+    if (waiting.frame == frame) waiting.doubtful = false;
+  }
+  ApplyUpToDoubt();
+}
+
+void RetainedBook::EndDoubts() {
+  std::erase_if(waiting_, [](const Waiting& waiting) { return waiting.doubtful; });
+  ApplyUpToDoubt();
+}
+
+void RetainedBook::ApplyUpToDoubt() {
+  for (; !waiting_.empty() && !waiting_.front().doubtful; waiting_.pop_front()) {
+    const Waiting& first = waiting_.front();
+    ApplyNow(first.operations, first.refusals, first.now_ns);
+  }
 }
 
 void RetainedBook::AddObject(const std::string& name, std::map<std::string, bool>* added,
@@ -120,6 +203,7 @@ std::vector<Operation> RetainedBook::Restore(int64_t now_ns) const {
   std::map<std::string, bool> added;
   for (const auto& [name, definition] : objects_) AddObject(name, &added, &out);
   std::vector<std::pair<uint64_t, std::string>> order;
+  order.reserve(layers_.size());
   for (const auto& [name, layer] : layers_) order.push_back({layer.number, name});
   std::sort(order.begin(), order.end());
   for (const auto& [number, name] : order) {

@@ -43,6 +43,20 @@ struct OperationBytes {
   }
 };
 
+// About, of the greatest message that it takes.
+struct MessageBytes {
+  size_t operator()(const FrameOperation& frame) const {
+    size_t bytes = 0;
+    for (const UpsertOperation& upsert : frame.upserts)
+      bytes = std::max(bytes, OperationBytes()(upsert));
+    return bytes;
+  }
+  template <typename Other>
+  size_t operator()(const Other& other) const {
+    return OperationBytes()(other);
+  }
+};
+
 std::string Words(sync::TimeNs time) { return absl::StrCat(static_cast<double>(time) / 1e9, " s"); }
 
 }  // namespace
@@ -61,6 +75,7 @@ std::string SessionCore::Where() const { return "voxeld at " + options_.address;
 
 sync::TimeNs SessionCore::Step() {
   std::deque<Event> events;
+  std::vector<Receipt> receipts;
   std::vector<std::unique_ptr<Link>> ended;
   sync::TimeNs next = sync::kNever;
   {
@@ -68,16 +83,20 @@ sync::TimeNs SessionCore::Step() {
     next = DoDue(clock_.Now());
     events.swap(events_);
     ended.swap(ended_links_);
+    if (Behind()) changed_.NotifyAll();
+    for (const uint64_t frame : receipts_.TakeChanged()) {
+      if (!options_.on_receipt) break;
+      if (const Receipt* receipt = receipts_.Find(frame)) receipts.push_back(*receipt);
+    }
   }
   for (const Event& event : events) {
-    if (const auto* receipt = std::get_if<Receipt>(&event)) {
-      if (options_.on_receipt) options_.on_receipt(*receipt);
-    } else if (const auto* issue = std::get_if<Issue>(&event)) {
+    if (const auto* issue = std::get_if<Issue>(&event)) {
       if (options_.on_issue) options_.on_issue(*issue);
     } else if (options_.on_connection) {
       options_.on_connection(std::get<ConnectionChange>(event));
     }
   }
+  for (const Receipt& receipt : receipts) options_.on_receipt(receipt);
   return next;
 }
 
@@ -85,10 +104,10 @@ void SessionCore::Run() {
   for (;;) {
     Step();
     sync::MutexLock lock(mutex_);
-    if (stop_ && link_ == nullptr && events_.empty()) return;
+    if (stop_ && link_ == nullptr && !HasEvents()) return;
     // Anew: a deadline may have come nearer since.
     const sync::TimeNs next = DoDue(clock_.Now());
-    if (events_.empty() && ended_links_.empty() && next > clock_.Now())
+    if (!HasEvents() && ended_links_.empty() && next > clock_.Now())
       clock_.WaitUntil(mutex_, work_, next);
   }
 }
@@ -106,13 +125,23 @@ bool SessionCore::TakesEvents() const {
   return options_.on_receipt || options_.on_issue || options_.on_connection;
 }
 
+bool SessionCore::HasEvents() const {
+  return !events_.empty() || (options_.on_receipt && receipts_.changed() > 0);
+}
+
+bool SessionCore::Behind() const {
+  return options_.on_receipt && receipts_.changed() >= kMostUntold;
+}
+
+bool SessionCore::Room() const {
+  return state_ == State::kOpen && outbox_.empty() && outbox_.has_credit() &&
+         receipts_.unsettled() < options_.most_unsettled && !Behind();
+}
+
 void SessionCore::Changed() {
-  for (const uint64_t frame : receipts_.TakeChanged()) {
-    const Receipt* receipt = receipts_.Find(frame);
-    if (options_.on_receipt && receipt != nullptr) events_.push_back(*receipt);
-  }
   if (!TakesEvents()) events_.clear();
-  if (!events_.empty() || !ended_links_.empty()) work_.NotifyAll();
+  if (!options_.on_receipt) receipts_.TakeChanged();
+  if (HasEvents() || !ended_links_.empty()) work_.NotifyAll();
   changed_.NotifyAll();
 }
 
@@ -126,13 +155,18 @@ absl::Status SessionCore::Stage(Operation operation) {
   sync::MutexLock lock(mutex_);
   if (state_ == State::kEnded || closing_)
     return absl::FailedPreconditionError("the session is closed");
-  const uint64_t most = server_ ? server_->limits.max_message_bytes : 0;
-  // Frames are several messages.
-  if (most > 0 && bytes > most + kFieldBytes &&
-      !std::holds_alternative<FrameOperation>(operation)) {
-    return absl::InvalidArgumentError(absl::StrCat("what is to be put up has ", bytes,
+  // About; Commit knows to the byte.
+  const size_t most = most_message_bytes();
+  const size_t largest = std::visit(MessageBytes(), operation);
+  if (most > 0 && largest > most + kFieldBytes) {
+    return absl::InvalidArgumentError(absl::StrCat("what is to be put up has ", largest,
                                                    " bytes, and the server's max_message_bytes is ",
                                                    most, "; put it up in pieces"));
+  }
+  if (!staged_.empty() && staged_bytes_ + bytes > options_.most_staged_bytes) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("it has ", bytes, " bytes, and ", staged_bytes_, " of ",
+                     options_.most_staged_bytes, " (most_staged_bytes) are staged; commit first"));
   }
   staged_.push_back(std::move(operation));
   staged_bytes_ += bytes;
@@ -161,9 +195,16 @@ absl::StatusOr<uint64_t> SessionCore::Commit(FrameOperation* frame, const Commit
     return ended_.ok() ? absl::FailedPreconditionError("the session is closed") : ended_;
   }
   if (closing_) return absl::FailedPreconditionError("the session is closed");
+  if (Behind()) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        receipts_.changed(), " receipts wait for on_receipt; commit again when it has returned"));
+  }
   std::vector<Operation> operations = std::exchange(staged_, {});
   if (frame != nullptr) operations.emplace_back(std::move(*frame));
-  std::shared_ptr<Transaction> transaction = MakeTransaction(std::move(operations), options);
+  const size_t most = most_message_bytes();
+  std::shared_ptr<Transaction> transaction = MakeTransaction(std::move(operations), options, most);
+  if (most > 0 && transaction->LargestMessage() > most)
+    return GiveUpOversized(std::move(transaction->operations), frame);
   transaction->frame_id = next_frame_;
   const absl::Status added = outbox_.Add(transaction);
   if (!added.ok()) {
@@ -174,13 +215,38 @@ absl::StatusOr<uint64_t> SessionCore::Commit(FrameOperation* frame, const Commit
     staged_ = std::move(transaction->operations);
     return added;
   }
-  if (!options_.restore) transaction->operations.clear();
+  // Before the server has said what it reads they may be needed once more.
+  if (!options_.restore && server_) transaction->operations.clear();
   staged_bytes_ = 0;
   receipts_.Queued(next_frame_);
   NoteDrops();
   Pump();
   Changed();
   return next_frame_++;
+}
+
+absl::Status SessionCore::GiveUpOversized(std::vector<Operation> operations,
+                                          FrameOperation* frame) {
+  const size_t most = most_message_bytes();
+  std::vector<Operation> last;  // the frame, which is the caller's
+  if (frame != nullptr) {
+    last.push_back(std::move(operations.back()));
+    operations.pop_back();
+  }
+  std::vector<Oversized> oversized = TakeOversized(most, &operations);
+  for (Oversized& of_frame : TakeOversized(most, &last)) oversized.push_back(std::move(of_frame));
+  if (!last.empty()) *frame = std::move(std::get<FrameOperation>(last.back()));
+  staged_ = std::move(operations);
+  staged_bytes_ = 0;
+  for (const Operation& operation : staged_)
+    staged_bytes_ += std::visit(OperationBytes(), operation);
+  return absl::InvalidArgumentError(
+      absl::StrCat(oversized.empty() ? "" : oversized.front().what,
+                   "; nothing was committed; it is given up, and all else stays staged"));
+}
+
+size_t SessionCore::most_message_bytes() const {
+  return server_ ? server_->limits.max_message_bytes : 0;
 }
 
 size_t SessionCore::staged_bytes() const {
@@ -190,8 +256,7 @@ size_t SessionCore::staged_bytes() const {
 
 bool SessionCore::HasRoom() const {
   sync::MutexLock lock(mutex_);
-  return state_ == State::kOpen && outbox_.empty() && outbox_.has_credit() &&
-         receipts_.unsettled() < options_.most_unsettled;
+  return Room();
 }
 
 template <typename Done>
@@ -222,10 +287,7 @@ absl::Status SessionCore::WaitOpened(Duration timeout) {
 }
 
 absl::Status SessionCore::WaitForRoom(Duration timeout) {
-  return Wait(timeout, true, "room", [this]() VOXELD_REQUIRES(mutex_) {
-    return state_ == State::kOpen && outbox_.empty() && outbox_.has_credit() &&
-           receipts_.unsettled() < options_.most_unsettled;
-  });
+  return Wait(timeout, true, "room", [this]() VOXELD_REQUIRES(mutex_) { return Room(); });
 }
 
 absl::StatusOr<Receipt> SessionCore::AnswerOf(uint64_t frame) const {

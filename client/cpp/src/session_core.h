@@ -14,6 +14,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cpp/src/clock_estimate.h"
+#include "client/cpp/src/in_memory.h"
+#include "client/cpp/src/memory_channel.h"
 #include "client/cpp/src/outbox.h"
 #include "client/cpp/src/receipt_book.h"
 #include "client/cpp/src/retained_book.h"
@@ -28,6 +30,9 @@ namespace voxeld::client {
 // Thread-safe.
 class SessionCore {
  public:
+  static constexpr size_t kMostUntold =
+      65536;  // receipts, and issues, that wait for their callbacks
+
   // `clock` must outlive it. Nothing begins before the first Step.
   SessionCore(Options options, std::unique_ptr<Transport> transport, sync::Clock& clock);
   // After Stop.
@@ -71,12 +76,13 @@ class SessionCore {
   enum class Take : uint8_t { kNothing, kSession, kOwner };
 
   // One stream and its events.
-  class Link final : public Stream::Events {
+  class Link final : public Stream::Events, public MemoryChannel::Events {
    public:
     Link(SessionCore* core, Take take) : core_(core), take_(take) {}
     void OnRead(const v1::StreamResponse& response) override { core_->Read(this, response); }
     void OnWritten() override { core_->Written(this); }
     void OnEnd(const absl::Status& status) override { core_->End(this, status); }
+    void OnHold(uint64_t, MemoryChannel::Answer answer) override { core_->Held(this, answer); }
     Take take() const { return take_; }
 
     std::unique_ptr<Stream> stream;
@@ -85,28 +91,57 @@ class SessionCore {
     uint64_t open_bytes = 0;
     absl::Status cancelled_for;  // not ok: we ended it, and why
 
+    // A request whose content is being handed over, and is to go with the answer.
+    struct Handing {
+      Rope whole;
+      InMemory moved;
+      uint64_t frame_id = 0;
+    };
+    std::optional<Handing> handing;
+    uint64_t memories = 0;                             // handed over; the last one's id
+    uint64_t memories_refused = 0;                     // one after the other
+    std::map<uint64_t, std::vector<uint64_t>> in_use;  // by unanswered commits: ids
+    std::unique_ptr<MemoryChannel>
+        memory;  // null: all goes over the stream. The first to be destroyed
+
    private:
     SessionCore* const core_;
     const Take take_;
   };
-  using Event = std::variant<Receipt, Issue, ConnectionChange>;
+  using Event = std::variant<Issue, ConnectionChange>;
 
   // Streams: session_link.cc.
   void Connect() VOXELD_REQUIRES(mutex_);
   void Read(Link* link, const v1::StreamResponse& response) VOXELD_EXCLUDES(mutex_);
   void Written(Link* link) VOXELD_EXCLUDES(mutex_);
+  void Held(Link* link, MemoryChannel::Answer answer) VOXELD_EXCLUDES(mutex_);
   void End(Link* link, const absl::Status& status) VOXELD_EXCLUDES(mutex_);
   void TakeOpened(const v1::Opened& opened) VOXELD_REQUIRES(mutex_);
   void TakeIssue(const v1::Issue& issue) VOXELD_REQUIRES(mutex_);
   void TakeReceipt(const v1::Receipt& receipt) VOXELD_REQUIRES(mutex_);
+  // What was sent on the stream before and has no answer, of a session that was taken up.
+  void TakeUnheard(uint64_t last_sequence) VOXELD_REQUIRES(mutex_);
   void SendRetained() VOXELD_REQUIRES(mutex_);
+  void TellNotRestored(const std::string& why) VOXELD_REQUIRES(mutex_);
   void Lose(const absl::Status& why) VOXELD_REQUIRES(mutex_);
   void EndSession(const absl::Status& status) VOXELD_REQUIRES(mutex_);
   void CancelLink(const absl::Status& why) VOXELD_REQUIRES(mutex_);
   void Pump() VOXELD_REQUIRES(mutex_);
+  void Write(const Rope& message) VOXELD_REQUIRES(mutex_);
+  // False: it is to go as it is.
+  bool HandOver(const Outbox::Outgoing& next) VOXELD_REQUIRES(mutex_);
+  void ReleaseMemory(uint64_t frame_id) VOXELD_REQUIRES(mutex_);
   sync::TimeNs DoDue(sync::TimeNs now) VOXELD_REQUIRES(mutex_);
   std::string OpenBytes(Take take) VOXELD_REQUIRES(mutex_);
 
+  absl::Status GiveUpOversized(std::vector<Operation> operations, FrameOperation* frame)
+      VOXELD_REQUIRES(mutex_);
+  // 0: not known.
+  size_t most_message_bytes() const VOXELD_REQUIRES(mutex_);
+  // on_receipt keeps too much waiting.
+  bool Behind() const VOXELD_REQUIRES(mutex_);
+  bool Room() const VOXELD_REQUIRES(mutex_);
+  bool HasEvents() const VOXELD_REQUIRES(mutex_);
   void NoteDrops() VOXELD_REQUIRES(mutex_);
   // Events for the callbacks, and everybody who waits is woken.
   void Changed() VOXELD_REQUIRES(mutex_);
@@ -148,6 +183,7 @@ class SessionCore {
   std::string resume_token_ VOXELD_GUARDED_BY(mutex_);
   std::string own_token_ VOXELD_GUARDED_BY(mutex_);  // of our owner, from the last Opened
   sync::Backoff backoff_ VOXELD_GUARDED_BY(mutex_);
+  sync::TimeNs opened_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs retry_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs open_deadline_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   sync::TimeNs last_heard_ VOXELD_GUARDED_BY(mutex_) = 0;

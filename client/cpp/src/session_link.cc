@@ -18,6 +18,8 @@ constexpr uint64_t kMostUnansweredPings = 4;
 // The server sends owed outcomes for 10 s after a resume.
 constexpr sync::TimeNs kOwedOutcomes = 12 * sync::kSecond;
 constexpr size_t kRestoreBytes = 4 << 20;
+// One after the other, and no more is offered on that stream.
+constexpr uint64_t kMostMemoriesRefused = 3;
 
 // No other attempt would end differently.
 bool IsFinal(const absl::Status& status) {
@@ -73,7 +75,8 @@ std::string SessionCore::OpenBytes(Take take) {
   open.set_no_outcomes(!options_.outcomes);
   if (take == Take::kSession) open.set_resume_token(resume_token_);
   if (take == Take::kOwner) open.set_owner_token(own_token_);
-  if (take == Take::kNothing) open.set_owner_token(options_.owner_token);
+  // One that was joined and is gone, as after the server's restart, nobody can join any more.
+  if (take == Take::kNothing && !server_) open.set_owner_token(options_.owner_token);
   return request.SerializeAsString();
 }
 
@@ -87,9 +90,14 @@ void SessionCore::Connect() {
   link_->stream = transport_->Start(link_.get());
   const Rope open(OpenBytes(take));
   link_->open_bytes = open.size();
+  Write(open);
+}
+
+void SessionCore::Write(const Rope& message) {
+  link_->writing = true;
   ++receipts_.tally().messages_sent;
-  receipts_.tally().bytes_sent += open.size();
-  link_->stream->Write(open);
+  receipts_.tally().bytes_sent += message.size();
+  link_->stream->Write(message);
 }
 
 void SessionCore::CancelLink(const absl::Status& why) {
@@ -98,7 +106,8 @@ void SessionCore::CancelLink(const absl::Status& why) {
 }
 
 void SessionCore::Pump() {
-  if (state_ != State::kOpen || link_ == nullptr || link_->writing || half_closed_) return;
+  if (state_ != State::kOpen || link_ == nullptr || half_closed_) return;
+  if (link_->writing || link_->handing) return;
   const sync::TimeNs now = clock_.Now();
   std::optional<Rope> message;
   if (ping_due_) {
@@ -112,6 +121,7 @@ void SessionCore::Pump() {
   if (!message) {
     std::optional<Outbox::Outgoing> next = outbox_.Next(now);
     if (next) {
+      if (HandOver(*next)) return;
       message = std::move(next->message);
       if (next->committed != nullptr) {
         receipts_.Sent(next->committed->frame_id, next->committed->first_sequence,
@@ -120,14 +130,48 @@ void SessionCore::Pump() {
     }
   }
   if (message) {
-    link_->writing = true;
-    ++receipts_.tally().messages_sent;
-    receipts_.tally().bytes_sent += message->size();
-    link_->stream->Write(*message);
+    Write(*message);
   } else if (closing_ && outbox_.empty()) {
     half_closed_ = true;
     link_->stream->WritesDone();
   }
+}
+
+bool SessionCore::HandOver(const Outbox::Outgoing& next) {
+  if (link_->memory == nullptr || link_->memories_refused >= kMostMemoriesRefused) return false;
+  std::optional<InMemory> moved = MoveToMemory(next.message, link_->memories + 1);
+  if (!moved) return false;
+  Rope content = moved->memory;
+  link_->handing = Link::Handing{next.message, *std::move(moved), next.frame_id};
+  link_->memory->Hold(++link_->memories, std::move(content));
+  return true;
+}
+
+void SessionCore::Held(Link* link, MemoryChannel::Answer answer) {
+  sync::MutexLock lock(mutex_);
+  if (link != link_.get() || !link->handing) return;
+  const Link::Handing handed = *std::exchange(link->handing, std::nullopt);
+  if (answer == MemoryChannel::Answer::kGone) {
+    link->memories_refused = kMostMemoriesRefused;
+  } else if (answer == MemoryChannel::Answer::kRefused) {
+    ++link->memories_refused;
+  }
+  if (answer == MemoryChannel::Answer::kHeld) {
+    link->memories_refused = 0;
+    link->in_use[handed.frame_id].push_back(link->memories);
+    outbox_.Saved(handed.whole.size() - handed.moved.request.size());
+    receipts_.tally().memory_bytes += handed.moved.memory.size();
+    Write(handed.moved.request);
+  } else {
+    Write(handed.whole);
+  }
+}
+
+void SessionCore::ReleaseMemory(uint64_t frame_id) {
+  const auto it = link_->in_use.find(frame_id);
+  if (it == link_->in_use.end()) return;
+  for (const uint64_t memory : it->second) link_->memory->Release(memory);
+  link_->in_use.erase(it);
 }
 
 void SessionCore::Written(Link* link) {
@@ -140,29 +184,41 @@ void SessionCore::Written(Link* link) {
 }
 
 void SessionCore::TakeIssue(const v1::Issue& issue) {
-  const Issue& told = receipts_.Told(issue);
-  if (options_.on_issue) events_.push_back(told);
+  const auto of = outbox_.Refused(issue.sequence(), issue.layer(), issue.id());
+  const Issue& told = receipts_.Told(issue, of == nullptr ? 0 : of->frame_id);
+  if (!options_.on_issue) return;
+  if (events_.size() < kMostUntold) {
+    events_.push_back(told);
+  } else {
+    ++receipts_.tally().untold_issues;
+  }
+}
+
+void SessionCore::TellNotRestored(const std::string& why) {
+  v1::Issue issue;
+  issue.set_message(
+      absl::StrCat("what was up before the connection was lost is not put up again: ", why));
+  TakeIssue(issue);
 }
 
 void SessionCore::TakeReceipt(const v1::Receipt& receipt) {
   const sync::TimeNs now = clock_.Now();
   receipts_.Told(receipt, now);
   if (receipt.has_scheduled()) outbox_.Scheduled(receipt.frame_id());
+  // It was read then, whatever became of it.
+  if (!receipt.has_outcome()) ReleaseMemory(receipt.frame_id());
+  if (receipt.has_outcome()) retained_.WasApplied(receipt.frame_id());
   if (!receipt.has_accepted() && !receipt.has_refused()) return;
+  backoff_.Reset();
   const std::shared_ptr<const Transaction> done = outbox_.Answered(receipt.frame_id());
   if (done == nullptr) return;
-  const Receipt* told = receipts_.Find(receipt.frame_id());
-  if (told == nullptr && receipt.has_refused()) {
-    // Nobody asked for this commit, so nobody reads its receipt.
-    v1::Issue issue;
-    issue.set_sequence(receipt.sequence());
-    issue.set_message(
-        absl::StrCat("what was up before the connection was lost is not put up again: ",
-                     receipt.refused().message()));
-    TakeIssue(issue);
+  if (done->restores) {
+    // Nobody asked for this commit, so nobody reads its receipt; and the book has it.
+    if (receipt.has_refused()) TellNotRestored(receipt.refused().message());
+    return;
   }
-  if (!receipt.has_accepted() || !options_.restore) return;
-  retained_.Apply(done->operations, told == nullptr ? std::vector<Issue>() : told->issues, now);
+  if (receipt.has_accepted() && options_.restore)
+    retained_.Apply(done->operations, done->GetRefusals(), now);
 }
 
 void SessionCore::Read(Link* link, const v1::StreamResponse& response) {
@@ -197,18 +253,17 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
   own_token_ = opened.owner_token();
   state_ = State::kOpen;
   open_deadline_ = sync::kNever;
-  backoff_.Reset();
+  opened_at_ = now;
   ++receipts_.tally().connections;
+  // A session may be kept, for its outcomes, longer than its layers.
+  const bool layers_kept = resumed && (options_.on_disconnect == OnDisconnect::kKeep ||
+                                       (options_.on_disconnect == OnDisconnect::kLinger &&
+                                        now - last_heard_ < options_.linger.count()));
   ConnectionChange change;
   if (resumed) {
     change.kind = ConnectionChange::Kind::kResumed;
     ++receipts_.tally().resumed;
-    if (opened.has_last_sequence()) {
-      for (const auto& applied : outbox_.Applied(opened.last_sequence())) {
-        receipts_.Applied(applied->frame_id);
-        if (options_.restore) retained_.Apply(applied->operations, {}, now);
-      }
-    }
+    if (layers_kept && opened.has_last_sequence()) TakeUnheard(opened.last_sequence());
     resumed_at_ = now;
     outcomes_until_ = now + kOwedOutcomes;
   } else if (!first) {
@@ -216,16 +271,26 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
     change.lost_outcomes = receipts_.OutcomesLost(
         sync::kNever, "the connection was lost, and the server did not keep the session");
   }
-  // A session may be kept, for its outcomes, longer than its layers.
-  const bool layers_kept = options_.on_disconnect == OnDisconnect::kKeep ||
-                           (options_.on_disconnect == OnDisconnect::kLinger &&
-                            now - last_heard_ < options_.linger.count());
-  if (!first && !(resumed && layers_kept)) {
-    change.kind = ConnectionChange::Kind::kRestored;
-    ++receipts_.tally().restored;
-    if (options_.restore) SendRetained();
+  if (!first && !layers_kept) {
+    // What was applied unheard went with the layers: it is sent again, after what is restored.
+    retained_.EndDoubts();
+    outbox_.DropRestores();
+    change.kind =
+        options_.restore ? ConnectionChange::Kind::kRestored : ConnectionChange::Kind::kReopened;
+    if (options_.restore) {
+      ++receipts_.tally().restored;
+      SendRetained();
+    }
+  }
+  if (const size_t most = most_message_bytes(); most > 0) {
+    for (const auto& [transaction, why] : outbox_.KeepTo(most))
+      receipts_.RefusedHere(transaction->frame_id, "it was not sent: " + why);
   }
   last_heard_ = now;
+  if (options_.local_memory && !opened.local_socket().empty()) {
+    link_->memory =
+        transport_->OpenMemory(opened.local_socket(), opened.local_token(), link_.get());
+  }
   outbox_.StreamOpened(link_->open_bytes, opened.credit_bytes());
   NoteDrops();
   events_.push_back(std::move(change));
@@ -234,6 +299,22 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
   pings_ = unanswered_pings_ = 0;
   pong_seen_ = false;
   work_.NotifyAll();  // for the pings
+}
+
+void SessionCore::TakeUnheard(uint64_t last_sequence) {
+  const sync::TimeNs now = clock_.Now();
+  for (const auto& unheard : outbox_.Applied(last_sequence)) {
+    // The last one was applied. Any before may have been refused, but whole only in a strict session.
+    if (options_.strict && unheard->commit_sequence != last_sequence) {
+      receipts_.Unheard(unheard->frame_id, server_->displays);
+      if (options_.restore) retained_.Doubt(unheard->frame_id, unheard->operations, now);
+    } else {
+      receipts_.Applied(unheard->frame_id, server_->displays);
+      if (options_.restore) retained_.Apply(unheard->operations, unheard->GetRefusals(), now);
+    }
+  }
+  // Without outcomes nothing will tell.
+  if (!options_.outcomes || server_->displays.empty()) retained_.EndDoubts();
 }
 
 void SessionCore::SendRetained() {
@@ -248,11 +329,18 @@ void SessionCore::SendRetained() {
   size_t bytes = 0;
   const auto flush = [&]() VOXELD_REQUIRES(mutex_) {
     if (operations.empty()) return;
-    transactions.push_back(MakeTransaction(std::exchange(operations, {}), {}));
+    transactions.push_back(
+        MakeTransaction(std::exchange(operations, {}), {}, most_message_bytes()));
+    transactions.back()->restores = true;
     transactions.back()->frame_id = next_frame_++;
     bytes = 0;
   };
-  for (Operation& operation : retained_.Restore(clock_.Now())) {
+  std::vector<Operation> retained = retained_.Restore(clock_.Now());
+  if (most_message_bytes() > 0) {
+    for (const Oversized& oversized : TakeOversized(most_message_bytes(), &retained))
+      TellNotRestored(oversized.what);
+  }
+  for (Operation& operation : retained) {
     const auto* upsert = std::get_if<UpsertOperation>(&operation);
     const auto* define = std::get_if<DefineOperation>(&operation);
     const size_t size = upsert != nullptr   ? upsert->primitive.size()
@@ -274,6 +362,8 @@ void SessionCore::Lose(const absl::Status& why) {
     receipts_.Lost(frame, absl::StrCat("the connection was lost before its time: ", why.message()));
   }
   receipts_.StreamLost();
+  // A stream that answered nothing and soon ended may have ended by what it was sent.
+  if (clock_.Now() - opened_at_ >= options_.longest_pause.count()) backoff_.Reset();
   half_closed_ = false;
   ping_at_ = outcomes_until_ = sync::kNever;
   ping_due_ = false;
@@ -346,6 +436,7 @@ sync::TimeNs SessionCore::DoDue(sync::TimeNs now) {
   if (now >= outcomes_until_) {
     outcomes_until_ = sync::kNever;
     receipts_.OutcomesLost(resumed_at_, "the server did not say after the session was resumed");
+    retained_.EndDoubts();
     Changed();
   }
   if (now >= ping_at_) {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "absl/status/status.h"
+#include "client/cpp/src/memory_channel.h"
 #include "client/cpp/src/wire.h"
 #include "voxeld/v1/scene.pb.h"
 
@@ -37,6 +39,13 @@ class Transport {
   virtual ~Transport() = default;
   // A stream over a connection of its own. `events` must outlive its OnEnd.
   virtual std::unique_ptr<Stream> Start(Stream::Events* events) = 0;
+  // With what Opened tells of the local socket. `events` must outlive it. Null: content is to go over the stream, as
+  // where the server is not on this machine.
+  virtual std::unique_ptr<MemoryChannel> OpenMemory(const std::string& /*path*/,
+                                                    const std::string& /*token*/,
+                                                    MemoryChannel::Events* /*events*/) {
+    return nullptr;
+  }
 };
 
 }  // namespace voxeld::client

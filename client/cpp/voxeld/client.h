@@ -64,10 +64,11 @@ struct ConnectionChange {
     kRestored,  // it had not: the retained state was sent again
     kLost,      // `status` says why; it is tried again
     kEnded,     // for good
+    kReopened,  // the server had not kept it, and Options::restore is false: what was up is gone
   };
   Kind kind = Kind::kOpened;
   absl::Status status;
-  // kRestored: commits that had been accepted and whose outcomes will not come.
+  // kRestored, kReopened: commits that had been accepted and whose outcomes will not come.
   uint64_t lost_outcomes = 0;
 };
 
@@ -76,9 +77,15 @@ struct Options {
   std::string client_name;  // a label for people
   OnDisconnect on_disconnect = OnDisconnect::kClear;
   Duration linger{0};
-  bool strict = false;      // a refused operation refuses its whole commit
-  bool outcomes = true;     // false: a commit is answered by accepted or refused alone
-  std::string owner_token;  // joins the owner whose ServerInfo gave it; empty: a new owner
+  bool strict = false;   // a refused operation refuses its whole commit
+  bool outcomes = true;  // false: a commit is answered by accepted or refused alone
+  // Joins the owner whose ServerInfo gave it; empty: a new owner. One that is not there ends the session, but only
+  // before it was opened: later, as after the server's restart, it goes on as a new owner (server()).
+  std::string owner_token;
+
+  // Over a unix socket, to a server that offers it: content of at least 64 KiB is handed over in sealed memory
+  // instead of being sent. Where that fails it is sent.
+  bool local_memory = true;
 
   Flow flow = Flow::kReliable;
   uint32_t drop_oldest_frames = 1;
@@ -86,6 +93,9 @@ struct Options {
   // next commit; without one, and under the other policies, the oldest frames of each layer that has
   // newer ones go, and are counted.
   size_t buffer_bytes = size_t{64} << 20;
+  // Of what is staged for the next commit, about. Beyond, staging is refused (ResourceExhausted), but for the
+  // first operation.
+  size_t most_staged_bytes = size_t{256} << 20;
   // HasRoom: fewer commits than this are without all their answers.
   uint64_t most_unsettled = 4;
 
@@ -98,8 +108,10 @@ struct Options {
   // a row); 0: none.
   Duration ping_interval = std::chrono::seconds(1);
 
-  // Called on the session's own thread, one at a time, after each change. They may call anything but
-  // Wait… and Close.
+  // Called on the session's own thread, one at a time, after each change: of a receipt that changed several times
+  // meanwhile, once. They may call anything but Wait… and Close. While one does not return, 65,536 issues wait for
+  // it, and Tally::untold_issues counts those beyond; once 65,536 receipts do, commits are refused
+  // (ResourceExhausted).
   std::function<void(const Receipt&)> on_receipt;
   std::function<void(const Issue&)> on_issue;
   std::function<void(const ConnectionChange&)> on_connection;
@@ -173,7 +185,7 @@ class Frame {
   Frame& Draw(std::string id, Shape shape, Look look = {});
 
   // Commits it with all that is staged; the commit's number. After ResourceExhausted it may be tried
-  // again.
+  // again. InvalidArgument: as Session::Commit; a frame with something that is too large is given up whole.
   absl::StatusOr<uint64_t> Commit(const CommitOptions& options = {});
   // Stages it for the session's next commit.
   absl::Status End();
@@ -231,7 +243,9 @@ class Session {
   absl::Status RemoveAll();
 
   // Commits what is staged: it takes effect together. The commit's number, from 1.
-  // ResourceExhausted if it does not fit into the buffer; then all stays staged.
+  // ResourceExhausted if it does not fit into the buffer, or if on_receipt is far behind; then all stays staged.
+  // InvalidArgument if something takes a message of more than Limits::max_message_bytes: that is given up, all else
+  // stays staged. (Where the limit is told only later, by the server's first answer, the commit is refused then.)
   absl::StatusOr<uint64_t> Commit(const CommitOptions& options = {});
   // Bytes of what is staged, about as they will be on the wire.
   size_t staged_bytes() const;

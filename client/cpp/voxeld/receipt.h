@@ -77,9 +77,9 @@ struct Receipt {
     kSent,       // no answer yet
     kScheduled,  // the server keeps it for its time
     kAccepted,
-    kRefused,
+    kRefused,  // by the server; or here, because it would take more than the server reads
     kDropped,  // all that it held were frames that the flow policy gave up; it was not sent
-    kLost,     // the session ended without an answer to it
+    kLost,  // no answer to it will come; `message` says why, and whether it may have been applied
   };
   uint64_t frame = 0;
   State state = State::kQueued;
@@ -115,8 +115,10 @@ struct Tally {
   uint64_t server_dropped_frames = 0;                   // and there
   uint64_t connections = 0, resumed = 0, restored = 0;  // opened; taken up again; sent again
   uint64_t bytes_sent = 0, messages_sent = 0;
+  uint64_t memory_bytes = 0;  // handed over in sealed memory, beside bytes_sent
   std::map<std::string, OutcomeCounts> displays;
   uint64_t issue_count = 0, not_found = 0;  // issues; those with Reason::kNotFound
+  uint64_t untold_issues = 0;               // that on_issue was not called for, being too slow
   std::vector<Issue> issues;                // the first 20
 };
 

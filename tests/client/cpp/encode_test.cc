@@ -132,11 +132,11 @@ TEST(Encode, LargeArraysThatAreOwnedAreNotCopied) {
   // And neither are they on their way into a message.
   Batcher batcher;
   batcher.Add({.layer = "l", .id = "i", .primitive = *rope, .label = {}});
-  const std::vector<Rope> messages = batcher.Take();
+  const std::vector<Batcher::Message> messages = batcher.Take();
   ASSERT_EQ(messages.size(), 1u);
-  ASSERT_EQ(messages[0].tail().size(), 1u);
-  EXPECT_EQ(static_cast<const void*>(messages[0].tail()[0].shared.data()), where);
-  const v1::StreamRequest request = Parse(messages[0]);
+  ASSERT_EQ(messages[0].bytes.tail().size(), 1u);
+  EXPECT_EQ(static_cast<const void*>(messages[0].bytes.tail()[0].shared.data()), where);
+  const v1::StreamRequest request = Parse(messages[0].bytes);
   EXPECT_EQ(request.batch().upserts(0).entity().primitive().points().vertices().positions().size(),
             120'000u);
 }
@@ -259,21 +259,35 @@ TEST(Batcher, SplitsInOrderAndKeepsTheLargeAlone) {
   for (int i = 0; i < 1000; ++i) batcher.Add(upsert(id++, 50));
   batcher.Add(upsert(id++, 100'000));
   for (int i = 0; i < 10; ++i) batcher.Add(upsert(id++, 50));
-  const std::vector<Rope> messages = batcher.Take();
+  const std::vector<Batcher::Message> messages = batcher.Take();
   int next = 0;
   for (size_t i = 0; i < messages.size(); ++i) {
-    const v1::StreamRequest request = Parse(messages[i]);
+    const v1::StreamRequest request = Parse(messages[i].bytes);
+    EXPECT_EQ(messages[i].upserts, static_cast<size_t>(request.batch().upserts_size()));
     if (request.batch().upserts_size() > 1) {
-      EXPECT_LE(messages[i].size(), kBatchBytes + 16);
+      EXPECT_LE(messages[i].bytes.size(), kBatchBytes + 16);
     }
     if (i < 3) {
-      EXPECT_GE(messages[i].size(), 64u << 10);
+      EXPECT_GE(messages[i].bytes.size(), 64u << 10);
     }
     for (const v1::Upsert& each : request.batch().upserts())
       EXPECT_EQ(each.id(), std::to_string(next++));
   }
   EXPECT_EQ(next, id);
   EXPECT_TRUE(batcher.Take().empty());
+}
+
+TEST(Batcher, OfOneEntityThereIsOneInEach) {
+  Batcher batcher;
+  for (const char* id : {"a", "b", "a", "c", "a"})
+    batcher.Add({.layer = "l", .id = id, .primitive = *EncodePrimitive(Sphere{}, {}), .label = {}});
+  std::vector<std::string> ids;
+  for (const Batcher::Message& message : batcher.Take()) {
+    std::string& in = ids.emplace_back();
+    const v1::StreamRequest request = Parse(message.bytes);
+    for (const v1::Upsert& upsert : request.batch().upserts()) in += upsert.id();
+  }
+  EXPECT_THAT(ids, ElementsAre("ab", "ac", "a"));
 }
 
 TEST(Affine, ComposesRightToLeft) {

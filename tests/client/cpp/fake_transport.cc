@@ -76,6 +76,32 @@ void SessionUnderTest::SayAccepted(uint64_t frame, const std::vector<std::string
   Say(response);
 }
 
+void SessionUnderTest::SayRefused(uint64_t frame, const std::string& message) {
+  v1::StreamResponse response;
+  v1::Receipt* receipt = response.add_receipts();
+  receipt->set_frame_id(frame);
+  receipt->mutable_refused()->set_message(message);
+  Say(response);
+}
+
+void SessionUnderTest::SayPresented(uint64_t frame, const std::string& display) {
+  v1::StreamResponse response;
+  v1::Receipt* receipt = response.add_receipts();
+  receipt->set_frame_id(frame);
+  receipt->mutable_outcome()->set_display(display);
+  receipt->mutable_outcome()->mutable_presented();
+  Say(response);
+}
+
+void SessionUnderTest::SayIssue(size_t index, const std::string& layer, const std::string& id) {
+  v1::StreamResponse response;
+  v1::Issue* issue = response.add_issues();
+  issue->set_sequence(stream().written.at(index).sequence());
+  issue->set_layer(layer);
+  issue->set_id(id);
+  Say(response);
+}
+
 void SessionUnderTest::End(const absl::Status& status) {
   stream().events->OnEnd(status);
   core_->Step();

@@ -31,9 +31,38 @@ class FakeStream final : public Stream {
   std::vector<FakeStream*>* const list_;
 };
 
+// Memory that is held or not, as the test says.
+class FakeMemory final : public MemoryChannel {
+ public:
+  FakeMemory(MemoryChannel::Events* events, FakeMemory** place) : events_(events), place_(place) {
+    *place_ = this;
+  }
+  ~FakeMemory() override {
+    if (*place_ == this) *place_ = nullptr;
+  }
+  void Hold(uint64_t id, Rope content) override { held.emplace_back(id, content.Flat()); }
+  void Release(uint64_t id) override { released.push_back(id); }
+  // Of the newest Hold.
+  void Answer(MemoryChannel::Answer answer) { events_->OnHold(held.back().first, answer); }
+
+  std::vector<std::pair<uint64_t, std::string>> held;
+  std::vector<uint64_t> released;
+
+ private:
+  MemoryChannel::Events* const events_;
+  FakeMemory** const place_;
+};
+
 class FakeTransport final : public Transport {
  public:
   std::unique_ptr<Stream> Start(Stream::Events* events) override;
+  std::unique_ptr<MemoryChannel> OpenMemory(const std::string& path, const std::string& token,
+                                            MemoryChannel::Events* events) override {
+    memory_path = path + " " + token;
+    return std::make_unique<FakeMemory>(events, &memory);
+  }
+  FakeMemory* memory = nullptr;  // the newest, if it still is
+  std::string memory_path;       // and its token
   // Of streams that still are: in the order of their starts.
   std::vector<FakeStream*> streams;
   uint64_t started = 0;
@@ -48,6 +77,8 @@ class SessionUnderTest {
   SessionCore& operator*() { return *core_; }
   SessionCore* operator->() { return core_.get(); }
   FakeStream& stream() { return *transport_->streams.back(); }
+  FakeMemory* memory() { return transport_->memory; }
+  const std::string& memory_path() const { return transport_->memory_path; }
   bool connected() const { return !transport_->streams.empty(); }
   uint64_t started() const { return transport_->started; }
   sync::FakeClock& clock() { return clock_; }
@@ -62,6 +93,10 @@ class SessionUnderTest {
   void SayOpened(uint64_t credit_bytes = 0, const std::string& token = "token");
   void SayOpened(const v1::Opened& opened);
   void SayAccepted(uint64_t frame, const std::vector<std::string>& displays = {});
+  void SayRefused(uint64_t frame, const std::string& message);
+  void SayPresented(uint64_t frame, const std::string& display);
+  // An Issue of the newest stream's request `index`, Open being the first.
+  void SayIssue(size_t index, const std::string& layer, const std::string& id);
   void End(const absl::Status& status);
 
   // Puts up a sphere of this id and commits it.

@@ -261,6 +261,95 @@ TEST(Outbox, WhatIsPutFirstGoesFirst) {
   EXPECT_THAT(Drain(&outbox, &server), ElementsAre(20, 10, 11, 1, 2));
 }
 
+TEST(Outbox, RestoringBeginsAnew) {
+  Outbox outbox(0, 1 << 20);
+  ASSERT_TRUE(outbox.Add(Retained(1, "a")).ok());
+  std::vector<std::shared_ptr<Transaction>> restores = {Retained(10, "x"), Retained(11, "y")};
+  for (const auto& restore : restores) restore->restores = true;
+  outbox.AddFirst(restores);
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(10, 11, 1));
+  outbox.StreamLost(std::nullopt);
+  const size_t all = outbox.waiting_bytes();
+  outbox.DropRestores();
+  EXPECT_LT(outbox.waiting_bytes(), all);
+  outbox.StreamOpened(1, 0);
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1));
+  EXPECT_EQ(outbox.waiting_bytes(), 0u);
+}
+
+TEST(Outbox, KeepsToTheMessagesThatTheServerReads) {
+  Outbox outbox(0, 1 << 20);
+  std::vector<Operation> operations;
+  for (int i = 0; i < 100; ++i) operations.emplace_back(UpsertOf("kept", absl::StrCat(i), 1));
+  auto many = MakeTransaction(operations, {});
+  ASSERT_EQ(many->pieces[0].messages.size(), 1u);
+  many->frame_id = 1;
+  ASSERT_TRUE(outbox.Add(many).ok());
+  ASSERT_TRUE(outbox.Add(Retained(2, "large", 1000)).ok());
+  ASSERT_TRUE(outbox.Add(FrameOf(3, "f", 1000)).ok());
+  ASSERT_TRUE(outbox.Add(Retained(4, "small")).ok());
+  const auto refused = outbox.KeepTo(1000);
+  ASSERT_EQ(refused.size(), 2u);
+  EXPECT_EQ(refused[0].first->frame_id, 2u);
+  EXPECT_THAT(refused[0].second, HasSubstr("kept/large takes a message of 12"));
+  EXPECT_THAT(refused[0].second, HasSubstr("max_message_bytes is 1000"));
+  EXPECT_EQ(refused[1].first->frame_id, 3u);
+  outbox.StreamOpened(1, 0);
+  ModelServer server;
+  std::vector<uint64_t> committed;
+  while (auto next = outbox.Next(0)) {
+    EXPECT_LE(next->message.size(), 1000u);
+    if (const auto frame = server.Take(next->message)) committed.push_back(*frame);
+  }
+  EXPECT_THAT(committed, ElementsAre(1, 4));
+  EXPECT_EQ(server.retained.size(), 101u);
+  EXPECT_EQ(server.retained[99], "99");
+  EXPECT_EQ(outbox.waiting_bytes(), 0u);
+}
+
+TEST(Outbox, AnEncodingAnewLeavesOutWhatWasGivenUp) {
+  Outbox outbox(1, 1 << 20);
+  auto both =
+      MakeTransaction({FrameOperation{"a", {UpsertOf("a", "old", 1)}}, UpsertOf("kept", "x", 1),
+                       UpsertOf("kept", "y", 1), FrameOperation{"b", {UpsertOf("b", "f", 1)}}},
+                      {});
+  both->frame_id = 1;
+  ASSERT_TRUE(outbox.Add(both).ok());
+  ASSERT_TRUE(outbox.Add(FrameOf(2, "a")).ok());  // the first one's goes
+  EXPECT_TRUE(outbox.KeepTo(100).empty());
+  outbox.StreamOpened(1, 0);
+  ASSERT_TRUE(outbox.Add(FrameOf(3, "b")).ok());  // and now its other
+  ModelServer server;
+  EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 2, 3));
+  EXPECT_EQ(server.frames_applied, 2u);
+  EXPECT_THAT(server.retained, ElementsAre("x", "y"));
+  EXPECT_EQ(outbox.waiting_bytes(), 0u);
+}
+
+TEST(Outbox, RefusalsAreOfTheRequestsThatTheyName) {
+  Outbox outbox(0, 1 << 20);
+  for (const uint64_t frame : {1, 2, 3}) {
+    auto transaction =
+        MakeTransaction({UpsertOf("l", "a", 1), TransformOperation{"l", "a", Affine()}}, {});
+    transaction->frame_id = frame;
+    ASSERT_TRUE(outbox.Add(transaction).ok());
+  }
+  outbox.StreamOpened(1, 0);
+  std::vector<uint64_t> sequences;
+  for (int i = 0; i < 8; ++i) sequences.push_back(outbox.Next(0)->sequence);
+  EXPECT_EQ(outbox.Refused(sequences[4], "l", "a")->frame_id, 2u);
+  EXPECT_EQ(outbox.Refused(sequences[7], "l", "a")->frame_id, 3u) << "it is being sent";
+  EXPECT_TRUE(outbox.Answered(1)->GetRefusals().refused.empty());
+  EXPECT_EQ(outbox.Refused(sequences[0], "l", "a"), nullptr) << "it has its answer";
+  const Refusals refusals = outbox.Answered(2)->GetRefusals();
+  ASSERT_EQ(refusals.requests.size(), 2u);
+  EXPECT_EQ(refusals.requests[1].sequence, sequences[4]);
+  EXPECT_EQ(refusals.requests[1].operations, 1u);
+  EXPECT_EQ(refusals.refused.size(), 1u);
+}
+
 // Everything at random: commits of all sorts, credit in small pieces, answers late, streams lost and
 // resumed or not.
 class OutboxAtRandom : public testing::TestWithParam<std::tuple<int, int>> {};

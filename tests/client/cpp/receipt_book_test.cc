@@ -175,7 +175,7 @@ TEST_F(ReceiptBookTest, DropsAndLossesAreSaid) {
   EXPECT_EQ(At(2).outcomes[1].reason, "gone");
   book_.Sent(3, 50, 51, 0);
   EXPECT_EQ(At(3).sendings, 2u);
-  book_.Applied(3);
+  book_.Applied(3, {});
   EXPECT_EQ(At(3).state, Receipt::State::kAccepted);
   book_.Queued(4);
   book_.Ended("the end");
@@ -185,6 +185,80 @@ TEST_F(ReceiptBookTest, DropsAndLossesAreSaid) {
   EXPECT_EQ(tally.commits, tally.accepted + tally.dropped + tally.lost);
   EXPECT_EQ(tally.client_dropped_frames, 3u);
   EXPECT_EQ(tally.unsettled, 0u);
+}
+
+TEST_F(ReceiptBookTest, WhatWasAppliedUnheardIsStillOwedItsOutcomes) {
+  Send(1, 0);
+  book_.StreamLost();
+  book_.Applied(1, {"a", "b"});
+  EXPECT_EQ(At(1).state, Receipt::State::kAccepted);
+  EXPECT_FALSE(At(1).settled);
+  book_.Told(PresentedOn(1, "b"), 100);
+  EXPECT_FALSE(At(1).settled);
+  EXPECT_EQ(book_.OutcomesLost(50, "gone"), 1u);
+  ASSERT_THAT(At(1).outcomes, SizeIs(2));
+  EXPECT_EQ(At(1).outcomes[0].kind, Outcome::Kind::kPresented);
+  EXPECT_EQ(At(1).outcomes[1].kind, Outcome::Kind::kLost);
+  ReceiptBook without(false);
+  without.Queued(1);
+  without.Sent(1, 1, 1, 0);
+  without.Applied(1, {"a"});
+  EXPECT_TRUE(without.Find(1)->settled);
+}
+
+TEST_F(ReceiptBookTest, WhatWasNotHeardOfIsToldByItsOutcomesOrLost) {
+  for (const uint64_t frame : {1, 2}) {
+    Send(frame, 0);
+    book_.Unheard(frame, {"a"});
+    EXPECT_EQ(At(frame).state, Receipt::State::kSent);
+  }
+  book_.StreamLost();
+  EXPECT_EQ(At(1).state, Receipt::State::kSent) << "it does not wait here";
+  book_.Told(PresentedOn(1, "a"), 100);
+  EXPECT_EQ(At(1).state, Receipt::State::kAccepted);
+  EXPECT_TRUE(At(1).settled);
+  EXPECT_EQ(book_.OutcomesLost(50, "gone"), 1u);
+  EXPECT_EQ(At(2).state, Receipt::State::kLost);
+  EXPECT_EQ(At(2).message,
+            "the answer was lost with its connection; the server applied it or refused it whole");
+  EXPECT_THAT(At(2).outcomes, IsEmpty());
+  EXPECT_EQ(book_.GetTally().accepted, 1u);
+  EXPECT_EQ(book_.GetTally().lost, 1u);
+  ReceiptBook without(false);
+  without.Queued(1);
+  without.Unheard(1, {"a"});
+  EXPECT_EQ(without.Find(1)->state, Receipt::State::kLost) << "nothing would tell";
+}
+
+TEST_F(ReceiptBookTest, OutcomesOfAnEarlierSendingAreNotThoseOfTheNext) {
+  Send(1, 0);
+  book_.StreamLost();
+  v1::Receipt old = PresentedOn(1, "a");
+  old.set_sequence(10);
+  book_.Told(old, 5);
+  EXPECT_THAT(At(1).outcomes, IsEmpty()) << "it waits here";
+  book_.Sent(1, 20, 21, 6);
+  book_.Told(old, 7);
+  EXPECT_THAT(At(1).outcomes, IsEmpty());
+  EXPECT_EQ(book_.GetTally().displays.at("a").presented, 2u);
+  book_.Told(Accepted(1, {"a"}), 8);
+  v1::Receipt outcome = PresentedOn(1, "a");
+  outcome.set_sequence(21);
+  book_.Told(outcome, 9);
+  EXPECT_TRUE(At(1).settled);
+}
+
+TEST_F(ReceiptBookTest, IssuesMayComeBeforeTheCommitIsSent) {
+  book_.Queued(1);
+  v1::Issue issue;
+  issue.set_sequence(5);
+  EXPECT_EQ(book_.Told(issue, 1).frame, 1u);
+  EXPECT_THAT(At(1).issues, SizeIs(1));
+  book_.Sent(1, 5, 6, 0);
+  EXPECT_THAT(At(1).issues, SizeIs(1));
+  book_.StreamLost();
+  book_.Sent(1, 8, 9, 0);
+  EXPECT_THAT(At(1).issues, IsEmpty()) << "it is told anew";
 }
 
 TEST_F(ReceiptBookTest, TimedCommitsAreScheduledFirst) {

@@ -41,8 +41,8 @@ std::vector<std::string> Words(const std::vector<Operation>& operations) {
 
 class RetainedBookTest : public testing::Test {
  protected:
-  void Apply(const std::vector<Operation>& operations, const std::vector<Issue>& issues = {}) {
-    book_.Apply(operations, issues, now_);
+  void Apply(const std::vector<Operation>& operations, const Refusals& refusals = {}) {
+    book_.Apply(operations, refusals, now_);
   }
   std::vector<std::string> Restored() { return Words(book_.Restore(now_)); }
 
@@ -89,13 +89,48 @@ TEST_F(RetainedBookTest, TransformsAndLooksAreThoseOfNow) {
 }
 
 TEST_F(RetainedBookTest, WhatWasRefusedIsNotThere) {
-  Issue issue;
-  issue.layer = "l";
-  issue.id = "bad";
-  Issue object;
-  object.id = "no";
-  Apply({Put("l", "good"), Put("l", "bad"), *EncodeDefinition("no", {})}, {issue, object});
+  Apply({Put("l", "good"), Put("l", "bad"), *EncodeDefinition("no", {})},
+        {.requests = {{7, 2}, {8, 1}}, .refused = {{7, "l", "bad"}, {8, "", "no"}}});
   EXPECT_THAT(Restored(), ElementsAre("l", "l/good"));
+}
+
+TEST_F(RetainedBookTest, ARefusalIsOfOneOperationAndNotOfAllOnItsEntity) {
+  Apply({Put("l", "a"), TransformOperation{"l", "a", Affine::Scale(2)}},
+        {.requests = {{7, 1}, {8, 1}}, .refused = {{8, "l", "a"}}});
+  ASSERT_THAT(Restored(), ElementsAre("l", "l/a"));
+  EXPECT_EQ(std::get<UpsertOperation>(book_.Restore(now_)[1]).transform, Affine());
+  // Of two that replace each other the other one; and what goes before does not shift it.
+  Apply({Put("l", "b"), Put("l", "a", Sphere{}, 500), Put("l", "a", Sphere{}, 600),
+         DeleteOperation{"l", What::kId, "b"}},
+        {.requests = {{10, 2}, {11, 1}, {12, 1}}, .refused = {{11, "l", "a"}, {12, "l", ""}}});
+  ASSERT_THAT(Restored(), ElementsAre("l", "l/b", "l/a"));
+  EXPECT_EQ(std::get<UpsertOperation>(book_.Restore(now_)[2]).lifetime_ns, 500);
+}
+
+TEST_F(RetainedBookTest, RefusalsWithinAFrameAndOfAFrame) {
+  const FrameOperation frame{"l", {Put("l", "x"), Put("l", "y"), Put("l", "z")}};
+  Apply({FrameOperation{}, frame, Put("m", "after")},
+        {.requests = {{5, 1}, {6, 2}, {7, 1}, {8, 1}, {9, 1}}, .refused = {{6, "l", "y"}}});
+  EXPECT_THAT(Restored(), ElementsAre("l", "l/x", "l/z", "m", "m/after"));
+  Apply({FrameOperation{"n", {Put("n", "x")}}},
+        {.requests = {{15, 1}, {16, 1}, {17, 1}}, .refused = {{15, "n", ""}}});
+  EXPECT_THAT(Restored(), ElementsAre("l", "l/x", "l/z", "m", "m/after"));
+}
+
+TEST_F(RetainedBookTest, WhatIsInDoubtKeepsItsPlace) {
+  Apply({Put("l", "before")});
+  book_.Doubt(4, {Put("l", "a", Sphere{}, 500), Put("l", "gone")}, now_);
+  book_.Doubt(5, {Put("l", "never")}, now_);
+  Apply({Put("l", "a", Sphere{}, 600), DeleteOperation{"l", What::kId, "gone"}});
+  EXPECT_THAT(Restored(), ElementsAre("l", "l/before"));
+  book_.WasApplied(77);
+  book_.WasApplied(4);
+  EXPECT_THAT(Restored(), ElementsAre("l", "l/before", "l/a", "l/gone"));
+  book_.EndDoubts();
+  ASSERT_THAT(Restored(), ElementsAre("l", "l/before", "l/a"));
+  EXPECT_EQ(std::get<UpsertOperation>(book_.Restore(now_)[2]).lifetime_ns, 600);
+  Apply({Put("l", "after")});
+  EXPECT_THAT(Restored(), ElementsAre("l", "l/before", "l/a", "l/after"));
 }
 
 TEST_F(RetainedBookTest, ObjectsComeBeforeThoseThatDrawThem) {
@@ -109,6 +144,24 @@ TEST_F(RetainedBookTest, ObjectsComeBeforeThoseThatDrawThem) {
   EXPECT_THAT(Restored(), ElementsAre("=b", "=a", "=c", "l", "l/i", "l/j", "l/k"));
   Apply({RemoveObjectOperation{"c", true}});
   EXPECT_THAT(Restored(), ElementsAre("=b", "=a", "l", "l/j", "l/k"));
+}
+
+TEST_F(RetainedBookTest, WhatIsOverIsForgotten) {
+  Apply({Put("l", "stays")});
+  for (int i = 0; i < 10'000; ++i) {
+    Apply({Put("l", std::to_string(i), Sphere{}, 100), Put("l", "again", Sphere{}, 1'000'000)});
+    ++now_;
+    ASSERT_LE(book_.entities(), 102u);
+  }
+  // Put up anew it lives on, and what was deleted meanwhile is no other's end.
+  Apply({Put("l", "9999", Sphere{}, 1000), DeleteOperation{"l", What::kId, "again"},
+         Put("l", "again")});
+  now_ += 999;
+  Apply({});
+  EXPECT_THAT(Restored(), ElementsAre("l", "l/stays", "l/9999", "l/again"));
+  now_ += 1'000'000;
+  Apply({});
+  EXPECT_EQ(book_.entities(), 2u);
 }
 
 TEST_F(RetainedBookTest, LifetimesRunOn) {

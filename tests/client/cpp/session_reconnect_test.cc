@@ -54,11 +54,30 @@ TEST_F(Reconnect, PausesGrowAndBeginAnewAfterASuccess) {
   EXPECT_THAT(session->WaitOpened(kAtOnce).message(),
               HasSubstr("voxeld at there:1 is not available: broken pipe"));
   session.SayOpened();
+  session.Put("a");
+  session.SayAccepted(1);
   session.End(kGone);
-  const uint64_t before = session.started();
+  uint64_t before = session.started();
   session.Advance(100 * sync::kMillisecond);
   EXPECT_EQ(session.started(), before + 1);
   EXPECT_THAT(changes_, ElementsAre(Kind::kOpened, Kind::kLost));
+  // A stream that ends again without an answer to what it was sent is no success, unless it lasted.
+  for (const int64_t pause : {200, 400}) {
+    session.SayOpened();
+    session.Put("a");
+    before = session.started();
+    session.End(absl::ResourceExhaustedError("too large"));
+    session.Advance(pause * sync::kMillisecond - 1);
+    EXPECT_EQ(session.started(), before);
+    session.Advance(1);
+    EXPECT_EQ(session.started(), before + 1) << pause;
+  }
+  session.SayOpened();
+  session.Advance(5 * sync::kSecond);
+  before = session.started();
+  session.End(kGone);
+  session.Advance(100 * sync::kMillisecond);
+  EXPECT_EQ(session.started(), before + 1);
   EXPECT_THAT(std::string(last_.status.message()), HasSubstr("broken pipe"));
 }
 
@@ -180,13 +199,13 @@ TEST_F(Reconnect, ASessionThatIsResumedMayHaveLostItsLayers) {
     session.Advance(away_s * sync::kSecond);
     session.TakeWords();
     session.SayOpened(OpenedAgain(second_commit));
-    // What was applied unheard is of the state as well.
+    // What was applied unheard went with the layers.
     if (kept) {
       EXPECT_THAT(session.TakeWords(), ElementsAre("l/c", "commit 3"));
       EXPECT_EQ(changes_.back(), Kind::kResumed);
     } else {
       EXPECT_THAT(session.TakeWords(),
-                  ElementsAre("layer l", "l/a l/b", "commit 4", "l/c", "commit 3"));
+                  ElementsAre("layer l", "l/a", "commit 4", "l/b", "commit 2", "l/c", "commit 3"));
       EXPECT_EQ(changes_.back(), Kind::kRestored);
       EXPECT_EQ(last_.lost_outcomes, 0u);
     }
