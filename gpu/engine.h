@@ -144,6 +144,9 @@ struct FrameResult {
   uint32_t pictures_drawn = 0;      // pictures sliced again
   uint32_t singular_drawables = 0;  // solids whose map has no inverse: they draw nothing
   int64_t assemble_ns = 0, slice_ns = 0;
+  // What the engine holds of its own, on the device where it has one: what it derives from the scene, the volume and
+  // the pictures. Bulk memory is not its own.
+  uint64_t memory_bytes = 0;
 };
 
 // A box of voxels, half-open.

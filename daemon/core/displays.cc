@@ -50,6 +50,7 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.view = view;
   options.work = std::make_shared<Loop>(clock_);
   options.clock = &clock_;
+  options.budget = budget_;
   // The core's queue is what keeps this safe: it is closed before the core is gone.
   options.tell = [this, loop = loop_](const Rider& rider, const CommitOutcome& outcome) {
     loop->Post([this, rider, outcome] { DeliverOutcome(rider, outcome); });

@@ -279,6 +279,11 @@ bool Intake::Room() const {
          queue_.size() < limits_.max_riding_commits;
 }
 
+bool Intake::HasRoom() const {
+  sync::MutexLock lock(mutex_);
+  return sink_ != nullptr && Room();
+}
+
 void Intake::Wake() {
   sync::MutexLock lock(mutex_);
   if (sink_ != nullptr) schedule_();

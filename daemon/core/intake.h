@@ -104,6 +104,7 @@ class Intake {
   // this filled it: then nothing more should be read until the sink gets OnRoom, which comes once for each time;
   // what has been read may still be handed over.
   bool Take(IncomingMessage message);
+  bool HasRoom() const;
   // Asks for a turn: the sink is not crowded any more.
   void Wake();
 

@@ -41,7 +41,8 @@ FramePipeline::FramePipeline(Options options)
       scene_(std::make_unique<EngineScene>([this] { Breathe(); })),
       pool_(display_->info().layout),
       riders_(display_->info().name,
-              [this](const Rider& rider, const CommitOutcome& outcome) { Told(rider, outcome); }) {}
+              [this](const Rider& rider, const CommitOutcome& outcome) { Told(rider, outcome); }),
+      budget_(std::move(options.budget)) {}
 
 FramePipeline::~FramePipeline() { Stop(); }
 
@@ -81,8 +82,17 @@ void FramePipeline::Stop() {
   alive_ = nullptr;
   if (care_ != nullptr) care_->Stop();
   made_.engine = nullptr;
+  SetEngineBytes(0);
   drawing_.reset();
   ServeCaptures();
+}
+
+void FramePipeline::SetEngineBytes(uint64_t bytes) {
+  if (budget_ == nullptr) return;
+  using Use = Budget::Use;
+  if (bytes > engine_bytes_) budget_->ChargeAnyway(Use::kEngines, bytes - engine_bytes_);
+  if (bytes < engine_bytes_) budget_->Release(Use::kEngines, engine_bytes_ - bytes);
+  engine_bytes_ = bytes;
 }
 
 sync::TimeNs FramePipeline::Step() {
@@ -277,6 +287,7 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   drawing.lease.frame->volume = drawing.volume;
   ++volumes_drawn_;
   lit_voxels_ = result->lit_voxels;
+  SetEngineBytes(result->memory_bytes);
   singular_drawables_ = result->singular_drawables;
   const sync::TimeNs now = clock_.Now();
   drawing.stages.drawing_ns = drawing.began;

@@ -37,6 +37,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "daemon/core/budget.h"
 #include "daemon/core/stats.h"
 #include "daemon/pipeline/display_settings.h"
 #include "daemon/pipeline/engine_care.h"
@@ -67,7 +68,8 @@ class FramePipeline final : private display::Display::Listener {
     // Where wakes and the engine's completions go: the queue of the thread
     // that this pipeline is bound to.
     std::shared_ptr<Loop> work;
-    sync::Clock* clock = nullptr;  // outlives the pipeline
+    sync::Clock* clock = nullptr;    // outlives the pipeline
+    std::shared_ptr<Budget> budget;  // charged with what the engine holds; may be none
     // An outcome, inside any call to the pipeline.
     RiderBook::Tell tell;
     // Takes what the pipeline has done with: freeing a large scene takes longer than its thread may
@@ -150,6 +152,7 @@ class FramePipeline final : private display::Display::Listener {
   gpu::Target CurrentTarget() const;
   absl::Status ApplyDelta(size_t size);
   void OnCallDone(const absl::Status& status);
+  void SetEngineBytes(uint64_t bytes);
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
   void OnEngineFailure(const absl::Status& status, sync::TimeNs since);
   void OnEngineLost(uint64_t id, const absl::Status& status);
@@ -214,6 +217,8 @@ class FramePipeline final : private display::Display::Listener {
 
   RiderBook riders_;
   uint64_t lit_voxels_ = 0, singular_drawables_ = 0;
+  const std::shared_ptr<Budget> budget_;
+  uint64_t engine_bytes_ = 0;  // charged
   uint64_t volumes_drawn_ = 0, volumes_unchanged_ = 0;
   SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_;
   SlidingLatency waiting_, transferring_, showing_;

@@ -35,6 +35,7 @@ struct Drawable {
   std::vector<Int3> vertices;
   Source source;
   Bins bins;
+  uint64_t derived_bytes = 0;
   bool pending = false;  // awaits preparation
   bool leaving = false;  // its entries are being taken out of the tiles
 };

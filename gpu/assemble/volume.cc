@@ -10,6 +10,12 @@
 namespace voxeld::gpu {
 namespace {
 
+uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
+  return d.vertices.size() * sizeof(d.vertices[0]) +
+         d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) +
+         d.bins.items.size() * sizeof(uint32_t);
+}
+
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 
 // Puts a layer's words over the colours of a tile.
@@ -107,6 +113,7 @@ void Volume::OnLeave(Drawable& drawable) {
     }
   }
   singular_ -= IsSingular(drawable);
+  derived_bytes_ -= drawable.derived_bytes;
   drawable.leaving = true;
   left_.push_back(&drawable);
 }
@@ -163,6 +170,8 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   pending_.clear();
   tiles_.Reset(grid);
   lit_voxels_ = 0;
+  lit_tiles_ = 0;
+  derived_bytes_ = 0;
   singular_ = 0;
   for (const auto& [id, drawable] : scene_.drawables()) {
     drawable->pending = true;
@@ -188,6 +197,8 @@ void Volume::PreparePending() {
   for (Drawable* d : pending_) {
     d->pending = false;
     singular_ += IsSingular(*d);
+    d->derived_bytes = DerivedBytes(*d, sizeof(Entry));
+    derived_bytes_ += d->derived_bytes;
     for (uint32_t row = 0; row < d->bins.tiles.size(); ++row) {
       const uint32_t tile = d->bins.tiles[row];
       index_[tile].entries.push_back({d, row});
@@ -246,6 +257,7 @@ Volume::Changes Volume::Update() {
     const uint32_t tile = dirty_[i];
     index_[tile].dirty = false;
     lit_voxels_ = lit_voxels_ - lit_before[i] + tiles_.lit(tile);
+    lit_tiles_ = lit_tiles_ - (lit_before[i] != 0) + (tiles_.lit(tile) != 0);
     if (differs[i] == 0) continue;
     changes.tiles.push_back(tile);
     changes.was_lit.push_back(lit_before[i] != 0);

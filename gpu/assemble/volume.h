@@ -56,6 +56,10 @@ class Volume final : private SceneObserver {
 
   const TileStore& tiles() const { return tiles_; }
   uint64_t lit_voxels() const { return lit_voxels_; }
+  // What is derived from the scene, and the tiles with light.
+  uint64_t memory_bytes() const {
+    return derived_bytes_ + lit_tiles_ * kTileVoxels * sizeof(uint32_t);
+  }
   // Solids whose map has no inverse: they draw nothing.
   uint32_t singular_drawables() const { return singular_; }
 
@@ -95,7 +99,7 @@ class Volume final : private SceneObserver {
   std::vector<Drawable*> pending_, left_;
   TileStore tiles_;
   std::vector<Scratch> scratch_;
-  uint64_t lit_voxels_ = 0;
+  uint64_t lit_voxels_ = 0, lit_tiles_ = 0, derived_bytes_ = 0;
   uint32_t singular_ = 0;
 };
 

@@ -61,6 +61,7 @@ absl::StatusOr<FrameResult> CpuCore::SubmitFrame(const FrameRequest& request, Fr
   result.pictures_drawn = drawn.pictures_drawn;
   result.lit_voxels = volume_.lit_voxels();
   result.singular_drawables = volume_.singular_drawables();
+  result.memory_bytes = volume_.memory_bytes() + pictures_.memory_bytes();
   result.assemble_ns = assembled - start;
   result.slice_ns = clock.Now() - assembled;
   last_frame_ = request.frame;

@@ -62,6 +62,7 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
       pictures_->Draw(volume_.view(), request.frame, buffer, request.buffer_holds, result);
   if (!status.ok()) return status;
   result.singular_drawables = volume_.singular_drawables();
+  result.memory_bytes = device_->pool().held();
   result.assemble_ns = assembled - start;
   result.slice_ns = clock.Now() - assembled;
   last_frame_ = request.frame;

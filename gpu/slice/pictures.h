@@ -42,6 +42,8 @@ class Pictures {
   // Slices again what looks at `changes`, as pictures of `frame`.
   Result Update(const TileStore& tiles, const Volume::Changes& changes, uint64_t frame);
 
+  uint64_t memory_bytes() const { return bytes_.size(); }
+
   // Writes the pictures that changed after frame `buffer_holds`, and when each did.
   void CopyTo(FrameBuffer buffer, uint64_t buffer_holds) const;
 

@@ -91,6 +91,9 @@ TEST_P(EngineContract, FrameCountsWhatWasDone) {
   EXPECT_EQ(first.lit_voxels, 2u);
   EXPECT_EQ(first.tiles_drawn, 2u);
   EXPECT_EQ(first.pictures_drawn, 32u);
+  EXPECT_GE(first.memory_bytes,
+            engine_.pictures().size() + size_t{2} * 16 * 16 * 16 * sizeof(uint32_t))
+      << "the pictures, and the tiles with light";
   const FrameResult second = MustFrame();
   EXPECT_FALSE(second.changed);
   EXPECT_EQ(second.tiles_drawn, 0u);

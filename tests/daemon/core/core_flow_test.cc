@@ -208,6 +208,36 @@ TEST(CoreFlow, ACrowdedClientsCommitsWaitUntilItReads) {
   EXPECT_EQ(AcceptedOf(client), 1u);
 }
 
+TEST(CoreFlow, WhatEnginesHoldCountsForTheLimit) {
+  Limits limits;
+  limits.max_memory_bytes = 10'000'000;
+  Simulation sim(limits);
+  sim.engine().memory_bytes = 9'990'000;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x"));
+  EXPECT_EQ(AcceptedOf(client), 1u);
+  while (sim.Show()) {
+  }
+  EXPECT_EQ(sim.GetStats().memory.engines, 9'990'000u);
+  for (uint64_t i = 2; i <= 40; ++i) sim.Send(client, i, Put("a", std::to_string(i)));
+  ASSERT_FALSE(client.sink->issues.empty());
+  EXPECT_EQ(client.sink->issues[0].reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(client.sink->issues[0].message, HasSubstr("max_memory_bytes"));
+
+  // There is room again once an engine holds less.
+  sim.engine().memory_bytes = 1000;
+  sim.Send(client, 41, testing::DeleteAllMine());
+  while (sim.Show()) {
+  }
+  EXPECT_EQ(sim.GetStats().memory.engines, 1000u);
+  client.sink->issues.clear();
+  sim.Send(client, 42, Put("a", "again"));
+  EXPECT_TRUE(client.sink->issues.empty());
+  EXPECT_TRUE(sim.core->Stop(sync::kSecond).ok());
+  EXPECT_EQ(sim.core->budget()->used_bytes(Budget::Use::kEngines), 0u);
+}
+
 TEST(CoreFlow, CommitsThatRideAreLimitedAndTheRestWaits) {
   Limits limits;
   limits.max_riding_commits = 3;

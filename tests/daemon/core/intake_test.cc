@@ -30,10 +30,10 @@ class IntakeTest : public ::testing::Test {
   }
 
   template <typename... Ops>
-  void Take(uint64_t bytes, Ops... ops) {
+  bool Take(uint64_t bytes, Ops... ops) {
     std::vector<Operation> all = testing::Sequence(sequence, std::move(ops)...);
     sequence += all.size();
-    intake->Take({std::move(all), {}, bytes, 1, 2, local_bytes});
+    return intake->Take({std::move(all), {}, bytes, 1, 2, local_bytes});
   }
 
   // The layers and ids of what a commit would put.
@@ -80,10 +80,11 @@ TEST_F(IntakeTest, WhatIsStagedWithNothingBeforeItCostsNoCredit) {
 
 TEST_F(IntakeTest, WhatWaitsForItsTurnHoldsItsCredit) {
   Make();
-  Take(600, Put("a", "x"), EndCommit(1));
+  EXPECT_FALSE(Take(600, Put("a", "x"), EndCommit(1)));
   EXPECT_TRUE(intake->HasRoom());
-  Take(600, Put("a", "y"));
-  EXPECT_FALSE(intake->HasRoom()) << "1200 bytes of 1000";
+  EXPECT_TRUE(Take(600, Put("a", "y"))) << "1200 bytes of 1000";
+  EXPECT_FALSE(intake->HasRoom());
+  EXPECT_FALSE(Take(1, Put("a", "z"))) << "it was full before";
   EXPECT_THAT(sink->credits, IsEmpty());
   EXPECT_EQ(scheduled, 1);
   WaitingCommit commit = Pop();
@@ -91,7 +92,7 @@ TEST_F(IntakeTest, WhatWaitsForItsTurnHoldsItsCredit) {
   intake->Done(std::move(commit));
   // Nothing waits any more, so what is staged holds none either.
   EXPECT_EQ(sink->rooms, 1);
-  EXPECT_EQ(sink->credits.back(), 10 + 1200 + kWindow);
+  EXPECT_EQ(sink->credits.back(), 10 + 1201 + kWindow);
   EXPECT_TRUE(intake->HasRoom());
 }
 

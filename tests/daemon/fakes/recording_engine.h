@@ -124,6 +124,7 @@ class SceneModel : public gpu::DeltaVisitor {
 
 // What a test steers and sees of its engines; survives them.
 struct EngineScript {
+  uint64_t memory_bytes = 0;         // what frames say that the engine holds
   bool inline_calls = true;          // false: calls wait for Run
   std::optional<absl::Status> fail;  // the next frame ends in this, once
   bool fail_staging = false;         // AcquireStaging is refused, once
@@ -211,6 +212,7 @@ class RecordingEngine final : public gpu::Engine {
       if (result.changed) changed_in_ = request.frame;
       last_ = std::move(content);
       result.lit_voxels = last_->size();
+      result.memory_bytes = script_->memory_bytes;
       result.assemble_ns = 1000;
       result.slice_ns = 2000;
       const size_t hash = absl::Hash<std::vector<std::string>>()(*last_);

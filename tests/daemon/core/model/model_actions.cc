@@ -224,8 +224,6 @@ void ModelRun::Send(uint32_t place, Chance& chance, bool step) {
     return Fail(absl::StrCat("session ", session.id, " has ", room ? "room" : "no room",
                              ", and should not"));
   }
-  stream.waits_for_room = !room;
-  stream.rooms = 0;
   if (!room) return;
   RandomMessage message =
       MakeMessage(chance, stream.last_sequence, &stream.next_frame_id, sim_.clock.Now());
@@ -235,7 +233,13 @@ void ModelRun::Send(uint32_t place, Chance& chance, bool step) {
       plain_.Take(session, message.operations, message.malformed, message.bytes);
   Refusals refused;
   refused.issues = message.malformed;
-  stream.info.intake->Take({std::move(message.operations), std::move(refused), message.bytes});
+  stream.rooms = 0;
+  stream.waits_for_room =
+      stream.info.intake->Take({std::move(message.operations), std::move(refused), message.bytes});
+  if (stream.waits_for_room == plain_.HasRoom(session)) {
+    return Fail(absl::StrCat("a message was ", stream.waits_for_room ? "" : "not ",
+                             "said to fill session ", session.id));
+  }
   ExpectIssues(stream, expected);
   if (step) Step();
 }
