@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -19,6 +20,8 @@ namespace {
 
 constexpr mode_t kSocketMode = 0660;
 constexpr size_t kDiscardBytes = 1u << 20;
+constexpr int kBufferLock = 72;       // SO_BUF_LOCK, which glibc's headers have not
+constexpr int kFixedBytes = 4 << 20;  // of a buffer that the system cannot adjust
 
 absl::Status Failed(int error, const Address& address) {
   if (error == EADDRINUSE) {
@@ -133,6 +136,25 @@ ListeningSocket::~ListeningSocket() {
   struct stat found;
   if (inode_ == 0 || !descriptor_.ok() || stat(address_.path.c_str(), &found) != 0) return;
   if (found.st_dev == device_ && found.st_ino == inode_) unlink(address_.path.c_str());
+}
+
+SocketWire::SocketWire(Descriptor descriptor, bool tcp) : descriptor_(std::move(descriptor)) {
+  if (!tcp) return;
+  socklen_t length = sizeof(wide_bytes_);
+  getsockopt(descriptor_.get(), SOL_SOCKET, SO_RCVBUF, &wide_bytes_, &length);
+  Set(descriptor_.get(), SOL_SOCKET, SO_RCVBUF, kNarrowBytes);
+}
+
+void SocketWire::Trust() {
+  if (wide_bytes_ == 0) return;
+  const int descriptor = descriptor_.get();
+  Set(descriptor, SOL_SOCKET, SO_RCVBUF, wide_bytes_ / 2);
+  // A size that was set is not adjusted any more, unless it is let go (Linux 5.14).
+  const int free = 0;
+  if (setsockopt(descriptor, SOL_SOCKET, kBufferLock, &free, sizeof(free)) != 0) {
+    Set(descriptor, SOL_SOCKET, SO_RCVBUF, kFixedBytes);
+  }
+  Set(descriptor, IPPROTO_TCP, TCP_WINDOW_CLAMP, std::numeric_limits<int>::max() / 2);
 }
 
 uint64_t SocketWire::BytesReceived() {

@@ -53,15 +53,22 @@ class ListeningSocket {
 
 // A connection's socket under a descriptor of its own: whoever serves the connection may close
 // theirs at any time.
-class SocketWire final : public Wire {
+//
+// Over TCP its receive buffer is small until it is trusted: the first window that the system offers
+// holds a first call, and what is behind it comes a little at a time, at the other system's pace.
+class SocketWire : public Wire {
  public:
-  explicit SocketWire(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}
+  static constexpr int kNarrowBytes = 12 << 10;  // as SO_RCVBUF has it: the system doubles it
+
+  SocketWire(Descriptor descriptor, bool tcp);
   int descriptor() const { return descriptor_.get(); }
   uint64_t BytesReceived() override;
   void Cut() override;
+  void Trust() override;
 
  private:
   const Descriptor descriptor_;
+  int wide_bytes_ = 0;  // what the buffer was; 0: it is as it was
 };
 
 // Who made the connected unix socket, by the kernel's word.
