@@ -8,8 +8,9 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-// Of a limit: what is left of it when a connection is cut.
-constexpr int kSixteenth = 16;
+// Sixteenths of a limit that are left of it when a connection is cut. Of the bytes as many as may come
+// at once while the receive buffer is small, and still more than a first call has.
+constexpr int kTimeLeft = 1, kBytesLeft = 3;
 
 }  // namespace
 
@@ -130,8 +131,7 @@ sync::TimeNs Guard::Look() {
   {
     sync::MutexLock lock(mutex_);
     const sync::TimeNs now = clock_.Now();
-    const sync::TimeNs most =
-        limits_.unauthorised_limit_ns - limits_.unauthorised_limit_ns / kSixteenth;
+    const sync::TimeNs most = limits_.unauthorised_limit_ns / 16 * (16 - kTimeLeft);
     for (auto it = watched_.begin(); it != watched_.end();) {
       Connection& connection = *(it++)->second;  // a cut takes it out
       if (BytesAreMany(connection, false, doomed)) continue;
@@ -267,7 +267,7 @@ bool Guard::BytesAreMany(Connection& connection, bool ended, std::vector<Doomed>
   if (connection.cut) return true;
   const uint64_t bytes = connection.wire->BytesReceived() - connection.base;
   const uint64_t most = limits_.unauthorised_bytes;
-  if (bytes <= most - most / kSixteenth) return false;
+  if (bytes <= most / 16 * (16 - kBytesLeft)) return false;
   const sync::TimeNs now = clock_.Now();
   if (connection.many_since == sync::kNever) connection.many_since = now;
   if (bytes <= most && (ended || now - connection.many_since < kGrace)) return false;

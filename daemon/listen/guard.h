@@ -14,7 +14,7 @@
 //                 no call began and no message was whole: cut
 //
 // Looking takes time, so what is near a limit is cut as well: a sixteenth before the end of the time,
-// and where no more than a sixteenth of the bytes is left for kGrace. Until it is authorised a
+// and where less than three sixteenths of the bytes are left for kGrace. Until it is authorised a
 // connection's receive buffer is small (Wire::Trust), so that little comes between a limit and the cut.
 //
 // The address of a connection that was cut, but for time, is refused for a while: cut_penalty_ns, and

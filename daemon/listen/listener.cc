@@ -271,6 +271,7 @@ class Listener::Impl {
         break;
     }
     epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, descriptor, nullptr);
+    SocketWire::Narrow(descriptor);
     const int listening = stranger.listening;
     Descriptor connection = std::move(stranger.connection);
     strangers_.erase(at);

@@ -35,6 +35,12 @@ void Set(int descriptor, int level, int option, int value) {
   setsockopt(descriptor, level, option, &value, sizeof(value));
 }
 
+// Since Linux 5.14.
+bool LetBufferGo(int descriptor) {
+  const int none = 0;
+  return setsockopt(descriptor, SOL_SOCKET, kBufferLock, &none, sizeof(none)) == 0;
+}
+
 void SetPort(SocketName& name, uint16_t port) {
   if (name.address.ss_family == AF_INET) {
     reinterpret_cast<sockaddr_in*>(&name.address)->sin_port = htons(port);
@@ -106,6 +112,11 @@ absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenTcp(const Ad
     if (!made.descriptor_.ok()) continue;  // no IPv6 here, say
     const int descriptor = made.descriptor();
     Set(descriptor, SOL_SOCKET, SO_REUSEADDR, 1);
+    // Its connections begin with this buffer. Were it not let go, they could never have a great window.
+    if (LetBufferGo(descriptor)) {
+      Set(descriptor, SOL_SOCKET, SO_RCVBUF, SocketWire::kUnreadBytes);
+      LetBufferGo(descriptor);
+    }
     if (at->ai_family == AF_INET6) {
       // [::] is every address of this machine, as everywhere.
       Set(descriptor, IPPROTO_IPV6, IPV6_V6ONLY,
@@ -138,22 +149,19 @@ ListeningSocket::~ListeningSocket() {
   if (found.st_dev == device_ && found.st_ino == inode_) unlink(address_.path.c_str());
 }
 
-SocketWire::SocketWire(Descriptor descriptor, bool tcp) : descriptor_(std::move(descriptor)) {
-  if (!tcp) return;
-  socklen_t length = sizeof(wide_bytes_);
-  getsockopt(descriptor_.get(), SOL_SOCKET, SO_RCVBUF, &wide_bytes_, &length);
-  Set(descriptor_.get(), SOL_SOCKET, SO_RCVBUF, kNarrowBytes);
+SocketWire::SocketWire(Descriptor descriptor, bool tcp)
+    : descriptor_(std::move(descriptor)), tcp_(tcp) {
+  if (tcp_) Set(descriptor_.get(), SOL_SOCKET, SO_RCVBUF, kUnreadBytes);
 }
 
+void SocketWire::Narrow(int descriptor) { Set(descriptor, SOL_SOCKET, SO_RCVBUF, kReadBytes); }
+
 void SocketWire::Trust() {
-  if (wide_bytes_ == 0) return;
+  if (!tcp_) return;
   const int descriptor = descriptor_.get();
-  Set(descriptor, SOL_SOCKET, SO_RCVBUF, wide_bytes_ / 2);
-  // A size that was set is not adjusted any more, unless it is let go (Linux 5.14).
-  const int free = 0;
-  if (setsockopt(descriptor, SOL_SOCKET, kBufferLock, &free, sizeof(free)) != 0) {
-    Set(descriptor, SOL_SOCKET, SO_RCVBUF, kFixedBytes);
-  }
+  Set(descriptor, SOL_SOCKET, SO_RCVBUF, kTrustedBytes);
+  // A size that was set is not adjusted any more, unless it is let go.
+  if (!LetBufferGo(descriptor)) Set(descriptor, SOL_SOCKET, SO_RCVBUF, kFixedBytes);
   Set(descriptor, IPPROTO_TCP, TCP_WINDOW_CLAMP, std::numeric_limits<int>::max() / 2);
 }
 
@@ -166,6 +174,9 @@ uint64_t SocketWire::BytesReceived() {
 }
 
 void SocketWire::Cut() {
+  // Resets the connection at once, whoever else has it open, and throws away what was received.
+  const sockaddr nobody = {.sa_family = AF_UNSPEC, .sa_data = {}};
+  if (connect(descriptor_.get(), &nobody, sizeof(nobody)) == 0) return;
   // The last to close it resets it: no waiting for a client that still sends.
   const linger reset = {.l_onoff = 1, .l_linger = 0};
   setsockopt(descriptor_.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));

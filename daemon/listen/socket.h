@@ -54,13 +54,21 @@ class ListeningSocket {
 // A connection's socket under a descriptor of its own: whoever serves the connection may close
 // theirs at any time.
 //
-// Over TCP its receive buffer is small until it is trusted: the first window that the system offers
-// holds a first call, and what is behind it comes a little at a time, at the other system's pace.
+// Over TCP its receive buffer is small until it is trusted: what a stranger sends waits in its own
+// system. Sizes are as SO_RCVBUF has them; the system doubles them.
 class SocketWire : public Wire {
  public:
-  static constexpr int kNarrowBytes = 12 << 10;  // as SO_RCVBUF has it: the system doubles it
+  // While nobody reads: a listening socket hands it to its connections.
+  static constexpr int kUnreadBytes = 32 << 10;
+  // When somebody does: less than half of the window that was offered first, so that a sender's system
+  // waits for the next one, 200 ms, before it sends a little.
+  static constexpr int kReadBytes = 6 << 10;
+  // What Linux begins with, and adjusts.
+  static constexpr int kTrustedBytes = 64 << 10;
 
   SocketWire(Descriptor descriptor, bool tcp);
+  // From now on somebody reads what comes on `descriptor`, a connection over TCP.
+  static void Narrow(int descriptor);
   int descriptor() const { return descriptor_.get(); }
   uint64_t BytesReceived() override;
   void Cut() override;
@@ -68,7 +76,7 @@ class SocketWire : public Wire {
 
  private:
   const Descriptor descriptor_;
-  int wide_bytes_ = 0;  // what the buffer was; 0: it is as it was
+  const bool tcp_;
 };
 
 // Who made the connected unix socket, by the kernel's word.
