@@ -57,14 +57,16 @@ uint16_t PortOf(const SocketName& name) {
 
 }  // namespace
 
-absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Listen(const Address& address) {
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Listen(const Address& address,
+                                                                     int type) {
   if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
-  return address.unix_socket ? ListenUnix(address) : ListenTcp(address);
+  return address.unix_socket ? ListenUnix(address, type) : ListenTcp(address);
 }
 
-absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const Address& address) {
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const Address& address,
+                                                                         int type) {
   ListeningSocket made;
-  made.descriptor_.Reset(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  made.descriptor_.Reset(socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!made.descriptor_.ok()) return Failed(errno, address);
   auto* name = reinterpret_cast<sockaddr_un*>(&made.name_.address);
   name->sun_family = AF_UNIX;

@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
-#include "daemon/listen/descriptor.h"
+#include "daemon/address/descriptor.h"
 #include "daemon/listen/guard.h"
 #include "daemon/listen/peer.h"
 
@@ -28,8 +28,9 @@ class ListeningSocket {
  public:
   // One for each number that the address' host has (one is enough; all have the same port), or the
   // one unix socket, mode 0660 from before anybody can connect. AlreadyExists if somebody listens
-  // there.
-  static absl::StatusOr<std::vector<ListeningSocket>> Listen(const Address& address);
+  // there. `type`: a unix socket's, SOCK_STREAM or SOCK_SEQPACKET.
+  static absl::StatusOr<std::vector<ListeningSocket>> Listen(const Address& address,
+                                                             int type = SOCK_STREAM);
 
   ListeningSocket(ListeningSocket&&) = default;
   ListeningSocket& operator=(ListeningSocket&&) = delete;
@@ -41,7 +42,7 @@ class ListeningSocket {
 
  private:
   ListeningSocket() = default;
-  static absl::StatusOr<std::vector<ListeningSocket>> ListenUnix(const Address& address);
+  static absl::StatusOr<std::vector<ListeningSocket>> ListenUnix(const Address& address, int type);
   static absl::StatusOr<std::vector<ListeningSocket>> ListenTcp(const Address& address);
 
   Descriptor descriptor_;

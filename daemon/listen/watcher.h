@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
-#include "daemon/listen/descriptor.h"
+#include "daemon/address/descriptor.h"
 #include "daemon/listen/guard.h"
 #include "daemon/listen/peer.h"
 #include "display/sync/clock.h"

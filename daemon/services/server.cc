@@ -97,7 +97,7 @@ class Server::Impl {
     if (absl::Status status = Build(); !status.ok()) return status;
     auto listener = listen::Listener::Start(
         std::move(sockets), guard_, *counters_, own_, context_.clock,
-        [this](int listening, listen::Descriptor connection) {
+        [this](int listening, Descriptor connection) {
           grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
           parameters.listener_fd = listening;
           parameters.fd = connection.Release();
