@@ -28,7 +28,7 @@ class ReachTest : public ::testing::Test {
     any.sin_family = AF_INET;
     listening_.Reset(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
     EXPECT_EQ(bind(listening_.get(), reinterpret_cast<sockaddr*>(&any), sizeof(any)), 0);
-    EXPECT_EQ(listen(listening_.get(), 8), 0);
+    EXPECT_EQ(::listen(listening_.get(), 8), 0);
     target_.text = "it";
     EXPECT_EQ(getsockname(listening_.get(), target_.name.get(), &target_.name.length), 0);
   }
