@@ -321,6 +321,7 @@ void Guard::Punish(const Connection& connection) {
 void Guard::Cut(const std::vector<Doomed>& doomed) {
   for (const Doomed& one : doomed) {
     one.wire->Cut();
+    one.wire->Arm();  // its end is told of, whether or not its bytes were taken meanwhile
     gate_.Log(Logger::Level::kWarn, "connection cut", one.name, one.why);
   }
 }

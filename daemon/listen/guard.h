@@ -52,8 +52,8 @@ class Wire {
   virtual uint64_t BytesReceived() = 0;
   virtual void Cut() = 0;    // at once, in both directions; what was received is thrown away
   virtual void Trust() = 0;  // as much may come at once as with any other socket
-  // Guard::OnBytes is called once, when there are bytes to read; again only after the next Arm. Until
-  // the first it is called whenever some come.
+  // Guard::OnBytes is called once, when there are bytes to read, or Leave, when it has ended; again only
+  // after the next Arm. Until the first one that is so whenever some come.
   virtual void Arm() = 0;
 };
 

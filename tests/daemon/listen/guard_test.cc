@@ -89,6 +89,7 @@ TEST_F(GuardTest, CutsAtTheFirstByteBeyondTheLimitAndOnce) {
   guard_.OnMessage(Tcp(1).name);
   EXPECT_EQ(line_.cuts, 1);
   EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
+  EXPECT_EQ(line_.armed, 1) << "its end is to be told of";
   EXPECT_FALSE(line_.gone) << "until it is known to be closed";
   guard_.Leave(id);
   EXPECT_TRUE(line_.gone);
