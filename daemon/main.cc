@@ -204,6 +204,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                .connection_age_limit_ns = config.server.connection_age_limit_ns,
                                .connection_age_grace_ns = config.server.connection_age_grace_ns,
                                .max_scene_watches = config.server.max_scene_watches,
+                               .max_stats_watches = config.server.max_stats_watches,
                                .keepalive_interval_ns = config.server.keepalive_interval_ns,
                                .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
                                .local = local,

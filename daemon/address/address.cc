@@ -1,6 +1,5 @@
 #include "daemon/address/address.h"
 
-#include <netdb.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -11,11 +10,11 @@
 #include <charconv>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/address/descriptor.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -31,20 +30,6 @@ absl::Status Wrong(std::string_view text, absl::string_view why) {
                    "; give HOST:PORT or unix:PATH, such as "
                    "127.0.0.1:50551 or unix:/run/voxeld/voxeld.sock"));
 }
-
-class Socket {
- public:
-  explicit Socket(int fd) : fd_(fd) {}
-  ~Socket() {
-    if (fd_ >= 0) close(fd_);
-  }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  int get() const { return fd_; }
-
- private:
-  const int fd_;
-};
 
 absl::StatusOr<Address> ParseUnix(std::string_view text) {
   Address address;
@@ -88,7 +73,7 @@ absl::Status PrepareUnix(const Address& address) {
     return absl::AlreadyExistsError(absl::StrCat(
         address.path, " is there and is no socket; move it away, or listen elsewhere"));
   }
-  const Socket probe(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const Descriptor probe(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   sockaddr_un name = {};
   name.sun_family = AF_UNIX;
   std::memcpy(name.sun_path, address.path.data(), address.path.size());
@@ -107,37 +92,6 @@ absl::Status PrepareUnix(const Address& address) {
         errno, absl::StrCat("the left-over socket ", address.path, " cannot be removed"));
   }
   return absl::OkStatus();
-}
-
-absl::Status PrepareTcp(const Address& address) {
-  addrinfo hints = {};
-  hints.ai_family = AF_UNSPEC;
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  const int code =
-      getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
-  if (code != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the host of ", address.ToString(), " is not known: ", gai_strerror(code)));
-  }
-  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> list(found, freeaddrinfo);
-  int first_error = 0;
-  for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
-    const Socket probe(socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol));
-    if (probe.get() < 0) continue;  // no IPv6 here, say
-    const int on = 1;
-    setsockopt(probe.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-    if (bind(probe.get(), at->ai_addr, at->ai_addrlen) == 0) return absl::OkStatus();
-    if (first_error == 0 || errno == EADDRINUSE) first_error = errno;
-    if (errno == EADDRINUSE) break;
-  }
-  if (first_error == EADDRINUSE) {
-    return absl::AlreadyExistsError(
-        absl::StrCat("somebody listens on ", address.ToString(), " already"));
-  }
-  return absl::ErrnoToStatus(first_error == 0 ? EADDRNOTAVAIL : first_error,
-                             absl::StrCat(address.ToString(), " cannot be listened on"));
 }
 
 }  // namespace
@@ -173,7 +127,7 @@ absl::StatusOr<Address> ParseAddress(std::string_view text) {
 }
 
 absl::Status PrepareToListen(const Address& address) {
-  return address.unix_socket ? PrepareUnix(address) : PrepareTcp(address);
+  return address.unix_socket ? PrepareUnix(address) : absl::OkStatus();
 }
 
 }  // namespace voxeld::daemon

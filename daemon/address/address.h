@@ -23,10 +23,10 @@ struct Address {
 // InvalidArgument says what would be right.
 absl::StatusOr<Address> ParseAddress(std::string_view text);
 
-// Makes sure that `address` can be listened on: for a unix socket makes its folder (mode 0700 if it
-// is new) and removes a socket that nobody listens on any more; never anything that is not a
-// socket. AlreadyExists if somebody listens there; other errors as the system has them. What it
-// finds may change afterwards.
+// Makes room for a unix socket that is to be listened on: makes its folder (mode 0700 if it is new)
+// and removes a socket that nobody listens on any more; never anything that is not a socket.
+// AlreadyExists if somebody listens there; other errors as the system has them. What it finds may
+// change afterwards. TCP needs none of this.
 absl::Status PrepareToListen(const Address& address);
 
 }  // namespace voxeld::daemon

@@ -37,7 +37,7 @@ struct ServerConfig {
   listen::ConnectionLimits connections;
   uint32_t max_calls_per_connection = 100;  // at once; further ones wait in the client
   uint32_t max_metadata_bytes = 8u << 10;   // of one call
-  // From accept until HTTP/2's settings have come.
+  // From when a call has begun until gRPC has HTTP/2's settings.
   int64_t handshake_limit_ns = 2 * sync::kSecond;
   // A client that pings more often without data, so many times, is sent away.
   int64_t ping_interval_min_ns = 5 * sync::kSecond;
@@ -48,6 +48,7 @@ struct ServerConfig {
   int64_t connection_age_limit_ns = 0;
   int64_t connection_age_grace_ns = 60 * sync::kSecond;
   uint32_t max_scene_watches = 64;            // WatchScene calls at once, of all connections
+  uint32_t max_stats_watches = 64;            // WatchStats calls
   int64_t open_limit_ns = 5 * sync::kSecond;  // how long a new stream waits for its Open
   // How long a stream that its client has half-closed waits for outcomes, and an ending one for its
   // client to read what is queued.

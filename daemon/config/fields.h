@@ -37,6 +37,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_queued_bytes", config.server.max_queued_bytes, 4096, kGiB);
   visitor.Integer("max_calls_per_connection", config.server.max_calls_per_connection, 1, 65536);
   visitor.Integer("max_scene_watches", config.server.max_scene_watches, 1, 65536);
+  visitor.Integer("max_stats_watches", config.server.max_stats_watches, 1, 65536);
   auto& connections = config.server.connections;
   visitor.Integer("max_connections", connections.max_connections, 1, 1 << 20);
   visitor.Integer("max_connections_per_address", connections.max_connections_per_address, 1,
@@ -45,6 +46,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("unauthorised_limit_ns", connections.unauthorised_limit_ns, kSecond / 10, kHour);
   visitor.Integer("max_cancelled_calls_per_second", connections.max_cancelled_calls_per_second, 0,
                   kMost32);
+  visitor.Integer("cut_penalty_ns", connections.cut_penalty_ns, 0, kHour);
   visitor.Integer("probe_interval_ns", connections.probe_interval_ns, 0, kHour);
   visitor.Integer("max_metadata_bytes", config.server.max_metadata_bytes, 1024, 1 << 20);
   visitor.Integer("handshake_limit_ns", config.server.handshake_limit_ns, kSecond / 10, kHour);

@@ -55,8 +55,11 @@ struct ListenFigures {
   uint64_t open = 0, accepted = 0;
   // Closed at once: max_connections, max_connections_per_address.
   uint64_t refused_in_all = 0, refused_by_address = 0;
-  // By the guard: too many bytes, too long, before a call was answered; too many calls cancelled.
+  uint64_t refused_after_cut = 0;  // one of the address was cut shortly before
+  // By the guard: too many bytes, too long, before a call was answered; too many calls cancelled; no
+  // beginning of a call; bytes without end that no call or message came of.
   uint64_t cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
+  uint64_t cut_for_greeting = 0, cut_for_flooding = 0;
   uint64_t accept_failures = 0;  // out of descriptors, say; tried again until it works
   uint64_t probe_failures = 0;   // of connections to itself
   std::string unreachable;       // empty: they work; else why they do not

@@ -207,6 +207,10 @@ class Server::Impl {
     }
     if (!error) acceptor_.bind(*endpoint, error);
     if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+    if (error == asio::error::address_in_use) {
+      return absl::AlreadyExistsError(
+          absl::StrCat("somebody listens on ", options_.listen.ToString(), " already"));
+    }
     if (error) {
       return absl::ErrnoToStatus(
           error.value(), absl::StrCat(options_.listen.ToString(), " cannot be listened on"));

@@ -17,8 +17,9 @@ class Counters {
   using Count = std::atomic<uint64_t>;
   Count open = 0;
   Count accepted = 0;
-  Count refused_in_all = 0, refused_by_address = 0;
+  Count refused_in_all = 0, refused_by_address = 0, refused_after_cut = 0;
   Count cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
+  Count cut_for_greeting = 0, cut_for_flooding = 0;
   Count accept_failures = 0;
   Count probe_failures = 0;
 
@@ -33,9 +34,12 @@ class Counters {
                       .accepted = accepted,
                       .refused_in_all = refused_in_all,
                       .refused_by_address = refused_by_address,
+                      .refused_after_cut = refused_after_cut,
                       .cut_for_bytes = cut_for_bytes,
                       .cut_for_time = cut_for_time,
                       .cut_for_cancelling = cut_for_cancelling,
+                      .cut_for_greeting = cut_for_greeting,
+                      .cut_for_flooding = cut_for_flooding,
                       .accept_failures = accept_failures,
                       .probe_failures = probe_failures};
     sync::MutexLock lock(mutex_);

@@ -1,18 +1,34 @@
 #include "daemon/listen/guard.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
 namespace voxeld::daemon::listen {
+namespace {
+
+// Sixteenths of a limit that are left of it when a connection is cut. Of the bytes as many as may come
+// at once while the receive buffer is small, and still more than a first call has.
+constexpr int kTimeLeft = 1, kBytesLeft = 3;
+
+}  // namespace
 
 absl::Status Guard::MayEnter(const Peer& peer) {
   absl::Status status;
   {
     sync::MutexLock lock(mutex_);
+    const sync::TimeNs now = clock_.Now();
     const auto at = by_address_.find(peer.address);
     const uint32_t of_address = at == by_address_.end() ? 0 : at->second;
-    if (of_address >= limits_.max_connections_per_address) {
+    const auto penalty = penalties_.find(peer.address);
+    if (penalty != penalties_.end() && now < penalty->second.until) {
+      ++counters_.refused_after_cut;
+      status = absl::ResourceExhaustedError(absl::StrCat(
+          "a connection from ", peer.address, " was cut; further ones are refused for ",
+          (penalty->second.until - now) / sync::kMillisecond,
+          " ms, which cut_penalty_ns and the times before come to"));
+    } else if (of_address >= limits_.max_connections_per_address) {
       ++counters_.refused_by_address;
       status = absl::ResourceExhaustedError(
           absl::StrCat(of_address, " connections from ", peer.address,
@@ -39,7 +55,7 @@ ConnectionId Guard::Enter(const Peer& peer, bool own, std::unique_ptr<Wire> wire
   connection.own = own;
   connection.unix_socket = peer.unix_socket;
   connection.wire = std::move(wire);
-  connection.since = clock_.Now();
+  connection.entered = connection.since = clock_.Now();
   if (!own) {
     ++by_address_[peer.address];
     ++counted_;
@@ -55,64 +71,120 @@ ConnectionId Guard::Enter(const Peer& peer, bool own, std::unique_ptr<Wire> wire
   return id;
 }
 
-void Guard::Leave(ConnectionId id) {
-  std::unique_ptr<Wire> wire;  // closed without the lock
-  sync::MutexLock lock(mutex_);
-  const auto it = connections_.find(id);
-  if (it == connections_.end()) return;
-  Connection& connection = it->second;
-  wire = std::move(connection.wire);
-  watched_.erase(id);
-  authorised_.erase(id);
-  if (const auto named = by_name_.find(connection.name);
-      named != by_name_.end() && named->second == id) {
-    by_name_.erase(named);
+void Guard::OnWrongGreeting(ConnectionId id, const std::string& why) {
+  std::vector<Doomed> doomed;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto it = watched_.find(id);
+    if (it == watched_.end()) return;
+    Doom(*it->second, counters_.cut_for_greeting, why, true, doomed);
   }
-  if (!connection.own) {
-    --counted_;
-    --counters_.open;
-    const auto at = by_address_.find(connection.address);
-    if (--at->second == 0) by_address_.erase(at);
-  }
-  connections_.erase(it);
+  Cut(doomed);
 }
 
-bool Guard::OnBytes(ConnectionId id) {
-  sync::MutexLock lock(mutex_);
-  const auto it = watched_.find(id);
-  if (it == watched_.end()) return false;
-  return !BytesAreMany(*it->second);
+void Guard::Leave(ConnectionId id) {
+  std::vector<Doomed> doomed;
+  std::shared_ptr<Wire> wire;  // closed without the lock
+  {
+    sync::MutexLock lock(mutex_);
+    const auto it = connections_.find(id);
+    if (it == connections_.end()) return;
+    Connection& connection = it->second;
+    // Whoever ends it first is not spared, and what gRPC has not read yet it need not.
+    if (connection.watched) BytesAreMany(connection, true, doomed);
+    wire = std::move(connection.wire);
+    watched_.erase(id);
+    busy_.erase(id);
+    if (const auto named = by_name_.find(connection.name);
+        named != by_name_.end() && named->second == id) {
+      by_name_.erase(named);
+    }
+    if (!connection.own) {
+      --counted_;
+      --counters_.open;
+      const auto at = by_address_.find(connection.address);
+      if (--at->second == 0) by_address_.erase(at);
+    }
+    connections_.erase(it);
+  }
+  Cut(doomed);
+}
+
+void Guard::OnBytes(ConnectionId id) {
+  std::vector<Doomed> doomed;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto it = connections_.find(id);
+    if (it == connections_.end() || it->second.unix_socket || it->second.cut) return;
+    if (it->second.watched && BytesAreMany(it->second, false, doomed)) {
+      // it is no more
+    } else {
+      MarkBusy(it->second);
+    }
+  }
+  Cut(doomed);
 }
 
 sync::TimeNs Guard::Look() {
-  sync::MutexLock lock(mutex_);
-  const sync::TimeNs now = clock_.Now();
-  for (auto it = watched_.begin(); it != watched_.end();) {
-    Connection& connection = *(it++)->second;  // a cut takes it out
-    if (BytesAreMany(connection)) continue;
-    if (connection.waiting > 0 || now - connection.since < limits_.unauthorised_limit_ns) continue;
-    Cut(connection, counters_.cut_for_time,
-        absl::StrCat("it has been open for ", limits_.unauthorised_limit_ns / sync::kMillisecond,
-                     " ms, which is unauthorised_limit_ns, and no call of it has been answered"));
+  std::vector<Doomed> doomed;
+  sync::TimeNs next = sync::kNever;
+  {
+    sync::MutexLock lock(mutex_);
+    const sync::TimeNs now = clock_.Now();
+    const sync::TimeNs most = limits_.unauthorised_limit_ns / 16 * (16 - kTimeLeft);
+    for (auto it = watched_.begin(); it != watched_.end();) {
+      Connection& connection = *(it++)->second;  // a cut takes it out
+      if (BytesAreMany(connection, false, doomed)) continue;
+      if (connection.waiting > 0 || now - connection.since < most) continue;
+      Doom(connection, counters_.cut_for_time,
+           absl::StrCat("it has been open for ", (now - connection.since) / sync::kMillisecond,
+                        " ms, unauthorised_limit_ns is ",
+                        limits_.unauthorised_limit_ns / sync::kMillisecond,
+                        " ms, and no call of it that authorises has been answered"),
+           false, doomed);
+    }
+    if (!watched_.empty()) next = now + kLookInterval;
   }
-  return watched_.empty() ? sync::kNever : now + kLookInterval;
+  Cut(doomed);
+  return next;
 }
 
 void Guard::OnMessage(const std::string& peer) {
-  sync::MutexLock lock(mutex_);
-  Connection* connection = Find(peer);
-  if (connection == nullptr || !connection->watched) return;
-  ++connection->waiting;
-  BytesAreMany(*connection);
+  std::vector<Doomed> doomed;
+  {
+    sync::MutexLock lock(mutex_);
+    Connection* connection = Find(peer);
+    if (connection == nullptr || !connection->watched) return;
+    ++connection->waiting;
+    BytesAreMany(*connection, false, doomed);
+  }
+  Cut(doomed);
 }
 
-void Guard::OnAuthorised(const std::string& peer) {
-  sync::MutexLock lock(mutex_);
-  Connection* connection = Find(peer);
-  if (connection == nullptr || !connection->watched || BytesAreMany(*connection)) return;
-  connection->watched = false;
-  watched_.erase(connection->id);
-  authorised_.emplace(connection->id, connection);
+void Guard::OnAnswer(const std::string& peer, bool authorises) {
+  std::vector<Doomed> doomed;
+  std::shared_ptr<Wire> trusted;
+  bool armed = false;
+  {
+    sync::MutexLock lock(mutex_);
+    Connection* connection = Find(peer);
+    if (connection == nullptr || !connection->watched) return;
+    if (!BytesAreMany(*connection, false, doomed)) {
+      if (authorises) {
+        connection->watched = false;
+        watched_.erase(connection->id);
+        trusted = connection->wire;
+        armed = on_busy_ != nullptr;
+      } else {
+        connection->since = clock_.Now();
+        connection->base = connection->wire->BytesReceived();
+        connection->many_since = sync::kNever;
+      }
+    }
+  }
+  Cut(doomed);
+  if (trusted != nullptr) trusted->Trust();
+  if (armed) trusted->Arm();
 }
 
 void Guard::OnCallEnd(const std::string& peer) {
@@ -122,30 +194,68 @@ void Guard::OnCallEnd(const std::string& peer) {
   if (--connection->waiting == 0) connection->since = clock_.Now();
 }
 
-std::vector<std::string> Guard::Busy() {
-  std::vector<std::string> out;
+void Guard::SetOnBusy(std::function<void()> on_busy) {
   sync::MutexLock lock(mutex_);
-  for (const auto& [id, connection] : authorised_) {
-    const uint64_t bytes = connection->wire->BytesReceived();
-    if (std::exchange(connection->bytes, bytes) != bytes) out.push_back(connection->name);
+  on_busy_ = std::move(on_busy);
+}
+
+std::vector<Guard::Busy> Guard::TakeBusy() {
+  std::vector<std::pair<Busy, std::shared_ptr<Wire>>> taken;
+  {
+    sync::MutexLock lock(mutex_);
+    for (const ConnectionId id : busy_) {
+      const Connection& connection = connections_.at(id);
+      // What is still watched tells of every byte anyway.
+      taken.push_back({{connection.name, 0}, connection.wire});
+      if (!connection.watched) continue;
+      taken.back().first.bytes = connection.wire->BytesReceived();
+      taken.back().second = nullptr;
+    }
+    busy_.clear();
+  }
+  std::vector<Busy> out;
+  out.reserve(taken.size());
+  for (auto& [busy, wire] : taken) {
+    if (wire != nullptr) {
+      wire->Arm();  // before the bytes are asked for: later ones are told of
+      busy.bytes = wire->BytesReceived();
+    }
+    out.push_back(std::move(busy));
   }
   return out;
 }
 
-void Guard::OnCancelled(const std::string& peer, uint64_t in_all) {
-  sync::MutexLock lock(mutex_);
-  Connection* connection = Find(peer);
-  if (connection == nullptr || limits_.max_cancelled_calls_per_second == 0) return;
-  const sync::TimeNs now = clock_.Now();
-  if (in_all > connection->cancelled_before + limits_.max_cancelled_calls_per_second) {
-    Cut(*connection, counters_.cut_for_cancelling,
-        absl::StrCat(in_all - connection->cancelled_before,
-                     " calls were cancelled within a second, and ",
-                     limits_.max_cancelled_calls_per_second, " is max_cancelled_calls_per_second"));
-  } else if (now - connection->cancelled_since >= sync::kSecond) {
-    connection->cancelled_since = now;
-    connection->cancelled_before = in_all;
+void Guard::OnFigures(const Busy& busy, const CallFigures& figures) {
+  std::vector<Doomed> doomed;
+  {
+    sync::MutexLock lock(mutex_);
+    Connection* connection = Find(busy.peer);
+    if (connection == nullptr || connection->cut) return;
+    const sync::TimeNs now = clock_.Now();
+    const uint32_t most_cancelled = limits_.max_cancelled_calls_per_second;
+    if (most_cancelled != 0 && figures.cancelled > connection->cancelled_before + most_cancelled) {
+      Doom(*connection, counters_.cut_for_cancelling,
+           absl::StrCat(figures.cancelled - connection->cancelled_before,
+                        " calls were cancelled within a second, and ", most_cancelled,
+                        " is max_cancelled_calls_per_second"),
+           true, doomed);
+    } else if (now - connection->cancelled_since >= sync::kSecond) {
+      connection->cancelled_since = now;
+      connection->cancelled_before = figures.cancelled;
+    }
+    const uint64_t most_bytes = limits_.max_message_bytes + limits_.lookahead_bytes * figures.open;
+    if (figures.progress != connection->progress || busy.bytes < connection->progress_bytes) {
+      connection->progress = figures.progress;
+      connection->progress_bytes = busy.bytes;
+    } else if (!connection->cut && busy.bytes - connection->progress_bytes > most_bytes) {
+      Doom(*connection, counters_.cut_for_flooding,
+           absl::StrCat(busy.bytes - connection->progress_bytes,
+                        " bytes came of which neither a call nor a message came; ", most_bytes,
+                        " is the most that ", figures.open, " calls can have under way"),
+           true, doomed);
+    }
   }
+  Cut(doomed);
 }
 
 Guard::Connection* Guard::Find(const std::string& peer) {
@@ -153,26 +263,67 @@ Guard::Connection* Guard::Find(const std::string& peer) {
   return named == by_name_.end() ? nullptr : &connections_.at(named->second);
 }
 
-bool Guard::BytesAreMany(Connection& connection) {
+bool Guard::BytesAreMany(Connection& connection, bool ended, std::vector<Doomed>& doomed) {
   if (connection.cut) return true;
-  const uint64_t bytes = connection.wire->BytesReceived();
-  if (bytes <= limits_.unauthorised_bytes) return false;
-  Cut(connection, counters_.cut_for_bytes,
-      absl::StrCat(bytes, " bytes came before a call was answered, and ",
-                   limits_.unauthorised_bytes,
-                   " is unauthorised_bytes; a client's first call is at most 48 KiB in all, and on "
-                   "a stream it sends nothing but Open before Opened"));
+  const uint64_t bytes = connection.wire->BytesReceived() - connection.base;
+  const uint64_t most = limits_.unauthorised_bytes;
+  if (bytes <= most / 16 * (16 - kBytesLeft)) return false;
+  const sync::TimeNs now = clock_.Now();
+  if (connection.many_since == sync::kNever) connection.many_since = now;
+  if (bytes <= most && (ended || now - connection.many_since < kGrace)) return false;
+  Doom(connection, counters_.cut_for_bytes,
+       absl::StrCat(bytes, " bytes came before a call was answered, and ", most,
+                    " is unauthorised_bytes; a client's first call is at most ",
+                    most_first_message() >> 10,
+                    " KiB in all, and on a stream it sends nothing but Open before Opened"),
+       true, doomed);
   return true;
 }
 
-void Guard::Cut(Connection& connection, Counters::Count& counter, const std::string& why) {
+void Guard::MarkBusy(const Connection& connection) {
+  if (on_busy_ == nullptr) return;
+  const bool first = busy_.empty();
+  busy_.insert(connection.id);
+  if (first) on_busy_();
+}
+
+void Guard::Doom(Connection& connection, Counters::Count& counter, std::string why, bool punished,
+                 std::vector<Doomed>& doomed) {
   if (std::exchange(connection.cut, true)) return;
   ++counter;
-  connection.wire->Cut();
   connection.watched = false;
   watched_.erase(connection.id);
-  authorised_.erase(connection.id);
-  gate_.Log(Logger::Level::kWarn, "connection cut", connection.name, why);
+  busy_.erase(connection.id);
+  if (punished) Punish(connection);
+  doomed.push_back({connection.wire, connection.name, std::move(why)});
+}
+
+void Guard::Punish(const Connection& connection) {
+  if (connection.own || connection.unix_socket || limits_.cut_penalty_ns == 0) return;
+  const sync::TimeNs now = clock_.Now();
+  const auto found = penalties_.find(connection.address);
+  sync::TimeNs length = limits_.cut_penalty_ns;
+  if (found != penalties_.end()) {
+    const Penalty& last = found->second;
+    if (now < last.until) return;  // it was there before; what came with it is cut with it
+    // Good for as long as it was refused: forgotten.
+    if (connection.entered >= last.until && now < last.until + last.length) {
+      length = std::min(2 * last.length, kLongestPenalty * limits_.cut_penalty_ns);
+    }
+  } else if (penalties_.size() >= kMostPenalties) {
+    penalties_.erase(std::min_element(
+        penalties_.begin(), penalties_.end(),
+        [](const auto& a, const auto& b) { return a.second.until < b.second.until; }));
+  }
+  penalties_[connection.address] = {length, now + length};
+}
+
+void Guard::Cut(const std::vector<Doomed>& doomed) {
+  for (const Doomed& one : doomed) {
+    one.wire->Cut();
+    one.wire->Arm();  // its end is told of, whether or not its bytes were taken meanwhile
+    gate_.Log(Logger::Level::kWarn, "connection cut", one.name, one.why);
+  }
 }
 
 }  // namespace voxeld::daemon::listen

@@ -5,22 +5,26 @@
 #include <netinet/tcp.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <map>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/listen/greeting.h"
 #include "daemon/listen/watcher.h"
 
 namespace voxeld::daemon::listen {
 namespace {
 
-constexpr uint64_t kWake = 0;  // epoll's word; listening sockets have those from 1 on
+// epoll's words: listening sockets have those from 1 on, connections those from kConnections on.
+constexpr uint64_t kWake = 0, kConnections = uint64_t{1} << 32;
 constexpr int kEvents = 64;
 constexpr int kAcceptsAtOnce = 64;  // of one address, before others have their turn
 
@@ -72,9 +76,11 @@ class Listener::Impl {
     absl::StatusOr<std::unique_ptr<Watcher>> watcher = Watcher::Start(guard_, clock_);
     if (!watcher.ok()) return watcher.status();
     watcher_ = *std::move(watcher);
+    Reserve();
     epoll_.Reset(epoll_create1(EPOLL_CLOEXEC));
     wake_.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!epoll_.ok() || !wake_.ok()) return absl::ErrnoToStatus(errno, "the listener");
+    if (!epoll_.ok() || !wake_.ok() || !reserve_.ok())
+      return absl::ErrnoToStatus(errno, "the listener");
     Watch(wake_.get(), EPOLLIN, kWake);
     for (size_t i = 0; i < sockets_.size(); ++i) Watch(sockets_[i].descriptor(), EPOLLIN, 1 + i);
     thread_ = std::thread([this] { Run(); });
@@ -113,7 +119,10 @@ class Listener::Impl {
     for (;;) {
       {
         sync::MutexLock lock(mutex_);
-        if (stop_ || deaf_) sockets_.clear();
+        if (stop_ || deaf_) {
+          sockets_.clear();
+          while (!strangers_.empty()) Drop(strangers_.begin());
+        }
         if (sockets_.empty() && !std::exchange(sockets_closed_, true)) closed_.NotifyAll();
         if (stop_) return;
       }
@@ -136,11 +145,31 @@ class Listener::Impl {
       [[maybe_unused]] const ssize_t n = read(wake_.get(), &count, sizeof(count));
       return;
     }
-    if (word - 1 < sockets_.size()) Accept(sockets_[word - 1]);
+    if (word < kConnections) {
+      if (word - 1 < sockets_.size()) Accept(sockets_[word - 1]);
+      return;
+    }
+    const auto stranger = strangers_.find(word - kConnections);
+    if (stranger == strangers_.end()) return;
+    if ((event.events & EPOLLHUP) != 0) return Drop(stranger);
+    Greet(stranger, (event.events & EPOLLRDHUP) != 0);
+  }
+
+  // So that a connection whose second descriptor cannot be had is the last one, and not lost.
+  bool Reserve() {
+    rlimit limit = {};
+    // A number beyond the limit, which was lowered meanwhile, gives nobody a place.
+    if (reserve_.ok() && getrlimit(RLIMIT_NOFILE, &limit) == 0 &&
+        static_cast<rlim_t>(reserve_.get()) >= limit.rlim_cur) {
+      reserve_.Reset(-1);
+    }
+    if (!reserve_.ok()) reserve_.Reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+    return reserve_.ok();
   }
 
   void Accept(const ListeningSocket& socket) {
     for (int i = 0; i < kAcceptsAtOnce; ++i) {
+      if (!Reserve()) return Pause(std::strerror(errno));
       SocketName name;
       Descriptor connection(
           accept4(socket.descriptor(), name.get(), &name.length, SOCK_NONBLOCK | SOCK_CLOEXEC));
@@ -151,6 +180,13 @@ class Listener::Impl {
       }
       if (!Take(socket, name, std::move(connection))) return;
     }
+  }
+
+  Descriptor Second(int descriptor) {
+    Descriptor out(fcntl(descriptor, F_DUPFD_CLOEXEC, 0));
+    if (out.ok() || (errno != EMFILE && errno != ENFILE)) return out;
+    reserve_.Reset(-1);
+    return Descriptor(fcntl(descriptor, F_DUPFD_CLOEXEC, 0));
   }
 
   // False: the listener pauses.
@@ -165,23 +201,89 @@ class Listener::Impl {
         gate_.Log(Logger::Level::kInfo, "local connection", peer.name,
                   absl::StrCat("user ", who->user, ", process ", who->process));
       }
-    } else {
+    }
+    if (!own && !guard_.MayEnter(peer).ok()) return true;
+    if (!peer.unix_socket) {
       const int on = 1;
       setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
       const auto limit = static_cast<unsigned>(options_.send_limit_ns / sync::kMillisecond);
       setsockopt(connection.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &limit, sizeof(limit));
     }
-    if (!own && !guard_.MayEnter(peer).ok()) return true;
-
-    Descriptor second(fcntl(connection.get(), F_DUPFD_CLOEXEC, 0));
-    absl::Status added = absl::ErrnoToStatus(errno, "a second descriptor");
-    if (second.ok()) added = watcher_->Add(peer, own, std::move(second));
-    if (!added.ok()) {  // unguarded it would be worse than refused
-      Pause(std::string(added.message()));
+    Descriptor second = Second(connection.get());
+    if (!second.ok()) {
+      Pause(std::strerror(errno));
       return false;
     }
-    serve_(socket.descriptor(), std::move(connection));
+    const absl::StatusOr<ConnectionId> id = watcher_->Add(peer, own, std::move(second));
+    if (!id.ok()) {  // unguarded it would be worse than refused
+      Pause(std::string(id.status().message()));
+      return false;
+    }
+    if (peer.unix_socket) {
+      serve_(socket.descriptor(), std::move(connection));
+      return true;
+    }
+    const int descriptor = connection.get();
+    const auto stranger = strangers_
+                              .try_emplace(*id, socket.descriptor(), std::move(connection),
+                                           guard_.most_first_message())
+                              .first;
+    // What has come already is an edge as well.
+    if (!Watch(descriptor, EPOLLIN | EPOLLRDHUP | EPOLLET, kConnections + *id)) Drop(stranger);
     return true;
+  }
+
+  // A connection over TCP of which no call has begun.
+  struct Stranger {
+    Stranger(int listening, Descriptor connection, uint64_t most_message)
+        : listening(listening), connection(std::move(connection)), greeting(most_message) {}
+    int listening;
+    Descriptor connection;
+    Greeting greeting;
+    bool answered = false;  // with the daemon's SETTINGS
+  };
+  using Strangers = std::map<ConnectionId, Stranger>;
+
+  // Something came. `over`: nothing more will. What was read stays, for whoever serves it.
+  void Greet(Strangers::iterator at, bool over) {
+    Stranger& stranger = at->second;
+    const int descriptor = stranger.connection.get();
+    int bytes = 0;
+    Greeting::Verdict verdict = Greeting::Verdict::kMore;
+    if (ioctl(descriptor, FIONREAD, &bytes) == 0 &&
+        static_cast<size_t>(bytes) >= stranger.greeting.needed()) {
+      std::array<char, Greeting::kMostBytes> buffer;
+      const ssize_t n = recv(descriptor, buffer.data(), buffer.size(), MSG_PEEK | MSG_DONTWAIT);
+      if (n > 0) verdict = stranger.greeting.Read({buffer.data(), static_cast<size_t>(n)});
+    }
+    switch (verdict) {
+      case Greeting::Verdict::kWrong:
+        guard_.OnWrongGreeting(at->first, stranger.greeting.why());
+        return Drop(at);
+      case Greeting::Verdict::kMore:
+        if (over) return Drop(at);
+        if (stranger.greeting.speaks_http2() && !std::exchange(stranger.answered, true)) {
+          const std::string_view settings = Greeting::kServerSettings;
+          send(descriptor, settings.data(), settings.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        }
+        return;
+      case Greeting::Verdict::kCall:
+        break;
+    }
+    epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, descriptor, nullptr);
+    SocketWire::Narrow(descriptor);
+    const int listening = stranger.listening;
+    Descriptor connection = std::move(stranger.connection);
+    strangers_.erase(at);
+    serve_(listening, std::move(connection));
+  }
+
+  // The guard's descriptor is closed when the watcher sees the end.
+  void Drop(Strangers::iterator at) {
+    const int descriptor = at->second.connection.get();
+    epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, descriptor, nullptr);
+    shutdown(descriptor, SHUT_RDWR);
+    strangers_.erase(at);
   }
 
   void Pause(const std::string& why) {
@@ -230,6 +332,8 @@ class Listener::Impl {
 
   // The thread's own.
   std::vector<ListeningSocket> sockets_;
+  Strangers strangers_;
+  Descriptor reserve_;
   sync::TimeNs retry_ = sync::kNever;
   bool paused_ = false;  // during Resume: again
   std::thread thread_;

@@ -3,6 +3,7 @@
 //
 //   out of descriptors   clients wait in the system's queue; the listener tries again every kRetry
 //   over a limit         closed at once, counted, logged (guard.h)
+//   over TCP             kept here until a call begins (greeting.h), and only then served
 //   the rest             under the guard until it is closed
 #pragma once
 

@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -19,6 +20,8 @@ namespace {
 
 constexpr mode_t kSocketMode = 0660;
 constexpr size_t kDiscardBytes = 1u << 20;
+constexpr int kBufferLock = 72;       // SO_BUF_LOCK, which glibc's headers have not
+constexpr int kFixedBytes = 4 << 20;  // of a buffer that the system cannot adjust
 
 absl::Status Failed(int error, const Address& address) {
   if (error == EADDRINUSE) {
@@ -30,6 +33,12 @@ absl::Status Failed(int error, const Address& address) {
 
 void Set(int descriptor, int level, int option, int value) {
   setsockopt(descriptor, level, option, &value, sizeof(value));
+}
+
+// Since Linux 5.14.
+bool LetBufferGo(int descriptor) {
+  const int none = 0;
+  return setsockopt(descriptor, SOL_SOCKET, kBufferLock, &none, sizeof(none)) == 0;
 }
 
 void SetPort(SocketName& name, uint16_t port) {
@@ -48,14 +57,16 @@ uint16_t PortOf(const SocketName& name) {
 
 }  // namespace
 
-absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Listen(const Address& address) {
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Listen(const Address& address,
+                                                                     int type) {
   if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
-  return address.unix_socket ? ListenUnix(address) : ListenTcp(address);
+  return address.unix_socket ? ListenUnix(address, type) : ListenTcp(address);
 }
 
-absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const Address& address) {
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const Address& address,
+                                                                         int type) {
   ListeningSocket made;
-  made.descriptor_.Reset(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  made.descriptor_.Reset(socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!made.descriptor_.ok()) return Failed(errno, address);
   auto* name = reinterpret_cast<sockaddr_un*>(&made.name_.address);
   name->sun_family = AF_UNIX;
@@ -103,6 +114,11 @@ absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenTcp(const Ad
     if (!made.descriptor_.ok()) continue;  // no IPv6 here, say
     const int descriptor = made.descriptor();
     Set(descriptor, SOL_SOCKET, SO_REUSEADDR, 1);
+    // Its connections begin with this buffer. Were it not let go, they could never have a great window.
+    if (LetBufferGo(descriptor)) {
+      Set(descriptor, SOL_SOCKET, SO_RCVBUF, SocketWire::kUnreadBytes);
+      LetBufferGo(descriptor);
+    }
     if (at->ai_family == AF_INET6) {
       // [::] is every address of this machine, as everywhere.
       Set(descriptor, IPPROTO_IPV6, IPV6_V6ONLY,
@@ -135,6 +151,22 @@ ListeningSocket::~ListeningSocket() {
   if (found.st_dev == device_ && found.st_ino == inode_) unlink(address_.path.c_str());
 }
 
+SocketWire::SocketWire(Descriptor descriptor, bool tcp)
+    : descriptor_(std::move(descriptor)), tcp_(tcp) {
+  if (tcp_) Set(descriptor_.get(), SOL_SOCKET, SO_RCVBUF, kUnreadBytes);
+}
+
+void SocketWire::Narrow(int descriptor) { Set(descriptor, SOL_SOCKET, SO_RCVBUF, kReadBytes); }
+
+void SocketWire::Trust() {
+  if (!tcp_) return;
+  const int descriptor = descriptor_.get();
+  Set(descriptor, SOL_SOCKET, SO_RCVBUF, kTrustedBytes);
+  // A size that was set is not adjusted any more, unless it is let go.
+  if (!LetBufferGo(descriptor)) Set(descriptor, SOL_SOCKET, SO_RCVBUF, kFixedBytes);
+  Set(descriptor, IPPROTO_TCP, TCP_WINDOW_CLAMP, std::numeric_limits<int>::max() / 2);
+}
+
 uint64_t SocketWire::BytesReceived() {
   tcp_info info = {};
   socklen_t length = sizeof(info);
@@ -144,6 +176,9 @@ uint64_t SocketWire::BytesReceived() {
 }
 
 void SocketWire::Cut() {
+  // Resets the connection at once, whoever else has it open, and throws away what was received.
+  const sockaddr nobody = {.sa_family = AF_UNSPEC, .sa_data = {}};
+  if (connect(descriptor_.get(), &nobody, sizeof(nobody)) == 0) return;
   // The last to close it resets it: no waiting for a client that still sends.
   const linger reset = {.l_onoff = 1, .l_linger = 0};
   setsockopt(descriptor_.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));

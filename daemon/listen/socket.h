@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
-#include "daemon/listen/descriptor.h"
+#include "daemon/address/descriptor.h"
 #include "daemon/listen/guard.h"
 #include "daemon/listen/peer.h"
 
@@ -28,8 +28,9 @@ class ListeningSocket {
  public:
   // One for each number that the address' host has (one is enough; all have the same port), or the
   // one unix socket, mode 0660 from before anybody can connect. AlreadyExists if somebody listens
-  // there.
-  static absl::StatusOr<std::vector<ListeningSocket>> Listen(const Address& address);
+  // there. `type`: a unix socket's, SOCK_STREAM or SOCK_SEQPACKET.
+  static absl::StatusOr<std::vector<ListeningSocket>> Listen(const Address& address,
+                                                             int type = SOCK_STREAM);
 
   ListeningSocket(ListeningSocket&&) = default;
   ListeningSocket& operator=(ListeningSocket&&) = delete;
@@ -41,7 +42,7 @@ class ListeningSocket {
 
  private:
   ListeningSocket() = default;
-  static absl::StatusOr<std::vector<ListeningSocket>> ListenUnix(const Address& address);
+  static absl::StatusOr<std::vector<ListeningSocket>> ListenUnix(const Address& address, int type);
   static absl::StatusOr<std::vector<ListeningSocket>> ListenTcp(const Address& address);
 
   Descriptor descriptor_;
@@ -53,15 +54,30 @@ class ListeningSocket {
 
 // A connection's socket under a descriptor of its own: whoever serves the connection may close
 // theirs at any time.
-class SocketWire final : public Wire {
+//
+// Over TCP its receive buffer is small until it is trusted: what a stranger sends waits in its own
+// system. Sizes are as SO_RCVBUF has them; the system doubles them.
+class SocketWire : public Wire {
  public:
-  explicit SocketWire(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}
+  // While nobody reads: a listening socket hands it to its connections.
+  static constexpr int kUnreadBytes = 32 << 10;
+  // When somebody does: less than half of the window that was offered first, so that a sender's system
+  // waits for the next one, 200 ms, before it sends a little.
+  static constexpr int kReadBytes = 6 << 10;
+  // What Linux begins with, and adjusts.
+  static constexpr int kTrustedBytes = 64 << 10;
+
+  SocketWire(Descriptor descriptor, bool tcp);
+  // From now on somebody reads what comes on `descriptor`, a connection over TCP.
+  static void Narrow(int descriptor);
   int descriptor() const { return descriptor_.get(); }
   uint64_t BytesReceived() override;
   void Cut() override;
+  void Trust() override;
 
  private:
   const Descriptor descriptor_;
+  const bool tcp_;
 };
 
 // Who made the connected unix socket, by the kernel's word.

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <thread>
-#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "daemon/listen/socket.h"
@@ -17,6 +18,28 @@ namespace {
 
 constexpr ConnectionId kWake = 0;  // epoll's word; no connection has it
 constexpr int kEvents = 64;
+
+bool Control(int operation, int epoll, int descriptor, uint32_t events, ConnectionId word) {
+  epoll_event event = {};
+  event.events = events;
+  event.data.u64 = word;
+  return epoll_ctl(epoll, operation, descriptor, &event) == 0;
+}
+
+class WatchedWire final : public SocketWire {
+ public:
+  WatchedWire(Descriptor descriptor, bool tcp, int epoll)
+      : SocketWire(std::move(descriptor), tcp), epoll_(epoll) {}
+  void SetWord(ConnectionId word) { word_ = word; }
+  // With it the end is told of once as well: whoever lets it be armed arms it again.
+  void Arm() override {
+    Control(EPOLL_CTL_MOD, epoll_, descriptor(), EPOLLET | EPOLLIN | EPOLLONESHOT, word_);
+  }
+
+ private:
+  const int epoll_;
+  std::atomic<ConnectionId> word_ = kWake;
+};
 
 }  // namespace
 
@@ -31,45 +54,44 @@ class Watcher::Impl {
     }
     Wake();
     if (thread_.joinable()) thread_.join();
-    for (const auto& [id, descriptor] : descriptors_) guard_.Leave(id);
+    for (const ConnectionId id : connections_) guard_.Leave(id);
   }
 
   absl::Status Start() {
     epoll_.Reset(epoll_create1(EPOLL_CLOEXEC));
     wake_.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!epoll_.ok() || !wake_.ok() || !Control(EPOLL_CTL_ADD, wake_.get(), EPOLLIN, kWake)) {
+    if (!epoll_.ok() || !wake_.ok() ||
+        !Control(EPOLL_CTL_ADD, epoll_.get(), wake_.get(), EPOLLIN, kWake)) {
       return absl::ErrnoToStatus(errno, "watching connections");
     }
     thread_ = std::thread([this] { Run(); });
     return absl::OkStatus();
   }
 
-  absl::Status Add(const Peer& peer, bool own, Descriptor connection) {
+  absl::StatusOr<ConnectionId> Add(const Peer& peer, bool own, Descriptor connection) {
     const int descriptor = connection.get();
     ConnectionId id = 0;
+    auto wire =
+        std::make_unique<WatchedWire>(std::move(connection), !peer.unix_socket, epoll_.get());
+    WatchedWire* const watched = wire.get();  // the guard's, until Leave below or on the thread
     {
       sync::MutexLock lock(mutex_);
-      id = guard_.Enter(peer, own, std::make_unique<SocketWire>(std::move(connection)));
-      descriptors_.emplace(id, descriptor);
+      id = guard_.Enter(peer, own, std::move(wire));
+      watched->SetWord(id);
+      connections_.insert(id);
     }
     // Edges alone; of the end epoll always tells.
-    if (!Control(EPOLL_CTL_ADD, descriptor, peer.unix_socket ? EPOLLET : EPOLLET | EPOLLIN, id)) {
+    const uint32_t events = peer.unix_socket ? EPOLLET : EPOLLET | EPOLLIN;
+    if (!Control(EPOLL_CTL_ADD, epoll_.get(), descriptor, events, id)) {
       const int error = errno;
       Leave(id);
       return absl::ErrnoToStatus(error, "watching a connection");
     }
     Wake();  // what is looked at may just have begun
-    return absl::OkStatus();
+    return id;
   }
 
  private:
-  bool Control(int operation, int descriptor, uint32_t events, ConnectionId word) {
-    epoll_event event = {};
-    event.events = events;
-    event.data.u64 = word;
-    return epoll_ctl(epoll_.get(), operation, descriptor, &event) == 0;
-  }
-
   void Wake() {
     const uint64_t one = 1;
     [[maybe_unused]] const ssize_t n = write(wake_.get(), &one, sizeof(one));
@@ -77,7 +99,7 @@ class Watcher::Impl {
 
   void Leave(ConnectionId id) {
     sync::MutexLock lock(mutex_);
-    descriptors_.erase(id);
+    connections_.erase(id);
     guard_.Leave(id);
   }
 
@@ -114,10 +136,7 @@ class Watcher::Impl {
   void Handle(const epoll_event& event) {
     const ConnectionId id = event.data.u64;
     if ((event.events & EPOLLHUP) != 0) return Leave(id);
-    if (guard_.OnBytes(id)) return;
-    sync::MutexLock lock(mutex_);
-    const auto at = descriptors_.find(id);
-    if (at != descriptors_.end()) Control(EPOLL_CTL_MOD, at->second, EPOLLET, id);
+    guard_.OnBytes(id);
   }
 
   Guard& guard_;
@@ -125,8 +144,8 @@ class Watcher::Impl {
   Descriptor epoll_, wake_;
   sync::Mutex mutex_;
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
-  // Of what the guard keeps, and closes.
-  std::unordered_map<ConnectionId, int> descriptors_ VOXELD_GUARDED_BY(mutex_);
+  // That have entered and not left.
+  std::unordered_set<ConnectionId> connections_ VOXELD_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 
@@ -139,7 +158,7 @@ absl::StatusOr<std::unique_ptr<Watcher>> Watcher::Start(Guard& guard, sync::Cloc
   return std::unique_ptr<Watcher>(new Watcher(std::move(impl)));
 }
 
-absl::Status Watcher::Add(const Peer& peer, bool own, Descriptor connection) {
+absl::StatusOr<ConnectionId> Watcher::Add(const Peer& peer, bool own, Descriptor connection) {
   return impl_->Add(peer, own, std::move(connection));
 }
 

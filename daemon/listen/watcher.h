@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
-#include "daemon/listen/descriptor.h"
+#include "daemon/address/descriptor.h"
 #include "daemon/listen/guard.h"
 #include "daemon/listen/peer.h"
 #include "display/sync/clock.h"
@@ -23,7 +23,7 @@ class Watcher {
 
   // A connection enters; it leaves when it has been closed in both directions. `own`: see
   // Guard::Enter. An error if the system has no means for it: then it has not entered.
-  absl::Status Add(const Peer& peer, bool own, Descriptor connection);
+  absl::StatusOr<ConnectionId> Add(const Peer& peer, bool own, Descriptor connection);
 
  private:
   class Impl;

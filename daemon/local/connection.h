@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/local/descriptor.h"
+#include "daemon/address/descriptor.h"
 #include "daemon/local/packet.h"
 #include "daemon/local/tokens.h"
 #include "daemon/log/logger.h"

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
-#include "daemon/local/descriptor.h"
+#include "daemon/address/descriptor.h"
 
 namespace voxeld::daemon::local {
 

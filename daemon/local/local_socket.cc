@@ -2,8 +2,6 @@
 
 #include <sys/epoll.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <array>
@@ -15,17 +13,16 @@
 #include <string_view>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/address/descriptor.h"
+#include "daemon/listen/socket.h"
 #include "daemon/local/connection.h"
-#include "daemon/local/descriptor.h"
 #include "daemon/local/doorbell.h"
 
 namespace voxeld::daemon::local {
 namespace {
-
-constexpr mode_t kSocketMode = 0660;
-constexpr int kBacklog = 128;
 
 // How often the clock is asked while a connection owes its Hello (the clock need not be the
 // kernel's), or accepting is tried again.
@@ -34,27 +31,12 @@ constexpr int kTickMs = 50;
 // What an event is about; connections count on from here.
 constexpr uint64_t kBell = 0, kListener = 1, kFirstConnection = 2;
 
-absl::StatusOr<Descriptor> Listen(const Address& address) {
-  const auto failed = [&](const char* what) {
-    return absl::ErrnoToStatus(errno,
-                               absl::StrCat(address.ToString(), " cannot be listened on: ", what));
-  };
-  sockaddr_un name = {};
-  name.sun_family = AF_UNIX;
-  if (!address.unix_socket || address.path.size() >= sizeof(name.sun_path)) {
+absl::StatusOr<std::vector<listen::ListeningSocket>> Listen(const Address& address) {
+  if (!address.unix_socket) {
     return absl::InvalidArgumentError(
         absl::StrCat("the local socket at ", address.ToString(), "; give unix:PATH"));
   }
-  if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
-  std::memcpy(name.sun_path, address.path.data(), address.path.size());
-  Descriptor listener(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (listener.get() < 0) return failed("socket");
-  if (bind(listener.get(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) != 0) {
-    return failed("bind");
-  }
-  chmod(address.path.c_str(), kSocketMode);
-  if (listen(listener.get(), kBacklog) != 0) return failed("listen");
-  return listener;
+  return listen::ListeningSocket::Listen(address, SOCK_SEQPACKET);
 }
 
 }  // namespace
@@ -73,20 +55,17 @@ class LocalSocket::Impl {
     stopping_ = true;
     bell_->Ring();
     thread_.join();
-    unlink(options_.listen.path.c_str());
   }
 
   absl::Status Start() {
     epoll_ = Descriptor(epoll_create1(EPOLL_CLOEXEC));
     if (epoll_.get() < 0) return absl::ErrnoToStatus(errno, "epoll_create1");
-    absl::StatusOr<Descriptor> listener = Listen(options_.listen);
+    auto listener = Listen(options_.listen);
     if (!listener.ok()) return listener.status();
     listener_ = *std::move(listener);
     if (!Watch(EPOLL_CTL_ADD, bell_->descriptor(), kBell, EPOLLIN) ||
-        !Watch(EPOLL_CTL_ADD, listener_.get(), kListener, EPOLLIN)) {
-      const absl::Status failed = absl::ErrnoToStatus(errno, "epoll_ctl");
-      unlink(options_.listen.path.c_str());
-      return failed;
+        !Watch(EPOLL_CTL_ADD, listener_.front().descriptor(), kListener, EPOLLIN)) {
+      return absl::ErrnoToStatus(errno, "epoll_ctl");
     }
     thread_ = std::thread([this] { Run(); });
     return absl::OkStatus();
@@ -129,7 +108,8 @@ class LocalSocket::Impl {
   }
 
   void Accept() {
-    Descriptor socket(accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    Descriptor socket(
+        accept4(listener_.front().descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (socket.get() < 0) {
       if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;
       accept_failed_ = true;  // out of descriptors, say: what is open may close
@@ -145,14 +125,14 @@ class LocalSocket::Impl {
 
   void StopAccepting() {
     accepting_ = false;
-    Watch(EPOLL_CTL_MOD, listener_.get(), kListener, 0);
+    Watch(EPOLL_CTL_MOD, listener_.front().descriptor(), kListener, 0);
   }
 
   // After a failure only once more has happened, or a tick has passed.
   void ListenAgain() {
     if (std::exchange(accept_failed_, false) || accepting_) return;
     if (without_hello_ >= options_.max_without_hello) return;
-    accepting_ = Watch(EPOLL_CTL_MOD, listener_.get(), kListener, EPOLLIN);
+    accepting_ = Watch(EPOLL_CTL_MOD, listener_.front().descriptor(), kListener, EPOLLIN);
   }
 
   void Serve(uint64_t number) {
@@ -217,7 +197,8 @@ class LocalSocket::Impl {
   const LocalSocketOptions options_;
   const std::shared_ptr<Doorbell> bell_;
   const std::shared_ptr<Tokens> tokens_;
-  Descriptor epoll_, listener_;
+  Descriptor epoll_;
+  std::vector<listen::ListeningSocket> listener_;  // one
   std::atomic<bool> stopping_ = false;
   Connections connections_;
   uint64_t next_ = kFirstConnection;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "daemon/local/descriptor.h"
+#include "daemon/address/descriptor.h"
 
 namespace voxeld::daemon::local {
 

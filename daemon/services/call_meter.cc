@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <charconv>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "daemon/listen/peer.h"
 
 namespace voxeld::daemon::services {
 namespace {
+
+constexpr size_t kMostSockets = 16384;
 
 // What follows `key` in `json`, up to the next quote; `at` moves behind it. Our keys stand for one
 // thing each, and no text of a client's is among them.
@@ -43,22 +46,34 @@ std::string Take(char* text) {
 
 }  // namespace
 
-uint64_t CallTotals::Cancelled(uint64_t at_once) const {
+uint64_t CallTotals::Open() const {
   const uint64_t ended = succeeded + failed;
-  const uint64_t open = started > ended ? started - ended : 0;
+  return started > ended ? started - ended : 0;
+}
+
+uint64_t CallTotals::Cancelled(uint64_t at_once) const {
+  const uint64_t open = Open();
   return failed + (open > at_once ? open - at_once : 0);
 }
 
 CallTotals CallTotals::FromJson(std::string_view json) {
   return {.started = Figure(json, "\"streamsStarted\":\""),
           .succeeded = Figure(json, "\"streamsSucceeded\":\""),
-          .failed = Figure(json, "\"streamsFailed\":\"")};
+          .failed = Figure(json, "\"streamsFailed\":\""),
+          .messages = Figure(json, "\"messagesReceived\":\"")};
 }
 
 CallMeter::CallMeter(listen::Guard& guard, uint64_t at_once, sync::Clock& clock)
-    : guard_(guard), at_once_(at_once), clock_(clock), thread_([this] { Run(); }) {}
+    : guard_(guard), at_once_(at_once), clock_(clock), thread_([this] { Run(); }) {
+  guard_.SetOnBusy([this] {
+    sync::MutexLock lock(mutex_);
+    busy_ = true;
+    changed_.NotifyAll();
+  });
+}
 
 CallMeter::~CallMeter() {
+  guard_.SetOnBusy(nullptr);
   {
     sync::MutexLock lock(mutex_);
     stop_ = true;
@@ -68,42 +83,53 @@ CallMeter::~CallMeter() {
 }
 
 void CallMeter::Run() {
+  sync::TimeNs due = clock_.Now();
   for (;;) {
     {
       sync::MutexLock lock(mutex_);
-      const sync::TimeNs due = clock_.Now() + kInterval;
+      while (!stop_ && !busy_) changed_.Wait(mutex_);
       while (!stop_ && clock_.Now() < due) clock_.WaitUntil(mutex_, changed_, due);
       if (stop_) return;
+      busy_ = false;
     }
+    due = clock_.Now() + kInterval;
     Look();
   }
 }
 
 void CallMeter::Look() {
   bool listed = false;
-  for (const std::string& peer : guard_.Busy()) {
+  for (const listen::Guard::Busy& busy : guard_.TakeBusy()) {
     // A number that was another connection's of the same name has nothing to say any more.
     for (;;) {
-      const auto known = sockets_.find(peer);
+      const auto known = sockets_.find(busy.peer);
       const std::string json =
           known == sockets_.end() ? "" : Take(grpc_channelz_get_socket(known->second));
       if (!json.empty()) {
-        guard_.OnCancelled(peer, CallTotals::FromJson(json).Cancelled(at_once_));
+        const CallTotals totals = CallTotals::FromJson(json);
+        guard_.OnFigures(busy, {.cancelled = totals.Cancelled(at_once_),
+                                .progress = totals.started + totals.messages,
+                                .open = totals.Open()});
         break;
       }
-      if (std::exchange(listed, true)) break;  // it has gone meanwhile
+      if (known != sockets_.end()) sockets_.erase(known);
+      if (std::exchange(listed, true)) break;  // no call of it has begun, or it has gone meanwhile
       ListSockets();
     }
   }
 }
 
 void CallMeter::ListSockets() {
-  sockets_.clear();
+  if (sockets_.size() > kMostSockets) {  // most of them have gone
+    sockets_.clear();
+    next_socket_ = 0;
+  }
+  const int64_t begin = next_socket_;
   const std::string servers = Take(grpc_channelz_get_servers(0));
   for (size_t at = 0;;) {
     const std::string_view server = TextAfter(servers, "\"serverId\":\"", &at);
     if (server.empty()) return;
-    for (int64_t first = 0;;) {
+    for (int64_t first = begin;;) {
       const std::string json =
           Take(grpc_channelz_get_server_sockets(NumberOf<intptr_t>(server), first, 0));
       // {"name":"chttp2 ipv4:127.0.0.1:40000","socketId":"5"}, in ascending order of numbers
@@ -113,6 +139,7 @@ void CallMeter::ListSockets() {
         const auto number = NumberOf<int64_t>(TextAfter(json, "\"socketId\":\"", &ref));
         sockets_[listen::PeerName(name)] = number;
         first = number + 1;
+        next_socket_ = std::max(next_socket_, first);
       }
       if (json.empty() || json.find("\"end\":true") != std::string::npos) break;
     }

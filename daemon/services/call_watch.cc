@@ -3,7 +3,7 @@
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/server_interceptor.h>
 
-#include <array>
+#include <atomic>
 #include <string>
 #include <string_view>
 
@@ -17,15 +17,20 @@ using grpc::experimental::InterceptionHookPoints;
 using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerRpcInfo;
 
-// Whose requests come as bytes and are parsed by us.
-constexpr std::array<std::string_view, 2> kRawMethods = {"/voxeld.v1.SceneService/Stream",
-                                                         "/voxeld.v1.SceneService/ApplyUpdate"};
+// Of the daemon's own services.
+constexpr std::string_view kOwnPackage = "/voxeld.";
 
-bool IsRaw(std::string_view method) {
-  for (const std::string_view raw : kRawMethods) {
-    if (method == raw) return true;
+bool Understood(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::StatusCode::OK:
+    case grpc::StatusCode::NOT_FOUND:
+    case grpc::StatusCode::ALREADY_EXISTS:
+    case grpc::StatusCode::ABORTED:
+    case grpc::StatusCode::FAILED_PRECONDITION:
+      return true;
+    default:
+      return false;
   }
-  return false;
 }
 
 // One call. gRPC runs its hooks from several threads: those of a stream's reads and writes may be at
@@ -34,7 +39,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
  public:
   CallWatch(listen::Guard& guard, ServerRpcInfo* info)
       : guard_(guard),
-        raw_(IsRaw(info->method())),
+        authorises_(std::string_view(info->method()).starts_with(kOwnPackage)),
         peer_(listen::PeerName(info->server_context()->peer())) {}
 
   ~CallWatch() override {
@@ -46,22 +51,26 @@ class CallWatch final : public grpc::experimental::Interceptor {
         methods->GetRecvMessage() != nullptr) {
       heard_ = true;
       guard_.OnMessage(peer_);
-      if (!raw_) guard_.OnAuthorised(peer_);
     }
-    if (raw_ && !answered_ &&
-        methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
+    if (!answered_ && heard_ && Answers(methods)) {
       answered_ = true;
-      guard_.OnAuthorised(peer_);
+      guard_.OnAnswer(peer_, authorises_);
     }
     methods->Proceed();
   }
 
  private:
+  static bool Answers(InterceptorBatchMethods* methods) {
+    return methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE) ||
+           (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS) &&
+            Understood(methods->GetSendStatus().error_code()));
+  }
+
   listen::Guard& guard_;
-  const bool raw_;
+  const bool authorises_;
   const std::string peer_;
-  bool heard_ = false;     // by reads
-  bool answered_ = false;  // by writes
+  std::atomic<bool> heard_ = false;  // by reads
+  bool answered_ = false;            // by writes
 };
 
 class Factory final : public grpc::experimental::ServerInterceptorFactoryInterface {

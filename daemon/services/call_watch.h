@@ -13,9 +13,10 @@ class Guard;
 
 namespace voxeld::daemon::services {
 
-// For every call of every service, also those to come: a request that was received and parsed counts
-// as a message, and authorises the connection where it was parsed by gRPC. A method that takes raw
-// bytes, which are parsed only later, authorises it when it first answers: Stream by Opened.
+// For every call of every service, also those to come: its first message counts as one; its first
+// answer authorises the connection if the service is the daemon's own. An answer is a message, or a
+// status that says that the request was understood: OK, NOT_FOUND, ALREADY_EXISTS, ABORTED,
+// FAILED_PRECONDITION. What anybody may ask (health, reflection) authorises nobody.
 // `guard` outlives the server.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
     listen::Guard& guard);

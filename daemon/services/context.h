@@ -33,10 +33,12 @@ struct ServiceContext {
   Logger* log = nullptr;  // may be none
   StreamLimits limits;
   uint32_t max_scene_watches = 64;
+  uint32_t max_stats_watches = 64;
 
   ActiveCalls calls;        // streams, watches, captures
   ActiveCalls short_calls;  // all others
   std::atomic<uint32_t> scene_watches = 0;
+  std::atomic<uint32_t> stats_watches = 0;
   // Captures under way, those included whose client is gone and that the core has not let go of.
   // Shared, as the core may hold them longer than the server lives.
   std::shared_ptr<std::atomic<uint32_t>> captures = std::make_shared<std::atomic<uint32_t>>(0);

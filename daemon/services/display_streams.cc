@@ -101,6 +101,14 @@ class StatsWatch final : public Sender<v1::Stats> {
 
   void Start(const v1::WatchStatsRequest& request) {
     Begin();
+    counted_ = ++context_.stats_watches <= context_.max_stats_watches;
+    if (!counted_) {
+      --context_.stats_watches;
+      return End(absl::ResourceExhaustedError(
+          absl::StrCat(context_.max_stats_watches,
+                       " watches of the statistics are open, which is max_stats_watches; try again "
+                       "when one has ended")));
+    }
     interval_ns_ = request.interval_ns() == 0 ? kDefaultNs : request.interval_ns();
     once_ = request.once();
     if (interval_ns_ < kLeastNs || interval_ns_ > kGreatestNs) {
@@ -132,6 +140,11 @@ class StatsWatch final : public Sender<v1::Stats> {
 
   void OnAlarm() override { Ask(); }
 
+  void OnEnded() override {
+    if (counted_) --context_.stats_watches;
+  }
+
+  bool counted_ = false;
   int64_t interval_ns_ = kDefaultNs;
   bool once_ = false;
 };

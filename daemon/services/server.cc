@@ -39,6 +39,12 @@ void KeepGrpcUp() {
   (void)up;
 }
 
+listen::ConnectionLimits LimitsOf(listen::ConnectionLimits limits, Core& core) {
+  limits.max_message_bytes = core.limits().max_message_bytes;
+  limits.lookahead_bytes = kLookaheadBytes;
+  return limits;
+}
+
 int Milliseconds(sync::TimeNs time) { return static_cast<int>(time / sync::kMillisecond); }
 
 // gRPC's word for never is its greatest.
@@ -51,12 +57,17 @@ int MillisecondsOrNever(sync::TimeNs time) {
 class Server::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ServerOptions options)
-      : context_{core,        clock,           options.version,
-                 options.log, options.streams, options.max_scene_watches},
+      : context_{core,
+                 clock,
+                 options.version,
+                 options.log,
+                 options.streams,
+                 options.max_scene_watches,
+                 options.max_stats_watches},
         options_(std::move(options)),
         counters_(options_.counters != nullptr ? options_.counters
                                                : std::make_shared<listen::Counters>()),
-        guard_(options_.connections, clock, *counters_, options_.log),
+        guard_(LimitsOf(options_.connections, core), clock, *counters_, options_.log),
         scene_(MakeSceneService(context_)),
         display_(MakeDisplayService(context_)) {}
 
@@ -86,7 +97,7 @@ class Server::Impl {
     if (absl::Status status = Build(); !status.ok()) return status;
     auto listener = listen::Listener::Start(
         std::move(sockets), guard_, *counters_, own_, context_.clock,
-        [this](int listening, listen::Descriptor connection) {
+        [this](int listening, Descriptor connection) {
           grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
           parameters.listener_fd = listening;
           parameters.fd = connection.Release();
@@ -95,10 +106,7 @@ class Server::Impl {
         {.send_limit_ns = options_.keepalive_timeout_ns, .log = options_.log});
     if (!listener.ok()) return listener.status();
     listener_ = *std::move(listener);
-    if (options_.connections.max_cancelled_calls_per_second > 0) {
-      meter_ =
-          std::make_unique<CallMeter>(guard_, options_.max_calls_per_connection, context_.clock);
-    }
+    meter_ = std::make_unique<CallMeter>(guard_, options_.max_calls_per_connection, context_.clock);
     if (options_.connections.probe_interval_ns > 0) {
       probe_ = std::make_unique<listen::Probe>(
           targets_, options_.connections.probe_interval_ns,

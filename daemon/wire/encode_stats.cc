@@ -82,6 +82,9 @@ void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
   out->set_accept_failures(in.accept_failures);
   out->set_probe_failures(in.probe_failures);
   out->set_unreachable(in.unreachable);
+  out->set_refused_after_cut(in.refused_after_cut);
+  out->set_cut_for_greeting(in.cut_for_greeting);
+  out->set_cut_for_flooding(in.cut_for_flooding);
 }
 
 }  // namespace

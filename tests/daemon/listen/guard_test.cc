@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <deque>
 #include <string>
+#include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "display/sync/fake_clock.h"
 
@@ -20,8 +23,8 @@ using ::testing::IsEmpty;
 // A connection, as the test sees it: it outlives the guard's wire.
 struct Line {
   uint64_t bytes = 0;
-  int cuts = 0;
-  bool gone = false;
+  int cuts = 0, armed = 0;
+  bool gone = false, trusted = false;
 };
 
 class FakeWire final : public Wire {
@@ -30,6 +33,8 @@ class FakeWire final : public Wire {
   ~FakeWire() override { line_.gone = true; }
   uint64_t BytesReceived() override { return line_.bytes; }
   void Cut() override { ++line_.cuts; }
+  void Trust() override { line_.trusted = true; }
+  void Arm() override { ++line_.armed; }
 
  private:
   Line& line_;
@@ -43,9 +48,15 @@ class GuardTest : public ::testing::Test {
  protected:
   static constexpr ConnectionLimits kLimits{.max_connections = 5,
                                             .max_connections_per_address = 3,
-                                            .unauthorised_bytes = 1000,
-                                            .unauthorised_limit_ns = 5 * sync::kSecond,
+                                            .unauthorised_bytes = 1600,
+                                            .unauthorised_limit_ns = 8 * sync::kSecond,
+                                            .max_message_bytes = 10'000,
+                                            .lookahead_bytes = 500,
+                                            .cut_penalty_ns = sync::kSecond,
                                             .max_cancelled_calls_per_second = 10};
+  // What is left alone: thirteen sixteenths of the bytes, fifteen of the time.
+  static constexpr uint64_t kFreeBytes = 1300;
+  static constexpr sync::TimeNs kFreeTime = 7'500 * sync::kMillisecond;
 
   ConnectionId Enter(const Peer& peer, Line& line, bool own = false) {
     return guard_.Enter(peer, own, std::make_unique<FakeWire>(line));
@@ -69,53 +80,108 @@ class GuardTest : public ::testing::Test {
 
 TEST_F(GuardTest, CutsAtTheFirstByteBeyondTheLimitAndOnce) {
   const ConnectionId id = Enter(Tcp(1), line_);
-  line_.bytes = 1000;
-  EXPECT_TRUE(guard_.OnBytes(id));
+  line_.bytes = 1600;
+  guard_.OnBytes(id);
   EXPECT_EQ(line_.cuts, 0);
-  line_.bytes = 1001;
-  EXPECT_FALSE(guard_.OnBytes(id));
+  line_.bytes = 1601;
+  guard_.OnBytes(id);
   guard_.Look();
   guard_.OnMessage(Tcp(1).name);
   EXPECT_EQ(line_.cuts, 1);
   EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
+  EXPECT_EQ(line_.armed, 1) << "its end is to be told of";
   EXPECT_FALSE(line_.gone) << "until it is known to be closed";
   guard_.Leave(id);
   EXPECT_TRUE(line_.gone);
+  EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
+}
+
+TEST_F(GuardTest, TheLastSixteenthsOfTheBytesAreLeftForAMoment) {
+  Enter(Tcp(1), line_);
+  line_.bytes = kFreeBytes;
+  Pass(sync::kSecond);
+  line_.bytes = kFreeBytes + 1;
+  guard_.Look();
+  Pass(Guard::kGrace - sync::kMillisecond);
+  EXPECT_EQ(line_.cuts, 0);
+  Pass(sync::kMillisecond);
+  EXPECT_EQ(line_.cuts, 1);
+  EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
 }
 
 TEST_F(GuardTest, BytesThatNobodyToldOfAreSeenByTheNextLook) {
   Enter(Tcp(1), line_);
   EXPECT_EQ(guard_.Look(), clock_.Now() + Guard::kLookInterval);
-  line_.bytes = 1001;
+  line_.bytes = 1601;
   EXPECT_EQ(guard_.Look(), sync::kNever) << "nobody is left to be looked at";
   EXPECT_EQ(line_.cuts, 1);
 }
 
-TEST_F(GuardTest, CutsWhenTheTimeIsOver) {
+TEST_F(GuardTest, WhoEndsItFirstIsCountedAndPunishedTheSame) {
+  const ConnectionId id = Enter(Tcp(1), line_);
+  line_.bytes = 1601;  // and reset, before anybody looked
+  guard_.Leave(id);
+  EXPECT_EQ(line_.cuts, 1) << "what gRPC has not read is thrown away";
+  EXPECT_TRUE(line_.gone);
+  EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
+  EXPECT_FALSE(guard_.MayEnter(Tcp(2)).ok());
+}
+
+TEST_F(GuardTest, CutsBeforeTheTimeIsOver) {
   Enter(Tcp(1), line_);
-  Pass(kLimits.unauthorised_limit_ns - 1);
+  Pass(kFreeTime - 1);
   EXPECT_EQ(line_.cuts, 0);
   Pass(1);
   EXPECT_EQ(line_.cuts, 1);
   EXPECT_EQ(counters_.Read().cut_for_time, 1u);
+  EXPECT_TRUE(guard_.MayEnter(Tcp(2)).ok()) << "silence is not punished";
 }
 
 TEST_F(GuardTest, AuthorisedIsFreeForGood) {
   const ConnectionId id = Enter(Tcp(1), line_);
-  line_.bytes = 1000;
-  guard_.OnAuthorised(Tcp(1).name);
+  line_.bytes = kFreeBytes;
+  EXPECT_FALSE(line_.trusted);
+  guard_.OnAnswer(Tcp(1).name, true);
+  EXPECT_TRUE(line_.trusted);
   line_.bytes = uint64_t{1} << 40;
-  EXPECT_FALSE(guard_.OnBytes(id)) << "of no interest any more";
+  guard_.OnBytes(id);
   EXPECT_EQ(guard_.Look(), sync::kNever);
   Pass(60 * sync::kSecond);
   EXPECT_EQ(line_.cuts, 0);
 }
 
-TEST_F(GuardTest, AFirstRequestBeyondTheLimitIsCutHoweverFastItWas) {
+TEST_F(GuardTest, AnAnswerThatAnybodyGetsBeginsBytesAndTimeAnewAndAuthorisesNobody) {
   Enter(Tcp(1), line_);
-  line_.bytes = 1001;  // in no time: neither OnBytes nor Look had a chance
-  guard_.OnAuthorised(Tcp(1).name);
+  for (int i = 0; i < 5; ++i) {
+    Pass(kFreeTime - sync::kSecond);
+    guard_.OnMessage(Tcp(1).name);
+    line_.bytes += kFreeBytes;
+    guard_.OnAnswer(Tcp(1).name, false);
+    guard_.OnCallEnd(Tcp(1).name);
+    EXPECT_EQ(line_.cuts, 0);
+    EXPECT_FALSE(line_.trusted);
+  }
+  line_.bytes += 1601;
+  guard_.Look();
   EXPECT_EQ(line_.cuts, 1);
+
+  Line& silent = lines_[0];
+  Pass(10 * sync::kSecond);
+  Enter(Tcp(2), silent);
+  Pass(sync::kSecond);
+  guard_.OnMessage(Tcp(2).name);
+  guard_.OnAnswer(Tcp(2).name, false);
+  guard_.OnCallEnd(Tcp(2).name);
+  Pass(kFreeTime);
+  EXPECT_EQ(silent.cuts, 1);
+}
+
+TEST_F(GuardTest, AnAnswerBeyondTheLimitAuthorisesNobodyHoweverFastItWas) {
+  Enter(Tcp(1), line_);
+  line_.bytes = 1601;  // in no time: neither OnBytes nor Look had a chance
+  guard_.OnAnswer(Tcp(1).name, true);
+  EXPECT_EQ(line_.cuts, 1);
+  EXPECT_FALSE(line_.trusted);
   EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
 }
 
@@ -125,7 +191,7 @@ TEST_F(GuardTest, TimeStandsStillWhileTheDaemonOwesAnAnswerBytesDoNot) {
   Pass(60 * sync::kSecond);
   EXPECT_EQ(line_.cuts, 0);
   guard_.OnCallEnd(Tcp(1).name);  // refused: it begins anew
-  Pass(kLimits.unauthorised_limit_ns - 1);
+  Pass(kFreeTime - 1);
   EXPECT_EQ(line_.cuts, 0);
   Pass(1);
   EXPECT_EQ(line_.cuts, 1);
@@ -133,44 +199,155 @@ TEST_F(GuardTest, TimeStandsStillWhileTheDaemonOwesAnAnswerBytesDoNot) {
   Line& other = lines_[0];
   Enter(Tcp(2), other);
   guard_.OnMessage(Tcp(2).name);
-  other.bytes = 1001;
+  other.bytes = 1601;
   guard_.Look();
   EXPECT_EQ(other.cuts, 1);
 }
 
-TEST_F(GuardTest, CancelledCallsAreCountedASecondAlsoOfTheAuthorised) {
-  Enter(Tcp(1), line_);
-  guard_.OnAuthorised(Tcp(1).name);
-  uint64_t cancelled = 0;
-  for (int second = 0; second < 5; ++second) {
-    for (int i = 0; i < 10; ++i) guard_.OnCancelled(Tcp(1).name, ++cancelled);
-    clock_.Advance(sync::kSecond);
-    guard_.OnCancelled(Tcp(1).name, cancelled);
-  }
-  EXPECT_EQ(line_.cuts, 0);
-  guard_.OnCancelled(Tcp(1).name, cancelled + 10);
-  EXPECT_EQ(line_.cuts, 0);
-  guard_.OnCancelled(Tcp(1).name, cancelled + 11);
+TEST_F(GuardTest, AWrongGreetingIsCutCountedAndPunished) {
+  const ConnectionId id = Enter(Tcp(1), line_);
+  guard_.OnWrongGreeting(id, "it begins with \"GET\"");
+  guard_.OnWrongGreeting(id, "once more");
   EXPECT_EQ(line_.cuts, 1);
-  EXPECT_EQ(counters_.Read().cut_for_cancelling, 1u);
+  EXPECT_EQ(counters_.Read().cut_for_greeting, 1u);
+  EXPECT_FALSE(guard_.MayEnter(Tcp(2)).ok());
 }
 
-TEST_F(GuardTest, BusyAreTheAuthorisedThatGotBytesSinceItWasAsked) {
+TEST_F(GuardTest, TheAddressOfWhatWasCutIsRefusedTwiceAsLongEachTime) {
+  sync::TimeNs length = kLimits.cut_penalty_ns;
+  for (int times = 0; times < 9; ++times) {
+    const ConnectionId id = Enter(Tcp(times), line_);
+    guard_.OnWrongGreeting(id, "");
+    guard_.Leave(id);
+    const absl::Status refused = guard_.MayEnter(Tcp(8));
+    EXPECT_TRUE(absl::IsResourceExhausted(refused));
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("cut_penalty_ns"));
+    EXPECT_TRUE(guard_.MayEnter(Tcp(8, "192.0.2.2")).ok()) << "others are not";
+    clock_.Advance(length - 1);
+    EXPECT_FALSE(guard_.MayEnter(Tcp(8)).ok());
+    clock_.Advance(1);
+    EXPECT_TRUE(guard_.MayEnter(Tcp(8)).ok());
+    length = std::min(2 * length, Guard::kLongestPenalty * kLimits.cut_penalty_ns);
+  }
+  EXPECT_EQ(counters_.Read().refused_after_cut, 18u);
+  clock_.Advance(length);  // as long as it was refused last
+  guard_.OnWrongGreeting(Enter(Tcp(1), line_), "");
+  clock_.Advance(kLimits.cut_penalty_ns);
+  EXPECT_TRUE(guard_.MayEnter(Tcp(8)).ok()) << "it begins anew";
+}
+
+TEST_F(GuardTest, WhatIsCutTogetherIsPunishedOnce) {
+  ConnectionId ids[3];
+  for (int i = 0; i < 3; ++i) ids[i] = Enter(Tcp(i), lines_[i]);
+  for (const ConnectionId id : ids) guard_.OnWrongGreeting(id, "");
+  clock_.Advance(kLimits.cut_penalty_ns);
+  EXPECT_FALSE(absl::StrContains(guard_.MayEnter(Tcp(8)).message(), "cut_penalty_ns"));
+}
+
+TEST_F(GuardTest, TheDaemonsOwnAddressIsNotPunished) {
+  guard_.OnWrongGreeting(Enter(Tcp(1), line_, true), "");
+  EXPECT_EQ(line_.cuts, 1);
+  EXPECT_TRUE(guard_.MayEnter(Tcp(2)).ok());
+}
+
+TEST_F(GuardTest, PenaltiesAreAsManyAsThereAreToBeAtMost) {
+  for (size_t i = 0; i <= Guard::kMostPenalties; ++i) {
+    Line line;
+    const Peer peer = Tcp(1, absl::StrCat("192.0.2.", i));
+    const ConnectionId id = Enter(peer, line);
+    guard_.OnWrongGreeting(id, "");
+    guard_.Leave(id);
+    clock_.Advance(1);
+  }
+  EXPECT_TRUE(guard_.MayEnter(Tcp(1, "192.0.2.0")).ok()) << "the oldest made room";
+  EXPECT_FALSE(guard_.MayEnter(Tcp(1, "192.0.2.1")).ok());
+}
+
+Guard::Busy Of(const Line& line, int port = 1) { return {Tcp(port).name, line.bytes}; }
+
+TEST_F(GuardTest, CancelledCallsAreCountedASecondAuthorisedOrNot) {
+  for (const bool authorised : {false, true}) {
+    Line& line = lines_[authorised ? 1 : 0];
+    const ConnectionId id = Enter(Tcp(1), line);
+    if (authorised) guard_.OnAnswer(Tcp(1).name, true);
+    uint64_t cancelled = 0;
+    for (int second = 0; second < 5; ++second) {
+      for (int i = 0; i < 10; ++i) guard_.OnFigures(Of(line), {.cancelled = ++cancelled});
+      clock_.Advance(sync::kSecond);
+      guard_.OnFigures(Of(line), {.cancelled = cancelled});
+    }
+    EXPECT_EQ(line.cuts, 0);
+    guard_.OnFigures(Of(line), {.cancelled = cancelled + 10});
+    EXPECT_EQ(line.cuts, 0);
+    guard_.OnFigures(Of(line), {.cancelled = cancelled + 11});
+    EXPECT_EQ(line.cuts, 1);
+    EXPECT_FALSE(guard_.MayEnter(Tcp(2)).ok());
+    guard_.Leave(id);
+    clock_.Advance(10 * sync::kSecond);
+  }
+  EXPECT_EQ(counters_.Read().cut_for_cancelling, 2u);
+}
+
+TEST_F(GuardTest, BytesOfWhichNothingComesAreCutThoughTheConnectionIsAuthorised) {
   Enter(Tcp(1), line_);
-  Enter(Tcp(2), lines_[0]);
+  guard_.OnAnswer(Tcp(1).name, true);
+  uint64_t progress = 1;
+  for (int i = 0; i < 10; ++i) {  // messages as great as may be
+    line_.bytes += kLimits.max_message_bytes + kLimits.lookahead_bytes;
+    guard_.OnFigures(Of(line_), {.progress = progress, .open = 1});
+    guard_.OnFigures(Of(line_), {.progress = ++progress, .open = 1});
+  }
+  EXPECT_EQ(line_.cuts, 0);
+  line_.bytes += kLimits.max_message_bytes + 3 * kLimits.lookahead_bytes;
+  guard_.OnFigures(Of(line_), {.progress = progress, .open = 3});
+  EXPECT_EQ(line_.cuts, 0);
+  ++line_.bytes;
+  guard_.OnFigures(Of(line_), {.progress = progress, .open = 3});
+  EXPECT_EQ(line_.cuts, 1);
+  EXPECT_EQ(counters_.Read().cut_for_flooding, 1u);
+  EXPECT_FALSE(guard_.MayEnter(Tcp(2)).ok());
+}
+
+std::vector<std::string> Names(const std::vector<Guard::Busy>& busy) {
+  std::vector<std::string> out;
+  for (const Guard::Busy& one : busy) out.push_back(one.peer);
+  return out;
+}
+
+TEST_F(GuardTest, BusyAreThoseWhoseBytesWereToldOfAndNobodyElseIsLookedAt) {
+  int told = 0;
+  guard_.SetOnBusy([&] { ++told; });
+  const ConnectionId first = Enter(Tcp(1), line_);
+  const ConnectionId second = Enter(Tcp(2), lines_[0]);
   line_.bytes = lines_[0].bytes = 100;
-  EXPECT_THAT(guard_.Busy(), IsEmpty());
-  guard_.OnAuthorised(Tcp(1).name);
-  EXPECT_THAT(guard_.Busy(), ElementsAre(Tcp(1).name));
-  EXPECT_THAT(guard_.Busy(), IsEmpty());
-  line_.bytes = 101;
-  EXPECT_THAT(guard_.Busy(), ElementsAre(Tcp(1).name));
+  EXPECT_THAT(guard_.TakeBusy(), IsEmpty()) << "nobody told of bytes";
+  guard_.OnBytes(first);
+  guard_.OnBytes(second);
+  EXPECT_EQ(told, 1) << "once until they are taken";
+  EXPECT_THAT(Names(guard_.TakeBusy()), ElementsAre(Tcp(1).name, Tcp(2).name));
+  EXPECT_THAT(guard_.TakeBusy(), IsEmpty());
+  EXPECT_EQ(line_.armed, 0) << "the unauthorised tell of all bytes";
+
+  guard_.OnAnswer(Tcp(1).name, true);
+  EXPECT_EQ(line_.armed, 1);
+  line_.bytes = 200;
+  guard_.OnBytes(first);
+  EXPECT_EQ(told, 2);
+  EXPECT_EQ(line_.armed, 1) << "no more is told of before they are taken";
+  const std::vector<Guard::Busy> busy = guard_.TakeBusy();
+  ASSERT_THAT(Names(busy), ElementsAre(Tcp(1).name));
+  EXPECT_EQ(busy[0].bytes, 200u);
+  EXPECT_EQ(line_.armed, 2);
+  guard_.OnBytes(first);
+  guard_.Leave(first);
+  EXPECT_THAT(guard_.TakeBusy(), IsEmpty());
+  guard_.SetOnBusy(nullptr);
 }
 
 TEST_F(GuardTest, UnixSocketsAreFreeOfBytesAndTime) {
   const ConnectionId id = Enter({"unix:", "user 1000", true}, line_);
   line_.bytes = 1 << 20;
-  EXPECT_FALSE(guard_.OnBytes(id));
+  guard_.OnBytes(id);
   Pass(60 * sync::kSecond);
   EXPECT_EQ(line_.cuts, 0);
 }
@@ -200,7 +377,7 @@ TEST_F(GuardTest, TheDaemonsOwnCountAgainstNothingAndAreGuarded) {
   EXPECT_TRUE(guard_.MayEnter(Tcp(9)).ok());
   EXPECT_EQ(counters_.Read().open, 0u);
   EXPECT_EQ(counters_.Read().accepted, 0u);
-  lines_[3].bytes = 1001;
+  lines_[3].bytes = 1601;
   guard_.Look();
   EXPECT_EQ(lines_[3].cuts, 1);
 }
@@ -209,21 +386,21 @@ TEST_F(GuardTest, ANameThatComesAgainIsTheNewConnections) {
   const ConnectionId old = Enter(Tcp(1), line_);
   Line& fresh = lines_[0];
   Enter(Tcp(1), fresh);
-  guard_.OnAuthorised(Tcp(1).name);
+  guard_.OnAnswer(Tcp(1).name, true);
   guard_.Leave(old);
   fresh.bytes = 1 << 20;
   guard_.Look();
   EXPECT_EQ(fresh.cuts, 0);
-  guard_.OnCancelled(Tcp(1).name, 11);
+  guard_.OnFigures(Of(fresh), {.cancelled = 11});
   EXPECT_EQ(fresh.cuts, 1) << "it is still known by its name";
   EXPECT_EQ(line_.cuts, 0);
 }
 
 TEST_F(GuardTest, NobodysCallsAreIgnored) {
   guard_.OnMessage("ipv4:203.0.113.1:1");
-  guard_.OnAuthorised("ipv4:203.0.113.1:1");
+  guard_.OnAnswer("ipv4:203.0.113.1:1", true);
   guard_.OnCallEnd("ipv4:203.0.113.1:1");
-  guard_.OnCancelled("ipv4:203.0.113.1:1", 1000);
+  guard_.OnFigures({"ipv4:203.0.113.1:1", 1 << 30}, {.cancelled = 1000});
   EXPECT_EQ(guard_.Look(), sync::kNever);
 }
 

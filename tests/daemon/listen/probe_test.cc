@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <map>
 #include <thread>
 
@@ -32,11 +33,13 @@ class ProbeTest : public ::testing::Test {
 
   // The probe's thread has made so many attempts, and waits for the time to come.
   void AwaitIdle(int attempts) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     for (;;) {
       {
         sync::MutexLock lock(mutex_);
         if (tried_ == attempts && clock_.waiters() == 1) return;
       }
+      ASSERT_LT(std::chrono::steady_clock::now(), end) << tried_ << " attempts";
       std::this_thread::yield();
     }
   }

@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/local/descriptor.h"
+#include "daemon/address/descriptor.h"
 #include "voxeld/v1/local.pb.h"
 
 namespace voxeld::daemon::local {

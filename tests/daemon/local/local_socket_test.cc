@@ -5,6 +5,8 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <filesystem>
+#include <fstream>
 #include <optional>
 
 #include "daemon/local/local_session.h"
@@ -62,6 +64,14 @@ TEST_F(LocalSocketTest, TakesMemoryAndLetsItGo) {
   const v1::LocalAnswer again = client.Call(ReleaseMessage(9));
   EXPECT_EQ(again.refused().id(), 9u);
   EXPECT_THAT(again.refused().message(), HasSubstr("memory 9 is not held"));
+}
+
+TEST_F(LocalSocketTest, AFileThatIsNotItsOwnStays) {
+  Start();
+  std::filesystem::remove(path());
+  std::ofstream(path()) << "another's";
+  socket_.reset();
+  EXPECT_TRUE(std::filesystem::exists(path()));
 }
 
 TEST_F(LocalSocketTest, RefusesAMemoryAndGoesOn) {

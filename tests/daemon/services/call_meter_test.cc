@@ -7,7 +7,7 @@ namespace voxeld::daemon::services {
 namespace {
 
 constexpr char kSocket[] =
-    R"({"socket":{"data":{"lastMessageSentTimestamp":"2026-01-31T12:00:00.5Z","messagesSent":"3",)"
+    R"({"socket":{"data":{"lastMessageSentTimestamp":"2026-01-31T12:00:00.5Z","messagesReceived":"21","messagesSent":"3",)"
     R"("streamsFailed":"7","streamsStarted":"18446744073709551615","streamsSucceeded":"12"},)"
     R"("ref":{"name":"chttp2 ipv4:127.0.0.1:40000","socketId":"5"}}})";
 
@@ -16,6 +16,7 @@ TEST(CallTotals, AreReadFromTheFiguresOfASocket) {
   EXPECT_EQ(totals.started, UINT64_MAX);
   EXPECT_EQ(totals.succeeded, 12u);
   EXPECT_EQ(totals.failed, 7u);
+  EXPECT_EQ(totals.messages, 21u);
 }
 
 TEST(CallTotals, WhatIsNotThereIsNone) {

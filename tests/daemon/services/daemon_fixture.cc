@@ -56,6 +56,7 @@ Daemon::Daemon(DaemonOptions options)
                                            .drain_limit_ns = options.drain_limit_ns,
                                            .max_queued_answers = options.max_queued_answers},
                                .max_scene_watches = options.max_scene_watches,
+                               .max_stats_watches = options.max_stats_watches,
                                .local = local});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);

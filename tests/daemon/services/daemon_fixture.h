@@ -38,6 +38,7 @@ struct DaemonOptions {
   sync::TimeNs drain_limit_ns = 30 * sync::kSecond;
   size_t max_queued_answers = 16384;
   uint32_t max_scene_watches = 64;
+  uint32_t max_stats_watches = 64;
   bool local_socket = false;
   bool stuck = false;  // displays that take volumes and never show one
 };

@@ -226,6 +226,42 @@ TEST(Stats, RefuseAnIntervalOutOfRange) {
   }
 }
 
+TEST(Stats, AreWatchedByNoMoreAtOnceThanAllowed) {
+  DaemonOptions options;
+  options.max_stats_watches = 2;
+  Daemon daemon(options);
+  struct Watch {
+    explicit Watch(Daemon& daemon) {
+      SetDeadline(context);
+      call = daemon.displays().WatchStats(&context, {});
+    }
+    bool Read() {
+      v1::Stats stats;
+      return call->Read(&stats);
+    }
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReader<v1::Stats>> call;
+  };
+  Watch first(daemon), second(daemon);
+  ASSERT_TRUE(first.Read());
+  ASSERT_TRUE(second.Read());
+  Watch third(daemon);
+  EXPECT_FALSE(third.Read());
+  const grpc::Status refused = third.call->Finish();
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("max_stats_watches"));
+  first.context.TryCancel();
+  EXPECT_EQ(first.call->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  // The place of one that has ended is free again.
+  for (bool free = false; !free;) {
+    Watch another(daemon);
+    free = another.Read();
+    if (free) another.context.TryCancel();
+    const grpc::StatusCode code = another.call->Finish().error_code();
+    ASSERT_EQ(code, free ? grpc::StatusCode::CANCELLED : grpc::StatusCode::RESOURCE_EXHAUSTED);
+  }
+}
+
 TEST(WatchVolume, SaysWhyNot) {
   Daemon daemon;
   grpc::ClientContext context;

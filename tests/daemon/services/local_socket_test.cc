@@ -205,7 +205,7 @@ TEST(LocalSocket, AStreamThatTakesUpASessionHasItsOwn) {
   LocalClient older(opened.local_socket());
   ASSERT_TRUE(older.Hello(opened.local_token()).has_welcome());
   const Lines lines = RandomLines(7);
-  const local::Descriptor positions = MakeMemfd(lines.positions);
+  const Descriptor positions = MakeMemfd(lines.positions);
   const v1::LocalMessage memory = MemoryMessage(1, lines.positions.size());
   ASSERT_TRUE(older.Call(memory, {positions.get()}).has_held());
 

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "tests/e2e/hostile/http2_bytes.h"
 
@@ -21,16 +22,18 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr size_t kFramePayload = 16384;
-constexpr size_t kHugeField = 15'000'000;
+constexpr size_t kHugeField = 100'000'000;
 constexpr milliseconds kDrip{100};
 constexpr char kHealthPath[] = "/grpc.health.v1.Health/Check";
+constexpr char kOwnPath[] = "/voxeld.v1.DisplayService/ListDisplays";
+constexpr char kWatchPath[] = "/voxeld.v1.SceneService/WatchScene";
 constexpr char kStreamPath[] = "/voxeld.v1.SceneService/Stream";
 constexpr char kUpdatePath[] = "/voxeld.v1.SceneService/ApplyUpdate";
 
 class Victim {
  public:
-  Victim(const std::string& target, steady_clock::time_point end)
-      : begin_(steady_clock::now()), end_(end), socket_(BeginToConnect(target)) {
+  Victim(const std::string& target, const std::string& source, steady_clock::time_point end)
+      : begin_(steady_clock::now()), end_(end), socket_(BeginToConnect(target, source)) {
     pollfd poll_fd = {socket_, POLLOUT, 0};
     if (socket_ < 0 || poll(&poll_fd, 1, Left()) != 1) return;
     int error = 0;
@@ -100,7 +103,7 @@ class Victim {
     return result_;
   }
 
-  void SetTrusted() { result_.trusted = true; }
+  void SetPrepared() { result_.prepared = true; }
 
  private:
   int Left() const {
@@ -134,12 +137,14 @@ class Victim {
   AttackResult result_;
 };
 
-void HugeHeader(Victim& victim) {
+// Each on a stream of its own; 1 is the first that a client may have.
+void HugeHeader(Victim& victim, uint32_t stream) {
   std::string begin = CallFields(kHealthPath);
   begin.push_back('\0');
   begin += HpackInteger(1, 7) + "x" + HpackInteger(kHugeField, 7);
-  if (!victim.Send(Frame(FrameType::kHeaders, 0, 1, begin))) return;
-  const std::string more = Frame(FrameType::kContinuation, 0, 1, std::string(kFramePayload, 'x'));
+  if (!victim.Send(Frame(FrameType::kHeaders, 0, stream, begin))) return;
+  const std::string more =
+      Frame(FrameType::kContinuation, 0, stream, std::string(kFramePayload, 'x'));
   for (size_t sent = 0; sent < kHugeField; sent += kFramePayload) {
     if (!victim.Send(more)) return;
   }
@@ -156,13 +161,13 @@ void VarintPadding(Victim& victim) {
   }
 }
 
-void ContinuationFlood(Victim& victim) {
-  if (!victim.Send(Frame(FrameType::kHeaders, 0, 1, CallFields(kHealthPath)))) return;
+void ContinuationFlood(Victim& victim, uint32_t stream) {
+  if (!victim.Send(Frame(FrameType::kHeaders, 0, stream, CallFields(kHealthPath)))) return;
   std::string fields;
   for (int i = 0; fields.size() + 16 < kFramePayload; ++i) {
     fields += Field("x" + std::to_string(i), "y");
   }
-  const std::string more = Frame(FrameType::kContinuation, 0, 1, fields);
+  const std::string more = Frame(FrameType::kContinuation, 0, stream, fields);
   while (victim.Send(more)) {
   }
 }
@@ -179,14 +184,19 @@ void Resets(Victim& victim, const char* path, uint32_t stream) {
   }
 }
 
-// One call that is answered.
-bool EarnTrust(Victim& victim) {
-  const bool answered =
-      victim.Send(Frame(FrameType::kHeaders, kEndHeaders, 1, CallFields(kHealthPath)) +
-                  Frame(FrameType::kData, kEndStream, 1, GrpcMessage(""))) &&
-      victim.AwaitFrame(FrameType::kHeaders);
-  if (answered) victim.SetTrusted();
+// One call that is answered, if only with a refusal.
+bool Call(Victim& victim, const char* path, std::string_view message) {
+  const bool answered = victim.Send(Frame(FrameType::kHeaders, kEndHeaders, 1, CallFields(path)) +
+                                    Frame(FrameType::kData, kEndStream, 1, GrpcMessage(message))) &&
+                        victim.AwaitFrame(FrameType::kHeaders);
+  if (answered) victim.SetPrepared();
   return answered;
+}
+
+void Drip(Victim& victim, std::string_view bytes) {
+  for (const char byte : bytes) {
+    if (!victim.Send({&byte, 1}) || !victim.Idle(kDrip)) return;
+  }
 }
 
 void LargeFirstCall(Victim& victim) {
@@ -207,88 +217,125 @@ void LargeFirstCall(Victim& victim) {
   }
 }
 
+constexpr std::pair<Attack, const char*> kNames[] = {
+    {Attack::kHugeHeader, "huge_header"},
+    {Attack::kVarintPadding, "varint_padding"},
+    {Attack::kContinuationFlood, "continuation_flood"},
+    {Attack::kRapidReset, "rapid_reset"},
+    {Attack::kLargeFirstCall, "large_first_call"},
+    {Attack::kSlowLoris, "slow_loris"},
+    {Attack::kSlowCall, "slow_call"},
+    {Attack::kSlowMessage, "slow_message"},
+    {Attack::kHalfOpen, "half_open"},
+    {Attack::kCheckedHugeHeader, "checked_huge_header"},
+    {Attack::kCheckedContinuation, "checked_continuation"},
+    {Attack::kCheckedReset, "checked_reset"},
+    {Attack::kGarbageContinuation, "garbage_continuation"},
+    {Attack::kTrustedHugeHeader, "trusted_huge_header"},
+    {Attack::kTrustedContinuation, "trusted_continuation"},
+    {Attack::kTrustedReset, "trusted_reset"},
+    {Attack::kTrustedUnsentReset, "trusted_unsent_reset"},
+};
+
+void Carry(Attack attack, Victim& victim) {
+  const std::string call = Frame(FrameType::kHeaders, kEndHeaders, 1, CallFields(kUpdatePath));
+  switch (attack) {
+    case Attack::kHugeHeader:
+      return HugeHeader(victim, 1);
+    case Attack::kVarintPadding:
+      return VarintPadding(victim);
+    case Attack::kContinuationFlood:
+      return ContinuationFlood(victim, 1);
+    case Attack::kRapidReset:
+      return Resets(victim, kStreamPath, 1);
+    case Attack::kLargeFirstCall:
+      return LargeFirstCall(victim);
+    case Attack::kSlowLoris:
+      return Drip(victim, kPreface);
+    case Attack::kSlowCall:
+      return Drip(victim, call);
+    case Attack::kSlowMessage:
+      if (!victim.Send(call)) return;
+      return Drip(victim, Frame(FrameType::kData, 0, 1, GrpcMessage(std::string(1000, '\0'))));
+    case Attack::kHalfOpen:
+      return;
+    case Attack::kCheckedHugeHeader:
+      if (Call(victim, kHealthPath, "")) HugeHeader(victim, 3);
+      return;
+    case Attack::kCheckedContinuation:
+      if (Call(victim, kHealthPath, "")) ContinuationFlood(victim, 3);
+      return;
+    case Attack::kCheckedReset:
+      if (Call(victim, kHealthPath, "")) Resets(victim, kStreamPath, 3);
+      return;
+    case Attack::kGarbageContinuation:
+      if (Call(victim, kWatchPath, "\xff\xff\xff")) ContinuationFlood(victim, 3);
+      return;
+    case Attack::kTrustedHugeHeader:
+      if (Call(victim, kOwnPath, "")) HugeHeader(victim, 3);
+      return;
+    case Attack::kTrustedContinuation:
+      if (Call(victim, kOwnPath, "")) ContinuationFlood(victim, 3);
+      return;
+    case Attack::kTrustedReset:
+      if (Call(victim, kOwnPath, "")) Resets(victim, kStreamPath, 3);
+      return;
+    case Attack::kTrustedUnsentReset:
+      if (Call(victim, kOwnPath, "")) Resets(victim, kHealthPath, 3);
+      return;
+  }
+}
+
+in_addr_t Loopback(const std::string& number) {
+  in_addr out = {};
+  const bool parsed = inet_pton(AF_INET, number.c_str(), &out) == 1;
+  return parsed && ntohl(out.s_addr) >> 24 == IN_LOOPBACKNET ? out.s_addr : INADDR_NONE;
+}
+
 }  // namespace
 
 std::vector<Attack> AllAttacks() {
-  return {Attack::kHugeHeader,     Attack::kVarintPadding,     Attack::kContinuationFlood,
-          Attack::kRapidReset,     Attack::kTrustedRapidReset, Attack::kTrustedUnsentReset,
-          Attack::kLargeFirstCall, Attack::kSlowLoris,         Attack::kHalfOpen};
+  std::vector<Attack> out;
+  for (const auto& [attack, name] : kNames) out.push_back(attack);
+  return out;
 }
 
 const char* AttackName(Attack attack) {
-  switch (attack) {
-    case Attack::kHugeHeader:
-      return "huge_header";
-    case Attack::kVarintPadding:
-      return "varint_padding";
-    case Attack::kContinuationFlood:
-      return "continuation_flood";
-    case Attack::kRapidReset:
-      return "rapid_reset";
-    case Attack::kTrustedRapidReset:
-      return "trusted_rapid_reset";
-    case Attack::kTrustedUnsentReset:
-      return "trusted_unsent_reset";
-    case Attack::kLargeFirstCall:
-      return "large_first_call";
-    case Attack::kSlowLoris:
-      return "slow_loris";
-    case Attack::kHalfOpen:
-      return "half_open";
+  for (const auto& [known, name] : kNames) {
+    if (known == attack) return name;
   }
   return "";
 }
 
-AttackResult RunAttack(Attack attack, const std::string& target, steady_clock::time_point end) {
-  Victim victim(target, end);
+bool NeedsTrust(Attack attack) { return attack >= Attack::kTrustedHugeHeader; }
+
+AttackResult RunAttack(Attack attack, const std::string& target, const std::string& source,
+                       steady_clock::time_point end) {
+  Victim victim(target, source, end);
   if (!victim.connected()) return victim.Result();
   const bool silent = attack == Attack::kHalfOpen || attack == Attack::kSlowLoris;
   if (!silent && !victim.Send(Greeting())) return victim.Result();
-  switch (attack) {
-    case Attack::kHugeHeader:
-      HugeHeader(victim);
-      break;
-    case Attack::kVarintPadding:
-      VarintPadding(victim);
-      break;
-    case Attack::kContinuationFlood:
-      ContinuationFlood(victim);
-      break;
-    case Attack::kRapidReset:
-      Resets(victim, kStreamPath, 1);
-      break;
-    case Attack::kTrustedRapidReset:
-      if (EarnTrust(victim)) Resets(victim, kStreamPath, 3);
-      break;
-    case Attack::kTrustedUnsentReset:
-      if (EarnTrust(victim)) Resets(victim, kHealthPath, 3);
-      break;
-    case Attack::kLargeFirstCall:
-      LargeFirstCall(victim);
-      break;
-    case Attack::kSlowLoris:
-      for (const char byte : kPreface) {
-        if (!victim.Send({&byte, 1}) || !victim.Idle(kDrip)) break;
-      }
-      break;
-    case Attack::kHalfOpen:
-      break;
-  }
+  Carry(attack, victim);
   while (victim.Idle(std::chrono::hours(1))) {  // whatever came of it
   }
   return victim.Result();
 }
 
-int BeginToConnect(const std::string& target) {
+int BeginToConnect(const std::string& target, const std::string& source) {
   const size_t colon = target.rfind(':');
-  sockaddr_in name = {};
-  name.sin_family = AF_INET;
-  name.sin_port = htons(static_cast<uint16_t>(std::atoi(target.c_str() + colon + 1)));
-  if (inet_pton(AF_INET, target.substr(0, colon).c_str(), &name.sin_addr) != 1) return -1;
-  if ((ntohl(name.sin_addr.s_addr) >> 24) != IN_LOOPBACKNET) return -1;  // nobody else is attacked
+  sockaddr_in to = {}, from = {};
+  to.sin_family = from.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<uint16_t>(std::atoi(target.c_str() + colon + 1)));
+  to.sin_addr.s_addr = Loopback(target.substr(0, colon));
+  from.sin_addr.s_addr = Loopback(source);
+  // Nobody else is attacked.
+  if (to.sin_addr.s_addr == INADDR_NONE || from.sin_addr.s_addr == INADDR_NONE) return -1;
   const int made = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (made >= 0 && connect(made, reinterpret_cast<sockaddr*>(&name), sizeof(name)) != 0 &&
-      errno != EINPROGRESS) {
+  if (made < 0) return -1;
+  const int on = 1;
+  setsockopt(made, IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, &on, sizeof(on));
+  if (bind(made, reinterpret_cast<sockaddr*>(&from), sizeof(from)) != 0 ||
+      (connect(made, reinterpret_cast<sockaddr*>(&to), sizeof(to)) != 0 && errno != EINPROGRESS)) {
     close(made);
     return -1;
   }

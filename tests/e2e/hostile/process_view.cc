@@ -14,17 +14,20 @@ std::filesystem::path Folder(pid_t process) {
   return std::filesystem::path("/proc") / std::to_string(process);
 }
 
-}  // namespace
-
-uint64_t ResidentKib(pid_t process) {
+uint64_t Figure(pid_t process, const char* name) {
   std::ifstream status(Folder(process) / "status");
   std::string word;
   while (status >> word) {
     uint64_t kib = 0;
-    if (word == "VmRSS:" && status >> kib) return kib;
+    if (word == name && status >> kib) return kib;
   }
   return 0;
 }
+
+}  // namespace
+
+uint64_t ResidentKib(pid_t process) { return Figure(process, "VmRSS:"); }
+uint64_t MostResidentKib(pid_t process) { return Figure(process, "VmHWM:"); }
 
 bool LeaveDescriptors(pid_t process, size_t spare) {
   std::set<size_t> used;

@@ -88,7 +88,7 @@ LayerState RandomState(Chance& chance) {
       for (uint32_t i = 0; i < clip.count; ++i) {
         clip.planes[i] = {static_cast<double>(chance.Pick(2)), chance.OneIn(4) ? 0.0 : 1.0, 0, 1};
       }
-      state.clip = clip;
+      state.clip = std::make_shared<Clip>(clip);
       break;
     }
     case 7: {

@@ -205,7 +205,7 @@ class PlainScene::Commit {
     if (op.order.has_value()) layer.order = *op.order;
     if (op.blend.has_value()) layer.blend = *op.blend;
     if (op.transform.has_value()) layer.transform = *op.transform;
-    if (op.clip.has_value()) layer.clip = *op.clip;
+    if (op.clip != nullptr) layer.clip = *op.clip;
     if (op.region.has_value()) layer.region = *op.region;
     Applied(op.layer);
   }

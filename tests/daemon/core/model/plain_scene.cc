@@ -114,7 +114,7 @@ std::optional<Reason> PlainScene::WrongAlone(const Operation& operation, const L
   if (state->transform.has_value()) {
     if (const auto wrong = WrongMap(*state->transform)) return wrong;
   }
-  if (state->clip.has_value()) {
+  if (state->clip != nullptr) {
     if (state->clip->count > limits.max_clip_planes) return Reason::kQuotaExceeded;
     for (uint32_t i = 0; i < state->clip->count; ++i) {
       const gpu::ClipPlane& p = state->clip->planes[i];

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-namespace voxeld::daemon::listen {
+namespace voxeld::daemon {
 
 class Descriptor {
  public:
@@ -30,4 +30,4 @@ class Descriptor {
   int fd_ = -1;
 };
 
-}  // namespace voxeld::daemon::listen
+}  // namespace voxeld::daemon
