@@ -193,6 +193,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                            .drain_limit_ns = config.server.drain_limit_ns,
                                            .max_queued_answers = config.server.max_queued_answers,
                                            .max_queued_bytes = config.server.max_queued_bytes},
+                               .max_arriving_bytes = config.server.max_arriving_bytes,
                                .connections = config.server.connections,
                                .counters = counters,
                                .max_calls_per_connection = config.server.max_calls_per_connection,

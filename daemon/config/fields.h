@@ -56,6 +56,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
                   24 * kHour);
   visitor.Integer("connection_age_limit_ns", config.server.connection_age_limit_ns, 0, 24 * kHour);
   visitor.Integer("connection_age_grace_ns", config.server.connection_age_grace_ns, 0, kHour);
+  visitor.Integer("max_arriving_bytes", config.server.max_arriving_bytes, 1 << 26,
+                  int64_t{1} << 44);
   visitor.Integer("open_limit_ns", config.server.open_limit_ns, kSecond / 10, kHour);
   visitor.Integer("drain_limit_ns", config.server.drain_limit_ns, 0, kHour);
   visitor.Integer("keepalive_interval_ns", config.server.keepalive_interval_ns, kSecond, kHour);

@@ -18,8 +18,11 @@ std::optional<int64_t> LeastOffset(std::optional<int64_t> before, sync::TimeNs e
                                    sync::TimeNs received, int64_t sent) {
   int64_t offset = 0;
   if (__builtin_sub_overflow(received, sent, &offset)) return before;
-  if (!before.has_value()) return offset;
-  return std::min(offset, *before + elapsed / kDriftDivisor);
+  int64_t least = 0;
+  if (!before.has_value() || __builtin_add_overflow(*before, elapsed / kDriftDivisor, &least)) {
+    return offset;
+  }
+  return std::min(offset, least);
 }
 
 }  // namespace
@@ -194,8 +197,11 @@ Stages Core::Impl::StagesOf(Session& session, const WaitingCommit& commit) {
       LeastOffset(session.clock_offset_ns, commit.received_ns - session.clock_offset_at,
                   commit.received_ns, commit.commit.send_time_ns);
   session.clock_offset_at = commit.received_ns;
-  if (session.clock_offset_ns.has_value()) {
-    stages.sent_ns = commit.commit.send_time_ns + *session.clock_offset_ns;
+  sync::TimeNs sent = 0;
+  if (session.clock_offset_ns.has_value() &&
+      !__builtin_add_overflow(commit.commit.send_time_ns, *session.clock_offset_ns, &sent) &&
+      sent <= commit.received_ns && sent > 0) {
+    stages.sent_ns = sent;
   }
   return stages;
 }

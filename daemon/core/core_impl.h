@@ -178,6 +178,7 @@ class Core::Impl {
   // Drops the objects of an owner who has neither session nor layers, and the owner when nothing is left at all.
   void ForgetOwner(uint64_t owner);
   bool OwnerIsOpen(uint64_t owner) const;
+  void PurgeLingering();
   bool HasLayers(SessionId session) const;  // that it last wrote
   absl::Status TooManySessions() const;
 
@@ -244,6 +245,8 @@ class Core::Impl {
   std::multimap<sync::TimeNs, Timed> timed_;  // by the time at which they are due
   std::set<SessionId> holding_;
   std::multimap<sync::TimeNs, Lingering> lingering_;
+  static constexpr size_t kLeastLingering = 64;
+  size_t purge_lingering_at_ = kLeastLingering;
   SessionId next_session_ = 1;
   uint64_t next_owner_ = 1;
   std::atomic<CaptureId> next_capture_ = 1;

@@ -22,6 +22,14 @@ uint64_t StagedBytes(const Operation& operation) {
     bytes += del->layer.size() + del->id_or_prefix.size();
   } else if (const auto* set = std::get_if<SetTransform>(&operation.op)) {
     bytes += set->layer.size() + set->id.size();
+  } else if (const auto* state = std::get_if<LayerState>(&operation.op)) {
+    bytes += state->layer.size() + (state->clip != nullptr ? sizeof(Clip) : 0);
+  } else if (const auto* begin = std::get_if<FrameBegin>(&operation.op)) {
+    bytes += begin->layer.size();
+  } else if (const auto* end = std::get_if<FrameEnd>(&operation.op)) {
+    bytes += end->layer.size();
+  } else if (const auto* remove = std::get_if<DeleteObject>(&operation.op)) {
+    bytes += remove->object.size();
   }
   return bytes;
 }

@@ -67,6 +67,7 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& option
     if (session.sink != nullptr) {
       session.sink->OnEnded(absl::AbortedError("the session was taken up by another stream"));
     }
+    session.options.on_disconnect = DisconnectPolicy::kKeep;  // its layers are the new stream's
     CloseSession(id, session.incarnation, true, nullptr);
     while (sessions_.contains(id)) Turn(id);
   }
@@ -165,8 +166,7 @@ void Core::Impl::FinishClose(SessionId id) {
       break;
     case DisconnectPolicy::kLinger:
       if (HasLayers(id)) {
-        std::erase_if(lingering_,
-                      [this](const auto& entry) { return !HasLayers(entry.second.session); });
+        PurgeLingering();
         layers_until = After(now, std::max<int64_t>(0, session.options.linger_ns));
         lingering_.emplace(layers_until, Lingering{id, session.owner});
       }
@@ -225,6 +225,17 @@ void Core::Impl::EndDormant(SessionId id) {
   budget_->Release(Budget::Use::kOwed, dormant.outcomes.size() * kOwedBytes);
   resume_tokens_.erase(dormant.resume_token);
   ForgetOwner(dormant.owner);
+}
+
+// What lingered and has no layer left by other means. One walk, when there are twice as many as the last one left.
+void Core::Impl::PurgeLingering() {
+  if (lingering_.size() < purge_lingering_at_) return;
+  std::set<SessionId> alive;
+  store_.snapshot()->layers.ForEach(
+      [&](const OwnedName&, const LayerPtr& layer) { alive.insert(layer->writer->session); });
+  std::erase_if(lingering_,
+                [&](const auto& entry) { return !alive.contains(entry.second.session); });
+  purge_lingering_at_ = std::max(kLeastLingering, 2 * lingering_.size());
 }
 
 bool Core::Impl::HasLayers(SessionId session) const {

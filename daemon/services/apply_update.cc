@@ -20,10 +20,14 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   Update(Core& core, UpdateDone done) : core_(core), done_(std::move(done)) {}
 
   void Start(OpenOptions open, wire::Decoded decoded, uint64_t bytes) {
+    // Until it is staged, or dropped.
+    const std::shared_ptr<void> arriving(nullptr, [budget = core_.budget(), bytes](void*) {
+      budget->Release(Budget::Use::kArriving, bytes);
+    });
     core_.OpenSession(
         std::move(open), bytes, shared_from_this(),
-        [self = shared_from_this(),
-         decoded = std::move(decoded)](absl::StatusOr<SessionInfo> info) mutable {
+        [self = shared_from_this(), decoded = std::move(decoded),
+         arriving](absl::StatusOr<SessionInfo> info) mutable {
           if (!info.ok()) return self->End(info.status());
           {
             sync::MutexLock lock(self->mutex_);
@@ -98,6 +102,14 @@ void ApplyUpdate(ServiceContext& context, std::span<const std::string_view> slic
   uint64_t bytes = 0;
   for (const std::string_view slice : slices) bytes += slice.size();
   OpenOptions open = *std::move(decoded.open);
+  Budget& budget = *context.core.budget();
+  if (!budget.Charge(Budget::Use::kArriving, bytes)) {
+    return done(absl::ResourceExhaustedError(absl::StrCat(
+                    "an update of ", bytes, " bytes would be held beside ", budget.used_bytes(),
+                    " of all clients; max_memory_bytes allows ", budget.limit_bytes(),
+                    "; try again when others have taken something away")),
+                v1::ApplyUpdateResponse());
+  }
   std::make_shared<Update>(context.core, std::move(done))
       ->Start(std::move(open), std::move(decoded), bytes);
 }

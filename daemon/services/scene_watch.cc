@@ -53,6 +53,7 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
       sync::MutexLock lock(mutex_);
       writing_ = false;
       outgoing_.Clear();
+      Release();
       if (end_.has_value()) return Finish(ToGrpc(*end_));
     }
     if (!ok) return End(absl::CancelledError("the client is gone"));
@@ -68,6 +69,7 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
       sync::MutexLock lock(mutex_);
       waiting = waiting_;
       alarm = std::move(alarm_);
+      Release();
     }
     scene_.Cancel(waiting);
     if (counted_) --context_.scene_watches;
@@ -77,6 +79,10 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   }
 
  private:
+  void Release() VOXELD_REQUIRES(mutex_) {
+    context_.core.budget()->Release(Budget::Use::kAnswers, std::exchange(charged_, 0));
+  }
+
   bool Count() {
     uint32_t open = context_.scene_watches;
     while (open < context_.max_scene_watches) {
@@ -98,7 +104,16 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     const grpc::Status packed =
         grpc::SerializationTraits<v1::WatchSceneResponse>::Serialize(message, &bytes, &owned);
     if (!packed.ok()) return End(absl::InternalError("a message could not be put into bytes"));
+    Budget& budget = *context_.core.budget();
+    const uint64_t size = bytes.Length();
+    if (!budget.Charge(Budget::Use::kAnswers, size)) {
+      return End(absl::ResourceExhaustedError(absl::StrCat(
+          "a message of ", size, " bytes would be held beside ", budget.used_bytes(),
+          " of all clients; max_memory_bytes allows ", budget.limit_bytes(),
+          ": watch a layer or an owner alone, or without contents, or try again later")));
+    }
     sync::MutexLock lock(mutex_);
+    charged_ += size;
     if (end_.has_value()) return;
     outgoing_.Swap(&bytes);
     writing_ = true;
@@ -135,6 +150,7 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   sync::Mutex mutex_;
   grpc::ByteBuffer outgoing_ VOXELD_GUARDED_BY(mutex_);
+  uint64_t charged_ VOXELD_GUARDED_BY(mutex_) = 0;  // for `outgoing_`
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);
   SnapshotWaitId waiting_ VOXELD_GUARDED_BY(mutex_) = 0;

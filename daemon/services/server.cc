@@ -4,6 +4,7 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/service_type.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
@@ -128,6 +129,9 @@ class Server::Impl {
     builder.SetMaxReceiveMessageSize(
         static_cast<int>(std::min(context_.core.limits().max_message_bytes, greatest)));
     builder.SetMaxSendMessageSize(-1);
+    grpc::ResourceQuota quota("voxeld");
+    quota.Resize(options_.max_arriving_bytes);
+    builder.SetResourceQuota(quota);
     for (const auto& [name, value] : {
              std::pair(GRPC_ARG_HTTP2_BDP_PROBE, 0),
              {GRPC_ARG_ENABLE_CHANNELZ, 1},  // what call_meter.h reads

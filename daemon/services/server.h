@@ -24,6 +24,8 @@ struct ServerOptions {
   std::vector<Address> listen;  // at least one
   std::string version;
   StreamLimits streams;
+  // Of messages that come in, until they are whole (gRPC's resource quota).
+  uint64_t max_arriving_bytes = uint64_t{1} << 30;
   listen::ConnectionLimits connections;
   // Where the listener counts; none: nobody asks.
   std::shared_ptr<listen::Counters> counters;

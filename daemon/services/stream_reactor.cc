@@ -69,6 +69,13 @@ class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grp
     });
   }
 
+  void Post() override {
+    turn_ = std::make_unique<grpc::Alarm>();
+    turn_->Set(gpr_now(GPR_CLOCK_MONOTONIC), [session = session_](bool due) {
+      if (due) session->OnTurn();
+    });
+  }
+
   void OnReadDone(bool ok) override {
     if (!ok) return session_->OnReadsDone();
     auto message = std::make_unique<Received>();
@@ -93,7 +100,7 @@ class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grp
  private:
   const std::shared_ptr<StreamSession> session_;
   grpc::ByteBuffer incoming_, outgoing_;
-  std::unique_ptr<grpc::Alarm> alarm_;
+  std::unique_ptr<grpc::Alarm> alarm_, turn_;
 };
 
 }  // namespace

@@ -62,33 +62,56 @@ void StreamSession::OnMessage(std::unique_ptr<const ReceivedMessage> message) {
     reading_ = false;
     arrived_.push_back({std::move(message), arrival});
     arrived_bytes_ += arrival.bytes;
-    if (std::exchange(taking_, true)) return Read();
+    if (taking_ || MustPause()) return Read();
+    taking_ = true;
   }
   TakeArrived();
 }
 
+bool StreamSession::MustPause() const {
+  return state_ == State::kOpen && (full_ > 0 || HalfFull());
+}
+
+void StreamSession::Resume() {
+  if (taking_ || arrived_.empty() || MustPause() || port_ == nullptr) return;
+  taking_ = true;
+  port_->Post();
+}
+
+void StreamSession::OnTurn() {
+  {
+    sync::MutexLock lock(mutex_);
+    if (port_ == nullptr || state_ == State::kFinished) return;
+    ++turns_;
+  }
+  TakeArrived();
+  sync::MutexLock lock(mutex_);
+  if (--turns_ == 0 && state_ == State::kFinished && port_ != nullptr) port_->Finish(end_);
+}
+
 void StreamSession::TakeArrived() {
-  std::vector<Arrived> taken;
   for (;;) {
+    Arrived next;
     bool close = false;
     {
       sync::MutexLock lock(mutex_);
-      taken.clear();
-      taken.swap(arrived_);
-      arrived_bytes_ = 0;
-      taking_ = !taken.empty();
-      if (!taking_) close = EndOfReads();
+      taking_ = !arrived_.empty() && !MustPause();
+      if (taking_) {
+        next = std::move(arrived_.front());
+        arrived_.pop_front();
+        arrived_bytes_ -= next.arrival.bytes;
+      } else {
+        close = EndOfReads();
+      }
       Read();
     }
-    if (taken.empty()) {
+    if (next.message == nullptr) {
       if (close) CloseSession();
       return;
     }
-    for (Arrived& next : taken) {
-      TakeMessage(next.message->slices(), next.arrival);
-      next.message.reset();
-      core_.budget()->Release(Budget::Use::kArriving, next.arrival.bytes);
-    }
+    TakeMessage(next.message->slices(), next.arrival);
+    next.message.reset();
+    core_.budget()->Release(Budget::Use::kArriving, next.arrival.bytes);
   }
 }
 
@@ -217,6 +240,7 @@ void StreamSession::TakeOperations(wire::Decoded decoded, const Arrival& arrival
 void StreamSession::OnRoom() {
   sync::MutexLock lock(mutex_);
   --full_;
+  Resume();
   Read();
 }
 
@@ -232,7 +256,7 @@ void StreamSession::OnReadsDone() {
 }
 
 bool StreamSession::EndOfReads() {
-  if (!reads_done_ || taking_) return false;
+  if (!reads_done_ || taking_ || !arrived_.empty()) return false;
   if (state_ == State::kNew) {
     return Close(absl::FailedPreconditionError(
         "the stream ended before its first message, which must be open"));
@@ -252,7 +276,8 @@ void StreamSession::OnAlarm() {
   bool close = false;
   {
     sync::MutexLock lock(mutex_);
-    // Of one that has been replaced meanwhile.
+    // Without a port the context may be gone. Or it is of one that has been replaced meanwhile.
+    if (port_ == nullptr) return;
     if (context_.clock.Now() < alarm_ns_ - kAlarmSlack) return;
     if (state_ == State::kNew) {
       close = Close(absl::DeadlineExceededError(
@@ -341,13 +366,15 @@ void StreamSession::FinishIfFlushed() {
 void StreamSession::Finish() {
   if (state_ == State::kFinished) return;
   state_ = State::kFinished;
-  if (port_ != nullptr) port_->Finish(end_);
+  if (port_ != nullptr && turns_ == 0) port_->Finish(end_);
 }
 
 void StreamSession::OnPortDone() {
   {
     sync::MutexLock lock(mutex_);
     port_ = nullptr;
+    core_.budget()->Release(Budget::Use::kArriving, std::exchange(arrived_bytes_, 0));
+    arrived_.clear();
   }
   context_.calls.Remove(this);
 }
@@ -429,6 +456,7 @@ void StreamSession::OnWritten(bool ok) {
       WriteNext();
     }
     if (crowded && !HalfFull()) wake = intake_;
+    Resume();
     Read();
     FinishIfFlushed();
   }

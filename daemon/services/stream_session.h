@@ -21,6 +21,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <string>
@@ -54,6 +55,7 @@ class StreamPort {
   virtual void Write(const std::string& message) = 0;   // then OnWritten; one at a time
   virtual void Finish(const absl::Status& status) = 0;  // once, and last
   virtual void SetAlarm(sync::TimeNs delay) = 0;  // then OnAlarm; replaces one that was set before
+  virtual void Post() = 0;  // then OnTurn, soon, on a thread of its own; one at a time
 };
 
 // What is read of a stream while something else of it is decoded: enough that neither waits for the
@@ -78,6 +80,7 @@ class StreamSession final : public SessionSink,
   void OnWritten(bool ok);
   void OnCancel();
   void OnAlarm();
+  void OnTurn();
   void OnPortDone();
 
   // ---- from the core
@@ -112,8 +115,11 @@ class StreamSession final : public SessionSink,
     Arrival arrival;
   };
 
-  // Decodes what has arrived, in order, until nothing is left. On one thread at a time.
+  // Decodes what has arrived, in order, until nothing is left or it must pause. On one thread at a time.
   void TakeArrived();
+  // Whether what has arrived waits: for room in the intake, or for the client to read its answers.
+  bool MustPause() const VOXELD_REQUIRES(mutex_);
+  void Resume() VOXELD_REQUIRES(mutex_);
   void TakeMessage(std::span<const std::string_view> slices, Arrival arrival);
   void TakeOpen(OpenOptions open, wire::Decoded decoded, const Arrival& arrival);
   void TakeOperations(wire::Decoded decoded, const Arrival& arrival);
@@ -148,10 +154,12 @@ class StreamSession final : public SessionSink,
   std::string client_name_ VOXELD_GUARDED_BY(mutex_);
   local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until CloseSession
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
-  bool reading_ VOXELD_GUARDED_BY(mutex_) = false;          // a read is pending
-  std::vector<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, not decoded
+  bool reading_ VOXELD_GUARDED_BY(mutex_) = false;         // a read is pending
+  std::deque<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, not decoded
   uint64_t arrived_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
-  bool taking_ VOXELD_GUARDED_BY(mutex_) = false;  // a thread is in TakeArrived
+  bool taking_ VOXELD_GUARDED_BY(mutex_) =
+      false;                                 // a thread is in TakeArrived, or has been asked for
+  int turns_ VOXELD_GUARDED_BY(mutex_) = 0;  // in OnTurn: the port is not finished meanwhile
   // How often the intake was filled and has not had room since; negative while it had sooner than it is known here
   // that it was filled.
   int full_ VOXELD_GUARDED_BY(mutex_) = 0;

@@ -148,6 +148,11 @@ constexpr int kPartsPath[] = {
     v1::ApplyUpdateRequest::kOperationsFieldNumber, v1::StreamRequest::kDefineObjectFieldNumber,
     v1::DefineObject::kDefinitionFieldNumber, v1::Object::kPartsFieldNumber};
 
+constexpr int kPlanesPath[] = {v1::ApplyUpdateRequest::kOperationsFieldNumber,
+                               v1::StreamRequest::kLayerStateFieldNumber,
+                               v1::LayerState::kClipFieldNumber, v1::Clip::kPlanesFieldNumber};
+constexpr uint64_t kMostPlanes = 1024;  // far beyond max_clip_planes, in one message
+
 // Before anything is parsed. A little too many elements are an Issue, later; so many that to unfold
 // them would be a burden end the stream, or refuse the update.
 absl::Status CheckElements(std::span<const std::string_view> slices, uint64_t size,
@@ -172,7 +177,9 @@ absl::Status CheckUpdateElements(std::span<const std::string_view> slices, uint6
   const ElementRow rows[] = {
       {"operations[].batch.upserts", kUpsertsPath, limits.max_operations_per_commit},
       {"operations[].define_object.definition.parts", kPartsPath,
-       std::max(limits.max_operations_per_commit, limits.max_parts_per_object)}};
+       std::max(limits.max_operations_per_commit, limits.max_parts_per_object)},
+      {"operations[].layer_state.clip.planes", kPlanesPath,
+       std::max<uint64_t>(limits.max_operations_per_commit, kMostPlanes)}};
   return CheckElements(slices, size, rows);
 }
 
@@ -329,7 +336,8 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
   const ElementRow rows[] = {
       {"batch.upserts", std::span(kUpsertsPath).subspan(1), limits.max_operations_per_commit},
       {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
-       limits.max_parts_per_object}};
+       limits.max_parts_per_object},
+      {"layer_state.clip.planes", std::span(kPlanesPath).subspan(1), kMostPlanes}};
   if (absl::Status status = CheckElements(slices, size, rows); !status.ok()) return Failed(status);
   Parsed<v1::StreamRequest> parsed;
   if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {

@@ -31,6 +31,7 @@ Offset Greatest(const display::FootprintLists& lists) {
 // Bit i: the i-th of `count` colours (kTileSize at most), each 2^shift words behind the last, is not black.
 uint32_t LitBits(const uint32_t* from, int32_t count, uint32_t shift) {
 #ifdef __SSE2__
+  static_assert(kTileSize == 16, "as many as a mask has bits");
   if (shift == 0 && count == kTileSize) {  // as a rule
     const auto black = [&](int32_t i) {
       return _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from + i)),

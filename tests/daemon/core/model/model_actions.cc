@@ -164,6 +164,7 @@ void ModelRun::Open(uint32_t place, OpenOptions options) {
     for (const std::unique_ptr<Stream>& other : streams_) {
       if (other->open && SessionOf(*other) == &plain_.sessions.at(id)) other->may_end = true;
     }
+    plain_.sessions.at(id).options.on_disconnect = DisconnectPolicy::kKeep;  // its layers go over
     AddFinish(id, /*turns=*/true);
     ends = next_effect_ - 1;
   }

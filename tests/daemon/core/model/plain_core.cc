@@ -31,6 +31,14 @@ uint64_t WeightOf(const Operation& operation) {
     bytes += op->layer.size() + op->id_or_prefix.size();
   } else if (const auto* op = std::get_if<SetTransform>(&operation.op)) {
     bytes += op->layer.size() + op->id.size();
+  } else if (const auto* op = std::get_if<LayerState>(&operation.op)) {
+    bytes += op->layer.size() + (op->clip ? sizeof(Clip) : 0);
+  } else if (const auto* op = std::get_if<FrameBegin>(&operation.op)) {
+    bytes += op->layer.size();
+  } else if (const auto* op = std::get_if<FrameEnd>(&operation.op)) {
+    bytes += op->layer.size();
+  } else if (const auto* op = std::get_if<DeleteObject>(&operation.op)) {
+    bytes += op->object.size();
   }
   return bytes;
 }
