@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/daemon/fakes/simulation.h"
 
 namespace voxeld::daemon {
@@ -299,6 +301,29 @@ TEST(CoreFlow, AFrameGivenUpIsCountedAndItsCommitAnswered) {
   while (sim.Show()) {
   }
   EXPECT_EQ(client.sink->Of<CommitOutcome>().size(), 3u);
+}
+
+TEST(CoreFlow, SendTimesThatNoClockHasAreNoTimes) {
+  Simulation sim;
+  sim.Start();
+  sim.clock.Advance(sync::kSecond);
+  auto client = sim.Open();
+  const sync::TimeNs now = sim.clock.Now();
+  constexpr int64_t kMost = std::numeric_limits<int64_t>::max();
+  for (const int64_t time : {kMost, -kMost - 1, kMost - 5, int64_t{-1}, -kMost, int64_t{1}}) {
+    Operation commit = testing::EndCommit(1);
+    std::get<Commit>(commit.op).send_time_ns = time;
+    std::vector<Operation> all = testing::Sequence(client.last_sequence, std::move(commit));
+    client.last_sequence += all.size();
+    client.info.intake->Take({std::move(all), {}, 10, now, now});
+    sim.core->Step();
+  }
+  const auto accepted = client.sink->Of<Accepted>();
+  ASSERT_THAT(accepted, SizeIs(6));
+  for (const auto& [receipt, what] : accepted) {
+    EXPECT_GE(what.stages.sent_ns, 0);
+    EXPECT_LE(what.stages.sent_ns, now);
+  }
 }
 
 TEST(CoreFlow, StagesAscendAndTheClientsClockIsFound) {

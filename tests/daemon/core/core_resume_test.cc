@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/core/token.h"
+#include "daemon/core/scene_watch.h"
 #include "tests/daemon/fakes/simulation.h"
 
 namespace voxeld::daemon {
@@ -85,6 +86,18 @@ TEST(CoreResume, EndsTheOldStreamAndAppliesWhatItHadSent) {
   EXPECT_EQ(sim.List().total, 1u);
   sim.Send(again, 4, Put("a", "y"));
   EXPECT_EQ(sim.List().total, 2u);
+}
+
+TEST(CoreResume, WhatEndsOneStreamForAnotherLeavesItsLayers) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();  // CLEAR
+  sim.Send(client, 1, Put("a", "x"));
+  auto again = sim.Open(Resuming(client, {}));
+  EXPECT_EQ(sim.List().total, 1u);
+  EXPECT_EQ(sim.core->scene_watch().newest()->total.drawables, 1u) << "as watchers see it";
+  sim.Close(again);
+  EXPECT_EQ(sim.List().total, 0u) << "its own end is as it asked for";
 }
 
 TEST(CoreResume, OutcomesOwedComeToTheNewStream) {

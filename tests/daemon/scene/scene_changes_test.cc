@@ -31,19 +31,17 @@ struct LayerLook {
   int32_t order = 0;
   gpu::BlendMode blend = gpu::BlendMode::kOver;
   gpu::Affine transform;
+  Clip clip;
+  std::optional<gpu::Region> region;
   std::string client_name;
   bool orphaned = false;
   bool operator==(const LayerLook&) const = default;
 };
 
 LayerLook LookOf(const Layer& layer) {
-  return {layer.number,
-          layer.visible,
-          layer.opacity,
-          layer.order,
-          layer.blend,
-          layer.transform,
-          layer.writer->client_name,
+  return {layer.number,       layer.visible, layer.opacity,
+          layer.order,        layer.blend,   layer.transform,
+          layer.clip,         layer.region,  layer.writer->client_name,
           layer.writer->ended};
 }
 
@@ -219,6 +217,26 @@ TEST(SceneChanges, ALayerMadeAgainIsRemovedFirst) {
   watcher.Bring({}, before, f.store.snapshot(), 1, random);
   EXPECT_EQ(watcher.changes_told, 3);  // removed, made, its entity
   EXPECT_EQ(watcher.layers, LayersOf(*f.store.snapshot(), {}));
+}
+
+TEST(SceneChanges, AClipAndARegionAreNews) {
+  StoreFixture f;
+  f.Commit(Put("a", "x", 1));
+  std::mt19937 random(1);
+  Watcher watcher;
+  watcher.Bring({}, nullptr, f.store.snapshot(), 100, random);
+  const auto tells = [&](Operation operation) {
+    const SnapshotPtr before = f.store.snapshot();
+    f.Commit(std::move(operation));
+    watcher.Bring({}, before, f.store.snapshot(), 100, random);
+    EXPECT_EQ(watcher.changes_told, 1);
+    EXPECT_EQ(watcher.layers, LayersOf(*f.store.snapshot(), {}));
+  };
+  tells(testing::SetClip("a", {{1, 0, 0, 2}}));
+  tells(testing::SetClip("a", {{1, 0, 0, 3}}));
+  tells(testing::SetRegion("a", gpu::Region{{0, 0, 0}, {1, 1, 1}}));
+  tells(testing::SetRegion("a", std::nullopt));
+  tells(testing::SetClip("a", {}));
 }
 
 TEST(SceneChanges, CountsAreNoNewsButOrphansAre) {

@@ -107,9 +107,9 @@ std::optional<v1::Stats> AwaitStats(v1::DisplayService::Stub& displays,
   v1::Stats stats;
   bool found = false;
   while (!found && call->Read(&stats)) found = right(stats);
-  EXPECT_TRUE(found) << stats.DebugString();
   context.TryCancel();
-  call->Finish();
+  const grpc::Status ended = call->Finish();
+  EXPECT_TRUE(found) << ended.error_message() << "\n" << stats.DebugString();
   if (!found) return std::nullopt;
   return stats;
 }

@@ -186,6 +186,10 @@ TEST(Decode, AbsurdlyManyElementsAreNotEvenParsed) {
   limits.max_operations_per_commit = 24;
   EXPECT_EQ(DecodeBytes(batch, limits).status.message(),
             "batch.upserts has 100 elements; 24 are allowed");
+  v1::StreamRequest clip;
+  for (int i = 0; i < 5000; ++i) clip.mutable_layer_state()->mutable_clip()->add_planes();
+  EXPECT_EQ(Decode(clip, limits).status.message(),
+            "layer_state.clip.planes has 5000 elements; 1024 are allowed");
   v1::StreamRequest object;
   for (int i = 0; i < 50; ++i) object.mutable_define_object()->mutable_definition()->add_parts();
   limits.max_parts_per_object = 10;
