@@ -108,6 +108,7 @@ sync::TimeNs FramePipeline::Step() {
   if (show_again_ && !drawing_.has_value() && showing() && display_->mailbox_free()) {
     next = std::min(next, show_again_at_);
   }
+  if (draw_from_ > clock_.Now()) next = std::min(next, draw_from_);
   return next;
 }
 
@@ -197,12 +198,24 @@ gpu::Target FramePipeline::CurrentTarget() const {
           pattern_ == TestPattern::kNone ? scene_to_voxel_ : gpu::Affine()};
 }
 
+sync::TimeNs FramePipeline::DrawFrom() const {
+  if (urgent_ || show_again_ || settings_changed_ || target_stale_ || last_submitted_ == 0 ||
+      !captures_.empty()) {
+    return 0;
+  }
+  const std::vector<sync::TimeNs> coming = display_->ComingSweeps(2);
+  if (coming.size() < 2) return 0;
+  return coming[0] - 2 * draw_ns_ - (coming[1] - coming[0]) / 4;
+}
+
 bool FramePipeline::MaybeDraw() {
   if (drawing_.has_value()) return false;
   if (care_ != nullptr && care_->ready()) TakeReturned();
   if (newest_ == nullptr || !showing() || !(display_->mailbox_free() || urgent_)) return false;
   const bool changed = newest_->number != drawn_snapshot_ || settings_changed_;
   if (!changed && !(show_again_ && clock_.Now() >= show_again_at_)) return false;
+  draw_from_ = DrawFrom();
+  if (clock_.Now() < draw_from_) return false;
 
   urgent_ = false;
   const SnapshotPtr newest = newest_;
@@ -290,6 +303,7 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   SetEngineBytes(result->memory_bytes);
   singular_drawables_ = result->singular_drawables;
   const sync::TimeNs now = clock_.Now();
+  draw_ns_ = std::max(now - drawing.began, draw_ns_ - draw_ns_ / 8);
   drawing.stages.drawing_ns = drawing.began;
   drawing.stages.sliced_ns = now;
   drawing.stages.assembled_ns = std::max(drawing.began, now - result->slice_ns);

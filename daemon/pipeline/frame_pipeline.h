@@ -14,6 +14,8 @@
 // - The first shows whatever the scene is, if only darkness. From then on a volume is drawn only if
 //   the scene, the view or the test pattern has changed, and handed over only if its bytes differ
 //   from the one before.
+// - Where the display tells of its coming sweeps, a plain commit is drawn as late as it still comes to the next
+//   one: what is shown is then as new as it can be. What has a time, a setting or a capture is drawn at once.
 // - While the display is absent or blanked nothing is drawn; when it shows again
 //   it gets the newest scene.
 // - If the volume handed over last was lost, the next drawn is handed over even if it
@@ -145,6 +147,10 @@ class FramePipeline final : private display::Display::Listener {
 
   bool showing() const { return display_->state() == display::DisplayState::kShowing; }
   std::string WhyNotShowing() const;
+  // When to begin drawing the newest: as late as it still comes to the next sweep, twice the time that frames take of
+  // late and a quarter of a sweep before it, so that what is shown is as new as it can be. 0, which is at once,
+  // where sweeps are not known, and for all that is not a plain commit.
+  sync::TimeNs DrawFrom() const;
   bool MaybeDraw();
   absl::StatusOr<EngineCare::Made> Make(gpu::EngineOptions options);
   bool HaveEngine();
@@ -217,6 +223,7 @@ class FramePipeline final : private display::Display::Listener {
 
   RiderBook riders_;
   uint64_t lit_voxels_ = 0, singular_drawables_ = 0;
+  sync::TimeNs draw_from_ = 0, draw_ns_ = 0;  // what a frame takes: the most of late
   const std::shared_ptr<Budget> budget_;
   uint64_t engine_bytes_ = 0;  // charged
   uint64_t volumes_drawn_ = 0, volumes_unchanged_ = 0;

@@ -124,6 +124,29 @@ TEST(CoreFlow, ATimedCommitIsInTheFirstVolumeWhoseSweepStartsThenOrLater) {
   EXPECT_EQ(AcceptedOf(client), 1u);
 }
 
+TEST(CoreFlow, APlainCommitIsDrawnAsLateAsItStillComesToTheNextSweep) {
+  Simulation sim;
+  sim.Start();
+  const sync::TimeNs zero = sim.clock.Now();
+  sim.display().sweep_start_ns = zero;
+  sim.display().sweep_period_ns = 100 * sync::kMillisecond;
+  auto client = sim.Open();
+  const size_t drawn = sim.engine().frames.size();
+  sim.Advance(10 * sync::kMillisecond);
+  sim.Send(client, 1, Put("a", "x", 1));
+  EXPECT_EQ(AcceptedOf(client), 1u) << "it is applied at once";
+  sim.Advance(64 * sync::kMillisecond);
+  sim.Send(client, 2, Put("a", "x", 2));
+  EXPECT_EQ(sim.engine().frames.size(), drawn);
+  sim.Advance(sync::kMillisecond);  // a quarter of a sweep before the next
+  EXPECT_EQ(sim.engine().frames.size(), drawn + 1);
+  EXPECT_TRUE(sim.Show());
+  ASSERT_THAT(client.sink->OutcomesOf(1), SizeIs(1));
+  EXPECT_EQ(client.sink->OutcomesOf(1)[0].kind, CommitOutcome::Kind::kSuperseded);
+  ASSERT_THAT(client.sink->OutcomesOf(2), SizeIs(1));
+  EXPECT_EQ(client.sink->OutcomesOf(2)[0].kind, CommitOutcome::Kind::kPresented);
+}
+
 TEST(CoreFlow, ADueCommitTakesThePlaceOfTheVolumeThatWaits) {
   Simulation sim;
   sim.Start();
