@@ -20,12 +20,13 @@ constexpr sync::TimeNs kAlarmSlack = 10 * sync::kMillisecond;
 void StreamSession::Start() {
   context_.calls.Add(shared_from_this());
   sync::MutexLock lock(mutex_);
-  SetAlarm(context_.limits.open_limit_ns);
+  SetAlarm(&StreamLimits::open_limit_ns);
   Read();
 }
 
-void StreamSession::SetAlarm(sync::TimeNs delay) {
-  if (port_ == nullptr) return;
+void StreamSession::SetAlarm(sync::TimeNs StreamLimits::*limit) {
+  if (port_ == nullptr) return;  // and the context may be gone
+  const sync::TimeNs delay = context_.limits.*limit;
   alarm_ns_ = context_.clock.Now() + delay;
   port_->SetAlarm(delay);
 }
@@ -263,7 +264,7 @@ bool StreamSession::EndOfReads() {
   }
   if (state_ != State::kOpen) return false;
   state_ = State::kDraining;
-  SetAlarm(context_.limits.drain_limit_ns);
+  SetAlarm(&StreamLimits::drain_limit_ns);
   return Drained();
 }
 
@@ -322,7 +323,7 @@ bool StreamSession::Close(const absl::Status& status) {
   // nothing is waited for.
   const bool session = session_ != 0;
   state_ = session ? State::kClosing : State::kFlushing;
-  SetAlarm(context_.limits.drain_limit_ns);
+  SetAlarm(&StreamLimits::drain_limit_ns);
   if (!session) FinishIfFlushed();
   return session;
 }

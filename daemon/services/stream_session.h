@@ -127,7 +127,7 @@ class StreamSession final : public SessionSink,
   void Read() VOXELD_REQUIRES(mutex_);
   bool FarAhead() const VOXELD_REQUIRES(mutex_);
   bool HalfFull() const VOXELD_REQUIRES(mutex_);
-  void SetAlarm(sync::TimeNs delay) VOXELD_REQUIRES(mutex_);
+  void SetAlarm(sync::TimeNs StreamLimits::*limit) VOXELD_REQUIRES(mutex_);
   // Whether there is anybody to be told.
   bool Listening() const VOXELD_REQUIRES(mutex_);
   void WriteNext() VOXELD_REQUIRES(mutex_);
