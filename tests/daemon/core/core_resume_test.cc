@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/core/token.h"
 #include "daemon/core/scene_watch.h"
+#include "daemon/core/token.h"
 #include "tests/daemon/fakes/simulation.h"
 
 namespace voxeld::daemon {
