@@ -27,11 +27,22 @@ std::shared_ptr<grpc::Channel> NewChannel(const std::string& target) {
   return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
 }
 
+// Over a connection that may still have to be made, and may have to be tried again: the descriptors of before may not
+// quite have come back.
+bool Answers(v1::DisplayService::Stub& stub) {
+  grpc::ClientContext context;
+  daemon::services::SetDeadline(context);
+  context.set_wait_for_ready(true);
+  v1::ListDisplaysResponse response;
+  return stub.ListDisplays(&context, {}, &response).ok();
+}
+
 }  // namespace
 
 std::optional<double> ExhaustAndRecover(const Daemon& daemon) {
   // A connection of before, over which the daemon says how it is.
   const auto watch = v1::DisplayService::NewStub(NewChannel(daemon.unix_target()));
+  if (!Answers(*watch)) return {};
   const auto before = daemon::services::AwaitStats(*watch, [](const v1::Stats&) { return true; });
   if (!before.has_value()) return {};
   if (!LeaveDescriptors(daemon.process_id(), kSpare)) return {};
@@ -46,11 +57,7 @@ std::optional<double> ExhaustAndRecover(const Daemon& daemon) {
 
   const auto begin = steady_clock::now();
   const auto stub = v1::DisplayService::NewStub(NewChannel(daemon.tcp_target()));
-  grpc::ClientContext context;
-  daemon::services::SetDeadline(context);
-  context.set_wait_for_ready(true);
-  v1::ListDisplaysResponse response;
-  if (!stub->ListDisplays(&context, {}, &response).ok()) return {};
+  if (!Answers(*stub)) return {};
   return std::chrono::duration<double>(steady_clock::now() - begin).count();
 }
 
