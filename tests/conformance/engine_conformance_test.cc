@@ -32,7 +32,7 @@ TEST_P(EngineConformance, RandomScenesEqualTheOracle) {
     lit += CountLit(engine.Voxels());
   }
   std::cout << lit << " voxels lit\n";
-  EXPECT_GT(lit, static_cast<uint64_t>(DeltasWanted())) << "something is to be seen, as a rule";
+  EXPECT_GT(lit, 10000u);
 }
 
 TEST_P(EngineConformance, PartsJoinedEqualTheWhole) {
@@ -169,7 +169,7 @@ TEST_P(EngineConformance, ThousandDeltasEqualTheSceneDrawnWhole) {
   }
   EXPECT_EQ(compared, DeltasWanted());
   std::cout << lit << " voxels lit in all frames\n";
-  EXPECT_GT(lit, static_cast<uint64_t>(DeltasWanted())) << "something is to be seen, as a rule";
+  EXPECT_GT(lit, 10000u);
   ASSERT_TRUE(engine.Frame().ok());
   const DenseVolume want = OracleVoxels(scene, target);
   EXPECT_EQ(FirstDifference(engine.Voxels(), want, target), "");

@@ -264,13 +264,18 @@ TEST_F(Hostile, OverAUnixSocketWhoDoesNotAwaitOpenedIsServedAllTheSame) {
   EXPECT_EQ(now.cut_for_bytes() + now.cut_for_greeting() + now.cut_for_flooding(), 0u);
 }
 
-TEST_F(Hostile, OnAWarmConnectionWhoDoesNotAwaitOpenedIsServedAllTheSame) {
-  const auto channel = NewChannel(daemon_.tcp_target());
-  const auto scene = v1::SceneService::NewStub(channel);
+// Over which a call has been answered.
+std::shared_ptr<grpc::Channel> WarmChannel(const std::string& target) {
+  const auto channel = NewChannel(target);
   grpc::ClientContext context;
   SetDeadline(context);
   v1::ListDisplaysResponse displays;
-  ASSERT_TRUE(v1::DisplayService::NewStub(channel)->ListDisplays(&context, {}, &displays).ok());
+  EXPECT_TRUE(v1::DisplayService::NewStub(channel)->ListDisplays(&context, {}, &displays).ok());
+  return channel;
+}
+
+TEST_F(Hostile, OnAWarmConnectionWhoDoesNotAwaitOpenedIsServedAllTheSame) {
+  const auto scene = v1::SceneService::NewStub(WarmChannel(daemon_.tcp_target()));
   for (int i = 0; i < 5; ++i) {
     const grpc::Status status = SendAllAtOnce(*scene);
     EXPECT_TRUE(status.ok()) << status.error_message();
@@ -307,12 +312,7 @@ grpc::Status Update(v1::SceneService::Stub& scene) {
 }
 
 TEST_F(Hostile, ALargeUpdateOnAWarmConnectionIsTakenAndAsAFirstCallItIsCut) {
-  const auto channel = NewChannel(daemon_.tcp_target());
-  const auto scene = v1::SceneService::NewStub(channel);
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::ListDisplaysResponse displays;
-  ASSERT_TRUE(v1::DisplayService::NewStub(channel)->ListDisplays(&context, {}, &displays).ok());
+  const auto scene = v1::SceneService::NewStub(WarmChannel(daemon_.tcp_target()));
   for (int i = 0; i < 3; ++i) {
     const grpc::Status status = Update(*scene);
     EXPECT_TRUE(status.ok()) << status.error_message();
