@@ -61,7 +61,8 @@ class Listener::Impl {
         serve_(std::move(serve)),
         options_(options),
         gate_(clock, options.log),
-        sockets_(std::move(sockets)) {}
+        sockets_(std::move(sockets)),
+        resting_(sockets_.size(), false) {}
 
   ~Impl() {
     {
@@ -128,13 +129,16 @@ class Listener::Impl {
       }
       const int n = epoll_wait(epoll_.get(), events.data(), kEvents, Timeout());
       for (int i = 0; i < n; ++i) Handle(events[static_cast<size_t>(i)]);
-      if (retry_ <= clock_.Now()) Resume();
+      const sync::TimeNs now = clock_.Now();
+      if (retry_ <= now) Resume();
+      if (rest_until_ <= now) EndRest();
     }
   }
 
   int Timeout() const {
-    if (retry_ == sync::kNever) return -1;
-    const sync::TimeNs left = std::max<sync::TimeNs>(0, retry_ - clock_.Now());
+    const sync::TimeNs due = std::min(retry_, rest_until_);
+    if (due == sync::kNever) return -1;
+    const sync::TimeNs left = std::max<sync::TimeNs>(0, due - clock_.Now());
     return static_cast<int>((left + sync::kMillisecond - 1) / sync::kMillisecond);
   }
 
@@ -146,7 +150,7 @@ class Listener::Impl {
       return;
     }
     if (word < kConnections) {
-      if (word - 1 < sockets_.size()) Accept(sockets_[word - 1]);
+      if (word - 1 < sockets_.size()) Accept(word - 1);
       return;
     }
     const auto stranger = strangers_.find(word - kConnections);
@@ -167,8 +171,10 @@ class Listener::Impl {
     return reserve_.ok();
   }
 
-  void Accept(const ListeningSocket& socket) {
+  void Accept(size_t index) {
+    const ListeningSocket& socket = sockets_[index];
     for (int i = 0; i < kAcceptsAtOnce; ++i) {
+      if (refusals_ >= kRefusals && MustRest()) return Rest(index);
       if (!Reserve()) return Pause(std::strerror(errno));
       SocketName name;
       Descriptor connection(
@@ -202,7 +208,10 @@ class Listener::Impl {
                   absl::StrCat("user ", who->user, ", process ", who->process));
       }
     }
-    if (!own && !guard_.MayEnter(peer).ok()) return true;
+    if (!own && !guard_.MayEnter(peer).ok()) {
+      if (refusals_++ == 0) refusing_since_ = clock_.Now();
+      return true;
+    }
     if (!peer.unix_socket) {
       const int on = 1;
       setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
@@ -286,6 +295,27 @@ class Listener::Impl {
     strangers_.erase(at);
   }
 
+  bool MustRest() {
+    if (clock_.Now() < refusing_since_ + kRefusalInterval) return true;
+    refusals_ = 0;
+    return false;
+  }
+
+  void Rest(size_t index) {
+    rest_until_ = refusing_since_ + kRefusalInterval;
+    resting_[index] = true;
+    Change(sockets_[index].descriptor(), 0, 1 + index);
+  }
+
+  void EndRest() {
+    rest_until_ = sync::kNever;
+    refusals_ = 0;
+    for (size_t i = 0; i < sockets_.size(); ++i) {
+      if (resting_[i] && retry_ == sync::kNever) Change(sockets_[i].descriptor(), EPOLLIN, 1 + i);
+    }
+    resting_.assign(resting_.size(), false);
+  }
+
   void Pause(const std::string& why) {
     ++counters_.accept_failures;
     if (retry_ == sync::kNever && options_.log != nullptr) {
@@ -307,8 +337,9 @@ class Listener::Impl {
   void Resume() {
     paused_ = false;
     for (size_t i = 0; i < sockets_.size(); ++i) {
+      resting_[i] = false;
       Change(sockets_[i].descriptor(), EPOLLIN, 1 + i);
-      if (!paused_) Accept(sockets_[i]);
+      if (!paused_) Accept(i);
     }
     if (paused_) return;
     retry_ = sync::kNever;
@@ -336,6 +367,10 @@ class Listener::Impl {
   Descriptor reserve_;
   sync::TimeNs retry_ = sync::kNever;
   bool paused_ = false;  // during Resume: again
+  // Refused since `refusing_since_`; addresses that are not listened to until `rest_until_`.
+  int refusals_ = 0;
+  sync::TimeNs refusing_since_ = 0, rest_until_ = sync::kNever;
+  std::vector<bool> resting_;
   std::thread thread_;
 };
 

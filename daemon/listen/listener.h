@@ -2,7 +2,8 @@
 // gRPC's own gives up for good when descriptors run out once, and has no limits.
 //
 //   out of descriptors   clients wait in the system's queue; the listener tries again every kRetry
-//   over a limit         closed at once, counted, logged (guard.h)
+//   over a limit         closed at once, counted, logged (guard.h); when many are, an address is left
+//                        alone for the rest of kRefusalInterval, so that they cost others little
 //   over TCP             kept here until a call begins (greeting.h), and only then served
 //   the rest             under the guard until it is closed
 #pragma once
@@ -58,6 +59,10 @@ struct ListenerOptions {
 class Listener {
  public:
   static constexpr sync::TimeNs kRetry = 100 * sync::kMillisecond;
+  // So many are refused in an interval; those beyond wait in the system's queue, and with them
+  // whoever comes after them.
+  static constexpr int kRefusals = 16;
+  static constexpr sync::TimeNs kRefusalInterval = 10 * sync::kMillisecond;
 
   // `guard`, `counters`, `own` and the clock outlive the listener. Accepts from now on, on a thread
   // of its own.

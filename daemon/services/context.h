@@ -23,6 +23,8 @@ struct StreamLimits {
   // Of answers that a client has not read. Beyond, its stream ends with RESOURCE_EXHAUSTED.
   size_t max_queued_answers = 16384;
   size_t max_queued_bytes = 16u << 20;
+  // How long a message of WatchScene may wait for its client before the watch ends.
+  sync::TimeNs watch_write_limit_ns = 30 * sync::kSecond;
 };
 
 // Outlives the services; the core and the clock outlive it.

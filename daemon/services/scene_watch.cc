@@ -1,5 +1,6 @@
 // SceneService.WatchScene: each message is made when gRPC has taken the last one, so that a client
-// that does not read holds one message and two snapshots, and nothing waits for it.
+// that does not read holds one message and two snapshots, and nothing waits for it. After
+// watch_write_limit_ns it holds the message alone.
 #include <grpcpp/alarm.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
@@ -64,17 +65,19 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   void OnDone() override {
     SnapshotWaitId waiting = 0;
-    std::unique_ptr<grpc::Alarm> alarm;
+    std::unique_ptr<grpc::Alarm> alarm, stall_alarm;
     {
       sync::MutexLock lock(mutex_);
       waiting = waiting_;
       alarm = std::move(alarm_);
+      stall_alarm = std::move(stall_alarm_);
       Release();
     }
     scene_.Cancel(waiting);
     if (counted_) --context_.scene_watches;
     context_.calls.Remove(this);
     alarm.reset();
+    stall_alarm.reset();
     const std::shared_ptr<SceneWatchCall> last = std::move(self_);
   }
 
@@ -117,7 +120,34 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     if (end_.has_value()) return;
     outgoing_.Swap(&bytes);
     writing_ = true;
+    stall_at_ = context_.clock.Now() + context_.limits.watch_write_limit_ns;
     StartWrite(&outgoing_);
+    if (stall_alarm_ == nullptr) LookForStallAt(stall_at_);
+  }
+
+  // One alarm for many messages: it looks when the one that was written first would be late.
+  void LookForStallAt(sync::TimeNs at) VOXELD_REQUIRES(mutex_) {
+    const sync::TimeNs wait = std::max<sync::TimeNs>(0, at - context_.clock.Now());
+    stall_alarm_ = std::make_unique<grpc::Alarm>();
+    stall_alarm_->Set(
+        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(wait, GPR_TIMESPAN)),
+        [self = shared_from_this()](bool due) {
+          if (due) self->LookForStall();
+        });
+  }
+
+  // What gRPC does not take stays, so that its client learns why when it reads on.
+  void LookForStall() {
+    SnapshotPtr told, target;  // go without the lock
+    sync::MutexLock lock(mutex_);
+    if (end_.has_value()) return;
+    if (!writing_) return stall_alarm_.reset();
+    if (context_.clock.Now() < stall_at_) return LookForStallAt(stall_at_);
+    end_ = absl::ResourceExhaustedError(absl::StrCat(
+        "the client took no message for ", context_.limits.watch_write_limit_ns / 1'000'000,
+        " ms, which is watch_write_limit_ns: the scene is no longer held for it; read on while "
+        "watching, or watch anew"));
+    messages_.LetGo(&told, &target);  // nobody has the turn while a message is written, nor after
   }
 
   void AwaitNewer() {
@@ -152,9 +182,11 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   grpc::ByteBuffer outgoing_ VOXELD_GUARDED_BY(mutex_);
   uint64_t charged_ VOXELD_GUARDED_BY(mutex_) = 0;  // for `outgoing_`
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
+  sync::TimeNs stall_at_ VOXELD_GUARDED_BY(mutex_) = 0;  // of `outgoing_`
   std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);
   SnapshotWaitId waiting_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<grpc::Alarm> alarm_ VOXELD_GUARDED_BY(mutex_);
+  std::unique_ptr<grpc::Alarm> stall_alarm_ VOXELD_GUARDED_BY(mutex_);
 };
 
 }  // namespace

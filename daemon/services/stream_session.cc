@@ -386,7 +386,7 @@ bool StreamSession::Listening() const {
 
 template <typename Answer>
 void StreamSession::Tell(const Answer& answer) {
-  bool close = false, lost = false;
+  bool close = false, lost = false, inherited = false;
   SessionId session = 0;
   {
     sync::MutexLock lock(mutex_);
@@ -394,7 +394,8 @@ void StreamSession::Tell(const Answer& answer) {
     if constexpr (std::is_same_v<Answer, Receipt>) {
       if (std::holds_alternative<CommitOutcome>(answer.what)) {
         // One of a former stream's was never counted here.
-        if (answer.incarnation == incarnation_ && outcomes_owed_ > 0) --outcomes_owed_;
+        inherited = answer.incarnation != incarnation_;
+        if (!inherited && outcomes_owed_ > 0) --outcomes_owed_;
       } else if (!std::holds_alternative<Scheduled>(answer.what)) {
         if (unanswered_ > 0) --unanswered_;
         const auto* accepted = std::get_if<Accepted>(&answer.what);
@@ -402,7 +403,12 @@ void StreamSession::Tell(const Answer& answer) {
       }
     }
     const bool listening = Listening();
+    const size_t bytes_before = answers_.bytes();
     const bool added = !listening || answers_.Add(answer);
+    if (inherited && listening && added) {
+      ++inherited_;
+      inherited_bytes_ += answers_.bytes() - bytes_before;
+    }
     lost = !listening || !added;
     WriteNext();
     close = Overrun(added) || Drained();
@@ -425,8 +431,8 @@ void StreamSession::OnCredit(uint64_t total_bytes) {
 
 bool StreamSession::Overrun(bool added) {
   if (!Listening()) return false;
-  if (added && answers_.size() <= context_.limits.max_queued_answers &&
-      answers_.bytes() <= context_.limits.max_queued_bytes) {
+  if (added && answers_.size() <= context_.limits.max_queued_answers + inherited_ &&
+      answers_.bytes() <= context_.limits.max_queued_bytes + inherited_bytes_) {
     return false;
   }
   core_.CountOverrun();

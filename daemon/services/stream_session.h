@@ -167,6 +167,9 @@ class StreamSession final : public SessionSink,
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;
   uint64_t unanswered_ VOXELD_GUARDED_BY(mutex_) = 0;  // commits without Accepted or Refused
   uint64_t outcomes_owed_ VOXELD_GUARDED_BY(mutex_) = 0;
+  // Outcomes of former streams that were queued here, and what they held: not what the client left unread.
+  size_t inherited_ VOXELD_GUARDED_BY(mutex_) = 0;
+  size_t inherited_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t sequence_ VOXELD_GUARDED_BY(mutex_) = 0;  // of the last request
   AnswerQueue answers_ VOXELD_GUARDED_BY(mutex_);
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;

@@ -43,6 +43,13 @@ class WatchMessages {
   // message can hold.
   absl::Status Next(v1::WatchSceneResponse* out);
 
+  // Gives its snapshots away: the watch is over.
+  void LetGo(SnapshotPtr* told, SnapshotPtr* target) {
+    changes_.reset();
+    told_.swap(*told);
+    target_.swap(*target);
+  }
+
  private:
   const bool contents_;
   const size_t message_bytes_;

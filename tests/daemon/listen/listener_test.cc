@@ -224,6 +224,23 @@ TEST_F(ListenerTest, AStrangerWhoseGreetingIsNoneIsCutAndItsAddressRefused) {
   EXPECT_EQ(counters_.Read().refused_after_cut, 1u);
 }
 
+TEST_F(ListenerTest, ThoseThatAreRefusedAreTakenAtAMeasuredPace) {
+  const std::vector<SocketName> names =
+      Start("127.0.0.1:0", {.cut_penalty_ns = 3600 * sync::kSecond});
+  const Descriptor cut = Connect(names[0]);
+  Send(cut.get(), "GET / HTTP/1.1\r\n\r\n");
+  ASSERT_TRUE(Ends(cut.get()));
+  ASSERT_TRUE(Await([&] { return counters_.Read().open == 0; }));
+
+  constexpr int kIntervals = 5;
+  constexpr int kMany = kIntervals * Listener::kRefusals + 1;
+  const sync::TimeNs begin = clock_.Now();
+  for (int i = 0; i < kMany; ++i) EXPECT_TRUE(Ends(Connect(names[0]).get()));
+  EXPECT_EQ(counters_.Read().refused_after_cut, uint64_t{kMany});
+  EXPECT_GE(clock_.Now() - begin, kIntervals * Listener::kRefusalInterval);
+  EXPECT_EQ(served(), 0u);
+}
+
 TEST_F(ListenerTest, AStrangerWhoGoesIsGoneAtOnce) {
   const std::vector<SocketName> names =
       Start("127.0.0.1:0", {.unauthorised_limit_ns = 3600 * sync::kSecond});

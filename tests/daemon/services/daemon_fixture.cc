@@ -54,7 +54,8 @@ Daemon::Daemon(DaemonOptions options)
                                .version = "9.8.7",
                                .streams = {.open_limit_ns = options.open_limit_ns,
                                            .drain_limit_ns = options.drain_limit_ns,
-                                           .max_queued_answers = options.max_queued_answers},
+                                           .max_queued_answers = options.max_queued_answers,
+                                           .watch_write_limit_ns = options.watch_write_limit_ns},
                                .max_scene_watches = options.max_scene_watches,
                                .max_stats_watches = options.max_stats_watches,
                                .local = local});

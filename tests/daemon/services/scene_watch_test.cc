@@ -192,20 +192,51 @@ TEST(WatchScene, OrphansAreTold) {
 
 // One that does not read holds two snapshots, however many there are, and holds nobody up; then it
 // comes to the newest by few change sets.
+constexpr uint32_t kPoints = 80'000;  // near a megabyte
+
+// A connection whose transport takes no more unread as time goes on.
+std::unique_ptr<v1::SceneService::Stub> StubOfFixedWindow(const Daemon& daemon) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  return v1::SceneService::NewStub(
+      grpc::CreateCustomChannel(daemon.target(), grpc::InsecureChannelCredentials(), arguments));
+}
+
+TEST(WatchScene, WhoTakesNothingForTooLongHoldsNothing) {
+  DaemonOptions options;
+  options.watch_write_limit_ns = 200 * sync::kMillisecond;
+  Daemon daemon(options);
+  Client client(daemon.scene());
+  client.Open(NoOutcomes());
+  for (int n = 0; n < 6; ++n) client.Send(PointsIn("layer", absl::StrCat(n), kPoints));
+  CommitNow(client, 1);
+  const std::weak_ptr<const Snapshot> first = daemon.core().scene_watch().newest();
+  const auto stub = StubOfFixedWindow(daemon);
+  Watcher idle(*stub, Request(0, "", true));
+  Watcher busy(daemon.scene(), Request(0, "", true));
+  ASSERT_TRUE(idle.Read());
+  EXPECT_EQ(idle.change_sets, 0);
+  client.Send(PointsIn("layer", "0", kPoints));
+  busy.ReadTo(CommitNow(client, 2));
+  // Held for the idle one, until its time is over.
+  for (int tries = 0; !first.expired() && tries < 100'000; ++tries) daemon.Stats();
+  EXPECT_TRUE(first.expired());
+  const grpc::Status ended = idle.Finish();
+  EXPECT_EQ(ended.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(ended.error_message(), HasSubstr("took no message for 200 ms"));
+  EXPECT_THAT(ended.error_message(), HasSubstr("watch_write_limit_ns"));
+  busy.ExpectNewest(daemon);
+}
+
 TEST(WatchScene, NothingIsQueuedForWhoDoesNotRead) {
   Daemon daemon;
   Client client(daemon.scene());
   client.Open(NoOutcomes());
   constexpr int kClouds = 6;
-  constexpr uint32_t kPoints = 80'000;  // near a megabyte
   for (int n = 0; n < kClouds; ++n) client.Send(PointsIn("layer", absl::StrCat(n), kPoints));
   const uint64_t first = CommitNow(client, 1);
-  // What its client's transport takes unread does not grow.
-  grpc::ChannelArguments arguments;
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  const auto stub = v1::SceneService::NewStub(
-      grpc::CreateCustomChannel(daemon.target(), grpc::InsecureChannelCredentials(), arguments));
+  const auto stub = StubOfFixedWindow(daemon);
   Watcher idle(*stub, Request(0, "", true));
   Watcher busy(daemon.scene(), Request(0, "", true));
   ASSERT_TRUE(idle.Read());  // the first cloud: it has begun

@@ -36,6 +36,7 @@ class Port final : public StreamPort {
     issues += static_cast<size_t>(response.issues_size());
     for (const v1::Receipt& receipt : response.receipts()) {
       accepted += receipt.has_accepted();
+      outcomes += receipt.has_outcome();
     }
   }
   void Finish(const absl::Status& status) override {
@@ -47,7 +48,7 @@ class Port final : public StreamPort {
 
   int reads = 0, posts = 0;
   bool writing = false;
-  size_t issues = 0, accepted = 0;
+  size_t issues = 0, accepted = 0, outcomes = 0;
   std::optional<absl::Status> finished;
 };
 
@@ -177,6 +178,23 @@ TEST_F(StreamSessionTest, WhatArrivesWaitsForAClientThatLeavesItsAnswersUnread) 
   WriteAll();
   EXPECT_FALSE(port_.finished.has_value());
   EXPECT_EQ(port_.issues, 40u);
+}
+
+TEST_F(StreamSessionTest, OutcomesKeptForASessionThatIsTakenUpAreNotLeftUnread) {
+  StreamLimits streams;
+  streams.max_queued_answers = 8;
+  Begin({}, streams);
+  const auto outcome = [](uint64_t incarnation) {
+    return Receipt{1, 1, CommitOutcome{.display = "d"}, incarnation};
+  };
+  for (int i = 0; i < 40; ++i) session_->OnReceipt(outcome(7));
+  EXPECT_FALSE(port_.finished.has_value());
+  WriteAll();
+  EXPECT_EQ(port_.outcomes, 40u);
+  // Its own are, however many there were before.
+  for (int i = 0; i < 60 && !port_.finished.has_value(); ++i) session_->OnReceipt(outcome(0));
+  ASSERT_TRUE(port_.finished.has_value());
+  EXPECT_EQ(port_.finished->code(), absl::StatusCode::kResourceExhausted);
 }
 
 TEST_F(StreamSessionTest, TheEndOfReadsComesAfterWhatWaits) {
