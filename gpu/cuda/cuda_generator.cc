@@ -1,0 +1,228 @@
+#include "gpu/cuda/cuda_generator.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::gpu::cuda {
+
+using generate::Batch;
+using generate::BytesOf;
+using generate::FixedSegment;
+using generate::Format;
+using generate::Plan;
+
+namespace {
+
+absl::Status CheckDeviceRoom(uint64_t voxels, Format format, std::span<std::byte> out) {
+  const uint64_t needed = voxels * BytesOf(format.output);
+  if (out.size() < needed) {
+    return absl::InvalidArgumentError(absl::StrCat("the output has ", out.size(), " bytes; ", voxels, " voxels of ",
+                                                   BytesOf(format.output), " bytes need ", needed));
+  }
+  if (reinterpret_cast<uintptr_t>(out.data()) % 16 != 0) {
+    return absl::InvalidArgumentError("the output in device memory does not begin at a multiple of 16 bytes");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CudaGenerator>> CudaGenerator::Open(int device, int threads) {
+  absl::StatusOr<std::unique_ptr<Device>> opened = Device::Open(device);
+  if (!opened.ok()) return opened.status();
+  std::unique_ptr<CudaGenerator> made(new CudaGenerator(*std::move(opened), MakeExecutor(threads)));
+  for (Slot& slot : made->slots_) {
+    for (cudaEvent_t* event : {&slot.made, &slot.copied}) {
+      absl::Status status = made->device_->api().Call("cudaEventCreateWithFlags", [&] {
+        return cudaEventCreateWithFlags(event, cudaEventDisableTiming);
+      });
+      if (!status.ok()) return status;
+    }
+  }
+  return made;
+}
+
+CudaGenerator::~CudaGenerator() {
+  cudaStreamSynchronize(device_->copies());
+  for (Slot& slot : slots_) {
+    if (slot.made != nullptr) cudaEventDestroy(slot.made);
+    if (slot.copied != nullptr) cudaEventDestroy(slot.copied);
+    if (slot.pinned != nullptr) cudaFreeHost(slot.pinned);
+  }
+}
+
+absl::StatusOr<Plan> CudaGenerator::Prepare(const Batch& batch, Format format) {
+  return MakePlan(batch, format, *executor_);
+}
+
+absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan& plan) {
+  PlacedBatch placed;
+  placed.view_.voxels = plan.voxels();
+  placed.view_.count = static_cast<uint32_t>(batch.size());
+  if (batch.size() == 0) return placed;
+  std::vector<FixedSegment> fixed(batch.size());
+  batch.With([&](const auto& segments) {
+    constexpr size_t kGrain = 16384;
+    executor_->For((segments.size() + kGrain - 1) / kGrain, 1, [&](size_t part, int) {
+      const size_t end = std::min(segments.size(), (part + 1) * kGrain);
+      for (size_t i = part * kGrain; i < end; ++i) fixed[i] = ToFixed(segments[i]);
+    });
+  });
+  const uint64_t blocks = (plan.voxels() + kGenerateBlockVoxels - 1) / kGenerateBlockVoxels;
+  auto segments = device_->Upload(fixed.data(), fixed.size());
+  auto offsets = device_->Upload(plan.offsets.data(), plan.offsets.size());
+  auto records = device_->pool().Acquire(batch.size() * sizeof(SegmentRecord));
+  auto first_segments = device_->pool().Acquire((blocks + 1) * sizeof(uint32_t));
+  for (const auto* block : {&segments, &offsets, &records, &first_segments}) {
+    if (!block->ok()) return block->status();
+  }
+  placed.segments_ = *std::move(segments);
+  placed.offsets_ = *std::move(offsets);
+  placed.records_ = *std::move(records);
+  placed.first_segments_ = *std::move(first_segments);
+  placed.view_.segments = placed.segments_.as<FixedSegment>();
+  placed.view_.offsets = placed.offsets_.as<uint64_t>();
+  placed.view_.records = placed.records_.as<SegmentRecord>();
+  placed.view_.first_segments = placed.first_segments_.as<uint32_t>();
+  absl::Status status = device_->Run("PrepareGenerate", [&] {
+    return PrepareGenerate(placed.view_, device_->stream());
+  });
+  if (status.ok()) status = device_->Wait();  // `fixed` goes
+  if (!status.ok()) return status;
+  return placed;
+}
+
+absl::Status CudaGenerator::GenerateOnDevice(const PlacedBatch& batch, Format format, std::span<std::byte> out) {
+  if (absl::Status status = CheckDeviceRoom(batch.voxels(), format, out); !status.ok()) return status;
+  absl::Status status = device_->Run("Generate", [&] {
+    return cuda::Generate(batch.view_, format, 0, batch.voxels(), out.data(), device_->stream());
+  });
+  if (!status.ok()) return status;
+  return device_->Wait();
+}
+
+absl::Status CudaGenerator::Ready(Slot& slot, size_t bytes, bool pinned) {
+  if (slot.voxels.size() < bytes) {
+    slot.voxels = Block();
+    absl::StatusOr<Block> block = device_->pool().Acquire(bytes);
+    if (!block.ok()) return block.status();
+    slot.voxels = *std::move(block);
+  }
+  if (!pinned || slot.pinned_bytes >= bytes) return absl::OkStatus();
+  if (slot.pinned != nullptr) FreePinned({std::exchange(slot.pinned, nullptr), slot.pinned_bytes});
+  slot.pinned_bytes = 0;
+  absl::StatusOr<std::span<std::byte>> memory = AllocatePinned(bytes);
+  if (!memory.ok()) return memory.status();
+  slot.pinned = memory->data();
+  slot.pinned_bytes = memory->size();
+  return absl::OkStatus();
+}
+
+absl::Status CudaGenerator::Queue(Slot& slot, const PlacedBatch& batch, Format format, uint64_t first,
+                                  uint64_t count, std::byte* to) {
+  Api& api = device_->api();
+  absl::Status status = api.Call("Generate", [&] {
+    return cuda::Generate(batch.view_, format, first, count, slot.voxels.as<void>(), device_->stream());
+  });
+  if (!status.ok()) return status;
+  const cudaStream_t copies = device_->copies();
+  status = api.Call("cudaEventRecord", [&] { return cudaEventRecord(slot.made, device_->stream()); });
+  if (!status.ok()) return status;
+  status = api.Call("cudaStreamWaitEvent", [&] { return cudaStreamWaitEvent(copies, slot.made, 0); });
+  if (!status.ok()) return status;
+  status = api.Call("cudaMemcpyAsync", [&] {
+    return cudaMemcpyAsync(to, slot.voxels.as<void>(), count * BytesOf(format.output), cudaMemcpyDeviceToHost,
+                           copies);
+  });
+  if (!status.ok()) return status;
+  return api.Call("cudaEventRecord", [&] { return cudaEventRecord(slot.copied, copies); });
+}
+
+absl::Status CudaGenerator::WaitFor(cudaEvent_t event) {
+  return device_->api().Call("cudaEventSynchronize", [&] { return cudaEventSynchronize(event); });
+}
+
+absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format format, std::span<std::byte> out) {
+  const uint64_t all = batch.voxels();
+  const size_t bytes = BytesOf(format.output);
+  if (out.size() < all * bytes) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the output has ", out.size(), " bytes; ", all, " voxels need ", all * bytes));
+  }
+  const uint64_t chunk = std::min(kChunkVoxels, all);
+  for (Slot& slot : slots_) {
+    if (absl::Status status = Ready(slot, chunk * bytes, false); !status.ok()) return status;
+  }
+  absl::Status status;
+  for (uint64_t i = 0, first = 0; first < all && status.ok(); ++i, first += chunk) {
+    Slot& slot = slots_[i % kSlots];
+    // The device waits for the slot's last copy, not this thread.
+    status = device_->api().Call("cudaStreamWaitEvent", [&] {
+      return cudaStreamWaitEvent(device_->stream(), slot.copied, 0);
+    });
+    if (!status.ok()) break;
+    status = Queue(slot, batch, format, first, std::min(chunk, all - first), out.data() + first * bytes);
+  }
+  // Whatever failed, nothing is written any more when this returns.
+  absl::Status waited = device_->api().Call("cudaStreamSynchronize", [&] {
+    return cudaStreamSynchronize(device_->copies());
+  });
+  return status.ok() ? waited : status;
+}
+
+absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format, uint64_t chunk_voxels,
+                                       const generate::TakeChunk& take) {
+  if (absl::Status status = generate::CheckChunk(chunk_voxels); !status.ok()) return status;
+  const uint64_t all = batch.voxels();
+  const size_t bytes = BytesOf(format.output);
+  const uint64_t chunks = (all + chunk_voxels - 1) / chunk_voxels;
+  for (Slot& slot : slots_) {
+    absl::Status status = Ready(slot, std::min(chunk_voxels, all) * bytes, true);
+    if (!status.ok()) return status;
+  }
+  const auto count_of = [&](uint64_t i) { return std::min(chunk_voxels, all - i * chunk_voxels); };
+  absl::Status status;
+  for (uint64_t i = 0; i < chunks + kSlots && status.ok(); ++i) {
+    Slot& slot = slots_[i % kSlots];
+    if (i >= kSlots) {
+      const uint64_t done = i - kSlots;
+      if (done >= chunks) break;
+      status = WaitFor(slot.copied);
+      if (status.ok()) status = take(done * chunk_voxels, {slot.pinned, count_of(done) * bytes});
+    }
+    if (status.ok() && i < chunks) status = Queue(slot, batch, format, i * chunk_voxels, count_of(i), slot.pinned);
+  }
+  if (!status.ok()) cudaStreamSynchronize(device_->copies());
+  return status;
+}
+
+absl::Status CudaGenerator::Generate(const Batch& batch, const Plan& plan, Format format,
+                                     std::span<std::byte> out) {
+  if (absl::Status status = CheckRoom(plan, format.output, out.size()); !status.ok()) return status;
+  absl::StatusOr<PlacedBatch> placed = Place(batch, plan);
+  if (!placed.ok()) return placed.status();
+  return GenerateToHost(*placed, format, out);
+}
+
+absl::Status CudaGenerator::Stream(const Batch& batch, const Plan& plan, Format format, uint64_t chunk_voxels,
+                                   const generate::TakeChunk& take) {
+  absl::StatusOr<PlacedBatch> placed = Place(batch, plan);
+  if (!placed.ok()) return placed.status();
+  return StreamFrom(*placed, format, chunk_voxels, take);
+}
+
+absl::StatusOr<std::span<std::byte>> AllocatePinned(size_t bytes) {
+  void* memory = nullptr;
+  if (const cudaError_t error = cudaMallocHost(&memory, bytes); error != cudaSuccess) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(bytes, " bytes of pinned memory: ", cudaGetErrorString(error)));
+  }
+  return std::span(static_cast<std::byte*>(memory), bytes);
+}
+
+void FreePinned(std::span<std::byte> memory) { cudaFreeHost(memory.data()); }
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,88 @@
+// The generator on CUDA: into device memory, or in chunks whose making and copying overlap.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/cuda/device.h"
+#include "gpu/cuda/generate_kernels.h"
+#include "gpu/generate/generator.h"
+
+namespace voxeld::gpu::cuda {
+
+// A batch that lies on the device, ready to be generated from. Its generator outlives it.
+class PlacedBatch {
+ public:
+  uint64_t voxels() const { return view_.voxels; }
+
+ private:
+  friend class CudaGenerator;
+  Block segments_, offsets_, records_, first_segments_;
+  GenerateView view_;
+};
+
+class CudaGenerator final : public generate::Generator {
+ public:
+  // Looks batches through on `threads` of the CPU's. FailedPrecondition: no such device, or no driver.
+  static absl::StatusOr<std::unique_ptr<CudaGenerator>> Open(int device, int threads);
+  ~CudaGenerator() override;
+
+  std::string name() const override { return "cuda"; }
+  absl::StatusOr<generate::Plan> Prepare(const generate::Batch& batch, generate::Format format) override;
+  // `out` may be any memory of the host's; pinned memory (AllocatePinned) is copied to at the bus's rate.
+  absl::Status Generate(const generate::Batch& batch, const generate::Plan& plan, generate::Format format,
+                        std::span<std::byte> out) override;
+  // What is taken lies in pinned memory.
+  absl::Status Stream(const generate::Batch& batch, const generate::Plan& plan, generate::Format format,
+                      uint64_t chunk_voxels, const generate::TakeChunk& take) override;
+
+  // ---- device memory
+  // ResourceExhausted: the device has too little memory.
+  absl::StatusOr<PlacedBatch> Place(const generate::Batch& batch, const generate::Plan& plan);
+  // All voxels to device memory aligned to 16 bytes (InvalidArgument otherwise, or if it is too small);
+  // done when it returns.
+  absl::Status GenerateOnDevice(const PlacedBatch& batch, generate::Format format, std::span<std::byte> out);
+  // The same, into host memory.
+  absl::Status GenerateToHost(const PlacedBatch& batch, generate::Format format, std::span<std::byte> out);
+  absl::Status StreamFrom(const PlacedBatch& batch, generate::Format format, uint64_t chunk_voxels,
+                          const generate::TakeChunk& take);
+
+  Device& device() { return *device_; }
+
+ private:
+  // Chunks on their way.
+  static constexpr size_t kSlots = 3;
+  struct Slot {
+    Block voxels;
+    cudaEvent_t made = nullptr, copied = nullptr;
+    std::byte* pinned = nullptr;
+    size_t pinned_bytes = 0;
+  };
+
+  CudaGenerator(std::unique_ptr<Device> device, std::unique_ptr<Executor> executor)
+      : device_(std::move(device)), executor_(std::move(executor)) {}
+  absl::Status Ready(Slot& slot, size_t bytes, bool pinned);
+  // Makes a chunk and queues its copy to `to`.
+  absl::Status Queue(Slot& slot, const PlacedBatch& batch, generate::Format format, uint64_t first,
+                     uint64_t count, std::byte* to);
+  absl::Status WaitFor(cudaEvent_t event);
+
+  const std::unique_ptr<Device> device_;
+  const std::unique_ptr<Executor> executor_;
+  std::array<Slot, kSlots> slots_;
+};
+
+// Host memory that devices copy to at the bus's rate; freed by FreePinned.
+absl::StatusOr<std::span<std::byte>> AllocatePinned(size_t bytes);
+void FreePinned(std::span<std::byte> memory);
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,52 @@
+// The generator's kernels. As kernels.h: each function queues in `stream` and answers whether that could
+// be done.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gpu/generate/batch.h"
+#include "gpu/generate/segment.h"
+#include "gpu/generate/stride.h"
+
+namespace voxeld::gpu::cuda {
+
+// Voxels that one thread makes in a walk, and that one block makes in all.
+inline constexpr uint32_t kGenerateRun = 4;
+inline constexpr uint64_t kGenerateBlockVoxels = 8192;
+
+struct StepRecord {
+  uint64_t step_fraction;
+  uint32_t whole, step_whole;
+  uint32_t fraction;  // of S, its high 32 bits: it has 16
+  uint32_t bias;      // of a walk
+};
+
+// All that most voxels of a segment need.
+struct alignas(16) SegmentRecord {
+  StepRecord axis[3];
+  uint32_t steps;
+  uint32_t sure;  // no walk of it can leave a doubt
+};
+
+// A batch in device memory.
+struct GenerateView {
+  const generate::FixedSegment* segments = nullptr;
+  const uint64_t* offsets = nullptr;   // segments + 1
+  SegmentRecord* records = nullptr;    // segments
+  uint32_t* first_segments = nullptr;  // of each block's first voxel, and of the last voxel
+  uint64_t voxels = 0;
+  uint32_t count = 0;  // segments, at least 1
+};
+
+// Fills `records` and `first_segments`.
+cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream);
+
+// Voxels [first, first + count) to `out` and on; `first` is a multiple of kGenerateBlockVoxels, `out` is
+// aligned to 16 bytes.
+cudaError_t Generate(const GenerateView& view, generate::Format format, uint64_t first,
+                     uint64_t count, void* out, cudaStream_t stream);
+
+}  // namespace voxeld::gpu::cuda

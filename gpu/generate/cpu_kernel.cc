@@ -1,0 +1,39 @@
+#include "gpu/generate/cpu_kernel.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "gpu/generate/cover.h"
+#include "gpu/generate/stride.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "gpu/generate/cpu_kernel.cc"
+#include "hwy/foreach_target.h"  // IWYU pragma: keep
+#include "hwy/cache_control.h"
+#include "hwy/highway.h"
+
+#include "gpu/generate/cpu_kernel-inl.h"
+
+#if HWY_ONCE
+namespace voxeld::gpu::generate {
+namespace {
+
+HWY_EXPORT(EmitVoxelsIn);
+HWY_EXPORT(StreamingFillIn);
+HWY_EXPORT(TargetIn);
+
+}  // namespace
+
+void EmitVoxels(const Batch& batch, Format format, std::span<const uint64_t> offsets,
+                uint64_t first, uint64_t count, std::byte* out) {
+  if (count > 0) HWY_DYNAMIC_DISPATCH(EmitVoxelsIn)(batch, format, offsets, first, count, out);
+}
+
+void StreamingFill(std::span<std::byte> out, uint32_t word) {
+  HWY_DYNAMIC_DISPATCH(StreamingFillIn)(out, word);
+}
+
+std::string VectorTarget() { return HWY_DYNAMIC_DISPATCH(TargetIn)(); }
+
+}  // namespace voxeld::gpu::generate
+#endif

@@ -1,0 +1,59 @@
+// Turns batches of 3D segments into voxel coordinates: the paper's generator of primitives (its Fig. 1,
+// its parametric method), on the CPU or on CUDA, with the same bytes.
+//
+//   auto generator = MakeCpuGenerator(threads);
+//   auto plan = generator->Prepare(segments, {.sampling = Sampling::kThin});
+//   std::vector<std::byte> out(plan->voxels() * BytesOf(Output::kI32x3));
+//   generator->Generate(segments, *plan, {.sampling = Sampling::kThin}, out);
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/generate/batch.h"
+#include "gpu/generate/plan.h"
+
+namespace voxeld::gpu::generate {
+
+// Takes voxels `first` and on, which are gone when it returns; an error ends the work and is its result.
+using TakeChunk = std::function<absl::Status(uint64_t first, std::span<const std::byte> voxels)>;
+
+// Used by one thread at a time.
+class Generator {
+ public:
+  // Of chunks, unless asked otherwise: 24 MiB of i32x3.
+  static constexpr uint64_t kChunkVoxels = uint64_t{2} << 20;
+
+  virtual ~Generator() = default;
+
+  // "cpu", "cuda", "auto".
+  virtual std::string name() const = 0;
+
+  // Looks the batch through; errors as MakePlan's. The plan serves this batch, this format and any
+  // generator, as often as wanted.
+  virtual absl::StatusOr<Plan> Prepare(const Batch& batch, Format format) = 0;
+
+  // All voxels into the caller's memory, in the order of the segments. InvalidArgument if it is too
+  // small; whatever else fails before the first byte leaves it untouched.
+  virtual absl::Status Generate(const Batch& batch, const Plan& plan, Format format,
+                                std::span<std::byte> out) = 0;
+
+  // The same, `chunk_voxels` (a multiple of 8,192) at a time, in order; needs no more memory than a few
+  // chunks.
+  virtual absl::Status Stream(const Batch& batch, const Plan& plan, Format format,
+                              uint64_t chunk_voxels, const TakeChunk& take) = 0;
+};
+
+// On `threads` ≥ 1 of the CPU's.
+std::unique_ptr<Generator> MakeCpuGenerator(int threads);
+
+// What a call of Stream must have. InvalidArgument.
+absl::Status CheckChunk(uint64_t chunk_voxels);
+
+}  // namespace voxeld::gpu::generate

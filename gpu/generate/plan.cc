@@ -1,0 +1,185 @@
+#include "gpu/generate/plan.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+namespace voxeld::gpu::generate {
+namespace {
+
+constexpr size_t kBlock = 8192;  // segments that one worker looks through at a time
+constexpr char kAxes[] = "xyz";
+
+struct Bounds {
+  int64_t lo[3] = {INT64_MAX, INT64_MAX, INT64_MAX}, hi[3] = {INT64_MIN, INT64_MIN, INT64_MIN};
+  void Add(const Bounds& other) {
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], other.lo[a]);
+      hi[a] = std::max(hi[a], other.hi[a]);
+    }
+  }
+};
+
+struct Range {
+  int64_t lo, hi;
+};
+
+Range Allowed(Output output, int axis) {
+  switch (output) {
+    case Output::kF32x3:
+      return {-(int64_t{1} << 24), int64_t{1} << 24};
+    case Output::kI16x3:
+      return {INT16_MIN, INT16_MAX};
+    case Output::kPacked:
+      return {0, axis == 2 ? 1023 : 2047};
+    case Output::kI32x3:
+      break;
+  }
+  return {INT32_MIN, INT32_MAX};
+}
+
+const char* NameOf(Output output) {
+  switch (output) {
+    case Output::kF32x3:
+      return "f32x3";
+    case Output::kI16x3:
+      return "i16x3";
+    case Output::kPacked:
+      return "packed";
+    case Output::kI32x3:
+      break;
+  }
+  return "i32x3";
+}
+
+template <typename T>
+bool InRange(const Segment<T>& segment) {
+  bool in = true;
+  for (size_t a = 0; a < 3; ++a) {
+    for (const T v : {segment.start[a], segment.end[a]}) {
+      in &= v >= static_cast<T>(-kMostCoordinate) && v <= static_cast<T>(kMostCoordinate);
+    }
+  }
+  return in;
+}
+
+template <typename T>
+absl::Status WhatIsWrong(const Segment<T>& segment, size_t index, Sampling sampling) {
+  for (size_t a = 0; a < 3; ++a) {
+    for (const auto& [name, v] : {std::pair("start", segment.start[a]), std::pair("end", segment.end[a])}) {
+      if (v >= static_cast<T>(-kMostCoordinate) && v <= static_cast<T>(kMostCoordinate)) continue;
+      return absl::InvalidArgumentError(
+          absl::StrCat("segments[", index, "].", name, ".", std::string(1, kAxes[a]), " is ", v,
+                       "; a coordinate is a number within ±2^30 (", kMostCoordinate, ")"));
+    }
+  }
+  return absl::InvalidArgumentError(
+      absl::StrFormat("segments[%d] has %d steps; at most 2^30 (%d) are allowed", index,
+                      StepsOf(ToFixed(segment), sampling), kMostSteps));
+}
+
+// Counts the voxels of segments[begin, end) into counts; the first that is wrong, if any is.
+template <typename T>
+std::optional<size_t> Count(std::span<const Segment<T>> segments, Sampling sampling, size_t begin,
+                            size_t end, uint64_t* counts, Bounds& bounds) {
+  for (size_t i = begin; i < end; ++i) {
+    if (!InRange(segments[i])) return i;
+    const FixedSegment g = ToFixed(segments[i]);
+    const int64_t steps = StepsOf(g, sampling);
+    if (steps > kMostSteps) return i;
+    counts[i] = static_cast<uint64_t>(steps) + 1;
+    for (int a = 0; a < 3; ++a) {
+      bounds.lo[a] = std::min(bounds.lo[a], CellOf(std::min(g.s[a], g.e[a])));
+      bounds.hi[a] = std::max(bounds.hi[a], CellOf(std::max(g.s[a], g.e[a])));
+    }
+  }
+  return std::nullopt;
+}
+
+absl::Status CheckBounds(const Bounds& bounds, Output output) {
+  for (int a = 0; a < 3; ++a) {
+    const Range range = Allowed(output, a);
+    if (bounds.lo[a] >= range.lo && bounds.hi[a] <= range.hi) continue;
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "the voxels' %c goes from %d to %d; %s holds %d to %d", kAxes[a], bounds.lo[a],
+        bounds.hi[a], NameOf(output), range.lo, range.hi));
+  }
+  return absl::OkStatus();
+}
+
+template <typename T>
+absl::StatusOr<Plan> MakePlanOf(std::span<const Segment<T>> segments, Format format,
+                                Executor& executor) {
+  Plan plan;
+  // offsets[i + 1] is segment i's count first.
+  plan.offsets.resize(segments.size() + 1);
+  uint64_t* const counts = plan.offsets.data() + 1;
+  const size_t blocks = (segments.size() + kBlock - 1) / kBlock;
+  std::vector<Bounds> bounds(blocks);
+  std::vector<std::optional<size_t>> wrong(blocks);
+  std::vector<uint64_t> sums(blocks + 1);
+  const auto count = [&](size_t block, int) {
+    const size_t begin = block * kBlock, end = std::min(begin + kBlock, segments.size());
+    wrong[block] = Count(segments, format.sampling, begin, end, counts, bounds[block]);
+    if (wrong[block].has_value()) return;
+    for (size_t i = begin; i < end; ++i) sums[block + 1] += counts[i];
+  };
+  const auto place = [&](size_t block, int) {
+    const size_t begin = block * kBlock, end = std::min(begin + kBlock, segments.size());
+    uint64_t at = sums[block];
+    for (size_t i = begin; i < end; ++i) counts[i] = at += counts[i];
+  };
+  if (blocks == 1) {
+    count(0, 0);
+  } else {
+    executor.For(blocks, 1, count);
+  }
+  Bounds all;
+  for (size_t block = 0; block < blocks; ++block) {
+    if (wrong[block].has_value()) {
+      return WhatIsWrong(segments[*wrong[block]], *wrong[block], format.sampling);
+    }
+    all.Add(bounds[block]);
+    sums[block + 1] += sums[block];
+  }
+  if (blocks == 0) return plan;
+  if (sums[blocks] > kMostVoxels) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%d segments have %d voxels; at most 2^40 (%d) are allowed at once: split the batch",
+        segments.size(), sums[blocks], kMostVoxels));
+  }
+  if (absl::Status status = CheckBounds(all, format.output); !status.ok()) return status;
+  if (blocks == 1) {
+    place(0, 0);
+  } else {
+    executor.For(blocks, 1, place);
+  }
+  plan.lo = {static_cast<int32_t>(all.lo[0]), static_cast<int32_t>(all.lo[1]),
+             static_cast<int32_t>(all.lo[2])};
+  plan.hi = {static_cast<int32_t>(all.hi[0]), static_cast<int32_t>(all.hi[1]),
+             static_cast<int32_t>(all.hi[2])};
+  return plan;
+}
+
+}  // namespace
+
+absl::StatusOr<Plan> MakePlan(const Batch& batch, Format format, Executor& executor) {
+  if (batch.size() > kMostSegments) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%d segments; at most 2^27 (%d) are allowed at once", batch.size(), kMostSegments));
+  }
+  return batch.With([&](const auto& segments) { return MakePlanOf(segments, format, executor); });
+}
+
+absl::Status CheckRoom(const Plan& plan, Output output, size_t bytes) {
+  const uint64_t needed = plan.voxels() * BytesOf(output);
+  if (needed <= bytes) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrFormat("the output has %d bytes; %d voxels of %d bytes (%s) need %d", bytes,
+                      plan.voxels(), BytesOf(output), NameOf(output), needed));
+}
+
+}  // namespace voxeld::gpu::generate

@@ -1,0 +1,35 @@
+// A batch that has been looked through: where each segment's voxels go, and that all is as it may be.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/generate/batch.h"
+
+namespace voxeld::gpu::generate {
+
+inline constexpr uint64_t kMostVoxels = uint64_t{1} << 40;     // of a batch
+inline constexpr size_t kMostSegments = size_t{1} << 27;
+
+struct Plan {
+  // Voxels of segment i: offsets[i] to offsets[i + 1] − 1, from S on (COVER: from the
+  // lexicographically smaller end on).
+  std::vector<uint64_t> offsets;
+  Voxel lo, hi;  // of all voxels, both included; none: 0
+
+  uint64_t voxels() const { return offsets.back(); }
+};
+
+// InvalidArgument names the segment, the coordinate, its value and what may be: a coordinate that is no
+// number or beyond ±kMostCoordinate, a segment beyond kMostSteps, bounds that `format.output` cannot
+// hold, more than kMostVoxels or kMostSegments. The first of several.
+absl::StatusOr<Plan> MakePlan(const Batch& batch, Format format, Executor& executor);
+
+// InvalidArgument if `bytes` are too few for the plan's voxels.
+absl::Status CheckRoom(const Plan& plan, Output output, size_t bytes);
+
+}  // namespace voxeld::gpu::generate
