@@ -36,7 +36,8 @@ ALLOWED = {
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
-    "tools/bench/voxel_bench": ["display/sync", "voxeld/v1", "tools/child", "daemon/process"],
+    "tools/bench/voxel_bench": ["display/sync", "voxeld/v1", "tools/child", "daemon/process",
+                                "tools/bench/paper"],
     # The one command that opens displays itself; it reads them as the daemon does.
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",

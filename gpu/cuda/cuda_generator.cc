@@ -19,11 +19,13 @@ namespace {
 absl::Status CheckDeviceRoom(uint64_t voxels, Format format, std::span<std::byte> out) {
   const uint64_t needed = voxels * BytesOf(format.output);
   if (out.size() < needed) {
-    return absl::InvalidArgumentError(absl::StrCat("the output has ", out.size(), " bytes; ", voxels, " voxels of ",
-                                                   BytesOf(format.output), " bytes need ", needed));
+    return absl::InvalidArgumentError(absl::StrCat("the output has ", out.size(), " bytes; ",
+                                                   voxels, " voxels of ", BytesOf(format.output),
+                                                   " bytes need ", needed));
   }
   if (reinterpret_cast<uintptr_t>(out.data()) % 16 != 0) {
-    return absl::InvalidArgumentError("the output in device memory does not begin at a multiple of 16 bytes");
+    return absl::InvalidArgumentError(
+        "the output in device memory does not begin at a multiple of 16 bytes");
   }
   return absl::OkStatus();
 }
@@ -87,16 +89,17 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
   placed.view_.offsets = placed.offsets_.as<uint64_t>();
   placed.view_.records = placed.records_.as<SegmentRecord>();
   placed.view_.first_segments = placed.first_segments_.as<uint32_t>();
-  absl::Status status = device_->Run("PrepareGenerate", [&] {
-    return PrepareGenerate(placed.view_, device_->stream());
-  });
+  absl::Status status = device_->Run(
+      "PrepareGenerate", [&] { return PrepareGenerate(placed.view_, device_->stream()); });
   if (status.ok()) status = device_->Wait();  // `fixed` goes
   if (!status.ok()) return status;
   return placed;
 }
 
-absl::Status CudaGenerator::GenerateOnDevice(const PlacedBatch& batch, Format format, std::span<std::byte> out) {
-  if (absl::Status status = CheckDeviceRoom(batch.voxels(), format, out); !status.ok()) return status;
+absl::Status CudaGenerator::GenerateOnDevice(const PlacedBatch& batch, Format format,
+                                             std::span<std::byte> out) {
+  if (absl::Status status = CheckDeviceRoom(batch.voxels(), format, out); !status.ok())
+    return status;
   absl::Status status = device_->Run("Generate", [&] {
     return cuda::Generate(batch.view_, format, 0, batch.voxels(), out.data(), device_->stream());
   });
@@ -121,21 +124,24 @@ absl::Status CudaGenerator::Ready(Slot& slot, size_t bytes, bool pinned) {
   return absl::OkStatus();
 }
 
-absl::Status CudaGenerator::Queue(Slot& slot, const PlacedBatch& batch, Format format, uint64_t first,
-                                  uint64_t count, std::byte* to) {
+absl::Status CudaGenerator::Queue(Slot& slot, const PlacedBatch& batch, Format format,
+                                  uint64_t first, uint64_t count, std::byte* to) {
   Api& api = device_->api();
   absl::Status status = api.Call("Generate", [&] {
-    return cuda::Generate(batch.view_, format, first, count, slot.voxels.as<void>(), device_->stream());
+    return cuda::Generate(batch.view_, format, first, count, slot.voxels.as<void>(),
+                          device_->stream());
   });
   if (!status.ok()) return status;
   const cudaStream_t copies = device_->copies();
-  status = api.Call("cudaEventRecord", [&] { return cudaEventRecord(slot.made, device_->stream()); });
+  status =
+      api.Call("cudaEventRecord", [&] { return cudaEventRecord(slot.made, device_->stream()); });
   if (!status.ok()) return status;
-  status = api.Call("cudaStreamWaitEvent", [&] { return cudaStreamWaitEvent(copies, slot.made, 0); });
+  status =
+      api.Call("cudaStreamWaitEvent", [&] { return cudaStreamWaitEvent(copies, slot.made, 0); });
   if (!status.ok()) return status;
   status = api.Call("cudaMemcpyAsync", [&] {
-    return cudaMemcpyAsync(to, slot.voxels.as<void>(), count * BytesOf(format.output), cudaMemcpyDeviceToHost,
-                           copies);
+    return cudaMemcpyAsync(to, slot.voxels.as<void>(), count * BytesOf(format.output),
+                           cudaMemcpyDeviceToHost, copies);
   });
   if (!status.ok()) return status;
   return api.Call("cudaEventRecord", [&] { return cudaEventRecord(slot.copied, copies); });
@@ -145,7 +151,8 @@ absl::Status CudaGenerator::WaitFor(cudaEvent_t event) {
   return device_->api().Call("cudaEventSynchronize", [&] { return cudaEventSynchronize(event); });
 }
 
-absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format format, std::span<std::byte> out) {
+absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format format,
+                                           std::span<std::byte> out) {
   const uint64_t all = batch.voxels();
   const size_t bytes = BytesOf(format.output);
   if (out.size() < all * bytes) {
@@ -164,17 +171,17 @@ absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format form
       return cudaStreamWaitEvent(device_->stream(), slot.copied, 0);
     });
     if (!status.ok()) break;
-    status = Queue(slot, batch, format, first, std::min(chunk, all - first), out.data() + first * bytes);
+    status =
+        Queue(slot, batch, format, first, std::min(chunk, all - first), out.data() + first * bytes);
   }
   // Whatever failed, nothing is written any more when this returns.
-  absl::Status waited = device_->api().Call("cudaStreamSynchronize", [&] {
-    return cudaStreamSynchronize(device_->copies());
-  });
+  absl::Status waited = device_->api().Call(
+      "cudaStreamSynchronize", [&] { return cudaStreamSynchronize(device_->copies()); });
   return status.ok() ? waited : status;
 }
 
-absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format, uint64_t chunk_voxels,
-                                       const generate::TakeChunk& take) {
+absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format,
+                                       uint64_t chunk_voxels, const generate::TakeChunk& take) {
   if (absl::Status status = generate::CheckChunk(chunk_voxels); !status.ok()) return status;
   const uint64_t all = batch.voxels();
   const size_t bytes = BytesOf(format.output);
@@ -193,7 +200,8 @@ absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format, 
       status = WaitFor(slot.copied);
       if (status.ok()) status = take(done * chunk_voxels, {slot.pinned, count_of(done) * bytes});
     }
-    if (status.ok() && i < chunks) status = Queue(slot, batch, format, i * chunk_voxels, count_of(i), slot.pinned);
+    if (status.ok() && i < chunks)
+      status = Queue(slot, batch, format, i * chunk_voxels, count_of(i), slot.pinned);
   }
   if (!status.ok()) cudaStreamSynchronize(device_->copies());
   return status;
@@ -207,8 +215,14 @@ absl::Status CudaGenerator::Generate(const Batch& batch, const Plan& plan, Forma
   return GenerateToHost(*placed, format, out);
 }
 
-absl::Status CudaGenerator::Stream(const Batch& batch, const Plan& plan, Format format, uint64_t chunk_voxels,
-                                   const generate::TakeChunk& take) {
+absl::StatusOr<generate::HostMemory> CudaGenerator::Allocate(size_t bytes) {
+  absl::StatusOr<std::span<std::byte>> memory = AllocatePinned(bytes);
+  if (!memory.ok()) return memory.status();
+  return generate::HostMemory(memory->data(), [](std::byte* at) { cudaFreeHost(at); });
+}
+
+absl::Status CudaGenerator::Stream(const Batch& batch, const Plan& plan, Format format,
+                                   uint64_t chunk_voxels, const generate::TakeChunk& take) {
   absl::StatusOr<PlacedBatch> placed = Place(batch, plan);
   if (!placed.ok()) return placed.status();
   return StreamFrom(*placed, format, chunk_voxels, take);

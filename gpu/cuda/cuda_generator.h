@@ -37,22 +37,27 @@ class CudaGenerator final : public generate::Generator {
   ~CudaGenerator() override;
 
   std::string name() const override { return "cuda"; }
-  absl::StatusOr<generate::Plan> Prepare(const generate::Batch& batch, generate::Format format) override;
+  absl::StatusOr<generate::Plan> Prepare(const generate::Batch& batch,
+                                         generate::Format format) override;
   // `out` may be any memory of the host's; pinned memory (AllocatePinned) is copied to at the bus's rate.
-  absl::Status Generate(const generate::Batch& batch, const generate::Plan& plan, generate::Format format,
-                        std::span<std::byte> out) override;
+  absl::Status Generate(const generate::Batch& batch, const generate::Plan& plan,
+                        generate::Format format, std::span<std::byte> out) override;
+  absl::StatusOr<generate::HostMemory> Allocate(size_t bytes) override;
   // What is taken lies in pinned memory.
-  absl::Status Stream(const generate::Batch& batch, const generate::Plan& plan, generate::Format format,
-                      uint64_t chunk_voxels, const generate::TakeChunk& take) override;
+  absl::Status Stream(const generate::Batch& batch, const generate::Plan& plan,
+                      generate::Format format, uint64_t chunk_voxels,
+                      const generate::TakeChunk& take) override;
 
   // ---- device memory
   // ResourceExhausted: the device has too little memory.
   absl::StatusOr<PlacedBatch> Place(const generate::Batch& batch, const generate::Plan& plan);
   // All voxels to device memory aligned to 16 bytes (InvalidArgument otherwise, or if it is too small);
   // done when it returns.
-  absl::Status GenerateOnDevice(const PlacedBatch& batch, generate::Format format, std::span<std::byte> out);
+  absl::Status GenerateOnDevice(const PlacedBatch& batch, generate::Format format,
+                                std::span<std::byte> out);
   // The same, into host memory.
-  absl::Status GenerateToHost(const PlacedBatch& batch, generate::Format format, std::span<std::byte> out);
+  absl::Status GenerateToHost(const PlacedBatch& batch, generate::Format format,
+                              std::span<std::byte> out);
   absl::Status StreamFrom(const PlacedBatch& batch, generate::Format format, uint64_t chunk_voxels,
                           const generate::TakeChunk& take);
 

@@ -17,7 +17,7 @@ using Rules = generate::WalkRules<kGenerateRun>;
 constexpr int kThreads = 256;
 constexpr int kWarps = kThreads / 32;
 constexpr uint32_t kWarpVoxels = 32 * kGenerateRun;
-constexpr uint32_t kRoundVoxels = kThreads * kGenerateRun;
+constexpr uint32_t kRounds = kGenerateBlockVoxels / kWarps / kWarpVoxels;
 
 __global__ void PrepareRecords(GenerateView view) {
   const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -75,7 +75,8 @@ __device__ __noinline__ Voxel ExactVoxel(const GenerateView& view, uint32_t segm
   const FixedSegment g = view.segments[segment];
   const int64_t n = view.records[segment].steps;
   int32_t v[3];
-  for (int a = 0; a < 3; ++a) v[a] = CoordinateAt(Stride::Of(g.s[a], g.e[a], n), g.s[a], g.e[a], n, k);
+  for (int a = 0; a < 3; ++a)
+    v[a] = CoordinateAt(Stride::Of(g.s[a], g.e[a], n), g.s[a], g.e[a], n, k);
   return {v[0], v[1], v[2]};
 }
 
@@ -97,14 +98,17 @@ struct Walks {
 template <Output kOut>
 __device__ void StoreOne(const Voxel& v, uint64_t at, void* out) {
   if constexpr (kOut == Output::kPacked) {
-    static_cast<uint32_t*>(out)[at] = static_cast<uint32_t>(v.x) + (static_cast<uint32_t>(v.y) << 11) +
+    static_cast<uint32_t*>(out)[at] = static_cast<uint32_t>(v.x) +
+                                      (static_cast<uint32_t>(v.y) << 11) +
                                       (static_cast<uint32_t>(v.z) << 22);
   } else {
     const int32_t c[3] = {v.x, v.y, v.z};
     for (int a = 0; a < 3; ++a) {
       if constexpr (kOut == Output::kI32x3) static_cast<int32_t*>(out)[3 * at + a] = c[a];
-      if constexpr (kOut == Output::kF32x3) static_cast<float*>(out)[3 * at + a] = __int2float_rn(c[a]);
-      if constexpr (kOut == Output::kI16x3) static_cast<int16_t*>(out)[3 * at + a] = static_cast<int16_t>(c[a]);
+      if constexpr (kOut == Output::kF32x3)
+        static_cast<float*>(out)[3 * at + a] = __int2float_rn(c[a]);
+      if constexpr (kOut == Output::kI16x3)
+        static_cast<int16_t*>(out)[3 * at + a] = static_cast<int16_t>(c[a]);
     }
   }
 }
@@ -116,7 +120,8 @@ __device__ uint32_t Bits(Output kind, int32_t c) {
 // A warp's voxels, four a thread, to memory in whole lines: through shared memory, where they are laid out
 // as they will be.
 template <Output kOut>
-__device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint4* stage, void* out) {
+__device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint4* stage,
+                          void* out) {
   const uint32_t lane = threadIdx.x % 32;
   if constexpr (kOut == Output::kPacked) {
     uint32_t p[kGenerateRun];
@@ -142,28 +147,31 @@ __device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint
   } else {
     __syncwarp();
     uint4* to = stage + 3 * lane;
-    to[0] = make_uint4(Bits(kOut, v[0].x), Bits(kOut, v[0].y), Bits(kOut, v[0].z), Bits(kOut, v[1].x));
-    to[1] = make_uint4(Bits(kOut, v[1].y), Bits(kOut, v[1].z), Bits(kOut, v[2].x), Bits(kOut, v[2].y));
-    to[2] = make_uint4(Bits(kOut, v[2].z), Bits(kOut, v[3].x), Bits(kOut, v[3].y), Bits(kOut, v[3].z));
+    to[0] =
+        make_uint4(Bits(kOut, v[0].x), Bits(kOut, v[0].y), Bits(kOut, v[0].z), Bits(kOut, v[1].x));
+    to[1] =
+        make_uint4(Bits(kOut, v[1].y), Bits(kOut, v[1].z), Bits(kOut, v[2].x), Bits(kOut, v[2].y));
+    to[2] =
+        make_uint4(Bits(kOut, v[2].z), Bits(kOut, v[3].x), Bits(kOut, v[3].y), Bits(kOut, v[3].z));
     __syncwarp();
     auto* line = reinterpret_cast<uint4*>(static_cast<uint32_t*>(out) + 3 * warp_at);
     for (int i = 0; i < 3; ++i) __stcs(line + 32 * i + lane, stage[32 * i + lane]);
   }
 }
 
-// `at`: of the thread's first voxel, from `out` on; `end`: of the first that is not asked for.
+// `warp_at`: of the warp's first voxel, from `out` on; `end`: of the first that is not asked for.
 template <Output kOut>
-__device__ void Store(const Voxel (&v)[kGenerateRun], uint64_t at, uint64_t end, uint4* stage, void* out) {
-  const uint64_t warp_at = at - threadIdx.x % 32 * kGenerateRun;
+__device__ void Store(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint32_t lane_at,
+                      uint64_t end, uint4* stage, void* out) {
   if (warp_at + kWarpVoxels <= end) return StoreWarp<kOut>(v, warp_at, stage, out);
   for (uint32_t i = 0; i < kGenerateRun; ++i) {
-    if (at + i < end) StoreOne<kOut>(v[i], at + i, out);
+    if (warp_at + lane_at + i < end) StoreOne<kOut>(v[i], warp_at + lane_at + i, out);
   }
 }
 
 // Voxels of one segment from step k on.
-__device__ void MakeRun(const GenerateView& view, const SegmentRecord& record, uint32_t segment, uint32_t k,
-                        Voxel (&v)[kGenerateRun]) {
+__device__ void MakeRun(const GenerateView& view, const SegmentRecord& record, uint32_t segment,
+                        uint32_t k, Voxel (&v)[kGenerateRun]) {
   Walks walks;
   walks.Begin(record, k);
   uint32_t least = 0xFFFFFFFF;
@@ -223,44 +231,49 @@ __device__ void MakeCoverRun(const GenerateView& view, uint32_t lo, uint32_t hi,
   }
 }
 
-// A block makes kGenerateBlockVoxels in rounds. `first` and `end` count from the batch's first voxel.
+// Each warp of a block makes a run of voxels of its own, a round of kWarpVoxels at a time, and keeps the
+// segment that it is in. `first` and `end` count from the batch's first voxel.
 template <Output kOut, bool kCover>
 __global__ void __launch_bounds__(kThreads)
-    GenerateVoxels(const __grid_constant__ GenerateView view, uint64_t first, uint64_t end, void* out) {
+    GenerateVoxels(const __grid_constant__ GenerateView view, uint64_t first, uint64_t end,
+                   void* out) {
   __shared__ uint4 stages[kWarps][kWarpVoxels * 12 / 16];
   uint4* const stage = stages[threadIdx.x / 32];
   const uint64_t block = first / kGenerateBlockVoxels + blockIdx.x;
-  const uint32_t lo = view.first_segments[block], hi = view.first_segments[block + 1];
-  uint64_t voxel = block * kGenerateBlockVoxels + threadIdx.x * kGenerateRun;
+  const uint32_t last = view.first_segments[block + 1];
+  uint64_t warp_at = block * kGenerateBlockVoxels + threadIdx.x / 32 * (kRounds * kWarpVoxels);
+  const uint32_t lane_at = threadIdx.x % 32 * kGenerateRun;
+  if (warp_at >= end) return;
+  uint32_t segment = SegmentOf(view.offsets, view.first_segments[block], last, warp_at);
+  SegmentRecord record = view.records[segment];
+  uint64_t segment_begin = view.offsets[segment], segment_end = view.offsets[segment + 1];
   Voxel v[kGenerateRun];
-  if (!kCover && lo == hi) {
-    const SegmentRecord record = view.records[lo];
-    auto k = static_cast<uint32_t>(voxel - view.offsets[lo]);
-    for (uint32_t round = 0; round < kGenerateBlockVoxels / kRoundVoxels; ++round) {
-      MakeRun(view, record, lo, k, v);
-      Store<kOut>(v, voxel - first, end - first, stage, out);
-      voxel += kRoundVoxels;
-      k += kRoundVoxels;
+  for (uint32_t round = 0; round < kRounds; ++round) {
+    const uint64_t next_at = warp_at + kWarpVoxels;
+    if constexpr (kCover) {
+      if (warp_at + lane_at < view.voxels) MakeCoverRun(view, segment, last, warp_at + lane_at, v);
+    } else if (next_at <= segment_end) {
+      MakeRun(view, record, segment, static_cast<uint32_t>(warp_at - segment_begin) + lane_at, v);
+    } else if (warp_at + lane_at < view.voxels) {
+      MakeMixedRun(view, segment, last, warp_at + lane_at, v);
     }
-    return;
-  }
-  for (uint32_t round = 0; round < kGenerateBlockVoxels / kRoundVoxels; ++round) {
-    if (voxel < view.voxels) {
-      if constexpr (kCover) {
-        MakeCoverRun(view, lo, hi, voxel, v);
-      } else {
-        MakeMixedRun(view, lo, hi, voxel, v);
-      }
+    Store<kOut>(v, warp_at - first, lane_at, end - first, stage, out);
+    warp_at = next_at;
+    if (warp_at >= end || round + 1 == kRounds) return;
+    if (warp_at >= segment_end) {
+      segment = SegmentOf(view.offsets, segment + 1, last, warp_at);
+      if constexpr (!kCover) record = view.records[segment];
+      segment_begin = view.offsets[segment];
+      segment_end = view.offsets[segment + 1];
     }
-    Store<kOut>(v, voxel - first, end - first, stage, out);
-    voxel += kRoundVoxels;
   }
 }
 
 template <Output kOut>
-cudaError_t Launch(const GenerateView& view, Sampling sampling, uint64_t first, uint64_t count, void* out,
-                   cudaStream_t stream) {
-  const auto blocks = static_cast<uint32_t>((count + kGenerateBlockVoxels - 1) / kGenerateBlockVoxels);
+cudaError_t Launch(const GenerateView& view, Sampling sampling, uint64_t first, uint64_t count,
+                   void* out, cudaStream_t stream) {
+  const auto blocks =
+      static_cast<uint32_t>((count + kGenerateBlockVoxels - 1) / kGenerateBlockVoxels);
   if (sampling == Sampling::kCover) {
     GenerateVoxels<kOut, true><<<blocks, kThreads, 0, stream>>>(view, first, first + count, out);
   } else {
@@ -278,8 +291,8 @@ cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream) {
   return cudaGetLastError();
 }
 
-cudaError_t Generate(const GenerateView& view, generate::Format format, uint64_t first, uint64_t count,
-                     void* out, cudaStream_t stream) {
+cudaError_t Generate(const GenerateView& view, generate::Format format, uint64_t first,
+                     uint64_t count, void* out, cudaStream_t stream) {
   if (count == 0) return cudaSuccess;
   switch (format.output) {
     case Output::kI32x3:

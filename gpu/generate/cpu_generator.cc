@@ -13,6 +13,8 @@ namespace {
 // Voxels that are worth another thread.
 constexpr uint64_t kTaskVoxels = 64 << 10;
 constexpr uint64_t kChunkGrain = 8192;
+// What a core's own cache may keep for whoever reads it next.
+constexpr uint64_t kCachedBytes = 4 << 20;
 
 class CpuGenerator final : public Generator {
  public:
@@ -26,7 +28,8 @@ class CpuGenerator final : public Generator {
 
   absl::Status Generate(const Batch& batch, const Plan& plan, Format format,
                         std::span<std::byte> out) override {
-    if (absl::Status status = CheckRoom(plan, format.output, out.size()); !status.ok()) return status;
+    if (absl::Status status = CheckRoom(plan, format.output, out.size()); !status.ok())
+      return status;
     Emit(batch, plan, format, 0, plan.voxels(), out.data());
     return absl::OkStatus();
   }
@@ -35,11 +38,13 @@ class CpuGenerator final : public Generator {
                       const TakeChunk& take) override {
     if (absl::Status status = CheckChunk(chunk_voxels); !status.ok()) return status;
     const uint64_t all = plan.voxels();
-    std::vector<std::byte> chunk(std::min(chunk_voxels, all) * BytesOf(format.output));
+    if (chunk_.size() < std::min(chunk_voxels, all) * BytesOf(format.output)) {
+      chunk_.resize(std::min(chunk_voxels, all) * BytesOf(format.output));
+    }
     for (uint64_t first = 0; first < all; first += chunk_voxels) {
       const uint64_t count = std::min(chunk_voxels, all - first);
-      Emit(batch, plan, format, first, count, chunk.data());
-      absl::Status taken = take(first, {chunk.data(), count * BytesOf(format.output)});
+      Emit(batch, plan, format, first, count, chunk_.data());
+      absl::Status taken = take(first, {chunk_.data(), count * BytesOf(format.output)});
       if (!taken.ok()) return taken;
     }
     return absl::OkStatus();
@@ -48,9 +53,10 @@ class CpuGenerator final : public Generator {
  private:
   void Emit(const Batch& batch, const Plan& plan, Format format, uint64_t first, uint64_t count,
             std::byte* out) {
+    const bool past_caches = count * BytesOf(format.output) > kCachedBytes;
     const auto threads = static_cast<uint64_t>(executor_->concurrency());
     if (threads == 1 || count < 2 * kTaskVoxels) {
-      return EmitVoxels(batch, format, plan.offsets, first, count, out);
+      return EmitVoxels(batch, format, plan.offsets, first, count, past_caches, out);
     }
     // A few tasks a thread, in case threads are not equally fast.
     const uint64_t tasks = std::min(count / kTaskVoxels, threads * 4);
@@ -58,14 +64,20 @@ class CpuGenerator final : public Generator {
     executor_->For(tasks, 1, [&](size_t task, int) {
       const uint64_t begin = std::min(count, task * each);
       const uint64_t end = task + 1 == tasks ? count : std::min(count, begin + each);
-      EmitVoxels(batch, format, plan.offsets, first + begin, end - begin, out + begin * BytesOf(format.output));
+      EmitVoxels(batch, format, plan.offsets, first + begin, end - begin, past_caches,
+                 out + begin * BytesOf(format.output));
     });
   }
 
   const std::unique_ptr<Executor> executor_;
+  std::vector<std::byte> chunk_;  // of Stream
 };
 
 }  // namespace
+
+absl::StatusOr<HostMemory> Generator::Allocate(size_t bytes) {
+  return HostMemory(new std::byte[bytes], [](std::byte* memory) { delete[] memory; });
+}
 
 std::unique_ptr<Generator> MakeCpuGenerator(int threads) {
   return std::make_unique<CpuGenerator>(threads);
@@ -73,8 +85,9 @@ std::unique_ptr<Generator> MakeCpuGenerator(int threads) {
 
 absl::Status CheckChunk(uint64_t chunk_voxels) {
   if (chunk_voxels > 0 && chunk_voxels % kChunkGrain == 0) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "a chunk of %d voxels; it must be a multiple of %d, and at least that", chunk_voxels, kChunkGrain));
+  return absl::InvalidArgumentError(
+      absl::StrFormat("a chunk of %d voxels; it must be a multiple of %d, and at least that",
+                      chunk_voxels, kChunkGrain));
 }
 
 }  // namespace voxeld::gpu::generate

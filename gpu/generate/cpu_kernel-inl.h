@@ -15,10 +15,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DU = hn::ScalableTag<uint32_t>;
 using VU = hn::Vec<DU>;
 
-constexpr uint64_t kPastCaches = uint64_t{4} << 20;  // bytes from which stores go past the caches
-constexpr int kVectorSteps = 256;                    // from one exact beginning
+constexpr int kVectorSteps = 1024;  // from one exact beginning
 constexpr size_t kMostLanes = HWY_MAX_BYTES / 4;
 constexpr int64_t kShortSteps = 192;
+constexpr uint64_t kDirect = 256;  // voxels that are worth a line's beginning
 using Rules = WalkRules<kVectorSteps + 64>;
 static_assert(HWY_MAX_BYTES > 256 || kMostLanes <= 64, "a walk begins at each lane");
 
@@ -27,7 +27,7 @@ class Stage {
  public:
   static constexpr size_t kBytes = 16 << 10;
 
-  Stage(std::byte* out, uint64_t bytes) : out_(out), stream_(bytes >= kPastCaches) {
+  Stage(std::byte* out, bool past_caches) : out_(out), stream_(past_caches) {
     // Lines begin where the output's do.
     used_ = begin_ = stream_ ? reinterpret_cast<uintptr_t>(out) % kLine : 0;
   }
@@ -37,6 +37,27 @@ class Stage {
   }
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
+
+  // Bytes, a multiple of `each`, after which the output is at the beginning of a line; none: it never is, or
+  // stores do not go past the caches.
+  std::optional<size_t> ToLine(size_t each) const {
+    const size_t over = (reinterpret_cast<uintptr_t>(out_) + used_ - begin_) % kLine;
+    if (!stream_ || over % 4 != 0) return std::nullopt;
+    size_t bytes = 0;
+    while ((over + bytes) % kLine != 0) bytes += each;
+    return bytes;
+  }
+  // Writes all that is held. What follows may be written to where it says, as far as Skip is then told.
+  std::byte* Drain() {
+    std::memcpy(out_, buffer_ + begin_, used_ - begin_);
+    out_ += used_ - begin_;
+    used_ = begin_ = reinterpret_cast<uintptr_t>(out_) % kLine;
+    return out_;
+  }
+  void Skip(size_t bytes) {
+    out_ += bytes;
+    used_ = begin_ = reinterpret_cast<uintptr_t>(out_) % kLine;
+  }
 
   // Where the next voxels go, a vector of them at least.
   std::byte* next() { return buffer_ + used_; }
@@ -61,7 +82,8 @@ class Stage {
       const hn::ScalableTag<uint8_t> d;
       const auto* from = reinterpret_cast<const uint8_t*>(buffer_);
       auto* to = reinterpret_cast<uint8_t*>(out_);
-      for (size_t i = at; i < whole; i += hn::Lanes(d)) hn::Stream(hn::Load(d, from + i), d, to + (i - at));
+      for (size_t i = at; i < whole; i += hn::Lanes(d))
+        hn::Stream(hn::Load(d, from + i), d, to + (i - at));
     } else {
       std::memcpy(out_, buffer_ + at, whole - at);
     }
@@ -70,29 +92,70 @@ class Stage {
     used_ -= whole;
   }
 
-  alignas(HWY_MAX_BYTES < 64 ? 64 : HWY_MAX_BYTES) std::byte buffer_[kBytes + 12 * kMostLanes + kLine];
+  alignas(HWY_MAX_BYTES < 64 ? 64
+                             : HWY_MAX_BYTES) std::byte buffer_[kBytes + 12 * kMostLanes + kLine];
   std::byte* out_;
   size_t used_ = 0, begin_ = 0;
   const bool stream_;
 };
 
-template <Output kOut>
-HWY_ATTR HWY_INLINE void StoreVoxels(VU x, VU y, VU z, std::byte* at) {
-  const hn::RebindToSigned<DU> di;
-  if constexpr (kOut == Output::kI32x3) {
-    hn::StoreInterleaved3(x, y, z, DU(), reinterpret_cast<uint32_t*>(at));
-  } else if constexpr (kOut == Output::kF32x3) {
-    const hn::RebindToFloat<DU> df;
-    hn::StoreInterleaved3(hn::ConvertTo(df, hn::BitCast(di, x)), hn::ConvertTo(df, hn::BitCast(di, y)),
-                          hn::ConvertTo(df, hn::BitCast(di, z)), df, reinterpret_cast<float*>(at));
-  } else if constexpr (kOut == Output::kI16x3) {
-    const hn::Rebind<int16_t, decltype(di)> ds;
-    hn::StoreInterleaved3(hn::DemoteTo(ds, hn::BitCast(di, x)), hn::DemoteTo(ds, hn::BitCast(di, y)),
-                          hn::DemoteTo(ds, hn::BitCast(di, z)), ds, reinterpret_cast<int16_t*>(at));
-  } else {
-    hn::StoreU(hn::Or(x, hn::Or(hn::ShiftLeft<11>(y), hn::ShiftLeft<22>(z))), DU(),
-               reinterpret_cast<uint32_t*>(at));
+// Three vectors hold as many voxels as one has lanes, laid out as they go to memory: lane l of vector v is
+// axis (L·v + l) mod 3 of voxel ⌊(L·v + l)/3⌋. What is kept of each axis is spread over them once.
+constexpr size_t kLanes = hn::MaxLanes(DU());
+
+struct Spread {
+  hn::Mask<DU> y[3], z[3];
+  VU voxel[3];
+
+  HWY_ATTR Spread() {
+    const DU d;
+    for (size_t v = 0; v < 3; ++v) {
+      HWY_ALIGN uint32_t axes[kLanes], voxels[kLanes];
+      for (size_t l = 0; l < kLanes; ++l) {
+        axes[l] = static_cast<uint32_t>((kLanes * v + l) % 3);
+        voxels[l] = static_cast<uint32_t>((kLanes * v + l) / 3);
+      }
+      y[v] = hn::Eq(hn::Load(d, axes), hn::Set(d, 1));
+      z[v] = hn::Eq(hn::Load(d, axes), hn::Set(d, 2));
+      voxel[v] = hn::Load(d, voxels);
+    }
   }
+  HWY_ATTR HWY_INLINE VU Of(size_t v, VU x_, VU y_, VU z_) const {
+    return hn::IfThenElse(y[v], y_, hn::IfThenElse(z[v], z_, x_));
+  }
+};
+
+template <bool kStream, class D, class V>
+HWY_ATTR HWY_INLINE void StoreLanes(V v, D d, hn::TFromD<D>* at) {
+  if constexpr (kStream) {
+    hn::Stream(v, d, at);
+  } else {
+    hn::StoreU(v, d, at);
+  }
+}
+
+template <Output kOut, bool kStream = false>
+HWY_ATTR HWY_INLINE void StoreSpread(VU a, VU b, VU c, std::byte* at) {
+  const hn::RebindToSigned<DU> di;
+  const VU all[3] = {a, b, c};
+  for (size_t v = 0; v < 3; ++v) {
+    const auto whole = hn::BitCast(di, all[v]);
+    if constexpr (kOut == Output::kI32x3) {
+      StoreLanes<kStream>(whole, di, reinterpret_cast<int32_t*>(at) + v * kLanes);
+    } else if constexpr (kOut == Output::kF32x3) {
+      const hn::RebindToFloat<DU> df;
+      StoreLanes<kStream>(hn::ConvertTo(df, whole), df, reinterpret_cast<float*>(at) + v * kLanes);
+    } else {
+      const hn::Rebind<int16_t, decltype(di)> ds;
+      hn::StoreU(hn::DemoteTo(ds, whole), ds, reinterpret_cast<int16_t*>(at) + v * kLanes);
+    }
+  }
+}
+
+template <bool kStream = false>
+HWY_ATTR HWY_INLINE void StorePacked(VU x, VU y, VU z, std::byte* at) {
+  StoreLanes<kStream>(hn::Or(x, hn::Or(hn::ShiftLeft<11>(y), hn::ShiftLeft<22>(z))), DU(),
+                      reinterpret_cast<uint32_t*>(at));
 }
 
 template <Output kOut>
@@ -103,7 +166,8 @@ HWY_INLINE void StoreVoxel(const Voxel& v, std::byte* at) {
     const float f[3] = {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
     std::memcpy(at, f, 12);
   } else if constexpr (kOut == Output::kI16x3) {
-    const int16_t s[3] = {static_cast<int16_t>(v.x), static_cast<int16_t>(v.y), static_cast<int16_t>(v.z)};
+    const int16_t s[3] = {static_cast<int16_t>(v.x), static_cast<int16_t>(v.y),
+                          static_cast<int16_t>(v.z)};
     std::memcpy(at, s, 6);
   } else {
     const uint32_t p = static_cast<uint32_t>(v.x) | static_cast<uint32_t>(v.y) << 11 |
@@ -153,44 +217,85 @@ struct LaneWalks {
 // The step of `times` steps, rounded up to 32 fraction bits.
 HWY_INLINE uint64_t StepOfMany(const Stride& stride, uint32_t times) {
   const unsigned __int128 fraction = static_cast<unsigned __int128>(stride.step_fraction) * times;
-  const auto whole = static_cast<uint32_t>(stride.step_whole) * times + static_cast<uint32_t>(fraction >> 64);
+  const auto whole =
+      static_cast<uint32_t>(stride.step_whole) * times + static_cast<uint32_t>(fraction >> 64);
   const auto rest = static_cast<uint64_t>(fraction);
   return (static_cast<uint64_t>(whole) << 32) + (rest >> 32) + (static_cast<uint32_t>(rest) != 0);
 }
 
-// `count` voxels from three walks' beginnings. `exact(k)` gives the voxel where the walks leave a doubt.
+// Voxels on which the vectors leave a doubt, one by one.
 template <Output kOut, class Exact>
-HWY_ATTR HWY_INLINE void EmitWalks(const Walk (&walks)[3], const uint64_t (&all)[3], uint32_t k,
-                                   uint32_t count, Stage& stage, const Exact& exact) {
+HWY_NOINLINE void StoreExact(uint32_t k, uint32_t count, std::byte* at, const Exact& exact) {
+  for (uint32_t i = 0; i < count; ++i) StoreVoxel<kOut>(exact(k + i), at + i * BytesOf(kOut));
+}
+
+// `count` voxels from three walks' beginnings. `exact(k)` gives the voxel where the walks leave a doubt.
+// kStream: straight to `to`, which begins a line; `count` is a multiple of kLanes.
+template <Output kOut, bool kStream, class Exact>
+HWY_ATTR HWY_INLINE void EmitWalks(const Spread& spread, const Walk (&walks)[3],
+                                   const uint64_t (&all)[3], uint32_t k, uint32_t count,
+                                   Stage& stage, std::byte* to, const Exact& exact) {
   const DU d;
-  const auto lanes = static_cast<uint32_t>(hn::Lanes(d));
   const VU zone = hn::Set(d, Rules::kWalkZone);
-  LaneWalks x, y, z;
-  x.Begin(walks[0], all[0]);
-  y.Begin(walks[1], all[1]);
-  z.Begin(walks[2], all[2]);
-  for (;;) {
-    std::byte* const at = stage.next();
-    StoreVoxels<kOut>(x.whole, y.whole, z.whole, at);
-    const uint32_t here = count < lanes ? count : lanes;
-    const auto least = hn::Min(hn::Min(x.fraction, y.fraction), z.fraction);
-    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Lt(least, zone)))) {
-      for (uint32_t i = 0; i < here; ++i) StoreVoxel<kOut>(exact(k + i), at + i * BytesOf(kOut));
+  LaneWalks p[3];
+  if constexpr (kOut == Output::kPacked) {
+    for (size_t a = 0; a < 3; ++a) p[a].Begin(walks[a], all[a]);
+  } else {
+    // Lane by lane: a walk is long.
+    HWY_ALIGN uint32_t whole[3 * kLanes], fraction[3 * kLanes];
+    for (size_t a = 0; a < 3; ++a) {
+      uint64_t at = walks[a].at;
+      for (size_t i = 0; i < kLanes; ++i, at += walks[a].step) {
+        whole[3 * i + a] = static_cast<uint32_t>(at >> 32);
+        fraction[3 * i + a] = static_cast<uint32_t>(at);
+      }
     }
-    stage.Add(here * BytesOf(kOut));
+    for (size_t v = 0; v < 3; ++v) {
+      p[v].whole = hn::Load(d, whole + v * kLanes);
+      p[v].fraction = hn::Load(d, fraction + v * kLanes);
+      p[v].step_whole = spread.Of(v, hn::Set(d, static_cast<uint32_t>(all[0] >> 32)),
+                                  hn::Set(d, static_cast<uint32_t>(all[1] >> 32)),
+                                  hn::Set(d, static_cast<uint32_t>(all[2] >> 32)));
+      p[v].step_fraction = spread.Of(v, hn::Set(d, static_cast<uint32_t>(all[0])),
+                                     hn::Set(d, static_cast<uint32_t>(all[1])),
+                                     hn::Set(d, static_cast<uint32_t>(all[2])));
+    }
+  }
+  for (;;) {
+    const uint32_t here = kStream || count >= kLanes ? static_cast<uint32_t>(kLanes) : count;
+    const auto least = hn::Min(hn::Min(p[0].fraction, p[1].fraction), p[2].fraction);
+    const bool doubt = HWY_UNLIKELY(!hn::AllFalse(d, hn::Lt(least, zone)));
+    if constexpr (kStream) {
+      if (HWY_UNLIKELY(doubt)) {
+        StoreExact<kOut>(k, here, to, exact);
+      } else if constexpr (kOut == Output::kPacked) {
+        StorePacked<true>(p[0].whole, p[1].whole, p[2].whole, to);
+      } else {
+        StoreSpread<kOut, true>(p[0].whole, p[1].whole, p[2].whole, to);
+      }
+      to += kLanes * BytesOf(kOut);
+    } else {
+      std::byte* const at = stage.next();
+      if constexpr (kOut == Output::kPacked) {
+        StorePacked(p[0].whole, p[1].whole, p[2].whole, at);
+      } else {
+        StoreSpread<kOut>(p[0].whole, p[1].whole, p[2].whole, at);
+      }
+      if (HWY_UNLIKELY(doubt)) StoreExact<kOut>(k, here, at, exact);
+      stage.Add(here * BytesOf(kOut));
+    }
     count -= here;
     if (count == 0) return;
     k += here;
-    x.Next();
-    y.Next();
-    z.Next();
+    for (size_t v = 0; v < 3; ++v) p[v].Next();
   }
 }
 
 // Voxels k to k + count − 1 of a segment of n > 0 steps.
 template <Output kOut>
-HWY_ATTR void EmitLong(const FixedSegment& g, int64_t n, uint32_t k, uint64_t count, Stage& stage) {
-  const auto lanes = static_cast<uint32_t>(hn::Lanes(DU()));
+HWY_ATTR void EmitLong(const Spread& spread, const FixedSegment& g, int64_t n, uint32_t k,
+                       uint64_t count, Stage& stage) {
+  constexpr auto lanes = static_cast<uint32_t>(kLanes);
   const int64_t grain = GrainOf(g);
   Stride strides[3];
   uint32_t bias[3];
@@ -201,45 +306,110 @@ HWY_ATTR void EmitLong(const FixedSegment& g, int64_t n, uint32_t k, uint64_t co
     all[a] = StepOfMany(strides[a], lanes);
   }
   const auto exact = [&](uint32_t at) {
-    return Voxel{CoordinateAt(strides[0], g.s[0], g.e[0], n, at), CoordinateAt(strides[1], g.s[1], g.e[1], n, at),
+    return Voxel{CoordinateAt(strides[0], g.s[0], g.e[0], n, at),
+                 CoordinateAt(strides[1], g.s[1], g.e[1], n, at),
                  CoordinateAt(strides[2], g.s[2], g.e[2], n, at)};
   };
-  while (count > 0) {
-    const auto run = static_cast<uint32_t>(std::min<uint64_t>(count, uint64_t{lanes} * kVectorSteps));
+  const auto emit = [&]<bool kStream>(uint32_t run, std::byte* to) {
     Walk walks[3];
     for (int a = 0; a < 3; ++a) walks[a] = Rules::From(strides[a], k, bias[a]);
-    EmitWalks<kOut>(walks, all, k, run, stage, exact);
+    EmitWalks<kOut, kStream>(spread, walks, all, k, run, stage, to, exact);
     k += run;
     count -= run;
+  };
+  constexpr uint32_t kRun = lanes * kVectorSteps;
+  if constexpr (kOut != Output::kI16x3) {
+    const std::optional<size_t> to_line = stage.ToLine(BytesOf(kOut));
+    if (to_line.has_value() && count >= kDirect) {
+      if (*to_line > 0)
+        emit.template operator()<false>(static_cast<uint32_t>(*to_line / BytesOf(kOut)), nullptr);
+      std::byte* to = stage.Drain();
+      std::byte* const begin = to;
+      while (count >= lanes) {
+        const auto run = static_cast<uint32_t>(std::min<uint64_t>(count / lanes * lanes, kRun));
+        emit.template operator()<true>(run, to);
+        to += run * BytesOf(kOut);
+      }
+      stage.Skip(static_cast<size_t>(to - begin));
+    }
+  }
+  while (count > 0) {
+    emit.template operator()<false>(static_cast<uint32_t>(std::min<uint64_t>(count, kRun)),
+                                    nullptr);
   }
 }
 
-// The same for few steps: one walk from S on, whose roundings add up to less than the zone allows.
+// The same for few steps: 32 bits hold where a voxel lies from the segment's first one, with 22 of
+// fraction. Rounding and zones are those of a walk (stride.h), in units of 2⁻²².
 template <Output kOut>
-HWY_ATTR HWY_INLINE void EmitShort(const FixedSegment& g, int64_t n, uint32_t k, uint32_t count,
-                                   Stage& stage) {
-  const auto lanes = static_cast<uint32_t>(hn::Lanes(DU()));
-  const bool apart = Rules::Apart(n, GrainOf(g));
-  Walk walks[3];
-  uint64_t all[3];
+HWY_ATTR HWY_INLINE void EmitShort(const Spread& spread, const FixedSegment& g, int64_t n,
+                                   uint32_t k, uint32_t count, Stage& stage) {
+  constexpr int kBits = 22;
+  static_assert((kShortSteps + 2) << kBits < int64_t{1} << 31);
+  const DU d;
+  const hn::RebindToSigned<DU> di;
+  const auto steps = static_cast<int32_t>(n);
+  const uint32_t too_large = static_cast<uint32_t>(steps) + 1, zone = 2 * too_large;
+  const bool apart = static_cast<uint64_t>(n) * (zone + too_large) <
+                     (static_cast<uint64_t>(GrainOf(g)) << (kBits - kFractionBits));
+  uint32_t cell[3], begin[3], step[3];
   for (int a = 0; a < 3; ++a) {
-    const int64_t length = (g.e[a] - g.s[a]) * kUnits;
-    const int64_t step = n == 0 ? 0 : CeilDiv<int64_t>(length, n);
-    const uint32_t bias =
-        apart || step * n == length ? Rules::kWalkZone : Rules::kWalkZone - Rules::kTooLarge;
-    walks[a].step = static_cast<uint64_t>(step);
-    walks[a].at = (static_cast<uint64_t>(g.s[a]) << (32 - kFractionBits)) + bias + walks[a].step * k;
-    all[a] = walks[a].step * lanes;
+    const auto length = static_cast<int32_t>(g.e[a] - g.s[a]) * (1 << (kBits - kFractionBits));
+    const int32_t of_one = steps == 0 ? 0 : CeilDiv<int32_t>(length, steps);
+    const uint32_t bias = apart || steps == 0 || of_one * steps == length ? zone : zone - too_large;
+    cell[a] = static_cast<uint32_t>(CellOf(g.s[a]));
+    begin[a] = (static_cast<uint32_t>(g.s[a] & (kUnits - 1)) << (kBits - kFractionBits)) + bias +
+               static_cast<uint32_t>(of_one) * k;
+    step[a] = static_cast<uint32_t>(of_one);
   }
   const auto exact = [&](uint32_t at) {
-    if (n == 0) {
-      return Voxel{static_cast<int32_t>(CellOf(g.s[0])), static_cast<int32_t>(CellOf(g.s[1])),
-                   static_cast<int32_t>(CellOf(g.s[2]))};
+    int32_t v[3];
+    for (int a = 0; a < 3; ++a) {
+      v[a] = n == 0 ? static_cast<int32_t>(cell[a]) : ExactCoordinate(g.s[a], g.e[a], n, at);
     }
-    return Voxel{ExactCoordinate(g.s[0], g.e[0], n, at), ExactCoordinate(g.s[1], g.e[1], n, at),
-                 ExactCoordinate(g.s[2], g.e[2], n, at)};
+    return Voxel{v[0], v[1], v[2]};
   };
-  EmitWalks<kOut>(walks, all, k, count, stage, exact);
+  const VU zones = hn::Set(d, zone), fraction = hn::Set(d, (1u << kBits) - 1);
+  const VU xs = hn::Set(d, step[0]), ys = hn::Set(d, step[1]), zs = hn::Set(d, step[2]);
+  const VU xb = hn::Set(d, begin[0]), yb = hn::Set(d, begin[1]), zb = hn::Set(d, begin[2]);
+  const VU xc = hn::Set(d, cell[0]), yc = hn::Set(d, cell[1]), zc = hn::Set(d, cell[2]);
+  VU at[3], advance[3], cells[3];
+  if constexpr (kOut == Output::kPacked) {
+    const VU lane = hn::Iota(d, 0);
+    at[0] = hn::Add(xb, hn::Mul(xs, lane)), at[1] = hn::Add(yb, hn::Mul(ys, lane)),
+    at[2] = hn::Add(zb, hn::Mul(zs, lane));
+    advance[0] = hn::Mul(xs, hn::Set(d, kLanes)), advance[1] = hn::Mul(ys, hn::Set(d, kLanes));
+    advance[2] = hn::Mul(zs, hn::Set(d, kLanes));
+    cells[0] = xc, cells[1] = yc, cells[2] = zc;
+  } else {
+    for (size_t v = 0; v < 3; ++v) {
+      const VU one = spread.Of(v, xs, ys, zs);
+      at[v] = hn::Add(spread.Of(v, xb, yb, zb), hn::Mul(one, spread.voxel[v]));
+      advance[v] = hn::Mul(one, hn::Set(d, kLanes));
+      cells[v] = spread.Of(v, xc, yc, zc);
+    }
+  }
+  for (;;) {
+    std::byte* const to = stage.next();
+    VU whole[3];
+    for (size_t v = 0; v < 3; ++v) {
+      whole[v] = hn::Add(cells[v], hn::BitCast(d, hn::ShiftRight<kBits>(hn::BitCast(di, at[v]))));
+    }
+    if constexpr (kOut == Output::kPacked) {
+      StorePacked(whole[0], whole[1], whole[2], to);
+    } else {
+      StoreSpread<kOut>(whole[0], whole[1], whole[2], to);
+    }
+    const uint32_t here = count < kLanes ? count : static_cast<uint32_t>(kLanes);
+    const auto least = hn::Min(hn::Min(hn::And(at[0], fraction), hn::And(at[1], fraction)),
+                               hn::And(at[2], fraction));
+    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Lt(least, zones)))) StoreExact<kOut>(k, here, to, exact);
+    stage.Add(here * BytesOf(kOut));
+    count -= here;
+    if (count == 0) return;
+    k += here;
+    for (size_t v = 0; v < 3; ++v) at[v] = hn::Add(at[v], advance[v]);
+  }
 }
 
 template <Output kOut>
@@ -257,9 +427,12 @@ HWY_ATTR void EmitCover(const FixedSegment& g, int64_t k, uint64_t count, Stage&
 template <Output kOut, typename T>
 HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
                         std::span<const uint64_t> offsets, uint64_t first, uint64_t count,
-                        std::byte* out) {
-  Stage stage(out, count * BytesOf(kOut));
-  size_t i = static_cast<size_t>(std::upper_bound(offsets.begin(), offsets.end(), first) - offsets.begin()) - 1;
+                        bool past_caches, std::byte* out) {
+  const Spread spread;
+  Stage stage(out, past_caches);
+  size_t i = static_cast<size_t>(std::upper_bound(offsets.begin(), offsets.end(), first) -
+                                 offsets.begin()) -
+             1;
   for (; count > 0; ++i) {
     const FixedSegment g = ToFixed(segments[i]);
     const auto n = static_cast<int64_t>(offsets[i + 1] - offsets[i]) - 1;
@@ -268,9 +441,9 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
     if (sampling == Sampling::kCover) {
       EmitCover<kOut>(g, static_cast<int64_t>(k), here, stage);
     } else if (n <= kShortSteps) {
-      EmitShort<kOut>(g, n, static_cast<uint32_t>(k), static_cast<uint32_t>(here), stage);
+      EmitShort<kOut>(spread, g, n, static_cast<uint32_t>(k), static_cast<uint32_t>(here), stage);
     } else {
-      EmitLong<kOut>(g, n, static_cast<uint32_t>(k), here, stage);
+      EmitLong<kOut>(spread, g, n, static_cast<uint32_t>(k), here, stage);
     }
     first += here;
     count -= here;
@@ -278,17 +451,21 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
 }
 
 HWY_ATTR void EmitVoxelsIn(const Batch& batch, Format format, std::span<const uint64_t> offsets,
-                           uint64_t first, uint64_t count, std::byte* out) {
+                           uint64_t first, uint64_t count, bool past_caches, std::byte* out) {
   batch.With([&](const auto& segments) {
     switch (format.output) {
       case Output::kI32x3:
-        return EmitRange<Output::kI32x3>(segments, format.sampling, offsets, first, count, out);
+        return EmitRange<Output::kI32x3>(segments, format.sampling, offsets, first, count,
+                                         past_caches, out);
       case Output::kF32x3:
-        return EmitRange<Output::kF32x3>(segments, format.sampling, offsets, first, count, out);
+        return EmitRange<Output::kF32x3>(segments, format.sampling, offsets, first, count,
+                                         past_caches, out);
       case Output::kI16x3:
-        return EmitRange<Output::kI16x3>(segments, format.sampling, offsets, first, count, out);
+        return EmitRange<Output::kI16x3>(segments, format.sampling, offsets, first, count,
+                                         past_caches, out);
       case Output::kPacked:
-        return EmitRange<Output::kPacked>(segments, format.sampling, offsets, first, count, out);
+        return EmitRange<Output::kPacked>(segments, format.sampling, offsets, first, count,
+                                          past_caches, out);
     }
   });
 }

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 
 #include "gpu/generate/cover.h"
 #include "gpu/generate/stride.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "gpu/generate/cpu_kernel.cc"
-#include "hwy/foreach_target.h"  // IWYU pragma: keep
 #include "hwy/cache_control.h"
+#include "hwy/foreach_target.h"  // IWYU pragma: keep
 #include "hwy/highway.h"
 
 #include "gpu/generate/cpu_kernel-inl.h"
@@ -25,8 +26,9 @@ HWY_EXPORT(TargetIn);
 }  // namespace
 
 void EmitVoxels(const Batch& batch, Format format, std::span<const uint64_t> offsets,
-                uint64_t first, uint64_t count, std::byte* out) {
-  if (count > 0) HWY_DYNAMIC_DISPATCH(EmitVoxelsIn)(batch, format, offsets, first, count, out);
+                uint64_t first, uint64_t count, bool past_caches, std::byte* out) {
+  if (count > 0) HWY_DYNAMIC_DISPATCH(EmitVoxelsIn)
+  (batch, format, offsets, first, count, past_caches, out);
 }
 
 void StreamingFill(std::span<std::byte> out, uint32_t word) {

@@ -10,10 +10,10 @@
 
 namespace voxeld::gpu::generate {
 
-// Voxels [first, first + count) of the batch, from out[0] on; `offsets` are the plan's. Large ranges are
-// written past the caches.
+// Voxels [first, first + count) of the batch, from out[0] on; `offsets` are the plan's. `past_caches`: by
+// streaming stores, for outputs that the caches would not keep.
 void EmitVoxels(const Batch& batch, Format format, std::span<const uint64_t> offsets,
-                uint64_t first, uint64_t count, std::byte* out);
+                uint64_t first, uint64_t count, bool past_caches, std::byte* out);
 
 // Fills memory with streaming stores, the ceiling of the above.
 void StreamingFill(std::span<std::byte> out, uint32_t word);

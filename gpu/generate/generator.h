@@ -24,6 +24,9 @@ namespace voxeld::gpu::generate {
 // Takes voxels `first` and on, which are gone when it returns; an error ends the work and is its result.
 using TakeChunk = std::function<absl::Status(uint64_t first, std::span<const std::byte> voxels)>;
 
+// Host memory of one size, freed with its pointer.
+using HostMemory = std::unique_ptr<std::byte[], std::function<void(std::byte*)>>;
+
 // Used by one thread at a time.
 class Generator {
  public:
@@ -43,6 +46,9 @@ class Generator {
   // small; whatever else fails before the first byte leaves it untouched.
   virtual absl::Status Generate(const Batch& batch, const Plan& plan, Format format,
                                 std::span<std::byte> out) = 0;
+
+  // Memory that Generate fills faster than any other, if there is such; its contents are not set.
+  virtual absl::StatusOr<HostMemory> Allocate(size_t bytes);
 
   // The same, `chunk_voxels` (a multiple of 8,192) at a time, in order; needs no more memory than a few
   // chunks.

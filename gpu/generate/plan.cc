@@ -69,7 +69,8 @@ bool InRange(const Segment<T>& segment) {
 template <typename T>
 absl::Status WhatIsWrong(const Segment<T>& segment, size_t index, Sampling sampling) {
   for (size_t a = 0; a < 3; ++a) {
-    for (const auto& [name, v] : {std::pair("start", segment.start[a]), std::pair("end", segment.end[a])}) {
+    for (const auto& [name, v] :
+         {std::pair("start", segment.start[a]), std::pair("end", segment.end[a])}) {
       if (v >= static_cast<T>(-kMostCoordinate) && v <= static_cast<T>(kMostCoordinate)) continue;
       return absl::InvalidArgumentError(
           absl::StrCat("segments[", index, "].", name, ".", std::string(1, kAxes[a]), " is ", v,
@@ -103,9 +104,9 @@ absl::Status CheckBounds(const Bounds& bounds, Output output) {
   for (int a = 0; a < 3; ++a) {
     const Range range = Allowed(output, a);
     if (bounds.lo[a] >= range.lo && bounds.hi[a] <= range.hi) continue;
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "the voxels' %c goes from %d to %d; %s holds %d to %d", kAxes[a], bounds.lo[a],
-        bounds.hi[a], NameOf(output), range.lo, range.hi));
+    return absl::InvalidArgumentError(
+        absl::StrFormat("the voxels' %c goes from %d to %d; %s holds %d to %d", kAxes[a],
+                        bounds.lo[a], bounds.hi[a], NameOf(output), range.lo, range.hi));
   }
   return absl::OkStatus();
 }

@@ -12,7 +12,7 @@
 
 namespace voxeld::gpu::generate {
 
-inline constexpr uint64_t kMostVoxels = uint64_t{1} << 40;     // of a batch
+inline constexpr uint64_t kMostVoxels = uint64_t{1} << 40;  // of a batch
 inline constexpr size_t kMostSegments = size_t{1} << 27;
 
 struct Plan {

@@ -97,7 +97,8 @@ struct WalkRules {
     const int32_t whole = stride.At(k, &fraction);
     Walk walk;
     const uint32_t up = static_cast<uint32_t>(fraction) != 0;
-    walk.at = (static_cast<uint64_t>(static_cast<uint32_t>(whole)) << 32) + (fraction >> 32) + up + bias;
+    walk.at =
+        (static_cast<uint64_t>(static_cast<uint32_t>(whole)) << 32) + (fraction >> 32) + up + bias;
     walk.step = StepOf(stride);
     return walk;
   }

@@ -16,11 +16,11 @@ namespace {
 
 using testing::Adversarial;
 using testing::Cell;
+using ::testing::HasSubstr;
 using testing::RandomSegments;
 using testing::SegmentD;
 using testing::SegmentF;
 using testing::SegmentI;
-using ::testing::HasSubstr;
 
 std::vector<std::byte> Generated(Generator& generator, const Batch& batch, Format format) {
   const absl::StatusOr<Plan> plan = generator.Prepare(batch, format);
@@ -36,7 +36,8 @@ std::vector<Cell> CellsOf(const std::vector<std::byte>& bytes) {
   std::vector<int32_t> words(bytes.size() / 4);
   std::memcpy(words.data(), bytes.data(), bytes.size());
   std::vector<Cell> cells;
-  for (size_t i = 0; i + 2 < words.size(); i += 3) cells.push_back({words[i], words[i + 1], words[i + 2]});
+  for (size_t i = 0; i + 2 < words.size(); i += 3)
+    cells.push_back({words[i], words[i + 1], words[i + 2]});
   return cells;
 }
 
@@ -44,9 +45,10 @@ std::vector<Cell> Expected(const std::vector<SegmentD>& segments, Sampling sampl
   std::vector<Cell> cells;
   for (const SegmentD& segment : segments) {
     const auto g = testing::ReferenceOf(segment.start, segment.end);
-    const std::vector<Cell> of = sampling == Sampling::kCover  ? testing::Crossed(g)
-                                 : sampling == Sampling::kThin ? testing::Steps(g, testing::ThinSteps(g))
-                                                               : testing::Steps(g, testing::EuclideanSteps(g));
+    const std::vector<Cell> of = sampling == Sampling::kCover ? testing::Crossed(g)
+                                 : sampling == Sampling::kThin
+                                     ? testing::Steps(g, testing::ThinSteps(g))
+                                     : testing::Steps(g, testing::EuclideanSteps(g));
     cells.insert(cells.end(), of.begin(), of.end());
   }
   return cells;
@@ -66,10 +68,10 @@ class CpuGenerator : public ::testing::TestWithParam<Sampling> {
   }
   const std::unique_ptr<Generator> generator_ = MakeCpuGenerator(1);
 };
-INSTANTIATE_TEST_SUITE_P(Samplings, CpuGenerator, ::testing::ValuesIn(kSamplings),
-                         [](const auto& info) {
-                           return std::string(std::array{"Euclidean", "Thin", "Cover"}[static_cast<size_t>(info.param)]);
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Samplings, CpuGenerator, ::testing::ValuesIn(kSamplings), [](const auto& info) {
+      return std::string(std::array{"Euclidean", "Thin", "Cover"}[static_cast<size_t>(info.param)]);
+    });
 
 TEST_P(CpuGenerator, AdversarialSegmentsAreExact) {
   ExpectExact(Adversarial(0, 30));
@@ -119,15 +121,17 @@ TEST_P(CpuGenerator, VoxelsOfTheLongestSegmentsAreExact) {
     for (int more = 0; more < 12; ++more) starts.push_back(random() % (count - 300));
     for (const uint64_t k : starts) {
       std::vector<std::byte> out(300 * 12);
-      EmitVoxels(segments, format, plan->offsets, plan->offsets[i] + k, 300, out.data());
+      EmitVoxels(segments, format, plan->offsets, plan->offsets[i] + k, 300, true, out.data());
       const std::vector<Cell> got = CellsOf(out);
-      for (uint64_t j = 0; j < 300; ++j) ASSERT_EQ(got[j], testing::CellAt(g, k + j, n)) << i << " " << k + j;
+      for (uint64_t j = 0; j < 300; ++j)
+        ASSERT_EQ(got[j], testing::CellAt(g, k + j, n)) << i << " " << k + j;
     }
   }
 }
 
 TEST(CpuGeneratorCover, AnyCellOfALongSegmentIsTheOneWhichThatManyCrossingsLeadTo) {
-  const std::vector<SegmentD> segments = {{{0.3, 0, 0}, {20000, -7000.5, 3333.25}}, {{9, 9, 9}, {-6000, 6018, 9}}};
+  const std::vector<SegmentD> segments = {{{0.3, 0, 0}, {20000, -7000.5, 3333.25}},
+                                          {{9, 9, 9}, {-6000, 6018, 9}}};
   const Format format = {Sampling::kCover, Output::kI32x3};
   const auto generator = MakeCpuGenerator(1);
   const auto plan = generator->Prepare(segments, format);
@@ -138,7 +142,7 @@ TEST(CpuGeneratorCover, AnyCellOfALongSegmentIsTheOneWhichThatManyCrossingsLeadT
   for (int i = 0; i < 5000; ++i) {
     const uint64_t at = random() % expected.size();
     std::vector<std::byte> out(12);
-    EmitVoxels(segments, format, plan->offsets, at, 1, out.data());
+    EmitVoxels(segments, format, plan->offsets, at, 1, false, out.data());
     ASSERT_EQ(CellsOf(out)[0], expected[at]) << at;
   }
 }
@@ -189,8 +193,7 @@ TEST_P(CpuGenerator, ThreadsChunksAndPlacesInMemoryChangeNothing) {
     std::vector<std::byte> chunks;
     uint64_t next = 0;
     const absl::Status status = several->Stream(
-        segments, *plan, format, 5 * 8192,
-        [&](uint64_t first, std::span<const std::byte> voxels) {
+        segments, *plan, format, 5 * 8192, [&](uint64_t first, std::span<const std::byte> voxels) {
           EXPECT_EQ(first, next);
           next += voxels.size() / BytesOf(output);
           chunks.insert(chunks.end(), voxels.begin(), voxels.end());
@@ -201,7 +204,9 @@ TEST_P(CpuGenerator, ThreadsChunksAndPlacesInMemoryChangeNothing) {
 
     for (const size_t shift : {1, 12, 63}) {
       std::vector<std::byte> out(one.size() + shift + 64, std::byte{0x5A});
-      ASSERT_TRUE(generator_->Generate(segments, *plan, format, std::span(out).subspan(shift, one.size())).ok());
+      ASSERT_TRUE(
+          generator_->Generate(segments, *plan, format, std::span(out).subspan(shift, one.size()))
+              .ok());
       EXPECT_EQ(std::memcmp(out.data() + shift, one.data(), one.size()), 0);
       for (size_t i = 0; i < 64; ++i) ASSERT_EQ(out[shift + one.size() + i], std::byte{0x5A});
       for (size_t i = 0; i < shift; ++i) ASSERT_EQ(out[i], std::byte{0x5A});
@@ -241,7 +246,8 @@ TEST(Generator, WhatCannotBeIsRefusedWithItsPlaceAndValue) {
   EXPECT_THAT(message({fine, {{0, 0, 0}, {1, nan, 2}}}), HasSubstr("segments[1].end.y is nan"));
   EXPECT_THAT(message({{{0, 0, -INFINITY}, {1, 1, 2}}}), HasSubstr("segments[0].start.z is -inf"));
   EXPECT_THAT(message({{{2e9, 0, 0}, {1, 1, 2}}}), HasSubstr("within ±2^30"));
-  EXPECT_THAT(message({{{-1e9, 0, 0}, {1e9, 1, 2}}}), HasSubstr("segments[0] has 2000000000 steps; at most 2^30"));
+  EXPECT_THAT(message({{{-1e9, 0, 0}, {1e9, 1, 2}}}),
+              HasSubstr("segments[0] has 2000000000 steps; at most 2^30"));
   EXPECT_THAT(message({{{0, 0, 0}, {17e6, 1, 2}}}, {Sampling::kThin, Output::kF32x3}),
               HasSubstr("x goes from 0 to 17000000; f32x3 holds -16777216 to 16777216"));
   EXPECT_THAT(message({{{0, 0, 0}, {10, 40000, 2}}}, {Sampling::kThin, Output::kI16x3}),
@@ -262,7 +268,8 @@ TEST(Generator, AnOutputThatIsTooSmallIsLeftAsItWas) {
   std::vector<std::byte> out(119, std::byte{7});
   const absl::Status status = generator->Generate(segments, *plan, {}, out);
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("the output has 119 bytes; 10 voxels of 12 bytes (i32x3) need 120"));
+  EXPECT_THAT(std::string(status.message()),
+              HasSubstr("the output has 119 bytes; 10 voxels of 12 bytes (i32x3) need 120"));
   EXPECT_EQ(out, std::vector<std::byte>(119, std::byte{7}));
   EXPECT_THAT(std::string(generator->Stream(segments, *plan, {}, 100, nullptr).message()),
               HasSubstr("multiple of 8192"));

@@ -79,7 +79,8 @@ inline std::vector<Cell> Steps(const ReferenceSegment& g, const Integer& n) {
 
 // Every crossing of a face, sorted.
 inline std::vector<Cell> Crossed(ReferenceSegment g) {
-  if (std::lexicographical_compare(g.e.begin(), g.e.end(), g.s.begin(), g.s.end())) std::swap(g.s, g.e);
+  if (std::lexicographical_compare(g.e.begin(), g.e.end(), g.s.begin(), g.s.end()))
+    std::swap(g.s, g.e);
   struct Crossing {
     Rational t;
     size_t axis;

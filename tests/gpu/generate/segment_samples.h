@@ -51,7 +51,8 @@ inline std::vector<SegmentD> RandomSegments(uint64_t seed, size_t count, double 
   std::vector<SegmentD> out(count);
   for (SegmentD& g : out) {
     for (auto* p : {&g.start, &g.end}) {
-      for (double& v : *p) v = whole ? static_cast<double>(static_cast<int64_t>(within(random))) : within(random);
+      for (double& v : *p)
+        v = whole ? static_cast<double>(static_cast<int64_t>(within(random))) : within(random);
     }
   }
   return out;

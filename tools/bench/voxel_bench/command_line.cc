@@ -121,12 +121,33 @@ CLI::App* AddIdle(CLI::App& app, IdleOptions& options) {
   return command;
 }
 
+CLI::App* AddPaper(CLI::App& app, PaperOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "paper", "The paper's Tables 2 to 4 on this machine, beside its figures and our ceilings");
+  command->add_option("--engine", options.engines, "Only these; may be repeated")
+      ->check(CLI::IsMember({"cpu", "cuda", "auto"}))
+      ->expected(1)
+      ->take_all();
+  command->add_option("--table", options.tables, "Only these; may be repeated")
+      ->check(CLI::IsMember({"2", "3", "4"}))
+      ->expected(1)
+      ->take_all();
+  AddSeconds(*command, options.seconds, "Of each figure, at least");
+  command->add_option("--voxels", options.voxels, "Of each batch of Table 4")
+      ->check(CLI::Range(uint64_t{100'000}, uint64_t{1} << 33))
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "Of the segments")->capture_default_str();
+  return command;
+}
+
 }  // namespace
 
 absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments) {
   CommandLine out;
   CLI::App app("What the daemon reaches, measured from its clients' side.", "voxel-bench");
-  app.footer("Each starts a daemon of its own. A figure is the median, with least and greatest.");
+  app.footer(
+      "All but paper start a daemon of their own. A figure is the median, with least and "
+      "greatest.");
   app.require_subcommand(1);
   app.fallthrough();
   app.add_flag("--json", out.json, "JSON alone on the standard output");
@@ -137,12 +158,14 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   FairnessOptions fairness;
   OverloadOptions overload;
   IdleOptions idle;
+  PaperOptions paper;
   SinkOptions sink;
   CLI::App* const ingest_command = AddIngest(app, ingest);
   CLI::App* const latency_command = AddLatency(app, latency);
   CLI::App* const fairness_command = AddFairness(app, fairness);
   CLI::App* const overload_command = AddOverload(app, overload);
   CLI::App* const idle_command = AddIdle(app, idle);
+  CLI::App* const paper_command = AddPaper(app, paper);
   CLI::App* const sink_command = app.add_subcommand("sink", "The bare gRPC server by itself");
   sink_command->add_option("--listen", sink.listen, "Where; may be repeated")
       ->required()
@@ -163,6 +186,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   if (fairness_command->parsed()) out.command = fairness;
   if (overload_command->parsed()) out.command = overload;
   if (idle_command->parsed()) out.command = idle;
+  if (paper_command->parsed()) out.command = paper;
   if (sink_command->parsed()) out.command = sink;
   return out;
 }

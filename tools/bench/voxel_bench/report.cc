@@ -98,7 +98,7 @@ nlohmann::json ToJson(const Tally& tally) {
 }
 
 std::string TextOf(const nlohmann::json& report) {
-  std::string out;
+  std::string out = report.value("text", "");
   for (const nlohmann::json& figure : report["figures"]) {
     absl::StrAppendFormat(&out, "%-44s %12.5g %s", std::string(figure["name"]),
                           double(figure["median"]), std::string(figure["unit"]));

@@ -23,7 +23,7 @@ void AddFigure(nlohmann::json& report, const std::string& name, const std::strin
 // Every count, the outcomes that are pending, and `exact`: that they add up.
 nlohmann::json ToJson(const Tally& tally);
 
-// The figures as lines for people.
+// The figures as lines for people, below what the benchmark says itself (`text`).
 std::string TextOf(const nlohmann::json& report);
 
 // "model name" of the text of /proc/cpuinfo; "unknown" if there is none.

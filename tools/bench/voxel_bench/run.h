@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "tools/bench/paper/paper_bench.h"
 
 namespace voxeld::bench {
 
@@ -70,5 +71,8 @@ struct IdleOptions {
   std::string display = "size=64x64x64,format=rgb888,rate=400";
 };
 absl::StatusOr<nlohmann::json> RunIdle(const IdleOptions& options, const Surroundings& with);
+
+using PaperOptions = paper::PaperOptions;
+absl::StatusOr<nlohmann::json> RunPaper(const PaperOptions& options, const Surroundings& with);
 
 }  // namespace voxeld::bench

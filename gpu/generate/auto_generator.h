@@ -1,0 +1,50 @@
+// The generator that is the fastest for each batch: a few segments are made before a GPU has begun (the
+// paper's conclusion 2), many are not.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "gpu/generate/cost_model.h"
+#include "gpu/generate/generator.h"
+
+namespace voxeld::gpu::generate {
+
+struct Candidate {
+  std::string name;  // unique, without tabs and line ends
+  std::unique_ptr<Generator> generator;
+};
+
+class AutoGenerator final : public Generator {
+ public:
+  // The last one's memory is what Allocate gives: GPUs last. Reads what they cost from `cache_file`, or measures it and writes that there; empty: measures. A file that
+  // cannot be written is no error.
+  static absl::StatusOr<std::unique_ptr<AutoGenerator>> Make(std::vector<Candidate> candidates,
+                                                             const std::string& cache_file);
+  // With costs that are known; as many curves as candidates.
+  AutoGenerator(std::vector<Candidate> candidates, std::vector<CostCurve> curves)
+      : candidates_(std::move(candidates)), curves_(std::move(curves)) {}
+
+  // Where costs are kept, by default: $XDG_CACHE_HOME/voxeld or ~/.cache/voxeld; empty without either.
+  static std::string DefaultCacheFile();
+
+  // The candidate for a batch of that size.
+  size_t Choose(uint64_t voxels, uint64_t segments) const;
+  const std::string& name_of(size_t candidate) const { return candidates_[candidate].name; }
+
+  std::string name() const override { return "auto"; }
+  absl::StatusOr<Plan> Prepare(const Batch& batch, Format format) override;
+  absl::Status Generate(const Batch& batch, const Plan& plan, Format format,
+                        std::span<std::byte> out) override;
+  absl::StatusOr<HostMemory> Allocate(size_t bytes) override;
+  absl::Status Stream(const Batch& batch, const Plan& plan, Format format, uint64_t chunk_voxels,
+                      const TakeChunk& take) override;
+
+ private:
+  const std::vector<Candidate> candidates_;
+  const std::vector<CostCurve> curves_;
+};
+
+}  // namespace voxeld::gpu::generate

@@ -1,0 +1,147 @@
+#include <cuda_runtime_api.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "gpu/cuda/cuda_generator.h"
+#include "tools/bench/paper/column.h"
+
+namespace voxeld::bench::paper {
+namespace {
+
+using gpu::cuda::Block;
+using gpu::cuda::CudaGenerator;
+using gpu::cuda::PlacedBatch;
+using gpu::generate::BytesOf;
+using gpu::generate::Generator;
+
+absl::Status ToStatus(const char* what, cudaError_t error) {
+  if (error == cudaSuccess) return absl::OkStatus();
+  return absl::InternalError(std::string(what) + ": " + cudaGetErrorString(error));
+}
+
+class DeviceColumn final : public Column {
+ public:
+  explicit DeviceColumn(std::shared_ptr<CudaGenerator> generator)
+      : generator_(std::move(generator)) {}
+
+  std::string engine() const override { return "cuda"; }
+  int threads() const override { return 0; }
+  bool host_copy() const override { return false; }
+  std::string call() const override {
+    return "a batch that lies on the device, until its voxels do";
+  }
+  std::string ceiling() const override { return "cudaMemset of the same bytes"; }
+
+  absl::Status Take(const Workload& workload) override {
+    Release();
+    format_ = workload.format;
+    bytes_ = workload.voxels * BytesOf(format_.output);
+    const auto plan = generator_->Prepare(workload.segments, format_);
+    if (!plan.ok()) return plan.status();
+    auto batch = generator_->Place(workload.segments, *plan);
+    if (!batch.ok()) return batch.status();
+    batch_ = *std::move(batch);
+    auto out = generator_->device().pool().Acquire(bytes_);
+    if (!out.ok()) return out.status();
+    out_ = *std::move(out);
+    return absl::OkStatus();
+  }
+  absl::Status Call() override {
+    return generator_->GenerateOnDevice(batch_, format_, {out_.as<std::byte>(), bytes_});
+  }
+  absl::Status Ceiling() override {
+    const cudaStream_t stream = generator_->device().stream();
+    absl::Status status =
+        ToStatus("cudaMemsetAsync", cudaMemsetAsync(out_.as<std::byte>(), 7, bytes_, stream));
+    return status.ok() ? generator_->device().Wait() : status;
+  }
+  void Release() override {
+    batch_ = PlacedBatch();
+    out_ = Block();
+  }
+
+ private:
+  const std::shared_ptr<CudaGenerator> generator_;
+  gpu::generate::Format format_;
+  uint64_t bytes_ = 0;
+  PlacedBatch batch_;
+  Block out_;
+};
+
+class HostColumn final : public Column {
+ public:
+  explicit HostColumn(std::shared_ptr<CudaGenerator> generator)
+      : generator_(std::move(generator)) {}
+  ~HostColumn() override { HostColumn::Release(); }
+
+  std::string engine() const override { return "cuda"; }
+  int threads() const override { return static_cast<int>(std::thread::hardware_concurrency()); }
+  bool host_copy() const override { return true; }
+  std::string call() const override {
+    return "the whole call, from segments to voxels in pinned memory";
+  }
+  std::string ceiling() const override { return "copies of the same bytes to pinned memory"; }
+
+  absl::Status Take(const Workload& workload) override {
+    Release();
+    workload_ = &workload;
+    bytes_ = workload.voxels * BytesOf(workload.format.output);
+    chunk_ = std::min(bytes_, bytes_ > kMostAtOnce
+                                  ? Generator::kChunkVoxels * BytesOf(workload.format.output)
+                                  : kMostAtOnce);
+    auto pinned = gpu::cuda::AllocatePinned(chunk_);
+    if (!pinned.ok()) return pinned.status();
+    pinned_ = *pinned;
+    auto block = generator_->device().pool().Acquire(chunk_);
+    if (!block.ok()) return block.status();
+    source_ = *std::move(block);
+    return absl::OkStatus();
+  }
+  absl::Status Call() override {
+    const auto plan = generator_->Prepare(workload_->segments, workload_->format);
+    if (!plan.ok()) return plan.status();
+    if (chunk_ == bytes_)
+      return generator_->Generate(workload_->segments, *plan, workload_->format, pinned_);
+    return generator_->Stream(workload_->segments, *plan, workload_->format,
+                              Generator::kChunkVoxels,
+                              [](uint64_t, auto) { return absl::OkStatus(); });
+  }
+  absl::Status Ceiling() override {
+    const cudaStream_t stream = generator_->device().copies();
+    for (uint64_t done = 0; done < bytes_; done += chunk_) {
+      absl::Status status =
+          ToStatus("cudaMemcpyAsync", cudaMemcpyAsync(pinned_.data(), source_.as<std::byte>(),
+                                                      std::min(chunk_, bytes_ - done),
+                                                      cudaMemcpyDeviceToHost, stream));
+      if (!status.ok()) return status;
+    }
+    return ToStatus("cudaStreamSynchronize", cudaStreamSynchronize(stream));
+  }
+  void Release() override {
+    if (!pinned_.empty()) gpu::cuda::FreePinned(pinned_);
+    pinned_ = {};
+    source_ = Block();
+  }
+
+ private:
+  const std::shared_ptr<CudaGenerator> generator_;
+  const Workload* workload_ = nullptr;
+  uint64_t bytes_ = 0, chunk_ = 0;
+  std::span<std::byte> pinned_;
+  Block source_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::vector<std::unique_ptr<Column>>> CudaColumns() {
+  auto opened = CudaGenerator::Open(0, static_cast<int>(std::thread::hardware_concurrency()));
+  if (!opened.ok()) return opened.status();
+  const std::shared_ptr<CudaGenerator> generator = *std::move(opened);
+  std::vector<std::unique_ptr<Column>> columns;
+  columns.push_back(std::make_unique<DeviceColumn>(generator));
+  columns.push_back(std::make_unique<HostColumn>(generator));
+  return columns;
+}
+
+}  // namespace voxeld::bench::paper
