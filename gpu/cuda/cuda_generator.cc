@@ -73,11 +73,11 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
       for (size_t i = part * kGrain; i < end; ++i) fixed[i] = ToFixed(segments[i]);
     });
   });
-  const uint64_t blocks = (plan.voxels() + kGenerateBlockVoxels - 1) / kGenerateBlockVoxels;
+  placed.view_.rounds = GenerateRounds(plan.voxels());
   auto segments = device_->Upload(fixed.data(), fixed.size());
   auto offsets = device_->Upload(plan.offsets.data(), plan.offsets.size());
   auto records = device_->pool().Acquire(batch.size() * sizeof(SegmentRecord));
-  auto first_segments = device_->pool().Acquire((blocks + 1) * sizeof(uint32_t));
+  auto first_segments = device_->pool().Acquire((placed.view_.warps() + 1) * sizeof(uint32_t));
   for (const auto* block : {&segments, &offsets, &records, &first_segments}) {
     if (!block->ok()) return block->status();
   }

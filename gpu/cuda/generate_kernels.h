@@ -13,9 +13,14 @@
 
 namespace voxeld::gpu::cuda {
 
-// Voxels that one thread makes in a walk, and that one block makes in all.
+// Voxels that one thread makes in a walk, that a warp makes at a time, and that a block makes at most.
 inline constexpr uint32_t kGenerateRun = 4;
-inline constexpr uint64_t kGenerateBlockVoxels = 8192;
+inline constexpr uint32_t kGenerateRound = 32 * kGenerateRun;
+inline constexpr uint32_t kGenerateWarps = 8;  // of a block
+inline constexpr uint64_t kGenerateMostBlock = uint64_t{kGenerateWarps} * 8 * kGenerateRound;
+
+// Rounds of each warp: few voxels are shared by many warps.
+inline uint32_t GenerateRounds(uint64_t voxels) { return voxels < (uint64_t{4} << 20) ? 1 : 8; }
 
 struct StepRecord {
   uint64_t step_fraction;
@@ -36,15 +41,19 @@ struct GenerateView {
   const generate::FixedSegment* segments = nullptr;
   const uint64_t* offsets = nullptr;   // segments + 1
   SegmentRecord* records = nullptr;    // segments
-  uint32_t* first_segments = nullptr;  // of each block's first voxel, and of the last voxel
+  uint32_t* first_segments = nullptr;  // of each warp's first voxel, and of the last voxel
   uint64_t voxels = 0;
-  uint32_t count = 0;  // segments, at least 1
+  uint32_t count = 0;   // segments, at least 1
+  uint32_t rounds = 1;  // of each warp: GenerateRounds(voxels)
+
+  uint64_t warp_voxels() const { return uint64_t{rounds} * kGenerateRound; }
+  uint64_t warps() const { return (voxels + warp_voxels() - 1) / warp_voxels(); }
 };
 
 // Fills `records` and `first_segments`.
 cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream);
 
-// Voxels [first, first + count) to `out` and on; `first` is a multiple of kGenerateBlockVoxels, `out` is
+// Voxels [first, first + count) to `out` and on; `first` is a multiple of kGenerateMostBlock, `out` is
 // aligned to 16 bytes.
 cudaError_t Generate(const GenerateView& view, generate::Format format, uint64_t first,
                      uint64_t count, void* out, cudaStream_t stream);

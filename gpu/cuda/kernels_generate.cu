@@ -14,10 +14,7 @@ using generate::Voxel;
 using generate::Walk;
 using Rules = generate::WalkRules<kGenerateRun>;
 
-constexpr int kThreads = 256;
-constexpr int kWarps = kThreads / 32;
-constexpr uint32_t kWarpVoxels = 32 * kGenerateRun;
-constexpr uint32_t kRounds = kGenerateBlockVoxels / kWarps / kWarpVoxels;
+constexpr int kThreads = 32 * kGenerateWarps;
 
 __global__ void PrepareRecords(GenerateView view) {
   const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -55,10 +52,10 @@ __device__ uint32_t SegmentOf(const uint64_t* offsets, uint32_t lo, uint32_t hi,
   return lo;
 }
 
-__global__ void FindFirstSegments(GenerateView view, uint64_t blocks) {
+__global__ void FindFirstSegments(GenerateView view, uint64_t warp_voxels, uint64_t warps) {
   const uint64_t i = static_cast<uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
-  if (i > blocks) return;
-  const uint64_t voxel = Min<uint64_t>(i * kGenerateBlockVoxels, view.voxels - 1);
+  if (i > warps) return;
+  const uint64_t voxel = Min<uint64_t>(i * warp_voxels, view.voxels - 1);
   view.first_segments[i] = SegmentOf(view.offsets, 0, view.count - 1, voxel);
 }
 
@@ -163,7 +160,7 @@ __device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint
 template <Output kOut>
 __device__ void Store(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint32_t lane_at,
                       uint64_t end, uint4* stage, void* out) {
-  if (warp_at + kWarpVoxels <= end) return StoreWarp<kOut>(v, warp_at, stage, out);
+  if (warp_at + kGenerateRound <= end) return StoreWarp<kOut>(v, warp_at, stage, out);
   for (uint32_t i = 0; i < kGenerateRun; ++i) {
     if (warp_at + lane_at + i < end) StoreOne<kOut>(v[i], warp_at + lane_at + i, out);
   }
@@ -231,49 +228,100 @@ __device__ void MakeCoverRun(const GenerateView& view, uint32_t lo, uint32_t hi,
   }
 }
 
-// Each warp of a block makes a run of voxels of its own, a round of kWarpVoxels at a time, and keeps the
-// segment that it is in. `first` and `end` count from the batch's first voxel.
+// Where a warp is: the segment of its next voxel, and where the one after that ends.
+struct Place {
+  uint32_t segment;
+  uint64_t begin, end, next_end;
+  SegmentRecord record;
+
+  __device__ void Load(const GenerateView& view, uint32_t to) {
+    segment = to;
+    begin = view.offsets[to];
+    end = view.offsets[to + 1];
+    record = view.records[to];
+    LookAhead(view);
+  }
+  // To the next segment, whose record is known.
+  __device__ void Advance(const GenerateView& view, const SegmentRecord& next) {
+    ++segment;
+    begin = end;
+    end = next_end;
+    record = next;
+    LookAhead(view);
+  }
+  __device__ void LookAhead(const GenerateView& view) {
+    const uint32_t next = min(segment + 1, view.count - 1);
+    next_end = view.offsets[next + 1];
+    const auto* at = reinterpret_cast<const char*>(&view.records[next]);
+    asm volatile("prefetch.global.L1 [%0];" ::"l"(at));
+    asm volatile("prefetch.global.L1 [%0];" ::"l"(at + sizeof(SegmentRecord) - 1));
+  }
+};
+
+// A round in which one segment ends and the next one does not.
+__device__ void MakeTwoRuns(const GenerateView& view, const SegmentRecord& record,
+                            const SegmentRecord& next, const Place& place, uint64_t voxel,
+                            Voxel (&v)[kGenerateRun]) {
+  if (voxel < place.end) {
+    MakeRun(view, record, place.segment, static_cast<uint32_t>(voxel - place.begin), v);
+    if (voxel + kGenerateRun <= place.end) return;
+  }
+  Voxel w[kGenerateRun];
+  // Before its first voxel the walk goes backwards, to where nobody looks.
+  MakeRun(view, next, place.segment + 1, static_cast<uint32_t>(voxel - place.end), w);
+#pragma unroll
+  for (uint32_t i = 0; i < kGenerateRun; ++i) {
+    if (voxel + i >= place.end) v[i] = w[i];
+  }
+}
+
+// Each warp makes a run of voxels of its own, a round of kGenerateRound at a time. `first` and `end` count from
+// the batch's first voxel.
 template <Output kOut, bool kCover>
 __global__ void __launch_bounds__(kThreads)
     GenerateVoxels(const __grid_constant__ GenerateView view, uint64_t first, uint64_t end,
                    void* out) {
-  __shared__ uint4 stages[kWarps][kWarpVoxels * 12 / 16];
+  __shared__ uint4 stages[kGenerateWarps][kGenerateRound * 12 / 16];
   uint4* const stage = stages[threadIdx.x / 32];
-  const uint64_t block = first / kGenerateBlockVoxels + blockIdx.x;
-  const uint32_t last = view.first_segments[block + 1];
-  uint64_t warp_at = block * kGenerateBlockVoxels + threadIdx.x / 32 * (kRounds * kWarpVoxels);
-  const uint32_t lane_at = threadIdx.x % 32 * kGenerateRun;
+  const uint32_t warp_voxels = view.rounds * kGenerateRound;
+  const uint64_t warp =
+      first / warp_voxels + static_cast<uint64_t>(blockIdx.x) * kGenerateWarps + threadIdx.x / 32;
+  uint64_t warp_at = warp * warp_voxels;
   if (warp_at >= end) return;
-  uint32_t segment = SegmentOf(view.offsets, view.first_segments[block], last, warp_at);
-  SegmentRecord record = view.records[segment];
-  uint64_t segment_begin = view.offsets[segment], segment_end = view.offsets[segment + 1];
+  const uint32_t lane_at = threadIdx.x % 32 * kGenerateRun;
+  const uint32_t last = view.first_segments[warp + 1];
+  Place place;
+  place.Load(view, view.first_segments[warp]);
   Voxel v[kGenerateRun];
-  for (uint32_t round = 0; round < kRounds; ++round) {
-    const uint64_t next_at = warp_at + kWarpVoxels;
+  for (uint32_t round = 0;;) {
+    const uint64_t voxel = warp_at + lane_at, next_at = warp_at + kGenerateRound;
+    bool known = false;  // where the next round begins
     if constexpr (kCover) {
-      if (warp_at + lane_at < view.voxels) MakeCoverRun(view, segment, last, warp_at + lane_at, v);
-    } else if (next_at <= segment_end) {
-      MakeRun(view, record, segment, static_cast<uint32_t>(warp_at - segment_begin) + lane_at, v);
-    } else if (warp_at + lane_at < view.voxels) {
-      MakeMixedRun(view, segment, last, warp_at + lane_at, v);
+      if (voxel < view.voxels) MakeCoverRun(view, place.segment, last, voxel, v);
+    } else if (next_at <= place.end) {
+      MakeRun(view, place.record, place.segment, static_cast<uint32_t>(voxel - place.begin), v);
+      known = next_at < place.end;
+    } else if (next_at <= place.next_end) {
+      const SegmentRecord next = view.records[place.segment + 1];
+      MakeTwoRuns(view, place.record, next, place, voxel, v);
+      place.Advance(view, next);
+      known = next_at < place.end;
+    } else if (voxel < view.voxels) {
+      MakeMixedRun(view, place.segment, last, voxel, v);
     }
     Store<kOut>(v, warp_at - first, lane_at, end - first, stage, out);
     warp_at = next_at;
-    if (warp_at >= end || round + 1 == kRounds) return;
-    if (warp_at >= segment_end) {
-      segment = SegmentOf(view.offsets, segment + 1, last, warp_at);
-      if constexpr (!kCover) record = view.records[segment];
-      segment_begin = view.offsets[segment];
-      segment_end = view.offsets[segment + 1];
-    }
+    if (++round == view.rounds || warp_at >= end) return;
+    if (!known && warp_at >= place.end)
+      place.Load(view, SegmentOf(view.offsets, place.segment + 1, last, warp_at));
   }
 }
 
 template <Output kOut>
 cudaError_t Launch(const GenerateView& view, Sampling sampling, uint64_t first, uint64_t count,
                    void* out, cudaStream_t stream) {
-  const auto blocks =
-      static_cast<uint32_t>((count + kGenerateBlockVoxels - 1) / kGenerateBlockVoxels);
+  const uint64_t each = view.warp_voxels() * kGenerateWarps;
+  const auto blocks = static_cast<uint32_t>((count + each - 1) / each);
   if (sampling == Sampling::kCover) {
     GenerateVoxels<kOut, true><<<blocks, kThreads, 0, stream>>>(view, first, first + count, out);
   } else {
@@ -285,9 +333,9 @@ cudaError_t Launch(const GenerateView& view, Sampling sampling, uint64_t first, 
 }  // namespace
 
 cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream) {
-  const uint64_t blocks = (view.voxels + kGenerateBlockVoxels - 1) / kGenerateBlockVoxels;
   PrepareRecords<<<(view.count + 127) / 128, 128, 0, stream>>>(view);
-  FindFirstSegments<<<static_cast<uint32_t>(blocks / 128 + 1), 128, 0, stream>>>(view, blocks);
+  FindFirstSegments<<<static_cast<uint32_t>(view.warps() / 128 + 1), 128, 0, stream>>>(
+      view, view.warp_voxels(), view.warps());
   return cudaGetLastError();
 }
 

@@ -102,10 +102,12 @@ class Stage {
 // Three vectors hold as many voxels as one has lanes, laid out as they go to memory: lane l of vector v is
 // axis (L·v + l) mod 3 of voxel ⌊(L·v + l)/3⌋. What is kept of each axis is spread over them once.
 constexpr size_t kLanes = hn::MaxLanes(DU());
+constexpr int kLaneBits = std::countr_zero(kLanes);
 
 struct Spread {
   hn::Mask<DU> y[3], z[3];
   VU voxel[3];
+  VU bytes[3];  // for TableLookupBytes, of x, y, z in each 16 bytes
 
   HWY_ATTR Spread() {
     const DU d;
@@ -118,6 +120,8 @@ struct Spread {
       y[v] = hn::Eq(hn::Load(d, axes), hn::Set(d, 1));
       z[v] = hn::Eq(hn::Load(d, axes), hn::Set(d, 2));
       voxel[v] = hn::Load(d, voxels);
+      bytes[v] =
+          hn::Add(hn::Mul(hn::Load(d, axes), hn::Set(d, 0x04040404)), hn::Set(d, 0x03020100));
     }
   }
   HWY_ATTR HWY_INLINE VU Of(size_t v, VU x_, VU y_, VU z_) const {
@@ -412,6 +416,110 @@ HWY_ATTR HWY_INLINE void EmitShort(const Spread& spread, const FixedSegment& g, 
   }
 }
 
+using DF = hn::ScalableTag<double>;
+using VF = hn::Vec<DF>;
+constexpr size_t kBlock = 64;  // segments whose arithmetic is done together
+
+// Coordinates as they lie in memory, `count` of them (room for a vector more), in units; exact.
+template <typename T>
+HWY_ATTR HWY_INLINE VF LoadUnits(const T* from) {
+  const DF d;
+  const hn::Rebind<T, DF> dt;
+  if constexpr (std::is_same_v<T, double>) {
+    return hn::Floor(hn::Add(hn::Mul(hn::LoadU(d, from), hn::Set(d, 65536.0)), hn::Set(d, 0.5)));
+  } else if constexpr (std::is_same_v<T, float>) {
+    const VF v = hn::PromoteTo(d, hn::LoadU(dt, from));
+    return hn::Floor(hn::Add(hn::Mul(v, hn::Set(d, 65536.0)), hn::Set(d, 0.5)));
+  } else {
+    return hn::Mul(hn::PromoteTo(d, hn::LoadU(dt, from)), hn::Set(d, 65536.0));
+  }
+}
+
+// Sixes of start and end, in units. Load says whether all are whole voxels.
+struct UnitBlock {
+  static constexpr size_t kRoom = 6 * kBlock + 64;
+  HWY_ALIGN double q[kRoom];
+
+  template <typename T>
+  HWY_ATTR bool Load(std::span<const Segment<T>> segments, size_t begin, size_t end) {
+    static_assert(sizeof(Segment<T>) == 6 * sizeof(T));
+    const DF d;
+    const T* from = segments[begin].start.data();
+    const size_t values = 6 * (end - begin), lanes = hn::Lanes(d);
+    size_t i = 0;
+    // The last segments' values are loaded one by one, so that nothing beyond them is.
+    bool whole = true;
+    for (; i + lanes <= values; i += lanes) {
+      const VF units = LoadUnits(from + i);
+      hn::Store(units, d, q + i);
+      const VF voxels = hn::Mul(units, hn::Set(d, 1.0 / 65536));
+      whole &= hn::AllTrue(d, hn::Eq(voxels, hn::Floor(voxels)));
+    }
+    for (; i < values; ++i) {
+      const int64_t units = ToUnits(from[i]);
+      q[i] = static_cast<double>(units);
+      whole &= units % kUnits == 0;
+    }
+    return whole;
+  }
+};
+
+HWY_INLINE double CellsBetween(double a, double b) {
+  constexpr double kVoxel = 1.0 / static_cast<double>(kUnits);
+  return std::abs(std::floor(b * kVoxel) - std::floor(a * kVoxel));
+}
+
+template <typename T>
+HWY_ATTR bool CountBlock(std::span<const Segment<T>> segments, Sampling sampling, size_t begin,
+                         size_t end, uint64_t* counts, UnitBounds& bounds) {
+  constexpr double kMost = static_cast<double>(kMostCoordinate);
+  for (size_t i = begin; i < end; ++i) {
+    bool within = true;
+    for (size_t a = 0; a < 3; ++a) {
+      const auto s = static_cast<double>(segments[i].start[a]),
+                 e = static_cast<double>(segments[i].end[a]);
+      within &= s >= -kMost && s <= kMost && e >= -kMost && e <= kMost;
+    }
+    if (!within) return false;
+  }
+  UnitBlock block;
+  block.Load(segments, begin, end);
+  for (size_t i = begin; i < end; ++i) {
+    const double* const q = block.q + 6 * (i - begin);
+    double most = 0, square = 0;
+    for (size_t a = 0; a < 3; ++a) {
+      const double d = q[3 + a] - q[a];
+      most = std::max(most, std::abs(d));
+      square += d * d;
+      bounds.lo[a] = std::min(bounds.lo[a], std::min(q[a], q[3 + a]));
+      bounds.hi[a] = std::max(bounds.hi[a], std::max(q[a], q[3 + a]));
+    }
+    if (sampling == Sampling::kEuclidean) {
+      // Squares of 2²⁵ and their sum are exact, the root is rounded correctly.
+      constexpr double kExact = 1 << 25;
+      const auto n = static_cast<int64_t>(std::sqrt(square) * (1.0 / static_cast<double>(kUnits)));
+      counts[i] = most > kExact || n == 0 ? 0 : static_cast<uint64_t>(n) + 1;
+      continue;
+    }
+    const double x = CellsBetween(q[0], q[3]), y = CellsBetween(q[1], q[4]),
+                 z = CellsBetween(q[2], q[5]);
+    counts[i] = static_cast<uint64_t>(sampling == Sampling::kThin ? std::max(x, std::max(y, z))
+                                                                  : x + y + z) +
+                1;
+  }
+  return true;
+}
+
+HWY_ATTR void CountVoxelsIn(const Batch& batch, Sampling sampling, size_t begin, size_t end,
+                            uint64_t* counts, UnitBounds& bounds) {
+  batch.With([&](const auto& segments) {
+    for (; begin < end && bounds.all_within; begin += kBlock) {
+      bounds.all_within =
+          CountBlock(segments, sampling, begin, std::min(begin + kBlock, end), counts, bounds);
+    }
+  });
+}
+
 template <Output kOut>
 HWY_ATTR void EmitCover(const FixedSegment& g, int64_t k, uint64_t count, Stage& stage) {
   const Cover cover = Cover::Of(g);
@@ -424,6 +532,107 @@ HWY_ATTR void EmitCover(const FixedSegment& g, int64_t k, uint64_t count, Stage&
   }
 }
 
+// The same for whole segments of few steps, whose arithmetic is done together: what EmitShort works out of
+// each, in three of four places.
+struct ShortBlock {
+  HWY_ALIGN int32_t cell[4 * kBlock + 16], begin[4 * kBlock + 16], step[4 * kBlock + 16];
+
+  // `zone`, `too_large`: of the block's longest; `apart`: so are all.
+  HWY_ATTR void Set(const UnitBlock& block, const uint64_t* offsets, size_t count, uint32_t zone,
+                    uint32_t too_large, bool apart) {
+    const hn::CappedTag<double, 4> d;
+    const hn::Rebind<int32_t, decltype(d)> di;
+    const auto whole_bias = hn::Set(d, static_cast<double>(zone));
+    const auto bias = hn::Set(d, static_cast<double>(apart ? zone : zone - too_large));
+    for (size_t i = 0; i < count; ++i) {
+      const auto n =
+          hn::Set(d, static_cast<double>(std::max<uint64_t>(1, offsets[i + 1] - offsets[i] - 1)));
+      for (size_t a = 0; a < 3; a += hn::Lanes(d)) {
+        const auto s = hn::LoadU(d, block.q + 6 * i + a), e = hn::LoadU(d, block.q + 6 * i + 3 + a);
+        const auto cells = hn::Floor(hn::Mul(s, hn::Set(d, 1.0 / 65536)));
+        const auto fraction = hn::Sub(s, hn::Mul(cells, hn::Set(d, 65536.0)));
+        // A quotient of so small numbers is rounded to a whole one only if it is one.
+        const auto quotient = hn::Div(hn::Mul(hn::Sub(e, s), hn::Set(d, 64.0)), n);
+        const auto one = hn::Ceil(quotient);
+        const auto from = hn::Add(hn::Mul(fraction, hn::Set(d, 64.0)),
+                                  hn::IfThenElse(hn::Eq(one, quotient), whole_bias, bias));
+        hn::StoreU(hn::DemoteTo(di, cells), di, cell + 4 * i + a);
+        hn::StoreU(hn::DemoteTo(di, from), di, begin + 4 * i + a);
+        hn::StoreU(hn::DemoteTo(di, one), di, step + 4 * i + a);
+      }
+    }
+  }
+};
+
+template <Output kOut>
+HWY_ATTR void EmitShortBlock(const Spread& spread, const UnitBlock& units, const uint64_t* offsets,
+                             size_t count, uint32_t longest, bool whole_ends, Stage& stage) {
+  constexpr int kBits = 22;
+  const DU d;
+  const hn::RebindToSigned<DU> di;
+  const uint32_t too_large = longest + 1, zone = 2 * too_large;
+  const uint64_t grain = whole_ends ? uint64_t{1} << kBits : uint64_t{1} << (kBits - kFractionBits);
+  ShortBlock block;
+  block.Set(units, offsets, count, zone, too_large, uint64_t{longest} * (zone + too_large) < grain);
+  const VU zones = hn::Set(d, zone), fraction = hn::Set(d, (1u << kBits) - 1);
+  const auto spread_of = [&](const int32_t* from, size_t v) HWY_ATTR {
+    const auto all = hn::LoadDup128(di, from);
+    return hn::BitCast(d, hn::TableLookupBytes(all, hn::BitCast(di, spread.bytes[v])));
+  };
+  for (size_t i = 0; i < count; ++i) {
+    const auto n = static_cast<int64_t>(offsets[i + 1] - offsets[i]) - 1;
+    VU at[3], advance[3], cells[3];
+    for (size_t v = 0; v < 3; ++v) {
+      const VU one = spread_of(block.step + 4 * i, v);
+      at[v] = hn::Add(spread_of(block.begin + 4 * i, v), hn::Mul(one, spread.voxel[v]));
+      advance[v] = hn::ShiftLeft<kLaneBits>(one);
+      cells[v] = spread_of(block.cell + 4 * i, v);
+    }
+    const double* const q = units.q + 6 * i;
+    const auto exact = [&](uint32_t k) {
+      int32_t c[3];
+      for (int a = 0; a < 3; ++a) {
+        const auto s = static_cast<int64_t>(q[a]), e = static_cast<int64_t>(q[3 + a]);
+        c[a] = static_cast<int32_t>(n == 0 ? CellOf(s)
+                                           : FloorDiv<int64_t>(s * n + (e - s) * k, n * kUnits));
+      }
+      return Voxel{c[0], c[1], c[2]};
+    };
+    auto left = static_cast<uint32_t>(n + 1);
+    for (uint32_t k = 0;; k += kLanes) {
+      std::byte* const to = stage.next();
+      VU whole[3];
+      for (size_t v = 0; v < 3; ++v) {
+        whole[v] = hn::Add(cells[v], hn::BitCast(d, hn::ShiftRight<kBits>(hn::BitCast(di, at[v]))));
+      }
+      StoreSpread<kOut>(whole[0], whole[1], whole[2], to);
+      const uint32_t here = left < kLanes ? left : static_cast<uint32_t>(kLanes);
+      const auto least = hn::Min(hn::Min(hn::And(at[0], fraction), hn::And(at[1], fraction)),
+                                 hn::And(at[2], fraction));
+      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Lt(least, zones))))
+        StoreExact<kOut>(k, here, to, exact);
+      stage.Add(here * BytesOf(kOut));
+      left -= here;
+      if (left == 0) break;
+      for (size_t v = 0; v < 3; ++v) at[v] = hn::Add(at[v], advance[v]);
+    }
+  }
+}
+
+// How many of the segments from `i` on, all of whose voxels are wanted, are short; and their longest.
+inline size_t ShortFrom(std::span<const uint64_t> offsets, size_t i, uint64_t end,
+                        uint32_t* longest) {
+  size_t count = 0;
+  *longest = 0;
+  while (count < kBlock && i + count + 1 < offsets.size() && offsets[i + count + 1] <= end) {
+    const uint64_t steps = offsets[i + count + 1] - offsets[i + count] - 1;
+    if (steps > static_cast<uint64_t>(kShortSteps)) break;
+    *longest = std::max(*longest, static_cast<uint32_t>(steps));
+    ++count;
+  }
+  return count;
+}
+
 template <Output kOut, typename T>
 HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
                         std::span<const uint64_t> offsets, uint64_t first, uint64_t count,
@@ -433,7 +642,22 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
   size_t i = static_cast<size_t>(std::upper_bound(offsets.begin(), offsets.end(), first) -
                                  offsets.begin()) -
              1;
-  for (; count > 0; ++i) {
+  UnitBlock units;
+  while (count > 0) {
+    if constexpr (kLanes >= 4 && kOut != Output::kPacked) {
+      uint32_t longest = 0;
+      const size_t block = sampling == Sampling::kCover || first != offsets[i]
+                               ? 0
+                               : ShortFrom(offsets, i, first + count, &longest);
+      if (block >= 4) {
+        const bool whole_ends = units.Load(segments, i, i + block);
+        EmitShortBlock<kOut>(spread, units, offsets.data() + i, block, longest, whole_ends, stage);
+        count -= offsets[i + block] - first;
+        first = offsets[i + block];
+        i += block;
+        continue;
+      }
+    }
     const FixedSegment g = ToFixed(segments[i]);
     const auto n = static_cast<int64_t>(offsets[i + 1] - offsets[i]) - 1;
     const uint64_t k = first - offsets[i];
@@ -447,6 +671,7 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
     }
     first += here;
     count -= here;
+    ++i;
   }
 }
 

@@ -1,8 +1,11 @@
 #include "gpu/generate/cpu_kernel.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstring>
 #include <optional>
+#include <type_traits>
 
 #include "gpu/generate/cover.h"
 #include "gpu/generate/stride.h"
@@ -20,6 +23,7 @@ namespace voxeld::gpu::generate {
 namespace {
 
 HWY_EXPORT(EmitVoxelsIn);
+HWY_EXPORT(CountVoxelsIn);
 HWY_EXPORT(StreamingFillIn);
 HWY_EXPORT(TargetIn);
 
@@ -29,6 +33,11 @@ void EmitVoxels(const Batch& batch, Format format, std::span<const uint64_t> off
                 uint64_t first, uint64_t count, bool past_caches, std::byte* out) {
   if (count > 0) HWY_DYNAMIC_DISPATCH(EmitVoxelsIn)
   (batch, format, offsets, first, count, past_caches, out);
+}
+
+void CountVoxels(const Batch& batch, Sampling sampling, size_t begin, size_t end, uint64_t* counts,
+                 UnitBounds& bounds) {
+  HWY_DYNAMIC_DISPATCH(CountVoxelsIn)(batch, sampling, begin, end, counts, bounds);
 }
 
 void StreamingFill(std::span<std::byte> out, uint32_t word) {

@@ -15,6 +15,16 @@ namespace voxeld::gpu::generate {
 void EmitVoxels(const Batch& batch, Format format, std::span<const uint64_t> offsets,
                 uint64_t first, uint64_t count, bool past_caches, std::byte* out);
 
+// The smallest and the greatest coordinates in units, or what is no coordinate.
+struct UnitBounds {
+  double lo[3], hi[3];
+  bool all_within = true;  // ±kMostCoordinate, and numbers
+};
+// Voxels of each of at most kBlockSegments segments into `counts`: 0 for one that is too long for 2⁵³ to hold
+// its square, which must be counted otherwise.
+void CountVoxels(const Batch& batch, Sampling sampling, size_t begin, size_t end, uint64_t* counts,
+                 UnitBounds& bounds);
+
 // Fills memory with streaming stores, the ceiling of the above.
 void StreamingFill(std::span<std::byte> out, uint32_t word);
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "gpu/generate/cpu_kernel.h"
 
 namespace voxeld::gpu::generate {
 namespace {
@@ -86,16 +87,20 @@ absl::Status WhatIsWrong(const Segment<T>& segment, size_t index, Sampling sampl
 template <typename T>
 std::optional<size_t> Count(std::span<const Segment<T>> segments, Sampling sampling, size_t begin,
                             size_t end, uint64_t* counts, Bounds& bounds) {
-  for (size_t i = begin; i < end; ++i) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  UnitBounds units = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+  CountVoxels(segments, sampling, begin, end, counts, units);
+  for (size_t i = begin; !units.all_within && i < end; ++i) {
     if (!InRange(segments[i])) return i;
-    const FixedSegment g = ToFixed(segments[i]);
-    const int64_t steps = StepsOf(g, sampling);
-    if (steps > kMostSteps) return i;
-    counts[i] = static_cast<uint64_t>(steps) + 1;
-    for (int a = 0; a < 3; ++a) {
-      bounds.lo[a] = std::min(bounds.lo[a], CellOf(std::min(g.s[a], g.e[a])));
-      bounds.hi[a] = std::max(bounds.hi[a], CellOf(std::max(g.s[a], g.e[a])));
-    }
+  }
+  for (size_t i = begin; i < end; ++i) {
+    if (counts[i] == 0)
+      counts[i] = static_cast<uint64_t>(StepsOf(ToFixed(segments[i]), sampling)) + 1;
+    if (counts[i] > static_cast<uint64_t>(kMostSteps) + 1) return i;
+  }
+  for (int a = 0; a < 3; ++a) {
+    bounds.lo[a] = CellOf(static_cast<int64_t>(units.lo[a]));
+    bounds.hi[a] = CellOf(static_cast<int64_t>(units.hi[a]));
   }
   return std::nullopt;
 }
