@@ -96,14 +96,18 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
   return placed;
 }
 
-absl::Status CudaGenerator::GenerateOnDevice(const PlacedBatch& batch, Format format,
-                                             std::span<std::byte> out) {
+absl::Status CudaGenerator::QueueOnDevice(const PlacedBatch& batch, Format format,
+                                          std::span<std::byte> out) {
   if (absl::Status status = CheckDeviceRoom(batch.voxels(), format, out); !status.ok())
     return status;
-  absl::Status status = device_->Run("Generate", [&] {
+  return device_->Run("Generate", [&] {
     return cuda::Generate(batch.view_, format, 0, batch.voxels(), out.data(), device_->stream());
   });
-  if (!status.ok()) return status;
+}
+
+absl::Status CudaGenerator::GenerateOnDevice(const PlacedBatch& batch, Format format,
+                                             std::span<std::byte> out) {
+  if (absl::Status status = QueueOnDevice(batch, format, out); !status.ok()) return status;
   return device_->Wait();
 }
 

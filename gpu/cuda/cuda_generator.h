@@ -55,6 +55,9 @@ class CudaGenerator final : public generate::Generator {
   // done when it returns.
   absl::Status GenerateOnDevice(const PlacedBatch& batch, generate::Format format,
                                 std::span<std::byte> out);
+  // The same, queued in device().stream(): done when that has come there, until when the batch stays.
+  absl::Status QueueOnDevice(const PlacedBatch& batch, generate::Format format,
+                             std::span<std::byte> out);
   // The same, into host memory.
   absl::Status GenerateToHost(const PlacedBatch& batch, generate::Format format,
                               std::span<std::byte> out);

@@ -27,9 +27,11 @@ class Stage {
  public:
   static constexpr size_t kBytes = 16 << 10;
 
-  Stage(std::byte* out, bool past_caches) : out_(out), stream_(past_caches) {
+  Stage(std::byte* out, uint64_t bytes, bool past_caches) : out_(out), stream_(past_caches) {
     // Lines begin where the output's do.
     used_ = begin_ = stream_ ? reinterpret_cast<uintptr_t>(out) % kLine : 0;
+    // Where the caches keep it, what follows in the output itself may be written over while there is some.
+    if (!stream_ && bytes > kSlack) direct_until_ = out + (bytes - kSlack);
   }
   ~Stage() {
     std::memcpy(out_, buffer_ + begin_, used_ - begin_);
@@ -59,15 +61,20 @@ class Stage {
     used_ = begin_ = reinterpret_cast<uintptr_t>(out_) % kLine;
   }
 
-  // Where the next voxels go, a vector of them at least.
-  std::byte* next() { return buffer_ + used_; }
+  // Where the next voxels go: a vector of them, or kShortSteps + 1 and one.
+  std::byte* next() { return out_ < direct_until_ ? out_ : buffer_ + used_; }
   HWY_ATTR void Add(size_t bytes) {
+    if (out_ < direct_until_) {
+      out_ += bytes;
+      return;
+    }
     used_ += bytes;
     if (used_ >= kBytes) Flush();
   }
 
  private:
   static constexpr size_t kLine = 64;
+  static constexpr size_t kSlack = 12 * (kShortSteps + 1 + kMostLanes);
 
   HWY_ATTR void Flush() {
     size_t at = begin_;
@@ -92,9 +99,9 @@ class Stage {
     used_ -= whole;
   }
 
-  alignas(HWY_MAX_BYTES < 64 ? 64
-                             : HWY_MAX_BYTES) std::byte buffer_[kBytes + 12 * kMostLanes + kLine];
+  alignas(HWY_MAX_BYTES < 64 ? 64 : HWY_MAX_BYTES) std::byte buffer_[kBytes + kSlack + kLine];
   std::byte* out_;
+  std::byte* direct_until_ = nullptr;
   size_t used_ = 0, begin_ = 0;
   const bool stream_;
 };
@@ -435,32 +442,58 @@ HWY_ATTR HWY_INLINE VF LoadUnits(const T* from) {
   }
 }
 
-// Sixes of start and end, in units. Load says whether all are whole voxels.
+// Sixes of start and end, in units, and what they have in common.
 struct UnitBlock {
-  static constexpr size_t kRoom = 6 * kBlock + 64;
-  HWY_ALIGN double q[kRoom];
+  HWY_ALIGN double q[6 * kBlock + 64];
+  bool whole;   // all are whole voxels
+  bool within;  // all are coordinates
+  double lo[3], hi[3];
 
   template <typename T>
-  HWY_ATTR bool Load(std::span<const Segment<T>> segments, size_t begin, size_t end) {
+  HWY_ATTR void Load(std::span<const Segment<T>> segments, size_t begin, size_t end) {
     static_assert(sizeof(Segment<T>) == 6 * sizeof(T));
+    constexpr double kMost = static_cast<double>(kMostCoordinate * kUnits);
+    constexpr double kFar = std::numeric_limits<double>::infinity();
     const DF d;
     const T* from = segments[begin].start.data();
     const size_t values = 6 * (end - begin), lanes = hn::Lanes(d);
-    size_t i = 0;
-    // The last segments' values are loaded one by one, so that nothing beyond them is.
-    bool whole = true;
-    for (; i + lanes <= values; i += lanes) {
-      const VF units = LoadUnits(from + i);
+    const VF far = hn::Set(d, kFar), most = hn::Set(d, kMost), voxel = hn::Set(d, 1.0 / 65536);
+    // Lane l of vector i is axis (lanes·i + l) mod 3: three vectors later it is so again.
+    VF least[3] = {far, far, far}, greatest[3] = {hn::Neg(far), hn::Neg(far), hn::Neg(far)};
+    auto all_whole = hn::Eq(far, far), all_within = all_whole;
+    const auto take = [&](VF units, size_t i, size_t phase) HWY_ATTR {
       hn::Store(units, d, q + i);
-      const VF voxels = hn::Mul(units, hn::Set(d, 1.0 / 65536));
-      whole &= hn::AllTrue(d, hn::Eq(voxels, hn::Floor(voxels)));
+      const VF voxels = hn::Mul(units, voxel);
+      all_whole = hn::And(all_whole, hn::Eq(voxels, hn::Floor(voxels)));
+      all_within =
+          hn::And(all_within, hn::Le(hn::Abs(units), most));  // false for what is no number
+      least[phase] = hn::Min(least[phase], units);
+      greatest[phase] = hn::Max(greatest[phase], units);
+    };
+    size_t i = 0;
+    for (; i + 3 * lanes <= values; i += 3 * lanes) {
+      for (size_t v = 0; v < 3; ++v) take(LoadUnits(from + i + v * lanes), i + v * lanes, v);
     }
+    HWY_ALIGN double edge[2][3 * HWY_MAX_BYTES / sizeof(double)];
+    for (size_t v = 0; v < 3; ++v) {
+      hn::Store(least[v], d, edge[0] + v * lanes);
+      hn::Store(greatest[v], d, edge[1] + v * lanes);
+    }
+    whole = hn::AllTrue(d, all_whole);
+    within = hn::AllTrue(d, all_within);
+    for (size_t a = 0; a < 3; ++a) {
+      lo[a] = kFar, hi[a] = -kFar;
+      for (size_t l = a; l < 3 * lanes; l += 3)
+        lo[a] = std::min(lo[a], edge[0][l]), hi[a] = std::max(hi[a], edge[1][l]);
+    }
+    // Nothing beyond the last one is loaded.
     for (; i < values; ++i) {
-      const int64_t units = ToUnits(from[i]);
-      q[i] = static_cast<double>(units);
-      whole &= units % kUnits == 0;
+      q[i] = std::floor(static_cast<double>(from[i]) * 65536.0 + 0.5);
+      whole &= q[i] * (1.0 / 65536) == std::floor(q[i] * (1.0 / 65536));
+      within &= q[i] >= -kMost && q[i] <= kMost;
+      lo[i % 3] = std::min(lo[i % 3], q[i]);
+      hi[i % 3] = std::max(hi[i % 3], q[i]);
     }
-    return whole;
   }
 };
 
@@ -472,33 +505,22 @@ HWY_INLINE double CellsBetween(double a, double b) {
 template <typename T>
 HWY_ATTR bool CountBlock(std::span<const Segment<T>> segments, Sampling sampling, size_t begin,
                          size_t end, uint64_t* counts, UnitBounds& bounds) {
-  constexpr double kMost = static_cast<double>(kMostCoordinate);
-  for (size_t i = begin; i < end; ++i) {
-    bool within = true;
-    for (size_t a = 0; a < 3; ++a) {
-      const auto s = static_cast<double>(segments[i].start[a]),
-                 e = static_cast<double>(segments[i].end[a]);
-      within &= s >= -kMost && s <= kMost && e >= -kMost && e <= kMost;
-    }
-    if (!within) return false;
-  }
   UnitBlock block;
   block.Load(segments, begin, end);
+  if (!block.within) return false;
+  for (size_t a = 0; a < 3; ++a) {
+    bounds.lo[a] = std::min(bounds.lo[a], block.lo[a]);
+    bounds.hi[a] = std::max(bounds.hi[a], block.hi[a]);
+  }
   for (size_t i = begin; i < end; ++i) {
     const double* const q = block.q + 6 * (i - begin);
-    double most = 0, square = 0;
-    for (size_t a = 0; a < 3; ++a) {
-      const double d = q[3 + a] - q[a];
-      most = std::max(most, std::abs(d));
-      square += d * d;
-      bounds.lo[a] = std::min(bounds.lo[a], std::min(q[a], q[3 + a]));
-      bounds.hi[a] = std::max(bounds.hi[a], std::max(q[a], q[3 + a]));
-    }
     if (sampling == Sampling::kEuclidean) {
-      // Squares of 2²⁵ and their sum are exact, the root is rounded correctly.
-      constexpr double kExact = 1 << 25;
+      // A sum of squares below 2⁵² is exact, and its root is rounded correctly.
+      constexpr double kExact = static_cast<double>(int64_t{1} << 52);
+      const double x = q[3] - q[0], y = q[4] - q[1], z = q[5] - q[2];
+      const double square = x * x + y * y + z * z;
       const auto n = static_cast<int64_t>(std::sqrt(square) * (1.0 / static_cast<double>(kUnits)));
-      counts[i] = most > kExact || n == 0 ? 0 : static_cast<uint64_t>(n) + 1;
+      counts[i] = square >= kExact || n == 0 ? 0 : static_cast<uint64_t>(n) + 1;
       continue;
     }
     const double x = CellsBetween(q[0], q[3]), y = CellsBetween(q[1], q[4]),
@@ -566,12 +588,13 @@ struct ShortBlock {
 
 template <Output kOut>
 HWY_ATTR void EmitShortBlock(const Spread& spread, const UnitBlock& units, const uint64_t* offsets,
-                             size_t count, uint32_t longest, bool whole_ends, Stage& stage) {
+                             size_t count, uint32_t longest, Stage& stage) {
   constexpr int kBits = 22;
   const DU d;
   const hn::RebindToSigned<DU> di;
   const uint32_t too_large = longest + 1, zone = 2 * too_large;
-  const uint64_t grain = whole_ends ? uint64_t{1} << kBits : uint64_t{1} << (kBits - kFractionBits);
+  const uint64_t grain =
+      units.whole ? uint64_t{1} << kBits : uint64_t{1} << (kBits - kFractionBits);
   ShortBlock block;
   block.Set(units, offsets, count, zone, too_large, uint64_t{longest} * (zone + too_large) < grain);
   const VU zones = hn::Set(d, zone), fraction = hn::Set(d, (1u << kBits) - 1);
@@ -598,24 +621,24 @@ HWY_ATTR void EmitShortBlock(const Spread& spread, const UnitBlock& units, const
       }
       return Voxel{c[0], c[1], c[2]};
     };
-    auto left = static_cast<uint32_t>(n + 1);
-    for (uint32_t k = 0;; k += kLanes) {
-      std::byte* const to = stage.next();
+    std::byte* const first = stage.next();
+    std::byte* to = first;
+    VU least = fraction;
+    for (auto left = static_cast<int32_t>(n + 1);; left -= static_cast<int32_t>(kLanes)) {
       VU whole[3];
       for (size_t v = 0; v < 3; ++v) {
         whole[v] = hn::Add(cells[v], hn::BitCast(d, hn::ShiftRight<kBits>(hn::BitCast(di, at[v]))));
+        least = hn::Min(least, hn::And(at[v], fraction));
       }
       StoreSpread<kOut>(whole[0], whole[1], whole[2], to);
-      const uint32_t here = left < kLanes ? left : static_cast<uint32_t>(kLanes);
-      const auto least = hn::Min(hn::Min(hn::And(at[0], fraction), hn::And(at[1], fraction)),
-                                 hn::And(at[2], fraction));
-      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Lt(least, zones))))
-        StoreExact<kOut>(k, here, to, exact);
-      stage.Add(here * BytesOf(kOut));
-      left -= here;
-      if (left == 0) break;
+      to += kLanes * BytesOf(kOut);
+      if (left <= static_cast<int32_t>(kLanes)) break;
       for (size_t v = 0; v < 3; ++v) at[v] = hn::Add(at[v], advance[v]);
     }
+    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Lt(least, zones)))) {
+      StoreExact<kOut>(0, static_cast<uint32_t>(n + 1), first, exact);
+    }
+    stage.Add(static_cast<size_t>(n + 1) * BytesOf(kOut));
   }
 }
 
@@ -638,7 +661,7 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
                         std::span<const uint64_t> offsets, uint64_t first, uint64_t count,
                         bool past_caches, std::byte* out) {
   const Spread spread;
-  Stage stage(out, past_caches);
+  Stage stage(out, count * BytesOf(kOut), past_caches);
   size_t i = static_cast<size_t>(std::upper_bound(offsets.begin(), offsets.end(), first) -
                                  offsets.begin()) -
              1;
@@ -650,8 +673,8 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
                                ? 0
                                : ShortFrom(offsets, i, first + count, &longest);
       if (block >= 4) {
-        const bool whole_ends = units.Load(segments, i, i + block);
-        EmitShortBlock<kOut>(spread, units, offsets.data() + i, block, longest, whole_ends, stage);
+        units.Load(segments, i, i + block);
+        EmitShortBlock<kOut>(spread, units, offsets.data() + i, block, longest, stage);
         count -= offsets[i + block] - first;
         first = offsets[i + block];
         i += block;

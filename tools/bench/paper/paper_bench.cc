@@ -30,7 +30,7 @@ double Median(std::vector<double> values) {
 absl::StatusOr<double> Timed(Column& column, absl::Status (Column::*what)()) {
   const double begin = Now();
   if (absl::Status status = (column.*what)(); !status.ok()) return status;
-  return Now() - begin;
+  return (Now() - begin) / column.repeats();
 }
 
 struct Figures {
@@ -54,7 +54,7 @@ absl::StatusOr<Figures> Measure(Column& column, double seconds,
     if (i == 0) continue;  // the first touches memory and wakes what sleeps
     out.calls.push_back(*call);
     out.ceilings.push_back(ceiling);
-    sum += *call;
+    sum += *call * column.repeats();
   }
   return out;
 }
@@ -81,6 +81,7 @@ json RowOf(const Workload& workload, const Column& column, const Figures& figure
               {"paper_mvoxel_per_s", nullptr},
               {"ceiling_mvoxel_per_s", nullptr},
               {"ceiling_ratio", nullptr},
+              {"queued", column.repeats()},
               {"call", column.call()},
               {"ceiling", column.ceiling()}};
   if (workload.paper_ms.has_value() && column.host_copy()) {
