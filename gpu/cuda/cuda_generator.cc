@@ -1,6 +1,7 @@
 #include "gpu/cuda/cuda_generator.h"
 
 #include <algorithm>
+#include <atomic>
 #include <utility>
 #include <vector>
 
@@ -49,10 +50,11 @@ absl::StatusOr<std::unique_ptr<CudaGenerator>> CudaGenerator::Open(int device, i
 
 CudaGenerator::~CudaGenerator() {
   cudaStreamSynchronize(device_->copies());
+  if (!staging_.empty()) FreePinned(staging_);
   for (Slot& slot : slots_) {
     if (slot.made != nullptr) cudaEventDestroy(slot.made);
     if (slot.copied != nullptr) cudaEventDestroy(slot.copied);
-    if (slot.pinned != nullptr) cudaFreeHost(slot.pinned);
+    if (!slot.pinned.empty()) FreePinned(slot.pinned);
   }
 }
 
@@ -65,17 +67,33 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
   placed.view_.voxels = plan.voxels();
   placed.view_.count = static_cast<uint32_t>(batch.size());
   if (batch.size() == 0) return placed;
-  std::vector<FixedSegment> fixed(batch.size());
+  const size_t segment_bytes = batch.size() * sizeof(FixedSegment);
+  const size_t offset_bytes = plan.offsets.size() * sizeof(uint64_t);
+  if (absl::Status status = Reserve(staging_, segment_bytes + offset_bytes); !status.ok())
+    return status;
+  auto* const fixed = reinterpret_cast<FixedSegment*>(staging_.data());
+  auto* const staged_offsets = reinterpret_cast<uint64_t*>(staging_.data() + segment_bytes);
+  staged_offsets[0] = plan.offsets[0];
+  std::atomic<uint64_t> most_steps = 0;
   batch.With([&](const auto& segments) {
     constexpr size_t kGrain = 16384;
     executor_->For((segments.size() + kGrain - 1) / kGrain, 1, [&](size_t part, int) {
       const size_t end = std::min(segments.size(), (part + 1) * kGrain);
-      for (size_t i = part * kGrain; i < end; ++i) fixed[i] = ToFixed(segments[i]);
+      uint64_t most = 0;
+      for (size_t i = part * kGrain; i < end; ++i) {
+        fixed[i] = ToFixed(segments[i]);
+        staged_offsets[i + 1] = plan.offsets[i + 1];
+        most = std::max(most, plan.offsets[i + 1] - plan.offsets[i] - 1);
+      }
+      uint64_t known = most_steps;
+      while (known < most && !most_steps.compare_exchange_weak(known, most)) {
+      }
     });
   });
+  placed.view_.most_steps = static_cast<uint32_t>(most_steps);
   placed.view_.rounds = GenerateRounds(plan.voxels());
-  auto segments = device_->Upload(fixed.data(), fixed.size());
-  auto offsets = device_->Upload(plan.offsets.data(), plan.offsets.size());
+  auto segments = device_->Upload(fixed, batch.size());
+  auto offsets = device_->Upload(staged_offsets, plan.offsets.size());
   auto records = device_->pool().Acquire(batch.size() * sizeof(SegmentRecord));
   auto first_segments = device_->pool().Acquire((placed.view_.warps() + 1) * sizeof(uint32_t));
   for (const auto* block : {&segments, &offsets, &records, &first_segments}) {
@@ -91,7 +109,7 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
   placed.view_.first_segments = placed.first_segments_.as<uint32_t>();
   absl::Status status = device_->Run(
       "PrepareGenerate", [&] { return PrepareGenerate(placed.view_, device_->stream()); });
-  if (status.ok()) status = device_->Wait();  // `fixed` goes
+  if (status.ok()) status = device_->Wait();  // the staging memory is the next batch's
   if (!status.ok()) return status;
   return placed;
 }
@@ -118,13 +136,15 @@ absl::Status CudaGenerator::Ready(Slot& slot, size_t bytes, bool pinned) {
     if (!block.ok()) return block.status();
     slot.voxels = *std::move(block);
   }
-  if (!pinned || slot.pinned_bytes >= bytes) return absl::OkStatus();
-  if (slot.pinned != nullptr) FreePinned({std::exchange(slot.pinned, nullptr), slot.pinned_bytes});
-  slot.pinned_bytes = 0;
+  return pinned ? Reserve(slot.pinned, bytes) : absl::OkStatus();
+}
+
+absl::Status CudaGenerator::Reserve(std::span<std::byte>& pinned, size_t bytes) {
+  if (pinned.size() >= bytes) return absl::OkStatus();
+  if (!pinned.empty()) FreePinned(std::exchange(pinned, {}));
   absl::StatusOr<std::span<std::byte>> memory = AllocatePinned(bytes);
   if (!memory.ok()) return memory.status();
-  slot.pinned = memory->data();
-  slot.pinned_bytes = memory->size();
+  pinned = *memory;
   return absl::OkStatus();
 }
 
@@ -202,10 +222,11 @@ absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format,
       const uint64_t done = i - kSlots;
       if (done >= chunks) break;
       status = WaitFor(slot.copied);
-      if (status.ok()) status = take(done * chunk_voxels, {slot.pinned, count_of(done) * bytes});
+      if (status.ok())
+        status = take(done * chunk_voxels, slot.pinned.first(count_of(done) * bytes));
     }
     if (status.ok() && i < chunks)
-      status = Queue(slot, batch, format, i * chunk_voxels, count_of(i), slot.pinned);
+      status = Queue(slot, batch, format, i * chunk_voxels, count_of(i), slot.pinned.data());
   }
   if (!status.ok()) cudaStreamSynchronize(device_->copies());
   return status;

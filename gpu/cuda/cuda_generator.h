@@ -72,13 +72,13 @@ class CudaGenerator final : public generate::Generator {
   struct Slot {
     Block voxels;
     cudaEvent_t made = nullptr, copied = nullptr;
-    std::byte* pinned = nullptr;
-    size_t pinned_bytes = 0;
+    std::span<std::byte> pinned;
   };
 
   CudaGenerator(std::unique_ptr<Device> device, std::unique_ptr<Executor> executor)
       : device_(std::move(device)), executor_(std::move(executor)) {}
   absl::Status Ready(Slot& slot, size_t bytes, bool pinned);
+  static absl::Status Reserve(std::span<std::byte>& pinned, size_t bytes);
   // Makes a chunk and queues its copy to `to`.
   absl::Status Queue(Slot& slot, const PlacedBatch& batch, generate::Format format, uint64_t first,
                      uint64_t count, std::byte* to);
@@ -87,6 +87,7 @@ class CudaGenerator final : public generate::Generator {
   const std::unique_ptr<Device> device_;
   const std::unique_ptr<Executor> executor_;
   std::array<Slot, kSlots> slots_;
+  std::span<std::byte> staging_;  // pinned: a batch on its way to the device
 };
 
 // Host memory that devices copy to at the bus's rate; freed by FreePinned.

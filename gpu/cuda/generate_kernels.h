@@ -17,23 +17,27 @@ namespace voxeld::gpu::cuda {
 inline constexpr uint32_t kGenerateRun = 4;
 inline constexpr uint32_t kGenerateRound = 32 * kGenerateRun;
 inline constexpr uint32_t kGenerateWarps = 8;  // of a block
-inline constexpr uint64_t kGenerateMostBlock = uint64_t{kGenerateWarps} * 8 * kGenerateRound;
 
-// Rounds of each warp: few voxels are shared by many warps.
-inline uint32_t GenerateRounds(uint64_t voxels) { return voxels < (uint64_t{4} << 20) ? 1 : 8; }
+// Rounds of each warp: few voxels are shared by many warps, of many each warp makes so many that finding where
+// to begin costs little.
+inline constexpr uint32_t kGenerateMostRounds = 32;
+inline uint32_t GenerateRounds(uint64_t voxels) {
+  if (voxels < uint64_t{4} << 20) return 1;
+  return voxels < uint64_t{64} << 20 ? 8 : kGenerateMostRounds;
+}
 
 struct StepRecord {
   uint64_t step_fraction;
   uint32_t whole, step_whole;
-  uint32_t fraction;  // of S, its high 32 bits: it has 16
-  uint32_t bias;      // of a walk
+  uint32_t fraction;    // of S, its high 32 bits: it has 16
+  uint32_t bias;        // of a walk
+  uint64_t round_step;  // of a walk, from the end of a thread's run to the beginning of its next
 };
 
 // All that most voxels of a segment need.
 struct alignas(16) SegmentRecord {
   StepRecord axis[3];
   uint32_t steps;
-  uint32_t sure;  // no walk of it can leave a doubt
 };
 
 // A batch in device memory.
@@ -43,8 +47,9 @@ struct GenerateView {
   SegmentRecord* records = nullptr;    // segments
   uint32_t* first_segments = nullptr;  // of each warp's first voxel, and of the last voxel
   uint64_t voxels = 0;
-  uint32_t count = 0;   // segments, at least 1
-  uint32_t rounds = 1;  // of each warp: GenerateRounds(voxels)
+  uint32_t count = 0;       // segments, at least 1
+  uint32_t rounds = 1;      // of each warp: GenerateRounds(voxels)
+  uint32_t most_steps = 0;  // of a segment
 
   uint64_t warp_voxels() const { return uint64_t{rounds} * kGenerateRound; }
   uint64_t warps() const { return (voxels + warp_voxels() - 1) / warp_voxels(); }
@@ -53,7 +58,7 @@ struct GenerateView {
 // Fills `records` and `first_segments`.
 cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream);
 
-// Voxels [first, first + count) to `out` and on; `first` is a multiple of kGenerateMostBlock, `out` is
+// Voxels [first, first + count) to `out` and on; `first` is a multiple of kGenerateMostRounds·kGenerateRound, `out` is
 // aligned to 16 bytes.
 cudaError_t Generate(const GenerateView& view, generate::Format format, uint64_t first,
                      uint64_t count, void* out, cudaStream_t stream);

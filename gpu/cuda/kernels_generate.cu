@@ -1,3 +1,5 @@
+#include <cuda_pipeline.h>
+
 #include "gpu/cuda/generate_kernels.h"
 #include "gpu/generate/cover.h"
 
@@ -12,7 +14,10 @@ using generate::Sampling;
 using generate::Stride;
 using generate::Voxel;
 using generate::Walk;
-using Rules = generate::WalkRules<kGenerateRun>;
+// A warp's walks begin exactly where it enters a segment, up to a round before that, and each round adds a run of
+// steps and one long one.
+using Rules =
+    generate::WalkRules<kGenerateRound + kGenerateMostRounds*(kGenerateRun + 1) + kGenerateRun>;
 
 constexpr int kThreads = 32 * kGenerateWarps;
 
@@ -24,7 +29,6 @@ __global__ void PrepareRecords(GenerateView view) {
   const int64_t grain = generate::GrainOf(g);
   SegmentRecord record;
   record.steps = static_cast<uint32_t>(n);
-  record.sure = 1;
   for (int a = 0; a < 3; ++a) {
     const Stride stride = Stride::Of(g.s[a], g.e[a], n);
     StepRecord& axis = record.axis[a];
@@ -33,8 +37,7 @@ __global__ void PrepareRecords(GenerateView view) {
     axis.step_whole = static_cast<uint32_t>(stride.step_whole);
     axis.fraction = static_cast<uint32_t>(stride.fraction >> 32);
     axis.bias = Rules::BiasOf(stride, n, grain);
-    // Values that are no nearer below a whole number than the zone and all rounding.
-    record.sure &= Rules::Apart(n, grain);
+    axis.round_step = Rules::StepOfMany(stride, kGenerateRound - kGenerateRun);
   }
   view.records[i] = record;
 }
@@ -59,36 +62,59 @@ __global__ void FindFirstSegments(GenerateView view, uint64_t warp_voxels, uint6
   view.first_segments[i] = SegmentOf(view.offsets, 0, view.count - 1, voxel);
 }
 
-__device__ Walk WalkFrom(const StepRecord& axis, uint32_t k) {
+__device__ Stride StrideOf(const StepRecord& axis) {
   Stride stride;
   stride.fraction = static_cast<uint64_t>(axis.fraction) << 32;
   stride.step_fraction = axis.step_fraction;
   stride.whole = static_cast<int32_t>(axis.whole);
   stride.step_whole = static_cast<int32_t>(axis.step_whole);
-  return Rules::From(stride, k, axis.bias);
+  return stride;
 }
 
-__device__ __noinline__ Voxel ExactVoxel(const GenerateView& view, uint32_t segment, uint32_t k) {
-  const FixedSegment g = view.segments[segment];
-  const int64_t n = view.records[segment].steps;
+// Of a segment of so many steps that strides do not decide. A call: it takes registers.
+__device__ __noinline__ Voxel LongExact(const FixedSegment* segment, const uint64_t* offset,
+                                        uint32_t k) {
+  const FixedSegment g = *segment;
+  const int64_t n = static_cast<int64_t>(offset[1] - offset[0]) - 1;
   int32_t v[3];
-  for (int a = 0; a < 3; ++a)
+  for (int a = 0; a < 3; ++a) {
     v[a] = CoordinateAt(Stride::Of(g.s[a], g.e[a], n), g.s[a], g.e[a], n, k);
+  }
   return {v[0], v[1], v[2]};
+}
+
+// What a walk leaves in doubt. kLong: segments may have kStrideExact steps or more.
+template <bool kLong>
+__device__ Voxel ExactVoxel(const GenerateView& view, const SegmentRecord& record, uint32_t segment,
+                            uint32_t k) {
+  if (kLong && record.steps >= generate::kStrideExact) {
+    return LongExact(view.segments + segment, view.offsets + segment, k);
+  }
+  uint64_t fraction = 0;
+  return {StrideOf(record.axis[0]).At(k, &fraction), StrideOf(record.axis[1]).At(k, &fraction),
+          StrideOf(record.axis[2]).At(k, &fraction)};
 }
 
 struct Walks {
   Walk axis[3];
 
   __device__ void Begin(const SegmentRecord& record, uint32_t k) {
-    for (int a = 0; a < 3; ++a) axis[a] = WalkFrom(record.axis[a], k);
+    for (int a = 0; a < 3; ++a)
+      axis[a] = Rules::From(StrideOf(record.axis[a]), k, record.axis[a].bias);
+  }
+  // Up to a round before the segment's first voxel they begin as if it went on there.
+  __device__ void BeginNear(const SegmentRecord& record, int32_t k) {
+    Begin(record, static_cast<uint32_t>(max(k, 0)));
+    const auto before = static_cast<uint64_t>(max(-k, 0));
+    for (int a = 0; a < 3; ++a) axis[a].at -= axis[a].step * before;
   }
   __device__ void Next() {
     for (int a = 0; a < 3; ++a) axis[a].at += axis[a].step;
   }
   __device__ Voxel voxel() const { return {axis[0].whole(), axis[1].whole(), axis[2].whole()}; }
-  __device__ uint32_t least() const {
-    return min(min(axis[0].fraction(), axis[1].fraction()), axis[2].fraction());
+  // The least of all fractions and `other`.
+  __device__ uint32_t least(uint32_t other) const {
+    return __vimin3_u32(axis[0].fraction(), axis[1].fraction(), min(axis[2].fraction(), other));
   }
 };
 
@@ -156,36 +182,57 @@ __device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint
   }
 }
 
+// The first `count` of a thread's run.
+template <Output kOut>
+__device__ void StoreSome(const Voxel (&v)[kGenerateRun], uint64_t at, int32_t count, void* out) {
+#pragma unroll
+  for (int32_t i = 0; i < static_cast<int32_t>(kGenerateRun); ++i) {
+    if (i < count) StoreOne<kOut>(v[i], at + static_cast<uint32_t>(i), out);
+  }
+}
+
 // `warp_at`: of the warp's first voxel, from `out` on; `end`: of the first that is not asked for.
 template <Output kOut>
 __device__ void Store(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint32_t lane_at,
                       uint64_t end, uint4* stage, void* out) {
   if (warp_at + kGenerateRound <= end) return StoreWarp<kOut>(v, warp_at, stage, out);
-  for (uint32_t i = 0; i < kGenerateRun; ++i) {
-    if (warp_at + lane_at + i < end) StoreOne<kOut>(v[i], warp_at + lane_at + i, out);
-  }
+  const auto left = static_cast<int32_t>(end - warp_at);
+  StoreSome<kOut>(v, warp_at + lane_at, left - static_cast<int32_t>(lane_at), out);
 }
 
-// Voxels of one segment from step k on.
-__device__ void MakeRun(const GenerateView& view, const SegmentRecord& record, uint32_t segment,
-                        uint32_t k, Voxel (&v)[kGenerateRun]) {
-  Walks walks;
-  walks.Begin(record, k);
+// Of a thread's run, voxels `at` and on of a warp's round, those that lie in one segment: from `begin` to `end` of
+// the round. kWhole: all do. The walks go on to the thread's run in the next round.
+template <bool kWhole, bool kLong>
+__device__ void MakePart(const GenerateView& view, const SegmentRecord& record, uint32_t segment,
+                         int32_t begin, int32_t end, int32_t at, Walks& walks,
+                         Voxel (&v)[kGenerateRun]) {
+  constexpr auto kRun = static_cast<int32_t>(kGenerateRun);
   uint32_t least = 0xFFFFFFFF;
 #pragma unroll
-  for (uint32_t i = 0; i < kGenerateRun; ++i) {
-    v[i] = walks.voxel();
-    if (!record.sure) least = min(least, walks.least());
+  for (int32_t i = 0; i < kRun; ++i) {
+    if (kWhole || (at + i >= begin && at + i < end)) {
+      v[i] = walks.voxel();
+      least = walks.least(least);
+    }
     walks.Next();
   }
-  if (!record.sure && Rules::Doubtful(least)) {
-    for (uint32_t i = 0; i < kGenerateRun; ++i) {
-      if (k + i <= record.steps) v[i] = ExactVoxel(view, segment, k + i);
+  for (int a = 0; a < 3; ++a) walks.axis[a].at += record.axis[a].round_step;
+  if (!Rules::Doubtful(least)) return;
+#pragma unroll 1
+  for (int32_t i = 0; i < kRun; ++i) {
+    if (!kWhole && (at + i < begin || at + i >= end)) continue;
+    const auto k = static_cast<uint32_t>(at + i - begin);
+    if (k > record.steps) return;  // beyond the batch's last voxel
+    const Voxel exact = ExactVoxel<kLong>(view, record, segment, k);
+#pragma unroll
+    for (int32_t j = 0; j < kRun; ++j) {  // no array is looked into by a variable
+      if (j == i) v[j] = exact;
     }
   }
 }
 
-// The same across the ends of segments.
+// A thread's run across the ends of segments.
+template <bool kLong>
 __device__ void MakeMixedRun(const GenerateView& view, uint32_t lo, uint32_t hi, uint64_t voxel,
                              Voxel (&v)[kGenerateRun]) {
   uint32_t segment = SegmentOf(view.offsets, lo, hi, voxel);
@@ -196,7 +243,8 @@ __device__ void MakeMixedRun(const GenerateView& view, uint32_t lo, uint32_t hi,
 #pragma unroll
   for (uint32_t i = 0; i < kGenerateRun; ++i) {
     v[i] = walks.voxel();
-    if (Rules::Doubtful(walks.least())) v[i] = ExactVoxel(view, segment, k);
+    if (Rules::Doubtful(walks.least(0xFFFFFFFF)))
+      v[i] = ExactVoxel<kLong>(view, record, segment, k);
     if (voxel + i + 1 >= view.voxels) return;
     if (k < record.steps) {
       ++k;
@@ -228,60 +276,88 @@ __device__ void MakeCoverRun(const GenerateView& view, uint32_t lo, uint32_t hi,
   }
 }
 
-// Where a warp is: the segment of its next voxel, and where the one after that ends.
-struct Place {
-  uint32_t segment;
-  uint64_t begin, end, next_end;
-  SegmentRecord record;
-
-  __device__ void Load(const GenerateView& view, uint32_t to) {
-    segment = to;
-    begin = view.offsets[to];
-    end = view.offsets[to + 1];
-    record = view.records[to];
-    LookAhead(view);
-  }
-  // To the next segment, whose record is known.
-  __device__ void Advance(const GenerateView& view, const SegmentRecord& next) {
-    ++segment;
-    begin = end;
-    end = next_end;
-    record = next;
-    LookAhead(view);
-  }
-  __device__ void LookAhead(const GenerateView& view) {
-    const uint32_t next = min(segment + 1, view.count - 1);
-    next_end = view.offsets[next + 1];
-    const auto* at = reinterpret_cast<const char*>(&view.records[next]);
-    asm volatile("prefetch.global.L1 [%0];" ::"l"(at));
-    asm volatile("prefetch.global.L1 [%0];" ::"l"(at + sizeof(SegmentRecord) - 1));
-  }
+// How segments are shared by threads.
+enum class Sharing : uint8_t {
+  kWarp,    // a warp goes from one to the next
+  kThread,  // each thread finds its own: where most are shorter than a round
+  kCover,
 };
 
-// A round in which one segment ends and the next one does not.
-__device__ void MakeTwoRuns(const GenerateView& view, const SegmentRecord& record,
-                            const SegmentRecord& next, const Place& place, uint64_t voxel,
-                            Voxel (&v)[kGenerateRun]) {
-  if (voxel < place.end) {
-    MakeRun(view, record, place.segment, static_cast<uint32_t>(voxel - place.begin), v);
-    if (voxel + kGenerateRun <= place.end) return;
+// Where a warp is: the segment of its next voxel, whose record lies in shared memory, and where the one after
+// it ends, whose record is on its way there.
+class WarpPlace {
+ public:
+  __device__ WarpPlace(const GenerateView& view, SegmentRecord (&slots)[2], uint32_t segment)
+      : view_(view),
+        slots_(slots),
+        segment_(segment),
+        begin_(view.offsets[segment]),
+        end_(view.offsets[segment + 1]) {
+    Fetch(segment, 0);
+    LookAhead();
   }
-  Voxel w[kGenerateRun];
-  // Before its first voxel the walk goes backwards, to where nobody looks.
-  MakeRun(view, next, place.segment + 1, static_cast<uint32_t>(voxel - place.end), w);
-#pragma unroll
-  for (uint32_t i = 0; i < kGenerateRun; ++i) {
-    if (voxel + i >= place.end) v[i] = w[i];
+  __device__ uint32_t segment() const { return segment_; }
+  __device__ bool IsLast() const { return segment_ + 1 == view_.count; }
+  // Where the segment begins (before it: negative) and ends, counted from a voxel in it or before it; ends far away
+  // are a little nearer.
+  __device__ int32_t BeginFrom(uint64_t voxel) const {
+    return static_cast<int32_t>(begin_ - voxel);
   }
+  __device__ int32_t EndFrom(uint64_t voxel) const {
+    return static_cast<int32_t>(min(end_ - voxel, static_cast<uint64_t>(1) << 29));
+  }
+  __device__ const SegmentRecord& record() const { return slots_[current_]; }
+  // To the next segment, which has so many voxels (many: a few less). Called by the whole warp.
+  __device__ int32_t Advance() {
+    ++segment_;
+    begin_ = end_;
+    end_ = next_end_;
+    const int32_t voxels = EndFrom(begin_);
+    current_ ^= 1;
+    __syncwarp();  // nobody reads the record that goes
+    LookAhead();
+    return voxels;
+  }
+
+ private:
+  // Waits for what is on its way, and sends for the next.
+  __device__ void LookAhead() {
+    __pipeline_wait_prior(0);
+    __syncwarp();
+    const uint32_t next = min(segment_ + 1, view_.count - 1);
+    next_end_ = view_.offsets[next + 1];
+    Fetch(next, current_ ^ 1);
+  }
+  __device__ void Fetch(uint32_t segment, uint32_t slot) {
+    constexpr uint32_t kParts = sizeof(SegmentRecord) / sizeof(uint4);
+    const uint32_t lane = threadIdx.x % 32;
+    if (lane < kParts) {
+      __pipeline_memcpy_async(reinterpret_cast<uint4*>(&slots_[slot]) + lane,
+                              reinterpret_cast<const uint4*>(&view_.records[segment]) + lane,
+                              sizeof(uint4));
+    }
+    __pipeline_commit();
+  }
+
+  const GenerateView& view_;
+  SegmentRecord (&slots_)[2];
+  uint32_t segment_, current_ = 0;
+  uint64_t begin_, end_, next_end_ = 0;
+};
+
+// Blocks that share a multiprocessor. Registers that do not suffice cost more than warps that are missing.
+constexpr int BlocksOf(Output output, Sharing sharing, bool may_be_long) {
+  return sharing == Sharing::kWarp && !may_be_long ? 3 : 2;
 }
 
 // Each warp makes a run of voxels of its own, a round of kGenerateRound at a time. `first` and `end` count from
 // the batch's first voxel.
-template <Output kOut, bool kCover>
-__global__ void __launch_bounds__(kThreads)
+template <Output kOut, Sharing kSharing, bool kLong>
+__global__ void __launch_bounds__(kThreads, BlocksOf(kOut, kSharing, kLong))
     GenerateVoxels(const __grid_constant__ GenerateView view, uint64_t first, uint64_t end,
                    void* out) {
   __shared__ uint4 stages[kGenerateWarps][kGenerateRound * 12 / 16];
+  __shared__ SegmentRecord records[kGenerateWarps][2];
   uint4* const stage = stages[threadIdx.x / 32];
   const uint32_t warp_voxels = view.rounds * kGenerateRound;
   const uint64_t warp =
@@ -289,31 +365,57 @@ __global__ void __launch_bounds__(kThreads)
   uint64_t warp_at = warp * warp_voxels;
   if (warp_at >= end) return;
   const uint32_t lane_at = threadIdx.x % 32 * kGenerateRun;
-  const uint32_t last = view.first_segments[warp + 1];
-  Place place;
-  place.Load(view, view.first_segments[warp]);
   Voxel v[kGenerateRun];
-  for (uint32_t round = 0;;) {
-    const uint64_t voxel = warp_at + lane_at, next_at = warp_at + kGenerateRound;
-    bool known = false;  // where the next round begins
-    if constexpr (kCover) {
-      if (voxel < view.voxels) MakeCoverRun(view, place.segment, last, voxel, v);
-    } else if (next_at <= place.end) {
-      MakeRun(view, place.record, place.segment, static_cast<uint32_t>(voxel - place.begin), v);
-      known = next_at < place.end;
-    } else if (next_at <= place.next_end) {
-      const SegmentRecord next = view.records[place.segment + 1];
-      MakeTwoRuns(view, place.record, next, place, voxel, v);
-      place.Advance(view, next);
-      known = next_at < place.end;
-    } else if (voxel < view.voxels) {
-      MakeMixedRun(view, place.segment, last, voxel, v);
+  if constexpr (kSharing == Sharing::kWarp) {
+    WarpPlace place(view, records[threadIdx.x / 32], view.first_segments[warp]);
+    constexpr auto kRound = static_cast<int32_t>(kGenerateRound);
+    const auto at = static_cast<int32_t>(lane_at);
+    // All of these count from the round's first voxel.
+    int32_t part_begin = place.BeginFrom(warp_at), part_end = place.EndFrom(warp_at);
+    auto left = static_cast<int32_t>(min(end - warp_at, static_cast<uint64_t>(warp_voxels)));
+    uint64_t to = warp_at - first;
+    Walks walks;
+    walks.BeginNear(place.record(), at - part_begin);
+    for (;;) {
+      if (part_end >= kRound) {
+        MakePart<true, kLong>(view, place.record(), place.segment(), part_begin, kRound, at, walks,
+                              v);
+      } else {
+        for (;;) {
+          MakePart<false, kLong>(view, place.record(), place.segment(), part_begin, part_end, at,
+                                 walks, v);
+          if (part_end >= kRound || place.IsLast()) break;
+          part_begin = part_end;
+          part_end += place.Advance();
+          walks.BeginNear(place.record(), at - part_begin);
+        }
+      }
+      if (left < kRound) return StoreSome<kOut>(v, to + lane_at, left - at, out);
+      StoreWarp<kOut>(v, to, stage, out);
+      left -= kRound;
+      if (left == 0) return;
+      to += kGenerateRound;
+      part_begin -= kRound;
+      part_end -= kRound;
+      if (part_end == 0) {
+        part_begin = 0;
+        part_end = place.Advance();
+        walks.BeginNear(place.record(), at);
+      }
     }
-    Store<kOut>(v, warp_at - first, lane_at, end - first, stage, out);
-    warp_at = next_at;
-    if (++round == view.rounds || warp_at >= end) return;
-    if (!known && warp_at >= place.end)
-      place.Load(view, SegmentOf(view.offsets, place.segment + 1, last, warp_at));
+  } else {
+    const uint32_t lowest = view.first_segments[warp], last = view.first_segments[warp + 1];
+    for (uint32_t round = 0; round < view.rounds && warp_at < end; ++round) {
+      if (warp_at + lane_at < view.voxels) {
+        if constexpr (kSharing == Sharing::kCover) {
+          MakeCoverRun(view, lowest, last, warp_at + lane_at, v);
+        } else {
+          MakeMixedRun<kLong>(view, lowest, last, warp_at + lane_at, v);
+        }
+      }
+      Store<kOut>(v, warp_at - first, lane_at, end - first, stage, out);
+      warp_at += kGenerateRound;
+    }
   }
 }
 
@@ -322,10 +424,18 @@ cudaError_t Launch(const GenerateView& view, Sampling sampling, uint64_t first, 
                    void* out, cudaStream_t stream) {
   const uint64_t each = view.warp_voxels() * kGenerateWarps;
   const auto blocks = static_cast<uint32_t>((count + each - 1) / each);
+  const auto launch = [&]<Sharing kSharing, bool kLong>() {
+    GenerateVoxels<kOut, kSharing, kLong>
+        <<<blocks, kThreads, 0, stream>>>(view, first, first + count, out);
+  };
   if (sampling == Sampling::kCover) {
-    GenerateVoxels<kOut, true><<<blocks, kThreads, 0, stream>>>(view, first, first + count, out);
+    launch.template operator()<Sharing::kCover, false>();
+  } else if (view.most_steps >= generate::kStrideExact) {
+    launch.template operator()<Sharing::kWarp, true>();
+  } else if (view.voxels / view.count >= kGenerateRound / 2) {
+    launch.template operator()<Sharing::kWarp, false>();
   } else {
-    GenerateVoxels<kOut, false><<<blocks, kThreads, 0, stream>>>(view, first, first + count, out);
+    launch.template operator()<Sharing::kThread, false>();
   }
   return cudaGetLastError();
 }

@@ -225,15 +225,6 @@ struct LaneWalks {
   }
 };
 
-// The step of `times` steps, rounded up to 32 fraction bits.
-HWY_INLINE uint64_t StepOfMany(const Stride& stride, uint32_t times) {
-  const unsigned __int128 fraction = static_cast<unsigned __int128>(stride.step_fraction) * times;
-  const auto whole =
-      static_cast<uint32_t>(stride.step_whole) * times + static_cast<uint32_t>(fraction >> 64);
-  const auto rest = static_cast<uint64_t>(fraction);
-  return (static_cast<uint64_t>(whole) << 32) + (rest >> 32) + (static_cast<uint32_t>(rest) != 0);
-}
-
 // Voxels on which the vectors leave a doubt, one by one.
 template <Output kOut, class Exact>
 HWY_NOINLINE void StoreExact(uint32_t k, uint32_t count, std::byte* at, const Exact& exact) {
@@ -314,7 +305,7 @@ HWY_ATTR void EmitLong(const Spread& spread, const FixedSegment& g, int64_t n, u
   for (int a = 0; a < 3; ++a) {
     strides[a] = Stride::Of(g.s[a], g.e[a], n);
     bias[a] = Rules::BiasOf(strides[a], n, grain);
-    all[a] = StepOfMany(strides[a], lanes);
+    all[a] = Rules::StepOfMany(strides[a], lanes);
   }
   const auto exact = [&](uint32_t at) {
     return Voxel{CoordinateAt(strides[0], g.s[0], g.e[0], n, at),

@@ -107,6 +107,14 @@ struct WalkRules {
     return (static_cast<uint64_t>(static_cast<uint32_t>(stride.step_whole)) << 32) +
            (stride.step_fraction >> 32) + up;
   }
+  // The step of `times` steps at once: 1 too large, in 2⁻³².
+  VOXELD_HD static uint64_t StepOfMany(const Stride& stride, uint32_t times) {
+    const uint64_t low = static_cast<uint64_t>(static_cast<uint32_t>(stride.step_fraction)) * times;
+    const uint64_t high = (stride.step_fraction >> 32) * times + (low >> 32);
+    const uint32_t up = static_cast<uint32_t>(low) != 0;
+    return (static_cast<uint64_t>(static_cast<uint32_t>(stride.step_whole) * times) << 32) + high +
+           up;
+  }
   VOXELD_HD static bool Doubtful(uint32_t fraction) { return fraction < kWalkZone; }
 };
 

@@ -21,7 +21,8 @@ class Column {
   virtual std::string call() const = 0;    // what is timed
   virtual std::string ceiling() const = 0;
 
-  // How many calls one Call() and one Ceiling() make, one after the other without waiting between them.
+  // How many calls one Call() and one Ceiling() make, one after the other without waiting between
+  // them.
   virtual int repeats() const { return 1; }
 
   // All that is done once: memory, and what a call does not repeat. The workload stays until the next.

@@ -1,6 +1,7 @@
 #include <cuda_runtime_api.h>
 
 #include <algorithm>
+#include <functional>
 #include <thread>
 
 #include "gpu/cuda/cuda_generator.h"
@@ -20,8 +21,42 @@ absl::Status ToStatus(const char* what, cudaError_t error) {
   return absl::InternalError(std::string(what) + ": " + cudaGetErrorString(error));
 }
 
-// Beyond it one wait is no part of what a call takes that is worth naming.
-constexpr uint64_t kQueuedBelow = uint64_t{64} << 20;  // bytes
+// Work that was queued once and is launched again as a whole, so that what a launch costs is shared.
+class Graph {
+ public:
+  Graph() = default;
+  ~Graph() { Reset(); }
+  Graph(const Graph&) = delete;
+  Graph& operator=(const Graph&) = delete;
+
+  absl::Status Record(cudaStream_t stream, const std::function<absl::Status()>& queue) {
+    Reset();
+    absl::Status status = ToStatus(
+        "cudaStreamBeginCapture", cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
+    if (!status.ok()) return status;
+    const absl::Status queued = queue();
+    cudaGraph_t graph = nullptr;
+    status = ToStatus("cudaStreamEndCapture", cudaStreamEndCapture(stream, &graph));
+    if (status.ok())
+      status = ToStatus("cudaGraphInstantiate", cudaGraphInstantiate(&graph_, graph, 0));
+    if (graph != nullptr) cudaGraphDestroy(graph);
+    return queued.ok() ? status : queued;
+  }
+  absl::Status Launch(cudaStream_t stream) {
+    return ToStatus("cudaGraphLaunch", cudaGraphLaunch(graph_, stream));
+  }
+  void Reset() {
+    if (graph_ != nullptr) cudaGraphExecDestroy(graph_);
+    graph_ = nullptr;
+  }
+
+ private:
+  cudaGraphExec_t graph_ = nullptr;
+};
+
+// Beyond it a launch and a wait are no part of a call that is worth naming.
+constexpr uint64_t kTogetherBelow = uint64_t{64} << 20;  // bytes
+constexpr int kTogether = 64;
 
 class DeviceColumn final : public Column {
  public:
@@ -33,8 +68,9 @@ class DeviceColumn final : public Column {
   bool host_copy() const override { return false; }
   std::string call() const override {
     return repeats() == 1 ? "a batch that lies on the device, until its voxels do"
-                          : "the same of many calls queued one after the other";
+                          : "the same, one of many calls launched together as a graph";
   }
+  int repeats() const override { return bytes_ < kTogetherBelow ? kTogether : 1; }
   std::string ceiling() const override { return "cudaMemset of the same bytes"; }
 
   absl::Status Take(const Workload& workload) override {
@@ -49,36 +85,45 @@ class DeviceColumn final : public Column {
     auto out = generator_->device().pool().Acquire(bytes_);
     if (!out.ok()) return out.status();
     out_ = *std::move(out);
-    return absl::OkStatus();
-  }
-  absl::Status Call() override {
-    for (int i = 0; i < repeats(); ++i) {
-      absl::Status status =
-          generator_->QueueOnDevice(batch_, format_, {out_.as<std::byte>(), bytes_});
-      if (!status.ok()) return status;
-    }
-    return generator_->device().Wait();
-  }
-  absl::Status Ceiling() override {
     const cudaStream_t stream = generator_->device().stream();
-    for (int i = 0; i < repeats(); ++i) {
-      absl::Status status =
-          ToStatus("cudaMemsetAsync", cudaMemsetAsync(out_.as<std::byte>(), 7, bytes_, stream));
-      if (!status.ok()) return status;
-    }
-    return generator_->device().Wait();
+    absl::Status status = calls_.Record(stream, [&] {
+      absl::Status queued;
+      for (int i = 0; i < repeats() && queued.ok(); ++i) {
+        queued = generator_->QueueOnDevice(batch_, format_, {out_.as<std::byte>(), bytes_});
+      }
+      return queued;
+    });
+    if (!status.ok()) return status;
+    return ceilings_.Record(stream, [&] {
+      absl::Status queued;
+      for (int i = 0; i < repeats() && queued.ok(); ++i) {
+        queued =
+            ToStatus("cudaMemsetAsync", cudaMemsetAsync(out_.as<std::byte>(), 7, bytes_, stream));
+      }
+      return queued;
+    });
   }
+  absl::Status Call() override { return Run(calls_); }
+  absl::Status Ceiling() override { return Run(ceilings_); }
   void Release() override {
+    calls_.Reset();
+    ceilings_.Reset();
     batch_ = PlacedBatch();
     out_ = Block();
   }
 
  private:
+  absl::Status Run(Graph& graph) {
+    absl::Status status = graph.Launch(generator_->device().stream());
+    return status.ok() ? generator_->device().Wait() : status;
+  }
+
   const std::shared_ptr<CudaGenerator> generator_;
   gpu::generate::Format format_;
   uint64_t bytes_ = 0;
   PlacedBatch batch_;
   Block out_;
+  Graph calls_, ceilings_;
 };
 
 class HostColumn final : public Column {

@@ -81,7 +81,7 @@ json RowOf(const Workload& workload, const Column& column, const Figures& figure
               {"paper_mvoxel_per_s", nullptr},
               {"ceiling_mvoxel_per_s", nullptr},
               {"ceiling_ratio", nullptr},
-              {"queued", column.repeats()},
+              {"calls_together", column.repeats()},
               {"call", column.call()},
               {"ceiling", column.ceiling()}};
   if (workload.paper_ms.has_value() && column.host_copy()) {
