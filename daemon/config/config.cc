@@ -156,7 +156,10 @@ std::string EngineKindText(gpu::EngineKind kind) {
 absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text) {
   if (text == "off") return std::optional<Address>();
   absl::StatusOr<Address> address = ParseAddress(text);
-  if (!address.ok()) return address.status();
+  if (!address.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(address.status().message(), "; or \"off\" for none"));
+  }
   return std::optional<Address>(*std::move(address));
 }
 

@@ -33,7 +33,8 @@ absl::StatusOr<gpu::Affine> SceneToVoxel(const ViewOptions& view, const display:
                      "; its linear part must have full rank"));
   }
   if (view.box.has_value() && view.mode != ViewOptions::Mode::kFit) {
-    return absl::InvalidArgumentError("view.box is for mode FIT; leave it out of the others");
+    return absl::InvalidArgumentError(
+        "view.box (view_box in the configuration) is for mode FIT; leave it out of the others");
   }
 
   const double cells[3] = {double(grid.nx), double(grid.ny), double(grid.nz)};

@@ -95,6 +95,13 @@ def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None,
     return result
 
 
+def numbers_each(value: Optional[Colors]) -> bool:
+    """Whether it is one number for each of many vertices, which only a colour map makes colours of."""
+    if value is None or isinstance(value, str) or np.ndim(value) != 1:
+        return False
+    return isinstance(value, np.ndarray) or (len(value) > 4 and not isinstance(value[0], str))
+
+
 def many(value: Optional[Colors], count: int, cmap: Optional[str] = None) -> Union[None, Rgb, Array]:
     """None (the default colour), one colour, or a C-contiguous (count, 3) or (count, 4) uint8 array. Such an array is
     taken without a copy."""

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from . import operations, shapes, transforms, wire
 from .arrays import as_array, number, vector
+from .colors import numbers_each
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue
 from .pieces import free_name, ids
@@ -63,6 +64,8 @@ class Handle:
         if unknown or len(args) > len(self._args):
             raise InvalidValue(f"{self._make.__name__} has no {unknown[0]!r}" if unknown else
                                f"{self._make.__name__} takes {len(self._args)} arguments, got {len(args)}")
+        if "colors" in changes and "cmap" in self._options and "cmap" not in changes and not numbers_each(changes["colors"]):
+            changes["cmap"] = None  # it was for the numbers that these colours replace
         before = self._args, self._options, self._look
         self._args = (*args, *self._args[len(args):])
         self._options = {**self._options, **changes}

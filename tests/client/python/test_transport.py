@@ -242,6 +242,25 @@ class Drawing(Case):
         v.commit().wait(LONG)
         self.assertEqual(self.ids(served), [])
 
+    def test_colours_of_an_update_need_no_map_of_those_before(self) -> None:
+        served = self.serve()
+        v = self.connect()
+        points = np.zeros((6, 3), np.float32)
+        cloud = v.points("c", points, colors=np.arange(6.0), cmap="viridis")
+
+        def looks() -> pb.Entity:
+            v.commit().wait(LONG)
+            assert served.plain.session is not None
+            return pb.Entity.FromString(served.plain.session.scene["main"]["c"])
+
+        self.assertTrue(looks().primitive.points.vertices.colors)
+        cloud.update(colors=np.arange(6.0)[::-1])
+        self.assertTrue(looks().primitive.points.vertices.colors, "numbers again: the map stays")
+        cloud.update(colors="red")
+        entity = looks()
+        self.assertFalse(entity.primitive.points.vertices.colors)
+        self.assertEqual(entity.primitive.color.rgb, 0xFF0000)
+
     def test_large_clouds_are_one_thing(self) -> None:
         served = self.serve()
         v = self.connect()

@@ -17,6 +17,8 @@ struct PaperOptions {
   double seconds = 0.2;              // at least, of each figure
   uint64_t voxels = 1'000'000'000;   // of Table 4's batches
   uint64_t seed = 1;
+  std::string from;  // a report (JSON) to show again instead of measuring; empty: none
+  std::string svg;   // a folder for the figures; empty: none
 };
 
 // {rows: [{table, segments, voxels, engine, threads, output, host_copy, ms, ms_least, ms_greatest,

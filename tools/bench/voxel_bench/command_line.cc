@@ -137,6 +137,12 @@ CLI::App* AddPaper(CLI::App& app, PaperOptions& options) {
       ->check(CLI::Range(uint64_t{100'000}, uint64_t{1} << 33))
       ->capture_default_str();
   command->add_option("--seed", options.seed, "Of the segments")->capture_default_str();
+  command->add_option("--from", options.from, "Shows this report again (--json wrote it)")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile);
+  command->add_option("--svg", options.svg, "Draws the paper's Figures 5 to 9 there")
+      ->type_name("FOLDER")
+      ->check(CLI::ExistingDirectory);
   return command;
 }
 

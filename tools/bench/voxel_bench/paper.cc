@@ -1,12 +1,17 @@
 // The paper's tables, as one of the benchmarks.
+#include <filesystem>
+#include <fstream>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "tools/bench/paper/figures.h"
 #include "tools/bench/voxel_bench/report.h"
 #include "tools/bench/voxel_bench/run.h"
 
 namespace voxeld::bench {
+namespace {
 
-absl::StatusOr<nlohmann::json> RunPaper(const PaperOptions& options, const Surroundings& with) {
+absl::StatusOr<nlohmann::json> Measured(const PaperOptions& options, const Surroundings& with) {
   nlohmann::json report = ReportOf("paper", {{"engines", options.engines},
                                              {"tables", options.tables},
                                              {"seconds", options.seconds},
@@ -15,8 +20,33 @@ absl::StatusOr<nlohmann::json> RunPaper(const PaperOptions& options, const Surro
   absl::StatusOr<nlohmann::json> measured =
       paper::MeasurePaper(options, with.progress, [&with] { return !with.interrupted->load(); });
   if (!measured.ok()) return measured.status();
-  report["text"] = paper::PaperText(*measured);
   report.update(*measured);
+  report["text"] = paper::PaperText(report);
+  return report;
+}
+
+absl::StatusOr<nlohmann::json> Read(const std::string& file) {
+  std::ifstream in(file);
+  nlohmann::json report = nlohmann::json::parse(in, nullptr, false);
+  if (report.is_object() && report.value("benchmark", "") == "paper" && report.contains("rows"))
+    return report;
+  return absl::InvalidArgumentError(absl::StrCat(
+      file, " is no report of voxel-bench paper; `voxel-bench paper --json` prints one"));
+}
+
+}  // namespace
+
+absl::StatusOr<nlohmann::json> RunPaper(const PaperOptions& options, const Surroundings& with) {
+  absl::StatusOr<nlohmann::json> report =
+      options.from.empty() ? Measured(options, with) : Read(options.from);
+  if (!report.ok() || options.svg.empty()) return report;
+  for (const auto& [name, svg] : paper::FiguresOf(*report)) {
+    const std::string file = std::filesystem::path(options.svg) / name;
+    std::ofstream out(file);
+    out << svg;
+    if (!out.flush()) return absl::UnavailableError(absl::StrCat(file, " could not be written"));
+    with.progress(file);
+  }
   return report;
 }
 
