@@ -80,10 +80,11 @@ std::string AutoGenerator::DefaultCacheFile() {
   return folder.empty() ? folder : absl::StrCat(folder, "/voxeld/generator-costs");
 }
 
-size_t AutoGenerator::Choose(uint64_t voxels, uint64_t segments) const {
+size_t AutoGenerator::Choose(uint64_t voxels, uint64_t segments, Output output) const {
+  const uint64_t written = voxels * BytesOf(output) / BytesOf(Output::kI32x3);
   size_t best = 0;
   for (size_t i = 1; i < curves_.size(); ++i) {
-    if (curves_[i].SecondsFor(voxels, segments) < curves_[best].SecondsFor(voxels, segments))
+    if (curves_[i].SecondsFor(written, segments) < curves_[best].SecondsFor(written, segments))
       best = i;
   }
   return best;
@@ -96,8 +97,8 @@ absl::StatusOr<Plan> AutoGenerator::Prepare(const Batch& batch, Format format) {
 
 absl::Status AutoGenerator::Generate(const Batch& batch, const Plan& plan, Format format,
                                      std::span<std::byte> out) {
-  return candidates_[Choose(plan.voxels(), batch.size())].generator->Generate(batch, plan, format,
-                                                                              out);
+  return candidates_[Choose(plan.voxels(), batch.size(), format.output)].generator->Generate(
+      batch, plan, format, out);
 }
 
 absl::StatusOr<HostMemory> AutoGenerator::Allocate(size_t bytes) {
@@ -106,8 +107,8 @@ absl::StatusOr<HostMemory> AutoGenerator::Allocate(size_t bytes) {
 
 absl::Status AutoGenerator::Stream(const Batch& batch, const Plan& plan, Format format,
                                    uint64_t chunk_voxels, const TakeChunk& take) {
-  return candidates_[Choose(plan.voxels(), batch.size())].generator->Stream(batch, plan, format,
-                                                                            chunk_voxels, take);
+  return candidates_[Choose(plan.voxels(), batch.size(), format.output)].generator->Stream(
+      batch, plan, format, chunk_voxels, take);
 }
 
 }  // namespace voxeld::gpu::generate

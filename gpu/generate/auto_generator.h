@@ -30,8 +30,8 @@ class AutoGenerator final : public Generator {
   // Where costs are kept, by default: $XDG_CACHE_HOME/voxeld or ~/.cache/voxeld; empty without either.
   static std::string DefaultCacheFile();
 
-  // The candidate for a batch of that size.
-  size_t Choose(uint64_t voxels, uint64_t segments) const;
+  // The candidate for a batch of that size; voxels count by their bytes, as they are written.
+  size_t Choose(uint64_t voxels, uint64_t segments, Output output = Output::kI32x3) const;
   const std::string& name_of(size_t candidate) const { return candidates_[candidate].name; }
 
   std::string name() const override { return "auto"; }

@@ -70,7 +70,7 @@ absl::StatusOr<CostCurve> MeasureCost(Generator& generator) {
     if (!seconds.ok()) return seconds.status();
     curve.points.emplace_back(static_cast<double>(voxels), *seconds);
   }
-  constexpr uint64_t kMany = 8192, kShort = 20;
+  constexpr uint64_t kMany = 65536, kShort = 20;
   const absl::StatusOr<double> many = SecondsOf(generator, Segments(kMany, kShort), out);
   if (!many.ok()) return many.status();
   curve.seconds_a_segment =

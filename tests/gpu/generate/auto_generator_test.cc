@@ -63,6 +63,8 @@ TEST_F(AutoGeneratorTest, FewVoxelsAreMadeNearManyFarAndWhereTheyCrossItChanges)
   uint64_t crossing = 1000;
   while (generator_->Choose(crossing, 1) == 0) ++crossing;
   EXPECT_NEAR(Near().SecondsFor(crossing, 1), Far().SecondsFor(crossing, 1), 1e-8);
+  EXPECT_EQ(generator_->Choose(2 * crossing, 1, Output::kPacked), 0u) << "a third of the bytes";
+  EXPECT_EQ(generator_->Choose(4 * crossing, 1, Output::kPacked), 1u);
   EXPECT_EQ(generator_->Choose(2000, 100'000), 1u) << "many segments count too";
 }
 

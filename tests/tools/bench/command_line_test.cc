@@ -32,6 +32,11 @@ TEST(CommandLine, EachSubcommandHasItsOptions) {
   EXPECT_EQ(Parsed<FairnessOptions>({"fairness", "--clients", "7"}).clients, 7);
   EXPECT_EQ(Parsed<OverloadOptions>({"overload", "--csv", "a.csv"}).csv, "a.csv");
   EXPECT_EQ(Parsed<IdleOptions>({"idle", "--streams", "9"}).streams, 9);
+  const auto paper = Parsed<PaperOptions>(
+      {"paper", "--engine", "cpu", "--table", "2", "--table", "4", "--seed", "9"});
+  EXPECT_THAT(paper.engines, ElementsAre("cpu"));
+  EXPECT_THAT(paper.tables, ElementsAre("2", "4"));
+  EXPECT_EQ(paper.seed, 9u);
   EXPECT_THAT(Parsed<SinkOptions>({"sink", "--listen", "unix:/x"}).listen, ElementsAre("unix:/x"));
 }
 
@@ -47,12 +52,14 @@ TEST(CommandLine, WhatIsWrongIsSaid) {
   EXPECT_THAT(Refusal({"ingest", "--line-bytes", "26"}), HasSubstr("26"));
   EXPECT_THAT(Refusal({"latency", "--seconds", "0"}), HasSubstr("--seconds"));
   EXPECT_THAT(Refusal({"latency", "--rate", "nan"}), HasSubstr("--rate"));
+  EXPECT_THAT(Refusal({"paper", "--engine", "gpu"}), HasSubstr("gpu"));
+  EXPECT_THAT(Refusal({"paper", "--from", "/nowhere.json"}), HasSubstr("/nowhere.json"));
   EXPECT_THAT(Refusal({"overload", "--rounds", "3"}), HasSubstr("--rounds"));
 }
 
 TEST(CommandLine, HelpNamesThemAll) {
   const std::string help = ParseCommandLine({"--help"})->print_and_exit;
-  for (const char* name : {"ingest", "latency", "fairness", "overload", "idle"}) {
+  for (const char* name : {"ingest", "latency", "fairness", "overload", "idle", "paper"}) {
     EXPECT_THAT(help, HasSubstr(name));
   }
 }

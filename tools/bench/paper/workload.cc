@@ -63,8 +63,10 @@ std::vector<uint64_t> Lengths(uint64_t count, uint64_t total, uint64_t seed) {
   std::vector<uint64_t> lengths;
   uint64_t sum = 0;
   for (uint64_t i = 0; i < count; ++i) {
-    lengths.push_back(static_cast<uint64_t>(static_cast<double>(total) /
-                                            static_cast<double>(count) * maker.Within(0.05, 1.95)));
+    const double length =
+        static_cast<double>(total) / static_cast<double>(count) * maker.Within(0.05, 1.95);
+    // Ends less than a voxel apart may lie in two.
+    lengths.push_back(std::max<uint64_t>(2, static_cast<uint64_t>(length)));
     sum += lengths.back();
   }
   // What is missing, or too much, is shared by all.
