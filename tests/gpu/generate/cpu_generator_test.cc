@@ -8,6 +8,7 @@
 #include "gpu/generate/cpu_kernel.h"
 #include "gpu/generate/generator.h"
 #include "gpu/generate/stride.h"
+#include "hwy/highway.h"
 #include "tests/gpu/generate/rational_reference.h"
 #include "tests/gpu/generate/segment_samples.h"
 
@@ -176,6 +177,33 @@ TEST_P(CpuGenerator, TheOtherFormsHoldTheSameVoxels) {
     ASSERT_EQ(p & 2047, cells[i][0]);
     ASSERT_EQ(p >> 11 & 2047, cells[i][1]);
     ASSERT_EQ(p >> 22, cells[i][2]);
+  }
+}
+
+// Every instruction set that this processor has, down to one lane.
+TEST_P(CpuGenerator, AllVectorsGiveTheSameBytes) {
+  auto segments = RandomSegments(11, 600, 150, false);
+  const auto adversarial = Adversarial(3, 300), longer = RandomSegments(12, 40, 3000, false);
+  segments.insert(segments.end(), adversarial.begin(), adversarial.end());
+  segments.insert(segments.end(), longer.begin(), longer.end());
+  for (const Output output : {Output::kI32x3, Output::kF32x3, Output::kI16x3}) {
+    const Format format = {GetParam(), output};
+    const auto expected = Generated(*generator_, segments, format);
+    int targets = 0;
+    for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
+      const int64_t target = left & -left;
+      hwy::SetSupportedTargetsForTest(target);
+      hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+      // Not all that the processor has are compiled for.
+      if (VectorTarget() == hwy::TargetName(target)) {
+        ++targets;
+        EXPECT_TRUE(Generated(*generator_, segments, format) == expected)
+            << hwy::TargetName(target);
+      }
+      hwy::SetSupportedTargetsForTest(0);
+      hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    }
+    EXPECT_GE(targets, 2);
   }
 }
 

@@ -165,5 +165,11 @@ TEST_P(CudaGeneratorTest, IntoDeviceMemoryAndThroughTheWholeCallTheyAreTheSame) 
   EXPECT_EQ(small.code(), absl::StatusCode::kInvalidArgument);
 }
 
+TEST(CudaGenerator, ADeviceThatIsNotThereIsSaidToBe) {
+  const auto none = CudaGenerator::Open(99, 1);
+  EXPECT_EQ(none.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(none.status().message()), HasSubstr("99"));
+}
+
 }  // namespace
 }  // namespace voxeld::gpu::cuda

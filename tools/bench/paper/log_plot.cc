@@ -124,7 +124,7 @@ std::string LogBarsSvg(const std::string& title, const std::string& label,
         top + 5, std::max(1.0, x.At(bars[i].value) - kNames), kRow - 10, colour);
     out += Text(kNames - 8, top + 20, "end", bars[i].name) +
            Text(std::max(kNames, x.At(bars[i].value)) + 8, top + 20, "start",
-                absl::StrFormat("%.4g", bars[i].value));
+                absl::StrFormat("%.*f", bars[i].value < 100 ? 1 : 0, bars[i].value));
   }
   return out + "</svg>\n";
 }
