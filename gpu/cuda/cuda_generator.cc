@@ -13,25 +13,8 @@ using generate::Batch;
 using generate::BytesOf;
 using generate::FixedSegment;
 using generate::Format;
+using generate::kChunkGrain;
 using generate::Plan;
-
-namespace {
-
-absl::Status CheckDeviceRoom(uint64_t voxels, Format format, std::span<std::byte> out) {
-  const uint64_t needed = voxels * BytesOf(format.output);
-  if (out.size() < needed) {
-    return absl::InvalidArgumentError(absl::StrCat("the output has ", out.size(), " bytes; ",
-                                                   voxels, " voxels of ", BytesOf(format.output),
-                                                   " bytes need ", needed));
-  }
-  if (reinterpret_cast<uintptr_t>(out.data()) % 16 != 0) {
-    return absl::InvalidArgumentError(
-        "the output in device memory does not begin at a multiple of 16 bytes");
-  }
-  return absl::OkStatus();
-}
-
-}  // namespace
 
 absl::StatusOr<std::unique_ptr<CudaGenerator>> CudaGenerator::Open(int device, int threads) {
   absl::StatusOr<std::unique_ptr<Device>> opened = Device::Open(device);
@@ -64,9 +47,24 @@ absl::StatusOr<Plan> CudaGenerator::Prepare(const Batch& batch, Format format) {
 
 absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan& plan) {
   PlacedBatch placed;
+  if (absl::Status status = CheckPlan(plan, batch); !status.ok()) return status;
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
+  placed.extent_ = plan.extent;
   placed.view_.voxels = plan.voxels();
   placed.view_.count = static_cast<uint32_t>(batch.size());
   if (batch.size() == 0) return placed;
+  if (absl::Status status = Settled(PlaceOn(batch, plan, placed)); !status.ok()) return status;
+  return placed;
+}
+
+absl::Status CudaGenerator::Settled(absl::Status status) {
+  if (status.ok()) return status;
+  cudaStreamSynchronize(device_->stream());
+  cudaStreamSynchronize(device_->copies());
+  return status;
+}
+
+absl::Status CudaGenerator::PlaceOn(const Batch& batch, const Plan& plan, PlacedBatch& placed) {
   const size_t segment_bytes = batch.size() * sizeof(FixedSegment);
   const size_t offset_bytes = plan.offsets.size() * sizeof(uint64_t);
   if (absl::Status status = Reserve(staging_, segment_bytes + offset_bytes); !status.ok())
@@ -94,7 +92,9 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
   placed.view_.rounds = GenerateRounds(plan.voxels());
   auto segments = device_->Upload(fixed, batch.size());
   auto offsets = device_->Upload(staged_offsets, plan.offsets.size());
-  auto records = device_->pool().Acquire(batch.size() * sizeof(SegmentRecord));
+  auto records = device_->pool().Acquire(plan.extent.format.sampling == generate::Sampling::kCover
+                                             ? 1
+                                             : batch.size() * sizeof(SegmentRecord));
   auto first_segments = device_->pool().Acquire((placed.view_.warps() + 1) * sizeof(uint32_t));
   for (const auto* block : {&segments, &offsets, &records, &first_segments}) {
     if (!block->ok()) return block->status();
@@ -107,17 +107,22 @@ absl::StatusOr<PlacedBatch> CudaGenerator::Place(const Batch& batch, const Plan&
   placed.view_.offsets = placed.offsets_.as<uint64_t>();
   placed.view_.records = placed.records_.as<SegmentRecord>();
   placed.view_.first_segments = placed.first_segments_.as<uint32_t>();
-  absl::Status status = device_->Run(
-      "PrepareGenerate", [&] { return PrepareGenerate(placed.view_, device_->stream()); });
-  if (status.ok()) status = device_->Wait();  // the staging memory is the next batch's
-  if (!status.ok()) return status;
-  return placed;
+  absl::Status status = device_->Run("PrepareGenerate", [&] {
+    return PrepareGenerate(placed.view_, plan.extent.format.sampling, device_->stream());
+  });
+  return status.ok() ? device_->Wait() : status;  // the staging memory is the next batch's
 }
 
 absl::Status CudaGenerator::QueueOnDevice(const PlacedBatch& batch, Format format,
                                           std::span<std::byte> out) {
-  if (absl::Status status = CheckDeviceRoom(batch.voxels(), format, out); !status.ok())
+  if (absl::Status status = CheckRoom(batch.extent_, format, out.size()); !status.ok())
     return status;
+  if (reinterpret_cast<uintptr_t>(out.data()) % 16 != 0) {
+    return absl::InvalidArgumentError(
+        "the output in device memory does not begin at a multiple of 16 bytes");
+  }
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
+  if (batch.voxels() == 0) return absl::OkStatus();
   return device_->Run("Generate", [&] {
     return cuda::Generate(batch.view_, format, 0, batch.voxels(), out.data(), device_->stream());
   });
@@ -179,10 +184,9 @@ absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format form
                                            std::span<std::byte> out) {
   const uint64_t all = batch.voxels();
   const size_t bytes = BytesOf(format.output);
-  if (out.size() < all * bytes) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the output has ", out.size(), " bytes; ", all, " voxels need ", all * bytes));
-  }
+  if (absl::Status status = CheckRoom(batch.extent_, format, out.size()); !status.ok())
+    return status;
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
   const uint64_t chunk = std::min(kChunkVoxels, all);
   for (Slot& slot : slots_) {
     if (absl::Status status = Ready(slot, chunk * bytes, false); !status.ok()) return status;
@@ -201,13 +205,16 @@ absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format form
   // Whatever failed, nothing is written any more when this returns.
   absl::Status waited = device_->api().Call(
       "cudaStreamSynchronize", [&] { return cudaStreamSynchronize(device_->copies()); });
-  return status.ok() ? waited : status;
+  return status.ok() ? waited : Settled(status);
 }
 
 absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format,
                                        uint64_t chunk_voxels, const generate::TakeChunk& take) {
   if (absl::Status status = generate::CheckChunk(chunk_voxels); !status.ok()) return status;
+  if (absl::Status status = CheckForm(batch.extent_, format); !status.ok()) return status;
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
   const uint64_t all = batch.voxels();
+  chunk_voxels = std::min(chunk_voxels, all / kChunkGrain * kChunkGrain + kChunkGrain);
   const size_t bytes = BytesOf(format.output);
   const uint64_t chunks = (all + chunk_voxels - 1) / chunk_voxels;
   for (Slot& slot : slots_) {
@@ -228,19 +235,19 @@ absl::Status CudaGenerator::StreamFrom(const PlacedBatch& batch, Format format,
     if (status.ok() && i < chunks)
       status = Queue(slot, batch, format, i * chunk_voxels, count_of(i), slot.pinned.data());
   }
-  if (!status.ok()) cudaStreamSynchronize(device_->copies());
-  return status;
+  return Settled(status);
 }
 
 absl::Status CudaGenerator::Generate(const Batch& batch, const Plan& plan, Format format,
                                      std::span<std::byte> out) {
-  if (absl::Status status = CheckRoom(plan, format.output, out.size()); !status.ok()) return status;
+  if (absl::Status status = CheckRoom(plan.extent, format, out.size()); !status.ok()) return status;
   absl::StatusOr<PlacedBatch> placed = Place(batch, plan);
   if (!placed.ok()) return placed.status();
   return GenerateToHost(*placed, format, out);
 }
 
 absl::StatusOr<generate::HostMemory> CudaGenerator::Allocate(size_t bytes) {
+  if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
   absl::StatusOr<std::span<std::byte>> memory = AllocatePinned(bytes);
   if (!memory.ok()) return memory.status();
   return generate::HostMemory(memory->data(), [](std::byte* at) { cudaFreeHost(at); });

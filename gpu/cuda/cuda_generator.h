@@ -22,10 +22,11 @@ namespace voxeld::gpu::cuda {
 // A batch that lies on the device, ready to be generated from. Its generator outlives it.
 class PlacedBatch {
  public:
-  uint64_t voxels() const { return view_.voxels; }
+  uint64_t voxels() const { return extent_.voxels; }
 
  private:
   friend class CudaGenerator;
+  generate::Extent extent_;
   Block segments_, offsets_, records_, first_segments_;
   GenerateView view_;
 };
@@ -83,6 +84,10 @@ class CudaGenerator final : public generate::Generator {
   absl::Status Queue(Slot& slot, const PlacedBatch& batch, generate::Format format, uint64_t first,
                      uint64_t count, std::byte* to);
   absl::Status WaitFor(cudaEvent_t event);
+  // The same status; an error only when nothing is under way any more.
+  absl::Status Settled(absl::Status status);
+  absl::Status PlaceOn(const generate::Batch& batch, const generate::Plan& plan,
+                       PlacedBatch& placed);
 
   const std::unique_ptr<Device> device_;
   const std::unique_ptr<Executor> executor_;

@@ -55,8 +55,9 @@ struct GenerateView {
   uint64_t warps() const { return (voxels + warp_voxels() - 1) / warp_voxels(); }
 };
 
-// Fills `records` and `first_segments`.
-cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream);
+// Fills `first_segments`, and `records` for samplings that have steps.
+cudaError_t PrepareGenerate(const GenerateView& view, generate::Sampling sampling,
+                            cudaStream_t stream);
 
 // Voxels [first, first + count) to `out` and on; `first` is a multiple of kGenerateMostRounds·kGenerateRound, `out` is
 // aligned to 16 bytes.

@@ -14,10 +14,13 @@ using generate::Sampling;
 using generate::Stride;
 using generate::Voxel;
 using generate::Walk;
-// A warp's walks begin exactly where it enters a segment, up to a round before that, and each round adds a run of
-// steps and one long one.
+// A warp's walks begin exactly where it enters a segment, or so many steps before that, at most a round of them, as
+// if it went on there; each round adds a run of steps and one long one. Steps backwards take their roundings away:
+// a walk may be a round's too small where nobody looks, and where somebody does it has at least so much bias.
 using Rules =
     generate::WalkRules<kGenerateRound + kGenerateMostRounds*(kGenerateRun + 1) + kGenerateRun>;
+
+static_assert(Rules::kWalkZone - Rules::kTooLarge > kGenerateRound);
 
 constexpr int kThreads = 32 * kGenerateWarps;
 
@@ -276,13 +279,6 @@ __device__ void MakeCoverRun(const GenerateView& view, uint32_t lo, uint32_t hi,
   }
 }
 
-// How segments are shared by threads.
-enum class Sharing : uint8_t {
-  kWarp,    // a warp goes from one to the next
-  kThread,  // each thread finds its own: where most are shorter than a round
-  kCover,
-};
-
 // Where a warp is: the segment of its next voxel, whose record lies in shared memory, and where the one after
 // it ends, whose record is on its way there.
 class WarpPlace {
@@ -345,15 +341,11 @@ class WarpPlace {
   uint64_t begin_, end_, next_end_ = 0;
 };
 
-// Blocks that share a multiprocessor. Registers that do not suffice cost more than warps that are missing.
-constexpr int BlocksOf(Output output, Sharing sharing, bool may_be_long) {
-  return sharing == Sharing::kWarp && !may_be_long ? 3 : 2;
-}
-
-// Each warp makes a run of voxels of its own, a round of kGenerateRound at a time. `first` and `end` count from
-// the batch's first voxel.
-template <Output kOut, Sharing kSharing, bool kLong>
-__global__ void __launch_bounds__(kThreads, BlocksOf(kOut, kSharing, kLong))
+// Each warp makes a run of voxels of its own, a round of kGenerateRound at a time: from segment to segment, or,
+// where most are shorter than a round, each thread finds its own. `first` and `end` count from the batch's first
+// voxel. Three blocks share a multiprocessor: registers that do not suffice cost more than warps that are missing.
+template <Output kOut, bool kCover, bool kLong>
+__global__ void __launch_bounds__(kThreads, kCover || kLong ? 2 : 3)
     GenerateVoxels(const __grid_constant__ GenerateView view, uint64_t first, uint64_t end,
                    void* out) {
   __shared__ uint4 stages[kGenerateWarps][kGenerateRound * 12 / 16];
@@ -365,9 +357,24 @@ __global__ void __launch_bounds__(kThreads, BlocksOf(kOut, kSharing, kLong))
   uint64_t warp_at = warp * warp_voxels;
   if (warp_at >= end) return;
   const uint32_t lane_at = threadIdx.x % 32 * kGenerateRun;
+  const uint32_t lowest = view.first_segments[warp], last = view.first_segments[warp + 1];
   Voxel v[kGenerateRun];
-  if constexpr (kSharing == Sharing::kWarp) {
-    WarpPlace place(view, records[threadIdx.x / 32], view.first_segments[warp]);
+  if (kCover || last - lowest > 2 * view.rounds) {
+    for (uint32_t round = 0; round < view.rounds && warp_at < end; ++round) {
+      if (warp_at + lane_at < view.voxels) {
+        if constexpr (kCover) {
+          MakeCoverRun(view, lowest, last, warp_at + lane_at, v);
+        } else {
+          MakeMixedRun<kLong>(view, lowest, last, warp_at + lane_at, v);
+        }
+      }
+      Store<kOut>(v, warp_at - first, lane_at, end - first, stage, out);
+      warp_at += kGenerateRound;
+    }
+    return;
+  }
+  if constexpr (!kCover) {
+    WarpPlace place(view, records[threadIdx.x / 32], lowest);
     constexpr auto kRound = static_cast<int32_t>(kGenerateRound);
     const auto at = static_cast<int32_t>(lane_at);
     // All of these count from the round's first voxel.
@@ -390,11 +397,11 @@ __global__ void __launch_bounds__(kThreads, BlocksOf(kOut, kSharing, kLong))
           walks.BeginNear(place.record(), at - part_begin);
         }
       }
-      if (left < kRound) return StoreSome<kOut>(v, to + lane_at, left - at, out);
+      if (left < kRound) break;
       StoreWarp<kOut>(v, to, stage, out);
       left -= kRound;
-      if (left == 0) return;
       to += kGenerateRound;
+      if (left == 0) break;
       part_begin -= kRound;
       part_end -= kRound;
       if (part_end == 0) {
@@ -403,19 +410,8 @@ __global__ void __launch_bounds__(kThreads, BlocksOf(kOut, kSharing, kLong))
         walks.BeginNear(place.record(), at);
       }
     }
-  } else {
-    const uint32_t lowest = view.first_segments[warp], last = view.first_segments[warp + 1];
-    for (uint32_t round = 0; round < view.rounds && warp_at < end; ++round) {
-      if (warp_at + lane_at < view.voxels) {
-        if constexpr (kSharing == Sharing::kCover) {
-          MakeCoverRun(view, lowest, last, warp_at + lane_at, v);
-        } else {
-          MakeMixedRun<kLong>(view, lowest, last, warp_at + lane_at, v);
-        }
-      }
-      Store<kOut>(v, warp_at - first, lane_at, end - first, stage, out);
-      warp_at += kGenerateRound;
-    }
+    __pipeline_wait_prior(0);  // nothing is on its way into shared memory that is others' then
+    if (left > 0) StoreSome<kOut>(v, to + lane_at, left - at, out);
   }
 }
 
@@ -424,26 +420,26 @@ cudaError_t Launch(const GenerateView& view, Sampling sampling, uint64_t first, 
                    void* out, cudaStream_t stream) {
   const uint64_t each = view.warp_voxels() * kGenerateWarps;
   const auto blocks = static_cast<uint32_t>((count + each - 1) / each);
-  const auto launch = [&]<Sharing kSharing, bool kLong>() {
-    GenerateVoxels<kOut, kSharing, kLong>
+  const auto launch = [&]<bool kCover, bool kLong>() {
+    GenerateVoxels<kOut, kCover, kLong>
         <<<blocks, kThreads, 0, stream>>>(view, first, first + count, out);
   };
   if (sampling == Sampling::kCover) {
-    launch.template operator()<Sharing::kCover, false>();
+    launch.template operator()<true, false>();
   } else if (view.most_steps >= generate::kStrideExact) {
-    launch.template operator()<Sharing::kWarp, true>();
-  } else if (view.voxels / view.count >= kGenerateRound / 2) {
-    launch.template operator()<Sharing::kWarp, false>();
+    launch.template operator()<false, true>();
   } else {
-    launch.template operator()<Sharing::kThread, false>();
+    launch.template operator()<false, false>();
   }
   return cudaGetLastError();
 }
 
 }  // namespace
 
-cudaError_t PrepareGenerate(const GenerateView& view, cudaStream_t stream) {
-  PrepareRecords<<<(view.count + 127) / 128, 128, 0, stream>>>(view);
+cudaError_t PrepareGenerate(const GenerateView& view, Sampling sampling, cudaStream_t stream) {
+  if (sampling != Sampling::kCover) {
+    PrepareRecords<<<(view.count + 127) / 128, 128, 0, stream>>>(view);
+  }
   FindFirstSegments<<<static_cast<uint32_t>(view.warps() / 128 + 1), 128, 0, stream>>>(
       view, view.warp_voxels(), view.warps());
   return cudaGetLastError();

@@ -51,7 +51,11 @@ absl::StatusOr<std::unique_ptr<AutoGenerator>> AutoGenerator::Make(
     std::vector<Candidate> candidates, const std::string& cache_file) {
   if (candidates.empty()) return absl::InvalidArgumentError("there is no generator to choose from");
   std::vector<std::string> names;
-  for (const Candidate& candidate : candidates) names.push_back(candidate.name);
+  names.reserve(2 * candidates.size());
+  for (const Candidate& candidate : candidates) {
+    names.push_back(candidate.name);
+    names.push_back(absl::StrCat(candidate.name, " COVER"));
+  }
   const std::string machine = Machine();
   if (!cache_file.empty()) {
     absl::StatusOr<std::vector<CostCurve>> known = FromText(TextOf(cache_file), machine, names);
@@ -60,10 +64,11 @@ absl::StatusOr<std::unique_ptr<AutoGenerator>> AutoGenerator::Make(
   }
   std::vector<CostCurve> curves;
   std::vector<std::pair<std::string, CostCurve>> named;
-  for (const Candidate& candidate : candidates) {
-    absl::StatusOr<CostCurve> curve = MeasureCost(*candidate.generator);
+  for (size_t i = 0; i < names.size(); ++i) {
+    absl::StatusOr<CostCurve> curve = MeasureCost(
+        *candidates[i / 2].generator, i % 2 == 0 ? Sampling::kEuclidean : Sampling::kCover);
     if (!curve.ok()) return curve.status();
-    named.emplace_back(candidate.name, *curve);
+    named.emplace_back(names[i], *curve);
     curves.push_back(*std::move(curve));
   }
   if (!cache_file.empty()) Write(cache_file, ToText(machine, named));
@@ -80,12 +85,15 @@ std::string AutoGenerator::DefaultCacheFile() {
   return folder.empty() ? folder : absl::StrCat(folder, "/voxeld/generator-costs");
 }
 
-size_t AutoGenerator::Choose(uint64_t voxels, uint64_t segments, Output output) const {
-  const uint64_t written = voxels * BytesOf(output) / BytesOf(Output::kI32x3);
+size_t AutoGenerator::Choose(uint64_t voxels, uint64_t segments, Format format) const {
+  const uint64_t written = voxels * BytesOf(format.output) / BytesOf(Output::kI32x3);
+  const size_t kind = format.sampling == Sampling::kCover ? 1 : 0;
+  const auto seconds = [&](size_t i) {
+    return curves_[2 * i + kind].SecondsFor(written, segments);
+  };
   size_t best = 0;
-  for (size_t i = 1; i < curves_.size(); ++i) {
-    if (curves_[i].SecondsFor(written, segments) < curves_[best].SecondsFor(written, segments))
-      best = i;
+  for (size_t i = 1; i < candidates_.size(); ++i) {
+    if (seconds(i) < seconds(best)) best = i;
   }
   return best;
 }
@@ -97,8 +105,8 @@ absl::StatusOr<Plan> AutoGenerator::Prepare(const Batch& batch, Format format) {
 
 absl::Status AutoGenerator::Generate(const Batch& batch, const Plan& plan, Format format,
                                      std::span<std::byte> out) {
-  return candidates_[Choose(plan.voxels(), batch.size(), format.output)].generator->Generate(
-      batch, plan, format, out);
+  return candidates_[Choose(plan.voxels(), batch.size(), format)].generator->Generate(batch, plan,
+                                                                                      format, out);
 }
 
 absl::StatusOr<HostMemory> AutoGenerator::Allocate(size_t bytes) {
@@ -107,7 +115,7 @@ absl::StatusOr<HostMemory> AutoGenerator::Allocate(size_t bytes) {
 
 absl::Status AutoGenerator::Stream(const Batch& batch, const Plan& plan, Format format,
                                    uint64_t chunk_voxels, const TakeChunk& take) {
-  return candidates_[Choose(plan.voxels(), batch.size(), format.output)].generator->Stream(
+  return candidates_[Choose(plan.voxels(), batch.size(), format)].generator->Stream(
       batch, plan, format, chunk_voxels, take);
 }
 

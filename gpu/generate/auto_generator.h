@@ -23,7 +23,7 @@ class AutoGenerator final : public Generator {
   // cannot be written is no error.
   static absl::StatusOr<std::unique_ptr<AutoGenerator>> Make(std::vector<Candidate> candidates,
                                                              const std::string& cache_file);
-  // With costs that are known; as many curves as candidates.
+  // With costs that are known; two curves a candidate: of steps (EUCLIDEAN, THIN), of COVER.
   AutoGenerator(std::vector<Candidate> candidates, std::vector<CostCurve> curves)
       : candidates_(std::move(candidates)), curves_(std::move(curves)) {}
 
@@ -31,7 +31,7 @@ class AutoGenerator final : public Generator {
   static std::string DefaultCacheFile();
 
   // The candidate for a batch of that size; voxels count by their bytes, as they are written.
-  size_t Choose(uint64_t voxels, uint64_t segments, Output output = Output::kI32x3) const;
+  size_t Choose(uint64_t voxels, uint64_t segments, Format format = {}) const;
   const std::string& name_of(size_t candidate) const { return candidates_[candidate].name; }
 
   std::string name() const override { return "auto"; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <ranges>
@@ -43,10 +44,14 @@ class Batch {
       segments_;
 };
 
-inline int64_t ToUnits(int32_t voxels) { return static_cast<int64_t>(voxels) * kUnits; }
-inline int64_t ToUnits(double voxels) {
-  return FloorToInt(voxels * static_cast<double>(kUnits) + 0.5);
+// To the nearest unit, halves up; both steps are exact. No number stays none.
+inline double RoundedUnits(double voxels) {
+  const double units = voxels * static_cast<double>(kUnits);
+  const double whole = std::floor(units);
+  return units - whole >= 0.5 ? whole + 1 : whole;
 }
+inline int64_t ToUnits(int32_t voxels) { return static_cast<int64_t>(voxels) * kUnits; }
+inline int64_t ToUnits(double voxels) { return static_cast<int64_t>(RoundedUnits(voxels)); }
 inline int64_t ToUnits(float voxels) { return ToUnits(static_cast<double>(voxels)); }
 
 template <typename T>

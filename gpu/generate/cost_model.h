@@ -21,8 +21,8 @@ struct CostCurve {
   double SecondsFor(uint64_t voxels, uint64_t segments) const;
 };
 
-// Times whole calls, the result on the host; takes about a tenth of a second.
-absl::StatusOr<CostCurve> MeasureCost(Generator& generator);
+// Times whole calls, the result in the generator's own host memory; takes about a tenth of a second.
+absl::StatusOr<CostCurve> MeasureCost(Generator& generator, Sampling sampling);
 
 // One line a generator, of its name and the figures, below one that names `machine`.
 std::string ToText(std::string_view machine,

@@ -17,18 +17,24 @@ using DF = hn::ScalableTag<double>;
 using VF = hn::Vec<DF>;
 constexpr size_t kBlock = 64;  // segments whose arithmetic is done together
 
-// Coordinates as they lie in memory, `count` of them (room for a vector more), in units; exact.
+// Coordinates as they lie in memory, in units, as RoundedUnits.
 template <typename T>
 HWY_ATTR HWY_INLINE VF LoadUnits(const T* from) {
   const DF d;
   const hn::Rebind<T, DF> dt;
-  if constexpr (std::is_same_v<T, double>) {
-    return hn::Floor(hn::Add(hn::Mul(hn::LoadU(d, from), hn::Set(d, 65536.0)), hn::Set(d, 0.5)));
-  } else if constexpr (std::is_same_v<T, float>) {
-    const VF v = hn::PromoteTo(d, hn::LoadU(dt, from));
-    return hn::Floor(hn::Add(hn::Mul(v, hn::Set(d, 65536.0)), hn::Set(d, 0.5)));
-  } else {
+  if constexpr (std::is_same_v<T, int32_t>) {
     return hn::Mul(hn::PromoteTo(d, hn::LoadU(dt, from)), hn::Set(d, 65536.0));
+  } else {
+    VF voxels;
+    if constexpr (std::is_same_v<T, double>) {
+      voxels = hn::LoadU(d, from);
+    } else {
+      voxels = hn::PromoteTo(d, hn::LoadU(dt, from));
+    }
+    const VF units = hn::Mul(voxels, hn::Set(d, 65536.0));
+    const VF whole = hn::Floor(units);
+    return hn::Add(
+        whole, hn::IfThenElseZero(hn::Ge(hn::Sub(units, whole), hn::Set(d, 0.5)), hn::Set(d, 1.0)));
   }
 }
 
@@ -78,7 +84,7 @@ struct UnitBlock {
     }
     // Nothing beyond the last one is loaded.
     for (; i < values; ++i) {
-      q[i] = std::floor(static_cast<double>(from[i]) * 65536.0 + 0.5);
+      q[i] = RoundedUnits(static_cast<double>(from[i]));
       whole &= q[i] * (1.0 / 65536) == std::floor(q[i] * (1.0 / 65536));
       within &= q[i] >= -kMost && q[i] <= kMost;
       lo[i % 3] = std::min(lo[i % 3], q[i]);

@@ -12,7 +12,6 @@ namespace {
 
 // Voxels that are worth another thread.
 constexpr uint64_t kTaskVoxels = 64 << 10;
-constexpr uint64_t kChunkGrain = 8192;
 // What a core's own cache may keep for whoever reads it next.
 constexpr uint64_t kCachedBytes = 4 << 20;
 
@@ -28,7 +27,8 @@ class CpuGenerator final : public Generator {
 
   absl::Status Generate(const Batch& batch, const Plan& plan, Format format,
                         std::span<std::byte> out) override {
-    if (absl::Status status = CheckRoom(plan, format.output, out.size()); !status.ok())
+    if (absl::Status status = CheckPlan(plan, batch); !status.ok()) return status;
+    if (absl::Status status = CheckRoom(plan.extent, format, out.size()); !status.ok())
       return status;
     Emit(batch, plan, format, 0, plan.voxels(), out.data());
     return absl::OkStatus();
@@ -36,8 +36,11 @@ class CpuGenerator final : public Generator {
 
   absl::Status Stream(const Batch& batch, const Plan& plan, Format format, uint64_t chunk_voxels,
                       const TakeChunk& take) override {
+    if (absl::Status status = CheckPlan(plan, batch); !status.ok()) return status;
+    if (absl::Status status = CheckForm(plan.extent, format); !status.ok()) return status;
     if (absl::Status status = CheckChunk(chunk_voxels); !status.ok()) return status;
     const uint64_t all = plan.voxels();
+    chunk_voxels = std::min(chunk_voxels, all / kChunkGrain * kChunkGrain + kChunkGrain);
     if (chunk_.size() < std::min(chunk_voxels, all) * BytesOf(format.output)) {
       chunk_.resize(std::min(chunk_voxels, all) * BytesOf(format.output));
     }

@@ -12,8 +12,8 @@ HWY_BEFORE_NAMESPACE();
 namespace voxeld::gpu::generate {
 namespace HWY_NAMESPACE {
 
-HWY_ATTR void CountVoxelsIn(const Batch& batch, Sampling sampling, size_t begin, size_t end,
-                            uint64_t* counts, UnitBounds& bounds) {
+HWY_ATTR inline void CountVoxelsIn(const Batch& batch, Sampling sampling, size_t begin, size_t end,
+                                   uint64_t* counts, UnitBounds& bounds) {
   batch.With([&](const auto& segments) {
     for (; begin < end && bounds.all_within; begin += kBlock) {
       bounds.all_within =
@@ -64,8 +64,9 @@ HWY_ATTR void EmitRange(std::span<const Segment<T>> segments, Sampling sampling,
   }
 }
 
-HWY_ATTR void EmitVoxelsIn(const Batch& batch, Format format, std::span<const uint64_t> offsets,
-                           uint64_t first, uint64_t count, bool past_caches, std::byte* out) {
+HWY_ATTR inline void EmitVoxelsIn(const Batch& batch, Format format,
+                                  std::span<const uint64_t> offsets, uint64_t first, uint64_t count,
+                                  bool past_caches, std::byte* out) {
   batch.With([&](const auto& segments) {
     switch (format.output) {
       case Output::kI32x3:
@@ -84,7 +85,7 @@ HWY_ATTR void EmitVoxelsIn(const Batch& batch, Format format, std::span<const ui
   });
 }
 
-HWY_ATTR void StreamingFillIn(std::span<std::byte> out, uint32_t word) {
+HWY_ATTR inline void StreamingFillIn(std::span<std::byte> out, uint32_t word) {
   const DU d;
   auto* at = reinterpret_cast<uint32_t*>(out.data());
   const size_t words = out.size() / 4, lanes = hn::Lanes(d);
@@ -96,7 +97,7 @@ HWY_ATTR void StreamingFillIn(std::span<std::byte> out, uint32_t word) {
   hwy::FlushStream();
 }
 
-const char* TargetIn() { return hwy::TargetName(HWY_TARGET); }
+inline const char* TargetIn() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace voxeld::gpu::generate

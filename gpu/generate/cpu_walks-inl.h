@@ -137,32 +137,35 @@ HWY_ATTR void EmitLong(const Spread& spread, const FixedSegment& g, int64_t n, u
                  CoordinateAt(strides[1], g.s[1], g.e[1], n, at),
                  CoordinateAt(strides[2], g.s[2], g.e[2], n, at)};
   };
-  const auto emit = [&]<bool kStream>(uint32_t run, std::byte* to) {
+  const auto emit = [&]<bool kStream>(uint64_t run, std::byte* to) {
     Walk walks[3];
     for (int a = 0; a < 3; ++a) walks[a] = Rules::From(strides[a], k, bias[a]);
-    EmitWalks<kOut, kStream>(spread, walks, all, k, run, stage, to, exact);
-    k += run;
-    count -= run;
+    EmitWalks<kOut, kStream>(spread, walks, all, k, static_cast<uint32_t>(run), stage, to, exact);
+    k += static_cast<uint32_t>(run);
   };
-  constexpr uint32_t kRun = lanes * kVectorSteps;
+  constexpr uint64_t kRun = uint64_t{lanes} * kVectorSteps;
   if constexpr (kOut != Output::kI16x3) {
     const std::optional<size_t> to_line = stage.ToLine(BytesOf(kOut));
     if (to_line.has_value() && count >= kDirect) {
-      if (*to_line > 0)
-        emit.template operator()<false>(static_cast<uint32_t>(*to_line / BytesOf(kOut)), nullptr);
-      std::byte* to = stage.Drain();
-      std::byte* const begin = to;
-      while (count >= lanes) {
-        const auto run = static_cast<uint32_t>(std::min<uint64_t>(count / lanes * lanes, kRun));
+      const uint64_t head = *to_line / BytesOf(kOut);
+      if (head > 0) emit.template operator()<false>(head, nullptr);
+      std::byte* const begin = stage.Drain();
+      uint64_t left = (count - head) / lanes * lanes;
+      count -= head + left;
+      std::byte* to = begin;
+      while (left > 0) {
+        const uint64_t run = std::min(left, kRun);
         emit.template operator()<true>(run, to);
         to += run * BytesOf(kOut);
+        left -= run;
       }
       stage.Skip(static_cast<size_t>(to - begin));
     }
   }
   while (count > 0) {
-    emit.template operator()<false>(static_cast<uint32_t>(std::min<uint64_t>(count, kRun)),
-                                    nullptr);
+    const uint64_t run = std::min(count, kRun);
+    emit.template operator()<false>(run, nullptr);
+    count -= run;
   }
 }
 

@@ -59,7 +59,8 @@ class Generator {
 // On `threads` ≥ 1 of the CPU's.
 std::unique_ptr<Generator> MakeCpuGenerator(int threads);
 
-// What a call of Stream must have. InvalidArgument.
+inline constexpr uint64_t kChunkGrain = 8192;
+// What a call of Stream must have: a multiple of kChunkGrain. InvalidArgument.
 absl::Status CheckChunk(uint64_t chunk_voxels);
 
 }  // namespace voxeld::gpu::generate

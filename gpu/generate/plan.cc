@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -56,53 +55,48 @@ const char* NameOf(Output output) {
   return "i32x3";
 }
 
-template <typename T>
-bool InRange(const Segment<T>& segment) {
-  bool in = true;
-  for (size_t a = 0; a < 3; ++a) {
-    for (const T v : {segment.start[a], segment.end[a]}) {
-      in &= v >= static_cast<T>(-kMostCoordinate) && v <= static_cast<T>(kMostCoordinate);
-    }
-  }
-  return in;
+bool InRange(double voxels) {
+  constexpr double kMost = static_cast<double>(kMostCoordinate * kUnits);
+  const double units = RoundedUnits(voxels);
+  return units >= -kMost && units <= kMost;  // false for what is no number
 }
 
+// What is wrong with a segment, if anything is.
 template <typename T>
-absl::Status WhatIsWrong(const Segment<T>& segment, size_t index, Sampling sampling) {
+absl::Status Check(const Segment<T>& segment, size_t index, Sampling sampling) {
   for (size_t a = 0; a < 3; ++a) {
     for (const auto& [name, v] :
          {std::pair("start", segment.start[a]), std::pair("end", segment.end[a])}) {
-      if (v >= static_cast<T>(-kMostCoordinate) && v <= static_cast<T>(kMostCoordinate)) continue;
+      if (InRange(static_cast<double>(v))) continue;
       return absl::InvalidArgumentError(
-          absl::StrCat("segments[", index, "].", name, ".", std::string(1, kAxes[a]), " is ", v,
-                       "; a coordinate is a number within ±2^30 (", kMostCoordinate, ")"));
+          absl::StrFormat("segments[%d].%s.%c is %.17g; a coordinate is a number within ±2^30 (%d)",
+                          index, name, kAxes[a], static_cast<double>(v), kMostCoordinate));
     }
   }
-  return absl::InvalidArgumentError(
-      absl::StrFormat("segments[%d] has %d steps; at most 2^30 (%d) are allowed", index,
-                      StepsOf(ToFixed(segment), sampling), kMostSteps));
+  const int64_t steps = StepsOf(ToFixed(segment), sampling);
+  if (steps <= kMostSteps) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "segments[%d] has %d steps; at most 2^30 (%d) are allowed", index, steps, kMostSteps));
 }
 
-// Counts the voxels of segments[begin, end) into counts; the first that is wrong, if any is.
+// Counts the voxels of segments[begin, end) into counts. False: one of them is wrong.
 template <typename T>
-std::optional<size_t> Count(std::span<const Segment<T>> segments, Sampling sampling, size_t begin,
-                            size_t end, uint64_t* counts, Bounds& bounds) {
+bool Count(std::span<const Segment<T>> segments, Sampling sampling, size_t begin, size_t end,
+           uint64_t* counts, Bounds& bounds) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   UnitBounds units = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
   CountVoxels(segments, sampling, begin, end, counts, units);
-  for (size_t i = begin; !units.all_within && i < end; ++i) {
-    if (!InRange(segments[i])) return i;
-  }
+  if (!units.all_within) return false;
   for (size_t i = begin; i < end; ++i) {
     if (counts[i] == 0)
       counts[i] = static_cast<uint64_t>(StepsOf(ToFixed(segments[i]), sampling)) + 1;
-    if (counts[i] > static_cast<uint64_t>(kMostSteps) + 1) return i;
+    if (counts[i] > static_cast<uint64_t>(kMostSteps) + 1) return false;
   }
   for (int a = 0; a < 3; ++a) {
     bounds.lo[a] = CellOf(static_cast<int64_t>(units.lo[a]));
     bounds.hi[a] = CellOf(static_cast<int64_t>(units.hi[a]));
   }
-  return std::nullopt;
+  return true;
 }
 
 absl::Status CheckBounds(const Bounds& bounds, Output output) {
@@ -120,17 +114,18 @@ template <typename T>
 absl::StatusOr<Plan> MakePlanOf(std::span<const Segment<T>> segments, Format format,
                                 Executor& executor) {
   Plan plan;
+  plan.extent.format = format;
   // offsets[i + 1] is segment i's count first.
   plan.offsets.resize(segments.size() + 1);
   uint64_t* const counts = plan.offsets.data() + 1;
   const size_t blocks = (segments.size() + kBlock - 1) / kBlock;
   std::vector<Bounds> bounds(blocks);
-  std::vector<std::optional<size_t>> wrong(blocks);
+  std::vector<uint8_t> wrong(blocks);
   std::vector<uint64_t> sums(blocks + 1);
   const auto count = [&](size_t block, int) {
     const size_t begin = block * kBlock, end = std::min(begin + kBlock, segments.size());
-    wrong[block] = Count(segments, format.sampling, begin, end, counts, bounds[block]);
-    if (wrong[block].has_value()) return;
+    wrong[block] = !Count(segments, format.sampling, begin, end, counts, bounds[block]);
+    if (wrong[block] != 0) return;
     for (size_t i = begin; i < end; ++i) sums[block + 1] += counts[i];
   };
   const auto place = [&](size_t block, int) {
@@ -145,8 +140,8 @@ absl::StatusOr<Plan> MakePlanOf(std::span<const Segment<T>> segments, Format for
   }
   Bounds all;
   for (size_t block = 0; block < blocks; ++block) {
-    if (wrong[block].has_value()) {
-      return WhatIsWrong(segments[*wrong[block]], *wrong[block], format.sampling);
+    for (size_t i = block * kBlock; wrong[block] != 0; ++i) {
+      if (absl::Status status = Check(segments[i], i, format.sampling); !status.ok()) return status;
     }
     all.Add(bounds[block]);
     sums[block + 1] += sums[block];
@@ -163,10 +158,11 @@ absl::StatusOr<Plan> MakePlanOf(std::span<const Segment<T>> segments, Format for
   } else {
     executor.For(blocks, 1, place);
   }
-  plan.lo = {static_cast<int32_t>(all.lo[0]), static_cast<int32_t>(all.lo[1]),
-             static_cast<int32_t>(all.lo[2])};
-  plan.hi = {static_cast<int32_t>(all.hi[0]), static_cast<int32_t>(all.hi[1]),
-             static_cast<int32_t>(all.hi[2])};
+  plan.extent.voxels = sums[blocks];
+  plan.extent.lo = {static_cast<int32_t>(all.lo[0]), static_cast<int32_t>(all.lo[1]),
+                    static_cast<int32_t>(all.lo[2])};
+  plan.extent.hi = {static_cast<int32_t>(all.hi[0]), static_cast<int32_t>(all.hi[1]),
+                    static_cast<int32_t>(all.hi[2])};
   return plan;
 }
 
@@ -180,12 +176,30 @@ absl::StatusOr<Plan> MakePlan(const Batch& batch, Format format, Executor& execu
   return batch.With([&](const auto& segments) { return MakePlanOf(segments, format, executor); });
 }
 
-absl::Status CheckRoom(const Plan& plan, Output output, size_t bytes) {
-  const uint64_t needed = plan.voxels() * BytesOf(output);
-  if (needed <= bytes) return absl::OkStatus();
+absl::Status CheckPlan(const Plan& plan, const Batch& batch) {
+  if (plan.offsets.size() == batch.size() + 1) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrFormat("the plan is of %d segments; the batch has %d",
+                                                    plan.offsets.size() - 1, batch.size()));
+}
+
+absl::Status CheckForm(const Extent& extent, Format format) {
+  if (format.sampling != extent.format.sampling) {
+    return absl::InvalidArgumentError(
+        "the plan was made for another sampling: prepare the batch anew");
+  }
+  if (extent.voxels == 0) return absl::OkStatus();
+  return CheckBounds(
+      {{extent.lo.x, extent.lo.y, extent.lo.z}, {extent.hi.x, extent.hi.y, extent.hi.z}},
+      format.output);
+}
+
+absl::Status CheckRoom(const Extent& extent, Format format, size_t bytes) {
+  if (absl::Status status = CheckForm(extent, format); !status.ok()) return status;
+  const size_t each = BytesOf(format.output);
+  if (extent.voxels * each <= bytes) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrFormat("the output has %d bytes; %d voxels of %d bytes (%s) need %d", bytes,
-                      plan.voxels(), BytesOf(output), NameOf(output), needed));
+                      extent.voxels, each, NameOf(format.output), extent.voxels * each));
 }
 
 }  // namespace voxeld::gpu::generate

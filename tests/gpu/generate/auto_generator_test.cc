@@ -50,8 +50,8 @@ class AutoGeneratorTest : public ::testing::Test {
     std::vector<Candidate> candidates;
     candidates.push_back({"near", std::make_unique<Counting>(&near_)});
     candidates.push_back({"far", std::make_unique<Counting>(&far_)});
-    generator_ = std::make_unique<AutoGenerator>(std::move(candidates),
-                                                 std::vector<CostCurve>{Near(), Far()});
+    generator_ = std::make_unique<AutoGenerator>(
+        std::move(candidates), std::vector<CostCurve>{Near(), Far(), Far(), Near()});
   }
   int near_ = 0, far_ = 0;
   std::unique_ptr<AutoGenerator> generator_;
@@ -63,8 +63,11 @@ TEST_F(AutoGeneratorTest, FewVoxelsAreMadeNearManyFarAndWhereTheyCrossItChanges)
   uint64_t crossing = 1000;
   while (generator_->Choose(crossing, 1) == 0) ++crossing;
   EXPECT_NEAR(Near().SecondsFor(crossing, 1), Far().SecondsFor(crossing, 1), 1e-8);
-  EXPECT_EQ(generator_->Choose(2 * crossing, 1, Output::kPacked), 0u) << "a third of the bytes";
-  EXPECT_EQ(generator_->Choose(4 * crossing, 1, Output::kPacked), 1u);
+  EXPECT_EQ(generator_->Choose(2 * crossing, 1, {Sampling::kThin, Output::kPacked}), 0u)
+      << "a third of the bytes";
+  EXPECT_EQ(generator_->Choose(4 * crossing, 1, {Sampling::kThin, Output::kPacked}), 1u);
+  EXPECT_EQ(generator_->Choose(1000, 1, {Sampling::kCover, Output::kI32x3}), 1u)
+      << "which costs otherwise";
   EXPECT_EQ(generator_->Choose(2000, 100'000), 1u) << "many segments count too";
 }
 

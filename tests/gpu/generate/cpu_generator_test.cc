@@ -180,13 +180,18 @@ TEST_P(CpuGenerator, TheOtherFormsHoldTheSameVoxels) {
   }
 }
 
-// Every instruction set that this processor has, down to one lane.
+// Every instruction set that is compiled for and this processor has.
 TEST_P(CpuGenerator, AllVectorsGiveTheSameBytes) {
   auto segments = RandomSegments(11, 600, 150, false);
   const auto adversarial = Adversarial(3, 300), longer = RandomSegments(12, 40, 3000, false);
   segments.insert(segments.end(), adversarial.begin(), adversarial.end());
   segments.insert(segments.end(), longer.begin(), longer.end());
-  for (const Output output : {Output::kI32x3, Output::kF32x3, Output::kI16x3}) {
+  for (SegmentD& g : segments) {  // where every form holds them
+    for (auto* p : {&g.start, &g.end}) {
+      for (double& v : *p) v = std::min(std::abs(v), 1023.75);
+    }
+  }
+  for (const Output output : {Output::kI32x3, Output::kF32x3, Output::kI16x3, Output::kPacked}) {
     const Format format = {GetParam(), output};
     const auto expected = Generated(*generator_, segments, format);
     int targets = 0;
@@ -209,8 +214,13 @@ TEST_P(CpuGenerator, AllVectorsGiveTheSameBytes) {
 
 // Large outputs go past the caches, threads share them, chunks cut them: the bytes are the same.
 TEST_P(CpuGenerator, ThreadsChunksAndPlacesInMemoryChangeNothing) {
-  const auto segments = RandomSegments(9, 400, 3000, false);
-  for (const Output output : {Output::kI32x3, Output::kI16x3}) {
+  auto segments = RandomSegments(9, 1500, 1000, false);
+  for (SegmentD& g : segments) {
+    for (auto* p : {&g.start, &g.end}) {
+      for (double& v : *p) v = std::abs(v);
+    }
+  }
+  for (const Output output : {Output::kI32x3, Output::kI16x3, Output::kPacked}) {
     const Format format = {GetParam(), output};
     const auto one = Generated(*generator_, segments, format);
     const auto several = MakeCpuGenerator(3);
@@ -301,6 +311,51 @@ TEST(Generator, AnOutputThatIsTooSmallIsLeftAsItWas) {
   EXPECT_EQ(out, std::vector<std::byte>(119, std::byte{7}));
   EXPECT_THAT(std::string(generator->Stream(segments, *plan, {}, 100, nullptr).message()),
               HasSubstr("multiple of 8192"));
+}
+
+TEST(Generator, APlanOfAnotherBatchSamplingOrFormIsRefused) {
+  const auto generator = MakeCpuGenerator(1);
+  const std::vector<SegmentD> segments = {{{0, 0, 0}, {5000, 0.9, 0.9}}}, two(2, segments[0]);
+  const auto plan = generator->Prepare(segments, {});
+  ASSERT_TRUE(plan.ok());
+  std::vector<std::byte> out(100'000, std::byte{7});
+  const auto message = [&](const std::vector<SegmentD>& of, Format format) {
+    const absl::Status status = generator->Generate(of, *plan, format, out);
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(generator->Stream(of, *plan, format, 8192, nullptr), status);
+    return std::string(status.message());
+  };
+  EXPECT_THAT(message(two, {}), HasSubstr("the plan is of 1 segments; the batch has 2"));
+  EXPECT_THAT(message(segments, {Sampling::kCover, Output::kI32x3}), HasSubstr("another sampling"));
+  EXPECT_THAT(message(segments, {Sampling::kEuclidean, Output::kPacked}),
+              HasSubstr("x goes from 0 to 5000; packed holds 0 to 2047"));
+  EXPECT_EQ(out, std::vector<std::byte>(100'000, std::byte{7}));
+}
+
+TEST(Generator, TheFirstOfSeveralFaultsIsNamedWithItsWholeValue) {
+  const auto generator = MakeCpuGenerator(1);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<SegmentD> several = {{{-1e9, 0, 0}, {1e9, 0, 0}}, {{nan, 0, 0}, {1, 1, 1}}};
+  EXPECT_THAT(std::string(generator->Prepare(several, {}).status().message()),
+              HasSubstr("segments[0] has"));
+  const std::vector<SegmentD> just = {{{0, 0, 1073741825.0}, {0, 0, 1073741824.0}}};
+  EXPECT_THAT(std::string(generator->Prepare(just, {}).status().message()),
+              HasSubstr("start.z is 1073741825;"));
+}
+
+TEST(Generator, AChunkMayBeLargerThanAllThereIs) {
+  const auto generator = MakeCpuGenerator(1);
+  const std::vector<SegmentD> segments = {{{0, 0, 0}, {10'000, 0, 0}}};
+  const auto plan = generator->Prepare(segments, {});
+  uint64_t voxels = 0;
+  EXPECT_TRUE(generator
+                  ->Stream(segments, *plan, {}, ~uint64_t{8191},
+                           [&](uint64_t, std::span<const std::byte> chunk) {
+                             voxels += chunk.size() / 12;
+                             return absl::OkStatus();
+                           })
+                  .ok());
+  EXPECT_EQ(voxels, 10'001u);
 }
 
 TEST(Generator, NoSegmentsAreNoVoxels) {

@@ -48,7 +48,6 @@ class CudaGeneratorTest : public ::testing::TestWithParam<std::tuple<Sampling, O
   void ExpectEqual(const Batch& batch) {
     const auto plan = cpu_->Prepare(batch, format());
     ASSERT_TRUE(plan.ok()) << plan.status();
-    std::vector<std::byte> expected;
     uint64_t compared = 0, wrong = 0;
     const auto placed = cuda_->Place(batch, *plan);
     ASSERT_TRUE(placed.ok()) << placed.status();
@@ -112,6 +111,58 @@ TEST_P(CudaGeneratorTest, ManyRandomSegmentsAreTheCpusBytes) {
   for (size_t i = 0; i < count; i += 5) segments[i] = whole[i / 5];
   for (size_t i = 1; i < count; i += 100) segments[i] = longer[i / 100];
   ExpectEqual(Held(std::move(segments)));
+}
+
+// A few hundred voxels each: warps go from one to the next, some with many short ones among them.
+TEST_P(CudaGeneratorTest, LongerSegmentsAndMixedLengthsAreTheCpusBytes) {
+  const uint64_t seed = Number("VOXELD_SEED", 1),
+                 count = Number("VOXELD_SEGMENTS", 200'000) / 10 * 13;
+  std::vector<SegmentD> segments = RandomSegments(seed + 3, count, 430, false);
+  const auto whole = RandomSegments(seed + 4, count / 3 + 1, 430, true);
+  for (size_t i = 0; i < count; i += 3) segments[i] = whole[i / 3];
+  // A tenth of them in one place, a few voxels long.
+  for (size_t i = count / 2; i < count / 2 + count / 10; ++i) {
+    for (size_t a = 0; a < 3; ++a)
+      segments[i].end[a] = segments[i].start[a] + static_cast<double>((i + a) % 7) - 3;
+  }
+  ExpectEqual(Held(std::move(segments)));
+}
+
+TEST_P(CudaGeneratorTest, EverySizeAroundARoundAWarpAndABlockIsTheCpus) {
+  ExpectEqual(std::vector<SegmentD>());
+  for (const int voxels : {1, 2, 3, 4, 5, 127, 128, 129, 1023, 1024, 1025}) {
+    ExpectEqual(std::vector<SegmentD>{{{0.25, 3, 5.5}, {voxels - 0.5, 3, 5.5}}});
+    ExpectEqual(std::vector<SegmentD>(static_cast<size_t>(voxels), {{7, 8, 9}, {7, 8, 9}}));
+  }
+}
+
+TEST_P(CudaGeneratorTest, ChunksAreTheSameHoweverLargeAndAnErrorEndsThem) {
+  const auto segments = Held(RandomSegments(6, 3000, 400, false));
+  const auto plan = cuda_->Prepare(segments, format());
+  ASSERT_TRUE(plan.ok());
+  std::vector<std::byte> expected(plan->voxels() * BytesOf(format().output));
+  ASSERT_TRUE(cpu_->Generate(segments, *plan, format(), expected).ok());
+  for (const uint64_t chunk : {uint64_t{8192}, uint64_t{5 * 8192}, ~uint64_t{8191}}) {
+    std::vector<std::byte> got;
+    const absl::Status status = cuda_->Stream(
+        segments, *plan, format(), chunk, [&](uint64_t first, std::span<const std::byte> voxels) {
+          EXPECT_EQ(first * BytesOf(format().output), got.size());
+          got.insert(got.end(), voxels.begin(), voxels.end());
+          return absl::OkStatus();
+        });
+    EXPECT_TRUE(status.ok()) << status;
+    EXPECT_TRUE(got == expected);
+  }
+  int chunks = 0;
+  EXPECT_EQ(cuda_->Stream(segments, *plan, format(), 8192,
+                          [&](uint64_t, auto) {
+                            return ++chunks == 5 ? absl::CancelledError("enough")
+                                                 : absl::OkStatus();
+                          }),
+            absl::CancelledError("enough"));
+  EXPECT_EQ(chunks, 5);
+  EXPECT_EQ(cuda_->Stream(segments, *plan, format(), 100, nullptr).code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 TEST_P(CudaGeneratorTest, AdversarialSegmentsAreTheCpusBytes) {

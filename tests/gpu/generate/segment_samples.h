@@ -1,6 +1,7 @@
 // Segments to try a generator with: random ones, and those that are likely to go wrong.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <random>
 #include <vector>
@@ -41,6 +42,11 @@ inline std::vector<SegmentD> Adversarial(double origin, double length) {
   add(kUnit, 0, 0, length, 1, kUnit);
   add(0, 1 - kUnit, 0.5, length, -1, kUnit);
   add(0, 0, 0, length, length - 1, 1);
+  // Half a unit, and what is just below it.
+  const double half = kUnit / 2;
+  for (const double at : {half, std::nextafter(half, 0.0), -half, std::nextafter(-half, -1.0)}) {
+    out.push_back({{at, at, at}, {length + at, at, -at}});
+  }
   return out;
 }
 

@@ -1,5 +1,7 @@
 #include <thread>
 
+#include "absl/strings/str_cat.h"
+
 #include "gpu/generate/auto_generator.h"
 #include "tools/bench/paper/column.h"
 #if defined(VOXELD_HAVE_CUDA)
@@ -60,14 +62,15 @@ absl::StatusOr<std::unique_ptr<Column>> AutoColumn() {
   const int all = static_cast<int>(std::thread::hardware_concurrency());
   std::vector<Candidate> candidates;
   candidates.push_back({"cpu 1", gpu::generate::MakeCpuGenerator(1)});
-  if (all > 1) candidates.push_back({"cpu all", gpu::generate::MakeCpuGenerator(all)});
+  if (all > 1)
+    candidates.push_back({absl::StrCat("cpu ", all), gpu::generate::MakeCpuGenerator(all)});
 #if defined(VOXELD_HAVE_CUDA)
   if (auto cuda = gpu::cuda::CudaGenerator::Open(0, all); cuda.ok()) {
     const std::string name = (*cuda)->device().api().device().name;
     candidates.push_back({"cuda " + name, *std::move(cuda)});
   }
 #endif
-  auto generator = AutoGenerator::Make(std::move(candidates), "");
+  auto generator = AutoGenerator::Make(std::move(candidates), AutoGenerator::DefaultCacheFile());
   if (!generator.ok()) return generator.status();
   return std::make_unique<Chosen>(*std::move(generator));
 }

@@ -12,6 +12,9 @@ namespace {
 using gpu::generate::BytesOf;
 using gpu::generate::Generator;
 
+// Below it one thread writes.
+constexpr uint64_t kSharedBytes = (128 << 10) * 12;
+
 class CpuColumn final : public Column {
  public:
   explicit CpuColumn(int threads)
@@ -45,6 +48,10 @@ class CpuColumn final : public Column {
   absl::Status Ceiling() override {
     for (uint64_t done = 0; done < bytes_; done += chunk_) {
       const uint64_t here = std::min(chunk_, bytes_ - done);
+      if (here < kSharedBytes) {  // as the generator does
+        gpu::generate::StreamingFill(std::span(out_).first(here), 7);
+        continue;
+      }
       const uint64_t each = (here / static_cast<uint64_t>(threads_) + 63) / 64 * 64;
       executor_->For(static_cast<size_t>(threads_), 1, [&](size_t i, int) {
         const uint64_t begin = std::min(here, i * each), end = std::min(here, begin + each);

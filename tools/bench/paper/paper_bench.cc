@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -91,8 +90,10 @@ json RowOf(const Workload& workload, const Column& column, const Figures& figure
               {"call", column.call()},
               {"ceiling", column.ceiling()}};
   if (workload.paper_ms.has_value() && column.host_copy()) {
-    const double best = *std::min_element(workload.paper_ms->begin(), workload.paper_ms->end());
-    row["paper_mvoxel_per_s"] = voxels / best / 1e3;
+    const auto best = std::min_element(workload.paper_ms->begin(), workload.paper_ms->end());
+    const Hardware& hardware = kHardware[static_cast<size_t>(best - workload.paper_ms->begin())];
+    row["paper_mvoxel_per_s"] = voxels / *best / 1e3;
+    row["paper_hardware"] = absl::StrCat(std::string(hardware.name), " (", hardware.year, ")");
   }
   if (!column.ceiling().empty()) {
     row["ceiling_mvoxel_per_s"] = voxels / Median(figures.ceilings) / 1e6;
@@ -235,8 +236,9 @@ std::string PaperText(const json& report) {
                             std::string(row["ceiling"]));
     }
     if (!row["paper_mvoxel_per_s"].is_null()) {
-      absl::StrAppendFormat(&out, "  %.0f x the paper's best",
-                            double(row["mvoxel_per_s"]) / double(row["paper_mvoxel_per_s"]));
+      absl::StrAppendFormat(&out, "  %.0f x the paper's %s",
+                            double(row["mvoxel_per_s"]) / double(row["paper_mvoxel_per_s"]),
+                            row.value("paper_hardware", "best"));
     }
     absl::StrAppend(&out, "\n");
   }

@@ -7,9 +7,7 @@
 namespace voxeld::bench::paper {
 namespace {
 
-using gpu::generate::Format;
 using gpu::generate::Output;
-using gpu::generate::Sampling;
 using gpu::generate::Segment;
 using gpu::generate::StepsOf;
 

@@ -1,4 +1,5 @@
 // The paper's tables, as one of the benchmarks.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <utility>
@@ -25,11 +26,24 @@ absl::StatusOr<nlohmann::json> Measured(const PaperOptions& options, const Surro
   return report;
 }
 
+// Whether it has what is shown of a row.
+bool IsRow(const nlohmann::json& row) {
+  const auto is_number = [&](const char* key) { return row.contains(key) && row[key].is_number(); };
+  return row.is_object() && row.contains("table") && row["table"].is_string() &&
+         row.contains("engine") && row["engine"].is_string() && row.contains("host_copy") &&
+         row["host_copy"].is_boolean() && is_number("segments") && row["segments"] > 0 &&
+         is_number("voxels") && is_number("threads") && is_number("ms") && row["ms"] > 0 &&
+         is_number("mvoxel_per_s");
+}
+
 absl::StatusOr<nlohmann::json> Read(const std::string& file) {
   std::ifstream in(file);
   nlohmann::json report = nlohmann::json::parse(in, nullptr, false);
-  if (report.is_object() && report.value("benchmark", "") == "paper" && report.contains("rows"))
-    return report;
+  bool good = report.is_object() && report.value("benchmark", "") == "paper" &&
+              report.contains("rows") && report["rows"].is_array() && report.contains("figures") &&
+              report["figures"].empty() && report.contains("text") && report["text"].is_string();
+  if (good) good = std::all_of(report["rows"].begin(), report["rows"].end(), IsRow);
+  if (good) return report;
   return absl::InvalidArgumentError(absl::StrCat(
       file, " is no report of voxel-bench paper; `voxel-bench paper --json` prints one"));
 }
