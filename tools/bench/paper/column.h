@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -37,6 +38,8 @@ class Column {
 std::vector<std::unique_ptr<Column>> CpuColumns();
 // In device memory, and with the copy. Nothing without CUDA; FailedPrecondition without a device.
 absl::StatusOr<std::vector<std::unique_ptr<Column>>> CudaColumns();
+// What the device and its bus do at most, in GB/s, of 1 GiB: names and rates.
+absl::StatusOr<std::vector<std::pair<std::string, double>>> CudaCeilings();
 // Whichever is faster, result on the host.
 absl::StatusOr<std::unique_ptr<Column>> AutoColumn();
 

@@ -1,6 +1,7 @@
 #include <cuda_runtime_api.h>
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <thread>
 
@@ -199,6 +200,52 @@ absl::StatusOr<std::vector<std::unique_ptr<Column>>> CudaColumns() {
   columns.push_back(std::make_unique<DeviceColumn>(generator));
   columns.push_back(std::make_unique<HostColumn>(generator));
   return columns;
+}
+
+absl::StatusOr<std::vector<std::pair<std::string, double>>> CudaCeilings() {
+  constexpr size_t kBytes = size_t{1} << 30;
+  constexpr int kTimes = 7;
+  auto generator = CudaGenerator::Open(0, 1);
+  if (!generator.ok()) return generator.status();
+  gpu::cuda::Device& device = (*generator)->device();
+  auto from = device.pool().Acquire(kBytes), to = device.pool().Acquire(kBytes);
+  if (!from.ok()) return from.status();
+  if (!to.ok()) return to.status();
+  auto host = (*generator)->Allocate(kBytes);
+  if (!host.ok()) return host.status();
+  const cudaStream_t stream = device.stream();
+  std::vector<std::pair<std::string, double>> out;
+  const auto measure = [&](const char* name, double moved,
+                           const std::function<cudaError_t()>& queue) {
+    std::vector<double> rates;
+    for (int i = 0; i <= kTimes; ++i) {
+      const auto begin = std::chrono::steady_clock::now();
+      absl::Status status = ToStatus(name, queue());
+      if (status.ok()) status = device.Wait();
+      if (!status.ok()) return status;
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+      if (i > 0) rates.push_back(moved / took.count() / 1e9);
+    }
+    std::sort(rates.begin(), rates.end());
+    out.emplace_back(name, rates[rates.size() / 2]);
+    return absl::OkStatus();
+  };
+  std::byte* const a = from->as<std::byte>();
+  std::byte* const b = to->as<std::byte>();
+  absl::Status status =
+      measure("memset", kBytes, [&] { return cudaMemsetAsync(b, 1, kBytes, stream); });
+  if (status.ok()) {
+    status = measure("device copy, read and written", 2.0 * kBytes, [&] {
+      return cudaMemcpyAsync(b, a, kBytes, cudaMemcpyDeviceToDevice, stream);
+    });
+  }
+  if (status.ok()) {
+    status = measure("copy to pinned memory", kBytes, [&] {
+      return cudaMemcpyAsync(host->get(), a, kBytes, cudaMemcpyDeviceToHost, stream);
+    });
+  }
+  if (!status.ok()) return status;
+  return out;
 }
 
 }  // namespace voxeld::bench::paper

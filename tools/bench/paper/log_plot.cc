@@ -107,6 +107,7 @@ std::string LogBarsSvg(const std::string& title, const std::string& label,
   std::string out = Begin(height, title);
   if (bars.empty()) return out + "</svg>\n";
   std::vector<double> values;
+  values.reserve(bars.size());
   for (const Bar& bar : bars) values.push_back(bar.value);
   constexpr double kNames = 230, kNumbers = 110;
   const Decades x = Decades::Of(values, kNames, kWidth - kNames - kNumbers);

@@ -177,6 +177,17 @@ absl::StatusOr<json> MeasurePaper(const PaperOptions& options,
   if (!columns.ok()) return columns.status();
   json report = {
       {"rows", json::array()}, {"seed", options.seed}, {"vectors", gpu::generate::VectorTarget()}};
+  const bool has_cuda = std::any_of(columns->begin(), columns->end(),
+                                    [](const auto& c) { return c->engine() == "cuda"; });
+  report["ceilings_gb_per_s"] = json::object();
+  if (has_cuda) {
+    const auto ceilings = CudaCeilings();
+    if (!ceilings.ok()) return ceilings.status();
+    for (const auto& [name, rate] : *ceilings) {
+      report["ceilings_gb_per_s"][name] = rate;
+      progress(absl::StrFormat("%s: %.0f GB/s", name, rate));
+    }
+  }
   for (const auto& make : Workloads(options)) {
     const Workload workload = make();
     for (const std::unique_ptr<Column>& column : *columns) {
@@ -203,6 +214,11 @@ std::string PaperText(const json& report) {
   // Rows of one batch stand together.
   std::string out = absl::StrFormat("seed %d; vectors: %s\n", uint64_t(report["seed"]),
                                     std::string(report["vectors"]));
+  if (report.contains("ceilings_gb_per_s")) {
+    for (const auto& [name, rate] : report["ceilings_gb_per_s"].items()) {
+      absl::StrAppendFormat(&out, "%s: %.0f GB/s\n", name, double(rate));
+    }
+  }
   std::string batch;
   for (const json& row : report["rows"]) {
     const std::string here = absl::StrFormat("Table %s: %d segments, %d voxels, %s",

@@ -21,7 +21,7 @@ struct PaperOptions {
   std::string svg;   // a folder for the figures; empty: none
 };
 
-// {rows: [{table, segments, voxels, engine, threads, output, host_copy, ms, ms_least, ms_greatest,
+// {ceilings_gb_per_s: {…}, rows: [{table, segments, voxels, engine, threads, output, host_copy, ms, ms_least, ms_greatest,
 // mvoxel_per_s, paper_mvoxel_per_s, paper_hardware, ceiling_mvoxel_per_s, ceiling_ratio, call, ceiling}], seed,
 // vectors}. A paper's rate includes the copy to the host and is of its best machine in that row: null where ours
 // does not, or it has no such row. `progress` takes a line for each row; false from `go_on` ends it with Cancelled.

@@ -22,6 +22,7 @@ Frames LayerFrames(int layers) {
   Frames frames;
   for (int variant = 0; variant < kVariants; ++variant) {
     std::vector<Put> puts;
+    puts.reserve(static_cast<size_t>(layers));
     for (int layer = 0; layer < layers; ++layer) {
       puts.push_back({absl::StrCat("layer-", layer),
                       "line",
@@ -72,6 +73,7 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
   Loop loop(with.interrupted);
   const Frames frames = LayerFrames(options.layers);
   std::vector<std::unique_ptr<Client>> clients;
+  clients.reserve(static_cast<size_t>(options.clients));
   for (int i = 0; i < options.clients; ++i) {
     clients.push_back(std::make_unique<Client>(loop, (*daemon)->unix_target(), frames));
   }
@@ -94,6 +96,7 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
   for (int round = 0; round < options.rounds; ++round) {
     const sync::TimeNs begin = Now();
     std::vector<uint64_t> before;
+    before.reserve(clients.size());
     for (const auto& client : clients) before.push_back(client->session.tally().accepted);
     if (absl::Status ran = loop.RunTo(begin + duration); !ran.ok()) return ran;
     const double seconds = static_cast<double>(Now() - begin) / sync::kSecond;
