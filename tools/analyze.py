@@ -46,7 +46,7 @@ def run(mode, build_dir, path, commands):
 
 def optional(path):
     """CUDA sources and sources of switched-off parts are built elsewhere."""
-    return path.startswith(("gpu/cuda/", "gpu/worker/"))
+    return path.startswith(("gpu/cuda/", "gpu/worker/", "tools/bench/paper/cuda_", "tools/bench/paper/no_cuda_"))
 
 
 def main():
