@@ -32,7 +32,6 @@ class AutoGenerator final : public Generator {
 
   // The candidate for a batch of that size; voxels count by their bytes, as they are written.
   size_t Choose(uint64_t voxels, uint64_t segments, Format format = {}) const;
-  const std::string& name_of(size_t candidate) const { return candidates_[candidate].name; }
 
   std::string name() const override { return "auto"; }
   absl::StatusOr<Plan> Prepare(const Batch& batch, Format format) override;

@@ -35,8 +35,6 @@ class Batch {
   auto With(Visit&& visit) const {
     return std::visit(visit, segments_);
   }
-  // A whole segment in units. Only of coordinates within the limits.
-  FixedSegment operator[](size_t i) const;
 
  private:
   std::variant<std::span<const Segment<int32_t>>, std::span<const Segment<float>>,
@@ -62,10 +60,6 @@ FixedSegment ToFixed(const Segment<T>& segment) {
     g.e[a] = ToUnits(segment.end[a]);
   }
   return g;
-}
-
-inline FixedSegment Batch::operator[](size_t i) const {
-  return With([i](const auto& s) { return ToFixed(s[i]); });
 }
 
 // A voxel's form, in the machine's byte order, x first.
