@@ -23,16 +23,22 @@ absl::Status CudaCore::SetTarget(const Target& target) {
   const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz, Sampler::FastestAxis(table));
   const display::TileToSlices tile_to_slices(table, voxels, kTileSize, kTileSize, kTileSize);
   const int32_t end = part_.end == -1 ? target.layout.slices : part_.end;
+  const std::optional<PackedPlan> packed =
+      PackedPlan::Of(table, voxels, target.layout, target.tone, part_.begin, end);
   absl::StatusOr<std::unique_ptr<CudaPictures>> pictures =
       CudaPictures::Make(*device_, {target.layout, target.tone, part_.begin, end}, table,
-                         tile_to_slices, pictures_.get());
+                         tile_to_slices, packed, pictures_.get());
   if (!pictures.ok()) return pictures.status();
-  absl::StatusOr<DeviceTiles> tiles =
-      DeviceTiles::Make(*device_, grid, OwnedTiles(tile_to_slices, grid, part_.begin, end));
+  absl::StatusOr<DeviceTiles> tiles = DeviceTiles::Make(
+      *device_, grid, OwnedTiles(tile_to_slices, grid, part_.begin, end), !packed.has_value());
   if (!tiles.ok()) return tiles.status();
   // The tables have been copied from memory that is about to go.
   if (absl::Status status = device_->Wait(); !status.ok()) return status;
-  volume_.SetView(*std::move(tiles), target.view);
+  const bool all_dirty = packed.has_value() && (*pictures)->inherited();
+  if (absl::Status status = volume_.SetView(*std::move(tiles), target.view, all_dirty);
+      !status.ok()) {
+    return status;
+  }
   pictures_ = *std::move(pictures);
   layout_ = target.layout;
   return absl::OkStatus();
@@ -55,7 +61,8 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   result.frame = request.frame;
   const sync::SystemClock clock;
   const sync::TimeNs start = clock.Now();
-  if (absl::Status status = volume_.Update(pictures_->index()); !status.ok()) return status;
+  if (absl::Status status = volume_.Update(pictures_->index(), pictures_->packed()); !status.ok())
+    return status;
   if (absl::Status status = device_->Wait(); !status.ok()) return status;
   const sync::TimeNs assembled = clock.Now();
   absl::Status status =
@@ -72,15 +79,14 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
 absl::Status CudaCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
   if (absl::Status status = CheckBox(box, out.size(), layout_); !status.ok()) return status;
   if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
-  if (absl::Status status = volume_.Update(pictures_->index()); !status.ok()) return status;
+  if (absl::Status status = volume_.Update(pictures_->index(), pictures_->packed()); !status.ok())
+    return status;
   if (out.empty()) return device_->Wait();
-  const int32_t lo[3] = {box.x0, box.y0, box.z0};
-  const int32_t size[3] = {box.x1 - box.x0, box.y1 - box.y0, box.z1 - box.z0};
-  absl::StatusOr<Block> voxels = device_->pool().Acquire(out.size() * sizeof(uint32_t));
+  // Outside the volume there is nothing.
+  absl::StatusOr<Block> voxels = device_->Zeros(out.size() * sizeof(uint32_t));
   if (!voxels.ok()) return voxels.status();
-  absl::Status status = device_->Run("ReadBox", [&] {
-    return ReadBox(volume_.view(), lo, size, voxels->as<uint32_t>(), device_->stream());
-  });
+  absl::Status status =
+      volume_.Read({{box.x0, box.y0, box.z0}, {box.x1, box.y1, box.z1}}, voxels->as<uint32_t>());
   if (status.ok()) {
     status = device_->ToHost(out.data(), voxels->as<uint32_t>(), out.size() * sizeof(uint32_t));
   }

@@ -16,10 +16,12 @@ constexpr size_t kGroups = 4;
 
 absl::StatusOr<std::unique_ptr<CudaPictures>> CudaPictures::Make(
     Device& device, const PicturesPlan& plan, const display::FootprintTable& table,
-    const display::TileToSlices& tile_to_slices, const CudaPictures* before) {
+    const display::TileToSlices& tile_to_slices, const std::optional<PackedPlan>& packed,
+    const CudaPictures* before) {
   std::unique_ptr<CudaPictures> made(new CudaPictures(device, plan));
   if (absl::Status status = made->PutTables(table, tile_to_slices); !status.ok()) return status;
   if (absl::Status status = made->PutPictures(before); !status.ok()) return status;
+  if (absl::Status status = made->PutPacked(packed); !status.ok()) return status;
   return made;
 }
 
@@ -76,6 +78,19 @@ absl::Status CudaPictures::PutTables(const display::FootprintTable& table,
   return status;
 }
 
+absl::Status CudaPictures::PutPacked(const std::optional<PackedPlan>& packed) {
+  if (!packed) return absl::OkStatus();
+  absl::StatusOr<Block> z = device_.Upload(packed->slice_of_z.data(), packed->slice_of_z.size());
+  if (!z.ok()) return z.status();
+  absl::StatusOr<Block> least = device_.Upload(packed->least.data(), packed->least.size());
+  if (!least.ok()) return least.status();
+  packed_ = PackedView{z->as<int32_t>(), packed->y0,           packed->y_step, view_,
+                       index_.dirty,     least->as<uint32_t>()};
+  tables_.push_back(*std::move(z));
+  tables_.push_back(*std::move(least));
+  return absl::OkStatus();
+}
+
 absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   const size_t slices = static_cast<size_t>(plan_.end - plan_.begin);
   const size_t pictures = slices * view_.sub_frames;
@@ -87,6 +102,7 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   };
   const bool same = before != nullptr && before->plan_.layout == plan_.layout &&
                     before->plan_.begin == plan_.begin && before->plan_.end == plan_.end;
+  inherited_ = same;
   for (const Wanted& wanted :
        {Wanted{&lit_tiles_, slices * sizeof(uint32_t), nullptr},
         {&differs_, pictures * sizeof(uint32_t), nullptr},
@@ -169,8 +185,12 @@ absl::Status CudaPictures::DrawGroups(const VolumeView& volume, uint64_t frame, 
     const size_t begin = slice_of(group), count = slice_of(group + 1) - begin;
     if (count > 0) {
       absl::Status status = device_.Run("DrawSlices", [&] {
-        return DrawSlices(volume, index_, view_, static_cast<uint32_t>(begin),
-                          static_cast<uint32_t>(count), frame, device_.stream());
+        const uint32_t first_slice = static_cast<uint32_t>(begin),
+                       slice_count = static_cast<uint32_t>(count);
+        return packed_ ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false,
+                                   device_.stream())
+                       : DrawSlices(volume, index_, view_, first_slice, slice_count, frame,
+                                    device_.stream());
       });
       if (!status.ok()) return status;
       const size_t first = begin * view_.sub_frames;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "display/api/slice_frame.h"
 #include "display/geometry/footprint.h"
 #include "gpu/cuda/device.h"
+#include "gpu/cuda/draw_types.h"
+#include "gpu/cuda/packed_plan.h"
 #include "gpu/cuda/types.h"
 #include "gpu/engine.h"
 
@@ -30,12 +33,17 @@ class CudaPictures {
   // out the same keep the frame of their last change.
   static absl::StatusOr<std::unique_ptr<CudaPictures>> Make(
       Device& device, const PicturesPlan& plan, const display::FootprintTable& table,
-      const display::TileToSlices& tile_to_slices, const CudaPictures* before);
+      const display::TileToSlices& tile_to_slices, const std::optional<PackedPlan>& packed,
+      const CudaPictures* before);
   ~CudaPictures();
   CudaPictures(const CudaPictures&) = delete;
   CudaPictures& operator=(const CudaPictures&) = delete;
 
   const SliceIndexView& index() const { return index_; }
+  // Where tiles are to be packed as they are drawn; null: they are kept, and sliced by Draw.
+  const PackedView* packed() const { return packed_ ? &*packed_ : nullptr; }
+  // Whether they begin with what others had, which may not be what an empty volume shows.
+  bool inherited() const { return inherited_; }
 
   // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
   // all is there. `result` gets what was counted. After an error nothing writes to `buffer` any
@@ -47,6 +55,7 @@ class CudaPictures {
   CudaPictures(Device& device, const PicturesPlan& plan) : device_(device), plan_(plan) {}
   absl::Status PutTables(const display::FootprintTable& table,
                          const display::TileToSlices& tile_to_slices);
+  absl::Status PutPacked(const std::optional<PackedPlan>& packed);
   absl::Status PutPictures(const CudaPictures* before);
   absl::Status DrawGroups(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
                           uint64_t buffer_holds);
@@ -56,6 +65,8 @@ class CudaPictures {
   const PicturesPlan plan_;
   SliceIndexView index_;
   SliceView view_;
+  std::optional<PackedView> packed_;
+  bool inherited_ = false;
   std::vector<Block> tables_;
   Block dirty_, lit_tiles_, blank_, bytes_, changed_in_, differs_;
   uint64_t* numbers_ = nullptr;   // pinned: changed_in as the host has it

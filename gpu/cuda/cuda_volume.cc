@@ -1,6 +1,7 @@
 #include "gpu/cuda/cuda_volume.h"
 
 #include <algorithm>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -8,12 +9,20 @@
 #include "absl/strings/str_cat.h"
 #include "gpu/assemble/delta_plan.h"
 #include "gpu/cuda/cpu_voxels.h"
+#include "gpu/cuda/draw_kernels.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/upload_plan.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
+
+// What a geometry's arrays lie in, and where what they say lies: if its items may be thin lines.
+struct DeviceArrays {
+  std::shared_ptr<Block> block;
+  std::optional<GeometryBounds> bounds;
+};
 
 // Beyond as many items as there are, what has gone is swept out of the index.
 constexpr uint64_t kSpareItems = 65536;
@@ -31,15 +40,19 @@ std::span<const T> Moved(std::span<const T> array, const std::byte* host, std::b
 // ------------------------------------------------------------------------------------------- tiles
 
 absl::StatusOr<DeviceTiles> DeviceTiles::Make(Device& device, const TileGrid& grid,
-                                              std::span<const uint8_t> owned) {
+                                              std::span<const uint8_t> owned, bool keep_colors) {
   DeviceTiles tiles;
   tiles.grid = grid;
-  const size_t count = grid.count();
-  for (const auto& [block, bytes] : {std::pair(&tiles.dirty, count),
-                                     {&tiles.dirty_list, count * sizeof(uint32_t)},
-                                     {&tiles.lit, count * sizeof(uint32_t)},
-                                     {&tiles.colors, count * kTileVoxels * sizeof(uint32_t)},
-                                     {&tiles.counters, sizeof(Counters)}}) {
+  tiles.regions = RegionGrid::Of(grid);
+  const size_t count = grid.count(), regions = tiles.regions.count();
+  for (const auto& [block, bytes] :
+       {std::pair(&tiles.dirty, count),
+        {&tiles.region_dirty, regions},
+        {&tiles.dirty_list, regions * sizeof(uint32_t)},
+        {&tiles.lit, count * sizeof(uint32_t)},
+        {&tiles.colors, keep_colors ? count * kTileVoxels * sizeof(uint32_t) : 0},
+        {&tiles.counters, sizeof(Counters)}}) {
+    if (bytes == 0) continue;
     absl::StatusOr<Block> zeros = device.Zeros(bytes);
     if (!zeros.ok()) return zeros.status();
     *block = *std::move(zeros);
@@ -55,18 +68,29 @@ VolumeView DeviceTiles::view() const {
   return {grid,
           owned.as<uint8_t>(),
           dirty.as<uint8_t>(),
+          region_dirty.as<uint8_t>(),
           dirty_list.as<uint32_t>(),
           lit.as<uint32_t>(),
           colors.as<uint32_t>(),
           counters.as<Counters>()};
 }
 
-void CudaVolume::SetView(DeviceTiles tiles, const Affine& view) {
+absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all_dirty) {
+  if (reciprocals_.size() == 0) {
+    std::vector<uint64_t> reciprocals = {ThinReciprocal(1)};
+    for (int32_t n = 1; n <= kMaxThinSteps; ++n) reciprocals.push_back(ThinReciprocal(n));
+    absl::StatusOr<Block> block = device_.Upload(reciprocals.data(), reciprocals.size());
+    if (!block.ok()) return block.status();
+    if (absl::Status status = device_.Wait(); !status.ok()) return status;
+    reciprocals_ = *std::move(block);
+  }
   tiles_ = std::move(tiles);
   view_ = view;
   scene_.MapClips(view_, true);
-  listed_ = false;
+  listed_ = all_dirty;
   index_.Clear();
+  lines_.Reset(tiles_.grid);
+  lines_suit_ = LineIndex::Suits(tiles_.grid);
   slots_.clear();
   free_slots_.clear();
   dead_slots_.clear();
@@ -78,6 +102,7 @@ void CudaVolume::SetView(DeviceTiles tiles, const Affine& view) {
   live_items_ = dead_items_ = 0;
   singular_ = 0;
   for (const auto& [id, drawable] : scene_.drawables()) pending_.insert(drawable.get());
+  return absl::OkStatus();
 }
 
 // ------------------------------------------------------------------------------------------- deltas
@@ -88,6 +113,7 @@ absl::Status CudaVolume::Apply(std::span<const std::byte> delta, BulkSource* bul
   arrays_ = nullptr;
   scene_.MapClips(view_, false);
   bulk_.clear();
+  bounds_.clear();
   return status;
 }
 
@@ -112,17 +138,89 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
     const float* const positions = geometry->positions.data();
     if (!bulk_.contains(positions)) bulk_[positions] = uploads.AddBulk(*geometry);
   }
-  if (uploads.size() == 0) return absl::OkStatus();
+  if (uploads.size() == 0) return FindGeometryBounds(plan);
   absl::StatusOr<Block> block = device_.pool().Acquire(uploads.size());
   if (!block.ok()) return block.status();
   for (const UploadPlan::Copy& copy : uploads.copies()) {
     absl::Status status = device_.ToDevice(block->as<std::byte>() + copy.to, copy.from, copy.size);
     if (!status.ok()) return status;
   }
-  // The delta's memory is given back when Apply returns, and so may bulk memory be.
-  if (absl::Status status = device_.Wait(); !status.ok()) return status;
   arrays_ = std::make_shared<Block>(*std::move(block));
+  if (absl::Status status = FindGeometryBounds(plan); !status.ok()) return status;
+  // The delta's memory is given back when Apply returns, and so may bulk memory be.
+  return device_.Wait();
+}
+
+namespace {
+
+bool CanBeThin(const GeometryRecord& record) {
+  if (record.drawn_by == DrawnBy::kCpu || record.thickness != 0) return false;
+  return record.kind == PrimitiveKind::kPoints ||
+         (record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover);
+}
+
+// Up to so many vertices the host looks through itself.
+constexpr size_t kFewVertices = 1024;
+
+}  // namespace
+
+// Where all geometries lie whose items may be thin lines: large ones are looked through on the
+// device.
+absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
+  std::vector<const GeometryView*> large;
+  for (const DeltaStep& step : plan.steps) {
+    const auto* geometry = std::get_if<GeometryView>(&step);
+    if (geometry == nullptr || geometry->positions.empty() || !CanBeThin(geometry->record))
+      continue;
+    const std::span<const float> p = geometry->positions;
+    if (p.size() > 3 * kFewVertices) {
+      large.push_back(geometry);
+      continue;
+    }
+    GeometryBounds bounds;
+    for (size_t a = 0; a < 3; ++a) {
+      bounds.lo[a] = bounds.hi[a] = static_cast<double>(p[a]);
+      for (size_t i = a; i < p.size(); i += 3) {
+        bounds.lo[a] = std::min(bounds.lo[a], static_cast<double>(p[i]));
+        bounds.hi[a] = std::max(bounds.hi[a], static_cast<double>(p[i]));
+      }
+    }
+    bounds_[p.data()] = bounds;
+  }
+  if (large.empty()) return absl::OkStatus();
+  std::vector<uint32_t> bits;
+  for (size_t i = 0; i < large.size(); ++i) bits.insert(bits.end(), {~0u, ~0u, ~0u, 0u, 0u, 0u});
+  const absl::StatusOr<Block> found = device_.Upload(bits.data(), bits.size());
+  if (!found.ok()) return found.status();
+  for (size_t i = 0; i < large.size(); ++i) {
+    const std::span<const float> p = large[i]->positions;
+    absl::Status status = device_.Run("FindBounds", [&] {
+      return FindBounds(OnDevice(*large[i], p).data(), static_cast<uint32_t>(p.size() / 3),
+                        found->as<uint32_t>() + i * 6, device_.stream());
+    });
+    if (!status.ok()) return status;
+  }
+  absl::Status status =
+      device_.ToHost(bits.data(), found->as<uint32_t>(), bits.size() * sizeof(uint32_t));
+  if (status.ok()) status = device_.Wait();
+  if (!status.ok()) return status;
+  for (size_t i = 0; i < large.size(); ++i) {
+    GeometryBounds bounds;
+    for (size_t a = 0; a < 3; ++a) {
+      bounds.lo[a] = static_cast<double>(FromOrderedBits(bits[i * 6 + a]));
+      bounds.hi[a] = static_cast<double>(FromOrderedBits(bits[i * 6 + 3 + a]));
+    }
+    bounds_[large[i]->positions.data()] = bounds;
+  }
   return absl::OkStatus();
+}
+
+// An array of a geometry of the delta under way, where it lies on the device.
+template <typename T>
+std::span<const T> CudaVolume::OnDevice(const GeometryView& view, std::span<const T> array) const {
+  if (view.bulk == nullptr) return Moved(array, arrays_begin_, arrays_->as<std::byte>());
+  return Moved(array, reinterpret_cast<const std::byte*>(view.positions.data()),
+               arrays_->as<std::byte>() + bulk_.at(view.positions.data()));
 }
 
 RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
@@ -130,15 +228,12 @@ RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   RetainedGeometry kept{view, nullptr};
   kept.view.bulk = nullptr;
   if (view.positions.empty()) return kept;
-  const bool in_bulk = view.bulk != nullptr;
-  const std::byte* const host =
-      in_bulk ? reinterpret_cast<const std::byte*>(view.positions.data()) : arrays_begin_;
-  std::byte* const device =
-      arrays_->as<std::byte>() + (in_bulk ? bulk_.at(view.positions.data()) : 0);
-  kept.view.positions = Moved(view.positions, host, device);
-  kept.view.indices = Moved(view.indices, host, device);
-  kept.view.colors = Moved(view.colors, host, device);
-  kept.memory = arrays_;
+  kept.view.positions = OnDevice(view, view.positions);
+  kept.view.indices = OnDevice(view, view.indices);
+  kept.view.colors = OnDevice(view, view.colors);
+  const auto bounds = bounds_.find(view.positions.data());
+  kept.memory = std::make_shared<DeviceArrays>(
+      arrays_, bounds == bounds_.end() ? std::nullopt : std::optional(bounds->second));
   return kept;
 }
 
@@ -266,20 +361,27 @@ absl::StatusOr<UploadedList> UploadList(Device& device, std::span<const uint32_t
 
 }  // namespace
 
+absl::Status CudaVolume::MarkPairs(std::span<const uint32_t> slots) {
+  const absl::StatusOr<UploadedList> list =
+      UploadList(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
+  if (!list.ok()) return list.status();
+  if (list->items == 0) return absl::OkStatus();
+  return device_.Run("MarkTiles", [&] {
+    return MarkTiles(table_.as<TableEntry>(), list->list, list->items, tiles_.view(),
+                     device_.stream());
+  });
+}
+
 absl::Status CudaVolume::MarkLeft() {
   if (!marks_.empty()) {
     std::sort(marks_.begin(), marks_.end());
     marks_.erase(std::unique(marks_.begin(), marks_.end()), marks_.end());
-    const absl::StatusOr<UploadedList> list =
-        UploadList(device_, marks_, [&](uint32_t slot) { return slots_[slot].items; });
-    if (!list.ok()) return list.status();
-    if (list->items > 0) {
-      absl::Status status = device_.Run("MarkTiles", [&] {
-        return MarkTiles(table_.as<TableEntry>(), list->list, list->items, tiles_.view(),
-                         device_.stream());
-      });
-      if (!status.ok()) return status;
-    }
+    const auto thin = std::partition(marks_.begin(), marks_.end(),
+                                     [&](uint32_t slot) { return !slots_[slot].thin; });
+    absl::Status status = MarkPairs({marks_.begin(), thin});
+    if (!status.ok()) return status;
+    status = lines_.Mark({thin, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
+    if (!status.ok()) return status;
     marks_.clear();
   }
   if (left_.empty()) return absl::OkStatus();
@@ -290,7 +392,17 @@ absl::Status CudaVolume::MarkLeft() {
                 device_.stream());
   });
   if (!status.ok()) return status;
+  std::vector<uint32_t> thin;
   for (const uint32_t slot : left_) {
+    if (slots_[slot].thin) thin.push_back(slot);
+  }
+  if (status = lines_.Drop(thin); !status.ok()) return status;
+  for (const uint32_t slot : left_) {
+    if (slots_[slot].thin) {
+      free_slots_.push_back(slot);
+      slots_[slot] = {};
+      continue;
+    }
     live_items_ -= slots_[slot].items;
     dead_items_ += slots_[slot].items;
     dead_slots_.push_back(slot);
@@ -308,6 +420,25 @@ absl::Status CudaVolume::MarkLeft() {
     dead_items_ = 0;
   }
   return absl::OkStatus();
+}
+
+bool CudaVolume::IsThin(const Drawable& drawable, const TableEntry& entry) const {
+  if (!lines_suit_ || !CanBeThin(entry.record) || entry.source.radius > 0) return false;
+  const auto* const arrays = static_cast<const DeviceArrays*>(drawable.geometry->memory.get());
+  if (arrays == nullptr || !arrays->bounds) return false;
+  const GeometryBounds& bounds = *arrays->bounds;
+  double lo[3] = {}, hi[3] = {};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Point3d p =
+        Map(entry.source.map, corner & 1 ? bounds.hi[0] : bounds.lo[0],
+            corner & 2 ? bounds.hi[1] : bounds.lo[1], corner & 4 ? bounds.hi[2] : bounds.lo[2]);
+    const double at[3] = {p.x, p.y, p.z};
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = corner == 0 ? at[a] : std::min(lo[a], at[a]);
+      hi[a] = corner == 0 ? at[a] : std::max(hi[a], at[a]);
+    }
+  }
+  return AreThin(lo, hi);
 }
 
 uint32_t CudaVolume::TakeSlot() {
@@ -409,6 +540,7 @@ absl::Status CudaVolume::Enter() {
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   uint32_t singular = 0;
+  absl::flat_hash_set<uint32_t> line_layers = lines_.Layers();
   for (const Drawable* drawable : drawables) {
     const uint32_t slot = TakeSlot();
     TableEntry entry = EntryOf(*drawable);
@@ -425,27 +557,28 @@ absl::Status CudaVolume::Enter() {
       WithPrimitive(entry.record.kind, [&](auto primitive) {
         using Primitive = typename decltype(primitive)::type;
         slots_[slot].items = Primitive::Count(entry.source);
+        slots_[slot].thin = IsThin(*drawable, entry) && (line_layers.contains(entry.layer) ||
+                                                         line_layers.size() < kMaxLineLayers);
+        if (slots_[slot].thin) line_layers.insert(entry.layer);
         slots_[slot].singular = kIsSolid<Primitive> && !entry.source.solid.drawable;
       });
     }
     singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);
   }
-  absl::Status status = PutDrawables(slots, entries);
-  if (status.ok()) {
-    const absl::StatusOr<UploadedList> list =
-        UploadList(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
-    status = list.status();
-    if (status.ok()) {
-      status = index_.Add(table_.as<TableEntry>(), looks_.as<LayerLook>(), list->list, list->items,
-                          tiles_.view());
-    }
-    for (const uint32_t slot : slots) live_items_ += slots_[slot].items;
-  } else {
+  if (absl::Status status = PutDrawables(slots, entries); !status.ok()) {
     for (const uint32_t taken : slots) slots_[taken] = {};
     free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
     return status;
   }
+  std::vector<uint32_t> pairs;
+  for (const uint32_t slot : slots) {
+    if (slots_[slot].thin) continue;
+    pairs.push_back(slot);
+    live_items_ += slots_[slot].items;
+  }
+  absl::Status status = EnterPairs(pairs);
+  if (status.ok()) status = EnterLines(drawables, slots);
   if (!status.ok()) {
     // They go again, and come anew with the next frame.
     left_.insert(left_.end(), slots.begin(), slots.end());
@@ -457,32 +590,143 @@ absl::Status CudaVolume::Enter() {
   return absl::OkStatus();
 }
 
-absl::Status CudaVolume::Update(const SliceIndexView& slices) {
+absl::Status CudaVolume::EnterPairs(std::span<const uint32_t> slots) {
+  if (slots.empty()) return absl::OkStatus();
+  const absl::StatusOr<UploadedList> list =
+      UploadList(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
+  if (!list.ok()) return list.status();
+  return index_.Add(table_.as<TableEntry>(), looks_.as<LayerLook>(), list->list, list->items,
+                    tiles_.view());
+}
+
+// Layer by layer.
+absl::Status CudaVolume::EnterLines(std::span<const Drawable* const> drawables,
+                                    std::span<const uint32_t> slots) {
+  struct Arriving {
+    std::vector<uint32_t> slots;
+    std::vector<uint64_t> first = {0};
+    bool visible = false, mixed = false;
+  };
+  absl::flat_hash_map<uint32_t, Arriving> layers;
+  for (size_t i = 0; i < slots.size(); ++i) {
+    if (!slots_[slots[i]].thin) continue;
+    const Drawable& drawable = *drawables[i];
+    Arriving& arriving = layers[layer_slots_.at(drawable.layer->record.id)];
+    arriving.slots.push_back(slots[i]);
+    arriving.first.push_back(arriving.first.back() + slots_[slots[i]].items);
+    arriving.visible = drawable.layer->record.visible != 0;
+    const GeometryRecord& record = drawable.geometry->view.record;
+    arriving.mixed |= record.kind == PrimitiveKind::kSegments &&
+                      record.color_mode == ColorMode::kPerVertex && drawable.record.erase == 0;
+  }
+  for (const auto& [layer, arriving] : layers) {
+    const absl::StatusOr<UploadedList> list =
+        UploadList(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
+    if (!list.ok()) return list.status();
+    absl::Status status = lines_.Add(table_.as<TableEntry>(),
+                                     {.layer = layer,
+                                      .visible = arriving.visible,
+                                      .mixed = arriving.mixed,
+                                      .list = list->list,
+                                      .slots = arriving.slots,
+                                      .first = arriving.first},
+                                     tiles_.region_dirty.as<uint8_t>());
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+DrawView CudaVolume::ViewForDrawing() const {
+  DrawView view;
+  view.table = table_.as<TableEntry>();
+  view.layers = looks_.as<LayerLook>();
+  view.half_spaces = half_spaces_.as<VoxelHalfSpace>();
+  view.pairs = index_.view();
+  view.lines = lines_.view();
+  view.reciprocals = reciprocals_.as<uint64_t>();
+  view.volume = tiles_.view();
+  view.regions = tiles_.regions;
+  return view;
+}
+
+absl::Status CudaVolume::Draw(const DrawView& view, DrawTo to) {
+  // Whether all that there is lies in one layer, to be seen as it is.
+  uint32_t visible = 0;
+  bool plain = true;
+  absl::flat_hash_set<uint32_t> layers;
+  for (uint32_t b = 0; b < view.lines.count; ++b) layers.insert(view.lines.batches[b].layer);
+  for (const uint32_t layer : layers) {
+    const LayerLook& look = looks_now_[layer];
+    if (look.visible == 0) continue;
+    ++visible;
+    plain &= look.blend == BlendMode::kOver && look.opacity == 255;
+  }
+  const auto draw = view.pairs.count > 0    ? DrawAll
+                    : plain && visible <= 1 ? DrawOneLayer
+                                            : DrawLines;
+  return device_.Run("DrawRegions", [&] {
+    return draw(view, to, static_cast<uint32_t>(device_.api().device().multiProcessorCount),
+                device_.stream());
+  });
+}
+
+absl::Status CudaVolume::Update(const SliceIndexView& slices, const PackedView* packed) {
   if (absl::Status status = PutLayers(); !status.ok()) return status;
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
-  const VolumeView view = tiles_.view();
+  if (absl::Status status = lines_.Merge(); !status.ok()) return status;
+  DrawView view = ViewForDrawing();
+  view.slices = slices;
+  if (packed != nullptr) view.packed = *packed;
+  const VolumeView& volume = view.volume;
   absl::Status status;
   if (listed_) {
     status = device_.Run("cudaMemcpyAsync", [&] {
-      return cudaMemcpyAsync(view.dirty, view.owned, view.grid.count(), cudaMemcpyDeviceToDevice,
-                             device_.stream());
+      return cudaMemcpyAsync(volume.dirty, volume.owned, volume.grid.count(),
+                             cudaMemcpyDeviceToDevice, device_.stream());
     });
     if (!status.ok()) return status;
   }
-  status = device_.Zero(&view.counters->dirty, 2 * sizeof(uint32_t));
+  status = device_.Zero(&volume.counters->dirty, 2 * sizeof(uint32_t));
   if (!status.ok()) return status;
-  status = device_.Run("ListDirty", [&] { return ListDirty(view, device_.stream()); });
+  listed_ = true;
+  status =
+      device_.Run("ListDirty", [&] { return ListDirty(volume, view.regions, device_.stream()); });
   if (!status.ok()) return status;
-  const uint32_t blocks = std::min<uint32_t>(
-      view.grid.count(), 2 * static_cast<uint32_t>(device_.api().device().multiProcessorCount));
-  status = device_.Run("DrawTiles", [&] {
-    return DrawTiles(table_.as<TableEntry>(), looks_.as<LayerLook>(),
-                     half_spaces_.as<VoxelHalfSpace>(), index_.view(), view, slices, blocks,
-                     device_.stream());
-  });
+  status = Draw(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
   listed_ = !status.ok();
   return status;
+}
+
+absl::Status CudaVolume::Read(const Box3& box, uint32_t* out) {
+  if (tiles_.colors.size() != 0) {
+    const int32_t size[3] = {box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]};
+    return device_.Run("ReadBox",
+                       [&] { return ReadBox(tiles_.view(), box.lo, size, out, device_.stream()); });
+  }
+  std::vector<uint32_t> list;
+  const Box3 tiles = tiles_.grid.TilesOf(box);
+  for (int32_t k = tiles.lo[2]; k < tiles.hi[2]; ++k) {
+    for (int32_t j = tiles.lo[1] / 2; j < (tiles.hi[1] + 1) / 2; ++j) {
+      for (int32_t i = tiles.lo[0] / 2; i < (tiles.hi[0] + 1) / 2; ++i) {
+        const int32_t at[3] = {i, j, k};
+        list.push_back(tiles_.regions.RegionAt(at));
+      }
+    }
+  }
+  Counters counters;
+  counters.dirty = static_cast<uint32_t>(list.size());
+  if (list.empty()) return absl::OkStatus();
+  const absl::StatusOr<Block> regions = device_.Upload(list.data(), list.size());
+  if (!regions.ok()) return regions.status();
+  const absl::StatusOr<Block> counts = device_.Upload(&counters, 1);
+  if (!counts.ok()) return counts.status();
+  DrawView view = ViewForDrawing();
+  view.volume.dirty_list = regions->as<uint32_t>();
+  view.volume.counters = counts->as<Counters>();
+  view.read = {box, out};
+  if (absl::Status status = Draw(view, DrawTo::kReader); !status.ok()) return status;
+  return device_.Wait();
 }
 
 }  // namespace voxeld::gpu::cuda

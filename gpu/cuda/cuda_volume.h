@@ -19,6 +19,8 @@
 #include "gpu/assemble/scene.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/cuda/device.h"
+#include "gpu/cuda/draw_types.h"
+#include "gpu/cuda/line_index.h"
 #include "gpu/cuda/pair_index.h"
 #include "gpu/cuda/pool.h"
 #include "gpu/cuda/types.h"
@@ -28,29 +30,40 @@ namespace voxeld::gpu::cuda {
 // The tiles of a target, dark and clean.
 struct DeviceTiles {
   TileGrid grid;
+  RegionGrid regions;
   std::vector<uint8_t> owned_here;  // as the device has it
-  Block owned, dirty, dirty_list, lit, colors, counters;
+  Block owned, dirty, region_dirty, dirty_list, lit, counters;
+  Block colors;  // unless pictures are packed as tiles are drawn
   VolumeView view() const;
 
   static absl::StatusOr<DeviceTiles> Make(Device& device, const TileGrid& grid,
-                                          std::span<const uint8_t> owned);
+                                          std::span<const uint8_t> owned, bool keep_colors);
+};
+
+// Of a geometry's positions, closed.
+struct GeometryBounds {
+  double lo[3], hi[3];
 };
 
 // Thread-bound. Its calls queue work in the device's stream. An error leaves the scene as it was,
 // and what could not be drawn is drawn with the next Update.
 class CudaVolume final : private SceneObserver {
  public:
-  explicit CudaVolume(Device& device) : device_(device), index_(device) {}
+  explicit CudaVolume(Device& device) : device_(device), index_(device), lines_(device) {}
 
   // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
   // fit the device.
   absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
 
-  // Everything is to be drawn anew.
-  void SetView(DeviceTiles tiles, const Affine& view);
+  // Everything is to be drawn anew; with `all_dirty` also where nothing is.
+  absl::Status SetView(DeviceTiles tiles, const Affine& view, bool all_dirty);
 
-  // Draws what is dirty; marks the slices that look at it.
-  absl::Status Update(const SliceIndexView& slices);
+  // Draws what is dirty: into the tiles, and marks the slices that look at it; or, if there is
+  // `packed`, straight into pictures.
+  absl::Status Update(const SliceIndexView& slices, const PackedView* packed);
+
+  // The colours of voxels, after Update; for who asks. `out` is on the device.
+  absl::Status Read(const Box3& box, uint32_t* out);
 
   VolumeView view() const { return tiles_.view(); }
   uint32_t singular_drawables() const { return singular_; }
@@ -60,6 +73,7 @@ class CudaVolume final : private SceneObserver {
   struct Slot {
     uint32_t items = 0;
     bool singular = false;
+    bool thin = false;           // in lines_; else in index_
     Block tiles, begin, voxels;  // of what the CPU has drawn
   };
 
@@ -70,8 +84,18 @@ class CudaVolume final : private SceneObserver {
   void OnLayerLook(Layer& layer, const LayerRecord& next) override;
 
   absl::Status PutLayers();
+  absl::Status FindGeometryBounds(const DeltaPlan& plan);
+  template <typename T>
+  std::span<const T> OnDevice(const GeometryView& view, std::span<const T> array) const;
+  bool IsThin(const Drawable& drawable, const TableEntry& entry) const;
   absl::Status MarkLeft();
+  absl::Status MarkPairs(std::span<const uint32_t> slots);
   absl::Status Enter();
+  absl::Status EnterLines(std::span<const Drawable* const> drawables,
+                          std::span<const uint32_t> slots);
+  absl::Status EnterPairs(std::span<const uint32_t> slots);
+  DrawView ViewForDrawing() const;
+  absl::Status Draw(const DrawView& view, DrawTo to);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
   TableEntry EntryOf(const Drawable& drawable) const;
@@ -84,7 +108,10 @@ class CudaVolume final : private SceneObserver {
   DeviceTiles tiles_;
   Affine view_;
   bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
-  PairIndex index_;
+  PairIndex index_;      // of all that is no thin line
+  LineIndex lines_;
+  bool lines_suit_ = false;  // the volume is not too large for them
+  Block reciprocals_;
 
   Block table_;
   std::vector<Slot> slots_;
@@ -111,6 +138,8 @@ class CudaVolume final : private SceneObserver {
   const std::byte* arrays_begin_ = nullptr;
   std::shared_ptr<Block> arrays_;
   absl::flat_hash_map<const float*, size_t> bulk_;
+  // Of its geometries' positions, by where these lie on the host.
+  absl::flat_hash_map<const float*, GeometryBounds> bounds_;
   uint32_t singular_ = 0;
   std::unique_ptr<Executor> executor_;  // for what the CPU draws; made when it is asked for
 };

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gpu/clip.h"
 #include "gpu/cuda/types.h"
 
 namespace voxeld::gpu::cuda {
@@ -51,22 +50,15 @@ cudaError_t SortPairs(void* temp, size_t& temp_bytes, uint64_t* keys, uint64_t* 
 cudaError_t FindRows(const uint64_t* keys, uint32_t pairs, uint32_t tiles, uint32_t* row_begin,
                      cudaStream_t stream);
 
-// ---- drawing (kernels_raster.cu)
-// Lists the dirty tiles, and they are clean.
-cudaError_t ListDirty(const VolumeView& volume, cudaStream_t stream);
-// Draws the tiles listed; marks the slices that look at those whose colours changed.
-// `half_spaces`: what the layers' looks refer to.
-cudaError_t DrawTiles(const TableEntry* table, const LayerLook* layers,
-                      const VoxelHalfSpace* half_spaces, const BatchList& batches,
-                      const VolumeView& volume, const SliceIndexView& slices, uint32_t blocks,
-                      cudaStream_t stream);
-cudaError_t ReadBox(const VolumeView& volume, const int32_t lo[3], const int32_t size[3],
-                    uint32_t* out, cudaStream_t stream);
-
 // ---- slicing (kernels_slice.cu)
 // Owned slices [begin, begin + count), those that are dirty; they are clean afterwards, and their
 // pictures carry `frame` if their bytes are not what they were.
 cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
                        uint32_t begin, uint32_t count, uint64_t frame, cudaStream_t stream);
+// The end of it, for pictures drawn already. `sampled`: that was done from tiles, so that slices
+// which no lit tile reaches are blank.
+cudaError_t EndSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
+                      uint32_t begin, uint32_t count, uint64_t frame, bool sampled,
+                      cudaStream_t stream);
 
 }  // namespace voxeld::gpu::cuda

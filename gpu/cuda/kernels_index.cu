@@ -5,32 +5,14 @@
 #include <cub/device/device_scan.cuh>
 #include <cuda/std/functional>
 
+#include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/kernels.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
 
-constexpr uint32_t kThreads = 256;
-
-template <typename Count>
-uint32_t Blocks(Count count) {
-  return static_cast<uint32_t>((count + kThreads - 1) / kThreads);
-}
-
-__device__ uint64_t Thread() {
-  return static_cast<uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
-}
-
-// Which drawable of the list has item `i` of the row.
-__device__ uint32_t DrawableOf(const ItemList& list, uint64_t i) {
-  uint32_t low = 0, high = list.count;  // first[low] ≤ i < first[high]
-  while (high - low > 1) {
-    const uint32_t middle = low + (high - low) / 2;
-    (list.first[middle] <= i ? low : high) = middle;
-  }
-  return low;
-}
+constexpr uint32_t kThreads = kItemThreads;
 
 // f(slot, entry, item, tile) for each owned tile that item `i` of the row may touch.
 template <typename F>

@@ -174,13 +174,13 @@ __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceV
 }
 
 __global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t begin,
-                                uint32_t count, uint64_t frame, Counters* counters) {
+                                uint32_t count, uint64_t frame, bool sampled, Counters* counters) {
   const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= count) return;
   const uint32_t s = begin + i;
   if (index.dirty[s] == 0) return;
   index.dirty[s] = 0;
-  view.blank[s] = index.lit_tiles[s] == 0 ? 1 : 0;
+  view.blank[s] = sampled && index.lit_tiles[s] == 0 ? 1 : 0;
   uint32_t changed = 0;
   for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
     const uint32_t picture = s * view.sub_frames + sub;
@@ -204,8 +204,14 @@ cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, co
   DrawSlicesKernel<<<grid, kThreads, with_line ? line_bytes : 0, stream>>>(volume, index, view,
                                                                            begin, with_line);
   if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
+  return EndSlices(volume, index, view, begin, count, frame, true, stream);
+}
+
+cudaError_t EndSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
+                      uint32_t begin, uint32_t count, uint64_t frame, bool sampled,
+                      cudaStream_t stream) {
   EndSlicesKernel<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(
-      index, view, begin, count, frame, volume.counters);
+      index, view, begin, count, frame, sampled, volume.counters);
   return cudaGetLastError();
 }
 

@@ -81,8 +81,8 @@ struct Counters {
   uint32_t tiles_drawn = 0;
   uint32_t slices_drawn = 0;
   uint32_t pictures_changed = 0;
-  uint32_t dirty = 0;      // tiles in the list
-  uint32_t next_tile = 0;  // of the list, to be drawn
+  uint32_t dirty = 0;        // regions in the list
+  uint32_t next_region = 0;  // of the list, to be drawn
   uint32_t reserved = 0;
   uint64_t lit_voxels = 0;
 };
@@ -92,9 +92,11 @@ struct VolumeView {
   TileGrid grid;
   const uint8_t* owned = nullptr;  // of each tile
   uint8_t* dirty = nullptr;
+  // Of regions (line_types.h): they are drawn whole.
+  uint8_t* region_dirty = nullptr;
   uint32_t* dirty_list = nullptr;
-  uint32_t* lit = nullptr;  // voxels of each tile
-  uint32_t* colors = nullptr;
+  uint32_t* lit = nullptr;     // voxels of each tile
+  uint32_t* colors = nullptr;  // null: pictures are packed as tiles are drawn
   Counters* counters = nullptr;
 };
 

@@ -1,0 +1,48 @@
+// What the drawing of regions gets and where its voxels go. Plain data, as host and device see it.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/clip.h"
+#include "gpu/cuda/line_types.h"
+
+namespace voxeld::gpu::cuda {
+
+// Where pixels are voxels: pixel (u, v) of slice s stands for voxel (u, y0 ± v, z) alone, and each z
+// belongs to one slice at most. Then tiles are packed as they are drawn, and their colours need not
+// be kept.
+struct PackedView {
+  const int32_t* slice_of_z = nullptr;  // −first of the owned; −1: none
+  int32_t y0 = 0, y_step = 1;           // y = y0 + y_step·v
+  SliceView slices;
+  uint32_t* slice_dirty = nullptr;  // by slice − first
+  // By sub-frame, v % 8, u % 8: the least level of a channel that a bit plane shows, spread as
+  // colours are interleaved (gpu/word.h) and not shifted; 2²⁴: none.
+  const uint32_t* least = nullptr;
+};
+
+// Voxels asked for: of a box, x fastest, 0x00RRGGBB.
+struct ReadView {
+  Box3 box;
+  uint32_t* out = nullptr;
+};
+
+// Everything about drawing dirty regions.
+struct DrawView {
+  const TableEntry* table = nullptr;
+  const LayerLook* layers = nullptr;
+  const VoxelHalfSpace* half_spaces = nullptr;
+  BatchList pairs;
+  LineBatchList lines;
+  const uint64_t* reciprocals = nullptr;  // ThinReciprocal(n), n from 0 (as 1) to kMaxThinSteps
+  VolumeView volume;
+  RegionGrid regions;
+  SliceIndexView slices;
+  PackedView packed;
+  ReadView read;
+};
+
+// Where drawn colours go: into the tiles kept for slicing, straight into pictures, or to who asks.
+enum class DrawTo : uint8_t { kTiles, kPictures, kReader };
+
+}  // namespace voxeld::gpu::cuda

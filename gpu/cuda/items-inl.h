@@ -1,0 +1,31 @@
+// For kernels over drawables' items: a thread's number, blocks for so many, the drawable of an item.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/cuda/types.h"
+
+namespace voxeld::gpu::cuda {
+
+inline constexpr uint32_t kItemThreads = 256;
+
+template <typename Count>
+uint32_t Blocks(Count count) {
+  return static_cast<uint32_t>((count + kItemThreads - 1) / kItemThreads);
+}
+
+__device__ inline uint64_t Thread() {
+  return static_cast<uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+}
+
+// Which drawable of the list has item `i` of the row.
+__device__ inline uint32_t DrawableOf(const ItemList& list, uint64_t i) {
+  uint32_t low = 0, high = list.count;  // first[low] ≤ i < first[high]
+  while (high - low > 1) {
+    const uint32_t middle = low + (high - low) / 2;
+    (list.first[middle] <= i ? low : high) = middle;
+  }
+  return low;
+}
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,72 @@
+// Thin lines on the device: made, and sorted by the regions that they touch, in two goes: lines into
+// blocks of regions, their pieces into regions. Each go counts, in chunks that reserve their places
+// in each row, and then fills: no list is ever searched, and nothing waits for the host.
+//
+// Each function queues its kernels in `stream` and answers whether that could be done.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "gpu/cuda/line_types.h"
+
+namespace voxeld::gpu::cuda {
+
+// bounds[6]: of `count` positions, the least and the greatest on each axis, as OrderedBits; they
+// begin as ~0, ~0, ~0, 0, 0, 0.
+cudaError_t FindBounds(const float* positions, uint32_t count, uint32_t* bounds,
+                       cudaStream_t stream);
+// A float's bits in the order of the numbers, and back.
+inline float FromOrderedBits(uint32_t bits) {
+  bits = bits >> 31 != 0 ? bits ^ 0x80000000u : ~bits;
+  float value;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+// lines[i]: item i of the list, of segments or points without thickness. `ends`: may be null.
+cudaError_t MakeLines(const TableEntry* table, const ItemList& list, uint32_t items,
+                      ThinLine* lines, uint32_t* ends, cudaStream_t stream);
+
+// to[first + i] = from[slots[d] + …] for i up to `count`, item first + i of the list being the …-th of
+// its d-th row. `ends_to` may be null; where `ends_from` is, a line's end is as its beginning.
+cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, const ThinLine* from,
+                      const uint32_t* ends_from, ThinLine* to, uint32_t* ends_to,
+                      cudaStream_t stream);
+
+// ---- sorting
+// Shared memory that the first go takes of a block of threads.
+inline size_t SortLinesShared(const RegionGrid& grid) {
+  return size_t{grid.block_count()} * sizeof(uint32_t);
+}
+inline constexpr size_t kMostSortLinesShared = 96u << 10;
+
+// block_counts must be 0. After it block_begin and chunk_begin are there.
+cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
+                        cudaStream_t stream);
+cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
+                       cudaStream_t stream);
+// region_counts must be 0.
+cudaError_t CountSpans(const LineSort& sort, const ThinLine* lines, uint32_t blocks,
+                       cudaStream_t stream);
+// rows[r]: sum of region_counts[0..r), r up to the number of regions. `temp` null: only its size.
+cudaError_t SumRows(void* temp, size_t& temp_bytes, const LineSort& sort, uint32_t* rows,
+                    cudaStream_t stream);
+// `ends`: which lines have two colours; may be null.
+cudaError_t FillSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
+                      const uint32_t* rows, LineSpan* spans, uint32_t blocks, cudaStream_t stream);
+
+// ---- what is to be drawn anew
+// Regions of a batch that have spans.
+cudaError_t MarkRows(const uint32_t* rows, uint32_t regions, uint8_t* dirty, cudaStream_t stream);
+// Lines in rows: `count` in all, the first of the d-th is slots[d].
+// Regions that they touch.
+cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,
+                      const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream);
+// They draw nothing from now on.
+cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream);
+
+}  // namespace voxeld::gpu::cuda

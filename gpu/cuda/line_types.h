@@ -1,0 +1,122 @@
+// Thin lines on the device (gpu/primitives/thin_line.h), sorted by the regions of the volume that
+// they touch. Plain data, as host and device see it.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/cuda/types.h"
+#include "gpu/primitives/thin_line.h"
+
+namespace voxeld::gpu::cuda {
+
+// A region is what a block of threads draws at once in shared memory: 32×32×16 voxels, 2×2×1 tiles.
+VOXELD_HD inline constexpr int RegionBits(int axis) { return axis == 2 ? 4 : 5; }
+inline constexpr uint32_t kRegionVoxels = 1u << 14;
+// Regions are numbered by blocks of 4×4×4 (2^kBlockBits), and within a block.
+inline constexpr int kBlockBits = 2;
+inline constexpr uint32_t kRegionsInBlock = 1u << 3 * kBlockBits;
+
+struct RegionGrid {
+  int32_t blocks[3] = {};
+
+  VOXELD_HD static RegionGrid Of(const TileGrid& tiles) {
+    RegionGrid g;
+    for (int a = 0; a < 3; ++a) {
+      const int32_t size = 1 << (RegionBits(a) + kBlockBits);
+      g.blocks[a] = (tiles.voxels[a] + size - 1) / size;
+    }
+    return g;
+  }
+  VOXELD_HD uint32_t block_count() const {
+    return static_cast<uint32_t>(blocks[0]) * static_cast<uint32_t>(blocks[1]) *
+           static_cast<uint32_t>(blocks[2]);
+  }
+  VOXELD_HD uint32_t count() const { return block_count() * kRegionsInBlock; }
+  VOXELD_HD bool HasBlock(const int32_t at[3]) const {
+    return static_cast<uint32_t>(at[0]) < static_cast<uint32_t>(blocks[0]) &&
+           static_cast<uint32_t>(at[1]) < static_cast<uint32_t>(blocks[1]) &&
+           static_cast<uint32_t>(at[2]) < static_cast<uint32_t>(blocks[2]);
+  }
+  VOXELD_HD uint32_t BlockAt(const int32_t at[3]) const {
+    return static_cast<uint32_t>((at[2] * blocks[1] + at[1]) * blocks[0] + at[0]);
+  }
+  VOXELD_HD void BlockCoordinates(uint32_t block, int32_t at[3]) const {
+    at[0] = static_cast<int32_t>(block % static_cast<uint32_t>(blocks[0]));
+    block /= static_cast<uint32_t>(blocks[0]);
+    at[1] = static_cast<int32_t>(block % static_cast<uint32_t>(blocks[1]));
+    at[2] = static_cast<int32_t>(block / static_cast<uint32_t>(blocks[1]));
+  }
+  // Of a region's coordinates, within its block.
+  VOXELD_HD static uint32_t InBlock(const int32_t at[3]) {
+    constexpr int32_t kMask = (1 << kBlockBits) - 1;
+    return static_cast<uint32_t>((((at[2] & kMask) << kBlockBits | (at[1] & kMask)) << kBlockBits) |
+                                 (at[0] & kMask));
+  }
+  VOXELD_HD uint32_t RegionAt(const int32_t at[3]) const {
+    const int32_t block[3] = {at[0] >> kBlockBits, at[1] >> kBlockBits, at[2] >> kBlockBits};
+    return BlockAt(block) * kRegionsInBlock + InBlock(at);
+  }
+  VOXELD_HD void RegionCoordinates(uint32_t region, int32_t at[3]) const {
+    BlockCoordinates(region / kRegionsInBlock, at);
+    for (int a = 0; a < 3; ++a) {
+      at[a] = at[a] << kBlockBits |
+              static_cast<int32_t>(region >> (a * kBlockBits) & ((1u << kBlockBits) - 1));
+    }
+  }
+};
+
+// A part of a line in a block of regions; it ends where the line leaves the block.
+struct LinePiece {
+  uint32_t line;
+  uint32_t k;  // of its first voxel
+};
+
+// A part of a line in a region: `count` voxels from k on.
+struct LineSpan {
+  uint32_t line;
+  uint32_t bits;  // k; from bit 16 on the count; the top bit if the line runs from colour to colour
+
+  VOXELD_HD static LineSpan Of(uint32_t line, int32_t k, int32_t count, bool mixed) {
+    return {line, static_cast<uint32_t>(k) | static_cast<uint32_t>(count) << 16 |
+                      (mixed ? 1u << 31 : 0u)};
+  }
+  VOXELD_HD int32_t k() const { return static_cast<int32_t>(bits & 0xFFFF); }
+  VOXELD_HD uint32_t count() const { return bits >> 16 & 0x7F; }
+  VOXELD_HD bool mixed() const { return bits >> 31 != 0; }
+};
+
+// Lines of one layer, with their spans by region: those of region r are
+// spans[rows[r]] to spans[rows[r + 1]].
+struct LineBatchView {
+  ThinLine* lines = nullptr;
+  uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
+  uint32_t count = 0;
+  uint32_t layer = 0;  // its slot
+  const uint32_t* rows = nullptr;
+  const LineSpan* spans = nullptr;
+};
+
+inline constexpr uint32_t kMaxLineBatches = 24;
+inline constexpr uint32_t kMaxLineLayers = 8;
+struct LineBatchList {
+  LineBatchView batches[kMaxLineBatches];
+  uint32_t count = 0;
+};
+
+// The work memory of sorting a batch.
+struct LineSort {
+  RegionGrid grid;
+  uint32_t chunk = 0;  // lines that a block of threads takes at once
+  uint32_t piece_capacity = 0, span_capacity = 0;
+  uint32_t* block_counts = nullptr;   // by block
+  uint32_t* block_begin = nullptr;    // by block, and the end
+  uint32_t* chunk_begin = nullptr;    // by block, and the end: chunks of pieces before
+  uint32_t* line_offsets = nullptr;   // by chunk of lines and block
+  uint32_t* piece_offsets = nullptr;  // by chunk of pieces and region of its block
+  LinePiece* pieces = nullptr;
+  uint32_t* region_counts = nullptr;  // by region, and a 0
+};
+
+inline constexpr uint32_t kPieceChunk = 1024;
+
+}  // namespace voxeld::gpu::cuda

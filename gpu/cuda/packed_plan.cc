@@ -1,0 +1,66 @@
+#include "gpu/cuda/packed_plan.h"
+
+#include <algorithm>
+
+#include "gpu/slice/quantize.h"
+#include "gpu/word.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+bool PutLeast(const display::FrameLayout& layout, const display::Tone& tone,
+              std::vector<uint32_t>& least) {
+  if (layout.format != display::PixelFormat::kBitPlanes3) return true;
+  if (!std::is_sorted(tone.lut.begin(), tone.lut.end())) return false;
+  const uint32_t sub_frames = static_cast<uint32_t>(layout.sub_frames);
+  for (uint32_t sub = 0; sub < sub_frames; ++sub) {
+    for (uint32_t v = 0; v < 8; ++v) {
+      for (uint32_t u = 0; u < 8; ++u) {
+        const uint32_t threshold = Threshold(tone.dither, u, v, sub, sub_frames);
+        uint32_t level = 0;
+        while (level < 256 && Quantize(tone.lut[level], 2, threshold) == 0) ++level;
+        least.push_back(level < 256 ? Spread3(level) : 1u << 24);
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<PackedPlan> PackedPlan::Of(const display::FootprintTable& table,
+                                         const display::VoxelGrid& grid,
+                                         const display::FrameLayout& layout,
+                                         const display::Tone& tone, int32_t begin, int32_t end) {
+  if (tone.sampling != display::Sampling::kMax || table.inner_sets != 1 ||
+      table.inner_axis != display::Axis::kY || table.width > grid.nx) {
+    return std::nullopt;
+  }
+  PackedPlan plan;
+  plan.slice_of_z.assign(static_cast<size_t>(grid.nz), -1);
+  std::vector<uint8_t> taken(plan.slice_of_z.size());
+  for (int32_t s = 0; s < table.slices; ++s) {
+    int32_t z = -1;
+    for (int32_t u = 0; u < table.width; ++u) {
+      const auto list = table.Outer(s, u);
+      if (list.size() != 1 || list[0].x != u || list[0].y != 0 || (u > 0 && list[0].z != z)) {
+        return std::nullopt;
+      }
+      z = list[0].z;
+    }
+    if (z < 0 || taken[static_cast<size_t>(z)]++ != 0) return std::nullopt;
+    if (s >= begin && s < end) plan.slice_of_z[static_cast<size_t>(z)] = s - begin;
+  }
+  for (int32_t v = 0; v < table.height; ++v) {
+    const auto list = table.Inner(0, v);
+    if (list.size() != 1 || list[0].x != 0 || list[0].z != 0) return std::nullopt;
+    if (v == 0) plan.y0 = list[0].y;
+    if (v == 1) plan.y_step = list[0].y - plan.y0;
+    if (list[0].y != plan.y0 + plan.y_step * v) return std::nullopt;
+  }
+  if (plan.y_step != 1 && plan.y_step != -1) return std::nullopt;
+  if (!PutLeast(layout, tone, plan.least)) return std::nullopt;
+  return plan;
+}
+
+}  // namespace voxeld::gpu::cuda

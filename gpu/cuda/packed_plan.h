@@ -1,0 +1,28 @@
+// Whether a display's pixels are voxels, so that tiles can be packed as they are drawn: a planar
+// stack along z of the grid's own resolution, each pixel one voxel, in the grid's x and y.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+
+namespace voxeld::gpu::cuda {
+
+struct PackedPlan {
+  std::vector<int32_t> slice_of_z;  // by z of the grid: −begin; −1: none of those owned
+  int32_t y0 = 0, y_step = 1;       // pixel v is the voxel y0 + y_step·v
+  // As PackedView::least; empty unless the format has bit planes.
+  std::vector<uint32_t> least;
+
+  // Of slices [begin, end). Nothing if pixels are not voxels, or if bit planes' tone is not
+  // monotonic.
+  static std::optional<PackedPlan> Of(const display::FootprintTable& table,
+                                      const display::VoxelGrid& grid,
+                                      const display::FrameLayout& layout, const display::Tone& tone,
+                                      int32_t begin, int32_t end);
+};
+
+}  // namespace voxeld::gpu::cuda

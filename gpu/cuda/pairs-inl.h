@@ -1,0 +1,213 @@
+// Pairs of items and tiles, raised into a region's words: whatever is no thin line.
+#pragma once
+
+#include "gpu/cuda/region_scratch-inl.h"
+#include "gpu/primitives/list.h"
+
+namespace voxeld::gpu::cuda {
+
+struct PairScratch {
+  uint64_t heavy[kDrawThreads];  // pairs for many threads
+  uint32_t heavy_count;
+  SolidBlock solid;
+};
+
+// A pair's voxels in `box`, raised into the region's words.
+template <class Primitive>
+__device__ void DrawItem(const TableEntry& entry, uint32_t item, const Box3& box, uint32_t* words) {
+  const uint32_t priority = entry.priority;
+  const bool erase = entry.erase != 0;
+  uint32_t rgb_before = 0;
+  uint32_t word = MakeWord(priority, erase, rgb_before);
+  Primitive::EmitVoxels(entry.source, item, box,
+                        [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
+                          if (rgb != rgb_before) {
+                            rgb_before = rgb;
+                            word = MakeWord(priority, erase, rgb);
+                          }
+                          atomicMax(&words[IndexInRegion(x, y, z)], word);
+                        });
+}
+
+// Whether an item is better drawn by many threads: thick ones, solids, large triangles.
+__device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box3& box) {
+  switch (entry.record.kind) {
+    case PrimitiveKind::kPoints:
+    case PrimitiveKind::kSegments:
+      return entry.source.radius > 0;
+    case PrimitiveKind::kTriangles: {
+      const Box3 part = Intersect(box, BoundsOf(Triangles::ItemOf(entry.source, item)));
+      constexpr int32_t kSmall = 128;  // voxels
+      return (part.hi[0] - part.lo[0]) * (part.hi[1] - part.lo[1]) * (part.hi[2] - part.lo[2]) >
+             kSmall;
+    }
+    default:
+      return true;
+  }
+}
+
+__device__ inline bool IsSolid(PrimitiveKind kind) {
+  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
+         kind == PrimitiveKind::kCylinder;
+}
+
+// A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
+// them.
+template <class Shape>
+__device__ void DrawSolid(const TableEntry& entry, const Box3& box, uint32_t* words,
+                          SolidBlock& block) {
+  const Solid& s = entry.source.solid;
+  const Box3 part = Intersect(box, s.bounds);
+  const uint32_t word = MakeWord(entry.priority, entry.erase != 0, entry.record.color & 0x00FFFFFF);
+  if (threadIdx.x == 0 && Contains(box, s.origin[0], s.origin[1], s.origin[2]) &&
+      !IsInside<Shape>(s, s.origin[0], s.origin[1], s.origin[2])) {
+    atomicMax(
+        &words[IndexInRegion(static_cast<int32_t>(s.origin[0]), static_cast<int32_t>(s.origin[1]),
+                             static_cast<int32_t>(s.origin[2]))],
+        word);
+  }
+  if (IsEmpty(part)) return;  // the same for every thread
+  int64_t lo[3], hi[3];
+  for (int a = 0; a < 3; ++a) {
+    lo[a] = static_cast<int64_t>(part.lo[a]) - 1;
+    hi[a] = static_cast<int64_t>(part.hi[a]) + 1;
+  }
+  const int32_t rows_y = static_cast<int32_t>(hi[1] - lo[1]);
+  const int32_t rows = rows_y * static_cast<int32_t>(hi[2] - lo[2]);
+  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < rows;
+       i += static_cast<int32_t>(kDrawThreads)) {
+    block.FillRow<Shape>(s, lo, hi, lo[1] + i % rows_y, lo[2] + i / rows_y);
+  }
+  __syncthreads();
+  const int32_t inner_y = part.hi[1] - part.lo[1];
+  const int32_t inner = inner_y * (part.hi[2] - part.lo[2]);
+  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < inner;
+       i += static_cast<int32_t>(kDrawThreads)) {
+    const int32_t y = i % inner_y, z = i / inner_y;
+    uint32_t row = block.bits[z + 1][y + 1];
+    if (row != 0 && entry.record.fill == Fill::kSurface) {
+      row &= ~block.Enclosed(y + 1, z + 1, entry.record.rule);
+    }
+    for (int32_t x = part.lo[0]; x < part.hi[0]; ++x) {
+      if ((row >> (x - part.lo[0] + 1)) & 1u) {
+        atomicMax(&words[IndexInRegion(x, part.lo[1] + y, part.lo[2] + z)], word);
+      }
+    }
+  }
+  __syncthreads();
+}
+
+// What the CPU has drawn of a tile, by a warp. Voxels are named as they lie in the tile.
+__device__ inline void RaiseDrawn(const CpuVoxelsView& drawn, uint32_t item, const Box3& box,
+                                  const TileGrid& grid, uint32_t* words) {
+  constexpr uint32_t kMask = kTileSize - 1;
+  for (uint64_t v = drawn.begin[item] + threadIdx.x % 32; v < drawn.begin[item + 1]; v += 32) {
+    const uint64_t voxel = drawn.voxels[v];
+    const uint32_t place = static_cast<uint32_t>(voxel >> 32);
+    atomicMax(
+        &words[IndexInRegion(box.lo[0] + static_cast<int32_t>(place >> grid.shift[0] & kMask),
+                             box.lo[1] + static_cast<int32_t>(place >> grid.shift[1] & kMask),
+                             box.lo[2] + static_cast<int32_t>(place >> grid.shift[2] & kMask))],
+        static_cast<uint32_t>(voxel));
+  }
+}
+
+// Every other heavy item, by a warp: each lane draws it in boxes of its own.
+__device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const Box3& box,
+                                  const TileGrid& grid, uint32_t* words) {
+  if (entry.record.kind == kDrawnByCpu) return RaiseDrawn(entry.drawn, item, box, grid, words);
+  constexpr int32_t kBlock = 4;
+  constexpr uint32_t kBlocks = kTileSize / kBlock;
+  for (uint32_t b = threadIdx.x % 32; b < kBlocks * kBlocks * kBlocks; b += 32) {
+    const int32_t at[3] = {static_cast<int32_t>(b % kBlocks),
+                           static_cast<int32_t>(b / kBlocks % kBlocks),
+                           static_cast<int32_t>(b / kBlocks / kBlocks)};
+    Box3 part;
+    for (int a = 0; a < 3; ++a) {
+      part.lo[a] = box.lo[a] + at[a] * kBlock;
+      part.hi[a] = Min(box.hi[a], part.lo[a] + kBlock);
+    }
+    if (IsEmpty(part)) continue;
+    switch (entry.record.kind) {
+      case PrimitiveKind::kPoints:
+        DrawItem<Points>(entry, item, part, words);
+        break;
+      case PrimitiveKind::kSegments:
+        DrawItem<Segments>(entry, item, part, words);
+        break;
+      default:
+        DrawItem<Triangles>(entry, item, part, words);
+        break;
+    }
+  }
+}
+
+__device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const TileGrid& grid,
+                                 uint32_t* words, PairScratch& scratch) {
+  const uint32_t count = scratch.heavy_count;
+  for (uint32_t i = threadIdx.x / 32; i < count; i += kDrawWarps) {
+    const TableEntry& entry = table[scratch.heavy[i] >> 32];
+    if (!IsSolid(entry.record.kind)) {
+      DrawByWarp(entry, static_cast<uint32_t>(scratch.heavy[i]), box, grid, words);
+    }
+  }
+  __syncthreads();
+  for (uint32_t i = 0; i < count; ++i) {
+    const TableEntry& entry = table[scratch.heavy[i] >> 32];
+    switch (entry.record.kind) {
+      case PrimitiveKind::kBox:
+        DrawSolid<Box>(entry, box, words, scratch.solid);
+        break;
+      case PrimitiveKind::kSphere:
+        DrawSolid<Sphere>(entry, box, words, scratch.solid);
+        break;
+      case PrimitiveKind::kCylinder:
+        DrawSolid<Cylinder>(entry, box, words, scratch.solid);
+        break;
+      default:
+        break;
+    }
+  }
+  __syncthreads();
+}
+
+// The layer's pairs of one tile, by the whole block.
+__device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile,
+                                 RegionScratch& region, PairScratch& scratch) {
+  const TileGrid& grid = view.volume.grid;
+  const Box3 box = grid.VoxelsOf(tile);
+  if (threadIdx.x == 0) scratch.heavy_count = 0;
+  __syncthreads();
+  for (uint32_t b = 0; b < view.pairs.count; ++b) {
+    const uint32_t end = region.row_end[t][b];
+    // In rounds of the block's size, so that what is heavy is drawn before its list is full.
+    for (uint32_t round = region.row_begin[t][b]; round < end; round += kDrawThreads) {
+      const uint32_t p = round + threadIdx.x;
+      bool heavy = false;
+      if (p < end) {
+        const uint64_t value = view.pairs.batches[b].values[p];
+        const TableEntry& entry = view.table[value >> 32];
+        const uint32_t item = static_cast<uint32_t>(value);
+        heavy = entry.alive != 0 && IsHeavy(entry, item, box);
+        if (entry.alive == 0) {
+        } else if (heavy) {
+          scratch.heavy[atomicAdd(&scratch.heavy_count, 1u)] = value;
+        } else if (entry.record.kind == PrimitiveKind::kPoints) {
+          DrawItem<Points>(entry, item, box, region.words);
+        } else if (entry.record.kind == PrimitiveKind::kSegments) {
+          DrawItem<Segments>(entry, item, box, region.words);
+        } else {
+          DrawItem<Triangles>(entry, item, box, region.words);
+        }
+      }
+      if (__syncthreads_or(heavy ? 1 : 0) != 0) {
+        DrawHeavy(view.table, box, grid, region.words, scratch);
+        if (threadIdx.x == 0) scratch.heavy_count = 0;
+        __syncthreads();
+      }
+    }
+  }
+  __syncthreads();
+}
+
+}  // namespace voxeld::gpu::cuda

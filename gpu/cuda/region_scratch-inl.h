@@ -1,0 +1,187 @@
+// A region being drawn, in shared memory: the words of the layer under way.
+#pragma once
+
+#include "gpu/assemble/blend.h"
+#include "gpu/cuda/draw_types.h"
+#include "gpu/word.h"
+
+namespace voxeld::gpu::cuda {
+
+inline constexpr uint32_t kDrawThreads = 512;
+inline constexpr uint32_t kDrawWarps = kDrawThreads / 32;
+inline constexpr uint32_t kQueue = 2 * kDrawThreads;  // spans sorted at once
+inline constexpr uint32_t kBuckets = 128;             // by length; those of two colours from 64 on
+inline constexpr uint32_t kRegionTiles = 4;           // bit 0: the further in x, bit 1: in y
+inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
+
+// Of a voxel in its region.
+__device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {
+  return static_cast<uint32_t>(x & 31) | static_cast<uint32_t>(y & 31) << 5 |
+         static_cast<uint32_t>(z & 15) << 10;
+}
+
+struct RegionScratch {
+  uint32_t words[kRegionVoxels];
+  LineSpan queue[kQueue];
+  uint32_t buckets[kBuckets];
+  // Of the layer under way: rows of pairs, of a tile and a batch each, and bits: which line batches.
+  uint32_t row_begin[kRegionTiles][kMaxBatches], row_end[kRegionTiles][kMaxBatches];
+  uint32_t line_batches;
+  uint32_t layer;    // its slot; kAllLanes: no more
+  uint32_t cutting;  // bits: which of its half-spaces cut the region
+  uint32_t outside;  // not 0: all of the region lies outside one of them
+  uint32_t region;
+  uint32_t lit[kRegionTiles], differs[kRegionTiles];
+  uint32_t pairs;  // not 0: the layer has some here
+};
+
+// A region's place: its tiles' numbers, kAllLanes where there is none or it is not owned.
+struct RegionPlace {
+  Box3 box;  // of its voxels in the volume
+  int32_t tile[3];
+
+  __device__ RegionPlace(const DrawView& view, uint32_t region) {
+    int32_t at[3];
+    view.regions.RegionCoordinates(region, at);
+    for (int a = 0; a < 3; ++a) {
+      box.lo[a] = at[a] << RegionBits(a);
+      box.hi[a] = Min(view.volume.grid.voxels[a], (at[a] + 1) << RegionBits(a));
+      tile[a] = box.lo[a] / kTileSize;
+    }
+  }
+  __device__ uint32_t TileOf(const VolumeView& volume, uint32_t t) const {
+    const int32_t i = tile[0] + static_cast<int32_t>(t & 1),
+                  j = tile[1] + static_cast<int32_t>(t >> 1);
+    const TileGrid& grid = volume.grid;
+    if (i >= grid.tiles[0] || j >= grid.tiles[1] || tile[2] >= grid.tiles[2]) return kAllLanes;
+    const uint32_t index = grid.Index(i, j, tile[2]);
+    return volume.owned[index] != 0 ? index : kAllLanes;
+  }
+};
+
+__device__ inline uint32_t LayerOf(uint64_t key) {
+  return static_cast<uint32_t>(key) & (kMaxLayers - 1);
+}
+
+// The pairs of a tile, in a batch, that are of the layer of the least rank beyond `last`.
+__device__ inline void FindPairs(const DrawView& view, const BatchView& batch, uint32_t tile,
+                                 int32_t last, int32_t& best, uint32_t& begin, uint32_t& end,
+                                 int32_t& least, uint32_t& layer) {
+  const uint32_t stop = batch.row_begin[tile + 1];
+  for (uint32_t p = batch.row_begin[tile]; p < stop;) {
+    const uint32_t here = LayerOf(batch.keys[p]);
+    uint32_t low = p + 1, high = stop;  // the first pair of a later layer
+    if (LayerOf(batch.keys[stop - 1]) == here) low = stop;
+    while (low < high) {
+      const uint32_t middle = low + (high - low) / 2;
+      if (LayerOf(batch.keys[middle]) <= here) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    const LayerLook look = view.layers[here];
+    if (look.visible != 0 && look.rank > last && look.rank < best) {
+      best = look.rank;
+      begin = p;
+      end = low;
+      if (look.rank < least) {
+        least = look.rank;
+        layer = here;
+      }
+    }
+    p = low;
+  }
+}
+
+// The layer of the least rank beyond `last` that has something in the region, and what. By the first
+// warp: a lane looks after a batch.
+template <bool kPairs>
+__device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int32_t last,
+                             RegionScratch& scratch) {
+  const uint32_t lane = threadIdx.x % 32;
+  constexpr int32_t kNone = 0x7FFFFFFF;
+  int32_t least = kNone;
+  uint32_t layer = kAllLanes;
+  int32_t best[kRegionTiles] = {kNone, kNone, kNone, kNone};
+  uint32_t begin[kRegionTiles] = {}, end[kRegionTiles] = {};
+  if constexpr (kPairs) {
+    for (uint32_t t = 0; t < kRegionTiles; ++t) {
+      const uint32_t tile = place.TileOf(view.volume, t);
+      if (lane < view.pairs.count && tile != kAllLanes) {
+        FindPairs(view, view.pairs.batches[lane], tile, last, best[t], begin[t], end[t], least,
+                  layer);
+      }
+    }
+  }
+  int32_t line_rank = kNone;
+  if (lane < view.lines.count) {
+    const LineBatchView& batch = view.lines.batches[lane];
+    const LayerLook look = view.layers[batch.layer];
+    const uint32_t region = scratch.region;
+    if (look.visible != 0 && look.rank > last && batch.rows[region] != batch.rows[region + 1]) {
+      line_rank = look.rank;
+      if (line_rank < least) {
+        least = line_rank;
+        layer = batch.layer;
+      }
+    }
+  }
+  const int32_t mine = least;
+  for (int lanes = 16; lanes > 0; lanes /= 2) {
+    least = Min(least, __shfl_xor_sync(kAllLanes, least, lanes));
+  }
+  bool pairs = false;
+  if constexpr (kPairs) {
+    for (uint32_t t = 0; t < kRegionTiles; ++t) {
+      const bool here = best[t] == least && least != kNone;
+      scratch.row_begin[t][lane] = here ? begin[t] : 0;
+      scratch.row_end[t][lane] = here ? end[t] : 0;
+      pairs |= here;
+    }
+  }
+  const uint32_t any_pairs = __ballot_sync(kAllLanes, pairs);
+  const uint32_t lines = __ballot_sync(kAllLanes, line_rank == least && least != kNone);
+  if (lane == 0) {
+    scratch.layer = kAllLanes;
+    scratch.pairs = any_pairs;
+    scratch.line_batches = lines;
+  }
+  __syncwarp();
+  if (mine == least && least != kNone) scratch.layer = layer;  // the same in all that have it
+  return least;
+}
+
+// How the layer found lies to the region. By the first warp: a lane looks after a half-space.
+static_assert(kMaxHalfSpaces <= 32);
+__device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionScratch& scratch) {
+  const uint32_t lane = threadIdx.x % 32;
+  ClipSide side = ClipSide::kInside;
+  __syncwarp();
+  if (scratch.layer != kAllLanes) {
+    const LayerLook& look = view.layers[scratch.layer];
+    if (lane < look.half_spaces) side = SideOf(view.half_spaces[look.first_half_space + lane], box);
+  }
+  const uint32_t cutting = __ballot_sync(kAllLanes, side == ClipSide::kCut);
+  const uint32_t outside = __ballot_sync(kAllLanes, side == ClipSide::kOutside);
+  if (lane == 0) {
+    scratch.cutting = cutting;
+    scratch.outside = outside;
+  }
+}
+
+// Whether a voxel of the region (its place there) lies inside all half-spaces that cut it.
+__device__ inline bool IsInsideAll(const VoxelHalfSpace* half_spaces, uint32_t cutting,
+                                   const Box3& box, uint32_t v) {
+  for (; cutting != 0; cutting &= cutting - 1) {
+    if (!IsInside(half_spaces[__ffs(static_cast<int>(cutting)) - 1],
+                  box.lo[0] + static_cast<int32_t>(v & 31),
+                  box.lo[1] + static_cast<int32_t>(v >> 5 & 31),
+                  box.lo[2] + static_cast<int32_t>(v >> 10))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace voxeld::gpu::cuda
