@@ -140,7 +140,7 @@ struct FrameResult {
   uint64_t frame = 0;
   bool changed = false;             // some picture differs from the frame before
   uint64_t lit_voxels = 0;          // of the engine's tiles: result not black
-  uint32_t tiles_drawn = 0;         // dirty tiles drawn for this frame
+  uint32_t tiles_drawn = 0;         // dirty tiles, of the engine's own size, drawn for this frame
   uint32_t pictures_drawn = 0;      // pictures sliced again
   uint32_t singular_drawables = 0;  // solids whose map has no inverse: they draw nothing
   int64_t assemble_ns = 0, slice_ns = 0;

@@ -38,7 +38,9 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
   int32_t rank = -1;
   for (;;) {
     if (threadIdx.x < 32) {
-      rank = NextLayer<kWhat == DrawWhat::kAll>(view, place, rank, scratch);
+      PairRows* rows = nullptr;
+      if constexpr (kWhat == DrawWhat::kAll) rows = &all.pairs.rows;
+      rank = NextLayer<kWhat == DrawWhat::kAll>(view, place, rank, scratch, rows);
       ClipRegion(view, place.box, scratch);
     }
     __syncthreads();
@@ -82,6 +84,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       scratch.region = next < counters.dirty ? view.volume.dirty_list[next] : kAllLanes;
     }
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
+    if (threadIdx.x < 1u << RegionBits(2)) scratch.pictures[threadIdx.x] = 0;
     uint4* const words = reinterpret_cast<uint4*>(scratch.words);
     for (uint32_t v = threadIdx.x; v < kRegionVoxels / 4; v += kDrawThreads) {
       words[v] = make_uint4(0, 0, 0, 0);

@@ -168,14 +168,25 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
     for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
       const uint32_t picture = static_cast<uint32_t>(s) * slices.sub_frames + sub;
       const bool pixel = inside && static_cast<uint32_t>(at.x) < slices.width;
-      if (PutRow(packed, sub, at, static_cast<uint32_t>(v), c, pixel,
-                 slices.bytes + static_cast<size_t>(picture) * slices.bytes_per_picture)) {
-        slices.differs[picture] = 1;
+      const bool differs =
+          PutRow(packed, sub, at, static_cast<uint32_t>(v), c, pixel,
+                 slices.bytes + static_cast<size_t>(picture) * slices.bytes_per_picture);
+      if (__any_sync(kAllLanes, differs) && at.lane == 0) {
+        atomicOr(&scratch.pictures[at.z - place.box.lo[2]], 1u << sub);
       }
     }
-    if (at.lane == 0) packed.slice_dirty[s] = 1;
   }
   __syncthreads();
+  const int32_t z = place.box.lo[2] + static_cast<int32_t>(threadIdx.x);
+  if (z < place.box.hi[2] && scratch.pictures[threadIdx.x] != 0) {
+    const uint32_t s = static_cast<uint32_t>(packed.slice_of_z[z]);
+    packed.slice_dirty[s] = 1;
+    for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
+      if (scratch.pictures[threadIdx.x] >> sub & 1) {
+        slices.differs[s * slices.sub_frames + sub] = 1;
+      }
+    }
+  }
   if (threadIdx.x < kRegionTiles) {
     const uint32_t tile = place.TileOf(view.volume, threadIdx.x);
     if (tile != kAllLanes) PutLit(view.volume, tile, scratch.lit[threadIdx.x]);

@@ -27,7 +27,7 @@ __global__ void ListDirtyKernel(VolumeView volume, RegionGrid regions) {
   }
   if (!dirty || owned == 0) return;
   volume.dirty_list[atomicAdd(&volume.counters->dirty, 1u)] = static_cast<uint32_t>(region);
-  atomicAdd(&volume.counters->tiles_drawn, owned);
+  atomicAdd(&volume.counters->tiles_drawn, 1u);
 }
 
 struct BoxArgs {

@@ -1,6 +1,5 @@
 // Thin lines: made from drawables' items, and sorted by region.
 #include <cub/block/block_scan.cuh>
-#include <cub/device/device_scan.cuh>
 
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/line_kernels.h"
@@ -11,6 +10,9 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 constexpr uint32_t kThreads = 256;
+constexpr uint32_t kWarps = kThreads / 32;
+constexpr uint32_t kAll = 0xFFFFFFFFu;
+static_assert(kLineChunk == kThreads, "a line each");
 
 __device__ uint32_t OrderedBits(float value) {
   const uint32_t bits = __float_as_uint(value);
@@ -90,18 +92,18 @@ __global__ void __launch_bounds__(kThreads)
   __syncthreads();
   const int bits[3] = {RegionBits(0) + kBlockBits, RegionBits(1) + kBlockBits,
                        RegionBits(2) + kBlockBits};
-  const uint64_t first = static_cast<uint64_t>(blockIdx.x) * sort.chunk;
-  const uint64_t last = Min<uint64_t>(count, first + sort.chunk);
-  for (uint64_t i = first + threadIdx.x; i < last; i += kThreads) {
-    const ThinLine line = Load(&lines[i]);
-    if (line.word == 0) continue;
+  const uint32_t i = blockIdx.x * kLineChunk + threadIdx.x;
+  ThinLine line;
+  line.word = 0;
+  if (i < count) line = Load(&lines[i]);
+  if (line.word != 0) {
     int32_t begin[3];
     for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
-    WalkThin(line, 0, begin, bits, [&](const int32_t block[3], int32_t k, int32_t) {
+    WalkThin(line, 0, begin, bits, [&](const int32_t block[3], int32_t k, int32_t end) {
       if (!sort.grid.HasBlock(block)) return true;
       const uint32_t place = atomicAdd(&at[sort.grid.BlockAt(block)], 1u);
       if (kFill && place < sort.piece_capacity) {
-        sort.pieces[place] = {static_cast<uint32_t>(i), static_cast<uint32_t>(k)};
+        sort.pieces[place] = LinePiece::Of(i, k, end - k);
       }
       return true;
     });
@@ -153,49 +155,124 @@ __device__ uint32_t BlockOf(const LineSort& sort, uint32_t chunk) {
   return low;
 }
 
-template <bool kFill>
-__global__ void __launch_bounds__(kThreads)
-    SortPiecesKernel(LineSort sort, const ThinLine* lines, const uint32_t* ends,
-                     const uint32_t* rows, LineSpan* spans) {
-  __shared__ uint32_t at[kRegionsInBlock];
-  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
+constexpr uint32_t kPiecesOfWarp = kPieceChunk / kWarps;
+constexpr uint32_t kSpansOfWarp = kPiecesOfWarp * kMostSpansOfPiece;
+constexpr uint32_t kLengths = 32;
+
+struct SpanScratch {
+  LinePiece order[kPieceChunk];  // by length, so that a warp's lanes have about as much to do
+  LineSpan spans[kWarps][kSpansOfWarp];  // as they were found
+  uint32_t found[kWarps];
+  uint32_t lengths[kLengths];
+  uint32_t at[kRegionsInBlock];  // spans by region, then the place of the next
+  uint32_t base;
+};
+
+// Exclusive sums over a warp; the sum of all in `total`.
+__device__ uint32_t SumBefore(uint32_t value, uint32_t& total) {
+  uint32_t sum = value;
+  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
+    const uint32_t other = __shfl_up_sync(kAll, sum, lanes);
+    if (threadIdx.x % 32 >= lanes) sum += other;
+  }
+  total = __shfl_sync(kAll, sum, 31);
+  return sum - value;
+}
+
+// Pieces first to last − 1 into `order`.
+__device__ void OrderPieces(const LinePiece* pieces, uint32_t count, SpanScratch& scratch) {
+  constexpr uint32_t kEach = kPieceChunk / kThreads;
+  LinePiece mine[kEach];
+  uint32_t rank[kEach], bucket[kEach];
+#pragma unroll
+  for (uint32_t e = 0; e < kEach; ++e) {
+    const uint32_t p = threadIdx.x + e * kThreads;
+    if (p >= count) continue;
+    mine[e] = pieces[p];
+    bucket[e] = Min(mine[e].count() / 4, kLengths - 1);
+    rank[e] = atomicAdd(&scratch.lengths[bucket[e]], 1u);
+  }
+  __syncthreads();
+  if (threadIdx.x < kLengths) {
+    uint32_t total;
+    scratch.lengths[threadIdx.x] = SumBefore(scratch.lengths[threadIdx.x], total);
+  }
+  __syncthreads();
+#pragma unroll
+  for (uint32_t e = 0; e < kEach; ++e) {
+    if (threadIdx.x + e * kThreads >= count) continue;
+    scratch.order[scratch.lengths[bucket[e]] + rank[e]] = mine[e];
+  }
+  __syncthreads();
+}
+
+__global__ void __launch_bounds__(kThreads, 4)
+    SortSpansKernel(LineSort sort, const ThinLine* lines, const uint32_t* ends) {
+  __shared__ SpanScratch scratch;
   const uint32_t chunks = sort.chunk_begin[sort.grid.block_count()];
   if (sort.block_begin[sort.grid.block_count()] > sort.piece_capacity) return;
+  const uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
   for (uint32_t chunk = blockIdx.x; chunk < chunks; chunk += gridDim.x) {
     const uint32_t b = BlockOf(sort, chunk);
     int32_t block[3];
     sort.grid.BlockCoordinates(b, block);
-    uint32_t* const offsets = sort.piece_offsets + static_cast<size_t>(chunk) * kRegionsInBlock;
-    if (threadIdx.x < kRegionsInBlock) {
-      at[threadIdx.x] = kFill ? rows[b * kRegionsInBlock + threadIdx.x] + offsets[threadIdx.x] : 0;
-    }
+    if (threadIdx.x < kRegionsInBlock) scratch.at[threadIdx.x] = 0;
+    if (threadIdx.x < kLengths) scratch.lengths[threadIdx.x] = 0;
+    if (threadIdx.x < kWarps) scratch.found[threadIdx.x] = 0;
     __syncthreads();
     const uint32_t first = sort.block_begin[b] + (chunk - sort.chunk_begin[b]) * kPieceChunk;
-    const uint32_t last = Min(sort.block_begin[b + 1], first + kPieceChunk);
-    for (uint32_t p = first + threadIdx.x; p < last; p += kThreads) {
-      const LinePiece piece = sort.pieces[p];
+    const uint32_t count = Min(sort.block_begin[b + 1] - first, kPieceChunk);
+    OrderPieces(sort.pieces + first, count, scratch);
+    for (uint32_t p = threadIdx.x; p < count; p += kThreads) {
+      const LinePiece piece = scratch.order[p];
       const ThinLine line = Load(&lines[piece.line]);
-      const int32_t k = static_cast<int32_t>(piece.k);
+      const int32_t k = piece.k(), stop = k + static_cast<int32_t>(piece.count());
       int32_t begin[3];
       for (int a = 0; a < 3; ++a) begin[a] = BoxAt(line, a, k, bits[a]);
-      bool mixed = false;
-      if (kFill && ends != nullptr) mixed = ends[piece.line] != line.word;
+      const bool mixed = ends != nullptr && ends[piece.line] != line.word;
       WalkThin(line, k, begin, bits, [&](const int32_t box[3], int32_t from, int32_t to) {
-        for (int a = 0; a < 3; ++a) {
-          if (box[a] >> kBlockBits != block[a]) return false;
+        const uint32_t region = RegionGrid::InBlock(box);
+        atomicAdd(&scratch.at[region], 1u);
+        // Lanes that are here together take places together.
+        const uint32_t here = __activemask();
+        uint32_t place = 0;
+        if (lane == static_cast<uint32_t>(__ffs(static_cast<int>(here))) - 1) {
+          place = atomicAdd(&scratch.found[warp], static_cast<uint32_t>(__popc(here)));
         }
-        const uint32_t place = atomicAdd(&at[RegionGrid::InBlock(box)], 1u);
-        if (kFill && place < sort.span_capacity) {
-          spans[place] = LineSpan::Of(piece.line, from, to - from, mixed);
-        }
-        return true;
+        place = __shfl_sync(here, place, __ffs(static_cast<int>(here)) - 1) +
+                static_cast<uint32_t>(__popc(here & ((1u << lane) - 1)));
+        scratch.spans[warp][place] = LineSpan::Of(piece.line, from, to - from, region, mixed);
+        return to < stop;
       });
     }
     __syncthreads();
-    if (!kFill && threadIdx.x < kRegionsInBlock) {
-      const uint32_t count = at[threadIdx.x];
-      offsets[threadIdx.x] =
-          count == 0 ? 0 : atomicAdd(&sort.region_counts[b * kRegionsInBlock + threadIdx.x], count);
+    if (warp == 0) {
+      const uint32_t low = scratch.at[2 * lane], high = scratch.at[2 * lane + 1];
+      uint32_t total;
+      const uint32_t before = SumBefore(low + high, total);
+      uint16_t* const offsets = sort.offsets + static_cast<size_t>(chunk) * (kRegionsInBlock + 1);
+      offsets[2 * lane] = static_cast<uint16_t>(before);
+      offsets[2 * lane + 1] = static_cast<uint16_t>(before + low);
+      scratch.at[2 * lane] = before;
+      scratch.at[2 * lane + 1] = before + low;
+      uint64_t any = static_cast<uint64_t>(low != 0) << 2 * lane | static_cast<uint64_t>(high != 0)
+                                                                       << (2 * lane + 1);
+      for (int lanes = 16; lanes > 0; lanes /= 2) any |= __shfl_xor_sync(kAll, any, lanes);
+      if (lane == 0) {
+        offsets[kRegionsInBlock] = static_cast<uint16_t>(total);
+        scratch.base = atomicAdd(sort.span_count, total);
+        sort.base[chunk] = scratch.base;
+        atomicOr(reinterpret_cast<unsigned long long*>(&sort.regions[b]),
+                 static_cast<unsigned long long>(any));
+      }
+    }
+    __syncthreads();
+    const uint32_t base = scratch.base;
+    for (uint32_t i = lane; i < scratch.found[warp]; i += 32) {
+      const LineSpan span = scratch.spans[warp][i];
+      const uint32_t place = base + atomicAdd(&scratch.at[span.region()], 1u);
+      if (place < sort.span_capacity) sort.spans[place] = span;
     }
     __syncthreads();
   }
@@ -203,9 +280,10 @@ __global__ void __launch_bounds__(kThreads)
 
 // ----------------------------------------------------------------------------------------- marking
 
-__global__ void MarkRowsKernel(const uint32_t* rows, uint32_t regions, uint8_t* dirty) {
+__global__ void MarkRegionsKernel(const uint64_t* regions, uint32_t blocks, uint8_t* dirty) {
   const uint64_t r = Thread();
-  if (r < regions && rows[r] != rows[r + 1]) dirty[r] = 1;
+  if (r >= static_cast<uint64_t>(blocks) * kRegionsInBlock) return;
+  if (regions[r / kRegionsInBlock] >> r % kRegionsInBlock & 1) dirty[r] = 1;
 }
 
 __global__ void MarkLinesKernel(ItemList list, uint32_t count, const ThinLine* lines,
@@ -232,7 +310,7 @@ template <bool kFill>
 cudaError_t SortLines(const LineSort& sort, const ThinLine* lines, uint32_t count,
                       cudaStream_t stream) {
   const size_t shared = SortLinesShared(sort.grid);
-  const uint32_t chunks = (count + sort.chunk - 1) / sort.chunk;
+  const uint32_t chunks = (count + kLineChunk - 1) / kLineChunk;
   const cudaError_t error =
       cudaFuncSetAttribute(SortLinesKernel<kFill>, cudaFuncAttributeMaxDynamicSharedMemorySize,
                            static_cast<int>(kMostSortLinesShared));
@@ -278,26 +356,16 @@ cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t cou
   return SortLines<true>(sort, lines, count, stream);
 }
 
-cudaError_t CountSpans(const LineSort& sort, const ThinLine* lines, uint32_t blocks,
-                       cudaStream_t stream) {
-  SortPiecesKernel<false><<<blocks, kThreads, 0, stream>>>(sort, lines, nullptr, nullptr, nullptr);
+cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
+                      uint32_t blocks, cudaStream_t stream) {
+  SortSpansKernel<<<blocks, kThreads, 0, stream>>>(sort, lines, ends);
   return cudaGetLastError();
 }
 
-cudaError_t SumRows(void* temp, size_t& temp_bytes, const LineSort& sort, uint32_t* rows,
-                    cudaStream_t stream) {
-  return cub::DeviceScan::ExclusiveSum(temp, temp_bytes, sort.region_counts, rows,
-                                       sort.grid.count() + 1, stream);
-}
-
-cudaError_t FillSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
-                      const uint32_t* rows, LineSpan* spans, uint32_t blocks, cudaStream_t stream) {
-  SortPiecesKernel<true><<<blocks, kThreads, 0, stream>>>(sort, lines, ends, rows, spans);
-  return cudaGetLastError();
-}
-
-cudaError_t MarkRows(const uint32_t* rows, uint32_t regions, uint8_t* dirty, cudaStream_t stream) {
-  MarkRowsKernel<<<Blocks(regions), kThreads, 0, stream>>>(rows, regions, dirty);
+cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty,
+                        cudaStream_t stream) {
+  MarkRegionsKernel<<<Blocks(uint64_t{blocks} * kRegionsInBlock), kThreads, 0, stream>>>(
+      regions, blocks, dirty);
   return cudaGetLastError();
 }
 

@@ -10,16 +10,7 @@ namespace {
 
 // Up to here what a batch may need at most is taken, and nobody waits for the count of what it does.
 constexpr uint64_t kUncountedBytes = uint64_t{64} << 20;
-constexpr uint32_t kLeastChunk = 256;  // lines
-constexpr uint32_t kChunks = 1056;     // eight blocks of threads for each of a large device's
 constexpr uint64_t kMostPlaces = 0xFFFFFFFFu;
-
-absl::StatusOr<Block> Zeroed(Device& device, size_t bytes) {
-  absl::StatusOr<Block> block = device.pool().Acquire(bytes);
-  if (!block.ok()) return block;
-  if (absl::Status status = device.Zero(block->as<void>(), bytes); !status.ok()) return status;
-  return block;
-}
 
 // Boxes that a line touches at most, of a volume of so many along the axes.
 uint64_t MostBoxes(const int32_t count[3], int shift) {
@@ -52,109 +43,108 @@ absl::flat_hash_set<uint32_t> LineIndex::Layers() const {
 LineBatchList LineIndex::view() const {
   LineBatchList list;
   for (const auto& [number, batch] : batches_) {
-    list.batches[list.count++] = {batch.lines.as<ThinLine>(),
-                                  batch.mixed ? batch.ends.as<uint32_t>() : nullptr,
-                                  batch.count,
-                                  batch.layer,
-                                  batch.rows.as<uint32_t>(),
-                                  batch.spans.as<LineSpan>()};
+    LineBatchView& view = list.batches[list.count++];
+    view.lines = batch.lines.as<ThinLine>();
+    view.ends = batch.mixed ? batch.ends.as<uint32_t>() : nullptr;
+    view.layer = batch.layer;
+    view.lists = {batch.chunk_begin.as<uint32_t>(), batch.base.as<uint32_t>(),
+                  batch.offsets.as<uint16_t>(), batch.regions.as<uint64_t>(),
+                  batch.spans.as<LineSpan>()};
   }
   return list;
 }
 
 // ------------------------------------------------------------------------------------------ sorting
 
-absl::Status LineIndex::Sort(Batch& batch) {
-  const uint32_t blocks = grid_.block_count(), regions = grid_.count();
-  LineSort sort;
+// With room for as many pieces and spans as `sort` says. needed[2]: how many there were; only if
+// `counted`, which waits for it.
+absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uint32_t* needed) {
+  const size_t blocks = grid_.block_count();
+  const size_t line_chunks = (size_t{batch.count} + kLineChunk - 1) / kLineChunk;
+  const size_t chunks = sort.piece_capacity / kPieceChunk + blocks;
   sort.grid = grid_;
-  sort.chunk = std::max(kLeastChunk, (batch.count + kChunks - 1) / kChunks);
-  const uint32_t line_chunks = (batch.count + sort.chunk - 1) / sort.chunk;
+  // What the sorting alone needs.
+  Block block_counts, block_begin, line_offsets, pieces, span_count;
   struct Wanted {
-    uint32_t** at;
-    uint64_t count;
+    Block* block;
+    size_t bytes;
     bool zero;
-    Block block;
   };
-  const uint64_t most_pieces =
-      std::min(kMostPlaces, uint64_t{batch.count} * MostBoxes(grid_.blocks, 0));
-  const uint64_t most_spans =
-      std::min(kMostPlaces, uint64_t{batch.count} * MostBoxes(grid_.blocks, kBlockBits));
-  Wanted wanted[] = {
-      {&sort.block_counts, blocks, true, {}},
-      {&sort.block_begin, uint64_t{blocks} + 1, false, {}},
-      {&sort.chunk_begin, uint64_t{blocks} + 1, false, {}},
-      {&sort.line_offsets, uint64_t{line_chunks} * blocks, false, {}},
-      {&sort.region_counts, uint64_t{regions} + 1, true, {}},
-  };
-  for (Wanted& want : wanted) {
-    const size_t bytes = want.count * sizeof(uint32_t);
-    absl::StatusOr<Block> block =
-        want.zero ? Zeroed(device_, bytes) : device_.pool().Acquire(bytes);
+  for (const Wanted& want : {
+           Wanted{&block_counts, blocks * sizeof(uint32_t), true},
+           Wanted{&block_begin, (blocks + 1) * sizeof(uint32_t), false},
+           Wanted{&line_offsets, line_chunks * blocks * sizeof(uint32_t), false},
+           Wanted{&pieces, sort.piece_capacity * sizeof(LinePiece), false},
+           Wanted{&span_count, sizeof(uint32_t), true},
+           Wanted{&batch.chunk_begin, (blocks + 1) * sizeof(uint32_t), false},
+           Wanted{&batch.base, chunks * sizeof(uint32_t), false},
+           Wanted{&batch.offsets, chunks * (kRegionsInBlock + 1) * sizeof(uint16_t), false},
+           Wanted{&batch.regions, blocks * sizeof(uint64_t), true},
+           Wanted{&batch.spans, sort.span_capacity * sizeof(LineSpan), false},
+       }) {
+    absl::StatusOr<Block> block = want.zero
+                                      ? device_.Zeros(want.bytes)
+                                      : device_.pool().Acquire(std::max<size_t>(1, want.bytes));
     if (!block.ok()) return block.status();
-    want.block = *std::move(block);
-    *want.at = want.block.as<uint32_t>();
+    *want.block = *std::move(block);
   }
+  sort.block_counts = block_counts.as<uint32_t>();
+  sort.block_begin = block_begin.as<uint32_t>();
+  sort.line_offsets = line_offsets.as<uint32_t>();
+  sort.pieces = pieces.as<LinePiece>();
+  sort.span_count = span_count.as<uint32_t>();
+  sort.chunk_begin = batch.chunk_begin.as<uint32_t>();
+  sort.base = batch.base.as<uint32_t>();
+  sort.offsets = batch.offsets.as<uint16_t>();
+  sort.regions = batch.regions.as<uint64_t>();
+  sort.spans = batch.spans.as<LineSpan>();
   const ThinLine* const lines = batch.lines.as<ThinLine>();
   const uint32_t* const ends = batch.mixed ? batch.ends.as<uint32_t>() : nullptr;
+  const size_t most_threads = static_cast<size_t>(device_.api().device().multiProcessorCount) * 4;
+  const uint32_t launch = static_cast<uint32_t>(std::min(chunks, most_threads));
   absl::Status status = device_.Run(
       "CountPieces", [&] { return CountPieces(sort, lines, batch.count, device_.stream()); });
   if (!status.ok()) return status;
-  const bool uncounted = most_spans * sizeof(LineSpan) <= kUncountedBytes;
-  sort.piece_capacity = static_cast<uint32_t>(most_pieces);
-  if (!uncounted) {
-    const absl::StatusOr<uint32_t> pieces = device_.Read(sort.block_begin + blocks);
-    if (!pieces.ok()) return pieces.status();
-    sort.piece_capacity = *pieces;
-  }
-  absl::StatusOr<Block> pieces =
-      device_.pool().Acquire(std::max<size_t>(1, sort.piece_capacity) * sizeof(LinePiece));
-  if (!pieces.ok()) return pieces.status();
-  sort.pieces = pieces->as<LinePiece>();
-  const size_t piece_chunks = sort.piece_capacity / kPieceChunk + blocks;
-  absl::StatusOr<Block> piece_offsets =
-      device_.pool().Acquire(piece_chunks * kRegionsInBlock * sizeof(uint32_t));
-  if (!piece_offsets.ok()) return piece_offsets.status();
-  sort.piece_offsets = piece_offsets->as<uint32_t>();
   status = device_.Run("FillPieces",
                        [&] { return FillPieces(sort, lines, batch.count, device_.stream()); });
   if (!status.ok()) return status;
-  const uint32_t multiprocessors =
-      static_cast<uint32_t>(device_.api().device().multiProcessorCount);
-  const uint32_t launch =
-      static_cast<uint32_t>(std::min<uint64_t>(piece_chunks, uint64_t{multiprocessors} * 16));
-  status =
-      device_.Run("CountSpans", [&] { return CountSpans(sort, lines, launch, device_.stream()); });
-  if (!status.ok()) return status;
-  absl::StatusOr<Block> rows = device_.pool().Acquire((size_t{regions} + 1) * sizeof(uint32_t));
-  if (!rows.ok()) return rows.status();
-  size_t temp_bytes = 0;
-  const auto sum = [&](void* temp) {
-    return device_.Run("SumRows", [&] {
-      return SumRows(temp, temp_bytes, sort, rows->as<uint32_t>(), device_.stream());
-    });
-  };
-  if (status = sum(nullptr); !status.ok()) return status;
-  const absl::StatusOr<Block> temp = device_.pool().Acquire(temp_bytes);
-  if (!temp.ok()) return temp.status();
-  if (status = sum(temp->as<void>()); !status.ok()) return status;
-  sort.span_capacity = static_cast<uint32_t>(most_spans);
-  if (!uncounted) {
-    const absl::StatusOr<uint32_t> spans = device_.Read(rows->as<uint32_t>() + regions);
-    if (!spans.ok()) return spans.status();
-    sort.span_capacity = *spans;
+  status = device_.Run("SortSpans",
+                       [&] { return SortSpans(sort, lines, ends, launch, device_.stream()); });
+  if (!status.ok() || !counted) return status;
+  status = device_.ToHost(&needed[0], sort.block_begin + blocks, sizeof(uint32_t));
+  if (status.ok()) status = device_.ToHost(&needed[1], sort.span_count, sizeof(uint32_t));
+  return status.ok() ? device_.Wait() : status;
+}
+
+absl::Status LineIndex::Sort(Batch& batch) {
+  const uint64_t most_pieces = uint64_t{batch.count} * MostBoxes(grid_.blocks, 0);
+  const uint64_t most_spans = uint64_t{batch.count} * MostBoxes(grid_.blocks, kBlockBits);
+  LineSort sort;
+  uint32_t needed[2] = {};
+  if (most_spans * sizeof(LineSpan) <= kUncountedBytes) {
+    sort.piece_capacity = static_cast<uint32_t>(most_pieces);
+    sort.span_capacity = static_cast<uint32_t>(most_spans);
+    return SortInto(batch, sort, false, needed);
   }
-  absl::StatusOr<Block> spans =
-      device_.pool().Acquire(std::max<size_t>(1, sort.span_capacity) * sizeof(LineSpan));
-  if (!spans.ok()) return spans.status();
-  status = device_.Run("FillSpans", [&] {
-    return FillSpans(sort, lines, ends, rows->as<uint32_t>(), spans->as<LineSpan>(), launch,
-                     device_.stream());
-  });
-  if (!status.ok()) return status;
-  batch.rows = *std::move(rows);
-  batch.spans = *std::move(spans);
-  return absl::OkStatus();
+  const auto guess = [&](double a_line, uint64_t most) {
+    return static_cast<uint32_t>(
+        std::min({kMostPlaces, most, static_cast<uint64_t>(a_line * batch.count)}));
+  };
+  sort.piece_capacity = guess(pieces_a_line_, most_pieces);
+  sort.span_capacity = guess(spans_a_line_, most_spans);
+  for (;;) {
+    if (absl::Status status = SortInto(batch, sort, true, needed); !status.ok()) return status;
+    constexpr double kSpare = 1.1;
+    pieces_a_line_ = std::max(1.0, kSpare * needed[0] / batch.count);
+    if (needed[0] > sort.piece_capacity) {
+      // So many spans are not known yet.
+      sort.piece_capacity = needed[0];
+      continue;
+    }
+    spans_a_line_ = std::max(1.0, kSpare * needed[1] / batch.count);
+    if (needed[1] <= sort.span_capacity) return absl::OkStatus();
+    sort.span_capacity = needed[1];
+  }
 }
 
 // ------------------------------------------------------------------------------------------ changes
@@ -182,8 +172,9 @@ absl::Status LineIndex::Add(const TableEntry* table, const LineArrivals& arrival
   if (!status.ok()) return status;
   if (status = Sort(batch); !status.ok()) return status;
   if (arrivals.visible) {
-    status = device_.Run("MarkRows", [&] {
-      return MarkRows(batch.rows.as<uint32_t>(), grid_.count(), region_dirty, device_.stream());
+    status = device_.Run("MarkRegions", [&] {
+      return MarkRegions(batch.regions.as<uint64_t>(), grid_.block_count(), region_dirty,
+                         device_.stream());
     });
     if (!status.ok()) return status;
   }
@@ -248,9 +239,12 @@ absl::Status LineIndex::Mark(std::span<const uint32_t> slots, uint8_t* region_di
   for (auto& [number, lines] : Find(slots)) {
     const Batch& batch = batches_.at(number);
     absl::Status status =
-        lines.count < batch.live ? Touch(batch, lines, region_dirty) : device_.Run("MarkRows", [&] {
-          return MarkRows(batch.rows.as<uint32_t>(), grid_.count(), region_dirty, device_.stream());
-        });
+        lines.count < batch.live
+            ? Touch(batch, lines, region_dirty)
+            : device_.Run("MarkRegions", [&] {
+                return MarkRegions(batch.regions.as<uint64_t>(), grid_.block_count(), region_dirty,
+                                   device_.stream());
+              });
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

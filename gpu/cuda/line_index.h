@@ -64,7 +64,8 @@ class LineIndex {
   struct Batch {
     uint32_t layer = 0;
     uint32_t count = 0, live = 0;  // lines
-    Block lines, ends, rows, spans;
+    Block lines, ends;
+    Block chunk_begin, base, offsets, regions, spans;  // SpanLists
     std::vector<Member> members;
     bool mixed = false;
   };
@@ -82,10 +83,13 @@ class LineIndex {
   // Marks, or kills, some lines of a batch.
   absl::Status Touch(const Batch& batch, Lines& lines, uint8_t* region_dirty);
   absl::Status Sort(Batch& batch);
+  absl::Status SortInto(Batch& batch, LineSort& sort, bool counted, uint32_t* needed);
   absl::Status MergeFrom(const std::vector<uint64_t>& numbers);
 
   Device& device_;
   RegionGrid grid_;
+  // Of a line, on the average, as large batches had them; with some to spare.
+  double pieces_a_line_ = 4, spans_a_line_ = 12;
   uint64_t next_number_ = 1;
   absl::flat_hash_map<uint64_t, Batch> batches_;  // by number
   absl::flat_hash_map<uint32_t, Place> places_;   // by slot of the table

@@ -1,6 +1,6 @@
-// Thin lines on the device: made, and sorted by the regions that they touch, in two goes: lines into
-// blocks of regions, their pieces into regions. Each go counts, in chunks that reserve their places
-// in each row, and then fills: no list is ever searched, and nothing waits for the host.
+// Thin lines on the device: made, and sorted by the regions that they touch, in two goes. Lines are
+// cut into pieces by block of regions: counted, in chunks that reserve their places, and then put
+// there. A block's pieces are cut into spans, chunk by chunk, each sorted by region in shared memory.
 //
 // Each function queues its kernels in `stream` and answers whether that could be done.
 #pragma once
@@ -44,24 +44,19 @@ inline size_t SortLinesShared(const RegionGrid& grid) {
 }
 inline constexpr size_t kMostSortLinesShared = 96u << 10;
 
-// block_counts must be 0. After it block_begin and chunk_begin are there.
+// After it block_begin and chunk_begin are there.
 cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                         cudaStream_t stream);
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                        cudaStream_t stream);
-// region_counts must be 0.
-cudaError_t CountSpans(const LineSort& sort, const ThinLine* lines, uint32_t blocks,
-                       cudaStream_t stream);
-// rows[r]: sum of region_counts[0..r), r up to the number of regions. `temp` null: only its size.
-cudaError_t SumRows(void* temp, size_t& temp_bytes, const LineSort& sort, uint32_t* rows,
-                    cudaStream_t stream);
-// `ends`: which lines have two colours; may be null.
-cudaError_t FillSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
-                      const uint32_t* rows, LineSpan* spans, uint32_t blocks, cudaStream_t stream);
+// `ends`: which lines have two colours; may be null. By so many blocks of threads.
+cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
+                      uint32_t blocks, cudaStream_t stream);
 
 // ---- what is to be drawn anew
-// Regions of a batch that have spans.
-cudaError_t MarkRows(const uint32_t* rows, uint32_t regions, uint8_t* dirty, cudaStream_t stream);
+// Those that have spans; `regions` by block as SpanLists has it.
+cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty,
+                        cudaStream_t stream);
 // Lines in rows: `count` in all, the first of the d-th is slots[d].
 // Regions that they touch.
 cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,

@@ -65,35 +65,60 @@ struct RegionGrid {
   }
 };
 
-// A part of a line in a block of regions; it ends where the line leaves the block.
+// A part of a line in a block of regions: `count` voxels from k on.
 struct LinePiece {
   uint32_t line;
-  uint32_t k;  // of its first voxel
+  uint32_t bits;  // k; from bit 16 on the count
+
+  VOXELD_HD static LinePiece Of(uint32_t line, int32_t k, int32_t count) {
+    return {line, static_cast<uint32_t>(k) | static_cast<uint32_t>(count) << 16};
+  }
+  VOXELD_HD int32_t k() const { return static_cast<int32_t>(bits & 0xFFFF); }
+  VOXELD_HD uint32_t count() const { return bits >> 16; }
 };
 
 // A part of a line in a region: `count` voxels from k on.
 struct LineSpan {
   uint32_t line;
-  uint32_t bits;  // k; from bit 16 on the count; the top bit if the line runs from colour to colour
+  // k; from bit 16 on the count; from bit 23 on the region in its block; the top bit if the line
+  // runs from colour to colour.
+  uint32_t bits;
 
-  VOXELD_HD static LineSpan Of(uint32_t line, int32_t k, int32_t count, bool mixed) {
-    return {line, static_cast<uint32_t>(k) | static_cast<uint32_t>(count) << 16 |
+  VOXELD_HD static LineSpan Of(uint32_t line, int32_t k, int32_t count, uint32_t region,
+                               bool mixed) {
+    return {line, static_cast<uint32_t>(k) | static_cast<uint32_t>(count) << 16 | region << 23 |
                       (mixed ? 1u << 31 : 0u)};
   }
   VOXELD_HD int32_t k() const { return static_cast<int32_t>(bits & 0xFFFF); }
   VOXELD_HD uint32_t count() const { return bits >> 16 & 0x7F; }
+  VOXELD_HD uint32_t region() const { return bits >> 23 & (kRegionsInBlock - 1); }
   VOXELD_HD bool mixed() const { return bits >> 31 != 0; }
 };
 
-// Lines of one layer, with their spans by region: those of region r are
-// spans[rows[r]] to spans[rows[r + 1]].
-struct LineBatchView {
-  ThinLine* lines = nullptr;
-  uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
-  uint32_t count = 0;
-  uint32_t layer = 0;  // its slot
-  const uint32_t* rows = nullptr;
+// Pieces that are sorted at once, all of one block, and the spans that they come to at most.
+inline constexpr uint32_t kPieceChunk = 512;
+inline constexpr uint32_t kMostSpansOfPiece = 3 * ((1 << kBlockBits) - 1) + 1;
+
+// Spans by region. A block's chunks are chunk_begin[b] to chunk_begin[b + 1]; those of region r of it
+// in chunk c are spans[base[c] + offsets[c][r]] to spans[base[c] + offsets[c][r + 1]].
+struct SpanLists {
+  const uint32_t* chunk_begin = nullptr;
+  const uint32_t* base = nullptr;
+  const uint16_t* offsets = nullptr;  // kRegionsInBlock + 1 a chunk
+  const uint64_t* regions = nullptr;  // by block, bits: which have any
   const LineSpan* spans = nullptr;
+
+  VOXELD_HD bool Has(uint32_t region) const {
+    return regions[region / kRegionsInBlock] >> region % kRegionsInBlock & 1;
+  }
+};
+
+// Lines of one layer, with their spans by region.
+struct LineBatchView {
+  const ThinLine* lines = nullptr;
+  const uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
+  uint32_t layer = 0;              // its slot
+  SpanLists lists;
 };
 
 inline constexpr uint32_t kMaxLineBatches = 24;
@@ -103,20 +128,23 @@ struct LineBatchList {
   uint32_t count = 0;
 };
 
-// The work memory of sorting a batch.
+// The sorting of a batch: into blocks, then into regions.
+inline constexpr uint32_t kLineChunk = 256;
 struct LineSort {
   RegionGrid grid;
-  uint32_t chunk = 0;  // lines that a block of threads takes at once
   uint32_t piece_capacity = 0, span_capacity = 0;
-  uint32_t* block_counts = nullptr;   // by block
-  uint32_t* block_begin = nullptr;    // by block, and the end
-  uint32_t* chunk_begin = nullptr;    // by block, and the end: chunks of pieces before
-  uint32_t* line_offsets = nullptr;   // by chunk of lines and block
-  uint32_t* piece_offsets = nullptr;  // by chunk of pieces and region of its block
+  uint32_t* block_counts = nullptr;  // by block; 0 at first
+  uint32_t* block_begin = nullptr;   // by block, and the end
+  uint32_t* line_offsets = nullptr;  // by chunk of lines and block
   LinePiece* pieces = nullptr;
-  uint32_t* region_counts = nullptr;  // by region, and a 0
+  // What the lists are to have, and how many spans there are in all, 0 at first: also of those for
+  // which there is no room.
+  uint32_t* chunk_begin = nullptr;
+  uint32_t* base = nullptr;
+  uint16_t* offsets = nullptr;
+  uint64_t* regions = nullptr;  // 0 at first
+  LineSpan* spans = nullptr;
+  uint32_t* span_count = nullptr;
 };
-
-inline constexpr uint32_t kPieceChunk = 1024;
 
 }  // namespace voxeld::gpu::cuda

@@ -8,6 +8,9 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
+// A bit each, where it is noted which pictures of a slice differ.
+constexpr int32_t kMostSubFrames = 32;
+
 bool PutLeast(const display::FrameLayout& layout, const display::Tone& tone,
               std::vector<uint32_t>& least) {
   if (layout.format != display::PixelFormat::kBitPlanes3) return true;
@@ -33,7 +36,8 @@ std::optional<PackedPlan> PackedPlan::Of(const display::FootprintTable& table,
                                          const display::FrameLayout& layout,
                                          const display::Tone& tone, int32_t begin, int32_t end) {
   if (tone.sampling != display::Sampling::kMax || table.inner_sets != 1 ||
-      table.inner_axis != display::Axis::kY || table.width > grid.nx) {
+      table.inner_axis != display::Axis::kY || table.width > grid.nx ||
+      layout.sub_frames > kMostSubFrames) {
     return std::nullopt;
   }
   PackedPlan plan;

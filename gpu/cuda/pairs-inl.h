@@ -7,6 +7,7 @@
 namespace voxeld::gpu::cuda {
 
 struct PairScratch {
+  PairRows rows;
   uint64_t heavy[kDrawThreads];  // pairs for many threads
   uint32_t heavy_count;
   SolidBlock solid;
@@ -179,9 +180,9 @@ __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile
   if (threadIdx.x == 0) scratch.heavy_count = 0;
   __syncthreads();
   for (uint32_t b = 0; b < view.pairs.count; ++b) {
-    const uint32_t end = region.row_end[t][b];
+    const uint32_t end = scratch.rows.end[t][b];
     // In rounds of the block's size, so that what is heavy is drawn before its list is full.
-    for (uint32_t round = region.row_begin[t][b]; round < end; round += kDrawThreads) {
+    for (uint32_t round = scratch.rows.begin[t][b]; round < end; round += kDrawThreads) {
       const uint32_t p = round + threadIdx.x;
       bool heavy = false;
       if (p < end) {

@@ -9,9 +9,10 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kDrawThreads = 512;
 inline constexpr uint32_t kDrawWarps = kDrawThreads / 32;
-inline constexpr uint32_t kQueue = 2 * kDrawThreads;  // spans sorted at once
-inline constexpr uint32_t kBuckets = 128;             // by length; those of two colours from 64 on
-inline constexpr uint32_t kRegionTiles = 4;           // bit 0: the further in x, bit 1: in y
+inline constexpr uint32_t kQueue = 128;      // spans that a warp sorts at once
+inline constexpr uint32_t kBuckets = 64;     // by length; those of two colours in the last
+inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are looked at at once
+inline constexpr uint32_t kRegionTiles = 4;  // bit 0: the further in x, bit 1: in y
 inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
 
 // Of a voxel in its region.
@@ -22,17 +23,24 @@ __device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {
 
 struct RegionScratch {
   uint32_t words[kRegionVoxels];
-  LineSpan queue[kQueue];
-  uint32_t buckets[kBuckets];
-  // Of the layer under way: rows of pairs, of a tile and a batch each, and bits: which line batches.
-  uint32_t row_begin[kRegionTiles][kMaxBatches], row_end[kRegionTiles][kMaxBatches];
-  uint32_t line_batches;
-  uint32_t layer;    // its slot; kAllLanes: no more
-  uint32_t cutting;  // bits: which of its half-spaces cut the region
-  uint32_t outside;  // not 0: all of the region lies outside one of them
+  uint32_t segment_first[kSegments + 1];  // spans before
+  uint32_t segment_at[kSegments];         // where its spans lie
+  uint32_t next_span;
+  uint32_t buckets[kDrawWarps][kBuckets];
+  uint8_t order[kDrawWarps][kQueue];
+  uint32_t line_batches;  // bits: those of the layer under way
+  uint32_t layer;         // its slot; kAllLanes: no more
+  uint32_t cutting;       // bits: which of its half-spaces cut the region
+  uint32_t outside;       // not 0: all of the region lies outside one of them
   uint32_t region;
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
-  uint32_t pairs;  // not 0: the layer has some here
+  uint32_t pairs;                          // not 0: the layer has some here
+  uint32_t pictures[1u << RegionBits(2)];  // by z, bits: sub-frames whose picture differs
+};
+
+// Of the layer under way: rows of pairs, of a tile and a batch each.
+struct PairRows {
+  uint32_t begin[kRegionTiles][kMaxBatches], end[kRegionTiles][kMaxBatches];
 };
 
 // A region's place: its tiles' numbers, kAllLanes where there is none or it is not owned.
@@ -98,7 +106,7 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
 // warp: a lane looks after a batch.
 template <bool kPairs>
 __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int32_t last,
-                             RegionScratch& scratch) {
+                             RegionScratch& scratch, PairRows* rows) {
   const uint32_t lane = threadIdx.x % 32;
   constexpr int32_t kNone = 0x7FFFFFFF;
   int32_t least = kNone;
@@ -119,7 +127,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
     const LineBatchView& batch = view.lines.batches[lane];
     const LayerLook look = view.layers[batch.layer];
     const uint32_t region = scratch.region;
-    if (look.visible != 0 && look.rank > last && batch.rows[region] != batch.rows[region + 1]) {
+    if (look.visible != 0 && look.rank > last && batch.lists.Has(region)) {
       line_rank = look.rank;
       if (line_rank < least) {
         least = line_rank;
@@ -135,8 +143,8 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
   if constexpr (kPairs) {
     for (uint32_t t = 0; t < kRegionTiles; ++t) {
       const bool here = best[t] == least && least != kNone;
-      scratch.row_begin[t][lane] = here ? begin[t] : 0;
-      scratch.row_end[t][lane] = here ? end[t] : 0;
+      rows->begin[t][lane] = here ? begin[t] : 0;
+      rows->end[t][lane] = here ? end[t] : 0;
       pairs |= here;
     }
   }

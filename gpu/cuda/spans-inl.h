@@ -44,58 +44,125 @@ __device__ inline void DrawSpan(const DrawView& view, const LineBatchView& batch
   }
 }
 
-// By the whole block. Sorted by length first, so that a warp's lanes have about as much to do.
+// The region's next segments of spans, from chunk `first` on, by the whole block; how many spans they
+// have.
+__device__ inline uint32_t FindSegments(const SpanLists& lists, uint32_t first, uint32_t last,
+                                        uint32_t region, RegionScratch& scratch) {
+  if (threadIdx.x < kSegments) {
+    const uint32_t chunk = first + threadIdx.x;
+    uint32_t count = 0;
+    if (chunk < last) {
+      const uint16_t* const offsets = lists.offsets +
+                                      static_cast<size_t>(chunk) * (kRegionsInBlock + 1) +
+                                      region % kRegionsInBlock;
+      count = offsets[1] - offsets[0];
+      scratch.segment_at[threadIdx.x] = lists.base[chunk] + offsets[0];
+    }
+    scratch.segment_first[threadIdx.x] = count;
+  }
+  __syncthreads();
+  if (threadIdx.x < 32) {
+    constexpr uint32_t kEach = kSegments / 32;
+    uint32_t* const own = &scratch.segment_first[threadIdx.x * kEach];
+    uint32_t counts[kEach], sum = 0;
+#pragma unroll
+    for (uint32_t e = 0; e < kEach; ++e) sum += counts[e] = own[e];
+    uint32_t before = sum;
+    for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
+      const uint32_t other = __shfl_up_sync(kAllLanes, before, lanes);
+      if (threadIdx.x >= lanes) before += other;
+    }
+    if (threadIdx.x == 31) scratch.segment_first[kSegments] = before;
+    before -= sum;
+#pragma unroll
+    for (uint32_t e = 0; e < kEach; ++e) {
+      own[e] = before;
+      before += counts[e];
+    }
+    if (threadIdx.x == 0) scratch.next_span = 0;
+  }
+  __syncthreads();
+  return scratch.segment_first[kSegments];
+}
+
+// A warp draws spans `first` to first + count − 1 of those found, count ≤ kQueue: by length, so that
+// its lanes have about as much to do.
+__device__ inline void DrawQueue(const DrawView& view, const LineBatchView& batch, uint32_t first,
+                                 uint32_t count, const int32_t at[3], RegionScratch& scratch) {
+  constexpr uint32_t kEach = kQueue / 32;
+  const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  uint32_t* const buckets = scratch.buckets[warp];
+  buckets[lane] = buckets[lane + 32] = 0;
+  __syncwarp();
+  uint32_t line[kEach], bits[kEach], rank[kEach];
+#pragma unroll
+  for (uint32_t e = 0; e < kEach; ++e) {
+    const uint32_t i = lane + 32 * e;
+    line[e] = bits[e] = rank[e] = 0;
+    if (i >= count) continue;
+    uint32_t low = 0, high = kSegments;  // segment_first[low] ≤ first + i < segment_first[high]
+    while (high - low > 1) {
+      const uint32_t middle = (low + high) / 2;
+      (scratch.segment_first[middle] <= first + i ? low : high) = middle;
+    }
+    const LineSpan span =
+        batch.lists.spans[scratch.segment_at[low] + (first + i - scratch.segment_first[low])];
+    line[e] = span.line;
+    bits[e] = span.bits;
+    rank[e] = atomicAdd(&buckets[span.mixed() ? kBuckets - 1 : span.count()], 1u);
+  }
+  __syncwarp();
+  uint32_t low = buckets[2 * lane], high = buckets[2 * lane + 1], sum = low + high;
+  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
+    const uint32_t other = __shfl_up_sync(kAllLanes, sum, lanes);
+    if (lane >= lanes) sum += other;
+  }
+  buckets[2 * lane] = sum - low - high;
+  buckets[2 * lane + 1] = sum - high;
+  __syncwarp();
+#pragma unroll
+  for (uint32_t e = 0; e < kEach; ++e) {
+    if (lane + 32 * e >= count) continue;
+    const LineSpan span{line[e], bits[e]};
+    const uint32_t bucket = span.mixed() ? kBuckets - 1 : span.count();
+    scratch.order[warp][buckets[bucket] + rank[e]] = static_cast<uint8_t>(lane + 32 * e);
+  }
+  __syncwarp();
+  for (uint32_t i = 0; i < count; i += 32) {
+    const uint32_t from = i + lane < count ? scratch.order[warp][i + lane] : 0;
+    LineSpan span{0, 0};
+#pragma unroll
+    for (uint32_t e = 0; e < kEach; ++e) {
+      const uint32_t l = __shfl_sync(kAllLanes, line[e], from % 32);
+      const uint32_t b = __shfl_sync(kAllLanes, bits[e], from % 32);
+      if (from / 32 == e) span = {l, b};
+    }
+    if (i + lane < count) DrawSpan(view, batch, span, at, scratch.words);
+    __syncwarp();
+  }
+}
+
+// By the whole block; warps take what comes next.
 __device__ inline void DrawSpans(const DrawView& view, const LineBatchView& batch,
                                  RegionScratch& scratch) {
   const uint32_t region = scratch.region;
-  const uint32_t first = batch.rows[region], last = batch.rows[region + 1];
   int32_t at[3];
   view.regions.RegionCoordinates(region, at);
-  constexpr uint32_t kEach = kQueue / kDrawThreads;
-  for (uint32_t base = first; base < last; base += kQueue) {
-    const uint32_t count = Min(kQueue, last - base);
-    if (threadIdx.x < kBuckets) scratch.buckets[threadIdx.x] = 0;
-    __syncthreads();
-    LineSpan mine[kEach];
-    uint32_t rank[kEach];
-#pragma unroll
-    for (uint32_t e = 0; e < kEach; ++e) {
-      const uint32_t i = threadIdx.x + e * kDrawThreads;
-      if (i < count) {
-        mine[e] = batch.spans[base + i];
-        const uint32_t bucket = mine[e].count() + (mine[e].mixed() ? 64 : 0);
-        rank[e] = bucket << 16 | atomicAdd(&scratch.buckets[bucket], 1u);
-      }
+  const uint32_t first = batch.lists.chunk_begin[region / kRegionsInBlock];
+  const uint32_t last = batch.lists.chunk_begin[region / kRegionsInBlock + 1];
+  for (uint32_t chunk = first; chunk < last; chunk += kSegments) {
+    const uint32_t count = FindSegments(batch.lists, chunk, last, region, scratch);
+    // Few spans are shared by all warps.
+    const uint32_t queue = Min(kQueue, ((count + kDrawWarps - 1) / kDrawWarps + 31) & ~31u);
+    for (;;) {
+      uint32_t next = 0;
+      if (threadIdx.x % 32 == 0) next = atomicAdd(&scratch.next_span, queue);
+      next = __shfl_sync(kAllLanes, next, 0);
+      if (next >= count) break;
+      DrawQueue(view, batch, next, Min(queue, count - next), at, scratch);
     }
     __syncthreads();
-    if (threadIdx.x < 32) {
-      uint32_t* const own = &scratch.buckets[threadIdx.x * (kBuckets / 32)];
-      uint32_t sum = own[0] + own[1] + own[2] + own[3], before = sum;
-      for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
-        const uint32_t other = __shfl_up_sync(kAllLanes, before, lanes);
-        if (threadIdx.x >= lanes) before += other;
-      }
-      before -= sum;
-      for (uint32_t b = 0; b < kBuckets / 32; ++b) {
-        const uint32_t in = own[b];
-        own[b] = before;
-        before += in;
-      }
-    }
-    __syncthreads();
-#pragma unroll
-    for (uint32_t e = 0; e < kEach; ++e) {
-      if (threadIdx.x + e * kDrawThreads < count) {
-        scratch.queue[scratch.buckets[rank[e] >> 16] + (rank[e] & 0xFFFF)] = mine[e];
-      }
-    }
-    __syncthreads();
-    for (uint32_t i = threadIdx.x; i < count; i += kDrawThreads) {
-      DrawSpan(view, batch, scratch.queue[i], at, scratch.words);
-    }
-    // The next round's buckets are cleared while others still draw: nobody reads them any more.
   }
-  __syncthreads();
 }
 
 }  // namespace voxeld::gpu::cuda

@@ -137,8 +137,8 @@ struct ThinAxis {
     if (d == 0) gap = 1;
     Find(d, n);
   }
-  VOXELD_HD void Cross(int32_t d, int32_t n, int bits) {
-    const int32_t size = d < 0 ? -(256 << bits) : 256 << bits;
+  // Into the next box; `size`: of a box, in units, towards it.
+  VOXELD_HD void Cross(int32_t d, int32_t n, int32_t size) {
     box += d < 0 ? -1 : 1;
     gap += static_cast<float>(size);
     base = WrapAdd(base, -WrapMul(size, n));
@@ -160,11 +160,22 @@ VOXELD_HD void WalkThin(const ThinLine& line, int32_t k, const int32_t at[3], co
     const int32_t end = Min(x.next, Min(y.next, z.next));
     const int32_t box[3] = {x.box, y.box, z.box};
     if (end > k && !f(box, k, end)) return;
+    if (end > n) return;
     k = end;
-    if (k > n) return;
-    if (x.next == k) x.Cross(line.d[0], n, bits[0]);
-    if (y.next == k) y.Cross(line.d[1], n, bits[1]);
-    if (z.next == k) z.Cross(line.d[2], n, bits[2]);
+    // One face after the other, also where several are met at one voxel: whatever the axis, the same
+    // instructions.
+    const bool in_x = x.next == k, in_y = !in_x && y.next == k;
+    const int32_t d = in_x ? line.d[0] : in_y ? line.d[1] : line.d[2];
+    const int32_t size = 256 << (in_x ? bits[0] : in_y ? bits[1] : bits[2]);
+    ThinAxis axis = in_x ? x : in_y ? y : z;
+    axis.Cross(d, n, d < 0 ? -size : size);
+    if (in_x) {
+      x = axis;
+    } else if (in_y) {
+      y = axis;
+    } else {
+      z = axis;
+    }
   }
 }
 
