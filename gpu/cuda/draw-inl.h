@@ -22,12 +22,14 @@ struct DrawScratch<DrawWhat::kAll> {
   PairScratch pairs;
 };
 
+// color(v): of voxel v of the region; any thread can tell.
 template <DrawTo kTo, typename Color>
 __device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
                       Color&& color) {
-  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch, color);
+  const auto round = [&](uint32_t j) { return color(threadIdx.x + j * kDrawThreads); };
+  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch, round);
   if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, scratch, color);
-  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, color);
+  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, round);
 }
 
 // The layers of a region from the lowest on, each raised into the words; blend() after each.
@@ -84,7 +86,6 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       scratch.region = next < counters.dirty ? view.volume.dirty_list[next] : kAllLanes;
     }
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
-    if (threadIdx.x < 1u << RegionBits(2)) scratch.pictures[threadIdx.x] = 0;
     uint4* const words = reinterpret_cast<uint4*>(scratch.words);
     for (uint32_t v = threadIdx.x; v < kRegionVoxels / 4; v += kDrawThreads) {
       words[v] = make_uint4(0, 0, 0, 0);
@@ -100,8 +101,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
         cutting = scratch.cutting;
         cut_by = view.half_spaces + view.layers[scratch.layer].first_half_space;
       });
-      Flush<kTo>(view, place, scratch, [&](uint32_t j) {
-        const uint32_t v = threadIdx.x + j * kDrawThreads;
+      Flush<kTo>(view, place, scratch, [&](uint32_t v) {
         const uint32_t word = scratch.words[v];
         if (!IsCovered(word)) return 0u;
         if (cutting != 0 && !IsInsideAll(cut_by, cutting, place.box, v)) return 0u;
@@ -125,17 +125,12 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
           colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
         }
       });
-      if constexpr (kTo == DrawTo::kPictures || kTo == DrawTo::kReader) {
-        // Whose loops are not unrolled whole: by way of shared memory.
 #pragma unroll
-        for (uint32_t j = 0; j < kRounds; ++j) {
-          scratch.words[threadIdx.x + j * kDrawThreads] = colors[j];
-        }
-        Flush<kTo>(view, place, scratch,
-                   [&](uint32_t j) { return scratch.words[threadIdx.x + j * kDrawThreads]; });
-      } else {
-        Flush<kTo>(view, place, scratch, [&](uint32_t j) { return colors[j]; });
+      for (uint32_t j = 0; j < kRounds; ++j) {
+        scratch.words[threadIdx.x + j * kDrawThreads] = colors[j];
       }
+      __syncthreads();
+      Flush<kTo>(view, place, scratch, [&](uint32_t v) { return scratch.words[v]; });
     }
     __syncthreads();
   }

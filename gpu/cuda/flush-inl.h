@@ -1,5 +1,4 @@
-// Where a region's colours go. Each function is called by the whole block; color(v) is the final
-// colour of voxel v of the region, for v = threadIdx.x + j·kDrawThreads: a warp has a row along x.
+// Where a region's colours go. Each function is called by the whole block.
 #pragma once
 
 #include "gpu/cuda/region_scratch-inl.h"
@@ -9,6 +8,7 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kRounds = kRegionVoxels / kDrawThreads;
 
+// Of voxel threadIdx.x + j·kDrawThreads of a region: a warp has a row along x.
 struct RowPlace {
   uint32_t lane, half;  // which of the two tiles along x
   int32_t x, y, z;
@@ -63,7 +63,8 @@ __device__ inline void MarkSlices(const SliceIndexView& slices, const TileGrid& 
   }
 }
 
-// Into the tiles' colours; marks the slices that look at those that changed.
+// Into the tiles' colours; marks the slices that look at those that changed. color(j): of voxel
+// threadIdx.x + j·kDrawThreads.
 template <typename Color>
 __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
                              Color&& color) {
@@ -108,28 +109,9 @@ __device__ inline bool PutByte(uint8_t* at, uint32_t value) {
   return true;
 }
 
-// A row's pixels into a picture. A warp together.
-__device__ inline bool PutRow(const PackedView& packed, uint32_t sub, const RowPlace& at,
-                              uint32_t v, uint32_t color, bool inside, uint8_t* picture) {
-  const SliceView& view = packed.slices;
-  const uint32_t u = static_cast<uint32_t>(at.x);
-  if (view.format == display::PixelFormat::kBitPlanes3) {
-    const uint32_t least = packed.least[(sub * 8 + v % 8) * 8 + u % 8];
-    constexpr uint32_t kBlue = 0x249249;
-    const bool on = inside && color != 0;
-    const uint32_t red = __ballot_sync(kAllLanes, on && (color & kBlue << 1) >= least << 1);
-    const uint32_t green = __ballot_sync(kAllLanes, on && (color & kBlue << 2) >= least << 2);
-    const uint32_t blue = __ballot_sync(kAllLanes, on && (color & kBlue) >= least);
-    // Twelve lanes write a byte each: of a plane's 32 pixels the eight from 8·(lane % 4) on.
-    const uint32_t plane = at.lane / 4, part = at.lane % 4;
-    const uint32_t first = u - at.lane + part * 8;
-    if (plane > 2 || first >= view.width) return false;
-    const uint32_t bits = plane == 0 ? red : plane == 1 ? green : blue;
-    const size_t row = (view.width + 7) / 8;
-    return PutByte(picture + plane * row * view.height + v * row + first / 8,
-                   __brev(bits >> part * 8 & 0xFF) >> 24);
-  }
-  if (!inside) return false;
+// A row's pixels into a picture of bytes.
+__device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u, uint32_t v,
+                                uint32_t color, uint8_t* picture) {
   Levels q = {0, 0, 0};
   if (color != 0) {
     const uint32_t rgb = Deinterleave(color);
@@ -149,51 +131,139 @@ __device__ inline bool PutRow(const PackedView& packed, uint32_t sub, const RowP
   return differs;
 }
 
-// Straight into the pictures of the slices that the region's planes are.
+// 32 pixels of a row of bits, the first in the lowest bit, at byte `at` of a picture; `count`: how
+// many of them the picture has, more than 0. True if they were others.
+__device__ inline bool PutBits(uint8_t* at, uint32_t bits, int32_t count) {
+  const uint32_t bytes =
+      __byte_perm(__brev(bits), 0, 0x0123);  // the first pixel: the top of a byte
+  if (count >= 32 && reinterpret_cast<uintptr_t>(at) % 4 == 0) {
+    uint32_t* const word = reinterpret_cast<uint32_t*>(at);
+    if (*word == bytes) return false;
+    *word = bytes;
+    return true;
+  }
+  bool differs = false;
+  for (int32_t i = 0; i < 4 && i * 8 < count; ++i) {
+    differs |= PutByte(at + i, bytes >> 8 * i & 0xFF);
+  }
+  return differs;
+}
+
+// One plane of the region, by a warp: rows as bits by vote, then a lane writes a row. Bits: which
+// sub-frames' pictures differ. color(y) is the colour of the lane's voxel in row y.
+template <typename Color>
+__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place, uint32_t slice,
+                               RegionScratch& scratch, Color&& color) {
+  constexpr uint32_t kBlue = 0x249249;
+  const SliceView& view = packed.slices;
+  const uint32_t lane = threadIdx.x % 32;
+  const int32_t rows = place.box.hi[1] - place.box.lo[1];
+  const int32_t first_v = (place.box.lo[1] - packed.y0) * packed.y_step;
+  const uint32_t u = static_cast<uint32_t>(place.box.lo[0]) + lane;
+  uint32_t pictures = 0;
+  for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
+    uint32_t least[8];  // of this lane's pixels, by row
+#pragma unroll
+    for (int32_t i = 0; i < 8; ++i) {
+      const uint32_t v = static_cast<uint32_t>(first_v + i * packed.y_step) % 8;
+      least[i] = __ldg(&packed.least[(sub * 8 + v) * 8 + u % 8]);
+    }
+    uint32_t red = 0, green = 0, blue = 0, lit = 0;  // of row `lane`
+#pragma unroll 8
+    for (int32_t y = 0; y < 32; ++y) {
+      const uint32_t c = color(y);
+      const uint32_t any = __ballot_sync(kAllLanes, c != 0);
+      const uint32_t l = least[y % 8];
+      const uint32_t r = __ballot_sync(kAllLanes, (c & kBlue << 1) >= l << 1);
+      const uint32_t g = __ballot_sync(kAllLanes, (c & kBlue << 2) >= l << 2);
+      const uint32_t b = __ballot_sync(kAllLanes, (c & kBlue) >= l);
+      if (y == static_cast<int32_t>(lane)) lit = any, red = r, green = g, blue = b;
+    }
+    // A pixel without light is at the lowest level whatever the least is.
+    red &= lit, green &= lit, blue &= lit;
+    if (sub == 0) {
+      const uint32_t half = lane < 16 ? 0 : 2;
+      if ((lit & 0xFFFF) != 0) atomicAdd(&scratch.lit[half], __popc(lit & 0xFFFF));
+      if (lit >> 16 != 0) atomicAdd(&scratch.lit[half + 1], __popc(lit >> 16));
+    }
+    const int32_t v = first_v + static_cast<int32_t>(lane) * packed.y_step;
+    const int32_t count = static_cast<int32_t>(view.width) - place.box.lo[0];
+    bool differs = false;
+    if (static_cast<int32_t>(lane) < rows && v >= 0 && v < static_cast<int32_t>(view.height) &&
+        count > 0) {
+      const uint32_t row = (view.width + 7) / 8, plane = row * view.height;
+      uint8_t* const at =
+          view.bytes + static_cast<size_t>(slice * view.sub_frames + sub) * view.bytes_per_picture +
+          static_cast<uint32_t>(v) * row + static_cast<uint32_t>(place.box.lo[0]) / 8;
+      const uint32_t kept = count >= 32 ? kAllLanes : (1u << count) - 1;
+      differs |= PutBits(at, red & kept, count);
+      differs |= PutBits(at + plane, green & kept, count);
+      differs |= PutBits(at + 2 * plane, blue & kept, count);
+    }
+    if (__any_sync(kAllLanes, differs)) pictures |= 1u << sub;
+  }
+  return pictures;
+}
+
+// Straight into the pictures of the slices that the region's planes are: a warp has a plane.
+// color(v): of voxel v of the region, which is of this warp's plane.
+static_assert(kDrawWarps == 1u << RegionBits(2));
 template <typename Color>
 __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
                                 RegionScratch& scratch, Color&& color) {
   const PackedView& packed = view.packed;
   const SliceView& slices = packed.slices;
-#pragma unroll 4
-  for (uint32_t j = 0; j < kRounds; ++j) {
-    const RowPlace at(place, j);
-    const int32_t v = (at.y - packed.y0) * packed.y_step;
-    const int32_t s = at.z < place.box.hi[2] ? packed.slice_of_z[at.z] : -1;
-    const bool row = s >= 0 && at.y < place.box.hi[1];  // the same in all lanes
-    const bool inside = row && at.x < place.box.hi[0];
-    const uint32_t c = inside ? color(j) : 0;
-    CountLit(c != 0, at, scratch);
-    if (!row || v < 0 || v >= static_cast<int32_t>(slices.height)) continue;
-    for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
-      const uint32_t picture = static_cast<uint32_t>(s) * slices.sub_frames + sub;
-      const bool pixel = inside && static_cast<uint32_t>(at.x) < slices.width;
-      const bool differs =
-          PutRow(packed, sub, at, static_cast<uint32_t>(v), c, pixel,
-                 slices.bytes + static_cast<size_t>(picture) * slices.bytes_per_picture);
-      if (__any_sync(kAllLanes, differs) && at.lane == 0) {
-        atomicOr(&scratch.pictures[at.z - place.box.lo[2]], 1u << sub);
+  const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  const int32_t z = place.box.lo[2] + static_cast<int32_t>(warp);
+  const int32_t s = z < place.box.hi[2] ? packed.slice_of_z[z] : -1;
+  const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
+  const int32_t rows = place.box.hi[1] - place.box.lo[1];
+  const bool column = x < place.box.hi[0];
+  const auto at = [&](int32_t y) {
+    return column && y < rows ? color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane) : 0u;
+  };
+  uint32_t pictures = 0;
+  if (s >= 0 && slices.format == display::PixelFormat::kBitPlanes3) {
+    pictures = FlushPlane(packed, place, static_cast<uint32_t>(s), scratch, at);
+  } else {
+    for (int32_t y = 0; y < 32; ++y) {
+      const uint32_t c = at(y);
+      const uint32_t lit = __ballot_sync(kAllLanes, c != 0);
+      if (lane < 2 && (lit >> 16 * lane & 0xFFFF) != 0) {
+        atomicAdd(&scratch.lit[(y >> 4) * 2 + lane], __popc(lit >> 16 * lane & 0xFFFF));
       }
+      const int32_t v = (place.box.lo[1] + y - packed.y0) * packed.y_step;
+      if (s < 0 || !column || y >= rows || v < 0 || v >= static_cast<int32_t>(slices.height) ||
+          x >= static_cast<int32_t>(slices.width)) {
+        continue;
+      }
+      for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
+        const uint32_t picture = static_cast<uint32_t>(s) * slices.sub_frames + sub;
+        if (PutPixel(slices, sub, static_cast<uint32_t>(x), static_cast<uint32_t>(v), c,
+                     slices.bytes + static_cast<size_t>(picture) * slices.bytes_per_picture)) {
+          pictures |= 1u << sub;
+        }
+      }
+    }
+    for (int lanes = 16; lanes > 0; lanes /= 2) {
+      pictures |= __shfl_xor_sync(kAllLanes, pictures, lanes);
+    }
+  }
+  if (lane == 0 && pictures != 0) {
+    packed.slice_dirty[s] = 1;
+    for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
+      if (pictures >> sub & 1)
+        slices.differs[static_cast<uint32_t>(s) * slices.sub_frames + sub] = 1;
     }
   }
   __syncthreads();
-  const int32_t z = place.box.lo[2] + static_cast<int32_t>(threadIdx.x);
-  if (z < place.box.hi[2] && scratch.pictures[threadIdx.x] != 0) {
-    const uint32_t s = static_cast<uint32_t>(packed.slice_of_z[z]);
-    packed.slice_dirty[s] = 1;
-    for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
-      if (scratch.pictures[threadIdx.x] >> sub & 1) {
-        slices.differs[s * slices.sub_frames + sub] = 1;
-      }
-    }
-  }
   if (threadIdx.x < kRegionTiles) {
     const uint32_t tile = place.TileOf(view.volume, threadIdx.x);
     if (tile != kAllLanes) PutLit(view.volume, tile, scratch.lit[threadIdx.x]);
   }
 }
 
-// To who asks for voxels.
+// To who asks for voxels. color(j): of voxel threadIdx.x + j·kDrawThreads.
 template <typename Color>
 __device__ void FlushToReader(const DrawView& view, const RegionPlace& place, RegionScratch&,
                               Color&& color) {
