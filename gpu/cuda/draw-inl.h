@@ -80,6 +80,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
   DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(memory);
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
+  if (threadIdx.x == 0) scratch.lit_change = 0;
   for (;;) {
     if (threadIdx.x == 0) {
       const uint32_t next = atomicAdd(&counters.next_region, 1u);
@@ -92,7 +93,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
     }
     __syncthreads();
     const uint32_t region = scratch.region;
-    if (region == kAllLanes) return;
+    if (region == kAllLanes) break;
     const RegionPlace place(view, region);
     if constexpr (kWhat == DrawWhat::kOneLayer) {
       const VoxelHalfSpace* cut_by = nullptr;
@@ -133,6 +134,9 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       Flush<kTo>(view, place, scratch, [&](uint32_t v) { return scratch.words[v]; });
     }
     __syncthreads();
+  }
+  if (threadIdx.x == 0 && scratch.lit_change != 0) {
+    atomicAdd(reinterpret_cast<unsigned long long*>(&counters.lit_voxels), scratch.lit_change);
   }
 }
 

@@ -34,13 +34,13 @@ __device__ inline void CountLit(bool lit, const RowPlace& at, RegionScratch& scr
   }
 }
 
-// What the tile's number of lit voxels was and is; by one thread a tile.
-__device__ inline uint32_t PutLit(const VolumeView& volume, uint32_t tile, uint32_t now) {
+// Notes a tile's number of lit voxels; returns what it was. By one thread a tile.
+__device__ inline uint32_t PutLit(const VolumeView& volume, uint32_t tile, uint32_t now,
+                                  RegionScratch& scratch) {
   const uint32_t before = volume.lit[tile];
-  volume.lit[tile] = now;
   if (now != before) {
-    atomicAdd(reinterpret_cast<unsigned long long*>(&volume.counters->lit_voxels),
-              static_cast<unsigned long long>(now) - before);
+    volume.lit[tile] = now;
+    atomicAdd(&scratch.lit_change, static_cast<unsigned long long>(now) - before);
   }
   return before;
 }
@@ -93,7 +93,7 @@ __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, Reg
     const uint32_t tile = place.TileOf(volume, t);
     if (tile != kAllLanes && scratch.differs[t] != 0) {
       uint32_t before = 0;
-      if (lane == 0) before = PutLit(volume, tile, scratch.lit[t]);
+      if (lane == 0) before = PutLit(volume, tile, scratch.lit[t], scratch);
       before = __shfl_sync(kAllLanes, before, 0);
       const uint32_t more =
           static_cast<uint32_t>(scratch.lit[t] != 0) - static_cast<uint32_t>(before != 0);
@@ -131,20 +131,32 @@ __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u,
   return differs;
 }
 
-// 32 pixels of a row of bits, the first in the lowest bit, at byte `at` of a picture; `count`: how
-// many of them the picture has, more than 0. True if they were others.
-__device__ inline bool PutBits(uint8_t* at, uint32_t bits, int32_t count) {
-  const uint32_t bytes =
-      __byte_perm(__brev(bits), 0, 0x0123);  // the first pixel: the top of a byte
-  if (count >= 32 && reinterpret_cast<uintptr_t>(at) % 4 == 0) {
-    uint32_t* const word = reinterpret_cast<uint32_t*>(at);
-    if (*word == bytes) return false;
-    *word = bytes;
-    return true;
+// A row of 32 pixels of each plane, the first in the lowest bit, at byte `at` of a picture, planes
+// so many bytes apart; `count`: how many of the pixels the picture has. True if they were others.
+__device__ inline bool PutBits(uint8_t* at, uint32_t plane, const uint32_t bits[3], int32_t count) {
+  const uint32_t kept = count >= 32 ? kAllLanes : (1u << count) - 1;
+  uint32_t bytes[3];
+#pragma unroll
+  for (int p = 0; p < 3; ++p) {
+    bytes[p] = __byte_perm(__brev(bits[p] & kept), 0, 0x0123);  // the first pixel: a byte's top
   }
   bool differs = false;
-  for (int32_t i = 0; i < 4 && i * 8 < count; ++i) {
-    differs |= PutByte(at + i, bytes >> 8 * i & 0xFF);
+  if (count >= 32 && (reinterpret_cast<uintptr_t>(at) | plane) % 4 == 0) {
+    uint32_t held[3];
+#pragma unroll
+    for (uint32_t p = 0; p < 3; ++p) held[p] = *reinterpret_cast<uint32_t*>(at + p * plane);
+#pragma unroll
+    for (uint32_t p = 0; p < 3; ++p) {
+      if (held[p] == bytes[p]) continue;
+      *reinterpret_cast<uint32_t*>(at + p * plane) = bytes[p];
+      differs = true;
+    }
+    return differs;
+  }
+  for (uint32_t p = 0; p < 3; ++p) {
+    for (int32_t i = 0; i < 4 && i * 8 < count; ++i) {
+      differs |= PutByte(at + p * plane + i, bytes[p] >> 8 * i & 0xFF);
+    }
   }
   return differs;
 }
@@ -182,9 +194,16 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
     // A pixel without light is at the lowest level whatever the least is.
     red &= lit, green &= lit, blue &= lit;
     if (sub == 0) {
-      const uint32_t half = lane < 16 ? 0 : 2;
-      if ((lit & 0xFFFF) != 0) atomicAdd(&scratch.lit[half], __popc(lit & 0xFFFF));
-      if (lit >> 16 != 0) atomicAdd(&scratch.lit[half + 1], __popc(lit >> 16));
+      // Of 16 rows: of the nearer tile in the lower half, of the further in the upper.
+      uint32_t counts = static_cast<uint32_t>(__popc(lit & 0xFFFF)) |
+                        static_cast<uint32_t>(__popc(lit >> 16)) << 16;
+      for (int lanes = 8; lanes > 0; lanes /= 2) {
+        counts += __shfl_xor_sync(kAllLanes, counts, lanes);
+      }
+      if (lane % 16 == 0 && counts != 0) {
+        atomicAdd(&scratch.lit[lane / 8], counts & 0xFFFF);
+        atomicAdd(&scratch.lit[lane / 8 + 1], counts >> 16);
+      }
     }
     const int32_t v = first_v + static_cast<int32_t>(lane) * packed.y_step;
     const int32_t count = static_cast<int32_t>(view.width) - place.box.lo[0];
@@ -195,10 +214,8 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
       uint8_t* const at =
           view.bytes + static_cast<size_t>(slice * view.sub_frames + sub) * view.bytes_per_picture +
           static_cast<uint32_t>(v) * row + static_cast<uint32_t>(place.box.lo[0]) / 8;
-      const uint32_t kept = count >= 32 ? kAllLanes : (1u << count) - 1;
-      differs |= PutBits(at, red & kept, count);
-      differs |= PutBits(at + plane, green & kept, count);
-      differs |= PutBits(at + 2 * plane, blue & kept, count);
+      const uint32_t bits[3] = {red, green, blue};
+      differs = PutBits(at, plane, bits, count);
     }
     if (__any_sync(kAllLanes, differs)) pictures |= 1u << sub;
   }
@@ -250,16 +267,17 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
     }
   }
   if (lane == 0 && pictures != 0) {
-    packed.slice_dirty[s] = 1;
+    // As a rule another region has said so already.
+    if (packed.slice_dirty[s] == 0) packed.slice_dirty[s] = 1;
     for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
-      if (pictures >> sub & 1)
-        slices.differs[static_cast<uint32_t>(s) * slices.sub_frames + sub] = 1;
+      uint32_t& differs = slices.differs[static_cast<uint32_t>(s) * slices.sub_frames + sub];
+      if ((pictures >> sub & 1) != 0 && differs == 0) differs = 1;
     }
   }
   __syncthreads();
   if (threadIdx.x < kRegionTiles) {
     const uint32_t tile = place.TileOf(view.volume, threadIdx.x);
-    if (tile != kAllLanes) PutLit(view.volume, tile, scratch.lit[threadIdx.x]);
+    if (tile != kAllLanes) PutLit(view.volume, tile, scratch.lit[threadIdx.x], scratch);
   }
 }
 

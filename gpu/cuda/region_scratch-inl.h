@@ -34,7 +34,8 @@ struct RegionScratch {
   uint32_t outside;       // not 0: all of the region lies outside one of them
   uint32_t region;
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
-  uint32_t pairs;  // not 0: the layer has some here
+  unsigned long long lit_change;  // of all regions that the block has drawn
+  uint32_t pairs;                 // not 0: the layer has some here
 };
 
 // Of the layer under way: rows of pairs, of a tile and a batch each.
