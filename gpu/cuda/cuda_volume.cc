@@ -649,21 +649,23 @@ DrawView CudaVolume::ViewForDrawing() const {
   return view;
 }
 
-absl::Status CudaVolume::Draw(const DrawView& view, DrawTo to) {
+absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
   // Whether all that there is lies in one layer, to be seen as it is.
-  uint32_t visible = 0;
   bool plain = true;
   absl::flat_hash_set<uint32_t> layers;
-  for (uint32_t b = 0; b < view.lines.count; ++b) layers.insert(view.lines.batches[b].layer);
-  for (const uint32_t layer : layers) {
-    const LayerLook& look = looks_now_[layer];
+  LineBatchList seen;
+  for (uint32_t b = 0; b < view.lines.count; ++b) {
+    const LayerLook& look = looks_now_[view.lines.batches[b].layer];
     if (look.visible == 0) continue;
-    ++visible;
+    seen.batches[seen.count++] = view.lines.batches[b];
+    layers.insert(view.lines.batches[b].layer);
     plain &= look.blend == BlendMode::kOver && look.opacity == 255;
   }
-  const auto draw = view.pairs.count > 0    ? DrawAll
-                    : plain && visible <= 1 ? DrawOneLayer
-                                            : DrawLines;
+  view.lines = seen;
+  view.clipped = !layers.empty() && looks_now_[*layers.begin()].half_spaces != 0;
+  const auto draw = view.pairs.count > 0          ? DrawAll
+                    : plain && layers.size() <= 1 ? DrawOneLayer
+                                                  : DrawLines;
   return device_.Run("DrawRegions", [&] {
     return draw(view, to, static_cast<uint32_t>(device_.api().device().multiProcessorCount),
                 device_.stream());

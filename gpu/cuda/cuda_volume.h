@@ -95,7 +95,7 @@ class CudaVolume final : private SceneObserver {
                           std::span<const uint32_t> slots);
   absl::Status EnterPairs(std::span<const uint32_t> slots);
   DrawView ViewForDrawing() const;
-  absl::Status Draw(const DrawView& view, DrawTo to);
+  absl::Status Draw(DrawView& view, DrawTo to);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
   TableEntry EntryOf(const Drawable& drawable) const;

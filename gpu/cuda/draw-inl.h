@@ -24,11 +24,11 @@ struct DrawScratch<DrawWhat::kAll> {
 
 // color(v): of voxel v of the region; any thread can tell.
 template <DrawTo kTo, typename Color>
-__device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
-                      Color&& color) {
+__device__ void Flush(const DrawView& view, const RegionPlace& place, const Ahead& ahead,
+                      RegionScratch& scratch, Color&& color) {
   const auto round = [&](uint32_t j) { return color(threadIdx.x + j * kDrawThreads); };
   if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch, round);
-  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, scratch, color);
+  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, ahead, scratch, color);
   if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, round);
 }
 
@@ -69,7 +69,7 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
 }
 
 template <DrawWhat kWhat>
-constexpr int kBlocksAtOnce = kWhat == DrawWhat::kOneLayer ? 3
+constexpr int kBlocksAtOnce = kWhat == DrawWhat::kOneLayer ? 2
                               : kWhat == DrawWhat::kLines  ? 2
                                                            : 1;
 
@@ -80,11 +80,23 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
   DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(memory);
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
-  if (threadIdx.x == 0) scratch.lit_change = 0;
+  // The first thread asks for the region after the next one, and for the place of the one after
+  // that, before it needs them.
+  const uint32_t dirty = counters.dirty;
+  const auto listed = [&](uint32_t place) {
+    return place < dirty ? view.volume.dirty_list[place] : kAllLanes;
+  };
+  uint32_t place_after = 0, region_after = kAllLanes;
+  if (threadIdx.x == 0) {
+    scratch.lit_change = 0;
+    region_after = listed(atomicAdd(&counters.next_region, 1u));
+    place_after = atomicAdd(&counters.next_region, 1u);
+  }
   for (;;) {
     if (threadIdx.x == 0) {
-      const uint32_t next = atomicAdd(&counters.next_region, 1u);
-      scratch.region = next < counters.dirty ? view.volume.dirty_list[next] : kAllLanes;
+      scratch.region = region_after;
+      region_after = listed(place_after);
+      place_after = atomicAdd(&counters.next_region, 1u);
     }
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
     uint4* const words = reinterpret_cast<uint4*>(scratch.words);
@@ -95,19 +107,34 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
     const uint32_t region = scratch.region;
     if (region == kAllLanes) break;
     const RegionPlace place(view, region);
+    const Ahead ahead = Ahead::Of<kTo>(view, place);
     if constexpr (kWhat == DrawWhat::kOneLayer) {
       const VoxelHalfSpace* cut_by = nullptr;
       uint32_t cutting = 0;
-      DrawLayers<kWhat>(view, place, all, [&] {
-        cutting = scratch.cutting;
-        cut_by = view.half_spaces + view.layers[scratch.layer].first_half_space;
-      });
-      Flush<kTo>(view, place, scratch, [&](uint32_t v) {
+      if (view.clipped) {
+        DrawLayers<kWhat>(view, place, all, [&] {
+          cutting = scratch.cutting;
+          cut_by = view.half_spaces + view.layers[scratch.layer].first_half_space;
+        });
+      } else {
+        // All batches are of the layer.
+        for (uint32_t b = 0; b < view.lines.count; ++b) {
+          if (view.lines.batches[b].lists.Has(region)) {
+            DrawSpans(view, view.lines.batches[b], scratch);
+          }
+        }
+      }
+      const auto shown = [&](uint32_t v) {
         const uint32_t word = scratch.words[v];
-        if (!IsCovered(word)) return 0u;
-        if (cutting != 0 && !IsInsideAll(cut_by, cutting, place.box, v)) return 0u;
-        return word & kColorMask;
-      });
+        return (word & kEraseBit) != 0 ? 0 : word & kColorMask;
+      };
+      if (cutting == 0) {
+        Flush<kTo>(view, place, ahead, scratch, shown);
+      } else {
+        Flush<kTo>(view, place, ahead, scratch, [&](uint32_t v) {
+          return IsInsideAll(cut_by, cutting, place.box, v) ? shown(v) : 0;
+        });
+      }
     } else {
       uint32_t colors[kRounds];
 #pragma unroll
@@ -131,7 +158,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
         scratch.words[threadIdx.x + j * kDrawThreads] = colors[j];
       }
       __syncthreads();
-      Flush<kTo>(view, place, scratch, [&](uint32_t v) { return scratch.words[v]; });
+      Flush<kTo>(view, place, ahead, scratch, [&](uint32_t v) { return scratch.words[v]; });
     }
     __syncthreads();
   }

@@ -40,6 +40,7 @@ struct DrawView {
   SliceIndexView slices;
   PackedView packed;
   ReadView read;
+  bool clipped = true;  // of one layer alone: it has half-spaces
 };
 
 // Where drawn colours go: into the tiles kept for slicing, straight into pictures, or to who asks.

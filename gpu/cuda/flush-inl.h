@@ -34,15 +34,12 @@ __device__ inline void CountLit(bool lit, const RowPlace& at, RegionScratch& scr
   }
 }
 
-// Notes a tile's number of lit voxels; returns what it was. By one thread a tile.
-__device__ inline uint32_t PutLit(const VolumeView& volume, uint32_t tile, uint32_t now,
-                                  RegionScratch& scratch) {
-  const uint32_t before = volume.lit[tile];
-  if (now != before) {
-    volume.lit[tile] = now;
-    atomicAdd(&scratch.lit_change, static_cast<unsigned long long>(now) - before);
-  }
-  return before;
+// Notes a tile's number of lit voxels. By one thread a tile.
+__device__ inline void PutLit(const VolumeView& volume, uint32_t tile, uint32_t before,
+                              uint32_t now, RegionScratch& scratch) {
+  if (now == before) return;
+  volume.lit[tile] = now;
+  atomicAdd(&scratch.lit_change, static_cast<unsigned long long>(now) - before);
 }
 
 // Slices that look at a tile whose colours changed. `more`: 1 if it has become lit, −1 if dark.
@@ -92,9 +89,9 @@ __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, Reg
     const uint32_t t = threadIdx.x / 32, lane = threadIdx.x % 32;
     const uint32_t tile = place.TileOf(volume, t);
     if (tile != kAllLanes && scratch.differs[t] != 0) {
-      uint32_t before = 0;
-      if (lane == 0) before = PutLit(volume, tile, scratch.lit[t], scratch);
-      before = __shfl_sync(kAllLanes, before, 0);
+      const uint32_t before = volume.lit[tile];
+      __syncwarp();
+      if (lane == 0) PutLit(volume, tile, before, scratch.lit[t], scratch);
       const uint32_t more =
           static_cast<uint32_t>(scratch.lit[t] != 0) - static_cast<uint32_t>(before != 0);
       MarkSlices(view.slices, volume.grid, tile, more, lane, 32);
@@ -131,45 +128,91 @@ __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u,
   return differs;
 }
 
-// A row of 32 pixels of each plane, the first in the lowest bit, at byte `at` of a picture, planes
-// so many bytes apart; `count`: how many of the pixels the picture has. True if they were others.
-__device__ inline bool PutBits(uint8_t* at, uint32_t plane, const uint32_t bits[3], int32_t count) {
-  const uint32_t kept = count >= 32 ? kAllLanes : (1u << count) - 1;
-  uint32_t bytes[3];
-#pragma unroll
-  for (int p = 0; p < 3; ++p) {
-    bytes[p] = __byte_perm(__brev(bits[p] & kept), 0, 0x0123);  // the first pixel: a byte's top
+// Three planes' words of a row of 32 pixels in a picture of bits, as far as the picture has them.
+struct BitsPlace {
+  uint8_t* at = nullptr;  // of the first plane; null: none
+  uint32_t plane = 0;     // bytes from one to the next
+  int32_t count = 0;      // pixels
+  bool whole = false;     // they are words in memory
+
+  // Of row `lane` of the region's plane that is `slice`.
+  __device__ BitsPlace(const PackedView& packed, const RegionPlace& place, int32_t slice,
+                       uint32_t sub) {
+    const SliceView& view = packed.slices;
+    const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
+    const int32_t v = (place.box.lo[1] + lane - packed.y0) * packed.y_step;
+    count = static_cast<int32_t>(view.width) - place.box.lo[0];
+    if (slice < 0 || lane >= place.box.hi[1] - place.box.lo[1] || v < 0 ||
+        v >= static_cast<int32_t>(view.height) || count <= 0) {
+      return;
+    }
+    const uint32_t row = (view.width + 7) / 8;
+    plane = row * view.height;
+    at = view.bytes +
+         static_cast<size_t>(static_cast<uint32_t>(slice) * view.sub_frames + sub) *
+             view.bytes_per_picture +
+         static_cast<uint32_t>(v) * row + static_cast<uint32_t>(place.box.lo[0]) / 8;
+    whole = count >= 32 && (reinterpret_cast<uintptr_t>(at) | plane) % 4 == 0;
   }
-  bool differs = false;
-  if (count >= 32 && (reinterpret_cast<uintptr_t>(at) | plane) % 4 == 0) {
-    uint32_t held[3];
+  __device__ void Load(uint32_t held[3]) const {
+    if (at == nullptr || !whole) return;
 #pragma unroll
     for (uint32_t p = 0; p < 3; ++p) held[p] = *reinterpret_cast<uint32_t*>(at + p * plane);
+  }
+  // The first pixel in the lowest bit. True if they were others.
+  __device__ bool Put(const uint32_t bits[3], const uint32_t held[3]) const {
+    if (at == nullptr) return false;
+    const uint32_t kept = count >= 32 ? kAllLanes : (1u << count) - 1;
+    bool differs = false;
 #pragma unroll
     for (uint32_t p = 0; p < 3; ++p) {
-      if (held[p] == bytes[p]) continue;
-      *reinterpret_cast<uint32_t*>(at + p * plane) = bytes[p];
-      differs = true;
+      const uint32_t bytes = __byte_perm(__brev(bits[p] & kept), 0, 0x0123);  // a byte's top first
+      if (whole) {
+        if (held[p] == bytes) continue;
+        *reinterpret_cast<uint32_t*>(at + p * plane) = bytes;
+        differs = true;
+        continue;
+      }
+      for (int32_t i = 0; i < 4 && i * 8 < count; ++i) {
+        differs |= PutByte(at + p * plane + i, bytes >> 8 * i & 0xFF);
+      }
     }
     return differs;
   }
-  for (uint32_t p = 0; p < 3; ++p) {
-    for (int32_t i = 0; i < 4 && i * 8 < count; ++i) {
-      differs |= PutByte(at + p * plane + i, bytes[p] >> 8 * i & 0xFF);
+};
+
+// What a region's writing out will ask for, asked for before it is drawn.
+struct Ahead {
+  uint32_t held[3] = {};               // of the first sub-frame
+  uint32_t tile = kAllLanes, lit = 0;  // of one tile, by the first kRegionTiles threads
+  int32_t slice = -1;                  // that the warp's plane is
+
+  template <DrawTo kTo>
+  __device__ static Ahead Of(const DrawView& view, const RegionPlace& place) {
+    Ahead ahead;
+    if constexpr (kTo == DrawTo::kPictures) {
+      const int32_t z = place.box.lo[2] + static_cast<int32_t>(threadIdx.x / 32);
+      if (z < place.box.hi[2]) ahead.slice = view.packed.slice_of_z[z];
+      if (view.packed.slices.format == display::PixelFormat::kBitPlanes3) {
+        BitsPlace(view.packed, place, ahead.slice, 0).Load(ahead.held);
+      }
+      if (threadIdx.x < kRegionTiles) {
+        ahead.tile = place.TileOf(view.volume, threadIdx.x);
+        if (ahead.tile != kAllLanes) ahead.lit = view.volume.lit[ahead.tile];
+      }
     }
+    return ahead;
   }
-  return differs;
-}
+};
 
 // One plane of the region, by a warp: rows as bits by vote, then a lane writes a row. Bits: which
 // sub-frames' pictures differ. color(y) is the colour of the lane's voxel in row y.
 template <typename Color>
-__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place, uint32_t slice,
-                               RegionScratch& scratch, Color&& color) {
+__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place,
+                               const Ahead& ahead, RegionScratch& scratch, Color&& color) {
   constexpr uint32_t kBlue = 0x249249;
   const SliceView& view = packed.slices;
   const uint32_t lane = threadIdx.x % 32;
-  const int32_t rows = place.box.hi[1] - place.box.lo[1];
   const int32_t first_v = (place.box.lo[1] - packed.y0) * packed.y_step;
   const uint32_t u = static_cast<uint32_t>(place.box.lo[0]) + lane;
   uint32_t pictures = 0;
@@ -205,18 +248,11 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
         atomicAdd(&scratch.lit[lane / 8 + 1], counts >> 16);
       }
     }
-    const int32_t v = first_v + static_cast<int32_t>(lane) * packed.y_step;
-    const int32_t count = static_cast<int32_t>(view.width) - place.box.lo[0];
-    bool differs = false;
-    if (static_cast<int32_t>(lane) < rows && v >= 0 && v < static_cast<int32_t>(view.height) &&
-        count > 0) {
-      const uint32_t row = (view.width + 7) / 8, plane = row * view.height;
-      uint8_t* const at =
-          view.bytes + static_cast<size_t>(slice * view.sub_frames + sub) * view.bytes_per_picture +
-          static_cast<uint32_t>(v) * row + static_cast<uint32_t>(place.box.lo[0]) / 8;
-      const uint32_t bits[3] = {red, green, blue};
-      differs = PutBits(at, plane, bits, count);
-    }
+    const BitsPlace bits_place(packed, place, ahead.slice, sub);
+    uint32_t held[3] = {ahead.held[0], ahead.held[1], ahead.held[2]};
+    if (sub > 0) bits_place.Load(held);
+    const uint32_t bits[3] = {red, green, blue};
+    const bool differs = bits_place.Put(bits, held);
     if (__any_sync(kAllLanes, differs)) pictures |= 1u << sub;
   }
   return pictures;
@@ -226,22 +262,27 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
 // color(v): of voxel v of the region, which is of this warp's plane.
 static_assert(kDrawWarps == 1u << RegionBits(2));
 template <typename Color>
-__device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
+__device__ void FlushToPictures(const DrawView& view, const RegionPlace& place, const Ahead& ahead,
                                 RegionScratch& scratch, Color&& color) {
   const PackedView& packed = view.packed;
   const SliceView& slices = packed.slices;
   const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-  const int32_t z = place.box.lo[2] + static_cast<int32_t>(warp);
-  const int32_t s = z < place.box.hi[2] ? packed.slice_of_z[z] : -1;
+  const int32_t s = ahead.slice;
   const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
   const int32_t rows = place.box.hi[1] - place.box.lo[1];
-  const bool column = x < place.box.hi[0];
+  const int32_t limit = x < place.box.hi[0] ? rows : 0;
   const auto at = [&](int32_t y) {
-    return column && y < rows ? color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane) : 0u;
+    return y < limit ? color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane) : 0u;
   };
   uint32_t pictures = 0;
   if (s >= 0 && slices.format == display::PixelFormat::kBitPlanes3) {
-    pictures = FlushPlane(packed, place, static_cast<uint32_t>(s), scratch, at);
+    if (rows == 32 && place.box.hi[0] - place.box.lo[0] == 32) {
+      pictures = FlushPlane(packed, place, ahead, scratch, [&](int32_t y) {
+        return color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane);
+      });
+    } else {
+      pictures = FlushPlane(packed, place, ahead, scratch, at);
+    }
   } else {
     for (int32_t y = 0; y < 32; ++y) {
       const uint32_t c = at(y);
@@ -250,7 +291,7 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
         atomicAdd(&scratch.lit[(y >> 4) * 2 + lane], __popc(lit >> 16 * lane & 0xFFFF));
       }
       const int32_t v = (place.box.lo[1] + y - packed.y0) * packed.y_step;
-      if (s < 0 || !column || y >= rows || v < 0 || v >= static_cast<int32_t>(slices.height) ||
+      if (s < 0 || y >= limit || v < 0 || v >= static_cast<int32_t>(slices.height) ||
           x >= static_cast<int32_t>(slices.width)) {
         continue;
       }
@@ -275,9 +316,8 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
     }
   }
   __syncthreads();
-  if (threadIdx.x < kRegionTiles) {
-    const uint32_t tile = place.TileOf(view.volume, threadIdx.x);
-    if (tile != kAllLanes) PutLit(view.volume, tile, scratch.lit[threadIdx.x], scratch);
+  if (threadIdx.x < kRegionTiles && ahead.tile != kAllLanes) {
+    PutLit(view.volume, ahead.tile, ahead.lit, scratch.lit[threadIdx.x], scratch);
   }
 }
 

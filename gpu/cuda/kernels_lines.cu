@@ -80,38 +80,101 @@ __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, c
 
 // ------------------------------------------------------------------------------ lines into blocks
 
-template <bool kFill>
-__global__ void __launch_bounds__(kThreads)
-    SortLinesKernel(LineSort sort, const ThinLine* lines, uint32_t count) {
-  extern __shared__ uint32_t at[];  // by block: pieces so far; filling, the place of the next
-  const uint32_t blocks = sort.grid.block_count();
-  uint32_t* const offsets = sort.line_offsets + static_cast<size_t>(blockIdx.x) * blocks;
-  for (uint32_t b = threadIdx.x; b < blocks; b += kThreads) {
-    at[b] = kFill ? sort.block_begin[b] + offsets[b] : 0;
-  }
-  __syncthreads();
+__device__ void WalkBlocks(const RegionGrid& grid, const ThinLine* lines, uint32_t i,
+                           uint32_t count, auto&& f) {
+  if (i >= count) return;
+  const ThinLine line = Load(&lines[i]);
+  if (line.word == 0) return;
   const int bits[3] = {RegionBits(0) + kBlockBits, RegionBits(1) + kBlockBits,
                        RegionBits(2) + kBlockBits};
-  const uint32_t i = blockIdx.x * kLineChunk + threadIdx.x;
-  ThinLine line;
-  line.word = 0;
-  if (i < count) line = Load(&lines[i]);
-  if (line.word != 0) {
-    int32_t begin[3];
-    for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
-    WalkThin(line, 0, begin, bits, [&](const int32_t block[3], int32_t k, int32_t end) {
-      if (!sort.grid.HasBlock(block)) return true;
-      const uint32_t place = atomicAdd(&at[sort.grid.BlockAt(block)], 1u);
-      if (kFill && place < sort.piece_capacity) {
-        sort.pieces[place] = LinePiece::Of(i, k, end - k);
-      }
-      return true;
-    });
-  }
-  if (kFill) return;
+  int32_t begin[3];
+  for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
+  WalkThin(line, 0, begin, bits, [&](const int32_t block[3], int32_t k, int32_t end) {
+    if (grid.HasBlock(block)) f(grid.BlockAt(block), LinePiece::Of(i, k, end - k));
+    return true;
+  });
+}
+
+__global__ void __launch_bounds__(kThreads)
+    CountPiecesKernel(LineSort sort, const ThinLine* lines, uint32_t count) {
+  extern __shared__ uint32_t found[];  // by block
+  const uint32_t blocks = sort.grid.block_count();
+  uint32_t* const offsets = sort.line_offsets + static_cast<size_t>(blockIdx.x) * blocks;
+  for (uint32_t b = threadIdx.x; b < blocks; b += kThreads) found[b] = 0;
+  __syncthreads();
+  WalkBlocks(sort.grid, lines, blockIdx.x * kLineChunk + threadIdx.x, count,
+             [&](uint32_t b, LinePiece) { atomicAdd(&found[b], 1u); });
   __syncthreads();
   for (uint32_t b = threadIdx.x; b < blocks; b += kThreads) {
-    offsets[b] = at[b] == 0 ? 0 : atomicAdd(&sort.block_counts[b], at[b]);
+    offsets[b] = found[b] == 0 ? 0 : atomicAdd(&sort.block_counts[b], found[b]);
+  }
+}
+
+// Pieces that wait for being written in the order of their blocks: single ones here and there are
+// what the memory is slowest at. A thread has a row; what does not fit is written at once.
+constexpr uint32_t kStagedEach = 18;
+constexpr uint32_t kStaged = kStagedEach * kThreads;
+constexpr uint32_t kMostSortedBlocks = 4 * kThreads;
+struct PieceScratch {
+  LinePiece pieces[kStaged];
+  uint32_t places[kStaged];  // block, and from bit 16 on the rank in it
+  uint16_t order[kStaged];
+};
+
+__global__ void __launch_bounds__(kThreads)
+    FillPiecesKernel(LineSort sort, const ThinLine* lines, uint32_t count) {
+  extern __shared__ __align__(16) unsigned char memory[];
+  PieceScratch& scratch = *reinterpret_cast<PieceScratch*>(memory);
+  uint32_t* const found = reinterpret_cast<uint32_t*>(memory + sizeof(PieceScratch));  // by block
+  const uint32_t blocks = sort.grid.block_count();
+  const uint32_t* const offsets = sort.line_offsets + static_cast<size_t>(blockIdx.x) * blocks;
+  for (uint32_t b = threadIdx.x; b < blocks; b += kThreads) found[b] = 0;
+  __syncthreads();
+  const bool staged = blocks <= kMostSortedBlocks;
+  const auto put = [&](uint32_t b, uint32_t rank, LinePiece piece) {
+    const uint32_t place = sort.block_begin[b] + offsets[b] + rank;
+    if (place < sort.piece_capacity) sort.pieces[place] = piece;
+  };
+  uint32_t mine = 0;
+  WalkBlocks(sort.grid, lines, blockIdx.x * kLineChunk + threadIdx.x, count,
+             [&](uint32_t b, LinePiece piece) {
+               const uint32_t rank = atomicAdd(&found[b], 1u);
+               if (!staged || mine == kStagedEach) return put(b, rank, piece);
+               const uint32_t slot = mine++ * kThreads + threadIdx.x;
+               scratch.pieces[slot] = piece;
+               scratch.places[slot] = b | rank << 16;
+             });
+  if (!staged) return;
+  using Scan = cub::BlockScan<uint32_t, kThreads>;
+  __shared__ typename Scan::TempStorage scan;
+  for (uint32_t i = threadIdx.x; i < kStaged; i += kThreads) scratch.order[i] = 0xFFFF;
+  __syncthreads();
+  uint32_t counts[kMostSortedBlocks / kThreads], total;
+  for (uint32_t e = 0; e < kMostSortedBlocks / kThreads; ++e) {
+    const uint32_t b = threadIdx.x * (kMostSortedBlocks / kThreads) + e;
+    counts[e] = b < blocks ? found[b] : 0;
+  }
+  Scan(scan).ExclusiveSum(counts, counts, total);
+  for (uint32_t e = 0; e < kMostSortedBlocks / kThreads; ++e) {
+    const uint32_t b = threadIdx.x * (kMostSortedBlocks / kThreads) + e;
+    if (b < blocks) found[b] = counts[e];
+  }
+  __syncthreads();
+  for (uint32_t m = 0; m < mine; ++m) {
+    const uint32_t slot = m * kThreads + threadIdx.x;
+    const uint32_t at = found[scratch.places[slot] & 0xFFFF] + (scratch.places[slot] >> 16);
+    // Beyond it only where others were written at once.
+    if (at < kStaged) {
+      scratch.order[at] = static_cast<uint16_t>(slot);
+    } else {
+      put(scratch.places[slot] & 0xFFFF, scratch.places[slot] >> 16, scratch.pieces[slot]);
+    }
+  }
+  __syncthreads();
+  for (uint32_t i = threadIdx.x; i < Min(total, kStaged); i += kThreads) {
+    const uint32_t slot = scratch.order[i];
+    if (slot == 0xFFFF) continue;
+    put(scratch.places[slot] & 0xFFFF, scratch.places[slot] >> 16, scratch.pieces[slot]);
   }
 }
 
@@ -213,10 +276,14 @@ __global__ void __launch_bounds__(kThreads, 4)
   if (sort.block_begin[sort.grid.block_count()] > sort.piece_capacity) return;
   const uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32;
   const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
-  for (uint32_t chunk = blockIdx.x; chunk < chunks; chunk += gridDim.x) {
-    const uint32_t b = BlockOf(sort, chunk);
-    int32_t block[3];
-    sort.grid.BlockCoordinates(b, block);
+  // A run of chunks, as a rule of the same block of regions.
+  const uint32_t begin_chunk =
+      static_cast<uint32_t>(static_cast<uint64_t>(chunks) * blockIdx.x / gridDim.x);
+  const uint32_t end_chunk =
+      static_cast<uint32_t>(static_cast<uint64_t>(chunks) * (blockIdx.x + 1) / gridDim.x);
+  uint32_t b = begin_chunk < end_chunk ? BlockOf(sort, begin_chunk) : 0;
+  for (uint32_t chunk = begin_chunk; chunk < end_chunk; ++chunk) {
+    while (sort.chunk_begin[b + 1] <= chunk) ++b;
     if (threadIdx.x < kRegionsInBlock) scratch.at[threadIdx.x] = 0;
     if (threadIdx.x < kLengths) scratch.lengths[threadIdx.x] = 0;
     if (threadIdx.x < kWarps) scratch.found[threadIdx.x] = 0;
@@ -224,7 +291,11 @@ __global__ void __launch_bounds__(kThreads, 4)
     const uint32_t first = sort.block_begin[b] + (chunk - sort.chunk_begin[b]) * kPieceChunk;
     const uint32_t count = Min(sort.block_begin[b + 1] - first, kPieceChunk);
     OrderPieces(sort.pieces + first, count, scratch);
-    for (uint32_t p = threadIdx.x; p < count; p += kThreads) {
+    for (uint32_t round = 0; round < kPieceChunk / kThreads; ++round) {
+      // What one warp has to do less in one round it has more in the next.
+      const uint32_t group = round % 2 == 0 ? warp : kWarps - 1 - warp;
+      const uint32_t p = round * kThreads + group * 32 + lane;
+      if (p >= count) continue;
       const LinePiece piece = scratch.order[p];
       const ThinLine line = Load(&lines[piece.line]);
       const int32_t k = piece.k(), stop = k + static_cast<int32_t>(piece.count());
@@ -306,19 +377,6 @@ __global__ void KillLinesKernel(ItemList list, uint32_t count, ThinLine* lines) 
   if (i < count) lines[LineAt(list, i)].word = 0;
 }
 
-template <bool kFill>
-cudaError_t SortLines(const LineSort& sort, const ThinLine* lines, uint32_t count,
-                      cudaStream_t stream) {
-  const size_t shared = SortLinesShared(sort.grid);
-  const uint32_t chunks = (count + kLineChunk - 1) / kLineChunk;
-  const cudaError_t error =
-      cudaFuncSetAttribute(SortLinesKernel<kFill>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                           static_cast<int>(kMostSortLinesShared));
-  if (error != cudaSuccess) return error;
-  SortLinesKernel<kFill><<<chunks, kThreads, shared, stream>>>(sort, lines, count);
-  return cudaGetLastError();
-}
-
 }  // namespace
 
 cudaError_t FindBounds(const float* positions, uint32_t count, uint32_t* bounds,
@@ -343,17 +401,27 @@ cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, cons
 
 cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                         cudaStream_t stream) {
-  if (const cudaError_t error = SortLines<false>(sort, lines, count, stream);
-      error != cudaSuccess) {
-    return error;
-  }
+  cudaError_t error =
+      cudaFuncSetAttribute(CountPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                           static_cast<int>(kMostSortLinesShared));
+  if (error != cudaSuccess) return error;
+  CountPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads, SortLinesShared(sort.grid),
+                      stream>>>(sort, lines, count);
+  if (error = cudaGetLastError(); error != cudaSuccess) return error;
   ScanBlocksKernel<<<1, kScanThreads, 0, stream>>>(sort);
   return cudaGetLastError();
 }
 
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                        cudaStream_t stream) {
-  return SortLines<true>(sort, lines, count, stream);
+  const cudaError_t error =
+      cudaFuncSetAttribute(FillPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                           static_cast<int>(sizeof(PieceScratch) + kMostSortLinesShared));
+  if (error != cudaSuccess) return error;
+  FillPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads,
+                     sizeof(PieceScratch) + SortLinesShared(sort.grid), stream>>>(sort, lines,
+                                                                                  count);
+  return cudaGetLastError();
 }
 
 cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,

@@ -18,30 +18,38 @@ __device__ inline uint32_t MixWords(uint32_t start, uint32_t end, int32_t k, int
   return (start & ~kColorMask) | Interleave(mixed);
 }
 
-__device__ inline void DrawSpan(const DrawView& view, const LineBatchView& batch, LineSpan span,
-                                const int32_t at[3], uint32_t* words) {
-  const ThinLine line = LoadLine(&batch.lines[span.line]);
+__device__ inline void DrawSpan(const DrawView& view, const LineBatchView& batch,
+                                const ThinLine& line, LineSpan span, const int32_t at[3],
+                                uint32_t* words) {
   const int32_t k = span.k();
   const ThinSteps steps =
       ThinSteps::At(line, k, __ldg(&view.reciprocals[line.n]), at, RegionBits(2));
-  uint32_t x = steps.at[0], y = steps.at[1], z = steps.at[2];
+  // 32.32 bits: a step is an addition with its carry, and the voxel is the upper half as it stands.
+  uint64_t at64[3], step64[3];
+  for (int a = 0; a < 3; ++a) {
+    at64[a] = static_cast<uint64_t>(steps.at[a]) << 5;
+    step64[a] =
+        static_cast<uint64_t>(static_cast<int64_t>(static_cast<int32_t>(steps.step[a])) << 5);
+  }
   const uint32_t count = span.count();
-  const auto place = [&] { return x >> 27 | (y >> 22 & 0x3E0) | (z >> 17 & 0x3C00); };
+  const auto next = [&] {
+    const uint32_t place =
+        (static_cast<uint32_t>(at64[2] >> 32) << 5 | static_cast<uint32_t>(at64[1] >> 32)) << 5 |
+        static_cast<uint32_t>(at64[0] >> 32);
+    for (int a = 0; a < 3; ++a) at64[a] += step64[a];
+    return place;
+  };
   if (span.mixed()) {
     const uint32_t end = batch.ends[span.line];
     for (uint32_t j = 0; j < count; ++j) {
-      if (line.word != 0) {
-        atomicMax(&words[place()], MixWords(line.word, end, k + static_cast<int32_t>(j), line.n));
-      }
-      x += steps.step[0], y += steps.step[1], z += steps.step[2];
+      const uint32_t place = next();
+      if (line.word == 0) continue;
+      atomicMax(&words[place], MixWords(line.word, end, k + static_cast<int32_t>(j), line.n));
     }
     return;
   }
 #pragma unroll 4
-  for (uint32_t j = 0; j < count; ++j) {
-    atomicMax(&words[place()], line.word);
-    x += steps.step[0], y += steps.step[1], z += steps.step[2];
-  }
+  for (uint32_t j = 0; j < count; ++j) atomicMax(&words[next()], line.word);
 }
 
 // The region's next segments of spans, from chunk `first` on, by the whole block; how many spans they
@@ -94,17 +102,33 @@ __device__ inline void DrawQueue(const DrawView& view, const LineBatchView& batc
   uint32_t* const buckets = scratch.buckets[warp];
   buckets[lane] = buckets[lane + 32] = 0;
   __syncwarp();
+  const auto search = [&](uint32_t i) {
+    uint32_t low = 0, high = kSegments;  // segment_first[low] ≤ i < segment_first[high]
+    while (high - low > 1) {
+      const uint32_t middle = (low + high) / 2;
+      (scratch.segment_first[middle] <= i ? low : high) = middle;
+    }
+    return low;
+  };
+  // As a rule the spans lie in one segment and the 31 after it, whose beginnings the lanes have.
+  const uint32_t low_segment = search(first);
+  const uint32_t begins = scratch.segment_first[Min(low_segment + 1 + lane, kSegments)];
+  const bool near = __shfl_sync(kAllLanes, begins, 31) >= first + count;
+  const auto segment = [&](uint32_t i) {
+    uint32_t after = 0;  // segments that begin at i or before
+#pragma unroll
+    for (uint32_t step = 16; step > 0; step /= 2) {
+      if (__shfl_sync(kAllLanes, begins, after + step - 1) <= i) after += step;
+    }
+    return near ? low_segment + after : search(i);
+  };
   uint32_t line[kEach], bits[kEach], rank[kEach];
 #pragma unroll
   for (uint32_t e = 0; e < kEach; ++e) {
     const uint32_t i = lane + 32 * e;
     line[e] = bits[e] = rank[e] = 0;
+    const uint32_t low = segment(Min(first + i, first + count - 1));
     if (i >= count) continue;
-    uint32_t low = 0, high = kSegments;  // segment_first[low] ≤ first + i < segment_first[high]
-    while (high - low > 1) {
-      const uint32_t middle = (low + high) / 2;
-      (scratch.segment_first[middle] <= first + i ? low : high) = middle;
-    }
     const LineSpan span =
         batch.lists.spans[scratch.segment_at[low] + (first + i - scratch.segment_first[low])];
     line[e] = span.line;
@@ -128,7 +152,7 @@ __device__ inline void DrawQueue(const DrawView& view, const LineBatchView& batc
     scratch.order[warp][buckets[bucket] + rank[e]] = static_cast<uint8_t>(lane + 32 * e);
   }
   __syncwarp();
-  for (uint32_t i = 0; i < count; i += 32) {
+  const auto take = [&](uint32_t i) {
     const uint32_t from = i + lane < count ? scratch.order[warp][i + lane] : 0;
     LineSpan span{0, 0};
 #pragma unroll
@@ -137,8 +161,22 @@ __device__ inline void DrawQueue(const DrawView& view, const LineBatchView& batc
       const uint32_t b = __shfl_sync(kAllLanes, bits[e], from % 32);
       if (from / 32 == e) span = {l, b};
     }
-    if (i + lane < count) DrawSpan(view, batch, span, at, scratch.words);
+    return span;
+  };
+  // The next one's line is on its way while this one is drawn.
+  LineSpan span = take(0);
+  ThinLine drawn = LoadLine(&batch.lines[span.line]);
+  for (uint32_t i = 0; i < count; i += 32) {
+    LineSpan next = span;
+    ThinLine coming = drawn;
+    if (i + 32 < count) {
+      next = take(i + 32);
+      coming = LoadLine(&batch.lines[next.line]);
+    }
+    if (i + lane < count) DrawSpan(view, batch, drawn, span, at, scratch.words);
     __syncwarp();
+    span = next;
+    drawn = coming;
   }
 }
 
@@ -152,8 +190,10 @@ __device__ inline void DrawSpans(const DrawView& view, const LineBatchView& batc
   const uint32_t last = batch.lists.chunk_begin[region / kRegionsInBlock + 1];
   for (uint32_t chunk = first; chunk < last; chunk += kSegments) {
     const uint32_t count = FindSegments(batch.lists, chunk, last, region, scratch);
-    // Few spans are shared by all warps.
-    const uint32_t queue = Min(kQueue, ((count + kDrawWarps - 1) / kDrawWarps + 31) & ~31u);
+    // Shared by all warps alike.
+    constexpr uint32_t kTogether = kQueue * kDrawWarps;
+    const uint32_t rounds = Max((count + kTogether - 1) / kTogether, 1u) * kDrawWarps;
+    const uint32_t queue = ((count + rounds - 1) / rounds + 31) & ~31u;
     for (;;) {
       uint32_t next = 0;
       if (threadIdx.x % 32 == 0) next = atomicAdd(&scratch.next_span, queue);
