@@ -17,8 +17,10 @@ bool IsSingular(const Drawable& d) {
   });
 }
 
-void DrawItems(const Drawable& d, std::span<const uint32_t> items, const TileGrid& grid,
+void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words) {
+  if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words);
+  if (d.bins.all_walks) return;
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
   uint32_t rgb_before = 0;
@@ -32,12 +34,22 @@ void DrawItems(const Drawable& d, std::span<const uint32_t> items, const TileGri
     at = std::max(at, word);
   };
   WithPrimitive(d.source.record->kind, [&](auto primitive) {
-    for (uint32_t item : items) decltype(primitive)::type::EmitVoxels(d.source, item, box, raise);
+    for (const BinItem& item : items) {
+      if (item.count() == 0) {
+        decltype(primitive)::type::EmitVoxels(d.source, item.item, box, raise);
+      }
+    }
   });
 }
 
 void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor) {
+  BinScratch scratch;
+  PrepareDrawable(d, view_map, grid, owned, executor, scratch);
+}
+
+void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
+                     std::span<const uint8_t> owned, Executor& executor, BinScratch& scratch) {
   const GeometryView& view = d.geometry->view;
   const Affine map = Compose(Compose(view_map, d.layer->record.transform), d.record.transform);
   d.source = {};
@@ -61,7 +73,8 @@ void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
       d.source.radius = RadiusOf(view.record, map);
     }
   });
-  d.bins = BinItems(d.source, grid, owned, executor);
+  BinItems(d.source, grid, owned, d.record.priority, d.record.erase != 0, executor, scratch,
+           d.bins);
 }
 
 }  // namespace voxeld::gpu

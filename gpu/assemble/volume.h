@@ -16,6 +16,10 @@
 
 namespace voxeld::gpu {
 
+struct alignas(64) TileWords {
+  uint32_t at[kTileVoxels];
+};
+
 // Blended colours, interleaved (word.h), of the tiles that have any:
 // a tile without light costs nothing.
 class TileStore {
@@ -23,14 +27,19 @@ class TileStore {
   void Reset(const TileGrid& grid);
   const TileGrid& grid() const { return grid_; }
   // kTileVoxels colours (TileGrid::IndexInTile), or nothing if all are black.
-  const uint32_t* colors(uint32_t tile) const { return colors_[tile].get(); }
+  const uint32_t* colors(uint32_t tile) const {
+    return colors_[tile] == nullptr ? nullptr : colors_[tile]->at;
+  }
   uint32_t lit(uint32_t tile) const { return lit_[tile]; }
-  // Copies `colors`, of which `lit` are not black. False if the tile is as it was.
+  // Copies `colors` (of kTileVoxels), of which `lit` are not black. False if the tile is as it was.
   bool Set(uint32_t tile, const uint32_t* colors, uint32_t lit);
+  // Takes `colors`, of which `lit` are not black, and leaves zeros. False if the tile is as it was. `past_caches`: they
+  // will not be read before much else was.
+  bool Take(uint32_t tile, TileWords& colors, uint32_t lit, bool past_caches);
 
  private:
   TileGrid grid_;
-  std::vector<std::unique_ptr<uint32_t[]>> colors_;
+  std::vector<std::unique_ptr<TileWords>> colors_;
   std::vector<uint32_t> lit_;
 };
 
@@ -73,9 +82,11 @@ class Volume final : private SceneObserver {
     bool dirty = false;
     bool leaving = false;  // some of its entries' drawables are
   };
+  // A worker's.
   struct Scratch {
-    std::vector<uint32_t> words, colors;
+    std::unique_ptr<TileWords> words, colors;  // zeros between tiles
     std::vector<Entry> entries;
+    BinScratch bins;
   };
 
   void OnLeave(Drawable& drawable) override;
@@ -84,9 +95,9 @@ class Volume final : private SceneObserver {
 
   void MarkDirty(uint32_t tile);
   void TakeOutLeaving();
-  void Prepare(Drawable& drawable, Executor& executor) const;
+  void Prepare(Drawable& drawable, Executor& executor, BinScratch& scratch) const;
   void PreparePending();
-  uint32_t DrawTile(uint32_t tile, Scratch& scratch) const;
+  bool DrawTile(uint32_t tile, bool past_caches, Scratch& scratch);
 
   Executor& executor_;
   Scene scene_;

@@ -23,13 +23,14 @@ TEST(Bins, RowsHoldEachItemOfEachTileInOrder) {
     std::vector<uint8_t> owned(grid.count(), 1);
     owned[0] = 0;
     const std::unique_ptr<Executor> executor = MakeThreadExecutor(3);
-    const Bins bins = BinItems(source, grid, owned, *executor);
+    BinScratch scratch;
+    Bins bins;
+    BinItems(source, grid, owned, 0, false, *executor, scratch, bins);
     ASSERT_EQ(bins.begin.size(), bins.tiles.size() + 1);
-    EXPECT_EQ(bins.begin.back(), bins.items.size());
-    std::vector<std::vector<uint32_t>> want(grid.count());
+    std::vector<std::vector<BinItem>> want(grid.count());
     for (uint32_t i = 0; i < count; ++i) {
       Points::EmitTiles(source, i, grid, [&](uint32_t tile) {
-        if (tile != 0) want[tile].push_back(i);
+        if (tile != 0) want[tile].push_back({i, 0});
       });
     }
     size_t rows = 0;
@@ -37,8 +38,8 @@ TEST(Bins, RowsHoldEachItemOfEachTileInOrder) {
       if (want[tile].empty()) continue;
       ASSERT_LT(rows, bins.tiles.size());
       EXPECT_EQ(bins.tiles[rows], tile);
-      const std::span<const uint32_t> row = bins.row(rows++);
-      EXPECT_EQ(std::vector<uint32_t>(row.begin(), row.end()), want[tile]);
+      const std::span<const BinItem> row = bins.row(rows++);
+      EXPECT_EQ(std::vector<BinItem>(row.begin(), row.end()), want[tile]);
     }
     EXPECT_EQ(rows, bins.tiles.size());
   }

@@ -1,0 +1,248 @@
+// What span_kernel.cc calls, once for each instruction set.
+#if defined(VOXELD_GPU_ASSEMBLE_SPAN_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef VOXELD_GPU_ASSEMBLE_SPAN_KERNEL_INL_H_
+#undef VOXELD_GPU_ASSEMBLE_SPAN_KERNEL_INL_H_
+#else
+#define VOXELD_GPU_ASSEMBLE_SPAN_KERNEL_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace voxeld::gpu {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using DW = hn::CappedTag<uint32_t, 16>;
+using VW = hn::Vec<DW>;
+
+// The smallest whole number at or above q, a crossing's (line_walk.h): q > −2⁵².
+HWY_INLINE int64_t CeilCrossing(double q) {
+  q -= 0x1p-36;
+  const auto k = static_cast<int64_t>(q);
+  return k + static_cast<int64_t>(static_cast<double>(k) < q);
+}
+
+// An axis of a walk, reflected if it goes down: then it goes up.
+struct UpwardAxis {
+  int64_t at, step;
+  bool down;
+  HWY_INLINE UpwardAxis(int64_t walk_at, int64_t walk_step)
+      : at(walk_step < 0 ? ~walk_at : walk_at),
+        step(walk_step < 0 ? -walk_step : walk_step),
+        down(walk_step < 0) {}
+  // The first k whose coordinate is `voxel` (reflected) or beyond; at most `most`.
+  HWY_INLINE int64_t FirstAt(int64_t voxel, int64_t most) const {
+    const int64_t way = voxel * (int64_t{1} << 32) - at;
+    if (way <= 0) return 0;
+    if (step == 0) return most;
+    const double q = static_cast<double>(way) / static_cast<double>(step);
+    return q >= static_cast<double>(most) ? most : std::min(most, CeilCrossing(q));
+  }
+};
+
+// The k inside the volume.
+HWY_NOINLINE void ClipToVolume(const LineWalk& walk, const WalkGrid& grid, int64_t* begin,
+                               int64_t* end) {
+  const int64_t most = *end;
+  for (int r = 0; r < 3; ++r) {
+    const UpwardAxis up(walk.at[r], walk.step[r]);
+    const int64_t lo = up.down ? -int64_t{grid.voxels[r]} : 0;
+    *begin = std::max(*begin, up.FirstAt(lo, most));
+    *end = std::min(*end, up.FirstAt(lo + grid.voxels[r], most));
+  }
+}
+
+HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const WalkGrid& grid,
+                                     const uint8_t* owned, FoundSpans& found) {
+  constexpr size_t kMostCrossings = kMostWalkSteps / kTileSize + 3;
+  const hn::CappedTag<double, 8> d;
+  const size_t lanes = hn::Lanes(d);
+  int32_t crossings[3][kMostCrossings + 8];
+  int64_t begin = 0, end = int64_t{walk.steps} + 1;
+  int64_t first[3], last[3], outside = 0;
+  for (int r = 0; r < 3; ++r) {
+    first[r] = walk.at[r] >> 32;
+    last[r] = (walk.at[r] + walk.step[r] * (end - 1)) >> 32;
+    outside |=
+        first[r] | (grid.voxels[r] - 1 - first[r]) | last[r] | (grid.voxels[r] - 1 - last[r]);
+  }
+  if (outside < 0) {
+    ClipToVolume(walk, grid, &begin, &end);
+    if (begin >= end) return;
+    for (int r = 0; r < 3; ++r) {
+      first[r] = (walk.at[r] + walk.step[r] * begin) >> 32;
+      last[r] = (walk.at[r] + walk.step[r] * (end - 1)) >> 32;
+    }
+  }
+  int32_t tile_step[3];
+  int32_t tile = 0;
+  size_t most = 1;
+  const auto sentinel = static_cast<int32_t>(end);
+  for (int r = 0; r < 3; ++r) {
+    const int64_t from = first[r] >> kTileBits, to = last[r] >> kTileBits;
+    tile += static_cast<int32_t>(from) * grid.tile_step[r];
+    const bool down = to < from;
+    tile_step[r] = down ? -grid.tile_step[r] : grid.tile_step[r];
+    const auto count = static_cast<size_t>(down ? from - to : to - from);
+    most += count;
+    if (count > 0) {
+      const int64_t at = down ? ~walk.at[r] : walk.at[r];
+      const double step = static_cast<double>(down ? -walk.step[r] : walk.step[r]);
+      const int64_t face = down ? -from : from + 1;  // of tiles, reflected
+      const double way = static_cast<double>(face * (int64_t{1} << 36) - at);
+      const double inverse = 1.0 / step;
+      if (count <= 2) {
+        crossings[r][0] = static_cast<int32_t>(CeilCrossing(way * inverse));
+        crossings[r][1] = static_cast<int32_t>(CeilCrossing((way + 0x1p36) * inverse));
+      } else {
+        const auto by = hn::Set(d, inverse), room = hn::Set(d, 0x1p-36);
+        auto ways = hn::Add(hn::Set(d, way), hn::Mul(hn::Iota(d, 0), hn::Set(d, 0x1p36)));
+        const auto all = hn::Set(d, 0x1p36 * static_cast<double>(lanes));
+        const hn::Rebind<int32_t, decltype(d)> di;
+        for (size_t j = 0; j < count; j += lanes) {
+          const auto k = hn::Ceil(hn::Sub(hn::Mul(ways, by), room));
+          hn::StoreU(hn::DemoteTo(di, k), di, crossings[r] + j);
+          ways = hn::Add(ways, all);
+        }
+      }
+    }
+    crossings[r][count] = sentinel;
+  }
+
+  found.tiles.Reserve(found.size, most);
+  found.items.Reserve(found.size, most);
+  uint32_t* const tiles = found.tiles.data();
+  BinItem* const items = found.items.data();
+  size_t size = found.size;
+  const int32_t *x = crossings[0], *y = crossings[1], *z = crossings[2];
+  auto k = static_cast<int32_t>(begin);
+  for (;;) {
+    const int32_t next = std::min(*x, std::min(*y, *z));
+    tiles[size] = static_cast<uint32_t>(tile);
+    items[size] = BinItem::Span(item, static_cast<uint32_t>(k), static_cast<uint32_t>(next - k));
+    size += owned[tile] != 0;
+    if (next == sentinel) break;
+    const bool in_x = *x == next, in_y = *y == next, in_z = *z == next;
+    x += in_x;
+    y += in_y;
+    z += in_z;
+    tile += (in_x ? tile_step[0] : 0) + (in_y ? tile_step[1] : 0) + (in_z ? tile_step[2] : 0);
+    k = next;
+  }
+  found.size = size;
+}
+
+HWY_ATTR inline void FindSpansIn(const LineWalk* walks, uint32_t first, uint32_t last,
+                                 const WalkGrid& grid, const uint8_t* owned, FoundSpans& found) {
+  for (uint32_t i = first; i < last; ++i) FindSpansOf(walks[i], i, grid, owned, found);
+}
+
+// The voxels of spans, one behind the other, before they are drawn.
+constexpr size_t kDrawBlock = 512;
+struct DrawBlock {
+  HWY_ALIGN uint32_t at[kDrawBlock + 64];  // in the tile
+  HWY_ALIGN uint32_t words[kDrawBlock + 64];
+};
+
+HWY_ATTR HWY_INLINE void RaiseBlock(const DrawBlock& block, size_t size, uint32_t* words) {
+  for (size_t i = 0; i < size; ++i) {
+    uint32_t& at = words[block.at[i]];
+    at = std::max(at, block.words[i]);
+  }
+}
+
+HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items,
+                                 uint32_t* words) {
+  constexpr size_t kAhead = 8;
+  const DW d;
+  const size_t lanes = hn::Lanes(d);
+  const VW iota = hn::Iota(d, 0);
+  const VW mask0 = hn::Set(d, 0xF), mask1 = hn::Set(d, 0xF0), mask2 = hn::Set(d, 0xF00);
+  DrawBlock block;
+  size_t size = 0;
+  for (size_t i = 0; i < items.size(); ++i) {
+    if (i + kAhead < items.size()) hwy::Prefetch(walks + items[i + kAhead].item);
+    const BinItem item = items[i];
+    const LineWalk& walk = walks[item.item];
+    const int64_t k = item.first();
+    const uint32_t count = item.count();
+    VW p[3], step[3];
+    for (int r = 0; r < 3; ++r) {
+      const auto at = static_cast<uint32_t>((walk.at[r] + walk.step[r] * k) >> 5) + 1;
+      step[r] = hn::Set(d, static_cast<uint32_t>(walk.step[r] >> 5) + 1);
+      p[r] = hn::Add(hn::Set(d, at), hn::Mul(step[r], iota));
+    }
+    const VW word = hn::Set(d, walk.word);
+    for (uint32_t done = 0;;) {
+      const VW at = hn::Or(hn::And(hn::ShiftRight<27>(p[0]), mask0),
+                           hn::Or(hn::And(hn::ShiftRight<23>(p[1]), mask1),
+                                  hn::And(hn::ShiftRight<19>(p[2]), mask2)));
+      hn::StoreU(at, d, block.at + size + done);
+      hn::StoreU(word, d, block.words + size + done);
+      done += static_cast<uint32_t>(lanes);
+      if (done >= count) break;
+      for (int r = 0; r < 3; ++r) {
+        p[r] = hn::Add(p[r], hn::Mul(step[r], hn::Set(d, static_cast<uint32_t>(lanes))));
+      }
+    }
+    size += count;
+    if (size >= kDrawBlock - kMostInTile) {
+      RaiseBlock(block, size, words);
+      size = 0;
+    }
+  }
+  RaiseBlock(block, size, words);
+}
+
+HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words) {
+  const DW d;
+  const size_t lanes = hn::Lanes(d);
+  const VW color = hn::Set(d, kColorMask), erase = hn::Set(d, kEraseBit), zero = hn::Zero(d);
+  VW lit = zero;
+  for (size_t i = 0; i < kTileVoxels; i += lanes) {
+    const VW word = hn::Load(d, words + i);
+    const VW shown = hn::IfThenElseZero(hn::Eq(hn::And(word, erase), zero), hn::And(word, color));
+    hn::Store(shown, d, words + i);
+    lit = hn::Sub(lit, hn::VecFromMask(d, hn::Ne(shown, zero)));  // all ones: −1
+  }
+  return hn::GetLane(hn::SumOfLanes(d, lit));
+}
+
+HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, bool past_caches, uint32_t* held) {
+  constexpr size_t kPart = 64;
+  const DW d;
+  const size_t lanes = hn::Lanes(d);
+  const VW zero = hn::Zero(d);
+  size_t i = 0;
+  for (bool same = true; i < kTileVoxels; i += kPart) {
+    VW differ = zero;
+    for (size_t j = i; j < i + kPart; j += lanes) {
+      differ = hn::Or(differ, hn::Xor(hn::Load(d, colors + j), hn::Load(d, held + j)));
+    }
+    same = hn::AllTrue(d, hn::Eq(differ, zero));
+    if (!same) break;
+    for (size_t j = i; j < i + kPart; j += lanes) hn::Store(zero, d, colors + j);
+  }
+  if (i == kTileVoxels) return false;
+  if (past_caches) {
+    for (; i < kTileVoxels; i += lanes) {
+      hn::Stream(hn::Load(d, colors + i), d, held + i);
+      hn::Store(zero, d, colors + i);
+    }
+    hwy::FlushStream();
+  } else {
+    for (; i < kTileVoxels; i += lanes) {
+      hn::Store(hn::Load(d, colors + i), d, held + i);
+      hn::Store(zero, d, colors + i);
+    }
+  }
+  return true;
+}
+
+inline const char* SpanTargetIn() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace voxeld::gpu
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,69 @@
+// The loops over spans and words that assembly spends its time in, for the widest vectors that the processor has; the
+// same bytes in all.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "gpu/assemble/bin_item.h"
+#include "gpu/assemble/line_walk.h"
+
+namespace voxeld::gpu {
+
+// Grows without a look at what is in it; what is put into it is kept.
+template <typename T>
+class Buffer {
+ public:
+  // Room for `more` behind the first `size`.
+  void Reserve(size_t size, size_t more) {
+    if (size + more <= capacity_) return;
+    const size_t capacity = size + more + capacity_ / 2;
+    std::unique_ptr<T[]> next = std::make_unique_for_overwrite<T[]>(capacity);
+    for (size_t i = 0; i < size; ++i) next[i] = data_[i];
+    data_ = std::move(next);
+    capacity_ = capacity;
+  }
+  T* data() { return data_.get(); }
+  const T* data() const { return data_.get(); }
+  size_t capacity() const { return capacity_; }
+
+ private:
+  std::unique_ptr<T[]> data_;
+  size_t capacity_ = 0;
+};
+
+// Spans as they are found, and the tile of each.
+struct FoundSpans {
+  Buffer<uint32_t> tiles;
+  Buffer<BinItem> items;
+  size_t size = 0;
+
+  void Add(uint32_t tile, BinItem item) {
+    tiles.Reserve(size, 1);
+    items.Reserve(size, 1);
+    tiles.data()[size] = tile;
+    items.data()[size++] = item;
+  }
+};
+
+// Appends the spans of walks [first, last) in the tiles with owned[tile] != 0, each walk's in the order of k.
+void FindSpans(const LineWalk* walks, uint32_t first, uint32_t last, const WalkGrid& grid,
+               const uint8_t* owned, FoundSpans& found);
+
+// Raises `words` of a tile to those of walks[item] for each span; items of count 0 are left out.
+void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words);
+
+// Words of a layer as it looks over black in full opacity, in place; returns how many are not black.
+uint32_t ShowWords(uint32_t* words);
+
+// Moves a tile's colours to `held`, and leaves zeros. False if it held the same. `past_caches`: for volumes that the
+// caches would not keep.
+bool MoveColors(uint32_t* colors, bool past_caches, uint32_t* held);
+
+// The instruction set in use.
+std::string SpanTarget();
+
+}  // namespace voxeld::gpu
