@@ -12,6 +12,8 @@ namespace {
 constexpr uint32_t kPartItems = 2048;  // at least, where there are several parts
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
 
+constexpr size_t kAhead = 16;          // items whose places are fetched before they are written
+
 // Few: sorted as numbers, the tile in the upper, the place in the lower 32 bits.
 void PutSorted(const FoundSpans& found, Bins& bins) {
   std::vector<uint64_t> order(found.size);
@@ -55,7 +57,12 @@ void PutCounted(std::span<const FoundSpans> parts, uint32_t tile_count, Executor
     uint32_t* const place = counts.data() + part * tile_count;
     const uint32_t* const tiles = parts[part].tiles.data();
     const BinItem* const items = parts[part].items.data();
-    for (size_t i = 0; i < parts[part].size; ++i) bins.items.data()[place[tiles[i]]++] = items[i];
+    BinItem* const to = bins.items.data();
+    const size_t size = parts[part].size;
+    for (size_t i = 0; i < size; ++i) {
+      if (i + kAhead < size) __builtin_prefetch(to + place[tiles[i + kAhead]], /*rw=*/1);
+      to[place[tiles[i]]++] = items[i];
+    }
   });
 }
 

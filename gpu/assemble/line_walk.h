@@ -4,7 +4,8 @@
 // multiple of 1/(256·N), so one that is too large by less than that lies in the same voxel.
 //   P(k) = at + k·step, in 2⁻³² voxel: `at` is S; `step` is too large by 1 + 2⁻¹⁷ at most, so P(N) by N·(1 + 2⁻¹⁷)·2⁻³².
 //   In a tile of 16 voxels: 5.27 fixed point, ⌊P(k0)/2⁵⌋ + 1 and ⌊step/2⁵⌋ + 1 a step: each too large by 2⁻²⁷ at most,
-//   in the tile's first kMostInTile voxels by kMostInTile·2⁻²⁷.
+//   in the tile's first kMostInTile voxels by kMostInTile·2⁻²⁷. Whole numbers beyond the tile do not matter, so this is
+//   done modulo 2³²: ⌊P(k0)/2⁵⌋ = S·2¹⁹ + k0·⌊step/2⁵⌋ + ⌊k0·(step mod 2⁵)/2⁵⌋.
 // Together less than 1/(256·N) for N ≤ kMostWalkSteps = 3072: 7.2·10⁻⁷ + 2.5·10⁻⁷ < 12.7·10⁻⁷.
 // A tile holds no more than that of consecutive k: along some axis the walk takes a step of more than (N−1)/N voxel
 // (THIN) or of 1/√3 (EUCLIDEAN), so it has left after 18, or 29.
@@ -43,38 +44,42 @@ struct WalkGrid {
   }
 };
 
-// Axes as in WalkGrid.
-struct alignas(64) LineWalk {
-  int64_t at[3];
-  int64_t step[3];
-  uint32_t word;
-  uint32_t steps;  // N
+// Axes as in WalkGrid. Half a cache line: tiles read the walks of their spans from all over.
+struct alignas(32) LineWalk {
+  int32_t start[3];   // S, units
+  uint32_t word;      // of its voxels
+  int32_t stride[3];  // ⌊step/2⁵⌋
+  uint32_t rest;      // step mod 2⁵ of axis r in the five bits from 5·r on; N from bit 16 on
+
+  int64_t at(int r) const { return int64_t{start[r]} * (int64_t{1} << 24); }
+  int64_t step(int r) const { return int64_t{stride[r]} * 32 + (rest >> (5 * r) & 31); }
+  int64_t steps() const { return rest >> 16; }  // N
 
   // False if the line is none: of another kind, too long, too far away, or of two colours. `word` is left to the caller.
   static bool Of(const Line& line, const WalkGrid& grid, LineWalk& walk) {
     if (line.sampling == LineSampling::kCover || line.color_s != line.color_e) return false;
-    int64_t d[3], n = 0;
-    bool near = true;
+    int64_t d[3], n = 0, most = 0;
     for (int r = 0; r < 3; ++r) {
       const int64_t s = line.s[grid.axis[r]], e = line.e[grid.axis[r]];
-      near = near && Abs(s) <= kMostWalkUnits && Abs(e) <= kMostWalkUnits;
-      walk.at[r] = s * (int64_t{1} << 24);
+      most = Max(most, Max(Abs(s), Abs(e)));
+      walk.start[r] = static_cast<int32_t>(s);
       d[r] = e - s;
       n = Max(n, Abs(VoxelOf(e) - VoxelOf(s)));
     }
-    if (!near) return false;
+    if (most > kMostWalkUnits || n > kMostWalkSteps) return false;
     if (line.sampling == LineSampling::kEuclidean) {
-      if (n > kMostWalkSteps) return false;
       const bool one_voxel = n == 0;
       n = LineSteps(line);
-      if (n == 0 && !one_voxel) return false;
+      if ((n == 0 && !one_voxel) || n > kMostWalkSteps) return false;
     }
-    if (n > kMostWalkSteps) return false;
-    walk.steps = static_cast<uint32_t>(n);
+    walk.rest = static_cast<uint32_t>(n) << 16;
     // 2²⁴/N and the product are rounded: |D|·2²⁴/N < 2³³·⁰¹, so by less than 2⁻¹⁸·⁹ in all.
     const double part = n == 0 ? 0.0 : 16777216.0 / static_cast<double>(n);
     for (int r = 0; r < 3; ++r) {
-      walk.step[r] = n == 0 ? 0 : FloorToInt(static_cast<double>(d[r]) * part + 0x1p-18) + 1;
+      const int64_t step =
+          n == 0 ? 0 : FloorToInt(static_cast<double>(d[r]) * part + 0x1p-18) + 1;
+      walk.stride[r] = static_cast<int32_t>(step >> 5);
+      walk.rest |= static_cast<uint32_t>(step & 31) << (5 * r);
     }
     return true;
   }

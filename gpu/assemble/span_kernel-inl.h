@@ -45,7 +45,7 @@ HWY_NOINLINE void ClipToVolume(const LineWalk& walk, const WalkGrid& grid, int64
                                int64_t* end) {
   const int64_t most = *end;
   for (int r = 0; r < 3; ++r) {
-    const UpwardAxis up(walk.at[r], walk.step[r]);
+    const UpwardAxis up(walk.at(r), walk.step(r));
     const int64_t lo = up.down ? -int64_t{grid.voxels[r]} : 0;
     *begin = std::max(*begin, up.FirstAt(lo, most));
     *end = std::min(*end, up.FirstAt(lo + grid.voxels[r], most));
@@ -58,11 +58,13 @@ HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const 
   const hn::CappedTag<double, 8> d;
   const size_t lanes = hn::Lanes(d);
   int32_t crossings[3][kMostCrossings + 8];
-  int64_t begin = 0, end = int64_t{walk.steps} + 1;
-  int64_t first[3], last[3], outside = 0;
+  int64_t begin = 0, end = walk.steps() + 1;
+  int64_t at[3], step[3], first[3], last[3], outside = 0;
   for (int r = 0; r < 3; ++r) {
-    first[r] = walk.at[r] >> 32;
-    last[r] = (walk.at[r] + walk.step[r] * (end - 1)) >> 32;
+    at[r] = walk.at(r);
+    step[r] = walk.step(r);
+    first[r] = at[r] >> 32;
+    last[r] = (at[r] + step[r] * (end - 1)) >> 32;
     outside |=
         first[r] | (grid.voxels[r] - 1 - first[r]) | last[r] | (grid.voxels[r] - 1 - last[r]);
   }
@@ -70,8 +72,8 @@ HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const 
     ClipToVolume(walk, grid, &begin, &end);
     if (begin >= end) return;
     for (int r = 0; r < 3; ++r) {
-      first[r] = (walk.at[r] + walk.step[r] * begin) >> 32;
-      last[r] = (walk.at[r] + walk.step[r] * (end - 1)) >> 32;
+      first[r] = (at[r] + step[r] * begin) >> 32;
+      last[r] = (at[r] + step[r] * (end - 1)) >> 32;
     }
   }
   int32_t tile_step[3];
@@ -86,11 +88,10 @@ HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const 
     const auto count = static_cast<size_t>(down ? from - to : to - from);
     most += count;
     if (count > 0) {
-      const int64_t at = down ? ~walk.at[r] : walk.at[r];
-      const double step = static_cast<double>(down ? -walk.step[r] : walk.step[r]);
       const int64_t face = down ? -from : from + 1;  // of tiles, reflected
-      const double way = static_cast<double>(face * (int64_t{1} << 36) - at);
-      const double inverse = 1.0 / step;
+      const double way =
+          static_cast<double>(face * (int64_t{1} << 36) - (down ? ~at[r] : at[r]));
+      const double inverse = 1.0 / static_cast<double>(down ? -step[r] : step[r]);
       if (count <= 2) {
         crossings[r][0] = static_cast<int32_t>(CeilCrossing(way * inverse));
         crossings[r][1] = static_cast<int32_t>(CeilCrossing((way + 0x1p36) * inverse));
@@ -137,6 +138,29 @@ HWY_ATTR inline void FindSpansIn(const LineWalk* walks, uint32_t first, uint32_t
   for (uint32_t i = first; i < last; ++i) FindSpansOf(walks[i], i, grid, owned, found);
 }
 
+#if HWY_TARGET == HWY_SCALAR
+
+inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words) {
+  constexpr uint32_t kShift[3] = {27, 23, 19};
+  for (const BinItem& item : items) {
+    const LineWalk& walk = walks[item.item];
+    uint32_t p[3];
+    for (int r = 0; r < 3; ++r) {
+      p[r] = static_cast<uint32_t>((walk.at(r) + walk.step(r) * item.first()) >> 5) + 1;
+    }
+    for (uint32_t left = item.count(); left > 0; --left) {
+      uint32_t at = 0;
+      for (int r = 0; r < 3; ++r) {
+        at |= p[r] >> kShift[r] & 0xFu << (4 * r);
+        p[r] += static_cast<uint32_t>(walk.stride[r]) + 1;
+      }
+      words[at] = std::max(words[at], walk.word);
+    }
+  }
+}
+
+#else
+
 // The voxels of spans, one behind the other, before they are drawn.
 constexpr size_t kDrawBlock = 512;
 struct DrawBlock {
@@ -145,45 +169,67 @@ struct DrawBlock {
 };
 
 HWY_ATTR HWY_INLINE void RaiseBlock(const DrawBlock& block, size_t size, uint32_t* words) {
-  for (size_t i = 0; i < size; ++i) {
-    uint32_t& at = words[block.at[i]];
-    at = std::max(at, block.words[i]);
+  const hn::CappedTag<uint32_t, 1> d;  // without a branch that nobody could foresee
+  const auto raise = [&](size_t i) HWY_ATTR {
+    uint32_t* const at = words + block.at[i];
+    hn::StoreU(hn::Max(hn::LoadU(d, at), hn::LoadU(d, block.words + i)), d, at);
+  };
+  size_t i = 0;
+  for (; i + 4 <= size; i += 4) {
+    raise(i);
+    raise(i + 1);
+    raise(i + 2);
+    raise(i + 3);
   }
+  for (; i < size; ++i) raise(i);
 }
 
 HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items,
                                  uint32_t* words) {
-  constexpr size_t kAhead = 8;
+  constexpr size_t kAhead = 24;
+  static_assert(sizeof(LineWalk) == 32, "two vectors of 128 bits");
   const DW d;
   const size_t lanes = hn::Lanes(d);
-  const VW iota = hn::Iota(d, 0);
+  const VW iota = hn::Iota(d, 0), all = hn::Set(d, static_cast<uint32_t>(lanes));
   const VW mask0 = hn::Set(d, 0xF), mask1 = hn::Set(d, 0xF0), mask2 = hn::Set(d, 0xF00);
+  const VW five_bits = hn::Set(d, 31), one = hn::Set(d, 1);
+  HWY_ALIGN static constexpr uint32_t kFive[4] = {0, 5, 10, 0};
+  const VW rest_at = hn::LoadDup128(d, kFive);
+  for (size_t i = 0; i < std::min(kAhead, items.size()); ++i) {
+    hwy::Prefetch(walks + items[i].item);
+  }
   DrawBlock block;
   size_t size = 0;
   for (size_t i = 0; i < items.size(); ++i) {
     if (i + kAhead < items.size()) hwy::Prefetch(walks + items[i + kAhead].item);
     const BinItem item = items[i];
     const LineWalk& walk = walks[item.item];
-    const int64_t k = item.first();
     const uint32_t count = item.count();
-    VW p[3], step[3];
-    for (int r = 0; r < 3; ++r) {
-      const auto at = static_cast<uint32_t>((walk.at[r] + walk.step[r] * k) >> 5) + 1;
-      step[r] = hn::Set(d, static_cast<uint32_t>(walk.step[r] >> 5) + 1);
-      p[r] = hn::Add(hn::Set(d, at), hn::Mul(step[r], iota));
-    }
-    const VW word = hn::Set(d, walk.word);
+    // In each block of four lanes: three axes and the word; three axes and what is left of their steps.
+    const VW start = hn::LoadDup128(d, reinterpret_cast<const uint32_t*>(walk.start));
+    const VW stride = hn::LoadDup128(d, reinterpret_cast<const uint32_t*>(walk.stride));
+    const VW rest = hn::And(hn::Shr(hn::Broadcast<3>(stride), rest_at), five_bits);
+    const VW k = hn::Set(d, item.first());
+    const VW from = hn::Add(hn::Add(hn::ShiftLeft<19>(start), hn::Mul(stride, k)),
+                            hn::Add(hn::ShiftRight<5>(hn::Mul(rest, k)), one));
+    const VW by = hn::Add(stride, one);
+    const VW x_step = hn::Broadcast<0>(by), y_step = hn::Broadcast<1>(by),
+             z_step = hn::Broadcast<2>(by);
+    VW x = hn::Add(hn::Broadcast<0>(from), hn::Mul(x_step, iota));
+    VW y = hn::Add(hn::Broadcast<1>(from), hn::Mul(y_step, iota));
+    VW z = hn::Add(hn::Broadcast<2>(from), hn::Mul(z_step, iota));
+    const VW word = hn::Broadcast<3>(start);
     for (uint32_t done = 0;;) {
-      const VW at = hn::Or(hn::And(hn::ShiftRight<27>(p[0]), mask0),
-                           hn::Or(hn::And(hn::ShiftRight<23>(p[1]), mask1),
-                                  hn::And(hn::ShiftRight<19>(p[2]), mask2)));
+      const VW at = hn::Or(hn::And(hn::ShiftRight<27>(x), mask0),
+                           hn::Or(hn::And(hn::ShiftRight<23>(y), mask1),
+                                  hn::And(hn::ShiftRight<19>(z), mask2)));
       hn::StoreU(at, d, block.at + size + done);
       hn::StoreU(word, d, block.words + size + done);
       done += static_cast<uint32_t>(lanes);
-      if (done >= count) break;
-      for (int r = 0; r < 3; ++r) {
-        p[r] = hn::Add(p[r], hn::Mul(step[r], hn::Set(d, static_cast<uint32_t>(lanes))));
-      }
+      if (HWY_LIKELY(done >= count)) break;
+      x = hn::Add(x, hn::Mul(x_step, all));
+      y = hn::Add(y, hn::Mul(y_step, all));
+      z = hn::Add(z, hn::Mul(z_step, all));
     }
     size += count;
     if (size >= kDrawBlock - kMostInTile) {
@@ -193,6 +239,8 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
   }
   RaiseBlock(block, size, words);
 }
+
+#endif
 
 HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words) {
   const DW d;

@@ -4,36 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 
 #include "gpu/assemble/bin_item.h"
+#include "gpu/assemble/buffer.h"
 #include "gpu/assemble/line_walk.h"
 
 namespace voxeld::gpu {
-
-// Grows without a look at what is in it; what is put into it is kept.
-template <typename T>
-class Buffer {
- public:
-  // Room for `more` behind the first `size`.
-  void Reserve(size_t size, size_t more) {
-    if (size + more <= capacity_) return;
-    const size_t capacity = size + more + capacity_ / 2;
-    std::unique_ptr<T[]> next = std::make_unique_for_overwrite<T[]>(capacity);
-    for (size_t i = 0; i < size; ++i) next[i] = data_[i];
-    data_ = std::move(next);
-    capacity_ = capacity;
-  }
-  T* data() { return data_.get(); }
-  const T* data() const { return data_.get(); }
-  size_t capacity() const { return capacity_; }
-
- private:
-  std::unique_ptr<T[]> data_;
-  size_t capacity_ = 0;
-};
 
 // Spans as they are found, and the tile of each.
 struct FoundSpans {
