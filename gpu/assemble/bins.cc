@@ -98,11 +98,28 @@ bool FindWalks(const Source& source, const TileGrid& grid, std::span<const uint8
     }
     follow(i);
     run = i + 1;
-    walks[i].word = 0;
     all = false;
     Find<Segments>(source, grid, owned, i, i + 1, found);
   }
   follow(last);
+  return all;
+}
+
+// The same of triangles; false if some are not small.
+bool FindTriangles(const Source& source, const TileGrid& grid, std::span<const uint8_t> owned,
+                   uint32_t priority, bool erase, uint32_t first, uint32_t last,
+                   SmallTriangle* triangles, FoundSpans& found) {
+  const WalkGrid walk_grid(grid);
+  bool all = true;
+  for (uint32_t i = first; i < last; ++i) {
+    const Triangle t = Triangles::ItemOf(source, i);
+    const bool small = SmallTriangle::Of(t, walk_grid, triangles[i]);
+    all &= small;
+    if (small) triangles[i].word = MakeWord(priority, erase, t.color[0]);
+    Triangles::EmitTiles(source, i, grid, [&](uint32_t tile) {
+      if (owned[tile] != 0) found.Add(tile, {i, small});
+    });
+  }
   return all;
 }
 
@@ -121,24 +138,33 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
     const std::span<FoundSpans> parts = std::span(scratch.parts).first(part_count);
     const bool walks = std::is_same_v<Primitive, Segments> && source.radius == 0 &&
                        source.record->sampling != LineSampling::kCover;
+    const bool triangles =
+        std::is_same_v<Primitive, Triangles> && source.record->rule == SurfaceRule::kThin;
     if (walks) {
       bins.walk_count = count;
       bins.walks.Reserve(0, count);
     }
-    std::vector<uint8_t> all_walks(part_count, walks);
+    if (triangles) {
+      bins.triangle_count = count;
+      bins.triangles.Reserve(0, count);
+    }
+    std::vector<uint8_t> all_fast(part_count, 0);
     executor.For(part_count, 1, [&](size_t part, int) {
       const auto first = static_cast<uint32_t>(uint64_t{count} * part / part_count);
       const auto last = static_cast<uint32_t>(uint64_t{count} * (part + 1) / part_count);
       FoundSpans& found = parts[part];
       found.size = 0;
       if (walks) {
-        all_walks[part] =
-            FindWalks(source, grid, owned, priority, erase, first, last, bins.walks.data(), found);
+        all_fast[part] = FindWalks(source, grid, owned, priority, erase, first, last,
+                                   bins.walks.data(), found);
+      } else if (triangles) {
+        all_fast[part] = FindTriangles(source, grid, owned, priority, erase, first, last,
+                                       bins.triangles.data(), found);
       } else {
         Find<Primitive>(source, grid, owned, first, last, found);
       }
     });
-    bins.all_walks = std::find(all_walks.begin(), all_walks.end(), 0) == all_walks.end();
+    bins.all_fast = std::find(all_fast.begin(), all_fast.end(), 0) == all_fast.end();
     if (part_count == 1 && parts[0].size < grid.count() / 4) return PutSorted(parts[0], bins);
     PutCounted(parts, grid.count(), executor, scratch.counts, bins);
   });

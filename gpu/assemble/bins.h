@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gpu/assemble/bin_item.h"
+#include "gpu/assemble/small_triangle.h"
 #include "gpu/assemble/span_kernel.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/primitives/list.h"
@@ -18,10 +19,11 @@ struct Bins {
   std::vector<uint32_t> tiles;
   std::vector<uint32_t> begin;
   Buffer<BinItem> items;
-  // Of lines one voxel wide, by item; those that are no walks have word 0, and no spans.
+  // By item, of lines one voxel wide and of triangles; undefined for items that are none.
   Buffer<LineWalk> walks;
-  size_t walk_count = 0;
-  bool all_walks = false;
+  Buffer<SmallTriangle> triangles;
+  size_t walk_count = 0, triangle_count = 0;
+  bool all_fast = false;  // every item is one of these
 
   std::span<const BinItem> row(size_t r) const {
     return std::span(items.data() + begin[r], begin[r + 1] - begin[r]);
@@ -31,8 +33,8 @@ struct Bins {
   void Clear() {
     tiles.clear();
     begin.clear();
-    walk_count = 0;
-    all_walks = false;
+    walk_count = triangle_count = 0;
+    all_fast = false;
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "gpu/assemble/triangle_kernel.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
@@ -20,7 +21,13 @@ bool IsSingular(const Drawable& d) {
 void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words) {
   if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words);
-  if (d.bins.all_walks) return;
+  if (d.bins.triangle_count > 0) {
+    const WalkGrid axes(grid);
+    int32_t lo[3], hi[3];
+    for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
+    DrawTriangles(d.bins.triangles.data(), items, lo, hi, words);
+  }
+  if (d.bins.all_fast) return;
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
   uint32_t rgb_before = 0;

@@ -6,14 +6,11 @@
 #define VOXELD_GPU_ASSEMBLE_SPAN_KERNEL_INL_H_
 #endif
 
+#include "gpu/assemble/draw_block-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace voxeld::gpu {
 namespace HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-using DW = hn::CappedTag<uint32_t, 16>;
-using VW = hn::Vec<DW>;
 
 // The smallest whole number at or above q, a crossing's (line_walk.h): q > −2⁵².
 HWY_INLINE int64_t CeilCrossing(double q) {
@@ -161,29 +158,6 @@ inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items, u
 
 #else
 
-// The voxels of spans, one behind the other, before they are drawn.
-constexpr size_t kDrawBlock = 512;
-struct DrawBlock {
-  HWY_ALIGN uint32_t at[kDrawBlock + 64];  // in the tile
-  HWY_ALIGN uint32_t words[kDrawBlock + 64];
-};
-
-HWY_ATTR HWY_INLINE void RaiseBlock(const DrawBlock& block, size_t size, uint32_t* words) {
-  const hn::CappedTag<uint32_t, 1> d;  // without a branch that nobody could foresee
-  const auto raise = [&](size_t i) HWY_ATTR {
-    uint32_t* const at = words + block.at[i];
-    hn::StoreU(hn::Max(hn::LoadU(d, at), hn::LoadU(d, block.words + i)), d, at);
-  };
-  size_t i = 0;
-  for (; i + 4 <= size; i += 4) {
-    raise(i);
-    raise(i + 1);
-    raise(i + 2);
-    raise(i + 3);
-  }
-  for (; i < size; ++i) raise(i);
-}
-
 HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items,
                                  uint32_t* words) {
   constexpr size_t kAhead = 24;
@@ -232,7 +206,7 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
       z = hn::Add(z, hn::Mul(z_step, all));
     }
     size += count;
-    if (size >= kDrawBlock - kMostInTile) {
+    if (size >= DrawBlock::kSize) {
       RaiseBlock(block, size, words);
       size = 0;
     }

@@ -12,7 +12,8 @@ namespace {
 uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
   return d.vertices.size() * sizeof(d.vertices[0]) +
          d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) +
-         d.bins.items.capacity_bytes() + d.bins.walks.capacity_bytes();
+         d.bins.items.capacity_bytes() + d.bins.walks.capacity_bytes() +
+         d.bins.triangles.capacity_bytes();
 }
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
