@@ -1,6 +1,7 @@
 #include "gpu/assemble/bins.h"
 
 #include <algorithm>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -115,10 +116,24 @@ bool FindTriangles(const Source& source, const TileGrid& grid, std::span<const u
     const Triangle t = Triangles::ItemOf(source, i);
     const bool small = SmallTriangle::Of(t, walk_grid, triangles[i]);
     all &= small;
-    if (small) triangles[i].word = MakeWord(priority, erase, t.color[0]);
-    Triangles::EmitTiles(source, i, grid, [&](uint32_t tile) {
-      if (owned[tile] != 0) found.Add(tile, {i, small});
-    });
+    if (!small) {
+      Find<Triangles>(source, grid, owned, i, i + 1, found);
+      continue;
+    }
+    triangles[i].word = MakeWord(priority, erase, t.color[0]);
+    const Box3 box = grid.TilesOf(BoundsOf(t));
+    const int32_t tiles = (box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) * (box.hi[2] - box.lo[2]);
+    const bool few = tiles <= 2;  // there is little to win
+    std::optional<SmallTriangleSlabs> slabs;
+    if (!few) slabs.emplace(t);
+    for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
+      for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
+        for (int32_t x = box.lo[0]; x < box.hi[0]; ++x) {
+          const uint32_t tile = grid.Index(x, y, z);
+          if (owned[tile] != 0 && (few || slabs->MayMeet(x, y, z))) found.Add(tile, {i, 1});
+        }
+      }
+    }
   }
   return all;
 }

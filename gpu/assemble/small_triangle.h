@@ -60,4 +60,60 @@ struct alignas(64) SmallTriangle {
   }
 };
 
+// The separating axes of a small triangle, for any number of tiles; whole numbers below 2⁵³ in doubles.
+class SmallTriangleSlabs {
+ public:
+  explicit SmallTriangleSlabs(const Triangle& t) {
+    double e[3][3], p[3][3];
+    for (int i = 0; i < 3; ++i) {
+      for (int a = 0; a < 3; ++a) {
+        p[i][a] = static_cast<double>(t.v[i][a]);
+        e[i][a] = static_cast<double>(t.v[i == 2 ? 0 : i + 1][a] - t.v[i][a]);
+      }
+    }
+    plane_ = 0;
+    reach_ = 0;
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c = (a + 2) % 3;
+      normal_[a] = e[0][b] * e[1][c] - e[0][c] * e[1][b];
+      plane_ += normal_[a] * p[0][a];
+      reach_ += Abs(normal_[a]) * kHalf;
+      for (int i = 0; i < 3; ++i) {
+        const double u = -e[i][c], w = e[i][b];
+        const double edge = u * p[i][b] + w * p[i][c];
+        const double third = u * p[(i + 2) % 3][b] + w * p[(i + 2) % 3][c];
+        const double r = (Abs(u) + Abs(w)) * kHalf;
+        edges_[a][i] = {u, w, Min(edge, third) - r, Max(edge, third) + r};
+      }
+    }
+  }
+
+  // Whether the triangle may meet the tile.
+  bool MayMeet(int32_t i, int32_t j, int32_t k) const {
+    const double centre[3] = {(i + 0.5) * kTile, (j + 0.5) * kTile, (k + 0.5) * kTile};
+    const double off =
+        normal_[0] * centre[0] + normal_[1] * centre[1] + normal_[2] * centre[2] - plane_;
+    if (Abs(off) > reach_) return false;
+    bool meets = true;
+    for (int a = 0; a < 3; ++a) {
+      const double b = centre[(a + 1) % 3], c = centre[(a + 2) % 3];
+      for (const Edge& edge : edges_[a]) {
+        const double f = edge.u * b + edge.w * c;
+        meets &= f >= edge.low && f <= edge.high;
+      }
+    }
+    return meets;
+  }
+
+ private:
+  static constexpr double kTile = static_cast<double>(kTileSize * kUnitsPerVoxel);
+  static constexpr double kHalf = kTile / 2 + 1;  // closed boxes, and the voxels that they touch
+
+  struct Edge {
+    double u, w, low, high;
+  };
+  double normal_[3], plane_, reach_;
+  Edge edges_[3][3];
+};
+
 }  // namespace voxeld::gpu
