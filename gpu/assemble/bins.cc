@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kPartItems = 2048;  // at least, where there are several parts
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
 
-constexpr size_t kAhead = 16;          // items whose places are fetched before they are written
+constexpr size_t kAhead = 16;  // items whose places are fetched before they are written
 
 // Few: sorted as numbers, the tile in the upper, the place in the lower 32 bits.
 void PutSorted(const FoundSpans& found, Bins& bins) {
@@ -122,7 +122,8 @@ bool FindTriangles(const Source& source, const TileGrid& grid, std::span<const u
     }
     triangles[i].word = MakeWord(priority, erase, t.color[0]);
     const Box3 box = grid.TilesOf(BoundsOf(t));
-    const int32_t tiles = (box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) * (box.hi[2] - box.lo[2]);
+    const int32_t tiles =
+        (box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) * (box.hi[2] - box.lo[2]);
     const bool few = tiles <= 2;  // there is little to win
     std::optional<SmallTriangleSlabs> slabs;
     if (!few) slabs.emplace(t);
@@ -170,8 +171,8 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
       FoundSpans& found = parts[part];
       found.size = 0;
       if (walks) {
-        all_fast[part] = FindWalks(source, grid, owned, priority, erase, first, last,
-                                   bins.walks.data(), found);
+        all_fast[part] =
+            FindWalks(source, grid, owned, priority, erase, first, last, bins.walks.data(), found);
       } else if (triangles) {
         all_fast[part] = FindTriangles(source, grid, owned, priority, erase, first, last,
                                        bins.triangles.data(), found);

@@ -76,8 +76,7 @@ struct alignas(32) LineWalk {
     // 2²⁴/N and the product are rounded: |D|·2²⁴/N < 2³³·⁰¹, so by less than 2⁻¹⁸·⁹ in all.
     const double part = n == 0 ? 0.0 : 16777216.0 / static_cast<double>(n);
     for (int r = 0; r < 3; ++r) {
-      const int64_t step =
-          n == 0 ? 0 : FloorToInt(static_cast<double>(d[r]) * part + 0x1p-18) + 1;
+      const int64_t step = n == 0 ? 0 : FloorToInt(static_cast<double>(d[r]) * part + 0x1p-18) + 1;
       walk.stride[r] = static_cast<int32_t>(step >> 5);
       walk.rest |= static_cast<uint32_t>(step & 31) << (5 * r);
     }

@@ -86,8 +86,7 @@ HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const 
     most += count;
     if (count > 0) {
       const int64_t face = down ? -from : from + 1;  // of tiles, reflected
-      const double way =
-          static_cast<double>(face * (int64_t{1} << 36) - (down ? ~at[r] : at[r]));
+      const double way = static_cast<double>(face * (int64_t{1} << 36) - (down ? ~at[r] : at[r]));
       const double inverse = 1.0 / static_cast<double>(down ? -step[r] : step[r]);
       if (count <= 2) {
         crossings[r][0] = static_cast<int32_t>(CeilCrossing(way * inverse));
@@ -194,9 +193,9 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
     VW z = hn::Add(hn::Broadcast<2>(from), hn::Mul(z_step, iota));
     const VW word = hn::Broadcast<3>(start);
     for (uint32_t done = 0;;) {
-      const VW at = hn::Or(hn::And(hn::ShiftRight<27>(x), mask0),
-                           hn::Or(hn::And(hn::ShiftRight<23>(y), mask1),
-                                  hn::And(hn::ShiftRight<19>(z), mask2)));
+      const VW at = hn::Or(
+          hn::And(hn::ShiftRight<27>(x), mask0),
+          hn::Or(hn::And(hn::ShiftRight<23>(y), mask1), hn::And(hn::ShiftRight<19>(z), mask2)));
       hn::StoreU(at, d, block.at + size + done);
       hn::StoreU(word, d, block.words + size + done);
       done += static_cast<uint32_t>(lanes);

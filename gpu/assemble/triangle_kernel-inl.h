@@ -112,8 +112,7 @@ inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinI
           voxel[b] = part.lo[b] + lane;
           int32_t outside = 0;
           for (int i = 0; i < 3; ++i) {
-            outside |=
-                columns.edge[i] + columns.edge_row[i] * row + columns.edge_lane[i] * lane;
+            outside |= columns.edge[i] + columns.edge_row[i] * row + columns.edge_lane[i] * lane;
           }
           const int64_t depth = columns.depth + columns.depth_row * row +
                                 static_cast<int64_t>(columns.depth_lane) * lane;
@@ -163,19 +162,17 @@ HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePar
     for (int i = 0; i < 3; ++i) edge[i] = columns.edge[i] + columns.edge_lane[i] * lane;
     int64_t depth = columns.depth + static_cast<int64_t>(columns.depth_lane) * lane;
     for (int32_t row = 0; row < columns.height; ++row) {
-      const auto outside = hn::Or(hn::Or(hn::Add(hn::Set(di, edge[0]), slope0),
-                                         hn::Add(hn::Set(di, edge[1]), slope1)),
-                                  hn::Add(hn::Set(di, edge[2]), slope2));
+      const auto outside = hn::Or(
+          hn::Or(hn::Add(hn::Set(di, edge[0]), slope0), hn::Add(hn::Set(di, edge[1]), slope1)),
+          hn::Add(hn::Set(di, edge[2]), slope2));
       const auto inside = hn::And(exists, hn::Gt(outside, minus_one));
       for (int i = 0; i < 3; ++i) edge[i] += columns.edge_row[i];
       if (!hn::AllFalse(di, inside)) {
         const auto q = hn::Set(df, (static_cast<double>(depth) + 0.5) * columns.inverse);
-        const auto voxel =
-            hn::Combine(di, hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_high))),
-                        hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_low))));
+        const auto voxel = hn::Combine(di, hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_high))),
+                                       hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_low))));
         const auto above = hn::BitCast(d, hn::Sub(voxel, first));
-        const auto drawn =
-            hn::And(hn::RebindMask(d, inside), hn::Lt(above, count));
+        const auto drawn = hn::And(hn::RebindMask(d, inside), hn::Lt(above, count));
         at_first[kC] = part.lo[kC] + row;
         const auto at = hn::Add(hn::Set(d, part.At(at_first)),
                                 hn::Add(in_lane, hn::ShiftLeft<4 * kAxis>(above)));
@@ -194,9 +191,8 @@ HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePar
   return size;
 }
 
-HWY_ATTR inline void DrawTrianglesIn(const SmallTriangle* triangles,
-                                     std::span<const BinItem> items, const int32_t* lo,
-                                     const int32_t* hi, uint32_t* words) {
+HWY_ATTR inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinItem> items,
+                                     const int32_t* lo, const int32_t* hi, uint32_t* words) {
   constexpr size_t kAhead = 8;
   DrawBlock block;
   size_t size = 0;
