@@ -215,49 +215,86 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
 
 #endif
 
-HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words) {
+// `show(v)`: what becomes of a vector of words; where it lies is for `put`.
+template <typename Show, typename Put>
+HWY_ATTR HWY_INLINE uint32_t LitRows(const uint32_t* words, const Show& show, const Put& put,
+                                     TileRows& rows) {
+  constexpr size_t kWords = kTileSize;
   const DW d;
   const size_t lanes = hn::Lanes(d);
-  const VW color = hn::Set(d, kColorMask), erase = hn::Set(d, kEraseBit), zero = hn::Zero(d);
+  const VW zero = hn::Zero(d);
   VW lit = zero;
-  for (size_t i = 0; i < kTileVoxels; i += lanes) {
-    const VW word = hn::Load(d, words + i);
-    const VW shown = hn::IfThenElseZero(hn::Eq(hn::And(word, erase), zero), hn::And(word, color));
-    hn::Store(shown, d, words + i);
-    lit = hn::Sub(lit, hn::VecFromMask(d, hn::Ne(shown, zero)));  // all ones: −1
+  for (size_t group = 0; group < std::size(rows.bits); ++group) {
+    uint64_t bits = 0;
+    for (size_t r = 0; r < 64; ++r) {
+      const size_t at = (group * 64 + r) * kWords;
+      VW any = zero;
+      for (size_t i = at; i < at + kWords; i += lanes) {
+        const VW shown = show(hn::Load(d, words + i));
+        put(shown, i);
+        any = hn::Or(any, shown);
+        lit = hn::Sub(lit, hn::VecFromMask(d, hn::Ne(shown, zero)));  // all ones: −1
+      }
+      bits |= uint64_t{!hn::AllTrue(d, hn::Eq(any, zero))} << r;
+    }
+    rows.bits[group] = bits;
   }
   return hn::GetLane(hn::SumOfLanes(d, lit));
 }
 
-HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, bool past_caches, uint32_t* held) {
-  constexpr size_t kPart = 64;
+HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words, TileRows& rows) {
   const DW d;
-  const size_t lanes = hn::Lanes(d);
-  const VW zero = hn::Zero(d);
-  size_t i = 0;
-  for (bool same = true; i < kTileVoxels; i += kPart) {
-    VW differ = zero;
-    for (size_t j = i; j < i + kPart; j += lanes) {
-      differ = hn::Or(differ, hn::Xor(hn::Load(d, colors + j), hn::Load(d, held + j)));
+  const VW color = hn::Set(d, kColorMask), erase = hn::Set(d, kEraseBit), zero = hn::Zero(d);
+  const auto show = [&](VW word) HWY_ATTR {
+    return hn::IfThenElseZero(hn::Eq(hn::And(word, erase), zero), hn::And(word, color));
+  };
+  const auto put = [&](VW shown, size_t i) HWY_ATTR { hn::Store(shown, d, words + i); };
+  return LitRows(words, show, put, rows);
+}
+
+HWY_ATTR inline uint32_t LitColorsIn(const uint32_t* colors, TileRows& rows) {
+  return LitRows(
+      colors, [](VW color) HWY_ATTR { return color; }, [](VW, size_t) HWY_ATTR {}, rows);
+}
+
+template <bool kPastCaches>
+HWY_ATTR HWY_INLINE void MoveRow(uint32_t* from, uint32_t* to) {
+  const DW d;
+  for (size_t i = 0; i < kTileSize; i += hn::Lanes(d)) {
+    const VW color = hn::Load(d, from + i);
+    if constexpr (kPastCaches) {
+      hn::Stream(color, d, to + i);
+    } else {
+      hn::Store(color, d, to + i);
     }
-    same = hn::AllTrue(d, hn::Eq(differ, zero));
-    if (!same) break;
-    for (size_t j = i; j < i + kPart; j += lanes) hn::Store(zero, d, colors + j);
+    hn::Store(hn::Zero(d), d, from + i);
   }
-  if (i == kTileVoxels) return false;
-  if (past_caches) {
-    for (; i < kTileVoxels; i += lanes) {
-      hn::Stream(hn::Load(d, colors + i), d, held + i);
-      hn::Store(zero, d, colors + i);
-    }
-    hwy::FlushStream();
-  } else {
-    for (; i < kTileVoxels; i += lanes) {
-      hn::Store(hn::Load(d, colors + i), d, held + i);
-      hn::Store(zero, d, colors + i);
+}
+
+HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool past_caches,
+                                  uint32_t* held, const TileRows& held_rows) {
+  const DW d;
+  bool same = true;
+  for (size_t group = 0; group < std::size(rows.bits); ++group) {
+    for (uint64_t left = rows.bits[group] | held_rows.bits[group]; left != 0; left &= left - 1) {
+      const size_t at = (group * 64 + static_cast<size_t>(std::countr_zero(left))) * kTileSize;
+      if (same) {
+        // What is held is looked at no further than to where it differs.
+        VW differ = hn::Zero(d);
+        for (size_t i = at; i < at + kTileSize; i += hn::Lanes(d)) {
+          differ = hn::Or(differ, hn::Xor(hn::Load(d, colors + i), hn::Load(d, held + i)));
+        }
+        same = hn::AllTrue(d, hn::Eq(differ, hn::Zero(d)));
+      }
+      if (past_caches && !same) {
+        MoveRow<true>(colors + at, held + at);
+      } else {
+        MoveRow<false>(colors + at, held + at);
+      }
     }
   }
-  return true;
+  if (past_caches) hwy::FlushStream();
+  return !same;
 }
 
 inline const char* SpanTargetIn() { return hwy::TargetName(HWY_TARGET); }

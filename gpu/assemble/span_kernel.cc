@@ -1,6 +1,7 @@
 #include "gpu/assemble/span_kernel.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -23,6 +24,7 @@ namespace {
 HWY_EXPORT(FindSpansIn);
 HWY_EXPORT(DrawSpansIn);
 HWY_EXPORT(ShowWordsIn);
+HWY_EXPORT(LitColorsIn);
 HWY_EXPORT(MoveColorsIn);
 HWY_EXPORT(SpanTargetIn);
 
@@ -37,10 +39,17 @@ void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* 
   HWY_DYNAMIC_DISPATCH(DrawSpansIn)(walks, items, words);
 }
 
-uint32_t ShowWords(uint32_t* words) { return HWY_DYNAMIC_DISPATCH(ShowWordsIn)(words); }
+uint32_t ShowWords(uint32_t* words, TileRows& rows) {
+  return HWY_DYNAMIC_DISPATCH(ShowWordsIn)(words, rows);
+}
 
-bool MoveColors(uint32_t* colors, bool past_caches, uint32_t* held) {
-  return HWY_DYNAMIC_DISPATCH(MoveColorsIn)(colors, past_caches, held);
+uint32_t LitColors(const uint32_t* colors, TileRows& rows) {
+  return HWY_DYNAMIC_DISPATCH(LitColorsIn)(colors, rows);
+}
+
+bool MoveColors(uint32_t* colors, const TileRows& rows, bool past_caches, uint32_t* held,
+                const TileRows& held_rows) {
+  return HWY_DYNAMIC_DISPATCH(MoveColorsIn)(colors, rows, past_caches, held, held_rows);
 }
 
 std::string SpanTarget() { return HWY_DYNAMIC_DISPATCH(SpanTargetIn)(); }

@@ -34,12 +34,21 @@ void FindSpans(const LineWalk* walks, uint32_t first, uint32_t last, const WalkG
 // Raises `words` of a tile to those of walks[item] for each span; items of count 0 are left out.
 void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words);
 
-// Words of a layer as it looks over black in full opacity, in place; returns how many are not black.
-uint32_t ShowWords(uint32_t* words);
+// Which rows of a tile have light: bit r of the 256 is for words 16·r to 16·r + 15, a cache line.
+struct TileRows {
+  uint64_t bits[kTileSize * kTileSize / 64] = {};
+  bool operator==(const TileRows&) const = default;
+};
 
-// Moves a tile's colours to `held`, and leaves zeros. False if it held the same. `past_caches`: for volumes that the
-// caches would not keep.
-bool MoveColors(uint32_t* colors, bool past_caches, uint32_t* held);
+// Words of a layer as it looks over black in full opacity, in place; returns how many are not black.
+uint32_t ShowWords(uint32_t* words, TileRows& rows);
+// The same of what is colours already.
+uint32_t LitColors(const uint32_t* colors, TileRows& rows);
+
+// Moves a tile's colours, which lie in `rows`, to `held`, of which what is not black lies in `held_rows`; leaves zeros. False
+// if it held the same. `past_caches`: for volumes that the caches would not keep.
+bool MoveColors(uint32_t* colors, const TileRows& rows, bool past_caches, uint32_t* held,
+                const TileRows& held_rows);
 
 // The instruction set in use.
 std::string SpanTarget();

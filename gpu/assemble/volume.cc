@@ -1,6 +1,7 @@
 #include "gpu/assemble/volume.h"
 
 #include <algorithm>
+#include <atomic>
 #include <utility>
 
 #include "gpu/assemble/blend.h"
@@ -76,26 +77,50 @@ struct TileClip {
 
 void TileStore::Reset(const TileGrid& grid) {
   grid_ = grid;
-  colors_.clear();
-  colors_.resize(grid.count());
+  blocks_.clear();
+  blocks_.resize(grid.count());
   lit_.assign(grid.count(), 0);
+  spare_.clear();
+  spare_left_ = 0;
 }
 
 bool TileStore::Set(uint32_t tile, const uint32_t* colors, uint32_t lit) {
   TileWords copy;
   std::copy_n(colors, kTileVoxels, copy.at);
-  return Take(tile, copy, lit, false);
+  TileRows rows;
+  LitColors(copy.at, rows);
+  return Take(tile, copy, rows, lit, false);
 }
 
-bool TileStore::Take(uint32_t tile, TileWords& colors, uint32_t lit, bool past_caches) {
-  std::unique_ptr<TileWords>& held = colors_[tile];
-  lit_[tile] = lit;
-  if (lit == 0) return std::exchange(held, nullptr) != nullptr;
-  if (held != nullptr) return MoveColors(colors.at, past_caches, held->at);
-  held = std::make_unique_for_overwrite<TileWords>();
-  std::copy_n(colors.at, kTileVoxels, held->at);
-  std::fill_n(colors.at, kTileVoxels, 0);
-  return true;
+std::unique_ptr<TileStore::Block> TileStore::TakeBlock() {
+  const std::atomic_ref<size_t> spares(spare_left_);
+  size_t left = spares.load(std::memory_order_relaxed);
+  while (left > 0) {
+    if (spares.compare_exchange_weak(left, left - 1, std::memory_order_relaxed)) {
+      return std::move(spare_[left - 1]);
+    }
+  }
+  return std::make_unique<Block>();
+}
+
+bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit,
+                     bool past_caches) {
+  std::unique_ptr<Block>& block = blocks_[tile];
+  const uint32_t before = std::exchange(lit_[tile], lit);
+  if (lit == 0) return before != 0;  // what it held stays, for Recycle
+  if (block == nullptr) block = TakeBlock();
+  const bool differs = MoveColors(colors.at, rows, past_caches, block->colors.at, block->rows);
+  block->rows = rows;
+  return differs || before == 0;
+}
+
+void TileStore::Recycle(std::span<const uint32_t> tiles, size_t most) {
+  spare_.resize(spare_left_);
+  for (uint32_t tile : tiles) {
+    if (lit_[tile] == 0 && blocks_[tile] != nullptr) spare_.push_back(std::move(blocks_[tile]));
+  }
+  if (spare_.size() > most) spare_.resize(most);
+  spare_left_ = spare_.size();
 }
 
 void Volume::MarkDirty(uint32_t tile) {
@@ -235,6 +260,7 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
       scratch.words
           .get();  // of the layers so far; while there are none, the next one's words become them
   uint32_t lit = 0;
+  TileRows rows;
   for (size_t i = 0; i < scratch.entries.size();) {
     const Layer& layer = *scratch.entries[i].drawable->layer;
     const TileClip clip(*layer.clip, box);
@@ -249,17 +275,15 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
     }
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {
-      lit = ShowWords(words);
+      lit = ShowWords(words, rows);
       break;
     }
     colors = scratch.colors.get();
     BlendTile(layer.record, words, colors->at);
     std::fill_n(words, kTileVoxels, 0);
   }
-  if (colors->at != words) {
-    lit = static_cast<uint32_t>(kTileVoxels - std::count(colors->at, colors->at + kTileVoxels, 0u));
-  }
-  return tiles_.Take(tile, *colors, lit, past_caches);
+  if (colors->at != words) lit = LitColors(colors->at, rows);
+  return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
 Volume::Changes Volume::Update() {
@@ -284,6 +308,7 @@ Volume::Changes Volume::Update() {
     changes.tiles.push_back(tile);
     changes.was_lit.push_back(lit_before[i] != 0);
   }
+  tiles_.Recycle(dirty_, static_cast<size_t>(lit_tiles_ / 2));
   dirty_.clear();
   return changes;
 }

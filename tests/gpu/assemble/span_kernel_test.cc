@@ -263,14 +263,24 @@ TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
         want.at[v] = erase ? 0 : Interleave(rgb);
         lit += want.at[v] != 0;
       }
-      EXPECT_EQ(ShowWords(words.at), lit);
+      TileRows rows, again, want_rows;
+      for (size_t v = 0; v < kTileVoxels; ++v) {
+        if (want.at[v] != 0) want_rows.bits[v / 1024] |= uint64_t{1} << (v / 16 % 64);
+      }
+      EXPECT_EQ(ShowWords(words.at, rows), lit);
       ASSERT_TRUE(words == want);
+      EXPECT_EQ(LitColors(words.at, again), lit);
+      EXPECT_TRUE(rows == want_rows && again == want_rows);
       for (bool past_caches : {false, true}) {
         for (int differs : {-1, 0, 63, 64, 2000, kTileVoxels - 1}) {
           auto held = std::make_unique<Words>(want);
-          if (differs >= 0) held->at[differs] ^= 1;
+          TileRows held_rows = want_rows;
+          if (differs >= 0) {
+            held->at[differs] ^= 1;
+            held_rows.bits[differs / 1024] |= uint64_t{1} << (differs / 16 % 64);
+          }
           Words moved = want;
-          EXPECT_EQ(MoveColors(moved.at, past_caches, held->at), differs >= 0);
+          EXPECT_EQ(MoveColors(moved.at, rows, past_caches, held->at, held_rows), differs >= 0);
           ASSERT_TRUE(*held == want);
           ASSERT_TRUE(moved == Words());
         }
