@@ -20,14 +20,21 @@ bool IsSingular(const Drawable& d) {
 
 void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words) {
-  if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words);
+  TileRows touched;
+  DrawItems(d, items, grid, box, words, touched);
+}
+
+void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
+               const Box3& box, uint32_t* words, TileRows& touched) {
+  if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words, touched);
   if (d.bins.triangle_count > 0) {
     const WalkGrid axes(grid);
     int32_t lo[3], hi[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
-    DrawTriangles(d.bins.triangles.data(), items, lo, hi, words);
+    DrawTriangles(d.bins.triangles.data(), items, lo, hi, words, touched);
   }
   if (d.bins.all_fast) return;
+  touched = TileRows::All();
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
   uint32_t rgb_before = 0;

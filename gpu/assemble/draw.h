@@ -24,5 +24,8 @@ bool IsSingular(const Drawable& drawable);
 // Raises `words` (kTileVoxels) of the tile in `box` to what these items of its bins cover.
 void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words);
+// The same; the rows that it may have reached join `touched`.
+void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
+               const Box3& box, uint32_t* words, TileRows& touched);
 
 }  // namespace voxeld::gpu

@@ -39,6 +39,18 @@ HWY_ATTR HWY_INLINE void RaiseBlock(const DrawBlock& block, size_t size, uint32_
   for (; i < size; ++i) raise(i);
 }
 
+// The same of what is left at the end; `all`: not the only one. Says which rows all of them reached: exactly, if that is
+// quickly said.
+HWY_ATTR HWY_INLINE void RaiseLast(const DrawBlock& block, size_t size, bool all, uint32_t* words,
+                                   TileRows& touched) {
+  RaiseBlock(block, size, words);
+  if (all) {
+    touched = TileRows::All();
+  } else {
+    for (size_t i = 0; i < size; ++i) touched.Add(block.at[i]);
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace voxeld::gpu
 HWY_AFTER_NAMESPACE();

@@ -136,7 +136,9 @@ HWY_ATTR inline void FindSpansIn(const LineWalk* walks, uint32_t first, uint32_t
 
 #if HWY_TARGET == HWY_SCALAR
 
-inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words) {
+inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words,
+                        TileRows& touched) {
+  touched = TileRows::All();
   constexpr uint32_t kShift[3] = {27, 23, 19};
   for (const BinItem& item : items) {
     const LineWalk& walk = walks[item.item];
@@ -158,7 +160,7 @@ inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items, u
 #else
 
 HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items,
-                                 uint32_t* words) {
+                                 uint32_t* words, TileRows& touched) {
   constexpr size_t kAhead = 24;
   static_assert(sizeof(LineWalk) == 32, "two vectors of 128 bits");
   const DW d;
@@ -173,6 +175,7 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
   }
   DrawBlock block;
   size_t size = 0;
+  bool several = false;
   for (size_t i = 0; i < items.size(); ++i) {
     if (i + kAhead < items.size()) hwy::Prefetch(walks + items[i + kAhead].item);
     const BinItem item = items[i];
@@ -208,53 +211,67 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
     if (size >= DrawBlock::kSize) {
       RaiseBlock(block, size, words);
       size = 0;
+      several = true;
     }
   }
-  RaiseBlock(block, size, words);
+  RaiseLast(block, size, several, words, touched);
 }
 
 #endif
 
-// `show(v)`: what becomes of a vector of words; where it lies is for `put`.
+// A row of words: `show(v)` is what becomes of a vector, `put` where it goes. True if some are not 0; counts them in `lit`.
 template <typename Show, typename Put>
-HWY_ATTR HWY_INLINE uint32_t LitRows(const uint32_t* words, const Show& show, const Put& put,
-                                     TileRows& rows) {
-  constexpr size_t kWords = kTileSize;
+HWY_ATTR HWY_INLINE bool LitRow(const uint32_t* words, size_t at, const Show& show, const Put& put,
+                                VW& lit) {
   const DW d;
-  const size_t lanes = hn::Lanes(d);
   const VW zero = hn::Zero(d);
-  VW lit = zero;
-  for (size_t group = 0; group < std::size(rows.bits); ++group) {
+  VW any = zero;
+  for (size_t i = at; i < at + kTileSize; i += hn::Lanes(d)) {
+    const VW shown = show(hn::Load(d, words + i));
+    put(shown, i);
+    any = hn::Or(any, shown);
+    lit = hn::Sub(lit, hn::VecFromMask(d, hn::Ne(shown, zero)));  // all ones: −1
+  }
+  return !hn::AllTrue(d, hn::Eq(any, zero));
+}
+
+template <typename Show, typename Put>
+HWY_ATTR HWY_INLINE uint32_t LitRows(const uint32_t* words, const TileRows& touched,
+                                     const Show& show, const Put& put, TileRows& rows) {
+  const DW d;
+  VW lit = hn::Zero(d);
+  for (size_t group = 0; group < TileRows::kGroups; ++group) {
     uint64_t bits = 0;
-    for (size_t r = 0; r < 64; ++r) {
-      const size_t at = (group * 64 + r) * kWords;
-      VW any = zero;
-      for (size_t i = at; i < at + kWords; i += lanes) {
-        const VW shown = show(hn::Load(d, words + i));
-        put(shown, i);
-        any = hn::Or(any, shown);
-        lit = hn::Sub(lit, hn::VecFromMask(d, hn::Ne(shown, zero)));  // all ones: −1
+    const uint64_t all = touched.bits[group];
+    if (all == ~uint64_t{0}) {
+      for (size_t r = 0; r < 64; ++r) {
+        bits |= uint64_t{LitRow(words, (group * 64 + r) * kTileSize, show, put, lit)} << r;
       }
-      bits |= uint64_t{!hn::AllTrue(d, hn::Eq(any, zero))} << r;
+    } else {
+      for (uint64_t left = all; left != 0; left &= left - 1) {
+        const auto r = static_cast<size_t>(std::countr_zero(left));
+        bits |= uint64_t{LitRow(words, (group * 64 + r) * kTileSize, show, put, lit)} << r;
+      }
     }
     rows.bits[group] = bits;
   }
   return hn::GetLane(hn::SumOfLanes(d, lit));
 }
 
-HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words, TileRows& rows) {
+HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words, const TileRows& touched, TileRows& rows) {
   const DW d;
   const VW color = hn::Set(d, kColorMask), erase = hn::Set(d, kEraseBit), zero = hn::Zero(d);
   const auto show = [&](VW word) HWY_ATTR {
     return hn::IfThenElseZero(hn::Eq(hn::And(word, erase), zero), hn::And(word, color));
   };
   const auto put = [&](VW shown, size_t i) HWY_ATTR { hn::Store(shown, d, words + i); };
-  return LitRows(words, show, put, rows);
+  return LitRows(words, touched, show, put, rows);
 }
 
 HWY_ATTR inline uint32_t LitColorsIn(const uint32_t* colors, TileRows& rows) {
   return LitRows(
-      colors, [](VW color) HWY_ATTR { return color; }, [](VW, size_t) HWY_ATTR {}, rows);
+      colors, TileRows::All(), [](VW color) HWY_ATTR { return color; }, [](VW, size_t) HWY_ATTR {},
+      rows);
 }
 
 template <bool kPastCaches>
@@ -275,7 +292,7 @@ HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool p
                                   uint32_t* held, const TileRows& held_rows) {
   const DW d;
   bool same = true;
-  for (size_t group = 0; group < std::size(rows.bits); ++group) {
+  for (size_t group = 0; group < TileRows::kGroups; ++group) {
     for (uint64_t left = rows.bits[group] | held_rows.bits[group]; left != 0; left &= left - 1) {
       const size_t at = (group * 64 + static_cast<size_t>(std::countr_zero(left))) * kTileSize;
       if (same) {

@@ -35,12 +35,13 @@ void FindSpans(const LineWalk* walks, uint32_t first, uint32_t last, const WalkG
   HWY_DYNAMIC_DISPATCH(FindSpansIn)(walks, first, last, grid, owned, found);
 }
 
-void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words) {
-  HWY_DYNAMIC_DISPATCH(DrawSpansIn)(walks, items, words);
+void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words,
+               TileRows& touched) {
+  HWY_DYNAMIC_DISPATCH(DrawSpansIn)(walks, items, words, touched);
 }
 
-uint32_t ShowWords(uint32_t* words, TileRows& rows) {
-  return HWY_DYNAMIC_DISPATCH(ShowWordsIn)(words, rows);
+uint32_t ShowWords(uint32_t* words, const TileRows& touched, TileRows& rows) {
+  return HWY_DYNAMIC_DISPATCH(ShowWordsIn)(words, touched, rows);
 }
 
 uint32_t LitColors(const uint32_t* colors, TileRows& rows) {

@@ -10,6 +10,7 @@
 #include "gpu/assemble/bin_item.h"
 #include "gpu/assemble/buffer.h"
 #include "gpu/assemble/line_walk.h"
+#include "gpu/assemble/tile_rows.h"
 
 namespace voxeld::gpu {
 
@@ -31,17 +32,14 @@ struct FoundSpans {
 void FindSpans(const LineWalk* walks, uint32_t first, uint32_t last, const WalkGrid& grid,
                const uint8_t* owned, FoundSpans& found);
 
-// Raises `words` of a tile to those of walks[item] for each span; items of count 0 are left out.
-void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words);
+// Raises `words` of a tile to those of walks[item] for each span; items of count 0 are left out. The rows that it may
+// have reached join `touched`.
+void DrawSpans(const LineWalk* walks, std::span<const BinItem> items, uint32_t* words,
+               TileRows& touched);
 
-// Which rows of a tile have light: bit r of the 256 is for words 16·r to 16·r + 15, a cache line.
-struct TileRows {
-  uint64_t bits[kTileSize * kTileSize / 64] = {};
-  bool operator==(const TileRows&) const = default;
-};
-
-// Words of a layer as it looks over black in full opacity, in place; returns how many are not black.
-uint32_t ShowWords(uint32_t* words, TileRows& rows);
+// Words of a layer as it looks over black in full opacity, in place; returns how many are not black. What is not in
+// `touched` is 0.
+uint32_t ShowWords(uint32_t* words, const TileRows& touched, TileRows& rows);
 // The same of what is colours already.
 uint32_t LitColors(const uint32_t* colors, TileRows& rows);
 

@@ -93,7 +93,9 @@ HWY_INLINE size_t AddVertices(const SmallTriangle& t, const TrianglePart& part, 
 #if HWY_TARGET == HWY_SCALAR
 
 inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinItem> items,
-                            const int32_t* lo, const int32_t* hi, uint32_t* words) {
+                            const int32_t* lo, const int32_t* hi, uint32_t* words,
+                            TileRows& touched) {
+  touched = TileRows::All();
   DrawBlock block;
   for (const BinItem& item : items) {
     const SmallTriangle& t = triangles[item.item];
@@ -131,7 +133,8 @@ inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinI
 // Columns along axis kAxis, a row of them in a vector or two.
 template <int kAxis>
 HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePart& part,
-                                       DrawBlock& block, size_t size, uint32_t* words) {
+                                       DrawBlock& block, size_t size, bool& several,
+                                       uint32_t* words) {
   constexpr int kB = (kAxis + 1) % 3, kC = (kAxis + 2) % 3;
   TriangleColumns columns;
   if (!columns.Set(t, part, kAxis)) return size;
@@ -183,6 +186,7 @@ HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePar
         if (size >= DrawBlock::kSize) {
           RaiseBlock(block, size, words);
           size = 0;
+          several = true;
         }
       }
       depth += columns.depth_row;
@@ -192,21 +196,23 @@ HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePar
 }
 
 HWY_ATTR inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinItem> items,
-                                     const int32_t* lo, const int32_t* hi, uint32_t* words) {
+                                     const int32_t* lo, const int32_t* hi, uint32_t* words,
+                                     TileRows& touched) {
   constexpr size_t kAhead = 8;
   DrawBlock block;
   size_t size = 0;
+  bool several = false;
   for (size_t i = 0; i < items.size(); ++i) {
     if (i + kAhead < items.size()) hwy::Prefetch(triangles + items[i + kAhead].item);
     const SmallTriangle& t = triangles[items[i].item];
     TrianglePart part;
     if (items[i].count() == 0 || !part.Set(t, lo, hi)) continue;
     size = AddVertices(t, part, block, size);
-    if (t.n[0] != 0) size = DrawColumns<0>(t, part, block, size, words);
-    if (t.n[1] != 0) size = DrawColumns<1>(t, part, block, size, words);
-    if (t.n[2] != 0) size = DrawColumns<2>(t, part, block, size, words);
+    if (t.n[0] != 0) size = DrawColumns<0>(t, part, block, size, several, words);
+    if (t.n[1] != 0) size = DrawColumns<1>(t, part, block, size, several, words);
+    if (t.n[2] != 0) size = DrawColumns<2>(t, part, block, size, several, words);
   }
-  RaiseBlock(block, size, words);
+  RaiseLast(block, size, several, words, touched);
 }
 
 #endif

@@ -22,8 +22,8 @@ HWY_EXPORT(TriangleTargetIn);
 }  // namespace
 
 void DrawTriangles(const SmallTriangle* triangles, std::span<const BinItem> items,
-                   const int32_t lo[3], const int32_t hi[3], uint32_t* words) {
-  HWY_DYNAMIC_DISPATCH(DrawTrianglesIn)(triangles, items, lo, hi, words);
+                   const int32_t lo[3], const int32_t hi[3], uint32_t* words, TileRows& touched) {
+  HWY_DYNAMIC_DISPATCH(DrawTrianglesIn)(triangles, items, lo, hi, words, touched);
 }
 
 std::string TriangleTarget() { return HWY_DYNAMIC_DISPATCH(TriangleTargetIn)(); }

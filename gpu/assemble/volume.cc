@@ -261,13 +261,14 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
           .get();  // of the layers so far; while there are none, the next one's words become them
   uint32_t lit = 0;
   TileRows rows;
+  TileRows touched;
   for (size_t i = 0; i < scratch.entries.size();) {
     const Layer& layer = *scratch.entries[i].drawable->layer;
     const TileClip clip(*layer.clip, box);
     for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
       const Entry& e = scratch.entries[i];
       if (clip.outside) continue;
-      DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, words);
+      DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, words, touched);
     }
     if (clip.outside) continue;
     for (uint32_t c = 0; c < clip.count; ++c) {
@@ -275,7 +276,7 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
     }
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {
-      lit = ShowWords(words, rows);
+      lit = ShowWords(words, touched, rows);
       break;
     }
     colors = scratch.colors.get();

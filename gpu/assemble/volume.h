@@ -53,7 +53,8 @@ class TileStore {
   TileGrid grid_;
   std::vector<std::unique_ptr<Block>> blocks_;
   std::vector<uint32_t> lit_;
-  std::vector<std::unique_ptr<Block>> spare_;  // the first spare_left_ of them, while tiles are taken
+  std::vector<std::unique_ptr<Block>>
+      spare_;              // the first spare_left_ of them, while tiles are taken
   size_t spare_left_ = 0;  // reached by atomic_ref then
 };
 

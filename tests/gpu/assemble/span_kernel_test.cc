@@ -34,6 +34,21 @@ struct alignas(64) Words {
   uint32_t at[kTileVoxels] = {};
   bool operator==(const Words&) const = default;
 };
+TileRows RowsOf(const Words& words) {
+  TileRows rows;
+  for (uint32_t v = 0; v < kTileVoxels; ++v) {
+    if (words.at[v] != 0) rows.bits[v / 1024] |= uint64_t{1} << (v / 16 % 64);
+  }
+  return rows;
+}
+
+bool Holds(const TileRows& rows, const Words& words) {
+  const TileRows needed = RowsOf(words);
+  bool holds = true;
+  for (size_t i = 0; i < TileRows::kGroups; ++i) holds &= (needed.bits[i] & ~rows.bits[i]) == 0;
+  return holds;
+}
+
 using Drawn = std::map<uint32_t, Words>;  // by tile
 
 class Random {
@@ -66,12 +81,16 @@ Drawn BySpans(const LineWalk& walk, const TileGrid& grid) {
   FoundSpans found;
   FindSpans(&walk, 0, 1, WalkGrid(grid), owned.data(), found);
   Drawn drawn;
+  std::map<uint32_t, TileRows> rows;
   for (size_t i = 0; i < found.size; ++i) {
     const BinItem item = found.items.data()[i];
     EXPECT_GE(item.count(), 1u);
     EXPECT_LE(item.count(), static_cast<uint32_t>(kMostInTile));
     EXPECT_LT(found.tiles.data()[i], grid.count());
-    DrawSpans(&walk, {&item, 1}, drawn[found.tiles.data()[i]].at);
+    TileRows& touched = rows[found.tiles.data()[i]];
+    Words& words = drawn[found.tiles.data()[i]];
+    DrawSpans(&walk, {&item, 1}, words.at, touched);
+    EXPECT_TRUE(Holds(touched, words));
   }
   return drawn;
 }
@@ -194,7 +213,9 @@ void ExpectAsDefined(const Triangle& t, const TileGrid& grid, uint64_t* small, u
     });
     int32_t lo[3], hi[3], ijk[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
-    DrawTriangles(&fast, {&item, 1}, lo, hi, got.at);
+    TileRows touched;
+    DrawTriangles(&fast, {&item, 1}, lo, hi, got.at, touched);
+    ASSERT_TRUE(Holds(touched, got)) << "tile " << tile;
     ASSERT_TRUE(got == want) << "tile " << tile;
     grid.Coordinates(tile, ijk);
     ASSERT_TRUE(!any || slabs.MayMeet(ijk[0], ijk[1], ijk[2])) << "tile " << tile;
@@ -263,11 +284,12 @@ TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
         want.at[v] = erase ? 0 : Interleave(rgb);
         lit += want.at[v] != 0;
       }
-      TileRows rows, again, want_rows;
-      for (size_t v = 0; v < kTileVoxels; ++v) {
-        if (want.at[v] != 0) want_rows.bits[v / 1024] |= uint64_t{1} << (v / 16 % 64);
-      }
-      EXPECT_EQ(ShowWords(words.at, rows), lit);
+      TileRows rows, again;
+      const TileRows want_rows = RowsOf(want);
+      Words copy = words;
+      EXPECT_EQ(ShowWords(copy.at, TileRows::All(), rows), lit);
+      ASSERT_TRUE(copy == want && rows == want_rows);
+      EXPECT_EQ(ShowWords(words.at, RowsOf(words), rows), lit);
       ASSERT_TRUE(words == want);
       EXPECT_EQ(LitColors(words.at, again), lit);
       EXPECT_TRUE(rows == want_rows && again == want_rows);
