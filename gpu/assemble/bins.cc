@@ -20,7 +20,7 @@ void PutSorted(const FoundSpans& found, Bins& bins) {
   std::vector<uint64_t> order(found.size);
   for (size_t i = 0; i < found.size; ++i) order[i] = uint64_t{found.tiles.data()[i]} << 32 | i;
   std::sort(order.begin(), order.end());
-  bins.items.Reserve(0, found.size);
+  bins.items.Make(found.size);
   for (size_t i = 0; i < found.size; ++i) {
     const auto tile = static_cast<uint32_t>(order[i] >> 32);
     if (bins.tiles.empty() || bins.tiles.back() != tile) {
@@ -53,7 +53,7 @@ void PutCounted(std::span<const FoundSpans> parts, uint32_t tile_count, Executor
     bins.begin.push_back(begin);
   }
   bins.begin.push_back(at);
-  bins.items.Reserve(0, at);
+  bins.items.Make(at);
   executor.For(parts.size(), 1, [&](size_t part, int) {
     uint32_t* const place = counts.data() + part * tile_count;
     const uint32_t* const tiles = parts[part].tiles.data();
@@ -156,14 +156,10 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
                        source.record->sampling != LineSampling::kCover;
     const bool triangles =
         std::is_same_v<Primitive, Triangles> && source.record->rule == SurfaceRule::kThin;
-    if (walks) {
-      bins.walk_count = count;
-      bins.walks.Reserve(0, count);
-    }
-    if (triangles) {
-      bins.triangle_count = count;
-      bins.triangles.Reserve(0, count);
-    }
+    bins.walk_count = walks ? count : 0;
+    bins.walks.Make(bins.walk_count);
+    bins.triangle_count = triangles ? count : 0;
+    bins.triangles.Make(bins.triangle_count);
     std::vector<uint8_t> all_fast(part_count, 0);
     executor.For(part_count, 1, [&](size_t part, int) {
       const auto first = static_cast<uint32_t>(uint64_t{count} * part / part_count);

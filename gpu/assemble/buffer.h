@@ -26,11 +26,20 @@ class Buffer {
   void Reserve(size_t size, size_t more) {
     if (size + more > capacity_) Grow(size, more);
   }
+  // Room for `size`, with nothing kept; what is far too much is given back.
+  void Make(size_t size) {
+    if (size <= capacity_ && capacity_ / 4 <= size + kSmall) return;
+    memory_.reset();
+    capacity_ = 0;
+    if (size > 0) Grow(0, size);
+  }
   T* data() { return static_cast<T*>(memory_.get()); }
   const T* data() const { return static_cast<const T*>(memory_.get()); }
   size_t capacity_bytes() const { return capacity_ * sizeof(T); }
 
  private:
+  static constexpr size_t kSmall = 1024;
+
   void Grow(size_t size, size_t more) {
     const size_t capacity = size + more + size / 2;
     PageMemory next = AllocatePages(capacity * sizeof(T));

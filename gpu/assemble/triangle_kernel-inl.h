@@ -130,7 +130,7 @@ inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinI
 
 #else
 
-// Columns along axis kAxis, a row of them in a vector or two.
+// Columns along axis kAxis, as many rows at once as have room in a vector. `several`: a block was drawn.
 template <int kAxis>
 HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePart& part,
                                        DrawBlock& block, size_t size, bool& several,
@@ -142,54 +142,68 @@ HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePar
   const hn::RebindToSigned<DW> di;
   const hn::Half<decltype(di)> half;
   const hn::Rebind<double, decltype(half)> df;
-  const size_t lanes = hn::Lanes(d);
-  const auto iota = hn::Iota(di, 0), minus_one = hn::Set(di, -1);
-  const auto slope0 = hn::Mul(iota, hn::Set(di, columns.edge_lane[0]));
-  const auto slope1 = hn::Mul(iota, hn::Set(di, columns.edge_lane[1]));
-  const auto slope2 = hn::Mul(iota, hn::Set(di, columns.edge_lane[2]));
-  const double lane_fall = columns.depth_lane * columns.inverse;
-  const auto fall_low = hn::Mul(hn::Iota(df, 0), hn::Set(df, lane_fall));
-  const auto fall_high =
-      hn::Mul(hn::Iota(df, static_cast<double>(lanes / 2)), hn::Set(df, lane_fall));
+  const auto lanes = static_cast<int32_t>(hn::Lanes(d));
+  // Lane i: column i mod `across`, row i / `across`.
+  int bits = std::countr_zero(static_cast<uint32_t>(lanes));
+  while (bits > 0 && columns.width <= 1 << (bits - 1)) --bits;
+  const int32_t across = 1 << bits, rows = lanes >> bits;
+  const auto iota = hn::Iota(di, 0);
+  const auto column = hn::And(iota, hn::Set(di, across - 1));
+  const auto row_of = hn::ShiftRightSame(iota, bits);
+  const auto spread = [&](int i) HWY_ATTR {
+    return hn::Add(hn::Mul(column, hn::Set(di, columns.edge_lane[i])),
+                   hn::Mul(row_of, hn::Set(di, columns.edge_row[i])));
+  };
+  const auto slope0 = spread(0), slope1 = spread(1), slope2 = spread(2);
+  const auto lane_fall = hn::Set(df, columns.depth_lane * columns.inverse);
+  const auto row_fall = hn::Set(df, static_cast<double>(columns.depth_row) * columns.inverse);
+  const auto fall = [&](auto column_part, auto row_part) HWY_ATTR {
+    return hn::Add(hn::Mul(hn::PromoteTo(df, column_part), lane_fall),
+                   hn::Mul(hn::PromoteTo(df, row_part), row_fall));
+  };
+  const auto fall_low = fall(hn::LowerHalf(half, column), hn::LowerHalf(half, row_of));
+  const auto fall_high = fall(hn::UpperHalf(half, column), hn::UpperHalf(half, row_of));
   const auto first = hn::Set(di, part.lo[kAxis]);
   const auto count = hn::Set(d, static_cast<uint32_t>(part.hi[kAxis] - part.lo[kAxis]));
-  const auto in_lane = hn::ShiftLeft<4 * kB>(hn::Iota(d, 0));
+  const auto in_lane =
+      hn::BitCast(d, hn::Or(hn::ShiftLeft<4 * kB>(column), hn::ShiftLeft<4 * kC>(row_of)));
   const VW word = hn::Set(d, t.word);
+  const auto minus_one = hn::Set(di, -1);
   int32_t at_first[3];
   at_first[kAxis] = part.lo[kAxis];
-  for (int32_t lane = 0; lane < columns.width; lane += static_cast<int32_t>(lanes)) {
-    const auto columns_left = hn::Set(di, columns.width - lane);
-    const auto exists = hn::Lt(iota, columns_left);
+  for (int32_t lane = 0; lane < columns.width; lane += across) {
+    const auto exists = hn::Lt(column, hn::Set(di, columns.width - lane));
     at_first[kB] = part.lo[kB] + lane;
     int32_t edge[3];
     for (int i = 0; i < 3; ++i) edge[i] = columns.edge[i] + columns.edge_lane[i] * lane;
     int64_t depth = columns.depth + static_cast<int64_t>(columns.depth_lane) * lane;
-    for (int32_t row = 0; row < columns.height; ++row) {
+    for (int32_t row = 0; row < columns.height; row += rows) {
       const auto outside = hn::Or(
           hn::Or(hn::Add(hn::Set(di, edge[0]), slope0), hn::Add(hn::Set(di, edge[1]), slope1)),
           hn::Add(hn::Set(di, edge[2]), slope2));
-      const auto inside = hn::And(exists, hn::Gt(outside, minus_one));
-      for (int i = 0; i < 3; ++i) edge[i] += columns.edge_row[i];
-      if (!hn::AllFalse(di, inside)) {
-        const auto q = hn::Set(df, (static_cast<double>(depth) + 0.5) * columns.inverse);
-        const auto voxel = hn::Combine(di, hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_high))),
-                                       hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_low))));
-        const auto above = hn::BitCast(d, hn::Sub(voxel, first));
-        const auto drawn = hn::And(hn::RebindMask(d, inside), hn::Lt(above, count));
-        at_first[kC] = part.lo[kC] + row;
-        const auto at = hn::Add(hn::Set(d, part.At(at_first)),
-                                hn::Add(in_lane, hn::ShiftLeft<4 * kAxis>(above)));
-        hn::StoreU(word, d, block.words + size);
-        // Not CompressStore, which some processors do word by word.
-        hn::StoreU(hn::Compress(at, drawn), d, block.at + size);
-        size += hn::CountTrue(d, drawn);
-        if (size >= DrawBlock::kSize) {
-          RaiseBlock(block, size, words);
-          size = 0;
-          several = true;
-        }
+      const auto inside =
+          hn::And(hn::And(exists, hn::Lt(row_of, hn::Set(di, columns.height - row))),
+                  hn::Gt(outside, minus_one));
+      // Worked out where none is inside, too: a branch could not be foreseen.
+      const auto q = hn::Set(df, (static_cast<double>(depth) + 0.5) * columns.inverse);
+      const auto voxel = hn::Combine(di, hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_high))),
+                                     hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_low))));
+      const auto above = hn::BitCast(d, hn::Sub(voxel, first));
+      const auto drawn = hn::And(hn::RebindMask(d, inside), hn::Lt(above, count));
+      at_first[kC] = part.lo[kC] + row;
+      const auto at =
+          hn::Add(hn::Set(d, part.At(at_first)), hn::Add(in_lane, hn::ShiftLeft<4 * kAxis>(above)));
+      hn::StoreU(word, d, block.words + size);
+      // Not CompressStore, which some processors do word by word.
+      hn::StoreU(hn::Compress(at, drawn), d, block.at + size);
+      size += hn::CountTrue(d, drawn);
+      if (size >= DrawBlock::kSize) {
+        RaiseBlock(block, size, words);
+        size = 0;
+        several = true;
       }
-      depth += columns.depth_row;
+      for (int i = 0; i < 3; ++i) edge[i] += columns.edge_row[i] * rows;
+      depth += columns.depth_row * rows;
     }
   }
   return size;

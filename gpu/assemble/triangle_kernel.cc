@@ -1,6 +1,7 @@
 #include "gpu/assemble/triangle_kernel.h"
 
 #include <algorithm>
+#include <bit>
 
 // Vectors whose size is known when this is compiled.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
