@@ -75,37 +75,48 @@ HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const 
   }
   int32_t tile_step[3];
   int32_t tile = 0;
-  size_t most = 1;
+  size_t count[3];
+  double way[3], inverse[3];  // to the first face of a tile that is crossed, and of a step
   const auto sentinel = static_cast<int32_t>(end);
   for (int r = 0; r < 3; ++r) {
     const int64_t from = first[r] >> kTileBits, to = last[r] >> kTileBits;
     tile += static_cast<int32_t>(from) * grid.tile_step[r];
-    const bool down = to < from;
-    tile_step[r] = down ? -grid.tile_step[r] : grid.tile_step[r];
-    const auto count = static_cast<size_t>(down ? from - to : to - from);
-    most += count;
-    if (count > 0) {
-      const int64_t face = down ? -from : from + 1;  // of tiles, reflected
-      const double way = static_cast<double>(face * (int64_t{1} << 36) - (down ? ~at[r] : at[r]));
-      const double inverse = 1.0 / static_cast<double>(down ? -step[r] : step[r]);
-      if (count <= 2) {
-        crossings[r][0] = static_cast<int32_t>(CeilCrossing(way * inverse));
-        crossings[r][1] = static_cast<int32_t>(CeilCrossing((way + 0x1p36) * inverse));
-      } else {
-        const auto by = hn::Set(d, inverse), room = hn::Set(d, 0x1p-36);
-        auto ways = hn::Add(hn::Set(d, way), hn::Mul(hn::Iota(d, 0), hn::Set(d, 0x1p36)));
-        const auto all = hn::Set(d, 0x1p36 * static_cast<double>(lanes));
-        const hn::Rebind<int32_t, decltype(d)> di;
-        for (size_t j = 0; j < count; j += lanes) {
-          const auto k = hn::Ceil(hn::Sub(hn::Mul(ways, by), room));
-          hn::StoreU(hn::DemoteTo(di, k), di, crossings[r] + j);
-          ways = hn::Add(ways, all);
-        }
+    // −1 if it goes down, for a reflection without a branch: nobody could foresee which way it goes.
+    const int64_t down = -static_cast<int64_t>(to < from);
+    const auto down32 = static_cast<int32_t>(down);
+    tile_step[r] = (grid.tile_step[r] ^ down32) - down32;
+    count[r] = static_cast<size_t>(((to - from) ^ down) - down);
+    const int64_t face = (from ^ down) + 1;  // of tiles
+    way[r] = static_cast<double>(face * (int64_t{1} << 36) - (at[r] ^ down));
+    // Where none is crossed the step may be 0 or go the other way.
+    inverse[r] = 1.0 / static_cast<double>(std::max<int64_t>((step[r] ^ down) - down, 1));
+  }
+  if ((count[0] | count[1] | count[2]) <= 3) {
+    // Short lines, without branches.
+    for (int r = 0; r < 3; ++r) {
+      for (size_t j = 0; j < 3; ++j) {
+        const int64_t k = CeilCrossing((way[r] + 0x1p36 * static_cast<double>(j)) * inverse[r]);
+        crossings[r][j] = j < count[r] ? static_cast<int32_t>(k) : sentinel;
       }
+      crossings[r][3] = sentinel;
     }
-    crossings[r][count] = sentinel;
+  } else {
+    const hn::Rebind<int32_t, decltype(d)> di;
+    const auto room = hn::Set(d, 0x1p-36), tiles = hn::Mul(hn::Iota(d, 0), hn::Set(d, 0x1p36));
+    const auto all = hn::Set(d, 0x1p36 * static_cast<double>(lanes));
+    for (int r = 0; r < 3; ++r) {
+      const auto by = hn::Set(d, inverse[r]);
+      auto ways = hn::Add(hn::Set(d, way[r]), tiles);
+      for (size_t j = 0; j < count[r]; j += lanes) {
+        const auto k = hn::Ceil(hn::Sub(hn::Mul(ways, by), room));
+        hn::StoreU(hn::DemoteTo(di, k), di, crossings[r] + j);
+        ways = hn::Add(ways, all);
+      }
+      crossings[r][count[r]] = sentinel;
+    }
   }
 
+  const size_t most = count[0] + count[1] + count[2] + 1;
   found.tiles.Reserve(found.size, most);
   found.items.Reserve(found.size, most);
   uint32_t* const tiles = found.tiles.data();
