@@ -1,6 +1,7 @@
 // Which parts of a tile there is something in.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "gpu/primitives/grid.h"
