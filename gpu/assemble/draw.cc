@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "gpu/assemble/triangle_kernel.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
@@ -17,8 +18,23 @@ bool IsSingular(const Drawable& d) {
   });
 }
 
-void DrawItems(const Drawable& d, std::span<const uint32_t> items, const TileGrid& grid,
+void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words) {
+  TileRows touched;
+  DrawItems(d, items, grid, box, words, touched);
+}
+
+void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
+               const Box3& box, uint32_t* words, TileRows& touched) {
+  if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words, touched);
+  if (d.bins.triangle_count > 0) {
+    const WalkGrid axes(grid);
+    int32_t lo[3], hi[3];
+    for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
+    DrawTriangles(d.bins.triangles.data(), items, lo, hi, words, touched);
+  }
+  if (d.bins.all_fast) return;
+  touched = TileRows::All();
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
   uint32_t rgb_before = 0;
@@ -32,12 +48,22 @@ void DrawItems(const Drawable& d, std::span<const uint32_t> items, const TileGri
     at = std::max(at, word);
   };
   WithPrimitive(d.source.record->kind, [&](auto primitive) {
-    for (uint32_t item : items) decltype(primitive)::type::EmitVoxels(d.source, item, box, raise);
+    for (const BinItem& item : items) {
+      if (item.count() == 0) {
+        decltype(primitive)::type::EmitVoxels(d.source, item.item, box, raise);
+      }
+    }
   });
 }
 
 void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor) {
+  BinScratch scratch;
+  PrepareDrawable(d, view_map, grid, owned, executor, scratch);
+}
+
+void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
+                     std::span<const uint8_t> owned, Executor& executor, BinScratch& scratch) {
   const GeometryView& view = d.geometry->view;
   const Affine map = Compose(Compose(view_map, d.layer->record.transform), d.record.transform);
   d.source = {};
@@ -61,7 +87,8 @@ void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
       d.source.radius = RadiusOf(view.record, map);
     }
   });
-  d.bins = BinItems(d.source, grid, owned, executor);
+  BinItems(d.source, grid, owned, d.record.priority, d.record.erase != 0, executor, scratch,
+           d.bins);
 }
 
 }  // namespace voxeld::gpu

@@ -14,13 +14,18 @@ namespace voxeld::gpu {
 // Fills in what is derived: vertices, source, bins. `view`: scene → voxel space. `owned[tile]`: 0
 // leaves the tile out.
 void PrepareDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid,
+                     std::span<const uint8_t> owned, Executor& executor, BinScratch& scratch);
+void PrepareDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor);
 
 // Of a drawable that is prepared: a solid whose map has no inverse. It draws nothing.
 bool IsSingular(const Drawable& drawable);
 
-// Raises `words` (kTileVoxels) of the tile in `box` to what these items cover.
-void DrawItems(const Drawable& drawable, std::span<const uint32_t> items, const TileGrid& grid,
+// Raises `words` (kTileVoxels) of the tile in `box` to what these items of its bins cover.
+void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words);
+// The same; the rows that it may have reached join `touched`.
+void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
+               const Box3& box, uint32_t* words, TileRows& touched);
 
 }  // namespace voxeld::gpu

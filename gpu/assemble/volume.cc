@@ -1,7 +1,7 @@
 #include "gpu/assemble/volume.h"
 
 #include <algorithm>
-#include <cstring>
+#include <atomic>
 #include <utility>
 
 #include "gpu/assemble/blend.h"
@@ -13,10 +13,12 @@ namespace {
 uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
   return d.vertices.size() * sizeof(d.vertices[0]) +
          d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) +
-         d.bins.items.size() * sizeof(uint32_t);
+         d.bins.items.capacity_bytes() + d.bins.walks.capacity_bytes() +
+         d.bins.triangles.capacity_bytes();
 }
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
+constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
 
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
@@ -75,26 +77,50 @@ struct TileClip {
 
 void TileStore::Reset(const TileGrid& grid) {
   grid_ = grid;
-  colors_.clear();
-  colors_.resize(grid.count());
+  blocks_.clear();
+  blocks_.resize(grid.count());
   lit_.assign(grid.count(), 0);
+  spare_.clear();
+  spare_left_ = 0;
 }
 
 bool TileStore::Set(uint32_t tile, const uint32_t* colors, uint32_t lit) {
-  constexpr size_t kBytes = kTileVoxels * sizeof(uint32_t);
-  std::unique_ptr<uint32_t[]>& held = colors_[tile];
-  if (lit == 0) {
-    lit_[tile] = 0;
-    return std::exchange(held, nullptr) != nullptr;
+  TileWords copy;
+  std::copy_n(colors, kTileVoxels, copy.at);
+  TileRows rows;
+  LitColors(copy.at, rows);
+  return Take(tile, copy, rows, lit, false);
+}
+
+std::unique_ptr<TileStore::Block> TileStore::TakeBlock() {
+  const std::atomic_ref<size_t> spares(spare_left_);
+  size_t left = spares.load(std::memory_order_relaxed);
+  while (left > 0) {
+    if (spares.compare_exchange_weak(left, left - 1, std::memory_order_relaxed)) {
+      return std::move(spare_[left - 1]);
+    }
   }
-  if (held == nullptr) {
-    held = std::make_unique_for_overwrite<uint32_t[]>(kTileVoxels);
-  } else if (std::memcmp(held.get(), colors, kBytes) == 0) {
-    return false;
+  return std::make_unique<Block>();
+}
+
+bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit,
+                     bool past_caches) {
+  std::unique_ptr<Block>& block = blocks_[tile];
+  const uint32_t before = std::exchange(lit_[tile], lit);
+  if (lit == 0) return before != 0;  // what it held stays, for Recycle
+  if (block == nullptr) block = TakeBlock();
+  const bool differs = MoveColors(colors.at, rows, past_caches, block->colors.at, block->rows);
+  block->rows = rows;
+  return differs || before == 0;
+}
+
+void TileStore::Recycle(std::span<const uint32_t> tiles, size_t most) {
+  spare_.resize(spare_left_);
+  for (uint32_t tile : tiles) {
+    if (lit_[tile] == 0 && blocks_[tile] != nullptr) spare_.push_back(std::move(blocks_[tile]));
   }
-  std::memcpy(held.get(), colors, kBytes);
-  lit_[tile] = lit;
-  return true;
+  if (spare_.size() > most) spare_.resize(most);
+  spare_left_ = spare_.size();
 }
 
 void Volume::MarkDirty(uint32_t tile) {
@@ -143,7 +169,7 @@ void Volume::TakeOutLeaving() {
   leaving_.clear();
   for (Drawable* drawable : left_) {
     drawable->leaving = false;
-    drawable->bins = {};
+    drawable->bins.Clear();
   }
   left_.clear();
 }
@@ -175,14 +201,21 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   singular_ = 0;
   for (const auto& [id, drawable] : scene_.drawables()) {
     drawable->pending = true;
-    drawable->bins = {};
+    drawable->bins.Clear();
     pending_.push_back(drawable.get());
   }
   scratch_.resize(static_cast<size_t>(executor_.concurrency()));
+  for (Scratch& scratch : scratch_) {
+    if (scratch.words != nullptr) continue;
+    scratch.words = std::make_unique<TileWords>();
+    scratch.colors = std::make_unique<TileWords>();
+    std::fill_n(scratch.words->at, kTileVoxels, 0);
+    std::fill_n(scratch.colors->at, kTileVoxels, 0);
+  }
 }
 
-void Volume::Prepare(Drawable& d, Executor& executor) const {
-  PrepareDrawable(d, view_, grid_, owned_, executor);
+void Volume::Prepare(Drawable& d, Executor& executor, BinScratch& scratch) const {
+  PrepareDrawable(d, view_, grid_, owned_, executor, scratch);
 }
 
 void Volume::PreparePending() {
@@ -192,8 +225,10 @@ void Volume::PreparePending() {
     (std::max(g.vertex_count, g.index_count) <= kSmallDrawable ? small : large).push_back(d);
   }
   const std::unique_ptr<Executor> serial = MakeSerialExecutor();
-  executor_.For(small.size(), 4, [&](size_t i, int) { Prepare(*small[i], *serial); });
-  for (Drawable* d : large) Prepare(*d, executor_);
+  executor_.For(small.size(), 4, [&](size_t i, int worker) {
+    Prepare(*small[i], *serial, scratch_[static_cast<size_t>(worker)].bins);
+  });
+  for (Drawable* d : large) Prepare(*d, executor_, scratch_[0].bins);
   for (Drawable* d : pending_) {
     d->pending = false;
     singular_ += IsSingular(*d);
@@ -208,35 +243,48 @@ void Volume::PreparePending() {
   pending_.clear();
 }
 
-// Into scratch.colors; returns how many are not black.
-uint32_t Volume::DrawTile(uint32_t tile, Scratch& scratch) const {
+// False if it comes out as it was.
+bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
   scratch.entries.clear();
   for (const Entry& e : index_[tile].entries) {
     if (e.drawable->layer->record.visible != 0) scratch.entries.push_back(e);
   }
-  if (scratch.entries.empty()) return 0;
   const auto rank = [](const Entry& e) { return e.drawable->layer->rank; };
-  std::sort(scratch.entries.begin(), scratch.entries.end(),
-            [&](const Entry& a, const Entry& b) { return rank(a) < rank(b); });
+  const auto lower = [&](const Entry& a, const Entry& b) { return rank(a) < rank(b); };
+  if (!std::is_sorted(scratch.entries.begin(), scratch.entries.end(), lower)) {
+    std::sort(scratch.entries.begin(), scratch.entries.end(), lower);
+  }
   const Box3 box = grid_.VoxelsOf(tile);
-  scratch.colors.assign(kTileVoxels, 0);
+  uint32_t* const words = scratch.words->at;
+  TileWords* colors =
+      scratch.words
+          .get();  // of the layers so far; while there are none, the next one's words become them
+  uint32_t lit = 0;
+  TileRows rows;
+  TileRows touched;
   for (size_t i = 0; i < scratch.entries.size();) {
     const Layer& layer = *scratch.entries[i].drawable->layer;
     const TileClip clip(*layer.clip, box);
-    if (!clip.outside) scratch.words.assign(kTileVoxels, 0);
     for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
       const Entry& e = scratch.entries[i];
       if (clip.outside) continue;
-      DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, scratch.words.data());
+      DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, words, touched);
     }
     if (clip.outside) continue;
     for (uint32_t c = 0; c < clip.count; ++c) {
-      UncoverOutside(*clip.cutting[c], grid_, box, scratch.words.data());
+      UncoverOutside(*clip.cutting[c], grid_, box, words);
     }
-    BlendTile(layer.record, scratch.words.data(), scratch.colors.data());
+    const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
+    if (opaque && i == scratch.entries.size() && colors->at == words) {
+      lit = ShowWords(words, touched, rows);
+      break;
+    }
+    colors = scratch.colors.get();
+    BlendTile(layer.record, words, colors->at);
+    std::fill_n(words, kTileVoxels, 0);
   }
-  return static_cast<uint32_t>(kTileVoxels -
-                               std::count(scratch.colors.begin(), scratch.colors.end(), 0u));
+  if (colors->at != words) lit = LitColors(colors->at, rows);
+  return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
 Volume::Changes Volume::Update() {
@@ -246,12 +294,11 @@ Volume::Changes Volume::Update() {
   changes.tiles_drawn = static_cast<uint32_t>(dirty_.size());
   std::vector<uint8_t> differs(dirty_.size());
   std::vector<uint32_t> lit_before(dirty_.size());
+  const bool past_caches = dirty_.size() > kCachedTiles;
   executor_.For(dirty_.size(), 1, [&](size_t i, int worker) {
-    Scratch& scratch = scratch_[static_cast<size_t>(worker)];
     const uint32_t tile = dirty_[i];
     lit_before[i] = tiles_.lit(tile);
-    const uint32_t lit = DrawTile(tile, scratch);
-    differs[i] = tiles_.Set(tile, scratch.colors.data(), lit);
+    differs[i] = DrawTile(tile, past_caches, scratch_[static_cast<size_t>(worker)]);
   });
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];
@@ -262,6 +309,7 @@ Volume::Changes Volume::Update() {
     changes.tiles.push_back(tile);
     changes.was_lit.push_back(lit_before[i] != 0);
   }
+  tiles_.Recycle(dirty_, static_cast<size_t>(lit_tiles_ / 2));
   dirty_.clear();
   return changes;
 }

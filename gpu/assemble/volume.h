@@ -10,11 +10,16 @@
 #include "absl/status/status.h"
 #include "gpu/affine.h"
 #include "gpu/assemble/scene.h"
+#include "gpu/assemble/span_kernel.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/engine.h"
 #include "gpu/primitives/grid.h"
 
 namespace voxeld::gpu {
+
+struct alignas(64) TileWords {
+  uint32_t at[kTileVoxels];
+};
 
 // Blended colours, interleaved (word.h), of the tiles that have any:
 // a tile without light costs nothing.
@@ -23,15 +28,34 @@ class TileStore {
   void Reset(const TileGrid& grid);
   const TileGrid& grid() const { return grid_; }
   // kTileVoxels colours (TileGrid::IndexInTile), or nothing if all are black.
-  const uint32_t* colors(uint32_t tile) const { return colors_[tile].get(); }
+  const uint32_t* colors(uint32_t tile) const {
+    return lit_[tile] == 0 ? nullptr : blocks_[tile]->colors.at;
+  }
+  // Where they are not black; only of a tile with colours.
+  const TileRows& rows(uint32_t tile) const { return blocks_[tile]->rows; }
   uint32_t lit(uint32_t tile) const { return lit_[tile]; }
-  // Copies `colors`, of which `lit` are not black. False if the tile is as it was.
+  // Copies `colors` (of kTileVoxels), of which `lit` are not black. False if the tile is as it was.
   bool Set(uint32_t tile, const uint32_t* colors, uint32_t lit);
+  // Takes `colors`, of which `lit`, in `rows`, are not black, and leaves zeros. False if the tile is as it was.
+  // `past_caches`: they will not be read before much else was. Different tiles may be given by different threads.
+  bool Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit, bool past_caches);
+  // Between Takes: what tiles of these that went dark had is kept for others, `most` blocks at most in all.
+  void Recycle(std::span<const uint32_t> tiles, size_t most);
+  size_t spare_blocks() const { return spare_.size(); }
 
  private:
+  struct Block {
+    TileWords colors;
+    TileRows rows;  // where not black
+  };
+  std::unique_ptr<Block> TakeBlock();
+
   TileGrid grid_;
-  std::vector<std::unique_ptr<uint32_t[]>> colors_;
+  std::vector<std::unique_ptr<Block>> blocks_;
   std::vector<uint32_t> lit_;
+  std::vector<std::unique_ptr<Block>>
+      spare_;              // the first spare_left_ of them, while tiles are taken
+  size_t spare_left_ = 0;  // reached by atomic_ref then
 };
 
 // Thread-bound; the work inside is spread over `executor`.
@@ -58,7 +82,7 @@ class Volume final : private SceneObserver {
   uint64_t lit_voxels() const { return lit_voxels_; }
   // What is derived from the scene, and the tiles with light.
   uint64_t memory_bytes() const {
-    return derived_bytes_ + lit_tiles_ * kTileVoxels * sizeof(uint32_t);
+    return derived_bytes_ + (lit_tiles_ + tiles_.spare_blocks()) * sizeof(TileWords);
   }
   // Solids whose map has no inverse: they draw nothing.
   uint32_t singular_drawables() const { return singular_; }
@@ -73,9 +97,11 @@ class Volume final : private SceneObserver {
     bool dirty = false;
     bool leaving = false;  // some of its entries' drawables are
   };
+  // A worker's.
   struct Scratch {
-    std::vector<uint32_t> words, colors;
+    std::unique_ptr<TileWords> words, colors;  // zeros between tiles
     std::vector<Entry> entries;
+    BinScratch bins;
   };
 
   void OnLeave(Drawable& drawable) override;
@@ -84,9 +110,9 @@ class Volume final : private SceneObserver {
 
   void MarkDirty(uint32_t tile);
   void TakeOutLeaving();
-  void Prepare(Drawable& drawable, Executor& executor) const;
+  void Prepare(Drawable& drawable, Executor& executor, BinScratch& scratch) const;
   void PreparePending();
-  uint32_t DrawTile(uint32_t tile, Scratch& scratch) const;
+  bool DrawTile(uint32_t tile, bool past_caches, Scratch& scratch);
 
   Executor& executor_;
   Scene scene_;

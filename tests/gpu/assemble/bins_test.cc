@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <numeric>
+#include <algorithm>
+#include <vector>
 
 namespace voxeld::gpu {
 namespace {
@@ -23,13 +24,14 @@ TEST(Bins, RowsHoldEachItemOfEachTileInOrder) {
     std::vector<uint8_t> owned(grid.count(), 1);
     owned[0] = 0;
     const std::unique_ptr<Executor> executor = MakeThreadExecutor(3);
-    const Bins bins = BinItems(source, grid, owned, *executor);
+    BinScratch scratch;
+    Bins bins;
+    BinItems(source, grid, owned, 0, false, *executor, scratch, bins);
     ASSERT_EQ(bins.begin.size(), bins.tiles.size() + 1);
-    EXPECT_EQ(bins.begin.back(), bins.items.size());
-    std::vector<std::vector<uint32_t>> want(grid.count());
+    std::vector<std::vector<BinItem>> want(grid.count());
     for (uint32_t i = 0; i < count; ++i) {
       Points::EmitTiles(source, i, grid, [&](uint32_t tile) {
-        if (tile != 0) want[tile].push_back(i);
+        if (tile != 0) want[tile].push_back({i, 0});
       });
     }
     size_t rows = 0;
@@ -37,10 +39,52 @@ TEST(Bins, RowsHoldEachItemOfEachTileInOrder) {
       if (want[tile].empty()) continue;
       ASSERT_LT(rows, bins.tiles.size());
       EXPECT_EQ(bins.tiles[rows], tile);
-      const std::span<const uint32_t> row = bins.row(rows++);
-      EXPECT_EQ(std::vector<uint32_t>(row.begin(), row.end()), want[tile]);
+      const std::span<const BinItem> row = bins.row(rows++);
+      EXPECT_EQ(std::vector<BinItem>(row.begin(), row.end()), want[tile]);
     }
     EXPECT_EQ(rows, bins.tiles.size());
+  }
+}
+
+// Walks and lines that are none, of which some are too long: the same rows from any number of threads, sorted or counted,
+// and each item where the definition has voxels of it.
+TEST(Bins, SpansAreTheSameFromAnyNumberOfThreads) {
+  const TileGrid grid = TileGrid::Of(64, 48, 32, 1);
+  for (uint32_t count : {20u, 9001u}) {
+    GeometryRecord record;
+    record.kind = PrimitiveKind::kSegments;
+    record.vertex_count = 2 * count;
+    std::vector<Int3> vertices(2 * size_t{count});
+    for (uint32_t i = 0; i < 2 * count; ++i) {
+      vertices[i] = {{(i * 3701) % (64 * 256), (i * 1103) % (48 * 256), (i * 509) % (32 * 256)}};
+      if (i % 100 == 0) vertices[i][0] = 5000 * 256;
+    }
+    Source source;
+    source.record = &record;
+    source.vertices = vertices.data();
+    std::vector<uint8_t> owned(grid.count(), 1);
+    owned[3] = 0;
+    BinScratch scratch;
+    Bins one, three;
+    BinItems(source, grid, owned, 2, false, *MakeSerialExecutor(), scratch, one);
+    BinItems(source, grid, owned, 2, false, *MakeThreadExecutor(3), scratch, three);
+    ASSERT_EQ(one.tiles, three.tiles);
+    ASSERT_EQ(one.begin, three.begin);
+    EXPECT_FALSE(one.all_fast);
+    for (size_t r = 0; r < one.tiles.size(); ++r) {
+      EXPECT_NE(one.tiles[r], 3u);
+      const std::span<const BinItem> a = one.row(r), b = three.row(r);
+      ASSERT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end())) << "tile " << one.tiles[r];
+      // Voxels of walks are counted by their spans.
+      std::vector<uint32_t> voxels(count), spanned(count);
+      for (const BinItem& item : a) {
+        spanned[item.item] += item.count();
+        if (item.count() == 0) continue;
+        Segments::EmitVoxels(source, item.item, grid.VoxelsOf(one.tiles[r]),
+                             [&](int32_t, int32_t, int32_t, uint32_t) { ++voxels[item.item]; });
+      }
+      ASSERT_EQ(spanned, voxels) << "tile " << one.tiles[r];
+    }
   }
 }
 

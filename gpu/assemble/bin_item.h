@@ -1,0 +1,22 @@
+// An item of a drawable in a tile.
+#pragma once
+
+#include <cstdint>
+
+namespace voxeld::gpu {
+
+// Of a line that is a walk (line_walk.h), the `count` voxels from the `first` on. Of any other item all it has there:
+// `count` is 1 for a small triangle (small_triangle.h), else 0.
+struct BinItem {
+  uint32_t item = 0;
+  uint32_t range = 0;  // first · 2⁸ + count
+
+  static BinItem Span(uint32_t item, uint32_t first, uint32_t count) {
+    return {item, first << 8 | count};
+  }
+  uint32_t first() const { return range >> 8; }
+  uint32_t count() const { return range & 0xFF; }
+  bool operator==(const BinItem&) const = default;
+};
+
+}  // namespace voxeld::gpu
