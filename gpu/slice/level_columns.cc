@@ -1,0 +1,230 @@
+#include "gpu/slice/level_columns.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include "gpu/primitives/grid.h"
+
+namespace voxeld::gpu {
+namespace {
+
+constexpr size_t kMostChunks = 64;  // bits of lit_
+constexpr uint64_t kMostLevelBytes = uint64_t{1}
+                                     << 30;  // beyond, sampling pixel by pixel is no worse
+constexpr size_t kColumnsATask = 128;
+static_assert(kBlockWords == kTileSize, "a run of a chunk's rows lies in one tile");
+
+constexpr uint32_t kNoLight[kBlockWords] = {};
+
+// The voxel of row 0, if row v takes its colour from the voxel v further alone, in every set of inner lists.
+std::optional<int32_t> FirstOfStraightRows(const display::FootprintTable& table, int axis) {
+  std::optional<int32_t> first;
+  for (int32_t set = 0; set < table.inner_sets; ++set) {
+    for (int32_t v = 0; v < table.height; ++v) {
+      const auto list = table.Inner(set, v);
+      if (list.size() != 1) return std::nullopt;
+      const int32_t at[3] = {list[0].x, list[0].y, list[0].z};
+      for (int a = 0; a < 3; ++a) {
+        if (a != axis && at[a] != 0) return std::nullopt;
+      }
+      if (!first) first = at[axis];
+      if (at[axis] != *first + v) return std::nullopt;
+    }
+  }
+  return first;
+}
+
+using List = std::span<const display::FootprintEntry>;
+
+struct Less {
+  bool operator()(const List& a, const List& b) const {
+    const auto key = [](const display::FootprintEntry& e) {
+      return uint64_t{e.z} << 32 | uint64_t{e.y} << 16 | e.x;
+    };
+    return std::lexicographical_compare(
+        a.begin(), a.end(), b.begin(), b.end(),
+        [&](const auto& p, const auto& q) { return key(p) < key(q); });
+  }
+};
+
+}  // namespace
+
+std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& table,
+                                                 const TileGrid& grid,
+                                                 const display::FrameLayout& layout,
+                                                 const display::Tone& tone, int32_t begin,
+                                                 int32_t end) {
+  if (layout.format != display::PixelFormat::kRgb332 || tone.sampling != display::Sampling::kMax) {
+    return std::nullopt;
+  }
+  const int axis = static_cast<int>(table.inner_axis);
+  const std::optional<int32_t> first = FirstOfStraightRows(table, axis);
+  if (!first || *first % kTileSize != 0 || grid.shift[axis] != 0) return std::nullopt;
+
+  LevelColumns out;
+  out.width_ = static_cast<size_t>(layout.width);
+  out.height_ = static_cast<size_t>(layout.height);
+  out.columns_ = (out.width_ + kColumnsTogether - 1) / kColumnsTogether * kColumnsTogether;
+  out.chunks_ = (out.height_ + kChunkRows - 1) / kChunkRows;
+  if (out.chunks_ > kMostChunks) return std::nullopt;
+  out.begin_ = begin;
+  out.axis_ = axis;
+  out.first_ = *first;
+  out.tiles_along_ = grid.tiles[axis];
+  out.tile_step_ = 1;
+  for (int a = 0; a < axis; ++a) out.tile_step_ *= static_cast<uint32_t>(grid.tiles[a]);
+
+  const size_t uses = static_cast<size_t>(end - begin) * out.width_;
+  std::map<List, uint32_t, Less> known;
+  out.voxel_begin_ = {0, 0};  // of kDark
+  out.column_of_.reserve(uses);
+  for (int32_t slice = begin; slice < end; ++slice) {
+    for (int32_t u = 0; u < layout.width; ++u) {
+      const List list = table.Outer(slice, u);
+      uint32_t column = kDark;
+      if (!list.empty()) {
+        const auto [at, is_new] =
+            known.try_emplace(list, static_cast<uint32_t>(out.voxel_begin_.size() - 1));
+        column = at->second;
+        if (is_new) out.AddColumn(grid, list);
+      }
+      out.column_of_.push_back(column);
+    }
+    const bool seldom_shared = known.size() > uses / 2;
+    if (seldom_shared) return std::nullopt;
+  }
+  const size_t columns = out.voxel_begin_.size() - 1;
+  out.level_bytes_ = uint64_t{columns} * out.chunks_ * kChunkBytes;
+  if (out.level_bytes_ > kMostLevelBytes) return std::nullopt;
+  out.levels_ = std::make_unique_for_overwrite<uint8_t[]>(out.level_bytes_);
+  out.lit_.assign(columns, 0);
+  out.IndexPillars(grid);
+  out.tables_ = LevelTables::OfRgb332(tone);
+  const auto sub_frames = static_cast<uint32_t>(layout.sub_frames);
+  for (uint32_t sub = 0; sub < sub_frames; ++sub) {
+    for (uint32_t u = 0; u < 8; ++u) out.dither_.push_back(DitherColumn(u, sub, sub_frames));
+  }
+  return out;
+}
+
+void LevelColumns::AddColumn(const TileGrid& grid, List list) {
+  for (const display::FootprintEntry& e : list) {
+    voxels_.push_back({grid.TileOf(e.x, e.y, e.z), grid.IndexInTile(e.x, e.y, e.z)});
+  }
+  voxel_begin_.push_back(static_cast<uint32_t>(voxels_.size()));
+}
+
+size_t LevelColumns::PillarOf(const TileGrid& grid, uint32_t tile) const {
+  int32_t ijk[3];
+  grid.Coordinates(tile, ijk);
+  const int a = axis_ == 0 ? 1 : 0, b = axis_ == 2 ? 1 : 2;  // the outer axes
+  return static_cast<size_t>(ijk[b]) * static_cast<size_t>(grid.tiles[a]) +
+         static_cast<size_t>(ijk[a]);
+}
+
+void LevelColumns::IndexPillars(const TileGrid& grid) {
+  const size_t pillars = grid.count() / static_cast<size_t>(tiles_along_);
+  const auto columns = static_cast<uint32_t>(voxel_begin_.size() - 1);
+  std::vector<std::vector<uint32_t>> of(pillars);
+  for (uint32_t column = 0; column < columns; ++column) {
+    for (uint32_t i = voxel_begin_[column]; i < voxel_begin_[column + 1]; ++i) {
+      std::vector<uint32_t>& to = of[PillarOf(grid, voxels_[i].tile)];
+      if (to.empty() || to.back() != column) to.push_back(column);
+    }
+  }
+  pillar_begin_ = {0};
+  for (const std::vector<uint32_t>& here : of) {
+    pillar_columns_.insert(pillar_columns_.end(), here.begin(), here.end());
+    pillar_begin_.push_back(static_cast<uint32_t>(pillar_columns_.size()));
+  }
+}
+
+void LevelColumns::Update(const TileStore& tiles, std::span<const uint32_t> changed,
+                          Executor& executor) {
+  std::vector<uint8_t> pillar_seen(pillar_begin_.size() - 1), seen(lit_.size());
+  std::vector<uint32_t> columns;
+  for (const uint32_t tile : changed) {
+    const size_t pillar = PillarOf(tiles.grid(), tile);
+    if (std::exchange(pillar_seen[pillar], 1) != 0) continue;
+    for (uint32_t i = pillar_begin_[pillar]; i < pillar_begin_[pillar + 1]; ++i) {
+      if (std::exchange(seen[pillar_columns_[i]], 1) == 0) columns.push_back(pillar_columns_[i]);
+    }
+  }
+  const size_t tasks = (columns.size() + kColumnsATask - 1) / kColumnsATask;
+  executor.For(tasks, 1, [&](size_t task, int) {
+    const size_t at = task * kColumnsATask;
+    Level(tiles, std::span(columns).subspan(at, std::min(kColumnsATask, columns.size() - at)));
+  });
+}
+
+void LevelColumns::Level(const TileStore& tiles, std::span<const uint32_t> columns) {
+  constexpr size_t kBlocks = kChunkRows / kBlockWords;
+  constexpr size_t kTogether = 16;
+  ChunkToLevel chunks[kTogether];
+  alignas(64) uint32_t greatest[kTogether][kChunkRows];  // of lists of several voxels
+  size_t waiting = 0;
+  const auto flush = [&] {
+    LevelChunks(tables_, std::span(chunks, waiting));
+    waiting = 0;
+  };
+  for (const uint32_t column : columns) {
+    const std::span<const Voxel> list = std::span(voxels_).subspan(
+        voxel_begin_[column], voxel_begin_[column + 1] - voxel_begin_[column]);
+    uint64_t lit = 0;
+    for (size_t chunk = 0; chunk < chunks_; ++chunk) {
+      ChunkToLevel& to = chunks[waiting];
+      bool any = false;
+      for (size_t block = 0; block < kBlocks; ++block) {
+        const int32_t along = first_ / kTileSize + static_cast<int32_t>(chunk * kBlocks + block);
+        const uint32_t* words = kNoLight;
+        for (size_t i = 0; i < list.size() && along < tiles_along_; ++i) {
+          const uint32_t* colors =
+              tiles.colors(list[i].tile + static_cast<uint32_t>(along) * tile_step_);
+          if (colors == nullptr) continue;
+          const uint32_t* here = colors + list[i].index;
+          if (words == kNoLight) {
+            words = here;
+            continue;
+          }
+          uint32_t* const most = &greatest[waiting][block * kBlockWords];
+          for (size_t v = 0; v < kBlockWords; ++v) most[v] = std::max(words[v], here[v]);
+          words = most;
+        }
+        to.words[block] = words;
+        any |= words != kNoLight;
+      }
+      if (!any) continue;
+      lit |= uint64_t{1} << chunk;
+      to.levels = levels(column) + chunk * kChunkBytes;
+      if (++waiting == kTogether) flush();
+    }
+    lit_[column] = lit;
+  }
+  flush();
+}
+
+std::span<const uint8_t> LevelColumns::Draw(int32_t slice, uint32_t sub, Scratch& scratch) const {
+  scratch.levels.resize(chunks_ * columns_);
+  scratch.pixels.resize(chunks_ * kChunkRows * columns_);
+  const uint32_t* const of = &column_of_[static_cast<size_t>(slice - begin_) * width_];
+  for (size_t chunk = 0; chunk < chunks_; ++chunk) {
+    const uint8_t** const to = &scratch.levels[chunk * columns_];
+    for (size_t u = 0; u < width_; ++u) {
+      const bool lit = (lit_[of[u]] >> chunk & 1) != 0;
+      to[u] = lit ? levels(of[u]) + chunk * kChunkBytes : nullptr;
+    }
+  }
+  uint64_t dither[8];
+  std::copy_n(&dither_[size_t{sub} * 8], 8, dither);
+  DrawRgb332(scratch.levels, columns_, dither, scratch.pixels.data());
+  if (columns_ != width_) {
+    for (size_t row = 1; row < height_; ++row) {
+      std::memmove(&scratch.pixels[row * width_], &scratch.pixels[row * columns_], width_);
+    }
+  }
+  return std::span(scratch.pixels).first(height_ * width_);
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,86 @@
+// Columns of pixels that many slices share, kept as levels before their dither.
+//
+// A column of a slice's pixels takes its colours from an outer list of the footprint table, row by row along the inner
+// axis. In a rotor the same list serves several slices (those in which a panel sweeps the same voxels), and what
+// becomes of its colours depends on the slice by the column's dither alone. So tone, levels and the greatest of the
+// list are worked out once a list and change, and a slice's picture is a comparison a pixel.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/assemble/volume.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/slice/column_kernel.h"
+#include "gpu/slice/levels.h"
+
+namespace voxeld::gpu {
+
+// Thread-bound, but for Draw.
+class LevelColumns {
+ public:
+  // Nothing where it does not apply: RGB332, sampled by the greatest, a row a voxel along the axis that comes first in
+  // a tile's memory, and lists that serve two slices or more on average. [begin, end): the slices owned.
+  static std::optional<LevelColumns> Create(const display::FootprintTable& table,
+                                            const TileGrid& grid,
+                                            const display::FrameLayout& layout,
+                                            const display::Tone& tone, int32_t begin, int32_t end);
+
+  // Works out anew what looks at `changed`; the first time all that is lit must be among them.
+  void Update(const TileStore& tiles, std::span<const uint32_t> changed, Executor& executor);
+
+  // Room that Draw takes, one a thread.
+  struct Scratch {
+    std::vector<const uint8_t*> levels;
+    std::vector<uint8_t> pixels;
+  };
+  // Picture `sub` of an owned slice, row-major. Valid until the next with this scratch. Any number of threads.
+  std::span<const uint8_t> Draw(int32_t slice, uint32_t sub, Scratch& scratch) const;
+
+  uint64_t memory_bytes() const { return level_bytes_; }
+
+ private:
+  struct Voxel {
+    uint32_t tile;   // the first along the inner axis
+    uint32_t index;  // in its memory, of the first voxel along the inner axis
+  };
+  static constexpr uint32_t kDark = 0;  // the column of lists without voxels
+
+  LevelColumns() = default;
+  void AddColumn(const TileGrid& grid, std::span<const display::FootprintEntry> list);
+  void IndexPillars(const TileGrid& grid);
+  size_t PillarOf(const TileGrid& grid, uint32_t tile) const;
+  void Level(const TileStore& tiles, std::span<const uint32_t> columns);
+  uint8_t* levels(uint32_t column) { return levels_.get() + column * chunks_ * kChunkBytes; }
+  const uint8_t* levels(uint32_t column) const {
+    return levels_.get() + column * chunks_ * kChunkBytes;
+  }
+
+  LevelTables tables_;
+  std::vector<uint64_t> dither_;  // eight of each sub-frame
+  size_t width_ = 0, height_ = 0;
+  size_t columns_ = 0;  // of a picture, with those that fill the last block
+  size_t chunks_ = 0;   // of a column
+  int32_t begin_ = 0;   // the first slice owned
+  int axis_ = 0;        // inner
+  int32_t first_ = 0;   // voxel along it of the first row
+  uint32_t tile_step_ = 0;
+  int32_t tiles_along_ = 0;
+  std::vector<uint32_t> column_of_;  // (slice − begin_) · width_ + u
+  // Columns: voxels_[voxel_begin_[c] .. voxel_begin_[c + 1]).
+  std::vector<uint32_t> voxel_begin_;
+  std::vector<Voxel> voxels_;
+  // Pillars, tiles along the inner axis: the columns that look at each.
+  std::vector<uint32_t> pillar_begin_, pillar_columns_;
+  std::unique_ptr<uint8_t[]>
+      levels_;  // chunks_ · kChunkBytes a column; memory is had where there is light
+  uint64_t level_bytes_ = 0;
+  std::vector<uint64_t> lit_;  // of each column, bit c: its chunk c is lit
+};
+
+}  // namespace voxeld::gpu
