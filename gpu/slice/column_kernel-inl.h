@@ -74,6 +74,20 @@ struct NibbleTables {
 };
 alignas(16) constexpr NibbleTables kNibbles;
 
+#if HWY_TARGET == HWY_AVX3_DL
+// Where byte b of each of 32 words lies.
+struct WordBytes {
+  uint8_t at[3][64];
+
+  constexpr WordBytes() : at() {
+    for (int byte = 0; byte < 3; ++byte) {
+      for (int word = 0; word < 32; ++word) at[byte][word] = static_cast<uint8_t>(word * 4 + byte);
+    }
+  }
+};
+alignas(64) constexpr WordBytes kWordBytes;
+#endif
+
 HWY_ATTR inline VBytes HighNibble(VBytes v) {
   const Bytes d;
   const hn::Repartition<uint16_t, Bytes> d16;
@@ -100,19 +114,37 @@ HWY_ATTR inline VBytes LookUp(const uint8_t* table, VBytes index) {
 #endif
 }
 
+#if HWY_TARGET == HWY_AVX3_DL
+// Byte `byte` of 64 words in four runs of 16.
+HWY_ATTR inline VBytes BytesOfWords(const uint32_t* const (&words)[4], size_t byte) {
+  const __m512i at = _mm512_load_si512(kWordBytes.at[byte]);
+  const auto run = [&](int i) HWY_ATTR { return _mm512_loadu_si512(words[i]); };
+  const __m512i low = _mm512_permutex2var_epi8(run(0), at, run(1));
+  const __m512i high = _mm512_permutex2var_epi8(run(2), at, run(3));
+  return VBytes{_mm512_inserti64x4(low, _mm512_castsi512_si256(high), 1)};
+}
+#endif
+
 HWY_ATTR inline void LevelChunksIn(const LevelTables& tables,
                                    std::span<const ChunkToLevel> chunks) {
   const Bytes d;
   const size_t lanes = hn::Lanes(d);
   for (const ChunkToLevel& chunk : chunks) {
+#if HWY_TARGET != HWY_AVX3_DL
     alignas(64) uint32_t words[kChunkRows];
     for (size_t block = 0; block < kChunkRows / kBlockWords; ++block) {
       std::memcpy(words + block * kBlockWords, chunk.words[block], kBlockWords * sizeof(uint32_t));
     }
+#endif
     for (size_t row = 0; row < kChunkRows; row += lanes) {
-      VBytes bytes[3], none;
+      VBytes bytes[3];
+#if HWY_TARGET == HWY_AVX3_DL
+      for (size_t byte = 0; byte < 3; ++byte) bytes[byte] = BytesOfWords(chunk.words, byte);
+#else
+      VBytes none;
       hn::LoadInterleaved4(d, reinterpret_cast<const uint8_t*>(words + row), bytes[0], bytes[1],
                            bytes[2], none);
+#endif
       VBytes channel[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
       for (int nibble = 0; nibble < 6; ++nibble) {
         const VBytes byte = bytes[nibble / 2];
@@ -143,8 +175,8 @@ HWY_ATTR inline void QuantizeChunk(const uint8_t* levels, uint64_t dither, uint8
     VBytes pixel = hn::LoadU(d, levels + row);
     for (size_t c = 0; c < 3; ++c) {
       const auto rise = hn::BitCast(ds, hn::LoadU(d, levels + (1 + c) * kChunkRows + row));
-      const auto lifted = hn::VecFromMask(ds, hn::Gt(rise, below));
-      pixel = hn::Add(pixel, hn::And(hn::BitCast(d, lifted), hn::Set(d, kStep[c])));
+      const auto lifted = hn::RebindMask(d, hn::Gt(rise, below));
+      pixel = hn::Add(pixel, hn::IfThenElseZero(lifted, hn::Set(d, kStep[c])));
     }
     hn::StoreU(pixel, d, pixels + row);
   }
@@ -188,7 +220,13 @@ HWY_ATTR inline void DrawRgb332In(std::span<const uint8_t* const> levels, size_t
         }
         continue;
       }
+      const bool more = u0 + kColumnsTogether < columns;
       for (size_t i = 0; i < kColumnsTogether; ++i) {
+        if (more) {
+          for (size_t plane = 0; plane < kChunkPlanes; ++plane) {
+            __builtin_prefetch(from[i + kColumnsTogether] + plane * kChunkRows);
+          }
+        }
         if (from[i] != nullptr) {
           QuantizeChunk(from[i], dither[i % 8], pixels[i]);
         } else {

@@ -13,7 +13,8 @@ namespace {
 constexpr size_t kMostChunks = 64;  // bits of lit_
 constexpr uint64_t kMostLevelBytes = uint64_t{1}
                                      << 30;  // beyond, sampling pixel by pixel is no worse
-constexpr size_t kColumnsATask = 128;
+constexpr size_t kColumnsATask = 64;
+constexpr size_t kBlocks = kChunkRows / kBlockWords;  // of a chunk
 static_assert(kBlockWords == kTileSize, "a run of a chunk's rows lies in one tile");
 
 constexpr uint32_t kNoLight[kBlockWords] = {};
@@ -126,71 +127,127 @@ size_t LevelColumns::PillarOf(const TileGrid& grid, uint32_t tile) const {
 
 void LevelColumns::IndexPillars(const TileGrid& grid) {
   const size_t pillars = grid.count() / static_cast<size_t>(tiles_along_);
-  const auto columns = static_cast<uint32_t>(voxel_begin_.size() - 1);
-  std::vector<std::vector<uint32_t>> of(pillars);
-  for (uint32_t column = 0; column < columns; ++column) {
-    for (uint32_t i = voxel_begin_[column]; i < voxel_begin_[column + 1]; ++i) {
-      std::vector<uint32_t>& to = of[PillarOf(grid, voxels_[i].tile)];
-      if (to.empty() || to.back() != column) to.push_back(column);
+  std::vector<std::vector<Single>> singles(pillars);
+  std::vector<std::vector<uint32_t>> others(pillars);
+  for (uint32_t column = 0; column < lit_.size(); ++column) {
+    const std::span<const Voxel> voxels = VoxelsOf(column);
+    for (const Voxel& voxel : voxels) {
+      const size_t pillar = PillarOf(grid, voxel.tile);
+      if (voxels.size() == 1) {
+        singles[pillar].push_back({column, voxel.index});
+      } else if (others[pillar].empty() || others[pillar].back() != column) {
+        others[pillar].push_back(column);
+      }
     }
   }
-  pillar_begin_ = {0};
-  for (const std::vector<uint32_t>& here : of) {
-    pillar_columns_.insert(pillar_columns_.end(), here.begin(), here.end());
-    pillar_begin_.push_back(static_cast<uint32_t>(pillar_columns_.size()));
+  pillars_.resize(pillars);
+  for (uint32_t tile = 0; tile < grid.count(); ++tile) {
+    Pillar& pillar = pillars_[PillarOf(grid, tile)];
+    pillar.first_tile = std::min(pillar.first_tile, tile);
+  }
+  for (size_t i = 0; i < pillars; ++i) {
+    pillars_[i].singles = static_cast<uint32_t>(singles_.size());
+    pillars_[i].others = static_cast<uint32_t>(others_.size());
+    singles_.insert(singles_.end(), singles[i].begin(), singles[i].end());
+    others_.insert(others_.end(), others[i].begin(), others[i].end());
+    pillars_[i].singles_end = static_cast<uint32_t>(singles_.size());
+    pillars_[i].others_end = static_cast<uint32_t>(others_.size());
   }
 }
+
+// Chunks that wait to be worked out, as many as may be on their way from farther caches.
+class LevelColumns::Waiting {
+ public:
+  explicit Waiting(const LevelTables& tables) : tables_(tables) {}
+  ~Waiting() { Flush(); }
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+
+  ChunkToLevel& next() { return chunks_[count_]; }
+  // Room for what next() refers to, until it is worked out.
+  uint32_t* room() { return room_[count_]; }
+  void Add() {
+    for (const uint32_t* words : chunks_[count_].words) __builtin_prefetch(words);
+    if (++count_ == kMost) Flush();
+  }
+
+ private:
+  void Flush() {
+    LevelChunks(tables_, std::span(chunks_, count_));
+    count_ = 0;
+  }
+
+  static constexpr size_t kMost = 32;
+  const LevelTables& tables_;
+  size_t count_ = 0;
+  ChunkToLevel chunks_[kMost];
+  alignas(64) uint32_t room_[kMost][kChunkRows];
+};
 
 void LevelColumns::Update(const TileStore& tiles, std::span<const uint32_t> changed,
                           Executor& executor) {
-  std::vector<uint8_t> pillar_seen(pillar_begin_.size() - 1), seen(lit_.size());
-  std::vector<uint32_t> columns;
+  std::vector<uint8_t> pillar_seen(pillars_.size()), seen(lit_.size());
+  std::vector<uint32_t> pillars, others;
   for (const uint32_t tile : changed) {
-    const size_t pillar = PillarOf(tiles.grid(), tile);
-    if (std::exchange(pillar_seen[pillar], 1) != 0) continue;
-    for (uint32_t i = pillar_begin_[pillar]; i < pillar_begin_[pillar + 1]; ++i) {
-      if (std::exchange(seen[pillar_columns_[i]], 1) == 0) columns.push_back(pillar_columns_[i]);
+    const size_t i = PillarOf(tiles.grid(), tile);
+    if (std::exchange(pillar_seen[i], 1) != 0) continue;
+    pillars.push_back(static_cast<uint32_t>(i));
+    for (uint32_t n = pillars_[i].others; n < pillars_[i].others_end; ++n) {
+      if (std::exchange(seen[others_[n]], 1) == 0) others.push_back(others_[n]);
     }
   }
-  const size_t tasks = (columns.size() + kColumnsATask - 1) / kColumnsATask;
+  executor.For(pillars.size(), 1,
+               [&](size_t i, int) { LevelSingles(tiles, pillars_[pillars[i]]); });
+  const size_t tasks = (others.size() + kColumnsATask - 1) / kColumnsATask;
   executor.For(tasks, 1, [&](size_t task, int) {
     const size_t at = task * kColumnsATask;
-    Level(tiles, std::span(columns).subspan(at, std::min(kColumnsATask, columns.size() - at)));
+    LevelOthers(tiles, std::span(others).subspan(at, std::min(kColumnsATask, others.size() - at)));
   });
 }
 
-void LevelColumns::Level(const TileStore& tiles, std::span<const uint32_t> columns) {
-  constexpr size_t kBlocks = kChunkRows / kBlockWords;
-  constexpr size_t kTogether = 16;
-  ChunkToLevel chunks[kTogether];
-  alignas(64) uint32_t greatest[kTogether][kChunkRows];  // of lists of several voxels
-  size_t waiting = 0;
-  const auto flush = [&] {
-    LevelChunks(tables_, std::span(chunks, waiting));
-    waiting = 0;
-  };
+// The columns of one voxel a row.
+void LevelColumns::LevelSingles(const TileStore& tiles, const Pillar& pillar) {
+  Waiting waiting(tables_);
+  for (size_t chunk = 0; chunk < chunks_; ++chunk) {
+    const uint32_t* colors[kBlocks] = {};
+    bool any = false;
+    for (size_t block = 0; block < kBlocks; ++block) {
+      colors[block] = ColorsAt(tiles, pillar.first_tile, chunk, block);
+      any |= colors[block] != nullptr;
+    }
+    const uint64_t bit = uint64_t{1} << chunk;
+    for (uint32_t n = pillar.singles; n < pillar.singles_end; ++n) {
+      const auto [column, index] = singles_[n];
+      lit_[column] = any ? lit_[column] | bit : lit_[column] & ~bit;
+      if (!any) continue;
+      ChunkToLevel& to = waiting.next();
+      for (size_t block = 0; block < kBlocks; ++block) {
+        to.words[block] = colors[block] != nullptr ? colors[block] + index : kNoLight;
+      }
+      to.levels = levels(column) + chunk * kChunkBytes;
+      waiting.Add();
+    }
+  }
+}
+
+void LevelColumns::LevelOthers(const TileStore& tiles, std::span<const uint32_t> columns) {
+  Waiting waiting(tables_);
   for (const uint32_t column : columns) {
-    const std::span<const Voxel> list = std::span(voxels_).subspan(
-        voxel_begin_[column], voxel_begin_[column + 1] - voxel_begin_[column]);
     uint64_t lit = 0;
     for (size_t chunk = 0; chunk < chunks_; ++chunk) {
-      ChunkToLevel& to = chunks[waiting];
+      ChunkToLevel& to = waiting.next();
       bool any = false;
       for (size_t block = 0; block < kBlocks; ++block) {
-        const int32_t along = first_ / kTileSize + static_cast<int32_t>(chunk * kBlocks + block);
+        uint32_t* const most = waiting.room() + block * kBlockWords;
         const uint32_t* words = kNoLight;
-        for (size_t i = 0; i < list.size() && along < tiles_along_; ++i) {
-          const uint32_t* colors =
-              tiles.colors(list[i].tile + static_cast<uint32_t>(along) * tile_step_);
+        for (const Voxel& voxel : VoxelsOf(column)) {
+          const uint32_t* colors = ColorsAt(tiles, voxel.tile, chunk, block);
           if (colors == nullptr) continue;
-          const uint32_t* here = colors + list[i].index;
-          if (words == kNoLight) {
-            words = here;
-            continue;
+          const uint32_t* const here = colors + voxel.index;
+          if (words != kNoLight) {
+            for (size_t v = 0; v < kBlockWords; ++v) most[v] = std::max(words[v], here[v]);
           }
-          uint32_t* const most = &greatest[waiting][block * kBlockWords];
-          for (size_t v = 0; v < kBlockWords; ++v) most[v] = std::max(words[v], here[v]);
-          words = most;
+          words = words == kNoLight ? here : most;
         }
         to.words[block] = words;
         any |= words != kNoLight;
@@ -198,11 +255,17 @@ void LevelColumns::Level(const TileStore& tiles, std::span<const uint32_t> colum
       if (!any) continue;
       lit |= uint64_t{1} << chunk;
       to.levels = levels(column) + chunk * kChunkBytes;
-      if (++waiting == kTogether) flush();
+      waiting.Add();
     }
     lit_[column] = lit;
   }
-  flush();
+}
+
+const uint32_t* LevelColumns::ColorsAt(const TileStore& tiles, uint32_t first_tile, size_t chunk,
+                                       size_t block) const {
+  const int32_t along = first_ / kTileSize + static_cast<int32_t>(chunk * kBlocks + block);
+  if (along >= tiles_along_) return nullptr;
+  return tiles.colors(first_tile + static_cast<uint32_t>(along) * tile_step_);
 }
 
 std::span<const uint8_t> LevelColumns::Draw(int32_t slice, uint32_t sub, Scratch& scratch) const {

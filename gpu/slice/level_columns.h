@@ -49,13 +49,31 @@ class LevelColumns {
     uint32_t tile;   // the first along the inner axis
     uint32_t index;  // in its memory, of the first voxel along the inner axis
   };
+  // A column of one voxel a row, and where in a tile's memory its voxels begin.
+  struct Single {
+    uint32_t column, index;
+  };
+  // Tiles along the inner axis, and the columns that look at them: ranges of singles_ and others_.
+  struct Pillar {
+    uint32_t first_tile = UINT32_MAX;
+    uint32_t singles = 0, singles_end = 0;
+    uint32_t others = 0, others_end = 0;
+  };
+  class Waiting;
   static constexpr uint32_t kDark = 0;  // the column of lists without voxels
 
   LevelColumns() = default;
   void AddColumn(const TileGrid& grid, std::span<const display::FootprintEntry> list);
   void IndexPillars(const TileGrid& grid);
   size_t PillarOf(const TileGrid& grid, uint32_t tile) const;
-  void Level(const TileStore& tiles, std::span<const uint32_t> columns);
+  void LevelSingles(const TileStore& tiles, const Pillar& pillar);
+  void LevelOthers(const TileStore& tiles, std::span<const uint32_t> columns);
+  const uint32_t* ColorsAt(const TileStore& tiles, uint32_t first_tile, size_t chunk,
+                           size_t block) const;
+  std::span<const Voxel> VoxelsOf(uint32_t column) const {
+    return std::span(voxels_).subspan(voxel_begin_[column],
+                                      voxel_begin_[column + 1] - voxel_begin_[column]);
+  }
   uint8_t* levels(uint32_t column) { return levels_.get() + column * chunks_ * kChunkBytes; }
   const uint8_t* levels(uint32_t column) const {
     return levels_.get() + column * chunks_ * kChunkBytes;
@@ -75,8 +93,9 @@ class LevelColumns {
   // Columns: voxels_[voxel_begin_[c] .. voxel_begin_[c + 1]).
   std::vector<uint32_t> voxel_begin_;
   std::vector<Voxel> voxels_;
-  // Pillars, tiles along the inner axis: the columns that look at each.
-  std::vector<uint32_t> pillar_begin_, pillar_columns_;
+  std::vector<Pillar> pillars_;
+  std::vector<Single> singles_;
+  std::vector<uint32_t> others_;
   std::unique_ptr<uint8_t[]>
       levels_;  // chunks_ · kChunkBytes a column; memory is had where there is light
   uint64_t level_bytes_ = 0;
