@@ -17,7 +17,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 inline void LevelChunksIn(const LevelTables& tables, std::span<const ChunkToLevel> chunks) {
   for (const ChunkToLevel& chunk : chunks) {
     for (size_t row = 0; row < kChunkRows; ++row) {
-      const uint32_t rgb = Deinterleave(chunk.words[row / kBlockWords][row % kBlockWords]);
+      const size_t block = row / kBlockWords, at = row % kBlockWords;
+      const uint32_t rgb = Deinterleave(std::max(
+          chunk.words[block][at], chunk.also[block] != nullptr ? chunk.also[block][at] : 0));
       uint32_t base = 0;
       for (size_t c = 0; c < 3; ++c) {
         const uint32_t channel = rgb >> (16 - 8 * c) & 0xFF;
@@ -41,9 +43,10 @@ inline void QuantizeChunk(const uint8_t* levels, uint64_t dither, uint8_t* pixel
   }
 }
 
-inline void Transpose16(const uint8_t* from, size_t from_stride, uint8_t* to, size_t to_stride) {
-  for (size_t row = 0; row < 16; ++row) {
-    for (size_t i = 0; i < 16; ++i) to[row * to_stride + i] = from[i * from_stride + row];
+inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunkRows], uint8_t* out,
+                      size_t stride) {
+  for (size_t row = 0; row < kChunkRows; ++row) {
+    for (size_t i = 0; i < kColumnsTogether; ++i) out[row * stride + i] = columns[i][row];
   }
 }
 
@@ -115,13 +118,32 @@ HWY_ATTR inline VBytes LookUp(const uint8_t* table, VBytes index) {
 }
 
 #if HWY_TARGET == HWY_AVX3_DL
-// Byte `byte` of 64 words in four runs of 16.
-HWY_ATTR inline VBytes BytesOfWords(const uint32_t* const (&words)[4], size_t byte) {
+// Byte `byte` of 64 words in four vectors.
+HWY_ATTR inline VBytes BytesOfWords(const __m512i (&words)[4], size_t byte) {
   const __m512i at = _mm512_load_si512(kWordBytes.at[byte]);
-  const auto run = [&](int i) HWY_ATTR { return _mm512_loadu_si512(words[i]); };
-  const __m512i low = _mm512_permutex2var_epi8(run(0), at, run(1));
-  const __m512i high = _mm512_permutex2var_epi8(run(2), at, run(3));
+  const __m512i low = _mm512_permutex2var_epi8(words[0], at, words[1]);
+  const __m512i high = _mm512_permutex2var_epi8(words[2], at, words[3]);
   return VBytes{_mm512_inserti64x4(low, _mm512_castsi512_si256(high), 1)};
+}
+
+HWY_ATTR inline void LoadWords(const ChunkToLevel& chunk, __m512i (&words)[4]) {
+  for (int i = 0; i < 4; ++i) {
+    words[i] = _mm512_loadu_si512(chunk.words[i]);
+    if (chunk.also[0] != nullptr) {
+      words[i] = _mm512_max_epu32(words[i], _mm512_loadu_si512(chunk.also[i]));
+    }
+  }
+}
+#else
+HWY_ATTR inline void LoadWords(const ChunkToLevel& chunk, uint32_t (&words)[kChunkRows]) {
+  const hn::CappedTag<uint32_t, kBlockWords> d;
+  for (size_t block = 0; block < kChunkRows / kBlockWords; ++block) {
+    for (size_t at = 0; at < kBlockWords; at += hn::Lanes(d)) {
+      auto v = hn::LoadU(d, chunk.words[block] + at);
+      if (chunk.also[0] != nullptr) v = hn::Max(v, hn::LoadU(d, chunk.also[block] + at));
+      hn::Store(v, d, words + block * kBlockWords + at);
+    }
+  }
 }
 #endif
 
@@ -130,16 +152,16 @@ HWY_ATTR inline void LevelChunksIn(const LevelTables& tables,
   const Bytes d;
   const size_t lanes = hn::Lanes(d);
   for (const ChunkToLevel& chunk : chunks) {
-#if HWY_TARGET != HWY_AVX3_DL
+#if HWY_TARGET == HWY_AVX3_DL
+    __m512i words[4];
+#else
     alignas(64) uint32_t words[kChunkRows];
-    for (size_t block = 0; block < kChunkRows / kBlockWords; ++block) {
-      std::memcpy(words + block * kBlockWords, chunk.words[block], kBlockWords * sizeof(uint32_t));
-    }
 #endif
+    LoadWords(chunk, words);
     for (size_t row = 0; row < kChunkRows; row += lanes) {
       VBytes bytes[3];
 #if HWY_TARGET == HWY_AVX3_DL
-      for (size_t byte = 0; byte < 3; ++byte) bytes[byte] = BytesOfWords(chunk.words, byte);
+      for (size_t byte = 0; byte < 3; ++byte) bytes[byte] = BytesOfWords(words, byte);
 #else
       VBytes none;
       hn::LoadInterleaved4(d, reinterpret_cast<const uint8_t*>(words + row), bytes[0], bytes[1],
@@ -182,59 +204,71 @@ HWY_ATTR inline void QuantizeChunk(const uint8_t* levels, uint64_t dither, uint8
   }
 }
 
-// Sixteen columns of sixteen rows, `from_stride` apart, to rows of sixteen columns: four rounds in each of which the
-// highest bit of a column's number becomes the lowest of its place.
-HWY_ATTR inline void Transpose16(const uint8_t* from, size_t from_stride, uint8_t* to,
-                                 size_t to_stride) {
-  const hn::FixedTag<uint8_t, 16> d;
+// Sixteen columns of a chunk to its rows, `stride` apart: four rounds, in each of which the highest bit of a column's
+// number becomes the lowest of its place. A vector holds sixteen rows of a column in each block.
+HWY_ATTR inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunkRows], uint8_t* out,
+                               size_t stride) {
+  static_assert(kColumnsTogether == 16, "four rounds");
+  const hn::CappedTag<uint8_t, 32> d;
+  const hn::FixedTag<uint8_t, 16> block;
   using V = hn::Vec<decltype(d)>;
-  V a[16], b[16];
-  for (size_t i = 0; i < 16; ++i) a[i] = hn::LoadU(d, from + i * from_stride);
-  const auto round = [&](const V(&in)[16], V(&out)[16]) HWY_ATTR {
+  const auto round = [d](const V(&in)[16], V(&to)[16]) HWY_ATTR {
     for (size_t i = 0; i < 8; ++i) {
-      out[2 * i] = hn::InterleaveLower(d, in[i], in[i + 8]);
-      out[2 * i + 1] = hn::InterleaveUpper(d, in[i], in[i + 8]);
+      to[2 * i] = hn::InterleaveLower(d, in[i], in[i + 8]);
+      to[2 * i + 1] = hn::InterleaveUpper(d, in[i], in[i + 8]);
     }
   };
-  round(a, b);
-  round(b, a);
-  round(a, b);
-  round(b, a);
-  for (size_t i = 0; i < 16; ++i) hn::StoreU(a[i], d, to + i * to_stride);
+  for (size_t row = 0; row < kChunkRows; row += hn::Lanes(d)) {
+    V a[16], b[16];
+    for (size_t i = 0; i < 16; ++i) a[i] = hn::LoadU(d, columns[i] + row);
+    round(a, b);
+    round(b, a);
+    round(a, b);
+    round(b, a);
+    for (size_t i = 0; i < 16; ++i) {
+#if HWY_MAX_BYTES >= 32
+      hn::StoreU(hn::LowerHalf(block, a[i]), block, out + (row + i) * stride);
+      hn::StoreU(hn::UpperHalf(block, a[i]), block, out + (row + 16 + i) * stride);
+#else
+      hn::StoreU(a[i], block, out + (row + i) * stride);
+#endif
+    }
+  }
 }
 
 #endif
 
-HWY_ATTR inline void DrawRgb332In(std::span<const uint8_t* const> levels, size_t columns,
-                                  const uint64_t (&dither)[8], uint8_t* out) {
+// Sixteen columns of one chunk.
+HWY_ATTR inline void DrawBlock(const uint8_t* const* levels, const uint64_t (&dither)[8],
+                               uint8_t* out, size_t stride) {
+  if (std::all_of(levels, levels + kColumnsTogether,
+                  [](const uint8_t* p) { return p == nullptr; })) {
+    for (size_t row = 0; row < kChunkRows; ++row) {
+      std::memset(out + row * stride, 0, kColumnsTogether);
+    }
+    return;
+  }
   alignas(64) uint8_t pixels[kColumnsTogether][kChunkRows];
-  const size_t chunks = levels.size() / columns;
+  for (size_t i = 0; i < kColumnsTogether; ++i) {
+    if (levels[i] != nullptr) {
+      QuantizeChunk(levels[i], dither[i % 8], pixels[i]);
+    } else {
+      std::memset(pixels[i], 0, kChunkRows);
+    }
+  }
+  Transpose(pixels, out, stride);
+}
+
+// Block by block in all pictures: neighbouring slices have most of a block's columns in common.
+HWY_ATTR inline void DrawRgb332In(std::span<const uint8_t* const> levels, size_t columns,
+                                  size_t chunks, const uint64_t (&dither)[8], uint8_t* out) {
+  const size_t places = chunks * columns;
+  const size_t pictures = levels.size() / places;
   for (size_t chunk = 0; chunk < chunks; ++chunk) {
     for (size_t u0 = 0; u0 < columns; u0 += kColumnsTogether) {
-      const uint8_t* const* const from = levels.data() + chunk * columns + u0;
-      uint8_t* const to = out + chunk * kChunkRows * columns + u0;
-      if (std::all_of(from, from + kColumnsTogether,
-                      [](const uint8_t* p) { return p == nullptr; })) {
-        for (size_t row = 0; row < kChunkRows; ++row) {
-          std::memset(to + row * columns, 0, kColumnsTogether);
-        }
-        continue;
-      }
-      const bool more = u0 + kColumnsTogether < columns;
-      for (size_t i = 0; i < kColumnsTogether; ++i) {
-        if (more) {
-          for (size_t plane = 0; plane < kChunkPlanes; ++plane) {
-            __builtin_prefetch(from[i + kColumnsTogether] + plane * kChunkRows);
-          }
-        }
-        if (from[i] != nullptr) {
-          QuantizeChunk(from[i], dither[i % 8], pixels[i]);
-        } else {
-          std::memset(pixels[i], 0, kChunkRows);
-        }
-      }
-      for (size_t row = 0; row < kChunkRows; row += 16) {
-        Transpose16(pixels[0] + row, kChunkRows, to + row * columns, columns);
+      for (size_t picture = 0; picture < pictures; ++picture) {
+        DrawBlock(levels.data() + picture * places + chunk * columns + u0, dither,
+                  out + (picture * places + chunk * columns) * kChunkRows + u0, columns);
       }
     }
   }

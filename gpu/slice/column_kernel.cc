@@ -30,9 +30,9 @@ void LevelChunks(const LevelTables& tables, std::span<const ChunkToLevel> chunks
   HWY_DYNAMIC_DISPATCH(LevelChunksIn)(tables, chunks);
 }
 
-void DrawRgb332(std::span<const uint8_t* const> levels, size_t columns, const uint64_t (&dither)[8],
-                uint8_t* out) {
-  HWY_DYNAMIC_DISPATCH(DrawRgb332In)(levels, columns, dither, out);
+void DrawRgb332(std::span<const uint8_t* const> levels, size_t columns, size_t chunks,
+                const uint64_t (&dither)[8], uint8_t* out) {
+  HWY_DYNAMIC_DISPATCH(DrawRgb332In)(levels, columns, chunks, dither, out);
 }
 
 std::string ColumnTarget() { return HWY_DYNAMIC_DISPATCH(ColumnTargetIn)(); }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "gpu/primitives/grid.h"
@@ -101,6 +103,7 @@ std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& 
   if (out.level_bytes_ > kMostLevelBytes) return std::nullopt;
   out.levels_ = std::make_unique_for_overwrite<uint8_t[]>(out.level_bytes_);
   out.lit_.assign(columns, 0);
+  out.SortColumns(grid);
   out.IndexPillars(grid);
   out.tables_ = LevelTables::OfRgb332(tone);
   const auto sub_frames = static_cast<uint32_t>(layout.sub_frames);
@@ -123,6 +126,28 @@ size_t LevelColumns::PillarOf(const TileGrid& grid, uint32_t tile) const {
   const int a = axis_ == 0 ? 1 : 0, b = axis_ == 2 ? 1 : 2;  // the outer axes
   return static_cast<size_t>(ijk[b]) * static_cast<size_t>(grid.tiles[a]) +
          static_cast<size_t>(ijk[a]);
+}
+
+// In the order of the voxels' memory: those of one voxel a row, tile by tile, then the others.
+void LevelColumns::SortColumns(const TileGrid& grid) {
+  std::vector<uint32_t> order(lit_.size() - 1);  // kDark stays where it is
+  std::iota(order.begin(), order.end(), kDark + 1);
+  const auto key = [&](uint32_t column) {
+    const std::span<const Voxel> voxels = VoxelsOf(column);
+    return std::tuple(voxels.size() > 1, PillarOf(grid, voxels[0].tile), voxels[0].index);
+  };
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+  std::vector<uint32_t> place(lit_.size(), kDark), begin = {0, 0};
+  std::vector<Voxel> voxels;
+  for (const uint32_t column : order) {
+    place[column] = static_cast<uint32_t>(begin.size() - 1);
+    const std::span<const Voxel> of = VoxelsOf(column);
+    voxels.insert(voxels.end(), of.begin(), of.end());
+    begin.push_back(static_cast<uint32_t>(voxels.size()));
+  }
+  voxel_begin_ = std::move(begin);
+  voxels_ = std::move(voxels);
+  for (uint32_t& column : column_of_) column = place[column];
 }
 
 void LevelColumns::IndexPillars(const TileGrid& grid) {
@@ -168,6 +193,7 @@ class LevelColumns::Waiting {
   uint32_t* room() { return room_[count_]; }
   void Add() {
     for (const uint32_t* words : chunks_[count_].words) __builtin_prefetch(words);
+    for (const uint32_t* words : chunks_[count_].also) __builtin_prefetch(words);
     if (++count_ == kMost) Flush();
   }
 
@@ -223,6 +249,7 @@ void LevelColumns::LevelSingles(const TileStore& tiles, const Pillar& pillar) {
       ChunkToLevel& to = waiting.next();
       for (size_t block = 0; block < kBlocks; ++block) {
         to.words[block] = colors[block] != nullptr ? colors[block] + index : kNoLight;
+        to.also[block] = nullptr;
       }
       to.levels = levels(column) + chunk * kChunkBytes;
       waiting.Add();
@@ -238,19 +265,24 @@ void LevelColumns::LevelOthers(const TileStore& tiles, std::span<const uint32_t>
       ChunkToLevel& to = waiting.next();
       bool any = false;
       for (size_t block = 0; block < kBlocks; ++block) {
-        uint32_t* const most = waiting.room() + block * kBlockWords;
-        const uint32_t* words = kNoLight;
+        const uint32_t* words[2] = {kNoLight, kNoLight};
+        size_t count = 0;
         for (const Voxel& voxel : VoxelsOf(column)) {
           const uint32_t* colors = ColorsAt(tiles, voxel.tile, chunk, block);
           if (colors == nullptr) continue;
-          const uint32_t* const here = colors + voxel.index;
-          if (words != kNoLight) {
-            for (size_t v = 0; v < kBlockWords; ++v) most[v] = std::max(words[v], here[v]);
+          if (count < 2) {
+            words[count++] = colors + voxel.index;
+            continue;
           }
-          words = words == kNoLight ? here : most;
+          uint32_t* const most = waiting.room() + block * kBlockWords;  // a third is rare
+          for (size_t v = 0; v < kBlockWords; ++v) {
+            most[v] = std::max(words[1][v], colors[voxel.index + v]);
+          }
+          words[1] = most;
         }
-        to.words[block] = words;
-        any |= words != kNoLight;
+        to.words[block] = words[0];
+        to.also[block] = words[1];
+        any |= count > 0;
       }
       if (!any) continue;
       lit |= uint64_t{1} << chunk;
@@ -268,26 +300,30 @@ const uint32_t* LevelColumns::ColorsAt(const TileStore& tiles, uint32_t first_ti
   return tiles.colors(first_tile + static_cast<uint32_t>(along) * tile_step_);
 }
 
-std::span<const uint8_t> LevelColumns::Draw(int32_t slice, uint32_t sub, Scratch& scratch) const {
-  scratch.levels.resize(chunks_ * columns_);
-  scratch.pixels.resize(chunks_ * kChunkRows * columns_);
-  const uint32_t* const of = &column_of_[static_cast<size_t>(slice - begin_) * width_];
-  for (size_t chunk = 0; chunk < chunks_; ++chunk) {
-    const uint8_t** const to = &scratch.levels[chunk * columns_];
-    for (size_t u = 0; u < width_; ++u) {
-      const bool lit = (lit_[of[u]] >> chunk & 1) != 0;
-      to[u] = lit ? levels(of[u]) + chunk * kChunkBytes : nullptr;
+void LevelColumns::Draw(std::span<const int32_t> slices, uint32_t sub, Scratch& scratch) const {
+  const size_t places = chunks_ * columns_;
+  scratch.levels.resize(slices.size() * places);
+  scratch.pixels.resize(slices.size() * picture_bytes());
+  for (size_t i = 0; i < slices.size(); ++i) {
+    const uint32_t* const of = &column_of_[static_cast<size_t>(slices[i] - begin_) * width_];
+    for (size_t chunk = 0; chunk < chunks_; ++chunk) {
+      const uint8_t** const to = &scratch.levels[i * places + chunk * columns_];
+      for (size_t u = 0; u < width_; ++u) {
+        const bool lit = (lit_[of[u]] >> chunk & 1) != 0;
+        to[u] = lit ? levels(of[u]) + chunk * kChunkBytes : nullptr;
+      }
+      std::fill(to + width_, to + columns_, nullptr);
     }
   }
   uint64_t dither[8];
   std::copy_n(&dither_[size_t{sub} * 8], 8, dither);
-  DrawRgb332(scratch.levels, columns_, dither, scratch.pixels.data());
-  if (columns_ != width_) {
+  DrawRgb332(scratch.levels, columns_, chunks_, dither, scratch.pixels.data());
+  for (size_t i = 0; i < slices.size() && columns_ != width_; ++i) {
+    uint8_t* const rows = scratch.pixels.data() + i * picture_bytes();
     for (size_t row = 1; row < height_; ++row) {
-      std::memmove(&scratch.pixels[row * width_], &scratch.pixels[row * columns_], width_);
+      std::memmove(rows + row * width_, rows + row * columns_, width_);
     }
   }
-  return std::span(scratch.pixels).first(height_ * width_);
 }
 
 }  // namespace voxeld::gpu

@@ -39,8 +39,13 @@ class LevelColumns {
     std::vector<const uint8_t*> levels;
     std::vector<uint8_t> pixels;
   };
-  // Picture `sub` of an owned slice, row-major. Valid until the next with this scratch. Any number of threads.
-  std::span<const uint8_t> Draw(int32_t slice, uint32_t sub, Scratch& scratch) const;
+  // Picture `sub` of each of some owned slices, neighbours at best. Any number of threads.
+  static constexpr size_t kSlicesTogether = 8;
+  void Draw(std::span<const int32_t> slices, uint32_t sub, Scratch& scratch) const;
+  // The i-th of those last drawn with this scratch, row-major.
+  std::span<const uint8_t> picture(size_t i, const Scratch& scratch) const {
+    return std::span(scratch.pixels).subspan(i * picture_bytes(), height_ * width_);
+  }
 
   uint64_t memory_bytes() const { return level_bytes_; }
 
@@ -63,7 +68,9 @@ class LevelColumns {
   static constexpr uint32_t kDark = 0;  // the column of lists without voxels
 
   LevelColumns() = default;
+  size_t picture_bytes() const { return chunks_ * kChunkRows * columns_; }
   void AddColumn(const TileGrid& grid, std::span<const display::FootprintEntry> list);
+  void SortColumns(const TileGrid& grid);
   void IndexPillars(const TileGrid& grid);
   size_t PillarOf(const TileGrid& grid, uint32_t tile) const;
   void LevelSingles(const TileStore& tiles, const Pillar& pillar);

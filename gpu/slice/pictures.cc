@@ -89,41 +89,54 @@ void Pictures::Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) c
   }
 }
 
-std::span<const uint8_t> Pictures::DrawPicture(const TileStore& tiles, int32_t slice, uint32_t sub,
-                                               bool blank, Scratch& scratch) const {
-  const display::FrameLayout& layout = plan_->layout;
-  if (columns_ && !blank) return columns_->Draw(slice, sub, scratch.columns);
-  if (sub == 0) {
-    scratch.pixels.Clear(static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height));
-    if (!blank) plan_->sampler.Sample(tiles, slice, scratch.pixels);
+// A picture's bytes as they are now; true if they are not what they were.
+bool Pictures::Keep(size_t index, std::span<const uint8_t> drawn, uint64_t frame) {
+  const bool differs = std::memcmp(picture(index), drawn.data(), drawn.size()) != 0;
+  if (differs) std::memcpy(picture(index), drawn.data(), drawn.size());
+  if (differs || changed_in_[index] == 0) {
+    changed_in_[index] = frame;
+    return true;
   }
-  scratch.picture.assign(layout.bytes_per_slice(), 0);
-  Pack(scratch.pixels, sub, scratch.picture.data());
-  return scratch.picture;
+  return false;
 }
 
-// True if some picture of the slice is not what it was.
-bool Pictures::DrawSlice(const TileStore& tiles, int32_t slice, uint64_t frame, Scratch& scratch) {
+// True if some picture of the slices is not what it was.
+bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slices, uint64_t frame,
+                          Scratch& scratch) {
   const display::FrameLayout& layout = plan_->layout;
-  const size_t s = static_cast<size_t>(slice - plan_->begin);
   const size_t sub_frames = static_cast<size_t>(layout.sub_frames);
-  const bool blank = lit_tiles_[s] == 0;
+  const auto index_of = [&](int32_t slice, size_t sub) {
+    return static_cast<size_t>(slice - plan_->begin) * sub_frames + sub;
+  };
   bool changed = false;
-  for (size_t sub = 0; sub < sub_frames; ++sub) {
-    const size_t index = s * sub_frames + sub;
-    bool differs = changed_in_[index] == 0;
-    if (!blank || blank_[s] == 0) {
-      const std::span<const uint8_t> drawn =
-          DrawPicture(tiles, slice, static_cast<uint32_t>(sub), blank, scratch);
-      if (std::memcmp(picture(index), drawn.data(), drawn.size()) != 0) {
-        std::memcpy(picture(index), drawn.data(), drawn.size());
-        differs = true;
+  scratch.lit.clear();
+  for (const int32_t slice : slices) {
+    const size_t s = static_cast<size_t>(slice - plan_->begin);
+    const bool blank = lit_tiles_[s] == 0, was_blank = blank_[s] != 0;
+    blank_[s] = blank;
+    if (!blank && columns_) {
+      scratch.lit.push_back(slice);
+      continue;
+    }
+    scratch.pixels.Clear(static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height));
+    if (!blank) plan_->sampler.Sample(tiles, slice, scratch.pixels);
+    for (size_t sub = 0; sub < sub_frames; ++sub) {
+      if (!blank || !was_blank) {
+        scratch.picture.assign(layout.bytes_per_slice(), 0);
+        Pack(scratch.pixels, static_cast<uint32_t>(sub), scratch.picture.data());
+        changed |= Keep(index_of(slice, sub), scratch.picture, frame);
+      } else if (uint64_t& in = changed_in_[index_of(slice, sub)]; in == 0) {
+        in = frame;
+        changed = true;
       }
     }
-    if (differs) changed_in_[index] = frame;
-    changed |= differs;
   }
-  blank_[s] = blank;
+  for (size_t sub = 0; sub < sub_frames && !scratch.lit.empty(); ++sub) {
+    columns_->Draw(scratch.lit, static_cast<uint32_t>(sub), scratch.columns);
+    for (size_t i = 0; i < scratch.lit.size(); ++i) {
+      changed |= Keep(index_of(scratch.lit[i], sub), columns_->picture(i, scratch.columns), frame);
+    }
+  }
   return changed;
 }
 
@@ -136,9 +149,14 @@ Pictures::Result Pictures::Update(const TileStore& tiles, const Volume::Changes&
     if (dirty_[s] != 0) slices.push_back(plan_->begin + static_cast<int32_t>(s));
     dirty_[s] = 0;
   }
-  std::vector<uint8_t> changed(slices.size());
-  executor_.For(slices.size(), 1, [&](size_t i, int worker) {
-    changed[i] = DrawSlice(tiles, slices[i], frame, scratch_[static_cast<size_t>(worker)]);
+  // What neighbours have in common is fetched once for all.
+  const size_t together = columns_ ? LevelColumns::kSlicesTogether : 1;
+  std::vector<uint8_t> changed((slices.size() + together - 1) / together);
+  executor_.For(changed.size(), 1, [&](size_t i, int worker) {
+    const size_t at = i * together;
+    changed[i] =
+        DrawSlices(tiles, std::span(slices).subspan(at, std::min(together, slices.size() - at)),
+                   frame, scratch_[static_cast<size_t>(worker)]);
   });
   Result result;
   result.pictures_drawn =

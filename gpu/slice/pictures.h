@@ -55,14 +55,14 @@ class Pictures {
     SlicePixels pixels;
     std::vector<uint8_t> picture;
     LevelColumns::Scratch columns;
+    std::vector<int32_t> lit;  // slices
   };
 
   uint8_t* picture(size_t index) { return bytes_.data() + index * plan_->layout.bytes_per_slice(); }
   void MarkSlices(const TileStore& tiles, const Volume::Changes& changes);
-  // Picture `sub` of a slice that has light, or had; a slice's come one after another, from 0.
-  std::span<const uint8_t> DrawPicture(const TileStore& tiles, int32_t slice, uint32_t sub,
-                                       bool blank, Scratch& scratch) const;
-  bool DrawSlice(const TileStore& tiles, int32_t slice, uint64_t frame, Scratch& scratch);
+  bool Keep(size_t index, std::span<const uint8_t> drawn, uint64_t frame);
+  bool DrawSlices(const TileStore& tiles, std::span<const int32_t> slices, uint64_t frame,
+                  Scratch& scratch);
   template <display::PixelFormat kFormat>
   void PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
   void Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
