@@ -198,19 +198,19 @@ HWY_ATTR inline void QuantizeChunk(const uint8_t* levels, uint64_t dither, uint8
     for (size_t c = 0; c < 3; ++c) {
       const auto rise = hn::BitCast(ds, hn::LoadU(d, levels + (1 + c) * kChunkRows + row));
       const auto lifted = hn::RebindMask(d, hn::Gt(rise, below));
-      pixel = hn::Add(pixel, hn::IfThenElseZero(lifted, hn::Set(d, kStep[c])));
+      pixel = hn::IfThenElse(lifted, hn::Add(pixel, hn::Set(d, kStep[c])), pixel);
     }
     hn::StoreU(pixel, d, pixels + row);
   }
 }
 
-// Sixteen columns of a chunk to its rows, `stride` apart: four rounds, in each of which the highest bit of a column's
-// number becomes the lowest of its place. A vector holds sixteen rows of a column in each block.
+// Columns of a chunk to its rows, `stride` apart. Of sixteen columns in four rounds, in each of which the highest bit
+// of a column's number becomes the lowest of its place; a vector holds sixteen rows of a column in each block. Rows of
+// two sixteens are stored together.
 HWY_ATTR inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunkRows], uint8_t* out,
                                size_t stride) {
-  static_assert(kColumnsTogether == 16, "four rounds");
+  static_assert(kColumnsTogether == 32, "two sixteens");
   const hn::CappedTag<uint8_t, 32> d;
-  const hn::FixedTag<uint8_t, 16> block;
   using V = hn::Vec<decltype(d)>;
   const auto round = [d](const V(&in)[16], V(&to)[16]) HWY_ATTR {
     for (size_t i = 0; i < 8; ++i) {
@@ -219,18 +219,22 @@ HWY_ATTR inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunk
     }
   };
   for (size_t row = 0; row < kChunkRows; row += hn::Lanes(d)) {
-    V a[16], b[16];
-    for (size_t i = 0; i < 16; ++i) a[i] = hn::LoadU(d, columns[i] + row);
-    round(a, b);
-    round(b, a);
-    round(a, b);
-    round(b, a);
+    V rows[2][16];
+    for (size_t half = 0; half < 2; ++half) {
+      V a[16], b[16];
+      for (size_t i = 0; i < 16; ++i) a[i] = hn::LoadU(d, columns[half * 16 + i] + row);
+      round(a, b);
+      round(b, a);
+      round(a, b);
+      round(b, rows[half]);
+    }
     for (size_t i = 0; i < 16; ++i) {
 #if HWY_MAX_BYTES >= 32
-      hn::StoreU(hn::LowerHalf(block, a[i]), block, out + (row + i) * stride);
-      hn::StoreU(hn::UpperHalf(block, a[i]), block, out + (row + 16 + i) * stride);
+      hn::StoreU(hn::ConcatLowerLower(d, rows[1][i], rows[0][i]), d, out + (row + i) * stride);
+      hn::StoreU(hn::ConcatUpperUpper(d, rows[1][i], rows[0][i]), d, out + (row + 16 + i) * stride);
 #else
-      hn::StoreU(a[i], block, out + (row + i) * stride);
+      hn::StoreU(rows[0][i], d, out + (row + i) * stride);
+      hn::StoreU(rows[1][i], d, out + (row + i) * stride + 16);
 #endif
     }
   }
@@ -238,7 +242,7 @@ HWY_ATTR inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunk
 
 #endif
 
-// Sixteen columns of one chunk.
+// A block of columns of one chunk.
 HWY_ATTR inline void DrawBlock(const uint8_t* const* levels, const uint64_t (&dither)[8],
                                uint8_t* out, size_t stride) {
   if (std::all_of(levels, levels + kColumnsTogether,

@@ -14,7 +14,7 @@ inline constexpr size_t kChunkRows = 64;   // of a column, worked on together
 inline constexpr size_t kBlockWords = 16;  // a chunk's voxels come in four runs
 inline constexpr size_t kChunkPlanes = 4;  // bases, rises of red, green and blue
 inline constexpr size_t kChunkBytes = kChunkPlanes * kChunkRows;
-inline constexpr size_t kColumnsTogether = 16;
+inline constexpr size_t kColumnsTogether = 32;
 
 // Colours (interleaved, gpu/word.h) of a chunk's rows → its levels, plane after plane. Where there is `also`, the greater
 // of both.

@@ -101,7 +101,7 @@ std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& 
   const size_t columns = out.voxel_begin_.size() - 1;
   out.level_bytes_ = uint64_t{columns} * out.chunks_ * kChunkBytes;
   if (out.level_bytes_ > kMostLevelBytes) return std::nullopt;
-  out.levels_ = std::make_unique_for_overwrite<uint8_t[]>(out.level_bytes_);
+  out.levels_ = std::make_unique_for_overwrite<ChunkLevels[]>(columns * out.chunks_);
   out.lit_.assign(columns, 0);
   out.SortColumns(grid);
   out.IndexPillars(grid);
@@ -251,7 +251,7 @@ void LevelColumns::LevelSingles(const TileStore& tiles, const Pillar& pillar) {
         to.words[block] = colors[block] != nullptr ? colors[block] + index : kNoLight;
         to.also[block] = nullptr;
       }
-      to.levels = levels(column) + chunk * kChunkBytes;
+      to.levels = levels(column, chunk);
       waiting.Add();
     }
   }
@@ -286,7 +286,7 @@ void LevelColumns::LevelOthers(const TileStore& tiles, std::span<const uint32_t>
       }
       if (!any) continue;
       lit |= uint64_t{1} << chunk;
-      to.levels = levels(column) + chunk * kChunkBytes;
+      to.levels = levels(column, chunk);
       waiting.Add();
     }
     lit_[column] = lit;
@@ -310,7 +310,7 @@ void LevelColumns::Draw(std::span<const int32_t> slices, uint32_t sub, Scratch& 
       const uint8_t** const to = &scratch.levels[i * places + chunk * columns_];
       for (size_t u = 0; u < width_; ++u) {
         const bool lit = (lit_[of[u]] >> chunk & 1) != 0;
-        to[u] = lit ? levels(of[u]) + chunk * kChunkBytes : nullptr;
+        to[u] = lit ? levels(of[u], chunk) : nullptr;
       }
       std::fill(to + width_, to + columns_, nullptr);
     }

@@ -81,9 +81,8 @@ class LevelColumns {
     return std::span(voxels_).subspan(voxel_begin_[column],
                                       voxel_begin_[column + 1] - voxel_begin_[column]);
   }
-  uint8_t* levels(uint32_t column) { return levels_.get() + column * chunks_ * kChunkBytes; }
-  const uint8_t* levels(uint32_t column) const {
-    return levels_.get() + column * chunks_ * kChunkBytes;
+  uint8_t* levels(uint32_t column, size_t chunk) const {
+    return levels_[column * chunks_ + chunk].bytes;
   }
 
   LevelTables tables_;
@@ -103,8 +102,11 @@ class LevelColumns {
   std::vector<Pillar> pillars_;
   std::vector<Single> singles_;
   std::vector<uint32_t> others_;
-  std::unique_ptr<uint8_t[]>
-      levels_;  // chunks_ · kChunkBytes a column; memory is had where there is light
+  // chunks_ of each column. Memory is had where there is light; aligned, so that a vector lies in one cache line.
+  struct alignas(kChunkRows) ChunkLevels {
+    uint8_t bytes[kChunkBytes];
+  };
+  std::unique_ptr<ChunkLevels[]> levels_;
   uint64_t level_bytes_ = 0;
   std::vector<uint64_t> lit_;  // of each column, bit c: its chunk c is lit
 };
