@@ -9,8 +9,12 @@
 #include <random>
 #include <string>
 
+#include "gpu/cpu/cpu_engine.h"
+#include "gpu/delta.h"
+#include "gpu/engine.h"
 #include "gpu/slice/pack.h"
 #include "gpu/slice/quantize.h"
+#include "gpu/slice/sampler.h"
 #include "gpu/word.h"
 #include "hwy/highway.h"
 
@@ -143,12 +147,14 @@ struct Scene {
   }
 };
 
-uint8_t PixelOf(const Scene& scene, const display::FootprintTable& table, const display::Tone& tone,
+// `at`: x, y, z → interleaved colour.
+template <class At>
+uint8_t PixelOf(const At& at, const display::FootprintTable& table, const display::Tone& tone,
                 int32_t slice, int32_t u, int32_t v, uint32_t sub, uint32_t sub_frames) {
   uint32_t most = 0;
   for (const auto& o : table.Outer(slice, u)) {
     for (const auto& i : table.Inner(slice, v)) {
-      most = std::max(most, scene.At(o.x + i.x, o.y + i.y, o.z + i.z));
+      most = std::max(most, at(o.x + i.x, o.y + i.y, o.z + i.z));
     }
   }
   const uint32_t rgb = Deinterleave(most);
@@ -166,6 +172,7 @@ uint8_t PixelOf(const Scene& scene, const display::FootprintTable& table, const 
 void ExpectPictures(const Case& c, const Scene& scene, const display::FootprintTable& table,
                     const display::Tone& tone, const LevelColumns& columns, int32_t begin,
                     int32_t end) {
+  const auto voxel = [&](int32_t x, int32_t y, int32_t z) { return scene.At(x, y, z); };
   LevelColumns::Scratch scratch;
   size_t lit = 0;
   std::vector<int32_t> slices;
@@ -182,7 +189,7 @@ void ExpectPictures(const Case& c, const Scene& scene, const display::FootprintT
       size_t at = 0;
       for (int32_t v = 0; v < table.height; ++v) {
         for (int32_t u = 0; u < table.width; ++u, ++at) {
-          const uint8_t want = PixelOf(scene, table, tone, slice, u, v, static_cast<uint32_t>(sub),
+          const uint8_t want = PixelOf(voxel, table, tone, slice, u, v, static_cast<uint32_t>(sub),
                                        static_cast<uint32_t>(c.sub_frames));
           lit += want != 0;
           ASSERT_EQ(picture[at], want)
@@ -255,6 +262,124 @@ TEST(LevelColumns, AreForSharedListsOfOneRowAVoxelInRgb332Alone) {
   fine.geometry.grid.nz *= 2;
   fine.geometry.grid.pitch_mm.z = 0.5;
   EXPECT_FALSE(create(fine, PixelFormat::kRgb332, Sampling::kMax)) << "two voxels a row";
+}
+
+// A whole engine whose pictures are drawn so: bytes, and the frames in which they changed.
+class RotorEngine {
+ public:
+  explicit RotorEngine(const Target& target)
+      : target_(target),
+        table_(display::BuildFootprints(target.geometry, target.tone.sampling)),
+        engine_(CreateCpuEngine({.threads = 2, .inline_execution = true}, "a test")),
+        bytes_(target.layout.bytes()),
+        changed_in_(target.layout.pictures()) {
+    engine_->SetTarget(target, [](const absl::Status& status) { ASSERT_TRUE(status.ok()); });
+    Apply([](DeltaWriter& w) { w.PutLayer({.id = 1}); });
+  }
+
+  void Apply(const std::function<void(DeltaWriter&)>& write) {
+    StagingBlock block = *engine_->AcquireStaging(1 << 16);
+    DeltaWriter writer(block.bytes());
+    write(writer);
+    ASSERT_FALSE(writer.overrun());
+    engine_->Apply(std::move(block), writer.size(),
+                   [](const absl::Status& status) { ASSERT_TRUE(status.ok()) << status; });
+  }
+
+  // Draws a frame and looks at all of it.
+  void ExpectFrame() {
+    const std::vector<std::byte> before = bytes_;
+    const std::vector<uint64_t> changed_before = changed_in_;
+    ++frame_;
+    engine_->SubmitFrame({frame_, frame_ - 1}, {bytes_, changed_in_},
+                         [](const absl::StatusOr<FrameResult>& result) {
+                           ASSERT_TRUE(result.ok()) << result.status();
+                         });
+    const display::VoxelGrid& grid = target_.geometry.grid;
+    std::vector<uint32_t> voxels(static_cast<size_t>(grid.nx * grid.ny * grid.nz));
+    engine_->ReadVoxels({0, 0, 0, grid.nx, grid.ny, grid.nz}, voxels,
+                        [](const absl::Status& status) { ASSERT_TRUE(status.ok()); });
+    const auto at = [&](int32_t x, int32_t y, int32_t z) {
+      return Interleave(voxels[static_cast<size_t>((z * grid.ny + y) * grid.nx + x)]);
+    };
+    const display::FrameLayout& layout = target_.layout;
+    const auto subs = static_cast<uint32_t>(layout.sub_frames);
+    size_t byte = 0;
+    for (size_t picture = 0; picture < layout.pictures(); ++picture) {
+      const size_t begin = byte;
+      for (int32_t v = 0; v < layout.height; ++v) {
+        for (int32_t u = 0; u < layout.width; ++u, ++byte) {
+          ASSERT_EQ(static_cast<uint8_t>(bytes_[byte]),
+                    PixelOf(at, table_, target_.tone, static_cast<int32_t>(picture / subs), u, v,
+                            static_cast<uint32_t>(picture % subs), subs))
+              << "frame " << frame_ << ", picture " << picture << ", pixel " << u << ", " << v;
+        }
+      }
+      const bool differs = !std::equal(bytes_.begin() + static_cast<ptrdiff_t>(begin),
+                                       bytes_.begin() + static_cast<ptrdiff_t>(byte),
+                                       before.begin() + static_cast<ptrdiff_t>(begin));
+      ASSERT_EQ(changed_in_[picture], frame_ == 1 || differs ? frame_ : changed_before[picture])
+          << "frame " << frame_ << ", picture " << picture;
+    }
+  }
+
+ private:
+  const Target target_;
+  const display::FootprintTable table_;
+  const std::unique_ptr<Engine> engine_;
+  std::vector<std::byte> bytes_;
+  std::vector<uint64_t> changed_in_;
+  uint64_t frame_ = 0;
+};
+
+TEST(LevelColumns, AWholeEngineShowsThemAndTellsWhatChanged) {
+  std::mt19937 random(11);
+  Case rotor = RotorCase("", 20, 24, 130, 22, 2);
+  Target target;
+  target.geometry = rotor.geometry;
+  target.layout = {.slices = display::SliceCount(rotor.geometry),
+                   .width = 20,
+                   .height = 24,
+                   .sub_frames = 2,
+                   .format = display::PixelFormat::kRgb332};
+  target.tone = RandomTone(random, display::Dither::kOrdered);
+  const display::FootprintTable table =
+      display::BuildFootprints(target.geometry, display::Sampling::kMax);
+  ASSERT_TRUE(LevelColumns::Create(table, TileGrid::Of(22, 22, 24, Sampler::FastestAxis(table)),
+                                   target.layout, target.tone, 0, target.layout.slices))
+      << "else it is not these that are looked at";
+  RotorEngine engine(target);
+  engine.ExpectFrame();  // nothing there
+  const auto put = [&](uint64_t geometry, uint64_t drawable, int lines) {
+    std::vector<float> positions;
+    for (int i = 0; i < lines * 2; ++i) {
+      for (const uint32_t size : {22u, 22u, 24u}) {
+        positions.push_back(static_cast<float>(random() % (size * 16)) / 16);
+      }
+    }
+    engine.Apply([&](DeltaWriter& w) {
+      GeometryRecord g;
+      g.id = geometry;
+      g.kind = PrimitiveKind::kSegments;
+      g.color = static_cast<uint32_t>(random()) & 0xFFFFFF;
+      g.vertex_count = static_cast<uint32_t>(lines) * 2;
+      w.PutGeometry(g, positions, {}, {});
+      w.PutDrawable({.id = drawable, .geometry = geometry, .layer = 1});
+    });
+  };
+  put(1, 1, 1);
+  engine.ExpectFrame();  // few slices have light
+  put(2, 2, 60);
+  engine.ExpectFrame();
+  engine.ExpectFrame();  // as before
+  put(3, 1, 2);          // in place of the first
+  engine.ExpectFrame();
+  engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 2); });
+  engine.ExpectFrame();
+  engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 1); });
+  engine.ExpectFrame();  // dark again
+  put(4, 4, 5);
+  engine.ExpectFrame();
 }
 
 }  // namespace
