@@ -13,8 +13,8 @@ namespace voxeld::gpu {
 namespace {
 
 constexpr size_t kMostChunks = 64;  // bits of lit_
-constexpr uint64_t kMostLevelBytes = uint64_t{1}
-                                     << 30;  // beyond, sampling pixel by pixel is no worse
+// Beyond it, sampling pixel by pixel is no worse.
+constexpr uint64_t kMostLevelBytes = uint64_t{1} << 30;
 constexpr size_t kColumnsATask = 64;
 constexpr size_t kBlocks = kChunkRows / kBlockWords;  // of a chunk
 static_assert(kBlockWords == kTileSize, "a run of a chunk's rows lies in one tile");
@@ -37,6 +37,14 @@ std::optional<int32_t> FirstOfStraightRows(const display::FootprintTable& table,
     }
   }
   return first;
+}
+
+// Outer entries say nothing of the inner axis; those of lattices may.
+bool AreFlat(const display::FootprintLists& outer, int axis) {
+  return std::all_of(outer.entries.begin(), outer.entries.end(), [axis](const auto& e) {
+    const int32_t at[3] = {e.x, e.y, e.z};
+    return at[axis] == 0;
+  });
 }
 
 using List = std::span<const display::FootprintEntry>;
@@ -65,6 +73,7 @@ std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& 
   const int axis = static_cast<int>(table.inner_axis);
   const std::optional<int32_t> first = FirstOfStraightRows(table, axis);
   if (!first || *first % kTileSize != 0 || grid.shift[axis] != 0) return std::nullopt;
+  if (!AreFlat(table.outer, axis)) return std::nullopt;
 
   LevelColumns out;
   out.width_ = static_cast<size_t>(layout.width);

@@ -25,7 +25,7 @@ namespace voxeld::gpu {
 class LevelColumns {
  public:
   // Nothing where it does not apply: RGB332, sampled by the greatest, a row a voxel along the axis that comes first in
-  // a tile's memory, and lists that serve two slices or more on average. [begin, end): the slices owned.
+  // a tile's memory, the first at a tile's beginning, and lists that serve two slices or more on average. [begin, end): the slices owned.
   static std::optional<LevelColumns> Create(const display::FootprintTable& table,
                                             const TileGrid& grid,
                                             const display::FrameLayout& layout,

@@ -258,6 +258,15 @@ TEST(LevelColumns, AreForSharedListsOfOneRowAVoxelInRgb332Alone) {
   EXPECT_FALSE(create(rotor, PixelFormat::kRgb332, Sampling::kWeighted));
   Case few = RotorCase("", 16, 20, 5, 18, 1);
   EXPECT_FALSE(create(few, PixelFormat::kRgb332, Sampling::kMax)) << "every list used about once";
+  display::Lattice lights;  // eight in each voxel
+  lights.width_px = 512;
+  for (int i = 0; i < 512; ++i) {
+    lights.points_mm.push_back(
+        display::Vec3{i % 8 * 0.5 + 0.1, i / 8 % 8 * 0.5 + 0.1, i / 64 * 0.5 + 0.1});
+  }
+  lights.cell_mm = {0.1, 0.1, 0.1};
+  const Case lattice = {"", {lights, {4, 4, 4, {1, 1, 1}, {0, 0, 0}}}};
+  EXPECT_FALSE(create(lattice, PixelFormat::kRgb332, Sampling::kMax)) << "no rows to go along";
   Case fine = rotor;
   fine.geometry.grid.nz *= 2;
   fine.geometry.grid.pitch_mm.z = 0.5;
