@@ -37,6 +37,7 @@ ALLOWED = {
     "tools/emulator": ["display", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
     "tools/bench/voxel_bench": ["display/sync", "voxeld/v1", "tools/child", "daemon/process",
+                                "tools/bench/frame",
                                 "tools/bench/paper"],
     # The one command that opens displays itself; it reads them as the daemon does.
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",

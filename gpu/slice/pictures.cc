@@ -20,6 +20,8 @@ void Pictures::SetPlan(SlicePlan plan) {
     changed_in_.assign(count, 0);
     blank_.assign(slices, 1);
   }
+  columns_ = LevelColumns::Create(plan_->sampler.table(), plan_->sampler.grid(), plan_->layout,
+                                  plan_->tone, plan_->begin, plan_->end);
   lit_tiles_.assign(slices, 0);
   dirty_.assign(slices, 1);
   scratch_.clear();
@@ -27,14 +29,25 @@ void Pictures::SetPlan(SlicePlan plan) {
 }
 
 void Pictures::MarkSlices(const TileStore& tiles, const Volume::Changes& changes) {
+  const display::TileToSlices::Tables look = plan_->tile_to_slices.tables();
+  size_t left = dirty_.size() - static_cast<size_t>(std::count(dirty_.begin(), dirty_.end(), 1));
   for (size_t i = 0; i < changes.tiles.size(); ++i) {
     const uint32_t tile = changes.tiles[i];
     const uint32_t before = changes.was_lit[i], now = tiles.colors(tile) != nullptr;
+    if (left == 0 && before == now) continue;
     int32_t ijk[3];
     tiles.grid().Coordinates(tile, ijk);
-    for (int32_t slice : plan_->tile_to_slices.Slices(ijk[0], ijk[1], ijk[2])) {
+    const auto place = static_cast<size_t>(look.stride[0] * ijk[0] + look.stride[1] * ijk[1] +
+                                           look.stride[2] * ijk[2]);
+    const int32_t inner = ijk[static_cast<int>(look.inner_axis)];
+    for (uint32_t n = look.begin[place]; n < look.begin[place + 1]; ++n) {
+      const int32_t slice = look.slices[n];
       if (slice < plan_->begin || slice >= plan_->end) continue;
+      if (look.seen[static_cast<size_t>(slice % look.inner_sets * look.inner_tiles + inner)] == 0) {
+        continue;
+      }
       const size_t s = static_cast<size_t>(slice - plan_->begin);
+      left -= dirty_[s] == 0;
       dirty_[s] = 1;
       lit_tiles_[s] = lit_tiles_[s] - before + now;
     }
@@ -76,44 +89,74 @@ void Pictures::Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) c
   }
 }
 
-// True if some picture of the slice is not what it was.
-bool Pictures::DrawSlice(const TileStore& tiles, int32_t slice, uint64_t frame, Scratch& scratch) {
+// A picture's bytes as they are now; true if they are not what they were.
+bool Pictures::Keep(size_t index, std::span<const uint8_t> drawn, uint64_t frame) {
+  const bool differs = std::memcmp(picture(index), drawn.data(), drawn.size()) != 0;
+  if (differs) std::memcpy(picture(index), drawn.data(), drawn.size());
+  if (differs || changed_in_[index] == 0) {
+    changed_in_[index] = frame;
+    return true;
+  }
+  return false;
+}
+
+// True if some picture of the slices is not what it was.
+bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slices, uint64_t frame,
+                          Scratch& scratch) {
   const display::FrameLayout& layout = plan_->layout;
-  const size_t s = static_cast<size_t>(slice - plan_->begin);
   const size_t sub_frames = static_cast<size_t>(layout.sub_frames);
-  const bool blank = lit_tiles_[s] == 0;
-  scratch.pixels.Clear(static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height));
-  if (!blank) plan_->sampler.Sample(tiles, slice, scratch.pixels);
+  const auto index_of = [&](int32_t slice, size_t sub) {
+    return static_cast<size_t>(slice - plan_->begin) * sub_frames + sub;
+  };
   bool changed = false;
-  for (size_t sub = 0; sub < sub_frames; ++sub) {
-    const size_t index = s * sub_frames + sub;
-    bool differs = changed_in_[index] == 0;
-    if (!blank || blank_[s] == 0) {
-      scratch.picture.assign(layout.bytes_per_slice(), 0);
-      Pack(scratch.pixels, static_cast<uint32_t>(sub), scratch.picture.data());
-      if (std::memcmp(picture(index), scratch.picture.data(), scratch.picture.size()) != 0) {
-        std::memcpy(picture(index), scratch.picture.data(), scratch.picture.size());
-        differs = true;
+  scratch.lit.clear();
+  for (const int32_t slice : slices) {
+    const size_t s = static_cast<size_t>(slice - plan_->begin);
+    const bool blank = lit_tiles_[s] == 0, was_blank = blank_[s] != 0;
+    blank_[s] = blank;
+    if (!blank && columns_) {
+      scratch.lit.push_back(slice);
+      continue;
+    }
+    scratch.pixels.Clear(static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height));
+    if (!blank) plan_->sampler.Sample(tiles, slice, scratch.pixels);
+    for (size_t sub = 0; sub < sub_frames; ++sub) {
+      if (!blank || !was_blank) {
+        scratch.picture.assign(layout.bytes_per_slice(), 0);
+        Pack(scratch.pixels, static_cast<uint32_t>(sub), scratch.picture.data());
+        changed |= Keep(index_of(slice, sub), scratch.picture, frame);
+      } else if (uint64_t& in = changed_in_[index_of(slice, sub)]; in == 0) {
+        in = frame;
+        changed = true;
       }
     }
-    if (differs) changed_in_[index] = frame;
-    changed |= differs;
   }
-  blank_[s] = blank;
+  for (size_t sub = 0; sub < sub_frames && !scratch.lit.empty(); ++sub) {
+    columns_->Draw(scratch.lit, static_cast<uint32_t>(sub), scratch.columns);
+    for (size_t i = 0; i < scratch.lit.size(); ++i) {
+      changed |= Keep(index_of(scratch.lit[i], sub), columns_->picture(i, scratch.columns), frame);
+    }
+  }
   return changed;
 }
 
 Pictures::Result Pictures::Update(const TileStore& tiles, const Volume::Changes& changes,
                                   uint64_t frame) {
   MarkSlices(tiles, changes);
+  if (columns_) columns_->Update(tiles, changes.tiles, executor_);
   std::vector<int32_t> slices;
   for (size_t s = 0; s < dirty_.size(); ++s) {
     if (dirty_[s] != 0) slices.push_back(plan_->begin + static_cast<int32_t>(s));
     dirty_[s] = 0;
   }
-  std::vector<uint8_t> changed(slices.size());
-  executor_.For(slices.size(), 1, [&](size_t i, int worker) {
-    changed[i] = DrawSlice(tiles, slices[i], frame, scratch_[static_cast<size_t>(worker)]);
+  // What neighbours have in common is fetched once for all.
+  const size_t together = columns_ ? LevelColumns::kSlicesTogether : 1;
+  std::vector<uint8_t> changed((slices.size() + together - 1) / together);
+  executor_.For(changed.size(), 1, [&](size_t i, int worker) {
+    const size_t at = i * together;
+    changed[i] =
+        DrawSlices(tiles, std::span(slices).subspan(at, std::min(together, slices.size() - at)),
+                   frame, scratch_[static_cast<size_t>(worker)]);
   });
   Result result;
   result.pictures_drawn =

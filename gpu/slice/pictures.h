@@ -13,6 +13,7 @@
 #include "gpu/assemble/volume.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/engine.h"
+#include "gpu/slice/level_columns.h"
 #include "gpu/slice/sampler.h"
 
 namespace voxeld::gpu {
@@ -42,7 +43,9 @@ class Pictures {
   // Slices again what looks at `changes`, as pictures of `frame`.
   Result Update(const TileStore& tiles, const Volume::Changes& changes, uint64_t frame);
 
-  uint64_t memory_bytes() const { return bytes_.size(); }
+  uint64_t memory_bytes() const {
+    return bytes_.size() + (columns_ ? columns_->memory_bytes() : 0);
+  }
 
   // Writes the pictures that changed after frame `buffer_holds`, and when each did.
   void CopyTo(FrameBuffer buffer, uint64_t buffer_holds) const;
@@ -51,22 +54,27 @@ class Pictures {
   struct Scratch {
     SlicePixels pixels;
     std::vector<uint8_t> picture;
+    LevelColumns::Scratch columns;
+    std::vector<int32_t> lit;  // slices
   };
 
   uint8_t* picture(size_t index) { return bytes_.data() + index * plan_->layout.bytes_per_slice(); }
   void MarkSlices(const TileStore& tiles, const Volume::Changes& changes);
-  bool DrawSlice(const TileStore& tiles, int32_t slice, uint64_t frame, Scratch& scratch);
+  bool Keep(size_t index, std::span<const uint8_t> drawn, uint64_t frame);
+  bool DrawSlices(const TileStore& tiles, std::span<const int32_t> slices, uint64_t frame,
+                  Scratch& scratch);
   template <display::PixelFormat kFormat>
   void PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
   void Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
 
   Executor& executor_;
   std::optional<SlicePlan> plan_;
-  std::vector<uint8_t> bytes_;        // the owned slices' pictures, from the first on
-  std::vector<uint64_t> changed_in_;  // 0: not drawn yet
-  std::vector<uint32_t> lit_tiles_;   // of each owned slice
-  std::vector<uint8_t> dirty_;        // of each owned slice
-  std::vector<uint8_t> blank_;        // all its pictures are zeros
+  std::optional<LevelColumns> columns_;  // where it applies
+  std::vector<uint8_t> bytes_;           // the owned slices' pictures, from the first on
+  std::vector<uint64_t> changed_in_;     // 0: not drawn yet
+  std::vector<uint32_t> lit_tiles_;      // of each owned slice
+  std::vector<uint8_t> dirty_;           // of each owned slice
+  std::vector<uint8_t> blank_;           // all its pictures are zeros
   std::vector<Scratch> scratch_;
 };
 

@@ -76,6 +76,7 @@ absl::StatusOr<Sampler> Sampler::Create(display::FootprintTable table, const Til
   }
   Sampler sampler;
   sampler.table_ = std::move(table);
+  sampler.grid_ = grid;
   sampler.sampling_ = sampling;
   sampler.BuildInner();
   return sampler;

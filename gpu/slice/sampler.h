@@ -36,6 +36,9 @@ class Sampler {
   static absl::StatusOr<Sampler> Create(display::FootprintTable table, const TileGrid& grid,
                                         display::Sampling sampling);
 
+  const display::FootprintTable& table() const { return table_; }
+  const TileGrid& grid() const { return grid_; }
+
   // `out` is cleared already.
   void Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
 
@@ -62,6 +65,7 @@ class Sampler {
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 
   display::FootprintTable table_;
+  TileGrid grid_;
   display::Sampling sampling_ = display::Sampling::kMax;
   std::vector<Run> runs_;
   std::vector<InnerEntry> inner_;  // rows as table_.inner.begin has them

@@ -37,6 +37,13 @@ TEST(CommandLine, EachSubcommandHasItsOptions) {
   EXPECT_THAT(paper.engines, ElementsAre("cpu"));
   EXPECT_THAT(paper.tables, ElementsAre("2", "4"));
   EXPECT_EQ(paper.seed, 9u);
+  const auto frame = Parsed<FrameOptions>(
+      {"frame", "--scene", "short", "--engine", "cuda", "--rounds", "3", "--seed", "8"});
+  EXPECT_EQ(frame.scene, "short");
+  EXPECT_EQ(frame.engine, "cuda");
+  EXPECT_EQ(frame.threads, 0);
+  EXPECT_EQ(frame.rounds, 3);
+  EXPECT_EQ(frame.seed, 8u);
   EXPECT_THAT(Parsed<SinkOptions>({"sink", "--listen", "unix:/x"}).listen, ElementsAre("unix:/x"));
 }
 
@@ -54,12 +61,16 @@ TEST(CommandLine, WhatIsWrongIsSaid) {
   EXPECT_THAT(Refusal({"latency", "--rate", "nan"}), HasSubstr("--rate"));
   EXPECT_THAT(Refusal({"paper", "--engine", "gpu"}), HasSubstr("gpu"));
   EXPECT_THAT(Refusal({"paper", "--from", "/nowhere.json"}), HasSubstr("/nowhere.json"));
+  EXPECT_THAT(Refusal({"frame"}), HasSubstr("--scene"));
+  EXPECT_THAT(Refusal({"frame", "--scene", "none"}), HasSubstr("none"));
+  EXPECT_THAT(Refusal({"frame", "--scene", "short", "--threads", "0"}), HasSubstr("--threads"));
+  EXPECT_THAT(Refusal({"frame", "--scene", "short", "--gpus", "2"}), HasSubstr("--gpus"));
   EXPECT_THAT(Refusal({"overload", "--rounds", "3"}), HasSubstr("--rounds"));
 }
 
 TEST(CommandLine, HelpNamesThemAll) {
   const std::string help = ParseCommandLine({"--help"})->print_and_exit;
-  for (const char* name : {"ingest", "latency", "fairness", "overload", "idle", "paper"}) {
+  for (const char* name : {"ingest", "latency", "fairness", "overload", "idle", "paper", "frame"}) {
     EXPECT_THAT(help, HasSubstr(name));
   }
 }

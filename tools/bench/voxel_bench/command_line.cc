@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "tools/bench/frame/scene.h"
 
 namespace voxeld::bench {
 namespace {
@@ -146,13 +147,33 @@ CLI::App* AddPaper(CLI::App& app, PaperOptions& options) {
   return command;
 }
 
+CLI::App* AddFrame(CLI::App& app, FrameOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "frame",
+      "Whole frames through the engine's door: a draw list to packed slices, beside ceilings");
+  command->add_option("--scene", options.scene, "Which")
+      ->required()
+      ->check(CLI::IsMember(frame::SceneNames()));
+  command->add_option("--engine", options.engine, "In this process")
+      ->check(CLI::IsMember({"cpu", "cuda"}))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Of the CPU engine; default: one a core")
+      ->check(CLI::Range(1, 1024));
+  AddRounds(*command, options.rounds);
+  command->add_option("--seed", options.seed, "Of the scene")->capture_default_str();
+  command->add_option("--share", options.share, "Of the scene's primitives")
+      ->check(Between(1e-6, 1))
+      ->capture_default_str();
+  return command;
+}
+
 }  // namespace
 
 absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments) {
   CommandLine out;
   CLI::App app("What the daemon reaches, measured from its clients' side.", "voxel-bench");
   app.footer(
-      "All but paper start a daemon of their own. A figure is the median, with least and "
+      "All but paper and frame start a daemon of their own. A figure is the median, with least and "
       "greatest.");
   app.require_subcommand(1);
   app.fallthrough();
@@ -165,6 +186,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   OverloadOptions overload;
   IdleOptions idle;
   PaperOptions paper;
+  FrameOptions frame;
   SinkOptions sink;
   CLI::App* const ingest_command = AddIngest(app, ingest);
   CLI::App* const latency_command = AddLatency(app, latency);
@@ -172,6 +194,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   CLI::App* const overload_command = AddOverload(app, overload);
   CLI::App* const idle_command = AddIdle(app, idle);
   CLI::App* const paper_command = AddPaper(app, paper);
+  CLI::App* const frame_command = AddFrame(app, frame);
   CLI::App* const sink_command = app.add_subcommand("sink", "The bare gRPC server by itself");
   sink_command->add_option("--listen", sink.listen, "Where; may be repeated")
       ->required()
@@ -193,6 +216,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   if (overload_command->parsed()) out.command = overload;
   if (idle_command->parsed()) out.command = idle;
   if (paper_command->parsed()) out.command = paper;
+  if (frame_command->parsed()) out.command = frame;
   if (sink_command->parsed()) out.command = sink;
   return out;
 }

@@ -18,7 +18,7 @@ struct CommandLine {
   bool json = false;
   std::string daemon;
   std::variant<IngestOptions, LatencyOptions, FairnessOptions, OverloadOptions, IdleOptions,
-               PaperOptions, SinkOptions>
+               PaperOptions, FrameOptions, SinkOptions>
       command;
   // Not empty: to be printed, and that is all.
   std::string print_and_exit;

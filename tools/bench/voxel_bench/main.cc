@@ -41,6 +41,7 @@ absl::StatusOr<nlohmann::json> Run(const CommandLine& line) {
         if constexpr (std::is_same_v<Options, OverloadOptions>) return RunOverload(options, with);
         if constexpr (std::is_same_v<Options, IdleOptions>) return RunIdle(options, with);
         if constexpr (std::is_same_v<Options, PaperOptions>) return RunPaper(options, with);
+        if constexpr (std::is_same_v<Options, FrameOptions>) return RunFrame(options, with);
         return absl::UnimplementedError("the sink measures nothing");
       },
       line.command);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "tools/bench/frame/frame_bench.h"
 #include "tools/bench/paper/paper_bench.h"
 
 namespace voxeld::bench {
@@ -74,5 +75,8 @@ absl::StatusOr<nlohmann::json> RunIdle(const IdleOptions& options, const Surroun
 
 using PaperOptions = paper::PaperOptions;
 absl::StatusOr<nlohmann::json> RunPaper(const PaperOptions& options, const Surroundings& with);
+
+using FrameOptions = frame::FrameOptions;
+absl::StatusOr<nlohmann::json> RunFrame(const FrameOptions& options, const Surroundings& with);
 
 }  // namespace voxeld::bench

@@ -1,0 +1,55 @@
+// An engine at its work on one scene.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/sync/clock.h"
+#include "gpu/engine.h"
+#include "tools/bench/frame/scene.h"
+
+namespace voxeld::bench::frame {
+
+// One frame: the change written and taken in, and the frame itself, each waited for.
+struct FrameTimes {
+  int64_t apply_ns = 0;  // Apply, until it is done; the change lay in staging already
+  int64_t host_ns = 0;   // SubmitFrame, until the bytes are in the caller's buffer
+  gpu::FrameResult result;
+
+  int64_t device_ns() const { return result.assemble_ns + result.slice_ns; }
+};
+
+class Subject {
+ public:
+  // `engine`: "cpu" or "cuda", in this process. The scene must outlive the subject.
+  static absl::StatusOr<std::unique_ptr<Subject>> Create(const std::string& engine, int threads,
+                                                         const Scene& scene);
+  ~Subject();
+  Subject(const Subject&) = delete;
+  Subject& operator=(const Subject&) = delete;
+
+  const gpu::EngineInfo& info() const { return engine_->info(); }
+  const std::vector<std::byte>& pictures() const { return bytes_; }
+
+  // Changes the scene as it says, and draws. The first also puts up what stays.
+  absl::StatusOr<FrameTimes> Draw();
+
+ private:
+  Subject(bool pinned, std::unique_ptr<gpu::Engine> engine, const Scene& scene);
+  absl::Status SetTarget();
+  absl::StatusOr<gpu::StagingBlock> Change(size_t* size);
+
+  const bool pinned_;
+  const std::unique_ptr<gpu::Engine> engine_;
+  const Scene& scene_;
+  std::vector<std::byte> bytes_;
+  std::vector<uint64_t> changed_in_;
+  uint64_t drawn_ = 0;
+  const sync::SystemClock clock_;
+};
+
+}  // namespace voxeld::bench::frame
