@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -43,6 +44,12 @@ struct DeviceTiles {
 // Of a geometry's positions, closed.
 struct GeometryBounds {
   double lo[3], hi[3];
+};
+
+// What a geometry's arrays lie in; and its bounds, if its items may be thin lines.
+struct DeviceArrays {
+  std::shared_ptr<Block> block;
+  std::optional<GeometryBounds> bounds;
 };
 
 // Thread-bound. Its calls queue work in the device's stream. An error leaves the scene as it was,
@@ -87,6 +94,7 @@ class CudaVolume final : private SceneObserver {
   absl::Status FindGeometryBounds(const DeltaPlan& plan);
   template <typename T>
   std::span<const T> OnDevice(const GeometryView& view, std::span<const T> array) const;
+  static bool CanBeThin(const GeometryRecord& record);
   bool IsThin(const Drawable& drawable, const TableEntry& entry) const;
   absl::Status MarkLeft();
   absl::Status MarkPairs(std::span<const uint32_t> slots);

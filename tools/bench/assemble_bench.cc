@@ -15,7 +15,7 @@
 #include "gpu/cpu/executor.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
-#include "tools/bench/plain_lines.h"
+#include "tools/bench/frame/plain_lines.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -124,15 +124,31 @@ const Draft& LineScene(uint64_t seed) {
   return scenes[seed];
 }
 
-uint64_t PlainFrame(std::vector<uint32_t>& dense, const Draft& scene) {
-  std::vector<uint32_t> colors;
-  for (size_t i = 0; i < scene.colors.size(); i += 2) colors.push_back(scene.colors[i]);
-  return bench::DrawPlainLines(scene.positions, colors, kLineVolume, dense.data());
-}
-
 size_t DenseVoxels() {
   return static_cast<size_t>(kLineVolume[0]) * static_cast<size_t>(kLineVolume[1]) *
          static_cast<size_t>(kLineVolume[2]);
+}
+
+// N + 1 a line.
+uint64_t VoxelsOf(const Draft& scene) {
+  uint64_t voxels = 0;
+  for (size_t i = 0; i < scene.positions.size(); i += 6) {
+    const float* const p = &scene.positions[i];
+    float n = 0;
+    for (int a = 0; a < 3; ++a) n = std::max(n, std::abs(std::floor(p[3 + a]) - std::floor(p[a])));
+    voxels += static_cast<uint64_t>(n) + 1;
+  }
+  return voxels;
+}
+
+uint64_t PlainFrame(std::vector<uint32_t>& dense, const Draft& scene) {
+  const size_t room = bench::frame::PlainLinesRoom(static_cast<size_t>(kLineVolume[0]),
+                                                   static_cast<size_t>(kLineVolume[1]));
+  dense.resize(room + DenseVoxels());
+  bench::frame::DrawPlainLines(scene.positions.data(), scene.colors.data(), 0,
+                               scene.colors.size() / 2, kLineVolume[0], kLineVolume[1],
+                               dense.data() + room);
+  return VoxelsOf(scene);
 }
 
 void PlainLines(benchmark::State& state) {
@@ -145,8 +161,7 @@ void PlainLines(benchmark::State& state) {
 
 void RandomLines(benchmark::State& state) {
   std::vector<uint32_t> dense(DenseVoxels());
-  const uint64_t voxels =
-      PlainFrame(dense, LineScene(0));  // both count the same, within a part in a thousand
+  const uint64_t voxels = PlainFrame(dense, LineScene(0));
   dense = {};
   Assemble(state, {LineScene(0), LineScene(1)}, kLineVolume, voxels);
 }

@@ -1,0 +1,176 @@
+// What deltas bring, and where it lies on the device.
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "gpu/assemble/delta_plan.h"
+#include "gpu/cuda/cuda_volume.h"
+#include "gpu/cuda/line_kernels.h"
+#include "gpu/cuda/upload_plan.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+// Up to so many vertices the host looks through itself.
+constexpr size_t kFewVertices = 1024;
+
+// The same array, at its place in device memory. Never looked at by the host.
+template <typename T>
+std::span<const T> Moved(std::span<const T> array, const std::byte* host, std::byte* device) {
+  if (array.empty()) return array;
+  const auto offset = reinterpret_cast<const std::byte*>(array.data()) - host;
+  return {reinterpret_cast<const T*>(device + offset), array.size()};
+}
+
+}  // namespace
+
+absl::Status CudaVolume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
+  std::vector<std::unique_ptr<Drawable>> gone;
+  const absl::Status status = scene_.Apply(delta, bulk, *this, gone);
+  arrays_ = nullptr;
+  scene_.MapClips(view_, false);
+  bulk_.clear();
+  bounds_.clear();
+  return status;
+}
+
+// The arrays of all geometries go over into one piece of memory.
+absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
+  UploadPlan uploads;
+  for (const DeltaStep& step : plan.steps) {
+    const auto* geometry = std::get_if<GeometryView>(&step);
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
+        geometry->positions.empty() || geometry->bulk != nullptr) {
+      continue;
+    }
+    uploads.AddInline(*geometry);
+  }
+  arrays_begin_ = uploads.inline_begin();
+  for (const DeltaStep& step : plan.steps) {
+    const auto* geometry = std::get_if<GeometryView>(&step);
+    if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
+        geometry->positions.empty() || geometry->bulk == nullptr) {
+      continue;
+    }
+    const float* const positions = geometry->positions.data();
+    if (!bulk_.contains(positions)) bulk_[positions] = uploads.AddBulk(*geometry);
+  }
+  if (uploads.size() == 0) return FindGeometryBounds(plan);
+  absl::StatusOr<Block> block = device_.pool().Acquire(uploads.size());
+  if (!block.ok()) return block.status();
+  for (const UploadPlan::Copy& copy : uploads.copies()) {
+    absl::Status status = device_.ToDevice(block->as<std::byte>() + copy.to, copy.from, copy.size);
+    if (!status.ok()) return status;
+  }
+  arrays_ = std::make_shared<Block>(*std::move(block));
+  if (absl::Status status = FindGeometryBounds(plan); !status.ok()) return status;
+  // The delta's memory is given back when Apply returns, and so may bulk memory be.
+  return device_.Wait();
+}
+
+bool CudaVolume::CanBeThin(const GeometryRecord& record) {
+  if (record.drawn_by == DrawnBy::kCpu || record.thickness != 0) return false;
+  return record.kind == PrimitiveKind::kPoints ||
+         (record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover);
+}
+
+// Where all geometries lie whose items may be thin lines: large ones are looked through on the
+// device.
+absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
+  std::vector<const GeometryView*> large;
+  for (const DeltaStep& step : plan.steps) {
+    const auto* geometry = std::get_if<GeometryView>(&step);
+    if (geometry == nullptr || geometry->positions.empty() || !CanBeThin(geometry->record))
+      continue;
+    const std::span<const float> p = geometry->positions;
+    if (p.size() > 3 * kFewVertices) {
+      large.push_back(geometry);
+      continue;
+    }
+    GeometryBounds bounds;
+    for (size_t a = 0; a < 3; ++a) {
+      bounds.lo[a] = bounds.hi[a] = static_cast<double>(p[a]);
+      for (size_t i = a; i < p.size(); i += 3) {
+        bounds.lo[a] = std::min(bounds.lo[a], static_cast<double>(p[i]));
+        bounds.hi[a] = std::max(bounds.hi[a], static_cast<double>(p[i]));
+      }
+    }
+    bounds_[p.data()] = bounds;
+  }
+  if (large.empty()) return absl::OkStatus();
+  std::vector<uint32_t> bits;
+  for (size_t i = 0; i < large.size(); ++i) bits.insert(bits.end(), {~0u, ~0u, ~0u, 0u, 0u, 0u});
+  const absl::StatusOr<Block> found = device_.Upload(bits.data(), bits.size());
+  if (!found.ok()) return found.status();
+  for (size_t i = 0; i < large.size(); ++i) {
+    const std::span<const float> p = large[i]->positions;
+    absl::Status status = device_.Run("FindBounds", [&] {
+      return FindBounds(OnDevice(*large[i], p).data(), static_cast<uint32_t>(p.size() / 3),
+                        found->as<uint32_t>() + i * 6, device_.stream());
+    });
+    if (!status.ok()) return status;
+  }
+  absl::Status status =
+      device_.ToHost(bits.data(), found->as<uint32_t>(), bits.size() * sizeof(uint32_t));
+  if (status.ok()) status = device_.Wait();
+  if (!status.ok()) return status;
+  for (size_t i = 0; i < large.size(); ++i) {
+    GeometryBounds bounds;
+    for (size_t a = 0; a < 3; ++a) {
+      bounds.lo[a] = static_cast<double>(FromOrderedBits(bits[i * 6 + a]));
+      bounds.hi[a] = static_cast<double>(FromOrderedBits(bits[i * 6 + 3 + a]));
+    }
+    bounds_[large[i]->positions.data()] = bounds;
+  }
+  return absl::OkStatus();
+}
+
+// An array of a geometry of the delta under way, where it lies on the device.
+template <typename T>
+std::span<const T> CudaVolume::OnDevice(const GeometryView& view, std::span<const T> array) const {
+  if (view.bulk == nullptr) return Moved(array, arrays_begin_, arrays_->as<std::byte>());
+  return Moved(array, reinterpret_cast<const std::byte*>(view.positions.data()),
+               arrays_->as<std::byte>() + bulk_.at(view.positions.data()));
+}
+
+RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
+  if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
+  RetainedGeometry kept{view, nullptr};
+  kept.view.bulk = nullptr;
+  if (view.positions.empty()) return kept;
+  kept.view.positions = OnDevice(view, view.positions);
+  kept.view.indices = OnDevice(view, view.indices);
+  kept.view.colors = OnDevice(view, view.colors);
+  const auto bounds = bounds_.find(view.positions.data());
+  kept.memory = std::make_shared<DeviceArrays>(
+      arrays_, bounds == bounds_.end() ? std::nullopt : std::optional(bounds->second));
+  return kept;
+}
+
+void CudaVolume::OnLeave(Drawable& drawable) {
+  if (pending_.erase(&drawable) > 0) return;
+  const auto it = slot_of_.find(&drawable);
+  if (it == slot_of_.end()) return;
+  const uint32_t slot = it->second;
+  slot_of_.erase(it);
+  if (drawable.layer->record.visible != 0) marks_.push_back(slot);
+  left_.push_back(slot);
+  kept_.push_back(drawable.geometry);
+  singular_ -= slots_[slot].singular ? 1 : 0;
+}
+
+void CudaVolume::OnEnter(Drawable& drawable) { pending_.insert(&drawable); }
+
+void CudaVolume::OnLayerLook(Layer& layer, const LayerRecord& next) {
+  const LayerRecord& now = layer.record;
+  if (LooksSame(now, next) || (now.visible == 0 && next.visible == 0)) return;
+  // Nothing of it was to be seen, and it enters anew.
+  if (now.visible == 0 && !(now.transform == next.transform)) return;
+  for (const Drawable* drawable : layer.drawables) {
+    const auto it = slot_of_.find(drawable);
+    if (it != slot_of_.end()) marks_.push_back(it->second);
+  }
+}
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,227 @@
+// Drawables that come: into the table, and into the index of pairs or that of lines.
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "gpu/cuda/cpu_voxels.h"
+#include "gpu/cuda/cuda_volume.h"
+#include "gpu/cuda/item_lists.h"
+#include "gpu/cuda/kernels.h"
+#include "gpu/primitives/list.h"
+
+namespace voxeld::gpu::cuda {
+bool CudaVolume::IsThin(const Drawable& drawable, const TableEntry& entry) const {
+  if (!lines_suit_ || !CanBeThin(entry.record) || entry.source.radius > 0) return false;
+  const auto* const arrays = static_cast<const DeviceArrays*>(drawable.geometry->memory.get());
+  if (arrays == nullptr || !arrays->bounds) return false;
+  const GeometryBounds& bounds = *arrays->bounds;
+  double lo[3] = {}, hi[3] = {};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Point3d p =
+        Map(entry.source.map, corner & 1 ? bounds.hi[0] : bounds.lo[0],
+            corner & 2 ? bounds.hi[1] : bounds.lo[1], corner & 4 ? bounds.hi[2] : bounds.lo[2]);
+    const double at[3] = {p.x, p.y, p.z};
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = corner == 0 ? at[a] : std::min(lo[a], at[a]);
+      hi[a] = corner == 0 ? at[a] : std::max(hi[a], at[a]);
+    }
+  }
+  return AreThin(lo, hi);
+}
+
+uint32_t CudaVolume::TakeSlot() {
+  if (free_slots_.empty()) {
+    slots_.emplace_back();
+    return static_cast<uint32_t>(slots_.size() - 1);
+  }
+  const uint32_t slot = free_slots_.back();
+  free_slots_.pop_back();
+  return slot;
+}
+
+TableEntry CudaVolume::EntryOf(const Drawable& d) const {
+  const GeometryView& view = d.geometry->view;
+  TableEntry entry;
+  entry.record = view.record;
+  entry.priority = d.record.priority;
+  entry.erase = d.record.erase;
+  entry.layer = layer_slots_.at(d.layer->record.id);
+  entry.alive = 1;
+  const Affine map = Compose(Compose(view_, d.layer->record.transform), d.record.transform);
+  WithPrimitive(view.record.kind, [&](auto primitive) {
+    using Primitive = typename decltype(primitive)::type;
+    if constexpr (kIsSolid<Primitive>) {
+      entry.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
+    } else {
+      entry.source.positions = view.positions.data();
+      entry.source.indices = view.indices.data();
+      entry.source.colors = view.colors.data();
+      entry.source.map = map;
+      entry.source.radius = RadiusOf(view.record, map);
+    }
+  });
+  return entry;
+}
+
+absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot) {
+  if (executor_ == nullptr) {
+    executor_ = MakeExecutor(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+  }
+  const CpuVoxels drawn = DrawOnCpu(drawable, view_, tiles_.grid, tiles_.owned_here, *executor_);
+  absl::StatusOr<Block> block = device_.Upload(drawn.tiles.data(), drawn.tiles.size());
+  if (!block.ok()) return block.status();
+  slot.tiles = *std::move(block);
+  block = device_.Upload(drawn.begin.data(), drawn.begin.size());
+  if (!block.ok()) return block.status();
+  slot.begin = *std::move(block);
+  block = device_.Upload(drawn.voxels.data(), drawn.voxels.size());
+  if (!block.ok()) return block.status();
+  slot.voxels = *std::move(block);
+  // What goes over lies in memory that is about to go.
+  if (absl::Status status = device_.Wait(); !status.ok()) return status;
+  slot.items = static_cast<uint32_t>(drawn.tiles.size());
+  slot.singular = drawn.singular;
+  entry.record.kind = kDrawnByCpu;
+  entry.drawn = {slot.tiles.as<uint32_t>(), slot.begin.as<uint64_t>(), slot.voxels.as<uint64_t>()};
+  return absl::OkStatus();
+}
+
+// The old table stays until all is right in the new one.
+absl::Status CudaVolume::GrowTable() {
+  if (slots_.size() * sizeof(TableEntry) <= table_.size()) return absl::OkStatus();
+  const size_t entries = table_.size() / sizeof(TableEntry);
+  Block grown;
+  absl::Status status = device_.pool().Grow<TableEntry>(grown, slots_.size(), 0, device_.stream());
+  if (status.ok() && entries > 0) {
+    status = device_.Run("cudaMemcpyAsync", [&] {
+      return cudaMemcpyAsync(grown.as<void>(), table_.as<void>(), entries * sizeof(TableEntry),
+                             cudaMemcpyDeviceToDevice, device_.stream());
+    });
+    if (status.ok()) {
+      status = device_.Run("Rebase", [&] {
+        return Rebase(grown.as<TableEntry>(), static_cast<uint32_t>(entries), device_.stream());
+      });
+    }
+  }
+  if (status.ok()) table_ = std::move(grown);
+  return status;
+}
+
+absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
+                                      std::span<const TableEntry> entries) {
+  if (absl::Status status = GrowTable(); !status.ok()) return status;
+  const absl::StatusOr<Block> uploaded = device_.Upload(entries.data(), entries.size());
+  if (!uploaded.ok()) return uploaded.status();
+  const absl::StatusOr<Block> places = device_.Upload(slots.data(), slots.size());
+  if (!places.ok()) return places.status();
+  return device_.Run("PutEntries", [&] {
+    return PutEntries(table_.as<TableEntry>(), uploaded->as<TableEntry>(), places->as<uint32_t>(),
+                      static_cast<uint32_t>(slots.size()), device_.stream());
+  });
+}
+
+absl::Status CudaVolume::Enter() {
+  if (pending_.empty()) return absl::OkStatus();
+  const std::vector<const Drawable*> drawables(pending_.begin(), pending_.end());
+  std::vector<uint32_t> slots;
+  std::vector<TableEntry> entries;
+  slots.reserve(drawables.size());
+  entries.reserve(drawables.size());
+  uint32_t singular = 0;
+  absl::flat_hash_set<uint32_t> line_layers = lines_.Layers();
+  for (const Drawable* drawable : drawables) {
+    const uint32_t slot = TakeSlot();
+    TableEntry entry = EntryOf(*drawable);
+    entry.source.record = &entry.record;
+    slots.push_back(slot);
+    slots_[slot] = {};
+    if (entry.record.drawn_by == DrawnBy::kCpu) {
+      if (absl::Status status = DrawInto(entry, *drawable, slots_[slot]); !status.ok()) {
+        for (const uint32_t taken : slots) slots_[taken] = {};
+        free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
+        return status;
+      }
+    } else {
+      WithPrimitive(entry.record.kind, [&](auto primitive) {
+        using Primitive = typename decltype(primitive)::type;
+        slots_[slot].items = Primitive::Count(entry.source);
+        slots_[slot].thin = IsThin(*drawable, entry) && (line_layers.contains(entry.layer) ||
+                                                         line_layers.size() < kMaxLineLayers);
+        if (slots_[slot].thin) line_layers.insert(entry.layer);
+        slots_[slot].singular = kIsSolid<Primitive> && !entry.source.solid.drawable;
+      });
+    }
+    singular += slots_[slot].singular ? 1 : 0;
+    entries.push_back(entry);
+  }
+  if (absl::Status status = PutDrawables(slots, entries); !status.ok()) {
+    for (const uint32_t taken : slots) slots_[taken] = {};
+    free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
+    return status;
+  }
+  std::vector<uint32_t> pairs;
+  for (const uint32_t slot : slots) {
+    if (slots_[slot].thin) continue;
+    pairs.push_back(slot);
+    live_items_ += slots_[slot].items;
+  }
+  absl::Status status = EnterPairs(pairs);
+  if (status.ok()) status = EnterLines(drawables, slots);
+  if (!status.ok()) {
+    // They go again, and come anew with the next frame.
+    left_.insert(left_.end(), slots.begin(), slots.end());
+    return status;
+  }
+  for (size_t i = 0; i < slots.size(); ++i) slot_of_[drawables[i]] = slots[i];
+  singular_ += singular;
+  pending_.clear();
+  return absl::OkStatus();
+}
+
+absl::Status CudaVolume::EnterPairs(std::span<const uint32_t> slots) {
+  if (slots.empty()) return absl::OkStatus();
+  const absl::StatusOr<UploadedList> list =
+      UploadList(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
+  if (!list.ok()) return list.status();
+  return index_.Add(table_.as<TableEntry>(), looks_.as<LayerLook>(), list->list, list->items,
+                    tiles_.view());
+}
+
+// Layer by layer.
+absl::Status CudaVolume::EnterLines(std::span<const Drawable* const> drawables,
+                                    std::span<const uint32_t> slots) {
+  struct Arriving {
+    std::vector<uint32_t> slots;
+    std::vector<uint64_t> first = {0};
+    bool visible = false, mixed = false;
+  };
+  absl::flat_hash_map<uint32_t, Arriving> layers;
+  for (size_t i = 0; i < slots.size(); ++i) {
+    if (!slots_[slots[i]].thin) continue;
+    const Drawable& drawable = *drawables[i];
+    Arriving& arriving = layers[layer_slots_.at(drawable.layer->record.id)];
+    arriving.slots.push_back(slots[i]);
+    arriving.first.push_back(arriving.first.back() + slots_[slots[i]].items);
+    arriving.visible = drawable.layer->record.visible != 0;
+    const GeometryRecord& record = drawable.geometry->view.record;
+    arriving.mixed |= record.kind == PrimitiveKind::kSegments &&
+                      record.color_mode == ColorMode::kPerVertex && drawable.record.erase == 0;
+  }
+  for (const auto& [layer, arriving] : layers) {
+    const absl::StatusOr<UploadedList> list =
+        UploadList(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
+    if (!list.ok()) return list.status();
+    absl::Status status = lines_.Add(table_.as<TableEntry>(),
+                                     {.layer = layer,
+                                      .visible = arriving.visible,
+                                      .mixed = arriving.mixed,
+                                      .list = list->list,
+                                      .slots = arriving.slots,
+                                      .first = arriving.first},
+                                     tiles_.region_dirty.as<uint8_t>());
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::gpu::cuda
