@@ -221,6 +221,12 @@ HWY_ATTR inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<c
     const SmallTriangle& t = triangles[items[i].item];
     TrianglePart part;
     if (items[i].count() == 0 || !part.Set(t, lo, hi)) continue;
+    // Triangles may have nothing but their vertices.
+    if (size >= DrawBlock::kSize) {
+      RaiseBlock(block, size, words);
+      size = 0;
+      several = true;
+    }
     size = AddVertices(t, part, block, size);
     if (t.n[0] != 0) size = DrawColumns<0>(t, part, block, size, several, words);
     if (t.n[1] != 0) size = DrawColumns<1>(t, part, block, size, several, words);

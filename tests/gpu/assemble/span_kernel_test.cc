@@ -251,6 +251,41 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
   });
 }
 
+// Among many with nothing but their vertices, whose words wait together, some that cover more.
+TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
+  const uint64_t seed = Seed();
+  ForEachVectorTarget(TriangleTarget, [&] {
+    Random random(seed);
+    const TileGrid grid = TileGrid::Of(16, 16, 16);
+    const Box3 box = grid.VoxelsOf(0);
+    std::vector<SmallTriangle> triangles;
+    std::vector<BinItem> items;
+    Words want, got;
+    for (uint32_t i = 0; i < 3000; ++i) {
+      Triangle t;
+      const int64_t extent = i % 500 == 499 ? 2000 : 20;  // units
+      for (int a = 0; a < 3; ++a) {
+        const int64_t from = random.Int(0, 16 * 256 - extent - 1);
+        for (Int3& v : t.v) v[a] = from + random.Int(0, extent);
+      }
+      SmallTriangle fast;
+      if (!SmallTriangle::Of(t, WalkGrid(grid), fast)) continue;
+      fast.word = kWord + i;
+      items.push_back({static_cast<uint32_t>(triangles.size()), 1});
+      triangles.push_back(fast);
+      EmitTriangle(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
+        uint32_t& at = want.at[grid.IndexInTile(x, y, z)];
+        at = std::max(at, fast.word);
+      });
+    }
+    ASSERT_GT(triangles.size(), 2000u);
+    TileRows touched;
+    DrawTriangles(triangles.data(), items, box.lo, box.hi, got.at, touched);
+    EXPECT_TRUE(Holds(touched, got));
+    EXPECT_TRUE(got == want);
+  });
+}
+
 TEST(SmallTriangles, OthersAreNone) {
   const WalkGrid grid(TileGrid::Of(64, 64, 64));
   SmallTriangle small;
