@@ -79,6 +79,7 @@ absl::StatusOr<Sampler> Sampler::Create(display::FootprintTable table, const Til
   sampler.grid_ = grid;
   sampler.sampling_ = sampling;
   sampler.BuildInner();
+  sampler.FindPlanes(grid);
   return sampler;
 }
 
@@ -120,6 +121,22 @@ void Sampler::BuildInner() {
   for (size_t row = 1; row < table_.outer.begin.size(); ++row) {
     single_ = single_ && table_.outer.begin[row] - table_.outer.begin[row - 1] <= 1;
   }
+}
+
+// Tiles lie in memory along y first, so that what they know of their rows says which columns are lit.
+void Sampler::FindPlanes(const TileGrid& grid) {
+  if (!single_ || runs_[0].axis != 1 || grid.shift[1] != 0 || table_.width > grid.voxels[0]) return;
+  std::vector<int32_t> planes;
+  for (int32_t slice = 0; slice < table_.slices; ++slice) {
+    for (int32_t u = 0; u < table_.width; ++u) {
+      const auto outer = table_.Outer(slice, u);
+      if (outer.size() != 1 || outer[0].x != u || outer[0].y != 0) return;
+      if (u > 0 && outer[0].z != planes.back()) return;
+      if (u == 0) planes.push_back(outer[0].z);
+    }
+  }
+  const int32_t(&at)[3] = runs_[0].at;
+  if (at[0] == 0 && at[2] == 0) plane_of_ = std::move(planes);
 }
 
 // Row (slice, v) as table_.inner has it.
@@ -216,6 +233,34 @@ void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& o
   }
 }
 
+// What SampleSingle comes to where slices are planes: tile by tile, and of those the lit rows alone.
+void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const {
+  const TileGrid& grid = tiles.grid();
+  const uint32_t width = static_cast<uint32_t>(table_.width);
+  const int32_t first = runs_[0].at[1], last = first + runs_[0].length;  // of y
+  for (int32_t j = first / kTileSize; j * kTileSize < last; ++j) {
+    const int32_t y0 = std::max(first, j * kTileSize);
+    const int32_t count = std::min(last, (j + 1) * kTileSize) - y0;
+    for (int32_t i = 0; i * kTileSize < table_.width; ++i) {
+      const uint32_t tile = grid.Index(i, j, z / kTileSize);
+      const uint32_t* const colors = tiles.colors(tile);
+      if (colors == nullptr) continue;
+      const TileRows& rows = tiles.rows(tile);
+      const int32_t end = std::min(table_.width, (i + 1) * kTileSize);
+      for (int32_t x = i * kTileSize; x < end; ++x) {
+        const uint32_t index = grid.IndexInTile(x, y0, z);
+        if ((rows.bits[index >> 10] >> (index >> 4 & 63) & 1) == 0) continue;
+        for (uint32_t lit = LitBits(colors + index, count, 0); lit != 0; lit &= lit - 1) {
+          const int bit = std::countr_zero(lit);
+          const uint32_t u = static_cast<uint32_t>(x), v = static_cast<uint32_t>(y0 - first + bit);
+          out.rgb[v * width + u] = Deinterleave(colors[index + static_cast<uint32_t>(bit)]);
+          out.lit.push_back({v * width + u, u, v});
+        }
+      }
+    }
+  }
+}
+
 void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
                              SlicePixels& out) const {
   const uint32_t width = static_cast<uint32_t>(table_.width);
@@ -240,6 +285,8 @@ void Sampler::Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) co
   if (sampling_ == display::Sampling::kWeighted) {
     out.lines.resize(places_);
     for (uint32_t u = 0; u < width; ++u) SampleWeighted(tiles, slice, u, out);
+  } else if (!plane_of_.empty()) {
+    SamplePlane(tiles, plane_of_[static_cast<size_t>(slice)], out);
   } else if (single_) {
     SampleSingle(tiles, slice, out);
   } else {

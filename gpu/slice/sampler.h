@@ -62,6 +62,8 @@ class Sampler {
   std::span<const InnerEntry> Inner(int32_t slice, uint32_t v) const;
   void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0, SlicePixels& out) const;
   void SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
+  void SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const;
+  void FindPlanes(const TileGrid& grid);
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 
   display::FootprintTable table_;
@@ -72,6 +74,8 @@ class Sampler {
   size_t places_ = 0;
   bool single_ =
       false;  // one voxel a pixel, those of a column in a row: a stack of the lattice's own resolution
+  std::vector<int32_t>
+      plane_of_;  // z by slice, where pixel u is x and slices are planes; else empty
 };
 
 }  // namespace voxeld::gpu
