@@ -125,7 +125,10 @@ void Sampler::BuildInner() {
 
 // Tiles lie in memory along y first, so that what they know of their rows says which columns are lit.
 void Sampler::FindPlanes(const TileGrid& grid) {
-  if (!single_ || runs_[0].axis != 1 || grid.shift[1] != 0 || table_.width > grid.voxels[0]) return;
+  if (!single_ || runs_[0].axis != 1 || grid.shift[1] != 0 || grid.shift[0] != kTileBits ||
+      table_.width > grid.voxels[0]) {
+    return;
+  }
   std::vector<int32_t> planes;
   for (int32_t slice = 0; slice < table_.slices; ++slice) {
     for (int32_t u = 0; u < table_.width; ++u) {
@@ -246,14 +249,17 @@ void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) c
       const uint32_t* const colors = tiles.colors(tile);
       if (colors == nullptr) continue;
       const TileRows& rows = tiles.rows(tile);
-      const int32_t end = std::min(table_.width, (i + 1) * kTileSize);
-      for (int32_t x = i * kTileSize; x < end; ++x) {
-        const uint32_t index = grid.IndexInTile(x, y0, z);
-        if ((rows.bits[index >> 10] >> (index >> 4 & 63) & 1) == 0) continue;
-        for (uint32_t lit = LitBits(colors + index, count, 0); lit != 0; lit &= lit - 1) {
+      const uint32_t plane = static_cast<uint32_t>(z % kTileSize);  // sixteen rows, by x
+      uint32_t lit_rows = rows.bits[plane / 4] >> plane % 4 * 16 & 0xFFFF;
+      const int32_t left = table_.width - i * kTileSize;
+      if (left < kTileSize) lit_rows &= (1u << left) - 1;
+      for (; lit_rows != 0; lit_rows &= lit_rows - 1) {
+        const int32_t x = i * kTileSize + std::countr_zero(lit_rows);
+        const uint32_t* const from = colors + grid.IndexInTile(x, y0, z);
+        for (uint32_t lit = LitBits(from, count, 0); lit != 0; lit &= lit - 1) {
           const int bit = std::countr_zero(lit);
           const uint32_t u = static_cast<uint32_t>(x), v = static_cast<uint32_t>(y0 - first + bit);
-          out.rgb[v * width + u] = Deinterleave(colors[index + static_cast<uint32_t>(bit)]);
+          out.rgb[v * width + u] = Deinterleave(from[bit]);
           out.lit.push_back({v * width + u, u, v});
         }
       }
