@@ -241,30 +241,47 @@ void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) c
   const TileGrid& grid = tiles.grid();
   const uint32_t width = static_cast<uint32_t>(table_.width);
   const int32_t first = runs_[0].at[1], last = first + runs_[0].length;  // of y
+  struct Row {
+    const uint32_t* from;
+    uint32_t u, v;
+    int32_t count;
+  };
+  // Rows are on their way from memory together before the first of them is looked at.
+  constexpr size_t kTogether = 64;
+  Row rows[kTogether];
+  size_t count = 0;
+  const auto look = [&] {
+    for (const Row& row : std::span(rows, count)) {
+      for (uint32_t lit = LitBits(row.from, row.count, 0); lit != 0; lit &= lit - 1) {
+        const uint32_t bit = static_cast<uint32_t>(std::countr_zero(lit));
+        const uint32_t index = (row.v + bit) * width + row.u;
+        out.rgb[index] = Deinterleave(row.from[bit]);
+        out.lit.push_back({index, row.u, row.v + bit});
+      }
+    }
+    count = 0;
+  };
+  const uint32_t plane = static_cast<uint32_t>(z % kTileSize);  // of a tile: sixteen rows, by x
   for (int32_t j = first / kTileSize; j * kTileSize < last; ++j) {
     const int32_t y0 = std::max(first, j * kTileSize);
-    const int32_t count = std::min(last, (j + 1) * kTileSize) - y0;
+    const int32_t length = std::min(last, (j + 1) * kTileSize) - y0;
     for (int32_t i = 0; i * kTileSize < table_.width; ++i) {
       const uint32_t tile = grid.Index(i, j, z / kTileSize);
       const uint32_t* const colors = tiles.colors(tile);
       if (colors == nullptr) continue;
-      const TileRows& rows = tiles.rows(tile);
-      const uint32_t plane = static_cast<uint32_t>(z % kTileSize);  // sixteen rows, by x
-      uint32_t lit_rows = rows.bits[plane / 4] >> plane % 4 * 16 & 0xFFFF;
+      uint32_t lit = tiles.rows(tile).bits[plane / 4] >> plane % 4 * 16 & 0xFFFF;
       const int32_t left = table_.width - i * kTileSize;
-      if (left < kTileSize) lit_rows &= (1u << left) - 1;
-      for (; lit_rows != 0; lit_rows &= lit_rows - 1) {
-        const int32_t x = i * kTileSize + std::countr_zero(lit_rows);
+      if (left < kTileSize) lit &= (1u << left) - 1;
+      for (; lit != 0; lit &= lit - 1) {
+        const int32_t x = i * kTileSize + std::countr_zero(lit);
         const uint32_t* const from = colors + grid.IndexInTile(x, y0, z);
-        for (uint32_t lit = LitBits(from, count, 0); lit != 0; lit &= lit - 1) {
-          const int bit = std::countr_zero(lit);
-          const uint32_t u = static_cast<uint32_t>(x), v = static_cast<uint32_t>(y0 - first + bit);
-          out.rgb[v * width + u] = Deinterleave(from[bit]);
-          out.lit.push_back({v * width + u, u, v});
-        }
+        __builtin_prefetch(from);
+        rows[count++] = {from, static_cast<uint32_t>(x), static_cast<uint32_t>(y0 - first), length};
+        if (count == kTogether) look();
       }
     }
   }
+  look();
 }
 
 void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
