@@ -20,7 +20,8 @@ if(NOT CMAKE_CUDA_COMPILER)
   endif()
   message(FATAL_ERROR "VOXELD_CUDA=ON, but there is no nvcc on the PATH, in CUDA_PATH or under /usr/local/cuda")
 endif()
-# Turing and later by way of PTX, Hopper natively.
+# Hopper natively, others by way of PTX: the generator from Turing on, the engine from Ampere on, whose blocks of threads
+# have the shared memory that it draws in.
 set(CMAKE_CUDA_ARCHITECTURES 75-virtual 90-real)
 set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
 if(VOXELD_CCACHE)

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "gpu/core_engine.h"
 #include "gpu/cuda/cuda_core.h"
+#include "gpu/cuda/draw_kernels.h"
 
 namespace voxeld::gpu {
 
@@ -13,6 +14,12 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& op
                                                          const cuda::FaultPlan& faults) {
   absl::StatusOr<std::unique_ptr<cuda::Device>> device = cuda::Device::Open(options.device);
   if (!device.ok()) return device.status();
+  const cudaDeviceProp& properties = (*device)->api().device();
+  if (properties.sharedMemPerBlockOptin < cuda::DrawShared()) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        properties.name, " gives a block of threads ", properties.sharedMemPerBlockOptin,
+        " bytes of shared memory; drawing takes ", cuda::DrawShared()));
+  }
   (*device)->api().SetFaults(faults);
   const EngineInfo info = {EngineKind::kCuda, (*device)->api().device().name, std::move(reason)};
   auto core = std::make_unique<cuda::CudaCore>(*std::move(device), options.part);

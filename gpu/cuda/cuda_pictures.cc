@@ -105,10 +105,12 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   inherited_ = same;
   for (const Wanted& wanted :
        {Wanted{&lit_tiles_, slices * sizeof(uint32_t), nullptr},
-        {&differs_, pictures * sizeof(uint32_t), nullptr},
+        {&differs_, pictures * sizeof(uint32_t), same ? &before->differs_ : nullptr},
         {&bytes_, pictures * view_.bytes_per_picture, same ? &before->bytes_ : nullptr},
         {&changed_in_, pictures * sizeof(uint64_t), same ? &before->changed_in_ : nullptr},
-        {&blank_, slices * sizeof(uint32_t), same ? &before->blank_ : nullptr}}) {
+        // Of pictures packed as they were drawn it is not known.
+        {&blank_, slices * sizeof(uint32_t),
+         same && !before->packed_ ? &before->blank_ : nullptr}}) {
     absl::StatusOr<Block> block = device_.Zeros(wanted.bytes);
     if (!block.ok()) return block.status();
     *wanted.block = *std::move(block);

@@ -69,7 +69,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   listed_ = all_dirty;
   index_.Clear();
   lines_.Reset(tiles_.grid);
-  lines_suit_ = LineIndex::Suits(tiles_.grid);
+  lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
   slots_.clear();
   free_slots_.clear();
   dead_slots_.clear();
@@ -201,6 +201,12 @@ absl::Status CudaVolume::MarkLeft() {
     slots_[slot] = {.items = slots_[slot].items};
   }
   left_.clear();
+  if (live_items_ == 0) {
+    index_.Clear();
+    free_slots_.insert(free_slots_.end(), dead_slots_.begin(), dead_slots_.end());
+    dead_slots_.clear();
+    dead_items_ = 0;
+  }
   // Their memory may be handed out again: in the stream, after what has just been queued.
   kept_.clear();
   if (dead_items_ + dead_slots_.size() > live_items_ + kSpareItems) {

@@ -101,6 +101,13 @@ class CudaVolume final : private SceneObserver {
   absl::Status Enter();
   absl::Status EnterLines(std::span<const Drawable* const> drawables,
                           std::span<const uint32_t> slots);
+  // Of one layer, no more than may come at once.
+  struct Arriving {
+    std::vector<uint32_t> slots;
+    std::vector<uint64_t> first = {0};
+    bool visible = false, mixed = false;
+  };
+  absl::Status EnterGroup(uint32_t layer, const Arriving& arriving);
   absl::Status EnterPairs(std::span<const uint32_t> slots);
   DrawView ViewForDrawing() const;
   absl::Status Draw(DrawView& view, DrawTo to);

@@ -64,9 +64,10 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
     if (!status.ok()) return status;
   }
   arrays_ = std::make_shared<Block>(*std::move(block));
-  if (absl::Status status = FindGeometryBounds(plan); !status.ok()) return status;
+  const absl::Status status = FindGeometryBounds(plan);
   // The delta's memory is given back when Apply returns, and so may bulk memory be.
-  return device_.Wait();
+  const absl::Status waited = device_.Wait();
+  return status.ok() ? waited : status;
 }
 
 bool CudaVolume::CanBeThin(const GeometryRecord& record) {

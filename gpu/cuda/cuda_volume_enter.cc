@@ -10,6 +10,7 @@
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
+
 bool CudaVolume::IsThin(const Drawable& drawable, const TableEntry& entry) const {
   if (!lines_suit_ || !CanBeThin(entry.record) || entry.source.radius > 0) return false;
   const auto* const arrays = static_cast<const DeviceArrays*>(drawable.geometry->memory.get());
@@ -145,8 +146,9 @@ absl::Status CudaVolume::Enter() {
       WithPrimitive(entry.record.kind, [&](auto primitive) {
         using Primitive = typename decltype(primitive)::type;
         slots_[slot].items = Primitive::Count(entry.source);
-        slots_[slot].thin = IsThin(*drawable, entry) && (line_layers.contains(entry.layer) ||
-                                                         line_layers.size() < kMaxLineLayers);
+        slots_[slot].thin =
+            slots_[slot].items <= lines_.most_lines() && IsThin(*drawable, entry) &&
+            (line_layers.contains(entry.layer) || line_layers.size() < kMaxLineLayers);
         if (slots_[slot].thin) line_layers.insert(entry.layer);
         slots_[slot].singular = kIsSolid<Primitive> && !entry.source.solid.drawable;
       });
@@ -190,38 +192,43 @@ absl::Status CudaVolume::EnterPairs(std::span<const uint32_t> slots) {
 // Layer by layer.
 absl::Status CudaVolume::EnterLines(std::span<const Drawable* const> drawables,
                                     std::span<const uint32_t> slots) {
-  struct Arriving {
-    std::vector<uint32_t> slots;
-    std::vector<uint64_t> first = {0};
-    bool visible = false, mixed = false;
-  };
-  absl::flat_hash_map<uint32_t, Arriving> layers;
+  absl::flat_hash_map<uint32_t, std::vector<Arriving>> layers;  // by slot
   for (size_t i = 0; i < slots.size(); ++i) {
-    if (!slots_[slots[i]].thin) continue;
+    const Slot& slot = slots_[slots[i]];
+    if (!slot.thin) continue;
     const Drawable& drawable = *drawables[i];
-    Arriving& arriving = layers[layer_slots_.at(drawable.layer->record.id)];
+    std::vector<Arriving>& groups = layers[layer_slots_.at(drawable.layer->record.id)];
+    if (groups.empty() || groups.back().first.back() + slot.items > lines_.most_lines()) {
+      groups.emplace_back();
+    }
+    Arriving& arriving = groups.back();
     arriving.slots.push_back(slots[i]);
-    arriving.first.push_back(arriving.first.back() + slots_[slots[i]].items);
+    arriving.first.push_back(arriving.first.back() + slot.items);
     arriving.visible = drawable.layer->record.visible != 0;
     const GeometryRecord& record = drawable.geometry->view.record;
     arriving.mixed |= record.kind == PrimitiveKind::kSegments &&
                       record.color_mode == ColorMode::kPerVertex && drawable.record.erase == 0;
   }
-  for (const auto& [layer, arriving] : layers) {
-    const absl::StatusOr<UploadedList> list =
-        UploadList(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
-    if (!list.ok()) return list.status();
-    absl::Status status = lines_.Add(table_.as<TableEntry>(),
-                                     {.layer = layer,
-                                      .visible = arriving.visible,
-                                      .mixed = arriving.mixed,
-                                      .list = list->list,
-                                      .slots = arriving.slots,
-                                      .first = arriving.first},
-                                     tiles_.region_dirty.as<uint8_t>());
-    if (!status.ok()) return status;
+  for (const auto& [layer, groups] : layers) {
+    for (const Arriving& arriving : groups) {
+      if (absl::Status status = EnterGroup(layer, arriving); !status.ok()) return status;
+    }
   }
   return absl::OkStatus();
+}
+
+absl::Status CudaVolume::EnterGroup(uint32_t layer, const Arriving& arriving) {
+  const absl::StatusOr<UploadedList> list =
+      UploadList(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
+  if (!list.ok()) return list.status();
+  return lines_.Add(table_.as<TableEntry>(),
+                    {.layer = layer,
+                     .visible = arriving.visible,
+                     .mixed = arriving.mixed,
+                     .list = list->list,
+                     .slots = arriving.slots,
+                     .first = arriving.first},
+                    tiles_.region_dirty.as<uint8_t>());
 }
 
 }  // namespace voxeld::gpu::cuda

@@ -4,6 +4,7 @@
 
 #include <cuda_runtime_api.h>
 
+#include <cstddef>
 #include <cstdint>
 
 #include "gpu/cuda/draw_types.h"
@@ -20,6 +21,9 @@ cudaError_t DrawOneLayer(const DrawView& view, DrawTo to, uint32_t multiprocesso
 cudaError_t DrawLines(const DrawView& view, DrawTo to, uint32_t multiprocessors,
                       cudaStream_t stream);
 cudaError_t DrawAll(const DrawView& view, DrawTo to, uint32_t multiprocessors, cudaStream_t stream);
+
+// Shared memory that drawing takes of a block of threads, at most.
+size_t DrawShared();
 
 // Voxels of the tiles' colours, x fastest, 0x00RRGGBB.
 cudaError_t ReadBox(const VolumeView& volume, const int32_t lo[3], const int32_t size[3],

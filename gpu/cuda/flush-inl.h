@@ -270,7 +270,8 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place, 
   const int32_t s = ahead.slice;
   const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
   const int32_t rows = place.box.hi[1] - place.box.lo[1];
-  const int32_t limit = x < place.box.hi[0] ? rows : 0;
+  const int32_t z = place.box.lo[2] + static_cast<int32_t>(warp);
+  const int32_t limit = x < place.box.hi[0] && z < place.box.hi[2] ? rows : 0;
   const auto at = [&](int32_t y) {
     return y < limit ? color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane) : 0u;
   };

@@ -62,6 +62,8 @@ cudaError_t DrawAll(const DrawView& view, DrawTo to, uint32_t multiprocessors,
   return DrawRegionsOf<DrawWhat::kAll>(view, to, multiprocessors, stream);
 }
 
+size_t DrawShared() { return sizeof(DrawScratch<DrawWhat::kAll>); }
+
 cudaError_t ReadBox(const VolumeView& volume, const int32_t lo[3], const int32_t size[3],
                     uint32_t* out, cudaStream_t stream) {
   BoxArgs box;

@@ -58,8 +58,11 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
                         ? Points::ItemOf(entry.source, item)
                         : Segments::ItemOf(entry.source, item);
   const bool erase = entry.erase != 0;
-  lines[i] = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
-  if (ends != nullptr) ends[i] = MakeWord(entry.priority, erase, line.color_e);
+  ThinLine thin = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
+  uint32_t end = MakeWord(entry.priority, erase, line.color_e);
+  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the one voxel
+  lines[i] = thin;
+  if (ends != nullptr) ends[i] = end;
 }
 
 // Line `i` of the rows.
@@ -124,13 +127,14 @@ struct PieceScratch {
 __global__ void __launch_bounds__(kThreads)
     FillPiecesKernel(LineSort sort, const ThinLine* lines, uint32_t count) {
   extern __shared__ __align__(16) unsigned char memory[];
-  PieceScratch& scratch = *reinterpret_cast<PieceScratch*>(memory);
-  uint32_t* const found = reinterpret_cast<uint32_t*>(memory + sizeof(PieceScratch));  // by block
   const uint32_t blocks = sort.grid.block_count();
+  const bool staged = blocks <= kMostSortedBlocks;
+  PieceScratch& scratch = *reinterpret_cast<PieceScratch*>(memory);  // if staged
+  uint32_t* const found =
+      reinterpret_cast<uint32_t*>(memory + (staged ? sizeof(PieceScratch) : 0));  // by block
   const uint32_t* const offsets = sort.line_offsets + static_cast<size_t>(blockIdx.x) * blocks;
   for (uint32_t b = threadIdx.x; b < blocks; b += kThreads) found[b] = 0;
   __syncthreads();
-  const bool staged = blocks <= kMostSortedBlocks;
   const auto put = [&](uint32_t b, uint32_t rank, LinePiece piece) {
     const uint32_t place = sort.block_begin[b] + offsets[b] + rank;
     if (place < sort.piece_capacity) sort.pieces[place] = piece;
@@ -242,7 +246,7 @@ __device__ uint32_t SumBefore(uint32_t value, uint32_t& total) {
   return sum - value;
 }
 
-// Pieces first to last − 1 into `order`.
+// `count` pieces into `order`.
 __device__ void OrderPieces(const LinePiece* pieces, uint32_t count, SpanScratch& scratch) {
   constexpr uint32_t kEach = kPieceChunk / kThreads;
   LinePiece mine[kEach];
@@ -377,7 +381,16 @@ __global__ void KillLinesKernel(ItemList list, uint32_t count, ThinLine* lines) 
   if (i < count) lines[LineAt(list, i)].word = 0;
 }
 
+size_t BlockNumbersShared(const RegionGrid& grid) {
+  return size_t{grid.block_count()} * sizeof(uint32_t);
+}
+
 }  // namespace
+
+size_t SortLinesShared(const RegionGrid& grid) {
+  const size_t staged = grid.block_count() <= kMostSortedBlocks ? sizeof(PieceScratch) : 0;
+  return staged + BlockNumbersShared(grid);
+}
 
 cudaError_t FindBounds(const float* positions, uint32_t count, uint32_t* bounds,
                        cudaStream_t stream) {
@@ -401,12 +414,12 @@ cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, cons
 
 cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                         cudaStream_t stream) {
-  cudaError_t error =
-      cudaFuncSetAttribute(CountPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                           static_cast<int>(kMostSortLinesShared));
+  const size_t shared = BlockNumbersShared(sort.grid);
+  cudaError_t error = cudaFuncSetAttribute(
+      CountPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared));
   if (error != cudaSuccess) return error;
-  CountPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads, SortLinesShared(sort.grid),
-                      stream>>>(sort, lines, count);
+  CountPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads, shared, stream>>>(
+      sort, lines, count);
   if (error = cudaGetLastError(); error != cudaSuccess) return error;
   ScanBlocksKernel<<<1, kScanThreads, 0, stream>>>(sort);
   return cudaGetLastError();
@@ -414,13 +427,12 @@ cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t co
 
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                        cudaStream_t stream) {
-  const cudaError_t error =
-      cudaFuncSetAttribute(FillPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                           static_cast<int>(sizeof(PieceScratch) + kMostSortLinesShared));
+  const size_t shared = SortLinesShared(sort.grid);
+  const cudaError_t error = cudaFuncSetAttribute(
+      FillPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared));
   if (error != cudaSuccess) return error;
-  FillPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads,
-                     sizeof(PieceScratch) + SortLinesShared(sort.grid), stream>>>(sort, lines,
-                                                                                  count);
+  FillPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads, shared, stream>>>(sort, lines,
+                                                                                        count);
   return cudaGetLastError();
 }
 

@@ -9,7 +9,7 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 // Up to here what a batch may need at most is taken, and nobody waits for the count of what it does.
-constexpr uint64_t kUncountedBytes = uint64_t{64} << 20;
+constexpr uint64_t kUncountedBytes = uint64_t{16} << 20;
 constexpr uint64_t kMostPlaces = 0xFFFFFFFFu;
 
 // Boxes that a line touches at most, of a volume of so many along the axes.
@@ -21,17 +21,17 @@ uint64_t MostBoxes(const int32_t count[3], int shift) {
 
 }  // namespace
 
-bool LineIndex::Suits(const TileGrid& grid) {
-  const RegionGrid regions = RegionGrid::Of(grid);
-  uint64_t blocks = 1;
-  for (int a = 0; a < 3; ++a) blocks *= static_cast<uint64_t>(regions.blocks[a]);
-  return blocks * sizeof(uint32_t) <= kMostSortLinesShared;
+bool LineIndex::Suits(const Api& api, const TileGrid& grid) {
+  return SortLinesShared(RegionGrid::Of(grid)) <= api.device().sharedMemPerBlockOptin;
 }
 
 void LineIndex::Reset(const TileGrid& grid) {
   batches_.clear();
   places_.clear();
   grid_ = RegionGrid::Of(grid);
+  merge_ = false;
+  // So that whatever they are, their spans can be counted in 32 bits.
+  most_lines_ = kMostPlaces / MostBoxes(grid_.blocks, kBlockBits);
 }
 
 absl::flat_hash_set<uint32_t> LineIndex::Layers() const {
@@ -82,6 +82,7 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
            Wanted{&batch.regions, blocks * sizeof(uint64_t), true},
            Wanted{&batch.spans, sort.span_capacity * sizeof(LineSpan), false},
        }) {
+    *want.block = Block();  // of a try before
     absl::StatusOr<Block> block = want.zero
                                       ? device_.Zeros(want.bytes)
                                       : device_.pool().Acquire(std::max<size_t>(1, want.bytes));
@@ -100,8 +101,8 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
   sort.spans = batch.spans.as<LineSpan>();
   const ThinLine* const lines = batch.lines.as<ThinLine>();
   const uint32_t* const ends = batch.mixed ? batch.ends.as<uint32_t>() : nullptr;
-  const size_t most_threads = static_cast<size_t>(device_.api().device().multiProcessorCount) * 4;
-  const uint32_t launch = static_cast<uint32_t>(std::min(chunks, most_threads));
+  const size_t most_blocks = static_cast<size_t>(device_.api().device().multiProcessorCount) * 4;
+  const uint32_t launch = static_cast<uint32_t>(std::min(chunks, most_blocks));
   absl::Status status = device_.Run(
       "CountPieces", [&] { return CountPieces(sort, lines, batch.count, device_.stream()); });
   if (!status.ok()) return status;
@@ -186,6 +187,7 @@ absl::Status LineIndex::Add(const TableEntry* table, const LineArrivals& arrival
                              true});
   }
   batches_.emplace(number, std::move(batch));
+  merge_ = true;
   return absl::OkStatus();
 }
 
@@ -267,6 +269,7 @@ absl::Status LineIndex::Drop(std::span<const uint32_t> slots) {
     batches_.at(it->second.batch).members[it->second.member].live = false;
     places_.erase(it);
   }
+  merge_ |= !found.empty();
   absl::erase_if(batches_, [](const auto& entry) { return entry.second.live == 0; });
   return absl::OkStatus();
 }
@@ -346,7 +349,7 @@ absl::Status LineIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
 }
 
 absl::Status LineIndex::Merge() {
-  for (;;) {
+  while (merge_) {
     std::vector<std::pair<uint32_t, uint64_t>> order;  // lines, batch
     for (const auto& [number, batch] : batches_) order.push_back({batch.count, number});
     std::sort(order.begin(), order.end());
@@ -358,18 +361,22 @@ absl::Status LineIndex::Merge() {
       for (size_t j = i + 1; j < order.size() && chosen.empty(); ++j) {
         const Batch& other = batches_.at(order[j].second);
         if (other.layer != batch.layer) continue;
+        if (uint64_t{other.count} + batch.count > most_lines_) continue;
         if (crowded || other.count / 2 <= batch.count) {
           chosen = {order[i].second, order[j].second};
         }
       }
     }
-    if (chosen.empty()) return absl::OkStatus();
+    merge_ = !chosen.empty();
+    if (!merge_) break;
     const absl::Status status = MergeFrom(chosen);
     if (absl::IsResourceExhausted(status) && order.size() <= kMaxLineBatches) {
-      return absl::OkStatus();  // later, then
+      merge_ = false;  // until something changes
+      break;
     }
     if (!status.ok()) return status;
   }
+  return absl::OkStatus();
 }
 
 }  // namespace voxeld::gpu::cuda

@@ -35,16 +35,17 @@ class LineIndex {
 
   // Forgets all, for a volume of that grid.
   void Reset(const TileGrid& grid);
-  // Whether a volume of that grid can have one.
-  static bool Suits(const TileGrid& grid);
+  // Whether a volume of that grid can have one, on such a device.
+  static bool Suits(const Api& api, const TileGrid& grid);
   // The slots of layers that have lines here; no more than kMaxLineLayers may.
   absl::flat_hash_set<uint32_t> Layers() const;
+  // Lines that may come in one Add.
+  uint64_t most_lines() const { return most_lines_; }
 
   // Adds them; marks regions if they are to be seen. ResourceExhausted, and nothing is added, if
   // memory does not suffice.
   absl::Status Add(const TableEntry* table, const LineArrivals& arrivals, uint8_t* region_dirty);
 
-  bool Has(uint32_t slot) const { return places_.contains(slot); }
   // Marks the regions of drawables.
   absl::Status Mark(std::span<const uint32_t> slots, uint8_t* region_dirty);
   // Drops them. An error leaves all as it was.
@@ -54,7 +55,6 @@ class LineIndex {
   absl::Status Merge();
 
   LineBatchList view() const;
-  bool empty() const { return batches_.empty(); }
 
  private:
   struct Member {
@@ -90,7 +90,8 @@ class LineIndex {
   RegionGrid grid_;
   // Of a line, on the average, as large batches had them; with some to spare.
   double pieces_a_line_ = 4, spans_a_line_ = 12;
-  uint64_t next_number_ = 1;
+  uint64_t next_number_ = 1, most_lines_ = 0;
+  bool merge_ = false;  // something has changed since merging was last done or given up
   absl::flat_hash_map<uint64_t, Batch> batches_;  // by number
   absl::flat_hash_map<uint32_t, Place> places_;   // by slot of the table
 };

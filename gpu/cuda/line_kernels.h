@@ -38,11 +38,8 @@ cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, cons
                       cudaStream_t stream);
 
 // ---- sorting
-// Shared memory that the first go takes of a block of threads.
-inline size_t SortLinesShared(const RegionGrid& grid) {
-  return size_t{grid.block_count()} * sizeof(uint32_t);
-}
-inline constexpr size_t kMostSortLinesShared = 96u << 10;
+// Shared memory that the first go takes of a block of threads, at most.
+size_t SortLinesShared(const RegionGrid& grid);
 
 // After it block_begin and chunk_begin are there.
 cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
@@ -57,11 +54,11 @@ cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_
 // Those that have spans; `regions` by block as SpanLists has it.
 cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty,
                         cudaStream_t stream);
-// Lines in rows: `count` in all, the first of the d-th is slots[d].
-// Regions that they touch.
+// Of lines in rows, `count` in all; the first of the d-th is slots[d]. Marks the regions that they
+// touch.
 cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,
                       const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream);
-// They draw nothing from now on.
+// Of such, too: they draw nothing from now on.
 cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream);
 
 }  // namespace voxeld::gpu::cuda

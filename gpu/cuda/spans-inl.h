@@ -24,19 +24,11 @@ __device__ inline void DrawSpan(const DrawView& view, const LineBatchView& batch
   const int32_t k = span.k();
   const ThinSteps steps =
       ThinSteps::At(line, k, __ldg(&view.reciprocals[line.n]), at, RegionBits(2));
-  // 32.32 bits: a step is an addition with its carry, and the voxel is the upper half as it stands.
-  uint64_t at64[3], step64[3];
-  for (int a = 0; a < 3; ++a) {
-    at64[a] = static_cast<uint64_t>(steps.at[a]) << 5;
-    step64[a] =
-        static_cast<uint64_t>(static_cast<int64_t>(static_cast<int32_t>(steps.step[a])) << 5);
-  }
+  ThinCursor cursor(steps);
   const uint32_t count = span.count();
   const auto next = [&] {
-    const uint32_t place =
-        (static_cast<uint32_t>(at64[2] >> 32) << 5 | static_cast<uint32_t>(at64[1] >> 32)) << 5 |
-        static_cast<uint32_t>(at64[0] >> 32);
-    for (int a = 0; a < 3; ++a) at64[a] += step64[a];
+    const uint32_t place = (cursor.voxel(2) << 5 | cursor.voxel(1)) << 5 | cursor.voxel(0);
+    cursor.Next();
     return place;
   };
   if (span.mixed()) {

@@ -26,8 +26,7 @@
 namespace voxeld::gpu {
 
 inline constexpr int32_t kMaxThinSteps = 8700;
-inline constexpr int32_t kMaxThinUnits = 1 << 22;  // positions: ±2¹⁴ voxels
-inline constexpr uint32_t kMaxSpan = 57;           // voxels of a line in a box of 32
+inline constexpr uint32_t kMaxSpan = 57;  // voxels of a line in a box of 32
 
 // 32 bytes, read as two times 16.
 struct alignas(16) ThinLine {
@@ -208,17 +207,30 @@ struct ThinSteps {
     }
     return t;
   }
-  VOXELD_HD void Next() {
-    for (int a = 0; a < 3; ++a) at[a] += step[a];
-  }
-  VOXELD_HD uint32_t voxel(int a) const { return at[a] >> 27; }
-
   VOXELD_HD static uint32_t MulHigh(uint32_t a, uint32_t b) {
 #if defined(__CUDA_ARCH__)
     return __umulhi(a, b);
 #else
     return static_cast<uint32_t>(static_cast<uint64_t>(a) * b >> 32);
 #endif
+  }
+};
+
+// The same as 32.32 bits: a step is an addition with its carry, and the voxel, modulo 2³², is the upper
+// half as it stands.
+struct ThinCursor {
+  uint64_t at[3], step[3];
+
+  VOXELD_HD explicit ThinCursor(const ThinSteps& steps) {
+    for (int a = 0; a < 3; ++a) {
+      at[a] = static_cast<uint64_t>(steps.at[a]) << 5;
+      step[a] = static_cast<uint64_t>(static_cast<int64_t>(static_cast<int32_t>(steps.step[a])))
+                << 5;
+    }
+  }
+  VOXELD_HD uint32_t voxel(int a) const { return static_cast<uint32_t>(at[a] >> 32); }
+  VOXELD_HD void Next() {
+    for (int a = 0; a < 3; ++a) at[a] += step[a];
   }
 };
 

@@ -68,8 +68,7 @@ void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture)
           Threshold(tone.dither, u, v, sub, static_cast<uint32_t>(layout.sub_frames));
     }
   }
-  for (const auto& [index, u, v] : pixels.lit) {
-    const uint32_t rgb = pixels.rgb[index];
+  for (const auto& [rgb, u, v] : pixels.lit) {
     const uint32_t threshold = thresholds[v % 8][u % 8];
     const Levels q = {Quantize(tone.lut[rgb >> 16], kLevels.r, threshold),
                       Quantize(tone.lut[(rgb >> 8) & 0xFF], kLevels.g, threshold),
@@ -118,7 +117,7 @@ bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slice
       scratch.lit.push_back(slice);
       continue;
     }
-    scratch.pixels.Clear(static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height));
+    scratch.pixels.lit.clear();
     if (!blank) plan_->sampler.Sample(tiles, slice, scratch.pixels);
     for (size_t sub = 0; sub < sub_frames; ++sub) {
       if (!blank || !was_blank) {

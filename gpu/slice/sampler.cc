@@ -51,15 +51,6 @@ uint32_t LitBits(const uint32_t* from, int32_t count, uint32_t shift) {
 
 }  // namespace
 
-void SlicePixels::Clear(size_t pixels) {
-  if (rgb.size() != pixels || lit.size() > pixels / 8) {
-    rgb.assign(pixels, 0);
-  } else {
-    for (const Pixel& pixel : lit) rgb[pixel.index] = 0;
-  }
-  lit.clear();
-}
-
 int Sampler::FastestAxis(const display::FootprintTable& table) {
   const Offset reach = Greatest(table.inner);
   return static_cast<int>(std::max_element(reach.begin(), reach.end()) - reach.begin());
@@ -202,9 +193,7 @@ void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
       uint32_t greatest = 0;
       for (const InnerEntry& e : inner) greatest = std::max(greatest, line[e.place]);
       if (greatest == 0) continue;
-      const uint32_t u = u0 + lit[n], pixel = v * width + u;
-      out.rgb[pixel] = Deinterleave(greatest);
-      out.lit.push_back({pixel, u, v});
+      out.lit.push_back({Deinterleave(greatest), u0 + lit[n], v});
     }
   }
 }
@@ -224,9 +213,8 @@ void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& o
           const uint32_t* from = colors + grid.IndexInTile(at[0], at[1], at[2]);
           for (uint32_t lit = LitBits(from, count, shift); lit != 0; lit &= lit - 1) {
             const int i = std::countr_zero(lit);
-            const uint32_t row = static_cast<uint32_t>(v + i), index = row * width + u;
-            out.rgb[index] = Deinterleave(from[static_cast<uint32_t>(i) << shift]);
-            out.lit.push_back({index, u, row});
+            out.lit.push_back({Deinterleave(from[static_cast<uint32_t>(i) << shift]), u,
+                               static_cast<uint32_t>(v + i)});
           }
         }
         at[run.axis] += count;
@@ -239,7 +227,6 @@ void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& o
 // What SampleSingle comes to where slices are planes: tile by tile, and of those the lit rows alone.
 void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const {
   const TileGrid& grid = tiles.grid();
-  const uint32_t width = static_cast<uint32_t>(table_.width);
   const int32_t first = runs_[0].at[1], last = first + runs_[0].length;  // of y
   struct Row {
     const uint32_t* from;
@@ -254,9 +241,7 @@ void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) c
     for (const Row& row : std::span(rows, count)) {
       for (uint32_t lit = LitBits(row.from, row.count, 0); lit != 0; lit &= lit - 1) {
         const uint32_t bit = static_cast<uint32_t>(std::countr_zero(lit));
-        const uint32_t index = (row.v + bit) * width + row.u;
-        out.rgb[index] = Deinterleave(row.from[bit]);
-        out.lit.push_back({index, row.u, row.v + bit});
+        out.lit.push_back({Deinterleave(row.from[bit]), row.u, row.v + bit});
       }
     }
     count = 0;
@@ -286,20 +271,23 @@ void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) c
 
 void Sampler::SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u,
                              SlicePixels& out) const {
-  const uint32_t width = static_cast<uint32_t>(table_.width);
+  bool any = false;
   for (const display::FootprintEntry& outer : table_.Outer(slice, static_cast<int32_t>(u))) {
     std::fill(out.lines.begin(), out.lines.end(), 0);
     if (!Gather(tiles, outer, out.lines.data())) continue;
+    if (!any) out.column.assign(static_cast<size_t>(table_.height), 0);
+    any = true;
     for (uint32_t v = 0; v < static_cast<uint32_t>(table_.height); ++v) {
-      uint32_t& rgb = out.rgb[v * width + u];
-      const uint32_t before = rgb;
+      uint32_t& rgb = out.column[v];
       for (const InnerEntry& inner : Inner(slice, v)) {
         const uint32_t color = out.lines[inner.place];
         if (color == 0) continue;
         rgb = RaiseWeighted(rgb, FootprintWeight(outer.weight, inner.weight), Deinterleave(color));
       }
-      if (before == 0 && rgb != 0) out.lit.push_back({v * width + u, u, v});
     }
+  }
+  for (uint32_t v = 0; any && v < static_cast<uint32_t>(table_.height); ++v) {
+    if (out.column[v] != 0) out.lit.push_back({out.column[v], u, v});
   }
 }
 

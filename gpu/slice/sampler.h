@@ -12,16 +12,14 @@
 
 namespace voxeld::gpu {
 
-// A slice's pixels. `rgb` is 0x00RRGGBB, row-major; only pixels in `lit` may differ from 0.
+// A slice's pixels that are not black, each once.
 struct SlicePixels {
   struct Pixel {
-    uint32_t index, u, v;  // index: v * width + u
+    uint32_t rgb, u, v;  // 0x00RRGGBB
   };
-  std::vector<uint32_t> rgb;
   std::vector<Pixel> lit;
-  std::vector<uint32_t> lines;  // scratch of the sampler's: kColumns of them
-
-  void Clear(size_t pixels);
+  std::vector<uint32_t> lines,
+      column;  // scratch of the sampler's: kColumns lines, a column of pixels
 };
 
 // Immutable; used by any number of threads.

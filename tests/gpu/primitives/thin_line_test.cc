@@ -12,6 +12,7 @@
 namespace voxeld::gpu {
 namespace {
 
+constexpr int64_t kMostUnits = int64_t{1} << 22;  // ±2¹⁴ voxels
 constexpr int kBits[3] = {5, 5, 4};
 constexpr int kFarBits[3] = {7, 7, 6};
 
@@ -44,7 +45,7 @@ void AddSpan(const ThinLine& line, const int32_t box[3], int32_t begin, int32_t 
              std::vector<Voxel>& voxels) {
   ASSERT_LT(begin, end);
   ASSERT_LE(end - begin, static_cast<int32_t>(kMaxSpan));
-  ThinSteps at = ThinSteps::At(line, begin, ThinReciprocal(Max(line.n, 1)), box, kBits[2]);
+  ThinCursor at(ThinSteps::At(line, begin, ThinReciprocal(Max(line.n, 1)), box, kBits[2]));
   for (int32_t k = begin; k < end; ++k, at.Next()) {
     Voxel voxel;
     for (int a = 0; a < 3; ++a) {
@@ -109,7 +110,7 @@ TEST_P(ThinLines, AreTheDefinedVoxelsForRandomEnds) {
   for (int i = 0; i < 20000; ++i) {
     const int bits = std::uniform_int_distribution<int>(3, 20)(random);
     std::uniform_int_distribution<int64_t> reach(-(int64_t{1} << bits), int64_t{1} << bits);
-    std::uniform_int_distribution<int64_t> place(-kMaxThinUnits / 2, kMaxThinUnits / 2);
+    std::uniform_int_distribution<int64_t> place(-kMostUnits / 2, kMostUnits / 2);
     Line line;
     line.sampling = GetParam();
     for (int a = 0; a < 3; ++a) {

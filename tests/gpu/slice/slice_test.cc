@@ -132,31 +132,39 @@ TileStore HandTiles(uint32_t at_1, uint32_t at_17, uint32_t at_17_above) {
   return tiles;
 }
 
-SlicePixels Sampled(const TileStore& tiles, display::Sampling sampling) {
-  absl::StatusOr<Sampler> sampler = Sampler::Create(HandTable(), tiles.grid(), sampling);
+// The colours of all pixels, row by row.
+std::vector<uint32_t> Sampled(const TileStore& tiles, display::Sampling sampling) {
+  const display::FootprintTable table = HandTable();
+  absl::StatusOr<Sampler> sampler = Sampler::Create(table, tiles.grid(), sampling);
   EXPECT_TRUE(sampler.ok()) << sampler.status();
   SlicePixels pixels;
-  pixels.Clear(4);
   sampler->Sample(tiles, 0, pixels);
-  return pixels;
+  std::vector<uint32_t> colors(static_cast<size_t>(table.width * table.height));
+  for (const auto& [rgb, u, v] : pixels.lit) {
+    uint32_t& color = colors[v * static_cast<uint32_t>(table.width) + u];
+    EXPECT_EQ(color, 0u) << "told twice";
+    EXPECT_NE(rgb, 0u);
+    color = rgb;
+  }
+  return colors;
 }
 
 TEST(Sampler, MaxTakesTheGreatestWordOfTheFootprint) {
-  const SlicePixels pixels =
+  const std::vector<uint32_t> pixels =
       Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kMax);
   // Grey's word is greater than green's: the highest bits are equal, then red's decides.
-  EXPECT_EQ(pixels.rgb, (std::vector<uint32_t>{0x00FF00, 0, 0x808080, 0}));
-  const SlicePixels other =
+  EXPECT_EQ(pixels, (std::vector<uint32_t>{0x00FF00, 0, 0x808080, 0}));
+  const std::vector<uint32_t> other =
       Sampled(HandTiles(0xFF0000, 0x000001, 0x808080), display::Sampling::kMax);
-  EXPECT_EQ(other.rgb, (std::vector<uint32_t>{0xFF0000, 0, 0x808080, 0}));
+  EXPECT_EQ(other, (std::vector<uint32_t>{0xFF0000, 0, 0x808080, 0}));
 }
 
 // Green at half weight: 128;
 // grey above at (128·64 + 127)/255 = 32, of 0x80: (32·128 + 127)/255 = 16.
 TEST(Sampler, WeightedTakesTheGreatestOfEachChannel) {
-  const SlicePixels pixels =
+  const std::vector<uint32_t> pixels =
       Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kWeighted);
-  EXPECT_EQ(pixels.rgb, (std::vector<uint32_t>{0xFF8000, 0, 0xFF8010, 0}));
+  EXPECT_EQ(pixels, (std::vector<uint32_t>{0xFF8000, 0, 0xFF8010, 0}));
 }
 
 TEST(Sampler, RefusesATableThatLeavesTheGrid) {
