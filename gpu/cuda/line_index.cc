@@ -41,7 +41,7 @@ absl::flat_hash_set<uint32_t> LineIndex::Layers() const {
 }
 
 LineBatchList LineIndex::view() const {
-  LineBatchList list;
+  LineBatchList list;  // Merge sees to it that they fit
   for (const auto& [number, batch] : batches_) {
     LineBatchView& view = list.batches[list.count++];
     view.lines = batch.lines.as<ThinLine>();
@@ -375,6 +375,9 @@ absl::Status LineIndex::Merge() {
       break;
     }
     if (!status.ok()) return status;
+  }
+  if (batches_.size() > kMaxLineBatches) {
+    return absl::ResourceExhaustedError("the scene has too many lines to be drawn at once");
   }
   return absl::OkStatus();
 }
