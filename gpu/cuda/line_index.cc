@@ -181,6 +181,7 @@ absl::Status LineIndex::Add(const TableEntry* table, const LineArrivals& arrival
   }
   const uint64_t number = next_number_++;
   for (size_t i = 0; i < arrivals.slots.size(); ++i) {
+    if (arrivals.first[i] == arrivals.first[i + 1]) continue;  // it has no lines
     places_[arrivals.slots[i]] = {number, batch.members.size()};
     batch.members.push_back({arrivals.slots[i], static_cast<uint32_t>(arrivals.first[i]),
                              static_cast<uint32_t>(arrivals.first[i + 1] - arrivals.first[i]),
@@ -200,13 +201,12 @@ absl::flat_hash_map<uint64_t, LineIndex::Lines> LineIndex::Find(
     const Member& member = batches_.at(it->second.batch).members[it->second.member];
     Lines& lines = found[it->second.batch];
     lines.count += member.count;
-    if (member.count > 0) lines.members.push_back(member);
+    lines.members.push_back(member);
   }
   return found;
 }
 
 absl::Status LineIndex::Touch(const Batch& batch, Lines& lines, uint8_t* region_dirty) {
-  if (lines.members.empty()) return absl::OkStatus();
   std::sort(lines.members.begin(), lines.members.end(),
             [](const Member& a, const Member& b) { return a.first < b.first; });
   std::vector<uint32_t> from;
@@ -291,7 +291,7 @@ absl::Status LineIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
     Range range{&batch, {}, {merged.count}};
     uint32_t end = 0;  // of the last range, in the old batch
     for (const Member& member : batch.members) {
-      if (!member.live || member.count == 0) continue;
+      if (!member.live) continue;
       merged.members.push_back({member.slot, merged.count, member.count, true});
       if (range.from.empty() || member.first != end) {
         if (!range.from.empty()) range.first.push_back(merged.count);
@@ -337,13 +337,7 @@ absl::Status LineIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
   for (size_t m = 0; m < merged.members.size(); ++m) {
     places_[merged.members[m].slot] = {number, m};
   }
-  // Drawables without lines stay in no batch.
-  for (const uint64_t old : numbers) {
-    for (const Member& member : batches_.at(old).members) {
-      if (member.live && member.count == 0) places_.erase(member.slot);
-    }
-    batches_.erase(old);
-  }
+  for (const uint64_t old : numbers) batches_.erase(old);
   batches_.emplace(number, std::move(merged));
   return absl::OkStatus();
 }

@@ -58,7 +58,7 @@ class LineIndex {
 
  private:
   struct Member {
-    uint32_t slot, first, count;  // lines
+    uint32_t slot, first, count;  // lines, one at least
     bool live;
   };
   struct Batch {

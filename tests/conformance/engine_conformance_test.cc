@@ -137,7 +137,7 @@ TEST_P(EngineConformance, ThousandDeltasEqualTheSceneDrawnWhole) {
       ASSERT_TRUE(applied.ok()) << applied;
     } while (generator.Chance(0.2));
     const absl::StatusOr<FrameResult> frame = engine.Frame();
-    ASSERT_TRUE(frame.ok());
+    ASSERT_TRUE(frame.ok()) << frame.status();
     EXPECT_EQ(frame->frame, engine.frame());
     // The numbers say exactly which pictures changed.
     bool changed = before.empty();

@@ -128,6 +128,27 @@ TEST_P(OwnResolution, ALineWithinAVoxelShowsTheGreaterColour) {
   EXPECT_EQ(CountLit(voxels), 1u);
 }
 
+// A strip of one corner has no lines: it goes after those that came with it.
+TEST_P(OwnResolution, DrawablesWithoutLinesComeAndGo) {
+  const Target target = StackOf(32, 32, 16, display::PixelFormat::kRgb888);
+  SceneModel scene = RandomLines(Seed() + 3, 4, target.geometry.grid);
+  scene.geometries[2].record.topology = Topology::kStrip;
+  scene.geometries[2].record.vertex_count = 1;
+  scene.geometries[2].positions.resize(3);
+  scene.geometries[2].colors.resize(1);
+  EngineDriver engine = Make();
+  ASSERT_TRUE(engine.SetTarget(target).ok());
+  ASSERT_TRUE(engine.Apply(Whole(scene)).ok());
+  ExpectLikeOracle(engine, scene, target);
+  for (const uint64_t id : {1, 3, 4, 2}) {
+    DeltaBuffer delta;
+    delta.Drop(Op::kDropDrawable, id);
+    scene.drawables.erase(id);
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    ExpectLikeOracle(engine, scene, target);
+  }
+}
+
 // What was drawn for a reader of voxels is told with the next frame, also if the target is set in
 // between; and nothing of it stays where a target is sliced another way.
 TEST_P(OwnResolution, ChangesBetweenTargetsAreTold) {
