@@ -1,9 +1,9 @@
-// The voxel volume on the device: the scene's table of drawables, the index of what may lie in which
-// tile, and the drawing of the tiles that changed.
+// The voxel volume on the device: the scene's table of drawables, the indices of what may lie in which
+// tile (pair_index.h) and of thin lines (line_index.h), and the drawing of the regions that changed.
 //
-// The index is a few batches of pairs, each sorted by tile: a change adds a batch, batches of like
-// size are merged, and pairs of drawables that have gone are dropped on the way; so an index of n
-// pairs costs O(log n) a pair, and what has gone never costs more than what is there.
+// Each index is a few batches: a change adds one, batches of like size are merged, and what has gone
+// is dropped on the way; so an index of n costs O(log n) each, and what has gone never costs more
+// than what is there.
 #pragma once
 
 #include <cstdint>

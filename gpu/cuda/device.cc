@@ -16,10 +16,6 @@ absl::StatusOr<std::unique_ptr<Device>> Device::Open(int device) {
 }
 
 Device::~Device() {
-  for (const Time& time : times_) {
-    cudaEventDestroy(time.begin);
-    cudaEventDestroy(time.end);
-  }
   for (cudaStream_t stream : {stream_, copies_}) {
     if (stream == nullptr) continue;
     cudaStreamSynchronize(stream);
@@ -48,41 +44,6 @@ absl::Status Device::Zero(void* at, size_t bytes) {
 
 absl::Status Device::Wait() {
   return api_->Call("cudaStreamSynchronize", [&] { return cudaStreamSynchronize(stream_); });
-}
-
-absl::Status Device::BeginTime(const char* what) {
-  Time time{what, nullptr, nullptr};
-  for (cudaEvent_t* event : {&time.begin, &time.end}) {
-    absl::Status status = api_->Call("cudaEventCreate", [&] { return cudaEventCreate(event); });
-    if (!status.ok()) return status;
-  }
-  times_.push_back(time);
-  return api_->Call("cudaEventRecord", [&] { return cudaEventRecord(time.begin, stream_); });
-}
-
-absl::Status Device::EndTime() {
-  return api_->Call("cudaEventRecord", [&] { return cudaEventRecord(times_.back().end, stream_); });
-}
-
-absl::StatusOr<std::map<std::string, double>> Device::TakeTimes() {
-  if (absl::Status status = Wait(); !status.ok()) return status;
-  std::map<std::string, double> taken;
-  float ms = 0;
-  for (const Time& time : times_) {
-    if (cudaEventElapsedTime(&ms, time.begin, time.end) == cudaSuccess) {
-      taken[time.what] += static_cast<double>(ms);
-    }
-  }
-  if (!times_.empty() &&
-      cudaEventElapsedTime(&ms, times_.front().begin, times_.back().end) == cudaSuccess) {
-    taken["all"] = static_cast<double>(ms);
-  }
-  for (const Time& time : times_) {
-    cudaEventDestroy(time.begin);
-    cudaEventDestroy(time.end);
-  }
-  times_.clear();
-  return taken;
 }
 
 absl::StatusOr<Block> Device::Zeros(size_t bytes) {

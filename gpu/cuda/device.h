@@ -5,11 +5,8 @@
 
 #include <cstddef>
 #include <cstring>
-#include <map>
 #include <memory>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -34,15 +31,8 @@ class Device {
   // A kernel's queueing.
   template <typename Function>
   absl::Status Run(const char* what, Function&& function) {
-    if (!timed_) return api_->Call(what, std::forward<Function>(function));
-    if (absl::Status status = BeginTime(what); !status.ok()) return status;
-    absl::Status status = api_->Call(what, std::forward<Function>(function));
-    return status.ok() ? EndTime() : status;
+    return api_->Call(what, std::forward<Function>(function));
   }
-  // From now on the device notes when what is queued begins and ends: for benchmarks.
-  void TimeRuns() { timed_ = true; }
-  // Milliseconds by name, of what has been queued since the last call; waits for the work.
-  absl::StatusOr<std::map<std::string, double>> TakeTimes();
   absl::Status ToDevice(void* to, const void* from, size_t bytes);
   absl::Status ToHost(void* to, const void* from, size_t bytes);
   absl::Status Zero(void* at, size_t bytes);
@@ -75,16 +65,7 @@ class Device {
 
   const std::unique_ptr<Api> api_;
   Pool pool_;
-  struct Time {
-    const char* what;
-    cudaEvent_t begin, end;
-  };
-  absl::Status BeginTime(const char* what);
-  absl::Status EndTime();
-
   cudaStream_t stream_ = nullptr, copies_ = nullptr;
-  bool timed_ = false;
-  std::vector<Time> times_;
 };
 
 }  // namespace voxeld::gpu::cuda
