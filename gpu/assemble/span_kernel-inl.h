@@ -39,7 +39,7 @@ struct UpwardAxis {
 
 // The k inside the volume.
 HWY_NOINLINE inline void ClipToVolume(const LineWalk& walk, const WalkGrid& grid, int64_t* begin,
-                               int64_t* end) {
+                                      int64_t* end) {
   const int64_t most = *end;
   for (int r = 0; r < 3; ++r) {
     const UpwardAxis up(walk.at(r), walk.step(r));

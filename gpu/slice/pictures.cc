@@ -37,13 +37,16 @@ void Pictures::MarkSlices(const TileStore& tiles, const Volume::Changes& changes
     if (left == 0 && before == now) continue;
     int32_t ijk[3];
     tiles.grid().Coordinates(tile, ijk);
-    const auto place = static_cast<size_t>(look.stride[0] * ijk[0] + look.stride[1] * ijk[1] +
-                                           look.stride[2] * ijk[2]);
-    const int32_t inner = ijk[static_cast<int>(look.inner_axis)];
+    size_t place = 0;
+    for (int a = 0; a < 3; ++a) {
+      place += static_cast<size_t>(look.stride[a]) * static_cast<size_t>(ijk[a]);
+    }
+    const auto inner = static_cast<size_t>(ijk[static_cast<int>(look.inner_axis)]);
     for (uint32_t n = look.begin[place]; n < look.begin[place + 1]; ++n) {
       const int32_t slice = look.slices[n];
       if (slice < plan_->begin || slice >= plan_->end) continue;
-      if (look.seen[static_cast<size_t>(slice % look.inner_sets * look.inner_tiles + inner)] == 0) {
+      const auto set = static_cast<size_t>(slice % look.inner_sets);
+      if (look.seen[set * static_cast<size_t>(look.inner_tiles) + inner] == 0) {
         continue;
       }
       const size_t s = static_cast<size_t>(slice - plan_->begin);

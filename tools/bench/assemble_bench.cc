@@ -102,7 +102,7 @@ void Assemble(benchmark::State& state, const Draft (&scenes)[2], const int32_t s
     ++id;
     frame();
   }
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     state.PauseTiming();
     delta = DeltaOf(scenes[id % 2], id + 1);
     ++id;
@@ -155,7 +155,7 @@ void PlainLines(benchmark::State& state) {
   std::vector<uint32_t> dense(DenseVoxels());
   PlainFrame(dense, LineScene(0));
   uint64_t voxels = 0, turn = 0;
-  for (auto _ : state) voxels += PlainFrame(dense, LineScene(turn++ % 2));
+  for ([[maybe_unused]] auto _ : state) voxels += PlainFrame(dense, LineScene(turn++ % 2));
   state.SetItemsProcessed(static_cast<int64_t>(voxels));
 }
 
@@ -268,7 +268,7 @@ void WholeFrames(benchmark::State& state, Frames& frames, const Draft (&scenes)[
     ++id;
     frames.Frame();
   }
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     state.PauseTiming();
     const std::vector<std::byte> delta = DeltaOf(scenes[id % 2], id + 1);
     ++id;
