@@ -55,14 +55,6 @@ VolumeView DeviceTiles::view() const {
 }
 
 absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all_dirty) {
-  if (reciprocals_.size() == 0) {
-    std::vector<uint64_t> reciprocals = {ThinReciprocal(1)};
-    for (int32_t n = 1; n <= kMaxThinSteps; ++n) reciprocals.push_back(ThinReciprocal(n));
-    absl::StatusOr<Block> block = device_.Upload(reciprocals.data(), reciprocals.size());
-    if (!block.ok()) return block.status();
-    if (absl::Status status = device_.Wait(); !status.ok()) return status;
-    reciprocals_ = *std::move(block);
-  }
   tiles_ = std::move(tiles);
   view_ = view;
   scene_.MapClips(view_, true);
@@ -227,7 +219,6 @@ DrawView CudaVolume::ViewForDrawing() const {
   view.half_spaces = half_spaces_.as<VoxelHalfSpace>();
   view.pairs = index_.view();
   view.lines = lines_.view();
-  view.reciprocals = reciprocals_.as<uint64_t>();
   view.volume = tiles_.view();
   view.regions = tiles_.regions;
   return view;
@@ -273,7 +264,7 @@ absl::Status CudaVolume::Update(const SliceIndexView& slices, const PackedView* 
     });
     if (!status.ok()) return status;
   }
-  status = device_.Zero(&volume.counters->dirty, 2 * sizeof(uint32_t));
+  status = device_.Zero(&volume.counters->dirty, sizeof(uint32_t));
   if (!status.ok()) return status;
   listed_ = true;
   status =

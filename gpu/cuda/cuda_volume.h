@@ -126,7 +126,6 @@ class CudaVolume final : private SceneObserver {
   PairIndex index_;      // of all that is no thin line
   LineIndex lines_;
   bool lines_suit_ = false;  // the volume is not too large for them
-  Block reciprocals_;
 
   Block table_;
   std::vector<Slot> slots_;

@@ -22,14 +22,12 @@ struct DrawScratch<DrawWhat::kAll> {
   PairScratch pairs;
 };
 
-// color(v): of voxel v of the region; any thread can tell.
 template <DrawTo kTo, typename Color>
-__device__ void Flush(const DrawView& view, const RegionPlace& place, const Ahead& ahead,
-                      RegionScratch& scratch, Color&& color) {
-  const auto round = [&](uint32_t j) { return color(threadIdx.x + j * kDrawThreads); };
-  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch, round);
-  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, ahead, scratch, color);
-  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, round);
+__device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
+                      Color&& color) {
+  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch, color);
+  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, scratch, color);
+  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, color);
 }
 
 // The layers of a region from the lowest on, each raised into the words; blend() after each.
@@ -76,42 +74,37 @@ constexpr int kBlocksAtOnce = kWhat == DrawWhat::kOneLayer ? 2
 template <DrawWhat kWhat, DrawTo kTo>
 __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
     DrawRegionsKernel(const __grid_constant__ DrawView view) {
-  extern __shared__ __align__(16) unsigned char memory[];
-  DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(memory);
+  DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(shared_memory);
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
-  // The first thread asks for the region after the next one, and for the place of the one after
-  // that, before it needs them.
   const uint32_t dirty = counters.dirty;
-  const auto listed = [&](uint32_t place) {
-    return place < dirty ? view.volume.dirty_list[place] : kAllLanes;
-  };
-  uint32_t place_after = 0, region_after = kAllLanes;
+  for (uint32_t i = threadIdx.x; i < kRegionRows * kRowStride; i += kDrawThreads) {
+    scratch.words[i] = 0;
+  }
+  if constexpr (kTo == DrawTo::kPictures) {
+    if (threadIdx.x < 64 && view.packed.slices.format == display::PixelFormat::kBitPlanes3) {
+      scratch.least[threadIdx.x] = view.packed.least[threadIdx.x];
+    }
+  }
   if (threadIdx.x == 0) {
     scratch.lit_change = 0;
-    region_after = listed(atomicAdd(&counters.next_region, 1u));
-    place_after = atomicAdd(&counters.next_region, 1u);
+    scratch.region = blockIdx.x < dirty ? view.volume.dirty_list[blockIdx.x] : kAllLanes;
   }
-  for (;;) {
-    if (threadIdx.x == 0) {
-      scratch.region = region_after;
-      region_after = listed(place_after);
-      place_after = atomicAdd(&counters.next_region, 1u);
-    }
+  for (uint32_t i = blockIdx.x; i < dirty; i += gridDim.x) {
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
-    uint4* const words = reinterpret_cast<uint4*>(scratch.words);
-    for (uint32_t v = threadIdx.x; v < kRegionVoxels / 4; v += kDrawThreads) {
-      words[v] = make_uint4(0, 0, 0, 0);
-    }
     __syncthreads();
     const uint32_t region = scratch.region;
-    if (region == kAllLanes) break;
-    const RegionPlace place(view, region);
-    const Ahead ahead = Ahead::Of<kTo>(view, place);
+    // On its way while this one is written out.
+    uint32_t region_after = 0;
+    const auto ask_ahead = [&] {
+      const uint32_t next = i + gridDim.x;
+      if (threadIdx.x == 0 && next < dirty) region_after = view.volume.dirty_list[next];
+    };
     if constexpr (kWhat == DrawWhat::kOneLayer) {
       const VoxelHalfSpace* cut_by = nullptr;
       uint32_t cutting = 0;
       if (view.clipped) {
+        const RegionPlace place(view, scratch);
         DrawLayers<kWhat>(view, place, all, [&] {
           cutting = scratch.cutting;
           cut_by = view.half_spaces + view.layers[scratch.layer].first_half_space;
@@ -124,18 +117,18 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
           }
         }
       }
-      const auto shown = [&](uint32_t v) {
-        const uint32_t word = scratch.words[v];
-        return (word & kEraseBit) != 0 ? 0 : word & kColorMask;
-      };
+      ask_ahead();
+      const RegionPlace place(view, scratch);
+      // An erase's colour is 0.
       if (cutting == 0) {
-        Flush<kTo>(view, place, ahead, scratch, shown);
+        Flush<kTo>(view, place, scratch, [](uint32_t word, uint32_t) { return word & kColorMask; });
       } else {
-        Flush<kTo>(view, place, ahead, scratch, [&](uint32_t v) {
-          return IsInsideAll(cut_by, cutting, place.box, v) ? shown(v) : 0;
+        Flush<kTo>(view, place, scratch, [&](uint32_t word, uint32_t v) {
+          return IsInsideAll(cut_by, cutting, place.box, v) ? word & kColorMask : 0;
         });
       }
     } else {
+      const RegionPlace place(view, scratch);
       uint32_t colors[kRounds];
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) colors[j] = 0;
@@ -146,8 +139,8 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
 #pragma unroll
         for (uint32_t j = 0; j < kRounds; ++j) {
           const uint32_t v = threadIdx.x + j * kDrawThreads;
-          const uint32_t word = scratch.words[v];
-          scratch.words[v] = 0;
+          const uint32_t word = scratch.words[IndexOf(v)];
+          scratch.words[IndexOf(v)] = 0;
           if (word == 0) continue;
           if (cutting != 0 && !IsInsideAll(cut_by, cutting, place.box, v)) continue;
           colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
@@ -155,12 +148,14 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       });
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) {
-        scratch.words[threadIdx.x + j * kDrawThreads] = colors[j];
+        scratch.words[IndexOf(threadIdx.x + j * kDrawThreads)] = colors[j];
       }
       __syncthreads();
-      Flush<kTo>(view, place, ahead, scratch, [&](uint32_t v) { return scratch.words[v]; });
+      ask_ahead();
+      Flush<kTo>(view, place, scratch, [](uint32_t color, uint32_t) { return color; });
     }
     __syncthreads();
+    if (threadIdx.x == 0) scratch.region = region_after;
   }
   if (threadIdx.x == 0 && scratch.lit_change != 0) {
     atomicAdd(reinterpret_cast<unsigned long long*>(&counters.lit_voxels), scratch.lit_change);

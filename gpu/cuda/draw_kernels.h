@@ -11,7 +11,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// Lists the dirty regions, and they are clean. `counters->dirty` and `next_region` must be 0.
+// Lists the dirty regions, and they are clean. `counters->dirty` must be 0.
 cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, cudaStream_t stream);
 
 // Draw the regions listed. Where there are thin lines alone, in one visible layer that is seen as it

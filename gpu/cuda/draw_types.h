@@ -34,7 +34,6 @@ struct DrawView {
   const VoxelHalfSpace* half_spaces = nullptr;
   BatchList pairs;
   LineBatchList lines;
-  const uint64_t* reciprocals = nullptr;  // ThinReciprocal(n), n from 0 (as 1) to kMaxThinSteps
   VolumeView volume;
   RegionGrid regions;
   SliceIndexView slices;

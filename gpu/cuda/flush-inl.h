@@ -1,4 +1,5 @@
-// Where a region's colours go. Each function is called by the whole block.
+// Where a region's colours go. Each function is called by the whole block, and leaves the words 0.
+// color(word, v) is what is seen of voxel v of the region, whose word is given.
 #pragma once
 
 #include "gpu/cuda/region_scratch-inl.h"
@@ -10,11 +11,11 @@ inline constexpr uint32_t kRounds = kRegionVoxels / kDrawThreads;
 
 // Of voxel threadIdx.x + j·kDrawThreads of a region: a warp has a row along x.
 struct RowPlace {
-  uint32_t lane, half;  // which of the two tiles along x
+  uint32_t v, lane, half;  // which of the two tiles along x
   int32_t x, y, z;
 
   __device__ RowPlace(const RegionPlace& place, uint32_t j) {
-    const uint32_t v = threadIdx.x + j * kDrawThreads;
+    v = threadIdx.x + j * kDrawThreads;
     lane = v & 31;
     half = lane >> 4;
     x = place.box.lo[0] + static_cast<int32_t>(lane);
@@ -24,6 +25,13 @@ struct RowPlace {
   // Of the region's four.
   __device__ uint32_t tile() const { return half | (static_cast<uint32_t>(y) >> 4 & 1) << 1; }
 };
+
+__device__ inline uint32_t TakeWord(RegionScratch& scratch, const RowPlace& at) {
+  uint32_t& word = scratch.words[IndexOf(at.v)];
+  const uint32_t taken = word;
+  word = 0;
+  return taken;
+}
 
 // Counts a row's lit voxels for the two tiles that it crosses.
 __device__ inline void CountLit(bool lit, const RowPlace& at, RegionScratch& scratch) {
@@ -60,8 +68,7 @@ __device__ inline void MarkSlices(const SliceIndexView& slices, const TileGrid& 
   }
 }
 
-// Into the tiles' colours; marks the slices that look at those that changed. color(j): of voxel
-// threadIdx.x + j·kDrawThreads.
+// Into the tiles' colours; marks the slices that look at those that changed.
 template <typename Color>
 __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
                              Color&& color) {
@@ -69,10 +76,11 @@ __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, Reg
 #pragma unroll
   for (uint32_t j = 0; j < kRounds; ++j) {
     const RowPlace at(place, j);
+    const uint32_t drawn = TakeWord(scratch, at);
     const uint32_t tile = place.TileOf(volume, at.tile());
     const bool inside = tile != kAllLanes && at.x < place.box.hi[0] && at.y < place.box.hi[1] &&
                         at.z < place.box.hi[2];
-    const uint32_t c = inside ? color(j) : 0;
+    const uint32_t c = inside ? color(drawn, at.v) : 0;
     if (inside) {
       uint32_t& held = volume.colors[static_cast<size_t>(tile) * kTileVoxels +
                                      volume.grid.IndexInTile(at.x, at.y, at.z)];
@@ -159,14 +167,14 @@ struct BitsPlace {
 #pragma unroll
     for (uint32_t p = 0; p < 3; ++p) held[p] = *reinterpret_cast<uint32_t*>(at + p * plane);
   }
-  // The first pixel in the lowest bit. True if they were others.
+  // The first pixel in the highest bit. True if they were others.
   __device__ bool Put(const uint32_t bits[3], const uint32_t held[3]) const {
     if (at == nullptr) return false;
-    const uint32_t kept = count >= 32 ? kAllLanes : (1u << count) - 1;
+    const uint32_t kept = count >= 32 ? kAllLanes : ~(kAllLanes >> count);
     bool differs = false;
 #pragma unroll
     for (uint32_t p = 0; p < 3; ++p) {
-      const uint32_t bytes = __byte_perm(__brev(bits[p] & kept), 0, 0x0123);  // a byte's top first
+      const uint32_t bytes = __byte_perm(bits[p] & kept, 0, 0x0123);
       if (whole) {
         if (held[p] == bytes) continue;
         *reinterpret_cast<uint32_t*>(at + p * plane) = bytes;
@@ -181,65 +189,81 @@ struct BitsPlace {
   }
 };
 
-// What a region's writing out will ask for, asked for before it is drawn.
-struct Ahead {
-  uint32_t held[3] = {};               // of the first sub-frame
-  uint32_t tile = kAllLanes, lit = 0;  // of one tile, by the first kRegionTiles threads
-  int32_t slice = -1;                  // that the warp's plane is
-
-  template <DrawTo kTo>
-  __device__ static Ahead Of(const DrawView& view, const RegionPlace& place) {
-    Ahead ahead;
-    if constexpr (kTo == DrawTo::kPictures) {
-      const int32_t z = place.box.lo[2] + static_cast<int32_t>(threadIdx.x / 32);
-      if (z < place.box.hi[2]) ahead.slice = view.packed.slice_of_z[z];
-      if (view.packed.slices.format == display::PixelFormat::kBitPlanes3) {
-        BitsPlace(view.packed, place, ahead.slice, 0).Load(ahead.held);
-      }
-      if (threadIdx.x < kRegionTiles) {
-        ahead.tile = place.TileOf(view.volume, threadIdx.x);
-        if (ahead.tile != kAllLanes) ahead.lit = view.volume.lit[ahead.tile];
-      }
-    }
-    return ahead;
-  }
+// Bits of a row's 32 voxels, the first in the highest.
+struct RowBits {
+  uint32_t lit = 0, red = 0, green = 0, blue = 0;
 };
 
-// One plane of the region, by a warp: rows as bits by vote, then a lane writes a row. Bits: which
-// sub-frames' pictures differ. color(y) is the colour of the lane's voxel in row y.
+// Of a row in shared memory, of which this lane alone sees to this one, while its warp sees to 32.
+// least[8]: PackedView::least of this row's pixels. `keep`: the words are wanted again.
+// limit: voxels of it that there are.
 template <typename Color>
-__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place,
-                               const Ahead& ahead, RegionScratch& scratch, Color&& color) {
+__device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint32_t least[8],
+                           bool keep, Color&& color) {
   constexpr uint32_t kBlue = 0x249249;
+  RowBits bits;  // of what is below the least, and of what is dark
+#pragma unroll 1
+  for (uint32_t x = 0; x < 32; x += 8) {
+#pragma unroll
+    for (uint32_t half = 0; half < 8; half += 4) {
+      uint4& place = *reinterpret_cast<uint4*>(row + x + half);
+      const uint4 words = place;
+      if (__any_sync(kAllLanes, (words.x | words.y | words.z | words.w) != 0) == 0) {
+        bits.lit = bits.lit << 4 | 0xF;
+        bits.red = bits.red << 4 | 0xF;
+        bits.green = bits.green << 4 | 0xF;
+        bits.blue = bits.blue << 4 | 0xF;
+        continue;
+      }
+      if (!keep) place = make_uint4(0, 0, 0, 0);
+      const uint32_t four[4] = {words.x, words.y, words.z, words.w};
+#pragma unroll
+      for (uint32_t i = 0; i < 4; ++i) {
+        const uint32_t at = x + half + i, l = least[half + i];
+        const uint32_t c = static_cast<int32_t>(at) < limit ? color(four[i], v + at) : 0;
+        // The sign of a difference is whether it is less.
+        bits.lit = __funnelshift_l(c - 1, bits.lit, 1);
+        bits.red = __funnelshift_l((c & kBlue << 1) - (l << 1), bits.red, 1);
+        bits.green = __funnelshift_l((c & kBlue << 2) - (l << 2), bits.green, 1);
+        bits.blue = __funnelshift_l((c & kBlue) - l, bits.blue, 1);
+      }
+    }
+  }
+  // A pixel without light is at the lowest level whatever the least is.
+  bits.lit = ~bits.lit;
+  bits.red = ~bits.red & bits.lit;
+  bits.green = ~bits.green & bits.lit;
+  bits.blue = ~bits.blue & bits.lit;
+  return bits;
+}
+
+// One plane of the region, by a warp: a lane has a row. Bits: which sub-frames' pictures differ.
+// limit[2]: how much of it there is, along x and y.
+template <typename Color>
+__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place, int32_t slice,
+                               const int32_t limit[2], RegionScratch& scratch, Color&& color) {
   const SliceView& view = packed.slices;
-  const uint32_t lane = threadIdx.x % 32;
-  const int32_t first_v = (place.box.lo[1] - packed.y0) * packed.y_step;
-  const uint32_t u = static_cast<uint32_t>(place.box.lo[0]) + lane;
+  const uint32_t lane = threadIdx.x % 32, row = threadIdx.x;
+  const uint32_t v =
+      static_cast<uint32_t>((place.box.lo[1] + static_cast<int32_t>(lane) - packed.y0) *
+                            packed.y_step) %
+      8;
+  const int32_t voxels = static_cast<int32_t>(lane) < limit[1] ? limit[0] : 0;
   uint32_t pictures = 0;
   for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
-    uint32_t least[8];  // of this lane's pixels, by row
-#pragma unroll
-    for (int32_t i = 0; i < 8; ++i) {
-      const uint32_t v = static_cast<uint32_t>(first_v + i * packed.y_step) % 8;
-      least[i] = __ldg(&packed.least[(sub * 8 + v) * 8 + u % 8]);
-    }
-    uint32_t red = 0, green = 0, blue = 0, lit = 0;  // of row `lane`
-#pragma unroll 8
-    for (int32_t y = 0; y < 32; ++y) {
-      const uint32_t c = color(y);
-      const uint32_t any = __ballot_sync(kAllLanes, c != 0);
-      const uint32_t l = least[y % 8];
-      const uint32_t r = __ballot_sync(kAllLanes, (c & kBlue << 1) >= l << 1);
-      const uint32_t g = __ballot_sync(kAllLanes, (c & kBlue << 2) >= l << 2);
-      const uint32_t b = __ballot_sync(kAllLanes, (c & kBlue) >= l);
-      if (y == static_cast<int32_t>(lane)) lit = any, red = r, green = g, blue = b;
-    }
-    // A pixel without light is at the lowest level whatever the least is.
-    red &= lit, green &= lit, blue &= lit;
+    const uint4* const leasts =
+        reinterpret_cast<const uint4*>(sub == 0 ? scratch.least : packed.least + sub * 64) + v * 2;
+    const uint4 low = leasts[0], high = leasts[1];
+    const uint32_t least[8] = {low.x, low.y, low.z, low.w, high.x, high.y, high.z, high.w};
+    const BitsPlace bits_place(packed, place, slice, sub);
+    uint32_t held[3] = {};
+    bits_place.Load(held);  // on their way while the row is read
+    const RowBits drawn = TakeRow(scratch.words + row * kRowStride, row * 32, voxels, least,
+                                  sub + 1 < view.sub_frames, color);
     if (sub == 0) {
       // Of 16 rows: of the nearer tile in the lower half, of the further in the upper.
-      uint32_t counts = static_cast<uint32_t>(__popc(lit & 0xFFFF)) |
-                        static_cast<uint32_t>(__popc(lit >> 16)) << 16;
+      uint32_t counts = static_cast<uint32_t>(__popc(drawn.lit >> 16)) |
+                        static_cast<uint32_t>(__popc(drawn.lit & 0xFFFF)) << 16;
       for (int lanes = 8; lanes > 0; lanes /= 2) {
         counts += __shfl_xor_sync(kAllLanes, counts, lanes);
       }
@@ -248,10 +272,7 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
         atomicAdd(&scratch.lit[lane / 8 + 1], counts >> 16);
       }
     }
-    const BitsPlace bits_place(packed, place, ahead.slice, sub);
-    uint32_t held[3] = {ahead.held[0], ahead.held[1], ahead.held[2]};
-    if (sub > 0) bits_place.Load(held);
-    const uint32_t bits[3] = {red, green, blue};
+    const uint32_t bits[3] = {drawn.red, drawn.green, drawn.blue};
     const bool differs = bits_place.Put(bits, held);
     if (__any_sync(kAllLanes, differs)) pictures |= 1u << sub;
   }
@@ -259,40 +280,38 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
 }
 
 // Straight into the pictures of the slices that the region's planes are: a warp has a plane.
-// color(v): of voxel v of the region, which is of this warp's plane.
 static_assert(kDrawWarps == 1u << RegionBits(2));
 template <typename Color>
-__device__ void FlushToPictures(const DrawView& view, const RegionPlace& place, const Ahead& ahead,
+__device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
                                 RegionScratch& scratch, Color&& color) {
   const PackedView& packed = view.packed;
   const SliceView& slices = packed.slices;
   const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-  const int32_t s = ahead.slice;
-  const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
-  const int32_t rows = place.box.hi[1] - place.box.lo[1];
   const int32_t z = place.box.lo[2] + static_cast<int32_t>(warp);
-  const int32_t limit = x < place.box.hi[0] && z < place.box.hi[2] ? rows : 0;
-  const auto at = [&](int32_t y) {
-    return y < limit ? color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane) : 0u;
-  };
+  const bool inside = z < place.box.hi[2];
+  const int32_t s = inside ? __ldg(&packed.slice_of_z[z]) : -1;
+  const uint32_t tile =
+      threadIdx.x < kRegionTiles ? place.TileOf(view.volume, threadIdx.x) : kAllLanes;
+  const uint32_t lit_before = tile != kAllLanes ? view.volume.lit[tile] : 0;
+  const int32_t limit[2] = {inside ? place.box.hi[0] - place.box.lo[0] : 0,
+                            inside ? place.box.hi[1] - place.box.lo[1] : 0};
   uint32_t pictures = 0;
-  if (s >= 0 && slices.format == display::PixelFormat::kBitPlanes3) {
-    if (rows == 32 && place.box.hi[0] - place.box.lo[0] == 32) {
-      pictures = FlushPlane(packed, place, ahead, scratch, [&](int32_t y) {
-        return color(warp << 10 | static_cast<uint32_t>(y) << 5 | lane);
-      });
-    } else {
-      pictures = FlushPlane(packed, place, ahead, scratch, at);
-    }
+  if (slices.format == display::PixelFormat::kBitPlanes3) {
+    pictures = FlushPlane(packed, place, s, limit, scratch, color);
   } else {
+    const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
     for (int32_t y = 0; y < 32; ++y) {
-      const uint32_t c = at(y);
+      const uint32_t voxel = warp << 10 | static_cast<uint32_t>(y) << 5 | lane;
+      uint32_t& word = scratch.words[IndexOf(voxel)];
+      const bool here = static_cast<int32_t>(lane) < limit[0] && y < limit[1];
+      const uint32_t c = here ? color(word, voxel) : 0;
+      word = 0;
       const uint32_t lit = __ballot_sync(kAllLanes, c != 0);
       if (lane < 2 && (lit >> 16 * lane & 0xFFFF) != 0) {
         atomicAdd(&scratch.lit[(y >> 4) * 2 + lane], __popc(lit >> 16 * lane & 0xFFFF));
       }
       const int32_t v = (place.box.lo[1] + y - packed.y0) * packed.y_step;
-      if (s < 0 || y >= limit || v < 0 || v >= static_cast<int32_t>(slices.height) ||
+      if (s < 0 || !here || v < 0 || v >= static_cast<int32_t>(slices.height) ||
           x >= static_cast<int32_t>(slices.width)) {
         continue;
       }
@@ -317,19 +336,20 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place, 
     }
   }
   __syncthreads();
-  if (threadIdx.x < kRegionTiles && ahead.tile != kAllLanes) {
-    PutLit(view.volume, ahead.tile, ahead.lit, scratch.lit[threadIdx.x], scratch);
+  if (tile != kAllLanes) {
+    PutLit(view.volume, tile, lit_before, scratch.lit[threadIdx.x], scratch);
   }
 }
 
-// To who asks for voxels. color(j): of voxel threadIdx.x + j·kDrawThreads.
+// To who asks for voxels.
 template <typename Color>
-__device__ void FlushToReader(const DrawView& view, const RegionPlace& place, RegionScratch&,
-                              Color&& color) {
+__device__ void FlushToReader(const DrawView& view, const RegionPlace& place,
+                              RegionScratch& scratch, Color&& color) {
   const Box3& box = view.read.box;
 #pragma unroll 4
   for (uint32_t j = 0; j < kRounds; ++j) {
     const RowPlace at(place, j);
+    const uint32_t drawn = TakeWord(scratch, at);
     if (at.x >= place.box.hi[0] || at.y >= place.box.hi[1] || at.z >= place.box.hi[2]) continue;
     if (!Contains(box, at.x, at.y, at.z)) continue;
     if (place.TileOf(view.volume, at.tile()) == kAllLanes) continue;
@@ -338,7 +358,7 @@ __device__ void FlushToReader(const DrawView& view, const RegionPlace& place, Re
     view.read
         .out[(static_cast<size_t>(at.z - box.lo[2]) * ny + static_cast<size_t>(at.y - box.lo[1])) *
                  nx +
-             static_cast<size_t>(at.x - box.lo[0])] = Deinterleave(color(j));
+             static_cast<size_t>(at.x - box.lo[0])] = Deinterleave(color(drawn, at.v));
   }
 }
 

@@ -41,10 +41,11 @@ __global__ void FindBoundsKernel(const float* positions, uint32_t count, uint32_
   }
 }
 
+// But for its track.
 __device__ ThinLine Load(const ThinLine* line) {
   const int4* const at = reinterpret_cast<const int4*>(line);
   const int4 a = at[0], b = at[1];
-  return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w)};
+  return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w), {}};
 }
 
 __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t items,
@@ -60,7 +61,7 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
   const bool erase = entry.erase != 0;
   ThinLine thin = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
   uint32_t end = MakeWord(entry.priority, erase, line.color_e);
-  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the one voxel
+  if (thin.n == 0) thin.SetWord(end = Max(thin.word, end));  // both ends are the one voxel
   lines[i] = thin;
   if (ends != nullptr) ends[i] = end;
 }
@@ -76,7 +77,7 @@ __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, c
   const uint64_t i = Thread();
   if (i >= count) return;
   const uint64_t at = LineAt(list, first + i);
-  const ThinLine line = Load(&from[at]);
+  const ThinLine line = from[at];
   to[first + i] = line;
   if (ends_to != nullptr) ends_to[first + i] = ends_from != nullptr ? ends_from[at] : line.word;
 }
@@ -299,6 +300,7 @@ __global__ void __launch_bounds__(kThreads, 4)
       // What one warp has to do less in one round it has more in the next.
       const uint32_t group = round % 2 == 0 ? warp : kWarps - 1 - warp;
       const uint32_t p = round * kThreads + group * 32 + lane;
+      __syncwarp();  // or lanes that are done go on by themselves
       if (p >= count) continue;
       const LinePiece piece = scratch.order[p];
       const ThinLine line = Load(&lines[piece.line]);
@@ -378,7 +380,7 @@ __global__ void MarkLinesKernel(ItemList list, uint32_t count, const ThinLine* l
 
 __global__ void KillLinesKernel(ItemList list, uint32_t count, ThinLine* lines) {
   const uint64_t i = Thread();
-  if (i < count) lines[LineAt(list, i)].word = 0;
+  if (i < count) lines[LineAt(list, i)].SetWord(0);
 }
 
 size_t BlockNumbersShared(const RegionGrid& grid) {

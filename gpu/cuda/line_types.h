@@ -10,7 +10,7 @@
 namespace voxeld::gpu::cuda {
 
 // A region is what a block of threads draws at once in shared memory: 32×32×16 voxels, 2×2×1 tiles.
-VOXELD_HD inline constexpr int RegionBits(int axis) { return axis == 2 ? 4 : 5; }
+VOXELD_HD inline constexpr int RegionBits(int axis) { return TrackBits(axis); }
 inline constexpr uint32_t kRegionVoxels = 1u << 14;
 // Regions are numbered by blocks of 4×4×4 (2^kBlockBits), and within a block.
 inline constexpr int kBlockBits = 2;
@@ -78,7 +78,7 @@ struct LinePiece {
 };
 
 // A part of a line in a region: `count` voxels from k on.
-struct LineSpan {
+struct alignas(8) LineSpan {
   uint32_t line;
   // k; from bit 16 on the count; from bit 23 on the region in its block; the top bit if the line
   // runs from colour to colour.

@@ -9,34 +9,47 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kDrawThreads = 512;
 inline constexpr uint32_t kDrawWarps = kDrawThreads / 32;
-inline constexpr uint32_t kQueue = 128;      // spans that a warp sorts at once
-inline constexpr uint32_t kBuckets = 64;     // by length; those of two colours in the last
-inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are looked at at once
-inline constexpr uint32_t kRegionTiles = 4;  // bit 0: the further in x, bit 1: in y
+inline constexpr uint32_t kMostSpans = 1536;  // of a region, that are sorted at once
+inline constexpr uint32_t kBuckets = 64;      // by length; those of two colours in the first
+inline constexpr uint32_t kSegments = 256;    // of a region's spans, that are looked at at once
+inline constexpr uint32_t kRegionTiles = 4;   // bit 0: the further in x, bit 1: in y
 inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
 
-// Of a voxel in its region.
+// Rows of 32 words along x, y within z, and so far apart: lanes that each read four words of a row of
+// their own meet all banks.
+inline constexpr uint32_t kRowStride = 36;
+inline constexpr uint32_t kRegionRows = kRegionVoxels / 32;
+
+// Of a voxel of a region, by number (x fastest, then y), and by place.
+__device__ inline uint32_t IndexOf(uint32_t v) { return v / 32 * kRowStride + v % 32; }
 __device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {
-  return static_cast<uint32_t>(x & 31) | static_cast<uint32_t>(y & 31) << 5 |
-         static_cast<uint32_t>(z & 15) << 10;
+  const uint32_t row = static_cast<uint32_t>(z & 15) * 32 + static_cast<uint32_t>(y & 31);
+  return row * kRowStride + static_cast<uint32_t>(x & 31);
 }
 
 struct RegionScratch {
-  uint32_t words[kRegionVoxels];
+  // 0 whenever the drawing of a region begins: who writes it out leaves it so.
+  alignas(16) uint32_t words[kRegionRows * kRowStride];
   uint32_t segment_first[kSegments + 1];  // spans before
   uint32_t segment_at[kSegments];         // where its spans lie
-  uint32_t next_span;
-  uint32_t buckets[kDrawWarps][kBuckets];
-  uint8_t order[kDrawWarps][kQueue];
+  LineSpan spans[kMostSpans];
+  uint32_t buckets[kBuckets];
   uint32_t line_batches;  // bits: those of the layer under way
   uint32_t layer;         // its slot; kAllLanes: no more
   uint32_t cutting;       // bits: which of its half-spaces cut the region
   uint32_t outside;       // not 0: all of the region lies outside one of them
   uint32_t region;
+  alignas(16) uint32_t least[64];  // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
   uint32_t pairs;                 // not 0: the layer has some here
 };
+
+// What a block of threads draws: first in its shared memory.
+extern __shared__ __align__(16) unsigned char shared_memory[];
+__device__ inline RegionScratch& SharedRegion() {
+  return *reinterpret_cast<RegionScratch*>(shared_memory);
+}
 
 // Of the layer under way: rows of pairs, of a tile and a batch each.
 struct PairRows {
@@ -48,7 +61,9 @@ struct RegionPlace {
   Box3 box;  // of its voxels in the volume
   int32_t tile[3];
 
-  __device__ RegionPlace(const DrawView& view, uint32_t region) {
+  // Of the region under way. Worked out where it is asked for, rather than kept while it is drawn.
+  __device__ RegionPlace(const DrawView& view, const RegionScratch& scratch) {
+    const uint32_t region = *static_cast<const volatile uint32_t*>(&scratch.region);
     int32_t at[3];
     view.regions.RegionCoordinates(region, at);
     for (int a = 0; a < 3; ++a) {

@@ -5,12 +5,6 @@
 
 namespace voxeld::gpu::cuda {
 
-__device__ inline ThinLine LoadLine(const ThinLine* line) {
-  const int4* const at = reinterpret_cast<const int4*>(line);
-  const int4 a = __ldg(at), b = __ldg(at + 1);
-  return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w)};
-}
-
 // MixColors of words' colours, where both have the same priority and neither erases.
 __device__ inline uint32_t MixWords(uint32_t start, uint32_t end, int32_t k, int32_t n) {
   const uint32_t mixed =
@@ -18,30 +12,61 @@ __device__ inline uint32_t MixWords(uint32_t start, uint32_t end, int32_t k, int
   return (start & ~kColorMask) | Interleave(mixed);
 }
 
-__device__ inline void DrawSpan(const DrawView& view, const LineBatchView& batch,
-                                const ThinLine& line, LineSpan span, const int32_t at[3],
-                                uint32_t* words) {
-  const int32_t k = span.k();
-  const ThinSteps steps =
-      ThinSteps::At(line, k, __ldg(&view.reciprocals[line.n]), at, RegionBits(2));
-  ThinCursor cursor(steps);
-  const uint32_t count = span.count();
-  const auto next = [&] {
-    const uint32_t place = (cursor.voxel(2) << 5 | cursor.voxel(1)) << 5 | cursor.voxel(0);
-    cursor.Next();
-    return place;
-  };
-  if (span.mixed()) {
-    const uint32_t end = batch.ends[span.line];
-    for (uint32_t j = 0; j < count; ++j) {
-      const uint32_t place = next();
-      if (line.word == 0) continue;
-      atomicMax(&words[place], MixWords(line.word, end, k + static_cast<int32_t>(j), line.n));
-    }
-    return;
+// But for n: a register that is loaded and not used would be waited for where it is used anew.
+__device__ inline ThinTrack LoadTrack(const ThinLine* line) {
+  const ThinTrack& track = line->track;
+  const uint4 a = __ldg(reinterpret_cast<const uint4*>(track.axis));
+  const uint2 b = __ldg(reinterpret_cast<const uint2*>(&track.axis[2]));
+  return {{static_cast<uint64_t>(a.y) << 32 | a.x, static_cast<uint64_t>(a.w) << 32 | a.z,
+           static_cast<uint64_t>(b.y) << 32 | b.x},
+          __ldg(&track.word),
+          0};
+}
+
+__device__ inline uint32_t IndexOf(const ThinCursor& cursor) {
+  return (cursor.voxel(2) * 32 + cursor.voxel(1)) * kRowStride + cursor.voxel(0);
+}
+
+// A span of a line that runs from colour to colour, by its lane alone.
+static __device__ __noinline__ void DrawMixed(const ThinLine* line, uint32_t end, LineSpan span) {
+  const ThinTrack track = LoadTrack(line);
+  if (track.word == 0) return;
+  uint32_t* const words = SharedRegion().words;
+  const int32_t k = span.k(), count = static_cast<int32_t>(span.count());
+  ThinCursor cursor(track, k);
+  for (int32_t j = 0; j < count; ++j, cursor.Next()) {
+    atomicMax(&words[IndexOf(cursor)], MixWords(track.word, end, k + j, line->track.n));
   }
-#pragma unroll 4
-  for (uint32_t j = 0; j < count; ++j) atomicMax(&words[next()], line.word);
+}
+
+// `left` voxels of one word from there on; 0 where a lane has none. All of a warp go on together
+// until the longest ends.
+__device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word, uint32_t* words) {
+  constexpr uint32_t kAtOnce = 4;
+  while (__all_sync(kAllLanes, left >= kAtOnce)) {
+#pragma unroll
+    for (uint32_t j = 0; j < kAtOnce; ++j, cursor.Next()) {
+      atomicMax(&words[IndexOf(cursor)], word);
+    }
+    left -= kAtOnce;
+  }
+  while (__any_sync(kAllLanes, left != 0)) {
+#pragma unroll
+    for (uint32_t j = 0; j < kAtOnce; ++j, cursor.Next()) {
+      if (j < left) atomicMax(&words[IndexOf(cursor)], word);
+    }
+    left -= Min(left, kAtOnce);
+  }
+}
+
+// Of a warp's values, the sum of those of the lanes before this one.
+__device__ inline uint32_t SumBefore(uint32_t value) {
+  uint32_t sum = value;
+  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
+    const uint32_t other = __shfl_up_sync(kAllLanes, sum, lanes);
+    if (threadIdx.x % 32 >= lanes) sum += other;
+  }
+  return sum - value;
 }
 
 // The region's next segments of spans, from chunk `first` on, by the whole block; how many spans they
@@ -67,133 +92,130 @@ __device__ inline uint32_t FindSegments(const SpanLists& lists, uint32_t first, 
     uint32_t counts[kEach], sum = 0;
 #pragma unroll
     for (uint32_t e = 0; e < kEach; ++e) sum += counts[e] = own[e];
-    uint32_t before = sum;
-    for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
-      const uint32_t other = __shfl_up_sync(kAllLanes, before, lanes);
-      if (threadIdx.x >= lanes) before += other;
-    }
-    if (threadIdx.x == 31) scratch.segment_first[kSegments] = before;
-    before -= sum;
+    uint32_t before = SumBefore(sum);
+    if (threadIdx.x == 31) scratch.segment_first[kSegments] = before + sum;
 #pragma unroll
     for (uint32_t e = 0; e < kEach; ++e) {
       own[e] = before;
       before += counts[e];
     }
-    if (threadIdx.x == 0) scratch.next_span = 0;
   }
   __syncthreads();
   return scratch.segment_first[kSegments];
 }
 
-// A warp draws spans `first` to first + count − 1 of those found, count ≤ kQueue: by length, so that
-// its lanes have about as much to do.
-__device__ inline void DrawQueue(const DrawView& view, const LineBatchView& batch, uint32_t first,
-                                 uint32_t count, const int32_t at[3], RegionScratch& scratch) {
-  constexpr uint32_t kEach = kQueue / 32;
-  const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-  uint32_t* const buckets = scratch.buckets[warp];
-  buckets[lane] = buckets[lane + 32] = 0;
-  __syncwarp();
-  const auto search = [&](uint32_t i) {
-    uint32_t low = 0, high = kSegments;  // segment_first[low] ≤ i < segment_first[high]
-    while (high - low > 1) {
-      const uint32_t middle = (low + high) / 2;
-      (scratch.segment_first[middle] <= i ? low : high) = middle;
-    }
-    return low;
-  };
-  // As a rule the spans lie in one segment and the 31 after it, whose beginnings the lanes have.
-  const uint32_t low_segment = search(first);
-  const uint32_t begins = scratch.segment_first[Min(low_segment + 1 + lane, kSegments)];
-  const bool near = __shfl_sync(kAllLanes, begins, 31) >= first + count;
-  const auto segment = [&](uint32_t i) {
-    uint32_t after = 0;  // segments that begin at i or before
+// Spans `first` to `first` + count − 1 of those found into shared memory, sorted by length, the
+// longest first, so that a warp's lanes have as much to do.
+__device__ inline void SortSpansHere(const LineBatchView& batch, uint32_t first, uint32_t count,
+                                     RegionScratch& scratch) {
+  // A warp goes over a segment; of some segments at once the first spans are asked for.
+  const uint2* const from = reinterpret_cast<const uint2*>(batch.lists.spans);
+  constexpr uint32_t kAtOnce = 4;
+  static_assert(kSegments % (kAtOnce * kDrawWarps) == 0);
+  for (uint32_t s = threadIdx.x / 32; s < kSegments; s += kAtOnce * kDrawWarps) {
+    if (scratch.segment_first[s] >= first + count) break;
+    uint32_t at[kAtOnce], high[kAtOnce];
+    uint2 spans[kAtOnce];
 #pragma unroll
-    for (uint32_t step = 16; step > 0; step /= 2) {
-      if (__shfl_sync(kAllLanes, begins, after + step - 1) <= i) after += step;
+    for (uint32_t e = 0; e < kAtOnce; ++e) {
+      const uint32_t segment = s + e * kDrawWarps;
+      at[e] = Max(scratch.segment_first[segment], first) + threadIdx.x % 32;
+      high[e] = Min(scratch.segment_first[segment + 1], first + count);
+      if (at[e] < high[e]) {
+        spans[e] =
+            __ldg(from + (scratch.segment_at[segment] - scratch.segment_first[segment] + at[e]));
+      }
     }
-    return near ? low_segment + after : search(i);
+#pragma unroll
+    for (uint32_t e = 0; e < kAtOnce; ++e) {
+      if (at[e] < high[e]) scratch.spans[at[e] - first] = {spans[e].x, spans[e].y};
+    }
+#pragma unroll 1
+    for (uint32_t e = 0; e < kAtOnce; ++e) {
+      const uint32_t segment = s + e * kDrawWarps;
+      const uint32_t begin = scratch.segment_first[segment];
+      const uint32_t end = Min(scratch.segment_first[segment + 1], first + count);
+      for (uint32_t i = Max(begin, first) + threadIdx.x % 32 + 32; i < end; i += 32) {
+        const uint2 span = __ldg(from + (scratch.segment_at[segment] - begin + i));
+        scratch.spans[i - first] = {span.x, span.y};
+      }
+    }
+  }
+  if (threadIdx.x < kBuckets) scratch.buckets[threadIdx.x] = 0;
+  __syncthreads();
+  constexpr uint32_t kEach = kMostSpans / kDrawThreads;
+  const auto bucket_of = [](LineSpan span) {
+    return span.mixed() ? 0 : kBuckets - 1 - span.count();
   };
-  uint32_t line[kEach], bits[kEach], rank[kEach];
+  LineSpan mine[kEach];
+  uint32_t rank[kEach];
 #pragma unroll
   for (uint32_t e = 0; e < kEach; ++e) {
-    const uint32_t i = lane + 32 * e;
-    line[e] = bits[e] = rank[e] = 0;
-    const uint32_t low = segment(Min(first + i, first + count - 1));
+    const uint32_t i = threadIdx.x + e * kDrawThreads;
     if (i >= count) continue;
-    const LineSpan span =
-        batch.lists.spans[scratch.segment_at[low] + (first + i - scratch.segment_first[low])];
-    line[e] = span.line;
-    bits[e] = span.bits;
-    rank[e] = atomicAdd(&buckets[span.mixed() ? kBuckets - 1 : span.count()], 1u);
+    mine[e] = scratch.spans[i];
+    rank[e] = atomicAdd(&scratch.buckets[bucket_of(mine[e])], 1u);
   }
-  __syncwarp();
-  uint32_t low = buckets[2 * lane], high = buckets[2 * lane + 1], sum = low + high;
-  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
-    const uint32_t other = __shfl_up_sync(kAllLanes, sum, lanes);
-    if (lane >= lanes) sum += other;
+  __syncthreads();
+  if (threadIdx.x < 32) {
+    const uint32_t low = scratch.buckets[2 * threadIdx.x],
+                   high = scratch.buckets[2 * threadIdx.x + 1];
+    const uint32_t before = SumBefore(low + high);
+    scratch.buckets[2 * threadIdx.x] = before;
+    scratch.buckets[2 * threadIdx.x + 1] = before + low;
   }
-  buckets[2 * lane] = sum - low - high;
-  buckets[2 * lane + 1] = sum - high;
-  __syncwarp();
+  __syncthreads();
 #pragma unroll
   for (uint32_t e = 0; e < kEach; ++e) {
-    if (lane + 32 * e >= count) continue;
-    const LineSpan span{line[e], bits[e]};
-    const uint32_t bucket = span.mixed() ? kBuckets - 1 : span.count();
-    scratch.order[warp][buckets[bucket] + rank[e]] = static_cast<uint8_t>(lane + 32 * e);
+    if (threadIdx.x + e * kDrawThreads >= count) continue;
+    scratch.spans[scratch.buckets[bucket_of(mine[e])] + rank[e]] = mine[e];
   }
-  __syncwarp();
-  const auto take = [&](uint32_t i) {
-    const uint32_t from = i + lane < count ? scratch.order[warp][i + lane] : 0;
-    LineSpan span{0, 0};
-#pragma unroll
-    for (uint32_t e = 0; e < kEach; ++e) {
-      const uint32_t l = __shfl_sync(kAllLanes, line[e], from % 32);
-      const uint32_t b = __shfl_sync(kAllLanes, bits[e], from % 32);
-      if (from / 32 == e) span = {l, b};
+  __syncthreads();
+}
+
+// Draws the `count` spans that lie in shared memory, 32 at a time. A function of its own, so that its
+// loop has all registers.
+static __device__ __noinline__ void DrawSorted(const ThinLine* lines, const uint32_t* ends,
+                                               uint32_t count) {
+  RegionScratch& scratch = SharedRegion();
+  const uint32_t lane = threadIdx.x % 32;
+  // To and fro, so that the warp that has the longest in one round has the shortest in the next.
+  uint32_t group = threadIdx.x / 32, next = 2 * kDrawWarps - 1 - 2 * group;
+  // The next group's tracks are on their way while one is drawn; in the first round that is none.
+  LineSpan span{0, 0};
+  ThinTrack track{};
+  for (;;) {
+    if (span.mixed()) DrawMixed(&lines[span.line], ends[span.line], span);
+    const ThinCursor cursor(track, span.k());
+    const uint32_t word = track.word, voxels = span.mixed() ? 0 : span.count();
+    const bool more = group * 32 < count;
+    span = {0, 0};
+    if (more) {
+      const uint32_t i = group * 32 + lane;
+      if (i < count) span = scratch.spans[i];
+      track = LoadTrack(&lines[span.line]);
     }
-    return span;
-  };
-  // The next one's line is on its way while this one is drawn.
-  LineSpan span = take(0);
-  ThinLine drawn = LoadLine(&batch.lines[span.line]);
-  for (uint32_t i = 0; i < count; i += 32) {
-    LineSpan next = span;
-    ThinLine coming = drawn;
-    if (i + 32 < count) {
-      next = take(i + 32);
-      coming = LoadLine(&batch.lines[next.line]);
-    }
-    if (i + lane < count) DrawSpan(view, batch, drawn, span, at, scratch.words);
-    __syncwarp();
-    span = next;
-    drawn = coming;
+    DrawGroup(cursor, voxels, word, scratch.words);
+    if (!more) return;
+    group += next;
+    next = 2 * kDrawWarps - next;
   }
 }
 
-// By the whole block; warps take what comes next.
+// By the whole block.
 __device__ inline void DrawSpans(const DrawView& view, const LineBatchView& batch,
                                  RegionScratch& scratch) {
   const uint32_t region = scratch.region;
-  int32_t at[3];
-  view.regions.RegionCoordinates(region, at);
   const uint32_t first = batch.lists.chunk_begin[region / kRegionsInBlock];
   const uint32_t last = batch.lists.chunk_begin[region / kRegionsInBlock + 1];
   for (uint32_t chunk = first; chunk < last; chunk += kSegments) {
-    const uint32_t count = FindSegments(batch.lists, chunk, last, region, scratch);
-    // Shared by all warps alike.
-    constexpr uint32_t kTogether = kQueue * kDrawWarps;
-    const uint32_t rounds = Max((count + kTogether - 1) / kTogether, 1u) * kDrawWarps;
-    const uint32_t queue = ((count + rounds - 1) / rounds + 31) & ~31u;
-    for (;;) {
-      uint32_t next = 0;
-      if (threadIdx.x % 32 == 0) next = atomicAdd(&scratch.next_span, queue);
-      next = __shfl_sync(kAllLanes, next, 0);
-      if (next >= count) break;
-      DrawQueue(view, batch, next, Min(queue, count - next), at, scratch);
+    const uint32_t found = FindSegments(batch.lists, chunk, last, region, scratch);
+    for (uint32_t span = 0; span < found; span += kMostSpans) {
+      const uint32_t count = Min(found - span, kMostSpans);
+      SortSpansHere(batch, span, count, scratch);
+      DrawSorted(batch.lines, batch.ends, count);
+      __syncthreads();
     }
-    __syncthreads();
   }
 }
 

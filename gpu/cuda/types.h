@@ -81,9 +81,7 @@ struct Counters {
   uint32_t tiles_drawn = 0;
   uint32_t slices_drawn = 0;
   uint32_t pictures_changed = 0;
-  uint32_t dirty = 0;        // regions in the list
-  uint32_t next_region = 0;  // of the list, to be drawn
-  uint32_t reserved = 0;
+  uint32_t dirty = 0;  // regions in the list
   uint64_t lit_voxels = 0;
 };
 

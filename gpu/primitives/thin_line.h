@@ -10,13 +10,15 @@
 //
 // Boxes: which box holds voxel_k: an estimate is off by one at most, and the same number tells.
 //
-// Steps: inside a box of 32 voxels a coordinate is kept as 5.27 bits, modulo 32. It begins at the
-// exact position rounded up and 2⁻²⁷ more, and each step adds D / (256·N) rounded up, or less than it
-// by 2⁻³⁷; so after j ≤ kMaxSpan steps it is too great, by less than (1.01·j + 2.1)·2⁻²⁷. Exact
-// positions are multiples of 1 / (256·N): the next whole number above one that is not whole is at
-// least that far away, so floors agree while (1.01·j + 2.1)·2⁻²⁷ < 1 / (256·N). In a box no line has
-// more than kMaxSpan voxels (EUCLIDEAN lines advance by 1/√3 on their greatest axis at least), and
-// (1.01·57 + 2.1)·8,700 < 2¹⁹.
+// Steps: inside a box of 2^b voxels a coordinate is kept in 32 bits, b before the point, modulo 2^b
+// (b: kTrackBits); let a unit be the last of them, 2⁻²⁷ voxel or less. A line keeps its step δ =
+// D / (256·N) in 64 bits: at least δ, and too great by less than 2.2·2⁻⁴⁶. So k times it, its upper
+// half and a unit more are beyond what they stand for, by less than 1.04 units while k ≤
+// kMaxThinSteps; and its own upper half and a unit more by at most 1.01. After j ≤ kMaxSpan − 1
+// steps a position is too great, by less than 1.04 + 1.01·j units. Exact positions are multiples of
+// 1 / (256·N): the next whole number above one that is not whole is at least that far away, so floors
+// agree while (1.04 + 1.01·j)·2⁻²⁷ < 1 / (256·N). In a box no line has more than kMaxSpan voxels
+// (EUCLIDEAN lines advance by 1/√3 on their greatest axis at least), and (1.04 + 1.01·56)·8,700 < 2¹⁹.
 #pragma once
 
 #include <cstdint>
@@ -28,13 +30,41 @@ namespace voxeld::gpu {
 inline constexpr int32_t kMaxThinSteps = 8700;
 inline constexpr uint32_t kMaxSpan = 57;  // voxels of a line in a box of 32
 
-// 32 bytes, read as two times 16.
+// The boxes in which lines are drawn: log2 of their voxels by axis.
+VOXELD_HD inline constexpr int TrackBits(int axis) { return axis == 2 ? 4 : 5; }
+
+// What drawing needs of a line. By axis the step, modulo 2^b voxels with b = TrackBits(axis) bits
+// before the point, in all but the low 13 bits; there S, modulo 2^b voxels, in units.
+struct alignas(16) ThinTrack {
+  static constexpr int kPlaceBits = 13;
+  uint64_t axis[3];
+  uint32_t word;  // as the line's
+  int32_t n;      // as the line's
+};
+
+// 64 bytes, read in pieces of 16: what sorting needs, then what drawing does.
 struct alignas(16) ThinLine {
   int32_t s[3];   // units
   int32_t n;      // N; 0: the voxel of S alone
   int32_t d[3];   // units; 0 if n is
   uint32_t word;  // gpu/word.h; 0: draws nothing
+  ThinTrack track;
+
+  VOXELD_HD void SetWord(uint32_t to) { word = track.word = to; }
 };
+
+// Of S and D (in units) on an axis; m = max(N, 1).
+VOXELD_HD inline uint64_t TrackAxis(int32_t s, int32_t d, int32_t m, int axis) {
+  const int bits = TrackBits(axis);
+  // D / N is below 2¹⁰, and its quotient off by 2⁻⁶ at most.
+  const double step = static_cast<double>(d) / static_cast<double>(m) *
+                      static_cast<double>(int64_t{1} << (64 - bits - 8 - ThinTrack::kPlaceBits));
+  const double above = step + 1.03125;
+  int64_t rounded = static_cast<int64_t>(above);
+  if (static_cast<double>(rounded) > above) --rounded;
+  return static_cast<uint64_t>(rounded) << ThinTrack::kPlaceBits |
+         (static_cast<uint32_t>(s) & ((1u << (bits + 8)) - 1));
+}
 
 // Whether all lines with both ends in a box of these positions (in voxels, closed) can be thin lines.
 VOXELD_HD inline bool AreThin(const double lo[3], const double hi[3]) {
@@ -61,7 +91,10 @@ VOXELD_HD inline ThinLine MakeThin(const Line& line, uint32_t word) {
   for (int a = 0; a < 3; ++a) {
     t.s[a] = static_cast<int32_t>(line.s[a]);
     t.d[a] = n == 0 ? 0 : static_cast<int32_t>(line.e[a] - line.s[a]);
+    t.track.axis[a] = TrackAxis(t.s[a], t.d[a], Max(t.n, 1), a);
   }
+  t.track.word = word;
+  t.track.n = t.n;
   return t;
 }
 
@@ -178,57 +211,20 @@ VOXELD_HD void WalkThin(const ThinLine& line, int32_t k, const int32_t at[3], co
   }
 }
 
-// ⌈2⁵¹ / n⌉, for ThinSteps; n ≥ 1.
-VOXELD_HD inline uint64_t ThinReciprocal(int32_t n) {
-  const uint64_t m = static_cast<uint64_t>(n);
-  return ((uint64_t{1} << 51) + m - 1) / m;
-}
-
-// Positions modulo 32 voxels, 5.27 bits.
-struct ThinSteps {
+// From voxel to voxel, modulo the size of a box.
+struct ThinCursor {
   uint32_t at[3], step[3];
 
-  // At voxel k. `reciprocal`: of max(n, 1).
-  VOXELD_HD static ThinSteps At(const ThinLine& line, int32_t k, uint64_t reciprocal,
-                                const int32_t box[3], int bits_z = 5) {
-    ThinSteps t;
-    const int32_t m = Max(line.n, 1);
-    const uint32_t high = static_cast<uint32_t>(reciprocal >> 32),
-                   low = static_cast<uint32_t>(reciprocal);
+  // At voxel k.
+  VOXELD_HD ThinCursor(const ThinTrack& track, int32_t k) {
     for (int a = 0; a < 3; ++a) {
-      const int bits = a == 2 ? bits_z : 5;
-      // In [0, 2¹³·m); the product is too small by less than 1, or too great by less than 2⁻⁴.
-      const uint32_t past = static_cast<uint32_t>(
-          WrapAdd(WrapMul(line.s[a] - WrapMul(box[a], 256 << bits), m), WrapMul(line.d[a], k)));
-      t.at[a] = past * high + MulHigh(past, low) + 2;
-      const uint32_t length = static_cast<uint32_t>(line.d[a] < 0 ? -line.d[a] : line.d[a]);
-      const uint32_t ahead = length * high + MulHigh(length, low);
-      t.step[a] = line.d[a] < 0 ? 0u - ahead : ahead + 1;
-    }
-    return t;
-  }
-  VOXELD_HD static uint32_t MulHigh(uint32_t a, uint32_t b) {
-#if defined(__CUDA_ARCH__)
-    return __umulhi(a, b);
-#else
-    return static_cast<uint32_t>(static_cast<uint64_t>(a) * b >> 32);
-#endif
-  }
-};
-
-// The same as 32.32 bits: a step is an addition with its carry, and the voxel, modulo 2³², is the upper
-// half as it stands.
-struct ThinCursor {
-  uint64_t at[3], step[3];
-
-  VOXELD_HD explicit ThinCursor(const ThinSteps& steps) {
-    for (int a = 0; a < 3; ++a) {
-      at[a] = static_cast<uint64_t>(steps.at[a]) << 5;
-      step[a] = static_cast<uint64_t>(static_cast<int64_t>(static_cast<int32_t>(steps.step[a])))
-                << 5;
+      const uint64_t axis = track.axis[a];
+      at[a] = static_cast<uint32_t>(static_cast<uint32_t>(k) * axis >> 32) +
+              (static_cast<uint32_t>(axis) << (24 - TrackBits(a))) + 1;
+      step[a] = static_cast<uint32_t>(axis >> 32) + 1;
     }
   }
-  VOXELD_HD uint32_t voxel(int a) const { return static_cast<uint32_t>(at[a] >> 32); }
+  VOXELD_HD uint32_t voxel(int a) const { return at[a] >> (32 - TrackBits(a)); }
   VOXELD_HD void Next() {
     for (int a = 0; a < 3; ++a) at[a] += step[a];
   }
