@@ -12,7 +12,7 @@
 namespace voxeld::gpu::cuda {
 
 CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part)
-    : device_(std::move(device)), part_(part), volume_(*device_) {}
+    : device_(std::move(device)), part_(part), uploader_(*device_), volume_(*device_, uploader_) {}
 
 absl::Status CudaCore::SetTarget(const Target& target) {
   if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;
