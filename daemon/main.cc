@@ -49,6 +49,7 @@ int Fail(int code, const absl::Status& status) {
 struct WantedDisplay {
   std::unique_ptr<display::Display> display;
   ViewOptions view;
+  std::vector<int> gpus;
 };
 using Displays = std::vector<WantedDisplay>;
 
@@ -66,9 +67,25 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, const display::Drive
     const absl::StatusOr<gpu::Affine> map =
         SceneToVoxel(options->view, (*made)->info().geometry.grid);
     if (!map.ok()) return wrong(map.status());
-    displays.push_back({*std::move(made), options->view});
+    if (absl::Status status =
+            CheckGpus(options->gpus, config.engine.kind, (*made)->info().layout.slices);
+        !status.ok()) {
+      return wrong(status);
+    }
+    displays.push_back({*std::move(made), options->view, options->gpus});
   }
   return displays;
+}
+
+// A display's own: one that names its GPUs asks for them.
+gpu::EngineOptions EngineOf(gpu::EngineOptions engine, const std::vector<int>& gpus) {
+  if (gpus.empty()) return engine;
+  engine.kind = gpu::EngineKind::kCuda;
+  engine.device = gpus.front();
+  engine.devices = gpus;
+  // Ranks end together, so they share their processes with nobody.
+  if (gpus.size() > 1) engine.workers = nullptr;
+  return engine;
 }
 
 absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
@@ -160,13 +177,15 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),
                                   .device = static_cast<int>(config.engine.device),
+                                  .nccl = config.engine.nccl,
                                   .in_worker = config.engine.in_worker,
                                   .worker = config.engine.worker,
                                   .workers = std::make_shared<gpu::WorkerPool>(),
                                   .worker_deadline_ns = config.engine.worker_deadline_ns,
                                   .staging_limit_bytes = config.engine.staging_limit_bytes};
-  for (auto& [display, view] : displays) {
-    if (absl::Status status = core.AddDisplay(std::move(display), engine, view); !status.ok()) {
+  for (auto& [display, view, gpus] : displays) {
+    if (absl::Status status = core.AddDisplay(std::move(display), EngineOf(engine, gpus), view);
+        !status.ok()) {
       return Fail(1, status);
     }
   }

@@ -63,6 +63,10 @@ absl::Status CheckTarget(const Target& target, SlicePart part) {
     return Wrong("part", absl::StrCat("[", part.begin, ", ", part.end, ")"),
                  absl::StrCat("within [0, ", target.layout.slices, ")"));
   }
+  if (part.ranks < 1 || part.rank < 0 || part.rank >= part.ranks) {
+    return Wrong("part", absl::StrCat("rank ", part.rank, " of ", part.ranks),
+                 "one of the ranks, from 0");
+  }
   return absl::OkStatus();
 }
 
@@ -76,12 +80,16 @@ absl::StatusOr<std::span<std::byte>> CheckDelta(const StagingBlock& block, size_
 }
 
 std::vector<uint8_t> OwnedTiles(const display::TileToSlices& tile_to_slices, const TileGrid& grid,
-                                int32_t begin, int32_t end) {
+                                SlicePart part, int32_t slices) {
+  const auto [begin, end] = part.Within(slices);
   std::vector<uint8_t> owned(grid.count());
   for (uint32_t tile = 0; tile < grid.count(); ++tile) {
     int32_t ijk[3];
     grid.Coordinates(tile, ijk);
-    owned[tile] = tile_to_slices.Visible(ijk[0], ijk[1], ijk[2], begin, end);
+    if (!tile_to_slices.Visible(ijk[0], ijk[1], ijk[2], begin, end)) continue;
+    owned[tile] = tile_to_slices.Visible(ijk[0], ijk[1], ijk[2], part.begin, begin)
+                      ? kOwnedAndCountedElsewhere
+                      : kOwned;
   }
   return owned;
 }

@@ -22,9 +22,9 @@ absl::Status CheckTarget(const Target& target, SlicePart part);
 // The first `size` bytes of `block`, if it has them.
 absl::StatusOr<std::span<std::byte>> CheckDelta(const StagingBlock& block, size_t size);
 
-// Which tiles the slices [begin, end) look at: 1 for each that they do.
+// Which tiles a part's slices, of so many in all, look at: a TileOwner each.
 std::vector<uint8_t> OwnedTiles(const display::TileToSlices& tile_to_slices, const TileGrid& grid,
-                                int32_t begin, int32_t end);
+                                SlicePart part, int32_t slices);
 
 // `layout` is the target's; none: FailedPrecondition.
 absl::Status CheckFrame(const FrameRequest& request, const FrameBuffer& buffer,

@@ -17,7 +17,7 @@
 namespace voxeld::gpu {
 
 // `Core`, used by one thread at a time: SetTarget, Apply, SubmitFrame, ReadVoxels, as CpuCore has
-// them.
+// them; link, where it has one.
 template <typename Core>
 class CoreEngine final : public Engine {
  public:
@@ -52,6 +52,14 @@ class CoreEngine final : public Engine {
 
   void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) override {
     Post(std::move(done), [this, box, out] { return core_->ReadVoxels(box, out); });
+  }
+
+  RankLink* link() override {
+    if constexpr (requires { core_->link(); }) {
+      return core_->link();
+    } else {
+      return nullptr;
+    }
   }
 
  private:

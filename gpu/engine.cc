@@ -1,8 +1,11 @@
 #include "gpu/engine.h"
 
 #include <atomic>
+#include <string>
+#include <utility>
 
 #include "gpu/cpu/cpu_engine.h"
+#include "gpu/ranks/ranked_engine.h"
 #include "gpu/worker/worker_engine.h"
 
 namespace voxeld::gpu {
@@ -19,13 +22,27 @@ const char* EngineKindName(EngineKind kind) {
   return "unknown";
 }
 
+namespace {
+
+absl::StatusOr<std::unique_ptr<Engine>> InWorkers(EngineOptions options, std::string reason) {
+  if (options.devices.size() > 1) return CreateRankedEngine(options, std::move(reason));
+  if (!options.devices.empty()) options.device = options.devices[0];
+  return CreateWorkerEngine(options, std::move(reason));
+}
+
+absl::StatusOr<std::unique_ptr<Engine>> OnCpu(const EngineOptions& options, std::string reason) {
+  return options.in_worker ? InWorkers(options, std::move(reason))
+                           : CreateCpuEngine(options, std::move(reason));
+}
+
+}  // namespace
+
 absl::StatusOr<std::unique_ptr<Engine>> CreateEngine(const EngineOptions& options) {
   switch (options.kind) {
     case EngineKind::kCpu:
-      return options.in_worker ? CreateWorkerEngine(options, "asked for")
-                               : CreateCpuEngine(options, "asked for");
+      return OnCpu(options, "asked for");
     case EngineKind::kCuda:
-      return CreateWorkerEngine(options, "asked for");
+      return InWorkers(options, "asked for");
     case EngineKind::kAuto: {
       EngineOptions cuda = options;
       cuda.kind = EngineKind::kCuda;
@@ -37,15 +54,15 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateEngine(const EngineOptions& option
         };
       }
       absl::StatusOr<std::unique_ptr<Engine>> engine =
-          CreateWorkerEngine(cuda, "there is a GPU that it can use");
+          InWorkers(cuda, "there is a GPU that it can use");
       if (engine.ok()) {
         *came = true;
         return engine;
       }
       EngineOptions cpu = options;
       cpu.kind = EngineKind::kCpu;
-      const std::string why(engine.status().message());
-      return options.in_worker ? CreateWorkerEngine(cpu, why) : CreateCpuEngine(cpu, why);
+      cpu.devices.clear();
+      return OnCpu(cpu, std::string(engine.status().message()));
     }
   }
   return absl::InvalidArgumentError("engine: the kind must be auto, cpu or cuda");

@@ -43,10 +43,16 @@
 
 namespace voxeld::gpu {
 
+class RankLink;
 class WorkerPool;
 
 enum class EngineKind : uint8_t { kAuto, kCpu, kCuda };
 const char* EngineKindName(EngineKind kind);
+
+// Slices [begin, end).
+struct SliceRange {
+  int32_t begin = 0, end = 0;
+};
 
 // The slices that an engine owns, [begin, end) of the layout's; it draws only
 // the tiles that they look at. Several engines, each with a part, make one display:
@@ -54,6 +60,16 @@ const char* EngineKindName(EngineKind kind);
 struct SlicePart {
   int32_t begin = 0;
   int32_t end = -1;  // −1: to the last
+  // Of that range, cut into `ranks` runs of equal length, give or take a slice, the one numbered
+  // `rank`; it may be empty.
+  int32_t rank = 0, ranks = 1;
+
+  // Of a layout with so many slices.
+  SliceRange Within(int32_t slices) const {
+    const int64_t count = (end == -1 ? slices : end) - begin;
+    return {static_cast<int32_t>(begin + count * rank / ranks),
+            static_cast<int32_t>(begin + count * (rank + 1) / ranks)};
+  }
 };
 
 struct EngineOptions {
@@ -61,6 +77,13 @@ struct EngineOptions {
   int threads = 0;                // worker threads of the CPU engine; 0: one a core
   bool inline_execution = false;  // every call finishes before it returns, in the caller's thread
   int device = 0;                 // of the CUDA engine
+  // Several GPUs: the engine is made of ranks, one for each, which each draw their share of the
+  // slices in a process of their own (gpu/ranks). The CPU engine has ranks only with `in_worker`, as
+  // many as there are numbers. Fewer than two: none.
+  std::vector<int> devices;
+  // By which a delta goes from the first of them to the others: a path of NCCL's library; empty:
+  // $VOXELD_NCCL, then where the loader looks; "off": each is sent all of it.
+  std::string nccl;
   // The CPU engine too runs in a process of its own (the CUDA engine always does).
   bool in_worker = false;
   std::string worker;  // the program of that process; empty: voxeld-engine, beside this one
@@ -138,8 +161,9 @@ struct FrameBuffer {
 
 struct FrameResult {
   uint64_t frame = 0;
-  bool changed = false;             // some picture differs from the frame before
-  uint64_t lit_voxels = 0;          // of the engine's tiles: result not black
+  bool changed = false;  // some picture differs from the frame before
+  // Of the engine's tiles, less those that a rank before counts: result not black.
+  uint64_t lit_voxels = 0;
   uint32_t tiles_drawn = 0;         // dirty tiles, of the engine's own size, drawn for this frame
   uint32_t pictures_drawn = 0;      // pictures sliced again
   uint32_t singular_drawables = 0;  // solids whose map has no inverse: they draw nothing
@@ -180,6 +204,10 @@ class Engine {
   // The blended voxels of `box`, x fastest, as 0x00RRGGBB; those outside the engine's tiles are 0.
   // For tests and tools: brings the scene up to date first.
   virtual void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) = 0;
+
+  // What connects it, in a worker, with the other ranks of its display (gpu/rank_link.h); null: such
+  // an engine needs nothing. Between calls, with inline_execution.
+  virtual RankLink* link() { return nullptr; }
 };
 
 // FailedPrecondition if the kind asked for cannot be had, with the reason; kAuto always succeeds.

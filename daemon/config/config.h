@@ -70,6 +70,9 @@ struct EngineConfig {
   // A CUDA engine always has a process of its own; the CPU's may have one too.
   bool in_worker = false;
   std::string worker;  // the program of that process; empty: voxeld-engine
+  // NCCL's library, for displays with several GPUs: a path; empty: $VOXELD_NCCL, then where the loader
+  // looks; "off": none.
+  std::string nccl;
   // After which a process that does not answer is ended, and the CPU takes over.
   int64_t worker_deadline_ns = 2 * sync::kSecond;
 };

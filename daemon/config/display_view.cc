@@ -42,7 +42,39 @@ absl::StatusOr<std::pair<display::Vec3, display::Vec3>> ParseBox(const std::stri
                    display::Vec3{numbers[3], numbers[4], numbers[5]});
 }
 
+absl::StatusOr<std::vector<int>> ParseGpus(const std::string& text) {
+  constexpr int kMost = 1023;
+  std::vector<int> gpus;
+  for (const absl::string_view item : absl::StrSplit(text, ';')) {
+    int gpu = 0;
+    if (!absl::SimpleAtoi(item, &gpu) || gpu < 0 || gpu > kMost) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "gpus is \"", text, "\"; give numbers of GPUs from 0 to ", kMost, ", such as 0;1"));
+    }
+    if (std::find(gpus.begin(), gpus.end(), gpu) != gpus.end()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("gpus is \"", text, "\", which has ", gpu, " twice; give each GPU once"));
+    }
+    gpus.push_back(gpu);
+  }
+  return gpus;
+}
+
 }  // namespace
+
+absl::Status CheckGpus(const std::vector<int>& gpus, gpu::EngineKind kind, int32_t slices) {
+  if (gpus.empty()) return absl::OkStatus();
+  if (kind == gpu::EngineKind::kCpu) {
+    return absl::InvalidArgumentError(
+        "gpus is given, and the engine is cpu; leave gpus out, or let engine be auto or cuda");
+  }
+  if (gpus.size() > static_cast<size_t>(slices)) {
+    return absl::InvalidArgumentError(absl::StrCat("gpus names ", gpus.size(),
+                                                   " GPUs, and the display has ", slices,
+                                                   " slices; give at most a GPU for each slice"));
+  }
+  return absl::OkStatus();
+}
 
 absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display) {
   DisplayOptions split;
@@ -56,6 +88,11 @@ absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display)
     const auto parsed = ParseBox(box.mapped());
     if (!parsed.ok()) return parsed.status();
     split.view.box = *parsed;
+  }
+  if (const auto gpus = split.driver.extract("gpus")) {
+    absl::StatusOr<std::vector<int>> parsed = ParseGpus(gpus.mapped());
+    if (!parsed.ok()) return parsed.status();
+    split.gpus = *std::move(parsed);
   }
   return split;
 }

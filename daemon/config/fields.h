@@ -73,6 +73,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("device", config.engine.device, 0, 1023);
   visitor.Flag("in_worker", config.engine.in_worker);
   visitor.Text("worker", config.engine.worker);
+  visitor.Text("nccl", config.engine.nccl);
   visitor.Integer("worker_deadline_ns", config.engine.worker_deadline_ns, kSecond / 100, kHour);
 
   visitor.Section("log");

@@ -11,7 +11,7 @@ inline constexpr int64_t kMaxSliceSteps = 16384;     // positions_mm, slices_per
 inline constexpr int64_t kMaxPanels = 16;
 inline constexpr int64_t kMaxCellsPerAxis = 16384;       // nx, ny, nz; coordinates fit 16 bits
 inline constexpr int64_t kMaxCells = int64_t{1} << 36;   // nx·ny·nz
-inline constexpr int64_t kMaxPixels = int64_t{1} << 32;  // slices·width·height
+inline constexpr int64_t kMaxPixels = int64_t{1} << 34;  // slices·width·height
 // Entries of a footprint table as bounded before it is built: 8 bytes each.
 inline constexpr int64_t kMaxFootprintEntries = int64_t{1} << 28;
 // slices·width_px of a lattice, each of which has its place in memory (32 bytes), light or no light.

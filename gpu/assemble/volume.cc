@@ -303,7 +303,7 @@ Volume::Changes Volume::Update() {
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];
     index_[tile].dirty = false;
-    lit_voxels_ = lit_voxels_ - lit_before[i] + tiles_.lit(tile);
+    if (owned_[tile] == kOwned) lit_voxels_ = lit_voxels_ - lit_before[i] + tiles_.lit(tile);
     lit_tiles_ = lit_tiles_ - (lit_before[i] != 0) + (tiles_.lit(tile) != 0);
     if (differs[i] == 0) continue;
     changes.tiles.push_back(tile);

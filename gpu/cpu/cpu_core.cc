@@ -20,10 +20,10 @@ absl::Status CpuCore::SetTarget(Target target) {
   absl::StatusOr<Sampler> sampler = Sampler::Create(std::move(table), grid, target.tone.sampling);
   if (!sampler.ok()) return sampler.status();
 
-  const int32_t end = part_.end == -1 ? target.layout.slices : part_.end;
-  volume_.SetView(grid, target.view, OwnedTiles(tile_to_slices, grid, part_.begin, end));
-  pictures_.SetPlan({target.layout, target.tone, part_.begin, end, *std::move(sampler),
-                     std::move(tile_to_slices)});
+  const auto [begin, end] = part_.Within(target.layout.slices);
+  volume_.SetView(grid, target.view, OwnedTiles(tile_to_slices, grid, part_, target.layout.slices));
+  pictures_.SetPlan(
+      {target.layout, target.tone, begin, end, *std::move(sampler), std::move(tile_to_slices)});
   unsliced_ = {};
   layout_ = target.layout;
   return absl::OkStatus();

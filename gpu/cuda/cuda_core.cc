@@ -12,7 +12,7 @@
 namespace voxeld::gpu::cuda {
 
 CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part)
-    : device_(std::move(device)), part_(part), volume_(*device_) {}
+    : device_(std::move(device)), part_(part), uploader_(*device_), volume_(*device_, uploader_) {}
 
 absl::Status CudaCore::SetTarget(const Target& target) {
   if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;
@@ -22,15 +22,16 @@ absl::Status CudaCore::SetTarget(const Target& target) {
       display::BuildFootprints(target.geometry, target.tone.sampling);
   const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz, Sampler::FastestAxis(table));
   const display::TileToSlices tile_to_slices(table, voxels, kTileSize, kTileSize, kTileSize);
-  const int32_t end = part_.end == -1 ? target.layout.slices : part_.end;
+  const auto [begin, end] = part_.Within(target.layout.slices);
   const std::optional<PackedPlan> packed =
-      PackedPlan::Of(table, voxels, target.layout, target.tone, part_.begin, end);
+      PackedPlan::Of(table, voxels, target.layout, target.tone, begin, end);
   absl::StatusOr<std::unique_ptr<CudaPictures>> pictures =
-      CudaPictures::Make(*device_, {target.layout, target.tone, part_.begin, end}, table,
-                         tile_to_slices, packed, pictures_.get());
+      CudaPictures::Make(*device_, {target.layout, target.tone, begin, end}, table, tile_to_slices,
+                         packed, pictures_.get());
   if (!pictures.ok()) return pictures.status();
   absl::StatusOr<DeviceTiles> tiles = DeviceTiles::Make(
-      *device_, grid, OwnedTiles(tile_to_slices, grid, part_.begin, end), !packed.has_value());
+      *device_, grid, OwnedTiles(tile_to_slices, grid, part_, target.layout.slices),
+      !packed.has_value());
   if (!tiles.ok()) return tiles.status();
   // The tables have been copied from memory that is about to go.
   if (absl::Status status = device_->Wait(); !status.ok()) return status;

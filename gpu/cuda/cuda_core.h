@@ -11,6 +11,7 @@
 #include "gpu/cuda/cuda_pictures.h"
 #include "gpu/cuda/cuda_volume.h"
 #include "gpu/cuda/device.h"
+#include "gpu/cuda/uploader.h"
 #include "gpu/engine.h"
 
 namespace voxeld::gpu::cuda {
@@ -24,11 +25,13 @@ class CudaCore {
   absl::Status Apply(const StagingBlock& block, size_t size);
   absl::StatusOr<FrameResult> SubmitFrame(const FrameRequest& request, FrameBuffer buffer);
   absl::Status ReadVoxels(VoxelBox box, std::span<uint32_t> out);
+  RankLink* link() { return &uploader_; }
 
  private:
   const std::unique_ptr<Device> device_;
   const SlicePart part_;
   std::optional<display::FrameLayout> layout_;  // the target's
+  Uploader uploader_;
   CudaVolume volume_;
   std::unique_ptr<CudaPictures> pictures_;
   uint64_t last_frame_ = 0;

@@ -60,7 +60,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   scene_.MapClips(view_, true);
   listed_ = all_dirty;
   index_.Clear();
-  lines_.Reset(tiles_.grid);
+  lines_.Reset(tiles_.grid, tiles_.owned_here);
   lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
   slots_.clear();
   free_slots_.clear();

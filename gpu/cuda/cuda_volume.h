@@ -25,6 +25,7 @@
 #include "gpu/cuda/pair_index.h"
 #include "gpu/cuda/pool.h"
 #include "gpu/cuda/types.h"
+#include "gpu/cuda/uploader.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -56,7 +57,8 @@ struct DeviceArrays {
 // and what could not be drawn is drawn with the next Update.
 class CudaVolume final : private SceneObserver {
  public:
-  explicit CudaVolume(Device& device) : device_(device), index_(device), lines_(device) {}
+  CudaVolume(Device& device, Uploader& uploader)
+      : device_(device), uploader_(uploader), index_(device), lines_(device) {}
 
   // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
   // fit the device.
@@ -119,6 +121,7 @@ class CudaVolume final : private SceneObserver {
   uint32_t TakeSlot();
 
   Device& device_;
+  Uploader& uploader_;
   Scene scene_;
   DeviceTiles tiles_;
   Affine view_;

@@ -57,16 +57,12 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
     if (!bulk_.contains(positions)) bulk_[positions] = uploads.AddBulk(*geometry);
   }
   if (uploads.size() == 0) return FindGeometryBounds(plan);
-  absl::StatusOr<Block> block = device_.pool().Acquire(uploads.size());
+  absl::StatusOr<Block> block = uploader_.Upload(uploads);
   if (!block.ok()) return block.status();
-  for (const UploadPlan::Copy& copy : uploads.copies()) {
-    absl::Status status = device_.ToDevice(block->as<std::byte>() + copy.to, copy.from, copy.size);
-    if (!status.ok()) return status;
-  }
   arrays_ = std::make_shared<Block>(*std::move(block));
   const absl::Status status = FindGeometryBounds(plan);
   // The delta's memory is given back when Apply returns, and so may bulk memory be.
-  const absl::Status waited = device_.Wait();
+  const absl::Status waited = uploader_.Wait();
   return status.ok() ? waited : status;
 }
 

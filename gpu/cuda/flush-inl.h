@@ -47,6 +47,7 @@ __device__ inline void PutLit(const VolumeView& volume, uint32_t tile, uint32_t 
                               uint32_t now, RegionScratch& scratch) {
   if (now == before) return;
   volume.lit[tile] = now;
+  if (volume.owned[tile] != kOwned) return;
   atomicAdd(&scratch.lit_change, static_cast<unsigned long long>(now) - before);
 }
 

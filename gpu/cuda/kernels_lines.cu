@@ -94,7 +94,7 @@ __device__ void WalkBlocks(const RegionGrid& grid, const ThinLine* lines, uint32
   int32_t begin[3];
   for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
   WalkThin(line, 0, begin, bits, [&](const int32_t block[3], int32_t k, int32_t end) {
-    if (grid.HasBlock(block)) f(grid.BlockAt(block), LinePiece::Of(i, k, end - k));
+    if (grid.DrawsBlock(block)) f(grid.BlockAt(block), LinePiece::Of(i, k, end - k));
     return true;
   });
 }
@@ -373,7 +373,7 @@ __global__ void MarkLinesKernel(ItemList list, uint32_t count, const ThinLine* l
   for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
   WalkThin(line, 0, begin, bits, [&](const int32_t box[3], int32_t, int32_t) {
     const int32_t block[3] = {box[0] >> kBlockBits, box[1] >> kBlockBits, box[2] >> kBlockBits};
-    if (grid.HasBlock(block)) dirty[grid.RegionAt(box)] = 1;
+    if (grid.DrawsBlock(block)) dirty[grid.RegionAt(box)] = 1;
     return true;
   });
 }

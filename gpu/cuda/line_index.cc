@@ -25,10 +25,23 @@ bool LineIndex::Suits(const Api& api, const TileGrid& grid) {
   return SortLinesShared(RegionGrid::Of(grid)) <= api.device().sharedMemPerBlockOptin;
 }
 
-void LineIndex::Reset(const TileGrid& grid) {
+void LineIndex::Reset(const TileGrid& grid, std::span<const uint8_t> owned) {
   batches_.clear();
   places_.clear();
   grid_ = RegionGrid::Of(grid);
+  int32_t lo[3] = {INT32_MAX, INT32_MAX, INT32_MAX}, hi[3] = {};
+  for (uint32_t tile = 0; tile < grid.count(); ++tile) {
+    if (owned[tile] == kNotOwned) continue;
+    int32_t at[3];
+    grid.Coordinates(tile, at);
+    for (int a = 0; a < 3; ++a) {
+      const int32_t block = at[a] * kTileSize >> (RegionBits(a) + kBlockBits);
+      lo[a] = std::min(lo[a], block);
+      hi[a] = std::max(hi[a], block + 1);
+    }
+  }
+  std::copy(lo, lo + 3, grid_.drawn_lo);
+  std::copy(hi, hi + 3, grid_.drawn_hi);
   merge_ = false;
   // So that whatever they are, their spans can be counted in 32 bits.
   most_lines_ = kMostPlaces / MostBoxes(grid_.blocks, kBlockBits);

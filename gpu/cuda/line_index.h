@@ -33,8 +33,9 @@ class LineIndex {
  public:
   explicit LineIndex(Device& device) : device_(device) {}
 
-  // Forgets all, for a volume of that grid.
-  void Reset(const TileGrid& grid);
+  // Forgets all, for a volume of that grid, of which the tiles are drawn that `owned` has (a TileOwner
+  // each): of lines elsewhere nothing is kept but themselves.
+  void Reset(const TileGrid& grid, std::span<const uint8_t> owned);
   // Whether a volume of that grid can have one, on such a device.
   static bool Suits(const Api& api, const TileGrid& grid);
   // The slots of layers that have lines here; no more than kMaxLineLayers may.

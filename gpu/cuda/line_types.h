@@ -18,12 +18,14 @@ inline constexpr uint32_t kRegionsInBlock = 1u << 3 * kBlockBits;
 
 struct RegionGrid {
   int32_t blocks[3] = {};
+  // Of the blocks, a box that holds all regions that are drawn: what lies elsewhere nobody needs.
+  int32_t drawn_lo[3] = {}, drawn_hi[3] = {};
 
   VOXELD_HD static RegionGrid Of(const TileGrid& tiles) {
     RegionGrid g;
     for (int a = 0; a < 3; ++a) {
       const int32_t size = 1 << (RegionBits(a) + kBlockBits);
-      g.blocks[a] = (tiles.voxels[a] + size - 1) / size;
+      g.blocks[a] = g.drawn_hi[a] = (tiles.voxels[a] + size - 1) / size;
     }
     return g;
   }
@@ -32,10 +34,11 @@ struct RegionGrid {
            static_cast<uint32_t>(blocks[2]);
   }
   VOXELD_HD uint32_t count() const { return block_count() * kRegionsInBlock; }
-  VOXELD_HD bool HasBlock(const int32_t at[3]) const {
-    return static_cast<uint32_t>(at[0]) < static_cast<uint32_t>(blocks[0]) &&
-           static_cast<uint32_t>(at[1]) < static_cast<uint32_t>(blocks[1]) &&
-           static_cast<uint32_t>(at[2]) < static_cast<uint32_t>(blocks[2]);
+  VOXELD_HD bool DrawsBlock(const int32_t at[3]) const {
+    for (int a = 0; a < 3; ++a) {
+      if (at[a] < drawn_lo[a] || at[a] >= drawn_hi[a]) return false;
+    }
+    return true;
   }
   VOXELD_HD uint32_t BlockAt(const int32_t at[3]) const {
     return static_cast<uint32_t>((at[2] * blocks[1] + at[1]) * blocks[0] + at[0]);

@@ -88,7 +88,7 @@ struct Counters {
 // The volume: colours, interleaved, kTileVoxels a tile.
 struct VolumeView {
   TileGrid grid;
-  const uint8_t* owned = nullptr;  // of each tile
+  const uint8_t* owned = nullptr;  // a TileOwner for each tile
   uint8_t* dirty = nullptr;
   // Of regions (line_types.h): they are drawn whole.
   uint8_t* region_dirty = nullptr;

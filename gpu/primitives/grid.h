@@ -10,6 +10,10 @@ inline constexpr uint32_t kTileBits = 4;
 inline constexpr int32_t kTileSize = 1 << kTileBits;
 inline constexpr int32_t kTileVoxels = kTileSize * kTileSize * kTileSize;
 
+// Whether an engine draws a tile. One that an engine of a rank before draws too has its lit voxels
+// counted there.
+enum TileOwner : uint8_t { kNotOwned = 0, kOwned = 1, kOwnedAndCountedElsewhere = 2 };
+
 struct TileGrid {
   int32_t voxels[3] = {};  // the volume; its last tiles may stand over
   int32_t tiles[3] = {};

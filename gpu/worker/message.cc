@@ -3,12 +3,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
-#include "display/crc/crc32c.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -94,21 +92,6 @@ absl::StatusOr<Message> ReceiveMessage(int socket) {
   message.call = header.call;
   message.body.resize(static_cast<size_t>(got) - sizeof(header));
   return message;
-}
-
-FrameBuffer FrameSlot::In(std::span<std::byte> segment) const {
-  return {segment.subspan(pictures * sizeof(uint64_t), bytes),
-          {reinterpret_cast<uint64_t*>(segment.data()), pictures}};
-}
-
-uint32_t FrameCrc(const display::FrameLayout& layout, const FrameBuffer& buffer, uint64_t holds) {
-  uint32_t crc = display::Crc32c(std::as_bytes(buffer.changed_in));
-  const size_t size = layout.bytes_per_slice();
-  for (size_t p = 0; p < buffer.changed_in.size(); ++p) {
-    if (buffer.changed_in[p] > holds)
-      crc = display::Crc32c(buffer.bytes.subspan(p * size, size), crc);
-  }
-  return crc;
 }
 
 }  // namespace voxeld::gpu

@@ -17,10 +17,11 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "gpu/engine.h"
+#include "gpu/rank_link.h"
 
 namespace voxeld::gpu {
 
-inline constexpr uint32_t kWorkerProtocol = 3;
+inline constexpr uint32_t kWorkerProtocol = 4;
 
 enum class MessageType : uint32_t {
   // To the worker. Each but the segments' is answered once, under its own call number.
@@ -34,10 +35,13 @@ enum class MessageType : uint32_t {
   kConnect = 8,      // a descriptor, the other end of a connection; over the control socket alone
   kBulkSegment = 9,  // BulkSegmentMessage, with its descriptor
   kDropBulkSegment = 10,  // BulkSegmentMessage
+  kInvite = 11,           // InviteMessage, then the library's path; kInvited or kDone
+  kJoin = 12,             // JoinMessage, then the library's path; kDone
   // From the worker.
   kReady = 32,      // ReadyMessage
   kDone = 33,       // DoneMessage, then the text of the status
   kFrameDone = 34,  // FrameDoneMessage
+  kInvited = 35,    // InvitedMessage
 };
 
 struct OpenMessage {
@@ -50,6 +54,7 @@ struct OpenMessage {
 
 struct SegmentMessage {
   uint32_t segment = 0;
+  uint32_t staging = 0;  // 1: for what comes, read by a device; 0: for what is asked for
   uint64_t size = 0;
 };
 
@@ -81,6 +86,19 @@ struct VoxelsMessage {
   uint64_t count = 0;
 };
 
+struct InviteMessage {
+  uint32_t reserved = 0;
+};
+
+struct InvitedMessage {
+  RankLink::Invitation invitation = {};
+};
+
+struct JoinMessage {
+  RankLink::Invitation invitation = {};
+  int32_t rank = 0, ranks = 1;
+};
+
 struct ReadyMessage {
   EngineKind kind = EngineKind::kCpu;
   char device[128] = {};
@@ -92,7 +110,7 @@ struct DoneMessage {
 
 struct FrameDoneMessage {
   FrameResult result;
-  uint32_t crc = 0;  // of the numbers, then of each picture that is newer than `holds`
+  uint32_t crc = 0;  // FrameCrc
 };
 
 struct Message {
@@ -109,6 +127,12 @@ struct Message {
     T value;
     std::memcpy(static_cast<void*>(&value), body.data(), sizeof(T));
     return value;
+  }
+  // What comes behind it.
+  template <typename T>
+  std::string TextAfter() const {
+    if (body.size() < sizeof(T)) return "";
+    return {reinterpret_cast<const char*>(body.data()) + sizeof(T), body.size() - sizeof(T)};
   }
 };
 
@@ -131,15 +155,5 @@ absl::Status StatusOf(const Message& done);
 // not read (only where the socket does not block). Receive: waits, Unavailable at the end.
 absl::Status SendMessage(int socket, const Message& message);
 absl::StatusOr<Message> ReceiveMessage(int socket);
-
-// How a frame lies in its segment: the pictures' numbers, then their bytes.
-struct FrameSlot {
-  size_t pictures = 0, bytes = 0;
-  size_t size() const { return pictures * sizeof(uint64_t) + bytes; }
-  FrameBuffer In(std::span<std::byte> segment) const;
-};
-
-// See FrameDoneMessage.
-uint32_t FrameCrc(const display::FrameLayout& layout, const FrameBuffer& buffer, uint64_t holds);
 
 }  // namespace voxeld::gpu

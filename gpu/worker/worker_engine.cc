@@ -22,6 +22,7 @@
 #include "gpu/checks.h"
 #include "gpu/worker/bulk_ledger.h"
 #include "gpu/worker/call_channel.h"
+#include "gpu/worker/frame_slot.h"
 #include "gpu/worker/process.h"
 #include "gpu/worker/segment_pool.h"
 #include "gpu/worker/target_codec.h"
@@ -34,17 +35,6 @@ namespace {
 constexpr int64_t kFirstAnswerFactor = 10;
 // What a byte that goes with a call may take: checked and copied twice, on a slow host.
 constexpr int64_t kNsPerByte = 4;
-
-class LeasedMemory final : public StagingBlock::Memory {
- public:
-  LeasedMemory(SegmentPool::Lease lease, size_t size) : lease_(std::move(lease)), size_(size) {}
-  std::span<std::byte> bytes() override { return lease_->segment->bytes().first(size_); }
-  const SegmentPool::Lease& lease() const { return lease_; }
-
- private:
-  const SegmentPool::Lease lease_;
-  const size_t size_;
-};
 
 // An answer that is a status only.
 absl::Status PlainStatus(const absl::StatusOr<Message>& answer) {
@@ -61,38 +51,44 @@ std::function<void(Message&)> NameBulk(SegmentPool::Lease lease, size_t size) {
   };
 }
 
-class WorkerEngine final : public Engine {
+class WorkerEngine final : public RankWorker {
  public:
   WorkerEngine(const EngineOptions& options, std::string reason,
-               std::shared_ptr<WorkerProcess> process, int socket, int wake)
+               std::shared_ptr<WorkerStaging> staging, std::shared_ptr<WorkerProcess> process,
+               int socket, int wake)
       : options_(options),
         channel_(std::make_shared<CallChannel>(
             std::move(process), socket, wake, options.worker_deadline_ns,
             options.worker_deadline_ns * kFirstAnswerFactor, options.lost)),
-        staging_(options.staging_limit_bytes, ids_, Added(), Dropped()),
-        results_(UINT64_MAX, ids_, Added(), Dropped()) {
+        staging_(std::move(staging)),
+        results_(UINT64_MAX, staging_->ids(), SegmentNews::Added(news_, false),
+                 SegmentNews::Dropped(news_)) {
+    staging_->AddListener(channel_);
+    news_->AddListener(channel_);
     info_.kind = options.kind;
     info_.reason = std::move(reason);
   }
 
   ~WorkerEngine() override { channel_->Close(); }
 
-  // Asks for the engine; `options_.wait_until_ready` says whether the answer is waited for.
-  absl::Status Open() {
+  // Asks for the engine; `options_.wait_until_ready` says whether the answer is waited for. `opened`
+  // (may be empty) is told, if it is not.
+  absl::Status Open(std::function<void(const absl::Status&)> opened) {
     OpenMessage open;
     open.kind = options_.kind;
     open.threads = options_.threads;
     open.device = options_.device;
     open.part = options_.part;
-    const auto ask = [&](std::function<void(absl::Status)> opened) {
+    const auto ask = [&](std::function<void(absl::Status)> answered) {
       channel_->Call(MakeMessage(MessageType::kOpen, 0, open), nullptr,
-                     [this, opened = std::move(opened)](const absl::StatusOr<Message>& answer) {
-                       opened(OnOpened(answer));
+                     [this, answered = std::move(answered)](const absl::StatusOr<Message>& answer) {
+                       answered(OnOpened(answer));
                      });
     };
     if (options_.wait_until_ready) return Await<absl::Status>(ask);
-    ask([this](const absl::Status& status) {
+    ask([this, opened = std::move(opened)](const absl::Status& status) {
       if (!status.ok()) channel_->Fail(absl::DataLossError(status.message()));
+      if (opened) opened(status);
     });
     return absl::OkStatus();
   }
@@ -118,6 +114,7 @@ class WorkerEngine final : public Engine {
                        if (status.ok()) {
                          sync::MutexLock lock(mutex_);
                          layout_ = layout;
+                         executor_ = MakeFrameExecutor(layout.bytes());
                        }
                        answer(status);
                      });
@@ -125,9 +122,7 @@ class WorkerEngine final : public Engine {
   }
 
   absl::StatusOr<StagingBlock> AcquireStaging(size_t size) override {
-    absl::StatusOr<SegmentPool::Lease> lease = staging_.Acquire(size);
-    if (!lease.ok()) return lease.status();
-    return StagingBlock(std::make_shared<LeasedMemory>(*std::move(lease), size));
+    return staging_->Acquire(size);
   }
 
   void Apply(StagingBlock block, size_t size, Done done) override {
@@ -165,14 +160,15 @@ class WorkerEngine final : public Engine {
       const FrameMessage sent{slot->lease->id,          request.frame,
                               slot->lease->holds,       request.buffer_holds,
                               buffer.changed_in.size(), buffer.bytes.size()};
-      channel_->Call(MakeMessage(MessageType::kFrame, 0, sent), nullptr,
-                     [this, request, buffer, sent, slot = *slot,
-                      answer](const absl::StatusOr<Message>& message) {
-                       absl::StatusOr<FrameResult> result =
-                           TakeFrame(message, request, buffer, sent, slot);
-                       if (absl::IsDataLoss(result.status())) channel_->Fail(result.status());
-                       answer(std::move(result));
-                     });
+      channel_->Call(
+          MakeMessage(MessageType::kFrame, 0, sent), nullptr,
+          [this, request, buffer, sent, slot = *slot,
+           answer](const absl::StatusOr<Message>& message) {
+            absl::StatusOr<FrameResult> result = TakeFrame(message, request, buffer, sent, slot);
+            if (absl::IsDataLoss(result.status())) channel_->Fail(result.status());
+            answer(std::move(result));
+          },
+          static_cast<int64_t>(buffer.bytes.size()) * kNsPerByte);
     });
   }
 
@@ -192,6 +188,34 @@ class WorkerEngine final : public Engine {
     });
   }
 
+  void Invite(const std::string& library,
+              std::function<void(absl::StatusOr<RankLink::Invitation>)> done) override {
+    channel_->Call(
+        MakeMessage(MessageType::kInvite, 0, InviteMessage{}, library), nullptr,
+        [done = std::move(done)](const absl::StatusOr<Message>& answer) {
+          if (!answer.ok()) return done(answer.status());
+          const auto invited = answer->As<InvitedMessage>();
+          if (answer->type == MessageType::kInvited && invited) return done(invited->invitation);
+          const absl::Status status = PlainStatus(answer);
+          done(status.ok() ? absl::DataLossError("the worker's invitation is none") : status);
+        },
+        options_.worker_deadline_ns * kFirstAnswerFactor);
+  }
+
+  void Join(const std::string& library, const RankLink::Invitation& invitation, int rank, int ranks,
+            Done done) override {
+    channel_->Call(
+        MakeMessage(MessageType::kJoin, 0, JoinMessage{invitation, rank, ranks}, library), nullptr,
+        [done = std::move(done)](const absl::StatusOr<Message>& answer) {
+          done(PlainStatus(answer));
+        },
+        options_.worker_deadline_ns * kFirstAnswerFactor);
+  }
+
+  void GiveUp(const absl::Status& why) override { channel_->Fail(why); }
+
+  void Close() override { channel_->Close(); }
+
  private:
   absl::Status OnOpened(const absl::StatusOr<Message>& answer) {
     if (!answer.ok()) return absl::FailedPreconditionError(answer.status().message());
@@ -206,24 +230,6 @@ class WorkerEngine final : public Engine {
     info_.device = std::string(ready->device, strnlen(ready->device, sizeof(ready->device)));
     if (info_.kind == EngineKind::kCpu) info_.device += ", in a process of its own";
     return absl::OkStatus();
-  }
-
-  SegmentPool::Told Added() {
-    return [channel = std::weak_ptr<CallChannel>(channel_)](const SegmentPool::Item& item) {
-      const std::shared_ptr<CallChannel> open = channel.lock();
-      if (open == nullptr) return;
-      Message message = MakeMessage(MessageType::kSegment, 0,
-                                    SegmentMessage{item.id, item.segment->bytes().size()});
-      message.fd = item.segment->fd();
-      open->Tell(std::move(message), item.segment);
-    };
-  }
-  SegmentPool::Told Dropped() {
-    return [channel = std::weak_ptr<CallChannel>(channel_)](const SegmentPool::Item& item) {
-      if (const std::shared_ptr<CallChannel> open = channel.lock()) {
-        open->Tell(MakeMessage(MessageType::kDropSegment, 0, SegmentMessage{item.id, 0}), nullptr);
-      }
-    };
   }
 
   // Has the worker know the segments of these blocks, before what is sent next.
@@ -336,13 +342,14 @@ class WorkerEngine final : public Engine {
       return absl::DataLossError("the worker took a buffer of the wrong size");
     }
     const FrameBuffer from = in.In(slot.lease->segment->bytes());
-    if (FrameCrc(*layout, from, sent.holds) != done->crc) {
-      return absl::DataLossError("a frame was damaged on its way from the worker");
-    }
     if (done->result.frame != request.frame) {
       return absl::DataLossError("the worker answered with another frame");
     }
-    CopyFrame(*layout, from, buffer, request.buffer_holds);
+    const PictureRange mine = PictureRange::Of(*layout, options_.part.Within(layout->slices));
+    if (CopyFrame(*layout, from, sent.holds, mine, buffer, request.buffer_holds, *executor_) !=
+        done->crc) {
+      return absl::DataLossError("a frame was damaged on its way from the worker");
+    }
     sync::MutexLock lock(mutex_);
     if (slot.target == target_) {
       slot.lease->holds = request.frame;
@@ -351,33 +358,21 @@ class WorkerEngine final : public Engine {
     return done->result;
   }
 
-  // The pictures of the engine's part that are newer than what the buffer holds.
-  void CopyFrame(const display::FrameLayout& layout, const FrameBuffer& from, const FrameBuffer& to,
-                 uint64_t holds) const {
-    const size_t subs = static_cast<size_t>(layout.sub_frames);
-    const size_t first = static_cast<size_t>(options_.part.begin) * subs;
-    const size_t last =
-        static_cast<size_t>(options_.part.end == -1 ? layout.slices : options_.part.end) * subs;
-    const size_t size = layout.bytes_per_slice();
-    for (size_t p = first; p < last; ++p) {
-      to.changed_in[p] = from.changed_in[p];
-      if (from.changed_in[p] <= holds) continue;
-      std::memcpy(to.bytes.data() + p * size, from.bytes.data() + p * size, size);
-    }
-  }
-
   const EngineOptions options_;
   EngineInfo info_;
   std::shared_ptr<CallChannel> channel_;
-  const SegmentPool::Ids ids_ = std::make_shared<std::atomic<uint32_t>>(1);
-  SegmentPool staging_, results_;
+  const std::shared_ptr<WorkerStaging> staging_;
+  const std::shared_ptr<SegmentNews> news_ = std::make_shared<SegmentNews>();  // of results_
+  SegmentPool results_;
   sync::Mutex mutex_;
   std::optional<display::FrameLayout> layout_ VOXELD_GUARDED_BY(mutex_);  // that the worker has
   uint64_t target_ VOXELD_GUARDED_BY(mutex_) = 0;                         // sent, counted
   std::vector<SegmentPool::Lease> slots_ VOXELD_GUARDED_BY(mutex_);       // for frames, newest last
   // The segments of bulk memory that the worker knows, by number.
   absl::flat_hash_map<uint64_t, std::weak_ptr<BulkSegment>> shown_ VOXELD_GUARDED_BY(mutex_);
-  BulkLedger ledger_;  // on the channel's thread
+  // On the channel's thread.
+  BulkLedger ledger_;
+  std::unique_ptr<Executor> executor_;  // to look through frames
 };
 
 std::filesystem::path RunningProgram() {
@@ -400,8 +395,11 @@ std::string DefaultWorkerProgram(const std::filesystem::path& running) {
   return above / "libexec/voxeld/voxeld-engine";
 }
 
-absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
-                                                           std::string reason) {
+namespace {
+
+absl::StatusOr<std::unique_ptr<WorkerEngine>> Create(
+    const EngineOptions& options, std::string reason, std::shared_ptr<WorkerStaging> staging,
+    std::function<void(const absl::Status&)> opened) {
   const std::string program =
       options.worker.empty() ? DefaultWorkerProgram(RunningProgram()) : options.worker;
   absl::StatusOr<std::shared_ptr<WorkerProcess>> process =
@@ -418,15 +416,33 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& 
   }
   std::unique_ptr<WorkerEngine> engine;
   try {
-    engine = std::make_unique<WorkerEngine>(options, std::move(reason), *std::move(process),
-                                            *socket, wake);
+    engine = std::make_unique<WorkerEngine>(options, std::move(reason), std::move(staging),
+                                            *std::move(process), *socket, wake);
   } catch (const std::exception& e) {
     close(*socket);
     close(wake);
     return absl::FailedPreconditionError(absl::StrCat("no thread for a worker: ", e.what()));
   }
-  if (absl::Status status = engine->Open(); !status.ok()) return status;
+  if (absl::Status status = engine->Open(std::move(opened)); !status.ok()) return status;
   return engine;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
+                                                           std::string reason) {
+  return Create(options, std::move(reason),
+                std::make_shared<WorkerStaging>(options.staging_limit_bytes), nullptr);
+}
+
+absl::StatusOr<std::unique_ptr<RankWorker>> CreateRankWorker(
+    const EngineOptions& options, std::shared_ptr<WorkerStaging> staging,
+    std::function<void(const absl::Status&)> opened) {
+  EngineOptions own = options;
+  own.workers = nullptr;
+  own.inline_execution = false;
+  own.wait_until_ready = false;
+  return Create(own, "", std::move(staging), std::move(opened));
 }
 
 }  // namespace voxeld::gpu

@@ -15,6 +15,8 @@
 #include "absl/strings/str_cat.h"
 #include "display/crc/crc32c.h"
 #include "gpu/bulk/segment.h"
+#include "gpu/cpu/executor.h"
+#include "gpu/worker/frame_slot.h"
 #include "gpu/worker/message.h"
 #include "gpu/worker/target_codec.h"
 
@@ -63,7 +65,7 @@ class Server {
   ~Server() {
     engine_ = nullptr;
     if (!hooks_.unpin) return;
-    for (const auto& [id, segment] : segments_) hooks_.unpin(segment->bytes());
+    for (const auto& [id, mapped] : segments_) Unpin(mapped);
     for (const auto& [id, segment] : bulk_.segments) hooks_.unpin(segment->bytes());
   }
 
@@ -96,6 +98,8 @@ class Server {
       case MessageType::kApply:
       case MessageType::kFrame:
       case MessageType::kVoxels:
+      case MessageType::kInvite:
+      case MessageType::kJoin:
         break;
       default:
         return absl::InvalidArgumentError("a message of an unknown type");
@@ -108,6 +112,10 @@ class Server {
         return Apply(message);
       case MessageType::kFrame:
         return Frame(message);
+      case MessageType::kInvite:
+        return Invite(message);
+      case MessageType::kJoin:
+        return Join(message);
       default:
         return Voxels(message);
     }
@@ -128,7 +136,7 @@ class Server {
     options.kind = open->kind;
     options.threads = open->threads;
     options.device = open->device;
-    options.part = open->part;
+    options.part = part_ = open->part;
     options.inline_execution = true;
     absl::StatusOr<std::unique_ptr<Engine>> engine = hooks_.make_engine(options);
     if (!engine.ok()) return Answer(message.call, engine.status());
@@ -145,8 +153,9 @@ class Server {
     if (!named.has_value() || fd < 0) return absl::InvalidArgumentError("a segment without memory");
     absl::StatusOr<std::shared_ptr<Segment>> segment = Segment::Adopt(fd, named->size);
     if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
-    if (hooks_.pin) hooks_.pin((*segment)->bytes());
-    segments_[named->segment] = *std::move(segment);
+    Mapped& mapped = segments_[named->segment];
+    mapped.segment = *std::move(segment);
+    if (named->staging != 0) Pin(mapped, mapped.segment->bytes());
     return absl::OkStatus();
   }
 
@@ -154,7 +163,7 @@ class Server {
     const auto named = message.As<SegmentMessage>();
     const auto it = named.has_value() ? segments_.find(named->segment) : segments_.end();
     if (it == segments_.end()) return absl::InvalidArgumentError("an unknown segment is dropped");
-    if (hooks_.unpin) hooks_.unpin(it->second->bytes());
+    Unpin(it->second);
     segments_.erase(it);
     return absl::OkStatus();
   }
@@ -183,8 +192,26 @@ class Server {
 
   std::shared_ptr<Segment> Find(uint32_t id, uint64_t size) const {
     const auto it = segments_.find(id);
-    if (it == segments_.end() || it->second->bytes().size() < size) return nullptr;
-    return it->second;
+    if (it == segments_.end() || it->second.segment->bytes().size() < size) return nullptr;
+    return it->second.segment;
+  }
+
+  // A segment, and what of it a device copies to and from.
+  struct Mapped {
+    std::shared_ptr<Segment> segment;
+    std::span<std::byte> pinned;
+  };
+  void Pin(Mapped& mapped, std::span<std::byte> memory) const {
+    if (!hooks_.pin ||
+        (mapped.pinned.data() == memory.data() && mapped.pinned.size() == memory.size())) {
+      return;
+    }
+    Unpin(mapped);
+    mapped.pinned = memory;
+    if (!memory.empty()) hooks_.pin(memory);
+  }
+  void Unpin(const Mapped& mapped) const {
+    if (hooks_.unpin && !mapped.pinned.empty()) hooks_.unpin(mapped.pinned);
   }
 
   // The segment of a bulk message, if its bytes are as they were sent.
@@ -207,7 +234,10 @@ class Server {
     const display::FrameLayout layout = target->layout;
     absl::Status status;
     engine_->SetTarget(*std::move(target), [&](const absl::Status& done) { status = done; });
-    if (status.ok()) layout_ = layout;
+    if (status.ok()) {
+      layout_ = layout;
+      executor_ = MakeFrameExecutor(layout.bytes());
+    }
     return Answer(message.call, status);
   }
 
@@ -236,12 +266,39 @@ class Server {
         slot.pictures < kMost && slot.bytes < kMost ? Find(frame->segment, slot.size()) : nullptr;
     if (segment == nullptr) return absl::InvalidArgumentError("a frame for an unknown segment");
     const FrameBuffer buffer = slot.In(segment->bytes());
+    const bool fits = layout_.has_value() && slot.pictures == layout_->pictures() &&
+                      slot.bytes == layout_->bytes();
+    const PictureRange mine =
+        fits ? PictureRange::Of(*layout_, part_.Within(layout_->slices)) : PictureRange();
+    if (fits) Pin(segments_[frame->segment], BytesOf(*layout_, buffer, mine));
     absl::StatusOr<FrameResult> result = absl::InternalError("no answer");
     engine_->SubmitFrame({frame->frame, frame->holds}, buffer,
                          [&](const absl::StatusOr<FrameResult>& done) { result = done; });
     if (!result.ok()) return Answer(message.call, result.status());
-    const FrameDoneMessage done{*result, FrameCrc(*layout_, buffer, frame->holds)};
+    const FrameDoneMessage done{*result,
+                                FrameCrc(*layout_, buffer, mine, frame->holds, *executor_)};
     return SendMessage(socket_, MakeMessage(MessageType::kFrameDone, message.call, done));
+  }
+
+  absl::Status Invite(const Message& message) {
+    if (engine_->link() == nullptr) return Answer(message.call, NoLink());
+    const absl::StatusOr<RankLink::Invitation> invitation =
+        engine_->link()->Invite(message.TextAfter<InviteMessage>());
+    if (!invitation.ok()) return Answer(message.call, invitation.status());
+    return SendMessage(
+        socket_, MakeMessage(MessageType::kInvited, message.call, InvitedMessage{*invitation}));
+  }
+
+  absl::Status Join(const Message& message) {
+    const auto join = message.As<JoinMessage>();
+    if (!join.has_value()) return absl::InvalidArgumentError("kJoin is too short");
+    if (engine_->link() == nullptr) return Answer(message.call, NoLink());
+    return Answer(message.call, engine_->link()->Join(message.TextAfter<JoinMessage>(),
+                                                      join->invitation, join->rank, join->ranks));
+  }
+
+  static absl::Status NoLink() {
+    return absl::FailedPreconditionError("such an engine is not linked with others");
   }
 
   absl::Status Voxels(const Message& message) {
@@ -260,7 +317,9 @@ class Server {
   const int socket_;
   const WorkerHooks& hooks_;
   std::unique_ptr<Engine> engine_;
-  std::map<uint32_t, std::shared_ptr<Segment>> segments_;
+  SlicePart part_;
+  std::map<uint32_t, Mapped> segments_;
+  std::unique_ptr<Executor> executor_;  // to look through frames
   BulkSegments bulk_;
   std::optional<display::FrameLayout> layout_;
 };
@@ -281,6 +340,10 @@ void ServeEngines(int control, const WorkerHooks& hooks) {
 
 void BecomeWorker() {
   setenv("CUDA_MODULE_LOADING", "EAGER", 0);
+  // Multicast over NVLink takes a service of the machine that may not be there, and then hangs; ranks
+  // of one display are of one host, and nobody else is to reach where they meet.
+  setenv("NCCL_NVLS_ENABLE", "0", 1);
+  setenv("NCCL_SOCKET_IFNAME", "lo", 0);
   // A terminal's Ctrl-C is for the owner, who ends its worker by closing the socket.
   std::signal(SIGINT, SIG_IGN);
   std::signal(SIGTERM, SIG_IGN);

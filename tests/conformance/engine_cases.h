@@ -11,10 +11,12 @@
 namespace voxeld::gpu::conformance {
 
 // Of CreateEngine; with `in_worker` in a process of its own.
-inline EngineCase CaseOf(const char* name, EngineKind kind, bool in_worker) {
-  return {name, [kind, in_worker](EngineOptions options) {
+inline EngineCase CaseOf(const char* name, EngineKind kind, bool in_worker,
+                         const std::vector<int>& devices = {}) {
+  return {name, [kind, in_worker, devices](EngineOptions options) {
             options.kind = kind;
             options.in_worker = in_worker;
+            options.devices = devices;
             return CreateEngine(options);
           }};
 }
@@ -26,6 +28,7 @@ inline std::vector<EngineCase> EngineCases() {
         CaseOf("cuda_worker", EngineKind::kCuda, true),
 #else
     CaseOf("cpu", EngineKind::kCpu, false), CaseOf("cpu_worker", EngineKind::kCpu, true),
+        CaseOf("cpu_ranks", EngineKind::kCpu, true, {0, 1}),
 #endif
   };
 }

@@ -89,8 +89,9 @@ void SendScene(Client& client, int i) {
 class Drilled {
  public:
   // `engine`: the program; empty: the CPU in the daemon's own process. `fault_color`: of geometries
-  // that fault.
-  explicit Drilled(const std::string& engine, const std::string& fault_color = "") {
+  // that fault. `more`: of every display's options.
+  explicit Drilled(const std::string& engine, const std::string& fault_color = "",
+                   const std::string& more = "") {
     std::string config = "[engine]\n";
     if (engine.empty()) {
       config += "kind = \"cpu\"\n";
@@ -104,10 +105,13 @@ class Drilled {
     environment["VOXELD_FAULT_FILE"] = fault_file_;
     environment["VOXELD_FAULT_COLOR"] = fault_color;
     process_ = std::make_unique<Process>(
-        std::vector<std::string>{VoxeldBinary(), "--config", folder_.File("voxeld.toml", config),
-                                 "--listen", target_, "--http", "off", "--log-format", "json",
-                                 "--display", "stack=simulated,size=48x48x24,rate=240", "--display",
-                                 "rotor=simulated,geometry=rotor,slices=60,size=48x32,rate=240"},
+        std::vector<std::string>{
+            VoxeldBinary(), "--config", folder_.File("voxeld.toml", config), "--listen", target_,
+            "--http", "off", "--log-format", "json", "--display",
+            absl::StrCat("stack=simulated,size=48x48x24,rate=240", more), "--display",
+            absl::StrCat("rotor=simulated,geometry=rotor,slices=60,"
+                         "size=48x32,rate=240",
+                         more)},
         environment);
     const std::optional<std::string> ready = process_->ReadLineWith("\"event\":\"ready\"");
     if (!ready.has_value()) throw std::runtime_error("voxeld: " + process_->output());
@@ -200,9 +204,9 @@ class Drilled {
 // Both get the same commits; what they show is compared.
 class Pair {
  public:
-  explicit Pair(const std::string& fault_color = "")
-      : faulted(ProgramBeside(FromEnvironment("VOXELD_DRILL_ENGINE", "faulty_engine")),
-                fault_color),
+  explicit Pair(const std::string& fault_color = "", const std::string& more = "")
+      : faulted(ProgramBeside(FromEnvironment("VOXELD_DRILL_ENGINE", "faulty_engine")), fault_color,
+                more),
         unfaulted("") {}
 
   void Commit() {
@@ -314,6 +318,53 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
               pair.commits, std::size(kDisplays));
   for (const auto& [kind, ms] : takeovers) Print(absl::StrCat("takeover, ", kind).c_str(), ms);
   Print("of which the CPU's drawing, once the loss was known", redraws);
+  Print("return", returns);
+}
+
+// Each display over two GPUs: whichever of the four ranks faults, its display's other one goes too, the
+// other display does not, and they come back together.
+TEST(FaultDrill, ALostRankTakesItsDisplaysOthersAlongAndTheyComeBack) {
+  int faults = 0;
+  ASSERT_TRUE(absl::SimpleAtoi(FromEnvironment("VOXELD_DRILL_FAULTS", "6"), &faults));
+  const std::vector<std::string> kinds =
+      absl::StrSplit(FromEnvironment("VOXELD_DRILL_KINDS", "crash,dataloss,exit,hang"), ',');
+  Pair pair("", ",gpus=0;1");
+  const auto sum = [&](auto figure) {
+    uint64_t all = 0;
+    const v1::Stats stats = pair.faulted.Stats();
+    for (const v1::DisplayStats& d : stats.displays()) all += figure(d);
+    return all;
+  };
+  pair.CommitMany();
+  pair.CommitUntil(Pair::OnCuda);
+  std::vector<double> takeovers, returns;
+  for (int fault = 1; fault <= faults && !::testing::Test::HasFailure(); ++fault) {
+    pair.faulted.Fault(kinds[static_cast<size_t>(fault) % kinds.size()]);
+    for (int waited = 0; waited < 3000 && sum([](const auto& d) { return d.engine_faults(); }) <
+                                              static_cast<uint64_t>(fault);
+         ++waited) {
+      pair.Commit();
+    }
+    EXPECT_TRUE(pair.faulted.faulted());
+    pair.CommitUntil(Pair::OnCuda);
+    pair.CommitMany();
+    EXPECT_EQ(sum([](const auto& d) { return d.engine_faults(); }), static_cast<uint64_t>(fault));
+    EXPECT_EQ(sum([](const auto& d) { return d.engine_returns(); }), static_cast<uint64_t>(fault));
+    const v1::Stats stats = pair.faulted.Stats();
+    for (const v1::DisplayStats& d : stats.displays()) {
+      if (d.engine_returns() == 0) continue;
+      takeovers.push_back(static_cast<double>(d.takeover_last_ns()) / 1e6);
+      returns.push_back(static_cast<double>(d.return_last_ns()) / 1e6);
+    }
+  }
+  const v1::Stats stats = pair.faulted.Stats();
+  for (const v1::DisplayStats& d : stats.displays()) {
+    EXPECT_EQ(d.volumes_lost() + d.commits_lost(), 0u) << d.name();
+    EXPECT_EQ(d.commits_presented(), static_cast<uint64_t>(pair.commits)) << d.name();
+    EXPECT_EQ(d.engine_mismatches(), 0u) << d.name();
+    EXPECT_THAT(d.engine_device(), ::testing::StartsWith("GPU 0: ")) << d.name();
+  }
+  Print("takeover", takeovers);
   Print("return", returns);
 }
 

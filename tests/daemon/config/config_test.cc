@@ -59,6 +59,7 @@ staging_limit_bytes = 2_097_152
 device = 3
 in_worker = true
 worker = "/opt/engine"
+nccl = "/opt/libnccl.so.2"
 worker_deadline_ns = 500_000_000
 [log]
 level = "warn"
@@ -94,6 +95,7 @@ driver = "simulated"
   EXPECT_EQ(config.engine.device, 3u);
   EXPECT_TRUE(config.engine.in_worker);
   EXPECT_EQ(config.engine.worker, "/opt/engine");
+  EXPECT_EQ(config.engine.nccl, "/opt/libnccl.so.2");
   EXPECT_EQ(config.engine.worker_deadline_ns, sync::kSecond / 2);
   EXPECT_EQ(config.log.level, "warn");
   EXPECT_EQ(config.log.format, "json");
@@ -107,7 +109,7 @@ driver = "simulated"
   EXPECT_THAT(config.displays[0].options,
               UnorderedElementsAre(Pair("geometry", "rotor"), Pair("slices", "360"),
                                    Pair("eccentricity", "13.5;0.375"), Pair("mirror", "true")));
-  EXPECT_EQ(config.displays[0].source, "test.toml:22:1");
+  EXPECT_EQ(config.displays[0].source, "test.toml:23:1");
 }
 
 TEST(ConfigText, NoDisplaysAtAllCanBeAskedForAndReadsBack) {

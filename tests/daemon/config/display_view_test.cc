@@ -47,5 +47,31 @@ TEST(DisplayView, AnUnknownOneIsAnsweredWithWhatIsMeant) {
               HasSubstr("view is \"voxel\"; did you mean voxels?"));
 }
 
+TEST(DisplayView, GpusAreNumbersEachOnce) {
+  EXPECT_THAT(Split("sim=simulated")->gpus, ElementsAre());
+  const auto split = Split("sim=simulated,gpus=3;0;1,size=8x8");
+  ASSERT_TRUE(split.ok()) << split.status();
+  EXPECT_THAT(split->gpus, ElementsAre(3, 0, 1));
+  EXPECT_THAT(split->driver, ElementsAre(Pair("size", "8x8")));
+  for (const char* wrong : {"", "0;", "0;x", "-1", "1024", "0,1", "0;1.5"}) {
+    DisplayConfig config;
+    config.options["gpus"] = wrong;
+    EXPECT_THAT(SplitDisplayOptions(config).status().message(),
+                HasSubstr("give numbers of GPUs from 0 to 1023"))
+        << wrong;
+  }
+  EXPECT_THAT(Split("sim=simulated,gpus=1;2;1").status().message(),
+              HasSubstr("gpus is \"1;2;1\", which has 1 twice"));
+}
+
+TEST(DisplayView, GpusMustSuitEngineAndDisplay) {
+  using gpu::EngineKind;
+  EXPECT_TRUE(CheckGpus({}, EngineKind::kCpu, 1).ok());
+  EXPECT_TRUE(CheckGpus({0, 1}, EngineKind::kAuto, 2).ok());
+  EXPECT_THAT(CheckGpus({0}, EngineKind::kCpu, 8).message(), HasSubstr("the engine is cpu"));
+  EXPECT_THAT(CheckGpus({0, 1, 2}, EngineKind::kCuda, 2).message(),
+              HasSubstr("gpus names 3 GPUs, and the display has 2 slices"));
+}
+
 }  // namespace
 }  // namespace voxeld::daemon

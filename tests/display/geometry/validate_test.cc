@@ -87,9 +87,9 @@ TEST(ValidateTest, Stacks) {
           {[](S& s, G&) { s.positions_mm = {0}, s.thickness_mm = kNan; }, {"thickness_mm is nan"}},
           {[](S& s, G&) {
              s.width_px = s.height_px = 16384;
-             s.positions_mm = EvenPositions(17, 1);
+             s.positions_mm = EvenPositions(65, 1);
            },
-           {"slices·width_px·height_px (17·16384·16384) is 4563402752", "at most 4294967296"}},
+           {"slices·width_px·height_px (65·16384·16384) is 17448304640", "at most 17179869184"}},
           {[](S& s, G& g) {
              s.width_px = g.nx = 16384;
              g.nz = 8192;
@@ -135,9 +135,9 @@ TEST(ValidateTest, Rotors) {
           {[](R& r, G&) {
              r.slices_per_turn = 16384;
              r.width_px = 1024;
-             r.height_px = 256;
+             r.height_px = 1024;
            },
-           {"slices·width_px·height_px (32768·1024·256) is 8589934592"}},
+           {"slices·width_px·height_px (32768·1024·1024) is 34359738368"}},
           {[](R& r, G&) { r.panels[0].eccentricity_mm = 20000; },
            {"panels' greatest distance from the axis is 20000", "within 16384 mm"}},
           {[](R&, G& g) { g.origin_mm.x = -17000; }, {"grid.origin_mm.x is -17000"}},

@@ -44,14 +44,41 @@ class ColorWatch final : public DeltaVisitor {
   std::set<uint64_t> ids_;
 };
 
+class FaultyLink final : public RankLink {
+ public:
+  explicit FaultyLink(std::string fault) : fault_(std::move(fault)) {}
+  absl::StatusOr<Invitation> Invite(const std::string& library) override {
+    if (fault_ == "invite") {
+      return absl::FailedPreconditionError("no library \"" + library + "\", as was asked for");
+    }
+    Invitation invitation;
+    invitation.fill(std::byte{0x5C});
+    return invitation;
+  }
+  absl::Status Join(const std::string&, const Invitation& invitation, int rank,
+                    int ranks) override {
+    if (fault_ == "join" && rank == 1) {
+      return absl::FailedPreconditionError("it does not come, as was asked for");
+    }
+    const bool mine = invitation.front() == std::byte{0x5C} && invitation == *Invite("");
+    return mine && rank >= 0 && rank < ranks ? absl::OkStatus()
+                                             : absl::DataLossError("another invitation");
+  }
+
+ private:
+  const std::string fault_;
+};
+
 class FaultyEngine final : public Engine {
  public:
   FaultyEngine(std::unique_ptr<Engine> engine, EngineInfo info, const FaultTrigger& trigger,
-               std::function<absl::Status(const std::string&)> fault)
+               std::function<absl::Status(const std::string&)> fault,
+               std::unique_ptr<RankLink> link)
       : engine_(std::move(engine)),
         info_(std::move(info)),
         trigger_(trigger),
-        fault_(std::move(fault)) {
+        fault_(std::move(fault)),
+        link_(std::move(link)) {
     if (trigger.color) watch_.emplace(*trigger.color);
   }
 
@@ -86,6 +113,7 @@ class FaultyEngine final : public Engine {
   void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) override {
     engine_->ReadVoxels(box, out, std::move(done));
   }
+  RankLink* link() override { return link_ != nullptr ? link_.get() : engine_->link(); }
 
  private:
   // Whether the file was there, for this engine.
@@ -101,6 +129,7 @@ class FaultyEngine final : public Engine {
   const EngineInfo info_;
   const FaultTrigger trigger_;
   const std::function<absl::Status(const std::string&)> fault_;
+  const std::unique_ptr<RankLink> link_;
   uint64_t frames_ = 0;
   std::optional<ColorWatch> watch_;
 };
@@ -120,8 +149,14 @@ FaultTrigger FaultTrigger::FromEnvironment() {
   return trigger;
 }
 
+std::unique_ptr<RankLink> MakeFaultyLink() {
+  const char* const fault = std::getenv("VOXELD_FAULT_LINK");
+  return std::make_unique<FaultyLink>(fault != nullptr ? fault : "");
+}
+
 absl::Status Fail(const std::string& kind) {
   if (kind == "dataloss") return absl::DataLossError("a fault that was asked for");
+  if (kind == "exhausted") return absl::ResourceExhaustedError("no room, as was asked for");
   if (kind == "exit") _exit(0);
   if (kind == "hang") {
     for (;;) pause();
@@ -132,9 +167,10 @@ absl::Status Fail(const std::string& kind) {
 
 std::unique_ptr<Engine> MakeFaulty(std::unique_ptr<Engine> engine, EngineInfo info,
                                    const FaultTrigger& trigger,
-                                   std::function<absl::Status(const std::string&)> fault) {
+                                   std::function<absl::Status(const std::string&)> fault,
+                                   std::unique_ptr<RankLink> link) {
   return std::make_unique<FaultyEngine>(std::move(engine), std::move(info), trigger,
-                                        std::move(fault));
+                                        std::move(fault), std::move(link));
 }
 
 }  // namespace voxeld::gpu

@@ -18,6 +18,7 @@
 
 #include "absl/status/status.h"
 #include "gpu/engine.h"
+#include "gpu/rank_link.h"
 
 namespace voxeld::gpu {
 
@@ -30,14 +31,19 @@ struct FaultTrigger {
   static FaultTrigger FromEnvironment();
 };
 
-// How a process fails: "crash" (as for any other word), "exit", "hang", "dataloss".
+// How a process fails: "crash" (as for any other word), "exit", "hang", "dataloss", "exhausted" (an
+// ordinary error).
 absl::Status Fail(const std::string& kind);
 
 // `engine`, which must carry out calls inline, under the name `info`. Before a frame that the
 // trigger names `fault` is called with the kind: an error is the frame's answer, after OK the engine
-// gets it.
+// gets it. `link` (may be null) stands for the engine's own.
 std::unique_ptr<Engine> MakeFaulty(std::unique_ptr<Engine> engine, EngineInfo info,
                                    const FaultTrigger& trigger,
-                                   std::function<absl::Status(const std::string& kind)> fault);
+                                   std::function<absl::Status(const std::string& kind)> fault,
+                                   std::unique_ptr<RankLink> link = nullptr);
+
+// A link that links nothing. VOXELD_FAULT_LINK: "invite" or "join" fails, the latter for rank 1.
+std::unique_ptr<RankLink> MakeFaultyLink();
 
 }  // namespace voxeld::gpu

@@ -1,5 +1,5 @@
 // A stand-in for voxeld-engine that fails when faults.h says so, without a GPU: asked for CUDA, it
-// is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss.
+// is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss, exhausted.
 #include <string>
 #include <utility>
 
@@ -15,7 +15,8 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const EngineOptions& options)
   std::unique_ptr<Engine> engine = CreateCpuEngine(options, "");
   EngineInfo info = engine->info();
   if (options.kind == EngineKind::kCuda) info = {EngineKind::kCuda, "a GPU that faults", ""};
-  return MakeFaulty(std::move(engine), std::move(info), FaultTrigger::FromEnvironment(), Fail);
+  return MakeFaulty(std::move(engine), std::move(info), FaultTrigger::FromEnvironment(), Fail,
+                    MakeFaultyLink());
 }
 
 int Main() {

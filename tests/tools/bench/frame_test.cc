@@ -279,6 +279,31 @@ TEST(FrameBench, EveryVoxelInReachOfTheRotorIsLitInEveryFrame) {
   }
 }
 
+TEST(FrameBench, RanksStandBesideOneOfThem) {
+  const auto report =
+      Measured({.scene = "vx1", .threads = 1, .rounds = 2, .share = 0.01, .gpus = 3});
+  ASSERT_TRUE(report.ok()) << report.status();
+  ASSERT_THAT((*report)["rows"], SizeIs(1));
+  const nlohmann::json& row = (*report)["rows"][0];
+  EXPECT_EQ(row["gpus"], 3);
+  EXPECT_EQ(row["same_bytes"], true);
+  EXPECT_THAT(std::string(row["device"]), HasSubstr("rank 2: CPU, 1 thread"));
+  for (const char* clock : {"device", "host"}) EXPECT_GT(double(row["speedup"][clock]), 0);
+  EXPECT_GT(double(row["one_gpu"]["host_ms"]["median"]), 0);
+  EXPECT_THAT(FrameText(*report), HasSubstr("the same bytes"));
+}
+
+TEST(FrameScenes, HugeLinesAreLongInTwoThousandCubed) {
+  const Scene scene = Only("huge", 1, 0.001);
+  EXPECT_EQ(scene.target.layout.bytes(), uint64_t{2048} * 2048 * 2048 / 8 * 3);
+  const Counted counted = CountLines(scene.contents);
+  EXPECT_EQ(counted.lines, 1000u);
+  EXPECT_EQ(counted.voxels, scene.voxels);
+  // The greatest of three distances of random places is 0.54 of the edge on average.
+  EXPECT_NEAR(static_cast<double>(counted.voxels) / 1000, 0.54 * 2048, 60);
+  ExpectInside(scene.contents, {0, 0, 0}, {2047, 2048, 2048});
+}
+
 TEST(FrameBench, TellsWhetherADisplayIsKeptUpWith) {
   const auto report = Measured({.scene = "vx1", .rounds = 1, .share = 0.01});
   ASSERT_TRUE(report.ok()) << report.status();
@@ -299,6 +324,7 @@ TEST(FrameBench, SaysWhatIsWrongWithTheOptions) {
   EXPECT_THAT(Refusal({.scene = "short", .engine = "gpu"}), HasSubstr("'gpu'; give cpu or cuda"));
   EXPECT_THAT(Refusal({.scene = "short", .engine = "cuda", .threads = 2}), HasSubstr("--threads"));
   EXPECT_THAT(Refusal({.scene = "short", .threads = -1}), HasSubstr("--threads is -1"));
+  EXPECT_THAT(Refusal({.scene = "short", .gpus = -1}), HasSubstr("--gpus is -1"));
   EXPECT_THAT(Refusal({.scene = "short", .rounds = 0}), HasSubstr("--rounds is 0"));
   EXPECT_THAT(Refusal({.scene = "short", .share = 0}), HasSubstr("--share is 0"));
   EXPECT_THAT(Refusal({.scene = "short", .share = 1.5}), HasSubstr("--share is 1.5"));

@@ -76,7 +76,23 @@ absl::StatusOr<Beside> BesideOf(const Scene& scene, bool cuda, int threads) {
 // The first two frames put up the scene and make room: neither is counted.
 constexpr int kWarmRounds = 2;
 
-absl::StatusOr<Times> Measure(Subject& subject, Beside& beside, int rounds,
+// `alone`: the same scene on one GPU, drawn in turns; null: that is not asked for.
+struct Alone {
+  Subject* subject = nullptr;
+  Times times;
+  bool same_bytes = true;
+
+  absl::Status Draw(const Subject& other, bool counts) {
+    if (subject == nullptr) return absl::OkStatus();
+    const absl::StatusOr<FrameTimes> frame = subject->Draw();
+    if (!frame.ok()) return frame.status();
+    if (counts) times.Add(*frame);
+    same_bytes = same_bytes && subject->pictures() == other.pictures();
+    return absl::OkStatus();
+  }
+};
+
+absl::StatusOr<Times> Measure(Subject& subject, Alone& alone, Beside& beside, int rounds,
                               const std::function<bool()>& go_on) {
   Times times;
   times.peers.resize(beside.peers.size());
@@ -84,6 +100,7 @@ absl::StatusOr<Times> Measure(Subject& subject, Beside& beside, int rounds,
     if (!go_on()) return absl::CancelledError("interrupted");
     const absl::StatusOr<FrameTimes> frame = subject.Draw();
     if (!frame.ok()) return frame.status();
+    if (absl::Status status = alone.Draw(subject, round >= 0); !status.ok()) return status;
     const absl::StatusOr<double> ceiling = TimeOf(*beside.ceiling);
     if (!ceiling.ok()) return ceiling.status();
     if (round >= 0) {
@@ -130,7 +147,9 @@ json RowOf(const Scene& scene, const FrameOptions& options, int threads, const S
               {"engine", options.engine},
               {"device", subject.info().device},
               {"threads", threads},
-              {"gpus", cuda ? 1 : 0},
+              {"gpus", options.gpus > 0 ? options.gpus
+                       : cuda           ? 1
+                                        : 0},
               {"voxels", voxels},
               {"voxels_are", scene.voxels != 0 ? "drawn" : "lit"},
               {"scene_voxels", scene.scene_voxels != 0 ? json(scene.scene_voxels) : json(nullptr)},
@@ -159,6 +178,20 @@ json RowOf(const Scene& scene, const FrameOptions& options, int threads, const S
   return row;
 }
 
+void AddAlone(const Scene& scene, const Subject& subject, const Times& times, const Alone& alone,
+              json& row) {
+  const auto device = [&](const Times& of) -> const std::vector<double>& {
+    return scene.slicing_only ? of.slice : of.device;
+  };
+  row["reason"] = subject.info().reason;
+  row["one_gpu"] = {{"device_ms", SpreadJson(device(alone.times))},
+                    {"host_ms", SpreadJson(alone.times.host)},
+                    {"apply_ms", SpreadJson(alone.times.apply)}};
+  row["speedup"] = {{"device", RatioOf(device(alone.times), device(times))},
+                    {"host", RatioOf(alone.times.host, times.host)}};
+  row["same_bytes"] = alone.same_bytes;
+}
+
 absl::Status CheckOptions(const FrameOptions& options) {
   const std::vector<std::string> scenes = SceneNames();
   if (std::find(scenes.begin(), scenes.end(), options.scene) == scenes.end()) {
@@ -168,6 +201,10 @@ absl::Status CheckOptions(const FrameOptions& options) {
   if (options.engine != "cpu" && options.engine != "cuda") {
     return absl::InvalidArgumentError(
         absl::StrCat("--engine is '", options.engine, "'; give cpu or cuda"));
+  }
+  if (options.gpus < 0 || options.gpus > 64) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--gpus is ", options.gpus, "; give a number from 1 to 64, or leave it out"));
   }
   if (options.engine == "cuda" && options.threads != 0) {
     return absl::InvalidArgumentError(
@@ -194,6 +231,7 @@ std::vector<int> ThreadsOf(const FrameOptions& options, const Scene& scene) {
   if (options.engine == "cuda") return {0};
   if (options.threads > 0) return {options.threads};
   const int all = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  if (options.gpus > 0) return {all};
   if (scene.plain_peer) return {1, 2};
   if (scene.slicing_only && all > 1) return {1, all};
   return {all};
@@ -209,13 +247,23 @@ absl::StatusOr<json> MeasureFrames(const FrameOptions& options,
   for (const MakeScene& make : ScenesOf(options.scene, options.seed, options.share)) {
     const Scene scene = make();
     for (const int threads : ThreadsOf(options, scene)) {
-      auto subject = Subject::Create(options.engine, threads, scene);
+      Subject::Machine machine{options.engine, threads, options.gpus, options.nccl};
+      auto subject = Subject::Create(machine, scene);
       if (!subject.ok()) return subject.status();
+      std::unique_ptr<Subject> one;
+      if (options.gpus > 0) {
+        machine.gpus = 1;
+        auto made = Subject::Create(machine, scene);
+        if (!made.ok()) return made.status();
+        one = *std::move(made);
+      }
+      Alone alone{one.get(), {}};
       auto beside = BesideOf(scene, options.engine == "cuda", threads);
       if (!beside.ok()) return beside.status();
-      const absl::StatusOr<Times> times = Measure(**subject, *beside, options.rounds, go_on);
+      const absl::StatusOr<Times> times = Measure(**subject, alone, *beside, options.rounds, go_on);
       if (!times.ok()) return times.status();
       report["rows"].push_back(RowOf(scene, options, threads, **subject, *beside, *times));
+      if (one != nullptr) AddAlone(scene, **subject, *times, alone, report["rows"].back());
       progress(RowText(report["rows"].back()));
     }
   }

@@ -25,13 +25,18 @@ struct FrameOptions {
   int rounds = 5;              // of each frame and its ceiling, in turns, the first not counted
   uint64_t seed = 1;
   double share = 1;  // of the scene's primitives
+  // Over so many GPUs (0 to gpus − 1), each in a process of its own, in turns with one of them alone;
+  // 0: one, in this process. Of the CPU engine: processes.
+  int gpus = 0;
+  std::string nccl;  // where NCCL is: gpu::EngineOptions::nccl
 };
 
 // {rows: [{scene, engine, device, threads, gpus, voxels, voxels_are ("drawn" or "lit"), scene_voxels, lit_voxels,
 // rounds, device_ms {median, least, greatest}, host_ms {…}, apply_ms {…}, gvoxel_per_s (device), host_gvoxel_per_s,
 // ceiling {name, ms}, ratio (of the host's time to it, or of slicing alone), peers: [{name, ms, ratio (of the device's
 // time)}], stages {apply, assemble, slice, door: share of all}, slicing_only, volumes_per_s {asked, reached} or
-// null}]}. `progress` takes a line for each row; false from `go_on` ends it with Cancelled. InvalidArgument names the
+// null, and with FrameOptions::gpus: reason (how they are linked), one_gpu {device_ms, host_ms, apply_ms, as above},
+// speedup {device, host: one GPU's time by theirs, the median over rounds}, same_bytes}]}. `progress` takes a line for each row; false from `go_on` ends it with Cancelled. InvalidArgument names the
 // option.
 absl::StatusOr<nlohmann::json> MeasureFrames(
     const FrameOptions& options, const std::function<void(const std::string&)>& progress,

@@ -45,6 +45,19 @@ std::string FrameText(const json& report) {
       absl::StrAppendFormat(&out, "  peer     %.4g ms: %s; device takes %.3g times as long\n",
                             double(peer["ms"]), std::string(peer["name"]), double(peer["ratio"]));
     }
+    if (row.contains("one_gpu")) {
+      absl::StrAppendFormat(&out, "  one GPU  device %s, host %s, apply %s\n",
+                            SpreadText(row["one_gpu"]["device_ms"]),
+                            SpreadText(row["one_gpu"]["host_ms"]),
+                            SpreadText(row["one_gpu"]["apply_ms"]));
+      absl::StrAppendFormat(&out,
+                            "  %d GPUs: %.3g times as fast by the device's clock, %.3g by the "
+                            "host's; %s\n",
+                            int(row["gpus"]), double(row["speedup"]["device"]),
+                            double(row["speedup"]["host"]),
+                            row["same_bytes"] ? "the same bytes" : "OTHER BYTES");
+      absl::StrAppendFormat(&out, "  %s\n", std::string(row["reason"]));
+    }
     out += "  shares  ";
     for (const auto& [stage, share] : row["stages"].items()) {
       absl::StrAppendFormat(&out, " %s %.1f %%", stage, 100 * double(share));

@@ -335,10 +335,25 @@ struct Named {
   std::vector<MakeScene> (*rows)(uint64_t seed, double share);
 };
 
+// Lines from anywhere to anywhere: 1,100 voxels each, on the average, in 2048³.
+Scene HugeLines(uint64_t count, uint64_t seed) {
+  Scene scene = OneLayer("huge", Stack(2048, 2048, 2048, PixelFormat::kBitPlanes3));
+  const Extent extent = ExtentOf(scene.target, true);
+  LineSet lines(seed);
+  while (lines.lines() < count) lines.AddUniform(extent);
+  scene.voxels = scene.scene_voxels = lines.voxels();
+  scene.contents.push_back(lines.Take());
+  return scene;
+}
+
 constexpr Named kScenes[] = {
     {"lines1g",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] { return UniformLines("lines1g", LargeStack(), Share(1e9, share), seed); }};
+     }},
+    {"huge",
+     [](uint64_t seed, double share) -> std::vector<MakeScene> {
+       return {[=] { return HugeLines(Share(1e6, share), seed); }};
      }},
     {"lines100m",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {

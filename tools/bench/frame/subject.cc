@@ -27,6 +27,9 @@ gpu::DrawableRecord DrawableOf(const Content& content, uint64_t id, uint64_t geo
           .transform = content.transform};
 }
 
+// Nothing is lost for being slow: the first frames map and pin gigabytes.
+constexpr int64_t kDeadline = 60 * sync::kSecond;
+
 size_t SizeOf(const Content& content) {
   return gpu::DeltaWriter::SizeOf(RecordOf(content, 1)) +
          gpu::DeltaWriter::SizeOf(gpu::DrawableRecord{}) + gpu::DeltaWriter::kSizeOfId;
@@ -47,15 +50,25 @@ Subject::~Subject() {
   if (pinned_) UnpinFrame(bytes_);
 }
 
-absl::StatusOr<std::unique_ptr<Subject>> Subject::Create(const std::string& engine, int threads,
+absl::StatusOr<std::unique_ptr<Subject>> Subject::Create(const Machine& machine,
                                                          const Scene& scene) {
   gpu::EngineOptions options;
-  options.threads = threads;
-  const bool cuda = engine == "cuda";
-  absl::StatusOr<std::unique_ptr<gpu::Engine>> made =
-      cuda ? MakeCudaEngine(options) : gpu::CreateCpuEngine(options, "a benchmark");
+  options.threads = machine.threads;
+  const bool cuda = machine.engine == "cuda";
+  absl::StatusOr<std::unique_ptr<gpu::Engine>> made = absl::InternalError("none");
+  if (machine.gpus > 0) {
+    options.kind = cuda ? gpu::EngineKind::kCuda : gpu::EngineKind::kCpu;
+    options.in_worker = true;
+    for (int g = 0; g < machine.gpus; ++g) options.devices.push_back(g);
+    options.nccl = machine.nccl;
+    options.worker_deadline_ns = kDeadline;
+    made = gpu::CreateEngine(options);
+  } else {
+    made = cuda ? MakeCudaEngine(options) : gpu::CreateCpuEngine(options, "a benchmark");
+  }
   if (!made.ok()) return made.status();
-  std::unique_ptr<Subject> subject(new Subject(cuda, *std::move(made), scene));
+  const bool pinned = cuda && machine.gpus == 0;
+  std::unique_ptr<Subject> subject(new Subject(pinned, *std::move(made), scene));
   if (absl::Status status = subject->SetTarget(); !status.ok()) return status;
   return subject;
 }

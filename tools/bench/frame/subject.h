@@ -25,8 +25,16 @@ struct FrameTimes {
 
 class Subject {
  public:
-  // `engine`: "cpu" or "cuda", in this process. The scene must outlive the subject.
-  static absl::StatusOr<std::unique_ptr<Subject>> Create(const std::string& engine, int threads,
+  struct Machine {
+    std::string engine = "cpu";  // or "cuda"
+    int threads = 0;             // of the CPU engine; 0: one a core
+    // 0: in this process. Else as a display has it: so many GPUs, from 0 on, each in a process of its
+    // own (of the CPU engine, so many processes).
+    int gpus = 0;
+    std::string nccl;  // gpu::EngineOptions::nccl
+  };
+  // The scene must outlive the subject.
+  static absl::StatusOr<std::unique_ptr<Subject>> Create(const Machine& machine,
                                                          const Scene& scene);
   ~Subject();
   Subject(const Subject&) = delete;

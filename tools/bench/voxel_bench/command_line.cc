@@ -154,7 +154,14 @@ CLI::App* AddFrame(CLI::App& app, FrameOptions& options) {
   command->add_option("--scene", options.scene, "Which")
       ->required()
       ->check(CLI::IsMember(frame::SceneNames()));
-  command->add_option("--engine", options.engine, "In this process")
+  command
+      ->add_option(
+          "--gpus", options.gpus,
+          "Over so many GPUs, a process each, beside one of them; default: in this process")
+      ->check(CLI::Range(1, 64));
+  command->add_option("--nccl", options.nccl, "Where NCCL's library is, or off; with --gpus")
+      ->type_name("FILE|off");
+  command->add_option("--engine", options.engine, "Which")
       ->check(CLI::IsMember({"cpu", "cuda"}))
       ->capture_default_str();
   command->add_option("--threads", options.threads, "Of the CPU engine; default: one a core")

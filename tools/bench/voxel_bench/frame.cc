@@ -29,6 +29,7 @@ absl::StatusOr<nlohmann::json> RunFrame(const FrameOptions& options, const Surro
                                              {"engine", options.engine},
                                              {"threads", options.threads},
                                              {"rounds", options.rounds},
+                                             {"gpus", options.gpus},
                                              {"seed", options.seed},
                                              {"share", options.share}});
   absl::StatusOr<nlohmann::json> measured =
