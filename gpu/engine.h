@@ -167,7 +167,12 @@ struct FrameResult {
   uint32_t tiles_drawn = 0;         // dirty tiles, of the engine's own size, drawn for this frame
   uint32_t pictures_drawn = 0;      // pictures sliced again
   uint32_t singular_drawables = 0;  // solids whose map has no inverse: they draw nothing
-  int64_t assemble_ns = 0, slice_ns = 0;
+  // Where a display's pixels are voxels, pictures may be packed as the volume is drawn; then that is
+  // all assembling. Else the volume is drawn, and sliced.
+  bool packed_as_drawn = false;
+  // Until the volume was drawn; from there until the pictures were packed; and until they lay in the
+  // buffer, as far as that took longer than the packing.
+  int64_t assemble_ns = 0, slice_ns = 0, copy_ns = 0;
   // What the engine holds of its own, on the device where it has one: what it derives from the scene, the volume and
   // the pictures. Bulk memory is not its own.
   uint64_t memory_bytes = 0;

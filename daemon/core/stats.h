@@ -26,7 +26,10 @@ struct DisplayFigures {
            volumes_lost = 0;
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
-  LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice;
+  // Of the engine's part: drawing the volume; slicing it; copying pictures from the device. Where they
+  // are packed as the volume is drawn there is no slicing.
+  LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice, copy;
+  bool packed_as_drawn = false;
   // Of commits presented: applied to drawing, sliced to transferred, transferred to shown.
   LatencyStats waiting, transferring, showing;
   std::string engine_degraded;  // empty: the engine is as was asked for; else what is not, and why

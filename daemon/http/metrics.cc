@@ -178,6 +178,8 @@ constexpr LatencyRow<DisplayFigures> kLatencyRows[] = {
      "The engine's blending of a frame, over 10 s"},
     {"voxeld_display_slice_seconds", &DisplayFigures::slice,
      "The engine's slicing of a frame, over 10 s"},
+    {"voxeld_display_copy_seconds", &DisplayFigures::copy,
+     "The engine's copying of a frame's pictures from its device, over 10 s"},
 };
 
 constexpr display::DisplayState kStates[] = {
@@ -249,6 +251,11 @@ void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
         display.volume_held               ? 2
         : display.engine_degraded.empty() ? 0
                                           : 1);
+  }
+  MetricFamily* packed = out->New("voxeld_display_packed_as_drawn", MetricType::Gauge,
+                                  "1 where pictures are packed as the volume is drawn, else 0");
+  for (const DisplayFigures& display : displays) {
+    Add(packed, {{"display", display.name}}, display.packed_as_drawn ? 1 : 0);
   }
   MetricFamily* times = out->New("voxeld_display_engine_recovery_seconds", MetricType::Gauge,
                                  "Of the last loss of the engine: until the CPU had drawn in its "

@@ -306,9 +306,11 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   draw_ns_ = std::max(now - drawing.began, draw_ns_ - draw_ns_ / 8);
   drawing.stages.drawing_ns = drawing.began;
   drawing.stages.sliced_ns = now;
-  drawing.stages.assembled_ns = std::max(drawing.began, now - result->slice_ns);
+  drawing.stages.assembled_ns = std::max(drawing.began, now - result->slice_ns - result->copy_ns);
   assemble_.Add(now, result->assemble_ns);
   slice_.Add(now, result->slice_ns);
+  copy_.Add(now, result->copy_ns);
+  packed_as_drawn_ = result->packed_as_drawn;
   if (care_ != nullptr && care_->away()) {
     care_->OnDrawn({scene_->held(), target_, drawing.lease.frame});
   } else if (care_ != nullptr) {

@@ -227,7 +227,8 @@ class FramePipeline final : private display::Display::Listener {
   const std::shared_ptr<Budget> budget_;
   uint64_t engine_bytes_ = 0;  // charged
   uint64_t volumes_drawn_ = 0, volumes_unchanged_ = 0;
-  SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_;
+  SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_, copy_;
+  bool packed_as_drawn_ = false;  // the last volume
   SlidingLatency waiting_, transferring_, showing_;
   const std::shared_ptr<SweepOutlook> sweeps_ = std::make_shared<SweepOutlook>();
   SlidingRate presented_rate_;

@@ -108,6 +108,8 @@ DisplayFigures FramePipeline::Figures() const {
   }
   figures.assemble = assemble_.Summary(now);
   figures.slice = slice_.Summary(now);
+  figures.copy = copy_.Summary(now);
+  figures.packed_as_drawn = packed_as_drawn_;
   figures.waiting = waiting_.Summary(now);
   figures.transferring = transferring_.Summary(now);
   figures.showing = showing_.Summary(now);

@@ -47,6 +47,8 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   EncodeLatency(in.commit_to_presented, out->mutable_commit_to_presented());
   EncodeLatency(in.assemble, out->mutable_assemble());
   EncodeLatency(in.slice, out->mutable_slice());
+  EncodeLatency(in.copy, out->mutable_copy());
+  out->set_packed_as_drawn(in.packed_as_drawn);
   EncodeLatency(in.waiting, out->mutable_waiting());
   EncodeLatency(in.transferring, out->mutable_transferring());
   EncodeLatency(in.showing, out->mutable_showing());

@@ -1,5 +1,6 @@
 #include "gpu/cuda/cuda_core.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -12,7 +13,11 @@
 namespace voxeld::gpu::cuda {
 
 CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part)
-    : device_(std::move(device)), part_(part), uploader_(*device_), volume_(*device_, uploader_) {}
+    : device_(std::move(device)),
+      part_(part),
+      uploader_(*device_),
+      stopwatch_(*device_),
+      volume_(*device_, uploader_) {}
 
 absl::Status CudaCore::SetTarget(const Target& target) {
   if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;
@@ -62,17 +67,27 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   result.frame = request.frame;
   const sync::SystemClock clock;
   const sync::TimeNs start = clock.Now();
-  if (absl::Status status = volume_.Update(pictures_->index(), pictures_->packed()); !status.ok())
-    return status;
-  if (absl::Status status = device_->Wait(); !status.ok()) return status;
-  const sync::TimeNs assembled = clock.Now();
-  absl::Status status =
-      pictures_->Draw(volume_.view(), request.frame, buffer, request.buffer_holds, result);
+  using Mark = Stopwatch::Mark;
+  if (absl::Status status = stopwatch_.Set(Mark::kBegun); !status.ok()) return status;
+  const bool together = volume_.IsSmall();
+  absl::Status status = volume_.Prepare(pictures_->GroupsOfRegions(together));
   if (!status.ok()) return status;
+  const PackedView* const packed = pictures_->packed();
+  status = pictures_->Draw(
+      volume_.view(), request.frame, buffer, request.buffer_holds, together,
+      [&](uint32_t group) { return volume_.DrawGroup(group, pictures_->index(), packed); },
+      stopwatch_, result);
+  if (!status.ok()) return status;
+  const Mark assembled = packed != nullptr ? Mark::kPacked : Mark::kAssembled;
+  const absl::StatusOr<int64_t> assemble = stopwatch_.Between(Mark::kBegun, assembled);
+  if (!assemble.ok()) return assemble.status();
+  const absl::StatusOr<int64_t> slice = stopwatch_.Between(assembled, Mark::kPacked);
+  if (!slice.ok()) return slice.status();
   result.singular_drawables = volume_.singular_drawables();
   result.memory_bytes = device_->pool().held();
-  result.assemble_ns = assembled - start;
-  result.slice_ns = clock.Now() - assembled;
+  result.assemble_ns = *assemble;
+  result.slice_ns = *slice;
+  result.copy_ns = std::max<int64_t>(0, clock.Now() - start - *assemble - *slice);
   last_frame_ = request.frame;
   return result;
 }
@@ -80,13 +95,14 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
 absl::Status CudaCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
   if (absl::Status status = CheckBox(box, out.size(), layout_); !status.ok()) return status;
   if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
-  if (absl::Status status = volume_.Update(pictures_->index(), pictures_->packed()); !status.ok())
-    return status;
+  absl::Status status = volume_.Prepare({});
+  if (status.ok()) status = volume_.DrawGroup(0, pictures_->index(), pictures_->packed());
+  if (!status.ok()) return status;
   if (out.empty()) return device_->Wait();
   // Outside the volume there is nothing.
   absl::StatusOr<Block> voxels = device_->Zeros(out.size() * sizeof(uint32_t));
   if (!voxels.ok()) return voxels.status();
-  absl::Status status =
+  status =
       volume_.Read({{box.x0, box.y0, box.z0}, {box.x1, box.y1, box.z1}}, voxels->as<uint32_t>());
   if (status.ok()) {
     status = device_->ToHost(out.data(), voxels->as<uint32_t>(), out.size() * sizeof(uint32_t));

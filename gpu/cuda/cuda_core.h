@@ -11,6 +11,7 @@
 #include "gpu/cuda/cuda_pictures.h"
 #include "gpu/cuda/cuda_volume.h"
 #include "gpu/cuda/device.h"
+#include "gpu/cuda/stopwatch.h"
 #include "gpu/cuda/uploader.h"
 #include "gpu/engine.h"
 
@@ -32,6 +33,7 @@ class CudaCore {
   const SlicePart part_;
   std::optional<display::FrameLayout> layout_;  // the target's
   Uploader uploader_;
+  Stopwatch stopwatch_;
   CudaVolume volume_;
   std::unique_ptr<CudaPictures> pictures_;
   uint64_t last_frame_ = 0;

@@ -8,9 +8,10 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Slices are drawn in so many groups, so that one's pictures are on their way while the next is
-// drawn.
-constexpr size_t kGroups = 4;
+// Of slices, so that one's pictures are on their way while the next is drawn.
+constexpr size_t kMostGroups = 4;
+static_assert(kMostGroups >= kMostDrawGroups && kMostDrawGroups >= PackedPlan::kMostGroups);
+static_assert(PackedPlan::kGroupGrain == 1 << RegionBits(2));
 
 }  // namespace
 
@@ -86,6 +87,7 @@ absl::Status CudaPictures::PutPacked(const std::optional<PackedPlan>& packed) {
   if (!least.ok()) return least.status();
   packed_ = PackedView{z->as<int32_t>(), packed->y0,           packed->y_step, view_,
                        index_.dirty,     least->as<uint32_t>()};
+  groups_ = packed->groups;
   tables_.push_back(*std::move(z));
   tables_.push_back(*std::move(least));
   return absl::OkStatus();
@@ -145,7 +147,7 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
     return cudaHostAlloc(reinterpret_cast<void**>(&counters_), sizeof(Counters),
                          cudaHostAllocDefault);
   });
-  for (size_t i = 0; i < kGroups && status.ok(); ++i) {
+  for (size_t i = 0; i < kMostGroups && status.ok(); ++i) {
     cudaEvent_t event = nullptr;
     status = device_.Run("cudaEventCreateWithFlags", [&] {
       return cudaEventCreateWithFlags(&event, cudaEventDisableTiming | cudaEventBlockingSync);
@@ -179,51 +181,88 @@ absl::Status CudaPictures::CopyPictures(size_t first, size_t count, FrameBuffer 
   return absl::OkStatus();
 }
 
-absl::Status CudaPictures::DrawGroups(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                                      uint64_t buffer_holds) {
+DrawGroups CudaPictures::GroupsOfRegions(bool together) const {
+  DrawGroups groups;
+  if (together || !packed_) return groups;
+  groups.count = 0;
+  for (const PackedPlan::Group& group : groups_) {
+    groups.end[groups.count++] =
+        (group.z_end + PackedPlan::kGroupGrain - 1) / PackedPlan::kGroupGrain;
+  }
+  return groups;
+}
+
+std::vector<CudaPictures::Range> CudaPictures::RangesOf(bool together) const {
   const size_t slices = static_cast<size_t>(plan_.end - plan_.begin);
-  const auto slice_of = [&](size_t group) { return group * slices / kGroups; };
-  for (size_t group = 0; group < kGroups; ++group) {
-    const size_t begin = slice_of(group), count = slice_of(group + 1) - begin;
-    if (count > 0) {
-      absl::Status status = device_.Run("DrawSlices", [&] {
-        const uint32_t first_slice = static_cast<uint32_t>(begin),
-                       slice_count = static_cast<uint32_t>(count);
-        return packed_ ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false,
-                                   device_.stream())
-                       : DrawSlices(volume, index_, view_, first_slice, slice_count, frame,
-                                    device_.stream());
-      });
-      if (!status.ok()) return status;
-      const size_t first = begin * view_.sub_frames;
-      status = device_.ToHost(numbers_ + first, view_.changed_in + first,
-                              count * view_.sub_frames * sizeof(uint64_t));
-      if (!status.ok()) return status;
+  std::vector<Range> ranges;
+  if (packed_ && together) return {{0, slices}};
+  if (packed_) {
+    for (const PackedPlan::Group& group : groups_) {
+      ranges.push_back({static_cast<size_t>(group.begin), static_cast<size_t>(group.end)});
     }
-    if (group + 1 == kGroups) {
-      absl::Status status = device_.ToHost(counters_, volume.counters, sizeof(Counters));
-      if (!status.ok()) return status;
-    }
-    absl::Status status = device_.Run(
-        "cudaEventRecord", [&] { return cudaEventRecord(events_[group], device_.stream()); });
-    if (!status.ok()) return status;
+    return ranges;
   }
-  for (size_t group = 0; group < kGroups; ++group) {
-    absl::Status status =
-        device_.Run("cudaEventSynchronize", [&] { return cudaEventSynchronize(events_[group]); });
-    if (!status.ok()) return status;
-    const size_t begin = slice_of(group) * view_.sub_frames;
-    status =
-        CopyPictures(begin, slice_of(group + 1) * view_.sub_frames - begin, buffer, buffer_holds);
-    if (!status.ok()) return status;
+  for (size_t g = 0; g < kMostGroups; ++g) {
+    ranges.push_back({g * slices / kMostGroups, (g + 1) * slices / kMostGroups});
   }
-  return device_.Run("cudaStreamSynchronize",
-                     [&] { return cudaStreamSynchronize(device_.copies()); });
+  return ranges;
+}
+
+absl::Status CudaPictures::QueueSlices(const VolumeView& volume, uint64_t frame, Range range) {
+  const size_t count = range.end - range.begin;
+  if (count == 0) return absl::OkStatus();
+  absl::Status status = device_.Run("DrawSlices", [&] {
+    const uint32_t first_slice = static_cast<uint32_t>(range.begin),
+                   slice_count = static_cast<uint32_t>(count);
+    return packed_ ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false,
+                               device_.stream())
+                   : DrawSlices(volume, index_, view_, first_slice, slice_count, frame,
+                                device_.stream());
+  });
+  if (!status.ok()) return status;
+  const size_t first = range.begin * view_.sub_frames;
+  return device_.ToHost(numbers_ + first, view_.changed_in + first,
+                        count * view_.sub_frames * sizeof(uint64_t));
 }
 
 absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                                uint64_t buffer_holds, FrameResult& result) {
-  absl::Status status = DrawGroups(volume, frame, buffer, buffer_holds);
+                                uint64_t buffer_holds, bool together,
+                                const std::function<absl::Status(uint32_t)>& draw,
+                                Stopwatch& stopwatch, FrameResult& result) {
+  const std::vector<Range> ranges = RangesOf(together);
+  const auto queue = [&]() -> absl::Status {
+    for (size_t g = 0; g < ranges.size(); ++g) {
+      absl::Status status;
+      if (packed_ || g == 0) status = draw(static_cast<uint32_t>(g));
+      if (status.ok() && !packed_ && g == 0) status = stopwatch.Set(Stopwatch::Mark::kAssembled);
+      if (status.ok()) status = QueueSlices(volume, frame, ranges[g]);
+      if (status.ok() && g + 1 == ranges.size()) {
+        status = stopwatch.Set(Stopwatch::Mark::kPacked);
+        if (status.ok()) {
+          status = device_.ToHost(counters_, volume.counters, sizeof(Counters));
+        }
+      }
+      if (!status.ok()) return status;
+      status = device_.Run("cudaEventRecord",
+                           [&] { return cudaEventRecord(events_[g], device_.stream()); });
+      if (!status.ok()) return status;
+    }
+    return absl::OkStatus();
+  };
+  const auto copy = [&]() -> absl::Status {
+    for (size_t g = 0; g < ranges.size(); ++g) {
+      absl::Status status =
+          device_.Run("cudaEventSynchronize", [&] { return cudaEventSynchronize(events_[g]); });
+      if (!status.ok()) return status;
+      const size_t begin = ranges[g].begin * view_.sub_frames;
+      status = CopyPictures(begin, ranges[g].end * view_.sub_frames - begin, buffer, buffer_holds);
+      if (!status.ok()) return status;
+    }
+    return device_.Run("cudaStreamSynchronize",
+                       [&] { return cudaStreamSynchronize(device_.copies()); });
+  };
+  absl::Status status = queue();
+  if (status.ok()) status = copy();
   if (!status.ok()) {
     cudaStreamSynchronize(device_.copies());
     return status;
@@ -232,6 +271,7 @@ absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameB
   result.pictures_drawn = counters_->slices_drawn * view_.sub_frames;
   result.changed = counters_->pictures_changed > 0;
   result.lit_voxels = counters_->lit_voxels;
+  result.packed_as_drawn = packed_.has_value();
   return device_.Zero(volume.counters, 3 * sizeof(uint32_t));
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,6 +16,7 @@
 #include "gpu/cuda/device.h"
 #include "gpu/cuda/draw_types.h"
 #include "gpu/cuda/packed_plan.h"
+#include "gpu/cuda/stopwatch.h"
 #include "gpu/cuda/types.h"
 #include "gpu/engine.h"
 
@@ -45,11 +47,19 @@ class CudaPictures {
   // Whether they begin with what others had, which may not be what an empty volume shows.
   bool inherited() const { return inherited_; }
 
+  // Where they are packed as they are drawn: the groups in which that can be done, so that one's
+  // pictures are copied while the next is drawn. `together`: as one.
+  DrawGroups GroupsOfRegions(bool together) const;
+
   // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
-  // all is there. `result` gets what was counted. After an error nothing writes to `buffer` any
-  // more, whose pictures may be of this frame or older; what was drawn is told with the next one.
+  // all is there. Before each group of slices draw(group) queues what draws it, where pictures are
+  // packed as they are drawn, else draw(0) what draws all; sets the marks. `result` gets what was
+  // counted. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
+  // or older; what was drawn is told with the next one.
   absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                    uint64_t buffer_holds, FrameResult& result);
+                    uint64_t buffer_holds, bool together,
+                    const std::function<absl::Status(uint32_t)>& draw, Stopwatch& stopwatch,
+                    FrameResult& result);
 
  private:
   CudaPictures(Device& device, const PicturesPlan& plan) : device_(device), plan_(plan) {}
@@ -57,8 +67,12 @@ class CudaPictures {
                          const display::TileToSlices& tile_to_slices);
   absl::Status PutPacked(const std::optional<PackedPlan>& packed);
   absl::Status PutPictures(const CudaPictures* before);
-  absl::Status DrawGroups(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                          uint64_t buffer_holds);
+  // Slices [begin, end), from the first owned.
+  struct Range {
+    size_t begin, end;
+  };
+  std::vector<Range> RangesOf(bool together) const;
+  absl::Status QueueSlices(const VolumeView& volume, uint64_t frame, Range range);
   absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);
 
   Device& device_;
@@ -66,6 +80,7 @@ class CudaPictures {
   SliceIndexView index_;
   SliceView view_;
   std::optional<PackedView> packed_;
+  std::vector<PackedPlan::Group> groups_;  // if they are packed as they are drawn
   bool inherited_ = false;
   std::vector<Block> tables_;
   Block dirty_, lit_tiles_, blank_, bytes_, changed_in_, differs_;

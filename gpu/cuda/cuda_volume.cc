@@ -247,15 +247,19 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
   });
 }
 
-absl::Status CudaVolume::Update(const SliceIndexView& slices, const PackedView* packed) {
+bool CudaVolume::IsSmall() const {
+  constexpr uint64_t kFewItems = 100'000;
+  uint64_t items = live_items_;
+  for (const Drawable* drawable : pending_) items += drawable->geometry->view.record.vertex_count;
+  return items + lines_.live() < kFewItems;
+}
+
+absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
   if (absl::Status status = PutLayers(); !status.ok()) return status;
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
   if (absl::Status status = lines_.Merge(); !status.ok()) return status;
-  DrawView view = ViewForDrawing();
-  view.slices = slices;
-  if (packed != nullptr) view.packed = *packed;
-  const VolumeView& volume = view.volume;
+  const VolumeView volume = tiles_.view();
   absl::Status status;
   if (listed_) {
     status = device_.Run("cudaMemcpyAsync", [&] {
@@ -264,14 +268,24 @@ absl::Status CudaVolume::Update(const SliceIndexView& slices, const PackedView* 
     });
     if (!status.ok()) return status;
   }
-  status = device_.Zero(&volume.counters->dirty, sizeof(uint32_t));
+  status = device_.Zero(volume.counters->dirty, sizeof(volume.counters->dirty));
   if (!status.ok()) return status;
   listed_ = true;
-  status =
-      device_.Run("ListDirty", [&] { return ListDirty(volume, view.regions, device_.stream()); });
-  if (!status.ok()) return status;
-  status = Draw(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
-  listed_ = !status.ok();
+  groups_ = groups;
+  return device_.Run("ListDirty",
+                     [&] { return ListDirty(volume, tiles_.regions, groups, device_.stream()); });
+}
+
+absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
+                                   const PackedView* packed) {
+  DrawView view = ViewForDrawing();
+  view.slices = slices;
+  if (packed != nullptr) view.packed = *packed;
+  const size_t before = group == 0 ? 0 : static_cast<size_t>(groups_.end[group - 1]);
+  view.list = view.volume.dirty_list + before * tiles_.regions.count_of_plane();
+  view.listed = &view.volume.counters->dirty[group];
+  absl::Status status = Draw(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
+  if (status.ok() && group + 1 == groups_.count) listed_ = false;
   return status;
 }
 
@@ -292,15 +306,16 @@ absl::Status CudaVolume::Read(const Box3& box, uint32_t* out) {
     }
   }
   Counters counters;
-  counters.dirty = static_cast<uint32_t>(list.size());
+  counters.dirty[0] = static_cast<uint32_t>(list.size());
   if (list.empty()) return absl::OkStatus();
   const absl::StatusOr<Block> regions = device_.Upload(list.data(), list.size());
   if (!regions.ok()) return regions.status();
   const absl::StatusOr<Block> counts = device_.Upload(&counters, 1);
   if (!counts.ok()) return counts.status();
   DrawView view = ViewForDrawing();
-  view.volume.dirty_list = regions->as<uint32_t>();
   view.volume.counters = counts->as<Counters>();
+  view.list = regions->as<uint32_t>();
+  view.listed = view.volume.counters->dirty;
   view.read = {box, out};
   if (absl::Status status = Draw(view, DrawTo::kReader); !status.ok()) return status;
   return device_.Wait();

@@ -67,11 +67,15 @@ class CudaVolume final : private SceneObserver {
   // Everything is to be drawn anew; with `all_dirty` also where nothing is.
   absl::Status SetView(DeviceTiles tiles, const Affine& view, bool all_dirty);
 
-  // Draws what is dirty: into the tiles, and marks the slices that look at it; or, if there is
+  // A frame: takes in what has come and gone and finds what is dirty, by group. Then, each group
+  // once, DrawGroup draws that: into the tiles, and marks the slices that look at it; or, if there is
   // `packed`, straight into pictures.
-  absl::Status Update(const SliceIndexView& slices, const PackedView* packed);
+  absl::Status Prepare(const DrawGroups& groups);
+  absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed);
+  // Whether so little may be drawn that groups cost more than they hide.
+  bool IsSmall() const;
 
-  // The colours of voxels, after Update; for who asks. `out` is on the device.
+  // The colours of voxels, after a frame; for who asks. `out` is on the device.
   absl::Status Read(const Box3& box, uint32_t* out);
 
   VolumeView view() const { return tiles_.view(); }
@@ -126,6 +130,7 @@ class CudaVolume final : private SceneObserver {
   DeviceTiles tiles_;
   Affine view_;
   bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
+  DrawGroups groups_;    // of the frame under way
   PairIndex index_;      // of all that is no thin line
   LineIndex lines_;
   bool lines_suit_ = false;  // the volume is not too large for them

@@ -77,7 +77,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
   DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(shared_memory);
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
-  const uint32_t dirty = counters.dirty;
+  const uint32_t dirty = *view.listed;
   for (uint32_t i = threadIdx.x; i < kRegionRows * kRowStride; i += kDrawThreads) {
     scratch.words[i] = 0;
   }
@@ -88,7 +88,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
   }
   if (threadIdx.x == 0) {
     scratch.lit_change = 0;
-    scratch.region = blockIdx.x < dirty ? view.volume.dirty_list[blockIdx.x] : kAllLanes;
+    scratch.region = blockIdx.x < dirty ? view.list[blockIdx.x] : 0;
   }
   for (uint32_t i = blockIdx.x; i < dirty; i += gridDim.x) {
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
@@ -98,7 +98,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
     uint32_t region_after = 0;
     const auto ask_ahead = [&] {
       const uint32_t next = i + gridDim.x;
-      if (threadIdx.x == 0 && next < dirty) region_after = view.volume.dirty_list[next];
+      if (threadIdx.x == 0 && next < dirty) region_after = view.list[next];
     };
     if constexpr (kWhat == DrawWhat::kOneLayer) {
       const VoxelHalfSpace* cut_by = nullptr;

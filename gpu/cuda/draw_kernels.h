@@ -11,8 +11,9 @@
 
 namespace voxeld::gpu::cuda {
 
-// Lists the dirty regions, and they are clean. `counters->dirty` must be 0.
-cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, cudaStream_t stream);
+// Lists the dirty regions by group, and they are clean. `counters->dirty` must be 0.
+cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, const DrawGroups& groups,
+                      cudaStream_t stream);
 
 // Draw the regions listed. Where there are thin lines alone, in one visible layer that is seen as it
 // is (OVER, opacity 255); where there are thin lines alone; whatever there is.

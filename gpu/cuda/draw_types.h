@@ -36,6 +36,8 @@ struct DrawView {
   LineBatchList lines;
   VolumeView volume;
   RegionGrid regions;
+  const uint32_t* list = nullptr;    // the regions to be drawn
+  const uint32_t* listed = nullptr;  // how many
   SliceIndexView slices;
   PackedView packed;
   ReadView read;

@@ -6,7 +6,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-__global__ void ListDirtyKernel(VolumeView volume, RegionGrid regions) {
+__global__ void ListDirtyKernel(VolumeView volume, RegionGrid regions, DrawGroups groups) {
   const uint64_t region = Thread();
   if (region >= regions.count()) return;
   int32_t at[3];
@@ -26,7 +26,12 @@ __global__ void ListDirtyKernel(VolumeView volume, RegionGrid regions) {
     volume.dirty[tile] = 0;
   }
   if (!dirty || owned == 0) return;
-  volume.dirty_list[atomicAdd(&volume.counters->dirty, 1u)] = static_cast<uint32_t>(region);
+  uint32_t group = 0;
+  while (group + 1 < groups.count && at[2] >= groups.end[group]) ++group;
+  const uint32_t first =
+      group == 0 ? 0 : static_cast<uint32_t>(groups.end[group - 1]) * regions.count_of_plane();
+  volume.dirty_list[first + atomicAdd(&volume.counters->dirty[group], 1u)] =
+      static_cast<uint32_t>(region);
   atomicAdd(&volume.counters->tiles_drawn, 1u);
 }
 
@@ -52,8 +57,9 @@ __global__ void ReadBoxKernel(VolumeView volume, BoxArgs box, uint32_t* out) {
 
 }  // namespace
 
-cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, cudaStream_t stream) {
-  ListDirtyKernel<<<Blocks(regions.count()), kItemThreads, 0, stream>>>(volume, regions);
+cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, const DrawGroups& groups,
+                      cudaStream_t stream) {
+  ListDirtyKernel<<<Blocks(regions.count()), kItemThreads, 0, stream>>>(volume, regions, groups);
   return cudaGetLastError();
 }
 

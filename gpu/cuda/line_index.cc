@@ -53,6 +53,12 @@ absl::flat_hash_set<uint32_t> LineIndex::Layers() const {
   return layers;
 }
 
+uint64_t LineIndex::live() const {
+  uint64_t lines = 0;
+  for (const auto& [number, batch] : batches_) lines += batch.live;
+  return lines;
+}
+
 LineBatchList LineIndex::view() const {
   LineBatchList list;  // Merge sees to it that they fit
   for (const auto& [number, batch] : batches_) {

@@ -40,6 +40,7 @@ class LineIndex {
   static bool Suits(const Api& api, const TileGrid& grid);
   // The slots of layers that have lines here; no more than kMaxLineLayers may.
   absl::flat_hash_set<uint32_t> Layers() const;
+  uint64_t live() const;  // lines
   // Lines that may come in one Add.
   uint64_t most_lines() const { return most_lines_; }
 

@@ -34,6 +34,10 @@ struct RegionGrid {
            static_cast<uint32_t>(blocks[2]);
   }
   VOXELD_HD uint32_t count() const { return block_count() * kRegionsInBlock; }
+  // Of one z.
+  VOXELD_HD uint32_t count_of_plane() const {
+    return static_cast<uint32_t>(blocks[0] * blocks[1]) << 2 * kBlockBits;
+  }
   VOXELD_HD bool DrawsBlock(const int32_t at[3]) const {
     for (int a = 0; a < 3; ++a) {
       if (at[a] < drawn_lo[a] || at[a] >= drawn_hi[a]) return false;

@@ -1,6 +1,7 @@
 #include "gpu/cuda/packed_plan.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "gpu/slice/quantize.h"
 #include "gpu/word.h"
@@ -27,6 +28,34 @@ bool PutLeast(const display::FrameLayout& layout, const display::Tone& tone,
     }
   }
   return true;
+}
+
+std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, int32_t slices) {
+  const int32_t nz = static_cast<int32_t>(slice_of_z.size());
+  std::vector<int32_t> owned;
+  std::copy_if(slice_of_z.begin(), slice_of_z.end(), std::back_inserter(owned),
+               [](int32_t s) { return s >= 0; });
+  const bool up = std::is_sorted(owned.begin(), owned.end());
+  const bool down = std::is_sorted(owned.rbegin(), owned.rend());
+  if (!up && !down) return {{nz, 0, slices}};
+  std::vector<PackedPlan::Group> groups;
+  constexpr int32_t kGrain = PackedPlan::kGroupGrain;
+  const int32_t planes = (nz + kGrain - 1) / kGrain;
+  int32_t z = 0;
+  for (int32_t g = 0; g < PackedPlan::kMostGroups; ++g) {
+    const int32_t z_end = std::min(nz, (g + 1) * planes / PackedPlan::kMostGroups * kGrain);
+    PackedPlan::Group group{z_end, 0, 0};
+    for (; z < z_end; ++z) {
+      const int32_t s = slice_of_z[static_cast<size_t>(z)];
+      if (s < 0) continue;
+      const bool first = group.end == 0;
+      group.begin = first ? s : std::min(group.begin, s);
+      group.end = first ? s + 1 : std::max(group.end, s + 1);
+    }
+    if (group.end == 0 && z_end < nz) continue;  // the next one sees to what lies there
+    groups.push_back(group);
+  }
+  return groups;
 }
 
 }  // namespace
@@ -64,6 +93,7 @@ std::optional<PackedPlan> PackedPlan::Of(const display::FootprintTable& table,
   }
   if (plan.y_step != 1 && plan.y_step != -1) return std::nullopt;
   if (!PutLeast(layout, tone, plan.least)) return std::nullopt;
+  plan.groups = GroupsOf(plan.slice_of_z, end - begin);
   return plan;
 }
 

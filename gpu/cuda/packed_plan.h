@@ -14,8 +14,19 @@ namespace voxeld::gpu::cuda {
 struct PackedPlan {
   std::vector<int32_t> slice_of_z;  // by z of the grid: −begin; −1: none of those owned
   int32_t y0 = 0, y_step = 1;       // pixel v is the voxel y0 + y_step·v
+  // Parts of the grid along z, [z_begin, z_end) voxels, with the slices that they are, [begin, end)
+  // as above: one after the other if slices are in the order of z or its reverse, else one of all.
+  // They lie at multiples of `kGroupGrain` voxels.
+  struct Group {
+    int32_t z_end = 0;
+    int32_t begin = 0, end = 0;
+  };
+  std::vector<Group> groups;
   // As PackedView::least; empty unless the format has bit planes.
   std::vector<uint32_t> least;
+
+  static constexpr int32_t kGroupGrain = 16;
+  static constexpr int32_t kMostGroups = 4;
 
   // Of slices [begin, end). Nothing if pixels are not voxels, or if bit planes' tone is not
   // monotonic.

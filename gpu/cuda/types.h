@@ -76,12 +76,20 @@ struct BatchList {
   uint32_t count = 0;
 };
 
+// Dirty regions are listed, drawn and packed in groups of planes of regions along z, so that one
+// group's pictures are on their way while the next is drawn.
+inline constexpr uint32_t kMostDrawGroups = 4;
+struct DrawGroups {
+  uint32_t count = 1;
+  int32_t end[kMostDrawGroups] = {0x7FFFFFFF};  // planes, half-open
+};
+
 // What kernels count. The first three begin at 0 with every frame.
 struct Counters {
   uint32_t tiles_drawn = 0;
   uint32_t slices_drawn = 0;
   uint32_t pictures_changed = 0;
-  uint32_t dirty = 0;  // regions in the list
+  uint32_t dirty[kMostDrawGroups] = {};  // regions in the list of each group
   uint64_t lit_voxels = 0;
 };
 
@@ -92,9 +100,9 @@ struct VolumeView {
   uint8_t* dirty = nullptr;
   // Of regions (line_types.h): they are drawn whole.
   uint8_t* region_dirty = nullptr;
-  uint32_t* dirty_list = nullptr;
-  uint32_t* lit = nullptr;     // voxels of each tile
-  uint32_t* colors = nullptr;  // null: pictures are packed as tiles are drawn
+  uint32_t* dirty_list = nullptr;  // a group's behind all that the groups before may have
+  uint32_t* lit = nullptr;         // voxels of each tile
+  uint32_t* colors = nullptr;      // null: pictures are packed as tiles are drawn
   Counters* counters = nullptr;
 };
 

@@ -300,6 +300,8 @@ class RankedEngine final : public Engine {
       sum.singular_drawables = std::max(sum.singular_drawables, one.singular_drawables);
       sum.assemble_ns = std::max(sum.assemble_ns, one.assemble_ns);
       sum.slice_ns = std::max(sum.slice_ns, one.slice_ns);
+      sum.copy_ns = std::max(sum.copy_ns, one.copy_ns);
+      sum.packed_as_drawn = sum.packed_as_drawn && one.packed_as_drawn;
       sum.memory_bytes += one.memory_bytes;
     }
     return sum;

@@ -319,7 +319,8 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.commits_owed = 32, d.commits_presented = 33, d.commits_unchanged = 34;
   d.commits_superseded = 35, d.commits_lost = 36, d.commits_not_shown = 37, d.commits_pending = 38;
   d.commit_to_last_byte = {41, 42, 43, 44}, d.commit_to_presented = {45, 46, 47, 48};
-  d.assemble = {49, 50, 51, 52}, d.slice = {53, 54, 55, 56};
+  d.assemble = {49, 50, 51, 52}, d.slice = {53, 54, 55, 56}, d.copy = {83, 84, 85, 86};
+  d.packed_as_drawn = true;
   d.engine_degraded = "w", d.volume_held = true, d.engine_faults = 57, d.engine_returns = 58;
   d.engine_mismatches = 59, d.takeover_last_ns = 60, d.takeover_max_ns = 61;
   d.redraw_last_ns = 64, d.redraw_max_ns = 65, d.return_last_ns = 62, d.return_max_ns = 63,
@@ -334,6 +335,7 @@ TEST(Encode, StatsHaveEveryFigure) {
   EXPECT_EQ(message.displays(0).commit_to_presented().count(), 45u);
   EXPECT_EQ(message.displays(0).assemble().p50_ns(), 50);
   EXPECT_EQ(message.displays(0).slice().max_ns(), 56);
+  EXPECT_EQ(message.displays(0).copy().max_ns(), 86);
   EXPECT_EQ(message.displays(0).waiting().p50_ns(), 72);
   EXPECT_EQ(message.displays(0).transferring().p50_ns(), 76);
   EXPECT_EQ(message.displays(0).showing().p50_ns(), 80);

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <vector>
+
 #include "gpu/slice/quantize.h"
 #include "gpu/word.h"
 
@@ -51,6 +54,42 @@ TEST(PackedPlan, NamesOwnedSlicesByTheirPlaceInThePart) {
   const std::optional<PackedPlan> plan = Display(16, 16, 8).Plan(3, 6);
   ASSERT_TRUE(plan);
   EXPECT_EQ(plan->slice_of_z, (std::vector<int32_t>{-1, -1, -1, 0, 1, 2, -1, -1}));
+}
+
+TEST(PackedPlan, GroupsAreOneAfterTheOther) {
+  const std::optional<PackedPlan> plan = Display(16, 16, 100).Plan(0, 100);
+  ASSERT_TRUE(plan);
+  // 7 planes of 16 voxels, the last with 4.
+  std::vector<std::array<int32_t, 3>> groups;
+  for (const PackedPlan::Group& group : plan->groups) {
+    groups.push_back({group.z_end, group.begin, group.end});
+  }
+  EXPECT_EQ(groups, (std::vector<std::array<int32_t, 3>>{
+                        {16, 0, 16}, {48, 16, 48}, {80, 48, 80}, {100, 80, 100}}));
+}
+
+TEST(PackedPlan, GroupsOfAPartHaveItsSlicesAlone) {
+  const std::optional<PackedPlan> plan = Display(16, 16, 128).Plan(40, 70);
+  ASSERT_TRUE(plan);
+  int32_t slices = 0, z = 0;
+  for (const PackedPlan::Group& group : plan->groups) {
+    EXPECT_GT(group.z_end, z);
+    z = group.z_end;
+    slices += group.end - group.begin;
+  }
+  EXPECT_EQ(z, 128);
+  EXPECT_EQ(slices, 30);
+}
+
+TEST(PackedPlan, SlicesInNoOrderAreOneGroup) {
+  Display display(16, 16, 64);
+  std::swap(display.stack.positions_mm[3], display.stack.positions_mm[60]);
+  display.geometry.shape = display.stack;
+  const std::optional<PackedPlan> plan = display.Plan(0, 64);
+  ASSERT_TRUE(plan);
+  ASSERT_EQ(plan->groups.size(), 1u);
+  EXPECT_EQ(plan->groups[0].z_end, 64);
+  EXPECT_EQ(plan->groups[0].end, 64);
 }
 
 TEST(PackedPlan, LeavesEverythingElseToSlicing) {

@@ -33,7 +33,7 @@ json SpreadJson(const std::vector<double>& values) {
 
 // Of all rounds of one row, in milliseconds.
 struct Times {
-  std::vector<double> apply, assemble, slice, device, host, ceiling;
+  std::vector<double> apply, assemble, slice, copy, device, host, ceiling;
   std::vector<std::vector<double>> peers;
   gpu::FrameResult last;
 
@@ -41,6 +41,7 @@ struct Times {
     apply.push_back(static_cast<double>(frame.apply_ns) / kMs);
     assemble.push_back(static_cast<double>(frame.result.assemble_ns) / kMs);
     slice.push_back(static_cast<double>(frame.result.slice_ns) / kMs);
+    copy.push_back(static_cast<double>(frame.result.copy_ns) / kMs);
     device.push_back(static_cast<double>(frame.device_ns()) / kMs);
     host.push_back(static_cast<double>(frame.host_ns) / kMs);
     last = frame.result;
@@ -127,11 +128,12 @@ json StagesOf(const Times& times) {
   std::vector<double> all, door;
   for (size_t i = 0; i < times.host.size(); ++i) {
     all.push_back(times.apply[i] + times.host[i]);
-    door.push_back(times.host[i] - times.device[i]);
+    door.push_back(times.host[i] - times.device[i] - times.copy[i]);
   }
   return {{"apply", RatioOf(times.apply, all)},
           {"assemble", RatioOf(times.assemble, all)},
           {"slice", RatioOf(times.slice, all)},
+          {"copy", RatioOf(times.copy, all)},
           {"door", RatioOf(door, all)}};
 }
 

@@ -20,6 +20,7 @@ struct FrameTimes {
   int64_t host_ns = 0;   // SubmitFrame, until the bytes are in the caller's buffer
   gpu::FrameResult result;
 
+  // Until the pictures were packed in the engine's memory.
   int64_t device_ns() const { return result.assemble_ns + result.slice_ns; }
 };
 

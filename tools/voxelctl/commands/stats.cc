@@ -66,7 +66,10 @@ std::string Full(const v1::Stats& stats) {
       [](const D& d) { return Duration(d.commit_to_presented().p50_ns()); });
   row("  p99", [](const D& d) { return Duration(d.commit_to_presented().p99_ns()); });
   row("assemble p50", [](const D& d) { return Duration(d.assemble().p50_ns()); });
-  row("slice p50", [](const D& d) { return Duration(d.slice().p50_ns()); });
+  row("slice p50", [](const D& d) {
+    return d.packed_as_drawn() ? std::string("as drawn") : Duration(d.slice().p50_ns());
+  });
+  row("copy p50", [](const D& d) { return Duration(d.copy().p50_ns()); });
   row("bytes out", [](const D& d) { return Bytes(d.bytes_out()); });
   row("slices sent", [](const D& d) { return Grouped(d.slices_sent()); });
   row("  again", [](const D& d) { return Grouped(d.slices_resent()); });

@@ -1,0 +1,35 @@
+// When the device was done with what lies in its stream.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/cuda/device.h"
+
+namespace voxeld::gpu::cuda {
+
+// Thread-bound.
+class Stopwatch {
+ public:
+  enum class Mark : uint8_t { kBegun, kAssembled, kPacked };
+
+  explicit Stopwatch(Device& device) : device_(device) {}
+  ~Stopwatch();
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+  // Sets the mark behind what has been queued.
+  absl::Status Set(Mark mark);
+  // From one mark to a later one; both have been waited for.
+  absl::StatusOr<int64_t> Between(Mark from, Mark to);
+
+ private:
+  Device& device_;
+  cudaEvent_t marks_[3] = {};
+};
+
+}  // namespace voxeld::gpu::cuda
