@@ -79,6 +79,9 @@ __global__ void CopyTrianglesKernel(ItemList list, uint64_t first, uint32_t coun
   for (uint32_t c = 0; c < 3; ++c) colors_to[(first + i) * 3 + c] = colors_from[at * 3 + c];
 }
 
+// Up to so many regions there is little to win by looking closer.
+constexpr int32_t kFewRegions = 8;
+
 // f(region) for each region that is drawn and that the triangle may touch.
 template <typename F>
 __device__ void ForRegions(const CompactTriangle& t, const RegionGrid& grid, F&& f) {
@@ -91,13 +94,12 @@ __device__ void ForRegions(const CompactTriangle& t, const RegionGrid& grid, F&&
     if (lo[a] >= hi[a]) return;
     count *= hi[a] - lo[a];
   }
-  // In two regions or fewer there is little to win.
   const uint32_t color[3] = {};
-  const Triangle wide = count > 2 ? TriangleOf(t, color) : Triangle{};
+  const Triangle wide = count > kFewRegions ? TriangleOf(t, color) : Triangle{};
   for (at[2] = lo[2]; at[2] < hi[2]; ++at[2]) {
     for (at[1] = lo[1]; at[1] < hi[1]; ++at[1]) {
       for (at[0] = lo[0]; at[0] < hi[0]; ++at[0]) {
-        if (count > 2) {
+        if (count > kFewRegions) {
           Box3 box;
           for (int a = 0; a < 3; ++a) {
             box.lo[a] = at[a] << RegionBits(a);

@@ -22,8 +22,10 @@ void RegionIndex::Reset(const TileGrid& grid, std::span<const uint8_t> owned) {
       hi[a] = std::max(hi[a], block + 1);
     }
   }
-  std::copy(lo, lo + 3, grid_.drawn_lo);
-  std::copy(hi, hi + 3, grid_.drawn_hi);
+  for (int a = 0; a < 3; ++a) {
+    grid_.drawn_lo[a] = std::min(lo[a], hi[a]);  // none: nothing is drawn
+    grid_.drawn_hi[a] = hi[a];
+  }
   merge_ = false;
   // So that whatever they are, their places can be counted in 32 bits.
   most_items_ = uint64_t{0xFFFFFFFFu} / MostRegions();
