@@ -61,6 +61,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   listed_ = all_dirty;
   index_.Clear();
   lines_.Reset(tiles_.grid, tiles_.owned_here);
+  triangles_.Reset(tiles_.grid, tiles_.owned_here);
   lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
   slots_.clear();
   free_slots_.clear();
@@ -160,11 +161,15 @@ absl::Status CudaVolume::MarkLeft() {
   if (!marks_.empty()) {
     std::sort(marks_.begin(), marks_.end());
     marks_.erase(std::unique(marks_.begin(), marks_.end()), marks_.end());
-    const auto thin = std::partition(marks_.begin(), marks_.end(),
-                                     [&](uint32_t slot) { return !slots_[slot].thin; });
-    absl::Status status = MarkPairs({marks_.begin(), thin});
-    if (!status.ok()) return status;
-    status = lines_.Mark({thin, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
+    const auto of_regions = std::partition(marks_.begin(), marks_.end(), [&](uint32_t slot) {
+      return slots_[slot].indexed_by == IndexedBy::kPairs;
+    });
+    absl::Status status = MarkPairs({marks_.begin(), of_regions});
+    // Either looks for its own.
+    for (RegionIndex* index : {&IndexOf(IndexedBy::kLines), &IndexOf(IndexedBy::kTriangles)}) {
+      if (!status.ok()) return status;
+      status = index->Mark({of_regions, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
+    }
     if (!status.ok()) return status;
     marks_.clear();
   }
@@ -176,13 +181,11 @@ absl::Status CudaVolume::MarkLeft() {
                 device_.stream());
   });
   if (!status.ok()) return status;
-  std::vector<uint32_t> thin;
-  for (const uint32_t slot : left_) {
-    if (slots_[slot].thin) thin.push_back(slot);
+  for (RegionIndex* index : {&IndexOf(IndexedBy::kLines), &IndexOf(IndexedBy::kTriangles)}) {
+    if (status = index->Drop(left_); !status.ok()) return status;
   }
-  if (status = lines_.Drop(thin); !status.ok()) return status;
   for (const uint32_t slot : left_) {
-    if (slots_[slot].thin) {
+    if (slots_[slot].indexed_by != IndexedBy::kPairs) {
       free_slots_.push_back(slot);
       slots_[slot] = {};
       continue;
@@ -219,6 +222,7 @@ DrawView CudaVolume::ViewForDrawing() const {
   view.half_spaces = half_spaces_.as<VoxelHalfSpace>();
   view.pairs = index_.view();
   view.lines = lines_.view();
+  view.triangles = triangles_.view();
   view.volume = tiles_.view();
   view.regions = tiles_.regions;
   return view;
@@ -228,15 +232,19 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
   // Whether all that there is lies in one layer, to be seen as it is.
   bool plain = true;
   absl::flat_hash_set<uint32_t> layers;
-  LineBatchList seen;
-  for (uint32_t b = 0; b < view.lines.count; ++b) {
-    const LayerLook& look = looks_now_[view.lines.batches[b].layer];
-    if (look.visible == 0) continue;
-    seen.batches[seen.count++] = view.lines.batches[b];
-    layers.insert(view.lines.batches[b].layer);
-    plain &= look.blend == BlendMode::kOver && look.opacity == 255;
-  }
-  view.lines = seen;
+  const auto keep_visible = [&](auto& list) {
+    uint32_t kept = 0;
+    for (uint32_t b = 0; b < list.count; ++b) {
+      const LayerLook& look = looks_now_[list.batches[b].layer];
+      if (look.visible == 0) continue;
+      layers.insert(list.batches[b].layer);
+      plain &= look.blend == BlendMode::kOver && look.opacity == 255;
+      list.batches[kept++] = list.batches[b];
+    }
+    list.count = kept;
+  };
+  keep_visible(view.lines);
+  keep_visible(view.triangles);
   view.clipped = !layers.empty() && looks_now_[*layers.begin()].half_spaces != 0;
   const auto draw = view.pairs.count > 0          ? DrawAll
                     : plain && layers.size() <= 1 ? DrawOneLayer
@@ -251,7 +259,7 @@ bool CudaVolume::IsSmall() const {
   constexpr uint64_t kFewItems = 100'000;
   uint64_t items = live_items_;
   for (const Drawable* drawable : pending_) items += drawable->geometry->view.record.vertex_count;
-  return items + lines_.live() < kFewItems;
+  return items + lines_.live() + triangles_.live() < kFewItems;
 }
 
 absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
@@ -259,6 +267,7 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
   if (absl::Status status = lines_.Merge(); !status.ok()) return status;
+  if (absl::Status status = triangles_.Merge(); !status.ok()) return status;
   const VolumeView volume = tiles_.view();
   absl::Status status;
   if (listed_) {

@@ -1,5 +1,6 @@
 // The voxel volume on the device: the scene's table of drawables, the indices of what may lie in which
-// tile (pair_index.h) and of thin lines (line_index.h), and the drawing of the regions that changed.
+// tile (pair_index.h), of thin lines (line_index.h) and of small triangles (triangle_index.h), and the
+// drawing of the regions that changed.
 //
 // Each index is a few batches: a change adds one, batches of like size are merged, and what has gone
 // is dropped on the way; so an index of n costs O(log n) each, and what has gone never costs more
@@ -24,6 +25,7 @@
 #include "gpu/cuda/line_index.h"
 #include "gpu/cuda/pair_index.h"
 #include "gpu/cuda/pool.h"
+#include "gpu/cuda/triangle_index.h"
 #include "gpu/cuda/types.h"
 #include "gpu/cuda/uploader.h"
 
@@ -42,12 +44,13 @@ struct DeviceTiles {
                                           std::span<const uint8_t> owned, bool keep_colors);
 };
 
-// Of a geometry's positions, closed.
+// Of a geometry's positions, closed; and how far corners of one of its triangles are apart at most.
 struct GeometryBounds {
   double lo[3], hi[3];
+  double extent[3] = {};
 };
 
-// What a geometry's arrays lie in; and its bounds, if its items may be thin lines.
+// What a geometry's arrays lie in; and its bounds, if its items may be thin lines or small triangles.
 struct DeviceArrays {
   std::shared_ptr<Block> block;
   std::optional<GeometryBounds> bounds;
@@ -58,7 +61,7 @@ struct DeviceArrays {
 class CudaVolume final : private SceneObserver {
  public:
   CudaVolume(Device& device, Uploader& uploader)
-      : device_(device), uploader_(uploader), index_(device), lines_(device) {}
+      : device_(device), uploader_(uploader), index_(device), lines_(device), triangles_(device) {}
 
   // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
   // fit the device.
@@ -82,11 +85,14 @@ class CudaVolume final : private SceneObserver {
   uint32_t singular_drawables() const { return singular_; }
 
  private:
+  // By which index a drawable's items are drawn.
+  enum class IndexedBy : uint8_t { kPairs, kLines, kTriangles };
   // What the host knows of a slot of the table.
   struct Slot {
     uint32_t items = 0;
     bool singular = false;
-    bool thin = false;           // in lines_; else in index_
+    IndexedBy indexed_by = IndexedBy::kPairs;
+    uint32_t regions_each = 0;   // that a triangle touches at most
     Block tiles, begin, voxels;  // of what the CPU has drawn
   };
 
@@ -100,20 +106,26 @@ class CudaVolume final : private SceneObserver {
   absl::Status FindGeometryBounds(const DeltaPlan& plan);
   template <typename T>
   std::span<const T> OnDevice(const GeometryView& view, std::span<const T> array) const;
-  static bool CanBeThin(const GeometryRecord& record);
-  bool IsThin(const Drawable& drawable, const TableEntry& entry) const;
+  // The index that its items are drawn by, if they turn out to be thin, or small.
+  static IndexedBy IndexFor(const GeometryRecord& record);
+  // Decides it for a drawable that comes.
+  void ChooseIndex(const Drawable& drawable, const TableEntry& entry, Slot& slot) const;
+  RegionIndex& IndexOf(IndexedBy by) {
+    return by == IndexedBy::kLines ? static_cast<RegionIndex&>(lines_) : triangles_;
+  }
   absl::Status MarkLeft();
   absl::Status MarkPairs(std::span<const uint32_t> slots);
   absl::Status Enter();
-  absl::Status EnterLines(std::span<const Drawable* const> drawables,
-                          std::span<const uint32_t> slots);
+  absl::Status EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
+                            std::span<const uint32_t> slots);
   // Of one layer, no more than may come at once.
   struct Arriving {
     std::vector<uint32_t> slots;
     std::vector<uint64_t> first = {0};
     bool visible = false, mixed = false;
+    uint32_t regions_each = 0;
   };
-  absl::Status EnterGroup(uint32_t layer, const Arriving& arriving);
+  absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving);
   absl::Status EnterPairs(std::span<const uint32_t> slots);
   DrawView ViewForDrawing() const;
   absl::Status Draw(DrawView& view, DrawTo to);
@@ -131,9 +143,10 @@ class CudaVolume final : private SceneObserver {
   Affine view_;
   bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
   DrawGroups groups_;    // of the frame under way
-  PairIndex index_;      // of all that is no thin line
+  PairIndex index_;      // of all that the others do not have
   LineIndex lines_;
   bool lines_suit_ = false;  // the volume is not too large for them
+  TriangleIndex triangles_;
 
   Block table_;
   std::vector<Slot> slots_;

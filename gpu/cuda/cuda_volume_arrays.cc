@@ -1,5 +1,6 @@
 // What deltas bring, and where it lies on the device.
 #include <algorithm>
+#include <bit>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -7,6 +8,7 @@
 #include "gpu/assemble/delta_plan.h"
 #include "gpu/cuda/cuda_volume.h"
 #include "gpu/cuda/line_kernels.h"
+#include "gpu/cuda/triangle_kernels.h"
 #include "gpu/cuda/upload_plan.h"
 
 namespace voxeld::gpu::cuda {
@@ -21,6 +23,44 @@ std::span<const T> Moved(std::span<const T> array, const std::byte* host, std::b
   if (array.empty()) return array;
   const auto offset = reinterpret_cast<const std::byte*>(array.data()) - host;
   return {reinterpret_cast<const T*>(device + offset), array.size()};
+}
+
+GeometryBounds BoundsOfFew(const GeometryView& g) {
+  const std::span<const float> p = g.positions;
+  GeometryBounds bounds;
+  for (size_t a = 0; a < 3; ++a) {
+    bounds.lo[a] = bounds.hi[a] = static_cast<double>(p[a]);
+    for (size_t i = a; i < p.size(); i += 3) {
+      bounds.lo[a] = std::min(bounds.lo[a], static_cast<double>(p[i]));
+      bounds.hi[a] = std::max(bounds.hi[a], static_cast<double>(p[i]));
+    }
+  }
+  if (g.record.kind != PrimitiveKind::kTriangles) return bounds;
+  const size_t corners = g.indices.empty() ? p.size() / 3 : g.indices.size();
+  for (size_t first = 0; first + 3 <= corners; first += 3) {
+    for (size_t a = 0; a < 3; ++a) {
+      double at[3];
+      for (size_t c = 0; c < 3; ++c) {
+        const size_t vertex = g.indices.empty() ? first + c : g.indices[first + c];
+        at[c] = static_cast<double>(p[vertex * 3 + a]);
+      }
+      const auto [low, high] = std::minmax({at[0], at[1], at[2]});
+      bounds.extent[a] = std::max(bounds.extent[a], high - low);
+    }
+  }
+  return bounds;
+}
+
+// Of the same positions, in bulk memory, several geometries may be made: all that any needs.
+void NoteBounds(absl::flat_hash_map<const float*, GeometryBounds>& all, const float* positions,
+                const GeometryBounds& bounds) {
+  const auto [it, fresh] = all.emplace(positions, bounds);
+  if (fresh) return;
+  for (int a = 0; a < 3; ++a) {
+    it->second.lo[a] = std::min(it->second.lo[a], bounds.lo[a]);
+    it->second.hi[a] = std::max(it->second.hi[a], bounds.hi[a]);
+    it->second.extent[a] = std::max(it->second.extent[a], bounds.extent[a]);
+  }
 }
 
 }  // namespace
@@ -66,46 +106,55 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
   return status.ok() ? waited : status;
 }
 
-bool CudaVolume::CanBeThin(const GeometryRecord& record) {
-  if (record.drawn_by == DrawnBy::kCpu || record.thickness != 0) return false;
-  return record.kind == PrimitiveKind::kPoints ||
-         (record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover);
+CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
+  if (record.drawn_by == DrawnBy::kCpu) return IndexedBy::kPairs;
+  if (record.kind == PrimitiveKind::kTriangles) return IndexedBy::kTriangles;
+  const bool line =
+      record.kind == PrimitiveKind::kPoints ||
+      (record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover);
+  return line && record.thickness == 0 ? IndexedBy::kLines : IndexedBy::kPairs;
 }
 
-// Where all geometries lie whose items may be thin lines: large ones are looked through on the
-// device.
+// Where all geometries lie whose items may be thin lines or small triangles, and how large these are:
+// large geometries are looked through on the device.
 absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   std::vector<const GeometryView*> large;
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
-    if (geometry == nullptr || geometry->positions.empty() || !CanBeThin(geometry->record))
+    if (geometry == nullptr || geometry->positions.empty() ||
+        IndexFor(geometry->record) == IndexedBy::kPairs) {
       continue;
-    const std::span<const float> p = geometry->positions;
-    if (p.size() > 3 * kFewVertices) {
+    }
+    if (geometry->positions.size() > 3 * kFewVertices || geometry->indices.size() > kFewVertices) {
       large.push_back(geometry);
-      continue;
+    } else {
+      NoteBounds(bounds_, geometry->positions.data(), BoundsOfFew(*geometry));
     }
-    GeometryBounds bounds;
-    for (size_t a = 0; a < 3; ++a) {
-      bounds.lo[a] = bounds.hi[a] = static_cast<double>(p[a]);
-      for (size_t i = a; i < p.size(); i += 3) {
-        bounds.lo[a] = std::min(bounds.lo[a], static_cast<double>(p[i]));
-        bounds.hi[a] = std::max(bounds.hi[a], static_cast<double>(p[i]));
-      }
-    }
-    bounds_[p.data()] = bounds;
   }
   if (large.empty()) return absl::OkStatus();
+  constexpr size_t kWords = 9;  // least and greatest by axis, and extents
   std::vector<uint32_t> bits;
-  for (size_t i = 0; i < large.size(); ++i) bits.insert(bits.end(), {~0u, ~0u, ~0u, 0u, 0u, 0u});
+  for (size_t i = 0; i < large.size(); ++i) {
+    bits.insert(bits.end(), {~0u, ~0u, ~0u, 0u, 0u, 0u, 0u, 0u, 0u});
+  }
   const absl::StatusOr<Block> found = device_.Upload(bits.data(), bits.size());
   if (!found.ok()) return found.status();
   for (size_t i = 0; i < large.size(); ++i) {
-    const std::span<const float> p = large[i]->positions;
+    const GeometryView& g = *large[i];
+    const float* const positions = OnDevice(g, g.positions).data();
+    uint32_t* const at = found->as<uint32_t>() + i * kWords;
     absl::Status status = device_.Run("FindBounds", [&] {
-      return FindBounds(OnDevice(*large[i], p).data(), static_cast<uint32_t>(p.size() / 3),
-                        found->as<uint32_t>() + i * 6, device_.stream());
+      return FindBounds(positions, static_cast<uint32_t>(g.positions.size() / 3), at,
+                        device_.stream());
     });
+    if (status.ok() && g.record.kind == PrimitiveKind::kTriangles) {
+      const bool indexed = !g.indices.empty();
+      const size_t corners = indexed ? g.indices.size() : g.positions.size() / 3;
+      status = device_.Run("FindExtents", [&] {
+        return FindExtents(positions, indexed ? OnDevice(g, g.indices).data() : nullptr,
+                           static_cast<uint32_t>(corners / 3), at + 6, device_.stream());
+      });
+    }
     if (!status.ok()) return status;
   }
   absl::Status status =
@@ -115,10 +164,12 @@ absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   for (size_t i = 0; i < large.size(); ++i) {
     GeometryBounds bounds;
     for (size_t a = 0; a < 3; ++a) {
-      bounds.lo[a] = static_cast<double>(FromOrderedBits(bits[i * 6 + a]));
-      bounds.hi[a] = static_cast<double>(FromOrderedBits(bits[i * 6 + 3 + a]));
+      const uint32_t* const at = &bits[i * kWords + a];
+      bounds.lo[a] = static_cast<double>(FromOrderedBits(at[0]));
+      bounds.hi[a] = static_cast<double>(FromOrderedBits(at[3]));
+      bounds.extent[a] = static_cast<double>(std::bit_cast<float>(at[6]));
     }
-    bounds_[large[i]->positions.data()] = bounds;
+    NoteBounds(bounds_, large[i]->positions.data(), bounds);
   }
   return absl::OkStatus();
 }

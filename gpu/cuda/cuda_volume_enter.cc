@@ -1,5 +1,6 @@
-// Drawables that come: into the table, and into the index of pairs or that of lines.
+// Drawables that come: into the table, and into the index of pairs, of lines or of triangles.
 #include <algorithm>
+#include <cmath>
 #include <thread>
 #include <utility>
 
@@ -11,23 +12,49 @@
 
 namespace voxeld::gpu::cuda {
 
-bool CudaVolume::IsThin(const Drawable& drawable, const TableEntry& entry) const {
-  if (!lines_suit_ || !CanBeThin(entry.record) || entry.source.radius > 0) return false;
+void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, Slot& slot) const {
+  const IndexedBy by = IndexFor(entry.record);
+  if (by == IndexedBy::kPairs) return;
+  if (by == IndexedBy::kLines && (!lines_suit_ || entry.source.radius > 0)) return;
   const auto* const arrays = static_cast<const DeviceArrays*>(drawable.geometry->memory.get());
-  if (arrays == nullptr || !arrays->bounds) return false;
+  if (arrays == nullptr || !arrays->bounds) return;
   const GeometryBounds& bounds = *arrays->bounds;
+  const Affine& map = entry.source.map;
   double lo[3] = {}, hi[3] = {};
   for (int corner = 0; corner < 8; ++corner) {
     const Point3d p =
-        Map(entry.source.map, corner & 1 ? bounds.hi[0] : bounds.lo[0],
-            corner & 2 ? bounds.hi[1] : bounds.lo[1], corner & 4 ? bounds.hi[2] : bounds.lo[2]);
+        Map(map, corner & 1 ? bounds.hi[0] : bounds.lo[0], corner & 2 ? bounds.hi[1] : bounds.lo[1],
+            corner & 4 ? bounds.hi[2] : bounds.lo[2]);
     const double at[3] = {p.x, p.y, p.z};
     for (int a = 0; a < 3; ++a) {
       lo[a] = corner == 0 ? at[a] : std::min(lo[a], at[a]);
       hi[a] = corner == 0 ? at[a] : std::max(hi[a], at[a]);
     }
   }
-  return AreThin(lo, hi);
+  if (by == IndexedBy::kLines) {
+    if (AreThin(lo, hi)) slot.indexed_by = by;
+    return;
+  }
+  // Differences of floats were rounded; and so is what a vertex is mapped to, in proportion to its
+  // terms.
+  constexpr double kSpare = 1.000001, kMostTerms = 1e11;
+  double extent[3];
+  for (int a = 0; a < 3; ++a) {
+    extent[a] = 0;
+    double terms = std::abs(map.m[a * 4 + 3]);
+    for (int b = 0; b < 3; ++b) {
+      const double m = std::abs(map.m[a * 4 + b]);
+      extent[a] += m * bounds.extent[b] * kSpare;
+      terms += m * std::max(std::abs(bounds.lo[b]), std::abs(bounds.hi[b]));
+    }
+    if (!(terms < kMostTerms)) return;
+  }
+  if (!AreCompact(lo, hi, extent)) return;
+  slot.indexed_by = by;
+  // Snapping, voxels only touched, and that the last one counts.
+  int32_t voxels[3];
+  for (int a = 0; a < 3; ++a) voxels[a] = static_cast<int32_t>(extent[a]) + 4;
+  slot.regions_each = RegionsOfExtent(voxels);
 }
 
 uint32_t CudaVolume::TakeSlot() {
@@ -129,7 +156,7 @@ absl::Status CudaVolume::Enter() {
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   uint32_t singular = 0;
-  absl::flat_hash_set<uint32_t> line_layers = lines_.Layers();
+  absl::flat_hash_set<uint32_t> layers[] = {{}, lines_.Layers(), triangles_.Layers()};  // by index
   for (const Drawable* drawable : drawables) {
     const uint32_t slot = TakeSlot();
     TableEntry entry = EntryOf(*drawable);
@@ -146,12 +173,17 @@ absl::Status CudaVolume::Enter() {
       WithPrimitive(entry.record.kind, [&](auto primitive) {
         using Primitive = typename decltype(primitive)::type;
         slots_[slot].items = Primitive::Count(entry.source);
-        slots_[slot].thin =
-            slots_[slot].items <= lines_.most_lines() && IsThin(*drawable, entry) &&
-            (line_layers.contains(entry.layer) || line_layers.size() < kMaxLineLayers);
-        if (slots_[slot].thin) line_layers.insert(entry.layer);
+        ChooseIndex(*drawable, entry, slots_[slot]);
         slots_[slot].singular = kIsSolid<Primitive> && !entry.source.solid.drawable;
       });
+      IndexedBy& by = slots_[slot].indexed_by;
+      auto& taken = layers[static_cast<size_t>(by)];
+      if (by != IndexedBy::kPairs &&
+          (slots_[slot].items > IndexOf(by).most_items() ||
+           (!taken.contains(entry.layer) && taken.size() >= kMaxLineLayers))) {
+        by = IndexedBy::kPairs;
+      }
+      if (by != IndexedBy::kPairs) taken.insert(entry.layer);
     }
     singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);
@@ -163,12 +195,13 @@ absl::Status CudaVolume::Enter() {
   }
   std::vector<uint32_t> pairs;
   for (const uint32_t slot : slots) {
-    if (slots_[slot].thin) continue;
+    if (slots_[slot].indexed_by != IndexedBy::kPairs) continue;
     pairs.push_back(slot);
     live_items_ += slots_[slot].items;
   }
   absl::Status status = EnterPairs(pairs);
-  if (status.ok()) status = EnterLines(drawables, slots);
+  if (status.ok()) status = EnterRegions(IndexedBy::kLines, drawables, slots);
+  if (status.ok()) status = EnterRegions(IndexedBy::kTriangles, drawables, slots);
   if (!status.ok()) {
     // They go again, and come anew with the next frame.
     left_.insert(left_.end(), slots.begin(), slots.end());
@@ -190,45 +223,48 @@ absl::Status CudaVolume::EnterPairs(std::span<const uint32_t> slots) {
 }
 
 // Layer by layer.
-absl::Status CudaVolume::EnterLines(std::span<const Drawable* const> drawables,
-                                    std::span<const uint32_t> slots) {
+absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
+                                      std::span<const uint32_t> slots) {
+  RegionIndex& index = IndexOf(by);
   absl::flat_hash_map<uint32_t, std::vector<Arriving>> layers;  // by slot
   for (size_t i = 0; i < slots.size(); ++i) {
     const Slot& slot = slots_[slots[i]];
-    if (!slot.thin) continue;
+    if (slot.indexed_by != by) continue;
     const Drawable& drawable = *drawables[i];
     std::vector<Arriving>& groups = layers[layer_slots_.at(drawable.layer->record.id)];
-    if (groups.empty() || groups.back().first.back() + slot.items > lines_.most_lines()) {
+    if (groups.empty() || groups.back().first.back() + slot.items > index.most_items()) {
       groups.emplace_back();
     }
     Arriving& arriving = groups.back();
     arriving.slots.push_back(slots[i]);
     arriving.first.push_back(arriving.first.back() + slot.items);
     arriving.visible = drawable.layer->record.visible != 0;
+    arriving.regions_each = std::max(arriving.regions_each, slot.regions_each);
     const GeometryRecord& record = drawable.geometry->view.record;
-    arriving.mixed |= record.kind == PrimitiveKind::kSegments &&
+    arriving.mixed |= record.kind != PrimitiveKind::kPoints &&
                       record.color_mode == ColorMode::kPerVertex && drawable.record.erase == 0;
   }
   for (const auto& [layer, groups] : layers) {
     for (const Arriving& arriving : groups) {
-      if (absl::Status status = EnterGroup(layer, arriving); !status.ok()) return status;
+      if (absl::Status status = EnterGroup(index, layer, arriving); !status.ok()) return status;
     }
   }
   return absl::OkStatus();
 }
 
-absl::Status CudaVolume::EnterGroup(uint32_t layer, const Arriving& arriving) {
+absl::Status CudaVolume::EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving) {
   const absl::StatusOr<UploadedList> list =
       UploadList(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
   if (!list.ok()) return list.status();
-  return lines_.Add(table_.as<TableEntry>(),
-                    {.layer = layer,
-                     .visible = arriving.visible,
-                     .mixed = arriving.mixed,
-                     .list = list->list,
-                     .slots = arriving.slots,
-                     .first = arriving.first},
-                    tiles_.region_dirty.as<uint8_t>());
+  return index.Add(table_.as<TableEntry>(),
+                   {.layer = layer,
+                    .visible = arriving.visible,
+                    .mixed = arriving.mixed,
+                    .regions_each = arriving.regions_each,
+                    .list = list->list,
+                    .slots = arriving.slots,
+                    .first = arriving.first},
+                   tiles_.region_dirty.as<uint8_t>());
 }
 
 }  // namespace voxeld::gpu::cuda

@@ -5,11 +5,12 @@
 #include "gpu/cuda/flush-inl.h"
 #include "gpu/cuda/pairs-inl.h"
 #include "gpu/cuda/spans-inl.h"
+#include "gpu/cuda/triangles-inl.h"
 
 namespace voxeld::gpu::cuda {
 
-// What a drawing has to reckon with: lines of one layer that is seen as it is; of any layers; or
-// anything.
+// What a drawing has to reckon with: thin lines and small triangles of one layer that is seen as it
+// is; of any layers; or anything.
 enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 
 template <DrawWhat kWhat>
@@ -51,6 +52,9 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
     }
     for (uint32_t left = scratch.line_batches; left != 0; left &= left - 1) {
       DrawSpans(view, view.lines.batches[__ffs(static_cast<int>(left)) - 1], scratch);
+    }
+    for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
+      DrawTriangles(view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
     }
     if constexpr (kWhat == DrawWhat::kAll) {
       if (scratch.pairs != 0) {
@@ -114,6 +118,11 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
         for (uint32_t b = 0; b < view.lines.count; ++b) {
           if (view.lines.batches[b].lists.Has(region)) {
             DrawSpans(view, view.lines.batches[b], scratch);
+          }
+        }
+        for (uint32_t b = 0; b < view.triangles.count; ++b) {
+          if (view.triangles.batches[b].Has(region)) {
+            DrawTriangles(view, b);
           }
         }
       }

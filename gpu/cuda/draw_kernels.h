@@ -15,8 +15,8 @@ namespace voxeld::gpu::cuda {
 cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, const DrawGroups& groups,
                       cudaStream_t stream);
 
-// Draw the regions listed. Where there are thin lines alone, in one visible layer that is seen as it
-// is (OVER, opacity 255); where there are thin lines alone; whatever there is.
+// Draw the regions listed. Where there are thin lines and small triangles alone, in one visible layer
+// that is seen as it is (OVER, opacity 255); where there are these alone; whatever there is.
 cudaError_t DrawOneLayer(const DrawView& view, DrawTo to, uint32_t multiprocessors,
                          cudaStream_t stream);
 cudaError_t DrawLines(const DrawView& view, DrawTo to, uint32_t multiprocessors,

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "gpu/clip.h"
-#include "gpu/cuda/line_types.h"
+#include "gpu/cuda/triangle_types.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -34,6 +34,7 @@ struct DrawView {
   const VoxelHalfSpace* half_spaces = nullptr;
   BatchList pairs;
   LineBatchList lines;
+  TriangleBatchList triangles;
   VolumeView volume;
   RegionGrid regions;
   const uint32_t* list = nullptr;    // the regions to be drawn

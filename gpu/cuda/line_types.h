@@ -126,6 +126,8 @@ struct LineBatchView {
   const uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
   uint32_t layer = 0;              // its slot
   SpanLists lists;
+
+  VOXELD_HD bool Has(uint32_t region) const { return lists.Has(region); }
 };
 
 inline constexpr uint32_t kMaxLineBatches = 24;

@@ -1,4 +1,4 @@
-// Pairs of items and tiles, raised into a region's words: whatever is no thin line.
+// Pairs of items and tiles, raised into a region's words: whatever is neither thin line nor small triangle.
 #pragma once
 
 #include "gpu/cuda/region_scratch-inl.h"

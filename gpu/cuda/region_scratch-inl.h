@@ -15,6 +15,16 @@ inline constexpr uint32_t kSegments = 256;    // of a region's spans, that are l
 inline constexpr uint32_t kRegionTiles = 4;   // bit 0: the further in x, bit 1: in y
 inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
 
+// Of a warp's values, the sum of those of the lanes before this one.
+__device__ inline uint32_t SumBefore(uint32_t value) {
+  uint32_t sum = value;
+  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
+    const uint32_t other = __shfl_up_sync(kAllLanes, sum, lanes);
+    if (threadIdx.x % 32 >= lanes) sum += other;
+  }
+  return sum - value;
+}
+
 // Rows of 32 words along x, y within z, and so far apart: lanes that each read four words of a row of
 // their own meet all banks.
 inline constexpr uint32_t kRowStride = 36;
@@ -34,10 +44,10 @@ struct RegionScratch {
   uint32_t segment_at[kSegments];         // where its spans lie
   LineSpan spans[kMostSpans];
   uint32_t buckets[kBuckets];
-  uint32_t line_batches;  // bits: those of the layer under way
-  uint32_t layer;         // its slot; kAllLanes: no more
-  uint32_t cutting;       // bits: which of its half-spaces cut the region
-  uint32_t outside;       // not 0: all of the region lies outside one of them
+  uint32_t line_batches, triangle_batches;  // bits: those of the layer under way
+  uint32_t layer;                           // its slot; kAllLanes: no more
+  uint32_t cutting;                         // bits: which of its half-spaces cut the region
+  uint32_t outside;                         // not 0: all of the region lies outside one of them
   uint32_t region;
   alignas(16) uint32_t least[64];  // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
@@ -137,19 +147,18 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
       }
     }
   }
-  int32_t line_rank = kNone;
-  if (lane < view.lines.count) {
-    const LineBatchView& batch = view.lines.batches[lane];
-    const LayerLook look = view.layers[batch.layer];
-    const uint32_t region = scratch.region;
-    if (look.visible != 0 && look.rank > last && batch.lists.Has(region)) {
-      line_rank = look.rank;
-      if (line_rank < least) {
-        least = line_rank;
-        layer = batch.layer;
-      }
+  const auto rank_here = [&](const auto& batches) {
+    if (lane >= batches.count || !batches.batches[lane].Has(scratch.region)) return kNone;
+    const uint32_t slot = batches.batches[lane].layer;
+    const LayerLook look = view.layers[slot];
+    if (look.visible == 0 || look.rank <= last) return kNone;
+    if (look.rank < least) {
+      least = look.rank;
+      layer = slot;
     }
-  }
+    return look.rank;
+  };
+  const int32_t line_rank = rank_here(view.lines), triangle_rank = rank_here(view.triangles);
   const int32_t mine = least;
   for (int lanes = 16; lanes > 0; lanes /= 2) {
     least = Min(least, __shfl_xor_sync(kAllLanes, least, lanes));
@@ -165,10 +174,12 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
   }
   const uint32_t any_pairs = __ballot_sync(kAllLanes, pairs);
   const uint32_t lines = __ballot_sync(kAllLanes, line_rank == least && least != kNone);
+  const uint32_t triangles = __ballot_sync(kAllLanes, triangle_rank == least && least != kNone);
   if (lane == 0) {
     scratch.layer = kAllLanes;
     scratch.pairs = any_pairs;
     scratch.line_batches = lines;
+    scratch.triangle_batches = triangles;
   }
   __syncwarp();
   if (mine == least && least != kNone) scratch.layer = layer;  // the same in all that have it

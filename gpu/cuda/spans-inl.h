@@ -59,16 +59,6 @@ __device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word
   }
 }
 
-// Of a warp's values, the sum of those of the lanes before this one.
-__device__ inline uint32_t SumBefore(uint32_t value) {
-  uint32_t sum = value;
-  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
-    const uint32_t other = __shfl_up_sync(kAllLanes, sum, lanes);
-    if (threadIdx.x % 32 >= lanes) sum += other;
-  }
-  return sum - value;
-}
-
 // The region's next segments of spans, from chunk `first` on, by the whole block; how many spans they
 // have.
 __device__ inline uint32_t FindSegments(const SpanLists& lists, uint32_t first, uint32_t last,

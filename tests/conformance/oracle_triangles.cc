@@ -155,9 +155,17 @@ void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& 
     }
   }
   if (flat) return;
-  for (int64_t z = 0; z < grid.nz; ++z) {
-    for (int64_t y = 0; y < grid.ny; ++y) {
-      for (int64_t x = 0; x < grid.nx; ++x) {
+  // What the triangle meets is no further away than its corners.
+  const int64_t size[3] = {grid.nx, grid.ny, grid.nz};
+  int64_t begin[3], end[3];
+  for (int a = 0; a < 3; ++a) {
+    const auto [low, high] = std::minmax({t.v[0].v[a], t.v[1].v[a], t.v[2].v[a]});
+    begin[a] = std::clamp<int64_t>(low / 256 - 2, 0, size[a]);
+    end[a] = std::clamp<int64_t>(high / 256 + 2, 0, size[a]);
+  }
+  for (int64_t z = begin[2]; z < end[2]; ++z) {
+    for (int64_t y = begin[1]; y < end[1]; ++y) {
+      for (int64_t x = begin[0]; x < end[0]; ++x) {
         const Vec corner = Vec{x * 256, y * 256, z * 256} - origin;
         const Vec centre = {corner.x + 128, corner.y + 128, corner.z + 128};
         const bool covered = t.rule == SurfaceRule::kCover

@@ -1,0 +1,128 @@
+// Items of one kind by the regions that they touch: a few batches, each of one layer.
+//
+// A change adds a batch; batches of like size are merged, and items that have gone are dropped on the
+// way: so an index of n items costs O(log n) an item.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "gpu/cuda/device.h"
+#include "gpu/cuda/line_types.h"
+
+namespace voxeld::gpu::cuda {
+
+// Drawables of one layer that come into an index together.
+struct Arrivals {
+  uint32_t layer = 0;  // its slot
+  bool visible = true;
+  bool mixed = false;         // some item may have several colours
+  uint32_t regions_each = 0;  // that an item touches at most, of kinds that want to know
+  ItemList list;              // on the device
+  std::span<const uint32_t> slots;
+  std::span<const uint64_t> first;  // as in the list
+};
+
+// The bookkeeping, whatever the items are. Thread-bound; its calls queue work in the device's stream.
+class RegionIndex {
+ public:
+  virtual ~RegionIndex() = default;
+  RegionIndex(const RegionIndex&) = delete;
+  RegionIndex& operator=(const RegionIndex&) = delete;
+
+  // Forgets all, for a volume of that grid, of which the tiles are drawn that `owned` has (a TileOwner
+  // each): of items elsewhere nothing is kept but themselves.
+  void Reset(const TileGrid& grid, std::span<const uint8_t> owned);
+  // The slots of layers that have items here; no more than kMaxLineLayers may.
+  absl::flat_hash_set<uint32_t> Layers() const;
+  uint64_t live() const;  // items
+  // Items that may come in one Add.
+  uint64_t most_items() const { return most_items_; }
+
+  // Adds them; marks regions if they are to be seen. ResourceExhausted, and nothing is added, if
+  // memory does not suffice.
+  absl::Status Add(const TableEntry* table, const Arrivals& arrivals, uint8_t* region_dirty);
+
+  // Marks the regions of drawables.
+  absl::Status Mark(std::span<const uint32_t> slots, uint8_t* region_dirty);
+  // Drops them. An error leaves all as it was.
+  absl::Status Drop(std::span<const uint32_t> slots);
+
+  // Merges batches of like size. Want of memory is no error, unless there are more than
+  // kMaxLineBatches.
+  absl::Status Merge();
+
+ protected:
+  struct Member {
+    uint32_t slot, first, count;  // items, one at least
+    bool live;
+  };
+  struct Batch {
+    uint32_t layer = 0;
+    uint32_t count = 0, live = 0;  // items
+    uint32_t regions_each = 0;
+    bool mixed = false;
+    Block items, colors;  // `colors` only if mixed
+    // By region, as the kind has it.
+    Block begin, base, offsets, regions, spans;
+    std::vector<Member> members;
+  };
+
+  // what: the items, for who reads an error. Sizes in bytes, of an item and of its further colours.
+  RegionIndex(Device& device, const char* what, size_t item_size, size_t color_size)
+      : device_(device), what_(what), item_size_(item_size), color_size_(color_size) {}
+
+  const absl::flat_hash_map<uint64_t, Batch>& batches() const { return batches_; }
+  Device& device() const { return device_; }
+  const RegionGrid& grid() const { return grid_; }
+
+ private:
+  // ---- the kind. Each queues its kernels.
+  // Regions that an item touches at most.
+  virtual uint64_t MostRegions() const = 0;
+  // batch.items and colors, of the list.
+  virtual absl::Status Make(const TableEntry* table, const ItemList& list, const Batch& batch) = 0;
+  // `to` gets `count` items at `first` of the list, in which rows are those of `from`.
+  virtual absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
+                            const Batch& to) = 0;
+  // Sorts the items by region.
+  virtual absl::Status Sort(Batch& batch) = 0;
+  // Marks the regions that have any.
+  virtual absl::Status MarkAll(const Batch& batch, uint8_t* region_dirty) = 0;
+  // Of items in rows, `count` in all, whose first is slots[d]: marks the regions that they touch, or,
+  // without `region_dirty`, has them draw nothing from now on.
+  virtual absl::Status Touch(const ItemList& list, uint32_t count, const Batch& batch,
+                             uint8_t* region_dirty) = 0;
+
+  struct Place {
+    uint64_t batch;  // its number
+    size_t member;
+  };
+  // Items of a batch.
+  struct Found {
+    uint64_t count = 0;
+    std::vector<Member> members;
+  };
+
+  absl::flat_hash_map<uint64_t, Found> Find(std::span<const uint32_t> slots) const;
+  absl::Status TouchFound(const Batch& batch, Found& found, uint8_t* region_dirty);
+  absl::Status TakeItems(Batch& batch);
+  absl::Status MergeFrom(const std::vector<uint64_t>& numbers);
+
+  Device& device_;
+  const char* const what_;
+  const size_t item_size_, color_size_;
+  RegionGrid grid_;
+  uint64_t next_number_ = 1, most_items_ = 0;
+  bool merge_ = false;  // something has changed since merging was last done or given up
+  absl::flat_hash_map<uint64_t, Batch> batches_;  // by number
+  absl::flat_hash_map<uint32_t, Place> places_;   // by slot of the table
+};
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,98 @@
+#include "gpu/cuda/triangle_index.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "gpu/cuda/triangle_kernels.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+// Up to here what a batch may need at most is taken, and nobody waits for the count of what it does.
+constexpr uint64_t kUncountedBytes = uint64_t{32} << 20;
+
+uint32_t* Colors(const auto& batch) {
+  return batch.mixed ? batch.colors.template as<uint32_t>() : nullptr;
+}
+
+}  // namespace
+
+TriangleBatchList TriangleIndex::view() const {
+  TriangleBatchList list;
+  for (const auto& [number, batch] : batches()) {
+    list.batches[list.count++] = {batch.items.as<CompactTriangle>(), Colors(batch),
+                                  batch.begin.as<uint32_t>(), batch.spans.as<uint32_t>(),
+                                  batch.layer};
+  }
+  return list;
+}
+
+uint64_t TriangleIndex::MostRegions() const {
+  constexpr int32_t kMost = CompactTriangle::kMostExtent / kUnitsPerVoxel + 3;
+  constexpr int32_t kVoxels[3] = {kMost, kMost, kMost};
+  return std::min(RegionsOfExtent(kVoxels), grid().count());
+}
+
+absl::Status TriangleIndex::Make(const TableEntry* table, const ItemList& list,
+                                 const Batch& batch) {
+  return device().Run("MakeTriangles", [&] {
+    return MakeTriangles(table, list, batch.count, batch.items.as<CompactTriangle>(), Colors(batch),
+                         device().stream());
+  });
+}
+
+absl::Status TriangleIndex::Copy(const ItemList& list, uint64_t first, uint32_t count,
+                                 const Batch& from, const Batch& to) {
+  return device().Run("CopyTriangles", [&] {
+    return CopyTriangles(list, first, count, from.items.as<CompactTriangle>(), Colors(from),
+                         to.items.as<CompactTriangle>(), Colors(to), device().stream());
+  });
+}
+
+absl::Status TriangleIndex::Sort(Batch& batch) {
+  const size_t regions = grid().count();
+  const CompactTriangle* const triangles = batch.items.as<CompactTriangle>();
+  const absl::StatusOr<Block> counts = device().Zeros(regions * sizeof(uint32_t));
+  if (!counts.ok()) return counts.status();
+  absl::StatusOr<Block> begin = device().pool().Acquire((regions + 1) * sizeof(uint32_t));
+  if (!begin.ok()) return begin.status();
+  batch.begin = *std::move(begin);
+  TriangleSort sort{grid(), counts->as<uint32_t>(), batch.begin.as<uint32_t>(), nullptr, 0};
+  absl::Status status = device().Run("CountTriangles", [&] {
+    return CountTriangles(sort, triangles, batch.count, device().stream());
+  });
+  if (!status.ok()) return status;
+  uint64_t places = batch.count * std::min<uint64_t>(batch.regions_each, MostRegions());
+  if (places * sizeof(uint32_t) > kUncountedBytes) {
+    const absl::StatusOr<uint32_t> counted = device().Read(sort.begin + regions);
+    if (!counted.ok()) return counted.status();
+    places = *counted;
+  }
+  absl::StatusOr<Block> block =
+      device().pool().Acquire(std::max<size_t>(1, places) * sizeof(uint32_t));
+  if (!block.ok()) return block.status();
+  batch.spans = *std::move(block);
+  sort.places = batch.spans.as<uint32_t>();
+  sort.capacity = static_cast<uint32_t>(places);
+  return device().Run("FillTriangles", [&] {
+    return FillTriangles(sort, triangles, batch.count, device().stream());
+  });
+}
+
+absl::Status TriangleIndex::MarkAll(const Batch& batch, uint8_t* region_dirty) {
+  return device().Run("MarkFilled", [&] {
+    return MarkFilled(batch.begin.as<uint32_t>(), grid().count(), region_dirty, device().stream());
+  });
+}
+
+absl::Status TriangleIndex::Touch(const ItemList& list, uint32_t count, const Batch& batch,
+                                  uint8_t* region_dirty) {
+  CompactTriangle* const triangles = batch.items.as<CompactTriangle>();
+  return device().Run(region_dirty != nullptr ? "MarkTriangles" : "KillTriangles", [&] {
+    return region_dirty != nullptr
+               ? MarkTriangles(list, count, triangles, grid(), region_dirty, device().stream())
+               : KillTriangles(list, count, triangles, device().stream());
+  });
+}
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,48 @@
+// Small triangles on the device (gpu/primitives/compact_triangle.h), sorted by the regions of the
+// volume that they touch. Plain data, as host and device see it.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/cuda/line_types.h"
+#include "gpu/primitives/compact_triangle.h"
+
+namespace voxeld::gpu::cuda {
+
+// Triangles of one layer. Those of region r are triangles[places[begin[r]]] to
+// triangles[places[begin[r + 1] − 1]].
+struct TriangleBatchView {
+  const CompactTriangle* triangles = nullptr;
+  const uint32_t* colors = nullptr;  // 0x00RRGGBB, three each, where they differ; else null
+  const uint32_t* begin = nullptr;
+  const uint32_t* places = nullptr;
+  uint32_t layer = 0;  // its slot
+
+  VOXELD_HD bool Has(uint32_t region) const { return begin[region] != begin[region + 1]; }
+};
+
+inline constexpr uint32_t kMaxTriangleBatches = kMaxLineBatches;
+struct TriangleBatchList {
+  TriangleBatchView batches[kMaxTriangleBatches];
+  uint32_t count = 0;
+};
+
+// Regions that something touches of so many voxels along the axes.
+VOXELD_HD constexpr uint32_t RegionsOfExtent(const int32_t voxels[3]) {
+  uint32_t regions = 1;
+  for (int a = 0; a < 3; ++a) {
+    regions *= (static_cast<uint32_t>(voxels[a] > 1 ? voxels[a] - 1 : 0) >> RegionBits(a)) + 2;
+  }
+  return regions;
+}
+
+// The sorting of a batch: counted by region, summed, put there.
+struct TriangleSort {
+  RegionGrid grid;
+  uint32_t* counts = nullptr;  // by region; 0 at first, and again at the end
+  uint32_t* begin = nullptr;   // by region, and the end
+  uint32_t* places = nullptr;
+  uint32_t capacity = 0;  // of `places`
+};
+
+}  // namespace voxeld::gpu::cuda
