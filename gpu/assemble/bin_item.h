@@ -5,8 +5,9 @@
 
 namespace voxeld::gpu {
 
-// Of a line that is a walk (line_walk.h), the `count` voxels from the `first` on. Of any other item all it has there:
-// `count` is 1 for a small triangle (small_triangle.h), else 0.
+// Of a line that is a walk (line_walk.h), the `count` voxels from the `first` on. Of a small triangle's face
+// (triangle_runs.h) what it has there: `item` is its place, `first` the part of the drawable's triangles, `count` 1. Of any
+// other item all it has there: `count` is 0.
 struct BinItem {
   uint32_t item = 0;
   uint32_t range = 0;  // first · 2⁸ + count

@@ -195,32 +195,35 @@ TEST(Spans, OtherLinesAreNoWalks) {
       LineWalk::Of({{{250, 0, 0}}, {{260, 0, 0}}, 1, 1, LineSampling::kEuclidean}, grid, walk));
 }
 
+// What the definition draws of a triangle, and what small triangles do.
 void ExpectAsDefined(const Triangle& t, const TileGrid& grid, uint64_t* small, uint64_t* lit) {
   SmallTriangle fast;
-  if (!SmallTriangle::Of(t, WalkGrid(grid), fast)) return;
+  const WalkGrid axes(grid);
+  if (!SmallTriangle::Of(t, axes, fast)) return;
   ++*small;
   fast.word = kWord;
-  const WalkGrid axes(grid);
-  const SmallTriangleSlabs slabs(t);
-  const BinItem item{0, 1};
-  for (uint32_t tile = 0; tile < grid.count(); ++tile) {
+  const std::vector<uint8_t> owned(grid.count(), 1);
+  TriangleMemory memory;
+  FoundSpans found;
+  FindTriangles({&fast, 1}, 0, axes, owned.data(), memory, found);
+  Drawn want, got;
+  EmitTriangle(t, Whole(grid), [&](int32_t x, int32_t y, int32_t z, uint32_t) {
+    want[grid.TileOf(x, y, z)].at[grid.IndexInTile(x, y, z)] = kWord;
+  });
+  *lit += want.size();
+  for (size_t i = 0; i < found.size; ++i) {
+    const uint32_t tile = found.tiles.data()[i];
+    ASSERT_LT(tile, grid.count());
     const Box3 box = grid.VoxelsOf(tile);
-    Words want, got;
-    bool any = false;
-    EmitTriangle(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
-      want.at[grid.IndexInTile(x, y, z)] = kWord;
-      any = true;
-    });
-    int32_t lo[3], hi[3], ijk[3];
+    int32_t lo[3], hi[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
     TileRows touched;
-    DrawTriangles(&fast, {&item, 1}, lo, hi, got.at, touched);
-    ASSERT_TRUE(Holds(touched, got)) << "tile " << tile;
-    ASSERT_TRUE(got == want) << "tile " << tile;
-    grid.Coordinates(tile, ijk);
-    ASSERT_TRUE(!any || slabs.MayMeet(ijk[0], ijk[1], ijk[2])) << "tile " << tile;
-    *lit += any;
+    Words& words = got[tile];
+    DrawTriangles({&memory, 1}, {found.items.data() + i, 1}, lo, hi, words.at, touched);
+    ASSERT_TRUE(Holds(touched, words)) << "tile " << tile;
   }
+  std::erase_if(got, [](const auto& drawn) { return drawn.second == Words(); });
+  ASSERT_TRUE(got == want);
 }
 
 TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
@@ -258,8 +261,10 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
     Random random(seed);
     const TileGrid grid = TileGrid::Of(16, 16, 16);
     const Box3 box = grid.VoxelsOf(0);
-    std::vector<SmallTriangle> triangles;
-    std::vector<BinItem> items;
+    const uint8_t owned = 1;
+    TriangleMemory memory;
+    FoundSpans found;
+    uint64_t small = 0;
     Words want, got;
     for (uint32_t i = 0; i < 3000; ++i) {
       Triangle t;
@@ -270,17 +275,17 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
       }
       SmallTriangle fast;
       if (!SmallTriangle::Of(t, WalkGrid(grid), fast)) continue;
+      ++small;
       fast.word = kWord + i;
-      items.push_back({static_cast<uint32_t>(triangles.size()), 1});
-      triangles.push_back(fast);
+      FindTriangles({&fast, 1}, 0, WalkGrid(grid), &owned, memory, found);
       EmitTriangle(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
         uint32_t& at = want.at[grid.IndexInTile(x, y, z)];
         at = std::max(at, fast.word);
       });
     }
-    ASSERT_GT(triangles.size(), 2000u);
+    ASSERT_GT(small, 2000u);
     TileRows touched;
-    DrawTriangles(triangles.data(), items, box.lo, box.hi, got.at, touched);
+    DrawTriangles({&memory, 1}, {found.items.data(), found.size}, box.lo, box.hi, got.at, touched);
     EXPECT_TRUE(Holds(touched, got));
     EXPECT_TRUE(got == want);
   });
