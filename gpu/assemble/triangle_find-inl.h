@@ -12,331 +12,404 @@ HWY_BEFORE_NAMESPACE();
 namespace voxeld::gpu {
 namespace HWY_NAMESPACE {
 
-using DF = hn::CappedTag<double, 8>;
-using VF = hn::Vec<DF>;
-using DI = hn::Rebind<int32_t, DF>;
+using DS = hn::RebindToSigned<DW>;
+using VS = hn::Vec<DS>;
+using DH = hn::Rebind<uint16_t, DW>;
 
-constexpr int kMostRuns = 64;
-constexpr int kMostSingles = 4 * kMostRuns + 3;
+constexpr int kMostTiles = 5;
 constexpr int kVectorRoom = 16;
-
-// The small things of one triangle, before it is known how many there are.
-struct TriangleParts {
-  HWY_ALIGN uint16_t runs[kMostRuns + kVectorRoom];
-  HWY_ALIGN uint32_t singles[kMostSingles + kVectorRoom];
-  size_t single_count;
-};
 
 // x · 2^shift / divisor rounded up, where that is below 2³⁴ and the product below 2⁶³; adds `weight` to `err` if it was
 // rounded.
-HWY_INLINE int64_t CeilFixed(int64_t x, int shift, int32_t divisor, double inverse,
-                             uint32_t weight, uint32_t* err) {
+HWY_INLINE uint32_t CeilFixed(int64_t x, int shift, int32_t divisor, double inverse,
+                              uint32_t weight, uint32_t* err) {
   const int64_t scaled = x * (int64_t{1} << shift);
   // Less than 1 + 2⁻¹⁰ from the quotient.
-  auto q = static_cast<int64_t>(static_cast<double>(scaled) * inverse);
-  int64_t rest = scaled - q * divisor;
-  const int64_t up = int64_t{rest > 0} + int64_t{rest > divisor};
-  q += up;
-  rest -= up * divisor;
-  const auto down = int64_t{rest <= -divisor};
-  *err += rest + down * divisor != 0 ? weight : 0;
-  return q - down;
+  const auto q = static_cast<int64_t>(static_cast<double>(scaled) * inverse);
+  const int64_t rest = scaled - q * divisor;
+  const int64_t up = int64_t{rest > 0} + int64_t{rest > divisor} - int64_t{rest <= -divisor};
+  *err += rest != up * divisor ? weight : 0;
+  return static_cast<uint32_t>(q + up);
 }
 
-// An edge function along an axis: its value is at(k, j) = base + k·by_k + j·by_j for whole k and j.
+// Twice the signed area of an edge and voxel (k, j) in a projection: base + k·by_k + j·by_j; inside of all three ≥ 0.
 struct EdgeFunction {
-  double base, by_k, by_j;
-};
+  int32_t base, by_k, by_j;
 
-// Edges of the projection along axis `along` onto (k, j) axes, all ≥ 0 inside.
-HWY_INLINE void SetEdges(const SmallTriangle& t, int along, int k, int j, EdgeFunction edges[3]) {
-  // The sign of the area in (j, k).
-  const bool cyclic = j == (along + 1) % 3;
-  const int32_t sign = (t.n[along] < 0) == cyclic ? -1 : 1;
-  for (int i = 0; i < 3; ++i) {
-    const int next = i == 2 ? 0 : i + 1;
-    const int32_t dj = (t.p[next][j] - t.p[i][j]) * sign, dk = (t.p[next][k] - t.p[i][k]) * sign;
-    edges[i] = {static_cast<double>(dj * (128 - t.p[i][k]) - dk * (128 - t.p[i][j])),
-                static_cast<double>(dj * 256), static_cast<double>(-dk * 256)};
-  }
-}
-
-// The plane over the columns along the dominant axis.
-struct Plane {
-  double numerator, by_k, by_j;  // N
-  double inverse, divisor;
-};
-
-// For each k the run of j in the projection along axis a; singles of lines along j's axis at its ends, if `j_lines`. `runs`
-// may be null.
-HWY_ATTR HWY_INLINE void FindRuns(const SmallTriangle& t, int a, int k_axis, int j_axis,
-                                  const Plane& plane, bool j_lines, uint16_t* runs,
-                                  TriangleParts& parts) {
-  const DF d;
-  const DI di;
-  const hn::Rebind<uint16_t, DF> d16;
-  const hn::Rebind<uint32_t, DF> du;
-  const auto lanes = static_cast<int32_t>(hn::Lanes(d));
-  EdgeFunction edges[3], crossing[3];
-  SetEdges(t, a, k_axis, j_axis, edges);
-  SetEdges(t, j_axis, k_axis, a, crossing);
-  // ⌊(x + ½)·inverse⌋ is where edge i ends a run, if it falls along j, or begins it: negated.
-  constexpr double kFar = 1 << 20;
-  double inverse[3], end_room[3], first_room[3];
-  for (int i = 0; i < 3; ++i) {
-    const bool rises = edges[i].by_j > 0;
-    const double steep = rises ? edges[i].by_j : -edges[i].by_j;
-    inverse[i] = steep == 0 ? kFar : 1.0 / steep;  // a whole row is inside or none of it
-    end_room[i] = rises ? kFar : 0;
-    first_room[i] = rises ? 0 : kFar;
-  }
-  const int32_t rows = t.size[k_axis];
-  const VF most = hn::Set(d, static_cast<double>(t.size[j_axis])), zero = hn::Zero(d);
-  const VF half = hn::Set(d, 0.5), one = hn::Set(d, 1.0);
-  const VF divisor = hn::Set(d, plane.divisor), middle = hn::Set(d, plane.divisor * 0.5);
-  const VF depth_inverse = hn::Set(d, plane.inverse), depth_by_j = hn::Set(d, plane.by_j);
-  const double reach = 128.0 * static_cast<double>(t.n[j_axis] < 0 ? -t.n[j_axis] : t.n[j_axis]);
-  const double side = (t.n[a] < 0) == (t.n[j_axis] < 0) ? 1.0 : -1.0;
-  const VF high = hn::Set(d, reach), low = hn::Set(d, -reach), sided = hn::Set(d, side);
-  const VF place_k = hn::Set(d, static_cast<double>(1 << (8 * k_axis)));
-  const VF place_j = hn::Set(d, static_cast<double>(1 << (8 * j_axis)));
-  const VF place_a = hn::Set(d, static_cast<double>(1 << (8 * a)));
-  VF k = hn::ConvertTo(d, hn::Iota(hn::RebindToSigned<DF>(), 0));
-  const VF k_step = hn::Set(d, static_cast<double>(lanes)),
-           k_end = hn::Set(d, static_cast<double>(rows));
-  size_t single_count = parts.single_count;
-  for (int32_t row = 0; row < rows; row += lanes) {
-    VF end = hn::Sub(most, one), first = zero;
+  static void Set(const SmallTriangle& t, int along, int k, int j, EdgeFunction edges[3]) {
+    const bool cyclic = j == (along + 1) % 3;
+    const int32_t sign = (t.n[along] < 0) == cyclic ? -1 : 1;  // of the area in (j, k)
     for (int i = 0; i < 3; ++i) {
-      const VF x = hn::Add(hn::Set(d, edges[i].base + 0.5), hn::Mul(k, hn::Set(d, edges[i].by_k)));
-      const VF q = hn::Floor(hn::Mul(x, hn::Set(d, inverse[i])));
+      const int next = i == 2 ? 0 : i + 1;
+      const int32_t dj = (t.p[next][j] - t.p[i][j]) * sign;
+      const int32_t dk = (t.p[next][k] - t.p[i][k]) * sign;
+      edges[i] = {dj * (128 - t.p[i][k]) - dk * (128 - t.p[i][j]), dj * 256, -dk * 256};
+    }
+  }
+};
+
+// For rows k the columns j inside all three edges: of each edge ⌊E/|slope|⌋ + 1 is where it ends a run, if it falls along j,
+// and its negative where it begins one. The quotient's first guess is in single precision, off by less than one where it
+// matters (beyond 2⁷ only its sign does); the remainder puts it right.
+struct RunFinder {
+  int32_t base[3], by_k[3], slope[3], end_room[3], first_room[3];
+  float inverse[3];
+  int32_t columns;
+
+  HWY_INLINE RunFinder(const EdgeFunction edges[3], int32_t column_count) : columns(column_count) {
+    constexpr int32_t kFar = 1 << 20;
+    for (int i = 0; i < 3; ++i) {
+      base[i] = edges[i].base;
+      by_k[i] = edges[i].by_k;
+      slope[i] = edges[i].by_j < 0 ? -edges[i].by_j : edges[i].by_j;
+      end_room[i] = edges[i].by_j > 0 ? kFar : 1;
+      first_room[i] = edges[i].by_j > 0 ? 0 : kFar;
+      inverse[i] = 1.0f / static_cast<float>(slope[i]);
+      if (slope[i] != 0) continue;
+      // A whole row is inside, or none of it: 2E + 1, of an edge one unit long, times 128.
+      const int32_t length = (by_k[i] < 0 ? -by_k[i] : by_k[i]) / 256;
+      base[i] = base[i] / length * 2 + 1;
+      by_k[i] = by_k[i] / length * 2;
+      inverse[i] = 128;
+    }
+  }
+
+  // From 0 to `columns`; first ≥ end where there are none.
+  HWY_ATTR HWY_INLINE void Find(VS k, VS& first, VS& end) const {
+    const DS d;
+    const hn::RebindToFloat<DS> df;
+    const VS one = hn::Set(d, 1), zero = hn::Zero(d), most = hn::Set(d, columns);
+    first = zero;
+    end = most;
+    for (int i = 0; i < 3; ++i) {
+      const VS steep = hn::Set(d, slope[i]);
+      const VS x = hn::Add(hn::Set(d, base[i]), hn::Mul(k, hn::Set(d, by_k[i])));
+      VS q = hn::ConvertTo(d, hn::Mul(hn::ConvertTo(df, x), hn::Set(df, inverse[i])));
+      const VS rest = hn::Sub(x, hn::Mul(q, steep));
+      q = hn::Add(q, hn::ShiftRight<31>(rest));
+      q = hn::Add(q, hn::AndNot(hn::VecFromMask(d, hn::Lt(rest, steep)), one));
       end = hn::Min(end, hn::Add(q, hn::Set(d, end_room[i])));
-      first = hn::Max(first, hn::Neg(hn::Add(q, hn::Set(d, first_room[i]))));
+      first = hn::Max(first, hn::Sub(hn::Set(d, -first_room[i]), q));
     }
     first = hn::Min(first, most);
-    end = hn::Max(hn::Add(end, one), zero);
-    if (runs != nullptr) {
-      const auto run = hn::Or(hn::DemoteTo(di, first), hn::ShiftLeft<8>(hn::DemoteTo(di, end)));
-      hn::StoreU(hn::DemoteTo(d16, run), d16, runs + row);
-    }
-    if (j_lines) {
-      const auto there = hn::Lt(k, k_end);
-      const VF at_k = hn::Add(hn::Set(d, plane.numerator), hn::Mul(k, hn::Set(d, plane.by_k)));
-      VF cross_k[3];
-      for (int i = 0; i < 3; ++i) {
-        cross_k[i] =
-            hn::Add(hn::Set(d, crossing[i].base), hn::Mul(k, hn::Set(d, crossing[i].by_k)));
-      }
-      const VF packed_k = hn::Mul(k, place_k);
-      const auto test = [&](VF j) HWY_ATTR {
-        const VF n = hn::Add(at_k, hn::Mul(j, depth_by_j));
-        const VF i = hn::Floor(hn::Mul(hn::Add(n, half), depth_inverse));
-        const VF off =
-            hn::Mul(hn::Sub(hn::Sub(n, hn::Mul(i, divisor)), middle), sided);
-        VF inside = hn::Add(cross_k[0], hn::Mul(i, hn::Set(d, crossing[0].by_j)));
-        for (int e = 1; e < 3; ++e) {
-          inside =
-              hn::Min(inside, hn::Add(cross_k[e], hn::Mul(i, hn::Set(d, crossing[e].by_j))));
-        }
-        const auto lit = hn::And(hn::And(there, hn::Ge(inside, zero)),
-                                 hn::And(hn::Ge(off, low), hn::Lt(off, high)));
-        const VF packed = hn::Add(packed_k, hn::Add(hn::Mul(j, place_j), hn::Mul(i, place_a)));
-        const auto lit32 = hn::RebindMask(
-            du, hn::MaskFromVec(hn::DemoteTo(
-                    di, hn::IfThenElseZero(lit, hn::Set(d, -1.0)))));
-        hn::StoreU(hn::Compress(hn::BitCast(du, hn::DemoteTo(di, packed)), lit32), du,
-                   parts.singles + single_count);
-        single_count += hn::CountTrue(d, lit);
-      };
-      test(hn::Sub(first, one));
-      test(end);
-    }
-    k = hn::Add(k, k_step);
+    end = hn::Max(end, zero);
   }
-  parts.single_count = single_count;
-}
+};
 
-// Tiles of a triangle's bounds, counted from that of its origin; up to 5 an axis.
-struct TileMarks {
-  int32_t origin[3], count[3];  // tiles
-  int32_t off[3];               // of the triangle's origin in its tile
-  uint8_t hit[128];
+// Whether lines along j's axis light voxels that lie in the columns (k, j) of a face.
+struct LineTest {
+  EdgeFunction edges[3];  // of the projection along j's axis, over k and the voxels of axis a
+  uint32_t depth, fall_k, fall_j, err;
+  int64_t numerator, step_k, step_j, divisor;  // the exact depth
+  int64_t reach;                               // 128·|n_j|
+  int32_t side;                                // of n_a·n_j
+  int32_t reach_fixed;                         // 2⁻²⁵ voxel along a
+
+  HWY_INLINE LineTest(const SmallTriangle& t, const TriangleRuns& face, double inverse, int k_axis,
+                      int j_axis) {
+    const bool turned = k_axis != face.u;
+    EdgeFunction::Set(t, j_axis, k_axis, face.a, edges);
+    depth = face.depth;
+    fall_k = turned ? face.fall_v : face.fall_u;
+    fall_j = turned ? face.fall_u : face.fall_v;
+    err = face.err;
+    numerator = face.numerator;
+    step_k = int64_t{256} * (turned ? face.step_v : face.step_u);
+    step_j = int64_t{256} * (turned ? face.step_u : face.step_v);
+    divisor = face.divisor;
+    const int32_t n = t.n[j_axis];
+    const int32_t size = n < 0 ? -n : n;
+    reach = int64_t{128} * size;
+    side = (t.n[face.a] < 0) == (n < 0) ? 1 : -1;
+    reach_fixed = static_cast<int32_t>(static_cast<double>(size) * inverse * 0x1p24);
+  }
+
+  // By the definition.
+  HWY_NOINLINE bool Exactly(int32_t k, int32_t j) const {
+    const int64_t n = numerator + step_k * k + step_j * j;
+    const int64_t i = FloorDiv(n, divisor * 256);
+    const int64_t off = (n - (i * 256 + 128) * divisor) * side;
+    bool lit = off >= -reach && off < reach;
+    for (const EdgeFunction& e : edges) {
+      lit &= e.base + int64_t{e.by_k} * k + i * e.by_j >= 0;
+    }
+    return lit;
+  }
+
+  // All ones where lit; 0 where not, and where `there` is 0.
+  HWY_ATTR HWY_INLINE VS Lit(VS k, VS j, hn::Mask<DS> there) const {
+    const DS d;
+    const VS at = hn::Add(hn::Set(d, static_cast<int32_t>(depth)),
+                          hn::Add(hn::Mul(k, hn::Set(d, static_cast<int32_t>(fall_k))),
+                                  hn::Mul(j, hn::Set(d, static_cast<int32_t>(fall_j)))));
+    const VS i = hn::ShiftRight<kDepthBits>(at);
+    const VS part = hn::And(at, hn::Set(d, (1 << kDepthBits) - 1));
+    const VS off = hn::Abs(hn::Sub(part, hn::Set(d, 1 << (kDepthBits - 1))));
+    VS least = hn::Set(d, INT32_MAX);
+    for (const EdgeFunction& e : edges) {
+      least = hn::Min(least, hn::Add(hn::Add(hn::Set(d, e.base), hn::Mul(k, hn::Set(d, e.by_k))),
+                                     hn::Mul(i, hn::Set(d, e.by_j))));
+    }
+    const VS bound = hn::Set(d, reach_fixed), room = hn::Set(d, static_cast<int32_t>(err));
+    const auto inside = hn::And(there, hn::Gt(least, hn::Set(d, -1)));
+    const VS lit = hn::VecFromMask(d, hn::And(inside, hn::Lt(off, bound)));
+    const auto close = hn::Lt(hn::Abs(hn::Sub(off, bound)), hn::Add(room, hn::Set(d, 3)));
+    const auto unsure = hn::Or(hn::And(inside, close), hn::And(there, hn::Lt(part, room)));
+    if (HWY_LIKELY(hn::AllFalse(d, unsure))) return lit;
+    HWY_ALIGN int32_t ks[kVectorRoom], js[kVectorRoom], lits[kVectorRoom], unsures[kVectorRoom];
+    hn::Store(k, d, ks);
+    hn::Store(j, d, js);
+    hn::Store(lit, d, lits);
+    hn::Store(hn::VecFromMask(d, unsure), d, unsures);
+    for (size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+      if (unsures[lane] != 0) lits[lane] = Exactly(ks[lane], js[lane]) ? -1 : 0;
+    }
+    return hn::Load(d, lits);
+  }
+};
+
+// The tiles of a triangle's bounds, and which of them are hit.
+struct TileHits {
+  static constexpr int32_t kStep[3] = {1, kMostTiles, kMostTiles* kMostTiles};
+  int32_t tile[3], count[3];  // the first, and how many
+  int32_t off[3];             // of the origin in its tile
+  uint64_t hits[2];
 
   HWY_INLINE void Set(const SmallTriangle& t) {
     for (int r = 0; r < 3; ++r) {
-      origin[r] = t.origin[r] >> kTileBits;
+      tile[r] = t.origin[r] >> kTileBits;
       off[r] = t.origin[r] & (kTileSize - 1);
       count[r] = (off[r] + t.size[r] + kTileSize - 1) >> kTileBits;
     }
   }
-  HWY_INLINE int32_t Step(int r) const { return r == 0 ? 1 : r == 1 ? 5 : 25; }
+  HWY_INLINE void Hit(int32_t at, bool is_hit = true) {
+    hits[at >> 6] |= uint64_t{is_hit} << (at & 63);
+  }
+  // The voxel at i along axis r.
+  HWY_INLINE int32_t At(int r, int32_t i) const { return ((i + off[r]) >> kTileBits) * kStep[r]; }
 };
 
-// Marks the tiles in which a face may have voxels.
-HWY_ATTR HWY_INLINE void MarkFace(const TriangleRuns& face, const uint16_t* runs,
-                                  TileMarks& marks) {
-  const DW du;
-  const hn::RebindToSigned<DW> d;
-  const hn::Rebind<uint16_t, DW> d16;
+// Column j of row k.
+HWY_INLINE void AddColumn(TriangleRuns& face, int32_t k, int32_t j, bool add,
+                          const TileHits& tiles) {
+  const int32_t column = j + tiles.off[face.v];
+  uint16_t& bits = face.columns(column >> kTileBits)[k];
+  bits = static_cast<uint16_t>(bits | int{add} << (column & (kTileSize - 1)));
+}
+HWY_INLINE uint32_t DepthAt(const TriangleRuns& face, int32_t k, int32_t j) {
+  return face.depth + static_cast<uint32_t>(k) * face.fall_u +
+         static_cast<uint32_t>(j) * face.fall_v;
+}
+
+// The columns of each tile along v, with what `lines` along v light, if any; and the tiles hit.
+HWY_ATTR HWY_INLINE void SetColumns(const RunFinder& runs, const LineTest* lines,
+                                    TriangleRuns& face, TileHits& tiles) {
+  const DS d;
+  const DH d16;
   const auto lanes = static_cast<int32_t>(hn::Lanes(d));
   const int a = face.a, u = face.u, v = face.v;
-  const auto fall_u = hn::Set(d, static_cast<int32_t>(face.fall_u));
-  const auto fall_v = hn::Set(d, static_cast<int32_t>(face.fall_v));
-  const auto err = hn::Set(d, static_cast<int32_t>(face.err));
-  auto k = hn::Iota(d, 0);
+  const VS fall_u = hn::Set(d, static_cast<int32_t>(face.fall_u));
+  const VS fall_v = hn::Set(d, static_cast<int32_t>(face.fall_v));
+  const VS err = hn::Set(d, static_cast<int32_t>(face.err)), one = hn::Set(d, 1);
+  // Two at least, of which the second may have nothing: seldom are there more, and a branch could not be foreseen.
+  const int32_t count_v = std::max(2, tiles.count[v]), count_a = std::max(2, tiles.count[a]);
+  VS k = hn::Iota(d, 0);
   for (int32_t row = 0; row < face.rows; row += lanes, k = hn::Add(k, hn::Set(d, lanes))) {
-    const auto run = hn::PromoteTo(du, hn::LoadU(d16, runs + row));
-    const auto run_first = hn::BitCast(d, hn::And(run, hn::Set(du, 0xFF)));
-    const auto run_end = hn::BitCast(d, hn::ShiftRight<8>(run));
     const auto there = hn::Lt(k, hn::Set(d, int32_t{face.rows}));
-    const auto depth = hn::Add(hn::Set(d, static_cast<int32_t>(face.depth)), hn::Mul(k, fall_u));
-    for (int32_t tv = 0; tv < marks.count[v]; ++tv) {
-      const int32_t from = tv * kTileSize - marks.off[v];
-      const auto first = hn::Max(run_first, hn::Set(d, from));
-      const auto end = hn::Min(run_end, hn::Set(d, from + kTileSize));
-      const auto last = hn::Sub(end, hn::Set(d, 1));
+    VS run_first, run_end;
+    runs.Find(k, run_first, run_end);
+    if (lines != nullptr) {
+      const VS low = lines->Lit(k, hn::Sub(run_first, one), there);
+      const VS high = lines->Lit(k, run_end, there);
+      run_first = hn::Add(run_first, low);
+      run_end = hn::Sub(run_end, high);
+    }
+    const VS depth = hn::Add(hn::Set(d, static_cast<int32_t>(face.depth)), hn::Mul(k, fall_u));
+    const int32_t row_in_tile = (row + tiles.off[u]) & (kTileSize - 1);
+    const int32_t at_row = tiles.At(u, row);
+    for (int32_t tv = 0; tv < count_v; ++tv) {
+      const int32_t from = tv * kTileSize - tiles.off[v];
+      const VS origin = hn::Set(d, from);
+      const VS first = hn::Max(run_first, origin);
+      const VS end = hn::Min(run_end, hn::Set(d, from + kTileSize));
       const auto some = hn::And(there, hn::Lt(first, end));
-      const auto p = hn::Add(depth, hn::Mul(first, fall_v)),
-                 q = hn::Add(depth, hn::Mul(last, fall_v));
-      const auto least = hn::ShiftRight<kDepthBits>(hn::Sub(hn::Min(p, q), err));
-      const auto most = hn::ShiftRight<kDepthBits>(hn::Max(p, q));
-      for (int32_t ta = 0; ta < marks.count[a]; ++ta) {
-        const int32_t lower = ta * kTileSize - marks.off[a];
+      const VS bits =
+          hn::Sub(hn::Shl(one, hn::Sub(end, origin)), hn::Shl(one, hn::Sub(first, origin)));
+      hn::StoreU(hn::DemoteTo(d16, hn::IfThenElseZero(some, bits)), d16, face.columns(tv) + row);
+      const VS p = hn::Add(depth, hn::Mul(first, fall_v)),
+               q = hn::Add(depth, hn::Mul(hn::Sub(end, one), fall_v));
+      const VS least = hn::ShiftRight<kDepthBits>(hn::Sub(hn::Min(p, q), err));
+      const VS most = hn::ShiftRight<kDepthBits>(hn::Max(p, q));
+      for (int32_t ta = 0; ta < count_a; ++ta) {
+        const int32_t lower = ta * kTileSize - tiles.off[a];
         const auto meets = hn::And(some, hn::And(hn::Lt(least, hn::Set(d, lower + kTileSize)),
                                                  hn::Gt(most, hn::Set(d, lower - 1))));
-        for (int32_t tu = 0; tu < marks.count[u]; ++tu) {
-          const int32_t begin = tu * kTileSize - marks.off[u];
-          const auto here = hn::And(hn::Gt(k, hn::Set(d, begin - 1)),
-                                    hn::Lt(k, hn::Set(d, begin + kTileSize)));
-          marks.hit[tv * marks.Step(v) + ta * marks.Step(a) + tu * marks.Step(u)] |=
-              !hn::AllFalse(d, hn::And(meets, here));
+        uint64_t rows = 0;
+        hn::StoreMaskBits(d, meets, reinterpret_cast<uint8_t*>(&rows));
+        rows = (rows & ((uint64_t{1} << lanes) - 1)) << row_in_tile;
+        const int32_t at = at_row + tv * tiles.kStep[v] + ta * tiles.kStep[a];
+        tiles.Hit(at, (rows & 0xFFFF) != 0);
+        tiles.Hit(at + tiles.kStep[u], rows >> kTileSize != 0);
+      }
+    }
+  }
+}
+
+// The columns that lines along u light.
+HWY_ATTR HWY_INLINE void AddLinesAlongRows(const RunFinder& runs, const LineTest& lines,
+                                           int32_t columns, TriangleRuns& face, TileHits& tiles) {
+  const DS d;
+  const VS one = hn::Set(d, 1);
+  const auto lanes = static_cast<int32_t>(hn::Lanes(d));
+  VS j = hn::Iota(d, 0);
+  HWY_ALIGN int32_t ks[2 * kVectorRoom];
+  for (int32_t column = 0; column < columns; column += lanes, j = hn::Add(j, hn::Set(d, lanes))) {
+    const auto there = hn::Lt(j, hn::Set(d, columns));
+    VS low, high;
+    runs.Find(j, low, high);
+    low = hn::Sub(low, one);
+    uint64_t lit_low = 0, lit_high = 0;
+    hn::StoreMaskBits(d, hn::MaskFromVec(lines.Lit(j, low, there)),
+                      reinterpret_cast<uint8_t*>(&lit_low));
+    hn::StoreMaskBits(d, hn::MaskFromVec(lines.Lit(j, high, there)),
+                      reinterpret_cast<uint8_t*>(&lit_high));
+    hn::StoreU(low, d, ks);
+    hn::StoreU(high, d, ks + lanes);
+    const uint64_t all = (uint64_t{1} << lanes) - 1;
+    for (uint64_t lit = (lit_low & all) | (lit_high & all) << lanes; lit != 0; lit &= lit - 1) {
+      const int lane = std::countr_zero(lit);
+      const int32_t k = ks[lane], at_j = column + (lane & (lanes - 1));
+      AddColumn(face, k, at_j, true, tiles);
+      const uint32_t depth = DepthAt(face, k, at_j);
+      const int32_t at = tiles.At(face.u, k) + tiles.At(face.v, at_j);
+      for (uint32_t i : {depth, depth - face.err}) {
+        tiles.Hit(at + tiles.At(face.a, std::max(0, static_cast<int32_t>(i) >> kDepthBits)));
+      }
+    }
+  }
+}
+
+HWY_INLINE void AddVertices(const SmallTriangle& t, TriangleRuns& face, TileHits& tiles) {
+  for (int n = 0; n < 3; ++n) {
+    const int32_t i = t.p[n][face.a] >> 8, k = t.p[n][face.u] >> 8, j = t.p[n][face.v] >> 8;
+    const uint32_t depth = DepthAt(face, k, j);
+    const bool at_depth = static_cast<int32_t>(depth) >> kDepthBits == i &&
+                          static_cast<int32_t>(depth - face.err) >> kDepthBits == i;
+    AddColumn(face, k, j, at_depth, tiles);
+    const auto voxel =
+        static_cast<uint32_t>(i << (8 * face.a) | k << (8 * face.u) | j << (8 * face.v));
+    face.vertices()[n] = at_depth ? TriangleRuns::kNoVertex : voxel;
+    tiles.Hit(tiles.At(face.a, i) + tiles.At(face.u, k) + tiles.At(face.v, j));
+  }
+}
+
+// An item for each tile that is hit.
+HWY_INLINE void PutItems(const TileHits& tiles, BinItem item, const WalkGrid& grid,
+                         const uint8_t* owned, FoundSpans& found) {
+  constexpr size_t kMost = kMostTiles * kMostTiles * kMostTiles;
+  found.tiles.Reserve(found.size, kMost);
+  found.items.Reserve(found.size, kMost);
+  uint32_t* const to = found.tiles.data();
+  BinItem* const items = found.items.data();
+  size_t size = found.size;
+  bool whole = true;  // within the volume
+  for (int r = 0; r < 3; ++r) {
+    whole &=
+        tiles.tile[r] >= 0 && (tiles.tile[r] + tiles.count[r] - 1) * kTileSize < grid.voxels[r];
+  }
+  const int32_t first = tiles.tile[0] * grid.tile_step[0] + tiles.tile[1] * grid.tile_step[1] +
+                        tiles.tile[2] * grid.tile_step[2];
+  for (size_t half = 0; half < 2; ++half) {
+    for (uint64_t left = tiles.hits[half]; left != 0; left &= left - 1) {
+      const auto at =
+          static_cast<uint32_t>(half * 64) + static_cast<uint32_t>(std::countr_zero(left));
+      const uint32_t zy = at / kMostTiles;
+      const uint32_t xyz[3] = {at - zy * kMostTiles, zy % kMostTiles, zy / kMostTiles};
+      bool inside = true;
+      int32_t tile = first;
+      for (int r = 0; r < 3; ++r) {
+        const auto i = static_cast<int32_t>(xyz[r]);
+        tile += i * grid.tile_step[r];
+        if (!whole) {
+          inside &= tiles.tile[r] + i >= 0 && (tiles.tile[r] + i) * kTileSize < grid.voxels[r];
         }
       }
+      if (!inside) continue;
+      to[size] = static_cast<uint32_t>(tile);
+      items[size] = item;
+      size += owned[tile] != 0;
     }
   }
+  found.size = size;
 }
 
-// Marks the tiles of singles; there is room behind them.
-HWY_ATTR HWY_INLINE void MarkSingles(const uint32_t* singles, size_t count, TileMarks& marks) {
-  const DW d;
-  HWY_ALIGN uint32_t at[kVectorRoom];
-  const auto off = hn::Set(d, static_cast<uint32_t>(marks.off[0] | marks.off[1] << 8 |
-                                                    marks.off[2] << 16));
-  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VW voxel = hn::Add(hn::LoadU(d, singles + i), off);
-    const VW x = hn::And(hn::ShiftRight<kTileBits>(voxel), hn::Set(d, 0xF)),
-             y = hn::And(hn::ShiftRight<kTileBits + 8>(voxel), hn::Set(d, 0xF)),
-             z = hn::ShiftRight<kTileBits + 16>(voxel);
-    hn::Store(hn::Add(x, hn::Add(hn::Mul(y, hn::Set(d, 5)), hn::Mul(z, hn::Set(d, 25)))), d, at);
-    for (size_t lane = 0; lane < std::min(hn::Lanes(d), count - i); ++lane) {
-      marks.hit[at[lane]] = 1;
-    }
+// The face along axis a; `whole`: and what else belongs to the triangle.
+HWY_ATTR HWY_INLINE void MakeFace(const SmallTriangle& t, int a, bool whole, TriangleRuns& face,
+                                  TileHits& tiles) {
+  int u = (a + 1) % 3, v = (a + 2) % 3;
+  if (t.size[u] > t.size[v]) std::swap(u, v);  // few rows
+  const int32_t sign = t.n[a] < 0 ? -1 : 1;
+  std::copy_n(t.origin, 3, face.origin);
+  face.word = t.word;
+  face.divisor = t.n[a] * sign;
+  face.step_u = -t.n[u] * sign;
+  face.step_v = -t.n[v] * sign;
+  face.numerator = int64_t{face.divisor} * t.p[0][a] + int64_t{face.step_u} * (128 - t.p[0][u]) +
+                   int64_t{face.step_v} * (128 - t.p[0][v]);
+  const double inverse = 1.0 / face.divisor;
+  uint32_t err = 0;
+  face.depth = CeilFixed(face.numerator, kDepthBits - 8, face.divisor, inverse, 1, &err);
+  face.fall_u = CeilFixed(face.step_u, kDepthBits, face.divisor, inverse,
+                          static_cast<uint32_t>(t.size[u]), &err);
+  face.fall_v = CeilFixed(face.step_v, kDepthBits, face.divisor, inverse,
+                          static_cast<uint32_t>(t.size[v]), &err);
+  face.err = err;
+  face.a = static_cast<uint8_t>(a);
+  face.u = static_cast<uint8_t>(u);
+  face.v = static_cast<uint8_t>(v);
+  face.rows = static_cast<uint8_t>(t.size[u]);
+  face.stride = static_cast<uint8_t>((t.size[u] + 15) & ~15);
+  face.tiles = static_cast<uint8_t>(tiles.count[v]);
+  tiles.hits[0] = tiles.hits[1] = 0;
+  const auto lines_along = [&](int r) {
+    return whole && t.n[r] != 0 && t.n[r] != t.n[a] && t.n[r] != -t.n[a];
+  };
+  EdgeFunction edges[3];
+  EdgeFunction::Set(t, a, u, v, edges);
+  if (HWY_LIKELY(lines_along(v))) {
+    const LineTest lines(t, face, inverse, u, v);
+    SetColumns(RunFinder(edges, t.size[v]), &lines, face, tiles);
+  } else {
+    SetColumns(RunFinder(edges, t.size[v]), nullptr, face, tiles);
   }
-}
-
-// Appends a face and its tiles.
-HWY_ATTR HWY_INLINE void PutFace(const TriangleRuns& face, const TriangleParts& parts,
-                                 uint32_t part, const WalkGrid& grid, const uint8_t* owned,
-                                 TileMarks& marks, TriangleMemory& memory, FoundSpans& found) {
-  std::fill(marks.hit, marks.hit + sizeof(marks.hit), uint8_t{0});
-  MarkFace(face, parts.runs, marks);
-  MarkSingles(parts.singles, face.singles, marks);
-  const size_t run_bytes = (size_t{face.rows} + 1) / 2 * 4;
-  const size_t units = 1 + (run_bytes + face.singles * sizeof(uint32_t) + 63) / 64;
-  memory.units.Reserve(memory.size, units + 1);  // and what is read beyond the last
-  TriangleRuns* const to = memory.units.data() + memory.size;
-  *to = face;
-  auto* const behind = reinterpret_cast<std::byte*>(to + 1);
-  std::memcpy(behind, parts.runs, run_bytes);
-  std::memcpy(behind + run_bytes, parts.singles, face.singles * sizeof(uint32_t));
-  const BinItem item = BinItem::Span(static_cast<uint32_t>(memory.size), part, 1);
-  memory.size += units;
-
-  int32_t lo[3], hi[3];
-  size_t most = 1;
-  for (int r = 0; r < 3; ++r) {
-    const int32_t tiles = (grid.voxels[r] + kTileSize - 1) >> kTileBits;
-    lo[r] = std::max(0, -marks.origin[r]);
-    hi[r] = std::min(marks.count[r], tiles - marks.origin[r]);
-    if (lo[r] >= hi[r]) return;
-    most *= static_cast<size_t>(hi[r] - lo[r]);
+  if (HWY_LIKELY(lines_along(u))) {
+    for (EdgeFunction& e : edges) std::swap(e.by_k, e.by_j);
+    AddLinesAlongRows(RunFinder(edges, t.size[u]), LineTest(t, face, inverse, v, u), t.size[v],
+                      face, tiles);
   }
-  found.tiles.Reserve(found.size, most);
-  found.items.Reserve(found.size, most);
-  for (int32_t z = lo[2]; z < hi[2]; ++z) {
-    for (int32_t y = lo[1]; y < hi[1]; ++y) {
-      for (int32_t x = lo[0]; x < hi[0]; ++x) {
-        const auto tile = static_cast<uint32_t>((marks.origin[0] + x) * grid.tile_step[0] +
-                                                (marks.origin[1] + y) * grid.tile_step[1] +
-                                                (marks.origin[2] + z) * grid.tile_step[2]);
-        found.tiles.data()[found.size] = tile;
-        found.items.data()[found.size] = item;
-        found.size += (marks.hit[x + 5 * y + 25 * z] & (owned[tile] != 0));
-      }
-    }
-  }
+  std::fill_n(face.vertices(), 4, TriangleRuns::kNoVertex);
+  if (whole) AddVertices(t, face, tiles);
 }
 
 HWY_ATTR inline void FindTrianglesIn(const SmallTriangle* triangles, size_t count, uint32_t part,
                                      const WalkGrid& grid, const uint8_t* owned,
                                      TriangleMemory& memory, FoundSpans& found) {
-  TriangleParts parts;
-  TileMarks marks;
+  TileHits tiles;
   for (const SmallTriangle* end = triangles + count; triangles != end; ++triangles) {
     const SmallTriangle& t = *triangles;
-    marks.Set(t);
+    tiles.Set(t);
     int32_t greatest = 0;
     for (int32_t n : t.n) greatest = std::max(greatest, n < 0 ? -n : n);
-    parts.single_count = 0;
-    bool first_face = true;
+    bool whole = true;
     for (int a = 0; a < 3; ++a) {
       if (t.n[a] != greatest && t.n[a] != -greatest) continue;
-      int u = (a + 1) % 3, v = (a + 2) % 3;
-      if (t.size[u] > t.size[v]) std::swap(u, v);  // few rows
-      const int64_t sign = t.n[a] < 0 ? -1 : 1, n_u = t.n[u] * sign, n_v = t.n[v] * sign;
-      const double inverse = 1.0 / greatest;
-      TriangleRuns face;
-      std::copy_n(t.origin, 3, face.origin);
-      face.word = t.word;
-      face.numerator = int64_t{greatest} * t.p[0][a] - n_u * (128 - t.p[0][u]) -
-                       n_v * (128 - t.p[0][v]);
-      face.step_u = static_cast<int32_t>(-n_u);
-      face.step_v = static_cast<int32_t>(-n_v);
-      face.divisor = greatest;
-      face.err = 0;
-      face.depth = static_cast<uint32_t>(
-          CeilFixed(face.numerator, kDepthBits - 8, greatest, inverse, 1, &face.err));
-      face.fall_u = static_cast<uint32_t>(CeilFixed(-n_u, kDepthBits, greatest, inverse,
-                                                    static_cast<uint32_t>(t.size[u]), &face.err));
-      face.fall_v = static_cast<uint32_t>(CeilFixed(-n_v, kDepthBits, greatest, inverse,
-                                                    static_cast<uint32_t>(t.size[v]), &face.err));
-      face.a = static_cast<uint8_t>(a);
-      face.u = static_cast<uint8_t>(u);
-      face.v = static_cast<uint8_t>(v);
-      face.rows = static_cast<uint8_t>(t.size[u]);
-      Plane plane;
-      plane.numerator = static_cast<double>(face.numerator);
-      plane.divisor = 256.0 * greatest;
-      plane.inverse = inverse / 256;
-      const auto lines = [&](int r) {
-        return first_face && t.n[r] != 0 && t.n[r] != greatest && t.n[r] != -greatest;
-      };
-      plane.by_k = -256.0 * static_cast<double>(n_u);
-      plane.by_j = -256.0 * static_cast<double>(n_v);
-      FindRuns(t, a, u, v, plane, lines(v), parts.runs, parts);
-      if (lines(u)) {
-        std::swap(plane.by_k, plane.by_j);
-        FindRuns(t, a, v, u, plane, true, nullptr, parts);
-      }
-      if (first_face) {
-        for (const int32_t(&p)[3] : t.p) {
-          parts.singles[parts.single_count++] =
-              static_cast<uint32_t>(p[0] >> 8 | (p[1] >> 8) << 8 | (p[2] >> 8) << 16);
-        }
-      }
-      face.singles = first_face ? static_cast<uint16_t>(parts.single_count) : uint16_t{0};
-      PutFace(face, parts, part, grid, owned, marks, memory, found);
-      first_face = false;
+      memory.units.Reserve(memory.size, TriangleRuns::kMostUnits);
+      TriangleRuns& face = memory.units.data()[memory.size];
+      MakeFace(t, a, whole, face, tiles);
+      PutItems(tiles, BinItem::Span(static_cast<uint32_t>(memory.size), part, 1), grid, owned,
+               found);
+      memory.size += face.units();
+      whole = false;
     }
   }
 }

@@ -12,145 +12,132 @@ HWY_BEFORE_NAMESPACE();
 namespace voxeld::gpu {
 namespace HWY_NAMESPACE {
 
-// Words of one face in a tile.
+// Places in a tile, those of each face one behind the other, before they are raised: in groups of four with a word each.
 struct FacePlaces {
-  static constexpr size_t kMost = kTileSize * kTileSize + 4 * 64 + 3;
-  static constexpr size_t kRoom = 32;
+  static constexpr size_t kGroup = 4;
+  static constexpr size_t kFull = 512;
+  static constexpr size_t kMostOfFace = kTileSize * kTileSize + 3;
+  static constexpr size_t kSize = kFull + kMostOfFace + 64;
 
-  HWY_ALIGN uint32_t at[kMost + kRoom];
+  HWY_ALIGN uint32_t at[kSize];
+  HWY_ALIGN uint32_t words[kSize / kGroup];
   size_t size = 0;
+
+  // Ends a face, of which the places from `begin` on are: with its last one again, up to a whole group.
+  HWY_ATTR HWY_INLINE void EndFace(size_t begin, uint32_t word) {
+    if (size == begin) return;
+    const DW d;
+    const hn::CappedTag<uint32_t, kGroup> group;
+    const size_t groups = (size + kGroup - 1) / kGroup;
+    const auto last = hn::Set(group, at[size - 1]);
+    for (size_t i = 0; i < kGroup; i += hn::Lanes(group)) hn::StoreU(last, group, at + size + i);
+    const VW all = hn::Set(d, word);
+    size_t i = begin / kGroup;
+    do {
+      hn::StoreU(all, d, words + i);
+      i += hn::Lanes(d);
+    } while (i < groups);
+    size = groups * kGroup;
+  }
 };
 
-HWY_ATTR HWY_INLINE void RaisePlaces(const FacePlaces& places, uint32_t word, uint32_t* words) {
+HWY_ATTR HWY_INLINE void RaisePlaces(FacePlaces& places, uint32_t* words) {
   const hn::CappedTag<uint32_t, 1> d;  // without a branch that nobody could foresee
-  const auto raised = hn::Set(d, word);
-  const auto raise = [&](size_t i) HWY_ATTR {
-    uint32_t* const at = words + places.at[i];
-    hn::StoreU(hn::Max(hn::LoadU(d, at), raised), d, at);
-  };
-  size_t i = 0;
-  for (; i + 4 <= places.size; i += 4) {
-    raise(i);
-    raise(i + 1);
-    raise(i + 2);
-    raise(i + 3);
+  for (size_t i = 0; i < places.size; i += FacePlaces::kGroup) {
+    const auto word = hn::Set(d, places.words[i / FacePlaces::kGroup]);
+    for (size_t j = i; j < i + FacePlaces::kGroup; ++j) {
+      uint32_t* const at = words + places.at[j];
+      hn::StoreU(hn::Max(hn::LoadU(d, at), word), d, at);
+    }
   }
-  for (; i < places.size; ++i) raise(i);
+  places.size = 0;
 }
 
-// Columns `first` on, `count` of them, in row k of a face, by the definition's division.
-HWY_NOINLINE inline void PlaceExactly(const TriangleRuns& face, int32_t k, int32_t first,
-                                      int32_t count, int32_t from_a, int32_t size_a,
-                                      uint32_t at_first, FacePlaces& places) {
+// The columns of row k of a face, in the tile that begins at voxel `from`, by the definition's division.
+HWY_NOINLINE inline void PlaceExactly(const TriangleRuns& face, int32_t k, uint32_t columns,
+                                      const int32_t from[3], const int32_t size[3],
+                                      FacePlaces& places) {
   const int64_t divisor = int64_t{face.divisor} * 256;
-  for (int32_t lane = 0; lane < count; ++lane) {
+  for (; columns != 0; columns &= columns - 1) {
+    const int column = std::countr_zero(columns);
     const int64_t numerator = face.numerator + int64_t{face.step_u} * 256 * k +
-                              int64_t{face.step_v} * 256 * (first + lane);
-    const int64_t above = FloorDiv(numerator, divisor) - from_a;
-    if (above < 0 || above >= size_a) continue;
-    places.at[places.size++] = at_first + (static_cast<uint32_t>(lane) << (4 * face.v)) +
-                               (static_cast<uint32_t>(above) << (4 * face.a));
+                              int64_t{face.step_v} * 256 * (from[face.v] + column);
+    const int64_t above = FloorDiv(numerator, divisor) - from[face.a];
+    if (above < 0 || above >= size[face.a]) continue;
+    places.at[places.size++] =
+        static_cast<uint32_t>((k - from[face.u]) << (4 * face.u) | column << (4 * face.v) |
+                              static_cast<int>(above) << (4 * face.a));
   }
 }
 
 // What of a face lies in the tile that begins at voxel `from`, counted from the face's origin, and has `size` voxels.
 HWY_ATTR HWY_INLINE void PlaceFace(const TriangleRuns& face, const int32_t from[3],
                                    const int32_t size[3], FacePlaces& places) {
-  const DW du;
-  const hn::RebindToSigned<DW> d;
-  const hn::Rebind<uint16_t, DW> d16;
+  const DW d;
   const auto lanes = static_cast<int32_t>(hn::Lanes(d));
   const int a = face.a, u = face.u, v = face.v;
-  const int32_t k_begin = std::max(0, from[u]),
-                k_end = std::min<int32_t>(face.rows, from[u] + size[u]);
-  HWY_ALIGN uint32_t depths[kTileSize + 16], at_first[kTileSize + 16];
-  HWY_ALIGN int32_t firsts[kTileSize + 16], counts[kTileSize + 16];
-  // Where each row's run begins.
-  const auto depth0 =
-      hn::Set(du, face.depth - (static_cast<uint32_t>(from[a]) << kDepthBits));
-  const auto iota = hn::Iota(d, 0);
-  for (int32_t row = k_begin; row < k_end; row += lanes) {
-    const auto k = hn::Add(hn::Set(d, row), iota);
-    const auto run = hn::PromoteTo(du, hn::LoadU(d16, face.runs() + row));
-    const auto first = hn::Max(hn::BitCast(d, hn::And(run, hn::Set(du, 0xFF))),
-                               hn::Set(d, from[v]));
-    const auto end = hn::Min(hn::BitCast(d, hn::ShiftRight<8>(run)),
-                             hn::Set(d, from[v] + size[v]));
-    const auto depth = hn::Add(
-        depth0, hn::Add(hn::Mul(hn::BitCast(du, k), hn::Set(du, face.fall_u)),
-                        hn::Mul(hn::BitCast(du, first), hn::Set(du, face.fall_v))));
-    const auto at =
-        hn::Add(hn::ShiftLeftSame(hn::Sub(k, hn::Set(d, from[u])), 4 * u),
-                hn::ShiftLeftSame(hn::Sub(first, hn::Set(d, from[v])), 4 * v));
-    hn::StoreU(depth, du, depths + (row - k_begin));
-    hn::StoreU(hn::BitCast(du, at), du, at_first + (row - k_begin));
-    hn::StoreU(first, d, firsts + (row - k_begin));
-    hn::StoreU(hn::Sub(end, first), d, counts + (row - k_begin));
-  }
-  const auto fall = hn::Mul(hn::BitCast(du, iota), hn::Set(du, face.fall_v));
-  const auto in_lane = hn::ShiftLeftSame(hn::BitCast(du, iota), 4 * v);
-  const auto all_fall = hn::Set(du, face.fall_v * static_cast<uint32_t>(lanes));
-  const auto all_lane = hn::Set(du, static_cast<uint32_t>(lanes) << (4 * v));
-  const auto err = hn::Set(du, face.err << (32 - kDepthBits));
-  const auto size_a = hn::Set(du, static_cast<uint32_t>(size[a]));
-  size_t placed = places.size;
-  for (int32_t row = 0; row < k_end - k_begin; ++row) {
-    int32_t count = counts[row];
-    if (count <= 0) continue;
-    auto depth = hn::Add(hn::Set(du, depths[row]), fall);
-    auto at = hn::Add(hn::Set(du, at_first[row]), in_lane);
-    for (int32_t done = 0;; done += lanes) {
-      const auto above = hn::ShiftRight<kDepthBits>(depth);
-      const auto inside = hn::RebindMask(du, hn::Lt(iota, hn::Set(d, count)));
+  const int32_t begin = std::max(0, from[u]), end = std::min<int32_t>(face.rows, from[u] + size[u]);
+  const uint16_t* const columns =
+      face.columns((from[v] + (face.origin[v] & (kTileSize - 1))) >> kTileBits);
+  const uint32_t in_volume = (uint32_t{1} << size[v]) - 1;
+  const VW iota = hn::Iota(d, 0);
+  const VW fall_u = hn::Set(d, face.fall_u), row_step = hn::Set(d, uint32_t{1} << (4 * u));
+  const VW err = hn::Set(d, face.err << (32 - kDepthBits));
+  const VW size_a = hn::Set(d, static_cast<uint32_t>(size[a]));
+  for (int32_t lane = 0; lane < kTileSize; lane += lanes) {
+    VW depth = hn::Add(hn::Set(d, face.depth - (static_cast<uint32_t>(from[a]) << kDepthBits) +
+                                      static_cast<uint32_t>(begin) * face.fall_u +
+                                      static_cast<uint32_t>(from[v] + lane) * face.fall_v),
+                       hn::Mul(iota, hn::Set(d, face.fall_v)));
+    VW at =
+        hn::Add(hn::Set(d, static_cast<uint32_t>((begin - from[u]) << (4 * u) | lane << (4 * v))),
+                hn::ShiftLeftSame(iota, 4 * v));
+    size_t placed = places.size;
+    for (int32_t k = begin; k < end; ++k) {
+      const uint64_t bits = (columns[k] & in_volume) >> lane;
+      const auto inside = hn::LoadMaskBits(d, reinterpret_cast<const uint8_t*>(&bits));
+      const VW above = hn::ShiftRight<kDepthBits>(depth);
       const auto close = hn::Lt(hn::ShiftLeft<32 - kDepthBits>(depth), err);
-      if (HWY_UNLIKELY(!hn::AllFalse(du, hn::And(inside, close)))) {
+      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(inside, close)))) {
         places.size = placed;
-        PlaceExactly(face, k_begin + row, firsts[row] + done, std::min(count, lanes), from[a],
-                     size[a],
-                     at_first[row] + (static_cast<uint32_t>(done) << (4 * v)), places);
+        PlaceExactly(face, k, (static_cast<uint32_t>(bits) & ((uint32_t{1} << lanes) - 1)) << lane,
+                     from, size, places);
         placed = places.size;
       } else {
         const auto drawn = hn::And(inside, hn::Lt(above, size_a));
-        const auto voxel = hn::Add(at, hn::ShiftLeftSame(above, 4 * a));
         // Not CompressStore, which some processors do word by word.
-        hn::StoreU(hn::Compress(voxel, drawn), du, places.at + placed);
-        placed += hn::CountTrue(du, drawn);
+        hn::StoreU(hn::Compress(hn::Add(at, hn::ShiftLeftSame(above, 4 * a)), drawn), d,
+                   places.at + placed);
+        placed += hn::CountTrue(d, drawn);
       }
-      count -= lanes;
-      if (HWY_LIKELY(count <= 0)) break;
-      depth = hn::Add(depth, all_fall);
-      at = hn::Add(at, all_lane);
+      depth = hn::Add(depth, fall_u);
+      at = hn::Add(at, row_step);
     }
+    places.size = placed;
   }
-  places.size = placed;
 }
 
-HWY_ATTR HWY_INLINE void PlaceSingles(const TriangleRuns& face, const int32_t from[3],
-                                      const int32_t size[3], FacePlaces& places) {
-  const DW d;
+HWY_ATTR HWY_INLINE void PlaceVertices(const TriangleRuns& face, const int32_t from[3],
+                                       const int32_t size[3], FacePlaces& places) {
+  const hn::CappedTag<uint32_t, 4> d;
   // Eight bits an axis, 64 too many so that none is negative: in the tile from 64 to 79.
   uint32_t base = 0, short_by = 0;
   for (int r = 0; r < 3; ++r) {
     base += static_cast<uint32_t>(64 - from[r]) << (8 * r);
     short_by += static_cast<uint32_t>(kTileSize - size[r]) << (8 * r);
   }
-  const VW to_tile = hn::Set(d, base), to_end = hn::Set(d, short_by);
-  const VW in_tile = hn::Set(d, 0x404040), outside = hn::Set(d, 0xF0F0F0), zero = hn::Zero(d);
-  const VW x = hn::Set(d, 0xF), y = hn::Set(d, 0xF0), z = hn::Set(d, 0xF00);
-  const VW count = hn::Set(d, static_cast<uint32_t>(face.singles)), iota = hn::Iota(d, 0);
-  const uint32_t* const voxels = face.voxels();
-  size_t placed = places.size;
-  for (uint32_t i = 0; i < face.singles; i += static_cast<uint32_t>(hn::Lanes(d))) {
-    const VW voxel = hn::Add(hn::LoadU(d, voxels + i), to_tile);
-    const VW beyond = hn::Or(hn::Xor(voxel, in_tile), hn::Xor(hn::Add(voxel, to_end), in_tile));
-    const auto drawn = hn::And(hn::Eq(hn::And(beyond, outside), zero),
-                               hn::Lt(hn::Add(hn::Set(d, i), iota), count));
-    const VW at = hn::Or(hn::And(voxel, x), hn::Or(hn::And(hn::ShiftRight<4>(voxel), y),
-                                                   hn::And(hn::ShiftRight<8>(voxel), z)));
-    hn::StoreU(hn::Compress(at, drawn), d, places.at + placed);
-    placed += hn::CountTrue(d, drawn);
+  const auto in_tile = hn::Set(d, 0x404040);
+  for (size_t i = 0; i < 4; i += hn::Lanes(d)) {
+    const auto voxel = hn::Add(hn::LoadU(d, face.vertices() + i), hn::Set(d, base));
+    const auto beyond =
+        hn::Or(hn::Xor(voxel, in_tile), hn::Xor(hn::Add(voxel, hn::Set(d, short_by)), in_tile));
+    const auto drawn = hn::Eq(hn::And(beyond, hn::Set(d, 0xF0F0F0)), hn::Zero(d));
+    const auto at = hn::Or(hn::And(voxel, hn::Set(d, 0xF)),
+                           hn::Or(hn::And(hn::ShiftRight<4>(voxel), hn::Set(d, 0xF0)),
+                                  hn::And(hn::ShiftRight<8>(voxel), hn::Set(d, 0xF00))));
+    hn::StoreU(hn::Compress(at, drawn), d, places.at + places.size);
+    places.size += hn::CountTrue(d, drawn);
   }
-  places.size = placed;
 }
 
 HWY_ATTR inline void DrawTrianglesIn(const TriangleMemory* parts, std::span<const BinItem> items,
@@ -174,14 +161,16 @@ HWY_ATTR inline void DrawTrianglesIn(const TriangleMemory* parts, std::span<cons
     const TriangleRuns& face = parts[item.first()].units.data()[item.item];
     int32_t from[3];
     for (int r = 0; r < 3; ++r) from[r] = lo[r] - face.origin[r];
-    places.size = 0;
+    const size_t begin = places.size;
     PlaceFace(face, from, size, places);
-    PlaceSingles(face, from, size, places);
-    RaisePlaces(places, face.word, words);
+    PlaceVertices(face, from, size, places);
     if (few) {
-      for (size_t p = 0; p < places.size; ++p) touched.Add(places.at[p]);
+      for (size_t p = begin; p < places.size; ++p) touched.Add(places.at[p]);
     }
+    places.EndFace(begin, face.word);
+    if (places.size >= FacePlaces::kFull) RaisePlaces(places, words);
   }
+  RaisePlaces(places, words);
 }
 
 inline const char* TriangleTargetIn() { return hwy::TargetName(HWY_TARGET); }

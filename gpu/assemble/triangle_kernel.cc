@@ -1,6 +1,7 @@
 #include "gpu/assemble/triangle_kernel.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <utility>
 

@@ -6,29 +6,31 @@
 // *face*. A line along v through the centre of voxel (k, j, i) that meets the triangle t from that centre, −½ ≤ t < ½, is
 // t·|n_v/n_a| < ½ away from it along a if |n_v| < |n_a|: so i is ⌊depth⌋ of column j, too. That point lies over row k at
 // j + t. So if the run does not have column j, then j is first − 1 or end: what lines along v add to a face are at
-// most two voxels a row, what lines along u add at most two a column, and each of those is tested by the definition.
-// These and the vertices' voxels are the triangle's *singles*. Where |n_v| = |n_a| the lines along v make another face.
+// most two voxels a row, which make the run longer, and what lines along u add at most two a column: all of them at the
+// depth of their columns. Where |n_v| = |n_a| the lines along v make another face. Voxels of vertices that are not at the
+// depth of their columns are kept by themselves.
 //
 // Whole numbers: vertices are below 2¹⁴ units, n below 2²⁹, edge functions at any voxel of the bounds below 2³⁰, and the
-// depth's numerator N = |n_a|·depth below 2⁴⁵: exact in double. ⌊x/d⌋ of whole numbers is ⌊(x + ½)·(1/d)⌋ in double: the
+// depth's numerator N = |n_a|·depth below 2⁴⁵. ⌊x/d⌋ of whole numbers, x below 2⁴⁵, is ⌊(x + ½)·(1/d)⌋ in double: the
 // argument is at least ½/d away from whole numbers and off by less than 2⁴⁵·2⁻⁵⁰/d.
 //
-// Depths in a tile: D(k, j) = depth + k·fall_u + j·fall_v in 2⁻²⁵ voxel, modulo 2³². The three are rounded up, so
+// Depths: D(k, j) = depth + k·fall_u + j·fall_v in 2⁻²⁵ voxel, modulo 2³². The three are rounded up, so
 // 0 ≤ D − true < err, err the number of roundings that were not exact: one for the start, one for each row and each column
-// at most. D lies in the same voxel as the true depth unless its fraction is below err; there, in a column of four millions
-// or where a plane falls by thirds of voxels and touches corners, the definition's division decides.
+// at most. D lies in the same voxel as the true depth unless its fraction is below err; there, in a column of hundreds of
+// thousands or where a plane falls by thirds of voxels and meets corners, the definition's division decides.
 #pragma once
 
 #include <cstdint>
 
 #include "gpu/assemble/buffer.h"
+#include "gpu/primitives/grid.h"
 
 namespace voxeld::gpu {
 
 inline constexpr int kDepthBits = 25;
 
-// A face. Behind it `rows` runs (a 16-bit word each: first in the lower, end in the upper half, ≤ 64), then, from the
-// next multiple of four bytes on, `singles` voxels of eight bits an axis. Axes as in WalkGrid; voxels from `origin`.
+// A face. Behind it are four vertices; then, for each tile along v from the one that holds the origin on, `stride` rows of 16
+// columns (bit 0 the tile's first): those that have a voxel. Axes as in WalkGrid; voxels from `origin`.
 struct alignas(64) TriangleRuns {
   int32_t origin[3];
   uint32_t word;
@@ -37,12 +39,22 @@ struct alignas(64) TriangleRuns {
   int32_t step_u, step_v;               // N's, in voxels: times 256
   int32_t divisor;                      // |n_a|: times 256
   uint8_t a, u, v, rows;
-  uint16_t singles;
+  uint8_t stride;  // `rows`, up to a multiple of 16
+  uint8_t tiles;
 
-  const uint16_t* runs() const { return reinterpret_cast<const uint16_t*>(this + 1); }
-  const uint32_t* voxels() const {
-    return reinterpret_cast<const uint32_t*>(runs() + (rows + 1) / 2 * 2);
+  // Voxels of vertices that no column has, eight bits an axis; or none. The last is none.
+  static constexpr uint32_t kNoVertex = 0x808080;
+  const uint32_t* vertices() const { return reinterpret_cast<const uint32_t*>(this + 1); }
+  uint32_t* vertices() { return reinterpret_cast<uint32_t*>(this + 1); }
+
+  const uint16_t* columns(int32_t tile) const {
+    return reinterpret_cast<const uint16_t*>(vertices() + 4) + tile * stride;
   }
+  uint16_t* columns(int32_t tile) {
+    return reinterpret_cast<uint16_t*>(vertices() + 4) + tile * stride;
+  }
+  size_t units() const { return 1 + (16 + size_t{tiles} * stride * 2 + 63) / 64; }
+  static constexpr size_t kMostUnits = 1 + (16 + 5 * 64 * 2 + 63) / 64;
 };
 static_assert(sizeof(TriangleRuns) == 64);
 

@@ -211,13 +211,14 @@ void ExpectAsDefined(const Triangle& t, const TileGrid& grid, uint64_t* small, u
     want[grid.TileOf(x, y, z)].at[grid.IndexInTile(x, y, z)] = kWord;
   });
   *lit += want.size();
+  std::map<uint32_t, TileRows> rows;
   for (size_t i = 0; i < found.size; ++i) {
     const uint32_t tile = found.tiles.data()[i];
     ASSERT_LT(tile, grid.count());
     const Box3 box = grid.VoxelsOf(tile);
     int32_t lo[3], hi[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
-    TileRows touched;
+    TileRows& touched = rows[tile];
     Words& words = got[tile];
     DrawTriangles({&memory, 1}, {found.items.data() + i, 1}, lo, hi, words.at, touched);
     ASSERT_TRUE(Holds(touched, words)) << "tile " << tile;
@@ -232,7 +233,7 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
   ForEachVectorTarget(TriangleTarget, [&] {
     Random random(seed);
     uint64_t small = 0, lit = 0;
-    for (int i = 0; i < 4000; ++i) {
+    for (int i = 0; i < 6000; ++i) {
       const TileGrid grid = TileGrid::Of(37, 48, 33, i % 3);
       const int64_t extent = i % 4 == 0 ? 62 : i % 4 == 1 ? 3 : 20;
       Triangle t;
@@ -249,8 +250,45 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
         return;
       }
     }
-    EXPECT_GT(small, 3000u);
-    EXPECT_GT(lit, 2000u);
+    EXPECT_GT(small, 5000u);
+    EXPECT_GT(lit, 3000u);
+  });
+}
+
+// Corners on corners, centres and quarters of voxels, where depths are whole numbers and edges run through centres; and
+// planes that rise as fast along two axes or three.
+TEST(SmallTriangles, OfRoundPlacesEqualTheirDefinition) {
+  const uint64_t seed = Seed();
+  ForEachVectorTarget(TriangleTarget, [&] {
+    Random random(seed);
+    uint64_t small = 0, lit = 0;
+    for (int i = 0; i < 9000; ++i) {
+      const TileGrid grid = TileGrid::Of(40, 40, 40, i % 3);
+      const int64_t unit = i % 5 == 0 ? 64 : 128, offset = i % 2 == 0 ? 0 : 128;
+      const int64_t extent = (i % 3 == 0 ? 4 : i % 3 == 1 ? 12 : 30) * 256 / unit;
+      Triangle t;
+      for (int a = 0; a < 3; ++a) {
+        for (Int3& v : t.v) v[a] = 5 * 256 + offset + random.Int(0, extent) * unit;
+      }
+      if (i % 7 < 3) {
+        // Edges of the same length along two axes, up or down.
+        const int64_t p = random.Int(-extent, extent) / 2 * unit,
+                      q = random.Int(-extent, extent) / 2 * unit;
+        const Int3 c{{20 * 256 + offset, 20 * 256 + offset, 20 * 256 + offset}};
+        t.v[0] = t.v[1] = t.v[2] = c;
+        t.v[1][i % 3] += p;
+        t.v[1][(i + 1) % 3] += random.Int(0, 1) == 0 ? p : -p;
+        t.v[2][(i + 1 + i % 2) % 3] += q;
+        t.v[2][(i + 2) % 3] += random.Int(0, 1) == 0 ? q : -q;
+      }
+      ExpectAsDefined(t, grid, &small, &lit);
+      if (testing::Test::HasFatalFailure()) {
+        ADD_FAILURE() << "triangle " << i;
+        return;
+      }
+    }
+    EXPECT_GT(small, 7000u);
+    EXPECT_GT(lit, 7000u);
   });
 }
 
