@@ -174,6 +174,7 @@ struct TileHits {
   int32_t tile[3], count[3];  // the first, and how many
   int32_t off[3];             // of the origin in its tile
   uint64_t hits[2];
+  HWY_ALIGN uint16_t rows[128];  // of each those with columns
 
   HWY_INLINE void Set(const SmallTriangle& t) {
     for (int r = 0; r < 3; ++r) {
@@ -182,8 +183,16 @@ struct TileHits {
       count[r] = (off[r] + t.size[r] + kTileSize - 1) >> kTileBits;
     }
   }
-  HWY_INLINE void Hit(int32_t at, bool is_hit = true) {
-    hits[at >> 6] |= uint64_t{is_hit} << (at & 63);
+  HWY_INLINE void Clear() {
+    hits[0] = hits[1] = 0;
+    std::fill_n(rows, 128, uint16_t{0});
+  }
+  HWY_INLINE void HitRows(int32_t at, uint64_t bits) {
+    rows[at] = static_cast<uint16_t>(rows[at] | bits);
+    hits[at >> 6] |= uint64_t{(bits & 0xFFFF) != 0} << (at & 63);
+  }
+  HWY_INLINE uint64_t RowBit(int u, int32_t k) const {
+    return uint64_t{1} << ((k + off[u]) & (kTileSize - 1));
   }
   // The voxel at i along axis r.
   HWY_INLINE int32_t At(int r, int32_t i) const { return ((i + off[r]) >> kTileBits) * kStep[r]; }
@@ -248,8 +257,8 @@ HWY_ATTR HWY_INLINE void SetColumns(const RunFinder& runs, const LineTest* lines
         hn::StoreMaskBits(d, meets, reinterpret_cast<uint8_t*>(&rows));
         rows = (rows & ((uint64_t{1} << lanes) - 1)) << row_in_tile;
         const int32_t at = at_row + tv * tiles.kStep[v] + ta * tiles.kStep[a];
-        tiles.Hit(at, (rows & 0xFFFF) != 0);
-        tiles.Hit(at + tiles.kStep[u], rows >> kTileSize != 0);
+        tiles.HitRows(at, rows);
+        tiles.HitRows(at + tiles.kStep[u], rows >> kTileSize);
       }
     }
   }
@@ -283,7 +292,8 @@ HWY_ATTR HWY_INLINE void AddLinesAlongRows(const RunFinder& runs, const LineTest
       const uint32_t depth = DepthAt(face, k, at_j);
       const int32_t at = tiles.At(face.u, k) + tiles.At(face.v, at_j);
       for (uint32_t i : {depth, depth - face.err}) {
-        tiles.Hit(at + tiles.At(face.a, std::max(0, static_cast<int32_t>(i) >> kDepthBits)));
+        tiles.HitRows(at + tiles.At(face.a, std::max(0, static_cast<int32_t>(i) >> kDepthBits)),
+                      tiles.RowBit(face.u, k));
       }
     }
   }
@@ -299,12 +309,14 @@ HWY_INLINE void AddVertices(const SmallTriangle& t, TriangleRuns& face, TileHits
     const auto voxel =
         static_cast<uint32_t>(i << (8 * face.a) | k << (8 * face.u) | j << (8 * face.v));
     face.vertices()[n] = at_depth ? TriangleRuns::kNoVertex : voxel;
-    tiles.Hit(tiles.At(face.a, i) + tiles.At(face.u, k) + tiles.At(face.v, j));
+    const int32_t at = tiles.At(face.a, i) + tiles.At(face.u, k) + tiles.At(face.v, j);
+    tiles.HitRows(at, at_depth ? tiles.RowBit(face.u, k) : 0);
+    tiles.hits[at >> 6] |= uint64_t{1} << (at & 63);
   }
 }
 
 // An item for each tile that is hit.
-HWY_INLINE void PutItems(const TileHits& tiles, BinItem item, const WalkGrid& grid,
+HWY_INLINE void PutItems(const TileHits& tiles, uint32_t item, uint32_t part, const WalkGrid& grid,
                          const uint8_t* owned, FoundSpans& found) {
   constexpr size_t kMost = kMostTiles * kMostTiles * kMostTiles;
   found.tiles.Reserve(found.size, kMost);
@@ -336,7 +348,10 @@ HWY_INLINE void PutItems(const TileHits& tiles, BinItem item, const WalkGrid& gr
       }
       if (!inside) continue;
       to[size] = static_cast<uint32_t>(tile);
-      items[size] = item;
+      const uint32_t rows = tiles.rows[at];
+      const int row = std::countr_zero(rows | 1u << 15);
+      items[size] = BinItem::Face(item, part, static_cast<uint32_t>(row),
+                                  static_cast<uint32_t>(std::bit_width(rows >> row)));
       size += owned[tile] != 0;
     }
   }
@@ -370,7 +385,7 @@ HWY_ATTR HWY_INLINE void MakeFace(const SmallTriangle& t, int a, bool whole, Tri
   face.rows = static_cast<uint8_t>(t.size[u]);
   face.stride = static_cast<uint8_t>((t.size[u] + 15) & ~15);
   face.tiles = static_cast<uint8_t>(tiles.count[v]);
-  tiles.hits[0] = tiles.hits[1] = 0;
+  tiles.Clear();
   const auto lines_along = [&](int r) {
     return whole && t.n[r] != 0 && t.n[r] != t.n[a] && t.n[r] != -t.n[a];
   };
@@ -406,8 +421,7 @@ HWY_ATTR inline void FindTrianglesIn(const SmallTriangle* triangles, size_t coun
       memory.units.Reserve(memory.size, TriangleRuns::kMostUnits);
       TriangleRuns& face = memory.units.data()[memory.size];
       MakeFace(t, a, whole, face, tiles);
-      PutItems(tiles, BinItem::Span(static_cast<uint32_t>(memory.size), part, 1), grid, owned,
-               found);
+      PutItems(tiles, static_cast<uint32_t>(memory.size), part, grid, owned, found);
       memory.size += face.units();
       whole = false;
     }

@@ -71,12 +71,14 @@ HWY_NOINLINE inline void PlaceExactly(const TriangleRuns& face, int32_t k, uint3
 }
 
 // What of a face lies in the tile that begins at voxel `from`, counted from the face's origin, and has `size` voxels.
-HWY_ATTR HWY_INLINE void PlaceFace(const TriangleRuns& face, const int32_t from[3],
+HWY_ATTR HWY_INLINE void PlaceFace(const TriangleRuns& face, BinItem item, const int32_t from[3],
                                    const int32_t size[3], FacePlaces& places) {
   const DW d;
   const auto lanes = static_cast<int32_t>(hn::Lanes(d));
   const int a = face.a, u = face.u, v = face.v;
-  const int32_t begin = std::max(0, from[u]), end = std::min<int32_t>(face.rows, from[u] + size[u]);
+  const auto row = static_cast<int32_t>(item.row());
+  const int32_t begin = from[u] + row,
+                end = from[u] + std::min(size[u], row + static_cast<int32_t>(item.rows()));
   const uint16_t* const columns =
       face.columns((from[v] + (face.origin[v] & (kTileSize - 1))) >> kTileBits);
   const uint32_t in_volume = (uint32_t{1} << size[v]) - 1;
@@ -85,35 +87,36 @@ HWY_ATTR HWY_INLINE void PlaceFace(const TriangleRuns& face, const int32_t from[
   const VW err = hn::Set(d, face.err << (32 - kDepthBits));
   const VW size_a = hn::Set(d, static_cast<uint32_t>(size[a]));
   for (int32_t lane = 0; lane < kTileSize; lane += lanes) {
+    const size_t first = places.size;
+    size_t placed = first;
     VW depth = hn::Add(hn::Set(d, face.depth - (static_cast<uint32_t>(from[a]) << kDepthBits) +
                                       static_cast<uint32_t>(begin) * face.fall_u +
                                       static_cast<uint32_t>(from[v] + lane) * face.fall_v),
                        hn::Mul(iota, hn::Set(d, face.fall_v)));
-    VW at =
-        hn::Add(hn::Set(d, static_cast<uint32_t>((begin - from[u]) << (4 * u) | lane << (4 * v))),
-                hn::ShiftLeftSame(iota, 4 * v));
-    size_t placed = places.size;
+    VW at = hn::Add(hn::Set(d, static_cast<uint32_t>(row << (4 * u) | lane << (4 * v))),
+                    hn::ShiftLeftSame(iota, 4 * v));
+    auto unsure = hn::MaskFromVec(hn::Zero(d));
     for (int32_t k = begin; k < end; ++k) {
       const uint64_t bits = (columns[k] & in_volume) >> lane;
       const auto inside = hn::LoadMaskBits(d, reinterpret_cast<const uint8_t*>(&bits));
       const VW above = hn::ShiftRight<kDepthBits>(depth);
       const auto close = hn::Lt(hn::ShiftLeft<32 - kDepthBits>(depth), err);
-      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(inside, close)))) {
-        places.size = placed;
-        PlaceExactly(face, k, (static_cast<uint32_t>(bits) & ((uint32_t{1} << lanes) - 1)) << lane,
-                     from, size, places);
-        placed = places.size;
-      } else {
-        const auto drawn = hn::And(inside, hn::Lt(above, size_a));
-        // Not CompressStore, which some processors do word by word.
-        hn::StoreU(hn::Compress(hn::Add(at, hn::ShiftLeftSame(above, 4 * a)), drawn), d,
-                   places.at + placed);
-        placed += hn::CountTrue(d, drawn);
-      }
+      unsure = hn::Or(unsure, hn::And(inside, close));
+      const auto drawn = hn::And(inside, hn::Lt(above, size_a));
+      // Not CompressStore, which some processors do word by word.
+      hn::StoreU(hn::Compress(hn::Add(at, hn::ShiftLeftSame(above, 4 * a)), drawn), d,
+                 places.at + placed);
+      placed += hn::CountTrue(d, drawn);
       depth = hn::Add(depth, fall_u);
       at = hn::Add(at, row_step);
     }
     places.size = placed;
+    if (HWY_LIKELY(hn::AllFalse(d, unsure))) continue;
+    places.size = first;
+    for (int32_t k = begin; k < end; ++k) {
+      const uint32_t there = ((uint32_t{1} << lanes) - 1) << lane & in_volume;
+      PlaceExactly(face, k, columns[k] & there, from, size, places);
+    }
   }
 }
 
@@ -151,18 +154,18 @@ HWY_ATTR inline void DrawTrianglesIn(const TriangleMemory* parts, std::span<cons
   for (size_t i = 0; i < items.size(); ++i) {
     if (i + kAhead < items.size() && items[i + kAhead].count() != 0) {
       const BinItem& next = items[i + kAhead];
-      const TriangleRuns* const face = parts[next.first()].units.data() + next.item;
+      const TriangleRuns* const face = parts[next.part()].units.data() + next.item;
       hwy::Prefetch(face);
       hwy::Prefetch(face + 1);
       hwy::Prefetch(face + 2);
     }
     const BinItem& item = items[i];
     if (item.count() == 0) continue;
-    const TriangleRuns& face = parts[item.first()].units.data()[item.item];
+    const TriangleRuns& face = parts[item.part()].units.data()[item.item];
     int32_t from[3];
     for (int r = 0; r < 3; ++r) from[r] = lo[r] - face.origin[r];
     const size_t begin = places.size;
-    PlaceFace(face, from, size, places);
+    PlaceFace(face, item, from, size, places);
     PlaceVertices(face, from, size, places);
     if (few) {
       for (size_t p = begin; p < places.size; ++p) touched.Add(places.at[p]);

@@ -14,8 +14,8 @@
 
 namespace voxeld::gpu {
 
-// Appends the runs of `triangles` to `memory`, the `part`-th, and to `found` an item for each of their faces in each of the
-// tiles with owned[tile] != 0 that it may reach: `item` is its place in `memory`, `first` the part, `count` 1.
+// Appends the runs of `triangles` to `memory`, the `part`-th (below 2²⁰), and to `found` an item for each of their faces in
+// each of the tiles with owned[tile] != 0 that it may reach.
 void FindTriangles(std::span<const SmallTriangle> triangles, uint32_t part, const WalkGrid& grid,
                    const uint8_t* owned, TriangleMemory& memory, FoundSpans& found);
 
