@@ -14,9 +14,10 @@ struct SmallTriangle {
 
   int32_t origin[3];  // the voxel of its bounds' lower corner
   int32_t size[3];    // voxels, 1 to 64
-  int32_t p[3][3];    // vertices, units from the origin: 0 ≤ p < 2¹⁴
-  int32_t n[3];       // normal: |n| < 2²⁹
-  uint32_t word;      // of its voxels
+  int32_t
+      p[3][4];  // by axis: vertices, the first again at the end; units from the origin, 0 ≤ p < 2¹⁴
+  int32_t n[3];   // normal: |n| < 2²⁹
+  uint32_t word;  // of its voxels
 
   // False if the triangle is none: large, far away, without area, of several colours, or to be covered. `word` is left to
   // the caller.
@@ -35,16 +36,14 @@ struct SmallTriangle {
       const int64_t origin = VoxelOf(low);
       small.origin[r] = static_cast<int32_t>(origin);
       small.size[r] = static_cast<int32_t>(VoxelOf(high) - origin) + 1;
-      for (int i = 0; i < 3; ++i) {
-        small.p[i][r] = static_cast<int32_t>(t.v[i][a] - origin * kUnitsPerVoxel);
+      for (int i = 0; i < 4; ++i) {
+        small.p[r][i] = static_cast<int32_t>(t.v[i % 3][a] - origin * kUnitsPerVoxel);
       }
     }
     int32_t area = 0;
-    const int32_t(&p)[3][3] = small.p;
     for (int r = 0; r < 3; ++r) {
-      const int b = (r + 1) % 3, c = (r + 2) % 3;
-      small.n[r] =
-          (p[1][b] - p[0][b]) * (p[2][c] - p[0][c]) - (p[1][c] - p[0][c]) * (p[2][b] - p[0][b]);
+      const int32_t *const b = small.p[(r + 1) % 3], *const c = small.p[(r + 2) % 3];
+      small.n[r] = (b[1] - b[0]) * (c[2] - c[0]) - (c[1] - c[0]) * (b[2] - b[0]);
       area |= small.n[r];
     }
     return area != 0;

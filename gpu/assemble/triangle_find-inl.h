@@ -19,6 +19,21 @@ using DH = hn::Rebind<uint16_t, DW>;
 constexpr int kMostTiles = 5;
 constexpr int kVectorRoom = 16;
 
+// Bit i: lane i. What is stored is loaded in the same size, so that it need not wait for the cache.
+HWY_ATTR HWY_INLINE uint32_t BitsOf(hn::Mask<DS> mask) {
+  const DS d;
+  constexpr size_t kLanes = hn::MaxLanes(DS());
+  if constexpr (kLanes > 8) {
+    uint16_t bits;
+    hn::StoreMaskBits(d, mask, reinterpret_cast<uint8_t*>(&bits));
+    return bits;
+  } else {
+    uint8_t bits;
+    hn::StoreMaskBits(d, mask, &bits);
+    return bits & ((1u << kLanes) - 1);
+  }
+}
+
 // x · 2^shift / divisor rounded up, where that is below 2³⁴ and the product below 2⁶³; adds `weight` to `err` if it was
 // rounded.
 HWY_INLINE uint32_t CeilFixed(int64_t x, int shift, int32_t divisor, double inverse,
@@ -32,18 +47,26 @@ HWY_INLINE uint32_t CeilFixed(int64_t x, int shift, int32_t divisor, double inve
   return static_cast<uint32_t>(q + up);
 }
 
-// Twice the signed area of an edge and voxel (k, j) in a projection: base + k·by_k + j·by_j; inside of all three ≥ 0.
-struct EdgeFunction {
-  int32_t base, by_k, by_j;
+using DQ = hn::CappedTag<int32_t, 4>;
 
-  static void Set(const SmallTriangle& t, int along, int k, int j, EdgeFunction edges[3]) {
+// Twice the signed areas of edges and voxel (k, j) in a projection: base + k·by_k + j·by_j; inside of all three ≥ 0.
+struct EdgeFunctions {
+  HWY_ALIGN int32_t base[4], by_k[4], by_j[4];
+
+  HWY_ATTR HWY_INLINE void Set(const SmallTriangle& t, int along, int k, int j) {
+    const DQ d;
     const bool cyclic = j == (along + 1) % 3;
-    const int32_t sign = (t.n[along] < 0) == cyclic ? -1 : 1;  // of the area in (j, k)
-    for (int i = 0; i < 3; ++i) {
-      const int next = i == 2 ? 0 : i + 1;
-      const int32_t dj = (t.p[next][j] - t.p[i][j]) * sign;
-      const int32_t dk = (t.p[next][k] - t.p[i][k]) * sign;
-      edges[i] = {dj * (128 - t.p[i][k]) - dk * (128 - t.p[i][j]), dj * 256, -dk * 256};
+    const auto sign = hn::Set(d, (t.n[along] < 0) == cyclic ? -1 : 1);  // of the area in (j, k)
+    const auto centre = hn::Set(d, 128);
+    for (size_t i = 0; i < 4; i += hn::Lanes(d)) {
+      // The fourth is of no use; behind the vertices lies the normal.
+      const auto pj = hn::LoadU(d, t.p[j] + i), pk = hn::LoadU(d, t.p[k] + i);
+      const auto dj = hn::Mul(hn::Sub(hn::LoadU(d, t.p[j] + i + 1), pj), sign);
+      const auto dk = hn::Mul(hn::Sub(hn::LoadU(d, t.p[k] + i + 1), pk), sign);
+      hn::Store(hn::Sub(hn::Mul(dj, hn::Sub(centre, pk)), hn::Mul(dk, hn::Sub(centre, pj))), d,
+                base + i);
+      hn::Store(hn::ShiftLeft<8>(dj), d, by_k + i);
+      hn::Store(hn::Neg(hn::ShiftLeft<8>(dk)), d, by_j + i);
     }
   }
 };
@@ -52,19 +75,31 @@ struct EdgeFunction {
 // and its negative where it begins one. The quotient's first guess is in single precision, off by less than one where it
 // matters (beyond 2⁷ only its sign does); the remainder puts it right.
 struct RunFinder {
-  int32_t base[3], by_k[3], slope[3], end_room[3], first_room[3];
-  float inverse[3];
+  HWY_ALIGN int32_t base[4], by_k[4], slope[4], end_room[4], first_room[4];
+  HWY_ALIGN float inverse[4];
   int32_t columns;
 
-  HWY_INLINE RunFinder(const EdgeFunction edges[3], int32_t column_count) : columns(column_count) {
-    constexpr int32_t kFar = 1 << 20;
+  HWY_ATTR HWY_INLINE void Set(const EdgeFunctions& edges, const int32_t* edges_by_k,
+                               const int32_t* edges_by_j, int32_t column_count) {
+    const DQ d;
+    const hn::RebindToFloat<DQ> df;
+    columns = column_count;
+    const auto far = hn::Set(d, 1 << 20), one = hn::Set(d, 1), zero = hn::Zero(d);
+    bool level = false;
+    for (size_t i = 0; i < 4; i += hn::Lanes(d)) {
+      const auto by_j = hn::Load(d, edges_by_j + i);
+      const auto steep = hn::Abs(by_j);
+      const auto rises = hn::Gt(by_j, zero);
+      hn::Store(hn::Load(d, edges.base + i), d, base + i);
+      hn::Store(hn::Load(d, edges_by_k + i), d, by_k + i);
+      hn::Store(steep, d, slope + i);
+      hn::Store(hn::IfThenElse(rises, far, one), d, end_room + i);
+      hn::Store(hn::Neg(hn::IfThenElse(rises, zero, far)), d, first_room + i);
+      hn::Store(hn::Div(hn::Set(df, 1.0f), hn::ConvertTo(df, steep)), df, inverse + i);
+      level |= !hn::AllFalse(d, hn::Eq(steep, zero));
+    }
+    if (HWY_LIKELY(!level)) return;
     for (int i = 0; i < 3; ++i) {
-      base[i] = edges[i].base;
-      by_k[i] = edges[i].by_k;
-      slope[i] = edges[i].by_j < 0 ? -edges[i].by_j : edges[i].by_j;
-      end_room[i] = edges[i].by_j > 0 ? kFar : 1;
-      first_room[i] = edges[i].by_j > 0 ? 0 : kFar;
-      inverse[i] = 1.0f / static_cast<float>(slope[i]);
       if (slope[i] != 0) continue;
       // A whole row is inside, or none of it: 2E + 1, of an edge one unit long, times 128.
       const int32_t length = (by_k[i] < 0 ? -by_k[i] : by_k[i]) / 256;
@@ -89,7 +124,7 @@ struct RunFinder {
       q = hn::Add(q, hn::ShiftRight<31>(rest));
       q = hn::Add(q, hn::AndNot(hn::VecFromMask(d, hn::Lt(rest, steep)), one));
       end = hn::Min(end, hn::Add(q, hn::Set(d, end_room[i])));
-      first = hn::Max(first, hn::Sub(hn::Set(d, -first_room[i]), q));
+      first = hn::Max(first, hn::Sub(hn::Set(d, first_room[i]), q));
     }
     first = hn::Min(first, most);
     end = hn::Max(end, zero);
@@ -98,17 +133,17 @@ struct RunFinder {
 
 // Whether lines along j's axis light voxels that lie in the columns (k, j) of a face.
 struct LineTest {
-  EdgeFunction edges[3];  // of the projection along j's axis, over k and the voxels of axis a
+  EdgeFunctions edges;  // of the projection along j's axis, over k and the voxels of axis a
   uint32_t depth, fall_k, fall_j, err;
   int64_t numerator, step_k, step_j, divisor;  // the exact depth
   int64_t reach;                               // 128·|n_j|
   int32_t side;                                // of n_a·n_j
   int32_t reach_fixed;                         // 2⁻²⁵ voxel along a
 
-  HWY_INLINE LineTest(const SmallTriangle& t, const TriangleRuns& face, double inverse, int k_axis,
-                      int j_axis) {
+  HWY_ATTR HWY_INLINE void Set(const SmallTriangle& t, const TriangleRuns& face, double inverse,
+                               int k_axis, int j_axis) {
     const bool turned = k_axis != face.u;
-    EdgeFunction::Set(t, j_axis, k_axis, face.a, edges);
+    edges.Set(t, j_axis, k_axis, face.a);
     depth = face.depth;
     fall_k = turned ? face.fall_v : face.fall_u;
     fall_j = turned ? face.fall_u : face.fall_v;
@@ -130,8 +165,8 @@ struct LineTest {
     const int64_t i = FloorDiv(n, divisor * 256);
     const int64_t off = (n - (i * 256 + 128) * divisor) * side;
     bool lit = off >= -reach && off < reach;
-    for (const EdgeFunction& e : edges) {
-      lit &= e.base + int64_t{e.by_k} * k + i * e.by_j >= 0;
+    for (int e = 0; e < 3; ++e) {
+      lit &= edges.base[e] + int64_t{edges.by_k[e]} * k + i * edges.by_j[e] >= 0;
     }
     return lit;
   }
@@ -146,9 +181,9 @@ struct LineTest {
     const VS part = hn::And(at, hn::Set(d, (1 << kDepthBits) - 1));
     const VS off = hn::Abs(hn::Sub(part, hn::Set(d, 1 << (kDepthBits - 1))));
     VS least = hn::Set(d, INT32_MAX);
-    for (const EdgeFunction& e : edges) {
-      least = hn::Min(least, hn::Add(hn::Add(hn::Set(d, e.base), hn::Mul(k, hn::Set(d, e.by_k))),
-                                     hn::Mul(i, hn::Set(d, e.by_j))));
+    for (int e = 0; e < 3; ++e) {
+      const VS at_k = hn::Add(hn::Set(d, edges.base[e]), hn::Mul(k, hn::Set(d, edges.by_k[e])));
+      least = hn::Min(least, hn::Add(at_k, hn::Mul(i, hn::Set(d, edges.by_j[e]))));
     }
     const VS bound = hn::Set(d, reach_fixed), room = hn::Set(d, static_cast<int32_t>(err));
     const auto inside = hn::And(there, hn::Gt(least, hn::Set(d, -1)));
@@ -253,9 +288,7 @@ HWY_ATTR HWY_INLINE void SetColumns(const RunFinder& runs, const LineTest* lines
         const int32_t lower = ta * kTileSize - tiles.off[a];
         const auto meets = hn::And(some, hn::And(hn::Lt(least, hn::Set(d, lower + kTileSize)),
                                                  hn::Gt(most, hn::Set(d, lower - 1))));
-        uint64_t rows = 0;
-        hn::StoreMaskBits(d, meets, reinterpret_cast<uint8_t*>(&rows));
-        rows = (rows & ((uint64_t{1} << lanes) - 1)) << row_in_tile;
+        const uint64_t rows = uint64_t{BitsOf(meets)} << row_in_tile;
         const int32_t at = at_row + tv * tiles.kStep[v] + ta * tiles.kStep[a];
         tiles.HitRows(at, rows);
         tiles.HitRows(at + tiles.kStep[u], rows >> kTileSize);
@@ -277,15 +310,11 @@ HWY_ATTR HWY_INLINE void AddLinesAlongRows(const RunFinder& runs, const LineTest
     VS low, high;
     runs.Find(j, low, high);
     low = hn::Sub(low, one);
-    uint64_t lit_low = 0, lit_high = 0;
-    hn::StoreMaskBits(d, hn::MaskFromVec(lines.Lit(j, low, there)),
-                      reinterpret_cast<uint8_t*>(&lit_low));
-    hn::StoreMaskBits(d, hn::MaskFromVec(lines.Lit(j, high, there)),
-                      reinterpret_cast<uint8_t*>(&lit_high));
+    const uint64_t lit_low = BitsOf(hn::MaskFromVec(lines.Lit(j, low, there)));
+    const uint64_t lit_high = BitsOf(hn::MaskFromVec(lines.Lit(j, high, there)));
     hn::StoreU(low, d, ks);
     hn::StoreU(high, d, ks + lanes);
-    const uint64_t all = (uint64_t{1} << lanes) - 1;
-    for (uint64_t lit = (lit_low & all) | (lit_high & all) << lanes; lit != 0; lit &= lit - 1) {
+    for (uint64_t lit = lit_low | lit_high << lanes; lit != 0; lit &= lit - 1) {
       const int lane = std::countr_zero(lit);
       const int32_t k = ks[lane], at_j = column + (lane & (lanes - 1));
       AddColumn(face, k, at_j, true, tiles);
@@ -301,7 +330,7 @@ HWY_ATTR HWY_INLINE void AddLinesAlongRows(const RunFinder& runs, const LineTest
 
 HWY_INLINE void AddVertices(const SmallTriangle& t, TriangleRuns& face, TileHits& tiles) {
   for (int n = 0; n < 3; ++n) {
-    const int32_t i = t.p[n][face.a] >> 8, k = t.p[n][face.u] >> 8, j = t.p[n][face.v] >> 8;
+    const int32_t i = t.p[face.a][n] >> 8, k = t.p[face.u][n] >> 8, j = t.p[face.v][n] >> 8;
     const uint32_t depth = DepthAt(face, k, j);
     const bool at_depth = static_cast<int32_t>(depth) >> kDepthBits == i &&
                           static_cast<int32_t>(depth - face.err) >> kDepthBits == i;
@@ -369,8 +398,8 @@ HWY_ATTR HWY_INLINE void MakeFace(const SmallTriangle& t, int a, bool whole, Tri
   face.divisor = t.n[a] * sign;
   face.step_u = -t.n[u] * sign;
   face.step_v = -t.n[v] * sign;
-  face.numerator = int64_t{face.divisor} * t.p[0][a] + int64_t{face.step_u} * (128 - t.p[0][u]) +
-                   int64_t{face.step_v} * (128 - t.p[0][v]);
+  face.numerator = int64_t{face.divisor} * t.p[a][0] + int64_t{face.step_u} * (128 - t.p[u][0]) +
+                   int64_t{face.step_v} * (128 - t.p[v][0]);
   const double inverse = 1.0 / face.divisor;
   uint32_t err = 0;
   face.depth = CeilFixed(face.numerator, kDepthBits - 8, face.divisor, inverse, 1, &err);
@@ -389,18 +418,21 @@ HWY_ATTR HWY_INLINE void MakeFace(const SmallTriangle& t, int a, bool whole, Tri
   const auto lines_along = [&](int r) {
     return whole && t.n[r] != 0 && t.n[r] != t.n[a] && t.n[r] != -t.n[a];
   };
-  EdgeFunction edges[3];
-  EdgeFunction::Set(t, a, u, v, edges);
+  EdgeFunctions edges;
+  edges.Set(t, a, u, v);
+  RunFinder runs;
+  LineTest lines;
+  runs.Set(edges, edges.by_k, edges.by_j, t.size[v]);
   if (HWY_LIKELY(lines_along(v))) {
-    const LineTest lines(t, face, inverse, u, v);
-    SetColumns(RunFinder(edges, t.size[v]), &lines, face, tiles);
+    lines.Set(t, face, inverse, u, v);
+    SetColumns(runs, &lines, face, tiles);
   } else {
-    SetColumns(RunFinder(edges, t.size[v]), nullptr, face, tiles);
+    SetColumns(runs, nullptr, face, tiles);
   }
   if (HWY_LIKELY(lines_along(u))) {
-    for (EdgeFunction& e : edges) std::swap(e.by_k, e.by_j);
-    AddLinesAlongRows(RunFinder(edges, t.size[u]), LineTest(t, face, inverse, v, u), t.size[v],
-                      face, tiles);
+    runs.Set(edges, edges.by_j, edges.by_k, t.size[u]);
+    lines.Set(t, face, inverse, v, u);
+    AddLinesAlongRows(runs, lines, t.size[v], face, tiles);
   }
   std::fill_n(face.vertices(), 4, TriangleRuns::kNoVertex);
   if (whole) AddVertices(t, face, tiles);
