@@ -140,18 +140,18 @@ struct LineTest {
   int32_t side;                                // of n_a·n_j
   int32_t reach_fixed;                         // 2⁻²⁵ voxel along a
 
-  HWY_ATTR HWY_INLINE void Set(const SmallTriangle& t, const TriangleRuns& face, double inverse,
-                               int k_axis, int j_axis) {
+  HWY_ATTR HWY_INLINE void Set(const SmallTriangle& t, const TriangleRuns& face,
+                               const ExactDepth& exact, double inverse, int k_axis, int j_axis) {
     const bool turned = k_axis != face.u;
     edges.Set(t, j_axis, k_axis, face.a);
     depth = face.depth;
     fall_k = turned ? face.fall_v : face.fall_u;
     fall_j = turned ? face.fall_u : face.fall_v;
     err = face.err;
-    numerator = face.numerator;
-    step_k = int64_t{256} * (turned ? face.step_v : face.step_u);
-    step_j = int64_t{256} * (turned ? face.step_u : face.step_v);
-    divisor = face.divisor;
+    numerator = exact.numerator;
+    step_k = int64_t{256} * (turned ? exact.step_v : exact.step_u);
+    step_j = int64_t{256} * (turned ? exact.step_u : exact.step_v);
+    divisor = exact.divisor;
     const int32_t n = t.n[j_axis];
     const int32_t size = n < 0 ? -n : n;
     reach = int64_t{128} * size;
@@ -337,7 +337,7 @@ HWY_INLINE void AddVertices(const SmallTriangle& t, TriangleRuns& face, TileHits
     AddColumn(face, k, j, at_depth, tiles);
     const auto voxel =
         static_cast<uint32_t>(i << (8 * face.a) | k << (8 * face.u) | j << (8 * face.v));
-    face.vertices()[n] = at_depth ? TriangleRuns::kNoVertex : voxel;
+    face.vertices[n] = at_depth ? TriangleRuns::kNoVertex : voxel;
     const int32_t at = tiles.At(face.a, i) + tiles.At(face.u, k) + tiles.At(face.v, j);
     tiles.HitRows(at, at_depth ? tiles.RowBit(face.u, k) : 0);
     tiles.hits[at >> 6] |= uint64_t{1} << (at & 63);
@@ -395,17 +395,18 @@ HWY_ATTR HWY_INLINE void MakeFace(const SmallTriangle& t, int a, bool whole, Tri
   const int32_t sign = t.n[a] < 0 ? -1 : 1;
   std::copy_n(t.origin, 3, face.origin);
   face.word = t.word;
-  face.divisor = t.n[a] * sign;
-  face.step_u = -t.n[u] * sign;
-  face.step_v = -t.n[v] * sign;
-  face.numerator = int64_t{face.divisor} * t.p[a][0] + int64_t{face.step_u} * (128 - t.p[u][0]) +
-                   int64_t{face.step_v} * (128 - t.p[v][0]);
-  const double inverse = 1.0 / face.divisor;
+  ExactDepth exact;
+  exact.divisor = t.n[a] * sign;
+  exact.step_u = -t.n[u] * sign;
+  exact.step_v = -t.n[v] * sign;
+  exact.numerator = int64_t{exact.divisor} * t.p[a][0] + int64_t{exact.step_u} * (128 - t.p[u][0]) +
+                    int64_t{exact.step_v} * (128 - t.p[v][0]);
+  const double inverse = 1.0 / exact.divisor;
   uint32_t err = 0;
-  face.depth = CeilFixed(face.numerator, kDepthBits - 8, face.divisor, inverse, 1, &err);
-  face.fall_u = CeilFixed(face.step_u, kDepthBits, face.divisor, inverse,
+  face.depth = CeilFixed(exact.numerator, kDepthBits - 8, exact.divisor, inverse, 1, &err);
+  face.fall_u = CeilFixed(exact.step_u, kDepthBits, exact.divisor, inverse,
                           static_cast<uint32_t>(t.size[u]), &err);
-  face.fall_v = CeilFixed(face.step_v, kDepthBits, face.divisor, inverse,
+  face.fall_v = CeilFixed(exact.step_v, kDepthBits, exact.divisor, inverse,
                           static_cast<uint32_t>(t.size[v]), &err);
   face.err = err;
   face.a = static_cast<uint8_t>(a);
@@ -424,17 +425,18 @@ HWY_ATTR HWY_INLINE void MakeFace(const SmallTriangle& t, int a, bool whole, Tri
   LineTest lines;
   runs.Set(edges, edges.by_k, edges.by_j, t.size[v]);
   if (HWY_LIKELY(lines_along(v))) {
-    lines.Set(t, face, inverse, u, v);
+    lines.Set(t, face, exact, inverse, u, v);
     SetColumns(runs, &lines, face, tiles);
   } else {
     SetColumns(runs, nullptr, face, tiles);
   }
   if (HWY_LIKELY(lines_along(u))) {
     runs.Set(edges, edges.by_j, edges.by_k, t.size[u]);
-    lines.Set(t, face, inverse, v, u);
+    lines.Set(t, face, exact, inverse, v, u);
     AddLinesAlongRows(runs, lines, t.size[v], face, tiles);
   }
-  std::fill_n(face.vertices(), 4, TriangleRuns::kNoVertex);
+  face.exact() = exact;
+  std::fill_n(face.vertices, 4, TriangleRuns::kNoVertex);
   if (whole) AddVertices(t, face, tiles);
 }
 

@@ -57,11 +57,12 @@ HWY_ATTR HWY_INLINE void RaisePlaces(FacePlaces& places, uint32_t* words) {
 HWY_NOINLINE inline void PlaceExactly(const TriangleRuns& face, int32_t k, uint32_t columns,
                                       const int32_t from[3], const int32_t size[3],
                                       FacePlaces& places) {
-  const int64_t divisor = int64_t{face.divisor} * 256;
+  const ExactDepth& exact = face.exact();
+  const int64_t divisor = int64_t{exact.divisor} * 256;
   for (; columns != 0; columns &= columns - 1) {
     const int column = std::countr_zero(columns);
-    const int64_t numerator = face.numerator + int64_t{face.step_u} * 256 * k +
-                              int64_t{face.step_v} * 256 * (from[face.v] + column);
+    const int64_t numerator = exact.numerator + int64_t{exact.step_u} * 256 * k +
+                              int64_t{exact.step_v} * 256 * (from[face.v] + column);
     const int64_t above = FloorDiv(numerator, divisor) - from[face.a];
     if (above < 0 || above >= size[face.a]) continue;
     places.at[places.size++] =
@@ -131,7 +132,7 @@ HWY_ATTR HWY_INLINE void PlaceVertices(const TriangleRuns& face, const int32_t f
   }
   const auto in_tile = hn::Set(d, 0x404040);
   for (size_t i = 0; i < 4; i += hn::Lanes(d)) {
-    const auto voxel = hn::Add(hn::LoadU(d, face.vertices() + i), hn::Set(d, base));
+    const auto voxel = hn::Add(hn::LoadU(d, face.vertices + i), hn::Set(d, base));
     const auto beyond =
         hn::Or(hn::Xor(voxel, in_tile), hn::Xor(hn::Add(voxel, hn::Set(d, short_by)), in_tile));
     const auto drawn = hn::Eq(hn::And(beyond, hn::Set(d, 0xF0F0F0)), hn::Zero(d));

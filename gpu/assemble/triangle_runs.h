@@ -29,32 +29,35 @@ namespace voxeld::gpu {
 
 inline constexpr int kDepthBits = 25;
 
-// A face. Behind it are four vertices; then, for each tile along v from the one that holds the origin on, `stride` rows of 16
-// columns (bit 0 the tile's first): those that have a voxel. Axes as in WalkGrid; voxels from `origin`.
+// The depth's numerator N, and |n_a|.
+struct ExactDepth {
+  int64_t numerator;       // at row 0, column 0
+  int32_t step_u, step_v;  // in voxels: times 256
+  int32_t divisor;         // times 256
+};
+
+// A face. Behind it, for each tile along v from the one that holds the origin on, `stride` rows of 16 columns (bit 0 the
+// tile's first): those that have a voxel; then the exact depth, which is seldom asked for. Axes as in WalkGrid; voxels
+// from `origin`.
 struct alignas(64) TriangleRuns {
   int32_t origin[3];
   uint32_t word;
   uint32_t depth, fall_u, fall_v, err;  // 2⁻²⁵ voxel
-  int64_t numerator;                    // N at row 0, column 0
-  int32_t step_u, step_v;               // N's, in voxels: times 256
-  int32_t divisor;                      // |n_a|: times 256
+  // Voxels of vertices that no column has, eight bits an axis; or none. The last is none.
+  static constexpr uint32_t kNoVertex = 0x808080;
+  uint32_t vertices[4];
   uint8_t a, u, v, rows;
   uint8_t stride;  // `rows`, up to a multiple of 16
   uint8_t tiles;
 
-  // Voxels of vertices that no column has, eight bits an axis; or none. The last is none.
-  static constexpr uint32_t kNoVertex = 0x808080;
-  const uint32_t* vertices() const { return reinterpret_cast<const uint32_t*>(this + 1); }
-  uint32_t* vertices() { return reinterpret_cast<uint32_t*>(this + 1); }
-
   const uint16_t* columns(int32_t tile) const {
-    return reinterpret_cast<const uint16_t*>(vertices() + 4) + tile * stride;
+    return reinterpret_cast<const uint16_t*>(this + 1) + tile * stride;
   }
-  uint16_t* columns(int32_t tile) {
-    return reinterpret_cast<uint16_t*>(vertices() + 4) + tile * stride;
-  }
-  size_t units() const { return 1 + (16 + size_t{tiles} * stride * 2 + 63) / 64; }
-  static constexpr size_t kMostUnits = 1 + (16 + 5 * 64 * 2 + 63) / 64;
+  uint16_t* columns(int32_t tile) { return reinterpret_cast<uint16_t*>(this + 1) + tile * stride; }
+  const ExactDepth& exact() const { return *reinterpret_cast<const ExactDepth*>(columns(tiles)); }
+  ExactDepth& exact() { return *reinterpret_cast<ExactDepth*>(columns(tiles)); }
+  size_t units() const { return 1 + (size_t{tiles} * stride * 2 + sizeof(ExactDepth) + 63) / 64; }
+  static constexpr size_t kMostUnits = 1 + (5 * 64 * 2 + sizeof(ExactDepth) + 63) / 64;
 };
 static_assert(sizeof(TriangleRuns) == 64);
 
