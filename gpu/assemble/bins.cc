@@ -1,10 +1,11 @@
 #include "gpu/assemble/bins.h"
 
 #include <algorithm>
-#include <optional>
 #include <type_traits>
 #include <utility>
 
+#include "gpu/assemble/small_triangle.h"
+#include "gpu/assemble/triangle_kernel.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
@@ -12,6 +13,7 @@ namespace {
 
 constexpr uint32_t kPartItems = 2048;  // at least, where there are several parts
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
+constexpr size_t kTriangleRun = 64;    // the same
 
 constexpr size_t kAhead = 16;  // items whose places are fetched before they are written
 
@@ -106,36 +108,29 @@ bool FindWalks(const Source& source, const TileGrid& grid, std::span<const uint8
   return all;
 }
 
-// The same of triangles; false if some are not small.
+// The same of triangles, of which the small ones go to `memory`; false if some are not small.
 bool FindTriangles(const Source& source, const TileGrid& grid, std::span<const uint8_t> owned,
-                   uint32_t priority, bool erase, uint32_t first, uint32_t last,
-                   SmallTriangle* triangles, FoundSpans& found) {
+                   uint32_t priority, bool erase, uint32_t first, uint32_t last, uint32_t part,
+                   TriangleMemory& memory, FoundSpans& found) {
   const WalkGrid walk_grid(grid);
+  SmallTriangle run[kTriangleRun];
+  size_t size = 0;
+  const auto follow = [&] {
+    FindTriangles(std::span(run, size), part, walk_grid, owned.data(), memory, found);
+    size = 0;
+  };
   bool all = true;
   for (uint32_t i = first; i < last; ++i) {
     const Triangle t = Triangles::ItemOf(source, i);
-    const bool small = SmallTriangle::Of(t, walk_grid, triangles[i]);
-    all &= small;
-    if (!small) {
-      Find<Triangles>(source, grid, owned, i, i + 1, found);
+    if (SmallTriangle::Of(t, walk_grid, run[size])) {
+      run[size++].word = MakeWord(priority, erase, t.color[0]);
+      if (size == kTriangleRun) follow();
       continue;
     }
-    triangles[i].word = MakeWord(priority, erase, t.color[0]);
-    const Box3 box = grid.TilesOf(BoundsOf(t));
-    const int32_t tiles =
-        (box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) * (box.hi[2] - box.lo[2]);
-    const bool few = tiles <= 2;  // there is little to win
-    std::optional<SmallTriangleSlabs> slabs;
-    if (!few) slabs.emplace(t);
-    for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
-      for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
-        for (int32_t x = box.lo[0]; x < box.hi[0]; ++x) {
-          const uint32_t tile = grid.Index(x, y, z);
-          if (owned[tile] != 0 && (few || slabs->MayMeet(x, y, z))) found.Add(tile, {i, 1});
-        }
-      }
-    }
+    all = false;
+    Find<Triangles>(source, grid, owned, i, i + 1, found);
   }
+  follow();
   return all;
 }
 
@@ -158,8 +153,8 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
         std::is_same_v<Primitive, Triangles> && source.record->rule == SurfaceRule::kThin;
     bins.walk_count = walks ? count : 0;
     bins.walks.Make(bins.walk_count);
-    bins.triangle_count = triangles ? count : 0;
-    bins.triangles.Make(bins.triangle_count);
+    bins.triangle_parts = triangles ? part_count : 0;
+    if (bins.triangles.size() < bins.triangle_parts) bins.triangles.resize(bins.triangle_parts);
     std::vector<uint8_t> all_fast(part_count, 0);
     executor.For(part_count, 1, [&](size_t part, int) {
       const auto first = static_cast<uint32_t>(uint64_t{count} * part / part_count);
@@ -170,8 +165,10 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
         all_fast[part] =
             FindWalks(source, grid, owned, priority, erase, first, last, bins.walks.data(), found);
       } else if (triangles) {
+        TriangleMemory& memory = bins.triangles[part];
+        memory.size = 0;
         all_fast[part] = FindTriangles(source, grid, owned, priority, erase, first, last,
-                                       bins.triangles.data(), found);
+                                       static_cast<uint32_t>(part), memory, found);
       } else {
         Find<Primitive>(source, grid, owned, first, last, found);
       }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "gpu/assemble/bin_item.h"
-#include "gpu/assemble/small_triangle.h"
 #include "gpu/assemble/span_kernel.h"
+#include "gpu/assemble/triangle_runs.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/primitives/list.h"
 
@@ -19,10 +19,11 @@ struct Bins {
   std::vector<uint32_t> tiles;
   std::vector<uint32_t> begin;
   Buffer<BinItem> items;
-  // By item, of lines one voxel wide and of triangles; undefined for items that are none.
+  // By item, of lines one voxel wide; undefined for items that are none.
   Buffer<LineWalk> walks;
-  Buffer<SmallTriangle> triangles;
-  size_t walk_count = 0, triangle_count = 0;
+  // Of small triangles, by part of the items.
+  std::vector<TriangleMemory> triangles;
+  size_t walk_count = 0, triangle_parts = 0;
   bool all_fast = false;  // every item is one of these
 
   std::span<const BinItem> row(size_t r) const {
@@ -33,7 +34,7 @@ struct Bins {
   void Clear() {
     tiles.clear();
     begin.clear();
-    walk_count = triangle_count = 0;
+    walk_count = triangle_parts = 0;
     all_fast = false;
   }
 };

@@ -27,11 +27,11 @@ void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid
 void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words, TileRows& touched) {
   if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words, touched);
-  if (d.bins.triangle_count > 0) {
+  if (d.bins.triangle_parts > 0) {
     const WalkGrid axes(grid);
     int32_t lo[3], hi[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
-    DrawTriangles(d.bins.triangles.data(), items, lo, hi, words, touched);
+    DrawTriangles(d.bins.triangles, items, lo, hi, words, touched);
   }
   if (d.bins.all_fast) return;
   touched = TileRows::All();

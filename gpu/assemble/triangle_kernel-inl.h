@@ -1,4 +1,4 @@
-// What triangle_kernel.cc calls, once for each instruction set.
+// How triangle_kernel.cc draws runs of small triangles (triangle_runs.h), once for each instruction set.
 #if defined(VOXELD_GPU_ASSEMBLE_TRIANGLE_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VOXELD_GPU_ASSEMBLE_TRIANGLE_KERNEL_INL_H_
 #undef VOXELD_GPU_ASSEMBLE_TRIANGLE_KERNEL_INL_H_
@@ -12,230 +12,170 @@ HWY_BEFORE_NAMESPACE();
 namespace voxeld::gpu {
 namespace HWY_NAMESPACE {
 
-// Part of a tile, in voxels relative to a triangle's first, and where that lies in the tile (mod 16).
-struct TrianglePart {
-  int32_t lo[3], hi[3], base[3];
+// Places in a tile, those of each face one behind the other, before they are raised: in groups of four with a word each.
+struct FacePlaces {
+  static constexpr size_t kGroup = 4;
+  static constexpr size_t kFull = 512;
+  static constexpr size_t kMostOfFace = kTileSize * kTileSize + 3;
+  static constexpr size_t kSize = kFull + kMostOfFace + 64;
 
-  // False if nothing of the triangle can be in the tile.
-  HWY_INLINE bool Set(const SmallTriangle& t, const int32_t tile_lo[3], const int32_t tile_hi[3]) {
-    bool some = true;
-    for (int r = 0; r < 3; ++r) {
-      lo[r] = std::max<int32_t>(t.lo[r], tile_lo[r] - t.origin[r]);
-      hi[r] = std::min<int32_t>(t.hi[r], tile_hi[r] - t.origin[r]);
-      base[r] = t.origin[r] - tile_lo[r];
-      some &= lo[r] < hi[r];
-    }
-    return some;
-  }
-  HWY_INLINE uint32_t At(const int32_t voxel[3]) const {
-    return static_cast<uint32_t>((voxel[0] + base[0]) | (voxel[1] + base[1]) << 4 |
-                                 (voxel[2] + base[2]) << 8);
-  }
-};
+  HWY_ALIGN uint32_t at[kSize];
+  HWY_ALIGN uint32_t words[kSize / kGroup];
+  size_t size = 0;
 
-// What the columns along an axis come to, at the part's first one; changes to the next column and to the next row.
-struct TriangleColumns {
-  int32_t edge[3], edge_lane[3], edge_row[3];  // inside: all ≥ 0
-  int64_t depth, depth_row;                    // times |n_a|
-  double depth_lane;
-  double inverse;  // of `den`, |n_a| voxels
-  int32_t width, height;
-
-  // False if no column of the part meets the triangle within the part.
-  HWY_INLINE bool Set(const SmallTriangle& t, const TrianglePart& part, int a) {
-    const int b = (a + 1) % 3, c = (a + 2) % 3;
-    const int32_t sign = t.n[a] < 0 ? -1 : 1;
-    width = part.hi[b] - part.lo[b];
-    height = part.hi[c] - part.lo[c];
-    const int32_t qb = part.lo[b] * 256 + 128, qc = part.lo[c] * 256 + 128;
-    int32_t outside = 0;
-    for (int i = 0; i < 3; ++i) {
-      const int j = i == 2 ? 0 : i + 1;
-      const int32_t db = (t.p[j][b] - t.p[i][b]) * sign, dc = (t.p[j][c] - t.p[i][c]) * sign;
-      edge[i] = db * (qc - t.p[i][c]) - dc * (qb - t.p[i][b]);
-      edge_lane[i] = -dc * 256;
-      edge_row[i] = db * 256;
-      outside |= edge[i] + std::max(0, edge_lane[i] * (width - 1)) +
-                 std::max(0, edge_row[i] * (height - 1));
-    }
-    if (outside < 0) return false;
-    const int64_t na = int64_t{t.n[a]} * sign, nb = int64_t{t.n[b]} * sign,
-                  nc = int64_t{t.n[c]} * sign;
-    depth = na * t.p[0][a] - nb * (qb - t.p[0][b]) - nc * (qc - t.p[0][c]);
-    depth_row = -nc * 256;
-    const int64_t lane = -nb * 256, den = na * 256;
-    depth_lane = static_cast<double>(lane);
-    const int64_t lanes = lane * (width - 1), rows = depth_row * (height - 1);
-    const int64_t least = depth + std::min<int64_t>(0, lanes) + std::min<int64_t>(0, rows);
-    const int64_t most = depth + std::max<int64_t>(0, lanes) + std::max<int64_t>(0, rows);
-    if (most < part.lo[a] * den || least >= part.hi[a] * den) return false;
-    inverse = 1.0 / static_cast<double>(den);
-    return true;
+  // Ends a face, of which the places from `begin` on are: with its last one again, up to a whole group.
+  HWY_ATTR HWY_INLINE void EndFace(size_t begin, uint32_t word) {
+    if (size == begin) return;
+    const DW d;
+    const hn::CappedTag<uint32_t, kGroup> group;
+    const size_t groups = (size + kGroup - 1) / kGroup;
+    const auto last = hn::Set(group, at[size - 1]);
+    for (size_t i = 0; i < kGroup; i += hn::Lanes(group)) hn::StoreU(last, group, at + size + i);
+    const VW all = hn::Set(d, word);
+    size_t i = begin / kGroup;
+    do {
+      hn::StoreU(all, d, words + i);
+      i += hn::Lanes(d);
+    } while (i < groups);
+    size = groups * kGroup;
   }
 };
 
-HWY_INLINE size_t AddVertices(const SmallTriangle& t, const TrianglePart& part, DrawBlock& block,
-                              size_t size) {
-  for (const int16_t(&p)[3] : t.p) {
-    int32_t voxel[3];
-    bool inside = true;
-    for (int r = 0; r < 3; ++r) {
-      voxel[r] = p[r] >> 8;
-      inside &= voxel[r] >= part.lo[r] && voxel[r] < part.hi[r];
+HWY_ATTR HWY_INLINE void RaisePlaces(FacePlaces& places, uint32_t* words) {
+  const hn::CappedTag<uint32_t, 1> d;  // without a branch that nobody could foresee
+  for (size_t i = 0; i < places.size; i += FacePlaces::kGroup) {
+    const auto word = hn::Set(d, places.words[i / FacePlaces::kGroup]);
+    for (size_t j = i; j < i + FacePlaces::kGroup; ++j) {
+      uint32_t* const at = words + places.at[j];
+      hn::StoreU(hn::Max(hn::LoadU(d, at), word), d, at);
     }
-    block.at[size] = part.At(voxel) & (kTileVoxels - 1);
-    block.words[size] = t.word;
-    size += inside;
   }
-  return size;
+  places.size = 0;
 }
 
-#if HWY_TARGET == HWY_SCALAR
-
-inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinItem> items,
-                            const int32_t* lo, const int32_t* hi, uint32_t* words,
-                            TileRows& touched) {
-  touched = TileRows::All();
-  DrawBlock block;
-  for (const BinItem& item : items) {
-    const SmallTriangle& t = triangles[item.item];
-    TrianglePart part;
-    if (item.count() == 0 || !part.Set(t, lo, hi)) continue;
-    RaiseBlock(block, AddVertices(t, part, block, 0), words);
-    for (int a = 0; a < 3; ++a) {
-      TriangleColumns columns;
-      if (t.n[a] == 0 || !columns.Set(t, part, a)) continue;
-      const int b = (a + 1) % 3, c = (a + 2) % 3;
-      const int64_t den = (t.n[a] < 0 ? -int64_t{t.n[a]} : int64_t{t.n[a]}) * 256;
-      int32_t voxel[3];
-      for (int32_t row = 0; row < columns.height; ++row) {
-        voxel[c] = part.lo[c] + row;
-        for (int32_t lane = 0; lane < columns.width; ++lane) {
-          voxel[b] = part.lo[b] + lane;
-          int32_t outside = 0;
-          for (int i = 0; i < 3; ++i) {
-            outside |= columns.edge[i] + columns.edge_row[i] * row + columns.edge_lane[i] * lane;
-          }
-          const int64_t depth = columns.depth + columns.depth_row * row +
-                                static_cast<int64_t>(columns.depth_lane) * lane;
-          voxel[a] = static_cast<int32_t>(FloorDiv(depth, den));
-          if (outside < 0 || voxel[a] < part.lo[a] || voxel[a] >= part.hi[a]) continue;
-          uint32_t& at = words[part.At(voxel)];
-          at = std::max(at, t.word);
-        }
-      }
-    }
+// The columns of row k of a face, in the tile that begins at voxel `from`, by the definition's division.
+HWY_NOINLINE inline void PlaceExactly(const TriangleRuns& face, int32_t k, uint32_t columns,
+                                      const int32_t from[3], const int32_t size[3],
+                                      FacePlaces& places) {
+  const ExactDepth& exact = face.exact();
+  const int64_t divisor = int64_t{exact.divisor} * 256;
+  for (; columns != 0; columns &= columns - 1) {
+    const int column = std::countr_zero(columns);
+    const int64_t numerator = exact.numerator + int64_t{exact.step_u} * 256 * k +
+                              int64_t{exact.step_v} * 256 * (from[face.v] + column);
+    const int64_t above = FloorDiv(numerator, divisor) - from[face.a];
+    if (above < 0 || above >= size[face.a]) continue;
+    places.at[places.size++] =
+        static_cast<uint32_t>((k - from[face.u]) << (4 * face.u) | column << (4 * face.v) |
+                              static_cast<int>(above) << (4 * face.a));
   }
 }
 
-#else
-
-// Columns along axis kAxis, as many rows at once as have room in a vector. `several`: a block was drawn.
-template <int kAxis>
-HWY_ATTR HWY_INLINE size_t DrawColumns(const SmallTriangle& t, const TrianglePart& part,
-                                       DrawBlock& block, size_t size, bool& several,
-                                       uint32_t* words) {
-  constexpr int kB = (kAxis + 1) % 3, kC = (kAxis + 2) % 3;
-  TriangleColumns columns;
-  if (!columns.Set(t, part, kAxis)) return size;
+// What of a face lies in the tile that begins at voxel `from`, counted from the face's origin, and has `size` voxels.
+HWY_ATTR HWY_INLINE void PlaceFace(const TriangleRuns& face, BinItem item, const int32_t from[3],
+                                   const int32_t size[3], FacePlaces& places) {
   const DW d;
-  const hn::RebindToSigned<DW> di;
-  const hn::Half<decltype(di)> half;
-  const hn::Rebind<double, decltype(half)> df;
   const auto lanes = static_cast<int32_t>(hn::Lanes(d));
-  // Lane i: column i mod `across`, row i / `across`.
-  int bits = std::countr_zero(static_cast<uint32_t>(lanes));
-  while (bits > 0 && columns.width <= 1 << (bits - 1)) --bits;
-  const int32_t across = 1 << bits, rows = lanes >> bits;
-  const auto iota = hn::Iota(di, 0);
-  const auto column = hn::And(iota, hn::Set(di, across - 1));
-  const auto row_of = hn::ShiftRightSame(iota, bits);
-  const auto spread = [&](int i) HWY_ATTR {
-    return hn::Add(hn::Mul(column, hn::Set(di, columns.edge_lane[i])),
-                   hn::Mul(row_of, hn::Set(di, columns.edge_row[i])));
-  };
-  const auto slope0 = spread(0), slope1 = spread(1), slope2 = spread(2);
-  const auto lane_fall = hn::Set(df, columns.depth_lane * columns.inverse);
-  const auto row_fall = hn::Set(df, static_cast<double>(columns.depth_row) * columns.inverse);
-  const auto fall = [&](auto column_part, auto row_part) HWY_ATTR {
-    return hn::Add(hn::Mul(hn::PromoteTo(df, column_part), lane_fall),
-                   hn::Mul(hn::PromoteTo(df, row_part), row_fall));
-  };
-  const auto fall_low = fall(hn::LowerHalf(half, column), hn::LowerHalf(half, row_of));
-  const auto fall_high = fall(hn::UpperHalf(half, column), hn::UpperHalf(half, row_of));
-  const auto first = hn::Set(di, part.lo[kAxis]);
-  const auto count = hn::Set(d, static_cast<uint32_t>(part.hi[kAxis] - part.lo[kAxis]));
-  const auto in_lane =
-      hn::BitCast(d, hn::Or(hn::ShiftLeft<4 * kB>(column), hn::ShiftLeft<4 * kC>(row_of)));
-  const VW word = hn::Set(d, t.word);
-  const auto minus_one = hn::Set(di, -1);
-  int32_t at_first[3];
-  at_first[kAxis] = part.lo[kAxis];
-  for (int32_t lane = 0; lane < columns.width; lane += across) {
-    const auto exists = hn::Lt(column, hn::Set(di, columns.width - lane));
-    at_first[kB] = part.lo[kB] + lane;
-    int32_t edge[3];
-    for (int i = 0; i < 3; ++i) edge[i] = columns.edge[i] + columns.edge_lane[i] * lane;
-    int64_t depth = columns.depth + static_cast<int64_t>(columns.depth_lane) * lane;
-    for (int32_t row = 0; row < columns.height; row += rows) {
-      const auto outside = hn::Or(
-          hn::Or(hn::Add(hn::Set(di, edge[0]), slope0), hn::Add(hn::Set(di, edge[1]), slope1)),
-          hn::Add(hn::Set(di, edge[2]), slope2));
-      const auto inside =
-          hn::And(hn::And(exists, hn::Lt(row_of, hn::Set(di, columns.height - row))),
-                  hn::Gt(outside, minus_one));
-      // Worked out where none is inside, too: a branch could not be foreseen.
-      const auto q = hn::Set(df, (static_cast<double>(depth) + 0.5) * columns.inverse);
-      const auto voxel = hn::Combine(di, hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_high))),
-                                     hn::DemoteTo(half, hn::Floor(hn::Add(q, fall_low))));
-      const auto above = hn::BitCast(d, hn::Sub(voxel, first));
-      const auto drawn = hn::And(hn::RebindMask(d, inside), hn::Lt(above, count));
-      at_first[kC] = part.lo[kC] + row;
-      const auto at =
-          hn::Add(hn::Set(d, part.At(at_first)), hn::Add(in_lane, hn::ShiftLeft<4 * kAxis>(above)));
-      hn::StoreU(word, d, block.words + size);
+  const int a = face.a, u = face.u, v = face.v;
+  const auto row = static_cast<int32_t>(item.row());
+  const int32_t begin = from[u] + row,
+                end = from[u] + std::min(size[u], row + static_cast<int32_t>(item.rows()));
+  const uint16_t* const columns =
+      face.columns((from[v] + (face.origin[v] & (kTileSize - 1))) >> kTileBits);
+  const uint32_t in_volume = (uint32_t{1} << size[v]) - 1;
+  const VW iota = hn::Iota(d, 0);
+  const VW fall_u = hn::Set(d, face.fall_u), row_step = hn::Set(d, uint32_t{1} << (4 * u));
+  const VW err = hn::Set(d, face.err << (32 - kDepthBits));
+  const VW size_a = hn::Set(d, static_cast<uint32_t>(size[a]));
+  for (int32_t lane = 0; lane < kTileSize; lane += lanes) {
+    const size_t first = places.size;
+    size_t placed = first;
+    VW depth = hn::Add(hn::Set(d, face.depth - (static_cast<uint32_t>(from[a]) << kDepthBits) +
+                                      static_cast<uint32_t>(begin) * face.fall_u +
+                                      static_cast<uint32_t>(from[v] + lane) * face.fall_v),
+                       hn::Mul(iota, hn::Set(d, face.fall_v)));
+    VW at = hn::Add(hn::Set(d, static_cast<uint32_t>(row << (4 * u) | lane << (4 * v))),
+                    hn::ShiftLeftSame(iota, 4 * v));
+    auto unsure = hn::MaskFromVec(hn::Zero(d));
+    for (int32_t k = begin; k < end; ++k) {
+      const uint64_t bits = (columns[k] & in_volume) >> lane;
+      const auto inside = hn::LoadMaskBits(d, reinterpret_cast<const uint8_t*>(&bits));
+      const VW above = hn::ShiftRight<kDepthBits>(depth);
+      const auto close = hn::Lt(hn::ShiftLeft<32 - kDepthBits>(depth), err);
+      unsure = hn::Or(unsure, hn::And(inside, close));
+      const auto drawn = hn::And(inside, hn::Lt(above, size_a));
       // Not CompressStore, which some processors do word by word.
-      hn::StoreU(hn::Compress(at, drawn), d, block.at + size);
-      size += hn::CountTrue(d, drawn);
-      if (size >= DrawBlock::kSize) {
-        RaiseBlock(block, size, words);
-        size = 0;
-        several = true;
-      }
-      for (int i = 0; i < 3; ++i) edge[i] += columns.edge_row[i] * rows;
-      depth += columns.depth_row * rows;
+      hn::StoreU(hn::Compress(hn::Add(at, hn::ShiftLeftSame(above, 4 * a)), drawn), d,
+                 places.at + placed);
+      placed += hn::CountTrue(d, drawn);
+      depth = hn::Add(depth, fall_u);
+      at = hn::Add(at, row_step);
+    }
+    places.size = placed;
+    if (HWY_LIKELY(hn::AllFalse(d, unsure))) continue;
+    places.size = first;
+    for (int32_t k = begin; k < end; ++k) {
+      const uint32_t there = ((uint32_t{1} << lanes) - 1) << lane & in_volume;
+      PlaceExactly(face, k, columns[k] & there, from, size, places);
     }
   }
-  return size;
 }
 
-HWY_ATTR inline void DrawTrianglesIn(const SmallTriangle* triangles, std::span<const BinItem> items,
+HWY_ATTR HWY_INLINE void PlaceVertices(const TriangleRuns& face, const int32_t from[3],
+                                       const int32_t size[3], FacePlaces& places) {
+  const hn::CappedTag<uint32_t, 4> d;
+  // Eight bits an axis, 64 too many so that none is negative: in the tile from 64 to 79.
+  uint32_t base = 0, short_by = 0;
+  for (int r = 0; r < 3; ++r) {
+    base += static_cast<uint32_t>(64 - from[r]) << (8 * r);
+    short_by += static_cast<uint32_t>(kTileSize - size[r]) << (8 * r);
+  }
+  const auto in_tile = hn::Set(d, 0x404040);
+  for (size_t i = 0; i < 4; i += hn::Lanes(d)) {
+    const auto voxel = hn::Add(hn::LoadU(d, face.vertices + i), hn::Set(d, base));
+    const auto beyond =
+        hn::Or(hn::Xor(voxel, in_tile), hn::Xor(hn::Add(voxel, hn::Set(d, short_by)), in_tile));
+    const auto drawn = hn::Eq(hn::And(beyond, hn::Set(d, 0xF0F0F0)), hn::Zero(d));
+    const auto at = hn::Or(hn::And(voxel, hn::Set(d, 0xF)),
+                           hn::Or(hn::And(hn::ShiftRight<4>(voxel), hn::Set(d, 0xF0)),
+                                  hn::And(hn::ShiftRight<8>(voxel), hn::Set(d, 0xF00))));
+    hn::StoreU(hn::Compress(at, drawn), d, places.at + places.size);
+    places.size += hn::CountTrue(d, drawn);
+  }
+}
+
+HWY_ATTR inline void DrawTrianglesIn(const TriangleMemory* parts, std::span<const BinItem> items,
                                      const int32_t* lo, const int32_t* hi, uint32_t* words,
                                      TileRows& touched) {
-  constexpr size_t kAhead = 8;
-  DrawBlock block;
-  size_t size = 0;
-  bool several = false;
+  constexpr size_t kAhead = 8, kFew = 16;
+  FacePlaces places;
+  const int32_t size[3] = {hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]};
+  const bool few = items.size() <= kFew;
+  if (!few) touched = TileRows::All();
   for (size_t i = 0; i < items.size(); ++i) {
-    if (i + kAhead < items.size()) hwy::Prefetch(triangles + items[i + kAhead].item);
-    const SmallTriangle& t = triangles[items[i].item];
-    TrianglePart part;
-    if (items[i].count() == 0 || !part.Set(t, lo, hi)) continue;
-    // Triangles may have nothing but their vertices.
-    if (size >= DrawBlock::kSize) {
-      RaiseBlock(block, size, words);
-      size = 0;
-      several = true;
+    if (i + kAhead < items.size() && items[i + kAhead].count() != 0) {
+      const BinItem& next = items[i + kAhead];
+      const TriangleRuns* const face = parts[next.part()].units.data() + next.item;
+      hwy::Prefetch(face);
+      hwy::Prefetch(face + 1);
+      hwy::Prefetch(face + 2);
     }
-    size = AddVertices(t, part, block, size);
-    if (t.n[0] != 0) size = DrawColumns<0>(t, part, block, size, several, words);
-    if (t.n[1] != 0) size = DrawColumns<1>(t, part, block, size, several, words);
-    if (t.n[2] != 0) size = DrawColumns<2>(t, part, block, size, several, words);
+    const BinItem& item = items[i];
+    if (item.count() == 0) continue;
+    const TriangleRuns& face = parts[item.part()].units.data()[item.item];
+    int32_t from[3];
+    for (int r = 0; r < 3; ++r) from[r] = lo[r] - face.origin[r];
+    const size_t begin = places.size;
+    PlaceFace(face, item, from, size, places);
+    PlaceVertices(face, from, size, places);
+    if (few) {
+      for (size_t p = begin; p < places.size; ++p) touched.Add(places.at[p]);
+    }
+    places.EndFace(begin, face.word);
+    if (places.size >= FacePlaces::kFull) RaisePlaces(places, words);
   }
-  RaiseLast(block, size, several, words, touched);
+  RaisePlaces(places, words);
 }
-
-#endif
 
 inline const char* TriangleTargetIn() { return hwy::TargetName(HWY_TARGET); }
 

@@ -11,10 +11,11 @@ namespace voxeld::gpu {
 namespace {
 
 uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
+  uint64_t triangles = 0;
+  for (const TriangleMemory& part : d.bins.triangles) triangles += part.units.capacity_bytes();
   return d.vertices.size() * sizeof(d.vertices[0]) +
          d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) +
-         d.bins.items.capacity_bytes() + d.bins.walks.capacity_bytes() +
-         d.bins.triangles.capacity_bytes();
+         d.bins.items.capacity_bytes() + d.bins.walks.capacity_bytes() + triangles;
 }
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread

@@ -195,32 +195,36 @@ TEST(Spans, OtherLinesAreNoWalks) {
       LineWalk::Of({{{250, 0, 0}}, {{260, 0, 0}}, 1, 1, LineSampling::kEuclidean}, grid, walk));
 }
 
+// What the definition draws of a triangle, and what small triangles do.
 void ExpectAsDefined(const Triangle& t, const TileGrid& grid, uint64_t* small, uint64_t* lit) {
   SmallTriangle fast;
-  if (!SmallTriangle::Of(t, WalkGrid(grid), fast)) return;
+  const WalkGrid axes(grid);
+  if (!SmallTriangle::Of(t, axes, fast)) return;
   ++*small;
   fast.word = kWord;
-  const WalkGrid axes(grid);
-  const SmallTriangleSlabs slabs(t);
-  const BinItem item{0, 1};
-  for (uint32_t tile = 0; tile < grid.count(); ++tile) {
+  const std::vector<uint8_t> owned(grid.count(), 1);
+  TriangleMemory memory;
+  FoundSpans found;
+  FindTriangles({&fast, 1}, 0, axes, owned.data(), memory, found);
+  Drawn want, got;
+  EmitTriangle(t, Whole(grid), [&](int32_t x, int32_t y, int32_t z, uint32_t) {
+    want[grid.TileOf(x, y, z)].at[grid.IndexInTile(x, y, z)] = kWord;
+  });
+  *lit += want.size();
+  std::map<uint32_t, TileRows> rows;
+  for (size_t i = 0; i < found.size; ++i) {
+    const uint32_t tile = found.tiles.data()[i];
+    ASSERT_LT(tile, grid.count());
     const Box3 box = grid.VoxelsOf(tile);
-    Words want, got;
-    bool any = false;
-    EmitTriangle(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
-      want.at[grid.IndexInTile(x, y, z)] = kWord;
-      any = true;
-    });
-    int32_t lo[3], hi[3], ijk[3];
+    int32_t lo[3], hi[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
-    TileRows touched;
-    DrawTriangles(&fast, {&item, 1}, lo, hi, got.at, touched);
-    ASSERT_TRUE(Holds(touched, got)) << "tile " << tile;
-    ASSERT_TRUE(got == want) << "tile " << tile;
-    grid.Coordinates(tile, ijk);
-    ASSERT_TRUE(!any || slabs.MayMeet(ijk[0], ijk[1], ijk[2])) << "tile " << tile;
-    *lit += any;
+    TileRows& touched = rows[tile];
+    Words& words = got[tile];
+    DrawTriangles({&memory, 1}, {found.items.data() + i, 1}, lo, hi, words.at, touched);
+    ASSERT_TRUE(Holds(touched, words)) << "tile " << tile;
   }
+  std::erase_if(got, [](const auto& drawn) { return drawn.second == Words(); });
+  ASSERT_TRUE(got == want);
 }
 
 TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
@@ -229,7 +233,7 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
   ForEachVectorTarget(TriangleTarget, [&] {
     Random random(seed);
     uint64_t small = 0, lit = 0;
-    for (int i = 0; i < 4000; ++i) {
+    for (int i = 0; i < 6000; ++i) {
       const TileGrid grid = TileGrid::Of(37, 48, 33, i % 3);
       const int64_t extent = i % 4 == 0 ? 62 : i % 4 == 1 ? 3 : 20;
       Triangle t;
@@ -246,8 +250,45 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
         return;
       }
     }
-    EXPECT_GT(small, 3000u);
-    EXPECT_GT(lit, 2000u);
+    EXPECT_GT(small, 5000u);
+    EXPECT_GT(lit, 3000u);
+  });
+}
+
+// Corners on corners, centres and quarters of voxels, where depths are whole numbers and edges run through centres; and
+// planes that rise as fast along two axes or three.
+TEST(SmallTriangles, OfRoundPlacesEqualTheirDefinition) {
+  const uint64_t seed = Seed();
+  ForEachVectorTarget(TriangleTarget, [&] {
+    Random random(seed);
+    uint64_t small = 0, lit = 0;
+    for (int i = 0; i < 9000; ++i) {
+      const TileGrid grid = TileGrid::Of(40, 40, 40, i % 3);
+      const int64_t unit = i % 5 == 0 ? 64 : 128, offset = i % 2 == 0 ? 0 : 128;
+      const int64_t extent = (i % 3 == 0 ? 4 : i % 3 == 1 ? 12 : 30) * 256 / unit;
+      Triangle t;
+      for (int a = 0; a < 3; ++a) {
+        for (Int3& v : t.v) v[a] = 5 * 256 + offset + random.Int(0, extent) * unit;
+      }
+      if (i % 7 < 3) {
+        // Edges of the same length along two axes, up or down.
+        const int64_t p = random.Int(-extent, extent) / 2 * unit,
+                      q = random.Int(-extent, extent) / 2 * unit;
+        const Int3 c{{20 * 256 + offset, 20 * 256 + offset, 20 * 256 + offset}};
+        t.v[0] = t.v[1] = t.v[2] = c;
+        t.v[1][i % 3] += p;
+        t.v[1][(i + 1) % 3] += random.Int(0, 1) == 0 ? p : -p;
+        t.v[2][(i + 1 + i % 2) % 3] += q;
+        t.v[2][(i + 2) % 3] += random.Int(0, 1) == 0 ? q : -q;
+      }
+      ExpectAsDefined(t, grid, &small, &lit);
+      if (testing::Test::HasFatalFailure()) {
+        ADD_FAILURE() << "triangle " << i;
+        return;
+      }
+    }
+    EXPECT_GT(small, 7000u);
+    EXPECT_GT(lit, 7000u);
   });
 }
 
@@ -258,8 +299,10 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
     Random random(seed);
     const TileGrid grid = TileGrid::Of(16, 16, 16);
     const Box3 box = grid.VoxelsOf(0);
-    std::vector<SmallTriangle> triangles;
-    std::vector<BinItem> items;
+    const uint8_t owned = 1;
+    TriangleMemory memory;
+    FoundSpans found;
+    uint64_t small = 0;
     Words want, got;
     for (uint32_t i = 0; i < 3000; ++i) {
       Triangle t;
@@ -270,17 +313,17 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
       }
       SmallTriangle fast;
       if (!SmallTriangle::Of(t, WalkGrid(grid), fast)) continue;
+      ++small;
       fast.word = kWord + i;
-      items.push_back({static_cast<uint32_t>(triangles.size()), 1});
-      triangles.push_back(fast);
+      FindTriangles({&fast, 1}, 0, WalkGrid(grid), &owned, memory, found);
       EmitTriangle(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
         uint32_t& at = want.at[grid.IndexInTile(x, y, z)];
         at = std::max(at, fast.word);
       });
     }
-    ASSERT_GT(triangles.size(), 2000u);
+    ASSERT_GT(small, 2000u);
     TileRows touched;
-    DrawTriangles(triangles.data(), items, box.lo, box.hi, got.at, touched);
+    DrawTriangles({&memory, 1}, {found.items.data(), found.size}, box.lo, box.hi, got.at, touched);
     EXPECT_TRUE(Holds(touched, got));
     EXPECT_TRUE(got == want);
   });
