@@ -36,6 +36,7 @@ struct Times {
   std::vector<double> apply, assemble, slice, copy, device, host, ceiling;
   std::vector<std::vector<double>> peers;
   gpu::FrameResult last;
+  uint32_t most_tiles = 0;  // drawn for a frame, also of those that are not counted
 
   void Add(const FrameTimes& frame) {
     apply.push_back(static_cast<double>(frame.apply_ns) / kMs);
@@ -101,6 +102,7 @@ absl::StatusOr<Times> Measure(Subject& subject, Alone& alone, Beside& beside, in
     if (!go_on()) return absl::CancelledError("interrupted");
     const absl::StatusOr<FrameTimes> frame = subject.Draw();
     if (!frame.ok()) return frame.status();
+    times.most_tiles = std::max(times.most_tiles, frame->result.tiles_drawn);
     if (absl::Status status = alone.Draw(subject, round >= 0); !status.ok()) return status;
     const absl::StatusOr<double> ceiling = TimeOf(*beside.ceiling);
     if (!ceiling.ok()) return ceiling.status();
@@ -156,6 +158,7 @@ json RowOf(const Scene& scene, const FrameOptions& options, int threads, const S
               {"voxels_are", scene.voxels != 0 ? "drawn" : "lit"},
               {"scene_voxels", scene.scene_voxels != 0 ? json(scene.scene_voxels) : json(nullptr)},
               {"lit_voxels", times.last.lit_voxels},
+              {"tiles", {{"drawn", times.last.tiles_drawn}, {"most", times.most_tiles}}},
               {"rounds", options.rounds},
               {"device_ms", SpreadJson(device)},
               {"host_ms", SpreadJson(times.host)},

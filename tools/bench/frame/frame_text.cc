@@ -37,6 +37,8 @@ std::string FrameText(const json& report) {
                           double(row["gvoxel_per_s"]));
     absl::StrAppendFormat(&out, "  %-8s %s, %.4g Gvoxel/s\n", "host", SpreadText(row["host_ms"]),
                           double(row["host_gvoxel_per_s"]));
+    absl::StrAppendFormat(&out, "  %-8s %d of %d\n", "tiles", uint64_t(row["tiles"]["drawn"]),
+                          uint64_t(row["tiles"]["most"]));
     absl::StrAppendFormat(&out, "  %-8s %s\n", "apply", SpreadText(row["apply_ms"]));
     absl::StrAppendFormat(&out, "  ceiling  %.4g ms: %s; %s takes %.3g times as long\n",
                           double(row["ceiling"]["ms"]), std::string(row["ceiling"]["name"]),

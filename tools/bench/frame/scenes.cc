@@ -92,43 +92,30 @@ Scene Replaced(const std::string& name, gpu::Target target, uint64_t count, int3
 }
 
 constexpr int32_t kMovingVoxels = 20;
-constexpr size_t kInCube = 1000;
 
-// `changed` of `count` lines, wherever they lie.
-Scene Moving(uint64_t count, uint64_t changed, const std::string& which, uint64_t seed) {
-  Scene scene =
-      OneLayer(absl::StrCat("moving, ", which), Stack(512, 512, 256, PixelFormat::kBitPlanes3));
-  const Extent extent = ExtentOf(scene.target, false);
-  LineSet lines(seed);
-  while (lines.lines() < count - changed) lines.AddOfLength(extent, kMovingVoxels);
-  if (lines.lines() > 0) scene.contents.push_back(lines.Take());
-  for (std::vector<Content>& set : scene.changing) {
-    while (lines.lines() < changed) lines.AddOfLength(extent, kMovingVoxels);
-    set.push_back(lines.Take());
-  }
-  scene.voxels = changed * kMovingVoxels;
-  scene.scene_voxels = count * kMovingVoxels;
-  return scene;
-}
-
-// Those that lie in a cube of an eighth of each side, at most kInCube of them, stay in it.
-Scene MovingInCube(uint64_t count, uint64_t seed) {
+// Of `count` lines those that lie in a box at the volume's corner, `side` of it along each axis, at
+// most `most` of them: they change, and stay in it.
+Scene MovingInBox(uint64_t count, double side, size_t most, const std::string& where,
+                  uint64_t seed) {
   Scene scene = OneLayer("", Stack(512, 512, 256, PixelFormat::kBitPlanes3));
   const Extent all = ExtentOf(scene.target, false);
-  const Extent cube{{0, 0, 0}, {all.hi[0] / 8, all.hi[1] / 8, all.hi[2] / 8}};
+  Extent box{{0, 0, 0}, {}};
+  for (size_t a = 0; a < 3; ++a) {
+    box.hi[a] = std::max(2 * kMovingVoxels, static_cast<int32_t>(std::lround(all.hi[a] * side)));
+  }
   LineSet lines(seed);
   while (lines.lines() < count) lines.AddOfLength(all, kMovingVoxels);
   Content everywhere = lines.Take(), still, inside;
   const auto is_inside = [&](size_t vertex) {
     for (size_t a = 0; a < 3; ++a) {
-      if (everywhere.positions[vertex * 3 + a] >= static_cast<float>(cube.hi[a])) return false;
+      if (everywhere.positions[vertex * 3 + a] >= static_cast<float>(box.hi[a])) return false;
     }
     return true;
   };
   still.record = inside.record = everywhere.record;
   for (size_t vertex = 0; vertex < everywhere.colors.size(); vertex += 2) {
     const bool moves =
-        inside.colors.size() / 2 < kInCube && is_inside(vertex) && is_inside(vertex + 1);
+        inside.colors.size() / 2 < most && is_inside(vertex) && is_inside(vertex + 1);
     Content& to = moves ? inside : still;
     for (size_t v = vertex; v < vertex + 2; ++v) {
       to.colors.push_back(everywhere.colors[v]);
@@ -136,11 +123,11 @@ Scene MovingInCube(uint64_t count, uint64_t seed) {
     }
   }
   const size_t changed = inside.colors.size() / 2;
-  while (lines.lines() < changed) lines.AddOfLength(cube, kMovingVoxels);
-  scene.contents.push_back(std::move(still));
+  while (lines.lines() < changed) lines.AddOfLength(box, kMovingVoxels);
+  if (!still.colors.empty()) scene.contents.push_back(std::move(still));
   scene.changing[0].push_back(std::move(inside));
   scene.changing[1].push_back(lines.Take());
-  scene.name = absl::StrCat("moving, ", changed, " in a cube");
+  scene.name = absl::StrCat("moving, ", changed, " in ", where);
   scene.voxels = changed * kMovingVoxels;
   scene.scene_voxels = count * kMovingVoxels;
   return scene;
@@ -318,13 +305,14 @@ Scene LitRotor(uint64_t seed) {
 
 gpu::Target LargeStack() { return Stack(1024, 1024, 256, PixelFormat::kBitPlanes3); }
 
+// What changes lies in a part of the volume, and what is dirty with it.
 std::vector<MakeScene> MovingRows(uint64_t seed, double share) {
   const uint64_t count = Share(1'000'000, share);
-  std::vector<MakeScene> rows = {[=] { return MovingInCube(count, seed); }};
+  std::vector<MakeScene> rows = {[=] { return MovingInBox(count, 1.0 / 8, 1000, "a cube", seed); }};
   for (const int percent : {1, 5, 20, 50, 100}) {
     rows.push_back([=] {
-      return Moving(count, Share(static_cast<double>(count), percent / 100.0),
-                    absl::StrCat(percent, " %"), seed);
+      return MovingInBox(count, std::cbrt(percent / 100.0), count,
+                         absl::StrCat(percent, " % of the volume"), seed);
     });
   }
   return rows;
