@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gpu/delta.h"
+#include "gpu/ranks/ranked_engine.h"
 #include "gpu/worker/worker_engine.h"
 
 namespace voxeld::daemon {
@@ -230,7 +231,8 @@ void EngineCare::OnResult(const absl::StatusOr<gpu::FrameResult>& result) {
   const std::shared_ptr<Attempt> attempt = std::exchange(attempt_, nullptr);
   Retire(attempt);
   const absl::Status status = attempt->status.ok() ? result.status() : attempt->status;
-  if (absl::IsDataLoss(status) && attempt->there && !gpu::IsLate(status)) {
+  const bool excused = gpu::IsLate(status) || gpu::IsOutOfMemory(status);
+  if (absl::IsDataLoss(status) && attempt->there && !excused) {
     return OnFault(*attempt, status);
   }
   if (!status.ok()) return StayAway(std::string(status.message()));

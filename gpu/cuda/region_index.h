@@ -51,7 +51,7 @@ class RegionIndex {
 
   // Marks the regions of drawables.
   absl::Status Mark(std::span<const uint32_t> slots, uint8_t* region_dirty);
-  // Drops them. An error leaves all as it was.
+  // Drops them. An error leaves them listed, some of them dark: to be called again.
   absl::Status Drop(std::span<const uint32_t> slots);
 
   // Merges batches of like size. Want of memory is no error, unless there are more than

@@ -26,7 +26,7 @@ absl::StatusOr<Block> Uploader::Upload(const UploadPlan& plan) {
   absl::StatusOr<Block> block = device_.pool().Acquire(plan.size());
   if (comm_ == nullptr || plan.size() < kBroadcastFrom) {
     if (!block.ok()) return block;
-    if (absl::Status status = CopyAll(plan, *block); !status.ok()) return status;
+    if (absl::Status status = CopyAll(plan, *block); !status.ok()) return GivenUp(status);
     return block;
   }
   if (!block.ok() && !absl::IsResourceExhausted(block.status())) return block;
@@ -38,8 +38,13 @@ absl::StatusOr<Block> Uploader::Upload(const UploadPlan& plan) {
         absl::StrCat("another GPU of this display is out of memory for the ", plan.size(),
                      " bytes of a delta; show less, or on larger devices"));
   }
-  if (absl::Status status = Broadcast(plan, *block); !status.ok()) return status;
+  if (absl::Status status = Broadcast(plan, *block); !status.ok()) return GivenUp(status);
   return block;
+}
+
+absl::Status Uploader::GivenUp(const absl::Status& why) {
+  for (cudaStream_t stream : {device_.copies(), device_.stream()}) cudaStreamSynchronize(stream);
+  return why;
 }
 
 absl::Status Uploader::Wait() {

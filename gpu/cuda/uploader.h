@@ -37,6 +37,8 @@ class Uploader final : public RankLink {
   absl::Status OpenLibrary(const std::string& library);
   absl::Status CopyAll(const UploadPlan& plan, const Block& block);
   absl::Status Broadcast(const UploadPlan& plan, const Block& block);
+  // Copies that were queued before an error end before their memory goes.
+  absl::Status GivenUp(const absl::Status& why);
   absl::StatusOr<bool> AllHave(bool mine);
 
   Device& device_;

@@ -22,6 +22,10 @@ const absl::Status& StatusOf(const absl::StatusOr<T>& result) {
   return result.status();
 }
 
+int64_t TimeOf(const FrameResult& frame) {
+  return frame.assemble_ns + frame.slice_ns + frame.copy_ns;
+}
+
 class RankedEngine final : public Engine {
  public:
   RankedEngine(const EngineOptions& options, std::string reason)
@@ -175,7 +179,12 @@ class RankedEngine final : public Engine {
       if (setup_.has_value()) return;
       failed = failed_;
     }
-    if (!failed.ok()) return Settle(failed);
+    if (!failed.ok()) {
+      return Settle(absl::Status(
+          failed.code(),
+          absl::StrCat(failed.message(),
+                       "; with engine.nccl = \"off\" each GPU copies for itself, without NCCL")));
+    }
     absl::StrAppend(&info_.reason, "; deltas go to ", NameOf(0),
                     " and from there to the others by NCCL");
     Settle(absl::OkStatus());
@@ -279,8 +288,13 @@ class RankedEngine final : public Engine {
       return StatusOf(result).code() == first.code();
     });
     if (same) return first;
-    const absl::Status lost = Lost(absl::DataLossError(absl::StrCat(
-        "the ranks of the display do not agree any more: ", Named(odd, first).message())));
+    absl::Status apart = absl::DataLossError(absl::StrCat(
+        "the ranks of the display do not agree any more: ", Named(odd, first).message()));
+    const bool full = std::all_of(all.begin(), all.end(), [](const Result& result) {
+      return StatusOf(result).ok() || absl::IsResourceExhausted(StatusOf(result));
+    });
+    if (full) apart.SetPayload(kOutOfMemoryPayload, absl::Cord());
+    const absl::Status lost = Lost(apart);
     GiveUp(lost);
     return lost;
   }
@@ -298,9 +312,12 @@ class RankedEngine final : public Engine {
       sum.pictures_drawn += one.pictures_drawn;
       // Every rank has the whole scene.
       sum.singular_drawables = std::max(sum.singular_drawables, one.singular_drawables);
-      sum.assemble_ns = std::max(sum.assemble_ns, one.assemble_ns);
-      sum.slice_ns = std::max(sum.slice_ns, one.slice_ns);
-      sum.copy_ns = std::max(sum.copy_ns, one.copy_ns);
+      // Those of the rank that took longest, so that together they are a frame's.
+      if (TimeOf(one) > TimeOf(sum)) {
+        sum.assemble_ns = one.assemble_ns;
+        sum.slice_ns = one.slice_ns;
+        sum.copy_ns = one.copy_ns;
+      }
       sum.packed_as_drawn = sum.packed_as_drawn && one.packed_as_drawn;
       sum.memory_bytes += one.memory_bytes;
     }
@@ -385,6 +402,10 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateRankedEngine(const EngineOptions& 
   auto engine = std::make_unique<RankedEngine>(options, std::move(reason));
   if (absl::Status status = engine->Open(); !status.ok()) return status;
   return engine;
+}
+
+bool IsOutOfMemory(const absl::Status& status) {
+  return status.GetPayload(kOutOfMemoryPayload).has_value();
 }
 
 }  // namespace voxeld::gpu

@@ -21,9 +21,14 @@ namespace voxeld::gpu {
 // - What one rank refuses all refuse, with nothing changed. Where they differ (memory that runs out
 //   on one GPU in the middle of a call), and where one is lost, all are: their processes are ended,
 //   and EngineOptions::lost is told once, when the last has gone.
-// - FrameResult: `changed` if one says so; times are the longest; the rest are sums. A voxel counts
+// - FrameResult: `changed` if one says so; times are those of the rank that took longest; the rest are sums. A voxel counts
 //   once, but a tile as often as ranks draw it.
 absl::StatusOr<std::unique_ptr<Engine>> CreateRankedEngine(const EngineOptions& options,
                                                            std::string reason);
+
+// Whether a DataLoss says that some GPU of a display had no memory for what the others did: none is
+// faulty, and nothing in the scene is.
+bool IsOutOfMemory(const absl::Status& status);
+inline constexpr char kOutOfMemoryPayload[] = "voxeld.dev/out-of-memory";
 
 }  // namespace voxeld::gpu

@@ -234,6 +234,19 @@ TEST_F(CoreEngine, ThatIsLateIsNoFaultOfTheScene) {
   EXPECT_THAT(script_->shared, ElementsAre(true, false, false, true));
 }
 
+// Of one GPU of several: nothing in the scene is to blame, and nothing is searched for.
+TEST_F(CoreEngine, RanksOfUnequalMemoryAreNoFaultOfTheScene) {
+  Draw("one", -0.5f);
+  script_->unequal = 2;
+  Draw("two", 0.5f);
+  EXPECT_EQ(Outcome(), Kind::kPresented);
+  Advance(4 * sync::kSecond);
+  EXPECT_EQ(Figures().engine, "cuda");
+  EXPECT_THAT(Figures().pinned_entities, IsEmpty());
+  // At the start; unequal; whole and shared: no part of the scene was tried.
+  EXPECT_THAT(script_->shared, ElementsAre(true, false, false, true));
+}
+
 TEST_F(CoreEngine, WithoutMemoryForTheSceneGivesWayToTheCpu) {
   Draw("one", -0.5f);
   script_->full = true;

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "gpu/cpu/cpu_engine.h"
 #include "gpu/engine.h"
+#include "gpu/ranks/ranked_engine.h"
 #include "gpu/worker/call_channel.h"
 #include "tests/daemon/fakes/recording_engine.h"
 
@@ -23,12 +24,13 @@ struct GpuScript {
   int faults = 0;                 // the next frames fault, whatever they draw
   bool broken = false;            // every frame faults
   int late = 0;                   // the next frames' answers do not come in time
-  bool full = false;              // frames are refused for want of memory
-  absl::Status absent;            // not OK: engines come, and then cannot be had
-  bool wrong = false;             // frames have other bytes than they should
-  bool slow_cpu = false;          // the CPU's frames wait for RunCpu
-  std::vector<bool> shared;       // of each GPU engine made: in the process that all share
-  int cpu_engines = 0;            // made
+  int unequal = 0;           // frames for which one of several GPUs has no memory: all are lost
+  bool full = false;         // frames are refused for want of memory
+  absl::Status absent;       // not OK: engines come, and then cannot be had
+  bool wrong = false;        // frames have other bytes than they should
+  bool slow_cpu = false;     // the CPU's frames wait for RunCpu
+  std::vector<bool> shared;  // of each GPU engine made: in the process that all share
+  int cpu_engines = 0;       // made
   std::vector<std::function<void()>> cpu_frames;
 
   void RunCpu() {
@@ -85,6 +87,13 @@ class FaultyGpu final : public gpu::Engine {
     }
     if (!gpu_) return engine_->SubmitFrame(request, buffer, std::move(done));
     if (script_->full) return done(absl::ResourceExhaustedError("the device is out of memory"));
+    if (script_->unequal > 0) {
+      --script_->unequal;
+      gone_ = true;
+      absl::Status status = absl::DataLossError("the ranks of the display do not agree any more");
+      status.SetPayload(gpu::kOutOfMemoryPayload, absl::Cord());
+      return done(status);
+    }
     if (script_->late > 0) {
       --script_->late;
       gone_ = true;

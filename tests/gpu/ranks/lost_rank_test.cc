@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "display/sync/mutex.h"
+#include "gpu/ranks/ranked_engine.h"
 #include "gpu/worker/worker_engine.h"
 #include "tests/conformance/scene_generator.h"
 #include "tests/gpu/ranks/rank_options.h"
@@ -132,6 +133,7 @@ TEST_F(LostRank, RanksThatDifferAreLost) {
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
   EXPECT_THAT(status.message(),
               AllOf(HasSubstr("do not agree any more: GPU "), HasSubstr("no room")));
+  EXPECT_TRUE(IsOutOfMemory(status));
   EXPECT_EQ(engine.Frame().status().code(), absl::StatusCode::kDataLoss);
   EXPECT_THAT(AwaitLoss().message(), HasSubstr("do not agree"));
 }

@@ -145,10 +145,10 @@ TEST(FrameScenes, OfWhatMovesTheStatedPartIsNew) {
     EXPECT_GE(static_cast<double>(changed), shares[row] * 100'000 * 0.6) << scene.name;
     const double side = std::cbrt(shares[row]);
     for (const auto& set : scene.changing) {
-      ExpectInside(set, {0, 0, 0},
-                   {static_cast<int32_t>(std::lround(512 * side)),
-                    static_cast<int32_t>(std::lround(512 * side)),
-                    static_cast<int32_t>(std::lround(256 * side))});
+      ExpectInside(
+          set, {0, 0, 0},
+          {static_cast<float>(std::lround(512 * side)), static_cast<float>(std::lround(512 * side)),
+           static_cast<float>(std::lround(256 * side))});
       EXPECT_EQ(CountLines(set).lines, changed);
       EXPECT_EQ(CountLines(set).voxels, scene.voxels);
     }

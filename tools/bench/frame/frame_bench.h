@@ -34,7 +34,8 @@ struct FrameOptions {
 // {rows: [{scene, engine, device, threads, gpus, voxels, voxels_are ("drawn" or "lit"), scene_voxels, lit_voxels,
 // rounds, device_ms {median, least, greatest}, host_ms {…}, apply_ms {…}, gvoxel_per_s (device), host_gvoxel_per_s,
 // ceiling {name, ms}, ratio (of the host's time to it, or of slicing alone), peers: [{name, ms, ratio (of the device's
-// time)}], stages {apply, assemble, slice, door: share of all}, slicing_only, volumes_per_s {asked, reached} or
+// time)}], stages {apply, assemble, slice, copy, door: share of
+// all}, tiles {drawn (of the last frame), most}, slicing_only, volumes_per_s {asked, reached} or
 // null, and with FrameOptions::gpus: reason (how they are linked), one_gpu {device_ms, host_ms, apply_ms, as above},
 // speedup {device, host: one GPU's time by theirs, the median over rounds}, same_bytes}]}. `progress` takes a line for each row; false from `go_on` ends it with Cancelled. InvalidArgument names the
 // option.
