@@ -206,6 +206,7 @@ void ExpectAllDifferent(const Message& message) {
     const auto* field = descriptor->field(i);
     if (field->is_repeated() || field->message_type() != nullptr) continue;
     EXPECT_TRUE(reflection->HasField(message, field)) << field->full_name();
+    if (field->cpp_type() == field->CPPTYPE_BOOL) continue;  // all of them are true
     Message alone;
     google::protobuf::Message* copy = alone.New();
     copy->CopyFrom(message);
@@ -336,6 +337,16 @@ TEST(Encode, StatsHaveEveryFigure) {
   EXPECT_EQ(message.displays(0).assemble().p50_ns(), 50);
   EXPECT_EQ(message.displays(0).slice().max_ns(), 56);
   EXPECT_EQ(message.displays(0).copy().max_ns(), 86);
+  d.packed_as_drawn = false;
+  message.Clear();
+  Encode(stats, &message);
+  EXPECT_FALSE(message.displays(0).packed_as_drawn());
+  EXPECT_TRUE(message.displays(0).volume_held());
+  d.packed_as_drawn = true, d.volume_held = false;
+  message.Clear();
+  Encode(stats, &message);
+  EXPECT_TRUE(message.displays(0).packed_as_drawn());
+  EXPECT_FALSE(message.displays(0).volume_held());
   EXPECT_EQ(message.displays(0).waiting().p50_ns(), 72);
   EXPECT_EQ(message.displays(0).transferring().p50_ns(), 76);
   EXPECT_EQ(message.displays(0).showing().p50_ns(), 80);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -81,15 +82,22 @@ TEST(PackedPlan, GroupsOfAPartHaveItsSlicesAlone) {
   EXPECT_EQ(slices, 30);
 }
 
-TEST(PackedPlan, SlicesInNoOrderAreOneGroup) {
+TEST(PackedPlan, SlicesFromTheTopDownAreGroupsToo) {
   Display display(16, 16, 64);
-  std::swap(display.stack.positions_mm[3], display.stack.positions_mm[60]);
+  std::reverse(display.stack.positions_mm.begin(), display.stack.positions_mm.end());
   display.geometry.shape = display.stack;
   const std::optional<PackedPlan> plan = display.Plan(0, 64);
   ASSERT_TRUE(plan);
-  ASSERT_EQ(plan->groups.size(), 1u);
-  EXPECT_EQ(plan->groups[0].z_end, 64);
-  EXPECT_EQ(plan->groups[0].end, 64);
+  EXPECT_EQ(plan->slice_of_z[0], 63);
+  int32_t z = 0;
+  for (const PackedPlan::Group& group : plan->groups) {
+    for (; z < group.z_end; ++z) {
+      EXPECT_GE(plan->slice_of_z[static_cast<size_t>(z)], group.begin) << z;
+      EXPECT_LT(plan->slice_of_z[static_cast<size_t>(z)], group.end) << z;
+    }
+  }
+  EXPECT_EQ(plan->groups.size(), 4u);
+  EXPECT_EQ(z, 64);
 }
 
 TEST(PackedPlan, LeavesEverythingElseToSlicing) {

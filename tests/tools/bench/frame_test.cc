@@ -260,7 +260,7 @@ TEST(FrameBench, RowsHaveTheirFields) {
     ASSERT_THAT(row["peers"], SizeIs(1));
     EXPECT_GT(double(row["peers"][0]["ratio"]), 0);
     EXPECT_TRUE(row["volumes_per_s"].is_null());
-    ASSERT_THAT(row["stages"], SizeIs(4));
+    ASSERT_THAT(row["stages"], SizeIs(5));
     for (const auto& [stage, share] : row["stages"].items()) {
       EXPECT_GE(double(share), 0) << stage;
       EXPECT_LE(double(share), 1) << stage;

@@ -101,7 +101,7 @@ Scene MovingInBox(uint64_t count, double side, size_t most, const std::string& w
   const Extent all = ExtentOf(scene.target, false);
   Extent box{{0, 0, 0}, {}};
   for (size_t a = 0; a < 3; ++a) {
-    box.hi[a] = std::max(2 * kMovingVoxels, static_cast<int32_t>(std::lround(all.hi[a] * side)));
+    box.hi[a] = std::max(kMovingVoxels + 1, static_cast<int32_t>(std::lround(all.hi[a] * side)));
   }
   LineSet lines(seed);
   while (lines.lines() < count) lines.AddOfLength(all, kMovingVoxels);
