@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "display/sync/mutex.h"
+#include "gpu/worker/await.h"
 #include "gpu/worker/worker_engine.h"
 #include "gpu/worker/worker_staging.h"
 
@@ -226,26 +227,9 @@ class RankedEngine final : public Engine {
   template <typename Result, typename Each>
   void Ask(std::function<void(Result)> done, Each each) {
     if (!options_.inline_execution) return Send<Result>(std::move(done), std::move(each));
-    struct Box {
-      sync::Mutex mutex;
-      sync::CondVar changed;
-      std::optional<Result> result VOXELD_GUARDED_BY(mutex);
-    };
-    const auto box = std::make_shared<Box>();
-    Send<Result>(
-        [box](Result result) {
-          sync::MutexLock lock(box->mutex);
-          box->result = std::move(result);
-          box->changed.NotifyAll();
-        },
-        std::move(each));
-    std::optional<Result> result;
-    {
-      sync::MutexLock lock(box->mutex);
-      while (!box->result.has_value()) box->changed.Wait(box->mutex);
-      result = std::move(box->result);
-    }
-    done(*std::move(result));
+    done(Await<Result>([&](std::function<void(Result)> answer) {
+      Send<Result>(std::move(answer), std::move(each));
+    }));
   }
 
   template <typename Result, typename Each>

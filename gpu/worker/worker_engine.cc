@@ -20,6 +20,7 @@
 #include "display/crc/crc32c.h"
 #include "display/sync/mutex.h"
 #include "gpu/checks.h"
+#include "gpu/worker/await.h"
 #include "gpu/worker/bulk_ledger.h"
 #include "gpu/worker/call_channel.h"
 #include "gpu/worker/frame_slot.h"
@@ -256,25 +257,6 @@ class WorkerEngine final : public RankWorker {
       });
     }
     return absl::OkStatus();
-  }
-
-  // Waits for what `ask` is answered.
-  template <typename Result, typename AskFor>
-  static Result Await(AskFor&& ask) {
-    struct Box {
-      sync::Mutex mutex;
-      sync::CondVar changed;
-      std::optional<Result> result VOXELD_GUARDED_BY(mutex);
-    };
-    auto box = std::make_shared<Box>();
-    ask([box](Result result) {
-      sync::MutexLock lock(box->mutex);
-      box->result = std::move(result);
-      box->changed.NotifyAll();
-    });
-    sync::MutexLock lock(box->mutex);
-    while (!box->result.has_value()) box->changed.Wait(box->mutex);
-    return *std::move(box->result);
   }
 
   // Has `ask` answered to `done`: on the engine's thread, or inside this call if calls are inline.

@@ -1,0 +1,32 @@
+// Waiting for an answer that comes by a call.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "display/sync/mutex.h"
+
+namespace voxeld::gpu {
+
+// What ask(answer) has `answer`, a function of a Result, called with, once: from any thread, or
+// inside `ask`.
+template <typename Result, typename AskFor>
+Result Await(AskFor&& ask) {
+  struct Box {
+    sync::Mutex mutex;
+    sync::CondVar changed;
+    std::optional<Result> result VOXELD_GUARDED_BY(mutex);
+  };
+  auto box = std::make_shared<Box>();
+  ask([box](Result result) {
+    sync::MutexLock lock(box->mutex);
+    box->result = std::move(result);
+    box->changed.NotifyAll();
+  });
+  sync::MutexLock lock(box->mutex);
+  while (!box->result.has_value()) box->changed.Wait(box->mutex);
+  return *std::move(box->result);
+}
+
+}  // namespace voxeld::gpu
