@@ -1,7 +1,6 @@
 // Waiting for an answer that comes by a call.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <utility>
 
@@ -18,15 +17,15 @@ Result Await(AskFor&& ask) {
     sync::CondVar changed;
     std::optional<Result> result VOXELD_GUARDED_BY(mutex);
   };
-  auto box = std::make_shared<Box>();
-  ask([box](Result result) {
-    sync::MutexLock lock(box->mutex);
-    box->result = std::move(result);
-    box->changed.NotifyAll();
+  Box box;
+  ask([&box](Result result) {
+    sync::MutexLock lock(box.mutex);
+    box.result = std::move(result);
+    box.changed.NotifyAll();
   });
-  sync::MutexLock lock(box->mutex);
-  while (!box->result.has_value()) box->changed.Wait(box->mutex);
-  return *std::move(box->result);
+  sync::MutexLock lock(box.mutex);
+  while (!box.result.has_value()) box.changed.Wait(box.mutex);
+  return *std::move(box.result);
 }
 
 }  // namespace voxeld::gpu
