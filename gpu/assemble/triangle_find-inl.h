@@ -223,6 +223,7 @@ struct TileHits {
     std::fill_n(rows, 128, uint16_t{0});
   }
   HWY_INLINE void HitRows(int32_t at, uint64_t bits) {
+    at &= 127;  // beyond them lies what has no rows
     rows[at] = static_cast<uint16_t>(rows[at] | bits);
     hits[at >> 6] |= uint64_t{(bits & 0xFFFF) != 0} << (at & 63);
   }
@@ -255,6 +256,7 @@ HWY_ATTR HWY_INLINE void SetColumns(const RunFinder& runs, const LineTest* lines
   const VS fall_u = hn::Set(d, static_cast<int32_t>(face.fall_u));
   const VS fall_v = hn::Set(d, static_cast<int32_t>(face.fall_v));
   const VS err = hn::Set(d, static_cast<int32_t>(face.err)), one = hn::Set(d, 1);
+  const VS five_bits = hn::Set(d, 31);  // of what is wanted; the rest may be anything
   // Two at least, of which the second may have nothing: seldom are there more, and a branch could not be foreseen.
   const int32_t count_v = std::max(2, tiles.count[v]), count_a = std::max(2, tiles.count[a]);
   VS k = hn::Iota(d, 0);
@@ -277,8 +279,8 @@ HWY_ATTR HWY_INLINE void SetColumns(const RunFinder& runs, const LineTest* lines
       const VS first = hn::Max(run_first, origin);
       const VS end = hn::Min(run_end, hn::Set(d, from + kTileSize));
       const auto some = hn::And(there, hn::Lt(first, end));
-      const VS bits =
-          hn::Sub(hn::Shl(one, hn::Sub(end, origin)), hn::Shl(one, hn::Sub(first, origin)));
+      const VS bits = hn::Sub(hn::Shl(one, hn::And(hn::Sub(end, origin), five_bits)),
+                              hn::Shl(one, hn::And(hn::Sub(first, origin), five_bits)));
       hn::StoreU(hn::DemoteTo(d16, hn::IfThenElseZero(some, bits)), d16, face.columns(tv) + row);
       const VS p = hn::Add(depth, hn::Mul(first, fall_v)),
                q = hn::Add(depth, hn::Mul(hn::Sub(end, one), fall_v));
