@@ -245,7 +245,9 @@ class RankedEngine final : public Engine {
             if (--joint->left > 0) return;
             for (std::optional<Result>& one : joint->results) all.push_back(*std::move(one));
           }
-          done(Join(all));
+          Result joined = Join(all);
+          all.clear();  // whoever is told has the only copy of an error
+          done(std::move(joined));
         }));
       }
     };

@@ -98,8 +98,8 @@ class WorkerEngine final : public RankWorker {
 
   void SetTarget(Target target, Done done) override {
     const std::vector<std::byte> bytes = EncodeTarget(target);
-    const absl::StatusOr<SegmentPool::Lease> lease = results_.Acquire(bytes.size());
-    if (!lease.ok()) return Refuse(std::move(done), lease.status());
+    absl::StatusOr<SegmentPool::Lease> lease = results_.Acquire(bytes.size());
+    if (!lease.ok()) return Refuse(std::move(done), std::move(lease).status());
     std::memcpy((*lease)->segment->bytes().data(), bytes.data(), bytes.size());
     {
       sync::MutexLock lock(mutex_);
@@ -127,15 +127,15 @@ class WorkerEngine final : public RankWorker {
   }
 
   void Apply(StagingBlock block, size_t size, Done done) override {
-    if (const auto delta = CheckDelta(block, size); !delta.ok()) {
-      return Refuse(std::move(done), delta.status());
+    if (auto delta = CheckDelta(block, size); !delta.ok()) {
+      return Refuse(std::move(done), std::move(delta).status());
     }
     absl::StatusOr<BulkLedger::Change> change =
         BulkLedger::ChangeOf(block.bytes().first(size), block.referred());
     if (change.ok()) {
       if (absl::Status status = Show(block.referred()); !status.ok()) change = status;
     }
-    if (!change.ok()) return Refuse(std::move(done), change.status());
+    if (!change.ok()) return Refuse(std::move(done), std::move(change).status());
     const auto* memory = static_cast<const LeasedMemory*>(block.memory().get());
     SegmentPool::Lease lease = memory->lease();
     block = {};
@@ -156,7 +156,7 @@ class WorkerEngine final : public RankWorker {
 
   void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) override {
     absl::StatusOr<Slot> slot = TakeSlot(buffer);
-    if (!slot.ok()) return Refuse(std::move(done), slot.status());
+    if (!slot.ok()) return Refuse(std::move(done), std::move(slot).status());
     Ask<absl::StatusOr<FrameResult>>(std::move(done), [&](auto answer) {
       const FrameMessage sent{slot->lease->id,          request.frame,
                               slot->lease->holds,       request.buffer_holds,
@@ -174,8 +174,8 @@ class WorkerEngine final : public RankWorker {
   }
 
   void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) override {
-    const absl::StatusOr<SegmentPool::Lease> lease = results_.Acquire(out.size_bytes());
-    if (!lease.ok()) return Refuse(std::move(done), lease.status());
+    absl::StatusOr<SegmentPool::Lease> lease = results_.Acquire(out.size_bytes());
+    if (!lease.ok()) return Refuse(std::move(done), std::move(lease).status());
     Ask<absl::Status>(std::move(done), [&](auto answer) {
       channel_->Call(
           MakeMessage(MessageType::kVoxels, 0, VoxelsMessage{(*lease)->id, box, out.size()}),
@@ -271,9 +271,11 @@ class WorkerEngine final : public RankWorker {
 
   // An answer in its turn, without asking the worker.
   template <typename DoneFunction>
-  void Refuse(DoneFunction done, const absl::Status& status) {
-    if (options_.inline_execution) return done(status);
-    channel_->Later([done = std::move(done), status] { done(status); });
+  void Refuse(DoneFunction done, absl::Status status) {
+    if (options_.inline_execution) return done(std::move(status));
+    channel_->Later([done = std::move(done), status = std::move(status)]() mutable {
+      done(std::move(status));
+    });
   }
 
   // A segment for a frame, and the target (counted) that it is for.
