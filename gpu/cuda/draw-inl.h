@@ -78,7 +78,7 @@ constexpr int kBlocksAtOnce = kWhat == DrawWhat::kOneLayer ? 2
 template <DrawWhat kWhat, DrawTo kTo>
 __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
     DrawRegionsKernel(const __grid_constant__ DrawView view) {
-  DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(shared_memory);
+  DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(SharedMemory());
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
   const uint32_t dirty = *view.listed;

@@ -56,9 +56,12 @@ struct RegionScratch {
 };
 
 // What a block of threads draws: first in its shared memory.
-extern __shared__ __align__(16) unsigned char shared_memory[];
+__device__ inline unsigned char* SharedMemory() {
+  extern __shared__ __align__(16) unsigned char shared_memory[];
+  return shared_memory;
+}
 __device__ inline RegionScratch& SharedRegion() {
-  return *reinterpret_cast<RegionScratch*>(shared_memory);
+  return *reinterpret_cast<RegionScratch*>(SharedMemory());
 }
 
 // Of the layer under way: rows of pairs, of a tile and a batch each.

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#if defined(VOXELD_TEST_CUDA)
+#if defined(VOXELD_TEST_CUDA) || defined(VOXELD_TEST_SIMT)
 #include "gpu/cuda/cuda_engine.h"
 #endif
 #include "tests/conformance/engine_driver.h"
@@ -26,6 +26,8 @@ inline std::vector<EngineCase> EngineCases() {
 #if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
     {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
         CaseOf("cuda_worker", EngineKind::kCuda, true),
+#elif defined(VOXELD_TEST_SIMT)  // with a CPU for a GPU
+    {"cuda_simt", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
 #else
     CaseOf("cpu", EngineKind::kCpu, false), CaseOf("cpu_worker", EngineKind::kCpu, true),
         CaseOf("cpu_ranks", EngineKind::kCpu, true, {0, 1}),

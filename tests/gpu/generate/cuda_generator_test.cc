@@ -1,6 +1,7 @@
 // The generator on a GPU: the CPU's bytes, for every sampling and form; and what it refuses.
 //
-// VOXELD_SEGMENTS: how many random ones (default 200,000); VOXELD_SEED: of them.
+// VOXELD_SEGMENTS: how many random ones (default 200,000, where a CPU plays the GPU 5,000);
+// VOXELD_SEED: of them.
 #include "gpu/cuda/cuda_generator.h"
 
 #include <gmock/gmock.h>
@@ -26,6 +27,12 @@ using generate::testing::Adversarial;
 using generate::testing::RandomSegments;
 using generate::testing::SegmentD;
 using ::testing::HasSubstr;
+
+#if defined(VOXELD_TEST_SIMT)
+constexpr uint64_t kSegments = 5'000;
+#else
+constexpr uint64_t kSegments = 200'000;
+#endif
 
 uint64_t Number(const char* name, uint64_t otherwise) {
   const char* text = std::getenv(name);
@@ -103,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(Forms, CudaGeneratorFar,
                          NameOf);
 
 TEST_P(CudaGeneratorTest, ManyRandomSegmentsAreTheCpusBytes) {
-  const uint64_t seed = Number("VOXELD_SEED", 1), count = Number("VOXELD_SEGMENTS", 200'000);
+  const uint64_t seed = Number("VOXELD_SEED", 1), count = Number("VOXELD_SEGMENTS", kSegments);
   // Short ones, nine in ten, and longer ones; on whole voxels, two in ten.
   std::vector<SegmentD> segments = RandomSegments(seed, count, 12, false);
   const auto whole = RandomSegments(seed + 1, count / 5 + 1, 12, true);
@@ -116,7 +123,7 @@ TEST_P(CudaGeneratorTest, ManyRandomSegmentsAreTheCpusBytes) {
 // A few hundred voxels each: warps go from one to the next, some with many short ones among them.
 TEST_P(CudaGeneratorTest, LongerSegmentsAndMixedLengthsAreTheCpusBytes) {
   const uint64_t seed = Number("VOXELD_SEED", 1),
-                 count = Number("VOXELD_SEGMENTS", 200'000) / 10 * 13;
+                 count = Number("VOXELD_SEGMENTS", kSegments) / 10 * 13;
   std::vector<SegmentD> segments = RandomSegments(seed + 3, count, 430, false);
   const auto whole = RandomSegments(seed + 4, count / 3 + 1, 430, true);
   for (size_t i = 0; i < count; i += 3) segments[i] = whole[i / 3];

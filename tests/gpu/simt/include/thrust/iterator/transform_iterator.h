@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+
+namespace thrust {
+
+// What `function` makes of an array's values.
+template <typename Function, typename Iterator>
+struct transform_iterator {
+  Iterator from;
+  Function function;
+  auto operator[](size_t i) const { return function(from[i]); }
+};
+
+template <typename Function, typename Iterator>
+transform_iterator<Function, Iterator> make_transform_iterator(Iterator from, Function function) {
+  return {from, function};
+}
+
+}  // namespace thrust
