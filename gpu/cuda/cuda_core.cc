@@ -12,9 +12,10 @@
 
 namespace voxeld::gpu::cuda {
 
-CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part)
+CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part, const Tuning& tuning)
     : device_(std::move(device)),
       part_(part),
+      tuning_(tuning),
       uploader_(*device_),
       stopwatch_(*device_),
       volume_(*device_, uploader_) {}
@@ -69,7 +70,7 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   const sync::TimeNs start = clock.Now();
   using Mark = Stopwatch::Mark;
   if (absl::Status status = stopwatch_.Set(Mark::kBegun); !status.ok()) return status;
-  const bool together = volume_.IsSmall();
+  const bool together = volume_.item_count() < tuning_.few_items;
   absl::Status status = volume_.Prepare(pictures_->GroupsOfRegions(together));
   if (!status.ok()) return status;
   const PackedView* const packed = pictures_->packed();

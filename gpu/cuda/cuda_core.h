@@ -12,6 +12,7 @@
 #include "gpu/cuda/cuda_volume.h"
 #include "gpu/cuda/device.h"
 #include "gpu/cuda/stopwatch.h"
+#include "gpu/cuda/tuning.h"
 #include "gpu/cuda/uploader.h"
 #include "gpu/engine.h"
 
@@ -20,7 +21,7 @@ namespace voxeld::gpu::cuda {
 // Thread-bound, but for where it was made. An error leaves it as it was, unless it is DataLoss.
 class CudaCore {
  public:
-  CudaCore(std::unique_ptr<Device> device, SlicePart part);
+  CudaCore(std::unique_ptr<Device> device, SlicePart part, const Tuning& tuning = {});
 
   absl::Status SetTarget(const Target& target);
   absl::Status Apply(const StagingBlock& block, size_t size);
@@ -31,6 +32,7 @@ class CudaCore {
  private:
   const std::unique_ptr<Device> device_;
   const SlicePart part_;
+  const Tuning tuning_;
   std::optional<display::FrameLayout> layout_;  // the target's
   Uploader uploader_;
   Stopwatch stopwatch_;

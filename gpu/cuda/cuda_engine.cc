@@ -11,7 +11,8 @@ namespace voxeld::gpu {
 
 absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& options,
                                                          std::string reason,
-                                                         const cuda::FaultPlan& faults) {
+                                                         const cuda::FaultPlan& faults,
+                                                         const cuda::Tuning& tuning) {
   absl::StatusOr<std::unique_ptr<cuda::Device>> device = cuda::Device::Open(options.device);
   if (!device.ok()) return device.status();
   const cudaDeviceProp& properties = (*device)->api().device();
@@ -22,7 +23,7 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& op
   }
   (*device)->api().SetFaults(faults);
   const EngineInfo info = {EngineKind::kCuda, (*device)->api().device().name, std::move(reason)};
-  auto core = std::make_unique<cuda::CudaCore>(*std::move(device), options.part);
+  auto core = std::make_unique<cuda::CudaCore>(*std::move(device), options.part, tuning);
   return std::make_unique<CoreEngine<cuda::CudaCore>>(options, info, std::move(core));
 }
 

@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "gpu/cuda/api.h"
+#include "gpu/cuda/tuning.h"
 #include "gpu/engine.h"
 
 namespace voxeld::gpu {
@@ -13,6 +14,7 @@ namespace voxeld::gpu {
 // `reason`: for EngineInfo. FailedPrecondition if there is no device that can be used.
 absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& options,
                                                          std::string reason,
-                                                         const cuda::FaultPlan& faults = {});
+                                                         const cuda::FaultPlan& faults = {},
+                                                         const cuda::Tuning& tuning = {});
 
 }  // namespace voxeld::gpu

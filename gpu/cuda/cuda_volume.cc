@@ -255,11 +255,10 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
   });
 }
 
-bool CudaVolume::IsSmall() const {
-  constexpr uint64_t kFewItems = 100'000;
-  uint64_t items = live_items_;
+uint64_t CudaVolume::item_count() const {
+  uint64_t items = live_items_ + lines_.live() + triangles_.live();
   for (const Drawable* drawable : pending_) items += drawable->geometry->view.record.vertex_count;
-  return items + lines_.live() + triangles_.live() < kFewItems;
+  return items;
 }
 
 absl::Status CudaVolume::Prepare(const DrawGroups& groups) {

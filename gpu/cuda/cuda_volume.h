@@ -75,8 +75,7 @@ class CudaVolume final : private SceneObserver {
   // `packed`, straight into pictures.
   absl::Status Prepare(const DrawGroups& groups);
   absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed);
-  // Whether so little may be drawn that groups cost more than they hide.
-  bool IsSmall() const;
+  uint64_t item_count() const;
 
   // The colours of voxels, after a frame; for who asks. `out` is on the device.
   absl::Status Read(const Box3& box, uint32_t* out);

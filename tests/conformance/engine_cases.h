@@ -25,9 +25,18 @@ inline std::vector<EngineCase> EngineCases() {
   return {
 #if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
     {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
+        // In groups, as large scenes are.
+        {"cuda_groups",
+         [](const EngineOptions& options) {
+           return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
+         }},
         CaseOf("cuda_worker", EngineKind::kCuda, true),
 #elif defined(VOXELD_TEST_SIMT)  // with a CPU for a GPU
     {"cuda_simt", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
+        // In groups, as large scenes are.
+        {"cuda_simt_groups", [](const EngineOptions& options) {
+           return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
+         }},
 #else
     CaseOf("cpu", EngineKind::kCpu, false), CaseOf("cpu_worker", EngineKind::kCpu, true),
         CaseOf("cpu_ranks", EngineKind::kCpu, true, {0, 1}),

@@ -85,6 +85,16 @@ TEST_P(OwnResolution, LinesOverAllEdgesEqualTheOracle) {
   }
 }
 
+// More lines in each neighbourhood than any list of an engine takes at once.
+TEST_P(OwnResolution, CrowdsEqualTheOracle) {
+  const Target target = StackOf(120, 100, 60, display::PixelFormat::kBitPlanes3);
+  const SceneModel scene = RandomLines(Seed() + 2, 40'000, target.geometry.grid);
+  EngineDriver engine = Make();
+  ASSERT_TRUE(engine.SetTarget(target).ok());
+  ASSERT_TRUE(engine.Apply(Whole(scene)).ok());
+  ExpectLikeOracle(engine, scene, target);
+}
+
 TEST_P(OwnResolution, PartsJoinedEqualTheWhole) {
   const Target target = StackOf(64, 40, 50, display::PixelFormat::kBitPlanes3);
   const SceneModel scene = RandomLines(Seed() + 1, 150, target.geometry.grid);
