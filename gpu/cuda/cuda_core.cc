@@ -78,6 +78,7 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
       volume_.view(), request.frame, buffer, request.buffer_holds, together,
       [&](uint32_t group) { return volume_.DrawGroup(group, pictures_->index(), packed); },
       stopwatch_, result);
+  if (status.ok()) status = volume_.ClearCounters();
   if (!status.ok()) return status;
   const Mark assembled = packed != nullptr ? Mark::kPacked : Mark::kAssembled;
   const absl::StatusOr<int64_t> assemble = stopwatch_.Between(Mark::kBegun, assembled);

@@ -1,6 +1,8 @@
 #include "gpu/cuda/cuda_volume.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -59,6 +61,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   view_ = view;
   scene_.MapClips(view_, true);
   listed_ = all_dirty;
+  counted_ = true;
   index_.Clear();
   lines_.Reset(tiles_.grid, tiles_.owned_here);
   triangles_.Reset(tiles_.grid, tiles_.owned_here);
@@ -148,12 +151,26 @@ absl::Status CudaVolume::PutLayers() {
 
 absl::Status CudaVolume::MarkPairs(std::span<const uint32_t> slots) {
   const absl::StatusOr<UploadedList> list =
-      UploadList(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
+      UploadItems(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
   if (!list.ok()) return list.status();
   if (list->items == 0) return absl::OkStatus();
   return device_.Run("MarkTiles", [&] {
     return MarkTiles(table_.as<TableEntry>(), list->list, list->items, tiles_.view(),
                      device_.stream());
+  });
+}
+
+// Those of `left_` that the index of pairs goes on naming.
+absl::Status CudaVolume::KillPairs() {
+  std::vector<uint32_t> slots;
+  std::copy_if(left_.begin(), left_.end(), std::back_inserter(slots),
+               [&](uint32_t slot) { return slots_[slot].indexed_by == IndexedBy::kPairs; });
+  if (slots.empty()) return absl::OkStatus();
+  const absl::StatusOr<Block> there = device_.Upload(slots.data(), slots.size());
+  if (!there.ok()) return there.status();
+  return device_.Run("Kill", [&] {
+    return Kill(table_.as<TableEntry>(), there->as<uint32_t>(), static_cast<uint32_t>(slots.size()),
+                device_.stream());
   });
 }
 
@@ -174,13 +191,8 @@ absl::Status CudaVolume::MarkLeft() {
     marks_.clear();
   }
   if (left_.empty()) return absl::OkStatus();
-  const absl::StatusOr<Block> slots = device_.Upload(left_.data(), left_.size());
-  if (!slots.ok()) return slots.status();
-  absl::Status status = device_.Run("Kill", [&] {
-    return Kill(table_.as<TableEntry>(), slots->as<uint32_t>(), static_cast<uint32_t>(left_.size()),
-                device_.stream());
-  });
-  if (!status.ok()) return status;
+  if (absl::Status status = KillPairs(); !status.ok()) return status;
+  absl::Status status;
   for (RegionIndex* index : {&IndexOf(IndexedBy::kLines), &IndexOf(IndexedBy::kTriangles)}) {
     if (status = index->Drop(left_); !status.ok()) return status;
   }
@@ -276,9 +288,9 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
     });
     if (!status.ok()) return status;
   }
-  status = device_.Zero(volume.counters->dirty, sizeof(volume.counters->dirty));
+  if (counted_) status = device_.Zero(volume.counters->dirty, sizeof(volume.counters->dirty));
   if (!status.ok()) return status;
-  listed_ = true;
+  listed_ = counted_ = true;
   groups_ = groups;
   return device_.Run("ListDirty",
                      [&] { return ListDirty(volume, tiles_.regions, groups, device_.stream()); });
@@ -294,6 +306,13 @@ absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
   view.listed = &view.volume.counters->dirty[group];
   absl::Status status = Draw(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
   if (status.ok() && group + 1 == groups_.count) listed_ = false;
+  return status;
+}
+
+absl::Status CudaVolume::ClearCounters() {
+  absl::Status status =
+      device_.Zero(tiles_.counters.as<Counters>(), offsetof(Counters, lit_voxels));
+  counted_ = !status.ok();
   return status;
 }
 

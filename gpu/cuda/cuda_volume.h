@@ -75,6 +75,8 @@ class CudaVolume final : private SceneObserver {
   // `packed`, straight into pictures.
   absl::Status Prepare(const DrawGroups& groups);
   absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed);
+  // After the frame's counters have been fetched: they begin anew.
+  absl::Status ClearCounters();
   uint64_t item_count() const;
 
   // The colours of voxels, after a frame; for who asks. `out` is on the device.
@@ -112,6 +114,7 @@ class CudaVolume final : private SceneObserver {
   RegionIndex& IndexOf(IndexedBy by) {
     return by == IndexedBy::kLines ? static_cast<RegionIndex&>(lines_) : triangles_;
   }
+  absl::Status KillPairs();
   absl::Status MarkLeft();
   absl::Status MarkPairs(std::span<const uint32_t> slots);
   absl::Status Enter();
@@ -141,6 +144,7 @@ class CudaVolume final : private SceneObserver {
   DeviceTiles tiles_;
   Affine view_;
   bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
+  bool counted_ = true;  // the counters have begun
   DrawGroups groups_;    // of the frame under way
   PairIndex index_;      // of all that the others do not have
   LineIndex lines_;

@@ -138,13 +138,22 @@ absl::Status CudaVolume::GrowTable() {
 absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
                                       std::span<const TableEntry> entries) {
   if (absl::Status status = GrowTable(); !status.ok()) return status;
+  const uint32_t count = static_cast<uint32_t>(slots.size());
+  if (count <= kFewRows) {
+    FewEntries few;
+    std::copy(slots.begin(), slots.end(), few.slots);
+    std::copy(entries.begin(), entries.end(), few.entries);
+    return device_.Run("PutEntries", [&] {
+      return PutFewEntries(table_.as<TableEntry>(), few, count, device_.stream());
+    });
+  }
   const absl::StatusOr<Block> uploaded = device_.Upload(entries.data(), entries.size());
   if (!uploaded.ok()) return uploaded.status();
   const absl::StatusOr<Block> places = device_.Upload(slots.data(), slots.size());
   if (!places.ok()) return places.status();
   return device_.Run("PutEntries", [&] {
     return PutEntries(table_.as<TableEntry>(), uploaded->as<TableEntry>(), places->as<uint32_t>(),
-                      static_cast<uint32_t>(slots.size()), device_.stream());
+                      count, device_.stream());
   });
 }
 
@@ -216,7 +225,7 @@ absl::Status CudaVolume::Enter() {
 absl::Status CudaVolume::EnterPairs(std::span<const uint32_t> slots) {
   if (slots.empty()) return absl::OkStatus();
   const absl::StatusOr<UploadedList> list =
-      UploadList(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
+      UploadItems(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
   if (!list.ok()) return list.status();
   return index_.Add(table_.as<TableEntry>(), looks_.as<LayerLook>(), list->list, list->items,
                     tiles_.view());
@@ -254,7 +263,7 @@ absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* co
 
 absl::Status CudaVolume::EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving) {
   const absl::StatusOr<UploadedList> list =
-      UploadList(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
+      UploadItems(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
   if (!list.ok()) return list.status();
   return index.Add(table_.as<TableEntry>(),
                    {.layer = layer,

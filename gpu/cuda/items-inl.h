@@ -20,10 +20,10 @@ __device__ inline uint64_t Thread() {
 
 // Which drawable of the list has item `i` of the row.
 __device__ inline uint32_t DrawableOf(const ItemList& list, uint64_t i) {
-  uint32_t low = 0, high = list.count;  // first[low] ≤ i < first[high]
+  uint32_t low = 0, high = list.count;  // first(low) ≤ i < first(high)
   while (high - low > 1) {
     const uint32_t middle = low + (high - low) / 2;
-    (list.first[middle] <= i ? low : high) = middle;
+    (list.first(middle) <= i ? low : high) = middle;
   }
   return low;
 }

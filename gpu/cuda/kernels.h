@@ -15,6 +15,8 @@ namespace voxeld::gpu::cuda {
 // table[slots[i]] = entries[i].
 cudaError_t PutEntries(TableEntry* table, const TableEntry* entries, const uint32_t* slots,
                        uint32_t count, cudaStream_t stream);
+cudaError_t PutFewEntries(TableEntry* table, const FewEntries& few, uint32_t count,
+                          cudaStream_t stream);
 // The table has moved: every record's address is set anew.
 cudaError_t Rebase(TableEntry* table, uint32_t count, cudaStream_t stream);
 cudaError_t Kill(TableEntry* table, const uint32_t* slots, uint32_t count, cudaStream_t stream);

@@ -19,8 +19,8 @@ template <typename F>
 __device__ void ForTiles(const TableEntry* table, const ItemList& list, uint64_t i,
                          const VolumeView& volume, F&& f) {
   const uint32_t d = DrawableOf(list, i);
-  const uint32_t slot = list.slots[d];
-  const uint32_t item = static_cast<uint32_t>(i - list.first[d]);
+  const uint32_t slot = list.slot(d);
+  const uint32_t item = static_cast<uint32_t>(i - list.first(d));
   const TableEntry& entry = table[slot];
   if (entry.record.kind == kDrawnByCpu) return f(slot, entry, item, entry.drawn.tiles[item]);
   WithPrimitive(entry.record.kind, [&](auto primitive) {
@@ -37,6 +37,21 @@ __global__ void PutEntriesKernel(TableEntry* table, const TableEntry* entries,
   TableEntry& to = table[slots[i]];
   to = entries[i];
   to.source.record = &to.record;
+}
+
+// By one block, word by word.
+__global__ void PutFewEntriesKernel(TableEntry* table, const __grid_constant__ FewEntries few,
+                                    uint32_t count) {
+  constexpr uint32_t kWords = sizeof(TableEntry) / sizeof(uint32_t);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t* const from = reinterpret_cast<const uint32_t*>(&few.entries[i]);
+    uint32_t* const to = reinterpret_cast<uint32_t*>(&table[few.slots[i]]);
+    for (uint32_t w = threadIdx.x; w < kWords; w += kThreads) to[w] = from[w];
+  }
+  __syncthreads();
+  if (threadIdx.x >= count) return;
+  TableEntry& entry = table[few.slots[threadIdx.x]];
+  entry.source.record = &entry.record;
 }
 
 __global__ void RebaseKernel(TableEntry* table, uint32_t count) {
@@ -123,6 +138,12 @@ __global__ void FindRowsKernel(const uint64_t* keys, uint32_t pairs, uint32_t ti
 cudaError_t PutEntries(TableEntry* table, const TableEntry* entries, const uint32_t* slots,
                        uint32_t count, cudaStream_t stream) {
   PutEntriesKernel<<<Blocks(count), kThreads, 0, stream>>>(table, entries, slots, count);
+  return cudaGetLastError();
+}
+
+cudaError_t PutFewEntries(TableEntry* table, const FewEntries& few, uint32_t count,
+                          cudaStream_t stream) {
+  PutFewEntriesKernel<<<1, kThreads, 0, stream>>>(table, few, count);
   return cudaGetLastError();
 }
 

@@ -53,8 +53,8 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
   const uint64_t i = Thread();
   if (i >= items) return;
   const uint32_t d = DrawableOf(list, i);
-  const TableEntry& entry = table[list.slots[d]];
-  const uint32_t item = static_cast<uint32_t>(i - list.first[d]);
+  const TableEntry& entry = table[list.slot(d)];
+  const uint32_t item = static_cast<uint32_t>(i - list.first(d));
   const Line line = entry.record.kind == PrimitiveKind::kPoints
                         ? Points::ItemOf(entry.source, item)
                         : Segments::ItemOf(entry.source, item);
@@ -69,7 +69,7 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
 // Line `i` of the rows.
 __device__ uint64_t LineAt(const ItemList& list, uint64_t i) {
   const uint32_t d = DrawableOf(list, i);
-  return list.slots[d] + (i - list.first[d]);
+  return list.slot(d) + (i - list.first(d));
 }
 
 __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, const ThinLine* from,
@@ -125,8 +125,44 @@ struct PieceScratch {
   uint16_t order[kStaged];
 };
 
+// Up to so many chunks each sums the blocks for itself, which takes less than one more kernel.
+constexpr uint32_t kFewLineChunks = 32;
+bool SumsWhereFilled(const RegionGrid& grid, uint32_t count) {
+  return grid.block_count() <= kMostSortedBlocks && count <= kFewLineChunks * kLineChunk;
+}
+
+// What ScanBlocksKernel does, by each block for itself: begin[b] where the pieces of b begin. The first
+// writes down what others want to know.
+__device__ void SumBlocksHere(const LineSort& sort, uint32_t* begin) {
+  using Scan = cub::BlockScan<uint32_t, kThreads>;
+  __shared__ typename Scan::TempStorage pieces_scan, chunks_scan;
+  constexpr uint32_t kEach = kMostSortedBlocks / kThreads;
+  const uint32_t blocks = sort.grid.block_count();
+  uint32_t pieces[kEach], chunks[kEach], all_pieces, all_chunks;
+  for (uint32_t e = 0; e < kEach; ++e) {
+    const uint32_t b = threadIdx.x * kEach + e;
+    pieces[e] = b < blocks ? sort.block_counts[b] : 0;
+    chunks[e] = (pieces[e] + kPieceChunk - 1) / kPieceChunk;
+  }
+  Scan(pieces_scan).ExclusiveSum(pieces, pieces, all_pieces);
+  Scan(chunks_scan).ExclusiveSum(chunks, chunks, all_chunks);
+  for (uint32_t e = 0; e < kEach; ++e) {
+    const uint32_t b = threadIdx.x * kEach + e;
+    if (b >= blocks) break;
+    begin[b] = pieces[e];
+    if (blockIdx.x != 0) continue;
+    sort.block_begin[b] = pieces[e];
+    sort.chunk_begin[b] = chunks[e];
+  }
+  if (blockIdx.x == 0 && threadIdx.x == 0) {
+    sort.block_begin[blocks] = all_pieces;
+    sort.chunk_begin[blocks] = all_chunks;
+  }
+}
+
+// `sum`: block_begin is not there yet.
 __global__ void __launch_bounds__(kThreads)
-    FillPiecesKernel(LineSort sort, const ThinLine* lines, uint32_t count) {
+    FillPiecesKernel(LineSort sort, const ThinLine* lines, uint32_t count, bool sum) {
   extern __shared__ __align__(16) unsigned char memory[];
   const uint32_t blocks = sort.grid.block_count();
   const bool staged = blocks <= kMostSortedBlocks;
@@ -135,9 +171,14 @@ __global__ void __launch_bounds__(kThreads)
       reinterpret_cast<uint32_t*>(memory + (staged ? sizeof(PieceScratch) : 0));  // by block
   const uint32_t* const offsets = sort.line_offsets + static_cast<size_t>(blockIdx.x) * blocks;
   for (uint32_t b = threadIdx.x; b < blocks; b += kThreads) found[b] = 0;
+  const uint32_t* begin = sort.block_begin;
+  if (sum) {
+    SumBlocksHere(sort, found + blocks);
+    begin = found + blocks;
+  }
   __syncthreads();
   const auto put = [&](uint32_t b, uint32_t rank, LinePiece piece) {
-    const uint32_t place = sort.block_begin[b] + offsets[b] + rank;
+    const uint32_t place = begin[b] + offsets[b] + rank;
     if (place < sort.piece_capacity) sort.pieces[place] = piece;
   };
   uint32_t mine = 0;
@@ -333,6 +374,11 @@ __global__ void __launch_bounds__(kThreads, 4)
       offsets[2 * lane + 1] = static_cast<uint16_t>(before + low);
       scratch.at[2 * lane] = before;
       scratch.at[2 * lane + 1] = before + low;
+      if (sort.dirty != nullptr) {
+        uint8_t* const dirty = sort.dirty + static_cast<size_t>(b) * kRegionsInBlock + 2 * lane;
+        if (low != 0) dirty[0] = 1;
+        if (high != 0) dirty[1] = 1;
+      }
       uint64_t any = static_cast<uint64_t>(low != 0) << 2 * lane | static_cast<uint64_t>(high != 0)
                                                                        << (2 * lane + 1);
       for (int lanes = 16; lanes > 0; lanes /= 2) any |= __shfl_xor_sync(kAll, any, lanes);
@@ -387,11 +433,17 @@ size_t BlockNumbersShared(const RegionGrid& grid) {
   return size_t{grid.block_count()} * sizeof(uint32_t);
 }
 
+size_t FillShared(const RegionGrid& grid, bool sum) {
+  const size_t staged = grid.block_count() <= kMostSortedBlocks ? sizeof(PieceScratch) : 0;
+  return staged + BlockNumbersShared(grid) * (sum ? 2 : 1);
+}
+
 }  // namespace
 
 size_t SortLinesShared(const RegionGrid& grid) {
-  const size_t staged = grid.block_count() <= kMostSortedBlocks ? sizeof(PieceScratch) : 0;
-  return staged + BlockNumbersShared(grid);
+  // What it has besides lies in static memory: less than so much.
+  constexpr size_t kSums = 4096;
+  return FillShared(grid, grid.block_count() <= kMostSortedBlocks) + kSums;
 }
 
 cudaError_t FindBounds(const float* positions, uint32_t count, uint32_t* bounds,
@@ -423,18 +475,20 @@ cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t co
   CountPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads, shared, stream>>>(
       sort, lines, count);
   if (error = cudaGetLastError(); error != cudaSuccess) return error;
+  if (SumsWhereFilled(sort.grid, count)) return cudaSuccess;
   ScanBlocksKernel<<<1, kScanThreads, 0, stream>>>(sort);
   return cudaGetLastError();
 }
 
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                        cudaStream_t stream) {
-  const size_t shared = SortLinesShared(sort.grid);
+  const bool sum = SumsWhereFilled(sort.grid, count);
+  const size_t shared = FillShared(sort.grid, sum);
   const cudaError_t error = cudaFuncSetAttribute(
       FillPiecesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared));
   if (error != cudaSuccess) return error;
   FillPiecesKernel<<<(count + kLineChunk - 1) / kLineChunk, kThreads, shared, stream>>>(sort, lines,
-                                                                                        count);
+                                                                                        count, sum);
   return cudaGetLastError();
 }
 

@@ -53,8 +53,8 @@ __global__ void MakeTrianglesKernel(const TableEntry* table, ItemList list, uint
   const uint64_t i = Thread();
   if (i >= items) return;
   const uint32_t d = DrawableOf(list, i);
-  const TableEntry& entry = table[list.slots[d]];
-  const Triangle t = Triangles::ItemOf(entry.source, static_cast<uint32_t>(i - list.first[d]));
+  const TableEntry& entry = table[list.slot(d)];
+  const Triangle t = Triangles::ItemOf(entry.source, static_cast<uint32_t>(i - list.first(d)));
   const bool erase = entry.erase != 0;
   const bool mixed = !erase && (t.color[0] != t.color[1] || t.color[1] != t.color[2]);
   Store(MakeCompact(t, MakeWord(entry.priority, erase, t.color[0]), mixed), &triangles[i]);
@@ -65,7 +65,7 @@ __global__ void MakeTrianglesKernel(const TableEntry* table, ItemList list, uint
 // Triangle `i` of the rows.
 __device__ uint64_t TriangleAt(const ItemList& list, uint64_t i) {
   const uint32_t d = DrawableOf(list, i);
-  return list.slots[d] + (i - list.first[d]);
+  return list.slot(d) + (i - list.first(d));
 }
 
 __global__ void CopyTrianglesKernel(ItemList list, uint64_t first, uint32_t count,
@@ -147,6 +147,9 @@ __global__ void __launch_bounds__(kScanThreads) SumRegionsKernel(TriangleSort so
       const uint4 four = first < regions ? *reinterpret_cast<const uint4*>(&sort.counts[first + e])
                                          : make_uint4(0, 0, 0, 0);
       counts[e] = four.x, counts[e + 1] = four.y, counts[e + 2] = four.z, counts[e + 3] = four.w;
+    }
+    for (uint32_t e = 0; e < kScanEach && sort.dirty != nullptr; ++e) {
+      if (counts[e] != 0) sort.dirty[first + e] = 1;
     }
     Scan(scan).ExclusiveSum(counts, counts, total);
     for (uint32_t e = 0; e < kScanEach && first < regions; e += 4) {

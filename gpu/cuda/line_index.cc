@@ -56,22 +56,22 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
   const size_t chunks = sort.piece_capacity / kPieceChunk + blocks;
   sort.grid = grid();
   // What the sorting alone needs.
-  Block block_counts, block_begin, line_offsets, pieces, span_count;
+  Block block_begin, line_offsets, pieces;
   struct Wanted {
     Block* block;
     size_t bytes;
     bool zero;
   };
   for (const Wanted& want : {
-           Wanted{&block_counts, blocks * sizeof(uint32_t), true},
            Wanted{&block_begin, (blocks + 1) * sizeof(uint32_t), false},
            Wanted{&line_offsets, line_chunks * blocks * sizeof(uint32_t), false},
            Wanted{&pieces, sort.piece_capacity * sizeof(LinePiece), false},
-           Wanted{&span_count, sizeof(uint32_t), true},
            Wanted{&batch.begin, (blocks + 1) * sizeof(uint32_t), false},
            Wanted{&batch.base, chunks * sizeof(uint32_t), false},
            Wanted{&batch.offsets, chunks * (kRegionsInBlock + 1) * sizeof(uint16_t), false},
-           Wanted{&batch.regions, blocks * sizeof(uint64_t), true},
+           // With what is counted behind it, so that all that begins as 0 is one.
+           Wanted{&batch.regions, blocks * (sizeof(uint64_t) + sizeof(uint32_t)) + sizeof(uint32_t),
+                  true},
            Wanted{&batch.spans, sort.span_capacity * sizeof(LineSpan), false},
        }) {
     *want.block = Block();  // of a try before
@@ -81,15 +81,15 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
     if (!block.ok()) return block.status();
     *want.block = *std::move(block);
   }
-  sort.block_counts = block_counts.as<uint32_t>();
   sort.block_begin = block_begin.as<uint32_t>();
   sort.line_offsets = line_offsets.as<uint32_t>();
   sort.pieces = pieces.as<LinePiece>();
-  sort.span_count = span_count.as<uint32_t>();
   sort.chunk_begin = batch.begin.as<uint32_t>();
   sort.base = batch.base.as<uint32_t>();
   sort.offsets = batch.offsets.as<uint16_t>();
   sort.regions = batch.regions.as<uint64_t>();
+  sort.block_counts = reinterpret_cast<uint32_t*>(sort.regions + blocks);
+  sort.span_count = sort.block_counts + blocks;
   sort.spans = batch.spans.as<LineSpan>();
   const ThinLine* const lines = batch.items.as<ThinLine>();
   const uint32_t* const ends = Ends(batch);
@@ -109,10 +109,11 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
   return status.ok() ? device().Wait() : status;
 }
 
-absl::Status LineIndex::Sort(Batch& batch) {
+absl::Status LineIndex::Sort(Batch& batch, uint8_t* region_dirty) {
   const uint64_t most_pieces = uint64_t{batch.count} * MostBoxes(grid().blocks, 0);
   const uint64_t most_spans = uint64_t{batch.count} * MostBoxes(grid().blocks, kBlockBits);
   LineSort sort;
+  sort.dirty = region_dirty;
   uint32_t needed[2] = {};
   if (most_spans * sizeof(LineSpan) <= kUncountedBytes) {
     sort.piece_capacity = static_cast<uint32_t>(most_pieces);

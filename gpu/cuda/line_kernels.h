@@ -31,7 +31,7 @@ inline float FromOrderedBits(uint32_t bits) {
 cudaError_t MakeLines(const TableEntry* table, const ItemList& list, uint32_t items,
                       ThinLine* lines, uint32_t* ends, cudaStream_t stream);
 
-// to[first + i] = from[slots[d] + …] for i up to `count`, item first + i of the list being the …-th of
+// to[first + i] = from[slot(d) + …] for i up to `count`, item first + i of the list being the …-th of
 // its d-th row. `ends_to` may be null; where `ends_from` is, a line's end is as its beginning.
 cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, const ThinLine* from,
                       const uint32_t* ends_from, ThinLine* to, uint32_t* ends_to,
@@ -41,7 +41,7 @@ cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, cons
 // Shared memory that the first go takes of a block of threads, at most.
 size_t SortLinesShared(const RegionGrid& grid);
 
-// After it block_begin and chunk_begin are there.
+// After the second of them block_begin and chunk_begin are there.
 cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                         cudaStream_t stream);
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
@@ -54,7 +54,7 @@ cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_
 // Those that have spans; `regions` by block as SpanLists has it.
 cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty,
                         cudaStream_t stream);
-// Of lines in rows, `count` in all; the first of the d-th is slots[d]. Marks the regions that they
+// Of lines in rows, `count` in all; the first of the d-th is slot(d). Marks the regions that they
 // touch.
 cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,
                       const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream);

@@ -154,6 +154,7 @@ struct LineSort {
   uint64_t* regions = nullptr;  // 0 at first
   LineSpan* spans = nullptr;
   uint32_t* span_count = nullptr;
+  uint8_t* dirty = nullptr;  // by region: those that have any are marked; or null
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "gpu/cuda/item_lists.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -69,8 +70,7 @@ absl::Status RegionIndex::Add(const TableEntry* table, const Arrivals& arrivals,
   batch.mixed = arrivals.mixed;
   absl::Status status = TakeItems(batch);
   if (status.ok()) status = Make(table, arrivals.list, batch);
-  if (status.ok()) status = Sort(batch);
-  if (status.ok() && arrivals.visible) status = MarkAll(batch, region_dirty);
+  if (status.ok()) status = Sort(batch, arrivals.visible ? region_dirty : nullptr);
   if (!status.ok()) return status;
   const uint64_t number = next_number_++;
   for (size_t i = 0; i < arrivals.slots.size(); ++i) {
@@ -116,13 +116,9 @@ absl::Status RegionIndex::TouchFound(const Batch& batch, Found& found, uint8_t* 
     total += member.count;
   }
   first.push_back(total);
-  const absl::StatusOr<Block> starts = device_.Upload(from.data(), from.size());
-  if (!starts.ok()) return starts.status();
-  const absl::StatusOr<Block> sums = device_.Upload(first.data(), first.size());
-  if (!sums.ok()) return sums.status();
-  const ItemList list{starts->as<uint32_t>(), sums->as<uint64_t>(),
-                      static_cast<uint32_t>(from.size())};
-  return Touch(list, static_cast<uint32_t>(total), batch, region_dirty);
+  const absl::StatusOr<UploadedList> rows = UploadList(device_, from, first);
+  if (!rows.ok()) return rows.status();
+  return Touch(rows->list, static_cast<uint32_t>(total), batch, region_dirty);
 }
 
 absl::Status RegionIndex::Mark(std::span<const uint32_t> slots, uint8_t* region_dirty) {
@@ -189,19 +185,14 @@ absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
   merged.live = merged.count;
   if (absl::Status status = TakeItems(merged); !status.ok()) return status;
   for (const Range& range : ranges) {
-    const uint64_t total = range.first.back() - range.first.front();
-    if (total == 0) continue;
-    const absl::StatusOr<Block> from = device_.Upload(range.from.data(), range.from.size());
-    if (!from.ok()) return from.status();
-    const absl::StatusOr<Block> first = device_.Upload(range.first.data(), range.first.size());
-    if (!first.ok()) return first.status();
-    const ItemList list{from->as<uint32_t>(), first->as<uint64_t>(),
-                        static_cast<uint32_t>(range.from.size())};
-    absl::Status status =
-        Copy(list, range.first.front(), static_cast<uint32_t>(total), *range.batch, merged);
+    if (range.from.empty()) continue;
+    const absl::StatusOr<UploadedList> rows = UploadList(device_, range.from, range.first);
+    if (!rows.ok()) return rows.status();
+    absl::Status status = Copy(rows->list, range.first.front(), static_cast<uint32_t>(rows->items),
+                               *range.batch, merged);
     if (!status.ok()) return status;
   }
-  if (absl::Status status = Sort(merged); !status.ok()) return status;
+  if (absl::Status status = Sort(merged, nullptr); !status.ok()) return status;
   const uint64_t number = next_number_++;
   for (size_t m = 0; m < merged.members.size(); ++m) {
     places_[merged.members[m].slot] = {number, m};

@@ -91,11 +91,11 @@ class RegionIndex {
   // `to` gets `count` items at `first` of the list, in which rows are those of `from`.
   virtual absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                             const Batch& to) = 0;
-  // Sorts the items by region.
-  virtual absl::Status Sort(Batch& batch) = 0;
+  // Sorts the items by region; with `region_dirty` marks the regions that have any.
+  virtual absl::Status Sort(Batch& batch, uint8_t* region_dirty) = 0;
   // Marks the regions that have any.
   virtual absl::Status MarkAll(const Batch& batch, uint8_t* region_dirty) = 0;
-  // Of items in rows, `count` in all, whose first is slots[d]: marks the regions that they touch, or,
+  // Of items in rows, `count` in all, whose first is slot(d): marks the regions that they touch, or,
   // without `region_dirty`, has them draw nothing from now on.
   virtual absl::Status Touch(const ItemList& list, uint32_t count, const Batch& batch,
                              uint8_t* region_dirty) = 0;

@@ -49,7 +49,7 @@ absl::Status TriangleIndex::Copy(const ItemList& list, uint64_t first, uint32_t 
   });
 }
 
-absl::Status TriangleIndex::Sort(Batch& batch) {
+absl::Status TriangleIndex::Sort(Batch& batch, uint8_t* region_dirty) {
   const size_t regions = grid().count();
   const CompactTriangle* const triangles = batch.items.as<CompactTriangle>();
   const absl::StatusOr<Block> counts = device().Zeros(regions * sizeof(uint32_t));
@@ -57,7 +57,8 @@ absl::Status TriangleIndex::Sort(Batch& batch) {
   absl::StatusOr<Block> begin = device().pool().Acquire((regions + 1) * sizeof(uint32_t));
   if (!begin.ok()) return begin.status();
   batch.begin = *std::move(begin);
-  TriangleSort sort{grid(), counts->as<uint32_t>(), batch.begin.as<uint32_t>(), nullptr, 0};
+  TriangleSort sort{grid(),      counts->as<uint32_t>(), batch.begin.as<uint32_t>(), nullptr, 0,
+                    region_dirty};
   absl::Status status = device().Run("CountTriangles", [&] {
     return CountTriangles(sort, triangles, batch.count, device().stream());
   });

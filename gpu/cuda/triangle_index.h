@@ -21,7 +21,7 @@ class TriangleIndex final : public RegionIndex {
   absl::Status Make(const TableEntry* table, const ItemList& list, const Batch& batch) override;
   absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                     const Batch& to) override;
-  absl::Status Sort(Batch& batch) override;
+  absl::Status Sort(Batch& batch, uint8_t* region_dirty) override;
   absl::Status MarkAll(const Batch& batch, uint8_t* region_dirty) override;
   absl::Status Touch(const ItemList& list, uint32_t count, const Batch& batch,
                      uint8_t* region_dirty) override;

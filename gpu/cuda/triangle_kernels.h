@@ -20,7 +20,7 @@ cudaError_t FindExtents(const float* positions, const uint32_t* indices, uint32_
 cudaError_t MakeTriangles(const TableEntry* table, const ItemList& list, uint32_t items,
                           CompactTriangle* triangles, uint32_t* colors, cudaStream_t stream);
 
-// to[first + i] = from[slots[d] + …] for i up to `count`, item first + i of the list being the …-th of
+// to[first + i] = from[slot(d) + …] for i up to `count`, item first + i of the list being the …-th of
 // its d-th row. `colors_to` may be null; where `colors_from` is, none of the triangles is mixed.
 cudaError_t CopyTriangles(const ItemList& list, uint64_t first, uint32_t count,
                           const CompactTriangle* from, const uint32_t* colors_from,
@@ -35,7 +35,7 @@ cudaError_t FillTriangles(const TriangleSort& sort, const CompactTriangle* trian
 // Marks the regions that have any.
 cudaError_t MarkFilled(const uint32_t* begin, uint32_t regions, uint8_t* dirty,
                        cudaStream_t stream);
-// Of triangles in rows, `count` in all; the first of the d-th is slots[d]. Marks the regions that
+// Of triangles in rows, `count` in all; the first of the d-th is slot(d). Marks the regions that
 // they touch.
 cudaError_t MarkTriangles(const ItemList& list, uint32_t count, const CompactTriangle* triangles,
                           const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream);

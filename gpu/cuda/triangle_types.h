@@ -42,7 +42,8 @@ struct TriangleSort {
   uint32_t* counts = nullptr;  // by region; 0 at first, and again at the end
   uint32_t* begin = nullptr;   // by region, and the end
   uint32_t* places = nullptr;
-  uint32_t capacity = 0;  // of `places`
+  uint32_t capacity = 0;     // of `places`
+  uint8_t* dirty = nullptr;  // by region: those that have any are marked; or null
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -44,13 +44,28 @@ struct LayerLook {
   bool operator==(const LayerLook&) const = default;
 };
 
-// Some drawables' items in one row: those of slots[i] are the items from first[i] on, up to
-// first[i + 1].
+// Some drawables' items in one row: those of slot(i) are the items from first(i) on, up to
+// first(i + 1). A few are there themselves, as a kernel's argument, so that nothing need be uploaded.
+inline constexpr uint32_t kFewRows = 4;
 struct ItemList {
-  const uint32_t* slots = nullptr;
-  const uint64_t* first = nullptr;  // count + 1
+  const uint32_t* slots = nullptr;   // null: a few
+  const uint64_t* firsts = nullptr;  // count + 1
   uint32_t count = 0;
+  uint32_t few_slots[kFewRows] = {};
+  uint64_t few_firsts[kFewRows + 1] = {};
+
+  VOXELD_HD uint32_t slot(uint32_t i) const { return slots != nullptr ? slots[i] : few_slots[i]; }
+  VOXELD_HD uint64_t first(uint32_t i) const {
+    return slots != nullptr ? firsts[i] : few_firsts[i];
+  }
 };
+
+// Entries of the table, by slot, as a kernel's argument.
+struct FewEntries {
+  uint32_t slots[kFewRows];
+  TableEntry entries[kFewRows];
+};
+static_assert(sizeof(FewEntries) <= 3500, "arguments have 4 KB");
 
 // A pair says that an item may lie in a tile. Key: the tile and, in the lower kLayerBits, the
 // layer's slot. Value: the drawable's slot and, in the lower half, the item.
@@ -84,7 +99,7 @@ struct DrawGroups {
   int32_t end[kMostDrawGroups] = {0x7FFFFFFF};  // planes, half-open
 };
 
-// What kernels count. The first three begin at 0 with every frame.
+// What kernels count. All before lit_voxels begins at 0 with every frame.
 struct Counters {
   uint32_t tiles_drawn = 0;
   uint32_t slices_drawn = 0;
