@@ -185,7 +185,11 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
     scratch.triangle_batches = triangles;
   }
   __syncwarp();
-  if (mine == least && least != kNone) scratch.layer = layer;  // the same in all that have it
+  // The same in all that have it.
+  const uint32_t having = __ballot_sync(kAllLanes, mine == least && least != kNone);
+  if (having != 0 && lane == static_cast<uint32_t>(__ffs(static_cast<int>(having))) - 1) {
+    scratch.layer = layer;
+  }
   return least;
 }
 
