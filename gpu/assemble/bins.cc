@@ -13,7 +13,6 @@ namespace {
 
 constexpr uint32_t kPartItems = 2048;  // at least, where there are several parts
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
-constexpr size_t kTriangleRun = 64;    // the same
 
 constexpr size_t kAhead = 16;  // items whose places are fetched before they are written
 
@@ -113,18 +112,13 @@ bool FindTriangles(const Source& source, const TileGrid& grid, std::span<const u
                    uint32_t priority, bool erase, uint32_t first, uint32_t last, uint32_t part,
                    TriangleMemory& memory, FoundSpans& found) {
   const WalkGrid walk_grid(grid);
-  SmallTriangle run[kTriangleRun];
-  size_t size = 0;
-  const auto follow = [&] {
-    FindTriangles(std::span(run, size), part, walk_grid, owned.data(), memory, found);
-    size = 0;
-  };
+  SmallTriangles run;
+  const auto follow = [&] { FindTriangles(run, part, walk_grid, owned.data(), memory, found); };
   bool all = true;
   for (uint32_t i = first; i < last; ++i) {
     const Triangle t = Triangles::ItemOf(source, i);
-    if (SmallTriangle::Of(t, walk_grid, run[size])) {
-      run[size++].word = MakeWord(priority, erase, t.color[0]);
-      if (size == kTriangleRun) follow();
+    if (run.Add(t, walk_grid, MakeWord(priority, erase, t.color[0]))) {
+      if (run.full()) follow();
       continue;
     }
     all = false;

@@ -9,6 +9,7 @@ namespace voxeld::gpu {
 namespace {
 
 constexpr size_t kVertexRun = 1024;
+constexpr size_t kMostFetched = 128;  // faces, which the first cache holds
 
 }  // namespace
 
@@ -54,6 +55,15 @@ void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid
       }
     }
   });
+}
+
+void FetchItems(const Drawable& d, std::span<const BinItem> items) {
+  if (d.bins.triangle_parts == 0) return;
+  for (const BinItem& item : items.first(std::min(items.size(), kMostFetched))) {
+    if (item.count() != 0) {
+      __builtin_prefetch(d.bins.triangles[item.part()].units.data() + item.item);
+    }
+  }
 }
 
 void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,

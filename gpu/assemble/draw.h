@@ -27,5 +27,7 @@ void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const T
 // The same; the rows that it may have reached join `touched`.
 void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words, TileRows& touched);
+// Soon these will be drawn: brings what they need near, as far as that is worth it.
+void FetchItems(const Drawable& drawable, std::span<const BinItem> items);
 
 }  // namespace voxeld::gpu

@@ -302,7 +302,7 @@ HWY_ATTR HWY_INLINE void MoveRow(uint32_t* from, uint32_t* to) {
 HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool past_caches,
                                   uint32_t* held, const TileRows& held_rows) {
   const DW d;
-  bool same = true;
+  bool same = rows == held_rows;  // if not, what is held need not be fetched
   for (size_t group = 0; group < TileRows::kGroups; ++group) {
     for (uint64_t left = rows.bits[group] | held_rows.bits[group]; left != 0; left &= left - 1) {
       const size_t at = (group * 64 + static_cast<size_t>(std::countr_zero(left))) * kTileSize;

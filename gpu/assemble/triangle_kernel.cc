@@ -26,10 +26,10 @@ HWY_EXPORT(TriangleTargetIn);
 
 }  // namespace
 
-void FindTriangles(std::span<const SmallTriangle> triangles, uint32_t part, const WalkGrid& grid,
+void FindTriangles(SmallTriangles& triangles, uint32_t part, const WalkGrid& grid,
                    const uint8_t* owned, TriangleMemory& memory, FoundSpans& found) {
   HWY_DYNAMIC_DISPATCH(FindTrianglesIn)
-  (triangles.data(), triangles.size(), part, grid, owned, memory, found);
+  (triangles, part, grid, owned, memory, found);
 }
 
 void DrawTriangles(std::span<const TriangleMemory> parts, std::span<const BinItem> items,

@@ -15,8 +15,8 @@
 namespace voxeld::gpu {
 
 // Appends the runs of `triangles` to `memory`, the `part`-th (below 2²⁰), and to `found` an item for each of their faces in
-// each of the tiles with owned[tile] != 0 that it may reach.
-void FindTriangles(std::span<const SmallTriangle> triangles, uint32_t part, const WalkGrid& grid,
+// each of the tiles with owned[tile] != 0 that it may reach. Then `triangles` has none.
+void FindTriangles(SmallTriangles& triangles, uint32_t part, const WalkGrid& grid,
                    const uint8_t* owned, TriangleMemory& memory, FoundSpans& found);
 
 // Raises `words` of the tile that begins at voxel lo and ends before hi (the volume may end in it), axes as in WalkGrid, to

@@ -11,8 +11,8 @@
 // depth of their columns are kept by themselves.
 //
 // Whole numbers: vertices are below 2¹⁴ units, n below 2²⁹, edge functions at any voxel of the bounds below 2³⁰, and the
-// depth's numerator N = |n_a|·depth below 2⁴⁵. ⌊x/d⌋ of whole numbers, x below 2⁴⁵, is ⌊(x + ½)·(1/d)⌋ in double: the
-// argument is at least ½/d away from whole numbers and off by less than 2⁴⁵·2⁻⁵⁰/d.
+// depth's numerator N = |n_a|·depth below 2⁴⁵, which doubles hold. A quotient by |n_a| in 2⁻²⁵ voxel is below 2³⁴: a double
+// is off by less than 2⁻¹⁷, so that the remainder at the nearest whole number is below 0.51·|n_a| and known modulo 2³².
 //
 // Depths: D(k, j) = depth + k·fall_u + j·fall_v in 2⁻²⁵ voxel, modulo 2³². The three are rounded up, so
 // 0 ≤ D − true < err, err the number of roundings that were not exact: one for the start, one for each row and each column
@@ -20,6 +20,7 @@
 // thousands or where a plane falls by thirds of voxels and meets corners, the definition's division decides.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "gpu/assemble/buffer.h"
@@ -29,39 +30,39 @@ namespace voxeld::gpu {
 
 inline constexpr int kDepthBits = 25;
 
-// The depth's numerator N, and |n_a|.
-struct ExactDepth {
-  int64_t numerator;       // at row 0, column 0
-  int32_t step_u, step_v;  // in voxels: times 256
-  int32_t divisor;         // times 256
+// Of several faces: the depth's numerator N at row 0, column 0, and |n_a|, which are seldom asked for.
+struct alignas(64) ExactDepths {
+  static constexpr size_t kMost = 16;
+  double numerator[kMost];               // whole
+  int32_t step_u[kMost], step_v[kMost];  // N's, in voxels: times 256
+  int32_t divisor[kMost];                // times 256
 };
 
-// A face. Behind it, for each tile along v from the one that holds the origin on, `stride` rows of 16 columns (bit 0 the
-// tile's first): those that have a voxel; then the exact depth, which is seldom asked for. Axes as in WalkGrid; voxels
-// from `origin`.
+// A face. Faces are made several at once and lie one behind the other; behind them their exact depths, by field, and their
+// rows. Axes and voxels as in SmallTriangles.
 struct alignas(64) TriangleRuns {
-  int32_t origin[3];
+  int32_t origin[3];  // by role
   uint32_t word;
   uint32_t depth, fall_u, fall_v, err;  // 2⁻²⁵ voxel
-  // Voxels of vertices that no column has, eight bits an axis; or none. The last is none.
+  // Voxels of vertices that no column has, eight bits an axis in the order of a tile's memory; or none.
   static constexpr uint32_t kNoVertex = 0x808080;
-  uint32_t vertices[4];
-  uint8_t a, u, v, rows;
-  uint8_t stride;  // `rows`, up to a multiple of 16
-  uint8_t tiles;
+  uint32_t vertices[3];
+  uint32_t axes;     // two bits each, by role; and kNoVertex
+  uint32_t rows_at;  // from the face on, in words
+  uint32_t more;  // from a row on, the words to its columns from the 32nd on; 0 if there are none
+  uint32_t exact_at;  // from the face on, in units
+  uint32_t exact_lane;
 
-  const uint16_t* columns(int32_t tile) const {
-    return reinterpret_cast<const uint16_t*>(this + 1) + tile * stride;
+  int axis(int role) const { return static_cast<int>(axes >> (2 * role) & 3); }
+  // Of each row the columns, bit j column j.
+  const uint32_t* rows() const { return reinterpret_cast<const uint32_t*>(this) + rows_at; }
+  const ExactDepths& exact() const {
+    return *reinterpret_cast<const ExactDepths*>(this + exact_at);
   }
-  uint16_t* columns(int32_t tile) { return reinterpret_cast<uint16_t*>(this + 1) + tile * stride; }
-  const ExactDepth& exact() const { return *reinterpret_cast<const ExactDepth*>(columns(tiles)); }
-  ExactDepth& exact() { return *reinterpret_cast<ExactDepth*>(columns(tiles)); }
-  size_t units() const { return 1 + (size_t{tiles} * stride * 2 + sizeof(ExactDepth) + 63) / 64; }
-  static constexpr size_t kMostUnits = 1 + (5 * 64 * 2 + sizeof(ExactDepth) + 63) / 64;
 };
 static_assert(sizeof(TriangleRuns) == 64);
 
-// Triangles of a part of a drawable's items, each beginning at a unit.
+// Triangles of a part of a drawable's items.
 struct TriangleMemory {
   Buffer<TriangleRuns> units;
   size_t size = 0;

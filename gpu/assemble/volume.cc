@@ -20,6 +20,7 @@ uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
+constexpr size_t kTileRun = 8;           // of more than those, drawn by one thread in turn
 
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
@@ -244,8 +245,8 @@ void Volume::PreparePending() {
   pending_.clear();
 }
 
-// False if it comes out as it was.
-bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
+// False if it comes out as it was. `next`: the tile that this worker draws after it, if it is known.
+bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scratch& scratch) {
   scratch.entries.clear();
   for (const Entry& e : index_[tile].entries) {
     if (e.drawable->layer->record.visible != 0) scratch.entries.push_back(e);
@@ -285,6 +286,12 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
     std::fill_n(words, kTileVoxels, 0);
   }
   if (colors->at != words) lit = LitColors(colors->at, rows);
+  if (next != nullptr) {
+    tiles_.Fetch(*next);
+    for (const Entry& e : index_[*next].entries) {
+      FetchItems(*e.drawable, e.drawable->bins.row(e.row));
+    }
+  }
   return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
@@ -296,10 +303,16 @@ Volume::Changes Volume::Update() {
   std::vector<uint8_t> differs(dirty_.size());
   std::vector<uint32_t> lit_before(dirty_.size());
   const bool past_caches = dirty_.size() > kCachedTiles;
-  executor_.For(dirty_.size(), 1, [&](size_t i, int worker) {
-    const uint32_t tile = dirty_[i];
-    lit_before[i] = tiles_.lit(tile);
-    differs[i] = DrawTile(tile, past_caches, scratch_[static_cast<size_t>(worker)]);
+  // Where what they need has to be fetched, in runs, in which each knows the next.
+  const size_t run = past_caches ? kTileRun : 1;
+  executor_.For((dirty_.size() + run - 1) / run, 1, [&](size_t n, int worker) {
+    const size_t end = std::min(dirty_.size(), (n + 1) * run);
+    for (size_t i = n * run; i < end; ++i) {
+      const uint32_t tile = dirty_[i];
+      lit_before[i] = tiles_.lit(tile);
+      const uint32_t* const next = i + 1 < end ? &dirty_[i + 1] : nullptr;
+      differs[i] = DrawTile(tile, next, past_caches, scratch_[static_cast<size_t>(worker)]);
+    }
   });
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];

@@ -39,6 +39,10 @@ class TileStore {
   // Takes `colors`, of which `lit`, in `rows`, are not black, and leaves zeros. False if the tile is as it was.
   // `past_caches`: they will not be read before much else was. Different tiles may be given by different threads.
   bool Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit, bool past_caches);
+  // The caller's thread will Take this tile soon.
+  void Fetch(uint32_t tile) const {
+    if (blocks_[tile] != nullptr) __builtin_prefetch(&blocks_[tile]->rows);
+  }
   // Between Takes: what tiles of these that went dark had is kept for others, `most` blocks at most in all.
   void Recycle(std::span<const uint32_t> tiles, size_t most);
   size_t spare_blocks() const { return spare_.size(); }
@@ -112,7 +116,7 @@ class Volume final : private SceneObserver {
   void TakeOutLeaving();
   void Prepare(Drawable& drawable, Executor& executor, BinScratch& scratch) const;
   void PreparePending();
-  bool DrawTile(uint32_t tile, bool past_caches, Scratch& scratch);
+  bool DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scratch& scratch);
 
   Executor& executor_;
   Scene scene_;

@@ -197,15 +197,14 @@ TEST(Spans, OtherLinesAreNoWalks) {
 
 // What the definition draws of a triangle, and what small triangles do.
 void ExpectAsDefined(const Triangle& t, const TileGrid& grid, uint64_t* small, uint64_t* lit) {
-  SmallTriangle fast;
+  SmallTriangles fast;
   const WalkGrid axes(grid);
-  if (!SmallTriangle::Of(t, axes, fast)) return;
+  if (!fast.Add(t, axes, kWord)) return;
   ++*small;
-  fast.word = kWord;
   const std::vector<uint8_t> owned(grid.count(), 1);
   TriangleMemory memory;
   FoundSpans found;
-  FindTriangles({&fast, 1}, 0, axes, owned.data(), memory, found);
+  FindTriangles(fast, 0, axes, owned.data(), memory, found);
   Drawn want, got;
   EmitTriangle(t, Whole(grid), [&](int32_t x, int32_t y, int32_t z, uint32_t) {
     want[grid.TileOf(x, y, z)].at[grid.IndexInTile(x, y, z)] = kWord;
@@ -311,14 +310,14 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
         const int64_t from = random.Int(0, 16 * 256 - extent - 1);
         for (Int3& v : t.v) v[a] = from + random.Int(0, extent);
       }
-      SmallTriangle fast;
-      if (!SmallTriangle::Of(t, WalkGrid(grid), fast)) continue;
+      SmallTriangles fast;
+      const uint32_t word = kWord + i;
+      if (!fast.Add(t, WalkGrid(grid), word)) continue;
       ++small;
-      fast.word = kWord + i;
-      FindTriangles({&fast, 1}, 0, WalkGrid(grid), &owned, memory, found);
+      FindTriangles(fast, 0, WalkGrid(grid), &owned, memory, found);
       EmitTriangle(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t) {
         uint32_t& at = want.at[grid.IndexInTile(x, y, z)];
-        at = std::max(at, fast.word);
+        at = std::max(at, word);
       });
     }
     ASSERT_GT(small, 2000u);
@@ -329,23 +328,73 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
   });
 }
 
+// Large and small ones made at once, some of two or three faces, in all tiles of a volume.
+TEST(SmallTriangles, SeveralAtOnceEqualTheirDefinitions) {
+  const uint64_t seed = Seed();
+  ForEachVectorTarget(TriangleTarget, [&] {
+    Random random(seed);
+    for (int i = 0; i < 40; ++i) {
+      const TileGrid grid = TileGrid::Of(70, 48, 33, i % 3);
+      const WalkGrid axes(grid);
+      const std::vector<uint8_t> owned(grid.count(), 1);
+      SmallTriangles fast;
+      TriangleMemory memory;
+      FoundSpans found;
+      std::vector<Words> want(grid.count()), got(grid.count());
+      const auto wanted = static_cast<size_t>(random.Int(1, SmallTriangles::kRun));
+      for (uint32_t n = 0; fast.size < wanted; ++n) {
+        Triangle t;
+        const int64_t extent = n % 5 == 0 ? 62 : n % 5 == 1 ? 20 : 2;
+        const bool diagonal = random.Int(0, 7) == 0;
+        for (int a = 0; a < 3; ++a) {
+          const int64_t from = random.Int(-extent, grid.voxels[a]);
+          for (Int3& v : t.v) {
+            v[a] = diagonal && a == 2 ? v[1] : random.In(from + random.Int(0, extent));
+          }
+        }
+        const uint32_t word = kWord + static_cast<uint32_t>(random.Int(0, 1000));
+        if (!fast.Add(t, axes, word)) continue;
+        EmitTriangle(t, Whole(grid), [&](int32_t x, int32_t y, int32_t z, uint32_t) {
+          uint32_t& at = want[grid.TileOf(x, y, z)].at[grid.IndexInTile(x, y, z)];
+          at = std::max(at, word);
+        });
+      }
+      FindTriangles(fast, 0, axes, owned.data(), memory, found);
+      EXPECT_EQ(fast.size, 0u);
+      for (uint32_t tile = 0; tile < grid.count(); ++tile) {
+        std::vector<BinItem> items;
+        for (size_t n = 0; n < found.size; ++n) {
+          if (found.tiles.data()[n] == tile) items.push_back(found.items.data()[n]);
+        }
+        const Box3 box = grid.VoxelsOf(tile);
+        int32_t lo[3], hi[3];
+        for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
+        TileRows touched;
+        DrawTriangles({&memory, 1}, items, lo, hi, got[tile].at, touched);
+        ASSERT_TRUE(Holds(touched, got[tile])) << "tile " << tile << " of volume " << i;
+        ASSERT_TRUE(got[tile] == want[tile]) << "tile " << tile << " of volume " << i;
+      }
+    }
+  });
+}
+
 TEST(SmallTriangles, OthersAreNone) {
   const WalkGrid grid(TileGrid::Of(64, 64, 64));
-  SmallTriangle small;
+  SmallTriangles small;
   const Triangle t{{{{0, 0, 0}}, {{900, 0, 0}}, {{0, 900, 0}}}, {1, 1, 1}, SurfaceRule::kThin};
-  EXPECT_TRUE(SmallTriangle::Of(t, grid, small));
+  EXPECT_TRUE(small.Add(t, grid, kWord));
   Triangle other = t;
   other.color[1] = 2;
-  EXPECT_FALSE(SmallTriangle::Of(other, grid, small));
+  EXPECT_FALSE(small.Add(other, grid, kWord));
   other = t;
   other.rule = SurfaceRule::kCover;
-  EXPECT_FALSE(SmallTriangle::Of(other, grid, small));
+  EXPECT_FALSE(small.Add(other, grid, kWord));
   other = t;
   other.v[1][0] = 64 * 256;
-  EXPECT_FALSE(SmallTriangle::Of(other, grid, small));
+  EXPECT_FALSE(small.Add(other, grid, kWord));
   other = t;
   other.v[2] = {{1800, 0, 0}};
-  EXPECT_FALSE(SmallTriangle::Of(other, grid, small));  // without area
+  EXPECT_FALSE(small.Add(other, grid, kWord));  // without area
 }
 
 TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
