@@ -299,21 +299,24 @@ HWY_ATTR HWY_INLINE void MoveRow(uint32_t* from, uint32_t* to) {
   }
 }
 
+// Whether two rows differ.
+HWY_ATTR HWY_INLINE bool RowsDiffer(const uint32_t* a, const uint32_t* b) {
+  const DW d;
+  VW differ = hn::Zero(d);
+  for (size_t i = 0; i < kTileSize; i += hn::Lanes(d)) {
+    differ = hn::Or(differ, hn::Xor(hn::Load(d, a + i), hn::Load(d, b + i)));
+  }
+  return !hn::AllTrue(d, hn::Eq(differ, hn::Zero(d)));
+}
+
 HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool past_caches,
                                   uint32_t* held, const TileRows& held_rows) {
-  const DW d;
   bool same = true;
   for (size_t group = 0; group < TileRows::kGroups; ++group) {
     for (uint64_t left = rows.bits[group] | held_rows.bits[group]; left != 0; left &= left - 1) {
       const size_t at = (group * 64 + static_cast<size_t>(std::countr_zero(left))) * kTileSize;
-      if (same) {
-        // What is held is looked at no further than to where it differs.
-        VW differ = hn::Zero(d);
-        for (size_t i = at; i < at + kTileSize; i += hn::Lanes(d)) {
-          differ = hn::Or(differ, hn::Xor(hn::Load(d, colors + i), hn::Load(d, held + i)));
-        }
-        same = hn::AllTrue(d, hn::Eq(differ, hn::Zero(d)));
-      }
+      // What is held is looked at no further than to where it differs.
+      if (same) same = !RowsDiffer(colors + at, held + at);
       if (past_caches && !same) {
         MoveRow<true>(colors + at, held + at);
       } else {
@@ -321,7 +324,6 @@ HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool p
       }
     }
   }
-  if (past_caches) hwy::FlushStream();
   return !same;
 }
 

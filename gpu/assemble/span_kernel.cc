@@ -53,6 +53,8 @@ bool MoveColors(uint32_t* colors, const TileRows& rows, bool past_caches, uint32
   return HWY_DYNAMIC_DISPATCH(MoveColorsIn)(colors, rows, past_caches, held, held_rows);
 }
 
+void FinishMoves() { hwy::FlushStream(); }
+
 std::string SpanTarget() { return HWY_DYNAMIC_DISPATCH(SpanTargetIn)(); }
 
 }  // namespace voxeld::gpu

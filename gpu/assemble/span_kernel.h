@@ -44,9 +44,11 @@ uint32_t ShowWords(uint32_t* words, const TileRows& touched, TileRows& rows);
 uint32_t LitColors(const uint32_t* colors, TileRows& rows);
 
 // Moves a tile's colours, which lie in `rows`, to `held`, of which what is not black lies in `held_rows`; leaves zeros. False
-// if it held the same. `past_caches`: for volumes that the caches would not keep.
+// if it held the same. `past_caches`: for volumes that the caches would not keep; other threads see what went past them
+// only after FinishMoves() in this one.
 bool MoveColors(uint32_t* colors, const TileRows& rows, bool past_caches, uint32_t* held,
                 const TileRows& held_rows);
+void FinishMoves();
 
 // The instruction set in use.
 std::string SpanTarget();

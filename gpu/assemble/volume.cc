@@ -20,6 +20,7 @@ uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
+constexpr size_t kMovedRun = 16;         // tiles that a worker draws one behind the other where more are
 
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
@@ -296,10 +297,16 @@ Volume::Changes Volume::Update() {
   std::vector<uint8_t> differs(dirty_.size());
   std::vector<uint32_t> lit_before(dirty_.size());
   const bool past_caches = dirty_.size() > kCachedTiles;
-  executor_.For(dirty_.size(), 1, [&](size_t i, int worker) {
-    const uint32_t tile = dirty_[i];
-    lit_before[i] = tiles_.lit(tile);
-    differs[i] = DrawTile(tile, past_caches, scratch_[static_cast<size_t>(worker)]);
+  // Waiting for moves takes as long as drawing some tiles, so it is not done after each.
+  const size_t run = past_caches ? kMovedRun : 1;
+  executor_.For((dirty_.size() + run - 1) / run, 1, [&](size_t r, int worker) {
+    const size_t end = std::min(dirty_.size(), (r + 1) * run);
+    for (size_t i = r * run; i < end; ++i) {
+      const uint32_t tile = dirty_[i];
+      lit_before[i] = tiles_.lit(tile);
+      differs[i] = DrawTile(tile, past_caches, scratch_[static_cast<size_t>(worker)]);
+    }
+    if (past_caches) FinishMoves();
   });
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];
