@@ -20,7 +20,7 @@ uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
-constexpr size_t kMovedRun = 16;         // tiles that a worker draws one behind the other where more are
+constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
@@ -114,6 +114,15 @@ bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uin
   const bool differs = MoveColors(colors.at, rows, past_caches, block->colors.at, block->rows);
   block->rows = rows;
   return differs || before == 0;
+}
+
+bool TileStore::TakeWords(uint32_t tile, TileWords& words, const TileRows& touched,
+                          bool past_caches) {
+  std::unique_ptr<Block>& block = blocks_[tile];
+  if (block == nullptr) block = TakeBlock();
+  const MovedWords moved = MoveWords(words.at, touched, past_caches, block->colors.at, block->rows);
+  const uint32_t before = std::exchange(lit_[tile], moved.lit);
+  return moved.lit == 0 ? before != 0 : moved.differ || before == 0;
 }
 
 void TileStore::Recycle(std::span<const uint32_t> tiles, size_t most) {
@@ -278,8 +287,7 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
     }
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {
-      lit = ShowWords(words, touched, rows);
-      break;
+      return tiles_.TakeWords(tile, *scratch.words, touched, past_caches);
     }
     colors = scratch.colors.get();
     BlendTile(layer.record, words, colors->at);

@@ -39,6 +39,8 @@ class TileStore {
   // Takes `colors`, of which `lit`, in `rows`, are not black, and leaves zeros. False if the tile is as it was.
   // `past_caches`: they will not be read before much else was. Different tiles may be given by different threads.
   bool Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit, bool past_caches);
+  // The same of words of a layer (ShowWords) in the rows `touched`.
+  bool TakeWords(uint32_t tile, TileWords& words, const TileRows& touched, bool past_caches);
   // Between Takes: what tiles of these that went dark had is kept for others, `most` blocks at most in all.
   void Recycle(std::span<const uint32_t> tiles, size_t most);
   size_t spare_blocks() const { return spare_.size(); }

@@ -362,6 +362,7 @@ TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
         want.at[v] = erase ? 0 : Interleave(rgb);
         lit += want.at[v] != 0;
       }
+      const Words drawn = words;
       TileRows rows, again;
       const TileRows want_rows = RowsOf(want);
       Words copy = words;
@@ -380,8 +381,19 @@ TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
             held_rows.bits[differs / 1024] |= uint64_t{1} << (differs / 16 % 64);
           }
           Words moved = want;
+          auto held_too = std::make_unique<Words>(*held);
           EXPECT_EQ(MoveColors(moved.at, rows, past_caches, held->at, held_rows), differs >= 0);
+          FinishMoves();
           ASSERT_TRUE(*held == want);
+          ASSERT_TRUE(moved == Words());
+          const bool whole = differs % 2 == 0;
+          moved = drawn;
+          const MovedWords at_once = MoveWords(moved.at, whole ? TileRows::All() : RowsOf(drawn),
+                                               past_caches, held_too->at, held_rows);
+          FinishMoves();
+          EXPECT_EQ(at_once.lit, lit);
+          EXPECT_EQ(at_once.differ, differs >= 0);
+          ASSERT_TRUE(*held_too == want && held_rows == want_rows);
           ASSERT_TRUE(moved == Words());
         }
       }
