@@ -16,7 +16,7 @@ constexpr uint32_t kPartItems = 2048;  // at least, where there are several part
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
 constexpr size_t kTriangleRun = 64;    // the same
 
-constexpr size_t kAhead = 16;  // items whose places are fetched before they are written
+constexpr size_t kAhead = 48;  // items whose places are fetched before they are written
 
 // Few: sorted as numbers, the tile in the upper, the place in the lower 32 bits.
 void PutSorted(const FoundSpans& found, Bins& bins) {

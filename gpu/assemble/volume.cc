@@ -311,6 +311,8 @@ Volume::Changes Volume::Update() {
     const size_t end = std::min(dirty_.size(), (r + 1) * run);
     for (size_t i = r * run; i < end; ++i) {
       const uint32_t tile = dirty_[i];
+      if (i + 2 < dirty_.size()) __builtin_prefetch(index_[dirty_[i + 2]].entries.data());
+      if (i + 1 < dirty_.size()) tiles_.Prefetch(dirty_[i + 1]);
       lit_before[i] = tiles_.lit(tile);
       differs[i] = DrawTile(tile, past_caches, scratch_[static_cast<size_t>(worker)]);
     }

@@ -41,6 +41,13 @@ class TileStore {
   bool Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit, bool past_caches);
   // The same of words of a layer (ShowWords) in the rows `touched`.
   bool TakeWords(uint32_t tile, TileWords& words, const TileRows& touched, bool past_caches);
+  // It will be taken soon.
+  void Prefetch(uint32_t tile) const {
+    const Block* const block = blocks_[tile].get();
+    if (block == nullptr) return;
+    __builtin_prefetch(&block->rows, /*rw=*/1);
+    __builtin_prefetch(block->colors.at, /*rw=*/1);
+  }
   // Between Takes: what tiles of these that went dark had is kept for others, `most` blocks at most in all.
   void Recycle(std::span<const uint32_t> tiles, size_t most);
   size_t spare_blocks() const { return spare_.size(); }
