@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <new>
 #include <utility>
 
 #include "gpu/assemble/blend.h"
@@ -20,6 +21,7 @@ uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
+constexpr size_t kFreeBlocks = 256;      // kept, beside as many as are spare
 constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
 // Puts a layer's words over the colours of a tile.
@@ -79,8 +81,8 @@ struct TileClip {
 
 void TileStore::Reset(const TileGrid& grid) {
   grid_ = grid;
-  blocks_.clear();
-  blocks_.resize(grid.count());
+  pool_.Reset(sizeof(Block), grid.count());
+  blocks_.assign(grid.count(), nullptr);
   lit_.assign(grid.count(), 0);
   spare_.clear();
   spare_left_ = 0;
@@ -91,23 +93,26 @@ bool TileStore::Set(uint32_t tile, const uint32_t* colors, uint32_t lit) {
   std::copy_n(colors, kTileVoxels, copy.at);
   TileRows rows;
   LitColors(copy.at, rows);
-  return Take(tile, copy, rows, lit, false);
+  Expect({&tile, 1});
+  const bool differs = Take(tile, copy, rows, lit, false);
+  Recycle({&tile, 1}, spare_.size());
+  return differs;
 }
 
-std::unique_ptr<TileStore::Block> TileStore::TakeBlock() {
+TileStore::Block* TileStore::TakeBlock() {
   const std::atomic_ref<size_t> spares(spare_left_);
   size_t left = spares.load(std::memory_order_relaxed);
   while (left > 0) {
     if (spares.compare_exchange_weak(left, left - 1, std::memory_order_relaxed)) {
-      return std::move(spare_[left - 1]);
+      return spare_[left - 1];
     }
   }
-  return std::make_unique<Block>();
+  return new (pool_.Take()) Block();
 }
 
 bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit,
                      bool past_caches) {
-  std::unique_ptr<Block>& block = blocks_[tile];
+  Block*& block = blocks_[tile];
   const uint32_t before = std::exchange(lit_[tile], lit);
   if (lit == 0) return before != 0;  // what it held stays, for Recycle
   if (block == nullptr) block = TakeBlock();
@@ -118,20 +123,33 @@ bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uin
 
 bool TileStore::TakeWords(uint32_t tile, TileWords& words, const TileRows& touched,
                           bool past_caches) {
-  std::unique_ptr<Block>& block = blocks_[tile];
+  Block*& block = blocks_[tile];
   if (block == nullptr) block = TakeBlock();
   const MovedWords moved = MoveWords(words.at, touched, past_caches, block->colors.at, block->rows);
   const uint32_t before = std::exchange(lit_[tile], moved.lit);
   return moved.lit == 0 ? before != 0 : moved.differ || before == 0;
 }
 
+void TileStore::Expect(std::span<const uint32_t> tiles) {
+  size_t none = 0;
+  for (uint32_t tile : tiles) none += blocks_[tile] == nullptr;
+  pool_.Provide(none - std::min(none, spare_.size()));
+}
+
 void TileStore::Recycle(std::span<const uint32_t> tiles, size_t most) {
+  pool_.Settle();
   spare_.resize(spare_left_);
   for (uint32_t tile : tiles) {
-    if (lit_[tile] == 0 && blocks_[tile] != nullptr) spare_.push_back(std::move(blocks_[tile]));
+    if (lit_[tile] == 0 && blocks_[tile] != nullptr) {
+      spare_.push_back(std::exchange(blocks_[tile], nullptr));
+    }
   }
-  if (spare_.size() > most) spare_.resize(most);
+  while (spare_.size() > most) {
+    pool_.Give(spare_.back());
+    spare_.pop_back();
+  }
   spare_left_ = spare_.size();
+  pool_.Trim(most + kFreeBlocks);
 }
 
 void Volume::MarkDirty(uint32_t tile) {
@@ -305,6 +323,7 @@ Volume::Changes Volume::Update() {
   std::vector<uint8_t> differs(dirty_.size());
   std::vector<uint32_t> lit_before(dirty_.size());
   const bool past_caches = dirty_.size() > kCachedTiles;
+  tiles_.Expect(dirty_);
   // Waiting for moves takes as long as drawing some tiles, so it is not done after each.
   const size_t run = past_caches ? kMovedRun : 1;
   executor_.For((dirty_.size() + run - 1) / run, 1, [&](size_t r, int worker) {
