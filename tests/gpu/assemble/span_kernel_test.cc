@@ -77,9 +77,24 @@ Drawn Defined(const Line& line, const TileGrid& grid) {
 }
 
 Drawn BySpans(const LineWalk& walk, const TileGrid& grid) {
-  const std::vector<uint8_t> owned(grid.count(), 1);
   FoundSpans found;
-  FindSpans(&walk, 0, 1, WalkGrid(grid), owned.data(), found);
+  FindSpans(&walk, 0, 1, WalkGrid(grid), nullptr, found);
+  // The same by tiles that are asked for, and nothing in others.
+  for (uint8_t odd : {0, 1}) {
+    std::vector<uint8_t> half(grid.count());
+    for (uint32_t tile = 0; tile < grid.count(); ++tile) half[tile] = (tile & 1) == odd;
+    FoundSpans some;
+    FindSpans(&walk, 0, 1, WalkGrid(grid), half.data(), some);
+    size_t next = 0;
+    for (size_t i = 0; i < found.size; ++i) {
+      if ((found.tiles.data()[i] & 1) != odd) continue;
+      const bool more = next < some.size;
+      EXPECT_TRUE(more && some.tiles.data()[next] == found.tiles.data()[i] &&
+                  some.items.data()[next] == found.items.data()[i]);
+      ++next;
+    }
+    EXPECT_EQ(next, some.size);
+  }
   Drawn drawn;
   std::map<uint32_t, TileRows> rows;
   for (size_t i = 0; i < found.size; ++i) {
