@@ -1,6 +1,7 @@
 #include "gpu/assemble/bins.h"
 
 #include <algorithm>
+#include <cstring>
 #include <type_traits>
 #include <utility>
 
@@ -14,7 +15,7 @@ namespace {
 constexpr uint32_t kPartItems = 2048;  // at least, where there are several parts
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
 
-constexpr size_t kAhead = 16;  // items whose places are fetched before they are written
+constexpr size_t kAhead = 48;  // items whose places are fetched before they are written
 
 // Few: sorted as numbers, the tile in the upper, the place in the lower 32 bits.
 void PutSorted(const FoundSpans& found, Bins& bins) {
@@ -81,13 +82,13 @@ void Find(const Source& source, const TileGrid& grid, std::span<const uint8_t> o
 
 // The same of lines one voxel wide; false if some are no walks.
 bool FindWalks(const Source& source, const TileGrid& grid, std::span<const uint8_t> owned,
-               uint32_t priority, bool erase, uint32_t first, uint32_t last, LineWalk* walks,
-               FoundSpans& found) {
+               bool all_owned, uint32_t priority, bool erase, uint32_t first, uint32_t last,
+               LineWalk* walks, FoundSpans& found) {
   const WalkGrid walk_grid(grid);
   bool all = true;
   uint32_t run = first;
   const auto follow = [&](uint32_t end) {
-    FindSpans(walks, run, end, walk_grid, owned.data(), found);
+    FindSpans(walks, run, end, walk_grid, all_owned ? nullptr : owned.data(), found);
   };
   for (uint32_t i = first; i < last; ++i) {
     const Line line = Segments::ItemOf(source, i);
@@ -149,6 +150,9 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
     bins.walks.Make(bins.walk_count);
     bins.triangle_parts = triangles ? part_count : 0;
     if (bins.triangles.size() < bins.triangle_parts) bins.triangles.resize(bins.triangle_parts);
+    // A look at every tile, where there are enough lines to make up for it.
+    const bool all_owned = walks && count >= owned.size() / 64 &&
+                           std::memchr(owned.data(), 0, owned.size()) == nullptr;
     std::vector<uint8_t> all_fast(part_count, 0);
     executor.For(part_count, 1, [&](size_t part, int) {
       const auto first = static_cast<uint32_t>(uint64_t{count} * part / part_count);
@@ -156,8 +160,8 @@ void BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
       FoundSpans& found = parts[part];
       found.size = 0;
       if (walks) {
-        all_fast[part] =
-            FindWalks(source, grid, owned, priority, erase, first, last, bins.walks.data(), found);
+        all_fast[part] = FindWalks(source, grid, owned, all_owned, priority, erase, first, last,
+                                   bins.walks.data(), found);
       } else if (triangles) {
         TriangleMemory& memory = bins.triangles[part];
         memory.size = 0;

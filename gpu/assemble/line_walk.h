@@ -48,11 +48,11 @@ struct WalkGrid {
 struct alignas(32) LineWalk {
   int32_t start[3];   // S, units
   uint32_t word;      // of its voxels
-  int32_t stride[3];  // ⌊step/2⁵⌋
+  int32_t stride[3];  // ⌊step/2⁵⌋ + 1
   uint32_t rest;      // step mod 2⁵ of axis r in the five bits from 5·r on; N from bit 16 on
 
   int64_t at(int r) const { return int64_t{start[r]} * (int64_t{1} << 24); }
-  int64_t step(int r) const { return int64_t{stride[r]} * 32 + (rest >> (5 * r) & 31); }
+  int64_t step(int r) const { return int64_t{stride[r] - 1} * 32 + (rest >> (5 * r) & 31); }
   int64_t steps() const { return rest >> 16; }  // N
 
   // False if the line is none: of another kind, too long, too far away, or of two colours. `word` is left to the caller.
@@ -77,7 +77,7 @@ struct alignas(32) LineWalk {
     const double part = n == 0 ? 0.0 : 16777216.0 / static_cast<double>(n);
     for (int r = 0; r < 3; ++r) {
       const int64_t step = n == 0 ? 0 : FloorToInt(static_cast<double>(d[r]) * part + 0x1p-18) + 1;
-      walk.stride[r] = static_cast<int32_t>(step >> 5);
+      walk.stride[r] = static_cast<int32_t>(step >> 5) + 1;
       walk.rest |= static_cast<uint32_t>(step & 31) << (5 * r);
     }
     return true;

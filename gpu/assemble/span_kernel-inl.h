@@ -7,143 +7,11 @@
 #endif
 
 #include "gpu/assemble/draw_block-inl.h"
+#include "gpu/assemble/span_find-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace voxeld::gpu {
 namespace HWY_NAMESPACE {
-
-// The smallest whole number at or above q, a crossing's (line_walk.h): q > −2⁵².
-HWY_INLINE int64_t CeilCrossing(double q) {
-  q -= 0x1p-36;
-  const auto k = static_cast<int64_t>(q);
-  return k + static_cast<int64_t>(static_cast<double>(k) < q);
-}
-
-// An axis of a walk, reflected if it goes down: then it goes up.
-struct UpwardAxis {
-  int64_t at, step;
-  bool down;
-  HWY_INLINE UpwardAxis(int64_t walk_at, int64_t walk_step)
-      : at(walk_step < 0 ? ~walk_at : walk_at),
-        step(walk_step < 0 ? -walk_step : walk_step),
-        down(walk_step < 0) {}
-  // The first k whose coordinate is `voxel` (reflected) or beyond; at most `most`.
-  HWY_INLINE int64_t FirstAt(int64_t voxel, int64_t most) const {
-    const int64_t way = voxel * (int64_t{1} << 32) - at;
-    if (way <= 0) return 0;
-    if (step == 0) return most;
-    const double q = static_cast<double>(way) / static_cast<double>(step);
-    return q >= static_cast<double>(most) ? most : std::min(most, CeilCrossing(q));
-  }
-};
-
-// The k inside the volume.
-HWY_NOINLINE inline void ClipToVolume(const LineWalk& walk, const WalkGrid& grid, int64_t* begin,
-                                      int64_t* end) {
-  const int64_t most = *end;
-  for (int r = 0; r < 3; ++r) {
-    const UpwardAxis up(walk.at(r), walk.step(r));
-    const int64_t lo = up.down ? -int64_t{grid.voxels[r]} : 0;
-    *begin = std::max(*begin, up.FirstAt(lo, most));
-    *end = std::min(*end, up.FirstAt(lo + grid.voxels[r], most));
-  }
-}
-
-HWY_ATTR HWY_INLINE void FindSpansOf(const LineWalk& walk, uint32_t item, const WalkGrid& grid,
-                                     const uint8_t* owned, FoundSpans& found) {
-  constexpr size_t kMostCrossings = kMostWalkSteps / kTileSize + 3;
-  const hn::CappedTag<double, 8> d;
-  const size_t lanes = hn::Lanes(d);
-  int32_t crossings[3][kMostCrossings + 8];
-  int64_t begin = 0, end = walk.steps() + 1;
-  int64_t at[3], step[3], first[3], last[3], outside = 0;
-  for (int r = 0; r < 3; ++r) {
-    at[r] = walk.at(r);
-    step[r] = walk.step(r);
-    first[r] = at[r] >> 32;
-    last[r] = (at[r] + step[r] * (end - 1)) >> 32;
-    outside |=
-        first[r] | (grid.voxels[r] - 1 - first[r]) | last[r] | (grid.voxels[r] - 1 - last[r]);
-  }
-  if (outside < 0) {
-    ClipToVolume(walk, grid, &begin, &end);
-    if (begin >= end) return;
-    for (int r = 0; r < 3; ++r) {
-      first[r] = (at[r] + step[r] * begin) >> 32;
-      last[r] = (at[r] + step[r] * (end - 1)) >> 32;
-    }
-  }
-  int32_t tile_step[3];
-  int32_t tile = 0;
-  size_t count[3];
-  double way[3], inverse[3];  // to the first face of a tile that is crossed, and of a step
-  const auto sentinel = static_cast<int32_t>(end);
-  for (int r = 0; r < 3; ++r) {
-    const int64_t from = first[r] >> kTileBits, to = last[r] >> kTileBits;
-    tile += static_cast<int32_t>(from) * grid.tile_step[r];
-    // −1 if it goes down, for a reflection without a branch: nobody could foresee which way it goes.
-    const int64_t down = -static_cast<int64_t>(to < from);
-    const auto down32 = static_cast<int32_t>(down);
-    tile_step[r] = (grid.tile_step[r] ^ down32) - down32;
-    count[r] = static_cast<size_t>(((to - from) ^ down) - down);
-    const int64_t face = (from ^ down) + 1;  // of tiles
-    way[r] = static_cast<double>(face * (int64_t{1} << 36) - (at[r] ^ down));
-    // Where none is crossed the step may be 0 or go the other way.
-    inverse[r] = 1.0 / static_cast<double>(std::max<int64_t>((step[r] ^ down) - down, 1));
-  }
-  if ((count[0] | count[1] | count[2]) <= 3) {
-    // Short lines, without branches.
-    for (int r = 0; r < 3; ++r) {
-      for (size_t j = 0; j < 3; ++j) {
-        const int64_t k = CeilCrossing((way[r] + 0x1p36 * static_cast<double>(j)) * inverse[r]);
-        crossings[r][j] = j < count[r] ? static_cast<int32_t>(k) : sentinel;
-      }
-      crossings[r][3] = sentinel;
-    }
-  } else {
-    const hn::Rebind<int32_t, decltype(d)> di;
-    const auto room = hn::Set(d, 0x1p-36), tiles = hn::Mul(hn::Iota(d, 0), hn::Set(d, 0x1p36));
-    const auto all = hn::Set(d, 0x1p36 * static_cast<double>(lanes));
-    for (int r = 0; r < 3; ++r) {
-      const auto by = hn::Set(d, inverse[r]);
-      auto ways = hn::Add(hn::Set(d, way[r]), tiles);
-      for (size_t j = 0; j < count[r]; j += lanes) {
-        const auto k = hn::Ceil(hn::Sub(hn::Mul(ways, by), room));
-        hn::StoreU(hn::DemoteTo(di, k), di, crossings[r] + j);
-        ways = hn::Add(ways, all);
-      }
-      crossings[r][count[r]] = sentinel;
-    }
-  }
-
-  const size_t most = count[0] + count[1] + count[2] + 1;
-  found.tiles.Reserve(found.size, most);
-  found.items.Reserve(found.size, most);
-  uint32_t* const tiles = found.tiles.data();
-  BinItem* const items = found.items.data();
-  size_t size = found.size;
-  const int32_t *x = crossings[0], *y = crossings[1], *z = crossings[2];
-  auto k = static_cast<int32_t>(begin);
-  for (;;) {
-    const int32_t next = std::min(*x, std::min(*y, *z));
-    tiles[size] = static_cast<uint32_t>(tile);
-    items[size] = BinItem::Span(item, static_cast<uint32_t>(k), static_cast<uint32_t>(next - k));
-    size += owned[tile] != 0;
-    if (next == sentinel) break;
-    const bool in_x = *x == next, in_y = *y == next, in_z = *z == next;
-    x += in_x;
-    y += in_y;
-    z += in_z;
-    tile += (in_x ? tile_step[0] : 0) + (in_y ? tile_step[1] : 0) + (in_z ? tile_step[2] : 0);
-    k = next;
-  }
-  found.size = size;
-}
-
-HWY_ATTR inline void FindSpansIn(const LineWalk* walks, uint32_t first, uint32_t last,
-                                 const WalkGrid& grid, const uint8_t* owned, FoundSpans& found) {
-  for (uint32_t i = first; i < last; ++i) FindSpansOf(walks[i], i, grid, owned, found);
-}
 
 #if HWY_TARGET == HWY_SCALAR
 
@@ -161,7 +29,7 @@ inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem> items, u
       uint32_t at = 0;
       for (int r = 0; r < 3; ++r) {
         at |= p[r] >> kShift[r] & 0xFu << (4 * r);
-        p[r] += static_cast<uint32_t>(walk.stride[r]) + 1;
+        p[r] += static_cast<uint32_t>(walk.stride[r]);
       }
       words[at] = std::max(words[at], walk.word);
     }
@@ -178,9 +46,11 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
   const size_t lanes = hn::Lanes(d);
   const VW iota = hn::Iota(d, 0), all = hn::Set(d, static_cast<uint32_t>(lanes));
   const VW mask0 = hn::Set(d, 0xF), mask1 = hn::Set(d, 0xF0), mask2 = hn::Set(d, 0xF00);
-  const VW five_bits = hn::Set(d, 31), one = hn::Set(d, 1);
+  // What a span begins with, of three axes at once.
+  const hn::CappedTag<uint32_t, 4> d4;
+  using V4 = hn::Vec<decltype(d4)>;
   HWY_ALIGN static constexpr uint32_t kFive[4] = {0, 5, 10, 0};
-  const VW rest_at = hn::LoadDup128(d, kFive);
+  const V4 rest_at = hn::Load(d4, kFive), five_bits = hn::Set(d4, 31);
   for (size_t i = 0; i < std::min(kAhead, items.size()); ++i) {
     hwy::Prefetch(walks + items[i].item);
   }
@@ -192,20 +62,25 @@ HWY_ATTR inline void DrawSpansIn(const LineWalk* walks, std::span<const BinItem>
     const BinItem item = items[i];
     const LineWalk& walk = walks[item.item];
     const uint32_t count = item.count();
-    // In each block of four lanes: three axes and the word; three axes and what is left of their steps.
-    const VW start = hn::LoadDup128(d, reinterpret_cast<const uint32_t*>(walk.start));
-    const VW stride = hn::LoadDup128(d, reinterpret_cast<const uint32_t*>(walk.stride));
-    const VW rest = hn::And(hn::Shr(hn::Broadcast<3>(stride), rest_at), five_bits);
-    const VW k = hn::Set(d, item.first());
-    const VW from = hn::Add(hn::Add(hn::ShiftLeft<19>(start), hn::Mul(stride, k)),
-                            hn::Add(hn::ShiftRight<5>(hn::Mul(rest, k)), one));
-    const VW by = hn::Add(stride, one);
-    const VW x_step = hn::Broadcast<0>(by), y_step = hn::Broadcast<1>(by),
-             z_step = hn::Broadcast<2>(by);
-    VW x = hn::Add(hn::Broadcast<0>(from), hn::Mul(x_step, iota));
-    VW y = hn::Add(hn::Broadcast<1>(from), hn::Mul(y_step, iota));
-    VW z = hn::Add(hn::Broadcast<2>(from), hn::Mul(z_step, iota));
-    const VW word = hn::Broadcast<3>(start);
+    // Three axes and the word; three axes and what is left of their steps.
+    const V4 start = hn::Load(d4, reinterpret_cast<const uint32_t*>(walk.start));
+    const V4 stride = hn::Load(d4, reinterpret_cast<const uint32_t*>(walk.stride));
+    const V4 rest = hn::And(hn::Shr(hn::Broadcast<3>(stride), rest_at), five_bits);
+    const V4 k = hn::Set(d4, item.first());
+    // k·⌊step/2⁵⌋ + 1 is k·stride + (1 − k).
+    const V4 from =
+        hn::Add(hn::Add(hn::ShiftLeft<19>(start), hn::Mul(stride, k)),
+                hn::Add(hn::ShiftRight<5>(hn::Mul(rest, k)), hn::Set(d4, 1 - item.first())));
+    // Broadcast by the loads: the units that shuffle have enough to do.
+    HWY_ALIGN uint32_t first[4];
+    hn::Store(from, d4, first);
+    const VW x_step = hn::Set(d, static_cast<uint32_t>(walk.stride[0])),
+             y_step = hn::Set(d, static_cast<uint32_t>(walk.stride[1])),
+             z_step = hn::Set(d, static_cast<uint32_t>(walk.stride[2]));
+    VW x = hn::Add(hn::Set(d, first[0]), hn::Mul(x_step, iota));
+    VW y = hn::Add(hn::Set(d, first[1]), hn::Mul(y_step, iota));
+    VW z = hn::Add(hn::Set(d, first[2]), hn::Mul(z_step, iota));
+    const VW word = hn::Set(d, walk.word);
     for (uint32_t done = 0;;) {
       const VW at = hn::Or(
           hn::And(hn::ShiftRight<27>(x), mask0),
@@ -269,14 +144,19 @@ HWY_ATTR HWY_INLINE uint32_t LitRows(const uint32_t* words, const TileRows& touc
   return hn::GetLane(hn::SumOfLanes(d, lit));
 }
 
+// What a word looks like over black in full opacity.
+struct ShowWord {
+  HWY_ATTR HWY_INLINE VW operator()(VW word) const {
+    const DW d;
+    const VW color = hn::Set(d, kColorMask), erase = hn::Set(d, kEraseBit), zero = hn::Zero(d);
+    return hn::IfThenElseZero(hn::Eq(hn::And(word, erase), zero), hn::And(word, color));
+  }
+};
+
 HWY_ATTR inline uint32_t ShowWordsIn(uint32_t* words, const TileRows& touched, TileRows& rows) {
   const DW d;
-  const VW color = hn::Set(d, kColorMask), erase = hn::Set(d, kEraseBit), zero = hn::Zero(d);
-  const auto show = [&](VW word) HWY_ATTR {
-    return hn::IfThenElseZero(hn::Eq(hn::And(word, erase), zero), hn::And(word, color));
-  };
   const auto put = [&](VW shown, size_t i) HWY_ATTR { hn::Store(shown, d, words + i); };
-  return LitRows(words, touched, show, put, rows);
+  return LitRows(words, touched, ShowWord(), put, rows);
 }
 
 HWY_ATTR inline uint32_t LitColorsIn(const uint32_t* colors, TileRows& rows) {
@@ -299,21 +179,24 @@ HWY_ATTR HWY_INLINE void MoveRow(uint32_t* from, uint32_t* to) {
   }
 }
 
+// Whether two rows differ.
+HWY_ATTR HWY_INLINE bool RowsDiffer(const uint32_t* a, const uint32_t* b) {
+  const DW d;
+  VW differ = hn::Zero(d);
+  for (size_t i = 0; i < kTileSize; i += hn::Lanes(d)) {
+    differ = hn::Or(differ, hn::Xor(hn::Load(d, a + i), hn::Load(d, b + i)));
+  }
+  return !hn::AllTrue(d, hn::Eq(differ, hn::Zero(d)));
+}
+
 HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool past_caches,
                                   uint32_t* held, const TileRows& held_rows) {
-  const DW d;
   bool same = rows == held_rows;  // if not, what is held need not be fetched
   for (size_t group = 0; group < TileRows::kGroups; ++group) {
     for (uint64_t left = rows.bits[group] | held_rows.bits[group]; left != 0; left &= left - 1) {
       const size_t at = (group * 64 + static_cast<size_t>(std::countr_zero(left))) * kTileSize;
-      if (same) {
-        // What is held is looked at no further than to where it differs.
-        VW differ = hn::Zero(d);
-        for (size_t i = at; i < at + kTileSize; i += hn::Lanes(d)) {
-          differ = hn::Or(differ, hn::Xor(hn::Load(d, colors + i), hn::Load(d, held + i)));
-        }
-        same = hn::AllTrue(d, hn::Eq(differ, hn::Zero(d)));
-      }
+      // What is held is looked at no further than to where it differs.
+      if (same) same = !RowsDiffer(colors + at, held + at);
       if (past_caches && !same) {
         MoveRow<true>(colors + at, held + at);
       } else {
@@ -321,8 +204,49 @@ HWY_ATTR inline bool MoveColorsIn(uint32_t* colors, const TileRows& rows, bool p
       }
     }
   }
-  if (past_caches) hwy::FlushStream();
   return !same;
+}
+
+// A row of words to where they are shown; true if some are not black.
+template <bool kPastCaches, typename Show>
+HWY_ATTR HWY_INLINE bool MoveShownRow(uint32_t* words, const Show& show, uint32_t* held, VW& lit) {
+  const DW d;
+  const auto put = [&](VW shown, size_t i) HWY_ATTR {
+    if constexpr (kPastCaches) {
+      hn::Stream(shown, d, held + i);
+    } else {
+      hn::Store(shown, d, held + i);
+    }
+    hn::Store(hn::Zero(d), d, words + i);
+  };
+  return LitRow(words, 0, show, put, lit);
+}
+
+HWY_ATTR inline MovedWords MoveWordsIn(uint32_t* words, const TileRows& touched, bool past_caches,
+                                       uint32_t* held, TileRows& held_rows) {
+  const DW d;
+  const ShowWord show;
+  VW lit = hn::Zero(d);
+  bool same = true;
+  for (size_t group = 0; group < TileRows::kGroups; ++group) {
+    uint64_t bits = 0;
+    for (uint64_t left = touched.bits[group] | held_rows.bits[group]; left != 0; left &= left - 1) {
+      const auto r = static_cast<size_t>(std::countr_zero(left));
+      const size_t at = (group * 64 + r) * kTileSize;
+      if (same) {
+        VW differ = hn::Zero(d);
+        for (size_t i = at; i < at + kTileSize; i += hn::Lanes(d)) {
+          differ = hn::Or(differ, hn::Xor(show(hn::Load(d, words + i)), hn::Load(d, held + i)));
+        }
+        same = hn::AllTrue(d, hn::Eq(differ, hn::Zero(d)));
+      }
+      bits |= uint64_t{past_caches && !same ? MoveShownRow<true>(words + at, show, held + at, lit)
+                                            : MoveShownRow<false>(words + at, show, held + at, lit)}
+              << r;
+    }
+    held_rows.bits[group] = bits;
+  }
+  return {hn::GetLane(hn::SumOfLanes(d, lit)), !same};
 }
 
 inline const char* SpanTargetIn() { return hwy::TargetName(HWY_TARGET); }

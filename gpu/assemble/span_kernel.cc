@@ -26,6 +26,7 @@ HWY_EXPORT(DrawSpansIn);
 HWY_EXPORT(ShowWordsIn);
 HWY_EXPORT(LitColorsIn);
 HWY_EXPORT(MoveColorsIn);
+HWY_EXPORT(MoveWordsIn);
 HWY_EXPORT(SpanTargetIn);
 
 }  // namespace
@@ -52,6 +53,13 @@ bool MoveColors(uint32_t* colors, const TileRows& rows, bool past_caches, uint32
                 const TileRows& held_rows) {
   return HWY_DYNAMIC_DISPATCH(MoveColorsIn)(colors, rows, past_caches, held, held_rows);
 }
+
+MovedWords MoveWords(uint32_t* words, const TileRows& touched, bool past_caches, uint32_t* held,
+                     TileRows& held_rows) {
+  return HWY_DYNAMIC_DISPATCH(MoveWordsIn)(words, touched, past_caches, held, held_rows);
+}
+
+void FinishMoves() { hwy::FlushStream(); }
 
 std::string SpanTarget() { return HWY_DYNAMIC_DISPATCH(SpanTargetIn)(); }
 

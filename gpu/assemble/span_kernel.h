@@ -28,7 +28,8 @@ struct FoundSpans {
   }
 };
 
-// Appends the spans of walks [first, last) in the tiles with owned[tile] != 0, each walk's in the order of k.
+// Appends the spans of walks [first, last) in the tiles with owned[tile] != 0, or in all if there is no `owned`; each
+// walk's together, in any order.
 void FindSpans(const LineWalk* walks, uint32_t first, uint32_t last, const WalkGrid& grid,
                const uint8_t* owned, FoundSpans& found);
 
@@ -44,9 +45,19 @@ uint32_t ShowWords(uint32_t* words, const TileRows& touched, TileRows& rows);
 uint32_t LitColors(const uint32_t* colors, TileRows& rows);
 
 // Moves a tile's colours, which lie in `rows`, to `held`, of which what is not black lies in `held_rows`; leaves zeros. False
-// if it held the same. `past_caches`: for volumes that the caches would not keep.
+// if it held the same. `past_caches`: for volumes that the caches would not keep; other threads see what went past them
+// only after FinishMoves() in this one.
 bool MoveColors(uint32_t* colors, const TileRows& rows, bool past_caches, uint32_t* held,
                 const TileRows& held_rows);
+void FinishMoves();
+
+struct MovedWords {
+  uint32_t lit;  // not black
+  bool differ;   // from what was held
+};
+// ShowWords, and MoveColors of what comes out, in one go; `held_rows` become those of what is held then.
+MovedWords MoveWords(uint32_t* words, const TileRows& touched, bool past_caches, uint32_t* held,
+                     TileRows& held_rows);
 
 // The instruction set in use.
 std::string SpanTarget();

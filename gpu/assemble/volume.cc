@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <new>
 #include <utility>
 
 #include "gpu/assemble/blend.h"
@@ -20,7 +21,8 @@ uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
-constexpr size_t kTileRun = 8;           // of more than those, drawn by one thread in turn
+constexpr size_t kFreeBlocks = 256;      // kept, beside as many as are spare
+constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
@@ -79,8 +81,8 @@ struct TileClip {
 
 void TileStore::Reset(const TileGrid& grid) {
   grid_ = grid;
-  blocks_.clear();
-  blocks_.resize(grid.count());
+  pool_.Reset(sizeof(Block), grid.count());
+  blocks_.assign(grid.count(), nullptr);
   lit_.assign(grid.count(), 0);
   spare_.clear();
   spare_left_ = 0;
@@ -91,23 +93,26 @@ bool TileStore::Set(uint32_t tile, const uint32_t* colors, uint32_t lit) {
   std::copy_n(colors, kTileVoxels, copy.at);
   TileRows rows;
   LitColors(copy.at, rows);
-  return Take(tile, copy, rows, lit, false);
+  Expect({&tile, 1});
+  const bool differs = Take(tile, copy, rows, lit, false);
+  Recycle({&tile, 1}, spare_.size());
+  return differs;
 }
 
-std::unique_ptr<TileStore::Block> TileStore::TakeBlock() {
+TileStore::Block* TileStore::TakeBlock() {
   const std::atomic_ref<size_t> spares(spare_left_);
   size_t left = spares.load(std::memory_order_relaxed);
   while (left > 0) {
     if (spares.compare_exchange_weak(left, left - 1, std::memory_order_relaxed)) {
-      return std::move(spare_[left - 1]);
+      return spare_[left - 1];
     }
   }
-  return std::make_unique<Block>();
+  return new (pool_.Take()) Block();
 }
 
 bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit,
                      bool past_caches) {
-  std::unique_ptr<Block>& block = blocks_[tile];
+  Block*& block = blocks_[tile];
   const uint32_t before = std::exchange(lit_[tile], lit);
   if (lit == 0) return before != 0;  // what it held stays, for Recycle
   if (block == nullptr) block = TakeBlock();
@@ -116,13 +121,35 @@ bool TileStore::Take(uint32_t tile, TileWords& colors, const TileRows& rows, uin
   return differs || before == 0;
 }
 
+bool TileStore::TakeWords(uint32_t tile, TileWords& words, const TileRows& touched,
+                          bool past_caches) {
+  Block*& block = blocks_[tile];
+  if (block == nullptr) block = TakeBlock();
+  const MovedWords moved = MoveWords(words.at, touched, past_caches, block->colors.at, block->rows);
+  const uint32_t before = std::exchange(lit_[tile], moved.lit);
+  return moved.lit == 0 ? before != 0 : moved.differ || before == 0;
+}
+
+void TileStore::Expect(std::span<const uint32_t> tiles) {
+  size_t none = 0;
+  for (uint32_t tile : tiles) none += blocks_[tile] == nullptr;
+  pool_.Provide(none - std::min(none, spare_.size()));
+}
+
 void TileStore::Recycle(std::span<const uint32_t> tiles, size_t most) {
+  pool_.Settle();
   spare_.resize(spare_left_);
   for (uint32_t tile : tiles) {
-    if (lit_[tile] == 0 && blocks_[tile] != nullptr) spare_.push_back(std::move(blocks_[tile]));
+    if (lit_[tile] == 0 && blocks_[tile] != nullptr) {
+      spare_.push_back(std::exchange(blocks_[tile], nullptr));
+    }
   }
-  if (spare_.size() > most) spare_.resize(most);
+  while (spare_.size() > most) {
+    pool_.Give(spare_.back());
+    spare_.pop_back();
+  }
   spare_left_ = spare_.size();
+  pool_.Trim(most + kFreeBlocks);
 }
 
 void Volume::MarkDirty(uint32_t tile) {
@@ -264,6 +291,13 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scr
   uint32_t lit = 0;
   TileRows rows;
   TileRows touched;
+  // While this one is moved.
+  const auto fetch_next = [&] {
+    if (next == nullptr) return;
+    for (const Entry& e : index_[*next].entries) {
+      FetchItems(*e.drawable, e.drawable->bins.row(e.row));
+    }
+  };
   for (size_t i = 0; i < scratch.entries.size();) {
     const Layer& layer = *scratch.entries[i].drawable->layer;
     const TileClip clip(*layer.clip, box);
@@ -278,20 +312,15 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scr
     }
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {
-      lit = ShowWords(words, touched, rows);
-      break;
+      fetch_next();
+      return tiles_.TakeWords(tile, *scratch.words, touched, past_caches);
     }
     colors = scratch.colors.get();
     BlendTile(layer.record, words, colors->at);
     std::fill_n(words, kTileVoxels, 0);
   }
   if (colors->at != words) lit = LitColors(colors->at, rows);
-  if (next != nullptr) {
-    tiles_.Fetch(*next);
-    for (const Entry& e : index_[*next].entries) {
-      FetchItems(*e.drawable, e.drawable->bins.row(e.row));
-    }
-  }
+  fetch_next();
   return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
@@ -303,16 +332,21 @@ Volume::Changes Volume::Update() {
   std::vector<uint8_t> differs(dirty_.size());
   std::vector<uint32_t> lit_before(dirty_.size());
   const bool past_caches = dirty_.size() > kCachedTiles;
-  // Where what they need has to be fetched, in runs, in which each knows the next.
-  const size_t run = past_caches ? kTileRun : 1;
-  executor_.For((dirty_.size() + run - 1) / run, 1, [&](size_t n, int worker) {
-    const size_t end = std::min(dirty_.size(), (n + 1) * run);
-    for (size_t i = n * run; i < end; ++i) {
+  tiles_.Expect(dirty_);
+  // Waiting for moves takes as long as drawing some tiles, so it is not done after each.
+  const size_t run = past_caches ? kMovedRun : 1;
+  executor_.For((dirty_.size() + run - 1) / run, 1, [&](size_t r, int worker) {
+    const size_t end = std::min(dirty_.size(), (r + 1) * run);
+    for (size_t i = r * run; i < end; ++i) {
       const uint32_t tile = dirty_[i];
-      lit_before[i] = tiles_.lit(tile);
+      if (i + 2 < dirty_.size()) __builtin_prefetch(index_[dirty_[i + 2]].entries.data());
+      // Others draw what lies beyond the run.
       const uint32_t* const next = i + 1 < end ? &dirty_[i + 1] : nullptr;
+      if (next != nullptr) tiles_.Prefetch(*next);
+      lit_before[i] = tiles_.lit(tile);
       differs[i] = DrawTile(tile, next, past_caches, scratch_[static_cast<size_t>(worker)]);
     }
+    if (past_caches) FinishMoves();
   });
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "gpu/affine.h"
+#include "gpu/assemble/block_pool.h"
 #include "gpu/assemble/scene.h"
 #include "gpu/assemble/span_kernel.h"
 #include "gpu/cpu/executor.h"
@@ -36,12 +37,19 @@ class TileStore {
   uint32_t lit(uint32_t tile) const { return lit_[tile]; }
   // Copies `colors` (of kTileVoxels), of which `lit` are not black. False if the tile is as it was.
   bool Set(uint32_t tile, const uint32_t* colors, uint32_t lit);
+  // Before Takes: these are all that may be taken until Recycle.
+  void Expect(std::span<const uint32_t> tiles);
   // Takes `colors`, of which `lit`, in `rows`, are not black, and leaves zeros. False if the tile is as it was.
   // `past_caches`: they will not be read before much else was. Different tiles may be given by different threads.
   bool Take(uint32_t tile, TileWords& colors, const TileRows& rows, uint32_t lit, bool past_caches);
-  // The caller's thread will Take this tile soon.
-  void Fetch(uint32_t tile) const {
-    if (blocks_[tile] != nullptr) __builtin_prefetch(&blocks_[tile]->rows);
+  // The same of words of a layer (ShowWords) in the rows `touched`.
+  bool TakeWords(uint32_t tile, TileWords& words, const TileRows& touched, bool past_caches);
+  // It will be taken soon.
+  void Prefetch(uint32_t tile) const {
+    const Block* const block = blocks_[tile];
+    if (block == nullptr) return;
+    __builtin_prefetch(&block->rows, /*rw=*/1);
+    __builtin_prefetch(block->colors.at, /*rw=*/1);
   }
   // Between Takes: what tiles of these that went dark had is kept for others, `most` blocks at most in all.
   void Recycle(std::span<const uint32_t> tiles, size_t most);
@@ -52,14 +60,14 @@ class TileStore {
     TileWords colors;
     TileRows rows;  // where not black
   };
-  std::unique_ptr<Block> TakeBlock();
+  Block* TakeBlock();
 
   TileGrid grid_;
-  std::vector<std::unique_ptr<Block>> blocks_;
+  BlockPool pool_;
+  std::vector<Block*> blocks_;
   std::vector<uint32_t> lit_;
-  std::vector<std::unique_ptr<Block>>
-      spare_;              // the first spare_left_ of them, while tiles are taken
-  size_t spare_left_ = 0;  // reached by atomic_ref then
+  std::vector<Block*> spare_;  // the first spare_left_ of them, while tiles are taken
+  size_t spare_left_ = 0;      // reached by atomic_ref then
 };
 
 // Thread-bound; the work inside is spread over `executor`.

@@ -77,9 +77,24 @@ Drawn Defined(const Line& line, const TileGrid& grid) {
 }
 
 Drawn BySpans(const LineWalk& walk, const TileGrid& grid) {
-  const std::vector<uint8_t> owned(grid.count(), 1);
   FoundSpans found;
-  FindSpans(&walk, 0, 1, WalkGrid(grid), owned.data(), found);
+  FindSpans(&walk, 0, 1, WalkGrid(grid), nullptr, found);
+  // The same by tiles that are asked for, and nothing in others.
+  for (uint8_t odd : {0, 1}) {
+    std::vector<uint8_t> half(grid.count());
+    for (uint32_t tile = 0; tile < grid.count(); ++tile) half[tile] = (tile & 1) == odd;
+    FoundSpans some;
+    FindSpans(&walk, 0, 1, WalkGrid(grid), half.data(), some);
+    size_t next = 0;
+    for (size_t i = 0; i < found.size; ++i) {
+      if ((found.tiles.data()[i] & 1) != odd) continue;
+      const bool more = next < some.size;
+      EXPECT_TRUE(more && some.tiles.data()[next] == found.tiles.data()[i] &&
+                  some.items.data()[next] == found.items.data()[i]);
+      ++next;
+    }
+    EXPECT_EQ(next, some.size);
+  }
   Drawn drawn;
   std::map<uint32_t, TileRows> rows;
   for (size_t i = 0; i < found.size; ++i) {
@@ -411,6 +426,7 @@ TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
         want.at[v] = erase ? 0 : Interleave(rgb);
         lit += want.at[v] != 0;
       }
+      const Words drawn = words;
       TileRows rows, again;
       const TileRows want_rows = RowsOf(want);
       Words copy = words;
@@ -429,8 +445,19 @@ TEST(TileWords, AreShownAndMovedAlikeInAllVectors) {
             held_rows.bits[differs / 1024] |= uint64_t{1} << (differs / 16 % 64);
           }
           Words moved = want;
+          auto held_too = std::make_unique<Words>(*held);
           EXPECT_EQ(MoveColors(moved.at, rows, past_caches, held->at, held_rows), differs >= 0);
+          FinishMoves();
           ASSERT_TRUE(*held == want);
+          ASSERT_TRUE(moved == Words());
+          const bool whole = differs % 2 == 0;
+          moved = drawn;
+          const MovedWords at_once = MoveWords(moved.at, whole ? TileRows::All() : RowsOf(drawn),
+                                               past_caches, held_too->at, held_rows);
+          FinishMoves();
+          EXPECT_EQ(at_once.lit, lit);
+          EXPECT_EQ(at_once.differ, differs >= 0);
+          ASSERT_TRUE(*held_too == want && held_rows == want_rows);
           ASSERT_TRUE(moved == Words());
         }
       }
