@@ -54,6 +54,12 @@ class Sampler {
     uint32_t weight;
   };
 
+  // Neighbouring pixels of a row, one voxel each, whose voxels are neighbours in a tile's memory.
+  struct Strip {
+    uint32_t u, count;
+    uint32_t tile, index;  // of the first voxel
+  };
+
   Sampler() = default;
   void BuildInner();
   bool Gather(const TileStore& tiles, const display::FootprintEntry& outer, uint32_t* line) const;
@@ -61,7 +67,9 @@ class Sampler {
   void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0, SlicePixels& out) const;
   void SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
   void SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const;
+  void SampleStrips(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
   void FindPlanes(const TileGrid& grid);
+  void FindStrips(const TileGrid& grid);
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 
   display::FootprintTable table_;
@@ -74,6 +82,10 @@ class Sampler {
       false;  // one voxel a pixel, those of a column in a row: a stack of the lattice's own resolution
   std::vector<int32_t>
       plane_of_;  // z by slice, where pixel u is x and slices are planes; else empty
+  // Where single_ holds and a slice is one row, as in lattices: those of slice s are strips_[strip_begin_[s] ..
+  // strip_begin_[s + 1]). Else empty.
+  std::vector<uint32_t> strip_begin_;
+  std::vector<Strip> strips_;
 };
 
 }  // namespace voxeld::gpu
