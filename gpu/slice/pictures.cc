@@ -20,6 +20,7 @@ void Pictures::SetPlan(SlicePlan plan) {
     changed_in_.assign(count, 0);
     blank_.assign(slices, 1);
   }
+  levels_ = LevelTables::Of(plan_->layout.format, plan_->tone);
   columns_ = LevelColumns::Create(plan_->sampler.table(), plan_->sampler.grid(), plan_->layout,
                                   plan_->tone, plan_->begin, plan_->end);
   lit_tiles_.assign(slices, 0);
@@ -60,22 +61,20 @@ void Pictures::MarkSlices(const TileStore& tiles, const Volume::Changes& changes
 template <display::PixelFormat kFormat>
 void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
   const display::FrameLayout& layout = plan_->layout;
-  const display::Tone& tone = plan_->tone;
   const uint32_t width = static_cast<uint32_t>(layout.width);
   const uint32_t height = static_cast<uint32_t>(layout.height);
-  constexpr Levels kLevels = LevelsOf(kFormat);
-  uint32_t thresholds[8][8];  // they repeat every 8 pixels
-  for (uint32_t v = 0; v < 8; ++v) {
-    for (uint32_t u = 0; u < 8; ++u) {
-      thresholds[v][u] =
-          Threshold(tone.dither, u, v, sub, static_cast<uint32_t>(layout.sub_frames));
-    }
+  uint64_t below[8];  // repeats every 8 pixels
+  for (uint32_t u = 0; u < 8; ++u) {
+    below[u] = DitherColumn(u, sub, static_cast<uint32_t>(layout.sub_frames));
   }
   for (const auto& [rgb, u, v] : pixels.lit) {
-    const uint32_t threshold = thresholds[v % 8][u % 8];
-    const Levels q = {Quantize(tone.lut[rgb >> 16], kLevels.r, threshold),
-                      Quantize(tone.lut[(rgb >> 8) & 0xFF], kLevels.g, threshold),
-                      Quantize(tone.lut[rgb & 0xFF], kLevels.b, threshold)};
+    const uint32_t least = below[u % 8] >> (v % 8 * 8) & 0xFF;
+    const auto level = [&](int channel, uint32_t c) {
+      return levels_.base[channel][c] + static_cast<uint32_t>(levels_.rise[channel][c] > least);
+    };
+    const Levels q = {level(LevelTables::kRed, rgb >> 16),
+                      level(LevelTables::kGreen, (rgb >> 8) & 0xFF),
+                      level(LevelTables::kBlue, rgb & 0xFF)};
     PackPixel(kFormat, width, height, u, v, q, picture);
   }
 }

@@ -14,6 +14,7 @@
 #include "gpu/cpu/executor.h"
 #include "gpu/engine.h"
 #include "gpu/slice/level_columns.h"
+#include "gpu/slice/levels.h"
 #include "gpu/slice/sampler.h"
 
 namespace voxeld::gpu {
@@ -69,6 +70,7 @@ class Pictures {
 
   Executor& executor_;
   std::optional<SlicePlan> plan_;
+  LevelTables levels_;                   // of the plan's format and tone
   std::optional<LevelColumns> columns_;  // where it applies
   std::vector<uint8_t> bytes_;           // the owned slices' pictures, from the first on
   std::vector<uint64_t> changed_in_;     // 0: not drawn yet
