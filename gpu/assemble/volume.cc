@@ -245,7 +245,7 @@ void Volume::PreparePending() {
 }
 
 // False if it comes out as it was.
-bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
+bool Volume::DrawTile(uint32_t tile, bool past_caches, TileObserver* observer, Scratch& scratch) {
   scratch.entries.clear();
   for (const Entry& e : index_[tile].entries) {
     if (e.drawable->layer->record.visible != 0) scratch.entries.push_back(e);
@@ -285,10 +285,11 @@ bool Volume::DrawTile(uint32_t tile, bool past_caches, Scratch& scratch) {
     std::fill_n(words, kTileVoxels, 0);
   }
   if (colors->at != words) lit = LitColors(colors->at, rows);
+  if (observer != nullptr) observer->OnTile(tile, colors->at, rows);
   return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
-Volume::Changes Volume::Update() {
+Volume::Changes Volume::Update(TileObserver* observer) {
   PreparePending();
   std::sort(dirty_.begin(), dirty_.end());
   Changes changes;
@@ -299,7 +300,7 @@ Volume::Changes Volume::Update() {
   executor_.For(dirty_.size(), 1, [&](size_t i, int worker) {
     const uint32_t tile = dirty_[i];
     lit_before[i] = tiles_.lit(tile);
-    differs[i] = DrawTile(tile, past_caches, scratch_[static_cast<size_t>(worker)]);
+    differs[i] = DrawTile(tile, past_caches, observer, scratch_[static_cast<size_t>(worker)]);
   });
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];

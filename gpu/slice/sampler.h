@@ -37,6 +37,14 @@ class Sampler {
   const display::FootprintTable& table() const { return table_; }
   const TileGrid& grid() const { return grid_; }
 
+  // z by slice, where slices are planes of the grid, pixel column u is x = u, and a row further is y + 1; else empty.
+  // Sampling by the greatest alone.
+  std::span<const int32_t> planes() const {
+    return sampling_ == display::Sampling::kMax ? plane_of_ : std::span<const int32_t>();
+  }
+  // y of pixel row 0 of planes.
+  int32_t first_row() const { return runs_[0].at[1]; }
+
   // `out` is cleared already.
   void Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
 
