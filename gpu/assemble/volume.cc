@@ -273,7 +273,8 @@ void Volume::PreparePending() {
 }
 
 // False if it comes out as it was. `next`: the tile that this worker draws after it, if it is known.
-bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scratch& scratch) {
+bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
+                      Scratch& scratch) {
   scratch.entries.clear();
   for (const Entry& e : index_[tile].entries) {
     if (e.drawable->layer->record.visible != 0) scratch.entries.push_back(e);
@@ -312,19 +313,24 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scr
     }
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {
-      fetch_next();
-      return tiles_.TakeWords(tile, *scratch.words, touched, past_caches);
+      if (observer == nullptr) {
+        fetch_next();
+        return tiles_.TakeWords(tile, *scratch.words, touched, past_caches);
+      }
+      lit = ShowWords(words, touched, rows);
+      break;
     }
     colors = scratch.colors.get();
     BlendTile(layer.record, words, colors->at);
     std::fill_n(words, kTileVoxels, 0);
   }
   if (colors->at != words) lit = LitColors(colors->at, rows);
+  if (observer != nullptr) observer->OnTile(tile, colors->at, rows);
   fetch_next();
   return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
-Volume::Changes Volume::Update() {
+Volume::Changes Volume::Update(TileObserver* observer) {
   PreparePending();
   std::sort(dirty_.begin(), dirty_.end());
   Changes changes;
@@ -344,7 +350,8 @@ Volume::Changes Volume::Update() {
       const uint32_t* const next = i + 1 < end ? &dirty_[i + 1] : nullptr;
       if (next != nullptr) tiles_.Prefetch(*next);
       lit_before[i] = tiles_.lit(tile);
-      differs[i] = DrawTile(tile, next, past_caches, scratch_[static_cast<size_t>(worker)]);
+      differs[i] =
+          DrawTile(tile, next, past_caches, observer, scratch_[static_cast<size_t>(worker)]);
     }
     if (past_caches) FinishMoves();
   });

@@ -70,6 +70,14 @@ class TileStore {
   size_t spare_left_ = 0;      // reached by atomic_ref then
 };
 
+// Is told of tiles as they are drawn, while their colours are in the nearest caches.
+class TileObserver {
+ public:
+  virtual ~TileObserver() = default;
+  // `colors`: kTileVoxels (TileGrid::IndexInTile), not black in `rows` alone. For different tiles by several threads.
+  virtual void OnTile(uint32_t tile, const uint32_t* colors, const TileRows& rows) = 0;
+};
+
 // Thread-bound; the work inside is spread over `executor`.
 class Volume final : private SceneObserver {
  public:
@@ -87,8 +95,8 @@ class Volume final : private SceneObserver {
     std::vector<uint32_t> tiles;   // whose colours differ from before
     std::vector<uint8_t> was_lit;  // for each of them
   };
-  // Draws what is dirty.
-  Changes Update();
+  // Draws what is dirty. `observer` may be null; it is told of every tile drawn, also if that comes out as it was.
+  Changes Update(TileObserver* observer);
 
   const TileStore& tiles() const { return tiles_; }
   uint64_t lit_voxels() const { return lit_voxels_; }
@@ -124,7 +132,7 @@ class Volume final : private SceneObserver {
   void TakeOutLeaving();
   void Prepare(Drawable& drawable, Executor& executor, BinScratch& scratch) const;
   void PreparePending();
-  bool DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Scratch& scratch);
+  bool DrawTile(uint32_t tile, bool past_caches, TileObserver* observer, Scratch& scratch);
 
   Executor& executor_;
   Scene scene_;

@@ -25,6 +25,7 @@ absl::Status CpuCore::SetTarget(Target target) {
   pictures_.SetPlan(
       {target.layout, target.tone, begin, end, *std::move(sampler), std::move(tile_to_slices)});
   unsliced_ = {};
+  unobserved_.clear();
   layout_ = target.layout;
   return absl::OkStatus();
 }
@@ -36,10 +37,13 @@ absl::Status CpuCore::Apply(const StagingBlock& block, size_t size) {
   return volume_.Apply(*delta, block.bulk() != nullptr ? block.bulk() : &referred);
 }
 
-void CpuCore::UpdateVolume() {
-  Volume::Changes now = volume_.Update();
+void CpuCore::UpdateVolume(TileObserver* observer) {
+  Volume::Changes now = volume_.Update(observer);
   unsliced_.tiles_drawn += now.tiles_drawn;
   unsliced_.tiles.insert(unsliced_.tiles.end(), now.tiles.begin(), now.tiles.end());
+  if (observer == nullptr) {
+    unobserved_.insert(unobserved_.end(), now.tiles.begin(), now.tiles.end());
+  }
   unsliced_.was_lit.insert(unsliced_.was_lit.end(), now.was_lit.begin(), now.was_lit.end());
 }
 
@@ -51,13 +55,16 @@ absl::StatusOr<FrameResult> CpuCore::SubmitFrame(const FrameRequest& request, Fr
   result.frame = request.frame;
   const sync::SystemClock clock;
   const sync::TimeNs start = clock.Now();
-  UpdateVolume();
+  UpdateVolume(pictures_.observer());
   const sync::TimeNs assembled = clock.Now();
   result.tiles_drawn = unsliced_.tiles_drawn;
   const Volume::Changes changes = std::exchange(unsliced_, {});
-  const Pictures::Result drawn = pictures_.Update(volume_.tiles(), changes, request.frame);
+  const std::vector<uint32_t> unobserved = std::exchange(unobserved_, {});
+  const Pictures::Result drawn =
+      pictures_.Update(volume_.tiles(), changes, unobserved, request.frame);
   pictures_.CopyTo(buffer, request.buffer_holds);
   result.changed = drawn.changed;
+  result.packed_as_drawn = pictures_.observer() != nullptr;
   result.pictures_drawn = drawn.pictures_drawn;
   result.lit_voxels = volume_.lit_voxels();
   result.singular_drawables = volume_.singular_drawables();
@@ -70,7 +77,7 @@ absl::StatusOr<FrameResult> CpuCore::SubmitFrame(const FrameRequest& request, Fr
 
 absl::Status CpuCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
   if (absl::Status status = CheckBox(box, out.size(), layout_); !status.ok()) return status;
-  UpdateVolume();
+  UpdateVolume(nullptr);
   const TileStore& tiles = volume_.tiles();
   const TileGrid& grid = tiles.grid();
   const Box3 volume{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -26,7 +27,7 @@ class CpuCore {
   absl::Status ReadVoxels(VoxelBox box, std::span<uint32_t> out);
 
  private:
-  void UpdateVolume();
+  void UpdateVolume(TileObserver* observer);
 
   const std::unique_ptr<Executor> executor_;
   const SlicePart part_;
@@ -34,6 +35,8 @@ class CpuCore {
   Volume volume_;
   Pictures pictures_;
   Volume::Changes unsliced_;  // changes to the volume that no frame has shown yet
+  std::vector<uint32_t>
+      unobserved_;  // of their tiles those whose drawing the pictures did not observe
   uint64_t last_frame_ = 0;
 };
 

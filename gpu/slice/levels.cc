@@ -10,10 +10,9 @@ constexpr uint32_t kThresholds = 64;
 
 }  // namespace
 
-LevelTables LevelTables::OfRgb332(const display::Tone& tone) {
-  constexpr Levels kLevels = LevelsOf(display::PixelFormat::kRgb332);
-  constexpr uint32_t kLevelsOf[3] = {kLevels.r, kLevels.g, kLevels.b};
-  constexpr int kShift[3] = {5, 2, 0};
+LevelTables LevelTables::Of(display::PixelFormat format, const display::Tone& tone) {
+  const Levels levels = LevelsOf(format);
+  const uint32_t levels_of[3] = {levels.r, levels.g, levels.b};
   uint32_t thresholds[kThresholds] = {};  // by the matrix' value
   for (uint32_t v = 0; v < 8; ++v) {
     for (uint32_t u = 0; u < 8; ++u) {
@@ -23,14 +22,23 @@ LevelTables LevelTables::OfRgb332(const display::Tone& tone) {
   LevelTables tables;
   for (int channel = 0; channel < 3; ++channel) {
     for (uint32_t c = 0; c < 256; ++c) {
-      const uint32_t base = Quantize(tone.lut[c], kLevelsOf[channel], thresholds[0]);
+      const uint32_t base = Quantize(tone.lut[c], levels_of[channel], thresholds[0]);
       uint32_t rise = 0;
       for (const uint32_t threshold : thresholds) {
-        rise += Quantize(tone.lut[c], kLevelsOf[channel], threshold) - base;
+        rise += Quantize(tone.lut[c], levels_of[channel], threshold) - base;
       }
-      tables.base[channel][c] = static_cast<uint8_t>(base << kShift[channel]);
+      tables.base[channel][c] = static_cast<uint8_t>(base);
       tables.rise[channel][c] = static_cast<uint8_t>(rise);
     }
+  }
+  return tables;
+}
+
+LevelTables LevelTables::OfRgb332(const display::Tone& tone) {
+  constexpr int kShift[3] = {5, 2, 0};
+  LevelTables tables = Of(display::PixelFormat::kRgb332, tone);
+  for (size_t channel = 0; channel < 3; ++channel) {
+    for (uint8_t& base : tables.base[channel]) base = static_cast<uint8_t>(base << kShift[channel]);
   }
   return tables;
 }

@@ -11,13 +11,15 @@
 
 namespace voxeld::gpu {
 
-// For RGB332: `base` holds a channel's level where it lies in the byte. Without dither no rise is above 0.
+// Without dither no rise is above 0.
 struct LevelTables {
   static constexpr int kRed = 0, kGreen = 1, kBlue = 2;
 
   alignas(64) uint8_t base[3][256];
   alignas(64) uint8_t rise[3][256];
 
+  static LevelTables Of(display::PixelFormat format, const display::Tone& tone);
+  // `base` holds a channel's level where it lies in the byte.
   static LevelTables OfRgb332(const display::Tone& tone);
 };
 

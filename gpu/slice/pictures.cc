@@ -20,8 +20,18 @@ void Pictures::SetPlan(SlicePlan plan) {
     changed_in_.assign(count, 0);
     blank_.assign(slices, 1);
   }
+  levels_ = LevelTables::Of(plan_->layout.format, plan_->tone);
   columns_ = LevelColumns::Create(plan_->sampler.table(), plan_->sampler.grid(), plan_->layout,
                                   plan_->tone, plan_->begin, plan_->end);
+  packer_ =
+      PlanePacker::Create(plan_->sampler, plan_->layout, plan_->tone, plan_->begin, plan_->end);
+  if (packer_) {
+    before_ = std::exchange(bytes_, std::vector<uint8_t>(bytes_.size()));
+    packer_->SetPictures(bytes_);
+    blank_.assign(slices, 0);  // what the packer puts there is not kept account of
+  } else {
+    before_ = {};
+  }
   lit_tiles_.assign(slices, 0);
   dirty_.assign(slices, 1);
   scratch_.clear();
@@ -60,22 +70,20 @@ void Pictures::MarkSlices(const TileStore& tiles, const Volume::Changes& changes
 template <display::PixelFormat kFormat>
 void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
   const display::FrameLayout& layout = plan_->layout;
-  const display::Tone& tone = plan_->tone;
   const uint32_t width = static_cast<uint32_t>(layout.width);
   const uint32_t height = static_cast<uint32_t>(layout.height);
-  constexpr Levels kLevels = LevelsOf(kFormat);
-  uint32_t thresholds[8][8];  // they repeat every 8 pixels
-  for (uint32_t v = 0; v < 8; ++v) {
-    for (uint32_t u = 0; u < 8; ++u) {
-      thresholds[v][u] =
-          Threshold(tone.dither, u, v, sub, static_cast<uint32_t>(layout.sub_frames));
-    }
+  uint64_t below[8];  // repeats every 8 pixels
+  for (uint32_t u = 0; u < 8; ++u) {
+    below[u] = DitherColumn(u, sub, static_cast<uint32_t>(layout.sub_frames));
   }
   for (const auto& [rgb, u, v] : pixels.lit) {
-    const uint32_t threshold = thresholds[v % 8][u % 8];
-    const Levels q = {Quantize(tone.lut[rgb >> 16], kLevels.r, threshold),
-                      Quantize(tone.lut[(rgb >> 8) & 0xFF], kLevels.g, threshold),
-                      Quantize(tone.lut[rgb & 0xFF], kLevels.b, threshold)};
+    const uint32_t least = below[u % 8] >> (v % 8 * 8) & 0xFF;
+    const auto level = [&](int channel, uint32_t c) {
+      return levels_.base[channel][c] + static_cast<uint32_t>(levels_.rise[channel][c] > least);
+    };
+    const Levels q = {level(LevelTables::kRed, rgb >> 16),
+                      level(LevelTables::kGreen, (rgb >> 8) & 0xFF),
+                      level(LevelTables::kBlue, rgb & 0xFF)};
     PackPixel(kFormat, width, height, u, v, q, picture);
   }
 }
@@ -142,15 +150,46 @@ bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slice
   return changed;
 }
 
+// True if some picture is not what it was.
+bool Pictures::TakePacked(const TileStore& tiles, std::span<const uint32_t> unobserved,
+                          uint64_t frame) {
+  executor_.For(unobserved.size(), 1, [&](size_t i, int) {
+    constexpr TileWords kDark = {};
+    const uint32_t tile = unobserved[i];
+    const bool lit = tiles.colors(tile) != nullptr;
+    packer_->OnTile(tile, lit ? tiles.colors(tile) : kDark.at, lit ? tiles.rows(tile) : TileRows());
+  });
+  const size_t size = plan_->layout.bytes_per_slice();
+  bool changed = false;
+  for (size_t i = 0; i < changed_in_.size(); ++i) {
+    bool differs = packer_->TakeDiffers(i);
+    if (!before_.empty()) {
+      differs = std::memcmp(&bytes_[i * size], &before_[i * size], size) != 0;
+    }
+    if (!differs && changed_in_[i] != 0) continue;
+    changed_in_[i] = frame;
+    changed = true;
+  }
+  before_ = {};
+  return changed;
+}
+
 Pictures::Result Pictures::Update(const TileStore& tiles, const Volume::Changes& changes,
-                                  uint64_t frame) {
+                                  std::span<const uint32_t> unobserved, uint64_t frame) {
   MarkSlices(tiles, changes);
-  if (columns_) columns_->Update(tiles, changes.tiles, executor_);
   std::vector<int32_t> slices;
   for (size_t s = 0; s < dirty_.size(); ++s) {
     if (dirty_[s] != 0) slices.push_back(plan_->begin + static_cast<int32_t>(s));
     dirty_[s] = 0;
   }
+  Result result;
+  result.pictures_drawn =
+      static_cast<uint32_t>(slices.size()) * static_cast<uint32_t>(plan_->layout.sub_frames);
+  if (packer_) {
+    result.changed = TakePacked(tiles, unobserved, frame);
+    return result;
+  }
+  if (columns_) columns_->Update(tiles, changes.tiles, executor_);
   // What neighbours have in common is fetched once for all.
   const size_t together = columns_ ? LevelColumns::kSlicesTogether : 1;
   std::vector<uint8_t> changed((slices.size() + together - 1) / together);
@@ -160,9 +199,6 @@ Pictures::Result Pictures::Update(const TileStore& tiles, const Volume::Changes&
         DrawSlices(tiles, std::span(slices).subspan(at, std::min(together, slices.size() - at)),
                    frame, scratch_[static_cast<size_t>(worker)]);
   });
-  Result result;
-  result.pictures_drawn =
-      static_cast<uint32_t>(slices.size()) * static_cast<uint32_t>(plan_->layout.sub_frames);
   result.changed = std::find(changed.begin(), changed.end(), 1) != changed.end();
   return result;
 }

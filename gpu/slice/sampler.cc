@@ -5,11 +5,9 @@
 #include <bit>
 #include <map>
 #include <utility>
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
 
 #include "absl/strings/str_cat.h"
+#include "gpu/slice/lit_bits.h"
 #include "gpu/slice/weight.h"
 #include "gpu/word.h"
 
@@ -26,27 +24,6 @@ Offset Greatest(const display::FootprintLists& lists) {
     for (size_t a = 0; a < 3; ++a) most[a] = std::max(most[a], OffsetOf(e)[a]);
   }
   return most;
-}
-
-// Bit i: the i-th of `count` colours (kTileSize at most), each 2^shift words behind the last, is not black.
-uint32_t LitBits(const uint32_t* from, int32_t count, uint32_t shift) {
-#ifdef __SSE2__
-  static_assert(kTileSize == 16, "as many as a mask has bits");
-  if (shift == 0 && count == kTileSize) {  // as a rule
-    const auto black = [&](int32_t i) {
-      return _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from + i)),
-                             _mm_setzero_si128());
-    };
-    const __m128i words =
-        _mm_packs_epi16(_mm_packs_epi32(black(0), black(4)), _mm_packs_epi32(black(8), black(12)));
-    return static_cast<uint32_t>(_mm_movemask_epi8(words)) ^ 0xFFFF;
-  }
-#endif
-  uint32_t bits = 0;
-  for (int32_t i = 0; i < count; ++i) {
-    bits |= static_cast<uint32_t>(from[static_cast<uint32_t>(i) << shift] != 0) << i;
-  }
-  return bits;
 }
 
 }  // namespace
@@ -71,6 +48,7 @@ absl::StatusOr<Sampler> Sampler::Create(display::FootprintTable table, const Til
   sampler.sampling_ = sampling;
   sampler.BuildInner();
   sampler.FindPlanes(grid);
+  sampler.FindStrips(grid);
   return sampler;
 }
 
@@ -131,6 +109,30 @@ void Sampler::FindPlanes(const TileGrid& grid) {
   }
   const int32_t(&at)[3] = runs_[0].at;
   if (at[0] == 0 && at[2] == 0) plane_of_ = std::move(planes);
+}
+
+void Sampler::FindStrips(const TileGrid& grid) {
+  if (!single_ || table_.height != 1) return;
+  const int32_t(&at)[3] = runs_[0].at;
+  strip_begin_.push_back(0);
+  for (int32_t slice = 0; slice < table_.slices; ++slice) {
+    for (int32_t u = 0; u < table_.width; ++u) {
+      for (const display::FootprintEntry& e : table_.Outer(slice, u)) {
+        const int32_t x = at[0] + e.x, y = at[1] + e.y, z = at[2] + e.z;
+        const Strip one = {static_cast<uint32_t>(u), 1, grid.TileOf(x, y, z),
+                           grid.IndexInTile(x, y, z)};
+        const bool first = strips_.size() == strip_begin_.back();
+        Strip* const last = first ? nullptr : &strips_.back();
+        if (last != nullptr && last->tile == one.tile && last->u + last->count == one.u &&
+            last->index + last->count == one.index && last->count < kTileSize) {
+          ++last->count;
+        } else {
+          strips_.push_back(one);
+        }
+      }
+    }
+    strip_begin_.push_back(static_cast<uint32_t>(strips_.size()));
+  }
 }
 
 // Row (slice, v) as table_.inner has it.
@@ -224,6 +226,22 @@ void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& o
   }
 }
 
+// What SampleSingle comes to where slices are rows.
+void Sampler::SampleStrips(const TileStore& tiles, int32_t slice, SlicePixels& out) const {
+  const size_t s = static_cast<size_t>(slice);
+  for (uint32_t n = strip_begin_[s]; n < strip_begin_[s + 1]; ++n) {
+    const Strip& strip = strips_[n];
+    const uint32_t* const colors = tiles.colors(strip.tile);
+    if (colors == nullptr) continue;
+    const uint32_t* const from = colors + strip.index;
+    for (uint32_t lit = LitBits(from, static_cast<int32_t>(strip.count), 0); lit != 0;
+         lit &= lit - 1) {
+      const uint32_t i = static_cast<uint32_t>(std::countr_zero(lit));
+      out.lit.push_back({Deinterleave(from[i]), strip.u + i, 0});
+    }
+  }
+}
+
 // What SampleSingle comes to where slices are planes: tile by tile, and of those the lit rows alone.
 void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const {
   const TileGrid& grid = tiles.grid();
@@ -298,6 +316,8 @@ void Sampler::Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) co
     for (uint32_t u = 0; u < width; ++u) SampleWeighted(tiles, slice, u, out);
   } else if (!plane_of_.empty()) {
     SamplePlane(tiles, plane_of_[static_cast<size_t>(slice)], out);
+  } else if (!strip_begin_.empty()) {
+    SampleStrips(tiles, slice, out);
   } else if (single_) {
     SampleSingle(tiles, slice, out);
   } else {

@@ -37,6 +37,14 @@ class Sampler {
   const display::FootprintTable& table() const { return table_; }
   const TileGrid& grid() const { return grid_; }
 
+  // z by slice, where slices are planes of the grid, pixel column u is x = u, and a row further is y + 1; else empty.
+  // Sampling by the greatest alone.
+  std::span<const int32_t> planes() const {
+    return sampling_ == display::Sampling::kMax ? plane_of_ : std::span<const int32_t>();
+  }
+  // y of pixel row 0 of planes.
+  int32_t first_row() const { return runs_[0].at[1]; }
+
   // `out` is cleared already.
   void Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
 
@@ -54,6 +62,12 @@ class Sampler {
     uint32_t weight;
   };
 
+  // Neighbouring pixels of a row, one voxel each, whose voxels are neighbours in a tile's memory.
+  struct Strip {
+    uint32_t u, count;
+    uint32_t tile, index;  // of the first voxel
+  };
+
   Sampler() = default;
   void BuildInner();
   bool Gather(const TileStore& tiles, const display::FootprintEntry& outer, uint32_t* line) const;
@@ -61,7 +75,9 @@ class Sampler {
   void SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0, SlicePixels& out) const;
   void SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
   void SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const;
+  void SampleStrips(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
   void FindPlanes(const TileGrid& grid);
+  void FindStrips(const TileGrid& grid);
   void SampleWeighted(const TileStore& tiles, int32_t slice, uint32_t u, SlicePixels& out) const;
 
   display::FootprintTable table_;
@@ -74,6 +90,10 @@ class Sampler {
       false;  // one voxel a pixel, those of a column in a row: a stack of the lattice's own resolution
   std::vector<int32_t>
       plane_of_;  // z by slice, where pixel u is x and slices are planes; else empty
+  // Where single_ holds and a slice is one row, as in lattices: those of slice s are strips_[strip_begin_[s] ..
+  // strip_begin_[s + 1]). Else empty.
+  std::vector<uint32_t> strip_begin_;
+  std::vector<Strip> strips_;
 };
 
 }  // namespace voxeld::gpu

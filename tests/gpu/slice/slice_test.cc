@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <optional>
+#include <random>
 #include <set>
+#include <utility>
 
 #include "gpu/slice/pack.h"
 #include "gpu/slice/quantize.h"
@@ -165,6 +169,71 @@ TEST(Sampler, WeightedTakesTheGreatestOfEachChannel) {
   const std::vector<uint32_t> pixels =
       Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kWeighted);
   EXPECT_EQ(pixels, (std::vector<uint32_t>{0xFF8000, 0, 0xFF8010, 0}));
+}
+
+// Rows of lights, one voxel each: neighbours in memory along x, with gaps, back to front, up to a tile's end.
+TEST(Sampler, RowsOfLightsTakeTheirOwnVoxels) {
+  std::mt19937 random(7);
+  TileStore tiles;
+  tiles.Reset(TileGrid::Of(40, 6, 5));
+  const TileGrid& grid = tiles.grid();
+  std::vector<uint32_t> rgb(40 * 6 * 5);
+  const auto at = [&](int32_t x, int32_t y, int32_t z) -> uint32_t& {
+    return rgb[static_cast<size_t>((z * 6 + y) * 40 + x)];
+  };
+  for (uint32_t tile = 0; tile + 1 < grid.count(); ++tile) {  // the last is dark
+    std::vector<uint32_t> colors(kTileVoxels, 0);
+    const Box3 box = grid.VoxelsOf(tile);
+    uint32_t lit = 0;
+    for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
+      for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
+        for (int32_t x = box.lo[0]; x < box.hi[0]; ++x) {
+          at(x, y, z) = random() % 3 == 0 ? 0 : 1 + random() % 0xFFFFFF;
+          colors[grid.IndexInTile(x, y, z)] = Interleave(at(x, y, z));
+          lit += at(x, y, z) != 0;
+        }
+      }
+    }
+    tiles.Set(tile, colors.data(), lit);
+  }
+  display::FootprintTable table;
+  table.slices = 4;
+  table.width = 40;
+  table.height = 1;
+  table.inner = {{0, 1}, {{0, 0, 0}}};
+  table.outer.begin = {0};
+  const auto voxel = [](int32_t slice, int32_t u) -> std::optional<std::array<int32_t, 3>> {
+    if (slice == 1 && u % 7 == 3) return std::nullopt;          // gaps
+    if (slice == 2) return std::array{39 - u, 3, 4};            // against the order of memory
+    if (slice == 3) return std::array{(u * 3) % 40, u % 6, 1};  // not neighbours
+    return std::array{u, 5, slice};
+  };
+  for (int32_t slice = 0; slice < table.slices; ++slice) {
+    for (int32_t u = 0; u < table.width; ++u) {
+      if (const auto v = voxel(slice, u)) {
+        table.outer.entries.push_back({static_cast<uint16_t>((*v)[0]),
+                                       static_cast<uint16_t>((*v)[1]),
+                                       static_cast<uint16_t>((*v)[2])});
+      }
+      table.outer.begin.push_back(static_cast<uint32_t>(table.outer.entries.size()));
+    }
+  }
+  const absl::StatusOr<Sampler> sampler = Sampler::Create(table, grid, display::Sampling::kMax);
+  ASSERT_TRUE(sampler.ok()) << sampler.status();
+  for (int32_t slice = 0; slice < table.slices; ++slice) {
+    SlicePixels pixels;
+    sampler->Sample(tiles, slice, pixels);
+    std::vector<uint32_t> got(40), want(40);
+    for (const auto& [color, u, v] : pixels.lit) {
+      EXPECT_EQ(v, 0u);
+      EXPECT_EQ(std::exchange(got[u], color), 0u) << "told twice";
+    }
+    for (int32_t u = 0; u < table.width; ++u) {
+      if (const auto v = voxel(slice, u))
+        want[static_cast<size_t>(u)] = at((*v)[0], (*v)[1], (*v)[2]);
+    }
+    EXPECT_EQ(got, want) << "slice " << slice;
+  }
 }
 
 TEST(Sampler, RefusesATableThatLeavesTheGrid) {
