@@ -132,7 +132,8 @@ class Volume final : private SceneObserver {
   void TakeOutLeaving();
   void Prepare(Drawable& drawable, Executor& executor, BinScratch& scratch) const;
   void PreparePending();
-  bool DrawTile(uint32_t tile, bool past_caches, TileObserver* observer, Scratch& scratch);
+  bool DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
+                Scratch& scratch);
 
   Executor& executor_;
   Scene scene_;
