@@ -95,7 +95,7 @@ void Assemble(benchmark::State& state, const Draft (&scenes)[2], const int32_t s
   std::vector<std::byte> delta;
   const auto frame = [&] {
     Check(volume.Apply(delta, nullptr));
-    benchmark::DoNotOptimize(volume.Update());
+    benchmark::DoNotOptimize(volume.Update(nullptr));
   };
   for (int i = 0; i < 2; ++i) {  // memory is had before
     delta = DeltaOf(scenes[id % 2], id + 1);
