@@ -2,6 +2,8 @@
 // anything else until all threads have come by a barrier.
 #pragma once
 
+#include <utility>
+
 #include "tests/gpu/simt/kernel.h"
 
 namespace cub {
@@ -10,7 +12,7 @@ template <typename T, int kThreads>
 class BlockScan {
  public:
   struct TempStorage {
-    T sums[kThreads];
+    T sums[kThreads + 1];
   };
 
   explicit BlockScan(TempStorage& storage) : storage_(storage) {}
@@ -21,12 +23,13 @@ class BlockScan {
     for (int i = 0; i < kItems; ++i) sum += in[i];
     storage_.sums[threadIdx.x] = sum;
     __syncthreads();
-    T before{};
-    total = T{};
-    for (uint32_t i = 0; i < kThreads; ++i) {
-      if (i == threadIdx.x) before = total;
-      total += storage_.sums[i];
+    if (threadIdx.x == 0) {
+      T all{};
+      for (T& place : storage_.sums) all += std::exchange(place, all);
     }
+    __syncthreads();
+    T before = storage_.sums[threadIdx.x];
+    total = storage_.sums[kThreads];
     for (int i = 0; i < kItems; ++i) {
       const T value = in[i];
       out[i] = before;
