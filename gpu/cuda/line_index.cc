@@ -81,6 +81,7 @@ absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, b
   }
   // With what is counted behind it, so that all that begins as 0 is one. Whatever the lines, it is
   // little: it lies beside them.
+  regions = Block();
   absl::StatusOr<Block> zeros =
       device().Zeros(blocks * (sizeof(uint64_t) + sizeof(uint32_t)) + sizeof(uint32_t));
   if (!zeros.ok()) return zeros.status();

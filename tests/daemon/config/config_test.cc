@@ -111,7 +111,7 @@ driver = "simulated"
   EXPECT_THAT(config.displays[0].options,
               UnorderedElementsAre(Pair("geometry", "rotor"), Pair("slices", "360"),
                                    Pair("eccentricity", "13.5;0.375"), Pair("mirror", "true")));
-  EXPECT_EQ(config.displays[0].source, "test.toml:23:1");
+  EXPECT_EQ(config.displays[0].source, "test.toml:24:1");
 }
 
 TEST(ConfigText, NoDisplaysAtAllCanBeAskedForAndReadsBack) {
