@@ -182,7 +182,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                   .worker = config.engine.worker,
                                   .workers = std::make_shared<gpu::WorkerPool>(),
                                   .worker_deadline_ns = config.engine.worker_deadline_ns,
-                                  .staging_limit_bytes = config.engine.staging_limit_bytes};
+                                  .staging_limit_bytes = config.engine.staging_limit_bytes,
+                                  .index_bytes = config.engine.index_bytes};
   for (auto& [display, view, gpus] : displays) {
     if (absl::Status status = core.AddDisplay(std::move(display), EngineOf(engine, gpus), view);
         !status.ok()) {

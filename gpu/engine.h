@@ -99,6 +99,9 @@ struct EngineOptions {
   std::function<void(const absl::Status&)> lost;
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
+  // What the CUDA engine's lists of thin lines by place may take of the device's memory: what would
+  // need more is drawn in passes, which takes longer. 0: the engine's own choice.
+  uint64_t index_bytes = 0;
 };
 
 struct EngineInfo {

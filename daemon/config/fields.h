@@ -71,6 +71,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("threads", config.engine.threads, 0, 1024);
   visitor.Integer("staging_limit_bytes", config.engine.staging_limit_bytes, 1 << 20, 1024 * kGiB);
   visitor.Integer("device", config.engine.device, 0, 1023);
+  visitor.Integer("index_bytes", config.engine.index_bytes, 0, 1024 * kGiB);
   visitor.Flag("in_worker", config.engine.in_worker);
   visitor.Text("worker", config.engine.worker);
   visitor.Text("nccl", config.engine.nccl);

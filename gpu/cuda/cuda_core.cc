@@ -18,7 +18,7 @@ CudaCore::CudaCore(std::unique_ptr<Device> device, SlicePart part, const Tuning&
       tuning_(tuning),
       uploader_(*device_),
       stopwatch_(*device_),
-      volume_(*device_, uploader_) {}
+      volume_(*device_, uploader_, tuning_) {}
 
 absl::Status CudaCore::SetTarget(const Target& target) {
   if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;

@@ -23,7 +23,9 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& op
   }
   (*device)->api().SetFaults(faults);
   const EngineInfo info = {EngineKind::kCuda, (*device)->api().device().name, std::move(reason)};
-  auto core = std::make_unique<cuda::CudaCore>(*std::move(device), options.part, tuning);
+  cuda::Tuning chosen = tuning;
+  if (options.index_bytes != 0) chosen.index_bytes = options.index_bytes;
+  auto core = std::make_unique<cuda::CudaCore>(*std::move(device), options.part, chosen);
   return std::make_unique<CoreEngine<cuda::CudaCore>>(options, info, std::move(core));
 }
 

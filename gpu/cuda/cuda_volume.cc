@@ -16,7 +16,22 @@ namespace {
 // Beyond as many items as there are, what has gone is swept out of the index.
 constexpr uint64_t kSpareItems = 65536;
 
+uint64_t IndexBytes(const Tuning& tuning, const cudaDeviceProp& device) {
+  if (tuning.index_bytes != 0) return tuning.index_bytes;
+  return std::min(uint64_t{16} << 30, uint64_t{device.totalGlobalMem} / 4);
+}
+
 }  // namespace
+
+CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
+    : device_(device),
+      uploader_(uploader),
+      index_(device),
+      line_lists_(device.pool(), IndexBytes(tuning, device.api().device())),
+      lines_(device, line_lists_,
+             static_cast<uint64_t>(static_cast<double>(line_lists_.limit()) *
+                                   tuning.index_share_kept)),
+      triangles_(device) {}
 
 // ------------------------------------------------------------------------------------------- tiles
 
@@ -66,6 +81,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   lines_.Reset(tiles_.grid, tiles_.owned_here);
   triangles_.Reset(tiles_.grid, tiles_.owned_here);
   lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
+  pass_planes_ = INT32_MAX;
   slots_.clear();
   free_slots_.clear();
   dead_slots_.clear();
@@ -258,9 +274,13 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
   keep_visible(view.lines);
   keep_visible(view.triangles);
   view.clipped = !layers.empty() && looks_now_[*layers.begin()].half_spaces != 0;
-  const auto draw = view.pairs.count > 0          ? DrawAll
-                    : plain && layers.size() <= 1 ? DrawOneLayer
-                                                  : DrawLines;
+  const auto* const lines = view.lines.batches;
+  const bool listed = std::none_of(lines, lines + view.lines.count, [](const LineBatchView& batch) {
+    return batch.lists.spans == nullptr;
+  });
+  const auto draw = view.pairs.count > 0 || !listed ? DrawAll
+                    : plain && layers.size() <= 1   ? DrawOneLayer
+                                                    : DrawLines;
   return device_.Run("DrawRegions", [&] {
     return draw(view, to, static_cast<uint32_t>(device_.api().device().multiProcessorCount),
                 device_.stream());
@@ -278,6 +298,7 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
   if (absl::Status status = lines_.Merge(); !status.ok()) return status;
+  if (absl::Status status = lines_.SortDeferred(); !status.ok()) return status;
   if (absl::Status status = triangles_.Merge(); !status.ok()) return status;
   const VolumeView volume = tiles_.view();
   absl::Status status;
@@ -304,7 +325,7 @@ absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
   const size_t before = group == 0 ? 0 : static_cast<size_t>(groups_.end[group - 1]);
   view.list = view.volume.dirty_list + before * tiles_.regions.count_of_plane();
   view.listed = &view.volume.counters->dirty[group];
-  absl::Status status = Draw(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
+  absl::Status status = DrawListed(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
   if (status.ok() && group + 1 == groups_.count) listed_ = false;
   return status;
 }
@@ -344,7 +365,7 @@ absl::Status CudaVolume::Read(const Box3& box, uint32_t* out) {
   view.list = regions->as<uint32_t>();
   view.listed = view.volume.counters->dirty;
   view.read = {box, out};
-  if (absl::Status status = Draw(view, DrawTo::kReader); !status.ok()) return status;
+  if (absl::Status status = DrawListed(view, DrawTo::kReader); !status.ok()) return status;
   return device_.Wait();
 }
 

@@ -26,6 +26,7 @@
 #include "gpu/cuda/pair_index.h"
 #include "gpu/cuda/pool.h"
 #include "gpu/cuda/triangle_index.h"
+#include "gpu/cuda/tuning.h"
 #include "gpu/cuda/types.h"
 #include "gpu/cuda/uploader.h"
 
@@ -60,8 +61,7 @@ struct DeviceArrays {
 // and what could not be drawn is drawn with the next Update.
 class CudaVolume final : private SceneObserver {
  public:
-  CudaVolume(Device& device, Uploader& uploader)
-      : device_(device), uploader_(uploader), index_(device), lines_(device), triangles_(device) {}
+  CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning);
 
   // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
   // fit the device.
@@ -130,6 +130,9 @@ class CudaVolume final : private SceneObserver {
   absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving);
   absl::Status EnterPairs(std::span<const uint32_t> slots);
   DrawView ViewForDrawing() const;
+  // The regions that `view` lists.
+  absl::Status DrawListed(DrawView& view, DrawTo to);
+  absl::Status DrawInPasses(const DrawView& view, DrawTo to, const LineIndex::Seen& seen);
   absl::Status Draw(DrawView& view, DrawTo to);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
@@ -147,7 +150,12 @@ class CudaVolume final : private SceneObserver {
   bool counted_ = true;  // the counters have begun
   DrawGroups groups_;    // of the frame under way
   PairIndex index_;      // of all that the others do not have
+  Pool line_lists_;
   LineIndex lines_;
+  // Of blocks of regions: a pass that failed last, with so many lines in it, halved. As many planes
+  // along z go in the next.
+  int32_t pass_planes_ = INT32_MAX;
+  uint64_t pass_lines_ = 0;
   bool lines_suit_ = false;  // the volume is not too large for them
   TriangleIndex triangles_;
 

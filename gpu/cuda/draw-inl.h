@@ -6,11 +6,12 @@
 #include "gpu/cuda/pairs-inl.h"
 #include "gpu/cuda/spans-inl.h"
 #include "gpu/cuda/triangles-inl.h"
+#include "gpu/cuda/unsorted-inl.h"
 
 namespace voxeld::gpu::cuda {
 
-// What a drawing has to reckon with: thin lines and small triangles of one layer that is seen as it
-// is; of any layers; or anything.
+// What a drawing has to reckon with: thin lines that have lists and small triangles, of one layer that
+// is seen as it is; of any layers; or anything.
 enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 
 template <DrawWhat kWhat>
@@ -51,7 +52,14 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
       continue;
     }
     for (uint32_t left = scratch.line_batches; left != 0; left &= left - 1) {
-      DrawSpans(view, view.lines.batches[__ffs(static_cast<int>(left)) - 1], scratch);
+      const LineBatchView& batch = view.lines.batches[__ffs(static_cast<int>(left)) - 1];
+      if constexpr (kWhat == DrawWhat::kAll) {
+        if (batch.lists.spans == nullptr) {
+          DrawUnsorted(batch.lines, batch.ends, batch.count, &view.regions);
+          continue;
+        }
+      }
+      DrawSpans(view, batch, scratch);
     }
     for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
       DrawTriangles(view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);

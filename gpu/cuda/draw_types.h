@@ -45,6 +45,12 @@ struct DrawView {
   bool clipped = true;  // of one layer alone: it has half-spaces
 };
 
+// Regions that were picked from a list: how many, and the box of their blocks.
+struct PickedRegions {
+  uint32_t count = 0;
+  int32_t lo[3] = {0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF}, hi[3] = {};
+};
+
 // Where drawn colours go: into the tiles kept for slicing, straight into pictures, or to who asks.
 enum class DrawTo : uint8_t { kTiles, kPictures, kReader };
 

@@ -35,6 +35,20 @@ __global__ void ListDirtyKernel(VolumeView volume, RegionGrid regions, DrawGroup
   atomicAdd(&volume.counters->tiles_drawn, 1u);
 }
 
+__global__ void PickRegionsKernel(const uint32_t* from, const uint32_t* listed, RegionGrid within,
+                                  uint32_t* list, PickedRegions* picked) {
+  const uint64_t i = Thread();
+  if (i >= *listed) return;
+  int32_t block[3];
+  within.BlockCoordinates(from[i] / kRegionsInBlock, block);
+  if (!within.DrawsBlock(block)) return;
+  list[atomicAdd(&picked->count, 1u)] = from[i];
+  for (int a = 0; a < 3; ++a) {
+    atomicMin(&picked->lo[a], block[a]);
+    atomicMax(&picked->hi[a], block[a] + 1);
+  }
+}
+
 struct BoxArgs {
   int32_t lo[3], size[3];
 };
@@ -60,6 +74,13 @@ __global__ void ReadBoxKernel(VolumeView volume, BoxArgs box, uint32_t* out) {
 cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, const DrawGroups& groups,
                       cudaStream_t stream) {
   ListDirtyKernel<<<Blocks(regions.count()), kItemThreads, 0, stream>>>(volume, regions, groups);
+  return cudaGetLastError();
+}
+
+cudaError_t PickRegions(const DrawView& view, const RegionGrid& within, uint32_t* list,
+                        PickedRegions* picked, cudaStream_t stream) {
+  PickRegionsKernel<<<Blocks(within.count()), kItemThreads, 0, stream>>>(view.list, view.listed,
+                                                                         within, list, picked);
   return cudaGetLastError();
 }
 

@@ -3,6 +3,7 @@
 
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/line_kernels.h"
+#include "gpu/cuda/lines-inl.h"
 #include "gpu/primitives/list.h"
 #include "gpu/word.h"
 
@@ -41,13 +42,6 @@ __global__ void FindBoundsKernel(const float* positions, uint32_t count, uint32_
   }
 }
 
-// But for its track.
-__device__ ThinLine Load(const ThinLine* line) {
-  const int4* const at = reinterpret_cast<const int4*>(line);
-  const int4 a = at[0], b = at[1];
-  return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w), {}};
-}
-
 __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t items,
                                 ThinLine* lines, uint32_t* ends) {
   const uint64_t i = Thread();
@@ -66,12 +60,6 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
   if (ends != nullptr) ends[i] = end;
 }
 
-// Line `i` of the rows.
-__device__ uint64_t LineAt(const ItemList& list, uint64_t i) {
-  const uint32_t d = DrawableOf(list, i);
-  return list.slot(d) + (i - list.first(d));
-}
-
 __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, const ThinLine* from,
                                 const uint32_t* ends_from, ThinLine* to, uint32_t* ends_to) {
   const uint64_t i = Thread();
@@ -87,7 +75,7 @@ __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, c
 __device__ void WalkBlocks(const RegionGrid& grid, const ThinLine* lines, uint32_t i,
                            uint32_t count, auto&& f) {
   if (i >= count) return;
-  const ThinLine line = Load(&lines[i]);
+  const ThinLine line = LoadLine(&lines[i]);
   if (line.word == 0) return;
   const int bits[3] = {RegionBits(0) + kBlockBits, RegionBits(1) + kBlockBits,
                        RegionBits(2) + kBlockBits};
@@ -344,7 +332,7 @@ __global__ void __launch_bounds__(kThreads, 4)
       __syncwarp();  // or lanes that are done go on by themselves
       if (p >= count) continue;
       const LinePiece piece = scratch.order[p];
-      const ThinLine line = Load(&lines[piece.line]);
+      const ThinLine line = LoadLine(&lines[piece.line]);
       const int32_t k = piece.k(), stop = k + static_cast<int32_t>(piece.count());
       int32_t begin[3];
       for (int a = 0; a < 3; ++a) begin[a] = BoxAt(line, a, k, bits[a]);
@@ -399,34 +387,6 @@ __global__ void __launch_bounds__(kThreads, 4)
     }
     __syncthreads();
   }
-}
-
-// ----------------------------------------------------------------------------------------- marking
-
-__global__ void MarkRegionsKernel(const uint64_t* regions, uint32_t blocks, uint8_t* dirty) {
-  const uint64_t r = Thread();
-  if (r >= static_cast<uint64_t>(blocks) * kRegionsInBlock) return;
-  if (regions[r / kRegionsInBlock] >> r % kRegionsInBlock & 1) dirty[r] = 1;
-}
-
-__global__ void MarkLinesKernel(ItemList list, uint32_t count, const ThinLine* lines,
-                                RegionGrid grid, uint8_t* dirty) {
-  const uint64_t i = Thread();
-  if (i >= count) return;
-  const ThinLine line = Load(&lines[LineAt(list, i)]);
-  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
-  int32_t begin[3];
-  for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
-  WalkThin(line, 0, begin, bits, [&](const int32_t box[3], int32_t, int32_t) {
-    const int32_t block[3] = {box[0] >> kBlockBits, box[1] >> kBlockBits, box[2] >> kBlockBits};
-    if (grid.DrawsBlock(block)) dirty[grid.RegionAt(box)] = 1;
-    return true;
-  });
-}
-
-__global__ void KillLinesKernel(ItemList list, uint32_t count, ThinLine* lines) {
-  const uint64_t i = Thread();
-  if (i < count) lines[LineAt(list, i)].SetWord(0);
 }
 
 size_t BlockNumbersShared(const RegionGrid& grid) {
@@ -495,24 +455,6 @@ cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t cou
 cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
                       uint32_t blocks, cudaStream_t stream) {
   SortSpansKernel<<<blocks, kThreads, 0, stream>>>(sort, lines, ends);
-  return cudaGetLastError();
-}
-
-cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty,
-                        cudaStream_t stream) {
-  MarkRegionsKernel<<<Blocks(uint64_t{blocks} * kRegionsInBlock), kThreads, 0, stream>>>(
-      regions, blocks, dirty);
-  return cudaGetLastError();
-}
-
-cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,
-                      const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream) {
-  MarkLinesKernel<<<Blocks(count), kThreads, 0, stream>>>(list, count, lines, grid, dirty);
-  return cudaGetLastError();
-}
-
-cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream) {
-  KillLinesKernel<<<Blocks(count), kThreads, 0, stream>>>(list, count, lines);
   return cudaGetLastError();
 }
 

@@ -11,6 +11,7 @@ namespace {
 // Up to here what a batch may need at most is taken, and nobody waits for the count of what it does.
 constexpr uint64_t kUncountedBytes = uint64_t{16} << 20;
 constexpr uint64_t kMostPlaces = 0xFFFFFFFFu;
+constexpr double kSpare = 1.1;
 
 // The words at the lines' ends, where they may differ from those at their beginnings.
 uint32_t* Ends(const auto& batch) {
@@ -39,6 +40,7 @@ LineBatchList LineIndex::view() const {
     view.lines = batch.items.as<ThinLine>();
     view.ends = Ends(batch);
     view.layer = batch.layer;
+    view.count = batch.count;
     view.lists = {batch.begin.as<uint32_t>(), batch.base.as<uint32_t>(),
                   batch.offsets.as<uint16_t>(), batch.regions.as<uint64_t>(),
                   batch.spans.as<LineSpan>()};
@@ -49,35 +51,43 @@ LineBatchList LineIndex::view() const {
 // ------------------------------------------------------------------------------------------ sorting
 
 // With room for as many pieces and spans as `sort` says. needed[2]: how many there were; only if
-// `counted`, which waits for it.
-absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uint32_t* needed) {
+// `counted`, which waits for it. ResourceExhausted if the lists' pool does not have it.
+absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, bool counted,
+                                 uint32_t* needed) {
   const size_t blocks = grid().block_count();
   const size_t line_chunks = (size_t{batch.count} + kLineChunk - 1) / kLineChunk;
   const size_t chunks = sort.piece_capacity / kPieceChunk + blocks;
-  sort.grid = grid();
   // What the sorting alone needs.
   Block block_begin, line_offsets, pieces;
   struct Wanted {
     Block* block;
     size_t bytes;
-    bool zero;
+    bool kept;
   };
-  for (const Wanted& want : {
-           Wanted{&block_begin, (blocks + 1) * sizeof(uint32_t), false},
-           Wanted{&line_offsets, line_chunks * blocks * sizeof(uint32_t), false},
-           Wanted{&pieces, sort.piece_capacity * sizeof(LinePiece), false},
-           Wanted{&batch.begin, (blocks + 1) * sizeof(uint32_t), false},
-           Wanted{&batch.base, chunks * sizeof(uint32_t), false},
-           Wanted{&batch.offsets, chunks * (kRegionsInBlock + 1) * sizeof(uint16_t), false},
-           // With what is counted behind it, so that all that begins as 0 is one.
-           Wanted{&batch.regions, blocks * (sizeof(uint64_t) + sizeof(uint32_t)) + sizeof(uint32_t),
-                  true},
-           Wanted{&batch.spans, sort.span_capacity * sizeof(LineSpan), false},
-       }) {
+  const Wanted wanted[] = {
+      {&block_begin, (blocks + 1) * sizeof(uint32_t), false},
+      {&line_offsets, line_chunks * blocks * sizeof(uint32_t), false},
+      {&pieces, sort.piece_capacity * sizeof(LinePiece), false},
+      {&batch.begin, (blocks + 1) * sizeof(uint32_t), true},
+      {&batch.base, chunks * sizeof(uint32_t), true},
+      {&batch.offsets, chunks * (kRegionsInBlock + 1) * sizeof(uint16_t), true},
+      {&batch.spans, sort.span_capacity * sizeof(LineSpan), true},
+  };
+  batch.list_bytes = batch.sort_bytes = 0;
+  for (const Wanted& want : wanted) {
     *want.block = Block();  // of a try before
-    absl::StatusOr<Block> block = want.zero
-                                      ? device().Zeros(want.bytes)
-                                      : device().pool().Acquire(std::max<size_t>(1, want.bytes));
+    batch.sort_bytes += want.bytes;
+    if (want.kept) batch.list_bytes += want.bytes;
+  }
+  // With what is counted behind it, so that all that begins as 0 is one. Whatever the lines, it is
+  // little: it lies beside them.
+  regions = Block();
+  absl::StatusOr<Block> zeros =
+      device().Zeros(blocks * (sizeof(uint64_t) + sizeof(uint32_t)) + sizeof(uint32_t));
+  if (!zeros.ok()) return zeros.status();
+  regions = *std::move(zeros);
+  for (const Wanted& want : wanted) {
+    absl::StatusOr<Block> block = lists_.Acquire(std::max<size_t>(1, want.bytes));
     if (!block.ok()) return block.status();
     *want.block = *std::move(block);
   }
@@ -87,7 +97,7 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
   sort.chunk_begin = batch.begin.as<uint32_t>();
   sort.base = batch.base.as<uint32_t>();
   sort.offsets = batch.offsets.as<uint16_t>();
-  sort.regions = batch.regions.as<uint64_t>();
+  sort.regions = regions.as<uint64_t>();
   sort.block_counts = reinterpret_cast<uint32_t*>(sort.regions + blocks);
   sort.span_count = sort.block_counts + blocks;
   sort.spans = batch.spans.as<LineSpan>();
@@ -109,16 +119,18 @@ absl::Status LineIndex::SortInto(Batch& batch, LineSort& sort, bool counted, uin
   return status.ok() ? device().Wait() : status;
 }
 
-absl::Status LineIndex::Sort(Batch& batch, uint8_t* region_dirty) {
+// As fast as it goes, in as much memory as that takes.
+absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   const uint64_t most_pieces = uint64_t{batch.count} * MostBoxes(grid().blocks, 0);
   const uint64_t most_spans = uint64_t{batch.count} * MostBoxes(grid().blocks, kBlockBits);
   LineSort sort;
+  sort.grid = grid();
   sort.dirty = region_dirty;
   uint32_t needed[2] = {};
   if (most_spans * sizeof(LineSpan) <= kUncountedBytes) {
     sort.piece_capacity = static_cast<uint32_t>(most_pieces);
     sort.span_capacity = static_cast<uint32_t>(most_spans);
-    return SortInto(batch, sort, false, needed);
+    return SortInto(batch, batch.regions, sort, false, needed);
   }
   const auto guess = [&](double a_line, uint64_t most) {
     return static_cast<uint32_t>(
@@ -127,8 +139,9 @@ absl::Status LineIndex::Sort(Batch& batch, uint8_t* region_dirty) {
   sort.piece_capacity = guess(pieces_a_line_, most_pieces);
   sort.span_capacity = guess(spans_a_line_, most_spans);
   for (;;) {
-    if (absl::Status status = SortInto(batch, sort, true, needed); !status.ok()) return status;
-    constexpr double kSpare = 1.1;
+    if (absl::Status status = SortInto(batch, batch.regions, sort, true, needed); !status.ok()) {
+      return status;
+    }
     pieces_a_line_ = std::max(1.0, kSpare * needed[0] / batch.count);
     if (needed[0] > sort.piece_capacity) {
       // So many spans are not known yet.
@@ -136,8 +149,124 @@ absl::Status LineIndex::Sort(Batch& batch, uint8_t* region_dirty) {
       continue;
     }
     spans_a_line_ = std::max(1.0, kSpare * needed[1] / batch.count);
+    if (needed[0] > 0) spans_a_piece_ = std::max(1.0, kSpare * needed[1] / needed[0]);
     if (needed[1] <= sort.span_capacity) return absl::OkStatus();
     sort.span_capacity = needed[1];
+  }
+}
+
+// In as little memory as it goes: first the pieces are counted. Of sort, `grid` and `dirty` are given.
+absl::Status LineIndex::SortExactly(Batch& batch, Block& regions, LineSort& sort) {
+  uint32_t needed[2] = {};
+  sort.piece_capacity = sort.span_capacity = 0;
+  absl::Status status = SortInto(batch, regions, sort, true, needed);
+  if (!status.ok() || needed[0] == 0) return status;
+  sort.piece_capacity = needed[0];
+  sort.span_capacity = static_cast<uint32_t>(
+      std::min<double>(kMostPlaces, spans_a_piece_ * static_cast<double>(needed[0])));
+  status = SortInto(batch, regions, sort, true, needed);
+  if (absl::IsResourceExhausted(status)) {
+    sort.span_capacity = 0;
+    status = SortInto(batch, regions, sort, true, needed);
+  }
+  if (!status.ok() || needed[1] <= sort.span_capacity) return status;
+  sort.span_capacity = needed[1];
+  return SortInto(batch, regions, sort, true, needed);
+}
+
+absl::Status LineIndex::Sort(Batch& batch, uint8_t* region_dirty) {
+  const auto over = [&](const absl::Status& status) {
+    return absl::IsResourceExhausted(status) || (status.ok() && lists_.used() > most_kept_);
+  };
+  absl::Status status = SortAll(batch, region_dirty);
+  if (over(status)) {
+    DropLists(batch);
+    LineSort sort;
+    sort.grid = grid();
+    sort.dirty = region_dirty;
+    status = SortExactly(batch, batch.regions, sort);
+  }
+  batch.deferred = over(status);
+  return batch.deferred ? Defer(batch, region_dirty) : status;
+}
+
+// ----------------------------------------------------------------------------------- deferred batches
+
+absl::Status LineIndex::Defer(Batch& batch, uint8_t* region_dirty) {
+  DropLists(batch);
+  const size_t blocks = grid().block_count();
+  batch.regions = Block();
+  absl::StatusOr<Block> regions = device().Zeros(blocks * sizeof(uint64_t));
+  if (!regions.ok()) return regions.status();
+  batch.regions = *std::move(regions);
+  absl::Status status = device().Run("FindRegions", [&] {
+    return FindRegions(batch.items.as<ThinLine>(), batch.count, grid(),
+                       batch.regions.as<uint64_t>(), device().stream());
+  });
+  return status.ok() && region_dirty != nullptr ? MarkAll(batch, region_dirty) : status;
+}
+
+absl::Status LineIndex::SortDeferred() {
+  if (lists_.used() < used_) {
+    for (auto& [number, batch] : batches()) {
+      if (!batch.deferred || lists_.used() + batch.list_bytes > most_kept_ ||
+          lists_.used() + batch.sort_bytes > lists_.limit()) {
+        continue;
+      }
+      Block regions;
+      LineSort sort;
+      sort.grid = grid();
+      const absl::Status status = SortExactly(batch, regions, sort);
+      if (status.ok() && lists_.used() <= most_kept_) {
+        batch.regions = std::move(regions);
+        batch.deferred = false;
+        continue;
+      }
+      DropLists(batch);
+      if (!status.ok() && !absl::IsResourceExhausted(status)) return status;
+    }
+  }
+  used_ = lists_.used();
+  return absl::OkStatus();
+}
+
+uint64_t LineIndex::CountDeferred(const Seen& seen) const {
+  uint64_t lines = 0;
+  for (const auto& [number, batch] : batches()) {
+    if (batch.deferred && seen(batch.layer)) lines += batch.count;
+  }
+  return lines;
+}
+
+absl::StatusOr<bool> LineIndex::SortWithin(const RegionGrid& within, const Seen& seen, bool some) {
+  bool all = true;
+  for (auto& [number, batch] : batches()) {
+    if (!batch.deferred || !seen(batch.layer)) continue;
+    Block regions;  // the batch's own say more
+    LineSort sort;
+    sort.grid = within;
+    for (int a = 0; a < 3; ++a) {
+      sort.grid.drawn_lo[a] = std::max(within.drawn_lo[a], grid().drawn_lo[a]);
+      sort.grid.drawn_hi[a] = std::min(within.drawn_hi[a], grid().drawn_hi[a]);
+    }
+    const uint64_t list_bytes = batch.list_bytes, sort_bytes = batch.sort_bytes;
+    const absl::Status status = SortExactly(batch, regions, sort);
+    batch.list_bytes = list_bytes;
+    batch.sort_bytes = sort_bytes;
+    if (status.ok()) continue;
+    DropLists(batch);
+    all = false;
+    if (!absl::IsResourceExhausted(status)) return status;
+    if (some) continue;
+    EndPass();
+    return false;
+  }
+  return all;
+}
+
+void LineIndex::EndPass() {
+  for (auto& [number, batch] : batches()) {
+    if (batch.deferred) DropLists(batch);
   }
 }
 

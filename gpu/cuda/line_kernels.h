@@ -58,7 +58,10 @@ cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty
 // touch.
 cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,
                       const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream);
-// Of such, too: they draw nothing from now on.
+// Adds to `regions`, by block, those that any of `count` lines touches.
+cudaError_t FindRegions(const ThinLine* lines, uint32_t count, const RegionGrid& grid,
+                        uint64_t* regions, cudaStream_t stream);
+// Of lines in rows: they draw nothing from now on.
 cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream);
 
 }  // namespace voxeld::gpu::cuda

@@ -120,11 +120,13 @@ struct SpanLists {
   }
 };
 
-// Lines of one layer, with their spans by region.
+// Lines of one layer, with their spans by region. Without spans (null), of the lists there is
+// `regions` alone, and who draws looks through all lines.
 struct LineBatchView {
   const ThinLine* lines = nullptr;
   const uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
   uint32_t layer = 0;              // its slot
+  uint32_t count = 0;              // lines
   SpanLists lists;
 
   VOXELD_HD bool Has(uint32_t region) const { return lists.Has(region); }

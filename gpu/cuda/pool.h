@@ -2,10 +2,11 @@
 // needs what the one before needed allocates nothing.
 //
 // All work on the blocks is ordered by one stream: a block given back may be handed out again at
-// once.
+// once. A pool may be a part of another, with a limit of its own.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <utility>
 #include <vector>
@@ -48,12 +49,15 @@ class Block {
 class Pool {
  public:
   explicit Pool(Api& api) : api_(api) {}
+  // A part of `whole`, which outlives it: what it holds counts there, too. It never holds more than
+  // `limit` bytes.
+  Pool(Pool& whole, size_t limit);
   ~Pool();
   Pool(const Pool&) = delete;
   Pool& operator=(const Pool&) = delete;
 
-  // At least `size` bytes, 256-byte aligned. ResourceExhausted if the device has none left, even
-  // after what is kept has been freed.
+  // At least `size` bytes, 256-byte aligned. ResourceExhausted if the device has none left, or the
+  // limit is reached, even after what is kept has been freed.
   absl::StatusOr<Block> Acquire(size_t size);
   // The same for `count` values, with room to grow: a block that is too small is replaced, and its
   // first `keep` values are copied over in `stream`.
@@ -74,16 +78,31 @@ class Pool {
     return absl::OkStatus();
   }
 
-  size_t held() const { return held_; }
+  size_t held() const { return held_; }  // handed out or kept
+  size_t used() const { return used_; }  // handed out
+  size_t limit() const { return limit_; }
 
  private:
   friend class Block;
-  void GiveBack(void* data, size_t size) { free_.emplace(size, data); }
-  void FreeKept();
+  void GiveBack(void* data, size_t size) {
+    free_.emplace(size, data);
+    used_ -= size;
+  }
+  // Whether there was anything.
+  bool FreeKept();
+  // Of the whole that this is a part of, and of all its parts.
+  bool FreeAllKept();
+  Block HandOut(void* data, size_t size) {
+    used_ += size;
+    return Block(this, data, size);
+  }
 
   Api& api_;
+  Pool* const whole_ = nullptr;
+  const size_t limit_ = SIZE_MAX;
+  std::vector<Pool*> parts_;
   std::multimap<size_t, void*> free_;  // by size
-  size_t held_ = 0;                    // bytes, handed out or kept
+  size_t held_ = 0, used_ = 0;         // bytes
 };
 
 inline Block::~Block() {

@@ -154,6 +154,10 @@ absl::Status RegionIndex::Drop(std::span<const uint32_t> slots) {
 
 // ------------------------------------------------------------------------------------------ merging
 
+void RegionIndex::DropLists(Batch& batch) {
+  for (Block* block : {&batch.begin, &batch.base, &batch.offsets, &batch.spans}) *block = Block();
+}
+
 absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
   Batch merged;
   merged.layer = batches_.at(numbers.front()).layer;
@@ -193,6 +197,19 @@ absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
     if (!status.ok()) return status;
   }
   if (absl::Status status = Sort(merged, nullptr); !status.ok()) return status;
+  if (merged.deferred) {
+    // It may be that there is room but for their lists.
+    bool dropped = false;
+    for (const uint64_t old : numbers) {
+      Batch& batch = batches_.at(old);
+      if (batch.deferred) continue;
+      DropLists(batch);
+      dropped = batch.deferred = true;
+    }
+    if (dropped) {
+      if (absl::Status status = Sort(merged, nullptr); !status.ok()) return status;
+    }
+  }
   const uint64_t number = next_number_++;
   for (size_t m = 0; m < merged.members.size(); ++m) {
     places_[merged.members[m].slot] = {number, m};
@@ -216,6 +233,8 @@ absl::Status RegionIndex::Merge() {
         const Batch& other = batches_.at(order[j].second);
         if (other.layer != batch.layer) continue;
         if (uint64_t{other.count} + batch.count > most_items_) continue;
+        // Or what has its lists might lose them.
+        if (other.deferred != batch.deferred && !crowded) continue;
         if (crowded || other.count / 2 <= batch.count) {
           chosen = {order[i].second, order[j].second};
         }

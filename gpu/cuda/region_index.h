@@ -71,6 +71,10 @@ class RegionIndex {
     Block items, colors;  // `colors` only if mixed
     // By region, as the kind has it.
     Block begin, base, offsets, regions, spans;
+    // There was no room for all that: of it there is `regions`, at the most.
+    bool deferred = false;
+    // Bytes that the lists took, or would have taken at least; and with what was needed to make them.
+    uint64_t list_bytes = 0, sort_bytes = 0;
     std::vector<Member> members;
   };
 
@@ -79,6 +83,8 @@ class RegionIndex {
       : device_(device), what_(what), item_size_(item_size), color_size_(color_size) {}
 
   const absl::flat_hash_map<uint64_t, Batch>& batches() const { return batches_; }
+  absl::flat_hash_map<uint64_t, Batch>& batches() { return batches_; }
+  static void DropLists(Batch& batch);  // but for `regions`
   Device& device() const { return device_; }
   const RegionGrid& grid() const { return grid_; }
 
@@ -91,7 +97,8 @@ class RegionIndex {
   // `to` gets `count` items at `first` of the list, in which rows are those of `from`.
   virtual absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                             const Batch& to) = 0;
-  // Sorts the items by region; with `region_dirty` marks the regions that have any.
+  // Sorts the items by region, or defers the batch; with `region_dirty` marks the regions that have
+  // any.
   virtual absl::Status Sort(Batch& batch, uint8_t* region_dirty) = 0;
   // Marks the regions that have any.
   virtual absl::Status MarkAll(const Batch& batch, uint8_t* region_dirty) = 0;

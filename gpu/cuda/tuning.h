@@ -9,6 +9,12 @@ struct Tuning {
   // A volume of fewer items is drawn as one group: copying its pictures while others are drawn is not
   // worth the launches.
   uint64_t few_items = 100'000;
+  // What the lists of all thin lines by region may take together, with their making; 0: 16 GiB, or a
+  // quarter of the device's memory if that is less. Lines beyond it are drawn in passes.
+  uint64_t index_bytes = 0;
+  // Of these, what lists may take that stay from frame to frame: the rest is for making them, and for
+  // the passes.
+  double index_share_kept = 0.5;
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -21,7 +21,7 @@
 
 namespace voxeld::gpu {
 
-inline constexpr uint32_t kWorkerProtocol = 4;
+inline constexpr uint32_t kWorkerProtocol = 5;
 
 enum class MessageType : uint32_t {
   // To the worker. Each but the segments' is answered once, under its own call number.
@@ -50,6 +50,7 @@ struct OpenMessage {
   int32_t threads = 0;
   int32_t device = 0;
   SlicePart part;
+  uint64_t index_bytes = 0;
 };
 
 struct SegmentMessage {

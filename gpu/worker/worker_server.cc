@@ -137,6 +137,7 @@ class Server {
     options.threads = open->threads;
     options.device = open->device;
     options.part = part_ = open->part;
+    options.index_bytes = open->index_bytes;
     options.inline_execution = true;
     absl::StatusOr<std::unique_ptr<Engine>> engine = hooks_.make_engine(options);
     if (!engine.ok()) return Answer(message.call, engine.status());

@@ -30,12 +30,32 @@ inline std::vector<EngineCase> EngineCases() {
          [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
          }},
+        // With no list of lines; and with none that stays.
+        {"cuda_tight",
+         [](const EngineOptions& options) {
+           return CreateCudaEngine(options, "a test", {}, {.few_items = 0, .index_bytes = 1});
+         }},
+        {"cuda_passes",
+         [](const EngineOptions& options) {
+           return CreateCudaEngine(options, "a test", {},
+                                   {.few_items = 0, .index_bytes = 1 << 20, .index_share_kept = 0});
+         }},
         CaseOf("cuda_worker", EngineKind::kCuda, true),
 #elif defined(VOXELD_TEST_SIMT)  // with a CPU for a GPU
     {"cuda_simt", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
         // In groups, as large scenes are.
-        {"cuda_simt_groups", [](const EngineOptions& options) {
+        {"cuda_simt_groups",
+         [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
+         }},
+        // With no list of lines; and with none that stays.
+        {"cuda_simt_tight",
+         [](const EngineOptions& options) {
+           return CreateCudaEngine(options, "a test", {}, {.few_items = 0, .index_bytes = 1});
+         }},
+        {"cuda_simt_passes", [](const EngineOptions& options) {
+           return CreateCudaEngine(options, "a test", {},
+                                   {.few_items = 0, .index_bytes = 1 << 20, .index_share_kept = 0});
          }},
 #else
     CaseOf("cpu", EngineKind::kCpu, false), CaseOf("cpu_worker", EngineKind::kCpu, true),

@@ -57,6 +57,7 @@ kind = "cpu"
 threads = 5
 staging_limit_bytes = 2_097_152
 device = 3
+index_bytes = 1_048_576
 in_worker = true
 worker = "/opt/engine"
 nccl = "/opt/libnccl.so.2"
@@ -93,6 +94,7 @@ driver = "simulated"
   EXPECT_EQ(config.engine.threads, 5u);
   EXPECT_EQ(config.engine.staging_limit_bytes, 2097152u);
   EXPECT_EQ(config.engine.device, 3u);
+  EXPECT_EQ(config.engine.index_bytes, 1048576u);
   EXPECT_TRUE(config.engine.in_worker);
   EXPECT_EQ(config.engine.worker, "/opt/engine");
   EXPECT_EQ(config.engine.nccl, "/opt/libnccl.so.2");
@@ -109,7 +111,7 @@ driver = "simulated"
   EXPECT_THAT(config.displays[0].options,
               UnorderedElementsAre(Pair("geometry", "rotor"), Pair("slices", "360"),
                                    Pair("eccentricity", "13.5;0.375"), Pair("mirror", "true")));
-  EXPECT_EQ(config.displays[0].source, "test.toml:23:1");
+  EXPECT_EQ(config.displays[0].source, "test.toml:24:1");
 }
 
 TEST(ConfigText, NoDisplaysAtAllCanBeAskedForAndReadsBack) {

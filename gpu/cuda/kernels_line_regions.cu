@@ -1,0 +1,79 @@
+// The regions that thin lines touch, from the lines or from their lists; and lines that go.
+#include "gpu/cuda/line_kernels.h"
+#include "gpu/cuda/lines-inl.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+// f(region) for each that a line touches.
+__device__ void ForRegions(const ThinLine& at, const RegionGrid& grid, auto&& f) {
+  const ThinLine line = LoadLine(&at);
+  if (line.word == 0) return;
+  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
+  int32_t begin[3];
+  for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
+  WalkThin(line, 0, begin, bits, [&](const int32_t box[3], int32_t, int32_t) {
+    const int32_t block[3] = {box[0] >> kBlockBits, box[1] >> kBlockBits, box[2] >> kBlockBits};
+    if (grid.DrawsBlock(block)) f(grid.RegionAt(box));
+    return true;
+  });
+}
+
+__global__ void MarkRegionsKernel(const uint64_t* regions, uint32_t blocks, uint8_t* dirty) {
+  const uint64_t r = Thread();
+  if (r >= static_cast<uint64_t>(blocks) * kRegionsInBlock) return;
+  if (regions[r / kRegionsInBlock] >> r % kRegionsInBlock & 1) dirty[r] = 1;
+}
+
+__global__ void MarkLinesKernel(ItemList list, uint32_t count, const ThinLine* lines,
+                                RegionGrid grid, uint8_t* dirty) {
+  const uint64_t i = Thread();
+  if (i >= count) return;
+  ForRegions(lines[LineAt(list, i)], grid, [&](uint32_t region) { dirty[region] = 1; });
+}
+
+__global__ void FindRegionsKernel(const ThinLine* lines, uint32_t count, RegionGrid grid,
+                                  uint64_t* regions) {
+  const uint64_t i = Thread();
+  if (i >= count) return;
+  ForRegions(lines[i], grid, [&](uint32_t region) {
+    uint64_t& bits = regions[region / kRegionsInBlock];
+    const uint64_t bit = uint64_t{1} << region % kRegionsInBlock;
+    // Most have been found before; one that is not seen to be is found once more.
+    if ((*static_cast<const volatile uint64_t*>(&bits) & bit) != 0) return;
+    atomicOr(reinterpret_cast<unsigned long long*>(&bits), static_cast<unsigned long long>(bit));
+  });
+}
+
+__global__ void KillLinesKernel(ItemList list, uint32_t count, ThinLine* lines) {
+  const uint64_t i = Thread();
+  if (i < count) lines[LineAt(list, i)].SetWord(0);
+}
+
+}  // namespace
+
+cudaError_t MarkRegions(const uint64_t* regions, uint32_t blocks, uint8_t* dirty,
+                        cudaStream_t stream) {
+  MarkRegionsKernel<<<Blocks(uint64_t{blocks} * kRegionsInBlock), kItemThreads, 0, stream>>>(
+      regions, blocks, dirty);
+  return cudaGetLastError();
+}
+
+cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* lines,
+                      const RegionGrid& grid, uint8_t* dirty, cudaStream_t stream) {
+  MarkLinesKernel<<<Blocks(count), kItemThreads, 0, stream>>>(list, count, lines, grid, dirty);
+  return cudaGetLastError();
+}
+
+cudaError_t FindRegions(const ThinLine* lines, uint32_t count, const RegionGrid& grid,
+                        uint64_t* regions, cudaStream_t stream) {
+  FindRegionsKernel<<<Blocks(count), kItemThreads, 0, stream>>>(lines, count, grid, regions);
+  return cudaGetLastError();
+}
+
+cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream) {
+  KillLinesKernel<<<Blocks(count), kItemThreads, 0, stream>>>(list, count, lines);
+  return cudaGetLastError();
+}
+
+}  // namespace voxeld::gpu::cuda
