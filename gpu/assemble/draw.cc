@@ -11,6 +11,22 @@ namespace {
 constexpr size_t kVertexRun = 1024;
 constexpr size_t kMostFetched = 128;  // faces, which the first cache holds
 
+// The walks among the items, where others have no place among the walks.
+void DrawWalksAlone(const Bins& bins, std::span<const BinItem> items, uint32_t* words,
+                    TileRows& touched) {
+  constexpr size_t kMost = 512;
+  BinItem walks[kMost];
+  size_t size = 0;
+  for (const BinItem& item : items) {
+    if (item.count() == 0) continue;
+    walks[size++] = item;
+    if (size < kMost) continue;
+    DrawSpans(bins.walks.data(), walks, words, touched);
+    size = 0;
+  }
+  DrawSpans(bins.walks.data(), {walks, size}, words, touched);
+}
+
 }  // namespace
 
 bool IsSingular(const Drawable& d) {
@@ -22,19 +38,23 @@ bool IsSingular(const Drawable& d) {
 void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words) {
   TileRows touched;
-  DrawItems(d, items, grid, box, words, touched);
+  DrawItems(d, d.bins, items, grid, box, words, touched);
 }
 
-void DrawItems(const Drawable& d, std::span<const BinItem> items, const TileGrid& grid,
-               const Box3& box, uint32_t* words, TileRows& touched) {
-  if (d.bins.walk_count > 0) DrawSpans(d.bins.walks.data(), items, words, touched);
-  if (d.bins.triangle_parts > 0) {
+void DrawItems(const Drawable& d, const Bins& bins, std::span<const BinItem> items,
+               const TileGrid& grid, const Box3& box, uint32_t* words, TileRows& touched) {
+  if (bins.chosen && !bins.all_fast) {
+    DrawWalksAlone(bins, items, words, touched);
+  } else if (bins.walk_count > 0) {
+    DrawSpans(bins.walks.data(), items, words, touched);
+  }
+  if (bins.triangle_parts > 0) {
     const WalkGrid axes(grid);
     int32_t lo[3], hi[3];
     for (int r = 0; r < 3; ++r) lo[r] = box.lo[axes.axis[r]], hi[r] = box.hi[axes.axis[r]];
-    DrawTriangles(d.bins.triangles, items, lo, hi, words, touched);
+    DrawTriangles(bins.triangles, items, lo, hi, words, touched);
   }
-  if (d.bins.all_fast) return;
+  if (bins.all_fast) return;
   touched = TileRows::All();
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
@@ -69,11 +89,12 @@ void FetchItems(const Drawable& d, std::span<const BinItem> items) {
 void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor) {
   BinScratch scratch;
-  PrepareDrawable(d, view_map, grid, owned, executor, scratch);
+  MapDrawable(d, view_map, executor);
+  BinItems(d.source, grid, owned, d.record.priority, d.record.erase != 0, executor, scratch,
+           d.bins);
 }
 
-void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
-                     std::span<const uint8_t> owned, Executor& executor, BinScratch& scratch) {
+void MapDrawable(Drawable& d, const Affine& view_map, Executor& executor) {
   const GeometryView& view = d.geometry->view;
   const Affine map = Compose(Compose(view_map, d.layer->record.transform), d.record.transform);
   d.source = {};
@@ -97,8 +118,6 @@ void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
       d.source.radius = RadiusOf(view.record, map);
     }
   });
-  BinItems(d.source, grid, owned, d.record.priority, d.record.erase != 0, executor, scratch,
-           d.bins);
 }
 
 }  // namespace voxeld::gpu

@@ -11,10 +11,9 @@
 
 namespace voxeld::gpu {
 
-// Fills in what is derived: vertices, source, bins. `view`: scene → voxel space. `owned[tile]`: 0
-// leaves the tile out.
-void PrepareDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid,
-                     std::span<const uint8_t> owned, Executor& executor, BinScratch& scratch);
+// Fills in what is derived: vertices, source. `view`: scene → voxel space.
+void MapDrawable(Drawable& drawable, const Affine& view, Executor& executor);
+// The same, and bins. `owned[tile]`: 0 leaves the tile out.
 void PrepareDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor);
 
@@ -24,9 +23,9 @@ bool IsSingular(const Drawable& drawable);
 // Raises `words` (kTileVoxels) of the tile in `box` to what these items of its bins cover.
 void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
                const Box3& box, uint32_t* words);
-// The same; the rows that it may have reached join `touched`.
-void DrawItems(const Drawable& drawable, std::span<const BinItem> items, const TileGrid& grid,
-               const Box3& box, uint32_t* words, TileRows& touched);
+// The same of `bins`, which may be others than its own; the rows that it may have reached join `touched`.
+void DrawItems(const Drawable& drawable, const Bins& bins, std::span<const BinItem> items,
+               const TileGrid& grid, const Box3& box, uint32_t* words, TileRows& touched);
 // Soon these will be drawn: brings what they need near, as far as that is worth it.
 void FetchItems(const Drawable& drawable, std::span<const BinItem> items);
 

@@ -36,8 +36,9 @@ struct Drawable {
   Source source;
   Bins bins;
   uint64_t derived_bytes = 0;
-  bool pending = false;  // awaits preparation
-  bool leaving = false;  // its entries are being taken out of the tiles
+  uint64_t index_bytes = 0;  // of the budget (passes.h), for as long as the bins have the memory
+  bool pending = false;      // awaits preparation
+  bool leaving = false;      // its entries are being taken out of the tiles
 };
 
 struct Layer {

@@ -12,11 +12,8 @@ namespace voxeld::gpu {
 namespace {
 
 uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
-  uint64_t triangles = 0;
-  for (const TriangleMemory& part : d.bins.triangles) triangles += part.units.capacity_bytes();
   return d.vertices.size() * sizeof(d.vertices[0]) +
-         d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) +
-         d.bins.items.capacity_bytes() + d.bins.walks.capacity_bytes() + triangles;
+         d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) + d.bins.item_bytes();
 }
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
@@ -152,6 +149,17 @@ void TileStore::Recycle(std::span<const uint32_t> tiles, size_t most) {
   pool_.Trim(most + kFreeBlocks);
 }
 
+uint64_t Volume::index_bytes() const {
+  uint64_t bytes = budget_.kept_bytes() + large_.bytes() + passes_.bytes();
+  for (const Scratch& scratch : scratch_) bytes += scratch.bins.bytes();
+  return bytes;
+}
+
+uint64_t Volume::memory_bytes() const {
+  return derived_bytes_ + index_bytes() - budget_.kept_bytes() +
+         (lit_tiles_ + tiles_.spare_blocks()) * sizeof(TileWords);
+}
+
 void Volume::MarkDirty(uint32_t tile) {
   if (index_[tile].dirty) return;
   index_[tile].dirty = true;
@@ -168,6 +176,7 @@ void Volume::OnLeave(Drawable& drawable) {
     }
   }
   singular_ -= IsSingular(drawable);
+  counted_ -= drawable.bins.counted();
   derived_bytes_ -= drawable.derived_bytes;
   drawable.leaving = true;
   left_.push_back(&drawable);
@@ -208,6 +217,7 @@ absl::Status Volume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
   absl::Status status = scene_.Apply(delta, bulk, *this, gone);
   TakeOutLeaving();
   scene_.MapClips(view_, false);
+  for (const std::unique_ptr<Drawable>& drawable : gone) budget_.Release(*drawable);
   if (!gone.empty()) {
     std::erase_if(pending_, [](const Drawable* d) { return d->layer == nullptr; });
   }
@@ -228,6 +238,7 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   lit_tiles_ = 0;
   derived_bytes_ = 0;
   singular_ = 0;
+  counted_ = 0;
   for (const auto& [id, drawable] : scene_.drawables()) {
     drawable->pending = true;
     drawable->bins.Clear();
@@ -243,8 +254,34 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   }
 }
 
-void Volume::Prepare(Drawable& d, Executor& executor, BinScratch& scratch) const {
-  PrepareDrawable(d, view_, grid_, owned_, executor, scratch);
+bool Volume::Keep(Drawable& d, Executor& executor, uint64_t bytes, BinScratch& scratch) {
+  if (!FindBins(d, grid_, owned_, executor, {.bytes = bytes}, scratch, d.bins)) {
+    budget_.Release(d);
+    return false;
+  }
+  return budget_.Keep(d);
+}
+
+void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const> large) {
+  const std::unique_ptr<Executor> serial = MakeSerialExecutor();
+  const uint64_t bytes = budget_.room_of_worker(executor_.concurrency());
+  std::vector<uint8_t> kept(small.size());
+  executor_.For(small.size(), 4, [&](size_t i, int worker) {
+    MapDrawable(*small[i], view_, *serial);
+    kept[i] = Keep(*small[i], *serial, bytes, scratch_[static_cast<size_t>(worker)].bins);
+  });
+  const auto keep_or_count = [&](Drawable& d) {
+    if (Keep(d, executor_, budget_.room(), large_)) return;
+    CountItems(d.source, grid_, owned_, executor_, budget_.room(), large_, d.bins);
+  };
+  for (size_t i = 0; i < small.size(); ++i) {
+    if (kept[i] == 0) keep_or_count(*small[i]);
+  }
+  for (Drawable* d : large) {
+    MapDrawable(*d, view_, executor_);
+    keep_or_count(*d);
+  }
+  if (large_.bytes() > budget_.room_to_keep()) large_ = BinScratch();
 }
 
 void Volume::PreparePending() {
@@ -253,14 +290,11 @@ void Volume::PreparePending() {
     const GeometryRecord& g = d->geometry->view.record;
     (std::max(g.vertex_count, g.index_count) <= kSmallDrawable ? small : large).push_back(d);
   }
-  const std::unique_ptr<Executor> serial = MakeSerialExecutor();
-  executor_.For(small.size(), 4, [&](size_t i, int worker) {
-    Prepare(*small[i], *serial, scratch_[static_cast<size_t>(worker)].bins);
-  });
-  for (Drawable* d : large) Prepare(*d, executor_, scratch_[0].bins);
+  Prepare(small, large);
   for (Drawable* d : pending_) {
     d->pending = false;
     singular_ += IsSingular(*d);
+    counted_ += d->bins.counted();
     d->derived_bytes = DerivedBytes(*d, sizeof(Entry));
     derived_bytes_ += d->derived_bytes;
     for (uint32_t row = 0; row < d->bins.tiles.size(); ++row) {
@@ -296,6 +330,7 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
   const auto fetch_next = [&] {
     if (next == nullptr) return;
     for (const Entry& e : index_[*next].entries) {
+      if (e.drawable->bins.counted()) continue;
       FetchItems(*e.drawable, e.drawable->bins.row(e.row));
     }
   };
@@ -305,7 +340,12 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
     for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
       const Entry& e = scratch.entries[i];
       if (clip.outside) continue;
-      DrawItems(*e.drawable, e.drawable->bins.row(e.row), grid_, box, words, touched);
+      const Bins& bins = e.drawable->bins;
+      if (bins.counted()) {
+        passes_.Draw(*e.drawable, tile, box, words, touched);
+      } else {
+        DrawItems(*e.drawable, bins, bins.row(e.row), grid_, box, words, touched);
+      }
     }
     if (clip.outside) continue;
     for (uint32_t c = 0; c < clip.count; ++c) {
@@ -330,39 +370,89 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
   return tiles_.Take(tile, *colors, rows, lit, past_caches);
 }
 
+void Volume::DrawRun(TileRun run, TileObserver* observer, std::span<Drawn> drawn) {
+  const bool past_caches = dirty_.size() > kCachedTiles;
+  const size_t count = run.end - run.begin;
+  // Waiting for moves takes as long as drawing some tiles, so it is not done after each.
+  const size_t at_once = past_caches ? kMovedRun : 1;
+  executor_.For((count + at_once - 1) / at_once, 1, [&](size_t r, int worker) {
+    const size_t begin = run.begin + r * at_once, end = std::min(run.end, begin + at_once);
+    for (size_t i = begin; i < end; ++i) {
+      const uint32_t tile = dirty_[i];
+      if (i + 2 < run.end) __builtin_prefetch(index_[dirty_[i + 2]].entries.data());
+      // Others draw what lies beyond the run.
+      const uint32_t* const next = i + 1 < end ? &dirty_[i + 1] : nullptr;
+      if (next != nullptr) tiles_.Prefetch(*next);
+      drawn[i].lit_before = tiles_.lit(tile);
+      drawn[i].differs =
+          DrawTile(tile, next, past_caches, observer, scratch_[static_cast<size_t>(worker)]);
+    }
+    if (past_caches) FinishMoves();
+  });
+}
+
+bool Volume::SeenCounted(const Entry& e) const {
+  return e.drawable->bins.counted() && e.drawable->layer->record.visible != 0;
+}
+
+// With the items of its counted drawables; what these do not fit into is cut in halves, down to a tile.
+void Volume::DrawPass(TileRun run, TileObserver* observer, std::span<Drawn> drawn) {
+  const std::span<const uint32_t> tiles = std::span(dirty_).subspan(run.begin, run.end - run.begin);
+  absl::flat_hash_set<const Drawable*> seen;
+  for (uint32_t tile : tiles) {
+    for (const Entry& e : index_[tile].entries) {
+      if (SeenCounted(e)) seen.insert(e.drawable);
+    }
+  }
+  const std::vector<const Drawable*> drawables(seen.begin(), seen.end());
+  if (passes_.Fill(drawables, tiles, grid_, budget_.room())) {
+    return DrawRun(run, observer, drawn);
+  }
+  if (tiles.size() == 1) {
+    passes_.FillByRanges(tiles[0], grid_, budget_.room());
+    const bool past_caches = dirty_.size() > kCachedTiles;
+    drawn[run.begin].lit_before = tiles_.lit(tiles[0]);
+    drawn[run.begin].differs = DrawTile(tiles[0], nullptr, past_caches, observer, scratch_[0]);
+    if (past_caches) FinishMoves();
+    return;
+  }
+  const size_t middle = run.begin + tiles.size() / 2;
+  DrawPass({run.begin, middle}, observer, drawn);
+  DrawPass({middle, run.end}, observer, drawn);
+}
+
+void Volume::DrawInPasses(TileObserver* observer, std::span<Drawn> drawn) {
+  std::vector<uint64_t> items(dirty_.size());
+  for (size_t i = 0; i < dirty_.size(); ++i) {
+    for (const Entry& e : index_[dirty_[i]].entries) {
+      if (SeenCounted(e)) items[i] += e.drawable->bins.counts[e.row];
+    }
+  }
+  large_ = BinScratch();  // the passes have its room
+  for (TileRun run : PlanPasses(items, budget_.room())) DrawPass(run, observer, drawn);
+  passes_.Release();
+}
+
 Volume::Changes Volume::Update(TileObserver* observer) {
   PreparePending();
   std::sort(dirty_.begin(), dirty_.end());
   Changes changes;
   changes.tiles_drawn = static_cast<uint32_t>(dirty_.size());
-  std::vector<uint8_t> differs(dirty_.size());
-  std::vector<uint32_t> lit_before(dirty_.size());
-  const bool past_caches = dirty_.size() > kCachedTiles;
+  std::vector<Drawn> drawn(dirty_.size());
   tiles_.Expect(dirty_);
-  // Waiting for moves takes as long as drawing some tiles, so it is not done after each.
-  const size_t run = past_caches ? kMovedRun : 1;
-  executor_.For((dirty_.size() + run - 1) / run, 1, [&](size_t r, int worker) {
-    const size_t end = std::min(dirty_.size(), (r + 1) * run);
-    for (size_t i = r * run; i < end; ++i) {
-      const uint32_t tile = dirty_[i];
-      if (i + 2 < dirty_.size()) __builtin_prefetch(index_[dirty_[i + 2]].entries.data());
-      // Others draw what lies beyond the run.
-      const uint32_t* const next = i + 1 < end ? &dirty_[i + 1] : nullptr;
-      if (next != nullptr) tiles_.Prefetch(*next);
-      lit_before[i] = tiles_.lit(tile);
-      differs[i] =
-          DrawTile(tile, next, past_caches, observer, scratch_[static_cast<size_t>(worker)]);
-    }
-    if (past_caches) FinishMoves();
-  });
+  if (counted_ == 0) {
+    DrawRun({0, dirty_.size()}, observer, drawn);
+  } else {
+    DrawInPasses(observer, drawn);
+  }
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];
     index_[tile].dirty = false;
-    if (owned_[tile] == kOwned) lit_voxels_ = lit_voxels_ - lit_before[i] + tiles_.lit(tile);
-    lit_tiles_ = lit_tiles_ - (lit_before[i] != 0) + (tiles_.lit(tile) != 0);
-    if (differs[i] == 0) continue;
+    if (owned_[tile] == kOwned) lit_voxels_ = lit_voxels_ - drawn[i].lit_before + tiles_.lit(tile);
+    lit_tiles_ = lit_tiles_ - (drawn[i].lit_before != 0) + (tiles_.lit(tile) != 0);
+    if (!drawn[i].differs) continue;
     changes.tiles.push_back(tile);
-    changes.was_lit.push_back(lit_before[i] != 0);
+    changes.was_lit.push_back(drawn[i].lit_before != 0);
   }
   tiles_.Recycle(dirty_, static_cast<size_t>(lit_tiles_ / 2));
   dirty_.clear();

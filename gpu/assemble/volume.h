@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "gpu/affine.h"
 #include "gpu/assemble/block_pool.h"
+#include "gpu/assemble/passes.h"
 #include "gpu/assemble/scene.h"
 #include "gpu/assemble/span_kernel.h"
 #include "gpu/cpu/executor.h"
@@ -81,7 +82,9 @@ class TileObserver {
 // Thread-bound; the work inside is spread over `executor`.
 class Volume final : private SceneObserver {
  public:
-  explicit Volume(Executor& executor) : executor_(executor) {}
+  // `index_bytes`: as EngineOptions has them.
+  explicit Volume(Executor& executor, uint64_t index_bytes = 0)
+      : executor_(executor), budget_(index_bytes), passes_(executor) {}
 
   // All or nothing; InvalidArgument for a malformed delta.
   absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
@@ -100,10 +103,12 @@ class Volume final : private SceneObserver {
 
   const TileStore& tiles() const { return tiles_; }
   uint64_t lit_voxels() const { return lit_voxels_; }
-  // What is derived from the scene, and the tiles with light.
-  uint64_t memory_bytes() const {
-    return derived_bytes_ + (lit_tiles_ + tiles_.spare_blocks()) * sizeof(TileWords);
-  }
+  // What is derived from the scene, the memory for that, and the tiles with light.
+  uint64_t memory_bytes() const;
+  // Of the index: what is kept of items, and the memory for finding them.
+  uint64_t index_bytes() const;
+  // That are drawn in passes.
+  size_t counted_drawables() const { return counted_; }
   // Solids whose map has no inverse: they draw nothing.
   uint32_t singular_drawables() const { return singular_; }
 
@@ -130,10 +135,21 @@ class Volume final : private SceneObserver {
 
   void MarkDirty(uint32_t tile);
   void TakeOutLeaving();
-  void Prepare(Drawable& drawable, Executor& executor, BinScratch& scratch) const;
+  bool SeenCounted(const Entry& entry) const;
+  // False if its bins are more than `bytes`, or than may be kept.
+  bool Keep(Drawable& drawable, Executor& executor, uint64_t bytes, BinScratch& scratch);
+  void Prepare(std::span<Drawable* const> small, std::span<Drawable* const> large);
   void PreparePending();
   bool DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
                 Scratch& scratch);
+  // What came of dirty_[i].
+  struct Drawn {
+    uint32_t lit_before = 0;
+    bool differs = false;
+  };
+  void DrawRun(TileRun run, TileObserver* observer, std::span<Drawn> drawn);
+  void DrawInPasses(TileObserver* observer, std::span<Drawn> drawn);
+  void DrawPass(TileRun run, TileObserver* observer, std::span<Drawn> drawn);
 
   Executor& executor_;
   Scene scene_;
@@ -146,6 +162,10 @@ class Volume final : private SceneObserver {
   std::vector<Drawable*> pending_, left_;
   TileStore tiles_;
   std::vector<Scratch> scratch_;
+  BinScratch large_;  // of drawables that all workers prepare
+  IndexBudget budget_;
+  PassBins passes_;
+  size_t counted_ = 0;  // drawables
   uint64_t lit_voxels_ = 0, lit_tiles_ = 0, derived_bytes_ = 0;
   uint32_t singular_ = 0;
 };

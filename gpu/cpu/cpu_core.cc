@@ -8,8 +8,11 @@
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
-CpuCore::CpuCore(std::unique_ptr<Executor> executor, SlicePart part)
-    : executor_(std::move(executor)), part_(part), volume_(*executor_), pictures_(*executor_) {}
+CpuCore::CpuCore(std::unique_ptr<Executor> executor, SlicePart part, uint64_t index_bytes)
+    : executor_(std::move(executor)),
+      part_(part),
+      volume_(*executor_, index_bytes),
+      pictures_(*executor_) {}
 
 absl::Status CpuCore::SetTarget(Target target) {
   if (absl::Status status = CheckTarget(target, part_); !status.ok()) return status;

@@ -19,7 +19,8 @@ namespace voxeld::gpu {
 // Thread-bound. An error leaves it as it was.
 class CpuCore {
  public:
-  CpuCore(std::unique_ptr<Executor> executor, SlicePart part);
+  // `index_bytes`: as EngineOptions has them.
+  CpuCore(std::unique_ptr<Executor> executor, SlicePart part, uint64_t index_bytes = 0);
 
   absl::Status SetTarget(Target target);
   absl::Status Apply(const StagingBlock& block, size_t size);

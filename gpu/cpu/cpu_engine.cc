@@ -27,7 +27,7 @@ std::unique_ptr<Engine> CreateCpuEngine(const EngineOptions& options, std::strin
   const int threads = ThreadCount(options);
   return std::make_unique<CoreEngine<CpuCore>>(
       options, InfoOf(threads, std::move(reason)),
-      std::make_unique<CpuCore>(MakeExecutor(threads), options.part));
+      std::make_unique<CpuCore>(MakeExecutor(threads), options.part, options.index_bytes));
 }
 
 }  // namespace voxeld::gpu

@@ -58,7 +58,15 @@ inline std::vector<EngineCase> EngineCases() {
                                    {.few_items = 0, .index_bytes = 1 << 20, .index_share_kept = 0});
          }},
 #else
-    CaseOf("cpu", EngineKind::kCpu, false), CaseOf("cpu_worker", EngineKind::kCpu, true),
+    CaseOf("cpu", EngineKind::kCpu, false),
+        // All of a scene in passes, of few items.
+        {"cpu_tight",
+         [](EngineOptions options) {
+           options.kind = EngineKind::kCpu;
+           options.index_bytes = 4096;
+           return CreateEngine(options);
+         }},
+        CaseOf("cpu_worker", EngineKind::kCpu, true),
         CaseOf("cpu_ranks", EngineKind::kCpu, true, {0, 1}),
 #endif
   };
