@@ -98,12 +98,10 @@ struct EngineOptions {
   // between calls. It must only post.
   std::function<void(const absl::Status&)> lost;
   SlicePart part;
-  // Bounds what an engine derives of items by tile or region. A scene that needs more is drawn in passes, from the same
-  // geometry to the same bytes, in more time. 0: the engine's own choice (CPU: 4 GiB).
-  uint64_t index_bytes = 0;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
-  // What the CUDA engine's lists of thin lines by place may take of the device's memory: what would
-  // need more is drawn in passes, which takes longer. 0: the engine's own choice.
+  // Bounds what an engine derives of items by tile (CPU) or of thin lines by region (CUDA, of the device's memory). A scene
+  // that needs more is drawn in passes, to the same bytes, in more time. 0: the engine's own choice (CPU: 4 GiB; CUDA: 16 GiB
+  // or a quarter of the device, whichever is less).
   uint64_t index_bytes = 0;
 };
 

@@ -42,17 +42,21 @@ inline std::vector<EngineCase> EngineCases() {
          }},
         CaseOf("cuda_worker", EngineKind::kCuda, true),
 #elif defined(VOXELD_TEST_SIMT)  // with a CPU for a GPU
+#if !defined(VOXELD_TEST_SIMT_FEW)
     {"cuda_simt", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
+#endif
         // In groups, as large scenes are.
         {"cuda_simt_groups",
          [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
          }},
-        // With no list of lines; and with none that stays.
+    // With no list of lines; and with none that stays.
+#if !defined(VOXELD_TEST_SIMT_FEW)
         {"cuda_simt_tight",
          [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0, .index_bytes = 1});
          }},
+#endif
         {"cuda_simt_passes", [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {},
                                    {.few_items = 0, .index_bytes = 1 << 20, .index_share_kept = 0});
