@@ -118,7 +118,6 @@ T atomicMin(T* at, U value) {
 // --------------------------------------------------------------------------------------- numbers
 
 inline int __popc(uint32_t x) { return std::popcount(x); }
-inline int __clz(int x) { return std::countl_zero(static_cast<uint32_t>(x)); }
 inline int __ffs(int x) { return __builtin_ffs(x); }
 inline uint32_t __brev(uint32_t x) {
   uint32_t reversed = 0;
