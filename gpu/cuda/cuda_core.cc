@@ -78,8 +78,8 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
       volume_.view(), request.frame, buffer, request.buffer_holds, together,
       [&](uint32_t group) { return volume_.DrawGroup(group, pictures_->index(), packed); },
       stopwatch_, result);
-  if (status.ok()) status = volume_.ClearCounters();
   if (!status.ok()) return status;
+  volume_.CountersAreClear();
   const Mark assembled = packed != nullptr ? Mark::kPacked : Mark::kAssembled;
   const absl::StatusOr<int64_t> assemble = stopwatch_.Between(Mark::kBegun, assembled);
   if (!assemble.ok()) return assemble.status();

@@ -140,12 +140,15 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
 
   absl::Status status = device_.Run("cudaHostAlloc", [&] {
     return cudaHostAlloc(reinterpret_cast<void**>(&numbers_),
-                         std::max<size_t>(1, pictures) * sizeof(uint64_t), cudaHostAllocDefault);
+                         std::max<size_t>(1, pictures) * sizeof(uint64_t), cudaHostAllocMapped);
   });
+  if (!status.ok()) return status;
+  view_.told = numbers_;
+  status = device_.ToHost(numbers_, view_.changed_in, pictures * sizeof(uint64_t));
   if (!status.ok()) return status;
   status = device_.Run("cudaHostAlloc", [&] {
     return cudaHostAlloc(reinterpret_cast<void**>(&counters_), sizeof(Counters),
-                         cudaHostAllocDefault);
+                         cudaHostAllocMapped);
   });
   for (size_t i = 0; i < kMostGroups && status.ok(); ++i) {
     cudaEvent_t event = nullptr;
@@ -208,21 +211,19 @@ std::vector<CudaPictures::Range> CudaPictures::RangesOf(bool together) const {
   return ranges;
 }
 
-absl::Status CudaPictures::QueueSlices(const VolumeView& volume, uint64_t frame, Range range) {
+absl::Status CudaPictures::QueueSlices(const VolumeView& volume, uint64_t frame, Range range,
+                                       bool last) {
   const size_t count = range.end - range.begin;
-  if (count == 0) return absl::OkStatus();
-  absl::Status status = device_.Run("DrawSlices", [&] {
+  if (count == 0 && !last) return absl::OkStatus();
+  Counters* const told = last ? counters_ : nullptr;
+  return device_.Run("DrawSlices", [&] {
     const uint32_t first_slice = static_cast<uint32_t>(range.begin),
                    slice_count = static_cast<uint32_t>(count);
-    return packed_ ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false,
+    return packed_ ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false, told,
                                device_.stream())
-                   : DrawSlices(volume, index_, view_, first_slice, slice_count, frame,
+                   : DrawSlices(volume, index_, view_, first_slice, slice_count, frame, told,
                                 device_.stream());
   });
-  if (!status.ok()) return status;
-  const size_t first = range.begin * view_.sub_frames;
-  return device_.ToHost(numbers_ + first, view_.changed_in + first,
-                        count * view_.sub_frames * sizeof(uint64_t));
 }
 
 absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
@@ -235,13 +236,9 @@ absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameB
       absl::Status status;
       if (packed_ || g == 0) status = draw(static_cast<uint32_t>(g));
       if (status.ok() && !packed_ && g == 0) status = stopwatch.Set(Stopwatch::Mark::kAssembled);
-      if (status.ok()) status = QueueSlices(volume, frame, ranges[g]);
-      if (status.ok() && g + 1 == ranges.size()) {
-        status = stopwatch.Set(Stopwatch::Mark::kPacked);
-        if (status.ok()) {
-          status = device_.ToHost(counters_, volume.counters, sizeof(Counters));
-        }
-      }
+      const bool last = g + 1 == ranges.size();
+      if (status.ok()) status = QueueSlices(volume, frame, ranges[g], last);
+      if (status.ok() && last) status = stopwatch.Set(Stopwatch::Mark::kPacked);
       if (!status.ok()) return status;
       status = device_.Run("cudaEventRecord",
                            [&] { return cudaEventRecord(events_[g], device_.stream()); });

@@ -54,7 +54,7 @@ class CudaPictures {
   // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
   // all is there. Before each group of slices draw(group) queues what draws it, where pictures are
   // packed as they are drawn, else draw(0) what draws all; sets the marks. `result` gets what was
-  // counted. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
+  // counted, of which nothing is left on the device. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
   // or older; what was drawn is told with the next one.
   absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
                     uint64_t buffer_holds, bool together,
@@ -72,7 +72,7 @@ class CudaPictures {
     size_t begin, end;
   };
   std::vector<Range> RangesOf(bool together) const;
-  absl::Status QueueSlices(const VolumeView& volume, uint64_t frame, Range range);
+  absl::Status QueueSlices(const VolumeView& volume, uint64_t frame, Range range, bool last);
   absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);
 
   Device& device_;
@@ -84,8 +84,9 @@ class CudaPictures {
   bool inherited_ = false;
   std::vector<Block> tables_;
   Block dirty_, lit_tiles_, blank_, bytes_, changed_in_, differs_;
-  uint64_t* numbers_ = nullptr;   // pinned: changed_in as the host has it
-  Counters* counters_ = nullptr;  // pinned
+  // Pinned, and written by kernels: what changed_in_ has, and what was counted in the frame.
+  uint64_t* numbers_ = nullptr;
+  Counters* counters_ = nullptr;
   std::vector<cudaEvent_t> events_;
 };
 

@@ -1,7 +1,6 @@
 #include "gpu/cuda/cuda_volume.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <iterator>
 #include <utility>
 
@@ -309,7 +308,9 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
     });
     if (!status.ok()) return status;
   }
-  if (counted_) status = device_.Zero(volume.counters->dirty, sizeof(volume.counters->dirty));
+  if (counted_)
+    status =
+        device_.Zero(volume.counters->dirty, sizeof(Counters::dirty) + sizeof(Counters::taken));
   if (!status.ok()) return status;
   listed_ = counted_ = true;
   groups_ = groups;
@@ -325,15 +326,9 @@ absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
   const size_t before = group == 0 ? 0 : static_cast<size_t>(groups_.end[group - 1]);
   view.list = view.volume.dirty_list + before * tiles_.regions.count_of_plane();
   view.listed = &view.volume.counters->dirty[group];
+  view.taken = &view.volume.counters->taken[group];
   absl::Status status = DrawListed(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
   if (status.ok() && group + 1 == groups_.count) listed_ = false;
-  return status;
-}
-
-absl::Status CudaVolume::ClearCounters() {
-  absl::Status status =
-      device_.Zero(tiles_.counters.as<Counters>(), offsetof(Counters, lit_voxels));
-  counted_ = !status.ok();
   return status;
 }
 
@@ -364,6 +359,7 @@ absl::Status CudaVolume::Read(const Box3& box, uint32_t* out) {
   view.volume.counters = counts->as<Counters>();
   view.list = regions->as<uint32_t>();
   view.listed = view.volume.counters->dirty;
+  view.taken = view.volume.counters->taken;
   view.read = {box, out};
   if (absl::Status status = DrawListed(view, DrawTo::kReader); !status.ok()) return status;
   return device_.Wait();

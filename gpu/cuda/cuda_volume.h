@@ -75,8 +75,8 @@ class CudaVolume final : private SceneObserver {
   // `packed`, straight into pictures.
   absl::Status Prepare(const DrawGroups& groups);
   absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed);
-  // After the frame's counters have been fetched: they begin anew.
-  absl::Status ClearCounters();
+  // The frame's counters have been told, and begin anew.
+  void CountersAreClear() { counted_ = false; }
   uint64_t item_count() const;
 
   // The colours of voxels, after a frame; for who asks. `out` is on the device.

@@ -71,6 +71,7 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Line
     view.lines = lines_.view();
     view.list = list->as<uint32_t>();
     view.listed = &picked_there->count;
+    view.taken = &picked_there->taken;
     status = Draw(view, to);
     // In the stream, who has the lists' memory next comes after the drawing.
     lines_.EndPass();

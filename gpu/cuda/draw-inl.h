@@ -98,19 +98,25 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       scratch.least[threadIdx.x] = view.packed.least[threadIdx.x];
     }
   }
+  // A block has one place in the list to begin with, and takes others from the `taken` counter.
   if (threadIdx.x == 0) {
     scratch.lit_change = 0;
-    scratch.region = blockIdx.x < dirty ? view.list[blockIdx.x] : 0;
+    scratch.region = blockIdx.x < dirty ? view.list[blockIdx.x] : kAllLanes;
+    scratch.place = gridDim.x + atomicAdd(view.taken, 1u);
   }
-  for (uint32_t i = blockIdx.x; i < dirty; i += gridDim.x) {
+  for (;;) {
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
-    __syncthreads();
+    // Voted on: a loop that threads might leave one by one, for all that the compiler knows, must not
+    // call functions.
+    if (__syncthreads_or(threadIdx.x == 0 && scratch.region != kAllLanes) == 0) break;
     const uint32_t region = scratch.region;
-    // On its way while this one is written out.
-    uint32_t region_after = 0;
+    // The next region, and the place of the one after it, are on their way while this one is written
+    // out.
+    uint32_t region_after = kAllLanes, place_after = 0;
     const auto ask_ahead = [&] {
-      const uint32_t next = i + gridDim.x;
-      if (threadIdx.x == 0 && next < dirty) region_after = view.list[next];
+      if (threadIdx.x != 0) return;
+      if (scratch.place < dirty) region_after = view.list[scratch.place];
+      place_after = gridDim.x + atomicAdd(view.taken, 1u);
     };
     if constexpr (kWhat == DrawWhat::kOneLayer) {
       const VoxelHalfSpace* cut_by = nullptr;
@@ -172,7 +178,10 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       Flush<kTo>(view, place, scratch, [](uint32_t color, uint32_t) { return color; });
     }
     __syncthreads();
-    if (threadIdx.x == 0) scratch.region = region_after;
+    if (threadIdx.x == 0) {
+      scratch.region = region_after;
+      scratch.place = place_after;
+    }
   }
   if (threadIdx.x == 0 && scratch.lit_change != 0) {
     atomicAdd(reinterpret_cast<unsigned long long*>(&counters.lit_voxels), scratch.lit_change);

@@ -11,7 +11,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// Lists the dirty regions by group, and they are clean. `counters->dirty` must be 0.
+// Lists the dirty regions by group, and they are clean. `counters->dirty` and `taken` must be 0.
 cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, const DrawGroups& groups,
                       cudaStream_t stream);
 

@@ -39,6 +39,7 @@ struct DrawView {
   RegionGrid regions;
   const uint32_t* list = nullptr;    // the regions to be drawn
   const uint32_t* listed = nullptr;  // how many
+  uint32_t* taken = nullptr;         // 0 at first
   SliceIndexView slices;
   PackedView packed;
   ReadView read;
@@ -48,6 +49,7 @@ struct DrawView {
 // Regions that were picked from a list: how many, and the box of their blocks.
 struct PickedRegions {
   uint32_t count = 0;
+  uint32_t taken = 0;  // by those who draw
   int32_t lo[3] = {0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF}, hi[3] = {};
 };
 

@@ -54,13 +54,16 @@ cudaError_t FindRows(const uint64_t* keys, uint32_t pairs, uint32_t tiles, uint3
 
 // ---- slicing (kernels_slice.cu)
 // Owned slices [begin, begin + count), those that are dirty; they are clean afterwards, and their
-// pictures carry `frame` if their bytes are not what they were.
+// pictures carry `frame` if their bytes are not what they were, which is told at once: a copy would
+// have to wait for those of pictures that are under way. `told`: null, or, with the last slices of a
+// frame, where in the host's memory all that was counted goes; counting begins anew.
 cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
-                       uint32_t begin, uint32_t count, uint64_t frame, cudaStream_t stream);
+                       uint32_t begin, uint32_t count, uint64_t frame, Counters* told,
+                       cudaStream_t stream);
 // The end of it, for pictures drawn already. `sampled`: that was done from tiles, so that slices
 // which no lit tile reaches are blank.
 cudaError_t EndSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
-                      uint32_t begin, uint32_t count, uint64_t frame, bool sampled,
+                      uint32_t begin, uint32_t count, uint64_t frame, bool sampled, Counters* told,
                       cudaStream_t stream);
 
 }  // namespace voxeld::gpu::cuda

@@ -173,11 +173,8 @@ __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceV
   }
 }
 
-__global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t begin,
-                                uint32_t count, uint64_t frame, bool sampled, Counters* counters) {
-  const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-  if (i >= count) return;
-  const uint32_t s = begin + i;
+__device__ void EndSlice(const SliceIndexView& index, const SliceView& view, uint32_t s,
+                         uint64_t frame, bool sampled, Counters* counters) {
   if (index.dirty[s] == 0) return;
   index.dirty[s] = 0;
   view.blank[s] = sampled && index.lit_tiles[s] == 0 ? 1 : 0;
@@ -186,7 +183,7 @@ __global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t b
     const uint32_t picture = s * view.sub_frames + sub;
     if (view.differs[picture] != 0 || view.changed_in[picture] == 0) {
       view.differs[picture] = 0;
-      view.changed_in[picture] = frame;
+      view.changed_in[picture] = view.told[picture] = frame;
       ++changed;
     }
   }
@@ -194,24 +191,50 @@ __global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t b
   if (changed != 0) atomicAdd(&counters->pictures_changed, changed);
 }
 
+__device__ void TellAndClear(volatile Counters& counters, Counters& told) {
+  told.tiles_drawn = counters.tiles_drawn;
+  told.slices_drawn = counters.slices_drawn;
+  told.pictures_changed = counters.pictures_changed;
+  told.lit_voxels = counters.lit_voxels;
+  counters.tiles_drawn = counters.slices_drawn = counters.pictures_changed = counters.ended = 0;
+  for (uint32_t g = 0; g < kMostDrawGroups; ++g) counters.dirty[g] = counters.taken[g] = 0;
+}
+
+__global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t begin,
+                                uint32_t count, uint64_t frame, bool sampled, Counters* counters,
+                                Counters* told) {
+  const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i < count) EndSlice(index, view, begin + i, frame, sampled, counters);
+  if (told == nullptr) return;
+  __syncthreads();
+  if (threadIdx.x != 0) return;
+  __threadfence();
+  if (atomicAdd(&counters->ended, 1u) + 1 < gridDim.x) return;
+  __threadfence();
+  TellAndClear(*counters, *told);
+}
+
 }  // namespace
 
 cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
-                       uint32_t begin, uint32_t count, uint64_t frame, cudaStream_t stream) {
+                       uint32_t begin, uint32_t count, uint64_t frame, Counters* told,
+                       cudaStream_t stream) {
   const size_t line_bytes = sizeof(uint32_t) * kColumns * view.line;
   const bool with_line = view.sampling == display::Sampling::kMax && line_bytes <= kLineBytes;
   const dim3 grid((view.width + kColumns - 1) / kColumns, count);
-  DrawSlicesKernel<<<grid, kThreads, with_line ? line_bytes : 0, stream>>>(volume, index, view,
-                                                                           begin, with_line);
+  if (count > 0) {
+    DrawSlicesKernel<<<grid, kThreads, with_line ? line_bytes : 0, stream>>>(volume, index, view,
+                                                                             begin, with_line);
+  }
   if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
-  return EndSlices(volume, index, view, begin, count, frame, true, stream);
+  return EndSlices(volume, index, view, begin, count, frame, true, told, stream);
 }
 
 cudaError_t EndSlices(const VolumeView& volume, const SliceIndexView& index, const SliceView& view,
-                      uint32_t begin, uint32_t count, uint64_t frame, bool sampled,
+                      uint32_t begin, uint32_t count, uint64_t frame, bool sampled, Counters* told,
                       cudaStream_t stream) {
-  EndSlicesKernel<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(
-      index, view, begin, count, frame, sampled, volume.counters);
+  EndSlicesKernel<<<Max(1u, (count + kThreads - 1) / kThreads), kThreads, 0, stream>>>(
+      index, view, begin, count, frame, sampled, volume.counters, told);
   return cudaGetLastError();
 }
 

@@ -48,8 +48,9 @@ struct RegionScratch {
   uint32_t layer;                           // its slot; kAllLanes: no more
   uint32_t cutting;                         // bits: which of its half-spaces cut the region
   uint32_t outside;                         // not 0: all of the region lies outside one of them
-  uint32_t region;
-  alignas(16) uint32_t least[64];  // PackedView::least of the first sub-frame
+  uint32_t region;                          // kAllLanes: there is none any more
+  uint32_t place;                           // in the list, of the one after it
+  alignas(16) uint32_t least[64];           // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
   uint32_t pairs;                 // not 0: the layer has some here

@@ -99,12 +99,15 @@ struct DrawGroups {
   int32_t end[kMostDrawGroups] = {0x7FFFFFFF};  // planes, half-open
 };
 
-// What kernels count. All before lit_voxels begins at 0 with every frame.
+// What kernels count. All before lit_voxels begins at 0 with every frame: who ends the last slices
+// leaves it so.
 struct Counters {
   uint32_t tiles_drawn = 0;
   uint32_t slices_drawn = 0;
   uint32_t pictures_changed = 0;
+  uint32_t ended = 0;                    // blocks of threads that have ended their slices
   uint32_t dirty[kMostDrawGroups] = {};  // regions in the list of each group
+  uint32_t taken[kMostDrawGroups] = {};  // of it, by those who draw
   uint64_t lit_voxels = 0;
 };
 
@@ -153,6 +156,7 @@ struct SliceView {
   const uint16_t* lut = nullptr;  // 256
   uint8_t* bytes = nullptr;       // pictures of the owned slices
   uint64_t* changed_in = nullptr;
+  uint64_t* told = nullptr;     // the same, in the host's memory
   uint32_t* differs = nullptr;  // of each picture: its bytes are not what they were
   uint32_t* blank = nullptr;    // of each owned slice: all its pictures are zeros
 };

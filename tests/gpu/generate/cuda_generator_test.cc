@@ -202,6 +202,8 @@ TEST_P(CudaGeneratorTest, IntoDeviceMemoryAndThroughTheWholeCallTheyAreTheSame) 
   auto block = cuda_->device().pool().Acquire(bytes + 64);
   ASSERT_TRUE(block.ok());
   ASSERT_EQ(cudaMemset(block->as<std::byte>(), 0xA5, bytes + 64), cudaSuccess);
+  // The generator's stream does not wait for the default one.
+  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
   const absl::Status made =
       cuda_->GenerateOnDevice(*placed, format(), {block->as<std::byte>(), bytes});
   ASSERT_TRUE(made.ok()) << made;

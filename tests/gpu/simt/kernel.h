@@ -30,6 +30,8 @@ using std::min;
 
 inline void __syncthreads() { voxeld::simt::WaitForBlock(false); }
 inline int __syncthreads_or(int value) { return voxeld::simt::WaitForBlock(value != 0) ? 1 : 0; }
+// Whoever sees what atomicAdd has left sees all that was before it.
+inline void __threadfence() {}
 inline void __syncwarp(uint32_t mask = 0xFFFFFFFFu) { voxeld::simt::Exchange(mask, 0); }
 // A set of lanes that happen to be together: at least the one that asks.
 inline uint32_t __activemask() { return 1u << voxeld::simt::Lane(); }
