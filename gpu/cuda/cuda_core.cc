@@ -74,10 +74,12 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   absl::Status status = volume_.Prepare(pictures_->GroupsOfRegions(together));
   if (!status.ok()) return status;
   const PackedView* const packed = pictures_->packed();
-  status = pictures_->Draw(
-      volume_.view(), request.frame, buffer, request.buffer_holds, together,
-      [&](uint32_t group) { return volume_.DrawGroup(group, pictures_->index(), packed); },
-      stopwatch_, result);
+  status = pictures_->Draw(volume_.view(), request.frame, buffer, request.buffer_holds, together,
+                           {[&](uint32_t group, cudaStream_t stream) {
+                              return volume_.DrawGroup(group, pictures_->index(), packed, stream);
+                            },
+                            volume_.DrawsApart()},
+                           stopwatch_, result);
   if (!status.ok()) return status;
   volume_.CountersAreClear();
   const Mark assembled = packed != nullptr ? Mark::kPacked : Mark::kAssembled;
@@ -98,7 +100,8 @@ absl::Status CudaCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
   if (absl::Status status = CheckBox(box, out.size(), layout_); !status.ok()) return status;
   if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
   absl::Status status = volume_.Prepare({});
-  if (status.ok()) status = volume_.DrawGroup(0, pictures_->index(), pictures_->packed());
+  if (status.ok())
+    status = volume_.DrawGroup(0, pictures_->index(), pictures_->packed(), device_->stream());
   if (!status.ok()) return status;
   if (out.empty()) return device_->Wait();
   // Outside the volume there is nothing.

@@ -150,7 +150,7 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
     return cudaHostAlloc(reinterpret_cast<void**>(&counters_), sizeof(Counters),
                          cudaHostAllocMapped);
   });
-  for (size_t i = 0; i < kMostGroups && status.ok(); ++i) {
+  for (size_t i = 0; i < kMostGroups + 1 && status.ok(); ++i) {
     cudaEvent_t event = nullptr;
     status = device_.Run("cudaEventCreateWithFlags", [&] {
       return cudaEventCreateWithFlags(&event, cudaEventDisableTiming | cudaEventBlockingSync);
@@ -212,55 +212,78 @@ std::vector<CudaPictures::Range> CudaPictures::RangesOf(bool together) const {
 }
 
 absl::Status CudaPictures::QueueSlices(const VolumeView& volume, uint64_t frame, Range range,
-                                       bool last) {
+                                       bool last, cudaStream_t stream) {
   const size_t count = range.end - range.begin;
   if (count == 0 && !last) return absl::OkStatus();
   Counters* const told = last ? counters_ : nullptr;
   return device_.Run("DrawSlices", [&] {
     const uint32_t first_slice = static_cast<uint32_t>(range.begin),
                    slice_count = static_cast<uint32_t>(count);
-    return packed_ ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false, told,
-                               device_.stream())
-                   : DrawSlices(volume, index_, view_, first_slice, slice_count, frame, told,
-                                device_.stream());
+    return packed_
+               ? EndSlices(volume, index_, view_, first_slice, slice_count, frame, false, told,
+                           stream)
+               : DrawSlices(volume, index_, view_, first_slice, slice_count, frame, told, stream);
   });
 }
 
+absl::Status CudaPictures::Record(size_t event, cudaStream_t stream) {
+  return device_.Run("cudaEventRecord", [&] { return cudaEventRecord(events_[event], stream); });
+}
+
+absl::Status CudaPictures::Await(size_t event, cudaStream_t stream) {
+  return device_.Run("cudaStreamWaitEvent",
+                     [&] { return cudaStreamWaitEvent(stream, events_[event]); });
+}
+
+// One group after the other; or in two streams by turns, so that one begins where the one before has
+// left multiprocessors, and the last in the device's.
+absl::Status CudaPictures::QueueGroups(const VolumeView& volume, uint64_t frame,
+                                       std::span<const Range> ranges, const Drawing& drawing,
+                                       Stopwatch& stopwatch) {
+  const size_t last = ranges.size() - 1;
+  const bool by_turns = packed_ && drawing.apart && last > 0;
+  absl::Status status;
+  if (by_turns) {
+    status = Record(kMostGroups, device_.stream());
+    if (status.ok()) status = Await(kMostGroups, device_.beside());
+  }
+  for (size_t g = 0; g <= last; ++g) {
+    const cudaStream_t stream =
+        by_turns && (last - g) % 2 == 1 ? device_.beside() : device_.stream();
+    if (status.ok() && (packed_ || g == 0))
+      status = drawing.queue(static_cast<uint32_t>(g), stream);
+    if (status.ok() && !packed_ && g == 0) status = stopwatch.Set(Stopwatch::Mark::kAssembled);
+    if (status.ok() && by_turns && g == last) status = Await(g - 1, stream);
+    if (status.ok()) status = QueueSlices(volume, frame, ranges[g], g == last, stream);
+    if (status.ok() && g == last) status = stopwatch.Set(Stopwatch::Mark::kPacked);
+    if (status.ok()) status = Record(g, stream);
+    if (!status.ok()) return status;
+  }
+  return status;
+}
+
+absl::Status CudaPictures::CopyGroups(std::span<const Range> ranges, FrameBuffer buffer,
+                                      uint64_t buffer_holds) {
+  for (size_t g = 0; g < ranges.size(); ++g) {
+    absl::Status status =
+        device_.Run("cudaEventSynchronize", [&] { return cudaEventSynchronize(events_[g]); });
+    if (!status.ok()) return status;
+    const size_t begin = ranges[g].begin * view_.sub_frames;
+    status = CopyPictures(begin, ranges[g].end * view_.sub_frames - begin, buffer, buffer_holds);
+    if (!status.ok()) return status;
+  }
+  return device_.Run("cudaStreamSynchronize",
+                     [&] { return cudaStreamSynchronize(device_.copies()); });
+}
+
 absl::Status CudaPictures::Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                                uint64_t buffer_holds, bool together,
-                                const std::function<absl::Status(uint32_t)>& draw,
+                                uint64_t buffer_holds, bool together, const Drawing& drawing,
                                 Stopwatch& stopwatch, FrameResult& result) {
   const std::vector<Range> ranges = RangesOf(together);
-  const auto queue = [&]() -> absl::Status {
-    for (size_t g = 0; g < ranges.size(); ++g) {
-      absl::Status status;
-      if (packed_ || g == 0) status = draw(static_cast<uint32_t>(g));
-      if (status.ok() && !packed_ && g == 0) status = stopwatch.Set(Stopwatch::Mark::kAssembled);
-      const bool last = g + 1 == ranges.size();
-      if (status.ok()) status = QueueSlices(volume, frame, ranges[g], last);
-      if (status.ok() && last) status = stopwatch.Set(Stopwatch::Mark::kPacked);
-      if (!status.ok()) return status;
-      status = device_.Run("cudaEventRecord",
-                           [&] { return cudaEventRecord(events_[g], device_.stream()); });
-      if (!status.ok()) return status;
-    }
-    return absl::OkStatus();
-  };
-  const auto copy = [&]() -> absl::Status {
-    for (size_t g = 0; g < ranges.size(); ++g) {
-      absl::Status status =
-          device_.Run("cudaEventSynchronize", [&] { return cudaEventSynchronize(events_[g]); });
-      if (!status.ok()) return status;
-      const size_t begin = ranges[g].begin * view_.sub_frames;
-      status = CopyPictures(begin, ranges[g].end * view_.sub_frames - begin, buffer, buffer_holds);
-      if (!status.ok()) return status;
-    }
-    return device_.Run("cudaStreamSynchronize",
-                       [&] { return cudaStreamSynchronize(device_.copies()); });
-  };
-  absl::Status status = queue();
-  if (status.ok()) status = copy();
+  absl::Status status = QueueGroups(volume, frame, ranges, drawing, stopwatch);
+  if (status.ok()) status = CopyGroups(ranges, buffer, buffer_holds);
   if (!status.ok()) {
+    cudaStreamSynchronize(device_.beside());
     cudaStreamSynchronize(device_.copies());
     return status;
   }

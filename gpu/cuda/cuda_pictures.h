@@ -51,15 +51,20 @@ class CudaPictures {
   // pictures are copied while the next is drawn. `together`: as one.
   DrawGroups GroupsOfRegions(bool together) const;
 
+  // What draws a group, queued in a stream; `apart`: two groups may be drawn at once.
+  struct Drawing {
+    std::function<absl::Status(uint32_t group, cudaStream_t stream)> queue;
+    bool apart;
+  };
+
   // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
-  // all is there. Before each group of slices draw(group) queues what draws it, where pictures are
-  // packed as they are drawn, else draw(0) what draws all; sets the marks. `result` gets what was
+  // all is there. Draws each group of slices before, where pictures are packed as they are drawn, else
+  // group 0 as that of all; sets the marks. `result` gets what was
   // counted, of which nothing is left on the device. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
   // or older; what was drawn is told with the next one.
   absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
-                    uint64_t buffer_holds, bool together,
-                    const std::function<absl::Status(uint32_t)>& draw, Stopwatch& stopwatch,
-                    FrameResult& result);
+                    uint64_t buffer_holds, bool together, const Drawing& drawing,
+                    Stopwatch& stopwatch, FrameResult& result);
 
  private:
   CudaPictures(Device& device, const PicturesPlan& plan) : device_(device), plan_(plan) {}
@@ -72,7 +77,15 @@ class CudaPictures {
     size_t begin, end;
   };
   std::vector<Range> RangesOf(bool together) const;
-  absl::Status QueueSlices(const VolumeView& volume, uint64_t frame, Range range, bool last);
+  absl::Status QueueSlices(const VolumeView& volume, uint64_t frame, Range range, bool last,
+                           cudaStream_t stream);
+  absl::Status QueueGroups(const VolumeView& volume, uint64_t frame, std::span<const Range> ranges,
+                           const Drawing& drawing, Stopwatch& stopwatch);
+  absl::Status CopyGroups(std::span<const Range> ranges, FrameBuffer buffer, uint64_t buffer_holds);
+  // `stream` goes on after what events_[event] has been recorded behind.
+  absl::Status Record(size_t event, cudaStream_t stream);
+  absl::Status Await(size_t event, cudaStream_t stream);
+
   absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);
 
   Device& device_;
@@ -87,7 +100,7 @@ class CudaPictures {
   // Pinned, and written by kernels: what changed_in_ has, and what was counted in the frame.
   uint64_t* numbers_ = nullptr;
   Counters* counters_ = nullptr;
-  std::vector<cudaEvent_t> events_;
+  std::vector<cudaEvent_t> events_;  // of each group, and that drawing may begin
 };
 
 }  // namespace voxeld::gpu::cuda

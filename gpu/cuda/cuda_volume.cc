@@ -255,7 +255,7 @@ DrawView CudaVolume::ViewForDrawing() const {
   return view;
 }
 
-absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
+absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
   // Whether all that there is lies in one layer, to be seen as it is.
   bool plain = true;
   absl::flat_hash_set<uint32_t> layers;
@@ -282,7 +282,7 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to) {
                                                     : DrawLines;
   return device_.Run("DrawRegions", [&] {
     return draw(view, to, static_cast<uint32_t>(device_.api().device().multiProcessorCount),
-                device_.stream());
+                stream);
   });
 }
 
@@ -319,7 +319,7 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
 }
 
 absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
-                                   const PackedView* packed) {
+                                   const PackedView* packed, cudaStream_t stream) {
   DrawView view = ViewForDrawing();
   view.slices = slices;
   if (packed != nullptr) view.packed = *packed;
@@ -327,7 +327,8 @@ absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
   view.list = view.volume.dirty_list + before * tiles_.regions.count_of_plane();
   view.listed = &view.volume.counters->dirty[group];
   view.taken = &view.volume.counters->taken[group];
-  absl::Status status = DrawListed(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles);
+  absl::Status status =
+      DrawListed(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles, stream);
   if (status.ok() && group + 1 == groups_.count) listed_ = false;
   return status;
 }
@@ -361,7 +362,8 @@ absl::Status CudaVolume::Read(const Box3& box, uint32_t* out) {
   view.listed = view.volume.counters->dirty;
   view.taken = view.volume.counters->taken;
   view.read = {box, out};
-  if (absl::Status status = DrawListed(view, DrawTo::kReader); !status.ok()) return status;
+  if (absl::Status status = DrawListed(view, DrawTo::kReader, device_.stream()); !status.ok())
+    return status;
   return device_.Wait();
 }
 

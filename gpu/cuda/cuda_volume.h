@@ -72,9 +72,14 @@ class CudaVolume final : private SceneObserver {
 
   // A frame: takes in what has come and gone and finds what is dirty, by group. Then, each group
   // once, DrawGroup draws that: into the tiles, and marks the slices that look at it; or, if there is
-  // `packed`, straight into pictures.
+  // `packed`, straight into pictures. If DrawsApart, groups may be drawn in streams of their own, after
+  // what Prepare has queued.
   absl::Status Prepare(const DrawGroups& groups);
-  absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed);
+  bool DrawsApart() const {
+    return lines_.CountDeferred([](uint32_t) { return true; }) == 0;
+  }
+  absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed,
+                         cudaStream_t stream);
   // The frame's counters have been told, and begin anew.
   void CountersAreClear() { counted_ = false; }
   uint64_t item_count() const;
@@ -131,9 +136,9 @@ class CudaVolume final : private SceneObserver {
   absl::Status EnterPairs(std::span<const uint32_t> slots);
   DrawView ViewForDrawing() const;
   // The regions that `view` lists.
-  absl::Status DrawListed(DrawView& view, DrawTo to);
+  absl::Status DrawListed(DrawView& view, DrawTo to, cudaStream_t stream);
   absl::Status DrawInPasses(const DrawView& view, DrawTo to, const LineIndex::Seen& seen);
-  absl::Status Draw(DrawView& view, DrawTo to);
+  absl::Status Draw(DrawView& view, DrawTo to, cudaStream_t stream);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
   TableEntry EntryOf(const Drawable& drawable) const;

@@ -18,10 +18,10 @@ int AxisToCut(const int32_t lo[3], const int32_t hi[3]) {
 
 }  // namespace
 
-absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to) {
+absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to, cudaStream_t stream) {
   const LineIndex::Seen seen = [&](uint32_t layer) { return looks_now_[layer].visible != 0; };
   const uint64_t lines = lines_.CountDeferred(seen);
-  if (lines == 0) return Draw(view, to);
+  if (lines == 0) return Draw(view, to, stream);
   if (lines < pass_lines_) pass_planes_ = INT32_MAX;
   pass_lines_ = lines;
   return DrawInPasses(view, to, seen);
@@ -72,7 +72,7 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Line
     view.list = list->as<uint32_t>();
     view.listed = &picked_there->count;
     view.taken = &picked_there->taken;
-    status = Draw(view, to);
+    status = Draw(view, to, device_.stream());
     // In the stream, who has the lists' memory next comes after the drawing.
     lines_.EndPass();
     if (!status.ok()) return status;

@@ -6,7 +6,7 @@ absl::StatusOr<std::unique_ptr<Device>> Device::Open(int device) {
   absl::StatusOr<std::unique_ptr<Api>> api = Api::Open(device);
   if (!api.ok()) return api.status();
   std::unique_ptr<Device> made(new Device(*std::move(api)));
-  for (cudaStream_t* stream : {&made->stream_, &made->copies_}) {
+  for (cudaStream_t* stream : {&made->stream_, &made->copies_, &made->beside_}) {
     absl::Status status = made->api_->Call("cudaStreamCreateWithFlags", [&] {
       return cudaStreamCreateWithFlags(stream, cudaStreamNonBlocking);
     });
@@ -16,7 +16,7 @@ absl::StatusOr<std::unique_ptr<Device>> Device::Open(int device) {
 }
 
 Device::~Device() {
-  for (cudaStream_t stream : {stream_, copies_}) {
+  for (cudaStream_t stream : {stream_, copies_, beside_}) {
     if (stream == nullptr) continue;
     cudaStreamSynchronize(stream);
     cudaStreamDestroy(stream);

@@ -27,6 +27,7 @@ class Device {
   Pool& pool() { return pool_; }
   cudaStream_t stream() const { return stream_; }  // the work
   cudaStream_t copies() const { return copies_; }  // results on their way to the host
+  cudaStream_t beside() const { return beside_; }  // work that needs not be done after the other
 
   // A kernel's queueing.
   template <typename Function>
@@ -65,7 +66,7 @@ class Device {
 
   const std::unique_ptr<Api> api_;
   Pool pool_;
-  cudaStream_t stream_ = nullptr, copies_ = nullptr;
+  cudaStream_t stream_ = nullptr, copies_ = nullptr, beside_ = nullptr;
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -55,7 +55,7 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
       const LineBatchView& batch = view.lines.batches[__ffs(static_cast<int>(left)) - 1];
       if constexpr (kWhat == DrawWhat::kAll) {
         if (batch.lists.spans == nullptr) {
-          DrawUnsorted(batch.lines, batch.ends, batch.count, &view.regions);
+          DrawUnsorted(batch.lines, batch.tracks, batch.ends, batch.count, &view.regions);
           continue;
         }
       }
@@ -90,7 +90,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
   const uint32_t dirty = *view.listed;
-  for (uint32_t i = threadIdx.x; i < kRegionRows * kRowStride; i += kDrawThreads) {
+  for (uint32_t i = threadIdx.x; i < kRegionVoxels; i += kDrawThreads) {
     scratch.words[i] = 0;
   }
   if constexpr (kTo == DrawTo::kPictures) {
@@ -162,8 +162,8 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
 #pragma unroll
         for (uint32_t j = 0; j < kRounds; ++j) {
           const uint32_t v = threadIdx.x + j * kDrawThreads;
-          const uint32_t word = scratch.words[IndexOf(v)];
-          scratch.words[IndexOf(v)] = 0;
+          const uint32_t word = scratch.words[v];
+          scratch.words[v] = 0;
           if (word == 0) continue;
           if (cutting != 0 && !IsInsideAll(cut_by, cutting, place.box, v)) continue;
           colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
@@ -171,13 +171,12 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       });
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) {
-        scratch.words[IndexOf(threadIdx.x + j * kDrawThreads)] = colors[j];
+        scratch.words[threadIdx.x + j * kDrawThreads] = colors[j];
       }
       __syncthreads();
       ask_ahead();
       Flush<kTo>(view, place, scratch, [](uint32_t color, uint32_t) { return color; });
     }
-    __syncthreads();
     if (threadIdx.x == 0) {
       scratch.region = region_after;
       scratch.place = place_after;

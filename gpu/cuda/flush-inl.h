@@ -1,4 +1,5 @@
-// Where a region's colours go. Each function is called by the whole block, and leaves the words 0.
+// Where a region's colours go. Each function is called by the whole block, and leaves the words 0. When a
+// thread returns, all have read what says which region it is.
 // color(word, v) is what is seen of voxel v of the region, whose word is given.
 #pragma once
 
@@ -27,7 +28,7 @@ struct RowPlace {
 };
 
 __device__ inline uint32_t TakeWord(RegionScratch& scratch, const RowPlace& at) {
-  uint32_t& word = scratch.words[IndexOf(at.v)];
+  uint32_t& word = scratch.words[at.v];
   const uint32_t taken = word;
   word = 0;
   return taken;
@@ -43,11 +44,11 @@ __device__ inline void CountLit(bool lit, const RowPlace& at, RegionScratch& scr
 }
 
 // Notes a tile's number of lit voxels. By one thread a tile.
-__device__ inline void PutLit(const VolumeView& volume, uint32_t tile, uint32_t before,
-                              uint32_t now, RegionScratch& scratch) {
+__device__ inline void PutLit(const VolumeView& volume, uint32_t tile, uint8_t owner,
+                              uint32_t before, uint32_t now, RegionScratch& scratch) {
   if (now == before) return;
   volume.lit[tile] = now;
-  if (volume.owned[tile] != kOwned) return;
+  if (owner != kOwned) return;
   atomicAdd(&scratch.lit_change, static_cast<unsigned long long>(now) - before);
 }
 
@@ -100,12 +101,15 @@ __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, Reg
     if (tile != kAllLanes && scratch.differs[t] != 0) {
       const uint32_t before = volume.lit[tile];
       __syncwarp();
-      if (lane == 0) PutLit(volume, tile, before, scratch.lit[t], scratch);
+      if (lane == 0) {
+        PutLit(volume, tile, volume.owned[tile], before, scratch.lit[t], scratch);
+      }
       const uint32_t more =
           static_cast<uint32_t>(scratch.lit[t] != 0) - static_cast<uint32_t>(before != 0);
       MarkSlices(view.slices, volume.grid, tile, more, lane, 32);
     }
   }
+  __syncthreads();
 }
 
 // Writes a byte; true if it was another.
@@ -195,19 +199,24 @@ struct RowBits {
   uint32_t lit = 0, red = 0, green = 0, blue = 0;
 };
 
-// Of a row in shared memory, of which this lane alone sees to this one, while its warp sees to 32.
-// least[8]: PackedView::least of this row's pixels. `keep`: the words are wanted again.
-// limit: voxels of it that there are.
+// Of a row in shared memory, of which this lane alone sees to this one, while its warp sees to 32: each
+// begins with other voxels, so that they meet all banks. Pixels of row v % 8 have the least[v % 8].
+// `keep`: the words are wanted again. limit: voxels of it that there are.
 template <typename Color>
-__device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint32_t least[8],
+__device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint4 least[2],
                            bool keep, Color&& color) {
   constexpr uint32_t kBlue = 0x249249;
+  const uint32_t begin = threadIdx.x % 8 * 4;
+  const bool odd = threadIdx.x % 2 != 0;
+  const uint4 near = least[odd ? 1 : 0], far = least[odd ? 0 : 1];
+  const uint32_t leasts[8] = {near.x, near.y, near.z, near.w, far.x, far.y, far.z, far.w};
   RowBits bits;  // of what is below the least, and of what is dark
 #pragma unroll 1
-  for (uint32_t x = 0; x < 32; x += 8) {
+  for (uint32_t step = 0; step < 32; step += 8) {
 #pragma unroll
     for (uint32_t half = 0; half < 8; half += 4) {
-      uint4& place = *reinterpret_cast<uint4*>(row + x + half);
+      const uint32_t x = (begin + step + half) % 32;
+      uint4& place = *reinterpret_cast<uint4*>(row + x);
       const uint4 words = place;
       if (__any_sync(kAllLanes, (words.x | words.y | words.z | words.w) != 0) == 0) {
         bits.lit = bits.lit << 4 | 0xF;
@@ -220,7 +229,7 @@ __device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint3
       const uint32_t four[4] = {words.x, words.y, words.z, words.w};
 #pragma unroll
       for (uint32_t i = 0; i < 4; ++i) {
-        const uint32_t at = x + half + i, l = least[half + i];
+        const uint32_t at = x + i, l = leasts[half + i];
         const uint32_t c = static_cast<int32_t>(at) < limit ? color(four[i], v + at) : 0;
         // The sign of a difference is whether it is less.
         bits.lit = __funnelshift_l(c - 1, bits.lit, 1);
@@ -230,19 +239,52 @@ __device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint3
       }
     }
   }
+  const auto in_order = [&](uint32_t turned) {
+    return ~__funnelshift_l(turned, turned, 32 - begin);
+  };
   // A pixel without light is at the lowest level whatever the least is.
-  bits.lit = ~bits.lit;
-  bits.red = ~bits.red & bits.lit;
-  bits.green = ~bits.green & bits.lit;
-  bits.blue = ~bits.blue & bits.lit;
+  bits.lit = in_order(bits.lit);
+  bits.red = in_order(bits.red) & bits.lit;
+  bits.green = in_order(bits.green) & bits.lit;
+  bits.blue = in_order(bits.blue) & bits.lit;
   return bits;
 }
+
+// What writing a region into pictures needs from memory, all asked for at once. A warp has a plane,
+// which is a slice; a thread of the first few a tile.
+struct PicturesHeld {
+  int32_t slice = -1;                     // from the first owned; −1: none
+  uint32_t slice_dirty = 0, differs = 0;  // of its first picture
+  uint32_t held[3] = {};                  // of that, this lane's row of bits
+  uint32_t tile = kAllLanes, lit = 0;
+  uint8_t owner = 0;
+
+  __device__ PicturesHeld(const DrawView& view, const RegionPlace& place) {
+    const PackedView& packed = view.packed;
+    const int32_t z = place.box.lo[2] + static_cast<int32_t>(threadIdx.x / 32);
+    if (z < place.box.hi[2]) slice = __ldg(&packed.slice_of_z[z]);
+    if (threadIdx.x < kRegionTiles) {
+      tile = place.TileOf(view.volume, threadIdx.x);
+      if (tile != kAllLanes) {
+        lit = view.volume.lit[tile];
+        owner = view.volume.owned[tile];
+      }
+    }
+    if (slice < 0) return;
+    slice_dirty = packed.slice_dirty[slice];
+    differs = packed.slices.differs[static_cast<uint32_t>(slice) * packed.slices.sub_frames];
+    if (packed.slices.format == display::PixelFormat::kBitPlanes3) {
+      BitsPlace(packed, place, slice, 0).Load(held);
+    }
+  }
+};
 
 // One plane of the region, by a warp: a lane has a row. Bits: which sub-frames' pictures differ.
 // limit[2]: how much of it there is, along x and y.
 template <typename Color>
-__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place, int32_t slice,
-                               const int32_t limit[2], RegionScratch& scratch, Color&& color) {
+__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place,
+                               const PicturesHeld& before, const int32_t limit[2],
+                               RegionScratch& scratch, Color&& color) {
   const SliceView& view = packed.slices;
   const uint32_t lane = threadIdx.x % 32, row = threadIdx.x;
   const uint32_t v =
@@ -254,12 +296,10 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
   for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
     const uint4* const leasts =
         reinterpret_cast<const uint4*>(sub == 0 ? scratch.least : packed.least + sub * 64) + v * 2;
-    const uint4 low = leasts[0], high = leasts[1];
-    const uint32_t least[8] = {low.x, low.y, low.z, low.w, high.x, high.y, high.z, high.w};
-    const BitsPlace bits_place(packed, place, slice, sub);
-    uint32_t held[3] = {};
-    bits_place.Load(held);  // on their way while the row is read
-    const RowBits drawn = TakeRow(scratch.words + row * kRowStride, row * 32, voxels, least,
+    const BitsPlace bits_place(packed, place, before.slice, sub);
+    uint32_t held[3] = {before.held[0], before.held[1], before.held[2]};
+    if (sub > 0) bits_place.Load(held);  // on their way while the row is read
+    const RowBits drawn = TakeRow(scratch.words + row * 32, row * 32, voxels, leasts,
                                   sub + 1 < view.sub_frames, color);
     if (sub == 0) {
       // Of 16 rows: of the nearer tile in the lower half, of the further in the upper.
@@ -290,20 +330,18 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
   const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
   const int32_t z = place.box.lo[2] + static_cast<int32_t>(warp);
   const bool inside = z < place.box.hi[2];
-  const int32_t s = inside ? __ldg(&packed.slice_of_z[z]) : -1;
-  const uint32_t tile =
-      threadIdx.x < kRegionTiles ? place.TileOf(view.volume, threadIdx.x) : kAllLanes;
-  const uint32_t lit_before = tile != kAllLanes ? view.volume.lit[tile] : 0;
+  const PicturesHeld before(view, place);
+  const int32_t s = before.slice;
   const int32_t limit[2] = {inside ? place.box.hi[0] - place.box.lo[0] : 0,
                             inside ? place.box.hi[1] - place.box.lo[1] : 0};
   uint32_t pictures = 0;
   if (slices.format == display::PixelFormat::kBitPlanes3) {
-    pictures = FlushPlane(packed, place, s, limit, scratch, color);
+    pictures = FlushPlane(packed, place, before, limit, scratch, color);
   } else {
     const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
     for (int32_t y = 0; y < 32; ++y) {
       const uint32_t voxel = warp << 10 | static_cast<uint32_t>(y) << 5 | lane;
-      uint32_t& word = scratch.words[IndexOf(voxel)];
+      uint32_t& word = scratch.words[voxel];
       const bool here = static_cast<int32_t>(lane) < limit[0] && y < limit[1];
       const uint32_t c = here ? color(word, voxel) : 0;
       word = 0;
@@ -330,15 +368,15 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
   }
   if (lane == 0 && pictures != 0) {
     // As a rule another region has said so already.
-    if (packed.slice_dirty[s] == 0) packed.slice_dirty[s] = 1;
+    if (before.slice_dirty == 0) packed.slice_dirty[s] = 1;
     for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
-      uint32_t& differs = slices.differs[static_cast<uint32_t>(s) * slices.sub_frames + sub];
-      if ((pictures >> sub & 1) != 0 && differs == 0) differs = 1;
+      if ((pictures >> sub & 1) == 0 || (sub == 0 && before.differs != 0)) continue;
+      slices.differs[static_cast<uint32_t>(s) * slices.sub_frames + sub] = 1;
     }
   }
   __syncthreads();
-  if (tile != kAllLanes) {
-    PutLit(view.volume, tile, lit_before, scratch.lit[threadIdx.x], scratch);
+  if (before.tile != kAllLanes) {
+    PutLit(view.volume, before.tile, before.owner, before.lit, scratch.lit[threadIdx.x], scratch);
   }
 }
 
@@ -361,6 +399,7 @@ __device__ void FlushToReader(const DrawView& view, const RegionPlace& place,
                  nx +
              static_cast<size_t>(at.x - box.lo[0])] = Deinterleave(color(drawn, at.v));
   }
+  __syncthreads();
 }
 
 }  // namespace voxeld::gpu::cuda

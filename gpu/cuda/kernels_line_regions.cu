@@ -45,9 +45,11 @@ __global__ void FindRegionsKernel(const ThinLine* lines, uint32_t count, RegionG
   });
 }
 
-__global__ void KillLinesKernel(ItemList list, uint32_t count, ThinLine* lines) {
+__global__ void KillLinesKernel(ItemList list, uint32_t count, LineArrays of) {
   const uint64_t i = Thread();
-  if (i < count) lines[LineAt(list, i)].SetWord(0);
+  if (i >= count) return;
+  const uint64_t at = LineAt(list, i);
+  of.lines[at].word = of.tracks[at].word = 0;
 }
 
 }  // namespace
@@ -71,7 +73,8 @@ cudaError_t FindRegions(const ThinLine* lines, uint32_t count, const RegionGrid&
   return cudaGetLastError();
 }
 
-cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream) {
+cudaError_t KillLines(const ItemList& list, uint32_t count, const LineArrays& lines,
+                      cudaStream_t stream) {
   KillLinesKernel<<<Blocks(count), kItemThreads, 0, stream>>>(list, count, lines);
   return cudaGetLastError();
 }

@@ -43,7 +43,7 @@ __global__ void FindBoundsKernel(const float* positions, uint32_t count, uint32_
 }
 
 __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t items,
-                                ThinLine* lines, uint32_t* ends) {
+                                LineArrays to, uint32_t* ends) {
   const uint64_t i = Thread();
   if (i >= items) return;
   const uint32_t d = DrawableOf(list, i);
@@ -55,18 +55,20 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
   const bool erase = entry.erase != 0;
   ThinLine thin = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
   uint32_t end = MakeWord(entry.priority, erase, line.color_e);
-  if (thin.n == 0) thin.SetWord(end = Max(thin.word, end));  // both ends are the one voxel
-  lines[i] = thin;
+  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the one voxel
+  to.lines[i] = thin;
+  to.tracks[i] = TrackOf(thin);
   if (ends != nullptr) ends[i] = end;
 }
 
-__global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, const ThinLine* from,
-                                const uint32_t* ends_from, ThinLine* to, uint32_t* ends_to) {
+__global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, LineArrays from,
+                                const uint32_t* ends_from, LineArrays to, uint32_t* ends_to) {
   const uint64_t i = Thread();
   if (i >= count) return;
   const uint64_t at = LineAt(list, first + i);
-  const ThinLine line = from[at];
-  to[first + i] = line;
+  const ThinLine line = from.lines[at];
+  to.lines[first + i] = line;
+  to.tracks[first + i] = from.tracks[at];
   if (ends_to != nullptr) ends_to[first + i] = ends_from != nullptr ? ends_from[at] : line.word;
 }
 
@@ -413,13 +415,13 @@ cudaError_t FindBounds(const float* positions, uint32_t count, uint32_t* bounds,
 }
 
 cudaError_t MakeLines(const TableEntry* table, const ItemList& list, uint32_t items,
-                      ThinLine* lines, uint32_t* ends, cudaStream_t stream) {
-  MakeLinesKernel<<<Blocks(items), kThreads, 0, stream>>>(table, list, items, lines, ends);
+                      const LineArrays& to, uint32_t* ends, cudaStream_t stream) {
+  MakeLinesKernel<<<Blocks(items), kThreads, 0, stream>>>(table, list, items, to, ends);
   return cudaGetLastError();
 }
 
-cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, const ThinLine* from,
-                      const uint32_t* ends_from, ThinLine* to, uint32_t* ends_to,
+cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, const LineArrays& from,
+                      const uint32_t* ends_from, const LineArrays& to, uint32_t* ends_to,
                       cudaStream_t stream) {
   CopyLinesKernel<<<Blocks(count), kThreads, 0, stream>>>(list, first, count, from, ends_from, to,
                                                           ends_to);

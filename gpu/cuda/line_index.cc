@@ -18,6 +18,10 @@ uint32_t* Ends(const auto& batch) {
   return batch.mixed ? batch.colors.template as<uint32_t>() : nullptr;
 }
 
+LineArrays Arrays(const auto& batch) {
+  return LineArrays::Of(batch.items.template as<void>(), batch.count);
+}
+
 // Boxes that a line touches at most, of a volume of so many along the axes.
 uint64_t MostBoxes(const int32_t count[3], int shift) {
   uint64_t most = 1;
@@ -37,7 +41,8 @@ LineBatchList LineIndex::view() const {
   LineBatchList list;  // Merge sees to it that they fit
   for (const auto& [number, batch] : batches()) {
     LineBatchView& view = list.batches[list.count++];
-    view.lines = batch.items.as<ThinLine>();
+    view.lines = Arrays(batch).lines;
+    view.tracks = Arrays(batch).tracks;
     view.ends = Ends(batch);
     view.layer = batch.layer;
     view.count = batch.count;
@@ -101,7 +106,7 @@ absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, b
   sort.block_counts = reinterpret_cast<uint32_t*>(sort.regions + blocks);
   sort.span_count = sort.block_counts + blocks;
   sort.spans = batch.spans.as<LineSpan>();
-  const ThinLine* const lines = batch.items.as<ThinLine>();
+  const ThinLine* const lines = Arrays(batch).lines;
   const uint32_t* const ends = Ends(batch);
   const size_t most_blocks = static_cast<size_t>(device().api().device().multiProcessorCount) * 4;
   const uint32_t launch = static_cast<uint32_t>(std::min(chunks, most_blocks));
@@ -200,8 +205,8 @@ absl::Status LineIndex::Defer(Batch& batch, uint8_t* region_dirty) {
   if (!regions.ok()) return regions.status();
   batch.regions = *std::move(regions);
   absl::Status status = device().Run("FindRegions", [&] {
-    return FindRegions(batch.items.as<ThinLine>(), batch.count, grid(),
-                       batch.regions.as<uint64_t>(), device().stream());
+    return FindRegions(Arrays(batch).lines, batch.count, grid(), batch.regions.as<uint64_t>(),
+                       device().stream());
   });
   return status.ok() && region_dirty != nullptr ? MarkAll(batch, region_dirty) : status;
 }
@@ -274,16 +279,15 @@ void LineIndex::EndPass() {
 
 absl::Status LineIndex::Make(const TableEntry* table, const ItemList& list, const Batch& batch) {
   return device().Run("MakeLines", [&] {
-    return MakeLines(table, list, batch.count, batch.items.as<ThinLine>(), Ends(batch),
-                     device().stream());
+    return MakeLines(table, list, batch.count, Arrays(batch), Ends(batch), device().stream());
   });
 }
 
 absl::Status LineIndex::Copy(const ItemList& list, uint64_t first, uint32_t count,
                              const Batch& from, const Batch& to) {
   return device().Run("CopyLines", [&] {
-    return CopyLines(list, first, count, from.items.as<ThinLine>(), Ends(from),
-                     to.items.as<ThinLine>(), Ends(to), device().stream());
+    return CopyLines(list, first, count, Arrays(from), Ends(from), Arrays(to), Ends(to),
+                     device().stream());
   });
 }
 
@@ -296,10 +300,10 @@ absl::Status LineIndex::MarkAll(const Batch& batch, uint8_t* region_dirty) {
 
 absl::Status LineIndex::Touch(const ItemList& list, uint32_t count, const Batch& batch,
                               uint8_t* region_dirty) {
-  ThinLine* const lines = batch.items.as<ThinLine>();
+  const LineArrays lines = Arrays(batch);
   return device().Run(region_dirty != nullptr ? "MarkLines" : "KillLines", [&] {
     return region_dirty != nullptr
-               ? MarkLines(list, count, lines, grid(), region_dirty, device().stream())
+               ? MarkLines(list, count, lines.lines, grid(), region_dirty, device().stream())
                : KillLines(list, count, lines, device().stream());
   });
 }

@@ -20,7 +20,7 @@ class LineIndex final : public RegionIndex {
   // `lists`: for the lists, and their making; `most_kept`: what lists of batches that are not
   // deferred may have of it. Outlives the index.
   LineIndex(Device& device, Pool& lists, uint64_t most_kept)
-      : RegionIndex(device, "lines", sizeof(ThinLine), sizeof(uint32_t)),
+      : RegionIndex(device, "lines", LineArrays::kBytes, sizeof(uint32_t)),
         lists_(lists),
         most_kept_(most_kept) {}
 

@@ -27,14 +27,14 @@ inline float FromOrderedBits(uint32_t bits) {
   return value;
 }
 
-// lines[i]: item i of the list, of segments or points without thickness. `ends`: may be null.
+// Line i of `to` is item i of the list, of segments or points without thickness. `ends`: may be null.
 cudaError_t MakeLines(const TableEntry* table, const ItemList& list, uint32_t items,
-                      ThinLine* lines, uint32_t* ends, cudaStream_t stream);
+                      const LineArrays& to, uint32_t* ends, cudaStream_t stream);
 
-// to[first + i] = from[slot(d) + …] for i up to `count`, item first + i of the list being the …-th of
+// Line first + i of `to` is slot(d) + … of `from` for i up to `count`, item first + i of the list being the …-th of
 // its d-th row. `ends_to` may be null; where `ends_from` is, a line's end is as its beginning.
-cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, const ThinLine* from,
-                      const uint32_t* ends_from, ThinLine* to, uint32_t* ends_to,
+cudaError_t CopyLines(const ItemList& list, uint64_t first, uint32_t count, const LineArrays& from,
+                      const uint32_t* ends_from, const LineArrays& to, uint32_t* ends_to,
                       cudaStream_t stream);
 
 // ---- sorting
@@ -62,6 +62,7 @@ cudaError_t MarkLines(const ItemList& list, uint32_t count, const ThinLine* line
 cudaError_t FindRegions(const ThinLine* lines, uint32_t count, const RegionGrid& grid,
                         uint64_t* regions, cudaStream_t stream);
 // Of lines in rows: they draw nothing from now on.
-cudaError_t KillLines(const ItemList& list, uint32_t count, ThinLine* lines, cudaStream_t stream);
+cudaError_t KillLines(const ItemList& list, uint32_t count, const LineArrays& lines,
+                      cudaStream_t stream);
 
 }  // namespace voxeld::gpu::cuda

@@ -72,6 +72,19 @@ struct RegionGrid {
   }
 };
 
+// A batch's lines: what sorting needs of each and, behind that of all, what drawing does, so that what
+// is looked up again and again lies close together.
+struct LineArrays {
+  ThinLine* lines = nullptr;
+  ThinTrack* tracks = nullptr;
+
+  static constexpr size_t kBytes = sizeof(ThinLine) + sizeof(ThinTrack);  // of a line
+  static LineArrays Of(void* items, uint32_t count) {
+    ThinLine* const lines = static_cast<ThinLine*>(items);
+    return {lines, reinterpret_cast<ThinTrack*>(lines + count)};
+  }
+};
+
 // A part of a line in a block of regions: `count` voxels from k on.
 struct LinePiece {
   uint32_t line;
@@ -124,6 +137,7 @@ struct SpanLists {
 // `regions` alone, and who draws looks through all lines.
 struct LineBatchView {
   const ThinLine* lines = nullptr;
+  const ThinTrack* tracks = nullptr;
   const uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
   uint32_t layer = 0;              // its slot
   uint32_t count = 0;              // lines

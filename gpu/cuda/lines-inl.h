@@ -6,11 +6,10 @@
 
 namespace voxeld::gpu::cuda {
 
-// But for its track.
 __device__ inline ThinLine LoadLine(const ThinLine* line) {
   const int4* const at = reinterpret_cast<const int4*>(line);
   const int4 a = at[0], b = at[1];
-  return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w), {}};
+  return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w)};
 }
 
 // Line `i` of the rows.

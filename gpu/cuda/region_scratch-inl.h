@@ -9,10 +9,11 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kDrawThreads = 512;
 inline constexpr uint32_t kDrawWarps = kDrawThreads / 32;
-inline constexpr uint32_t kMostSpans = 1536;  // of a region, that are sorted at once
-inline constexpr uint32_t kBuckets = 64;      // by length; those of two colours in the first
-inline constexpr uint32_t kSegments = 256;    // of a region's spans, that are looked at at once
-inline constexpr uint32_t kRegionTiles = 4;   // bit 0: the further in x, bit 1: in y
+inline constexpr uint32_t kSpansOfLane = 4;  // that a warp sorts at once
+inline constexpr uint32_t kSpansOfWarp = 32 * kSpansOfLane;
+inline constexpr uint32_t kMostSpans = kDrawWarps * kSpansOfWarp;
+inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are looked at at once
+inline constexpr uint32_t kRegionTiles = 4;  // bit 0: the further in x, bit 1: in y
 inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
 
 // Of a warp's values, the sum of those of the lanes before this one.
@@ -25,25 +26,21 @@ __device__ inline uint32_t SumBefore(uint32_t value) {
   return sum - value;
 }
 
-// Rows of 32 words along x, y within z, and so far apart: lanes that each read four words of a row of
-// their own meet all banks.
-inline constexpr uint32_t kRowStride = 36;
-inline constexpr uint32_t kRegionRows = kRegionVoxels / 32;
-
-// Of a voxel of a region, by number (x fastest, then y), and by place.
-__device__ inline uint32_t IndexOf(uint32_t v) { return v / 32 * kRowStride + v % 32; }
+// The number of a voxel of a region: x fastest, then y.
 __device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {
-  const uint32_t row = static_cast<uint32_t>(z & 15) * 32 + static_cast<uint32_t>(y & 31);
-  return row * kRowStride + static_cast<uint32_t>(x & 31);
+  return static_cast<uint32_t>(z & 15) << 10 | static_cast<uint32_t>(y & 31) << 5 |
+         static_cast<uint32_t>(x & 31);
 }
 
 struct RegionScratch {
   // 0 whenever the drawing of a region begins: who writes it out leaves it so.
-  alignas(16) uint32_t words[kRegionRows * kRowStride];
-  uint32_t segment_first[kSegments + 1];  // spans before
-  uint32_t segment_at[kSegments];         // where its spans lie
-  LineSpan spans[kMostSpans];
-  uint32_t buckets[kBuckets];
+  alignas(16) uint32_t words[kRegionVoxels];
+  LineSpan spans[kMostSpans];        // a part for each warp
+  uint32_t buckets[kDrawWarps][32];  // of its spans by length
+  // Segments of spans: how many lie before each, and what is to be added to a span's number among all
+  // to find it.
+  uint32_t segment_first[kSegments], segment_from[kSegments];
+  uint32_t segments, spans_found;
   uint32_t line_batches, triangle_batches;  // bits: those of the layer under way
   uint32_t layer;                           // its slot; kAllLanes: no more
   uint32_t cutting;                         // bits: which of its half-spaces cut the region

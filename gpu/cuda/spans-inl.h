@@ -13,183 +13,274 @@ __device__ inline uint32_t MixWords(uint32_t start, uint32_t end, int32_t k, int
 }
 
 // But for n: a register that is loaded and not used would be waited for where it is used anew.
-__device__ inline ThinTrack LoadTrack(const ThinLine* line) {
-  const ThinTrack& track = line->track;
-  const uint4 a = __ldg(reinterpret_cast<const uint4*>(track.axis));
-  const uint2 b = __ldg(reinterpret_cast<const uint2*>(&track.axis[2]));
+__device__ inline ThinTrack LoadTrack(const ThinTrack* track) {
+  const uint4 a = __ldg(reinterpret_cast<const uint4*>(track->axis));
+  const uint2 b = __ldg(reinterpret_cast<const uint2*>(&track->axis[2]));
   return {{static_cast<uint64_t>(a.y) << 32 | a.x, static_cast<uint64_t>(a.w) << 32 | a.z,
            static_cast<uint64_t>(b.y) << 32 | b.x},
-          __ldg(&track.word),
+          __ldg(&track->word),
           0};
 }
 
-__device__ inline uint32_t IndexOf(const ThinCursor& cursor) {
-  return (cursor.voxel(2) * 32 + cursor.voxel(1)) * kRowStride + cursor.voxel(0);
-}
+// The words of the region, to be raised. On a device by its own instructions: the compiler would work
+// out where shared memory lies anew for each, and branch around those that are not to be done.
+class RegionWords {
+ public:
+#if defined(__CUDA_ARCH__)
+  __device__ explicit RegionWords(uint32_t* words)
+      : at_(static_cast<uint32_t>(__cvta_generic_to_shared(words))) {
+    asm volatile("" : "+r"(at_));
+  }
+  __device__ void Raise(const ThinCursor& cursor, uint32_t word) const {
+    asm volatile("red.shared.max.u32 [%0], %1;" ::"r"(At(cursor)), "r"(word) : "memory");
+  }
+  // If kLess < count.
+  template <uint32_t kLess>
+  __device__ void RaiseIf(uint32_t count, const ThinCursor& cursor, uint32_t word) const {
+    asm volatile(
+        "{ .reg .pred more; setp.gt.u32 more, %0, %1; @more red.shared.max.u32 [%2], %3; }" ::"r"(
+            count),
+        "n"(kLess), "r"(At(cursor)), "r"(word)
+        : "memory");
+  }
+
+ private:
+  __device__ uint32_t At(const ThinCursor& cursor) const {
+    return at_ + IndexOf(cursor) * sizeof(uint32_t);
+  }
+  uint32_t at_;
+#else
+  __device__ explicit RegionWords(uint32_t* words) : words_(words) {}
+  __device__ void Raise(const ThinCursor& cursor, uint32_t word) const {
+    atomicMax(&words_[IndexOf(cursor)], word);
+  }
+  template <uint32_t kLess>
+  __device__ void RaiseIf(uint32_t count, const ThinCursor& cursor, uint32_t word) const {
+    if (count > kLess) Raise(cursor, word);
+  }
+
+ private:
+  uint32_t* words_;
+#endif
+
+ public:
+  __device__ static uint32_t IndexOf(const ThinCursor& cursor) {
+    const uint32_t row = __funnelshift_l(cursor.at[1], cursor.voxel(2), TrackBits(1));
+    return __funnelshift_l(cursor.at[0], row, TrackBits(0));
+  }
+};
 
 // A span of a line that runs from colour to colour, by its lane alone.
-static __device__ __noinline__ void DrawMixed(const ThinLine* line, uint32_t end, LineSpan span) {
-  const ThinTrack track = LoadTrack(line);
+static __device__ __noinline__ void DrawMixed(const ThinTrack* of, uint32_t end, LineSpan span) {
+  const ThinTrack track = LoadTrack(of);
   if (track.word == 0) return;
   uint32_t* const words = SharedRegion().words;
   const int32_t k = span.k(), count = static_cast<int32_t>(span.count());
   ThinCursor cursor(track, k);
   for (int32_t j = 0; j < count; ++j, cursor.Next()) {
-    atomicMax(&words[IndexOf(cursor)], MixWords(track.word, end, k + j, line->track.n));
+    atomicMax(&words[RegionWords::IndexOf(cursor)], MixWords(track.word, end, k + j, of->n));
   }
 }
 
 // `left` voxels of one word from there on; 0 where a lane has none. All of a warp go on together
 // until the longest ends.
-__device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word, uint32_t* words) {
+__device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word,
+                                 const RegionWords& words) {
   constexpr uint32_t kAtOnce = 4;
   while (__all_sync(kAllLanes, left >= kAtOnce)) {
 #pragma unroll
-    for (uint32_t j = 0; j < kAtOnce; ++j, cursor.Next()) {
-      atomicMax(&words[IndexOf(cursor)], word);
-    }
+    for (uint32_t j = 0; j < kAtOnce; ++j, cursor.Next()) words.Raise(cursor, word);
     left -= kAtOnce;
   }
   while (__any_sync(kAllLanes, left != 0)) {
-#pragma unroll
-    for (uint32_t j = 0; j < kAtOnce; ++j, cursor.Next()) {
-      if (j < left) atomicMax(&words[IndexOf(cursor)], word);
-    }
+    words.RaiseIf<0>(left, cursor, word);
+    cursor.Next();
+    words.RaiseIf<1>(left, cursor, word);
+    cursor.Next();
+    words.RaiseIf<2>(left, cursor, word);
+    cursor.Next();
+    words.RaiseIf<3>(left, cursor, word);
+    cursor.Next();
     left -= Min(left, kAtOnce);
   }
 }
 
-// The region's next segments of spans, from chunk `first` on, by the whole block; how many spans they
-// have.
-__device__ inline uint32_t FindSegments(const SpanLists& lists, uint32_t first, uint32_t last,
-                                        uint32_t region, RegionScratch& scratch) {
-  if (threadIdx.x < kSegments) {
-    const uint32_t chunk = first + threadIdx.x;
-    uint32_t count = 0;
-    if (chunk < last) {
-      const uint16_t* const offsets = lists.offsets +
-                                      static_cast<size_t>(chunk) * (kRegionsInBlock + 1) +
-                                      region % kRegionsInBlock;
-      count = offsets[1] - offsets[0];
-      scratch.segment_at[threadIdx.x] = lists.base[chunk] + offsets[0];
-    }
-    scratch.segment_first[threadIdx.x] = count;
-  }
-  __syncthreads();
-  if (threadIdx.x < 32) {
-    constexpr uint32_t kEach = kSegments / 32;
-    uint32_t* const own = &scratch.segment_first[threadIdx.x * kEach];
-    uint32_t counts[kEach], sum = 0;
-#pragma unroll
-    for (uint32_t e = 0; e < kEach; ++e) sum += counts[e] = own[e];
-    uint32_t before = SumBefore(sum);
-    if (threadIdx.x == 31) scratch.segment_first[kSegments] = before + sum;
-#pragma unroll
-    for (uint32_t e = 0; e < kEach; ++e) {
-      own[e] = before;
-      before += counts[e];
-    }
-  }
-  __syncthreads();
-  return scratch.segment_first[kSegments];
-}
-
-// Spans `first` to `first` + count − 1 of those found into shared memory, sorted by length, the
-// longest first, so that a warp's lanes have as much to do.
-__device__ inline void SortSpansHere(const LineBatchView& batch, uint32_t first, uint32_t count,
-                                     RegionScratch& scratch) {
-  // A warp goes over a segment; of some segments at once the first spans are asked for.
-  const uint2* const from = reinterpret_cast<const uint2*>(batch.lists.spans);
-  constexpr uint32_t kAtOnce = 4;
-  static_assert(kSegments % (kAtOnce * kDrawWarps) == 0);
-  for (uint32_t s = threadIdx.x / 32; s < kSegments; s += kAtOnce * kDrawWarps) {
-    if (scratch.segment_first[s] >= first + count) break;
-    uint32_t at[kAtOnce], high[kAtOnce];
-    uint2 spans[kAtOnce];
-#pragma unroll
-    for (uint32_t e = 0; e < kAtOnce; ++e) {
-      const uint32_t segment = s + e * kDrawWarps;
-      at[e] = Max(scratch.segment_first[segment], first) + threadIdx.x % 32;
-      high[e] = Min(scratch.segment_first[segment + 1], first + count);
-      if (at[e] < high[e]) {
-        spans[e] =
-            __ldg(from + (scratch.segment_at[segment] - scratch.segment_first[segment] + at[e]));
-      }
-    }
-#pragma unroll
-    for (uint32_t e = 0; e < kAtOnce; ++e) {
-      if (at[e] < high[e]) scratch.spans[at[e] - first] = {spans[e].x, spans[e].y};
-    }
-#pragma unroll 1
-    for (uint32_t e = 0; e < kAtOnce; ++e) {
-      const uint32_t segment = s + e * kDrawWarps;
-      const uint32_t begin = scratch.segment_first[segment];
-      const uint32_t end = Min(scratch.segment_first[segment + 1], first + count);
-      for (uint32_t i = Max(begin, first) + threadIdx.x % 32 + 32; i < end; i += 32) {
-        const uint2 span = __ldg(from + (scratch.segment_at[segment] - begin + i));
-        scratch.spans[i - first] = {span.x, span.y};
-      }
-    }
-  }
-  if (threadIdx.x < kBuckets) scratch.buckets[threadIdx.x] = 0;
-  __syncthreads();
-  constexpr uint32_t kEach = kMostSpans / kDrawThreads;
-  const auto bucket_of = [](LineSpan span) {
-    return span.mixed() ? 0 : kBuckets - 1 - span.count();
-  };
-  LineSpan mine[kEach];
-  uint32_t rank[kEach];
-#pragma unroll
-  for (uint32_t e = 0; e < kEach; ++e) {
-    const uint32_t i = threadIdx.x + e * kDrawThreads;
-    if (i >= count) continue;
-    mine[e] = scratch.spans[i];
-    rank[e] = atomicAdd(&scratch.buckets[bucket_of(mine[e])], 1u);
-  }
-  __syncthreads();
-  if (threadIdx.x < 32) {
-    const uint32_t low = scratch.buckets[2 * threadIdx.x],
-                   high = scratch.buckets[2 * threadIdx.x + 1];
-    const uint32_t before = SumBefore(low + high);
-    scratch.buckets[2 * threadIdx.x] = before;
-    scratch.buckets[2 * threadIdx.x + 1] = before + low;
-  }
-  __syncthreads();
-#pragma unroll
-  for (uint32_t e = 0; e < kEach; ++e) {
-    if (threadIdx.x + e * kDrawThreads >= count) continue;
-    scratch.spans[scratch.buckets[bucket_of(mine[e])] + rank[e]] = mine[e];
-  }
-  __syncthreads();
-}
-
-// Draws the `count` spans that lie in shared memory, 32 at a time. A function of its own, so that its
-// loop has all registers.
-static __device__ __noinline__ void DrawSorted(const ThinLine* lines, const uint32_t* ends,
-                                               uint32_t count) {
-  RegionScratch& scratch = SharedRegion();
+// The region's next segments of spans, from chunk `first` on, up to kSegments. By the first warp.
+__device__ inline void FindSegments(const SpanLists& lists, uint32_t first, uint32_t last,
+                                    uint32_t region, RegionScratch& scratch) {
   const uint32_t lane = threadIdx.x % 32;
-  // To and fro, so that the warp that has the longest in one round has the shortest in the next.
-  uint32_t group = threadIdx.x / 32, next = 2 * kDrawWarps - 1 - 2 * group;
-  // The next group's tracks are on their way while one is drawn; in the first round that is none.
+  constexpr uint32_t kAtOnce = 4;
+  const uint32_t segments = Min(last - first, kSegments);
+  uint32_t sum = 0;
+  for (uint32_t s = 0; s < segments; s += 32 * kAtOnce) {
+    uint32_t count[kAtOnce], at[kAtOnce];
+#pragma unroll
+    for (uint32_t e = 0; e < kAtOnce; ++e) {
+      const uint32_t segment = s + e * 32 + lane;
+      count[e] = at[e] = 0;
+      if (segment >= segments) continue;
+      const uint16_t* const offsets = lists.offsets +
+                                      static_cast<size_t>(first + segment) * (kRegionsInBlock + 1) +
+                                      region % kRegionsInBlock;
+      count[e] = offsets[1] - offsets[0];
+      at[e] = lists.base[first + segment] + offsets[0];
+    }
+#pragma unroll
+    for (uint32_t e = 0; e < kAtOnce; ++e) {
+      if (s + e * 32 >= segments) break;
+      const uint32_t before = sum + SumBefore(count[e]);
+      const uint32_t segment = s + e * 32 + lane;
+      if (segment < segments) {
+        scratch.segment_first[segment] = before;
+        scratch.segment_from[segment] = at[e] - before;
+      }
+      sum = __shfl_sync(kAllLanes, before + count[e], 31);
+    }
+  }
+  if (lane == 0) {
+    scratch.segments = segments;
+    scratch.spans_found = sum;
+  }
+}
+
+// A warp's spans, a lane's among them: number i in spans[i / 32] of lane i % 32.
+struct WarpSpans {
+  LineSpan spans[kSpansOfLane];
+  uint32_t count = 0;
+
+  // From span `first` of those found on; `most` at most, and one at least.
+  __device__ void Fetch(const LineSpan* from, uint32_t first, uint32_t most,
+                        const RegionScratch& scratch) {
+    const uint32_t lane = threadIdx.x % 32, segments = scratch.segments;
+    // The segment that has the first one: the last that begins there or before.
+    constexpr uint32_t kStride = kSegments / 32;
+    static_assert(kStride <= 32);
+    const auto begins = [&](uint32_t segment) {
+      return segment < segments && scratch.segment_first[segment] <= first;
+    };
+    uint32_t segment = kStride * static_cast<uint32_t>(
+                                     __popc(__ballot_sync(kAllLanes, begins(lane * kStride))) - 1);
+    segment += static_cast<uint32_t>(
+        __popc(__ballot_sync(kAllLanes, lane < kStride && begins(segment + lane))) - 1);
+    // Of this one and the next ones each lane has one.
+    const uint32_t mine = segment + lane;
+    const uint32_t begin = mine < segments ? scratch.segment_first[mine] : scratch.spans_found;
+    const uint32_t move = mine < segments ? scratch.segment_from[mine] : 0;
+    const uint32_t known =
+        segment + 32 < segments ? scratch.segment_first[segment + 32] : scratch.spans_found;
+    count = Min(most, known - first);
+    uint32_t at[kSpansOfLane];
+#pragma unroll
+    for (uint32_t e = 0; e < kSpansOfLane; ++e) {
+      const uint32_t i = first + e * 32 + lane;
+      uint32_t low = 0;
+#pragma unroll
+      for (uint32_t step = 16; step > 0; step /= 2) {
+        if (__shfl_sync(kAllLanes, begin, low + step) <= i) low += step;
+      }
+      at[e] = __shfl_sync(kAllLanes, move, low) + i;
+    }
+#pragma unroll
+    for (uint32_t e = 0; e < kSpansOfLane; ++e) {
+      uint2 span = make_uint2(0, 0);
+      if (e * 32 + lane < count) span = __ldg(reinterpret_cast<const uint2*>(from) + at[e]);
+      spans[e] = {span.x, span.y};
+    }
+  }
+
+  // Into `sorted`, by length, the longest first, so that lanes have as much to do; those of two
+  // colours before all.
+  __device__ void Sort(uint32_t buckets[32], LineSpan* sorted) const {
+    const uint32_t lane = threadIdx.x % 32;
+    if (count <= 32) {
+      if (lane < count) sorted[lane] = spans[0];
+      return __syncwarp();
+    }
+    buckets[lane] = 0;
+    __syncwarp();
+    uint32_t rank[kSpansOfLane];
+#pragma unroll
+    for (uint32_t e = 0; e < kSpansOfLane; ++e) {
+      if (e * 32 + lane < count) rank[e] = atomicAdd(&buckets[BucketOf(spans[e])], 1u);
+    }
+    __syncwarp();
+    buckets[lane] = SumBefore(buckets[lane]);
+    __syncwarp();
+#pragma unroll
+    for (uint32_t e = 0; e < kSpansOfLane; ++e) {
+      if (e * 32 + lane < count) sorted[buckets[BucketOf(spans[e])] + rank[e]] = spans[e];
+    }
+    __syncwarp();
+  }
+
+ private:
+  static_assert(kMaxSpan >> 1 < 31);
+  __device__ static uint32_t BucketOf(LineSpan span) {
+    return span.mixed() ? 0 : 31 - (span.count() >> 1);
+  }
+};
+
+// Draws `count` spans, 32 at a time. By a warp.
+__device__ inline void DrawSorted(const ThinTrack* tracks, const uint32_t* ends,
+                                  const LineSpan* spans, uint32_t count, const RegionWords& words) {
+  const uint32_t lane = threadIdx.x % 32;
+  // The next spans' tracks are on their way while some are drawn; in the first round these are none.
   LineSpan span{0, 0};
   ThinTrack track{};
-  for (;;) {
-    if (span.mixed()) DrawMixed(&lines[span.line], ends[span.line], span);
+  for (uint32_t first = 0;; first += 32) {
+    if (span.mixed()) DrawMixed(&tracks[span.line], ends[span.line], span);
     const ThinCursor cursor(track, span.k());
     const uint32_t word = track.word, voxels = span.mixed() ? 0 : span.count();
-    const bool more = group * 32 < count;
+    const bool more = first < count;
     span = {0, 0};
     if (more) {
-      const uint32_t i = group * 32 + lane;
-      if (i < count) span = scratch.spans[i];
-      track = LoadTrack(&lines[span.line]);
+      if (first + lane < count) span = spans[first + lane];
+      track = LoadTrack(&tracks[span.line]);
     }
-    DrawGroup(cursor, voxels, word, scratch.words);
+    DrawGroup(cursor, voxels, word, words);
     if (!more) return;
-    group += next;
-    next = 2 * kDrawWarps - next;
   }
+}
+
+// Draws the spans that have been found: each warp for itself. A function of its own, so that it has
+// all registers.
+static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTrack* tracks,
+                                              const uint32_t* ends) {
+  RegionScratch& scratch = SharedRegion();
+  const RegionWords words(scratch.words);
+  const uint32_t warp = threadIdx.x / 32, found = scratch.spans_found;
+  if (found == 0) return;
+  LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
+  // All have as many, in as few parts as can be sorted at once.
+  const uint32_t share = (found + kDrawThreads - 1) / kDrawThreads * 32;
+  const uint32_t parts = (share + kSpansOfWarp - 1) / kSpansOfWarp;
+  const uint32_t most = (share / 32 + parts - 1) / parts * 32;
+  const uint32_t end = Min((warp + 1) * share, found);
+  WarpSpans spans;
+  for (uint32_t first = warp * share; first < end; first += spans.count) {
+    spans.Fetch(from, first, Min(most, end - first), scratch);
+    spans.Sort(scratch.buckets[warp], sorted);
+    DrawSorted(tracks, ends, sorted, spans.count, words);
+    __syncwarp();
+  }
+}
+
+// Draws the `count` spans that lie in scratch.spans.
+static __device__ __noinline__ void DrawHeld(const ThinTrack* tracks, const uint32_t* ends,
+                                             uint32_t count) {
+  RegionScratch& scratch = SharedRegion();
+  const uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+  if (warp * kSpansOfWarp >= count) return;
+  LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
+  WarpSpans spans;
+  spans.count = Min(count - warp * kSpansOfWarp, kSpansOfWarp);
+#pragma unroll
+  for (uint32_t e = 0; e < kSpansOfLane; ++e) {
+    if (e * 32 + lane < spans.count) spans.spans[e] = sorted[e * 32 + lane];
+  }
+  __syncwarp();
+  spans.Sort(scratch.buckets[warp], sorted);
+  DrawSorted(tracks, ends, sorted, spans.count, RegionWords(scratch.words));
 }
 
 // By the whole block.
@@ -199,13 +290,10 @@ __device__ inline void DrawSpans(const DrawView& view, const LineBatchView& batc
   const uint32_t first = batch.lists.chunk_begin[region / kRegionsInBlock];
   const uint32_t last = batch.lists.chunk_begin[region / kRegionsInBlock + 1];
   for (uint32_t chunk = first; chunk < last; chunk += kSegments) {
-    const uint32_t found = FindSegments(batch.lists, chunk, last, region, scratch);
-    for (uint32_t span = 0; span < found; span += kMostSpans) {
-      const uint32_t count = Min(found - span, kMostSpans);
-      SortSpansHere(batch, span, count, scratch);
-      DrawSorted(batch.lines, batch.ends, count);
-      __syncthreads();
-    }
+    if (threadIdx.x < 32) FindSegments(batch.lists, chunk, last, region, scratch);
+    __syncthreads();
+    DrawFound(batch.lists.spans, batch.tracks, batch.ends);
+    __syncthreads();
   }
 }
 

@@ -22,7 +22,7 @@ class Stopwatch {
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
-  // Sets the mark behind what has been queued.
+  // Sets the mark behind what has been queued in the device's stream.
   absl::Status Set(Mark mark);
   // From one mark to a later one; both have been waited for.
   absl::StatusOr<int64_t> Between(Mark from, Mark to);

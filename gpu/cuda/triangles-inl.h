@@ -26,7 +26,7 @@ __device__ __noinline__ inline void RaiseMixed(const TriangleBatchView& batch, u
                             y + (place >> 5 & 31) - CompactAxis::Of(t, 1).origin,
                             z + (place >> 10) - CompactAxis::Of(t, 2).origin};
   const uint32_t rgb = CompactColorAt(t, batch.colors + static_cast<size_t>(triangle) * 3, voxel);
-  atomicMax(&SharedRegion().words[IndexOf(static_cast<uint32_t>(place))], Recolored(t.word, rgb));
+  atomicMax(&SharedRegion().words[place], Recolored(t.word, rgb));
 }
 
 __device__ __noinline__ inline void RaiseFlat(const TriangleBatchView& batch, uint32_t triangle,
@@ -56,7 +56,7 @@ __device__ inline void DrawTriangleRow(const TriangleBatchView& batch, uint32_t 
   const bool mixed = (t.flags & CompactTriangle::kMixed) != 0;
   EmitCompactRow(t, part, row, [&](int32_t place) {
     if (mixed) return RaiseMixed(batch, triangle, at[0], at[1], at[2], place);
-    atomicMax(&SharedRegion().words[IndexOf(static_cast<uint32_t>(place))], t.word);
+    atomicMax(&SharedRegion().words[place], t.word);
   });
 }
 
@@ -86,7 +86,7 @@ __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t
       if (rows != 0 && warp % team == 0) {
         const bool mixed = (t.flags & CompactTriangle::kMixed) != 0;
         EmitCompactVertices(t, part, [&](int32_t place, int vertex) {
-          atomicMax(&scratch.words[IndexOf(static_cast<uint32_t>(place))],
+          atomicMax(&scratch.words[place],
                     mixed ? Recolored(t.word, batch.colors[static_cast<size_t>(triangle) * 3 +
                                                            static_cast<uint32_t>(vertex)])
                           : t.word);

@@ -37,10 +37,11 @@ __device__ inline bool CutToRegion(const ThinLine& line, const int32_t at[3], in
 }
 
 // By the whole block.
-static __device__ __noinline__ void DrawUnsorted(const ThinLine* lines, const uint32_t* ends,
-                                                 uint32_t count, const RegionGrid* regions) {
+static __device__ __noinline__ void DrawUnsorted(const ThinLine* lines, const ThinTrack* tracks,
+                                                 const uint32_t* ends, uint32_t count,
+                                                 const RegionGrid* regions) {
   RegionScratch& scratch = SharedRegion();
-  uint32_t& found = scratch.segment_at[0];
+  uint32_t& found = scratch.spans_found;
   int32_t at[3];
   regions->RegionCoordinates(scratch.region, at);
   if (threadIdx.x == 0) found = 0;
@@ -60,7 +61,7 @@ static __device__ __noinline__ void DrawUnsorted(const ThinLine* lines, const ui
     const uint32_t here = found;
     // There is room for as many as one more round may find.
     if (here > kMostSpans - kDrawThreads || first + kDrawThreads >= count) {
-      DrawSorted(lines, ends, here);
+      DrawHeld(tracks, ends, here);
       __syncthreads();
       if (threadIdx.x == 0) found = 0;
     }

@@ -33,6 +33,14 @@ inline constexpr uint32_t kMaxSpan = 57;  // voxels of a line in a box of 32
 // The boxes in which lines are drawn: log2 of their voxels by axis.
 VOXELD_HD inline constexpr int TrackBits(int axis) { return axis == 2 ? 4 : 5; }
 
+// What sorting needs of a line.
+struct alignas(16) ThinLine {
+  int32_t s[3];   // units
+  int32_t n;      // N; 0: the voxel of S alone
+  int32_t d[3];   // units; 0 if n is
+  uint32_t word;  // gpu/word.h; 0: draws nothing
+};
+
 // What drawing needs of a line. By axis the step, modulo 2^b voxels with b = TrackBits(axis) bits
 // before the point, in all but the low 13 bits; there S, modulo 2^b voxels, in units.
 struct alignas(16) ThinTrack {
@@ -40,17 +48,6 @@ struct alignas(16) ThinTrack {
   uint64_t axis[3];
   uint32_t word;  // as the line's
   int32_t n;      // as the line's
-};
-
-// 64 bytes, read in pieces of 16: what sorting needs, then what drawing does.
-struct alignas(16) ThinLine {
-  int32_t s[3];   // units
-  int32_t n;      // N; 0: the voxel of S alone
-  int32_t d[3];   // units; 0 if n is
-  uint32_t word;  // gpu/word.h; 0: draws nothing
-  ThinTrack track;
-
-  VOXELD_HD void SetWord(uint32_t to) { word = track.word = to; }
 };
 
 // Of S and D (in units) on an axis; m = max(N, 1).
@@ -91,11 +88,18 @@ VOXELD_HD inline ThinLine MakeThin(const Line& line, uint32_t word) {
   for (int a = 0; a < 3; ++a) {
     t.s[a] = static_cast<int32_t>(line.s[a]);
     t.d[a] = n == 0 ? 0 : static_cast<int32_t>(line.e[a] - line.s[a]);
-    t.track.axis[a] = TrackAxis(t.s[a], t.d[a], Max(t.n, 1), a);
   }
-  t.track.word = word;
-  t.track.n = t.n;
   return t;
+}
+
+VOXELD_HD inline ThinTrack TrackOf(const ThinLine& line) {
+  ThinTrack track;
+  for (int a = 0; a < 3; ++a) {
+    track.axis[a] = TrackAxis(line.s[a], line.d[a], Max(line.n, 1), a);
+  }
+  track.word = line.word;
+  track.n = line.n;
+  return track;
 }
 
 VOXELD_HD inline int32_t WrapMul(int32_t a, int32_t b) {

@@ -45,7 +45,7 @@ void AddSpan(const ThinLine& line, const int32_t box[3], int32_t begin, int32_t 
              std::vector<Voxel>& voxels) {
   ASSERT_LT(begin, end);
   ASSERT_LE(end - begin, static_cast<int32_t>(kMaxSpan));
-  ThinCursor at(line.track, begin);
+  ThinCursor at(TrackOf(line), begin);
   for (int32_t k = begin; k < end; ++k, at.Next()) {
     Voxel voxel;
     for (int a = 0; a < 3; ++a) {
