@@ -59,7 +59,7 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
           continue;
         }
       }
-      DrawSpans(view, batch, scratch);
+      DrawSpans(batch, scratch);
     }
     for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
       DrawTriangles(view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
@@ -130,9 +130,7 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       } else {
         // All batches are of the layer.
         for (uint32_t b = 0; b < view.lines.count; ++b) {
-          if (view.lines.batches[b].lists.Has(region)) {
-            DrawSpans(view, view.lines.batches[b], scratch);
-          }
+          DrawSpans(view.lines.batches[b], scratch);
         }
         for (uint32_t b = 0; b < view.triangles.count; ++b) {
           if (view.triangles.batches[b].Has(region)) {

@@ -278,16 +278,35 @@ __device__ uint32_t SumBefore(uint32_t value, uint32_t& total) {
   return sum - value;
 }
 
-// `count` pieces into `order`.
-__device__ void OrderPieces(const LinePiece* pieces, uint32_t count, SpanScratch& scratch) {
-  constexpr uint32_t kEach = kPieceChunk / kThreads;
-  LinePiece mine[kEach];
-  uint32_t rank[kEach], bucket[kEach];
+constexpr uint32_t kPiecesEach = kPieceChunk / kThreads;
+
+// A chunk of pieces, of the `count` from `first` on; they lie in block b.
+struct PieceChunk {
+  uint32_t b, first, count;
+  LinePiece mine[kPiecesEach];
+
+  // Of `chunk`, which b's are not behind. Its pieces are on their way.
+  __device__ void Load(const LineSort& sort, uint32_t chunk) {
+    while (sort.chunk_begin[b + 1] <= chunk) ++b;
+    first = sort.block_begin[b] + (chunk - sort.chunk_begin[b]) * kPieceChunk;
+    count = Min(sort.block_begin[b + 1] - first, kPieceChunk);
 #pragma unroll
-  for (uint32_t e = 0; e < kEach; ++e) {
+    for (uint32_t e = 0; e < kPiecesEach; ++e) {
+      const uint32_t p = threadIdx.x + e * kThreads;
+      if (p < count) mine[e] = sort.pieces[first + p];
+    }
+  }
+};
+
+// Pieces into `order`.
+__device__ void OrderPieces(const LinePiece mine[kPiecesEach], uint32_t count,
+                            const ThinLine* lines, SpanScratch& scratch) {
+  uint32_t rank[kPiecesEach], bucket[kPiecesEach];
+#pragma unroll
+  for (uint32_t e = 0; e < kPiecesEach; ++e) {
     const uint32_t p = threadIdx.x + e * kThreads;
     if (p >= count) continue;
-    mine[e] = pieces[p];
+    AskFor(&lines[mine[e].line]);
     bucket[e] = Min(mine[e].count() / 4, kLengths - 1);
     rank[e] = atomicAdd(&scratch.lengths[bucket[e]], 1u);
   }
@@ -298,7 +317,7 @@ __device__ void OrderPieces(const LinePiece* pieces, uint32_t count, SpanScratch
   }
   __syncthreads();
 #pragma unroll
-  for (uint32_t e = 0; e < kEach; ++e) {
+  for (uint32_t e = 0; e < kPiecesEach; ++e) {
     if (threadIdx.x + e * kThreads >= count) continue;
     scratch.order[scratch.lengths[bucket[e]] + rank[e]] = mine[e];
   }
@@ -317,16 +336,17 @@ __global__ void __launch_bounds__(kThreads, 4)
       static_cast<uint32_t>(static_cast<uint64_t>(chunks) * blockIdx.x / gridDim.x);
   const uint32_t end_chunk =
       static_cast<uint32_t>(static_cast<uint64_t>(chunks) * (blockIdx.x + 1) / gridDim.x);
-  uint32_t b = begin_chunk < end_chunk ? BlockOf(sort, begin_chunk) : 0;
+  if (begin_chunk == end_chunk) return;
+  PieceChunk next{BlockOf(sort, begin_chunk)};
+  next.Load(sort, begin_chunk);
   for (uint32_t chunk = begin_chunk; chunk < end_chunk; ++chunk) {
-    while (sort.chunk_begin[b + 1] <= chunk) ++b;
     if (threadIdx.x < kRegionsInBlock) scratch.at[threadIdx.x] = 0;
     if (threadIdx.x < kLengths) scratch.lengths[threadIdx.x] = 0;
     if (threadIdx.x < kWarps) scratch.found[threadIdx.x] = 0;
     __syncthreads();
-    const uint32_t first = sort.block_begin[b] + (chunk - sort.chunk_begin[b]) * kPieceChunk;
-    const uint32_t count = Min(sort.block_begin[b + 1] - first, kPieceChunk);
-    OrderPieces(sort.pieces + first, count, scratch);
+    const uint32_t b = next.b, count = next.count;
+    OrderPieces(next.mine, count, lines, scratch);
+    if (chunk + 1 < end_chunk) next.Load(sort, chunk + 1);
     for (uint32_t round = 0; round < kPieceChunk / kThreads; ++round) {
       // What one warp has to do less in one round it has more in the next.
       const uint32_t group = round % 2 == 0 ? warp : kWarps - 1 - warp;
@@ -385,7 +405,9 @@ __global__ void __launch_bounds__(kThreads, 4)
     for (uint32_t i = lane; i < scratch.found[warp]; i += 32) {
       const LineSpan span = scratch.spans[warp][i];
       const uint32_t place = base + atomicAdd(&scratch.at[span.region()], 1u);
-      if (place < sort.span_capacity) sort.spans[place] = span;
+      if (place < sort.span_capacity) {
+        __stcs(reinterpret_cast<uint2*>(sort.spans) + place, make_uint2(span.line, span.bits));
+      }
     }
     __syncthreads();
   }

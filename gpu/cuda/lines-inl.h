@@ -6,6 +6,13 @@
 
 namespace voxeld::gpu::cuda {
 
+// Into the second cache.
+__device__ inline void AskFor(const void* what) {
+#if defined(__CUDA_ARCH__)
+  asm volatile("prefetch.global.L2 [%0];" ::"l"(what));
+#endif
+}
+
 __device__ inline ThinLine LoadLine(const ThinLine* line) {
   const int4* const at = reinterpret_cast<const int4*>(line);
   const int4 a = at[0], b = at[1];

@@ -1,6 +1,7 @@
 // The spans of thin lines, raised into a region's words.
 #pragma once
 
+#include "gpu/cuda/lines-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 
 namespace voxeld::gpu::cuda {
@@ -140,6 +141,7 @@ __device__ inline void FindSegments(const SpanLists& lists, uint32_t first, uint
   if (lane == 0) {
     scratch.segments = segments;
     scratch.spans_found = sum;
+    scratch.parts_taken = 0;
   }
 }
 
@@ -148,9 +150,9 @@ struct WarpSpans {
   LineSpan spans[kSpansOfLane];
   uint32_t count = 0;
 
-  // From span `first` of those found on; `most` at most, and one at least.
-  __device__ void Fetch(const LineSpan* from, uint32_t first, uint32_t most,
-                        const RegionScratch& scratch) {
+  // From span `first` of those found on; `most` at most, and one at least. Their tracks are asked for.
+  __device__ void Fetch(const LineSpan* from, const ThinTrack* tracks, uint32_t first,
+                        uint32_t most, const RegionScratch& scratch) {
     const uint32_t lane = threadIdx.x % 32, segments = scratch.segments;
     // The segment that has the first one: the last that begins there or before.
     constexpr uint32_t kStride = kSegments / 32;
@@ -183,8 +185,12 @@ struct WarpSpans {
 #pragma unroll
     for (uint32_t e = 0; e < kSpansOfLane; ++e) {
       uint2 span = make_uint2(0, 0);
-      if (e * 32 + lane < count) span = __ldg(reinterpret_cast<const uint2*>(from) + at[e]);
+      if (e * 32 + lane < count) span = __ldcs(reinterpret_cast<const uint2*>(from) + at[e]);
       spans[e] = {span.x, span.y};
+    }
+#pragma unroll
+    for (uint32_t e = 0; e < kSpansOfLane; ++e) {
+      if (e * 32 + lane < count) AskFor(&tracks[spans[e].line]);
     }
   }
 
@@ -249,19 +255,25 @@ static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTr
   RegionScratch& scratch = SharedRegion();
   const RegionWords words(scratch.words);
   const uint32_t warp = threadIdx.x / 32, found = scratch.spans_found;
-  if (found == 0) return;
   LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
-  // All have as many, in as few parts as can be sorted at once.
-  const uint32_t share = (found + kDrawThreads - 1) / kDrawThreads * 32;
-  const uint32_t parts = (share + kSpansOfWarp - 1) / kSpansOfWarp;
-  const uint32_t most = (share / 32 + parts - 1) / parts * 32;
-  const uint32_t end = Min((warp + 1) * share, found);
+  // As many as can be sorted at once while there are enough for all, then few, so that all end together.
+  constexpr uint32_t kFew = 3 * 32 * kDrawWarps;
+  const uint32_t large = found > kFew ? (found - kFew) / kSpansOfWarp : 0;
   WarpSpans spans;
-  for (uint32_t first = warp * share; first < end; first += spans.count) {
-    spans.Fetch(from, first, Min(most, end - first), scratch);
-    spans.Sort(scratch.buckets[warp], sorted);
-    DrawSorted(tracks, ends, sorted, spans.count, words);
-    __syncwarp();
+  for (;;) {
+    uint32_t part = 0;
+    if (threadIdx.x % 32 == 0) part = atomicAdd(&scratch.parts_taken, 1u);
+    part = __shfl_sync(kAllLanes, part, 0);
+    uint32_t first =
+        part < large ? part * kSpansOfWarp : large * kSpansOfWarp + (part - large) * 32;
+    if (first >= found) return;
+    const uint32_t end = Min(first + (part < large ? kSpansOfWarp : 32), found);
+    for (; first < end; first += spans.count) {
+      spans.Fetch(from, tracks, first, end - first, scratch);
+      spans.Sort(scratch.buckets[warp], sorted);
+      DrawSorted(tracks, ends, sorted, spans.count, words);
+      __syncwarp();
+    }
   }
 }
 
@@ -283,12 +295,13 @@ static __device__ __noinline__ void DrawHeld(const ThinTrack* tracks, const uint
   DrawSorted(tracks, ends, sorted, spans.count, RegionWords(scratch.words));
 }
 
-// By the whole block.
-__device__ inline void DrawSpans(const DrawView& view, const LineBatchView& batch,
-                                 RegionScratch& scratch) {
+// By the whole block: what the batch has in the region, if it has any there.
+__device__ inline void DrawSpans(const LineBatchView& batch, RegionScratch& scratch) {
   const uint32_t region = scratch.region;
+  // Asked for together.
+  const bool any = batch.lists.Has(region);
   const uint32_t first = batch.lists.chunk_begin[region / kRegionsInBlock];
-  const uint32_t last = batch.lists.chunk_begin[region / kRegionsInBlock + 1];
+  const uint32_t last = any ? batch.lists.chunk_begin[region / kRegionsInBlock + 1] : first;
   for (uint32_t chunk = first; chunk < last; chunk += kSegments) {
     if (threadIdx.x < 32) FindSegments(batch.lists, chunk, last, region, scratch);
     __syncthreads();

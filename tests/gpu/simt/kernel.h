@@ -82,6 +82,10 @@ T __ldg(const T* at) {
   return *at;
 }
 template <typename T>
+T __ldcs(const T* at) {
+  return *at;
+}
+template <typename T>
 void __stcs(T* at, T value) {
   *at = value;
 }
