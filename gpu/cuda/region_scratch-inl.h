@@ -41,7 +41,6 @@ struct RegionScratch {
   // to find it.
   uint32_t segment_first[kSegments], segment_from[kSegments];
   uint32_t segments, spans_found;
-  uint32_t parts_taken;                     // of these, by warps
   uint32_t line_batches, triangle_batches;  // bits: those of the layer under way
   uint32_t layer;                           // its slot; kAllLanes: no more
   uint32_t cutting;                         // bits: which of its half-spaces cut the region

@@ -141,7 +141,6 @@ __device__ inline void FindSegments(const SpanLists& lists, uint32_t first, uint
   if (lane == 0) {
     scratch.segments = segments;
     scratch.spans_found = sum;
-    scratch.parts_taken = 0;
   }
 }
 
@@ -256,24 +255,18 @@ static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTr
   const RegionWords words(scratch.words);
   const uint32_t warp = threadIdx.x / 32, found = scratch.spans_found;
   LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
-  // As many as can be sorted at once while there are enough for all, then few, so that all end together.
-  constexpr uint32_t kFew = 3 * 32 * kDrawWarps;
-  const uint32_t large = found > kFew ? (found - kFew) / kSpansOfWarp : 0;
+  if (found == 0) return;
+  // All have as many, in as few parts as can be sorted at once.
+  const uint32_t share = (found + kDrawThreads - 1) / kDrawThreads * 32;
+  const uint32_t parts = (share + kSpansOfWarp - 1) / kSpansOfWarp;
+  const uint32_t most = (share / 32 + parts - 1) / parts * 32;
+  const uint32_t end = Min((warp + 1) * share, found);
   WarpSpans spans;
-  for (;;) {
-    uint32_t part = 0;
-    if (threadIdx.x % 32 == 0) part = atomicAdd(&scratch.parts_taken, 1u);
-    part = __shfl_sync(kAllLanes, part, 0);
-    uint32_t first =
-        part < large ? part * kSpansOfWarp : large * kSpansOfWarp + (part - large) * 32;
-    if (first >= found) return;
-    const uint32_t end = Min(first + (part < large ? kSpansOfWarp : 32), found);
-    for (; first < end; first += spans.count) {
-      spans.Fetch(from, tracks, first, end - first, scratch);
-      spans.Sort(scratch.buckets[warp], sorted);
-      DrawSorted(tracks, ends, sorted, spans.count, words);
-      __syncwarp();
-    }
+  for (uint32_t first = warp * share; first < end; first += spans.count) {
+    spans.Fetch(from, tracks, first, Min(most, end - first), scratch);
+    spans.Sort(scratch.buckets[warp], sorted);
+    DrawSorted(tracks, ends, sorted, spans.count, words);
+    __syncwarp();
   }
 }
 
