@@ -16,6 +16,7 @@ namespace {
 
 constexpr uint32_t kPartItems = 2048;  // at least, where there are several parts
 constexpr uint32_t kWalkRun = 256;     // made, and followed while they are in the cache
+constexpr uint32_t kPointRun = 64;     // found, before a look at the limit
 
 // Of a span: while the two arrays of those found grow, sorted, and put in order. Of what grows: old, new and a copy.
 constexpr uint64_t kSpanBytes = 48, kWalkBytes = 4 * sizeof(LineWalk),
@@ -150,8 +151,10 @@ struct Part {
 // What BinItems does with items [first, last).
 template <class Primitive>
 void Find(Part& part, uint32_t first, uint32_t last) {
-  for (uint32_t i = first; i < last; ++i) {
-    part.FindItem<Primitive>(i);
+  // A point touches one tile, or, if it has a radius, as few as anything else.
+  const uint32_t run = std::is_same_v<Primitive, Points> && part.source.radius == 0 ? kPointRun : 1;
+  for (uint32_t i = first; i < last;) {
+    for (const uint32_t end = std::min(last, i + run); i < end; ++i) part.FindItem<Primitive>(i);
     if (!part.Charge()) return;
   }
 }
