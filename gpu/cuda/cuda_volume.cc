@@ -27,9 +27,10 @@ CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
       uploader_(uploader),
       index_(device),
       line_lists_(device.pool(), IndexBytes(tuning, device.api().device())),
-      lines_(device, line_lists_,
-             static_cast<uint64_t>(static_cast<double>(line_lists_.limit()) *
-                                   tuning.index_share_kept)),
+      lines_(
+          device, line_lists_,
+          static_cast<uint64_t>(static_cast<double>(line_lists_.limit()) * tuning.index_share_kept),
+          tuning.few_lines),
       triangles_(device) {}
 
 // ------------------------------------------------------------------------------------------- tiles

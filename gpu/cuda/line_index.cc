@@ -124,6 +124,45 @@ absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, b
   return status.ok() ? device().Wait() : status;
 }
 
+bool LineIndex::AreFew(const Batch& batch) const {
+  constexpr size_t kScan = 4096;
+  return batch.count <= std::min(few_lines_, kMostFewLines) &&
+         SortFewLinesShared(grid()) + kScan <= device().api().device().sharedMemPerBlockOptin;
+}
+
+// They have `most_spans` at most.
+absl::Status LineIndex::SortFew(Batch& batch, uint64_t most_spans, uint8_t* region_dirty) {
+  const size_t blocks = grid().block_count();
+  const std::pair<Block*, size_t> wanted[] = {
+      {&batch.begin, (blocks + 1) * sizeof(uint32_t)},
+      {&batch.base, blocks * sizeof(uint32_t)},
+      {&batch.offsets, blocks * (kRegionsInBlock + 1) * sizeof(uint16_t)},
+      {&batch.spans, most_spans * sizeof(LineSpan)}};
+  batch.list_bytes = 0;
+  for (const auto& [block, bytes] : wanted) {
+    absl::StatusOr<Block> taken = lists_.Acquire(bytes);
+    if (!taken.ok()) return taken.status();
+    *block = *std::move(taken);
+    batch.list_bytes += bytes;
+  }
+  batch.sort_bytes = batch.list_bytes;
+  absl::StatusOr<Block> regions = device().pool().Acquire(blocks * sizeof(uint64_t));
+  if (!regions.ok()) return regions.status();
+  batch.regions = *std::move(regions);
+  LineSort sort;
+  sort.grid = grid();
+  sort.span_capacity = static_cast<uint32_t>(most_spans);
+  sort.chunk_begin = batch.begin.as<uint32_t>();
+  sort.base = batch.base.as<uint32_t>();
+  sort.offsets = batch.offsets.as<uint16_t>();
+  sort.regions = batch.regions.as<uint64_t>();
+  sort.spans = batch.spans.as<LineSpan>();
+  sort.dirty = region_dirty;
+  return device().Run("SortFewLines", [&] {
+    return SortFewLines(sort, Arrays(batch).lines, Ends(batch), batch.count, device().stream());
+  });
+}
+
 // As fast as it goes, in as much memory as that takes.
 absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   const uint64_t most_pieces = uint64_t{batch.count} * MostBoxes(grid().blocks, 0);
@@ -132,6 +171,7 @@ absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   sort.grid = grid();
   sort.dirty = region_dirty;
   uint32_t needed[2] = {};
+  if (AreFew(batch)) return SortFew(batch, most_spans, region_dirty);
   if (most_spans * sizeof(LineSpan) <= kUncountedBytes) {
     sort.piece_capacity = static_cast<uint32_t>(most_pieces);
     sort.span_capacity = static_cast<uint32_t>(most_spans);

@@ -18,11 +18,12 @@ namespace voxeld::gpu::cuda {
 class LineIndex final : public RegionIndex {
  public:
   // `lists`: for the lists, and their making; `most_kept`: what lists of batches that are not
-  // deferred may have of it. Outlives the index.
-  LineIndex(Device& device, Pool& lists, uint64_t most_kept)
+  // deferred may have of it; `few_lines`: Tuning's. Outlives the index.
+  LineIndex(Device& device, Pool& lists, uint64_t most_kept, uint32_t few_lines)
       : RegionIndex(device, "lines", LineArrays::kBytes, sizeof(uint32_t)),
         lists_(lists),
-        most_kept_(most_kept) {}
+        most_kept_(most_kept),
+        few_lines_(few_lines) {}
 
   // Whether a volume of that grid can have one, on such a device.
   static bool Suits(const Api& api, const TileGrid& grid);
@@ -51,12 +52,15 @@ class LineIndex final : public RegionIndex {
 
   absl::Status SortInto(Batch& batch, Block& regions, LineSort& sort, bool counted,
                         uint32_t* needed);
+  bool AreFew(const Batch& batch) const;
+  absl::Status SortFew(Batch& batch, uint64_t most_spans, uint8_t* region_dirty);
   absl::Status SortAll(Batch& batch, uint8_t* region_dirty);
   absl::Status SortExactly(Batch& batch, Block& regions, LineSort& sort);
   absl::Status Defer(Batch& batch, uint8_t* region_dirty);
 
   Pool& lists_;
   const uint64_t most_kept_;
+  const uint32_t few_lines_;
   uint64_t used_ = 0;  // of lists_, when SortDeferred last looked
   // Of a line, on the average, as large batches had them; with some to spare.
   double pieces_a_line_ = 4, spans_a_line_ = 12, spans_a_piece_ = 4;

@@ -46,6 +46,12 @@ cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t co
                         cudaStream_t stream);
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                        cudaStream_t stream);
+// All of it at once, of kMostFewLines at most; of `sort` all is put down but what is between the goes.
+inline constexpr uint32_t kMostFewLines = 1024;
+cudaError_t SortFewLines(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
+                         uint32_t count, cudaStream_t stream);
+// Shared memory that this takes.
+size_t SortFewLinesShared(const RegionGrid& grid);
 // `ends`: which lines have two colours; may be null. By so many blocks of threads.
 cudaError_t SortSpans(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
                       uint32_t blocks, cudaStream_t stream);

@@ -9,6 +9,8 @@ struct Tuning {
   // A volume of fewer items is drawn as one group: copying its pictures while others are drawn is not
   // worth the launches.
   uint64_t few_items = 100'000;
+  // As many thin lines at most, of those that come together, are sorted by one block of threads.
+  uint32_t few_lines = 1024;
   // What the lists of all thin lines by region may take together, with their making; 0: 16 GiB, or a
   // quarter of the device's memory if that is less. Lines beyond it are drawn in passes.
   uint64_t index_bytes = 0;
