@@ -9,8 +9,9 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 // Of slices, so that one's pictures are on their way while the next is drawn.
-constexpr size_t kMostGroups = 4;
-static_assert(kMostGroups >= kMostDrawGroups && kMostDrawGroups >= PackedPlan::kMostGroups);
+constexpr size_t kSampledGroups = 4;
+constexpr size_t kMostGroups = kMostDrawGroups;
+static_assert(kMostGroups >= kSampledGroups && kMostGroups >= PackedPlan::kMostGroups);
 static_assert(PackedPlan::kGroupGrain == 1 << RegionBits(2));
 
 }  // namespace
@@ -198,15 +199,15 @@ DrawGroups CudaPictures::GroupsOfRegions(bool together) const {
 std::vector<CudaPictures::Range> CudaPictures::RangesOf(bool together) const {
   const size_t slices = static_cast<size_t>(plan_.end - plan_.begin);
   std::vector<Range> ranges;
-  if (packed_ && together) return {{0, slices}};
+  if (together) return {{0, slices}};
   if (packed_) {
     for (const PackedPlan::Group& group : groups_) {
       ranges.push_back({static_cast<size_t>(group.begin), static_cast<size_t>(group.end)});
     }
     return ranges;
   }
-  for (size_t g = 0; g < kMostGroups; ++g) {
-    ranges.push_back({g * slices / kMostGroups, (g + 1) * slices / kMostGroups});
+  for (size_t g = 0; g < kSampledGroups; ++g) {
+    ranges.push_back({g * slices / kSampledGroups, (g + 1) * slices / kSampledGroups});
   }
   return ranges;
 }
@@ -236,7 +237,7 @@ absl::Status CudaPictures::Await(size_t event, cudaStream_t stream) {
 }
 
 // One group after the other; or in two streams by turns, so that one begins where the one before has
-// left multiprocessors, and the last in the device's.
+// left multiprocessors. At the end the device's stream has waited for all.
 absl::Status CudaPictures::QueueGroups(const VolumeView& volume, uint64_t frame,
                                        std::span<const Range> ranges, const Drawing& drawing,
                                        Stopwatch& stopwatch) {
@@ -247,19 +248,16 @@ absl::Status CudaPictures::QueueGroups(const VolumeView& volume, uint64_t frame,
     status = Record(kMostGroups, device_.stream());
     if (status.ok()) status = Await(kMostGroups, device_.beside());
   }
-  for (size_t g = 0; g <= last; ++g) {
-    const cudaStream_t stream =
-        by_turns && (last - g) % 2 == 1 ? device_.beside() : device_.stream();
-    if (status.ok() && (packed_ || g == 0))
-      status = drawing.queue(static_cast<uint32_t>(g), stream);
+  for (size_t g = 0; g <= last && status.ok(); ++g) {
+    const cudaStream_t stream = by_turns && g % 2 == 1 ? device_.beside() : device_.stream();
+    if (packed_ || g == 0) status = drawing.queue(static_cast<uint32_t>(g), stream);
     if (status.ok() && !packed_ && g == 0) status = stopwatch.Set(Stopwatch::Mark::kAssembled);
     if (status.ok() && by_turns && g == last) status = Await(g - 1, stream);
     if (status.ok()) status = QueueSlices(volume, frame, ranges[g], g == last, stream);
-    if (status.ok() && g == last) status = stopwatch.Set(Stopwatch::Mark::kPacked);
     if (status.ok()) status = Record(g, stream);
-    if (!status.ok()) return status;
   }
-  return status;
+  if (status.ok() && by_turns) status = Await(last, device_.stream());
+  return status.ok() ? stopwatch.Set(Stopwatch::Mark::kPacked) : status;
 }
 
 absl::Status CudaPictures::CopyGroups(std::span<const Range> ranges, FrameBuffer buffer,

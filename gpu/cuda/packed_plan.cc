@@ -30,7 +30,8 @@ bool PutLeast(const display::FrameLayout& layout, const display::Tone& tone,
   return true;
 }
 
-std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, int32_t slices) {
+std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, int32_t slices,
+                                        int32_t most) {
   const int32_t nz = static_cast<int32_t>(slice_of_z.size());
   std::vector<int32_t> owned;
   std::copy_if(slice_of_z.begin(), slice_of_z.end(), std::back_inserter(owned),
@@ -42,8 +43,8 @@ std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, 
   constexpr int32_t kGrain = PackedPlan::kGroupGrain;
   const int32_t planes = (nz + kGrain - 1) / kGrain;
   int32_t z = 0;
-  for (int32_t g = 0; g < PackedPlan::kMostGroups; ++g) {
-    const int32_t z_end = std::min(nz, (g + 1) * planes / PackedPlan::kMostGroups * kGrain);
+  for (int32_t g = 0; g < most; ++g) {
+    const int32_t z_end = std::min(nz, (g + 1) * planes / most * kGrain);
     PackedPlan::Group group{z_end, 0, 0};
     for (; z < z_end; ++z) {
       const int32_t s = slice_of_z[static_cast<size_t>(z)];
@@ -63,7 +64,8 @@ std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, 
 std::optional<PackedPlan> PackedPlan::Of(const display::FootprintTable& table,
                                          const display::VoxelGrid& grid,
                                          const display::FrameLayout& layout,
-                                         const display::Tone& tone, int32_t begin, int32_t end) {
+                                         const display::Tone& tone, int32_t begin, int32_t end,
+                                         int32_t most_groups) {
   if (tone.sampling != display::Sampling::kMax || table.inner_sets != 1 ||
       table.inner_axis != display::Axis::kY || table.width > grid.nx ||
       layout.sub_frames > kMostSubFrames) {
@@ -93,7 +95,7 @@ std::optional<PackedPlan> PackedPlan::Of(const display::FootprintTable& table,
   }
   if (plan.y_step != 1 && plan.y_step != -1) return std::nullopt;
   if (!PutLeast(layout, tone, plan.least)) return std::nullopt;
-  plan.groups = GroupsOf(plan.slice_of_z, end - begin);
+  plan.groups = GroupsOf(plan.slice_of_z, end - begin, most_groups);
   return plan;
 }
 

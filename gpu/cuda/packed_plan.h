@@ -26,14 +26,14 @@ struct PackedPlan {
   std::vector<uint32_t> least;
 
   static constexpr int32_t kGroupGrain = 16;
-  static constexpr int32_t kMostGroups = 4;
+  static constexpr int32_t kMostGroups = 8;
 
-  // Of slices [begin, end). Nothing if pixels are not voxels, or if bit planes' tone is not
+  // Of slices [begin, end), in `most_groups` at most. Nothing if pixels are not voxels, or if bit planes' tone is not
   // monotonic.
   static std::optional<PackedPlan> Of(const display::FootprintTable& table,
                                       const display::VoxelGrid& grid,
                                       const display::FrameLayout& layout, const display::Tone& tone,
-                                      int32_t begin, int32_t end);
+                                      int32_t begin, int32_t end, int32_t most_groups);
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -9,6 +9,9 @@ struct Tuning {
   // A volume of fewer items is drawn as one group: copying its pictures while others are drawn is not
   // worth the launches.
   uint64_t few_items = 100'000;
+  // Bytes of pictures that make it worth while to draw what follows as a group of its own: so long a
+  // copy takes some launches.
+  uint64_t group_bytes = uint64_t{12} << 20;
   // As many thin lines at most, of those that come together, are sorted by one block of threads.
   uint32_t few_lines = 1024;
   // What the lists of all thin lines by region may take together, with their making; 0: 16 GiB, or a

@@ -93,7 +93,7 @@ struct BatchList {
 
 // Dirty regions are listed, drawn and packed in groups of planes of regions along z, so that one
 // group's pictures are on their way while the next is drawn.
-inline constexpr uint32_t kMostDrawGroups = 4;
+inline constexpr uint32_t kMostDrawGroups = 8;
 struct DrawGroups {
   uint32_t count = 1;
   int32_t end[kMostDrawGroups] = {0x7FFFFFFF};  // planes, half-open

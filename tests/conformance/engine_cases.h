@@ -28,19 +28,24 @@ inline std::vector<EngineCase> EngineCases() {
         // In groups, as large scenes are.
         {"cuda_groups",
          [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {}, {.few_items = 0, .few_lines = 0});
+           return CreateCudaEngine(options, "a test", {},
+                                   {.few_items = 0, .group_bytes = 1, .few_lines = 0});
          }},
         // With no list of lines; and with none that stays.
         {"cuda_tight",
          [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {},
-                                   {.few_items = 0, .few_lines = 0, .index_bytes = 1});
+           return CreateCudaEngine(
+               options, "a test", {},
+               {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1});
          }},
         {"cuda_passes",
          [](const EngineOptions& options) {
-           return CreateCudaEngine(
-               options, "a test", {},
-               {.few_items = 0, .few_lines = 0, .index_bytes = 1 << 20, .index_share_kept = 0});
+           return CreateCudaEngine(options, "a test", {},
+                                   {.few_items = 0,
+                                    .group_bytes = 1,
+                                    .few_lines = 0,
+                                    .index_bytes = 1 << 20,
+                                    .index_share_kept = 0});
          }},
         CaseOf("cuda_worker", EngineKind::kCuda, true),
 #elif defined(VOXELD_TEST_SIMT)  // with a CPU for a GPU
@@ -50,20 +55,25 @@ inline std::vector<EngineCase> EngineCases() {
         // In groups, as large scenes are.
         {"cuda_simt_groups",
          [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {}, {.few_items = 0, .few_lines = 0});
+           return CreateCudaEngine(options, "a test", {},
+                                   {.few_items = 0, .group_bytes = 1, .few_lines = 0});
          }},
     // With no list of lines; and with none that stays.
 #if !defined(VOXELD_TEST_SIMT_FEW)
         {"cuda_simt_tight",
          [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {},
-                                   {.few_items = 0, .few_lines = 0, .index_bytes = 1});
+           return CreateCudaEngine(
+               options, "a test", {},
+               {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1});
          }},
 #endif
         {"cuda_simt_passes", [](const EngineOptions& options) {
-           return CreateCudaEngine(
-               options, "a test", {},
-               {.few_items = 0, .few_lines = 0, .index_bytes = 1 << 20, .index_share_kept = 0});
+           return CreateCudaEngine(options, "a test", {},
+                                   {.few_items = 0,
+                                    .group_bytes = 1,
+                                    .few_lines = 0,
+                                    .index_bytes = 1 << 20,
+                                    .index_share_kept = 0});
          }},
 #else
     CaseOf("cpu", EngineKind::kCpu, false),

@@ -33,7 +33,7 @@ struct Display {
   }
   std::optional<PackedPlan> Plan(int32_t begin, int32_t end) const {
     return PackedPlan::Of(display::BuildFootprints(geometry, tone.sampling), geometry.grid, layout,
-                          tone, begin, end);
+                          tone, begin, end, 4);
   }
 };
 
