@@ -9,7 +9,7 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kDrawThreads = 512;
 inline constexpr uint32_t kDrawWarps = kDrawThreads / 32;
-inline constexpr uint32_t kSpansOfLane = 4;  // that a warp sorts at once
+inline constexpr uint32_t kSpansOfLane = 3;  // that a warp sorts at once
 inline constexpr uint32_t kSpansOfWarp = 32 * kSpansOfLane;
 inline constexpr uint32_t kMostSpans = kDrawWarps * kSpansOfWarp;
 inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are looked at at once

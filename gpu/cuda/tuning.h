@@ -11,7 +11,7 @@ struct Tuning {
   uint64_t few_items = 100'000;
   // Bytes of pictures that make it worth while to draw what follows as a group of its own: so long a
   // copy takes some launches.
-  uint64_t group_bytes = uint64_t{12} << 20;
+  uint64_t group_bytes = uint64_t{24} << 20;
   // As many thin lines at most, of those that come together, are sorted by one block of threads.
   uint32_t few_lines = 1024;
   // What the lists of all thin lines by region may take together, with their making; 0: 16 GiB, or a
