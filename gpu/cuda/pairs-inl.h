@@ -1,6 +1,8 @@
-// Pairs of items and tiles, raised into a region's words: whatever is neither thin line nor small triangle.
+// Pairs of items and tiles, raised into a region's words: whatever is neither thin line nor small triangle,
+// also where there is no list of pairs.
 #pragma once
 
+#include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/primitives/list.h"
 
@@ -172,21 +174,61 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
   __syncthreads();
 }
 
-// The layer's pairs of one tile, by the whole block.
+// Whether an item may have voxels in a tile.
+__device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t tile,
+                                const Box3& box) {
+  Box3 bounds;
+  switch (entry.record.kind) {
+    case kDrawnByCpu:
+      return entry.drawn.tiles[item] == tile;
+    case PrimitiveKind::kPoints:
+      bounds = BoundsOf(Points::ItemOf(entry.source, item), entry.source.radius);
+      break;
+    case PrimitiveKind::kSegments:
+      bounds = BoundsOf(Segments::ItemOf(entry.source, item), entry.source.radius);
+      break;
+    case PrimitiveKind::kTriangles:
+      bounds = BoundsOf(Triangles::ItemOf(entry.source, item));
+      break;
+    default:
+      bounds = entry.source.solid.bounds;
+      break;
+  }
+  return !IsEmpty(Intersect(box, bounds));
+}
+
+// The value of a pair, if item `i` of those that are not listed is of that layer, and may have voxels
+// in the tile.
+__device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t layer, uint32_t tile,
+                                    const Box3& box, uint64_t& value) {
+  const uint32_t d = DrawableOf(view.unlisted, i);
+  const uint32_t slot = view.unlisted.slot(d);
+  const TableEntry& entry = view.table[slot];
+  if (entry.layer != layer) return false;
+  const uint32_t item = static_cast<uint32_t>(i - view.unlisted.first(d));
+  value = PairValue(slot, item);
+  return MayTouch(entry, item, tile, box);
+}
+
+// The layer's pairs of one tile, by the whole block; last what is not listed.
 __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile,
                                  RegionScratch& region, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   const Box3 box = grid.VoxelsOf(tile);
   if (threadIdx.x == 0) scratch.heavy_count = 0;
   __syncthreads();
-  for (uint32_t b = 0; b < view.pairs.count; ++b) {
-    const uint32_t end = scratch.rows.end[t][b];
+  for (uint32_t b = 0; b <= view.pairs.count; ++b) {
+    const bool listed = b < view.pairs.count;
+    const uint64_t begin = listed ? scratch.rows.begin[t][b] : 0;
+    const uint64_t end = listed ? scratch.rows.end[t][b] : view.unlisted.items;
     // In rounds of the block's size, so that what is heavy is drawn before its list is full.
-    for (uint32_t round = scratch.rows.begin[t][b]; round < end; round += kDrawThreads) {
-      const uint32_t p = round + threadIdx.x;
-      bool heavy = false;
-      if (p < end) {
-        const uint64_t value = view.pairs.batches[b].values[p];
+    for (uint64_t round = begin; round < end; round += kDrawThreads) {
+      const uint64_t p = round + threadIdx.x;
+      bool here = p < end, heavy = false;
+      uint64_t value = 0;
+      if (here && listed) value = view.pairs.batches[b].values[p];
+      if (here && !listed) here = FindUnlisted(view, p, region.layer, tile, box, value);
+      if (here) {
         const TableEntry& entry = view.table[value >> 32];
         const uint32_t item = static_cast<uint32_t>(value);
         heavy = entry.alive != 0 && IsHeavy(entry, item, box);

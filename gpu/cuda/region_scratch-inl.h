@@ -50,7 +50,7 @@ struct RegionScratch {
   alignas(16) uint32_t least[64];           // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
-  uint32_t pairs;                 // not 0: the layer has some here
+  uint32_t pairs;                 // not 0: the layer has some here, or items that are not listed
 };
 
 // What a block of threads draws: first in its shared memory.
@@ -148,6 +148,19 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
       }
     }
   }
+  int32_t unlisted_rank = kNone;
+  if constexpr (kPairs) {
+    for (uint32_t i = lane; i < view.unlisted.layer_count; i += 32) {
+      const uint32_t slot = view.unlisted.layers[i];
+      const LayerLook look = view.layers[slot];
+      if (look.visible == 0 || look.rank <= last || look.rank >= unlisted_rank) continue;
+      unlisted_rank = look.rank;
+      if (look.rank < least) {
+        least = look.rank;
+        layer = slot;
+      }
+    }
+  }
   const auto rank_here = [&](const auto& batches) {
     if (lane >= batches.count || !batches.batches[lane].Has(scratch.region)) return kNone;
     const uint32_t slot = batches.batches[lane].layer;
@@ -172,6 +185,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
       rows->end[t][lane] = here ? end[t] : 0;
       pairs |= here;
     }
+    pairs |= unlisted_rank == least && least != kNone;
   }
   const uint32_t any_pairs = __ballot_sync(kAllLanes, pairs);
   const uint32_t lines = __ballot_sync(kAllLanes, line_rank == least && least != kNone);
