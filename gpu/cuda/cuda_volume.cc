@@ -287,14 +287,14 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
   keep_visible(view.lines);
   keep_visible(view.triangles);
   view.clipped = !layers.empty() && looks_now_[*layers.begin()].half_spaces != 0;
-  const auto* const lines = view.lines.batches;
-  const bool listed = std::none_of(lines, lines + view.lines.count, [](const LineBatchView& batch) {
-    return batch.lists.spans == nullptr;
-  });
-  const bool pairs = view.pairs.count > 0 || view.unlisted.items > 0;
-  const auto draw = pairs || !listed              ? DrawAll
-                    : plain && layers.size() <= 1 ? DrawOneLayer
-                                                  : DrawLines;
+  bool any = view.pairs.count > 0 || view.unlisted.items > 0;
+  for (uint32_t b = 0; b < view.lines.count; ++b) {
+    any |= view.lines.batches[b].lists.spans == nullptr;
+  }
+  for (uint32_t b = 0; b < view.triangles.count; ++b) {
+    any |= view.triangles.batches[b].begin == nullptr;
+  }
+  const auto draw = any ? DrawAll : plain && layers.size() <= 1 ? DrawOneLayer : DrawLines;
   return device_.Run("DrawRegions", [&] {
     return draw(view, to, static_cast<uint32_t>(device_.api().device().multiProcessorCount),
                 stream);

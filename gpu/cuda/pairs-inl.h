@@ -210,38 +210,41 @@ __device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t l
   return MayTouch(entry, item, tile, box);
 }
 
-// The layer's pairs of one tile, by the whole block; last what is not listed.
+// A pair's voxels; true if it is heavy: then it is listed.
+__device__ inline bool DrawLight(const DrawView& view, uint64_t value, const Box3& box,
+                                 RegionScratch& region, PairScratch& scratch) {
+  const TableEntry& entry = view.table[value >> 32];
+  const uint32_t item = static_cast<uint32_t>(value);
+  const bool heavy = entry.alive != 0 && IsHeavy(entry, item, box);
+  if (entry.alive == 0) {
+  } else if (heavy) {
+    scratch.heavy[atomicAdd(&scratch.heavy_count, 1u)] = value;
+  } else if (entry.record.kind == PrimitiveKind::kPoints) {
+    DrawItem<Points>(entry, item, box, region.words);
+  } else if (entry.record.kind == PrimitiveKind::kSegments) {
+    DrawItem<Segments>(entry, item, box, region.words);
+  } else {
+    DrawItem<Triangles>(entry, item, box, region.words);
+  }
+  return heavy;
+}
+
+// The layer's pairs of one tile, by the whole block.
 __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile,
                                  RegionScratch& region, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   const Box3 box = grid.VoxelsOf(tile);
   if (threadIdx.x == 0) scratch.heavy_count = 0;
   __syncthreads();
-  for (uint32_t b = 0; b <= view.pairs.count; ++b) {
-    const bool listed = b < view.pairs.count;
-    const uint64_t begin = listed ? scratch.rows.begin[t][b] : 0;
-    const uint64_t end = listed ? scratch.rows.end[t][b] : view.unlisted.items;
+  for (uint32_t b = 0; b < view.pairs.count; ++b) {
+    const uint32_t end = scratch.rows.end[t][b];
     // In rounds of the block's size, so that what is heavy is drawn before its list is full.
-    for (uint64_t round = begin; round < end; round += kDrawThreads) {
-      const uint64_t p = round + threadIdx.x;
-      bool here = p < end, heavy = false;
-      uint64_t value = 0;
-      if (here && listed) value = view.pairs.batches[b].values[p];
-      if (here && !listed) here = FindUnlisted(view, p, region.layer, tile, box, value);
-      if (here) {
-        const TableEntry& entry = view.table[value >> 32];
-        const uint32_t item = static_cast<uint32_t>(value);
-        heavy = entry.alive != 0 && IsHeavy(entry, item, box);
-        if (entry.alive == 0) {
-        } else if (heavy) {
-          scratch.heavy[atomicAdd(&scratch.heavy_count, 1u)] = value;
-        } else if (entry.record.kind == PrimitiveKind::kPoints) {
-          DrawItem<Points>(entry, item, box, region.words);
-        } else if (entry.record.kind == PrimitiveKind::kSegments) {
-          DrawItem<Segments>(entry, item, box, region.words);
-        } else {
-          DrawItem<Triangles>(entry, item, box, region.words);
-        }
+    for (uint32_t round = scratch.rows.begin[t][b]; round < end; round += kDrawThreads) {
+      const uint32_t p = round + threadIdx.x;
+      bool heavy = false;
+      if (p < end) {
+        const uint64_t value = view.pairs.batches[b].values[p];
+        heavy = DrawLight(view, value, box, region, scratch);
       }
       if (__syncthreads_or(heavy ? 1 : 0) != 0) {
         DrawHeavy(view.table, box, grid, region.words, scratch);
@@ -251,6 +254,28 @@ __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile
     }
   }
   __syncthreads();
+}
+
+// What the layer has in one tile of items that are not listed, by the whole block. Rare, and apart, so
+// that pairs are drawn as they would be without it; its loop is left by vote, as it must be around calls.
+static __device__ __noinline__ void DrawUnlisted(const DrawView& view, uint32_t tile,
+                                                 RegionScratch& region, PairScratch& scratch) {
+  const TileGrid& grid = view.volume.grid;
+  const Box3 box = grid.VoxelsOf(tile);
+  if (threadIdx.x == 0) scratch.heavy_count = 0;
+  for (uint64_t i = threadIdx.x; __syncthreads_or(i < view.unlisted.items) != 0;
+       i += kDrawThreads) {
+    bool heavy = false;
+    uint64_t value;
+    if (i < view.unlisted.items && FindUnlisted(view, i, region.layer, tile, box, value)) {
+      heavy = DrawLight(view, value, box, region, scratch);
+    }
+    if (__syncthreads_or(heavy ? 1 : 0) != 0) {
+      DrawHeavy(view.table, box, grid, region.words, scratch);
+      if (threadIdx.x == 0) scratch.heavy_count = 0;
+      __syncthreads();
+    }
+  }
 }
 
 }  // namespace voxeld::gpu::cuda

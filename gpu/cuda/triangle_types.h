@@ -20,8 +20,10 @@ struct TriangleBatchView {
   uint32_t layer = 0;  // its slot
   uint32_t count = 0;  // triangles
 
+  // Whether it has any in a region; kListed: it has lists.
+  template <bool kListed>
   VOXELD_HD bool Has(uint32_t region) const {
-    if (begin == nullptr) return (places[region / 32] >> region % 32 & 1) != 0;
+    if (!kListed && begin == nullptr) return (places[region / 32] >> region % 32 & 1) != 0;
     return begin[region] != begin[region + 1];
   }
 };

@@ -62,8 +62,9 @@ __device__ inline void DrawTriangleRow(const TriangleBatchView& batch, uint32_t 
 
 // By the whole block: teams of warps take some triangles each, and a team's lanes a row each of what
 // these have in the region, so that all have about as much to do. b: of the view's batches; of one
-// without lists all triangles are looked at, and of most there are no rows. Not inlined: lines want the
-// registers.
+// without lists (if not kListed) all triangles are looked at, and of most there are no rows. Not
+// inlined: lines want the registers.
+template <bool kListed>
 __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t b) {
   RegionScratch& scratch = SharedRegion();
   const TriangleBatchView& batch = view.triangles.batches[b];
@@ -71,7 +72,7 @@ __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t
   int32_t at[3];
   view.regions.RegionCoordinates(region, at);
   for (int a = 0; a < 3; ++a) at[a] <<= RegionBits(a);
-  const bool listed = batch.begin != nullptr;
+  const bool listed = kListed || batch.begin != nullptr;
   const uint32_t begin = listed ? batch.begin[region] : 0;
   const uint32_t count = listed ? batch.begin[region + 1] - begin : batch.count;
   uint32_t team = 1;  // warps
