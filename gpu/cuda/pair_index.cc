@@ -204,6 +204,7 @@ absl::Status PairIndex::AddDeferred(const TableEntry* table, const VolumeView& v
   absl::Status status;
   if (!deferred_.empty() && lists_.pool.used() < used_) {
     const absl::StatusOr<UploadedList> list = UploadDrawables(device_, deferred_);
+    if (absl::IsResourceExhausted(list.status())) return absl::OkStatus();  // later, then
     if (!list.ok()) return list.status();
     status = AddItems(table, nullptr, *list, volume, skip_);
     const size_t whole = CountWhole(deferred_, skip_);

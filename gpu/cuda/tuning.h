@@ -9,8 +9,9 @@ struct Tuning {
   // A volume of fewer items is drawn as one group: copying its pictures while others are drawn is not
   // worth the launches.
   uint64_t few_items = 100'000;
-  // What the lists of all thin lines by region may take together, with their making; 0: 16 GiB, or a
-  // quarter of the device's memory if that is less. Lines beyond it are drawn in passes.
+  // What all lists of what lies where (of thin lines and small triangles by region, of other items by
+  // tile) may take together, with their making; 0: 16 GiB, or a quarter of the device's memory if that
+  // is less. What goes beyond it is drawn in passes.
   uint64_t index_bytes = 0;
   // Of these, what lists may take that stay from frame to frame: the rest is for making them, and for
   // the passes.

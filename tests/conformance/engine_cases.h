@@ -30,7 +30,7 @@ inline std::vector<EngineCase> EngineCases() {
          [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
          }},
-        // With no list of lines; and with none that stays.
+        // With no list at all; and with none that stays.
         {"cuda_tight",
          [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0, .index_bytes = 1});
@@ -50,7 +50,7 @@ inline std::vector<EngineCase> EngineCases() {
          [](const EngineOptions& options) {
            return CreateCudaEngine(options, "a test", {}, {.few_items = 0});
          }},
-    // With no list of lines; and with none that stays.
+    // With no list at all; and with none that stays.
 #if !defined(VOXELD_TEST_SIMT_FEW)
         {"cuda_simt_tight",
          [](const EngineOptions& options) {
