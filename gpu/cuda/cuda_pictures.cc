@@ -28,6 +28,8 @@ absl::StatusOr<std::unique_ptr<CudaPictures>> CudaPictures::Make(
 }
 
 CudaPictures::~CudaPictures() {
+  // After an error kernels may be under way that write to what is freed here.
+  for (cudaStream_t stream : {device_.beside(), device_.stream()}) cudaStreamSynchronize(stream);
   for (cudaEvent_t event : events_) cudaEventDestroy(event);
   if (numbers_ != nullptr) cudaFreeHost(numbers_);
   if (counters_ != nullptr) cudaFreeHost(counters_);
