@@ -59,9 +59,9 @@ class CudaPictures {
 
   // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
   // all is there. Draws each group of slices before, where pictures are packed as they are drawn, else
-  // group 0 as that of all; sets the marks. `result` gets what was
-  // counted, of which nothing is left on the device. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
-  // or older; what was drawn is told with the next one.
+  // group 0 as that of all; sets the marks. `result` gets what was counted, of which nothing is left on
+  // the device. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
+  // or older; what was drawn may be told by the next one, or, if all of it was, by none.
   absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
                     uint64_t buffer_holds, bool together, const Drawing& drawing,
                     Stopwatch& stopwatch, FrameResult& result);
@@ -82,8 +82,8 @@ class CudaPictures {
   absl::Status QueueGroups(const VolumeView& volume, uint64_t frame, std::span<const Range> ranges,
                            const Drawing& drawing, Stopwatch& stopwatch);
   absl::Status CopyGroups(std::span<const Range> ranges, FrameBuffer buffer, uint64_t buffer_holds);
-  // `stream` goes on after what events_[event] has been recorded behind.
   absl::Status Record(size_t event, cudaStream_t stream);
+  // `stream` goes on after what events_[event] has been recorded behind.
   absl::Status Await(size_t event, cudaStream_t stream);
 
   absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);

@@ -200,8 +200,9 @@ struct RowBits {
 };
 
 // Of a row in shared memory, of which this lane alone sees to this one, while its warp sees to 32: each
-// begins with other voxels, so that they meet all banks. Pixels of row v % 8 have the least[v % 8].
-// `keep`: the words are wanted again. limit: voxels of it that there are.
+// begins with other voxels, so that they meet all banks. least:
+// PackedView::least of eight pixels of the row. `keep`: the words are wanted again. limit: voxels of it
+// that there are.
 template <typename Color>
 __device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint4 least[2],
                            bool keep, Color&& color) {

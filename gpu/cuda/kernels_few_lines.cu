@@ -11,19 +11,6 @@ namespace {
 constexpr uint32_t kThreads = kMostFewLines;  // a line each
 constexpr uint32_t kAll = 0xFFFFFFFFu;
 
-// f(box, region, k, end) for each region of those drawn that the line has voxels in.
-__device__ void WalkRegions(const RegionGrid& grid, const ThinLine& line, auto&& f) {
-  if (line.word == 0) return;
-  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
-  int32_t begin[3];
-  for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
-  WalkThin(line, 0, begin, bits, [&](const int32_t box[3], int32_t k, int32_t end) {
-    const int32_t block[3] = {box[0] >> kBlockBits, box[1] >> kBlockBits, box[2] >> kBlockBits};
-    if (grid.DrawsBlock(block)) f(box, grid.RegionAt(box), k, end);
-    return true;
-  });
-}
-
 // counts[r] becomes the sum of those before; returns the sum of all.
 __device__ uint32_t SumCounts(uint32_t* counts, uint32_t regions) {
   using Scan = cub::BlockScan<uint32_t, kThreads>;

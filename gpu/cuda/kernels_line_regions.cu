@@ -7,16 +7,8 @@ namespace {
 
 // f(region) for each that a line touches.
 __device__ void ForRegions(const ThinLine& at, const RegionGrid& grid, auto&& f) {
-  const ThinLine line = LoadLine(&at);
-  if (line.word == 0) return;
-  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
-  int32_t begin[3];
-  for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
-  WalkThin(line, 0, begin, bits, [&](const int32_t box[3], int32_t, int32_t) {
-    const int32_t block[3] = {box[0] >> kBlockBits, box[1] >> kBlockBits, box[2] >> kBlockBits};
-    if (grid.DrawsBlock(block)) f(grid.RegionAt(box));
-    return true;
-  });
+  WalkRegions(grid, LoadLine(&at),
+              [&](const int32_t[3], uint32_t region, int32_t, int32_t) { f(region); });
 }
 
 __global__ void MarkRegionsKernel(const uint64_t* regions, uint32_t blocks, uint8_t* dirty) {

@@ -19,6 +19,19 @@ __device__ inline ThinLine LoadLine(const ThinLine* line) {
   return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w)};
 }
 
+// f(box, region, k, end) for each region of those drawn that the line has voxels in.
+__device__ void WalkRegions(const RegionGrid& grid, const ThinLine& line, auto&& f) {
+  if (line.word == 0) return;
+  const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
+  int32_t begin[3];
+  for (int a = 0; a < 3; ++a) begin[a] = line.s[a] >> (8 + bits[a]);
+  WalkThin(line, 0, begin, bits, [&](const int32_t box[3], int32_t k, int32_t end) {
+    const int32_t block[3] = {box[0] >> kBlockBits, box[1] >> kBlockBits, box[2] >> kBlockBits};
+    if (grid.DrawsBlock(block)) f(box, grid.RegionAt(box), k, end);
+    return true;
+  });
+}
+
 // Line `i` of the rows.
 __device__ inline uint64_t LineAt(const ItemList& list, uint64_t i) {
   const uint32_t d = DrawableOf(list, i);

@@ -28,8 +28,8 @@ struct PackedPlan {
   static constexpr int32_t kGroupGrain = 16;
   static constexpr int32_t kMostGroups = 8;
 
-  // Of slices [begin, end), in `most_groups` at most. Nothing if pixels are not voxels, or if bit planes' tone is not
-  // monotonic.
+  // Of slices [begin, end), in `most_groups` at most. Nothing if pixels are not voxels, or if bit
+  // planes' tone is not monotonic.
   static std::optional<PackedPlan> Of(const display::FootprintTable& table,
                                       const display::VoxelGrid& grid,
                                       const display::FrameLayout& layout, const display::Tone& tone,
