@@ -25,13 +25,13 @@ uint64_t IndexBytes(const Tuning& tuning, const cudaDeviceProp& device) {
 CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
     : device_(device),
       uploader_(uploader),
-      index_(device),
-      line_lists_(device.pool(), IndexBytes(tuning, device.api().device())),
-      lines_(
-          device, line_lists_,
-          static_cast<uint64_t>(static_cast<double>(line_lists_.limit()) * tuning.index_share_kept),
-          tuning.few_lines),
-      triangles_(device) {}
+      list_budget_{
+          Pool(device.pool(), IndexBytes(tuning, device.api().device())),
+          static_cast<uint64_t>(static_cast<double>(IndexBytes(tuning, device.api().device())) *
+                                tuning.index_share_kept)},
+      index_(device, list_budget_),
+      lines_(device, list_budget_, tuning.few_lines),
+      triangles_(device, list_budget_) {}
 
 // ------------------------------------------------------------------------------------------- tiles
 
@@ -208,6 +208,7 @@ absl::Status CudaVolume::MarkLeft() {
   }
   if (left_.empty()) return absl::OkStatus();
   if (absl::Status status = KillPairs(); !status.ok()) return status;
+  index_.Forget(left_);
   absl::Status status;
   for (RegionIndex* index : {&IndexOf(IndexedBy::kLines), &IndexOf(IndexedBy::kTriangles)}) {
     if (status = index->Drop(left_); !status.ok()) return status;
@@ -234,13 +235,25 @@ absl::Status CudaVolume::MarkLeft() {
   kept_.clear();
   if (dead_items_ + dead_slots_.size() > live_items_ + kSpareItems) {
     status = index_.DropDead(table_.as<TableEntry>(), tiles_.grid.count());
-    if (absl::IsResourceExhausted(status)) return absl::OkStatus();  // later, then
-    if (!status.ok()) return status;
+    if (absl::IsResourceExhausted(status)) {
+      DeferPairs();  // which leaves the room that there is
+    } else if (!status.ok()) {
+      return status;
+    }
     free_slots_.insert(free_slots_.end(), dead_slots_.begin(), dead_slots_.end());
     dead_slots_.clear();
     dead_items_ = 0;
   }
   return absl::OkStatus();
+}
+
+void CudaVolume::DeferPairs() {
+  std::vector<PairedDrawable> drawables;
+  for (const auto& [drawable, slot] : slot_of_) {
+    if (slots_[slot].indexed_by != IndexedBy::kPairs) continue;
+    drawables.push_back({slot, layer_slots_.at(drawable->layer->record.id), slots_[slot].items});
+  }
+  index_.Defer(std::move(drawables));
 }
 
 DrawView CudaVolume::ViewForDrawing() const {
@@ -274,13 +287,14 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
   keep_visible(view.lines);
   keep_visible(view.triangles);
   view.clipped = !layers.empty() && looks_now_[*layers.begin()].half_spaces != 0;
-  const auto* const lines = view.lines.batches;
-  const bool listed = std::none_of(lines, lines + view.lines.count, [](const LineBatchView& batch) {
-    return batch.lists.spans == nullptr;
-  });
-  const auto draw = view.pairs.count > 0 || !listed ? DrawAll
-                    : plain && layers.size() <= 1   ? DrawOneLayer
-                                                    : DrawLines;
+  bool any = view.pairs.count > 0 || view.unlisted.items > 0;
+  for (uint32_t b = 0; b < view.lines.count; ++b) {
+    any |= view.lines.batches[b].lists.spans == nullptr;
+  }
+  for (uint32_t b = 0; b < view.triangles.count; ++b) {
+    any |= view.triangles.batches[b].begin == nullptr;
+  }
+  const auto draw = any ? DrawAll : plain && layers.size() <= 1 ? DrawOneLayer : DrawLines;
   return device_.Run("DrawRegions", [&] {
     return draw(view, to, static_cast<uint32_t>(device_.api().device().multiProcessorCount),
                 stream);
@@ -300,8 +314,10 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
   if (absl::Status status = lines_.Merge(); !status.ok()) return status;
   if (absl::Status status = lines_.SortDeferred(); !status.ok()) return status;
   if (absl::Status status = triangles_.Merge(); !status.ok()) return status;
+  if (absl::Status status = triangles_.SortDeferred(); !status.ok()) return status;
   const VolumeView volume = tiles_.view();
-  absl::Status status;
+  absl::Status status = index_.AddDeferred(table_.as<TableEntry>(), volume);
+  if (!status.ok()) return status;
   if (listed_) {
     status = device_.Run("cudaMemcpyAsync", [&] {
       return cudaMemcpyAsync(volume.dirty, volume.owned, volume.grid.count(),

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -23,8 +24,8 @@
 #include "gpu/cuda/device.h"
 #include "gpu/cuda/draw_types.h"
 #include "gpu/cuda/line_index.h"
+#include "gpu/cuda/list_budget.h"
 #include "gpu/cuda/pair_index.h"
-#include "gpu/cuda/pool.h"
 #include "gpu/cuda/triangle_index.h"
 #include "gpu/cuda/tuning.h"
 #include "gpu/cuda/types.h"
@@ -76,7 +77,7 @@ class CudaVolume final : private SceneObserver {
   // what Prepare has queued.
   absl::Status Prepare(const DrawGroups& groups);
   bool DrawsApart() const {
-    return lines_.CountDeferred([](uint32_t) { return true; }) == 0;
+    return CountDeferred([](uint32_t) { return true; }) == 0;
   }
   absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed,
                          cudaStream_t stream);
@@ -133,11 +134,20 @@ class CudaVolume final : private SceneObserver {
     uint32_t regions_each = 0;
   };
   absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving);
-  absl::Status EnterPairs(std::span<const uint32_t> slots);
+  absl::Status EnterPairs(std::span<const PairedDrawable> drawables);
+  // Puts off all that the index of pairs has.
+  void DeferPairs();
   DrawView ViewForDrawing() const;
   // The regions that `view` lists.
   absl::Status DrawListed(DrawView& view, DrawTo to, cudaStream_t stream);
-  absl::Status DrawInPasses(const DrawView& view, DrawTo to, const LineIndex::Seen& seen);
+  // The items, of layers for which seen(slot) is true, that have no lists.
+  using Seen = std::function<bool(uint32_t)>;
+  uint64_t CountDeferred(const Seen& seen) const;
+  absl::Status DrawInPasses(const DrawView& view, DrawTo to, const Seen& seen);
+  // Gives them lists of what `pass` draws. False if not all have: there was no room. Then only if
+  // `some` they can be drawn all the same.
+  absl::StatusOr<bool> SortPass(const RegionGrid& pass, const Seen& seen, bool some);
+  void EndPass();
   absl::Status Draw(DrawView& view, DrawTo to, cudaStream_t stream);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
@@ -154,15 +164,15 @@ class CudaVolume final : private SceneObserver {
   bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
   bool counted_ = true;  // the counters have begun
   DrawGroups groups_;    // of the frame under way
-  PairIndex index_;      // of all that the others do not have
-  Pool line_lists_;
+  ListBudget list_budget_;
+  PairIndex index_;  // of all that the others do not have
   LineIndex lines_;
-  // Of blocks of regions: a pass that failed last, with so many lines in it, halved. As many planes
-  // along z go in the next.
-  int32_t pass_planes_ = INT32_MAX;
-  uint64_t pass_lines_ = 0;
   bool lines_suit_ = false;  // the volume is not too large for them
   TriangleIndex triangles_;
+  // Of blocks of regions: a pass that failed last, with so many items without lists, halved. As many
+  // planes along z go in the next.
+  int32_t pass_planes_ = INT32_MAX;
+  uint64_t pass_items_ = 0;
 
   Block table_;
   std::vector<Slot> slots_;

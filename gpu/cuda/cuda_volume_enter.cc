@@ -202,11 +202,12 @@ absl::Status CudaVolume::Enter() {
     free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
     return status;
   }
-  std::vector<uint32_t> pairs;
-  for (const uint32_t slot : slots) {
-    if (slots_[slot].indexed_by != IndexedBy::kPairs) continue;
-    pairs.push_back(slot);
-    live_items_ += slots_[slot].items;
+  std::vector<PairedDrawable> pairs;
+  for (size_t i = 0; i < slots.size(); ++i) {
+    const Slot& slot = slots_[slots[i]];
+    if (slot.indexed_by != IndexedBy::kPairs) continue;
+    pairs.push_back({slots[i], entries[i].layer, slot.items});
+    live_items_ += slot.items;
   }
   absl::Status status = EnterPairs(pairs);
   if (status.ok()) status = EnterRegions(IndexedBy::kLines, drawables, slots);
@@ -222,13 +223,16 @@ absl::Status CudaVolume::Enter() {
   return absl::OkStatus();
 }
 
-absl::Status CudaVolume::EnterPairs(std::span<const uint32_t> slots) {
-  if (slots.empty()) return absl::OkStatus();
-  const absl::StatusOr<UploadedList> list =
-      UploadItems(device_, slots, [&](uint32_t slot) { return slots_[slot].items; });
-  if (!list.ok()) return list.status();
-  return index_.Add(table_.as<TableEntry>(), looks_.as<LayerLook>(), list->list, list->items,
-                    tiles_.view());
+absl::Status CudaVolume::EnterPairs(std::span<const PairedDrawable> drawables) {
+  if (drawables.empty()) return absl::OkStatus();
+  const absl::StatusOr<size_t> added =
+      index_.Add(table_.as<TableEntry>(), looks_.as<LayerLook>(), drawables, tiles_.view());
+  if (!added.ok()) return added.status();
+  std::vector<uint32_t> deferred;
+  for (const PairedDrawable& d : drawables.subspan(*added)) {
+    if (looks_now_[d.layer].visible != 0) deferred.push_back(d.slot);
+  }
+  return deferred.empty() ? absl::OkStatus() : MarkPairs(deferred);
 }
 
 // Layer by layer.

@@ -1,4 +1,4 @@
-// The drawing of regions while some lines have no lists: pass by pass, each with lists of what it draws.
+// The drawing of regions while some items have no lists: pass by pass, each with lists of what it draws.
 #include <algorithm>
 #include <utility>
 
@@ -18,16 +18,40 @@ int AxisToCut(const int32_t lo[3], const int32_t hi[3]) {
 
 }  // namespace
 
-absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to, cudaStream_t stream) {
-  const LineIndex::Seen seen = [&](uint32_t layer) { return looks_now_[layer].visible != 0; };
-  const uint64_t lines = lines_.CountDeferred(seen);
-  if (lines == 0) return Draw(view, to, stream);
-  if (lines < pass_lines_) pass_planes_ = INT32_MAX;
-  pass_lines_ = lines;
-  return DrawInPasses(view, to, seen);
+uint64_t CudaVolume::CountDeferred(const Seen& seen) const {
+  return index_.CountDeferred(seen) + lines_.CountDeferred(seen) + triangles_.CountDeferred(seen);
 }
 
-absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const LineIndex::Seen& seen) {
+absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to, cudaStream_t stream) {
+  const Seen seen = [&](uint32_t layer) { return looks_now_[layer].visible != 0; };
+  const uint64_t items = CountDeferred(seen);
+  if (items == 0) return Draw(view, to, stream);
+  if (items < pass_items_) pass_planes_ = INT32_MAX;
+  pass_items_ = items;
+  absl::Status status = index_.BeginPasses(seen);
+  if (status.ok()) status = DrawInPasses(view, to, seen);
+  EndPass();
+  index_.EndPasses();
+  return status;
+}
+
+absl::StatusOr<bool> CudaVolume::SortPass(const RegionGrid& pass, const Seen& seen, bool some) {
+  absl::StatusOr<bool> lines = lines_.SortWithin(pass, seen, some);
+  if (!lines.ok() || (!*lines && !some)) return lines;
+  absl::StatusOr<bool> triangles = triangles_.SortWithin(pass, seen, some);
+  if (!triangles.ok() || (!*triangles && !some)) return triangles;
+  absl::StatusOr<bool> pairs = index_.SortWithin(table_.as<TableEntry>(), tiles_.view(), pass);
+  if (!pairs.ok()) return pairs;
+  return *lines && *triangles && *pairs;
+}
+
+void CudaVolume::EndPass() {
+  lines_.EndPass();
+  triangles_.EndPass();
+  index_.EndPass();
+}
+
+absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Seen& seen) {
   const RegionGrid& regions = tiles_.regions;
   absl::StatusOr<Block> list = device_.pool().Acquire(regions.count() * sizeof(uint32_t));
   if (!list.ok()) return list.status();
@@ -57,9 +81,10 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Line
     std::copy_n(read->lo, 3, pass.drawn_lo);
     std::copy_n(read->hi, 3, pass.drawn_hi);
     const int axis = AxisToCut(pass.drawn_lo, pass.drawn_hi);
-    const absl::StatusOr<bool> sorted = lines_.SortWithin(pass, seen, axis < 0);
+    const absl::StatusOr<bool> sorted = SortPass(pass, seen, axis < 0);
     if (!sorted.ok()) return sorted.status();
     if (!*sorted && axis >= 0) {
+      EndPass();
       const int32_t half = (pass.drawn_hi[axis] - pass.drawn_lo[axis] + 1) / 2;
       if (axis == 2) pass_planes_ = half;
       left.insert(left.end(), 2, pass);
@@ -68,13 +93,16 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Line
       continue;
     }
     DrawView view = all;
+    view.pairs = index_.view();
+    view.unlisted = index_.unlisted();
     view.lines = lines_.view();
+    view.triangles = triangles_.view();
     view.list = list->as<uint32_t>();
     view.listed = &picked_there->count;
     view.taken = &picked_there->taken;
     status = Draw(view, to, device_.stream());
     // In the stream, who has the lists' memory next comes after the drawing.
-    lines_.EndPass();
+    EndPass();
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

@@ -10,7 +10,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// What a drawing has to reckon with: thin lines that have lists and small triangles, of one layer that
+// What a drawing has to reckon with: thin lines and small triangles that have lists, of one layer that
 // is seen as it is; of any layers; or anything.
 enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 
@@ -62,13 +62,16 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawS
       DrawSpans(batch, scratch);
     }
     for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
-      DrawTriangles(view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
+      DrawTriangles<kWhat != DrawWhat::kAll>(
+          view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
     }
     if constexpr (kWhat == DrawWhat::kAll) {
       if (scratch.pairs != 0) {
         for (uint32_t t = 0; t < kRegionTiles; ++t) {
           const uint32_t tile = place.TileOf(view.volume, t);
-          if (tile != kAllLanes) DrawPairs(view, t, tile, scratch, all.pairs);
+          if (tile == kAllLanes) continue;
+          DrawPairs(view, t, tile, scratch, all.pairs);
+          if (view.unlisted.items != 0) DrawUnlisted(view, tile, scratch, all.pairs);
         }
       }
     }
@@ -133,8 +136,8 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
           DrawSpans(view.lines.batches[b], scratch);
         }
         for (uint32_t b = 0; b < view.triangles.count; ++b) {
-          if (view.triangles.batches[b].Has(region)) {
-            DrawTriangles(view, b);
+          if (view.triangles.batches[b].Has<true>(region)) {
+            DrawTriangles<true>(view, b);
           }
         }
       }

@@ -27,12 +27,25 @@ struct ReadView {
   uint32_t* out = nullptr;
 };
 
+// Drawables whose items have no pairs where they are drawn: who draws looks through all of them.
+struct UnlistedItems {
+  const uint32_t* slots = nullptr;
+  const uint64_t* firsts = nullptr;  // as ItemList has them
+  const uint32_t* layers = nullptr;  // all that they are of
+  uint32_t count = 0, layer_count = 0;
+  uint64_t items = 0;
+
+  VOXELD_HD uint32_t slot(uint32_t i) const { return slots[i]; }
+  VOXELD_HD uint64_t first(uint32_t i) const { return firsts[i]; }
+};
+
 // Everything about drawing dirty regions.
 struct DrawView {
   const TableEntry* table = nullptr;
   const LayerLook* layers = nullptr;
   const VoxelHalfSpace* half_spaces = nullptr;
   BatchList pairs;
+  UnlistedItems unlisted;
   LineBatchList lines;
   TriangleBatchList triangles;
   VolumeView volume;
@@ -45,6 +58,7 @@ struct DrawView {
   ReadView read;
   bool clipped = true;  // of one layer alone: it has half-spaces
 };
+static_assert(sizeof(DrawView) <= 4096, "arguments have 4 KB");
 
 // Regions that were picked from a list: how many, and the box of their blocks.
 struct PickedRegions {

@@ -18,8 +18,9 @@ __device__ inline uint64_t Thread() {
   return static_cast<uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
 }
 
-// Which drawable of the list has item `i` of the row.
-__device__ inline uint32_t DrawableOf(const ItemList& list, uint64_t i) {
+// Which drawable of the list (ItemList, or of its kind) has item `i` of the row.
+template <typename List>
+__device__ uint32_t DrawableOf(const List& list, uint64_t i) {
   uint32_t low = 0, high = list.count;  // first(low) ≤ i < first(high)
   while (high - low > 1) {
     const uint32_t middle = low + (high - low) / 2;

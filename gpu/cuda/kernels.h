@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gpu/cuda/types.h"
+#include "gpu/cuda/line_types.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -32,11 +32,16 @@ cudaError_t CountTiles(const TableEntry* table, const ItemList& list, uint64_t b
 // offsets[i]: sum of counts[0..i), and of all at offsets[items]. `temp` null: only its size.
 cudaError_t SumCounts(void* temp, size_t& temp_bytes, const uint32_t* counts, uint64_t* offsets,
                       uint32_t items, cudaStream_t stream);
-// The pairs themselves; marks the tiles of drawables in visible layers.
+// The pairs themselves; marks the tiles of drawables in visible layers, unless volume.dirty is null.
 cudaError_t FillPairs(const TableEntry* table, const LayerLook* layers, const ItemList& list,
                       uint64_t begin, uint32_t items, const uint64_t* offsets,
                       const VolumeView& volume, uint64_t* keys, uint64_t* values,
                       cudaStream_t stream);
+// Pairs of items [begin, end) of the list and tiles in the blocks that `within` draws, in any order, of
+// those items for which there is room; *count grows by how many there are.
+cudaError_t AppendPairs(const TableEntry* table, const ItemList& list, uint64_t begin, uint64_t end,
+                        const VolumeView& volume, const RegionGrid& within, uint64_t* keys,
+                        uint64_t* values, uint64_t capacity, uint64_t* count, cudaStream_t stream);
 // flags[i] is 1 if pair i is of a drawable that is alive; then they can be summed by SumCounts.
 cudaError_t FlagLive(const TableEntry* table, const uint64_t* values, uint32_t pairs,
                      uint32_t* flags, cudaStream_t stream);

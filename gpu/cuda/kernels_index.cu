@@ -7,6 +7,7 @@
 
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/cuda/line_types.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
@@ -94,8 +95,41 @@ __global__ void FillPairsKernel(const TableEntry* table, const LayerLook* layers
              keys[at] = PairKey(tile, entry.layer);
              values[at] = PairValue(slot, item);
              ++at;
-             if (layers[entry.layer].visible != 0) volume.dirty[tile] = 1;
+             if (volume.dirty != nullptr && layers[entry.layer].visible != 0) {
+               volume.dirty[tile] = 1;
+             }
            });
+}
+
+__global__ void AppendPairsKernel(const TableEntry* table, ItemList list, uint64_t begin,
+                                  uint64_t end, VolumeView volume, RegionGrid within,
+                                  uint64_t* keys, uint64_t* values, uint64_t capacity,
+                                  unsigned long long* count) {
+  const uint64_t stride = static_cast<uint64_t>(gridDim.x) * blockDim.x;
+  const auto drawn = [&](uint32_t tile) {
+    int32_t at[3];
+    volume.grid.Coordinates(tile, at);
+    for (int a = 0; a < 3; ++a) at[a] = at[a] * kTileSize >> (RegionBits(a) + kBlockBits);
+    return within.DrawsBlock(at);
+  };
+  for (uint64_t i = begin + Thread(); i < end; i += stride) {
+    // Room is taken once for all of an item: of additions made one by one within the walk, and
+    // gathered for the threads of a warp by CUDA 13.0's compiler, some are lost.
+    unsigned long long pairs = 0;
+    ForTiles(table, list, i, volume,
+             [&](uint32_t, const TableEntry&, uint32_t, uint32_t tile) { pairs += drawn(tile); });
+    if (pairs == 0) continue;
+    uint64_t place = atomicAdd(count, pairs);
+    const uint64_t all = place + pairs;
+    if (all > capacity) continue;
+    ForTiles(table, list, i, volume,
+             [&](uint32_t slot, const TableEntry& entry, uint32_t item, uint32_t tile) {
+               if (!drawn(tile)) return;
+               keys[place] = PairKey(tile, entry.layer);
+               values[place] = PairValue(slot, item);
+               ++place;
+             });
+  }
 }
 
 __global__ void FlagLiveKernel(const TableEntry* table, const uint64_t* values, uint32_t pairs,
@@ -133,6 +167,12 @@ __global__ void FindRowsKernel(const uint64_t* keys, uint32_t pairs, uint32_t ti
   row_begin[tile] = low;
 }
 
+// For threads that take items in turn.
+uint32_t SomeBlocks(uint64_t items) {
+  constexpr uint64_t kMostBlocks = 1 << 16;
+  return static_cast<uint32_t>(Min((items + kThreads - 1) / kThreads, kMostBlocks));
+}
+
 }  // namespace
 
 cudaError_t PutEntries(TableEntry* table, const TableEntry* entries, const uint32_t* slots,
@@ -159,10 +199,16 @@ cudaError_t Kill(TableEntry* table, const uint32_t* slots, uint32_t count, cudaS
 
 cudaError_t MarkTiles(const TableEntry* table, const ItemList& list, uint64_t items,
                       const VolumeView& volume, cudaStream_t stream) {
-  constexpr uint64_t kMostBlocks = 1 << 16;
-  const uint64_t blocks = (items + kThreads - 1) / kThreads;
-  MarkTilesKernel<<<static_cast<uint32_t>(Min(blocks, kMostBlocks)), kThreads, 0, stream>>>(
-      table, list, items, volume);
+  MarkTilesKernel<<<SomeBlocks(items), kThreads, 0, stream>>>(table, list, items, volume);
+  return cudaGetLastError();
+}
+
+cudaError_t AppendPairs(const TableEntry* table, const ItemList& list, uint64_t begin, uint64_t end,
+                        const VolumeView& volume, const RegionGrid& within, uint64_t* keys,
+                        uint64_t* values, uint64_t capacity, uint64_t* count, cudaStream_t stream) {
+  AppendPairsKernel<<<SomeBlocks(end - begin), kThreads, 0, stream>>>(
+      table, list, begin, end, volume, within, keys, values, capacity,
+      reinterpret_cast<unsigned long long*>(count));
   return cudaGetLastError();
 }
 

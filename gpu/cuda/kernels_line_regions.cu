@@ -28,13 +28,7 @@ __global__ void FindRegionsKernel(const ThinLine* lines, uint32_t count, RegionG
                                   uint64_t* regions) {
   const uint64_t i = Thread();
   if (i >= count) return;
-  ForRegions(lines[i], grid, [&](uint32_t region) {
-    uint64_t& bits = regions[region / kRegionsInBlock];
-    const uint64_t bit = uint64_t{1} << region % kRegionsInBlock;
-    // Most have been found before; one that is not seen to be is found once more.
-    if ((*static_cast<const volatile uint64_t*>(&bits) & bit) != 0) return;
-    atomicOr(reinterpret_cast<unsigned long long*>(&bits), static_cast<unsigned long long>(bit));
-  });
+  ForRegions(lines[i], grid, [&](uint32_t region) { SetRegion(regions, region); });
 }
 
 __global__ void KillLinesKernel(ItemList list, uint32_t count, LineArrays of) {

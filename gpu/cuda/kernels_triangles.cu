@@ -1,7 +1,7 @@
 // Small triangles: made from drawables' items, and sorted by region.
 #include <cub/block/block_scan.cuh>
 
-#include "gpu/cuda/items-inl.h"
+#include "gpu/cuda/lines-inl.h"
 #include "gpu/cuda/triangle_kernels.h"
 #include "gpu/primitives/triangles.h"
 #include "gpu/word.h"
@@ -164,6 +164,13 @@ __global__ void __launch_bounds__(kScanThreads) SumRegionsKernel(TriangleSort so
 }
 static_assert(kRegionsInBlock % kScanEach == 0);
 
+__global__ void FindTriangleRegionsKernel(const CompactTriangle* triangles, uint32_t count,
+                                          RegionGrid grid, uint64_t* regions) {
+  const uint64_t i = Thread();
+  if (i >= count) return;
+  ForRegions(Load(&triangles[i]), grid, [&](uint32_t region) { SetRegion(regions, region); });
+}
+
 __global__ void MarkFilledKernel(const uint32_t* begin, uint32_t regions, uint8_t* dirty) {
   const uint64_t r = Thread();
   if (r < regions && begin[r] != begin[r + 1]) dirty[r] = 1;
@@ -217,6 +224,13 @@ cudaError_t CountTriangles(const TriangleSort& sort, const CompactTriangle* tria
 cudaError_t FillTriangles(const TriangleSort& sort, const CompactTriangle* triangles,
                           uint32_t count, cudaStream_t stream) {
   FillTrianglesKernel<<<Blocks(count), kThreads, 0, stream>>>(sort, triangles, count);
+  return cudaGetLastError();
+}
+
+cudaError_t FindTriangleRegions(const CompactTriangle* triangles, uint32_t count,
+                                const RegionGrid& grid, uint64_t* regions, cudaStream_t stream) {
+  FindTriangleRegionsKernel<<<Blocks(count), kThreads, 0, stream>>>(triangles, count, grid,
+                                                                    regions);
   return cudaGetLastError();
 }
 

@@ -92,7 +92,7 @@ absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, b
   if (!zeros.ok()) return zeros.status();
   regions = *std::move(zeros);
   for (const Wanted& want : wanted) {
-    absl::StatusOr<Block> block = lists_.Acquire(std::max<size_t>(1, want.bytes));
+    absl::StatusOr<Block> block = lists().Acquire(std::max<size_t>(1, want.bytes));
     if (!block.ok()) return block.status();
     *want.block = *std::move(block);
   }
@@ -140,7 +140,7 @@ absl::Status LineIndex::SortFew(Batch& batch, uint64_t most_spans, uint8_t* regi
       {&batch.spans, most_spans * sizeof(LineSpan)}};
   batch.list_bytes = 0;
   for (const auto& [block, bytes] : wanted) {
-    absl::StatusOr<Block> taken = lists_.Acquire(bytes);
+    absl::StatusOr<Block> taken = lists().Acquire(bytes);
     if (!taken.ok()) return taken.status();
     *block = *std::move(taken);
     batch.list_bytes += bytes;
@@ -163,7 +163,6 @@ absl::Status LineIndex::SortFew(Batch& batch, uint64_t most_spans, uint8_t* regi
   });
 }
 
-// As fast as it goes, in as much memory as that takes.
 absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   const uint64_t most_pieces = uint64_t{batch.count} * MostBoxes(grid().blocks, 0);
   const uint64_t most_spans = uint64_t{batch.count} * MostBoxes(grid().blocks, kBlockBits);
@@ -200,10 +199,13 @@ absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   }
 }
 
-// In as little memory as it goes: first the pieces are counted. Of sort, `grid` and `dirty` are given.
-absl::Status LineIndex::SortExactly(Batch& batch, Block& regions, LineSort& sort) {
+// First the pieces are counted.
+absl::Status LineIndex::SortExactly(Batch& batch, Block& regions, const RegionGrid& within,
+                                    uint8_t* region_dirty) {
+  LineSort sort;
+  sort.grid = within;
+  sort.dirty = region_dirty;
   uint32_t needed[2] = {};
-  sort.piece_capacity = sort.span_capacity = 0;
   absl::Status status = SortInto(batch, regions, sort, true, needed);
   if (!status.ok() || needed[0] == 0) return status;
   sort.piece_capacity = needed[0];
@@ -219,102 +221,6 @@ absl::Status LineIndex::SortExactly(Batch& batch, Block& regions, LineSort& sort
   return SortInto(batch, regions, sort, true, needed);
 }
 
-absl::Status LineIndex::Sort(Batch& batch, uint8_t* region_dirty) {
-  const auto over = [&](const absl::Status& status) {
-    return absl::IsResourceExhausted(status) || (status.ok() && lists_.used() > most_kept_);
-  };
-  absl::Status status = SortAll(batch, region_dirty);
-  if (over(status)) {
-    DropLists(batch);
-    LineSort sort;
-    sort.grid = grid();
-    sort.dirty = region_dirty;
-    status = SortExactly(batch, batch.regions, sort);
-  }
-  batch.deferred = over(status);
-  return batch.deferred ? Defer(batch, region_dirty) : status;
-}
-
-// ----------------------------------------------------------------------------------- deferred batches
-
-absl::Status LineIndex::Defer(Batch& batch, uint8_t* region_dirty) {
-  DropLists(batch);
-  const size_t blocks = grid().block_count();
-  batch.regions = Block();
-  absl::StatusOr<Block> regions = device().Zeros(blocks * sizeof(uint64_t));
-  if (!regions.ok()) return regions.status();
-  batch.regions = *std::move(regions);
-  absl::Status status = device().Run("FindRegions", [&] {
-    return FindRegions(Arrays(batch).lines, batch.count, grid(), batch.regions.as<uint64_t>(),
-                       device().stream());
-  });
-  return status.ok() && region_dirty != nullptr ? MarkAll(batch, region_dirty) : status;
-}
-
-absl::Status LineIndex::SortDeferred() {
-  if (lists_.used() < used_) {
-    for (auto& [number, batch] : batches()) {
-      if (!batch.deferred || lists_.used() + batch.list_bytes > most_kept_ ||
-          lists_.used() + batch.sort_bytes > lists_.limit()) {
-        continue;
-      }
-      Block regions;
-      LineSort sort;
-      sort.grid = grid();
-      const absl::Status status = SortExactly(batch, regions, sort);
-      if (status.ok() && lists_.used() <= most_kept_) {
-        batch.regions = std::move(regions);
-        batch.deferred = false;
-        continue;
-      }
-      DropLists(batch);
-      if (!status.ok() && !absl::IsResourceExhausted(status)) return status;
-    }
-  }
-  used_ = lists_.used();
-  return absl::OkStatus();
-}
-
-uint64_t LineIndex::CountDeferred(const Seen& seen) const {
-  uint64_t lines = 0;
-  for (const auto& [number, batch] : batches()) {
-    if (batch.deferred && seen(batch.layer)) lines += batch.count;
-  }
-  return lines;
-}
-
-absl::StatusOr<bool> LineIndex::SortWithin(const RegionGrid& within, const Seen& seen, bool some) {
-  bool all = true;
-  for (auto& [number, batch] : batches()) {
-    if (!batch.deferred || !seen(batch.layer)) continue;
-    Block regions;  // the batch's own say more
-    LineSort sort;
-    sort.grid = within;
-    for (int a = 0; a < 3; ++a) {
-      sort.grid.drawn_lo[a] = std::max(within.drawn_lo[a], grid().drawn_lo[a]);
-      sort.grid.drawn_hi[a] = std::min(within.drawn_hi[a], grid().drawn_hi[a]);
-    }
-    const uint64_t list_bytes = batch.list_bytes, sort_bytes = batch.sort_bytes;
-    const absl::Status status = SortExactly(batch, regions, sort);
-    batch.list_bytes = list_bytes;
-    batch.sort_bytes = sort_bytes;
-    if (status.ok()) continue;
-    DropLists(batch);
-    all = false;
-    if (!absl::IsResourceExhausted(status)) return status;
-    if (some) continue;
-    EndPass();
-    return false;
-  }
-  return all;
-}
-
-void LineIndex::EndPass() {
-  for (auto& [number, batch] : batches()) {
-    if (batch.deferred) DropLists(batch);
-  }
-}
-
 // ------------------------------------------------------------------------------------------ items
 
 absl::Status LineIndex::Make(const TableEntry* table, const ItemList& list, const Batch& batch) {
@@ -328,6 +234,12 @@ absl::Status LineIndex::Copy(const ItemList& list, uint64_t first, uint32_t coun
   return device().Run("CopyLines", [&] {
     return CopyLines(list, first, count, Arrays(from), Ends(from), Arrays(to), Ends(to),
                      device().stream());
+  });
+}
+
+absl::Status LineIndex::FindRegions(const Batch& batch, uint64_t* regions) {
+  return device().Run("FindRegions", [&] {
+    return cuda::FindRegions(Arrays(batch).lines, batch.count, grid(), regions, device().stream());
   });
 }
 

@@ -143,7 +143,10 @@ struct LineBatchView {
   uint32_t count = 0;              // lines
   SpanLists lists;
 
-  VOXELD_HD bool Has(uint32_t region) const { return lists.Has(region); }
+  template <bool>
+  VOXELD_HD bool Has(uint32_t region) const {
+    return lists.Has(region);
+  }
 };
 
 inline constexpr uint32_t kMaxLineBatches = 24;

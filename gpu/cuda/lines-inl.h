@@ -32,6 +32,15 @@ __device__ void WalkRegions(const RegionGrid& grid, const ThinLine& line, auto&&
   });
 }
 
+// A region's bit, by block as SpanLists has them.
+__device__ inline void SetRegion(uint64_t* regions, uint32_t region) {
+  uint64_t& bits = regions[region / kRegionsInBlock];
+  const uint64_t bit = uint64_t{1} << region % kRegionsInBlock;
+  // Most have been set before; one that is not seen to be is set once more.
+  if ((*static_cast<const volatile uint64_t*>(&bits) & bit) != 0) return;
+  atomicOr(reinterpret_cast<unsigned long long*>(&bits), static_cast<unsigned long long>(bit));
+}
+
 // Line `i` of the rows.
 __device__ inline uint64_t LineAt(const ItemList& list, uint64_t i) {
   const uint32_t d = DrawableOf(list, i);

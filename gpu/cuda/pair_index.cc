@@ -4,27 +4,39 @@
 #include <bit>
 #include <utility>
 
+#include "absl/container/flat_hash_set.h"
 #include "gpu/cuda/kernels.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
 
-constexpr uint32_t kLeastPass = 1024;        // items
-constexpr uint64_t kMostPairs = 1ull << 31;  // of a batch
+constexpr uint32_t kMostPass = 1u << 22, kLeastPass = 1024;  // items
+constexpr uint64_t kMostPairs = 1ull << 31;                  // of a batch
 
 }  // namespace
 
+void PairIndex::Defer(std::vector<PairedDrawable> drawables) {
+  batches_.clear();
+  deferred_ = std::move(drawables);
+  skip_ = 0;
+  used_ = UINT64_MAX;  // there is room now
+}
+
 BatchList PairIndex::view() const {
   BatchList list;
-  for (const Batch& batch : batches_) {
+  const auto add = [&](const Batch& batch) {
     list.batches[list.count++] = {batch.keys.as<uint64_t>(), batch.values.as<uint64_t>(),
                                   batch.rows.as<uint32_t>()};
-  }
+  };
+  for (const Batch& batch : batches_) add(batch);
+  if (pass_) add(*pass_);
   return list;
 }
 
+// ------------------------------------------------------------------------------------------ sorting
+
 absl::StatusOr<Block> PairIndex::Sums(const uint32_t* counts, uint32_t items) {
-  absl::StatusOr<Block> sums = device_.pool().Acquire((size_t{items} + 1) * sizeof(uint64_t));
+  absl::StatusOr<Block> sums = lists_.pool.Acquire((size_t{items} + 1) * sizeof(uint64_t));
   if (!sums.ok()) return sums;
   size_t temp_bytes = 0;
   const auto sum = [&](void* temp) {
@@ -33,33 +45,45 @@ absl::StatusOr<Block> PairIndex::Sums(const uint32_t* counts, uint32_t items) {
     });
   };
   if (absl::Status status = sum(nullptr); !status.ok()) return status;
-  absl::StatusOr<Block> temp = device_.pool().Acquire(temp_bytes);
+  absl::StatusOr<Block> temp = lists_.pool.Acquire(temp_bytes);
   if (!temp.ok()) return temp;
   if (absl::Status status = sum(temp->as<void>()); !status.ok()) return status;
   return sums;
 }
 
-absl::StatusOr<PairIndex::Batch> PairIndex::Sorted(Block keys, Block values, Block keys2,
-                                                   Block values2, uint32_t pairs, uint32_t tiles) {
+absl::StatusOr<PairIndex::Arrays> PairIndex::ArraysFor(uint64_t pairs) {
+  if (pairs > kMostPairs) {
+    return absl::ResourceExhaustedError("one pass over the scene has too many pairs");
+  }
+  Arrays arrays;
+  for (Block* array : {&arrays.keys, &arrays.values, &arrays.keys2, &arrays.values2}) {
+    absl::StatusOr<Block> made = lists_.pool.Acquire(pairs * sizeof(uint64_t));
+    if (!made.ok()) return made.status();
+    *array = *std::move(made);
+  }
+  return arrays;
+}
+
+absl::StatusOr<PairIndex::Batch> PairIndex::Sorted(Arrays arrays, uint32_t pairs, uint32_t tiles) {
   const int key_bits = static_cast<int>(kLayerBits) + std::bit_width(tiles);
   size_t temp_bytes = 0;
   bool swapped = false;
   const auto sort = [&](void* temp) {
     return device_.Run("SortPairs", [&] {
-      return SortPairs(temp, temp_bytes, keys.as<uint64_t>(), keys2.as<uint64_t>(),
-                       values.as<uint64_t>(), values2.as<uint64_t>(), pairs, key_bits, swapped,
-                       device_.stream());
+      return SortPairs(temp, temp_bytes, arrays.keys.as<uint64_t>(), arrays.keys2.as<uint64_t>(),
+                       arrays.values.as<uint64_t>(), arrays.values2.as<uint64_t>(), pairs, key_bits,
+                       swapped, device_.stream());
     });
   };
   if (absl::Status status = sort(nullptr); !status.ok()) return status;
-  absl::StatusOr<Block> temp = device_.pool().Acquire(temp_bytes);
+  absl::StatusOr<Block> temp = lists_.pool.Acquire(temp_bytes);
   if (!temp.ok()) return temp.status();
   if (absl::Status status = sort(temp->as<void>()); !status.ok()) return status;
   Batch batch;
   batch.pairs = pairs;
-  batch.keys = swapped ? std::move(keys2) : std::move(keys);
-  batch.values = swapped ? std::move(values2) : std::move(values);
-  absl::StatusOr<Block> rows = device_.pool().Acquire((size_t{tiles} + 1) * sizeof(uint32_t));
+  batch.keys = std::move(swapped ? arrays.keys2 : arrays.keys);
+  batch.values = std::move(swapped ? arrays.values2 : arrays.values);
+  absl::StatusOr<Block> rows = lists_.pool.Acquire((size_t{tiles} + 1) * sizeof(uint32_t));
   if (!rows.ok()) return rows.status();
   absl::Status status = device_.Run("FindRows", [&] {
     return FindRows(batch.keys.as<uint64_t>(), pairs, tiles, rows->as<uint32_t>(),
@@ -70,15 +94,14 @@ absl::StatusOr<PairIndex::Batch> PairIndex::Sorted(Block keys, Block values, Blo
   return batch;
 }
 
-absl::Status PairIndex::AddPass(const TableEntry* table, const LayerLook* looks,
-                                const ItemList& list, uint64_t begin, uint32_t items,
-                                const VolumeView& volume) {
-  absl::Status status;
-  if (batches_.size() == kMaxBatches) status = MergeFrom(0, table, volume.grid.count());
-  if (!status.ok()) return status;
-  absl::StatusOr<Block> counts = device_.pool().Acquire(items * sizeof(uint32_t));
+// ------------------------------------------------------------------------------------------ changes
+
+absl::StatusOr<PairIndex::Batch> PairIndex::Paired(const TableEntry* table, const LayerLook* looks,
+                                                   const ItemList& list, uint64_t begin,
+                                                   uint32_t items, const VolumeView& volume) {
+  absl::StatusOr<Block> counts = lists_.pool.Acquire(items * sizeof(uint32_t));
   if (!counts.ok()) return counts.status();
-  status = device_.Run("CountTiles", [&] {
+  absl::Status status = device_.Run("CountTiles", [&] {
     return CountTiles(table, list, begin, items, volume, counts->as<uint32_t>(), device_.stream());
   });
   if (!status.ok()) return status;
@@ -86,62 +109,129 @@ absl::Status PairIndex::AddPass(const TableEntry* table, const LayerLook* looks,
   if (!offsets.ok()) return offsets.status();
   const absl::StatusOr<uint64_t> pairs = device_.Read(offsets->as<uint64_t>() + items);
   if (!pairs.ok()) return pairs.status();
-  if (*pairs == 0) return absl::OkStatus();
-  if (*pairs > kMostPairs) {
-    return absl::ResourceExhaustedError("one pass over the scene has too many pairs");
-  }
-  Block arrays[4];
-  for (Block& array : arrays) {
-    absl::StatusOr<Block> made = device_.pool().Acquire(*pairs * sizeof(uint64_t));
-    if (!made.ok()) return made.status();
-    array = *std::move(made);
-  }
+  if (*pairs == 0) return Batch();
+  absl::StatusOr<Arrays> arrays = ArraysFor(*pairs);
+  if (!arrays.ok()) return arrays.status();
+  VolumeView marked = volume;
+  if (looks == nullptr) marked.dirty = nullptr;
   status = device_.Run("FillPairs", [&] {
-    return FillPairs(table, looks, list, begin, items, offsets->as<uint64_t>(), volume,
-                     arrays[0].as<uint64_t>(), arrays[1].as<uint64_t>(), device_.stream());
+    return FillPairs(table, looks, list, begin, items, offsets->as<uint64_t>(), marked,
+                     arrays->keys.as<uint64_t>(), arrays->values.as<uint64_t>(), device_.stream());
   });
   if (!status.ok()) return status;
-  absl::StatusOr<Batch> batch =
-      Sorted(std::move(arrays[0]), std::move(arrays[1]), std::move(arrays[2]), std::move(arrays[3]),
-             static_cast<uint32_t>(*pairs), volume.grid.count());
-  if (!batch.ok()) return batch.status();
-  batches_.push_back(*std::move(batch));
+  return Sorted(*std::move(arrays), static_cast<uint32_t>(*pairs), volume.grid.count());
+}
+
+absl::Status PairIndex::AddPass(const TableEntry* table, const LayerLook* looks,
+                                const ItemList& list, uint64_t begin, uint32_t items,
+                                const VolumeView& volume) {
+  absl::Status status;
+  // One place is for a pass of drawing.
+  if (batches_.size() + 1 == kMaxBatches) status = MergeFrom(0, table, volume.grid.count());
+  if (!status.ok()) return status;
+  {
+    absl::StatusOr<Batch> batch = Paired(table, looks, list, begin, items, volume);
+    if (!batch.ok()) return batch.status();
+    if (batch->pairs == 0) return absl::OkStatus();
+    if (lists_.KeepsTooMuch()) {
+      return absl::ResourceExhaustedError("lists that stay have had their share of the budget");
+    }
+    batches_.push_back(*std::move(batch));
+  }
   return Merge(table, volume.grid.count());
 }
 
-absl::Status PairIndex::Add(const TableEntry* table, const LayerLook* looks, const ItemList& list,
-                            uint64_t items, const VolumeView& volume) {
-  for (uint64_t begin = 0; begin < items;) {
-    const auto pass = static_cast<uint32_t>(std::min<uint64_t>(pass_items_, items - begin));
-    const absl::Status status = AddPass(table, looks, list, begin, pass, volume);
-    if (absl::IsResourceExhausted(status) && pass > kLeastPass) {
-      pass_items_ = std::max(kLeastPass, pass / 4);
+absl::Status PairIndex::AddItems(const TableEntry* table, const LayerLook* looks,
+                                 const UploadedList& list, const VolumeView& volume,
+                                 uint64_t& begin) {
+  uint32_t most = kMostPass;
+  while (begin < list.items) {
+    const auto pass = static_cast<uint32_t>(std::min<uint64_t>(most, list.items - begin));
+    const absl::Status status = AddPass(table, looks, list.list, begin, pass, volume);
+    if (status.ok()) {
+      begin += pass;
       continue;
     }
-    if (!status.ok()) return status;
-    begin += pass;
+    if (!absl::IsResourceExhausted(status)) return status;
+    if (pass <= kLeastPass) break;
+    most = std::max(kLeastPass, pass / 4);
   }
   return absl::OkStatus();
+}
+
+namespace {
+
+absl::StatusOr<UploadedList> UploadDrawables(Device& device,
+                                             std::span<const PairedDrawable> drawables) {
+  std::vector<uint32_t> slots;
+  std::vector<uint64_t> firsts = {0};
+  for (const PairedDrawable& d : drawables) {
+    slots.push_back(d.slot);
+    firsts.push_back(firsts.back() + d.items);
+  }
+  return UploadList(device, slots, firsts);
+}
+
+// How many drawables have all their items among the first `items`; of which what is over is left.
+size_t CountWhole(std::span<const PairedDrawable> drawables, uint64_t& items) {
+  size_t whole = 0;
+  while (whole < drawables.size() && drawables[whole].items <= items) {
+    items -= drawables[whole++].items;
+  }
+  return whole;
+}
+
+}  // namespace
+
+absl::StatusOr<size_t> PairIndex::Add(const TableEntry* table, const LayerLook* looks,
+                                      std::span<const PairedDrawable> drawables,
+                                      const VolumeView& volume) {
+  const absl::StatusOr<UploadedList> list = UploadDrawables(device_, drawables);
+  if (!list.ok()) return list.status();
+  uint64_t done = 0;
+  if (absl::Status status = AddItems(table, looks, *list, volume, done); !status.ok()) {
+    return status;
+  }
+  const size_t whole = CountWhole(drawables, done);
+  // Of one behind others, whose part is there, the pairs come twice: that is drawn alike.
+  if (deferred_.empty()) skip_ = done;
+  deferred_.insert(deferred_.end(), drawables.begin() + static_cast<ptrdiff_t>(whole),
+                   drawables.end());
+  return whole;
+}
+
+absl::Status PairIndex::AddDeferred(const TableEntry* table, const VolumeView& volume) {
+  absl::Status status;
+  if (!deferred_.empty() && lists_.pool.used() < used_) {
+    const absl::StatusOr<UploadedList> list = UploadDrawables(device_, deferred_);
+    if (absl::IsResourceExhausted(list.status())) return absl::OkStatus();  // later, then
+    if (!list.ok()) return list.status();
+    status = AddItems(table, nullptr, *list, volume, skip_);
+    const size_t whole = CountWhole(deferred_, skip_);
+    deferred_.erase(deferred_.begin(), deferred_.begin() + static_cast<ptrdiff_t>(whole));
+  }
+  used_ = lists_.pool.used();
+  return status;
+}
+
+void PairIndex::Forget(std::span<const uint32_t> slots) {
+  if (deferred_.empty()) return;
+  const absl::flat_hash_set<uint32_t> gone(slots.begin(), slots.end());
+  if (gone.contains(deferred_.front().slot)) skip_ = 0;
+  std::erase_if(deferred_, [&](const PairedDrawable& d) { return gone.contains(d.slot); });
 }
 
 absl::Status PairIndex::MergeFrom(size_t first, const TableEntry* table, uint32_t tiles) {
   uint64_t pairs = 0;
   for (size_t b = first; b < batches_.size(); ++b) pairs += batches_[b].pairs;
-  if (pairs > kMostPairs) {
-    return absl::ResourceExhaustedError("the index of tiles has too many pairs");
-  }
-  Block arrays[4];
-  for (Block& array : arrays) {
-    absl::StatusOr<Block> made = device_.pool().Acquire(pairs * sizeof(uint64_t));
-    if (!made.ok()) return made.status();
-    array = *std::move(made);
-  }
+  absl::StatusOr<Arrays> arrays = ArraysFor(pairs);
+  if (!arrays.ok()) return arrays.status();
   const auto count = static_cast<uint32_t>(pairs);
   uint64_t at = 0;
   for (size_t b = first; b < batches_.size(); ++b) {
     const Batch& batch = batches_[b];
     for (const auto& [to, from] :
-         {std::pair(&arrays[0], &batch.keys), {&arrays[1], &batch.values}}) {
+         {std::pair(&arrays->keys, &batch.keys), {&arrays->values, &batch.values}}) {
       absl::Status status = device_.Run("cudaMemcpyAsync", [&] {
         return cudaMemcpyAsync(to->as<uint64_t>() + at, from->as<uint64_t>(),
                                batch.pairs * sizeof(uint64_t), cudaMemcpyDeviceToDevice,
@@ -151,10 +241,10 @@ absl::Status PairIndex::MergeFrom(size_t first, const TableEntry* table, uint32_
     }
     at += batch.pairs;
   }
-  const absl::StatusOr<Block> flags = device_.pool().Acquire(pairs * sizeof(uint32_t));
+  const absl::StatusOr<Block> flags = lists_.pool.Acquire(pairs * sizeof(uint32_t));
   if (!flags.ok()) return flags.status();
   absl::Status status = device_.Run("FlagLive", [&] {
-    return FlagLive(table, arrays[1].as<uint64_t>(), count, flags->as<uint32_t>(),
+    return FlagLive(table, arrays->values.as<uint64_t>(), count, flags->as<uint32_t>(),
                     device_.stream());
   });
   if (!status.ok()) return status;
@@ -167,14 +257,14 @@ absl::Status PairIndex::MergeFrom(size_t first, const TableEntry* table, uint32_
     return absl::OkStatus();
   }
   status = device_.Run("PickLive", [&] {
-    return PickLive(arrays[0].as<uint64_t>(), arrays[1].as<uint64_t>(), flags->as<uint32_t>(),
-                    offsets->as<uint64_t>(), count, arrays[2].as<uint64_t>(),
-                    arrays[3].as<uint64_t>(), device_.stream());
+    return PickLive(arrays->keys.as<uint64_t>(), arrays->values.as<uint64_t>(),
+                    flags->as<uint32_t>(), offsets->as<uint64_t>(), count,
+                    arrays->keys2.as<uint64_t>(), arrays->values2.as<uint64_t>(), device_.stream());
   });
   if (!status.ok()) return status;
-  absl::StatusOr<Batch> merged =
-      Sorted(std::move(arrays[2]), std::move(arrays[3]), std::move(arrays[0]), std::move(arrays[1]),
-             static_cast<uint32_t>(*live), tiles);
+  std::swap(arrays->keys, arrays->keys2);
+  std::swap(arrays->values, arrays->values2);
+  absl::StatusOr<Batch> merged = Sorted(*std::move(arrays), static_cast<uint32_t>(*live), tiles);
   if (!merged.ok()) return merged.status();
   batches_.resize(first);
   batches_.push_back(*std::move(merged));
@@ -187,12 +277,105 @@ absl::Status PairIndex::Merge(const TableEntry* table, uint32_t tiles) {
   while (first > 0 && batches_[first - 1].pairs <= 2 * pairs) pairs += batches_[--first].pairs;
   if (first + 1 == batches_.size()) return absl::OkStatus();
   const absl::Status status = MergeFrom(first, table, tiles);
-  // As many batches as there is room for are in order; the next pass makes room or is refused.
+  // As many batches as there is room for are in order; what comes then is deferred.
   return absl::IsResourceExhausted(status) ? absl::OkStatus() : status;
 }
 
 absl::Status PairIndex::DropDead(const TableEntry* table, uint32_t tiles) {
   return batches_.empty() ? absl::OkStatus() : MergeFrom(0, table, tiles);
+}
+
+// ------------------------------------------------------------------------------------------ passes
+
+uint64_t PairIndex::CountDeferred(const Seen& seen) const {
+  uint64_t items = 0;
+  for (const PairedDrawable& d : deferred_) items += seen(d.layer) ? d.items : 0;
+  return items;
+}
+
+absl::Status PairIndex::BeginPasses(const Seen& seen) {
+  passing_ = {};
+  std::vector<uint32_t> slots, layers;
+  std::vector<uint64_t> firsts = {0};
+  for (const PairedDrawable& d : deferred_) {
+    if (!seen(d.layer)) continue;
+    if (&d == &deferred_.front()) passing_.begin = skip_;
+    slots.push_back(d.slot);
+    firsts.push_back(firsts.back() + d.items);
+    layers.push_back(d.layer);
+  }
+  if (slots.empty()) return absl::OkStatus();
+  std::sort(layers.begin(), layers.end());
+  layers.erase(std::unique(layers.begin(), layers.end()), layers.end());
+  absl::StatusOr<Block> block = device_.Upload(slots.data(), slots.size());
+  if (!block.ok()) return block.status();
+  passing_.slots = *std::move(block);
+  block = device_.Upload(firsts.data(), firsts.size());
+  if (!block.ok()) return block.status();
+  passing_.firsts = *std::move(block);
+  block = device_.Upload(layers.data(), layers.size());
+  if (!block.ok()) return block.status();
+  passing_.layers = *std::move(block);
+  passing_.items = {.slots = passing_.slots.as<uint32_t>(),
+                    .firsts = passing_.firsts.as<uint64_t>(),
+                    .layers = passing_.layers.as<uint32_t>(),
+                    .count = static_cast<uint32_t>(slots.size()),
+                    .layer_count = static_cast<uint32_t>(layers.size()),
+                    .items = firsts.back()};
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PairIndex::Batch> PairIndex::PairedWithin(const TableEntry* table,
+                                                         const VolumeView& volume,
+                                                         const RegionGrid& within) {
+  ItemList list;
+  list.slots = passing_.items.slots;
+  list.firsts = passing_.items.firsts;
+  list.count = passing_.items.count;
+  const absl::StatusOr<Block> count = lists_.pool.Acquire(sizeof(uint64_t));
+  if (!count.ok()) return count.status();
+  Arrays arrays;
+  const auto append = [&](uint64_t room) {
+    absl::Status status = device_.Zero(count->as<void>(), sizeof(uint64_t));
+    if (!status.ok()) return status;
+    return device_.Run("AppendPairs", [&] {
+      return AppendPairs(table, list, passing_.begin, passing_.items.items, volume, within,
+                         arrays.keys.as<uint64_t>(), arrays.values.as<uint64_t>(), room,
+                         count->as<uint64_t>(), device_.stream());
+    });
+  };
+  if (absl::Status status = append(0); !status.ok()) return status;
+  const absl::StatusOr<uint64_t> pairs = device_.Read(count->as<uint64_t>());
+  if (!pairs.ok()) return pairs.status();
+  if (*pairs == 0) return Batch();
+  absl::StatusOr<Arrays> made = ArraysFor(*pairs);
+  if (!made.ok()) return made.status();
+  arrays = *std::move(made);
+  if (absl::Status status = append(*pairs); !status.ok()) return status;
+  return Sorted(std::move(arrays), static_cast<uint32_t>(*pairs), volume.grid.count());
+}
+
+absl::StatusOr<bool> PairIndex::SortWithin(const TableEntry* table, const VolumeView& volume,
+                                           const RegionGrid& within) {
+  if (passing_.items.items == 0) return true;
+  absl::StatusOr<Batch> batch = PairedWithin(table, volume, within);
+  if (absl::IsResourceExhausted(batch.status())) {
+    unlisted_ = passing_.items;
+    return false;
+  }
+  if (!batch.ok()) return batch.status();
+  if (batch->pairs > 0) pass_ = *std::move(batch);
+  return true;
+}
+
+void PairIndex::EndPass() {
+  pass_.reset();
+  unlisted_ = {};
+}
+
+void PairIndex::EndPasses() {
+  EndPass();
+  passing_ = {};
 }
 
 }  // namespace voxeld::gpu::cuda

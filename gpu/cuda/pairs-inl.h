@@ -1,6 +1,8 @@
-// Pairs of items and tiles, raised into a region's words: whatever is neither thin line nor small triangle.
+// Pairs of items and tiles, raised into a region's words: whatever is neither thin line nor small triangle,
+// also where there is no list of pairs.
 #pragma once
 
+#include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/primitives/list.h"
 
@@ -172,6 +174,61 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
   __syncthreads();
 }
 
+// Whether an item may have voxels in a tile.
+__device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t tile,
+                                const Box3& box) {
+  Box3 bounds;
+  switch (entry.record.kind) {
+    case kDrawnByCpu:
+      return entry.drawn.tiles[item] == tile;
+    case PrimitiveKind::kPoints:
+      bounds = BoundsOf(Points::ItemOf(entry.source, item), entry.source.radius);
+      break;
+    case PrimitiveKind::kSegments:
+      bounds = BoundsOf(Segments::ItemOf(entry.source, item), entry.source.radius);
+      break;
+    case PrimitiveKind::kTriangles:
+      bounds = BoundsOf(Triangles::ItemOf(entry.source, item));
+      break;
+    default:
+      bounds = entry.source.solid.bounds;
+      break;
+  }
+  return !IsEmpty(Intersect(box, bounds));
+}
+
+// The value of a pair, if item `i` of those that are not listed is of that layer, and may have voxels
+// in the tile.
+__device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t layer, uint32_t tile,
+                                    const Box3& box, uint64_t& value) {
+  const uint32_t d = DrawableOf(view.unlisted, i);
+  const uint32_t slot = view.unlisted.slot(d);
+  const TableEntry& entry = view.table[slot];
+  if (entry.layer != layer) return false;
+  const uint32_t item = static_cast<uint32_t>(i - view.unlisted.first(d));
+  value = PairValue(slot, item);
+  return MayTouch(entry, item, tile, box);
+}
+
+// A pair's voxels; true if it is heavy: then it is listed.
+__device__ inline bool DrawLight(const DrawView& view, uint64_t value, const Box3& box,
+                                 RegionScratch& region, PairScratch& scratch) {
+  const TableEntry& entry = view.table[value >> 32];
+  const uint32_t item = static_cast<uint32_t>(value);
+  const bool heavy = entry.alive != 0 && IsHeavy(entry, item, box);
+  if (entry.alive == 0) {
+  } else if (heavy) {
+    scratch.heavy[atomicAdd(&scratch.heavy_count, 1u)] = value;
+  } else if (entry.record.kind == PrimitiveKind::kPoints) {
+    DrawItem<Points>(entry, item, box, region.words);
+  } else if (entry.record.kind == PrimitiveKind::kSegments) {
+    DrawItem<Segments>(entry, item, box, region.words);
+  } else {
+    DrawItem<Triangles>(entry, item, box, region.words);
+  }
+  return heavy;
+}
+
 // The layer's pairs of one tile, by the whole block.
 __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile,
                                  RegionScratch& region, PairScratch& scratch) {
@@ -187,19 +244,7 @@ __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile
       bool heavy = false;
       if (p < end) {
         const uint64_t value = view.pairs.batches[b].values[p];
-        const TableEntry& entry = view.table[value >> 32];
-        const uint32_t item = static_cast<uint32_t>(value);
-        heavy = entry.alive != 0 && IsHeavy(entry, item, box);
-        if (entry.alive == 0) {
-        } else if (heavy) {
-          scratch.heavy[atomicAdd(&scratch.heavy_count, 1u)] = value;
-        } else if (entry.record.kind == PrimitiveKind::kPoints) {
-          DrawItem<Points>(entry, item, box, region.words);
-        } else if (entry.record.kind == PrimitiveKind::kSegments) {
-          DrawItem<Segments>(entry, item, box, region.words);
-        } else {
-          DrawItem<Triangles>(entry, item, box, region.words);
-        }
+        heavy = DrawLight(view, value, box, region, scratch);
       }
       if (__syncthreads_or(heavy ? 1 : 0) != 0) {
         DrawHeavy(view.table, box, grid, region.words, scratch);
@@ -209,6 +254,28 @@ __device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile
     }
   }
   __syncthreads();
+}
+
+// What the layer has in one tile of items that are not listed, by the whole block. Rare, and apart, so
+// that pairs are drawn as they would be without it; its loop is left by vote, as it must be around calls.
+static __device__ __noinline__ void DrawUnlisted(const DrawView& view, uint32_t tile,
+                                                 RegionScratch& region, PairScratch& scratch) {
+  const TileGrid& grid = view.volume.grid;
+  const Box3 box = grid.VoxelsOf(tile);
+  if (threadIdx.x == 0) scratch.heavy_count = 0;
+  for (uint64_t i = threadIdx.x; __syncthreads_or(i < view.unlisted.items) != 0;
+       i += kDrawThreads) {
+    bool heavy = false;
+    uint64_t value;
+    if (i < view.unlisted.items && FindUnlisted(view, i, region.layer, tile, box, value)) {
+      heavy = DrawLight(view, value, box, region, scratch);
+    }
+    if (__syncthreads_or(heavy ? 1 : 0) != 0) {
+      DrawHeavy(view.table, box, grid, region.words, scratch);
+      if (threadIdx.x == 0) scratch.heavy_count = 0;
+      __syncthreads();
+    }
+  }
 }
 
 }  // namespace voxeld::gpu::cuda

@@ -152,11 +152,94 @@ absl::Status RegionIndex::Drop(std::span<const uint32_t> slots) {
   return absl::OkStatus();
 }
 
-// ------------------------------------------------------------------------------------------ merging
+// ------------------------------------------------------------------------------------------ sorting
 
 void RegionIndex::DropLists(Batch& batch) {
   for (Block* block : {&batch.begin, &batch.base, &batch.offsets, &batch.spans}) *block = Block();
 }
+
+absl::Status RegionIndex::Sort(Batch& batch, uint8_t* region_dirty) {
+  absl::Status status = SortAll(batch, region_dirty);
+  if (WentOver(status)) {
+    DropLists(batch);
+    status = SortExactly(batch, batch.regions, grid_, region_dirty);
+  }
+  batch.deferred = WentOver(status);
+  return batch.deferred ? Defer(batch, region_dirty) : status;
+}
+
+absl::Status RegionIndex::Defer(Batch& batch, uint8_t* region_dirty) {
+  DropLists(batch);
+  batch.regions = Block();
+  absl::StatusOr<Block> regions = device_.Zeros(grid_.block_count() * sizeof(uint64_t));
+  if (!regions.ok()) return regions.status();
+  batch.regions = *std::move(regions);
+  absl::Status status = FindRegions(batch, batch.regions.as<uint64_t>());
+  return status.ok() && region_dirty != nullptr ? MarkAll(batch, region_dirty) : status;
+}
+
+absl::Status RegionIndex::SortDeferred() {
+  const Pool& pool = lists_.pool;
+  if (pool.used() < used_) {
+    for (auto& [number, batch] : batches_) {
+      if (!batch.deferred || pool.used() + batch.list_bytes > lists_.most_kept ||
+          pool.used() + batch.sort_bytes > pool.limit()) {
+        continue;
+      }
+      Block regions;
+      const absl::Status status = SortExactly(batch, regions, grid_, nullptr);
+      if (status.ok() && !lists_.KeepsTooMuch()) {
+        batch.regions = std::move(regions);
+        batch.deferred = false;
+        continue;
+      }
+      DropLists(batch);
+      if (!status.ok() && !absl::IsResourceExhausted(status)) return status;
+    }
+  }
+  used_ = pool.used();
+  return absl::OkStatus();
+}
+
+uint64_t RegionIndex::CountDeferred(const Seen& seen) const {
+  uint64_t items = 0;
+  for (const auto& [number, batch] : batches_) {
+    if (batch.deferred && seen(batch.layer)) items += batch.count;
+  }
+  return items;
+}
+
+absl::StatusOr<bool> RegionIndex::SortWithin(const RegionGrid& within, const Seen& seen,
+                                             bool some) {
+  RegionGrid drawn = within;
+  for (int a = 0; a < 3; ++a) {
+    drawn.drawn_lo[a] = std::max(within.drawn_lo[a], grid_.drawn_lo[a]);
+    drawn.drawn_hi[a] = std::min(within.drawn_hi[a], grid_.drawn_hi[a]);
+  }
+  bool all = true;
+  for (auto& [number, batch] : batches_) {
+    if (!batch.deferred || !seen(batch.layer)) continue;
+    Block regions;  // the batch's own say more
+    const uint64_t list_bytes = batch.list_bytes, sort_bytes = batch.sort_bytes;
+    const absl::Status status = SortExactly(batch, regions, drawn, nullptr);
+    batch.list_bytes = list_bytes;
+    batch.sort_bytes = sort_bytes;
+    if (status.ok()) continue;
+    DropLists(batch);
+    all = false;
+    if (!absl::IsResourceExhausted(status)) return status;
+    if (!some) return false;
+  }
+  return all;
+}
+
+void RegionIndex::EndPass() {
+  for (auto& [number, batch] : batches_) {
+    if (batch.deferred) DropLists(batch);
+  }
+}
+
+// ------------------------------------------------------------------------------------------ merging
 
 absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
   Batch merged;

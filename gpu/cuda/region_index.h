@@ -2,10 +2,16 @@
 //
 // A change adds a batch; batches of like size are merged, and items that have gone are dropped on the
 // way: so an index of n items costs O(log n) an item.
+//
+// Lists have a budget. A batch for whose lists there is no room, or whose lists would leave too little
+// for others' making, is deferred: of it are kept the items, and which regions they touch. Before it is
+// drawn, it is sorted as far as some blocks of regions go that are drawn then; or it is drawn without
+// lists, by threads that look through all of it.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -15,6 +21,7 @@
 #include "absl/status/statusor.h"
 #include "gpu/cuda/device.h"
 #include "gpu/cuda/line_types.h"
+#include "gpu/cuda/list_budget.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -58,6 +65,17 @@ class RegionIndex {
   // kMaxLineBatches.
   absl::Status Merge();
 
+  // Sorts what was deferred and has room now that other lists have gone.
+  absl::Status SortDeferred();
+  // The items of deferred batches of layers for which seen(slot) is true.
+  using Seen = std::function<bool(uint32_t)>;
+  uint64_t CountDeferred(const Seen& seen) const;
+  // Gives such batches lists, until EndPass, of what lies in the blocks that `within` draws. False if
+  // there is no room for all of them: then none need have any, but if `some`, those have that have
+  // room.
+  absl::StatusOr<bool> SortWithin(const RegionGrid& within, const Seen& seen, bool some);
+  void EndPass();
+
  protected:
   struct Member {
     uint32_t slot, first, count;  // items, one at least
@@ -78,14 +96,19 @@ class RegionIndex {
     std::vector<Member> members;
   };
 
-  // what: the items, for who reads an error. Sizes in bytes, of an item and of its further colours.
-  RegionIndex(Device& device, const char* what, size_t item_size, size_t color_size)
-      : device_(device), what_(what), item_size_(item_size), color_size_(color_size) {}
+  // `lists`: outlives the index. what: the items, for who reads an error. Sizes in bytes, of an item
+  // and of its further colours.
+  RegionIndex(Device& device, ListBudget& lists, const char* what, size_t item_size,
+              size_t color_size)
+      : device_(device),
+        lists_(lists),
+        what_(what),
+        item_size_(item_size),
+        color_size_(color_size) {}
 
   const absl::flat_hash_map<uint64_t, Batch>& batches() const { return batches_; }
-  absl::flat_hash_map<uint64_t, Batch>& batches() { return batches_; }
-  static void DropLists(Batch& batch);  // but for `regions`
   Device& device() const { return device_; }
+  Pool& lists() const { return lists_.pool; }
   const RegionGrid& grid() const { return grid_; }
 
  private:
@@ -97,10 +120,16 @@ class RegionIndex {
   // `to` gets `count` items at `first` of the list, in which rows are those of `from`.
   virtual absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                             const Batch& to) = 0;
-  // Sorts the items by region, or defers the batch; with `region_dirty` marks the regions that have
-  // any.
-  virtual absl::Status Sort(Batch& batch, uint8_t* region_dirty) = 0;
-  // Marks the regions that have any.
+  // Sorts the items by region, as fast as it goes, in as much memory as that takes; with
+  // `region_dirty` marks the regions that have any.
+  virtual absl::Status SortAll(Batch& batch, uint8_t* region_dirty) = 0;
+  // Those in the blocks that `within` draws, in as little memory as it goes. `regions`: to be had in
+  // place of the batch's own.
+  virtual absl::Status SortExactly(Batch& batch, Block& regions, const RegionGrid& within,
+                                   uint8_t* region_dirty) = 0;
+  // Adds to `regions`, by block, a bit for each region that has any.
+  virtual absl::Status FindRegions(const Batch& batch, uint64_t* regions) = 0;
+  // Marks the regions that have any; of a deferred batch, by its `regions`.
   virtual absl::Status MarkAll(const Batch& batch, uint8_t* region_dirty) = 0;
   // Of items in rows, `count` in all, whose first is slot(d): marks the regions that they touch, or,
   // without `region_dirty`, has them draw nothing from now on.
@@ -121,12 +150,22 @@ class RegionIndex {
   absl::Status TouchFound(const Batch& batch, Found& found, uint8_t* region_dirty);
   absl::Status TakeItems(Batch& batch);
   absl::Status MergeFrom(const std::vector<uint64_t>& numbers);
+  static void DropLists(Batch& batch);  // but for `regions`
+  // Whether a try at lists, which went as `status` says, took more than there is for them.
+  bool WentOver(const absl::Status& status) const {
+    return absl::IsResourceExhausted(status) || (status.ok() && lists_.KeepsTooMuch());
+  }
+  // Sorts the batch, or defers it.
+  absl::Status Sort(Batch& batch, uint8_t* region_dirty);
+  absl::Status Defer(Batch& batch, uint8_t* region_dirty);
 
   Device& device_;
+  ListBudget& lists_;
   const char* const what_;
   const size_t item_size_, color_size_;
   RegionGrid grid_;
   uint64_t next_number_ = 1, most_items_ = 0;
+  uint64_t used_ = 0;   // of the lists' pool, when SortDeferred last looked
   bool merge_ = false;  // something has changed since merging was last done or given up
   absl::flat_hash_map<uint64_t, Batch> batches_;  // by number
   absl::flat_hash_map<uint32_t, Place> places_;   // by slot of the table

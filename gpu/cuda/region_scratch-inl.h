@@ -50,7 +50,7 @@ struct RegionScratch {
   alignas(16) uint32_t least[64];           // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
-  uint32_t pairs;                 // not 0: the layer has some here
+  uint32_t pairs;                 // not 0: the layer has some here, or items that are not listed
 };
 
 // What a block of threads draws: first in its shared memory.
@@ -129,8 +129,8 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
 }
 
 // The layer of the least rank beyond `last` that has something in the region, and what. By the first
-// warp: a lane looks after a batch.
-template <bool kPairs>
+// warp: a lane looks after a batch. kAll: there may be pairs, and what has no lists.
+template <bool kAll>
 __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int32_t last,
                              RegionScratch& scratch, PairRows* rows) {
   const uint32_t lane = threadIdx.x % 32;
@@ -139,7 +139,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
   uint32_t layer = kAllLanes;
   int32_t best[kRegionTiles] = {kNone, kNone, kNone, kNone};
   uint32_t begin[kRegionTiles] = {}, end[kRegionTiles] = {};
-  if constexpr (kPairs) {
+  if constexpr (kAll) {
     for (uint32_t t = 0; t < kRegionTiles; ++t) {
       const uint32_t tile = place.TileOf(view.volume, t);
       if (lane < view.pairs.count && tile != kAllLanes) {
@@ -148,8 +148,22 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
       }
     }
   }
+  int32_t unlisted_rank = kNone;
+  if constexpr (kAll) {
+    for (uint32_t i = lane; i < view.unlisted.layer_count; i += 32) {
+      const uint32_t slot = view.unlisted.layers[i];
+      const LayerLook look = view.layers[slot];
+      if (look.visible == 0 || look.rank <= last || look.rank >= unlisted_rank) continue;
+      unlisted_rank = look.rank;
+      if (look.rank < least) {
+        least = look.rank;
+        layer = slot;
+      }
+    }
+  }
   const auto rank_here = [&](const auto& batches) {
-    if (lane >= batches.count || !batches.batches[lane].Has(scratch.region)) return kNone;
+    if (lane >= batches.count || !batches.batches[lane].template Has<!kAll>(scratch.region))
+      return kNone;
     const uint32_t slot = batches.batches[lane].layer;
     const LayerLook look = view.layers[slot];
     if (look.visible == 0 || look.rank <= last) return kNone;
@@ -165,13 +179,14 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
     least = Min(least, __shfl_xor_sync(kAllLanes, least, lanes));
   }
   bool pairs = false;
-  if constexpr (kPairs) {
+  if constexpr (kAll) {
     for (uint32_t t = 0; t < kRegionTiles; ++t) {
       const bool here = best[t] == least && least != kNone;
       rows->begin[t][lane] = here ? begin[t] : 0;
       rows->end[t][lane] = here ? end[t] : 0;
       pairs |= here;
     }
+    pairs |= unlisted_rank == least && least != kNone;
   }
   const uint32_t any_pairs = __ballot_sync(kAllLanes, pairs);
   const uint32_t lines = __ballot_sync(kAllLanes, line_rank == least && least != kNone);

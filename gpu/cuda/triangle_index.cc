@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/triangle_kernels.h"
 
 namespace voxeld::gpu::cuda {
@@ -20,9 +21,10 @@ uint32_t* Colors(const auto& batch) {
 TriangleBatchList TriangleIndex::view() const {
   TriangleBatchList list;
   for (const auto& [number, batch] : batches()) {
-    list.batches[list.count++] = {batch.items.as<CompactTriangle>(), Colors(batch),
-                                  batch.begin.as<uint32_t>(), batch.spans.as<uint32_t>(),
-                                  batch.layer};
+    TriangleBatchView& view = list.batches[list.count++];
+    view = {batch.items.as<CompactTriangle>(), Colors(batch), batch.begin.as<uint32_t>(),
+            batch.spans.as<uint32_t>(),        batch.layer,   batch.count};
+    if (view.begin == nullptr) view.places = batch.regions.as<uint32_t>();
   }
   return list;
 }
@@ -49,28 +51,35 @@ absl::Status TriangleIndex::Copy(const ItemList& list, uint64_t first, uint32_t 
   });
 }
 
-absl::Status TriangleIndex::Sort(Batch& batch, uint8_t* region_dirty) {
+absl::Status TriangleIndex::SortInto(Batch& batch, const RegionGrid& within, uint8_t* region_dirty,
+                                     bool counted) {
   const size_t regions = grid().count();
   const CompactTriangle* const triangles = batch.items.as<CompactTriangle>();
-  const absl::StatusOr<Block> counts = device().Zeros(regions * sizeof(uint32_t));
+  for (Block* block : {&batch.begin, &batch.spans}) *block = Block();  // of a try before
+  batch.list_bytes = (regions + 1) * sizeof(uint32_t);
+  batch.sort_bytes = batch.list_bytes + regions * sizeof(uint32_t);
+  const absl::StatusOr<Block> counts = lists().Acquire(regions * sizeof(uint32_t));
   if (!counts.ok()) return counts.status();
-  absl::StatusOr<Block> begin = device().pool().Acquire((regions + 1) * sizeof(uint32_t));
+  absl::StatusOr<Block> begin = lists().Acquire((regions + 1) * sizeof(uint32_t));
   if (!begin.ok()) return begin.status();
   batch.begin = *std::move(begin);
-  TriangleSort sort{grid(),      counts->as<uint32_t>(), batch.begin.as<uint32_t>(), nullptr, 0,
+  absl::Status status = device().Zero(counts->as<void>(), regions * sizeof(uint32_t));
+  if (!status.ok()) return status;
+  TriangleSort sort{within,      counts->as<uint32_t>(), batch.begin.as<uint32_t>(), nullptr, 0,
                     region_dirty};
-  absl::Status status = device().Run("CountTriangles", [&] {
+  status = device().Run("CountTriangles", [&] {
     return CountTriangles(sort, triangles, batch.count, device().stream());
   });
   if (!status.ok()) return status;
-  uint64_t places = batch.count * std::min<uint64_t>(batch.regions_each, MostRegions());
-  if (places * sizeof(uint32_t) > kUncountedBytes) {
-    const absl::StatusOr<uint32_t> counted = device().Read(sort.begin + regions);
-    if (!counted.ok()) return counted.status();
-    places = *counted;
+  uint64_t places = MostPlaces(batch);
+  if (counted) {
+    const absl::StatusOr<uint32_t> there = device().Read(sort.begin + regions);
+    if (!there.ok()) return there.status();
+    places = *there;
   }
-  absl::StatusOr<Block> block =
-      device().pool().Acquire(std::max<size_t>(1, places) * sizeof(uint32_t));
+  batch.list_bytes += places * sizeof(uint32_t);
+  batch.sort_bytes += places * sizeof(uint32_t);
+  absl::StatusOr<Block> block = lists().Acquire(std::max<size_t>(1, places) * sizeof(uint32_t));
   if (!block.ok()) return block.status();
   batch.spans = *std::move(block);
   sort.places = batch.spans.as<uint32_t>();
@@ -80,9 +89,33 @@ absl::Status TriangleIndex::Sort(Batch& batch, uint8_t* region_dirty) {
   });
 }
 
+uint64_t TriangleIndex::MostPlaces(const Batch& batch) const {
+  return batch.count * std::min<uint64_t>(batch.regions_each, MostRegions());
+}
+
+absl::Status TriangleIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
+  return SortInto(batch, grid(), region_dirty,
+                  MostPlaces(batch) * sizeof(uint32_t) > kUncountedBytes);
+}
+
+absl::Status TriangleIndex::SortExactly(Batch& batch, Block&, const RegionGrid& within,
+                                        uint8_t* region_dirty) {
+  return SortInto(batch, within, region_dirty, true);
+}
+
+absl::Status TriangleIndex::FindRegions(const Batch& batch, uint64_t* regions) {
+  return device().Run("FindTriangleRegions", [&] {
+    return FindTriangleRegions(batch.items.as<CompactTriangle>(), batch.count, grid(), regions,
+                               device().stream());
+  });
+}
+
 absl::Status TriangleIndex::MarkAll(const Batch& batch, uint8_t* region_dirty) {
   return device().Run("MarkFilled", [&] {
-    return MarkFilled(batch.begin.as<uint32_t>(), grid().count(), region_dirty, device().stream());
+    return batch.deferred ? MarkRegions(batch.regions.as<uint64_t>(), grid().block_count(),
+                                        region_dirty, device().stream())
+                          : MarkFilled(batch.begin.as<uint32_t>(), grid().count(), region_dirty,
+                                       device().stream());
   });
 }
 

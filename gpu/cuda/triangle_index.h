@@ -1,4 +1,4 @@
-// Small triangles by the regions that they touch.
+// Small triangles by the regions that they touch. What is deferred keeps `regions`, a bit for each.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@ namespace voxeld::gpu::cuda {
 // A batch's `begin` and `spans` are TriangleBatchView's arrays `begin` and `places`.
 class TriangleIndex final : public RegionIndex {
  public:
-  explicit TriangleIndex(Device& device)
-      : RegionIndex(device, "triangles", sizeof(CompactTriangle), 3 * sizeof(uint32_t)) {}
+  TriangleIndex(Device& device, ListBudget& lists)
+      : RegionIndex(device, lists, "triangles", sizeof(CompactTriangle), 3 * sizeof(uint32_t)) {}
 
   TriangleBatchList view() const;  // after Merge
 
@@ -21,10 +21,18 @@ class TriangleIndex final : public RegionIndex {
   absl::Status Make(const TableEntry* table, const ItemList& list, const Batch& batch) override;
   absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                     const Batch& to) override;
-  absl::Status Sort(Batch& batch, uint8_t* region_dirty) override;
+  absl::Status SortAll(Batch& batch, uint8_t* region_dirty) override;
+  absl::Status SortExactly(Batch& batch, Block& regions, const RegionGrid& within,
+                           uint8_t* region_dirty) override;
+  absl::Status FindRegions(const Batch& batch, uint64_t* regions) override;
   absl::Status MarkAll(const Batch& batch, uint8_t* region_dirty) override;
   absl::Status Touch(const ItemList& list, uint32_t count, const Batch& batch,
                      uint8_t* region_dirty) override;
+
+  uint64_t MostPlaces(const Batch& batch) const;
+  // With room for as many places as there can be, or, if `counted`, which waits for it, as there are.
+  absl::Status SortInto(Batch& batch, const RegionGrid& within, uint8_t* region_dirty,
+                        bool counted);
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -32,6 +32,9 @@ cudaError_t CountTriangles(const TriangleSort& sort, const CompactTriangle* tria
 cudaError_t FillTriangles(const TriangleSort& sort, const CompactTriangle* triangles,
                           uint32_t count, cudaStream_t stream);
 
+// Adds to `regions`, by block as SpanLists has them, those that any of `count` triangles touches.
+cudaError_t FindTriangleRegions(const CompactTriangle* triangles, uint32_t count,
+                                const RegionGrid& grid, uint64_t* regions, cudaStream_t stream);
 // Marks the regions that have any.
 cudaError_t MarkFilled(const uint32_t* begin, uint32_t regions, uint8_t* dirty,
                        cudaStream_t stream);

@@ -10,15 +10,22 @@
 namespace voxeld::gpu::cuda {
 
 // Triangles of one layer. Those of region r are triangles[places[begin[r]]] to
-// triangles[places[begin[r + 1] − 1]].
+// triangles[places[begin[r + 1] − 1]]. Without such lists `begin` is null, and `places` are bits by
+// region, which have any: who draws looks through all triangles.
 struct TriangleBatchView {
   const CompactTriangle* triangles = nullptr;
   const uint32_t* colors = nullptr;  // 0x00RRGGBB, three each, where they differ; else null
   const uint32_t* begin = nullptr;
   const uint32_t* places = nullptr;
   uint32_t layer = 0;  // its slot
+  uint32_t count = 0;  // triangles
 
-  VOXELD_HD bool Has(uint32_t region) const { return begin[region] != begin[region + 1]; }
+  // Whether it has any in a region; kListed: it has lists.
+  template <bool kListed>
+  VOXELD_HD bool Has(uint32_t region) const {
+    if (!kListed && begin == nullptr) return (places[region / 32] >> region % 32 & 1) != 0;
+    return begin[region] != begin[region + 1];
+  }
 };
 
 inline constexpr uint32_t kMaxTriangleBatches = kMaxLineBatches;

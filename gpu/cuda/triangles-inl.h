@@ -61,8 +61,10 @@ __device__ inline void DrawTriangleRow(const TriangleBatchView& batch, uint32_t 
 }
 
 // By the whole block: teams of warps take some triangles each, and a team's lanes a row each of what
-// these have in the region, so that all have about as much to do. b: of the view's batches. Not
+// these have in the region, so that all have about as much to do. b: of the view's batches; of one
+// without lists (if not kListed) all triangles are looked at, and of most there are no rows. Not
 // inlined: lines want the registers.
+template <bool kListed>
 __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t b) {
   RegionScratch& scratch = SharedRegion();
   const TriangleBatchView& batch = view.triangles.batches[b];
@@ -70,7 +72,9 @@ __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t
   int32_t at[3];
   view.regions.RegionCoordinates(region, at);
   for (int a = 0; a < 3; ++a) at[a] <<= RegionBits(a);
-  const uint32_t begin = batch.begin[region], count = batch.begin[region + 1] - begin;
+  const bool listed = kListed || batch.begin != nullptr;
+  const uint32_t begin = listed ? batch.begin[region] : 0;
+  const uint32_t count = listed ? batch.begin[region + 1] - begin : batch.count;
   uint32_t team = 1;  // warps
   while (team < kDrawWarps && team * count < kDrawWarps) team *= 2;
   const uint32_t teams = kDrawWarps / team;
@@ -79,7 +83,7 @@ __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t
   for (uint32_t first = warp / team * group; first < count; first += teams * group) {
     uint32_t triangle = 0, rows = 0;
     if (lane < Min(group, count - first)) {
-      triangle = __ldg(&batch.places[begin + first + lane]);
+      triangle = listed ? __ldg(&batch.places[begin + first + lane]) : first + lane;
       const CompactTriangle t = LoadTriangle(&batch.triangles[triangle]);
       const CompactPart part = CompactPart::Of(t, at);
       if (t.word != 0) rows = static_cast<uint32_t>(part.row_count());

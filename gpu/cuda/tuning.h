@@ -14,8 +14,9 @@ struct Tuning {
   uint64_t group_bytes = uint64_t{24} << 20;
   // As many thin lines at most, of those that come together, are sorted by one block of threads.
   uint32_t few_lines = 1024;
-  // What the lists of all thin lines by region may take together, with their making; 0: 16 GiB, or a
-  // quarter of the device's memory if that is less. Lines beyond it are drawn in passes.
+  // What all lists of what lies where (of thin lines and small triangles by region, of other items by
+  // tile) may take together, with their making; 0: 16 GiB, or a quarter of the device's memory if that
+  // is less. What goes beyond it is drawn in passes.
   uint64_t index_bytes = 0;
   // Of these, what lists may take that stay from frame to frame: the rest is for making them, and for
   // the passes.

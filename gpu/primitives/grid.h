@@ -94,14 +94,29 @@ VOXELD_HD void EmitTilesOfBox(const Box3& box, const TileGrid& grid, Emit&& emit
   }
 }
 
+// Beyond the axis of a line, or of the capsule of `radius` units around it, how far its voxels reach:
+// the radius, half a voxel from a cell to its centre, and room for rounding.
+VOXELD_HD inline double ReachOf(int64_t radius) {
+  return radius > 0 ? static_cast<double>(radius) + kHalfVoxel + 2 : 2;
+}
+// A box that holds them.
+VOXELD_HD inline Box3 BoundsOf(const Line& line, int64_t radius) {
+  const double reach = ReachOf(radius);
+  Box3 box;
+  for (int a = 0; a < 3; ++a) {
+    const double s = static_cast<double>(line.s[a]), e = static_cast<double>(line.e[a]);
+    box.lo[a] = ToVoxel32(FloorToInt((Min(s, e) - reach) / 256.0));
+    box.hi[a] = ToVoxel32(FloorToInt((Max(s, e) + reach) / 256.0) + 1);
+  }
+  return box;
+}
+
 // Every tile that a voxel of the line, or of the capsule of `radius` units around it, may lie in,
 // and few others: slab by slab of the axis along which it runs most.
 template <class Emit>
 VOXELD_HD void EmitTilesOfLine(const Line& line, int64_t radius, const TileGrid& grid,
                                Emit&& emit) {
-  // Reach beyond the axis: the radius, half a voxel from a cell
-  // to its centre, and room for rounding.
-  const double reach = radius > 0 ? static_cast<double>(radius) + kHalfVoxel + 2 : 2;
+  const double reach = ReachOf(radius);
   double s[3], e[3];
   int major = 0;
   for (int a = 0; a < 3; ++a) {
@@ -109,11 +124,7 @@ VOXELD_HD void EmitTilesOfLine(const Line& line, int64_t radius, const TileGrid&
     e[a] = static_cast<double>(line.e[a]);
     if (Abs(line.e[a] - line.s[a]) > Abs(line.e[major] - line.s[major])) major = a;
   }
-  Box3 box;
-  for (int a = 0; a < 3; ++a) {
-    box.lo[a] = ToVoxel32(FloorToInt((Min(s[a], e[a]) - reach) / 256.0));
-    box.hi[a] = ToVoxel32(FloorToInt((Max(s[a], e[a]) + reach) / 256.0) + 1);
-  }
+  const Box3 box = BoundsOf(line, radius);
   const Box3 all = grid.TilesOf(box);
   const double length = e[major] - s[major];
   for (int32_t slab = all.lo[major]; slab < all.hi[major]; ++slab) {

@@ -31,7 +31,7 @@ inline std::vector<EngineCase> EngineCases() {
            return CreateCudaEngine(options, "a test", {},
                                    {.few_items = 0, .group_bytes = 1, .few_lines = 0});
          }},
-        // With no list of lines; and with none that stays.
+        // With no list at all; and with none that stays.
         {"cuda_tight",
          [](const EngineOptions& options) {
            return CreateCudaEngine(
@@ -58,7 +58,7 @@ inline std::vector<EngineCase> EngineCases() {
            return CreateCudaEngine(options, "a test", {},
                                    {.few_items = 0, .group_bytes = 1, .few_lines = 0});
          }},
-    // With no list of lines; and with none that stays.
+    // With no list at all; and with none that stays.
 #if !defined(VOXELD_TEST_SIMT_FEW)
         {"cuda_simt_tight",
          [](const EngineOptions& options) {

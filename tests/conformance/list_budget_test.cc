@@ -1,0 +1,437 @@
+// Scenes for whose lists, by region and by tile, the CUDA engine may not take enough memory.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <ostream>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "display/geometry/footprint.h"
+#include "gpu/cuda/cuda_engine.h"
+#include "tests/conformance/conformance_test.h"
+
+namespace voxeld::gpu::conformance {
+namespace {
+
+// Blocks of regions are 128×128×64 voxels.
+Target StackOf(int32_t width, int32_t height, int32_t slices) {
+  Target target;
+  display::PlanarStack stack;
+  stack.width_px = width;
+  stack.height_px = height;
+  for (int32_t s = 0; s < slices; ++s) stack.positions_mm.push_back(s - (slices - 1) * 0.5);
+  target.geometry.shape = stack;
+  target.geometry.grid = display::DefaultGrid(target.geometry);
+  target.layout = {.slices = slices,
+                   .width = width,
+                   .height = height,
+                   .format = display::PixelFormat::kBitPlanes3};
+  for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(c * 257);
+  return target;
+}
+
+// Of one or two colours each, here and there beyond the volume.
+void PutLines(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t lines, float length,
+              const display::VoxelGrid& grid) {
+  std::mt19937_64 random(id);
+  scene.layers[layer].id = layer;
+  scene.layers[layer].order = static_cast<int32_t>(layer);
+  ModelGeometry& g = scene.geometries[id];
+  g.record.id = id;
+  g.record.kind = PrimitiveKind::kSegments;
+  g.record.color_mode = ColorMode::kPerVertex;
+  const float size[3] = {static_cast<float>(grid.nx), static_cast<float>(grid.ny),
+                         static_cast<float>(grid.nz)};
+  std::uniform_real_distribution<float> step(-length, length);
+  for (uint32_t i = 0; i < lines; ++i) {
+    float at[3];
+    for (int a = 0; a < 3; ++a) {
+      at[a] = std::uniform_real_distribution<float>(-0.1F * size[a], 1.1F * size[a])(random);
+      g.positions.push_back(at[a]);
+    }
+    for (const float s : at) g.positions.push_back(s + step(random));
+    g.colors.push_back(static_cast<uint32_t>(random() & 0xFFFFFF));
+    g.colors.push_back(i % 2 == 0 ? g.colors.back() : static_cast<uint32_t>(random() & 0xFFFFFF));
+  }
+  g.record.vertex_count = 2 * lines;
+  scene.drawables[id] = {.id = id, .geometry = id, .layer = layer, .priority = 1};
+}
+
+// Of one or two colours each, less than `extent` wide.
+void PutTriangles(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t triangles, float extent,
+                  const display::VoxelGrid& grid) {
+  // What goes to and fro as a line does is a triangle with a third corner.
+  PutLines(scene, id, layer, triangles, extent / 2, grid);
+  ModelGeometry& g = scene.geometries[id];
+  std::mt19937_64 random(id);
+  std::uniform_real_distribution<float> step(-extent / 2, extent / 2);
+  g.record.kind = PrimitiveKind::kTriangles;
+  std::vector<float> positions;
+  std::vector<uint32_t> colors;
+  for (size_t i = 0; i < triangles; ++i) {
+    const float* const line = &g.positions[i * 6];
+    positions.insert(positions.end(), line, line + 6);
+    for (int a = 0; a < 3; ++a) positions.push_back(line[a] + step(random));
+    colors.insert(colors.end(), {g.colors[2 * i], g.colors[2 * i], g.colors[2 * i + 1]});
+  }
+  g.positions = std::move(positions);
+  g.colors = std::move(colors);
+  g.record.vertex_count = 3 * triangles;
+}
+
+// Thick ones: in pairs with the tiles that they touch.
+void PutCapsules(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t lines, float length,
+                 const display::VoxelGrid& grid) {
+  PutLines(scene, id, layer, lines, length, grid);
+  scene.geometries[id].record.thickness = 3;
+}
+
+void PutBall(SceneModel& scene, uint64_t id, uint64_t layer, float x, float y, float z,
+             float radius) {
+  scene.layers[layer].id = layer;
+  scene.layers[layer].order = static_cast<int32_t>(layer);
+  ModelGeometry& g = scene.geometries[id];
+  g.record.id = id;
+  g.record.kind = PrimitiveKind::kSphere;
+  g.record.color = 0x2040FFu + static_cast<uint32_t>(id);
+  const float params[4] = {x, y, z, radius};
+  for (int i = 0; i < 4; ++i) g.record.params[i] = params[i];
+  scene.drawables[id] = {.id = id, .geometry = id, .layer = layer, .priority = 1};
+}
+
+EngineCase CaseWith(const cuda::Tuning& tuning, const cuda::FaultPlan& faults = {}) {
+  return {"cuda", [=](const EngineOptions& options) {
+            return CreateCudaEngine(options, "a test", faults, tuning);
+          }};
+}
+
+// A scene as it should be drawn.
+struct Drawn {
+  DeltaBuffer delta;
+  DenseVolume voxels;
+  std::vector<std::byte> pictures;
+
+  Drawn(const SceneModel& scene, const Target& target)
+      : voxels(OracleVoxels(scene, target)), pictures(OraclePictures(voxels, target)) {
+    delta.PutWhole(scene);
+  }
+};
+
+constexpr uint64_t kPlenty = uint64_t{1} << 30;
+
+// What is put into a scene of two layers and drawn under several budgets.
+struct Kind {
+  const char* name;
+  void (*put)(SceneModel& scene, const display::VoxelGrid& grid);
+  int32_t slices;
+  std::vector<uint64_t> budgets;
+  uint64_t lists;      // that are larger than all budgets, and than this
+  uint32_t for_lists;  // calls that take memory for them, of few
+};
+void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
+
+const Kind kKinds[] = {
+    {"lines",
+     [](SceneModel& scene, const display::VoxelGrid& grid) {
+       PutLines(scene, 1, 1, 20'000, 60, grid);
+       PutLines(scene, 2, 2, 4'000, 300, grid);
+     },
+     200,
+     {1, 200'000, 400'000, 1'000'000, 3'000'000},
+     3'000'000,
+     7},
+    {"triangles",
+     [](SceneModel& scene, const display::VoxelGrid& grid) {
+       PutTriangles(scene, 1, 1, 4'000, 50, grid);
+       PutTriangles(scene, 2, 2, 4'000, 20, grid);
+     },
+     200,
+     {1, 15'000, 40'000, 60'000, 90'000},
+     90'000,
+     3},
+    {"pairs",
+     [](SceneModel& scene, const display::VoxelGrid& grid) {
+       PutCapsules(scene, 1, 1, 1'000, 40, grid);
+       PutTriangles(scene, 2, 2, 20, 400, grid);
+       PutBall(scene, 3, 2, 70, 60, 60, 40);
+     },
+     100,
+     {1, 20'000, 50'000, 100'000, 150'000},
+     150'000,
+     7},
+    {"all",
+     [](SceneModel& scene, const display::VoxelGrid& grid) {
+       PutLines(scene, 1, 1, 2'000, 60, grid);
+       PutTriangles(scene, 2, 2, 2'000, 30, grid);
+       PutCapsules(scene, 3, 2, 200, 30, grid);
+       PutBall(scene, 4, 1, 70, 60, 60, 40);
+     },
+     100,
+     {1, 50'000, 100'000, 300'000},
+     300'000,
+     7},
+};
+
+class ListBudgetOf : public testing::TestWithParam<Kind> {
+ protected:
+  SceneModel SceneOn(const Target& target) const {
+    SceneModel scene;
+    GetParam().put(scene, target.geometry.grid);
+    scene.layers[2].opacity = 180;
+    scene.layers[2].blend = BlendMode::kAdd;
+    return scene;
+  }
+};
+
+TEST_P(ListBudgetOf, WhateverItIsTheSameIsDrawnAndNoMoreMemoryTaken) {
+  const Target target = StackOf(150, 140, GetParam().slices);
+  const Drawn want(SceneOn(target), target);
+  std::vector<uint64_t> budgets = GetParam().budgets;
+  budgets.push_back(kPlenty);
+  uint64_t without_lists = 0;
+  for (const uint64_t bytes : budgets) {
+    for (const double kept : {0.0, 0.5}) {
+      SCOPED_TRACE(std::to_string(bytes) + " bytes, to be kept " + std::to_string(kept));
+      EngineDriver engine(CaseWith({.index_bytes = bytes, .index_share_kept = kept}),
+                          {.threads = 1});
+      ASSERT_TRUE(engine.SetTarget(target).ok());
+      ASSERT_TRUE(engine.Apply(want.delta).ok());
+      const absl::StatusOr<FrameResult> frame = engine.Frame();
+      ASSERT_TRUE(frame.ok()) << frame.status();
+      EXPECT_TRUE(engine.pictures() == want.pictures);
+      EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+      if (bytes == 1 && kept == 0) without_lists = frame->memory_bytes;
+      if (bytes == kPlenty) {
+        EXPECT_GT(frame->memory_bytes, without_lists + GetParam().lists)
+            << "the lists need no more";
+      } else {
+        EXPECT_LE(frame->memory_bytes, without_lists + bytes);
+      }
+    }
+  }
+}
+
+// Lists of some stay, others' do not fit; then they have room.
+TEST(ListBudget, SomeLinesWithinItAndSomeNot) {
+  const Target target = StackOf(70, 60, 150);
+  SceneModel scene;
+  PutLines(scene, 1, 1, 3'000, 10, target.geometry.grid);
+  EngineDriver engine(CaseWith({.few_items = 0, .index_bytes = 500'000}), {.threads = 1});
+  ASSERT_TRUE(engine.SetTarget(target).ok());
+  const auto expect = [&](const std::string& what) {
+    SCOPED_TRACE(what);
+    const Drawn want(scene, target);
+    const absl::StatusOr<FrameResult> frame = engine.Frame();
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_TRUE(engine.pictures() == want.pictures);
+    EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+  };
+  DeltaBuffer first;
+  first.PutWhole(scene);
+  ASSERT_TRUE(engine.Apply(first).ok());
+  expect("a little");
+
+  PutLines(scene, 2, 1, 30'000, 20, target.geometry.grid);
+  PutLines(scene, 3, 2, 500, 20, target.geometry.grid);
+  PutLines(scene, 4, 3, 6'000, 10, target.geometry.grid);
+  DeltaBuffer more;
+  for (const uint64_t id : {2, 3, 4}) more.Put(scene.geometries[id]);
+  for (const uint64_t id : {2, 3}) more.Put(scene.layers[id]);
+  for (const uint64_t id : {2, 3, 4}) more.Put(scene.drawables[id]);
+  ASSERT_TRUE(engine.Apply(more).ok());
+  expect("with more in the same layer, and others");
+
+  scene.layers[3].visible = 0;
+  scene.drawables[2].transform.m[3] = 7;
+  DeltaBuffer moved;
+  moved.Put(scene.layers[3]);
+  moved.Put(scene.drawables[2]);
+  ASSERT_TRUE(engine.Apply(moved).ok());
+  expect("a layer hidden, the most of the lines moved");
+
+  scene.layers[3].visible = 1;
+  for (const uint64_t id : {1, 2}) scene.drawables.erase(id);
+  DeltaBuffer less;
+  less.Put(scene.layers[3]);
+  for (const uint64_t id : {1, 2}) less.Drop(Op::kDropDrawable, id);
+  ASSERT_TRUE(engine.Apply(less).ok());
+  expect("without the most of the lines");
+  scene.drawables.erase(3);
+  DeltaBuffer last;
+  last.Drop(Op::kDropDrawable, 3);
+  ASSERT_TRUE(engine.Apply(last).ok());
+  expect("without those in front");
+}
+
+TEST(ListBudget, SomeTrianglesAndPairsWithinItAndSomeNot) {
+  const Target target = StackOf(70, 60, 150);
+  const display::VoxelGrid& grid = target.geometry.grid;
+  SceneModel scene;
+  PutTriangles(scene, 1, 1, 300, 10, grid);
+  PutCapsules(scene, 2, 1, 40, 10, grid);
+  EngineDriver engine(CaseWith({.few_items = 0, .index_bytes = 120'000}), {.threads = 1});
+  ASSERT_TRUE(engine.SetTarget(target).ok());
+  const auto expect = [&](const std::string& what, const DeltaBuffer& delta) {
+    SCOPED_TRACE(what);
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    const Drawn want(scene, target);
+    const absl::StatusOr<FrameResult> frame = engine.Frame();
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_TRUE(engine.pictures() == want.pictures);
+    EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+  };
+  DeltaBuffer first;
+  first.PutWhole(scene);
+  expect("a little", first);
+
+  PutTriangles(scene, 3, 1, 6'000, 12, grid);
+  PutTriangles(scene, 4, 2, 2'000, 12, grid);
+  PutCapsules(scene, 5, 1, 1'500, 6, grid);  // of more than one go
+  PutCapsules(scene, 6, 3, 60, 40, grid);
+  for (uint64_t id = 10; id < 40; ++id) {
+    const auto at = static_cast<float>(id);
+    PutBall(scene, id, 2 + id % 2, at * 1.5F, 60 - at, at * 3, 6);
+  }
+  DeltaBuffer more;
+  for (const auto& [id, geometry] : scene.geometries) {
+    if (id > 2) more.Put(geometry);
+  }
+  for (const uint64_t id : {2, 3}) more.Put(scene.layers[id]);
+  for (const auto& [id, drawable] : scene.drawables) {
+    if (id > 2) more.Put(drawable);
+  }
+  expect("with more in the same layer, and others", more);
+
+  scene.layers[3].visible = 0;
+  for (const uint64_t id : {3, 5, 10}) scene.drawables[id].transform.m[3] = 7;
+  DeltaBuffer moved;
+  moved.Put(scene.layers[3]);
+  for (const uint64_t id : {3, 5, 10}) moved.Put(scene.drawables[id]);
+  expect("a layer hidden, the most moved", moved);
+
+  scene.layers[3].visible = 1;
+  DeltaBuffer less;
+  less.Put(scene.layers[3]);
+  for (const uint64_t id : {1, 3, 5, 12}) {
+    scene.drawables.erase(id);
+    less.Drop(Op::kDropDrawable, id);
+  }
+  expect("without the most of it", less);
+  DeltaBuffer last;
+  for (const uint64_t id : {2, 4, 6, 13}) {
+    scene.drawables.erase(id);
+    last.Drop(Op::kDropDrawable, id);
+  }
+  expect("of balls alone", last);
+  PutTriangles(scene, 50, 1, 300, 10, grid);
+  DeltaBuffer fresh;
+  fresh.Put(scene.geometries[50]);
+  fresh.Put(scene.drawables[50]);
+  expect("with some triangles again", fresh);
+}
+
+// Where there is no room to sweep out of the index of pairs what has gone, it is made anew.
+TEST(ListBudget, WhatHasGoneLeavesItsRoom) {
+  const Target target = StackOf(40, 30, 70);
+  const display::VoxelGrid& grid = target.geometry.grid;
+  constexpr uint32_t kCloud = 70'000;  // more than goes unswept
+  SceneModel scene;
+  PutCapsules(scene, 1, 1, 30, 8, grid);
+  PutCapsules(scene, 2, 2, kCloud, 2, grid);
+  scene.layers[2].visible = 0;  // costs pairs, and no drawing
+  EngineDriver engine(CaseWith({.few_items = 0, .index_bytes = 6'000'000, .index_share_kept = 0.9}),
+                      {.threads = 1});
+  ASSERT_TRUE(engine.SetTarget(target).ok());
+  DeltaBuffer delta;
+  delta.PutWhole(scene);
+  uint64_t greatest = 0;
+  for (uint64_t round = 0; round < 4; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    const Drawn want(scene, target);
+    const absl::StatusOr<FrameResult> frame = engine.Frame();
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_TRUE(engine.pictures() == want.pictures);
+    EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+    if (round == 0) {
+      greatest = frame->memory_bytes;
+      EXPECT_GT(greatest, 4'000'000u) << "the cloud needs no pairs";
+    }
+    EXPECT_LE(frame->memory_bytes, greatest + 8'000'000);
+    // Another cloud in place of this one, and something to be seen.
+    const uint64_t cloud = round == 0 ? 2 : 100 + round - 1, ball = 200 + round;
+    scene.drawables.erase(cloud);
+    scene.geometries.erase(cloud);
+    PutCapsules(scene, 100 + round, 2, kCloud, 2, grid);
+    scene.layers[2].visible = 0;
+    PutBall(scene, ball, 1, 10 + 5 * static_cast<float>(round), 15, 30, 5);
+    delta = {};
+    delta.Drop(Op::kDropDrawable, cloud);
+    delta.Drop(Op::kDropGeometry, cloud);
+    for (const uint64_t id : {100 + round, ball}) {
+      delta.Put(scene.geometries[id]);
+      delta.Put(scene.drawables[id]);
+    }
+  }
+}
+
+// The target, the scene and a frame, each made again if it is refused.
+struct Played {
+  uint32_t refused = 0, lost = 0;
+  bool as_wanted = false;
+};
+Played Play(const Target& target, const Drawn& want, const cuda::FaultPlan& faults) {
+  Played played;
+  EngineDriver engine(CaseWith({}, faults), {.threads = 1});
+  const auto twice = [&](const std::function<absl::Status()>& call) {
+    absl::Status status = call();
+    if (absl::IsResourceExhausted(status)) {
+      ++played.refused;
+      status = call();
+    }
+    if (!status.ok()) ++played.lost;
+  };
+  twice([&] { return engine.SetTarget(target); });
+  twice([&] { return engine.Apply(want.delta); });
+  twice([&] { return engine.Frame().status(); });
+  played.as_wanted = engine.pictures() == want.pictures;
+  return played;
+}
+
+// Each call of CUDA in its turn finds no memory, once. Where that was to be had for a list, or was for
+// its making, nothing is refused.
+TEST_P(ListBudgetOf, ADeviceWithoutMemoryForListsRefusesNothing) {
+  const Target target = StackOf(40, 30, 20);
+  SceneModel scene = SceneOn(target);
+  // A few of each.
+  for (auto& [id, g] : scene.geometries) {
+    if (g.positions.empty()) continue;
+    constexpr uint32_t kVertices = 120;
+    g.record.vertex_count = std::min(g.record.vertex_count, kVertices);
+    g.positions.resize(size_t{g.record.vertex_count} * 3);
+    g.colors.resize(g.record.vertex_count);
+  }
+  const Drawn want(scene, target);
+  uint32_t refused = 0, drawn = 0;
+  for (uint64_t call = 1; Play(target, want, {call, cudaErrorIllegalAddress, false}).lost != 0;
+       ++call) {
+    SCOPED_TRACE("call " + std::to_string(call));
+    ASSERT_LT(call, 1000u);
+    const Played played = Play(target, want, {call, cudaErrorMemoryAllocation, false});
+    EXPECT_TRUE(played.as_wanted);
+    EXPECT_EQ(played.lost, 0u);
+    EXPECT_LE(played.refused, 1u);
+    ++(played.refused != 0 ? refused : drawn);
+  }
+  EXPECT_GT(refused, 0u);
+  EXPECT_GE(drawn, GetParam().for_lists);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, ListBudgetOf, testing::ValuesIn(kKinds),
+                         [](const auto& kind) { return std::string(kind.param.name); });
+
+}  // namespace
+}  // namespace voxeld::gpu::conformance
