@@ -99,9 +99,9 @@ struct EngineOptions {
   std::function<void(const absl::Status&)> lost;
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
-  // Bounds what an engine derives of items by tile (CPU), or by tile and region (CUDA, of the device's memory). A scene
-  // that needs more is drawn in passes, to the same bytes, in more time. 0: the engine's own choice (CPU: 4 GiB; CUDA: 16 GiB
-  // or a quarter of the device, whichever is less).
+  // Bounds what an engine derives of items by tile (CPU), or by tile and region (CUDA, of the device's
+  // memory). A scene that needs more is drawn in passes, to the same bytes, in more time. 0: the
+  // engine's own choice (CPU: 4 GiB; CUDA: 16 GiB or a quarter of the device, whichever is less).
   uint64_t index_bytes = 0;
 };
 
