@@ -75,8 +75,10 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   const sync::TimeNs start = clock.Now();
   using Mark = Stopwatch::Mark;
   if (absl::Status status = stopwatch_.Set(Mark::kBegun); !status.ok()) return status;
-  const bool together = volume_.item_count() < tuning_.few_items;
-  absl::Status status = volume_.Prepare(pictures_->GroupsOfRegions(together));
+  absl::Status status = volume_.TakeIn();
+  if (!status.ok()) return status;
+  const bool together = volume_.ItemsToDraw() < tuning_.few_items;
+  status = volume_.ListDirty(pictures_->GroupsOfRegions(together));
   if (!status.ok()) return status;
   const PackedView* const packed = pictures_->packed();
   status = pictures_->Draw(volume_.view(), request.frame, buffer, request.buffer_holds, together,
@@ -104,7 +106,8 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
 absl::Status CudaCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
   if (absl::Status status = CheckBox(box, out.size(), layout_); !status.ok()) return status;
   if (absl::Status status = device_->api().Enter(); !status.ok()) return status;
-  absl::Status status = volume_.Prepare({});
+  absl::Status status = volume_.TakeIn();
+  if (status.ok()) status = volume_.ListDirty({});
   if (status.ok())
     status = volume_.DrawGroup(0, pictures_->index(), pictures_->packed(), device_->stream());
   if (!status.ok()) return status;

@@ -1,6 +1,7 @@
 #include "gpu/cuda/cuda_volume.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -32,6 +33,24 @@ CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
       index_(device, list_budget_),
       lines_(device, list_budget_, tuning.few_lines),
       triangles_(device, list_budget_) {}
+
+void RoughBox::Add(const RoughBox& other) {
+  for (int a = 0; a < 3; ++a) {
+    lo[a] = std::min(lo[a], other.lo[a]);
+    hi[a] = std::max(hi[a], other.hi[a]);
+  }
+}
+
+double RoughBox::ShareOf(const RegionGrid& regions) const {
+  double share = 1;
+  for (int a = 0; a < 3; ++a) {
+    const double count = regions.blocks[a] << kBlockBits, size = 1 << RegionBits(a);
+    const double begin = std::clamp(std::floor(lo[a] / size), 0.0, count);
+    const double end = std::clamp(std::floor(hi[a] / size) + 1, begin, count);
+    share *= (end - begin) / count;
+  }
+  return share;
+}
 
 // ------------------------------------------------------------------------------------------- tiles
 
@@ -76,6 +95,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   view_ = view;
   scene_.MapClips(view_, true);
   listed_ = all_dirty;
+  dirty_ = all_dirty ? RoughBox::Everything() : RoughBox::Nothing();
   counted_ = true;
   index_.Clear();
   lines_.Reset(tiles_.grid, tiles_.owned_here);
@@ -204,6 +224,7 @@ absl::Status CudaVolume::MarkLeft() {
       status = index->Mark({of_regions, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
     }
     if (!status.ok()) return status;
+    for (const uint32_t slot : marks_) dirty_.Add(slots_[slot].box);
     marks_.clear();
   }
   if (left_.empty()) return absl::OkStatus();
@@ -214,6 +235,7 @@ absl::Status CudaVolume::MarkLeft() {
     if (status = index->Drop(left_); !status.ok()) return status;
   }
   for (const uint32_t slot : left_) {
+    dirty_.Add(slots_[slot].box);
     if (slots_[slot].indexed_by != IndexedBy::kPairs) {
       free_slots_.push_back(slot);
       slots_[slot] = {};
@@ -301,13 +323,12 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
   });
 }
 
-uint64_t CudaVolume::item_count() const {
-  uint64_t items = live_items_ + lines_.live() + triangles_.live();
-  for (const Drawable* drawable : pending_) items += drawable->geometry->view.record.vertex_count;
-  return items;
+double CudaVolume::ItemsToDraw() const {
+  const uint64_t items = live_items_ + lines_.live() + triangles_.live();
+  return static_cast<double>(items) * dirty_.ShareOf(tiles_.regions);
 }
 
-absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
+absl::Status CudaVolume::TakeIn() {
   if (absl::Status status = PutLayers(); !status.ok()) return status;
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
@@ -315,9 +336,12 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
   if (absl::Status status = lines_.SortDeferred(); !status.ok()) return status;
   if (absl::Status status = triangles_.Merge(); !status.ok()) return status;
   if (absl::Status status = triangles_.SortDeferred(); !status.ok()) return status;
+  return index_.AddDeferred(table_.as<TableEntry>(), tiles_.view());
+}
+
+absl::Status CudaVolume::ListDirty(const DrawGroups& groups) {
   const VolumeView volume = tiles_.view();
-  absl::Status status = index_.AddDeferred(table_.as<TableEntry>(), volume);
-  if (!status.ok()) return status;
+  absl::Status status;
   if (listed_) {
     status = device_.Run("cudaMemcpyAsync", [&] {
       return cudaMemcpyAsync(volume.dirty, volume.owned, volume.grid.count(),
@@ -331,8 +355,9 @@ absl::Status CudaVolume::Prepare(const DrawGroups& groups) {
   if (!status.ok()) return status;
   listed_ = counted_ = true;
   groups_ = groups;
-  return device_.Run("ListDirty",
-                     [&] { return ListDirty(volume, tiles_.regions, groups, device_.stream()); });
+  return device_.Run("ListDirty", [&] {
+    return cuda::ListDirty(volume, tiles_.regions, groups, device_.stream());
+  });
 }
 
 absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
@@ -346,7 +371,10 @@ absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
   view.taken = &view.volume.counters->taken[group];
   absl::Status status =
       DrawListed(view, packed != nullptr ? DrawTo::kPictures : DrawTo::kTiles, stream);
-  if (status.ok() && group + 1 == groups_.count) listed_ = false;
+  if (status.ok() && group + 1 == groups_.count) {
+    listed_ = false;
+    dirty_ = RoughBox::Nothing();
+  }
   return status;
 }
 

@@ -58,6 +58,18 @@ struct DeviceArrays {
   std::optional<GeometryBounds> bounds;
 };
 
+// A box of voxels, closed, of which nothing more is asked than about how large it is; at first, none.
+struct RoughBox {
+  double lo[3], hi[3];
+
+  static constexpr double kFar = 1e30;
+  static RoughBox Nothing() { return {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}}; }
+  static RoughBox Everything() { return {{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}}; }
+  void Add(const RoughBox& other);
+  // Of a volume's regions, the share that it touches.
+  double ShareOf(const RegionGrid& regions) const;
+};
+
 // Thread-bound. Its calls queue work in the device's stream. An error leaves the scene as it was,
 // and what could not be drawn is drawn with the next Update.
 class CudaVolume final : private SceneObserver {
@@ -71,11 +83,14 @@ class CudaVolume final : private SceneObserver {
   // Everything is to be drawn anew; with `all_dirty` also where nothing is.
   absl::Status SetView(DeviceTiles tiles, const Affine& view, bool all_dirty);
 
-  // A frame: takes in what has come and gone and finds what is dirty, by group. Then, each group
-  // once, DrawGroup draws that: into the tiles, and marks the slices that look at it; or, if there is
-  // `packed`, straight into pictures. If DrawsApart, groups may be drawn in streams of their own, after
-  // what Prepare has queued.
-  absl::Status Prepare(const DrawGroups& groups);
+  // A frame: TakeIn takes in what has come and gone, and ListDirty finds what is dirty, by group.
+  // Then, each group once, DrawGroup draws that: into the tiles, and marks the slices that look at it;
+  // or, if there is `packed`, straight into pictures. If DrawsApart, groups may be drawn in streams of
+  // their own, after what ListDirty has queued.
+  absl::Status TakeIn();
+  absl::Status ListDirty(const DrawGroups& groups);
+  // About how many items lie where something is dirty; after TakeIn.
+  double ItemsToDraw() const;
   bool DrawsApart() const {
     return CountDeferred([](uint32_t) { return true; }) == 0;
   }
@@ -83,7 +98,6 @@ class CudaVolume final : private SceneObserver {
                          cudaStream_t stream);
   // The frame's counters have been told, and begin anew.
   void CountersAreClear() { counted_ = false; }
-  uint64_t item_count() const;
 
   // The colours of voxels, after a frame; for who asks. `out` is on the device.
   absl::Status Read(const Box3& box, uint32_t* out);
@@ -99,6 +113,7 @@ class CudaVolume final : private SceneObserver {
     uint32_t items = 0;
     bool singular = false;
     IndexedBy indexed_by = IndexedBy::kPairs;
+    RoughBox box = RoughBox::Everything();
     uint32_t regions_each = 0;   // that a triangle touches at most
     Block tiles, begin, voxels;  // of what the CPU has drawn
   };
@@ -124,8 +139,11 @@ class CudaVolume final : private SceneObserver {
   absl::Status MarkLeft();
   absl::Status MarkPairs(std::span<const uint32_t> slots);
   absl::Status Enter();
+  // `entries`: null, or what the table does not have of these drawables, which then come together.
   absl::Status EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
-                            std::span<const uint32_t> slots);
+                            std::span<const uint32_t> slots, const FewEntries* entries);
+  // Whether they are lines, of one layer, and so few that an index of them puts them into the table.
+  bool AreFewLines(std::span<const uint32_t> slots, std::span<const TableEntry> entries) const;
   // Of one layer, no more than may come at once.
   struct Arriving {
     std::vector<uint32_t> slots;
@@ -133,7 +151,8 @@ class CudaVolume final : private SceneObserver {
     bool visible = false, mixed = false;
     uint32_t regions_each = 0;
   };
-  absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving);
+  absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving,
+                          const FewEntries* entries);
   absl::Status EnterPairs(std::span<const PairedDrawable> drawables);
   // Puts off all that the index of pairs has.
   void DeferPairs();
@@ -163,7 +182,8 @@ class CudaVolume final : private SceneObserver {
   Affine view_;
   bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
   bool counted_ = true;  // the counters have begun
-  DrawGroups groups_;    // of the frame under way
+  RoughBox dirty_ = RoughBox::Nothing();
+  DrawGroups groups_;  // of the frame under way
   ListBudget list_budget_;
   PairIndex index_;  // of all that the others do not have
   LineIndex lines_;

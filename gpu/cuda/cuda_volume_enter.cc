@@ -8,6 +8,7 @@
 #include "gpu/cuda/cuda_volume.h"
 #include "gpu/cuda/item_lists.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/cuda/line_kernels.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
@@ -31,8 +32,11 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
       hi[a] = corner == 0 ? at[a] : std::max(hi[a], at[a]);
     }
   }
+  const RoughBox box{{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
   if (by == IndexedBy::kLines) {
-    if (AreThin(lo, hi)) slot.indexed_by = by;
+    if (!AreThin(lo, hi)) return;
+    slot.indexed_by = by;
+    slot.box = box;
     return;
   }
   // Differences of floats were rounded; and so is what a vertex is mapped to, in proportion to its
@@ -51,6 +55,7 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
   }
   if (!AreCompact(lo, hi, extent)) return;
   slot.indexed_by = by;
+  slot.box = box;
   // Snapping, voxels only touched, and that the last one counts.
   int32_t voxels[3];
   for (int a = 0; a < 3; ++a) voxels[a] = static_cast<int32_t>(extent[a]) + 4;
@@ -135,14 +140,33 @@ absl::Status CudaVolume::GrowTable() {
   return status;
 }
 
+namespace {
+
+FewEntries FewOf(std::span<const uint32_t> slots, std::span<const TableEntry> entries) {
+  FewEntries few;
+  std::copy(slots.begin(), slots.end(), few.slots);
+  std::copy(entries.begin(), entries.end(), few.entries);
+  return few;
+}
+
+}  // namespace
+
+bool CudaVolume::AreFewLines(std::span<const uint32_t> slots,
+                             std::span<const TableEntry> entries) const {
+  uint64_t items = 0;
+  for (size_t i = 0; i < slots.size(); ++i) {
+    const Slot& slot = slots_[slots[i]];
+    if (slot.indexed_by != IndexedBy::kLines || entries[i].layer != entries[0].layer) return false;
+    items += slot.items;
+  }
+  return slots.size() <= kFewRows && items > 0 && items <= kMostFewLines;
+}
+
 absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
                                       std::span<const TableEntry> entries) {
-  if (absl::Status status = GrowTable(); !status.ok()) return status;
   const uint32_t count = static_cast<uint32_t>(slots.size());
   if (count <= kFewRows) {
-    FewEntries few;
-    std::copy(slots.begin(), slots.end(), few.slots);
-    std::copy(entries.begin(), entries.end(), few.entries);
+    const FewEntries few = FewOf(slots, entries);
     return device_.Run("PutEntries", [&] {
       return PutFewEntries(table_.as<TableEntry>(), few, count, device_.stream());
     });
@@ -197,7 +221,10 @@ absl::Status CudaVolume::Enter() {
     singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);
   }
-  if (absl::Status status = PutDrawables(slots, entries); !status.ok()) {
+  const bool few_lines = AreFewLines(slots, entries);
+  absl::Status status = GrowTable();
+  if (status.ok() && !few_lines) status = PutDrawables(slots, entries);
+  if (!status.ok()) {
     for (const uint32_t taken : slots) slots_[taken] = {};
     free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
     return status;
@@ -209,15 +236,23 @@ absl::Status CudaVolume::Enter() {
     pairs.push_back({slots[i], entries[i].layer, slot.items});
     live_items_ += slot.items;
   }
-  absl::Status status = EnterPairs(pairs);
-  if (status.ok()) status = EnterRegions(IndexedBy::kLines, drawables, slots);
-  if (status.ok()) status = EnterRegions(IndexedBy::kTriangles, drawables, slots);
+  if (few_lines) {
+    const FewEntries few = FewOf(slots, entries);
+    status = EnterRegions(IndexedBy::kLines, drawables, slots, &few);
+  } else {
+    status = EnterPairs(pairs);
+    if (status.ok()) status = EnterRegions(IndexedBy::kLines, drawables, slots, nullptr);
+    if (status.ok()) status = EnterRegions(IndexedBy::kTriangles, drawables, slots, nullptr);
+  }
   if (!status.ok()) {
     // They go again, and come anew with the next frame.
     left_.insert(left_.end(), slots.begin(), slots.end());
     return status;
   }
-  for (size_t i = 0; i < slots.size(); ++i) slot_of_[drawables[i]] = slots[i];
+  for (size_t i = 0; i < slots.size(); ++i) {
+    slot_of_[drawables[i]] = slots[i];
+    dirty_.Add(slots_[slots[i]].box);
+  }
   singular_ += singular;
   pending_.clear();
   return absl::OkStatus();
@@ -237,7 +272,7 @@ absl::Status CudaVolume::EnterPairs(std::span<const PairedDrawable> drawables) {
 
 // Layer by layer.
 absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
-                                      std::span<const uint32_t> slots) {
+                                      std::span<const uint32_t> slots, const FewEntries* entries) {
   RegionIndex& index = IndexOf(by);
   absl::flat_hash_map<uint32_t, std::vector<Arriving>> layers;  // by slot
   for (size_t i = 0; i < slots.size(); ++i) {
@@ -259,13 +294,15 @@ absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* co
   }
   for (const auto& [layer, groups] : layers) {
     for (const Arriving& arriving : groups) {
-      if (absl::Status status = EnterGroup(index, layer, arriving); !status.ok()) return status;
+      absl::Status status = EnterGroup(index, layer, arriving, entries);
+      if (!status.ok()) return status;
     }
   }
   return absl::OkStatus();
 }
 
-absl::Status CudaVolume::EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving) {
+absl::Status CudaVolume::EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving,
+                                    const FewEntries* entries) {
   const absl::StatusOr<UploadedList> list =
       UploadItems(device_, arriving.slots, [&](uint32_t slot) { return slots_[slot].items; });
   if (!list.ok()) return list.status();
@@ -276,7 +313,8 @@ absl::Status CudaVolume::EnterGroup(RegionIndex& index, uint32_t layer, const Ar
                     .regions_each = arriving.regions_each,
                     .list = list->list,
                     .slots = arriving.slots,
-                    .first = arriving.first},
+                    .first = arriving.first,
+                    .entries = entries},
                    tiles_.region_dirty.as<uint8_t>());
 }
 

@@ -18,6 +18,21 @@ __device__ inline uint64_t Thread() {
   return static_cast<uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
 }
 
+// table[few.slots[i]] = few.entries[i], by one block of threads, word by word.
+__device__ inline void PutFew(TableEntry* table, const FewEntries& few, uint32_t count) {
+  constexpr uint32_t kWords = sizeof(TableEntry) / sizeof(uint32_t);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t* const from = reinterpret_cast<const uint32_t*>(&few.entries[i]);
+    uint32_t* const to = reinterpret_cast<uint32_t*>(&table[few.slots[i]]);
+    for (uint32_t w = threadIdx.x; w < kWords; w += blockDim.x) to[w] = from[w];
+  }
+  __syncthreads();
+  if (threadIdx.x < count) {
+    TableEntry& entry = table[few.slots[threadIdx.x]];
+    entry.source.record = &entry.record;
+  }
+}
+
 // Which drawable of the list (ItemList, or of its kind) has item `i` of the row.
 template <typename List>
 __device__ uint32_t DrawableOf(const List& list, uint64_t i) {

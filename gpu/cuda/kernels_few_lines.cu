@@ -1,5 +1,5 @@
-// Few thin lines sorted by region, by one block of threads: what takes four kernels where there are
-// many would be over before the next could be queued.
+// Few thin lines made and sorted by region, by one block of threads: what takes six kernels where
+// there are many would be over before the next could be queued.
 #include <cub/block/block_scan.cuh>
 
 #include "gpu/cuda/line_kernels.h"
@@ -53,14 +53,20 @@ __device__ void PutLists(const LineSort& sort, const uint32_t* counts, uint32_t 
 }
 
 __global__ void __launch_bounds__(kThreads)
-    SortFewLinesKernel(LineSort sort, const ThinLine* lines, const uint32_t* ends, uint32_t count) {
+    SortFewLinesKernel(const __grid_constant__ FewLines few) {
   // Spans by region, then before it, then the place of the next.
   extern __shared__ uint32_t counts[];
+  const LineSort& sort = few.sort;
   const uint32_t regions = sort.grid.count(), i = threadIdx.x;
   for (uint32_t r = i; r < regions; r += kThreads) counts[r] = 0;
-  const ThinLine line = i < count ? LoadLine(&lines[i]) : ThinLine{};
-  const bool mixed = i < count && ends != nullptr && ends[i] != line.word;
+  PutFew(few.table, few.entries, few.entry_count);
   __syncthreads();
+  ThinLine line = {};
+  if (i < few.count) {
+    line = few.table != nullptr ? MakeLine(few.table, few.list, i, few.lines, few.ends)
+                                : LoadLine(&few.lines.lines[i]);
+  }
+  const bool mixed = i < few.count && few.ends != nullptr && few.ends[i] != line.word;
   WalkRegions(sort.grid, line, [&](const int32_t[3], uint32_t region, int32_t, int32_t) {
     atomicAdd(&counts[region], 1u);
   });
@@ -81,13 +87,12 @@ size_t SortFewLinesShared(const RegionGrid& grid) {
   return size_t{grid.count()} * sizeof(uint32_t);
 }
 
-cudaError_t SortFewLines(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
-                         uint32_t count, cudaStream_t stream) {
-  const size_t shared = SortFewLinesShared(sort.grid);
+cudaError_t SortFewLines(const FewLines& few, cudaStream_t stream) {
+  const size_t shared = SortFewLinesShared(few.sort.grid);
   const cudaError_t error = cudaFuncSetAttribute(
       SortFewLinesKernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared));
   if (error != cudaSuccess) return error;
-  SortFewLinesKernel<<<1, kThreads, shared, stream>>>(sort, lines, ends, count);
+  SortFewLinesKernel<<<1, kThreads, shared, stream>>>(few);
   return cudaGetLastError();
 }
 

@@ -40,19 +40,9 @@ __global__ void PutEntriesKernel(TableEntry* table, const TableEntry* entries,
   to.source.record = &to.record;
 }
 
-// By one block, word by word.
 __global__ void PutFewEntriesKernel(TableEntry* table, const __grid_constant__ FewEntries few,
                                     uint32_t count) {
-  constexpr uint32_t kWords = sizeof(TableEntry) / sizeof(uint32_t);
-  for (uint32_t i = 0; i < count; ++i) {
-    const uint32_t* const from = reinterpret_cast<const uint32_t*>(&few.entries[i]);
-    uint32_t* const to = reinterpret_cast<uint32_t*>(&table[few.slots[i]]);
-    for (uint32_t w = threadIdx.x; w < kWords; w += kThreads) to[w] = from[w];
-  }
-  __syncthreads();
-  if (threadIdx.x >= count) return;
-  TableEntry& entry = table[few.slots[threadIdx.x]];
-  entry.source.record = &entry.record;
+  PutFew(table, few, count);
 }
 
 __global__ void RebaseKernel(TableEntry* table, uint32_t count) {

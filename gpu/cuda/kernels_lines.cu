@@ -4,8 +4,6 @@
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/lines-inl.h"
-#include "gpu/primitives/list.h"
-#include "gpu/word.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
@@ -46,19 +44,7 @@ __global__ void MakeLinesKernel(const TableEntry* table, ItemList list, uint32_t
                                 LineArrays to, uint32_t* ends) {
   const uint64_t i = Thread();
   if (i >= items) return;
-  const uint32_t d = DrawableOf(list, i);
-  const TableEntry& entry = table[list.slot(d)];
-  const uint32_t item = static_cast<uint32_t>(i - list.first(d));
-  const Line line = entry.record.kind == PrimitiveKind::kPoints
-                        ? Points::ItemOf(entry.source, item)
-                        : Segments::ItemOf(entry.source, item);
-  const bool erase = entry.erase != 0;
-  ThinLine thin = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
-  uint32_t end = MakeWord(entry.priority, erase, line.color_e);
-  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the one voxel
-  to.lines[i] = thin;
-  to.tracks[i] = TrackOf(thin);
-  if (ends != nullptr) ends[i] = end;
+  MakeLine(table, list, i, to, ends);
 }
 
 __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, LineArrays from,

@@ -130,9 +130,13 @@ bool LineIndex::AreFew(const Batch& batch) const {
          SortFewLinesShared(grid()) + kScan <= device().api().device().sharedMemPerBlockOptin;
 }
 
-// They have `most_spans` at most.
-absl::Status LineIndex::SortFew(Batch& batch, uint64_t most_spans, uint8_t* region_dirty) {
+uint64_t LineIndex::MostSpans(const Batch& batch) const {
+  return uint64_t{batch.count} * MostBoxes(grid().blocks, kBlockBits);
+}
+
+absl::Status LineIndex::SortFew(Batch& batch, FewLines& few, uint8_t* region_dirty) {
   const size_t blocks = grid().block_count();
+  const uint64_t most_spans = MostSpans(batch);
   const std::pair<Block*, size_t> wanted[] = {
       {&batch.begin, (blocks + 1) * sizeof(uint32_t)},
       {&batch.base, blocks * sizeof(uint32_t)},
@@ -149,28 +153,47 @@ absl::Status LineIndex::SortFew(Batch& batch, uint64_t most_spans, uint8_t* regi
   absl::StatusOr<Block> regions = device().pool().Acquire(blocks * sizeof(uint64_t));
   if (!regions.ok()) return regions.status();
   batch.regions = *std::move(regions);
-  LineSort sort;
-  sort.grid = grid();
-  sort.span_capacity = static_cast<uint32_t>(most_spans);
-  sort.chunk_begin = batch.begin.as<uint32_t>();
-  sort.base = batch.base.as<uint32_t>();
-  sort.offsets = batch.offsets.as<uint16_t>();
-  sort.regions = batch.regions.as<uint64_t>();
-  sort.spans = batch.spans.as<LineSpan>();
-  sort.dirty = region_dirty;
-  return device().Run("SortFewLines", [&] {
-    return SortFewLines(sort, Arrays(batch).lines, Ends(batch), batch.count, device().stream());
-  });
+  few.sort.grid = grid();
+  few.sort.span_capacity = static_cast<uint32_t>(most_spans);
+  few.sort.chunk_begin = batch.begin.as<uint32_t>();
+  few.sort.base = batch.base.as<uint32_t>();
+  few.sort.offsets = batch.offsets.as<uint16_t>();
+  few.sort.regions = batch.regions.as<uint64_t>();
+  few.sort.spans = batch.spans.as<LineSpan>();
+  few.sort.dirty = region_dirty;
+  few.lines = Arrays(batch);
+  few.ends = Ends(batch);
+  few.count = batch.count;
+  return device().Run("SortFewLines", [&] { return SortFewLines(few, device().stream()); });
+}
+
+absl::StatusOr<bool> LineIndex::MakeFew(TableEntry* table, const Arrivals& arrivals, Batch& batch,
+                                        uint8_t* region_dirty) {
+  if (!AreFew(batch)) return false;
+  FewLines few;
+  few.table = table;
+  few.list = arrivals.list;
+  if (arrivals.entries != nullptr) {
+    few.entries = *arrivals.entries;
+    few.entry_count = static_cast<uint32_t>(arrivals.slots.size());
+  }
+  const absl::Status status = SortFew(batch, few, region_dirty);
+  if (absl::IsResourceExhausted(status)) return false;
+  if (!status.ok()) return status;
+  return true;
 }
 
 absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   const uint64_t most_pieces = uint64_t{batch.count} * MostBoxes(grid().blocks, 0);
-  const uint64_t most_spans = uint64_t{batch.count} * MostBoxes(grid().blocks, kBlockBits);
+  const uint64_t most_spans = MostSpans(batch);
   LineSort sort;
   sort.grid = grid();
   sort.dirty = region_dirty;
   uint32_t needed[2] = {};
-  if (AreFew(batch)) return SortFew(batch, most_spans, region_dirty);
+  if (AreFew(batch)) {
+    FewLines few;
+    return SortFew(batch, few, region_dirty);
+  }
   if (most_spans * sizeof(LineSpan) <= kUncountedBytes) {
     sort.piece_capacity = static_cast<uint32_t>(most_pieces);
     sort.span_capacity = static_cast<uint32_t>(most_spans);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/region_index.h"
 
 namespace voxeld::gpu::cuda {
@@ -24,6 +25,8 @@ class LineIndex final : public RegionIndex {
  private:
   uint64_t MostRegions() const override;
   absl::Status Make(const TableEntry* table, const ItemList& list, const Batch& batch) override;
+  absl::StatusOr<bool> MakeFew(TableEntry* table, const Arrivals& arrivals, Batch& batch,
+                               uint8_t* region_dirty) override;
   absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                     const Batch& to) override;
   absl::Status SortAll(Batch& batch, uint8_t* region_dirty) override;
@@ -37,7 +40,9 @@ class LineIndex final : public RegionIndex {
   absl::Status SortInto(Batch& batch, Block& regions, LineSort& sort, bool counted,
                         uint32_t* needed);
   bool AreFew(const Batch& batch) const;
-  absl::Status SortFew(Batch& batch, uint64_t most_spans, uint8_t* region_dirty);
+  uint64_t MostSpans(const Batch& batch) const;
+  // `few`: what of it is not the batch's.
+  absl::Status SortFew(Batch& batch, FewLines& few, uint8_t* region_dirty);
 
   const uint32_t few_lines_;
   // Of a line, on the average, as large batches had them; with some to spare.

@@ -47,9 +47,19 @@ cudaError_t CountPieces(const LineSort& sort, const ThinLine* lines, uint32_t co
 cudaError_t FillPieces(const LineSort& sort, const ThinLine* lines, uint32_t count,
                        cudaStream_t stream);
 // All of it at once, of kMostFewLines at most; of `sort` all is put down but what is between the goes.
+// With a table the lines are made first, as MakeLines does, after the entries have been put into it.
 inline constexpr uint32_t kMostFewLines = 1024;
-cudaError_t SortFewLines(const LineSort& sort, const ThinLine* lines, const uint32_t* ends,
-                         uint32_t count, cudaStream_t stream);
+struct FewLines {
+  LineSort sort;
+  LineArrays lines;
+  uint32_t* ends = nullptr;
+  uint32_t count = 0, entry_count = 0;
+  TableEntry* table = nullptr;
+  ItemList list;
+  FewEntries entries;
+};
+static_assert(sizeof(FewLines) <= 4096, "arguments have 4 KB");
+cudaError_t SortFewLines(const FewLines& few, cudaStream_t stream);
 // Shared memory that this takes.
 size_t SortFewLinesShared(const RegionGrid& grid);
 // `ends`: which lines have two colours; may be null. By so many blocks of threads.

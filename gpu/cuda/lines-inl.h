@@ -3,6 +3,8 @@
 
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/line_types.h"
+#include "gpu/primitives/list.h"
+#include "gpu/word.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -39,6 +41,25 @@ __device__ inline void SetRegion(uint64_t* regions, uint32_t region) {
   // Most have been set before; one that is not seen to be is set once more.
   if ((*static_cast<const volatile uint64_t*>(&bits) & bit) != 0) return;
   atomicOr(reinterpret_cast<unsigned long long*>(&bits), static_cast<unsigned long long>(bit));
+}
+
+// Line i of `to` is item i of the list; what it is.
+__device__ inline ThinLine MakeLine(const TableEntry* table, const ItemList& list, uint64_t i,
+                                    const LineArrays& to, uint32_t* ends) {
+  const uint32_t d = DrawableOf(list, i);
+  const TableEntry& entry = table[list.slot(d)];
+  const uint32_t item = static_cast<uint32_t>(i - list.first(d));
+  const Line line = entry.record.kind == PrimitiveKind::kPoints
+                        ? Points::ItemOf(entry.source, item)
+                        : Segments::ItemOf(entry.source, item);
+  const bool erase = entry.erase != 0;
+  ThinLine thin = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
+  uint32_t end = MakeWord(entry.priority, erase, line.color_e);
+  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the one voxel
+  to.lines[i] = thin;
+  to.tracks[i] = TrackOf(thin);
+  if (ends != nullptr) ends[i] = end;
+  return thin;
 }
 
 // Line `i` of the rows.

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gpu/cuda/item_lists.h"
+#include "gpu/cuda/kernels.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -59,8 +60,27 @@ absl::Status RegionIndex::TakeItems(Batch& batch) {
 
 // ------------------------------------------------------------------------------------------ changes
 
-absl::Status RegionIndex::Add(const TableEntry* table, const Arrivals& arrivals,
-                              uint8_t* region_dirty) {
+absl::Status RegionIndex::MakeAndSort(TableEntry* table, const Arrivals& arrivals, Batch& batch,
+                                      uint8_t* region_dirty) {
+  const absl::StatusOr<bool> made = MakeFew(table, arrivals, batch, region_dirty);
+  if (!made.ok()) return made.status();
+  if (*made) {
+    if (!lists_.KeepsTooMuch()) return absl::OkStatus();
+  } else {
+    absl::Status status;
+    if (arrivals.entries != nullptr) {
+      status = device_.Run("PutEntries", [&] {
+        return PutFewEntries(table, *arrivals.entries, static_cast<uint32_t>(arrivals.slots.size()),
+                             device_.stream());
+      });
+    }
+    if (status.ok()) status = Make(table, arrivals.list, batch);
+    if (!status.ok()) return status;
+  }
+  return Sort(batch, region_dirty);
+}
+
+absl::Status RegionIndex::Add(TableEntry* table, const Arrivals& arrivals, uint8_t* region_dirty) {
   const uint64_t count = arrivals.first.back();
   if (count == 0) return absl::OkStatus();
   Batch batch;
@@ -69,8 +89,9 @@ absl::Status RegionIndex::Add(const TableEntry* table, const Arrivals& arrivals,
   batch.regions_each = arrivals.regions_each;
   batch.mixed = arrivals.mixed;
   absl::Status status = TakeItems(batch);
-  if (status.ok()) status = Make(table, arrivals.list, batch);
-  if (status.ok()) status = Sort(batch, arrivals.visible ? region_dirty : nullptr);
+  if (status.ok()) {
+    status = MakeAndSort(table, arrivals, batch, arrivals.visible ? region_dirty : nullptr);
+  }
   if (!status.ok()) return status;
   const uint64_t number = next_number_++;
   for (size_t i = 0; i < arrivals.slots.size(); ++i) {

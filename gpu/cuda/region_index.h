@@ -34,6 +34,8 @@ struct Arrivals {
   ItemList list;              // on the device
   std::span<const uint32_t> slots;
   std::span<const uint64_t> first;  // as in the list
+  // Entries that the table does not have yet: then all of these drawables'; or null.
+  const FewEntries* entries = nullptr;
 };
 
 // The bookkeeping, whatever the items are. Thread-bound; its calls queue work in the device's stream.
@@ -54,7 +56,7 @@ class RegionIndex {
 
   // Adds them; marks regions if they are to be seen. ResourceExhausted, and nothing is added, if
   // memory does not suffice.
-  absl::Status Add(const TableEntry* table, const Arrivals& arrivals, uint8_t* region_dirty);
+  absl::Status Add(TableEntry* table, const Arrivals& arrivals, uint8_t* region_dirty);
 
   // Marks the regions of drawables.
   absl::Status Mark(std::span<const uint32_t> slots, uint8_t* region_dirty);
@@ -117,6 +119,11 @@ class RegionIndex {
   virtual uint64_t MostRegions() const = 0;
   // batch.items and colors, of the list.
   virtual absl::Status Make(const TableEntry* table, const ItemList& list, const Batch& batch) = 0;
+  // The entries put into the table, and the items made and sorted all at once; false, and nothing of
+  // it, if they are too many, or if there is no room.
+  virtual absl::StatusOr<bool> MakeFew(TableEntry*, const Arrivals&, Batch&, uint8_t*) {
+    return false;
+  }
   // `to` gets `count` items at `first` of the list, in which rows are those of `from`.
   virtual absl::Status Copy(const ItemList& list, uint64_t first, uint32_t count, const Batch& from,
                             const Batch& to) = 0;
@@ -155,6 +162,9 @@ class RegionIndex {
   bool WentOver(const absl::Status& status) const {
     return absl::IsResourceExhausted(status) || (status.ok() && lists_.KeepsTooMuch());
   }
+  // Makes the items of a batch that comes, and sorts it.
+  absl::Status MakeAndSort(TableEntry* table, const Arrivals& arrivals, Batch& batch,
+                           uint8_t* region_dirty);
   // Sorts the batch, or defers it.
   absl::Status Sort(Batch& batch, uint8_t* region_dirty);
   absl::Status Defer(Batch& batch, uint8_t* region_dirty);

@@ -6,9 +6,9 @@
 namespace voxeld::gpu::cuda {
 
 struct Tuning {
-  // A volume of fewer items is drawn as one group: copying its pictures while others are drawn is not
-  // worth the launches.
-  uint64_t few_items = 100'000;
+  // What has fewer items, about, where something is dirty is drawn as one group: copying its pictures
+  // while others are drawn is not worth the launches.
+  double few_items = 100'000;
   // Bytes of pictures that make it worth while to draw what follows as a group of its own: so long a
   // copy takes some launches.
   uint64_t group_bytes = uint64_t{24} << 20;

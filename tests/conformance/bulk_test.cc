@@ -135,7 +135,7 @@ TEST_P(EngineBulk, BulkMemoryIsHeldUntilItsGeometryIsDropped) {
     EXPECT_TRUE(engine.pictures() == other.pictures());
   }
   ASSERT_TRUE(engine.ApplyBytes(Drop(1).bytes).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   EXPECT_EQ(pool->used_bytes(), 0u);
   EXPECT_EQ(pool->held_bytes(), 0u);
 }
@@ -170,7 +170,7 @@ TEST_P(EngineBulk, BulkMemoryComesAndGoes) {
   EXPECT_LE(most, 20 * 8192u);  // places are used again
   Bulk reset(DeltaWriter::kSizeOfReset, [](DeltaWriter& writer) { writer.Reset(); });
   ASSERT_TRUE(engine.ApplyBytes(reset.bytes).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   EXPECT_EQ(pool->held_bytes(), 0u);
 }
 
@@ -198,7 +198,7 @@ TEST(BulkInAWorker, MustBeShared) {
   EXPECT_THAT(std::string(refused.message()), HasSubstr("of this process alone"));
   put = Put(1, InPool(*MakePool(), 1));
   EXPECT_TRUE(engine.ApplyBytes(put.bytes, put.referred).ok());
-  EXPECT_TRUE(engine.Frame().ok());
+  EXPECT_EQ(engine.Frame().status(), absl::OkStatus());
 }
 
 // ------------------------------------------------------------------------------------ the ledger

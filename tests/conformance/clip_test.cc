@@ -220,7 +220,7 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   whole.PutWhole(scene);
   ASSERT_TRUE(engine.SetTarget(StackTarget()).ok());
   ASSERT_TRUE(engine.Apply(whole).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   const auto put = [&](LayerRecord layer) {
     DeltaBuffer delta;
     delta.Put(layer);
@@ -266,7 +266,7 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   scene.drawables[1].transform.m[11] = 15;
   moved.Put(scene.drawables[1]);
   ASSERT_TRUE(engine.Apply(moved).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   scene.layers[1] = layer;
   ExpectLikeOracle(engine, scene, StackTarget());
 }
@@ -298,12 +298,12 @@ TEST_P(EngineClip, ANewViewMovesThePlanes) {
   delta.Put(DrawableRecord{.id = 2, .geometry = 2, .layer = 1});
   ASSERT_TRUE(engine.Apply(delta).ok());
   ASSERT_TRUE(engine.SetTarget(StackTarget(flat)).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   EXPECT_EQ(CountLit(engine.Voxels()), 0u);
   DeltaBuffer unclipped;
   unclipped.Put(LayerRecord{.id = 1});
   ASSERT_TRUE(engine.Apply(unclipped).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   EXPECT_EQ(CountLit(engine.Voxels()), 1u);
 }
 

@@ -108,7 +108,7 @@ TEST_P(OwnResolution, PartsJoinedEqualTheWhole) {
     EngineDriver engine = Make(options);
     ASSERT_TRUE(engine.SetTarget(target).ok());
     ASSERT_TRUE(engine.Apply(Whole(scene)).ok());
-    ASSERT_TRUE(engine.Frame().ok());
+    ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
     std::copy(engine.pictures().begin() + static_cast<ptrdiff_t>(begin * size),
               engine.pictures().begin() + static_cast<ptrdiff_t>(end * size),
               joined.begin() + static_cast<ptrdiff_t>(begin * size));
@@ -132,7 +132,7 @@ TEST_P(OwnResolution, ALineWithinAVoxelShowsTheGreaterColour) {
   EngineDriver engine = Make();
   ASSERT_TRUE(engine.SetTarget(target).ok());
   ASSERT_TRUE(engine.Apply(Whole(scene)).ok());
-  ASSERT_TRUE(engine.Frame().ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   const std::vector<uint32_t> voxels = engine.Voxels();
   EXPECT_EQ(voxels[(5 * 32 + 5) * 32 + 5], 0xFFFFFFu);
   EXPECT_EQ(CountLit(voxels), 1u);

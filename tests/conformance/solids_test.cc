@@ -153,7 +153,7 @@ class Solids : public EngineConformance {
     DeltaBuffer delta;
     delta.PutWhole(scene);
     EXPECT_TRUE(engine_.Apply(delta).ok());
-    EXPECT_TRUE(engine_.Frame().ok());
+    EXPECT_EQ(engine_.Frame().status(), absl::OkStatus());
     return engine_.Voxels();
   }
   EngineDriver engine_;
