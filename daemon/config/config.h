@@ -67,7 +67,7 @@ struct EngineConfig {
   uint32_t threads = 0;  // 0: one a core
   uint64_t staging_limit_bytes = uint64_t{4} << 30;
   uint32_t device = 0;  // which GPU
-  // Of a GPU's memory, for lists of thin lines by place, of each display; 0: the engine's own choice.
+  // gpu::EngineOptions::index_bytes, of each display.
   uint64_t index_bytes = 0;
   // A CUDA engine always has a process of its own; the CPU's may have one too.
   bool in_worker = false;

@@ -1,6 +1,6 @@
 // A budget for the index of items by tile, and how drawables that exceed it are drawn.
 //
-// A drawable whose bins fit keeps them (IndexBudget). Of any other it keeps which tiles it is in and how many items are
+// A drawable whose bins fit keeps them (IndexBudget). Of any other, until others' have gone, it keeps which tiles it is in and how many items are
 // in each (Bins::counts). Where such are to be seen, tiles are drawn in passes, runs of tiles with few enough of their
 // items, which are found anew for each pass (PassBins). In a tile that has too many by itself they are found and drawn range by
 // range.

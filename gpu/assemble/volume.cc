@@ -239,6 +239,7 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   derived_bytes_ = 0;
   singular_ = 0;
   counted_ = 0;
+  most_kept_ = 0;
   for (const auto& [id, drawable] : scene_.drawables()) {
     drawable->pending = true;
     drawable->bins.Clear();
@@ -297,13 +298,41 @@ void Volume::PreparePending() {
     counted_ += d->bins.counted();
     d->derived_bytes = DerivedBytes(*d, sizeof(Entry));
     derived_bytes_ += d->derived_bytes;
-    for (uint32_t row = 0; row < d->bins.tiles.size(); ++row) {
-      const uint32_t tile = d->bins.tiles[row];
-      index_[tile].entries.push_back({d, row});
-      if (d->layer->record.visible != 0) MarkDirty(tile);
-    }
+    List(*d);
+    if (d->layer->record.visible == 0) continue;
+    for (const uint32_t tile : d->bins.tiles) MarkDirty(tile);
   }
   pending_.clear();
+}
+
+void Volume::List(Drawable& d) {
+  for (uint32_t row = 0; row < d.bins.tiles.size(); ++row) {
+    index_[d.bins.tiles[row]].entries.push_back({&d, row});
+  }
+}
+
+void Volume::KeepCounted() {
+  if (counted_ == 0 || budget_.kept_bytes() + budget_.room_to_keep() > most_kept_) return;
+  most_kept_ = 0;
+  for (const auto& [id, drawable] : scene_.drawables()) {
+    Drawable& d = *drawable;
+    if (!d.bins.counted()) continue;
+    Bins counted = std::move(d.bins);
+    d.bins = Bins();
+    if (!Keep(d, executor_, budget_.room(), large_)) {
+      d.bins = std::move(counted);
+      break;
+    }
+    for (const uint32_t tile : counted.tiles) {
+      std::erase_if(index_[tile].entries, [&](const Entry& e) { return e.drawable == &d; });
+    }
+    List(d);
+    derived_bytes_ -= d.derived_bytes;
+    d.derived_bytes = DerivedBytes(d, sizeof(Entry));
+    derived_bytes_ += d.derived_bytes;
+    if (--counted_ == 0) break;
+  }
+  if (large_.bytes() > budget_.room_to_keep()) large_ = BinScratch();
 }
 
 // False if it comes out as it was. `next`: the tile that this worker draws after it, if it is known.
@@ -435,6 +464,8 @@ void Volume::DrawInPasses(TileObserver* observer, std::span<Drawn> drawn) {
 
 Volume::Changes Volume::Update(TileObserver* observer) {
   PreparePending();
+  KeepCounted();
+  most_kept_ = std::max(most_kept_, budget_.kept_bytes());
   std::sort(dirty_.begin(), dirty_.end());
   Changes changes;
   changes.tiles_drawn = static_cast<uint32_t>(dirty_.size());

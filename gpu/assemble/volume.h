@@ -140,6 +140,11 @@ class Volume final : private SceneObserver {
   bool Keep(Drawable& drawable, Executor& executor, uint64_t bytes, BinScratch& scratch);
   void Prepare(std::span<Drawable* const> small, std::span<Drawable* const> large);
   void PreparePending();
+  // Enters a drawable in the lists of its tiles.
+  void List(Drawable& drawable);
+  // Keeps the bins of drawables that were only counted, if so much of the budget has become free that
+  // it is worth trying.
+  void KeepCounted();
   bool DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
                 Scratch& scratch);
   // What came of dirty_[i].
@@ -165,7 +170,8 @@ class Volume final : private SceneObserver {
   BinScratch large_;  // of drawables that all workers prepare
   IndexBudget budget_;
   PassBins passes_;
-  size_t counted_ = 0;  // drawables
+  size_t counted_ = 0;      // drawables
+  uint64_t most_kept_ = 0;  // of the budget, since KeepCounted last tried
   uint64_t lit_voxels_ = 0, lit_tiles_ = 0, derived_bytes_ = 0;
   uint32_t singular_ = 0;
 };

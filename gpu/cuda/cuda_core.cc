@@ -32,10 +32,13 @@ absl::Status CudaCore::SetTarget(const Target& target) {
   const uint64_t bytes = static_cast<uint64_t>(end - begin) *
                          static_cast<uint64_t>(target.layout.sub_frames) *
                          target.layout.bytes_per_slice();
-  const std::optional<PackedPlan> packed =
-      PackedPlan::Of(table, voxels, target.layout, target.tone, begin, end,
-                     static_cast<int32_t>(std::clamp<uint64_t>(bytes / tuning_.group_bytes, 2,
-                                                               PackedPlan::kMostGroups)));
+  std::optional<PackedPlan> packed;
+  if (tuning_.pack_as_drawn) {
+    const auto groups =
+        std::clamp<uint64_t>(bytes / tuning_.group_bytes, 2, PackedPlan::kMostGroups);
+    packed = PackedPlan::Of(table, voxels, target.layout, target.tone, begin, end,
+                            static_cast<int32_t>(groups));
+  }
   absl::StatusOr<std::unique_ptr<CudaPictures>> pictures =
       CudaPictures::Make(*device_, {target.layout, target.tone, begin, end}, table, tile_to_slices,
                          packed, pictures_.get());

@@ -189,6 +189,7 @@ absl::Status CudaVolume::Enter() {
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   uint32_t singular = 0;
+  uint64_t coming[3] = {};  // items, by index
   absl::flat_hash_set<uint32_t> layers[] = {{}, lines_.Layers(), triangles_.Layers()};  // by index
   for (const Drawable* drawable : drawables) {
     const uint32_t slot = TakeSlot();
@@ -211,12 +212,17 @@ absl::Status CudaVolume::Enter() {
       });
       IndexedBy& by = slots_[slot].indexed_by;
       auto& taken = layers[static_cast<size_t>(by)];
+      uint64_t& items = coming[static_cast<size_t>(by)];
       if (by != IndexedBy::kPairs &&
           (slots_[slot].items > IndexOf(by).most_items() ||
-           (!taken.contains(entry.layer) && taken.size() >= kMaxLineLayers))) {
+           !IndexOf(by).MayHave(items + slots_[slot].items) ||
+           (!taken.contains(entry.layer) && taken.size() >= kMaxRegionLayers))) {
         by = IndexedBy::kPairs;
       }
-      if (by != IndexedBy::kPairs) taken.insert(entry.layer);
+      if (by != IndexedBy::kPairs) {
+        taken.insert(entry.layer);
+        items += slots_[slot].items;
+      }
     }
     singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);

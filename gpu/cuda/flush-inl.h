@@ -3,6 +3,7 @@
 // color(word, v) is what is seen of voxel v of the region, whose word is given.
 #pragma once
 
+#include "gpu/cuda/pixels-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/slice/pack.h"
 
@@ -112,13 +113,6 @@ __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, Reg
   __syncthreads();
 }
 
-// Writes a byte; true if it was another.
-__device__ inline bool PutByte(uint8_t* at, uint32_t value) {
-  if (*at == value) return false;
-  *at = static_cast<uint8_t>(value);
-  return true;
-}
-
 // A row's pixels into a picture of bytes.
 __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u, uint32_t v,
                                 uint32_t color, uint8_t* picture) {
@@ -131,14 +125,7 @@ __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u,
          Quantize(view.lut[rgb >> 8 & 0xFF], levels.g, threshold),
          Quantize(view.lut[rgb & 0xFF], levels.b, threshold)};
   }
-  const size_t pixel = static_cast<size_t>(v) * view.width + u;
-  if (view.format == display::PixelFormat::kRgb332) {
-    return PutByte(picture + pixel, q.r << 5 | q.g << 2 | q.b);
-  }
-  bool differs = PutByte(picture + pixel * 3, q.r);
-  differs |= PutByte(picture + pixel * 3 + 1, q.g);
-  differs |= PutByte(picture + pixel * 3 + 2, q.b);
-  return differs;
+  return PutLevels(view, u, v, q, picture);
 }
 
 // Three planes' words of a row of 32 pixels in a picture of bits, as far as the picture has them.

@@ -44,4 +44,10 @@ __device__ uint32_t DrawableOf(const List& list, uint64_t i) {
   return low;
 }
 
+// Where item `i` of the rows lies, of a list in which slot(d) is the first of the d-th row.
+__device__ inline uint64_t PlaceOf(const ItemList& list, uint64_t i) {
+  const uint32_t d = DrawableOf(list, i);
+  return list.slot(d) + (i - list.first(d));
+}
+
 }  // namespace voxeld::gpu::cuda

@@ -103,8 +103,9 @@ __global__ void AppendPairsKernel(const TableEntry* table, ItemList list, uint64
     return within.DrawsBlock(at);
   };
   for (uint64_t i = begin + Thread(); i < end; i += stride) {
-    // Room is taken once for all of an item: of additions made one by one within the walk, and
-    // gathered for the threads of a warp by CUDA 13.0's compiler, some are lost.
+    // Room is taken once for all of an item. One pair at a time within the walk, some of the additions
+    // were lost as ptxas 13.0 optimised this kernel for compute capability 9.0, from run to run others;
+    // none without its optimisation, and none of those that other kernels make outside such a walk.
     unsigned long long pairs = 0;
     ForTiles(table, list, i, volume,
              [&](uint32_t, const TableEntry&, uint32_t, uint32_t tile) { pairs += drawn(tile); });

@@ -21,7 +21,7 @@ __global__ void MarkLinesKernel(ItemList list, uint32_t count, const ThinLine* l
                                 RegionGrid grid, uint8_t* dirty) {
   const uint64_t i = Thread();
   if (i >= count) return;
-  ForRegions(lines[LineAt(list, i)], grid, [&](uint32_t region) { dirty[region] = 1; });
+  ForRegions(lines[PlaceOf(list, i)], grid, [&](uint32_t region) { dirty[region] = 1; });
 }
 
 __global__ void FindRegionsKernel(const ThinLine* lines, uint32_t count, RegionGrid grid,
@@ -34,7 +34,7 @@ __global__ void FindRegionsKernel(const ThinLine* lines, uint32_t count, RegionG
 __global__ void KillLinesKernel(ItemList list, uint32_t count, LineArrays of) {
   const uint64_t i = Thread();
   if (i >= count) return;
-  const uint64_t at = LineAt(list, i);
+  const uint64_t at = PlaceOf(list, i);
   of.lines[at].word = of.tracks[at].word = 0;
 }
 

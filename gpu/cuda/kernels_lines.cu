@@ -4,6 +4,7 @@
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/lines-inl.h"
+#include "gpu/cuda/warp-inl.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
@@ -51,7 +52,7 @@ __global__ void CopyLinesKernel(ItemList list, uint64_t first, uint32_t count, L
                                 const uint32_t* ends_from, LineArrays to, uint32_t* ends_to) {
   const uint64_t i = Thread();
   if (i >= count) return;
-  const uint64_t at = LineAt(list, first + i);
+  const uint64_t at = PlaceOf(list, first + i);
   const ThinLine line = from.lines[at];
   to.lines[first + i] = line;
   to.tracks[first + i] = from.tracks[at];
@@ -252,17 +253,6 @@ struct SpanScratch {
   uint32_t at[kRegionsInBlock];  // spans by region, then the place of the next
   uint32_t base;
 };
-
-// Exclusive sums over a warp; the sum of all in `total`.
-__device__ uint32_t SumBefore(uint32_t value, uint32_t& total) {
-  uint32_t sum = value;
-  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
-    const uint32_t other = __shfl_up_sync(kAll, sum, lanes);
-    if (threadIdx.x % 32 >= lanes) sum += other;
-  }
-  total = __shfl_sync(kAll, sum, 31);
-  return sum - value;
-}
 
 constexpr uint32_t kPiecesEach = kPieceChunk / kThreads;
 

@@ -1,6 +1,7 @@
 // The pictures of dirty slices: sampled through footprints, toned, dithered, packed, and compared
 // with what they were, in one pass.
 #include "gpu/cuda/kernels.h"
+#include "gpu/cuda/pixels-inl.h"
 #include "gpu/slice/pack.h"
 #include "gpu/slice/weight.h"
 #include "gpu/word.h"
@@ -80,29 +81,14 @@ __device__ uint32_t SampleWeighted(const VolumeView& volume, const SliceView& vi
   return rgb;
 }
 
-// Writes a byte; true if it was another.
-__device__ bool PutByte(uint8_t* at, uint32_t value) {
-  if (*at == value) return false;
-  *at = static_cast<uint8_t>(value);
-  return true;
-}
-
 // A pixel's levels into its picture, by 8 neighbouring lanes at once (bit planes: a byte of each
 // plane is theirs together).
 __device__ bool PutPixel(const SliceView& view, uint32_t u, uint32_t v, bool inside, Levels q,
                          uint8_t* picture) {
   switch (view.format) {
-    case display::PixelFormat::kRgb888: {
-      if (!inside) return false;
-      uint8_t* at = picture + (static_cast<size_t>(v) * view.width + u) * 3;
-      bool differs = PutByte(at, q.r);
-      differs |= PutByte(at + 1, q.g);
-      differs |= PutByte(at + 2, q.b);
-      return differs;
-    }
+    case display::PixelFormat::kRgb888:
     case display::PixelFormat::kRgb332:
-      return inside &&
-             PutByte(picture + static_cast<size_t>(v) * view.width + u, q.r << 5 | q.g << 2 | q.b);
+      return inside && PutLevels(view, u, v, q, picture);
     case display::PixelFormat::kBitPlanes3: {
       const size_t row = (view.width + 7) / 8, plane = row * view.height;
       const uint32_t first = threadIdx.x % 32 & ~7u;

@@ -62,18 +62,12 @@ __global__ void MakeTrianglesKernel(const TableEntry* table, ItemList list, uint
   for (uint32_t c = 0; c < 3; ++c) colors[i * 3 + c] = t.color[c];
 }
 
-// Triangle `i` of the rows.
-__device__ uint64_t TriangleAt(const ItemList& list, uint64_t i) {
-  const uint32_t d = DrawableOf(list, i);
-  return list.slot(d) + (i - list.first(d));
-}
-
 __global__ void CopyTrianglesKernel(ItemList list, uint64_t first, uint32_t count,
                                     const CompactTriangle* from, const uint32_t* colors_from,
                                     CompactTriangle* to, uint32_t* colors_to) {
   const uint64_t i = Thread();
   if (i >= count) return;
-  const uint64_t at = TriangleAt(list, first + i);
+  const uint64_t at = PlaceOf(list, first + i);
   Store(Load(&from[at]), &to[first + i]);
   if (colors_to == nullptr || colors_from == nullptr) return;
   for (uint32_t c = 0; c < 3; ++c) colors_to[(first + i) * 3 + c] = colors_from[at * 3 + c];
@@ -180,13 +174,12 @@ __global__ void MarkTrianglesKernel(ItemList list, uint32_t count, const Compact
                                     RegionGrid grid, uint8_t* dirty) {
   const uint64_t i = Thread();
   if (i >= count) return;
-  ForRegions(Load(&triangles[TriangleAt(list, i)]), grid,
-             [&](uint32_t region) { dirty[region] = 1; });
+  ForRegions(Load(&triangles[PlaceOf(list, i)]), grid, [&](uint32_t region) { dirty[region] = 1; });
 }
 
 __global__ void KillTrianglesKernel(ItemList list, uint32_t count, CompactTriangle* triangles) {
   const uint64_t i = Thread();
-  if (i < count) triangles[TriangleAt(list, i)].word = 0;
+  if (i < count) triangles[PlaceOf(list, i)].word = 0;
 }
 
 }  // namespace

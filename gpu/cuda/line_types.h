@@ -149,10 +149,10 @@ struct LineBatchView {
   }
 };
 
-inline constexpr uint32_t kMaxLineBatches = 24;
-inline constexpr uint32_t kMaxLineLayers = 8;
+inline constexpr uint32_t kMaxRegionBatches = 24;
+inline constexpr uint32_t kMaxRegionLayers = 8;
 struct LineBatchList {
-  LineBatchView batches[kMaxLineBatches];
+  LineBatchView batches[kMaxRegionBatches];
   uint32_t count = 0;
 };
 

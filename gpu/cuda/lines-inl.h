@@ -62,10 +62,4 @@ __device__ inline ThinLine MakeLine(const TableEntry* table, const ItemList& lis
   return thin;
 }
 
-// Line `i` of the rows.
-__device__ inline uint64_t LineAt(const ItemList& list, uint64_t i) {
-  const uint32_t d = DrawableOf(list, i);
-  return list.slot(d) + (i - list.first(d));
-}
-
 }  // namespace voxeld::gpu::cuda

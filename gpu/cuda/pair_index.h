@@ -49,9 +49,6 @@ class PairIndex {
   // Drops the pairs of drawables that are not alive. An error leaves all as it was.
   absl::Status DropDead(const TableEntry* table, uint32_t tiles);
 
-  // Merges batches of like size; an error leaves all as it was, and want of memory is none.
-  absl::Status Merge(const TableEntry* table, uint32_t tiles);
-
   // The items of deferred drawables of layers for which seen(slot) is true.
   using Seen = std::function<bool(uint32_t)>;
   uint64_t CountDeferred(const Seen& seen) const;
@@ -98,6 +95,9 @@ class PairIndex {
   // Sorts `pairs` pairs.
   absl::StatusOr<Batch> Sorted(Arrays arrays, uint32_t pairs, uint32_t tiles);
   absl::StatusOr<Block> Sums(const uint32_t* counts, uint32_t items);
+  // Merges batches of like size, of which there are some; an error leaves all as it was, and want of
+  // memory is none.
+  absl::Status Merge(const TableEntry* table, uint32_t tiles);
   // The batches from `first` on become one, without what is dead.
   absl::Status MergeFrom(size_t first, const TableEntry* table, uint32_t tiles);
 

@@ -2,7 +2,8 @@
 // needs what the one before needed allocates nothing.
 //
 // All work on the blocks is ordered by one stream: a block given back may be handed out again at
-// once. A pool may be a part of another, with a limit of its own.
+// once. Who has work on them done in another stream beside has that wait for the first, and the first
+// for it before any block goes back. A pool may be a part of another, with a limit of its own.
 #pragma once
 
 #include <cstddef>

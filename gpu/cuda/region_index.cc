@@ -185,18 +185,22 @@ absl::Status RegionIndex::Sort(Batch& batch, uint8_t* region_dirty) {
     DropLists(batch);
     status = SortExactly(batch, batch.regions, grid_, region_dirty);
   }
-  batch.deferred = WentOver(status);
-  return batch.deferred ? Defer(batch, region_dirty) : status;
+  batch.deferred = false;
+  if (!WentOver(status)) return status;
+  DropLists(batch);
+  return Defer(batch, region_dirty);
 }
 
+// An error leaves the batch as it was, unless it is one of marking.
 absl::Status RegionIndex::Defer(Batch& batch, uint8_t* region_dirty) {
-  DropLists(batch);
-  batch.regions = Block();
   absl::StatusOr<Block> regions = device_.Zeros(grid_.block_count() * sizeof(uint64_t));
   if (!regions.ok()) return regions.status();
+  absl::Status status = FindRegions(batch, regions->as<uint64_t>());
+  if (!status.ok()) return status;
+  DropLists(batch);
   batch.regions = *std::move(regions);
-  absl::Status status = FindRegions(batch, batch.regions.as<uint64_t>());
-  return status.ok() && region_dirty != nullptr ? MarkAll(batch, region_dirty) : status;
+  batch.deferred = true;
+  return region_dirty != nullptr ? MarkAll(batch, region_dirty) : status;
 }
 
 absl::Status RegionIndex::SortDeferred() {
@@ -307,8 +311,8 @@ absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
     for (const uint64_t old : numbers) {
       Batch& batch = batches_.at(old);
       if (batch.deferred) continue;
-      DropLists(batch);
-      dropped = batch.deferred = true;
+      if (absl::Status status = Defer(batch, nullptr); !status.ok()) return status;
+      dropped = true;
     }
     if (dropped) {
       if (absl::Status status = Sort(merged, nullptr); !status.ok()) return status;
@@ -329,7 +333,7 @@ absl::Status RegionIndex::Merge() {
     for (const auto& [number, batch] : batches_) order.push_back({batch.count, number});
     std::sort(order.begin(), order.end());
     std::vector<uint64_t> chosen;
-    const bool crowded = order.size() > kMaxLineBatches;
+    const bool crowded = order.size() > kMaxRegionBatches;
     for (size_t i = 0; i < order.size() && chosen.empty(); ++i) {
       const Batch& batch = batches_.at(order[i].second);
       if (batch.live < batch.count / 2) chosen = {order[i].second};
@@ -347,13 +351,13 @@ absl::Status RegionIndex::Merge() {
     merge_ = !chosen.empty();
     if (!merge_) break;
     const absl::Status status = MergeFrom(chosen);
-    if (absl::IsResourceExhausted(status) && order.size() <= kMaxLineBatches) {
+    if (absl::IsResourceExhausted(status) && order.size() <= kMaxRegionBatches) {
       merge_ = false;  // until something changes
       break;
     }
     if (!status.ok()) return status;
   }
-  if (batches_.size() > kMaxLineBatches) {
+  if (batches_.size() > kMaxRegionBatches) {
     return absl::ResourceExhaustedError(
         absl::StrCat("the scene has too many ", what_, " to be drawn at once"));
   }

@@ -48,11 +48,16 @@ class RegionIndex {
   // Forgets all, for a volume of that grid, of which the tiles are drawn that `owned` has (a TileOwner
   // each): of items elsewhere nothing is kept but themselves.
   void Reset(const TileGrid& grid, std::span<const uint8_t> owned);
-  // The slots of layers that have items here; no more than kMaxLineLayers may.
+  // The slots of layers that have items here; no more than kMaxRegionLayers may.
   absl::flat_hash_set<uint32_t> Layers() const;
   uint64_t live() const;  // items
   // Items that may come in one Add.
   uint64_t most_items() const { return most_items_; }
+  // Whether so many more leave no more batches, once merged, than can be drawn: of two of a layer that
+  // stay apart, one has more than half of what one may have, and half of these may be dead.
+  bool MayHave(uint64_t items) const {
+    return live() + items <= (kMaxRegionBatches - kMaxRegionLayers) / 4 * most_items_;
+  }
 
   // Adds them; marks regions if they are to be seen. ResourceExhausted, and nothing is added, if
   // memory does not suffice.
@@ -64,7 +69,7 @@ class RegionIndex {
   absl::Status Drop(std::span<const uint32_t> slots);
 
   // Merges batches of like size. Want of memory is no error, unless there are more than
-  // kMaxLineBatches.
+  // kMaxRegionBatches.
   absl::Status Merge();
 
   // Sorts what was deferred and has room now that other lists have gone.

@@ -3,6 +3,7 @@
 
 #include "gpu/assemble/blend.h"
 #include "gpu/cuda/draw_types.h"
+#include "gpu/cuda/warp-inl.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu::cuda {
@@ -14,17 +15,6 @@ inline constexpr uint32_t kSpansOfWarp = 32 * kSpansOfLane;
 inline constexpr uint32_t kMostSpans = kDrawWarps * kSpansOfWarp;
 inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are looked at at once
 inline constexpr uint32_t kRegionTiles = 4;  // bit 0: the further in x, bit 1: in y
-inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
-
-// Of a warp's values, the sum of those of the lanes before this one.
-__device__ inline uint32_t SumBefore(uint32_t value) {
-  uint32_t sum = value;
-  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
-    const uint32_t other = __shfl_up_sync(kAllLanes, sum, lanes);
-    if (threadIdx.x % 32 >= lanes) sum += other;
-  }
-  return sum - value;
-}
 
 // The number of a voxel of a region: x fastest, then y.
 __device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {

@@ -28,7 +28,7 @@ struct TriangleBatchView {
   }
 };
 
-inline constexpr uint32_t kMaxTriangleBatches = kMaxLineBatches;
+inline constexpr uint32_t kMaxTriangleBatches = kMaxRegionBatches;
 struct TriangleBatchList {
   TriangleBatchView batches[kMaxTriangleBatches];
   uint32_t count = 0;

@@ -9,6 +9,8 @@ struct Tuning {
   // What has fewer items, about, where something is dirty is drawn as one group: copying its pictures
   // while others are drawn is not worth the launches.
   double few_items = 100'000;
+  // Pictures whose pixels are voxels are packed as these are drawn, and no tiles are kept.
+  bool pack_as_drawn = true;
   // Bytes of pictures that make it worth while to draw what follows as a group of its own: so long a
   // copy takes some launches.
   uint64_t group_bytes = uint64_t{24} << 20;

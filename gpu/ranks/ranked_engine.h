@@ -21,8 +21,9 @@ namespace voxeld::gpu {
 // - What one rank refuses all refuse, with nothing changed. Where they differ (memory that runs out
 //   on one GPU in the middle of a call), and where one is lost, all are: their processes are ended,
 //   and EngineOptions::lost is told once, when the last has gone.
-// - FrameResult: `changed` if one says so; times are those of the rank that took longest; the rest are sums. A voxel counts
-//   once, but a tile as often as ranks draw it.
+// - FrameResult: `changed` if one says so, `packed_as_drawn` if all do; times are those of the rank
+//   that took longest; `singular_drawables` is every rank's; the rest are sums. A voxel counts once,
+//   but a tile as often as ranks draw it.
 absl::StatusOr<std::unique_ptr<Engine>> CreateRankedEngine(const EngineOptions& options,
                                                            std::string reason);
 

@@ -1,6 +1,7 @@
 // Every engine that must pass the conformance suite: one line each.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #if defined(VOXELD_TEST_CUDA) || defined(VOXELD_TEST_SIMT)
@@ -21,73 +22,53 @@ inline EngineCase CaseOf(const char* name, EngineKind kind, bool in_worker,
           }};
 }
 
-inline std::vector<EngineCase> EngineCases() {
-  return {
-#if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
-    {"cuda", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
-        // In groups, as large scenes are.
-        {"cuda_groups",
-         [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {},
-                                   {.few_items = 0, .group_bytes = 1, .few_lines = 0});
-         }},
-        // With no list at all; and with none that stays.
-        {"cuda_tight",
-         [](const EngineOptions& options) {
-           return CreateCudaEngine(
-               options, "a test", {},
-               {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1});
-         }},
-        {"cuda_passes",
-         [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {},
-                                   {.few_items = 0,
-                                    .group_bytes = 1,
-                                    .few_lines = 0,
-                                    .index_bytes = 1 << 20,
-                                    .index_share_kept = 0});
-         }},
-        CaseOf("cuda_worker", EngineKind::kCuda, true),
-#elif defined(VOXELD_TEST_SIMT)  // with a CPU for a GPU
-#if !defined(VOXELD_TEST_SIMT_FEW)
-    {"cuda_simt", [](const EngineOptions& options) { return CreateCudaEngine(options, "a test"); }},
-#endif
-        // In groups, as large scenes are.
-        {"cuda_simt_groups",
-         [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {},
-                                   {.few_items = 0, .group_bytes = 1, .few_lines = 0});
-         }},
-    // With no list at all; and with none that stays.
-#if !defined(VOXELD_TEST_SIMT_FEW)
-        {"cuda_simt_tight",
-         [](const EngineOptions& options) {
-           return CreateCudaEngine(
-               options, "a test", {},
-               {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1});
-         }},
-#endif
-        {"cuda_simt_passes", [](const EngineOptions& options) {
-           return CreateCudaEngine(options, "a test", {},
-                                   {.few_items = 0,
-                                    .group_bytes = 1,
-                                    .few_lines = 0,
-                                    .index_bytes = 1 << 20,
-                                    .index_share_kept = 0});
-         }},
-#else
-    CaseOf("cpu", EngineKind::kCpu, false),
-        // All of a scene in passes, of few items.
-        {"cpu_tight",
-         [](EngineOptions options) {
-           options.kind = EngineKind::kCpu;
-           options.index_bytes = 4096;
-           return CreateEngine(options);
-         }},
-        CaseOf("cpu_worker", EngineKind::kCpu, true),
-        CaseOf("cpu_ranks", EngineKind::kCpu, true, {0, 1}),
-#endif
+#if defined(VOXELD_TEST_CUDA) || defined(VOXELD_TEST_SIMT)
+// The CUDA engine in this process; unless `few`, each of its ways by itself.
+inline std::vector<EngineCase> CudaCases(const std::string& name, bool few) {
+  const auto tuned = [&](const char* how, const cuda::Tuning& tuning) {
+    return EngineCase{name + how, [tuning](const EngineOptions& options) {
+                        return CreateCudaEngine(options, "a test", {}, tuning);
+                      }};
   };
+  // In groups, as large scenes are.
+  cuda::Tuning groups;
+  groups.few_items = 0;
+  groups.group_bytes = 1;
+  groups.few_lines = 0;
+  // With no list at all; and with none that stays.
+  cuda::Tuning tight = groups, passes = groups;
+  tight.index_bytes = 1;
+  passes.index_bytes = 1 << 20;
+  passes.index_share_kept = 0;
+  if (few) return {tuned("_groups", groups), tuned("_passes", passes)};
+  return {tuned("", {}), tuned("_groups", groups), tuned("_tight", tight),
+          tuned("_passes", passes)};
+}
+#endif
+
+inline std::vector<EngineCase> EngineCases() {
+#if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
+  std::vector<EngineCase> cases = CudaCases("cuda", false);
+  cases.push_back(CaseOf("cuda_worker", EngineKind::kCuda, true));
+  return cases;
+#elif defined(VOXELD_TEST_SIMT_FEW)  // with a CPU for a GPU
+  return CudaCases("cuda_simt", true);
+#elif defined(VOXELD_TEST_SIMT)
+  return CudaCases("cuda_simt", false);
+#else
+  return {
+      CaseOf("cpu", EngineKind::kCpu, false),
+      // All of a scene in passes, of few items.
+      {"cpu_tight",
+       [](EngineOptions options) {
+         options.kind = EngineKind::kCpu;
+         options.index_bytes = 4096;
+         return CreateEngine(options);
+       }},
+      CaseOf("cpu_worker", EngineKind::kCpu, true),
+      CaseOf("cpu_ranks", EngineKind::kCpu, true, {0, 1}),
+  };
+#endif
 }
 
 }  // namespace voxeld::gpu::conformance

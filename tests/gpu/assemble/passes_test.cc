@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -222,6 +223,27 @@ TEST_F(PassesTest, ChangesOfWhatIsCounted) {
   ExpectDrawn(0);
   // A new view draws all anew.
   volume_->SetView(grid_, Affine(), std::vector<uint8_t>(grid_.count(), kOwned));
+  ExpectDrawn(0);
+}
+
+TEST_F(PassesTest, WhatWasCountedIsKeptWhenOthersHaveGone) {
+  Make(uint64_t{1} << 19,
+       SceneOf({Lines(1, 1500), Lines(2, 1500), Lines(3, 1500), Lines(4, 1500)}));
+  volume_->Update(nullptr);
+  const size_t counted = volume_->counted_drawables();
+  ASSERT_GT(counted, 0u);
+  ASSERT_LT(counted, 4u);
+  // The first ones fitted.
+  DeltaBuffer drop;
+  for (uint64_t id = 1; id <= counted; ++id) {
+    scene_.drawables.erase(id);
+    drop.Drop(Op::kDropDrawable, id);
+  }
+  Apply(drop);
+  ExpectDrawn(0);
+  EXPECT_LE(volume_->index_bytes(), uint64_t{1} << 19);
+  // They are where they were.
+  for (const auto& [id, drawable] : std::map(scene_.drawables)) Move(id, 5.5);
   ExpectDrawn(0);
 }
 

@@ -1,8 +1,8 @@
 // What gpu/engine.h promises about errors, with each of the CUDA engine's calls of CUDA failing in
 // its turn.
 //
-// VOXELD_FAULTS_EVERY: with every so many-th (default 1; where a CPU plays the GPU 61), from one on that
-// VOXELD_SEED draws.
+// VOXELD_FAULTS_EVERY: with every so many-th (default 1, in passes 11; where a CPU plays the GPU 61), from
+// one on that VOXELD_SEED draws.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -39,9 +39,10 @@ uint64_t Number(const char* name, uint64_t otherwise) {
 // The CUDA engine playing the scenario, and what it calls CUDA through.
 class CudaPlayer {
  public:
-  explicit CudaPlayer(const cuda::FaultPlan& faults)
-      : fails_at_(faults.call),
-        player_({"cuda", [&](const EngineOptions& options) { return Make(options, faults); }}) {}
+  CudaPlayer(const cuda::FaultPlan& faults, const cuda::Tuning& tuning)
+      : fails_at_(faults.call), player_({"cuda", [&](const EngineOptions& options) {
+                                           return Make(options, faults, tuning);
+                                         }}) {}
 
   absl::Status Do(const FaultStep& step) { return player_.Do(step); }
   const Seen& seen() const { return player_.seen(); }
@@ -50,14 +51,15 @@ class CudaPlayer {
 
  private:
   absl::StatusOr<std::unique_ptr<Engine>> Make(const EngineOptions& options,
-                                               const cuda::FaultPlan& faults) {
+                                               const cuda::FaultPlan& faults,
+                                               const cuda::Tuning& tuning) {
     absl::StatusOr<std::unique_ptr<cuda::Device>> device = cuda::Device::Open(0);
     if (!device.ok()) return device.status();
     api_ = &(*device)->api();
     api_->SetFaults(faults);
     return std::make_unique<CoreEngine<cuda::CudaCore>>(
         options, EngineInfo{EngineKind::kCuda, api_->device().name, "a test"},
-        std::make_unique<cuda::CudaCore>(*std::move(device), SlicePart{}));
+        std::make_unique<cuda::CudaCore>(*std::move(device), SlicePart{}, tuning));
   }
 
   const uint64_t fails_at_;
@@ -65,7 +67,20 @@ class CudaPlayer {
   FaultPlayer player_;
 };
 
-class CudaFaults : public ::testing::Test {
+// Which way the engine goes: the short one, or with hardly any room for lists, so that batches are put
+// off, merged and drawn in passes.
+struct Way {
+  const char* name;
+  uint64_t every;  // of its calls fails, one after the other, at least
+  cuda::Tuning tuning;
+};
+void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
+const Way kWays[] = {{"plain", kEvery, {}},
+                     {"passes",
+                      std::max<uint64_t>(kEvery, 11),
+                      {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1 << 16}}};
+
+class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:
   // What the CPU engine leaves after each step, and how many calls the CUDA engine makes of CUDA
   // when none fails.
@@ -75,7 +90,7 @@ class CudaFaults : public ::testing::Test {
       ASSERT_TRUE(cpu.Do(step).ok()) << step.name;
       wanted_.push_back(cpu.seen());
     }
-    CudaPlayer cuda({});
+    CudaPlayer cuda({}, GetParam().tuning);
     for (size_t s = 0; s < steps_.size(); ++s) {
       const absl::Status status = cuda.Do(steps_[s]);
       ASSERT_TRUE(status.ok()) << steps_[s].name << ": " << status;
@@ -108,7 +123,7 @@ class CudaFaults : public ::testing::Test {
       SCOPED_TRACE("call " + std::to_string(call) + " of CUDA fails");
       cuda::FaultPlan faults = plan;
       faults.call = call;
-      CudaPlayer cuda(faults);
+      CudaPlayer cuda(faults, GetParam().tuning);
       play(cuda);
     }
   }
@@ -128,7 +143,7 @@ class CudaFaults : public ::testing::Test {
 
   const std::vector<FaultStep> steps_ = FaultScenario();
   std::vector<Seen> wanted_;
-  const uint64_t every_ = std::max<uint64_t>(1, Number("VOXELD_FAULTS_EVERY", kEvery));
+  const uint64_t every_ = std::max<uint64_t>(1, Number("VOXELD_FAULTS_EVERY", GetParam().every));
   uint64_t calls_ = 0;
 };
 
@@ -136,7 +151,7 @@ constexpr cuda::FaultPlan kNoMemoryOnce = {1, cudaErrorMemoryAllocation, false};
 constexpr cuda::FaultPlan kNoMemoryFromThen = {1, cudaErrorMemoryAllocation, true};
 constexpr cuda::FaultPlan kIllegalFromThen = {1, cudaErrorIllegalAddress, true};
 
-TEST_F(CudaFaults, WantOfMemoryRefusesACallThatSucceedsWhenItIsMadeAgain) {
+TEST_P(CudaFaults, WantOfMemoryRefusesACallThatSucceedsWhenItIsMadeAgain) {
   int refused = 0;
   ForEachCall(kNoMemoryOnce, [&](CudaPlayer& cuda) {
     int refused_here = 0;
@@ -159,7 +174,7 @@ TEST_F(CudaFaults, WantOfMemoryRefusesACallThatSucceedsWhenItIsMadeAgain) {
 }
 
 // A frame that is refused is left out; what it would have shown comes with the next.
-TEST_F(CudaFaults, WantOfMemoryCostsAFrameNotTheNext) {
+TEST_P(CudaFaults, WantOfMemoryCostsAFrameNotTheNext) {
   int left_out = 0;
   ForEachCall(kNoMemoryOnce, [&](CudaPlayer& cuda) {
     for (size_t s = 0; s < steps_.size(); ++s) {
@@ -180,7 +195,7 @@ TEST_F(CudaFaults, WantOfMemoryCostsAFrameNotTheNext) {
   EXPECT_GT(left_out * static_cast<int>(every_), 50);
 }
 
-TEST_F(CudaFaults, WantOfMemoryThatLastsRefusesAndEndsWithIt) {
+TEST_P(CudaFaults, WantOfMemoryThatLastsRefusesAndEndsWithIt) {
   ForEachCall(kNoMemoryFromThen, [&](CudaPlayer& cuda) {
     int refused = 0;
     for (const FaultStep& step : steps_) {
@@ -199,7 +214,7 @@ TEST_F(CudaFaults, WantOfMemoryThatLastsRefusesAndEndsWithIt) {
   });
 }
 
-TEST_F(CudaFaults, AnIllegalAddressLosesTheEngineForGood) {
+TEST_P(CudaFaults, AnIllegalAddressLosesTheEngineForGood) {
   ForEachCall(kIllegalFromThen, [&](CudaPlayer& cuda) {
     bool lost = false;
     for (const FaultStep& step : steps_) {
@@ -217,6 +232,9 @@ TEST_F(CudaFaults, AnIllegalAddressLosesTheEngineForGood) {
     EXPECT_TRUE(lost);
   });
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, CudaFaults, testing::ValuesIn(kWays),
+                         [](const auto& way) { return std::string(way.param.name); });
 
 }  // namespace
 }  // namespace voxeld::gpu

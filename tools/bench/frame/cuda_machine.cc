@@ -46,8 +46,9 @@ class DeviceToHost final : public Ceiling {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options) {
-  return gpu::CreateCudaEngine(options, "a benchmark");
+absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options,
+                                                            bool keep_tiles) {
+  return gpu::CreateCudaEngine(options, "a benchmark", {}, {.pack_as_drawn = !keep_tiles});
 }
 
 void PinFrame(std::span<std::byte> bytes) { gpu::cuda::PinMemory(bytes); }

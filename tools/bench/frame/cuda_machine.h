@@ -11,7 +11,9 @@
 
 namespace voxeld::bench::frame {
 
-absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options);
+// keep_tiles: pictures are sliced from tiles also where they could be packed as they are drawn.
+absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options,
+                                                            bool keep_tiles);
 
 // A frame's buffer that the device writes directly.
 void PinFrame(std::span<std::byte> bytes);

@@ -28,11 +28,12 @@ struct FrameOptions {
   // Over so many GPUs (0 to gpus − 1), each in a process of its own, in turns with one of them alone;
   // 0: one, in this process. Of the CPU engine: processes.
   int gpus = 0;
-  std::string nccl;  // where NCCL is: gpu::EngineOptions::nccl
+  std::string nccl;         // where NCCL is: gpu::EngineOptions::nccl
+  bool keep_tiles = false;  // cuda::Tuning::pack_as_drawn is off
 };
 
 // {rows: [{scene, engine, device, threads, gpus, voxels, voxels_are ("drawn" or "lit"), scene_voxels, lit_voxels,
-// rounds, device_ms {median, least, greatest}, host_ms {…}, apply_ms {…}, gvoxel_per_s (device), host_gvoxel_per_s,
+// rounds, packed_as_drawn, device_ms {median, least, greatest}, host_ms {…}, apply_ms {…}, gvoxel_per_s (device), host_gvoxel_per_s,
 // ceiling {name, ms}, ratio (of the host's time to it, or of slicing alone), peers: [{name, ms, ratio (of the device's
 // time)}], stages {apply, assemble, slice, copy, door: share of
 // all}, tiles {drawn (of the last frame), most}, slicing_only, volumes_per_s {asked, reached} or

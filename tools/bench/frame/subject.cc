@@ -64,7 +64,8 @@ absl::StatusOr<std::unique_ptr<Subject>> Subject::Create(const Machine& machine,
     options.worker_deadline_ns = kDeadline;
     made = gpu::CreateEngine(options);
   } else {
-    made = cuda ? MakeCudaEngine(options) : gpu::CreateCpuEngine(options, "a benchmark");
+    made = cuda ? MakeCudaEngine(options, machine.keep_tiles)
+                : gpu::CreateCpuEngine(options, "a benchmark");
   }
   if (!made.ok()) return made.status();
   const bool pinned = cuda && machine.gpus == 0;

@@ -32,7 +32,8 @@ class Subject {
     // 0: in this process. Else as a display has it: so many GPUs, from 0 on, each in a process of its
     // own (of the CPU engine, so many processes).
     int gpus = 0;
-    std::string nccl;  // gpu::EngineOptions::nccl
+    std::string nccl;         // gpu::EngineOptions::nccl
+    bool keep_tiles = false;  // of the CUDA engine in this process
   };
   // The scene must outlive the subject.
   static absl::StatusOr<std::unique_ptr<Subject>> Create(const Machine& machine,

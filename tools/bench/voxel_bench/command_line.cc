@@ -161,6 +161,9 @@ CLI::App* AddFrame(CLI::App& app, FrameOptions& options) {
       ->check(CLI::Range(1, 64));
   command->add_option("--nccl", options.nccl, "Where NCCL's library is, or off; with --gpus")
       ->type_name("FILE|off");
+  command->add_flag("--keep-tiles", options.keep_tiles,
+                    "Slices kept tiles, as geometries need whose pixels are not voxels; with "
+                    "--engine cuda, without --gpus");
   command->add_option("--engine", options.engine, "Which")
       ->check(CLI::IsMember({"cpu", "cuda"}))
       ->capture_default_str();

@@ -1,0 +1,32 @@
+// Pixels into pictures of bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "gpu/cuda/types.h"
+#include "gpu/slice/pack.h"
+
+namespace voxeld::gpu::cuda {
+
+// Writes a byte; true if it was another.
+__device__ inline bool PutByte(uint8_t* at, uint32_t value) {
+  if (*at == value) return false;
+  *at = static_cast<uint8_t>(value);
+  return true;
+}
+
+// The pixel (u, v) of a picture, of a format that is not of bit planes; true if it was another.
+__device__ inline bool PutLevels(const SliceView& view, uint32_t u, uint32_t v, Levels q,
+                                 uint8_t* picture) {
+  const size_t pixel = static_cast<size_t>(v) * view.width + u;
+  if (view.format == display::PixelFormat::kRgb332) {
+    return PutByte(picture + pixel, q.r << 5 | q.g << 2 | q.b);
+  }
+  bool differs = PutByte(picture + pixel * 3, q.r);
+  differs |= PutByte(picture + pixel * 3 + 1, q.g);
+  differs |= PutByte(picture + pixel * 3 + 2, q.b);
+  return differs;
+}
+
+}  // namespace voxeld::gpu::cuda
