@@ -230,15 +230,16 @@ absl::Status PairIndex::MergeFrom(size_t first, const TableEntry* table, uint32_
   uint64_t at = 0;
   for (size_t b = first; b < batches_.size(); ++b) {
     const Batch& batch = batches_[b];
-    for (const auto& [to, from] :
-         {std::pair(&arrays->keys, &batch.keys), {&arrays->values, &batch.values}}) {
-      absl::Status status = device_.Run("cudaMemcpyAsync", [&] {
-        return cudaMemcpyAsync(to->as<uint64_t>() + at, from->as<uint64_t>(),
+    const auto copy = [&](const Block& to, const Block& from) {
+      return device_.Run("cudaMemcpyAsync", [&] {
+        return cudaMemcpyAsync(to.as<uint64_t>() + at, from.as<uint64_t>(),
                                batch.pairs * sizeof(uint64_t), cudaMemcpyDeviceToDevice,
                                device_.stream());
       });
-      if (!status.ok()) return status;
-    }
+    };
+    absl::Status status = copy(arrays->keys, batch.keys);
+    if (status.ok()) status = copy(arrays->values, batch.values);
+    if (!status.ok()) return status;
     at += batch.pairs;
   }
   const absl::StatusOr<Block> flags = lists_.pool.Acquire(pairs * sizeof(uint32_t));

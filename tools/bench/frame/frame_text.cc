@@ -49,16 +49,18 @@ std::string FrameText(const json& report) {
                             double(peer["ms"]), std::string(peer["name"]), double(peer["ratio"]));
     }
     if (row.contains("one_gpu")) {
-      absl::StrAppendFormat(&out, "  one GPU  device %s, host %s, apply %s\n",
+      const char* const what = row["engine"] == "cuda" ? "GPU" : "process";
+      const char* const clock = row["slicing_only"] ? "slicing" : "device";
+      const int count = int(row["gpus"]);
+      absl::StrAppendFormat(&out, "  one %s: %s %s, host %s, apply %s\n", what, clock,
                             SpreadText(row["one_gpu"]["device_ms"]),
                             SpreadText(row["one_gpu"]["host_ms"]),
                             SpreadText(row["one_gpu"]["apply_ms"]));
-      absl::StrAppendFormat(&out,
-                            "  %d GPUs: %.3g times as fast by the device's clock, %.3g by the "
-                            "host's; the same bytes\n",
-                            int(row["gpus"]), double(row["speedup"]["device"]),
-                            double(row["speedup"]["host"]));
-      absl::StrAppendFormat(&out, "  %s\n", std::string(row["reason"]));
+      absl::StrAppendFormat(
+          &out, "  %d %s: %s %.3g times as fast, host %.3g; the same bytes\n", count,
+          count == 1 ? what : absl::StrCat(what, row["engine"] == "cuda" ? "s" : "es"), clock,
+          double(row["speedup"]["device"]), double(row["speedup"]["host"]));
+      absl::StrAppendFormat(&out, "  engine   %s\n", std::string(row["reason"]));
     }
     out += "  shares  ";
     for (const auto& [stage, share] : row["stages"].items()) {

@@ -137,7 +137,9 @@ CLI::App* AddPaper(CLI::App& app, PaperOptions& options) {
   command->add_option("--voxels", options.voxels, "Of each batch of Table 4")
       ->check(CLI::Range(uint64_t{100'000}, uint64_t{1} << 33))
       ->capture_default_str();
-  command->add_option("--seed", options.seed, "Of the segments")->capture_default_str();
+  command->add_option("--seed", options.seed, "Of the segments")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 53))
+      ->capture_default_str();
   command->add_option("--from", options.from, "Shows this report again (--json wrote it)")
       ->type_name("FILE")
       ->check(CLI::ExistingFile);
@@ -154,24 +156,30 @@ CLI::App* AddFrame(CLI::App& app, FrameOptions& options) {
   command->add_option("--scene", options.scene, "Which")
       ->required()
       ->check(CLI::IsMember(frame::SceneNames()));
-  command
-      ->add_option(
-          "--gpus", options.gpus,
-          "Over so many GPUs, a process each, beside one of them; default: in this process")
-      ->check(CLI::Range(1, 64));
+  CLI::Option* const gpus =
+      command
+          ->add_option("--gpus", options.gpus,
+                       "Over so many GPUs (of the CPU engine: processes), a process each, beside "
+                       "one of them; default: in this process")
+          ->check(CLI::Range(1, 64));
   command->add_option("--nccl", options.nccl, "Where NCCL's library is, or off; with --gpus")
-      ->type_name("FILE|off");
-  command->add_flag("--keep-tiles", options.keep_tiles,
-                    "Slices kept tiles, as geometries need whose pixels are not voxels; with "
-                    "--engine cuda, without --gpus");
+      ->type_name("FILE|off")
+      ->needs(gpus);
+  command
+      ->add_flag("--keep-tiles", options.keep_tiles,
+                 "Slices kept tiles, as geometries need whose pixels are not voxels; with "
+                 "--engine cuda, without --gpus")
+      ->excludes(gpus);
   command->add_option("--engine", options.engine, "Which")
       ->check(CLI::IsMember({"cpu", "cuda"}))
       ->capture_default_str();
   command->add_option("--threads", options.threads, "Of the CPU engine; default: one a core")
       ->check(CLI::Range(1, 1024));
   AddRounds(*command, options.rounds);
-  command->add_option("--seed", options.seed, "Of the scene")->capture_default_str();
-  command->add_option("--share", options.share, "Of the scene's primitives")
+  command->add_option("--seed", options.seed, "Of the scene")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 53))
+      ->capture_default_str();
+  command->add_option("--share", options.share, "Of the scene's primitives, but of rotor's")
       ->check(Between(1e-6, 1))
       ->capture_default_str();
   return command;

@@ -30,6 +30,8 @@ absl::StatusOr<nlohmann::json> RunFrame(const FrameOptions& options, const Surro
                                              {"threads", options.threads},
                                              {"rounds", options.rounds},
                                              {"gpus", options.gpus},
+                                             {"nccl", options.nccl},
+                                             {"keep_tiles", options.keep_tiles},
                                              {"seed", options.seed},
                                              {"share", options.share}});
   absl::StatusOr<nlohmann::json> measured =
