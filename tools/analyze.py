@@ -8,6 +8,7 @@ Exit 1 if any finding; each is printed once.
 import concurrent.futures
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -46,7 +47,7 @@ def run(mode, build_dir, path, commands):
 
 def optional(path):
     """CUDA sources and sources of switched-off parts are built elsewhere."""
-    return path.startswith(("gpu/cuda/", "gpu/worker/", "tools/bench/paper/cuda_", "tools/bench/paper/no_cuda_"))
+    return path.startswith(("gpu/cuda/", "gpu/worker/")) or re.match(r"tools/bench/(frame|paper)/(no_)?cuda_", path)
 
 
 def main():

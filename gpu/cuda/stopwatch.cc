@@ -21,10 +21,13 @@ absl::Status Stopwatch::Set(Mark mark) {
 
 absl::StatusOr<int64_t> Stopwatch::Between(Mark from, Mark to) {
   float ms = 0;
-  absl::Status status = device_.Run("cudaEventElapsedTime", [&] {
-    return cudaEventElapsedTime(&ms, marks_[static_cast<size_t>(from)],
-                                marks_[static_cast<size_t>(to)]);
-  });
+  const cudaEvent_t begin = marks_[static_cast<size_t>(from)],
+                    end = marks_[static_cast<size_t>(to)];
+  absl::Status status =
+      device_.Run("cudaEventSynchronize", [&] { return cudaEventSynchronize(end); });
+  if (!status.ok()) return status;
+  status =
+      device_.Run("cudaEventElapsedTime", [&] { return cudaEventElapsedTime(&ms, begin, end); });
   if (!status.ok()) return status;
   return std::llround(static_cast<double>(ms) * 1e6);
 }

@@ -24,7 +24,7 @@ class Stopwatch {
 
   // Sets the mark behind what has been queued in the device's stream.
   absl::Status Set(Mark mark);
-  // From one mark to a later one; both have been waited for.
+  // From one mark to a later one, which is waited for.
   absl::StatusOr<int64_t> Between(Mark from, Mark to);
 
  private:

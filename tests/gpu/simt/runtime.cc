@@ -1,4 +1,6 @@
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -10,9 +12,16 @@
 #include "cuda_runtime_api.h"
 #include "tests/gpu/simt/limits.h"
 
-struct CUstream_st {};
+// Moments, counted: whatever was recorded in a stream before it was waited for has happened.
+static std::atomic<uint64_t> moments{0};
+struct CUstream_st {
+  std::atomic<uint64_t> waited{0};
+};
 struct CUevent_st {
   std::chrono::steady_clock::time_point recorded;
+  cudaStream_t stream = nullptr;
+  uint64_t at = 0;
+  bool waited = false;
 };
 
 namespace voxeld::simt {
@@ -74,6 +83,8 @@ const char* cudaGetErrorName(cudaError_t error) {
       return "cudaErrorInvalidConfiguration";
     case cudaErrorInvalidDevice:
       return "cudaErrorInvalidDevice";
+    case cudaErrorNotReady:
+      return "cudaErrorNotReady";
     case cudaErrorIllegalAddress:
       return "cudaErrorIllegalAddress";
   }
@@ -143,7 +154,10 @@ cudaError_t cudaStreamDestroy(cudaStream_t stream) {
   delete stream;
   return cudaSuccess;
 }
-cudaError_t cudaStreamSynchronize(cudaStream_t) { return cudaSuccess; }
+cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
+  if (stream != nullptr) stream->waited = ++moments;
+  return cudaSuccess;
+}
 cudaError_t cudaStreamWaitEvent(cudaStream_t, cudaEvent_t, unsigned) { return cudaSuccess; }
 cudaError_t cudaEventCreate(cudaEvent_t* event) {
   *event = new CUevent_st;
@@ -156,12 +170,21 @@ cudaError_t cudaEventDestroy(cudaEvent_t event) {
   delete event;
   return cudaSuccess;
 }
-cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t) {
+cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream) {
   event->recorded = std::chrono::steady_clock::now();
+  event->stream = stream;
+  event->at = ++moments;
+  event->waited = false;
   return cudaSuccess;
 }
-cudaError_t cudaEventSynchronize(cudaEvent_t) { return cudaSuccess; }
+cudaError_t cudaEventSynchronize(cudaEvent_t event) {
+  event->waited = true;
+  return cudaSuccess;
+}
+// On a GPU it may not have come to an event that nobody has waited for.
 cudaError_t cudaEventElapsedTime(float* ms, cudaEvent_t from, cudaEvent_t to) {
+  const bool waited = to->waited || (to->stream != nullptr && to->stream->waited > to->at);
+  if (!waited) return Told(cudaErrorNotReady);
   *ms = std::chrono::duration<float, std::milli>(to->recorded - from->recorded).count();
   return cudaSuccess;
 }
