@@ -1,9 +1,9 @@
 // A budget for the index of items by tile, and how drawables that exceed it are drawn.
 //
-// A drawable whose bins fit keeps them (IndexBudget). Of any other, until others' have gone, it keeps which tiles it is in and how many items are
-// in each (Bins::counts). Where such are to be seen, tiles are drawn in passes, runs of tiles with few enough of their
-// items, which are found anew for each pass (PassBins). In a tile that has too many by itself they are found and drawn range by
-// range.
+// A drawable whose bins fit keeps them (IndexBudget). Any other keeps, until there is room, which tiles it is in and how many
+// items are in each (Bins::counts). Where such are to be seen, tiles are drawn in passes, runs of tiles with few enough of
+// their items, which are found anew for each pass (PassBins). In a tile that has too many by itself they are found and drawn
+// range by range.
 //
 // Beside the budget, for each tile of the grid and each tile that a drawable is in, there are a few bytes.
 #pragma once

@@ -321,7 +321,7 @@ void Volume::KeepCounted() {
     d.bins = Bins();
     if (!Keep(d, executor_, budget_.room(), large_)) {
       d.bins = std::move(counted);
-      break;
+      continue;  // a smaller one may fit
     }
     for (const uint32_t tile : counted.tiles) {
       std::erase_if(index_[tile].entries, [&](const Entry& e) { return e.drawable == &d; });

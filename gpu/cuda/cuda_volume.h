@@ -58,7 +58,7 @@ struct DeviceArrays {
   std::optional<GeometryBounds> bounds;
 };
 
-// A box of voxels, closed, of which nothing more is asked than about how large it is; at first, none.
+// A box of voxels, closed, of which nothing more is asked than about how large it is.
 struct RoughBox {
   double lo[3], hi[3];
 

@@ -153,13 +153,14 @@ FewEntries FewOf(std::span<const uint32_t> slots, std::span<const TableEntry> en
 
 bool CudaVolume::AreFewLines(std::span<const uint32_t> slots,
                              std::span<const TableEntry> entries) const {
+  if (slots.size() > kFewRows) return false;
   uint64_t items = 0;
   for (size_t i = 0; i < slots.size(); ++i) {
     const Slot& slot = slots_[slots[i]];
     if (slot.indexed_by != IndexedBy::kLines || entries[i].layer != entries[0].layer) return false;
     items += slot.items;
   }
-  return slots.size() <= kFewRows && items > 0 && items <= kMostFewLines;
+  return items > 0 && items <= kMostFewLines;
 }
 
 absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
