@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "gpu/implicit/program_check.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -78,9 +79,19 @@ absl::Status CheckSizes(const Checker& check, const GeometryRecord& g) {
   return absl::OkStatus();
 }
 
+absl::Status CheckDomain(const Checker& check, const GeometryRecord& g) {
+  if (g.params[6] != 0 && g.params[6] != 1) return check.Wrong("params[6]", g.params[6], "0 or 1");
+  for (int a = 0; a < 3 && g.params[6] != 0; ++a) {
+    if (g.params[a] <= g.params[3 + a]) continue;
+    return check.Wrong(absl::StrCat("params[", 3 + a, "]").c_str(), g.params[3 + a],
+                       absl::StrCat("no less than ", g.params[a]).c_str());
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   absl::Status status =
-      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 6),
+      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 7),
                   check.Enum("color_mode", static_cast<uint32_t>(g.color_mode), 0, 1),
                   check.Enum("sampling", static_cast<uint32_t>(g.sampling), 0, 2),
                   check.Enum("rule", static_cast<uint32_t>(g.rule), 0, 1),
@@ -98,6 +109,12 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
       return check.Wrong("color_mode", static_cast<uint32_t>(g.color_mode), "0 for a solid");
     }
     return CheckSizes(check, g);
+  }
+  if (g.kind == PrimitiveKind::kImplicit) {
+    if (g.color_mode != ColorMode::kUniform) {
+      return check.Wrong("color_mode", static_cast<uint32_t>(g.color_mode), "0 for a program");
+    }
+    return CheckDomain(check, g);
   }
   const bool indexed = g.index_count != 0;
   const uint32_t corners = indexed ? g.index_count : g.vertex_count;
@@ -118,6 +135,15 @@ void SetArrays(const std::byte* at, GeometryView& view) {
   view.positions = {reinterpret_cast<const float*>(at), size_t{g.vertex_count} * 3};
   view.indices = {reinterpret_cast<const uint32_t*>(at + layout.indices), g.index_count};
   view.colors = {reinterpret_cast<const uint32_t*>(at + layout.colors), ColorCount(g)};
+}
+
+// Of a program, which is looked at wherever it lies.
+absl::Status CheckCode(uint64_t offset, const GeometryView& view) {
+  if (view.record.kind != PrimitiveKind::kImplicit) return absl::OkStatus();
+  const absl::Status status = implicit::CheckProgram(view.indices, view.record.vertex_count);
+  if (status.ok()) return status;
+  return absl::InvalidArgumentError(
+      absl::StrCat("delta, record at byte ", offset, ": ", status.message()));
 }
 
 std::string ForCounts(uint64_t size, const GeometryRecord& g) {
@@ -143,7 +169,8 @@ absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, Delt
   SetArrays(body.data() + sizeof(GeometryRecord), view);
   absl::Status status = check.Finite("positions", view.positions.data(), view.positions.size());
   if (!status.ok()) return status;
-  for (size_t i = 0; i < view.indices.size(); ++i) {
+  if (status = CheckCode(offset, view); !status.ok()) return status;
+  for (size_t i = 0; g.kind != PrimitiveKind::kImplicit && i < view.indices.size(); ++i) {
     if (view.indices[i] >= g.vertex_count) {
       return check.Wrong(absl::StrCat("indices[", i, "]").c_str(), view.indices[i],
                          absl::StrCat("less than vertex_count ", g.vertex_count).c_str());
@@ -179,6 +206,7 @@ absl::Status ReadBulkGeometry(uint64_t offset, std::span<const std::byte> body,
   SetArrays(found->bytes.data(), view);
   view.bulk = std::move(found->owner);
   view.bulk_segment = ref.segment;
+  if (absl::Status status = CheckCode(offset, view); !status.ok()) return status;
   return visitor.OnGeometry(view);
 }
 

@@ -47,6 +47,8 @@ enum class PrimitiveKind : uint32_t {
   kBox = 4,        // centre params[0..2], full sizes params[3..5] along its own axes
   kSphere = 5,     // centre params[0..2], radius params[3] (an ellipsoid under a transform)
   kCylinder = 6,   // centre params[0..2], radius params[3], height params[4] along its own z
+  kImplicit = 7,   // its program (implicit/program.h) is the indices, the points of its rings the positions;
+                   // with params[6] = 1 only from params[0..2] to params[3..5]
 };
 
 enum class LineSampling : uint32_t { kThin = 0, kEuclidean = 1, kCover = 2 };
@@ -79,10 +81,11 @@ struct GeometryRecord {
   ColorMode color_mode = ColorMode::kUniform;
   LineSampling sampling = LineSampling::kThin;  // kSegments
   SurfaceRule rule = SurfaceRule::kThin;        // surfaces
-  Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder
+  Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder, kImplicit
   Topology topology = Topology::kList;          // kSegments
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  // Diameter of points and segments; 0: one voxel. kUnits: scaled by ∛|det| of the map.
+  // Diameter of points and segments, of surfaces of kImplicit their thickness; 0: one voxel. kUnits:
+  // scaled by ∛|det| of the map.
   float thickness = 0;
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand
@@ -194,6 +197,8 @@ struct GeometryView {
   std::span<const uint32_t> colors;
   std::shared_ptr<const void> bulk;  // keeps bulk memory; null if the arrays lie in the delta
   uint64_t bulk_segment = 0;         // in which they lie
+
+  bool HasArrays() const { return !positions.empty() || !indices.empty(); }
 };
 
 // What ReadDelta calls, in order. An error from any ends the reading.

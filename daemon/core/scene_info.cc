@@ -19,6 +19,8 @@ const char* KindName(gpu::PrimitiveKind kind) {
       return "sphere";
     case gpu::PrimitiveKind::kCylinder:
       return "cylinder";
+    case gpu::PrimitiveKind::kImplicit:
+      return "implicit";
   }
   return "?";
 }
@@ -29,7 +31,8 @@ EntityInfo InfoOf(const OwnedName& layer, const std::string& id, const Entity& e
   EntityInfo info;
   info.key = {layer.owner, layer.name, id};
   if (const auto* geometry = std::get_if<GeometryPtr>(&entity.data.content)) {
-    info.kind = KindName((*geometry)->record.kind);
+    const char* const kind = (*geometry)->kind;
+    info.kind = kind != nullptr ? kind : KindName((*geometry)->record.kind);
     info.vertices = (*geometry)->record.vertex_count;
     info.color = (*geometry)->record.color;
   } else {

@@ -98,6 +98,10 @@ struct Limits {
   int64_t must_show_timeout_ns = 2 * sync::kSecond;
   uint32_t max_drop_oldest_frames = 64;
   uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session's sealed memory
+  // Of one shape's expressions together: operations, and how deep text nests.
+  uint32_t max_expression_nodes = 1024;
+  uint32_t max_expression_depth = 64;
+  uint32_t max_boundary_points = 4096;  // of one shape's boundary
 };
 
 // Immutable content of a primitive: the engine's record (its id unused) and arrays, which engines
@@ -107,9 +111,14 @@ struct GeometryData {
   gpu::GeometryArrays arrays;  // of the lengths that the record states
   // Bounds in its own coordinates, thickness left out.
   double min[3] = {}, max[3] = {};
+  // Where record and arrays do not say what the client asked for: the wire's name of it, and the primitive
+  // as it was sent.
+  const char* kind = nullptr;
+  std::string as_sent;
+
   uint64_t bytes() const {
-    return sizeof(*this) + arrays.positions().size_bytes() + arrays.indices().size_bytes() +
-           arrays.colors().size_bytes();
+    return sizeof(*this) + as_sent.size() + arrays.positions().size_bytes() +
+           arrays.indices().size_bytes() + arrays.colors().size_bytes();
   }
 };
 using GeometryPtr = std::shared_ptr<const GeometryData>;

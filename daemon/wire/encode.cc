@@ -129,6 +129,9 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_sessions(in.max_sessions);
   out->set_max_parts_per_object(in.max_parts_per_object);
   out->set_max_clip_planes(in.max_clip_planes);
+  out->set_max_expression_nodes(in.max_expression_nodes);
+  out->set_max_expression_depth(in.max_expression_depth);
+  out->set_max_boundary_points(in.max_boundary_points);
   out->set_max_entities(in.max_entities);
   out->set_max_layers(in.max_layers);
   out->set_max_scene_bytes(in.max_scene_bytes);

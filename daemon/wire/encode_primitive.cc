@@ -100,6 +100,10 @@ void Vec3ToWire(const float* in, v1::Vec3* out) {
 }
 
 void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
+  if (!in.as_sent.empty()) {
+    out->ParseFromString(in.as_sent);
+    return;
+  }
   const gpu::GeometryRecord& record = in.record;
   out->mutable_color()->set_rgb(record.color);
   switch (record.kind) {
@@ -143,6 +147,8 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
       cylinder->set_rule(RuleToWire(record.rule));
       return;
     }
+    case gpu::PrimitiveKind::kImplicit:  // kept as it was sent
+      return;
   }
 }
 
@@ -170,6 +176,7 @@ uint64_t EncodedBytes(const Content& in) {
     return kFixedBytes + instance->object.size();
   }
   const GeometryData& geometry = *std::get<GeometryPtr>(in);
+  if (!geometry.as_sent.empty()) return kFixedBytes + geometry.as_sent.size();
   return kFixedBytes + PositionsOf(geometry).size_bytes() + IndicesOf(geometry).size_bytes() +
          ColorsOf(geometry).size() * 3;
 }

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/fields.h"
+#include "daemon/wire/implicit.h"
 #include "daemon/wire/vertices.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -12,58 +14,6 @@ namespace voxeld::daemon::wire {
 namespace {
 
 constexpr uint32_t kGreatestColor = 0xFFFFFF;
-
-MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
-                       gpu::GeometryRecord* out) {
-  const float value = in.value();
-  if (auto fault = CheckFinite(FieldPath(path, "value"), value)) return fault;
-  if (value < 0 || value > limits.max_thickness) {
-    return Fault{FieldPath(path, "value").ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", Show(value), "; give 0 (one voxel) to max_thickness, ",
-                              limits.max_thickness)};
-  }
-  switch (in.unit()) {
-    case v1::Thickness::UNIT_UNSPECIFIED:
-    case v1::Thickness::VOXELS:
-      out->thickness_unit = gpu::ThicknessUnit::kVoxels;
-      break;
-    case v1::Thickness::UNITS:
-      out->thickness_unit = gpu::ThicknessUnit::kUnits;
-      break;
-    default:
-      return UnknownEnum(FieldPath(path, "unit"), in.unit(), "VOXELS, UNITS");
-  }
-  out->thickness = value;
-  return {};
-}
-
-MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out) {
-  switch (in) {
-    case v1::SURFACE_RULE_UNSPECIFIED:
-    case v1::SURFACE_RULE_THIN:
-      out->rule = gpu::SurfaceRule::kThin;
-      return {};
-    case v1::SURFACE_RULE_COVER:
-      out->rule = gpu::SurfaceRule::kCover;
-      return {};
-    default:
-      return UnknownEnum(FieldPath(path, "rule"), in, "SURFACE_RULE_THIN, SURFACE_RULE_COVER");
-  }
-}
-
-MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) {
-  switch (in) {
-    case v1::FILL_UNSPECIFIED:
-    case v1::FILL_SURFACE:
-      out->fill = gpu::Fill::kSurface;
-      return {};
-    case v1::FILL_SOLID:
-      out->fill = gpu::Fill::kSolid;
-      return {};
-    default:
-      return UnknownEnum(FieldPath(path, "fill"), in, "FILL_SURFACE, FILL_SOLID");
-  }
-}
 
 MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const DecodeContext& context,
                     GeometryData* out) {
@@ -226,13 +176,15 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
       return ToSphere(FieldPath(path, "sphere"), in.sphere(), out);
     case v1::Primitive::kCylinder:
       return ToCylinder(FieldPath(path, "cylinder"), in.cylinder(), out);
+    case v1::Primitive::kImplicit:
+      return ToImplicit(FieldPath(path, "implicit"), in.implicit(), context, out);
     case v1::Primitive::kInstance:  // is no geometry, and has been dealt with
     case v1::Primitive::KIND_NOT_SET:
       break;
   }
   return Fault{FieldPath(path, "kind").ToString(), Reason::kInvalidValue,
                "is not set, or not known to this version of the server; give one of points, "
-               "segments, mesh, box, sphere, cylinder, instance"};
+               "segments, mesh, box, sphere, cylinder, instance, implicit"};
 }
 
 }  // namespace
@@ -251,6 +203,10 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Decod
     data->record.color = in.color().rgb();
   }
   if (auto fault = ToGeometry(path, in, context, data.get())) return fault;
+  if (in.kind_case() == v1::Primitive::kImplicit) {
+    data->kind = "implicit";
+    data->as_sent = in.SerializeAsString();
+  }
   *out = GeometryPtr(std::move(data));
   return {};
 }

@@ -31,7 +31,7 @@ void DrawWalksAlone(const Bins& bins, std::span<const BinItem> items, uint32_t* 
 
 bool IsSingular(const Drawable& d) {
   return WithPrimitive(d.geometry->view.record.kind, [&](auto primitive) {
-    return kIsSolid<typename decltype(primitive)::type> && !d.source.solid.drawable;
+    return kIsInverted<typename decltype(primitive)::type> && !d.source.solid.drawable;
   });
 }
 
@@ -89,12 +89,12 @@ void FetchItems(const Drawable& d, std::span<const BinItem> items) {
 void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor) {
   BinScratch scratch;
-  MapDrawable(d, view_map, executor);
+  MapDrawable(d, view_map, grid, executor);
   BinItems(d.source, grid, owned, d.record.priority, d.record.erase != 0, executor, scratch,
            d.bins);
 }
 
-void MapDrawable(Drawable& d, const Affine& view_map, Executor& executor) {
+void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Executor& executor) {
   const GeometryView& view = d.geometry->view;
   const Affine map = Compose(Compose(view_map, d.layer->record.transform), d.record.transform);
   d.source = {};
@@ -103,6 +103,10 @@ void MapDrawable(Drawable& d, const Affine& view_map, Executor& executor) {
     using Primitive = typename decltype(primitive)::type;
     if constexpr (kIsSolid<Primitive>) {
       d.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
+    } else if constexpr (std::is_same_v<Primitive, Implicit>) {
+      Implicit::Place(view.record, map, grid, d.source.solid, d.source.implicit);
+      d.source.positions = view.positions.data();
+      d.source.indices = view.indices.data();
     } else {
       d.vertices.resize(view.record.vertex_count);
       const size_t runs = (d.vertices.size() + kVertexRun - 1) / kVertexRun;

@@ -268,7 +268,7 @@ void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const
   const uint64_t bytes = budget_.room_of_worker(executor_.concurrency());
   std::vector<uint8_t> kept(small.size());
   executor_.For(small.size(), 4, [&](size_t i, int worker) {
-    MapDrawable(*small[i], view_, *serial);
+    MapDrawable(*small[i], view_, grid_, *serial);
     kept[i] = Keep(*small[i], *serial, bytes, scratch_[static_cast<size_t>(worker)].bins);
   });
   const auto keep_or_count = [&](Drawable& d) {
@@ -279,7 +279,7 @@ void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const
     if (kept[i] == 0) keep_or_count(*small[i]);
   }
   for (Drawable* d : large) {
-    MapDrawable(*d, view_, executor_);
+    MapDrawable(*d, view_, grid_, executor_);
     keep_or_count(*d);
   }
   if (large_.bytes() > budget_.room_to_keep()) large_ = BinScratch();

@@ -81,7 +81,7 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
     if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
-        geometry->positions.empty() || geometry->bulk != nullptr) {
+        !geometry->HasArrays() || geometry->bulk != nullptr) {
       continue;
     }
     uploads.AddInline(*geometry);
@@ -90,7 +90,7 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
     if (geometry == nullptr || geometry->record.drawn_by == DrawnBy::kCpu ||
-        geometry->positions.empty() || geometry->bulk == nullptr) {
+        !geometry->HasArrays() || geometry->bulk == nullptr) {
       continue;
     }
     const float* const positions = geometry->positions.data();
@@ -186,7 +186,7 @@ RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
   RetainedGeometry kept{view, nullptr};
   kept.view.bulk = nullptr;
-  if (view.positions.empty()) return kept;
+  if (!view.HasArrays()) return kept;
   kept.view.positions = OnDevice(view, view.positions);
   kept.view.indices = OnDevice(view, view.indices);
   kept.view.colors = OnDevice(view, view.colors);

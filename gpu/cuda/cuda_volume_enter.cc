@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <thread>
+#include <type_traits>
 #include <utility>
 
 #include "gpu/cuda/cpu_voxels.h"
@@ -85,6 +86,10 @@ TableEntry CudaVolume::EntryOf(const Drawable& d) const {
     using Primitive = typename decltype(primitive)::type;
     if constexpr (kIsSolid<Primitive>) {
       entry.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
+    } else if constexpr (std::is_same_v<Primitive, Implicit>) {
+      Implicit::Place(view.record, map, tiles_.grid, entry.source.solid, entry.source.implicit);
+      entry.source.positions = view.positions.data();
+      entry.source.indices = view.indices.data();
     } else {
       entry.source.positions = view.positions.data();
       entry.source.indices = view.indices.data();
@@ -209,7 +214,7 @@ absl::Status CudaVolume::Enter() {
         using Primitive = typename decltype(primitive)::type;
         slots_[slot].items = Primitive::Count(entry.source);
         ChooseIndex(*drawable, entry, slots_[slot]);
-        slots_[slot].singular = kIsSolid<Primitive> && !entry.source.solid.drawable;
+        slots_[slot].singular = kIsInverted<Primitive> && !entry.source.solid.drawable;
       });
       IndexedBy& by = slots_[slot].indexed_by;
       auto& taken = layers[static_cast<size_t>(by)];

@@ -2,6 +2,7 @@
 // also where there is no list of pairs.
 #pragma once
 
+#include "gpu/cuda/implicit-inl.h"
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/primitives/list.h"
@@ -12,7 +13,10 @@ struct PairScratch {
   PairRows rows;
   uint64_t heavy[kDrawThreads];  // pairs for many threads
   uint32_t heavy_count;
-  SolidBlock solid;
+  union {
+    SolidBlock solid;
+    ImplicitScratch implicit;
+  };
 };
 
 // A pair's voxels in `box`, raised into the region's words.
@@ -49,9 +53,10 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
   }
 }
 
-__device__ inline bool IsSolid(PrimitiveKind kind) {
+// By the whole block rather than by a warp.
+__device__ inline bool IsForBlock(PrimitiveKind kind) {
   return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
-         kind == PrimitiveKind::kCylinder;
+         kind == PrimitiveKind::kCylinder || kind == PrimitiveKind::kImplicit;
 }
 
 // A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
@@ -150,7 +155,7 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
   const uint32_t count = scratch.heavy_count;
   for (uint32_t i = threadIdx.x / 32; i < count; i += kDrawWarps) {
     const TableEntry& entry = table[scratch.heavy[i] >> 32];
-    if (!IsSolid(entry.record.kind)) {
+    if (!IsForBlock(entry.record.kind)) {
       DrawByWarp(entry, static_cast<uint32_t>(scratch.heavy[i]), box, grid, words);
     }
   }
@@ -166,6 +171,9 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
         break;
       case PrimitiveKind::kCylinder:
         DrawSolid<Cylinder>(entry, box, words, scratch.solid);
+        break;
+      case PrimitiveKind::kImplicit:
+        DrawImplicit(entry, box, words, scratch.implicit);
         break;
       default:
         break;
@@ -189,6 +197,9 @@ __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t
       break;
     case PrimitiveKind::kTriangles:
       bounds = BoundsOf(Triangles::ItemOf(entry.source, item));
+      break;
+    case PrimitiveKind::kImplicit:
+      bounds = Implicit::BlockOf(entry.source, item);
       break;
     default:
       bounds = entry.source.solid.bounds;

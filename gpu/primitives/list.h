@@ -14,6 +14,7 @@
 
 #include "gpu/primitives/box.h"
 #include "gpu/primitives/cylinder.h"
+#include "gpu/primitives/implicit.h"
 #include "gpu/primitives/points.h"
 #include "gpu/primitives/segments.h"
 #include "gpu/primitives/sphere.h"
@@ -37,11 +38,18 @@ VOXELD_HD decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
       return f(std::type_identity<Sphere>{});
     case PrimitiveKind::kCylinder:
       return f(std::type_identity<Cylinder>{});
+    case PrimitiveKind::kImplicit:
+      return f(std::type_identity<Implicit>{});
   }
   __builtin_unreachable();  // ReadDelta lets no other kind in
 }
 
 template <class Primitive>
 inline constexpr bool kIsSolid = requires(const GeometryRecord& g) { Primitive::CanonicalMap(g); };
+
+// Whether it is evaluated through the inverse of its map, and draws nothing where there is none.
+template <class Primitive>
+inline constexpr bool kIsInverted =
+    kIsSolid<Primitive> || Primitive::kKind == PrimitiveKind::kImplicit;
 
 }  // namespace voxeld::gpu

@@ -26,8 +26,9 @@ struct Solid {
   Box3 bounds;
   bool drawable = false;  // false: no inverse, nothing is drawn
 
-  // `map`: canonical coordinates (each −1 to 1) → voxel space.
-  VOXELD_HD static Solid Of(const Affine& map) {
+  // `map`: canonical coordinates (each −1 to 1) → voxel space. `keep_thin`: rows are scaled down to
+  // kMaxRow.
+  VOXELD_HD static Solid Of(const Affine& map, bool keep_thin = true) {
     Solid s;
     const double* m = map.m;
     const double cofactor[3][3] = {
@@ -44,7 +45,7 @@ struct Solid {
         if (!(Abs(row[c]) < kHuge) || !(Abs(m[c * 4 + r]) < kHuge)) return s;
         greatest = Max(greatest, Abs(row[c]));
       }
-      const double scale = greatest > kMaxRow ? kMaxRow / greatest : 1.0;
+      const double scale = keep_thin && greatest > kMaxRow ? kMaxRow / greatest : 1.0;
       for (int c = 0; c < 3; ++c) {
         s.inverse[r][c] = static_cast<float>(row[c] * scale);
         reach[c] = reach[c] + Abs(m[c * 4 + r]) / scale;

@@ -19,6 +19,13 @@ VOXELD_HD inline Int3 SnapPoint(const Affine& map, const float* p) {
   return r;
 }
 
+// Where an implicit shape is looked for (implicit.h).
+struct ImplicitPlace {
+  float voxel = 0;  // the edge of a voxel in the shape's units
+  float half = 0;   // half the surface's thickness, voxels; 0: one voxel wide
+  int32_t first[3] = {}, blocks[3] = {};  // items along each axis
+};
+
 struct Source {
   const GeometryRecord* record = nullptr;
   // record->vertex_count, mapped and snapped; null: made of `positions` by `map` as they are asked
@@ -29,7 +36,8 @@ struct Source {
   const uint32_t* indices = nullptr;  // record->index_count
   const uint32_t* colors = nullptr;   // record->vertex_count, with kPerVertex
   int64_t radius = 0;                 // of points and segments, units; 0: one voxel
-  Solid solid;                        // kBox, kSphere, kCylinder
+  Solid solid;                        // kBox, kSphere, kCylinder, kImplicit
+  ImplicitPlace implicit;             // kImplicit, whose program `indices` are
 
   // Corners are what indices name, or the vertices as they stand.
   VOXELD_HD uint32_t corners() const {

@@ -10,14 +10,6 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// Half the thickness in units.
-// Tests keep to maps for which a cube root by libm rounds to the same unit.
-int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
-  double thickness = g.thickness;
-  if (g.thickness_unit == ThicknessUnit::kUnits) thickness *= OracleScale(map);
-  return static_cast<int64_t>(std::min(std::floor(thickness / 2 * 256 + 0.5), 0x1p38));
-}
-
 // Bits of green, red, blue from the top, bit by bit.
 uint32_t Interleaved(uint32_t rgb) {
   uint32_t word = 0;
@@ -95,6 +87,12 @@ uint32_t PixelOf(const DenseVolume& volume, const OracleFootprints& footprints, 
 
 }  // namespace
 
+int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
+  double thickness = g.thickness;
+  if (g.thickness_unit == ThicknessUnit::kUnits) thickness *= OracleScale(map);
+  return static_cast<int64_t>(std::min(std::floor(thickness / 2 * 256 + 0.5), 0x1p38));
+}
+
 void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
                   const Plot& plot) {
   const GeometryRecord& record = g.record;
@@ -102,6 +100,7 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
       record.kind == PrimitiveKind::kCylinder) {
     return PlotSolid(record, map, grid, plot);
   }
+  if (record.kind == PrimitiveKind::kImplicit) return PlotImplicit(g, map, grid, plot);
   std::vector<Units> at;
   std::vector<uint32_t> colors;
   const size_t corners = record.index_count ? record.index_count : record.vertex_count;

@@ -44,6 +44,25 @@ void PlotLine(const OracleLine& line, const DenseVolume& grid, const Plot& plot)
 // Centres within `radius` units of the segment.
 void PlotCapsule(const OracleLine& line, int64_t radius, const DenseVolume& grid, const Plot& plot);
 void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& plot);
+// Half the thickness in units.
+// Tests keep to maps for which a cube root by libm rounds to the same unit.
+int64_t OracleRadius(const GeometryRecord& g, const Affine& map);
+
+// gpu/primitives/solid.h's coordinates of voxels' centres, a second time.
+struct OracleFrame {
+  float inverse[3][3];
+  int64_t origin[3], rest[3];
+  double reach[3];  // of the shape from its origin, voxels
+
+  void Coordinates(int64_t x, int64_t y, int64_t z, float q[3]) const;
+};
+// False if there is no inverse.
+bool SetOracleFrame(const Affine& map, bool keep_thin, OracleFrame& frame);
+// The voxels that a program's domain leaves, a few around it included: half-open.
+void OracleDomain(const GeometryRecord& g, const Affine& map, int64_t low[3], int64_t high[3]);
+
+void PlotImplicit(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
+                  const Plot& plot);
 // `map`: geometry → voxel space.
 void PlotSolid(const GeometryRecord& g, const Affine& map, const DenseVolume& grid,
                const Plot& plot);

@@ -9,20 +9,16 @@ namespace {
 // gpu/primitives/solid.h's definition, a second time.
 struct OracleSolid {
   PrimitiveKind kind;
-  float inverse[3][3];
-  int64_t origin[3], rest[3], low[3], high[3];
+  OracleFrame frame;
+  int64_t low[3], high[3];
 
   bool Inside(int64_t x, int64_t y, int64_t z) const {
     const int64_t at[3] = {x, y, z};
-    float d[3], q[3];
     for (int a = 0; a < 3; ++a) {
       if (at[a] < low[a] || at[a] > high[a]) return false;
-      d[a] = static_cast<float>(256 * (at[a] - origin[a]) + 128 - rest[a]) / 256.0f;
     }
-    for (int r = 0; r < 3; ++r) {
-      q[r] = inverse[r][0] * d[0] + inverse[r][1] * d[1];
-      q[r] = q[r] + inverse[r][2] * d[2];
-    }
+    float q[3];
+    frame.Coordinates(x, y, z, q);
     switch (kind) {
       case PrimitiveKind::kBox:
         return std::max({std::fabs(q[0]), std::fabs(q[1]), std::fabs(q[2])}) <= 1;
@@ -47,9 +43,32 @@ bool Set(const GeometryRecord& g, const Affine& map, OracleSolid& s) {
   local.m[0] = box ? p3 / 2 : p3;
   local.m[5] = box ? p4 / 2 : p3;
   local.m[10] = box ? p5 / 2 : sphere ? p3 : p4 / 2;
-  const Affine m = OracleCompose(map, local);
-  const auto at = [&](int row, int column) { return m.m[row * 4 + column]; };
-  double reach[3] = {0, 0, 0};
+  s.kind = g.kind;
+  if (!SetOracleFrame(OracleCompose(map, local), /*keep_thin=*/true, s.frame)) return false;
+  for (int a = 0; a < 3; ++a) {
+    const double reach = std::min(std::floor(s.frame.reach[a] * 1.0001) + 2, 0x1p30);
+    s.low[a] = s.frame.origin[a] - static_cast<int64_t>(reach);
+    s.high[a] = s.frame.origin[a] + static_cast<int64_t>(reach);
+  }
+  return true;
+}
+
+}  // namespace
+
+void OracleFrame::Coordinates(int64_t x, int64_t y, int64_t z, float q[3]) const {
+  const int64_t at[3] = {x, y, z};
+  float d[3];
+  for (int a = 0; a < 3; ++a) {
+    d[a] = static_cast<float>(256 * (at[a] - origin[a]) + 128 - rest[a]) / 256.0f;
+  }
+  for (int r = 0; r < 3; ++r) {
+    q[r] = inverse[r][0] * d[0] + inverse[r][1] * d[1];
+    q[r] = q[r] + inverse[r][2] * d[2];
+  }
+}
+
+bool SetOracleFrame(const Affine& map, bool keep_thin, OracleFrame& frame) {
+  const auto at = [&](int row, int column) { return map.m[row * 4 + column]; };
   const auto minor = [&](int r0, int c0, int r1, int c1) {
     return at(r0, c0) * at(r1, c1) - at(r0, c1) * at(r1, c0);
   };
@@ -58,7 +77,7 @@ bool Set(const GeometryRecord& g, const Affine& map, OracleSolid& s) {
                                  {minor(1, 0, 2, 1), minor(0, 1, 2, 0), minor(0, 0, 1, 1)}};
   const double det =
       at(0, 0) * adjugate[0][0] + at(0, 1) * adjugate[1][0] + at(0, 2) * adjugate[2][0];
-  s.kind = g.kind;
+  for (double& reach : frame.reach) reach = 0;
   for (int r = 0; r < 3; ++r) {
     double row[3];
     for (int c = 0; c < 3; ++c) {
@@ -67,34 +86,44 @@ bool Set(const GeometryRecord& g, const Affine& map, OracleSolid& s) {
     }
     const double greatest = std::max({std::fabs(row[0]), std::fabs(row[1]), std::fabs(row[2])});
     const double most = 2047.0 / 1024.0;
-    const double scale = greatest > most ? most / greatest : 1;
+    const double scale = keep_thin && greatest > most ? most / greatest : 1;
     for (int c = 0; c < 3; ++c) {
-      s.inverse[r][c] = static_cast<float>(row[c] * scale);
-      reach[c] += std::fabs(at(c, r)) / scale;
+      frame.inverse[r][c] = static_cast<float>(row[c] * scale);
+      frame.reach[c] += std::fabs(at(c, r)) / scale;
     }
   }
   for (int a = 0; a < 3; ++a) {
     const double units = std::floor(at(a, 3) * 256 + 0.5);
     const int64_t snapped = static_cast<int64_t>(std::clamp(units, -0x1p38, 0x1p38));
-    s.origin[a] = static_cast<int64_t>(std::floor(static_cast<double>(snapped) / 256));
-    s.rest[a] = snapped - 256 * s.origin[a];
-    const int64_t size = static_cast<int64_t>(std::min(std::floor(reach[a] * 1.0001) + 2, 0x1p30));
-    s.low[a] = s.origin[a] - size;
-    s.high[a] = s.origin[a] + size;
+    frame.origin[a] = static_cast<int64_t>(std::floor(static_cast<double>(snapped) / 256));
+    frame.rest[a] = snapped - 256 * frame.origin[a];
   }
   return true;
 }
 
-}  // namespace
+// From the left, the lesser and the greater product of each axis.
+void OracleDomain(const GeometryRecord& g, const Affine& map, int64_t low[3], int64_t high[3]) {
+  for (int a = 0; a < 3; ++a) {
+    double least = map.m[a * 4 + 3], most = least;
+    for (int b = 0; b < 3; ++b) {
+      const double at[2] = {map.m[a * 4 + b] * static_cast<double>(g.params[b]),
+                            map.m[a * 4 + b] * static_cast<double>(g.params[3 + b])};
+      least += std::min(at[0], at[1]);
+      most += std::max(at[0], at[1]);
+    }
+    low[a] = static_cast<int64_t>(std::floor(std::clamp(least, -0x1p30, 0x1p30))) - 2;
+    high[a] = static_cast<int64_t>(std::floor(std::clamp(most, -0x1p30, 0x1p30))) + 3;
+  }
+}
 
 void PlotSolid(const GeometryRecord& g, const Affine& map, const DenseVolume& grid,
                const Plot& plot) {
   OracleSolid s;
   if (!Set(g, map, s)) return;
   const uint32_t rgb = g.color & 0xFFFFFF;
-  const bool missed = !s.Inside(s.origin[0], s.origin[1], s.origin[2]);
-  if (missed && grid.Has(s.origin[0], s.origin[1], s.origin[2])) {
-    plot(s.origin[0], s.origin[1], s.origin[2], rgb);
+  const bool missed = !s.Inside(s.frame.origin[0], s.frame.origin[1], s.frame.origin[2]);
+  if (missed && grid.Has(s.frame.origin[0], s.frame.origin[1], s.frame.origin[2])) {
+    plot(s.frame.origin[0], s.frame.origin[1], s.frame.origin[2], rgb);
   }
   for (int64_t z = 0; z < grid.nz; ++z) {
     for (int64_t y = 0; y < grid.ny; ++y) {

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "display/geometry/footprint.h"
+#include "tests/conformance/program_generator.h"
 
 namespace voxeld::gpu::conformance {
 
@@ -179,7 +180,7 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   ModelGeometry g;
   GeometryRecord& r = g.record;
   r.id = id;
-  r.kind = static_cast<PrimitiveKind>(Int(1, 6));
+  r.kind = static_cast<PrimitiveKind>(Int(1, 7));
   r.color = RandomColor();
   r.sampling = static_cast<LineSampling>(Int(0, 2));
   r.rule = static_cast<SurfaceRule>(Int(0, 1));
@@ -195,6 +196,10 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
       r.params[i] = static_cast<float>(Chance(0.2) ? Real(0, 1) : Real(0.5, size));
     }
     if (Chance(0.03)) r.params[3] = 0;
+    return g;
+  }
+  if (r.kind == PrimitiveKind::kImplicit) {
+    AddProgram(*this, size, g);
     return g;
   }
   uint32_t corners = static_cast<uint32_t>(Int(0, 4));

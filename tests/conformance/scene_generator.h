@@ -33,6 +33,7 @@ class SceneGenerator {
   int64_t Int(int64_t low, int64_t high);
   double Real(double low, double high);
   bool Chance(double probability);
+  uint32_t RandomColor();
 
  private:
   display::PlanarStack RandomStack();
@@ -47,7 +48,6 @@ class SceneGenerator {
   Affine RandomTransform(int size);
   void AddVertices(ModelGeometry& g, uint32_t count, int size);
   double RandomCoordinate(int size);
-  uint32_t RandomColor();
   uint64_t RandomId(const auto& map);
 
   std::mt19937_64 engine_;

@@ -281,7 +281,7 @@ TEST_F(PassesTest, FindingStaysWithinItsLimit) {
     view.indices = g.indices;
     view.colors = g.colors;
     d.geometry = std::make_shared<const RetainedGeometry>(RetainedGeometry{view, nullptr});
-    MapDrawable(d, Affine(), *executor_);
+    MapDrawable(d, Affine(), grid_, *executor_);
     const std::vector<uint8_t> owned(grid_.count(), 1);
     Bins all;
     BinScratch scratch;

@@ -1,0 +1,20 @@
+// Colour maps by name (proto/voxeld/v1/colormaps.txt).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxeld {
+
+using ColorTable = std::array<uint32_t, 256>;  // 0x00RRGGBB, of 0 to 1
+
+// None if there is no such map.
+std::optional<ColorTable> FindColormap(std::string_view name);
+// As they stand in the file.
+std::vector<std::string> ColormapNames();
+
+}  // namespace voxeld

@@ -1,0 +1,59 @@
+#include "daemon/wire/fields.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon::wire {
+
+MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
+                       gpu::GeometryRecord* out) {
+  const float value = in.value();
+  if (auto fault = CheckFinite(FieldPath(path, "value"), value)) return fault;
+  if (value < 0 || value > limits.max_thickness) {
+    return Fault{FieldPath(path, "value").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(value), "; give 0 (one voxel) to max_thickness, ",
+                              limits.max_thickness)};
+  }
+  switch (in.unit()) {
+    case v1::Thickness::UNIT_UNSPECIFIED:
+    case v1::Thickness::VOXELS:
+      out->thickness_unit = gpu::ThicknessUnit::kVoxels;
+      break;
+    case v1::Thickness::UNITS:
+      out->thickness_unit = gpu::ThicknessUnit::kUnits;
+      break;
+    default:
+      return UnknownEnum(FieldPath(path, "unit"), in.unit(), "VOXELS, UNITS");
+  }
+  out->thickness = value;
+  return {};
+}
+
+MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out) {
+  switch (in) {
+    case v1::SURFACE_RULE_UNSPECIFIED:
+    case v1::SURFACE_RULE_THIN:
+      out->rule = gpu::SurfaceRule::kThin;
+      return {};
+    case v1::SURFACE_RULE_COVER:
+      out->rule = gpu::SurfaceRule::kCover;
+      return {};
+    default:
+      return UnknownEnum(FieldPath(path, "rule"), in, "SURFACE_RULE_THIN, SURFACE_RULE_COVER");
+  }
+}
+
+MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) {
+  switch (in) {
+    case v1::FILL_UNSPECIFIED:
+    case v1::FILL_SURFACE:
+      out->fill = gpu::Fill::kSurface;
+      return {};
+    case v1::FILL_SOLID:
+      out->fill = gpu::Fill::kSolid;
+      return {};
+    default:
+      return UnknownEnum(FieldPath(path, "fill"), in, "FILL_SURFACE, FILL_SOLID");
+  }
+}
+
+}  // namespace voxeld::daemon::wire

@@ -1,0 +1,189 @@
+// An implicit shape in voxel space: which voxels it covers, in which colours, and what is known of a
+// box of voxels without looking at each. Host and device.
+//
+// P, Φ and the colour are functions of the shape's own coordinates at a voxel's centre (solid.h). A
+// voxel is inside if P ≤ 0; what is not a number is outside. The solid is what is inside. The surface,
+// of half-width h voxels, is each voxel with
+//   |P| ≤ h·|∇P|, the gradient in voxel space; for h = 0: P = 0; or with
+//   a neighbour on the other side whose |P| is not less (what is not a number is infinite),
+// among the 6 neighbours that share a face (THIN) or all 26 (COVER). Of any two neighbours on different
+// sides one is covered, so no path of such steps leads from one side to the other past the surface.
+// Of either only those voxels are covered at whose centre Φ ≤ 0 and which lie within the rings: the
+// closed curves, projected along an axis, by the even-odd rule.
+#pragma once
+
+#include "gpu/implicit/program.h"
+#include "gpu/primitives/source.h"
+
+namespace voxeld::gpu::implicit {
+
+enum class Side : uint8_t { kOutside, kInside, kMixed };
+
+// Of all voxels in a box.
+struct BoxState {
+  Side side = Side::kMixed;  // of all of them
+  bool none = false;         // nothing in it is covered
+  bool all = false;          // of a solid: everything is
+  float reach = 0;           // no voxel of greater |P| is covered by |P| ≤ h·|∇P|
+};
+
+class Field {
+ public:
+  VOXELD_HD explicit Field(const Source& source)
+      : solid_(source.solid),
+        place_(source.implicit),
+        record_(*source.record),
+        positions_(source.positions),
+        program_{source.indices} {}
+
+  VOXELD_HD bool solid() const { return record_.fill == Fill::kSolid; }
+  VOXELD_HD bool cover() const { return record_.rule == SurfaceRule::kCover; }
+  VOXELD_HD float half() const { return place_.half; }
+
+  // The shape's coordinates at offsets from its origin, in voxels.
+  template <class N>
+  VOXELD_HD void Coordinates(const N& dx, const N& dy, const N& dz, N q[3]) const {
+    for (int r = 0; r < 3; ++r) {
+      const float* const row = solid_.inverse[r];
+      q[r] = Add(Add(Mul(ConstantLike(dx, row[0]), dx), Mul(ConstantLike(dx, row[1]), dy)),
+                 Mul(ConstantLike(dx, row[2]), dz));
+    }
+  }
+  template <class N>
+  VOXELD_HD void WithGradients(const N q[3], Dual<N> dual[3]) const {
+    for (int r = 0; r < 3; ++r) {
+      dual[r].value = q[r];
+      for (int a = 0; a < 3; ++a) dual[r].d[a] = ConstantLike(q[0], solid_.inverse[r][a]);
+    }
+  }
+  VOXELD_HD void CoordinatesOf(int32_t x, int32_t y, int32_t z, float q[3]) const {
+    Coordinates(solid_.Distance(0, x), solid_.Distance(1, y), solid_.Distance(2, z), q);
+  }
+
+  template <class N>
+  VOXELD_HD N Surface(const N q[3]) const {
+    N slots[kMostSlots];
+    Run(program_.surface_code(), program_.surface(), q, place_.voxel, slots);
+    return slots[program_.surface_slot()];
+  }
+  template <class N>
+  VOXELD_HD N Bound(const N q[3]) const {
+    N slots[kMostSlots];
+    Run(program_.bound_code(), program_.bound(), q, place_.voxel, slots);
+    return slots[program_.bound_slot()];
+  }
+
+  // As neighbours compare it.
+  VOXELD_HD static float Magnitude(float p) { return IsNan(p) ? Infinity() : Abs(p); }
+  VOXELD_HD static bool IsInside(float p) { return p <= 0; }
+
+  // |P| ≤ h·|∇P|.
+  template <class N>
+  VOXELD_HD static N Slope(const Dual<N>& p) {
+    return Sqrt(Add(Add(Square(p.d[0]), Square(p.d[1])), Square(p.d[2])));
+  }
+  VOXELD_HD bool IsWithin(const Dual<float>& p) const {
+    return Abs(p.value) <= place_.half * Slope(p);
+  }
+
+  // Φ and the rings.
+  VOXELD_HD bool IsBounded(const float q[3]) const {
+    if (program_.bound() != 0 && !(Bound(q) <= 0)) return false;
+    return program_.rings() == 0 || IsInRings(q);
+  }
+
+  VOXELD_HD uint32_t ColorAt(const float q[3]) const {
+    const ColorBy by = program_.color_by();
+    if (by == ColorBy::kUniform) return record_.color & 0x00FFFFFF;
+    float slots[kMostSlots];
+    Run(program_.color_code(), program_.color(), q, place_.voxel, slots);
+    if (by == ColorBy::kTable) return program_.table()[Level(slots[program_.color_slot(0)], 256)];
+    uint32_t rgb = 0;
+    for (uint32_t c = 0; c < 3; ++c) rgb = rgb << 8 | Level(slots[program_.color_slot(c)], 255.5f);
+    return rgb;
+  }
+
+  // What is known of the voxels in a box, of which each axis has at least one. With `rim`, sides are those
+  // of the voxels around it, too.
+  VOXELD_HD BoxState StateOf(const Box3& box) const {
+    BoxState state;
+    Interval q[3];
+    if (program_.bound() != 0) {
+      CoordinatesOf(box, 0, q);
+      const Interval bound = Bound(q);
+      if (bound.lo > 0) {
+        state.none = true;
+        return state;
+      }
+    }
+    const int32_t rim = solid() ? 0 : 1;
+    CoordinatesOf(box, rim, q);
+    if (solid() || place_.half == 0) {
+      SetSide(Surface(q), state);
+      return state;
+    }
+    Dual<Interval> dual[3];
+    WithGradients(q, dual);
+    const Dual<Interval> p = Surface(dual);
+    SetSide(p.value, state);
+    const Interval slope = Mul(ConstantLike(p.value, place_.half), Slope(p));
+    state.reach = slope.nan ? Infinity() : slope.hi;
+    state.none = state.side != Side::kMixed && Abs(p.value).lo > state.reach;
+    return state;
+  }
+
+ private:
+  // Steps of 0 to 1, the last one included in the one before it.
+  VOXELD_HD static uint32_t Level(float value, float steps) {
+    if (!(value > 0)) return 0;
+    if (value >= 1) return 255;
+    const float scaled = steps == 256 ? value * 256.0f : value * 255.0f + 0.5f;
+    return static_cast<uint32_t>(scaled);
+  }
+
+  VOXELD_HD void CoordinatesOf(const Box3& box, int32_t rim, Interval q[3]) const {
+    Interval d[3];
+    for (int a = 0; a < 3; ++a) {
+      d[a] = {solid_.Distance(a, int64_t{box.lo[a]} - rim),
+              solid_.Distance(a, int64_t{box.hi[a]} - 1 + rim), false};
+    }
+    Coordinates(d[0], d[1], d[2], q);
+  }
+  VOXELD_HD void SetSide(const Interval& p, BoxState& state) const {
+    if (p.lo > 0) {
+      state.side = Side::kOutside;
+    } else if (!p.nan && (p.hi < 0 || (solid() && p.hi <= 0))) {
+      state.side = Side::kInside;
+    }
+    state.none = state.side == Side::kOutside || (!solid() && state.side == Side::kInside);
+    state.all = solid() && state.side == Side::kInside;
+  }
+
+  VOXELD_HD bool IsInRings(const float q[3]) const {
+    const uint32_t axis = program_.ring_axis(), across = axis == 2 ? 0 : axis + 1,
+                   up = axis == 0 ? 2 : axis - 1;
+    const float u = q[across], v = q[up];
+    bool in = false;
+    uint32_t begin = 0;
+    for (uint32_t r = 0; r < program_.rings(); ++r) {
+      const uint32_t end = program_.ring_ends()[r];
+      for (uint32_t i = begin; i < end; ++i) {
+        const float* const a = positions_ + size_t{i} * 3;
+        const float* const b = positions_ + size_t{i + 1 < end ? i + 1 : begin} * 3;
+        if ((a[up] > v) == (b[up] > v)) continue;
+        const float at = a[across] + (v - a[up]) / (b[up] - a[up]) * (b[across] - a[across]);
+        in ^= u < at;
+      }
+      begin = end;
+    }
+    return in;
+  }
+
+  const Solid& solid_;
+  const ImplicitPlace& place_;
+  const GeometryRecord& record_;
+  const float* positions_;
+  ProgramView program_;
+};
+
+}  // namespace voxeld::gpu::implicit

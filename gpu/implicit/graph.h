@@ -1,0 +1,96 @@
+// Expressions as graphs: made node by node, with what is alike made once and constants computed, and
+// compiled into programs (program.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/statusor.h"
+#include "gpu/implicit/program.h"
+
+namespace voxeld::gpu::implicit {
+
+// Thread-compatible. A node is an index, valid for this graph alone.
+class Graph {
+ public:
+  using Node = int32_t;
+
+  Node Constant(double value) { return Leaf(Op::kConstant, BitsOf(static_cast<float>(value))); }
+  Node Axis(int axis) { return Leaf(static_cast<Op>(static_cast<int>(Op::kX) + axis), 0); }
+  Node Voxel() { return Leaf(Op::kVoxel, 0); }
+
+  Node Neg(Node a) { return Unary(Op::kNeg, a); }
+  Node Abs(Node a) { return Unary(Op::kAbs, a); }
+  Node Square(Node a) { return Unary(Op::kSquare, a); }
+  Node Sqrt(Node a) { return Unary(Op::kSqrt, a); }
+  Node Cbrt(Node a) { return Unary(Op::kCbrt, a); }
+  Node Sin(Node a) { return Unary(Op::kSin, a); }
+  Node Cos(Node a) { return Unary(Op::kCos, a); }
+  Node Exp(Node a) { return Unary(Op::kExp, a); }
+  Node Log(Node a) { return Unary(Op::kLog, a); }
+  Node Floor(Node a) { return Unary(Op::kFloor, a); }
+  Node PowI(Node a, int32_t exponent);  // within ±kMostExponent
+  Node Add(Node a, Node b) { return Binary(Op::kAdd, a, b); }
+  Node Sub(Node a, Node b) { return Binary(Op::kSub, a, b); }
+  Node Mul(Node a, Node b) { return Binary(Op::kMul, a, b); }
+  Node Div(Node a, Node b) { return Binary(Op::kDiv, a, b); }
+  Node Min(Node a, Node b) { return Binary(Op::kMin, a, b); }
+  Node Max(Node a, Node b) { return Binary(Op::kMax, a, b); }
+  Node Atan2(Node y, Node x) { return Binary(Op::kAtan2, y, x); }
+
+  // a^b: by squaring where b is a whole constant, a root where it is ½ or ⅓, else exp(b·log a), which
+  // is not a number for a < 0.
+  Node Pow(Node a, Node b);
+  Node Tan(Node a) { return Div(Sin(a), Cos(a)); }
+  Node Asin(Node a);
+  Node Acos(Node a);
+  Node Sinh(Node a);
+  Node Cosh(Node a);
+  Node Tanh(Node a);
+  Node Mod(Node a, Node b);  // a − b·⌊a/b⌋
+  // Minimum and maximum rounded off within k of equality: min(a, b) − max(k − |a − b|, 0)²/(4k).
+  Node SmoothMin(Node a, Node b, Node k);
+  Node SmoothMax(Node a, Node b, Node k);
+  Node Length(std::span<const Node> of);  // √ of the sum of squares
+
+  size_t size() const { return nodes_.size(); }
+
+ private:
+  friend class Compiler;
+  struct Content {
+    Op op;
+    uint32_t immediate = 0;
+    Node a = -1, b = -1;
+    bool operator==(const Content&) const = default;
+    template <typename H>
+    friend H AbslHashValue(H h, const Content& c) {
+      return H::combine(std::move(h), c.op, c.immediate, c.a, c.b);
+    }
+  };
+
+  Node Make(const Content& content);
+  Node Leaf(Op op, uint32_t immediate) { return Make({op, immediate}); }
+  Node Unary(Op op, Node a) { return Make({op, 0, a}); }
+  Node Binary(Op op, Node a, Node b) { return Make({op, 0, a, b}); }
+  bool IsConstant(Node a, float* value) const;
+
+  std::vector<Content> nodes_;
+  absl::flat_hash_map<Content, Node> made_;
+};
+
+// What a program is compiled from.
+struct ProgramSource {
+  Graph::Node surface = -1;
+  Graph::Node bound = -1;                // −1: none
+  Graph::Node color[3] = {-1, -1, -1};   // three of them, one, with a table, or none
+  std::span<const uint32_t> table = {};  // kTableColors, or none
+  std::span<const uint32_t> ring_ends = {};
+  uint32_t ring_axis = 2;
+};
+
+// ResourceExhausted if one of the three takes more than kMostInstructions or kMostSlots: says how many.
+absl::StatusOr<std::vector<uint32_t>> Compile(const Graph& graph, const ProgramSource& source);
+
+}  // namespace voxeld::gpu::implicit

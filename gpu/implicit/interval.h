@@ -1,0 +1,171 @@
+// Interval arithmetic that holds what single precision computes.
+//
+// An interval holds every value that the functions of number.h may give for arguments within the
+// given intervals: if `nan` is false all lie in [lo, hi]; if it is true some may be no numbers as well.
+// The four operations, squares, roots and floors are rounded correctly, so they are monotonic where
+// the exact ones are, and their values at the ends bound those within: nothing need be widened. What
+// is a polynomial is widened by more than twice its error, kSlack. Where an exact function would be
+// undefined or unbounded the answer is everything.
+//
+// Ends may be infinite, and are never NaN.
+#pragma once
+
+#include "gpu/implicit/number.h"
+
+namespace voxeld::gpu::implicit {
+
+struct Interval {
+  float lo = 0, hi = 0;
+  bool nan = false;
+
+  VOXELD_HD static Interval Everything() { return {-Infinity(), Infinity(), true}; }
+  VOXELD_HD bool Has(float x) const { return IsNan(x) ? nan : lo <= x && x <= hi; }
+};
+
+// More than four times the error of a polynomial in number.h.
+inline constexpr float kSlack = 1.9073486328125e-06f;  // 2⁻¹⁹
+
+VOXELD_HD inline Interval ConstantLike(const Interval&, float value) {
+  return IsNan(value) ? Interval::Everything() : Interval{value, value, false};
+}
+
+VOXELD_HD inline Interval Hull(const Interval& a, const Interval& b) {
+  return {a.lo < b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi, a.nan || b.nan};
+}
+
+// Of ends that were computed: everything if one of them is not a number.
+VOXELD_HD inline Interval Checked(float lo, float hi, bool nan) {
+  return IsNan(lo) || IsNan(hi) ? Interval::Everything() : Interval{lo, hi, nan};
+}
+// Ends of monotonic sums of infinities of both signs may come out as numbers though what lies between
+// does not.
+VOXELD_HD inline bool Bounded(const Interval& a) { return IsFinite(a.lo) && IsFinite(a.hi); }
+
+VOXELD_HD inline Interval Add(const Interval& a, const Interval& b) {
+  const bool undefined = !Bounded(a) && !Bounded(b);
+  return Checked(a.lo + b.lo, a.hi + b.hi, a.nan || b.nan || undefined);
+}
+VOXELD_HD inline Interval Sub(const Interval& a, const Interval& b) {
+  const bool undefined = !Bounded(a) && !Bounded(b);
+  return Checked(a.lo - b.hi, a.hi - b.lo, a.nan || b.nan || undefined);
+}
+VOXELD_HD inline Interval Neg(const Interval& a) { return {-a.hi, -a.lo, a.nan}; }
+
+// Of four corners; NaN among them: everything.
+VOXELD_HD inline Interval OfCorners(float a, float b, float c, float d, bool nan) {
+  if (IsNan(a) || IsNan(b) || IsNan(c) || IsNan(d)) return Interval::Everything();
+  const float lo1 = a < b ? a : b, hi1 = a < b ? b : a;
+  const float lo2 = c < d ? c : d, hi2 = c < d ? d : c;
+  return {lo1 < lo2 ? lo1 : lo2, hi1 > hi2 ? hi1 : hi2, nan};
+}
+VOXELD_HD inline bool HasZero(const Interval& a) { return a.lo <= 0 && a.hi >= 0; }
+
+VOXELD_HD inline Interval Mul(const Interval& a, const Interval& b) {
+  // Zero times infinity.
+  const bool undefined = (HasZero(a) && !Bounded(b)) || (HasZero(b) && !Bounded(a));
+  if (undefined) return Interval::Everything();
+  return OfCorners(a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi, a.nan || b.nan);
+}
+VOXELD_HD inline Interval Div(const Interval& a, const Interval& b) {
+  if (HasZero(b) || (!Bounded(a) && !Bounded(b))) return Interval::Everything();
+  return OfCorners(a.lo / b.lo, a.lo / b.hi, a.hi / b.lo, a.hi / b.hi, a.nan || b.nan);
+}
+
+VOXELD_HD inline Interval Abs(const Interval& a) {
+  if (a.lo >= 0) return a;
+  if (a.hi <= 0) return Neg(a);
+  return {0, -a.lo > a.hi ? -a.lo : a.hi, a.nan};
+}
+VOXELD_HD inline Interval Square(const Interval& a) {
+  const Interval b = Abs(a);
+  return {b.lo * b.lo, b.hi * b.hi, a.nan};
+}
+VOXELD_HD inline Interval Sqrt(const Interval& a) {
+  const float lo = a.lo > 0 ? a.lo : 0, hi = a.hi > 0 ? a.hi : 0;
+  return {Sqrt(lo), Sqrt(hi), a.nan || a.lo < 0};
+}
+VOXELD_HD inline Interval Floor(const Interval& a) { return {Floor(a.lo), Floor(a.hi), a.nan}; }
+
+// Down and up in proportion, by kSlack.
+VOXELD_HD inline float Below(float x) { return x - (Abs(x) * kSlack + 1.0e-44f); }
+VOXELD_HD inline float Above(float x) { return x + (Abs(x) * kSlack + 1.0e-44f); }
+// Infinite ends stay as they are; no more than that is left of one that was infinite by rounding alone.
+VOXELD_HD inline float BelowEnd(float x) {
+  return x == Infinity() ? 3.0e38f : (x == -Infinity() ? x : Below(x));
+}
+VOXELD_HD inline float AboveEnd(float x) {
+  return x == -Infinity() ? -3.0e38f : (x == Infinity() ? x : Above(x));
+}
+
+VOXELD_HD inline Interval Cbrt(const Interval& a) {
+  return {BelowEnd(Cbrt(a.lo)), AboveEnd(Cbrt(a.hi)), a.nan};
+}
+
+// Products of monotonic factors of one sign, rounded, are monotonic.
+VOXELD_HD inline Interval PowI(const Interval& a, int32_t n) {
+  if (n < 0) return Div(Interval{1, 1, false}, PowI(a, -n));
+  if (n % 2 != 0) return {PowI(a.lo, n), PowI(a.hi, n), a.nan};
+  const Interval b = Abs(a);
+  return {PowI(b.lo, n), PowI(b.hi, n), a.nan};
+}
+
+VOXELD_HD inline Interval Exp(const Interval& a) {
+  const float lo = BelowEnd(Exp(a.lo));
+  return {lo > 0 ? lo : 0, AboveEnd(Exp(a.hi)), a.nan};
+}
+VOXELD_HD inline Interval Log(const Interval& a) {
+  if (!(a.hi > 0)) {
+    return {-Infinity(), -Infinity(), true};
+  }
+  const float lo = a.lo > 0 ? Log(a.lo) : -Infinity(), hi = Log(a.hi);
+  return {BelowEnd(lo) - kSlack, AboveEnd(hi) + kSlack, a.nan || a.lo < 0};
+}
+
+// Of x + quarters·π/2.
+VOXELD_HD inline Interval SineOf(const Interval& a, int32_t quarters) {
+  const float lo = a.lo, hi = a.hi;
+  const bool lost = !(lo >= -kMostAngle && hi <= kMostAngle);
+  const Interval all = {-1.0f - kSlack, 1.0f + kSlack, a.nan || lost};
+  if (lost) return all;
+  // In quarter turns, with more room than rounding takes.
+  constexpr double kTurns = 0.63661977236758134, kRoom = 1e-6;
+  const double from = static_cast<double>(lo) * kTurns + quarters - kRoom;
+  const double to = static_cast<double>(hi) * kTurns + quarters + kRoom;
+  if (to - from >= 4) return all;
+  const float s = SineOf(lo, quarters), t = SineOf(hi, quarters);
+  Interval result = {(s < t ? s : t) - kSlack, (s < t ? t : s) + kSlack, a.nan};
+  // Whether 1 + 4i or 3 + 4i lies between: i.e. whether the number of such below differs.
+  const auto below = [](double quarter, double phase) {
+    const double q = (quarter - phase) * 0.25;
+    int64_t i = static_cast<int64_t>(q);
+    if (static_cast<double>(i) > q) --i;
+    return i;
+  };
+  if (below(from, 1) != below(to, 1)) result.hi = all.hi;
+  if (below(from, 3) != below(to, 3)) result.lo = all.lo;
+  return result;
+}
+VOXELD_HD inline Interval Sin(const Interval& a) { return SineOf(a, 0); }
+VOXELD_HD inline Interval Cos(const Interval& a) { return SineOf(a, 1); }
+
+VOXELD_HD inline Interval Min(const Interval& a, const Interval& b) {
+  // Where one is not a number it is the other.
+  float hi = a.hi < b.hi ? a.hi : b.hi;
+  if (a.nan && b.hi > hi) hi = b.hi;
+  if (b.nan && a.hi > hi) hi = a.hi;
+  return {a.lo < b.lo ? a.lo : b.lo, hi, a.nan && b.nan};
+}
+VOXELD_HD inline Interval Max(const Interval& a, const Interval& b) {
+  return {a.lo > b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi, a.nan || b.nan};
+}
+
+// Extreme at corners, unless the box meets the cut along the negative x axis.
+VOXELD_HD inline Interval Atan2(const Interval& y, const Interval& x) {
+  const bool nan = x.nan || y.nan;
+  if (x.lo <= 0 && HasZero(y)) return {-3.14159274f - kSlack, 3.14159274f + kSlack, nan};
+  const Interval box =
+      OfCorners(Atan2(y.lo, x.lo), Atan2(y.lo, x.hi), Atan2(y.hi, x.lo), Atan2(y.hi, x.hi), nan);
+  return {box.lo - 2 * kSlack, box.hi + 2 * kSlack, nan};
+}
+
+}  // namespace voxeld::gpu::implicit

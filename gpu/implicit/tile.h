@@ -1,0 +1,175 @@
+// The voxels of an implicit shape in a tile, on the CPU: parts of 4³ voxels that may have some are
+// found by intervals, and P is computed row by row where they lie.
+#pragma once
+
+#include <cstdint>
+
+#include "gpu/implicit/field.h"
+#include "gpu/implicit/row.h"
+#include "gpu/primitives/grid.h"
+
+namespace voxeld::gpu::implicit {
+
+class TileField {
+ public:
+  // `box`: not empty, kTileSize along each axis at most.
+  TileField(const Field& field, const Source& source, const Box3& box)
+      : field_(field), solid_(source.solid), box_(box) {
+    for (int a = 0; a < 3; ++a) size_[a] = box.hi[a] - box.lo[a];
+  }
+
+  // f(x, y, z, rgb) for each voxel covered.
+  template <class Emit>
+  void EmitVoxels(Emit&& emit) {
+    if (!FindParts()) return;
+    FindRows();
+    for (int32_t z = 0; z < size_[2]; ++z) {
+      for (int32_t y = 0; y < size_[1]; ++y) EmitRow(y, z, emit);
+    }
+  }
+
+ private:
+  static constexpr int32_t kPart = 4;
+  static constexpr int32_t kParts = kTileSize / kPart;
+  static constexpr int32_t kRows = kTileSize + 2;
+
+  // False if no part has anything.
+  bool FindParts() {
+    bool any = false;
+    for (int32_t k = 0; k * kPart < size_[2]; ++k) {
+      for (int32_t j = 0; j * kPart < size_[1]; ++j) {
+        for (int32_t i = 0; i * kPart < size_[0]; ++i) {
+          const int32_t at[3] = {i, j, k};
+          Box3 part;
+          for (int a = 0; a < 3; ++a) {
+            part.lo[a] = box_.lo[a] + at[a] * kPart;
+            part.hi[a] = Min(part.lo[a] + kPart, box_.hi[a]);
+          }
+          parts_[k][j][i] = field_.StateOf(part);
+          any |= !parts_[k][j][i].none;
+        }
+      }
+    }
+    return any;
+  }
+
+  // P in rows that parts with anything, or their neighbours, have.
+  void FindRows() {
+    const int32_t rim = field_.solid() ? 0 : 1;
+    bool needed[kRows][kRows] = {};
+    for (int32_t k = 0; k * kPart < size_[2]; ++k) {
+      for (int32_t j = 0; j * kPart < size_[1]; ++j) {
+        bool any = false;
+        for (int32_t i = 0; i * kPart < size_[0]; ++i) {
+          any |= !parts_[k][j][i].none && !parts_[k][j][i].all;
+        }
+        if (!any) continue;
+        const int32_t z1 = Min((k + 1) * kPart, size_[2]), y1 = Min((j + 1) * kPart, size_[1]);
+        for (int32_t z = k * kPart - rim; z < z1 + rim; ++z) {
+          for (int32_t y = j * kPart - rim; y < y1 + rim; ++y) needed[z + 1][y + 1] = true;
+        }
+      }
+    }
+    for (int32_t z = -1; z <= size_[2]; ++z) {
+      for (int32_t y = -1; y <= size_[1]; ++y) {
+        if (!needed[z + 1][y + 1]) continue;
+        Row q[3];
+        RowCoordinates(y, z, q);
+        values_[z + 1][y + 1] = field_.Surface(q);
+      }
+    }
+  }
+
+  // Of the row's voxels from one before the box on.
+  void RowCoordinates(int32_t y, int32_t z, Row q[3]) const {
+    const Row dx = EachOf([&](size_t i) {
+      return solid_.Distance(0, int64_t{box_.lo[0]} - 1 + static_cast<int64_t>(i));
+    });
+    const Row dy = ConstantLike(dx, solid_.Distance(1, int64_t{box_.lo[1]} + y));
+    const Row dz = ConstantLike(dx, solid_.Distance(2, int64_t{box_.lo[2]} + z));
+    field_.Coordinates(dx, dy, dz, q);
+  }
+
+  float ValueAt(int32_t x, int32_t y, int32_t z) const { return values_[z + 1][y + 1].at[x + 1]; }
+
+  // Whether a neighbour on the other side has no less |P|.
+  bool IsBetweenSides(int32_t x, int32_t y, int32_t z, float p) const {
+    const bool inside = Field::IsInside(p);
+    const float magnitude = Field::Magnitude(p);
+    const auto meets = [&](int32_t dx, int32_t dy, int32_t dz) {
+      const float other = ValueAt(x + dx, y + dy, z + dz);
+      return Field::IsInside(other) != inside && magnitude <= Field::Magnitude(other);
+    };
+    if (!field_.cover()) {
+      return meets(-1, 0, 0) || meets(1, 0, 0) || meets(0, -1, 0) || meets(0, 1, 0) ||
+             meets(0, 0, -1) || meets(0, 0, 1);
+    }
+    for (int32_t dz = -1; dz <= 1; ++dz) {
+      for (int32_t dy = -1; dy <= 1; ++dy) {
+        for (int32_t dx = -1; dx <= 1; ++dx) {
+          if (meets(dx, dy, dz)) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  // Of the row's voxels, a bit each: |P| ≤ h·|∇P|.
+  uint32_t FindShell(int32_t y, int32_t z) const {
+    Row q[3];
+    RowCoordinates(y, z, q);
+    DualRow dual[3];
+    field_.WithGradients(q, dual);
+    const DualRow p = field_.Surface(dual);
+    const Row slope = Field::Slope(p);
+    uint32_t bits = 0;
+    for (int32_t x = 0; x < size_[0]; ++x) {
+      bits |= static_cast<uint32_t>(Abs(p.value.at[x + 1]) <= field_.half() * slope.at[x + 1]) << x;
+    }
+    return bits;
+  }
+
+  template <class Emit>
+  void EmitRow(int32_t y, int32_t z, Emit&& emit) {
+    const BoxState* const parts = parts_[z / kPart][y / kPart];
+    bool shell_known = false;
+    uint32_t shell = 0;
+    for (int32_t x = 0; x < size_[0]; ++x) {
+      const BoxState& part = parts[x / kPart];
+      if (part.none) {
+        x |= kPart - 1;
+        continue;
+      }
+      bool covered = part.all;
+      if (!covered) {
+        const float p = ValueAt(x, y, z);
+        if (field_.solid()) {
+          covered = Field::IsInside(p);
+        } else if (field_.half() == 0) {
+          covered = p == 0;
+        } else if (Abs(p) <= part.reach) {
+          if (!shell_known) shell = FindShell(y, z);
+          shell_known = true;
+          covered = (shell >> x & 1) != 0;
+        }
+        if (!covered && !field_.solid() && part.side == Side::kMixed) {
+          covered = IsBetweenSides(x, y, z, p);
+        }
+      }
+      if (!covered) continue;
+      const int32_t at[3] = {box_.lo[0] + x, box_.lo[1] + y, box_.lo[2] + z};
+      float q[3];
+      field_.CoordinatesOf(at[0], at[1], at[2], q);
+      if (field_.IsBounded(q)) emit(at[0], at[1], at[2], field_.ColorAt(q));
+    }
+  }
+
+  const Field& field_;
+  const Solid& solid_;
+  const Box3 box_;
+  int32_t size_[3];
+  BoxState parts_[kParts][kParts][kParts];
+  Row values_[kRows][kRows];
+};
+
+}  // namespace voxeld::gpu::implicit
