@@ -9,6 +9,7 @@ namespace voxeld::gpu {
 namespace {
 
 constexpr size_t kVertexRun = 1024;
+constexpr int32_t kBlockTiles = 4;    // of implicit shapes: looked at together first
 constexpr size_t kMostFetched = 128;  // faces, which the first cache holds
 
 // The walks among the items, where others have no place among the walks.
@@ -104,7 +105,9 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
     if constexpr (kIsSolid<Primitive>) {
       d.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
     } else if constexpr (std::is_same_v<Primitive, Implicit>) {
-      Implicit::Place(view.record, map, grid, d.source.solid, d.source.implicit);
+      d.hoisted = Implicit::Place(view.record, view.indices.data(), map, grid, kBlockTiles,
+                                  d.source.solid, d.source.implicit);
+      d.source.implicit.hoisted = d.hoisted.data();
       d.source.positions = view.positions.data();
       d.source.indices = view.indices.data();
     } else {

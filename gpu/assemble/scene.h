@@ -33,6 +33,7 @@ struct Drawable {
 
   // Derived, in voxel space; empty while `pending`.
   std::vector<Int3> vertices;
+  std::vector<uint32_t> hoisted;  // of an implicit shape
   Source source;
   Bins bins;
   uint64_t derived_bytes = 0;

@@ -56,6 +56,7 @@ struct GeometryBounds {
 struct DeviceArrays {
   std::shared_ptr<Block> block;
   std::optional<GeometryBounds> bounds;
+  std::vector<uint32_t> program;  // of an implicit shape, where the host can read it
 };
 
 // A box of voxels, closed, of which nothing more is asked than about how large it is.
@@ -116,6 +117,7 @@ class CudaVolume final : private SceneObserver {
     RoughBox box = RoughBox::Everything();
     uint32_t regions_each = 0;   // that a triangle touches at most
     Block tiles, begin, voxels;  // of what the CPU has drawn
+    Block hoisted, reach;        // of an implicit shape (ImplicitPlace)
   };
 
   absl::Status OnPlan(const DeltaPlan& plan) override;
@@ -170,7 +172,10 @@ class CudaVolume final : private SceneObserver {
   absl::Status Draw(DrawView& view, DrawTo to, cudaStream_t stream);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
-  TableEntry EntryOf(const Drawable& drawable) const;
+  TableEntry EntryOf(const Drawable& drawable, std::vector<uint32_t>& hoisted) const;
+  // Of an implicit shape: uploads what is hoisted of it; memory for what its tiles are known to have.
+  absl::Status PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry, Slot& slot);
+  absl::Status FindImplicitTiles(std::span<const uint32_t> slots);
   // Has the CPU draw it; the result goes over, and into `slot`.
   absl::Status DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot);
   uint32_t TakeSlot();

@@ -192,7 +192,10 @@ RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   kept.view.colors = OnDevice(view, view.colors);
   const auto bounds = bounds_.find(view.positions.data());
   kept.memory = std::make_shared<DeviceArrays>(
-      arrays_, bounds == bounds_.end() ? std::nullopt : std::optional(bounds->second));
+      arrays_, bounds == bounds_.end() ? std::nullopt : std::optional(bounds->second),
+      view.record.kind == PrimitiveKind::kImplicit
+          ? std::vector<uint32_t>(view.indices.begin(), view.indices.end())
+          : std::vector<uint32_t>());
   return kept;
 }
 

@@ -73,7 +73,8 @@ uint32_t CudaVolume::TakeSlot() {
   return slot;
 }
 
-TableEntry CudaVolume::EntryOf(const Drawable& d) const {
+// `hoisted`: of an implicit shape.
+TableEntry CudaVolume::EntryOf(const Drawable& d, std::vector<uint32_t>& hoisted) const {
   const GeometryView& view = d.geometry->view;
   TableEntry entry;
   entry.record = view.record;
@@ -87,7 +88,12 @@ TableEntry CudaVolume::EntryOf(const Drawable& d) const {
     if constexpr (kIsSolid<Primitive>) {
       entry.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
     } else if constexpr (std::is_same_v<Primitive, Implicit>) {
-      Implicit::Place(view.record, map, tiles_.grid, entry.source.solid, entry.source.implicit);
+      const auto* const arrays = static_cast<const DeviceArrays*>(d.geometry->memory.get());
+      // What the CPU draws lies in the host's memory.
+      const uint32_t* const program =
+          view.record.drawn_by == DrawnBy::kCpu ? view.indices.data() : arrays->program.data();
+      hoisted = Implicit::Place(view.record, program, map, tiles_.grid, /*tiles=*/1,
+                                entry.source.solid, entry.source.implicit);
       entry.source.positions = view.positions.data();
       entry.source.indices = view.indices.data();
     } else {
@@ -99,6 +105,33 @@ TableEntry CudaVolume::EntryOf(const Drawable& d) const {
     }
   });
   return entry;
+}
+
+absl::Status CudaVolume::PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry,
+                                       Slot& slot) {
+  absl::StatusOr<Block> block = device_.Upload(hoisted.data(), hoisted.size());
+  if (!block.ok()) return block.status();
+  slot.hoisted = *std::move(block);
+  block = device_.pool().Acquire(Implicit::Count(entry.source) * sizeof(float));
+  if (!block.ok()) return block.status();
+  slot.reach = *std::move(block);
+  entry.source.implicit.hoisted = slot.hoisted.as<uint32_t>();
+  entry.source.implicit.reach = slot.reach.as<float>();
+  // What goes over lies in memory that is about to go.
+  return device_.Wait();
+}
+
+// After they are in the table.
+absl::Status CudaVolume::FindImplicitTiles(std::span<const uint32_t> slots) {
+  for (const uint32_t slot : slots) {
+    if (slots_[slot].reach.size() == 0 || slots_[slot].items == 0) continue;
+    const absl::Status status = device_.Run("FindImplicitTiles", [&] {
+      return cuda::FindImplicitTiles(table_.as<TableEntry>(), slot, slots_[slot].items,
+                                     device_.stream());
+    });
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot) {
@@ -199,17 +232,22 @@ absl::Status CudaVolume::Enter() {
   absl::flat_hash_set<uint32_t> layers[] = {{}, lines_.Layers(), triangles_.Layers()};  // by index
   for (const Drawable* drawable : drawables) {
     const uint32_t slot = TakeSlot();
-    TableEntry entry = EntryOf(*drawable);
+    std::vector<uint32_t> hoisted;
+    TableEntry entry = EntryOf(*drawable, hoisted);
     entry.source.record = &entry.record;
     slots.push_back(slot);
     slots_[slot] = {};
-    if (entry.record.drawn_by == DrawnBy::kCpu) {
-      if (absl::Status status = DrawInto(entry, *drawable, slots_[slot]); !status.ok()) {
+    const bool by_cpu = entry.record.drawn_by == DrawnBy::kCpu;
+    if (by_cpu || !hoisted.empty()) {
+      const absl::Status status = by_cpu ? DrawInto(entry, *drawable, slots_[slot])
+                                         : PlaceImplicit(hoisted, entry, slots_[slot]);
+      if (!status.ok()) {
         for (const uint32_t taken : slots) slots_[taken] = {};
         free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
         return status;
       }
-    } else {
+    }
+    if (!by_cpu) {
       WithPrimitive(entry.record.kind, [&](auto primitive) {
         using Primitive = typename decltype(primitive)::type;
         slots_[slot].items = Primitive::Count(entry.source);
@@ -236,6 +274,7 @@ absl::Status CudaVolume::Enter() {
   const bool few_lines = AreFewLines(slots, entries);
   absl::Status status = GrowTable();
   if (status.ok() && !few_lines) status = PutDrawables(slots, entries);
+  if (status.ok()) status = FindImplicitTiles(slots);
   if (!status.ok()) {
     for (const uint32_t taken : slots) slots_[taken] = {};
     free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());

@@ -37,6 +37,10 @@ cudaError_t FillPairs(const TableEntry* table, const LayerLook* layers, const It
                       uint64_t begin, uint32_t items, const uint64_t* offsets,
                       const VolumeView& volume, uint64_t* keys, uint64_t* values,
                       cudaStream_t stream);
+// What is known of each of the tiles, `count` of them, of the implicit shape in `slot` goes where its
+// ImplicitPlace::reach points.
+cudaError_t FindImplicitTiles(TableEntry* table, uint32_t slot, uint32_t count,
+                              cudaStream_t stream);
 // Pairs of items [begin, end) of the list and tiles in the blocks that `within` draws, in any order, of
 // those items for which there is room; *count grows by how many there are.
 cudaError_t AppendPairs(const TableEntry* table, const ItemList& list, uint64_t begin, uint64_t end,

@@ -31,6 +31,24 @@ __device__ void ForTiles(const TableEntry* table, const ItemList& list, uint64_t
   });
 }
 
+__global__ void FindImplicitTilesKernel(TableEntry* table, uint32_t slot, uint32_t count) {
+  const uint64_t i = Thread();
+  if (i >= count) return;
+  const Source& source = table[slot].source;
+  const Box3 box = Implicit::BlockOf(source, static_cast<uint32_t>(i));
+  float reach = Implicit::kNothing;
+  if (!IsEmpty(box)) {
+    const implicit::Field field(source);
+    const implicit::BoxState state = field.StateOf(box);
+    if (state.all) {
+      reach = Implicit::kEverything;
+    } else if (!state.none) {
+      reach = field.solid() || field.half() == 0 ? 0 : field.ReachIn(box);
+    }
+  }
+  const_cast<float*>(source.implicit.reach)[i] = reach;
+}
+
 __global__ void PutEntriesKernel(TableEntry* table, const TableEntry* entries,
                                  const uint32_t* slots, uint32_t count) {
   const uint64_t i = Thread();
@@ -175,6 +193,12 @@ cudaError_t PutEntries(TableEntry* table, const TableEntry* entries, const uint3
 cudaError_t PutFewEntries(TableEntry* table, const FewEntries& few, uint32_t count,
                           cudaStream_t stream) {
   PutFewEntriesKernel<<<1, kThreads, 0, stream>>>(table, few, count);
+  return cudaGetLastError();
+}
+
+cudaError_t FindImplicitTiles(TableEntry* table, uint32_t slot, uint32_t count,
+                              cudaStream_t stream) {
+  FindImplicitTilesKernel<<<Blocks(count), kThreads, 0, stream>>>(table, slot, count);
   return cudaGetLastError();
 }
 

@@ -173,7 +173,7 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
         DrawSolid<Cylinder>(entry, box, words, scratch.solid);
         break;
       case PrimitiveKind::kImplicit:
-        DrawImplicit(entry, box, words, scratch.implicit);
+        DrawImplicit(entry, static_cast<uint32_t>(scratch.heavy[i]), box, words, scratch.implicit);
         break;
       default:
         break;

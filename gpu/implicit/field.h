@@ -12,6 +12,7 @@
 // closed curves, projected along an axis, by the even-odd rule.
 #pragma once
 
+#include "gpu/implicit/hoist.h"
 #include "gpu/implicit/program.h"
 #include "gpu/primitives/source.h"
 
@@ -21,10 +22,9 @@ enum class Side : uint8_t { kOutside, kInside, kMixed };
 
 // Of all voxels in a box.
 struct BoxState {
-  Side side = Side::kMixed;  // of all of them
+  Side side = Side::kMixed;  // of all of them, and of those around it if they matter
   bool none = false;         // nothing in it is covered
   bool all = false;          // of a solid: everything is
-  float reach = 0;           // no voxel of greater |P| is covered by |P| ≤ h·|∇P|
 };
 
 class Field {
@@ -34,7 +34,8 @@ class Field {
         place_(source.implicit),
         record_(*source.record),
         positions_(source.positions),
-        program_{source.indices} {}
+        program_{source.indices},
+        hoisted_{source.implicit.hoisted} {}
 
   VOXELD_HD bool solid() const { return record_.fill == Fill::kSolid; }
   VOXELD_HD bool cover() const { return record_.rule == SurfaceRule::kCover; }
@@ -45,8 +46,10 @@ class Field {
   VOXELD_HD void Coordinates(const N& dx, const N& dy, const N& dz, N q[3]) const {
     for (int r = 0; r < 3; ++r) {
       const float* const row = solid_.inverse[r];
-      q[r] = Add(Add(Mul(ConstantLike(dx, row[0]), dx), Mul(ConstantLike(dx, row[1]), dy)),
-                 Mul(ConstantLike(dx, row[2]), dz));
+      const N sum = Add(Add(Mul(ConstantLike(dx, row[0]), dx), Mul(ConstantLike(dx, row[1]), dy)),
+                        Mul(ConstantLike(dx, row[2]), dz));
+      // No zero is negative: it would tell of an axis that the coordinate does not depend on.
+      q[r] = Add(sum, ConstantLike(dx, 0.0f));
     }
   }
   template <class N>
@@ -103,33 +106,82 @@ class Field {
     return rgb;
   }
 
-  // What is known of the voxels in a box, of which each axis has at least one. With `rim`, sides are those
-  // of the voxels around it, too.
-  VOXELD_HD BoxState StateOf(const Box3& box) const {
+  // Whether every voxel that P says to be covered is, in the record's colour.
+  VOXELD_HD bool is_plain() const {
+    return program_.bound() == 0 && program_.rings() == 0 &&
+           program_.color_by() == ColorBy::kUniform;
+  }
+
+  VOXELD_HD const HoistedView& hoisted() const { return hoisted_; }
+  // Along an axis at `d` voxels from the origin: f(value, number of the hoisted value).
+  template <class N, class F>
+  VOXELD_HD void HoistedAlong(int axis, const N& d, F&& f) const {
+    const N zero = ConstantLike(d, 0.0f);
+    N q[3], slots[kMostSlots];
+    Coordinates(axis == 0 ? d : zero, axis == 1 ? d : zero, axis == 2 ? d : zero, q);
+    Run(hoisted_.axis_code(axis), hoisted_.axis_instructions(axis), q, place_.voxel, slots);
+    for (uint32_t v = hoisted_.begin(axis); v < hoisted_.end(axis); ++v) {
+      f(slots[hoisted_.slot(v)], v);
+    }
+  }
+  // The same with gradients.
+  template <class N, class F>
+  VOXELD_HD void DualHoistedAlong(int axis, const N& d, F&& f) const {
+    const N zero = ConstantLike(d, 0.0f);
+    N q[3];
+    Dual<N> dual[3], slots[kMostSlots];
+    Coordinates(axis == 0 ? d : zero, axis == 1 ? d : zero, axis == 2 ? d : zero, q);
+    WithGradients(q, dual);
+    Run(hoisted_.axis_code(axis), hoisted_.axis_instructions(axis), dual, place_.voxel, slots);
+    for (uint32_t v = hoisted_.begin(axis); v < hoisted_.end(axis); ++v) {
+      f(slots[hoisted_.slot(v)], v);
+    }
+  }
+  // P of hoisted values; `q` counts only if they do not suffice (HoistedView::needs_coordinates).
+  template <class N, class Values>
+  VOXELD_HD N Rest(const N q[3], Values&& values) const {
+    N slots[kMostSlots];
+    Run(hoisted_.rest_code(), hoisted_.rest(), q, place_.voxel, slots, values);
+    return slots[hoisted_.rest_slot()];
+  }
+
+  // Of voxels where P lies in there.
+  VOXELD_HD BoxState StateOf(const Interval& p) const {
     BoxState state;
+    if (p.lo > 0) {
+      state.side = Side::kOutside;
+    } else if (!p.nan && (p.hi < 0 || (solid() && p.hi <= 0))) {
+      state.side = Side::kInside;
+    }
+    state.none = state.side == Side::kOutside || (!solid() && state.side == Side::kInside);
+    state.all = solid() && state.side == Side::kInside;
+    return state;
+  }
+  // A surface's sides matter one voxel beyond a box.
+  VOXELD_HD int32_t rim() const { return solid() ? 0 : 1; }
+
+  // What is known of the voxels in a box, of which each axis has at least one.
+  VOXELD_HD BoxState StateOf(const Box3& box) const {
     Interval q[3];
     if (program_.bound() != 0) {
       CoordinatesOf(box, 0, q);
-      const Interval bound = Bound(q);
-      if (bound.lo > 0) {
-        state.none = true;
-        return state;
-      }
+      if (Bound(q).lo > 0) return {Side::kMixed, true, false};
     }
-    const int32_t rim = solid() ? 0 : 1;
-    CoordinatesOf(box, rim, q);
-    if (solid() || place_.half == 0) {
-      SetSide(Surface(q), state);
-      return state;
-    }
+    CoordinatesOf(box, rim(), q);
+    const Interval p = Surface(q);
+    BoxState state = StateOf(p);
+    if (state.none && !solid() && place_.half != 0) state.none = Abs(p).lo > ReachIn(box);
+    return state;
+  }
+  // No voxel in the box of a greater |P| is covered by |P| ≤ h·|∇P|; 0 < h.
+  VOXELD_HD float ReachIn(const Box3& box) const {
+    Interval q[3];
+    CoordinatesOf(box, 0, q);
     Dual<Interval> dual[3];
     WithGradients(q, dual);
     const Dual<Interval> p = Surface(dual);
-    SetSide(p.value, state);
-    const Interval slope = Mul(ConstantLike(p.value, place_.half), Slope(p));
-    state.reach = slope.nan ? Infinity() : slope.hi;
-    state.none = state.side != Side::kMixed && Abs(p.value).lo > state.reach;
-    return state;
+    const Interval reach = Mul(ConstantLike(p.value, place_.half), Slope(p));
+    return reach.hi;
   }
 
  private:
@@ -148,15 +200,6 @@ class Field {
               solid_.Distance(a, int64_t{box.hi[a]} - 1 + rim), false};
     }
     Coordinates(d[0], d[1], d[2], q);
-  }
-  VOXELD_HD void SetSide(const Interval& p, BoxState& state) const {
-    if (p.lo > 0) {
-      state.side = Side::kOutside;
-    } else if (!p.nan && (p.hi < 0 || (solid() && p.hi <= 0))) {
-      state.side = Side::kInside;
-    }
-    state.none = state.side == Side::kOutside || (!solid() && state.side == Side::kInside);
-    state.all = solid() && state.side == Side::kInside;
   }
 
   VOXELD_HD bool IsInRings(const float q[3]) const {
@@ -184,6 +227,7 @@ class Field {
   const GeometryRecord& record_;
   const float* positions_;
   ProgramView program_;
+  HoistedView hoisted_;
 };
 
 }  // namespace voxeld::gpu::implicit

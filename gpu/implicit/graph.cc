@@ -171,6 +171,11 @@ class Compiler {
   std::vector<int> weight_;
 };
 
+absl::StatusOr<uint32_t> CompilePart(const Graph& graph, std::span<const Graph::Node> roots,
+                                     std::span<uint32_t> root_slots, std::vector<uint32_t>& words) {
+  return Compiler(graph).Compile("surface", roots, root_slots, words);
+}
+
 absl::StatusOr<std::vector<uint32_t>> Compile(const Graph& graph, const ProgramSource& source) {
   ProgramHeader header;
   std::vector<uint32_t> words(kHeaderWords);

@@ -17,6 +17,9 @@ class Graph {
  public:
   using Node = int32_t;
 
+  // Any operation that a program may have; −1 for arguments that it has not.
+  Node Operation(Op op, uint32_t immediate, Node a, Node b) { return Make({op, immediate, a, b}); }
+
   Node Constant(double value) { return Leaf(Op::kConstant, BitsOf(static_cast<float>(value))); }
   Node Axis(int axis) { return Leaf(static_cast<Op>(static_cast<int>(Op::kX) + axis), 0); }
   Node Voxel() { return Leaf(Op::kVoxel, 0); }
@@ -89,6 +92,10 @@ struct ProgramSource {
   std::span<const uint32_t> ring_ends = {};
   uint32_t ring_axis = 2;
 };
+
+// Appends instructions that leave `roots` in `root_slots`, and answers how many; errors as Compile's.
+absl::StatusOr<uint32_t> CompilePart(const Graph& graph, std::span<const Graph::Node> roots,
+                                     std::span<uint32_t> root_slots, std::vector<uint32_t>& words);
 
 // ResourceExhausted if one of the three takes more than kMostInstructions or kMostSlots: says how many.
 absl::StatusOr<std::vector<uint32_t>> Compile(const Graph& graph, const ProgramSource& source);

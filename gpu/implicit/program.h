@@ -20,7 +20,8 @@ enum class Op : uint8_t {
   kX,
   kY,
   kZ,
-  kVoxel,  // the edge of a voxel in the shape's own units
+  kVoxel,    // the edge of a voxel in the shape's own units
+  kHoisted,  // a value of a row: immediate; within engines only (hoist.h)
   kNeg,
   kAbs,
   kSquare,
@@ -40,8 +41,8 @@ enum class Op : uint8_t {
   kMax,
   kAtan2,
 };
-inline constexpr uint32_t kOps = 23;
-VOXELD_HD constexpr bool IsLeaf(Op op) { return op <= Op::kVoxel; }
+inline constexpr uint32_t kOps = 24;
+VOXELD_HD constexpr bool IsLeaf(Op op) { return op <= Op::kHoisted; }
 VOXELD_HD constexpr bool IsBinary(Op op) { return op >= Op::kAdd; }
 
 inline constexpr uint32_t kMostSlots = 24;
@@ -95,9 +96,11 @@ struct ProgramView {
   VOXELD_HD const uint32_t* table() const { return ring_ends() + rings(); }
 };
 
-// Runs `count` instructions over `slots`, which has room for kMostSlots. `at`: x, y and z.
-template <class N>
-VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float voxel, N* slots) {
+// Runs `count` instructions over `slots`, which has room for kMostSlots. `at`: x, y and z;
+// hoisted(i): what stands for Op::kHoisted.
+template <class N, class Hoisted>
+VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float voxel, N* slots,
+                   Hoisted&& hoisted) {
   for (uint32_t i = 0; i < count; ++i) {
     const Instruction in{code[2 * i], code[2 * i + 1]};
     const N& a = slots[in.a()];
@@ -118,6 +121,9 @@ VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float vo
         break;
       case Op::kVoxel:
         to = ConstantLike(at[0], voxel);
+        break;
+      case Op::kHoisted:
+        to = hoisted(in.immediate);
         break;
       case Op::kNeg:
         to = Neg(a);
@@ -175,6 +181,12 @@ VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float vo
         break;
     }
   }
+}
+
+// Of a program without hoisted values.
+template <class N>
+VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float voxel, N* slots) {
+  Run(code, count, at, voxel, slots, [&](uint32_t) { return at[0]; });
 }
 
 }  // namespace voxeld::gpu::implicit

@@ -22,8 +22,10 @@ absl::Status CheckCode(const char* what, const uint32_t* code, uint32_t count,
   for (uint32_t i = 0; i < count; ++i) {
     const Instruction in{code[2 * i], code[2 * i + 1]};
     const std::string at = absl::StrCat(what, ", instruction ", i, ": ");
-    if ((in.word & 0xFF) >= kOps)
-      return Wrong(at + "op", in.word & 0xFF, absl::StrCat("0 to ", kOps - 1));
+    if ((in.word & 0xFF) >= kOps || in.op() == Op::kHoisted)
+      return Wrong(
+          at + "op", in.word & 0xFF,
+          absl::StrCat("0 to ", kOps - 1, ", but not ", static_cast<uint32_t>(Op::kHoisted)));
     if (in.to() >= kMostSlots)
       return Wrong(at + "slot", in.to(), absl::StrCat("0 to ", kMostSlots - 1));
     if (in.a() >= kMostSlots)

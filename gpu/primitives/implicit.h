@@ -2,11 +2,14 @@
 // coordinates (gpu/implicit/field.h says which voxels that means). The paper's "arbitrary 3D primitive
 // Γ is a surface P bounded by a closed curve Φ".
 //
-// Its items are blocks of 2×2×2 tiles. What intervals say to be empty is not looked at, so that time
-// follows the surface.
+// Its items are blocks of tiles. What intervals say to be empty is not looked at, so that time follows
+// the surface.
 #pragma once
 
+#include <vector>
+
 #include "gpu/implicit/field.h"
+#include "gpu/implicit/hoist.h"
 #include "gpu/implicit/tile.h"
 #include "gpu/primitives/grid.h"
 #include "gpu/primitives/source.h"
@@ -15,23 +18,31 @@ namespace voxeld::gpu {
 
 struct Implicit {
   static constexpr PrimitiveKind kKind = PrimitiveKind::kImplicit;
-  static constexpr int32_t kBlock = 2 * kTileSize;  // voxels along an edge of an item
+  // What is known of a tile (ImplicitPlace::reach) where it is not a reach, the most that Field::ReachIn
+  // may answer.
+  static constexpr float kNothing = -1, kEverything = -2;
 
-  // Where it is looked for: `map` takes the geometry's coordinates to voxel space.
-  static void Place(const GeometryRecord& g, const Affine& map, const TileGrid& grid, Solid& solid,
-                    ImplicitPlace& place) {
+  // Where it is looked for: `map` takes the geometry's coordinates to voxel space. Items are blocks of
+  // `tiles` tiles along an edge. What is to be put into `place.hoisted` it answers.
+  static std::vector<uint32_t> Place(const GeometryRecord& g, const uint32_t* program,
+                                     const Affine& map, const TileGrid& grid, int32_t tiles,
+                                     Solid& solid, ImplicitPlace& place) {
     solid = Solid::Of(map, /*keep_thin=*/false);
     const double det = Determinant(map);
-    const double scale = CubeRoot(det < 0 ? -det : det);
-    place.voxel = static_cast<float>(1.0 / scale);
+    place.voxel = static_cast<float>(1.0 / CubeRoot(det < 0 ? -det : det));
     place.half = static_cast<float>(RadiusOf(g, map)) * 0.00390625f;
+    place.edge = tiles * kTileSize;
     Box3 box{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
     if (g.params[6] != 0) box = Intersect(box, BoundsOf(g, map));
     solid.bounds = box;
+    uint32_t depends[3] = {};
     for (int a = 0; a < 3; ++a) {
-      place.first[a] = box.lo[a] / kBlock;
-      place.blocks[a] = IsEmpty(box) ? 0 : (box.hi[a] + kBlock - 1) / kBlock - place.first[a];
+      place.first[a] = box.lo[a] / place.edge;
+      place.blocks[a] =
+          IsEmpty(box) ? 0 : (box.hi[a] + place.edge - 1) / place.edge - place.first[a];
+      for (int b = 0; b < 3; ++b) depends[a] |= solid.inverse[a][b] != 0 ? 1u << b : 0;
     }
+    return implicit::Hoist({program}, depends);
   }
 
   VOXELD_HD static uint32_t Count(const Source& source) {
@@ -48,8 +59,8 @@ struct Implicit {
     const uint32_t at[3] = {i % nx, i / nx % ny, i / nx / ny};
     Box3 box;
     for (int a = 0; a < 3; ++a) {
-      box.lo[a] = (place.first[a] + static_cast<int32_t>(at[a])) * kBlock;
-      box.hi[a] = box.lo[a] + kBlock;
+      box.lo[a] = (place.first[a] + static_cast<int32_t>(at[a])) * place.edge;
+      box.hi[a] = box.lo[a] + place.edge;
     }
     return Intersect(box, source.solid.bounds);
   }
@@ -59,13 +70,11 @@ struct Implicit {
                                   Emit&& emit) {
     const Box3 block = BlockOf(source, i);
     if (IsEmpty(block)) return;
-    const implicit::Field field(source);
-    const implicit::BoxState state = field.StateOf(block);
-    if (state.none) return;
-    EmitTilesOfBox(block, grid, [&](uint32_t tile) {
-      const Box3 part = Intersect(block, grid.VoxelsOf(tile));
-      if (state.all || !field.StateOf(part).none) emit(tile);
-    });
+    if (const float* const reach = source.implicit.reach; reach != nullptr) {
+      if (reach[i] != kNothing) emit(grid.TileOf(block.lo[0], block.lo[1], block.lo[2]));
+      return;
+    }
+    EmitTilesOfBlock(source, block, grid, emit);
   }
 
   // On the host, of a box of a tile at most; the device has its own way to the same voxels.
@@ -78,6 +87,18 @@ struct Implicit {
   }
 
  private:
+  template <class Emit>
+  static void EmitTilesOfBlock(const Source& source, const Box3& block, const TileGrid& grid,
+                               Emit&& emit) {
+    const implicit::Field field(source);
+    const implicit::BoxState state = field.StateOf(block);
+    if (state.none) return;
+    EmitTilesOfBox(block, grid, [&](uint32_t tile) {
+      const Box3 part = Intersect(block, grid.VoxelsOf(tile));
+      if (state.all || !field.StateOf(part).none) emit(tile);
+    });
+  }
+
   // Of the domain's corners, with room for rounding.
   static Box3 BoundsOf(const GeometryRecord& g, const Affine& map) {
     Box3 box;

@@ -23,7 +23,11 @@ VOXELD_HD inline Int3 SnapPoint(const Affine& map, const float* p) {
 struct ImplicitPlace {
   float voxel = 0;  // the edge of a voxel in the shape's units
   float half = 0;   // half the surface's thickness, voxels; 0: one voxel wide
-  int32_t first[3] = {}, blocks[3] = {};  // items along each axis
+  // Items: blocks of `edge` voxels.
+  int32_t edge = 0, first[3] = {}, blocks[3] = {};
+  const uint32_t* hoisted = nullptr;  // implicit/hoist.h
+  // Of each item, which is a tile then, what is known (implicit.h); null: it is found out when asked for.
+  const float* reach = nullptr;
 };
 
 struct Source {

@@ -63,7 +63,7 @@ void OracleFrame::Coordinates(int64_t x, int64_t y, int64_t z, float q[3]) const
   }
   for (int r = 0; r < 3; ++r) {
     q[r] = inverse[r][0] * d[0] + inverse[r][1] * d[1];
-    q[r] = q[r] + inverse[r][2] * d[2];
+    q[r] = q[r] + inverse[r][2] * d[2] + 0.0f;
   }
 }
 

@@ -93,7 +93,7 @@ TEST(Program, RefusalsSayWhatIsWrong) {
             "program: last ring end is 0, must be 3, as there are positions");
   words[kHeaderWords] = 99;
   EXPECT_EQ(CheckProgram(words, 0).message(),
-            "program: surface, instruction 0: op is 99, must be 0 to 22");
+            "program: surface, instruction 0: op is 99, must be 0 to 23, but not 5");
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "display/geometry/footprint.h"
 #include "tools/bench/frame/line_set.h"
-#include "tools/bench/frame/scene.h"
+#include "tools/bench/frame/shape_scenes.h"
 
 namespace voxeld::bench::frame {
 namespace {
@@ -28,7 +28,8 @@ gpu::Target TargetOf(display::Geometry geometry, PixelFormat format) {
   return target;
 }
 
-// nz slices of nx × ny pixels that are the voxels.
+}  // namespace
+
 gpu::Target Stack(int32_t nx, int32_t ny, int32_t nz, PixelFormat format) {
   display::PlanarStack stack;
   stack.width_px = nx;
@@ -39,6 +40,16 @@ gpu::Target Stack(int32_t nx, int32_t ny, int32_t nz, PixelFormat format) {
   return TargetOf(std::move(geometry), format);
 }
 
+Scene OneLayer(std::string name, gpu::Target target) {
+  Scene scene;
+  scene.name = std::move(name);
+  scene.target = std::move(target);
+  scene.layers = {gpu::LayerRecord{.id = 1}};
+  return scene;
+}
+
+namespace {
+
 // The display's voxels; without the last layer along x, so that what lies in it may move there.
 Extent ExtentOf(const gpu::Target& target, bool moves) {
   const display::VoxelGrid& grid = target.geometry.grid;
@@ -47,14 +58,6 @@ Extent ExtentOf(const gpu::Target& target, bool moves) {
 
 uint64_t Share(double of, double share) {
   return static_cast<uint64_t>(std::max(1.0, std::round(of * share)));
-}
-
-Scene OneLayer(std::string name, gpu::Target target) {
-  Scene scene;
-  scene.name = std::move(name);
-  scene.target = std::move(target);
-  scene.layers = {gpu::LayerRecord{.id = 1}};
-  return scene;
 }
 
 Scene UniformLines(const std::string& name, gpu::Target target, uint64_t voxels, uint64_t seed) {
@@ -368,6 +371,27 @@ constexpr Named kScenes[] = {
     {"points",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] { return Points(Share(1e7, share), seed); }};
+     }},
+    {"cloud",
+     [](uint64_t seed, double share) -> std::vector<MakeScene> {
+       return {[=] { return CubePoints(Share(1e7, share), seed); }};
+     }},
+    {"spheres",
+     [](uint64_t seed, double share) -> std::vector<MakeScene> {
+       return {[=] { return InstancedSpheres(Share(1e5, share), seed); }};
+     }},
+    {"gyroid",
+     [](uint64_t, double share) -> std::vector<MakeScene> {
+       return {[=] { return Gyroid(share); }};
+     }},
+    {"implicit",
+     [](uint64_t, double share) -> std::vector<MakeScene> {
+       std::vector<MakeScene> rows;
+       for (const int32_t n : {128, 256, 512, 1024}) {
+         if (n * std::cbrt(share) < 120) break;
+         rows.push_back([=] { return ImplicitSphere(n); });
+       }
+       return rows;
      }},
     {"mixed",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {

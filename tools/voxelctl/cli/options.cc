@@ -32,6 +32,16 @@ constexpr const char* kPlayAbout =
     "not).\n"
     "What is up stays when this ends, in the layer \"voxelctl\", until the next play, or clear.\n"
     "A test pattern that is up ends.";
+constexpr const char* kDrawAbout =
+    "Puts up shapes, each in quotes: a name with values, or an expression.\n"
+    "  voxelctl draw \"sphere radius=0.8 color=orange\" \"box size=1,0.5,0.2 turn=0,0,30\"\n"
+    "  voxelctl draw \"x^2+y^2-z = 0 where x^2+y^2 <= 1\"\n"
+    "Values are the fields of the shape (docs/primitives.md), and color, at, scale, turn "
+    "(degrees), "
+    "priority, erase,\n"
+    "label, lifetime (s). What is up stays when this ends, in the layer \"voxelctl\", until the "
+    "next "
+    "draw or play, or clear.";
 constexpr const char* kSnapshotAbout =
     "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
     "perspective, dimmer with\n"
@@ -112,6 +122,7 @@ class Parser {
     app_.fallthrough();
     app_.allow_extras();
     AddPlay();
+    AddDraw();
     AddSnapshot();
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
@@ -197,6 +208,13 @@ class Parser {
     c->add_option("--display", play_.display, "Fill this display's volume (default: fit into all)")
         ->type_name("NAME");
     c->add_flag("--clear", play_.clear, "Take the scene down at the end");
+  }
+
+  void AddDraw() {
+    CLI::App* c = Add("draw", kDrawAbout);
+    c->add_option("SHAPE", draw_.shapes, "Shapes or expressions, each in quotes")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    c->add_flag("--add", draw_.add, "Leave up what voxelctl put up before");
   }
 
   void AddSnapshot() {
@@ -341,6 +359,12 @@ class Parser {
       play_.files.insert(play_.files.end(), plain_.begin(), plain_.end());
       return FillInPlay();
     }
+    if (name == "draw") {
+      draw_.shapes.insert(draw_.shapes.end(), plain_.begin(), plain_.end());
+      if (draw_.shapes.empty()) throw UsageError{"draw wants at least one SHAPE"};
+      options_.command = draw_;
+      return;
+    }
     TakePlain(name == "snapshot"  ? &snapshot_.file
               : name == "pattern" ? &pattern_name_
               : name == "verify"  ? &verify_.display
@@ -433,6 +457,7 @@ class Parser {
   std::vector<std::string> plain_;  // arguments after --
   Options options_;
   PlayOptions play_;
+  DrawOptions draw_;
   SnapshotOptions snapshot_;
   StatsOptions stats_;
   EntitiesOptions entities_;

@@ -27,6 +27,11 @@ struct PlayOptions {
   std::string display;  // whose space is filled; empty: all of them fit
 };
 
+struct DrawOptions {
+  std::vector<std::string> shapes;  // at least one, as shape/shape_text.h has them
+  bool add = false;                 // to what voxelctl put up before
+};
+
 struct SnapshotOptions {
   std::string file;
   std::string display;  // empty: the first
@@ -76,7 +81,7 @@ struct VerifyOptions {
 struct Options {
   std::string server;  // empty: see ChooseServer
   bool json = false;
-  std::variant<PlayOptions, SnapshotOptions, DisplaysOptions, StatsOptions, EntitiesOptions,
+  std::variant<PlayOptions, DrawOptions, SnapshotOptions, DisplaysOptions, StatsOptions, EntitiesOptions,
                WatchOptions, ClearOptions, PatternOptions, VerifyOptions>
       command;
 };

@@ -23,6 +23,8 @@ using Connector = std::function<absl::StatusOr<std::unique_ptr<Connection>>()>;
 // Reads the files before it connects: nothing is put up unless all of them can be.
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console);
+// Nothing is put up unless all shapes are understood, and taken by the server.
+absl::Status Draw(const DrawOptions& options, const Connector& connect, Console& console);
 absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console);
 absl::Status Displays(Connection& connection, Console& console);
 absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,

@@ -11,6 +11,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
                       Console& console) {
   if (const auto* play = std::get_if<PlayOptions>(&options.command))
     return Play(*play, connect, interrupt, console);
+  if (const auto* draw = std::get_if<DrawOptions>(&options.command))
+    return Draw(*draw, connect, console);
   if (const auto* pattern = std::get_if<PatternOptions>(&options.command);
       pattern != nullptr && pattern->list) {
     ListPatterns(console);

@@ -177,6 +177,14 @@ absl::StatusOr<v1::ClearLayerResponse> Connection::ClearLayer(
       });
 }
 
+absl::StatusOr<v1::ApplyUpdateResponse> Connection::ApplyUpdate(
+    const v1::ApplyUpdateRequest& request) {
+  return impl_->Unary<v1::ApplyUpdateResponse>(
+      [&](grpc::ClientContext* context, v1::ApplyUpdateResponse* response) {
+        return impl_->scene().ApplyUpdate(context, request, response);
+      });
+}
+
 absl::Status Connection::WatchStats(const v1::WatchStatsRequest& request,
                                     const std::function<bool(const v1::Stats&)>& each) {
   return impl_->Watch<v1::Stats>(

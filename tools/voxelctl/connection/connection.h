@@ -32,6 +32,7 @@ class Connection {
   // All pages in one answer.
   absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
+  absl::StatusOr<v1::ApplyUpdateResponse> ApplyUpdate(const v1::ApplyUpdateRequest& request);
 
   // Calls `each` with every answer until that returns false, or the stream ends.
   absl::Status WatchStats(const v1::WatchStatsRequest& request,

@@ -1,0 +1,23 @@
+// Shapes as people type them.
+//
+//   SHAPE NAME=VALUE …      a primitive of the wire by its fields, as "torus radius=0.6 tube=0.2 color=orange"
+//   EXPRESSION              anything else: the surface of an implicit shape, as "x^2+y^2-z = 0 where x^2+y^2 <= 1"
+//
+// NAME is a field of the primitive; or color, priority, erase, label, lifetime (s); or at, scale and turn
+// (degrees about x, y and z, in this order), which place it. A VALUE with spaces stands in quotes, "…" or '…'. Vectors are
+// x,y,z, or one number for all three; boxes two corners x,y,z:x,y,z; vertices x,y,z x,y,z …; thicknesses
+// numbers of voxels, or of the shape's units with a u behind; colours #rrggbb or plain names.
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::voxelctl {
+
+// InvalidArgument says what was not understood, and what would have been.
+absl::StatusOr<v1::Entity> ParseShapeText(absl::string_view text);
+
+}  // namespace voxeld::voxelctl
