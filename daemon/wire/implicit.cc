@@ -75,40 +75,8 @@ MaybeFault ToBoundary(const FieldPath& path, const v1::Boundary& in, const Limit
     default:
       return UnknownEnum(FieldPath(path, "axis"), in.axis(), "X, Y, Z");
   }
-  const FieldPath at(path, "points");
-  if (in.points_size() % 3 != 0 || in.points_size() == 0) {
-    return Fault{
-        at.ToString(), Reason::kSizeMismatch,
-        absl::StrCat("has ", in.points_size(), " numbers; give x, y and z of each vertex")};
-  }
-  if (static_cast<uint32_t>(in.points_size()) / 3 > limits.max_boundary_points) {
-    return Fault{
-        at.ToString(), Reason::kQuotaExceeded,
-        absl::StrCat("has ", in.points_size() / 3, " vertices; max_boundary_points allows ",
-                     limits.max_boundary_points)};
-  }
-  for (int i = 0; i < in.points_size(); ++i) {
-    if (auto fault = CheckFloat(FieldPath(path, "points", i), in.points(i))) return fault;
-    points->push_back(static_cast<float>(in.points(i)));
-  }
-  const uint32_t vertices = static_cast<uint32_t>(in.points_size() / 3);
-  ends->assign(in.ends().begin(), in.ends().end());
-  if (ends->empty()) ends->push_back(vertices);
-  uint32_t begin = 0;
-  for (size_t i = 0; i < ends->size(); ++i) {
-    const uint32_t end = (*ends)[i];
-    if (end < begin + 3 || end > vertices) {
-      return Fault{FieldPath(path, "ends", static_cast<int64_t>(i)).ToString(),
-                   Reason::kIndexOutOfRange,
-                   absl::StrCat("is ", end, "; a curve has 3 vertices at least: give ", begin + 3,
-                                " to ", vertices)};
-    }
-    begin = end;
-  }
-  if (begin != vertices) {
-    return Fault{FieldPath(path, "ends").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("ends with ", begin, "; there are ", vertices, " vertices")};
-  }
+  if (auto fault = ToRings(path, in.points(), in.ends(), limits, ends)) return fault;
+  for (const double number : in.points()) points->push_back(static_cast<float>(number));
   return {};
 }
 
@@ -169,11 +137,61 @@ MaybeFault ToDomain(const FieldPath& path, const v1::Box3& in, Graph& graph, Gra
 
 }  // namespace
 
+MaybeFault ToRings(const FieldPath& path, const google::protobuf::RepeatedField<double>& points,
+                   const google::protobuf::RepeatedField<uint32_t>& ends, const Limits& limits,
+                   std::vector<uint32_t>* out) {
+  const FieldPath at(path, "points");
+  if (points.size() % 3 != 0 || points.size() == 0) {
+    return Fault{at.ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", points.size(), " numbers; give x, y and z of each vertex")};
+  }
+  if (static_cast<uint32_t>(points.size()) / 3 > limits.max_boundary_points) {
+    return Fault{at.ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("has ", points.size() / 3, " vertices; max_boundary_points allows ",
+                              limits.max_boundary_points)};
+  }
+  for (int i = 0; i < points.size(); ++i) {
+    if (auto fault = CheckFloat(FieldPath(path, "points", i), points[i])) return fault;
+  }
+  const uint32_t vertices = static_cast<uint32_t>(points.size() / 3);
+  out->assign(ends.begin(), ends.end());
+  if (out->empty()) out->push_back(vertices);
+  uint32_t begin = 0;
+  for (size_t i = 0; i < out->size(); ++i) {
+    const uint32_t end = (*out)[i];
+    if (end < begin + 3 || end > vertices) {
+      return Fault{FieldPath(path, "ends", static_cast<int64_t>(i)).ToString(),
+                   Reason::kIndexOutOfRange,
+                   absl::StrCat("is ", end, "; a curve has 3 vertices at least: give ", begin + 3,
+                                " to ", vertices)};
+    }
+    begin = end;
+  }
+  if (begin != vertices) {
+    return Fault{FieldPath(path, "ends").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("ends with ", begin, "; there are ", vertices, " vertices")};
+  }
+  return {};
+}
+
+MaybeFault ToProgram(const FieldPath& path, const gpu::implicit::Graph& graph,
+                     const ProgramSource& source, const std::vector<float>& ring_points,
+                     GeometryData* out) {
+  const absl::StatusOr<std::vector<uint32_t>> program = gpu::implicit::Compile(graph, source);
+  if (!program.ok()) {
+    return Fault{path.ToString(), Reason::kQuotaExceeded, std::string(program.status().message())};
+  }
+  out->record.kind = gpu::PrimitiveKind::kImplicit;
+  out->record.index_count = static_cast<uint32_t>(program->size());
+  out->record.vertex_count = static_cast<uint32_t>(ring_points.size() / 3);
+  out->arrays = gpu::GeometryArrays::Of(out->record, ring_points, *program);
+  return {};
+}
+
 MaybeFault ToImplicit(const FieldPath& path, const v1::Implicit& in, const DecodeContext& context,
                       GeometryData* out) {
   const Limits& limits = context.limits;
   gpu::GeometryRecord& record = out->record;
-  record.kind = gpu::PrimitiveKind::kImplicit;
   Parameters parameters;
   if (auto fault = ToParameters(path, in, limits, &parameters)) return fault;
   Graph graph;
@@ -217,14 +235,7 @@ MaybeFault ToImplicit(const FieldPath& path, const v1::Implicit& in, const Decod
   }
   if (auto fault = ToRule(path, in.rule(), &record)) return fault;
   if (auto fault = ToThickness(FieldPath(path, "shell"), in.shell(), limits, &record)) return fault;
-  const absl::StatusOr<std::vector<uint32_t>> program = gpu::implicit::Compile(graph, source);
-  if (!program.ok()) {
-    return Fault{path.ToString(), Reason::kQuotaExceeded, std::string(program.status().message())};
-  }
-  record.index_count = static_cast<uint32_t>(program->size());
-  record.vertex_count = static_cast<uint32_t>(points.size() / 3);
-  out->arrays = gpu::GeometryArrays::Of(record, points, *program);
-  return {};
+  return ToProgram(path, graph, source, points, out);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/fields.h"
 #include "daemon/wire/implicit.h"
+#include "daemon/wire/shapes.h"
 #include "daemon/wire/vertices.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -178,13 +179,28 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
       return ToCylinder(FieldPath(path, "cylinder"), in.cylinder(), out);
     case v1::Primitive::kImplicit:
       return ToImplicit(FieldPath(path, "implicit"), in.implicit(), context, out);
+    case v1::Primitive::kEllipsoid:
+      return ToShape(FieldPath(path, "ellipsoid"), in.ellipsoid(), context, out);
+    case v1::Primitive::kTorus:
+      return ToShape(FieldPath(path, "torus"), in.torus(), context, out);
+    case v1::Primitive::kCone:
+      return ToShape(FieldPath(path, "cone"), in.cone(), context, out);
+    case v1::Primitive::kParallelepiped:
+      return ToShape(FieldPath(path, "parallelepiped"), in.parallelepiped(), context, out);
+    case v1::Primitive::kDisc:
+      return ToShape(FieldPath(path, "disc"), in.disc(), context, out);
+    case v1::Primitive::kPatch:
+      return ToShape(FieldPath(path, "patch"), in.patch(), context, out);
+    case v1::Primitive::kPolygon:
+      return ToShape(FieldPath(path, "polygon"), in.polygon(), context, out);
     case v1::Primitive::kInstance:  // is no geometry, and has been dealt with
     case v1::Primitive::KIND_NOT_SET:
       break;
   }
   return Fault{FieldPath(path, "kind").ToString(), Reason::kInvalidValue,
                "is not set, or not known to this version of the server; give one of points, "
-               "segments, mesh, box, sphere, cylinder, instance, implicit"};
+               "segments, mesh, box, sphere, cylinder, instance, implicit, ellipsoid, torus, cone, "
+               "parallelepiped, disc, patch, polygon"};
 }
 
 }  // namespace
@@ -203,8 +219,8 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Decod
     data->record.color = in.color().rgb();
   }
   if (auto fault = ToGeometry(path, in, context, data.get())) return fault;
-  if (in.kind_case() == v1::Primitive::kImplicit) {
-    data->kind = "implicit";
+  if (data->record.kind == gpu::PrimitiveKind::kImplicit) {
+    data->kind = in.GetDescriptor()->FindFieldByNumber(in.kind_case())->name().c_str();
     data->as_sent = in.SerializeAsString();
   }
   *out = GeometryPtr(std::move(data));

@@ -1,7 +1,7 @@
 // An implicit shape in a tile, by a block of threads: P's hoisted values along each axis (hoist.h);
-// which parts of 4³ voxels may have something, by intervals; then what is inside, a bit each, with a
-// rim around the tile; then whoever has a neighbour on the other side, or lies within the shell, by the
-// definition (implicit/field.h).
+// which parts of 4³ voxels may have something, by intervals; P in these and around them, four voxels a
+// thread; then whoever has a neighbour on the other side, or lies within the shell, by the definition
+// (implicit/field.h).
 //
 // Loops around the program's run are the same for all threads of a warp: idle ones run it as well, and
 // take no notice of what comes out.
@@ -11,6 +11,7 @@
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/cuda/warp-inl.h"
 #include "gpu/implicit/field.h"
+#include "gpu/implicit/row.h"
 #include "gpu/primitives/implicit.h"
 
 namespace voxeld::gpu::cuda {
@@ -22,13 +23,16 @@ struct ImplicitScratch {
   static constexpr int32_t kRows = kTileSize + 2;
 
   // P's hoisted values: at voxels from one before the box on, with gradients of a shell; and in parts.
-  float value[implicit::kMostHoisted][kRows];
+  float value[implicit::kMostHoisted][kRows + 2];
   float gradient[implicit::kMostHoisted][kRows][3];
   implicit::Interval range[implicit::kMostHoisted][kParts];
-  uint32_t inside[kRows][kRows];  // [z][y], bit i for x = i − 1
-  uint32_t within[kTileSize]
-                 [kTileSize];  // |P| is small enough for the shell, for all that is known
-  uint32_t some;               // parts with anything: their numbers,
+  // P in rows [z][y] from one before the box on, where parts with anything or their neighbours are.
+  static constexpr int32_t kQuads = (kRows + 3) / 4;
+  alignas(16) implicit::Quad p[kRows][kRows][kQuads];
+  uint8_t row_parts[kParts][kParts];  // [z][y], bits: parts along x with anything
+  uint16_t near[kTileVoxels];         // voxels that may lie in the shell: place in 16³, x fastest
+  uint32_t near_count;
+  uint32_t some;  // parts with anything: their numbers,
   uint8_t list[kAllParts];
   implicit::BoxState parts[kAllParts];  // and what is known of each
 };
@@ -85,15 +89,29 @@ static __device__ __noinline__ void FindHoisted(const ImplicitTile& tile) {
   }
 }
 
-// P at a voxel, by its place in the tile, from −1 on.
-static __device__ __noinline__ float ImplicitValue(const ImplicitTile& tile, int32_t x, int32_t y,
-                                                   int32_t z) {
-  float q[3];
-  if (tile.field.hoisted().needs_coordinates()) {
-    tile.field.CoordinatesOf(tile.box.lo[0] + x, tile.box.lo[1] + y, tile.box.lo[2] + z, q);
+// P at four voxels along x, by the place of the first in the tile, from −1 on.
+static __device__ __noinline__ implicit::Quad ImplicitValues(const ImplicitTile& tile, int32_t x,
+                                                             int32_t y, int32_t z) {
+  implicit::Quad q[3];
+  const implicit::Field& field = tile.field;
+  if (field.hoisted().needs_coordinates()) {
+    const implicit::Quad dx = implicit::EachOf<4>([&](size_t i) {
+      return tile.solid.Distance(0, int64_t{tile.box.lo[0]} + x + static_cast<int32_t>(i));
+    });
+    const implicit::Quad dy = implicit::ConstantLike(
+                             dx, tile.solid.Distance(1, int64_t{tile.box.lo[1]} + y)),
+                         dz = implicit::ConstantLike(
+                             dx, tile.solid.Distance(2, int64_t{tile.box.lo[2]} + z));
+    field.Coordinates(dx, dy, dz, q);
   }
-  return tile.field.Rest(
-      q, [&](uint32_t v) { return tile.scratch.value[v][tile.PlaceOf(v, x, y, z)]; });
+  return field.Rest(q, [&](uint32_t v) {
+    const int axis = field.hoisted().axis_of(v);
+    const float* const along = tile.scratch.value[v];
+    if (axis == 0) {
+      return implicit::EachOf<4>([&](size_t i) { return along[x + 1 + static_cast<int32_t>(i)]; });
+    }
+    return implicit::ConstantLike(implicit::Quad(), along[(axis == 1 ? y : z) + 1]);
+  });
 }
 static __device__ __noinline__ bool ImplicitIsWithin(const ImplicitTile& tile, int32_t x, int32_t y,
                                                      int32_t z) {
@@ -146,14 +164,7 @@ static __device__ __noinline__ uint32_t ImplicitWord(const implicit::Field& fiel
 __device__ inline bool FindImplicitParts(const ImplicitTile& tile) {
   ImplicitScratch& s = tile.scratch;
   FindHoisted(tile);
-  if (threadIdx.x == 0) s.some = 0;
-  for (uint32_t i = threadIdx.x; i < ImplicitScratch::kRows * ImplicitScratch::kRows;
-       i += kDrawThreads) {
-    (&s.inside[0][0])[i] = 0;
-  }
-  for (uint32_t i = threadIdx.x; i < kTileSize * kTileSize; i += kDrawThreads) {
-    (&s.within[0][0])[i] = 0;
-  }
+  if (threadIdx.x == 0) s.some = s.near_count = 0;
   __syncthreads();
   if (threadIdx.x < ImplicitScratch::kAllParts) {
     const uint32_t part = threadIdx.x;
@@ -163,7 +174,12 @@ __device__ inline bool FindImplicitParts(const ImplicitTile& tile) {
     s.parts[part] = state;
     bool here = true;
     for (int a = 0; a < 3; ++a) here = here && tile.box.lo[a] + at[a] < tile.box.hi[a];
-    if (here && !state.none) s.list[atomicAdd(&s.some, 1u)] = static_cast<uint8_t>(part);
+    const bool some = here && !state.none;
+    if (some) s.list[atomicAdd(&s.some, 1u)] = static_cast<uint8_t>(part);
+    const uint32_t bits = __ballot_sync(kAllLanes, some && !state.all);
+    if (part % 4 == 0) {
+      s.row_parts[part / 16][part / 4 % 4] = static_cast<uint8_t>(bits >> part % 32 & 0xFu);
+    }
   }
   __syncthreads();
   const bool any = s.some != 0;
@@ -171,112 +187,96 @@ __device__ inline bool FindImplicitParts(const ImplicitTile& tile) {
   return any;
 }
 
-// A voxel's side, and of a shell whether it may lie in it. By a warp, of which those with `asked`.
-__device__ inline void FindImplicitSide(const ImplicitTile& tile, int32_t x, int32_t y, int32_t z,
-                                        bool asked, bool own) {
+// P where it matters. By the whole block.
+__device__ inline void FindImplicitValues(const ImplicitTile& tile) {
+  constexpr int32_t kRows = ImplicitScratch::kRows, kQuads = ImplicitScratch::kQuads;
+  constexpr int32_t kAll = kRows * kRows * kQuads;
   ImplicitScratch& s = tile.scratch;
-  const implicit::Field& field = tile.field;
-  const float p = ImplicitValue(tile, x, y, z);
-  if (asked && implicit::Field::IsInside(p)) atomicOr(&s.inside[z + 1][y + 1], 1u << (x + 1));
-  const bool near = field.half() == 0 ? p == 0 : implicit::Abs(p) <= tile.reach;
-  if (asked && own && near && !field.solid()) atomicOr(&s.within[z][y], 1u << x);
-}
-
-// Which voxels of a part with anything are inside, and of those around it that lie in other tiles: of
-// parts with nothing beside it all voxels are on the side of those next to them. A warp's.
-__device__ inline void FindImplicitSides(const ImplicitTile& tile, uint32_t part) {
-  constexpr int32_t kPart = ImplicitScratch::kPart;
-  const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
-  int32_t at[3];
-  ImplicitTile::PartAt(part, at);
-  for (int32_t half = 0; half < 2; ++half) {
-    FindImplicitSide(tile, at[0] + lane % 4, at[1] + lane / 4 % 4, at[2] + lane / 16 + half * 2,
-                     true, true);
-  }
-  if (tile.scratch.parts[part].side != implicit::Side::kMixed || tile.field.solid()) return;
-  const bool cover = tile.field.cover();
-  // Voxels of the next tile, and of the last one that is in the volume, are past the box.
-  const int32_t end[3] = {tile.box.hi[0] - tile.box.lo[0], tile.box.hi[1] - tile.box.lo[1],
-                          tile.box.hi[2] - tile.box.lo[2]};
-  const auto outer = [&](int a) { return at[a] == 0 || at[a] + kPart >= end[a]; };
-  if (!outer(0) && !outer(1) && !outer(2)) return;
-  constexpr int32_t kAround = kPart + 2;
-  for (int32_t first = 0; first < kAround * kAround * kAround; first += 32) {
-    const int32_t i = first + lane;
-    const int32_t p[3] = {at[0] - 1 + i % kAround, at[1] - 1 + i / kAround % kAround,
-                          at[2] - 1 + i / kAround / kAround};
-    bool past = false;
-    int32_t beyond = 0;  // the part, on how many axes
-    for (int a = 0; a < 3; ++a) {
-      past = past || p[a] < 0 || p[a] >= end[a];
-      beyond += p[a] < at[a] || p[a] >= at[a] + kPart ? 1 : 0;
+  const int32_t rim = tile.field.rim();
+  const auto part = [](int32_t at) { return Clamp(at, 0, kTileSize - 1) / ImplicitScratch::kPart; };
+  for (int32_t first = 0; first < kAll; first += static_cast<int32_t>(kDrawThreads)) {
+    const int32_t i = first + static_cast<int32_t>(threadIdx.x);
+    const int32_t x = i % kQuads * 4 - 1, y = i / kQuads % kRows - 1, z = i / kQuads / kRows - 1;
+    bool wanted = false;
+    if (i < kAll) {
+      uint32_t bits = 0;
+      for (int32_t k = part(z - rim); k <= part(z + rim); ++k) {
+        for (int32_t j = part(y - rim); j <= part(y + rim); ++j) bits |= s.row_parts[k][j];
+      }
+      const int32_t lo = part(x - rim), hi = part(x + 3 + rim);
+      wanted = (bits >> lo & ((2u << (hi - lo)) - 1u)) != 0;
     }
-    const bool asked = i < kAround * kAround * kAround && past && beyond > 0 &&
-                       (cover || beyond == 1) && p[0] <= kTileSize && p[1] <= kTileSize &&
-                       p[2] <= kTileSize;
-    if (__any_sync(kAllLanes, asked) == 0) continue;
-    FindImplicitSide(tile, asked ? p[0] : 0, asked ? p[1] : 0, asked ? p[2] : 0, asked, false);
-  }
-}
-
-// The same of a part with nothing: all are on one side. It matters only to others in the tile.
-__device__ inline void FillImplicitSide(const ImplicitTile& tile, uint32_t part) {
-  constexpr int32_t kPart = ImplicitScratch::kPart;
-  if (tile.scratch.parts[part].side != implicit::Side::kInside) return;
-  int32_t at[3];
-  ImplicitTile::PartAt(part, at);
-  const uint32_t lane = threadIdx.x % 32;
-  if (lane < kPart * kPart) {
-    atomicOr(&tile.scratch.inside[at[2] + static_cast<int32_t>(lane / kPart) + 1]
-                                 [at[1] + static_cast<int32_t>(lane % kPart) + 1],
-             0xFu << (at[0] + 1));
+    if (__any_sync(kAllLanes, wanted) == 0) continue;
+    const implicit::Quad p = ImplicitValues(tile, wanted ? x : 0, wanted ? y : 0, wanted ? z : 0);
+    if (wanted) s.p[z + 1][y + 1][(x + 1) / 4] = p;
   }
 }
 
 // Whether the voxel, at (x, y, z) in its tile, has a neighbour on the other side whose |P| is not less.
-// By a warp, of which those with `asked` want to know.
-__device__ inline bool IsBetweenSides(const ImplicitTile& tile, int32_t x, int32_t y, int32_t z,
-                                      bool asked) {
-  const ImplicitScratch& s = tile.scratch;
-  const bool cover = tile.field.cover();
-  const auto inside = [&](int32_t dx, int32_t dy, int32_t dz) {
-    return (s.inside[z + dz + 1][y + dy + 1] >> (x + dx + 1) & 1) != 0;
+__device__ inline bool IsBetweenSides(const ImplicitTile& tile, int32_t x, int32_t y, int32_t z) {
+  const auto value = [&](int32_t dx, int32_t dy, int32_t dz) {
+    return (&tile.scratch.p[z + dz + 1][y + dy + 1][0].at[0])[x + dx + 1];
   };
-  const bool own = asked && inside(0, 0, 0);
-  bool any = false, known = false;  // `known` is the whole warp's
-  float magnitude = 0;
-  for (int32_t n = 0; n < 27; ++n) {
-    const int32_t dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
-    const int32_t steps = Abs(dx) + Abs(dy) + Abs(dz);
-    if (steps == 0 || (!cover && steps > 1)) continue;
-    const bool wanted = asked && !any && inside(dx, dy, dz) != own;
-    if (__any_sync(kAllLanes, wanted) == 0) continue;
-    if (!known) magnitude = implicit::Field::Magnitude(ImplicitValue(tile, x, y, z));
-    known = true;
-    const float other = implicit::Field::Magnitude(ImplicitValue(tile, x + dx, y + dy, z + dz));
-    any = any || (wanted && magnitude <= other);
+  const float p = value(0, 0, 0);
+  const bool inside = implicit::Field::IsInside(p);
+  const float magnitude = implicit::Field::Magnitude(p);
+  const auto meets = [&](int32_t dx, int32_t dy, int32_t dz) {
+    const float other = value(dx, dy, dz);
+    return implicit::Field::IsInside(other) != inside &&
+           magnitude <= implicit::Field::Magnitude(other);
+  };
+  if (!tile.field.cover()) {
+    return meets(-1, 0, 0) || meets(1, 0, 0) || meets(0, -1, 0) || meets(0, 1, 0) ||
+           meets(0, 0, -1) || meets(0, 0, 1);
   }
+  bool any = false;
+  for (int32_t n = 0; n < 27 && !any; ++n) any = meets(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
   return any;
 }
 
-// Whether the voxel is covered, but for bounds. By a warp, of which those with `asked` want to know.
-__device__ inline bool IsImplicitCovered(const ImplicitTile& tile, const implicit::BoxState& state,
-                                         int32_t x, int32_t y, int32_t z, bool asked) {
-  const ImplicitScratch& s = tile.scratch;
+// A voxel that P says to be covered.
+__device__ inline void RaiseImplicit(const TableEntry& entry, const ImplicitTile& tile, int32_t x,
+                                     int32_t y, int32_t z, uint32_t* words) {
+  const int32_t at[3] = {tile.box.lo[0] + x, tile.box.lo[1] + y, tile.box.lo[2] + z};
+  const uint32_t word =
+      ImplicitWord(tile.field, entry.priority, entry.erase != 0, at[0], at[1], at[2]);
+  if (word != 0) atomicMax(&words[IndexInRegion(at[0], at[1], at[2])], word);
+}
+
+// The voxels of a part that are covered for their sides' sake; those that may lie in the shell are put
+// down. By a warp.
+__device__ inline void DrawImplicitPart(const TableEntry& entry, const ImplicitTile& tile,
+                                        uint32_t part, uint32_t* words) {
+  ImplicitScratch& s = tile.scratch;
+  const implicit::BoxState state = s.parts[part];
   const implicit::Field& field = tile.field;
-  if (field.solid()) {
-    return asked && (state.all || (s.inside[z + 1][y + 1] >> (x + 1) & 1) != 0);
+  const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
+  int32_t at[3];
+  ImplicitTile::PartAt(part, at);
+  for (int32_t half = 0; half < 2; ++half) {
+    const int32_t x = at[0] + lane % 4, y = at[1] + lane / 4 % 4, z = at[2] + lane / 16 + half * 2;
+    const bool here = tile.box.lo[0] + x < tile.box.hi[0] && tile.box.lo[1] + y < tile.box.hi[1] &&
+                      tile.box.lo[2] + z < tile.box.hi[2];
+    bool covered = state.all, near = false;
+    if (!state.all) {
+      const float p = (&s.p[z + 1][y + 1][0].at[0])[x + 1];
+      covered = field.solid() ? implicit::Field::IsInside(p) : field.half() == 0 && p == 0;
+      if (!field.solid() && !covered && state.side == implicit::Side::kMixed) {
+        covered = IsBetweenSides(tile, x, y, z);
+      }
+      near = tile.is_shell() && !covered && implicit::Abs(p) <= tile.reach;
+    }
+    const uint32_t nears = __ballot_sync(kAllLanes, near && here);
+    uint32_t place = 0;
+    if (lane == 0 && nears != 0)
+      place = atomicAdd(&s.near_count, static_cast<uint32_t>(__popc(nears)));
+    place = __shfl_sync(kAllLanes, place, 0);
+    if (near && here) {
+      s.near[place + static_cast<uint32_t>(__popc(nears & ((1u << lane) - 1u)))] =
+          static_cast<uint16_t>(z << 8 | y << 4 | x);
+    }
+    if (covered && here) RaiseImplicit(entry, tile, x, y, z, words);
   }
-  const bool near = asked && (s.within[z][y] >> x & 1) != 0;
-  bool covered = near && field.half() == 0;
-  if (field.half() != 0 && __any_sync(kAllLanes, near) != 0) {
-    const bool within = ImplicitIsWithin(tile, x, y, z);
-    covered = near && within;
-  }
-  const bool between = asked && !covered && state.side == implicit::Side::kMixed;
-  if (__any_sync(kAllLanes, between) == 0) return covered;
-  const bool is_between = IsBetweenSides(tile, x, y, z, between);
-  return covered || is_between;
 }
 
 // An item's voxels, which lie in the tile of `box`, by the whole block.
@@ -287,30 +287,21 @@ static __device__ __noinline__ void DrawImplicit(const TableEntry& entry, uint32
   const ImplicitTile tile{field, entry.source.solid, s, Intersect(box, entry.source.solid.bounds),
                           entry.source.implicit.reach[item]};
   if (IsEmpty(tile.box) || !FindImplicitParts(tile)) return;  // the same for every thread
-  const uint32_t warp = threadIdx.x / 32;
-  for (uint32_t part = warp; part < ImplicitScratch::kAllParts; part += kDrawWarps) {
-    if (s.parts[part].none) FillImplicitSide(tile, part);
-  }
-  for (uint32_t i = warp; i < s.some; i += kDrawWarps) {
-    if (!s.parts[s.list[i]].all) FindImplicitSides(tile, s.list[i]);
+  FindImplicitValues(tile);
+  __syncthreads();
+  for (uint32_t i = threadIdx.x / 32; i < s.some; i += kDrawWarps) {
+    DrawImplicitPart(entry, tile, s.list[i], words);
   }
   __syncthreads();
-  for (uint32_t i = warp; i < s.some; i += kDrawWarps) {
-    const implicit::BoxState state = s.parts[s.list[i]];
-    int32_t at[3];
-    ImplicitTile::PartAt(s.list[i], at);
-    for (int32_t half = 0; half < 2; ++half) {
-      const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
-      const int32_t x = at[0] + lane % 4, y = at[1] + lane / 4 % 4,
-                    z = at[2] + lane / 16 + half * 2;
-      const int32_t voxel[3] = {tile.box.lo[0] + x, tile.box.lo[1] + y, tile.box.lo[2] + z};
-      const bool here =
-          voxel[0] < tile.box.hi[0] && voxel[1] < tile.box.hi[1] && voxel[2] < tile.box.hi[2];
-      if (!IsImplicitCovered(tile, state, x, y, z, here)) continue;
-      const uint32_t word =
-          ImplicitWord(field, entry.priority, entry.erase != 0, voxel[0], voxel[1], voxel[2]);
-      if (word != 0) atomicMax(&words[IndexInRegion(voxel[0], voxel[1], voxel[2])], word);
-    }
+  const uint32_t count = s.near_count;
+  for (uint32_t first = 0; first < count; first += kDrawThreads) {
+    const uint32_t i = first + threadIdx.x;
+    if (__any_sync(kAllLanes, i < count) == 0) continue;
+    const uint32_t at = i < count ? s.near[i] : 0;
+    const int32_t x = static_cast<int32_t>(at & 15), y = static_cast<int32_t>(at >> 4 & 15),
+                  z = static_cast<int32_t>(at >> 8);
+    const bool within = ImplicitIsWithin(tile, x, y, z);
+    if (i < count && within) RaiseImplicit(entry, tile, x, y, z, words);
   }
   __syncthreads();
 }

@@ -103,10 +103,10 @@ VOXELD_HD inline Interval Cbrt(const Interval& a) {
 
 // Products of monotonic factors of one sign, rounded, are monotonic.
 VOXELD_HD inline Interval PowI(const Interval& a, int32_t n) {
-  if (n < 0) return Div(Interval{1, 1, false}, PowI(a, -n));
-  if (n % 2 != 0) return {PowI(a.lo, n), PowI(a.hi, n), a.nan};
-  const Interval b = Abs(a);
-  return {PowI(b.lo, n), PowI(b.hi, n), a.nan};
+  const int32_t m = n < 0 ? -n : n;
+  const Interval b = m % 2 != 0 ? a : Abs(a);
+  const Interval power = {PowI(b.lo, m), PowI(b.hi, m), a.nan};
+  return n < 0 ? Div(Interval{1, 1, false}, power) : power;
 }
 
 VOXELD_HD inline Interval Exp(const Interval& a) {

@@ -30,6 +30,7 @@ class TileField {
 
  private:
   static constexpr int32_t kPart = 4;
+  static constexpr size_t kRowNumbers = sizeof(Row) / sizeof(float);
   static constexpr int32_t kParts = kTileSize / kPart;
   static constexpr int32_t kRows = kTileSize + 2;
 
@@ -82,13 +83,14 @@ class TileField {
           any |= !parts_[k][j][i].none && !parts_[k][j][i].all;
         }
         if (!any) continue;
-        const int32_t z1 = gpu::Min((k + 1) * kPart, size_[2]), y1 = gpu::Min((j + 1) * kPart, size_[1]);
+        const int32_t z1 = gpu::Min((k + 1) * kPart, size_[2]),
+                      y1 = gpu::Min((j + 1) * kPart, size_[1]);
         for (int32_t z = k * kPart - rim; z < z1 + rim; ++z) {
           for (int32_t y = j * kPart - rim; y < y1 + rim; ++y) needed[z + 1][y + 1] = true;
         }
       }
     }
-    dx_ = EachOf([&](size_t i) {
+    dx_ = EachOf<kRowNumbers>([&](size_t i) {
       return solid_.Distance(0, int64_t{box_.lo[0]} - 1 + static_cast<int64_t>(i));
     });
     field_.HoistedAlong(0, dx_, [&](const Row& value, uint32_t v) { along_x_[v] = value; });

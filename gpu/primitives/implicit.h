@@ -33,7 +33,7 @@ struct Implicit {
     place.half = static_cast<float>(RadiusOf(g, map)) * 0.00390625f;
     place.edge = tiles * kTileSize;
     Box3 box{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
-    if (g.params[6] != 0) box = Intersect(box, BoundsOf(g, map));
+    if (g.params[6] != 0) box = Intersect(box, BoundsOf(g, map, place.half));
     solid.bounds = box;
     uint32_t depends[3] = {};
     for (int a = 0; a < 3; ++a) {
@@ -99,8 +99,8 @@ struct Implicit {
     });
   }
 
-  // Of the domain's corners, with room for rounding.
-  static Box3 BoundsOf(const GeometryRecord& g, const Affine& map) {
+  // Of the domain's corners, with room for half a shell, what is drawn thicker than it is, and rounding.
+  static Box3 BoundsOf(const GeometryRecord& g, const Affine& map, float half) {
     Box3 box;
     for (int a = 0; a < 3; ++a) {
       double low = map.m[a * 4 + 3], high = low;
@@ -112,8 +112,9 @@ struct Implicit {
         high += p < q ? q : p;
       }
       constexpr double kFar = 1073741824.0;
-      box.lo[a] = static_cast<int32_t>(FloorToInt(Clamp(low, -kFar, kFar))) - 2;
-      box.hi[a] = static_cast<int32_t>(FloorToInt(Clamp(high, -kFar, kFar))) + 3;
+      const double shell = static_cast<double>(half);
+      box.lo[a] = static_cast<int32_t>(FloorToInt(Clamp(low - shell, -kFar, kFar))) - 2;
+      box.hi[a] = static_cast<int32_t>(FloorToInt(Clamp(high + shell, -kFar, kFar))) + 3;
     }
     return box;
   }

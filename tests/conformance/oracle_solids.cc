@@ -111,8 +111,9 @@ void OracleDomain(const GeometryRecord& g, const Affine& map, int64_t low[3], in
       least += std::min(at[0], at[1]);
       most += std::max(at[0], at[1]);
     }
-    low[a] = static_cast<int64_t>(std::floor(std::clamp(least, -0x1p30, 0x1p30))) - 2;
-    high[a] = static_cast<int64_t>(std::floor(std::clamp(most, -0x1p30, 0x1p30))) + 3;
+    const double half = static_cast<double>(OracleRadius(g, map)) / 256;
+    low[a] = static_cast<int64_t>(std::floor(std::clamp(least - half, -0x1p30, 0x1p30))) - 2;
+    high[a] = static_cast<int64_t>(std::floor(std::clamp(most + half, -0x1p30, 0x1p30))) + 3;
   }
 }
 

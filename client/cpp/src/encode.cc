@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/src/encode_shapes.h"
 #include "voxeld/v1/primitives.pb.h"
 #include "voxeld/v1/scene.pb.h"
 
@@ -162,6 +163,13 @@ struct ShapeEncoder {
     AppendUnsigned(v1::Cylinder::kFillFieldNumber, AfterUnspecified(cylinder.fill), &fields);
     AppendUnsigned(v1::Cylinder::kRuleFieldNumber, AfterUnspecified(cylinder.rule), &fields);
     return Wrap(before, v1::Primitive::kCylinderFieldNumber, Rope(std::move(fields)));
+  }
+  // The others' bytes are a primitive's: they follow what precedes.
+  template <typename Measured>
+  absl::StatusOr<Rope> operator()(const Measured& shape) const {
+    absl::StatusOr<std::string> encoded = EncodeShape(shape);
+    if (!encoded.ok()) return encoded.status();
+    return Rope(before + *encoded);
   }
   absl::StatusOr<Rope> operator()(const Instance& instance) const {
     std::string fields;

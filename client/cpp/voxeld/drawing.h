@@ -17,32 +17,10 @@
 #include <variant>
 #include <vector>
 
+#include "voxeld/basics.h"
+#include "voxeld/shapes.h"
+
 namespace voxeld::client {
-
-struct Vec3 {
-  double x = 0, y = 0, z = 0;
-};
-
-struct Color {
-  uint8_t r = 255, g = 255, b = 255;
-};
-
-// Row-major 3×4: p ↦ (m0·x + m1·y + m2·z + m3, m4·x + …, m8·x + …). The linear part must not be
-// singular.
-struct Affine {
-  std::array<double, 12> m = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-
-  static Affine Translate(const Vec3& by);
-  static Affine Scale(const Vec3& by);
-  static Affine Scale(double by) { return Scale({by, by, by}); }
-  // Right-handed, about an axis through the origin, of any length but 0.
-  static Affine Rotate(const Vec3& axis, double radians);
-
-  bool operator==(const Affine&) const = default;
-};
-
-// `second` after `first`.
-Affine operator*(const Affine& second, const Affine& first);
 
 // A packed array of numbers. Made of an lvalue or a span it is a view, which must stay until the
 // call that it is given to returns; that call copies it once. Made of an rvalue vector or a list it
@@ -70,17 +48,6 @@ class Array {
   std::shared_ptr<const std::vector<T>> owner_;
   std::span<const T> view_;
 };
-
-// Diameter of a curve or point; 0: one voxel wide.
-struct Thickness {
-  enum class Unit : uint8_t { kVoxels, kUnits };  // of the display, or the entity's own
-  float value = 0;
-  Unit unit = Unit::kVoxels;
-};
-
-enum class LineSampling : uint8_t { kThin, kEuclidean, kCover };
-enum class SurfaceRule : uint8_t { kThin, kCover };
-enum class Fill : uint8_t { kSurface, kSolid };
 
 // Vertices as they lie in memory. At most one of the two index arrays.
 struct Vertices {
@@ -137,7 +104,8 @@ struct Instance {
   std::string object;
 };
 
-using Shape = std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance>;
+using Shape = std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance, Implicit,
+                           Ellipsoid, Torus, Cone, Parallelepiped, Disc, Patch, Polygon>;
 
 // Everything about an entity but its shape.
 struct Look {
@@ -161,12 +129,6 @@ enum class Blend : uint8_t { kOver, kAdd, kErase };
 // A half-space of scene space: a·x + b·y + c·z + d ≥ 0.
 struct HalfSpace {
   double a = 0, b = 0, c = 0, d = 0;
-};
-
-// A part of scene space, its faces included; `everything`: all of it, whatever the corners.
-struct Region {
-  Vec3 min, max;
-  bool everything = false;
 };
 
 // What is set is changed; the rest stays as it was.

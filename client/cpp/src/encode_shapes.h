@@ -1,0 +1,22 @@
+// Shapes by their measures as bytes of v1.Primitive.
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "voxeld/shapes.h"
+
+namespace voxeld::client {
+
+// Each is a v1.Primitive with that shape alone. InvalidArgument for what cannot be said on the wire; what
+// is wrong with measures the server says.
+absl::StatusOr<std::string> EncodeShape(const Implicit& shape);
+absl::StatusOr<std::string> EncodeShape(const Ellipsoid& shape);
+absl::StatusOr<std::string> EncodeShape(const Torus& shape);
+absl::StatusOr<std::string> EncodeShape(const Cone& shape);
+absl::StatusOr<std::string> EncodeShape(const Parallelepiped& shape);
+absl::StatusOr<std::string> EncodeShape(const Disc& shape);
+absl::StatusOr<std::string> EncodeShape(const Patch& shape);
+absl::StatusOr<std::string> EncodeShape(const Polygon& shape);
+
+}  // namespace voxeld::client

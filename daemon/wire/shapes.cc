@@ -1,0 +1,211 @@
+#include "daemon/wire/shapes.h"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/wire/fields.h"
+#include "daemon/wire/implicit.h"
+#include "gpu/primitives/cone.h"
+#include "gpu/primitives/disc.h"
+#include "gpu/primitives/ellipsoid.h"
+#include "gpu/primitives/parallelepiped.h"
+#include "gpu/primitives/patch.h"
+#include "gpu/primitives/polygon.h"
+#include "gpu/primitives/torus.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using gpu::implicit::Graph;
+using gpu::implicit::Vector;
+
+constexpr double kLeastSine = 1e-6;  // of the angle between edges
+
+MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, Vector* out) {
+  if (auto fault = CheckVec3(path, in)) return fault;
+  *out = {in.x(), in.y(), in.z()};
+  return {};
+}
+
+MaybeFault CheckNotNegative(const FieldPath& path, double value) {
+  if (auto fault = CheckFloat(path, value)) return fault;
+  if (value >= 0) return {};
+  return Fault{path.ToString(), Reason::kInvalidValue,
+               absl::StrCat("is ", Show(value), "; give 0 or more")};
+}
+
+std::string Show(const Vector& v) {
+  return absl::StrCat("(", wire::Show(v.x), ", ", wire::Show(v.y), ", ", wire::Show(v.z), ")");
+}
+
+// `in`: rule and shell are fields of all. Surfaces without an inside have no fill.
+template <typename Message>
+MaybeFault ToLook(const FieldPath& path, const Message& in, const Limits& limits,
+                  gpu::GeometryRecord* out) {
+  if constexpr (requires { in.fill(); }) {
+    if (auto fault = ToFill(path, in.fill(), out)) return fault;
+  }
+  if (auto fault = ToRule(path, in.rule(), out)) return fault;
+  return ToThickness(FieldPath(path, "shell"), in.shell(), limits, out);
+}
+
+template <typename Shape>
+MaybeFault Finish(const FieldPath& path, const Shape& shape, GeometryData* out) {
+  Graph graph;
+  const gpu::implicit::FieldShape made = shape.Make(graph);
+  gpu::implicit::ProgramSource source{.surface = made.surface, .bound = made.bound};
+  source.ring_ends = made.ring_ends;
+  source.ring_axis = made.ring_axis;
+  // A shell of the shape's units lies beyond its box; one of voxels is the engine's to allow for.
+  const bool units = out->record.thickness_unit == gpu::ThicknessUnit::kUnits;
+  const double shell = units ? static_cast<double>(out->record.thickness) / 2 : 0;
+  out->record.params[6] = 1;
+  for (int a = 0; a < 3; ++a) {
+    out->min[a] = made.min[a] - shell;
+    out->max[a] = made.max[a] + shell;
+    out->record.params[a] = static_cast<float>(out->min[a]);
+    out->record.params[3 + a] = static_cast<float>(out->max[a]);
+  }
+  return ToProgram(path, graph, source, made.ring_points, out);
+}
+
+}  // namespace
+
+MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const Limits& limits,
+                   GeometryData* out) {
+  gpu::Cone cone{
+      .start_radius = in.start_radius(), .end_radius = in.end_radius(), .round = in.round_ends()};
+  if (auto fault = ToVector(FieldPath(path, "start"), in.start(), &cone.start)) return fault;
+  if (auto fault = ToVector(FieldPath(path, "end"), in.end(), &cone.end)) return fault;
+  const FieldPath start_radius(path, "start_radius"), end_radius(path, "end_radius");
+  if (auto fault = CheckNotNegative(start_radius, in.start_radius())) return fault;
+  if (auto fault = CheckNotNegative(end_radius, in.end_radius())) return fault;
+  if (in.start_radius() == 0 && in.end_radius() == 0) {
+    return Fault{start_radius.ToString(), Reason::kInvalidValue,
+                 "and end_radius are 0; give one of them greater than 0"};
+  }
+  if (!(gpu::implicit::Length(cone.end - cone.start) > 0)) {
+    return Fault{FieldPath(path, "end").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(cone.end), " as start is; give another point")};
+  }
+  if (cone.OneHoldsTheOther()) {
+    return Fault{
+        end_radius.ToString(), Reason::kInvalidValue,
+        absl::StrCat("is ", wire::Show(in.end_radius()), " beside ", wire::Show(in.start_radius()),
+                     ", so that one end's sphere holds the other's; give a sphere")};
+  }
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, cone, out);
+}
+
+MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const Limits& limits,
+                   GeometryData* out) {
+  gpu::Disc disc{.normal = {0, 0, 1}, .radius = in.radius(), .inner_radius = in.inner_radius()};
+  if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &disc.center)) return fault;
+  if (in.has_normal()) {
+    const FieldPath normal(path, "normal");
+    if (auto fault = ToVector(normal, in.normal(), &disc.normal)) return fault;
+    if (!(gpu::implicit::Length(disc.normal) > 0)) {
+      return Fault{normal.ToString(), Reason::kInvalidValue,
+                   absl::StrCat("is ", Show(disc.normal), "; give a direction")};
+    }
+  }
+  if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
+  const FieldPath inner(path, "inner_radius");
+  if (auto fault = CheckNotNegative(inner, in.inner_radius())) return fault;
+  if (in.inner_radius() >= in.radius()) {
+    return Fault{inner.ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", wire::Show(in.inner_radius()), "; give less than radius, ",
+                              wire::Show(in.radius()))};
+  }
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, disc, out);
+}
+
+MaybeFault ToShape(const FieldPath& path, const v1::Ellipsoid& in, const Limits& limits,
+                   GeometryData* out) {
+  gpu::Ellipsoid ellipsoid;
+  if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &ellipsoid.center))
+    return fault;
+  if (auto fault = CheckSize(FieldPath(path, "radii"), in.radii())) return fault;
+  ellipsoid.radii = {in.radii().x(), in.radii().y(), in.radii().z()};
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, ellipsoid, out);
+}
+
+MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const Limits& limits,
+                   GeometryData* out) {
+  gpu::Parallelepiped shape;
+  if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &shape.center)) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_a"), in.edge_a(), &shape.edges[0])) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_b"), in.edge_b(), &shape.edges[1])) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_c"), in.edge_c(), &shape.edges[2])) return fault;
+  double product = 1;
+  for (const Vector& edge : shape.edges) product *= gpu::implicit::Length(edge);
+  if (!(shape.volume() > kLeastSine * product)) {
+    return Fault{
+        FieldPath(path, "edge_c").ToString(), Reason::kInvalidValue,
+        absl::StrCat("is ", Show(shape.edges[2]), " beside ", Show(shape.edges[0]), " and ",
+                     Show(shape.edges[1]), "; the three edges must span a volume")};
+  }
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, shape, out);
+}
+
+MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const Limits& limits,
+                   GeometryData* out) {
+  gpu::Patch patch;
+  if (auto fault = ToVector(FieldPath(path, "corner"), in.corner(), &patch.corner)) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_a"), in.edge_a(), &patch.u)) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_b"), in.edge_b(), &patch.v)) return fault;
+  const double product = gpu::implicit::Length(patch.u) * gpu::implicit::Length(patch.v);
+  if (!(gpu::implicit::Length(gpu::implicit::Cross(patch.u, patch.v)) > kLeastSine * product)) {
+    return Fault{FieldPath(path, "edge_b").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(patch.v), " beside ", Show(patch.u),
+                              "; the two edges must span an area")};
+  }
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, patch, out);
+}
+
+MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const Limits& limits,
+                   GeometryData* out) {
+  std::vector<uint32_t> ends;
+  if (auto fault = ToRings(path, in.points(), in.ends(), limits, &ends)) return fault;
+  std::vector<Vector> points;
+  for (int i = 0; i + 2 < in.points_size(); i += 3) {
+    points.push_back({in.points(i), in.points(i + 1), in.points(i + 2)});
+  }
+  const gpu::Polygon polygon{points, ends};
+  const Vector normal = polygon.Normal();
+  double extent = 0;
+  for (const Vector& p : points) extent = std::max(extent, gpu::implicit::Length(p - points[0]));
+  const FieldPath at(path, "points");
+  if (!(gpu::implicit::Length(normal) > kLeastSine * extent * extent)) {
+    return Fault{at.ToString(), Reason::kInvalidValue,
+                 "lie along one line; give curves that have an area"};
+  }
+  constexpr double kMostUneven = 1e-3;
+  if (const double uneven = polygon.Unevenness(normal); uneven > kMostUneven * extent) {
+    return Fault{at.ToString(), Reason::kInvalidValue,
+                 absl::StrCat("are ", wire::Show(uneven), " away from a plane; give points within ",
+                              wire::Show(kMostUneven * extent), ", or a mesh")};
+  }
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, polygon, out);
+}
+
+MaybeFault ToShape(const FieldPath& path, const v1::Torus& in, const Limits& limits,
+                   GeometryData* out) {
+  gpu::Torus torus{.radius = in.radius(), .tube_radius = in.tube_radius()};
+  if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &torus.center)) return fault;
+  if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
+  if (auto fault = CheckPositive(FieldPath(path, "tube_radius"), in.tube_radius())) return fault;
+  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
+  return Finish(path, torus, out);
+}
+
+}  // namespace voxeld::daemon::wire

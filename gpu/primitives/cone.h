@@ -1,0 +1,64 @@
+// What two circles across a line, or two spheres along it, have between them: cones, truncated ones,
+// cylinders and capsules, each with two radii. P is the distance from the surface, outside of it as well
+// as inside; past the rim of a flat end it is that from the planes and the mantle, whichever is greater.
+#pragma once
+
+#include "gpu/implicit/field_shape.h"
+
+namespace voxeld::gpu {
+
+struct Cone {
+  implicit::Vector start, end;  // apart
+  double start_radius = 1, end_radius = 0;
+  bool round = false;  // spheres at the ends, of which neither holds the other
+
+  // Of spheres: whether one is within the other.
+  bool OneHoldsTheOther() const {
+    return round && implicit::Length(end - start) <= std::fabs(start_radius - end_radius);
+  }
+
+  implicit::FieldShape Make(implicit::Graph& g) const {
+    using implicit::Node;
+    using implicit::Vector;
+    const double length = implicit::Length(end - start);
+    const Vector axis = 1 / length * (end - start);
+    const Node r0 = implicit::AtLeastAVoxel(g, start_radius),
+               r1 = end_radius == 0 && !round ? g.Constant(0)
+                                              : implicit::AtLeastAVoxel(g, end_radius);
+    const Node along = implicit::Along(g, axis, implicit::Dot(axis, start));
+    const Node across = implicit::DistanceFromAxis(g, start, axis);
+    // The mantle's slope: per unit along the axis the radius falls by b, of which a and b are the normal.
+    const Node fall = g.Div(g.Sub(r0, r1), g.Constant(length));
+    implicit::FieldShape shape;
+    if (round) {
+      const Node b = fall, a = g.Sqrt(g.Sub(g.Constant(1), g.Square(b)));
+      // The mantle touches the spheres where the foot of the point, along the normal, lies between their
+      // centres.
+      const Node foot = g.Sub(along, g.Mul(across, g.Div(b, a)));
+      const Node mantle = g.Sub(g.Add(g.Mul(across, a), g.Mul(along, b)), r0);
+      const Node head = g.Sub(implicit::DistanceFrom(g, end), r1);
+      const Node tail = g.Sub(implicit::DistanceFrom(g, start), r0);
+      // The union of both spheres and of the mantle where its foot is between them.
+      const Node beyond = g.Max(g.Neg(foot), g.Sub(foot, g.Constant(length)));
+      shape.surface = g.Min(g.Min(head, tail), g.Max(mantle, beyond));
+    } else {
+      const Node norm = g.Sqrt(g.Add(g.Constant(1), g.Square(fall)));
+      const Node mantle = g.Div(g.Sub(g.Add(across, g.Mul(along, fall)), r0), norm);
+      // A thin disc is a voxel thick.
+      const Node half = implicit::AtLeastAVoxel(g, length / 2);
+      const Node ends = g.Sub(g.Abs(g.Sub(along, g.Constant(length / 2))), half);
+      shape.surface = g.Max(mantle, ends);
+    }
+    const double most = std::max(start_radius, end_radius);
+    const Vector reach = {most, most, most};
+    shape.min =
+        Vector{std::min(start.x, end.x), std::min(start.y, end.y), std::min(start.z, end.z)} -
+        reach;
+    shape.max =
+        Vector{std::max(start.x, end.x), std::max(start.y, end.y), std::max(start.z, end.z)} +
+        reach;
+    return shape;
+  }
+};
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,20 @@
+// An ellipsoid along the axes: √((x/a)² + (y/b)² + (z/c)²) = 1.
+#pragma once
+
+#include "gpu/implicit/field_shape.h"
+
+namespace voxeld::gpu {
+
+struct Ellipsoid {
+  implicit::Vector center, radii;  // each > 0
+
+  implicit::FieldShape Make(implicit::Graph& g) const {
+    implicit::Node q[3];
+    for (int a = 0; a < 3; ++a) {
+      q[a] = g.Div(g.Sub(g.Axis(a), g.Constant(center[a])), implicit::AtLeastAVoxel(g, radii[a]));
+    }
+    return {g.Sub(g.Length(q), g.Constant(1)), -1, center - radii, center + radii};
+  }
+};
+
+}  // namespace voxeld::gpu
