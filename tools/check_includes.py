@@ -32,7 +32,9 @@ ALLOWED = {
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
               # What an address looks like, and what was meant: alike at both ends.
-              "daemon/address", "daemon/suggest"],
+              "daemon/address", "daemon/suggest",
+              # Strokes of letters: in scenes and in pictures of them.
+              "daemon/text"],
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
@@ -46,7 +48,8 @@ ALLOWED = {
     # Its own headers are "voxeld/…", as its users write them.
     "client": ["voxeld", "display/sync", "daemon/address"],
     # What users see has neither protobuf nor anything else of ours.
-    "client/cpp/voxeld": ["voxeld/address.h", "voxeld/drawing.h", "voxeld/receipt.h"],
+    "client/cpp/voxeld": ["voxeld/address.h", "voxeld/basics.h", "voxeld/drawing.h", "voxeld/receipt.h",
+                          "voxeld/shapes.h"],
     "client/cpp/examples": ["voxeld/client.h"],
     "tests": ["daemon", "gpu", "display", "voxeld", "tools", "client"],
 }

@@ -1,52 +1,17 @@
 """The drawing calls, alike wherever something can be drawn: the connection, a layer, a frame, an object."""
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, Callable, Generic, Optional, TypeVar
+from typing import Any, Optional
 
 import numpy.typing as npt
 
-from . import shapes, transforms, wire
-from .arrays import number
+from . import shapes
 from .colors import Colors
+from .draw_measured import Drawn, DrawMeasured, Make
 from .errors import InvalidValue
-from .transforms import Matrix
-from .v1 import scene_pb2 as pb
+from .look import Look
 
-Drawn = TypeVar("Drawn", covariant=True)
-Make = Callable[..., list[wire.Packed]]
-
-
-@dataclass(frozen=True)
-class Look:
-    """What every entity has beside its shape."""
-
-    transform: Optional[Matrix] = None
-    priority: int = 0
-    erase: bool = False
-    lifetime: Optional[float] = None  # s
-    label: str = ""
-
-    @staticmethod
-    def of(transform: Optional[npt.ArrayLike], priority: int, erase: bool, lifetime: Optional[float], label: str) -> "Look":
-        if not (isinstance(priority, int) and 0 <= priority <= 126):
-            raise InvalidValue(f"priority is {priority!r}; give a whole number from 0 to 126, the higher wins")
-        if lifetime is not None:
-            number(lifetime, "lifetime", above=0)
-        return Look(None if transform is None else transforms.as_matrix(transform), priority, bool(erase), lifetime, label)
-
-    def changed(self, **new: Any) -> "Look":
-        look = replace(self, **new)
-        return Look.of(look.transform, look.priority, look.erase, look.lifetime, look.label)
-
-    @property
-    def lifetime_ns(self) -> int:
-        return 0 if self.lifetime is None else max(int(self.lifetime * 1e9), 1)
-
-    def to_bytes(self) -> bytes:
-        return pb.Entity(
-            transform=None if self.transform is None else transforms.to_wire(self.transform), priority=self.priority,
-            erase=self.erase, lifetime_ns=self.lifetime_ns, label=self.label).SerializeToString()
+__all__ = ["Draw", "Look", "Make", "checked_name"]
 
 
 def checked_name(name: str, what: str) -> str:
@@ -55,14 +20,11 @@ def checked_name(name: str, what: str) -> str:
     return name
 
 
-class Draw(Generic[Drawn]):
+class Draw(DrawMeasured[Drawn]):
     """Each call puts up one thing under a name; the same name again replaces it. All take `transform` (4×4 or 3×4),
     `priority` (0 to 126, the higher wins within its layer), `erase` (takes away what is of lower or equal priority),
     `lifetime` in seconds and `label`, a text for people. Arguments are checked before anything is sent; arrays may be
     changed again as soon as the call is back."""
-
-    def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> Drawn:
-        raise NotImplementedError
 
     def points(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
                width: Optional[float] = None, unit: str = "voxels", transform: Optional[npt.ArrayLike] = None,

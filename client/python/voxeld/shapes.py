@@ -23,9 +23,9 @@ PIECE_BYTES = (1 << 20) - (2 << 10)
 
 _MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segments.LIST}
 _SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
-_RULES = {"thin": pb.SURFACE_RULE_THIN, "cover": pb.SURFACE_RULE_COVER}
-_FILLS = {"surface": pb.FILL_SURFACE, "solid": pb.FILL_SOLID}
-_UNITS = {"voxels": pb.Thickness.VOXELS, "units": pb.Thickness.UNITS}
+RULES = {"thin": pb.SURFACE_RULE_THIN, "cover": pb.SURFACE_RULE_COVER}
+FILLS = {"surface": pb.FILL_SURFACE, "solid": pb.FILL_SOLID}
+UNITS = {"voxels": pb.Thickness.VOXELS, "units": pb.Thickness.UNITS}
 
 
 def choice(table: dict[str, Any], value: str, what: str) -> Any:
@@ -35,7 +35,7 @@ def choice(table: dict[str, Any], value: str, what: str) -> Any:
 
 
 def _thickness(value: Optional[float], unit: str) -> Optional[pb.Thickness]:
-    word = choice(_UNITS, unit, "unit")
+    word = choice(UNITS, unit, "unit")
     return None if value is None else pb.Thickness(value=number(value, "width", least=0), unit=word)
 
 
@@ -111,7 +111,7 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
     """Triangles: of `faces`, or of the vertices three by three."""
     array, element = positions(at, "vertices")
     color, each = _split_colors(colors_.many(colors, len(array), cmap))
-    head = pb.Mesh(rule=choice(_RULES, rule, "rule")).SerializeToString()
+    head = pb.Mesh(rule=choice(RULES, rule, "rule")).SerializeToString()
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
 
     def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
@@ -134,12 +134,13 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
     return result
 
 
-def _solid(color: Optional[Colors], **kind: Any) -> list[wire.Packed]:
+def solid(color: Optional[Colors], **kind: Any) -> list[wire.Packed]:
+    """The one primitive of that kind."""
     rgb = None if color is None else pb.Color(rgb=colors_.one(color))
     return [wire.message(pb.Primitive(color=rgb, **kind))]
 
 
-def _vec(values: npt.ArrayLike, what: str) -> types_pb2.Vec3:
+def vec(values: npt.ArrayLike, what: str) -> types_pb2.Vec3:
     x, y, z = vector(values, what)
     return types_pb2.Vec3(x=x, y=y, z=z)
 
@@ -150,25 +151,25 @@ def box(center: npt.ArrayLike, size: npt.ArrayLike, *, color: Optional[Colors] =
     edges = np.broadcast_to(as_array(size, "size"), (3,)) if np.ndim(size) == 0 else size
     for edge, axis in zip(vector(edges, "size"), "xyz"):
         number(edge, f"the size along {axis}", above=0)
-    return _solid(color, box=pb.Box(center=_vec(center, "center"), size=_vec(edges, "size"),
-                                    fill=choice(_FILLS, fill, "fill"), rule=choice(_RULES, rule, "rule")))
+    return solid(color, box=pb.Box(center=vec(center, "center"), size=vec(edges, "size"),
+                                    fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
 
 
 def sphere(center: npt.ArrayLike, radius: float, *, color: Optional[Colors] = None, fill: str = "surface",
            rule: str = "thin") -> list[wire.Packed]:
-    return _solid(color, sphere=pb.Sphere(center=_vec(center, "center"), radius=number(radius, "radius", above=0),
-                                          fill=choice(_FILLS, fill, "fill"), rule=choice(_RULES, rule, "rule")))
+    return solid(color, sphere=pb.Sphere(center=vec(center, "center"), radius=number(radius, "radius", above=0),
+                                          fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
 
 
 def cylinder(center: npt.ArrayLike, radius: float, height: float, *, color: Optional[Colors] = None,
              fill: str = "surface", rule: str = "thin") -> list[wire.Packed]:
-    return _solid(color, cylinder=pb.Cylinder(
-        center=_vec(center, "center"), radius=number(radius, "radius", above=0), height=number(height, "height", above=0),
-        fill=choice(_FILLS, fill, "fill"), rule=choice(_RULES, rule, "rule")))
+    return solid(color, cylinder=pb.Cylinder(
+        center=vec(center, "center"), radius=number(radius, "radius", above=0), height=number(height, "height", above=0),
+        fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
 
 
 def instance(of: str, *, color: Optional[Colors] = None) -> list[wire.Packed]:
-    return _solid(color, instance=pb.Instance(object=of))
+    return solid(color, instance=pb.Instance(object=of))
 
 
 def volume(array: npt.ArrayLike, *, threshold: Optional[float] = None, cmap: str = "viridis",

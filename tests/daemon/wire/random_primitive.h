@@ -18,8 +18,8 @@ class RandomPrimitives {
   // Up to `most` corners; kInstance refers to one of "o0" to "o4", where instances are wanted.
   v1::Primitive Next(uint32_t most, bool instances) {
     v1::Primitive primitive;
-    const uint32_t kind = random_() % (instances ? 7 : 6);
-    if (kind < 6 && random_() % 2 == 0) primitive.mutable_color()->set_rgb(random_() & 0xFFFFFF);
+    const uint32_t kind = random_() % (instances ? 8 : 7);
+    if (kind < 7 && random_() % 2 == 0) primitive.mutable_color()->set_rgb(random_() & 0xFFFFFF);
     switch (kind) {
       case 0:
         *primitive.mutable_points()->mutable_vertices() = Corners(1 + random_() % most, false);
@@ -59,6 +59,9 @@ class RandomPrimitives {
         SetSurface(primitive.mutable_cylinder());
         break;
       case 6:
+        SetMeasured(&primitive);
+        break;
+      case 7:
         primitive.mutable_instance()->set_object(absl::StrCat("o", random_() % 5));
         break;
     }
@@ -94,6 +97,92 @@ class RandomPrimitives {
   void SetSurface(T* out) {
     out->set_fill(Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_SOLID}));
     out->set_rule(Rule());
+  }
+
+  template <typename T>
+  void SetShell(T* out) {
+    out->set_rule(Rule());
+    if (random_() % 2 == 0) out->mutable_shell()->set_value(static_cast<float>(random_() % 64) / 8);
+  }
+  void SetPoint(v1::Vec3* out) { SetVec3(out, Coordinate(), Coordinate(), Coordinate()); }
+
+  // What is drawn by the general method.
+  void SetMeasured(v1::Primitive* out) {
+    switch (random_() % 8) {
+      case 0:
+        SetPoint(out->mutable_ellipsoid()->mutable_center());
+        SetVec3(out->mutable_ellipsoid()->mutable_radii(), Length(), Length(), Length());
+        out->mutable_ellipsoid()->set_fill(v1::FILL_SOLID);
+        return SetShell(out->mutable_ellipsoid());
+      case 1:
+        SetPoint(out->mutable_torus()->mutable_center());
+        out->mutable_torus()->set_radius(Length());
+        out->mutable_torus()->set_tube_radius(Length());
+        return SetShell(out->mutable_torus());
+      case 2:
+        SetVec3(out->mutable_cone()->mutable_start(), 1, Length(), 2);
+        SetVec3(out->mutable_cone()->mutable_end(), 3, -Length(), 2);
+        out->mutable_cone()->set_start_radius(Length());
+        out->mutable_cone()->set_end_radius(Length());
+        return SetShell(out->mutable_cone());
+      case 3:
+        SetPoint(out->mutable_parallelepiped()->mutable_center());
+        SetVec3(out->mutable_parallelepiped()->mutable_edge_a(), 1, 0.25, 0);
+        SetVec3(out->mutable_parallelepiped()->mutable_edge_b(), 0, 2, 0.5);
+        SetVec3(out->mutable_parallelepiped()->mutable_edge_c(), 0.125, 0, 1 + Length() / 1e4);
+        return SetShell(out->mutable_parallelepiped());
+      case 4:
+        SetPoint(out->mutable_disc()->mutable_center());
+        if (random_() % 2 == 0) SetVec3(out->mutable_disc()->mutable_normal(), 1, Length(), 3);
+        out->mutable_disc()->set_radius(10 + Length());
+        out->mutable_disc()->set_inner_radius(random_() % 10);
+        return SetShell(out->mutable_disc());
+      case 5:
+        SetPoint(out->mutable_patch()->mutable_corner());
+        SetVec3(out->mutable_patch()->mutable_edge_a(), 1, 0, 0.5);
+        SetVec3(out->mutable_patch()->mutable_edge_b(), 0, 1 + Length() / 1e4, 0);
+        return SetShell(out->mutable_patch());
+      case 6:
+        for (const double number : {0, 0, 1, 4, 0, 1, 4, 4, 1, 1, 1, 1, 2, 1, 1, 1, 2, 1}) {
+          out->mutable_polygon()->add_points(number);
+        }
+        if (random_() % 2 == 0) {
+          out->mutable_polygon()->add_ends(3);
+          out->mutable_polygon()->add_ends(6);
+        }
+        return SetShell(out->mutable_polygon());
+      default:
+        return SetImplicit(out->mutable_implicit());
+    }
+  }
+
+  void SetImplicit(v1::Implicit* out) {
+    const char* const surfaces[] = {"x^2+y^2-z = 0 where x^2+y^2 <= 1", "length(x, y, z) <= r",
+                                    "smin(x, y, 0.5) - sin(z)*r", "not (x <= 1 and y > r)"};
+    out->mutable_surface()->set_text(surfaces[random_() % 4]);
+    out->set_parameter_names("r");
+    out->add_parameter_values(Length());
+    if (random_() % 2 == 0) out->mutable_bound()->set_text("z <= r or x > 2");
+    if (random_() % 3 == 0) {
+      v1::Expression::Tree* const tree = out->mutable_surface()->mutable_tree();
+      for (const auto op : {v1::Expression::Tree::X, v1::Expression::Tree::PARAMETER,
+                            v1::Expression::Tree::SUBTRACT, v1::Expression::Tree::CONSTANT,
+                            v1::Expression::Tree::MAX}) {
+        tree->add_ops(op);
+      }
+      tree->add_values(Coordinate());
+      tree->set_names("r");
+    }
+    if (random_() % 2 == 0) {
+      out->mutable_level()->set_text("z / r");
+      out->set_colormap("viridis");
+    }
+    if (random_() % 2 == 0) {
+      SetVec3(out->mutable_domain()->mutable_min(), -1, -2, -3);
+      SetVec3(out->mutable_domain()->mutable_max(), 1, Length(), 3);
+    }
+    out->set_fill(Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_SOLID}));
+    SetShell(out);
   }
 
   template <typename T>

@@ -124,6 +124,7 @@ class Parser {
     AddPlay();
     AddDraw();
     AddSnapshot();
+    AddGallery();
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
     AddEntities();
@@ -215,6 +216,16 @@ class Parser {
     c->add_option("SHAPE", draw_.shapes, "Shapes or expressions, each in quotes")
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     c->add_flag("--add", draw_.add, "Leave up what voxelctl put up before");
+  }
+
+  void AddGallery() {
+    CLI::App* c = Add("gallery",
+                      "Draws an example of every shape, one after another, and puts what a display "
+                      "shows of each\ninto one picture. What voxelctl put up before goes.");
+    c->add_option("OUT.png", gallery_.file,
+                  "Where the picture goes; an old one is replaced when the new one is whole");
+    c->add_option("--display", gallery_.display, "Which display (default: the first)")
+        ->type_name("NAME");
   }
 
   void AddSnapshot() {
@@ -366,10 +377,17 @@ class Parser {
       return;
     }
     TakePlain(name == "snapshot"  ? &snapshot_.file
+              : name == "gallery" ? &gallery_.file
               : name == "pattern" ? &pattern_name_
               : name == "verify"  ? &verify_.display
                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
+    if (name == "gallery") {
+      if (gallery_.file.empty()) throw UsageError{"gallery wants the name of a file, OUT.png"};
+      CheckPictureName(gallery_.file);
+      options_.command = gallery_;
+      return;
+    }
     if (name == "pattern") return FillInPattern();
     if (name == "verify") return FillInVerify();
     if (name == "displays") options_.command = DisplaysOptions();
@@ -458,6 +476,7 @@ class Parser {
   Options options_;
   PlayOptions play_;
   DrawOptions draw_;
+  GalleryOptions gallery_;
   SnapshotOptions snapshot_;
   StatsOptions stats_;
   EntitiesOptions entities_;

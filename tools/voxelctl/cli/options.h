@@ -41,6 +41,11 @@ struct SnapshotOptions {
   double timeout_s = 5;
 };
 
+struct GalleryOptions {
+  std::string file;
+  std::string display;  // empty: the first
+};
+
 struct DisplaysOptions {};
 
 struct StatsOptions {
@@ -81,8 +86,9 @@ struct VerifyOptions {
 struct Options {
   std::string server;  // empty: see ChooseServer
   bool json = false;
-  std::variant<PlayOptions, DrawOptions, SnapshotOptions, DisplaysOptions, StatsOptions, EntitiesOptions,
-               WatchOptions, ClearOptions, PatternOptions, VerifyOptions>
+  std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
+               StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
+               VerifyOptions>
       command;
 };
 

@@ -25,6 +25,9 @@ absl::Status Play(const PlayOptions& options, const Connector& connect, Interrup
                   Console& console);
 // Nothing is put up unless all shapes are understood, and taken by the server.
 absl::Status Draw(const DrawOptions& options, const Connector& connect, Console& console);
+// Every shape by itself, as the display shows it, in one picture; the layer is empty afterwards.
+absl::Status Gallery(const GalleryOptions& options, Connection& connection, Interrupt& interrupt,
+                     Console& console);
 absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console);
 absl::Status Displays(Connection& connection, Console& console);
 absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,

@@ -28,6 +28,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
         using Command = std::decay_t<decltype(command)>;
         if constexpr (std::is_same_v<Command, SnapshotOptions>)
           return Snapshot(command, connection, console);
+        if constexpr (std::is_same_v<Command, GalleryOptions>)
+          return Gallery(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, DisplaysOptions>)
           return Displays(connection, console);
         if constexpr (std::is_same_v<Command, StatsOptions>)

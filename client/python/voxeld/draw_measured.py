@@ -1,0 +1,86 @@
+"""What is drawn by its measures, and by the general method."""
+from __future__ import annotations
+
+from typing import Any, Callable, Generic, Mapping, Optional, Sequence, TypeVar, Union
+
+import numpy.typing as npt
+
+from . import measured, wire
+from .colors import Colors
+from .look import Look
+
+Drawn = TypeVar("Drawn", covariant=True)
+Make = Callable[..., list[wire.Packed]]
+Curves = Union[npt.ArrayLike, Sequence[npt.ArrayLike]]
+
+
+class DrawMeasured(Generic[Drawn]):
+    """Of each, `fill` is "surface" or "solid", `rule` "thin" or "cover", and `shell` how thick a surface is, in "voxels" or
+    "units" (by default one voxel). `look` is `transform`, `priority`, `erase`, `lifetime` and `label`, as everywhere."""
+
+    def _draw(self, name: str, make: Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> Drawn:
+        raise NotImplementedError
+
+    def ellipsoid(self, name: str, center: npt.ArrayLike = (0, 0, 0), radii: npt.ArrayLike = (1, 1, 1), *,
+                  color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
+                  unit: str = "voxels", **look: Any) -> Drawn:
+        """Along the axes."""
+        return self._draw(name, measured.ellipsoid, (center, radii),
+                          dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
+
+    def torus(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, tube_radius: float = 0.2, *,
+              color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
+              unit: str = "voxels", **look: Any) -> Drawn:
+        """Around z: `radius` is that of the circle which the tube follows."""
+        return self._draw(name, measured.torus, (center, radius, tube_radius),
+                          dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
+
+    def cone(self, name: str, start: npt.ArrayLike = (0, 0, 0), end: npt.ArrayLike = (0, 0, 1), start_radius: float = 0.5,
+             end_radius: float = 0.0, *, round_ends: bool = False, color: Optional[Colors] = None, fill: str = "surface",
+             rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
+        """From `start` to `end`, with a radius at either: a cone, a cylinder; with `round_ends` a capsule."""
+        return self._draw(name, measured.cone, (start, end, start_radius, end_radius),
+                          dict(round_ends=round_ends, color=color, fill=fill, rule=rule, shell=shell, unit=unit),
+                          Look.of(**look))
+
+    def parallelepiped(self, name: str, center: npt.ArrayLike, edges: npt.ArrayLike, *, color: Optional[Colors] = None,
+                       fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
+                       **look: Any) -> Drawn:
+        """A box in any position: `edges` are three, (3, 3)."""
+        return self._draw(name, measured.parallelepiped, (center, edges),
+                          dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
+
+    def disc(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, *, normal: npt.ArrayLike = (0, 0, 1),
+             inner_radius: float = 0.0, color: Optional[Colors] = None, rule: str = "thin", shell: Optional[float] = None,
+             unit: str = "voxels", **look: Any) -> Drawn:
+        """Across `normal`; with an inner radius, a ring."""
+        return self._draw(name, measured.disc, (center, radius),
+                          dict(normal=normal, inner_radius=inner_radius, color=color, rule=rule, shell=shell, unit=unit),
+                          Look.of(**look))
+
+    def patch(self, name: str, corner: npt.ArrayLike, edges: npt.ArrayLike, *, color: Optional[Colors] = None,
+              rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
+        """A parallelogram: `edges` are the two at the corner, (2, 3)."""
+        return self._draw(name, measured.patch, (corner, edges), dict(color=color, rule=rule, shell=shell, unit=unit),
+                          Look.of(**look))
+
+    def polygon(self, name: str, curves: Curves, *, color: Optional[Colors] = None, rule: str = "thin",
+                shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
+        """Plane: one closed curve, (n, 3), or several, of which those within others are holes."""
+        return self._draw(name, measured.polygon, (curves,), dict(color=color, rule=rule, shell=shell, unit=unit),
+                          Look.of(**look))
+
+    def implicit(self, name: str, surface: str, *, bound: Optional[str] = None, boundary: Optional[Curves] = None,
+                 boundary_axis: str = "z", parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None,
+                 rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
+                 domain: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, color: Optional[Colors] = None,
+                 rgb: Optional[tuple[str, str, str]] = None, level: Optional[str] = None, cmap: Optional[str] = None,
+                 **look: Any) -> Drawn:
+        """The general method: where `surface`, an expression in x, y and z, is 0; or, as an inequality, where it is true;
+        as in "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1". `bound` is a condition besides, and `boundary` closed curves,
+        projected along an axis. Names in expressions are `parameters`. `rgb` are expressions from 0 to 1, `level` one whose
+        colour `cmap` gives."""
+        return self._draw(name, measured.implicit, (surface,),
+                          dict(bound=bound, boundary=boundary, boundary_axis=boundary_axis, parameters=parameters, fill=fill,
+                               rule=rule, shell=shell, unit=unit, domain=domain, color=color, rgb=rgb, level=level, cmap=cmap),
+                          Look.of(**look))

@@ -1,0 +1,68 @@
+"""What shapes by their measures say on the wire, and what is wrong with measures."""
+import unittest
+
+import numpy as np
+
+from voxeld import InvalidArray, InvalidValue, measured
+from voxeld.v1 import primitives_pb2 as pb
+
+
+def parsed(shape: list) -> pb.Primitive:
+    assert len(shape) == 1
+    return pb.Primitive.FromString(shape[0].to_bytes())
+
+
+class Measured(unittest.TestCase):
+    def test_measures_come_through(self) -> None:
+        ellipsoid = parsed(measured.ellipsoid((1, 2, 3), (4, 5, 6), color="red", fill="solid")).ellipsoid
+        self.assertEqual((ellipsoid.center.y, ellipsoid.radii.z, ellipsoid.fill), (2, 6, pb.FILL_SOLID))
+        torus = parsed(measured.torus((0, 0, 0), 0.5, 0.1, rule="cover", shell=2)).torus
+        self.assertEqual((torus.radius, torus.tube_radius, torus.rule), (0.5, 0.1, pb.SURFACE_RULE_COVER))
+        self.assertEqual((torus.shell.value, torus.shell.unit), (2, pb.Thickness.VOXELS))
+        cone = parsed(measured.cone((0, 0, 0), (0, 0, 2), 1, 0.5, round_ends=True)).cone
+        self.assertEqual((cone.end.z, cone.start_radius, cone.end_radius, cone.round_ends), (2, 1, 0.5, True))
+        box = parsed(measured.parallelepiped((0, 0, 0), np.eye(3) * 2)).parallelepiped
+        self.assertEqual((box.edge_a.x, box.edge_b.y, box.edge_c.z), (2, 2, 2))
+        disc = parsed(measured.disc((0, 0, 0), 1, normal=(0, 1, 0), inner_radius=0.25, shell=0.1, unit="units")).disc
+        self.assertEqual((disc.normal.y, disc.inner_radius, disc.shell.unit), (1, 0.25, pb.Thickness.UNITS))
+        patch = parsed(measured.patch((1, 1, 1), [(1, 0, 0), (0, 1, 0)])).patch
+        self.assertEqual((patch.corner.x, patch.edge_b.y), (1, 1))
+
+    def test_curves_are_one_or_several(self) -> None:
+        triangle = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+        one = parsed(measured.polygon(triangle)).polygon
+        self.assertEqual((list(one.ends), len(one.points)), ([3], 9))
+        two = parsed(measured.polygon([np.array(triangle) * 4, np.array(triangle + [(1, 1, 0)])])).polygon
+        self.assertEqual((list(two.ends), two.points[3]), ([3, 7], 4))
+        with self.assertRaisesRegex(InvalidArray, "a closed curve has 3 vertices at least, got 2"):
+            measured.polygon(triangle[:2])
+
+    def test_the_general_method(self) -> None:
+        shape = parsed(measured.implicit("x^2+y^2 <= r", bound="z > 0", boundary=[(0, 0, 0), (1, 0, 0), (0, 1, 0)],
+                                         boundary_axis="x", parameters={"r": 2, "s": 3}, fill="surface", shell=1.5,
+                                         domain=((-1, -1, -1), (1, 1, 1)), level="z", cmap="viridis")).implicit
+        self.assertEqual((shape.surface.text, shape.bound.text, shape.level.text), ("x^2+y^2 <= r", "z > 0", "z"))
+        self.assertEqual((shape.parameter_names, list(shape.parameter_values)), ("r s", [2, 3]))
+        self.assertEqual((shape.boundary.axis, list(shape.boundary.ends)), (pb.Boundary.X, [3]))
+        self.assertEqual((shape.fill, shape.domain.max.z, shape.colormap), (pb.FILL_SURFACE, 1, "viridis"))
+        colored = parsed(measured.implicit("x = 0", rgb=("x", "y", "z"))).implicit
+        self.assertEqual((colored.red.text, colored.blue.text, colored.fill), ("x", "z", pb.FILL_UNSPECIFIED))
+
+    def test_what_is_wrong_is_said(self) -> None:
+        for wrong, words in (
+                (lambda: measured.ellipsoid((0, 0, 0), (1, 0, 1)), "the radius along y must be greater than 0"),
+                (lambda: measured.torus((0, 0, 0), 1, -1), "tube_radius must be greater than 0"),
+                (lambda: measured.cone((0, 0), (0, 0, 1), 1, 0), "start must be three numbers"),
+                (lambda: measured.parallelepiped((0, 0, 0), np.eye(3)[:2]), r"edges must be of shape \(3, 3\)"),
+                (lambda: measured.disc((0, 0, 0), 1, rule="thick"), "rule is 'thick'; give one of 'thin', 'cover'"),
+                (lambda: measured.implicit(""), "the surface is ''; give an expression"),
+                (lambda: measured.implicit("x", level="y"), "each goes with the other"),
+                (lambda: measured.implicit("x", rgb=("x", "y")), "rgb has 2 expressions"),
+                (lambda: measured.implicit("x", parameters={"2a": 1}), "a parameter is called '2a'")):
+            with self.subTest(words):
+                with self.assertRaisesRegex((InvalidArray, InvalidValue), words):
+                    wrong()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,293 @@
+// What is wrong with shapes that are drawn by the general method, and what becomes of good ones.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "daemon/wire/primitive.h"
+#include "gpu/implicit/program.h"
+#include "gpu/implicit/program_check.h"
+#include "tests/daemon/wire/requests.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using ::testing::HasSubstr;
+
+using P = v1::Primitive;
+
+MaybeFault FaultOf(const P& primitive, Content* content, const Limits& limits = {}) {
+  return ToContent(FieldPath("primitive"), primitive, {limits}, content);
+}
+
+void Set(v1::Vec3* out, double x, double y, double z) {
+  out->set_x(x);
+  out->set_y(y);
+  out->set_z(z);
+}
+
+P Torus() {
+  P p;
+  p.mutable_torus()->set_radius(2);
+  p.mutable_torus()->set_tube_radius(0.5);
+  return p;
+}
+P Cone() {
+  P p;
+  Set(p.mutable_cone()->mutable_end(), 0, 0, 3);
+  p.mutable_cone()->set_start_radius(1);
+  return p;
+}
+P Disc() {
+  P p;
+  p.mutable_disc()->set_radius(2);
+  return p;
+}
+P Patch() {
+  P p;
+  Set(p.mutable_patch()->mutable_edge_a(), 1, 0, 0);
+  Set(p.mutable_patch()->mutable_edge_b(), 0, 1, 0);
+  return p;
+}
+P Parallelepiped() {
+  P p;
+  Set(p.mutable_parallelepiped()->mutable_edge_a(), 1, 0, 0);
+  Set(p.mutable_parallelepiped()->mutable_edge_b(), 0, 1, 0);
+  Set(p.mutable_parallelepiped()->mutable_edge_c(), 0, 0, 1);
+  return p;
+}
+P Polygon() {
+  P p;
+  for (const double number : {0, 0, 0, 1, 0, 0, 0, 1, 0}) p.mutable_polygon()->add_points(number);
+  return p;
+}
+P Ellipsoid() {
+  P p;
+  Set(p.mutable_ellipsoid()->mutable_radii(), 1, 2, 3);
+  return p;
+}
+P Implicit() {
+  P p;
+  p.mutable_implicit()->mutable_surface()->set_text("x^2 + y^2 + z^2 <= r");
+  p.mutable_implicit()->set_parameter_names("r");
+  p.mutable_implicit()->add_parameter_values(4);
+  return p;
+}
+
+struct Case {
+  const char* name;
+  P (*good)();
+  std::function<void(P&)> spoil;
+  const char* field;
+  Reason reason;
+  const char* message;
+};
+
+const Case kCases[] = {
+    {"ellipsoid_flat", Ellipsoid, [](P& p) { p.mutable_ellipsoid()->mutable_radii()->set_y(0); },
+     "primitive.ellipsoid.radii.y", Reason::kInvalidValue, "is 0; give a number greater than 0"},
+    {"torus_radius", Torus, [](P& p) { p.mutable_torus()->set_radius(-1); },
+     "primitive.torus.radius", Reason::kInvalidValue, "is -1; give a number greater than 0"},
+    {"torus_tube", Torus, [](P& p) { p.mutable_torus()->set_tube_radius(0); },
+     "primitive.torus.tube_radius", Reason::kInvalidValue, "is 0; give"},
+    {"torus_shell", Torus, [](P& p) { p.mutable_torus()->mutable_shell()->set_value(-2); },
+     "primitive.torus.shell.value", Reason::kInvalidValue, "is -2; give 0 (one voxel)"},
+    {"cone_point", Cone, [](P& p) { p.mutable_cone()->mutable_end()->set_z(0); },
+     "primitive.cone.end", Reason::kInvalidValue, "is (0, 0, 0) as start is; give another point"},
+    {"cone_no_radius", Cone, [](P& p) { p.mutable_cone()->set_start_radius(0); },
+     "primitive.cone.start_radius", Reason::kInvalidValue, "and end_radius are 0"},
+    {"cone_negative", Cone, [](P& p) { p.mutable_cone()->set_end_radius(-1); },
+     "primitive.cone.end_radius", Reason::kInvalidValue, "is -1; give 0 or more"},
+    {"cone_swallowed", Cone,
+     [](P& p) {
+       p.mutable_cone()->set_round_ends(true);
+       p.mutable_cone()->set_end_radius(5);
+     },
+     "primitive.cone.end_radius", Reason::kInvalidValue, "one end's sphere holds the other's"},
+    {"disc_radius", Disc, [](P& p) { p.mutable_disc()->set_radius(0); }, "primitive.disc.radius",
+     Reason::kInvalidValue, "is 0; give"},
+    {"disc_inner", Disc, [](P& p) { p.mutable_disc()->set_inner_radius(2); },
+     "primitive.disc.inner_radius", Reason::kInvalidValue, "is 2; give less than radius, 2"},
+    {"disc_normal", Disc, [](P& p) { p.mutable_disc()->mutable_normal(); }, "primitive.disc.normal",
+     Reason::kInvalidValue, "is (0, 0, 0); give a direction"},
+    {"patch_flat", Patch, [](P& p) { Set(p.mutable_patch()->mutable_edge_b(), -3, 0, 0); },
+     "primitive.patch.edge_b", Reason::kInvalidValue, "must span an area"},
+    {"parallelepiped_flat", Parallelepiped,
+     [](P& p) { Set(p.mutable_parallelepiped()->mutable_edge_c(), 1, 1, 0); },
+     "primitive.parallelepiped.edge_c", Reason::kInvalidValue, "must span a volume"},
+    {"polygon_line", Polygon, [](P& p) { p.mutable_polygon()->set_points(7, 0); },
+     "primitive.polygon.points", Reason::kInvalidValue, "lie along one line"},
+    {"polygon_uneven", Polygon,
+     [](P& p) {
+       for (const double number : {1, 1, 1}) p.mutable_polygon()->add_points(number);
+     },
+     "primitive.polygon.points", Reason::kInvalidValue, "away from a plane"},
+    {"polygon_numbers", Polygon, [](P& p) { p.mutable_polygon()->add_points(1); },
+     "primitive.polygon.points", Reason::kSizeMismatch, "has 10 numbers"},
+    {"polygon_short", Polygon, [](P& p) { p.mutable_polygon()->add_ends(2); },
+     "primitive.polygon.ends[0]", Reason::kIndexOutOfRange,
+     "is 2; a curve has 3 vertices at least"},
+    {"polygon_ends", Polygon,
+     [](P& p) {
+       for (int i = 0; i < 9; ++i) p.mutable_polygon()->add_points(i % 3 == 2 ? 0 : i);
+       p.mutable_polygon()->add_ends(3);
+     },
+     "primitive.polygon.ends", Reason::kSizeMismatch, "ends with 3; there are 6 vertices"},
+    {"polygon_infinite", Polygon, [](P& p) { p.mutable_polygon()->set_points(4, 1e300); },
+     "primitive.polygon.points[4]", Reason::kInvalidValue, "1e+300"},
+    {"implicit_text", Implicit,
+     [](P& p) { p.mutable_implicit()->mutable_surface()->set_text("x +"); },
+     "primitive.implicit.surface.text", Reason::kInvalidValue, "at character 4: found the end"},
+    {"implicit_nothing", Implicit, [](P& p) { p.mutable_implicit()->clear_surface(); },
+     "primitive.implicit.surface", Reason::kInvalidValue, "is not set; give text or tree"},
+    {"implicit_bound", Implicit, [](P& p) { p.mutable_implicit()->mutable_bound()->set_text("x"); },
+     "primitive.implicit.bound.text", Reason::kInvalidValue, "a condition"},
+    {"implicit_parameters", Implicit, [](P& p) { p.mutable_implicit()->add_parameter_values(4); },
+     "primitive.implicit.parameter_values", Reason::kSizeMismatch, "has 2 numbers for 1 names"},
+    {"implicit_name", Implicit, [](P& p) { p.mutable_implicit()->set_parameter_names("2r"); },
+     "primitive.implicit.parameter_names", Reason::kInvalidValue, "a digit not first"},
+    {"implicit_unknown", Implicit, [](P& p) { p.mutable_implicit()->set_parameter_names("s"); },
+     "primitive.implicit.surface.text", Reason::kInvalidValue, "there is no 'r'"},
+    {"implicit_channels", Implicit,
+     [](P& p) { p.mutable_implicit()->mutable_red()->set_text("x"); }, "primitive.implicit",
+     Reason::kInvalidValue, "has 1 of red, green and blue"},
+    {"implicit_level", Implicit, [](P& p) { p.mutable_implicit()->mutable_level()->set_text("x"); },
+     "primitive.implicit.colormap", Reason::kInvalidValue, "each goes with the other"},
+    {"implicit_colormap", Implicit,
+     [](P& p) {
+       p.mutable_implicit()->mutable_level()->set_text("x");
+       p.mutable_implicit()->set_colormap("sepia");
+     },
+     "primitive.implicit.colormap", Reason::kNotFound, "there are viridis, plasma"},
+    {"implicit_domain", Implicit,
+     [](P& p) { Set(p.mutable_implicit()->mutable_domain()->mutable_min(), 1, 1, 1); },
+     "primitive.implicit.domain", Reason::kInvalidValue, ""},
+    {"tree_empty", Implicit, [](P& p) { p.mutable_implicit()->mutable_surface()->mutable_tree(); },
+     "primitive.implicit.surface.tree.ops", Reason::kSizeMismatch, "leaves 0 numbers"},
+    {"tree_starved", Implicit,
+     [](P& p) {
+       p.mutable_implicit()->mutable_surface()->mutable_tree()->add_ops(v1::Expression::Tree::ADD);
+     },
+     "primitive.implicit.surface.tree.ops[0]", Reason::kSizeMismatch,
+     "is ADD, which takes 2; there are 0"},
+    {"tree_value", Implicit,
+     [](P& p) {
+       p.mutable_implicit()->mutable_surface()->mutable_tree()->add_ops(
+           v1::Expression::Tree::CONSTANT);
+     },
+     "primitive.implicit.surface.tree.ops[0]", Reason::kSizeMismatch,
+     "is a CONSTANT beyond the 0 values"},
+    {"tree_name", Implicit,
+     [](P& p) {
+       v1::Expression::Tree* tree = p.mutable_implicit()->mutable_surface()->mutable_tree();
+       tree->add_ops(v1::Expression::Tree::PARAMETER);
+       tree->set_names("q");
+     },
+     "primitive.implicit.surface.tree.names", Reason::kNotFound, "none of the parameters"},
+    {"tree_left_over", Implicit,
+     [](P& p) {
+       v1::Expression::Tree* tree = p.mutable_implicit()->mutable_surface()->mutable_tree();
+       tree->add_ops(v1::Expression::Tree::X);
+       tree->add_values(1);
+     },
+     "primitive.implicit.surface.tree", Reason::kSizeMismatch,
+     "has 1 values and 0 names for 0 constants"},
+    {"tree_op", Implicit,
+     [](P& p) {
+       p.mutable_implicit()->mutable_surface()->mutable_tree()->add_ops(
+           static_cast<v1::Expression::Tree::Op>(77));
+     },
+     "primitive.implicit.surface.tree.ops[0]", Reason::kInvalidValue, "has the unknown value 77"},
+};
+
+TEST(Shapes, WhatIsWrongIsSaid) {
+  for (const Case& c : kCases) {
+    SCOPED_TRACE(c.name);
+    Content content;
+    ASSERT_FALSE(FaultOf(c.good(), &content).has_value());
+    P spoilt = c.good();
+    c.spoil(spoilt);
+    const MaybeFault fault = FaultOf(spoilt, &content);
+    ASSERT_TRUE(fault.has_value());
+    EXPECT_EQ(fault->field, c.field);
+    EXPECT_EQ(fault->reason, c.reason) << fault->message;
+    EXPECT_THAT(fault->message, HasSubstr(c.message));
+  }
+}
+
+TEST(Shapes, LimitsHold) {
+  Content content;
+  P many = Implicit();
+  std::string sum = "x";
+  for (int i = 0; i < 400; ++i) sum += "+y*" + std::to_string(i);
+  many.mutable_implicit()->mutable_surface()->set_text(sum);
+  MaybeFault fault = FaultOf(many, &content, {.max_expression_nodes = 100});
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(fault->message, HasSubstr("has more than 100 operations"));
+  P deep = Implicit();
+  deep.mutable_implicit()->mutable_surface()->set_text("((((x))))");
+  EXPECT_FALSE(FaultOf(deep, &content, {.max_expression_depth = 4}).has_value());
+  fault = FaultOf(deep, &content, {.max_expression_depth = 3});
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->reason, Reason::kQuotaExceeded);
+  P wide = Polygon();
+  for (const double number : {1, 1, 0}) wide.mutable_polygon()->add_points(number);
+  fault = FaultOf(wide, &content, {.max_boundary_points = 3});
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_THAT(fault->message, HasSubstr("has 4 vertices; max_boundary_points allows 3"));
+}
+
+TEST(Shapes, BecomeProgramsWithinBounds) {
+  for (P (*good)() : {Torus, Cone, Disc, Patch, Parallelepiped, Polygon, Ellipsoid, Implicit}) {
+    Content content;
+    const P primitive = good();
+    ASSERT_FALSE(FaultOf(primitive, &content).has_value());
+    const GeometryData& data = *std::get<GeometryPtr>(content);
+    EXPECT_EQ(data.record.kind, gpu::PrimitiveKind::kImplicit);
+    EXPECT_EQ(data.kind, P::descriptor()->FindFieldByNumber(primitive.kind_case())->name());
+    EXPECT_TRUE(gpu::implicit::CheckProgram(data.arrays.indices(), data.record.vertex_count).ok());
+    EXPECT_EQ(data.as_sent, primitive.SerializeAsString());
+  }
+}
+
+TEST(Shapes, ATreeSaysWhatItsTextSays) {
+  P text = Implicit(), tree = Implicit();
+  text.mutable_implicit()->mutable_surface()->set_text("max(x^2 - r, sin(y)*0.5)");
+  v1::Expression::Tree* const t = tree.mutable_implicit()->mutable_surface()->mutable_tree();
+  using T = v1::Expression::Tree;
+  for (const auto op : {T::X, T::CONSTANT, T::POWER, T::PARAMETER, T::SUBTRACT, T::Y, T::SIN,
+                        T::CONSTANT, T::MULTIPLY, T::MAX}) {
+    t->add_ops(op);
+  }
+  t->add_values(2);
+  t->add_values(0.5);
+  t->set_names("r");
+  Content of_text, of_tree;
+  ASSERT_FALSE(FaultOf(text, &of_text).has_value());
+  const MaybeFault fault = FaultOf(tree, &of_tree);
+  ASSERT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
+  const auto words = [](const Content& content) {
+    const auto span = std::get<GeometryPtr>(content)->arrays.indices();
+    return std::vector<uint32_t>(span.begin(), span.end());
+  };
+  EXPECT_EQ(words(of_text), words(of_tree));
+}
+
+TEST(Shapes, FillIsWhatTheRelationSays) {
+  Content content;
+  const auto fill = [&](const char* surface) {
+    P p = Implicit();
+    p.mutable_implicit()->mutable_surface()->set_text(surface);
+    EXPECT_FALSE(FaultOf(p, &content).has_value());
+    return std::get<GeometryPtr>(content)->record.fill;
+  };
+  EXPECT_EQ(fill("x <= r"), gpu::Fill::kSolid);
+  EXPECT_EQ(fill("x = r"), gpu::Fill::kSurface);
+  EXPECT_EQ(fill("x - r"), gpu::Fill::kSurface);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::wire

@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# The real programs, end to end: shapes and expressions as they are typed, seen in what the display shows.
+# usage: draw_test.sh VOXELD VOXELCTL
+set -euo pipefail
+voxeld=$1
+voxelctl=$2
+
+work=$(mktemp -d)
+daemon=
+trap '[ -z "$daemon" ] || kill -KILL "$daemon" 2>/dev/null || true; rm -rf "$work"' EXIT
+export VOXELD_SERVER=unix:$work/voxeld.sock
+
+"$voxeld" --listen "$VOXELD_SERVER" --http off --log-level warn --engine cpu \
+  --display stack=simulated,geometry=planar,size=64x64x64 &
+daemon=$!
+for _ in $(seq 600); do
+  "$voxelctl" displays >/dev/null 2>&1 && break
+  kill -0 "$daemon"
+  sleep 0.1 # the daemon has no other way to say that it listens
+done
+
+# field FILE EXPRESSION: prints what Python makes of the JSON document `d`.
+field() { python3 -c 'import json, sys; d = json.load(open(sys.argv[1])); print(eval(sys.argv[2]))' "$1" "$2"; }
+fail() { echo "$1" >&2; exit 1; }
+
+# Draws its arguments; what the display shows then has between LEAST and MOST lit pixels.
+draws() {
+  local least=$1 most=$2
+  shift 2
+  "$voxelctl" --json draw "$@" >"$work/draw.json"
+  # The picture may be of the volume before: it is asked for until it is new.
+  for _ in $(seq 100); do
+    "$voxelctl" --json snapshot "$work/picture.png" >"$work/picture.json"
+    [ "$(field "$work/picture.json" 'd["volume"]')" != "${volume:-}" ] && break
+    sleep 0.05
+  done
+  volume=$(field "$work/picture.json" 'd["volume"]')
+  lit=$(field "$work/picture.json" 'd["lit_pixels"]')
+  [ "$lit" -ge "$least" ] && [ "$lit" -le "$most" ] || fail "$*: $lit lit pixels, not $least to $most"
+}
+
+volume=$("$voxelctl" --json snapshot "$work/first.png" | python3 -c 'import json, sys; print(json.load(sys.stdin)["volume"])')
+# Of a paraboloid over the unit disc, 5.33 units of area: 32² voxels each, and some for its slope.
+draws 5000 9000 "x^2+y^2-z = 0 where x^2+y^2 <= 1"
+draws 16000 17500 "sphere radius=0.5 fill=solid"
+draws 17000 19000 "sphere radius=0.5 fill=solid" "torus radius=0.8 tube_radius=0.05 fill=solid"
+"$voxelctl" --json entities >"$work/entities.json"
+[ "$(field "$work/entities.json" '[e["kind"] for e in d["entities"]]')" = "['sphere', 'torus']" ] ||
+  fail "not what was drawn last is up: $(cat "$work/entities.json")"
+"$voxelctl" draw --add "points vertices=0,0,0.9"
+"$voxelctl" --json entities >"$work/entities.json"
+[ "$(field "$work/entities.json" 'len(d["entities"])')" = 3 ] || fail "--add took something away"
+
+# Nothing is put up, or taken down, for the sake of one that is wrong.
+if "$voxelctl" draw "sphere radius=1" "x +" 2>"$work/error"; then fail "x + was drawn"; fi
+grep -q "at character 4: found the end where a number, a name or ( would be right" "$work/error" || fail "$(cat "$work/error")"
+if "$voxelctl" draw "spere radius=1" 2>"$work/error"; then fail "a spere was drawn"; fi
+grep -q 'there is no shape spere; did you mean sphere?' "$work/error" || fail "$(cat "$work/error")"
+"$voxelctl" --json entities >"$work/entities.json"
+[ "$(field "$work/entities.json" 'len(d["entities"])')" = 3 ] || fail "a refused shape took something away"
+
+# A pattern hides nothing that is drawn.
+"$voxelctl" pattern corners
+draws 16000 17500 "sphere radius=0.5 fill=solid"
+
+"$voxelctl" --json gallery "$work/gallery.png" >"$work/gallery.json"
+[ "$(field "$work/gallery.json" 'd["shapes"] > 10 and d["width"] > 1000')" = True ] || fail "$(cat "$work/gallery.json")"
+[ "$(head -c 8 "$work/gallery.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+"$voxelctl" --json entities >"$work/entities.json"
+[ "$(field "$work/entities.json" 'len(d.get("entities", []))')" = 0 ] || fail "the gallery left something up"

@@ -1,0 +1,120 @@
+// Shapes as people type them.
+#include "tools/voxelctl/shape/shape_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <set>
+#include <string>
+
+#include "tools/voxelctl/shape/examples.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+v1::Entity Parsed(const std::string& text) {
+  const absl::StatusOr<v1::Entity> entity = ParseShapeText(text);
+  EXPECT_TRUE(entity.ok()) << text << ": " << entity.status();
+  return entity.value_or(v1::Entity());
+}
+std::string ErrorOf(const std::string& text) {
+  return std::string(ParseShapeText(text).status().message());
+}
+
+TEST(ShapeText, FieldsOfEveryTypeComeThrough) {
+  const v1::Entity entity = Parsed(
+      "cone start=0,0,-1 end=0,1,2 start_radius=0.5 round_ends=true fill=solid rule=cover "
+      "shell=0.1u color=#102030 "
+      "priority=7 erase=true lifetime=1.5 label='two words'");
+  const v1::Cone& cone = entity.primitive().cone();
+  EXPECT_EQ(cone.start().z(), -1);
+  EXPECT_EQ(cone.end().y(), 1);
+  EXPECT_EQ(cone.start_radius(), 0.5);
+  EXPECT_TRUE(cone.round_ends());
+  EXPECT_EQ(cone.fill(), v1::FILL_SOLID);
+  EXPECT_EQ(cone.rule(), v1::SURFACE_RULE_COVER);
+  EXPECT_FLOAT_EQ(cone.shell().value(), 0.1f);
+  EXPECT_EQ(cone.shell().unit(), v1::Thickness::UNITS);
+  EXPECT_EQ(entity.primitive().color().rgb(), 0x102030u);
+  EXPECT_EQ(entity.priority(), 7u);
+  EXPECT_TRUE(entity.erase());
+  EXPECT_EQ(entity.lifetime_ns(), 1'500'000'000);
+  EXPECT_EQ(entity.label(), "two words");
+  const v1::Entity lines = Parsed("segments vertices='0,0,0 1,2,3' topology=strip thickness=3");
+  float positions[6];
+  ASSERT_EQ(lines.primitive().segments().vertices().positions().size(), sizeof(positions));
+  std::memcpy(positions, lines.primitive().segments().vertices().positions().data(),
+              sizeof(positions));
+  EXPECT_THAT(positions, ElementsAre(0, 0, 0, 1, 2, 3));
+  EXPECT_EQ(lines.primitive().segments().topology(), v1::Segments::STRIP);
+  EXPECT_EQ(lines.primitive().segments().thickness().unit(), v1::Thickness::VOXELS);
+  EXPECT_EQ(Parsed("box size=2").primitive().box().size().z(), 2);
+  const v1::Entity shape = Parsed(
+      "implicit surface=\"x <= r\" parameter_names=r parameter_values=3 domain=-1,-1,-1:1,2,3 "
+      "boundary=0,0,0,1,0,0,0,1,0 level=z colormap=jet");
+  EXPECT_EQ(shape.primitive().implicit().surface().text(), "x <= r");
+  EXPECT_THAT(shape.primitive().implicit().parameter_values(), ElementsAre(3));
+  EXPECT_EQ(shape.primitive().implicit().domain().max().z(), 3);
+  EXPECT_EQ(shape.primitive().implicit().boundary().points_size(), 9);
+}
+
+TEST(ShapeText, ShapesArePlaced) {
+  const v1::Entity entity = Parsed("sphere radius=1 at=1,2,3 scale=2,1,1 turn=0,0,90");
+  // x, doubled, comes to lie along y.
+  EXPECT_NEAR(entity.transform().m(0), 0, 1e-12);
+  EXPECT_NEAR(entity.transform().m(4), 2, 1e-12);
+  EXPECT_NEAR(entity.transform().m(1), -1, 1e-12);
+  EXPECT_EQ(entity.transform().m(3), 1);
+  EXPECT_EQ(entity.transform().m(11), 3);
+}
+
+TEST(ShapeText, AllElseIsAnExpression) {
+  EXPECT_EQ(Parsed("x^2+y^2-z = 0 where x^2+y^2 <= 1").primitive().implicit().surface().text(),
+            "x^2+y^2-z = 0 where x^2+y^2 <= 1");
+  EXPECT_EQ(Parsed("x").primitive().implicit().surface().text(), "x");
+  EXPECT_EQ(Parsed("length(x, y, z) = 1").primitive().implicit().surface().text(),
+            "length(x, y, z) = 1");
+}
+
+TEST(ShapeText, WhatIsWrongIsSaid) {
+  EXPECT_EQ(ErrorOf(""), "a shape is expected, or an expression");
+  EXPECT_EQ(ErrorOf("spere radius=1"), "there is no shape spere; did you mean sphere?");
+  EXPECT_EQ(ErrorOf("sphere radios=1"), "sphere has no radios; did you mean radius?");
+  EXPECT_EQ(ErrorOf("sphere radius=big"), "radius is \"big\"; a number would be right");
+  EXPECT_EQ(ErrorOf("sphere 1"), "after sphere is \"1\"; NAME=VALUE would be right");
+  EXPECT_EQ(ErrorOf("box size=1,2"),
+            "size is \"1,2\"; x,y,z would be right, or one number for all");
+  EXPECT_EQ(ErrorOf("box fill=full"), "fill is \"full\"; one of surface, solid would be right");
+  EXPECT_EQ(ErrorOf("cone round_ends=yes"), "round_ends is \"yes\"; true or false would be right");
+  EXPECT_EQ(ErrorOf("implicit domain=1,2,3"),
+            "domain is \"1,2,3\"; two corners, x,y,z:x,y,z, would be right");
+  EXPECT_EQ(
+      ErrorOf("torus shell=2v"),
+      "shell is \"2v\"; a number of voxels would be right, or one of units with a u, as 0.1u");
+  EXPECT_EQ(ErrorOf("box label='open"), "a ' is not closed");
+  EXPECT_THAT(ErrorOf("box color=purpel"),
+              HasSubstr("color is \"purpel\"; #rrggbb would be right, or one of black"));
+  EXPECT_THAT(ErrorOf("points vertices=1,2"), HasSubstr("these are 2 numbers"));
+}
+
+// The gallery has every shape that there is, instances aside, which need an object.
+TEST(ShapeText, EveryShapeHasAnExample) {
+  std::set<std::string> shown;
+  for (const ShapeExample& example : ShapeExamples()) {
+    const v1::Entity entity = Parsed(example.text);
+    const auto* field =
+        v1::Primitive::descriptor()->FindFieldByNumber(entity.primitive().kind_case());
+    ASSERT_NE(field, nullptr) << example.name;
+    EXPECT_EQ(std::string(example.name).find(field->name()), 0u) << example.name;
+    shown.insert(field->name());
+  }
+  const auto& kinds = *v1::Primitive::descriptor()->oneof_decl(0);
+  EXPECT_EQ(shown.size() + 1, static_cast<size_t>(kinds.field_count()));
+}
+
+}  // namespace
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""Writes docs/primitives.md from what the wire contract, the engine's headers and the gallery's examples say.
+
+    tools/primitives_doc.py            writes it
+    tools/primitives_doc.py --check    exit status 1 if it is not what would be written
+"""
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROTO = ROOT / "proto/voxeld/v1/primitives.proto"
+HEADERS = ROOT / "gpu/primitives"
+EXAMPLES = ROOT / "tools/voxelctl/shape/examples.cc"
+OUT = ROOT / "docs/primitives.md"
+
+# The header of a primitive that is not called as its message.
+NAMED = {"Mesh": "triangles", "Instance": None}
+
+HEAD = """# Primitives
+
+<!-- Written by tools/primitives_doc.py from proto/voxeld/v1/primitives.proto, gpu/primitives/ and the gallery's examples. -->
+
+What can be drawn, by the name of its field in `Primitive`. Coordinates are in the entity's own space: its transform, its layer's and
+the display's view follow. Lengths are in the entity's units unless said otherwise; colours 0xRRGGBB. Defaults are zero, or
+what a field says. `voxelctl draw "SHAPE NAME=VALUE …"` takes the same names. Both engines cover the same voxels.
+
+![Every shape, each as a display shows it](images/gallery.png)
+"""
+
+
+def comment_above(lines: list[str], at: int) -> str:
+    begin = at
+    while begin > 0 and lines[begin - 1].startswith("//"):
+        begin -= 1
+    return " ".join(line[2:].strip() for line in lines[begin:at])
+
+
+def messages() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
+    """Of each message at the top: what stands above it, and (type, name, comment) of each field."""
+    lines = PROTO.read_text().split("\n")
+    found = {}
+    for i, line in enumerate(lines):
+        start = re.match(r"message (\w+) \{", line)
+        if not start:
+            continue
+        fields, above, depth = [], [], 1
+        for inner in lines[i + 1:]:
+            depth += inner.count("{") - inner.count("}")
+            if depth == 0:
+                break
+            text = inner.strip()
+            if text.startswith("//"):
+                above.append(text[2:].strip())
+                continue
+            field = re.match(r"((?:repeated |optional )?[\w.]+) (\w+) = \d+;(?:\s*// (.*))?", text)
+            if field and depth == 1:
+                fields.append((field[1], field[2], " ".join([*above, field[3] or ""]).strip()))
+            above = []
+        found[start[1]] = (comment_above(lines, i), fields)
+    return found
+
+
+def kinds() -> list[tuple[str, str]]:
+    """(message, field) of each shape, in the wire's order."""
+    body = re.search(r"message Primitive \{\s*oneof kind \{(.*?)\}", PROTO.read_text(), re.S)
+    assert body
+    return re.findall(r"(\w+) (\w+) = \d+;", body[1])
+
+
+def guarantee(message: str) -> str:
+    name = NAMED.get(message, message.lower())
+    path = HEADERS / f"{name}.h"
+    if name is None or not path.exists():
+        return ""
+    text = path.read_text().split("#pragma once")[0]
+    return "\n".join(line[2:].strip() for line in text.split("\n") if line.startswith("//"))
+
+
+def examples() -> dict[str, list[str]]:
+    """By field: the gallery's texts."""
+    text = EXAMPLES.read_text()
+    body = text[text.index("kExamples[]"):text.index("std::span<const ShapeExample> ShapeExamples")]
+    result: dict[str, list[str]] = {}
+    for entry in re.finditer(r'\{("[^{}]*?")\}', re.sub(r'"\s*\n\s*"', "", body)):
+        parts = re.findall(r'"((?:[^"\\]|\\.)*)"', entry[1])
+        field = parts[0].split(" ")[0].rstrip(",")
+        result.setdefault(field, []).append(parts[1])
+    return result
+
+
+def page() -> str:
+    all_messages, shown = messages(), examples()
+    out = [HEAD]
+    for message, field in kinds():
+        above, fields = all_messages[message]
+        out.append(f"## {field}\n")
+        if above:
+            out.append(above + "\n")
+        out.append("| field | type | |\n|---|---|---|")
+        out += [f"| `{name}` | {kind} | {said.replace('|', chr(92) + '|')} |" for kind, name, said in fields]
+        out.append("")
+        if said := guarantee(message):
+            out.append(f"**What it covers** (`gpu/primitives/{NAMED.get(message, message.lower())}.h`): {said}\n")
+        for text in shown.get(field, []):
+            out.append(f"```\nvoxelctl draw \"{text}\"\n```\n")
+    out.append("## Types that several have\n")
+    for message in ("Vertices", "Thickness", "Expression", "Boundary"):
+        above, fields = all_messages[message]
+        out.append(f"### {message}\n\n{above}\n")
+        if fields:
+            out.append("| field | type | |\n|---|---|---|")
+            out += [f"| `{name}` | {kind} | {said.replace('|', chr(92) + '|')} |" for kind, name, said in fields]
+            out.append("")
+    out.append("[Expressions](expressions.md) have a page of their own; colour maps are those of "
+               "`proto/voxeld/v1/colormaps.txt`.\n")
+    return "\n".join(out)
+
+
+def main() -> int:
+    text = page()
+    if sys.argv[1:] == ["--check"]:
+        if OUT.read_text() == text:
+            return 0
+        print("docs/primitives.md is not what tools/primitives_doc.py writes; run it", file=sys.stderr)
+        return 1
+    OUT.write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/text/stroke_font.h"
+#include "display/sync/clock.h"
+#include "tools/voxelctl/commands/captured_volume.h"
+#include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/put_shapes.h"
+#include "tools/voxelctl/render/label.h"
+#include "tools/voxelctl/render/png_file.h"
+#include "tools/voxelctl/render/render_volume.h"
+#include "tools/voxelctl/shape/examples.h"
+#include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/proto_json.h"
+#include "tools/voxelctl/text/table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr int kTile = 320, kMargin = 12;
+constexpr double kLetters = 13;
+
+absl::StatusOr<Volume> Capture(const GalleryOptions& options, Connection& connection) {
+  v1::CaptureVolumeRequest request;
+  request.set_name(options.display);
+  request.set_timeout_ns(5 * sync::kSecond);
+  CapturedVolume captured;
+  absl::Status status = connection.CaptureVolume(
+      request, [&](const v1::VolumeChunk& chunk) { return captured.Add(chunk); });
+  if (!status.ok()) return status;
+  return std::move(captured).Finish();
+}
+
+// One after volume `last`: what was put up since is in it.
+absl::StatusOr<Volume> CaptureNext(const GalleryOptions& options, uint64_t last,
+                                   Connection& connection, Interrupt& interrupt) {
+  constexpr sync::TimeNs kLongest = 10 * sync::kSecond, kStep = 10 * sync::kMillisecond;
+  sync::SystemClock clock;
+  const sync::TimeNs end = clock.Now() + kLongest;
+  for (;;) {
+    absl::StatusOr<Volume> volume = Capture(options, connection);
+    if (!volume.ok() || volume->number > last) return volume;
+    if (interrupt.requested()) return absl::CancelledError("interrupted");
+    if (clock.Now() > end) {
+      return absl::DeadlineExceededError(
+          "the display shows nothing new; `voxelctl displays` tells how it is");
+    }
+    interrupt.WaitUntil(clock, clock.Now() + kStep);
+  }
+}
+
+void Paste(const Image& tile, int left, int top, Image& sheet) {
+  for (int v = 0; v < tile.height; ++v) {
+    const uint8_t* const from =
+        &tile.rgb[static_cast<size_t>(v) * static_cast<size_t>(tile.width) * 3];
+    const size_t to = (static_cast<size_t>(top + v) * static_cast<size_t>(sheet.width) +
+                       static_cast<size_t>(left)) *
+                      3;
+    std::copy(from, from + static_cast<size_t>(tile.width) * 3,
+              sheet.rgb.begin() + static_cast<ptrdiff_t>(to));
+  }
+}
+
+}  // namespace
+
+absl::Status Gallery(const GalleryOptions& options, Connection& connection, Interrupt& interrupt,
+                     Console& console) {
+  const absl::StatusOr<text::StrokeFont> font = text::StrokeFont::Load("futural");
+  if (!font.ok()) return font.status();
+  const std::span<const ShapeExample> examples = ShapeExamples();
+  const int columns = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(examples.size()))));
+  const int rows = (static_cast<int>(examples.size()) + columns - 1) / columns;
+  Image sheet{columns * kTile, rows * kTile, {}};
+  sheet.rgb.resize(static_cast<size_t>(sheet.width) * static_cast<size_t>(sheet.height) * 3);
+  const absl::StatusOr<Volume> first = Capture(options, connection);
+  if (!first.ok()) return first.status();
+  uint64_t last = first->number;
+  for (size_t i = 0; i < examples.size(); ++i) {
+    if (interrupt.requested()) return absl::CancelledError("interrupted");
+    console.ProgressBar("drawing", static_cast<double>(i) / static_cast<double>(examples.size()),
+                        examples[i].name);
+    const std::vector<std::string> shapes = {examples[i].text};
+    const absl::StatusOr<v1::ApplyUpdateRequest> request = ShapesRequest(shapes);
+    if (!request.ok()) return request.status();
+    const absl::StatusOr<uint64_t> put = PutShapes(*request, /*add=*/false, connection);
+    if (!put.ok()) return put.status();
+    const absl::StatusOr<Volume> volume = CaptureNext(options, last, connection, interrupt);
+    if (!volume.ok()) return volume.status();
+    last = volume->number;
+    Image tile = RenderVolume(*volume, {.width = kTile, .height = kTile, .angles = {24, 20}});
+    DrawLabel(*font, examples[i].name, kMargin, kTile - kMargin, kLetters, tile);
+    Paste(tile, static_cast<int>(i) % columns * kTile, static_cast<int>(i) / columns * kTile,
+          sheet);
+  }
+  v1::ClearLayerRequest clear;
+  clear.set_layer(kLayer);
+  const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(clear);
+  if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
+  if (absl::Status status = WritePng(options.file, sheet); !status.ok()) return status;
+  if (console.json()) {
+    console.Data(JsonText({{"file", options.file},
+                           {"shapes", examples.size()},
+                           {"width", sheet.width},
+                           {"height", sheet.height}},
+                          false));
+    return absl::OkStatus();
+  }
+  console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", sheet.width, "x", sheet.height,
+                           ", ", Counted(examples.size(), "shape"),
+                           ", each decoded from what the display was sent"));
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::voxelctl
