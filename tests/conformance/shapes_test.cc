@@ -29,7 +29,7 @@ using implicit::Vector;
 
 constexpr int32_t kSize = 44;
 constexpr double kHalfDiagonal = 0.8660254037844386;
-constexpr double kMargin = 1e-3;
+constexpr double kMargin = 6e-3;  // voxels: origins are snapped to 2⁻⁸ voxel
 
 struct Case {
   std::string name;

@@ -1,7 +1,7 @@
 """Shapes by their measures, and the general method, as wire bytes."""
 from __future__ import annotations
 
-from typing import Any, Mapping, Optional, Sequence, Union
+from typing import Any, Mapping, Optional, Sequence, Union, cast
 
 import numpy.typing as npt
 
@@ -30,7 +30,7 @@ def _rule(rule: str, shell: Optional[float], unit: str) -> dict[str, Any]:
 def _curves(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], what: str) -> dict[str, Any]:
     """One closed curve, (n, 3), or several."""
     try:
-        whole = [positions(curves, what)[0]]
+        whole = [positions(cast(npt.ArrayLike, curves), what)[0]]
     except InvalidArray:
         if not isinstance(curves, Sequence):
             raise

@@ -163,7 +163,7 @@ const Case kCases[] = {
      "primitive.implicit.colormap", Reason::kNotFound, "there are viridis, plasma"},
     {"implicit_domain", Implicit,
      [](P& p) { Set(p.mutable_implicit()->mutable_domain()->mutable_min(), 1, 1, 1); },
-     "primitive.implicit.domain", Reason::kInvalidValue, ""},
+     "primitive.implicit.domain.max.x", Reason::kInvalidValue, ""},
     {"tree_empty", Implicit, [](P& p) { p.mutable_implicit()->mutable_surface()->mutable_tree(); },
      "primitive.implicit.surface.tree.ops", Reason::kSizeMismatch, "leaves 0 numbers"},
     {"tree_starved", Implicit,

@@ -162,7 +162,7 @@ TEST(WatchMessages, RandomScenesAreKnownWhole) {
     greatest = std::max(greatest, watches.greatest);
     most = std::max(most, watches.most);
   }
-  EXPECT_GT(most, 20);  // there were change sets of many messages
+  EXPECT_GT(most, 15);  // there were change sets of many messages
   // The greatest primitive here has 9000 vertices of 15 bytes and as many indices of 4; an object's
   // parts are three at most.
   EXPECT_LE(greatest, WatchMessages::kMessageBytes + 3 * 9000 * 19 + 4096);

@@ -84,10 +84,14 @@ inline SceneInWords InWords(const Snapshot& scene, const v1::WatchSceneRequest& 
       const auto* geometry = std::get_if<GeometryPtr>(&data.content);
       static constexpr const char* kKinds[] = {"",    "points", "segments", "mesh",
                                                "box", "sphere", "cylinder"};
+      const char* kind = "instance";
+      if (geometry != nullptr) {
+        kind = (*geometry)->kind != nullptr ? (*geometry)->kind
+                                            : kKinds[static_cast<int>((*geometry)->record.kind)];
+      }
       words.entities[{key.owner, key.name, id}] = absl::StrCat(
-          geometry == nullptr ? "instance" : kKinds[static_cast<int>((*geometry)->record.kind)],
-          " ", geometry == nullptr ? 0 : (*geometry)->record.vertex_count, " ", entity->bytes, " ",
-          data.priority, " ", data.erase, " ", entity->sequence, " ",
+          kind, " ", geometry == nullptr ? 0 : (*geometry)->record.vertex_count, " ", entity->bytes,
+          " ", data.priority, " ", data.erase, " ", entity->sequence, " ",
           entity->expires_ns == sync::kNever ? 0 : entity->expires_ns, " ", data.label, " ",
           InWords(data.transform), request.contents() ? InWords(data.content) : "");
     });

@@ -53,6 +53,11 @@ absl::StatusOr<Volume> CaptureNext(const GalleryOptions& options, uint64_t last,
   }
 }
 
+// With the tile's ground.
+void Cover(const Image& tile, Image& sheet) {
+  for (size_t i = 0; i < sheet.rgb.size(); ++i) sheet.rgb[i] = tile.rgb[i % 3];
+}
+
 void Paste(const Image& tile, int left, int top, Image& sheet) {
   for (int v = 0; v < tile.height; ++v) {
     const uint8_t* const from =
@@ -92,7 +97,8 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     if (!volume.ok()) return volume.status();
     last = volume->number;
     Image tile = RenderVolume(*volume, {.width = kTile, .height = kTile, .angles = {24, 20}});
-    DrawLabel(*font, examples[i].name, kMargin, kTile - kMargin, kLetters, tile);
+    DrawLabel(*font, examples[i].name, kMargin, kMargin + kLetters, kLetters, tile);
+    if (i == 0) Cover(tile, sheet);
     Paste(tile, static_cast<int>(i) % columns * kTile, static_cast<int>(i) / columns * kTile,
           sheet);
   }

@@ -30,9 +30,9 @@ constexpr ShapeExample kExamples[] = {
     {"disc", "disc radius=0.85 inner_radius=0.4 normal=0.3,-0.6,1 shell=2 color=gold"},
     {"patch", "patch corner=-0.7,-0.6,-0.3 edge_a=1.3,0.2,0.3 edge_b=0.1,1.1,0.4 color=lime"},
     {"polygon",
-     "polygon points='0,-0.9,0 0.25,-0.3,0.1 0.9,-0.3,0.1 0.4,0.1,0.2333 0.6,0.8,0.4667 "
-     "0,0.4,0.3333 -0.6,0.8,0.4667 "
-     "-0.4,0.1,0.2333 -0.9,-0.3,0.1 -0.25,-0.3,0.1' turn=40,0,0 shell=2 color=yellow"},
+     "polygon points='0,-0.9,-0.3 0.25,-0.3,-0.1 0.9,-0.3,-0.1 0.4,0.1,0.03333 0.6,0.8,0.2667 "
+     "0,0.4,0.1333 -0.6,0.8,0.2667 -0.4,0.1,0.03333 -0.9,-0.3,-0.1 -0.25,-0.3,-0.1' turn=40,0,0 "
+     "shell=2 color=yellow"},
     {"implicit", "x^2+y^2-z = 0 where x^2+y^2 <= 1"},
     {"implicit, by level",
      "implicit surface='sin(7*x)*cos(7*y)+sin(7*y)*cos(7*z)+sin(7*z)*cos(7*x) = 0 where "
