@@ -15,7 +15,7 @@ EXAMPLES = ROOT / "tools/voxelctl/shape/examples.cc"
 OUT = ROOT / "docs/primitives.md"
 
 # The header of a primitive that is not called as its message.
-NAMED = {"Mesh": "triangles", "Instance": None}
+NAMED = {"Mesh": "triangles", "Instance": None, "HeightMap": None}
 
 HEAD = """# Primitives
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/fields.h"
+#include "daemon/wire/height_map.h"
 #include "daemon/wire/implicit.h"
 #include "daemon/wire/shapes.h"
 #include "daemon/wire/vertices.h"
@@ -193,6 +194,8 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
       return ToShape(FieldPath(path, "patch"), in.patch(), context, out);
     case v1::Primitive::kPolygon:
       return ToShape(FieldPath(path, "polygon"), in.polygon(), context, out);
+    case v1::Primitive::kHeightMap:
+      return ToHeightMap(FieldPath(path, "height_map"), in.height_map(), context, out);
     case v1::Primitive::kInstance:  // is no geometry, and has been dealt with
     case v1::Primitive::KIND_NOT_SET:
       break;
@@ -200,7 +203,22 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
   return Fault{FieldPath(path, "kind").ToString(), Reason::kInvalidValue,
                "is not set, or not known to this version of the server; give one of points, "
                "segments, mesh, box, sphere, cylinder, instance, implicit, ellipsoid, torus, cone, "
-               "parallelepiped, disc, patch, polygon"};
+               "parallelepiped, disc, patch, polygon, height_map"};
+}
+
+// Whether record and arrays do not say what was sent.
+bool IsKeptAsSent(const v1::Primitive& in) {
+  switch (in.kind_case()) {
+    case v1::Primitive::kPoints:
+    case v1::Primitive::kSegments:
+    case v1::Primitive::kMesh:
+    case v1::Primitive::kBox:
+    case v1::Primitive::kSphere:
+    case v1::Primitive::kCylinder:
+      return false;
+    default:
+      return true;
+  }
 }
 
 }  // namespace
@@ -219,7 +237,7 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Decod
     data->record.color = in.color().rgb();
   }
   if (auto fault = ToGeometry(path, in, context, data.get())) return fault;
-  if (data->record.kind == gpu::PrimitiveKind::kImplicit) {
+  if (IsKeptAsSent(in)) {
     data->kind = in.GetDescriptor()->FindFieldByNumber(in.kind_case())->name().c_str();
     data->as_sent = in.SerializeAsString();
   }

@@ -207,6 +207,31 @@ TEST(Delta, SizesAreAsCountedByHand) {
   EXPECT_EQ(DeltaWriter::kSizeOfReset, 16u);
 }
 
+TEST(Delta, ProgramsAreLookedAt) {
+  // P = x, in slot 0.
+  std::vector<uint32_t> words(14);
+  words[0] = 1;   // instructions of the surface
+  words[12] = 1;  // x
+  const auto read = [&] {
+    GeometryRecord g;
+    g.id = 1;
+    g.kind = PrimitiveKind::kImplicit;
+    g.index_count = static_cast<uint32_t>(words.size());
+    Block block(DeltaWriter::SizeOf(g));
+    DeltaWriter writer(block.bytes());
+    writer.PutGeometry(g, {}, words, {});
+    return Read(block.bytes());
+  };
+  EXPECT_TRUE(read().ok()) << read();
+  words[12] = 200;
+  EXPECT_THAT(std::string(read().message()),
+              HasSubstr("record at byte 0: program: surface, instruction 0: op is 200"));
+  words[12] = 1 | 99 << 8;
+  EXPECT_THAT(std::string(read().message()), HasSubstr("slot is 99"));
+  words.pop_back();
+  EXPECT_THAT(std::string(read().message()), HasSubstr("size is 13, must be 14 words"));
+}
+
 TEST(Delta, AnOverrunIsCountedAndNotWritten) {
   Block block(48);
   std::fill(block.bytes().begin(), block.bytes().end(), std::byte{0xEE});
@@ -250,8 +275,10 @@ TEST(Delta, RefusesGeometriesThatDoNotHoldTogether) {
   };
   EXPECT_TRUE(ReadGeometryWith([](GeometryRecord&) {}).ok());
   using G = GeometryRecord;
-  EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(7); }),
-              HasSubstr("record at byte 0: geometry.kind is 7, must be 1 to 6"));
+  EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(8); }),
+              HasSubstr("record at byte 0: geometry.kind is 8, must be 1 to 7"));
+  EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kImplicit; }),
+              HasSubstr("geometry.color_mode is 1, must be 0 for a program"));
   EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(0); }),
               HasSubstr("kind is 0"));
   EXPECT_THAT(message([](G& g) { g.color_mode = static_cast<ColorMode>(2); }),

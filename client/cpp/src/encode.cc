@@ -164,6 +164,31 @@ struct ShapeEncoder {
     AppendUnsigned(v1::Cylinder::kRuleFieldNumber, AfterUnspecified(cylinder.rule), &fields);
     return Wrap(before, v1::Primitive::kCylinderFieldNumber, Rope(std::move(fields)));
   }
+  absl::StatusOr<Rope> operator()(const HeightMap& map) const {
+    const size_t samples = size_t{map.columns} * map.rows;
+    if (samples == 0 || map.heights.size() != samples) {
+      return absl::InvalidArgumentError(absl::StrCat("heights has ", map.heights.size(),
+                                                     " numbers for ", map.columns, " columns and ",
+                                                     map.rows, " rows; one for each is right"));
+    }
+    if (!map.colors.empty() && map.colors.size() != 3 * samples) {
+      return absl::InvalidArgumentError(absl::StrCat("colors has ", map.colors.size(),
+                                                     " bytes for ", samples, " heights; ",
+                                                     3 * samples, " or none is right"));
+    }
+    std::string fields;
+    AppendVec3(v1::HeightMap::kCornerFieldNumber, map.corner, &fields);
+    AppendVec3(v1::HeightMap::kEdgeAFieldNumber, map.edge_a, &fields);
+    AppendVec3(v1::HeightMap::kEdgeBFieldNumber, map.edge_b, &fields);
+    AppendVec3(v1::HeightMap::kUpFieldNumber, map.up, &fields);
+    AppendUnsigned(v1::HeightMap::kColumnsFieldNumber, map.columns, &fields);
+    AppendUnsigned(v1::HeightMap::kRowsFieldNumber, map.rows, &fields);
+    AppendUnsigned(v1::HeightMap::kRuleFieldNumber, AfterUnspecified(map.rule), &fields);
+    Rope rope(std::move(fields));
+    AppendPayload(v1::HeightMap::kColorsFieldNumber, map.colors, &rope);
+    AppendPayload(v1::HeightMap::kHeightsFieldNumber, map.heights, &rope);
+    return Wrap(before, v1::Primitive::kHeightMapFieldNumber, std::move(rope));
+  }
   // The others' bytes are a primitive's: they follow what precedes.
   template <typename Measured>
   absl::StatusOr<Rope> operator()(const Measured& shape) const {

@@ -76,6 +76,18 @@ struct Mesh {
   SurfaceRule rule = SurfaceRule::kThin;
 };
 
+// A surface over a grid of heights, row by row.
+struct HeightMap {
+  Vec3 corner;
+  Vec3 edge_a = {1, 0, 0};  // from the first to the last sample of a row
+  Vec3 edge_b = {0, 1, 0};  // from the first to the last row
+  Vec3 up = {0, 0, 1};      // by how much a height of 1 lifts a sample
+  uint32_t columns = 0, rows = 0;
+  Array<float> heights;
+  Array<uint8_t> colors;  // r g b of each; empty: Look::color
+  SurfaceRule rule = SurfaceRule::kThin;
+};
+
 struct Box {
   Vec3 center;
   Vec3 size = {1, 1, 1};  // full edge lengths
@@ -105,7 +117,7 @@ struct Instance {
 };
 
 using Shape = std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance, Implicit,
-                           Ellipsoid, Torus, Cone, Parallelepiped, Disc, Patch, Polygon>;
+                           Ellipsoid, Torus, Cone, Parallelepiped, Disc, Patch, Polygon, HeightMap>;
 
 // Everything about an entity but its shape.
 struct Look {

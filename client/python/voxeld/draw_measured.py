@@ -70,6 +70,14 @@ class DrawMeasured(Generic[Drawn]):
         return self._draw(name, measured.polygon, (curves,), dict(color=color, rule=rule, shell=shell, unit=unit),
                           Look.of(**look))
 
+    def height_map(self, name: str, heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
+                   edges: npt.ArrayLike = ((2, 0, 0), (0, 2, 0)), up: npt.ArrayLike = (0, 0, 1),
+                   colors: Optional[Colors] = None, cmap: Optional[str] = None, rule: str = "thin", **look: Any) -> Drawn:
+        """A surface over a grid of heights, (rows, columns): along `edges[0]` in a row, along `edges[1]` from row to row.
+        `colors` is one, (rows, columns, 3), or, with a `cmap`, (rows, columns) numbers."""
+        return self._draw(name, measured.height_map, (heights,),
+                          dict(corner=corner, edges=edges, up=up, colors=colors, cmap=cmap, rule=rule), Look.of(**look))
+
     def implicit(self, name: str, surface: str, *, bound: Optional[str] = None, boundary: Optional[Curves] = None,
                  boundary_axis: str = "z", parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None,
                  rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",

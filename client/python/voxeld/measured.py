@@ -3,13 +3,15 @@ from __future__ import annotations
 
 from typing import Any, Mapping, Optional, Sequence, Union, cast
 
+import numpy as np
 import numpy.typing as npt
 
+from . import colors as colors_
 from . import wire
-from .arrays import number, positions, vector
+from .arrays import as_array, number, positions, require_finite, vector
 from .colors import Colors
 from .errors import InvalidArray, InvalidValue
-from .shapes import FILLS, RULES, UNITS, choice, solid, vec
+from .shapes import FILLS, PIECE_BYTES, RULES, UNITS, choice, solid, vec
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
@@ -99,6 +101,41 @@ def patch(corner: npt.ArrayLike, edges: npt.ArrayLike, *, color: Color = None, r
 def polygon(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], *, color: Color = None, rule: str = "thin",
             shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     return solid(color, polygon=pb.Polygon(**_curves(curves, "curves"), **_rule(rule, shell, unit)))
+
+
+def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
+               edges: npt.ArrayLike = ((2, 0, 0), (0, 2, 0)), up: npt.ArrayLike = (0, 0, 1),
+               colors: Color = None, cmap: Optional[str] = None, rule: str = "thin") -> list[wire.Packed]:
+    """`heights`: (rows, columns). `colors`: one, (rows, columns, 3), or with a map (rows, columns) numbers."""
+    field = as_array(heights, "heights")
+    if field.ndim != 2 or min(field.shape) < 2:
+        raise InvalidArray(f"heights must be of shape (rows, columns), 2 of each at least, got {field.shape}")
+    require_finite(field, "heights")
+    samples = np.ascontiguousarray(field, np.float32)
+    rows, columns = samples.shape
+    first, second = (np.array(vector(edge, "edges"), np.float64) for edge in as_array(edges, "edges").reshape(2, 3))
+    start = np.array(vector(corner, "corner"))
+    each = colors
+    if isinstance(colors, np.ndarray) and colors.ndim == 3:
+        each = colors.reshape(-1, colors.shape[2])
+    elif cmap is not None and colors is not None:
+        each = np.asarray(colors).reshape(-1)
+    found = colors_.many(each, rows * columns, cmap)
+    uniform = found if isinstance(found, int) else None
+    rgb = None if found is None or isinstance(found, int) else np.ascontiguousarray(found[:, :3])
+    word = choice(RULES, rule, "rule")
+    most = max(2, PIECE_BYTES // (columns * (4 if rgb is None else 7)))
+    result = []
+    for begin in range(0, rows - 1, most - 1):  # a row in common
+        end = min(begin + most, rows)
+        piece = pb.HeightMap(
+            corner=vec(start + second * (begin / (rows - 1)), "corner"), edge_a=vec(first, "edges"),
+            edge_b=vec(second * ((end - 1 - begin) / (rows - 1)), "edges"), up=vec(up, "up"), columns=columns, rows=end - begin,
+            rule=word, heights=samples[begin:end].tobytes(),
+            colors=b"" if rgb is None else rgb[begin * columns:end * columns].tobytes())
+        color = None if uniform is None else pb.Color(rgb=uniform)
+        result.append(wire.message(pb.Primitive(color=color, height_map=piece)))
+    return result
 
 
 def implicit(surface: str, *, bound: Optional[str] = None,

@@ -14,9 +14,11 @@ fail() {
 (cd "$work/prefix" && find . -type f | LC_ALL=C sort | sed "s|-$(sed -n 's/^CMAKE_BUILD_TYPE:[^=]*=//p' "$build/CMakeCache.txt" | tr A-Z a-z)\.|-TYPE.|") >"$work/files"
 cat >"$work/expected" <<'EOT'
 ./include/voxeld/address.h
+./include/voxeld/basics.h
 ./include/voxeld/client.h
 ./include/voxeld/drawing.h
 ./include/voxeld/receipt.h
+./include/voxeld/shapes.h
 ./lib/cmake/voxeld_client/voxeld_client-config-version.cmake
 ./lib/cmake/voxeld_client/voxeld_client-config.cmake
 ./lib/cmake/voxeld_client/voxeld_client-targets-TYPE.cmake

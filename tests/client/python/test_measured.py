@@ -37,6 +37,29 @@ class Measured(unittest.TestCase):
         with self.assertRaisesRegex(InvalidArray, "a closed curve has 3 vertices at least, got 2"):
             measured.polygon(triangle[:2])
 
+    def test_height_maps_come_in_pieces_with_a_row_in_common(self) -> None:
+        heights = np.arange(12, dtype=np.float32).reshape(3, 4)
+        whole = parsed(measured.height_map(heights, colors="red")).height_map
+        self.assertEqual((whole.columns, whole.rows, whole.edge_b.y), (4, 3, 2))
+        self.assertEqual(np.frombuffer(whole.heights, np.float32).tolist(), list(range(12)))
+        colored = parsed(measured.height_map(heights, colors=heights, cmap="gray")).height_map
+        self.assertEqual((colored.colors[:3], colored.colors[-3:]), (bytes(3), b"\xff" * 3))
+        large = np.random.default_rng(2).random((700, 1000), np.float32)
+        rows, last = [], None
+        for piece in measured.height_map(large, corner=(0, 0, 5), edges=[(1, 0, 0), (0, 699, 0)]):
+            self.assertLess(len(piece), 1 << 20)
+            one = pb.Primitive.FromString(piece.to_bytes()).height_map
+            samples = np.frombuffer(one.heights, np.float32).reshape(one.rows, one.columns)
+            self.assertAlmostEqual(one.corner.y, len(rows) - 1 if rows else 0, places=9)
+            self.assertAlmostEqual(one.edge_b.y, one.rows - 1, places=9)
+            if last is not None:
+                self.assertEqual(samples[0].tolist(), last.tolist())
+            rows += list(samples[1:] if rows else samples)
+            last = samples[-1]
+        self.assertTrue(np.array_equal(np.array(rows), large))
+        with self.assertRaisesRegex(InvalidArray, r"heights must be of shape \(rows, columns\)"):
+            measured.height_map([1, 2, 3])
+
     def test_the_general_method(self) -> None:
         shape = parsed(measured.implicit("x^2+y^2 <= r", bound="z > 0", boundary=[(0, 0, 0), (1, 0, 0), (0, 1, 0)],
                                          boundary_axis="x", parameters={"r": 2, "s": 3}, fill="surface", shell=1.5,

@@ -45,7 +45,7 @@ TEST(EncodePrimitive, DecodesToTheSame) {
     Encode(Decoded1(encoded), &again);
     EXPECT_EQ(again.SerializeAsString(), encoded.SerializeAsString());
   }
-  EXPECT_EQ(kinds.size(), 15u);
+  EXPECT_EQ(kinds.size(), 16u);
 }
 
 TEST(EncodePrimitive, ArraysComeInTheirPlainestTypes) {

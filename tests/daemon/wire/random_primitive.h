@@ -108,7 +108,19 @@ class RandomPrimitives {
 
   // What is drawn by the general method.
   void SetMeasured(v1::Primitive* out) {
-    switch (random_() % 8) {
+    switch (random_() % 9) {
+      case 8: {
+        v1::HeightMap* const map = out->mutable_height_map();
+        SetVec3(map->mutable_edge_a(), 1, 0, 0.5);
+        SetVec3(map->mutable_edge_b(), 0, 1, 0);
+        map->set_columns(2 + random_() % 5);
+        map->set_rows(2 + random_() % 5);
+        const size_t samples = size_t{map->columns()} * map->rows();
+        map->set_heights(Values<float>(samples, [&] { return Coordinate(); }));
+        if (random_() % 2 == 0)
+          map->set_colors(Values<uint8_t>(3 * samples, [&] { return random_(); }));
+        return map->set_rule(Rule());
+      }
       case 0:
         SetPoint(out->mutable_ellipsoid()->mutable_center());
         SetVec3(out->mutable_ellipsoid()->mutable_radii(), Length(), Length(), Length());

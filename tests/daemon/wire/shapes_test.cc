@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "daemon/wire/primitive.h"
@@ -66,6 +67,16 @@ P Polygon() {
 P Ellipsoid() {
   P p;
   Set(p.mutable_ellipsoid()->mutable_radii(), 1, 2, 3);
+  return p;
+}
+P HeightMap() {
+  P p;
+  v1::HeightMap* const map = p.mutable_height_map();
+  Set(map->mutable_edge_a(), 2, 0, 0);
+  Set(map->mutable_edge_b(), 0, 4, 0);
+  map->set_columns(3);
+  map->set_rows(2);
+  map->set_heights(Packed<float>({0, 1, 2, 3, 4, -5}));
   return p;
 }
 P Implicit() {
@@ -137,6 +148,26 @@ const Case kCases[] = {
      "primitive.polygon.ends", Reason::kSizeMismatch, "ends with 3; there are 6 vertices"},
     {"polygon_infinite", Polygon, [](P& p) { p.mutable_polygon()->set_points(4, 1e300); },
      "primitive.polygon.points[4]", Reason::kInvalidValue, "1e+300"},
+    {"map_columns", HeightMap, [](P& p) { p.mutable_height_map()->set_columns(1); },
+     "primitive.height_map.columns", Reason::kInvalidValue, "is 1; give 2 or more"},
+    {"map_heights", HeightMap, [](P& p) { p.mutable_height_map()->mutable_heights()->pop_back(); },
+     "primitive.height_map.heights", Reason::kSizeMismatch, "has 23 bytes; 6 samples take 24"},
+    {"map_colors", HeightMap, [](P& p) { p.mutable_height_map()->set_colors("abc"); },
+     "primitive.height_map.colors", Reason::kSizeMismatch, "has 3 bytes; 6 samples take 18"},
+    {"map_type", HeightMap,
+     [](P& p) { p.mutable_height_map()->set_height_type(v1::ELEMENT_TYPE_RGB8); },
+     "primitive.height_map.height_type", Reason::kInvalidValue,
+     "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16"},
+    {"map_line", HeightMap, [](P& p) { Set(p.mutable_height_map()->mutable_edge_b(), 1, 0, 0); },
+     "primitive.height_map.edge_b", Reason::kInvalidValue, "lies along edge_a"},
+    {"map_huge", HeightMap, [](P& p) { p.mutable_height_map()->set_rows(0xFFFFFFFF); },
+     "primitive.height_map.rows", Reason::kQuotaExceeded, "max_vertices_per_entity is"},
+    {"map_infinite", HeightMap,
+     [](P& p) {
+       p.mutable_height_map()->set_heights(
+           Packed<float>({0, 1, 2, 3, std::numeric_limits<float>::infinity(), 5}));
+     },
+     "primitive.height_map.heights[4]", Reason::kInvalidValue, "is inf"},
     {"implicit_text", Implicit,
      [](P& p) { p.mutable_implicit()->mutable_surface()->set_text("x +"); },
      "primitive.implicit.surface.text", Reason::kInvalidValue, "at character 4: found the end"},
@@ -251,6 +282,29 @@ TEST(Shapes, BecomeProgramsWithinBounds) {
     EXPECT_TRUE(gpu::implicit::CheckProgram(data.arrays.indices(), data.record.vertex_count).ok());
     EXPECT_EQ(data.as_sent, primitive.SerializeAsString());
   }
+}
+
+TEST(Shapes, HeightMapsAreTrianglesBetweenTheirSamples) {
+  P primitive = HeightMap();
+  primitive.mutable_height_map()->set_colors(std::string("\1\2\3\4\5\6\7\10\11aaabbbccc", 18));
+  Content content;
+  ASSERT_FALSE(FaultOf(primitive, &content).has_value());
+  const GeometryData& data = *std::get<GeometryPtr>(content);
+  EXPECT_EQ(data.record.kind, gpu::PrimitiveKind::kTriangles);
+  EXPECT_STREQ(data.kind, "height_map");
+  EXPECT_THAT(data.arrays.positions(),
+              testing::ElementsAre(0, 0, 0, 1, 0, 1, 2, 0, 2, 0, 4, 3, 1, 4, 4, 2, 4, -5));
+  EXPECT_THAT(data.arrays.indices(), testing::ElementsAre(0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4));
+  EXPECT_THAT(data.arrays.colors(),
+              testing::ElementsAre(0x010203, 0x040506, 0x070809, 0x616161, 0x626262, 0x636363));
+  EXPECT_THAT(data.min, testing::ElementsAre(0, 0, -5));
+  EXPECT_THAT(data.max, testing::ElementsAre(2, 4, 4));
+  primitive.mutable_height_map()->clear_colors();
+  primitive.mutable_height_map()->set_height_type(v1::ELEMENT_TYPE_U16);
+  primitive.mutable_height_map()->set_heights(Packed<uint16_t>({0, 65535, 0, 0, 0, 0}));
+  Set(primitive.mutable_height_map()->mutable_up(), 0, 0, 7);
+  ASSERT_FALSE(FaultOf(primitive, &content).has_value());
+  EXPECT_EQ(std::get<GeometryPtr>(content)->max[2], 7);
 }
 
 TEST(Shapes, ATreeSaysWhatItsTextSays) {

@@ -96,7 +96,7 @@ TEST(FrameScenes, ShortLinesHaveTwentyVoxelsEach) {
 
 TEST(FrameScenes, OneSeedOneSceneAnotherAnother) {
   for (const std::string& name : SceneNames()) {
-    if (name == "mesh") continue;  // nothing at random
+    if (name == "mesh" || name == "gyroid" || name == "implicit") continue;  // nothing at random
     const auto first = ScenesOf(name, 5, 1e-4), again = ScenesOf(name, 5, 1e-4);
     const auto other = ScenesOf(name, 6, 1e-4);
     ASSERT_EQ(first.size(), again.size());
@@ -110,8 +110,9 @@ TEST(FrameScenes, OneSeedOneSceneAnotherAnother) {
         for (size_t i = 0; i < x.size(); ++i) {
           EXPECT_EQ(x[i].positions, y[i].positions) << a.name;
           EXPECT_EQ(x[i].colors, y[i].colors) << a.name;
-          differs |=
-              i >= z.size() || x[i].positions != z[i].positions || x[i].colors != z[i].colors;
+          EXPECT_EQ(x[i].transform, y[i].transform) << a.name;
+          differs |= i >= z.size() || x[i].positions != z[i].positions ||
+                     x[i].colors != z[i].colors || !(x[i].transform == z[i].transform);
         }
       };
       compare(a.contents, b.contents, c.contents);

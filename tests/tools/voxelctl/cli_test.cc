@@ -142,7 +142,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"snap o.png", {"did you mean snapshot?"}},
         Wrong{"--json stat", {"did you mean stats?"}},
         Wrong{"--server a:1 claer", {"did you mean clear?"}},
-        Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, snapshot"}},
+        Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, draw, snapshot"}},
         Wrong{"pl\x1b[31m", {"pl\\u{1b}[31m"}},
         Wrong{"play", {"at least one FILE", "voxelctl play --help"}},
         Wrong{"play a.obj --sipn", {"--sipn", "did you mean --spin?"}},

@@ -52,6 +52,12 @@ TEST(ShapeText, FieldsOfEveryTypeComeThrough) {
   EXPECT_THAT(positions, ElementsAre(0, 0, 0, 1, 2, 3));
   EXPECT_EQ(lines.primitive().segments().topology(), v1::Segments::STRIP);
   EXPECT_EQ(lines.primitive().segments().thickness().unit(), v1::Thickness::VOXELS);
+  const v1::HeightMap map =
+      Parsed("height_map columns=2 rows=2 heights=0,1,2,3 colors='red #102030 white black'")
+          .primitive()
+          .height_map();
+  EXPECT_EQ(map.heights().size(), 16u);
+  EXPECT_EQ(map.colors().substr(0, 6), std::string("\xFF\0\0\x10\x20\x30", 6));
   EXPECT_EQ(Parsed("box size=2").primitive().box().size().z(), 2);
   const v1::Entity shape = Parsed(
       "implicit surface=\"x <= r\" parameter_names=r parameter_values=3 domain=-1,-1,-1:1,2,3 "

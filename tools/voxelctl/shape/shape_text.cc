@@ -196,6 +196,28 @@ absl::Status SetMessage(const FieldDescriptor& field, absl::string_view text, Me
   return absl::InvalidArgumentError(absl::StrCat(name, " is nothing that can be typed here"));
 }
 
+// Packed arrays: colours, or numbers in single precision.
+absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Message* out) {
+  std::string bytes;
+  if (field.name() == "colors") {
+    for (const absl::string_view part : absl::StrSplit(text, ' ', absl::SkipEmpty())) {
+      v1::Color color;
+      if (absl::Status status = SetColor(field.name(), part, &color); !status.ok()) return status;
+      for (const uint32_t shift : {16u, 8u, 0u})
+        bytes += static_cast<char>(color.rgb() >> shift & 0xFF);
+    }
+  } else {
+    const absl::StatusOr<std::vector<double>> numbers = Numbers(field.name(), text);
+    if (!numbers.ok()) return numbers.status();
+    for (const double number : *numbers) {
+      const float value = static_cast<float>(number);
+      bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    }
+  }
+  out->GetReflection()->SetString(out, &field, std::move(bytes));
+  return absl::OkStatus();
+}
+
 absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Message* out) {
   const Reflection& reflection = *out->GetReflection();
   if (field.is_repeated()) {
@@ -215,6 +237,7 @@ absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Mess
     case FieldDescriptor::CPPTYPE_ENUM:
       return SetEnum(field, text, out);
     case FieldDescriptor::CPPTYPE_STRING:
+      if (field.type() == FieldDescriptor::TYPE_BYTES) return SetBytes(field, text, out);
       reflection.SetString(out, &field, std::string(text));
       return absl::OkStatus();
     case FieldDescriptor::CPPTYPE_BOOL:
