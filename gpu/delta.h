@@ -47,7 +47,7 @@ enum class PrimitiveKind : uint32_t {
   kBox = 4,        // centre params[0..2], full sizes params[3..5] along its own axes
   kSphere = 5,     // centre params[0..2], radius params[3] (an ellipsoid under a transform)
   kCylinder = 6,   // centre params[0..2], radius params[3], height params[4] along its own z
-  kImplicit = 7,   // its program (implicit/program.h) is the indices, the points of its rings the positions;
+  kImplicit = 7,   // its program (implicit/program.h) is the indices, its rings are positions;
                    // with params[6] = 1 only from params[0..2] to params[3..5]
 };
 

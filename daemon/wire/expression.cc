@@ -94,7 +94,10 @@ Node Make(Tree::Op op, std::span<const Node> a, Graph& g) {
 class TreeReader {
  public:
   TreeReader(const FieldPath& path, const Tree& tree, const ExpressionContext& context)
-      : path_(path), tree_(tree), context_(context), names_(SplitNames(tree.names())) {}
+      : path_(path),
+        tree_(tree),
+        context_(context),
+        names_(SplitNames(tree.names(), context.limits.nodes)) {}
 
   MaybeFault Read(Node* out) {
     std::vector<Node> left;
@@ -183,8 +186,13 @@ MaybeFault ToNode(const FieldPath& path, const Tree& in, const ExpressionContext
 
 }  // namespace
 
-std::vector<std::string> SplitNames(const std::string& names) {
-  return absl::StrSplit(names, ' ', absl::SkipEmpty());
+std::vector<std::string> SplitNames(const std::string& names, size_t most) {
+  std::vector<std::string> split;
+  for (const absl::string_view name : absl::StrSplit(names, ' ', absl::SkipEmpty())) {
+    split.emplace_back(name);
+    if (split.size() > most) break;
+  }
+  return split;
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Expression& in,

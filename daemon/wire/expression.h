@@ -13,8 +13,8 @@ class Expression;
 
 namespace voxeld::daemon::wire {
 
-// What stands between spaces.
-std::vector<std::string> SplitNames(const std::string& names);
+// What stands between spaces: the first `most` and one more, if there are more.
+std::vector<std::string> SplitNames(const std::string& names, size_t most);
 
 struct ExpressionContext {
   const gpu::implicit::Parameters& parameters;

@@ -31,16 +31,16 @@ bool IsName(std::string_view name) {
 
 MaybeFault ToParameters(const FieldPath& path, const v1::Implicit& in, const Limits& limits,
                         Parameters* out) {
-  const std::vector<std::string> names = SplitNames(in.parameter_names());
+  const std::vector<std::string> names =
+      SplitNames(in.parameter_names(), limits.max_expression_nodes);
   const size_t values = static_cast<size_t>(in.parameter_values_size());
-  if (names.size() != values) {
+  if (names.size() <= limits.max_expression_nodes && names.size() != values) {
     return Fault{FieldPath(path, "parameter_values").ToString(), Reason::kSizeMismatch,
                  absl::StrCat("has ", values, " numbers for ", names.size(), " names")};
   }
   if (names.size() > limits.max_expression_nodes) {
     return Fault{FieldPath(path, "parameter_names").ToString(), Reason::kQuotaExceeded,
-                 absl::StrCat("has ", names.size(), "; max_expression_nodes allows ",
-                              limits.max_expression_nodes)};
+                 absl::StrCat("has more than max_expression_nodes, ", limits.max_expression_nodes)};
   }
   for (size_t i = 0; i < names.size(); ++i) {
     if (!IsName(names[i])) {

@@ -59,15 +59,22 @@ MaybeFault Finish(const FieldPath& path, const Shape& shape, GeometryData* out) 
   gpu::implicit::ProgramSource source{.surface = made.surface, .bound = made.bound};
   source.ring_ends = made.ring_ends;
   source.ring_axis = made.ring_axis;
-  // A shell of the shape's units lies beyond its box; one of voxels is the engine's to allow for.
+  // The engine looks beyond the box by as much as a shell is thick; bounds are for what fits a display.
   const bool units = out->record.thickness_unit == gpu::ThicknessUnit::kUnits;
   const double shell = units ? static_cast<double>(out->record.thickness) / 2 : 0;
   out->record.params[6] = 1;
   for (int a = 0; a < 3; ++a) {
+    for (const double reach : {made.min[a] - shell, made.max[a] + shell}) {
+      if (CheckFloat(path, reach).has_value()) {
+        return Fault{path.ToString(), Reason::kOutOfRange,
+                     absl::StrCat("reaches to ", wire::Show(reach),
+                                  ", beyond what single precision holds; give it a transform")};
+      }
+    }
     out->min[a] = made.min[a] - shell;
     out->max[a] = made.max[a] + shell;
-    out->record.params[a] = static_cast<float>(out->min[a]);
-    out->record.params[3 + a] = static_cast<float>(out->max[a]);
+    out->record.params[a] = static_cast<float>(made.min[a]);
+    out->record.params[3 + a] = static_cast<float>(made.max[a]);
   }
   return ToProgram(path, graph, source, made.ring_points, out);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -34,6 +35,12 @@ Graph::Node Graph::Make(const Content& content) {
   return it->second;
 }
 
+Graph::Node Graph::Constant(double value) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  const double held = std::isfinite(value) ? std::clamp(value, -kMost, kMost) : value;
+  return Leaf(Op::kConstant, BitsOf(static_cast<float>(held)));
+}
+
 Graph::Node Graph::PowI(Node a, int32_t exponent) {
   if (exponent == 1) return a;
   if (exponent == 2) return Square(a);
@@ -63,7 +70,9 @@ Graph::Node Graph::Mod(Node a, Node b) { return Sub(a, Mul(b, Floor(Div(a, b))))
 
 Graph::Node Graph::SmoothMin(Node a, Node b, Node k) {
   const Node overlap = Max(Sub(k, Abs(Sub(a, b))), Constant(0));
-  return Sub(Min(a, b), Div(Square(overlap), Mul(Constant(4), k)));
+  // Where k is 0 nothing overlaps.
+  const Node share = Max(Mul(Constant(4), k), Constant(std::numeric_limits<float>::min()));
+  return Sub(Min(a, b), Div(Square(overlap), share));
 }
 Graph::Node Graph::SmoothMax(Node a, Node b, Node k) { return Neg(SmoothMin(Neg(a), Neg(b), k)); }
 
@@ -84,6 +93,7 @@ class Compiler {
     order_.clear();
     place_.assign(graph_.nodes_.size(), -1);
     weight_.assign(graph_.nodes_.size(), 0);
+    weighed_ = 0;
     for (const Graph::Node root : roots) Visit(root);
     std::vector<size_t> last(order_.size(), 0);
     for (size_t i = 0; i < order_.size(); ++i) {
@@ -133,9 +143,9 @@ class Compiler {
   }
   // How many slots a tree would take; children have smaller numbers than their parents.
   int Weight(Graph::Node root) {
-    for (Graph::Node n = 0; n <= root; ++n) {
+    for (; weighed_ <= root; ++weighed_) {
+      const Graph::Node n = weighed_;
       int& weight = weight_[static_cast<size_t>(n)];
-      if (weight != 0) continue;
       const Graph::Content& c = graph_.nodes_[static_cast<size_t>(n)];
       const int a = c.a < 0 ? 0 : weight_[static_cast<size_t>(c.a)];
       const int b = c.b < 0 ? 0 : weight_[static_cast<size_t>(c.b)];
@@ -169,6 +179,7 @@ class Compiler {
   std::vector<Graph::Node> order_;
   std::vector<int32_t> place_;
   std::vector<int> weight_;
+  Graph::Node weighed_ = 0;  // those before have their weights
 };
 
 absl::StatusOr<uint32_t> CompilePart(const Graph& graph, std::span<const Graph::Node> roots,

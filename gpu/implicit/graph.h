@@ -20,7 +20,8 @@ class Graph {
   // Any operation that a program may have; −1 for arguments that it has not.
   Node Operation(Op op, uint32_t immediate, Node a, Node b) { return Make({op, immediate, a, b}); }
 
-  Node Constant(double value) { return Leaf(Op::kConstant, BitsOf(static_cast<float>(value))); }
+  // The nearest that single precision has, finite for what is.
+  Node Constant(double value);
   Node Axis(int axis) { return Leaf(static_cast<Op>(static_cast<int>(Op::kX) + axis), 0); }
   Node Voxel() { return Leaf(Op::kVoxel, 0); }
 

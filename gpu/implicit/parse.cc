@@ -155,7 +155,12 @@ class Parser {
   std::string Found() const {
     return token_ == Token::kEnd
                ? "the end"
-               : absl::StrCat("'", text_.substr(token_begin_, at_ - token_begin_), "'");
+               : absl::StrCat("'", Shown(text_.substr(token_begin_, at_ - token_begin_)), "'");
+  }
+  // As it stands, if it is no longer than a word that somebody typed.
+  static std::string Shown(absl::string_view text) {
+    constexpr size_t kMost = 64;
+    return text.size() <= kMost ? std::string(text) : absl::StrCat(text.substr(0, kMost), "…");
   }
   absl::Status AtEnd() const {
     if (token_ == Token::kEnd) return absl::OkStatus();
@@ -390,7 +395,7 @@ class Parser {
       }
       token_begin_ = begin;
       return Wrong(
-          absl::StrCat("there is no function '", name, "'; there are ",
+          absl::StrCat("there is no function '", Shown(name), "'; there are ",
                        absl::StrJoin(kFunctions, ", ", [](std::string* out, const Function& f) {
                          absl::StrAppend(out, f.name);
                        })));
@@ -408,9 +413,14 @@ class Parser {
     if (name == "voxel") return number(graph_.Voxel());
     token_begin_ = begin;
     std::string known = "x, y, z, pi, tau, e, voxel";
-    for (const auto& [parameter, value] : parameters_) absl::StrAppend(&known, ", ", parameter);
-    return Wrong(
-        absl::StrCat("there is no '", name, "'; there are ", known, ", and functions with ("));
+    constexpr int kMostNamed = 16;
+    int named = 0;
+    for (const auto& [parameter, value] : parameters_) {
+      if (++named <= kMostNamed) absl::StrAppend(&known, ", ", Shown(parameter));
+    }
+    if (named > kMostNamed) absl::StrAppend(&known, " and ", named - kMostNamed, " more");
+    return Wrong(absl::StrCat("there is no '", Shown(name), "'; there are ", known,
+                              ", and functions with ("));
   }
 
   MaybeValue Call(const Function& function) {
@@ -433,7 +443,7 @@ class Parser {
     const int count = static_cast<int>(arguments.size());
     if (count < function.least || count > function.most) {
       return Wrong(absl::StrCat(function.name, " has ", count, " arguments; ",
-                                function.most == kAny ? absl::StrCat(function.least, " or more")
+                                function.most == kAny ? absl::StrCat(function.least, " to ", kAny)
                                                       : absl::StrCat(function.least),
                                 " would be right"));
     }

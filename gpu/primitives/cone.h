@@ -47,7 +47,9 @@ struct Cone {
       // A thin disc is a voxel thick.
       const Node half = implicit::AtLeastAVoxel(g, length / 2);
       const Node ends = g.Sub(g.Abs(g.Sub(along, g.Constant(length / 2))), half);
-      shape.surface = g.Max(mantle, ends);
+      // Of one that is shorter than a voxel the mantle, so far, goes on beyond its ends.
+      const Node within = g.Sub(across, g.Max(r0, r1));
+      shape.surface = g.Max(g.Max(mantle, within), ends);
     }
     const double most = std::max(start_radius, end_radius);
     const Vector reach = {most, most, most};

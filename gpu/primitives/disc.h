@@ -1,4 +1,4 @@
-// A disc across its normal, or a ring: its plane, bounded by the circles' distance from the centre.
+// A disc across its normal, or a ring: its plane, bounded by the distance from its axis.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"
@@ -11,7 +11,7 @@ struct Disc {
 
   implicit::FieldShape Make(implicit::Graph& g) const {
     const implicit::Vector unit = 1 / implicit::Length(normal) * normal;
-    const implicit::Node distance = implicit::DistanceFrom(g, center);
+    const implicit::Node distance = implicit::DistanceFromAxis(g, center, unit);
     implicit::Node bound = g.Sub(distance, implicit::AtLeastAVoxel(g, radius));
     if (inner_radius > 0) bound = g.Max(bound, g.Sub(g.Constant(inner_radius), distance));
     implicit::Vector reach = {radius * std::sqrt(1 - std::min(1.0, unit.x * unit.x)),

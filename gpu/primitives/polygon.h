@@ -13,8 +13,9 @@ struct Polygon {
   std::span<const implicit::Vector> points;
   std::span<const uint32_t> ends;  // of each curve among the points
 
-  // Twice the area, along the normal, of all curves together by Newell's sums; zero if there is none. Of
-  // the greatest curve, so that holes do not take from it.
+  // Of any length; zero if all points lie along one line. Twice the area along the normal of the greatest
+  // curve by Newell's sums, so that holes do not take from it; of curves that cross themselves so that
+  // nothing is left, across the farthest point and the one that is farthest from the line to it.
   implicit::Vector Normal() const {
     implicit::Vector normal;
     uint32_t begin = 0;
@@ -27,7 +28,15 @@ struct Polygon {
       if (implicit::Length(sum) > implicit::Length(normal)) normal = sum;
       begin = end;
     }
-    return normal;
+    implicit::Vector far, across;
+    for (const implicit::Vector& p : points) {
+      if (implicit::Length(p - points[0]) > implicit::Length(far)) far = p - points[0];
+    }
+    for (const implicit::Vector& p : points) {
+      const implicit::Vector c = implicit::Cross(far, p - points[0]);
+      if (implicit::Length(c) > implicit::Length(across)) across = c;
+    }
+    return implicit::Length(normal) > 1e-3 * implicit::Length(across) ? normal : across;
   }
   // How far the points are from the plane of `normal`, of any length, through their middle.
   double Unevenness(const implicit::Vector& normal) const {

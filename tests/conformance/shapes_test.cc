@@ -146,10 +146,11 @@ std::vector<Case> Cases() {
   };
   cases.push_back({"disc", [=](Graph& g) { return disc.Make(g); },
                    [=](const Vector& p, bool& edge) {
-                     const double radial = Norm(p - disc.center);
+                     const double height = Along(p, disc.center, up);
+                     const double radial = Norm(p - disc.center - height * up);
                      const double outside = std::max(radial - 15, 6 - radial);
                      edge = outside > -2.5;
-                     return flat(Along(p, disc.center, up), outside);
+                     return flat(height, outside);
                    }});
   const Patch patch{{-10, -9, 3}, {20, 4, -6}, {-2, 18, 5}};
   cases.push_back({"patch", [=](Graph& g) { return patch.Make(g); },
@@ -398,6 +399,41 @@ TEST_P(MeasuredShapes, TinyOnesAreNotLost) {
       const uint64_t lit = CountLit(Draw(shape, graph, record, Placed(random, 1)));
       EXPECT_GE(lit, least);
       EXPECT_LE(lit, least * 5);
+    }
+  }
+}
+
+// Whatever is past the edge of a flat cone or of a disc is dark, at every height.
+TEST_P(MeasuredShapes, FlatOnesEndAtTheirRadii) {
+  struct Flat {
+    std::function<FieldShape(Graph&)> make;
+    double least, most;  // from the axis
+    float thickness;
+    Fill fill;
+  };
+  const Cone plate{{0, 0, 0}, {0, 0, 0.2}, 10, 0, false};
+  const Disc ring{{0, 0, 0}, {0, 0, 1}, 12, 4};
+  const Flat cases[] = {{[&](Graph& g) { return plate.Make(g); }, 0, 10, 0, Fill::kSolid},
+                        {[&](Graph& g) { return ring.Make(g); }, 4, 12, 6, Fill::kSurface}};
+  for (const Flat& flat : cases) {
+    Graph graph;
+    const FieldShape shape = flat.make(graph);
+    GeometryRecord record;
+    record.fill = flat.fill;
+    record.thickness = flat.thickness;
+    Affine map;
+    for (int a = 0; a < 3; ++a) map.m[a * 4 + 3] = kSize / 2 + 0.5;
+    const std::vector<uint32_t> voxels = Draw(shape, graph, record, map);
+    EXPECT_GT(CountLit(voxels), 200u);
+    for (int32_t z = 0; z < kSize; ++z) {
+      for (int32_t y = 0; y < kSize; ++y) {
+        for (int32_t x = 0; x < kSize; ++x) {
+          const double across = std::hypot(x - kSize / 2, y - kSize / 2);
+          if (voxels[At(x, y, z)] == 0) continue;
+          EXPECT_LE(across, flat.most + 1e-3) << x << ", " << y << ", " << z;
+          EXPECT_GE(across, flat.least - 1e-3) << x << ", " << y << ", " << z;
+        }
+      }
     }
   }
 }

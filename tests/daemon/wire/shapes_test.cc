@@ -130,6 +130,26 @@ const Case kCases[] = {
      "primitive.parallelepiped.edge_c", Reason::kInvalidValue, "must span a volume"},
     {"polygon_line", Polygon, [](P& p) { p.mutable_polygon()->set_points(7, 0); },
      "primitive.polygon.points", Reason::kInvalidValue, "lie along one line"},
+    {"ellipsoid_far", Ellipsoid,
+     [](P& p) {
+       p.mutable_ellipsoid()->mutable_center()->set_x(3e38);
+       p.mutable_ellipsoid()->mutable_radii()->set_x(3e38);
+     },
+     "primitive.ellipsoid", Reason::kOutOfRange, "beyond what single precision holds"},
+    {"torus_far", Torus,
+     [](P& p) {
+       p.mutable_torus()->set_radius(3e38);
+       p.mutable_torus()->set_tube_radius(3e38);
+     },
+     "primitive.torus", Reason::kOutOfRange, "beyond what single precision holds"},
+    {"implicit_many_names", Implicit,
+     [](P& p) {
+       std::string names;
+       for (int i = 0; i < 5000; ++i) names += "a ";
+       p.mutable_implicit()->set_parameter_names(names);
+     },
+     "primitive.implicit.parameter_names", Reason::kQuotaExceeded,
+     "has more than max_expression_nodes"},
     {"polygon_uneven", Polygon,
      [](P& p) {
        for (const double number : {1, 1, 1}) p.mutable_polygon()->add_points(number);
@@ -328,6 +348,15 @@ TEST(Shapes, ATreeSaysWhatItsTextSays) {
     return std::vector<uint32_t>(span.begin(), span.end());
   };
   EXPECT_EQ(words(of_text), words(of_tree));
+}
+
+TEST(Shapes, APolygonMayCrossItself) {
+  P bow;
+  for (const double number : {0, 0, 0, 1, 1, 0, 1, 0, 0, 0, 1, 0})
+    bow.mutable_polygon()->add_points(number);
+  Content content;
+  const MaybeFault fault = FaultOf(bow, &content);
+  EXPECT_FALSE(fault.has_value()) << fault->message;
 }
 
 TEST(Shapes, FillIsWhatTheRelationSays) {

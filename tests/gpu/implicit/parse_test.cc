@@ -92,6 +92,7 @@ TEST(Parse, FunctionsAreWhatTheyAreCalled) {
       {"tan(x)", std::tan(x)},
       {"tanh(y)", std::tanh(y)},
       {"union(x, y)", y},
+      {"smin(x, y, 0)", y},
       {"smin(x, y, 2)", y - (2 - 1.0) * (2 - 1.0) / 8},
       {"smax(x, y, 2)", x + (2 - 1.0) * (2 - 1.0) / 8}};
   for (const auto& [text, want] : cases) {
@@ -149,7 +150,7 @@ TEST(Parse, ErrorsSayWhereWhatAndWhatWouldBeRight) {
       ErrorOf("sine(x)").find("at character 1: there is no function 'sine'; there are abs, acos"),
       std::string::npos);
   EXPECT_EQ(ErrorOf("atan2(x)"), "at character 8: atan2 has 1 arguments; 2 would be right");
-  EXPECT_EQ(ErrorOf("max(x)"), "at character 6: max has 1 arguments; 2 or more would be right");
+  EXPECT_EQ(ErrorOf("max(x)"), "at character 6: max has 1 arguments; 2 to 64 would be right");
   EXPECT_EQ(ErrorOf("x = 1 where y"),
             "at character 14: what stands before is a number after where; a condition, as x <= 1 "
             "would be right");

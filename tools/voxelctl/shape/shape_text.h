@@ -1,6 +1,6 @@
 // Shapes as people type them.
 //
-//   SHAPE NAME=VALUE …      a primitive of the wire by its fields, as "torus radius=0.6 tube=0.2 color=orange"
+//   SHAPE NAME=VALUE …      a primitive of the wire by its fields, as "torus radius=0.6 tube_radius=0.2 color=orange"
 //   EXPRESSION              anything else: the surface of an implicit shape, as "x^2+y^2-z = 0 where x^2+y^2 <= 1"
 //
 // NAME is a field of the primitive; or color, priority, erase, label, lifetime (s); or at, scale and turn
