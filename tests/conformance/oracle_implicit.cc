@@ -20,22 +20,22 @@ struct Jet {
   float v = 0, d[3] = {};
 };
 
-template <typename F>
-Jet JetOf(float v, F&& f) {
-  return {v, {f(0), f(1), f(2)}};
-}
-
-// One operation; `n` is its immediate.
-Jet Apply(Op op, const Jet& a, const Jet& b, int32_t n) {
+// One operation; `n` is its immediate. Without `gradients` they are left at 0.
+Jet Apply(Op op, const Jet& a, const Jet& b, int32_t n, bool gradients) {
+  const auto jet_of = [gradients](float v, auto f) {
+    Jet jet{v};
+    for (int i = 0; gradients && i < 3; ++i) jet.d[i] = f(i);
+    return jet;
+  };
   const auto chain = [&](float v, float slope) {
-    return JetOf(v, [&](int i) { return slope * a.d[i]; });
+    return jet_of(v, [&](int i) { return slope * a.d[i]; });
   };
   const bool a_first = std::isnan(a.v) ? false : (std::isnan(b.v) || a.v <= b.v);
   switch (op) {
     case Op::kNeg:
-      return JetOf(-a.v, [&](int i) { return -a.d[i]; });
+      return jet_of(-a.v, [&](int i) { return -a.d[i]; });
     case Op::kAbs:
-      return a.v < 0 ? JetOf(-a.v, [&](int i) { return -a.d[i]; }) : a;
+      return a.v < 0 ? jet_of(-a.v, [&](int i) { return -a.d[i]; }) : a;
     case Op::kSquare:
       return chain(a.v * a.v, a.v + a.v);
     case Op::kSqrt: {
@@ -60,14 +60,14 @@ Jet Apply(Op op, const Jet& a, const Jet& b, int32_t n) {
       return chain(implicit::PowI(a.v, n),
                    static_cast<float>(n) * implicit::PowI(a.v, n == 0 ? 0 : n - 1));
     case Op::kAdd:
-      return JetOf(a.v + b.v, [&](int i) { return a.d[i] + b.d[i]; });
+      return jet_of(a.v + b.v, [&](int i) { return a.d[i] + b.d[i]; });
     case Op::kSub:
-      return JetOf(a.v - b.v, [&](int i) { return a.d[i] - b.d[i]; });
+      return jet_of(a.v - b.v, [&](int i) { return a.d[i] - b.d[i]; });
     case Op::kMul:
-      return JetOf(a.v * b.v, [&](int i) { return a.d[i] * b.v + a.v * b.d[i]; });
+      return jet_of(a.v * b.v, [&](int i) { return a.d[i] * b.v + a.v * b.d[i]; });
     case Op::kDiv: {
       const float q = a.v / b.v;
-      return JetOf(q, [&](int i) { return (a.d[i] - q * b.d[i]) / b.v; });
+      return jet_of(q, [&](int i) { return (a.d[i] - q * b.d[i]) / b.v; });
     }
     case Op::kMin:
       return a_first ? a : b;
@@ -75,8 +75,8 @@ Jet Apply(Op op, const Jet& a, const Jet& b, int32_t n) {
       return std::isnan(a.v) || (!std::isnan(b.v) && a.v >= b.v) ? a : b;
     case Op::kAtan2: {
       const float length2 = b.v * b.v + a.v * a.v;
-      return JetOf(implicit::Atan2(a.v, b.v),
-                   [&](int i) { return (b.v * a.d[i] - a.v * b.d[i]) / length2; });
+      return jet_of(implicit::Atan2(a.v, b.v),
+                    [&](int i) { return (b.v * a.d[i] - a.v * b.d[i]) / length2; });
     }
     default:
       return {};
@@ -107,24 +107,23 @@ class OracleField {
         for (int64_t x = -1; x < nx_ - 1; ++x) {
           float q[3];
           frame_.Coordinates(x, y, z, q);
-          surface_.push_back(Run(0, header_.surface, q)[header_.surface_slot]);
+          surface_.push_back(Run(0, header_.surface, q)[header_.surface_slot].v);
         }
       }
     }
   }
 
   bool Covers(int64_t x, int64_t y, int64_t z) const {
-    const Jet& p = Surface(x, y, z);
-    bool covered = p.v <= 0;
+    const float p = Surface(x, y, z);
+    bool covered = p <= 0;
     if (g_.record.fill != Fill::kSolid) {
-      const float slope = std::sqrt((p.d[0] * p.d[0] + p.d[1] * p.d[1]) + p.d[2] * p.d[2]);
-      covered = half_ == 0 ? p.v == 0 : std::fabs(p.v) <= half_ * slope;
+      covered = half_ == 0 ? p == 0 : IsWithin(x, y, z);
       for (int n = 0; n < 27 && !covered; ++n) {
         const int dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
         const int steps = std::abs(dx) + std::abs(dy) + std::abs(dz);
         if (steps == 0 || (steps > 1 && g_.record.rule == SurfaceRule::kThin)) continue;
-        const float other = Surface(x + dx, y + dy, z + dz).v;
-        covered = (p.v <= 0) != (other <= 0) && Size(p.v) <= Size(other);
+        const float other = Surface(x + dx, y + dy, z + dz);
+        covered = (p <= 0) != (other <= 0) && Size(p) <= Size(other);
       }
     }
     if (!covered) return false;
@@ -160,7 +159,7 @@ class OracleField {
   }
 
   using Slots = std::array<Jet, implicit::kMostSlots>;
-  Slots Run(int section, uint32_t count, const float q[3]) const {
+  Slots Run(int section, uint32_t count, const float q[3], bool gradients = false) const {
     Slots slots;
     for (uint32_t i = 0; i < count; ++i) {
       const uint32_t word = g_.indices[code_[section] + 2 * i];
@@ -173,17 +172,25 @@ class OracleField {
         value.v = voxel_;
       } else if (op == Op::kX || op == Op::kY || op == Op::kZ) {
         const int axis = static_cast<int>(op) - static_cast<int>(Op::kX);
-        value = JetOf(q[axis], [&](int a) { return frame_.inverse[axis][a]; });
+        value.v = q[axis];
+        for (int a = 0; a < 3; ++a) value.d[a] = frame_.inverse[axis][a];
       } else {
-        value =
-            Apply(op, slots[word >> 16 & 255], slots[word >> 24], static_cast<int32_t>(immediate));
+        value = Apply(op, slots[word >> 16 & 255], slots[word >> 24],
+                      static_cast<int32_t>(immediate), gradients);
       }
       slots[word >> 8 & 255] = value;
     }
     return slots;
   }
 
-  const Jet& Surface(int64_t x, int64_t y, int64_t z) const {
+  bool IsWithin(int64_t x, int64_t y, int64_t z) const {
+    float q[3];
+    frame_.Coordinates(x, y, z, q);
+    const Jet p = Run(0, header_.surface, q, /*gradients=*/true)[header_.surface_slot];
+    return std::fabs(p.v) <=
+           half_ * std::sqrt((p.d[0] * p.d[0] + p.d[1] * p.d[1]) + p.d[2] * p.d[2]);
+  }
+  float Surface(int64_t x, int64_t y, int64_t z) const {
     return surface_[static_cast<size_t>(((z + 1) * ny_ + y + 1) * nx_ + x + 1)];
   }
 
@@ -207,7 +214,7 @@ class OracleField {
 
   const ModelGeometry& g_;
   int64_t nx_, ny_, nz_;
-  std::vector<Jet> surface_;
+  std::vector<float> surface_;
   OracleFrame frame_;
   bool drawable_ = false;
   float voxel_ = 0, half_ = 0;

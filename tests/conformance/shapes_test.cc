@@ -271,7 +271,7 @@ std::vector<uint8_t> Flood(const std::vector<uint32_t>& voxels, bool any) {
 TEST_P(MeasuredShapes, AreAsFarAsTheyAreSaidToBe) {
   const uint64_t seed = SeedOr(9000);
   uint64_t judged = 0, lit = 0;
-  for (uint64_t i = 0; i < 4; ++i) {
+  for (uint64_t i = 0; i < 2; ++i) {
     for (const Case& c : Cases()) {
       SceneGenerator random(seed + i);
       SCOPED_TRACE(c.name + ", VOXELD_SEED=" + std::to_string(seed + i));
@@ -314,7 +314,7 @@ TEST_P(MeasuredShapes, AreAsFarAsTheyAreSaidToBe) {
       }
     }
   }
-  EXPECT_GT(judged, 1'000'000u);
+  EXPECT_GT(judged, 500'000u);
   EXPECT_GT(lit, 50'000u);
 }
 
