@@ -16,7 +16,7 @@ struct DecodeContext {
   LocalRanges* ranges = nullptr;  // in place of payloads; null: they are refused
 
   // Most parts ask for no more.
-  operator const Limits&() const { return limits; }
+  operator const Limits&() const { return limits; }  // NOLINT(google-explicit-constructor)
 };
 
 }  // namespace voxeld::daemon::wire

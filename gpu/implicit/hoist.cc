@@ -86,30 +86,21 @@ void ChooseHoisted(std::vector<Operation>& operations, int root) {
   }
 }
 
-// The node of an operation; hoisted values as `hoisted` numbers them, where there are any.
-class Builder {
- public:
-  Builder(const std::vector<Operation>& operations, Graph& graph, const std::vector<int>* hoisted)
-      : operations_(operations), graph_(graph), hoisted_(hoisted), made_(operations.size(), -1) {
-    for (size_t i = 0; i < operations.size(); ++i) {
-      const Operation& o = operations[i];
-      if (hoisted_ != nullptr && o.hoisted) {
-        made_[i] = graph_.Operation(Op::kHoisted, static_cast<uint32_t>((*hoisted_)[i]), -1, -1);
-      } else {
-        made_[i] =
-            graph_.Operation(o.op, o.immediate, o.a < 0 ? -1 : made_[static_cast<size_t>(o.a)],
-                             o.b < 0 ? -1 : made_[static_cast<size_t>(o.b)]);
-      }
-    }
+// The nodes of all operations; where there are numbers, hoisted values stand for theirs.
+std::vector<Node> NodesOf(const std::vector<Operation>& operations, Graph& graph,
+                          const std::vector<int>* numbers) {
+  std::vector<Node> made(operations.size(), -1);
+  const auto at = [&](int argument) {
+    return argument < 0 ? -1 : made[static_cast<size_t>(argument)];
+  };
+  for (size_t i = 0; i < operations.size(); ++i) {
+    const Operation& o = operations[i];
+    made[i] = numbers != nullptr && o.hoisted
+                  ? graph.Operation(Op::kHoisted, static_cast<uint32_t>((*numbers)[i]), -1, -1)
+                  : graph.Operation(o.op, o.immediate, at(o.a), at(o.b));
   }
-  Node at(size_t i) const { return made_[i]; }
-
- private:
-  const std::vector<Operation>& operations_;
-  Graph& graph_;
-  const std::vector<int>* hoisted_;
-  std::vector<Node> made_;
-};
+  return made;
+}
 
 struct Parts {
   HoistedHeader header;
@@ -129,14 +120,14 @@ std::optional<Parts> Part(const std::vector<Operation>& operations, int root) {
   Parts parts;
   std::vector<int> numbers(operations.size(), -1);
   Graph graph;
-  const Builder whole(operations, graph, nullptr);
+  const std::vector<Node> whole = NodesOf(operations, graph, nullptr);
   uint32_t next = 0;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<Node> roots;
     for (size_t i = 0; i < operations.size(); ++i) {
       if (!operations[i].hoisted || operations[i].axes != 1u << axis) continue;
       numbers[i] = static_cast<int>(next++);
-      roots.push_back(whole.at(i));
+      roots.push_back(whole[i]);
     }
     parts.header.end[axis] = next;
     if (roots.empty()) continue;
@@ -147,8 +138,8 @@ std::optional<Parts> Part(const std::vector<Operation>& operations, int root) {
     parts.slots.insert(parts.slots.end(), slots.begin(), slots.end());
   }
   Graph rest_graph;
-  const Builder rest(operations, rest_graph, &numbers);
-  const Node roots[1] = {rest.at(static_cast<size_t>(root))};
+  const std::vector<Node> rest = NodesOf(operations, rest_graph, &numbers);
+  const Node roots[1] = {rest[static_cast<size_t>(root)]};
   const size_t begin = parts.code.size();
   const absl::StatusOr<uint32_t> count =
       CompilePart(rest_graph, roots, {&parts.header.rest_slot, 1}, parts.code);

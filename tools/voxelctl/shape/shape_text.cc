@@ -20,7 +20,6 @@
 namespace voxeld::voxelctl {
 namespace {
 
-using google::protobuf::Descriptor;
 using google::protobuf::EnumValueDescriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
@@ -348,10 +347,10 @@ absl::Status SetShape(const FieldDescriptor& kind, const std::vector<Setting>& s
     const absl::StatusOr<bool> common = SetCommon(setting, placement, out);
     if (!common.ok()) return common.status();
     if (*common) continue;
-    std::vector<std::string> known;
-    for (int i = 0; i < shape->GetDescriptor()->field_count(); ++i) {
-      known.push_back(shape->GetDescriptor()->field(i)->name());
-    }
+    const int fields = shape->GetDescriptor()->field_count();
+    std::vector<std::string> known(static_cast<size_t>(fields));
+    for (int i = 0; i < fields; ++i)
+      known[static_cast<size_t>(i)] = shape->GetDescriptor()->field(i)->name();
     for (const char* name :
          {"color", "at", "scale", "turn", "priority", "erase", "label", "lifetime"}) {
       known.emplace_back(name);
@@ -391,8 +390,9 @@ absl::StatusOr<v1::Entity> ParseShapeText(absl::string_view text) {
   // A misspelt shape is none of an expression's beginnings.
   const std::string& first = words->front();
   if (words->size() == 1 || absl::StrContains((*words)[1], '=')) {
-    std::vector<std::string> names;
-    for (int i = 0; i < kinds.field_count(); ++i) names.push_back(kinds.field(i)->name());
+    std::vector<std::string> names(static_cast<size_t>(kinds.field_count()));
+    for (int i = 0; i < kinds.field_count(); ++i)
+      names[static_cast<size_t>(i)] = kinds.field(i)->name();
     const bool name = absl::c_all_of(first, [](char c) {
       return absl::ascii_isalpha(static_cast<unsigned char>(c)) || c == '_';
     });
