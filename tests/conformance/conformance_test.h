@@ -32,6 +32,19 @@ inline std::string FirstDifference(const std::vector<uint32_t>& got, const Dense
   return "";
 }
 
+// `size` voxels a side, each a pixel of a stack of slices.
+inline Target CubeTarget(int32_t size) {
+  Target target;
+  display::PlanarStack stack;
+  stack.width_px = stack.height_px = size;
+  for (int32_t i = 0; i < size; ++i) stack.positions_mm.push_back(i);
+  target.geometry.shape = stack;
+  target.geometry.grid = {size, size, size, {1, 1, 1}, {-size / 2.0, -size / 2.0, -0.5}};
+  target.layout = {.slices = size, .width = size, .height = size};
+  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
+  return target;
+}
+
 inline uint64_t CountLit(const std::vector<uint32_t>& voxels) {
   uint64_t lit = 0;
   for (uint32_t rgb : voxels) lit += rgb != 0;

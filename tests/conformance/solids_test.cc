@@ -127,22 +127,10 @@ std::optional<bool> Drawn(const ClosedForm& shape, const GeometryRecord& g, int3
   return near ? std::nullopt : std::optional(false);
 }
 
-Target CubeTarget() {
-  Target target;
-  display::PlanarStack stack;
-  stack.width_px = stack.height_px = kSize;
-  for (int i = 0; i < kSize; ++i) stack.positions_mm.push_back(i);
-  target.geometry.shape = stack;
-  target.geometry.grid = {kSize, kSize, kSize, {1, 1, 1}, {-kSize / 2, -kSize / 2, -0.5}};
-  target.layout = {.slices = kSize, .width = kSize, .height = kSize};
-  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
-  return target;
-}
-
 class Solids : public EngineConformance {
  protected:
   Solids() : engine_(Make({.threads = 1, .inline_execution = true})) {
-    EXPECT_TRUE(engine_.SetTarget(CubeTarget()).ok());
+    EXPECT_TRUE(engine_.SetTarget(CubeTarget(kSize)).ok());
   }
   std::vector<uint32_t> Draw(const GeometryRecord& g, const Affine& map) {
     SceneModel scene;
