@@ -4,11 +4,13 @@
 #include <utility>
 #include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "daemon/text/stroke_font.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/captured_volume.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/commands/put_shapes.h"
 #include "tools/voxelctl/render/label.h"
 #include "tools/voxelctl/render/png_file.h"
@@ -35,7 +37,7 @@ absl::StatusOr<Volume> Capture(const GalleryOptions& options, Connection& connec
   return std::move(captured).Finish();
 }
 
-// One after volume `last`: what was put up since is in it.
+// The first after volume `last`: of one change, which is then all that it shows beside what was there.
 absl::StatusOr<Volume> CaptureNext(const GalleryOptions& options, uint64_t last,
                                    Connection& connection, Interrupt& interrupt) {
   constexpr sync::TimeNs kLongest = 10 * sync::kSecond, kStep = 10 * sync::kMillisecond;
@@ -51,6 +53,20 @@ absl::StatusOr<Volume> CaptureNext(const GalleryOptions& options, uint64_t last,
     }
     interrupt.WaitUntil(clock, clock.Now() + kStep);
   }
+}
+
+// Empties the layer; `last` is then the volume that shows it so.
+absl::Status Empty(const GalleryOptions& options, Connection& connection, Interrupt& interrupt,
+                   uint64_t* last) {
+  v1::ClearLayerRequest request;
+  request.set_layer(kLayer);
+  const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
+  if (absl::IsNotFound(cleared.status())) return absl::OkStatus();
+  if (!cleared.ok()) return cleared.status();
+  if (cleared->entities() == 0) return absl::OkStatus();
+  const absl::StatusOr<Volume> volume = CaptureNext(options, *last, connection, interrupt);
+  if (volume.ok()) *last = volume->number;
+  return volume.status();
 }
 
 // With the tile's ground.
@@ -81,9 +97,16 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
   const int rows = (static_cast<int>(examples.size()) + columns - 1) / columns;
   Image sheet{columns * kTile, rows * kTile, {}};
   sheet.rgb.resize(static_cast<size_t>(sheet.width) * static_cast<size_t>(sheet.height) * 3);
-  const absl::StatusOr<Volume> first = Capture(options, connection);
-  if (!first.ok()) return first.status();
-  uint64_t last = first->number;
+  absl::StatusOr<Volume> volume = Capture(options, connection);
+  if (!volume.ok()) return volume.status();
+  const absl::StatusOr<std::vector<std::string>> patterns = EndPatterns(connection);
+  if (!patterns.ok()) return patterns.status();
+  if (absl::c_linear_search(*patterns, volume->display))
+    volume = CaptureNext(options, volume->number, connection, interrupt);
+  if (!volume.ok()) return volume.status();
+  uint64_t last = volume->number;
+  if (absl::Status status = Empty(options, connection, interrupt, &last); !status.ok())
+    return status;
   for (size_t i = 0; i < examples.size(); ++i) {
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     console.ProgressBar("drawing", static_cast<double>(i) / static_cast<double>(examples.size()),
@@ -91,9 +114,9 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     const std::vector<std::string> shapes = {examples[i].text};
     const absl::StatusOr<v1::ApplyUpdateRequest> request = ShapesRequest(shapes);
     if (!request.ok()) return request.status();
-    const absl::StatusOr<uint64_t> put = PutShapes(*request, /*add=*/false, connection);
+    const absl::StatusOr<uint64_t> put = PutShapes(*request, /*add=*/true, connection);
     if (!put.ok()) return put.status();
-    const absl::StatusOr<Volume> volume = CaptureNext(options, last, connection, interrupt);
+    volume = CaptureNext(options, last, connection, interrupt);
     if (!volume.ok()) return volume.status();
     last = volume->number;
     Image tile = RenderVolume(*volume, {.width = kTile, .height = kTile, .angles = {24, 20}});
@@ -101,11 +124,9 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     if (i == 0) Cover(tile, sheet);
     Paste(tile, static_cast<int>(i) % columns * kTile, static_cast<int>(i) / columns * kTile,
           sheet);
+    if (absl::Status status = Empty(options, connection, interrupt, &last); !status.ok())
+      return status;
   }
-  v1::ClearLayerRequest clear;
-  clear.set_layer(kLayer);
-  const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(clear);
-  if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
   if (absl::Status status = WritePng(options.file, sheet); !status.ok()) return status;
   if (console.json()) {
     console.Data(JsonText({{"file", options.file},

@@ -11,6 +11,7 @@
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/commands/own_layer.h"
 #include "tools/voxelctl/commands/play_summary.h"
 #include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/import/importer.h"
@@ -117,11 +118,13 @@ class Player {
     PlaceModels(models, space_, {.up = options_.up, .spin = options_.spin, .each = options_.each});
     ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
 
-    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore();
+    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore(connection_);
     if (!before.ok()) return before.status();
     absl::Status status = Open();
     if (status.ok()) status = PutUp(std::move(models));
-    if (status.ok()) status = TakeDown(*before);
+    // After the new scene is in: for a moment both may be up, but never neither.
+    std::erase(*before, session_ == nullptr ? 0 : session_->server().owner);
+    if (status.ok()) status = TakeDown(*before, connection_);
     if (!status.ok()) return status;
     status = Stay();
     if (status.ok() && options_.clear) status = ClearMine();
@@ -138,17 +141,6 @@ class Player {
   }
 
  private:
-  // Owners that have something in our layer: what an earlier play left.
-  absl::StatusOr<std::vector<uint64_t>> OwnersBefore() {
-    v1::ListEntitiesRequest request;
-    request.set_layer(kLayer);
-    const absl::StatusOr<v1::ListEntitiesResponse> response = connection_.ListEntities(request);
-    if (!response.ok()) return response.status();
-    std::vector<uint64_t> owners;
-    for (const v1::LayerInfo& layer : response->layers()) owners.push_back(layer.owner());
-    return owners;
-  }
-
   absl::Status Open() {
     client::Options open;
     open.client_name = "voxelctl play";
@@ -245,19 +237,6 @@ class Player {
     client::Affine out;
     std::copy(std::begin(transform.m), std::end(transform.m), out.m.begin());
     return out;
-  }
-
-  // After the new scene is in: for a moment both may be up, but never neither.
-  absl::Status TakeDown(const std::vector<uint64_t>& owners) {
-    for (const uint64_t owner : owners) {
-      if (owner == session_->server().owner || owner == 0) continue;
-      v1::ClearLayerRequest request;
-      request.set_owner(owner);
-      request.set_layer(kLayer);
-      const absl::StatusOr<v1::ClearLayerResponse> cleared = connection_.ClearLayer(request);
-      if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
-    }
-    return absl::OkStatus();
   }
 
   sync::TimeNs End() const {

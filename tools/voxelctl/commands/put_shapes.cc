@@ -7,6 +7,7 @@
 #include "absl/strings/str_join.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/commands/own_layer.h"
 #include "tools/voxelctl/shape/shape_text.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -14,28 +15,6 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kLabelBytes = 200;
-
-// Who has something in our layer: what an earlier command left.
-absl::StatusOr<std::vector<uint64_t>> OwnersBefore(Connection& connection) {
-  v1::ListEntitiesRequest request;
-  request.set_layer(kLayer);
-  const absl::StatusOr<v1::ListEntitiesResponse> response = connection.ListEntities(request);
-  if (!response.ok()) return response.status();
-  std::vector<uint64_t> owners;
-  for (const v1::LayerInfo& layer : response->layers()) owners.push_back(layer.owner());
-  return owners;
-}
-
-absl::Status TakeDown(const std::vector<uint64_t>& owners, Connection& connection) {
-  for (const uint64_t owner : owners) {
-    v1::ClearLayerRequest request;
-    request.set_owner(owner);
-    request.set_layer(kLayer);
-    const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
-    if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
-  }
-  return absl::OkStatus();
-}
 
 }  // namespace
 
