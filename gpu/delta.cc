@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "gpu/implicit/program_check.h"
+#include "gpu/samples_check.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -89,9 +90,26 @@ absl::Status CheckDomain(const Checker& check, const GeometryRecord& g) {
   return absl::OkStatus();
 }
 
+absl::Status CheckCurved(const Checker& check, const GeometryRecord& g) {
+  if (g.index_count != 0) return check.Wrong("index_count", g.index_count, "0 for curves");
+  if (g.kind == PrimitiveKind::kPatches) {
+    if (g.vertex_count % 16 == 0) return absl::OkStatus();
+    return check.Wrong("vertex_count", g.vertex_count, "a multiple of 16 for patches");
+  }
+  if (g.topology == Topology::kList) {
+    if (g.vertex_count % 4 == 0) return absl::OkStatus();
+    return check.Wrong("vertex_count", g.vertex_count, "a multiple of 4 for a list of curves");
+  }
+  if (g.topology != Topology::kStrip) {
+    return check.Wrong("topology", static_cast<uint32_t>(g.topology), "0 or 1 for curves");
+  }
+  if (g.vertex_count % 3 == 1) return absl::OkStatus();
+  return check.Wrong("vertex_count", g.vertex_count, "3 a curve and 1 for a strip of curves");
+}
+
 absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   absl::Status status =
-      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 7),
+      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 10),
                   check.Enum("color_mode", static_cast<uint32_t>(g.color_mode), 0, 1),
                   check.Enum("sampling", static_cast<uint32_t>(g.sampling), 0, 2),
                   check.Enum("rule", static_cast<uint32_t>(g.rule), 0, 1),
@@ -99,6 +117,7 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
                   check.Enum("topology", static_cast<uint32_t>(g.topology), 0, 2),
                   check.Enum("thickness_unit", static_cast<uint32_t>(g.thickness_unit), 0, 1),
                   check.Enum("drawn_by", static_cast<uint32_t>(g.drawn_by), 0, 1),
+                  check.Enum("splat", static_cast<uint32_t>(g.splat), 0, 2),
                   check.Finite("thickness", &g.thickness, 1), check.Finite("params", g.params, 8)});
   if (!status.ok()) return status;
   if (g.thickness < 0) return check.Wrong("thickness", g.thickness, "0 or greater");
@@ -115,6 +134,12 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
       return check.Wrong("color_mode", static_cast<uint32_t>(g.color_mode), "0 for a program");
     }
     return CheckDomain(check, g);
+  }
+  if (IsCurved(g.kind)) return CheckCurved(check, g);
+  if (g.kind == PrimitiveKind::kSamples) {
+    if (g.vertex_count != 0) return check.Wrong("vertex_count", g.vertex_count, "0 for samples");
+    if (g.color_mode == ColorMode::kUniform) return absl::OkStatus();
+    return check.Wrong("color_mode", static_cast<uint32_t>(g.color_mode), "0 for samples");
   }
   const bool indexed = g.index_count != 0;
   const uint32_t corners = indexed ? g.index_count : g.vertex_count;
@@ -137,10 +162,14 @@ void SetArrays(const std::byte* at, GeometryView& view) {
   view.colors = {reinterpret_cast<const uint32_t*>(at + layout.colors), ColorCount(g)};
 }
 
-// Of a program, which is looked at wherever it lies.
+// Of a program, or of a grid's head, which are looked at wherever they lie.
 absl::Status CheckCode(uint64_t offset, const GeometryView& view) {
-  if (view.record.kind != PrimitiveKind::kImplicit) return absl::OkStatus();
-  const absl::Status status = implicit::CheckProgram(view.indices, view.record.vertex_count);
+  absl::Status status;
+  if (view.record.kind == PrimitiveKind::kImplicit) {
+    status = implicit::CheckProgram(view.indices, view.record.vertex_count);
+  } else if (view.record.kind == PrimitiveKind::kSamples) {
+    status = CheckSamples(view.indices);
+  }
   if (status.ok()) return status;
   return absl::InvalidArgumentError(
       absl::StrCat("delta, record at byte ", offset, ": ", status.message()));
@@ -170,7 +199,9 @@ absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, Delt
   absl::Status status = check.Finite("positions", view.positions.data(), view.positions.size());
   if (!status.ok()) return status;
   if (status = CheckCode(offset, view); !status.ok()) return status;
-  for (size_t i = 0; g.kind != PrimitiveKind::kImplicit && i < view.indices.size(); ++i) {
+  const bool are_indices =
+      g.kind != PrimitiveKind::kImplicit && g.kind != PrimitiveKind::kSamples;
+  for (size_t i = 0; are_indices && i < view.indices.size(); ++i) {
     if (view.indices[i] >= g.vertex_count) {
       return check.Wrong(absl::StrCat("indices[", i, "]").c_str(), view.indices[i],
                          absl::StrCat("less than vertex_count ", g.vertex_count).c_str());
@@ -225,9 +256,9 @@ absl::Status ReadDrawable(uint64_t offset, std::span<const std::byte> body, Delt
   const Checker check(offset, "drawable");
   absl::StatusOr<DrawableRecord> d = Fixed<DrawableRecord>(check, body);
   if (!d.ok()) return d.status();
-  absl::Status status =
-      FirstError({check.Enum("priority", d->priority, 0, 126), check.Enum("erase", d->erase, 0, 1),
-                  check.Finite("transform", d->transform.m, 12)});
+  absl::Status status = FirstError(
+      {check.Enum("priority", d->priority, 0, 126), check.Enum("erase", d->erase, 0, 1),
+       check.Enum("tint", d->tint, 0, 0x00FFFFFF), check.Finite("transform", d->transform.m, 12)});
   return status.ok() ? visitor.OnDrawable(*d) : status;
 }
 

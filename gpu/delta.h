@@ -49,12 +49,22 @@ enum class PrimitiveKind : uint32_t {
   kCylinder = 6,   // centre params[0..2], radius params[3], height params[4] along its own z
   kImplicit = 7,   // its program (implicit/program.h) is the indices, its rings are positions;
                    // with params[6] = 1 only from params[0..2] to params[3..5]
+  kCurves = 8,  // cubic Béziers: list (4 points each) or strip (they share ends), drawn as segments
+  kPatches = 9,  // bicubic Béziers: 16 points each, along u first, drawn as triangles
+  kSamples = 10,  // a grid of samples (primitives/samples.h), which the indices hold; no positions
 };
+
+// Made of control points, and cut into straight pieces where it is drawn (gpu/curves/).
+constexpr bool IsCurved(PrimitiveKind kind) {
+  return kind == PrimitiveKind::kCurves || kind == PrimitiveKind::kPatches;
+}
 
 enum class LineSampling : uint32_t { kThin = 0, kEuclidean = 1, kCover = 2 };
 enum class SurfaceRule : uint32_t { kThin = 0, kCover = 1 };
 enum class Fill : uint32_t { kSurface = 0, kSolid = 1 };
 enum class Topology : uint32_t { kList = 0, kStrip = 1, kLoop = 2 };
+// What a thick point is: a ball, one that fades out from its middle, or a cube along the voxels.
+enum class Splat : uint32_t { kBall = 0, kSoft = 1, kCube = 2 };
 enum class ColorMode : uint32_t { kUniform = 0, kPerVertex = 1 };
 enum class ThicknessUnit : uint32_t { kVoxels = 0, kUnits = 1 };
 // What covers the voxels: whatever the engine has, or its CPU even where it has a GPU.
@@ -79,19 +89,20 @@ struct GeometryRecord {
   PrimitiveKind kind = PrimitiveKind::kPoints;
   uint32_t color = 0x00FFFFFF;  // kUniform
   ColorMode color_mode = ColorMode::kUniform;
-  LineSampling sampling = LineSampling::kThin;  // kSegments
+  LineSampling sampling = LineSampling::kThin;  // kSegments, kCurves
   SurfaceRule rule = SurfaceRule::kThin;        // surfaces
-  Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder, kImplicit
-  Topology topology = Topology::kList;          // kSegments
+  Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder, kImplicit, kSamples
+  Topology topology = Topology::kList;          // kSegments, kCurves
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  // Diameter of points and segments, of surfaces of kImplicit their thickness; 0: one voxel. kUnits:
+  // Diameter of points and segments, of surfaces of kImplicit and kSamples their thickness; 0: one voxel. kUnits:
   // scaled by ∛|det| of the map.
   float thickness = 0;
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand
   float params[8] = {};
   DrawnBy drawn_by = DrawnBy::kEngine;  // the same voxels
-  uint32_t reserved[2] = {};
+  Splat splat = Splat::kBall;           // kPoints
+  uint32_t reserved = 0;
 };
 
 // Where a geometry's arrays lie, in a record or in bulk memory: positions at the beginning, each
@@ -107,9 +118,11 @@ struct DrawableRecord {
   uint64_t id = 0;
   uint64_t geometry = 0;
   uint64_t layer = 0;
-  uint32_t priority = 0;  // 0 to 126
-  uint32_t erase = 0;     // 1: removes what is of lower or equal priority in its layer
-  Affine transform;       // geometry's coordinates → layer's
+  uint32_t priority = 0;       // 0 to 126
+  uint32_t erase = 0;          // 1: removes what is of lower or equal priority in its layer
+  uint32_t tint = 0x00FFFFFF;  // its colours are multiplied by it, 0xFF being 1
+  uint32_t reserved[3] = {};
+  Affine transform;  // geometry's coordinates → layer's
 };
 
 // A half-space of the scene: a·x + b·y + c·z + d ≥ 0. Its normal is not zero.

@@ -42,6 +42,16 @@ VOXELD_HD inline uint32_t Deinterleave(uint32_t w) {
   return Gather3(w >> 1) << 16 | Gather3(w >> 2) << 8 | Gather3(w);
 }
 
+// Each channel multiplied by the tint's, 255 being 1, and rounded.
+VOXELD_HD inline uint32_t Tinted(uint32_t rgb, uint32_t tint) {
+  if (tint == 0x00FFFFFF) return rgb & 0x00FFFFFF;
+  uint32_t tinted = 0;
+  for (uint32_t shift = 0; shift < 24; shift += 8) {
+    tinted |= (((rgb >> shift) & 255) * ((tint >> shift) & 255) + 127) / 255 << shift;
+  }
+  return tinted;
+}
+
 // `priority` 0 to 126; `rgb` 0x00RRGGBB.
 VOXELD_HD inline uint32_t MakeWord(uint32_t priority, bool erase, uint32_t rgb) {
   return (priority + 1) << 25 | (erase ? kEraseBit : Interleave(rgb));

@@ -15,7 +15,8 @@ EXAMPLES = ROOT / "tools/voxelctl/shape/examples.cc"
 OUT = ROOT / "docs/primitives.md"
 
 # The header of a primitive that is not called as its message.
-NAMED = {"Mesh": "triangles", "Instance": None, "HeightMap": None}
+NAMED = {"Mesh": "triangles", "Instance": None, "HeightMap": None, "Curve": "spline", "Arc": None, "Ellipse": None, "Text": None,
+         "BezierSurface": None}
 
 HEAD = """# Primitives
 
@@ -105,7 +106,7 @@ def page() -> str:
         for text in shown.get(field, []):
             out.append(f"```\nvoxelctl draw \"{text}\"\n```\n")
     out.append("## Types that several have\n")
-    for message in ("Vertices", "Thickness", "Expression", "Boundary"):
+    for message in ("Vertices", "Thickness", "ColorScale", "Expression", "Boundary"):
         above, fields = all_messages[message]
         out.append(f"### {message}\n\n{above}\n")
         if fields:

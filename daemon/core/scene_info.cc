@@ -21,6 +21,12 @@ const char* KindName(gpu::PrimitiveKind kind) {
       return "cylinder";
     case gpu::PrimitiveKind::kImplicit:
       return "implicit";
+    case gpu::PrimitiveKind::kCurves:
+      return "curve";
+    case gpu::PrimitiveKind::kPatches:
+      return "bezier_surface";
+    case gpu::PrimitiveKind::kSamples:
+      return "volume";
   }
   return "?";
 }
@@ -35,6 +41,9 @@ EntityInfo InfoOf(const OwnedName& layer, const std::string& id, const Entity& e
     info.kind = kind != nullptr ? kind : KindName((*geometry)->record.kind);
     info.vertices = (*geometry)->record.vertex_count;
     info.color = (*geometry)->record.color;
+  } else if (const auto* group = std::get_if<GroupPtr>(&entity.data.content)) {
+    info.kind = (*group)->kind;
+    info.color = (*group)->color;
   } else {
     info.kind = "instance";
   }

@@ -11,7 +11,19 @@ uint64_t AddSaturating(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UIN
 
 uint64_t BytesOf(const Content& content) {
   if (const auto* geometry = std::get_if<GeometryPtr>(&content)) return (*geometry)->bytes();
+  if (const auto* group = std::get_if<GroupPtr>(&content)) return (*group)->bytes();
   return sizeof(InstanceRef) + std::get<InstanceRef>(content).object.size();
+}
+
+uint64_t GroupData::bytes() const {
+  uint64_t bytes = sizeof(*this) + as_sent.size() + parts.size() * sizeof(Part);
+  const GeometryData* before = nullptr;
+  for (const Part& part : parts) {
+    // Those that share one follow one another, or nearly so: counted too often rather than not at all.
+    if (part.geometry.get() != before) bytes += part.geometry->bytes();
+    before = part.geometry.get();
+  }
+  return bytes;
 }
 
 namespace {
@@ -55,6 +67,9 @@ void Draft::Count(uint64_t owner, const OwnerTally& more, const OwnerTally& less
 }
 
 uint64_t Draft::DrawablesOf(uint64_t owner, const Content& content) const {
+  if (const auto* group = std::get_if<GroupPtr>(&content)) {
+    return std::max<uint64_t>(1, (*group)->parts.size());
+  }
   const InstanceRef* instance = InstanceOf(content);
   if (instance == nullptr) return 1;
   return std::max<uint64_t>(1, FindObject({owner, instance->object})->drawables);
@@ -64,12 +79,15 @@ Bounds Draft::BoundsOf(uint64_t owner, const Content& content) const {
   if (const InstanceRef* instance = InstanceOf(content)) {
     return FindObject({owner, instance->object})->bounds;
   }
-  const GeometryData& geometry = *std::get<GeometryPtr>(content);
-  Bounds bounds;
-  bounds.empty = false;
-  std::copy(std::begin(geometry.min), std::end(geometry.min), bounds.min);
-  std::copy(std::begin(geometry.max), std::end(geometry.max), bounds.max);
-  return bounds;
+  const auto from = [](const auto& extent) {
+    Bounds bounds;
+    bounds.empty = false;
+    std::copy(std::begin(extent.min), std::end(extent.min), bounds.min);
+    std::copy(std::begin(extent.max), std::end(extent.max), bounds.max);
+    return bounds;
+  };
+  if (const auto* group = std::get_if<GroupPtr>(&content)) return from(**group);
+  return from(*std::get<GeometryPtr>(content));
 }
 
 Layer& Draft::OpenLayer(const OwnedName& key) {

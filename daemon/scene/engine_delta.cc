@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "gpu/word.h"
+
 namespace voxeld::daemon {
 namespace {
 
+constexpr uint32_t kNoTint = 0x00FFFFFF;
 constexpr uint32_t kRecordsPerBreath = 256;
 constexpr size_t kBytesPerBreath = size_t{1} << 20;
 
@@ -186,7 +189,7 @@ void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::stri
   const DrawnWhere where = choose_ ? choose_(key, id, entity) : DrawnWhere::kEngine;
   flat_.clear();
   if (where != DrawnWhere::kNowhere) {
-    Flatten(key.owner, entity.data.content, entity.data.transform);
+    Flatten(key.owner, entity.data.content, entity.data.transform, kNoTint);
   }
   std::vector<Part>& parts = drawn_[entity.number];
   // Old geometries are let go only when the new ones are held: what stays is not sent again.
@@ -202,6 +205,7 @@ void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::stri
     record.priority = entity.data.priority;
     record.erase = entity.data.erase ? 1 : 0;
     record.transform = flat_[i].transform;
+    record.tint = flat_[i].tint;
     put_drawables_.push_back(record);
     parts.push_back({record.id, std::move(geometry)});
     Breathe();
@@ -223,14 +227,23 @@ void EngineScene::Undraw(const Entity& entity) {
   Breathe();
 }
 
-void EngineScene::Flatten(uint64_t owner, const Content& content, const gpu::Affine& map) {
+void EngineScene::Flatten(uint64_t owner, const Content& content, const gpu::Affine& map,
+                          uint32_t tint) {
   if (const auto* geometry = std::get_if<GeometryPtr>(&content)) {
-    flat_.push_back({*geometry, map});
+    flat_.push_back({*geometry, map, tint});
     return;
   }
-  const Object* object = next_->FindObject({owner, std::get<InstanceRef>(content).object});
+  if (const auto* group = std::get_if<GroupPtr>(&content)) {
+    for (const GroupData::Part& part : (*group)->parts) {
+      flat_.push_back({part.geometry, gpu::Compose(map, part.transform), tint});
+    }
+    return;
+  }
+  const auto& instance = std::get<InstanceRef>(content);
+  const Object* object = next_->FindObject({owner, instance.object});
+  const uint32_t both = gpu::Tinted(instance.tint, tint);
   for (const ObjectPart& part : object->data->parts) {
-    Flatten(owner, part.content, gpu::Compose(map, part.transform));
+    Flatten(owner, part.content, gpu::Compose(map, part.transform), both);
   }
 }
 

@@ -84,13 +84,14 @@ class EngineScene {
   struct Flat {
     GeometryPtr geometry;
     gpu::Affine transform;
+    uint32_t tint;
   };
 
   void PlanLayer(const OwnedName& key, const Layer* before, const Layer* now);
   void PlanInstances(const Snapshot& before, const Snapshot& next);
   void Draw(const OwnedName& key, const Layer& layer, const std::string& id, const Entity& entity);
   void Undraw(const Entity& entity);
-  void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map);
+  void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map, uint32_t tint);
   uint64_t Use(const HeldGeometry& geometry);
   void Release(const HeldGeometry& geometry);
   void Breathe();

@@ -125,10 +125,27 @@ using GeometryPtr = std::shared_ptr<const GeometryData>;
 
 struct InstanceRef {
   std::string object;
+  uint32_t tint = 0x00FFFFFF;  // all colours are multiplied by it (gpu/word.h)
   bool operator==(const InstanceRef&) const = default;
 };
 
-using Content = std::variant<GeometryPtr, InstanceRef>;
+// Geometries that together are one primitive: a text's letters. Immutable; shared by snapshots.
+struct GroupData {
+  struct Part {
+    GeometryPtr geometry;
+    gpu::Affine transform;
+  };
+  std::vector<Part> parts;          // several may share one
+  double min[3] = {}, max[3] = {};  // of them all, thickness left out
+  const char* kind = nullptr;       // as GeometryData has them
+  std::string as_sent;
+  uint32_t color = 0x00FFFFFF;
+
+  uint64_t bytes() const;
+};
+using GroupPtr = std::shared_ptr<const GroupData>;
+
+using Content = std::variant<GeometryPtr, InstanceRef, GroupPtr>;
 
 struct EntityData {
   Content content;

@@ -10,6 +10,7 @@
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/active_calls.h"
+#include "daemon/text/fonts.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::daemon::services {
@@ -45,6 +46,7 @@ struct ServiceContext {
   // Shared, as the core may hold them longer than the server lives.
   std::shared_ptr<std::atomic<uint32_t>> captures = std::make_shared<std::atomic<uint32_t>>(0);
   std::unique_ptr<local::LocalSocket> local;  // may be none
+  text::Fonts fonts;
 };
 
 }  // namespace voxeld::daemon::services

@@ -132,8 +132,8 @@ void StreamSession::TakeMessage(std::span<const std::string_view> slices, Arriva
                                                          arrival.bytes, " bytes; open has at most ",
                                                          kOpenBytes, ": send it alone")));
   }
-  wire::Decoded decoded =
-      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(), memory.get());
+  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(),
+                                                    memory.get(), &context_.fonts);
   arrival.decoded_ns = context_.clock.Now();
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {

@@ -24,12 +24,12 @@ absl::StatusOr<StrokeFont> StrokeFont::Load(std::string_view name) {
   const std::string path =
       absl::StrCat(kFolder, "/", absl::string_view(name.data(), name.size()), ".jhf");
   if (name.empty() || name.find('/') != std::string_view::npos) {
-    return absl::InvalidArgumentError("a font's name is a word, as futural");
+    return absl::NotFoundError("is none: a stroke font's name is a word, as futural");
   }
   std::ifstream file(path);
   if (!file) {
     return absl::NotFoundError(
-        absl::StrCat("there is no font ", path, "; the package hershey-fonts-data has some"));
+        absl::StrCat("is none: there is no ", path, "; the package hershey-fonts-data has some"));
   }
   std::ostringstream whole;
   whole << file.rdbuf();

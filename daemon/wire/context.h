@@ -6,6 +6,10 @@
 #include "daemon/wire/payload.h"
 #include "gpu/bulk/bulk_pool.h"
 
+namespace voxeld::text {
+class Fonts;
+}
+
 namespace voxeld::daemon::wire {
 
 struct DecodeContext {
@@ -14,6 +18,7 @@ struct DecodeContext {
   // What the bytes fields of Vertices name; null: they hold it themselves.
   const PayloadTable* payloads = nullptr;
   LocalRanges* ranges = nullptr;  // in place of payloads; null: they are refused
+  text::Fonts* fonts = nullptr;   // null: text is refused but for strokes
 
   // Most parts ask for no more.
   operator const Limits&() const { return limits; }  // NOLINT(google-explicit-constructor)

@@ -324,13 +324,13 @@ absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limit
 
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
                             uint64_t previous_sequence, gpu::BulkPool* pool,
-                            const MemorySource* memory) {
-  return Decode(request, {limits, pool}, previous_sequence, memory);
+                            const MemorySource* memory, text::Fonts* fonts) {
+  return Decode(request, {limits, pool, nullptr, nullptr, fonts}, previous_sequence, memory);
 }
 
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
                             uint64_t previous_sequence, gpu::BulkPool* pool,
-                            const MemorySource* memory) {
+                            const MemorySource* memory, text::Fonts* fonts) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   const ElementRow rows[] = {
@@ -343,11 +343,12 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
   if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {
     return Failed(status);
   }
-  return Decode(parsed.message(), {limits, pool, parsed.payloads()}, previous_sequence, memory);
+  return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts},
+                previous_sequence, memory);
 }
 
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
-                     gpu::BulkPool* pool) {
+                     gpu::BulkPool* pool, text::Fonts* fonts) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   if (absl::Status status = CheckUpdateElements(slices, size, limits); !status.ok()) {
@@ -357,12 +358,12 @@ Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& lim
   if (absl::Status status = parsed.Parse(slices, size, Root::kApplyUpdateRequest); !status.ok()) {
     return Failed(status);
   }
-  return Decode(parsed.message(), {limits, pool, parsed.payloads()});
+  return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts});
 }
 
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
-                     gpu::BulkPool* pool) {
-  return Decode(request, {limits, pool});
+                     gpu::BulkPool* pool, text::Fonts* fonts) {
+  return Decode(request, {limits, pool, nullptr, nullptr, fonts});
 }
 
 }  // namespace voxeld::daemon::wire

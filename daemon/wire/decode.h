@@ -28,6 +28,10 @@ class Open;
 class StreamRequest;
 }  // namespace voxeld::v1
 
+namespace voxeld::text {
+class Fonts;
+}
+
 namespace voxeld::daemon::wire {
 
 struct Decoded {
@@ -55,12 +59,12 @@ struct Decoded {
 // Unimplemented (an Open that asks for what this version has not).
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
                             uint64_t previous_sequence, gpu::BulkPool* pool = nullptr,
-                            const MemorySource* memory = nullptr);
+                            const MemorySource* memory = nullptr, text::Fonts* fonts = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
                             uint64_t previous_sequence, gpu::BulkPool* pool = nullptr,
-                            const MemorySource* memory = nullptr);
+                            const MemorySource* memory = nullptr, text::Fonts* fonts = nullptr);
 
 // An ApplyUpdateRequest: `open` is always set (KEEP unless it says otherwise), the operations end
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].". It has no local
@@ -68,11 +72,11 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
 //
 // Status: as above, and InvalidArgument for more than max_operations_per_commit operations.
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
-                     gpu::BulkPool* pool = nullptr);
+                     gpu::BulkPool* pool = nullptr, text::Fonts* fonts = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
-                     gpu::BulkPool* pool = nullptr);
+                     gpu::BulkPool* pool = nullptr, text::Fonts* fonts = nullptr);
 
 absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);
 

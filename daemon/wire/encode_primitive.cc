@@ -40,6 +40,8 @@ void PackColors(std::span<const uint32_t> in, std::string* out) {
   }
 }
 
+}  // namespace
+
 void VerticesToWire(const GeometryData& in, v1::Vertices* out) {
   out->set_count(in.record.vertex_count);
   out->set_position_type(v1::ELEMENT_TYPE_F32);
@@ -54,6 +56,8 @@ void VerticesToWire(const GeometryData& in, v1::Vertices* out) {
     PackColors(ColorsOf(in), out->mutable_colors());
   }
 }
+
+namespace {
 
 void ThicknessToWire(const gpu::GeometryRecord& in, v1::Thickness* out) {
   out->set_value(in.thickness);
@@ -110,6 +114,8 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
     case gpu::PrimitiveKind::kPoints: {
       v1::Points* points = out->mutable_points();
       ThicknessToWire(record, points->mutable_thickness());
+      if (record.splat == gpu::Splat::kSoft) points->set_splat(v1::Points::SOFT);
+      if (record.splat == gpu::Splat::kCube) points->set_splat(v1::Points::CUBE);
       return VerticesToWire(in, points->mutable_vertices());
     }
     case gpu::PrimitiveKind::kSegments: {
@@ -147,7 +153,10 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
       cylinder->set_rule(RuleToWire(record.rule));
       return;
     }
-    case gpu::PrimitiveKind::kImplicit:  // kept as it was sent
+    case gpu::PrimitiveKind::kImplicit:  // these are kept as they were sent
+    case gpu::PrimitiveKind::kCurves:
+    case gpu::PrimitiveKind::kPatches:
+    case gpu::PrimitiveKind::kSamples:
       return;
   }
 }
@@ -157,6 +166,12 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
 void Encode(const Content& in, v1::Primitive* out) {
   if (const auto* instance = std::get_if<InstanceRef>(&in)) {
     out->mutable_instance()->set_object(instance->object);
+    if (instance->tint != 0x00FFFFFF)
+      out->mutable_instance()->mutable_tint()->set_rgb(instance->tint);
+    return;
+  }
+  if (const auto* group = std::get_if<GroupPtr>(&in)) {
+    out->ParseFromString((*group)->as_sent);
     return;
   }
   GeometryToWire(*std::get<GeometryPtr>(in), out);
@@ -175,6 +190,7 @@ uint64_t EncodedBytes(const Content& in) {
   if (const auto* instance = std::get_if<InstanceRef>(&in)) {
     return kFixedBytes + instance->object.size();
   }
+  if (const auto* group = std::get_if<GroupPtr>(&in)) return kFixedBytes + (*group)->as_sent.size();
   const GeometryData& geometry = *std::get<GeometryPtr>(in);
   if (!geometry.as_sent.empty()) return kFixedBytes + geometry.as_sent.size();
   return kFixedBytes + PositionsOf(geometry).size_bytes() + IndicesOf(geometry).size_bytes() +

@@ -42,6 +42,34 @@ MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord
   }
 }
 
+MaybeFault ToSampling(const FieldPath& path, v1::LineSampling in, gpu::GeometryRecord* out) {
+  switch (in) {
+    case v1::LINE_SAMPLING_UNSPECIFIED:
+    case v1::LINE_SAMPLING_THIN:
+      out->sampling = gpu::LineSampling::kThin;
+      return {};
+    case v1::LINE_SAMPLING_EUCLIDEAN:
+      out->sampling = gpu::LineSampling::kEuclidean;
+      return {};
+    case v1::LINE_SAMPLING_COVER:
+      out->sampling = gpu::LineSampling::kCover;
+      return {};
+    default:
+      return UnknownEnum(FieldPath(path, "sampling"), in,
+                         "LINE_SAMPLING_THIN, LINE_SAMPLING_EUCLIDEAN, LINE_SAMPLING_COVER");
+  }
+}
+
+MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out, bool* framed) {
+  *framed = in == v1::FILL_LINES || in == v1::FILL_DOTS;
+  if (*framed) return {};
+  if (in == v1::FILL_UNSPECIFIED || in == v1::FILL_SURFACE || in == v1::FILL_SOLID) {
+    return ToFill(path, in, out);
+  }
+  return UnknownEnum(FieldPath(path, "fill"), in,
+                     "FILL_SURFACE, FILL_SOLID, FILL_LINES, FILL_DOTS");
+}
+
 MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) {
   switch (in) {
     case v1::FILL_UNSPECIFIED:
@@ -51,6 +79,12 @@ MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out) 
     case v1::FILL_SOLID:
       out->fill = gpu::Fill::kSolid;
       return {};
+    case v1::FILL_LINES:
+    case v1::FILL_DOTS:
+      return Fault{FieldPath(path, "fill").ToString(), Reason::kInvalidValue,
+                   in == v1::FILL_LINES
+                       ? "is FILL_LINES, which it has none of; give FILL_SURFACE or FILL_SOLID"
+                       : "is FILL_DOTS, which it has none of; give FILL_SURFACE or FILL_SOLID"};
     default:
       return UnknownEnum(FieldPath(path, "fill"), in, "FILL_SURFACE, FILL_SOLID");
   }

@@ -8,8 +8,12 @@ namespace voxeld::daemon::wire {
 
 MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
                        gpu::GeometryRecord* out);
-// `path`: of what has the rule, or the fill.
+// `path`: of what has the sampling, the rule, or the fill.
+MaybeFault ToSampling(const FieldPath& path, v1::LineSampling in, gpu::GeometryRecord* out);
 MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out);
+// LINES and DOTS are the caller's to see to: `*framed` says that it is one of them.
+MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out, bool* framed);
+// Of what has neither.
 MaybeFault ToFill(const FieldPath& path, v1::Fill in, gpu::GeometryRecord* out);
 
 }  // namespace voxeld::daemon::wire

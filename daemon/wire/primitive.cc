@@ -5,10 +5,15 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/color_scale.h"
+#include "daemon/wire/curves.h"
+#include "daemon/wire/encode_primitive.h"
 #include "daemon/wire/fields.h"
+#include "daemon/wire/grids.h"
 #include "daemon/wire/height_map.h"
 #include "daemon/wire/implicit.h"
 #include "daemon/wire/shapes.h"
+#include "daemon/wire/text.h"
 #include "daemon/wire/vertices.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -16,6 +21,7 @@ namespace voxeld::daemon::wire {
 namespace {
 
 constexpr uint32_t kGreatestColor = 0xFFFFFF;
+constexpr uint32_t kWhite = 0xFFFFFF;
 
 MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const DecodeContext& context,
                     GeometryData* out) {
@@ -23,6 +29,19 @@ MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const DecodeCon
   if (auto fault =
           ToThickness(FieldPath(path, "thickness"), in.thickness(), context, &out->record)) {
     return fault;
+  }
+  switch (in.splat()) {
+    case v1::Points::SPLAT_UNSPECIFIED:
+    case v1::Points::BALL:
+      break;
+    case v1::Points::SOFT:
+      out->record.splat = gpu::Splat::kSoft;
+      break;
+    case v1::Points::CUBE:
+      out->record.splat = gpu::Splat::kCube;
+      break;
+    default:
+      return UnknownEnum(FieldPath(path, "splat"), in.splat(), "BALL, SOFT, CUBE");
   }
   return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, context, out);
 }
@@ -56,21 +75,7 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Decod
     default:
       return UnknownEnum(FieldPath(path, "topology"), in.topology(), "LIST, STRIP, LOOP");
   }
-  switch (in.sampling()) {
-    case v1::LINE_SAMPLING_UNSPECIFIED:
-    case v1::LINE_SAMPLING_THIN:
-      record.sampling = gpu::LineSampling::kThin;
-      break;
-    case v1::LINE_SAMPLING_EUCLIDEAN:
-      record.sampling = gpu::LineSampling::kEuclidean;
-      break;
-    case v1::LINE_SAMPLING_COVER:
-      record.sampling = gpu::LineSampling::kCover;
-      break;
-    default:
-      return UnknownEnum(FieldPath(path, "sampling"), in.sampling(),
-                         "LINE_SAMPLING_THIN, LINE_SAMPLING_EUCLIDEAN, LINE_SAMPLING_COVER");
-  }
+  if (auto fault = ToSampling(path, in.sampling(), &record)) return fault;
   if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), context, &record)) {
     return fault;
   }
@@ -88,6 +93,13 @@ MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext
                   GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kTriangles;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  bool framed;
+  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
+  if (out->record.fill == gpu::Fill::kSolid) {
+    return Unimplemented(
+        FieldPath(path, "fill"),
+        "a mesh has a surface, lines or dots; leave it unset, or give one of these");
+  }
   if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out)) {
     return fault;
   }
@@ -95,6 +107,11 @@ MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext
     return BadCorners(path, out->record, "triangles take three corners each: a multiple of 3");
   }
   return {};
+}
+
+template <typename Message>
+gpu::implicit::Vector MiddleOf(const Message& in) {
+  return {in.center().x(), in.center().y(), in.center().z()};
 }
 
 // Writes centre and bounds: `half` is how far the shape reaches from its centre along each axis.
@@ -107,12 +124,20 @@ void SetExtent(const v1::Vec3& center, const double (&half)[3], GeometryData* ou
   }
 }
 
-MaybeFault ToBox(const FieldPath& path, const v1::Box& in, GeometryData* out) {
+MaybeFault ToBox(const FieldPath& path, const v1::Box& in, const DecodeContext& context,
+                 GeometryData* out) {
+  bool framed;
   out->record.kind = gpu::PrimitiveKind::kBox;
   if (auto fault = CheckVec3(FieldPath(path, "center"), in.center())) return fault;
   if (auto fault = CheckSize(FieldPath(path, "size"), in.size())) return fault;
-  if (auto fault = ToFill(path, in.fill(), &out->record)) return fault;
+  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  if (framed) {
+    const gpu::implicit::Vector middle = MiddleOf(in);
+    const auto frame = gpu::WireFrameOf(gpu::Parallelepiped{
+        middle, {{in.size().x(), 0, 0}, {0, in.size().y(), 0}, {0, 0, in.size().z()}}});
+    return ToWireFrame(path, frame, in.fill() == v1::FILL_DOTS, context, out);
+  }
   const double size[3] = {in.size().x(), in.size().y(), in.size().z()};
   double half[3];
   for (int axis = 0; axis < 3; ++axis) {
@@ -123,30 +148,56 @@ MaybeFault ToBox(const FieldPath& path, const v1::Box& in, GeometryData* out) {
   return {};
 }
 
-MaybeFault ToSphere(const FieldPath& path, const v1::Sphere& in, GeometryData* out) {
+MaybeFault ToSphere(const FieldPath& path, const v1::Sphere& in, const DecodeContext& context,
+                    GeometryData* out) {
+  bool framed;
   out->record.kind = gpu::PrimitiveKind::kSphere;
   if (auto fault = CheckVec3(FieldPath(path, "center"), in.center())) return fault;
   if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
-  if (auto fault = ToFill(path, in.fill(), &out->record)) return fault;
+  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  if (framed) {
+    const gpu::implicit::Vector middle = MiddleOf(in);
+    const auto frame =
+        gpu::WireFrameOf(gpu::Ellipsoid{middle, {in.radius(), in.radius(), in.radius()}});
+    return ToWireFrame(path, frame, in.fill() == v1::FILL_DOTS, context, out);
+  }
   const float radius = static_cast<float>(in.radius());
   out->record.params[3] = radius;
   SetExtent(in.center(), {radius, radius, radius}, out);
   return {};
 }
 
-MaybeFault ToCylinder(const FieldPath& path, const v1::Cylinder& in, GeometryData* out) {
+MaybeFault ToCylinder(const FieldPath& path, const v1::Cylinder& in, const DecodeContext& context,
+                      GeometryData* out) {
+  bool framed;
   out->record.kind = gpu::PrimitiveKind::kCylinder;
   if (auto fault = CheckVec3(FieldPath(path, "center"), in.center())) return fault;
   if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
   if (auto fault = CheckPositive(FieldPath(path, "height"), in.height())) return fault;
-  if (auto fault = ToFill(path, in.fill(), &out->record)) return fault;
+  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  if (framed) {
+    const gpu::implicit::Vector middle = MiddleOf(in);
+    const auto frame = gpu::WireFrameOf(
+        gpu::Cone{middle - gpu::implicit::Vector{0, 0, in.height() / 2},
+                  middle + gpu::implicit::Vector{0, 0, in.height() / 2}, in.radius(), in.radius()});
+    return ToWireFrame(path, frame, in.fill() == v1::FILL_DOTS, context, out);
+  }
   const float radius = static_cast<float>(in.radius());
   const float height = static_cast<float>(in.height());
   out->record.params[3] = radius;
   out->record.params[4] = height;
   SetExtent(in.center(), {radius, radius, double{height} / 2}, out);
+  return {};
+}
+
+MaybeFault ToRgb(const FieldPath& path, const v1::Color& in, uint32_t* out) {
+  if (in.rgb() > kGreatestColor) {
+    return Fault{FieldPath(path, "rgb").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is 0x", absl::Hex(in.rgb()), "; give 0xRRGGBB, at most 0xffffff")};
+  }
+  *out = in.rgb();
   return {};
 }
 
@@ -159,12 +210,20 @@ MaybeFault ToInstance(const FieldPath& path, const v1::Primitive& in, const Limi
   const FieldPath instance(path, "instance");
   const FieldPath object(instance, "object");
   if (auto fault = CheckName(object, in.instance().object(), limits.max_id_bytes)) return fault;
-  *out = InstanceRef{in.instance().object()};
+  InstanceRef ref{in.instance().object()};
+  if (in.instance().has_tint()) {
+    if (auto fault = ToRgb(FieldPath(instance, "tint"), in.instance().tint(), &ref.tint)) {
+      return fault;
+    }
+  }
+  *out = std::move(ref);
   return {};
 }
 
 MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
                       GeometryData* out) {
+  const FieldPath scale(path, "color_scale");
+  const ShapeContext shape{context, scale, in.has_color_scale() ? &in.color_scale() : nullptr};
   switch (in.kind_case()) {
     case v1::Primitive::kPoints:
       return ToPoints(FieldPath(path, "points"), in.points(), context, out);
@@ -173,29 +232,45 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
     case v1::Primitive::kMesh:
       return ToMesh(FieldPath(path, "mesh"), in.mesh(), context, out);
     case v1::Primitive::kBox:
-      return ToBox(FieldPath(path, "box"), in.box(), out);
+      return ToBox(FieldPath(path, "box"), in.box(), context, out);
     case v1::Primitive::kSphere:
-      return ToSphere(FieldPath(path, "sphere"), in.sphere(), out);
+      return ToSphere(FieldPath(path, "sphere"), in.sphere(), context, out);
     case v1::Primitive::kCylinder:
-      return ToCylinder(FieldPath(path, "cylinder"), in.cylinder(), out);
+      return ToCylinder(FieldPath(path, "cylinder"), in.cylinder(), context, out);
     case v1::Primitive::kImplicit:
       return ToImplicit(FieldPath(path, "implicit"), in.implicit(), context, out);
     case v1::Primitive::kEllipsoid:
-      return ToShape(FieldPath(path, "ellipsoid"), in.ellipsoid(), context, out);
+      return ToShape(FieldPath(path, "ellipsoid"), in.ellipsoid(), shape, out);
     case v1::Primitive::kTorus:
-      return ToShape(FieldPath(path, "torus"), in.torus(), context, out);
+      return ToShape(FieldPath(path, "torus"), in.torus(), shape, out);
     case v1::Primitive::kCone:
-      return ToShape(FieldPath(path, "cone"), in.cone(), context, out);
+      return ToShape(FieldPath(path, "cone"), in.cone(), shape, out);
     case v1::Primitive::kParallelepiped:
-      return ToShape(FieldPath(path, "parallelepiped"), in.parallelepiped(), context, out);
+      return ToShape(FieldPath(path, "parallelepiped"), in.parallelepiped(), shape, out);
     case v1::Primitive::kDisc:
-      return ToShape(FieldPath(path, "disc"), in.disc(), context, out);
+      return ToShape(FieldPath(path, "disc"), in.disc(), shape, out);
     case v1::Primitive::kPatch:
-      return ToShape(FieldPath(path, "patch"), in.patch(), context, out);
+      return ToShape(FieldPath(path, "patch"), in.patch(), shape, out);
     case v1::Primitive::kPolygon:
-      return ToShape(FieldPath(path, "polygon"), in.polygon(), context, out);
+      return ToShape(FieldPath(path, "polygon"), in.polygon(), shape, out);
     case v1::Primitive::kHeightMap:
       return ToHeightMap(FieldPath(path, "height_map"), in.height_map(), context, out);
+    case v1::Primitive::kCurve:
+      return ReadCurve(FieldPath(path, "curve"), in.curve(), context, out);
+    case v1::Primitive::kArc:
+      return ToArc(FieldPath(path, "arc"), in.arc(), context, out);
+    case v1::Primitive::kEllipse:
+      return ToEllipse(FieldPath(path, "ellipse"), in.ellipse(), context, out);
+    case v1::Primitive::kHelix:
+      return ToHelix(FieldPath(path, "helix"), in.helix(), context, out);
+    case v1::Primitive::kBezierSurface:
+      return ReadBezierSurface(FieldPath(path, "bezier_surface"), in.bezier_surface(), context,
+                               out);
+    case v1::Primitive::kArrow:
+      return ToShape(FieldPath(path, "arrow"), in.arrow(), shape, out);
+    case v1::Primitive::kVolume:  // these are groups, and have been dealt with
+    case v1::Primitive::kIsosurface:
+    case v1::Primitive::kText:      // is several geometries, and has been dealt with
     case v1::Primitive::kInstance:  // is no geometry, and has been dealt with
     case v1::Primitive::KIND_NOT_SET:
       break;
@@ -203,22 +278,95 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
   return Fault{FieldPath(path, "kind").ToString(), Reason::kInvalidValue,
                "is not set, or not known to this version of the server; give one of points, "
                "segments, mesh, box, sphere, cylinder, instance, implicit, ellipsoid, torus, cone, "
-               "parallelepiped, disc, patch, polygon, height_map"};
+               "parallelepiped, disc, patch, polygon, height_map, curve, arc, ellipse, helix, "
+               "bezier_surface, arrow, text, volume, isosurface"};
 }
 
 // Whether record and arrays do not say what was sent.
-bool IsKeptAsSent(const v1::Primitive& in) {
+bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
+  switch (in.kind_case()) {
+    case v1::Primitive::kPoints:
+    case v1::Primitive::kSegments:
+      return false;
+    case v1::Primitive::kMesh:
+      return data.record.kind != gpu::PrimitiveKind::kTriangles;
+    case v1::Primitive::kBox:
+    case v1::Primitive::kSphere:
+    case v1::Primitive::kCylinder:
+      return data.record.vertex_count != 0;  // as lines or dots
+    default:
+      return true;
+  }
+}
+
+// Whether what is read of it becomes something else.
+bool IsConverted(const v1::Primitive& in) {
+  return in.has_curve() || in.has_bezier_surface() ||
+         (in.has_mesh() &&
+          (in.mesh().fill() == v1::FILL_LINES || in.mesh().fill() == v1::FILL_DOTS));
+}
+
+// A primitive that has been read, its arrays in the message wherever they lay.
+std::string AsRead(const v1::Primitive& in, const GeometryData& data) {
+  v1::Primitive sent = in;
+  v1::Vertices* const vertices = sent.has_curve() ? sent.mutable_curve()->mutable_vertices()
+                                 : sent.has_mesh()
+                                     ? sent.mutable_mesh()->mutable_vertices()
+                                     : sent.mutable_bezier_surface()->mutable_vertices();
+  vertices->Clear();
+  VerticesToWire(data, vertices);
+  return sent.SerializeAsString();
+}
+
+MaybeFault Convert(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                   GeometryData* out) {
+  if (in.has_curve()) return ToSpline(FieldPath(path, "curve"), in.curve(), context, out);
+  if (in.has_bezier_surface()) return ToPatches(FieldPath(path, "bezier_surface"), context, out);
+  return ToMeshFrame(FieldPath(path, "mesh"), in.mesh().fill() == v1::FILL_DOTS, context, out);
+}
+
+MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                    GeometryData* out) {
+  const FieldPath scale(path, "color_scale");
   switch (in.kind_case()) {
     case v1::Primitive::kPoints:
     case v1::Primitive::kSegments:
     case v1::Primitive::kMesh:
-    case v1::Primitive::kBox:
-    case v1::Primitive::kSphere:
-    case v1::Primitive::kCylinder:
-      return false;
+    case v1::Primitive::kCurve:
+      return ToVertexColors(scale, in.color_scale(), context, out);
+    case v1::Primitive::kEllipsoid:
+    case v1::Primitive::kTorus:
+    case v1::Primitive::kCone:
+    case v1::Primitive::kParallelepiped:
+    case v1::Primitive::kDisc:
+    case v1::Primitive::kPatch:
+    case v1::Primitive::kPolygon:
+    case v1::Primitive::kArrow:
+      if (out->record.kind == gpu::PrimitiveKind::kImplicit) return {};  // they have them
+      break;
     default:
-      return true;
+      break;
   }
+  return Fault{
+      scale.ToString(), Reason::kInvalidValue,
+      absl::StrCat("is given, but ", in.GetDescriptor()->FindFieldByNumber(in.kind_case())->name(),
+                   " takes none here; points, segments, meshes, curves and shapes of one "
+                   "colour do, among them ellipsoid, cone and parallelepiped")};
+}
+
+MaybeFault ToSamples(const FieldPath& path, const v1::Primitive& in, uint32_t color,
+                     const DecodeContext& context, Content* out) {
+  auto group = std::make_shared<GroupData>();
+  const FieldPath volume(path, "volume"), isosurface(path, "isosurface");
+  if (auto fault = in.has_volume()
+                       ? ToVolume(volume, in.volume(), color, context, group.get())
+                       : ToIsosurface(isosurface, in.isosurface(), color, context, group.get())) {
+    return fault;
+  }
+  group->kind = in.has_volume() ? "volume" : "isosurface";
+  group->as_sent = in.SerializeAsString();
+  *out = GroupPtr(std::move(group));
+  return {};
 }
 
 }  // namespace
@@ -226,20 +374,29 @@ bool IsKeptAsSent(const v1::Primitive& in) {
 MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
                      Content* out) {
   if (in.kind_case() == v1::Primitive::kInstance) return ToInstance(path, in, context, out);
-  auto data = std::make_shared<GeometryData>();
+  uint32_t color = kWhite;
   if (in.has_color()) {
-    if (in.color().rgb() > kGreatestColor) {
-      const FieldPath color(path, "color");
-      return Fault{
-          FieldPath(color, "rgb").ToString(), Reason::kInvalidValue,
-          absl::StrCat("is 0x", absl::Hex(in.color().rgb()), "; give 0xRRGGBB, at most 0xffffff")};
-    }
-    data->record.color = in.color().rgb();
+    if (auto fault = ToRgb(FieldPath(path, "color"), in.color(), &color)) return fault;
   }
+  if (in.has_text() || in.has_volume() || in.has_isosurface()) {
+    if (in.has_color_scale()) return ToColors(path, in, context, nullptr);
+    if (in.has_text()) return ToText(FieldPath(path, "text"), in, color, context, out);
+    return ToSamples(path, in, color, context, out);
+  }
+  auto data = std::make_shared<GeometryData>();
+  data->record.color = color;
   if (auto fault = ToGeometry(path, in, context, data.get())) return fault;
-  if (IsKeptAsSent(in)) {
+  const bool converted = IsConverted(in);
+  if (converted) data->as_sent = AsRead(in, *data);
+  if (in.has_color_scale()) {
+    if (auto fault = ToColors(path, in, context, data.get())) return fault;
+  }
+  if (converted) {
+    if (auto fault = Convert(path, in, context, data.get())) return fault;
+  }
+  if (IsKeptAsSent(in, *data)) {
     data->kind = in.GetDescriptor()->FindFieldByNumber(in.kind_case())->name().c_str();
-    data->as_sent = in.SerializeAsString();
+    if (!converted) data->as_sent = in.SerializeAsString();
   }
   *out = GeometryPtr(std::move(data));
   return {};

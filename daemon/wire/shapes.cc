@@ -5,8 +5,11 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/color_scale.h"
+#include "daemon/wire/curves.h"
 #include "daemon/wire/fields.h"
 #include "daemon/wire/implicit.h"
+#include "gpu/primitives/arrow.h"
 #include "gpu/primitives/cone.h"
 #include "gpu/primitives/disc.h"
 #include "gpu/primitives/ellipsoid.h"
@@ -53,9 +56,27 @@ MaybeFault ToLook(const FieldPath& path, const Message& in, const Limits& limits
 }
 
 template <typename Shape>
-MaybeFault Finish(const FieldPath& path, const Shape& shape, GeometryData* out) {
+MaybeFault Finish(const FieldPath& path, const ShapeContext& context, const Shape& shape,
+                  GeometryData* out) {
   Graph graph;
-  const gpu::implicit::FieldShape made = shape.Make(graph);
+  return ToField(path, context, graph, shape.Make(graph), out);
+}
+
+// Fill and all of a look, of what has lines and dots; `*done`: it has been drawn as these.
+template <typename Message, typename Shape>
+MaybeFault ToLookOrFrame(const FieldPath& path, const Message& in, const ShapeContext& context,
+                         const Shape& shape, GeometryData* out, bool* done) {
+  if (auto fault = ToFill(path, in.fill(), &out->record, done)) return fault;
+  if (!*done) return ToLook(path, in, context.context, &out->record);
+  if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  return ToWireFrame(path, gpu::WireFrameOf(shape), in.fill() == v1::FILL_DOTS, context.context,
+                     out);
+}
+
+}  // namespace
+
+MaybeFault ToField(const FieldPath& path, const ShapeContext& context, Graph& graph,
+                   const gpu::implicit::FieldShape& made, GeometryData* out) {
   gpu::implicit::ProgramSource source{.surface = made.surface, .bound = made.bound};
   source.ring_ends = made.ring_ends;
   source.ring_axis = made.ring_axis;
@@ -76,12 +97,45 @@ MaybeFault Finish(const FieldPath& path, const Shape& shape, GeometryData* out) 
     out->record.params[a] = static_cast<float>(made.min[a]);
     out->record.params[3 + a] = static_cast<float>(made.max[a]);
   }
+  ScaleTable table;
+  if (context.scale != nullptr) {
+    if (auto fault = ToLevel(context.scale_path, *context.scale, out->min, out->max, graph,
+                             &source.color[0], &table)) {
+      return fault;
+    }
+    source.table = table;
+  }
   return ToProgram(path, graph, source, made.ring_points, out);
 }
 
-}  // namespace
+MaybeFault ToShape(const FieldPath& path, const v1::Arrow& in, const ShapeContext& context,
+                   GeometryData* out) {
+  gpu::Arrow arrow;
+  if (auto fault = ToVector(FieldPath(path, "start"), in.start(), &arrow.start)) return fault;
+  if (auto fault = ToVector(FieldPath(path, "end"), in.end(), &arrow.end)) return fault;
+  const double length = gpu::implicit::Length(arrow.end - arrow.start);
+  if (!(length > 0)) {
+    return Fault{FieldPath(path, "end").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(arrow.end), " as start is; give another point")};
+  }
+  const FieldPath head_length(path, "head_length");
+  if (auto fault = CheckNotNegative(FieldPath(path, "shaft_radius"), in.shaft_radius()))
+    return fault;
+  if (auto fault = CheckNotNegative(head_length, in.head_length())) return fault;
+  if (auto fault = CheckNotNegative(FieldPath(path, "head_radius"), in.head_radius())) return fault;
+  if (in.head_length() > length * (1 + 1e-6)) {
+    return Fault{head_length.ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", wire::Show(in.head_length()), "; the arrow is ",
+                              wire::Show(length), " long: give no more")};
+  }
+  arrow.shaft_radius = in.shaft_radius();
+  arrow.head_length = in.head_length() == 0 ? length / 4 : in.head_length();
+  arrow.head_radius = in.head_radius() == 0 ? arrow.head_length * 2 / 5 : in.head_radius();
+  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
+  return Finish(path, context, arrow, out);
+}
 
-MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const ShapeContext& context,
                    GeometryData* out) {
   gpu::Cone cone{
       .start_radius = in.start_radius(), .end_radius = in.end_radius(), .round = in.round_ends()};
@@ -104,11 +158,12 @@ MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const Limits& limi
         absl::StrCat("is ", wire::Show(in.end_radius()), " beside ", wire::Show(in.start_radius()),
                      ", so that one end's sphere holds the other's; give a sphere")};
   }
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, cone, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, cone, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, cone, out);
 }
 
-MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const ShapeContext& context,
                    GeometryData* out) {
   gpu::Disc disc{.normal = {0, 0, 1}, .radius = in.radius(), .inner_radius = in.inner_radius()};
   if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &disc.center)) return fault;
@@ -128,22 +183,23 @@ MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const Limits& limi
                  absl::StrCat("is ", wire::Show(in.inner_radius()), "; give less than radius, ",
                               wire::Show(in.radius()))};
   }
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, disc, out);
+  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
+  return Finish(path, context, disc, out);
 }
 
-MaybeFault ToShape(const FieldPath& path, const v1::Ellipsoid& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Ellipsoid& in, const ShapeContext& context,
                    GeometryData* out) {
   gpu::Ellipsoid ellipsoid;
   if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &ellipsoid.center))
     return fault;
   if (auto fault = CheckSize(FieldPath(path, "radii"), in.radii())) return fault;
   ellipsoid.radii = {in.radii().x(), in.radii().y(), in.radii().z()};
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, ellipsoid, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, ellipsoid, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, ellipsoid, out);
 }
 
-MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const ShapeContext& context,
                    GeometryData* out) {
   gpu::Parallelepiped shape;
   if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &shape.center)) return fault;
@@ -158,11 +214,12 @@ MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const Li
         absl::StrCat("is ", Show(shape.edges[2]), " beside ", Show(shape.edges[0]), " and ",
                      Show(shape.edges[1]), "; the three edges must span a volume")};
   }
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, shape, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, shape, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, shape, out);
 }
 
-MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const ShapeContext& context,
                    GeometryData* out) {
   gpu::Patch patch;
   if (auto fault = ToVector(FieldPath(path, "corner"), in.corner(), &patch.corner)) return fault;
@@ -174,14 +231,14 @@ MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const Limits& lim
                  absl::StrCat("is ", Show(patch.v), " beside ", Show(patch.u),
                               "; the two edges must span an area")};
   }
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, patch, out);
+  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
+  return Finish(path, context, patch, out);
 }
 
-MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const ShapeContext& context,
                    GeometryData* out) {
   std::vector<uint32_t> ends;
-  if (auto fault = ToRings(path, in.points(), in.ends(), limits, &ends)) return fault;
+  if (auto fault = ToRings(path, in.points(), in.ends(), context.context, &ends)) return fault;
   std::vector<Vector> points;
   for (int i = 0; i + 2 < in.points_size(); i += 3) {
     points.push_back({in.points(i), in.points(i + 1), in.points(i + 2)});
@@ -201,18 +258,19 @@ MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const Limits& l
                  absl::StrCat("are ", wire::Show(uneven), " away from a plane; give points within ",
                               wire::Show(kMostUneven * extent), ", or a mesh")};
   }
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, polygon, out);
+  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
+  return Finish(path, context, polygon, out);
 }
 
-MaybeFault ToShape(const FieldPath& path, const v1::Torus& in, const Limits& limits,
+MaybeFault ToShape(const FieldPath& path, const v1::Torus& in, const ShapeContext& context,
                    GeometryData* out) {
   gpu::Torus torus{.radius = in.radius(), .tube_radius = in.tube_radius()};
   if (auto fault = ToVector(FieldPath(path, "center"), in.center(), &torus.center)) return fault;
   if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
   if (auto fault = CheckPositive(FieldPath(path, "tube_radius"), in.tube_radius())) return fault;
-  if (auto fault = ToLook(path, in, limits, &out->record)) return fault;
-  return Finish(path, torus, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, torus, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, torus, out);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -24,7 +24,7 @@ struct Node {
     int field = 0;
     const Node* to = nullptr;  // null: a payload
   };
-  Step steps[3];  // field 0: none
+  Step steps[5];  // field 0: none
 };
 
 constexpr Node kVertices = {{{v1::Vertices::kIndicesFieldNumber},
@@ -33,9 +33,13 @@ constexpr Node kVertices = {{{v1::Vertices::kIndicesFieldNumber},
 constexpr Node kPoints = {{{v1::Points::kVerticesFieldNumber, &kVertices}}};
 constexpr Node kSegments = {{{v1::Segments::kVerticesFieldNumber, &kVertices}}};
 constexpr Node kMesh = {{{v1::Mesh::kVerticesFieldNumber, &kVertices}}};
+constexpr Node kCurve = {{{v1::Curve::kVerticesFieldNumber, &kVertices}}};
+constexpr Node kBezierSurface = {{{v1::BezierSurface::kVerticesFieldNumber, &kVertices}}};
 constexpr Node kPrimitive = {{{v1::Primitive::kPointsFieldNumber, &kPoints},
                               {v1::Primitive::kSegmentsFieldNumber, &kSegments},
-                              {v1::Primitive::kMeshFieldNumber, &kMesh}}};
+                              {v1::Primitive::kMeshFieldNumber, &kMesh},
+                              {v1::Primitive::kCurveFieldNumber, &kCurve},
+                              {v1::Primitive::kBezierSurfaceFieldNumber, &kBezierSurface}}};
 constexpr Node kEntity = {{{v1::Entity::kPrimitiveFieldNumber, &kPrimitive}}};
 constexpr Node kUpsert = {{{v1::Upsert::kEntityFieldNumber, &kEntity}}};
 constexpr Node kBatch = {{{v1::Batch::kUpsertsFieldNumber, &kUpsert}}};

@@ -100,6 +100,17 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
   const Affine map = Compose(Compose(view_map, d.layer->record.transform), d.record.transform);
   d.source = {};
   d.source.record = &view.record;
+  d.source.tint = d.record.tint;
+  d.cut = nullptr;
+  if (IsCurved(view.record.kind)) {
+    d.cut = std::make_unique<Cut>(CutCurved(view, map, grid));
+    d.source.record = &d.cut->record;
+    d.source.vertices = d.cut->vertices.data();
+    d.source.indices = d.cut->indices.data();
+    d.source.colors = d.cut->colors.data();
+    d.source.radius = RadiusOf(view.record, map);
+    return;
+  }
   WithPrimitive(view.record.kind, [&](auto primitive) {
     using Primitive = typename decltype(primitive)::type;
     if constexpr (kIsSolid<Primitive>) {
@@ -109,6 +120,10 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
                                   d.source.solid, d.source.implicit);
       d.source.implicit.hoisted = d.hoisted.data();
       d.source.positions = view.positions.data();
+      d.source.indices = view.indices.data();
+    } else if constexpr (std::is_same_v<Primitive, Samples>) {
+      Samples::Place(view.record, view.indices.data(), map, grid, kBlockTiles, d.source.solid,
+                     d.source.implicit);
       d.source.indices = view.indices.data();
     } else {
       d.vertices.resize(view.record.vertex_count);

@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "gpu/assemble/bins.h"
 #include "gpu/clip.h"
+#include "gpu/curves/cut.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
 
@@ -34,6 +35,7 @@ struct Drawable {
   // Derived, in voxel space; empty while `pending`.
   std::vector<Int3> vertices;
   std::vector<uint32_t> hoisted;  // of an implicit shape
+  std::unique_ptr<Cut> cut;       // of what is curved
   Source source;
   Bins bins;
   uint64_t derived_bytes = 0;

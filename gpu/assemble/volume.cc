@@ -12,7 +12,8 @@ namespace voxeld::gpu {
 namespace {
 
 uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
-  return d.vertices.size() * sizeof(d.vertices[0]) +
+  return d.vertices.size() * sizeof(d.vertices[0]) + d.hoisted.size() * sizeof(d.hoisted[0]) +
+         (d.cut != nullptr ? d.cut->bytes() : 0) +
          d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) + d.bins.item_bytes();
 }
 

@@ -56,7 +56,8 @@ struct GeometryBounds {
 struct DeviceArrays {
   std::shared_ptr<Block> block;
   std::optional<GeometryBounds> bounds;
-  std::vector<uint32_t> program;  // of an implicit shape, where the host can read it
+  // Of what is worked out on the host as well, implicit shapes and curves, where that can read them.
+  std::optional<RetainedGeometry> on_host;
 };
 
 // A box of voxels, closed, of which nothing more is asked than about how large it is.
@@ -115,9 +116,10 @@ class CudaVolume final : private SceneObserver {
     bool singular = false;
     IndexedBy indexed_by = IndexedBy::kPairs;
     RoughBox box = RoughBox::Everything();
-    uint32_t regions_each = 0;   // that a triangle touches at most
-    Block tiles, begin, voxels;  // of what the CPU has drawn
-    Block hoisted, reach;        // of an implicit shape (ImplicitPlace)
+    uint32_t regions_each = 0;        // that a triangle touches at most
+    Block tiles, begin, voxels;       // of what the CPU has drawn
+    Block hoisted, reach;             // of an implicit shape (ImplicitPlace)
+    Block vertices, indices, colors;  // of a curve that was cut
   };
 
   absl::Status OnPlan(const DeltaPlan& plan) override;
@@ -133,7 +135,10 @@ class CudaVolume final : private SceneObserver {
   // The index that its items are drawn by, if they turn out to be thin, or small.
   static IndexedBy IndexFor(const GeometryRecord& record);
   // Decides it for a drawable that comes.
-  void ChooseIndex(const Drawable& drawable, const TableEntry& entry, Slot& slot) const;
+  void ChooseIndex(const Drawable& drawable, const TableEntry& entry, const Cut* cut,
+                   Slot& slot) const;
+  static void ChooseIndexOf(IndexedBy by, const RoughBox& box, const double extent[3], Slot& slot);
+  static void ChooseIndexOfCut(IndexedBy by, const Cut& cut, Slot& slot);
   RegionIndex& IndexOf(IndexedBy by) {
     return by == IndexedBy::kLines ? static_cast<RegionIndex&>(lines_) : triangles_;
   }
@@ -172,9 +177,17 @@ class CudaVolume final : private SceneObserver {
   absl::Status Draw(DrawView& view, DrawTo to, cudaStream_t stream);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
-  TableEntry EntryOf(const Drawable& drawable, std::vector<uint32_t>& hoisted) const;
-  // Of an implicit shape: uploads what is hoisted of it; memory for what its tiles are known to have.
+  // What the host works out of a drawable that comes, until it has gone over.
+  struct WorkedOut {
+    std::vector<uint32_t> hoisted;  // of an implicit shape
+    std::unique_ptr<Cut> cut;       // of what is curved
+  };
+  static const GeometryView& OnHost(const Drawable& drawable);
+  TableEntry EntryOf(const Drawable& drawable, WorkedOut& worked_out) const;
+  // Queues its way over, and finds room for what the device works out. It is to live until then.
+  absl::Status Place(const WorkedOut& worked_out, TableEntry& entry, Slot& slot);
   absl::Status PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry, Slot& slot);
+  absl::Status PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot);
   absl::Status FindImplicitTiles(std::span<const uint32_t> slots);
   // Has the CPU draw it; the result goes over, and into `slot`.
   absl::Status DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot);

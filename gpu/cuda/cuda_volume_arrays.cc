@@ -182,6 +182,15 @@ std::span<const T> CudaVolume::OnDevice(const GeometryView& view, std::span<cons
                arrays_->as<std::byte>() + bulk_.at(view.positions.data()));
 }
 
+namespace {
+
+// Whether the host reads what such geometries have, as well.
+bool IsWorkedOutOnHost(PrimitiveKind kind) {
+  return kind == PrimitiveKind::kImplicit || kind == PrimitiveKind::kSamples || IsCurved(kind);
+}
+
+}  // namespace
+
 RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
   RetainedGeometry kept{view, nullptr};
@@ -193,10 +202,19 @@ RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   const auto bounds = bounds_.find(view.positions.data());
   kept.memory = std::make_shared<DeviceArrays>(
       arrays_, bounds == bounds_.end() ? std::nullopt : std::optional(bounds->second),
-      view.record.kind == PrimitiveKind::kImplicit
-          ? std::vector<uint32_t>(view.indices.begin(), view.indices.end())
-          : std::vector<uint32_t>());
+      IsWorkedOutOnHost(view.record.kind)
+          ? std::optional(SceneObserver::Retain(view))
+          : std::nullopt);
   return kept;
+}
+
+// A geometry whose arrays the host can read: of kinds that it works something out of.
+const GeometryView& CudaVolume::OnHost(const Drawable& drawable) {
+  const RetainedGeometry& geometry = *drawable.geometry;
+  const auto* const arrays = static_cast<const DeviceArrays*>(geometry.memory.get());
+  // What the CPU draws lies in the host's memory.
+  if (geometry.view.record.drawn_by == DrawnBy::kCpu || arrays == nullptr) return geometry.view;
+  return arrays->on_host->view;
 }
 
 void CudaVolume::OnLeave(Drawable& drawable) {

@@ -1,6 +1,7 @@
 // Drawables that come: into the table, and into the index of pairs, of lines or of triangles.
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <thread>
 #include <type_traits>
 #include <utility>
@@ -14,10 +15,12 @@
 
 namespace voxeld::gpu::cuda {
 
-void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, Slot& slot) const {
+void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, const Cut* cut,
+                             Slot& slot) const {
   const IndexedBy by = IndexFor(entry.record);
   if (by == IndexedBy::kPairs) return;
   if (by == IndexedBy::kLines && (!lines_suit_ || entry.source.radius > 0)) return;
+  if (cut != nullptr) return ChooseIndexOfCut(by, *cut, slot);
   const auto* const arrays = static_cast<const DeviceArrays*>(drawable.geometry->memory.get());
   if (arrays == nullptr || !arrays->bounds) return;
   const GeometryBounds& bounds = *arrays->bounds;
@@ -33,19 +36,11 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
       hi[a] = corner == 0 ? at[a] : std::max(hi[a], at[a]);
     }
   }
-  const RoughBox box{{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
-  if (by == IndexedBy::kLines) {
-    if (!AreThin(lo, hi)) return;
-    slot.indexed_by = by;
-    slot.box = box;
-    return;
-  }
   // Differences of floats were rounded; and so is what a vertex is mapped to, in proportion to its
   // terms.
   constexpr double kSpare = 1.000001, kMostTerms = 1e11;
-  double extent[3];
-  for (int a = 0; a < 3; ++a) {
-    extent[a] = 0;
+  double extent[3] = {};
+  for (int a = 0; a < 3 && by == IndexedBy::kTriangles; ++a) {
     double terms = std::abs(map.m[a * 4 + 3]);
     for (int b = 0; b < 3; ++b) {
       const double m = std::abs(map.m[a * 4 + b]);
@@ -54,13 +49,43 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
     }
     if (!(terms < kMostTerms)) return;
   }
-  if (!AreCompact(lo, hi, extent)) return;
+  ChooseIndexOf(by, {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}}, extent, slot);
+}
+
+// `box` holds all vertices, of which those of a triangle are at most `extent` apart, voxels.
+void CudaVolume::ChooseIndexOf(IndexedBy by, const RoughBox& box, const double extent[3],
+                               Slot& slot) {
+  if (by == IndexedBy::kLines ? !AreThin(box.lo, box.hi) : !AreCompact(box.lo, box.hi, extent)) {
+    return;
+  }
   slot.indexed_by = by;
   slot.box = box;
+  if (by == IndexedBy::kLines) return;
   // Snapping, voxels only touched, and that the last one counts.
   int32_t voxels[3];
   for (int a = 0; a < 3; ++a) voxels[a] = static_cast<int32_t>(extent[a]) + 4;
   slot.regions_each = RegionsOfExtent(voxels);
+}
+
+void CudaVolume::ChooseIndexOfCut(IndexedBy by, const Cut& cut, Slot& slot) {
+  if (cut.vertices.empty()) return;
+  const auto at = [&](size_t vertex, size_t a) {
+    return static_cast<double>(cut.vertices[vertex].v[a]) / kUnitsPerVoxel;
+  };
+  RoughBox box = RoughBox::Nothing();
+  double extent[3] = {};
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t i = 0; i < cut.vertices.size(); ++i) {
+      box.lo[a] = std::min(box.lo[a], at(i, a));
+      box.hi[a] = std::max(box.hi[a], at(i, a));
+    }
+    for (size_t first = 0; first + 3 <= cut.indices.size(); first += 3) {
+      const uint32_t* const corner = &cut.indices[first];
+      const auto [low, high] = std::minmax({at(corner[0], a), at(corner[1], a), at(corner[2], a)});
+      extent[a] = std::max(extent[a], high - low);
+    }
+  }
+  ChooseIndexOf(by, box, extent, slot);
 }
 
 uint32_t CudaVolume::TakeSlot() {
@@ -73,28 +98,34 @@ uint32_t CudaVolume::TakeSlot() {
   return slot;
 }
 
-// `hoisted`: of an implicit shape.
-TableEntry CudaVolume::EntryOf(const Drawable& d, std::vector<uint32_t>& hoisted) const {
+TableEntry CudaVolume::EntryOf(const Drawable& d, WorkedOut& worked_out) const {
   const GeometryView& view = d.geometry->view;
   TableEntry entry;
   entry.record = view.record;
+  entry.source.tint = d.record.tint;
   entry.priority = d.record.priority;
   entry.erase = d.record.erase;
   entry.layer = layer_slots_.at(d.layer->record.id);
   entry.alive = 1;
   const Affine map = Compose(Compose(view_, d.layer->record.transform), d.record.transform);
+  if (IsCurved(view.record.kind)) {
+    worked_out.cut = std::make_unique<Cut>(CutCurved(OnHost(d), map, tiles_.grid));
+    entry.record = worked_out.cut->record;
+    entry.source.radius = RadiusOf(view.record, map);
+    return entry;
+  }
   WithPrimitive(view.record.kind, [&](auto primitive) {
     using Primitive = typename decltype(primitive)::type;
     if constexpr (kIsSolid<Primitive>) {
       entry.source.solid = Solid::Of(Compose(map, Primitive::CanonicalMap(view.record)));
     } else if constexpr (std::is_same_v<Primitive, Implicit>) {
-      const auto* const arrays = static_cast<const DeviceArrays*>(d.geometry->memory.get());
-      // What the CPU draws lies in the host's memory.
-      const uint32_t* const program =
-          view.record.drawn_by == DrawnBy::kCpu ? view.indices.data() : arrays->program.data();
-      hoisted = Implicit::Place(view.record, program, map, tiles_.grid, /*tiles=*/1,
-                                entry.source.solid, entry.source.implicit);
+      worked_out.hoisted = Implicit::Place(view.record, OnHost(d).indices.data(), map, tiles_.grid,
+                                           /*tiles=*/1, entry.source.solid, entry.source.implicit);
       entry.source.positions = view.positions.data();
+      entry.source.indices = view.indices.data();
+    } else if constexpr (std::is_same_v<Primitive, Samples>) {
+      Samples::Place(view.record, OnHost(d).indices.data(), map, tiles_.grid, /*tiles=*/1,
+                     entry.source.solid, entry.source.implicit);
       entry.source.indices = view.indices.data();
     } else {
       entry.source.positions = view.positions.data();
@@ -107,18 +138,48 @@ TableEntry CudaVolume::EntryOf(const Drawable& d, std::vector<uint32_t>& hoisted
   return entry;
 }
 
+absl::Status CudaVolume::Place(const WorkedOut& worked_out, TableEntry& entry, Slot& slot) {
+  if (worked_out.cut != nullptr) return PlaceCut(*worked_out.cut, entry, slot);
+  return worked_out.hoisted.empty() ? absl::OkStatus()
+                                    : PlaceImplicit(worked_out.hoisted, entry, slot);
+}
+
+absl::Status CudaVolume::PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot) {
+  if (cut.vertices.empty()) return absl::OkStatus();
+  absl::StatusOr<Block> block = device_.Upload(cut.vertices.data(), cut.vertices.size());
+  if (!block.ok()) return block.status();
+  slot.vertices = *std::move(block);
+  entry.source.vertices = slot.vertices.as<Int3>();
+  if (!cut.indices.empty()) {
+    block = device_.Upload(cut.indices.data(), cut.indices.size());
+    if (!block.ok()) return block.status();
+    slot.indices = *std::move(block);
+    entry.source.indices = slot.indices.as<uint32_t>();
+  }
+  if (!cut.colors.empty()) {
+    block = device_.Upload(cut.colors.data(), cut.colors.size());
+    if (!block.ok()) return block.status();
+    slot.colors = *std::move(block);
+    entry.source.colors = slot.colors.as<uint32_t>();
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CudaVolume::PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry,
                                        Slot& slot) {
   absl::StatusOr<Block> block = device_.Upload(hoisted.data(), hoisted.size());
   if (!block.ok()) return block.status();
   slot.hoisted = *std::move(block);
-  block = device_.pool().Acquire(Implicit::Count(entry.source) * sizeof(float));
+  entry.source.implicit.hoisted = slot.hoisted.as<uint32_t>();
+  // Without room for what is known of its tiles, that is found out anew whenever one is drawn.
+  block = list_budget_.KeepsTooMuch()
+              ? absl::ResourceExhaustedError("lists have all that they may keep")
+              : list_budget_.pool.Acquire(Implicit::Count(entry.source) * sizeof(float));
+  if (absl::IsResourceExhausted(block.status())) return absl::OkStatus();
   if (!block.ok()) return block.status();
   slot.reach = *std::move(block);
-  entry.source.implicit.hoisted = slot.hoisted.as<uint32_t>();
   entry.source.implicit.reach = slot.reach.as<float>();
-  // What goes over lies in memory that is about to go.
-  return device_.Wait();
+  return absl::OkStatus();
 }
 
 // After they are in the table.
@@ -227,31 +288,28 @@ absl::Status CudaVolume::Enter() {
   std::vector<TableEntry> entries;
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
+  std::deque<WorkedOut> worked_out;
+  bool uploads = false;
+  absl::Status status;
   uint32_t singular = 0;
   uint64_t coming[3] = {};  // items, by index
   absl::flat_hash_set<uint32_t> layers[] = {{}, lines_.Layers(), triangles_.Layers()};  // by index
   for (const Drawable* drawable : drawables) {
     const uint32_t slot = TakeSlot();
-    std::vector<uint32_t> hoisted;
-    TableEntry entry = EntryOf(*drawable, hoisted);
+    WorkedOut& mine = worked_out.emplace_back();
+    TableEntry entry = EntryOf(*drawable, mine);
     entry.source.record = &entry.record;
     slots.push_back(slot);
     slots_[slot] = {};
     const bool by_cpu = entry.record.drawn_by == DrawnBy::kCpu;
-    if (by_cpu || !hoisted.empty()) {
-      const absl::Status status = by_cpu ? DrawInto(entry, *drawable, slots_[slot])
-                                         : PlaceImplicit(hoisted, entry, slots_[slot]);
-      if (!status.ok()) {
-        for (const uint32_t taken : slots) slots_[taken] = {};
-        free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());
-        return status;
-      }
-    }
+    uploads |= mine.cut != nullptr || !mine.hoisted.empty();
+    status = by_cpu ? DrawInto(entry, *drawable, slots_[slot]) : Place(mine, entry, slots_[slot]);
+    if (!status.ok()) break;
     if (!by_cpu) {
       WithPrimitive(entry.record.kind, [&](auto primitive) {
         using Primitive = typename decltype(primitive)::type;
         slots_[slot].items = Primitive::Count(entry.source);
-        ChooseIndex(*drawable, entry, slots_[slot]);
+        ChooseIndex(*drawable, entry, mine.cut.get(), slots_[slot]);
         slots_[slot].singular = kIsInverted<Primitive> && !entry.source.solid.drawable;
       });
       IndexedBy& by = slots_[slot].indexed_by;
@@ -271,8 +329,13 @@ absl::Status CudaVolume::Enter() {
     singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);
   }
-  const bool few_lines = AreFewLines(slots, entries);
-  absl::Status status = GrowTable();
+  // What goes over lies in memory that goes with this call.
+  if (uploads) {
+    const absl::Status waited = device_.Wait();
+    if (status.ok()) status = waited;
+  }
+  const bool few_lines = status.ok() && AreFewLines(slots, entries);
+  if (status.ok()) status = GrowTable();
   if (status.ok() && !few_lines) status = PutDrawables(slots, entries);
   if (status.ok()) status = FindImplicitTiles(slots);
   if (!status.ok()) {

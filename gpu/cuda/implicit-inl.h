@@ -284,9 +284,13 @@ static __device__ __noinline__ void DrawImplicit(const TableEntry& entry, uint32
                                                  const Box3& box, uint32_t* words,
                                                  ImplicitScratch& s) {
   const implicit::Field field(entry.source);
-  const ImplicitTile tile{field, entry.source.solid, s, Intersect(box, entry.source.solid.bounds),
-                          entry.source.implicit.reach[item]};
-  if (IsEmpty(tile.box) || !FindImplicitParts(tile)) return;  // the same for every thread
+  const Box3 part = Intersect(box, entry.source.solid.bounds);
+  if (IsEmpty(part)) return;  // the same for every thread, as what follows
+  const float* const known = entry.source.implicit.reach;
+  const float reach = known != nullptr ? known[item] : Implicit::ReachOf(field, part);
+  if (reach == Implicit::kNothing) return;
+  const ImplicitTile tile{field, entry.source.solid, s, part, reach};
+  if (!FindImplicitParts(tile)) return;
   FindImplicitValues(tile);
   __syncthreads();
   for (uint32_t i = threadIdx.x / 32; i < s.some; i += kDrawWarps) {

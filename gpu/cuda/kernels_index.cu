@@ -35,18 +35,9 @@ __global__ void FindImplicitTilesKernel(TableEntry* table, uint32_t slot, uint32
   const uint64_t i = Thread();
   if (i >= count) return;
   const Source& source = table[slot].source;
-  const Box3 box = Implicit::BlockOf(source, static_cast<uint32_t>(i));
-  float reach = Implicit::kNothing;
-  if (!IsEmpty(box)) {
-    const implicit::Field field(source);
-    const implicit::BoxState state = field.StateOf(box);
-    if (state.all) {
-      reach = Implicit::kEverything;
-    } else if (!state.none) {
-      reach = field.solid() || field.half() == 0 ? 0 : field.ReachIn(box);
-    }
-  }
-  const_cast<float*>(source.implicit.reach)[i] = reach;
+  const Box3 box = BlockOf(source, static_cast<uint32_t>(i));
+  const_cast<float*>(source.implicit.reach)[i] =
+      IsEmpty(box) ? Implicit::kNothing : Implicit::ReachOf(implicit::Field(source), box);
 }
 
 __global__ void PutEntriesKernel(TableEntry* table, const TableEntry* entries,

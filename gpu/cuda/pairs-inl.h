@@ -3,6 +3,7 @@
 #pragma once
 
 #include "gpu/cuda/implicit-inl.h"
+#include "gpu/cuda/samples-inl.h"
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/primitives/list.h"
@@ -56,7 +57,8 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
 // By the whole block rather than by a warp.
 __device__ inline bool IsForBlock(PrimitiveKind kind) {
   return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
-         kind == PrimitiveKind::kCylinder || kind == PrimitiveKind::kImplicit;
+         kind == PrimitiveKind::kCylinder || kind == PrimitiveKind::kImplicit ||
+         kind == PrimitiveKind::kSamples;
 }
 
 // A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
@@ -66,7 +68,7 @@ __device__ void DrawSolid(const TableEntry& entry, const Box3& box, uint32_t* wo
                           SolidBlock& block) {
   const Solid& s = entry.source.solid;
   const Box3 part = Intersect(box, s.bounds);
-  const uint32_t word = MakeWord(entry.priority, entry.erase != 0, entry.record.color & 0x00FFFFFF);
+  const uint32_t word = MakeWord(entry.priority, entry.erase != 0, entry.source.UniformColor());
   if (threadIdx.x == 0 && Contains(box, s.origin[0], s.origin[1], s.origin[2]) &&
       !IsInside<Shape>(s, s.origin[0], s.origin[1], s.origin[2])) {
     atomicMax(
@@ -175,6 +177,9 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
       case PrimitiveKind::kImplicit:
         DrawImplicit(entry, static_cast<uint32_t>(scratch.heavy[i]), box, words, scratch.implicit);
         break;
+      case PrimitiveKind::kSamples:
+        DrawSamples(entry, box, words);
+        break;
       default:
         break;
     }
@@ -199,7 +204,8 @@ __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t
       bounds = BoundsOf(Triangles::ItemOf(entry.source, item));
       break;
     case PrimitiveKind::kImplicit:
-      bounds = Implicit::BlockOf(entry.source, item);
+    case PrimitiveKind::kSamples:
+      bounds = BlockOf(entry.source, item);
       break;
     default:
       bounds = entry.source.solid.bounds;

@@ -34,6 +34,7 @@ class Field {
         place_(source.implicit),
         record_(*source.record),
         positions_(source.positions),
+        tint_(source.tint),
         program_{source.indices},
         hoisted_{source.implicit.hoisted} {}
 
@@ -97,13 +98,15 @@ class Field {
 
   VOXELD_HD uint32_t ColorAt(const float q[3]) const {
     const ColorBy by = program_.color_by();
-    if (by == ColorBy::kUniform) return record_.color & 0x00FFFFFF;
+    if (by == ColorBy::kUniform) return Tinted(record_.color, tint_);
     float slots[kMostSlots];
     Run(program_.color_code(), program_.color(), q, place_.voxel, slots);
-    if (by == ColorBy::kTable) return program_.table()[Level(slots[program_.color_slot(0)], 256)];
+    if (by == ColorBy::kTable) {
+      return Tinted(program_.table()[Level(slots[program_.color_slot(0)], 256)], tint_);
+    }
     uint32_t rgb = 0;
     for (uint32_t c = 0; c < 3; ++c) rgb = rgb << 8 | Level(slots[program_.color_slot(c)], 255.5f);
-    return rgb;
+    return Tinted(rgb, tint_);
   }
 
   // Whether every voxel that P says to be covered is, in the record's colour.
@@ -226,6 +229,7 @@ class Field {
   const ImplicitPlace& place_;
   const GeometryRecord& record_;
   const float* positions_;
+  uint32_t tint_;
   ProgramView program_;
   HoistedView hoisted_;
 };

@@ -11,6 +11,7 @@
 #include "gpu/implicit/field.h"
 #include "gpu/implicit/hoist.h"
 #include "gpu/implicit/tile.h"
+#include "gpu/primitives/blocks.h"
 #include "gpu/primitives/grid.h"
 #include "gpu/primitives/source.h"
 
@@ -31,39 +32,15 @@ struct Implicit {
     const double det = Determinant(map);
     place.voxel = static_cast<float>(1.0 / CubeRoot(det < 0 ? -det : det));
     place.half = static_cast<float>(RadiusOf(g, map)) * 0.00390625f;
-    place.edge = tiles * kTileSize;
-    Box3 box{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
-    if (g.params[6] != 0) box = Intersect(box, BoundsOf(g, map, place.half));
-    solid.bounds = box;
+    SetBlocks(BoundsOf(g, map, grid, place.half), tiles, solid, place);
     uint32_t depends[3] = {};
     for (int a = 0; a < 3; ++a) {
-      place.first[a] = box.lo[a] / place.edge;
-      place.blocks[a] =
-          IsEmpty(box) ? 0 : (box.hi[a] + place.edge - 1) / place.edge - place.first[a];
       for (int b = 0; b < 3; ++b) depends[a] |= solid.inverse[a][b] != 0 ? 1u << b : 0;
     }
     return implicit::Hoist({program}, depends);
   }
 
-  VOXELD_HD static uint32_t Count(const Source& source) {
-    const int32_t* n = source.implicit.blocks;
-    if (!source.solid.drawable) return 0;
-    return static_cast<uint32_t>(n[0]) * static_cast<uint32_t>(n[1]) * static_cast<uint32_t>(n[2]);
-  }
-
-  // The voxels of an item.
-  VOXELD_HD static Box3 BlockOf(const Source& source, uint32_t i) {
-    const ImplicitPlace& place = source.implicit;
-    const uint32_t nx = static_cast<uint32_t>(place.blocks[0]),
-                   ny = static_cast<uint32_t>(place.blocks[1]);
-    const uint32_t at[3] = {i % nx, i / nx % ny, i / nx / ny};
-    Box3 box;
-    for (int a = 0; a < 3; ++a) {
-      box.lo[a] = (place.first[a] + static_cast<int32_t>(at[a])) * place.edge;
-      box.hi[a] = box.lo[a] + place.edge;
-    }
-    return Intersect(box, source.solid.bounds);
-  }
+  VOXELD_HD static uint32_t Count(const Source& source) { return CountBlocks(source); }
 
   template <class Emit>
   VOXELD_HD static void EmitTiles(const Source& source, uint32_t i, const TileGrid& grid,
@@ -74,7 +51,23 @@ struct Implicit {
       if (reach[i] != kNothing) emit(grid.TileOf(block.lo[0], block.lo[1], block.lo[2]));
       return;
     }
-    EmitTilesOfBlock(source, block, grid, emit);
+#if defined(__CUDA_ARCH__)
+    emit(grid.TileOf(block.lo[0], block.lo[1], block.lo[2]));  // the device's items are tiles
+#else
+    if (source.implicit.edge == kTileSize) {
+      emit(grid.TileOf(block.lo[0], block.lo[1], block.lo[2]));
+    } else {
+      EmitTilesOfBlock(source, block, grid, emit);
+    }
+#endif
+  }
+
+  // What is known of a tile, an item: `box` is not empty.
+  VOXELD_HD static float ReachOf(const implicit::Field& field, const Box3& box) {
+    const implicit::BoxState state = field.StateOf(box);
+    if (state.none) return kNothing;
+    if (state.all) return kEverything;
+    return field.solid() || field.half() == 0 ? 0 : field.ReachIn(box);
   }
 
   // On the host, of a box of a tile at most; the device has its own way to the same voxels.
@@ -99,24 +92,18 @@ struct Implicit {
     });
   }
 
-  // Of the domain's corners, with room for half a shell, what is drawn thicker than it is, and rounding.
-  static Box3 BoundsOf(const GeometryRecord& g, const Affine& map, float half) {
-    Box3 box;
-    for (int a = 0; a < 3; ++a) {
-      double low = map.m[a * 4 + 3], high = low;
-      for (int b = 0; b < 3; ++b) {
-        const double m = map.m[a * 4 + b];
-        const double p = m * static_cast<double>(g.params[b]),
-                     q = m * static_cast<double>(g.params[3 + b]);
-        low += p < q ? p : q;
-        high += p < q ? q : p;
-      }
-      constexpr double kFar = 1073741824.0;
-      const double shell = static_cast<double>(half);
-      box.lo[a] = static_cast<int32_t>(FloorToInt(Clamp(low - shell, -kFar, kFar))) - 2;
-      box.hi[a] = static_cast<int32_t>(FloorToInt(Clamp(high + shell, -kFar, kFar))) + 3;
+  // Of the domain, with room for half a shell, what is drawn thicker than it is, and rounding.
+  static Box3 BoundsOf(const GeometryRecord& g, const Affine& map, const TileGrid& grid,
+                       float half) {
+    if (g.params[6] == 0) {
+      return {{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
     }
-    return box;
+    double low[3], high[3];
+    for (int a = 0; a < 3; ++a) {
+      low[a] = static_cast<double>(g.params[a]);
+      high[a] = static_cast<double>(g.params[3 + a]);
+    }
+    return VoxelsAround(low, high, map, grid, static_cast<double>(half));
   }
 };
 

@@ -16,6 +16,7 @@
 #include "gpu/primitives/cylinder.h"
 #include "gpu/primitives/implicit.h"
 #include "gpu/primitives/points.h"
+#include "gpu/primitives/samples.h"
 #include "gpu/primitives/segments.h"
 #include "gpu/primitives/sphere.h"
 #include "gpu/primitives/triangles.h"
@@ -29,8 +30,10 @@ VOXELD_HD decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
     case PrimitiveKind::kPoints:
       return f(std::type_identity<Points>{});
     case PrimitiveKind::kSegments:
+    case PrimitiveKind::kCurves:
       return f(std::type_identity<Segments>{});
     case PrimitiveKind::kTriangles:
+    case PrimitiveKind::kPatches:
       return f(std::type_identity<Triangles>{});
     case PrimitiveKind::kBox:
       return f(std::type_identity<Box>{});
@@ -40,6 +43,8 @@ VOXELD_HD decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
       return f(std::type_identity<Cylinder>{});
     case PrimitiveKind::kImplicit:
       return f(std::type_identity<Implicit>{});
+    case PrimitiveKind::kSamples:
+      return f(std::type_identity<Samples>{});
   }
   __builtin_unreachable();  // ReadDelta lets no other kind in
 }
@@ -50,6 +55,7 @@ inline constexpr bool kIsSolid = requires(const GeometryRecord& g) { Primitive::
 // Whether it is evaluated through the inverse of its map, and draws nothing where there is none.
 template <class Primitive>
 inline constexpr bool kIsInverted =
-    kIsSolid<Primitive> || Primitive::kKind == PrimitiveKind::kImplicit;
+    kIsSolid<Primitive> || Primitive::kKind == PrimitiveKind::kImplicit ||
+    Primitive::kKind == PrimitiveKind::kSamples;
 
 }  // namespace voxeld::gpu

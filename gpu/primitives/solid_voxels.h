@@ -97,7 +97,7 @@ struct SolidPrimitive {
   template <class Emit>
   VOXELD_HD static void EmitVoxels(const Source& source, uint32_t, const Box3& box, Emit&& emit) {
     const Solid& s = source.solid;
-    const uint32_t rgb = source.record->color & 0x00FFFFFF;
+    const uint32_t rgb = source.UniformColor();
     if (Contains(box, s.origin[0], s.origin[1], s.origin[2]) &&
         !IsInside<Shape>(s, s.origin[0], s.origin[1], s.origin[2])) {
       emit(static_cast<int32_t>(s.origin[0]), static_cast<int32_t>(s.origin[1]),

@@ -6,6 +6,7 @@
 #include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/solid.h"
+#include "gpu/word.h"
 
 namespace voxeld::gpu {
 
@@ -39,6 +40,7 @@ struct Source {
   Affine map;                         // the geometry's coordinates → voxel space
   const uint32_t* indices = nullptr;  // record->index_count
   const uint32_t* colors = nullptr;   // record->vertex_count, with kPerVertex
+  uint32_t tint = 0x00FFFFFF;         // DrawableRecord
   int64_t radius = 0;                 // of points and segments, units; 0: one voxel
   Solid solid;                        // kBox, kSphere, kCylinder, kImplicit
   ImplicitPlace implicit;             // kImplicit, whose program `indices` are
@@ -55,9 +57,10 @@ struct Source {
                                : SnapPoint(map, positions + static_cast<size_t>(vertex) * 3);
   }
   VOXELD_HD uint32_t ColorOf(uint32_t vertex) const {
-    return (record->color_mode == ColorMode::kPerVertex ? colors[vertex] : record->color) &
-           0x00FFFFFF;
+    return Tinted(record->color_mode == ColorMode::kPerVertex ? colors[vertex] : record->color,
+                  tint);
   }
+  VOXELD_HD uint32_t UniformColor() const { return Tinted(record->color, tint); }
 };
 
 // The cube root of x ≥ 0 in IEEE double: a guess from the exponent, then Newton's steps.

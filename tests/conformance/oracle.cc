@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gpu/curves/cut.h"
 #include "tests/conformance/oracle_clip.h"
 #include "tests/conformance/oracle_footprints.h"
 #include "tests/conformance/oracle_shapes.h"
@@ -43,6 +44,77 @@ struct LayerVoxel {
     }
   }
 };
+
+// By channel a·b/255, to the nearest.
+uint32_t OracleTint(uint32_t rgb, uint32_t tint) {
+  uint32_t result = 0;
+  for (int shift = 0; shift < 24; shift += 8) {
+    const double product = (rgb >> shift & 255) * static_cast<double>(tint >> shift & 255);
+    result |= static_cast<uint32_t>(std::lround(product / 255)) << shift;
+  }
+  return result;
+}
+
+// The voxel of the point, and those with centres within a ball, fading, or a cube.
+void PlotSplat(const Units& at, uint32_t rgb, int64_t radius, Splat splat, const DenseVolume& grid,
+               const Plot& plot) {
+  PlotLine({at, at, rgb, rgb, LineSampling::kThin}, grid, plot);
+  if (radius == 0) return;
+  const double r2 = static_cast<double>(radius) * static_cast<double>(radius);
+  for (int64_t z = 0; z < grid.nz; ++z) {
+    for (int64_t y = 0; y < grid.ny; ++y) {
+      for (int64_t x = 0; x < grid.nx; ++x) {
+        double square = 0;
+        bool within = true;
+        const int64_t voxel[3] = {x, y, z};
+        for (int a = 0; a < 3; ++a) {
+          const int64_t d = std::abs(256 * voxel[a] + 128 - at.v[a]);
+          square += static_cast<double>(d) * static_cast<double>(d);
+          within = within && d <= radius;
+        }
+        if (splat == Splat::kCube && within) plot(x, y, z, rgb);
+        if (splat == Splat::kCube || square > r2) continue;
+        const auto left = static_cast<uint32_t>(std::floor((r2 - square) * 255 / r2));
+        const uint32_t faded = OracleTint(rgb, left * 0x010101);
+        if (faded != 0) plot(x, y, z, faded);
+      }
+    }
+  }
+}
+
+// What a curve is cut into, which tests of the cutting judge, drawn as any segments and triangles.
+void PlotCurved(const ModelGeometry& g, const Affine& map, const DenseVolume& grid, uint32_t tint,
+                const Plot& plot) {
+  GeometryView view;
+  view.record = g.record;
+  view.positions = g.positions;
+  view.colors = g.colors;
+  TileGrid tiles;
+  tiles.voxels[0] = grid.nx, tiles.voxels[1] = grid.ny, tiles.voxels[2] = grid.nz;
+  const Cut cut = CutCurved(view, map, tiles);
+  const bool colored = !cut.colors.empty();
+  const auto color = [&](size_t i) {
+    return OracleTint(colored ? cut.colors[i] : g.record.color, tint);
+  };
+  const auto at = [&](size_t i) {
+    return Units{{cut.vertices[i].v[0], cut.vertices[i].v[1], cut.vertices[i].v[2]}};
+  };
+  const int64_t radius = OracleRadius(g.record, map);
+  for (size_t i = 0; g.record.kind == PrimitiveKind::kCurves && i < cut.vertices.size(); i += 2) {
+    const OracleLine line{at(i), at(i + 1), color(i), color(i + 1), g.record.sampling};
+    PlotLine(line, grid, plot);
+    if (radius > 0) PlotCapsule(line, radius, grid, plot);
+  }
+  for (size_t i = 0; i < cut.indices.size(); i += 3) {
+    OracleTriangle t;
+    for (size_t c = 0; c < 3; ++c) {
+      t.v[c] = at(cut.indices[i + c]);
+      t.color[c] = color(cut.indices[i + c]);
+    }
+    t.rule = g.record.rule;
+    PlotTriangle(t, grid, plot);
+  }
+}
 
 uint32_t Blended(uint32_t below, uint32_t rgb, const LayerRecord& layer) {
   uint32_t result = 0;
@@ -94,20 +166,27 @@ int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
 }
 
 void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
-                  const Plot& plot) {
+                  const Plot& plot, uint32_t tint) {
   const GeometryRecord& record = g.record;
+  const Plot tinted = [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
+    plot(x, y, z, OracleTint(rgb, tint));
+  };
   if (record.kind == PrimitiveKind::kBox || record.kind == PrimitiveKind::kSphere ||
       record.kind == PrimitiveKind::kCylinder) {
-    return PlotSolid(record, map, grid, plot);
+    return PlotSolid(record, map, grid, tinted);
   }
-  if (record.kind == PrimitiveKind::kImplicit) return PlotImplicit(g, map, grid, plot);
+  if (record.kind == PrimitiveKind::kImplicit) return PlotImplicit(g, map, grid, tinted);
+  if (record.kind == PrimitiveKind::kSamples) return PlotSamples(g, map, grid, tinted);
+  if (IsCurved(record.kind)) return PlotCurved(g, map, grid, tint, plot);
   std::vector<Units> at;
   std::vector<uint32_t> colors;
   const size_t corners = record.index_count ? record.index_count : record.vertex_count;
   for (size_t corner = 0; corner < corners; ++corner) {
     const size_t vertex = record.index_count ? g.indices[corner] : corner;
     at.push_back(OracleSnap(map, &g.positions[vertex * 3]));
-    colors.push_back(record.color_mode == ColorMode::kPerVertex ? g.colors[vertex] : record.color);
+    // Vertices are tinted, and colours between them mixed of what comes out.
+    colors.push_back(OracleTint(
+        record.color_mode == ColorMode::kPerVertex ? g.colors[vertex] : record.color, tint));
   }
   const int64_t radius = OracleRadius(record, map);
   const auto segment = [&](size_t a, size_t b) {
@@ -115,7 +194,11 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
     PlotLine(line, grid, plot);
     if (radius > 0) PlotCapsule(line, radius, grid, plot);
   };
-  if (record.kind == PrimitiveKind::kPoints) {
+  if (record.kind == PrimitiveKind::kPoints && record.splat != Splat::kBall) {
+    for (size_t i = 0; i < corners; ++i) {
+      PlotSplat(at[i], colors[i], radius, record.splat, grid, plot);
+    }
+  } else if (record.kind == PrimitiveKind::kPoints) {
     for (size_t i = 0; i < corners; ++i) segment(i, i);
   } else if (record.kind == PrimitiveKind::kTriangles) {
     for (size_t i = 0; i < corners; i += 3) {
@@ -151,10 +234,12 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
       if (drawable.layer != layer->id) continue;
       const Affine map =
           OracleCompose(OracleCompose(target.view, layer->transform), drawable.transform);
-      PlotGeometry(scene.geometries.at(drawable.geometry), map, volume,
-                   [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
-                     voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
-                   });
+      PlotGeometry(
+          scene.geometries.at(drawable.geometry), map, volume,
+          [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
+            voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
+          },
+          drawable.tint);
     }
     const OracleClip clip(*layer, target);
     for (int32_t z = 0; z < volume.nz; ++z) {

@@ -63,12 +63,14 @@ void OracleDomain(const GeometryRecord& g, const Affine& map, int64_t low[3], in
 
 void PlotImplicit(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
                   const Plot& plot);
+void PlotSamples(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
+                 const Plot& plot);
 // `map`: geometry → voxel space.
 void PlotSolid(const GeometryRecord& g, const Affine& map, const DenseVolume& grid,
                const Plot& plot);
 
 // Everything that a geometry under a map covers.
 void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
-                  const Plot& plot);
+                  const Plot& plot, uint32_t tint = 0xFFFFFF);
 
 }  // namespace voxeld::gpu::conformance

@@ -8,6 +8,7 @@
 
 #include "display/geometry/footprint.h"
 #include "tests/conformance/program_generator.h"
+#include "tests/conformance/samples_generator.h"
 
 namespace voxeld::gpu::conformance {
 
@@ -176,11 +177,31 @@ void SceneGenerator::AddVertices(ModelGeometry& g, uint32_t count, int size) {
   g.record.vertex_count = count;
 }
 
+void SceneGenerator::AddControlPoints(ModelGeometry& g, int size) {
+  GeometryRecord& r = g.record;
+  const uint32_t count = static_cast<uint32_t>(Int(0, 3));
+  r.topology = static_cast<Topology>(Int(0, 1));
+  const bool strip = r.topology == Topology::kStrip;
+  if (r.kind == PrimitiveKind::kPatches) {
+    // Near one another: far ones make more triangles than the plain reference has time for.
+    const double reach = Real(1, size);
+    for (uint32_t i = 0; i < std::min(count, 2u) * 16 * 3; ++i) {
+      g.positions.push_back(static_cast<float>(size / 2.0 + Real(-reach, reach)));
+    }
+    r.vertex_count = static_cast<uint32_t>(g.positions.size() / 3);
+  } else {
+    AddVertices(g, strip ? count * 3 + 1 : count * 4, size);
+  }
+  if (!Chance(0.5)) return;
+  r.color_mode = ColorMode::kPerVertex;
+  for (uint32_t i = 0; i < r.vertex_count; ++i) g.colors.push_back(RandomColor());
+}
+
 ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   ModelGeometry g;
   GeometryRecord& r = g.record;
   r.id = id;
-  r.kind = static_cast<PrimitiveKind>(Int(1, 7));
+  r.kind = static_cast<PrimitiveKind>(Int(1, 10));
   r.color = RandomColor();
   r.sampling = static_cast<LineSampling>(Int(0, 2));
   r.rule = static_cast<SurfaceRule>(Int(0, 1));
@@ -189,6 +210,7 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   r.thickness_unit = static_cast<ThicknessUnit>(Int(0, 1));
   if (Chance(0.25)) r.thickness = static_cast<float>(Real(0, 5));
   if (Chance(0.15)) r.drawn_by = DrawnBy::kCpu;
+  r.splat = static_cast<Splat>(Int(0, 2));
   if (r.kind == PrimitiveKind::kBox || r.kind == PrimitiveKind::kSphere ||
       r.kind == PrimitiveKind::kCylinder) {
     for (int i = 0; i < 3; ++i) r.params[i] = static_cast<float>(RandomCoordinate(size));
@@ -200,6 +222,14 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   }
   if (r.kind == PrimitiveKind::kImplicit) {
     AddProgram(*this, size, g);
+    return g;
+  }
+  if (r.kind == PrimitiveKind::kSamples) {
+    AddSamples(*this, g);
+    return g;
+  }
+  if (IsCurved(r.kind)) {
+    AddControlPoints(g, size);
     return g;
   }
   uint32_t corners = static_cast<uint32_t>(Int(0, 4));
@@ -298,6 +328,7 @@ DrawableRecord SceneGenerator::RandomDrawable(uint64_t id, const SceneModel& sce
   d.layer = RandomId(scene.layers);
   d.priority = Chance(0.6) ? 5 : static_cast<uint32_t>(Int(0, 126));
   d.erase = Chance(0.15);
+  if (Chance(0.2)) d.tint = RandomColor();
   if (Chance(0.6)) d.transform = RandomTransform(size);
   return d;
 }

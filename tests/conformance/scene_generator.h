@@ -47,6 +47,7 @@ class SceneGenerator {
   DrawableRecord RandomDrawable(uint64_t id, const SceneModel& scene, int size);
   Affine RandomTransform(int size);
   void AddVertices(ModelGeometry& g, uint32_t count, int size);
+  void AddControlPoints(ModelGeometry& g, int size);
   double RandomCoordinate(int size);
   uint64_t RandomId(const auto& map);
 

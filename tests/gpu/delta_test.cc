@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "gpu/bulk/bulk_pool.h"
 #include "gpu/geometry_arrays.h"
+#include "gpu/primitives/samples.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -201,10 +203,80 @@ TEST(Delta, WritesEveryRecordAndReadsItBack) {
 TEST(Delta, SizesAreAsCountedByHand) {
   EXPECT_EQ(DeltaWriter::SizeOf(Mesh()), 208u);
   EXPECT_EQ(DeltaWriter::SizeOf(GeometryRecord{}), 112u);
-  EXPECT_EQ(DeltaWriter::SizeOf(DrawableRecord{}), 144u);
+  EXPECT_EQ(DeltaWriter::SizeOf(DrawableRecord{}), 160u);
   EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 448u);
   EXPECT_EQ(DeltaWriter::kSizeOfId, 32u);
   EXPECT_EQ(DeltaWriter::kSizeOfReset, 16u);
+}
+
+TEST(Delta, CurvesHaveAsManyPointsAsTheyNeed) {
+  const auto read = [](PrimitiveKind kind, Topology topology, uint32_t points) {
+    GeometryRecord g;
+    g.id = 1;
+    g.kind = kind;
+    g.topology = topology;
+    g.vertex_count = points;
+    const std::vector<float> positions(size_t{points} * 3);
+    Block block(DeltaWriter::SizeOf(g));
+    DeltaWriter writer(block.bytes());
+    writer.PutGeometry(g, positions, {}, {});
+    return Read(block.bytes());
+  };
+  EXPECT_TRUE(read(PrimitiveKind::kCurves, Topology::kList, 8).ok());
+  EXPECT_TRUE(read(PrimitiveKind::kCurves, Topology::kStrip, 7).ok());
+  EXPECT_TRUE(read(PrimitiveKind::kPatches, Topology::kList, 32).ok());
+  EXPECT_THAT(std::string(read(PrimitiveKind::kCurves, Topology::kList, 7).message()),
+              HasSubstr("vertex_count is 7, must be a multiple of 4"));
+  EXPECT_THAT(std::string(read(PrimitiveKind::kCurves, Topology::kStrip, 8).message()),
+              HasSubstr("vertex_count is 8, must be 3 a curve and 1"));
+  EXPECT_THAT(std::string(read(PrimitiveKind::kCurves, Topology::kLoop, 4).message()),
+              HasSubstr("topology is 2"));
+  EXPECT_THAT(std::string(read(PrimitiveKind::kPatches, Topology::kList, 17).message()),
+              HasSubstr("vertex_count is 17, must be a multiple of 16"));
+}
+
+TEST(Delta, SamplesAreLookedAt) {
+  SampleHead head = {};
+  head.size[0] = 3, head.size[1] = 2, head.size[2] = 1;
+  head.format = SampleFormat::kU16;
+  head.bricks = 1;
+  std::vector<uint32_t> words(12 + 256 + 1 + 3);
+  const auto message = [&](auto spoil) {
+    SampleHead spoilt = head;
+    spoil(spoilt);
+    std::memcpy(words.data(), &spoilt, sizeof(spoilt));
+    GeometryRecord g;
+    g.id = 1;
+    g.kind = PrimitiveKind::kSamples;
+    g.index_count = static_cast<uint32_t>(words.size());
+    Block block(DeltaWriter::SizeOf(g));
+    DeltaWriter writer(block.bytes());
+    writer.PutGeometry(g, {}, words, {});
+    return std::string(Read(block.bytes()).message());
+  };
+  EXPECT_EQ(message([](SampleHead&) {}), "");
+  EXPECT_THAT(message([](SampleHead& h) { h.size[1] = 0; }), HasSubstr("samples.size is 0, must be 1 to"));
+  EXPECT_THAT(message([](SampleHead& h) { h.size[0] = 4; }), HasSubstr("samples.words is 272, must be 273"));
+  EXPECT_THAT(message([](SampleHead& h) { h.size[2] = 65536; }), HasSubstr("samples.bricks is 1"));
+  EXPECT_THAT(message([](SampleHead& h) { h.format = static_cast<SampleFormat>(4); }),
+              HasSubstr("samples.format is 4"));
+  EXPECT_THAT(message([](SampleHead& h) { h.filter = static_cast<SampleFilter>(2); }),
+              HasSubstr("samples.filter is 2"));
+  EXPECT_THAT(message([](SampleHead& h) {
+                h.by_level = 1;
+                h.format = SampleFormat::kRgba8;
+              }),
+              HasSubstr("samples.by_level is 1, must be 0 for colours"));
+  EXPECT_THAT(message([](SampleHead& h) { h.scale = 1.0f / 0.0f; }), HasSubstr("finite"));
+  words.resize(5);
+  GeometryRecord g;
+  g.id = 1;
+  g.kind = PrimitiveKind::kSamples;
+  g.index_count = 5;
+  Block block(DeltaWriter::SizeOf(g));
+  DeltaWriter writer(block.bytes());
+  writer.PutGeometry(g, {}, words, {});
+  EXPECT_THAT(std::string(Read(block.bytes()).message()), HasSubstr("samples.words is 5, must be 12 at least"));
 }
 
 TEST(Delta, ProgramsAreLookedAt) {
@@ -275,8 +347,14 @@ TEST(Delta, RefusesGeometriesThatDoNotHoldTogether) {
   };
   EXPECT_TRUE(ReadGeometryWith([](GeometryRecord&) {}).ok());
   using G = GeometryRecord;
-  EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(8); }),
-              HasSubstr("record at byte 0: geometry.kind is 8, must be 1 to 7"));
+  EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(11); }),
+              HasSubstr("record at byte 0: geometry.kind is 11, must be 1 to 10"));
+  EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kCurves; }),
+              HasSubstr("index_count is 6, must be 0 for curves"));
+  EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kSamples; }),
+              HasSubstr("must be 0 for samples"));
+  EXPECT_THAT(message([](G& g) { g.splat = static_cast<Splat>(3); }),
+              HasSubstr("splat is 3, must be 0 to 2"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kImplicit; }),
               HasSubstr("geometry.color_mode is 1, must be 0 for a program"));
   EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(0); }),

@@ -105,7 +105,7 @@ Frame& Frame::Draw(Shape shape, Look look) {
 Frame& Frame::Draw(std::string id, Shape shape, Look look) {
   ++drawn_;
   if (!error_.ok()) return *this;
-  absl::StatusOr<Rope> primitive = EncodePrimitive(shape, look.color);
+  absl::StatusOr<Rope> primitive = EncodePrimitive(shape, look.color, look.color_scale);
   if (id.empty()) primitive = absl::InvalidArgumentError("the entity has no id");
   if (!primitive.ok()) {
     error_ = absl::Status(

@@ -111,6 +111,10 @@ uint64_t AfterUnspecified(Enum value) {
   return static_cast<uint64_t>(value) + 1;
 }
 
+uint32_t RgbOf(const Color& color) {
+  return static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 | color.b;
+}
+
 struct ShapeEncoder {
   std::string before;  // what precedes the shape within the primitive: its colour
 
@@ -120,6 +124,7 @@ struct ShapeEncoder {
     }
     std::string fields;
     AppendThickness(v1::Points::kThicknessFieldNumber, points.thickness, &fields);
+    AppendUnsigned(v1::Points::kSplatFieldNumber, AfterUnspecified(points.splat), &fields);
     return OverVertices(points.vertices, v1::Points::kVerticesFieldNumber, fields,
                         v1::Primitive::kPointsFieldNumber);
   }
@@ -136,8 +141,24 @@ struct ShapeEncoder {
   absl::StatusOr<Rope> operator()(const Mesh& mesh) const {
     std::string fields;
     AppendUnsigned(v1::Mesh::kRuleFieldNumber, AfterUnspecified(mesh.rule), &fields);
+    AppendUnsigned(v1::Mesh::kFillFieldNumber, AfterUnspecified(mesh.fill), &fields);
     return OverVertices(mesh.vertices, v1::Mesh::kVerticesFieldNumber, fields,
                         v1::Primitive::kMeshFieldNumber);
+  }
+  absl::StatusOr<Rope> operator()(const Curve& curve) const {
+    std::string fields;
+    AppendUnsigned(v1::Curve::kFormFieldNumber, AfterUnspecified(curve.form), &fields);
+    AppendUnsigned(v1::Curve::kClosedFieldNumber, curve.closed ? 1 : 0, &fields);
+    AppendUnsigned(v1::Curve::kSamplingFieldNumber, AfterUnspecified(curve.sampling), &fields);
+    AppendThickness(v1::Curve::kThicknessFieldNumber, curve.thickness, &fields);
+    return OverVertices(curve.vertices, v1::Curve::kVerticesFieldNumber, fields,
+                        v1::Primitive::kCurveFieldNumber);
+  }
+  absl::StatusOr<Rope> operator()(const BezierSurface& surface) const {
+    std::string fields;
+    AppendUnsigned(v1::BezierSurface::kRuleFieldNumber, AfterUnspecified(surface.rule), &fields);
+    return OverVertices(surface.vertices, v1::BezierSurface::kVerticesFieldNumber, fields,
+                        v1::Primitive::kBezierSurfaceFieldNumber);
   }
   absl::StatusOr<Rope> operator()(const Box& box) const {
     std::string fields;
@@ -199,6 +220,11 @@ struct ShapeEncoder {
   absl::StatusOr<Rope> operator()(const Instance& instance) const {
     std::string fields;
     AppendBytes(v1::Instance::kObjectFieldNumber, instance.object, &fields);
+    if (const uint32_t tint = RgbOf(instance.tint); tint != RgbOf(Color())) {
+      std::string rgb;
+      AppendFixed32(v1::Color::kRgbFieldNumber, tint, &rgb);
+      AppendPresentBytes(v1::Instance::kTintFieldNumber, rgb, &fields);
+    }
     return Wrap(before, v1::Primitive::kInstanceFieldNumber, Rope(std::move(fields)));
   }
 
@@ -310,15 +336,17 @@ struct OperationEncoder {
 
 }  // namespace
 
-absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color) {
+absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color,
+                                     const std::optional<ColorScale>& scale) {
   std::string before;
   // An instance has the colours of its object. Black is present and empty, unlike the default, white.
   if (!std::holds_alternative<Instance>(shape)) {
     std::string rgb;
-    AppendFixed32(
-        v1::Color::kRgbFieldNumber,
-        static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 | color.b, &rgb);
+    AppendFixed32(v1::Color::kRgbFieldNumber, RgbOf(color), &rgb);
     AppendPresentBytes(v1::Primitive::kColorFieldNumber, rgb, &before);
+  }
+  if (scale.has_value()) {
+    AppendBytes(v1::Primitive::kColorScaleFieldNumber, EncodeColorScale(*scale), &before);
   }
   return std::visit(ShapeEncoder{std::move(before)}, shape);
 }
@@ -327,7 +355,8 @@ absl::StatusOr<DefineOperation> EncodeDefinition(std::string object,
                                                  const std::vector<Part>& parts) {
   DefineOperation define{.object = std::move(object), .definition = {}, .uses = {}};
   for (size_t i = 0; i < parts.size(); ++i) {
-    absl::StatusOr<Rope> primitive = EncodePrimitive(parts[i].shape, parts[i].color);
+    absl::StatusOr<Rope> primitive =
+        EncodePrimitive(parts[i].shape, parts[i].color, parts[i].color_scale);
     if (!primitive.ok()) {
       return absl::Status(primitive.status().code(),
                           absl::StrCat("part ", i, " of the object \"", define.object,

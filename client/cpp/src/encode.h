@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_set>
@@ -21,7 +22,8 @@ inline constexpr size_t kBatchBytes = 192 << 10;
 
 // InvalidArgument if an array's size does not fit: says which, its size, and what would be right.
 // Views are copied; what the arrays own is shared.
-absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color);
+absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color,
+                                     const std::optional<ColorScale>& scale = std::nullopt);
 absl::StatusOr<DefineOperation> EncodeDefinition(std::string object,
                                                  const std::vector<Part>& parts);
 

@@ -14,17 +14,32 @@ void Set(const Vec3& from, v1::Vec3* to) {
   to->set_z(from.z);
 }
 
-v1::Fill WireFill(Fill fill) { return fill == Fill::kSolid ? v1::FILL_SOLID : v1::FILL_SURFACE; }
+// The wire's enumerations begin with UNSPECIFIED and go on as ours.
+template <typename Wire, typename Ours>
+Wire Word(Ours value) {
+  return static_cast<Wire>(static_cast<int>(value) + 1);
+}
+
+v1::Fill WireFill(Fill fill) { return Word<v1::Fill>(fill); }
+
+void Set(const Thickness& from, v1::Thickness* to) {
+  to->set_value(from.value);
+  to->set_unit(Word<v1::Thickness::Unit>(from.unit));
+}
+
+// Sampling and thickness of a line.
+template <typename Line, typename Message>
+void SetLine(const Line& from, Message* to) {
+  to->set_sampling(Word<v1::LineSampling>(from.sampling));
+  if (from.thickness.value != 0) Set(from.thickness, to->mutable_thickness());
+}
 
 // Rule and shell, and the fill of what has an inside.
 template <typename Shape, typename Message>
 void SetLook(const Shape& from, Message* to) {
   if constexpr (requires { to->set_fill(WireFill(from.fill)); }) to->set_fill(WireFill(from.fill));
-  to->set_rule(from.rule == SurfaceRule::kCover ? v1::SURFACE_RULE_COVER : v1::SURFACE_RULE_THIN);
-  if (from.shell.value == 0) return;
-  to->mutable_shell()->set_value(from.shell.value);
-  to->mutable_shell()->set_unit(from.shell.unit == Thickness::Unit::kUnits ? v1::Thickness::UNITS
-                                                                           : v1::Thickness::VOXELS);
+  to->set_rule(Word<v1::SurfaceRule>(from.rule));
+  if (from.shell.value != 0) Set(from.shell, to->mutable_shell());
 }
 
 template <typename Message>
@@ -144,6 +159,90 @@ absl::StatusOr<std::string> EncodeShape(const Polygon& shape) {
   SetCurves(shape.curves, primitive.mutable_polygon());
   SetLook(shape, primitive.mutable_polygon());
   return primitive.SerializeAsString();
+}
+
+absl::StatusOr<std::string> EncodeShape(const Arrow& shape) {
+  v1::Primitive primitive;
+  v1::Arrow* const to = primitive.mutable_arrow();
+  Set(shape.start, to->mutable_start());
+  Set(shape.end, to->mutable_end());
+  to->set_shaft_radius(shape.shaft_radius);
+  to->set_head_length(shape.head_length);
+  to->set_head_radius(shape.head_radius);
+  SetLook(shape, to);
+  return primitive.SerializeAsString();
+}
+
+absl::StatusOr<std::string> EncodeShape(const Arc& shape) {
+  v1::Primitive primitive;
+  v1::Arc* const to = primitive.mutable_arc();
+  Set(shape.center, to->mutable_center());
+  Set(shape.normal, to->mutable_normal());
+  to->set_radius(shape.radius);
+  if (shape.toward.has_value()) Set(*shape.toward, to->mutable_toward());
+  to->set_start(shape.start);
+  to->set_sweep(shape.sweep);
+  SetLine(shape, to);
+  return primitive.SerializeAsString();
+}
+
+absl::StatusOr<std::string> EncodeShape(const Ellipse& shape) {
+  v1::Primitive primitive;
+  v1::Ellipse* const to = primitive.mutable_ellipse();
+  Set(shape.center, to->mutable_center());
+  Set(shape.axis_a, to->mutable_axis_a());
+  Set(shape.axis_b, to->mutable_axis_b());
+  to->set_start(shape.start);
+  to->set_sweep(shape.sweep);
+  SetLine(shape, to);
+  return primitive.SerializeAsString();
+}
+
+absl::StatusOr<std::string> EncodeShape(const Helix& shape) {
+  v1::Primitive primitive;
+  v1::Helix* const to = primitive.mutable_helix();
+  Set(shape.start, to->mutable_start());
+  Set(shape.end, to->mutable_end());
+  to->set_radius(shape.radius);
+  if (shape.end_radius.has_value()) to->set_end_radius(*shape.end_radius);
+  to->set_turns(shape.turns);
+  if (shape.toward.has_value()) Set(*shape.toward, to->mutable_toward());
+  SetLine(shape, to);
+  return primitive.SerializeAsString();
+}
+
+absl::StatusOr<std::string> EncodeShape(const Text& shape) {
+  v1::Primitive primitive;
+  v1::Text* const to = primitive.mutable_text();
+  to->set_text(shape.text);
+  to->set_height(shape.height);
+  Set(shape.position, to->mutable_position());
+  Set(shape.facing, to->mutable_facing());
+  if (shape.up.has_value()) Set(*shape.up, to->mutable_up());
+  to->set_style(Word<v1::Text::Style>(shape.style));
+  to->set_alignment(Word<v1::Text::Alignment>(shape.alignment));
+  to->set_line_spacing(shape.line_spacing);
+  to->set_width(shape.width);
+  to->set_font(shape.font);
+  to->set_depth(shape.depth);
+  to->set_rule(Word<v1::SurfaceRule>(shape.rule));
+  if (shape.thickness.value != 0) Set(shape.thickness, to->mutable_thickness());
+  return primitive.SerializeAsString();
+}
+
+std::string EncodeColorScale(const ColorScale& scale) {
+  v1::ColorScale to;
+  to.set_colormap(scale.colormap);
+  for (const Color& color : scale.colors) {
+    to.add_colors(static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 |
+                  color.b);
+  }
+  to.set_low(scale.low);
+  to.set_high(scale.high);
+  if (scale.along.has_value()) Set(*scale.along, to.mutable_along());
+  const std::span<const float> numbers = scale.scalars.view();
+  to.set_scalars(reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes());
+  return to.SerializeAsString();
 }
 
 }  // namespace voxeld::client

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "voxeld/shapes.h"
+#include "voxeld/drawing.h"
 
 namespace voxeld::client {
 
@@ -18,5 +18,12 @@ absl::StatusOr<std::string> EncodeShape(const Parallelepiped& shape);
 absl::StatusOr<std::string> EncodeShape(const Disc& shape);
 absl::StatusOr<std::string> EncodeShape(const Patch& shape);
 absl::StatusOr<std::string> EncodeShape(const Polygon& shape);
+absl::StatusOr<std::string> EncodeShape(const Arrow& shape);
+absl::StatusOr<std::string> EncodeShape(const Arc& shape);
+absl::StatusOr<std::string> EncodeShape(const Ellipse& shape);
+absl::StatusOr<std::string> EncodeShape(const Helix& shape);
+absl::StatusOr<std::string> EncodeShape(const Text& shape);
+// A v1.ColorScale.
+std::string EncodeColorScale(const ColorScale& scale);
 
 }  // namespace voxeld::client

@@ -177,7 +177,7 @@ absl::Status SessionCore::StageUpsert(std::string layer, std::string id, const S
                                       const Look& look) {
   if (layer.empty()) return absl::InvalidArgumentError("the layer has no name");
   if (id.empty()) return absl::InvalidArgumentError("the entity has no id");
-  absl::StatusOr<Rope> primitive = EncodePrimitive(shape, look.color);
+  absl::StatusOr<Rope> primitive = EncodePrimitive(shape, look.color, look.color_scale);
   if (!primitive.ok()) return primitive.status();
   return Stage(UpsertOperation{.layer = std::move(layer),
                                .id = std::move(id),

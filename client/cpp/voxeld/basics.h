@@ -40,7 +40,8 @@ struct Thickness {
 
 enum class LineSampling : uint8_t { kThin, kEuclidean, kCover };
 enum class SurfaceRule : uint8_t { kThin, kCover };
-enum class Fill : uint8_t { kSurface, kSolid };
+// As lines: edges, or meridians and parallels 45° apart; as dots: where those meet.
+enum class Fill : uint8_t { kSurface, kSolid, kLines, kDots };
 
 // A part of a space, its faces included; `everything`: all of it, whatever the corners.
 struct Region {

@@ -58,8 +58,10 @@ struct Vertices {
 };
 
 struct Points {
-  Vertices vertices;  // without indices
+  enum class Splat : uint8_t { kBall, kSoft, kCube };  // of thick ones; kSoft fades out
+  Vertices vertices;                                   // without indices
   Thickness thickness;
+  Splat splat = Splat::kBall;
 };
 
 struct Segments {
@@ -72,6 +74,24 @@ struct Segments {
 
 // Indexed triangles, or vertices three by three.
 struct Mesh {
+  Vertices vertices;
+  SurfaceRule rule = SurfaceRule::kThin;
+  Fill fill = Fill::kSurface;  // or lines, or dots
+};
+
+// A smooth line along points: through them all (Catmull–Rom), near them (B-spline), or Béziers: an end, two
+// handles (one, of quadratic ones), an end, and so on.
+struct Curve {
+  enum class Form : uint8_t { kCatmullRom, kBSpline, kBezier, kQuadratic };
+  Vertices vertices;  // without indices
+  Form form = Form::kCatmullRom;
+  bool closed = false;
+  LineSampling sampling = LineSampling::kThin;
+  Thickness thickness;
+};
+
+// Bicubic Bézier patches: 16 control points each, four by four, or so many indices.
+struct BezierSurface {
   Vertices vertices;
   SurfaceRule rule = SurfaceRule::kThin;
 };
@@ -114,14 +134,29 @@ struct Cylinder {
 // Draws an object that Session::DefineObject defined.
 struct Instance {
   std::string object;
+  Color tint;  // all its colours are multiplied by this one, 255 being 1
+};
+
+// Colours by numbers, from one end of a row of colours to the other. For what has vertices, and, along a
+// direction, for shapes of one colour other than boxes, spheres and cylinders.
+struct ColorScale {
+  std::string colormap;       // a name of matplotlib's, as "viridis";
+  std::vector<Color> colors;  // or 2 to 256 colours, evenly apart
+  double low = 0,
+         high = 0;  // the numbers at the two ends; both 0: the least and the greatest there are
+  // What the numbers are: how far a place is along this, (p · along) / |along|²;
+  std::optional<Vec3> along;
+  Array<float> scalars;  // or one for each vertex
 };
 
 using Shape = std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance, Implicit,
-                           Ellipsoid, Torus, Cone, Parallelepiped, Disc, Patch, Polygon, HeightMap>;
+                           Ellipsoid, Torus, Cone, Parallelepiped, Disc, Patch, Polygon, HeightMap,
+                           Curve, Arc, Ellipse, Helix, BezierSurface, Arrow, Text>;
 
 // Everything about an entity but its shape.
 struct Look {
   Color color;  // of what has no colours of its own; black covers. Instances have their object's
+  std::optional<ColorScale> color_scale;  // in place of colours
   Affine transform;
   uint32_t priority = 0;  // 0 to 126: within its layer the higher wins
   bool erase = false;     // removes what is of lower or equal priority within its layer
@@ -134,6 +169,7 @@ struct Part {
   Shape shape;
   Color color;
   Affine transform;  // part → object
+  std::optional<ColorScale> color_scale;
 };
 
 enum class Blend : uint8_t { kOver, kAdd, kErase };

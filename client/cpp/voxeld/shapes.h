@@ -77,6 +77,72 @@ struct Polygon {
   Thickness shell;
 };
 
+// A shaft with a cone at its end.
+struct Arrow {
+  Vec3 start;
+  Vec3 end = {0, 0, 1};        // the tip
+  double shaft_radius = 0;     // 0: as thin as a voxel
+  double head_length = 0;      // 0: a quarter of the length
+  double head_radius = 0;      // 0: two fifths of the head's length
+  Fill fill = Fill::kSurface;  // or solid
+  SurfaceRule rule = SurfaceRule::kThin;
+  Thickness shell;
+};
+
+// A circle, or a part of it: angles in radians, counter-clockwise as seen from where the normal points to.
+struct Arc {
+  Vec3 center;
+  Vec3 normal = {0, 0, 1};
+  double radius = 1;
+  std::optional<Vec3> toward;  // the side of angle 0; else x, or y where the normal is along x
+  double start = 0;
+  double sweep = 0;  // -2π to 2π; 0: all around
+  LineSampling sampling = LineSampling::kThin;
+  Thickness thickness;
+};
+
+// center + cos(t)·axis_a + sin(t)·axis_b, or a part of it.
+struct Ellipse {
+  Vec3 center;
+  Vec3 axis_a = {1, 0, 0}, axis_b = {0, 1, 0};  // half axes
+  double start = 0;
+  double sweep = 0;  // -2π to 2π; 0: all around
+  LineSampling sampling = LineSampling::kThin;
+  Thickness thickness;
+};
+
+// A line that winds around the one from `start` to `end`.
+struct Helix {
+  Vec3 start;
+  Vec3 end = {0, 0, 1};
+  double radius = 1;
+  std::optional<double> end_radius;  // else as at the start
+  double turns = 1;                  // right-handed; left-handed where negative
+  std::optional<Vec3> toward;        // it begins on this side
+  LineSampling sampling = LineSampling::kThin;
+  Thickness thickness;
+};
+
+// In any script, by the server's fonts.
+struct Text {
+  enum class Style : uint8_t { kFilled, kOutline, kStrokes };
+  enum class Alignment : uint8_t { kLeft, kCenter, kRight };
+
+  std::string text;         // UTF-8; lines end at \n
+  double height = 0.2;      // of capital letters
+  Vec3 position;            // on the first line's base line
+  Vec3 facing = {0, 0, 1};  // to where it is read from
+  std::optional<Vec3> up;   // of letters; else y, or z where it faces along y
+  Style style = Style::kFilled;
+  Alignment alignment = Alignment::kLeft;
+  double line_spacing = 1;
+  double width = 0;  // lines are broken between words so as not to be longer; 0: only at \n
+  std::string font;  // a family, or of strokes one of Hershey's; empty: the server's choice
+  double depth = 0;  // filled letters are solid and reach this far to the back; 0: flat
+  SurfaceRule rule = SurfaceRule::kThin;
+  Thickness thickness;  // of lines, and of flat letters
+};
+
 // The general method: a surface P bounded by Φ, as expressions of the shape's own coordinates
 // (docs/expressions.md).
 struct Implicit {

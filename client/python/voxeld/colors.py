@@ -8,17 +8,51 @@ from __future__ import annotations
 
 import difflib
 import string
+from dataclasses import dataclass
 from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Array, as_array, require_finite
+from .arrays import Array, as_array, number, require_finite, vector
 from .color_names import MAPS, NAMES
 from .errors import InvalidColor
+from .v1 import primitives_pb2, types_pb2
 
 Rgb = int  # 0xRRGGBB
-Colors = Union[str, Sequence[Any], Array]
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Colours along a direction, in place of one: how far a place is along it, (p · along) / |along|², from `low` to `high`
+    (by default from the least to the greatest that there are). `cmap`: a map's name, or 2 to 256 colours, evenly apart."""
+
+    cmap: Union[str, Sequence[Any]] = "viridis"
+    along: Sequence[float] = (0, 0, 1)
+    low: float = 0
+    high: float = 0
+
+    def to_wire(self) -> primitives_pb2.ColorScale:
+        x, y, z = vector(self.along, "along")
+        scale = primitives_pb2.ColorScale(along=types_pb2.Vec3(x=x, y=y, z=z), low=number(self.low, "low"),
+                                          high=number(self.high, "high"))
+        if isinstance(self.cmap, str):
+            scale.colormap = self.cmap
+        else:
+            scale.colors.extend(one(color) for color in self.cmap)
+        return scale
+
+    def of(self, positions: Array) -> npt.NDArray[np.uint8]:
+        """Of each place."""
+        direction = np.array(vector(self.along, "along"), np.float64)
+        if not direction.any():
+            raise InvalidColor("a gradient's along is 0; give a direction")
+        distances = positions.astype(np.float64) @ direction / (direction @ direction)
+        ends = (None, None) if self.low == self.high == 0 else (self.low, self.high)
+        return mapped(distances, self.cmap, *ends)
+
+
+Colors = Union[str, Sequence[Any], Array, Gradient]
 
 
 def _from_text(text: str) -> Rgb:
@@ -58,6 +92,8 @@ def _bytes_of(array: Array, what: str) -> npt.NDArray[np.uint8]:
 
 def one(value: Colors, what: str = "color") -> Rgb:
     """One colour."""
+    if isinstance(value, Gradient):
+        raise InvalidColor(f"{what} is a gradient; one colour is right here")
     if isinstance(value, str):
         return _from_text(value)
     array = as_array(value, what)
@@ -76,10 +112,15 @@ def rgb_of(colors: Sequence[Rgb]) -> npt.NDArray[np.uint8]:
     return result
 
 
-def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None,
+def along(value: Optional[Colors], positions: Array) -> Optional[Colors]:
+    """What a gradient makes of places; all else as it is."""
+    return value.of(positions) if isinstance(value, Gradient) else value
+
+
+def mapped(values: npt.ArrayLike, cmap: Union[str, Sequence[Any]], low: Optional[float] = None,
            high: Optional[float] = None) -> npt.NDArray[np.uint8]:
     """A colour for each number: `low` (default: the least) is the map's first, `high` its last."""
-    if cmap not in MAPS:
+    if isinstance(cmap, str) and cmap not in MAPS:
         raise InvalidColor(f"there is no colour map {cmap!r}; there are {', '.join(MAPS)}")
     array = as_array(values, "colors").astype(np.float64)
     require_finite(array, "colors")
@@ -88,7 +129,7 @@ def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None,
     first = float(array.min()) if low is None else float(low)
     last = float(array.max()) if high is None else float(high)
     at = np.clip((array - first) / (last - first), 0, 1) if last > first else np.zeros_like(array)
-    stops = rgb_of(MAPS[cmap]).astype(np.float64)
+    stops = rgb_of(MAPS[cmap] if isinstance(cmap, str) else [one(color) for color in cmap]).astype(np.float64)
     place = np.linspace(0, 1, len(stops))
     channels = np.stack([np.interp(at, place, stops[:, c]) for c in range(3)], axis=-1)
     result: npt.NDArray[np.uint8] = np.rint(channels).astype(np.uint8)
@@ -97,7 +138,7 @@ def mapped(values: npt.ArrayLike, cmap: str, low: Optional[float] = None,
 
 def numbers_each(value: Optional[Colors]) -> bool:
     """Whether it is one number for each of many vertices, which only a colour map makes colours of."""
-    if value is None or isinstance(value, str) or np.ndim(value) != 1:
+    if value is None or isinstance(value, (str, Gradient)) or np.ndim(value) != 1:
         return False
     return isinstance(value, np.ndarray) or (len(value) > 4 and not isinstance(value[0], str))
 
@@ -109,6 +150,8 @@ def many(value: Optional[Colors], count: int, cmap: Optional[str] = None) -> Uni
         if cmap is not None:
             raise InvalidColor(f"cmap is {cmap!r}, but there are no colors to map; give one number for each of {count}")
         return None
+    if isinstance(value, Gradient):
+        raise InvalidColor("colors is a gradient; colours themselves are right here")
     if cmap is not None:
         values = as_array(value, "colors")
         if values.shape != (count,):

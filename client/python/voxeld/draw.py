@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from . import shapes
 from .colors import Colors
-from .draw_measured import Drawn, DrawMeasured, Make
+from .draw_curves import DrawCurves
+from .draw_measured import Drawn, Make
 from .errors import InvalidValue
 from .look import Look
 
@@ -20,17 +21,20 @@ def checked_name(name: str, what: str) -> str:
     return name
 
 
-class Draw(DrawMeasured[Drawn]):
+class Draw(DrawCurves[Drawn]):
     """Each call puts up one thing under a name; the same name again replaces it. All take `transform` (4×4 or 3×4),
     `priority` (0 to 126, the higher wins within its layer), `erase` (takes away what is of lower or equal priority),
     `lifetime` in seconds and `label`, a text for people. Arguments are checked before anything is sent; arrays may be
     changed again as soon as the call is back."""
 
     def points(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
-               width: Optional[float] = None, unit: str = "voxels", transform: Optional[npt.ArrayLike] = None,
-               priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """A cloud, (n, 3). `width`: each point's diameter, in "voxels" or "units"; by default one voxel."""
-        return self._draw(name, shapes.points, (positions,), dict(colors=colors, cmap=cmap, width=width, unit=unit),
+               width: Optional[float] = None, unit: str = "voxels", splat: str = "ball",
+               transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+               lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """A cloud, (n, 3). `width`: each point's diameter, in "voxels" or "units"; by default one voxel. Thick points are a
+        "ball", a "soft" one, which fades out, or a "cube"."""
+        return self._draw(name, shapes.points, (positions,),
+                          dict(colors=colors, cmap=cmap, width=width, unit=unit, splat=splat),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def lines(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
@@ -45,16 +49,17 @@ class Draw(DrawMeasured[Drawn]):
 
     def mesh(self, name: str, vertices: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *,
              colors: Optional[Colors] = None, cmap: Optional[str] = None, rule: str = "thin",
-             transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+             fill: str = "surface", transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
              lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover"."""
-        return self._draw(name, shapes.mesh, (vertices, faces), dict(colors=colors, cmap=cmap, rule=rule),
+        """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover".
+        `fill`: "surface", "lines" or "dots"."""
+        return self._draw(name, shapes.mesh, (vertices, faces), dict(colors=colors, cmap=cmap, rule=rule, fill=fill),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def box(self, name: str, center: npt.ArrayLike = (0, 0, 0), size: npt.ArrayLike = 1.0, *, color: Optional[Colors] = None,
             fill: str = "surface", rule: str = "thin", transform: Optional[npt.ArrayLike] = None, priority: int = 0,
             erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """`size`: three edge lengths or one. `fill`: "surface" or "solid"."""
+        """`size`: three edge lengths or one. `fill`: "surface", "solid", "lines" or "dots"."""
         return self._draw(name, shapes.box, (center, size), dict(color=color, fill=fill, rule=rule),
                           Look.of(transform, priority, erase, lifetime, label))
 
@@ -85,8 +90,8 @@ class Draw(DrawMeasured[Drawn]):
                           dict(threshold=threshold, cmap=cmap, low=low, high=high, extent=extent),
                           Look.of(transform, priority, erase, lifetime, label))
 
-    def instance(self, name: str, of: str, *, color: Optional[Colors] = None, transform: Optional[npt.ArrayLike] = None,
+    def instance(self, name: str, of: str, *, color: Optional[Colors] = None, tint: Optional[Colors] = None, transform: Optional[npt.ArrayLike] = None,
                  priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """Draws the object `of` here."""
-        return self._draw(name, shapes.instance, (checked_name(of, "object"),), dict(color=color),
+        """Draws the object `of` here, its colours multiplied by `tint`."""
+        return self._draw(name, shapes.instance, (checked_name(of, "object"),), dict(color=color, tint=tint),
                           Look.of(transform, priority, erase, lifetime, label))

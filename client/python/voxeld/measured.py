@@ -11,7 +11,7 @@ from . import wire
 from .arrays import as_array, number, positions, require_finite, vector
 from .colors import Colors
 from .errors import InvalidArray, InvalidValue
-from .shapes import FILLS, PIECE_BYTES, RULES, UNITS, choice, solid, vec
+from .shapes import FILLS, PIECE_BYTES, RULES, choice, solid, thickness, vec
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
@@ -20,13 +20,8 @@ Color = Optional[Colors]
 _AXES = {"z": pb.Boundary.Z, "x": pb.Boundary.X, "y": pb.Boundary.Y}
 
 
-def _shell(value: Optional[float], unit: str) -> Optional[pb.Thickness]:
-    word = choice(UNITS, unit, "unit")
-    return None if value is None else pb.Thickness(value=number(value, "shell", least=0), unit=word)
-
-
 def _rule(rule: str, shell: Optional[float], unit: str) -> dict[str, Any]:
-    return dict(rule=choice(RULES, rule, "rule"), shell=_shell(shell, unit))
+    return dict(rule=choice(RULES, rule, "rule"), shell=thickness(shell, unit, "shell"))
 
 
 def _curves(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], what: str) -> dict[str, Any]:
@@ -149,7 +144,7 @@ def implicit(surface: str, *, bound: Optional[str] = None,
         raise InvalidValue(f"the surface is {surface!r}; give an expression, such as 'x^2 + y^2 + z^2 <= 1'")
     if (level is None) != (cmap is None):
         raise InvalidValue(f"level is {level!r} and cmap is {cmap!r}; each goes with the other")
-    shape = pb.Implicit(surface=_text(surface), rule=choice(RULES, rule, "rule"), shell=_shell(shell, unit),
+    shape = pb.Implicit(surface=_text(surface), rule=choice(RULES, rule, "rule"), shell=thickness(shell, unit, "shell"),
                         colormap=cmap or "")
     if bound is not None:
         shape.bound.CopyFrom(_text(bound))

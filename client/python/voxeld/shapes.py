@@ -22,9 +22,10 @@ from .v1 import types_pb2
 PIECE_BYTES = (1 << 20) - (2 << 10)
 
 _MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segments.LIST}
-_SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
+SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
 RULES = {"thin": pb.SURFACE_RULE_THIN, "cover": pb.SURFACE_RULE_COVER}
-FILLS = {"surface": pb.FILL_SURFACE, "solid": pb.FILL_SOLID}
+FILLS = {"surface": pb.FILL_SURFACE, "solid": pb.FILL_SOLID, "lines": pb.FILL_LINES, "dots": pb.FILL_DOTS}
+_SPLATS = {"ball": pb.Points.BALL, "soft": pb.Points.SOFT, "cube": pb.Points.CUBE}
 UNITS = {"voxels": pb.Thickness.VOXELS, "units": pb.Thickness.UNITS}
 
 
@@ -34,17 +35,18 @@ def choice(table: dict[str, Any], value: str, what: str) -> Any:
     return table[value]
 
 
-def _thickness(value: Optional[float], unit: str) -> Optional[pb.Thickness]:
+def thickness(value: Optional[float], unit: str, what: str = "width") -> Optional[pb.Thickness]:
     word = choice(UNITS, unit, "unit")
-    return None if value is None else pb.Thickness(value=number(value, "width", least=0), unit=word)
+    return None if value is None else pb.Thickness(value=number(value, what, least=0), unit=word)
 
 
-def _primitive(key: bytes, kind: str, head: bytes, vertices: wire.Packed, color: Optional[int]) -> wire.Packed:
+def packed(kind: str, head: bytes, vertices: wire.Packed, color: Optional[int]) -> wire.Packed:
+    """The primitive of that kind, its fields but for the vertices in `head`."""
     before = b"" if color is None else pb.Primitive(color=pb.Color(rgb=color)).SerializeToString()
-    return vertices.inside(wire.Field.VERTICES[kind], head).inside(key, before)
+    return vertices.inside(wire.Field.VERTICES[kind], head).inside(wire.Field.KINDS[kind], before)
 
 
-def _split_colors(color: object) -> tuple[Optional[int], Optional[Array]]:
+def split_colors(color: object) -> tuple[Optional[int], Optional[Array]]:
     return (None, color) if isinstance(color, np.ndarray) else (color if isinstance(color, int) else None, None)
 
 
@@ -58,13 +60,13 @@ def _pieces(count: int, vertex_bytes: int, whole: int = 1, overlap: int = 0) -> 
 
 
 def points(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
-           width: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
+           width: Optional[float] = None, unit: str = "voxels",
+           splat: str = "ball") -> list[wire.Packed]:
     array, element = positions(at, "points")
-    color, each = _split_colors(colors_.many(colors, len(array), cmap))
-    thickness = _thickness(width, unit)
-    head = pb.Points(thickness=thickness).SerializeToString() if thickness else b""
+    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
+    head = pb.Points(thickness=thickness(width, unit), splat=choice(_SPLATS, splat, "splat")).SerializeToString()
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
-    return [_primitive(wire.Field.POINTS, "points", head,
+    return [packed("points", head,
                        wire.vertices(array[r], element, None if each is None else each[r]), color)
             for r in _pieces(len(array), size)]
 
@@ -79,7 +81,7 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
     strips, each_strip = (array.shape[0], array.shape[1]) if many else (1, len(array))
     array, element = positions(array.reshape(-1, 3) if many else at, "lines")
     topology = choice(_MODES, mode or ("strip"), "mode")
-    color, each = _split_colors(colors_.many(colors, len(array), cmap))
+    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
     if many and each_strip > 2 or many and topology == pb.Segments.LOOP:
         # Strips side by side, as pairs.
         start = np.arange(len(array)).reshape(strips, each_strip)
@@ -98,24 +100,24 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
         array = np.concatenate([array, array[:1]])
         each = None if each is None else np.concatenate([each, each[:1]])
         topology = pb.Segments.STRIP
-    head = pb.Segments(topology=topology, sampling=choice(_SAMPLINGS, sampling, "sampling"),
-                       thickness=_thickness(width, unit)).SerializeToString()
+    head = pb.Segments(topology=topology, sampling=choice(SAMPLINGS, sampling, "sampling"),
+                       thickness=thickness(width, unit)).SerializeToString()
     whole, overlap = (2, 0) if topology == pb.Segments.LIST else (1, 1)
-    return [_primitive(wire.Field.SEGMENTS, "segments", head,
+    return [packed("segments", head,
                        wire.vertices(array[r], element, None if each is None else each[r]), color)
             for r in _pieces(len(array), size, whole, overlap)]
 
 
 def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Optional[Colors] = None,
-         cmap: Optional[str] = None, rule: str = "thin") -> list[wire.Packed]:
+         cmap: Optional[str] = None, rule: str = "thin", fill: str = "surface") -> list[wire.Packed]:
     """Triangles: of `faces`, or of the vertices three by three."""
     array, element = positions(at, "vertices")
-    color, each = _split_colors(colors_.many(colors, len(array), cmap))
-    head = pb.Mesh(rule=choice(RULES, rule, "rule")).SerializeToString()
+    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
+    head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill")).SerializeToString()
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
 
     def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
-        return _primitive(wire.Field.MESH, "mesh", head, wire.vertices(vertices, element, own, index), color)
+        return packed("mesh", head, wire.vertices(vertices, element, own, index), color)
 
     if faces is None:
         if len(array) % 3:
@@ -136,6 +138,8 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
 
 def solid(color: Optional[Colors], **kind: Any) -> list[wire.Packed]:
     """The one primitive of that kind."""
+    if isinstance(color, colors_.Gradient):
+        return [wire.message(pb.Primitive(color_scale=color.to_wire(), **kind))]
     rgb = None if color is None else pb.Color(rgb=colors_.one(color))
     return [wire.message(pb.Primitive(color=rgb, **kind))]
 
@@ -168,8 +172,9 @@ def cylinder(center: npt.ArrayLike, radius: float, height: float, *, color: Opti
         fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
 
 
-def instance(of: str, *, color: Optional[Colors] = None) -> list[wire.Packed]:
-    return solid(color, instance=pb.Instance(object=of))
+def instance(of: str, *, color: Optional[Colors] = None, tint: Optional[Colors] = None) -> list[wire.Packed]:
+    by = None if tint is None else pb.Color(rgb=colors_.one(tint, "tint"))
+    return solid(color, instance=pb.Instance(object=of, tint=by))
 
 
 def volume(array: npt.ArrayLike, *, threshold: Optional[float] = None, cmap: str = "viridis",

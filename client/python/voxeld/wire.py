@@ -45,9 +45,13 @@ class Field:
     PART_PRIMITIVE = _key(primitives_pb2.Object.Part.PRIMITIVE_FIELD_NUMBER)
     DEFINE_OBJECT = _key(scene_pb2.StreamRequest.DEFINE_OBJECT_FIELD_NUMBER)
     DEFINITION = _key(scene_pb2.DefineObject.DEFINITION_FIELD_NUMBER)
-    POINTS = _key(primitives_pb2.Primitive.POINTS_FIELD_NUMBER)
-    SEGMENTS = _key(primitives_pb2.Primitive.SEGMENTS_FIELD_NUMBER)
-    MESH = _key(primitives_pb2.Primitive.MESH_FIELD_NUMBER)
+    KINDS = {
+        "points": _key(primitives_pb2.Primitive.POINTS_FIELD_NUMBER),
+        "segments": _key(primitives_pb2.Primitive.SEGMENTS_FIELD_NUMBER),
+        "mesh": _key(primitives_pb2.Primitive.MESH_FIELD_NUMBER),
+        "curve": _key(primitives_pb2.Primitive.CURVE_FIELD_NUMBER),
+        "bezier_surface": _key(primitives_pb2.Primitive.BEZIER_SURFACE_FIELD_NUMBER),
+    }
     INDICES = _key(primitives_pb2.Vertices.INDICES_FIELD_NUMBER)
     COLORS = _key(primitives_pb2.Vertices.COLORS_FIELD_NUMBER)
     POSITIONS = _key(primitives_pb2.Vertices.POSITIONS_FIELD_NUMBER)
@@ -55,6 +59,8 @@ class Field:
         "points": _key(primitives_pb2.Points.VERTICES_FIELD_NUMBER),
         "segments": _key(primitives_pb2.Segments.VERTICES_FIELD_NUMBER),
         "mesh": _key(primitives_pb2.Mesh.VERTICES_FIELD_NUMBER),
+        "curve": _key(primitives_pb2.Curve.VERTICES_FIELD_NUMBER),
+        "bezier_surface": _key(primitives_pb2.BezierSurface.VERTICES_FIELD_NUMBER),
     }
 
 

@@ -56,7 +56,7 @@ class Expected:
         if rng.random() < 0.5:
             self.message.color.rgb = 0xFF8040
             before = primitives_pb2.Primitive(color=primitives_pb2.Color(rgb=0xFF8040)).SerializeToString()
-        key = {"points": wire.Field.POINTS, "segments": wire.Field.SEGMENTS, "mesh": wire.Field.MESH}[self.kind]
+        key = wire.Field.KINDS[self.kind]
         self.packed = wire.vertices(self.positions, element, self.colors, self.indices).inside(
             wire.Field.VERTICES[self.kind], head).inside(key, before)
 

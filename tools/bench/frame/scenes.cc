@@ -393,6 +393,14 @@ constexpr Named kScenes[] = {
        }
        return rows;
      }},
+    {"volume",
+     [](uint64_t, double share) -> std::vector<MakeScene> {
+       return {[=] { return SampledVolume(false, share); }};
+     }},
+    {"isosurface",
+     [](uint64_t, double share) -> std::vector<MakeScene> {
+       return {[=] { return SampledVolume(true, share); }};
+     }},
     {"mixed",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] { return Mixed(share, seed); }};

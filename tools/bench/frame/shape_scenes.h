@@ -16,6 +16,8 @@ Scene Gyroid(double share);
 Scene ImplicitSphere(int32_t n);
 // `count` instances of a sphere of radius 4 in 512³.
 Scene InstancedSpheres(uint64_t count, uint64_t seed);
+// 256³ numbers of 16 bits in 512³, turned: through a table of colours, or the surface at their middle.
+Scene SampledVolume(bool by_level, double share);
 // `count` coloured points in 512³.
 Scene CubePoints(uint64_t count, uint64_t seed);
 

@@ -12,15 +12,50 @@ constexpr ShapeExample kExamples[] = {
      "segments vertices='-0.8,-0.8,-0.8 0.8,-0.5,-0.5 0.6,0.7,-0.2 -0.6,0.5,0.1 -0.5,-0.5,0.4 "
      "0.5,-0.3,0.6 0.2,0.3,0.8' "
      "topology=strip thickness=4 color=cyan"},
+    {"points, soft",
+     "points vertices='-0.5,-0.4,-0.4 0.4,0.3,-0.1 -0.1,0.2,0.5' thickness=50 splat=soft "
+     "color=skyblue"},
     {"mesh",
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8' "
      "color=gold"},
+    {"curve",
+     "curve vertices='-0.8,-0.6,-0.5 -0.4,0.7,-0.2 0,-0.6,0 0.4,0.7,0.2 0.8,-0.6,0.5' turn=60,0,0 "
+     "thickness=3 color=orange"},
+    {"curve, B-spline",
+     "curve form=b_spline closed=true vertices='0.8,0,-0.4 0.3,0.5,0.4 -0.2,0.8,-0.4 -0.6,0.3,0.4 "
+     "-0.8,-0.4,-0.4 "
+     "0,-0.5,0.4 0.5,-0.8,-0.4' thickness=3 color=skyblue"},
+    {"arc", "arc radius=0.75 sweep=4.7 turn=30,20,0 thickness=3 color=lime"},
+    {"ellipse", "ellipse axis_a=0.85,0,0.3 axis_b=0,0.5,0 thickness=3 color=pink"},
+    {"helix",
+     "helix start=0,0,-0.8 end=0,0,0.8 radius=0.6 end_radius=0.2 turns=4 thickness=3 color=violet"},
+    {"bezier_surface",
+     "bezier_surface vertices='-0.8,-0.8,-0.6 -0.27,-0.8,0.2 0.27,-0.8,0.2 0.8,-0.8,-0.6 "
+     "-0.8,-0.27,0.2 -0.27,-0.27,1.1 "
+     "0.27,-0.27,1.1 0.8,-0.27,0.2 -0.8,0.27,0.2 -0.27,0.27,1.1 0.27,0.27,1.1 0.8,0.27,0.2 "
+     "-0.8,0.8,-0.6 "
+     "-0.27,0.8,0.2 0.27,0.8,0.2 0.8,0.8,-0.6' color=teal"},
+    {"arrow",
+     "arrow start=-0.7,-0.5,-0.6 end=0.6,0.5,0.7 shaft_radius=0.08 head_radius=0.25 color=red"},
+    {"text",
+     "text text='Aa ßΩ' height=0.55 position=0,-0.25,0 alignment=center facing=0,-1,0.4 up=0,0,1 "
+     "depth=0.15 color=gold"},
+    {"text, outline",
+     "text text=Rose style=outline height=0.5 position=0,0,-0.25 alignment=center facing=0,-1,0 "
+     "color=cyan"},
+    {"text, strokes",
+     "text text='one line\\nof strokes' style=strokes height=0.2 position=0,0,0.2 alignment=center "
+     "facing=0,-1,0 color=lime"},
     {"box", "box size=1.2,0.9,0.6 turn=20,10,30 color=orange"},
+    {"box, lines", "box size=1.2,0.9,0.6 fill=lines turn=20,10,30 color=orange"},
     {"sphere", "sphere radius=0.8 color=skyblue"},
+    {"sphere, dots", "sphere radius=0.8 fill=dots color=skyblue"},
     {"cylinder", "cylinder radius=0.5 height=1.4 turn=20,15,0 color=lime"},
     {"ellipsoid", "ellipsoid radii=0.9,0.6,0.35 turn=0,20,30 color=pink"},
     {"torus", "torus radius=0.6 tube_radius=0.22 turn=50,0,20 color=violet"},
+    {"torus, by a color_scale",
+     "torus radius=0.6 tube_radius=0.22 turn=50,0,20 color_scale.along=1,0,0 color_scale.colormap=plasma"},
     {"cone", "cone start=0,0,-0.8 end=0,0,0.8 start_radius=0.7 end_radius=0.1 color=red"},
     {"cone with round ends",
      "cone start=-0.5,-0.4,-0.4 end=0.5,0.4,0.4 start_radius=0.4 end_radius=0.15 round_ends=true "
@@ -41,6 +76,25 @@ constexpr ShapeExample kExamples[] = {
      "-0.3,-0.3,-0.5,-0.2,0.3,0.5,0.3,-0.2,-0.5,-0.3,-0.3,-0.5,-0.3,0.1,0.3,0.1,-0.3,-0.5,"
      "-0.3,-0.1,-0.4,-0.5,-0.3,-0.2,-0.3,-0.5,-0.4,-0.1,0.1,-0.2,-0.4,-0.5,-0.5,-0.5,-0.4,"
      "-0.2,0.1,0.4,0.1,-0.1,-0.3,-0.3,-0.3,-0.1,0.1,0.4"},
+    {"volume",
+     "volume grid.corner=-0.9,-0.9,-0.9 grid.edge_a=1.8,0,0 grid.edge_b=0,1.8,0 grid.edge_c=0,0,1.8 grid.size_a=6 "
+     "grid.size_b=6 grid.size_c=6 transfer.values=0.2,0.6,1.1 transfer.colors='blue red yellow' transfer.opacities=0,0.6,1 "
+     "grid.samples="
+     ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.1,.2,.2,.2,.2,.1,.1,.2,.3,.4,.5,.2,.0,.1,.1,.3,.3,.1,.0,.0,.0,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.1,.3,.2,.1,.1,.0,.3,.6,.6,.5,.4,.1,.3,.6,.7,.9,.9,.3,.1,.3,.3,.5,.5,.2,.0,.0,.1,.1,.1,.0,"
+     ".0,.1,.1,.0,.0,.0,.1,.3,.3,.1,.0,.0,.3,.8,.8,.4,.2,.1,.3,.8,.8,.6,.4,.1,.1,.3,.4,.3,.2,.1,.0,.1,.1,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.1,.2,.2,.1,.0,.0,.2,.4,.4,.2,.0,.0,.2,.4,.4,.2,.1,.0,.1,.2,.2,.1,.0,.0,.0,.0,.0,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0"},
+    {"isosurface",
+     "isosurface level=0.4 grid.corner=-0.9,-0.9,-0.9 grid.edge_a=1.8,0,0 grid.edge_b=0,1.8,0 grid.edge_c=0,0,1.8 "
+     "grid.size_a=6 grid.size_b=6 grid.size_c=6 color=pink grid.samples="
+     ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.1,.2,.2,.2,.2,.1,.1,.2,.3,.4,.5,.2,.0,.1,.1,.3,.3,.1,.0,.0,.0,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.1,.3,.2,.1,.1,.0,.3,.6,.6,.5,.4,.1,.3,.6,.7,.9,.9,.3,.1,.3,.3,.5,.5,.2,.0,.0,.1,.1,.1,.0,"
+     ".0,.1,.1,.0,.0,.0,.1,.3,.3,.1,.0,.0,.3,.8,.8,.4,.2,.1,.3,.8,.8,.6,.4,.1,.1,.3,.4,.3,.2,.1,.0,.1,.1,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.1,.2,.2,.1,.0,.0,.2,.4,.4,.2,.0,.0,.2,.4,.4,.2,.1,.0,.1,.2,.2,.1,.0,.0,.0,.0,.0,.0,.0,.0,"
+     ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0"},
     {"implicit", "x^2+y^2-z = 0 where x^2+y^2 <= 1"},
     {"implicit, by level",
      "implicit surface='sin(7*x)*cos(7*y)+sin(7*y)*cos(7*z)+sin(7*z)*cos(7*x) = 0 where "

@@ -12,6 +12,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
 #include "daemon/suggest/suggest.h"
 #include "gpu/affine.h"
@@ -181,6 +182,7 @@ absl::Status SetMessage(const FieldDescriptor& field, absl::string_view text, Me
   if (auto* box = dynamic_cast<v1::Box3*>(to)) return SetBox(name, text, box);
   if (auto* thickness = dynamic_cast<v1::Thickness*>(to))
     return SetThickness(name, text, thickness);
+  if (auto* color = dynamic_cast<v1::Color*>(to)) return SetColor(name, text, color);
   if (auto* vertices = dynamic_cast<v1::Vertices*>(to)) return SetVertices(name, text, vertices);
   if (auto* expression = dynamic_cast<v1::Expression*>(to)) {
     expression->set_text(std::string(text));
@@ -219,6 +221,14 @@ absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Mess
 
 absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Message* out) {
   const Reflection& reflection = *out->GetReflection();
+  if (field.is_repeated() && field.type() == FieldDescriptor::TYPE_FIXED32) {
+    for (const absl::string_view part : absl::StrSplit(text, ' ', absl::SkipEmpty())) {
+      v1::Color color;
+      if (absl::Status status = SetColor(field.name(), part, &color); !status.ok()) return status;
+      reflection.AddUInt32(out, &field, color.rgb());
+    }
+    return absl::OkStatus();
+  }
   if (field.is_repeated()) {
     if (field.cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) {
       return absl::InvalidArgumentError(
@@ -237,7 +247,8 @@ absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Mess
       return SetEnum(field, text, out);
     case FieldDescriptor::CPPTYPE_STRING:
       if (field.type() == FieldDescriptor::TYPE_BYTES) return SetBytes(field, text, out);
-      reflection.SetString(out, &field, std::string(text));
+      // A text's lines; a shell leaves \n as it is.
+      reflection.SetString(out, &field, absl::StrReplaceAll(text, {{"\\n", "\n"}}));
       return absl::OkStatus();
     case FieldDescriptor::CPPTYPE_BOOL:
       if (text != "true" && text != "false")
@@ -303,12 +314,32 @@ struct Placement {
   }
 };
 
+// A field by its name, or by those of the messages that it is in with points between, which are made: "grid.size_a".
+// Null: there is none.
+const FieldDescriptor* FindField(absl::string_view name, Message** within) {
+  for (;;) {
+    const std::pair<absl::string_view, absl::string_view> parts =
+        absl::StrSplit(name, absl::MaxSplits('.', 1));
+    const FieldDescriptor* const field =
+        (*within)->GetDescriptor()->FindFieldByName(std::string(parts.first));
+    if (field == nullptr || !absl::StrContains(name, '.')) return field;
+    if (field->message_type() == nullptr || field->is_repeated()) return nullptr;
+    *within = (*within)->GetReflection()->MutableMessage(*within, field);
+    name = parts.second;
+  }
+}
+
 // Of what every shape has; false if `setting` is none of it.
 absl::StatusOr<bool> SetCommon(const Setting& setting, Placement* placement, v1::Entity* out) {
   const auto& [name, value] = setting;
   absl::Status status;
   double number = 0;
-  if (name == "color") {
+  if (absl::StartsWith(name, "color_scale.")) {
+    Message* within = out->mutable_primitive();
+    const FieldDescriptor* const field = FindField(name, &within);
+    if (field == nullptr) return false;
+    status = SetField(*field, value, within);
+  } else if (name == "color") {
     status = SetColor(name, value, out->mutable_primitive()->mutable_color());
   } else if (name == "at") {
     status = SetVec3(name, value, &placement->at);
@@ -340,8 +371,11 @@ absl::Status SetShape(const FieldDescriptor& kind, const std::vector<Setting>& s
   v1::Primitive* const primitive = out->mutable_primitive();
   Message* const shape = primitive->GetReflection()->MutableMessage(primitive, &kind);
   for (const Setting& setting : settings) {
-    if (const FieldDescriptor* field = shape->GetDescriptor()->FindFieldByName(setting.name)) {
-      if (absl::Status status = SetField(*field, setting.value, shape); !status.ok()) return status;
+    Message* within = shape;
+    if (const FieldDescriptor* field = FindField(setting.name, &within)) {
+      if (absl::Status status = SetField(*field, setting.value, within); !status.ok()) {
+        return status;
+      }
       continue;
     }
     const absl::StatusOr<bool> common = SetCommon(setting, placement, out);
@@ -352,7 +386,7 @@ absl::Status SetShape(const FieldDescriptor& kind, const std::vector<Setting>& s
     for (int i = 0; i < fields; ++i)
       known[static_cast<size_t>(i)] = shape->GetDescriptor()->field(i)->name();
     for (const char* name :
-         {"color", "at", "scale", "turn", "priority", "erase", "label", "lifetime"}) {
+         {"color", "color_scale.colormap", "color_scale.along", "at", "scale", "turn", "priority", "erase", "label", "lifetime"}) {
       known.emplace_back(name);
     }
     return absl::InvalidArgumentError(absl::StrCat(

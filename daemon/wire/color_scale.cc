@@ -1,0 +1,180 @@
+#include "daemon/wire/color_scale.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/colormaps/colormaps.h"
+#include "gpu/implicit/field_shape.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using gpu::implicit::Vector;
+
+// Between two colours at t of 1, by channel.
+uint32_t Between(uint32_t a, uint32_t b, double t) {
+  uint32_t rgb = 0;
+  for (int shift = 16; shift >= 0; shift -= 8) {
+    const double from = (a >> shift) & 255, to = (b >> shift) & 255;
+    rgb = rgb << 8 | static_cast<uint32_t>(std::lround(from + (to - from) * t));
+  }
+  return rgb;
+}
+
+MaybeFault ToTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* out) {
+  const FieldPath colors(path, "colors");
+  if (in.colormap().empty() == in.colors().empty()) {
+    return Fault{FieldPath(path, "colormap").ToString(), Reason::kInvalidValue,
+                 in.colormap().empty() ? "is empty, and so is colors; give one of the two"
+                                       : "is given, and so is colors; give one of the two"};
+  }
+  if (!in.colormap().empty()) {
+    const std::optional<ColorTable> table = FindColormap(in.colormap());
+    if (!table.has_value()) {
+      return Fault{FieldPath(path, "colormap").ToString(), Reason::kNotFound,
+                   absl::StrCat("is ", Quote(in.colormap()),
+                                ", which is none; give a name of matplotlib's, as viridis")};
+    }
+    *out = *table;
+    return {};
+  }
+  if (in.colors_size() < 2 || in.colors_size() > 256) {
+    return Fault{colors.ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", in.colors_size(), "; give 2 to 256")};
+  }
+  for (int i = 0; i < in.colors_size(); ++i) {
+    if (in.colors(i) <= 0xFFFFFF) continue;
+    return Fault{
+        FieldPath(path, "colors", i).ToString(), Reason::kInvalidValue,
+        absl::StrCat("is 0x", absl::Hex(in.colors(i)), "; give 0xRRGGBB, at most 0xffffff")};
+  }
+  for (size_t i = 0; i < out->size(); ++i) {
+    const double place = static_cast<double>(i) / 255 * (in.colors_size() - 1);
+    const int first = std::min(static_cast<int>(place), in.colors_size() - 2);
+    (*out)[i] = Between(in.colors(first), in.colors(first + 1), place - first);
+  }
+  return {};
+}
+
+MaybeFault ToEnds(const FieldPath& path, const v1::ColorScale& in) {
+  if (auto fault = CheckFloat(FieldPath(path, "low"), in.low())) return fault;
+  if (auto fault = CheckFloat(FieldPath(path, "high"), in.high())) return fault;
+  if (in.low() == in.high() && in.low() != 0) {
+    return Fault{FieldPath(path, "high").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(in.high()), " as low is; give another number")};
+  }
+  return {};
+}
+
+// (p · along) / |along|².
+MaybeFault ToAlong(const FieldPath& path, const v1::ColorScale& in, Vector* out) {
+  const FieldPath at(path, "along");
+  if (auto fault = CheckVec3(at, in.along())) return fault;
+  const Vector along = {in.along().x(), in.along().y(), in.along().z()};
+  const double square = gpu::implicit::Dot(along, along);
+  if (!(square > 0) || !std::isfinite(square)) {
+    return Fault{at.ToString(), Reason::kInvalidValue, "has no direction; give one that is not 0"};
+  }
+  *out = 1 / square * along;
+  return {};
+}
+
+}  // namespace
+
+MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
+                          const DecodeContext& context, GeometryData* out) {
+  ScaleTable table;
+  if (auto fault = ToTable(path, in, &table)) return fault;
+  if (auto fault = ToEnds(path, in)) return fault;
+  if (out->record.color_mode == gpu::ColorMode::kPerVertex) {
+    return Fault{path.ToString(), Reason::kInvalidValue,
+                 "is given, and so are colours of vertices; give one of the two"};
+  }
+  const size_t count = out->record.vertex_count;
+  std::vector<float> numbers(count);
+  if (in.has_along() == !in.scalars().empty()) {
+    return Fault{FieldPath(path, "along").ToString(), Reason::kInvalidValue,
+                 in.has_along() ? "is given, and so is scalars; give one of the two"
+                                : "is missing, and so is scalars; give one of the two"};
+  }
+  if (in.has_along()) {
+    Vector along;
+    if (auto fault = ToAlong(path, in, &along)) return fault;
+    const std::span<const float> p = out->arrays.positions();
+    for (size_t i = 0; i < count; ++i) {
+      numbers[i] = static_cast<float>(gpu::implicit::Dot(
+          along, {static_cast<double>(p[i * 3]), static_cast<double>(p[i * 3 + 1]),
+                  static_cast<double>(p[i * 3 + 2])}));
+    }
+  } else {
+    if (in.scalars().size() != count * sizeof(float)) {
+      return Fault{FieldPath(path, "scalars").ToString(), Reason::kSizeMismatch,
+                   absl::StrCat("has ", in.scalars().size(), " bytes; ", count, " vertices take ",
+                                count * sizeof(float))};
+    }
+    std::memcpy(numbers.data(), in.scalars().data(), in.scalars().size());
+    for (size_t i = 0; i < count; ++i) {
+      if (auto fault = CheckFinite(FieldPath(path, "scalars", static_cast<int64_t>(i)),
+                                   static_cast<double>(numbers[i]))) {
+        return fault;
+      }
+    }
+  }
+  double low = in.low(), high = in.high();
+  if (low == high) {
+    const auto [least, greatest] = std::minmax_element(numbers.begin(), numbers.end());
+    low = static_cast<double>(*least);
+    high = static_cast<double>(*greatest);
+  }
+  gpu::GeometryRecord record = out->record;
+  record.color_mode = gpu::ColorMode::kPerVertex;
+  absl::StatusOr<gpu::GeometryArrays> colored = gpu::GeometryArrays::Allocate(record, context.pool);
+  if (!colored.ok()) {
+    return Fault{path.ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("colours cannot be kept: ", colored.status().message())};
+  }
+  std::copy(out->arrays.positions().begin(), out->arrays.positions().end(),
+            colored->writable_positions().begin());
+  std::copy(out->arrays.indices().begin(), out->arrays.indices().end(),
+            colored->writable_indices().begin());
+  for (size_t i = 0; i < count; ++i) {
+    const double level = high == low ? 0 : (static_cast<double>(numbers[i]) - low) / (high - low);
+    colored->writable_colors()[i] =
+        table[static_cast<size_t>(std::lround(std::clamp(level, 0.0, 1.0) * 255))];
+  }
+  out->record = record;
+  out->arrays = *std::move(colored);
+  return {};
+}
+
+MaybeFault ToLevel(const FieldPath& path, const v1::ColorScale& in, const double min[3],
+                   const double max[3], gpu::implicit::Graph& graph,
+                   gpu::implicit::Graph::Node* level, ScaleTable* table) {
+  if (auto fault = ToTable(path, in, table)) return fault;
+  if (auto fault = ToEnds(path, in)) return fault;
+  if (!in.scalars().empty()) {
+    return Fault{FieldPath(path, "scalars").ToString(), Reason::kInvalidValue,
+                 "is given, but the shape has no vertices; give along"};
+  }
+  Vector along;
+  if (auto fault = ToAlong(path, in, &along)) return fault;
+  double low = in.low(), high = in.high();
+  if (low == high) {
+    low = high = 0;
+    for (int a = 0; a < 3; ++a) {
+      low += std::min(along[a] * min[a], along[a] * max[a]);
+      high += std::max(along[a] * min[a], along[a] * max[a]);
+    }
+    if (low == high) high = low + 1;
+  }
+  *level = graph.Mul(gpu::implicit::Along(graph, along, low), graph.Constant(1 / (high - low)));
+  return {};
+}
+
+}  // namespace voxeld::daemon::wire

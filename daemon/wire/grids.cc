@@ -1,0 +1,346 @@
+#include "daemon/wire/grids.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/colormaps/colormaps.h"
+#include "daemon/scene/bounds.h"
+#include "daemon/wire/fields.h"
+#include "gpu/implicit/field_shape.h"
+#include "gpu/primitives/samples.h"
+#include "gpu/samples_bricks.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using gpu::SampleFilter;
+using gpu::SampleFormat;
+using gpu::SampleHead;
+using gpu::implicit::Vector;
+
+constexpr double kLeastSine = 1e-6;
+using Table = std::array<uint32_t, SampleHead::kTableEntries>;
+
+// A grid that has been checked.
+struct ReadGrid {
+  SampleHead head = {};
+  uint64_t samples = 0;
+  gpu::Affine map;  // samples' coordinates → the primitive's
+  const std::string* bytes = nullptr;
+
+  float Number(uint64_t i) const {
+    switch (head.format) {
+      case SampleFormat::kU8:
+        return static_cast<float>(static_cast<uint8_t>((*bytes)[i]));
+      case SampleFormat::kU16: {
+        uint16_t number;
+        std::memcpy(&number, bytes->data() + i * sizeof(number), sizeof(number));
+        return static_cast<float>(number);
+      }
+      default: {
+        float number;
+        std::memcpy(&number, bytes->data() + i * sizeof(number), sizeof(number));
+        return number;
+      }
+    }
+  }
+};
+
+MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, Vector* out) {
+  if (auto fault = CheckVec3(path, in)) return fault;
+  *out = {in.x(), in.y(), in.z()};
+  return {};
+}
+
+MaybeFault ToFormat(const FieldPath& path, const v1::Grid& in, bool colors, ReadGrid* out) {
+  switch (in.type()) {
+    case v1::ELEMENT_TYPE_UNSPECIFIED:
+    case v1::ELEMENT_TYPE_F32:
+      out->head.format = SampleFormat::kF32;
+      break;
+    case v1::ELEMENT_TYPE_U16:
+      out->head.format = SampleFormat::kU16;
+      break;
+    case v1::ELEMENT_TYPE_U8:
+      out->head.format = SampleFormat::kU8;
+      break;
+    case v1::ELEMENT_TYPE_RGBA8:
+      out->head.format = SampleFormat::kRgba8;
+      if (colors) break;
+      [[fallthrough]];
+    default:
+      return UnknownEnum(FieldPath(path, "type"), in.type(),
+                         colors ? "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16, ELEMENT_TYPE_U8, ELEMENT_TYPE_RGBA8"
+                                : "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16, ELEMENT_TYPE_U8");
+  }
+  switch (in.filter()) {
+    case v1::Grid::FILTER_UNSPECIFIED:
+    case v1::Grid::LINEAR:
+      out->head.filter = SampleFilter::kLinear;
+      return {};
+    case v1::Grid::NEAREST:
+      out->head.filter = SampleFilter::kNearest;
+      return {};
+    default:
+      return UnknownEnum(FieldPath(path, "filter"), in.filter(), "LINEAR, NEAREST");
+  }
+}
+
+MaybeFault ToPlace(const FieldPath& path, const v1::Grid& in, ReadGrid* out) {
+  Vector corner, edges[3];
+  if (auto fault = ToVector(FieldPath(path, "corner"), in.corner(), &corner)) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_a"), in.edge_a(), &edges[0])) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_b"), in.edge_b(), &edges[1])) return fault;
+  if (auto fault = ToVector(FieldPath(path, "edge_c"), in.edge_c(), &edges[2])) return fault;
+  double product = 1;
+  for (const Vector& edge : edges) product *= gpu::implicit::Length(edge);
+  const double volume = gpu::implicit::Dot(edges[0], gpu::implicit::Cross(edges[1], edges[2]));
+  if (!(std::fabs(volume) > kLeastSine * product)) {
+    return Fault{FieldPath(path, "edge_c").ToString(), Reason::kInvalidValue,
+                 "spans no volume with edge_a and edge_b; give edges in three directions"};
+  }
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) out->map.m[r * 4 + c] = edges[c][r] / out->head.size[c];
+    out->map.m[r * 4 + 3] = corner[r];
+  }
+  return {};
+}
+
+MaybeFault ToGrid(const FieldPath& path, const v1::Grid& in, bool colors, const Limits& limits,
+                  ReadGrid* out) {
+  if (auto fault = ToFormat(path, in, colors, out)) return fault;
+  const std::pair<const char*, uint32_t> sizes[] = {
+      {"size_a", in.size_a()}, {"size_b", in.size_b()}, {"size_c", in.size_c()}};
+  out->samples = 1;
+  for (int a = 0; a < 3; ++a) {
+    const uint32_t size = sizes[a].second;
+    if (size < 1 || size > SampleHead::kMostAlong) {
+      return Fault{FieldPath(path, sizes[a].first).ToString(), Reason::kInvalidValue,
+                   absl::StrCat("is ", size, "; give 1 to ", SampleHead::kMostAlong)};
+    }
+    out->head.size[a] = size;
+    out->samples *= size;
+  }
+  if (SampleHead::WordsOf(out->head.format, out->samples) > limits.max_indices_per_entity) {
+    return Fault{FieldPath(path, "size_a").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("makes ", out->samples, " samples; max_indices_per_entity allows ",
+                              limits.max_indices_per_entity, " words of 4 bytes")};
+  }
+  const uint64_t each = out->head.format == SampleFormat::kU8    ? 1
+                        : out->head.format == SampleFormat::kU16 ? 2
+                                                                 : 4;
+  const FieldPath samples(path, "samples");
+  if (in.samples().size() != out->samples * each) {
+    return Fault{samples.ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", in.samples().size(), " bytes; ", out->samples,
+                              " samples take ", out->samples * each)};
+  }
+  out->bytes = &in.samples();
+  for (uint64_t i = 0; out->head.format == SampleFormat::kF32 && i < out->samples; ++i) {
+    if (!std::isinf(out->Number(i))) continue;
+    return Fault{FieldPath(path, "samples", static_cast<int64_t>(i)).ToString(),
+                 Reason::kInvalidValue, "is infinite; give finite numbers, or none (NaN)"};
+  }
+  return ToPlace(path, in, out);
+}
+
+uint32_t Between(uint32_t a, uint32_t b, double t) {
+  uint32_t rgb = 0;
+  for (int shift = 16; shift >= 0; shift -= 8) {
+    const double from = (a >> shift) & 255, to = (b >> shift) & 255;
+    rgb = rgb << 8 | static_cast<uint32_t>(std::lround(from + (to - from) * t));
+  }
+  return rgb;
+}
+
+MaybeFault CheckTransfer(const FieldPath& path, const v1::Transfer& in) {
+  const int count = in.values_size();
+  if (count < 2 || count > 256) {
+    return Fault{FieldPath(path, "values").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", count, "; give 2 to 256")};
+  }
+  for (int i = 0; i < count; ++i) {
+    const FieldPath at(path, "values", i);
+    if (auto fault = CheckFloat(at, in.values(i))) return fault;
+    if (i > 0 && in.values(i) < in.values(i - 1)) {
+      return Fault{at.ToString(), Reason::kInvalidValue,
+                   absl::StrCat("is ", Show(in.values(i)), " after ", Show(in.values(i - 1)),
+                                "; give values that do not descend")};
+    }
+  }
+  if (!(in.values(0) < in.values(count - 1))) {
+    return Fault{FieldPath(path, "values", count - 1).ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(in.values(0)), " as the first; give a greater one")};
+  }
+  if (in.colors().empty() == in.colormap().empty()) {
+    return Fault{FieldPath(path, "colormap").ToString(), Reason::kInvalidValue,
+                 in.colormap().empty() ? "is empty, and so is colors; give one of the two"
+                                       : "is given, and so is colors; give one of the two"};
+  }
+  if (!in.colors().empty() && in.colors_size() != count) {
+    return Fault{FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", in.colors_size(), " for ", count, " values; give one for each")};
+  }
+  for (int i = 0; i < in.colors_size(); ++i) {
+    if (in.colors(i) <= 0xFFFFFF) continue;
+    return Fault{FieldPath(path, "colors", i).ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is 0x", absl::Hex(in.colors(i)), "; give 0xRRGGBB, at most 0xffffff")};
+  }
+  if (!in.opacities().empty() && in.opacities_size() != count) {
+    return Fault{
+        FieldPath(path, "opacities").ToString(), Reason::kSizeMismatch,
+        absl::StrCat("has ", in.opacities_size(), " for ", count, " values; give one for each, or none")};
+  }
+  for (int i = 0; i < in.opacities_size(); ++i) {
+    if (in.opacities(i) >= 0 && in.opacities(i) <= 1) continue;
+    return Fault{FieldPath(path, "opacities", i).ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(in.opacities(i)), "; give 0 to 1")};
+  }
+  return {};
+}
+
+MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* head, Table* out) {
+  if (auto fault = CheckTransfer(path, in)) return fault;
+  std::optional<ColorTable> map;
+  if (!in.colormap().empty()) {
+    map = FindColormap(in.colormap());
+    if (!map.has_value()) {
+      return Fault{FieldPath(path, "colormap").ToString(), Reason::kNotFound,
+                   absl::StrCat("is ", Quote(in.colormap()),
+                                ", which is none; give a name of matplotlib's, as viridis")};
+    }
+  }
+  const double low = in.values(0), high = in.values(in.values_size() - 1);
+  head->low = static_cast<float>(low);
+  head->scale = static_cast<float>(SampleHead::kTableEntries / (high - low));
+  int stop = 0;
+  for (size_t i = 0; i < out->size(); ++i) {
+    const double value = low + (static_cast<double>(i) + 0.5) / SampleHead::kTableEntries * (high - low);
+    while (stop + 2 < in.values_size() && in.values(stop + 1) <= value) ++stop;
+    const double from = in.values(stop), to = in.values(stop + 1);
+    const double t = to > from ? std::clamp((value - from) / (to - from), 0.0, 1.0) : 1;
+    const uint32_t rgb = map.has_value() ? (*map)[i] : Between(in.colors(stop), in.colors(stop + 1), t);
+    const double opacity = in.opacities().empty()
+                               ? 1
+                               : in.opacities(stop) + (in.opacities(stop + 1) - in.opacities(stop)) * t;
+    (*out)[i] = opacity > 0 ? Between(0, rgb, opacity) | SampleHead::kDrawn : 0;
+  }
+  return {};
+}
+
+// Least and greatest of the numbers; false if there is none.
+bool FindRange(const ReadGrid& grid, float* least, float* greatest) {
+  bool any = false;
+  for (uint64_t i = 0; i < grid.samples; ++i) {
+    const float number = grid.Number(i);
+    if (std::isnan(number)) continue;
+    *least = any ? std::min(*least, number) : number;
+    *greatest = any ? std::max(*greatest, number) : number;
+    any = true;
+  }
+  return any;
+}
+
+// What is above the middle, in one colour.
+void SetHalf(const ReadGrid& grid, uint32_t color, SampleHead* head, Table* out) {
+  float least = 0, greatest = 1;
+  if (!FindRange(grid, &least, &greatest) || least == greatest) greatest = least + 1;
+  head->low = least;
+  head->scale = static_cast<float>(SampleHead::kTableEntries / (double{greatest} - double{least}));
+  for (size_t i = 0; i < out->size(); ++i) {
+    (*out)[i] = i < out->size() / 2 ? 0 : color | SampleHead::kDrawn;
+  }
+}
+
+MaybeFault Finish(const FieldPath& path, const ReadGrid& grid, const Table& table,
+                  const gpu::GeometryRecord& look, const DecodeContext& context, GroupData* out) {
+  auto data = std::make_shared<GeometryData>();
+  gpu::GeometryRecord& record = data->record;
+  record = look;
+  record.kind = gpu::PrimitiveKind::kSamples;
+  SampleHead head = grid.head;
+  head.bricks = gpu::BrickWords(head.size);
+  const uint64_t words = gpu::SampleWords(head.size, static_cast<uint32_t>(head.format));
+  record.index_count = static_cast<uint32_t>(words);
+  absl::StatusOr<gpu::GeometryArrays> kept = gpu::GeometryArrays::Allocate(record, context.pool);
+  if (!kept.ok()) {
+    return Fault{path.ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("cannot be kept: ", kept.status().message())};
+  }
+  data->arrays = *std::move(kept);
+  const std::span<uint32_t> all = data->arrays.writable_indices();
+  std::memcpy(all.data(), &head, sizeof(head));
+  std::copy(table.begin(), table.end(), all.begin() + gpu::kSampleHeadWords);
+  const std::span<uint32_t> samples =
+      all.subspan(gpu::kSampleHeadWords + SampleHead::kTableEntries + head.bricks);
+  samples.back() = 0;  // beyond the last sample
+  std::memcpy(samples.data(), grid.bytes->data(), grid.bytes->size());
+  if (head.format == SampleFormat::kRgba8) {
+    for (uint32_t& word : samples) {  // 0xAARRGGBB
+      word = (word & 0xFF00FF00u) | (word & 0xFFu) << 16 | (word >> 16 & 0xFFu);
+    }
+  }
+  gpu::FillBricks(record, all);
+  Bounds box;
+  box.empty = false;
+  for (int a = 0; a < 3; ++a) box.max[a] = data->max[a] = grid.head.size[a];
+  const Bounds mapped = MapBounds(grid.map, box);
+  std::copy_n(mapped.min, 3, out->min);
+  std::copy_n(mapped.max, 3, out->max);
+  out->color = look.color;
+  out->parts.push_back({std::move(data), grid.map});
+  return {};
+}
+
+}  // namespace
+
+MaybeFault ToVolume(const FieldPath& path, const v1::Volume& in, uint32_t color,
+                    const DecodeContext& context, GroupData* out) {
+  ReadGrid grid;
+  if (auto fault = ToGrid(FieldPath(path, "grid"), in.grid(), true, context, &grid)) return fault;
+  Table table = {};
+  const FieldPath transfer(path, "transfer");
+  if (grid.head.format == SampleFormat::kRgba8) {
+    if (in.has_transfer()) {
+      return Fault{transfer.ToString(), Reason::kInvalidValue,
+                   "is given, but the samples are colours; leave it unset, or give numbers"};
+    }
+  } else if (in.has_transfer()) {
+    if (auto fault = ToTable(transfer, in.transfer(), &grid.head, &table)) return fault;
+  } else {
+    SetHalf(grid, color, &grid.head, &table);
+  }
+  gpu::GeometryRecord look;
+  look.color = color;
+  return Finish(path, grid, table, look, context, out);
+}
+
+MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_t color,
+                        const DecodeContext& context, GroupData* out) {
+  ReadGrid grid;
+  gpu::GeometryRecord look;
+  look.color = color;
+  if (auto fault = ToGrid(FieldPath(path, "grid"), in.grid(), false, context, &grid)) return fault;
+  if (auto fault = CheckFloat(FieldPath(path, "level"), in.level())) return fault;
+  if (auto fault = ToFill(path, in.fill(), &look)) return fault;
+  if (auto fault = ToRule(path, in.rule(), &look)) return fault;
+  if (auto fault = ToThickness(FieldPath(path, "shell"), in.shell(), context, &look)) return fault;
+  grid.head.by_level = 1;
+  grid.head.level = static_cast<float>(in.level());
+  // Thickness in the primitive's units, of which a sample is as many as its cell's edge.
+  if (look.thickness_unit == gpu::ThicknessUnit::kUnits) {
+    look.thickness /= static_cast<float>(std::cbrt(std::fabs(gpu::Determinant(grid.map))));
+  }
+  return Finish(path, grid, {}, look, context, out);
+}
+
+}  // namespace voxeld::daemon::wire

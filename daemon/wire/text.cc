@@ -1,0 +1,324 @@
+#include "daemon/wire/text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "daemon/scene/bounds.h"
+#include "daemon/text/fonts.h"
+#include "daemon/text/line_break.h"
+#include "daemon/text/stroke_font.h"
+#include "daemon/wire/curves.h"
+#include "daemon/wire/fields.h"
+#include "daemon/wire/shapes.h"
+#include "gpu/primitives/polygon.h"
+#include "gpu/primitives/prism.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using gpu::implicit::Vector;
+
+constexpr size_t kMostBytes = 64 << 10;
+constexpr double kFlatness = 1.0 / 1500;  // of what letters' curves become, capital heights
+constexpr const char* kStrokeFont = "futural";
+constexpr double kStrokeLine = 1.6;  // from one line of strokes to the next, capital heights
+
+// Where the text stands: letters' x, y and z, in capital heights, to the primitive's coordinates.
+struct Place {
+  Vector origin, right, up, facing;  // of the height's length
+
+  Vector At(double x, double y) const { return origin + x * right + y * up; }
+  gpu::Affine Map(double x, double y) const {
+    const Vector at = At(x, y);
+    gpu::Affine map;
+    for (int a = 0; a < 3; ++a) {
+      map.m[a * 4] = right[a];
+      map.m[a * 4 + 1] = up[a];
+      map.m[a * 4 + 2] = facing[a];
+      map.m[a * 4 + 3] = at[a];
+    }
+    return map;
+  }
+};
+
+MaybeFault ToPlace(const FieldPath& path, const v1::Text& in, Place* out) {
+  if (auto fault = CheckPositive(FieldPath(path, "height"), in.height())) return fault;
+  if (auto fault = CheckVec3(FieldPath(path, "position"), in.position())) return fault;
+  if (auto fault = CheckVec3(FieldPath(path, "facing"), in.facing())) return fault;
+  if (auto fault = CheckVec3(FieldPath(path, "up"), in.up())) return fault;
+  const Vector facing =
+      in.has_facing() ? Vector{in.facing().x(), in.facing().y(), in.facing().z()} : Vector{0, 0, 1};
+  Vector up, left;
+  if (in.has_up()) {
+    if (!gpu::FrameOf(facing, {in.up().x(), in.up().y(), in.up().z()}, &up, &left)) {
+      return Fault{FieldPath(path, "up").ToString(), Reason::kInvalidValue,
+                   "lies along facing, or one of the two is 0; give two directions"};
+    }
+  } else if (!gpu::FrameOf(facing, {0, 1, 0}, &up, &left) &&
+             !gpu::FrameOf(facing, {0, 0, 1}, &up, &left)) {
+    return Fault{FieldPath(path, "facing").ToString(), Reason::kInvalidValue,
+                 "has no direction; give one that is not 0"};
+  }
+  const double height = in.height();
+  *out = {{in.position().x(), in.position().y(), in.position().z()},
+          -height * left,
+          height * up,
+          (height / gpu::implicit::Length(facing)) * facing};
+  return {};
+}
+
+struct Wording {
+  text::Layout layout;
+  double depth = 0;  // capital heights
+};
+
+MaybeFault ToWording(const FieldPath& path, const v1::Text& in, Wording* out) {
+  if (in.text().size() > kMostBytes) {
+    return Fault{FieldPath(path, "text").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("has ", in.text().size(), " bytes; give at most ", kMostBytes)};
+  }
+  switch (in.alignment()) {
+    case v1::Text::ALIGNMENT_UNSPECIFIED:
+    case v1::Text::LEFT:
+      break;
+    case v1::Text::CENTER:
+      out->layout.alignment = text::Alignment::kCenter;
+      break;
+    case v1::Text::RIGHT:
+      out->layout.alignment = text::Alignment::kRight;
+      break;
+    default:
+      return UnknownEnum(FieldPath(path, "alignment"), in.alignment(), "LEFT, CENTER, RIGHT");
+  }
+  const std::pair<const char*, double> lengths[] = {
+      {"line_spacing", in.line_spacing()}, {"width", in.width()}, {"depth", in.depth()}};
+  for (const auto& [name, value] : lengths) {
+    const FieldPath at(path, name);
+    if (auto fault = CheckFloat(at, value)) return fault;
+    if (value < 0) {
+      return Fault{at.ToString(), Reason::kInvalidValue,
+                   absl::StrCat("is ", Show(value), "; give 0 or more")};
+    }
+  }
+  if (in.depth() > 0 && in.style() != v1::Text::STYLE_UNSPECIFIED &&
+      in.style() != v1::Text::FILLED) {
+    return Fault{FieldPath(path, "depth").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(in.depth()), ", but only FILLED letters have one")};
+  }
+  out->layout.font = in.font();
+  out->layout.line_spacing = in.line_spacing() == 0 ? 1 : in.line_spacing();
+  out->layout.width = in.width() / in.height();
+  out->depth = in.depth() / in.height();
+  return {};
+}
+
+Fault FromStatus(const FieldPath& path, const absl::Status& status) {
+  const bool text = absl::IsInvalidArgument(status);
+  const Reason reason = absl::IsNotFound(status) ? Reason::kNotFound
+                        : text                   ? Reason::kInvalidValue
+                                                 : Reason::kUnimplemented;
+  return {FieldPath(path, text ? "text" : "font").ToString(), reason,
+          std::string(status.message())};
+}
+
+// A contour's curves as straight pieces, none farther from them than kFlatness; its last point is its first.
+void Flatten(const text::Contour& contour, std::vector<Vector>* out) {
+  for (size_t i = 0; i + 4 <= contour.size(); i += 4) {
+    Vector p[4];
+    for (size_t k = 0; k < 4; ++k) p[k] = {contour[i + k].x, contour[i + k].y, 0};
+    const double bend = std::max(gpu::implicit::Length(p[0] - 2 * p[1] + p[2]),
+                                 gpu::implicit::Length(p[1] - 2 * p[2] + p[3]));
+    const int parts = std::max(1, static_cast<int>(std::ceil(std::sqrt(0.75 * bend / kFlatness))));
+    for (int k = 0; k < parts; ++k) {
+      const double t = static_cast<double>(k) / parts, s = 1 - t;
+      out->push_back(s * s * s * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] +
+                     t * t * t * p[3]);
+    }
+  }
+}
+
+// One letter, flat or solid, in its own coordinates.
+MaybeFault ToLetter(const FieldPath& path, const text::Glyph& glyph, double depth,
+                    const ShapeContext& context, GeometryData* out) {
+  std::vector<Vector> points;
+  std::vector<uint32_t> ends;
+  for (const text::Contour& contour : glyph.contours) {
+    Flatten(contour, &points);
+    ends.push_back(static_cast<uint32_t>(points.size()));
+  }
+  if (points.size() > context.context.limits.max_boundary_points) {
+    return Fault{
+        path.ToString(), Reason::kQuotaExceeded,
+        absl::StrCat("has a letter of ", points.size(), " vertices; max_boundary_points is ",
+                     context.context.limits.max_boundary_points)};
+  }
+  gpu::implicit::Graph graph;
+  if (depth > 0) {
+    out->record.fill = gpu::Fill::kSolid;
+    return ToField(path, context, graph, gpu::Prism{points, ends, depth}.Make(graph), out);
+  }
+  return ToField(path, context, graph, gpu::Polygon{points, ends}.Make(graph), out);
+}
+
+MaybeFault ToLetters(const FieldPath& path, const text::LaidOut& laid, const Place& place,
+                     double depth, const gpu::GeometryRecord& look, const DecodeContext& context,
+                     GroupData* out) {
+  if (laid.glyphs.size() > context.limits.max_parts_per_object) {
+    return Fault{FieldPath(path, "text").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("makes ", laid.glyphs.size(), " letters; max_parts_per_object is ",
+                              context.limits.max_parts_per_object)};
+  }
+  std::map<const text::Glyph*, GeometryPtr> made;
+  for (const text::PlacedGlyph& placed : laid.glyphs) {
+    GeometryPtr& geometry = made[placed.glyph.get()];
+    if (geometry == nullptr) {
+      auto data = std::make_shared<GeometryData>();
+      data->record = look;
+      if (auto fault = ToLetter(path, *placed.glyph, depth, {context, path, nullptr}, data.get())) {
+        return fault;
+      }
+      geometry = std::move(data);
+    }
+    out->parts.push_back({geometry, place.Map(placed.x, placed.y)});
+  }
+  std::stable_sort(out->parts.begin(), out->parts.end(), [](const auto& a, const auto& b) {
+    return a.geometry.get() < b.geometry.get();
+  });
+  bool first = true;
+  for (const GroupData::Part& part : out->parts) {
+    Bounds box;
+    box.empty = false;
+    std::copy_n(part.geometry->min, 3, box.min);
+    std::copy_n(part.geometry->max, 3, box.max);
+    const Bounds mapped = MapBounds(part.transform, box);
+    for (int a = 0; a < 3; ++a) {
+      out->min[a] = first ? mapped.min[a] : std::min(out->min[a], mapped.min[a]);
+      out->max[a] = first ? mapped.max[a] : std::max(out->max[a], mapped.max[a]);
+    }
+    first = false;
+  }
+  return {};
+}
+
+// Strokes of lines, broken like any text, as straight spans.
+MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layout& layout,
+                     const Place& place, gpu::Spans* out) {
+  const absl::StatusOr<text::StrokeFont> font =
+      text::StrokeFont::Load(layout.font.empty() ? kStrokeFont : layout.font);
+  if (!font.ok()) return FromStatus(path, font.status());
+  for (size_t i = 0; i < in.text().size(); ++i) {
+    const auto c = static_cast<unsigned char>(in.text()[i]);
+    if (c == '\n' || (c >= 0x20 && c < 0x7F)) continue;
+    return Fault{
+        FieldPath(path, "text").ToString(), Reason::kInvalidValue,
+        absl::StrCat("has a character at byte ", i,
+                     " that stroke fonts have not; give ASCII, or the style FILLED or OUTLINE")};
+  }
+  double base = 0;
+  const std::vector<std::string> paragraphs = absl::StrSplit(in.text(), '\n');
+  for (const std::string& paragraph : paragraphs) {
+    std::vector<text::Word> words;
+    for (size_t i = 0; i < paragraph.size();) {
+      size_t end = i + 1;
+      while (end < paragraph.size() && (paragraph[end] == ' ') == (paragraph[i] == ' ')) ++end;
+      const double advance =
+          static_cast<double>(font->Lay(std::string_view(paragraph).substr(i, end - i)).width);
+      words.push_back({i, end, advance, paragraph[i] == ' '});
+      i = end;
+    }
+    for (const text::TextLine& line : text::BreakLines(words, layout.width)) {
+      if (line.begin < line.end) {
+        const size_t begin = words[line.begin].begin, end = words[line.end - 1].end;
+        const text::StrokeFont::Line laid =
+            font->Lay(std::string_view(paragraph).substr(begin, end - begin));
+        const double shift = layout.alignment == text::Alignment::kLeft     ? 0.0
+                             : layout.alignment == text::Alignment::kCenter ? -0.5
+                                                                            : -1.0;
+        const double from = shift * static_cast<double>(laid.width);
+        for (const text::Stroke& stroke : laid.strokes) {
+          const auto at = [&](size_t i) {
+            return place.At(from + static_cast<double>(stroke[i].x),
+                            base + static_cast<double>(stroke[i].y));
+          };
+          for (size_t i = 0; i + 1 < stroke.size(); ++i) out->Line(at(i), at(i + 1));
+        }
+      }
+      base -= kStrokeLine * layout.line_spacing;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+MaybeFault ToText(const FieldPath& path, const v1::Primitive& primitive, uint32_t color,
+                  const DecodeContext& context, Content* out) {
+  const v1::Text& in = primitive.text();
+  Place place;
+  Wording wording;
+  gpu::GeometryRecord look;
+  look.color = color;
+  if (auto fault = ToPlace(path, in, &place)) return fault;
+  if (auto fault = ToWording(path, in, &wording)) return fault;
+  if (auto fault = ToRule(path, in.rule(), &look)) return fault;
+  if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), context, &look)) {
+    return fault;
+  }
+  const bool lines = in.style() == v1::Text::OUTLINE || in.style() == v1::Text::STROKES;
+  if (!lines && in.style() != v1::Text::STYLE_UNSPECIFIED && in.style() != v1::Text::FILLED) {
+    return UnknownEnum(FieldPath(path, "style"), in.style(), "FILLED, OUTLINE, STROKES");
+  }
+  gpu::Spans spans;
+  text::LaidOut laid;
+  if (in.style() == v1::Text::STROKES) {
+    if (auto fault = ToStrokes(path, in, wording.layout, place, &spans)) return fault;
+  } else {
+    if (context.fonts == nullptr) {
+      return Unimplemented(path, "it was built without fonts; use the style STROKES");
+    }
+    absl::StatusOr<text::LaidOut> found = context.fonts->Lay(in.text(), wording.layout);
+    if (!found.ok()) return FromStatus(path, found.status());
+    laid = *std::move(found);
+  }
+  if (!lines) {
+    auto group = std::make_shared<GroupData>();
+    // Letters are made in capital heights.
+    if (look.thickness_unit == gpu::ThicknessUnit::kUnits)
+      look.thickness /= static_cast<float>(in.height());
+    if (auto fault = ToLetters(path, laid, place, wording.depth, look, context, group.get())) {
+      return fault;
+    }
+    group->kind = "text";
+    group->as_sent = primitive.SerializeAsString();
+    group->color = color;
+    *out = GroupPtr(std::move(group));
+    return {};
+  }
+  for (const text::PlacedGlyph& placed : laid.glyphs) {
+    for (const text::Contour& contour : placed.glyph->contours) {
+      for (size_t i = 0; i + 4 <= contour.size(); i += 4) {
+        const auto at = [&](size_t k) {
+          return place.At(placed.x + contour[i + k].x, placed.y + contour[i + k].y);
+        };
+        spans.Curve(at(0), at(1), at(2), at(3));
+      }
+    }
+  }
+  auto data = std::make_shared<GeometryData>();
+  data->record = look;
+  if (auto fault = SetSpans(path, spans, context, data.get())) return fault;
+  data->kind = "text";
+  data->as_sent = primitive.SerializeAsString();
+  *out = GeometryPtr(std::move(data));
+  return {};
+}
+
+}  // namespace voxeld::daemon::wire

@@ -1,0 +1,67 @@
+// Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space, so
+// that the error is one of voxels whatever the transform. On the host, in IEEE double, in the order
+// written there; every engine draws what comes out.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "gpu/affine.h"
+#include "gpu/delta.h"
+#include "gpu/primitives/fixed.h"
+#include "gpu/primitives/grid.h"
+
+namespace voxeld::gpu {
+
+// No point of a curve is farther from its segments than this, nor of a patch from its triangles,
+// voxels; snapping to a unit comes on top.
+inline constexpr double kCurveError = 0.125;
+inline constexpr double kPatchError = 0.25;
+// Of a patch along each of its sides, whatever its error.
+inline constexpr int32_t kMostPatchPieces = 512;
+
+// As a source's arrays, of kSegments or kTriangles.
+struct Cut {
+  GeometryRecord record;
+  std::vector<Int3> vertices;  // mapped and snapped
+  std::vector<uint32_t> indices, colors;
+
+  uint64_t bytes() const {
+    return vertices.size() * sizeof(Int3) + (indices.size() + colors.size()) * sizeof(uint32_t);
+  }
+};
+
+// `g`: IsCurved. `map` takes its coordinates to the voxels of `grid`. What lies outside of it is not cut
+// finely. Of curves a list of segments, two vertices each; of patches triangles, indexed.
+Cut CutCurved(const GeometryView& g, const Affine& map, const TileGrid& grid);
+
+namespace curves {
+
+struct Point {
+  double at[3] = {};
+};
+
+// Whether the hull of control points is out of reach: all of it past one face of the volume, widened by
+// `room` voxels.
+bool IsOutside(const Point* points, int count, const TileGrid& grid, double room);
+std::vector<Point> MapPoints(const GeometryView& g, const Affine& map);
+Int3 SnapOf(const Point& p);
+inline Point Mix(const Point& a, const Point& b, double t) {
+  Point m;
+  for (int i = 0; i < 3; ++i) m.at[i] = a.at[i] + (b.at[i] - a.at[i]) * t;
+  return m;
+}
+// |a − 2b + c|.
+double SecondDifference(const Point& a, const Point& b, const Point& c);
+// The point of a cubic Bézier at `t`, by de Casteljau; at 0 and 1 its ends.
+Point PointOn(const Point p[4], double t);
+// Of two colours, by channel, to the nearest level.
+uint32_t MixColors(uint32_t a, uint32_t b, double t);
+
+void CutCurves(const GeometryView& g, const std::vector<Point>& points, const TileGrid& grid,
+               double room, Cut& cut);
+void CutPatches(const GeometryView& g, const std::vector<Point>& points, const TileGrid& grid,
+                double room, Cut& cut);
+
+}  // namespace curves
+}  // namespace voxeld::gpu

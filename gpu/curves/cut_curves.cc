@@ -1,0 +1,84 @@
+// Cubic Béziers into segments.
+//
+// A piece of n even parts is no farther from the curve than max|B″|/(8n²), and |B″| is at most 6 times the
+// greater of the two second differences of its control points.
+#include <algorithm>
+#include <cmath>
+
+#include "gpu/curves/cut.h"
+
+namespace voxeld::gpu::curves {
+namespace {
+
+constexpr int kMostHalvings = 40;
+
+class Cutter {
+ public:
+  Cutter(const TileGrid& grid, double room, Cut& cut) : grid_(grid), room_(room), cut_(cut) {}
+
+  // From `from` to `to` of the colours' way, both in 0 to 1.
+  void Add(const Point p[4], double from, double to, const uint32_t* colors, int halvings) {
+    const double bend =
+        std::max(SecondDifference(p[0], p[1], p[2]), SecondDifference(p[1], p[2], p[3]));
+    const double square = 0.75 * bend / kCurveError;
+    if (!(square > 1) || IsOutside(p, 4, grid_, room_)) {
+      Segment(p[0], p[3], from, to, colors);
+      return;
+    }
+    // What has its ends inside is short; of all else only those parts that come near are cut finely.
+    if (halvings < kMostHalvings &&
+        (IsOutside(p, 1, grid_, room_) || IsOutside(p + 3, 1, grid_, room_))) {
+      Point left[4], right[4];
+      Halve(p, left, right);
+      const double middle = (from + to) / 2;
+      Add(left, from, middle, colors, halvings + 1);
+      Add(right, middle, to, colors, halvings + 1);
+      return;
+    }
+    const int parts = static_cast<int>(std::ceil(std::sqrt(std::min(square, 1e8))));
+    Point at = p[0];
+    for (int i = 1; i <= parts; ++i) {
+      const Point next = i == parts ? p[3] : PointOn(p, static_cast<double>(i) / parts);
+      Segment(at, next, from + (to - from) * (i - 1) / parts, from + (to - from) * i / parts,
+              colors);
+      at = next;
+    }
+  }
+
+ private:
+  static void Halve(const Point p[4], Point left[4], Point right[4]) {
+    const Point a = Mix(p[0], p[1], 0.5), b = Mix(p[1], p[2], 0.5), c = Mix(p[2], p[3], 0.5);
+    const Point ab = Mix(a, b, 0.5), bc = Mix(b, c, 0.5), middle = Mix(ab, bc, 0.5);
+    left[0] = p[0], left[1] = a, left[2] = ab, left[3] = middle;
+    right[0] = middle, right[1] = bc, right[2] = c, right[3] = p[3];
+  }
+
+  void Segment(const Point& a, const Point& b, double from, double to, const uint32_t* colors) {
+    cut_.vertices.push_back(SnapOf(a));
+    cut_.vertices.push_back(SnapOf(b));
+    if (colors == nullptr) return;
+    cut_.colors.push_back(MixColors(colors[0], colors[1], from));
+    cut_.colors.push_back(MixColors(colors[0], colors[1], to));
+  }
+
+  const TileGrid& grid_;
+  const double room_;
+  Cut& cut_;
+};
+
+}  // namespace
+
+void CutCurves(const GeometryView& g, const std::vector<Point>& points, const TileGrid& grid,
+               double room, Cut& cut) {
+  cut.record.kind = PrimitiveKind::kSegments;
+  cut.record.topology = Topology::kList;
+  const size_t step = g.record.topology == Topology::kStrip ? 3 : 4;
+  Cutter cutter(grid, room, cut);
+  for (size_t first = 0; first + 4 <= points.size(); first += step) {
+    const uint32_t ends[2] = {g.colors.empty() ? 0 : g.colors[first],
+                              g.colors.empty() ? 0 : g.colors[first + 3]};
+    cutter.Add(&points[first], 0, 1, g.colors.empty() ? nullptr : ends, 0);
+  }
+}
+
+}  // namespace voxeld::gpu::curves

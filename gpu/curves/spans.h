@@ -1,0 +1,85 @@
+// Cubic Béziers as they are put together: straight lines, arcs, handles. Words only; a list of 4 points
+// each, as kCurves has them.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "gpu/implicit/field_shape.h"
+
+namespace voxeld::gpu {
+
+class Spans {
+ public:
+  using Vector = implicit::Vector;
+
+  const std::vector<Vector>& points() const { return points_; }  // 4 a span
+  size_t size() const { return points_.size() / 4; }
+
+  void Curve(const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
+    points_.insert(points_.end(), {a, b, c, d});
+  }
+  void Line(const Vector& a, const Vector& b) {
+    Curve(a, a + (1.0 / 3) * (b - a), b - (1.0 / 3) * (b - a), b);
+  }
+  // The same curve as the quadratic one.
+  void Quadratic(const Vector& a, const Vector& b, const Vector& c) {
+    Curve(a, a + (2.0 / 3) * (b - a), c + (2.0 / 3) * (b - c), c);
+  }
+  // center + cos t·a + sin t·b, and `rise` per radian, from `start` on, through `sweep` radians. Of radius r
+  // it is no farther off than 7e-8·r; where it rises the place along that is.
+  void Arc(const Vector& center, const Vector& a, const Vector& b, double start, double sweep,
+           const Vector& rise = {}) {
+    Spiral(center, a, b, start, sweep, rise, 0);
+  }
+  // The same, a and b growing by `growth` of theirs per radian.
+  void Spiral(const Vector& center, const Vector& a, const Vector& b, double start, double sweep,
+              const Vector& rise, double growth) {
+    const double turns = std::fabs(sweep) / (2 * std::numbers::pi);
+    const auto count = static_cast<size_t>(std::ceil(turns * kSpansPerTurn - 1e-9));
+    const double step = sweep / static_cast<double>(count);
+    const double handle = 4.0 / 3 * std::tan(step / 4);
+    const auto at = [&](double t) {
+      const double grown = 1 + growth * (t - start);
+      return center + (grown * std::cos(t)) * a + (grown * std::sin(t)) * b + (t - start) * rise;
+    };
+    const auto slope = [&](double t) {
+      const double grown = 1 + growth * (t - start);
+      return (growth * std::cos(t) - grown * std::sin(t)) * a +
+             (growth * std::sin(t) + grown * std::cos(t)) * b + rise;
+    };
+    const bool whole = growth == 0 && implicit::Length(rise) == 0 &&
+                       std::fabs(std::fabs(sweep) - 2 * std::numbers::pi) < 1e-12;
+    for (size_t i = 0; i < count; ++i) {
+      const double from = start + step * static_cast<double>(i);
+      const double to = i + 1 == count ? start + sweep : start + step * static_cast<double>(i + 1);
+      const Vector end = whole && i + 1 == count ? at(start) : at(to);
+      Curve(at(from), at(from) + handle * slope(from), end - handle * slope(to), end);
+    }
+  }
+
+  static constexpr double kSpansPerTurn = 16;
+
+ private:
+  std::vector<Vector> points_;
+};
+
+// Two unit vectors across `axis`, and across one another: the first on the side of `toward`, as far as
+// that lies across; the second a quarter turn on, counter-clockwise as seen from where the axis points to.
+// False if there is none.
+inline bool FrameOf(const implicit::Vector& axis, const implicit::Vector& toward,
+                    implicit::Vector* u, implicit::Vector* v) {
+  const double length = implicit::Length(axis);
+  if (!(length > 0)) return false;
+  const implicit::Vector unit = 1 / length * axis;
+  const implicit::Vector across = toward - implicit::Dot(toward, unit) * unit;
+  const double reach = implicit::Length(across);
+  if (!(reach > 1e-9 * implicit::Length(toward))) return false;
+  *u = 1 / reach * across;
+  *v = implicit::Cross(unit, *u);
+  return true;
+}
+
+}  // namespace voxeld::gpu

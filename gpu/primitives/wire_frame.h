@@ -1,0 +1,123 @@
+// Shapes as lines, and as dots where those meet: edges of what has any, of what is round meridians and
+// parallels, 45° apart.
+#pragma once
+
+#include <numbers>
+#include <vector>
+
+#include "gpu/curves/spans.h"
+#include "gpu/primitives/cone.h"
+#include "gpu/primitives/ellipsoid.h"
+#include "gpu/primitives/parallelepiped.h"
+#include "gpu/primitives/torus.h"
+
+namespace voxeld::gpu {
+
+struct WireFrame {
+  Spans lines;
+  std::vector<implicit::Vector> dots;
+};
+
+inline constexpr int kMeridians = 8;
+inline constexpr double kMeridianStep = 2 * std::numbers::pi / kMeridians;
+
+inline WireFrame WireFrameOf(const Parallelepiped& shape) {
+  WireFrame frame;
+  const auto corner = [&](int i) {
+    implicit::Vector p = shape.center;
+    for (int e = 0; e < 3; ++e) p = p + ((i >> e & 1) != 0 ? 0.5 : -0.5) * shape.edges[e];
+    return p;
+  };
+  for (int i = 0; i < 8; ++i) {
+    frame.dots.push_back(corner(i));
+    for (int e = 0; e < 3; ++e) {
+      if ((i >> e & 1) == 0) frame.lines.Line(corner(i), corner(i | 1 << e));
+    }
+  }
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Ellipsoid& shape) {
+  using implicit::Vector;
+  WireFrame frame;
+  const Vector x = {shape.radii.x, 0, 0}, y = {0, shape.radii.y, 0}, z = {0, 0, shape.radii.z};
+  frame.dots = {shape.center + z, shape.center - z};
+  for (int m = 0; m < kMeridians; ++m) {
+    const Vector out = std::cos(m * kMeridianStep) * x + std::sin(m * kMeridianStep) * y;
+    frame.lines.Arc(shape.center, z, out, 0, std::numbers::pi);
+    for (int p = -1; p <= 1; ++p) {
+      frame.dots.push_back(shape.center + std::cos(p * kMeridianStep) * out +
+                           std::sin(p * kMeridianStep) * z);
+    }
+  }
+  for (int p = -1; p <= 1; ++p) {
+    const double wide = std::cos(p * kMeridianStep);
+    frame.lines.Arc(shape.center + std::sin(p * kMeridianStep) * z, wide * x, wide * y, 0,
+                    2 * std::numbers::pi);
+  }
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Torus& shape) {
+  using implicit::Vector;
+  WireFrame frame;
+  const Vector z = {0, 0, shape.tube_radius};
+  for (int m = 0; m < kMeridians; ++m) {
+    const Vector out = {std::cos(m * kMeridianStep), std::sin(m * kMeridianStep), 0};
+    const Vector middle = shape.center + shape.radius * out;
+    frame.lines.Arc(middle, shape.tube_radius * out, z, 0, 2 * std::numbers::pi);
+    const double up = std::sin(m * kMeridianStep) * shape.tube_radius;
+    const double wide = shape.radius + std::cos(m * kMeridianStep) * shape.tube_radius;
+    frame.lines.Arc(shape.center + Vector{0, 0, up}, {wide, 0, 0}, {0, wide, 0}, 0,
+                    2 * std::numbers::pi);
+    for (int p = 0; p < kMeridians; ++p) {
+      frame.dots.push_back(middle + (std::cos(p * kMeridianStep) * shape.tube_radius) * out +
+                           std::sin(p * kMeridianStep) * z);
+    }
+  }
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Cone& shape) {
+  using implicit::Vector;
+  WireFrame frame;
+  const Vector axis = shape.end - shape.start;
+  const double length = implicit::Length(axis);
+  const Vector unit = 1 / length * axis;
+  Vector u, v;
+  if (!FrameOf(axis, {1, 0, 0}, &u, &v)) FrameOf(axis, {0, 1, 0}, &u, &v);
+  // With round ends the mantle touches the spheres off their middles.
+  const double fall = shape.round ? (shape.start_radius - shape.end_radius) / length : 0;
+  const double slant = std::sqrt(std::max(0.0, 1 - fall * fall));
+  const double tilt = std::asin(std::clamp(fall, -1.0, 1.0));
+  const Vector middles[2] = {shape.start + (fall * shape.start_radius) * unit,
+                             shape.end + (fall * shape.end_radius) * unit};
+  const double radii[2] = {shape.start_radius * slant, shape.end_radius * slant};
+  for (int end = 0; end < 2; ++end) {
+    if (radii[end] > 0) {
+      frame.lines.Arc(middles[end], radii[end] * u, radii[end] * v, 0, 2 * std::numbers::pi);
+    } else {
+      frame.dots.push_back(middles[end]);
+    }
+  }
+  for (int m = 0; m < kMeridians; ++m) {
+    const Vector out = std::cos(m * kMeridianStep) * u + std::sin(m * kMeridianStep) * v;
+    frame.lines.Line(middles[0] + radii[0] * out, middles[1] + radii[1] * out);
+    for (int end = 0; end < 2; ++end) {
+      if (radii[end] > 0) frame.dots.push_back(middles[end] + radii[end] * out);
+    }
+    if (!shape.round) continue;
+    const double quarter = std::numbers::pi / 2;
+    frame.lines.Arc(shape.start, shape.start_radius * out, shape.start_radius * unit, tilt,
+                    -quarter - tilt);
+    frame.lines.Arc(shape.end, shape.end_radius * out, shape.end_radius * unit, tilt,
+                    quarter - tilt);
+  }
+  if (shape.round) {
+    frame.dots.push_back(shape.start - shape.start_radius * unit);
+    frame.dots.push_back(shape.end + shape.end_radius * unit);
+  }
+  return frame;
+}
+
+}  // namespace voxeld::gpu

@@ -1,0 +1,120 @@
+// What shapes, curves, text and colour scales say on the wire, read by protobuf.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "client/cpp/src/encode.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::client {
+namespace {
+
+using ::testing::ElementsAre;
+
+v1::Primitive Parse(const Shape& shape, const std::optional<ColorScale>& scale = std::nullopt) {
+  const absl::StatusOr<Rope> rope = EncodePrimitive(shape, {255, 0, 0}, scale);
+  EXPECT_TRUE(rope.ok()) << rope.status();
+  v1::Primitive primitive;
+  EXPECT_TRUE(primitive.ParseFromString(rope->Flat()));
+  EXPECT_TRUE(primitive.GetReflection()->GetUnknownFields(primitive).empty());
+  return primitive;
+}
+
+TEST(EncodeShapes, Curves) {
+  const v1::Primitive p = Parse(Curve{.vertices = {.positions = {0, 0, 0, 1, 1, 1, 2, 0, 0}},
+                                      .form = Curve::Form::kBSpline,
+                                      .closed = true,
+                                      .sampling = LineSampling::kCover,
+                                      .thickness = {2}});
+  EXPECT_EQ(p.curve().form(), v1::Curve::B_SPLINE);
+  EXPECT_TRUE(p.curve().closed());
+  EXPECT_EQ(p.curve().vertices().count(), 3u);
+  EXPECT_EQ(p.curve().sampling(), v1::LINE_SAMPLING_COVER);
+  EXPECT_EQ(p.curve().thickness().value(), 2);
+  EXPECT_EQ(p.color().rgb(), 0xFF0000u);
+  const v1::Primitive patches = Parse(BezierSurface{
+      .vertices = {.positions = std::vector<float>(48)}, .rule = SurfaceRule::kCover});
+  EXPECT_EQ(patches.bezier_surface().vertices().count(), 16u);
+  EXPECT_EQ(patches.bezier_surface().rule(), v1::SURFACE_RULE_COVER);
+}
+
+TEST(EncodeShapes, LinesByTheirMeasures) {
+  const v1::Arc arc = Parse(Arc{.normal = {1, 0, 0},
+                                .radius = 2,
+                                .toward = Vec3{0, 1, 0},
+                                .start = 1,
+                                .sweep = -2,
+                                .thickness = {3, Thickness::Unit::kUnits}})
+                          .arc();
+  EXPECT_EQ(arc.radius(), 2);
+  EXPECT_EQ(arc.normal().x(), 1);
+  EXPECT_EQ(arc.toward().y(), 1);
+  EXPECT_EQ(arc.sweep(), -2);
+  EXPECT_EQ(arc.thickness().unit(), v1::Thickness::UNITS);
+  EXPECT_FALSE(Parse(Arc{}).arc().has_toward());
+  const v1::Ellipse ellipse = Parse(Ellipse{.axis_b = {0, 3, 0}, .start = 0.5}).ellipse();
+  EXPECT_EQ(ellipse.axis_b().y(), 3);
+  EXPECT_EQ(ellipse.start(), 0.5);
+  const v1::Helix helix = Parse(Helix{.end = {0, 0, 4}, .end_radius = 0.0, .turns = -3}).helix();
+  EXPECT_EQ(helix.turns(), -3);
+  EXPECT_TRUE(helix.has_end_radius());
+  EXPECT_FALSE(Parse(Helix{}).helix().has_end_radius());
+}
+
+TEST(EncodeShapes, ArrowsAndText) {
+  const v1::Arrow arrow =
+      Parse(Arrow{.end = {1, 0, 0}, .head_length = 0.5, .fill = Fill::kSolid}).arrow();
+  EXPECT_EQ(arrow.head_length(), 0.5);
+  EXPECT_EQ(arrow.fill(), v1::FILL_SOLID);
+  const v1::Text text = Parse(Text{.text = "Größe",
+                                   .height = 2,
+                                   .up = Vec3{0, 0, 1},
+                                   .style = Text::Style::kOutline,
+                                   .alignment = Text::Alignment::kRight,
+                                   .font = "serif"})
+                            .text();
+  EXPECT_EQ(text.text(), "Größe");
+  EXPECT_EQ(text.style(), v1::Text::OUTLINE);
+  EXPECT_EQ(text.alignment(), v1::Text::RIGHT);
+  EXPECT_EQ(text.up().z(), 1);
+  EXPECT_EQ(text.facing().z(), 1);
+  EXPECT_EQ(text.font(), "serif");
+}
+
+TEST(EncodeShapes, FillsSplatsAndTints) {
+  EXPECT_EQ(Parse(Box{.fill = Fill::kLines}).box().fill(), v1::FILL_LINES);
+  EXPECT_EQ(Parse(Torus{.fill = Fill::kDots}).torus().fill(), v1::FILL_DOTS);
+  EXPECT_EQ(Parse(Mesh{.vertices = {.positions = std::vector<float>(9)}, .fill = Fill::kLines})
+                .mesh()
+                .fill(),
+            v1::FILL_LINES);
+  EXPECT_EQ(Parse(Points{.vertices = {.positions = {0, 0, 0}}, .splat = Points::Splat::kSoft})
+                .points()
+                .splat(),
+            v1::Points::SOFT);
+  EXPECT_EQ(Parse(Instance{.object = "o", .tint = {1, 2, 3}}).instance().tint().rgb(), 0x010203u);
+  EXPECT_FALSE(Parse(Instance{.object = "o"}).instance().has_tint());
+}
+
+TEST(EncodeShapes, ColorScales) {
+  const v1::ColorScale scale =
+      Parse(Sphere{},
+            ColorScale{
+                .colors = {{0, 0, 0}, {255, 128, 0}}, .low = 1, .high = 2, .along = Vec3{0, 0, 1}})
+          .color_scale();
+  EXPECT_THAT(scale.colors(), ElementsAre(0x000000, 0xFF8000));
+  EXPECT_EQ(scale.low(), 1);
+  EXPECT_EQ(scale.along().z(), 1);
+  const v1::ColorScale numbers = Parse(Points{.vertices = {.positions = {0, 0, 0, 1, 1, 1}}},
+                                       ColorScale{.colormap = "viridis", .scalars = {1.5f, 2.5f}})
+                                     .color_scale();
+  EXPECT_EQ(numbers.colormap(), "viridis");
+  float values[2];
+  ASSERT_EQ(numbers.scalars().size(), sizeof(values));
+  std::memcpy(values, numbers.scalars().data(), sizeof(values));
+  EXPECT_THAT(values, ElementsAre(1.5f, 2.5f));
+}
+
+}  // namespace
+}  // namespace voxeld::client

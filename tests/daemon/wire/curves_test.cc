@@ -1,0 +1,424 @@
+// Curves, wire frames, text, splats, colour scales and tints from the wire: what is wrong with them, what becomes
+// of good ones, and that they can be told to watchers as they were sent.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <variant>
+
+#include "daemon/text/fonts.h"
+#include "daemon/wire/encode_primitive.h"
+#include "daemon/wire/primitive.h"
+#include "tests/daemon/wire/requests.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::daemon::wire {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+using P = v1::Primitive;
+
+class CurvesTest : public ::testing::Test {
+ protected:
+  MaybeFault FaultOf(const P& primitive, Content* content) {
+    return ToContent(FieldPath("primitive"), primitive, {.limits = limits_, .fonts = &fonts_},
+                     content);
+  }
+  const GeometryData& Geometry(const P& primitive) {
+    const MaybeFault fault = FaultOf(primitive, &content_);
+    EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
+    return *std::get<GeometryPtr>(content_);
+  }
+  const GroupData& Group(const P& primitive) {
+    const MaybeFault fault = FaultOf(primitive, &content_);
+    EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
+    return *std::get<GroupPtr>(content_);
+  }
+
+  Limits limits_;
+  text::Fonts fonts_;
+  Content content_;
+};
+
+void Set(v1::Vec3* out, double x, double y, double z) {
+  out->set_x(x);
+  out->set_y(y);
+  out->set_z(z);
+}
+
+v1::Vertices Line(int count) {
+  v1::Vertices vertices;
+  std::vector<float> positions;
+  for (int i = 0; i < count; ++i) {
+    for (const float c : {static_cast<float>(i), static_cast<float>(i % 2), 0.0f})
+      positions.push_back(c);
+  }
+  vertices.set_count(static_cast<uint32_t>(count));
+  vertices.set_positions(Packed(positions));
+  return vertices;
+}
+
+P Curve() {
+  P p;
+  *p.mutable_curve()->mutable_vertices() = Line(4);
+  return p;
+}
+P Arc() {
+  P p;
+  p.mutable_arc()->set_radius(2);
+  return p;
+}
+P Ellipse() {
+  P p;
+  Set(p.mutable_ellipse()->mutable_axis_a(), 2, 0, 0);
+  Set(p.mutable_ellipse()->mutable_axis_b(), 0, 1, 0);
+  return p;
+}
+P Helix() {
+  P p;
+  Set(p.mutable_helix()->mutable_end(), 0, 0, 3);
+  p.mutable_helix()->set_radius(1);
+  p.mutable_helix()->set_turns(2);
+  return p;
+}
+P BezierSurface() {
+  P p;
+  *p.mutable_bezier_surface()->mutable_vertices() = Line(16);
+  return p;
+}
+P Arrow() {
+  P p;
+  Set(p.mutable_arrow()->mutable_end(), 0, 0, 4);
+  return p;
+}
+P Text() {
+  P p;
+  p.mutable_text()->set_text("AbA");
+  p.mutable_text()->set_height(2);
+  return p;
+}
+P Torus() {
+  P p;
+  p.mutable_torus()->set_radius(2);
+  p.mutable_torus()->set_tube_radius(0.5);
+  return p;
+}
+P Points() {
+  P p;
+  *p.mutable_points()->mutable_vertices() = Line(3);
+  return p;
+}
+P Scaled() {
+  P p = Points();
+  p.mutable_color_scale()->set_colormap("viridis");
+  Set(p.mutable_color_scale()->mutable_along(), 1, 0, 0);
+  return p;
+}
+P Mesh() {
+  P p;
+  *p.mutable_mesh()->mutable_vertices() = Line(6);
+  return p;
+}
+
+struct Case {
+  const char* name;
+  P (*good)();
+  std::function<void(P&)> spoil;
+  const char* field;
+  Reason reason;
+  const char* message;
+};
+
+const Case kCases[] = {
+    {"curve_form", Curve,
+     [](P& p) { p.mutable_curve()->set_form(static_cast<v1::Curve::Form>(9)); },
+     "primitive.curve.form", Reason::kInvalidValue, "CATMULL_ROM, B_SPLINE, BEZIER, QUADRATIC"},
+    {"curve_bezier", Curve,
+     [](P& p) {
+       p.mutable_curve()->set_form(v1::Curve::BEZIER);
+       p.mutable_curve()->set_closed(true);
+     },
+     "primitive.curve.vertices.count", Reason::kSizeMismatch, "is 4; give 3 for each closed"},
+    {"curve_one", Curve, [](P& p) { *p.mutable_curve()->mutable_vertices() = Line(1); },
+     "primitive.curve.vertices.count", Reason::kSizeMismatch, "is 1; give 2 or more"},
+    {"curve_sampling", Curve,
+     [](P& p) { p.mutable_curve()->set_sampling(static_cast<v1::LineSampling>(9)); },
+     "primitive.curve.sampling", Reason::kInvalidValue, "LINE_SAMPLING_THIN"},
+    {"arc_radius", Arc, [](P& p) { p.mutable_arc()->set_radius(0); }, "primitive.arc.radius",
+     Reason::kInvalidValue, "is 0; give"},
+    {"arc_normal", Arc, [](P& p) { p.mutable_arc()->mutable_normal(); }, "primitive.arc.normal",
+     Reason::kInvalidValue, "has no direction"},
+    {"arc_toward", Arc, [](P& p) { Set(p.mutable_arc()->mutable_toward(), 0, 0, -3); },
+     "primitive.arc.toward", Reason::kInvalidValue, "lies along normal"},
+    {"arc_sweep", Arc, [](P& p) { p.mutable_arc()->set_sweep(7); }, "primitive.arc.sweep",
+     Reason::kInvalidValue, "is 7; give"},
+    {"arc_far", Arc,
+     [](P& p) {
+       p.mutable_arc()->set_radius(3e38);
+       p.mutable_arc()->mutable_center()->set_x(3e38);
+     },
+     "primitive.arc", Reason::kOutOfRange, "beyond what single precision holds"},
+    {"ellipse_flat", Ellipse, [](P& p) { Set(p.mutable_ellipse()->mutable_axis_b(), 5, 0, 0); },
+     "primitive.ellipse.axis_b", Reason::kInvalidValue, "spans no area"},
+    {"helix_turns", Helix, [](P& p) { p.mutable_helix()->set_turns(0); }, "primitive.helix.turns",
+     Reason::kInvalidValue, "is 0; give up to 4096"},
+    {"helix_end", Helix, [](P& p) { p.mutable_helix()->clear_end(); }, "primitive.helix.end",
+     Reason::kInvalidValue, "is where start is"},
+    {"helix_end_radius", Helix, [](P& p) { p.mutable_helix()->set_end_radius(-1); },
+     "primitive.helix.end_radius", Reason::kInvalidValue, "is -1; give 0 or more"},
+    {"surface_count", BezierSurface,
+     [](P& p) { *p.mutable_bezier_surface()->mutable_vertices() = Line(15); },
+     "primitive.bezier_surface.vertices.count", Reason::kSizeMismatch, "is 15; give 16"},
+    {"arrow_end", Arrow, [](P& p) { p.mutable_arrow()->clear_end(); }, "primitive.arrow.end",
+     Reason::kInvalidValue, "as start is"},
+    {"arrow_head", Arrow, [](P& p) { p.mutable_arrow()->set_head_length(5); },
+     "primitive.arrow.head_length", Reason::kInvalidValue, "is 5; the arrow is 4 long"},
+    {"arrow_lines", Arrow, [](P& p) { p.mutable_arrow()->set_fill(v1::FILL_LINES); },
+     "primitive.arrow.fill", Reason::kInvalidValue, "is FILL_LINES, which it has none of"},
+    {"text_height", Text, [](P& p) { p.mutable_text()->clear_height(); }, "primitive.text.height",
+     Reason::kInvalidValue, "is 0; give"},
+    {"text_up", Text, [](P& p) { Set(p.mutable_text()->mutable_up(), 0, 0, 1); },
+     "primitive.text.up", Reason::kInvalidValue, "lies along facing"},
+    {"text_font", Text, [](P& p) { p.mutable_text()->set_font("No Such Family"); },
+     "primitive.text.font", Reason::kNotFound,
+     "is No Such Family, which is none; there are DejaVu"},
+    {"text_depth", Text,
+     [](P& p) {
+       p.mutable_text()->set_style(v1::Text::OUTLINE);
+       p.mutable_text()->set_depth(1);
+     },
+     "primitive.text.depth", Reason::kInvalidValue, "only FILLED letters"},
+    {"text_long", Text, [](P& p) { p.mutable_text()->set_text(std::string(70000, 'a')); },
+     "primitive.text.text", Reason::kQuotaExceeded, "has 70000 bytes"},
+    {"text_many", Text, [](P& p) { p.mutable_text()->set_text(std::string(5000, 'a')); },
+     "primitive.text.text", Reason::kQuotaExceeded, "makes 5000 letters"},
+    {"text_strokes", Text,
+     [](P& p) {
+       p.mutable_text()->set_style(v1::Text::STROKES);
+       p.mutable_text()->set_text("a\xC3\x9F");
+     },
+     "primitive.text.text", Reason::kInvalidValue, "at byte 1 that stroke fonts have not"},
+    {"text_spacing", Text, [](P& p) { p.mutable_text()->set_line_spacing(-1); },
+     "primitive.text.line_spacing", Reason::kInvalidValue, "is -1; give 0 or more"},
+    {"splat", Points,
+     [](P& p) { p.mutable_points()->set_splat(static_cast<v1::Points::Splat>(9)); },
+     "primitive.points.splat", Reason::kInvalidValue, "BALL, SOFT, CUBE"},
+    {"mesh_solid", Mesh, [](P& p) { p.mutable_mesh()->set_fill(v1::FILL_SOLID); },
+     "primitive.mesh.fill", Reason::kUnimplemented, "a mesh has a surface, lines or dots"},
+    {"scale_neither", Scaled, [](P& p) { p.mutable_color_scale()->clear_colormap(); },
+     "primitive.color_scale.colormap", Reason::kInvalidValue, "give one of the two"},
+    {"scale_name", Scaled, [](P& p) { p.mutable_color_scale()->set_colormap("mud"); },
+     "primitive.color_scale.colormap", Reason::kNotFound, "is \"mud\", which is none"},
+    {"scale_scalars", Scaled,
+     [](P& p) {
+       p.mutable_color_scale()->clear_along();
+       p.mutable_color_scale()->set_scalars("1234");
+     },
+     "primitive.color_scale.scalars", Reason::kSizeMismatch, "has 4 bytes; 3 vertices take 12"},
+    {"scale_one_color", Scaled,
+     [](P& p) {
+       p.mutable_color_scale()->clear_colormap();
+       p.mutable_color_scale()->add_colors(1);
+     },
+     "primitive.color_scale.colors", Reason::kSizeMismatch, "has 1; give 2 to 256"},
+    {"scale_direction", Scaled,
+     [](P& p) { Set(p.mutable_color_scale()->mutable_along(), 0, 0, 0); },
+     "primitive.color_scale.along", Reason::kInvalidValue, "has no direction"},
+    {"scale_colors_too", Scaled,
+     [](P& p) { p.mutable_points()->mutable_vertices()->set_colors("123456789"); },
+     "primitive.color_scale", Reason::kInvalidValue, "so are colours of vertices"},
+};
+
+TEST_F(CurvesTest, WhatIsWrongIsSaid) {
+  for (const Case& c : kCases) {
+    SCOPED_TRACE(c.name);
+    Content content;
+    ASSERT_FALSE(FaultOf(c.good(), &content).has_value());
+    P spoilt = c.good();
+    c.spoil(spoilt);
+    const MaybeFault fault = FaultOf(spoilt, &content);
+    ASSERT_TRUE(fault.has_value());
+    EXPECT_EQ(fault->field, c.field);
+    EXPECT_EQ(fault->reason, c.reason) << fault->message;
+    EXPECT_THAT(fault->message, HasSubstr(c.message));
+  }
+}
+
+TEST_F(CurvesTest, ScalesAreForWhatCanHaveThem) {
+  for (P (*const make)() : {Arc, Text, BezierSurface}) {
+    P p = make();
+    *p.mutable_color_scale() = Scaled().color_scale();
+    Content content;
+    const MaybeFault fault = FaultOf(p, &content);
+    ASSERT_TRUE(fault.has_value());
+    EXPECT_EQ(fault->field, "primitive.color_scale");
+  }
+}
+
+TEST_F(CurvesTest, EveryOneIsToldAsItWasSent) {
+  for (P (*const make)() : {Curve, Arc, Ellipse, Helix, BezierSurface, Arrow, Text}) {
+    const P sent = make();
+    Content content, again;
+    ASSERT_FALSE(FaultOf(sent, &content).has_value());
+    P told;
+    Encode(content, &told);
+    EXPECT_LE(told.ByteSizeLong(), EncodedBytes(content));
+    EXPECT_EQ(told.kind_case(), sent.kind_case());
+    ASSERT_FALSE(FaultOf(told, &again).has_value()) << told.ShortDebugString();
+    P twice;
+    Encode(again, &twice);
+    EXPECT_EQ(twice.SerializeAsString(), told.SerializeAsString());
+  }
+}
+
+TEST_F(CurvesTest, CurvesBecomeSpansWithTheirColors) {
+  P p = Curve();
+  p.mutable_curve()->mutable_vertices()->set_colors(std::string("\1\0\0\2\0\0\3\0\0\4\0\0", 12));
+  p.mutable_curve()->mutable_thickness()->set_value(3);
+  const GeometryData& data = Geometry(p);
+  EXPECT_EQ(data.record.kind, gpu::PrimitiveKind::kCurves);
+  EXPECT_EQ(data.record.vertex_count, 12u) << "three spans";
+  EXPECT_EQ(data.record.thickness, 3);
+  EXPECT_THAT(std::vector(data.arrays.colors().begin(), data.arrays.colors().end()),
+              ElementsAre(0x010000, 0x010000, 0x020000, 0x020000, 0x020000, 0x020000, 0x030000,
+                          0x030000, 0x030000, 0x030000, 0x040000, 0x040000));
+  EXPECT_STREQ(data.kind, "curve");
+}
+
+TEST_F(CurvesTest, PatchesMayBeIndexed) {
+  P p = BezierSurface();
+  v1::Vertices* const vertices = p.mutable_bezier_surface()->mutable_vertices();
+  std::vector<uint32_t> indices;
+  for (uint32_t i = 0; i < 32; ++i) indices.push_back(i % 16);
+  vertices->set_index_count(32);
+  vertices->set_indices(Packed(indices));
+  const GeometryData& data = Geometry(p);
+  EXPECT_EQ(data.record.vertex_count, 32u);
+  EXPECT_EQ(data.record.index_count, 0u);
+  EXPECT_EQ(data.arrays.positions()[16 * 3 + 3], 1);
+}
+
+TEST_F(CurvesTest, FramesHaveTheirEdgesAndCorners) {
+  P box;
+  Set(box.mutable_box()->mutable_size(), 2, 4, 6);
+  box.mutable_box()->set_fill(v1::FILL_LINES);
+  EXPECT_EQ(Geometry(box).record.vertex_count, 12u * 4) << "its edges";
+  EXPECT_EQ(Geometry(box).record.kind, gpu::PrimitiveKind::kCurves);
+  EXPECT_EQ(Geometry(box).max[2], 3);
+  box.mutable_box()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(box).record.kind, gpu::PrimitiveKind::kPoints);
+  EXPECT_EQ(Geometry(box).record.vertex_count, 8u);
+  EXPECT_STREQ(Geometry(box).kind, "box");
+  P torus = Torus();
+  torus.mutable_torus()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(torus).record.vertex_count, 64u);
+  P sphere;
+  sphere.mutable_sphere()->set_radius(1);
+  sphere.mutable_sphere()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(sphere).record.vertex_count, 2u + 8 * 3);
+  // Two triangles that share an edge have five.
+  P mesh = Mesh();
+  mesh.mutable_mesh()->set_fill(v1::FILL_LINES);
+  v1::Vertices* const vertices = mesh.mutable_mesh()->mutable_vertices();
+  *vertices = Line(5);
+  vertices->set_index_count(6);
+  vertices->set_indices(Packed<uint32_t>({0, 1, 2, 2, 1, 3}));
+  EXPECT_EQ(Geometry(mesh).record.index_count, 10u);
+  EXPECT_EQ(Geometry(mesh).record.kind, gpu::PrimitiveKind::kSegments);
+  mesh.mutable_mesh()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(mesh).record.index_count, 4u) << "the fifth is no triangle's";
+}
+
+TEST_F(CurvesTest, LettersShareWhatTheyShare) {
+  const GroupData& group = Group(Text());
+  ASSERT_EQ(group.parts.size(), 3u);
+  int same = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t k = 0; k < i; ++k) same += group.parts[i].geometry == group.parts[k].geometry;
+  }
+  EXPECT_EQ(same, 1) << "A is the same twice";
+  EXPECT_NEAR(group.max[1], 2, 0.15) << "b is about as tall as A";
+  EXPECT_NEAR(group.min[1], 0, 0.1);
+  EXPECT_EQ(group.min[2], 0);
+  EXPECT_STREQ(group.kind, "text");
+  P deep = Text();
+  deep.mutable_text()->set_depth(1);
+  EXPECT_NEAR(Group(deep).min[2], -1, 1e-6) << "to the back";
+  EXPECT_EQ(Group(deep).parts[0].geometry->record.fill, gpu::Fill::kSolid);
+  P outline = Text();
+  outline.mutable_text()->set_style(v1::Text::OUTLINE);
+  EXPECT_EQ(Geometry(outline).record.kind, gpu::PrimitiveKind::kCurves);
+  P strokes = Text();
+  strokes.mutable_text()->set_style(v1::Text::STROKES);
+  strokes.mutable_text()->set_alignment(v1::Text::RIGHT);
+  EXPECT_LT(Geometry(strokes).max[0], 1e-6) << "they end where the text is";
+}
+
+TEST_F(CurvesTest, TextFacesWhereItIsRead) {
+  P p = Text();
+  Set(p.mutable_text()->mutable_facing(), 0, -2, 0);
+  const GroupData& group = Group(p);
+  EXPECT_GT(group.max[0], 2) << "along x, as seen from -y";
+  EXPECT_NEAR(group.max[2], 2, 0.15) << "upright";
+  EXPECT_EQ(group.max[1], 0);
+}
+
+TEST_F(CurvesTest, ScalesColorVertices) {
+  P p = Scaled();
+  p.mutable_color_scale()->clear_colormap();
+  for (const uint32_t color : {0x000000, 0x0000FF, 0xFF0000})
+    p.mutable_color_scale()->add_colors(color);
+  const auto colors = [&] {
+    const GeometryData& data = Geometry(p);
+    return std::vector(data.arrays.colors().begin(), data.arrays.colors().end());
+  };
+  EXPECT_THAT(colors(), ElementsAre(0x000000, 0x0100FE, 0xFF0000))
+      << "from the least to the greatest";
+  Set(p.mutable_color_scale()->mutable_along(), 4, 0, 0);
+  p.mutable_color_scale()->set_high(1);
+  EXPECT_THAT(colors(), ElementsAre(0x000000, 0x000080, 0x0100FE)) << "x / 4 from 0 to 1";
+  p.mutable_color_scale()->clear_along();
+  p.mutable_color_scale()->set_scalars(Packed<float>({2, -1, 0}));
+  EXPECT_THAT(colors(), ElementsAre(0xFF0000, 0x000000, 0x000000)) << "clamped";
+}
+
+TEST_F(CurvesTest, ScalesColorShapes) {
+  P p = Torus();
+  *p.mutable_color_scale() = Scaled().color_scale();
+  EXPECT_GT(Geometry(p).record.index_count, Geometry(Torus()).record.index_count + 256)
+      << "the program has a table";
+  p.mutable_torus()->set_fill(v1::FILL_LINES);
+  Content content;
+  EXPECT_TRUE(FaultOf(p, &content).has_value());
+}
+
+TEST_F(CurvesTest, InstancesHaveTints) {
+  P p;
+  p.mutable_instance()->set_object("o");
+  p.mutable_instance()->mutable_tint()->set_rgb(0x80FF00);
+  Content content;
+  ASSERT_FALSE(FaultOf(p, &content).has_value());
+  EXPECT_EQ(std::get<InstanceRef>(content).tint, 0x80FF00u);
+  P told;
+  Encode(content, &told);
+  EXPECT_EQ(told.SerializeAsString(), p.SerializeAsString());
+  p.mutable_instance()->mutable_tint()->set_rgb(0x1000000);
+  const MaybeFault fault = FaultOf(p, &content);
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->field, "primitive.instance.tint.rgb");
+}
+
+TEST_F(CurvesTest, SplatsAreKept) {
+  P p = Points();
+  p.mutable_points()->set_splat(v1::Points::SOFT);
+  EXPECT_EQ(Geometry(p).record.splat, gpu::Splat::kSoft);
+  P told;
+  Encode(content_, &told);
+  EXPECT_EQ(told.points().splat(), v1::Points::SOFT);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::wire

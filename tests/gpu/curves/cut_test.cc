@@ -1,0 +1,222 @@
+// Curves and patches cut into straight pieces: how far these are from the true ones, worked out from
+// Bernstein's polynomials at many places; that ends meet; what is not cut finely.
+#include "gpu/curves/cut.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+namespace voxeld::gpu {
+namespace {
+
+constexpr int32_t kSize = 256;
+constexpr double kSnapped = 0.0034;  // half a unit along each axis, voxels
+
+using P = std::array<double, 3>;
+
+GeometryView View(const std::vector<float>& positions, PrimitiveKind kind, Topology topology,
+                  const std::vector<uint32_t>& colors = {}) {
+  GeometryView view;
+  view.record.kind = kind;
+  view.record.topology = topology;
+  view.record.vertex_count = static_cast<uint32_t>(positions.size() / 3);
+  view.record.color_mode = colors.empty() ? ColorMode::kUniform : ColorMode::kPerVertex;
+  view.positions = positions;
+  view.colors = colors;
+  return view;
+}
+
+std::vector<float> RandomPoints(std::mt19937& random, int count, double low, double high) {
+  std::uniform_real_distribution<double> number(low, high);
+  std::vector<float> points;
+  for (int i = 0; i < count * 3; ++i) points.push_back(static_cast<float>(number(random)));
+  return points;
+}
+
+double Weight(int i, double t) {
+  const double chosen[4] = {1, 3, 3, 1};
+  return chosen[i] * std::pow(t, i) * std::pow(1 - t, 3 - i);
+}
+
+P CurveAt(const float* p, double t) {
+  P at = {};
+  for (size_t i = 0; i < 4; ++i) {
+    for (size_t a = 0; a < 3; ++a) {
+      at[a] += Weight(static_cast<int>(i), t) * static_cast<double>(p[i * 3 + a]);
+    }
+  }
+  return at;
+}
+
+P PatchAt(const float* p, double u, double v) {
+  P at = {};
+  for (size_t i = 0; i < 16; ++i) {
+    const double w = Weight(static_cast<int>(i % 4), u) * Weight(static_cast<int>(i / 4), v);
+    for (size_t a = 0; a < 3; ++a) at[a] += w * static_cast<double>(p[i * 3 + a]);
+  }
+  return at;
+}
+
+P Minus(const P& a, const P& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double Dot(const P& a, const P& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+P Voxels(const Int3& p) {
+  P at;
+  for (size_t a = 0; a < 3; ++a) at[a] = static_cast<double>(p.v[a]) / 256;
+  return at;
+}
+
+double SegmentDistance(const P& p, const P& a, const P& b) {
+  const P d = Minus(b, a), w = Minus(p, a);
+  const double length2 = Dot(d, d);
+  const double t = length2 == 0 ? 0 : std::clamp(Dot(w, d) / length2, 0.0, 1.0);
+  const P rest = {w[0] - t * d[0], w[1] - t * d[1], w[2] - t * d[2]};
+  return std::sqrt(Dot(rest, rest));
+}
+
+double TriangleDistance(const P& p, const P& a, const P& b, const P& c) {
+  double nearest =
+      std::min({SegmentDistance(p, a, b), SegmentDistance(p, b, c), SegmentDistance(p, c, a)});
+  const P u = Minus(b, a), v = Minus(c, a), w = Minus(p, a);
+  const double uu = Dot(u, u), uv = Dot(u, v), vv = Dot(v, v), wu = Dot(w, u), wv = Dot(w, v);
+  const double det = uu * vv - uv * uv;
+  if (det <= 0) return nearest;
+  const double s = (vv * wu - uv * wv) / det, t = (uu * wv - uv * wu) / det;
+  if (s < 0 || t < 0 || s + t > 1) return nearest;
+  const P rest = {w[0] - s * u[0] - t * v[0], w[1] - s * u[1] - t * v[1],
+                  w[2] - s * u[2] - t * v[2]};
+  return std::min(nearest, std::sqrt(Dot(rest, rest)));
+}
+
+TEST(CutCurves, SegmentsStayWithinTheStatedErrorAndMeet) {
+  std::mt19937 random(1);
+  double worst = 0;
+  for (int round = 0; round < 60; ++round) {
+    const std::vector<float> points = RandomPoints(random, 7, 0, kSize);
+    const Cut cut = CutCurved(View(points, PrimitiveKind::kCurves, Topology::kStrip), Affine(),
+                              TileGrid::Of(kSize, kSize, kSize));
+    ASSERT_EQ(cut.record.kind, PrimitiveKind::kSegments);
+    ASSERT_EQ(cut.record.topology, Topology::kList);
+    ASSERT_EQ(cut.record.vertex_count, cut.vertices.size());
+    for (size_t i = 2; i < cut.vertices.size(); i += 2) {
+      ASSERT_EQ(Voxels(cut.vertices[i]), Voxels(cut.vertices[i - 1])) << "they meet";
+    }
+    for (int sample = 0; sample <= 600; ++sample) {
+      const P p = CurveAt(&points[sample < 300 ? 0 : 9], sample % 300 / 300.0);
+      double nearest = 1e9;
+      for (size_t i = 0; i < cut.vertices.size(); i += 2) {
+        nearest = std::min(
+            nearest, SegmentDistance(p, Voxels(cut.vertices[i]), Voxels(cut.vertices[i + 1])));
+      }
+      worst = std::max(worst, nearest);
+    }
+  }
+  EXPECT_LE(worst, kCurveError + kSnapped);
+  EXPECT_GT(worst, kCurveError / 4) << "finer than anyone needs";
+}
+
+TEST(CutCurves, ErrorIsOfVoxelsWhateverTheTransform) {
+  const std::vector<float> points = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+  const auto segments = [&](double scale) {
+    Affine map;
+    map.m[0] = map.m[5] = map.m[10] = scale;
+    return CutCurved(View(points, PrimitiveKind::kCurves, Topology::kList), map,
+                     TileGrid::Of(kSize, kSize, kSize))
+               .vertices.size() /
+           2;
+  };
+  EXPECT_EQ(segments(0.05), 1u);
+  // |second difference| is the scale here: n = ⌈√(6·scale·√2)⌉.
+  EXPECT_EQ(segments(1), 3u);
+  EXPECT_EQ(segments(100), 30u);
+}
+
+TEST(CutCurves, WhatIsFarAwayCostsLittleAndWhatIsNearIsTheSame) {
+  // It passes through the volume on its way between far ends.
+  const std::vector<float> points = {-1e6f, -1e6f, 100, 0, 0, 100, 300, 200, 100, 1e6f, 1e6f, 100};
+  const Cut cut = CutCurved(View(points, PrimitiveKind::kCurves, Topology::kList), Affine(),
+                            TileGrid::Of(kSize, kSize, kSize));
+  EXPECT_LT(cut.vertices.size(), 2000u);
+  int inside = 0;
+  for (int sample = 0; sample <= 2'000'000; ++sample) {
+    const P p = CurveAt(points.data(), sample / 2e6);
+    if (p[0] < 0 || p[1] < 0 || p[0] > kSize || p[1] > kSize) continue;
+    ++inside;
+    double nearest = 1e9;
+    for (size_t i = 0; i < cut.vertices.size(); i += 2) {
+      nearest = std::min(nearest,
+                         SegmentDistance(p, Voxels(cut.vertices[i]), Voxels(cut.vertices[i + 1])));
+    }
+    ASSERT_LE(nearest, kCurveError + kSnapped);
+  }
+  EXPECT_GT(inside, 10);
+  const std::vector<float> away = {-900, 0, 0, -800, 900, 0, -700, -900, 0, -600, 0, 0};
+  EXPECT_EQ(CutCurved(View(away, PrimitiveKind::kCurves, Topology::kList), Affine(),
+                      TileGrid::Of(kSize, kSize, kSize))
+                .vertices.size(),
+            2u);
+}
+
+TEST(CutCurves, ColorsRunFromJointToJoint) {
+  const std::vector<float> points = {0, 0, 0, 60, 200, 0, 160, -200, 0, 220, 0, 0};
+  const std::vector<uint32_t> colors = {0x000000, 0x123456, 0x654321, 0xFF8000};
+  const Cut cut = CutCurved(View(points, PrimitiveKind::kCurves, Topology::kList, colors), Affine(),
+                            TileGrid::Of(kSize, kSize, kSize));
+  ASSERT_EQ(cut.colors.size(), cut.vertices.size());
+  EXPECT_EQ(cut.colors.front(), 0x000000u);
+  EXPECT_EQ(cut.colors.back(), 0xFF8000u);
+  for (size_t i = 1; i < cut.colors.size(); ++i) EXPECT_GE(cut.colors[i], cut.colors[i - 1]);
+}
+
+TEST(CutPatches, TrianglesStayWithinTheStatedErrorAndNeighboursMeet) {
+  std::mt19937 random(2);
+  double worst = 0;
+  for (int round = 0; round < 12; ++round) {
+    std::vector<float> points = RandomPoints(random, 32, 60, 140);
+    // The second begins where the first ends: its row v = 0 is the other's v = 1.
+    for (size_t i = 0; i < 12; ++i) points[48 + i] = points[36 + i];
+    const Cut cut = CutCurved(View(points, PrimitiveKind::kPatches, Topology::kList), Affine(),
+                              TileGrid::Of(kSize, kSize, kSize));
+    ASSERT_EQ(cut.record.kind, PrimitiveKind::kTriangles);
+    ASSERT_EQ(cut.record.index_count, cut.indices.size());
+    const size_t each = cut.vertices.size() / 2;
+    const auto line = static_cast<size_t>(std::lround(std::sqrt(static_cast<double>(each))));
+    for (size_t u = 0; u < line; ++u) {
+      EXPECT_EQ(Voxels(cut.vertices[each + u]), Voxels(cut.vertices[each - line + u]));
+    }
+    for (int sample = 0; sample < 150; ++sample) {
+      const double u = std::uniform_real_distribution<double>(0, 1)(random);
+      const double v = std::uniform_real_distribution<double>(0, 1)(random);
+      const P p = PatchAt(points.data(), u, v);
+      double nearest = 1e9;
+      for (size_t i = 0; i < cut.indices.size() / 2; i += 3) {
+        const P a = Voxels(cut.vertices[cut.indices[i]]);
+        if (std::abs(a[0] - p[0]) > 30 || std::abs(a[1] - p[1]) > 30) continue;
+        nearest = std::min(nearest, TriangleDistance(p, a, Voxels(cut.vertices[cut.indices[i + 1]]),
+                                                     Voxels(cut.vertices[cut.indices[i + 2]])));
+      }
+      worst = std::max(worst, nearest);
+    }
+  }
+  EXPECT_LE(worst, kPatchError + kSnapped);
+  EXPECT_GT(worst, kPatchError / 20) << "finer than anyone needs";
+}
+
+TEST(CutPatches, FarOnesAreLeftOutAndAllHaveAnEnd) {
+  std::vector<float> away(48, -5000.0f);
+  EXPECT_TRUE(CutCurved(View(away, PrimitiveKind::kPatches, Topology::kList), Affine(),
+                        TileGrid::Of(kSize, kSize, kSize))
+                  .vertices.empty());
+  std::mt19937 random(3);
+  const std::vector<float> huge = RandomPoints(random, 16, -1e9, 1e9);
+  const Cut cut = CutCurved(View(huge, PrimitiveKind::kPatches, Topology::kList), Affine(),
+                            TileGrid::Of(kSize, kSize, kSize));
+  EXPECT_EQ(cut.vertices.size(), size_t{kMostPatchPieces + 1} * (kMostPatchPieces + 1));
+}
+
+}  // namespace
+}  // namespace voxeld::gpu
