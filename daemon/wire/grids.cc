@@ -78,9 +78,10 @@ MaybeFault ToFormat(const FieldPath& path, const v1::Grid& in, bool colors, Read
       if (colors) break;
       [[fallthrough]];
     default:
-      return UnknownEnum(FieldPath(path, "type"), in.type(),
-                         colors ? "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16, ELEMENT_TYPE_U8, ELEMENT_TYPE_RGBA8"
-                                : "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16, ELEMENT_TYPE_U8");
+      return UnknownEnum(
+          FieldPath(path, "type"), in.type(),
+          colors ? "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16, ELEMENT_TYPE_U8, ELEMENT_TYPE_RGBA8"
+                 : "ELEMENT_TYPE_F32, ELEMENT_TYPE_U16, ELEMENT_TYPE_U8");
   }
   switch (in.filter()) {
     case v1::Grid::FILTER_UNSPECIFIED:
@@ -187,18 +188,20 @@ MaybeFault CheckTransfer(const FieldPath& path, const v1::Transfer& in) {
                                        : "is given, and so is colors; give one of the two"};
   }
   if (!in.colors().empty() && in.colors_size() != count) {
-    return Fault{FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", in.colors_size(), " for ", count, " values; give one for each")};
+    return Fault{
+        FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
+        absl::StrCat("has ", in.colors_size(), " for ", count, " values; give one for each")};
   }
   for (int i = 0; i < in.colors_size(); ++i) {
     if (in.colors(i) <= 0xFFFFFF) continue;
-    return Fault{FieldPath(path, "colors", i).ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is 0x", absl::Hex(in.colors(i)), "; give 0xRRGGBB, at most 0xffffff")};
+    return Fault{
+        FieldPath(path, "colors", i).ToString(), Reason::kInvalidValue,
+        absl::StrCat("is 0x", absl::Hex(in.colors(i)), "; give 0xRRGGBB, at most 0xffffff")};
   }
   if (!in.opacities().empty() && in.opacities_size() != count) {
-    return Fault{
-        FieldPath(path, "opacities").ToString(), Reason::kSizeMismatch,
-        absl::StrCat("has ", in.opacities_size(), " for ", count, " values; give one for each, or none")};
+    return Fault{FieldPath(path, "opacities").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", in.opacities_size(), " for ", count,
+                              " values; give one for each, or none")};
   }
   for (int i = 0; i < in.opacities_size(); ++i) {
     if (in.opacities(i) >= 0 && in.opacities(i) <= 1) continue;
@@ -224,14 +227,17 @@ MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* he
   head->scale = static_cast<float>(SampleHead::kTableEntries / (high - low));
   int stop = 0;
   for (size_t i = 0; i < out->size(); ++i) {
-    const double value = low + (static_cast<double>(i) + 0.5) / SampleHead::kTableEntries * (high - low);
+    const double value =
+        low + (static_cast<double>(i) + 0.5) / SampleHead::kTableEntries * (high - low);
     while (stop + 2 < in.values_size() && in.values(stop + 1) <= value) ++stop;
     const double from = in.values(stop), to = in.values(stop + 1);
     const double t = to > from ? std::clamp((value - from) / (to - from), 0.0, 1.0) : 1;
-    const uint32_t rgb = map.has_value() ? (*map)[i] : Between(in.colors(stop), in.colors(stop + 1), t);
-    const double opacity = in.opacities().empty()
-                               ? 1
-                               : in.opacities(stop) + (in.opacities(stop + 1) - in.opacities(stop)) * t;
+    const uint32_t rgb =
+        map.has_value() ? (*map)[i] : Between(in.colors(stop), in.colors(stop + 1), t);
+    const double opacity =
+        in.opacities().empty()
+            ? 1
+            : in.opacities(stop) + (in.opacities(stop + 1) - in.opacities(stop)) * t;
     (*out)[i] = opacity > 0 ? Between(0, rgb, opacity) | SampleHead::kDrawn : 0;
   }
   return {};

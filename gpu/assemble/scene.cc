@@ -9,7 +9,7 @@
 
 namespace voxeld::gpu {
 
-RetainedGeometry SceneObserver::Retain(const GeometryView& view) {
+RetainedGeometry KeepOnHost(const GeometryView& view) {
   const size_t positions = view.positions.size_bytes(), indices = view.indices.size_bytes(),
                colors = view.colors.size_bytes();
   RetainedGeometry kept{view, view.bulk};

@@ -25,6 +25,9 @@ struct RetainedGeometry {
   std::shared_ptr<const void> memory;  // what its arrays lie in; none if there are none
 };
 
+// Bulk memory as it is, else a copy of its arrays: the delta is gone after it was applied.
+RetainedGeometry KeepOnHost(const GeometryView& view);
+
 struct Layer;
 
 struct Drawable {
@@ -63,7 +66,7 @@ struct SceneObserver {
   virtual absl::Status OnPlan(const DeltaPlan&) { return absl::OkStatus(); }
   // What is kept of a new geometry: bulk memory as it is, else a copy of its arrays, unless an engine
   // has them elsewhere. The delta is gone after Apply.
-  virtual RetainedGeometry Retain(const GeometryView& view);
+  virtual RetainedGeometry Retain(const GeometryView& view) { return KeepOnHost(view); }
   // It goes, or what it is drawn from changes.
   virtual void OnLeave(Drawable& drawable) = 0;
   // It is new, or has changed (after OnLeave); `layer` and `geometry` are set.

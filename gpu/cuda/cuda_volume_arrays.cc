@@ -10,6 +10,7 @@
 #include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/triangle_kernels.h"
 #include "gpu/cuda/upload_plan.h"
+#include "gpu/primitives/samples.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
@@ -184,6 +185,17 @@ std::span<const T> CudaVolume::OnDevice(const GeometryView& view, std::span<cons
 
 namespace {
 
+// What the host reads of a geometry. Copied from bulk memory, too, which its owner may use for something else
+// once the delta has been applied.
+RetainedGeometry CopyOf(const GeometryView& view) {
+  GeometryView copied = view;
+  copied.bulk = nullptr;
+  if (view.record.kind == PrimitiveKind::kSamples) {
+    copied.indices = view.indices.first(kSampleHeadWords);
+  }
+  return KeepOnHost(copied);
+}
+
 // Whether the host reads what such geometries have, as well.
 bool IsWorkedOutOnHost(PrimitiveKind kind) {
   return kind == PrimitiveKind::kImplicit || kind == PrimitiveKind::kSamples || IsCurved(kind);
@@ -192,7 +204,7 @@ bool IsWorkedOutOnHost(PrimitiveKind kind) {
 }  // namespace
 
 RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
-  if (view.record.drawn_by == DrawnBy::kCpu) return SceneObserver::Retain(view);
+  if (view.record.drawn_by == DrawnBy::kCpu) return KeepOnHost(view);
   RetainedGeometry kept{view, nullptr};
   kept.view.bulk = nullptr;
   if (!view.HasArrays()) return kept;
@@ -202,9 +214,7 @@ RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   const auto bounds = bounds_.find(view.positions.data());
   kept.memory = std::make_shared<DeviceArrays>(
       arrays_, bounds == bounds_.end() ? std::nullopt : std::optional(bounds->second),
-      IsWorkedOutOnHost(view.record.kind)
-          ? std::optional(SceneObserver::Retain(view))
-          : std::nullopt);
+      IsWorkedOutOnHost(view.record.kind) ? std::optional(CopyOf(view)) : std::nullopt);
   return kept;
 }
 

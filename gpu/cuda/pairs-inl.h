@@ -3,9 +3,9 @@
 #pragma once
 
 #include "gpu/cuda/implicit-inl.h"
-#include "gpu/cuda/samples-inl.h"
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
+#include "gpu/cuda/samples-inl.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
@@ -17,6 +17,7 @@ struct PairScratch {
   union {
     SolidBlock solid;
     ImplicitScratch implicit;
+    SampleScratch samples;
   };
 };
 
@@ -178,7 +179,7 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
         DrawImplicit(entry, static_cast<uint32_t>(scratch.heavy[i]), box, words, scratch.implicit);
         break;
       case PrimitiveKind::kSamples:
-        DrawSamples(entry, box, words);
+        DrawSamples(entry, box, words, scratch.samples);
         break;
       default:
         break;

@@ -12,8 +12,7 @@ inline void SetBlocks(const Box3& box, int32_t tiles, Solid& solid, ImplicitPlac
   place.edge = tiles * kTileSize;
   for (int a = 0; a < 3; ++a) {
     place.first[a] = box.lo[a] / place.edge;
-    place.blocks[a] =
-        IsEmpty(box) ? 0 : (box.hi[a] + place.edge - 1) / place.edge - place.first[a];
+    place.blocks[a] = IsEmpty(box) ? 0 : (box.hi[a] + place.edge - 1) / place.edge - place.first[a];
   }
 }
 

@@ -191,6 +191,41 @@ struct Samples {
     return false;
   }
 
+  VOXELD_HD static float Mix(float a, float b, float t) { return a + (b - a) * t; }
+
+  // Of corners, x fastest.
+  VOXELD_HD static float MixCorners(const float corner[8], const float t[3]) {
+    const float a = Mix(Mix(corner[0], corner[1], t[0]), Mix(corner[2], corner[3], t[0]), t[1]);
+    const float b = Mix(Mix(corner[4], corner[5], t[0]), Mix(corner[6], corner[7], t[0]), t[1]);
+    return Mix(a, b, t[2]);
+  }
+
+  // Of a voxel with a depth: |P| ≤ h·|∇P|, the gradient in voxel space; of NEAREST grids there is none.
+  VOXELD_HD static bool IsWithinShell(const Source& source, const SampleView& view, int32_t x,
+                                      int32_t y, int32_t z, float depth) {
+    Cell cell;
+    if (view.head().filter == SampleFilter::kNearest || !Find(source, view, x, y, z, &cell)) {
+      return false;
+    }
+    float corner[8], slope[3];
+    CornersOf(view, cell, corner);
+    for (int a = 0; a < 3; ++a) {
+      // Where the two samples of an axis are one, nothing changes along it.
+      float t[3] = {cell.t[0], cell.t[1], cell.t[2]};
+      t[a] = 0;
+      const float from = MixCorners(corner, t);
+      t[a] = 1;
+      slope[a] = MixCorners(corner, t) - from;
+    }
+    float square = 0;
+    for (int c = 0; c < 3; ++c) {
+      const float(&m)[3][3] = source.solid.inverse;
+      const float d = (slope[0] * m[0][c] + slope[1] * m[1][c]) + slope[2] * m[2][c];
+      square = square + d * d;
+    }
+    return Abs(depth) <= source.implicit.half * implicit::Sqrt(square);
+  }
+
  private:
   // Where a voxel's centre lies: the samples around it, and how far it is from the first to the last.
   struct Cell {
@@ -222,20 +257,12 @@ struct Samples {
     return true;
   }
 
-  VOXELD_HD static float Mix(float a, float b, float t) { return a + (b - a) * t; }
-
   VOXELD_HD static void CornersOf(const SampleView& view, const Cell& cell, float corner[8]) {
     for (uint32_t i = 0; i < 8; ++i) {
       corner[i] =
           view.Number(view.IndexOf(cell.at[0][i & 1], cell.at[1][i >> 1 & 1], cell.at[2][i >> 2]));
     }
   }
-  VOXELD_HD static float MixCorners(const float corner[8], const float t[3]) {
-    const float a = Mix(Mix(corner[0], corner[1], t[0]), Mix(corner[2], corner[3], t[0]), t[1]);
-    const float b = Mix(Mix(corner[4], corner[5], t[0]), Mix(corner[6], corner[7], t[0]), t[1]);
-    return Mix(a, b, t[2]);
-  }
-
   VOXELD_HD static float ValueIn(const SampleView& view, const Cell& cell) {
     if (view.head().filter == SampleFilter::kNearest) {
       return view.Number(view.IndexOf(cell.at[0][0], cell.at[1][0], cell.at[2][0]));
@@ -293,32 +320,6 @@ struct Samples {
       }
     }
     return false;
-  }
-
-  // |P| ≤ h·|∇P|, the gradient in voxel space; of NEAREST grids there is none.
-  VOXELD_HD static bool IsWithinShell(const Source& source, const SampleView& view, int32_t x,
-                                      int32_t y, int32_t z, float depth) {
-    Cell cell;
-    if (view.head().filter == SampleFilter::kNearest || !Find(source, view, x, y, z, &cell)) {
-      return false;
-    }
-    float corner[8], slope[3];
-    CornersOf(view, cell, corner);
-    for (int a = 0; a < 3; ++a) {
-      // Where the two samples of an axis are one, nothing changes along it.
-      float t[3] = {cell.t[0], cell.t[1], cell.t[2]};
-      t[a] = 0;
-      const float from = MixCorners(corner, t);
-      t[a] = 1;
-      slope[a] = MixCorners(corner, t) - from;
-    }
-    float square = 0;
-    for (int c = 0; c < 3; ++c) {
-      const float(&m)[3][3] = source.solid.inverse;
-      const float d = (slope[0] * m[0][c] + slope[1] * m[1][c]) + slope[2] * m[2][c];
-      square = square + d * d;
-    }
-    return Abs(depth) <= source.implicit.half * implicit::Sqrt(square);
   }
 };
 

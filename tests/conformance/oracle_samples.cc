@@ -28,7 +28,8 @@ struct Words {
   uint32_t entry(size_t i) const { return all[12 + i]; }
   // Four channels, or the number four times.
   std::array<float, 4> At(int64_t x, int64_t y, int64_t z) const {
-    const size_t i = static_cast<size_t>((z * size(1) + y) * size(0) + x), begin = 12 + 256 + all[9];
+    const size_t i = static_cast<size_t>((z * size(1) + y) * size(0) + x),
+                 begin = 12 + 256 + all[9];
     const auto* bytes = reinterpret_cast<const unsigned char*>(&all[begin]);
     if (format() == 3) {
       const uint32_t word = all[begin + i];

@@ -29,8 +29,7 @@ void AddSamples(SceneGenerator& random, ModelGeometry& g) {
   const bool holes = random.Chance(0.6);
   for (uint32_t i = 0; i < SampleHead::kTableEntries; ++i) {
     const bool drawn = !holes || i % 64 > 40;
-    g.indices[kSampleHeadWords + i] =
-        drawn ? random.RandomColor() | SampleHead::kDrawn : 0;
+    g.indices[kSampleHeadWords + i] = drawn ? random.RandomColor() | SampleHead::kDrawn : 0;
   }
   auto* const bytes = reinterpret_cast<unsigned char*>(
       &g.indices[kSampleHeadWords + SampleHead::kTableEntries + head.bricks]);
@@ -42,8 +41,7 @@ void AddSamples(SceneGenerator& random, ModelGeometry& g) {
   for (uint32_t z = 0; z < head.size[2]; ++z) {
     for (uint32_t y = 0; y < head.size[1]; ++y) {
       for (uint32_t x = 0; x < head.size[0]; ++x, ++i) {
-        const double distance =
-            std::hypot(x - centre[0], std::hypot(y - centre[1], z - centre[2]));
+        const double distance = std::hypot(x - centre[0], std::hypot(y - centre[1], z - centre[2]));
         double value = std::clamp(1.3 * std::cos(distance / period), 0.0, 1.0) * most;
         if (noise && random.Chance(0.3)) value = random.Real(0, most);
         if (head.format == SampleFormat::kU8) bytes[i] = static_cast<unsigned char>(value);

@@ -255,8 +255,10 @@ TEST(Delta, SamplesAreLookedAt) {
     return std::string(Read(block.bytes()).message());
   };
   EXPECT_EQ(message([](SampleHead&) {}), "");
-  EXPECT_THAT(message([](SampleHead& h) { h.size[1] = 0; }), HasSubstr("samples.size is 0, must be 1 to"));
-  EXPECT_THAT(message([](SampleHead& h) { h.size[0] = 4; }), HasSubstr("samples.words is 272, must be 273"));
+  EXPECT_THAT(message([](SampleHead& h) { h.size[1] = 0; }),
+              HasSubstr("samples.size is 0, must be 1 to"));
+  EXPECT_THAT(message([](SampleHead& h) { h.size[0] = 4; }),
+              HasSubstr("samples.words is 272, must be 273"));
   EXPECT_THAT(message([](SampleHead& h) { h.size[2] = 65536; }), HasSubstr("samples.bricks is 1"));
   EXPECT_THAT(message([](SampleHead& h) { h.format = static_cast<SampleFormat>(4); }),
               HasSubstr("samples.format is 4"));
@@ -276,7 +278,8 @@ TEST(Delta, SamplesAreLookedAt) {
   Block block(DeltaWriter::SizeOf(g));
   DeltaWriter writer(block.bytes());
   writer.PutGeometry(g, {}, words, {});
-  EXPECT_THAT(std::string(Read(block.bytes()).message()), HasSubstr("samples.words is 5, must be 12 at least"));
+  EXPECT_THAT(std::string(Read(block.bytes()).message()),
+              HasSubstr("samples.words is 5, must be 12 at least"));
 }
 
 TEST(Delta, ProgramsAreLookedAt) {

@@ -111,10 +111,6 @@ uint64_t AfterUnspecified(Enum value) {
   return static_cast<uint64_t>(value) + 1;
 }
 
-uint32_t RgbOf(const Color& color) {
-  return static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 | color.b;
-}
-
 struct ShapeEncoder {
   std::string before;  // what precedes the shape within the primitive: its colour
 
@@ -210,6 +206,33 @@ struct ShapeEncoder {
     AppendPayload(v1::HeightMap::kHeightsFieldNumber, map.heights, &rope);
     return Wrap(before, v1::Primitive::kHeightMapFieldNumber, std::move(rope));
   }
+  absl::StatusOr<Rope> operator()(const Volume& volume) const {
+    const auto* bytes = std::get_if<Array<uint8_t>>(&volume.grid.samples);
+    if (volume.colors && bytes == nullptr) {
+      return absl::InvalidArgumentError(
+          "samples are colours but not bytes; r g b a of each is right");
+    }
+    absl::StatusOr<Rope> grid = EncodeGrid(volume.grid, volume.colors);
+    if (!grid.ok()) return grid.status();
+    std::string fields;
+    if (volume.transfer.has_value()) {
+      AppendPresentBytes(v1::Volume::kTransferFieldNumber, EncodeTransfer(*volume.transfer),
+                         &fields);
+    }
+    return Wrap(before, v1::Primitive::kVolumeFieldNumber,
+                Wrap(fields, v1::Volume::kGridFieldNumber, *std::move(grid)));
+  }
+  absl::StatusOr<Rope> operator()(const Isosurface& surface) const {
+    absl::StatusOr<Rope> grid = EncodeGrid(surface.grid, false);
+    if (!grid.ok()) return grid.status();
+    std::string fields;
+    AppendDouble(v1::Isosurface::kLevelFieldNumber, surface.level, &fields);
+    AppendUnsigned(v1::Isosurface::kFillFieldNumber, AfterUnspecified(surface.fill), &fields);
+    AppendUnsigned(v1::Isosurface::kRuleFieldNumber, AfterUnspecified(surface.rule), &fields);
+    AppendThickness(v1::Isosurface::kShellFieldNumber, surface.shell, &fields);
+    return Wrap(before, v1::Primitive::kIsosurfaceFieldNumber,
+                Wrap(fields, v1::Isosurface::kGridFieldNumber, *std::move(grid)));
+  }
   // The others' bytes are a primitive's: they follow what precedes.
   template <typename Measured>
   absl::StatusOr<Rope> operator()(const Measured& shape) const {
@@ -229,6 +252,34 @@ struct ShapeEncoder {
   }
 
  private:
+  static absl::StatusOr<Rope> EncodeGrid(const Grid& grid, bool colors) {
+    const uint64_t samples = uint64_t{grid.size_a} * grid.size_b * grid.size_c * (colors ? 4 : 1);
+    const size_t given = std::visit([](const auto& array) { return array.size(); }, grid.samples);
+    if (samples == 0 || given != samples) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("samples has ", given, " numbers for a grid of ", grid.size_a, " by ",
+                       grid.size_b, " by ", grid.size_c, "; ", samples, " are right"));
+    }
+    std::string fields;
+    AppendVec3(v1::Grid::kCornerFieldNumber, grid.corner, &fields);
+    AppendVec3(v1::Grid::kEdgeAFieldNumber, grid.edge_a, &fields);
+    AppendVec3(v1::Grid::kEdgeBFieldNumber, grid.edge_b, &fields);
+    AppendVec3(v1::Grid::kEdgeCFieldNumber, grid.edge_c, &fields);
+    AppendUnsigned(v1::Grid::kSizeAFieldNumber, grid.size_a, &fields);
+    AppendUnsigned(v1::Grid::kSizeBFieldNumber, grid.size_b, &fields);
+    AppendUnsigned(v1::Grid::kSizeCFieldNumber, grid.size_c, &fields);
+    constexpr v1::ElementType kTypes[] = {v1::ELEMENT_TYPE_F32, v1::ELEMENT_TYPE_U16,
+                                          v1::ELEMENT_TYPE_U8};
+    AppendUnsigned(v1::Grid::kTypeFieldNumber,
+                   colors ? v1::ELEMENT_TYPE_RGBA8 : kTypes[grid.samples.index()], &fields);
+    AppendUnsigned(v1::Grid::kFilterFieldNumber, AfterUnspecified(grid.filter), &fields);
+    Rope rope(std::move(fields));
+    std::visit(
+        [&](const auto& array) { AppendPayload(v1::Grid::kSamplesFieldNumber, array, &rope); },
+        grid.samples);
+    return rope;
+  }
+
   absl::StatusOr<Rope> OverVertices(const Vertices& vertices, int vertices_field,
                                     const std::string& fields, int primitive_field) const {
     absl::StatusOr<Rope> encoded = EncodeVertices(vertices);

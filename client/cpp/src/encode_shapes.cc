@@ -58,6 +58,10 @@ void SetText(const std::string& text, v1::Expression* to) { to->set_text(text); 
 
 }  // namespace
 
+uint32_t RgbOf(const Color& color) {
+  return static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 | color.b;
+}
+
 absl::StatusOr<std::string> EncodeShape(const Implicit& shape) {
   v1::Primitive primitive;
   v1::Implicit* const to = primitive.mutable_implicit();
@@ -230,13 +234,19 @@ absl::StatusOr<std::string> EncodeShape(const Text& shape) {
   return primitive.SerializeAsString();
 }
 
+std::string EncodeTransfer(const Transfer& transfer) {
+  v1::Transfer to;
+  to.mutable_values()->Assign(transfer.values.begin(), transfer.values.end());
+  for (const Color& color : transfer.colors) to.add_colors(RgbOf(color));
+  to.set_colormap(transfer.colormap);
+  to.mutable_opacities()->Assign(transfer.opacities.begin(), transfer.opacities.end());
+  return to.SerializeAsString();
+}
+
 std::string EncodeColorScale(const ColorScale& scale) {
   v1::ColorScale to;
   to.set_colormap(scale.colormap);
-  for (const Color& color : scale.colors) {
-    to.add_colors(static_cast<uint32_t>(color.r) << 16 | static_cast<uint32_t>(color.g) << 8 |
-                  color.b);
-  }
+  for (const Color& color : scale.colors) to.add_colors(RgbOf(color));
   to.set_low(scale.low);
   to.set_high(scale.high);
   if (scale.along.has_value()) Set(*scale.along, to.mutable_along());

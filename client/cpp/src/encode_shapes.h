@@ -23,6 +23,10 @@ absl::StatusOr<std::string> EncodeShape(const Arc& shape);
 absl::StatusOr<std::string> EncodeShape(const Ellipse& shape);
 absl::StatusOr<std::string> EncodeShape(const Helix& shape);
 absl::StatusOr<std::string> EncodeShape(const Text& shape);
+// 0xRRGGBB.
+uint32_t RgbOf(const Color& color);
+// A v1.Transfer.
+std::string EncodeTransfer(const Transfer& transfer);
 // A v1.ColorScale.
 std::string EncodeColorScale(const ColorScale& scale);
 

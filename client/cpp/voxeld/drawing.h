@@ -108,6 +108,41 @@ struct HeightMap {
   SurfaceRule rule = SurfaceRule::kThin;
 };
 
+// Samples in the middles of cells that fill what three edges span from a corner.
+struct Grid {
+  enum class Filter : uint8_t { kLinear, kNearest };
+  Vec3 corner = {-1, -1, -1};
+  Vec3 edge_a = {2, 0, 0}, edge_b = {0, 2, 0}, edge_c = {0, 0, 2};
+  uint32_t size_a = 0, size_b = 0, size_c = 0;  // samples along each
+  // Those along edge_a side by side, then rows along edge_b. All in one message: a server takes so many bytes.
+  std::variant<Array<float>, Array<uint16_t>, Array<uint8_t>> samples;
+  Filter filter = Filter::kLinear;
+};
+
+// Colours and opacities of numbers, in 256 steps from the first value to the last.
+struct Transfer {
+  std::vector<double> values;     // 2 to 256, not descending
+  std::vector<Color> colors;      // of each; or
+  std::string colormap;           // matplotlib's name of a row of colours
+  std::vector<double> opacities;  // 0 to 1 of each, 0: nothing is drawn; empty: 1
+};
+
+// Numbers through a transfer function, without one what is above their middle; or colours.
+struct Volume {
+  Grid grid;
+  bool colors = false;  // the samples are bytes, r g b a of each
+  std::optional<Transfer> transfer;
+};
+
+// Where numbers are at a level; inside is where they are no less.
+struct Isosurface {
+  Grid grid;
+  double level = 0;
+  Fill fill = Fill::kSurface;  // or solid
+  SurfaceRule rule = SurfaceRule::kThin;
+  Thickness shell;
+};
+
 struct Box {
   Vec3 center;
   Vec3 size = {1, 1, 1};  // full edge lengths
@@ -149,9 +184,10 @@ struct ColorScale {
   Array<float> scalars;  // or one for each vertex
 };
 
-using Shape = std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance, Implicit,
-                           Ellipsoid, Torus, Cone, Parallelepiped, Disc, Patch, Polygon, HeightMap,
-                           Curve, Arc, Ellipse, Helix, BezierSurface, Arrow, Text>;
+using Shape =
+    std::variant<Points, Segments, Mesh, Box, Sphere, Cylinder, Instance, Implicit, Ellipsoid,
+                 Torus, Cone, Parallelepiped, Disc, Patch, Polygon, HeightMap, Curve, Arc, Ellipse,
+                 Helix, BezierSurface, Arrow, Text, Volume, Isosurface>;
 
 // Everything about an entity but its shape.
 struct Look {

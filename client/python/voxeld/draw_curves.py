@@ -1,11 +1,11 @@
-"""Lines that bend, surfaces of Bézier patches, arrows and text."""
+"""Lines that bend, surfaces of Bézier patches, arrows, text, and what lies on grids."""
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Any, Optional, Sequence
 
 import numpy.typing as npt
 
-from . import curves
+from . import curves, grids
 from .colors import Colors
 from .draw_measured import Drawn, DrawMeasured
 from .look import Look
@@ -74,3 +74,20 @@ class DrawCurves(DrawMeasured[Drawn]):
         return self._draw(name, curves.text, (content, position, height), dict(
             facing=facing, up=up, style=style, align=align, line_spacing=line_spacing, wrap=wrap, font=font, depth=depth,
             color=color, rule=rule, width=width, unit=unit), Look.of(**look))
+
+    def grid(self, name: str, array: npt.ArrayLike, *, values: Optional[Sequence[float]] = None,
+             colors: Optional[Sequence[Any]] = None, cmap: Optional[str] = None, opacities: Optional[Sequence[float]] = None,
+             extent: grids.Extent = None, filter: str = "linear", color: Optional[Colors] = None, **look: Any) -> Drawn:
+        """A volume, without gaps: (nx, ny, nz) numbers, uint8, uint16 or float32, or (nx, ny, nz, 4) uint8 colours, whose
+        fourth dims them and leaves out what is 0. Numbers have the colours of `values`: one each, or a map's from the first to
+        the last; with opacities, 0 for nothing. Without values what is above the middle is drawn. `extent`: the two corners; by
+        default it fills [-1, 1] on its longest axis. `filter`: "linear" or "nearest"."""
+        return self._draw(name, grids.grid, (array,), dict(values=values, colors=colors, cmap=cmap, opacities=opacities,
+                                                           extent=extent, filter=filter, color=color), Look.of(**look))
+
+    def isosurface(self, name: str, array: npt.ArrayLike, level: float, *, extent: grids.Extent = None, filter: str = "linear",
+                   color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
+                   unit: str = "voxels", **look: Any) -> Drawn:
+        """Where (nx, ny, nz) numbers are at a level, or, solid, no less than it."""
+        return self._draw(name, grids.isosurface, (array, level), dict(
+            extent=extent, filter=filter, color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))

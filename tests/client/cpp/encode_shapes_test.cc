@@ -97,6 +97,45 @@ TEST(EncodeShapes, FillsSplatsAndTints) {
   EXPECT_FALSE(Parse(Instance{.object = "o"}).instance().has_tint());
 }
 
+TEST(EncodeShapes, VolumesAndIsosurfaces) {
+  const v1::Volume volume =
+      Parse(
+          Volume{
+              .grid = {.size_a = 2, .size_b = 1, .size_c = 1, .samples = Array<uint16_t>({1, 300})},
+              .transfer =
+                  Transfer{
+                      .values = {0, 300}, .colors = {{0, 0, 0}, {1, 2, 3}}, .opacities = {0, 1}}})
+          .volume();
+  EXPECT_EQ(volume.grid().type(), v1::ELEMENT_TYPE_U16);
+  EXPECT_EQ(volume.grid().samples(), std::string("\x01\0\x2C\x01", 4));
+  EXPECT_EQ(volume.grid().edge_b().y(), 2);
+  EXPECT_THAT(volume.transfer().colors(), ElementsAre(0, 0x010203));
+  EXPECT_THAT(volume.transfer().opacities(), ElementsAre(0, 1));
+  const v1::Volume colors = Parse(Volume{.grid = {.size_a = 1,
+                                                  .size_b = 1,
+                                                  .size_c = 1,
+                                                  .samples = Array<uint8_t>({1, 2, 3, 4})},
+                                         .colors = true})
+                                .volume();
+  EXPECT_EQ(colors.grid().type(), v1::ELEMENT_TYPE_RGBA8);
+  const v1::Isosurface surface = Parse(Isosurface{.grid = {.size_a = 1,
+                                                           .size_b = 1,
+                                                           .size_c = 2,
+                                                           .samples = Array<float>({1, 2}),
+                                                           .filter = Grid::Filter::kNearest},
+                                                  .level = 1.5,
+                                                  .fill = Fill::kSolid})
+                                     .isosurface();
+  EXPECT_EQ(surface.level(), 1.5);
+  EXPECT_EQ(surface.fill(), v1::FILL_SOLID);
+  EXPECT_EQ(surface.grid().filter(), v1::Grid::NEAREST);
+  const absl::Status wrong =
+      EncodePrimitive(
+          Volume{.grid = {.size_a = 2, .size_b = 2, .size_c = 1, .samples = Array<float>({1})}}, {})
+          .status();
+  EXPECT_EQ(wrong.message(), "samples has 1 numbers for a grid of 2 by 2 by 1; 4 are right");
+}
+
 TEST(EncodeShapes, ColorScales) {
   const v1::ColorScale scale =
       Parse(Sphere{},

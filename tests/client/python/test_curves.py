@@ -4,7 +4,7 @@ import unittest
 import numpy as np
 
 import voxeld as voxel
-from voxeld import InvalidArray, InvalidColor, InvalidValue, curves, measured, shapes
+from voxeld import InvalidArray, InvalidColor, InvalidValue, curves, grids, measured, shapes
 from voxeld.v1 import primitives_pb2 as pb
 
 
@@ -76,6 +76,30 @@ class Curves(unittest.TestCase):
             shapes.points(LINE, colors=voxel.Gradient(along=(0, 0, 0)))
         with self.assertRaisesRegex(InvalidColor, "tint is a gradient; one colour is right here"):
             shapes.instance("o", tint=by)
+
+    def test_grids(self) -> None:
+        field = np.arange(24, dtype=np.uint16).reshape(2, 3, 4)
+        shape = parsed(grids.grid(field, values=[0, 10, 23], colors=["black", "red", "white"], opacities=[0, 0.5, 1],
+                                  filter="nearest")).volume
+        self.assertEqual((shape.grid.size_a, shape.grid.size_b, shape.grid.size_c), (2, 3, 4))
+        self.assertEqual((shape.grid.type, shape.grid.filter), (pb.ELEMENT_TYPE_U16, pb.Grid.NEAREST))
+        samples = np.frombuffer(shape.grid.samples, np.uint16)
+        self.assertEqual(samples[:3].tolist(), [field[0, 0, 0], field[1, 0, 0], field[0, 1, 0]])
+        self.assertEqual((shape.grid.corner.x, shape.grid.edge_c.z), (-0.5, 2))
+        self.assertEqual((list(shape.transfer.values), list(shape.transfer.colors)), ([0, 10, 23], [0, 0xFF0000, 0xFFFFFF]))
+        colored = parsed(grids.grid(np.zeros((2, 2, 2, 4), np.uint8))).volume
+        self.assertEqual((colored.grid.type, len(colored.grid.samples)), (pb.ELEMENT_TYPE_RGBA8, 32))
+        surface = parsed(grids.isosurface(field.astype(float), 11.5, fill="solid", extent=((0, 0, 0), (1, 2, 3)))).isosurface
+        self.assertEqual((surface.level, surface.fill, surface.grid.edge_b.y), (11.5, pb.FILL_SOLID, 2))
+        self.assertEqual(surface.grid.type, pb.ELEMENT_TYPE_F32)
+        with self.assertRaisesRegex(InvalidArray, r"array must be of shape \(nx, ny, nz\)"):
+            grids.isosurface([1, 2, 3], 1)
+        with self.assertRaisesRegex(InvalidArray, "more than the 15728640 that go at once"):
+            grids.grid(np.zeros((300, 300, 300), np.uint8))
+        with self.assertRaisesRegex(InvalidValue, "colors has 1 for 2 values"):
+            grids.grid(field, values=[0, 1], colors=["red"])
+        with self.assertRaisesRegex(InvalidValue, "give these as well"):
+            grids.grid(field, cmap="jet")
 
 
 if __name__ == "__main__":

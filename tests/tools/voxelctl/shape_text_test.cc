@@ -67,8 +67,9 @@ TEST(ShapeText, FieldsOfEveryTypeComeThrough) {
   EXPECT_EQ(shape.primitive().implicit().domain().max().z(), 3);
   EXPECT_EQ(shape.primitive().implicit().boundary().points_size(), 9);
   const v1::Primitive volume =
-      Parsed("volume grid.size_a=2 grid.samples=1,2 grid.edge_b=0,3,0 grid.filter=nearest "
-             "transfer.values=0,1 transfer.colors='red blue'")
+      Parsed(
+          "volume grid.size_a=2 grid.samples=1,2 grid.edge_b=0,3,0 grid.filter=nearest "
+          "transfer.values=0,1 transfer.colors='red blue'")
           .primitive();
   EXPECT_EQ(volume.volume().grid().size_a(), 2u);
   EXPECT_EQ(volume.volume().grid().samples().size(), 8u);
@@ -76,7 +77,8 @@ TEST(ShapeText, FieldsOfEveryTypeComeThrough) {
   EXPECT_EQ(volume.volume().grid().filter(), v1::Grid::NEAREST);
   EXPECT_THAT(volume.volume().transfer().colors(), ElementsAre(0xFF0000, 0x0000FF));
   const v1::Primitive scaled =
-      Parsed("torus radius=1 tube_radius=0.2 color_scale.along=0,0,1 color_scale.colormap=jet").primitive();
+      Parsed("torus radius=1 tube_radius=0.2 color_scale.along=0,0,1 color_scale.colormap=jet")
+          .primitive();
   EXPECT_EQ(scaled.color_scale().along().z(), 1);
   EXPECT_EQ(scaled.color_scale().colormap(), "jet");
   EXPECT_EQ(Parsed("instance object=o tint=red").primitive().instance().tint().rgb(), 0xFF0000u);
@@ -109,7 +111,8 @@ TEST(ShapeText, WhatIsWrongIsSaid) {
   EXPECT_EQ(ErrorOf("sphere 1"), "after sphere is \"1\"; NAME=VALUE would be right");
   EXPECT_EQ(ErrorOf("box size=1,2"),
             "size is \"1,2\"; x,y,z would be right, or one number for all");
-  EXPECT_EQ(ErrorOf("box fill=full"), "fill is \"full\"; one of surface, solid, lines, dots would be right");
+  EXPECT_EQ(ErrorOf("box fill=full"),
+            "fill is \"full\"; one of surface, solid, lines, dots would be right");
   EXPECT_EQ(ErrorOf("cone round_ends=yes"), "round_ends is \"yes\"; true or false would be right");
   EXPECT_EQ(ErrorOf("implicit domain=1,2,3"),
             "domain is \"1,2,3\"; two corners, x,y,z:x,y,z, would be right");

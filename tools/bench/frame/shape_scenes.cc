@@ -116,7 +116,8 @@ Scene SampledVolume(bool by_level, double share) {
   std::memcpy(content.indices.data(), &head, sizeof(head));
   // The upper three quarters of the numbers, from dark to light.
   for (uint32_t i = 64; i < gpu::SampleHead::kTableEntries; ++i) {
-    content.indices[gpu::kSampleHeadWords + i] = gpu::SampleHead::kDrawn | i << 16 | (i / 2) << 8 | (255 - i);
+    content.indices[gpu::kSampleHeadWords + i] =
+        gpu::SampleHead::kDrawn | i << 16 | (i / 2) << 8 | (255 - i);
   }
   auto* const samples = reinterpret_cast<uint16_t*>(
       &content.indices[gpu::kSampleHeadWords + gpu::SampleHead::kTableEntries + head.bricks]);

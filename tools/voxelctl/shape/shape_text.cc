@@ -385,8 +385,8 @@ absl::Status SetShape(const FieldDescriptor& kind, const std::vector<Setting>& s
     std::vector<std::string> known(static_cast<size_t>(fields));
     for (int i = 0; i < fields; ++i)
       known[static_cast<size_t>(i)] = shape->GetDescriptor()->field(i)->name();
-    for (const char* name :
-         {"color", "color_scale.colormap", "color_scale.along", "at", "scale", "turn", "priority", "erase", "label", "lifetime"}) {
+    for (const char* name : {"color", "color_scale.colormap", "color_scale.along", "at", "scale",
+                             "turn", "priority", "erase", "label", "lifetime"}) {
       known.emplace_back(name);
     }
     return absl::InvalidArgumentError(absl::StrCat(
