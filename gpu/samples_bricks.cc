@@ -50,6 +50,10 @@ Range RangeOf(const SampleView& view, const int32_t at[3]) {
       }
     }
   }
+  // Means of samples are rounded.
+  constexpr float kRounding = 1e-6f;
+  range.least -= implicit::Abs(range.least) * kRounding;
+  range.greatest += implicit::Abs(range.greatest) * kRounding;
   return range;
 }
 
@@ -66,7 +70,7 @@ bool MayBeCovered(const SampleView& view, const Range& range, const GeometryReco
   const bool inside = range.greatest >= head.level;
   if (record.fill == Fill::kSolid) return inside;
   // A thick shell reaches to wherever numbers change.
-  if (record.thickness > 0 && range.least < range.greatest) return true;
+  if (record.thickness > 0) return range.least < range.greatest || inside;
   return inside && (range.least < head.level || range.edge);
 }
 

@@ -67,7 +67,8 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
       const std::string* child_name = InstanceName(part);
       Bounds bounds;
       if (child_name == nullptr) {
-        object.drawables = AddSaturating(object.drawables, 1);
+        object.drawables =
+            AddSaturating(object.drawables, draft_.DrawablesOf(author_.owner, part.content));
         bounds = draft_.BoundsOf(author_.owner, part.content);
       } else {
         if (affected.contains(*child_name)) self(self, *child_name);

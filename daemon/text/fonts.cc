@@ -11,10 +11,11 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
+#include <string>
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/text/line_break.h"
@@ -114,7 +115,8 @@ absl::StatusOr<std::vector<FriBidiChar>> Characters(std::string_view utf8) {
       return absl::InvalidArgumentError(
           absl::StrCat("is wrong at byte ", i, ", which begins no character of UTF-8"));
     }
-    characters.push_back(code);
+    // Tabs and other controls are as wide as a space.
+    characters.push_back(code < 0x20 && code != '\n' ? ' ' : code);
     i += length;
   }
   return characters;
@@ -128,6 +130,16 @@ class Fonts::Library {
  public:
   Library() {
     config_ = FcInitLoadConfigAndFonts();
+    const FcFontSet* const all = FcConfigGetFonts(config_, FcSetSystem);
+    for (int i = 0; all != nullptr && i < all->nfont; ++i) {
+      FcChar8* family = nullptr;
+      for (int n = 0; FcPatternGetString(all->fonts[i], FC_FAMILY, n, &family) == FcResultMatch;
+           ++n) {
+        const std::string name = reinterpret_cast<const char*>(family);
+        names_.emplace(absl::AsciiStrToLower(name), name);
+      }
+    }
+    for (const char* generic : {"sans", "serif", "mono"}) names_.emplace(generic, generic);
     if (FT_Init_FreeType(&freetype_) != 0) freetype_ = nullptr;
   }
   ~Library() {
@@ -140,28 +152,47 @@ class Fonts::Library {
   absl::StatusOr<LaidOut> Lay(std::string_view utf8, const Layout& layout) {
     const absl::StatusOr<std::vector<FriBidiChar>> characters = Characters(utf8);
     if (!characters.ok()) return characters.status();
+    if (characters->size() > layout.most) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("has ", characters->size(), " characters; give at most ", layout.most));
+    }
     const sync::MutexLock lock(mutex_);
     const absl::StatusOr<const Family*> family = FindFamily(layout.font);
     if (!family.ok()) return family.status();
     LaidOut out;
     double base = 0;
+    FriBidiChar missing = 0;
     const double step = (*family)->faces.front()->line * layout.line_spacing;
     for (size_t begin = 0; begin <= characters->size();) {
       size_t end = begin;
       while (end < characters->size() && (*characters)[end] != '\n') ++end;
       LayParagraph(std::span(*characters).subspan(begin, end - begin), **family, layout, step,
-                   &base, &out);
+                   &base, &missing, &out);
+      if (missing != 0) {
+        return absl::InvalidArgumentError(absl::StrCat(
+            "has U+", absl::Hex(missing, absl::kZeroPad4), ", which no font of the server has"));
+      }
       begin = end + 1;
     }
     return out;
   }
 
+  absl::StatusOr<std::shared_ptr<const StrokeFont>> Strokes(const std::string& name) {
+    const sync::MutexLock lock(mutex_);
+    const auto known = strokes_.find(name);
+    if (known != strokes_.end()) return known->second;
+    absl::StatusOr<StrokeFont> loaded = StrokeFont::Load(name);
+    if (!loaded.ok()) return loaded.status();
+    return strokes_[name] = std::make_shared<const StrokeFont>(*std::move(loaded));
+  }
+
  private:
+  using FontFile = std::pair<std::string, int>;  // and which of its fonts
   // Fonts to be tried one after another.
   struct Family {
     std::vector<std::shared_ptr<Face>> faces;
-    std::vector<std::string> fallbacks;  // files that are not open yet
-    size_t opened = 0;                   // of fallbacks
+    std::vector<FontFile> fallbacks;  // that are not open yet
+    size_t opened = 0;                // of fallbacks
   };
   struct ShapedGlyph {
     std::shared_ptr<const Glyph> glyph;
@@ -173,12 +204,13 @@ class Fonts::Library {
     double advance = 0;
   };
 
-  std::shared_ptr<Face> Open(const std::string& file, int index) VOXELD_REQUIRES(mutex_) {
-    const auto known = faces_.find({file, index});
+  std::shared_ptr<Face> Open(const FontFile& place) VOXELD_REQUIRES(mutex_) {
+    const auto known = faces_.find(place);
     if (known != faces_.end()) return known->second;
     auto face = std::make_shared<Face>();
-    std::shared_ptr<Face>& slot = faces_[{file, index}];
-    if (freetype_ == nullptr || FT_New_Face(freetype_, file.c_str(), index, &face->ft) != 0)
+    std::shared_ptr<Face>& slot = faces_[place];
+    if (freetype_ == nullptr ||
+        FT_New_Face(freetype_, place.first.c_str(), place.second, &face->ft) != 0)
       return slot;
     if (!FT_IS_SCALABLE(face->ft) || face->ft->units_per_EM == 0) return slot;
     hb_face_t* const tables = hb_ft_face_create_referenced(face->ft);
@@ -203,93 +235,93 @@ class Fonts::Library {
                                                                       : 0.7 * ft->units_per_EM;
   }
 
+  // `name` in any case; empty: sans. There are as many as there are names.
   absl::StatusOr<const Family*> FindFamily(const std::string& name) VOXELD_REQUIRES(mutex_) {
-    const auto known = families_.find(name);
+    const auto named = names_.find(name.empty() ? "sans" : absl::AsciiStrToLower(name));
+    if (named == names_.end()) {
+      return absl::NotFoundError(
+          absl::StrCat("is ", Shown(name), ", which is none; there are ", KnownFamilies()));
+    }
+    const auto known = families_.find(named->first);
     if (known != families_.end()) return &known->second;
     FcPattern* const wanted = FcPatternCreate();
-    const std::string family = name.empty() ? "sans" : name;
-    FcPatternAddString(wanted, FC_FAMILY, reinterpret_cast<const FcChar8*>(family.c_str()));
+    FcPatternAddString(wanted, FC_FAMILY, reinterpret_cast<const FcChar8*>(named->second.c_str()));
     FcPatternAddBool(wanted, FC_SCALABLE, FcTrue);
     FcConfigSubstitute(config_, wanted, FcMatchPattern);
     FcDefaultSubstitute(wanted);
     FcResult result;
     FcFontSet* const sorted = FcFontSort(config_, wanted, FcTrue, nullptr, &result);
     Family found;
-    absl::Status status;
     for (int i = 0; sorted != nullptr && i < sorted->nfont; ++i) {
       FcChar8* file = nullptr;
       int index = 0;
       if (FcPatternGetString(sorted->fonts[i], FC_FILE, 0, &file) != FcResultMatch) continue;
       FcPatternGetInteger(sorted->fonts[i], FC_INDEX, 0, &index);
+      FontFile place{reinterpret_cast<const char*>(file), index};
       if (found.faces.empty()) {
-        if (!name.empty() && !IsCalled(sorted->fonts[i], name) && !IsGeneric(name)) {
-          status = absl::NotFoundError(
-              absl::StrCat("is ", name, ", which is none; there are ", KnownFamilies()));
-          break;
-        }
-        std::shared_ptr<Face> face = Open(reinterpret_cast<const char*>(file), index);
+        std::shared_ptr<Face> face = Open(place);
         if (face != nullptr) found.faces.push_back(std::move(face));
       } else if (found.fallbacks.size() < kMostFallbacks) {
-        found.fallbacks.emplace_back(reinterpret_cast<const char*>(file));
+        found.fallbacks.push_back(std::move(place));
       }
     }
     if (sorted != nullptr) FcFontSetDestroy(sorted);
     FcPatternDestroy(wanted);
-    if (!status.ok()) return status;
     if (found.faces.empty()) {
       return absl::UnavailableError(
           "cannot be had: the server has no fonts; install some, as fonts-dejavu-core");
     }
-    return &(families_[name] = std::move(found));
+    return &(families_[named->first] = std::move(found));
   }
 
-  static bool IsGeneric(const std::string& name) {
-    const std::string lower = absl::AsciiStrToLower(name);
-    return lower == "sans" || lower == "serif" || lower == "mono" || lower == "monospace" ||
-           lower == "sans-serif";
+  // For messages.
+  static std::string Shown(const std::string& name) {
+    constexpr size_t kMost = 40;
+    std::string shown = absl::CHexEscape(name.substr(0, kMost));
+    return name.size() > kMost ? shown + "…" : shown;
   }
 
-  static bool IsCalled(FcPattern* font, const std::string& name) {
-    FcChar8* family = nullptr;
-    for (int i = 0; FcPatternGetString(font, FC_FAMILY, i, &family) == FcResultMatch; ++i) {
-      if (FcStrCmpIgnoreCase(family, reinterpret_cast<const FcChar8*>(name.c_str())) == 0)
-        return true;
-    }
-    return false;
-  }
-
-  std::string KnownFamilies() VOXELD_REQUIRES(mutex_) {
-    std::set<std::string> names;
-    const FcFontSet* const all = FcConfigGetFonts(config_, FcSetSystem);
-    for (int i = 0; all != nullptr && i < all->nfont; ++i) {
-      FcChar8* family = nullptr;
-      if (FcPatternGetString(all->fonts[i], FC_FAMILY, 0, &family) == FcResultMatch) {
-        names.insert(reinterpret_cast<const char*>(family));
-      }
-    }
+  std::string KnownFamilies() const {
     constexpr size_t kMost = 12;
-    std::vector<std::string> few(names.begin(), names.end());
-    if (few.size() > kMost) {
-      few.resize(kMost);
-      few.emplace_back("others");
+    std::vector<std::string> few;
+    for (const auto& [lower, name] : names_) {
+      if (few.size() == kMost) {
+        few.emplace_back("others");
+        break;
+      }
+      few.push_back(name);
     }
     return absl::StrJoin(few, ", ");
   }
 
-  // The first of a family's faces that has the character; its first face if none has.
-  std::shared_ptr<Face> FaceOf(const Family& given, FriBidiChar c, bool* missing)
+  // Of what is seen: no controls, formats, and the like.
+  static bool IsSeen(FriBidiChar c) {
+    switch (hb_unicode_general_category(hb_unicode_funcs_get_default(), c)) {
+      case HB_UNICODE_GENERAL_CATEGORY_CONTROL:
+      case HB_UNICODE_GENERAL_CATEGORY_FORMAT:
+      case HB_UNICODE_GENERAL_CATEGORY_LINE_SEPARATOR:
+      case HB_UNICODE_GENERAL_CATEGORY_PARAGRAPH_SEPARATOR:
+      case HB_UNICODE_GENERAL_CATEGORY_SPACE_SEPARATOR:
+        return false;
+      default:
+        return true;
+    }
+  }
+
+  // The first of a family's faces that has the character; its first face if none has, of which `missing` is told.
+  std::shared_ptr<Face> FaceOf(const Family& given, FriBidiChar c, FriBidiChar* missing)
       VOXELD_REQUIRES(mutex_) {
     auto& family = const_cast<Family&>(given);
     for (const std::shared_ptr<Face>& face : family.faces) {
       if (FT_Get_Char_Index(face->ft, c) != 0) return face;
     }
     while (family.opened < family.fallbacks.size()) {
-      std::shared_ptr<Face> face = Open(family.fallbacks[family.opened++], 0);
+      std::shared_ptr<Face> face = Open(family.fallbacks[family.opened++]);
       if (face == nullptr) continue;
       family.faces.push_back(face);
       if (FT_Get_Char_Index(face->ft, c) != 0) return face;
     }
-    *missing = true;
+    if (IsSeen(c) && *missing == 0) *missing = c;
     return family.faces.front();
   }
 
@@ -333,7 +365,7 @@ class Fonts::Library {
 
   // Runs of one level of a line, which stand one after another from left to right.
   Shaped ShapeStretch(std::span<const FriBidiChar> text, size_t begin, size_t end,
-                      bool right_to_left, const Family& family, uint32_t* missing)
+                      bool right_to_left, const Family& family, FriBidiChar* missing)
       VOXELD_REQUIRES(mutex_) {
     struct Run {
       size_t begin, end;
@@ -346,12 +378,10 @@ class Fonts::Library {
       const hb_script_t now = hb_unicode_script(unicode, text[i]);
       const bool plain =
           now == HB_SCRIPT_COMMON || now == HB_SCRIPT_INHERITED || now == HB_SCRIPT_UNKNOWN;
-      bool none = false;
       // Marks stay with what they are put on.
       std::shared_ptr<Face> face = now == HB_SCRIPT_INHERITED && !runs.empty()
                                        ? runs.back().face
-                                       : FaceOf(family, text[i], &none);
-      *missing += none;
+                                       : FaceOf(family, text[i], missing);
       const bool same = !runs.empty() && runs.back().face == face &&
                         (plain || script == HB_SCRIPT_INVALID || script == now);
       if (same) {
@@ -371,8 +401,8 @@ class Fonts::Library {
 
   // Characters of a line in the order in which they stand.
   Shaped ShapeLine(std::span<const FriBidiChar> text, size_t begin, size_t end,
-                   const std::vector<FriBidiLevel>& levels, const Family& family, uint32_t* missing)
-      VOXELD_REQUIRES(mutex_) {
+                   const std::vector<FriBidiLevel>& levels, const Family& family,
+                   FriBidiChar* missing) VOXELD_REQUIRES(mutex_) {
     struct Stretch {
       size_t begin, end;
       FriBidiLevel level;
@@ -410,7 +440,8 @@ class Fonts::Library {
   }
 
   void LayParagraph(std::span<const FriBidiChar> text, const Family& family, const Layout& layout,
-                    double step, double* base, LaidOut* out) VOXELD_REQUIRES(mutex_) {
+                    double step, double* base, FriBidiChar* missing, LaidOut* out)
+      VOXELD_REQUIRES(mutex_) {
     const auto count = static_cast<FriBidiStrIndex>(text.size());
     std::vector<FriBidiLevel> levels(text.size());
     if (count > 0) {
@@ -425,19 +456,18 @@ class Fonts::Library {
       }
     }
     std::vector<Word> words;
-    uint32_t measured = 0;  // missing ones are counted with the lines
     for (size_t i = 0; i < text.size();) {
       size_t end = i + 1;
       while (end < text.size() && IsSpace(text[end]) == IsSpace(text[i])) ++end;
       const double advance =
-          layout.width > 0 ? ShapeLine(text, i, end, levels, family, &measured).advance : 0;
+          layout.width > 0 ? ShapeLine(text, i, end, levels, family, missing).advance : 0;
       words.push_back({i, end, advance, IsSpace(text[i])});
       i = end;
     }
     for (const TextLine& line : BreakLines(words, layout.width)) {
       if (line.begin < line.end) {
         const Shaped shaped = ShapeLine(text, words[line.begin].begin, words[line.end - 1].end,
-                                        levels, family, &out->missing);
+                                        levels, family, missing);
         const double shift = layout.alignment == Alignment::kLeft     ? 0
                              : layout.alignment == Alignment::kCenter ? -shaped.advance / 2
                                                                       : -shaped.advance;
@@ -453,9 +483,16 @@ class Fonts::Library {
   sync::Mutex mutex_;
   FcConfig* config_ = nullptr;
   FT_Library freetype_ = nullptr;
-  std::map<std::pair<std::string, int>, std::shared_ptr<Face>> faces_ VOXELD_GUARDED_BY(mutex_);
+  std::map<std::string, std::string>
+      names_;  // of families, by lower case; as they are from the beginning
+  std::map<FontFile, std::shared_ptr<Face>> faces_ VOXELD_GUARDED_BY(mutex_);
   std::map<std::string, Family> families_ VOXELD_GUARDED_BY(mutex_);
+  std::map<std::string, std::shared_ptr<const StrokeFont>> strokes_ VOXELD_GUARDED_BY(mutex_);
 };
+
+absl::StatusOr<std::shared_ptr<const StrokeFont>> Fonts::Strokes(const std::string& name) {
+  return library_->Strokes(name);
+}
 
 Fonts::Fonts() : library_(std::make_unique<Library>()) {}
 Fonts::~Fonts() = default;

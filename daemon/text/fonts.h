@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "daemon/text/stroke_font.h"
 
 namespace voxeld::text {
 
@@ -20,7 +21,7 @@ struct OutlinePoint {
 // A closed curve: cubic Béziers, 4 points each, each from where the one before ends.
 using Contour = std::vector<OutlinePoint>;
 
-// A letter, or what a font makes of several; its origin at 0, 0. Filled by the rule of non-zero winding.
+// A letter, or what a font makes of several; its origin at 0, 0.
 struct Glyph {
   std::vector<Contour> contours;
 };
@@ -37,11 +38,11 @@ struct Layout {
   Alignment alignment = Alignment::kLeft;
   double line_spacing = 1;  // times the font's
   double width = 0;         // lines are broken between words so as not to be longer; 0: only at \n
+  size_t most = 4096;       // characters
 };
 
 struct LaidOut {
   std::vector<PlacedGlyph> glyphs;
-  uint32_t missing = 0;  // characters that no font here has
 };
 
 // Thread-safe.
@@ -52,9 +53,13 @@ class Fonts {
   Fonts(const Fonts&) = delete;
   Fonts& operator=(const Fonts&) = delete;
 
-  // `utf8` is checked. InvalidArgument says which byte is wrong; NotFound that there is no font of that family,
-  // and which there are that are called alike; Unavailable that there are none at all.
+  // `utf8` is checked. InvalidArgument says which byte is wrong, or which character no font has; NotFound that there
+  // is no font of that family, and which there are; ResourceExhausted that there are too many characters;
+  // Unavailable that there are no fonts at all.
   absl::StatusOr<LaidOut> Lay(std::string_view utf8, const Layout& layout);
+
+  // A stroke font by its name, as StrokeFont::Load, which is read once.
+  absl::StatusOr<std::shared_ptr<const StrokeFont>> Strokes(const std::string& name);
 
  private:
   class Library;

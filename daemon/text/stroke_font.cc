@@ -1,10 +1,12 @@
 #include "daemon/text/stroke_font.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -23,9 +25,11 @@ constexpr size_t kHead = 8;
 absl::StatusOr<StrokeFont> StrokeFont::Load(std::string_view name) {
   const std::string path =
       absl::StrCat(kFolder, "/", absl::string_view(name.data(), name.size()), ".jhf");
-  if (name.empty() || name.find('/') != std::string_view::npos) {
-    return absl::NotFoundError("is none: a stroke font's name is a word, as futural");
-  }
+  const bool word =
+      !name.empty() && name.size() < 64 && std::all_of(name.begin(), name.end(), [](char c) {
+        return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_';
+      });
+  if (!word) return absl::NotFoundError("is none: a stroke font's name is a word, as futural");
   std::ifstream file(path);
   if (!file) {
     return absl::NotFoundError(

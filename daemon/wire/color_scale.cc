@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "daemon/colormaps/colormaps.h"
+#include "daemon/wire/colors.h"
+#include "daemon/wire/fields.h"
 #include "gpu/implicit/field_shape.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -17,42 +18,16 @@ namespace {
 
 using gpu::implicit::Vector;
 
-// Between two colours at t of 1, by channel.
-uint32_t Between(uint32_t a, uint32_t b, double t) {
-  uint32_t rgb = 0;
-  for (int shift = 16; shift >= 0; shift -= 8) {
-    const double from = (a >> shift) & 255, to = (b >> shift) & 255;
-    rgb = rgb << 8 | static_cast<uint32_t>(std::lround(from + (to - from) * t));
-  }
-  return rgb;
-}
-
 MaybeFault ToTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* out) {
-  const FieldPath colors(path, "colors");
-  if (in.colormap().empty() == in.colors().empty()) {
-    return Fault{FieldPath(path, "colormap").ToString(), Reason::kInvalidValue,
-                 in.colormap().empty() ? "is empty, and so is colors; give one of the two"
-                                       : "is given, and so is colors; give one of the two"};
-  }
-  if (!in.colormap().empty()) {
-    const std::optional<ColorTable> table = FindColormap(in.colormap());
-    if (!table.has_value()) {
-      return Fault{FieldPath(path, "colormap").ToString(), Reason::kNotFound,
-                   absl::StrCat("is ", Quote(in.colormap()),
-                                ", which is none; give a name of matplotlib's, as viridis")};
-    }
-    *out = *table;
+  std::optional<ColorTable> map;
+  if (auto fault = ToColorRow(path, in.colormap(), in.colors(), &map)) return fault;
+  if (map.has_value()) {
+    *out = *map;
     return {};
   }
   if (in.colors_size() < 2 || in.colors_size() > 256) {
-    return Fault{colors.ToString(), Reason::kSizeMismatch,
+    return Fault{FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
                  absl::StrCat("has ", in.colors_size(), "; give 2 to 256")};
-  }
-  for (int i = 0; i < in.colors_size(); ++i) {
-    if (in.colors(i) <= 0xFFFFFF) continue;
-    return Fault{
-        FieldPath(path, "colors", i).ToString(), Reason::kInvalidValue,
-        absl::StrCat("is 0x", absl::Hex(in.colors(i)), "; give 0xRRGGBB, at most 0xffffff")};
   }
   for (size_t i = 0; i < out->size(); ++i) {
     const double place = static_cast<double>(i) / 255 * (in.colors_size() - 1);
@@ -75,8 +50,8 @@ MaybeFault ToEnds(const FieldPath& path, const v1::ColorScale& in) {
 // (p · along) / |along|².
 MaybeFault ToAlong(const FieldPath& path, const v1::ColorScale& in, Vector* out) {
   const FieldPath at(path, "along");
-  if (auto fault = CheckVec3(at, in.along())) return fault;
-  const Vector along = {in.along().x(), in.along().y(), in.along().z()};
+  Vector along;
+  if (auto fault = ToVector(at, in.along(), &along)) return fault;
   const double square = gpu::implicit::Dot(along, along);
   if (!(square > 0) || !std::isfinite(square)) {
     return Fault{at.ToString(), Reason::kInvalidValue, "has no direction; give one that is not 0"};
@@ -97,7 +72,7 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
                  "is given, and so are colours of vertices; give one of the two"};
   }
   const size_t count = out->record.vertex_count;
-  std::vector<float> numbers(count);
+  std::vector<double> numbers(count);
   if (in.has_along() == !in.scalars().empty()) {
     return Fault{FieldPath(path, "along").ToString(), Reason::kInvalidValue,
                  in.has_along() ? "is given, and so is scalars; give one of the two"
@@ -108,9 +83,9 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
     if (auto fault = ToAlong(path, in, &along)) return fault;
     const std::span<const float> p = out->arrays.positions();
     for (size_t i = 0; i < count; ++i) {
-      numbers[i] = static_cast<float>(gpu::implicit::Dot(
+      numbers[i] = gpu::implicit::Dot(
           along, {static_cast<double>(p[i * 3]), static_cast<double>(p[i * 3 + 1]),
-                  static_cast<double>(p[i * 3 + 2])}));
+                  static_cast<double>(p[i * 3 + 2])});
     }
   } else {
     if (in.scalars().size() != count * sizeof(float)) {
@@ -118,10 +93,12 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
                    absl::StrCat("has ", in.scalars().size(), " bytes; ", count, " vertices take ",
                                 count * sizeof(float))};
     }
-    std::memcpy(numbers.data(), in.scalars().data(), in.scalars().size());
     for (size_t i = 0; i < count; ++i) {
-      if (auto fault = CheckFinite(FieldPath(path, "scalars", static_cast<int64_t>(i)),
-                                   static_cast<double>(numbers[i]))) {
+      float number;
+      std::memcpy(&number, in.scalars().data() + i * sizeof(number), sizeof(number));
+      numbers[i] = static_cast<double>(number);
+      if (auto fault =
+              CheckFinite(FieldPath(path, "scalars", static_cast<int64_t>(i)), numbers[i])) {
         return fault;
       }
     }
@@ -129,8 +106,8 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
   double low = in.low(), high = in.high();
   if (low == high) {
     const auto [least, greatest] = std::minmax_element(numbers.begin(), numbers.end());
-    low = static_cast<double>(*least);
-    high = static_cast<double>(*greatest);
+    low = *least;
+    high = *greatest;
   }
   gpu::GeometryRecord record = out->record;
   record.color_mode = gpu::ColorMode::kPerVertex;
@@ -144,9 +121,10 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
   std::copy(out->arrays.indices().begin(), out->arrays.indices().end(),
             colored->writable_indices().begin());
   for (size_t i = 0; i < count; ++i) {
-    const double level = high == low ? 0 : (static_cast<double>(numbers[i]) - low) / (high - low);
+    const double level = (numbers[i] - low) / (high - low);
+    // Where there is no range, or it is beyond all numbers, all have the first colour.
     colored->writable_colors()[i] =
-        table[static_cast<size_t>(std::lround(std::clamp(level, 0.0, 1.0) * 255))];
+        table[level > 0 ? static_cast<size_t>(std::lround(std::min(level, 1.0) * 255)) : 0];
   }
   out->record = record;
   out->arrays = *std::move(colored);

@@ -18,7 +18,9 @@ struct DecodeContext {
   // What the bytes fields of Vertices name; null: they hold it themselves.
   const PayloadTable* payloads = nullptr;
   LocalRanges* ranges = nullptr;  // in place of payloads; null: they are refused
-  text::Fonts* fonts = nullptr;   // null: text is refused but for strokes
+  text::Fonts* fonts = nullptr;   // null: text is refused
+  // Of the request under way, what those primitives take that have become something else; null: nobody counts.
+  uint64_t* decoded_bytes = nullptr;
 
   // Most parts ask for no more.
   operator const Limits&() const { return limits; }  // NOLINT(google-explicit-constructor)

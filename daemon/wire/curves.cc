@@ -20,15 +20,9 @@ namespace {
 using gpu::implicit::Vector;
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kMostTurns = 4096;
+constexpr double kMostTurns = 1024;
 constexpr double kLeastSine = 1e-6;
 constexpr uint32_t kPatchPoints = 16;
-
-MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, Vector* out) {
-  if (auto fault = CheckVec3(path, in)) return fault;
-  *out = {in.x(), in.y(), in.z()};
-  return {};
-}
 
 // Two directions across an axis; `message` has the field `toward`, which may be absent.
 template <typename Message>
@@ -246,12 +240,7 @@ MaybeFault ToHelix(const FieldPath& path, const v1::Helix& in, const DecodeConte
   if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
   helix.radius = helix.end_radius = in.radius();
   if (in.has_end_radius()) {
-    const FieldPath at(path, "end_radius");
-    if (auto fault = CheckFloat(at, in.end_radius())) return fault;
-    if (in.end_radius() < 0) {
-      return Fault{at.ToString(), Reason::kInvalidValue,
-                   absl::StrCat("is ", Show(in.end_radius()), "; give 0 or more")};
-    }
+    if (auto fault = CheckNotNegative(FieldPath(path, "end_radius"), in.end_radius())) return fault;
     helix.end_radius = in.end_radius();
   }
   const Vector axis = helix.end - helix.start;
@@ -269,9 +258,12 @@ MaybeFault ToHelix(const FieldPath& path, const v1::Helix& in, const DecodeConte
   helix.turns = in.turns();
   if (auto fault = ToFrame(path, in, "the axis", axis, &helix.u, &helix.v)) return fault;
   if (auto fault = ToLine(path, in, context, &out->record)) return fault;
+  const double spans_needed = std::ceil(std::fabs(in.turns()) * gpu::Spans::kSpansPerTurn);
+  if (auto fault = CheckVertexCount(turns, static_cast<uint64_t>(spans_needed) * 4, context)) {
+    return fault;
+  }
   gpu::Spans spans;
   helix.Make(spans);
-  if (auto fault = CheckVertexCount(turns, spans.points().size(), context)) return fault;
   return SetSpans(path, spans, context, out);
 }
 

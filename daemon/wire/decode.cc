@@ -272,13 +272,17 @@ Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t
   }
   std::optional<LocalRanges> ranges;
   if (memory != nullptr) context.ranges = &ranges.emplace(*memory, context.limits);
+  uint64_t decoded = 0;
+  context.decoded_bytes = &decoded;
   Take(FieldPath(""), request, context, previous_sequence, &out);
   if (ranges.has_value()) out.local_bytes = ranges->bytes_read();
   return out;
 }
 
-Decoded Decode(const v1::ApplyUpdateRequest& request, const DecodeContext& context) {
+Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context) {
   Decoded out;
+  uint64_t decoded = 0;
+  context.decoded_bytes = &decoded;
   if (const auto count = static_cast<uint64_t>(request.operations_size());
       count > context.limits.max_operations_per_commit) {
     return Failed(TooManyOperations(count, context));

@@ -4,6 +4,19 @@
 
 namespace voxeld::daemon::wire {
 
+MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, gpu::implicit::Vector* out) {
+  if (auto fault = CheckVec3(path, in)) return fault;
+  *out = {in.x(), in.y(), in.z()};
+  return {};
+}
+
+MaybeFault CheckNotNegative(const FieldPath& path, double value) {
+  if (auto fault = CheckFloat(path, value)) return fault;
+  if (value >= 0) return {};
+  return Fault{path.ToString(), Reason::kInvalidValue,
+               absl::StrCat("is ", Show(value), "; give 0 or more")};
+}
+
 MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
                        gpu::GeometryRecord* out) {
   const float value = in.value();

@@ -2,12 +2,16 @@
 #pragma once
 
 #include "daemon/wire/check.h"
+#include "gpu/implicit/field_shape.h"
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
 
 MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
                        gpu::GeometryRecord* out);
+MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, gpu::implicit::Vector* out);
+// As CheckFloat, and 0 or greater.
+MaybeFault CheckNotNegative(const FieldPath& path, double value);
 // `path`: of what has the sampling, the rule, or the fill.
 MaybeFault ToSampling(const FieldPath& path, v1::LineSampling in, gpu::GeometryRecord* out);
 MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out);

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "daemon/colormaps/colormaps.h"
 #include "daemon/scene/bounds.h"
+#include "daemon/wire/colors.h"
 #include "daemon/wire/fields.h"
 #include "gpu/implicit/field_shape.h"
 #include "gpu/primitives/samples.h"
@@ -54,12 +54,6 @@ struct ReadGrid {
     }
   }
 };
-
-MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, Vector* out) {
-  if (auto fault = CheckVec3(path, in)) return fault;
-  *out = {in.x(), in.y(), in.z()};
-  return {};
-}
 
 MaybeFault ToFormat(const FieldPath& path, const v1::Grid& in, bool colors, ReadGrid* out) {
   switch (in.type()) {
@@ -113,7 +107,9 @@ MaybeFault ToPlace(const FieldPath& path, const v1::Grid& in, ReadGrid* out) {
     for (int c = 0; c < 3; ++c) out->map.m[r * 4 + c] = edges[c][r] / out->head.size[c];
     out->map.m[r * 4 + 3] = corner[r];
   }
-  return {};
+  if (!IsSingular(out->map)) return {};
+  return Fault{FieldPath(path, "edge_c").ToString(), Reason::kSingularTransform,
+               "spans next to nothing with edge_a and edge_b; give longer edges, and a transform"};
 }
 
 MaybeFault ToGrid(const FieldPath& path, const v1::Grid& in, bool colors, const Limits& limits,
@@ -154,15 +150,6 @@ MaybeFault ToGrid(const FieldPath& path, const v1::Grid& in, bool colors, const 
   return ToPlace(path, in, out);
 }
 
-uint32_t Between(uint32_t a, uint32_t b, double t) {
-  uint32_t rgb = 0;
-  for (int shift = 16; shift >= 0; shift -= 8) {
-    const double from = (a >> shift) & 255, to = (b >> shift) & 255;
-    rgb = rgb << 8 | static_cast<uint32_t>(std::lround(from + (to - from) * t));
-  }
-  return rgb;
-}
-
 MaybeFault CheckTransfer(const FieldPath& path, const v1::Transfer& in) {
   const int count = in.values_size();
   if (count < 2 || count > 256) {
@@ -182,21 +169,10 @@ MaybeFault CheckTransfer(const FieldPath& path, const v1::Transfer& in) {
     return Fault{FieldPath(path, "values", count - 1).ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", Show(in.values(0)), " as the first; give a greater one")};
   }
-  if (in.colors().empty() == in.colormap().empty()) {
-    return Fault{FieldPath(path, "colormap").ToString(), Reason::kInvalidValue,
-                 in.colormap().empty() ? "is empty, and so is colors; give one of the two"
-                                       : "is given, and so is colors; give one of the two"};
-  }
   if (!in.colors().empty() && in.colors_size() != count) {
     return Fault{
         FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
         absl::StrCat("has ", in.colors_size(), " for ", count, " values; give one for each")};
-  }
-  for (int i = 0; i < in.colors_size(); ++i) {
-    if (in.colors(i) <= 0xFFFFFF) continue;
-    return Fault{
-        FieldPath(path, "colors", i).ToString(), Reason::kInvalidValue,
-        absl::StrCat("is 0x", absl::Hex(in.colors(i)), "; give 0xRRGGBB, at most 0xffffff")};
   }
   if (!in.opacities().empty() && in.opacities_size() != count) {
     return Fault{FieldPath(path, "opacities").ToString(), Reason::kSizeMismatch,
@@ -214,17 +190,15 @@ MaybeFault CheckTransfer(const FieldPath& path, const v1::Transfer& in) {
 MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* head, Table* out) {
   if (auto fault = CheckTransfer(path, in)) return fault;
   std::optional<ColorTable> map;
-  if (!in.colormap().empty()) {
-    map = FindColormap(in.colormap());
-    if (!map.has_value()) {
-      return Fault{FieldPath(path, "colormap").ToString(), Reason::kNotFound,
-                   absl::StrCat("is ", Quote(in.colormap()),
-                                ", which is none; give a name of matplotlib's, as viridis")};
-    }
-  }
+  if (auto fault = ToColorRow(path, in.colormap(), in.colors(), &map)) return fault;
   const double low = in.values(0), high = in.values(in.values_size() - 1);
   head->low = static_cast<float>(low);
   head->scale = static_cast<float>(SampleHead::kTableEntries / (high - low));
+  if (!std::isfinite(head->scale)) {
+    return Fault{FieldPath(path, "values", in.values_size() - 1).ToString(), Reason::kOutOfRange,
+                 absl::StrCat("is ", Show(high), " after ", Show(low),
+                              ", too little apart for single precision; scale the samples")};
+  }
   int stop = 0;
   for (size_t i = 0; i < out->size(); ++i) {
     const double value =
@@ -243,8 +217,8 @@ MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* he
   return {};
 }
 
-// Least and greatest of the numbers; false if there is none.
-bool FindRange(const ReadGrid& grid, float* least, float* greatest) {
+// Least and greatest of the numbers, if there are any.
+void FindRange(const ReadGrid& grid, float* least, float* greatest) {
   bool any = false;
   for (uint64_t i = 0; i < grid.samples; ++i) {
     const float number = grid.Number(i);
@@ -253,15 +227,16 @@ bool FindRange(const ReadGrid& grid, float* least, float* greatest) {
     *greatest = any ? std::max(*greatest, number) : number;
     any = true;
   }
-  return any;
 }
 
 // What is above the middle, in one colour.
 void SetHalf(const ReadGrid& grid, uint32_t color, SampleHead* head, Table* out) {
-  float least = 0, greatest = 1;
-  if (!FindRange(grid, &least, &greatest) || least == greatest) greatest = least + 1;
+  float least = 0, greatest = 0;
+  FindRange(grid, &least, &greatest);
   head->low = least;
   head->scale = static_cast<float>(SampleHead::kTableEntries / (double{greatest} - double{least}));
+  // All alike, or as good as that: nothing is above their middle.
+  if (!std::isfinite(head->scale)) head->scale = 0;
   for (size_t i = 0; i < out->size(); ++i) {
     (*out)[i] = i < out->size() / 2 ? 0 : color | SampleHead::kDrawn;
   }
@@ -344,7 +319,14 @@ MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_
   grid.head.level = static_cast<float>(in.level());
   // Thickness in the primitive's units, of which a sample is as many as its cell's edge.
   if (look.thickness_unit == gpu::ThicknessUnit::kUnits) {
-    look.thickness /= static_cast<float>(std::cbrt(std::fabs(gpu::Determinant(grid.map))));
+    const double thickness =
+        static_cast<double>(look.thickness) / std::cbrt(std::fabs(gpu::Determinant(grid.map)));
+    if (CheckFloat(path, thickness).has_value()) {
+      return Fault{
+          FieldPath(path, "shell").ToString(), Reason::kOutOfRange,
+          absl::StrCat("is ", Show(thickness), " samples thick; give less, or another grid")};
+    }
+    look.thickness = static_cast<float>(thickness);
   }
   return Finish(path, grid, {}, look, context, out);
 }

@@ -60,12 +60,6 @@ MaybeFault CheckGrid(const FieldPath& path, const v1::HeightMap& in, const Limit
   return {};
 }
 
-MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, Vector* out) {
-  if (auto fault = CheckVec3(path, in)) return fault;
-  *out = {in.x(), in.y(), in.z()};
-  return {};
-}
-
 double HeightAt(const v1::HeightMap& in, size_t sample) {
   if (in.height_type() == v1::ELEMENT_TYPE_U16) {
     uint16_t height;

@@ -207,6 +207,10 @@ MaybeFault ToInstance(const FieldPath& path, const v1::Primitive& in, const Limi
     return Unimplemented(FieldPath(path, "color"),
                          "an instance takes the colours of its object; leave it unset");
   }
+  if (in.has_color_scale()) {
+    return Unimplemented(FieldPath(path, "color_scale"),
+                         "an instance takes the colours of its object; leave it unset");
+  }
   const FieldPath instance(path, "instance");
   const FieldPath object(instance, "object");
   if (auto fault = CheckName(object, in.instance().object(), limits.max_id_bytes)) return fault;
@@ -369,10 +373,8 @@ MaybeFault ToSamples(const FieldPath& path, const v1::Primitive& in, uint32_t co
   return {};
 }
 
-}  // namespace
-
-MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
-                     Content* out) {
+MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                      Content* out) {
   if (in.kind_case() == v1::Primitive::kInstance) return ToInstance(path, in, context, out);
   uint32_t color = kWhite;
   if (in.has_color()) {
@@ -399,6 +401,29 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Decod
     if (!converted) data->as_sent = in.SerializeAsString();
   }
   *out = GeometryPtr(std::move(data));
+  return {};
+}
+
+// Of what may take more than its message: what is kept as it was sent has become something else.
+uint64_t MadeBytes(const Content& content) {
+  if (const auto* group = std::get_if<GroupPtr>(&content)) return (*group)->bytes();
+  const auto* geometry = std::get_if<GeometryPtr>(&content);
+  return geometry != nullptr && (*geometry)->kind != nullptr ? (*geometry)->bytes() : 0;
+}
+
+}  // namespace
+
+MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
+                     Content* out) {
+  const uint64_t most = context.limits.max_uncommitted_bytes;
+  const bool counted = context.decoded_bytes != nullptr;
+  if (counted && *context.decoded_bytes > most) {
+    return Fault{path.ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("comes after primitives that take ", *context.decoded_bytes,
+                              " bytes; max_uncommitted_bytes is ", most, ": commit less at once")};
+  }
+  if (auto fault = ToWhatItIs(path, in, context, out)) return fault;
+  if (counted) *context.decoded_bytes += MadeBytes(*out);
   return {};
 }
 

@@ -27,19 +27,6 @@ using gpu::implicit::Vector;
 
 constexpr double kLeastSine = 1e-6;  // of the angle between edges
 
-MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, Vector* out) {
-  if (auto fault = CheckVec3(path, in)) return fault;
-  *out = {in.x(), in.y(), in.z()};
-  return {};
-}
-
-MaybeFault CheckNotNegative(const FieldPath& path, double value) {
-  if (auto fault = CheckFloat(path, value)) return fault;
-  if (value >= 0) return {};
-  return Fault{path.ToString(), Reason::kInvalidValue,
-               absl::StrCat("is ", Show(value), "; give 0 or more")};
-}
-
 std::string Show(const Vector& v) {
   return absl::StrCat("(", wire::Show(v.x), ", ", wire::Show(v.y), ", ", wire::Show(v.z), ")");
 }

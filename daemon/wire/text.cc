@@ -51,14 +51,14 @@ struct Place {
 
 MaybeFault ToPlace(const FieldPath& path, const v1::Text& in, Place* out) {
   if (auto fault = CheckPositive(FieldPath(path, "height"), in.height())) return fault;
-  if (auto fault = CheckVec3(FieldPath(path, "position"), in.position())) return fault;
-  if (auto fault = CheckVec3(FieldPath(path, "facing"), in.facing())) return fault;
-  if (auto fault = CheckVec3(FieldPath(path, "up"), in.up())) return fault;
-  const Vector facing =
-      in.has_facing() ? Vector{in.facing().x(), in.facing().y(), in.facing().z()} : Vector{0, 0, 1};
-  Vector up, left;
+  Vector origin, facing = {0, 0, 1}, toward, up, left;
+  if (auto fault = ToVector(FieldPath(path, "position"), in.position(), &origin)) return fault;
+  if (in.has_facing()) {
+    if (auto fault = ToVector(FieldPath(path, "facing"), in.facing(), &facing)) return fault;
+  }
+  if (auto fault = ToVector(FieldPath(path, "up"), in.up(), &toward)) return fault;
   if (in.has_up()) {
-    if (!gpu::FrameOf(facing, {in.up().x(), in.up().y(), in.up().z()}, &up, &left)) {
+    if (!gpu::FrameOf(facing, toward, &up, &left)) {
       return Fault{FieldPath(path, "up").ToString(), Reason::kInvalidValue,
                    "lies along facing, or one of the two is 0; give two directions"};
     }
@@ -68,10 +68,7 @@ MaybeFault ToPlace(const FieldPath& path, const v1::Text& in, Place* out) {
                  "has no direction; give one that is not 0"};
   }
   const double height = in.height();
-  *out = {{in.position().x(), in.position().y(), in.position().z()},
-          -height * left,
-          height * up,
-          (height / gpu::implicit::Length(facing)) * facing};
+  *out = {origin, -height * left, height * up, (height / gpu::implicit::Length(facing)) * facing};
   return {};
 }
 
@@ -101,12 +98,7 @@ MaybeFault ToWording(const FieldPath& path, const v1::Text& in, Wording* out) {
   const std::pair<const char*, double> lengths[] = {
       {"line_spacing", in.line_spacing()}, {"width", in.width()}, {"depth", in.depth()}};
   for (const auto& [name, value] : lengths) {
-    const FieldPath at(path, name);
-    if (auto fault = CheckFloat(at, value)) return fault;
-    if (value < 0) {
-      return Fault{at.ToString(), Reason::kInvalidValue,
-                   absl::StrCat("is ", Show(value), "; give 0 or more")};
-    }
+    if (auto fault = CheckNotNegative(FieldPath(path, name), value)) return fault;
   }
   if (in.depth() > 0 && in.style() != v1::Text::STYLE_UNSPECIFIED &&
       in.style() != v1::Text::FILLED) {
@@ -120,13 +112,12 @@ MaybeFault ToWording(const FieldPath& path, const v1::Text& in, Wording* out) {
   return {};
 }
 
-Fault FromStatus(const FieldPath& path, const absl::Status& status) {
-  const bool text = absl::IsInvalidArgument(status);
-  const Reason reason = absl::IsNotFound(status) ? Reason::kNotFound
-                        : text                   ? Reason::kInvalidValue
-                                                 : Reason::kUnimplemented;
-  return {FieldPath(path, text ? "text" : "font").ToString(), reason,
-          std::string(status.message())};
+Fault FromStatus(const FieldPath& path, const char* field, const absl::Status& status) {
+  const Reason reason = absl::IsNotFound(status)            ? Reason::kNotFound
+                        : absl::IsInvalidArgument(status)   ? Reason::kInvalidValue
+                        : absl::IsResourceExhausted(status) ? Reason::kQuotaExceeded
+                                                            : Reason::kUnimplemented;
+  return {FieldPath(path, field).ToString(), reason, std::string(status.message())};
 }
 
 // A contour's curves as straight pieces, none farther from them than kFlatness; its last point is its first.
@@ -193,6 +184,7 @@ MaybeFault ToLetters(const FieldPath& path, const text::LaidOut& laid, const Pla
     return a.geometry.get() < b.geometry.get();
   });
   bool first = true;
+  for (int a = 0; a < 3; ++a) out->min[a] = out->max[a] = place.origin[a];  // of nothing
   for (const GroupData::Part& part : out->parts) {
     Bounds box;
     box.empty = false;
@@ -210,10 +202,15 @@ MaybeFault ToLetters(const FieldPath& path, const text::LaidOut& laid, const Pla
 
 // Strokes of lines, broken like any text, as straight spans.
 MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layout& layout,
-                     const Place& place, gpu::Spans* out) {
-  const absl::StatusOr<text::StrokeFont> font =
-      text::StrokeFont::Load(layout.font.empty() ? kStrokeFont : layout.font);
-  if (!font.ok()) return FromStatus(path, font.status());
+                     const Place& place, const DecodeContext& context, gpu::Spans* out) {
+  const auto found = context.fonts->Strokes(layout.font.empty() ? kStrokeFont : layout.font);
+  if (!found.ok()) return FromStatus(path, "font", found.status());
+  const text::StrokeFont& font = **found;
+  if (in.text().size() > layout.most) {
+    return FromStatus(path, "text",
+                      absl::ResourceExhaustedError(absl::StrCat(
+                          "has ", in.text().size(), " characters; give at most ", layout.most)));
+  }
   for (size_t i = 0; i < in.text().size(); ++i) {
     const auto c = static_cast<unsigned char>(in.text()[i]);
     if (c == '\n' || (c >= 0x20 && c < 0x7F)) continue;
@@ -230,7 +227,7 @@ MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layo
       size_t end = i + 1;
       while (end < paragraph.size() && (paragraph[end] == ' ') == (paragraph[i] == ' ')) ++end;
       const double advance =
-          static_cast<double>(font->Lay(std::string_view(paragraph).substr(i, end - i)).width);
+          static_cast<double>(font.Lay(std::string_view(paragraph).substr(i, end - i)).width);
       words.push_back({i, end, advance, paragraph[i] == ' '});
       i = end;
     }
@@ -238,7 +235,7 @@ MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layo
       if (line.begin < line.end) {
         const size_t begin = words[line.begin].begin, end = words[line.end - 1].end;
         const text::StrokeFont::Line laid =
-            font->Lay(std::string_view(paragraph).substr(begin, end - begin));
+            font.Lay(std::string_view(paragraph).substr(begin, end - begin));
         const double shift = layout.alignment == text::Alignment::kLeft     ? 0.0
                              : layout.alignment == text::Alignment::kCenter ? -0.5
                                                                             : -1.0;
@@ -276,16 +273,20 @@ MaybeFault ToText(const FieldPath& path, const v1::Primitive& primitive, uint32_
   if (!lines && in.style() != v1::Text::STYLE_UNSPECIFIED && in.style() != v1::Text::FILLED) {
     return UnknownEnum(FieldPath(path, "style"), in.style(), "FILLED, OUTLINE, STROKES");
   }
+  if (context.fonts == nullptr) {
+    return Unimplemented(path, "there are no fonts here; draw its lines as segments");
+  }
+  wording.layout.most = context.limits.max_parts_per_object;
   gpu::Spans spans;
   text::LaidOut laid;
   if (in.style() == v1::Text::STROKES) {
-    if (auto fault = ToStrokes(path, in, wording.layout, place, &spans)) return fault;
+    if (auto fault = ToStrokes(path, in, wording.layout, place, context, &spans)) return fault;
   } else {
-    if (context.fonts == nullptr) {
-      return Unimplemented(path, "it was built without fonts; use the style STROKES");
-    }
     absl::StatusOr<text::LaidOut> found = context.fonts->Lay(in.text(), wording.layout);
-    if (!found.ok()) return FromStatus(path, found.status());
+    if (!found.ok()) {
+      const bool font = absl::IsNotFound(found.status()) || absl::IsUnavailable(found.status());
+      return FromStatus(path, font ? "font" : "text", found.status());
+    }
     laid = *std::move(found);
   }
   if (!lines) {
@@ -314,6 +315,7 @@ MaybeFault ToText(const FieldPath& path, const v1::Primitive& primitive, uint32_
   }
   auto data = std::make_shared<GeometryData>();
   data->record = look;
+  for (int a = 0; a < 3; ++a) data->min[a] = data->max[a] = place.origin[a];  // of nothing
   if (auto fault = SetSpans(path, spans, context, data.get())) return fault;
   data->kind = "text";
   data->as_sent = primitive.SerializeAsString();

@@ -108,7 +108,7 @@ TableEntry CudaVolume::EntryOf(const Drawable& d, WorkedOut& worked_out) const {
   entry.layer = layer_slots_.at(d.layer->record.id);
   entry.alive = 1;
   const Affine map = Compose(Compose(view_, d.layer->record.transform), d.record.transform);
-  if (IsCurved(view.record.kind)) {
+  if (IsCurved(view.record.kind) && view.record.drawn_by != DrawnBy::kCpu) {
     worked_out.cut = std::make_unique<Cut>(CutCurved(OnHost(d), map, tiles_.grid));
     entry.record = worked_out.cut->record;
     entry.source.radius = RadiusOf(view.record, map);
@@ -282,6 +282,7 @@ absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
 }
 
 absl::Status CudaVolume::Enter() {
+  constexpr uint64_t kMostWorkedOut = 64u << 20;  // bytes on their way, about
   if (pending_.empty()) return absl::OkStatus();
   const std::vector<const Drawable*> drawables(pending_.begin(), pending_.end());
   std::vector<uint32_t> slots;
@@ -289,6 +290,7 @@ absl::Status CudaVolume::Enter() {
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   std::deque<WorkedOut> worked_out;
+  uint64_t held = 0;  // bytes of cuts in there
   bool uploads = false;
   absl::Status status;
   uint32_t singular = 0;
@@ -303,6 +305,7 @@ absl::Status CudaVolume::Enter() {
     slots_[slot] = {};
     const bool by_cpu = entry.record.drawn_by == DrawnBy::kCpu;
     uploads |= mine.cut != nullptr || !mine.hoisted.empty();
+    held += mine.cut != nullptr ? mine.cut->bytes() : 0;
     status = by_cpu ? DrawInto(entry, *drawable, slots_[slot]) : Place(mine, entry, slots_[slot]);
     if (!status.ok()) break;
     if (!by_cpu) {
@@ -328,6 +331,12 @@ absl::Status CudaVolume::Enter() {
     }
     singular += slots_[slot].singular ? 1 : 0;
     entries.push_back(entry);
+    if (held > kMostWorkedOut) {
+      status = device_.Wait();
+      if (!status.ok()) break;
+      worked_out.clear();
+      held = 0;
+    }
   }
   // What goes over lies in memory that goes with this call.
   if (uploads) {

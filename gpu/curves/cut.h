@@ -19,6 +19,10 @@ inline constexpr double kCurveError = 0.125;
 inline constexpr double kPatchError = 0.25;
 // Of a patch along each of its sides, whatever its error.
 inline constexpr int32_t kMostPatchPieces = 512;
+// Of a geometry, whatever its error: when so many segments have been made, each further span is one; patches are cut so
+// that there are no more vertices.
+inline constexpr size_t kMostCurveSegments = 1u << 20;
+inline constexpr size_t kMostPatchVertices = 1u << 20;
 
 // As a source's arrays, of kSegments or kTriangles.
 struct Cut {

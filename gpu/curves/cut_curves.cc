@@ -25,9 +25,8 @@ class Cutter {
       Segment(p[0], p[3], from, to, colors);
       return;
     }
-    // What has its ends inside is short; of all else only those parts that come near are cut finely.
-    if (halvings < kMostHalvings &&
-        (IsOutside(p, 1, grid_, room_) || IsOutside(p + 3, 1, grid_, room_))) {
+    // Even parts suit what stays near; of all else only what comes near is cut finely.
+    if (halvings < kMostHalvings && !IsNear(p)) {
       Point left[4], right[4];
       Halve(p, left, right);
       const double middle = (from + to) / 2;
@@ -35,7 +34,10 @@ class Cutter {
       Add(right, middle, to, colors, halvings + 1);
       return;
     }
-    const int parts = static_cast<int>(std::ceil(std::sqrt(std::min(square, 1e8))));
+    const auto left = static_cast<double>(kMostCurveSegments -
+                                          std::min(kMostCurveSegments, cut_.vertices.size() / 2));
+    const int parts =
+        static_cast<int>(std::ceil(std::clamp(std::sqrt(square), 1.0, std::max(left, 1.0))));
     Point at = p[0];
     for (int i = 1; i <= parts; ++i) {
       const Point next = i == parts ? p[3] : PointOn(p, static_cast<double>(i) / parts);
@@ -46,6 +48,17 @@ class Cutter {
   }
 
  private:
+  // Whether all control points are within the volume, or no farther from it than it is wide.
+  bool IsNear(const Point p[4]) const {
+    for (int a = 0; a < 3; ++a) {
+      const double beyond = grid_.voxels[a] + room_;
+      for (int i = 0; i < 4; ++i) {
+        if (!(p[i].at[a] > -beyond && p[i].at[a] < grid_.voxels[a] + beyond)) return false;
+      }
+    }
+    return true;
+  }
+
   static void Halve(const Point p[4], Point left[4], Point right[4]) {
     const Point a = Mix(p[0], p[1], 0.5), b = Mix(p[1], p[2], 0.5), c = Mix(p[2], p[3], 0.5);
     const Point ab = Mix(a, b, 0.5), bc = Mix(b, c, 0.5), middle = Mix(ab, bc, 0.5);

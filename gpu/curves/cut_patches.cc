@@ -13,7 +13,6 @@ namespace {
 
 constexpr int kSide = 4;
 constexpr int kPoints = kSide * kSide;
-constexpr uint64_t kMostVertices = 4u << 20;  // of a geometry's patches together
 
 double Twist(const Point& a, const Point& b, const Point& c, const Point& d) {
   double square = 0;
@@ -63,7 +62,8 @@ void CutPatches(const GeometryView& g, const std::vector<Point>& points, const T
     bend = std::max(bend, BendOf(&points[first]));
   }
   if (near.empty()) return;
-  const double most = std::floor(std::sqrt(static_cast<double>(kMostVertices / near.size()))) - 1;
+  const double most =
+      std::floor(std::sqrt(static_cast<double>(kMostPatchVertices / near.size()))) - 1;
   const int parts = static_cast<int>(std::clamp(std::ceil(std::sqrt(bend / (8 * kPatchError))), 1.0,
                                                 std::clamp(most, 1.0, 1.0 * kMostPatchPieces)));
   const uint32_t line = static_cast<uint32_t>(parts) + 1;

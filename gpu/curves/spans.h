@@ -2,6 +2,7 @@
 // each, as kCurves has them.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -38,7 +39,8 @@ class Spans {
   void Spiral(const Vector& center, const Vector& a, const Vector& b, double start, double sweep,
               const Vector& rise, double growth) {
     const double turns = std::fabs(sweep) / (2 * std::numbers::pi);
-    const auto count = static_cast<size_t>(std::ceil(turns * kSpansPerTurn - 1e-9));
+    const auto count =
+        std::max<size_t>(1, static_cast<size_t>(std::ceil(turns * kSpansPerTurn - 1e-9)));
     const double step = sweep / static_cast<double>(count);
     const double handle = 4.0 / 3 * std::tan(step / 4);
     const auto at = [&](double t) {

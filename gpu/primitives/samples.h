@@ -162,15 +162,16 @@ struct Samples {
     int32_t first[3], last[3];
     for (int r = 0; r < 3; ++r) {
       // Of voxels' centres, and those of neighbours; in double, with room for the rounding of singles.
-      double low = 0, high = 0;
+      double low = 0, high = 0, terms = 0;
       for (int c = 0; c < 3; ++c) {
         const double row = static_cast<double>(source.solid.inverse[r][c]);
         const double from = static_cast<double>(source.solid.Distance(c, box.lo[c])) - 1,
                      to = static_cast<double>(source.solid.Distance(c, int64_t{box.hi[c]} - 1)) + 1;
         low += row < 0 ? row * to : row * from;
         high += row < 0 ? row * from : row * to;
+        terms += Abs(row) * Max(Abs(from), Abs(to));
       }
-      const double room = 1 + 1e-5 * (Abs(low) + Abs(high));
+      const double room = 1 + 1e-5 * terms;
       low -= room;
       high += room;
       if (!(high >= 0) || !(low < head.size[r])) return false;

@@ -22,7 +22,10 @@ void AddSamples(SceneGenerator& random, ModelGeometry& g) {
                                                           : 250;
   head.low = static_cast<float>(random.Real(0, most / 2));
   head.scale = static_cast<float>(random.Real(20, 400) / most);
-  head.level = static_cast<float>(random.Chance(0.3) ? std::floor(most / 2) : random.Real(0, most));
+  // Now and then a sample's own number, or where many of them are alike.
+  head.level = static_cast<float>(random.Chance(0.3)   ? std::floor(most / 2)
+                                  : random.Chance(0.3) ? most
+                                                       : random.Real(0, most));
   head.bricks = BrickWords(head.size);
   g.indices.resize(SampleWords(head.size, static_cast<uint32_t>(head.format)));
   std::memcpy(g.indices.data(), &head, sizeof(head));

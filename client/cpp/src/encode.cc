@@ -397,7 +397,7 @@ absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color,
     AppendPresentBytes(v1::Primitive::kColorFieldNumber, rgb, &before);
   }
   if (scale.has_value()) {
-    AppendBytes(v1::Primitive::kColorScaleFieldNumber, EncodeColorScale(*scale), &before);
+    AppendPresentBytes(v1::Primitive::kColorScaleFieldNumber, EncodeColorScale(*scale), &before);
   }
   return std::visit(ShapeEncoder{std::move(before)}, shape);
 }

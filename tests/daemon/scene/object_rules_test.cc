@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/scene/engine_delta.h"
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon {
@@ -47,6 +48,35 @@ TEST(ObjectRules, ObjectsBelongToTheirOwner) {
   StoreFixture f;
   f.Commit(MakeAuthor(2, 22), Define("theirs", {Part(1)}));
   EXPECT_EQ(f.Commit(PutInstance("a", "x", "theirs")).issues[0].reason, Reason::kNotFound);
+}
+
+// A primitive of three geometries, as a text of three letters, each a step further along x.
+Content Letters(float x) {
+  auto group = std::make_shared<GroupData>();
+  const Content dot = Dots(x);
+  for (int i = 0; i < 3; ++i) {
+    gpu::Affine step;
+    step.m[3] = 10.0 * i;
+    group->parts.push_back({std::get<GeometryPtr>(dot), step});
+  }
+  group->max[0] = double{x} + 20;
+  group->kind = "text";
+  return GroupPtr(std::move(group));
+}
+
+TEST(ObjectRules, AGroupCountsAsWhatItDraws) {
+  StoreFixture f;
+  f.Commit(Define("word", {{Letters(1), {}}, Part(1)}), PutInstance("a", "x", "word"),
+           PutInstance("a", "y", "word"));
+  EXPECT_EQ(Find(f, "word")->drawables, 4u);
+  EXPECT_EQ(Find(f, "word")->bounds.max[0], 21);
+  EXPECT_EQ(f.store.snapshot()->total.drawables, 8u);
+  EngineScene scene;
+  EXPECT_GT(scene.Plan(f.store.snapshot()), 0u);
+  EXPECT_EQ(scene.geometries(), 2u) << "letters share theirs; the part has its own";
+  const GroupPtr letters = std::get<GroupPtr>(Letters(2));
+  EXPECT_GT(letters->bytes(), letters->parts[0].geometry->bytes());
+  EXPECT_LT(letters->bytes(), 2 * letters->parts[0].geometry->bytes() + 1000) << "counted once";
 }
 
 TEST(ObjectRules, CyclesAreRefused) {

@@ -48,7 +48,6 @@ TEST_F(FontsTest, CapitalsAreOneHighAndLettersFollowOneAnother) {
   }
   EXPECT_LT(ExtentOf(laid.glyphs[0]).right, ExtentOf(laid.glyphs[1]).left);
   EXPECT_LT(ExtentOf(laid.glyphs[1]).right, ExtentOf(laid.glyphs[2]).left);
-  EXPECT_EQ(laid.missing, 0u);
 }
 
 TEST_F(FontsTest, ContoursAreClosedCurvesThatMeet) {
@@ -111,10 +110,22 @@ TEST_F(FontsTest, ArabicJoinsAndRunsFromRightToLeft) {
   EXPECT_EQ(mixed.glyphs[2].glyph, alef.glyphs[0].glyph);
 }
 
-TEST_F(FontsTest, WhatNoFontHasIsCounted) {
-  const LaidOut laid = Lay("a\xF0\x92\x80\x80");  // a sign of cuneiform
-  EXPECT_EQ(laid.missing, 1u);
-  EXPECT_EQ(laid.glyphs.size(), 2u) << "a box in its place";
+TEST_F(FontsTest, WhatNoFontHasIsSaid) {
+  // U+10FFFE is no character, and will be none.
+  EXPECT_EQ(fonts_.Lay("a\xF4\x8F\xBF\xBE", {}).status(),
+            absl::InvalidArgumentError("has U+10fffe, which no font of the server has"));
+  EXPECT_EQ(Lay("a\xE2\x80\x8D\tb").glyphs.size(), 2u) << "joiners and tabs are not seen";
+  EXPECT_TRUE(absl::IsResourceExhausted(fonts_.Lay("abc", {.most = 2}).status()));
+}
+
+TEST_F(FontsTest, StrokeFontsAreReadOnce) {
+  const auto first = fonts_.Strokes("futural"), again = fonts_.Strokes("futural");
+  ASSERT_TRUE(first.ok());
+  EXPECT_EQ(*first, *again);
+  for (const char* name : {"", "../futural", "no_such", "a b"}) {
+    EXPECT_TRUE(absl::IsNotFound(fonts_.Strokes(name).status())) << name;
+  }
+  EXPECT_TRUE(absl::IsNotFound(fonts_.Strokes(std::string("futural\0x", 9)).status()));
 }
 
 TEST_F(FontsTest, WhatIsWrongIsSaid) {
@@ -128,6 +139,9 @@ TEST_F(FontsTest, WhatIsWrongIsSaid) {
   EXPECT_THAT(std::string(unknown.message()), HasSubstr("DejaVu"));
   EXPECT_TRUE(fonts_.Lay("a", {.font = "DejaVu Sans Mono"}).ok());
   EXPECT_TRUE(fonts_.Lay("a", {.font = "serif"}).ok());
+  EXPECT_TRUE(fonts_.Lay("a", {.font = "dejavu SANS"}).ok());
+  EXPECT_THAT(std::string(fonts_.Lay("a", {.font = std::string(5000, '\n')}).status().message()),
+              HasSubstr("\\n\\n"));
 }
 
 TEST_F(FontsTest, NothingIsNothing) {

@@ -164,7 +164,7 @@ const Case kCases[] = {
     {"ellipse_flat", Ellipse, [](P& p) { Set(p.mutable_ellipse()->mutable_axis_b(), 5, 0, 0); },
      "primitive.ellipse.axis_b", Reason::kInvalidValue, "spans no area"},
     {"helix_turns", Helix, [](P& p) { p.mutable_helix()->set_turns(0); }, "primitive.helix.turns",
-     Reason::kInvalidValue, "is 0; give up to 4096"},
+     Reason::kInvalidValue, "is 0; give up to 1024"},
     {"helix_end", Helix, [](P& p) { p.mutable_helix()->clear_end(); }, "primitive.helix.end",
      Reason::kInvalidValue, "is where start is"},
     {"helix_end_radius", Helix, [](P& p) { p.mutable_helix()->set_end_radius(-1); },
@@ -194,7 +194,7 @@ const Case kCases[] = {
     {"text_long", Text, [](P& p) { p.mutable_text()->set_text(std::string(70000, 'a')); },
      "primitive.text.text", Reason::kQuotaExceeded, "has 70000 bytes"},
     {"text_many", Text, [](P& p) { p.mutable_text()->set_text(std::string(5000, 'a')); },
-     "primitive.text.text", Reason::kQuotaExceeded, "makes 5000 letters"},
+     "primitive.text.text", Reason::kQuotaExceeded, "has 5000 characters; give at most 4096"},
     {"text_strokes", Text,
      [](P& p) {
        p.mutable_text()->set_style(v1::Text::STROKES);
@@ -385,6 +385,29 @@ TEST_F(CurvesTest, ScalesColorVertices) {
   EXPECT_THAT(colors(), ElementsAre(0xFF0000, 0x000000, 0x000000)) << "clamped";
 }
 
+TEST_F(CurvesTest, ScalesBeyondAllNumbersAreRefusedOrPlain) {
+  P p = Scaled();
+  Set(p.mutable_color_scale()->mutable_along(), 1e-150, 0, 0);
+  const GeometryData& data = Geometry(p);
+  EXPECT_EQ(data.arrays.colors().size(), 3u);
+  Set(p.mutable_color_scale()->mutable_along(), 0, 0, 1);  // all are at 0
+  EXPECT_EQ(Geometry(p).arrays.colors()[2], Geometry(p).arrays.colors()[0]);
+}
+
+TEST_F(CurvesTest, TinyArcsAndBlankTextAreSomewhere) {
+  P arc = Arc();
+  Set(arc.mutable_arc()->mutable_center(), 5, 0, 0);
+  arc.mutable_arc()->set_sweep(1e-12);
+  EXPECT_EQ(Geometry(arc).record.vertex_count, 4u);
+  EXPECT_GT(Geometry(arc).min[0], 6);
+  P text = Text();
+  text.mutable_text()->set_text("  \n ");
+  Set(text.mutable_text()->mutable_position(), 7, 8, 9);
+  EXPECT_TRUE(Group(text).parts.empty());
+  EXPECT_EQ(Group(text).min[0], 7);
+  EXPECT_EQ(Group(text).max[2], 9);
+}
+
 TEST_F(CurvesTest, ScalesColorShapes) {
   P p = Torus();
   *p.mutable_color_scale() = Scaled().color_scale();
@@ -409,6 +432,25 @@ TEST_F(CurvesTest, InstancesHaveTints) {
   const MaybeFault fault = FaultOf(p, &content);
   ASSERT_TRUE(fault.has_value());
   EXPECT_EQ(fault->field, "primitive.instance.tint.rgb");
+}
+
+TEST_F(CurvesTest, AMessageMakesNoMoreThanMayWait) {
+  // A few bytes that become many.
+  limits_.max_uncommitted_bytes = 1'000'000;
+  v1::ApplyUpdateRequest request;
+  for (int i = 0; i < 20; ++i) {
+    v1::StreamRequest* const operation = request.add_operations();
+    operation->mutable_upsert()->set_layer("l");
+    operation->mutable_upsert()->set_id(std::to_string(i));
+    P helix = Helix();
+    helix.mutable_helix()->set_turns(200);
+    *operation->mutable_upsert()->mutable_entity()->mutable_primitive() = helix;
+  }
+  const Decoded decoded = DecodeUpdate(request, limits_, nullptr, &fonts_);
+  ASSERT_TRUE(decoded.status.ok());
+  EXPECT_EQ(decoded.refused.issues.size(), 13u) << "each takes 154 kB";
+  EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(decoded.refused.issues[0].message, HasSubstr("max_uncommitted_bytes is 1000000"));
 }
 
 TEST_F(CurvesTest, SplatsAreKept) {

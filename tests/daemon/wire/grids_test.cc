@@ -10,6 +10,7 @@
 #include "daemon/wire/encode_primitive.h"
 #include "daemon/wire/primitive.h"
 #include "gpu/primitives/samples.h"
+#include "gpu/samples_check.h"
 #include "tests/daemon/wire/requests.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -113,6 +114,20 @@ const Case kCases[] = {
     {"colors_with_transfer", Mapped,
      [](P& p) { p.mutable_volume()->mutable_grid()->set_type(v1::ELEMENT_TYPE_RGBA8); },
      "primitive.volume.transfer", Reason::kInvalidValue, "the samples are colours"},
+    {"tiny_values", Mapped,
+     [](P& p) {
+       p.mutable_volume()->mutable_transfer()->set_values(1, 1e-40);
+       p.mutable_volume()->mutable_transfer()->set_values(2, 2e-40);
+     },
+     "primitive.volume.transfer.values[2]", Reason::kOutOfRange, "too little apart"},
+    {"tiny_edges", Isosurface,
+     [](P& p) {
+       v1::Grid* const grid = p.mutable_isosurface()->mutable_grid();
+       Set(grid->mutable_edge_a(), 1e-120, 0, 0);
+       Set(grid->mutable_edge_b(), 0, 1e-120, 0);
+       Set(grid->mutable_edge_c(), 0, 0, 1e-120);
+     },
+     "primitive.isosurface.grid.edge_c", Reason::kInvalidValue, "spans no volume"},
     {"level", Isosurface,
      [](P& p) { p.mutable_isosurface()->set_level(std::numeric_limits<double>::infinity()); },
      "primitive.isosurface.level", Reason::kInvalidValue, "inf"},
@@ -191,6 +206,18 @@ TEST(Grids, WithoutATransferFunctionTheUpperHalfIsDrawn) {
   EXPECT_EQ(view.table()[gpu::Samples::EntryOf(view.head(), 3.9f)], 0u);
   EXPECT_EQ(view.table()[gpu::Samples::EntryOf(view.head(), 4.1f)],
             0x123456u | gpu::SampleHead::kDrawn);
+}
+
+TEST(Grids, WhatIsAllAlikeIsNothingButGood) {
+  for (const float value : {0.0f, 2e7f, 1e-40f, std::numeric_limits<float>::quiet_NaN()}) {
+    P p = Volume();
+    p.mutable_volume()->mutable_grid()->set_samples(
+        Packed<float>({value, value, value, value, value, value}));
+    Content content;
+    ASSERT_FALSE(FaultOf(p, &content).has_value());
+    EXPECT_TRUE(gpu::CheckSamples(GroupOf(content).parts[0].geometry->arrays.indices()).ok())
+        << value;
+  }
 }
 
 TEST(Grids, ColorsAreTurnedAround) {

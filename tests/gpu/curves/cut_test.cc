@@ -161,6 +161,44 @@ TEST(CutCurves, WhatIsFarAwayCostsLittleAndWhatIsNearIsTheSame) {
             2u);
 }
 
+TEST(CutCurves, FarHandlesBetweenNearEndsCostNoPrecision) {
+  for (const float far : {3000.0f, 1e6f}) {
+    const std::vector<float> points = {10, 100, 100, 10, far, 100, 240, -far, 100, 240, 150, 100};
+    const Cut cut = CutCurved(View(points, PrimitiveKind::kCurves, Topology::kList), Affine(),
+                              TileGrid::Of(kSize, kSize, kSize));
+    EXPECT_LT(cut.vertices.size(), 20'000u);
+    int inside = 0;
+    double worst = 0;
+    for (int sample = 0; sample <= 1'000'000; ++sample) {
+      const P p = CurveAt(points.data(), sample / 1e6);
+      if (p[1] < 0 || p[1] > kSize) continue;
+      if (sample % 20 != 0 && far < 1e5f) continue;
+      ++inside;
+      double nearest = 1e9;
+      for (size_t i = 0; i < cut.vertices.size(); i += 2) {
+        nearest = std::min(
+            nearest, SegmentDistance(p, Voxels(cut.vertices[i]), Voxels(cut.vertices[i + 1])));
+      }
+      worst = std::max(worst, nearest);
+    }
+    EXPECT_GT(inside, 50);
+    EXPECT_LE(worst, kCurveError + kSnapped);
+  }
+}
+
+TEST(CutCurves, ThereIsAnEndToThem) {
+  std::vector<float> points;
+  for (int i = 0; i < 20'000; ++i) {
+    for (const float c :
+         {0.0f, 0.0f, 0.0f, 400.0f, 400.0f, 0.0f, -200.0f, 400.0f, 0.0f, 200.0f, 0.0f, 0.0f}) {
+      points.push_back(c);
+    }
+  }
+  const Cut cut = CutCurved(View(points, PrimitiveKind::kCurves, Topology::kList), Affine(),
+                            TileGrid::Of(kSize, kSize, kSize));
+  EXPECT_LE(cut.vertices.size() / 2, kMostCurveSegments + 20'000);
+}
+
 TEST(CutCurves, ColorsRunFromJointToJoint) {
   const std::vector<float> points = {0, 0, 0, 60, 200, 0, 160, -200, 0, 220, 0, 0};
   const std::vector<uint32_t> colors = {0x000000, 0x123456, 0x654321, 0xFF8000};

@@ -248,7 +248,9 @@ absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Mess
     case FieldDescriptor::CPPTYPE_STRING:
       if (field.type() == FieldDescriptor::TYPE_BYTES) return SetBytes(field, text, out);
       // A text's lines; a shell leaves \n as it is.
-      reflection.SetString(out, &field, absl::StrReplaceAll(text, {{"\\n", "\n"}}));
+      reflection.SetString(
+          out, &field,
+          field.name() == "text" ? absl::StrReplaceAll(text, {{"\\n", "\n"}}) : std::string(text));
       return absl::OkStatus();
     case FieldDescriptor::CPPTYPE_BOOL:
       if (text != "true" && text != "false")
