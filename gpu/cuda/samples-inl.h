@@ -44,7 +44,8 @@ struct SampleReader {
       in = in && q[a] >= 0 && q[a] < static_cast<float>(size[a]);
       const int32_t last = static_cast<int32_t>(size[a]) - 1;
       const float p = kNearest ? q[a] : q[a] - 0.5f;
-      const int32_t whole = static_cast<int32_t>(p);
+      // Of what is far outside, which fits no whole number, a place at the edge.
+      const int32_t whole = static_cast<int32_t>(Clamp(p, 0.0f, static_cast<float>(last)));
       const int32_t below = !kNearest && p < 0 ? -1 : whole;
       first[a] = static_cast<uint32_t>(Clamp(below, 0, last));
       second[a] = static_cast<uint32_t>(Clamp(below + 1, 0, last));
