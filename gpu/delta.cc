@@ -199,8 +199,7 @@ absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, Delt
   absl::Status status = check.Finite("positions", view.positions.data(), view.positions.size());
   if (!status.ok()) return status;
   if (status = CheckCode(offset, view); !status.ok()) return status;
-  const bool are_indices =
-      g.kind != PrimitiveKind::kImplicit && g.kind != PrimitiveKind::kSamples;
+  const bool are_indices = g.kind != PrimitiveKind::kImplicit && g.kind != PrimitiveKind::kSamples;
   for (size_t i = 0; are_indices && i < view.indices.size(); ++i) {
     if (view.indices[i] >= g.vertex_count) {
       return check.Wrong(absl::StrCat("indices[", i, "]").c_str(), view.indices[i],

@@ -50,7 +50,7 @@ enum class PrimitiveKind : uint32_t {
   kImplicit = 7,   // its program (implicit/program.h) is the indices, its rings are positions;
                    // with params[6] = 1 only from params[0..2] to params[3..5]
   kCurves = 8,  // cubic Béziers: list (4 points each) or strip (they share ends), drawn as segments
-  kPatches = 9,  // bicubic Béziers: 16 points each, along u first, drawn as triangles
+  kPatches = 9,   // bicubic Béziers: 16 points each, along u first, drawn as triangles
   kSamples = 10,  // a grid of samples (primitives/samples.h), which the indices hold; no positions
 };
 

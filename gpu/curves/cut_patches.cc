@@ -62,8 +62,9 @@ void CutPatches(const GeometryView& g, const std::vector<Point>& points, const T
     bend = std::max(bend, BendOf(&points[first]));
   }
   if (near.empty()) return;
-  const double most =
-      std::floor(std::sqrt(static_cast<double>(kMostPatchVertices / near.size()))) - 1;
+  const double most = std::floor(std::sqrt(static_cast<double>(kMostPatchVertices) /
+                                           static_cast<double>(near.size()))) -
+                      1;
   const int parts = static_cast<int>(std::clamp(std::ceil(std::sqrt(bend / (8 * kPatchError))), 1.0,
                                                 std::clamp(most, 1.0, 1.0 * kMostPatchPieces)));
   const uint32_t line = static_cast<uint32_t>(parts) + 1;
