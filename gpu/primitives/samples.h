@@ -286,7 +286,7 @@ struct Samples {
     for (uint32_t shift = 0; shift < 32; shift += 8) {
       float channel[8];
       for (int i = 0; i < 8; ++i) channel[i] = static_cast<float>(corner[i] >> shift & 255);
-      color |= static_cast<uint32_t>(MixCorners(channel, cell.t) + 0.5f) << shift;  // NOLINT: to the nearest
+      color |= static_cast<uint32_t>(MixCorners(channel, cell.t) + 0.5f) << shift;  // NOLINT
     }
     return color;
   }
