@@ -10,6 +10,7 @@
 #include "daemon/text/fonts.h"
 #include "daemon/wire/encode_primitive.h"
 #include "daemon/wire/primitive.h"
+#include "tests/daemon/wire/faults.h"
 #include "tests/daemon/wire/requests.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -42,12 +43,6 @@ class CurvesTest : public ::testing::Test {
   text::Fonts fonts_;
   Content content_;
 };
-
-void Set(v1::Vec3* out, double x, double y, double z) {
-  out->set_x(x);
-  out->set_y(y);
-  out->set_z(z);
-}
 
 v1::Vertices Line(int count) {
   v1::Vertices vertices;
@@ -123,16 +118,7 @@ P Mesh() {
   return p;
 }
 
-struct Case {
-  const char* name;
-  P (*good)();
-  std::function<void(P&)> spoil;
-  const char* field;
-  Reason reason;
-  const char* message;
-};
-
-const Case kCases[] = {
+const FaultCase kCases[] = {
     {"curve_form", Curve,
      [](P& p) { p.mutable_curve()->set_form(static_cast<v1::Curve::Form>(9)); },
      "primitive.curve.form", Reason::kInvalidValue, "CATMULL_ROM, B_SPLINE, BEZIER, QUADRATIC"},
@@ -233,18 +219,7 @@ const Case kCases[] = {
 };
 
 TEST_F(CurvesTest, WhatIsWrongIsSaid) {
-  for (const Case& c : kCases) {
-    SCOPED_TRACE(c.name);
-    Content content;
-    ASSERT_FALSE(FaultOf(c.good(), &content).has_value());
-    P spoilt = c.good();
-    c.spoil(spoilt);
-    const MaybeFault fault = FaultOf(spoilt, &content);
-    ASSERT_TRUE(fault.has_value());
-    EXPECT_EQ(fault->field, c.field);
-    EXPECT_EQ(fault->reason, c.reason) << fault->message;
-    EXPECT_THAT(fault->message, HasSubstr(c.message));
-  }
+  ExpectFaults(kCases, [this](const P& p, Content* content) { return FaultOf(p, content); });
 }
 
 TEST_F(CurvesTest, ScalesAreForWhatCanHaveThem) {

@@ -11,6 +11,7 @@
 #include "daemon/wire/primitive.h"
 #include "gpu/primitives/samples.h"
 #include "gpu/samples_check.h"
+#include "tests/daemon/wire/faults.h"
 #include "tests/daemon/wire/requests.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -23,12 +24,6 @@ using P = v1::Primitive;
 
 MaybeFault FaultOf(const P& primitive, Content* content, const Limits& limits = {}) {
   return ToContent(FieldPath("primitive"), primitive, {limits}, content);
-}
-
-void Set(v1::Vec3* out, double x, double y, double z) {
-  out->set_x(x);
-  out->set_y(y);
-  out->set_z(z);
 }
 
 void SetGrid(v1::Grid* grid) {
@@ -61,16 +56,7 @@ P Isosurface() {
   return p;
 }
 
-struct Case {
-  const char* name;
-  P (*good)();
-  std::function<void(P&)> spoil;
-  const char* field;
-  Reason reason;
-  const char* message;
-};
-
-const Case kCases[] = {
+const FaultCase kCases[] = {
     {"size", Volume, [](P& p) { p.mutable_volume()->mutable_grid()->set_size_b(0); },
      "primitive.volume.grid.size_b", Reason::kInvalidValue, "is 0; give 1 to 65536"},
     {"samples", Volume, [](P& p) { p.mutable_volume()->mutable_grid()->set_size_a(3); },
@@ -138,18 +124,7 @@ const Case kCases[] = {
 };
 
 TEST(Grids, WhatIsWrongIsSaid) {
-  for (const Case& c : kCases) {
-    SCOPED_TRACE(c.name);
-    Content content;
-    ASSERT_FALSE(FaultOf(c.good(), &content).has_value());
-    P spoilt = c.good();
-    c.spoil(spoilt);
-    const MaybeFault fault = FaultOf(spoilt, &content);
-    ASSERT_TRUE(fault.has_value());
-    EXPECT_EQ(fault->field, c.field);
-    EXPECT_EQ(fault->reason, c.reason) << fault->message;
-    EXPECT_THAT(fault->message, HasSubstr(c.message));
-  }
+  ExpectFaults(kCases, [](const P& p, Content* content) { return FaultOf(p, content); });
 }
 
 const GroupData& GroupOf(const Content& content) { return *std::get<GroupPtr>(content); }

@@ -9,6 +9,7 @@
 #include "daemon/wire/primitive.h"
 #include "gpu/implicit/program.h"
 #include "gpu/implicit/program_check.h"
+#include "tests/daemon/wire/faults.h"
 #include "tests/daemon/wire/requests.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -21,12 +22,6 @@ using P = v1::Primitive;
 
 MaybeFault FaultOf(const P& primitive, Content* content, const Limits& limits = {}) {
   return ToContent(FieldPath("primitive"), primitive, {limits}, content);
-}
-
-void Set(v1::Vec3* out, double x, double y, double z) {
-  out->set_x(x);
-  out->set_y(y);
-  out->set_z(z);
 }
 
 P Torus() {
@@ -87,16 +82,7 @@ P Implicit() {
   return p;
 }
 
-struct Case {
-  const char* name;
-  P (*good)();
-  std::function<void(P&)> spoil;
-  const char* field;
-  Reason reason;
-  const char* message;
-};
-
-const Case kCases[] = {
+const FaultCase kCases[] = {
     {"ellipsoid_flat", Ellipsoid, [](P& p) { p.mutable_ellipsoid()->mutable_radii()->set_y(0); },
      "primitive.ellipsoid.radii.y", Reason::kInvalidValue, "is 0; give a number greater than 0"},
     {"torus_radius", Torus, [](P& p) { p.mutable_torus()->set_radius(-1); },
@@ -254,18 +240,7 @@ const Case kCases[] = {
 };
 
 TEST(Shapes, WhatIsWrongIsSaid) {
-  for (const Case& c : kCases) {
-    SCOPED_TRACE(c.name);
-    Content content;
-    ASSERT_FALSE(FaultOf(c.good(), &content).has_value());
-    P spoilt = c.good();
-    c.spoil(spoilt);
-    const MaybeFault fault = FaultOf(spoilt, &content);
-    ASSERT_TRUE(fault.has_value());
-    EXPECT_EQ(fault->field, c.field);
-    EXPECT_EQ(fault->reason, c.reason) << fault->message;
-    EXPECT_THAT(fault->message, HasSubstr(c.message));
-  }
+  ExpectFaults(kCases, [](const P& p, Content* content) { return FaultOf(p, content); });
 }
 
 TEST(Shapes, LimitsHold) {
