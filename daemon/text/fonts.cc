@@ -6,7 +6,6 @@
 #include <hb-ft.h>
 #include <hb.h>
 #include FT_FREETYPE_H
-#include FT_OUTLINE_H
 #include FT_TRUETYPE_TABLES_H
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "daemon/text/glyph_outline.h"
 #include "daemon/text/line_break.h"
 #include "display/sync/mutex.h"
 
@@ -39,57 +39,6 @@ struct Face {
   ~Face() {
     if (hb != nullptr) hb_font_destroy(hb);
     if (ft != nullptr) FT_Done_Face(ft);
-  }
-};
-
-// A contour as FreeType tells it.
-struct Reader {
-  double scale;
-  std::vector<Contour> contours;
-  OutlinePoint at, begin;
-
-  OutlinePoint Point(const FT_Vector* p) const {
-    return {static_cast<double>(p->x) * scale, static_cast<double>(p->y) * scale};
-  }
-  void Curve(OutlinePoint a, OutlinePoint b, OutlinePoint end) {
-    contours.back().insert(contours.back().end(), {at, a, b, end});
-    at = end;
-  }
-  static OutlinePoint Mix(OutlinePoint a, OutlinePoint b, double t) {
-    return {a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t};
-  }
-  void Line(OutlinePoint end) {
-    if (end.x == at.x && end.y == at.y) return;
-    Curve(Mix(at, end, 1.0 / 3), Mix(at, end, 2.0 / 3), end);
-  }
-  void Close() {
-    if (contours.empty()) return;
-    Line(begin);
-    if (contours.back().empty()) contours.pop_back();
-  }
-
-  static int MoveTo(const FT_Vector* to, void* self) {
-    auto& r = *static_cast<Reader*>(self);
-    r.Close();
-    r.contours.emplace_back();
-    r.at = r.begin = r.Point(to);
-    return 0;
-  }
-  static int LineTo(const FT_Vector* to, void* self) {
-    auto& r = *static_cast<Reader*>(self);
-    r.Line(r.Point(to));
-    return 0;
-  }
-  static int ConicTo(const FT_Vector* handle, const FT_Vector* to, void* self) {
-    auto& r = *static_cast<Reader*>(self);
-    const OutlinePoint h = r.Point(handle), end = r.Point(to);
-    r.Curve(Mix(r.at, h, 2.0 / 3), Mix(end, h, 2.0 / 3), end);
-    return 0;
-  }
-  static int CubicTo(const FT_Vector* a, const FT_Vector* b, const FT_Vector* to, void* self) {
-    auto& r = *static_cast<Reader*>(self);
-    r.Curve(r.Point(a), r.Point(b), r.Point(to));
-    return 0;
   }
 };
 
@@ -331,13 +280,7 @@ class Fonts::Library {
     auto glyph = std::make_shared<Glyph>();
     if (FT_Load_Glyph(face.ft, number, FT_LOAD_NO_SCALE | FT_LOAD_NO_HINTING) == 0 &&
         face.ft->glyph->format == FT_GLYPH_FORMAT_OUTLINE) {
-      Reader reader{1 / face.capital, {}, {}, {}};
-      const FT_Outline_Funcs functions = {
-          Reader::MoveTo, Reader::LineTo, Reader::ConicTo, Reader::CubicTo, 0, 0};
-      if (FT_Outline_Decompose(&face.ft->glyph->outline, &functions, &reader) == 0) {
-        reader.Close();
-        glyph->contours = std::move(reader.contours);
-      }
+      glyph->contours = ContoursOf(face.ft->glyph->outline, 1 / face.capital);
     }
     return kept = std::move(glyph);
   }
