@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/colors.h"
 #include "daemon/wire/fields.h"
+#include "gpu/curves/mix_colors.h"
 #include "gpu/implicit/field_shape.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -32,7 +33,7 @@ MaybeFault ToTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* 
   for (size_t i = 0; i < out->size(); ++i) {
     const double place = static_cast<double>(i) / 255 * (in.colors_size() - 1);
     const int first = std::min(static_cast<int>(place), in.colors_size() - 2);
-    (*out)[i] = Between(in.colors(first), in.colors(first + 1), place - first);
+    (*out)[i] = gpu::curves::MixColors(in.colors(first), in.colors(first + 1), place - first);
   }
   return {};
 }

@@ -1,19 +1,8 @@
 #include "daemon/wire/colors.h"
 
-#include <cmath>
-
 #include "absl/strings/str_cat.h"
 
 namespace voxeld::daemon::wire {
-
-uint32_t Between(uint32_t a, uint32_t b, double t) {
-  uint32_t rgb = 0;
-  for (int shift = 16; shift >= 0; shift -= 8) {
-    const double from = (a >> shift) & 255, to = (b >> shift) & 255;
-    rgb = rgb << 8 | static_cast<uint32_t>(std::lround(from + (to - from) * t));
-  }
-  return rgb;
-}
 
 MaybeFault ToColorRow(const FieldPath& path, const std::string& colormap,
                       const google::protobuf::RepeatedField<uint32_t>& colors,

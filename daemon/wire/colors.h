@@ -11,9 +11,6 @@
 
 namespace voxeld::daemon::wire {
 
-// Between two colours, 0xRRGGBB, at t of 1, by channel to the nearest.
-uint32_t Between(uint32_t a, uint32_t b, double t);
-
 // One of the two, fields `colormap` and `colors` of `path`: a map, which is found then, or colours, each 0xRRGGBB.
 MaybeFault ToColorRow(const FieldPath& path, const std::string& colormap,
                       const google::protobuf::RepeatedField<uint32_t>& colors,

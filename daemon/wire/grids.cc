@@ -14,6 +14,7 @@
 #include "daemon/scene/bounds.h"
 #include "daemon/wire/colors.h"
 #include "daemon/wire/fields.h"
+#include "gpu/curves/mix_colors.h"
 #include "gpu/implicit/field_shape.h"
 #include "gpu/primitives/samples.h"
 #include "gpu/samples_bricks.h"
@@ -206,13 +207,14 @@ MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* he
     while (stop + 2 < in.values_size() && in.values(stop + 1) <= value) ++stop;
     const double from = in.values(stop), to = in.values(stop + 1);
     const double t = to > from ? std::clamp((value - from) / (to - from), 0.0, 1.0) : 1;
-    const uint32_t rgb =
-        map.has_value() ? (*map)[i] : Between(in.colors(stop), in.colors(stop + 1), t);
+    const uint32_t rgb = map.has_value()
+                             ? (*map)[i]
+                             : gpu::curves::MixColors(in.colors(stop), in.colors(stop + 1), t);
     const double opacity =
         in.opacities().empty()
             ? 1
             : in.opacities(stop) + (in.opacities(stop + 1) - in.opacities(stop)) * t;
-    (*out)[i] = opacity > 0 ? Between(0, rgb, opacity) | SampleHead::kDrawn : 0;
+    (*out)[i] = opacity > 0 ? gpu::curves::MixColors(0, rgb, opacity) | SampleHead::kDrawn : 0;
   }
   return {};
 }

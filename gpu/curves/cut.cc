@@ -50,15 +50,6 @@ Point PointOn(const Point p[4], double t) {
   return Mix(Mix(a, b, t), Mix(b, c, t), t);
 }
 
-uint32_t MixColors(uint32_t a, uint32_t b, double t) {
-  uint32_t rgb = 0;
-  for (int shift = 16; shift >= 0; shift -= 8) {
-    const double from = (a >> shift) & 255, to = (b >> shift) & 255;
-    rgb = rgb << 8 | static_cast<uint32_t>(std::lround(from + (to - from) * t));
-  }
-  return rgb;
-}
-
 }  // namespace curves
 
 Cut CutCurved(const GeometryView& g, const Affine& map, const TileGrid& grid) {

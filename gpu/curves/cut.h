@@ -59,8 +59,6 @@ inline Point Mix(const Point& a, const Point& b, double t) {
 double SecondDifference(const Point& a, const Point& b, const Point& c);
 // The point of a cubic Bézier at `t`, by de Casteljau; at 0 and 1 its ends.
 Point PointOn(const Point p[4], double t);
-// Of two colours, by channel, to the nearest level.
-uint32_t MixColors(uint32_t a, uint32_t b, double t);
 
 void CutCurves(const GeometryView& g, const std::vector<Point>& points, const TileGrid& grid,
                double room, Cut& cut);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "gpu/curves/cut.h"
+#include "gpu/curves/mix_colors.h"
 
 namespace voxeld::gpu::curves {
 namespace {
