@@ -19,7 +19,8 @@ endif()
 find_program(VOXELD_CCACHE ccache)
 if(VOXELD_CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${VOXELD_CCACHE})
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${VOXELD_CCACHE})
+  # The second is what it asks for where headers are precompiled.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${VOXELD_CCACHE})
 endif()
 
 find_program(VOXELD_MOLD mold)
@@ -45,7 +46,8 @@ if(VOXELD_SANITIZE)
   if(VOXELD_SANITIZE MATCHES "undefined")
     # The check of virtual tables opens a pipe to look at an object, and takes
     # the object for a wrong one where a test has used up the descriptors.
-    target_compile_options(voxeld_options INTERFACE -fno-sanitize-recover=undefined -fno-sanitize=vptr)
+    # A null pointer faults without being looked for.
+    target_compile_options(voxeld_options INTERFACE -fno-sanitize-recover=undefined -fno-sanitize=null,vptr)
   endif()
 else()
   target_compile_options(voxeld_options INTERFACE -fstack-protector-strong)
@@ -64,8 +66,18 @@ if(VOXELD_WERROR)
   target_compile_options(voxeld_warnings INTERFACE -Werror)
 endif()
 
-# voxeld_library(NAME SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. Each of HEADERS is also
-# compiled alone (but under a sanitizer), so none leans on what its includer happened to include.
+# How a test and the headers compiled before it are built.
+function(voxeld_test_options name)
+  target_link_libraries(${name} PRIVATE voxeld_options voxeld_warnings GTest::gmock GTest::gtest_main)
+  if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_SANITIZE)
+    # What is tested is built as it is shipped; the test itself compiles faster so.
+    target_compile_options(${name} PRIVATE -O1)
+  endif()
+endfunction()
+
+# voxeld_library(NAME SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. Each of HEADERS is also compiled with
+# nothing before it (but under a sanitizer), so none leans on what its includer happened to include: by its own .cc, which
+# includes it first (tools/check_includes.py), or alone.
 function(voxeld_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;LINK" ${ARGN})
   set(alone "")
@@ -73,6 +85,10 @@ function(voxeld_library name)
     set(ARG_HEADERS "")
   endif()
   foreach(header ${ARG_HEADERS})
+    string(REGEX REPLACE "\\.h$" ".cc" own ${header})
+    if(own IN_LIST ARG_SOURCES)
+      continue()
+    endif()
     file(RELATIVE_PATH path ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${header})
     string(MAKE_C_IDENTIFIER ${path} id)
     set(file ${CMAKE_BINARY_DIR}/headers/${id}.cc)
@@ -85,10 +101,25 @@ function(voxeld_library name)
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
 endfunction()
 
-# voxeld_test(NAME [SINGLE_THREADED] LABELS … SOURCES … LINK …): an executable `NAME` in bin/tests; each of its cases is a
-# ctest test. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
+# What most tests include, compiled once for all of them. Clang, which checks includes, reads them each time.
+set(VOXELD_TEST_HEADERS OFF)
+if(VOXELD_TESTS AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(VOXELD_TEST_HEADERS ON)
+  find_package(GTest REQUIRED)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/tests.cc CONTENT "int main() {}\n" @ONLY)
+  add_executable(voxeld_test_headers EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/tests.cc)
+  target_precompile_headers(voxeld_test_headers PRIVATE
+    <gmock/gmock.h> <gtest/gtest.h> <absl/status/statusor.h> <absl/strings/str_cat.h> <algorithm> <array> <cmath> <functional>
+    <map> <memory> <optional> <random> <span> <string> <utility> <variant> <vector>)
+  target_link_libraries(voxeld_test_headers PRIVATE absl::statusor absl::strings)
+  voxeld_test_options(voxeld_test_headers)
+endif()
+
+# voxeld_test(NAME [SINGLE_THREADED] LABELS … SOURCES … LINK … LONG …): an executable `NAME` in bin/tests; each of its cases is a
+# ctest test. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LONG: patterns of cases that are
+# left out where VOXELD_LONG_TESTS is off. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
 function(voxeld_test name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED" "TIMEOUT" "SOURCES;LINK;LABELS;LONG" ${ARGN})
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     return()
   endif()
@@ -99,21 +130,21 @@ function(voxeld_test name)
     set(ARG_TIMEOUT 300)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE ${ARG_LINK} voxeld_options voxeld_warnings
-                                        GTest::gmock GTest::gtest_main)
-  if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_SANITIZE)
-    # What is tested is built as it is shipped; the test itself compiles faster so.
-    target_compile_options(${name} PRIVATE -O1)
-  endif()
-  if(VOXELD_SANITIZE MATCHES "undefined")
-    # A test's own arithmetic is not what is looked at, and would take as long to compile as all else.
-    target_compile_options(${name} PRIVATE -fno-sanitize=undefined)
+  target_link_libraries(${name} PRIVATE ${ARG_LINK})
+  voxeld_test_options(${name})
+  if(VOXELD_TEST_HEADERS)
+    target_precompile_headers(${name} REUSE_FROM voxeld_test_headers)
   endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
   set(prefix "${name}.")
   if("gpu" IN_LIST ARG_LABELS)
     set(prefix "gpu.${name}.")
   endif()
-  gtest_discover_tests(${name} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 60
+  set(chosen "")
+  if(ARG_LONG AND NOT VOXELD_LONG_TESTS)
+    list(JOIN ARG_LONG ":" long)
+    set(chosen TEST_FILTER "-${long}")
+  endif()
+  gtest_discover_tests(${name} ${chosen} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
 endfunction()

@@ -76,10 +76,40 @@ struct PlaneMap {
   }
 };
 
+// Nowhere, where there is no inverse.
+VoxelCylinder MapCylinder(const ClipCylinder& cylinder, const Affine& view) {
+  const Affine map = Compose(view, cylinder.unit);  // x² + y² ≤ 1 → voxel space
+  const double determinant = Determinant(map);
+  VoxelCylinder out;
+  bool is_finite = determinant != 0;
+  for (int r = 0; r < 2; ++r) {
+    VoxelCylinder::Row& row = out.rows[r];
+    double base = 0;
+    for (int c = 0; c < 3; ++c) {
+      const auto at = [&](int i, int j) { return map.m[i % 3 * 4 + j % 3]; };
+      // Row r of the inverse: cofactors of column r.
+      const double inverse =
+          (at(c + 1, r + 1) * at(c + 2, r + 2) - at(c + 1, r + 2) * at(c + 2, r + 1)) / determinant;
+      row.by[c] = inverse / 2;
+      base = base - inverse * map.m[c * 4 + 3];
+      is_finite = is_finite && std::isfinite(inverse);
+    }
+    row.base = base;
+    is_finite = is_finite && std::isfinite(base);
+  }
+  if (is_finite) return out;
+  VoxelCylinder nowhere;
+  nowhere.rows[0].base = 2;
+  return nowhere;
+}
+
 }  // namespace
 
 VoxelClip MapClip(const LayerRecord& layer, const Affine& view) {
   VoxelClip clip;
+  for (uint32_t i = 0; i < layer.cylinder_count; ++i) {
+    clip.cylinders[clip.cylinder_count++] = MapCylinder(layer.cylinders[i], view);
+  }
   if (layer.plane_count == 0 && layer.has_region == 0) return clip;
   const PlaneMap map(view);
   const auto add = [&](const ClipPlane& plane) { clip.half_spaces[clip.count++] = map.Of(plane); };

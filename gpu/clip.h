@@ -1,5 +1,6 @@
 // Where a layer is drawn: its clip planes and its region (gpu/delta.h), as half-spaces of voxel
-// space in whole numbers, so that every machine gives each voxel the same verdict.
+// space in whole numbers, and its clip cylinders in double precision, so that every machine gives each voxel the
+// same verdict.
 //
 // Definition. A voxel (x, y, z) belongs to the layer if for each half-space
 //
@@ -14,6 +15,12 @@
 // to its normal, by at most (nx + ny + nz + 1) · 2⁻³⁸ voxel: 2⁻²² in the greatest grid there can
 // be. Double precision before that adds what it adds to vertices: 2⁻⁵⁰ of the terms that are
 // summed.
+//
+// A cylinder holds a voxel if q₀² + q₁² ≤ 1 for
+//
+//   qᵣ = ((row₀·(2x+1) + row₁·(2y+1)) + row₂·(2z+1)) + base     in IEEE double, each operation rounded
+//
+// Rounding keeps order: of a box of voxels the least and the greatest q are known from its corners, as computed.
 //
 // A plane and its opposite are rounded to exact opposites: each voxel is in one of them at least,
 // and in both only if its centre lies in the rounded plane.
@@ -62,13 +69,57 @@ VOXELD_HD inline ClipSide SideOf(const VoxelHalfSpace& h, const Box3& box) {
   return least >= 0 ? ClipSide::kInside : greatest < 0 ? ClipSide::kOutside : ClipSide::kCut;
 }
 
+struct VoxelCylinder {
+  struct Row {
+    double by[3] = {}, base = 0;  // of half voxels
+    bool operator==(const Row&) const = default;
+  };
+  Row rows[2];
+  bool operator==(const VoxelCylinder&) const = default;
+};
+
+VOXELD_HD inline bool IsInside(const VoxelCylinder& c, int64_t x, int64_t y, int64_t z) {
+  double square[2];
+  for (int r = 0; r < 2; ++r) {
+    const VoxelCylinder::Row& row = c.rows[r];
+    const double q =
+        ((row.by[0] * static_cast<double>(2 * x + 1) + row.by[1] * static_cast<double>(2 * y + 1)) +
+         row.by[2] * static_cast<double>(2 * z + 1)) +
+        row.base;
+    square[r] = q * q;
+  }
+  return square[0] + square[1] <= 1;
+}
+
+VOXELD_HD inline ClipSide SideOf(const VoxelCylinder& c, const Box3& box) {
+  double nearest[2], farthest[2];  // squares
+  for (int r = 0; r < 2; ++r) {
+    const VoxelCylinder::Row& row = c.rows[r];
+    double low[3], high[3];
+    for (int a = 0; a < 3; ++a) {
+      const double first = row.by[a] * static_cast<double>(2 * static_cast<int64_t>(box.lo[a]) + 1);
+      const double last = row.by[a] * static_cast<double>(2 * static_cast<int64_t>(box.hi[a]) - 1);
+      low[a] = Min(first, last);
+      high[a] = Max(first, last);
+    }
+    const double least = ((low[0] + low[1]) + low[2]) + row.base;
+    const double greatest = ((high[0] + high[1]) + high[2]) + row.base;
+    farthest[r] = Max(least * least, greatest * greatest);
+    nearest[r] = least <= 0 && greatest >= 0 ? 0 : Min(least * least, greatest * greatest);
+  }
+  if (farthest[0] + farthest[1] <= 1) return ClipSide::kInside;
+  return nearest[0] + nearest[1] <= 1 ? ClipSide::kCut : ClipSide::kOutside;
+}
+
 // Planes and the region's six faces.
 inline constexpr uint32_t kMaxHalfSpaces = kMaxClipPlanes + 6;
 
-// All of a layer's, under one view.
+// All of a layer's, under one view; without any it is drawn everywhere.
 struct VoxelClip {
-  uint32_t count = 0;  // none: drawn everywhere
+  uint32_t count = 0;
   VoxelHalfSpace half_spaces[kMaxHalfSpaces];
+  uint32_t cylinder_count = 0;
+  VoxelCylinder cylinders[kMaxClipCylinders];
 };
 
 // `view`: scene → voxel space. Host.

@@ -109,7 +109,7 @@ absl::Status CheckCurved(const Checker& check, const GeometryRecord& g) {
 
 absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   absl::Status status =
-      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 10),
+      FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 11),
                   check.Enum("color_mode", static_cast<uint32_t>(g.color_mode), 0, 1),
                   check.Enum("sampling", static_cast<uint32_t>(g.sampling), 0, 2),
                   check.Enum("rule", static_cast<uint32_t>(g.rule), 0, 1),
@@ -144,8 +144,12 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   const bool indexed = g.index_count != 0;
   const uint32_t corners = indexed ? g.index_count : g.vertex_count;
   const char* field = indexed ? "index_count" : "vertex_count";
-  if (g.kind == PrimitiveKind::kTriangles && corners % 3 != 0) {
+  const bool filled = g.kind == PrimitiveKind::kFilled;
+  if ((g.kind == PrimitiveKind::kTriangles || filled) && corners % 3 != 0) {
     return check.Wrong(field, corners, "a multiple of 3 for triangles");
+  }
+  if (filled && g.color_mode != ColorMode::kUniform) {
+    return check.Wrong("color_mode", static_cast<uint32_t>(g.color_mode), "0 for a filled mesh");
   }
   if (g.kind == PrimitiveKind::kSegments && g.topology == Topology::kList && corners % 2 != 0) {
     return check.Wrong(field, corners, "even for a list of segments");
@@ -262,8 +266,10 @@ absl::Status ReadDrawable(uint64_t offset, std::span<const std::byte> body, Delt
 }
 
 absl::Status CheckClip(const Checker& check, const LayerRecord& l) {
-  absl::Status status = FirstError({check.Enum("plane_count", l.plane_count, 0, kMaxClipPlanes),
-                                    check.Enum("has_region", l.has_region, 0, 1)});
+  absl::Status status =
+      FirstError({check.Enum("plane_count", l.plane_count, 0, kMaxClipPlanes),
+                  check.Enum("cylinder_count", l.cylinder_count, 0, kMaxClipCylinders),
+                  check.Enum("has_region", l.has_region, 0, 1)});
   if (!status.ok()) return status;
   for (uint32_t i = 0; i < l.plane_count; ++i) {
     const ClipPlane& p = l.planes[i];
@@ -274,6 +280,11 @@ absl::Status CheckClip(const Checker& check, const LayerRecord& l) {
     if (p.a == 0 && p.b == 0 && p.c == 0) {
       return check.Wrong(field.c_str(), "(0, 0, 0)", "a plane with a normal other than zero");
     }
+  }
+  for (uint32_t i = 0; i < l.cylinder_count; ++i) {
+    const std::string field = absl::StrCat("cylinders[", i, "].unit");
+    status = check.Finite(field.c_str(), l.cylinders[i].unit.m, 12);
+    if (!status.ok()) return status;
   }
   if (l.has_region == 0) return absl::OkStatus();
   status = FirstError(

@@ -52,6 +52,7 @@ enum class PrimitiveKind : uint32_t {
   kCurves = 8,  // cubic Béziers: list (4 points each) or strip (they share ends), drawn as segments
   kPatches = 9,   // bicubic Béziers: 16 points each, along u first, drawn as triangles
   kSamples = 10,  // a grid of samples (primitives/samples.h), which the indices hold; no positions
+  kFilled = 11,   // what triangles enclose (primitives/filled.h), indexed or not; of one colour
 };
 
 // Made of control points, and cut into straight pieces where it is drawn (gpu/curves/).
@@ -130,7 +131,14 @@ struct ClipPlane {
   double a = 0, b = 0, c = 0, d = 0;
   bool operator==(const ClipPlane&) const = default;
 };
-inline constexpr uint32_t kMaxClipPlanes = 8;
+inline constexpr uint32_t kMaxClipPlanes = 20;
+
+// What is around a line of the scene: where `unit`⁻¹ takes a point to x² + y² ≤ 1, at any z. `unit` has an inverse.
+struct ClipCylinder {
+  Affine unit;  // x² + y² ≤ 1 → scene
+  bool operator==(const ClipCylinder&) const = default;
+};
+inline constexpr uint32_t kMaxClipCylinders = 4;
 
 // A box of the scene, its faces included; min < max.
 struct Region {
@@ -138,7 +146,7 @@ struct Region {
   bool operator==(const Region&) const = default;
 };
 
-// Layers combine in ascending (order, id). Where there are planes or a region, only voxels that lie
+// Layers combine in ascending (order, id). Where there are planes, cylinders or a region, only voxels that lie
 // inside all of them (gpu/clip.h) are the layer's: the others it does not cover.
 struct LayerRecord {
   uint64_t id = 0;  // the number of creation
@@ -146,16 +154,21 @@ struct LayerRecord {
   uint32_t visible = 1;
   uint32_t opacity = 255;  // 0 to 255
   BlendMode blend = BlendMode::kOver;
-  uint32_t plane_count = 0;  // 0 to kMaxClipPlanes
-  uint32_t has_region = 0;   // 1: `region` holds
-  Affine transform;          // layer's coordinates → scene's
+  uint32_t plane_count = 0;     // 0 to kMaxClipPlanes
+  uint32_t has_region = 0;      // 1: `region` holds
+  uint32_t cylinder_count = 0;  // 0 to kMaxClipCylinders
+  uint32_t reserved[3] = {};
+  Affine transform;  // layer's coordinates → scene's
   ClipPlane planes[kMaxClipPlanes];
+  ClipCylinder cylinders[kMaxClipCylinders];
   Region region;
 };
 
 // Whether two layers are drawn in the same part of the scene, as it is written.
 inline bool SameClip(const LayerRecord& a, const LayerRecord& b) {
   return std::equal(a.planes, a.planes + a.plane_count, b.planes, b.planes + b.plane_count) &&
+         std::equal(a.cylinders, a.cylinders + a.cylinder_count, b.cylinders,
+                    b.cylinders + b.cylinder_count) &&
          a.has_region == b.has_region && (a.has_region == 0 || a.region == b.region);
 }
 

@@ -69,18 +69,24 @@ def rule_of(path):
     return best
 
 
-def wrong_includes(path, lines):
-    """What is wrong with the includes of a file, whose path is from the repository root."""
+def wrong_includes(path, lines, own_header=os.path.exists):
+    """What is wrong with the includes of a file, whose path is from the repository root. own_header says whether there
+    is a header of that path."""
     folder = rule_of(path)
     if folder is None:
         return [f"{path}: lies in no folder that has a rule"]
     wrong = []
+    first = True
     for number, line in enumerate(lines, 1):
         match = INCLUDE.match(line)
         if not match:
             continue
         kind, target = match.groups()
         where = f"{path}:{number}"
+        own = path[:-len(".cc")] + ".h"
+        if first and path.endswith(".cc") and own_header(own) and not own.endswith(target):
+            wrong.append(f"{where}: {own} comes first, so that it is known to stand alone")
+        first = False
         if target.startswith(("grpc/", "grpcpp/", "grpc++/")) or target.endswith(".grpc.pb.h"):
             if path.endswith(".h") and not path.startswith("tests/"):
                 wrong.append(f"{where}: a header includes gRPC's {target}")

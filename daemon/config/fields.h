@@ -103,6 +103,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_sessions", limits.max_sessions, 1, kMost32);
   visitor.Integer("max_parts_per_object", limits.max_parts_per_object, 1, kMost32);
   visitor.Integer("max_clip_planes", limits.max_clip_planes, 1, gpu::kMaxClipPlanes);
+  visitor.Integer("max_clip_cylinders", limits.max_clip_cylinders, 0, gpu::kMaxClipCylinders);
   visitor.Integer("max_expression_nodes", limits.max_expression_nodes, 1, 1024);
   visitor.Integer("max_expression_depth", limits.max_expression_depth, 1, 256);
   visitor.Integer("max_boundary_points", limits.max_boundary_points, 3, 65536);

@@ -12,6 +12,7 @@ const char* KindName(gpu::PrimitiveKind kind) {
     case gpu::PrimitiveKind::kSegments:
       return "segments";
     case gpu::PrimitiveKind::kTriangles:
+    case gpu::PrimitiveKind::kFilled:
       return "mesh";
     case gpu::PrimitiveKind::kBox:
       return "box";

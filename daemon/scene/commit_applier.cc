@@ -390,10 +390,15 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
     }
   };
   const auto check_clip = [&](const Clip& clip, const std::string& layer) {
-    if (clip.count > limits.max_clip_planes) {
-      return refuse(
-          layer, "", "layer_state.clip.planes", Reason::kQuotaExceeded,
-          absl::StrFormat("%d planes; max_clip_planes is %d", clip.count, limits.max_clip_planes));
+    if (clip.planes_in_all() > limits.max_clip_planes) {
+      return refuse(layer, "", "layer_state.clip.planes", Reason::kQuotaExceeded,
+                    absl::StrFormat("%d planes; max_clip_planes is %d", clip.planes_in_all(),
+                                    limits.max_clip_planes));
+    }
+    if (clip.cylinders_count > limits.max_clip_cylinders) {
+      return refuse(layer, "", "layer_state.clip.cylinders", Reason::kQuotaExceeded,
+                    absl::StrFormat("%d cylinders; max_clip_cylinders is %d", clip.cylinders_count,
+                                    limits.max_clip_cylinders));
     }
     for (uint32_t i = 0; i < clip.count; ++i) {
       const gpu::ClipPlane& p = clip.planes[i];
@@ -403,6 +408,11 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
       refuse(layer, "", absl::StrFormat("layer_state.clip.planes[%d]", i), Reason::kInvalidValue,
              absl::StrFormat("the plane is (%g, %g, %g, %g); it must be finite, its normal not 0",
                              p.a, p.b, p.c, p.d));
+    }
+    gpu::LayerRecord record;
+    if (clip.boxes_count + clip.cylinders_count > 0 && !PutClip(clip, record)) {
+      refuse(layer, "", "layer_state.clip", Reason::kInvalidValue,
+             "a box or a cylinder of it has no inside, or does not stay finite");
     }
   };
   const auto check_region = [&](const gpu::Region& region, const std::string& layer) {

@@ -25,8 +25,7 @@ gpu::LayerRecord RecordOf(const Layer& layer) {
   record.opacity = layer.opacity;
   record.blend = layer.blend;
   record.transform = layer.transform;
-  record.plane_count = layer.clip.count;
-  std::copy_n(layer.clip.planes, layer.clip.count, record.planes);
+  PutClip(layer.clip, record);  // sound, or it would have been refused
   record.has_region = layer.region.has_value() ? 1 : 0;
   record.region = layer.region.value_or(gpu::Region());
   return record;

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/scene/clip.h"
 #include "display/sync/clock.h"
 #include "gpu/affine.h"
 #include "gpu/delta.h"
@@ -86,7 +87,9 @@ struct Limits {
   double max_thickness = 4096;                  // in its own unit
   uint32_t max_sessions = 1024;
   uint32_t max_parts_per_object = 4096;
-  uint32_t max_clip_planes = gpu::kMaxClipPlanes;  // the most there can be
+  // The most there can be. A clip box is six planes, a clip cylinder two and itself.
+  uint32_t max_clip_planes = gpu::kMaxClipPlanes;
+  uint32_t max_clip_cylinders = gpu::kMaxClipCylinders;
   uint32_t max_captures = 16;
   int64_t max_linger_ns = 3600 * sync::kSecond;
   uint64_t credit_bytes = 8u << 20;  // sent by one session and not yet applied
@@ -196,14 +199,6 @@ struct SetTransform {
   std::string layer, id;
   gpu::Affine transform;
 };
-// Half-spaces of the scene, 0 to gpu::kMaxClipPlanes: only what lies in all of them is drawn.
-struct Clip {
-  uint32_t count = 0;
-  gpu::ClipPlane planes[gpu::kMaxClipPlanes];
-  bool operator==(const Clip& other) const {
-    return std::equal(planes, planes + count, other.planes, other.planes + other.count);
-  }
-};
 struct LayerState {
   std::string layer;
   std::optional<bool> visible;
@@ -211,7 +206,7 @@ struct LayerState {
   std::optional<int32_t> order;
   std::optional<gpu::BlendMode> blend;
   std::optional<gpu::Affine> transform;
-  std::shared_ptr<const Clip> clip;                  // null: as it is; no planes: none any more
+  std::shared_ptr<const Clip> clip;                  // null: as it is; empty: none any more
   std::optional<std::optional<gpu::Region>> region;  // holds nothing: none any more
 };
 struct FrameBegin {

@@ -162,6 +162,21 @@ void ToWire(const Clip& in, v1::Clip* out) {
     plane->set_c(in.planes[i].c);
     plane->set_d(in.planes[i].d);
   }
+  const auto put = [](const double(&from)[3], v1::Vec3* to) {
+    ToWire(display::Vec3{from[0], from[1], from[2]}, to);
+  };
+  for (uint32_t i = 0; i < in.boxes_count; ++i) {
+    v1::Clip::Box* box = out->add_boxes();
+    put(in.boxes[i].center, box->mutable_center());
+    put(in.boxes[i].size, box->mutable_size());
+    ToWire(in.boxes[i].transform, box->mutable_transform());
+  }
+  for (uint32_t i = 0; i < in.cylinders_count; ++i) {
+    v1::Clip::Cylinder* cylinder = out->add_cylinders();
+    put(in.cylinders[i].start, cylinder->mutable_start());
+    put(in.cylinders[i].end, cylinder->mutable_end());
+    cylinder->set_radius(in.cylinders[i].radius);
+  }
 }
 
 void ToWire(const gpu::Region& in, v1::Box3* out) {

@@ -4,6 +4,7 @@
 #include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -148,9 +149,13 @@ constexpr int kPartsPath[] = {
     v1::ApplyUpdateRequest::kOperationsFieldNumber, v1::StreamRequest::kDefineObjectFieldNumber,
     v1::DefineObject::kDefinitionFieldNumber, v1::Object::kPartsFieldNumber};
 
-constexpr int kPlanesPath[] = {v1::ApplyUpdateRequest::kOperationsFieldNumber,
-                               v1::StreamRequest::kLayerStateFieldNumber,
-                               v1::LayerState::kClipFieldNumber, v1::Clip::kPlanesFieldNumber};
+constexpr std::array<int, 4> ClipPath(int field) {
+  return {v1::ApplyUpdateRequest::kOperationsFieldNumber, v1::StreamRequest::kLayerStateFieldNumber,
+          v1::LayerState::kClipFieldNumber, field};
+}
+constexpr std::array<int, 4> kPlanesPath = ClipPath(v1::Clip::kPlanesFieldNumber);
+constexpr std::array<int, 4> kBoxesPath = ClipPath(v1::Clip::kBoxesFieldNumber);
+constexpr std::array<int, 4> kCylindersPath = ClipPath(v1::Clip::kCylindersFieldNumber);
 constexpr uint64_t kMostPlanes = 1024;  // far beyond max_clip_planes, in one message
 
 // Before anything is parsed. A little too many elements are an Issue, later; so many that to unfold
@@ -173,13 +178,15 @@ absl::Status CheckUpdateElements(std::span<const std::string_view> slices, uint6
       count > limits.max_operations_per_commit) {
     return TooManyOperations(count, limits);
   }
+  const uint64_t planes = std::max<uint64_t>(limits.max_operations_per_commit, kMostPlanes);
   // Together they may be as many as are allowed of entities, or of one object's parts.
   const ElementRow rows[] = {
       {"operations[].batch.upserts", kUpsertsPath, limits.max_operations_per_commit},
       {"operations[].define_object.definition.parts", kPartsPath,
        std::max(limits.max_operations_per_commit, limits.max_parts_per_object)},
-      {"operations[].layer_state.clip.planes", kPlanesPath,
-       std::max<uint64_t>(limits.max_operations_per_commit, kMostPlanes)}};
+      {"operations[].layer_state.clip.planes", kPlanesPath, planes},
+      {"operations[].layer_state.clip.boxes", kBoxesPath, planes},
+      {"operations[].layer_state.clip.cylinders", kCylindersPath, planes}};
   return CheckElements(slices, size, rows);
 }
 
@@ -341,7 +348,9 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
       {"batch.upserts", std::span(kUpsertsPath).subspan(1), limits.max_operations_per_commit},
       {"define_object.definition.parts", std::span(kPartsPath).subspan(1),
        limits.max_parts_per_object},
-      {"layer_state.clip.planes", std::span(kPlanesPath).subspan(1), kMostPlanes}};
+      {"layer_state.clip.planes", std::span(kPlanesPath).subspan(1), kMostPlanes},
+      {"layer_state.clip.boxes", std::span(kBoxesPath).subspan(1), kMostPlanes},
+      {"layer_state.clip.cylinders", std::span(kCylindersPath).subspan(1), kMostPlanes}};
   if (absl::Status status = CheckElements(slices, size, rows); !status.ok()) return Failed(status);
   Parsed<v1::StreamRequest> parsed;
   if (absl::Status status = parsed.Parse(slices, size, Root::kStreamRequest); !status.ok()) {

@@ -129,6 +129,7 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_sessions(in.max_sessions);
   out->set_max_parts_per_object(in.max_parts_per_object);
   out->set_max_clip_planes(in.max_clip_planes);
+  out->set_max_clip_cylinders(in.max_clip_cylinders);
   out->set_max_expression_nodes(in.max_expression_nodes);
   out->set_max_expression_depth(in.max_expression_depth);
   out->set_max_boundary_points(in.max_boundary_points);
@@ -178,7 +179,7 @@ void Encode(const LayerInfo& in, v1::LayerInfo* out) {
   out->set_order(in.order);
   out->set_blend(ToWire(in.blend));
   ToWire(in.transform, out->mutable_transform());
-  if (in.clip.count > 0) ToWire(in.clip, out->mutable_clip());
+  if (!in.clip.empty()) ToWire(in.clip, out->mutable_clip());
   if (in.region.has_value()) ToWire(*in.region, out->mutable_region());
   out->set_entities(in.entities);
   out->set_bytes(in.bytes);

@@ -125,6 +125,9 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
       ThicknessToWire(record, segments->mutable_thickness());
       return VerticesToWire(in, segments->mutable_vertices());
     }
+    case gpu::PrimitiveKind::kFilled:
+      out->mutable_mesh()->set_fill(v1::FILL_SOLID);
+      [[fallthrough]];
     case gpu::PrimitiveKind::kTriangles:
       out->mutable_mesh()->set_rule(RuleToWire(record.rule));
       return VerticesToWire(in, out->mutable_mesh()->mutable_vertices());

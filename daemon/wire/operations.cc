@@ -6,8 +6,10 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/clip.h"
 #include "daemon/wire/primitive.h"
 #include "voxeld/v1/scene.pb.h"
 
@@ -116,28 +118,6 @@ MaybeFault To(const FieldPath& path, const v1::SetTransform& in, const Limits& l
   out->layer = in.layer();
   out->id = in.id();
   return ToAffine(FieldPath(path, "transform"), in.transform(), &out->transform);
-}
-
-MaybeFault ToClip(const FieldPath& path, const v1::Clip& in, const Limits& limits, Clip* out) {
-  // Never more than there is room for, whatever the limit says.
-  const uint32_t most = std::min(limits.max_clip_planes, gpu::kMaxClipPlanes);
-  if (static_cast<uint32_t>(in.planes_size()) > most) {
-    return Fault{FieldPath(path, "planes").ToString(), Reason::kQuotaExceeded,
-                 absl::StrCat("has ", in.planes_size(), " planes; max_clip_planes allows ", most)};
-  }
-  for (const v1::Clip::Plane& plane : in.planes()) {
-    const FieldPath at(path, "planes", out->count);
-    if (auto fault = CheckFinite(FieldPath(at, "a"), plane.a())) return fault;
-    if (auto fault = CheckFinite(FieldPath(at, "b"), plane.b())) return fault;
-    if (auto fault = CheckFinite(FieldPath(at, "c"), plane.c())) return fault;
-    if (auto fault = CheckFinite(FieldPath(at, "d"), plane.d())) return fault;
-    if (plane.a() == 0 && plane.b() == 0 && plane.c() == 0) {
-      return Fault{at.ToString(), Reason::kInvalidValue,
-                   "has the normal (0, 0, 0); one of a, b, c must not be 0"};
-    }
-    out->planes[out->count++] = {plane.a(), plane.b(), plane.c(), plane.d()};
-  }
-  return {};
 }
 
 MaybeFault ToRegion(const FieldPath& path, const v1::Box3& in, std::optional<gpu::Region>* out) {
@@ -302,9 +282,15 @@ template <typename Out, typename In>
 void Add(const FieldPath& path, const In& in, uint64_t sequence, const DecodeContext& context,
          const Sinks& out) {
   Out op;
-  if (auto fault = To(path, in, context, &op)) {
+  std::vector<Fault> notes;
+  DecodeContext noting = context;
+  noting.notes = &notes;
+  if (auto fault = To(path, in, noting, &op)) {
     AddIssue(*std::move(fault), sequence, LayerOf(in), IdOf(in), context, out);
     if (!std::is_same_v<Out, Commit>) return;
+  }
+  for (Fault& note : notes) {
+    AddIssue(std::move(note), sequence, LayerOf(in), IdOf(in), context, out);
   }
   out.operations->push_back({sequence, std::move(op)});
 }

@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/color_scale.h"
@@ -12,6 +14,7 @@
 #include "daemon/wire/grids.h"
 #include "daemon/wire/height_map.h"
 #include "daemon/wire/implicit.h"
+#include "daemon/wire/open_edges.h"
 #include "daemon/wire/shapes.h"
 #include "daemon/wire/text.h"
 #include "daemon/wire/vertices.h"
@@ -89,24 +92,44 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Decod
   return {};
 }
 
+// An open one keeps its surface.
+MaybeFault FillMesh(const FieldPath& path, const DecodeContext& context, GeometryData* out) {
+  out->record.fill = gpu::Fill::kSurface;
+  const FieldPath fill(path, "fill");
+  if (out->record.color_mode != gpu::ColorMode::kUniform) {
+    return Fault{fill.ToString(), Reason::kInvalidValue,
+                 "is FILL_SOLID, which has one colour, but vertices have theirs; leave these out, "
+                 "and draw the surface in them as another entity"};
+  }
+  const std::optional<OpenEdge> open = FindOpenEdge(out->arrays.positions(), out->arrays.indices());
+  if (!open) {
+    out->record.kind = gpu::PrimitiveKind::kFilled;
+    return {};
+  }
+  if (context.notes != nullptr) {
+    context.notes->push_back(
+        {fill.ToString(), Reason::kInvalidValue,
+         absl::StrCat("is FILL_SOLID, but the mesh is open: the edge of vertices ", open->first,
+                      " and ", open->second, " belongs to ", open->triangles,
+                      open->triangles == 1 ? " triangle" : " triangles",
+                      ", and it takes an even number; its surface is drawn")});
+  }
+  return {};
+}
+
 MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext& context,
                   GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kTriangles;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
   bool framed;
   if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
-  if (out->record.fill == gpu::Fill::kSolid) {
-    return Unimplemented(
-        FieldPath(path, "fill"),
-        "a mesh has a surface, lines or dots; leave it unset, or give one of these");
-  }
   if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out)) {
     return fault;
   }
   if (Corners(out->record) % 3 != 0) {
     return BadCorners(path, out->record, "triangles take three corners each: a multiple of 3");
   }
-  return {};
+  return out->record.fill == gpu::Fill::kSolid ? FillMesh(path, context, out) : MaybeFault();
 }
 
 template <typename Message>
@@ -293,7 +316,8 @@ bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
     case v1::Primitive::kSegments:
       return false;
     case v1::Primitive::kMesh:
-      return data.record.kind != gpu::PrimitiveKind::kTriangles;
+      return data.record.kind != gpu::PrimitiveKind::kTriangles &&
+             data.record.kind != gpu::PrimitiveKind::kFilled;
     case v1::Primitive::kBox:
     case v1::Primitive::kSphere:
     case v1::Primitive::kCylinder:
@@ -337,6 +361,7 @@ MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const Decode
     case v1::Primitive::kSegments:
     case v1::Primitive::kMesh:
     case v1::Primitive::kCurve:
+      if (out->record.kind == gpu::PrimitiveKind::kFilled) break;
       return ToVertexColors(scale, in.color_scale(), context, out);
     case v1::Primitive::kEllipsoid:
     case v1::Primitive::kTorus:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "gpu/assemble/inside.h"
 #include "gpu/assemble/triangle_kernel.h"
 #include "gpu/word.h"
 
@@ -26,6 +27,15 @@ void DrawWalksAlone(const Bins& bins, std::span<const BinItem> items, uint32_t* 
     size = 0;
   }
   DrawSpans(bins.walks.data(), {walks, size}, words, touched);
+}
+
+// Sets source.inside, if there is room for it.
+void FillIn(Drawable& d, uint64_t most_bytes, Executor& executor) {
+  d.inside.clear();
+  const uint64_t words = InsideRows{d.source.solid.bounds}.size();
+  if (words == 0 || words > most_bytes / sizeof(uint32_t)) return;
+  d.inside = FindInside(d.source, executor);
+  d.source.inside = d.inside.data();
 }
 
 }  // namespace
@@ -95,7 +105,8 @@ void PrepareDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid,
            d.bins);
 }
 
-void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Executor& executor) {
+void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Executor& executor,
+                 uint64_t inside_bytes) {
   const GeometryView& view = d.geometry->view;
   const Affine map = Compose(Compose(view_map, d.layer->record.transform), d.record.transform);
   d.source = {};
@@ -138,6 +149,11 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
       d.source.indices = view.indices.data();
       d.source.colors = view.colors.data();
       d.source.radius = RadiusOf(view.record, map);
+      if constexpr (std::is_same_v<Primitive, Filled>) {
+        Filled::Place(BoundsOfVertices(d.source, grid), kBlockTiles, d.source.solid,
+                      d.source.implicit);
+        FillIn(d, inside_bytes, executor);
+      }
     }
   });
 }

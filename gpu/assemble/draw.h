@@ -12,7 +12,8 @@
 namespace voxeld::gpu {
 
 // Fills in what is derived: vertices, source. `view`: scene → voxel space.
-void MapDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid, Executor& executor);
+void MapDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid, Executor& executor,
+                 uint64_t inside_bytes = UINT64_MAX);
 // The same, and bins. `owned[tile]`: 0 leaves the tile out.
 void PrepareDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor);

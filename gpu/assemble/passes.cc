@@ -18,7 +18,7 @@ void IndexBudget::Charge(Drawable& d, uint64_t bytes) {
 }
 
 bool IndexBudget::Keep(Drawable& d) {
-  Charge(d, d.bins.item_bytes());
+  Charge(d, d.bins.item_bytes() + d.inside.capacity() * sizeof(d.inside[0]));
   if (kept_bytes() <= bytes_ / 4 * 3) return true;
   Release(d);
   return false;
@@ -26,6 +26,8 @@ bool IndexBudget::Keep(Drawable& d) {
 
 void IndexBudget::Release(Drawable& d) {
   d.bins = Bins();
+  d.inside = {};
+  d.source.inside = nullptr;
   Charge(d, 0);
 }
 

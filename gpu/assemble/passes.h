@@ -30,10 +30,10 @@ class IndexBudget {
  public:
   explicit IndexBudget(uint64_t bytes) : bytes_(bytes == 0 ? kIndexBytes : bytes) {}
 
-  // Charges what the bins of a drawable hold now, instead of what they held. False if too much would be kept: then they
-  // have no items, and hold nothing. For different drawables by several threads.
+  // Charges what the bins of a drawable, and `inside`, hold now, instead of what they held. False if too much would be kept:
+  // then they have no items, and hold nothing. For different drawables by several threads.
   bool Keep(Drawable& drawable);
-  // The bins go.
+  // The bins go, and `inside`.
   void Release(Drawable& drawable);
   uint64_t kept_bytes() const { return kept_.load(std::memory_order_relaxed); }
   // For all workers in turns: to find items, or for a pass.

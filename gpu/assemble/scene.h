@@ -39,10 +39,11 @@ struct Drawable {
   std::vector<Int3> vertices;
   std::vector<uint32_t> hoisted;  // of an implicit shape
   std::unique_ptr<Cut> cut;       // of what is curved
+  std::vector<uint32_t> inside;   // of a mesh that is filled, if there is room for it
   Source source;
   Bins bins;
   uint64_t derived_bytes = 0;
-  uint64_t index_bytes = 0;  // of the budget (passes.h), for as long as the bins have the memory
+  uint64_t index_bytes = 0;  // of the budget (passes.h), for as long as bins and `inside` have it
   bool pending = false;      // awaits preparation
   bool leaving = false;      // its entries are being taken out of the tiles
 };

@@ -13,7 +13,7 @@ namespace {
 
 uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
   return d.vertices.size() * sizeof(d.vertices[0]) + d.hoisted.size() * sizeof(d.hoisted[0]) +
-         (d.cut != nullptr ? d.cut->bytes() : 0) +
+         d.inside.size() * sizeof(d.inside[0]) + (d.cut != nullptr ? d.cut->bytes() : 0) +
          d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) + d.bins.item_bytes();
 }
 
@@ -60,17 +60,35 @@ void UncoverOutside(const VoxelHalfSpace& half_space, const TileGrid& grid, cons
   }
 }
 
-// The half-spaces that cut a tile; `outside`: all of it lies outside one of them.
+void UncoverOutside(const VoxelCylinder& cylinder, const TileGrid& grid, const Box3& box,
+                    uint32_t* words) {
+  for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
+    for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
+      for (int32_t x = box.lo[0]; x < box.hi[0]; ++x) {
+        uint32_t& word = words[grid.IndexInTile(x, y, z)];
+        if (word != 0 && !IsInside(cylinder, x, y, z)) word = 0;
+      }
+    }
+  }
+}
+
+// What cuts a tile; `outside`: all of it lies outside one of them.
 struct TileClip {
   bool outside = false;
-  uint32_t count = 0;
+  uint32_t count = 0, cylinder_count = 0;
   const VoxelHalfSpace* cutting[kMaxHalfSpaces];
+  const VoxelCylinder* cylinders[kMaxClipCylinders];
 
   TileClip(const VoxelClip& clip, const Box3& box) {
     for (uint32_t i = 0; i < clip.count; ++i) {
       const ClipSide side = SideOf(clip.half_spaces[i], box);
       if (side == ClipSide::kOutside) outside = true;
       if (side == ClipSide::kCut) cutting[count++] = &clip.half_spaces[i];
+    }
+    for (uint32_t i = 0; i < clip.cylinder_count; ++i) {
+      const ClipSide side = SideOf(clip.cylinders[i], box);
+      if (side == ClipSide::kOutside) outside = true;
+      if (side == ClipSide::kCut) cylinders[cylinder_count++] = &clip.cylinders[i];
     }
   }
 };
@@ -269,7 +287,7 @@ void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const
   const uint64_t bytes = budget_.room_of_worker(executor_.concurrency());
   std::vector<uint8_t> kept(small.size());
   executor_.For(small.size(), 4, [&](size_t i, int worker) {
-    MapDrawable(*small[i], view_, grid_, *serial);
+    MapDrawable(*small[i], view_, grid_, *serial, bytes);
     kept[i] = Keep(*small[i], *serial, bytes, scratch_[static_cast<size_t>(worker)].bins);
   });
   const auto keep_or_count = [&](Drawable& d) {
@@ -280,7 +298,7 @@ void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const
     if (kept[i] == 0) keep_or_count(*small[i]);
   }
   for (Drawable* d : large) {
-    MapDrawable(*d, view_, grid_, executor_);
+    MapDrawable(*d, view_, grid_, executor_, budget_.room() / 2);
     keep_or_count(*d);
   }
   if (large_.bytes() > budget_.room_to_keep()) large_ = BinScratch();
@@ -380,6 +398,9 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
     if (clip.outside) continue;
     for (uint32_t c = 0; c < clip.count; ++c) {
       UncoverOutside(*clip.cutting[c], grid_, box, words);
+    }
+    for (uint32_t c = 0; c < clip.cylinder_count; ++c) {
+      UncoverOutside(*clip.cylinders[c], grid_, box, words);
     }
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {

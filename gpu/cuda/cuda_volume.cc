@@ -141,6 +141,7 @@ absl::Status CudaVolume::PutLayers() {
   std::vector<const Layer*> fresh;
   std::fill(looks_now_.begin(), looks_now_.end(), LayerLook());
   half_spaces_now_.clear();
+  cylinders_now_.clear();
   const auto put = [&](const Layer& layer, uint32_t slot) {
     const LayerRecord& record = layer.record;
     const VoxelClip& clip = *layer.clip;
@@ -149,7 +150,11 @@ absl::Status CudaVolume::PutLayers() {
                         record.opacity,
                         record.blend,
                         static_cast<uint32_t>(half_spaces_now_.size()),
-                        clip.count};
+                        clip.count,
+                        static_cast<uint32_t>(cylinders_now_.size()),
+                        clip.cylinder_count};
+    cylinders_now_.insert(cylinders_now_.end(), clip.cylinders,
+                          clip.cylinders + clip.cylinder_count);
     half_spaces_now_.insert(half_spaces_now_.end(), clip.half_spaces,
                             clip.half_spaces + clip.count);
     slots[record.id] = slot;
@@ -182,6 +187,7 @@ absl::Status CudaVolume::PutLayers() {
   layer_slots_ = std::move(slots);
   absl::Status status = PutArray(device_, looks_, looks_now_, looks_there_);
   if (status.ok()) status = PutArray(device_, half_spaces_, half_spaces_now_, half_spaces_there_);
+  if (status.ok()) status = PutArray(device_, cylinders_, cylinders_now_, cylinders_there_);
   return status;
 }
 
@@ -283,6 +289,7 @@ DrawView CudaVolume::ViewForDrawing() const {
   view.table = table_.as<TableEntry>();
   view.layers = looks_.as<LayerLook>();
   view.half_spaces = half_spaces_.as<VoxelHalfSpace>();
+  view.cylinders = cylinders_.as<VoxelCylinder>();
   view.pairs = index_.view();
   view.lines = lines_.view();
   view.triangles = triangles_.view();
@@ -308,7 +315,8 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
   };
   keep_visible(view.lines);
   keep_visible(view.triangles);
-  view.clipped = !layers.empty() && looks_now_[*layers.begin()].half_spaces != 0;
+  const LayerLook first = layers.empty() ? LayerLook() : looks_now_[*layers.begin()];
+  view.clipped = first.half_spaces != 0 || first.cylinders != 0;
   bool any = view.pairs.count > 0 || view.unlisted.items > 0;
   for (uint32_t b = 0; b < view.lines.count; ++b) {
     any |= view.lines.batches[b].lists.spans == nullptr;

@@ -120,6 +120,7 @@ class CudaVolume final : private SceneObserver {
     Block tiles, begin, voxels;       // of what the CPU has drawn
     Block hoisted, reach;             // of an implicit shape (ImplicitPlace)
     Block vertices, indices, colors;  // of a curve that was cut
+    Block inside;                     // of a mesh that is filled
   };
 
   absl::Status OnPlan(const DeltaPlan& plan) override;
@@ -187,6 +188,9 @@ class CudaVolume final : private SceneObserver {
   // Queues its way over, and finds room for what the device works out. It is to live until then.
   absl::Status Place(const WorkedOut& worked_out, TableEntry& entry, Slot& slot);
   absl::Status PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry, Slot& slot);
+  absl::Status PlaceFilled(TableEntry& entry, Slot& slot);
+  // Where a geometry is, or the whole volume.
+  Box3 BoundsOf(const Drawable& drawable, const Affine& map) const;
   absl::Status PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot);
   absl::Status FindImplicitTiles(std::span<const uint32_t> slots);
   // Has the CPU draw it; the result goes over, and into `slot`.
@@ -220,9 +224,10 @@ class CudaVolume final : private SceneObserver {
   absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
   absl::flat_hash_set<const Drawable*> pending_;
 
-  Block looks_, half_spaces_;
+  Block looks_, half_spaces_, cylinders_;
   std::vector<LayerLook> looks_now_, looks_there_;  // by slot; what the device has
   std::vector<VoxelHalfSpace> half_spaces_now_, half_spaces_there_;
+  std::vector<VoxelCylinder> cylinders_now_, cylinders_there_;
   absl::flat_hash_map<uint64_t, uint32_t> layer_slots_;
   std::vector<uint32_t> free_layer_slots_;
 

@@ -123,7 +123,8 @@ absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
     if (geometry == nullptr || geometry->positions.empty() ||
-        IndexFor(geometry->record) == IndexedBy::kPairs) {
+        (IndexFor(geometry->record) == IndexedBy::kPairs &&
+         geometry->record.kind != PrimitiveKind::kFilled)) {
       continue;
     }
     if (geometry->positions.size() > 3 * kFewVertices || geometry->indices.size() > kFewVertices) {

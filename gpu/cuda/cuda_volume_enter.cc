@@ -133,6 +133,9 @@ TableEntry CudaVolume::EntryOf(const Drawable& d, WorkedOut& worked_out) const {
       entry.source.colors = view.colors.data();
       entry.source.map = map;
       entry.source.radius = RadiusOf(view.record, map);
+      if constexpr (std::is_same_v<Primitive, Filled>) {
+        Filled::Place(BoundsOf(d, map), /*tiles=*/1, entry.source.solid, entry.source.implicit);
+      }
     }
   });
   return entry;
@@ -140,6 +143,7 @@ TableEntry CudaVolume::EntryOf(const Drawable& d, WorkedOut& worked_out) const {
 
 absl::Status CudaVolume::Place(const WorkedOut& worked_out, TableEntry& entry, Slot& slot) {
   if (worked_out.cut != nullptr) return PlaceCut(*worked_out.cut, entry, slot);
+  if (entry.record.kind == PrimitiveKind::kFilled) return PlaceFilled(entry, slot);
   return worked_out.hoisted.empty() ? absl::OkStatus()
                                     : PlaceImplicit(worked_out.hoisted, entry, slot);
 }
@@ -163,6 +167,31 @@ absl::Status CudaVolume::PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot)
     entry.source.colors = slot.colors.as<uint32_t>();
   }
   return absl::OkStatus();
+}
+
+Box3 CudaVolume::BoundsOf(const Drawable& d, const Affine& map) const {
+  const auto* const arrays = static_cast<const DeviceArrays*>(d.geometry->memory.get());
+  const TileGrid& grid = tiles_.grid;
+  if (arrays == nullptr || !arrays->bounds) {
+    return {{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
+  }
+  return VoxelsAround(arrays->bounds->lo, arrays->bounds->hi, map, grid, 0);
+}
+
+absl::Status CudaVolume::PlaceFilled(TableEntry& entry, Slot& slot) {
+  const uint64_t bytes = InsideRows{entry.source.solid.bounds}.size() * sizeof(uint32_t);
+  if (bytes == 0 || list_budget_.KeepsTooMuch()) return absl::OkStatus();
+  absl::StatusOr<Block> block = list_budget_.pool.Acquire(bytes);
+  // Without room for it, tiles look at all triangles.
+  if (absl::IsResourceExhausted(block.status())) return absl::OkStatus();
+  if (!block.ok()) return block.status();
+  slot.inside = *std::move(block);
+  uint32_t* const inside = slot.inside.as<uint32_t>();
+  if (absl::Status status = device_.Zero(inside, bytes); !status.ok()) return status;
+  entry.source.inside = inside;
+  return device_.Run("FindInside", [&] {
+    return cuda::FindInside(entry.source, entry.record, inside, device_.stream());
+  });
 }
 
 absl::Status CudaVolume::PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry,

@@ -122,14 +122,10 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       place_after = gridDim.x + atomicAdd(view.taken, 1u);
     };
     if constexpr (kWhat == DrawWhat::kOneLayer) {
-      const VoxelHalfSpace* cut_by = nullptr;
-      uint32_t cutting = 0;
+      CutBy cut_by;
       if (view.clipped) {
         const RegionPlace place(view, scratch);
-        DrawLayers<kWhat>(view, place, all, [&] {
-          cutting = scratch.cutting;
-          cut_by = view.half_spaces + view.layers[scratch.layer].first_half_space;
-        });
+        DrawLayers<kWhat>(view, place, all, [&] { cut_by = CutBy::Of(view, scratch); });
       } else {
         // All batches are of the layer.
         for (uint32_t b = 0; b < view.lines.count; ++b) {
@@ -144,11 +140,11 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       ask_ahead();
       const RegionPlace place(view, scratch);
       // An erase's colour is 0.
-      if (cutting == 0) {
+      if (cut_by.cutting == 0) {
         Flush<kTo>(view, place, scratch, [](uint32_t word, uint32_t) { return word & kColorMask; });
       } else {
         Flush<kTo>(view, place, scratch, [&](uint32_t word, uint32_t v) {
-          return IsInsideAll(cut_by, cutting, place.box, v) ? word & kColorMask : 0;
+          return cut_by.Keeps(place.box, v) ? word & kColorMask : 0;
         });
       }
     } else {
@@ -158,15 +154,14 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       for (uint32_t j = 0; j < kRounds; ++j) colors[j] = 0;
       DrawLayers<kWhat>(view, place, all, [&] {
         const LayerLook look = view.layers[scratch.layer];
-        const uint32_t cutting = scratch.cutting;
-        const VoxelHalfSpace* const cut_by = view.half_spaces + look.first_half_space;
+        const CutBy cut_by = CutBy::Of(view, scratch);
 #pragma unroll
         for (uint32_t j = 0; j < kRounds; ++j) {
           const uint32_t v = threadIdx.x + j * kDrawThreads;
           const uint32_t word = scratch.words[v];
           scratch.words[v] = 0;
           if (word == 0) continue;
-          if (cutting != 0 && !IsInsideAll(cut_by, cutting, place.box, v)) continue;
+          if (cut_by.cutting != 0 && !cut_by.Keeps(place.box, v)) continue;
           colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
         }
       });

@@ -44,6 +44,7 @@ struct DrawView {
   const TableEntry* table = nullptr;
   const LayerLook* layers = nullptr;
   const VoxelHalfSpace* half_spaces = nullptr;
+  const VoxelCylinder* cylinders = nullptr;
   BatchList pairs;
   UnlistedItems unlisted;
   LineBatchList lines;
@@ -56,7 +57,7 @@ struct DrawView {
   SliceIndexView slices;
   PackedView packed;
   ReadView read;
-  bool clipped = true;  // of one layer alone: it has half-spaces
+  bool clipped = true;  // of one layer alone: it has half-spaces or cylinders
 };
 static_assert(sizeof(DrawView) <= 4096, "arguments have 4 KB");
 

@@ -2,6 +2,7 @@
 // also where there is no list of pairs.
 #pragma once
 
+#include "gpu/cuda/filled-inl.h"
 #include "gpu/cuda/implicit-inl.h"
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
@@ -18,6 +19,7 @@ struct PairScratch {
     SolidBlock solid;
     ImplicitScratch implicit;
     SampleScratch samples;
+    FilledScratch filled;
   };
 };
 
@@ -59,7 +61,7 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
 __device__ inline bool IsForBlock(PrimitiveKind kind) {
   return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
          kind == PrimitiveKind::kCylinder || kind == PrimitiveKind::kImplicit ||
-         kind == PrimitiveKind::kSamples;
+         kind == PrimitiveKind::kSamples || kind == PrimitiveKind::kFilled;
 }
 
 // A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
@@ -181,6 +183,9 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
       case PrimitiveKind::kSamples:
         DrawSamples(entry, box, words, scratch.samples);
         break;
+      case PrimitiveKind::kFilled:
+        DrawFilled(entry, box, words, scratch.filled);
+        break;
       default:
         break;
     }
@@ -206,6 +211,7 @@ __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t
       break;
     case PrimitiveKind::kImplicit:
     case PrimitiveKind::kSamples:
+    case PrimitiveKind::kFilled:
       bounds = BlockOf(entry.source, item);
       break;
     default:

@@ -196,8 +196,10 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
   return least;
 }
 
-// How the layer found lies to the region. By the first warp: a lane looks after a half-space.
-static_assert(kMaxHalfSpaces <= 32);
+// How the layer found lies to the region. By the first warp: a lane looks after a half-space, the last ones after
+// cylinders.
+constexpr uint32_t kFirstCylinder = 32 - kMaxClipCylinders;
+static_assert(kMaxHalfSpaces <= kFirstCylinder);
 __device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionScratch& scratch) {
   const uint32_t lane = threadIdx.x % 32;
   ClipSide side = ClipSide::kInside;
@@ -205,6 +207,10 @@ __device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionS
   if (scratch.layer != kAllLanes) {
     const LayerLook& look = view.layers[scratch.layer];
     if (lane < look.half_spaces) side = SideOf(view.half_spaces[look.first_half_space + lane], box);
+    const uint32_t cylinder = lane - kFirstCylinder;  // of other lanes more than there can be
+    if (cylinder < look.cylinders) {
+      side = SideOf(view.cylinders[look.first_cylinder + cylinder], box);
+    }
   }
   const uint32_t cutting = __ballot_sync(kAllLanes, side == ClipSide::kCut);
   const uint32_t outside = __ballot_sync(kAllLanes, side == ClipSide::kOutside);
@@ -214,18 +220,30 @@ __device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionS
   }
 }
 
-// Whether a voxel of the region (its place there) lies inside all half-spaces that cut it.
-__device__ inline bool IsInsideAll(const VoxelHalfSpace* half_spaces, uint32_t cutting,
-                                   const Box3& box, uint32_t v) {
-  for (; cutting != 0; cutting &= cutting - 1) {
-    if (!IsInside(half_spaces[__ffs(static_cast<int>(cutting)) - 1],
-                  box.lo[0] + static_cast<int32_t>(v & 31),
-                  box.lo[1] + static_cast<int32_t>(v >> 5 & 31),
-                  box.lo[2] + static_cast<int32_t>(v >> 10))) {
-      return false;
-    }
+// What cuts a region of what the layer found has: bits of ClipRegion, of these.
+struct CutBy {
+  const VoxelHalfSpace* half_spaces = nullptr;
+  const VoxelCylinder* cylinders = nullptr;
+  uint32_t cutting = 0;
+
+  __device__ static CutBy Of(const DrawView& view, const RegionScratch& scratch) {
+    const LayerLook& look = view.layers[scratch.layer];
+    return {view.half_spaces + look.first_half_space, view.cylinders + look.first_cylinder,
+            scratch.cutting};
   }
-  return true;
-}
+  // Whether a voxel of the region (its place there) lies inside all of it.
+  __device__ bool Keeps(const Box3& box, uint32_t v) const {
+    const int32_t x = box.lo[0] + static_cast<int32_t>(v & 31),
+                  y = box.lo[1] + static_cast<int32_t>(v >> 5 & 31),
+                  z = box.lo[2] + static_cast<int32_t>(v >> 10);
+    for (uint32_t left = cutting; left != 0; left &= left - 1) {
+      const uint32_t i = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
+      const bool inside = i < kFirstCylinder ? IsInside(half_spaces[i], x, y, z)
+                                             : IsInside(cylinders[i - kFirstCylinder], x, y, z);
+      if (!inside) return false;
+    }
+    return true;
+  }
+};
 
 }  // namespace voxeld::gpu::cuda

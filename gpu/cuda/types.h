@@ -39,8 +39,9 @@ struct LayerLook {
   uint32_t visible = 0;
   uint32_t opacity = 255;
   BlendMode blend = BlendMode::kOver;
-  // Its half-spaces (gpu/clip.h) in the array of all layers'; at most kMaxHalfSpaces.
+  // Its half-spaces and cylinders (gpu/clip.h) in the arrays of all layers'; at most kMaxHalfSpaces, kMaxClipCylinders.
   uint32_t first_half_space = 0, half_spaces = 0;
+  uint32_t first_cylinder = 0, cylinders = 0;
   bool operator==(const LayerLook&) const = default;
 };
 

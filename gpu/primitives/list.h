@@ -14,6 +14,7 @@
 
 #include "gpu/primitives/box.h"
 #include "gpu/primitives/cylinder.h"
+#include "gpu/primitives/filled.h"
 #include "gpu/primitives/implicit.h"
 #include "gpu/primitives/points.h"
 #include "gpu/primitives/samples.h"
@@ -45,6 +46,8 @@ VOXELD_HD decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
       return f(std::type_identity<Implicit>{});
     case PrimitiveKind::kSamples:
       return f(std::type_identity<Samples>{});
+    case PrimitiveKind::kFilled:
+      return f(std::type_identity<Filled>{});
   }
   __builtin_unreachable();  // ReadDelta lets no other kind in
 }

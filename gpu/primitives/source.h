@@ -42,8 +42,10 @@ struct Source {
   const uint32_t* colors = nullptr;   // record->vertex_count, with kPerVertex
   uint32_t tint = 0x00FFFFFF;         // DrawableRecord
   int64_t radius = 0;                 // of points and segments, units; 0: one voxel
-  Solid solid;                        // kBox, kSphere, kCylinder, kImplicit
-  ImplicitPlace implicit;             // kImplicit, whose program `indices` are
+  Solid solid;                        // kBox, kSphere, kCylinder, kImplicit; of kFilled the bounds
+  ImplicitPlace implicit;  // kImplicit, whose program `indices` are; of kFilled the blocks
+  const uint32_t* inside =
+      nullptr;  // kFilled: InsideRows (filled.h); null: found out anew each time
 
   // Corners are what indices name, or the vertices as they stand.
   VOXELD_HD uint32_t corners() const {

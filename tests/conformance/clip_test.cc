@@ -350,6 +350,9 @@ TEST_P(EngineClip, RandomPlanesUnderEveryKindOfViewEqualTheOracle) {
             v.a * m[0] + v.b * m[4] + v.c * m[8], v.a * m[1] + v.b * m[5] + v.c * m[9],
             v.a * m[2] + v.b * m[6] + v.c * m[10], v.d + v.a * m[3] + v.b * m[7] + v.c * m[11]};
       }
+      for (uint32_t k = 0; k < layer.cylinder_count; ++k) {
+        layer.cylinders[k].unit = Compose(back, layer.cylinders[k].unit);
+      }
       if (layer.has_region != 0) {
         const Region v = layer.region;
         const Point3d p = Map(back, v.min[0], v.min[1], v.min[2]);
@@ -360,7 +363,7 @@ TEST_P(EngineClip, RandomPlanesUnderEveryKindOfViewEqualTheOracle) {
       const OracleClip clip(layer, target);
       for (int64_t v = 0; v < int64_t{grid.nx} * grid.ny * grid.nz; ++v) {
         clip.Has(v % grid.nx, v / grid.nx % grid.ny, v / grid.nx / grid.ny);
-        verdicts += layer.plane_count + 6 * layer.has_region;
+        verdicts += layer.plane_count + layer.cylinder_count + 6 * layer.has_region;
       }
       near += clip.near();
     }
@@ -372,7 +375,9 @@ TEST_P(EngineClip, RandomPlanesUnderEveryKindOfViewEqualTheOracle) {
     ExpectLikeOracle(engine, scene, target);
     if (HasFatalFailure()) return;
     lit += CountLit(engine.Voxels());
-    for (auto& [id, layer] : scene.layers) layer.plane_count = layer.has_region = 0;
+    for (auto& [id, layer] : scene.layers) {
+      layer.plane_count = layer.cylinder_count = layer.has_region = 0;
+    }
     unclipped += CountLit(OracleVoxels(scene, target).rgb);
   }
   std::cout << lit << " voxels lit, without clips " << unclipped << "; of " << verdicts

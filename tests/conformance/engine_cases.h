@@ -40,7 +40,7 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few) {
   tight.index_bytes = 1;
   passes.index_bytes = 1 << 20;
   passes.index_share_kept = 0;
-  if (few) return {tuned("_groups", groups), tuned("_passes", passes)};
+  if (few) return {tuned("_passes", passes)};
   return {tuned("", {}), tuned("_groups", groups), tuned("_tight", tight),
           tuned("_passes", passes)};
 }

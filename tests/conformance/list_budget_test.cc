@@ -176,11 +176,7 @@ const Kind kKinds[] = {
 };
 
 // Of a budget, what may be kept.
-#if defined(VOXELD_TEST_SIMT_FEW)
-constexpr double kShares[] = {0.5};
-#else
 constexpr double kShares[] = {0.0, 0.5};
-#endif
 
 class ListBudgetOf : public testing::TestWithParam<Kind> {
  protected:

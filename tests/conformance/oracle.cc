@@ -206,6 +206,12 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
           {{at[i], at[i + 1], at[i + 2]}, {colors[i], colors[i + 1], colors[i + 2]}, record.rule},
           grid, plot);
     }
+  } else if (record.kind == PrimitiveKind::kFilled) {
+    std::vector<OracleTriangle> triangles;
+    for (size_t i = 0; i < corners; i += 3) {
+      triangles.push_back({{at[i], at[i + 1], at[i + 2]}, {colors[i], colors[i], colors[i]}, {}});
+    }
+    PlotFilled(triangles, grid, plot);
   } else if (record.topology == Topology::kList) {
     for (size_t i = 0; i < corners; i += 2) segment(i, i + 1);
   } else {

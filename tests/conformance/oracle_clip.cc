@@ -89,6 +89,9 @@ OracleClip::OracleClip(const LayerRecord& layer, const Target& target) {
   // Four times the error that gpu/clip.h states for the rounding: there are doubles before it.
   least_distance_ = std::ldexp(static_cast<long double>(grid.nx + grid.ny + grid.nz + 1), -36);
   invertible_ = Invert(target.view, inverse_);
+  for (uint32_t i = 0; i < layer.cylinder_count; ++i) {
+    cylinders_.push_back(CylinderOf(layer.cylinders[i], target.view));
+  }
   std::vector<std::vector<double>> scene;
   for (uint32_t i = 0; i < layer.plane_count; ++i) {
     const ClipPlane& p = layer.planes[i];
@@ -118,6 +121,60 @@ OracleClip::OracleClip(const LayerRecord& layer, const Target& target) {
   }
 }
 
+// The published rounding: the inverse of view ∘ unit by cofactors, in doubles.
+OracleClip::Cylinder OracleClip::CylinderOf(const ClipCylinder& cylinder, const Affine& view) {
+  Cylinder out;
+  double m[3][4];
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 4; ++c) {
+      double sum = view.m[r * 4] * cylinder.unit.m[c];
+      sum = sum + view.m[r * 4 + 1] * cylinder.unit.m[4 + c];
+      sum = sum + view.m[r * 4 + 2] * cylinder.unit.m[8 + c];
+      m[r][c] = c == 3 ? sum + view.m[r * 4 + 3] : sum;
+    }
+  }
+  const double determinant = (m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                              m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])) +
+                             m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  const int next[3] = {1, 2, 0}, last[3] = {2, 0, 1};
+  bool is_finite = determinant != 0;
+  for (int r = 0; r < 2; ++r) {
+    double base = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double cofactor =
+          m[next[c]][next[r]] * m[last[c]][last[r]] - m[next[c]][last[r]] * m[last[c]][next[r]];
+      const double inverse = cofactor / determinant;
+      out.rounded[r][c] = inverse * 0.5;
+      base -= inverse * m[c][3];
+      is_finite = is_finite && std::isfinite(inverse) && std::isfinite(base);
+    }
+    out.rounded[r][3] = base;
+  }
+  out.exists = is_finite && Invert(cylinder.unit, out.inverse);
+  return out;
+}
+
+bool OracleClip::IsInside(const Cylinder& cylinder, const long double scene[3], int64_t x,
+                          int64_t y, int64_t z) const {
+  long double square = 0;
+  for (int r = 0; r < 2; ++r) {
+    long double q = cylinder.inverse[r][3];
+    for (int c = 0; c < 3; ++c) q += cylinder.inverse[r][c] * scene[c];
+    square += q * q;
+  }
+  if (std::fabs(square - 1) > 1e-6L) return square < 1;
+  ++near_;
+  double rounded = 0;
+  for (const double* row : {cylinder.rounded[0], cylinder.rounded[1]}) {
+    double q = row[0] * static_cast<double>(2 * x + 1);
+    q = q + row[1] * static_cast<double>(2 * y + 1);
+    q = q + row[2] * static_cast<double>(2 * z + 1);
+    q = q + row[3];
+    rounded = rounded + q * q;
+  }
+  return rounded <= 1;
+}
+
 bool OracleClip::IsInside(const Plane& plane, const long double scene[3], int64_t x, int64_t y,
                           int64_t z) const {
   const long double value = plane.scene[0] * scene[0] + plane.scene[1] * scene[1] +
@@ -130,7 +187,7 @@ bool OracleClip::IsInside(const Plane& plane, const long double scene[3], int64_
 }
 
 bool OracleClip::Has(int64_t x, int64_t y, int64_t z) const {
-  if (planes_.empty()) return true;
+  if (planes_.empty() && cylinders_.empty()) return true;
   if (!invertible_) return false;
   const long double centre[3] = {static_cast<long double>(x) + 0.5L,
                                  static_cast<long double>(y) + 0.5L,
@@ -139,6 +196,9 @@ bool OracleClip::Has(int64_t x, int64_t y, int64_t z) const {
   for (int r = 0; r < 3; ++r) {
     scene[r] = inverse_[r][3];
     for (int c = 0; c < 3; ++c) scene[r] += inverse_[r][c] * centre[c];
+  }
+  for (const Cylinder& cylinder : cylinders_) {
+    if (!cylinder.exists || !IsInside(cylinder, scene, x, y, z)) return false;
   }
   return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
     return plane.exists && IsInside(plane, scene, x, y, z);

@@ -29,6 +29,15 @@ class OracleClip {
     bool exists = false;    // in voxel space
   };
 
+  struct Cylinder {
+    long double inverse[3][4];  // scene → where it is x² + y² ≤ 1
+    double rounded[2][4];       // of half voxels
+    bool exists = false;        // in voxel space
+  };
+
+  static Cylinder CylinderOf(const ClipCylinder& cylinder, const Affine& view);
+  bool IsInside(const Cylinder& cylinder, const long double scene[3], int64_t x, int64_t y,
+                int64_t z) const;
   bool IsInside(const Plane& plane, const long double scene[3], int64_t x, int64_t y,
                 int64_t z) const;
 
@@ -36,6 +45,7 @@ class OracleClip {
   long double inverse_[3][4] = {};  // voxel space → scene
   long double least_distance_ = 0;  // in voxels: nearer, rounding may decide
   std::vector<Plane> planes_;
+  std::vector<Cylinder> cylinders_;
   mutable uint64_t near_ = 0;
 };
 

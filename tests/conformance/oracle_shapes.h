@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 
 #include "gpu/delta.h"
 #include "tests/conformance/oracle.h"
@@ -65,6 +66,8 @@ void PlotImplicit(const ModelGeometry& g, const Affine& map, const DenseVolume& 
                   const Plot& plot);
 void PlotSamples(const ModelGeometry& g, const Affine& map, const DenseVolume& grid,
                  const Plot& plot);
+void PlotFilled(std::span<const OracleTriangle> triangles, const DenseVolume& grid,
+                const Plot& plot);
 // `map`: geometry → voxel space.
 void PlotSolid(const GeometryRecord& g, const Affine& map, const DenseVolume& grid,
                const Plot& plot);

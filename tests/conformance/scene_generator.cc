@@ -197,11 +197,22 @@ void SceneGenerator::AddControlPoints(ModelGeometry& g, int size) {
   for (uint32_t i = 0; i < r.vertex_count; ++i) g.colors.push_back(RandomColor());
 }
 
+// Closed, and now and then one in the other.
+void SceneGenerator::AddTetrahedra(ModelGeometry& g, int size) {
+  constexpr uint32_t kFaces[] = {0, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0};
+  const uint32_t count = static_cast<uint32_t>(Int(1, 3));
+  AddVertices(g, 4 * count, size);
+  for (uint32_t i = 0; i < count; ++i) {
+    for (const uint32_t corner : kFaces) g.indices.push_back(i * 4 + corner);
+  }
+  g.record.index_count = static_cast<uint32_t>(g.indices.size());
+}
+
 ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   ModelGeometry g;
   GeometryRecord& r = g.record;
   r.id = id;
-  r.kind = static_cast<PrimitiveKind>(Int(1, 10));
+  r.kind = static_cast<PrimitiveKind>(Int(1, 11));
   r.color = RandomColor();
   r.sampling = static_cast<LineSampling>(Int(0, 2));
   r.rule = static_cast<SurfaceRule>(Int(0, 1));
@@ -232,8 +243,13 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
     AddControlPoints(g, size);
     return g;
   }
+  const bool filled = r.kind == PrimitiveKind::kFilled;
+  if (filled && Chance(0.7)) {
+    AddTetrahedra(g, size);
+    return g;
+  }
   uint32_t corners = static_cast<uint32_t>(Int(0, 4));
-  if (r.kind == PrimitiveKind::kTriangles) corners *= 3;
+  if (r.kind == PrimitiveKind::kTriangles || filled) corners *= 3;
   if (r.kind == PrimitiveKind::kSegments && r.topology == Topology::kList) corners *= 2;
   const bool indexed = corners > 0 && Chance(0.4);
   AddVertices(g, indexed ? static_cast<uint32_t>(Int(1, 8)) : corners, size);
@@ -243,7 +259,7 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
       g.indices.push_back(static_cast<uint32_t>(Int(0, r.vertex_count - 1)));
     }
   }
-  if (Chance(0.5)) {
+  if (!filled && Chance(0.5)) {
     r.color_mode = ColorMode::kPerVertex;
     for (uint32_t i = 0; i < r.vertex_count; ++i) g.colors.push_back(RandomColor());
   }
@@ -293,10 +309,28 @@ ClipPlane SceneGenerator::RandomPlane(int size) {
   return {n[0], n[1], n[2], d};
 }
 
+// Along any axis, round or not.
+ClipCylinder SceneGenerator::RandomCylinder(int size) {
+  ClipCylinder cylinder;
+  double* const m = cylinder.unit.m;
+  do {
+    for (int i = 0; i < 12; ++i) {
+      m[i] = i % 4 == 3 ? RandomCoordinate(size) : Real(-1, 1) * size * (Chance(0.3) ? 1 : 0.5);
+    }
+    if (Chance(0.3)) m[1] = m[2] = m[4] = m[6] = m[8] = m[9] = 0;
+  } while (std::fabs(Determinant(cylinder.unit)) < 0.02 * size * size * size);
+  if (Chance(0.03)) m[0] = m[4] = m[8] = 0;
+  return cylinder;
+}
+
 void SceneGenerator::RandomClip(LayerRecord& l, int size) {
   if (Chance(0.35)) {
     l.plane_count = static_cast<uint32_t>(Chance(0.8) ? Int(1, 2) : Int(1, kMaxClipPlanes));
     for (uint32_t i = 0; i < l.plane_count; ++i) l.planes[i] = RandomPlane(size);
+  }
+  if (Chance(0.25)) {
+    l.cylinder_count = static_cast<uint32_t>(Chance(0.7) ? 1 : Int(2, kMaxClipCylinders));
+    for (uint32_t i = 0; i < l.cylinder_count; ++i) l.cylinders[i] = RandomCylinder(size);
   }
   if (!Chance(0.25)) return;
   l.has_region = 1;
@@ -381,6 +415,7 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
       const uint64_t id = Chance(0.2) ? next_id_++ : RandomId(scene.layers);
       if (scene.layers.contains(id) && Chance(0.4)) {  // where it is drawn, alone
         scene.layers[id].plane_count = scene.layers[id].has_region = 0;
+        scene.layers[id].cylinder_count = 0;
         RandomClip(scene.layers[id], 20);
       } else {
         scene.layers[id] = RandomLayer(id);

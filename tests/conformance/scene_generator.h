@@ -42,12 +42,14 @@ class SceneGenerator {
   display::VoxelGrid RandomGrid(const display::Geometry& geometry);
   LayerRecord RandomLayer(uint64_t id);
   ClipPlane RandomPlane(int size);
+  ClipCylinder RandomCylinder(int size);
   void RandomClip(LayerRecord& layer, int size);
   ModelGeometry RandomGeometry(uint64_t id, int size);
   DrawableRecord RandomDrawable(uint64_t id, const SceneModel& scene, int size);
   Affine RandomTransform(int size);
   void AddVertices(ModelGeometry& g, uint32_t count, int size);
   void AddControlPoints(ModelGeometry& g, int size);
+  void AddTetrahedra(ModelGeometry& g, int size);
   double RandomCoordinate(int size);
   uint64_t RandomId(const auto& map);
 

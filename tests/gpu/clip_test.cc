@@ -139,6 +139,63 @@ TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxels) {
   for (int count : sides) EXPECT_GT(count, 1000);
 }
 
+// What is computed keeps order, so boxes that lie by a cylinder's side all the same are known.
+TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxelsForCylindersToo) {
+  int sides[3] = {};
+  for (int i = 0; i < 20000; ++i) {
+    Box3 box;
+    for (int a = 0; a < 3; ++a) {
+      box.lo[a] = Int(0, 20);
+      box.hi[a] = box.lo[a] + Int(1, 5);
+    }
+    LayerRecord layer;
+    layer.cylinder_count = 1;
+    double* const m = layer.cylinders[0].unit.m;
+    for (int k = 0; k < 12; ++k) m[k] = k % 4 == 3 ? Real(0, 24) : Real(-12, 12);
+    if (i % 3 == 0) m[2] = m[6] = m[8] = m[9] = 0, m[10] = 1;  // along z
+    const VoxelClip clip = MapClip(layer, {});
+    ASSERT_EQ(clip.cylinder_count, 1u);
+    int inside = 0, all = 0;
+    for (int32_t x = box.lo[0]; x < box.hi[0]; ++x) {
+      for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
+        for (int32_t z = box.lo[2]; z < box.hi[2]; ++z, ++all) {
+          inside += IsInside(clip.cylinders[0], x, y, z);
+        }
+      }
+    }
+    const ClipSide side = SideOf(clip.cylinders[0], box);
+    ++sides[static_cast<int>(side)];
+    // Of boxes that touch it near a corner of its own the side is not known, only that they may be cut.
+    if (side == ClipSide::kInside) {
+      ASSERT_EQ(inside, all);
+    } else if (side == ClipSide::kOutside) {
+      ASSERT_EQ(inside, 0);
+    }
+  }
+  for (int count : sides) EXPECT_GT(count, 500);
+}
+
+TEST(Clip, CylindersAreAsWorkedOutByHand) {
+  LayerRecord layer;
+  layer.cylinder_count = 1;
+  layer.cylinders[0].unit = {
+      {3, 0, 0, 4.5, 0, 3, 0, 4.5, 0, 0, 1, 0}};  // of radius 3 around (4.5, 4.5)
+  Affine view;
+  view.m[11] = 100;  // along its axis: nothing changes
+  const VoxelClip clip = MapClip(layer, view);
+  EXPECT_EQ(clip.count, 0u);
+  const VoxelCylinder& c = clip.cylinders[0];
+  EXPECT_TRUE(IsInside(c, 4, 4, 0));
+  EXPECT_TRUE(IsInside(c, 7, 4, 200)) << "on its side";
+  EXPECT_TRUE(IsInside(c, 6, 6, 5));
+  EXPECT_FALSE(IsInside(c, 7, 5, 5));
+  EXPECT_FALSE(IsInside(c, 8, 4, 5));
+  layer.cylinders[0].unit.m[0] = 0;
+  const VoxelClip none = MapClip(layer, view);
+  EXPECT_FALSE(IsInside(none.cylinders[0], 4, 4, 0));
+  EXPECT_EQ(SideOf(none.cylinders[0], {{0, 0, 0}, {16, 16, 16}}), ClipSide::kOutside);
+}
+
 // In the greatest grid, the error that clip.h states: centres at that distance and more are where
 // the plane itself has them.
 TEST_F(RandomClip, RoundingMovesAPlaneByNoMoreThanStated) {

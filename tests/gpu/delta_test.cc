@@ -204,7 +204,7 @@ TEST(Delta, SizesAreAsCountedByHand) {
   EXPECT_EQ(DeltaWriter::SizeOf(Mesh()), 208u);
   EXPECT_EQ(DeltaWriter::SizeOf(GeometryRecord{}), 112u);
   EXPECT_EQ(DeltaWriter::SizeOf(DrawableRecord{}), 160u);
-  EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 448u);
+  EXPECT_EQ(DeltaWriter::SizeOf(LayerRecord{}), 1232u);
   EXPECT_EQ(DeltaWriter::kSizeOfId, 32u);
   EXPECT_EQ(DeltaWriter::kSizeOfReset, 16u);
 }
@@ -313,7 +313,7 @@ TEST(Delta, AnOverrunIsCountedAndNotWritten) {
   DeltaWriter writer(block.bytes().first(32));
   writer.PutLayer({.id = 1});
   EXPECT_TRUE(writer.overrun());
-  EXPECT_EQ(writer.size(), 448u);
+  EXPECT_EQ(writer.size(), 1232u);
   for (std::byte b : block.bytes().last(16)) EXPECT_EQ(b, std::byte{0xEE});
 }
 
@@ -350,12 +350,14 @@ TEST(Delta, RefusesGeometriesThatDoNotHoldTogether) {
   };
   EXPECT_TRUE(ReadGeometryWith([](GeometryRecord&) {}).ok());
   using G = GeometryRecord;
-  EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(11); }),
-              HasSubstr("record at byte 0: geometry.kind is 11, must be 1 to 10"));
+  EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(12); }),
+              HasSubstr("record at byte 0: geometry.kind is 12, must be 1 to 11"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kCurves; }),
               HasSubstr("index_count is 6, must be 0 for curves"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kSamples; }),
               HasSubstr("must be 0 for samples"));
+  EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kFilled; }),
+              HasSubstr("color_mode is 1, must be 0 for a filled mesh"));
   EXPECT_THAT(message([](G& g) { g.splat = static_cast<Splat>(3); }),
               HasSubstr("splat is 3, must be 0 to 2"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kImplicit; }),
@@ -441,7 +443,8 @@ TEST(Delta, RefusesBadDrawablesAndLayers) {
   EXPECT_THAT(layer({.visible = 2}), HasSubstr("layer.visible is 2"));
   EXPECT_THAT(layer({.opacity = 256}), HasSubstr("layer.opacity is 256, must be 0 to 255"));
   EXPECT_THAT(layer({.blend = static_cast<BlendMode>(3)}), HasSubstr("layer.blend is 3"));
-  EXPECT_THAT(layer({.plane_count = 9}), HasSubstr("layer.plane_count is 9, must be 0 to 8"));
+  EXPECT_THAT(layer({.plane_count = 21}), HasSubstr("layer.plane_count is 21, must be 0 to 20"));
+  EXPECT_THAT(layer({.cylinder_count = 5}), HasSubstr("layer.cylinder_count is 5, must be 0 to 4"));
   EXPECT_THAT(layer({.has_region = 2}), HasSubstr("layer.has_region is 2, must be 0 to 1"));
   LayerRecord clipped{.plane_count = 2};
   clipped.planes[0] = {0, 0, 1, -7};

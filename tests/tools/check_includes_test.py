@@ -11,7 +11,7 @@ import check_includes  # noqa: E402
 
 
 def wrong(path, *lines):
-    return check_includes.wrong_includes(path, list(lines))
+    return check_includes.wrong_includes(path, list(lines), own_header=lambda header: False)
 
 
 class CheckIncludesTest(unittest.TestCase):
@@ -23,6 +23,13 @@ class CheckIncludesTest(unittest.TestCase):
     def test_quotes_that_point_the_wrong_way_are_found(self):
         self.assertEqual(wrong("gpu/a.cc", "", '#include "daemon/core/core.h"'),
                          ["gpu/a.cc:2: gpu must not include daemon/core/core.h"])
+
+    def test_a_files_own_header_comes_first(self):
+        lines = ["#include <vector>", '#include "gpu/a.h"']
+        self.assertEqual(check_includes.wrong_includes("gpu/a.cc", lines, lambda path: path == "gpu/a.h"),
+                         ["gpu/a.cc:1: gpu/a.h comes first, so that it is known to stand alone"])
+        self.assertEqual(check_includes.wrong_includes("gpu/a.cc", lines[::-1], lambda path: True), [])
+        self.assertEqual(check_includes.wrong_includes("gpu/a.cc", lines, lambda path: False), [])
 
     def test_angle_brackets_that_point_the_wrong_way_are_found(self):
         self.assertEqual(wrong("gpu/a.cc", "#include <daemon/core/core.h>"),

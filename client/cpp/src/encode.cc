@@ -95,6 +95,31 @@ void AppendAffine(int field, const Affine& affine, std::string* out) {
   AppendPresentBytes(field, inner, out);
 }
 
+void AppendClipPart(const HalfSpace& half, std::string* out) {
+  std::string plane;
+  AppendDouble(v1::Clip::Plane::kAFieldNumber, half.a, &plane);
+  AppendDouble(v1::Clip::Plane::kBFieldNumber, half.b, &plane);
+  AppendDouble(v1::Clip::Plane::kCFieldNumber, half.c, &plane);
+  AppendDouble(v1::Clip::Plane::kDFieldNumber, half.d, &plane);
+  AppendPresentBytes(v1::Clip::kPlanesFieldNumber, plane, out);
+}
+
+void AppendClipPart(const ClipBox& in, std::string* out) {
+  std::string box;
+  AppendVec3(v1::Clip::Box::kCenterFieldNumber, in.center, &box);
+  AppendVec3(v1::Clip::Box::kSizeFieldNumber, in.size, &box);
+  AppendAffine(v1::Clip::Box::kTransformFieldNumber, in.transform, &box);
+  AppendPresentBytes(v1::Clip::kBoxesFieldNumber, box, out);
+}
+
+void AppendClipPart(const ClipCylinder& in, std::string* out) {
+  std::string cylinder;
+  AppendVec3(v1::Clip::Cylinder::kStartFieldNumber, in.start, &cylinder);
+  AppendVec3(v1::Clip::Cylinder::kEndFieldNumber, in.end, &cylinder);
+  AppendDouble(v1::Clip::Cylinder::kRadiusFieldNumber, in.radius, &cylinder);
+  AppendPresentBytes(v1::Clip::kCylindersFieldNumber, cylinder, out);
+}
+
 void AppendThickness(int field, const Thickness& thickness, std::string* out) {
   std::string inner;
   AppendFloat(v1::Thickness::kValueFieldNumber, thickness.value, &inner);
@@ -348,16 +373,11 @@ struct OperationEncoder {
     if (look.transform)
       AppendAffine(v1::LayerState::kTransformFieldNumber, *look.transform, &fields);
     if (look.clip) {
-      std::string planes;
-      for (const HalfSpace& half : *look.clip) {
-        std::string plane;
-        AppendDouble(v1::Clip::Plane::kAFieldNumber, half.a, &plane);
-        AppendDouble(v1::Clip::Plane::kBFieldNumber, half.b, &plane);
-        AppendDouble(v1::Clip::Plane::kCFieldNumber, half.c, &plane);
-        AppendDouble(v1::Clip::Plane::kDFieldNumber, half.d, &plane);
-        AppendPresentBytes(v1::Clip::kPlanesFieldNumber, plane, &planes);
+      std::string parts;
+      for (const ClipPart& part : *look.clip) {
+        std::visit([&](const auto& it) { AppendClipPart(it, &parts); }, part);
       }
-      AppendPresentBytes(v1::LayerState::kClipFieldNumber, planes, &fields);
+      AppendPresentBytes(v1::LayerState::kClipFieldNumber, parts, &fields);
     }
     if (look.region) {
       std::string corners;

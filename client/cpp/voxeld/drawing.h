@@ -215,6 +215,20 @@ struct HalfSpace {
   double a = 0, b = 0, c = 0, d = 0;
 };
 
+// A box under a transform (box → scene); all sizes are greater than 0.
+struct ClipBox {
+  Vec3 center, size;
+  Affine transform;
+};
+
+// Round, from one point to another, its ends flat.
+struct ClipCylinder {
+  Vec3 start, end;
+  double radius = 0;  // greater than 0
+};
+
+using ClipPart = std::variant<HalfSpace, ClipBox, ClipCylinder>;
+
 // What is set is changed; the rest stays as it was.
 struct LayerLook {
   std::optional<bool> visible;
@@ -223,7 +237,7 @@ struct LayerLook {
   std::optional<Blend> blend;
   std::optional<Affine> transform;
   // Only what lies in all of these and in the region is drawn. An empty list takes the former away.
-  std::optional<std::vector<HalfSpace>> clip;
+  std::optional<std::vector<ClipPart>> clip;
   std::optional<Region> region;
 };
 

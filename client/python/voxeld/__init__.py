@@ -5,6 +5,7 @@
     v.lines("axes", [[-1, 0, 0], [1, 0, 0]], colors="tab:orange")
 """
 from . import aio
+from .clip import ClipBox, ClipCylinder
 from .colors import Gradient
 from .connection import Connection, connect
 from .errors import (BufferFull, CommitDropped, CommitRefused, ConnectionLost, InvalidArray, InvalidColor, InvalidValue,
@@ -18,6 +19,6 @@ from .volumes import Volume
 __version__ = "0.1.0"
 
 __all__ = [
-    "Accepted", "BufferFull", "ChangeSet", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Frame",
+    "Accepted", "BufferFull", "ChangeSet", "ClipBox", "ClipCylinder", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Frame",
     "FrameBlock", "Gradient", "Handle", "InvalidArray", "InvalidColor", "InvalidValue", "Issue", "Layer", "ObjectBlock", "Outcome",
     "Stages", "VoxelError", "Volume", "aio", "connect", "identity", "rotate", "scale", "translate"]

@@ -15,6 +15,7 @@ from typing import Any, Callable, Iterator, Mapping, Optional, Sequence, Union
 import numpy.typing as npt
 
 from . import address, operations, picture, transforms
+from .clip import ClipPart
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue, VoxelError
 from .handles import FrameBlock, Handle, Layer, ObjectBlock
@@ -111,7 +112,7 @@ class BaseConnection(Draw[Handle]):
 
     def layer(self, name: str, *, visible: Optional[bool] = None, opacity: Optional[float] = None,
               order: Optional[int] = None, blend: Optional[str] = None, transform: Optional[npt.ArrayLike] = None,
-              clip: Optional[Sequence[npt.ArrayLike]] = None,
+              clip: Optional[Sequence[ClipPart]] = None,
               region: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, mask: Optional[str] = None) -> Layer:
         """The layer of that name, to draw in; it is made when it is first drawn in or set. See Layer.set()."""
         layer = Layer(self, name)

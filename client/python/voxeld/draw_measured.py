@@ -8,6 +8,7 @@ import numpy.typing as npt
 from . import measured, wire
 from .colors import Colors
 from .look import Look
+from .measured import Formula
 
 Drawn = TypeVar("Drawn", covariant=True)
 Make = Callable[..., list[wire.Packed]]
@@ -78,14 +79,14 @@ class DrawMeasured(Generic[Drawn]):
         return self._draw(name, measured.height_map, (heights,),
                           dict(corner=corner, edges=edges, up=up, colors=colors, cmap=cmap, rule=rule), Look.of(**look))
 
-    def implicit(self, name: str, surface: str, *, bound: Optional[str] = None, boundary: Optional[Curves] = None,
+    def implicit(self, name: str, surface: Formula, *, bound: Optional[Formula] = None, boundary: Optional[Curves] = None,
                  boundary_axis: str = "z", parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None,
                  rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
                  domain: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, color: Optional[Colors] = None,
-                 rgb: Optional[tuple[str, str, str]] = None, level: Optional[str] = None, cmap: Optional[str] = None,
+                 rgb: Optional[tuple[Formula, Formula, Formula]] = None, level: Optional[Formula] = None, cmap: Optional[str] = None,
                  **look: Any) -> Drawn:
         """The general method: where `surface`, an expression in x, y and z, is 0; or, as an inequality, where it is true;
-        as in "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1". `bound` is a condition besides, and `boundary` closed curves,
+        as in "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1", or computed with (voxeld.expressions). `bound` is a condition besides, and `boundary` closed curves,
         projected along an axis. Names in expressions are `parameters`. `rgb` are expressions from 0 to 1, `level` one whose
         colour `cmap` gives."""
         return self._draw(name, measured.implicit, (surface,),

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Type
 
 import numpy.typing as npt
 
+from . import clip as clips
 from . import operations, shapes, transforms, wire
-from .arrays import as_array, number, vector
+from .arrays import number, vector
 from .colors import numbers_each
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue
@@ -101,10 +102,11 @@ class Layer(Draw[Handle]):
 
     def set(self, *, visible: Optional[bool] = None, opacity: Optional[float] = None, order: Optional[int] = None,
             blend: Optional[str] = None, transform: Optional[npt.ArrayLike] = None,
-            clip: Optional[Sequence[npt.ArrayLike]] = None,
+            clip: Optional[Sequence[clips.ClipPart]] = None,
             region: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, mask: Optional[str] = None) -> Optional[Frame]:
         """Sets what is given. `opacity`: 0 to 1. `order`: the higher is drawn over the lower. `blend`: "over", "add" or
-        "erase". `clip`: half-spaces (a, b, c, d) that keep a·x + b·y + c·z + d ≥ 0. `region`: two corners of a box."""
+        "erase". `clip`: planes (a, b, c, d) that keep a·x + b·y + c·z + d ≥ 0, ClipBox, ClipCylinder: what lies in all
+        of them is drawn. `region`: two corners of a box."""
         state = pb.LayerState(layer=self.name)
         if visible is not None:
             state.visible = visible
@@ -119,13 +121,7 @@ class Layer(Draw[Handle]):
         if transform is not None:
             state.transform.CopyFrom(transforms.to_wire(transforms.as_matrix(transform)))
         if clip is not None:
-            state.clip.CopyFrom(pb.Clip())
-            for plane in clip:
-                four = as_array(plane, "clip")
-                if four.shape != (4,):
-                    raise InvalidValue(f"a clip plane is four numbers (a, b, c, d), got shape {four.shape}")
-                a, b, c = vector(four[:3], "the clip plane's normal")
-                state.clip.planes.add(a=a, b=b, c=c, d=number(four[3], "the clip plane's distance"))
+            state.clip.CopyFrom(clips.to_wire(clip))
         if region is not None:
             low, high = vector(region[0], "region[0]"), vector(region[1], "region[1]")
             state.region.min.CopyFrom(types_pb2.Vec3(x=low[0], y=low[1], z=low[2]))

@@ -11,11 +11,13 @@ from . import wire
 from .arrays import as_array, number, positions, require_finite, vector
 from .colors import Colors
 from .errors import InvalidArray, InvalidValue
+from .expressions import Expression
 from .shapes import FILLS, PIECE_BYTES, RULES, choice, solid, thickness, vec
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
 Color = Optional[Colors]
+Formula = Union[str, Expression]
 
 _AXES = {"z": pb.Boundary.Z, "x": pb.Boundary.X, "y": pb.Boundary.Y}
 
@@ -133,14 +135,14 @@ def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
     return result
 
 
-def implicit(surface: str, *, bound: Optional[str] = None,
+def implicit(surface: Formula, *, bound: Optional[Formula] = None,
              boundary: Union[None, npt.ArrayLike, Sequence[npt.ArrayLike]] = None, boundary_axis: str = "z",
              parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None, rule: str = "thin",
              shell: Optional[float] = None, unit: str = "voxels",
              domain: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, color: Color = None,
-             rgb: Optional[tuple[str, str, str]] = None, level: Optional[str] = None,
+             rgb: Optional[tuple[Formula, Formula, Formula]] = None, level: Optional[Formula] = None,
              cmap: Optional[str] = None) -> list[wire.Packed]:
-    if not isinstance(surface, str) or not surface.strip():
+    if not isinstance(surface, Expression) and (not isinstance(surface, str) or not surface.strip()):
         raise InvalidValue(f"the surface is {surface!r}; give an expression, such as 'x^2 + y^2 + z^2 <= 1'")
     if (level is None) != (cmap is None):
         raise InvalidValue(f"level is {level!r} and cmap is {cmap!r}; each goes with the other")
@@ -170,5 +172,5 @@ def implicit(surface: str, *, bound: Optional[str] = None,
     return solid(color, implicit=shape)
 
 
-def _text(text: str) -> pb.Expression:
-    return pb.Expression(text=text)
+def _text(formula: Formula) -> pb.Expression:
+    return formula.to_wire() if isinstance(formula, Expression) else pb.Expression(text=formula)

@@ -199,17 +199,24 @@ TEST(Encode, Operations) {
     EXPECT_TRUE(request.layer_state().has_transform());
   }
 
-  request = Parse(
-      EncodeOperation(LayerOperation{"l",
-                                     {.clip = std::vector<HalfSpace>{{1, 0, 0, 0.5}, {0, -2, 3, 0}},
-                                      .region = Region{.min = {-1, -2, -3}, .max = {1, 0, 3}}}}));
+  request = Parse(EncodeOperation(
+      LayerOperation{"l",
+                     {.clip = std::vector<ClipPart>{HalfSpace{1, 0, 0, 0.5}, HalfSpace{0, -2, 3, 0},
+                                                    ClipBox{{1, 2, 3}, {4, 5, 6}, {}},
+                                                    ClipCylinder{{0, 0, -1}, {0, 0, 1}, 2.5}},
+                      .region = Region{.min = {-1, -2, -3}, .max = {1, 0, 3}}}}));
+  ASSERT_EQ(request.layer_state().clip().boxes_size(), 1);
+  EXPECT_EQ(request.layer_state().clip().boxes(0).size().z(), 6);
+  ASSERT_EQ(request.layer_state().clip().cylinders_size(), 1);
+  EXPECT_EQ(request.layer_state().clip().cylinders(0).end().z(), 1);
+  EXPECT_EQ(request.layer_state().clip().cylinders(0).radius(), 2.5);
   ASSERT_EQ(request.layer_state().clip().planes_size(), 2);
   EXPECT_EQ(request.layer_state().clip().planes(0).d(), 0.5);
   EXPECT_EQ(request.layer_state().clip().planes(1).b(), -2);
   EXPECT_EQ(request.layer_state().region().min().y(), -2);
   EXPECT_TRUE(request.layer_state().region().has_max());
   request = Parse(EncodeOperation(LayerOperation{
-      "l", {.clip = std::vector<HalfSpace>(), .region = Region{.everything = true}}}));
+      "l", {.clip = std::vector<ClipPart>(), .region = Region{.everything = true}}}));
   EXPECT_TRUE(request.layer_state().has_clip());
   EXPECT_EQ(request.layer_state().clip().planes_size(), 0);
   EXPECT_TRUE(request.layer_state().has_region());

@@ -286,6 +286,9 @@ TEST(Encode, LayersSayWhereTheyAreDrawn) {
   layer.clip.count = 2;
   layer.clip.planes[0] = {1, 2, 3, 4};
   layer.clip.planes[1] = {0, 0, -1, 0.5};
+  layer.clip.boxes_count = layer.clip.cylinders_count = 1;
+  layer.clip.boxes[0] = {{1, 0, 0}, {2, 3, 4}, {}};
+  layer.clip.cylinders[0] = {{0, 0, 1}, {0, 0, 2}, 3};
   layer.region = {{-1, -2, -3}, {0, 5, 6}};
   v1::ListEntitiesResponse message;
   Encode(page, &message);
@@ -294,6 +297,11 @@ TEST(Encode, LayersSayWhereTheyAreDrawn) {
   ASSERT_EQ(message.layers(1).clip().planes_size(), 2);
   EXPECT_EQ(message.layers(1).clip().planes(0).ShortDebugString(), "a: 1 b: 2 c: 3 d: 4");
   EXPECT_EQ(message.layers(1).clip().planes(1).ShortDebugString(), "c: -1 d: 0.5");
+  ASSERT_EQ(message.layers(1).clip().boxes_size(), 1);
+  EXPECT_EQ(message.layers(1).clip().boxes(0).size().ShortDebugString(), "x: 2 y: 3 z: 4");
+  ASSERT_EQ(message.layers(1).clip().cylinders_size(), 1);
+  EXPECT_EQ(message.layers(1).clip().cylinders(0).ShortDebugString(),
+            "start { z: 1 } end { z: 2 } radius: 3");
   EXPECT_EQ(message.layers(1).region().ShortDebugString(),
             "min { x: -1 y: -2 z: -3 } max { y: 5 z: 6 }");
 }

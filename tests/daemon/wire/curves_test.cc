@@ -192,8 +192,13 @@ const FaultCase kCases[] = {
     {"splat", Points,
      [](P& p) { p.mutable_points()->set_splat(static_cast<v1::Points::Splat>(9)); },
      "primitive.points.splat", Reason::kInvalidValue, "BALL, SOFT, CUBE"},
-    {"mesh_solid", Mesh, [](P& p) { p.mutable_mesh()->set_fill(v1::FILL_SOLID); },
-     "primitive.mesh.fill", Reason::kUnimplemented, "a mesh has a surface, lines or dots"},
+    {"mesh_solid_colors", Mesh,
+     [](P& p) {
+       p.mutable_mesh()->set_fill(v1::FILL_SOLID);
+       p.mutable_mesh()->mutable_vertices()->set_colors(
+           std::string(3 * p.mesh().vertices().count(), 'x'));
+     },
+     "primitive.mesh.fill", Reason::kInvalidValue, "which has one colour"},
     {"scale_neither", Scaled, [](P& p) { p.mutable_color_scale()->clear_colormap(); },
      "primitive.color_scale.colormap", Reason::kInvalidValue, "give one of the two"},
     {"scale_name", Scaled, [](P& p) { p.mutable_color_scale()->set_colormap("mud"); },
@@ -363,10 +368,10 @@ TEST_F(CurvesTest, ScalesColorVertices) {
 TEST_F(CurvesTest, ScalesBeyondAllNumbersAreRefusedOrPlain) {
   P p = Scaled();
   Set(p.mutable_color_scale()->mutable_along(), 1e-150, 0, 0);
-  const GeometryData& data = Geometry(p);
-  EXPECT_EQ(data.arrays.colors().size(), 3u);
+  EXPECT_EQ(Geometry(p).arrays.colors().size(), 3u);
   Set(p.mutable_color_scale()->mutable_along(), 0, 0, 1);  // all are at 0
-  EXPECT_EQ(Geometry(p).arrays.colors()[2], Geometry(p).arrays.colors()[0]);
+  const GeometryData& data = Geometry(p);                  // until the next one
+  EXPECT_EQ(data.arrays.colors()[2], data.arrays.colors()[0]);
 }
 
 TEST_F(CurvesTest, TinyArcsAndBlankTextAreSomewhere) {

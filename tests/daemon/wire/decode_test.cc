@@ -297,6 +297,51 @@ TEST(Decode, ClipsAndRegions) {
   EXPECT_EQ(*decode().region, (gpu::Region{{-1, 0, 0}, {1, 2, 0.5}}));
 }
 
+TEST(Decode, ClipsOfBoxesAndCylinders) {
+  v1::StreamRequest request;
+  request.mutable_layer_state()->set_layer("l");
+  v1::Clip* clip = request.mutable_layer_state()->mutable_clip();
+  v1::Clip::Box* box = clip->add_boxes();
+  box->mutable_center()->set_y(2);
+  for (const auto set : {&v1::Vec3::set_x, &v1::Vec3::set_y, &v1::Vec3::set_z}) {
+    (box->mutable_size()->*set)(3);
+  }
+  v1::Clip::Cylinder* cylinder = clip->add_cylinders();
+  cylinder->mutable_end()->set_z(4);
+  cylinder->set_radius(0.5);
+  const auto got = std::get<LayerState>(Decode(request).operations.at(0).op).clip;
+  ASSERT_NE(got, nullptr);
+  EXPECT_EQ(got->planes_in_all(), 8u);
+  EXPECT_EQ(got->boxes[0], (ClipBox{{0, 2, 0}, {3, 3, 3}, {}}));
+  EXPECT_EQ(got->cylinders[0], (ClipCylinder{{0, 0, 0}, {0, 0, 4}, 0.5}));
+}
+
+TEST(Decode, SolidMeshesAreFilledIfTheyAreClosed) {
+  v1::StreamRequest request = MeshRequest();
+  v1::Mesh* mesh = request.mutable_upsert()->mutable_entity()->mutable_primitive()->mutable_mesh();
+  mesh->set_fill(v1::FILL_SOLID);
+  Decoded decoded = Decode(request);
+  // Of one triangle: its surface, and a word about it.
+  ASSERT_THAT(decoded.operations, SizeIs(1));
+  EXPECT_EQ(GeometryOf(decoded).record.kind, gpu::PrimitiveKind::kTriangles);
+  ASSERT_THAT(decoded.refused.issues, SizeIs(1));
+  const Issue& issue = decoded.refused.issues[0];
+  EXPECT_EQ(issue.field, "upsert.entity.primitive.mesh.fill");
+  EXPECT_EQ(issue.id, "id");
+  EXPECT_EQ(issue.reason, Reason::kInvalidValue);
+  EXPECT_EQ(issue.message,
+            "fill is FILL_SOLID, but the mesh is open: the edge of vertices 0 and 1 belongs to 1 "
+            "triangle, and it takes an even number; its surface is drawn");
+  // With the same one behind it, it is closed, however thin.
+  v1::Vertices* vertices = mesh->mutable_vertices();
+  vertices->set_positions(vertices->positions() + vertices->positions());
+  vertices->set_count(2 * vertices->count());
+  decoded = Decode(request);
+  EXPECT_THAT(decoded.refused.issues, IsEmpty());
+  EXPECT_EQ(GeometryOf(decoded).record.kind, gpu::PrimitiveKind::kFilled);
+  EXPECT_EQ(GeometryOf(decoded).record.fill, gpu::Fill::kSurface);
+}
+
 TEST(Decode, Deletes) {
   v1::StreamRequest request;
   v1::Delete* del = request.mutable_delete_();

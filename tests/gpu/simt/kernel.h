@@ -103,6 +103,10 @@ T atomicOr(T* at, U value) {
   return std::atomic_ref<T>(*at).fetch_or(static_cast<T>(value), std::memory_order_relaxed);
 }
 template <typename T, typename U>
+T atomicXor(T* at, U value) {
+  return std::atomic_ref<T>(*at).fetch_xor(static_cast<T>(value), std::memory_order_relaxed);
+}
+template <typename T, typename U>
 T atomicMax(T* at, U value) {
   std::atomic_ref<T> place(*at);
   T held = place.load(std::memory_order_relaxed);

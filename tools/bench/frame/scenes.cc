@@ -181,6 +181,14 @@ Scene Mesh(gpu::SurfaceRule rule, double share) {
   return scene;
 }
 
+// What it encloses.
+Scene FilledMesh(double share) {
+  Scene scene = Mesh(gpu::SurfaceRule::kThin, share);
+  scene.name = "mesh, filled";
+  scene.contents[0].record.kind = gpu::PrimitiveKind::kFilled;
+  return scene;
+}
+
 Scene Points(uint64_t count, uint64_t seed) {
   Scene scene = OneLayer("points", Stack(512, 512, 256, PixelFormat::kBitPlanes3));
   const Extent extent = ExtentOf(scene.target, true);
@@ -367,6 +375,10 @@ constexpr Named kScenes[] = {
      [](uint64_t, double share) -> std::vector<MakeScene> {
        return {[=] { return Mesh(gpu::SurfaceRule::kThin, share); },
                [=] { return Mesh(gpu::SurfaceRule::kCover, share); }};
+     }},
+    {"filled",
+     [](uint64_t, double share) -> std::vector<MakeScene> {
+       return {[=] { return FilledMesh(share); }};
      }},
     {"points",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {

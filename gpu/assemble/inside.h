@@ -1,0 +1,18 @@
+// Which voxels are inside of triangles (primitives/filled.h), worked out once for all rows.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "gpu/cpu/executor.h"
+#include "gpu/primitives/filled.h"
+
+namespace voxeld::gpu {
+
+// Voxels of the volume around a source's vertices. They are there (`vertices` is not null).
+Box3 BoundsOfVertices(const Source& source, const TileGrid& grid);
+
+// As InsideRows has them, of the box that is the source's bounds.
+std::vector<uint32_t> FindInside(const Source& source, Executor& executor);
+
+}  // namespace voxeld::gpu
