@@ -69,6 +69,11 @@ void DrawItems(const Drawable& d, const Bins& bins, std::span<const BinItem> ite
   touched = TileRows::All();
   const uint32_t priority = d.record.priority;
   const bool erase = d.record.erase != 0;
+  if (d.source.record->kind == PrimitiveKind::kFilled) {
+    // A tile lies in one block.
+    const uint32_t word = MakeWord(priority, erase, d.source.UniformColor());
+    return items.empty() ? void() : DrawInside(d.source, box, grid, word, words);
+  }
   uint32_t rgb_before = 0;
   uint32_t word = MakeWord(priority, erase, rgb_before);
   const auto raise = [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 
 namespace voxeld::gpu {
 namespace {
@@ -13,6 +14,11 @@ template <class F>
 void ForRuns(uint64_t count, uint64_t run, Executor& executor, F&& f) {
   executor.For(static_cast<size_t>((count + run - 1) / run), 1,
                [&](size_t i, int) { f(i * run, std::min(count, (i + 1) * run)); });
+}
+
+// Of voxels side by side in memory.
+void RaisePlane(uint32_t word, uint32_t* words) {
+  for (int i = 0; i < kTileSize * kTileSize; ++i) words[i] = std::max(words[i], word);
 }
 
 }  // namespace
@@ -66,6 +72,32 @@ std::vector<uint32_t> FindInside(const Source& source, Executor& executor) {
     }
   });
   return bits;
+}
+
+void DrawInside(const Source& source, const Box3& box, const TileGrid& grid, uint32_t word,
+                uint32_t* words) {
+  const Box3 part = Intersect(box, source.solid.bounds);
+  if (IsEmpty(part)) return;
+  for (int32_t z = part.lo[2]; z < part.hi[2]; ++z) {
+    uint32_t rows[kTileSize], all = ~0u;
+    const int32_t count = part.hi[1] - part.lo[1];
+    for (int32_t i = 0; i < count; ++i) {
+      rows[i] = Filled::RowIn(source, part, part.lo[1] + i, z) << (part.lo[0] - box.lo[0]);
+      all &= rows[i];
+    }
+    constexpr uint32_t kWholeRow = (1u << kTileSize) - 1;
+    if (all == kWholeRow && count == kTileSize && grid.shift[2] == 2 * kTileBits) {
+      RaisePlane(word, words + grid.IndexInTile(box.lo[0], box.lo[1], z));
+      continue;
+    }
+    for (int32_t i = 0; i < count; ++i) {
+      uint32_t* const row = words + grid.IndexInTile(box.lo[0], part.lo[1] + i, z);
+      for (uint32_t left = rows[i]; left != 0; left &= left - 1) {
+        uint32_t& at = row[static_cast<uint32_t>(std::countr_zero(left)) << grid.shift[0]];
+        at = std::max(at, word);
+      }
+    }
+  }
 }
 
 }  // namespace voxeld::gpu

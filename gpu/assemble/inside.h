@@ -15,4 +15,8 @@ Box3 BoundsOfVertices(const Source& source, const TileGrid& grid);
 // As InsideRows has them, of the box that is the source's bounds.
 std::vector<uint32_t> FindInside(const Source& source, Executor& executor);
 
+// Raises the words of a tile to `word` where its voxels, `box`, are inside.
+void DrawInside(const Source& source, const Box3& box, const TileGrid& grid, uint32_t word,
+                uint32_t* words);
+
 }  // namespace voxeld::gpu

@@ -8,27 +8,31 @@
 namespace voxeld::gpu::cuda {
 
 struct FilledScratch {
-  uint32_t rows[kTileSize * kTileSize];  // [z][y] of the part: bit i is voxel lo[0] + i
+  uint32_t rows[kTileSize * kTileSize];  // [z][y] of the tile: bit i is its voxel i along x
 };
 
 static __device__ __noinline__ void DrawFilled(const TableEntry& entry, const Box3& box,
                                                uint32_t* words, FilledScratch& scratch) {
+  static_assert(kTileSize == 16);
   const Source& source = entry.source;
   const Box3 part = Intersect(box, source.solid.bounds);
   if (IsEmpty(part)) return;  // the same for every thread
-  const int32_t nx = part.hi[0] - part.lo[0], ny = part.hi[1] - part.lo[1],
-                nz = part.hi[2] - part.lo[2];
-  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < ny * nz; i += kDrawThreads) {
-    scratch.rows[i] = Filled::RowIn(source, part, part.lo[1] + i % ny, part.lo[2] + i / ny);
+  for (uint32_t row = threadIdx.x; row < kTileSize * kTileSize; row += kDrawThreads) {
+    const int32_t y = box.lo[1] + static_cast<int32_t>(row & 15),
+                  z = box.lo[2] + static_cast<int32_t>(row >> 4);
+    scratch.rows[row] = Contains(part, part.lo[0], y, z)
+                            ? Filled::RowIn(source, part, y, z) << (part.lo[0] - box.lo[0])
+                            : 0;
   }
   __syncthreads();
   const uint32_t word = MakeWord(entry.priority, entry.erase != 0, source.UniformColor());
-  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < nx * ny * nz; i += kDrawThreads) {
-    const int32_t x = i % nx, row = i / nx;
+  uint32_t* const at = words + IndexInRegion(box.lo[0], box.lo[1], box.lo[2]);
+  const uint32_t x = threadIdx.x & 15;
+#pragma unroll
+  for (uint32_t row = threadIdx.x >> 4; row < kTileSize * kTileSize; row += kDrawThreads / 16) {
     if ((scratch.rows[row] >> x & 1) == 0) continue;
-    uint32_t& at =
-        words[IndexInRegion(part.lo[0] + x, part.lo[1] + row % ny, part.lo[2] + row / ny)];
-    at = Max(at, word);  // nobody else has this voxel now
+    uint32_t& voxel = at[x | (row & 15) << 5 | row >> 4 << 10];
+    voxel = Max(voxel, word);  // nobody else has this voxel now
   }
   __syncthreads();
 }

@@ -17,6 +17,12 @@ constexpr size_t kChannels = 3;
 // Pixel x of 16 within a channel's bits.
 constexpr uint32_t BitOf(uint32_t x) { return x ^ 7; }
 
+bool AreAlike(const uint32_t* row) {
+  uint32_t differs = 0;
+  for (int32_t i = 1; i < kTileSize; ++i) differs |= row[i] ^ row[0];
+  return differs == 0;
+}
+
 }  // namespace
 
 std::optional<PlanePacker> PlanePacker::Create(const Sampler& sampler,
@@ -86,7 +92,7 @@ std::optional<PlanePacker::Place> PlanePacker::PlaceOf(const int32_t (&ijk)[3]) 
 // Of a plane of a tile, in which voxels of x in `lit_rows` are not black. Bit y of what it returns: there may be bits in
 // row y.
 uint32_t PlanePacker::CollectBits(const uint32_t* colors, uint32_t lit_rows, uint32_t sub,
-                                  PlaneBits& bits) const {
+                                  RunBits& run, PlaneBits& bits) const {
   // Dither counts from pixel row 0.
   const uint32_t turn = static_cast<uint32_t>(8 - first_row_ % 8);
   uint32_t lit_ys = 0;
@@ -95,20 +101,38 @@ uint32_t PlanePacker::CollectBits(const uint32_t* colors, uint32_t lit_rows, uin
     const uint32_t* const from = colors + x * kTileSize;
     const uint64_t dither = dither_[sub * 8 + x % 8];
     uint32_t lit = LitBits(from, kTileSize, 0);
-    for (lit_ys |= lit; lit != 0; lit &= lit - 1) {
+    lit_ys |= lit;
+    if (lit == (1u << kTileSize) - 1 && AreAlike(from)) {
+      if (run.word != from[0] || run.sub != sub) {
+        run.word = from[0];
+        run.sub = sub;
+        run.known = 0;
+      }
+      uint64_t* const of = run.bits[x % 8];
+      if ((run.known >> x % 8 & 1) == 0) {
+        run.known |= 1u << x % 8;
+        const Under under = UnderOf(from[0]);
+        for (uint32_t y = 0; y < 8; ++y) of[y] = under.Bits(dither >> y * 8 & 0xFF);
+      }
+      for (uint32_t y = 0; y < kTileSize; ++y) bits[y] |= of[(y + turn) % 8] << BitOf(x);
+      continue;
+    }
+    // Voxels side by side often are of one colour.
+    uint32_t word = 0;
+    Under under;
+    for (; lit != 0; lit &= lit - 1) {
       const uint32_t y = static_cast<uint32_t>(std::countr_zero(lit));
-      const uint32_t word = from[y];
-      const uint32_t rgb =
-          rgb_of_[0][word & 0xFF] | rgb_of_[1][word >> 8 & 0xFF] | rgb_of_[2][word >> 16 & 0xFF];
-      const uint32_t below = dither >> ((y + turn) % 8 * 8) & 0xFF;
-      const auto bit = [&](size_t channel, uint32_t c) {
-        return static_cast<uint64_t>(lit_under_[channel][c] > below);
-      };
-      bits[y] |= (bit(0, rgb >> 16) | bit(1, rgb >> 8 & 0xFF) << 16 | bit(2, rgb & 0xFF) << 32)
-                 << BitOf(x);
+      if (from[y] != word) under = UnderOf(word = from[y]);
+      bits[y] |= under.Bits(dither >> ((y + turn) % 8 * 8) & 0xFF) << BitOf(x);
     }
   }
   return lit_ys;
+}
+
+PlanePacker::Under PlanePacker::UnderOf(uint32_t word) const {
+  const uint32_t rgb =
+      rgb_of_[0][word & 0xFF] | rgb_of_[1][word >> 8 & 0xFF] | rgb_of_[2][word >> 16 & 0xFF];
+  return {{lit_under_[0][rgb >> 16], lit_under_[1][rgb >> 8 & 0xFF], lit_under_[2][rgb & 0xFF]}};
 }
 
 void PlanePacker::Put(size_t picture, const Place& place, uint32_t rows, const PlaneBits& bits) {
@@ -146,13 +170,15 @@ void PlanePacker::OnTile(uint32_t tile, const uint32_t* colors, const TileRows& 
   const std::optional<Place> place = PlaceOf(ijk);
   if (!place) return;
   PlaneBits bits = {};  // zeros between planes
+  RunBits run;
   for (size_t z = 0; z < kTileSize; ++z) {
     const uint32_t lit_rows = rows.bits[z / 4] >> (z % 4 * 16) & 0xFFFF;
     const uint32_t before = std::exchange(rows_[tile][z], uint16_t{0});
     if ((lit_rows | before) == 0) continue;
     const auto& slices = slices_[static_cast<size_t>(ijk[2] * kTileSize) + z];
     for (uint32_t sub = 0; sub < sub_frames_ && !slices.empty(); ++sub) {
-      const uint32_t now = CollectBits(colors + z * kTileSize * kTileSize, lit_rows, sub, bits);
+      const uint32_t now =
+          CollectBits(colors + z * kTileSize * kTileSize, lit_rows, sub, run, bits);
       for (const uint32_t slice : slices) {
         Put(slice * sub_frames_ + sub, *place, now | before, bits);
       }

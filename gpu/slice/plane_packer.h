@@ -53,7 +53,24 @@ class PlanePacker final : public TileObserver {
 
   PlanePacker() = default;
   std::optional<Place> PlaceOf(const int32_t (&ijk)[3]) const;
-  uint32_t CollectBits(const uint32_t* colors, uint32_t lit_rows, uint32_t sub,
+  // Of a colour, what its channels are lit under.
+  struct Under {
+    uint32_t of[3] = {};
+
+    // Of a voxel whose dither is `below`: as PlaneBits have those of pixel 0.
+    uint64_t Bits(uint32_t below) const {
+      return uint64_t{of[0] > below} | uint64_t{of[1] > below} << 16 |
+             uint64_t{of[2] > below} << 32;
+    }
+  };
+  // Bits of a colour of which whole rows are, by x and y modulo 8.
+  struct RunBits {
+    uint32_t word = 0, sub = 0;
+    uint32_t known = 0;  // bit x: those of x are there
+    uint64_t bits[8][8];
+  };
+  Under UnderOf(uint32_t word) const;
+  uint32_t CollectBits(const uint32_t* colors, uint32_t lit_rows, uint32_t sub, RunBits& run,
                        PlaneBits& bits) const;
   void Put(size_t picture, const Place& place, uint32_t rows, const PlaneBits& bits);
 
