@@ -112,9 +112,11 @@ uint32_t PlanePacker::CollectBits(const uint32_t* colors, uint32_t lit_rows, uin
       if ((run.known >> x % 8 & 1) == 0) {
         run.known |= 1u << x % 8;
         const Under under = UnderOf(from[0]);
-        for (uint32_t y = 0; y < 8; ++y) of[y] = under.Bits(dither >> y * 8 & 0xFF);
+        for (uint32_t y = 0; y < kTileSize; ++y) {
+          of[y] = under.Bits(dither >> ((y + turn) % 8 * 8) & 0xFF);
+        }
       }
-      for (uint32_t y = 0; y < kTileSize; ++y) bits[y] |= of[(y + turn) % 8] << BitOf(x);
+      for (uint32_t y = 0; y < kTileSize; ++y) bits[y] |= of[y] << BitOf(x);
       continue;
     }
     // Voxels side by side often are of one colour.

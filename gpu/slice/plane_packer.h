@@ -63,11 +63,11 @@ class PlanePacker final : public TileObserver {
              uint64_t{of[2] > below} << 32;
     }
   };
-  // Bits of a colour of which whole rows are, by x and y modulo 8.
+  // Bits of a colour of which whole rows are, by x modulo 8 and y.
   struct RunBits {
     uint32_t word = 0, sub = 0;
     uint32_t known = 0;  // bit x: those of x are there
-    uint64_t bits[8][8];
+    uint64_t bits[8][kTileSize];
   };
   Under UnderOf(uint32_t word) const;
   uint32_t CollectBits(const uint32_t* colors, uint32_t lit_rows, uint32_t sub, RunBits& run,
