@@ -27,7 +27,7 @@ bool AddBox(const ClipBox& box, gpu::LayerRecord& record) {
   const double* const m = box.transform.m;
   const auto at = [&](int i, int j) { return m[i % 3 * 4 + j % 3]; };
   const double determinant = gpu::Determinant(box.transform);
-  bool is_sound = determinant != 0;
+  bool is_sound = std::isnormal(determinant);
   for (int a = 0; a < 3; ++a) {
     // The box's coordinate a of a point p of the scene is n · p − shift.
     double n[3], shift = 0;
@@ -70,14 +70,13 @@ bool AddCylinder(const ClipCylinder& cylinder, gpu::LayerRecord& record) {
   SetLength(cylinder.radius, across[0]);
   Cross(axis, across[0], across[1]);
   double* const m = record.cylinders[record.cylinder_count++].unit.m;
-  bool is_sound = true;
   for (int a = 0; a < 3; ++a) {
     const double row[4] = {across[0][a], across[1][a], axis[a], cylinder.start[a]};
-    for (int c = 0; c < 4; ++c) {
-      m[a * 4 + c] = row[c];
-      is_sound = is_sound && std::isfinite(row[c]);
-    }
+    std::copy_n(row, 4, m + a * 4);
   }
+  const bool is_sound =
+      std::isnormal(gpu::Determinant(record.cylinders[record.cylinder_count - 1].unit)) &&
+      std::all_of(m, m + 12, [](double x) { return std::isfinite(x); });
   return AddSlab(axis, Dot(axis, cylinder.start), Dot(axis, cylinder.end), record) && is_sound;
 }
 

@@ -405,9 +405,10 @@ std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits
       const bool finite =
           std::isfinite(p.a) && std::isfinite(p.b) && std::isfinite(p.c) && std::isfinite(p.d);
       if (finite && (p.a != 0 || p.b != 0 || p.c != 0)) continue;
-      refuse(layer, "", absl::StrFormat("layer_state.clip.planes[%d]", i), Reason::kInvalidValue,
-             absl::StrFormat("the plane is (%g, %g, %g, %g); it must be finite, its normal not 0",
-                             p.a, p.b, p.c, p.d));
+      return refuse(
+          layer, "", absl::StrFormat("layer_state.clip.planes[%d]", i), Reason::kInvalidValue,
+          absl::StrFormat("the plane is (%g, %g, %g, %g); it must be finite, its normal not 0", p.a,
+                          p.b, p.c, p.d));
     }
     gpu::LayerRecord record;
     if (clip.boxes_count + clip.cylinders_count > 0 && !PutClip(clip, record)) {

@@ -93,9 +93,10 @@ MaybeFault ToClip(const FieldPath& path, const v1::Clip& in, const Limits& limit
   }
   gpu::LayerRecord record;
   if (PutClip(*out, record)) return {};
-  return Fault{path.ToString(), Reason::kInvalidValue,
-               "has a box or a cylinder that has no inside or does not stay finite; give "
-               "transforms that have an inverse"};
+  return Fault{
+      path.ToString(), Reason::kInvalidValue,
+      "has a box or a cylinder that is too small, too large or too far away for numbers in "
+      "double precision"};
 }
 
 }  // namespace voxeld::daemon::wire

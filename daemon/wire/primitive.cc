@@ -361,7 +361,11 @@ MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const Decode
     case v1::Primitive::kSegments:
     case v1::Primitive::kMesh:
     case v1::Primitive::kCurve:
-      if (out->record.kind == gpu::PrimitiveKind::kFilled) break;
+      if (in.has_mesh() && in.mesh().fill() == v1::FILL_SOLID) {
+        return Fault{scale.ToString(), Reason::kInvalidValue,
+                     "is given for a mesh that is FILL_SOLID, which has one colour; leave it out, "
+                     "and draw the surface in colours as another entity"};
+      }
       return ToVertexColors(scale, in.color_scale(), context, out);
     case v1::Primitive::kEllipsoid:
     case v1::Primitive::kTorus:

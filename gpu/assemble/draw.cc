@@ -31,7 +31,6 @@ void DrawWalksAlone(const Bins& bins, std::span<const BinItem> items, uint32_t* 
 
 // Sets source.inside, if there is room for it.
 void FillIn(Drawable& d, uint64_t most_bytes, Executor& executor) {
-  d.inside.clear();
   const uint64_t words = InsideRows{d.source.solid.bounds}.size();
   if (words == 0 || words > most_bytes / sizeof(uint32_t)) return;
   d.inside = FindInside(d.source, executor);
@@ -118,6 +117,7 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
   d.source.record = &view.record;
   d.source.tint = d.record.tint;
   d.cut = nullptr;
+  d.inside = {};
   if (IsCurved(view.record.kind)) {
     d.cut = std::make_unique<Cut>(CutCurved(view, map, grid));
     d.source.record = &d.cut->record;

@@ -7,6 +7,7 @@
 
 #include "gpu/assemble/blend.h"
 #include "gpu/assemble/draw.h"
+#include "gpu/assemble/tile_clip.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -37,61 +38,6 @@ void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors
     if (words[v] != 0) colors[v] = BlendLayer(colors[v], words[v], layer.blend, layer.opacity);
   }
 }
-
-// Uncovers what lies outside a half-space, in the order in which the tile of `box` lies in memory.
-void UncoverOutside(const VoxelHalfSpace& half_space, const TileGrid& grid, const Box3& box,
-                    uint32_t* words) {
-  int axis[3];  // from the fastest
-  for (int a = 0; a < 3; ++a) axis[grid.shift[a] / kTileBits] = a;
-  const auto size = [&](int n) { return box.hi[axis[n]] - box.lo[axis[n]]; };
-  const int64_t step = 2 * half_space.normal[axis[0]];
-  int32_t voxel[3] = {box.lo[0], box.lo[1], box.lo[2]};
-  for (int32_t k = 0; k < size(2); ++k) {
-    for (int32_t j = 0; j < size(1); ++j) {
-      voxel[axis[1]] = box.lo[axis[1]] + j;
-      voxel[axis[2]] = box.lo[axis[2]] + k;
-      int64_t value = ClipValue(half_space, voxel[0], voxel[1], voxel[2]);
-      uint32_t* row = words + (static_cast<size_t>(k) * kTileSize + static_cast<size_t>(j)) *
-                                  static_cast<size_t>(kTileSize);
-      for (int32_t i = 0; i < size(0); ++i, value += step) {
-        if (value < 0) row[i] = 0;
-      }
-    }
-  }
-}
-
-void UncoverOutside(const VoxelCylinder& cylinder, const TileGrid& grid, const Box3& box,
-                    uint32_t* words) {
-  for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
-    for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
-      for (int32_t x = box.lo[0]; x < box.hi[0]; ++x) {
-        uint32_t& word = words[grid.IndexInTile(x, y, z)];
-        if (word != 0 && !IsInside(cylinder, x, y, z)) word = 0;
-      }
-    }
-  }
-}
-
-// What cuts a tile; `outside`: all of it lies outside one of them.
-struct TileClip {
-  bool outside = false;
-  uint32_t count = 0, cylinder_count = 0;
-  const VoxelHalfSpace* cutting[kMaxHalfSpaces];
-  const VoxelCylinder* cylinders[kMaxClipCylinders];
-
-  TileClip(const VoxelClip& clip, const Box3& box) {
-    for (uint32_t i = 0; i < clip.count; ++i) {
-      const ClipSide side = SideOf(clip.half_spaces[i], box);
-      if (side == ClipSide::kOutside) outside = true;
-      if (side == ClipSide::kCut) cutting[count++] = &clip.half_spaces[i];
-    }
-    for (uint32_t i = 0; i < clip.cylinder_count; ++i) {
-      const ClipSide side = SideOf(clip.cylinders[i], box);
-      if (side == ClipSide::kOutside) outside = true;
-      if (side == ClipSide::kCut) cylinders[cylinder_count++] = &clip.cylinders[i];
-    }
-  }
-};
 
 }  // namespace
 
@@ -387,7 +333,7 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
     const TileClip clip(*layer.clip, box);
     for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
       const Entry& e = scratch.entries[i];
-      if (clip.outside) continue;
+      if (clip.outside()) continue;
       const Bins& bins = e.drawable->bins;
       if (bins.counted()) {
         passes_.Draw(*e.drawable, tile, box, words, touched);
@@ -395,13 +341,8 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
         DrawItems(*e.drawable, bins, bins.row(e.row), grid_, box, words, touched);
       }
     }
-    if (clip.outside) continue;
-    for (uint32_t c = 0; c < clip.count; ++c) {
-      UncoverOutside(*clip.cutting[c], grid_, box, words);
-    }
-    for (uint32_t c = 0; c < clip.cylinder_count; ++c) {
-      UncoverOutside(*clip.cylinders[c], grid_, box, words);
-    }
+    if (clip.outside()) continue;
+    clip.Uncover(grid_, box, words);
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
     if (opaque && i == scratch.entries.size() && colors->at == words) {
       if (observer == nullptr) {

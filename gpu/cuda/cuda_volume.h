@@ -52,7 +52,8 @@ struct GeometryBounds {
   double extent[3] = {};
 };
 
-// What a geometry's arrays lie in; and its bounds, if its items may be thin lines or small triangles.
+// What a geometry's arrays lie in; and its bounds, if its items may be thin lines or small triangles, or if it
+// is filled.
 struct DeviceArrays {
   std::shared_ptr<Block> block;
   std::optional<GeometryBounds> bounds;

@@ -123,6 +123,7 @@ absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   for (const DeltaStep& step : plan.steps) {
     const auto* geometry = std::get_if<GeometryView>(&step);
     if (geometry == nullptr || geometry->positions.empty() ||
+        geometry->record.drawn_by == DrawnBy::kCpu ||
         (IndexFor(geometry->record) == IndexedBy::kPairs &&
          geometry->record.kind != PrimitiveKind::kFilled)) {
       continue;

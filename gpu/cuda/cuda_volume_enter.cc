@@ -170,8 +170,11 @@ absl::Status CudaVolume::PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot)
 }
 
 Box3 CudaVolume::BoundsOf(const Drawable& d, const Affine& map) const {
-  const auto* const arrays = static_cast<const DeviceArrays*>(d.geometry->memory.get());
   const TileGrid& grid = tiles_.grid;
+  // What the CPU draws lies in the host's memory.
+  const bool on_device = d.geometry->view.record.drawn_by != DrawnBy::kCpu;
+  const auto* const arrays =
+      on_device ? static_cast<const DeviceArrays*>(d.geometry->memory.get()) : nullptr;
   if (arrays == nullptr || !arrays->bounds) {
     return {{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};
   }

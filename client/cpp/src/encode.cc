@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/src/encode_parts.h"
 #include "client/cpp/src/encode_shapes.h"
 #include "voxeld/v1/primitives.pb.h"
 #include "voxeld/v1/scene.pb.h"
@@ -77,47 +78,6 @@ absl::StatusOr<Rope> EncodeVertices(const Vertices& v) {
   AppendPayload(v1::Vertices::kColorsFieldNumber, v.colors, &rope);
   AppendPayload(v1::Vertices::kPositionsFieldNumber, v.positions, &rope);
   return rope;
-}
-
-void AppendVec3(int field, const Vec3& vec, std::string* out) {
-  std::string inner;
-  AppendDouble(v1::Vec3::kXFieldNumber, vec.x, &inner);
-  AppendDouble(v1::Vec3::kYFieldNumber, vec.y, &inner);
-  AppendDouble(v1::Vec3::kZFieldNumber, vec.z, &inner);
-  AppendPresentBytes(field, inner, out);
-}
-
-void AppendAffine(int field, const Affine& affine, std::string* out) {
-  std::string packed, inner;
-  packed.resize(sizeof affine.m);
-  std::memcpy(packed.data(), affine.m.data(), sizeof affine.m);
-  AppendPresentBytes(v1::Affine::kMFieldNumber, packed, &inner);
-  AppendPresentBytes(field, inner, out);
-}
-
-void AppendClipPart(const HalfSpace& half, std::string* out) {
-  std::string plane;
-  AppendDouble(v1::Clip::Plane::kAFieldNumber, half.a, &plane);
-  AppendDouble(v1::Clip::Plane::kBFieldNumber, half.b, &plane);
-  AppendDouble(v1::Clip::Plane::kCFieldNumber, half.c, &plane);
-  AppendDouble(v1::Clip::Plane::kDFieldNumber, half.d, &plane);
-  AppendPresentBytes(v1::Clip::kPlanesFieldNumber, plane, out);
-}
-
-void AppendClipPart(const ClipBox& in, std::string* out) {
-  std::string box;
-  AppendVec3(v1::Clip::Box::kCenterFieldNumber, in.center, &box);
-  AppendVec3(v1::Clip::Box::kSizeFieldNumber, in.size, &box);
-  AppendAffine(v1::Clip::Box::kTransformFieldNumber, in.transform, &box);
-  AppendPresentBytes(v1::Clip::kBoxesFieldNumber, box, out);
-}
-
-void AppendClipPart(const ClipCylinder& in, std::string* out) {
-  std::string cylinder;
-  AppendVec3(v1::Clip::Cylinder::kStartFieldNumber, in.start, &cylinder);
-  AppendVec3(v1::Clip::Cylinder::kEndFieldNumber, in.end, &cylinder);
-  AppendDouble(v1::Clip::Cylinder::kRadiusFieldNumber, in.radius, &cylinder);
-  AppendPresentBytes(v1::Clip::kCylindersFieldNumber, cylinder, out);
 }
 
 void AppendThickness(int field, const Thickness& thickness, std::string* out) {
@@ -373,11 +333,7 @@ struct OperationEncoder {
     if (look.transform)
       AppendAffine(v1::LayerState::kTransformFieldNumber, *look.transform, &fields);
     if (look.clip) {
-      std::string parts;
-      for (const ClipPart& part : *look.clip) {
-        std::visit([&](const auto& it) { AppendClipPart(it, &parts); }, part);
-      }
-      AppendPresentBytes(v1::LayerState::kClipFieldNumber, parts, &fields);
+      AppendClip(v1::LayerState::kClipFieldNumber, *look.clip, &fields);
     }
     if (look.region) {
       std::string corners;

@@ -51,7 +51,7 @@ def _add(part: ClipPart, clip: pb.Clip) -> None:
     if isinstance(part, ClipCylinder):
         clip.cylinders.add(start=_point(part.start, "the clip cylinder's start"),
                            end=_point(part.end, "the clip cylinder's end"),
-                           radius=number(part.radius, "the clip cylinder's radius", least=0))
+                           radius=number(part.radius, "the clip cylinder's radius", above=0))
         return
     four = as_array(part, "clip")
     if four.shape != (4,):

@@ -52,7 +52,7 @@ class Draw(DrawCurves[Drawn]):
              fill: str = "surface", transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
              lifetime: Optional[float] = None, label: str = "") -> Drawn:
         """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover".
-        `fill`: "surface", "lines" or "dots"."""
+        `fill`: "surface", "lines", "dots" or "solid": what a closed mesh encloses, in one colour."""
         return self._draw(name, shapes.mesh, (vertices, faces), dict(colors=colors, cmap=cmap, rule=rule, fill=fill),
                           Look.of(transform, priority, erase, lifetime, label))
 

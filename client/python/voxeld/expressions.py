@@ -22,7 +22,7 @@ class Expression:
 
     __slots__ = ("_names", "_ops", "_values")
 
-    def __init__(self, ops: tuple[int, ...], values: tuple[float, ...] = (), names: tuple[str, ...] = ()) -> None:
+    def __init__(self, ops: tuple[Tree.Op, ...], values: tuple[float, ...] = (), names: tuple[str, ...] = ()) -> None:
         self._ops, self._values, self._names = ops, values, names
 
     def to_wire(self) -> pb.Expression:
@@ -91,7 +91,7 @@ def _as_expression(value: Number) -> Expression:
     return Expression((Tree.CONSTANT,), (number(value, "a number in an expression"),))
 
 
-def _of(op: int, *operands: Number) -> Expression:
+def _of(op: Tree.Op, *operands: Number) -> Expression:
     parts = [_as_expression(operand) for operand in operands]
     return Expression(sum((part._ops for part in parts), ()) + (op,), sum((part._values for part in parts), ()),
                       sum((part._names for part in parts), ()))

@@ -115,6 +115,10 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
     color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
     head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill")).SerializeToString()
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
+    whole = len(array) * size + (0 if faces is None else 12 * len(faces))  # type: ignore[arg-type]
+    if fill == "solid" and whole > PIECE_BYTES:
+        raise InvalidArray(f"the mesh takes {whole} bytes, more than the {PIECE_BYTES} that go at once, and a part of it "
+                           "is no solid; draw its surface, or a coarser one")
 
     def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
         return packed("mesh", head, wire.vertices(vertices, element, own, index), color)

@@ -1,7 +1,7 @@
 """What a layer is cut to, as it goes over the wire."""
 import unittest
 
-from voxeld import ClipBox, ClipCylinder, InvalidValue, clip, translate
+from voxeld import ClipBox, ClipCylinder, InvalidArray, InvalidValue, clip, translate
 
 
 class ClipTest(unittest.TestCase):
@@ -25,7 +25,7 @@ class ClipTest(unittest.TestCase):
     def test_what_is_no_part_is_refused(self) -> None:
         for bad in [(1, 2, 3), "plane", ClipBox(size=(1, 2)), ClipCylinder((0, 0, 0), (0, 0, 1), -1),
                     ClipCylinder((0, 0, 0), (0, float("nan"), 1), 1)]:
-            with self.assertRaises(InvalidValue, msg=repr(bad)):
+            with self.assertRaises((InvalidArray, InvalidValue), msg=repr(bad)):
                 clip.to_wire([bad])  # type: ignore[list-item]
 
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "daemon/scene/view_check.h"
@@ -198,6 +199,24 @@ TEST(SceneStore, ClipsAndRegionsThatAreNoneAreRefusedOnSight) {
     EXPECT_EQ(issue.reason, Reason::kInvalidValue);
     EXPECT_EQ(issue.field, "layer_state.clip.planes[1]");
   }
+  const auto with = [&](const std::function<void(Clip&)>& change) {
+    Operation operation = SetClip("a", {});
+    Clip clip;
+    change(clip);
+    std::get<LayerState>(operation.op).clip = std::make_shared<Clip>(clip);
+    return refused(std::move(operation));
+  };
+  const auto one_cylinder = [](Clip& clip) {
+    clip.cylinders_count = 1;
+    clip.cylinders[0] = {{0, 0, 0}, {0, 0, 1}, 1e-200};
+  };
+  EXPECT_EQ(with(one_cylinder).message,
+            "a box or a cylinder of it has no inside, or does not stay finite");
+  EXPECT_EQ(with([](Clip& clip) {
+              clip.boxes_count = 1;
+              clip.boxes[0] = {{0, 0, 0}, {1, 1, 1}, {}};
+            }).message,
+            "6 planes; max_clip_planes is 2");
   for (const gpu::Region& bad :
        {gpu::Region{{0, 0, 1}, {1, 1, 1}}, gpu::Region{{0, 2, 0}, {1, 1, 1}},
         gpu::Region{{nan, 0, 0}, {1, 1, 1}}, gpu::Region{{0, 0, 0}, {1, 1, HUGE_VAL}}}) {

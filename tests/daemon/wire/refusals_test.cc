@@ -444,50 +444,6 @@ const Case kCases[] = {
             }
           }),
      "layer_state.clip.planes", Reason::kQuotaExceeded, "has 21 planes; max_clip_planes allows 20"},
-    {"clip_boxes",
-     With(ClipRequest,
-          [](R& r) {
-            for (int i = 0; i < 4; ++i) r.mutable_layer_state()->mutable_clip()->add_boxes();
-          }),
-     "layer_state.clip.planes", Reason::kQuotaExceeded,
-     "has 26 planes with those of boxes and cylinders; max_clip_planes allows 20"},
-    {"clip_cylinders",
-     With(ClipRequest,
-          [](R& r) {
-            for (int i = 0; i < 5; ++i) {
-              r.mutable_layer_state()->mutable_clip()->add_cylinders();
-            }
-          }),
-     "layer_state.clip.cylinders", Reason::kQuotaExceeded,
-     "has 5 cylinders; max_clip_cylinders allows 4"},
-    {"clip_box_size",
-     With(ClipRequest,
-          [](R& r) {
-            auto* size = r.mutable_layer_state()->mutable_clip()->add_boxes()->mutable_size();
-            size->set_x(1), size->set_y(2);
-          }),
-     "layer_state.clip.boxes[0].size", Reason::kInvalidValue,
-     "has an edge of 0; all three must be greater than 0"},
-    {"clip_box_flat",
-     With(ClipRequest,
-          [](R& r) {
-            auto* box = r.mutable_layer_state()->mutable_clip()->add_boxes();
-            box->mutable_size()->set_x(1);
-            box->mutable_size()->set_y(1);
-            box->mutable_size()->set_z(1);
-            for (int i = 0; i < 12; ++i) box->mutable_transform()->add_m(0);
-          }),
-     "layer_state.clip", Reason::kInvalidValue, "give transforms that have an inverse"},
-    {"clip_cylinder_end",
-     With(ClipRequest, [](R& r) { r.mutable_layer_state()->mutable_clip()->add_cylinders(); }),
-     "layer_state.clip.cylinders[0].end", Reason::kInvalidValue, "is where start is"},
-    {"clip_cylinder_radius",
-     With(ClipRequest,
-          [](R& r) {
-            auto* cylinder = r.mutable_layer_state()->mutable_clip()->add_cylinders();
-            cylinder->mutable_end()->set_z(1);
-          }),
-     "layer_state.clip.cylinders[0].radius", Reason::kInvalidValue, "give a number greater than 0"},
     {"clip_normal", With(ClipRequest, [](R& r) { PlaneOf(r)->set_b(0); }),
      "layer_state.clip.planes[1]", Reason::kInvalidValue, "normal (0, 0, 0)"},
     {"clip_a", With(ClipRequest, [](R& r) { PlaneOf(r)->set_a(kNaN); }),

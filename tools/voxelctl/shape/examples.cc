@@ -22,7 +22,7 @@ constexpr ShapeExample kExamples[] = {
     {"mesh, filled",
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8 -0.8,-0.8,-0.6 0,0.8,-0.6 0.8,-0.8,-0.6' "
-     "fill=solid color=tomato"},
+     "fill=solid color=pink"},
     {"curve",
      "curve vertices='-0.8,-0.6,-0.5 -0.4,0.7,-0.2 0,-0.6,0 0.4,0.7,0.2 0.8,-0.6,0.5' turn=60,0,0 "
      "thickness=3 color=orange"},

@@ -115,7 +115,8 @@ std::optional<Reason> PlainScene::WrongAlone(const Operation& operation, const L
     if (const auto wrong = WrongMap(*state->transform)) return wrong;
   }
   if (state->clip != nullptr) {
-    if (state->clip->count > limits.max_clip_planes) return Reason::kQuotaExceeded;
+    if (state->clip->planes_in_all() > limits.max_clip_planes) return Reason::kQuotaExceeded;
+    if (state->clip->cylinders_count > limits.max_clip_cylinders) return Reason::kQuotaExceeded;
     for (uint32_t i = 0; i < state->clip->count; ++i) {
       const gpu::ClipPlane& p = state->clip->planes[i];
       if (p.a == 0 && p.b == 0 && p.c == 0) return Reason::kInvalidValue;

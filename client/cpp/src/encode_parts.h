@@ -1,0 +1,15 @@
+// Messages that stand in others, as fields of these.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "voxeld/drawing.h"
+
+namespace voxeld::client {
+
+void AppendVec3(int field, const Vec3& vec, std::string* out);
+void AppendAffine(int field, const Affine& affine, std::string* out);
+void AppendClip(int field, const std::vector<ClipPart>& parts, std::string* out);
+
+}  // namespace voxeld::client
