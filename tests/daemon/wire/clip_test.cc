@@ -63,13 +63,16 @@ TEST_F(ClipTest, BoxesHaveSizesAndAnInside) {
   EXPECT_EQ(FaultOf(clip),
             "clip.boxes[0].size: has an edge of 0; all three must be greater than 0");
   box->mutable_size()->set_y(INFINITY);
-  EXPECT_THAT(FaultOf(clip), HasSubstr("clip.boxes[0].size.y: is infinite"));
+  EXPECT_THAT(FaultOf(clip), HasSubstr("clip.boxes[0].size.y: is infinity"));
   box->mutable_size()->set_y(1);
   box->mutable_center()->set_x(NAN);
   EXPECT_THAT(FaultOf(clip), HasSubstr("clip.boxes[0].center.x: is NaN"));
   box->clear_center();
   for (int i = 0; i < 12; ++i) box->mutable_transform()->add_m(i == 0 || i == 5 ? 1 : 0);
-  EXPECT_THAT(FaultOf(clip), HasSubstr("give transforms that have an inverse"));
+  EXPECT_THAT(FaultOf(clip), HasSubstr("clip.boxes[0].transform.m: has a singular linear part"));
+  box->mutable_transform()->set_m(10, 1);
+  box->mutable_transform()->set_m(0, 1e-320);
+  EXPECT_THAT(FaultOf(clip), HasSubstr("too small, too large or too far away"));
 }
 
 TEST_F(ClipTest, CylindersHaveALengthAndARadius) {
