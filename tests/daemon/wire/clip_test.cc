@@ -70,9 +70,6 @@ TEST_F(ClipTest, BoxesHaveSizesAndAnInside) {
   box->clear_center();
   for (int i = 0; i < 12; ++i) box->mutable_transform()->add_m(i == 0 || i == 5 ? 1 : 0);
   EXPECT_THAT(FaultOf(clip), HasSubstr("clip.boxes[0].transform.m: has a singular linear part"));
-  box->mutable_transform()->set_m(10, 1);
-  box->mutable_transform()->set_m(0, 1e-320);
-  EXPECT_THAT(FaultOf(clip), HasSubstr("too small, too large or too far away"));
 }
 
 TEST_F(ClipTest, CylindersHaveALengthAndARadius) {
@@ -82,6 +79,9 @@ TEST_F(ClipTest, CylindersHaveALengthAndARadius) {
   EXPECT_EQ(FaultOf(clip), "clip.cylinders[0].radius: is 0; give a number greater than 0");
   cylinder->set_radius(-1);
   EXPECT_THAT(FaultOf(clip), HasSubstr("radius: is -1"));
+  cylinder->set_radius(1);
+  cylinder->set_radius(1e-200);
+  EXPECT_THAT(FaultOf(clip), HasSubstr("too small, too large or too far away"));
   cylinder->set_radius(1);
   cylinder->mutable_start()->set_z(1);
   EXPECT_EQ(FaultOf(clip), "clip.cylinders[0].end: is where start is; the two must be apart");
