@@ -29,15 +29,16 @@ void DrawWalksAlone(const Bins& bins, std::span<const BinItem> items, uint32_t* 
   DrawSpans(bins.walks.data(), {walks, size}, words, touched);
 }
 
-// Sets source.inside, if there is room for it.
-void FillIn(Drawable& d, uint64_t most_bytes, Executor& executor) {
+}  // namespace
+
+bool FillIn(Drawable& d, uint64_t inside_bytes, Executor& executor) {
+  if (d.source.record->kind != PrimitiveKind::kFilled || d.source.inside != nullptr) return false;
   const uint64_t words = InsideRows{d.source.solid.bounds}.size();
-  if (words == 0 || words > most_bytes / sizeof(uint32_t)) return;
+  if (words == 0 || words > inside_bytes / sizeof(uint32_t)) return false;
   d.inside = FindInside(d.source, executor);
   d.source.inside = d.inside.data();
+  return true;
 }
-
-}  // namespace
 
 bool IsSingular(const Drawable& d) {
   return WithPrimitive(d.geometry->view.record.kind, [&](auto primitive) {

@@ -14,6 +14,9 @@ namespace voxeld::gpu {
 // Fills in what is derived: vertices, source. `view`: scene → voxel space.
 void MapDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid, Executor& executor,
                  uint64_t inside_bytes = UINT64_MAX);
+// Finds what is inside of a mesh that is filled, and mapped, if that is not there and takes no more than so many bytes.
+// True if it has.
+bool FillIn(Drawable& drawable, uint64_t inside_bytes, Executor& executor);
 // The same, and bins. `owned[tile]`: 0 leaves the tile out.
 void PrepareDrawable(Drawable& drawable, const Affine& view, const TileGrid& grid,
                      std::span<const uint8_t> owned, Executor& executor);

@@ -241,7 +241,9 @@ void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const
     CountItems(d.source, grid_, owned_, executor_, budget_.room(), large_, d.bins);
   };
   for (size_t i = 0; i < small.size(); ++i) {
-    if (kept[i] == 0) keep_or_count(*small[i]);
+    // There may be room now for what was too much for one of the workers.
+    const bool filled = FillIn(*small[i], budget_.room() / 2, executor_);
+    if (kept[i] == 0 || filled) keep_or_count(*small[i]);
   }
   for (Drawable* d : large) {
     MapDrawable(*d, view_, grid_, executor_, budget_.room() / 2);
@@ -284,6 +286,7 @@ void Volume::KeepCounted() {
     if (!d.bins.counted()) continue;
     Bins counted = std::move(d.bins);
     d.bins = Bins();
+    FillIn(d, budget_.room() / 2, executor_);
     if (!Keep(d, executor_, budget_.room(), large_)) {
       d.bins = std::move(counted);
       continue;  // a smaller one may fit
