@@ -72,7 +72,8 @@ void DrawItems(const Drawable& d, const Bins& bins, std::span<const BinItem> ite
   if (d.source.record->kind == PrimitiveKind::kFilled) {
     // A tile lies in one block.
     const uint32_t word = MakeWord(priority, erase, d.source.UniformColor());
-    return items.empty() ? void() : DrawInside(d.source, box, grid, word, words);
+    if (!items.empty()) DrawInside(d.source, box, grid, word, words);
+    return;
   }
   uint32_t rgb_before = 0;
   uint32_t word = MakeWord(priority, erase, rgb_before);

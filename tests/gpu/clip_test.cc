@@ -99,6 +99,14 @@ class RandomClip : public testing::Test {
     for (int row = 0; row < 3; ++row) view.m[row * 4 + 3] = Real(-1000, 1000);
     return view;
   }
+  Box3 SmallBox() {
+    Box3 box;
+    for (int a = 0; a < 3; ++a) {
+      box.lo[a] = Int(0, 20);
+      box.hi[a] = box.lo[a] + Int(1, 5);
+    }
+    return box;
+  }
   std::mt19937_64 random_{5};
 };
 
@@ -116,11 +124,7 @@ TEST_F(RandomClip, OppositesAreExactOpposites) {
 TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxels) {
   int sides[3] = {};
   for (int i = 0; i < 20000; ++i) {
-    Box3 box;
-    for (int a = 0; a < 3; ++a) {
-      box.lo[a] = Int(0, 20);
-      box.hi[a] = box.lo[a] + Int(1, 5);
-    }
+    const Box3 box = SmallBox();
     const double n[3] = {Real(-1, 1), Real(-1, 1), Int(0, 2) == 0 ? 0 : Real(-1, 1)};
     const VoxelHalfSpace h =
         HalfSpaceOf({n[0], n[1], n[2], -12 * (n[0] + n[1] + n[2]) + Real(-8, 8)});
@@ -143,11 +147,7 @@ TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxels) {
 TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxelsForCylindersToo) {
   int sides[3] = {};
   for (int i = 0; i < 20000; ++i) {
-    Box3 box;
-    for (int a = 0; a < 3; ++a) {
-      box.lo[a] = Int(0, 20);
-      box.hi[a] = box.lo[a] + Int(1, 5);
-    }
+    const Box3 box = SmallBox();
     LayerRecord layer;
     layer.cylinder_count = 1;
     double* const m = layer.cylinders[0].unit.m;
