@@ -81,6 +81,20 @@ function(voxeld_test_options name)
   endif()
 endfunction()
 
+# Under a sanitizer, where no header is compiled alone anyway, what most files include is compiled once for all of them.
+set(VOXELD_COMMON_HEADERS OFF)
+if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(VOXELD_COMMON_HEADERS ON)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/common.cc CONTENT "int voxeld_common_headers;\n" @ONLY)
+  add_library(voxeld_common_headers OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/common.cc)
+  target_precompile_headers(voxeld_common_headers PRIVATE
+    <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
+    <algorithm> <array> <chrono> <cmath> <functional> <map> <memory> <optional> <span> <string> <thread> <utility> <variant>
+    <vector>)
+  target_link_libraries(voxeld_common_headers PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::statusor absl::strings)
+  target_compile_options(voxeld_common_headers PRIVATE -pthread)
+endif()
+
 # voxeld_library(NAME SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. Each of HEADERS is also compiled with
 # nothing before it (but under a sanitizer), so none leans on what its includer happened to include: by its own .cc, which
 # includes it first (tools/check_includes.py), or alone.
@@ -105,6 +119,10 @@ function(voxeld_library name)
   endforeach()
   add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
+  if(VOXELD_COMMON_HEADERS)
+    target_compile_options(voxeld_${name} PRIVATE -pthread)
+    target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers)
+  endif()
 endfunction()
 
 # What most tests include, compiled once for all of them. Clang, which checks includes, reads them each time.

@@ -17,6 +17,8 @@ inline EngineCase CaseOf(const char* name, EngineKind kind, bool in_worker,
   return {name, [kind, in_worker, devices](EngineOptions options) {
             options.kind = kind;
             options.in_worker = in_worker;
+            options.worker_deadline_ns =
+                int64_t{60} * 1'000'000'000;  // of a slow machine, or a sanitizer
             options.devices = devices;
             return CreateEngine(options);
           }};
