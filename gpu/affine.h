@@ -45,4 +45,10 @@ VOXELD_HD inline double Determinant(const Affine& a) {
          m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
+// Of an entry of the linear part. Row r of the inverse has entries Cofactor(a, c, r) / Determinant(a).
+inline double Cofactor(const Affine& a, int row, int col) {
+  const auto at = [&](int i, int j) { return a.m[i % 3 * 4 + j % 3]; };
+  return at(row + 1, col + 1) * at(row + 2, col + 2) - at(row + 1, col + 2) * at(row + 2, col + 1);
+}
+
 }  // namespace voxeld::gpu

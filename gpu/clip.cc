@@ -29,11 +29,9 @@ struct PlaneMap {
   explicit PlaneMap(const Affine& view) {
     const double determinant = Determinant(view);
     const double sign = determinant < 0 ? -1 : 1;
-    const auto at = [&](int row, int col) { return view.m[row % 3 * 4 + col % 3]; };
     for (int row = 0; row < 3; ++row) {
       for (int col = 0; col < 3; ++col) {
-        cofactor[row][col] = sign * (at(row + 1, col + 1) * at(row + 2, col + 2) -
-                                     at(row + 1, col + 2) * at(row + 2, col + 1));
+        cofactor[row][col] = sign * Cofactor(view, row, col);
       }
       shift[row] = view.m[row * 4 + 3];
     }
@@ -86,10 +84,7 @@ VoxelCylinder MapCylinder(const ClipCylinder& cylinder, const Affine& view) {
     VoxelCylinder::Row& row = out.rows[r];
     double base = 0;
     for (int c = 0; c < 3; ++c) {
-      const auto at = [&](int i, int j) { return map.m[i % 3 * 4 + j % 3]; };
-      // Row r of the inverse: cofactors of column r.
-      const double inverse =
-          (at(c + 1, r + 1) * at(c + 2, r + 2) - at(c + 1, r + 2) * at(c + 2, r + 1)) / determinant;
+      const double inverse = Cofactor(map, c, r) / determinant;
       row.by[c] = inverse / 2;
       base = base - inverse * map.m[c * 4 + 3];
       is_finite = is_finite && std::isfinite(inverse);

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "gpu/implicit/program_check.h"
+#include "gpu/primitives/texture.h"
 #include "gpu/samples_check.h"
 
 namespace voxeld::gpu {
@@ -23,10 +24,6 @@ static_assert(std::is_trivially_copyable_v<BulkRef> && sizeof(BulkRef) % kAlign 
 static_assert(sizeof(RecordHeader) == kAlign && sizeof(IdRecord) == kAlign);
 
 constexpr uint64_t Padded(uint64_t size) { return (size + kAlign - 1) / kAlign * kAlign; }
-
-uint64_t ColorCount(const GeometryRecord& g) {
-  return g.color_mode == ColorMode::kPerVertex ? g.vertex_count : 0;
-}
 
 // Builds messages that say where, what, and what would be right.
 class Checker {
@@ -107,6 +104,16 @@ absl::Status CheckCurved(const Checker& check, const GeometryRecord& g) {
   return check.Wrong("vertex_count", g.vertex_count, "3 a curve and 1 for a strip of curves");
 }
 
+absl::Status CheckTexture(const Checker& check, const GeometryRecord& g) {
+  const uint32_t width = g.texture_width, height = g.texture_height;
+  if (width == 0 && height == 0) return absl::OkStatus();
+  if (g.kind != PrimitiveKind::kTriangles) {
+    return check.Wrong("texture_width", width, "0 for what is no triangles");
+  }
+  return FirstError({check.Enum("texture_width", width, 1, kMostTextureSide),
+                     check.Enum("texture_height", height, 1, kMostTextureSide)});
+}
+
 absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   absl::Status status =
       FirstError({check.Enum("kind", static_cast<uint32_t>(g.kind), 1, 11),
@@ -118,7 +125,8 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
                   check.Enum("thickness_unit", static_cast<uint32_t>(g.thickness_unit), 0, 1),
                   check.Enum("drawn_by", static_cast<uint32_t>(g.drawn_by), 0, 1),
                   check.Enum("splat", static_cast<uint32_t>(g.splat), 0, 2),
-                  check.Finite("thickness", &g.thickness, 1), check.Finite("params", g.params, 8)});
+                  check.Finite("thickness", &g.thickness, 1), check.Finite("params", g.params, 8),
+                  CheckTexture(check, g)});
   if (!status.ok()) return status;
   if (g.thickness < 0) return check.Wrong("thickness", g.thickness, "0 or greater");
   if (IsSolid(g.kind)) {
@@ -304,7 +312,8 @@ absl::Status ReadLayer(uint64_t offset, std::span<const std::byte> body, DeltaVi
   absl::Status status = FirstError(
       {check.Enum("visible", l->visible, 0, 1), check.Enum("opacity", l->opacity, 0, 255),
        check.Enum("blend", static_cast<uint32_t>(l->blend), 0, 2),
-       check.Finite("transform", l->transform.m, 12), CheckClip(check, *l)});
+       check.Enum("has_mask", l->has_mask, 0, 1), check.Finite("transform", l->transform.m, 12),
+       CheckClip(check, *l)});
   return status.ok() ? visitor.OnLayer(*l) : status;
 }
 
@@ -337,6 +346,14 @@ absl::Status ReadRecord(Op op, uint64_t offset, std::span<const std::byte> body,
 }  // namespace
 
 // Counts are 32-bit, so the sums fit.
+uint64_t ColorCount(const GeometryRecord& g) {
+  uint64_t count = g.color_mode == ColorMode::kPerVertex ? g.vertex_count : 0;
+  if (g.texture_width != 0) {
+    count += uint64_t{2} * g.vertex_count + TexelCount(g.texture_width, g.texture_height);
+  }
+  return count;
+}
+
 ArrayLayout ArrayLayout::Of(const GeometryRecord& g) {
   ArrayLayout layout;
   layout.indices = Padded(uint64_t{g.vertex_count} * 12);

@@ -84,7 +84,8 @@ struct IdRecord {
 };
 
 // Arrays follow in this order, each padded to 16 bytes: positions f32[vertex_count][3], indices
-// u32[index_count], colors u32[vertex_count] (0x00RRGGBB; only with kPerVertex).
+// u32[index_count], colors u32[ColorCount]: with kPerVertex 0x00RRGGBB of each vertex; with a texture f32[2] of each vertex,
+// its place on it, and the texture (primitives/texture.h).
 struct GeometryRecord {
   uint64_t id = 0;
   PrimitiveKind kind = PrimitiveKind::kPoints;
@@ -103,8 +104,13 @@ struct GeometryRecord {
   float params[8] = {};
   DrawnBy drawn_by = DrawnBy::kEngine;  // the same voxels
   Splat splat = Splat::kBall;           // kPoints
-  uint32_t reserved = 0;
+  // Of kTriangles: a picture that colours are multiplied by; 1 to kMostTextureSide, both 0: none.
+  uint16_t texture_width = 0, texture_height = 0;
 };
+inline constexpr uint32_t kMostTextureSide = 8192;
+
+// Entries of a geometry's array of colours.
+uint64_t ColorCount(const GeometryRecord& g);
 
 // Where a geometry's arrays lie, in a record or in bulk memory: positions at the beginning, each
 // array padded to 16 bytes.
@@ -147,7 +153,9 @@ struct Region {
 };
 
 // Layers combine in ascending (order, id). Where there are planes, cylinders or a region, only voxels that lie
-// inside all of them (gpu/clip.h) are the layer's: the others it does not cover.
+// inside all of them (gpu/clip.h) are the layer's: the others it does not cover. Where there is a mask, only voxels that
+// this layer covers, as its own planes, cylinders and region leave it; whether it is visible, and what its own mask is,
+// makes no difference.
 struct LayerRecord {
   uint64_t id = 0;  // the number of creation
   int32_t order = 0;
@@ -157,8 +165,9 @@ struct LayerRecord {
   uint32_t plane_count = 0;     // 0 to kMaxClipPlanes
   uint32_t has_region = 0;      // 1: `region` holds
   uint32_t cylinder_count = 0;  // 0 to kMaxClipCylinders
-  uint32_t reserved[3] = {};
-  Affine transform;  // layer's coordinates → scene's
+  uint32_t has_mask = 0;        // 1: `mask` holds
+  uint64_t mask = 0;            // the id of a layer, which need not be there
+  Affine transform;             // layer's coordinates → scene's
   ClipPlane planes[kMaxClipPlanes];
   ClipCylinder cylinders[kMaxClipCylinders];
   Region region;

@@ -34,8 +34,7 @@ absl::StatusOr<GeometryArrays> GeometryArrays::Allocate(const GeometryRecord& re
   }
   arrays.positions_ = {reinterpret_cast<float*>(at), size_t{record.vertex_count} * 3};
   arrays.indices_ = {reinterpret_cast<uint32_t*>(at + layout.indices), record.index_count};
-  arrays.colors_ = {reinterpret_cast<uint32_t*>(at + layout.colors),
-                    record.color_mode == ColorMode::kPerVertex ? record.vertex_count : 0};
+  arrays.colors_ = {reinterpret_cast<uint32_t*>(at + layout.colors), ColorCount(record)};
   return arrays;
 }
 

@@ -106,7 +106,7 @@ def page() -> str:
         for text in shown.get(field, []):
             out.append(f"```\nvoxelctl draw \"{text}\"\n```\n")
     out.append("## Types that several have\n")
-    for message in ("Vertices", "Thickness", "ColorScale", "Grid", "Transfer", "Expression", "Boundary"):
+    for message in ("Vertices", "Thickness", "Texture", "ColorScale", "Grid", "Transfer", "Expression", "Boundary"):
         above, fields = all_messages[message]
         out.append(f"### {message}\n\n{above}\n")
         if fields:

@@ -107,6 +107,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_expression_nodes", limits.max_expression_nodes, 1, 1024);
   visitor.Integer("max_expression_depth", limits.max_expression_depth, 1, 256);
   visitor.Integer("max_boundary_points", limits.max_boundary_points, 3, 65536);
+  visitor.Integer("max_texture_texels", limits.max_texture_texels, 1,
+                  uint64_t{gpu::kMostTextureSide} * gpu::kMostTextureSide);
   visitor.Integer("max_captures", limits.max_captures, 1, 1024);
   visitor.Integer("max_linger_ns", limits.max_linger_ns, 0, kMost);
   visitor.Integer("credit_bytes", limits.credit_bytes, 4096, kMost);

@@ -123,6 +123,7 @@ struct LayerInfo {
   gpu::Affine transform;
   Clip clip;
   std::optional<gpu::Region> region;
+  std::string mask;  // empty: none
   uint64_t entities = 0, bytes = 0;
   bool orphaned = false;
   std::string client_name;

@@ -23,7 +23,8 @@ uint64_t StagedBytes(const Operation& operation) {
   } else if (const auto* set = std::get_if<SetTransform>(&operation.op)) {
     bytes += set->layer.size() + set->id.size();
   } else if (const auto* state = std::get_if<LayerState>(&operation.op)) {
-    bytes += state->layer.size() + (state->clip != nullptr ? sizeof(Clip) : 0);
+    bytes += state->layer.size() + (state->clip != nullptr ? sizeof(Clip) : 0) +
+             (state->mask.has_value() ? state->mask->size() : 0);
   } else if (const auto* begin = std::get_if<FrameBegin>(&operation.op)) {
     bytes += begin->layer.size();
   } else if (const auto* end = std::get_if<FrameEnd>(&operation.op)) {

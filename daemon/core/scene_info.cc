@@ -70,6 +70,7 @@ LayerInfo InfoOf(const OwnedName& key, const Layer& layer) {
   info.transform = layer.transform;
   info.clip = layer.clip;
   info.region = layer.region;
+  info.mask = layer.mask;
   info.entities = layer.entities.size();
   info.bytes = layer.bytes;
   info.orphaned = layer.writer->ended;

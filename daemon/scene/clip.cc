@@ -25,15 +25,13 @@ bool AddSlab(const double n[3], double least, double most, gpu::LayerRecord& rec
 
 bool AddBox(const ClipBox& box, gpu::LayerRecord& record) {
   const double* const m = box.transform.m;
-  const auto at = [&](int i, int j) { return m[i % 3 * 4 + j % 3]; };
   const double determinant = gpu::Determinant(box.transform);
   bool is_sound = std::isnormal(determinant);
   for (int a = 0; a < 3; ++a) {
     // The box's coordinate a of a point p of the scene is n · p − shift.
     double n[3], shift = 0;
     for (int c = 0; c < 3; ++c) {
-      n[c] =
-          (at(c + 1, a + 1) * at(c + 2, a + 2) - at(c + 1, a + 2) * at(c + 2, a + 1)) / determinant;
+      n[c] = gpu::Cofactor(box.transform, c, a) / determinant;
       shift += n[c] * m[c * 4 + 3];
     }
     const double middle = shift + box.center[a];

@@ -318,6 +318,7 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
   layer.transform = state.transform.value_or(layer.transform);
   if (state.clip != nullptr) layer.clip = *state.clip;
   layer.region = state.region.value_or(layer.region);
+  layer.mask = state.mask.value_or(layer.mask);
   Applied(state.layer);
 }
 

@@ -9,6 +9,7 @@ namespace voxeld::daemon {
 namespace {
 
 constexpr uint32_t kNoTint = 0x00FFFFFF;
+constexpr uint64_t kNoLayer = 0;  // no layer has this number
 constexpr uint32_t kRecordsPerBreath = 256;
 constexpr size_t kBytesPerBreath = size_t{1} << 20;
 
@@ -17,7 +18,8 @@ const Snapshot& EmptyScene() {
   return empty;
 }
 
-gpu::LayerRecord RecordOf(const Layer& layer) {
+// `mask`: the layer that masks it, if that is there.
+gpu::LayerRecord RecordOf(const Layer& layer, const Layer* mask) {
   gpu::LayerRecord record;
   record.id = layer.number;
   record.order = layer.order;
@@ -28,13 +30,15 @@ gpu::LayerRecord RecordOf(const Layer& layer) {
   PutClip(layer.clip, record);  // sound, or it would have been refused
   record.has_region = layer.region.has_value() ? 1 : 0;
   record.region = layer.region.value_or(gpu::Region());
+  record.has_mask = layer.mask.empty() ? 0 : 1;
+  record.mask = mask == nullptr ? kNoLayer : mask->number;
   return record;
 }
 
 bool LooksSame(const Layer& a, const Layer& b) {
   return a.order == b.order && a.shown() == b.shown() && a.opacity == b.opacity &&
          a.blend == b.blend && a.transform == b.transform && a.clip == b.clip &&
-         a.region == b.region;
+         a.region == b.region && a.mask == b.mask;
 }
 
 // Nothing that an engine sees: label, sequence and expiry may differ.
@@ -80,6 +84,10 @@ size_t EngineScene::Plan(SnapshotPtr next) {
       [&](const OwnedName& key, const LayerPtr* was, const LayerPtr* is) {
         const Layer* old_layer = was == nullptr ? nullptr : was->get();
         const Layer* new_layer = is == nullptr ? nullptr : is->get();
+        if (old_layer == nullptr || new_layer == nullptr ||
+            old_layer->number != new_layer->number) {
+          renumbered_.insert(key);
+        }
         if (old_layer != nullptr && new_layer != nullptr &&
             old_layer->number != new_layer->number) {
           PlanLayer(key, old_layer, nullptr);  // removed, and another made by the same name
@@ -87,6 +95,7 @@ size_t EngineScene::Plan(SnapshotPtr next) {
         }
         PlanLayer(key, old_layer, new_layer);
       });
+  PlanMasks(before);
   for (const auto& [number, place] : redraw_) {
     Draw(place.layer, *next_->FindLayer(place.layer), place.id,
          *next_->FindEntity(place.layer, place.id));
@@ -166,13 +175,28 @@ void EngineScene::PlanInstances(const Snapshot& before, const Snapshot& next) {
       });
 }
 
+void EngineScene::PutLayer(const OwnedName& key, const Layer& layer) {
+  const Layer* const mask = next_->FindLayer({key.owner, layer.mask});
+  put_layers_.push_back(RecordOf(layer, mask));
+}
+
+void EngineScene::PlanMasks(const Snapshot& before) {
+  if (renumbered_.empty()) return;
+  next_->layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
+    if (layer->mask.empty() || renumbered_.contains(key)) return;
+    if (!renumbered_.contains({key.owner, layer->mask})) return;
+    if (LooksSame(*before.FindLayer(key), *layer)) PutLayer(key, *layer);
+  });
+  renumbered_.clear();
+}
+
 void EngineScene::PlanLayer(const OwnedName& key, const Layer* before, const Layer* now) {
   if (now == nullptr) {
     before->entities.ForEach([&](const std::string&, const EntityPtr& entity) { Undraw(*entity); });
     drop_layers_.push_back(before->number);
     return;
   }
-  if (before == nullptr || !LooksSame(*before, *now)) put_layers_.push_back(RecordOf(*now));
+  if (before == nullptr || !LooksSame(*before, *now)) PutLayer(key, *now);
   EntityMap::Diff(before == nullptr ? EntityMap() : before->entities, now->entities,
                   [&](const std::string& id, const EntityPtr* was, const EntityPtr* is) {
                     if (is == nullptr) return Undraw(**was);

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
 #include "daemon/scene/snapshot.h"
 #include "gpu/delta.h"
 
@@ -88,6 +89,9 @@ class EngineScene {
   };
 
   void PlanLayer(const OwnedName& key, const Layer* before, const Layer* now);
+  void PutLayer(const OwnedName& key, const Layer& layer);
+  // Of layers that have not changed themselves, puts those whose mask has come, gone, or been made anew.
+  void PlanMasks(const Snapshot& before);
   void PlanInstances(const Snapshot& before, const Snapshot& next);
   void Draw(const OwnedName& key, const Layer& layer, const std::string& id, const Entity& entity);
   void Undraw(const Entity& entity);
@@ -111,6 +115,7 @@ class EngineScene {
   std::vector<Flat> flat_;
   // Entities to draw anew though they have not changed: objects that they draw have. By number.
   std::map<uint64_t, EntityPlace> redraw_;
+  absl::flat_hash_set<OwnedName> renumbered_;  // layers that came, went, or were made anew
   std::vector<HeldGeometry> put_geometries_;
   std::vector<HeldGeometry> unused_;  // dropped to no use at some time; may be in use again
   std::vector<uint64_t> drop_geometries_, drop_drawables_, drop_layers_;

@@ -104,7 +104,8 @@ struct Limits {
   // Of one shape's expressions together: operations, and how deep text nests.
   uint32_t max_expression_nodes = 1024;
   uint32_t max_expression_depth = 64;
-  uint32_t max_boundary_points = 4096;  // of one shape's boundary
+  uint32_t max_boundary_points = 4096;      // of one shape's boundary
+  uint64_t max_texture_texels = 16u << 20;  // of one picture
 };
 
 // Immutable content of a primitive: the engine's record (its id unused) and arrays, which engines
@@ -208,6 +209,7 @@ struct LayerState {
   std::optional<gpu::Affine> transform;
   std::shared_ptr<const Clip> clip;                  // null: as it is; empty: none any more
   std::optional<std::optional<gpu::Region>> region;  // holds nothing: none any more
+  std::optional<std::string> mask;  // a layer of the same owner; empty: none any more
 };
 struct FrameBegin {
   std::string layer;

@@ -20,7 +20,7 @@ bool LooksSame(const WriterPtr& a, const WriterPtr& b) {
 bool LooksSame(const Layer& a, const Layer& b) {
   return a.visible == b.visible && a.opacity == b.opacity && a.order == b.order &&
          a.blend == b.blend && a.transform == b.transform && a.clip == b.clip &&
-         a.region == b.region && LooksSame(a.writer, b.writer);
+         a.region == b.region && a.mask == b.mask && LooksSame(a.writer, b.writer);
 }
 
 // What was there under the same name, if it is the same layer still.

@@ -58,6 +58,7 @@ struct Layer {
   gpu::Affine transform;
   Clip clip;
   std::optional<gpu::Region> region;
+  std::string mask;  // a layer of the same owner, which need not be there; empty: none
   bool shown() const { return visible && !suppressed; }
   WriterPtr writer;
   EntityMap entities;

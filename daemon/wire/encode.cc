@@ -133,6 +133,7 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_expression_nodes(in.max_expression_nodes);
   out->set_max_expression_depth(in.max_expression_depth);
   out->set_max_boundary_points(in.max_boundary_points);
+  out->set_max_texture_texels(in.max_texture_texels);
   out->set_max_entities(in.max_entities);
   out->set_max_layers(in.max_layers);
   out->set_max_scene_bytes(in.max_scene_bytes);
@@ -181,6 +182,7 @@ void Encode(const LayerInfo& in, v1::LayerInfo* out) {
   ToWire(in.transform, out->mutable_transform());
   if (!in.clip.empty()) ToWire(in.clip, out->mutable_clip());
   if (in.region.has_value()) ToWire(*in.region, out->mutable_region());
+  out->set_mask_layer(in.mask);
   out->set_entities(in.entities);
   out->set_bytes(in.bytes);
   out->set_orphaned(in.orphaned);

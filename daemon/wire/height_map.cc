@@ -5,9 +5,11 @@
 #include <cstring>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/fields.h"
+#include "daemon/wire/texture.h"
 #include "gpu/implicit/field_shape.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -17,6 +19,7 @@ namespace {
 using gpu::implicit::Vector;
 
 constexpr double kLeastSine = 1e-6;
+constexpr uint32_t kCornersPerCell = 6;
 
 // A grid of samples: counts and payloads that fit one another.
 MaybeFault CheckGrid(const FieldPath& path, const v1::HeightMap& in, const Limits& limits) {
@@ -27,7 +30,7 @@ MaybeFault CheckGrid(const FieldPath& path, const v1::HeightMap& in, const Limit
                  absl::StrCat("is ", count, "; give 2 or more")};
   }
   const uint64_t samples = uint64_t{in.columns()} * in.rows();
-  const uint64_t corners = uint64_t{in.columns() - 1} * (in.rows() - 1) * 6;
+  const uint64_t corners = uint64_t{in.columns() - 1} * (in.rows() - 1) * kCornersPerCell;
   if (samples > limits.max_vertices_per_entity || corners > limits.max_indices_per_entity) {
     return Fault{FieldPath(path, "rows").ToString(), Reason::kQuotaExceeded,
                  absl::StrCat("makes ", samples, " samples and ", corners,
@@ -72,7 +75,7 @@ double HeightAt(const v1::HeightMap& in, size_t sample) {
 }
 
 // Two triangles to each square, cut from its first sample to the opposite one.
-void FillIndices(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
+void FillTriangles(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
   size_t at = 0;
   for (uint32_t row = 0; row + 1 < rows; ++row) {
     for (uint32_t column = 0; column + 1 < columns; ++column) {
@@ -84,12 +87,76 @@ void FillIndices(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
   }
 }
 
+// Between neighbours along rows and columns.
+void FillLines(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
+  size_t at = 0;
+  for (uint32_t row = 0; row < rows; ++row) {
+    for (uint32_t column = 0; column < columns; ++column) {
+      const uint32_t sample = row * columns + column;
+      const uint32_t right = column + 1 < columns ? 1 : 0, below = row + 1 < rows ? columns : 0;
+      for (const uint32_t step : {right, below}) {
+        if (step == 0) continue;
+        out[at++] = sample;
+        out[at++] = sample + step;
+      }
+    }
+  }
+}
+
+MaybeFault ToFill(const FieldPath& path, const v1::HeightMap& in, gpu::GeometryRecord* out) {
+  const uint32_t columns = in.columns(), rows = in.rows();
+  out->vertex_count = columns * rows;
+  switch (in.fill()) {
+    case v1::FILL_UNSPECIFIED:
+    case v1::FILL_SURFACE:
+      out->kind = gpu::PrimitiveKind::kTriangles;
+      out->index_count = (columns - 1) * (rows - 1) * kCornersPerCell;
+      return {};
+    case v1::FILL_LINES:
+      out->kind = gpu::PrimitiveKind::kSegments;
+      out->topology = gpu::Topology::kList;
+      out->index_count = ((columns - 1) * rows + columns * (rows - 1)) * 2;
+      break;
+    case v1::FILL_DOTS:
+      out->kind = gpu::PrimitiveKind::kPoints;
+      break;
+    case v1::FILL_SOLID:
+      return Fault{
+          FieldPath(path, "fill").ToString(), Reason::kInvalidValue,
+          "is FILL_SOLID, but it has no inside; give FILL_SURFACE, FILL_LINES or FILL_DOTS"};
+    default:
+      return UnknownEnum(FieldPath(path, "fill"), in.fill(), "FILL_SURFACE, FILL_LINES, FILL_DOTS");
+  }
+  if (in.picture().empty()) return {};
+  return Fault{FieldPath(path, "picture").ToString(), Reason::kInvalidValue,
+               "is given, but only a surface takes one; leave it out, or fill"};
+}
+
+void FillIndices(const gpu::GeometryRecord& record, const v1::HeightMap& in,
+                 std::span<uint32_t> out) {
+  if (record.kind == gpu::PrimitiveKind::kTriangles) FillTriangles(in.columns(), in.rows(), out);
+  if (record.kind == gpu::PrimitiveKind::kSegments) FillLines(in.columns(), in.rows(), out);
+}
+
+// From edge to edge, whatever the heights.
+MaybeFault AddPicture(const FieldPath& path, const v1::HeightMap& in, const DecodeContext& context,
+                      GeometryData* out) {
+  std::vector<float> places;
+  places.reserve(size_t{2} * out->record.vertex_count);
+  for (uint32_t row = 0; row < in.rows(); ++row) {
+    for (uint32_t column = 0; column < in.columns(); ++column) {
+      places.push_back(static_cast<float>(column / (in.columns() - 1.0)));
+      places.push_back(static_cast<float>(row / (in.rows() - 1.0)));
+    }
+  }
+  return wire::AddPicture(FieldPath(path, "picture"), in.picture(), places, context, out);
+}
+
 }  // namespace
 
 MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const DecodeContext& context,
                        GeometryData* out) {
   gpu::GeometryRecord& record = out->record;
-  record.kind = gpu::PrimitiveKind::kTriangles;
   Vector corner, edges[2], up = {0, 0, 1};
   if (auto fault = ToVector(FieldPath(path, "corner"), in.corner(), &corner)) return fault;
   if (auto fault = ToVector(FieldPath(path, "edge_a"), in.edge_a(), &edges[0])) return fault;
@@ -105,8 +172,7 @@ MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const Dec
   if (auto fault = CheckGrid(path, in, context)) return fault;
   if (auto fault = ToRule(path, in.rule(), &record)) return fault;
 
-  record.vertex_count = in.columns() * in.rows();
-  record.index_count = (in.columns() - 1) * (in.rows() - 1) * 6;
+  if (auto fault = ToFill(path, in, &record)) return fault;
   if (!in.colors().empty()) record.color_mode = gpu::ColorMode::kPerVertex;
   absl::StatusOr<gpu::GeometryArrays> kept = gpu::GeometryArrays::Allocate(record, context.pool);
   if (!kept.ok()) {
@@ -135,13 +201,13 @@ MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const Dec
       }
     }
   }
-  FillIndices(in.columns(), in.rows(), out->arrays.writable_indices());
+  FillIndices(record, in, out->arrays.writable_indices());
   const auto* color = reinterpret_cast<const uint8_t*>(in.colors().data());
   for (uint32_t& rgb : out->arrays.writable_colors()) {
     rgb = uint32_t{color[0]} << 16 | uint32_t{color[1]} << 8 | color[2];
     color += 3;
   }
-  return {};
+  return in.picture().empty() ? MaybeFault() : AddPicture(path, in, context, out);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -174,9 +174,14 @@ MaybeFault To(const FieldPath& path, const v1::LayerState& in, const Limits& lim
       return fault;
     }
   }
-  if (!in.mask_layer().empty()) {
-    return Unimplemented(FieldPath(path, "mask_layer"),
-                         "layers are not masked by others; leave it empty");
+  if (in.has_mask_layer()) {
+    if (!in.mask_layer().empty()) {
+      if (auto fault =
+              CheckName(FieldPath(path, "mask_layer"), in.mask_layer(), limits.max_id_bytes)) {
+        return fault;
+      }
+    }
+    out->mask = in.mask_layer();
   }
   out->layer = in.layer();
   if (in.has_visible()) out->visible = in.visible();

@@ -17,6 +17,7 @@
 #include "daemon/wire/open_edges.h"
 #include "daemon/wire/shapes.h"
 #include "daemon/wire/text.h"
+#include "daemon/wire/texture.h"
 #include "daemon/wire/vertices.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -123,6 +124,10 @@ MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
   bool framed;
   if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
+  if (in.has_texture() && (framed || out->record.fill != gpu::Fill::kSurface)) {
+    return Fault{FieldPath(path, "texture").ToString(), Reason::kInvalidValue,
+                 "is given, but only a surface takes one; leave it out, or fill"};
+  }
   if (auto fault = ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out)) {
     return fault;
   }
@@ -316,8 +321,9 @@ bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
     case v1::Primitive::kSegments:
       return false;
     case v1::Primitive::kMesh:
-      return data.record.kind != gpu::PrimitiveKind::kTriangles &&
-             data.record.kind != gpu::PrimitiveKind::kFilled;
+      return (data.record.kind != gpu::PrimitiveKind::kTriangles &&
+              data.record.kind != gpu::PrimitiveKind::kFilled) ||
+             data.record.texture_width != 0;
     case v1::Primitive::kBox:
     case v1::Primitive::kSphere:
     case v1::Primitive::kCylinder:
@@ -330,8 +336,8 @@ bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
 // Whether what is read of it becomes something else.
 bool IsConverted(const v1::Primitive& in) {
   return in.has_curve() || in.has_bezier_surface() ||
-         (in.has_mesh() &&
-          (in.mesh().fill() == v1::FILL_LINES || in.mesh().fill() == v1::FILL_DOTS));
+         (in.has_mesh() && (in.mesh().has_texture() || in.mesh().fill() == v1::FILL_LINES ||
+                            in.mesh().fill() == v1::FILL_DOTS));
 }
 
 // A primitive that has been read, its arrays in the message wherever they lay.
@@ -350,7 +356,11 @@ MaybeFault Convert(const FieldPath& path, const v1::Primitive& in, const DecodeC
                    GeometryData* out) {
   if (in.has_curve()) return ToSpline(FieldPath(path, "curve"), in.curve(), context, out);
   if (in.has_bezier_surface()) return ToPatches(FieldPath(path, "bezier_surface"), context, out);
-  return ToMeshFrame(FieldPath(path, "mesh"), in.mesh().fill() == v1::FILL_DOTS, context, out);
+  const FieldPath mesh(path, "mesh");
+  if (in.mesh().has_texture()) {
+    return ToTexture(FieldPath(mesh, "texture"), in.mesh().texture(), context, out);
+  }
+  return ToMeshFrame(mesh, in.mesh().fill() == v1::FILL_DOTS, context, out);
 }
 
 MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -31,13 +32,10 @@ std::string Show(const Vector& v) {
   return absl::StrCat("(", wire::Show(v.x), ", ", wire::Show(v.y), ", ", wire::Show(v.z), ")");
 }
 
-// `in`: rule and shell are fields of all. Surfaces without an inside have no fill.
 template <typename Message>
 MaybeFault ToLook(const FieldPath& path, const Message& in, const Limits& limits,
                   gpu::GeometryRecord* out) {
-  if constexpr (requires { in.fill(); }) {
-    if (auto fault = ToFill(path, in.fill(), out)) return fault;
-  }
+  if (auto fault = ToFill(path, in.fill(), out)) return fault;
   if (auto fault = ToRule(path, in.rule(), out)) return fault;
   return ToThickness(FieldPath(path, "shell"), in.shell(), limits, out);
 }
@@ -49,10 +47,19 @@ MaybeFault Finish(const FieldPath& path, const ShapeContext& context, const Shap
   return ToField(path, context, graph, shape.Make(graph), out);
 }
 
+template <typename Message>
+inline constexpr bool kHasInside =
+    !std::is_same_v<Message, v1::Disc> && !std::is_same_v<Message, v1::Patch> &&
+    !std::is_same_v<Message, v1::Polygon>;
+
 // Fill and all of a look, of what has lines and dots; `*done`: it has been drawn as these.
 template <typename Message, typename Shape>
 MaybeFault ToLookOrFrame(const FieldPath& path, const Message& in, const ShapeContext& context,
                          const Shape& shape, GeometryData* out, bool* done) {
+  if (!kHasInside<Message> && in.fill() == v1::FILL_SOLID) {
+    return Fault{FieldPath(path, "fill").ToString(), Reason::kInvalidValue,
+                 "is FILL_SOLID, but it has no inside; give FILL_SURFACE, FILL_LINES or FILL_DOTS"};
+  }
   if (auto fault = ToFill(path, in.fill(), &out->record, done)) return fault;
   if (!*done) return ToLook(path, in, context.context, &out->record);
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
@@ -118,8 +125,9 @@ MaybeFault ToShape(const FieldPath& path, const v1::Arrow& in, const ShapeContex
   arrow.shaft_radius = in.shaft_radius();
   arrow.head_length = in.head_length() == 0 ? length / 4 : in.head_length();
   arrow.head_radius = in.head_radius() == 0 ? arrow.head_length * 2 / 5 : in.head_radius();
-  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
-  return Finish(path, context, arrow, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, arrow, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, arrow, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const ShapeContext& context,
@@ -170,8 +178,9 @@ MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const ShapeContext
                  absl::StrCat("is ", wire::Show(in.inner_radius()), "; give less than radius, ",
                               wire::Show(in.radius()))};
   }
-  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
-  return Finish(path, context, disc, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, disc, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, disc, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Ellipsoid& in, const ShapeContext& context,
@@ -218,8 +227,9 @@ MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const ShapeContex
                  absl::StrCat("is ", Show(patch.v), " beside ", Show(patch.u),
                               "; the two edges must span an area")};
   }
-  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
-  return Finish(path, context, patch, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, patch, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, patch, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const ShapeContext& context,
@@ -245,8 +255,9 @@ MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const ShapeCont
                  absl::StrCat("are ", wire::Show(uneven), " away from a plane; give points within ",
                               wire::Show(kMostUneven * extent), ", or a mesh")};
   }
-  if (auto fault = ToLook(path, in, context.context, &out->record)) return fault;
-  return Finish(path, context, polygon, out);
+  bool done;
+  if (auto fault = ToLookOrFrame(path, in, context, polygon, out, &done)) return fault;
+  return done ? MaybeFault() : Finish(path, context, polygon, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Torus& in, const ShapeContext& context,

@@ -32,7 +32,8 @@ RetainedGeometry KeepOnHost(const GeometryView& view) {
 
 bool LooksSame(const LayerRecord& a, const LayerRecord& b) {
   return a.visible == b.visible && a.opacity == b.opacity && a.order == b.order &&
-         a.blend == b.blend && SameClip(a, b);
+         a.blend == b.blend && a.has_mask == b.has_mask && (a.has_mask == 0 || a.mask == b.mask) &&
+         SameClip(a, b);
 }
 
 void Scene::MapClips(const Affine& view, bool anew) {
@@ -123,6 +124,17 @@ void Scene::RankLayers() {
   for (size_t i = 0; i < layers.size(); ++i) layers[i]->rank = static_cast<int>(i);
 }
 
+void Scene::LinkMasks() {
+  for (const auto& [id, layer] : layers_) {
+    const auto it = layer->record.has_mask != 0 ? layers_.find(layer->record.mask) : layers_.end();
+    layer->mask = it == layers_.end() ? nullptr : it->second.get();
+    layer->drawn = layer->seen();
+  }
+  for (const auto& [id, layer] : layers_) {
+    if (layer->mask != nullptr && layer->seen()) layers_[layer->mask->record.id]->drawn = true;
+  }
+}
+
 absl::Status Scene::Apply(std::span<const std::byte> delta, BulkSource* bulk,
                           SceneObserver& observer, std::vector<std::unique_ptr<Drawable>>& gone) {
   absl::StatusOr<DeltaPlan> plan = PlanDelta(delta, *this, bulk);
@@ -157,6 +169,7 @@ absl::Status Scene::Apply(std::span<const std::byte> delta, BulkSource* bulk,
   for (uint64_t id : plan->geometries_to_erase) geometries_.erase(id);
   for (uint64_t id : plan->layers_to_erase) layers_.erase(id);
   RankLayers();
+  LinkMasks();
   return absl::OkStatus();
 }
 

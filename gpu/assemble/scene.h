@@ -52,7 +52,12 @@ struct Layer {
   LayerRecord record;
   std::optional<VoxelClip> clip;  // derived, in voxel space; none: to be mapped anew
   absl::flat_hash_set<Drawable*> drawables;
-  int rank = 0;  // in the order of combination
+  int rank = 0;                 // in the order of combination
+  const Layer* mask = nullptr;  // if it has one that is there
+  bool drawn = false;           // it is seen, or the mask of one that is; as of the last delta
+
+  // It is visible, and has no mask or one that is there.
+  bool seen() const { return record.visible != 0 && (record.has_mask == 0 || mask != nullptr); }
 };
 
 // Whether what is drawn in a layer of this record comes out as in one of the other, if nothing moves.
@@ -106,6 +111,7 @@ class Scene {
   void PutLayer(const LayerRecord& record, SceneObserver& observer);
   std::unique_ptr<Drawable> TakeDrawable(uint64_t id, SceneObserver& observer);
   void RankLayers();
+  void LinkMasks();
 
   absl::flat_hash_map<uint64_t, GeometryEntry> geometries_;
   absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>> layers_;

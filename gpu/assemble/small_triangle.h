@@ -32,7 +32,7 @@ struct SmallTriangles {
 
   // False if the triangle is none: large, far away, without area, of several colours, or to be covered. Not if it is full.
   bool Add(const Triangle& t, const WalkGrid& grid, uint32_t of_word) {
-    if (t.rule != SurfaceRule::kThin || t.color[0] != t.color[1] || t.color[1] != t.color[2]) {
+    if (t.rule != SurfaceRule::kThin || !t.IsOfOneColor()) {
       return false;
     }
     int64_t from[3];

@@ -39,6 +39,14 @@ void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors
   }
 }
 
+// Uncovers what the mask does not cover, and leaves that zeros.
+void TakeMask(uint32_t* mask, uint32_t* words) {
+  for (size_t v = 0; v < kTileVoxels; ++v) {
+    if (!IsCovered(mask[v])) words[v] = 0;
+    mask[v] = 0;
+  }
+}
+
 }  // namespace
 
 void TileStore::Reset(const TileGrid& grid) {
@@ -134,7 +142,7 @@ void Volume::MarkDirty(uint32_t tile) {
 void Volume::OnLeave(Drawable& drawable) {
   if (drawable.pending || drawable.leaving) return;  // in no tile, or on its way out already
   for (uint32_t tile : drawable.bins.tiles) {
-    if (drawable.layer->record.visible != 0) MarkDirty(tile);
+    if (drawable.layer->drawn) MarkDirty(tile);
     if (!index_[tile].leaving) {
       index_[tile].leaving = true;
       leaving_.push_back(tile);
@@ -155,9 +163,9 @@ void Volume::OnEnter(Drawable& drawable) {
 
 void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const LayerRecord& now = layer.record;
-  if (LooksSame(now, next) || (now.visible == 0 && next.visible == 0)) return;
+  if (LooksSame(now, next) || (!layer.drawn && next.visible == 0)) return;
   // Nothing of it was to be seen, and where it will be is not known yet.
-  if (now.visible == 0 && !(now.transform == next.transform)) return;
+  if (!layer.drawn && !(now.transform == next.transform)) return;
   for (Drawable* drawable : layer.drawables) {
     for (uint32_t tile : drawable->bins.tiles) MarkDirty(tile);
   }
@@ -215,8 +223,10 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
     if (scratch.words != nullptr) continue;
     scratch.words = std::make_unique<TileWords>();
     scratch.colors = std::make_unique<TileWords>();
-    std::fill_n(scratch.words->at, kTileVoxels, 0);
-    std::fill_n(scratch.colors->at, kTileVoxels, 0);
+    scratch.mask = std::make_unique<TileWords>();
+    for (TileWords* words : {scratch.words.get(), scratch.colors.get(), scratch.mask.get()}) {
+      std::fill_n(words->at, kTileVoxels, 0);
+    }
   }
 }
 
@@ -266,7 +276,7 @@ void Volume::PreparePending() {
     d->derived_bytes = DerivedBytes(*d, sizeof(Entry));
     derived_bytes_ += d->derived_bytes;
     List(*d);
-    if (d->layer->record.visible == 0) continue;
+    if (!d->layer->drawn) continue;
     for (const uint32_t tile : d->bins.tiles) MarkDirty(tile);
   }
   pending_.clear();
@@ -303,17 +313,46 @@ void Volume::KeepCounted() {
   if (large_.bytes() > budget_.room_to_keep()) large_ = BinScratch();
 }
 
+std::span<const Volume::Entry> Volume::EntriesOf(const Layer& layer,
+                                                 std::span<const Entry> entries) {
+  const auto rank = [](const Entry& e) { return e.drawable->layer->rank; };
+  const auto [begin, end] = std::ranges::equal_range(entries, layer.rank, {}, rank);
+  return {begin, end};
+}
+
+void Volume::DrawEntries(std::span<const Entry> entries, uint32_t tile, const Box3& box,
+                         uint32_t* words, TileRows& touched) {
+  for (const Entry& e : entries) {
+    const Bins& bins = e.drawable->bins;
+    if (bins.counted()) {
+      passes_.Draw(*e.drawable, tile, box, words, touched);
+    } else {
+      DrawItems(*e.drawable, bins, bins.row(e.row), grid_, box, words, touched);
+    }
+  }
+}
+
+bool Volume::DrawMask(const Layer& layer, uint32_t tile, const Box3& box, Scratch& scratch) {
+  const std::span<const Entry> entries = EntriesOf(layer, scratch.entries);
+  const TileClip clip(*layer.clip, box);
+  if (entries.empty() || clip.outside()) return false;
+  uint32_t* const words = scratch.mask->at;
+  TileRows touched;
+  DrawEntries(entries, tile, box, words, touched);
+  clip.Uncover(grid_, box, words);
+  return true;
+}
+
 // False if it comes out as it was. `next`: the tile that this worker draws after it, if it is known.
 bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
                       Scratch& scratch) {
   scratch.entries.clear();
   for (const Entry& e : index_[tile].entries) {
-    if (e.drawable->layer->record.visible != 0) scratch.entries.push_back(e);
+    if (e.drawable->layer->drawn) scratch.entries.push_back(e);
   }
-  const auto rank = [](const Entry& e) { return e.drawable->layer->rank; };
-  const auto lower = [&](const Entry& a, const Entry& b) { return rank(a) < rank(b); };
-  if (!std::is_sorted(scratch.entries.begin(), scratch.entries.end(), lower)) {
-    std::sort(scratch.entries.begin(), scratch.entries.end(), lower);
+  const std::span<const Entry> entries = scratch.entries;
+  if (!std::is_sorted(entries.begin(), entries.end(), Lower)) {
+    std::sort(scratch.entries.begin(), scratch.entries.end(), Lower);
   }
   const Box3 box = grid_.VoxelsOf(tile);
   uint32_t* const words = scratch.words->at;
@@ -331,23 +370,18 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
       FetchItems(*e.drawable, e.drawable->bins.row(e.row));
     }
   };
-  for (size_t i = 0; i < scratch.entries.size();) {
-    const Layer& layer = *scratch.entries[i].drawable->layer;
+  for (size_t i = 0; i < entries.size();) {
+    const Layer& layer = *entries[i].drawable->layer;
+    const std::span<const Entry> of_layer = EntriesOf(layer, entries.subspan(i));
+    i += of_layer.size();
     const TileClip clip(*layer.clip, box);
-    for (; i < scratch.entries.size() && scratch.entries[i].drawable->layer == &layer; ++i) {
-      const Entry& e = scratch.entries[i];
-      if (clip.outside()) continue;
-      const Bins& bins = e.drawable->bins;
-      if (bins.counted()) {
-        passes_.Draw(*e.drawable, tile, box, words, touched);
-      } else {
-        DrawItems(*e.drawable, bins, bins.row(e.row), grid_, box, words, touched);
-      }
-    }
-    if (clip.outside()) continue;
+    if (!layer.seen() || clip.outside()) continue;
+    if (layer.mask != nullptr && !DrawMask(*layer.mask, tile, box, scratch)) continue;
+    DrawEntries(of_layer, tile, box, words, touched);
     clip.Uncover(grid_, box, words);
+    if (layer.mask != nullptr) TakeMask(scratch.mask->at, words);
     const bool opaque = layer.record.blend == BlendMode::kOver && layer.record.opacity == 255;
-    if (opaque && i == scratch.entries.size() && colors->at == words) {
+    if (opaque && i == entries.size() && colors->at == words) {
       if (observer == nullptr) {
         fetch_next();
         return tiles_.TakeWords(tile, *scratch.words, touched, past_caches);
@@ -387,7 +421,7 @@ void Volume::DrawRun(TileRun run, TileObserver* observer, std::span<Drawn> drawn
 }
 
 bool Volume::SeenCounted(const Entry& e) const {
-  return e.drawable->bins.counted() && e.drawable->layer->record.visible != 0;
+  return e.drawable->bins.counted() && e.drawable->layer->drawn;
 }
 
 // With the items of its counted drawables; what these do not fit into is cut in halves, down to a tile.

@@ -117,6 +117,11 @@ class Volume final : private SceneObserver {
     Drawable* drawable;
     uint32_t row;  // of its bins
   };
+  static bool Lower(const Entry& a, const Entry& b) {
+    return a.drawable->layer->rank < b.drawable->layer->rank;
+  }
+  // Of entries that are sorted, those of a layer.
+  static std::span<const Entry> EntriesOf(const Layer& layer, std::span<const Entry> entries);
   struct TileIndex {
     std::vector<Entry> entries;
     bool dirty = false;
@@ -124,7 +129,7 @@ class Volume final : private SceneObserver {
   };
   // A worker's.
   struct Scratch {
-    std::unique_ptr<TileWords> words, colors;  // zeros between tiles
+    std::unique_ptr<TileWords> words, colors, mask;  // zeros between tiles
     std::vector<Entry> entries;
     BinScratch bins;
   };
@@ -145,6 +150,11 @@ class Volume final : private SceneObserver {
   // Keeps the bins of drawables that were only counted, if so much of the budget has become free that
   // it is worth trying.
   void KeepCounted();
+  // Raises `words` to what entries of the tile, of one layer, cover.
+  void DrawEntries(std::span<const Entry> entries, uint32_t tile, const Box3& box, uint32_t* words,
+                   TileRows& touched);
+  // The words of a layer among the entries of `scratch`, into its `mask`. False if it has none here.
+  bool DrawMask(const Layer& layer, uint32_t tile, const Box3& box, Scratch& scratch);
   bool DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
                 Scratch& scratch);
   // What came of dirty_[i].

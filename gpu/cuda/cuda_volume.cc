@@ -146,7 +146,9 @@ absl::Status CudaVolume::PutLayers() {
     const LayerRecord& record = layer.record;
     const VoxelClip& clip = *layer.clip;
     looks_now_[slot] = {layer.rank,
-                        record.visible,
+                        layer.seen() ? 1u : 0,
+                        layer.drawn ? 1u : 0,
+                        -1,  // slots are not known yet
                         record.opacity,
                         record.blend,
                         static_cast<uint32_t>(half_spaces_now_.size()),
@@ -183,6 +185,10 @@ absl::Status CudaVolume::PutLayers() {
     }
     put(*layer, free_layer_slots_.back());
     free_layer_slots_.pop_back();
+  }
+  for (const auto& [id, layer] : scene_.layers()) {
+    if (layer->mask == nullptr) continue;
+    looks_now_[slots.at(id)].mask = static_cast<int32_t>(slots.at(layer->mask->record.id));
   }
   layer_slots_ = std::move(slots);
   absl::Status status = PutArray(device_, looks_, looks_now_, looks_there_);
@@ -300,24 +306,25 @@ DrawView CudaVolume::ViewForDrawing() const {
 
 absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
   // Whether all that there is lies in one layer, to be seen as it is.
-  bool plain = true;
+  bool plain = true, masked = false;
   absl::flat_hash_set<uint32_t> layers;
-  const auto keep_visible = [&](auto& list) {
+  const auto keep_drawn = [&](auto& list) {
     uint32_t kept = 0;
     for (uint32_t b = 0; b < list.count; ++b) {
       const LayerLook& look = looks_now_[list.batches[b].layer];
-      if (look.visible == 0) continue;
+      if (look.drawn == 0) continue;
+      masked |= look.mask >= 0;
       layers.insert(list.batches[b].layer);
       plain &= look.blend == BlendMode::kOver && look.opacity == 255;
       list.batches[kept++] = list.batches[b];
     }
     list.count = kept;
   };
-  keep_visible(view.lines);
-  keep_visible(view.triangles);
+  keep_drawn(view.lines);
+  keep_drawn(view.triangles);
   const LayerLook first = layers.empty() ? LayerLook() : looks_now_[*layers.begin()];
   view.clipped = first.half_spaces != 0 || first.cylinders != 0;
-  bool any = view.pairs.count > 0 || view.unlisted.items > 0;
+  bool any = masked || view.pairs.count > 0 || view.unlisted.items > 0;
   for (uint32_t b = 0; b < view.lines.count; ++b) {
     any |= view.lines.batches[b].lists.spans == nullptr;
   }

@@ -157,7 +157,7 @@ class CudaVolume final : private SceneObserver {
   struct Arriving {
     std::vector<uint32_t> slots;
     std::vector<uint64_t> first = {0};
-    bool visible = false, mixed = false;
+    bool drawn = false, mixed = false;
     uint32_t regions_each = 0;
   };
   absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving,

@@ -109,7 +109,9 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
 
 CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
   if (record.drawn_by == DrawnBy::kCpu) return IndexedBy::kPairs;
-  if (record.kind == PrimitiveKind::kTriangles) return IndexedBy::kTriangles;
+  if (record.kind == PrimitiveKind::kTriangles && record.texture_width == 0) {
+    return IndexedBy::kTriangles;
+  }
   const bool line =
       record.kind == PrimitiveKind::kPoints ||
       (record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover);
@@ -235,7 +237,7 @@ void CudaVolume::OnLeave(Drawable& drawable) {
   if (it == slot_of_.end()) return;
   const uint32_t slot = it->second;
   slot_of_.erase(it);
-  if (drawable.layer->record.visible != 0) marks_.push_back(slot);
+  if (drawable.layer->drawn) marks_.push_back(slot);
   left_.push_back(slot);
   kept_.push_back(drawable.geometry);
   singular_ -= slots_[slot].singular ? 1 : 0;
@@ -245,9 +247,9 @@ void CudaVolume::OnEnter(Drawable& drawable) { pending_.insert(&drawable); }
 
 void CudaVolume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const LayerRecord& now = layer.record;
-  if (LooksSame(now, next) || (now.visible == 0 && next.visible == 0)) return;
+  if (LooksSame(now, next) || (!layer.drawn && next.visible == 0)) return;
   // Nothing of it was to be seen, and it enters anew.
-  if (now.visible == 0 && !(now.transform == next.transform)) return;
+  if (!layer.drawn && !(now.transform == next.transform)) return;
   for (const Drawable* drawable : layer.drawables) {
     const auto it = slot_of_.find(drawable);
     if (it != slot_of_.end()) marks_.push_back(it->second);

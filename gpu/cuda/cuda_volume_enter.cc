@@ -420,7 +420,7 @@ absl::Status CudaVolume::EnterPairs(std::span<const PairedDrawable> drawables) {
   if (!added.ok()) return added.status();
   std::vector<uint32_t> deferred;
   for (const PairedDrawable& d : drawables.subspan(*added)) {
-    if (looks_now_[d.layer].visible != 0) deferred.push_back(d.slot);
+    if (looks_now_[d.layer].drawn != 0) deferred.push_back(d.slot);
   }
   return deferred.empty() ? absl::OkStatus() : MarkPairs(deferred);
 }
@@ -441,7 +441,7 @@ absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* co
     Arriving& arriving = groups.back();
     arriving.slots.push_back(slots[i]);
     arriving.first.push_back(arriving.first.back() + slot.items);
-    arriving.visible = drawable.layer->record.visible != 0;
+    arriving.drawn = drawable.layer->drawn;
     arriving.regions_each = std::max(arriving.regions_each, slot.regions_each);
     const GeometryRecord& record = drawable.geometry->view.record;
     arriving.mixed |= record.kind != PrimitiveKind::kPoints &&
@@ -463,7 +463,7 @@ absl::Status CudaVolume::EnterGroup(RegionIndex& index, uint32_t layer, const Ar
   if (!list.ok()) return list.status();
   return index.Add(table_.as<TableEntry>(),
                    {.layer = layer,
-                    .visible = arriving.visible,
+                    .drawn = arriving.drawn,
                     .mixed = arriving.mixed,
                     .regions_each = arriving.regions_each,
                     .list = list->list,

@@ -23,7 +23,7 @@ uint64_t CudaVolume::CountDeferred(const Seen& seen) const {
 }
 
 absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to, cudaStream_t stream) {
-  const Seen seen = [&](uint32_t layer) { return looks_now_[layer].visible != 0; };
+  const Seen seen = [&](uint32_t layer) { return looks_now_[layer].drawn != 0; };
   const uint64_t items = CountDeferred(seen);
   if (items == 0) return Draw(view, to, stream);
   if (items < pass_items_) pass_planes_ = INT32_MAX;

@@ -32,22 +32,55 @@ __device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScra
   if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, color);
 }
 
+// What is to be done with the layer that was found, and which is wanted next. One with a mask is found three times: it has
+// something here, then its mask is, then it is drawn. By the first warp; `under`: the layer whose mask was asked for.
+template <DrawWhat kWhat>
+__device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scratch,
+                         LayerWanted& wanted, uint32_t& under) {
+  __syncwarp();
+  const uint32_t layer = scratch.layer;
+  const bool here = layer != kAllLanes && scratch.outside == 0;
+  DrawStep step = here ? DrawStep::kLayer : DrawStep::kSkip;
+  if (wanted.slot == kAllLanes) {
+    wanted.last = found;
+    if (layer == kAllLanes) step = DrawStep::kNone;
+    if constexpr (kWhat == DrawWhat::kAll) {
+      const int32_t mask = here ? view.layers[layer].mask : -1;
+      if (mask >= 0) {
+        step = DrawStep::kSkip;
+        under = layer;
+        wanted.slot = static_cast<uint32_t>(mask);
+      }
+    }
+  } else if (under != kAllLanes) {
+    wanted.slot = here ? under : kAllLanes;
+    if (here) step = DrawStep::kMask;
+    under = kAllLanes;
+  } else {
+    wanted.slot = kAllLanes;
+  }
+  __syncwarp();
+  if (threadIdx.x == 0) scratch.step = step;
+}
+
 // The layers of a region from the lowest on, each raised into the words; blend() after each.
 template <DrawWhat kWhat, typename Blend>
 __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawScratch<kWhat>& all,
                            Blend&& blend) {
   RegionScratch& scratch = all.region;
-  int32_t rank = -1;
+  LayerWanted wanted;
+  uint32_t under = kAllLanes;
   for (;;) {
     if (threadIdx.x < 32) {
       PairRows* rows = nullptr;
       if constexpr (kWhat == DrawWhat::kAll) rows = &all.pairs.rows;
-      rank = NextLayer<kWhat == DrawWhat::kAll>(view, place, rank, scratch, rows);
+      const int32_t found = NextLayer<kWhat == DrawWhat::kAll>(view, place, wanted, scratch, rows);
       ClipRegion(view, place.box, scratch);
+      PlanStep<kWhat>(view, found, scratch, wanted, under);
     }
     __syncthreads();
-    if (scratch.layer == kAllLanes) return;
-    if (scratch.outside != 0) {
+    if (scratch.step == DrawStep::kNone) return;
+    if (scratch.step == DrawStep::kSkip) {
       __syncthreads();  // all have seen it
       continue;
     }
@@ -152,18 +185,34 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       uint32_t colors[kRounds];
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) colors[j] = 0;
+      uint32_t mask = kAllLanes;  // bits: by j
       DrawLayers<kWhat>(view, place, all, [&] {
         const LayerLook look = view.layers[scratch.layer];
         const CutBy cut_by = CutBy::Of(view, scratch);
+        if constexpr (kWhat == DrawWhat::kAll) {
+          if (scratch.step == DrawStep::kMask) {
+            mask = 0;
+#pragma unroll 4
+            for (uint32_t j = 0; j < kRounds; ++j) {
+              const uint32_t v = threadIdx.x + j * kDrawThreads;
+              const uint32_t word = scratch.words[v];
+              scratch.words[v] = 0;
+              if (!IsCovered(word)) continue;
+              if (cut_by.cutting == 0 || cut_by.Keeps(place.box, v)) mask |= 1u << j;
+            }
+            return;
+          }
+        }
 #pragma unroll
         for (uint32_t j = 0; j < kRounds; ++j) {
           const uint32_t v = threadIdx.x + j * kDrawThreads;
           const uint32_t word = scratch.words[v];
           scratch.words[v] = 0;
-          if (word == 0) continue;
+          if (word == 0 || (mask >> j & 1) == 0) continue;
           if (cut_by.cutting != 0 && !cut_by.Keeps(place.box, v)) continue;
           colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
         }
+        mask = kAllLanes;
       });
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) {

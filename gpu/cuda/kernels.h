@@ -32,7 +32,7 @@ cudaError_t CountTiles(const TableEntry* table, const ItemList& list, uint64_t b
 // offsets[i]: sum of counts[0..i), and of all at offsets[items]. `temp` null: only its size.
 cudaError_t SumCounts(void* temp, size_t& temp_bytes, const uint32_t* counts, uint64_t* offsets,
                       uint32_t items, cudaStream_t stream);
-// The pairs themselves; marks the tiles of drawables in visible layers, unless volume.dirty is null.
+// The pairs themselves; marks the tiles of drawables in layers that are drawn, unless volume.dirty is null.
 cudaError_t FillPairs(const TableEntry* table, const LayerLook* layers, const ItemList& list,
                       uint64_t begin, uint32_t items, const uint64_t* offsets,
                       const VolumeView& volume, uint64_t* keys, uint64_t* values,

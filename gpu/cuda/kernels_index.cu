@@ -94,7 +94,7 @@ __global__ void FillPairsKernel(const TableEntry* table, const LayerLook* layers
              keys[at] = PairKey(tile, entry.layer);
              values[at] = PairValue(slot, item);
              ++at;
-             if (volume.dirty != nullptr && layers[entry.layer].visible != 0) {
+             if (volume.dirty != nullptr && layers[entry.layer].drawn != 0) {
                volume.dirty[tile] = 1;
              }
            });

@@ -37,7 +37,7 @@ class PairIndex {
   void Defer(std::vector<PairedDrawable> drawables);
 
   // Adds the pairs of drawables, in several goes, for as long as there is room, and marks the tiles of
-  // visible layers. Those of the first so many, which it answers, are all there; the others are
+  // layers that are drawn. Those of the first so many, which it answers, are all there; the others are
   // deferred, and of these not all tiles are marked. An error leaves some of the pairs.
   absl::StatusOr<size_t> Add(const TableEntry* table, const LayerLook* looks,
                              std::span<const PairedDrawable> drawables, const VolumeView& volume);

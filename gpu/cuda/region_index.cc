@@ -90,7 +90,7 @@ absl::Status RegionIndex::Add(TableEntry* table, const Arrivals& arrivals, uint8
   batch.mixed = arrivals.mixed;
   absl::Status status = TakeItems(batch);
   if (status.ok()) {
-    status = MakeAndSort(table, arrivals, batch, arrivals.visible ? region_dirty : nullptr);
+    status = MakeAndSort(table, arrivals, batch, arrivals.drawn ? region_dirty : nullptr);
   }
   if (!status.ok()) return status;
   const uint64_t number = next_number_++;

@@ -28,7 +28,7 @@ namespace voxeld::gpu::cuda {
 // Drawables of one layer that come into an index together.
 struct Arrivals {
   uint32_t layer = 0;  // its slot
-  bool visible = true;
+  bool drawn = true;
   bool mixed = false;         // some item may have several colours
   uint32_t regions_each = 0;  // that an item touches at most, of kinds that want to know
   ItemList list;              // on the device

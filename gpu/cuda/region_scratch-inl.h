@@ -22,6 +22,14 @@ __device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {
          static_cast<uint32_t>(x & 31);
 }
 
+// What is done with the layer under way.
+enum class DrawStep : uint32_t {
+  kNone,   // there is none any more
+  kSkip,   // nothing: it has nothing here to be seen
+  kMask,   // what it covers is the mask of the one that follows
+  kLayer,  // it is blended, as far as its mask has it
+};
+
 struct RegionScratch {
   // 0 whenever the drawing of a region begins: who writes it out leaves it so.
   alignas(16) uint32_t words[kRegionVoxels];
@@ -41,6 +49,7 @@ struct RegionScratch {
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
   uint32_t pairs;                 // not 0: the layer has some here, or items that are not listed
+  DrawStep step;
 };
 
 // What a block of threads draws: first in its shared memory.
@@ -87,10 +96,20 @@ __device__ inline uint32_t LayerOf(uint64_t key) {
   return static_cast<uint32_t>(key) & (kMaxLayers - 1);
 }
 
-// The pairs of a tile, in a batch, that are of the layer of the least rank beyond `last`.
+// Which layer is looked for: that of the least rank beyond `last` that is seen, or one by its slot.
+struct LayerWanted {
+  int32_t last = -1;
+  uint32_t slot = kAllLanes;  // kAllLanes: any
+
+  __device__ bool Is(uint32_t layer, const LayerLook& look) const {
+    return slot == kAllLanes ? look.seen != 0 && look.rank > last : layer == slot;
+  }
+};
+
+// The pairs of a tile, in a batch, that are of the layer of the least rank that is wanted.
 __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, uint32_t tile,
-                                 int32_t last, int32_t& best, uint32_t& begin, uint32_t& end,
-                                 int32_t& least, uint32_t& layer) {
+                                 const LayerWanted& wanted, int32_t& best, uint32_t& begin,
+                                 uint32_t& end, int32_t& least, uint32_t& layer) {
   const uint32_t stop = batch.row_begin[tile + 1];
   for (uint32_t p = batch.row_begin[tile]; p < stop;) {
     const uint32_t here = LayerOf(batch.keys[p]);
@@ -105,7 +124,7 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
       }
     }
     const LayerLook look = view.layers[here];
-    if (look.visible != 0 && look.rank > last && look.rank < best) {
+    if (wanted.Is(here, look) && look.rank < best) {
       best = look.rank;
       begin = p;
       end = low;
@@ -118,11 +137,11 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
   }
 }
 
-// The layer of the least rank beyond `last` that has something in the region, and what. By the first
+// The layer of the least rank that is wanted and has something in the region, and what. By the first
 // warp: a lane looks after a batch. kAll: there may be pairs, and what has no lists.
 template <bool kAll>
-__device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int32_t last,
-                             RegionScratch& scratch, PairRows* rows) {
+__device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
+                             const LayerWanted& wanted, RegionScratch& scratch, PairRows* rows) {
   const uint32_t lane = threadIdx.x % 32;
   constexpr int32_t kNone = 0x7FFFFFFF;
   int32_t least = kNone;
@@ -133,7 +152,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
     for (uint32_t t = 0; t < kRegionTiles; ++t) {
       const uint32_t tile = place.TileOf(view.volume, t);
       if (lane < view.pairs.count && tile != kAllLanes) {
-        FindPairs(view, view.pairs.batches[lane], tile, last, best[t], begin[t], end[t], least,
+        FindPairs(view, view.pairs.batches[lane], tile, wanted, best[t], begin[t], end[t], least,
                   layer);
       }
     }
@@ -143,7 +162,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
     for (uint32_t i = lane; i < view.unlisted.layer_count; i += 32) {
       const uint32_t slot = view.unlisted.layers[i];
       const LayerLook look = view.layers[slot];
-      if (look.visible == 0 || look.rank <= last || look.rank >= unlisted_rank) continue;
+      if (!wanted.Is(slot, look) || look.rank >= unlisted_rank) continue;
       unlisted_rank = look.rank;
       if (look.rank < least) {
         least = look.rank;
@@ -156,7 +175,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place, int
       return kNone;
     const uint32_t slot = batches.batches[lane].layer;
     const LayerLook look = view.layers[slot];
-    if (look.visible == 0 || look.rank <= last) return kNone;
+    if (!wanted.Is(slot, look)) return kNone;
     if (look.rank < least) {
       least = look.rank;
       layer = slot;

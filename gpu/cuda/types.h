@@ -35,8 +35,10 @@ struct TableEntry {
 
 // A layer, by slot.
 struct LayerLook {
-  int32_t rank = -1;  // in the order of combination; none: the slot is free
-  uint32_t visible = 0;
+  int32_t rank = -1;   // in the order of combination; none: the slot is free
+  uint32_t seen = 0;   // not 0: visible, and without a mask that is not there
+  uint32_t drawn = 0;  // not 0: seen, or the mask of one that is
+  int32_t mask = -1;   // the slot of its mask; none: −1
   uint32_t opacity = 255;
   BlendMode blend = BlendMode::kOver;
   // Its half-spaces and cylinders (gpu/clip.h) in the arrays of all layers'; at most kMaxHalfSpaces, kMaxClipCylinders.

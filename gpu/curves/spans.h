@@ -62,6 +62,10 @@ class Spans {
     }
   }
 
+  void Add(const Spans& other) {
+    points_.insert(points_.end(), other.points_.begin(), other.points_.end());
+  }
+
   static constexpr double kSpansPerTurn = 16;
 
  private:

@@ -39,7 +39,7 @@ struct Source {
   const float* positions = nullptr;
   Affine map;                         // the geometry's coordinates → voxel space
   const uint32_t* indices = nullptr;  // record->index_count
-  const uint32_t* colors = nullptr;   // record->vertex_count, with kPerVertex
+  const uint32_t* colors = nullptr;   // ColorCount(*record)
   uint32_t tint = 0x00FFFFFF;         // DrawableRecord
   int64_t radius = 0;                 // of points and segments, units; 0: one voxel
   Solid solid;                        // kBox, kSphere, kCylinder, kImplicit; of kFilled the bounds
@@ -62,7 +62,20 @@ struct Source {
     return Tinted(record->color_mode == ColorMode::kPerVertex ? colors[vertex] : record->color,
                   tint);
   }
+  VOXELD_HD bool IsTextured() const { return record->texture_width != 0; }
+  // Of a vertex, with a texture.
+  VOXELD_HD void PlaceOnTexture(uint32_t vertex, float place[2]) const {
+    std::memcpy(place, places() + static_cast<size_t>(vertex) * 2, 2 * sizeof(float));
+  }
+  VOXELD_HD const uint32_t* texels() const {
+    return places() + static_cast<size_t>(record->vertex_count) * 2;
+  }
   VOXELD_HD uint32_t UniformColor() const { return Tinted(record->color, tint); }
+
+ private:
+  VOXELD_HD const uint32_t* places() const {
+    return record->color_mode == ColorMode::kPerVertex ? colors + record->vertex_count : colors;
+  }
 };
 
 // The cube root of x ≥ 0 in IEEE double: a guess from the exponent, then Newton's steps.

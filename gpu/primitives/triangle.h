@@ -9,12 +9,15 @@
 //
 // Colour: weights are the areas opposite to the vertices in the projection along the axis of the
 // normal's greatest component (ties: x before y before z), taken at the voxel's centre and clamped
-// at 0; (Σ w·C + ⌊Σw/2⌋) / Σw a channel.
+// at 0; (Σ w·C + ⌊Σw/2⌋) / Σw a channel. With a texture (texture.h) that is multiplied by its texel, at the place weighted
+// in double precision.
 #pragma once
 
 #include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/line.h"
+#include "gpu/primitives/texture.h"
+#include "gpu/word.h"
 
 namespace voxeld::gpu {
 
@@ -22,6 +25,14 @@ struct Triangle {
   Int3 v[3];
   uint32_t color[3] = {};  // 0x00RRGGBB
   SurfaceRule rule = SurfaceRule::kThin;
+  TexturePlace texture;
+
+  VOXELD_HD bool IsOfOneColor() const {
+    return color[0] == color[1] && color[1] == color[2] && texture.texels == nullptr;
+  }
+  VOXELD_HD uint32_t ColorOfCorner(int i) const {
+    return texture.texels == nullptr ? color[i] : Tinted(texture.OfCorner(i), color[i]);
+  }
 };
 
 // All voxels whose closed boxes the triangle's bounding box meets.
@@ -34,6 +45,13 @@ VOXELD_HD inline Box3 BoundsOf(const Triangle& t) {
     b.hi[a] = ToVoxel32(VoxelOf(high) + 1);
   }
   return b;
+}
+
+// Of a number that is not negative: both machines round alike.
+VOXELD_HD inline double ToDouble(int64_t value) { return static_cast<double>(value); }
+VOXELD_HD inline double ToDouble(Wide value) {
+  return static_cast<double>(static_cast<int64_t>(value >> 64)) * 0x1p64 +
+         static_cast<double>(static_cast<uint64_t>(value));
 }
 
 // Relative to the voxel that holds vertex 0. `I`: 64 bits for extents up to 2¹⁹ units, else 128.
@@ -73,7 +91,7 @@ struct TriangleSetup {
   }
 
   VOXELD_HD uint32_t ColorAt(const Triangle& t, const int32_t voxel[3]) const {
-    if (t.color[0] == t.color[1] && t.color[1] == t.color[2]) return t.color[0];
+    if (t.IsOfOneColor()) return t.color[0];
     const int b = (major + 1) % 3, c = (major + 2) % 3;
     const I qb = Centre(b, voxel[b]), qc = Centre(c, voxel[c]);
     I weight[3], sum = 0;
@@ -87,7 +105,18 @@ struct TriangleSetup {
       for (int i = 0; i < 3; ++i) total += weight[i] * static_cast<I>((t.color[i] >> shift) & 0xFF);
       rgb |= static_cast<uint32_t>(total / sum) << shift;
     }
-    return rgb;
+    return t.texture.texels == nullptr ? rgb : Tinted(TexelAt(t, weight, sum), rgb);
+  }
+
+  VOXELD_HD static uint32_t TexelAt(const Triangle& t, const I (&weight)[3], I sum) {
+    double place[2] = {0, 0};
+    for (int i = 0; i < 3; ++i) {
+      const double share = ToDouble(weight[i]);
+      for (int k = 0; k < 2; ++k) {
+        place[k] = place[k] + share * static_cast<double>(t.texture.at[i][k]);
+      }
+    }
+    return t.texture.Texel(place[0] / ToDouble(sum), place[1] / ToDouble(sum));
   }
 };
 
@@ -201,7 +230,7 @@ VOXELD_HD inline Line LongestEdge(const Triangle& t) {
     if (sum > greatest) greatest = sum, longest = i;
   }
   const int next = (longest + 1) % 3;
-  return {t.v[longest], t.v[next], t.color[longest], t.color[next],
+  return {t.v[longest], t.v[next], t.ColorOfCorner(longest), t.ColorOfCorner(next),
           t.rule == SurfaceRule::kThin ? LineSampling::kThin : LineSampling::kCover};
 }
 
@@ -220,7 +249,7 @@ VOXELD_HD void EmitTriangleAs(const Triangle& t, const Box3& box, Emit&& emit) {
       if (setup.n[a] != 0) EmitThinAlong(t, setup, a, part, emit);
     }
   }
-  for (int i = 0; i < 3; ++i) EmitVoxelOf(t.v[i], t.color[i], box, emit);
+  for (int i = 0; i < 3; ++i) EmitVoxelOf(t.v[i], t.ColorOfCorner(i), box, emit);
 }
 
 VOXELD_HD inline int64_t Extent(const Triangle& t) {

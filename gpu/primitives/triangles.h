@@ -49,6 +49,15 @@ struct Triangles {
       t.color[corner] = source.ColorOf(vertex);
     }
     t.rule = source.record->rule;
+    if (source.IsTextured()) {
+      for (uint32_t corner = 0; corner < 3; ++corner) {
+        source.PlaceOnTexture(source.VertexOf(i * 3 + corner), t.texture.at[corner]);
+      }
+      t.texture.texels = source.texels();
+      t.texture.width = source.record->texture_width;
+      t.texture.height = source.record->texture_height;
+      t.texture.ChooseLevel(t.v);
+    }
     return t;
   }
 

@@ -6,9 +6,13 @@
 #include <vector>
 
 #include "gpu/curves/spans.h"
+#include "gpu/primitives/arrow.h"
 #include "gpu/primitives/cone.h"
+#include "gpu/primitives/disc.h"
 #include "gpu/primitives/ellipsoid.h"
 #include "gpu/primitives/parallelepiped.h"
+#include "gpu/primitives/patch.h"
+#include "gpu/primitives/polygon.h"
 #include "gpu/primitives/torus.h"
 
 namespace voxeld::gpu {
@@ -16,6 +20,11 @@ namespace voxeld::gpu {
 struct WireFrame {
   Spans lines;
   std::vector<implicit::Vector> dots;
+
+  void Add(const WireFrame& other) {
+    lines.Add(other.lines);
+    dots.insert(dots.end(), other.dots.begin(), other.dots.end());
+  }
 };
 
 inline constexpr int kMeridians = 8;
@@ -116,6 +125,66 @@ inline WireFrame WireFrameOf(const Cone& shape) {
   if (shape.round) {
     frame.dots.push_back(shape.start - shape.start_radius * unit);
     frame.dots.push_back(shape.end + shape.end_radius * unit);
+  }
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Disc& shape) {
+  using implicit::Vector;
+  WireFrame frame;
+  Vector u, v;
+  if (!FrameOf(shape.normal, {1, 0, 0}, &u, &v)) FrameOf(shape.normal, {0, 1, 0}, &u, &v);
+  for (const double radius : {shape.inner_radius, shape.radius}) {
+    if (!(radius > 0)) {
+      frame.dots.push_back(shape.center);
+      continue;
+    }
+    frame.lines.Arc(shape.center, radius * u, radius * v, 0, 2 * std::numbers::pi);
+    for (int m = 0; m < kMeridians; ++m) {
+      const double angle = m * kMeridianStep;
+      frame.dots.push_back(shape.center + (std::cos(angle) * radius) * u +
+                           (std::sin(angle) * radius) * v);
+    }
+  }
+  for (int m = 0; m < kMeridians; ++m) {
+    const Vector out = std::cos(m * kMeridianStep) * u + std::sin(m * kMeridianStep) * v;
+    frame.lines.Line(shape.center + shape.inner_radius * out, shape.center + shape.radius * out);
+  }
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Patch& shape) {
+  WireFrame frame;
+  frame.dots = {shape.corner, shape.corner + shape.u, shape.corner + shape.u + shape.v,
+                shape.corner + shape.v};
+  for (size_t i = 0; i < 4; ++i) frame.lines.Line(frame.dots[i], frame.dots[(i + 1) % 4]);
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Polygon& shape) {
+  WireFrame frame;
+  frame.dots.assign(shape.points.begin(), shape.points.end());
+  uint32_t begin = 0;
+  for (const uint32_t end : shape.ends) {
+    for (uint32_t i = begin; i < end; ++i) {
+      frame.lines.Line(shape.points[i], shape.points[i + 1 < end ? i + 1 : begin]);
+    }
+    begin = end;
+  }
+  return frame;
+}
+
+inline WireFrame WireFrameOf(const Arrow& shape) {
+  const double length = implicit::Length(shape.end - shape.start);
+  const implicit::Vector neck =
+      shape.end - (shape.head_length / length) * (shape.end - shape.start);
+  WireFrame frame = WireFrameOf(Cone{neck, shape.end, shape.head_radius, 0});
+  if (!(shape.head_length < length)) return frame;
+  if (shape.shaft_radius > 0) {
+    frame.Add(WireFrameOf(Cone{shape.start, neck, shape.shaft_radius, shape.shaft_radius}));
+  } else {
+    frame.lines.Line(shape.start, neck);
+    frame.dots.push_back(shape.start);
   }
   return frame;
 }

@@ -29,20 +29,6 @@ Target StackTarget(const Affine& view = {}) {
   return target;
 }
 
-ModelGeometry SolidBox(uint64_t id, std::array<float, 3> center, std::array<float, 3> size,
-                       uint32_t rgb) {
-  ModelGeometry g;
-  g.record.id = id;
-  g.record.kind = PrimitiveKind::kBox;
-  g.record.fill = Fill::kSolid;
-  g.record.color = rgb;
-  for (size_t a = 0; a < 3; ++a) {
-    g.record.params[a] = center[a];
-    g.record.params[3 + a] = size[a];
-  }
-  return g;
-}
-
 // Layer 1 with a solid box of 32³ voxels, from (0, 0, 0) on.
 SceneModel BoxScene() {
   SceneModel scene;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdio>
 #include <iostream>
 #include <string>
@@ -43,6 +44,20 @@ inline Target CubeTarget(int32_t size) {
   target.layout = {.slices = size, .width = size, .height = size};
   for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
   return target;
+}
+
+inline ModelGeometry SolidBox(uint64_t id, std::array<float, 3> center, std::array<float, 3> size,
+                              uint32_t rgb) {
+  ModelGeometry g;
+  g.record.id = id;
+  g.record.kind = PrimitiveKind::kBox;
+  g.record.fill = Fill::kSolid;
+  g.record.color = rgb;
+  for (size_t a = 0; a < 3; ++a) {
+    g.record.params[a] = center[a];
+    g.record.params[3 + a] = size[a];
+  }
+  return g;
 }
 
 inline uint64_t CountLit(const std::vector<uint32_t>& voxels) {

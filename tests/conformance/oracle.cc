@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "gpu/curves/cut.h"
 #include "tests/conformance/oracle_clip.h"
@@ -44,16 +45,6 @@ struct LayerVoxel {
     }
   }
 };
-
-// By channel a·b/255, to the nearest.
-uint32_t OracleTint(uint32_t rgb, uint32_t tint) {
-  uint32_t result = 0;
-  for (int shift = 0; shift < 24; shift += 8) {
-    const double product = (rgb >> shift & 255) * static_cast<double>(tint >> shift & 255);
-    result |= static_cast<uint32_t>(std::lround(product / 255)) << shift;
-  }
-  return result;
-}
 
 // The voxel of the point, and those with centres within a ball, fading, or a cube.
 void PlotSplat(const Units& at, uint32_t rgb, int64_t radius, Splat splat, const DenseVolume& grid,
@@ -159,6 +150,15 @@ uint32_t PixelOf(const DenseVolume& volume, const OracleFootprints& footprints, 
 
 }  // namespace
 
+uint32_t OracleTint(uint32_t rgb, uint32_t tint) {
+  uint32_t result = 0;
+  for (int shift = 0; shift < 24; shift += 8) {
+    const double product = (rgb >> shift & 255) * static_cast<double>(tint >> shift & 255);
+    result |= static_cast<uint32_t>(std::lround(product / 255)) << shift;
+  }
+  return result;
+}
+
 int64_t OracleRadius(const GeometryRecord& g, const Affine& map) {
   double thickness = g.thickness;
   if (g.thickness_unit == ThicknessUnit::kUnits) thickness *= OracleScale(map);
@@ -180,13 +180,27 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
   if (IsCurved(record.kind)) return PlotCurved(g, map, grid, tint, plot);
   std::vector<Units> at;
   std::vector<uint32_t> colors;
+  // Behind the vertices' colours, if they have any: where they are on the texture, and it.
+  const bool colored = record.color_mode == ColorMode::kPerVertex;
+  const size_t places = colored ? record.vertex_count : 0;
+  const auto on_texture = [&](size_t first) {
+    OracleTexture texture;
+    if (record.texture_width == 0) return texture;
+    texture.texels = g.colors.data() + places + 2 * size_t{record.vertex_count};
+    texture.width = record.texture_width;
+    texture.height = record.texture_height;
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t vertex = record.index_count ? g.indices[first + i] : first + i;
+      std::memcpy(texture.at[i], &g.colors[places + 2 * vertex], sizeof(texture.at[i]));
+    }
+    return texture;
+  };
   const size_t corners = record.index_count ? record.index_count : record.vertex_count;
   for (size_t corner = 0; corner < corners; ++corner) {
     const size_t vertex = record.index_count ? g.indices[corner] : corner;
     at.push_back(OracleSnap(map, &g.positions[vertex * 3]));
     // Vertices are tinted, and colours between them mixed of what comes out.
-    colors.push_back(OracleTint(
-        record.color_mode == ColorMode::kPerVertex ? g.colors[vertex] : record.color, tint));
+    colors.push_back(OracleTint(colored ? g.colors[vertex] : record.color, tint));
   }
   const int64_t radius = OracleRadius(record, map);
   const auto segment = [&](size_t a, size_t b) {
@@ -202,9 +216,11 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
     for (size_t i = 0; i < corners; ++i) segment(i, i);
   } else if (record.kind == PrimitiveKind::kTriangles) {
     for (size_t i = 0; i < corners; i += 3) {
-      PlotTriangle(
-          {{at[i], at[i + 1], at[i + 2]}, {colors[i], colors[i + 1], colors[i + 2]}, record.rule},
-          grid, plot);
+      PlotTriangle({{at[i], at[i + 1], at[i + 2]},
+                    {colors[i], colors[i + 1], colors[i + 2]},
+                    record.rule,
+                    on_texture(i)},
+                   grid, plot);
     }
   } else if (record.kind == PrimitiveKind::kFilled) {
     std::vector<OracleTriangle> triangles;
@@ -220,6 +236,37 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
   }
 }
 
+namespace {
+
+// What a layer covers, as its clip leaves it, whether it is seen or not.
+std::vector<LayerVoxel> CoveredBy(const LayerRecord& layer, const SceneModel& scene,
+                                  const Target& target, const DenseVolume& volume) {
+  std::vector<LayerVoxel> voxels(volume.rgb.size());
+  for (const auto& [id, drawable] : scene.drawables) {
+    if (drawable.layer != layer.id) continue;
+    const Affine map =
+        OracleCompose(OracleCompose(target.view, layer.transform), drawable.transform);
+    PlotGeometry(
+        scene.geometries.at(drawable.geometry), map, volume,
+        [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
+          voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
+        },
+        drawable.tint);
+  }
+  const OracleClip clip(layer, target);
+  for (int32_t z = 0; z < volume.nz; ++z) {
+    for (int32_t y = 0; y < volume.ny; ++y) {
+      for (int32_t x = 0; x < volume.nx; ++x) {
+        LayerVoxel& voxel = voxels[volume.Index(x, y, z)];
+        voxel.covered = voxel.covered && clip.Has(x, y, z);
+      }
+    }
+  }
+  return voxels;
+}
+
+}  // namespace
+
 DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
   DenseVolume volume;
   volume.nx = target.geometry.grid.nx;
@@ -234,28 +281,13 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
     return a->order < b->order;  // ids ascend already
   });
   for (const LayerRecord* layer : order) {
-    if (!layer->visible) continue;
-    std::vector<LayerVoxel> voxels(volume.rgb.size());
-    for (const auto& [id, drawable] : scene.drawables) {
-      if (drawable.layer != layer->id) continue;
-      const Affine map =
-          OracleCompose(OracleCompose(target.view, layer->transform), drawable.transform);
-      PlotGeometry(
-          scene.geometries.at(drawable.geometry), map, volume,
-          [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
-            voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
-          },
-          drawable.tint);
-    }
-    const OracleClip clip(*layer, target);
-    for (int32_t z = 0; z < volume.nz; ++z) {
-      for (int32_t y = 0; y < volume.ny; ++y) {
-        for (int32_t x = 0; x < volume.nx; ++x) {
-          const size_t i = volume.Index(x, y, z);
-          if (!voxels[i].covered || !clip.Has(x, y, z)) continue;
-          volume.rgb[i] = Blended(volume.rgb[i], voxels[i].rgb, *layer);
-        }
-      }
+    if (!layer->visible || (layer->has_mask && !scene.layers.contains(layer->mask))) continue;
+    const std::vector<LayerVoxel> voxels = CoveredBy(*layer, scene, target, volume);
+    std::vector<LayerVoxel> mask;
+    if (layer->has_mask) mask = CoveredBy(scene.layers.at(layer->mask), scene, target, volume);
+    for (size_t i = 0; i < voxels.size(); ++i) {
+      if (!voxels[i].covered || (layer->has_mask && !mask[i].covered)) continue;
+      volume.rgb[i] = Blended(volume.rgb[i], voxels[i].rgb, *layer);
     }
   }
   return volume;

@@ -28,14 +28,23 @@ struct OracleLine {
   LineSampling sampling;
 };
 
+// Where a triangle's corners are on a picture (gpu/primitives/texture.h); without texels: nowhere.
+struct OracleTexture {
+  const uint32_t* texels = nullptr;
+  uint64_t width = 0, height = 0;
+  float at[3][2] = {};
+};
 struct OracleTriangle {
   Units v[3];
   uint32_t color[3];
   SurfaceRule rule;
+  OracleTexture texture = {};
 };
 
 // outer ∘ inner in double precision.
 Affine OracleCompose(const Affine& outer, const Affine& inner);
+// By channel a·b/255, to the nearest.
+uint32_t OracleTint(uint32_t rgb, uint32_t tint);
 // Where a vertex comes to, to the nearest unit, half up.
 Units OracleSnap(const Affine& map, const float* p);
 // The cube root of how a map changes volumes.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "tests/conformance/oracle_shapes.h"
 
@@ -97,8 +98,53 @@ bool MeetsBox(const Tri& t, const Vec& corner) {
   return false;
 }
 
+// What multiplies colours there: a texel of the level that suits the triangle.
+uint32_t TexelOf(const OracleTriangle& t, double u, double v) {
+  uint64_t begin = 0, width = t.texture.width, height = t.texture.height;
+  const auto at = [&](int corner, int k) {
+    return static_cast<long double>(t.texture.at[corner][k]) -
+           static_cast<long double>(t.texture.at[0][k]);
+  };
+  const long double share = std::fabs(at(1, 0) * at(2, 1) - at(1, 1) * at(2, 0));
+  long double faces = 0;  // of the voxels that its largest shadow holds, twice
+  for (int a = 0; a < 3; ++a) {
+    const auto edge = [&](int corner, int axis) {
+      return static_cast<long double>(t.v[corner].v[axis % 3] - t.v[0].v[axis % 3]) / 256;
+    };
+    const long double shadow = edge(1, a + 1) * edge(2, a + 2) - edge(1, a + 2) * edge(2, a + 1);
+    faces = std::max(faces, std::fabs(shadow));
+  }
+  while ((width > 1 || height > 1) &&
+         share * static_cast<long double>(width * height) > 2 * faces) {
+    begin += width * height;
+    width = std::max<uint64_t>(width / 2, 1);
+    height = std::max<uint64_t>(height / 2, 1);
+  }
+  // How far along a side of the picture, in (0, 1] but for 0 itself.
+  const auto along = [](double place, uint64_t count) -> uint64_t {
+    if (std::isnan(place) || std::fabs(place) >= 1e12) return 0;
+    double part = place - std::floor(place);
+    if (part == 0 && place > 0) part = 1;
+    return std::min(static_cast<uint64_t>(part * static_cast<double>(count)), count - 1);
+  };
+  return t.texture.texels[begin + along(v, height) * width + along(u, width)];
+}
+
+uint32_t ColorOfCorner(const OracleTriangle& t, int i) {
+  if (t.texture.texels == nullptr) return t.color[i];
+  return OracleTint(t.color[i], TexelOf(t, static_cast<double>(t.texture.at[i][0]),
+                                        static_cast<double>(t.texture.at[i][1])));
+}
+
+// As it is rounded: each half by itself.
+double Rounded(Int128 value) {
+  return static_cast<double>(static_cast<uint64_t>(value >> 64)) * 0x1p64 +
+         static_cast<double>(static_cast<uint64_t>(value));
+}
+
 uint32_t ColorOf(const OracleTriangle& t, const Tri& tri, const Vec& centre) {
-  if (t.color[0] == t.color[1] && t.color[1] == t.color[2]) return t.color[0];
+  const bool textured = t.texture.texels != nullptr;
+  if (!textured && t.color[0] == t.color[1] && t.color[1] == t.color[2]) return t.color[0];
   int major = 0;
   for (int a = 1; a < 3; ++a) {
     if (Magnitude(tri.n[a]) > Magnitude(tri.n[major])) major = a;
@@ -117,7 +163,16 @@ uint32_t ColorOf(const OracleTriangle& t, const Tri& tri, const Vec& centre) {
     for (int i = 0; i < 3; ++i) total += weight[i] * (t.color[i] >> shift & 255);
     rgb |= static_cast<uint32_t>(total / sum) << shift;
   }
-  return rgb;
+  if (!textured) return rgb;
+  double place[2];
+  for (int k = 0; k < 2; ++k) {
+    double total = 0;
+    for (int i = 0; i < 3; ++i) {
+      total += Rounded(weight[i]) * static_cast<double>(t.texture.at[i][k]);
+    }
+    place[k] = total / Rounded(sum);
+  }
+  return OracleTint(rgb, TexelOf(t, place[0], place[1]));
 }
 
 OracleLine LongestEdgeOf(const OracleTriangle& t) {
@@ -134,7 +189,7 @@ OracleLine LongestEdgeOf(const OracleTriangle& t) {
     }
     if (square <= longest) continue;
     longest = square;
-    line = {t.v[i], t.v[j], t.color[i], t.color[j], sampling};
+    line = {t.v[i], t.v[j], ColorOfCorner(t, i), ColorOfCorner(t, j), sampling};
   }
   return line;
 }
@@ -151,7 +206,8 @@ void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& 
   if (flat) PlotLine(LongestEdgeOf(t), grid, plot);
   if (flat || t.rule == SurfaceRule::kThin) {
     for (int i = 0; i < 3; ++i) {
-      PlotLine({t.v[i], t.v[i], t.color[i], t.color[i], LineSampling::kThin}, grid, plot);
+      const uint32_t color = ColorOfCorner(t, i);
+      PlotLine({t.v[i], t.v[i], color, color, LineSampling::kThin}, grid, plot);
     }
   }
   if (flat) return;

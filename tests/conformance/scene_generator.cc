@@ -1,6 +1,7 @@
 #include "tests/conformance/scene_generator.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <optional>
@@ -263,7 +264,23 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
     r.color_mode = ColorMode::kPerVertex;
     for (uint32_t i = 0; i < r.vertex_count; ++i) g.colors.push_back(RandomColor());
   }
+  if (r.kind == PrimitiveKind::kTriangles && Chance(0.4)) AddTexture(g);
   return g;
+}
+
+// Any picture, of any levels, at places that may be none.
+void SceneGenerator::AddTexture(ModelGeometry& g) {
+  const int64_t most = Chance(0.2) ? 100 : 9;
+  g.record.texture_width = static_cast<uint16_t>(Int(1, most));
+  g.record.texture_height = static_cast<uint16_t>(Int(1, most));
+  for (uint32_t i = 0; i < 2 * g.record.vertex_count; ++i) {
+    float place = static_cast<float>(Real(-0.5, 1.5));
+    if (Chance(0.3)) place = static_cast<float>(Int(-2, 3));
+    if (Chance(0.03)) place = std::bit_cast<float>(static_cast<uint32_t>(Int(0, 0xFFFFFFFF)));
+    g.colors.push_back(std::bit_cast<uint32_t>(place));
+  }
+  const size_t texels = ColorCount(g.record);
+  while (g.colors.size() < texels) g.colors.push_back(RandomColor());
 }
 
 Affine SceneGenerator::RandomTransform(int size) {
@@ -355,6 +372,13 @@ LayerRecord SceneGenerator::RandomLayer(uint64_t id) {
   return l;
 }
 
+// By another of the scene, or itself, or one that is not there.
+void SceneGenerator::RandomMask(LayerRecord& layer, const SceneModel& scene) {
+  if (!Chance(0.25)) return;
+  layer.has_mask = 1;
+  layer.mask = Chance(0.1) ? next_id_ + 1000 : RandomId(scene.layers);
+}
+
 DrawableRecord SceneGenerator::RandomDrawable(uint64_t id, const SceneModel& scene, int size) {
   DrawableRecord d;
   d.id = id;
@@ -373,6 +397,7 @@ SceneModel SceneGenerator::RandomScene(int size) {
     const uint64_t id = next_id_++;
     scene.layers[id] = RandomLayer(id);
   }
+  for (auto& [id, layer] : scene.layers) RandomMask(layer, scene);
   for (int64_t n = Int(1, 10); n > 0; --n) {
     const uint64_t id = next_id_++;
     scene.geometries[id] = RandomGeometry(id, size);
@@ -415,11 +440,12 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
       const uint64_t id = Chance(0.2) ? next_id_++ : RandomId(scene.layers);
       if (scene.layers.contains(id) && Chance(0.4)) {  // where it is drawn, alone
         scene.layers[id].plane_count = scene.layers[id].has_region = 0;
-        scene.layers[id].cylinder_count = 0;
+        scene.layers[id].cylinder_count = scene.layers[id].has_mask = 0;
         RandomClip(scene.layers[id], 20);
       } else {
         scene.layers[id] = RandomLayer(id);
       }
+      RandomMask(scene.layers[id], scene);
       delta.Put(scene.layers[id]);
       break;
     }

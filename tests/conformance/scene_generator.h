@@ -44,11 +44,13 @@ class SceneGenerator {
   ClipPlane RandomPlane(int size);
   ClipCylinder RandomCylinder(int size);
   void RandomClip(LayerRecord& layer, int size);
+  void RandomMask(LayerRecord& layer, const SceneModel& scene);
   ModelGeometry RandomGeometry(uint64_t id, int size);
   DrawableRecord RandomDrawable(uint64_t id, const SceneModel& scene, int size);
   Affine RandomTransform(int size);
   void AddVertices(ModelGeometry& g, uint32_t count, int size);
   void AddControlPoints(ModelGeometry& g, int size);
+  void AddTexture(ModelGeometry& g);
   void AddTetrahedra(ModelGeometry& g, int size);
   double RandomCoordinate(int size);
   uint64_t RandomId(const auto& map);

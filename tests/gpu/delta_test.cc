@@ -358,6 +358,15 @@ TEST(Delta, RefusesGeometriesThatDoNotHoldTogether) {
               HasSubstr("must be 0 for samples"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kFilled; }),
               HasSubstr("color_mode is 1, must be 0 for a filled mesh"));
+  EXPECT_THAT(message([](G& g) { g.texture_width = 5; }),
+              HasSubstr("geometry.texture_height is 0, must be 1 to 8192"));
+  EXPECT_THAT(message([](G& g) { g.texture_width = 8193, g.texture_height = 1; }),
+              HasSubstr("geometry.texture_width is 8193, must be 1 to 8192"));
+  EXPECT_THAT(message([](G& g) {
+                g.kind = PrimitiveKind::kSegments;
+                g.texture_width = g.texture_height = 1;
+              }),
+              HasSubstr("texture_width is 1, must be 0 for what is no triangles"));
   EXPECT_THAT(message([](G& g) { g.splat = static_cast<Splat>(3); }),
               HasSubstr("splat is 3, must be 0 to 2"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kImplicit; }),
@@ -446,6 +455,8 @@ TEST(Delta, RefusesBadDrawablesAndLayers) {
   EXPECT_THAT(layer({.plane_count = 21}), HasSubstr("layer.plane_count is 21, must be 0 to 20"));
   EXPECT_THAT(layer({.cylinder_count = 5}), HasSubstr("layer.cylinder_count is 5, must be 0 to 4"));
   EXPECT_THAT(layer({.has_region = 2}), HasSubstr("layer.has_region is 2, must be 0 to 1"));
+  EXPECT_THAT(layer({.has_mask = 2}), HasSubstr("layer.has_mask is 2, must be 0 to 1"));
+  EXPECT_EQ(layer({.has_mask = 1, .mask = 77}), "");  // which need not be there
   LayerRecord clipped{.plane_count = 2};
   clipped.planes[0] = {0, 0, 1, -7};
   EXPECT_THAT(layer(clipped),

@@ -123,8 +123,22 @@ struct ShapeEncoder {
     std::string fields;
     AppendUnsigned(v1::Mesh::kRuleFieldNumber, AfterUnspecified(mesh.rule), &fields);
     AppendUnsigned(v1::Mesh::kFillFieldNumber, AfterUnspecified(mesh.fill), &fields);
-    return OverVertices(mesh.vertices, v1::Mesh::kVerticesFieldNumber, fields,
-                        v1::Primitive::kMeshFieldNumber);
+    absl::StatusOr<Rope> vertices = EncodeVertices(mesh.vertices);
+    if (!vertices.ok()) return vertices.status();
+    Rope rope = Wrap(fields, v1::Mesh::kVerticesFieldNumber, *std::move(vertices));
+    if (mesh.texture.has_value()) {
+      const size_t count = mesh.vertices.positions.size() / 3;
+      if (mesh.texture->coordinates.size() != 2 * count) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("texture.coordinates has ", mesh.texture->coordinates.size(),
+                         " numbers for ", count, " vertices; ", 2 * count, " are right"));
+      }
+      Rope texture;
+      AppendPayload(v1::Texture::kPictureFieldNumber, mesh.texture->picture, &texture);
+      AppendPayload(v1::Texture::kCoordinatesFieldNumber, mesh.texture->coordinates, &texture);
+      rope.Append(Wrap("", v1::Mesh::kTextureFieldNumber, std::move(texture)));
+    }
+    return Wrap(before, v1::Primitive::kMeshFieldNumber, std::move(rope));
   }
   absl::StatusOr<Rope> operator()(const Curve& curve) const {
     std::string fields;
@@ -186,7 +200,9 @@ struct ShapeEncoder {
     AppendUnsigned(v1::HeightMap::kColumnsFieldNumber, map.columns, &fields);
     AppendUnsigned(v1::HeightMap::kRowsFieldNumber, map.rows, &fields);
     AppendUnsigned(v1::HeightMap::kRuleFieldNumber, AfterUnspecified(map.rule), &fields);
+    AppendUnsigned(v1::HeightMap::kFillFieldNumber, AfterUnspecified(map.fill), &fields);
     Rope rope(std::move(fields));
+    AppendPayload(v1::HeightMap::kPictureFieldNumber, map.picture, &rope);
     AppendPayload(v1::HeightMap::kColorsFieldNumber, map.colors, &rope);
     AppendPayload(v1::HeightMap::kHeightsFieldNumber, map.heights, &rope);
     return Wrap(before, v1::Primitive::kHeightMapFieldNumber, std::move(rope));
@@ -343,6 +359,7 @@ struct OperationEncoder {
       }
       AppendPresentBytes(v1::LayerState::kRegionFieldNumber, corners, &fields);
     }
+    if (look.mask) AppendPresentBytes(v1::LayerState::kMaskLayerFieldNumber, *look.mask, &fields);
     return Request(StreamRequest::kLayerStateFieldNumber, std::move(fields));
   }
   Rope operator()(const DefineOperation& define) const {

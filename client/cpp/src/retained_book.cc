@@ -123,6 +123,7 @@ struct RetainedBook::Applier {
     take(operation.look.transform, &look.transform);
     take(operation.look.clip, &look.clip);
     take(operation.look.region, &look.region);
+    take(operation.look.mask, &look.mask);
   }
   void operator()(const DefineOperation& define) {
     if (!Refused("", define.object)) book.objects_[define.object] = define;

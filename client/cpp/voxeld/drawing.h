@@ -72,11 +72,20 @@ struct Segments {
   Thickness thickness;
 };
 
+// A picture on a mesh, which colours are multiplied by.
+struct Texture {
+  Array<uint8_t> picture;  // a PNG or JPEG file
+  // Two of each vertex: how far right and how far down. (0, 0) is the picture's upper left corner, (1, 1) its lower right
+  // one; beyond them it repeats.
+  Array<float> coordinates;
+};
+
 // Indexed triangles, or vertices three by three.
 struct Mesh {
   Vertices vertices;
   SurfaceRule rule = SurfaceRule::kThin;
-  Fill fill = Fill::kSurface;  // or lines, or dots
+  Fill fill = Fill::kSurface;
+  std::optional<Texture> texture;  // of a surface
 };
 
 // A smooth line along points: through them all (Catmull–Rom), near them (B-spline), or Béziers: an end, two
@@ -106,6 +115,9 @@ struct HeightMap {
   Array<float> heights;
   Array<uint8_t> colors;  // r g b of each; empty: Look::color
   SurfaceRule rule = SurfaceRule::kThin;
+  Fill fill = Fill::kSurface;  // or lines, which are rows and columns, or dots
+  Array<uint8_t>
+      picture;  // a PNG or JPEG file over all of it, from the first sample on; empty: none
 };
 
 // Samples in the middles of cells that fill what three edges span from a corner.
@@ -239,6 +251,8 @@ struct LayerLook {
   // Only what lies in all of these and in the region is drawn. An empty list takes the former away.
   std::optional<std::vector<ClipPart>> clip;
   std::optional<Region> region;
+  // A layer of this client: only where it covers is anything seen. Empty: none any more.
+  std::optional<std::string> mask;
 };
 
 }  // namespace voxeld::client

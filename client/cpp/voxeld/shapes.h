@@ -60,6 +60,7 @@ struct Disc {
   double inner_radius = 0;
   SurfaceRule rule = SurfaceRule::kThin;
   Thickness shell;
+  Fill fill = Fill::kSurface;  // or lines, or dots
 };
 
 // A parallelogram.
@@ -68,6 +69,7 @@ struct Patch {
   Vec3 edge_a = {1, 0, 0}, edge_b = {0, 1, 0};
   SurfaceRule rule = SurfaceRule::kThin;
   Thickness shell;
+  Fill fill = Fill::kSurface;  // or lines, or dots
 };
 
 // Closed plane curves, by the even-odd rule: curves within others are holes.
@@ -75,16 +77,17 @@ struct Polygon {
   std::vector<std::vector<Vec3>> curves;
   SurfaceRule rule = SurfaceRule::kThin;
   Thickness shell;
+  Fill fill = Fill::kSurface;  // or lines, or dots
 };
 
 // A shaft with a cone at its end.
 struct Arrow {
   Vec3 start;
-  Vec3 end = {0, 0, 1};        // the tip
-  double shaft_radius = 0;     // 0: as thin as a voxel
-  double head_length = 0;      // 0: a quarter of the length
-  double head_radius = 0;      // 0: two fifths of the head's length
-  Fill fill = Fill::kSurface;  // or solid
+  Vec3 end = {0, 0, 1};     // the tip
+  double shaft_radius = 0;  // 0: as thin as a voxel
+  double head_length = 0;   // 0: a quarter of the length
+  double head_radius = 0;   // 0: two fifths of the head's length
+  Fill fill = Fill::kSurface;
   SurfaceRule rule = SurfaceRule::kThin;
   Thickness shell;
 };

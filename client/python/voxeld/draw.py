@@ -11,6 +11,7 @@ from .draw_curves import DrawCurves
 from .draw_measured import Drawn, Make
 from .errors import InvalidValue
 from .look import Look
+from .texture import PictureFile
 
 __all__ = ["Draw", "Look", "Make", "checked_name"]
 
@@ -48,13 +49,16 @@ class Draw(DrawCurves[Drawn]):
                           Look.of(transform, priority, erase, lifetime, label))
 
     def mesh(self, name: str, vertices: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *,
-             colors: Optional[Colors] = None, cmap: Optional[str] = None, rule: str = "thin",
-             fill: str = "surface", transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+             colors: Optional[Colors] = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
+             uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface",
+             transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
              lifetime: Optional[float] = None, label: str = "") -> Drawn:
         """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover".
-        `fill`: "surface", "lines", "dots" or "solid": what a closed mesh encloses, in one colour."""
-        return self._draw(name, shapes.mesh, (vertices, faces), dict(colors=colors, cmap=cmap, rule=rule, fill=fill),
-                          Look.of(transform, priority, erase, lifetime, label))
+        `fill`: "surface", "lines", "dots" or "solid": what a closed mesh encloses, in one colour. `texture` is a PNG or
+        JPEG file's path or bytes, which multiplies colours, `uv` (n, 2) where vertices are on it: from (0, 0), its upper
+        left corner, to (1, 1); beyond it repeats."""
+        return self._draw(name, shapes.mesh, (vertices, faces),
+                          dict(colors=colors, cmap=cmap, texture=texture, uv=uv, rule=rule, fill=fill), Look.of(transform, priority, erase, lifetime, label))
 
     def box(self, name: str, center: npt.ArrayLike = (0, 0, 0), size: npt.ArrayLike = 1.0, *, color: Optional[Colors] = None,
             fill: str = "surface", rule: str = "thin", transform: Optional[npt.ArrayLike] = None, priority: int = 0,

@@ -9,6 +9,7 @@ from . import measured, wire
 from .colors import Colors
 from .look import Look
 from .measured import Formula
+from .texture import PictureFile
 
 Drawn = TypeVar("Drawn", covariant=True)
 Make = Callable[..., list[wire.Packed]]
@@ -52,32 +53,38 @@ class DrawMeasured(Generic[Drawn]):
                           dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
 
     def disc(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, *, normal: npt.ArrayLike = (0, 0, 1),
-             inner_radius: float = 0.0, color: Optional[Colors] = None, rule: str = "thin", shell: Optional[float] = None,
-             unit: str = "voxels", **look: Any) -> Drawn:
-        """Across `normal`; with an inner radius, a ring."""
+             inner_radius: float = 0.0, color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin",
+             shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
+        """Across `normal`; with an inner radius, a ring. `fill`: "surface", "lines" or "dots"."""
         return self._draw(name, measured.disc, (center, radius),
-                          dict(normal=normal, inner_radius=inner_radius, color=color, rule=rule, shell=shell, unit=unit),
+                          dict(normal=normal, inner_radius=inner_radius, color=color, fill=fill, rule=rule, shell=shell,
+                               unit=unit),
                           Look.of(**look))
 
     def patch(self, name: str, corner: npt.ArrayLike, edges: npt.ArrayLike, *, color: Optional[Colors] = None,
-              rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
-        """A parallelogram: `edges` are the two at the corner, (2, 3)."""
-        return self._draw(name, measured.patch, (corner, edges), dict(color=color, rule=rule, shell=shell, unit=unit),
-                          Look.of(**look))
+              fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
+              **look: Any) -> Drawn:
+        """A parallelogram: `edges` are the two at the corner, (2, 3). `fill`: "surface", "lines" or "dots"."""
+        return self._draw(name, measured.patch, (corner, edges),
+                          dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
 
-    def polygon(self, name: str, curves: Curves, *, color: Optional[Colors] = None, rule: str = "thin",
-                shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
-        """Plane: one closed curve, (n, 3), or several, of which those within others are holes."""
-        return self._draw(name, measured.polygon, (curves,), dict(color=color, rule=rule, shell=shell, unit=unit),
-                          Look.of(**look))
+    def polygon(self, name: str, curves: Curves, *, color: Optional[Colors] = None, fill: str = "surface",
+                rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
+        """Plane: one closed curve, (n, 3), or several, of which those within others are holes. `fill`: "surface", "lines"
+        or "dots"."""
+        return self._draw(name, measured.polygon, (curves,),
+                          dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
 
     def height_map(self, name: str, heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
                    edges: npt.ArrayLike = ((2, 0, 0), (0, 2, 0)), up: npt.ArrayLike = (0, 0, 1),
-                   colors: Optional[Colors] = None, cmap: Optional[str] = None, rule: str = "thin", **look: Any) -> Drawn:
+                   colors: Optional[Colors] = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
+                   fill: str = "surface", rule: str = "thin", **look: Any) -> Drawn:
         """A surface over a grid of heights, (rows, columns): along `edges[0]` in a row, along `edges[1]` from row to row.
-        `colors` is one, (rows, columns, 3), or, with a `cmap`, (rows, columns) numbers."""
+        `colors` is one, (rows, columns, 3), or, with a `cmap`, (rows, columns) numbers. `texture`, a PNG or JPEG file's
+        path or bytes, lies over all of it and multiplies colours. `fill`: "surface", "lines" (rows and columns), "dots"."""
         return self._draw(name, measured.height_map, (heights,),
-                          dict(corner=corner, edges=edges, up=up, colors=colors, cmap=cmap, rule=rule), Look.of(**look))
+                          dict(corner=corner, edges=edges, up=up, colors=colors, cmap=cmap, texture=texture, fill=fill,
+                               rule=rule), Look.of(**look))
 
     def implicit(self, name: str, surface: Formula, *, bound: Optional[Formula] = None, boundary: Optional[Curves] = None,
                  boundary_axis: str = "z", parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None,

@@ -106,7 +106,8 @@ class Layer(Draw[Handle]):
             region: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, mask: Optional[str] = None) -> Optional[Frame]:
         """Sets what is given. `opacity`: 0 to 1. `order`: the higher is drawn over the lower. `blend`: "over", "add" or
         "erase". `clip`: planes (a, b, c, d) that keep a·x + b·y + c·z + d ≥ 0, ClipBox, ClipCylinder: what lies in all
-        of them is drawn. `region`: two corners of a box."""
+        of them is drawn. `region`: two corners of a box. `mask`: a layer of yours; only where it covers, seen or not, this
+        one is seen; "": none any more."""
         state = pb.LayerState(layer=self.name)
         if visible is not None:
             state.visible = visible

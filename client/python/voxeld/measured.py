@@ -13,6 +13,7 @@ from .colors import Colors
 from .errors import InvalidArray, InvalidValue
 from .expressions import Expression
 from .shapes import FILLS, PIECE_BYTES, RULES, choice, solid, thickness, vec
+from .texture import PictureFile, picture_bytes
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
@@ -83,26 +84,30 @@ def _edges(edges: npt.ArrayLike, count: int) -> list[types_pb2.Vec3]:
 
 
 def disc(center: npt.ArrayLike, radius: float, *, normal: npt.ArrayLike = (0, 0, 1), inner_radius: float = 0, color: Color = None,
-         rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
+         fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     return solid(color, disc=pb.Disc(center=vec(center, "center"), normal=vec(normal, "normal"),
                                      radius=number(radius, "radius", above=0),
-                                     inner_radius=number(inner_radius, "inner_radius", least=0), **_rule(rule, shell, unit)))
+                                     inner_radius=number(inner_radius, "inner_radius", least=0),
+                                     fill=choice(FILLS, fill, "fill"), **_rule(rule, shell, unit)))
 
 
-def patch(corner: npt.ArrayLike, edges: npt.ArrayLike, *, color: Color = None, rule: str = "thin",
+def patch(corner: npt.ArrayLike, edges: npt.ArrayLike, *, color: Color = None, fill: str = "surface", rule: str = "thin",
           shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     a, b = _edges(edges, 2)
-    return solid(color, patch=pb.Patch(corner=vec(corner, "corner"), edge_a=a, edge_b=b, **_rule(rule, shell, unit)))
+    return solid(color, patch=pb.Patch(corner=vec(corner, "corner"), edge_a=a, edge_b=b, fill=choice(FILLS, fill, "fill"),
+                                       **_rule(rule, shell, unit)))
 
 
-def polygon(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], *, color: Color = None, rule: str = "thin",
-            shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
-    return solid(color, polygon=pb.Polygon(**_curves(curves, "curves"), **_rule(rule, shell, unit)))
+def polygon(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], *, color: Color = None, fill: str = "surface",
+            rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
+    return solid(color, polygon=pb.Polygon(**_curves(curves, "curves"), fill=choice(FILLS, fill, "fill"),
+                                           **_rule(rule, shell, unit)))
 
 
 def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
                edges: npt.ArrayLike = ((2, 0, 0), (0, 2, 0)), up: npt.ArrayLike = (0, 0, 1),
-               colors: Color = None, cmap: Optional[str] = None, rule: str = "thin") -> list[wire.Packed]:
+               colors: Color = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
+               fill: str = "surface", rule: str = "thin") -> list[wire.Packed]:
     """`heights`: (rows, columns). `colors`: one, (rows, columns, 3), or with a map (rows, columns) numbers."""
     field = as_array(heights, "heights")
     if field.ndim != 2 or min(field.shape) < 2:
@@ -120,15 +125,20 @@ def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
     found = colors_.many(each, rows * columns, cmap)
     uniform = found if isinstance(found, int) else None
     rgb = None if found is None or isinstance(found, int) else np.ascontiguousarray(found[:, :3])
-    word = choice(RULES, rule, "rule")
+    look: dict[str, Any] = dict(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"))
     most = max(2, PIECE_BYTES // (columns * (4 if rgb is None else 7)))
+    if texture is not None:
+        look["picture"] = picture_bytes(texture)
+        if most < rows:
+            raise InvalidArray(f"heights: {rows} by {columns} are more than go at once, and a picture lies over all of them; "
+                               "leave out rows and columns, or give colors")
     result = []
     for begin in range(0, rows - 1, most - 1):  # a row in common
         end = min(begin + most, rows)
         piece = pb.HeightMap(
             corner=vec(start + second * (begin / (rows - 1)), "corner"), edge_a=vec(first, "edges"),
             edge_b=vec(second * ((end - 1 - begin) / (rows - 1)), "edges"), up=vec(up, "up"), columns=columns, rows=end - begin,
-            rule=word, heights=samples[begin:end].tobytes(),
+            **look, heights=samples[begin:end].tobytes(),
             colors=b"" if rgb is None else rgb[begin * columns:end * columns].tobytes())
         color = None if uniform is None else pb.Color(rgb=uniform)
         result.append(wire.message(pb.Primitive(color=color, height_map=piece)))

@@ -15,6 +15,7 @@ from . import wire
 from .arrays import Array, as_array, indices, number, positions, require_finite, vector
 from .colors import Colors
 from .errors import InvalidArray, InvalidValue
+from .texture import PictureFile, to_texture
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
@@ -109,16 +110,21 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
 
 
 def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Optional[Colors] = None,
-         cmap: Optional[str] = None, rule: str = "thin", fill: str = "surface") -> list[wire.Packed]:
+         cmap: Optional[str] = None, texture: Optional[PictureFile] = None, uv: Optional[npt.ArrayLike] = None,
+         rule: str = "thin", fill: str = "surface") -> list[wire.Packed]:
     """Triangles: of `faces`, or of the vertices three by three."""
     array, element = positions(at, "vertices")
     color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
-    head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill")).SerializeToString()
+    head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"),
+                   texture=to_texture(texture, uv, len(array))).SerializeToString()
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
     whole = len(array) * size + (0 if faces is None else 12 * len(faces))  # type: ignore[arg-type]
     if fill == "solid" and whole > PIECE_BYTES:
         raise InvalidArray(f"the mesh takes {whole} bytes, more than the {PIECE_BYTES} that go at once, and a part of it "
                            "is no solid; draw its surface, or a coarser one")
+    if texture is not None and whole > PIECE_BYTES:
+        raise InvalidArray(f"the mesh takes {whole} bytes, more than the {PIECE_BYTES} that go at once with a texture; draw "
+                           "it in parts, or a coarser one")
 
     def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
         return packed("mesh", head, wire.vertices(vertices, element, own, index), color)

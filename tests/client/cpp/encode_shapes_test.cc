@@ -89,12 +89,41 @@ TEST(EncodeShapes, FillsSplatsAndTints) {
                 .mesh()
                 .fill(),
             v1::FILL_LINES);
+  EXPECT_EQ(Parse(Disc{.fill = Fill::kLines}).disc().fill(), v1::FILL_LINES);
+  EXPECT_EQ(Parse(Patch{.fill = Fill::kDots}).patch().fill(), v1::FILL_DOTS);
+  EXPECT_EQ(Parse(Polygon{.fill = Fill::kLines}).polygon().fill(), v1::FILL_LINES);
+  EXPECT_EQ(Parse(HeightMap{.columns = 1, .rows = 1, .heights = {0.f}, .fill = Fill::kDots})
+                .height_map()
+                .fill(),
+            v1::FILL_DOTS);
   EXPECT_EQ(Parse(Points{.vertices = {.positions = {0, 0, 0}}, .splat = Points::Splat::kSoft})
                 .points()
                 .splat(),
             v1::Points::SOFT);
   EXPECT_EQ(Parse(Instance{.object = "o", .tint = {1, 2, 3}}).instance().tint().rgb(), 0x010203u);
   EXPECT_FALSE(Parse(Instance{.object = "o"}).instance().has_tint());
+}
+
+TEST(EncodeShapes, PicturesOnMeshesAndHeightMaps) {
+  const Array<uint8_t> picture = {1, 2, 3, 0, 255};
+  const std::string bytes("\x01\x02\x03\0\xFF", 5);
+  Mesh mesh{.vertices = {.positions = std::vector<float>(9)}};
+  mesh.texture = Texture{.picture = picture, .coordinates = {0, 0, 0.5f, 1, -2, 3}};
+  const v1::Mesh encoded = Parse(mesh).mesh();
+  EXPECT_EQ(encoded.texture().picture(), bytes);
+  EXPECT_EQ(encoded.vertices().count(), 3u);
+  float coordinates[6];
+  ASSERT_EQ(encoded.texture().coordinates().size(), sizeof(coordinates));
+  std::memcpy(coordinates, encoded.texture().coordinates().data(), sizeof(coordinates));
+  EXPECT_THAT(coordinates, ElementsAre(0, 0, 0.5f, 1, -2, 3));
+  EXPECT_FALSE(Parse(Mesh{.vertices = {.positions = std::vector<float>(9)}}).mesh().has_texture());
+  mesh.texture->coordinates = {0, 0};
+  EXPECT_EQ(std::string(EncodePrimitive(mesh, {}).status().message()),
+            "texture.coordinates has 2 numbers for 3 vertices; 6 are right");
+  EXPECT_EQ(Parse(HeightMap{.columns = 1, .rows = 1, .heights = {0.f}, .picture = picture})
+                .height_map()
+                .picture(),
+            bytes);
 }
 
 TEST(EncodeShapes, VolumesAndIsosurfaces) {

@@ -204,7 +204,9 @@ TEST(Encode, Operations) {
                      {.clip = std::vector<ClipPart>{HalfSpace{1, 0, 0, 0.5}, HalfSpace{0, -2, 3, 0},
                                                     ClipBox{{1, 2, 3}, {4, 5, 6}, {}},
                                                     ClipCylinder{{0, 0, -1}, {0, 0, 1}, 2.5}},
-                      .region = Region{.min = {-1, -2, -3}, .max = {1, 0, 3}}}}));
+                      .region = Region{.min = {-1, -2, -3}, .max = {1, 0, 3}},
+                      .mask = "stencil"}}));
+  EXPECT_EQ(request.layer_state().mask_layer(), "stencil");
   ASSERT_EQ(request.layer_state().clip().boxes_size(), 1);
   EXPECT_EQ(request.layer_state().clip().boxes(0).size().z(), 6);
   ASSERT_EQ(request.layer_state().clip().cylinders_size(), 1);
@@ -216,7 +218,9 @@ TEST(Encode, Operations) {
   EXPECT_EQ(request.layer_state().region().min().y(), -2);
   EXPECT_TRUE(request.layer_state().region().has_max());
   request = Parse(EncodeOperation(LayerOperation{
-      "l", {.clip = std::vector<ClipPart>(), .region = Region{.everything = true}}}));
+      "l", {.clip = std::vector<ClipPart>(), .region = Region{.everything = true}, .mask = ""}}));
+  EXPECT_TRUE(request.layer_state().has_mask_layer());
+  EXPECT_EQ(request.layer_state().mask_layer(), "");
   EXPECT_TRUE(request.layer_state().has_clip());
   EXPECT_EQ(request.layer_state().clip().planes_size(), 0);
   EXPECT_TRUE(request.layer_state().has_region());

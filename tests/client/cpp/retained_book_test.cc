@@ -76,7 +76,7 @@ TEST_F(RetainedBookTest, FramesReplaceAndThoseGivenUpDoNot) {
 }
 
 TEST_F(RetainedBookTest, TransformsAndLooksAreThoseOfNow) {
-  Apply({Put("l", "a"), LayerOperation{"l", {.opacity = uint8_t{9}, .order = 3}}});
+  Apply({Put("l", "a"), LayerOperation{"l", {.opacity = uint8_t{9}, .order = 3, .mask = "m"}}});
   Apply({TransformOperation{"l", "a", Affine::Translate({1, 2, 3})},
          TransformOperation{"l", "none", Affine()}, LayerOperation{"l", {.order = -1}}});
   const std::vector<Operation> restored = book_.Restore(now_);
@@ -84,6 +84,7 @@ TEST_F(RetainedBookTest, TransformsAndLooksAreThoseOfNow) {
   const LayerLook& look = std::get<LayerOperation>(restored[0]).look;
   EXPECT_EQ(look.opacity, 9);
   EXPECT_EQ(look.order, -1);
+  EXPECT_EQ(look.mask, "m");
   EXPECT_FALSE(look.visible.has_value());
   EXPECT_EQ(std::get<UpsertOperation>(restored[1]).transform, Affine::Translate({1, 2, 3}));
 }

@@ -28,6 +28,17 @@ class Measured(unittest.TestCase):
         patch = parsed(measured.patch((1, 1, 1), [(1, 0, 0), (0, 1, 0)])).patch
         self.assertEqual((patch.corner.x, patch.edge_b.y), (1, 1))
 
+    def test_surfaces_have_lines_and_dots(self) -> None:
+        self.assertEqual(parsed(measured.disc((0, 0, 0), 1, fill="lines")).disc.fill, pb.FILL_LINES)
+        self.assertEqual(parsed(measured.patch((0, 0, 0), np.eye(3)[:2], fill="dots")).patch.fill, pb.FILL_DOTS)
+        self.assertEqual(parsed(measured.polygon(np.eye(3), fill="lines")).polygon.fill, pb.FILL_LINES)
+        self.assertEqual(parsed(measured.height_map(np.zeros((2, 2)), fill="dots")).height_map.fill, pb.FILL_DOTS)
+
+    def test_a_picture_lies_over_a_whole_height_map(self) -> None:
+        self.assertEqual(parsed(measured.height_map(np.zeros((2, 2)), texture=b"file")).height_map.picture, b"file")
+        with self.assertRaisesRegex(InvalidArray, "700 by 1000 are more than go at once"):
+            measured.height_map(np.zeros((700, 1000)), texture=b"file")
+
     def test_curves_are_one_or_several(self) -> None:
         triangle = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
         one = parsed(measured.polygon(triangle)).polygon

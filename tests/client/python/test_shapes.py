@@ -1,4 +1,6 @@
 """What shapes say on the wire, and that pieces of large ones are the whole."""
+import pathlib
+import tempfile
 import unittest
 from typing import Any, Sequence
 
@@ -113,6 +115,41 @@ class Mesh(unittest.TestCase):
         np.testing.assert_array_equal(np.concatenate([xyz(v) for v in got]), at)
         with self.assertRaisesRegex(InvalidArray, "multiple of 3"):
             shapes.mesh(at[:4])
+
+
+class Textures(unittest.TestCase):
+    AT = np.eye(3, dtype=np.float32)
+    UV = [(0, 0), (1, 0.5), (-2, 3)]
+
+    def test_a_file_or_its_bytes(self) -> None:
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(b"a picture")
+            file.flush()
+            for source in (b"a picture", bytearray(b"a picture"), file.name, pathlib.Path(file.name)):
+                (primitive,) = parsed(shapes.mesh(self.AT, texture=source, uv=self.UV))
+                self.assertEqual(primitive.mesh.texture.picture, b"a picture")
+        places = np.frombuffer(primitive.mesh.texture.coordinates, np.float32)
+        self.assertEqual(places.tolist(), [0, 0, 1, 0.5, -2, 3])
+        self.assertEqual(primitive.mesh.vertices.count, 3)
+        (plain,) = parsed(shapes.mesh(self.AT))
+        self.assertFalse(plain.mesh.HasField("texture"))
+
+    def test_what_is_wrong_says_so(self) -> None:
+        with self.assertRaisesRegex(InvalidValue, "texture and uv go together"):
+            shapes.mesh(self.AT, texture=b"x")
+        with self.assertRaisesRegex(InvalidValue, "texture and uv go together"):
+            shapes.mesh(self.AT, uv=self.UV)
+        with self.assertRaisesRegex(InvalidArray, r"uv must be of shape \(3, 2\), got \(2, 2\)"):
+            shapes.mesh(self.AT, texture=b"x", uv=self.UV[:2])
+        with self.assertRaisesRegex(InvalidArray, "uv"):
+            shapes.mesh(self.AT, texture=b"x", uv=[(0, 0), (1, np.nan), (0, 1)])
+        with self.assertRaisesRegex(InvalidValue, "texture is a int; give a PNG or JPEG file"):
+            shapes.mesh(self.AT, texture=5, uv=self.UV)  # type: ignore[arg-type]
+        with self.assertRaises(OSError):
+            shapes.mesh(self.AT, texture="/nowhere/at/all.png", uv=self.UV)
+        many = np.zeros((300_000, 3), np.float32)
+        with self.assertRaisesRegex(InvalidArray, "go at once with a texture"):
+            shapes.mesh(many, texture=b"x", uv=many[:, :2])
 
 
 class Solids(unittest.TestCase):

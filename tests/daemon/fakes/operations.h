@@ -96,6 +96,12 @@ inline Operation SetRegion(std::string layer, std::optional<gpu::Region> region)
   state.region = region;
   return {0, std::move(state)};
 }
+inline Operation SetMask(std::string layer, std::string mask) {
+  LayerState state;
+  state.layer = std::move(layer);
+  state.mask = std::move(mask);
+  return {0, std::move(state)};
+}
 inline Operation Begin(std::string layer) { return {0, FrameBegin{std::move(layer)}}; }
 inline Operation End(std::string layer) { return {0, FrameEnd{std::move(layer)}}; }
 inline Operation Define(std::string object, std::vector<ObjectPart> parts) {

@@ -134,6 +134,46 @@ TEST(EngineDelta, ALayersClipAndRegionGoWithTheLayerAlone) {
   EXPECT_EQ(layer().has_region, 0u);
 }
 
+TEST(EngineDelta, AMaskIsTheLayerOfThatName) {
+  StoreFixture f;
+  f.Commit(Put("a", "x"), Put("b", "y"), testing::SetMask("a", "b"));
+  Pair pair;
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  const auto layer = [&] { return pair.model.layers().at(f.GetLayer("a")->number); };
+  const auto bring = [&](auto... operations) {
+    f.Commit(std::move(operations)...);
+    EXPECT_TRUE(pair.Bring(f.store.snapshot()).ok());
+    return pair.model.puts() + pair.model.drops();
+  };
+  EXPECT_EQ(layer().has_mask, 1u);
+  EXPECT_EQ(layer().mask, f.GetLayer("b")->number);
+  EXPECT_EQ(bring(testing::SetMask("a", "b")), 0);  // the same again
+  // One that is not there is no layer's number.
+  EXPECT_EQ(bring(testing::SetMask("a", "c")), 1);
+  EXPECT_EQ(layer().has_mask, 1u);
+  EXPECT_EQ(layer().mask, 0u);
+  // When it comes, and when it is gone, the layer that it masks is told.
+  const SnapshotPtr without = f.store.snapshot();
+  EXPECT_EQ(bring(Put("c", "z")), 4);  // layer, geometry, drawable; and a
+  EXPECT_EQ(layer().mask, f.GetLayer("c")->number);
+  const SnapshotPtr with = f.store.snapshot();
+  EXPECT_TRUE(pair.Bring(without).ok());
+  EXPECT_EQ(layer().mask, 0u);
+  EXPECT_TRUE(pair.Bring(with).ok());
+  EXPECT_EQ(layer().mask, f.GetLayer("c")->number);
+  EXPECT_EQ(bring(testing::SetMask("a", "")), 1);
+  EXPECT_EQ(layer().has_mask, 0u);
+}
+
+TEST(EngineDelta, AMaskIsOfTheSameOwner) {
+  StoreFixture f;
+  f.Commit(Put("a", "x"), testing::SetMask("a", "b"));
+  f.Commit(testing::MakeAuthor(2, 12), Put("b", "y"));
+  Pair pair;
+  ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
+  EXPECT_EQ(pair.model.layers().at(f.GetLayer("a")->number).mask, 0u);
+}
+
 TEST(EngineDelta, InstancesShareGeometriesAndComposeFromTheOutside) {
   StoreFixture f;
   gpu::Affine turn;  // a quarter about z

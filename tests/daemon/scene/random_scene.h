@@ -58,6 +58,8 @@ inline std::vector<Operation> RandomOperations(std::mt19937& random, uint32_t mo
           std::optional<gpu::Region> region;
           if (random() % 3 != 0) region = {{0, 0, 0}, {1, 1, 1.0 + random() % 3}};
           all.push_back(SetRegion(layer, region));
+        } else {
+          all.push_back(SetMask(layer, random() % 4 == 0 ? "" : name("l", 4)));
         }
         break;
       case 8:

@@ -33,15 +33,15 @@ struct LayerLook {
   gpu::Affine transform;
   Clip clip;
   std::optional<gpu::Region> region;
+  std::string mask;
   std::string client_name;
   bool orphaned = false;
   bool operator==(const LayerLook&) const = default;
 };
 
 LayerLook LookOf(const Layer& layer) {
-  return {layer.number,       layer.visible, layer.opacity,
-          layer.order,        layer.blend,   layer.transform,
-          layer.clip,         layer.region,  layer.writer->client_name,
+  return {layer.number,       layer.visible, layer.opacity, layer.order, layer.blend,
+          layer.transform,    layer.clip,    layer.region,  layer.mask,  layer.writer->client_name,
           layer.writer->ended};
 }
 

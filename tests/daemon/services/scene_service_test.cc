@@ -153,7 +153,7 @@ TEST(ListEntities, InPages) {
       5u);
 }
 
-TEST(ListEntities, LayersHaveTheirClipAndRegion) {
+TEST(ListEntities, LayersHaveTheirClipRegionAndMask) {
   Daemon daemon;
   v1::ApplyUpdateRequest update;
   v1::LayerState* state = update.add_operations()->mutable_layer_state();
@@ -165,6 +165,7 @@ TEST(ListEntities, LayersHaveTheirClipAndRegion) {
   state->mutable_region()->mutable_max()->set_x(1);
   state->mutable_region()->mutable_max()->set_y(1);
   state->mutable_region()->mutable_max()->set_z(1);
+  state->set_mask_layer("stencil");
   const auto [status, response] = Apply(daemon, update);
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(response.issues_size(), 0);
@@ -172,6 +173,7 @@ TEST(ListEntities, LayersHaveTheirClipAndRegion) {
   ASSERT_EQ(listed.layers_size(), 1);
   EXPECT_EQ(listed.layers(0).clip().SerializeAsString(), state->clip().SerializeAsString());
   EXPECT_EQ(listed.layers(0).region().ShortDebugString(), "min { x: -1 } max { x: 1 y: 1 z: 1 }");
+  EXPECT_EQ(listed.layers(0).mask_layer(), "stencil");
 }
 
 TEST(GetEntity, ByKeyOrNotFound) {

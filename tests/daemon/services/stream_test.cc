@@ -222,19 +222,14 @@ TEST(Stream, WhatIsNotImplementedSaysSo) {
   Daemon daemon;
   Client client(daemon.scene());
   client.Open();
-  v1::StreamRequest layer;
-  layer.mutable_layer_state()->set_layer("layer");
-  layer.mutable_layer_state()->set_mask_layer("other");
-  client.Send(layer);
   v1::StreamRequest commit;
   commit.mutable_commit()->set_durable(true);
   client.Send(commit);
   client.ReadOutcomes(1);
-  ASSERT_THAT(client.issues, SizeIs(2));
+  ASSERT_THAT(client.issues, SizeIs(1));
   EXPECT_EQ(client.issues[0].reason(), v1::REASON_UNIMPLEMENTED);
-  EXPECT_EQ(client.issues[0].field(), "layer_state.mask_layer");
-  EXPECT_EQ(client.issues[1].field(), "commit.durable");
-  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 2u);
+  EXPECT_EQ(client.issues[0].field(), "commit.durable");
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 1u);
 }
 
 TEST(Stream, PingsAreAnsweredOutOfTurn) {

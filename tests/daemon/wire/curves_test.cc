@@ -162,8 +162,6 @@ const FaultCase kCases[] = {
      Reason::kInvalidValue, "as start is"},
     {"arrow_head", Arrow, [](P& p) { p.mutable_arrow()->set_head_length(5); },
      "primitive.arrow.head_length", Reason::kInvalidValue, "is 5; the arrow is 4 long"},
-    {"arrow_lines", Arrow, [](P& p) { p.mutable_arrow()->set_fill(v1::FILL_LINES); },
-     "primitive.arrow.fill", Reason::kInvalidValue, "is FILL_LINES, which it has none of"},
     {"text_height", Text, [](P& p) { p.mutable_text()->clear_height(); }, "primitive.text.height",
      Reason::kInvalidValue, "is 0; give"},
     {"text_up", Text, [](P& p) { Set(p.mutable_text()->mutable_up(), 0, 0, 1); },
@@ -310,6 +308,72 @@ TEST_F(CurvesTest, FramesHaveTheirEdgesAndCorners) {
   EXPECT_EQ(Geometry(mesh).record.kind, gpu::PrimitiveKind::kSegments);
   mesh.mutable_mesh()->set_fill(v1::FILL_DOTS);
   EXPECT_EQ(Geometry(mesh).record.index_count, 4u) << "the fifth is no triangle's";
+}
+
+TEST_F(CurvesTest, FramesOfPlaneThingsAndArrows) {
+  P p;
+  p.mutable_disc()->set_radius(2);
+  p.mutable_disc()->set_fill(v1::FILL_LINES);
+  EXPECT_EQ(Geometry(p).record.vertex_count, (16 + 8) * 4u) << "a circle and spokes";
+  EXPECT_FLOAT_EQ(static_cast<float>(Geometry(p).max[1]), 2);
+  p.mutable_disc()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(p).record.vertex_count, 1u + 8);
+  p.mutable_disc()->set_inner_radius(1);
+  EXPECT_EQ(Geometry(p).record.vertex_count, 8u + 8);
+  p.mutable_disc()->set_fill(v1::FILL_LINES);
+  EXPECT_EQ(Geometry(p).record.vertex_count, (16 + 16 + 8) * 4u);
+
+  Set(p.mutable_patch()->mutable_edge_a(), 1, 0, 0);
+  Set(p.mutable_patch()->mutable_edge_b(), 0, 3, 0);
+  p.mutable_patch()->set_fill(v1::FILL_LINES);
+  EXPECT_EQ(Geometry(p).record.vertex_count, 4u * 4);
+  EXPECT_EQ(Geometry(p).max[1], 3);
+  p.mutable_patch()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(p).record.vertex_count, 4u);
+
+  // A square with a triangle's hole.
+  for (const double number : {0, 0, 0, 9, 0, 0, 9, 9, 0, 0, 9, 0, 2, 2, 0, 5, 2, 0, 2, 5, 0}) {
+    p.mutable_polygon()->add_points(number);
+  }
+  p.mutable_polygon()->add_ends(4);
+  p.mutable_polygon()->add_ends(7);
+  p.mutable_polygon()->set_fill(v1::FILL_LINES);
+  EXPECT_EQ(Geometry(p).record.vertex_count, 7u * 4);
+  EXPECT_EQ(Geometry(p).arrays.positions()[27 * 3], 2) << "the hole's last edge ends at its first";
+  p.mutable_polygon()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(p).record.vertex_count, 7u);
+
+  P arrow = Arrow();
+  arrow.mutable_arrow()->set_fill(v1::FILL_LINES);
+  EXPECT_EQ(Geometry(arrow).record.vertex_count, (16 + 8 + 1) * 4u) << "a cone, and a line to it";
+  arrow.mutable_arrow()->set_shaft_radius(0.1);
+  EXPECT_EQ(Geometry(arrow).record.vertex_count, (16 + 8 + 2 * 16 + 8) * 4u);
+  arrow.mutable_arrow()->set_fill(v1::FILL_DOTS);
+  EXPECT_EQ(Geometry(arrow).record.vertex_count, 1u + 8 + 16);
+}
+
+TEST_F(CurvesTest, HeightMapsHaveRowsColumnsAndSamples) {
+  P p;
+  v1::HeightMap* const map = p.mutable_height_map();
+  Set(map->mutable_edge_a(), 2, 0, 0);
+  Set(map->mutable_edge_b(), 0, 4, 0);
+  map->set_columns(3);
+  map->set_rows(2);
+  map->set_heights(Packed<float>({0, 1, 2, 3, 4, -5}));
+  map->set_colors("abcdefghijklmnopqr");
+  map->set_fill(v1::FILL_LINES);
+  const GeometryData& lines = Geometry(p);
+  EXPECT_EQ(lines.record.kind, gpu::PrimitiveKind::kSegments);
+  EXPECT_EQ(lines.record.topology, gpu::Topology::kList);
+  EXPECT_THAT(lines.arrays.indices(),
+              ::testing::ElementsAre(0, 1, 0, 3, 1, 2, 1, 4, 2, 5, 3, 4, 4, 5));
+  EXPECT_EQ(lines.arrays.colors()[5], 0x707172u);
+  map->set_fill(v1::FILL_DOTS);
+  const GeometryData& dots = Geometry(p);
+  EXPECT_EQ(dots.record.kind, gpu::PrimitiveKind::kPoints);
+  EXPECT_EQ(dots.record.vertex_count, 6u);
+  EXPECT_TRUE(dots.arrays.indices().empty());
+  EXPECT_EQ(dots.arrays.positions()[5 * 3 + 2], -5);
 }
 
 TEST_F(CurvesTest, LettersShareWhatTheyShare) {

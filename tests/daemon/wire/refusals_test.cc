@@ -465,8 +465,10 @@ const Case kCases[] = {
      "is 0; it must be greater than that of min"},
     {"region_inverted", With(RegionRequest, [](R& r) { RegionOf(r)->mutable_max()->set_x(-3); }),
      "layer_state.region.max.x", Reason::kInvalidValue, "is -3"},
-    {"mask", With(LayerRequest, [](R& r) { r.mutable_layer_state()->set_mask_layer("other"); }),
-     "layer_state.mask_layer", Reason::kUnimplemented, "not masked"},
+    {"mask",
+     With(LayerRequest,
+          [](R& r) { r.mutable_layer_state()->set_mask_layer(std::string(300, 'm')); }),
+     "layer_state.mask_layer", Reason::kInvalidValue, "has 300 bytes"},
 
     // objects
     {"object_empty", With(ObjectRequest, [](R& r) { r.mutable_define_object()->set_object(""); }),

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 
+#include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/shape/examples.h"
 
 namespace voxeld::voxelctl {
@@ -101,6 +102,20 @@ TEST(ShapeText, AllElseIsAnExpression) {
   EXPECT_EQ(Parsed("x").primitive().implicit().surface().text(), "x");
   EXPECT_EQ(Parsed("length(x, y, z) = 1").primitive().implicit().surface().text(),
             "length(x, y, z) = 1");
+}
+
+TEST(ShapeText, PicturesAreFilesOrTheirBytes) {
+  const TempFolder folder;
+  const std::string bytes("\x89PNG\0!", 6);
+  const std::string path = folder.Write("a picture.png", bytes);
+  EXPECT_EQ(Parsed("height_map picture='" + path + "'").primitive().height_map().picture(), bytes);
+  EXPECT_EQ(Parsed("mesh texture.picture=base64:iVBORwAh").primitive().mesh().texture().picture(),
+            bytes);
+  EXPECT_THAT(ErrorOf("height_map picture=" + folder.Path("none")),
+              HasSubstr("the path of a PNG or JPEG file would be right, one that can be read"));
+  EXPECT_THAT(ErrorOf("height_map picture=" + folder.Path("")), HasSubstr("one that can be read"));
+  EXPECT_EQ(ErrorOf("height_map picture=base64:*"),
+            "picture is \"base64:*\"; base64 would be right, or a file's path");
 }
 
 TEST(ShapeText, WhatIsWrongIsSaid) {

@@ -23,6 +23,13 @@ constexpr ShapeExample kExamples[] = {
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8 -0.8,-0.8,-0.6 0,0.8,-0.6 0.8,-0.8,-0.6' "
      "fill=solid color=pink"},
+    {"mesh, textured",
+     "mesh vertices='-0.8,-0.8,-0.5 0.8,-0.8,-0.5 0,0,0.7 0.8,-0.8,-0.5 0.8,0.8,-0.5 0,0,0.7 "
+     "0.8,0.8,-0.5 -0.8,0.8,-0.5 0,0,0.7 -0.8,0.8,-0.5 -0.8,-0.8,-0.5 0,0,0.7' "
+     "texture.coordinates='0,1 1,1 0.5,0 0,1 1,1 0.5,0 0,1 1,1 0.5,0 0,1 1,1 0.5,0' "
+     "texture.picture="
+     "base64:iVBORw0KGgoAAAANSUhEUgAAABAAAAAIAgMAAACNGJcEAAAADFBMVEX/UCj/3Dw8oP/w8P8BGlucAAAA"
+     "JElEQVR42mP4DwQMrJysnAwBEwImMEQERAQwtLK2siKJgZQAABIpDhWsRM2vAAAAAElFTkSuQmCC"},
     {"curve",
      "curve vertices='-0.8,-0.6,-0.5 -0.4,0.7,-0.2 0,-0.6,0 0.4,0.7,0.2 0.8,-0.6,0.5' turn=60,0,0 "
      "thickness=3 color=orange"},
@@ -81,6 +88,19 @@ constexpr ShapeExample kExamples[] = {
      "-0.3,-0.3,-0.5,-0.2,0.3,0.5,0.3,-0.2,-0.5,-0.3,-0.3,-0.5,-0.3,0.1,0.3,0.1,-0.3,-0.5,"
      "-0.3,-0.1,-0.4,-0.5,-0.3,-0.2,-0.3,-0.5,-0.4,-0.1,0.1,-0.2,-0.4,-0.5,-0.5,-0.5,-0.4,"
      "-0.2,0.1,0.4,0.1,-0.1,-0.3,-0.3,-0.3,-0.1,0.1,0.4"},
+    {"height_map, textured",
+     "height_map corner=-0.9,-0.9,0 edge_a=1.8,0,0 edge_b=0,1.8,0 columns=5 rows=5 "
+     "heights=-0.3,0,0.2,0,-0.3,0,0.3,0.5,0.3,0,0.2,0.5,0.7,0.5,0.2,0,0.3,0.5,0.3,0,-0.3,0,0.2,0,-"
+     "0.3 "
+     "picture="
+     "base64:iVBORw0KGgoAAAANSUhEUgAAABAAAAAIAgMAAACNGJcEAAAADFBMVEX/UCj/3Dw8oP/w8P8BGlucAAAA"
+     "JElEQVR42mP4DwQMrJysnAwBEwImMEQERAQwtLK2siKJgZQAABIpDhWsRM2vAAAAAElFTkSuQmCC"},
+    {"height_map, lines",
+     "height_map corner=-0.9,-0.9,0 edge_a=1.8,0,0 edge_b=0,1.8,0 columns=7 rows=7 fill=lines "
+     "color=cyan "
+     "heights=0.4,0.2,0,0,0,-0.2,-0.4,0.2,0.2,0.2,0,-0.2,-0.3,-0.2,0,0.2,0.4,0.2,-0.2,-0.2,0,0,0,0."
+     "2,0.4,"
+     "0.2,0,0,0,-0.2,-0.2,0.2,0.4,0.2,0,-0.2,-0.3,-0.2,0,0.2,0.2,0.2,-0.4,-0.2,0,0,0,0.2,0.4"},
     {"volume",
      "volume grid.corner=-0.9,-0.9,-0.9 grid.edge_a=1.8,0,0 grid.edge_b=0,1.8,0 "
      "grid.edge_c=0,0,1.8 grid.size_a=6 "

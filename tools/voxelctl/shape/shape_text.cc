@@ -2,12 +2,15 @@
 
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <numbers>
+#include <sstream>
 #include <utility>
 #include <vector>
 
 #include "absl/algorithm/container.h"
 #include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -197,8 +200,30 @@ absl::Status SetMessage(const FieldDescriptor& field, absl::string_view text, Me
   return absl::InvalidArgumentError(absl::StrCat(name, " is nothing that can be typed here"));
 }
 
+// A file by its path, or its bytes.
+absl::Status SetPicture(const FieldDescriptor& field, absl::string_view text, Message* out) {
+  std::string bytes;
+  absl::string_view code = text;
+  if (absl::ConsumePrefix(&code, "base64:")) {
+    if (!absl::Base64Unescape(code, &bytes)) {
+      return Wrong(field.name(), text, "base64 would be right, or a file's path");
+    }
+  } else {
+    std::ifstream file{std::string(text), std::ios::binary};
+    std::ostringstream whole;
+    if (!file || !(whole << file.rdbuf())) {
+      return Wrong(field.name(), text,
+                   "the path of a PNG or JPEG file would be right, one that can be read");
+    }
+    bytes = std::move(whole).str();
+  }
+  out->GetReflection()->SetString(out, &field, std::move(bytes));
+  return absl::OkStatus();
+}
+
 // Packed arrays: colours, or numbers in single precision.
 absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Message* out) {
+  if (field.name() == "picture") return SetPicture(field, text, out);
   std::string bytes;
   if (field.name() == "colors") {
     for (const absl::string_view part : absl::StrSplit(text, ' ', absl::SkipEmpty())) {

@@ -6,7 +6,8 @@
 // NAME is a field of the primitive; or color, priority, erase, label, lifetime (s); or at, scale and turn
 // (degrees about x, y and z, in this order), which place it. A VALUE with spaces stands in quotes, "…" or '…'. Vectors are
 // x,y,z, or one number for all three; boxes two corners x,y,z:x,y,z; vertices x,y,z x,y,z …; thicknesses
-// numbers of voxels, or of the shape's units with a u behind; colours #rrggbb or plain names.
+// numbers of voxels, or of the shape's units with a u behind; colours #rrggbb or plain names; pictures the path of a PNG or JPEG
+// file, or base64: and its bytes.
 #pragma once
 
 #include <string>

@@ -1,0 +1,38 @@
+"""Pictures on surfaces."""
+from __future__ import annotations
+
+import os
+from typing import Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import as_array, require_finite
+from .errors import InvalidArray, InvalidValue
+from .v1 import primitives_pb2 as pb
+
+PictureFile = Union[str, "os.PathLike[str]", bytes, bytearray, memoryview]
+"""A PNG or JPEG file: its path, or its bytes."""
+
+
+def picture_bytes(texture: PictureFile) -> bytes:
+    """Of the file; OSError if it cannot be read."""
+    if isinstance(texture, (bytes, bytearray, memoryview)):
+        return bytes(texture)
+    if not isinstance(texture, (str, os.PathLike)):
+        raise InvalidValue(f"texture is a {type(texture).__name__}; give a PNG or JPEG file, its path or its bytes")
+    with open(texture, "rb") as file:
+        return file.read()
+
+
+def to_texture(texture: Optional[PictureFile], uv: Optional[npt.ArrayLike], count: int) -> Optional[pb.Texture]:
+    """With the places of `count` vertices; neither, or both."""
+    if texture is None and uv is None:
+        return None
+    if texture is None or uv is None:
+        raise InvalidValue("texture and uv go together; give both, or none of them")
+    places = as_array(uv, "uv")
+    if places.shape != (count, 2):
+        raise InvalidArray(f"uv must be of shape ({count}, 2), got {places.shape}")
+    require_finite(places, "uv")
+    return pb.Texture(picture=picture_bytes(texture), coordinates=np.ascontiguousarray(places, np.float32).tobytes())

@@ -1,0 +1,200 @@
+// Layers that are seen only where another covers.
+#include <cstdint>
+
+#include "tests/conformance/conformance_test.h"
+
+namespace voxeld::gpu::conformance {
+namespace {
+
+constexpr uint32_t kRed = 0xFF0000, kBlue = 0x0000FF;
+constexpr uint64_t kSide = 40, kFace = kSide * kSide, kMaskFace = 20 * 20;
+
+// Layer 1, red, fills all. Layer 2, below it and blue, is a box in the middle, in 8 tiles, none of them full. Layer 3 is empty.
+class Masks : public EngineConformance {
+ protected:
+  Masks() {
+    for (const uint64_t id : {1, 2, 3}) scene_.layers[id].id = id;
+    scene_.layers[2].order = -1;
+    scene_.geometries[1] = SolidBox(1, {20, 20, 20}, {40, 40, 40}, kRed);
+    scene_.geometries[2] = SolidBox(2, {20, 20, 20}, {20, 20, 20}, kBlue);
+    for (const uint64_t id : {1, 2}) scene_.drawables[id] = {.id = id, .geometry = id, .layer = id};
+  }
+
+  LayerRecord& layer(uint64_t id) { return scene_.layers[id]; }
+  void Mask(uint64_t id, uint64_t by) {
+    layer(id).has_mask = 1;
+    layer(id).mask = by;
+  }
+
+  // Voxels of one colour when the scene is drawn whole, as the oracle has them.
+  uint64_t Count(uint32_t rgb) {
+    EngineDriver engine = Make();
+    DeltaBuffer whole;
+    whole.PutWhole(scene_);
+    EXPECT_TRUE(engine.SetTarget(target_).ok());
+    const absl::Status applied = engine.Apply(whole);
+    EXPECT_TRUE(applied.ok()) << applied;
+    ExpectLikeOracle(engine, scene_, target_);
+    return Count(engine, rgb);
+  }
+  static uint64_t Count(EngineDriver& engine, uint32_t rgb) {
+    uint64_t count = 0;
+    for (const uint32_t voxel : engine.Voxels()) count += voxel == rgb;
+    return count;
+  }
+
+  const Target target_ = CubeTarget(kSide);
+  SceneModel scene_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, Masks, testing::ValuesIn(EngineCases()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(Masks, OnlyWhatTheMaskCoversIsSeen) {
+  EXPECT_EQ(Count(kRed), kSide * kFace);
+  Mask(1, 2);
+  EXPECT_EQ(Count(kRed), 20 * kMaskFace);
+  EXPECT_EQ(Count(kBlue), 0u);
+  layer(1).visible = 0;
+  EXPECT_EQ(Count(kBlue), 20 * kMaskFace);
+}
+
+TEST_P(Masks, HowAMaskLooksMakesNoDifference) {
+  Mask(1, 2);
+  layer(2).visible = 0;
+  EXPECT_EQ(Count(kRed), 20 * kMaskFace);
+  layer(2).opacity = 0;
+  layer(2).order = 9;
+  layer(2).blend = BlendMode::kErase;
+  EXPECT_EQ(Count(kRed), 20 * kMaskFace);
+  Mask(2, 3);  // so that itself it is not seen
+  EXPECT_EQ(Count(kRed), 20 * kMaskFace);
+  scene_.geometries[2].record.color = 0;  // black covers
+  EXPECT_EQ(Count(kRed), 20 * kMaskFace);
+}
+
+TEST_P(Masks, ClipsCutBoth) {
+  Mask(1, 2);
+  layer(2).visible = 0;
+  layer(2).plane_count = 1;
+  layer(2).planes[0] = {1, 0, 0, -25};
+  EXPECT_EQ(Count(kRed), 5 * kMaskFace);
+  layer(1).has_region = 1;
+  layer(1).region = {{0, 0, 12}, {40, 40, 13}};
+  EXPECT_EQ(Count(kRed), 5 * 20u);
+}
+
+TEST_P(Masks, WithoutItsMaskALayerIsNotSeen) {
+  Mask(1, 3);
+  EXPECT_EQ(Count(kRed), 0u);
+  EXPECT_EQ(Count(kBlue), 20 * kMaskFace);
+  Mask(1, 77);
+  EXPECT_EQ(Count(kRed), 0u);
+  EXPECT_EQ(Count(kBlue), 20 * kMaskFace);
+}
+
+TEST_P(Masks, OneMayMaskItselfAndTwoEachOther) {
+  Mask(1, 1);
+  EXPECT_EQ(Count(kRed), kSide * kFace);
+  Mask(1, 2);
+  Mask(2, 1);
+  EXPECT_EQ(Count(kRed), 20 * kMaskFace);
+  layer(1).visible = 0;
+  EXPECT_EQ(Count(kBlue), 20 * kMaskFace);
+}
+
+TEST_P(Masks, WhatIsNotInItIsNotErasedFromBelow) {
+  layer(1).blend = BlendMode::kErase;
+  Mask(1, 3);
+  scene_.geometries[3] = SolidBox(3, {20, 20, 14}, {20, 20, 8}, kRed);
+  scene_.drawables[3] = {.id = 3, .geometry = 3, .layer = 3};
+  layer(3).visible = 0;
+  EXPECT_EQ(Count(kBlue), 12 * kMaskFace);
+}
+
+// Every step as a delta of its own, to one engine.
+TEST_P(Masks, ChangesOfEitherShow) {
+  EngineDriver engine = Make();
+  ASSERT_TRUE(engine.SetTarget(target_).ok());
+  DeltaBuffer whole;
+  whole.PutWhole(scene_);
+  ASSERT_TRUE(engine.Apply(whole).ok());
+  const auto red_after = [&](const DeltaBuffer& delta) {
+    EXPECT_TRUE(engine.Apply(delta).ok());
+    ExpectLikeOracle(engine, scene_, target_);
+    return Count(engine, kRed);
+  };
+  const auto put_layer = [&](uint64_t id) {
+    DeltaBuffer delta;
+    delta.Put(layer(id));
+    return red_after(delta);
+  };
+  const auto put_drawable = [&](uint64_t id) {
+    DeltaBuffer delta;
+    delta.Put(scene_.drawables[id]);
+    return red_after(delta);
+  };
+  Mask(1, 2);
+  EXPECT_EQ(put_layer(1), 20 * kMaskFace);
+  layer(2).visible = 0;
+  EXPECT_EQ(put_layer(2), 20 * kMaskFace);
+  scene_.drawables[2].transform.m[3] = 15;  // a part of it leaves the volume
+  EXPECT_EQ(put_drawable(2), 15 * kMaskFace);
+  layer(2).transform.m[3] = -15;
+  EXPECT_EQ(put_layer(2), 20 * kMaskFace);
+  layer(1).visible = 0;
+  EXPECT_EQ(put_layer(1), 0u);
+  layer(2).plane_count = 1;  // while nothing needs it
+  layer(2).planes[0] = {0, 1, 0, -20};
+  EXPECT_EQ(put_layer(2), 0u);
+  scene_.drawables[2].transform.m[3] = 20;
+  EXPECT_EQ(put_drawable(2), 0u);
+  layer(1).visible = 1;
+  EXPECT_EQ(put_layer(1), 20 * kMaskFace / 2);
+  {
+    DeltaBuffer delta;
+    delta.Drop(Op::kDropDrawable, 2);
+    delta.Drop(Op::kDropLayer, 2);
+    const DrawableRecord drawable = scene_.drawables[2];
+    const LayerRecord mask = layer(2);
+    scene_.drawables.erase(2);
+    scene_.layers.erase(2);
+    EXPECT_EQ(red_after(delta), 0u);
+    scene_.layers[2] = mask;
+    EXPECT_EQ(put_layer(2), 0u);  // there again, and empty
+    scene_.drawables[2] = drawable;
+    EXPECT_EQ(put_drawable(2), 20 * kMaskFace / 2);
+  }
+  layer(1).has_mask = 0;
+  EXPECT_EQ(put_layer(1), kSide * kFace);
+}
+
+// What draws where nobody sees it costs nothing.
+TEST_P(Masks, AHiddenMaskOfNoneIsNotDrawn) {
+  layer(2).visible = 0;
+  EngineDriver engine = Make();
+  ASSERT_TRUE(engine.SetTarget(target_).ok());
+  DeltaBuffer whole;
+  whole.PutWhole(scene_);
+  ASSERT_TRUE(engine.Apply(whole).ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
+  const auto drawn = [&] {
+    scene_.drawables[2].transform.m[3] += 1;
+    DeltaBuffer delta;
+    delta.Put(scene_.drawables[2]);
+    EXPECT_TRUE(engine.Apply(delta).ok());
+    const absl::StatusOr<FrameResult> frame = engine.Frame();
+    EXPECT_TRUE(frame.ok()) << frame.status();
+    return frame.value_or(FrameResult{}).tiles_drawn;
+  };
+  EXPECT_EQ(drawn(), 0u);
+  Mask(3, 2);
+  DeltaBuffer delta;
+  delta.Put(layer(3));
+  ASSERT_TRUE(engine.Apply(delta).ok());
+  ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
+  EXPECT_GT(drawn(), 0u);
+}
+
+}  // namespace
+}  // namespace voxeld::gpu::conformance
