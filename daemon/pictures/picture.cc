@@ -72,8 +72,8 @@ absl::StatusOr<PictureFile> PictureFile::OpenJpeg(absl::string_view bytes) {
 absl::Status PictureFile::ReadJpeg(std::vector<uint8_t>& rgb) const {
   const tjhandle reader = tjInitDecompress();
   const absl::Cleanup destroy = [&] { tjDestroy(reader); };
-  // One way to compute it, so that a file is the same picture on every processor.
-  constexpr int kFlags = TJFLAG_ACCURATEDCT | TJFLAG_STOPONWARNING;
+  // One way to compute it, so that a file is the same picture on every processor; and no file of a thousand scans.
+  constexpr int kFlags = TJFLAG_ACCURATEDCT | TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
   if (tjDecompress2(reader, Bytes(bytes_), bytes_.size(), rgb.data(), static_cast<int>(size_.width),
                     0, static_cast<int>(size_.height), TJPF_RGB, kFlags) != 0) {
     return Broken("JPEG", tjGetErrorStr2(reader));
