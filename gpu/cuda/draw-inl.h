@@ -22,6 +22,7 @@ template <>
 struct DrawScratch<DrawWhat::kAll> {
   RegionScratch region;
   PairScratch pairs;
+  uint32_t mask[kDrawThreads];  // of the layer that is drawn, if it has one; each thread's voxels
 };
 
 template <DrawTo kTo, typename Color>
@@ -33,11 +34,12 @@ __device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScra
 }
 
 // What is to be done with the layer that was found, and which is wanted next. One with a mask is found three times: it has
-// something here, then its mask is, then it is drawn. By the first warp; `under`: the layer whose mask was asked for.
+// something here, then its mask is, then it is drawn. By the first warp.
 template <DrawWhat kWhat>
-__device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scratch,
-                         LayerWanted& wanted, uint32_t& under) {
+__device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scratch) {
   __syncwarp();
+  LayerWanted wanted = scratch.wanted;
+  uint32_t under = scratch.under;
   const uint32_t layer = scratch.layer;
   const bool here = layer != kAllLanes && scratch.outside == 0;
   DrawStep step = here ? DrawStep::kLayer : DrawStep::kSkip;
@@ -60,7 +62,11 @@ __device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scr
     wanted.slot = kAllLanes;
   }
   __syncwarp();
-  if (threadIdx.x == 0) scratch.step = step;
+  if (threadIdx.x == 0) {
+    scratch.step = step;
+    scratch.wanted = wanted;
+    scratch.under = under;
+  }
 }
 
 // The layers of a region from the lowest on, each raised into the words; blend() after each.
@@ -68,15 +74,19 @@ template <DrawWhat kWhat, typename Blend>
 __device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawScratch<kWhat>& all,
                            Blend&& blend) {
   RegionScratch& scratch = all.region;
-  LayerWanted wanted;
-  uint32_t under = kAllLanes;
+  if (threadIdx.x == 0) {
+    scratch.wanted = LayerWanted();
+    scratch.under = kAllLanes;
+  }
   for (;;) {
     if (threadIdx.x < 32) {
+      __syncwarp();
       PairRows* rows = nullptr;
       if constexpr (kWhat == DrawWhat::kAll) rows = &all.pairs.rows;
-      const int32_t found = NextLayer<kWhat == DrawWhat::kAll>(view, place, wanted, scratch, rows);
+      const int32_t found =
+          NextLayer<kWhat == DrawWhat::kAll>(view, place, scratch.wanted, scratch, rows);
       ClipRegion(view, place.box, scratch);
-      PlanStep<kWhat>(view, found, scratch, wanted, under);
+      PlanStep<kWhat>(view, found, scratch);
     }
     __syncthreads();
     if (scratch.step == DrawStep::kNone) return;
@@ -185,13 +195,13 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       uint32_t colors[kRounds];
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) colors[j] = 0;
-      uint32_t mask = kAllLanes;  // bits: by j
       DrawLayers<kWhat>(view, place, all, [&] {
         const LayerLook look = view.layers[scratch.layer];
         const CutBy cut_by = CutBy::Of(view, scratch);
+        uint32_t seen = kAllLanes;
         if constexpr (kWhat == DrawWhat::kAll) {
           if (scratch.step == DrawStep::kMask) {
-            mask = 0;
+            uint32_t mask = 0;  // bits: by j
 #pragma unroll 4
             for (uint32_t j = 0; j < kRounds; ++j) {
               const uint32_t v = threadIdx.x + j * kDrawThreads;
@@ -200,19 +210,20 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
               if (!IsCovered(word)) continue;
               if (cut_by.cutting == 0 || cut_by.Keeps(place.box, v)) mask |= 1u << j;
             }
+            all.mask[threadIdx.x] = mask;
             return;
           }
+          if (look.mask >= 0) seen = all.mask[threadIdx.x];
         }
 #pragma unroll
         for (uint32_t j = 0; j < kRounds; ++j) {
           const uint32_t v = threadIdx.x + j * kDrawThreads;
           const uint32_t word = scratch.words[v];
           scratch.words[v] = 0;
-          if (word == 0 || (mask >> j & 1) == 0) continue;
+          if (word == 0 || (seen >> j & 1) == 0) continue;
           if (cut_by.cutting != 0 && !cut_by.Keeps(place.box, v)) continue;
           colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
         }
-        mask = kAllLanes;
       });
 #pragma unroll
       for (uint32_t j = 0; j < kRounds; ++j) {

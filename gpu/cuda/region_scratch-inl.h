@@ -30,6 +30,16 @@ enum class DrawStep : uint32_t {
   kLayer,  // it is blended, as far as its mask has it
 };
 
+// Which layer is looked for: that of the least rank beyond `last` that is seen, or one by its slot.
+struct LayerWanted {
+  int32_t last = -1;
+  uint32_t slot = kAllLanes;  // kAllLanes: any
+
+  __device__ bool Is(uint32_t layer, const LayerLook& look) const {
+    return slot == kAllLanes ? look.seen != 0 && look.rank > last : layer == slot;
+  }
+};
+
 struct RegionScratch {
   // 0 whenever the drawing of a region begins: who writes it out leaves it so.
   alignas(16) uint32_t words[kRegionVoxels];
@@ -50,6 +60,8 @@ struct RegionScratch {
   unsigned long long lit_change;  // of all regions that the block has drawn
   uint32_t pairs;                 // not 0: the layer has some here, or items that are not listed
   DrawStep step;
+  LayerWanted wanted;
+  uint32_t under;  // the layer whose mask is wanted; kAllLanes: none
 };
 
 // What a block of threads draws: first in its shared memory.
@@ -95,16 +107,6 @@ struct RegionPlace {
 __device__ inline uint32_t LayerOf(uint64_t key) {
   return static_cast<uint32_t>(key) & (kMaxLayers - 1);
 }
-
-// Which layer is looked for: that of the least rank beyond `last` that is seen, or one by its slot.
-struct LayerWanted {
-  int32_t last = -1;
-  uint32_t slot = kAllLanes;  // kAllLanes: any
-
-  __device__ bool Is(uint32_t layer, const LayerLook& look) const {
-    return slot == kAllLanes ? look.seen != 0 && look.rank > last : layer == slot;
-  }
-};
 
 // The pairs of a tile, in a batch, that are of the layer of the least rank that is wanted.
 __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, uint32_t tile,

@@ -249,7 +249,7 @@ std::vector<LayerVoxel> CoveredBy(const LayerRecord& layer, const SceneModel& sc
     PlotGeometry(
         scene.geometries.at(drawable.geometry), map, volume,
         [&](int64_t x, int64_t y, int64_t z, uint32_t rgb) {
-          voxels[volume.Index(x, y, z)].Add(drawable.priority, drawable.erase != 0, rgb);
+          voxels.at(volume.Index(x, y, z)).Add(drawable.priority, drawable.erase != 0, rgb);
         },
         drawable.tint);
   }
@@ -276,6 +276,7 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
                         static_cast<size_t>(volume.nz),
                     0);
   std::vector<const LayerRecord*> order;
+  order.reserve(scene.layers.size());
   for (const auto& [id, layer] : scene.layers) order.push_back(&layer);
   std::stable_sort(order.begin(), order.end(), [](const LayerRecord* a, const LayerRecord* b) {
     return a->order < b->order;  // ids ascend already

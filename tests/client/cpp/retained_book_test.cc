@@ -137,6 +137,7 @@ TEST_F(RetainedBookTest, WhatIsInDoubtKeepsItsPlace) {
 TEST_F(RetainedBookTest, ObjectsComeBeforeThoseThatDrawThem) {
   const auto define = [](const std::string& name, const std::vector<std::string>& uses) {
     std::vector<Part> parts;
+    parts.reserve(uses.size());
     for (const std::string& used : uses) parts.push_back({.shape = Instance{used}});
     return *EncodeDefinition(name, parts);
   };

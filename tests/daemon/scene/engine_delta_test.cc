@@ -237,6 +237,7 @@ TEST(EngineDelta, AfterForgettingEverythingIsSentAnew) {
 TEST(EngineDelta, ItBreathesDuringLongWork) {
   StoreFixture f;
   std::vector<Operation> all;
+  all.reserve(5000);
   for (int i = 0; i < 5000; ++i) all.push_back(Put("a", std::to_string(i)));
   f.CommitAll(f.me, std::move(all));
   int breaths = 0;

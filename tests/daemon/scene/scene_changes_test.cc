@@ -19,7 +19,6 @@ using testing::Dots;
 using testing::MakeAuthor;
 using testing::Move;
 using testing::Put;
-using testing::SetLayer;
 using testing::Shift;
 using testing::StoreFixture;
 

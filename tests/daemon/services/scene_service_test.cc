@@ -12,7 +12,6 @@
 namespace voxeld::daemon::services {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 // One call, with its status and answer.
