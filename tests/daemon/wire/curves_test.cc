@@ -352,30 +352,6 @@ TEST_F(CurvesTest, FramesOfPlaneThingsAndArrows) {
   EXPECT_EQ(Geometry(arrow).record.vertex_count, 1u + 8 + 16);
 }
 
-TEST_F(CurvesTest, HeightMapsHaveRowsColumnsAndSamples) {
-  P p;
-  v1::HeightMap* const map = p.mutable_height_map();
-  Set(map->mutable_edge_a(), 2, 0, 0);
-  Set(map->mutable_edge_b(), 0, 4, 0);
-  map->set_columns(3);
-  map->set_rows(2);
-  map->set_heights(Packed<float>({0, 1, 2, 3, 4, -5}));
-  map->set_colors("abcdefghijklmnopqr");
-  map->set_fill(v1::FILL_LINES);
-  const GeometryData& lines = Geometry(p);
-  EXPECT_EQ(lines.record.kind, gpu::PrimitiveKind::kSegments);
-  EXPECT_EQ(lines.record.topology, gpu::Topology::kList);
-  EXPECT_THAT(lines.arrays.indices(),
-              ::testing::ElementsAre(0, 1, 0, 3, 1, 2, 1, 4, 2, 5, 3, 4, 4, 5));
-  EXPECT_EQ(lines.arrays.colors()[5], 0x707172u);
-  map->set_fill(v1::FILL_DOTS);
-  const GeometryData& dots = Geometry(p);
-  EXPECT_EQ(dots.record.kind, gpu::PrimitiveKind::kPoints);
-  EXPECT_EQ(dots.record.vertex_count, 6u);
-  EXPECT_TRUE(dots.arrays.indices().empty());
-  EXPECT_EQ(dots.arrays.positions()[5 * 3 + 2], -5);
-}
-
 TEST_F(CurvesTest, LettersShareWhatTheyShare) {
   const GroupData& group = Group(Text());
   ASSERT_EQ(group.parts.size(), 3u);

@@ -358,5 +358,26 @@ TEST(Shapes, FillIsWhatTheRelationSays) {
   EXPECT_EQ(fill("x - r"), gpu::Fill::kSurface);
 }
 
+TEST(Shapes, HeightMapsHaveRowsColumnsAndSamples) {
+  P p = HeightMap();
+  p.mutable_height_map()->set_colors("abcdefghijklmnopqr");
+  p.mutable_height_map()->set_fill(v1::FILL_LINES);
+  Content content;
+  ASSERT_FALSE(FaultOf(p, &content).has_value());
+  const GeometryPtr lines = std::get<GeometryPtr>(content);
+  EXPECT_EQ(lines->record.kind, gpu::PrimitiveKind::kSegments);
+  EXPECT_EQ(lines->record.topology, gpu::Topology::kList);
+  EXPECT_THAT(lines->arrays.indices(),
+              ::testing::ElementsAre(0, 1, 0, 3, 1, 2, 1, 4, 2, 5, 3, 4, 4, 5));
+  EXPECT_EQ(lines->arrays.colors()[5], 0x707172u);
+  p.mutable_height_map()->set_fill(v1::FILL_DOTS);
+  ASSERT_FALSE(FaultOf(p, &content).has_value());
+  const GeometryPtr dots = std::get<GeometryPtr>(content);
+  EXPECT_EQ(dots->record.kind, gpu::PrimitiveKind::kPoints);
+  EXPECT_EQ(dots->record.vertex_count, 6u);
+  EXPECT_TRUE(dots->arrays.indices().empty());
+  EXPECT_EQ(dots->arrays.positions()[5 * 3 + 2], -5);
+}
+
 }  // namespace
 }  // namespace voxeld::daemon::wire
