@@ -290,8 +290,23 @@ void CudaVolume::DeferPairs() {
   index_.Defer(std::move(drawables));
 }
 
-DrawView CudaVolume::ViewForDrawing() const {
+absl::StatusOr<DrawView> CudaVolume::ViewForDrawing(uint32_t group) {
   DrawView view;
+  const auto drawn = [](const LayerLook& look) { return look.drawn != 0; };
+  if (std::count_if(looks_now_.begin(), looks_now_.end(), drawn) > 1) {
+    Block& below = below_[group];
+    const size_t blocks =
+        std::min(tiles_.regions.count(),
+                 kDrawBlocks * static_cast<uint32_t>(device_.api().device().multiProcessorCount));
+    const size_t bytes = blocks * kRegionVoxels * sizeof(uint32_t);
+    if (below.size() < bytes) {
+      below = Block();
+      absl::StatusOr<Block> block = device_.pool().Acquire(bytes);
+      if (!block.ok()) return block.status();
+      below = *std::move(block);
+    }
+    view.below = below.as<uint32_t>();
+  }
   view.table = table_.as<TableEntry>();
   view.layers = looks_.as<LayerLook>();
   view.half_spaces = half_spaces_.as<VoxelHalfSpace>();
@@ -377,7 +392,9 @@ absl::Status CudaVolume::ListDirty(const DrawGroups& groups) {
 
 absl::Status CudaVolume::DrawGroup(uint32_t group, const SliceIndexView& slices,
                                    const PackedView* packed, cudaStream_t stream) {
-  DrawView view = ViewForDrawing();
+  absl::StatusOr<DrawView> all = ViewForDrawing(group);
+  if (!all.ok()) return all.status();
+  DrawView& view = *all;
   view.slices = slices;
   if (packed != nullptr) view.packed = *packed;
   const size_t before = group == 0 ? 0 : static_cast<size_t>(groups_.end[group - 1]);
@@ -416,7 +433,9 @@ absl::Status CudaVolume::Read(const Box3& box, uint32_t* out) {
   if (!regions.ok()) return regions.status();
   const absl::StatusOr<Block> counts = device_.Upload(&counters, 1);
   if (!counts.ok()) return counts.status();
-  DrawView view = ViewForDrawing();
+  absl::StatusOr<DrawView> all = ViewForDrawing(0);
+  if (!all.ok()) return all.status();
+  DrawView& view = *all;
   view.volume.counters = counts->as<Counters>();
   view.list = regions->as<uint32_t>();
   view.listed = view.volume.counters->dirty;

@@ -165,7 +165,8 @@ class CudaVolume final : private SceneObserver {
   absl::Status EnterPairs(std::span<const PairedDrawable> drawables);
   // Puts off all that the index of pairs has.
   void DeferPairs();
-  DrawView ViewForDrawing() const;
+  // What is drawn by a group's number, at the same time as other groups.
+  absl::StatusOr<DrawView> ViewForDrawing(uint32_t group);
   // The regions that `view` lists.
   absl::Status DrawListed(DrawView& view, DrawTo to, cudaStream_t stream);
   // The items, of layers for which seen(slot) is true, that have no lists.
@@ -226,6 +227,7 @@ class CudaVolume final : private SceneObserver {
   absl::flat_hash_set<const Drawable*> pending_;
 
   Block looks_, half_spaces_, cylinders_;
+  Block below_[kMostDrawGroups];                    // DrawView::below of each group
   std::vector<LayerLook> looks_now_, looks_there_;  // by slot; what the device has
   std::vector<VoxelHalfSpace> half_spaces_now_, half_spaces_there_;
   std::vector<VoxelCylinder> cylinders_now_, cylinders_there_;

@@ -17,20 +17,26 @@ enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 template <DrawWhat kWhat>
 struct DrawScratch {
   RegionScratch region;
+  SpanScratch spans;
 };
 template <>
 struct DrawScratch<DrawWhat::kAll> {
   RegionScratch region;
-  PairScratch pairs;
+  union {  // one after the other
+    SpanScratch spans;
+    PairScratch pairs;
+  };
+  PairRows rows;
   uint32_t mask[kDrawThreads];  // of the layer that is drawn, if it has one; each thread's voxels
 };
+// So that a multiprocessor has kDrawBlocks of them; the system keeps 1 KB of each.
+static_assert(sizeof(DrawScratch<DrawWhat::kAll>) <= (228 / kDrawBlocks - 1) * 1024);
 
-template <DrawTo kTo, typename Color>
-__device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
-                      Color&& color) {
-  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch, color);
-  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, scratch, color);
-  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch, color);
+template <DrawTo kTo>
+__device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScratch& scratch) {
+  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch);
+  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, scratch);
+  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch);
 }
 
 // What is to be done with the layer that was found, and which is wanted next. One with a mask is found three times: it has
@@ -69,68 +75,145 @@ __device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scr
   }
 }
 
-// The layers of a region from the lowest on, each raised into the words; blend() after each.
-template <DrawWhat kWhat, typename Blend>
-__device__ void DrawLayers(const DrawView& view, const RegionPlace& place, DrawScratch<kWhat>& all,
-                           Blend&& blend) {
+// A layer that was drawn: its words stand.
+struct Standing {
+  uint32_t layer = kAllLanes;  // its slot; kAllLanes: none
+  uint32_t cutting = 0;        // RegionScratch::cutting
+};
+
+// What is shown of the layer, above what was settled before, if anything was: put aside, so that the next
+// layer can be drawn; or, if there is none (`last`), it stands where the words did. By the whole block: a
+// thread sees to the same voxels each time.
+template <DrawWhat kWhat>
+static __device__ __noinline__ void Settle(const DrawView& view, Standing standing, bool settled,
+                                           bool last, DrawScratch<kWhat>& all) {
+  RegionScratch& scratch = all.region;
+  const RegionPlace place(view, scratch);
+  const LayerLook look = view.layers[standing.layer];
+  const CutBy cut_by = CutBy::Of(view, look, standing.cutting);
+  uint32_t seen = kAllLanes;
+  if constexpr (kWhat == DrawWhat::kAll) {
+    if (look.mask >= 0) seen = all.mask[threadIdx.x];
+  }
+  uint32_t* const below = view.below + static_cast<size_t>(blockIdx.x) * kRegionVoxels;
+#pragma unroll 4
+  for (uint32_t j = 0; j < kRounds; ++j) {
+    const uint32_t v = threadIdx.x + j * kDrawThreads;
+    const uint32_t word = scratch.words[v];
+    const bool shown =
+        word != 0 && (seen >> j & 1) != 0 && (cut_by.cutting == 0 || cut_by.Keeps(place.box, v));
+    uint32_t color = 0;
+    if (settled && (shown || last)) color = below[v];
+    if (shown) color = BlendLayer(color, word, look.blend, look.opacity);
+    if (!last && (shown || !settled)) below[v] = color;
+    scratch.words[v] = last ? color : 0;
+  }
+  __syncthreads();
+}
+
+// The words become the mask of the layer that follows. By the whole block.
+static __device__ __noinline__ void TakeMask(const DrawView& view,
+                                             DrawScratch<DrawWhat::kAll>& all) {
+  RegionScratch& scratch = all.region;
+  const RegionPlace place(view, scratch);
+  const CutBy cut_by = CutBy::Of(view, view.layers[scratch.layer], scratch.cutting);
+  uint32_t mask = 0;  // bits: by j
+#pragma unroll 4
+  for (uint32_t j = 0; j < kRounds; ++j) {
+    const uint32_t v = threadIdx.x + j * kDrawThreads;
+    const uint32_t word = scratch.words[v];
+    scratch.words[v] = 0;
+    if (!IsCovered(word)) continue;
+    if (cut_by.cutting == 0 || cut_by.Keeps(place.box, v)) mask |= 1u << j;
+  }
+  all.mask[threadIdx.x] = mask;
+  __syncthreads();
+}
+
+// What a layer has in the region, raised into the words. By the whole block.
+template <DrawWhat kWhat>
+__device__ void RaiseLayer(const DrawView& view, const RegionPlace& place,
+                           DrawScratch<kWhat>& all) {
+  RegionScratch& scratch = all.region;
+  for (uint32_t left = scratch.line_batches; left != 0; left &= left - 1) {
+    const LineBatchView& batch = view.lines.batches[__ffs(static_cast<int>(left)) - 1];
+    if constexpr (kWhat == DrawWhat::kAll) {
+      if (batch.lists.spans == nullptr) {
+        DrawUnsorted(batch.lines, batch.tracks, batch.ends, batch.count, &view.regions);
+        continue;
+      }
+    }
+    DrawSpans(batch);
+  }
+  for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
+    DrawTriangles<kWhat != DrawWhat::kAll>(
+        view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
+  }
+  if constexpr (kWhat == DrawWhat::kAll) {
+    if (scratch.pairs == 0) return;
+    for (uint32_t t = 0; t < kRegionTiles; ++t) {
+      const uint32_t tile = place.TileOf(view.volume, t);
+      if (tile == kAllLanes) continue;
+      DrawPairs(view, all.rows, t, tile, scratch, all.pairs);
+      if (view.unlisted.items != 0) DrawUnlisted(view, tile, scratch, all.pairs);
+    }
+  }
+}
+
+// The layers of a region from the lowest on. The words are then what is seen.
+template <DrawWhat kWhat>
+__device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
+                           DrawScratch<kWhat>& all) {
   RegionScratch& scratch = all.region;
   if (threadIdx.x == 0) {
     scratch.wanted = LayerWanted();
     scratch.under = kAllLanes;
   }
+  Standing standing;
+  bool settled = false;
   for (;;) {
     if (threadIdx.x < 32) {
       __syncwarp();
       PairRows* rows = nullptr;
-      if constexpr (kWhat == DrawWhat::kAll) rows = &all.pairs.rows;
+      if constexpr (kWhat == DrawWhat::kAll) rows = &all.rows;
       const int32_t found =
           NextLayer<kWhat == DrawWhat::kAll>(view, place, scratch.wanted, scratch, rows);
       ClipRegion(view, place.box, scratch);
       PlanStep<kWhat>(view, found, scratch);
     }
     __syncthreads();
-    if (scratch.step == DrawStep::kNone) return;
-    if (scratch.step == DrawStep::kSkip) {
+    const DrawStep step = scratch.step;
+    if (step == DrawStep::kNone) break;
+    if (step == DrawStep::kSkip) {
       __syncthreads();  // all have seen it
       continue;
     }
-    for (uint32_t left = scratch.line_batches; left != 0; left &= left - 1) {
-      const LineBatchView& batch = view.lines.batches[__ffs(static_cast<int>(left)) - 1];
-      if constexpr (kWhat == DrawWhat::kAll) {
-        if (batch.lists.spans == nullptr) {
-          DrawUnsorted(batch.lines, batch.tracks, batch.ends, batch.count, &view.regions);
-          continue;
-        }
-      }
-      DrawSpans(batch, scratch);
+    if (standing.layer != kAllLanes) {
+      Settle<kWhat>(view, standing, settled, false, all);
+      standing = Standing();
+      settled = true;
     }
-    for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
-      DrawTriangles<kWhat != DrawWhat::kAll>(
-          view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
-    }
+    RaiseLayer<kWhat>(view, place, all);
+    if (step == DrawStep::kLayer) standing = {scratch.layer, scratch.cutting};
+    if constexpr (kWhat == DrawWhat::kOneLayer) break;
     if constexpr (kWhat == DrawWhat::kAll) {
-      if (scratch.pairs != 0) {
-        for (uint32_t t = 0; t < kRegionTiles; ++t) {
-          const uint32_t tile = place.TileOf(view.volume, t);
-          if (tile == kAllLanes) continue;
-          DrawPairs(view, t, tile, scratch, all.pairs);
-          if (view.unlisted.items != 0) DrawUnlisted(view, tile, scratch, all.pairs);
-        }
+      if (step == DrawStep::kMask) {
+        TakeMask(view, all);
+        continue;
       }
     }
-    blend();
-    if constexpr (kWhat == DrawWhat::kOneLayer) return;
-    __syncthreads();
+    __syncthreads();  // all know what stands
+  }
+  if (standing.layer == kAllLanes) return;
+  const LayerLook& look = view.layers[standing.layer];
+  const bool as_it_is = look.blend == BlendMode::kOver && look.opacity == 255 && look.mask < 0;
+  if (settled || standing.cutting != 0 || !as_it_is) {
+    Settle<kWhat>(view, standing, settled, true, all);
   }
 }
 
-template <DrawWhat kWhat>
-constexpr int kBlocksAtOnce = kWhat == DrawWhat::kOneLayer ? 2
-                              : kWhat == DrawWhat::kLines  ? 2
-                                                           : 1;
-
 template <DrawWhat kWhat, DrawTo kTo>
-__global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
+__global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
     DrawRegionsKernel(const __grid_constant__ DrawView view) {
   DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(SharedMemory());
   RegionScratch& scratch = all.region;
@@ -164,75 +247,17 @@ __global__ void __launch_bounds__(kDrawThreads, kBlocksAtOnce<kWhat>)
       if (scratch.place < dirty) region_after = view.list[scratch.place];
       place_after = gridDim.x + atomicAdd(view.taken, 1u);
     };
-    if constexpr (kWhat == DrawWhat::kOneLayer) {
-      CutBy cut_by;
-      if (view.clipped) {
-        const RegionPlace place(view, scratch);
-        DrawLayers<kWhat>(view, place, all, [&] { cut_by = CutBy::Of(view, scratch); });
-      } else {
-        // All batches are of the layer.
-        for (uint32_t b = 0; b < view.lines.count; ++b) {
-          DrawSpans(view.lines.batches[b], scratch);
-        }
-        for (uint32_t b = 0; b < view.triangles.count; ++b) {
-          if (view.triangles.batches[b].Has<true>(region)) {
-            DrawTriangles<true>(view, b);
-          }
-        }
-      }
-      ask_ahead();
-      const RegionPlace place(view, scratch);
-      // An erase's colour is 0.
-      if (cut_by.cutting == 0) {
-        Flush<kTo>(view, place, scratch, [](uint32_t word, uint32_t) { return word & kColorMask; });
-      } else {
-        Flush<kTo>(view, place, scratch, [&](uint32_t word, uint32_t v) {
-          return cut_by.Keeps(place.box, v) ? word & kColorMask : 0;
-        });
+    if (kWhat == DrawWhat::kOneLayer && !view.clipped) {
+      // All batches are of the layer.
+      for (uint32_t b = 0; b < view.lines.count; ++b) DrawSpans(view.lines.batches[b]);
+      for (uint32_t b = 0; b < view.triangles.count; ++b) {
+        if (view.triangles.batches[b].Has<true>(region)) DrawTriangles<true>(view, b);
       }
     } else {
-      const RegionPlace place(view, scratch);
-      uint32_t colors[kRounds];
-#pragma unroll
-      for (uint32_t j = 0; j < kRounds; ++j) colors[j] = 0;
-      DrawLayers<kWhat>(view, place, all, [&] {
-        const LayerLook look = view.layers[scratch.layer];
-        const CutBy cut_by = CutBy::Of(view, scratch);
-        uint32_t seen = kAllLanes;
-        if constexpr (kWhat == DrawWhat::kAll) {
-          if (scratch.step == DrawStep::kMask) {
-            uint32_t mask = 0;  // bits: by j
-#pragma unroll 4
-            for (uint32_t j = 0; j < kRounds; ++j) {
-              const uint32_t v = threadIdx.x + j * kDrawThreads;
-              const uint32_t word = scratch.words[v];
-              scratch.words[v] = 0;
-              if (!IsCovered(word)) continue;
-              if (cut_by.cutting == 0 || cut_by.Keeps(place.box, v)) mask |= 1u << j;
-            }
-            all.mask[threadIdx.x] = mask;
-            return;
-          }
-          if (look.mask >= 0) seen = all.mask[threadIdx.x];
-        }
-#pragma unroll
-        for (uint32_t j = 0; j < kRounds; ++j) {
-          const uint32_t v = threadIdx.x + j * kDrawThreads;
-          const uint32_t word = scratch.words[v];
-          scratch.words[v] = 0;
-          if (word == 0 || (seen >> j & 1) == 0) continue;
-          if (cut_by.cutting != 0 && !cut_by.Keeps(place.box, v)) continue;
-          colors[j] = BlendLayer(colors[j], word, look.blend, look.opacity);
-        }
-      });
-#pragma unroll
-      for (uint32_t j = 0; j < kRounds; ++j) {
-        scratch.words[threadIdx.x + j * kDrawThreads] = colors[j];
-      }
-      __syncthreads();
-      ask_ahead();
-      Flush<kTo>(view, place, scratch, [](uint32_t color, uint32_t) { return color; });
+      DrawLayers<kWhat>(view, RegionPlace(view, scratch), all);
     }
+    ask_ahead();
+    Flush<kTo>(view, RegionPlace(view, scratch), scratch);
     if (threadIdx.x == 0) {
       scratch.region = region_after;
       scratch.place = place_after;
@@ -249,8 +274,7 @@ cudaError_t DrawRegionsTo(const DrawView& view, uint32_t multiprocessors, cudaSt
   const cudaError_t error = cudaFuncSetAttribute(
       DrawRegionsKernel<kWhat, kTo>, cudaFuncAttributeMaxDynamicSharedMemorySize, kShared);
   if (error != cudaSuccess) return error;
-  const uint32_t blocks =
-      Min(view.regions.count(), static_cast<uint32_t>(kBlocksAtOnce<kWhat>) * multiprocessors);
+  const uint32_t blocks = Min(view.regions.count(), kDrawBlocks * multiprocessors);
   DrawRegionsKernel<kWhat, kTo><<<blocks, kDrawThreads, kShared, stream>>>(view);
   return cudaGetLastError();
 }

@@ -39,6 +39,9 @@ struct UnlistedItems {
   VOXELD_HD uint64_t first(uint32_t i) const { return firsts[i]; }
 };
 
+// Blocks of threads that draw, of each multiprocessor.
+inline constexpr uint32_t kDrawBlocks = 2;
+
 // Everything about drawing dirty regions.
 struct DrawView {
   const TableEntry* table = nullptr;
@@ -58,6 +61,8 @@ struct DrawView {
   PackedView packed;
   ReadView read;
   bool clipped = true;  // of one layer alone: it has half-spaces or cylinders
+  // Where several layers are drawn: for each block of threads, colours of a region's voxels. Null: of one.
+  uint32_t* below = nullptr;
 };
 static_assert(sizeof(DrawView) <= 4096, "arguments have 4 KB");
 

@@ -1,6 +1,6 @@
 // Where a region's colours go. Each function is called by the whole block, and leaves the words 0. When a
 // thread returns, all have read what says which region it is.
-// color(word, v) is what is seen of voxel v of the region, whose word is given.
+// What is seen of a voxel is its word's colour (an erase's is 0), or what else stands in its place as a colour.
 #pragma once
 
 #include "gpu/cuda/pixels-inl.h"
@@ -72,9 +72,8 @@ __device__ inline void MarkSlices(const SliceIndexView& slices, const TileGrid& 
 }
 
 // Into the tiles' colours; marks the slices that look at those that changed.
-template <typename Color>
-__device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, RegionScratch& scratch,
-                             Color&& color) {
+__device__ inline void FlushToTiles(const DrawView& view, const RegionPlace& place,
+                                    RegionScratch& scratch) {
   const VolumeView& volume = view.volume;
 #pragma unroll
   for (uint32_t j = 0; j < kRounds; ++j) {
@@ -83,7 +82,7 @@ __device__ void FlushToTiles(const DrawView& view, const RegionPlace& place, Reg
     const uint32_t tile = place.TileOf(volume, at.tile());
     const bool inside = tile != kAllLanes && at.x < place.box.hi[0] && at.y < place.box.hi[1] &&
                         at.z < place.box.hi[2];
-    const uint32_t c = inside ? color(drawn, at.v) : 0;
+    const uint32_t c = inside ? drawn & kColorMask : 0;
     if (inside) {
       uint32_t& held = volume.colors[static_cast<size_t>(tile) * kTileVoxels +
                                      volume.grid.IndexInTile(at.x, at.y, at.z)];
@@ -190,9 +189,8 @@ struct RowBits {
 // begins with other voxels, so that they meet all banks. least:
 // PackedView::least of eight pixels of the row. `keep`: the words are wanted again. limit: voxels of it
 // that there are.
-template <typename Color>
-__device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint4 least[2],
-                           bool keep, Color&& color) {
+__device__ inline RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint4 least[2],
+                                  bool keep) {
   constexpr uint32_t kBlue = 0x249249;
   const uint32_t begin = threadIdx.x % 8 * 4;
   const bool odd = threadIdx.x % 2 != 0;
@@ -218,7 +216,7 @@ __device__ RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint4
 #pragma unroll
       for (uint32_t i = 0; i < 4; ++i) {
         const uint32_t at = x + i, l = leasts[half + i];
-        const uint32_t c = static_cast<int32_t>(at) < limit ? color(four[i], v + at) : 0;
+        const uint32_t c = static_cast<int32_t>(at) < limit ? four[i] & kColorMask : 0;
         // The sign of a difference is whether it is less.
         bits.lit = __funnelshift_l(c - 1, bits.lit, 1);
         bits.red = __funnelshift_l((c & kBlue << 1) - (l << 1), bits.red, 1);
@@ -269,10 +267,9 @@ struct PicturesHeld {
 
 // One plane of the region, by a warp: a lane has a row. Bits: which sub-frames' pictures differ.
 // limit[2]: how much of it there is, along x and y.
-template <typename Color>
-__device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place,
-                               const PicturesHeld& before, const int32_t limit[2],
-                               RegionScratch& scratch, Color&& color) {
+__device__ inline uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place,
+                                      const PicturesHeld& before, const int32_t limit[2],
+                                      RegionScratch& scratch) {
   const SliceView& view = packed.slices;
   const uint32_t lane = threadIdx.x % 32, row = threadIdx.x;
   const uint32_t v =
@@ -287,8 +284,8 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
     const BitsPlace bits_place(packed, place, before.slice, sub);
     uint32_t held[3] = {before.held[0], before.held[1], before.held[2]};
     if (sub > 0) bits_place.Load(held);  // on their way while the row is read
-    const RowBits drawn = TakeRow(scratch.words + row * 32, row * 32, voxels, leasts,
-                                  sub + 1 < view.sub_frames, color);
+    const RowBits drawn =
+        TakeRow(scratch.words + row * 32, row * 32, voxels, leasts, sub + 1 < view.sub_frames);
     if (sub == 0) {
       // Of 16 rows: of the nearer tile in the lower half, of the further in the upper.
       uint32_t counts = static_cast<uint32_t>(__popc(drawn.lit >> 16)) |
@@ -310,9 +307,8 @@ __device__ uint32_t FlushPlane(const PackedView& packed, const RegionPlace& plac
 
 // Straight into the pictures of the slices that the region's planes are: a warp has a plane.
 static_assert(kDrawWarps == 1u << RegionBits(2));
-template <typename Color>
-__device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
-                                RegionScratch& scratch, Color&& color) {
+__device__ inline void FlushToPictures(const DrawView& view, const RegionPlace& place,
+                                       RegionScratch& scratch) {
   const PackedView& packed = view.packed;
   const SliceView& slices = packed.slices;
   const uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
@@ -324,14 +320,14 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
                             inside ? place.box.hi[1] - place.box.lo[1] : 0};
   uint32_t pictures = 0;
   if (slices.format == display::PixelFormat::kBitPlanes3) {
-    pictures = FlushPlane(packed, place, before, limit, scratch, color);
+    pictures = FlushPlane(packed, place, before, limit, scratch);
   } else {
     const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);
     for (int32_t y = 0; y < 32; ++y) {
       const uint32_t voxel = warp << 10 | static_cast<uint32_t>(y) << 5 | lane;
       uint32_t& word = scratch.words[voxel];
       const bool here = static_cast<int32_t>(lane) < limit[0] && y < limit[1];
-      const uint32_t c = here ? color(word, voxel) : 0;
+      const uint32_t c = here ? word & kColorMask : 0;
       word = 0;
       const uint32_t lit = __ballot_sync(kAllLanes, c != 0);
       if (lane < 2 && (lit >> 16 * lane & 0xFFFF) != 0) {
@@ -369,9 +365,8 @@ __device__ void FlushToPictures(const DrawView& view, const RegionPlace& place,
 }
 
 // To who asks for voxels.
-template <typename Color>
-__device__ void FlushToReader(const DrawView& view, const RegionPlace& place,
-                              RegionScratch& scratch, Color&& color) {
+__device__ inline void FlushToReader(const DrawView& view, const RegionPlace& place,
+                                     RegionScratch& scratch) {
   const Box3& box = view.read.box;
 #pragma unroll 4
   for (uint32_t j = 0; j < kRounds; ++j) {
@@ -385,7 +380,7 @@ __device__ void FlushToReader(const DrawView& view, const RegionPlace& place,
     view.read
         .out[(static_cast<size_t>(at.z - box.lo[2]) * ny + static_cast<size_t>(at.y - box.lo[1])) *
                  nx +
-             static_cast<size_t>(at.x - box.lo[0])] = Deinterleave(color(drawn, at.v));
+             static_cast<size_t>(at.x - box.lo[0])] = Deinterleave(drawn & kColorMask);
   }
   __syncthreads();
 }

@@ -4,6 +4,16 @@
 #include "gpu/cuda/items-inl.h"
 
 namespace voxeld::gpu::cuda {
+
+// Each is compiled by itself (kernels_draw_pictures.cu and its like): they take long.
+extern template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kTiles>(const DrawView&, uint32_t,
+                                                                          cudaStream_t);
+extern template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kPictures>(const DrawView&,
+                                                                             uint32_t,
+                                                                             cudaStream_t);
+extern template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kReader>(const DrawView&,
+                                                                           uint32_t, cudaStream_t);
+
 namespace {
 
 __global__ void ListDirtyKernel(VolumeView volume, RegionGrid regions, DrawGroups groups) {

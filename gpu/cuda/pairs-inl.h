@@ -12,7 +12,6 @@
 namespace voxeld::gpu::cuda {
 
 struct PairScratch {
-  PairRows rows;
   uint64_t heavy[kDrawThreads];  // pairs for many threads
   uint32_t heavy_count;
   union {
@@ -254,16 +253,16 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, const Box
 }
 
 // The layer's pairs of one tile, by the whole block.
-__device__ inline void DrawPairs(const DrawView& view, uint32_t t, uint32_t tile,
-                                 RegionScratch& region, PairScratch& scratch) {
+__device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, uint32_t t,
+                                 uint32_t tile, RegionScratch& region, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   const Box3 box = grid.VoxelsOf(tile);
   if (threadIdx.x == 0) scratch.heavy_count = 0;
   __syncthreads();
   for (uint32_t b = 0; b < view.pairs.count; ++b) {
-    const uint32_t end = scratch.rows.end[t][b];
+    const uint32_t end = rows.end[t][b];
     // In rounds of the block's size, so that what is heavy is drawn before its list is full.
-    for (uint32_t round = scratch.rows.begin[t][b]; round < end; round += kDrawThreads) {
+    for (uint32_t round = rows.begin[t][b]; round < end; round += kDrawThreads) {
       const uint32_t p = round + threadIdx.x;
       bool heavy = false;
       if (p < end) {

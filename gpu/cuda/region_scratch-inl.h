@@ -43,12 +43,6 @@ struct LayerWanted {
 struct RegionScratch {
   // 0 whenever the drawing of a region begins: who writes it out leaves it so.
   alignas(16) uint32_t words[kRegionVoxels];
-  LineSpan spans[kMostSpans];        // a part for each warp
-  uint32_t buckets[kDrawWarps][32];  // of its spans by length
-  // Segments of spans: how many lie before each, and what is to be added to a span's number among all
-  // to find it.
-  uint32_t segment_first[kSegments], segment_from[kSegments];
-  uint32_t segments, spans_found;
   uint32_t line_batches, triangle_batches;  // bits: those of the layer under way
   uint32_t layer;                           // its slot; kAllLanes: no more
   uint32_t cutting;                         // bits: which of its half-spaces cut the region
@@ -64,13 +58,27 @@ struct RegionScratch {
   uint32_t under;  // the layer whose mask is wanted; kAllLanes: none
 };
 
-// What a block of threads draws: first in its shared memory.
+// What lines are drawn with.
+struct SpanScratch {
+  LineSpan spans[kMostSpans];        // a part for each warp
+  uint32_t buckets[kDrawWarps][32];  // of its spans by length
+  // Segments of spans: how many lie before each, and what is to be added to a span's number among all
+  // to find it.
+  uint32_t segment_first[kSegments], segment_from[kSegments];
+  uint32_t segments, spans_found;
+};
+
+// What a block of threads draws, first in its shared memory; and behind it, what for.
 __device__ inline unsigned char* SharedMemory() {
   extern __shared__ __align__(16) unsigned char shared_memory[];
   return shared_memory;
 }
 __device__ inline RegionScratch& SharedRegion() {
   return *reinterpret_cast<RegionScratch*>(SharedMemory());
+}
+__device__ inline SpanScratch& SharedSpans() {
+  static_assert(sizeof(RegionScratch) % 16 == 0);
+  return *reinterpret_cast<SpanScratch*>(SharedMemory() + sizeof(RegionScratch));
 }
 
 // Of the layer under way: rows of pairs, of a tile and a batch each.
@@ -247,10 +255,9 @@ struct CutBy {
   const VoxelCylinder* cylinders = nullptr;
   uint32_t cutting = 0;
 
-  __device__ static CutBy Of(const DrawView& view, const RegionScratch& scratch) {
-    const LayerLook& look = view.layers[scratch.layer];
+  __device__ static CutBy Of(const DrawView& view, const LayerLook& look, uint32_t cutting) {
     return {view.half_spaces + look.first_half_space, view.cylinders + look.first_cylinder,
-            scratch.cutting};
+            cutting};
   }
   // Whether a voxel of the region (its place there) lies inside all of it.
   __device__ bool Keeps(const Box3& box, uint32_t v) const {

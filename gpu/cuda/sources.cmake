@@ -1,6 +1,7 @@
 # The engine on CUDA: what nvcc compiles, headers that these alone include, and the host's part.
 set(VOXELD_CUDA_KERNELS
-  kernels_draw_all.cu kernels_draw_lines.cu kernels_few_lines.cu kernels_filled.cu kernels_generate.cu kernels_index.cu kernels_line_regions.cu
+  kernels_draw_all.cu kernels_draw_lines.cu kernels_draw_pictures.cu kernels_draw_reader.cu kernels_draw_tiles.cu
+  kernels_few_lines.cu kernels_filled.cu kernels_generate.cu kernels_index.cu kernels_line_regions.cu
   kernels_lines.cu kernels_slice.cu kernels_triangles.cu)
 set(VOXELD_CUDA_KERNEL_PARTS
   draw-inl.h filled-inl.h flush-inl.h implicit-inl.h items-inl.h lines-inl.h pairs-inl.h pixels-inl.h region_scratch-inl.h samples-inl.h spans-inl.h

@@ -108,7 +108,8 @@ __device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word
 
 // The region's next segments of spans, from chunk `first` on, up to kSegments. By the first warp.
 __device__ inline void FindSegments(const SpanLists& lists, uint32_t first, uint32_t last,
-                                    uint32_t region, RegionScratch& scratch) {
+                                    uint32_t region) {
+  SpanScratch& scratch = SharedSpans();
   const uint32_t lane = threadIdx.x % 32;
   constexpr uint32_t kAtOnce = 4;
   const uint32_t segments = Min(last - first, kSegments);
@@ -151,7 +152,8 @@ struct WarpSpans {
 
   // From span `first` of those found on; `most` at most, and one at least. Their tracks are asked for.
   __device__ void Fetch(const LineSpan* from, const ThinTrack* tracks, uint32_t first,
-                        uint32_t most, const RegionScratch& scratch) {
+                        uint32_t most) {
+    const SpanScratch& scratch = SharedSpans();
     const uint32_t lane = threadIdx.x % 32, segments = scratch.segments;
     // The segment that has the first one: the last that begins there or before.
     constexpr uint32_t kStride = kSegments / 32;
@@ -251,8 +253,8 @@ __device__ inline void DrawSorted(const ThinTrack* tracks, const uint32_t* ends,
 // all registers.
 static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTrack* tracks,
                                               const uint32_t* ends) {
-  RegionScratch& scratch = SharedRegion();
-  const RegionWords words(scratch.words);
+  SpanScratch& scratch = SharedSpans();
+  const RegionWords words(SharedRegion().words);
   const uint32_t warp = threadIdx.x / 32, found = scratch.spans_found;
   LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
   if (found == 0) return;
@@ -263,17 +265,17 @@ static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTr
   const uint32_t end = Min((warp + 1) * share, found);
   WarpSpans spans;
   for (uint32_t first = warp * share; first < end; first += spans.count) {
-    spans.Fetch(from, tracks, first, Min(most, end - first), scratch);
+    spans.Fetch(from, tracks, first, Min(most, end - first));
     spans.Sort(scratch.buckets[warp], sorted);
     DrawSorted(tracks, ends, sorted, spans.count, words);
     __syncwarp();
   }
 }
 
-// Draws the `count` spans that lie in scratch.spans.
+// Draws the `count` spans that lie in SharedSpans().
 static __device__ __noinline__ void DrawHeld(const ThinTrack* tracks, const uint32_t* ends,
                                              uint32_t count) {
-  RegionScratch& scratch = SharedRegion();
+  SpanScratch& scratch = SharedSpans();
   const uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32;
   if (warp * kSpansOfWarp >= count) return;
   LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
@@ -285,18 +287,18 @@ static __device__ __noinline__ void DrawHeld(const ThinTrack* tracks, const uint
   }
   __syncwarp();
   spans.Sort(scratch.buckets[warp], sorted);
-  DrawSorted(tracks, ends, sorted, spans.count, RegionWords(scratch.words));
+  DrawSorted(tracks, ends, sorted, spans.count, RegionWords(SharedRegion().words));
 }
 
 // By the whole block: what the batch has in the region, if it has any there.
-__device__ inline void DrawSpans(const LineBatchView& batch, RegionScratch& scratch) {
-  const uint32_t region = scratch.region;
+__device__ inline void DrawSpans(const LineBatchView& batch) {
+  const uint32_t region = SharedRegion().region;
   // Asked for together.
   const bool any = batch.lists.Has(region);
   const uint32_t first = batch.lists.chunk_begin[region / kRegionsInBlock];
   const uint32_t last = any ? batch.lists.chunk_begin[region / kRegionsInBlock + 1] : first;
   for (uint32_t chunk = first; chunk < last; chunk += kSegments) {
-    if (threadIdx.x < 32) FindSegments(batch.lists, chunk, last, region, scratch);
+    if (threadIdx.x < 32) FindSegments(batch.lists, chunk, last, region);
     __syncthreads();
     DrawFound(batch.lists.spans, batch.tracks, batch.ends);
     __syncthreads();

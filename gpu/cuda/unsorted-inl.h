@@ -40,10 +40,10 @@ __device__ inline bool CutToRegion(const ThinLine& line, const int32_t at[3], in
 static __device__ __noinline__ void DrawUnsorted(const ThinLine* lines, const ThinTrack* tracks,
                                                  const uint32_t* ends, uint32_t count,
                                                  const RegionGrid* regions) {
-  RegionScratch& scratch = SharedRegion();
+  SpanScratch& scratch = SharedSpans();
   uint32_t& found = scratch.spans_found;
   int32_t at[3];
-  regions->RegionCoordinates(scratch.region, at);
+  regions->RegionCoordinates(SharedRegion().region, at);
   if (threadIdx.x == 0) found = 0;
   __syncthreads();
   for (uint64_t first = 0; first < count; first += kDrawThreads) {
