@@ -124,7 +124,7 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
                   check.Enum("topology", static_cast<uint32_t>(g.topology), 0, 2),
                   check.Enum("thickness_unit", static_cast<uint32_t>(g.thickness_unit), 0, 1),
                   check.Enum("drawn_by", static_cast<uint32_t>(g.drawn_by), 0, 1),
-                  check.Enum("splat", static_cast<uint32_t>(g.splat), 0, 2),
+                  check.Enum("splat", static_cast<uint32_t>(g.splat), 0, 3),
                   check.Finite("thickness", &g.thickness, 1), check.Finite("params", g.params, 8),
                   CheckTexture(check, g)});
   if (!status.ok()) return status;
@@ -345,7 +345,6 @@ absl::Status ReadRecord(Op op, uint64_t offset, std::span<const std::byte> body,
 
 }  // namespace
 
-// Counts are 32-bit, so the sums fit.
 uint64_t ColorCount(const GeometryRecord& g) {
   uint64_t count = g.color_mode == ColorMode::kPerVertex ? g.vertex_count : 0;
   if (g.texture_width != 0) {
@@ -354,6 +353,7 @@ uint64_t ColorCount(const GeometryRecord& g) {
   return count;
 }
 
+// Counts are 32-bit, so the sums fit.
 ArrayLayout ArrayLayout::Of(const GeometryRecord& g) {
   ArrayLayout layout;
   layout.indices = Padded(uint64_t{g.vertex_count} * 12);

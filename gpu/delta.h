@@ -65,7 +65,7 @@ enum class SurfaceRule : uint32_t { kThin = 0, kCover = 1 };
 enum class Fill : uint32_t { kSurface = 0, kSolid = 1 };
 enum class Topology : uint32_t { kList = 0, kStrip = 1, kLoop = 2 };
 // What a thick point is: a ball, one that fades out from its middle, or a cube along the voxels.
-enum class Splat : uint32_t { kBall = 0, kSoft = 1, kCube = 2 };
+enum class Splat : uint32_t { kBall = 0, kSoft = 1, kCube = 2, kCell = 3 };
 enum class ColorMode : uint32_t { kUniform = 0, kPerVertex = 1 };
 enum class ThicknessUnit : uint32_t { kVoxels = 0, kUnits = 1 };
 // What covers the voxels: whatever the engine has, or its CPU even where it has a GPU.
@@ -108,6 +108,11 @@ struct GeometryRecord {
   uint16_t texture_width = 0, texture_height = 0;
 };
 inline constexpr uint32_t kMostTextureSide = 8192;
+
+// Whether its points are cells (points.h).
+constexpr bool IsCells(const GeometryRecord& record) {
+  return record.kind == PrimitiveKind::kPoints && record.splat == Splat::kCell;
+}
 
 // Entries of a geometry's array of colours.
 uint64_t ColorCount(const GeometryRecord& g);

@@ -62,6 +62,50 @@ def messages() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
     return found
 
 
+def enums() -> dict[str, list[tuple[str, str]]]:
+    """By "Message.Enum", or "Enum" at the top: (value, comment) of each, as voxelctl takes them; what counts unless told, first."""
+    owner, name, found, above = "", "", {}, []
+    for line in PROTO.read_text().split("\n"):
+        if start := re.match(r"message (\w+) \{", line):
+            owner = start[1]
+        elif line.startswith("}"):
+            owner = ""
+        text = line.strip()
+        if start := re.match(r"enum (\w+) \{", text):
+            name = f"{owner}.{start[1]}".lstrip(".")
+            prefix = "" if owner else re.sub(r"(?<!^)(?=[A-Z])", "_", start[1]).upper() + "_"
+            found[name] = []
+        elif name and text == "}":
+            name = ""
+        elif name and text.startswith("//"):
+            above.append(text[2:].strip())
+        elif name and (value := re.match(r"(\w+) = \d+;(?:\s*// (.*))?", text)):
+            found[name].append((value[1].removeprefix(prefix).lower(), " ".join([*above, value[2] or ""]).strip()))
+            above = []
+    return found
+
+
+def words(values: list[tuple[str, str]]) -> str:
+    """`a` unless told, `b` or `c`."""
+    unless = values[0][1].lower()
+    named = [f"`{value}`" + (" (unless told)" if value == unless else "") for value, _ in values[1:]]
+    return ", ".join(named[:-1]) + " or " + named[-1]
+
+
+def table(message: str, fields: list[tuple[str, str, str]], values: dict[str, list[tuple[str, str]]]) -> list[str]:
+    """The fields of a message, and what its own words mean."""
+    out, own = ["| field | type | |\n|---|---|---|"], []
+    for kind, name, said in fields:
+        of = values.get(f"{message}.{kind}", values.get(kind))
+        if of and len(of) <= 8:
+            named = words(of).replace(" (unless told)", "") if "UNSPECIFIED" in said else words(of)
+            said = "; ".join(filter(None, [named, said]))
+        if f"{message}.{kind}" in values:
+            own += [f"- `{value}`: {comment}" for value, comment in values[f"{message}.{kind}"][1:] if comment]
+        out.append(f"| `{name}` | {kind} | {said.replace('|', chr(92) + '|')} |")
+    return [*out, "", *own, *([""] if own else [])]
+
+
 def kinds() -> list[tuple[str, str]]:
     """(message, field) of each shape, in the wire's order."""
     body = re.search(r"message Primitive \{\s*oneof kind \{(.*?)\}", PROTO.read_text(), re.S)
@@ -91,16 +135,14 @@ def examples() -> dict[str, list[str]]:
 
 
 def page() -> str:
-    all_messages, shown = messages(), examples()
+    all_messages, values, shown = messages(), enums(), examples()
     out = [HEAD]
     for message, field in kinds():
         above, fields = all_messages[message]
         out.append(f"## {field}\n")
         if above:
             out.append(above + "\n")
-        out.append("| field | type | |\n|---|---|---|")
-        out += [f"| `{name}` | {kind} | {said.replace('|', chr(92) + '|')} |" for kind, name, said in fields]
-        out.append("")
+        out += table(message, fields, values)
         if said := guarantee(message):
             out.append(f"**What it covers** (`gpu/primitives/{NAMED.get(message, message.lower())}.h`): {said}\n")
         for text in shown.get(field, []):
@@ -110,9 +152,10 @@ def page() -> str:
         above, fields = all_messages[message]
         out.append(f"### {message}\n\n{above}\n")
         if fields:
-            out.append("| field | type | |\n|---|---|---|")
-            out += [f"| `{name}` | {kind} | {said.replace('|', chr(92) + '|')} |" for kind, name, said in fields]
-            out.append("")
+            out += table(message, fields, values)
+    for name in ("Fill", "SurfaceRule", "LineSampling"):
+        out.append(f"### {name}\n\n{words(values[name]).capitalize()}.\n")
+        out += [*(f"- `{value}`: {comment}" for value, comment in values[name][1:] if comment), ""]
     out.append("[Expressions](expressions.md) have a page of their own; colour maps are those of "
                "`proto/voxeld/v1/colormaps.txt`.\n")
     return "\n".join(out)

@@ -65,6 +65,7 @@ constexpr uint64_t kCommitBytes = sizeof(WaitingCommit);
 }  // namespace
 
 void RefusalTally::Count(const Issue& issue) {
+  if (issue.applied) return;
   ++refused_;
   if (first_.empty()) first_ = absl::StrFormat("%s: %s", issue.field, issue.message);
 }
@@ -86,8 +87,8 @@ void RefusalTally::TellOfThoseLeftOut(uint64_t sequence, SessionSink* sink, uint
                  "commit",
                  Reason::kQuotaExceeded,
                  absl::StrFormat("%d more issues are left out, beyond the %d of "
-                                 "max_issues_per_commit; the receipt counts them; commit "
-                                 "fewer operations at a time to be told of each",
+                                 "max_issues_per_commit; the receipt counts all "
+                                 "refusals; commit fewer operations at a time to be told of each",
                                  left_out_, most)});
 }
 
@@ -134,7 +135,7 @@ bool Intake::Take(IncomingMessage message) {
   for (const Issue& issue : message.refused.issues) {
     staged_.refusals.Tell(issue, sink_.get(), limits_.max_issues_per_commit);
   }
-  staged_.refusals.LeaveOut(message.refused.more);
+  staged_.refusals.LeaveOut(message.refused.more + message.refused.more_applied);
   staged_.refusals.CountMore(message.refused.more);
   // What decoding refused counts for the commit that it came before.
   size_t counted = 0;

@@ -45,13 +45,13 @@ struct IncomingMessage {
   uint64_t local_bytes = 0;  // copied from local memory, beside its own bytes
 };
 
-// A commit's refusals so far, and how many of them its session was told one by one. Single-threaded.
+// A commit's refusals so far, and how many Issues its session was told one by one. Single-threaded.
 class RefusalTally {
  public:
   uint64_t refused() const { return refused_; }
   const std::string& first() const { return first_; }  // "field: message"
 
-  // Counts one; does not tell it.
+  // Counts one, if it is a refusal; does not tell it.
   void Count(const Issue& issue);
   void CountMore(uint64_t more) { refused_ += more; }
   // Tells `sink` (null: nobody), unless it has been told `most`.

@@ -41,26 +41,27 @@ enum class Reason : uint8_t {
   kTimedOut = 15,
 };
 
-// One refused operation. Not fatal.
+// One refused operation; or one that was carried out otherwise than asked. Not fatal.
 struct Issue {
   uint64_t sequence = 0;
   std::string layer, id;
   std::string field;  // path within the request
   Reason reason = Reason::kUnspecified;
-  std::string message;  // what was wrong, the value, what would be right
+  std::string message;   // what was wrong, the value, what would be right
+  bool applied = false;  // no refusal: it is taken, otherwise than asked
 };
 
-// Operations that were refused together: the first max_issues_per_commit one by one, of the others
-// their number.
+// Operations that were refused together, and such as were carried out otherwise: the first max_issues_per_commit one
+// by one, of the others their numbers.
 struct Refusals {
   std::vector<Issue> issues;
-  uint64_t more = 0;
+  uint64_t more = 0, more_applied = 0;
 
   void Add(Issue issue, uint64_t most) {
     if (issues.size() < most) {
       issues.push_back(std::move(issue));
     } else {
-      ++more;
+      ++(issue.applied ? more_applied : more);
     }
   }
 };

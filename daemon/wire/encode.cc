@@ -105,6 +105,7 @@ void Encode(const Issue& in, v1::Issue* out) {
   out->set_field(in.field);
   out->set_reason(ToWire(in.reason));
   out->set_message(in.message);
+  out->set_applied(in.applied);
 }
 
 void Encode(const Receipt& in, v1::Receipt* out) {

@@ -116,6 +116,7 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
       ThicknessToWire(record, points->mutable_thickness());
       if (record.splat == gpu::Splat::kSoft) points->set_splat(v1::Points::SOFT);
       if (record.splat == gpu::Splat::kCube) points->set_splat(v1::Points::CUBE);
+      if (record.splat == gpu::Splat::kCell) points->set_splat(v1::Points::CELL);
       return VerticesToWire(in, points->mutable_vertices());
     }
     case gpu::PrimitiveKind::kSegments: {

@@ -262,11 +262,11 @@ MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit
 
 // The message names the field alone; the whole path stands beside it.
 void AddIssue(Fault fault, uint64_t sequence, std::string layer, std::string id,
-              const Limits& limits, const Sinks& out) {
+              const Limits& limits, const Sinks& out, bool applied = false) {
   std::string message =
       absl::StrCat(fault.field.substr(fault.field.rfind('.') + 1), " ", fault.message);
   out.refused->Add({sequence, std::move(layer), std::move(id), std::move(fault.field), fault.reason,
-                    std::move(message)},
+                    std::move(message), applied},
                    limits.max_issues_per_commit);
 }
 
@@ -295,7 +295,7 @@ void Add(const FieldPath& path, const In& in, uint64_t sequence, const DecodeCon
     if (!std::is_same_v<Out, Commit>) return;
   }
   for (Fault& note : notes) {
-    AddIssue(std::move(note), sequence, LayerOf(in), IdOf(in), context, out);
+    AddIssue(std::move(note), sequence, LayerOf(in), IdOf(in), context, out, /*applied=*/true);
   }
   out.operations->push_back({sequence, std::move(op)});
 }

@@ -44,8 +44,16 @@ MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const DecodeCon
     case v1::Points::CUBE:
       out->record.splat = gpu::Splat::kCube;
       break;
+    case v1::Points::CELL:
+      if (out->record.thickness != 0) {
+        return Fault{FieldPath(path, "thickness").ToString(), Reason::kOutOfRange,
+                     absl::StrCat("is ", Show(in.thickness().value()),
+                                  "; cells have none: each is 1 unit wide")};
+      }
+      out->record.splat = gpu::Splat::kCell;
+      break;
     default:
-      return UnknownEnum(FieldPath(path, "splat"), in.splat(), "BALL, SOFT, CUBE");
+      return UnknownEnum(FieldPath(path, "splat"), in.splat(), "BALL, SOFT, CUBE, CELL");
   }
   return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, context, out);
 }

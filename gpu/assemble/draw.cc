@@ -143,6 +143,11 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
       Samples::Place(view.record, view.indices.data(), map, grid, kBlockTiles, d.source.solid,
                      d.source.implicit);
       d.source.indices = view.indices.data();
+    } else if (IsCells(view.record)) {
+      d.source.positions = view.positions.data();
+      d.source.indices = view.indices.data();
+      d.source.colors = view.colors.data();
+      Points::PlaceCells(map, d.source);
     } else {
       d.vertices.resize(view.record.vertex_count);
       const size_t runs = (d.vertices.size() + kVertexRun - 1) / kVertexRun;

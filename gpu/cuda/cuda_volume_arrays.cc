@@ -108,7 +108,7 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
 }
 
 CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
-  if (record.drawn_by == DrawnBy::kCpu) return IndexedBy::kPairs;
+  if (record.drawn_by == DrawnBy::kCpu || IsCells(record)) return IndexedBy::kPairs;
   if (record.kind == PrimitiveKind::kTriangles && record.texture_width == 0) {
     return IndexedBy::kTriangles;
   }

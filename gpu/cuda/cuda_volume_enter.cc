@@ -133,6 +133,7 @@ TableEntry CudaVolume::EntryOf(const Drawable& d, WorkedOut& worked_out) const {
       entry.source.colors = view.colors.data();
       entry.source.map = map;
       entry.source.radius = RadiusOf(view.record, map);
+      if (IsCells(view.record)) Points::PlaceCells(map, entry.source);
       if constexpr (std::is_same_v<Primitive, Filled>) {
         Filled::Place(BoundsOf(d, map), /*tiles=*/1, entry.source.solid, entry.source.implicit);
       }

@@ -8,18 +8,19 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 constexpr uint32_t kThreads = 256, kWarps = kThreads / 32;
-constexpr uint32_t kMostSlices = 256;  // warps a triangle, where there are few
+// Threads a triangle, where there are many, and where there are few.
+constexpr uint32_t kLeastTeam = 4, kMostTeam = 256 * 32;
 
-// Rows of triangle `warp / slices`, by a warp and those of the other slices.
-__global__ void FlipKernel(Source source, GeometryRecord record, uint32_t slices, uint32_t* bits) {
+// Rows of a triangle, by a team of threads: a power of two.
+__global__ void FlipKernel(Source source, GeometryRecord record, uint32_t team, uint32_t* bits) {
   source.record = &record;
-  const uint64_t warp = uint64_t{blockIdx.x} * kWarps + threadIdx.x / 32;
-  if (warp >= uint64_t{Filled::CountTriangles(source)} * slices) return;
+  const uint64_t thread = uint64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (thread >= uint64_t{Filled::CountTriangles(source)} * team) return;
   Int3 v[3];
-  Filled::TriangleOf(source, static_cast<uint32_t>(warp / slices), v);
+  Filled::TriangleOf(source, static_cast<uint32_t>(thread / team), v);
   const InsideRows rows{source.solid.bounds};
-  EmitCrossings(v, rows.box, static_cast<uint32_t>(warp % slices) * 32 + threadIdx.x % 32,
-                slices * 32, [&](int32_t y, int32_t z, int32_t x) {
+  EmitCrossings(v, rows.box, static_cast<uint32_t>(thread % team), team,
+                [&](int32_t y, int32_t z, int32_t x) {
                   atomicXor(&bits[rows.PlaceOf(x, y, z)], 1u << (x & 31));
                 });
 }
@@ -53,10 +54,11 @@ cudaError_t FindInside(const Source& source, const GeometryRecord& record, uint3
   const uint32_t corners = record.index_count != 0 ? record.index_count : record.vertex_count;
   const uint32_t triangles = corners / 3;
   if (triangles == 0 || rows.size() == 0) return cudaSuccess;
-  constexpr uint32_t kEnough = 1 << 14;  // warps that keep a device busy
-  const uint32_t slices = Clamp<uint32_t>(kEnough / triangles, 1, kMostSlices);
-  FlipKernel<<<BlocksOf(uint64_t{triangles} * slices), kThreads, 0, stream>>>(source, record,
-                                                                              slices, inside);
+  constexpr uint64_t kEnough = 1 << 19;  // threads that keep a device busy
+  uint32_t team = kLeastTeam;
+  while (team < kMostTeam && uint64_t{triangles} * team < kEnough) team *= 2;
+  FlipKernel<<<BlocksOf(uint64_t{triangles} * team / 32 + 1), kThreads, 0, stream>>>(source, record,
+                                                                                     team, inside);
   if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
   SumKernel<<<BlocksOf(rows.rows()), kThreads, 0, stream>>>(inside, rows.rows(),
                                                             static_cast<uint32_t>(rows.words()));

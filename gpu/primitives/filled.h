@@ -203,9 +203,9 @@ struct Filled {
   VOXELD_HD static bool HasAny(const Source& source, const Box3& box) {
     if (IsEmpty(box)) return false;
     for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
-      for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) {
-        if (RowIn(source, box, y, z) != 0) return true;
-      }
+      uint32_t any = 0;  // rows that do not wait for each other
+      for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) any |= RowIn(source, box, y, z);
+      if (any != 0) return true;
     }
     return false;
   }

@@ -1,4 +1,10 @@
 // Points: the voxel ⌊P⌋ each; with a thickness also the ball around P, one that fades, or a cube.
+//
+// Or cells, of which sparse voxels are: of the lattice of whole numbers in the geometry's own coordinates each point names the one
+// that it lies in, P is that cell's middle, and besides its voxel all those are covered whose centres' coordinates
+// (Solid::Canonical) lie in the cell, its lower sides included. Cells side by side leave no gaps, whatever the transform: a voxel's
+// centre lies in one of them. The voxel of a middle may have its own centre in the next cell, if cells are turned and small; then
+// it is of both.
 #pragma once
 
 #include "gpu/primitives/capsule.h"
@@ -19,10 +25,32 @@ struct Points {
 
   VOXELD_HD static uint32_t Count(const Source& source) { return source.corners(); }
 
+  // What a source of cells needs besides its positions.
+  VOXELD_HD static void PlaceCells(const Affine& map, Source& source) {
+    source.map = map;
+    source.solid = Solid::Of(map, /*keep_thin=*/false);
+    double reach = 0;  // from the middle along the axes, voxels
+    for (int a = 0; a < 3; ++a) {
+      const double* const row = &map.m[a * 4];
+      reach = Max(reach, ((Abs(row[0]) + Abs(row[1])) + Abs(row[2])) / 2);
+    }
+    source.radius = source.solid.drawable ? Max<int64_t>(1, Snap(reach)) : 0;
+  }
+
   VOXELD_HD static Line ItemOf(const Source& source, uint32_t i) {
     const uint32_t vertex = source.VertexOf(i);
     const uint32_t rgb = source.ColorOf(vertex);
-    const Int3 at = source.Vertex(vertex);
+    if (source.record->splat != Splat::kCell) {
+      const Int3 at = source.Vertex(vertex);
+      return {at, at, rgb, rgb};
+    }
+    double cell[3];
+    CellOf(source, vertex, cell);
+    const Point3d middle = Map(source.map, cell[0] + 0.5, cell[1] + 0.5, cell[2] + 0.5);
+    Int3 at;
+    at[0] = Snap(middle.x);
+    at[1] = Snap(middle.y);
+    at[2] = Snap(middle.z);
     return {at, at, rgb, rgb};
   }
 
@@ -42,11 +70,50 @@ struct Points {
     EmitVoxelOf(point.s, point.color_s, box, emit);
     if (source.radius == 0) return;
     const Splat splat = source.record->splat;
+    if (splat == Splat::kCell)
+      return EmitCell(source, i, BoundsOf(point, source.radius), box, emit);
     if (splat == Splat::kBall) return EmitCapsule(Capsule::Of(point, source.radius), box, emit);
     EmitSplat(point, source.radius, splat, box, emit);
   }
 
  private:
+  // A vertex' cell, as whole numbers; what is farther than 2³⁰ counts as there.
+  VOXELD_HD static void CellOf(const Source& source, uint32_t vertex, double cell[3]) {
+    for (int a = 0; a < 3; ++a) {
+      constexpr double kMost = 1073741824.0;
+      const double at = static_cast<double>(
+          source.positions[static_cast<size_t>(vertex) * 3 + static_cast<size_t>(a)]);
+      cell[a] = static_cast<double>(FloorToInt(Clamp(at, -kMost, kMost)));
+    }
+  }
+
+  template <class Emit>
+  VOXELD_HD static void EmitCell(const Source& source, uint32_t i, const Box3& bounds,
+                                 const Box3& box, Emit&& emit) {
+    const uint32_t vertex = source.VertexOf(i);
+    const uint32_t rgb = source.ColorOf(vertex);
+    double cell[3];
+    CellOf(source, vertex, cell);
+    const Box3 near = Intersect(bounds, box);
+    const Solid& s = source.solid;
+    for (int32_t z = near.lo[2]; z < near.hi[2]; ++z) {
+      const float dz = s.Distance(2, z);
+      for (int32_t y = near.lo[1]; y < near.hi[1]; ++y) {
+        const float dy = s.Distance(1, y);
+        for (int32_t x = near.lo[0]; x < near.hi[0]; ++x) {
+          float q[3];
+          s.Canonical(s.Distance(0, x), dy, dz, q);
+          bool inside = true;
+          for (int a = 0; a < 3; ++a) {
+            const double at = static_cast<double>(q[a]);
+            inside = inside && at >= cell[a] && at < cell[a] + 1;
+          }
+          if (inside) emit(x, y, z, rgb);
+        }
+      }
+    }
+  }
+
   // Voxels whose centres are no farther than the radius: in any direction, or along each axis.
   template <class Emit>
   VOXELD_HD static void EmitSplat(const Line& point, int64_t radius, Splat splat, const Box3& box,

@@ -73,6 +73,31 @@ void PlotSplat(const Units& at, uint32_t rgb, int64_t radius, Splat splat, const
   }
 }
 
+// The voxel of the middle of the cell that a point lies in, and those with centres in the cell.
+void PlotCell(const float* position, uint32_t rgb, const Affine& map, const DenseVolume& grid,
+              const Plot& plot) {
+  float middle[3], lower[3];
+  for (int a = 0; a < 3; ++a) {
+    lower[a] = std::floor(position[a]);
+    middle[a] = lower[a] + 0.5f;
+  }
+  const Units at = OracleSnap(map, middle);
+  PlotLine({at, at, rgb, rgb, LineSampling::kThin}, grid, plot);
+  OracleFrame frame;
+  if (!SetOracleFrame(map, /*keep_thin=*/false, frame)) return;
+  for (int64_t z = 0; z < grid.nz; ++z) {
+    for (int64_t y = 0; y < grid.ny; ++y) {
+      for (int64_t x = 0; x < grid.nx; ++x) {
+        float q[3];
+        frame.Coordinates(x, y, z, q);
+        bool within = true;
+        for (int a = 0; a < 3; ++a) within = within && std::floor(q[a]) == lower[a];
+        if (within) plot(x, y, z, rgb);
+      }
+    }
+  }
+}
+
 // What a curve is cut into, which tests of the cutting judge, drawn as any segments and triangles.
 void PlotCurved(const ModelGeometry& g, const Affine& map, const DenseVolume& grid, uint32_t tint,
                 const Plot& plot) {
@@ -208,7 +233,12 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
     PlotLine(line, grid, plot);
     if (radius > 0) PlotCapsule(line, radius, grid, plot);
   };
-  if (record.kind == PrimitiveKind::kPoints && record.splat != Splat::kBall) {
+  if (record.kind == PrimitiveKind::kPoints && record.splat == Splat::kCell) {
+    for (size_t i = 0; i < corners; ++i) {
+      const size_t vertex = record.index_count ? g.indices[i] : i;
+      PlotCell(&g.positions[vertex * 3], colors[i], map, grid, plot);
+    }
+  } else if (record.kind == PrimitiveKind::kPoints && record.splat != Splat::kBall) {
     for (size_t i = 0; i < corners; ++i) {
       PlotSplat(at[i], colors[i], radius, record.splat, grid, plot);
     }

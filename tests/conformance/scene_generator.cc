@@ -222,7 +222,7 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   r.thickness_unit = static_cast<ThicknessUnit>(Int(0, 1));
   if (Chance(0.25)) r.thickness = static_cast<float>(Real(0, 5));
   if (Chance(0.15)) r.drawn_by = DrawnBy::kCpu;
-  r.splat = static_cast<Splat>(Int(0, 2));
+  r.splat = static_cast<Splat>(Int(0, 3));
   if (r.kind == PrimitiveKind::kBox || r.kind == PrimitiveKind::kSphere ||
       r.kind == PrimitiveKind::kCylinder) {
     for (int i = 0; i < 3; ++i) r.params[i] = static_cast<float>(RandomCoordinate(size));

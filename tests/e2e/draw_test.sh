@@ -41,6 +41,12 @@ draws() {
 # Of a paraboloid over the unit disc, 5.33 units of area, 32² voxels each; where it is steep it takes fewer.
 draws 3200 5400 "x^2+y^2-z = 0 where x^2+y^2 <= 1"
 draws 16000 17500 "sphere radius=0.5 fill=solid"
+draws 4096 4096 "points vertices=0,0,0 splat=cell scale=0.5"
+# What is drawn otherwise than asked is drawn, and told.
+draws 400 700 "mesh vertices='-0.5,-0.5,0 0.5,-0.5,0 0,0.5,0' fill=solid"
+[ "$(field "$work/draw.json" '["its surface is drawn" in note for note in d["notes"]]')" = "[True]" ] || fail "$(cat "$work/draw.json")"
+"$voxelctl" draw "mesh vertices='-0.5,-0.5,0 0.5,-0.5,0 0,0.5,0' fill=solid" 2>"$work/note"
+grep -q "the mesh is open" "$work/note" || fail "the mesh' note is not told"
 draws 17000 19000 "sphere radius=0.5 fill=solid" "torus radius=0.8 tube_radius=0.05 fill=solid"
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" '[e["kind"] for e in d["entities"]]')" = "['sphere', 'torus']" ] ||

@@ -367,8 +367,8 @@ TEST(Delta, RefusesGeometriesThatDoNotHoldTogether) {
                 g.texture_width = g.texture_height = 1;
               }),
               HasSubstr("texture_width is 1, must be 0 for what is no triangles"));
-  EXPECT_THAT(message([](G& g) { g.splat = static_cast<Splat>(3); }),
-              HasSubstr("splat is 3, must be 0 to 2"));
+  EXPECT_THAT(message([](G& g) { g.splat = static_cast<Splat>(4); }),
+              HasSubstr("splat is 4, must be 0 to 3"));
   EXPECT_THAT(message([](G& g) { g.kind = PrimitiveKind::kImplicit; }),
               HasSubstr("geometry.color_mode is 1, must be 0 for a program"));
   EXPECT_THAT(message([](G& g) { g.kind = static_cast<PrimitiveKind>(0); }),

@@ -1,7 +1,12 @@
 #include "client/cpp/src/encode_shapes.h"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "absl/status/status.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -54,7 +59,43 @@ void SetCurves(const std::vector<std::vector<Vec3>>& curves, Message* to) {
   }
 }
 
-void SetText(const std::string& text, v1::Expression* to) { to->set_text(text); }
+bool IsName(const std::string& name) {
+  return !name.empty() && !absl::ascii_isdigit(static_cast<unsigned char>(name[0])) &&
+         std::all_of(name.begin(), name.end(),
+                     [](unsigned char c) { return absl::ascii_isalnum(c) || c == '_'; });
+}
+
+absl::Status CheckName(const std::string& name) {
+  if (IsName(name)) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("a parameter is called \"", absl::CHexEscape(name),
+                   "\"; letters, digits and _ make a name, a digit not first"));
+}
+
+static_assert(static_cast<int>(expressions::Op::kConstant) == v1::Expression::Tree::CONSTANT &&
+              static_cast<int>(expressions::Op::kAdd) == v1::Expression::Tree::ADD &&
+              static_cast<int>(expressions::Op::kSmoothMax) == v1::Expression::Tree::SMOOTH_MAX);
+
+absl::Status Set(const Expression& from, v1::Expression* to) {
+  if (from.text() != nullptr) to->set_text(*from.text());
+  if (from.term() == nullptr) return absl::OkStatus();
+  v1::Expression::Tree* const tree = to->mutable_tree();
+  for (const expressions::Op op : from.term()->ops()) {
+    tree->add_ops(static_cast<v1::Expression::Tree::Op>(op));
+  }
+  for (const double value : from.term()->values()) {
+    if (!std::isfinite(value)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("a number in an expression is ", value, "; it must be finite"));
+    }
+    tree->add_values(value);
+  }
+  for (const std::string& name : from.term()->names()) {
+    if (absl::Status status = CheckName(name); !status.ok()) return status;
+    absl::StrAppend(tree->mutable_names(), tree->names().empty() ? "" : " ", name);
+  }
+  return absl::OkStatus();
+}
 
 }  // namespace
 
@@ -65,8 +106,15 @@ uint32_t RgbOf(const Color& color) {
 absl::StatusOr<std::string> EncodeShape(const Implicit& shape) {
   v1::Primitive primitive;
   v1::Implicit* const to = primitive.mutable_implicit();
-  SetText(shape.surface, to->mutable_surface());
-  if (!shape.bound.empty()) SetText(shape.bound, to->mutable_bound());
+  absl::Status status = Set(shape.surface, to->mutable_surface());
+  const auto set = [&](const Expression& from, v1::Expression* (v1::Implicit::*into)()) {
+    if (!from.empty()) status.Update(Set(from, (to->*into)()));
+  };
+  set(shape.bound, &v1::Implicit::mutable_bound);
+  set(shape.red, &v1::Implicit::mutable_red);
+  set(shape.green, &v1::Implicit::mutable_green);
+  set(shape.blue, &v1::Implicit::mutable_blue);
+  set(shape.level, &v1::Implicit::mutable_level);
   if (!shape.boundary.empty()) {
     SetCurves(shape.boundary, to->mutable_boundary());
     to->mutable_boundary()->set_axis(shape.boundary_axis == Implicit::Axis::kX   ? v1::Boundary::X
@@ -74,10 +122,7 @@ absl::StatusOr<std::string> EncodeShape(const Implicit& shape) {
                                                                                  : v1::Boundary::Z);
   }
   for (const auto& [name, value] : shape.parameters) {
-    if (name.empty() || name.find(' ') != std::string::npos) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("a parameter is called \"", name, "\"; letters, digits and _ make a name"));
-    }
+    status.Update(CheckName(name));
     absl::StrAppend(to->mutable_parameter_names(), to->parameter_names().empty() ? "" : " ", name);
     to->add_parameter_values(value);
   }
@@ -87,11 +132,8 @@ absl::StatusOr<std::string> EncodeShape(const Implicit& shape) {
     Set(shape.domain->min, to->mutable_domain()->mutable_min());
     Set(shape.domain->max, to->mutable_domain()->mutable_max());
   }
-  if (!shape.red.empty()) SetText(shape.red, to->mutable_red());
-  if (!shape.green.empty()) SetText(shape.green, to->mutable_green());
-  if (!shape.blue.empty()) SetText(shape.blue, to->mutable_blue());
-  if (!shape.level.empty()) SetText(shape.level, to->mutable_level());
   to->set_colormap(shape.colormap);
+  if (!status.ok()) return status;
   return primitive.SerializeAsString();
 }
 

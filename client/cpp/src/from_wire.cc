@@ -45,7 +45,8 @@ Issue FromWire(const v1::Issue& issue) {
           .reason = reason >= 0 && reason <= static_cast<int>(Reason::kTimedOut)
                         ? static_cast<Reason>(reason)
                         : Reason::kUnspecified,
-          .message = issue.message()};
+          .message = issue.message(),
+          .applied = issue.applied()};
 }
 
 Outcome FromWire(const v1::Outcome& outcome) {

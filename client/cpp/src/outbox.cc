@@ -447,7 +447,7 @@ void Outbox::Scheduled(uint64_t frame_id) {
 }
 
 std::shared_ptr<const Transaction> Outbox::Refused(uint64_t sequence, const std::string& layer,
-                                                   const std::string& id) {
+                                                   const std::string& id, bool applied) {
   std::shared_ptr<Transaction> transaction;
   if (const auto it = by_commit_sequence_.lower_bound(sequence); it != by_commit_sequence_.end()) {
     transaction = unanswered_.at(it->second);
@@ -458,7 +458,7 @@ std::shared_ptr<const Transaction> Outbox::Refused(uint64_t sequence, const std:
       sequence < transaction->first_sequence) {
     return nullptr;
   }
-  if (transaction->refused.size() < kMostRefused)
+  if (!applied && transaction->refused.size() < kMostRefused)
     transaction->refused.insert({sequence, layer, id});
   return transaction;
 }

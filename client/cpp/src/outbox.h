@@ -118,10 +118,10 @@ class Outbox {
   std::optional<Rope> Ping(int64_t now_ns);
 
   void Scheduled(uint64_t frame_id);
-  // An operation of the request `sequence` was refused. Of which commit: null if it is not known (any
-  // more). Its frame id is all that is known of one that is being sent.
+  // An operation of the request `sequence` has an Issue: it was refused, unless `applied`. Of which commit: null if it is not
+  // known (any more). Its frame id is all that is known of one that is being sent.
   std::shared_ptr<const Transaction> Refused(uint64_t sequence, const std::string& layer,
-                                             const std::string& id);
+                                             const std::string& id, bool applied = false);
   // Accepted or refused: it is forgotten. Null if it is not known.
   std::shared_ptr<const Transaction> Answered(uint64_t frame_id);
 

@@ -184,7 +184,7 @@ void SessionCore::Written(Link* link) {
 }
 
 void SessionCore::TakeIssue(const v1::Issue& issue) {
-  const auto of = outbox_.Refused(issue.sequence(), issue.layer(), issue.id());
+  const auto of = outbox_.Refused(issue.sequence(), issue.layer(), issue.id(), issue.applied());
   const Issue& told = receipts_.Told(issue, of == nullptr ? 0 : of->frame_id);
   if (!options_.on_issue) return;
   if (events_.size() < kMostUntold) {

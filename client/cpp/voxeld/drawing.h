@@ -58,8 +58,9 @@ struct Vertices {
 };
 
 struct Points {
-  enum class Splat : uint8_t { kBall, kSoft, kCube };  // of thick ones; kSoft fades out
-  Vertices vertices;                                   // without indices
+  // Of thick ones; kSoft fades out. kCell: sparse voxels, each point the cell (1 unit wide) that it lies in.
+  enum class Splat : uint8_t { kBall, kSoft, kCube, kCell };
+  Vertices vertices;  // without indices
   Thickness thickness;
   Splat splat = Splat::kBall;
 };

@@ -39,7 +39,8 @@ struct Issue {
   std::string layer, id;
   std::string field;  // path within the request
   Reason reason = Reason::kUnspecified;
-  std::string message;  // what was wrong, the value, what would be right
+  std::string message;   // what was wrong, the value, what would be right
+  bool applied = false;  // it was carried out all the same, otherwise than asked
 };
 
 // When a commit passed what, in ns of the server's monotonic clock; 0: not known.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "voxeld/basics.h"
+#include "voxeld/expression.h"
 
 namespace voxeld::client {
 
@@ -146,13 +147,12 @@ struct Text {
   Thickness thickness;  // of lines, and of flat letters
 };
 
-// The general method: a surface P bounded by Φ, as expressions of the shape's own coordinates
-// (docs/expressions.md).
+// The general method: a surface P bounded by Φ.
 struct Implicit {
   enum class Axis : uint8_t { kZ, kX, kY };
 
-  std::string surface;  // "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1"
-  std::string bound;    // a condition; empty: none
+  Expression surface;  // "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1"
+  Expression bound;    // a condition; empty: none
   // Closed curves, projected along an axis: what lies within them is drawn.
   std::vector<std::vector<Vec3>> boundary;
   Axis boundary_axis = Axis::kZ;
@@ -162,7 +162,8 @@ struct Implicit {
   Thickness shell;
   std::optional<Region> domain;
   // Red, green and blue, 0 to 1 each: all three; or a level of 0 to 1 and the name of a colour map.
-  std::string red, green, blue, level, colormap;
+  Expression red, green, blue, level;
+  std::string colormap;
 };
 
 }  // namespace voxeld::client

@@ -33,9 +33,17 @@ class Draw(DrawCurves[Drawn]):
                transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
                lifetime: Optional[float] = None, label: str = "") -> Drawn:
         """A cloud, (n, 3). `width`: each point's diameter, in "voxels" or "units"; by default one voxel. Thick points are a
-        "ball", a "soft" one, which fades out, or a "cube"."""
+        "ball", a "soft" one, which fades out, or a "cube"; a "cell" is what `voxels` draws."""
         return self._draw(name, shapes.points, (positions,),
                           dict(colors=colors, cmap=cmap, width=width, unit=unit, splat=splat),
+                          Look.of(transform, priority, erase, lifetime, label))
+
+    def voxels(self, name: str, cells: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
+               transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+               lifetime: Optional[float] = None, label: str = "") -> Drawn:
+        """A sparse list of voxels with a lattice of their own, (n, 3) whole numbers: each is the cube of 1 unit from (x, y, z)
+        on, under `transform`; side by side they leave no gaps."""
+        return self._draw(name, shapes.points, (cells,), dict(colors=colors, cmap=cmap, splat="cell"),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def lines(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,

@@ -225,11 +225,12 @@ class Unit:
     def apply(self, mirror: Mirror, now_ns: int) -> None:
         """It was accepted; less what its issues say was refused."""
         mirror.purge(now_ns)
-        if not self.issues:
+        refusals = [issue for issue in self.issues if not issue.applied]
+        if not refusals:
             for operation in self.operations:
                 operation.apply(mirror, now_ns)
             return
-        refused = Refused(self.issues)
+        refused = Refused(refusals)
         frame: Optional[Immediate] = None  # that has begun, with what was taken of it
         for message, sequence in zip(self._messages(), self.sequences):
             if isinstance(message, _Begin):

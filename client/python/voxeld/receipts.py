@@ -117,7 +117,8 @@ def _why(why: int) -> str:
 
 @dataclass(frozen=True)
 class Issue:
-    """A refused operation: which, what was wrong, what would be right."""
+    """A refused operation, or one that was carried out otherwise than asked (`applied`): which, what was wrong, what would be
+    right."""
 
     layer: str
     id: str
@@ -125,6 +126,7 @@ class Issue:
     reason: str
     message: str
     sequence: int = 0
+    applied: bool = False
 
     def __str__(self) -> str:
         where = "/".join(part for part in (self.layer, self.id) if part)
@@ -136,7 +138,7 @@ class Issue:
             reason = types_pb2.Reason.Name(issue.reason)[len("REASON_"):]
         except ValueError:
             reason = str(int(issue.reason))
-        return Issue(issue.layer, issue.id, issue.field, reason, issue.message, issue.sequence)
+        return Issue(issue.layer, issue.id, issue.field, reason, issue.message, issue.sequence, issue.applied)
 
 
 Done = Callable[["Future[Frame]", "Frame"], None]

@@ -26,7 +26,7 @@ _MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segm
 SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
 RULES = {"thin": pb.SURFACE_RULE_THIN, "cover": pb.SURFACE_RULE_COVER}
 FILLS = {"surface": pb.FILL_SURFACE, "solid": pb.FILL_SOLID, "lines": pb.FILL_LINES, "dots": pb.FILL_DOTS}
-_SPLATS = {"ball": pb.Points.BALL, "soft": pb.Points.SOFT, "cube": pb.Points.CUBE}
+_SPLATS = {"ball": pb.Points.BALL, "soft": pb.Points.SOFT, "cube": pb.Points.CUBE, "cell": pb.Points.CELL}
 UNITS = {"voxels": pb.Thickness.VOXELS, "units": pb.Thickness.UNITS}
 
 

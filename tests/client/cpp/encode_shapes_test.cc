@@ -100,6 +100,10 @@ TEST(EncodeShapes, FillsSplatsAndTints) {
                 .points()
                 .splat(),
             v1::Points::SOFT);
+  EXPECT_EQ(Parse(Points{.vertices = {.positions = {0, 0, 0}}, .splat = Points::Splat::kCell})
+                .points()
+                .splat(),
+            v1::Points::CELL);
   EXPECT_EQ(Parse(Instance{.object = "o", .tint = {1, 2, 3}}).instance().tint().rgb(), 0x010203u);
   EXPECT_FALSE(Parse(Instance{.object = "o"}).instance().has_tint());
 }

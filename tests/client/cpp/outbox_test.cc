@@ -340,6 +340,7 @@ TEST(Outbox, RefusalsAreOfTheRequestsThatTheyName) {
   std::vector<uint64_t> sequences;
   for (int i = 0; i < 8; ++i) sequences.push_back(outbox.Next(0)->sequence);
   EXPECT_EQ(outbox.Refused(sequences[4], "l", "a")->frame_id, 2u);
+  EXPECT_EQ(outbox.Refused(sequences[3], "l", "a", /*applied=*/true)->frame_id, 2u);
   EXPECT_EQ(outbox.Refused(sequences[7], "l", "a")->frame_id, 3u) << "it is being sent";
   EXPECT_TRUE(outbox.Answered(1)->GetRefusals().refused.empty());
   EXPECT_EQ(outbox.Refused(sequences[0], "l", "a"), nullptr) << "it has its answer";

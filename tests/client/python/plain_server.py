@@ -7,6 +7,7 @@ from voxeld.v1 import primitives_pb2, types_pb2
 from voxeld.v1 import scene_pb2 as pb
 
 REFUSED = "refuse this"  # the label of an entity that is to be refused
+NOTED = "note this"  # of one that is taken with an Issue
 
 Scene = dict[str, dict[str, bytes]]  # layer → id → Entity, serialised; layers in the order of their creation
 
@@ -197,6 +198,8 @@ class PlainServer:
                 for one in alone(request):
                     try:
                         apply(self.session, one)
+                        if one.upsert.entity.label == NOTED:
+                            issues.append(pb.Issue(sequence=at, layer=one.upsert.layer, id=one.upsert.id, applied=True))
                     except Refusal as refusal:
                         refuse(at, refusal)
         if frame is not None:  # it has no end, and its layer is as it was

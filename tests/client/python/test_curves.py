@@ -62,6 +62,7 @@ class Curves(unittest.TestCase):
         self.assertEqual(parsed(shapes.box((0, 0, 0), 1, fill="lines")).box.fill, pb.FILL_LINES)
         self.assertEqual(parsed(shapes.mesh(np.zeros((3, 3)), fill="dots")).mesh.fill, pb.FILL_DOTS)
         self.assertEqual(parsed(shapes.points(LINE, width=3, splat="soft")).points.splat, pb.Points.SOFT)
+        self.assertEqual(parsed(shapes.points(LINE, splat="cell")).points.splat, pb.Points.CELL)
         self.assertEqual(parsed(shapes.instance("o", tint="red")).instance.tint.rgb, 0xFF0000)
 
     def test_gradients(self) -> None:

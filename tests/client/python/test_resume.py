@@ -2,7 +2,7 @@
 import unittest
 from typing import Any
 
-from plain_server import REFUSED, PlainServer
+from plain_server import NOTED, REFUSED, PlainServer
 from test_outbox import puts
 from test_session import Wire, define, puts_of
 
@@ -61,6 +61,14 @@ class Accepted(Case):
         self.again(forget=True)
         self.assertEqual((self.ids(), self.entity("x").label), (["x", "y"], "good"))
         self.assertEqual(len(self.issues), 1, "it is not refused once more")
+
+    def test_what_was_carried_out_otherwise_is_put_up_again(self) -> None:
+        self.start(PlainServer())
+        frame = self.commit(puts_of("l", "x", NOTED))
+        self.link.settle()
+        self.assertEqual((frame.state, [(i.id, i.applied) for i in frame.issues]), ("accepted", [("x", True)]))
+        self.again(forget=True)
+        self.assertEqual((self.ids(), self.entity("x").label), (["x"], NOTED))
 
     def test_one_refusal_does_not_poison_a_strict_session(self) -> None:
         self.start(PlainServer(), strict=True)

@@ -78,6 +78,26 @@ TEST_F(IntakeTest, WhatIsStagedWithNothingBeforeItCostsNoCredit) {
   EXPECT_EQ(bytes_in->load(), 4010u);
 }
 
+TEST_F(IntakeTest, WhatIsCarriedOutOtherwiseIsToldAndNoRefusal) {
+  limits.max_issues_per_commit = 2;
+  Make();
+  Refusals told;
+  for (const bool applied : {true, false, true, false, true}) {
+    told.Add({.sequence = 1, .field = "f", .message = applied ? "so" : "no", .applied = applied},
+             limits.max_issues_per_commit);
+  }
+  EXPECT_EQ(told.more, 1u);
+  EXPECT_EQ(told.more_applied, 2u);
+  std::vector<Operation> all = testing::Sequence(sequence, Put("a", "x"), EndCommit(1));
+  intake->Take({std::move(all), std::move(told), 10, 1, 2, 0});
+  ASSERT_EQ(sink->issues.size(), 2u);
+  EXPECT_TRUE(sink->issues[0].applied);
+  EXPECT_FALSE(sink->issues[1].applied);
+  const WaitingCommit commit = Pop();
+  EXPECT_EQ(commit.refusals.refused(), 2u);
+  EXPECT_EQ(commit.refusals.first(), "f: no");
+}
+
 TEST_F(IntakeTest, WhatWaitsForItsTurnHoldsItsCredit) {
   Make();
   EXPECT_FALSE(Take(600, Put("a", "x"), EndCommit(1)));

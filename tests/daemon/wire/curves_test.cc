@@ -474,12 +474,29 @@ TEST_F(CurvesTest, AMessageMakesNoMoreThanMayWait) {
 }
 
 TEST_F(CurvesTest, SplatsAreKept) {
+  const std::pair<v1::Points::Splat, gpu::Splat> splats[] = {
+      {v1::Points::SOFT, gpu::Splat::kSoft},
+      {v1::Points::CUBE, gpu::Splat::kCube},
+      {v1::Points::CELL, gpu::Splat::kCell}};
+  for (const auto& [wire, ours] : splats) {
+    P p = Points();
+    p.mutable_points()->set_splat(wire);
+    EXPECT_EQ(Geometry(p).record.splat, ours);
+    P told;
+    Encode(content_, &told);
+    EXPECT_EQ(told.points().splat(), wire);
+  }
+}
+
+TEST_F(CurvesTest, CellsHaveNoThickness) {
   P p = Points();
-  p.mutable_points()->set_splat(v1::Points::SOFT);
-  EXPECT_EQ(Geometry(p).record.splat, gpu::Splat::kSoft);
-  P told;
-  Encode(content_, &told);
-  EXPECT_EQ(told.points().splat(), v1::Points::SOFT);
+  p.mutable_points()->set_splat(v1::Points::CELL);
+  p.mutable_points()->mutable_thickness()->set_value(2);
+  Content content;
+  const MaybeFault fault = FaultOf(p, &content);
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_THAT(fault->field, HasSubstr("points.thickness"));
+  EXPECT_THAT(fault->message, HasSubstr("is 2; cells have none"));
 }
 
 }  // namespace

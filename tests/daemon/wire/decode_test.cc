@@ -326,6 +326,7 @@ TEST(Decode, SolidMeshesAreFilledIfTheyAreClosed) {
   EXPECT_EQ(GeometryOf(decoded).record.kind, gpu::PrimitiveKind::kTriangles);
   ASSERT_THAT(decoded.refused.issues, SizeIs(1));
   const Issue& issue = decoded.refused.issues[0];
+  EXPECT_TRUE(issue.applied) << "it is no refusal";
   EXPECT_EQ(issue.field, "upsert.entity.primitive.mesh.fill");
   EXPECT_EQ(issue.id, "id");
   EXPECT_EQ(issue.reason, Reason::kInvalidValue);

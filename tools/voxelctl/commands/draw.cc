@@ -11,13 +11,17 @@ absl::Status Draw(const DrawOptions& options, const Connector& connect, Console&
   if (!request.ok()) return request.status();
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
   if (!connected.ok()) return connected.status();
-  const absl::StatusOr<uint64_t> snapshot = PutShapes(*request, options.add, **connected);
-  if (!snapshot.ok()) return snapshot.status();
+  const absl::StatusOr<ShapesPut> put = PutShapes(*request, options.add, **connected);
+  if (!put.ok()) return put.status();
   if (console.json()) {
-    console.Data(JsonText(
-        {{"layer", kLayer}, {"shapes", options.shapes.size()}, {"snapshot", *snapshot}}, false));
+    console.Data(JsonText({{"layer", kLayer},
+                           {"shapes", options.shapes.size()},
+                           {"snapshot", put->snapshot},
+                           {"notes", put->notes}},
+                          false));
     return absl::OkStatus();
   }
+  for (const std::string& note : put->notes) console.Say(note);
   console.Say(
       absl::StrCat(Counted(options.shapes.size(), "shape"), " up, in the layer \"", kLayer,
                    "\"; `voxelctl snapshot OUT.png` shows what the display shows, `voxelctl "

@@ -114,7 +114,7 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     const std::vector<std::string> shapes = {examples[i].text};
     const absl::StatusOr<v1::ApplyUpdateRequest> request = ShapesRequest(shapes);
     if (!request.ok()) return request.status();
-    const absl::StatusOr<uint64_t> put = PutShapes(*request, /*add=*/true, connection);
+    const absl::StatusOr<ShapesPut> put = PutShapes(*request, /*add=*/true, connection);
     if (!put.ok()) return put.status();
     volume = CaptureNext(options, last, connection, interrupt);
     if (!volume.ok()) return volume.status();

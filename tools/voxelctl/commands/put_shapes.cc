@@ -40,8 +40,8 @@ absl::StatusOr<v1::ApplyUpdateRequest> ShapesRequest(std::span<const std::string
   return request;
 }
 
-absl::StatusOr<uint64_t> PutShapes(const v1::ApplyUpdateRequest& request, bool add,
-                                   Connection& connection) {
+absl::StatusOr<ShapesPut> PutShapes(const v1::ApplyUpdateRequest& request, bool add,
+                                    Connection& connection) {
   absl::StatusOr<std::vector<uint64_t>> before = std::vector<uint64_t>();
   if (!add) before = OwnersBefore(connection);
   if (!before.ok()) return before.status();
@@ -51,7 +51,11 @@ absl::StatusOr<uint64_t> PutShapes(const v1::ApplyUpdateRequest& request, bool a
   // A test pattern would hide them.
   const absl::StatusOr<std::vector<std::string>> patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
-  return applied->snapshot();
+  ShapesPut put{.snapshot = applied->snapshot()};
+  for (const v1::Issue& issue : applied->issues()) {
+    put.notes.push_back(EscapeForTerminal(absl::StrCat("\"", issue.id(), "\": ", issue.message())));
+  }
+  return put;
 }
 
 }  // namespace voxeld::voxelctl
