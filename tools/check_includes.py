@@ -48,8 +48,8 @@ ALLOWED = {
     # Its own headers are "voxeld/…", as its users write them.
     "client": ["voxeld", "display/sync", "daemon/address"],
     # What users see has neither protobuf nor anything else of ours.
-    "client/cpp/voxeld": ["voxeld/address.h", "voxeld/basics.h", "voxeld/drawing.h", "voxeld/receipt.h",
-                          "voxeld/shapes.h"],
+    "client/cpp/voxeld": ["voxeld/address.h", "voxeld/basics.h", "voxeld/drawing.h", "voxeld/expression.h",
+                          "voxeld/receipt.h", "voxeld/shapes.h"],
     "client/cpp/examples": ["voxeld/client.h"],
     "tests": ["daemon", "gpu", "display", "voxeld", "tools", "client"],
 }

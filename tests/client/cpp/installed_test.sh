@@ -17,6 +17,7 @@ cat >"$work/expected" <<'EOT'
 ./include/voxeld/basics.h
 ./include/voxeld/client.h
 ./include/voxeld/drawing.h
+./include/voxeld/expression.h
 ./include/voxeld/receipt.h
 ./include/voxeld/shapes.h
 ./lib/cmake/voxeld_client/voxeld_client-config-version.cmake

@@ -1,4 +1,4 @@
-// Curves, wire frames, text, splats, colour scales and tints from the wire: what is wrong with them, what becomes
+// Curves, wire frames, text, colour scales and tints from the wire: what is wrong with them, what becomes
 // of good ones, and that they can be told to watchers as they were sent.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -471,32 +471,6 @@ TEST_F(CurvesTest, AMessageMakesNoMoreThanMayWait) {
   EXPECT_EQ(decoded.refused.issues.size(), 13u) << "each takes 154 kB";
   EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kQuotaExceeded);
   EXPECT_THAT(decoded.refused.issues[0].message, HasSubstr("max_uncommitted_bytes is 1000000"));
-}
-
-TEST_F(CurvesTest, SplatsAreKept) {
-  const std::pair<v1::Points::Splat, gpu::Splat> splats[] = {
-      {v1::Points::SOFT, gpu::Splat::kSoft},
-      {v1::Points::CUBE, gpu::Splat::kCube},
-      {v1::Points::CELL, gpu::Splat::kCell}};
-  for (const auto& [wire, ours] : splats) {
-    P p = Points();
-    p.mutable_points()->set_splat(wire);
-    EXPECT_EQ(Geometry(p).record.splat, ours);
-    P told;
-    Encode(content_, &told);
-    EXPECT_EQ(told.points().splat(), wire);
-  }
-}
-
-TEST_F(CurvesTest, CellsHaveNoThickness) {
-  P p = Points();
-  p.mutable_points()->set_splat(v1::Points::CELL);
-  p.mutable_points()->mutable_thickness()->set_value(2);
-  Content content;
-  const MaybeFault fault = FaultOf(p, &content);
-  ASSERT_TRUE(fault.has_value());
-  EXPECT_THAT(fault->field, HasSubstr("points.thickness"));
-  EXPECT_THAT(fault->message, HasSubstr("is 2; cells have none"));
 }
 
 }  // namespace

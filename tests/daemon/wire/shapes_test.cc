@@ -5,7 +5,10 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
+#include <variant>
 
+#include "daemon/wire/encode_primitive.h"
 #include "daemon/wire/primitive.h"
 #include "gpu/implicit/program.h"
 #include "gpu/implicit/program_check.h"
@@ -377,6 +380,40 @@ TEST(Shapes, HeightMapsHaveRowsColumnsAndSamples) {
   EXPECT_EQ(dots->record.vertex_count, 6u);
   EXPECT_TRUE(dots->arrays.indices().empty());
   EXPECT_EQ(dots->arrays.positions()[5 * 3 + 2], -5);
+}
+
+P OnePoint() {
+  P p;
+  p.mutable_points()->mutable_vertices()->set_count(1);
+  p.mutable_points()->mutable_vertices()->set_positions(std::string(12, '\0'));
+  return p;
+}
+
+TEST(Shapes, SplatsAreKept) {
+  const std::pair<v1::Points::Splat, gpu::Splat> splats[] = {{v1::Points::SOFT, gpu::Splat::kSoft},
+                                                             {v1::Points::CUBE, gpu::Splat::kCube},
+                                                             {v1::Points::CELL, gpu::Splat::kCell}};
+  for (const auto& [wire, ours] : splats) {
+    P p = OnePoint();
+    p.mutable_points()->set_splat(wire);
+    Content content;
+    ASSERT_FALSE(FaultOf(p, &content).has_value());
+    EXPECT_EQ(std::get<GeometryPtr>(content)->record.splat, ours);
+    P told;
+    Encode(content, &told);
+    EXPECT_EQ(told.points().splat(), wire);
+  }
+}
+
+TEST(Shapes, CellsHaveNoThickness) {
+  P p = OnePoint();
+  p.mutable_points()->set_splat(v1::Points::CELL);
+  p.mutable_points()->mutable_thickness()->set_value(2);
+  Content content;
+  const MaybeFault fault = FaultOf(p, &content);
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_THAT(fault->field, HasSubstr("points.thickness"));
+  EXPECT_THAT(fault->message, HasSubstr("is 2; cells have none"));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ constexpr ShapeExample kExamples[] = {
     {"points, cells",
      "points vertices='-3,-2,-2 -2,-2,-2 -1,-2,-2 -1,-1,-2 -1,0,-2 -1,0,-1 -1,0,0 0,0,0 1,0,0 "
      "1,1,0 "
-     "1,1,1 2,1,1' splat=cell scale=0.28 turn=20,10,30 color=tomato"},
+     "1,1,1 2,1,1' splat=cell scale=0.28 turn=20,10,30 color=teal"},
     {"mesh",
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8' "
