@@ -15,8 +15,22 @@ EXAMPLES = ROOT / "tools/voxelctl/shape/examples.cc"
 OUT = ROOT / "docs/primitives.md"
 
 # The header of a primitive that is not called as its message.
-NAMED = {"Mesh": "triangles", "Instance": None, "HeightMap": None, "Curve": "spline", "Arc": None, "Ellipse": None, "Text": None,
-         "BezierSurface": None}
+# What headers say of a shape, if it is not the one that is called as the shape is.
+_SOLID, _FIELD, _CURVE = ["solid.h", "solid_voxels.h"], ["../implicit/field.h"], ["../curves/cut.h"]
+HEADERS_OF = {
+    "Segments": ["segments.h", "line.h", "capsule.h"],
+    "Mesh": ["triangle.h", "filled.h", "texture.h"],
+    "Box": ["box.h", *_SOLID], "Sphere": ["sphere.h", *_SOLID], "Cylinder": ["cylinder.h", *_SOLID],
+    "Implicit": ["implicit.h", *_FIELD],
+    **{shape: [f"{shape.lower()}.h", *_FIELD]
+       for shape in ("Ellipsoid", "Torus", "Cone", "Parallelepiped", "Disc", "Patch", "Polygon", "Arrow")},
+    "HeightMap": ["../../daemon/wire/height_map.h", "triangle.h"],
+    "Curve": ["spline.h", *_CURVE], "Arc": _CURVE, "Ellipse": _CURVE, "Helix": ["helix.h", *_CURVE],
+    "BezierSurface": [*_CURVE, "triangle.h"],
+    "Text": ["../../daemon/wire/text.h"],
+    "Volume": ["samples.h"], "Isosurface": ["samples.h"],
+    "Instance": [],
+}
 
 HEAD = """# Primitives
 
@@ -113,13 +127,15 @@ def kinds() -> list[tuple[str, str]]:
     return re.findall(r"(\w+) (\w+) = \d+;", body[1])
 
 
-def guarantee(message: str) -> str:
-    name = NAMED.get(message, message.lower())
-    path = HEADERS / f"{name}.h"
-    if name is None or not path.exists():
-        return ""
-    text = path.read_text().split("#pragma once")[0]
-    return "\n".join(line[2:].strip() for line in text.split("\n") if line.startswith("//"))
+def guarantees(message: str) -> list[tuple[str, str]]:
+    """(header, what it says) of each that says which voxels a shape covers."""
+    found = []
+    for name in HEADERS_OF.get(message, [f"{message.lower()}.h"]):
+        path = (HEADERS / name).resolve()
+        text = path.read_text().split("#pragma once")[0]
+        said = "\n".join(line[2:].strip() for line in text.split("\n") if line.startswith("//"))
+        found.append((str(path.relative_to(ROOT)), said))
+    return found
 
 
 def examples() -> dict[str, list[str]]:
@@ -137,14 +153,22 @@ def examples() -> dict[str, list[str]]:
 def page() -> str:
     all_messages, values, shown = messages(), enums(), examples()
     out = [HEAD]
+    pages: dict[str, str] = {}  # where a header's words stand
     for message, field in kinds():
         above, fields = all_messages[message]
         out.append(f"## {field}\n")
         if above:
             out.append(above + "\n")
         out += table(message, fields, values)
-        if said := guarantee(message):
-            out.append(f"**What it covers** (`gpu/primitives/{NAMED.get(message, message.lower())}.h`): {said}\n")
+        elsewhere = []
+        for path, said in guarantees(message):
+            if path in pages:
+                elsewhere.append(f"`{path}`, under [{pages[path]}](#{pages[path]})")
+            else:
+                pages[path] = field
+                out.append(f"**What it covers** (`{path}`): {said}\n")
+        if elsewhere:
+            out.append(f"**What it covers**, as others do: {'; '.join(elsewhere)}.\n")
         for text in shown.get(field, []):
             out.append(f"```\nvoxelctl draw \"{text}\"\n```\n")
     out.append("## Types that several have\n")

@@ -1,4 +1,4 @@
-// Text: letters of the server's fonts into polygons, solids, curves or strokes.
+// Text: letters of the server's fonts into polygons, solids, curves or strokes, whose voxels they then have.
 #pragma once
 
 #include "daemon/wire/check.h"

@@ -1,5 +1,5 @@
 // Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space, so
-// that the error is one of voxels whatever the transform. On the host, in IEEE double, in the order
+// that the error is one of voxels whatever the transform: an eighth of one (kCurveError). On the host, in IEEE double, in the order
 // written there; every engine draws what comes out.
 #pragma once
 
