@@ -11,14 +11,11 @@ from . import wire
 from .arrays import as_array, number, vector
 from .colors import Colors
 from .errors import InvalidArray, InvalidValue
-from .shapes import FILLS, RULES, choice, solid, thickness, vec
+from .shapes import FILLS, RULES, WHOLE_BYTES, choice, solid, thickness, vec
 from .v1 import primitives_pb2 as pb
 
 Color = Optional[Colors]
 Extent = Optional[tuple[npt.ArrayLike, npt.ArrayLike]]
-
-# A grid goes in one message; servers take 16 MiB unless they are told otherwise.
-MOST_BYTES = 15 << 20
 
 _FILTERS = {"linear": pb.Grid.LINEAR, "nearest": pb.Grid.NEAREST}
 _TYPES = {np.dtype(np.uint8): pb.ELEMENT_TYPE_U8, np.dtype(np.uint16): pb.ELEMENT_TYPE_U16}
@@ -44,8 +41,8 @@ def _grid(array: npt.ArrayLike, extent: Extent, filter: str, colors: bool) -> pb
         field = field.astype(np.float32)
         if np.isinf(field).any():
             raise InvalidArray("array has infinite numbers; give finite ones, or NaN where there is nothing")
-    if field.nbytes > MOST_BYTES:
-        raise InvalidArray(f"array takes {field.nbytes} bytes, more than the {MOST_BYTES} that go at once; give fewer samples, or "
+    if field.nbytes > WHOLE_BYTES:
+        raise InvalidArray(f"array takes {field.nbytes} bytes, more than the {WHOLE_BYTES} that go at once; give fewer samples, or "
                            "narrower ones (uint8)")
     samples = np.ascontiguousarray(np.swapaxes(field, 0, 2)).tobytes()  # x fastest
     edges = np.diag(last - first)

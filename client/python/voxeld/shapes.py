@@ -21,6 +21,8 @@ from .v1 import types_pb2
 
 # A piece's payload at most; with its head a message stays below 1 MiB.
 PIECE_BYTES = (1 << 20) - (2 << 10)
+# Of what cannot come in pieces; servers take messages of 16 MiB unless they are told otherwise.
+WHOLE_BYTES = 15 << 20
 
 _MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segments.LIST}
 SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
@@ -118,13 +120,11 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
     head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"),
                    texture=to_texture(texture, uv, len(array))).SerializeToString()
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
-    whole = len(array) * size + (0 if faces is None else 12 * len(faces))  # type: ignore[arg-type]
-    if fill == "solid" and whole > PIECE_BYTES:
-        raise InvalidArray(f"the mesh takes {whole} bytes, more than the {PIECE_BYTES} that go at once, and a part of it "
-                           "is no solid; draw its surface, or a coarser one")
-    if texture is not None and whole > PIECE_BYTES:
-        raise InvalidArray(f"the mesh takes {whole} bytes, more than the {PIECE_BYTES} that go at once with a texture; draw "
-                           "it in parts, or a coarser one")
+    together = fill == "solid" or texture is not None  # a part of it is no solid, and each would have the texture
+    whole = len(head) + len(array) * size + (0 if faces is None else 12 * len(faces))  # type: ignore[arg-type]
+    if together and whole > WHOLE_BYTES:
+        raise InvalidArray(f"the mesh takes {whole} bytes, more than the {WHOLE_BYTES} that a solid, or one with a texture, may "
+                           "have; draw its surface, draw it in parts, or a coarser one")
 
     def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
         return packed("mesh", head, wire.vertices(vertices, element, own, index), color)
@@ -132,11 +132,13 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
     if faces is None:
         if len(array) % 3:
             raise InvalidArray(f"vertices: got {len(array)} without faces; triangles need a multiple of 3")
+        if together:
+            return [one(array, each, None)]
         return [one(array[r], None if each is None else each[r], None) for r in _pieces(len(array), size, 3)]
     index = indices(faces, len(array))
     if len(index) == 0:
         return []
-    if index.nbytes + len(array) * size <= PIECE_BYTES:
+    if together or index.nbytes + len(array) * size <= PIECE_BYTES:
         return [one(array, each, index)]
     # Each piece has the vertices of its own faces, at most three each.
     result = []

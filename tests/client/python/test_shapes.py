@@ -12,9 +12,9 @@ from voxeld.v1 import primitives_pb2 as pb
 NUMPY = np.random.default_rng(1)
 
 
-def parsed(shape: Sequence[wire.Packed]) -> list[pb.Primitive]:
+def parsed(shape: Sequence[wire.Packed], most: int = 1 << 20) -> list[pb.Primitive]:
     for one in shape:
-        assert len(one) < 1 << 20, "a piece's message stays below 1 MiB"
+        assert len(one) < most, "a piece's message stays below 1 MiB"
     return [pb.Primitive.FromString(one.to_bytes()) for one in shape]
 
 
@@ -147,9 +147,20 @@ class Textures(unittest.TestCase):
             shapes.mesh(self.AT, texture=5, uv=self.UV)  # type: ignore[arg-type]
         with self.assertRaises(OSError):
             shapes.mesh(self.AT, texture="/nowhere/at/all.png", uv=self.UV)
-        many = np.zeros((300_000, 3), np.float32)
-        with self.assertRaisesRegex(InvalidArray, "go at once with a texture"):
+        many = np.zeros((1_500_000, 3), np.float32)
+        with self.assertRaisesRegex(InvalidArray, "more than the 15728640 that a solid, or one with a texture, may have"):
             shapes.mesh(many, texture=b"x", uv=many[:, :2])
+        with self.assertRaisesRegex(InvalidArray, "more than the 15728640 that a solid"):
+            shapes.mesh(many, fill="solid")
+
+    def test_what_is_one_stays_one(self) -> None:
+        corners = np.zeros((300_000, 3), np.float32)
+        faces = np.arange(300_000).reshape(-1, 3)
+        for index in (None, faces):
+            (solid,) = parsed(shapes.mesh(corners, index, fill="solid"), shapes.WHOLE_BYTES)
+            self.assertEqual(solid.mesh.vertices.count, 300_000)
+            (textured,) = parsed(shapes.mesh(corners, index, texture=b"x", uv=corners[:, :2]), shapes.WHOLE_BYTES)
+            self.assertEqual(textured.mesh.vertices.count, 300_000)
 
 
 class Solids(unittest.TestCase):
