@@ -16,8 +16,6 @@ constexpr int32_t kSide = 40;
 class Cells : public EngineConformance {
  protected:
   Cells() {
-    scene_.layers[1].id = 1;
-    scene_.drawables[1] = {.id = 1, .geometry = 1, .layer = 1};
     geometry_.record.id = 1;
     geometry_.record.kind = PrimitiveKind::kPoints;
     geometry_.record.splat = Splat::kCell;
@@ -33,30 +31,18 @@ class Cells : public EngineConformance {
   void Turn(double edge) {
     const double c = std::cos(std::numbers::pi / 6), s = std::sin(std::numbers::pi / 6);
     const double turn[9] = {c, -s * c, s * s, s, c * c, -c * s, 0, s, c};
-    for (int i = 0; i < 9; ++i) transform().m[i / 3 * 4 + i % 3] = edge * turn[i];
-    for (int a = 0; a < 3; ++a) transform().m[a * 4 + 3] = 19.8125 + a * 0.203125;
+    for (int i = 0; i < 9; ++i) transform_.m[i / 3 * 4 + i % 3] = edge * turn[i];
+    for (int a = 0; a < 3; ++a) transform_.m[a * 4 + 3] = 19.8125 + a * 0.203125;
   }
-  Affine& transform() { return scene_.drawables[1].transform; }
-
   // All voxels, as the engine and the oracle have them.
-  std::vector<uint32_t> Draw() {
-    scene_.geometries[1] = geometry_;
-    EngineDriver engine = Make();
-    DeltaBuffer whole;
-    whole.PutWhole(scene_);
-    EXPECT_TRUE(engine.SetTarget(target_).ok());
-    const absl::Status applied = engine.Apply(whole);
-    EXPECT_TRUE(applied.ok()) << applied;
-    ExpectLikeOracle(engine, scene_, target_);
-    return engine.Voxels();
-  }
+  std::vector<uint32_t> Draw() { return DrawnLikeOracle(SceneOf(geometry_, transform_), target_); }
   static uint64_t Count(const std::vector<uint32_t>& voxels, uint32_t rgb) {
     return static_cast<uint64_t>(std::count(voxels.begin(), voxels.end(), rgb));
   }
 
   const Target target_ = CubeTarget(kSide);
   ModelGeometry geometry_;
-  SceneModel scene_;
+  Affine transform_;
 };
 
 INSTANTIATE_TEST_SUITE_P(Engines, Cells, testing::ValuesIn(EngineCases()),
@@ -77,7 +63,7 @@ TEST_P(Cells, AreVoxelsWhereTheLatticesAreOne) {
 }
 
 TEST_P(Cells, AreCubesOfTheTransformsSize) {
-  for (int a = 0; a < 3; ++a) transform().m[a * 4 + a] = 3;
+  for (int a = 0; a < 3; ++a) transform_.m[a * 4 + a] = 3;
   Add(1, 2, 3, kRed);
   Add(2, 2, 3, kGreen);
   const std::vector<uint32_t> voxels = Draw();
@@ -111,8 +97,8 @@ TEST_P(Cells, SmallerThanVoxelsAreStillSeen) {
   Turn(0.01);
   Add(0, 0, 0, kRed);
   EXPECT_EQ(Count(Draw(), kRed), 1u);
-  for (double& number : transform().m) number = 0;
-  for (int a = 0; a < 3; ++a) transform().m[a * 4 + 3] = 7.5;
+  for (double& number : transform_.m) number = 0;
+  for (int a = 0; a < 3; ++a) transform_.m[a * 4 + 3] = 7.5;
   EXPECT_EQ(Count(Draw(), kRed), 1u) << "flattened to one place";
 }
 

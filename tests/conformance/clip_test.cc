@@ -65,14 +65,7 @@ class EngineClip : public EngineConformance {
  protected:
   // What is lit of a scene under a view, by the engine; by the oracle it is the same.
   uint64_t Lit(const SceneModel& scene, const Target& target) {
-    EngineDriver engine = Make();
-    DeltaBuffer delta;
-    delta.PutWhole(scene);
-    EXPECT_TRUE(engine.SetTarget(target).ok());
-    const absl::Status applied = engine.Apply(delta);
-    EXPECT_TRUE(applied.ok()) << applied;
-    ExpectLikeOracle(engine, scene, target);
-    return CountLit(engine.Voxels());
+    return CountLit(DrawnLikeOracle(scene, target));
   }
   uint64_t LitWith(const std::vector<ClipPlane>& planes, const Affine& view = {}) {
     SceneModel scene = BoxScene();

@@ -60,6 +60,16 @@ inline ModelGeometry SolidBox(uint64_t id, std::array<float, 3> center, std::arr
   return g;
 }
 
+// Alone in a layer.
+inline SceneModel SceneOf(const ModelGeometry& g, const Affine& transform = Affine()) {
+  SceneModel scene;
+  scene.layers[1].id = 1;
+  scene.geometries[1] = g;
+  scene.drawables[1] = {.id = 1, .geometry = 1, .layer = 1};
+  scene.drawables[1].transform = transform;
+  return scene;
+}
+
 inline uint64_t CountLit(const std::vector<uint32_t>& voxels) {
   uint64_t lit = 0;
   for (uint32_t rgb : voxels) lit += rgb != 0;
@@ -80,6 +90,17 @@ class EngineConformance : public testing::TestWithParam<EngineCase> {
     ASSERT_EQ(FirstDifference(voxels, want, target), "");
     EXPECT_EQ(frame->lit_voxels, CountLit(voxels));
     ASSERT_TRUE(engine.pictures() == OraclePictures(want, target)) << "pictures differ";
+  }
+  // Its voxels, drawn whole by a new engine; by the oracle they are the same.
+  std::vector<uint32_t> DrawnLikeOracle(const SceneModel& scene, const Target& target) {
+    EngineDriver engine = Make();
+    DeltaBuffer whole;
+    whole.PutWhole(scene);
+    EXPECT_TRUE(engine.SetTarget(target).ok());
+    const absl::Status applied = engine.Apply(whole);
+    EXPECT_TRUE(applied.ok()) << applied;
+    ExpectLikeOracle(engine, scene, target);
+    return engine.Voxels();
   }
 };
 

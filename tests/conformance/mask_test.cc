@@ -1,5 +1,7 @@
 // Layers that are seen only where another covers.
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "tests/conformance/conformance_test.h"
 
@@ -27,20 +29,9 @@ class Masks : public EngineConformance {
   }
 
   // Voxels of one colour when the scene is drawn whole, as the oracle has them.
-  uint64_t Count(uint32_t rgb) {
-    EngineDriver engine = Make();
-    DeltaBuffer whole;
-    whole.PutWhole(scene_);
-    EXPECT_TRUE(engine.SetTarget(target_).ok());
-    const absl::Status applied = engine.Apply(whole);
-    EXPECT_TRUE(applied.ok()) << applied;
-    ExpectLikeOracle(engine, scene_, target_);
-    return Count(engine, rgb);
-  }
-  static uint64_t Count(EngineDriver& engine, uint32_t rgb) {
-    uint64_t count = 0;
-    for (const uint32_t voxel : engine.Voxels()) count += voxel == rgb;
-    return count;
+  uint64_t Count(uint32_t rgb) { return Count(DrawnLikeOracle(scene_, target_), rgb); }
+  static uint64_t Count(const std::vector<uint32_t>& voxels, uint32_t rgb) {
+    return static_cast<uint64_t>(std::count(voxels.begin(), voxels.end(), rgb));
   }
 
   const Target target_ = CubeTarget(kSide);
@@ -122,7 +113,7 @@ TEST_P(Masks, ChangesOfEitherShow) {
   const auto red_after = [&](const DeltaBuffer& delta) {
     EXPECT_TRUE(engine.Apply(delta).ok());
     ExpectLikeOracle(engine, scene_, target_);
-    return Count(engine, kRed);
+    return Count(engine.Voxels(), kRed);
   };
   const auto put_layer = [&](uint64_t id) {
     DeltaBuffer delta;

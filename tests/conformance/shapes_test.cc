@@ -190,13 +190,8 @@ class MeasuredShapes : public EngineConformance {
       g.record.params[a] = static_cast<float>(shape.min[a]);
       g.record.params[3 + a] = static_cast<float>(shape.max[a]);
     }
-    SceneModel scene;
-    scene.layers[1].id = 1;
-    scene.geometries[1] = g;
-    scene.drawables[1] = {.id = 1, .geometry = 1, .layer = 1};
-    scene.drawables[1].transform = map;
     DeltaBuffer delta;
-    delta.PutWhole(scene);
+    delta.PutWhole(SceneOf(g, map));
     EXPECT_TRUE(engine_.Apply(delta).ok());
     EXPECT_EQ(engine_.Frame().status(), absl::OkStatus());
     return engine_.Voxels();

@@ -127,13 +127,8 @@ TEST_P(Sides, OfNeighboursOnDifferentOnesOneIsLit) {
       for (const SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
         g.record.thickness = thickness;
         g.record.rule = rule;
-        SceneModel scene;
-        scene.layers[1].id = 1;
-        scene.geometries[1] = g;
-        scene.drawables[1] = {.id = 1, .geometry = 1, .layer = 1};
-        scene.drawables[1].transform = map;
         DeltaBuffer delta;
-        delta.PutWhole(scene);
+        delta.PutWhole(SceneOf(g, map));
         ASSERT_TRUE(engine.Apply(delta).ok());
         ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
         const std::vector<uint32_t> voxels = engine.Voxels();

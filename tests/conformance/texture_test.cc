@@ -43,20 +43,10 @@ class Textures : public EngineConformance {
 
   // All that is drawn is in the plane, and what each of its voxels must be; as the oracle has it.
   void ExpectPlane(const ModelGeometry& g, const Want& want, uint32_t tint = 0xFFFFFF) {
-    SceneModel scene;
-    scene.layers[1].id = 1;
-    scene.geometries[1] = g;
-    scene.drawables[1] = {.id = 1, .geometry = 1, .layer = 1};
+    SceneModel scene = SceneOf(g);
     scene.drawables[1].tint = tint;
-    const Target target = CubeTarget(kSide);
-    EngineDriver engine = Make();
-    DeltaBuffer whole;
-    whole.PutWhole(scene);
-    ASSERT_TRUE(engine.SetTarget(target).ok());
-    const absl::Status applied = engine.Apply(whole);
-    ASSERT_TRUE(applied.ok()) << applied;
-    ExpectLikeOracle(engine, scene, target);
-    const std::vector<uint32_t> voxels = engine.Voxels();
+    const std::vector<uint32_t> voxels = DrawnLikeOracle(scene, CubeTarget(kSide));
+    ASSERT_EQ(voxels.size(), static_cast<size_t>(kSide) * kSide * kSide);
     size_t at = 0;
     for (int32_t z = 0; z < kSide; ++z) {
       for (int32_t y = 0; y < kSide; ++y) {
