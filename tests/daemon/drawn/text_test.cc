@@ -1,0 +1,178 @@
+// Letters against their outlines, as the fonts have them, in double precision: what these hold by the even-odd rule, from the front
+// to the back; flat; and as lines. From the fonts that the tests' machines have (fonts-dejavu-core).
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "gpu/curves/cut.h"
+#include "tests/daemon/drawn/drawn.h"
+
+namespace voxeld::daemon::drawn {
+namespace {
+
+constexpr int32_t kSize = 64;
+constexpr double kScale = 4;
+constexpr double kHeight = 7.5;  // of capital letters, units
+constexpr const char* kText = "g8\xC3\x85";
+// Letters' curves are cut into pieces no farther from them than this, capital heights.
+constexpr double kFlatness = 1.0 / 1500;
+
+struct Point {
+  double x, y;
+};
+using Ring = std::vector<Point>;
+
+Point BezierAt(const text::OutlinePoint* p, double t) {
+  const double s = 1 - t, w[] = {s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t};
+  Point at = {0, 0};
+  for (int i = 0; i < 4; ++i) at = {at.x + w[i] * p[i].x, at.y + w[i] * p[i].y};
+  return at;
+}
+
+// In capital heights, where the text stands.
+struct Letter {
+  std::vector<Ring> rings;
+
+  // How far from the outline, and whether within.
+  double Distance(const Point& p, bool* inside) const {
+    double square = 1e9;
+    *inside = false;
+    for (const Ring& ring : rings) {
+      for (size_t i = 0; i < ring.size(); ++i) {
+        const Point& a = ring[i];
+        const Point& b = ring[(i + 1) % ring.size()];
+        const double dx = b.x - a.x, dy = b.y - a.y, length2 = dx * dx + dy * dy;
+        if (length2 == 0) continue;
+        const double t = std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / length2, 0.0, 1.0);
+        const double u = p.x - a.x - t * dx, v = p.y - a.y - t * dy;
+        square = std::min(square, u * u + v * v);
+        // Edges that a ray upwards meets.
+        if ((a.x > p.x) != (b.x > p.x) && a.y + (p.x - a.x) / dx * dy > p.y) *inside = !*inside;
+      }
+    }
+    return std::sqrt(square);
+  }
+};
+
+class DrawnText : public DrawnPrimitives {
+ protected:
+  DrawnText() : DrawnPrimitives(kSize) {
+    const absl::StatusOr<text::LaidOut> laid = fonts_.Lay(kText, {});
+    EXPECT_TRUE(laid.ok()) << laid.status();
+    for (const text::PlacedGlyph& placed : laid->glyphs) {
+      Letter& letter = letters_.emplace_back();
+      for (const text::Contour& contour : placed.glyph->contours) {
+        Ring& ring = letter.rings.emplace_back();
+        for (size_t i = 0; i + 4 <= contour.size(); i += 4) {
+          for (int k = 0; k < kPieces; ++k) {
+            const Point p = BezierAt(&contour[i], k / double{kPieces});
+            ring.push_back({placed.x + p.x, placed.y + p.y});
+          }
+        }
+      }
+    }
+    EXPECT_EQ(letters_.size(), 3u);
+  }
+
+  static P Text() {
+    P p;
+    v1::Text* const text = p.mutable_text();
+    text->set_text(kText);
+    text->set_height(kHeight);
+    Set(text->mutable_position(), kPosition);
+    Set(text->mutable_facing(), kFacing);
+    Set(text->mutable_up(), kUp);
+    return p;
+  }
+  // Of a place in units: x along the line, y up, z to the reader, in capital heights.
+  static Vector InText(const Vector& p) {
+    const Vector z = Unit(kFacing);
+    const Vector y = Unit(kUp - gpu::implicit::Dot(kUp, z) * z), x = gpu::implicit::Cross(y, z);
+    const Vector d = 1 / kHeight * (p - kPosition);
+    return {gpu::implicit::Dot(d, x), gpu::implicit::Dot(d, y), gpu::implicit::Dot(d, z)};
+  }
+  static Vector FromText(const Point& p) {
+    const Vector z = Unit(kFacing);
+    const Vector y = Unit(kUp - gpu::implicit::Dot(kUp, z) * z), x = gpu::implicit::Cross(y, z);
+    return kPosition + kHeight * (p.x * x + p.y * y);
+  }
+  // Letters between two depths, towards the reader, voxels.
+  void ExpectBetween(const Drawn& drawn, double back, double front) const {
+    constexpr double kVoxel = 1 / (kHeight * kScale);  // capital heights
+    constexpr double kDoubt = kFlatness + kSnapped * kVoxel;
+    uint64_t lit = 0, judged = 0, wrong = 0;
+    drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
+      const Vector p = InText(placed_.Back(x, y, z));
+      lit += drawn.Lit(x, y, z);
+      const double beyond = std::max(back * kVoxel - p.z, p.z - front * kVoxel);
+      if (std::fabs(beyond) < kDoubt) return;
+      bool want = false, doubtful = false;
+      for (const Letter& letter : letters_) {
+        if (beyond > 0) break;
+        bool inside;
+        doubtful = doubtful || letter.Distance({p.x, p.y}, &inside) < kDoubt;
+        want = want || inside;
+      }
+      if (doubtful) return;
+      ++judged;
+      wrong += drawn.Lit(x, y, z) != want;
+    });
+    EXPECT_GT(lit, 1000u);
+    EXPECT_GT(judged, uint64_t{kSize} * kSize * kSize * 9 / 10);
+    EXPECT_EQ(wrong, 0u);
+  }
+
+  static constexpr int kPieces = 16;
+  static constexpr Vector kPosition = {-6.5, -2, -1}, kFacing = {0.2, -0.5, 2}, kUp = {0.3, 1, 0};
+  const Placement placed_ = Placed(0.3, kScale, kSize / 2, 0.2);
+  std::vector<Letter> letters_;
+};
+
+TEST_F(DrawnText, SolidLettersHoldWhatTheirOutlinesDo) {
+  P p = Text();
+  p.mutable_text()->set_depth(1.3);
+  ExpectBetween(Draw(p, placed_.map), -1.3 * kScale, 0);
+}
+
+TEST_F(DrawnText, FlatLettersAreAsThickAsTheyAreSaidToBe) {
+  P p = Text();
+  p.mutable_text()->mutable_thickness()->set_value(3);
+  ExpectBetween(Draw(p, placed_.map), -1.5, 1.5);
+}
+
+TEST_F(DrawnText, OutlinesAreWithinTheirRadius) {
+  constexpr double kRadius = 1.25;
+  P p = Text();
+  p.mutable_text()->set_style(v1::Text::OUTLINE);
+  p.mutable_text()->mutable_thickness()->set_value(2 * kRadius);
+  const Drawn drawn = Draw(p, placed_.map);
+  Distances distances(kSize, kRadius + 0.5);
+  for (const Letter& letter : letters_) {
+    for (const Ring& ring : letter.rings) {
+      for (size_t i = 0; i < ring.size(); ++i) {
+        const Point& a = ring[i];
+        const Point& b = ring[(i + 1) % ring.size()];
+        for (int k = 0; k < kPieces; ++k) {
+          const double t = k / double{kPieces};
+          distances.Add(placed_.Forth(FromText({a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)})));
+        }
+      }
+    }
+  }
+  // A sixteenth of a piece of an outline is at most a tenth of a voxel here.
+  constexpr double kError = gpu::kCurveError + kSnapped + 0.01;
+  uint64_t lit = 0, far = 0, missing = 0;
+  drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
+    const double d = distances.At(x, y, z);
+    lit += drawn.Lit(x, y, z);
+    far += drawn.Lit(x, y, z) && d > kRadius + kError;
+    missing += !drawn.Lit(x, y, z) && d < kRadius - kError;
+  });
+  EXPECT_GT(lit, 1000u);
+  EXPECT_EQ(far, 0u);
+  EXPECT_EQ(missing, 0u);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::drawn
