@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "tests/daemon/pictures/files.h"
 #include "tests/daemon/wire/requests.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -23,7 +24,11 @@ class RandomPrimitives {
     switch (kind) {
       case 0:
         *primitive.mutable_points()->mutable_vertices() = Corners(1 + random_() % most, false);
-        SetThickness(primitive.mutable_points());
+        primitive.mutable_points()->set_splat(
+            Pick({v1::Points::SPLAT_UNSPECIFIED, v1::Points::BALL, v1::Points::SOFT,
+                  v1::Points::CUBE, v1::Points::CELL}));
+        if (primitive.points().splat() != v1::Points::CELL)
+          SetThickness(primitive.mutable_points());
         break;
       case 1: {
         v1::Segments* segments = primitive.mutable_segments();
@@ -38,6 +43,7 @@ class RandomPrimitives {
       case 2:
         *primitive.mutable_mesh()->mutable_vertices() = Corners(3 * (1 + random_() % most), true);
         primitive.mutable_mesh()->set_rule(Rule());
+        if (random_() % 4 == 0) SetTexture(primitive.mutable_mesh());
         break;
       case 3:
         SetVec3(primitive.mutable_box()->mutable_center(), Coordinate(), Coordinate(),
@@ -99,6 +105,19 @@ class RandomPrimitives {
     out->set_rule(Rule());
   }
 
+  std::string Picture() {
+    const uint32_t width = 1 + random_() % 5, height = 1 + random_() % 5;
+    std::vector<uint32_t> pixels(size_t{width} * height);
+    for (uint32_t& pixel : pixels) pixel = random_();
+    return pictures::PngOf(width, height, pixels, random_() % 2 == 0);
+  }
+  void SetTexture(v1::Mesh* out) {
+    out->mutable_texture()->set_picture(Picture());
+    out->mutable_texture()->set_coordinates(Values<float>(size_t{2} * out->vertices().count(), [&] {
+      return std::uniform_real_distribution<>(-2, 3)(random_);
+    }));
+  }
+
   template <typename T>
   void SetShell(T* out) {
     out->set_rule(Rule());
@@ -119,6 +138,7 @@ class RandomPrimitives {
         map->set_heights(Values<float>(samples, [&] { return Coordinate(); }));
         if (random_() % 2 == 0)
           map->set_colors(Values<uint8_t>(3 * samples, [&] { return random_(); }));
+        if (random_() % 4 == 0) map->set_picture(Picture());
         return map->set_rule(Rule());
       }
       case 0:
