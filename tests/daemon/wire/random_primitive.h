@@ -69,6 +69,8 @@ class RandomPrimitives {
         break;
       case 7:
         primitive.mutable_instance()->set_object(absl::StrCat("o", random_() % 5));
+        if (random_() % 2 == 0)
+          primitive.mutable_instance()->mutable_tint()->set_rgb(random_() & 0xFFFFFF);
         break;
     }
     return primitive;

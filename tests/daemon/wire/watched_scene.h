@@ -22,14 +22,17 @@ namespace voxeld::daemon::wire {
 
 // Everything that decoding an entity's primitive gives.
 inline std::string InWords(const Content& content) {
-  if (const auto* instance = std::get_if<InstanceRef>(&content)) return "of " + instance->object;
+  if (const auto* instance = std::get_if<InstanceRef>(&content)) {
+    return absl::StrCat("of ", instance->object, " #", absl::Hex(instance->tint));
+  }
   const GeometryData& g = *std::get<GeometryPtr>(content);
   const gpu::GeometryRecord& r = g.record;
   std::string text = absl::StrCat(
       static_cast<int>(r.kind), " #", absl::Hex(r.color), " ", static_cast<int>(r.color_mode), " ",
       static_cast<int>(r.sampling), " ", static_cast<int>(r.rule), " ", static_cast<int>(r.fill),
       " ", static_cast<int>(r.topology), " ", static_cast<int>(r.thickness_unit), " ", r.thickness,
-      " ", r.vertex_count, " ", r.index_count, " ", static_cast<int>(r.drawn_by), " (");
+      " ", r.vertex_count, " ", r.index_count, " ", static_cast<int>(r.drawn_by), " ",
+      static_cast<int>(r.splat), " ", r.texture_width, " × ", r.texture_height, " (");
   for (const float param : r.params) absl::StrAppendFormat(&text, "%a ", param);
   for (int axis = 0; axis < 3; ++axis)
     absl::StrAppendFormat(&text, "%a-%a ", g.min[axis], g.max[axis]);
