@@ -171,7 +171,7 @@ TEST_P(Shifts, ByWholeVoxelsShiftEverything) {
   AddGrids(all);
   for (const auto& [name, geometry] : all) {
     SCOPED_TRACE(name + ", kind " + std::to_string(static_cast<uint32_t>(geometry.record.kind)));
-    // Places, and in the middle of a grid, that are none of the voxels'.
+    // Its middle, of a grid that of its samples, comes to a place that is no voxel's corner or centre.
     Placement placed = Placed(0.9, 1.07, 0, 0);
     const double half = geometry.record.kind == PrimitiveKind::kSamples ? 5.5 : 0;
     const Vector corner = placed.Forth({-half, -half, -half});
