@@ -170,7 +170,8 @@ def page() -> str:
         if elsewhere:
             out.append(f"**What it covers**, as others do: {'; '.join(elsewhere)}.\n")
         for text in shown.get(field, []):
-            out.append(f"```\nvoxelctl draw \"{text}\"\n```\n")
+            shapes = " \\\n    ".join(f'"{shape}"' for shape in re.split(r"(?<!\\)\\n", text))
+            out.append(f"```\nvoxelctl draw {shapes}\n```\n")
     out.append("## Types that several have\n")
     for message in ("Vertices", "Thickness", "Texture", "ColorScale", "Grid", "Transfer", "Expression", "Boundary"):
         above, fields = all_messages[message]

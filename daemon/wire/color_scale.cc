@@ -132,27 +132,34 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
   return {};
 }
 
-MaybeFault ToLevel(const FieldPath& path, const v1::ColorScale& in, const double min[3],
-                   const double max[3], gpu::implicit::Graph& graph,
-                   gpu::implicit::Graph::Node* level, ScaleTable* table) {
-  if (auto fault = ToTable(path, in, table)) return fault;
+MaybeFault ToScaleEnds(const FieldPath& path, const v1::ColorScale& in, const double min[3],
+                       const double max[3], ScaleEnds* out) {
   if (auto fault = ToEnds(path, in)) return fault;
   if (!in.scalars().empty()) {
     return Fault{FieldPath(path, "scalars").ToString(), Reason::kInvalidValue,
                  "is given, but the shape has no vertices; give along"};
   }
-  Vector along;
-  if (auto fault = ToAlong(path, in, &along)) return fault;
-  double low = in.low(), high = in.high();
-  if (low == high) {
-    low = high = 0;
-    for (int a = 0; a < 3; ++a) {
-      low += std::min(along[a] * min[a], along[a] * max[a]);
-      high += std::max(along[a] * min[a], along[a] * max[a]);
-    }
-    if (low == high) high = low + 1;
+  if (auto fault = ToAlong(path, in, &out->along)) return fault;
+  out->low = in.low();
+  out->high = in.high();
+  if (out->low != out->high) return {};
+  out->low = out->high = 0;
+  for (int a = 0; a < 3; ++a) {
+    out->low += std::min(out->along[a] * min[a], out->along[a] * max[a]);
+    out->high += std::max(out->along[a] * min[a], out->along[a] * max[a]);
   }
-  *level = graph.Mul(gpu::implicit::Along(graph, along, low), graph.Constant(1 / (high - low)));
+  if (out->low == out->high) out->high = out->low + 1;
+  return {};
+}
+
+MaybeFault ToLevel(const FieldPath& path, const v1::ColorScale& in, const double min[3],
+                   const double max[3], gpu::implicit::Graph& graph,
+                   gpu::implicit::Graph::Node* level, ScaleTable* table) {
+  ScaleEnds ends;
+  if (auto fault = ToTable(path, in, table)) return fault;
+  if (auto fault = ToScaleEnds(path, in, min, max, &ends)) return fault;
+  *level = graph.Mul(gpu::implicit::Along(graph, ends.along, ends.low),
+                     graph.Constant(1 / (ends.high - ends.low)));
   return {};
 }
 

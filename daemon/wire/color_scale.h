@@ -6,6 +6,7 @@
 
 #include "daemon/wire/check.h"
 #include "daemon/wire/context.h"
+#include "gpu/implicit/field_shape.h"
 #include "gpu/implicit/graph.h"
 
 namespace voxeld::v1 {
@@ -20,6 +21,15 @@ using ScaleTable = std::array<uint32_t, 256>;  // 0x00RRGGBB
 // Gives the vertices of `out`, which have none, the colours that `path`, a scale of the primitive's, says.
 MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
                           const DecodeContext& context, GeometryData* out);
+
+// What numbers a scale has along a direction: p · along, from low to high.
+struct ScaleEnds {
+  gpu::implicit::Vector along;  // divided by the square of its length
+  double low = 0, high = 1;
+};
+// Of a shape without vertices in `min` to `max`.
+MaybeFault ToScaleEnds(const FieldPath& path, const v1::ColorScale& in, const double min[3],
+                       const double max[3], ScaleEnds* out);
 
 // The level of a place, 0 to 1 from one end to the other, as a node, and the table of it. `min` and `max` are what
 // the shape lies in.

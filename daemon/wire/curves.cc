@@ -101,6 +101,16 @@ MaybeFault CheckVertexCount(const FieldPath& path, uint64_t count, const Limits&
                             limits.max_vertices_per_entity)};
 }
 
+// Which points of a patch are those of its surface, of the curves along its edges, or of its corners.
+std::span<const uint8_t> ControlPointsOf(v1::Fill fill) {
+  static constexpr uint8_t kAll[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  static constexpr uint8_t kEdges[] = {0, 1, 2, 3, 12, 13, 14, 15, 0, 4, 8, 12, 3, 7, 11, 15};
+  static constexpr uint8_t kCorners[] = {0, 3, 12, 15};
+  if (fill == v1::FILL_LINES) return kEdges;
+  if (fill == v1::FILL_DOTS) return kCorners;
+  return kAll;
+}
+
 }  // namespace
 
 MaybeFault SetSpans(const FieldPath& path, const gpu::Spans& spans, const DecodeContext& context,
@@ -169,12 +179,20 @@ MaybeFault ToSpline(const FieldPath& path, const v1::Curve& in, const DecodeCont
 MaybeFault ReadBezierSurface(const FieldPath& path, const v1::BezierSurface& in,
                              const DecodeContext& context, GeometryData* out) {
   out->record.kind = gpu::PrimitiveKind::kPatches;
+  bool framed;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  if (in.fill() == v1::FILL_SOLID) {
+    return Fault{FieldPath(path, "fill").ToString(), Reason::kInvalidValue,
+                 "is FILL_SOLID, but it has no inside; give FILL_SURFACE, FILL_LINES or FILL_DOTS"};
+  }
+  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
   return ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out);
 }
 
-MaybeFault ToPatches(const FieldPath& path, const DecodeContext& context, GeometryData* out) {
+MaybeFault ToPatches(const FieldPath& path, const v1::BezierSurface& in,
+                     const DecodeContext& context, GeometryData* out) {
   gpu::GeometryRecord& record = out->record;
+  const v1::Fill fill = in.fill();
   const FieldPath vertices(path, "vertices");
   const bool indexed = record.index_count != 0;
   const uint32_t corners = indexed ? record.index_count : record.vertex_count;
@@ -183,16 +201,34 @@ MaybeFault ToPatches(const FieldPath& path, const DecodeContext& context, Geomet
     return Fault{at.ToString(), Reason::kSizeMismatch,
                  absl::StrCat("is ", corners, "; give 16 for each patch")};
   }
-  if (!indexed) return {};
-  if (auto fault = CheckVertexCount(at, corners, context)) return fault;
+  const std::span<const uint8_t> kept = ControlPointsOf(fill);
+  const bool framed = fill == v1::FILL_LINES || fill == v1::FILL_DOTS;
+  if (!indexed && !framed) return {};
+  if (auto fault = CheckVertexCount(at, uint64_t{corners} / kPatchPoints * kept.size(), context)) {
+    return fault;
+  }
   const gpu::GeometryArrays read = out->arrays;
   std::vector<Vector> points;
   std::vector<uint32_t> colors;
-  for (const uint32_t index : read.indices()) {
-    points.push_back(PointOf(*out, index));
-    if (!read.colors().empty()) colors.push_back(read.colors()[index]);
+  for (uint32_t patch = 0; patch < corners; patch += kPatchPoints) {
+    for (size_t i = 0; i < kept.size(); ++i) {
+      const uint32_t place = patch + kept[i];
+      const uint32_t index = indexed ? read.indices()[place] : place;
+      points.push_back(PointOf(*out, index));
+      if (read.colors().empty()) continue;
+      // A curve has the colours of its ends, each at two of its points.
+      const uint32_t end =
+          fill == v1::FILL_LINES ? patch + kept[i / 2 % 2 == 0 ? i / 4 * 4 : i / 4 * 4 + 3] : place;
+      colors.push_back(read.colors()[indexed ? read.indices()[end] : end]);
+    }
   }
   record.index_count = 0;
+  if (fill == v1::FILL_LINES) {
+    record.kind = gpu::PrimitiveKind::kCurves;
+    record.topology = gpu::Topology::kList;
+  } else if (fill == v1::FILL_DOTS) {
+    record.kind = gpu::PrimitiveKind::kPoints;
+  }
   return SetPoints(vertices, points, colors, context.pool, out);
 }
 

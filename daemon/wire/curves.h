@@ -32,7 +32,8 @@ MaybeFault ToSpline(const FieldPath& path, const v1::Curve& in, const DecodeCont
                     GeometryData* out);
 MaybeFault ReadBezierSurface(const FieldPath& path, const v1::BezierSurface& in,
                              const DecodeContext& context, GeometryData* out);
-MaybeFault ToPatches(const FieldPath& path, const DecodeContext& context, GeometryData* out);
+MaybeFault ToPatches(const FieldPath& path, const v1::BezierSurface& in,
+                     const DecodeContext& context, GeometryData* out);
 
 // Cubic Béziers, cut as the record says.
 MaybeFault SetSpans(const FieldPath& path, const gpu::Spans& spans, const DecodeContext& context,

@@ -138,20 +138,6 @@ void FillIndices(const gpu::GeometryRecord& record, const v1::HeightMap& in,
   if (record.kind == gpu::PrimitiveKind::kSegments) FillLines(in.columns(), in.rows(), out);
 }
 
-// From edge to edge, whatever the heights.
-MaybeFault AddPicture(const FieldPath& path, const v1::HeightMap& in, const DecodeContext& context,
-                      GeometryData* out) {
-  std::vector<float> places;
-  places.reserve(size_t{2} * out->record.vertex_count);
-  for (uint32_t row = 0; row < in.rows(); ++row) {
-    for (uint32_t column = 0; column < in.columns(); ++column) {
-      places.push_back(static_cast<float>(column / (in.columns() - 1.0)));
-      places.push_back(static_cast<float>(row / (in.rows() - 1.0)));
-    }
-  }
-  return wire::AddPicture(FieldPath(path, "picture"), in.picture(), places, context, out);
-}
-
 }  // namespace
 
 MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const DecodeContext& context,
@@ -207,7 +193,22 @@ MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const Dec
     rgb = uint32_t{color[0]} << 16 | uint32_t{color[1]} << 8 | color[2];
     color += 3;
   }
-  return in.picture().empty() ? MaybeFault() : AddPicture(path, in, context, out);
+  return {};
+}
+
+// From edge to edge, whatever the heights.
+MaybeFault AddHeightMapPicture(const FieldPath& path, const v1::HeightMap& in,
+                               const DecodeContext& context, GeometryData* out) {
+  if (in.picture().empty()) return {};
+  std::vector<float> places;
+  places.reserve(size_t{2} * out->record.vertex_count);
+  for (uint32_t row = 0; row < in.rows(); ++row) {
+    for (uint32_t column = 0; column < in.columns(); ++column) {
+      places.push_back(static_cast<float>(column / (in.columns() - 1.0)));
+      places.push_back(static_cast<float>(row / (in.rows() - 1.0)));
+    }
+  }
+  return AddPicture(FieldPath(path, "picture"), in.picture(), places, context, out);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/colormaps/colormaps.h"
+#include "daemon/wire/boundary.h"
 #include "daemon/wire/expression.h"
 #include "daemon/wire/fields.h"
 #include "voxeld/v1/primitives.pb.h"
@@ -55,28 +56,6 @@ MaybeFault ToParameters(const FieldPath& path, const v1::Implicit& in, const Lim
     }
     (*out)[names[i]] = value;
   }
-  return {};
-}
-
-MaybeFault ToBoundary(const FieldPath& path, const v1::Boundary& in, const Limits& limits,
-                      ProgramSource* source, std::vector<uint32_t>* ends,
-                      std::vector<float>* points) {
-  switch (in.axis()) {
-    case v1::Boundary::AXIS_UNSPECIFIED:
-    case v1::Boundary::Z:
-      source->ring_axis = 2;
-      break;
-    case v1::Boundary::X:
-      source->ring_axis = 0;
-      break;
-    case v1::Boundary::Y:
-      source->ring_axis = 1;
-      break;
-    default:
-      return UnknownEnum(FieldPath(path, "axis"), in.axis(), "X, Y, Z");
-  }
-  if (auto fault = ToRings(path, in.points(), in.ends(), limits, ends)) return fault;
-  for (const double number : in.points()) points->push_back(static_cast<float>(number));
   return {};
 }
 
@@ -136,43 +115,6 @@ MaybeFault ToDomain(const FieldPath& path, const v1::Box3& in, Graph& graph, Gra
 }
 
 }  // namespace
-
-MaybeFault ToRings(const FieldPath& path, const google::protobuf::RepeatedField<double>& points,
-                   const google::protobuf::RepeatedField<uint32_t>& ends, const Limits& limits,
-                   std::vector<uint32_t>* out) {
-  const FieldPath at(path, "points");
-  if (points.size() % 3 != 0 || points.size() == 0) {
-    return Fault{at.ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", points.size(), " numbers; give x, y and z of each vertex")};
-  }
-  if (static_cast<uint32_t>(points.size()) / 3 > limits.max_boundary_points) {
-    return Fault{at.ToString(), Reason::kQuotaExceeded,
-                 absl::StrCat("has ", points.size() / 3, " vertices; max_boundary_points allows ",
-                              limits.max_boundary_points)};
-  }
-  for (int i = 0; i < points.size(); ++i) {
-    if (auto fault = CheckFloat(FieldPath(path, "points", i), points[i])) return fault;
-  }
-  const uint32_t vertices = static_cast<uint32_t>(points.size() / 3);
-  out->assign(ends.begin(), ends.end());
-  if (out->empty()) out->push_back(vertices);
-  uint32_t begin = 0;
-  for (size_t i = 0; i < out->size(); ++i) {
-    const uint32_t end = (*out)[i];
-    if (end < begin + 3 || end > vertices) {
-      return Fault{FieldPath(path, "ends", static_cast<int64_t>(i)).ToString(),
-                   Reason::kIndexOutOfRange,
-                   absl::StrCat("is ", end, "; a curve has 3 vertices at least: give ", begin + 3,
-                                " to ", vertices)};
-    }
-    begin = end;
-  }
-  if (begin != vertices) {
-    return Fault{FieldPath(path, "ends").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("ends with ", begin, "; there are ", vertices, " vertices")};
-  }
-  return {};
-}
 
 MaybeFault ToProgram(const FieldPath& path, const gpu::implicit::Graph& graph,
                      const ProgramSource& source, const std::vector<float>& ring_points,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/basic_shapes.h"
 #include "daemon/wire/color_scale.h"
 #include "daemon/wire/curves.h"
 #include "daemon/wire/encode_primitive.h"
@@ -98,7 +99,7 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Decod
     return BadCorners(path, record, "a LIST of segments takes two corners each: an even number");
   }
   if (Corners(record) < 2) return BadCorners(path, record, "give at least 2 corners");
-  return {};
+  return ToElementColors(FieldPath(path, "vertices"), in.vertices(), context, out);
 }
 
 // An open one keeps its surface.
@@ -142,90 +143,13 @@ MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext
   if (Corners(out->record) % 3 != 0) {
     return BadCorners(path, out->record, "triangles take three corners each: a multiple of 3");
   }
+  const FieldPath vertices(path, "vertices");
+  if (in.has_texture() && in.vertices().colors_of() == v1::Vertices::ELEMENTS) {
+    return Fault{FieldPath(vertices, "colors_of").ToString(), Reason::kInvalidValue,
+                 "is ELEMENTS, but a texture lies on vertices; give VERTICES"};
+  }
+  if (auto fault = ToElementColors(vertices, in.vertices(), context, out)) return fault;
   return out->record.fill == gpu::Fill::kSolid ? FillMesh(path, context, out) : MaybeFault();
-}
-
-template <typename Message>
-gpu::implicit::Vector MiddleOf(const Message& in) {
-  return {in.center().x(), in.center().y(), in.center().z()};
-}
-
-// Writes centre and bounds: `half` is how far the shape reaches from its centre along each axis.
-void SetExtent(const v1::Vec3& center, const double (&half)[3], GeometryData* out) {
-  const double middle[3] = {center.x(), center.y(), center.z()};
-  for (int axis = 0; axis < 3; ++axis) {
-    out->record.params[axis] = static_cast<float>(middle[axis]);
-    out->min[axis] = double{out->record.params[axis]} - half[axis];
-    out->max[axis] = double{out->record.params[axis]} + half[axis];
-  }
-}
-
-MaybeFault ToBox(const FieldPath& path, const v1::Box& in, const DecodeContext& context,
-                 GeometryData* out) {
-  bool framed;
-  out->record.kind = gpu::PrimitiveKind::kBox;
-  if (auto fault = CheckVec3(FieldPath(path, "center"), in.center())) return fault;
-  if (auto fault = CheckSize(FieldPath(path, "size"), in.size())) return fault;
-  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
-  if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  if (framed) {
-    const gpu::implicit::Vector middle = MiddleOf(in);
-    const auto frame = gpu::WireFrameOf(gpu::Parallelepiped{
-        middle, {{in.size().x(), 0, 0}, {0, in.size().y(), 0}, {0, 0, in.size().z()}}});
-    return ToWireFrame(path, frame, in.fill() == v1::FILL_DOTS, context, out);
-  }
-  const double size[3] = {in.size().x(), in.size().y(), in.size().z()};
-  double half[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    out->record.params[3 + axis] = static_cast<float>(size[axis]);
-    half[axis] = double{out->record.params[3 + axis]} / 2;
-  }
-  SetExtent(in.center(), half, out);
-  return {};
-}
-
-MaybeFault ToSphere(const FieldPath& path, const v1::Sphere& in, const DecodeContext& context,
-                    GeometryData* out) {
-  bool framed;
-  out->record.kind = gpu::PrimitiveKind::kSphere;
-  if (auto fault = CheckVec3(FieldPath(path, "center"), in.center())) return fault;
-  if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
-  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
-  if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  if (framed) {
-    const gpu::implicit::Vector middle = MiddleOf(in);
-    const auto frame =
-        gpu::WireFrameOf(gpu::Ellipsoid{middle, {in.radius(), in.radius(), in.radius()}});
-    return ToWireFrame(path, frame, in.fill() == v1::FILL_DOTS, context, out);
-  }
-  const float radius = static_cast<float>(in.radius());
-  out->record.params[3] = radius;
-  SetExtent(in.center(), {radius, radius, radius}, out);
-  return {};
-}
-
-MaybeFault ToCylinder(const FieldPath& path, const v1::Cylinder& in, const DecodeContext& context,
-                      GeometryData* out) {
-  bool framed;
-  out->record.kind = gpu::PrimitiveKind::kCylinder;
-  if (auto fault = CheckVec3(FieldPath(path, "center"), in.center())) return fault;
-  if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
-  if (auto fault = CheckPositive(FieldPath(path, "height"), in.height())) return fault;
-  if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
-  if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  if (framed) {
-    const gpu::implicit::Vector middle = MiddleOf(in);
-    const auto frame = gpu::WireFrameOf(
-        gpu::Cone{middle - gpu::implicit::Vector{0, 0, in.height() / 2},
-                  middle + gpu::implicit::Vector{0, 0, in.height() / 2}, in.radius(), in.radius()});
-    return ToWireFrame(path, frame, in.fill() == v1::FILL_DOTS, context, out);
-  }
-  const float radius = static_cast<float>(in.radius());
-  const float height = static_cast<float>(in.height());
-  out->record.params[3] = radius;
-  out->record.params[4] = height;
-  SetExtent(in.center(), {radius, radius, double{height} / 2}, out);
-  return {};
 }
 
 MaybeFault ToRgb(const FieldPath& path, const v1::Color& in, uint32_t* out) {
@@ -272,11 +196,11 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
     case v1::Primitive::kMesh:
       return ToMesh(FieldPath(path, "mesh"), in.mesh(), context, out);
     case v1::Primitive::kBox:
-      return ToBox(FieldPath(path, "box"), in.box(), context, out);
+      return ToBox(FieldPath(path, "box"), in.box(), shape, out);
     case v1::Primitive::kSphere:
-      return ToSphere(FieldPath(path, "sphere"), in.sphere(), context, out);
+      return ToSphere(FieldPath(path, "sphere"), in.sphere(), shape, out);
     case v1::Primitive::kCylinder:
-      return ToCylinder(FieldPath(path, "cylinder"), in.cylinder(), context, out);
+      return ToCylinder(FieldPath(path, "cylinder"), in.cylinder(), shape, out);
     case v1::Primitive::kImplicit:
       return ToImplicit(FieldPath(path, "implicit"), in.implicit(), context, out);
     case v1::Primitive::kEllipsoid:
@@ -335,7 +259,8 @@ bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
     case v1::Primitive::kBox:
     case v1::Primitive::kSphere:
     case v1::Primitive::kCylinder:
-      return data.record.vertex_count != 0;  // as lines or dots
+      return data.record.vertex_count != 0 ||  // as lines or dots
+             data.record.kind == gpu::PrimitiveKind::kImplicit;
     default:
       return true;
   }
@@ -363,7 +288,9 @@ std::string AsRead(const v1::Primitive& in, const GeometryData& data) {
 MaybeFault Convert(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
                    GeometryData* out) {
   if (in.has_curve()) return ToSpline(FieldPath(path, "curve"), in.curve(), context, out);
-  if (in.has_bezier_surface()) return ToPatches(FieldPath(path, "bezier_surface"), context, out);
+  if (in.has_bezier_surface()) {
+    return ToPatches(FieldPath(path, "bezier_surface"), in.bezier_surface(), context, out);
+  }
   const FieldPath mesh(path, "mesh");
   if (in.mesh().has_texture()) {
     return ToTexture(FieldPath(mesh, "texture"), in.mesh().texture(), context, out);
@@ -374,35 +301,36 @@ MaybeFault Convert(const FieldPath& path, const v1::Primitive& in, const DecodeC
 MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
                     GeometryData* out) {
   const FieldPath scale(path, "color_scale");
+  const bool implicit = out != nullptr && out->record.kind == gpu::PrimitiveKind::kImplicit;
   switch (in.kind_case()) {
     case v1::Primitive::kPoints:
     case v1::Primitive::kSegments:
     case v1::Primitive::kMesh:
     case v1::Primitive::kCurve:
+    case v1::Primitive::kBezierSurface:
+    case v1::Primitive::kHeightMap:
       if (in.has_mesh() && in.mesh().fill() == v1::FILL_SOLID) {
         return Fault{scale.ToString(), Reason::kInvalidValue,
                      "is given for a mesh that is FILL_SOLID, which has one colour; leave it out, "
                      "and draw the surface in colours as another entity"};
       }
       return ToVertexColors(scale, in.color_scale(), context, out);
-    case v1::Primitive::kEllipsoid:
-    case v1::Primitive::kTorus:
-    case v1::Primitive::kCone:
-    case v1::Primitive::kParallelepiped:
-    case v1::Primitive::kDisc:
-    case v1::Primitive::kPatch:
-    case v1::Primitive::kPolygon:
-    case v1::Primitive::kArrow:
-      if (out->record.kind == gpu::PrimitiveKind::kImplicit) return {};  // they have them
+    case v1::Primitive::kImplicit:
+    case v1::Primitive::kVolume:
+    case v1::Primitive::kIsosurface:
       break;
     default:
-      break;
+      if (implicit) return {};  // it has them
+      if (!in.color_scale().scalars().empty()) {
+        return Fault{FieldPath(scale, "scalars").ToString(), Reason::kInvalidValue,
+                     "is given, but the shape has no vertices; give along"};
+      }
+      return ToVertexColors(scale, in.color_scale(), context, out);
   }
   return Fault{
       scale.ToString(), Reason::kInvalidValue,
       absl::StrCat("is given, but ", in.GetDescriptor()->FindFieldByNumber(in.kind_case())->name(),
-                   " takes none here; points, segments, meshes, curves and shapes of one "
-                   "colour do, among them ellipsoid, cone and parallelepiped")};
+                   " takes none; leave it out")};
 }
 
 MaybeFault ToSamples(const FieldPath& path, const v1::Primitive& in, uint32_t color,
@@ -428,8 +356,8 @@ MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const Deco
     if (auto fault = ToRgb(FieldPath(path, "color"), in.color(), &color)) return fault;
   }
   if (in.has_text() || in.has_volume() || in.has_isosurface()) {
-    if (in.has_color_scale()) return ToColors(path, in, context, nullptr);
-    if (in.has_text()) return ToText(FieldPath(path, "text"), in, color, context, out);
+    if (in.has_color_scale() && !in.has_text()) return ToColors(path, in, context, nullptr);
+    if (in.has_text()) return ToText(path, in, color, context, out);
     return ToSamples(path, in, color, context, out);
   }
   auto data = std::make_shared<GeometryData>();
@@ -439,6 +367,12 @@ MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const Deco
   if (converted) data->as_sent = AsRead(in, *data);
   if (in.has_color_scale()) {
     if (auto fault = ToColors(path, in, context, data.get())) return fault;
+  }
+  if (in.has_height_map()) {
+    if (auto fault = AddHeightMapPicture(FieldPath(path, "height_map"), in.height_map(), context,
+                                         data.get())) {
+      return fault;
+    }
   }
   if (converted) {
     if (auto fault = Convert(path, in, context, data.get())) return fault;

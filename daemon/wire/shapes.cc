@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/boundary.h"
 #include "daemon/wire/color_scale.h"
 #include "daemon/wire/curves.h"
 #include "daemon/wire/fields.h"

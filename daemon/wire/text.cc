@@ -14,6 +14,7 @@
 #include "daemon/text/fonts.h"
 #include "daemon/text/line_break.h"
 #include "daemon/text/stroke_font.h"
+#include "daemon/wire/color_scale.h"
 #include "daemon/wire/curves.h"
 #include "daemon/wire/fields.h"
 #include "daemon/wire/shapes.h"
@@ -125,14 +126,8 @@ void Flatten(const text::Contour& contour, std::vector<Vector>* out) {
   for (size_t i = 0; i + 4 <= contour.size(); i += 4) {
     Vector p[4];
     for (size_t k = 0; k < 4; ++k) p[k] = {contour[i + k].x, contour[i + k].y, 0};
-    const double bend = std::max(gpu::implicit::Length(p[0] - 2 * p[1] + p[2]),
-                                 gpu::implicit::Length(p[1] - 2 * p[2] + p[3]));
-    const int parts = std::max(1, static_cast<int>(std::ceil(std::sqrt(0.75 * bend / kFlatness))));
-    for (int k = 0; k < parts; ++k) {
-      const double t = static_cast<double>(k) / parts, s = 1 - t;
-      out->push_back(s * s * s * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] +
-                     t * t * t * p[3]);
-    }
+    const double parts = gpu::PartsOfSpan(p, kFlatness);
+    for (double k = 0; k < parts; ++k) out->push_back(gpu::OnSpan(p, k / parts));
   }
 }
 
@@ -159,6 +154,24 @@ MaybeFault ToLetter(const FieldPath& path, const text::Glyph& glyph, double dept
   return ToField(path, context, graph, gpu::Polygon{points, ends}.Make(graph), out);
 }
 
+// Of all its parts, thickness left out.
+void SetBounds(const Place& place, GroupData* out) {
+  bool first = true;
+  for (int a = 0; a < 3; ++a) out->min[a] = out->max[a] = place.origin[a];  // of nothing
+  for (const GroupData::Part& part : out->parts) {
+    Bounds box;
+    box.empty = false;
+    std::copy_n(part.geometry->min, 3, box.min);
+    std::copy_n(part.geometry->max, 3, box.max);
+    const Bounds mapped = MapBounds(part.transform, box);
+    for (int a = 0; a < 3; ++a) {
+      out->min[a] = first ? mapped.min[a] : std::min(out->min[a], mapped.min[a]);
+      out->max[a] = first ? mapped.max[a] : std::max(out->max[a], mapped.max[a]);
+    }
+    first = false;
+  }
+}
+
 MaybeFault ToLetters(const FieldPath& path, const text::LaidOut& laid, const Place& place,
                      double depth, const gpu::GeometryRecord& look, const DecodeContext& context,
                      GroupData* out) {
@@ -183,23 +196,59 @@ MaybeFault ToLetters(const FieldPath& path, const text::LaidOut& laid, const Pla
   std::stable_sort(out->parts.begin(), out->parts.end(), [](const auto& a, const auto& b) {
     return a.geometry.get() < b.geometry.get();
   });
-  bool first = true;
-  for (int a = 0; a < 3; ++a) out->min[a] = out->max[a] = place.origin[a];  // of nothing
-  for (const GroupData::Part& part : out->parts) {
-    Bounds box;
-    box.empty = false;
-    std::copy_n(part.geometry->min, 3, box.min);
-    std::copy_n(part.geometry->max, 3, box.max);
-    const Bounds mapped = MapBounds(part.transform, box);
-    for (int a = 0; a < 3; ++a) {
-      out->min[a] = first ? mapped.min[a] : std::min(out->min[a], mapped.min[a]);
-      out->max[a] = first ? mapped.max[a] : std::max(out->max[a], mapped.max[a]);
-    }
-    first = false;
-  }
+  SetBounds(place, out);
   return {};
 }
 
+// The scale of a part, in the part's own coordinates, where `scale` has its ends.
+v1::ColorScale ScaleOf(const v1::ColorScale& scale, const gpu::Affine& part) {
+  const double along[3] = {scale.along().x(), scale.along().y(), scale.along().z()};
+  const double square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
+  Vector rise;  // of the number, by each of the part's units
+  double start = 0;
+  for (int a = 0; a < 3; ++a) {
+    rise = rise + along[a] / square * Vector{part.m[a * 4], part.m[a * 4 + 1], part.m[a * 4 + 2]};
+    start += along[a] / square * part.m[a * 4 + 3];
+  }
+  // Along a part nothing may rise: then it has the number of where it begins, as good as everywhere.
+  constexpr double kLeastRise = 1e-9;
+  const double range = scale.high() - scale.low();
+  if (!(gpu::implicit::Length(rise) > kLeastRise * std::fabs(range)))
+    rise = {0, 0, kLeastRise * std::fabs(range)};
+  const Vector sent = 1 / gpu::implicit::Dot(rise, rise) * rise;
+  v1::ColorScale own = scale;
+  own.mutable_along()->set_x(sent.x);
+  own.mutable_along()->set_y(sent.y);
+  own.mutable_along()->set_z(sent.z);
+  own.set_low(scale.low() - start);
+  own.set_high(scale.high() - start);
+  return own;
+}
+
+// Letters in colours of a scale: each is one of its own.
+MaybeFault ToColoredLetters(const FieldPath& path, const v1::ColorScale& in,
+                            const text::LaidOut& laid, const Place& place, double depth,
+                            const gpu::GeometryRecord& look, const ShapeContext& context,
+                            GroupData* out) {
+  v1::ColorScale scale = in;
+  ScaleEnds ends;
+  if (auto fault = ToScaleEnds(context.scale_path, in, out->min, out->max, &ends)) return fault;
+  scale.set_low(ends.low);
+  scale.set_high(ends.high);
+  out->parts.clear();
+  for (const text::PlacedGlyph& placed : laid.glyphs) {
+    const gpu::Affine map = place.Map(placed.x, placed.y);
+    const v1::ColorScale own = ScaleOf(scale, map);
+    auto data = std::make_shared<GeometryData>();
+    data->record = look;
+    if (auto fault = ToLetter(path, *placed.glyph, depth,
+                              {context.context, context.scale_path, &own}, data.get())) {
+      return fault;
+    }
+    out->parts.push_back({std::move(data), map});
+  }
+  return {};
+}
 // Strokes of lines, broken like any text, as straight spans.
 MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layout& layout,
                      const Place& place, const DecodeContext& context, gpu::Spans* out) {
@@ -256,9 +305,10 @@ MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layo
 
 }  // namespace
 
-MaybeFault ToText(const FieldPath& path, const v1::Primitive& primitive, uint32_t color,
+MaybeFault ToText(const FieldPath& primitive_path, const v1::Primitive& primitive, uint32_t color,
                   const DecodeContext& context, Content* out) {
   const v1::Text& in = primitive.text();
+  const FieldPath path(primitive_path, "text"), scale_path(primitive_path, "color_scale");
   Place place;
   Wording wording;
   gpu::GeometryRecord look;
@@ -297,6 +347,12 @@ MaybeFault ToText(const FieldPath& path, const v1::Primitive& primitive, uint32_
     if (auto fault = ToLetters(path, laid, place, wording.depth, look, context, group.get())) {
       return fault;
     }
+    if (primitive.has_color_scale()) {
+      if (auto fault = ToColoredLetters(path, primitive.color_scale(), laid, place, wording.depth,
+                                        look, {context, scale_path, nullptr}, group.get())) {
+        return fault;
+      }
+    }
     group->kind = "text";
     group->as_sent = primitive.SerializeAsString();
     group->color = color;
@@ -317,6 +373,11 @@ MaybeFault ToText(const FieldPath& path, const v1::Primitive& primitive, uint32_
   data->record = look;
   for (int a = 0; a < 3; ++a) data->min[a] = data->max[a] = place.origin[a];  // of nothing
   if (auto fault = SetSpans(path, spans, context, data.get())) return fault;
+  if (primitive.has_color_scale() && data->record.vertex_count != 0) {
+    if (auto fault = ToVertexColors(scale_path, primitive.color_scale(), context, data.get())) {
+      return fault;
+    }
+  }
   data->kind = "text";
   data->as_sent = primitive.SerializeAsString();
   *out = GeometryPtr(std::move(data));

@@ -10,7 +10,7 @@ class Primitive;
 
 namespace voxeld::daemon::wire {
 
-// `path`: of the text. Letters become a group, which share what they share; lines one geometry. `color`: 0xRRGGBB.
+// `path`: of the primitive. Letters become a group, which share what they share; lines one geometry. `color`: 0xRRGGBB.
 MaybeFault ToText(const FieldPath& path, const v1::Primitive& in, uint32_t color,
                   const DecodeContext& context, Content* out);
 

@@ -221,6 +221,45 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, const Paylo
   return {};
 }
 
+// Whether colours are those of segments or triangles; of points and vertices are as good as each other.
+MaybeFault CheckColorsOf(const FieldPath& path, const v1::Vertices& in, bool colored,
+                         gpu::PrimitiveKind kind, bool* of_elements) {
+  *of_elements = false;
+  const FieldPath at(path, "colors_of");
+  switch (in.colors_of()) {
+    case v1::Vertices::COLORS_OF_UNSPECIFIED:
+    case v1::Vertices::VERTICES:
+      return {};
+    case v1::Vertices::ELEMENTS:
+      break;
+    default:
+      return UnknownEnum(at, in.colors_of(), "VERTICES, ELEMENTS");
+  }
+  if (!colored) {
+    return Fault{at.ToString(), Reason::kInvalidValue,
+                 "is ELEMENTS without colors; leave it unset, or give colors"};
+  }
+  *of_elements = kind == gpu::PrimitiveKind::kSegments || kind == gpu::PrimitiveKind::kTriangles;
+  if (*of_elements || kind == gpu::PrimitiveKind::kPoints) return {};
+  return Fault{at.ToString(), Reason::kInvalidValue,
+               "is ELEMENTS, which are segments and triangles; give VERTICES"};
+}
+
+// The corners of each element, one element's after another's: numbers of vertices.
+std::vector<uint32_t> CornersOfElements(const gpu::GeometryRecord& record,
+                                        std::span<const uint32_t> indices) {
+  const uint32_t corners = indices.empty() ? record.vertex_count : record.index_count;
+  const auto at = [&](uint32_t i) { return indices.empty() ? i : indices[i]; };
+  std::vector<uint32_t> all;
+  if (record.kind == gpu::PrimitiveKind::kTriangles || record.topology == gpu::Topology::kList) {
+    for (uint32_t i = 0; i < corners; ++i) all.push_back(at(i));
+    return all;
+  }
+  for (uint32_t i = 0; i + 1 < corners; ++i) all.insert(all.end(), {at(i), at(i + 1)});
+  if (record.topology == gpu::Topology::kLoop) all.insert(all.end(), {at(corners - 1), at(0)});
+  return all;
+}
+
 }  // namespace
 
 MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_indices,
@@ -249,7 +288,10 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
                               &arrays.indices)) {
     return fault;
   }
-  if (colored) {
+  bool of_elements;
+  if (auto fault = CheckColorsOf(path, in, colored, out->record.kind, &of_elements)) return fault;
+  const bool of_vertices = colored && !of_elements;
+  if (of_vertices) {
     if (auto fault = CheckArray(path, in.count(), ColorBytes(in.color_type()), context.ranges,
                                 &arrays.colors)) {
       return fault;
@@ -258,7 +300,7 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
 
   out->record.vertex_count = in.count();
   out->record.index_count = in.index_count();
-  if (colored) out->record.color_mode = gpu::ColorMode::kPerVertex;
+  if (of_vertices) out->record.color_mode = gpu::ColorMode::kPerVertex;
   absl::StatusOr<gpu::GeometryArrays> kept =
       gpu::GeometryArrays::Allocate(out->record, context.pool);
   if (!kept.ok()) {
@@ -273,9 +315,48 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
                              out->arrays.writable_indices())) {
     return fault;
   }
-  if (colored) {
+  if (of_vertices) {
     CopyColors(arrays.colors.payload, ColorBytes(in.color_type()), out->arrays.writable_colors());
   }
+  return {};
+}
+
+MaybeFault ToElementColors(const FieldPath& path, const v1::Vertices& in,
+                           const DecodeContext& context, GeometryData* out) {
+  if (in.colors_of() != v1::Vertices::ELEMENTS) return {};
+  const std::vector<uint32_t> corners = CornersOfElements(out->record, out->arrays.indices());
+  const size_t each = out->record.kind == gpu::PrimitiveKind::kTriangles ? 3 : 2;
+  Array colors = ArraysOf(in, context).colors;
+  if (auto fault = CheckArray(path, corners.size() / each, ColorBytes(in.color_type()),
+                              context.ranges, &colors)) {
+    return fault;
+  }
+  if (auto fault = CheckCount(path, "colors_of", corners.size(),
+                              context.limits.max_vertices_per_entity, "max_vertices_per_entity")) {
+    fault->message = absl::StrCat("makes ", corners.size(),
+                                  " corners of elements; max_vertices_per_entity allows ",
+                                  context.limits.max_vertices_per_entity);
+    return fault;
+  }
+  gpu::GeometryRecord record = out->record;
+  record.vertex_count = static_cast<uint32_t>(corners.size());
+  record.index_count = 0;
+  record.color_mode = gpu::ColorMode::kPerVertex;
+  record.topology = gpu::Topology::kList;
+  absl::StatusOr<gpu::GeometryArrays> kept = gpu::GeometryArrays::Allocate(record, context.pool);
+  if (!kept.ok()) {
+    return Fault{FieldPath(path, "colors_of").ToString(), Reason::kQuotaExceeded,
+                 absl::StrCat("cannot be kept: ", kept.status().message())};
+  }
+  std::vector<uint32_t> of_elements(corners.size() / each);
+  CopyColors(colors.payload, ColorBytes(in.color_type()), of_elements);
+  for (size_t i = 0; i < corners.size(); ++i) {
+    std::copy_n(&out->arrays.positions()[size_t{corners[i]} * 3], 3,
+                &kept->writable_positions()[i * 3]);
+    kept->writable_colors()[i] = of_elements[i / each];
+  }
+  out->record = record;
+  out->arrays = *std::move(kept);
   return {};
 }
 

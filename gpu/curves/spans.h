@@ -72,6 +72,20 @@ class Spans {
   std::vector<Vector> points_;
 };
 
+// How many even parts of a span's 4 points are no farther from it than `error`: max|B″|/(8n²), where |B″| is at most 6 times the
+// greater of the points' second differences. A whole number, at least 1.
+inline double PartsOfSpan(const implicit::Vector* p, double error) {
+  const double bend = std::max(implicit::Length(p[0] - 2 * p[1] + p[2]),
+                               implicit::Length(p[1] - 2 * p[2] + p[3]));
+  return std::max(1.0, std::ceil(std::sqrt(0.75 * bend / error)));
+}
+
+// The place on a span, 0 to 1 from its first point to its last.
+inline implicit::Vector OnSpan(const implicit::Vector* p, double t) {
+  const double s = 1 - t;
+  return s * s * s * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] + t * t * t * p[3];
+}
+
 // Two unit vectors across `axis`, and across one another: the first on the side of `toward`, as far as
 // that lies across; the second a quarter turn on, counter-clockwise as seen from where the axis points to.
 // False if there is none.

@@ -51,7 +51,12 @@ absl::StatusOr<Rope> EncodeVertices(const Vertices& v) {
         absl::StrCat("positions has ", v.positions.size(),
                      " numbers; x y z of each vertex and at least one vertex is right"));
   }
-  if (!v.colors.empty() && v.colors.size() != 3 * count) {
+  const bool of_elements = v.colors_of == Vertices::ColorsOf::kElements;
+  if (of_elements && (v.colors.empty() || v.colors.size() % 3 != 0)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "colors has ", v.colors.size(), " bytes; r g b of each segment or triangle is right"));
+  }
+  if (!of_elements && !v.colors.empty() && v.colors.size() != 3 * count) {
     return absl::InvalidArgumentError(absl::StrCat("colors has ", v.colors.size(), " bytes for ",
                                                    count, " vertices; ", 3 * count,
                                                    " or none is right"));
@@ -66,6 +71,8 @@ absl::StatusOr<Rope> EncodeVertices(const Vertices& v) {
   AppendUnsigned(v1::Vertices::kPositionTypeFieldNumber, v1::ELEMENT_TYPE_F32, &head);
   if (!v.colors.empty())
     AppendUnsigned(v1::Vertices::kColorTypeFieldNumber, v1::ELEMENT_TYPE_RGB8, &head);
+  if (of_elements)
+    AppendUnsigned(v1::Vertices::kColorsOfFieldNumber, v1::Vertices::ELEMENTS, &head);
   const size_t indices = v.indices.size() + v.short_indices.size();
   if (indices > 0) {
     AppendUnsigned(v1::Vertices::kIndexTypeFieldNumber,
@@ -152,6 +159,7 @@ struct ShapeEncoder {
   absl::StatusOr<Rope> operator()(const BezierSurface& surface) const {
     std::string fields;
     AppendUnsigned(v1::BezierSurface::kRuleFieldNumber, AfterUnspecified(surface.rule), &fields);
+    AppendUnsigned(v1::BezierSurface::kFillFieldNumber, AfterUnspecified(surface.fill), &fields);
     return OverVertices(surface.vertices, v1::BezierSurface::kVerticesFieldNumber, fields,
                         v1::Primitive::kBezierSurfaceFieldNumber);
   }
@@ -161,6 +169,7 @@ struct ShapeEncoder {
     AppendVec3(v1::Box::kSizeFieldNumber, box.size, &fields);
     AppendUnsigned(v1::Box::kFillFieldNumber, AfterUnspecified(box.fill), &fields);
     AppendUnsigned(v1::Box::kRuleFieldNumber, AfterUnspecified(box.rule), &fields);
+    if (box.shell.value != 0) AppendThickness(v1::Box::kShellFieldNumber, box.shell, &fields);
     return Wrap(before, v1::Primitive::kBoxFieldNumber, Rope(std::move(fields)));
   }
   absl::StatusOr<Rope> operator()(const Sphere& sphere) const {
@@ -169,6 +178,8 @@ struct ShapeEncoder {
     AppendDouble(v1::Sphere::kRadiusFieldNumber, sphere.radius, &fields);
     AppendUnsigned(v1::Sphere::kFillFieldNumber, AfterUnspecified(sphere.fill), &fields);
     AppendUnsigned(v1::Sphere::kRuleFieldNumber, AfterUnspecified(sphere.rule), &fields);
+    if (sphere.shell.value != 0)
+      AppendThickness(v1::Sphere::kShellFieldNumber, sphere.shell, &fields);
     return Wrap(before, v1::Primitive::kSphereFieldNumber, Rope(std::move(fields)));
   }
   absl::StatusOr<Rope> operator()(const Cylinder& cylinder) const {
@@ -178,6 +189,8 @@ struct ShapeEncoder {
     AppendDouble(v1::Cylinder::kHeightFieldNumber, cylinder.height, &fields);
     AppendUnsigned(v1::Cylinder::kFillFieldNumber, AfterUnspecified(cylinder.fill), &fields);
     AppendUnsigned(v1::Cylinder::kRuleFieldNumber, AfterUnspecified(cylinder.rule), &fields);
+    if (cylinder.shell.value != 0)
+      AppendThickness(v1::Cylinder::kShellFieldNumber, cylinder.shell, &fields);
     return Wrap(before, v1::Primitive::kCylinderFieldNumber, Rope(std::move(fields)));
   }
   absl::StatusOr<Rope> operator()(const HeightMap& map) const {

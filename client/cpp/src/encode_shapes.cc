@@ -120,6 +120,8 @@ absl::StatusOr<std::string> EncodeShape(const Implicit& shape) {
     to->mutable_boundary()->set_axis(shape.boundary_axis == Implicit::Axis::kX   ? v1::Boundary::X
                                      : shape.boundary_axis == Implicit::Axis::kY ? v1::Boundary::Y
                                                                                  : v1::Boundary::Z);
+    to->mutable_boundary()->set_form(
+        static_cast<v1::Boundary::Form>(static_cast<int>(shape.boundary_form) + 1));
   }
   for (const auto& [name, value] : shape.parameters) {
     status.Update(CheckName(name));

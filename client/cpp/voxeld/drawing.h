@@ -51,10 +51,13 @@ class Array {
 
 // Vertices as they lie in memory. At most one of the two index arrays.
 struct Vertices {
+  // Of kElements, each segment or triangle has one, in their order; only of segments and meshes.
+  enum class ColorsOf : uint8_t { kVertices, kElements };
   Array<float> positions;         // x y z of each
-  Array<uint8_t> colors;          // r g b of each; empty: Look::color
+  Array<uint8_t> colors;          // r g b of each, or as colors_of says; empty: Look::color
   Array<uint32_t> indices;        // empty: vertices are used as they stand
   Array<uint16_t> short_indices;  // the same in less room
+  ColorsOf colors_of = ColorsOf::kVertices;
 };
 
 struct Points {
@@ -104,6 +107,7 @@ struct Curve {
 struct BezierSurface {
   Vertices vertices;
   SurfaceRule rule = SurfaceRule::kThin;
+  Fill fill = Fill::kSurface;  // or lines, the edges of each, or dots, their corners
 };
 
 // A surface over a grid of heights, row by row.
@@ -156,11 +160,13 @@ struct Isosurface {
   Thickness shell;
 };
 
+// With a shell or a colour scale, boxes, spheres and cylinders are what parallelepipeds, ellipsoids and cones are.
 struct Box {
   Vec3 center;
   Vec3 size = {1, 1, 1};  // full edge lengths
   Fill fill = Fill::kSurface;
   SurfaceRule rule = SurfaceRule::kThin;
+  Thickness shell;
 };
 
 struct Sphere {
@@ -168,6 +174,7 @@ struct Sphere {
   double radius = 1;
   Fill fill = Fill::kSurface;
   SurfaceRule rule = SurfaceRule::kThin;
+  Thickness shell;
 };
 
 // Along its own z axis, centred.
@@ -177,6 +184,7 @@ struct Cylinder {
   double height = 1;
   Fill fill = Fill::kSurface;
   SurfaceRule rule = SurfaceRule::kThin;
+  Thickness shell;
 };
 
 // Draws an object that Session::DefineObject defined.
@@ -185,8 +193,8 @@ struct Instance {
   Color tint;  // all its colours are multiplied by this one, 255 being 1
 };
 
-// Colours by numbers, from one end of a row of colours to the other. For what has vertices, and, along a
-// direction, for shapes of one colour other than boxes, spheres and cylinders.
+// Colours by numbers, from one end of a row of colours to the other. Along a direction for all but Implicit, which has a level,
+// volumes, isosurfaces and instances; numbers for what has vertices, or samples of heights.
 struct ColorScale {
   std::string colormap;       // a name of matplotlib's, as "viridis";
   std::vector<Color> colors;  // or 2 to 256 colours, evenly apart

@@ -150,12 +150,15 @@ struct Text {
 // The general method: a surface P bounded by Φ.
 struct Implicit {
   enum class Axis : uint8_t { kZ, kX, kY };
+  enum class BoundaryForm : uint8_t { kPolyline, kCatmullRom, kBSpline };
 
   Expression surface;  // "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1"
   Expression bound;    // a condition; empty: none
   // Closed curves, projected along an axis: what lies within them is drawn.
   std::vector<std::vector<Vec3>> boundary;
   Axis boundary_axis = Axis::kZ;
+  BoundaryForm boundary_form =
+      BoundaryForm::kPolyline;               // or smooth: through the points, or near them
   std::map<std::string, double> parameters;  // that expressions name
   std::optional<Fill> fill;  // else solid for an inequality, the surface for all else
   SurfaceRule rule = SurfaceRule::kThin;

@@ -86,7 +86,8 @@ def helix(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, turns: float,
     return solid(color, helix=shape)
 
 
-def bezier_surface(patches: npt.ArrayLike, *, colors: Color = None, rule: str = "thin") -> list[wire.Packed]:
+def bezier_surface(patches: npt.ArrayLike, *, colors: Color = None, rule: str = "thin",
+                   fill: str = "surface") -> list[wire.Packed]:
     """`patches`: (4, 4, 3), or (n, 4, 4, 3)."""
     field = as_array(patches, "patches")
     if field.ndim not in (3, 4) or field.shape[-3:] != (4, 4, 3):
@@ -95,7 +96,7 @@ def bezier_surface(patches: npt.ArrayLike, *, colors: Color = None, rule: str = 
     color, each = split_colors(colors_.many(colors, len(array)))
     vertices = wire.vertices(array, element, each)
     _within_a_piece(len(vertices), "patches")
-    head = pb.BezierSurface(rule=choice(RULES, rule, "rule")).SerializeToString()
+    head = pb.BezierSurface(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill")).SerializeToString()
     return [packed("bezier_surface", head, vertices, color)]
 
 

@@ -47,47 +47,49 @@ class Draw(DrawCurves[Drawn]):
                           Look.of(transform, priority, erase, lifetime, label))
 
     def lines(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
-              mode: Optional[str] = None, width: Optional[float] = None, unit: str = "voxels", sampling: str = "thin",
+              segment_colors: Optional[Colors] = None, mode: Optional[str] = None, width: Optional[float] = None, unit: str = "voxels", sampling: str = "thin",
               transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
               lifetime: Optional[float] = None, label: str = "") -> Drawn:
         """(n, 3): a "strip", a "loop" or "pairs"; or (m, k, 3): m strips (or loops) of k vertices each. Colours run from
-        vertex to vertex."""
+        vertex to vertex; or each segment has its own, `segment_colors`."""
         return self._draw(name, shapes.lines, (positions,),
-                          dict(colors=colors, cmap=cmap, mode=mode, width=width, unit=unit, sampling=sampling),
+                          dict(colors=colors, cmap=cmap, segment_colors=segment_colors, mode=mode, width=width, unit=unit, sampling=sampling),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def mesh(self, name: str, vertices: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *,
-             colors: Optional[Colors] = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
-             uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface",
+             colors: Optional[Colors] = None, cmap: Optional[str] = None, face_colors: Optional[Colors] = None,
+             texture: Optional[PictureFile] = None, uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface",
              transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
              lifetime: Optional[float] = None, label: str = "") -> Drawn:
         """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover".
         `fill`: "surface", "lines", "dots" or "solid": what a closed mesh encloses, in one colour. `texture` is a PNG or
         JPEG file's path or bytes, which multiplies colours, `uv` (n, 2) where vertices are on it: from (0, 0), its upper
-        left corner, to (1, 1); beyond it repeats."""
+        left corner, to (1, 1); beyond it repeats. `face_colors`, in place of `colors`: of each triangle."""
         return self._draw(name, shapes.mesh, (vertices, faces),
-                          dict(colors=colors, cmap=cmap, texture=texture, uv=uv, rule=rule, fill=fill), Look.of(transform, priority, erase, lifetime, label))
+                          dict(colors=colors, cmap=cmap, face_colors=face_colors, texture=texture, uv=uv, rule=rule, fill=fill), Look.of(transform, priority, erase, lifetime, label))
 
     def box(self, name: str, center: npt.ArrayLike = (0, 0, 0), size: npt.ArrayLike = 1.0, *, color: Optional[Colors] = None,
-            fill: str = "surface", rule: str = "thin", transform: Optional[npt.ArrayLike] = None, priority: int = 0,
+            fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
+            transform: Optional[npt.ArrayLike] = None, priority: int = 0,
             erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """`size`: three edge lengths or one. `fill`: "surface", "solid", "lines" or "dots"."""
-        return self._draw(name, shapes.box, (center, size), dict(color=color, fill=fill, rule=rule),
+        """`size`: three edge lengths or one. `fill`: "surface", "solid", "lines" or "dots". `shell`: its thickness."""
+        return self._draw(name, shapes.box, (center, size), dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def sphere(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, *, color: Optional[Colors] = None,
-               fill: str = "surface", rule: str = "thin", transform: Optional[npt.ArrayLike] = None, priority: int = 0,
+               fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
+            transform: Optional[npt.ArrayLike] = None, priority: int = 0,
                erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """An ellipsoid under a transform. `fill`: "surface" or "solid"."""
-        return self._draw(name, shapes.sphere, (center, radius), dict(color=color, fill=fill, rule=rule),
+        """An ellipsoid under a transform. `fill`: "surface", "solid", "lines" or "dots". `shell`: its thickness."""
+        return self._draw(name, shapes.sphere, (center, radius), dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def cylinder(self, name: str, center: npt.ArrayLike = (0, 0, 0), radius: float = 0.5, height: float = 1.0, *,
                  color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin",
-                 transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
+                 shell: Optional[float] = None, unit: str = "voxels", transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
                  lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """Along z, centred. `fill`: "surface" or "solid"."""
-        return self._draw(name, shapes.cylinder, (center, radius, height), dict(color=color, fill=fill, rule=rule),
+        """Along z, centred. `fill`: "surface", "solid", "lines" or "dots". `shell`: its thickness."""
+        return self._draw(name, shapes.cylinder, (center, radius, height), dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def volume(self, name: str, array: npt.ArrayLike, *, threshold: Optional[float] = None, cmap: str = "viridis",

@@ -87,16 +87,17 @@ class DrawMeasured(Generic[Drawn]):
                                rule=rule), Look.of(**look))
 
     def implicit(self, name: str, surface: Formula, *, bound: Optional[Formula] = None, boundary: Optional[Curves] = None,
-                 boundary_axis: str = "z", parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None,
+                 boundary_axis: str = "z", boundary_form: str = "polyline",
+                 parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None,
                  rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
                  domain: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, color: Optional[Colors] = None,
                  rgb: Optional[tuple[Formula, Formula, Formula]] = None, level: Optional[Formula] = None, cmap: Optional[str] = None,
                  **look: Any) -> Drawn:
         """The general method: where `surface`, an expression in x, y and z, is 0; or, as an inequality, where it is true;
         as in "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1", or computed with (voxeld.expressions). `bound` is a condition besides, and `boundary` closed curves,
-        projected along an axis. Names in expressions are `parameters`. `rgb` are expressions from 0 to 1, `level` one whose
+        projected along an axis: a "polyline", or smooth, "catmull-rom" through their points or "b-spline" near them. Names in expressions are `parameters`. `rgb` are expressions from 0 to 1, `level` one whose
         colour `cmap` gives."""
         return self._draw(name, measured.implicit, (surface,),
-                          dict(bound=bound, boundary=boundary, boundary_axis=boundary_axis, parameters=parameters, fill=fill,
+                          dict(bound=bound, boundary=boundary, boundary_axis=boundary_axis, boundary_form=boundary_form, parameters=parameters, fill=fill,
                                rule=rule, shell=shell, unit=unit, domain=domain, color=color, rgb=rgb, level=level, cmap=cmap),
                           Look.of(**look))

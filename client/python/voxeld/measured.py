@@ -20,6 +20,7 @@ from .v1 import types_pb2
 Color = Optional[Colors]
 Formula = Union[str, Expression]
 
+_BOUNDARY_FORMS = {"polyline": pb.Boundary.POLYLINE, "catmull-rom": pb.Boundary.CATMULL_ROM, "b-spline": pb.Boundary.B_SPLINE}
 _AXES = {"z": pb.Boundary.Z, "x": pb.Boundary.X, "y": pb.Boundary.Y}
 
 
@@ -147,7 +148,7 @@ def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
 
 def implicit(surface: Formula, *, bound: Optional[Formula] = None,
              boundary: Union[None, npt.ArrayLike, Sequence[npt.ArrayLike]] = None, boundary_axis: str = "z",
-             parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None, rule: str = "thin",
+             boundary_form: str = "polyline", parameters: Optional[Mapping[str, float]] = None, fill: Optional[str] = None, rule: str = "thin",
              shell: Optional[float] = None, unit: str = "voxels",
              domain: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, color: Color = None,
              rgb: Optional[tuple[Formula, Formula, Formula]] = None, level: Optional[Formula] = None,
@@ -162,6 +163,7 @@ def implicit(surface: Formula, *, bound: Optional[Formula] = None,
         shape.bound.CopyFrom(_text(bound))
     if boundary is not None:
         shape.boundary.CopyFrom(pb.Boundary(axis=choice(_AXES, boundary_axis, "boundary_axis"),
+                                            form=choice(_BOUNDARY_FORMS, boundary_form, "boundary_form"),
                                             **_curves(boundary, "boundary")))
     for name, value in (parameters or {}).items():
         if not name.isidentifier() or not name.isascii():

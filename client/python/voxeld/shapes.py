@@ -74,9 +74,24 @@ def points(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional
             for r in _pieces(len(array), size)]
 
 
-def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None, mode: Optional[str] = None,
-          width: Optional[float] = None, unit: str = "voxels", sampling: str = "thin") -> list[wire.Packed]:
-    """`at`: (n, 3), by default a strip; or (m, k, 3), m strips of k vertices each."""
+def _each_element(colors: Optional[Colors], cmap: Optional[str], count: int, what: str) -> Optional[Array]:
+    """(count, 3): of each segment or face its own."""
+    found = colors_.many(colors, count, cmap)
+    if found is None:
+        return None
+    if isinstance(found, int):
+        return np.broadcast_to(np.array([found >> 16 & 255, found >> 8 & 255, found & 255], np.uint8), (count, 3))
+    if not isinstance(found, np.ndarray):
+        raise InvalidValue(f"{what} is a gradient, which runs along vertices; give it as colors")
+    return np.ascontiguousarray(found)
+
+
+def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
+          segment_colors: Optional[Colors] = None, mode: Optional[str] = None, width: Optional[float] = None,
+          unit: str = "voxels", sampling: str = "thin") -> list[wire.Packed]:
+    """`at`: (n, 3), by default a strip; or (m, k, 3), m strips of k vertices each. `segment_colors`: of each segment."""
+    if colors is not None and segment_colors is not None:
+        raise InvalidValue("colors and segment_colors are given; give one of them")
     array = as_array(at, "lines")
     many = array.ndim == 3 and array.shape[2] == 3
     if many and array.shape[1] < 2:
@@ -98,53 +113,71 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
     if 0 < len(array) < 2 or topology == pb.Segments.LIST and len(array) % 2:
         need = "pairs need an even number" if topology == pb.Segments.LIST else "a line needs at least 2"
         raise InvalidArray(f"lines: got {len(array)} vertices; {need}")
-    size = array.itemsize * 3 + (0 if each is None else each.shape[1])
+    pairs = topology == pb.Segments.LIST
+    segments = len(array) // 2 if pairs else len(array) if topology == pb.Segments.LOOP else max(len(array) - 1, 0)
+    own = _each_element(segment_colors, cmap, segments, "segment_colors") if segment_colors is not None else None
+    size = array.itemsize * 3 + (0 if each is None else each.shape[1]) + (0 if own is None else own.shape[1])
     if topology == pb.Segments.LOOP and len(array) * size > PIECE_BYTES:
         array = np.concatenate([array, array[:1]])
         each = None if each is None else np.concatenate([each, each[:1]])
         topology = pb.Segments.STRIP
     head = pb.Segments(topology=topology, sampling=choice(SAMPLINGS, sampling, "sampling"),
                        thickness=thickness(width, unit)).SerializeToString()
-    whole, overlap = (2, 0) if topology == pb.Segments.LIST else (1, 1)
-    return [packed("segments", head,
-                       wire.vertices(array[r], element, None if each is None else each[r]), color)
-            for r in _pieces(len(array), size, whole, overlap)]
+    whole, overlap = (2, 0) if pairs else (1, 1)
+    result = []
+    for r in _pieces(len(array), size, whole, overlap):
+        if own is not None:
+            last = r.stop if topology == pb.Segments.LOOP else r.stop - 1
+            part = wire.vertices(array[r], element, own[r.start // 2:r.stop // 2] if pairs else own[r.start:last], of_elements=True)
+        else:
+            part = wire.vertices(array[r], element, None if each is None else each[r])
+        result.append(packed("segments", head, part, color))
+    return result
 
 
 def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Optional[Colors] = None,
-         cmap: Optional[str] = None, texture: Optional[PictureFile] = None, uv: Optional[npt.ArrayLike] = None,
-         rule: str = "thin", fill: str = "surface") -> list[wire.Packed]:
-    """Triangles: of `faces`, or of the vertices three by three."""
+         cmap: Optional[str] = None, face_colors: Optional[Colors] = None, texture: Optional[PictureFile] = None,
+         uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface") -> list[wire.Packed]:
+    """Triangles: of `faces`, or of the vertices three by three. `face_colors`: of each triangle."""
+    if face_colors is not None and (colors is not None or texture is not None):
+        raise InvalidValue(f"face_colors are given, and so is {'colors' if colors is not None else 'a texture'}; give one of them")
     array, element = positions(at, "vertices")
-    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
+    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap if face_colors is None else None))
     head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"),
                    texture=to_texture(texture, uv, len(array))).SerializeToString()
+    index = None if faces is None else indices(faces, len(array))
+    if index is None and len(array) % 3:
+        raise InvalidArray(f"vertices: got {len(array)} without faces; triangles need a multiple of 3")
+    if index is not None and len(index) == 0:
+        return []
+    own = None
+    if face_colors is not None:
+        own = _each_element(face_colors, cmap, len(array) // 3 if index is None else len(index), "face_colors")
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
+    face = 0 if own is None else own.shape[1]
     together = fill == "solid" or texture is not None  # a part of it is no solid, and each would have the texture
-    whole = len(head) + len(array) * size + (0 if faces is None else 12 * len(faces))  # type: ignore[arg-type]
+    whole = len(head) + len(array) * size + (0 if index is None else (12 + face) * len(index))
     if together and whole > WHOLE_BYTES:
         raise InvalidArray(f"the mesh takes {whole} bytes, more than the {WHOLE_BYTES} that a solid, or one with a texture, may "
                            "have; draw its surface, draw it in parts, or a coarser one")
 
-    def one(vertices: Array, own: Optional[Array], index: Optional[Array]) -> wire.Packed:
-        return packed("mesh", head, wire.vertices(vertices, element, own, index), color)
+    def one(vertices: Array, colored: Optional[Array], corners: Optional[Array], faces_of: slice = slice(None)) -> wire.Packed:
+        if own is not None:
+            return packed("mesh", head, wire.vertices(vertices, element, own[faces_of], corners, of_elements=True), color)
+        return packed("mesh", head, wire.vertices(vertices, element, colored, corners), color)
 
-    if faces is None:
-        if len(array) % 3:
-            raise InvalidArray(f"vertices: got {len(array)} without faces; triangles need a multiple of 3")
+    if index is None:
         if together:
             return [one(array, each, None)]
-        return [one(array[r], None if each is None else each[r], None) for r in _pieces(len(array), size, 3)]
-    index = indices(faces, len(array))
-    if len(index) == 0:
-        return []
-    if together or index.nbytes + len(array) * size <= PIECE_BYTES:
+        return [one(array[r], None if each is None else each[r], None, slice(r.start // 3, r.stop // 3))
+                for r in _pieces(len(array), size + face, 3)]
+    if together or index.nbytes + len(array) * size + len(index) * face <= PIECE_BYTES:
         return [one(array, each, index)]
     # Each piece has the vertices of its own faces, at most three each.
     result = []
-    for r in _pieces(len(index), 12 + 3 * size):
-        used, own = np.unique(index[r], return_inverse=True)
-        result.append(one(array[used], None if each is None else each[used], own.reshape(-1, 3).astype(np.uint32)))
+    for r in _pieces(len(index), 12 + face + 3 * size):
+        used, corners = np.unique(index[r], return_inverse=True)
+        result.append(one(array[used], None if each is None else each[used], corners.reshape(-1, 3).astype(np.uint32), r))
     return result
 
 
@@ -162,26 +195,30 @@ def vec(values: npt.ArrayLike, what: str) -> types_pb2.Vec3:
 
 
 def box(center: npt.ArrayLike, size: npt.ArrayLike, *, color: Optional[Colors] = None, fill: str = "surface",
-        rule: str = "thin") -> list[wire.Packed]:
+        rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     """`size`: three edge lengths, or one for all."""
     edges = np.broadcast_to(as_array(size, "size"), (3,)) if np.ndim(size) == 0 else size
     for edge, axis in zip(vector(edges, "size"), "xyz"):
         number(edge, f"the size along {axis}", above=0)
     return solid(color, box=pb.Box(center=vec(center, "center"), size=vec(edges, "size"),
-                                    fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
+                                    fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule"),
+        shell=thickness(shell, unit, "shell")))
 
 
 def sphere(center: npt.ArrayLike, radius: float, *, color: Optional[Colors] = None, fill: str = "surface",
-           rule: str = "thin") -> list[wire.Packed]:
+           rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     return solid(color, sphere=pb.Sphere(center=vec(center, "center"), radius=number(radius, "radius", above=0),
-                                          fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
+                                          fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule"),
+        shell=thickness(shell, unit, "shell")))
 
 
 def cylinder(center: npt.ArrayLike, radius: float, height: float, *, color: Optional[Colors] = None,
-             fill: str = "surface", rule: str = "thin") -> list[wire.Packed]:
+             fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
+             unit: str = "voxels") -> list[wire.Packed]:
     return solid(color, cylinder=pb.Cylinder(
         center=vec(center, "center"), radius=number(radius, "radius", above=0), height=number(height, "height", above=0),
-        fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule")))
+        fill=choice(FILLS, fill, "fill"), rule=choice(RULES, rule, "rule"),
+        shell=thickness(shell, unit, "shell")))
 
 
 def instance(of: str, *, color: Optional[Colors] = None, tint: Optional[Colors] = None) -> list[wire.Packed]:

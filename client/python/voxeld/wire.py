@@ -92,8 +92,8 @@ def payload(array: Array) -> memoryview:
 
 
 def vertices(positions: Array, position_type: primitives_pb2.ElementType,
-             colors: Optional[Array] = None, indices: Optional[Array] = None) -> Packed:
-    """Vertices. `colors` is (n, 3) or (n, 4) uint8, `indices` uint32."""
+             colors: Optional[Array] = None, indices: Optional[Array] = None, *, of_elements: bool = False) -> Packed:
+    """Vertices. `colors` is (n, 3) or (n, 4) uint8, of segments or triangles if `of_elements`; `indices` uint32."""
     head = primitives_pb2.Vertices(count=len(positions), position_type=position_type)
     parts: list[tuple[bytes, memoryview]] = []
     if indices is not None:
@@ -103,6 +103,8 @@ def vertices(positions: Array, position_type: primitives_pb2.ElementType,
     if colors is not None:
         wide = colors.shape[1] == 4
         head.color_type = primitives_pb2.ELEMENT_TYPE_RGBX8 if wide else primitives_pb2.ELEMENT_TYPE_RGB8
+        if of_elements:
+            head.colors_of = primitives_pb2.Vertices.ELEMENTS
         parts.append((Field.COLORS, payload(colors)))
     parts.append((Field.POSITIONS, payload(positions)))
     tail: list[Buffer] = []

@@ -37,6 +37,44 @@ TEST(EncodeShapes, Curves) {
       .vertices = {.positions = std::vector<float>(48)}, .rule = SurfaceRule::kCover});
   EXPECT_EQ(patches.bezier_surface().vertices().count(), 16u);
   EXPECT_EQ(patches.bezier_surface().rule(), v1::SURFACE_RULE_COVER);
+  EXPECT_EQ(patches.bezier_surface().fill(), v1::FILL_SURFACE);
+  EXPECT_EQ(
+      Parse(BezierSurface{.vertices = {.positions = std::vector<float>(48)}, .fill = Fill::kLines})
+          .bezier_surface()
+          .fill(),
+      v1::FILL_LINES);
+}
+
+TEST(EncodeShapes, ColorsOfElements) {
+  const v1::Vertices vertices =
+      Parse(Mesh{.vertices = {.positions = std::vector<float>(12),
+                              .colors = {1, 2, 3, 4, 5, 6},
+                              .indices = {0, 1, 2, 2, 1, 3},
+                              .colors_of = Vertices::ColorsOf::kElements}})
+          .mesh()
+          .vertices();
+  EXPECT_EQ(vertices.colors_of(), v1::Vertices::ELEMENTS);
+  EXPECT_EQ(vertices.colors().size(), 6u);
+  EXPECT_EQ(
+      Parse(Mesh{.vertices = {.positions = std::vector<float>(9)}}).mesh().vertices().colors_of(),
+      v1::Vertices::COLORS_OF_UNSPECIFIED);
+}
+
+TEST(EncodeShapes, ShellsOfBoxesSpheresAndCylinders) {
+  EXPECT_EQ(Parse(Box{.shell = {3}}).box().shell().value(), 3);
+  EXPECT_EQ(Parse(Sphere{.shell = {2, Thickness::Unit::kUnits}}).sphere().shell().unit(),
+            v1::Thickness::UNITS);
+  EXPECT_EQ(Parse(Cylinder{.shell = {4}}).cylinder().shell().value(), 4);
+  EXPECT_FALSE(Parse(Box{}).box().has_shell());
+}
+
+TEST(EncodeShapes, BoundariesAreLinesOrSmooth) {
+  Implicit shape{.surface = "z = 0", .boundary = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
+  EXPECT_EQ(Parse(shape).implicit().boundary().form(), v1::Boundary::POLYLINE);
+  shape.boundary_form = Implicit::BoundaryForm::kCatmullRom;
+  EXPECT_EQ(Parse(shape).implicit().boundary().form(), v1::Boundary::CATMULL_ROM);
+  shape.boundary_form = Implicit::BoundaryForm::kBSpline;
+  EXPECT_EQ(Parse(shape).implicit().boundary().form(), v1::Boundary::B_SPLINE);
 }
 
 TEST(EncodeShapes, LinesByTheirMeasures) {

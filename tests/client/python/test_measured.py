@@ -73,11 +73,12 @@ class Measured(unittest.TestCase):
 
     def test_the_general_method(self) -> None:
         shape = parsed(measured.implicit("x^2+y^2 <= r", bound="z > 0", boundary=[(0, 0, 0), (1, 0, 0), (0, 1, 0)],
-                                         boundary_axis="x", parameters={"r": 2, "s": 3}, fill="surface", shell=1.5,
+                                         boundary_axis="x", boundary_form="b-spline", parameters={"r": 2, "s": 3}, fill="surface", shell=1.5,
                                          domain=((-1, -1, -1), (1, 1, 1)), level="z", cmap="viridis")).implicit
         self.assertEqual((shape.surface.text, shape.bound.text, shape.level.text), ("x^2+y^2 <= r", "z > 0", "z"))
         self.assertEqual((shape.parameter_names, list(shape.parameter_values)), ("r s", [2, 3]))
         self.assertEqual((shape.boundary.axis, list(shape.boundary.ends)), (pb.Boundary.X, [3]))
+        self.assertEqual(shape.boundary.form, pb.Boundary.B_SPLINE)
         self.assertEqual((shape.fill, shape.domain.max.z, shape.colormap), (pb.FILL_SURFACE, 1, "viridis"))
         colored = parsed(measured.implicit("x = 0", rgb=("x", "y", "z"))).implicit
         self.assertEqual((colored.red.text, colored.blue.text, colored.fill), ("x", "z", pb.FILL_UNSPECIFIED))

@@ -117,6 +117,69 @@ class Mesh(unittest.TestCase):
             shapes.mesh(at[:4])
 
 
+class ColorsOfElements(unittest.TestCase):
+    """Of each segment or face its own colour: in every piece beside the element that it was given for."""
+
+    def test_of_segments(self) -> None:
+        for mode, vertices, segments in (("strip", 200_000, 199_999), ("loop", 3, 3), ("loop", 200_000, 200_000),
+                                         ("pairs", 200_000, 100_000), ("strip", 2, 1)):
+            with self.subTest(mode=mode, vertices=vertices):
+                at = NUMPY.uniform(-1, 1, (vertices, 3)).astype(np.float32)
+                colors = NUMPY.integers(0, 256, (segments, 3), dtype=np.uint8)
+                begins = at[::2] if mode == "pairs" else at[:segments]
+                got_begins, got = [], []
+                for primitive in parsed(shapes.lines(at, mode=mode, segment_colors=colors)):
+                    v = primitive.segments.vertices
+                    self.assertEqual(v.colors_of, pb.Vertices.ELEMENTS)
+                    place = np.frombuffer(v.positions, np.float32).reshape(-1, 3)
+                    own = np.frombuffer(v.colors, np.uint8).reshape(-1, 3)
+                    step = 2 if primitive.segments.topology == pb.Segments.LIST else 1
+                    got_begins.append(place[::step][:len(own)])
+                    got.append(own)
+                np.testing.assert_array_equal(np.concatenate(got), colors)
+                np.testing.assert_array_equal(np.concatenate(got_begins), begins)
+
+    def test_of_faces(self) -> None:
+        for faces in (1, 60_000):
+            at = NUMPY.uniform(-1, 1, (100_000, 3)).astype(np.float32)
+            index = NUMPY.integers(0, len(at), (faces, 3))
+            colors = NUMPY.integers(0, 256, (faces, 3), dtype=np.uint8)
+            corners, own = [], []
+            for primitive in parsed(shapes.mesh(at[:3] if faces == 1 else at, index % 3 if faces == 1 else index, face_colors=colors)):
+                v = primitive.mesh.vertices
+                self.assertEqual(v.colors_of, pb.Vertices.ELEMENTS)
+                corners.append(xyz(v)[np.frombuffer(v.indices, np.uint32)])
+                own.append(np.frombuffer(v.colors, np.uint8).reshape(-1, 3))
+            np.testing.assert_array_equal(np.concatenate(own), colors)
+            np.testing.assert_array_equal(np.concatenate(corners), (at[index % 3] if faces == 1 else at[index]).reshape(-1, 3))
+
+    def test_without_faces_and_by_numbers(self) -> None:
+        at = NUMPY.uniform(-1, 1, (300_000, 3)).astype(np.float32)
+        got = [p.mesh.vertices for p in parsed(shapes.mesh(at, face_colors=np.arange(100_000.0), cmap="gray"))]
+        self.assertGreater(len(got), 1)
+        for v in got:
+            self.assertEqual(len(v.colors), v.count)
+        one, = parsed(shapes.mesh(at[:6], face_colors="red"))
+        self.assertEqual(one.mesh.vertices.colors, b"\xff\0\0" * 2)
+
+    def test_what_is_wrong_says_so(self) -> None:
+        at = np.zeros((6, 3))
+        for wrong, words in (
+                (lambda: shapes.mesh(at, colors="red", face_colors="red"), "give one of them"),
+                (lambda: shapes.mesh(at, face_colors=np.zeros((3, 3), np.uint8)), "colors are 3 for 2"),
+                (lambda: shapes.lines(at, colors="red", segment_colors="red"), "give one of them"),
+                (lambda: shapes.lines(at, segment_colors=np.zeros((6, 3), np.uint8)), "colors are 6 for 5")):
+            with self.subTest(words):
+                with self.assertRaisesRegex((InvalidValue, InvalidArray), words):
+                    wrong()
+
+    def test_shells(self) -> None:
+        for kind, shape in (("box", shapes.box((0, 0, 0), 1, shell=3)), ("sphere", shapes.sphere((0, 0, 0), 1, shell=3)),
+                            ("cylinder", shapes.cylinder((0, 0, 0), 1, 1, shell=3))):
+            self.assertEqual(getattr(parsed(shape)[0], kind).shell.value, 3)
+        self.assertFalse(parsed(shapes.sphere((0, 0, 0), 1))[0].sphere.HasField("shell"))
+
+
 class Textures(unittest.TestCase):
     AT = np.eye(3, dtype=np.float32)
     UV = [(0, 0), (1, 0.5), (-2, 3)]

@@ -1,4 +1,4 @@
-// Curves, wire frames, text, colour scales and tints from the wire: what is wrong with them, what becomes
+// Curves, wire frames, text and tints from the wire: what is wrong with them, what becomes
 // of good ones, and that they can be told to watchers as they were sent.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +10,7 @@
 #include "daemon/text/fonts.h"
 #include "daemon/wire/encode_primitive.h"
 #include "daemon/wire/primitive.h"
+#include "tests/daemon/wire/curve_messages.h"
 #include "tests/daemon/wire/faults.h"
 #include "tests/daemon/wire/requests.h"
 #include "voxeld/v1/primitives.pb.h"
@@ -19,104 +20,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-using P = v1::Primitive;
-
-class CurvesTest : public ::testing::Test {
- protected:
-  MaybeFault FaultOf(const P& primitive, Content* content) {
-    return ToContent(FieldPath("primitive"), primitive, {.limits = limits_, .fonts = &fonts_},
-                     content);
-  }
-  const GeometryData& Geometry(const P& primitive) {
-    const MaybeFault fault = FaultOf(primitive, &content_);
-    EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
-    return *std::get<GeometryPtr>(content_);
-  }
-  const GroupData& Group(const P& primitive) {
-    const MaybeFault fault = FaultOf(primitive, &content_);
-    EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
-    return *std::get<GroupPtr>(content_);
-  }
-
-  Limits limits_;
-  text::Fonts fonts_;
-  Content content_;
-};
-
-v1::Vertices Line(int count) {
-  v1::Vertices vertices;
-  std::vector<float> positions;
-  for (int i = 0; i < count; ++i) {
-    for (const float c : {static_cast<float>(i), static_cast<float>(i % 2), 0.0f})
-      positions.push_back(c);
-  }
-  vertices.set_count(static_cast<uint32_t>(count));
-  vertices.set_positions(Packed(positions));
-  return vertices;
-}
-
-P Curve() {
-  P p;
-  *p.mutable_curve()->mutable_vertices() = Line(4);
-  return p;
-}
-P Arc() {
-  P p;
-  p.mutable_arc()->set_radius(2);
-  return p;
-}
-P Ellipse() {
-  P p;
-  Set(p.mutable_ellipse()->mutable_axis_a(), 2, 0, 0);
-  Set(p.mutable_ellipse()->mutable_axis_b(), 0, 1, 0);
-  return p;
-}
-P Helix() {
-  P p;
-  Set(p.mutable_helix()->mutable_end(), 0, 0, 3);
-  p.mutable_helix()->set_radius(1);
-  p.mutable_helix()->set_turns(2);
-  return p;
-}
-P BezierSurface() {
-  P p;
-  *p.mutable_bezier_surface()->mutable_vertices() = Line(16);
-  return p;
-}
-P Arrow() {
-  P p;
-  Set(p.mutable_arrow()->mutable_end(), 0, 0, 4);
-  return p;
-}
-P Text() {
-  P p;
-  p.mutable_text()->set_text("AbA");
-  p.mutable_text()->set_height(2);
-  return p;
-}
-P Torus() {
-  P p;
-  p.mutable_torus()->set_radius(2);
-  p.mutable_torus()->set_tube_radius(0.5);
-  return p;
-}
-P Points() {
-  P p;
-  *p.mutable_points()->mutable_vertices() = Line(3);
-  return p;
-}
-P Scaled() {
-  P p = Points();
-  p.mutable_color_scale()->set_colormap("viridis");
-  Set(p.mutable_color_scale()->mutable_along(), 1, 0, 0);
-  return p;
-}
-P Mesh() {
-  P p;
-  *p.mutable_mesh()->mutable_vertices() = Line(6);
-  return p;
-}
 
 const FaultCase kCases[] = {
     {"curve_form", Curve,
@@ -223,17 +126,6 @@ const FaultCase kCases[] = {
 
 TEST_F(CurvesTest, WhatIsWrongIsSaid) {
   ExpectFaults(kCases, [this](const P& p, Content* content) { return FaultOf(p, content); });
-}
-
-TEST_F(CurvesTest, ScalesAreForWhatCanHaveThem) {
-  for (P (*const make)() : {Arc, Text, BezierSurface}) {
-    P p = make();
-    *p.mutable_color_scale() = Scaled().color_scale();
-    Content content;
-    const MaybeFault fault = FaultOf(p, &content);
-    ASSERT_TRUE(fault.has_value());
-    EXPECT_EQ(fault->field, "primitive.color_scale");
-  }
 }
 
 TEST_F(CurvesTest, EveryOneIsToldAsItWasSent) {
@@ -386,34 +278,6 @@ TEST_F(CurvesTest, TextFacesWhereItIsRead) {
   EXPECT_EQ(group.max[1], 0);
 }
 
-TEST_F(CurvesTest, ScalesColorVertices) {
-  P p = Scaled();
-  p.mutable_color_scale()->clear_colormap();
-  for (const uint32_t color : {0x000000, 0x0000FF, 0xFF0000})
-    p.mutable_color_scale()->add_colors(color);
-  const auto colors = [&] {
-    const GeometryData& data = Geometry(p);
-    return std::vector(data.arrays.colors().begin(), data.arrays.colors().end());
-  };
-  EXPECT_THAT(colors(), ElementsAre(0x000000, 0x0100FE, 0xFF0000))
-      << "from the least to the greatest";
-  Set(p.mutable_color_scale()->mutable_along(), 4, 0, 0);
-  p.mutable_color_scale()->set_high(1);
-  EXPECT_THAT(colors(), ElementsAre(0x000000, 0x000080, 0x0100FE)) << "x / 4 from 0 to 1";
-  p.mutable_color_scale()->clear_along();
-  p.mutable_color_scale()->set_scalars(Packed<float>({2, -1, 0}));
-  EXPECT_THAT(colors(), ElementsAre(0xFF0000, 0x000000, 0x000000)) << "clamped";
-}
-
-TEST_F(CurvesTest, ScalesBeyondAllNumbersAreRefusedOrPlain) {
-  P p = Scaled();
-  Set(p.mutable_color_scale()->mutable_along(), 1e-150, 0, 0);
-  EXPECT_EQ(Geometry(p).arrays.colors().size(), 3u);
-  Set(p.mutable_color_scale()->mutable_along(), 0, 0, 1);  // all are at 0
-  const GeometryData& data = Geometry(p);                  // until the next one
-  EXPECT_EQ(data.arrays.colors()[2], data.arrays.colors()[0]);
-}
-
 TEST_F(CurvesTest, TinyArcsAndBlankTextAreSomewhere) {
   P arc = Arc();
   Set(arc.mutable_arc()->mutable_center(), 5, 0, 0);
@@ -426,16 +290,6 @@ TEST_F(CurvesTest, TinyArcsAndBlankTextAreSomewhere) {
   EXPECT_TRUE(Group(text).parts.empty());
   EXPECT_EQ(Group(text).min[0], 7);
   EXPECT_EQ(Group(text).max[2], 9);
-}
-
-TEST_F(CurvesTest, ScalesColorShapes) {
-  P p = Torus();
-  *p.mutable_color_scale() = Scaled().color_scale();
-  EXPECT_GT(Geometry(p).record.index_count, Geometry(Torus()).record.index_count + 256)
-      << "the program has a table";
-  p.mutable_torus()->set_fill(v1::FILL_LINES);
-  Content content;
-  EXPECT_TRUE(FaultOf(p, &content).has_value());
 }
 
 TEST_F(CurvesTest, InstancesHaveTints) {

@@ -7,8 +7,11 @@
 #include <cstring>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "absl/strings/str_split.h"
 #include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/shape/examples.h"
 
 namespace voxeld::voxelctl {
@@ -140,19 +143,98 @@ TEST(ShapeText, WhatIsWrongIsSaid) {
   EXPECT_THAT(ErrorOf("points vertices=1,2"), HasSubstr("these are 2 numbers"));
 }
 
-// The gallery has every shape that there is, instances aside, which need an object.
+TEST(ShapeText, NumbersAreOfTheTypeBeforeThem) {
+  const auto samples = [](const char* text) {
+    return Parsed(text).primitive().volume().grid().samples();
+  };
+  EXPECT_EQ(samples("volume grid.type=u8 grid.samples=1,255"), "\x01\xFF");
+  EXPECT_EQ(samples("volume grid.type=u16 grid.samples=258"), "\x02\x01");
+  EXPECT_EQ(samples("volume grid.type=rgba8 grid.samples=1,2,3,4"), "\x01\x02\x03\x04");
+  EXPECT_EQ(samples("volume grid.samples=1").size(), 4u);
+  EXPECT_EQ(Parsed("height_map height_type=u16 heights=258").primitive().height_map().heights(),
+            "\x02\x01");
+  EXPECT_EQ(ErrorOf("volume grid.type=u8 grid.samples=256"),
+            "samples is \"256\"; whole numbers of the type before it would be right");
+}
+
+TEST(ShapeText, BoundariesBeginWithAxisAndForm) {
+  const v1::Boundary boundary =
+      Parsed("implicit boundary='y b_spline 1,0,0 0,0,1 0,0,0'").primitive().implicit().boundary();
+  EXPECT_EQ(boundary.axis(), v1::Boundary::Y);
+  EXPECT_EQ(boundary.form(), v1::Boundary::B_SPLINE);
+  EXPECT_EQ(boundary.points_size(), 9);
+  EXPECT_EQ(Parsed("implicit boundary='1,0,0 0,0,1 0,0,0'")
+                .primitive()
+                .implicit()
+                .boundary()
+                .points_size(),
+            9);
+  EXPECT_EQ(ErrorOf("implicit boundary='spline 1,0,0'"),
+            "form is \"spline\"; one of polyline, catmull_rom, b_spline would be right");
+  EXPECT_EQ(ErrorOf("implicit boundary='w 1,0,0'"), "axis is \"w\"; one of z, x, y would be right");
+}
+
+TEST(ShapeText, ClipsAreNoShapes) {
+  v1::Clip clip;
+  ASSERT_TRUE(*ParseClipText("clip_plane a=1 d=-0.5", &clip));
+  ASSERT_TRUE(*ParseClipText("clip_box size=1,2,3 at=4,5,6 turn=0,0,90", &clip));
+  ASSERT_TRUE(*ParseClipText("clip_cylinder start=0,0,-1 end=0,0,1 radius=0.5", &clip));
+  EXPECT_FALSE(*ParseClipText("sphere radius=1", &clip));
+  EXPECT_EQ(clip.planes(0).a(), 1);
+  EXPECT_EQ(clip.planes(0).d(), -0.5);
+  EXPECT_EQ(clip.boxes(0).size().y(), 2);
+  EXPECT_EQ(clip.boxes(0).transform().m(3), 4);
+  EXPECT_NEAR(clip.boxes(0).transform().m(1), -1, 1e-12);
+  EXPECT_EQ(clip.cylinders(0).end().z(), 1);
+  EXPECT_EQ(ParseClipText("clip_plane q=1", &clip).status().message(),
+            "clip_plane has no q; known are a, b, c, d");
+  EXPECT_EQ(ParseClipText("clip_plane a", &clip).status().message(),
+            "after clip_plane is \"a\"; NAME=VALUE would be right");
+  EXPECT_FALSE(ParseClipText("clip_cylinder at=1", &clip).ok()) << "its ends say where it is";
+}
+
+// The gallery has every shape that there is.
 TEST(ShapeText, EveryShapeHasAnExample) {
   std::set<std::string> shown;
   for (const ShapeExample& example : ShapeExamples()) {
-    const v1::Entity entity = Parsed(example.text);
-    const auto* field =
-        v1::Primitive::descriptor()->FindFieldByNumber(entity.primitive().kind_case());
-    ASSERT_NE(field, nullptr) << example.name;
-    EXPECT_EQ(std::string(example.name).find(field->name()), 0u) << example.name;
-    shown.insert(field->name());
+    const std::vector<std::string> lines = absl::StrSplit(example.text, '\n');
+    const absl::StatusOr<v1::ApplyUpdateRequest> request = ShapesRequest(lines);
+    ASSERT_TRUE(request.ok()) << request.status();
+    for (const v1::StreamRequest& operation : request->operations()) {
+      if (!operation.has_upsert()) continue;
+      const v1::Primitive& primitive = operation.upsert().entity().primitive();
+      const auto* field = v1::Primitive::descriptor()->FindFieldByNumber(primitive.kind_case());
+      ASSERT_NE(field, nullptr) << example.name;
+      EXPECT_EQ(std::string(example.name).find(field->name()), 0u) << example.name;
+      shown.insert(field->name());
+    }
   }
   const auto& kinds = *v1::Primitive::descriptor()->oneof_decl(0);
-  EXPECT_EQ(shown.size() + 1, static_cast<size_t>(kinds.field_count()));
+  EXPECT_EQ(shown.size(), static_cast<size_t>(kinds.field_count()));
+}
+
+TEST(Drawings, ObjectsMasksAndClipsComeWithTheShapes) {
+  const std::vector<std::string> texts = {
+      "instance object=o at=1,0,0",         "mask: box size=1",     "clip_plane c=1",
+      "object o: sphere radius=1 at=0,2,0", "object o: box size=2", "sphere radius=3"};
+  const absl::StatusOr<v1::ApplyUpdateRequest> request = ShapesRequest(texts);
+  ASSERT_TRUE(request.ok()) << request.status();
+  ASSERT_EQ(request->operations_size(), 6);
+  const v1::DefineObject& object = request->operations(0).define_object();
+  EXPECT_EQ(object.object(), "o");
+  ASSERT_EQ(object.definition().parts_size(), 2) << "which instances find";
+  EXPECT_EQ(object.definition().parts(0).transform().m(7), 2);
+  EXPECT_EQ(request->operations(1).upsert().layer(), kMaskLayer);
+  EXPECT_EQ(request->operations(2).upsert().entity().primitive().instance().object(), "o");
+  EXPECT_EQ(request->operations(3).upsert().layer(), kLayer);
+  EXPECT_FALSE(request->operations(4).layer_state().visible());
+  EXPECT_EQ(request->operations(4).layer_state().layer(), kMaskLayer);
+  EXPECT_EQ(request->operations(5).layer_state().mask_layer(), kMaskLayer);
+  EXPECT_EQ(request->operations(5).layer_state().clip().planes(0).c(), 1);
+  for (const char* wrong :
+       {"object : sphere", "object o sphere", "mask: object o: sphere", "mask: clip_plane c=1"}) {
+    EXPECT_FALSE(ShapesRequest(std::vector<std::string>{wrong}).ok()) << wrong;
+  }
 }
 
 }  // namespace

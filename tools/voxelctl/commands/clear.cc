@@ -1,6 +1,7 @@
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
@@ -13,6 +14,15 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
   // A layer that is not there is as clear as can be.
   if (absl::IsNotFound(cleared.status())) cleared = v1::ClearLayerResponse();
   if (!cleared.ok()) return cleared.status();
+  if (!options.all && options.layer.empty()) {
+    request.set_layer(kMaskLayer);
+    const absl::StatusOr<v1::ClearLayerResponse> masks = connection.ClearLayer(request);
+    if (!masks.ok() && !absl::IsNotFound(masks.status())) return masks.status();
+    if (masks.ok()) {
+      cleared->set_entities(cleared->entities() + masks->entities());
+      cleared->set_layers(cleared->layers() + masks->layers());
+    }
+  }
   absl::StatusOr<std::vector<std::string>> patterns = std::vector<std::string>();
   if (options.layer.empty()) patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();

@@ -15,9 +15,6 @@
 
 namespace voxeld::voxelctl {
 
-// Whatever voxelctl puts up lies in this layer.
-inline constexpr const char* kLayer = "voxelctl";
-
 using Connector = std::function<absl::StatusOr<std::unique_ptr<Connection>>()>;
 
 // Reads the files before it connects: nothing is put up unless all of them can be.

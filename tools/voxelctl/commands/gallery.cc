@@ -6,6 +6,7 @@
 
 #include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "daemon/text/stroke_font.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/captured_volume.h"
@@ -15,6 +16,7 @@
 #include "tools/voxelctl/render/label.h"
 #include "tools/voxelctl/render/png_file.h"
 #include "tools/voxelctl/render/render_volume.h"
+#include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/shape/examples.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
@@ -111,7 +113,7 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     console.ProgressBar("drawing", static_cast<double>(i) / static_cast<double>(examples.size()),
                         examples[i].name);
-    const std::vector<std::string> shapes = {examples[i].text};
+    const std::vector<std::string> shapes = absl::StrSplit(examples[i].text, '\n');
     const absl::StatusOr<v1::ApplyUpdateRequest> request = ShapesRequest(shapes);
     if (!request.ok()) return request.status();
     const absl::StatusOr<ShapesPut> put = PutShapes(*request, /*add=*/true, connection);

@@ -1,6 +1,7 @@
 #include "tools/voxelctl/commands/own_layer.h"
 
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/shape/drawing.h"
 
 namespace voxeld::voxelctl {
 
@@ -18,11 +19,13 @@ absl::StatusOr<std::vector<uint64_t>> OwnersBefore(Connection& connection) {
 absl::Status TakeDown(const std::vector<uint64_t>& owners, Connection& connection) {
   for (const uint64_t owner : owners) {
     if (owner == 0) continue;  // would stand for all
-    v1::ClearLayerRequest request;
-    request.set_owner(owner);
-    request.set_layer(kLayer);
-    const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
-    if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
+    for (const char* const layer : {kLayer, kMaskLayer}) {
+      v1::ClearLayerRequest request;
+      request.set_owner(owner);
+      request.set_layer(layer);
+      const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
+      if (!cleared.ok() && !absl::IsNotFound(cleared.status())) return cleared.status();
+    }
   }
   return absl::OkStatus();
 }

@@ -18,6 +18,7 @@
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/pack.h"
 #include "tools/voxelctl/scene/placement.h"
+#include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 

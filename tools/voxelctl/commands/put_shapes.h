@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -10,9 +9,6 @@
 #include "tools/voxelctl/connection/connection.h"
 
 namespace voxeld::voxelctl {
-
-// What is to be sent. InvalidArgument names each shape that is not understood, and what would have been.
-absl::StatusOr<v1::ApplyUpdateRequest> ShapesRequest(std::span<const std::string> shapes);
 
 struct ShapesPut {
   uint64_t snapshot = 0;

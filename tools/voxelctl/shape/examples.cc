@@ -23,6 +23,10 @@ constexpr ShapeExample kExamples[] = {
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8' "
      "color=gold"},
+    {"mesh, a colour a triangle",
+     "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
+     "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8' "
+     "vertices.colors='red gold skyblue' vertices.colors_of=elements"},
     {"mesh, filled",
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8 -0.8,-0.8,-0.6 0,0.8,-0.6 0.8,-0.8,-0.6' "
@@ -51,6 +55,12 @@ constexpr ShapeExample kExamples[] = {
      "0.27,-0.27,1.1 0.8,-0.27,0.2 -0.8,0.27,0.2 -0.27,0.27,1.1 0.27,0.27,1.1 0.8,0.27,0.2 "
      "-0.8,0.8,-0.6 "
      "-0.27,0.8,0.2 0.27,0.8,0.2 0.8,0.8,-0.6' color=teal"},
+    {"bezier_surface, lines",
+     "bezier_surface vertices='-0.8,-0.8,-0.6 -0.27,-0.8,0.2 0.27,-0.8,0.2 0.8,-0.8,-0.6 "
+     "-0.8,-0.27,0.2 -0.27,-0.27,1.1 "
+     "0.27,-0.27,1.1 0.8,-0.27,0.2 -0.8,0.27,0.2 -0.27,0.27,1.1 0.27,0.27,1.1 0.8,0.27,0.2 "
+     "-0.8,0.8,-0.6 "
+     "-0.27,0.8,0.2 0.27,0.8,0.2 0.8,0.8,-0.6' fill=lines color=teal"},
     {"arrow",
      "arrow start=-0.7,-0.5,-0.6 end=0.6,0.5,0.7 shaft_radius=0.08 head_radius=0.25 color=red"},
     {"text",
@@ -65,6 +75,9 @@ constexpr ShapeExample kExamples[] = {
     {"box", "box size=1.2,0.9,0.6 turn=20,10,30 color=orange"},
     {"box, lines", "box size=1.2,0.9,0.6 fill=lines turn=20,10,30 color=orange"},
     {"sphere", "sphere radius=0.8 color=skyblue"},
+    {"sphere, a shell cut open",
+     "sphere radius=0.8 shell=10 color_scale.along=0,0,1 color_scale.colormap=viridis\n"
+     "clip_plane a=-1 b=1 d=0.1"},
     {"sphere, dots", "sphere radius=0.8 fill=dots color=skyblue"},
     {"cylinder", "cylinder radius=0.5 height=1.4 turn=20,15,0 color=lime"},
     {"ellipsoid", "ellipsoid radii=0.9,0.6,0.35 turn=0,20,30 color=pink"},
@@ -139,7 +152,15 @@ constexpr ShapeExample kExamples[] = {
      ".0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0"},
+    {"instance",
+     "object pin: cone start=0,0,-0.4 end=0,0,0.2 start_radius=0.02 end_radius=0.22 color=orange\n"
+     "object pin: sphere center=0,0,0.3 radius=0.22 color=gold\n"
+     "instance object=pin at=-0.45,0,0\n"
+     "instance object=pin at=0.4,0,0.2 turn=0,120,0 scale=1.2 tint=skyblue"},
     {"implicit", "x^2+y^2-z = 0 where x^2+y^2 <= 1"},
+    {"implicit, bounded by a spline",
+     "implicit surface='z = 0.2*sin(4*x)' color=lime "
+     "boundary='catmull_rom -0.8,-0.6,0 0.8,-0.6,0 0.3,0,0 0.8,0.8,0 -0.8,0.7,0 -0.3,0,0'"},
     {"implicit, by level",
      "implicit surface='sin(7*x)*cos(7*y)+sin(7*y)*cos(7*z)+sin(7*z)*cos(7*x) = 0 where "
      "length(x,y,z) <= 0.95' "

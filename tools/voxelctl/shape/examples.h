@@ -7,7 +7,7 @@ namespace voxeld::voxelctl {
 
 struct ShapeExample {
   const char* name;  // a label
-  const char* text;  // shape_text.h
+  const char* text;  // what draw takes, one beneath another
 };
 
 std::span<const ShapeExample> ShapeExamples();

@@ -7,7 +7,11 @@
 // (degrees about x, y and z, in this order), which place it. A VALUE with spaces stands in quotes, "…" or '…'. Vectors are
 // x,y,z, or one number for all three; boxes two corners x,y,z:x,y,z; vertices x,y,z x,y,z …; thicknesses
 // numbers of voxels, or of the shape's units with a u behind; colours #rrggbb or plain names; pictures the path of a PNG or JPEG
-// file, or base64: and its bytes.
+// file, or base64: and its bytes. A boundary is x,y,z of each vertex, the axis and its form before them: "y b_spline 1,0,0 …".
+// Numbers of grids and heights are of the type told before them: "grid.type=u8 grid.samples=…", else single precision.
+//
+//   clip_plane a= b= c= d=, clip_box center= size= at= scale= turn=, clip_cylinder start= end= radius=
+//                           no shapes, but what the others are clipped to
 #pragma once
 
 #include <string>
@@ -20,5 +24,7 @@ namespace voxeld::voxelctl {
 
 // InvalidArgument says what was not understood, and what would have been.
 absl::StatusOr<v1::Entity> ParseShapeText(absl::string_view text);
+// Adds a part of a clip; false if `text` is none.
+absl::StatusOr<bool> ParseClipText(absl::string_view text, v1::Clip* out);
 
 }  // namespace voxeld::voxelctl
