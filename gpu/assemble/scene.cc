@@ -104,7 +104,8 @@ void Scene::PutLayer(const LayerRecord& record, SceneObserver& observer) {
     return;
   }
   observer.OnLayerLook(*slot, record);
-  const bool moved = !(slot->record.transform == record.transform);
+  const bool moved =
+      !(slot->record.transform == record.transform) && !observer.OnLayerMove(*slot);
   if (moved) {
     for (Drawable* drawable : slot->drawables) observer.OnLeave(*drawable);
   }

@@ -77,6 +77,8 @@ struct SceneObserver {
   virtual void OnLeave(Drawable& drawable) = 0;
   // It is new, or has changed (after OnLeave); `layer` and `geometry` are set.
   virtual void OnEnter(Drawable& drawable) = 0;
+  // It is about to move, after OnLayerLook. True: its drawables do so together, and neither leave nor enter.
+  virtual bool OnLayerMove(Layer&) { return false; }
   // Its drawables stay as they are, but combine otherwise (LooksSame is false, or it moves).
   virtual void OnLayerLook(Layer& layer, const LayerRecord& next) = 0;
 };

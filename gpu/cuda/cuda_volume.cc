@@ -32,7 +32,8 @@ CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
                                 tuning.index_share_kept)},
       index_(device, list_budget_),
       lines_(device, list_budget_, tuning.few_lines),
-      triangles_(device, list_budget_) {}
+      triangles_(device, list_budget_),
+      least_crowd_(tuning.least_crowd) {}
 
 void RoughBox::Add(const RoughBox& other) {
   for (int a = 0; a < 3; ++a) {
@@ -107,6 +108,7 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   dead_slots_.clear();
   slot_of_.clear();
   pending_.clear();
+  crowds_.clear();
   marks_.clear();
   left_.clear();
   kept_.clear();
@@ -282,6 +284,7 @@ absl::Status CudaVolume::MarkLeft() {
 }
 
 void CudaVolume::DeferPairs() {
+  DisperseAll();
   std::vector<PairedDrawable> drawables;
   for (const auto& [drawable, slot] : slot_of_) {
     if (slots_[slot].indexed_by != IndexedBy::kPairs) continue;
@@ -361,6 +364,7 @@ double CudaVolume::ItemsToDraw() const {
 absl::Status CudaVolume::TakeIn() {
   if (absl::Status status = PutLayers(); !status.ok()) return status;
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
+  if (absl::Status status = MoveCrowds(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
   if (absl::Status status = lines_.Merge(); !status.ok()) return status;
   if (absl::Status status = lines_.SortDeferred(); !status.ok()) return status;

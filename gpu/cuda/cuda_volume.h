@@ -128,6 +128,7 @@ class CudaVolume final : private SceneObserver {
   RetainedGeometry Retain(const GeometryView& view) override;
   void OnLeave(Drawable& drawable) override;
   void OnEnter(Drawable& drawable) override;
+  bool OnLayerMove(Layer& layer) override;
   void OnLayerLook(Layer& layer, const LayerRecord& next) override;
 
   absl::Status PutLayers();
@@ -163,6 +164,32 @@ class CudaVolume final : private SceneObserver {
   absl::Status EnterGroup(RegionIndex& index, uint32_t layer, const Arriving& arriving,
                           const FewEntries* entries);
   absl::Status EnterPairs(std::span<const PairedDrawable> drawables);
+
+  // All that a layer has, if it is many boxes, spheres and cylinders: where the layer moves, the device
+  // places them anew, and the host has nothing to do for each (cuda_volume_crowds.cc).
+  struct Crowd {
+    std::vector<const Drawable*> drawables;
+    std::vector<uint32_t> slots;      // of each, with one item
+    uint32_t layer = 0;               // its slot
+    bool moved = false;               // and not yet placed anew
+    bool marks = false;               // where they were is to be drawn anew
+    Block there, firsts, transforms;  // on the device, once they have moved
+
+    uint32_t count() const { return static_cast<uint32_t>(slots.size()); }
+  };
+  using Crowds = absl::flat_hash_map<const Layer*, Crowd>;
+  // Of drawables that come: those that are crowds get their pairs, and are no more among `pairs`.
+  absl::Status EnterCrowds(std::span<const Drawable* const> drawables,
+                           std::span<const uint32_t> slots, Crowds& formed,
+                           std::vector<PairedDrawable>& pairs);
+  // Places those anew whose layers have moved. What cannot stay together leaves, and comes anew.
+  absl::Status MoveCrowds();
+  // False: it cannot stay together.
+  absl::StatusOr<bool> MoveCrowd(const Layer& layer, Crowd& crowd);
+  absl::Status BringCrowd(Crowd& crowd);
+  // A layer's drawables are on their own again: one comes, or goes.
+  void Disperse(const Layer* layer);
+  void DisperseAll();
   // Puts off all that the index of pairs has.
   void DeferPairs();
   // What is drawn by a group's number, at the same time as other groups.
@@ -225,6 +252,8 @@ class CudaVolume final : private SceneObserver {
   uint64_t live_items_ = 0, dead_items_ = 0;
   absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
   absl::flat_hash_set<const Drawable*> pending_;
+  Crowds crowds_;
+  const uint32_t least_crowd_;
 
   Block looks_, half_spaces_, cylinders_;
   Block below_[kMostDrawGroups];                    // DrawView::below of each group

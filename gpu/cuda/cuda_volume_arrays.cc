@@ -232,6 +232,7 @@ const GeometryView& CudaVolume::OnHost(const Drawable& drawable) {
 }
 
 void CudaVolume::OnLeave(Drawable& drawable) {
+  Disperse(drawable.layer);
   if (pending_.erase(&drawable) > 0) return;
   const auto it = slot_of_.find(&drawable);
   if (it == slot_of_.end()) return;
@@ -243,13 +244,20 @@ void CudaVolume::OnLeave(Drawable& drawable) {
   singular_ -= slots_[slot].singular ? 1 : 0;
 }
 
-void CudaVolume::OnEnter(Drawable& drawable) { pending_.insert(&drawable); }
+void CudaVolume::OnEnter(Drawable& drawable) {
+  Disperse(drawable.layer);
+  pending_.insert(&drawable);
+}
 
 void CudaVolume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const LayerRecord& now = layer.record;
   if (LooksSame(now, next) || (!layer.drawn && next.visible == 0)) return;
   // Nothing of it was to be seen, and it enters anew.
   if (!layer.drawn && !(now.transform == next.transform)) return;
+  if (const auto it = crowds_.find(&layer); it != crowds_.end()) {
+    it->second.marks = true;
+    return;
+  }
   for (const Drawable* drawable : layer.drawables) {
     const auto it = slot_of_.find(drawable);
     if (it != slot_of_.end()) marks_.push_back(it->second);

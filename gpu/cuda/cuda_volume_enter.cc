@@ -386,6 +386,7 @@ absl::Status CudaVolume::Enter() {
     return status;
   }
   std::vector<PairedDrawable> pairs;
+  Crowds formed;
   for (size_t i = 0; i < slots.size(); ++i) {
     const Slot& slot = slots_[slots[i]];
     if (slot.indexed_by != IndexedBy::kPairs) continue;
@@ -396,12 +397,14 @@ absl::Status CudaVolume::Enter() {
     const FewEntries few = FewOf(slots, entries);
     status = EnterRegions(IndexedBy::kLines, drawables, slots, &few);
   } else {
-    status = EnterPairs(pairs);
+    status = EnterCrowds(drawables, slots, formed, pairs);
+    if (status.ok()) status = EnterPairs(pairs);
     if (status.ok()) status = EnterRegions(IndexedBy::kLines, drawables, slots, nullptr);
     if (status.ok()) status = EnterRegions(IndexedBy::kTriangles, drawables, slots, nullptr);
   }
   if (!status.ok()) {
     // They go again, and come anew with the next frame.
+    for (const auto& [layer, crowd] : formed) index_.Loosen(crowd.layer);
     left_.insert(left_.end(), slots.begin(), slots.end());
     return status;
   }
@@ -409,6 +412,7 @@ absl::Status CudaVolume::Enter() {
     slot_of_[drawables[i]] = slots[i];
     dirty_.Add(slots_[slots[i]].box);
   }
+  crowds_.merge(formed);
   singular_ += singular;
   pending_.clear();
   return absl::OkStatus();

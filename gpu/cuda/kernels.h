@@ -19,6 +19,10 @@ cudaError_t PutFewEntries(TableEntry* table, const FewEntries& few, uint32_t cou
                           cudaStream_t stream);
 // The table has moved: every record's address is set anew.
 cudaError_t Rebase(TableEntry* table, uint32_t count, cudaStream_t stream);
+// Places solids of the table anew: those of `slots`, each by map ∘ its own of `transforms`. Adds to `*singular` how many of them
+// have no inverse.
+cudaError_t MoveSolids(TableEntry* table, const uint32_t* slots, const Affine* transforms,
+                       const Affine& map, uint32_t count, uint32_t* singular, cudaStream_t stream);
 cudaError_t Kill(TableEntry* table, const uint32_t* slots, uint32_t count, cudaStream_t stream);
 
 // ---- the index of tiles (kernels_index.cu)

@@ -59,6 +59,22 @@ __global__ void RebaseKernel(TableEntry* table, uint32_t count) {
   if (i < count) table[i].source.record = &table[i].record;
 }
 
+__global__ void MoveSolidsKernel(TableEntry* table, const uint32_t* slots, const Affine* transforms,
+                                 const __grid_constant__ Affine map, uint32_t count,
+                                 uint32_t* singular) {
+  const uint64_t i = Thread();
+  if (i >= count) return;
+  TableEntry& entry = table[slots[i]];
+  WithPrimitive(entry.record.kind, [&](auto primitive) {
+    using Primitive = typename decltype(primitive)::type;
+    if constexpr (kIsSolid<Primitive>) {
+      entry.source.solid = Solid::Of(
+          Compose(Compose(map, transforms[i]), Primitive::CanonicalMap(entry.record)));
+    }
+  });
+  if (!entry.source.solid.drawable) atomicAdd(singular, 1u);
+}
+
 __global__ void KillKernel(TableEntry* table, const uint32_t* slots, uint32_t count) {
   const uint64_t i = Thread();
   if (i < count) table[slots[i]].alive = 0;
@@ -195,6 +211,13 @@ cudaError_t FindImplicitTiles(TableEntry* table, uint32_t slot, uint32_t count,
 
 cudaError_t Rebase(TableEntry* table, uint32_t count, cudaStream_t stream) {
   RebaseKernel<<<Blocks(count), kThreads, 0, stream>>>(table, count);
+  return cudaGetLastError();
+}
+
+cudaError_t MoveSolids(TableEntry* table, const uint32_t* slots, const Affine* transforms,
+                       const Affine& map, uint32_t count, uint32_t* singular, cudaStream_t stream) {
+  MoveSolidsKernel<<<Blocks(count), kThreads, 0, stream>>>(table, slots, transforms, map, count,
+                                                           singular);
   return cudaGetLastError();
 }
 

@@ -17,6 +17,7 @@ constexpr uint64_t kMostPairs = 1ull << 31;                  // of a batch
 
 void PairIndex::Defer(std::vector<PairedDrawable> drawables) {
   batches_.clear();
+  whole_.clear();
   deferred_ = std::move(drawables);
   skip_ = 0;
   used_ = UINT64_MAX;  // there is room now
@@ -29,6 +30,7 @@ BatchList PairIndex::view() const {
                                   batch.rows.as<uint32_t>()};
   };
   for (const Batch& batch : batches_) add(batch);
+  for (const auto& [layer, batch] : whole_) add(batch);
   if (pass_) add(*pass_);
   return list;
 }
@@ -127,7 +129,8 @@ absl::Status PairIndex::AddPass(const TableEntry* table, const LayerLook* looks,
                                 const VolumeView& volume) {
   absl::Status status;
   // One place is for a pass of drawing.
-  if (batches_.size() + 1 == kMaxBatches) status = MergeFrom(0, table, volume.grid.count());
+  if (batches_.size() + whole_.size() + 1 >= kMaxBatches)
+    status = MergeFrom(0, table, volume.grid.count());
   if (!status.ok()) return status;
   {
     absl::StatusOr<Batch> batch = Paired(table, looks, list, begin, items, volume);
@@ -198,6 +201,31 @@ absl::StatusOr<size_t> PairIndex::Add(const TableEntry* table, const LayerLook* 
   deferred_.insert(deferred_.end(), drawables.begin() + static_cast<ptrdiff_t>(whole),
                    drawables.end());
   return whole;
+}
+
+absl::StatusOr<bool> PairIndex::SetWhole(uint32_t layer, const TableEntry* table,
+                                         const LayerLook* looks, const ItemList& list,
+                                         uint32_t items, const VolumeView& volume) {
+  whole_.erase(layer);
+  absl::Status status;
+  if (batches_.size() + whole_.size() + 1 >= kMaxBatches) {
+    status = MergeFrom(0, table, volume.grid.count());
+  }
+  absl::StatusOr<Batch> batch =
+      status.ok() ? Paired(table, looks, list, 0, items, volume) : absl::StatusOr<Batch>(status);
+  if (absl::IsResourceExhausted(batch.status())) return false;
+  if (!batch.ok()) return batch.status();
+  if (batch->pairs == 0) return true;
+  if (lists_.KeepsTooMuch()) return false;
+  whole_.emplace(layer, *std::move(batch));
+  return true;
+}
+
+void PairIndex::Loosen(uint32_t layer) {
+  const auto it = whole_.find(layer);
+  if (it == whole_.end()) return;
+  batches_.push_back(std::move(it->second));
+  whole_.erase(it);
 }
 
 absl::Status PairIndex::AddDeferred(const TableEntry* table, const VolumeView& volume) {

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "gpu/cuda/device.h"
@@ -41,6 +42,16 @@ class PairIndex {
   // deferred, and of these not all tiles are marked. An error leaves some of the pairs.
   absl::StatusOr<size_t> Add(const TableEntry* table, const LayerLook* looks,
                              std::span<const PairedDrawable> drawables, const VolumeView& volume);
+  // The pairs of all that a layer has, in place of those that it had before; a change to one layer leaves other batches alone.
+  // At most kMostWhole items, of at most kMostWholeLayers layers. False: there is no room, and it has none now. Marks as Add.
+  static constexpr uint32_t kMostWhole = 1u << 22, kMostWholeLayers = 8;
+  absl::StatusOr<bool> SetWhole(uint32_t layer, const TableEntry* table, const LayerLook* looks,
+                                const ItemList& list, uint32_t items, const VolumeView& volume);
+  bool MayHaveWhole(uint32_t items) const {
+    return items <= kMostWhole && whole_.size() < kMostWholeLayers;
+  }
+  // From now on these are as if they had been added.
+  void Loosen(uint32_t layer);
   // Adds the pairs of what is deferred, if other lists have gone, for as long as there is room.
   absl::Status AddDeferred(const TableEntry* table, const VolumeView& volume);
 
@@ -104,6 +115,7 @@ class PairIndex {
   Device& device_;
   ListBudget& lists_;
   std::vector<Batch> batches_;
+  absl::flat_hash_map<uint32_t, Batch> whole_;  // of layers, by slot
   std::vector<PairedDrawable> deferred_;
   uint64_t skip_ = 0;          // items of the first of these that have their pairs
   uint64_t used_ = 0;          // of the lists' pool, when AddDeferred last looked

@@ -16,6 +16,8 @@ struct Tuning {
   uint64_t group_bytes = uint64_t{24} << 20;
   // As many thin lines at most, of those that come together, are sorted by one block of threads.
   uint32_t few_lines = 1024;
+  // As many boxes, spheres and cylinders at least, if they are all that a layer has, move together with it on the device.
+  uint32_t least_crowd = 256;
   // What all lists of what lies where (of thin lines and small triangles by region, of other items by
   // tile) may take together, with their making; 0: 16 GiB, or a quarter of the device's memory if that
   // is less. What goes beyond it is drawn in passes.

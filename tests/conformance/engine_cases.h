@@ -37,6 +37,7 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few) {
   groups.few_items = 0;
   groups.group_bytes = 1;
   groups.few_lines = 0;
+  groups.least_crowd = 1;
   // With no list at all; and with none that stays.
   cuda::Tuning tight = groups, passes = groups;
   tight.index_bytes = 1;
