@@ -1,6 +1,8 @@
 // What two circles across a line, or two spheres along it, have between them: cones, truncated ones,
-// cylinders and capsules, each with two radii. P is the distance from the surface, outside of it as well
-// as inside; past the rim of a flat end it is that from the planes and the mantle, whichever is greater.
+// cylinders and capsules, each with two radii. P is the distance from the surface, outside of it; past
+// the rim of a flat end it is that from the planes and the mantle, whichever is greater. Inside it is that from the nearer of the
+// surfaces that it is made of, which where a round end meets the mantle is less by up to about the square of the depth over the
+// diameter.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"

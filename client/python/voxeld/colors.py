@@ -143,9 +143,9 @@ def numbers_each(value: Optional[Colors]) -> bool:
     return isinstance(value, np.ndarray) or (len(value) > 4 and not isinstance(value[0], str))
 
 
-def many(value: Optional[Colors], count: int, cmap: Optional[str] = None) -> Union[None, Rgb, Array]:
+def many(value: Optional[Colors], count: int, cmap: Optional[str] = None, of: str = "vertices") -> Union[None, Rgb, Array]:
     """None (the default colour), one colour, or a C-contiguous (count, 3) or (count, 4) uint8 array. Such an array is
-    taken without a copy."""
+    taken without a copy. `of`: what they are the colours of."""
     if value is None:
         if cmap is not None:
             raise InvalidColor(f"cmap is {cmap!r}, but there are no colors to map; give one number for each of {count}")
@@ -161,16 +161,16 @@ def many(value: Optional[Colors], count: int, cmap: Optional[str] = None) -> Uni
         return _from_text(value)
     if len(value) and all(isinstance(v, str) for v in value):
         if len(value) != count:
-            raise InvalidColor(f"colors are {len(value)} names for {count} vertices")
+            raise InvalidColor(f"colors are {len(value)} names for {count} {of}")
         return rgb_of([_from_text(str(v)) for v in value])
     array = as_array(value, "colors")
     if array.ndim == 1 and len(array) in (3, 4):
         return one(value, "colors")
     if array.ndim == 1 and len(array) == count and count:
-        raise InvalidColor(f"colors is one number for each of {count} vertices; say how they become colours: cmap='viridis'")
+        raise InvalidColor(f"colors is one number for each of {count} {of}; say how they become colours: cmap='viridis'")
     if array.ndim != 2 or array.shape[1] not in (3, 4):
         hint = ", did you mean .T?" if array.ndim == 2 and array.shape[0] in (3, 4) else ""
         raise InvalidColor(f"colors must be one colour or of shape ({count}, 3) or ({count}, 4), got {array.shape}{hint}")
     if len(array) != count:
-        raise InvalidColor(f"colors are {len(array)} for {count} vertices")
+        raise InvalidColor(f"colors are {len(array)} for {count} {of}")
     return np.ascontiguousarray(_bytes_of(array, "colors"))

@@ -76,7 +76,7 @@ def points(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional
 
 def _each_element(colors: Optional[Colors], cmap: Optional[str], count: int, what: str) -> Optional[Array]:
     """(count, 3): of each segment or face its own."""
-    found = colors_.many(colors, count, cmap)
+    found = colors_.many(colors, count, cmap, "segments" if what == "segment_colors" else "faces")
     if found is None:
         return None
     if isinstance(found, int):

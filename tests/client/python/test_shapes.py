@@ -6,7 +6,7 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from voxeld import InvalidArray, InvalidValue, shapes, wire
+from voxeld import InvalidArray, InvalidColor, InvalidValue, shapes, wire
 from voxeld.v1 import primitives_pb2 as pb
 
 NUMPY = np.random.default_rng(1)
@@ -166,11 +166,11 @@ class ColorsOfElements(unittest.TestCase):
         at = np.zeros((6, 3))
         for wrong, words in (
                 (lambda: shapes.mesh(at, colors="red", face_colors="red"), "give one of them"),
-                (lambda: shapes.mesh(at, face_colors=np.zeros((3, 3), np.uint8)), "colors are 3 for 2"),
+                (lambda: shapes.mesh(at, face_colors=np.zeros((3, 3), np.uint8)), "colors are 3 for 2 faces"),
                 (lambda: shapes.lines(at, colors="red", segment_colors="red"), "give one of them"),
-                (lambda: shapes.lines(at, segment_colors=np.zeros((6, 3), np.uint8)), "colors are 6 for 5")):
+                (lambda: shapes.lines(at, segment_colors=np.zeros((6, 3), np.uint8)), "colors are 6 for 5 segments")):
             with self.subTest(words):
-                with self.assertRaisesRegex((InvalidValue, InvalidArray), words):
+                with self.assertRaisesRegex((InvalidValue, InvalidArray, InvalidColor), words):
                     wrong()
 
     def test_shells(self) -> None:

@@ -203,6 +203,8 @@ class FakeServer::Scene final : public v1::SceneService::Service {
   grpc::Status ClearLayer(grpc::ServerContext*, const v1::ClearLayerRequest* request,
                           v1::ClearLayerResponse* response) override {
     sync::MutexLock lock(server_.mutex_);
+    // Nothing is ever masked there.
+    if (request->layer() == "voxelctl mask") return {grpc::StatusCode::NOT_FOUND, "no such layer"};
     server_.log_.clears.push_back(*request);
     if (request->layer() == "absent") return {grpc::StatusCode::NOT_FOUND, "no layer absent"};
     response->set_entities(2);

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -22,7 +23,7 @@ class Drawing {
     std::string rest = text;
     std::string object;
     const bool mask = absl::StartsWith(rest, kMaskWord);
-    if (mask) rest = rest.substr(kMaskWord.size());
+    if (mask) rest = std::string(absl::StripLeadingAsciiWhitespace(rest.substr(kMaskWord.size())));
     if (absl::StartsWith(rest, kObjectWord)) {
       const size_t colon = rest.find(':');
       if (mask || colon == std::string::npos || colon == kObjectWord.size()) {
