@@ -7,6 +7,7 @@
 #include "gpu/cuda/items-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/cuda/samples-inl.h"
+#include "gpu/cuda/solids-inl.h"
 #include "gpu/primitives/list.h"
 
 namespace voxeld::gpu::cuda {
@@ -58,55 +59,8 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
 
 // By the whole block rather than by a warp.
 __device__ inline bool IsForBlock(PrimitiveKind kind) {
-  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
-         kind == PrimitiveKind::kCylinder || kind == PrimitiveKind::kImplicit ||
-         kind == PrimitiveKind::kSamples || kind == PrimitiveKind::kFilled;
-}
-
-// A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
-// them.
-template <class Shape>
-__device__ void DrawSolid(const TableEntry& entry, const Box3& box, uint32_t* words,
-                          SolidBlock& block) {
-  const Solid& s = entry.source.solid;
-  const Box3 part = Intersect(box, s.bounds);
-  const uint32_t word = MakeWord(entry.priority, entry.erase != 0, entry.source.UniformColor());
-  if (threadIdx.x == 0 && Contains(box, s.origin[0], s.origin[1], s.origin[2]) &&
-      !IsInside<Shape>(s, s.origin[0], s.origin[1], s.origin[2])) {
-    atomicMax(
-        &words[IndexInRegion(static_cast<int32_t>(s.origin[0]), static_cast<int32_t>(s.origin[1]),
-                             static_cast<int32_t>(s.origin[2]))],
-        word);
-  }
-  if (IsEmpty(part)) return;  // the same for every thread
-  int64_t lo[3], hi[3];
-  for (int a = 0; a < 3; ++a) {
-    lo[a] = static_cast<int64_t>(part.lo[a]) - 1;
-    hi[a] = static_cast<int64_t>(part.hi[a]) + 1;
-  }
-  const int32_t rows_y = static_cast<int32_t>(hi[1] - lo[1]);
-  const int32_t rows = rows_y * static_cast<int32_t>(hi[2] - lo[2]);
-  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < rows;
-       i += static_cast<int32_t>(kDrawThreads)) {
-    block.FillRow<Shape>(s, lo, hi, lo[1] + i % rows_y, lo[2] + i / rows_y);
-  }
-  __syncthreads();
-  const int32_t inner_y = part.hi[1] - part.lo[1];
-  const int32_t inner = inner_y * (part.hi[2] - part.lo[2]);
-  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < inner;
-       i += static_cast<int32_t>(kDrawThreads)) {
-    const int32_t y = i % inner_y, z = i / inner_y;
-    uint32_t row = block.bits[z + 1][y + 1];
-    if (row != 0 && entry.record.fill == Fill::kSurface) {
-      row &= ~block.Enclosed(y + 1, z + 1, entry.record.rule);
-    }
-    for (int32_t x = part.lo[0]; x < part.hi[0]; ++x) {
-      if ((row >> (x - part.lo[0] + 1)) & 1u) {
-        atomicMax(&words[IndexInRegion(x, part.lo[1] + y, part.lo[2] + z)], word);
-      }
-    }
-  }
-  __syncthreads();
+  return IsSolid(kind) || kind == PrimitiveKind::kImplicit || kind == PrimitiveKind::kSamples ||
+         kind == PrimitiveKind::kFilled;
 }
 
 // What the CPU has drawn of a tile, by a warp. Voxels are named as they lie in the tile.
@@ -157,15 +111,21 @@ __device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const 
 __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const TileGrid& grid,
                                  uint32_t* words, PairScratch& scratch) {
   const uint32_t count = scratch.heavy_count;
+  // Several solids are drawn at once, one alone by all threads.
+  constexpr uint32_t kSeveral = 3;
+  const bool several = count >= kSeveral;
   for (uint32_t i = threadIdx.x / 32; i < count; i += kDrawWarps) {
     const TableEntry& entry = table[scratch.heavy[i] >> 32];
-    if (!IsForBlock(entry.record.kind)) {
+    if (several && IsSolid(entry.record.kind)) {
+      DrawSolidByWarp(entry, box, words);
+    } else if (!IsForBlock(entry.record.kind)) {
       DrawByWarp(entry, static_cast<uint32_t>(scratch.heavy[i]), box, grid, words);
     }
   }
   __syncthreads();
   for (uint32_t i = 0; i < count; ++i) {
     const TableEntry& entry = table[scratch.heavy[i] >> 32];
+    if (several && IsSolid(entry.record.kind)) continue;
     switch (entry.record.kind) {
       case PrimitiveKind::kBox:
         DrawSolid<Box>(entry, box, words, scratch.solid);

@@ -4,7 +4,7 @@ set(VOXELD_CUDA_KERNELS
   kernels_few_lines.cu kernels_filled.cu kernels_generate.cu kernels_index.cu kernels_line_regions.cu
   kernels_lines.cu kernels_slice.cu kernels_triangles.cu)
 set(VOXELD_CUDA_KERNEL_PARTS
-  draw-inl.h filled-inl.h flush-inl.h implicit-inl.h items-inl.h lines-inl.h pairs-inl.h pixels-inl.h region_scratch-inl.h samples-inl.h spans-inl.h
+  draw-inl.h filled-inl.h flush-inl.h implicit-inl.h items-inl.h lines-inl.h pairs-inl.h pixels-inl.h region_scratch-inl.h samples-inl.h solids-inl.h spans-inl.h
   triangles-inl.h unsorted-inl.h warp-inl.h)
 set(VOXELD_CUDA_HOST
   api.cc broadcast_plan.cc cpu_voxels.cc cuda_core.cc cuda_engine.cc cuda_generator.cc cuda_pictures.cc cuda_volume.cc

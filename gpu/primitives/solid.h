@@ -38,6 +38,7 @@ struct Solid {
     const double det = (m[0] * cofactor[0][0] + m[1] * cofactor[1][0]) + m[2] * cofactor[2][0];
     constexpr double kHuge = 1e300;
     double reach[3] = {};  // of the shape from its origin, voxels
+    double scales[3];
     for (int r = 0; r < 3; ++r) {
       double row[3], greatest = 0;
       for (int c = 0; c < 3; ++c) {
@@ -46,16 +47,29 @@ struct Solid {
         greatest = Max(greatest, Abs(row[c]));
       }
       const double scale = keep_thin && greatest > kMaxRow ? kMaxRow / greatest : 1.0;
+      scales[r] = scale;
       for (int c = 0; c < 3; ++c) {
         s.inverse[r][c] = static_cast<float>(row[c] * scale);
         reach[c] = reach[c] + Abs(m[c * 4 + r]) / scale;
       }
     }
+    // By how much canonical coordinates are off in single precision, there, and what that makes in voxels.
+    constexpr double kRounding = 2.5e-7;
+    double spare[3] = {};
+    for (int r = 0; r < 3; ++r) {
+      double off = 0;
+      for (int c = 0; c < 3; ++c) off = off + Abs(static_cast<double>(s.inverse[r][c])) * reach[c];
+      for (int c = 0; c < 3; ++c)
+        spare[c] = spare[c] + Abs(m[c * 4 + r]) / scales[r] * (off * kRounding);
+    }
     for (int a = 0; a < 3; ++a) {
       const int64_t units = Snap(m[a * 4 + 3]);
       s.origin[a] = VoxelOf(units);
       s.rest[a] = units - s.origin[a] * kUnitsPerVoxel;
-      const int64_t size = reach[a] < 1073741824.0 ? FloorToInt(reach[a] * 1.0001) + 2 : 1 << 30;
+      // The centre of a voxel inside is no farther from the origin than that, and the origin less than half a
+      // voxel from the centre of its own.
+      const double far = reach[a] + spare[a] + 0.5625;
+      const int64_t size = far < 1073741824.0 ? FloorToInt(far) : 1 << 30;
       s.bounds.lo[a] = ToVoxel32(s.origin[a] - size);
       s.bounds.hi[a] = ToVoxel32(s.origin[a] + size + 1);
     }
