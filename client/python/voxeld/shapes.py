@@ -21,8 +21,9 @@ from .v1 import types_pb2
 
 # A piece's payload at most; with its head a message stays below 1 MiB.
 PIECE_BYTES = (1 << 20) - (2 << 10)
-# Of what cannot come in pieces; servers take messages of 16 MiB unless they are told otherwise.
-WHOLE_BYTES = 15 << 20
+# Of what cannot come in pieces: what protobuf has room for. A session says before it sends anything if that is more than its
+# server's max_message_bytes, 16 MiB unless the server is told otherwise.
+WHOLE_BYTES = 1 << 30
 
 _MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segments.LIST}
 SAMPLINGS = {"thin": pb.LINE_SAMPLING_THIN, "euclidean": pb.LINE_SAMPLING_EUCLIDEAN, "cover": pb.LINE_SAMPLING_COVER}
