@@ -151,12 +151,17 @@ __device__ void RaiseLayer(const DrawView& view, const RegionPlace& place,
   }
   if constexpr (kWhat == DrawWhat::kAll) {
     if (scratch.pairs == 0) return;
+    __syncthreads();
+    if (threadIdx.x == 0) all.pairs.heavy_count = 0;
+    __syncthreads();
     for (uint32_t t = 0; t < kRegionTiles; ++t) {
       const uint32_t tile = place.TileOf(view.volume, t);
       if (tile == kAllLanes) continue;
       DrawPairs(view, all.rows, t, tile, scratch, all.pairs);
       if (view.unlisted.items != 0) DrawUnlisted(view, tile, scratch, all.pairs);
     }
+    if (all.pairs.heavy_count != 0)
+      DrawHeavy(view.table, view.volume.grid, scratch.words, all.pairs);
   }
 }
 

@@ -13,7 +13,8 @@
 namespace voxeld::gpu::cuda {
 
 struct PairScratch {
-  uint64_t heavy[kDrawThreads];  // pairs for many threads
+  uint64_t heavy[kDrawThreads];  // pairs for many threads,
+  uint32_t tiles[kDrawThreads];  // and which tile each is of
   uint32_t heavy_count;
   union {
     SolidBlock solid;
@@ -108,14 +109,16 @@ __device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const 
   }
 }
 
-__device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const TileGrid& grid,
-                                 uint32_t* words, PairScratch& scratch) {
+// All that are listed, which are none then; by the whole block, which has come to a barrier.
+__device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, uint32_t* words,
+                                 PairScratch& scratch) {
   const uint32_t count = scratch.heavy_count;
   // Several solids are drawn at once, one alone by all threads.
   constexpr uint32_t kSeveral = 3;
   const bool several = count >= kSeveral;
   for (uint32_t i = threadIdx.x / 32; i < count; i += kDrawWarps) {
     const TableEntry& entry = table[scratch.heavy[i] >> 32];
+    const Box3 box = grid.VoxelsOf(scratch.tiles[i]);
     if (several && IsSolid(entry.record.kind)) {
       DrawSolidByWarp(entry, box, words);
     } else if (!IsForBlock(entry.record.kind)) {
@@ -126,6 +129,7 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
   for (uint32_t i = 0; i < count; ++i) {
     const TableEntry& entry = table[scratch.heavy[i] >> 32];
     if (several && IsSolid(entry.record.kind)) continue;
+    const Box3 box = grid.VoxelsOf(scratch.tiles[i]);
     switch (entry.record.kind) {
       case PrimitiveKind::kBox:
         DrawSolid<Box>(entry, box, words, scratch.solid);
@@ -149,6 +153,8 @@ __device__ inline void DrawHeavy(const TableEntry* table, const Box3& box, const
         break;
     }
   }
+  __syncthreads();
+  if (threadIdx.x == 0) scratch.heavy_count = 0;
   __syncthreads();
 }
 
@@ -194,14 +200,17 @@ __device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t l
 }
 
 // A pair's voxels; true if it is heavy: then it is listed.
-__device__ inline bool DrawLight(const DrawView& view, uint64_t value, const Box3& box,
+__device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t tile,
                                  RegionScratch& region, PairScratch& scratch) {
+  const Box3 box = view.volume.grid.VoxelsOf(tile);
   const TableEntry& entry = view.table[value >> 32];
   const uint32_t item = static_cast<uint32_t>(value);
   const bool heavy = entry.alive != 0 && IsHeavy(entry, item, box);
   if (entry.alive == 0) {
   } else if (heavy) {
-    scratch.heavy[atomicAdd(&scratch.heavy_count, 1u)] = value;
+    const uint32_t at = atomicAdd(&scratch.heavy_count, 1u);
+    scratch.heavy[at] = value;
+    scratch.tiles[at] = tile;
   } else if (entry.record.kind == PrimitiveKind::kPoints) {
     DrawItem<Points>(entry, item, box, region.words);
   } else if (entry.record.kind == PrimitiveKind::kSegments) {
@@ -212,31 +221,24 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, const Box
   return heavy;
 }
 
-// The layer's pairs of one tile, by the whole block.
+// The layer's pairs of one tile, by the whole block. What is heavy is listed: it is drawn with that of other tiles, when there is
+// no more room for what may come.
 __device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, uint32_t t,
                                  uint32_t tile, RegionScratch& region, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
-  const Box3 box = grid.VoxelsOf(tile);
-  if (threadIdx.x == 0) scratch.heavy_count = 0;
-  __syncthreads();
   for (uint32_t b = 0; b < view.pairs.count; ++b) {
     const uint32_t end = rows.end[t][b];
-    // In rounds of the block's size, so that what is heavy is drawn before its list is full.
     for (uint32_t round = rows.begin[t][b]; round < end; round += kDrawThreads) {
+      // The same for every thread: a barrier lies between this and whatever is listed before or after it.
+      if (scratch.heavy_count + Min(end - round, kDrawThreads) > kDrawThreads) {
+        DrawHeavy(view.table, grid, region.words, scratch);
+      }
       const uint32_t p = round + threadIdx.x;
-      bool heavy = false;
-      if (p < end) {
-        const uint64_t value = view.pairs.batches[b].values[p];
-        heavy = DrawLight(view, value, box, region, scratch);
-      }
-      if (__syncthreads_or(heavy ? 1 : 0) != 0) {
-        DrawHeavy(view.table, box, grid, region.words, scratch);
-        if (threadIdx.x == 0) scratch.heavy_count = 0;
-        __syncthreads();
-      }
+      __syncthreads();
+      if (p < end) DrawLight(view, view.pairs.batches[b].values[p], tile, region, scratch);
+      __syncthreads();
     }
   }
-  __syncthreads();
 }
 
 // What the layer has in one tile of items that are not listed, by the whole block. Rare, and apart, so
@@ -245,18 +247,16 @@ static __device__ __noinline__ void DrawUnlisted(const DrawView& view, uint32_t 
                                                  RegionScratch& region, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   const Box3 box = grid.VoxelsOf(tile);
-  if (threadIdx.x == 0) scratch.heavy_count = 0;
+  if (scratch.heavy_count != 0) DrawHeavy(view.table, grid, region.words, scratch);
   for (uint64_t i = threadIdx.x; __syncthreads_or(i < view.unlisted.items) != 0;
        i += kDrawThreads) {
     bool heavy = false;
     uint64_t value;
     if (i < view.unlisted.items && FindUnlisted(view, i, region.layer, tile, box, value)) {
-      heavy = DrawLight(view, value, box, region, scratch);
+      heavy = DrawLight(view, value, tile, region, scratch);
     }
     if (__syncthreads_or(heavy ? 1 : 0) != 0) {
-      DrawHeavy(view.table, box, grid, region.words, scratch);
-      if (threadIdx.x == 0) scratch.heavy_count = 0;
-      __syncthreads();
+      DrawHeavy(view.table, grid, region.words, scratch);
     }
   }
 }
