@@ -104,8 +104,7 @@ void Scene::PutLayer(const LayerRecord& record, SceneObserver& observer) {
     return;
   }
   observer.OnLayerLook(*slot, record);
-  const bool moved =
-      !(slot->record.transform == record.transform) && !observer.OnLayerMove(*slot);
+  const bool moved = !(slot->record.transform == record.transform) && !observer.OnLayerMove(*slot);
   if (moved) {
     for (Drawable* drawable : slot->drawables) observer.OnLeave(*drawable);
   }

@@ -68,8 +68,8 @@ __global__ void MoveSolidsKernel(TableEntry* table, const uint32_t* slots, const
   WithPrimitive(entry.record.kind, [&](auto primitive) {
     using Primitive = typename decltype(primitive)::type;
     if constexpr (kIsSolid<Primitive>) {
-      entry.source.solid = Solid::Of(
-          Compose(Compose(map, transforms[i]), Primitive::CanonicalMap(entry.record)));
+      entry.source.solid =
+          Solid::Of(Compose(Compose(map, transforms[i]), Primitive::CanonicalMap(entry.record)));
     }
   });
   if (!entry.source.solid.drawable) atomicAdd(singular, 1u);

@@ -75,8 +75,8 @@ class Spans {
 // How many even parts of a span's 4 points are no farther from it than `error`: max|B″|/(8n²), where |B″| is at most 6 times the
 // greater of the points' second differences. A whole number, at least 1.
 inline double PartsOfSpan(const implicit::Vector* p, double error) {
-  const double bend = std::max(implicit::Length(p[0] - 2 * p[1] + p[2]),
-                               implicit::Length(p[1] - 2 * p[2] + p[3]));
+  const double bend =
+      std::max(implicit::Length(p[0] - 2 * p[1] + p[2]), implicit::Length(p[1] - 2 * p[2] + p[3]));
   return std::max(1.0, std::ceil(std::sqrt(0.75 * bend / error)));
 }
 
