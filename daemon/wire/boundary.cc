@@ -1,6 +1,7 @@
 #include "daemon/wire/boundary.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/fields.h"
@@ -58,7 +59,13 @@ MaybeFault ToLines(const FieldPath& path, const std::vector<Vector>& vertices, g
       }
       for (double i = 0; i < parts; ++i) {
         const Vector at = gpu::OnSpan(p, i / parts);
-        for (int a = 0; a < 3; ++a) points->push_back(static_cast<float>(at[a]));
+        for (int a = 0; a < 3; ++a) {
+          points->push_back(static_cast<float>(at[a]));
+          if (std::isfinite(points->back())) continue;
+          return Fault{FieldPath(path, "points").ToString(), Reason::kOutOfRange,
+                       absl::StrCat("are of smooth curves that reach to ", Show(at[a]),
+                                    ", beyond what single precision holds; give it a transform")};
+        }
       }
     }
     end = static_cast<uint32_t>(points->size() / 3);

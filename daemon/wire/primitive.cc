@@ -385,11 +385,16 @@ MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const Deco
   return {};
 }
 
-// Of what may take more than its message: what is kept as it was sent has become something else.
-uint64_t MadeBytes(const Content& content) {
+// Of what may take more than its message: what is kept as it was sent has become something else, and elements with colours have
+// vertices of their own.
+uint64_t MadeBytes(const v1::Primitive& in, const Content& content) {
   if (const auto* group = std::get_if<GroupPtr>(&content)) return (*group)->bytes();
   const auto* geometry = std::get_if<GeometryPtr>(&content);
-  return geometry != nullptr && (*geometry)->kind != nullptr ? (*geometry)->bytes() : 0;
+  const bool made =
+      geometry != nullptr && ((*geometry)->kind != nullptr ||
+                              in.segments().vertices().colors_of() == v1::Vertices::ELEMENTS ||
+                              in.mesh().vertices().colors_of() == v1::Vertices::ELEMENTS);
+  return made ? (*geometry)->bytes() : 0;
 }
 
 }  // namespace
@@ -404,7 +409,7 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Decod
                               " bytes; max_uncommitted_bytes is ", most, ": commit less at once")};
   }
   if (auto fault = ToWhatItIs(path, in, context, out)) return fault;
-  if (counted) *context.decoded_bytes += MadeBytes(*out);
+  if (counted) *context.decoded_bytes += MadeBytes(in, *out);
   return {};
 }
 

@@ -323,6 +323,10 @@ MaybeFault ToText(const FieldPath& primitive_path, const v1::Primitive& primitiv
   if (!lines && in.style() != v1::Text::STYLE_UNSPECIFIED && in.style() != v1::Text::FILLED) {
     return UnknownEnum(FieldPath(path, "style"), in.style(), "FILLED, OUTLINE, STROKES");
   }
+  if (!primitive.color_scale().scalars().empty()) {
+    return Fault{FieldPath(scale_path, "scalars").ToString(), Reason::kInvalidValue,
+                 "is given, but the shape has no vertices; give along"};
+  }
   if (context.fonts == nullptr) {
     return Unimplemented(path, "there are no fonts here; draw its lines as segments");
   }

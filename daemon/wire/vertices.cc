@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/payload.h"
@@ -245,19 +246,23 @@ MaybeFault CheckColorsOf(const FieldPath& path, const v1::Vertices& in, bool col
                "is ELEMENTS, which are segments and triangles; give VERTICES"};
 }
 
-// The corners of each element, one element's after another's: numbers of vertices.
-std::vector<uint32_t> CornersOfElements(const gpu::GeometryRecord& record,
-                                        std::span<const uint32_t> indices) {
-  const uint32_t corners = indices.empty() ? record.vertex_count : record.index_count;
-  const auto at = [&](uint32_t i) { return indices.empty() ? i : indices[i]; };
-  std::vector<uint32_t> all;
+// How many corners the elements have, each its own.
+uint64_t CountCorners(const gpu::GeometryRecord& record) {
+  const uint64_t corners = record.index_count != 0 ? record.index_count : record.vertex_count;
   if (record.kind == gpu::PrimitiveKind::kTriangles || record.topology == gpu::Topology::kList) {
-    for (uint32_t i = 0; i < corners; ++i) all.push_back(at(i));
-    return all;
+    return corners;
   }
-  for (uint32_t i = 0; i + 1 < corners; ++i) all.insert(all.end(), {at(i), at(i + 1)});
-  if (record.topology == gpu::Topology::kLoop) all.insert(all.end(), {at(corners - 1), at(0)});
-  return all;
+  return 2 * (record.topology == gpu::Topology::kLoop ? corners : corners - 1);
+}
+
+// Of the corner `i` of all elements, one after another, the vertex.
+uint32_t VertexOfCorner(const gpu::GeometryRecord& record, std::span<const uint32_t> indices,
+                        uint64_t i) {
+  const bool listed =
+      record.kind == gpu::PrimitiveKind::kTriangles || record.topology == gpu::Topology::kList;
+  const uint64_t corners = indices.empty() ? record.vertex_count : indices.size();
+  const uint64_t at = listed ? i : (i / 2 + i % 2) % corners;
+  return indices.empty() ? static_cast<uint32_t>(at) : indices[at];
 }
 
 }  // namespace
@@ -324,22 +329,22 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
 MaybeFault ToElementColors(const FieldPath& path, const v1::Vertices& in,
                            const DecodeContext& context, GeometryData* out) {
   if (in.colors_of() != v1::Vertices::ELEMENTS) return {};
-  const std::vector<uint32_t> corners = CornersOfElements(out->record, out->arrays.indices());
+  const uint64_t corners = CountCorners(out->record);
   const size_t each = out->record.kind == gpu::PrimitiveKind::kTriangles ? 3 : 2;
   Array colors = ArraysOf(in, context).colors;
-  if (auto fault = CheckArray(path, corners.size() / each, ColorBytes(in.color_type()),
-                              context.ranges, &colors)) {
+  if (auto fault =
+          CheckArray(path, corners / each, ColorBytes(in.color_type()), context.ranges, &colors)) {
     return fault;
   }
-  if (auto fault = CheckCount(path, "colors_of", corners.size(),
-                              context.limits.max_vertices_per_entity, "max_vertices_per_entity")) {
-    fault->message = absl::StrCat("makes ", corners.size(),
-                                  " corners of elements; max_vertices_per_entity allows ",
-                                  context.limits.max_vertices_per_entity);
+  if (auto fault = CheckCount(path, "colors_of", corners, context.limits.max_vertices_per_entity,
+                              "max_vertices_per_entity")) {
+    fault->message =
+        absl::StrCat("makes ", corners, " corners of elements; max_vertices_per_entity allows ",
+                     context.limits.max_vertices_per_entity);
     return fault;
   }
   gpu::GeometryRecord record = out->record;
-  record.vertex_count = static_cast<uint32_t>(corners.size());
+  record.vertex_count = static_cast<uint32_t>(corners);
   record.index_count = 0;
   record.color_mode = gpu::ColorMode::kPerVertex;
   record.topology = gpu::Topology::kList;
@@ -348,11 +353,11 @@ MaybeFault ToElementColors(const FieldPath& path, const v1::Vertices& in,
     return Fault{FieldPath(path, "colors_of").ToString(), Reason::kQuotaExceeded,
                  absl::StrCat("cannot be kept: ", kept.status().message())};
   }
-  std::vector<uint32_t> of_elements(corners.size() / each);
+  std::vector<uint32_t> of_elements(corners / each);
   CopyColors(colors.payload, ColorBytes(in.color_type()), of_elements);
-  for (size_t i = 0; i < corners.size(); ++i) {
-    std::copy_n(&out->arrays.positions()[size_t{corners[i]} * 3], 3,
-                &kept->writable_positions()[i * 3]);
+  for (size_t i = 0; i < corners; ++i) {
+    const size_t vertex = VertexOfCorner(out->record, out->arrays.indices(), i);
+    std::copy_n(&out->arrays.positions()[vertex * 3], 3, &kept->writable_positions()[i * 3]);
     kept->writable_colors()[i] = of_elements[i / each];
   }
   out->record = record;

@@ -169,7 +169,7 @@ class CudaVolume final : private SceneObserver {
   // places them anew, and the host has nothing to do for each (cuda_volume_crowds.cc).
   struct Crowd {
     std::vector<const Drawable*> drawables;
-    std::vector<uint32_t> slots;      // of each, with one item
+    std::vector<uint32_t> slots;      // of each, with one item: none is without an inverse
     uint32_t layer = 0;               // its slot
     bool moved = false;               // and not yet placed anew
     bool marks = false;               // where they were is to be drawn anew

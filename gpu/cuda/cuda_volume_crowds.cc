@@ -25,6 +25,7 @@ absl::Status CudaVolume::EnterCrowds(std::span<const Drawable* const> drawables,
     if (!IsSolidKind(record.kind) || record.drawn_by == DrawnBy::kCpu) continue;
     if (slots_[slots[i]].items != 1) continue;  // without an inverse
     Crowd& crowd = formed[drawables[i]->layer];
+    crowd.layer = layer_slots_.at(drawables[i]->layer->record.id);
     crowd.drawables.push_back(drawables[i]);
     crowd.slots.push_back(slots[i]);
   }
@@ -35,7 +36,6 @@ absl::Status CudaVolume::EnterCrowds(std::span<const Drawable* const> drawables,
   absl::flat_hash_set<uint32_t> taken;
   for (auto it = formed.begin(); it != formed.end();) {
     Crowd& crowd = it->second;
-    crowd.layer = layer_slots_.at(it->first->record.id);
     absl::StatusOr<bool> whole = index_.MayHaveWhole(crowd.count());
     if (*whole) {
       const absl::StatusOr<UploadedList> list =

@@ -207,6 +207,7 @@ absl::StatusOr<bool> PairIndex::SetWhole(uint32_t layer, const TableEntry* table
                                          const LayerLook* looks, const ItemList& list,
                                          uint32_t items, const VolumeView& volume) {
   whole_.erase(layer);
+  if (!MayHaveWhole(items)) return false;
   absl::Status status;
   if (batches_.size() + whole_.size() + 1 >= kMaxBatches) {
     status = MergeFrom(0, table, volume.grid.count());
@@ -252,6 +253,10 @@ void PairIndex::Forget(std::span<const uint32_t> slots) {
 absl::Status PairIndex::MergeFrom(size_t first, const TableEntry* table, uint32_t tiles) {
   uint64_t pairs = 0;
   for (size_t b = first; b < batches_.size(); ++b) pairs += batches_[b].pairs;
+  if (pairs == 0) {
+    batches_.resize(first);
+    return absl::OkStatus();
+  }
   absl::StatusOr<Arrays> arrays = ArraysFor(pairs);
   if (!arrays.ok()) return arrays.status();
   const auto count = static_cast<uint32_t>(pairs);

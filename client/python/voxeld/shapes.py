@@ -100,7 +100,7 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
     strips, each_strip = (array.shape[0], array.shape[1]) if many else (1, len(array))
     array, element = positions(array.reshape(-1, 3) if many else at, "lines")
     topology = choice(_MODES, mode or ("strip"), "mode")
-    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap))
+    color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap if segment_colors is None else None))
     if many and each_strip > 2 or many and topology == pb.Segments.LOOP:
         # Strips side by side, as pairs.
         start = np.arange(len(array)).reshape(strips, each_strip)

@@ -95,8 +95,8 @@ class Curves(unittest.TestCase):
         self.assertEqual(surface.grid.type, pb.ELEMENT_TYPE_F32)
         with self.assertRaisesRegex(InvalidArray, r"array must be of shape \(nx, ny, nz\)"):
             grids.isosurface([1, 2, 3], 1)
-        with self.assertRaisesRegex(InvalidArray, "more than the 15728640 that go at once"):
-            grids.grid(np.zeros((300, 300, 300), np.uint8))
+        with self.assertRaisesRegex(InvalidArray, "more than the 1073741824 that go at once"):
+            grids.grid(np.broadcast_to(np.uint8(0), (1100, 1100, 1100)))  # which takes no memory
         with self.assertRaisesRegex(InvalidValue, "colors has 1 for 2 values"):
             grids.grid(field, values=[0, 1], colors=["red"])
         with self.assertRaisesRegex(InvalidValue, "give these as well"):

@@ -160,6 +160,9 @@ class ColorsOfElements(unittest.TestCase):
         self.assertGreater(len(got), 1)
         for v in got:
             self.assertEqual(len(v.colors), v.count)
+        line, = parsed(shapes.lines(at[:4], segment_colors=[0.0, 0.5, 1.0], cmap="gray"))
+        self.assertEqual(len(line.segments.vertices.colors) % 3, 0)
+        self.assertEqual(line.segments.vertices.colors_of, pb.Vertices.ELEMENTS)
         one, = parsed(shapes.mesh(at[:6], face_colors="red"))
         self.assertEqual(one.mesh.vertices.colors, b"\xff\0\0" * 2)
 

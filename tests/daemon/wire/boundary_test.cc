@@ -174,6 +174,16 @@ TEST(Boundaries, LimitsHoldForTheLines) {
   EXPECT_THAT(fault->message, HasSubstr("more lines than max_boundary_points allows"));
 }
 
+TEST(Boundaries, OvershootingAllNumbersIsRefused) {
+  const std::vector<Point> vast = {{-3e38, -3e38}, {3e38, -3e38}, {3e38, 3e38}, {-3e38, 3e38}};
+  Content content;
+  const MaybeFault fault =
+      FaultOf(Bounded(vast, v1::Boundary::CATMULL_ROM, v1::Boundary::Z), &content);
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->reason, Reason::kOutOfRange);
+  EXPECT_THAT(fault->message, HasSubstr("beyond what single precision holds"));
+}
+
 P Smooth() { return Bounded(kOutline, v1::Boundary::CATMULL_ROM, v1::Boundary::Z); }
 
 TEST(Boundaries, WhatIsWrongIsSaid) {

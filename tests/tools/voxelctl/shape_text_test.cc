@@ -232,7 +232,8 @@ TEST(Drawings, ObjectsMasksAndClipsComeWithTheShapes) {
   EXPECT_EQ(request->operations(5).layer_state().mask_layer(), kMaskLayer);
   EXPECT_EQ(request->operations(5).layer_state().clip().planes(0).c(), 1);
   for (const char* wrong :
-       {"object : sphere", "object o sphere", "mask: object o: sphere", "mask: clip_plane c=1"}) {
+       {"object : sphere", "object o sphere", "mask: object o: sphere", "mask: clip_plane c=1",
+        "object o: sphere", "mask: sphere", "clip_plane c=1"}) {
     EXPECT_FALSE(ShapesRequest(std::vector<std::string>{wrong}).ok()) << wrong;
   }
 }

@@ -53,6 +53,8 @@ class Drawing {
     return absl::OkStatus();
   }
 
+  bool empty() const { return shapes_.empty(); }
+
   v1::ApplyUpdateRequest Request() && {
     v1::ApplyUpdateRequest request;
     for (auto& [name, definition] : objects_) {
@@ -96,6 +98,9 @@ absl::StatusOr<v1::ApplyUpdateRequest> ShapesRequest(std::span<const std::string
     const absl::Status status = drawing.Add(shape);
     if (status.ok()) continue;
     errors.push_back(absl::StrCat("\"", EscapeForTerminal(shape), "\": ", status.message()));
+  }
+  if (errors.empty() && drawing.empty()) {
+    errors.push_back("nothing is drawn: there is no shape beside objects, masks and clips");
   }
   if (!errors.empty()) return absl::InvalidArgumentError(absl::StrJoin(errors, "\n"));
   v1::ApplyUpdateRequest request = std::move(drawing).Request();
