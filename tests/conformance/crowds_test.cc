@@ -47,6 +47,14 @@ class Crowds : public EngineConformance {
     }
     return d;
   }
+  // All of it, drawn once.
+  void PutUp(EngineDriver& engine, const SceneModel& scene, const Target& target) {
+    ASSERT_TRUE(engine.SetTarget(target).ok());
+    DeltaBuffer whole;
+    whole.PutWhole(scene);
+    ASSERT_TRUE(engine.Apply(whole).ok());
+    ExpectLikeOracle(engine, scene, target);
+  }
   // Turns, stretches and shifts it, by a little.
   LayerRecord& Move(uint64_t id) {
     LayerRecord& layer = scene_.layers[id];
@@ -97,11 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Engines, Crowds, testing::ValuesIn(EngineCases()),
 TEST_P(Crowds, MoveLikeTheOracle) {
   const Target target = CubeTarget(kSide);
   EngineDriver engine = Make();
-  ASSERT_TRUE(engine.SetTarget(target).ok());
-  DeltaBuffer whole;
-  whole.PutWhole(scene_);
-  ASSERT_TRUE(engine.Apply(whole).ok());
-  ExpectLikeOracle(engine, scene_, target);
+  PutUp(engine, scene_, target);
   for (int move = 0; move < 3; ++move) {
     SCOPED_TRACE(move);
     DeltaBuffer delta;
@@ -126,11 +130,7 @@ TEST_P(Crowds, MayBeOfManyLayers) {
     }
   }
   EngineDriver engine = Make();
-  ASSERT_TRUE(engine.SetTarget(target).ok());
-  DeltaBuffer whole;
-  whole.PutWhole(scene);
-  ASSERT_TRUE(engine.Apply(whole).ok());
-  ExpectLikeOracle(engine, scene, target);
+  PutUp(engine, scene, target);
   for (const double place : {0.0, 1.5, 1000.0}) {
     DeltaBuffer delta;
     for (auto& [id, layer] : scene.layers) {
@@ -155,10 +155,7 @@ TEST_P(Crowds, MayBeOfManyLayers) {
 TEST_P(Crowds, StayRightWhateverHappensToThem) {
   Target target = CubeTarget(kSide);
   EngineDriver engine = Make();
-  ASSERT_TRUE(engine.SetTarget(target).ok());
-  DeltaBuffer whole;
-  whole.PutWhole(scene_);
-  ASSERT_TRUE(engine.Apply(whole).ok());
+  PutUp(engine, scene_, target);
   for (int frame = 0; frame < 40; ++frame) {
     SCOPED_TRACE("frame " + std::to_string(frame));
     const uint64_t changes = 1 + random_() % 3;

@@ -1,0 +1,44 @@
+// What --help says of voxelctl and of those commands that take more than a line.
+#pragma once
+
+namespace voxeld::voxelctl {
+
+inline constexpr const char* kAbout =
+    "Puts files into the volumetric displays of a voxeld server, and shows how they do.\n"
+    "Data goes to standard output, words to standard error; --json makes the data JSON.";
+inline constexpr const char* kPlayAbout =
+    "Puts files up: meshes (.obj .stl .ply .gltf .glb), point clouds (.ply), maps (.geojson "
+    ".topojson .json).\n"
+    "The scene is turned upright, centred and made as large as fits. Light is baked into the "
+    "colours by the\n"
+    "direction of each surface, so that shape can be read on a display that only glows (--flat: "
+    "not).\n"
+    "What is up stays when this ends, in the layer \"voxelctl\", until the next play, or clear.\n"
+    "A test pattern that is up ends.";
+inline constexpr const char* kDrawAbout =
+    "Puts up shapes, each in quotes: a name with values, or an expression.\n"
+    "  voxelctl draw \"sphere radius=0.8 color=orange\" \"box size=1,0.5,0.2 turn=0,0,30\"\n"
+    "  voxelctl draw \"x^2+y^2-z = 0 where x^2+y^2 <= 1\"\n"
+    "  voxelctl draw \"object pin: cone end=0,0,0.4 start_radius=0 end_radius=0.1\" "
+    "\"object pin: sphere center=0,0,0.45 radius=0.1\"\n"
+    "                \"instance object=pin at=0.5,0,0 tint=red\" \"instance object=pin\"\n"
+    "  voxelctl draw \"sphere radius=0.8\" \"clip_plane c=1\" \"mask: box size=1\"\n"
+    "The last shows what is in a mask, above a plane; clip_box and clip_cylinder clip too.\n"
+    "Values are the fields of the shape (docs/primitives.md), and color, at, scale, turn "
+    "(degrees), "
+    "priority, erase,\n"
+    "label, lifetime (s). What is up stays when this ends, in the layer \"voxelctl\", until the "
+    "next "
+    "draw or play, or clear.";
+inline constexpr const char* kSnapshotAbout =
+    "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
+    "perspective, dimmer with\n"
+    "distance, with the outline of its volume; with --slices all its slices side by side.";
+inline constexpr const char* kVerifyAbout =
+    "Holds a display's device to its protocol, case by case, and says what is not as it must be. "
+    "Opens the device\n"
+    "itself: no voxeld may have it. DISPLAY is what voxeld's --display takes, such as\n"
+    "voxlink,serial=A1 or fadecandy; simulated,size=32x32x16 is the emulated device, to try it.\n"
+    "Ends with 0 if no case failed, 1 if one did, 3 if there is no device.";
+
+}  // namespace voxeld::voxelctl
