@@ -33,6 +33,7 @@ CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
       index_(device, list_budget_),
       lines_(device, list_budget_, tuning.few_lines),
       triangles_(device, list_budget_),
+      formulas_(device.api(), tuning.compile_formulas),
       least_crowd_(tuning.least_crowd) {}
 
 void RoughBox::Add(const RoughBox& other) {

@@ -21,6 +21,8 @@
 #include "gpu/affine.h"
 #include "gpu/assemble/scene.h"
 #include "gpu/cpu/executor.h"
+#include "gpu/cuda/compiled_formulas.h"
+#include "gpu/cuda/covered_types.h"
 #include "gpu/cuda/device.h"
 #include "gpu/cuda/draw_types.h"
 #include "gpu/cuda/line_index.h"
@@ -119,7 +121,7 @@ class CudaVolume final : private SceneObserver {
     RoughBox box = RoughBox::Everything();
     uint32_t regions_each = 0;        // that a triangle touches at most
     Block tiles, begin, voxels;       // of what the CPU has drawn
-    Block hoisted, reach;             // of an implicit shape (ImplicitPlace)
+    Block hoisted, reach, covered;    // of an implicit shape (ImplicitPlace; CoveredView)
     Block vertices, indices, colors;  // of a curve that was cut
     Block inside;                     // of a mesh that is filled
   };
@@ -212,16 +214,28 @@ class CudaVolume final : private SceneObserver {
     std::vector<uint32_t> hoisted;  // of an implicit shape
     std::unique_ptr<Cut> cut;       // of what is curved
   };
+  // An implicit shape that was placed: which voxels it covers is yet to be found.
+  struct PlacedImplicit {
+    CoveredView view;
+    cudaKernel_t formula = nullptr;  // by which; null: by interpreting its program
+  };
   static const GeometryView& OnHost(const Drawable& drawable);
   TableEntry EntryOf(const Drawable& drawable, WorkedOut& worked_out) const;
   // Queues its way over, and finds room for what the device works out. It is to live until then.
-  absl::Status Place(const WorkedOut& worked_out, TableEntry& entry, Slot& slot);
-  absl::Status PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry, Slot& slot);
+  absl::Status Place(const Drawable& drawable, const WorkedOut& worked_out, TableEntry& entry,
+                     uint32_t slot);
+  absl::Status PlaceImplicit(const Drawable& drawable, std::span<const uint32_t> hoisted,
+                             TableEntry& entry, uint32_t slot);
   absl::Status PlaceFilled(TableEntry& entry, Slot& slot);
   // Where a geometry is, or the whole volume.
   Box3 BoundsOf(const Drawable& drawable, const Affine& map) const;
   absl::Status PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot);
-  absl::Status FindImplicitTiles(std::span<const uint32_t> slots);
+  // Which voxels implicit shapes cover, of those that were placed and are in the table
+  // (cuda_volume_implicit.cc).
+  absl::Status FindImplicit();
+  template <typename F>
+  absl::Status ForViews(std::span<const CoveredView> all, F&& f);
+  absl::StatusOr<std::optional<Block>> RoomToKeep(uint64_t bytes);
   // Has the CPU draw it; the result goes over, and into `slot`.
   absl::Status DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot);
   uint32_t TakeSlot();
@@ -240,6 +254,7 @@ class CudaVolume final : private SceneObserver {
   LineIndex lines_;
   bool lines_suit_ = false;  // the volume is not too large for them
   TriangleIndex triangles_;
+  CompiledFormulas formulas_;
   // Of blocks of regions: a pass that failed last, with so many items without lists, halved. As many
   // planes along z go in the next.
   int32_t pass_planes_ = INT32_MAX;
@@ -252,6 +267,7 @@ class CudaVolume final : private SceneObserver {
   uint64_t live_items_ = 0, dead_items_ = 0;
   absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
   absl::flat_hash_set<const Drawable*> pending_;
+  std::vector<PlacedImplicit> placed_;  // of those that are entering
   Crowds crowds_;
   const uint32_t least_crowd_;
 

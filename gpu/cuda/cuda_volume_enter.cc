@@ -142,11 +142,12 @@ TableEntry CudaVolume::EntryOf(const Drawable& d, WorkedOut& worked_out) const {
   return entry;
 }
 
-absl::Status CudaVolume::Place(const WorkedOut& worked_out, TableEntry& entry, Slot& slot) {
-  if (worked_out.cut != nullptr) return PlaceCut(*worked_out.cut, entry, slot);
-  if (entry.record.kind == PrimitiveKind::kFilled) return PlaceFilled(entry, slot);
+absl::Status CudaVolume::Place(const Drawable& drawable, const WorkedOut& worked_out,
+                               TableEntry& entry, uint32_t slot) {
+  if (worked_out.cut != nullptr) return PlaceCut(*worked_out.cut, entry, slots_[slot]);
+  if (entry.record.kind == PrimitiveKind::kFilled) return PlaceFilled(entry, slots_[slot]);
   return worked_out.hoisted.empty() ? absl::OkStatus()
-                                    : PlaceImplicit(worked_out.hoisted, entry, slot);
+                                    : PlaceImplicit(drawable, worked_out.hoisted, entry, slot);
 }
 
 absl::Status CudaVolume::PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot) {
@@ -196,36 +197,6 @@ absl::Status CudaVolume::PlaceFilled(TableEntry& entry, Slot& slot) {
   return device_.Run("FindInside", [&] {
     return cuda::FindInside(entry.source, entry.record, inside, device_.stream());
   });
-}
-
-absl::Status CudaVolume::PlaceImplicit(std::span<const uint32_t> hoisted, TableEntry& entry,
-                                       Slot& slot) {
-  absl::StatusOr<Block> block = device_.Upload(hoisted.data(), hoisted.size());
-  if (!block.ok()) return block.status();
-  slot.hoisted = *std::move(block);
-  entry.source.implicit.hoisted = slot.hoisted.as<uint32_t>();
-  // Without room for what is known of its tiles, that is found out anew whenever one is drawn.
-  block = list_budget_.KeepsTooMuch()
-              ? absl::ResourceExhaustedError("lists have all that they may keep")
-              : list_budget_.pool.Acquire(Implicit::Count(entry.source) * sizeof(float));
-  if (absl::IsResourceExhausted(block.status())) return absl::OkStatus();
-  if (!block.ok()) return block.status();
-  slot.reach = *std::move(block);
-  entry.source.implicit.reach = slot.reach.as<float>();
-  return absl::OkStatus();
-}
-
-// After they are in the table.
-absl::Status CudaVolume::FindImplicitTiles(std::span<const uint32_t> slots) {
-  for (const uint32_t slot : slots) {
-    if (slots_[slot].reach.size() == 0 || slots_[slot].items == 0) continue;
-    const absl::Status status = device_.Run("FindImplicitTiles", [&] {
-      return cuda::FindImplicitTiles(table_.as<TableEntry>(), slot, slots_[slot].items,
-                                     device_.stream());
-    });
-    if (!status.ok()) return status;
-  }
-  return absl::OkStatus();
 }
 
 absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot) {
@@ -320,6 +291,7 @@ absl::Status CudaVolume::Enter() {
   const std::vector<const Drawable*> drawables(pending_.begin(), pending_.end());
   std::vector<uint32_t> slots;
   std::vector<TableEntry> entries;
+  placed_.clear();
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   std::deque<WorkedOut> worked_out;
@@ -339,7 +311,8 @@ absl::Status CudaVolume::Enter() {
     const bool by_cpu = entry.record.drawn_by == DrawnBy::kCpu;
     uploads |= mine.cut != nullptr || !mine.hoisted.empty();
     held += mine.cut != nullptr ? mine.cut->bytes() : 0;
-    status = by_cpu ? DrawInto(entry, *drawable, slots_[slot]) : Place(mine, entry, slots_[slot]);
+    status = by_cpu ? DrawInto(entry, *drawable, slots_[slot])
+                    : Place(*drawable, mine, entry, slot);
     if (!status.ok()) break;
     if (!by_cpu) {
       WithPrimitive(entry.record.kind, [&](auto primitive) {
@@ -379,7 +352,7 @@ absl::Status CudaVolume::Enter() {
   const bool few_lines = status.ok() && AreFewLines(slots, entries);
   if (status.ok()) status = GrowTable();
   if (status.ok() && !few_lines) status = PutDrawables(slots, entries);
-  if (status.ok()) status = FindImplicitTiles(slots);
+  if (status.ok()) status = FindImplicit();
   if (!status.ok()) {
     for (const uint32_t taken : slots) slots_[taken] = {};
     free_slots_.insert(free_slots_.end(), slots.begin(), slots.end());

@@ -1,13 +1,16 @@
-// An implicit shape in a tile, by a block of threads: P's hoisted values along each axis (hoist.h);
-// which parts of 4³ voxels may have something, by intervals; P in these and around them, four voxels a
-// thread; then whoever has a neighbour on the other side, or lies within the shell, by the definition
+// An implicit shape in a tile, by a block of threads. As a rule it is known which voxels it covers
+// (kernels_implicit.cu). Where there was no room for that it is found here: P's hoisted values along each axis
+// (hoisted.h); which parts of 4³ voxels may have something, by intervals; P in these and around them, four voxels
+// a thread; then whoever has a neighbour on the other side, or lies within the shell, by the definition
 // (implicit/field.h).
 //
 // Loops around the program's run are the same for all threads of a warp: idle ones run it as well, and
 // take no notice of what comes out.
 #pragma once
 
+#include "gpu/cuda/covered_types.h"
 #include "gpu/cuda/draw_types.h"
+#include "gpu/cuda/filled-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/cuda/warp-inl.h"
 #include "gpu/implicit/field.h"
@@ -160,6 +163,14 @@ static __device__ __noinline__ uint32_t ImplicitWord(const implicit::Field& fiel
   return MakeWord(priority, erase, field.ColorAt(q));
 }
 
+static __device__ __noinline__ uint32_t ImplicitColor(const implicit::Field& field,
+                                                      uint32_t priority, bool erase, int32_t x,
+                                                      int32_t y, int32_t z) {
+  float q[3];
+  field.CoordinatesOf(x, y, z, q);
+  return MakeWord(priority, erase, field.ColorAt(q));
+}
+
 // Finds out which parts have anything; false if none has. By the whole block.
 __device__ inline bool FindImplicitParts(const ImplicitTile& tile) {
   ImplicitScratch& s = tile.scratch;
@@ -306,6 +317,41 @@ static __device__ __noinline__ void DrawImplicit(const TableEntry& entry, uint32
                   z = static_cast<int32_t>(at >> 8);
     const bool within = ImplicitIsWithin(tile, x, y, z);
     if (i < count && within) RaiseImplicit(entry, tile, x, y, z, words);
+  }
+  __syncthreads();
+}
+
+// The same where its rows are known.
+static __device__ __noinline__ void DrawCovered(const TableEntry& entry, uint32_t item,
+                                                const Box3& box, uint32_t* words,
+                                                FilledScratch& scratch) {
+  const Source& source = entry.source;
+  const Box3 part = Intersect(box, source.solid.bounds);
+  if (IsEmpty(part)) return;  // the same for every thread
+  const uint16_t* const rows = source.implicit.rows + size_t{item} * kCoveredRows;
+  const int32_t dx = part.lo[0] - box.lo[0], dy = part.lo[1] - box.lo[1],
+                dz = part.lo[2] - box.lo[2];
+  for (uint32_t row = threadIdx.x; row < kCoveredRows; row += kDrawThreads) {
+    const int32_t y = static_cast<int32_t>(row & 15) - dy, z = static_cast<int32_t>(row >> 4) - dz;
+    scratch.rows[row] = y < 0 || z < 0 ? 0 : static_cast<uint32_t>(__ldg(&rows[z << 4 | y])) << dx;
+  }
+  __syncthreads();
+  const implicit::Field field(source);
+  const bool uniform = field.is_uniform();
+  uint32_t word = MakeWord(entry.priority, entry.erase != 0, source.UniformColor());
+  uint32_t* const at = words + IndexInRegion(box.lo[0], box.lo[1], box.lo[2]);
+  const uint32_t x = threadIdx.x & 15;
+#pragma unroll 1
+  for (uint32_t row = threadIdx.x >> 4; row < kCoveredRows; row += kDrawThreads / 16) {
+    if ((scratch.rows[row] >> x & 1) == 0) continue;
+    if (!uniform) {
+      word = ImplicitColor(field, entry.priority, entry.erase != 0,
+                           box.lo[0] + static_cast<int32_t>(x),
+                           box.lo[1] + static_cast<int32_t>(row & 15),
+                           box.lo[2] + static_cast<int32_t>(row >> 4));
+    }
+    uint32_t& voxel = at[x | (row & 15) << 5 | row >> 4 << 10];
+    voxel = Max(voxel, word);  // nobody else has this voxel now
   }
   __syncthreads();
 }

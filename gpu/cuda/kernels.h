@@ -41,10 +41,6 @@ cudaError_t FillPairs(const TableEntry* table, const LayerLook* layers, const It
                       uint64_t begin, uint32_t items, const uint64_t* offsets,
                       const VolumeView& volume, uint64_t* keys, uint64_t* values,
                       cudaStream_t stream);
-// What is known of each of the tiles, `count` of them, of the implicit shape in `slot` goes where its
-// ImplicitPlace::reach points.
-cudaError_t FindImplicitTiles(TableEntry* table, uint32_t slot, uint32_t count,
-                              cudaStream_t stream);
 // Sets `inside` (InsideRows, of the source's bounds, zeros before) to which voxels are inside of the source's triangles
 // (kernels_filled.cu). Pointers of the source are the device's.
 cudaError_t FindInside(const Source& source, const GeometryRecord& record, uint32_t* inside,

@@ -31,15 +31,6 @@ __device__ void ForTiles(const TableEntry* table, const ItemList& list, uint64_t
   });
 }
 
-__global__ void FindImplicitTilesKernel(TableEntry* table, uint32_t slot, uint32_t count) {
-  const uint64_t i = Thread();
-  if (i >= count) return;
-  const Source& source = table[slot].source;
-  const Box3 box = BlockOf(source, static_cast<uint32_t>(i));
-  const_cast<float*>(source.implicit.reach)[i] =
-      IsEmpty(box) ? Implicit::kNothing : Implicit::ReachOf(implicit::Field(source), box);
-}
-
 __global__ void PutEntriesKernel(TableEntry* table, const TableEntry* entries,
                                  const uint32_t* slots, uint32_t count) {
   const uint64_t i = Thread();
@@ -200,12 +191,6 @@ cudaError_t PutEntries(TableEntry* table, const TableEntry* entries, const uint3
 cudaError_t PutFewEntries(TableEntry* table, const FewEntries& few, uint32_t count,
                           cudaStream_t stream) {
   PutFewEntriesKernel<<<1, kThreads, 0, stream>>>(table, few, count);
-  return cudaGetLastError();
-}
-
-cudaError_t FindImplicitTiles(TableEntry* table, uint32_t slot, uint32_t count,
-                              cudaStream_t stream) {
-  FindImplicitTilesKernel<<<Blocks(count), kThreads, 0, stream>>>(table, slot, count);
   return cudaGetLastError();
 }
 

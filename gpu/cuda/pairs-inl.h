@@ -140,9 +140,15 @@ __device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, 
       case PrimitiveKind::kCylinder:
         DrawSolid<Cylinder>(entry, box, words, scratch.solid);
         break;
-      case PrimitiveKind::kImplicit:
-        DrawImplicit(entry, static_cast<uint32_t>(scratch.heavy[i]), box, words, scratch.implicit);
+      case PrimitiveKind::kImplicit: {
+        const uint32_t item = static_cast<uint32_t>(scratch.heavy[i]);
+        if (entry.source.implicit.rows != nullptr) {
+          DrawCovered(entry, item, box, words, scratch.filled);
+        } else {
+          DrawImplicit(entry, item, box, words, scratch.implicit);
+        }
         break;
+      }
       case PrimitiveKind::kSamples:
         DrawSamples(entry, box, words, scratch.samples);
         break;

@@ -5,6 +5,13 @@
 
 namespace voxeld::gpu::cuda {
 
+// When the programs of implicit shapes are compiled for the device, where there is a compiler.
+enum class CompileFormulas : uint8_t {
+  kNever,
+  kLater,   // beside the engine's work; until then they are interpreted
+  kAtOnce,  // frames wait for it
+};
+
 struct Tuning {
   // What has fewer items, about, where something is dirty is drawn as one group: copying its pictures
   // while others are drawn is not worth the launches.
@@ -25,6 +32,7 @@ struct Tuning {
   // Of these, what lists may take that stay from frame to frame: the rest is for making them, and for
   // the passes.
   double index_share_kept = 0.5;
+  CompileFormulas compile_formulas = CompileFormulas::kLater;
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -102,6 +102,12 @@ VOXELD_HD Dual<N> Atan2(const Dual<N>& y, const Dual<N>& x) {
   });
 }
 
+// |∇p|.
+template <class N>
+VOXELD_HD N SlopeOf(const Dual<N>& p) {
+  return Sqrt(Add(Add(Square(p.d[0]), Square(p.d[1])), Square(p.d[2])));
+}
+
 // Of functions that take one of two branches: the gradient is that of the branch taken.
 VOXELD_HD inline Dual<float> Abs(const Dual<float>& a) { return a.value < 0 ? Neg(a) : a; }
 VOXELD_HD inline Dual<float> Min(const Dual<float>& a, const Dual<float>& b) {

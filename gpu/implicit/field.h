@@ -12,7 +12,7 @@
 // closed curves, projected along an axis, by the even-odd rule.
 #pragma once
 
-#include "gpu/implicit/hoist.h"
+#include "gpu/implicit/hoisted.h"
 #include "gpu/implicit/program.h"
 #include "gpu/primitives/source.h"
 
@@ -84,7 +84,7 @@ class Field {
   // |P| ≤ h·|∇P|.
   template <class N>
   VOXELD_HD static N Slope(const Dual<N>& p) {
-    return Sqrt(Add(Add(Square(p.d[0]), Square(p.d[1])), Square(p.d[2])));
+    return SlopeOf(p);
   }
   VOXELD_HD bool IsWithin(const Dual<float>& p) const {
     return Abs(p.value) <= place_.half * Slope(p);
@@ -109,11 +109,10 @@ class Field {
     return Tinted(rgb, tint_);
   }
 
+  VOXELD_HD bool is_bounded() const { return program_.bound() != 0 || program_.rings() != 0; }
+  VOXELD_HD bool is_uniform() const { return program_.color_by() == ColorBy::kUniform; }
   // Whether every voxel that P says to be covered is, in the record's colour.
-  VOXELD_HD bool is_plain() const {
-    return program_.bound() == 0 && program_.rings() == 0 &&
-           program_.color_by() == ColorBy::kUniform;
-  }
+  VOXELD_HD bool is_plain() const { return !is_bounded() && is_uniform(); }
 
   VOXELD_HD const HoistedView& hoisted() const { return hoisted_; }
   // Along an axis at `d` voxels from the origin: f(value, number of the hoisted value).

@@ -65,6 +65,16 @@ VOXELD_HD Lanes<n> PowI(const Lanes<n>& a, int32_t exponent) {
   return EachOf<n>([&](size_t i) { return PowI(a.at[i], exponent); });
 }
 
+// A value that is the same in all lanes, or stands by itself.
+template <class N>
+VOXELD_HD N Spread(const N& value, const N&) {
+  return value;
+}
+template <size_t n>
+VOXELD_HD Lanes<n> Spread(float value, const Lanes<n>& like) {
+  return ConstantLike(like, value);
+}
+
 using DualRow = Dual<Row>;
 
 template <size_t n, typename First>

@@ -17,6 +17,7 @@ enum cudaError_t {
   cudaErrorInvalidDevice = 101,
   cudaErrorNotReady = 600,
   cudaErrorIllegalAddress = 700,
+  cudaErrorNotSupported = 801,
 };
 
 enum cudaMemcpyKind {
@@ -83,6 +84,21 @@ cudaError_t cudaEventDestroy(cudaEvent_t event);
 cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream);
 cudaError_t cudaEventSynchronize(cudaEvent_t event);
 cudaError_t cudaEventElapsedTime(float* ms, cudaEvent_t from, cudaEvent_t to);
+
+// Modules are for devices that there are.
+using cudaLibrary_t = struct CUlib_st*;
+using cudaKernel_t = struct CUkern_st*;
+inline cudaError_t cudaLibraryLoadData(cudaLibrary_t*, const void*, const void*, const void*, unsigned,
+                                       const void*, const void*, unsigned) {
+  return cudaErrorNotSupported;
+}
+inline cudaError_t cudaLibraryGetKernel(cudaKernel_t*, cudaLibrary_t, const char*) {
+  return cudaErrorNotSupported;
+}
+inline cudaError_t cudaLibraryUnload(cudaLibrary_t) { return cudaErrorNotSupported; }
+inline cudaError_t cudaLaunchKernel(cudaKernel_t, dim3, dim3, void**, size_t, cudaStream_t) {
+  return cudaErrorNotSupported;
+}
 
 cudaError_t SetFunctionAttribute(const void* function, cudaFuncAttribute attribute, int value);
 template <typename Result, typename... Parameters>

@@ -1,0 +1,117 @@
+#include "gpu/cuda/compiled_formulas.h"
+
+#include <utility>
+
+#include "gpu/cuda/formula_source.h"
+#include "gpu/implicit/formula_text.h"
+
+namespace voxeld::gpu::cuda {
+
+CompiledFormulas::CompiledFormulas(Api& api, CompileFormulas when) : api_(api), when_(when) {}
+
+CompiledFormulas::~CompiledFormulas() {
+  {
+    const sync::MutexLock lock(mutex_);
+    ends_ = true;
+    queue_.clear();
+  }
+  queued_.NotifyAll();
+  if (thread_.joinable()) thread_.join();
+  for (const auto& [key, formula] : formulas_) {
+    if (formula.library != nullptr) cudaLibraryUnload(formula.library);
+  }
+}
+
+bool CompiledFormulas::HasCompiler() {
+  if (!looked_for_) {
+    looked_for_ = true;
+    if (absl::StatusOr<std::shared_ptr<const Nvrtc>> opened = Nvrtc::Open(); opened.ok()) {
+      nvrtc_ = *std::move(opened);
+    }
+  }
+  return nvrtc_ != nullptr;
+}
+
+absl::StatusOr<std::string> CompiledFormulas::Compile(const std::string& source) const {
+  return nvrtc_->Compile(source, FormulaSources(), api_.device().major, api_.device().minor);
+}
+
+absl::StatusOr<cudaKernel_t> CompiledFormulas::Find(std::span<const uint32_t> hoisted) {
+  if (when_ == CompileFormulas::kNever) return nullptr;
+  if (absl::Status status = TakeDone(); !status.ok()) return status;
+  Key key = implicit::FormulaKey(hoisted);
+  const auto found = formulas_.find(key);
+  const bool is_new = found == formulas_.end();
+  if (is_new && formulas_.size() >= kMostKernels) return nullptr;
+  Formula& formula = is_new ? formulas_[key] : found->second;
+  if (formula.state != State::kSeen) return formula.kernel;
+  if (is_new && when_ == CompileFormulas::kLater) return nullptr;
+  if (implicit::FormulaWeight(hoisted) > kMostWeight || !HasCompiler()) {
+    formula.state = State::kNone;
+    return nullptr;
+  }
+  std::string source = FormulaSource(hoisted);
+  if (when_ == CompileFormulas::kAtOnce) {
+    if (absl::Status status = Load(formula, Compile(source)); !status.ok()) return status;
+    return formula.kernel;
+  }
+  formula.state = State::kAsked;
+  {
+    const sync::MutexLock lock(mutex_);
+    queue_.push_back({std::move(key), std::move(source)});
+  }
+  if (!thread_.joinable()) thread_ = std::thread([this] { CompileQueued(); });
+  queued_.NotifyOne();
+  return nullptr;
+}
+
+absl::Status CompiledFormulas::TakeDone() {
+  std::vector<Done> done;
+  {
+    const sync::MutexLock lock(mutex_);
+    done.swap(done_);
+  }
+  for (const Done& one : done) {
+    if (absl::Status status = Load(formulas_[one.key], one.module); !status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+// A module that the device does not take is as good as none.
+absl::Status CompiledFormulas::Load(Formula& formula, const absl::StatusOr<std::string>& module) {
+  formula.state = State::kNone;
+  if (!module.ok()) return absl::OkStatus();
+  return api_.Call("cudaLibraryLoadData", [&] {
+    cudaError_t error = cudaLibraryLoadData(&formula.library, module->data(), nullptr, nullptr, 0,
+                                            nullptr, nullptr, 0);
+    if (error == cudaSuccess) {
+      error = cudaLibraryGetKernel(&formula.kernel, formula.library, kFormulaKernel);
+    }
+    if (error == cudaSuccess) {
+      formula.state = State::kLoaded;
+      ++loaded_;
+    } else {
+      formula.kernel = nullptr;
+      cudaGetLastError();
+    }
+    return cudaSuccess;
+  });
+}
+
+void CompiledFormulas::CompileQueued() {
+  for (;;) {
+    Work work;
+    {
+      const sync::MutexLock lock(mutex_);
+      while (queue_.empty() && !ends_) queued_.Wait(mutex_);
+      if (ends_) return;
+      work = std::move(queue_.front());
+      queue_.pop_front();
+    }
+    absl::StatusOr<std::string> module = Compile(work.source);
+    const sync::MutexLock lock(mutex_);
+    done_.push_back({std::move(work.key), std::move(module)});
+  }
+}
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,86 @@
+// Kernels for implicit shapes' programs, compiled for each as they are asked for. Programs that differ in
+// constants alone share a kernel; a compiled formula covers the same voxels as an interpreted one does, so it
+// can take its place in any frame.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "display/sync/mutex.h"
+#include "gpu/cuda/api.h"
+#include "gpu/cuda/nvrtc.h"
+#include "gpu/cuda/tuning.h"
+
+namespace voxeld::gpu::cuda {
+
+// Thread-bound, but for its own thread, which compiles and knows no device.
+class CompiledFormulas {
+ public:
+  // Beyond as many kernels no more are made. A program heavier than kMostWeight (FormulaWeight) is left to be
+  // interpreted: its code would be compiled for seconds.
+  static constexpr size_t kMostKernels = 512;
+  static constexpr uint64_t kMostWeight = 600;
+
+  CompiledFormulas(Api& api, CompileFormulas when);
+  ~CompiledFormulas();
+  CompiledFormulas(const CompiledFormulas&) = delete;
+  CompiledFormulas& operator=(const CompiledFormulas&) = delete;
+
+  // The kernel for a program (implicit/hoisted.h); null: there is none, or not yet. An error is one of the
+  // device's. With kLater a program is compiled when it comes for the second time: one that comes once and
+  // stays is drawn once.
+  absl::StatusOr<cudaKernel_t> Find(std::span<const uint32_t> hoisted);
+
+  size_t compiled() const { return loaded_; }
+
+ private:
+  using Key = std::vector<uint32_t>;
+  enum class State : uint8_t { kSeen, kAsked, kLoaded, kNone };
+  struct Formula {
+    State state = State::kSeen;
+    cudaLibrary_t library = nullptr;
+    cudaKernel_t kernel = nullptr;
+  };
+  struct Work {
+    Key key;
+    std::string source;
+  };
+  struct Done {
+    Key key;
+    absl::StatusOr<std::string> module;
+  };
+
+  // False: there is no compiler.
+  bool HasCompiler();
+  absl::StatusOr<std::string> Compile(const std::string& source) const;
+  absl::Status TakeDone() VOXELD_EXCLUDES(mutex_);
+  absl::Status Load(Formula& formula, const absl::StatusOr<std::string>& module);
+  void CompileQueued() VOXELD_EXCLUDES(mutex_);
+
+  Api& api_;
+  const CompileFormulas when_;
+  bool looked_for_ = false;
+  std::shared_ptr<const Nvrtc> nvrtc_;
+  absl::flat_hash_map<Key, Formula> formulas_;
+  size_t loaded_ = 0;
+
+  sync::Mutex mutex_;
+  sync::CondVar queued_;
+  std::deque<Work> queue_ VOXELD_GUARDED_BY(mutex_);
+  std::vector<Done> done_ VOXELD_GUARDED_BY(mutex_);
+  bool ends_ VOXELD_GUARDED_BY(mutex_) = false;
+  std::thread thread_;  // once something is to be compiled later
+};
+
+}  // namespace voxeld::gpu::cuda

@@ -1,0 +1,268 @@
+// Which voxels an implicit shape covers (implicit/field.h), tile by tile, by blocks of threads: P at a tile's
+// voxels and one around it, a thread a row along x; then, from which side of the surface each is on, who has
+// a neighbour on the other one, and who lies within the shell.
+//
+// What computes P is a Formula: interpreted (kernels_implicit.cu), or compiled at run time from the same
+// program (implicit/formula_text.h), and then this file with it. So it knows what covered_types.h and
+// numbers know, no more.
+//
+//   struct Formula {
+//     using Of = …;  // what it is made of, beside the view
+//     Formula(const CoveredView& view, const Of& of, uint32_t y, uint32_t z);  // places along these axes
+//     Six Values(uint32_t x) const;                                            // P at six places from x on
+//     bool IsWithin(uint32_t x) const;                                         // |P| ≤ h·|∇P| at one
+//   };
+#pragma once
+
+#include "gpu/cuda/covered_types.h"
+#include "gpu/implicit/row.h"
+
+namespace voxeld::gpu::cuda {
+
+using Six = implicit::Lanes<6>;
+
+inline constexpr int32_t kCoveredRim = kCoveredEdge + 2;  // voxels of a tile's row and those around it
+inline constexpr uint32_t kCoveredAcross = kCoveredRim * kCoveredRim;
+inline constexpr uint32_t kCoveredThreads = (kCoveredAcross + 31) / 32 * 32;
+inline constexpr uint32_t kCoveredBlocks = 3;  // of a multiprocessor
+inline constexpr uint32_t kCoveredAtOnce = 8;  // items that a block of threads looks through
+
+struct CoveredScratch {
+  float p[kCoveredRim][kCoveredAcross];  // by place along x, then row: y first, then z
+  // By row: bit x + 1 is voxel x of the tile: whether it is inside; whether it may lie within the shell.
+  uint32_t inside[kCoveredAcross], near[kCoveredAcross];
+};
+
+// An item's voxels that lie in the bounds.
+struct CoveredTile {
+  int32_t lo[3], size[3];
+
+  __device__ CoveredTile(const CoveredView& view, uint32_t item) {
+    const uint32_t nx = static_cast<uint32_t>(view.blocks[0]),
+                   ny = static_cast<uint32_t>(view.blocks[1]);
+    const uint32_t at[3] = {item % nx, item / nx % ny, item / nx / ny};
+    for (int a = 0; a < 3; ++a) {
+      const int32_t begin = (view.first[a] + static_cast<int32_t>(at[a])) * kCoveredEdge;
+      lo[a] = begin > view.lo[a] ? begin : view.lo[a];
+      const int32_t end = begin + kCoveredEdge < view.hi[a] ? begin + kCoveredEdge : view.hi[a];
+      size[a] = end - lo[a];
+    }
+  }
+  // Of the voxel before the tile's first, in CoveredAxis.
+  __device__ uint32_t PlaceBefore(const CoveredView& view, int a) const {
+    return static_cast<uint32_t>(lo[a] - view.lo[a]);
+  }
+  // Of row (y, z), bits that there are; the first voxel's is bit 0.
+  __device__ uint32_t Within(int32_t y, int32_t z) const {
+    return y < size[1] && z < size[2] ? (1u << size[0]) - 1 : 0;
+  }
+};
+
+// Of a row's voxels, a bit each as in CoveredScratch: those that have a neighbour on the other side.
+__device__ inline uint32_t BesideOthers(const CoveredScratch& s, uint32_t row, bool cover) {
+  const uint32_t own = s.inside[row];
+  uint32_t others = own ^ own << 1 | own ^ own >> 1;
+  if (!cover) {
+    return others | own ^ s.inside[row - 1] | own ^ s.inside[row + 1] |
+           own ^ s.inside[row - kCoveredRim] | own ^ s.inside[row + kCoveredRim];
+  }
+  for (int32_t k = 0; k < 9; ++k) {
+    const uint32_t beside =
+        s.inside[static_cast<int32_t>(row) + (k / 3 - 1) * kCoveredRim + k % 3 - 1];
+    others |= own ^ beside | own ^ beside << 1 | own ^ beside >> 1;
+  }
+  return others;
+}
+
+// Whether the voxel at `x` of the row, both from the rim on, has a neighbour on the other side whose |P| is
+// not less; what is no number is infinite.
+__device__ inline bool IsNearest(const CoveredScratch& s, uint32_t row, int32_t x, bool cover) {
+  const float p = s.p[x][row];
+  const bool inside = p <= 0;
+  const auto magnitude = [](float q) {
+    return implicit::IsNan(q) ? implicit::Infinity() : implicit::Abs(q);
+  };
+  const float mine = magnitude(p);
+  const auto meets = [&](int32_t dx, int32_t across) {
+    const float q = s.p[x + dx][static_cast<int32_t>(row) + across];
+    return (q <= 0) != inside && mine <= magnitude(q);
+  };
+  if (!cover) {
+    return meets(-1, 0) || meets(1, 0) || meets(0, -1) || meets(0, 1) || meets(0, -kCoveredRim) ||
+           meets(0, kCoveredRim);
+  }
+  for (int32_t n = 0; n < 27; ++n) {
+    if (meets(n % 3 - 1, (n / 9 - 1) * kCoveredRim + n / 3 % 3 - 1)) return true;
+  }
+  return false;
+}
+
+// P of a tile and the voxels around it. By the whole block.
+template <class Formula>
+__device__ void FindCoveredValues(const CoveredView& view, const typename Formula::Of& of,
+                                  const CoveredTile& tile, float reach, CoveredScratch& s) {
+  const uint32_t row = threadIdx.x;
+  if (row < kCoveredAcross) {
+    const uint32_t x = tile.PlaceBefore(view, 0);
+    const Formula formula(view, of, tile.PlaceBefore(view, 1) + row % kCoveredRim,
+                          tile.PlaceBefore(view, 2) + row / kCoveredRim);
+    uint32_t inside = 0, near = 0;
+#pragma unroll 1
+    for (uint32_t first = 0; first < kCoveredRim; first += 6) {
+      const Six p = formula.Values(x + first);
+#pragma unroll
+      for (uint32_t i = 0; i < 6; ++i) {
+        s.p[first + i][row] = p.at[i];
+        inside |= (p.at[i] <= 0 ? 1u : 0u) << (first + i);
+        near |= (implicit::Abs(p.at[i]) <= reach ? 1u : 0u) << (first + i);
+      }
+    }
+    s.inside[row] = inside;
+    s.near[row] = near;
+  }
+  __syncthreads();
+}
+
+// Of the tile's row (y, z) the voxels that are covered.
+template <class Formula>
+__device__ uint32_t CoveredInRow(const CoveredView& view, const typename Formula::Of& of,
+                                 const CoveredTile& tile, int32_t y, int32_t z,
+                                 const CoveredScratch& s) {
+  const uint32_t row = static_cast<uint32_t>((z + 1) * kCoveredRim + y + 1);
+  const uint32_t there = tile.Within(y, z);
+  if (view.solid) return s.inside[row] >> 1 & there;
+  uint32_t left = BesideOthers(s, row, view.cover) >> 1 & there, covered = 0;
+  while (left != 0) {
+    const int32_t x = __ffs(static_cast<int>(left)) - 1;
+    left &= left - 1;
+    if (IsNearest(s, row, x + 1, view.cover)) covered |= 1u << x;
+  }
+  const uint32_t near = s.near[row] >> 1 & there & ~covered;
+  if (view.half == 0) return covered | near;  // there P is 0
+  if (near == 0) return covered;
+  const Formula formula(view, of, tile.PlaceBefore(view, 1) + 1 + static_cast<uint32_t>(y),
+                        tile.PlaceBefore(view, 2) + 1 + static_cast<uint32_t>(z));
+  for (left = near; left != 0; left &= left - 1) {
+    const uint32_t x = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
+    if (formula.IsWithin(tile.PlaceBefore(view, 0) + 1 + x)) covered |= 1u << x;
+  }
+  return covered;
+}
+
+// An item's rows. By the whole block.
+template <class Formula>
+__device__ void FindCoveredTile(const CoveredView& view, const typename Formula::Of& of,
+                                uint32_t item, float reach, bool whole, CoveredScratch& s) {
+  const CoveredTile tile(view, item);
+  if (!whole) FindCoveredValues<Formula>(view, of, tile, reach, s);
+  if (threadIdx.x < kCoveredRows) {
+    const int32_t y = static_cast<int32_t>(threadIdx.x) % kCoveredEdge,
+                  z = static_cast<int32_t>(threadIdx.x) / kCoveredEdge;
+    const uint32_t covered =
+        whole ? tile.Within(y, z) : CoveredInRow<Formula>(view, of, tile, y, z, s);
+    view.rows[size_t{item} * kCoveredRows + threadIdx.x] = static_cast<uint16_t>(covered);
+  }
+  __syncthreads();
+}
+
+// Implicit::kNothing and kEverything.
+inline constexpr float kCoversNothing = -1, kCoversEverything = -2;
+
+// The rows of kCoveredAtOnce items, those of which anything is covered.
+template <class Formula>
+__device__ void FindCoveredItems(const CoveredView& view, const typename Formula::Of& of,
+                                 CoveredScratch& s) {
+  for (uint32_t i = 0; i < kCoveredAtOnce; ++i) {
+    const uint32_t item = blockIdx.x * kCoveredAtOnce + i;
+    if (item >= view.items) return;  // the same for every thread, as what follows
+    const float reach = __ldg(&view.reach[item]);
+    if (reach == kCoversNothing) continue;
+    FindCoveredTile<Formula>(view, of, item, reach, reach == kCoversEverything, s);
+  }
+}
+
+// ---------------------------------------------------------------------------- formulas that were compiled
+
+// What a row's formula reads: N is a number, or several side by side, or either with gradients.
+__device__ inline float CoveredValue(const CoveredAxis& axis, uint32_t value, uint32_t place,
+                                     float) {
+  return __ldg(&axis.value[(value - axis.first) * axis.places + place]);
+}
+__device__ inline Six CoveredValue(const CoveredAxis& axis, uint32_t value, uint32_t place, Six) {
+  const float* const at = &axis.value[(value - axis.first) * axis.places + place];
+  return implicit::EachOf<6>([&](size_t i) { return __ldg(at + i); });
+}
+__device__ inline implicit::Dual<float> CoveredValue(const CoveredAxis& axis, uint32_t value,
+                                                     uint32_t place, implicit::Dual<float>) {
+  const CoveredDual dual = axis.dual[(value - axis.first) * axis.places + place];
+  return {dual.value, {dual.d[0], dual.d[1], dual.d[2]}};
+}
+__device__ inline float CoveredDistance(const CoveredAxis& axis, uint32_t place, float) {
+  return __ldg(&axis.distance[place]);
+}
+__device__ inline Six CoveredDistance(const CoveredAxis& axis, uint32_t place, Six) {
+  return implicit::EachOf<6>([&](size_t i) { return __ldg(&axis.distance[place + i]); });
+}
+
+// Where a formula is asked for: places along x (of Six the first), y and z.
+template <class N>
+struct CoveredAt {
+  const CoveredView& view;
+  uint32_t x, y, z;
+
+  __device__ N Hoisted(int axis, uint32_t value) const {
+    return CoveredValue(view.axis[axis], value, axis == 0 ? x : axis == 1 ? y : z, N());
+  }
+  // An instruction's immediate, by its place among the words of hoisted.h.
+  __device__ N Constant(uint32_t word) const {
+    return implicit::ConstantLike(N(), implicit::FromBits(__ldg(&view.hoisted[word])));
+  }
+  __device__ N Voxel() const { return implicit::ConstantLike(N(), view.voxel); }
+
+  // As Field::Coordinates.
+  template <class M>
+  __device__ M CoordinateOf(int r, M like) const {
+    const float* const row = view.inverse[r];
+    const auto times = [&](float a, const M& d) {
+      return implicit::Mul(implicit::ConstantLike(like, a), d);
+    };
+    const M sum = implicit::Add(
+        implicit::Add(times(row[0], CoveredDistance(view.axis[0], x, like)),
+                      times(row[1], implicit::Spread(CoveredDistance(view.axis[1], y, 0.0f), like))),
+        times(row[2], implicit::Spread(CoveredDistance(view.axis[2], z, 0.0f), like)));
+    return implicit::Add(sum, implicit::ConstantLike(like, 0.0f));
+  }
+  __device__ Six Coordinate(int r, Six like) const { return CoordinateOf(r, like); }
+  __device__ implicit::Dual<float> Coordinate(int r, implicit::Dual<float>) const {
+    const float* const row = view.inverse[r];
+    return {CoordinateOf(r, 0.0f), {row[0], row[1], row[2]}};
+  }
+  __device__ N Coordinate(int r) const { return Coordinate(r, N()); }
+};
+
+// A Formula of what was compiled (implicit/formula_text.h).
+template <class Compiled>
+class CompiledFormula {
+ public:
+  struct Of {};
+  __device__ CompiledFormula(const CoveredView& view, const Of&, uint32_t y, uint32_t z)
+      : view_(view), y_(y), z_(z), row_(CoveredAt<float>{view, 0, y, z}) {}
+
+  __device__ Six Values(uint32_t x) const {
+    return Compiled::template Value<Six>(row_, CoveredAt<Six>{view_, x, y_, z_});
+  }
+  __device__ bool IsWithin(uint32_t x) const {
+    using Dual = implicit::Dual<float>;
+    const CoveredAt<Dual> at{view_, x, y_, z_};
+    const typename Compiled::template Row<Dual> row(at);
+    const Dual p = Compiled::template Value<Dual>(row, at);
+    return implicit::Abs(p.value) <= view_.half * implicit::SlopeOf(p);
+  }
+
+ private:
+  const CoveredView& view_;
+  const uint32_t y_, z_;
+  const typename Compiled::template Row<float> row_;
+};
+
+}  // namespace voxeld::gpu::cuda
