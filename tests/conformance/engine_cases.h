@@ -38,6 +38,7 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few) {
   groups.group_bytes = 1;
   groups.few_lines = 0;
   groups.least_crowd = 1;
+  groups.compile_formulas = cuda::CompileFormulas::kNever;
   // With no list at all; and with none that stays.
   cuda::Tuning tight = groups, passes = groups;
   tight.index_bytes = 1;
@@ -52,6 +53,12 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few) {
 inline std::vector<EngineCase> EngineCases() {
 #if defined(VOXELD_TEST_CUDA)  // a program of its own, for machines with a GPU
   std::vector<EngineCase> cases = CudaCases("cuda", false);
+  // With formulas that are compiled before anything is drawn.
+  cases.push_back({"cuda_formulas", [](const EngineOptions& options) {
+                     return CreateCudaEngine(
+                         options, "a test", {},
+                         {.compile_formulas = cuda::CompileFormulas::kAtOnce});
+                   }});
   cases.push_back(CaseOf("cuda_worker", EngineKind::kCuda, true));
   return cases;
 #elif defined(VOXELD_TEST_SIMT_FEW)  // with a CPU for a GPU

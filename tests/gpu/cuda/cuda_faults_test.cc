@@ -75,10 +75,11 @@ struct Way {
   cuda::Tuning tuning;
 };
 void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
-const Way kWays[] = {{"plain", kEvery, {}},
+const Way kWays[] = {{"plain", kEvery, {.compile_formulas = cuda::CompileFormulas::kNever}},
                      {"passes",
                       kEvery == 1 ? 11 : 2 * kEvery,
-                      {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1 << 16}}};
+                      {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1 << 16,
+                       .compile_formulas = cuda::CompileFormulas::kNever}}};
 
 class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:
