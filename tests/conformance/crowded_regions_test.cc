@@ -21,7 +21,10 @@ class CrowdedRegions : public EngineConformance {
   // A turn about some axis, after which each of the shape's own axes is stretched.
   void Turn(Affine& map, double least, double most) {
     double axis[3], length = 0;
-    for (double& a : axis) length += (a = Random(-1, 1)) * a;
+    for (double& a : axis) {
+      a = Random(-1, 1);
+      length += a * a;
+    }
     for (double& a : axis) a /= std::sqrt(length);
     const double angle = Random(0, 3), c = std::cos(angle), s = std::sin(angle);
     const double cross[3][3] = {
