@@ -186,16 +186,18 @@ Box3 CudaVolume::BoundsOf(const Drawable& d, const Affine& map) const {
 absl::Status CudaVolume::PlaceFilled(TableEntry& entry, Slot& slot) {
   const uint64_t bytes = InsideRows{entry.source.solid.bounds}.size() * sizeof(uint32_t);
   if (bytes == 0 || list_budget_.KeepsTooMuch()) return absl::OkStatus();
-  absl::StatusOr<Block> block = list_budget_.pool.Acquire(bytes);
+  absl::StatusOr<Block> block = list_budget_.pool.Acquire(bytes + Filled::Count(entry.source));
   // Without room for it, tiles look at all triangles.
   if (absl::IsResourceExhausted(block.status())) return absl::OkStatus();
   if (!block.ok()) return block.status();
   slot.inside = *std::move(block);
   uint32_t* const inside = slot.inside.as<uint32_t>();
   if (absl::Status status = device_.Zero(inside, bytes); !status.ok()) return status;
+  uint8_t* const tiles = slot.inside.as<uint8_t>() + bytes;
   entry.source.inside = inside;
+  entry.source.inside_tiles = tiles;
   return device_.Run("FindInside", [&] {
-    return cuda::FindInside(entry.source, entry.record, inside, device_.stream());
+    return cuda::FindInside(entry.source, entry.record, inside, tiles, device_.stream());
   });
 }
 

@@ -2,6 +2,8 @@
 // writes it out once.
 #pragma once
 
+#include <cstddef>
+
 #include "gpu/cuda/flush-inl.h"
 #include "gpu/cuda/pairs-inl.h"
 #include "gpu/cuda/spans-inl.h"
@@ -29,6 +31,8 @@ struct DrawScratch<DrawWhat::kAll> {
   PairRows rows;
   uint32_t mask[kDrawThreads];  // of the layer that is drawn, if it has one; each thread's voxels
 };
+static_assert(offsetof(DrawScratch<DrawWhat::kAll>, pairs) == sizeof(RegionScratch) &&
+              offsetof(PairScratch, solid) == 0);  // SharedBehind
 // So that a multiprocessor has kDrawBlocks of them; the system keeps 1 KB of each.
 static_assert(sizeof(DrawScratch<DrawWhat::kAll>) <= (228 / kDrawBlocks - 1) * 1024);
 
@@ -132,8 +136,7 @@ static __device__ __noinline__ void TakeMask(const DrawView& view,
 
 // What a layer has in the region, raised into the words. By the whole block.
 template <DrawWhat kWhat>
-__device__ void RaiseLayer(const DrawView& view, const RegionPlace& place,
-                           DrawScratch<kWhat>& all) {
+__device__ void RaiseLayer(const DrawView& view, DrawScratch<kWhat>& all) {
   RegionScratch& scratch = all.region;
   for (uint32_t left = scratch.line_batches; left != 0; left &= left - 1) {
     const LineBatchView& batch = view.lines.batches[__ffs(static_cast<int>(left)) - 1];
@@ -152,16 +155,15 @@ __device__ void RaiseLayer(const DrawView& view, const RegionPlace& place,
   if constexpr (kWhat == DrawWhat::kAll) {
     if (scratch.pairs == 0) return;
     __syncthreads();
-    if (threadIdx.x == 0) all.pairs.heavy_count = 0;
+    PairScratch& pairs = all.pairs;
+    if (threadIdx.x == 0) pairs.heavy_count = pairs.small_count = pairs.small_taken = 0;
     __syncthreads();
-    for (uint32_t t = 0; t < kRegionTiles; ++t) {
-      const uint32_t tile = place.TileOf(view.volume, t);
-      if (tile == kAllLanes) continue;
-      DrawPairs(view, all.rows, t, tile, scratch, all.pairs);
-      if (view.unlisted.items != 0) DrawUnlisted(view, tile, scratch, all.pairs);
+    DrawPairs(view, all.rows, scratch, pairs);
+    for (uint32_t t = 0; t < kRegionTiles && view.unlisted.items != 0; ++t) {
+      const uint32_t tile = all.rows.tile[t];
+      if (tile != kAllLanes) DrawUnlisted(view, tile, all.rows.owned, scratch, pairs);
     }
-    if (all.pairs.heavy_count != 0)
-      DrawHeavy(view.table, view.volume.grid, scratch.words, all.pairs);
+    if (pairs.listed() != 0) DrawHeavy(view.table, view.volume.grid, scratch.words, pairs);
   }
 }
 
@@ -198,7 +200,7 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
       standing = Standing();
       settled = true;
     }
-    RaiseLayer<kWhat>(view, place, all);
+    RaiseLayer<kWhat>(view, all);
     if (step == DrawStep::kLayer) standing = {scratch.layer, scratch.cutting};
     if constexpr (kWhat == DrawWhat::kOneLayer) break;
     if constexpr (kWhat == DrawWhat::kAll) {
@@ -207,7 +209,8 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
         continue;
       }
     }
-    __syncthreads();  // all know what stands
+    __syncthreads();                   // all know what stands
+    if (view.below == nullptr) break;  // there is one layer
   }
   if (standing.layer == kAllLanes) return;
   const LayerLook& look = view.layers[standing.layer];

@@ -1,4 +1,4 @@
-// The inside of a mesh in a tile, by a block of threads: rows first, then their voxels.
+// The inside of a mesh in a region, by a block of threads: a thread looks up a row, a warp raises a plane.
 #pragma once
 
 #include "gpu/cuda/draw_types.h"
@@ -7,32 +7,27 @@
 
 namespace voxeld::gpu::cuda {
 
-struct FilledScratch {
-  uint32_t rows[kTileSize * kTileSize];  // [z][y] of the tile: bit i is its voxel i along x
-};
-
-static __device__ __noinline__ void DrawFilled(const TableEntry& entry, const Box3& box,
-                                               uint32_t* words, FilledScratch& scratch) {
-  static_assert(kTileSize == 16);
+// box: of the region's voxels.
+static __device__ __noinline__ void DrawFilled(const TableEntry& entry, const Box3& box) {
+  static_assert(RegionBits(0) == 5 && RegionBits(1) == 5 && kDrawWarps == 1u << RegionBits(2));
   const Source& source = entry.source;
   const Box3 part = Intersect(box, source.solid.bounds);
   if (IsEmpty(part)) return;  // the same for every thread
-  for (uint32_t row = threadIdx.x; row < kTileSize * kTileSize; row += kDrawThreads) {
-    const int32_t y = box.lo[1] + static_cast<int32_t>(row & 15),
-                  z = box.lo[2] + static_cast<int32_t>(row >> 4);
-    scratch.rows[row] = Contains(part, part.lo[0], y, z)
-                            ? Filled::RowIn(source, part, y, z) << (part.lo[0] - box.lo[0])
-                            : 0;
+  const uint32_t lane = threadIdx.x % 32, plane = threadIdx.x / 32;
+  const int32_t y = box.lo[1] + static_cast<int32_t>(lane),
+                z = box.lo[2] + static_cast<int32_t>(plane);
+  uint32_t row = 0;  // bit i: voxel i along x
+  if (Contains(part, part.lo[0], y, z)) {
+    const uint32_t first = static_cast<uint32_t>(part.lo[0] - box.lo[0]),
+                   beyond = static_cast<uint32_t>(32 - (part.hi[0] - box.lo[0]));
+    row = Filled::InsideAround(source, part.lo[0], y, z) & kAllLanes << first & kAllLanes >> beyond;
   }
-  __syncthreads();
   const uint32_t word = MakeWord(entry.priority, entry.erase != 0, source.UniformColor());
-  uint32_t* const at = words + IndexInRegion(box.lo[0], box.lo[1], box.lo[2]);
-  const uint32_t x = threadIdx.x & 15;
-#pragma unroll
-  for (uint32_t row = threadIdx.x >> 4; row < kTileSize * kTileSize; row += kDrawThreads / 16) {
-    if ((scratch.rows[row] >> x & 1) == 0) continue;
-    uint32_t& voxel = at[x | (row & 15) << 5 | row >> 4 << 10];
-    voxel = Max(voxel, word);  // nobody else has this voxel now
+  uint32_t* const at = SharedRegion().words + (plane << 10 | lane);
+  for (uint32_t left = __ballot_sync(kAllLanes, row != 0); left != 0; left &= left - 1) {
+    const uint32_t r = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
+    if ((__shfl_sync(kAllLanes, row, r) >> lane & 1) == 0) continue;
+    at[r << 5] = Max(at[r << 5], word);  // nobody else has this voxel now
   }
   __syncthreads();
 }

@@ -1,5 +1,5 @@
 // Which voxels are inside of a mesh (primitives/filled.h): every triangle flips bits where rows meet it, then each row's
-// bits become the parity up to them.
+// bits become the parity up to them, and each tile is noted that has any.
 #include "gpu/cuda/kernels.h"
 #include "gpu/cuda/warp-inl.h"
 #include "gpu/primitives/filled.h"
@@ -44,24 +44,71 @@ __global__ void SumKernel(uint32_t* bits, uint64_t rows, uint32_t words) {
   for (uint32_t i = lane; before != 0 && i < words; i += 32) at[i] = 0;
 }
 
+// Of a row of tiles along x, by a block of threads: tiles[i] is whether item i has any. A lane has a word of 32 voxels
+// along x, half of it a tile's.
+__global__ void NoteTilesKernel(Source source, const uint32_t* bits, uint8_t* tiles) {
+  __shared__ uint32_t any[32];
+  static_assert(kTileSize == 16);
+  const ImplicitPlace& place = source.implicit;
+  const InsideRows rows{source.solid.bounds};
+  const int32_t tile[2] = {static_cast<int32_t>(blockIdx.x) % place.blocks[1],
+                           static_cast<int32_t>(blockIdx.x) / place.blocks[1]};
+  int32_t lo[2], count[2];
+  for (int a = 0; a < 2; ++a) {
+    const int32_t begin = (place.first[a + 1] + tile[a]) * kTileSize;
+    lo[a] = Max(begin, rows.box.lo[a + 1]);
+    count[a] = Min(begin + kTileSize, rows.box.hi[a + 1]) - lo[a];
+  }
+  const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
+  for (int32_t begin = 0; begin < rows.words(); begin += 32) {
+    if (threadIdx.x < 32) any[threadIdx.x] = 0;
+    __syncthreads();
+    uint32_t found = 0;
+    if (begin + lane < rows.words()) {
+      for (int32_t row = static_cast<int32_t>(threadIdx.x / 32); row < count[0] * count[1];
+           row += static_cast<int32_t>(kWarps)) {
+        found |= bits[rows.PlaceOf((rows.first_word() + begin + lane) * 32, lo[0] + row % count[0],
+                                   lo[1] + row / count[0])];
+      }
+    }
+    if (found != 0) atomicOr(&any[lane], found);
+    __syncthreads();
+    if (threadIdx.x < 64) {
+      const int32_t word = static_cast<int32_t>(threadIdx.x / 2), half = threadIdx.x % 2;
+      const int32_t i = (rows.first_word() + begin + word) * 2 + half - place.first[0];
+      if (i >= 0 && i < place.blocks[0]) {
+        tiles[(tile[1] * place.blocks[1] + tile[0]) * place.blocks[0] + i] =
+            (any[word] >> 16 * half & 0xFFFF) != 0 ? 1 : 0;
+      }
+    }
+    __syncthreads();
+  }
+}
+
 uint32_t BlocksOf(uint64_t warps) { return static_cast<uint32_t>((warps + kWarps - 1) / kWarps); }
 
 }  // namespace
 
 cudaError_t FindInside(const Source& source, const GeometryRecord& record, uint32_t* inside,
-                       cudaStream_t stream) {
+                       uint8_t* tiles, cudaStream_t stream) {
   const InsideRows rows{source.solid.bounds};
   const uint32_t corners = record.index_count != 0 ? record.index_count : record.vertex_count;
   const uint32_t triangles = corners / 3;
-  if (triangles == 0 || rows.size() == 0) return cudaSuccess;
+  if (rows.size() == 0) return cudaSuccess;
   constexpr uint64_t kEnough = 1 << 19;  // threads that keep a device busy
   uint32_t team = kLeastTeam;
   while (team < kMostTeam && uint64_t{triangles} * team < kEnough) team *= 2;
-  FlipKernel<<<BlocksOf(uint64_t{triangles} * team / 32 + 1), kThreads, 0, stream>>>(source, record,
-                                                                                     team, inside);
+  if (triangles != 0) {
+    FlipKernel<<<BlocksOf(uint64_t{triangles} * team / 32 + 1), kThreads, 0, stream>>>(
+        source, record, team, inside);
+  }
   if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
   SumKernel<<<BlocksOf(rows.rows()), kThreads, 0, stream>>>(inside, rows.rows(),
                                                             static_cast<uint32_t>(rows.words()));
+  if (const cudaError_t error = cudaGetLastError(); error != cudaSuccess) return error;
+  const int32_t* const blocks = source.implicit.blocks;
+  NoteTilesKernel<<<static_cast<uint32_t>(blocks[1] * blocks[2]), kThreads, 0, stream>>>(
+      source, inside, tiles);
   return cudaGetLastError();
 }
 

@@ -13,16 +13,29 @@
 namespace voxeld::gpu::cuda {
 
 struct PairScratch {
-  uint64_t heavy[kDrawThreads];  // pairs for many threads,
-  uint32_t tiles[kDrawThreads];  // and which tile each is of
-  uint32_t heavy_count;
-  union {
+  union {  // first: SharedBehind
     SolidBlock solid;
+    SmallSolids small_solids;
     ImplicitScratch implicit;
     SampleScratch samples;
-    FilledScratch filled;
   };
+  uint64_t heavy[kDrawThreads];  // pairs for many threads; from the end on small solids,
+  uint32_t tiles[kDrawThreads];  // and which tile each is of
+  uint32_t heavy_count;
+  uint32_t small_count, small_taken;  // by warps that draw them
+
+  __device__ uint32_t listed() const { return heavy_count + small_count; }
 };
+
+// Of the voxels that there are, the region that a tile lies in.
+__device__ inline Box3 RegionAround(const TileGrid& grid, uint32_t tile) {
+  Box3 box = grid.VoxelsOf(tile);
+  for (int a = 0; a < 3; ++a) {
+    box.lo[a] &= -(1 << RegionBits(a));
+    box.hi[a] = Min(grid.voxels[a], box.lo[a] + (1 << RegionBits(a)));
+  }
+  return box;
+}
 
 // A pair's voxels in `box`, raised into the region's words.
 template <class Primitive>
@@ -109,10 +122,45 @@ __device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const 
   }
 }
 
+// A solid is drawn once in a region: with the first of its tiles there. owned: PairRows::owned.
+__device__ inline bool IsFirstTile(const Solid& s, const Box3& tile, uint32_t owned) {
+  uint32_t halves[2], place = 0;  // of the region along x and y: bits
+  for (int a = 0; a < 2; ++a) {
+    const int32_t middle = (tile.lo[a] & -(2 * kTileSize)) + kTileSize;
+    halves[a] = (s.bounds.lo[a] < middle ? 1 : 0) | (s.bounds.hi[a] > middle ? 2 : 0);
+    if (tile.lo[a] == middle) place |= 1u << a;
+  }
+  const uint32_t touched =
+      ((halves[1] & 1) != 0 ? halves[0] : 0) | ((halves[1] & 2) != 0 ? halves[0] << 2 : 0);
+  return (touched & owned & ((1u << place) - 1)) == 0;
+}
+
+// The small solids listed, a warp each: who is done takes the next. By the whole block.
+static __device__ __noinline__ void DrawSmallSolids(const TableEntry* table, const TileGrid& grid) {
+  PairScratch& scratch = SharedBehind<PairScratch>();
+  const uint32_t count = scratch.small_count, warp = threadIdx.x / 32;
+  const Box3 region = RegionAround(grid, scratch.tiles[kDrawThreads - 1]);
+  for (;;) {
+    uint32_t i = 0;
+    if (threadIdx.x % 32 == 0) i = atomicAdd(&scratch.small_taken, 1u);
+    i = __shfl_sync(kAllLanes, i, 0);
+    if (i >= count) break;
+    DrawSmallSolid(table[scratch.heavy[kDrawThreads - 1 - i] >> 32], region, SharedRegion().words,
+                   scratch.small_solids.columns[warp]);
+  }
+}
+
+// Whether an earlier pair that is listed is of the same drawable. By the whole block.
+__device__ inline bool IsListedBefore(const PairScratch& scratch, uint32_t i) {
+  return __syncthreads_or(threadIdx.x < i &&
+                          scratch.heavy[threadIdx.x] >> 32 == scratch.heavy[i] >> 32) != 0;
+}
+
 // All that are listed, which are none then; by the whole block, which has come to a barrier.
 __device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, uint32_t* words,
                                  PairScratch& scratch) {
   const uint32_t count = scratch.heavy_count;
+  if (scratch.small_count != 0) DrawSmallSolids(table, grid);
   // Several solids are drawn at once, one alone by all threads.
   constexpr uint32_t kSeveral = 3;
   const bool several = count >= kSeveral;
@@ -150,17 +198,17 @@ __device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, 
         break;
       }
       case PrimitiveKind::kSamples:
-        DrawSamples(entry, box, words, scratch.samples);
+        DrawSamples(entry, box);
         break;
       case PrimitiveKind::kFilled:
-        DrawFilled(entry, box, words, scratch.filled);
+        if (!IsListedBefore(scratch, i)) DrawFilled(entry, RegionAround(grid, scratch.tiles[i]));
         break;
       default:
         break;
     }
   }
   __syncthreads();
-  if (threadIdx.x == 0) scratch.heavy_count = 0;
+  if (threadIdx.x == 0) scratch.heavy_count = scratch.small_count = scratch.small_taken = 0;
   __syncthreads();
 }
 
@@ -205,12 +253,19 @@ __device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t l
   return MayTouch(entry, item, tile, box);
 }
 
-// A pair's voxels; true if it is heavy: then it is listed.
+// A pair's voxels; true if it is listed to be drawn by many threads. owned: PairRows::owned.
 __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t tile,
-                                 RegionScratch& region, PairScratch& scratch) {
+                                 uint32_t owned, RegionScratch& region, PairScratch& scratch) {
   const Box3 box = view.volume.grid.VoxelsOf(tile);
   const TableEntry& entry = view.table[value >> 32];
   const uint32_t item = static_cast<uint32_t>(value);
+  if (entry.alive != 0 && IsSolid(entry.record.kind) && SmallSolids::Has(entry.source.solid)) {
+    if (!IsFirstTile(entry.source.solid, box, owned)) return false;
+    const uint32_t at = kDrawThreads - 1 - atomicAdd(&scratch.small_count, 1u);
+    scratch.heavy[at] = value;
+    scratch.tiles[at] = tile;
+    return true;
+  }
   const bool heavy = entry.alive != 0 && IsHeavy(entry, item, box);
   if (entry.alive == 0) {
   } else if (heavy) {
@@ -227,21 +282,32 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t 
   return heavy;
 }
 
-// The layer's pairs of one tile, by the whole block. What is heavy is listed: it is drawn with that of other tiles, when there is
+// The layer's pairs of all tiles, by the whole block. What is heavy is listed: it is drawn together, at the end, or when there is
 // no more room for what may come.
-__device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, uint32_t t,
-                                 uint32_t tile, RegionScratch& region, PairScratch& scratch) {
+__device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, RegionScratch& region,
+                                 PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   for (uint32_t b = 0; b < view.pairs.count; ++b) {
-    const uint32_t end = rows.end[t][b];
-    for (uint32_t round = rows.begin[t][b]; round < end; round += kDrawThreads) {
+    uint32_t until[kRegionTiles];  // pairs of the tiles up to each
+    for (uint32_t t = 0, sum = 0; t < kRegionTiles; ++t) {
+      until[t] = sum += rows.end[t][b] - rows.begin[t][b];
+    }
+    const uint32_t end = until[kRegionTiles - 1];
+    for (uint32_t round = 0; round < end; round += kDrawThreads) {
       // The same for every thread: a barrier lies between this and whatever is listed before or after it.
-      if (scratch.heavy_count + Min(end - round, kDrawThreads) > kDrawThreads) {
+      if (scratch.listed() + Min(end - round, kDrawThreads) > kDrawThreads) {
         DrawHeavy(view.table, grid, region.words, scratch);
       }
       const uint32_t p = round + threadIdx.x;
       __syncthreads();
-      if (p < end) DrawLight(view, view.pairs.batches[b].values[p], tile, region, scratch);
+      if (p < end) {
+        uint32_t t = 0, before = 0;
+        for (uint32_t u = 0; u + 1 < kRegionTiles; ++u) {
+          if (p >= until[u]) t = u + 1, before = until[u];
+        }
+        const uint64_t value = view.pairs.batches[b].values[rows.begin[t][b] + (p - before)];
+        DrawLight(view, value, rows.tile[t], rows.owned, region, scratch);
+      }
       __syncthreads();
     }
   }
@@ -250,16 +316,17 @@ __device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, uin
 // What the layer has in one tile of items that are not listed, by the whole block. Rare, and apart, so
 // that pairs are drawn as they would be without it; its loop is left by vote, as it must be around calls.
 static __device__ __noinline__ void DrawUnlisted(const DrawView& view, uint32_t tile,
-                                                 RegionScratch& region, PairScratch& scratch) {
+                                                 uint32_t owned, RegionScratch& region,
+                                                 PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   const Box3 box = grid.VoxelsOf(tile);
-  if (scratch.heavy_count != 0) DrawHeavy(view.table, grid, region.words, scratch);
+  if (scratch.listed() != 0) DrawHeavy(view.table, grid, region.words, scratch);
   for (uint64_t i = threadIdx.x; __syncthreads_or(i < view.unlisted.items) != 0;
        i += kDrawThreads) {
     bool heavy = false;
     uint64_t value;
     if (i < view.unlisted.items && FindUnlisted(view, i, region.layer, tile, box, value)) {
-      heavy = DrawLight(view, value, tile, region, scratch);
+      heavy = DrawLight(view, value, tile, owned, region, scratch);
     }
     if (__syncthreads_or(heavy ? 1 : 0) != 0) {
       DrawHeavy(view.table, grid, region.words, scratch);

@@ -76,14 +76,19 @@ __device__ inline unsigned char* SharedMemory() {
 __device__ inline RegionScratch& SharedRegion() {
   return *reinterpret_cast<RegionScratch*>(SharedMemory());
 }
-__device__ inline SpanScratch& SharedSpans() {
+// Behind the region. Who is not inlined asks here for what it needs, so that it is known to lie in shared memory.
+template <class Scratch>
+__device__ inline Scratch& SharedBehind() {
   static_assert(sizeof(RegionScratch) % 16 == 0);
-  return *reinterpret_cast<SpanScratch*>(SharedMemory() + sizeof(RegionScratch));
+  return *reinterpret_cast<Scratch*>(SharedMemory() + sizeof(RegionScratch));
 }
+__device__ inline SpanScratch& SharedSpans() { return SharedBehind<SpanScratch>(); }
 
 // Of the layer under way: rows of pairs, of a tile and a batch each.
 struct PairRows {
   uint32_t begin[kRegionTiles][kMaxBatches], end[kRegionTiles][kMaxBatches];
+  uint32_t tile[kRegionTiles];  // their numbers; kAllLanes: it is not owned
+  uint32_t owned;               // bits: which are
 };
 
 // A region's place: its tiles' numbers, kAllLanes where there is none or it is not owned.
@@ -148,7 +153,7 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
 }
 
 // The layer of the least rank that is wanted and has something in the region, and what. By the first
-// warp: a lane looks after a batch. kAll: there may be pairs, and what has no lists.
+// warp: a lane looks after a batch, of pairs after a tile's part of some. kAll: there may be pairs, and what has no lists.
 template <bool kAll>
 __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
                              const LayerWanted& wanted, RegionScratch& scratch, PairRows* rows) {
@@ -156,13 +161,20 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
   constexpr int32_t kNone = 0x7FFFFFFF;
   int32_t least = kNone;
   uint32_t layer = kAllLanes;
-  int32_t best[kRegionTiles] = {kNone, kNone, kNone, kNone};
-  uint32_t begin[kRegionTiles] = {}, end[kRegionTiles] = {};
+  constexpr uint32_t kAtOnce = 32 / kRegionTiles, kTurns = kMaxBatches / kAtOnce;
+  [[maybe_unused]] const uint32_t t = lane % kRegionTiles;
+  int32_t best[kTurns];
+  uint32_t begin[kTurns] = {}, end[kTurns] = {};
+  for (int32_t& rank : best) rank = kNone;
   if constexpr (kAll) {
-    for (uint32_t t = 0; t < kRegionTiles; ++t) {
-      const uint32_t tile = place.TileOf(view.volume, t);
-      if (lane < view.pairs.count && tile != kAllLanes) {
-        FindPairs(view, view.pairs.batches[lane], tile, wanted, best[t], begin[t], end[t], least,
+    const uint32_t tile = place.TileOf(view.volume, t);
+    const uint32_t owned = __ballot_sync(kAllLanes, tile != kAllLanes);
+    if (lane < kRegionTiles) rows->tile[lane] = tile;
+    if (lane == 0) rows->owned = owned & ((1u << kRegionTiles) - 1);
+    for (uint32_t r = 0; r < kTurns; ++r) {
+      const uint32_t b = r * kAtOnce + lane / kRegionTiles;
+      if (b < view.pairs.count && tile != kAllLanes) {
+        FindPairs(view, view.pairs.batches[b], tile, wanted, best[r], begin[r], end[r], least,
                   layer);
       }
     }
@@ -199,10 +211,11 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
   }
   bool pairs = false;
   if constexpr (kAll) {
-    for (uint32_t t = 0; t < kRegionTiles; ++t) {
-      const bool here = best[t] == least && least != kNone;
-      rows->begin[t][lane] = here ? begin[t] : 0;
-      rows->end[t][lane] = here ? end[t] : 0;
+    for (uint32_t r = 0; r < kTurns; ++r) {
+      const uint32_t b = r * kAtOnce + lane / kRegionTiles;
+      const bool here = best[r] == least && least != kNone;
+      rows->begin[t][b] = here ? begin[r] : 0;
+      rows->end[t][b] = here ? end[r] : 0;
       pairs |= here;
     }
     pairs |= unlisted_rank == least && least != kNone;

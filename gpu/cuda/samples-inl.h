@@ -1,7 +1,10 @@
 // A grid of samples in a tile, by a block of threads: what primitives/samples.h says of each voxel, with what
-// is the same for a column of them worked out once. At a level, depths go into shared memory first, of the tile
+// is the same for a column of them worked out once. Of LINEAR numbers, the samples around the tile go into shared memory first,
+// if they are not too many: a voxel reads eight of them. At a level, depths go there, of the tile
 // and one voxel around it, so that each is worked out once.
 #pragma once
+
+#include <type_traits>
 
 #include "gpu/cuda/draw_types.h"
 #include "gpu/cuda/region_scratch-inl.h"
@@ -10,12 +13,29 @@
 
 namespace voxeld::gpu::cuda {
 
+// Samples around a tile, and what else drawing it takes.
+struct NearSamples {
+  static constexpr int32_t kMostSide = 32;  // along x and y
+  static constexpr int32_t kMost = 9216;
+
+  uint32_t table[SampleHead::kTableEntries];  // words; 0: nothing
+  alignas(16) float step[kTileSize]
+                        [4];  // of the voxels of a column: the part of coordinates that changes
+  int32_t lo[3], size[3];     // of the samples: from −1, for one before the grid, on
+  bool fit;                   // they are not too many
+  bool within;                // all voxels are, of the grid
+  alignas(16) float samples[kMost];  // x fastest; beyond the grid its edge
+
+  // Rows along x lie so far apart.
+  __device__ int32_t row() const { return (size[0] + 1) & -2; }
+};
+
 struct SampleScratch {
   static constexpr int32_t kRows = kTileSize + 2;
   static constexpr uint32_t kDepths = kRows * kRows * kRows;
   union {
-    uint32_t table[SampleHead::kTableEntries];  // words; 0: nothing
-    float depth[kDepths];                       // x fastest, from one voxel before the tile on
+    NearSamples near;
+    float depth[kDepths];  // x fastest, from one voxel before the tile on
   };
 };
 
@@ -81,26 +101,162 @@ struct SampleColumn {
   }
 };
 
+// Which samples voxels look at, and what their columns' coordinates change by. By a warp.
+__device__ inline void FindNear(const Solid& s, const SampleHead& head, const Box3& part,
+                                NearSamples& near) {
+  const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
+  if (lane < kTileSize) {
+    const float dz = s.Distance(2, part.lo[2] + lane);
+    for (int r = 0; r < 3; ++r) near.step[lane][r] = s.inverse[r][2] * dz;
+  }
+  int32_t lo = 0, size = 0;
+  bool within = true;
+  if (lane < 3) {
+    // Of voxels' centres; in double, with room for the rounding of singles.
+    double low = 0, high = 0, terms = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double row = static_cast<double>(s.inverse[lane][c]);
+      const double from = static_cast<double>(s.Distance(c, part.lo[c])),
+                   to = static_cast<double>(s.Distance(c, int64_t{part.hi[c]} - 1));
+      low += row < 0 ? row * to : row * from;
+      high += row < 0 ? row * from : row * to;
+      terms += Abs(row) * Max(Abs(from), Abs(to));
+    }
+    const double room = 1e-4 + 1e-5 * terms, samples = head.size[lane];
+    within = low - room >= 0 && high + room < samples;
+    size = NearSamples::kMost + 1;
+    constexpr double kFar = 1e9;
+    if (low > -kFar && high < kFar) {
+      // From the first sample of the first voxel to the second of the last, as far as there are any and their edge.
+      const double first = Clamp(low - room - 0.5, -1.0, samples - 1),
+                   last = Clamp(high + room - 0.5, -1.0, samples - 1);
+      lo = static_cast<int32_t>(FloorToInt(first));
+      size = static_cast<int32_t>(FloorToInt(last)) + 2 - lo;
+    }
+    near.lo[lane] = lo;
+    near.size[lane] = size;
+  }
+  const bool all_within = __all_sync(kAllLanes, within) != 0;
+  const int32_t nx = __shfl_sync(kAllLanes, size, 0), ny = __shfl_sync(kAllLanes, size, 1),
+                nz = __shfl_sync(kAllLanes, size, 2);
+  if (lane == 0) {
+    near.within = all_within;
+    near.fit = nx <= NearSamples::kMostSide && ny <= NearSamples::kMostSide &&
+               nz <= NearSamples::kMost && ((nx + 1) & -2) * ny * nz <= NearSamples::kMost;
+  }
+}
+
+// Sixteen threads have a row, two samples each.
+template <class Number>
+__device__ inline void LoadNear(const SampleReader<Number>& reader, NearSamples& near) {
+  const int32_t x = static_cast<int32_t>(threadIdx.x % 16) * 2,
+                y = static_cast<int32_t>(threadIdx.x / 16);
+  static_assert(kDrawThreads / 16 >= NearSamples::kMostSide);
+  if (x >= near.size[0] || y >= near.size[1]) return;
+  const auto within = [&](int a, int32_t i) {
+    return static_cast<uint32_t>(
+        Clamp(near.lo[a] + i, 0, static_cast<int32_t>(reader.size[a]) - 1));
+  };
+  const uint32_t first = within(0, x), second = within(0, x + 1), in_plane = within(1, y);
+  float* to = near.samples + y * near.row() + x;
+  const int32_t plane = near.row() * near.size[1];
+#pragma unroll 4
+  for (int32_t z = 0; z < near.size[2]; ++z, to += plane) {
+    const uint32_t row = (within(2, z) * reader.size[1] + in_plane) * reader.size[0];
+    *reinterpret_cast<float2*>(to) = make_float2(reader.At(first, row), reader.At(second, row));
+  }
+}
+
+// A thread has every second voxel of a column of the tile.
+inline constexpr uint32_t kSampleColumns = kTileSize * kTileSize,
+                          kSampleStep = kDrawThreads / kSampleColumns;
+static_assert(kDrawThreads % kSampleColumns == 0);
+
+// Numbers through the table, by samples in shared memory. kPlain: all voxels lie within the grid, and all numbers are some.
+template <bool kPlain>
+__device__ inline void DrawNear(const Solid& s, const SampleHead& head, const Box3& part,
+                                uint32_t* words, const NearSamples& near) {
+  const int32_t x = part.lo[0] + static_cast<int32_t>(threadIdx.x % kTileSize),
+                y = part.lo[1] + static_cast<int32_t>(threadIdx.x / kTileSize % kTileSize);
+  if (x >= part.hi[0] || y >= part.hi[1]) return;
+  const SampleColumn column(s, x, y);
+  const float low = head.low, scale = head.scale;
+  const uint32_t row = static_cast<uint32_t>(near.row()),
+                 plane = row * static_cast<uint32_t>(near.size[1]);
+  // Added to −1 or more and rounded down, it leaves the floor in the lower bits.
+  constexpr float kWhole = 12582912.0f;  // 1.5 · 2²³
+  constexpr uint32_t kWholeBits = 0x4B400000u;
+  const auto whole = [](int32_t i) { return kWholeBits + static_cast<uint32_t>(i); };
+  const uint32_t from = whole(near.lo[2]) * plane + whole(near.lo[1]) * row + whole(near.lo[0]);
+  float limit[3];
+  for (int a = 0; a < 3; ++a) limit[a] = static_cast<float>(head.size[a]);
+  const int32_t count = part.hi[2] - part.lo[2];
+#pragma unroll 2
+  for (int32_t z = static_cast<int32_t>(threadIdx.x / kSampleColumns); z < count;
+       z += static_cast<int32_t>(kSampleStep)) {
+    float t[3];
+    uint32_t bits[3];
+    bool in = true;
+    const float4 step4 = *reinterpret_cast<const float4*>(near.step[z]);
+    const float step[3] = {step4.x, step4.y, step4.z};
+    for (int a = 0; a < 3; ++a) {
+      const float q = column.base[a] + step[a];
+      if (!kPlain) in = in && q >= 0 && q < limit[a];
+      const float p = q - 0.5f;
+      const float floor = __fadd_rd(p, kWhole);
+      bits[a] = __float_as_uint(floor);
+      t[a] = p - (floor - kWhole);
+    }
+    if (!in) continue;
+    const float* const at = near.samples + (bits[2] * plane + bits[1] * row + bits[0] - from);
+    const float *const beside = at + row, *const above = at + plane, *const last = above + row;
+    const float corner[8] = {at[0],    at[1],    beside[0], beside[1],
+                             above[0], above[1], last[0],   last[1]};
+    const float value = Samples::MixCorners(corner, t);
+    const float place = (value - low) * scale;
+    // What is no number is 0 here, as in Samples::EntryOf.
+    const float entry = fminf(fmaxf(place, 0.0f), 255.0f);
+    const uint32_t word = near.table[__float_as_uint(__fadd_rd(entry, kWhole)) & 0xFF];
+    if (word == 0 || (!kPlain && implicit::IsNan(value))) continue;
+    atomicMax(&words[IndexInRegion(x, y, part.lo[2] + z)], word);
+  }
+}
+
 // Numbers through the table.
 template <class Number, bool kNearest>
 __device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, const Box3& part,
                             uint32_t* words, SampleScratch& scratch) {
   const Source& source = entry.source;
+  const SampleReader<Number> reader(view);
+  NearSamples& near = scratch.near;
   for (uint32_t i = threadIdx.x; i < SampleHead::kTableEntries; i += kDrawThreads) {
     const uint32_t color = view.table()[i];
-    scratch.table[i] =
+    near.table[i] =
         (color & SampleHead::kDrawn) != 0
             ? MakeWord(entry.priority, entry.erase != 0, Tinted(color & 0x00FFFFFF, source.tint))
             : 0;
   }
+  if (!kNearest && threadIdx.x >= kDrawThreads - 32) {
+    FindNear(source.solid, view.head(), part, near);
+  }
   __syncthreads();
-  const SampleReader<Number> reader(view);
+  if constexpr (!kNearest) {
+    if (near.fit) {
+      LoadNear(reader, near);
+      __syncthreads();
+      if (near.within && !std::is_same_v<Number, float>) {
+        DrawNear<true>(source.solid, view.head(), part, words, near);
+      } else {
+        DrawNear<false>(source.solid, view.head(), part, words, near);
+      }
+      __syncthreads();
+      return;
+    }
+  }
   const float low = view.head().low, scale = view.head().scale;
   const int32_t nx = part.hi[0] - part.lo[0], ny = part.hi[1] - part.lo[1];
-  // A thread has every second voxel of a column of the tile, four at once.
-  constexpr uint32_t kColumns = kTileSize * kTileSize, kStep = kDrawThreads / kColumns;
-  constexpr int32_t kAtOnce = 4;
-  static_assert(kDrawThreads % kColumns == 0);
+  constexpr uint32_t kColumns = kSampleColumns, kStep = kSampleStep;
+  constexpr int32_t kAtOnce = 4;  // voxels
   const int32_t i = static_cast<int32_t>(threadIdx.x % kTileSize),
                 j = static_cast<int32_t>(threadIdx.x / kTileSize % kTileSize);
   if (i < nx && j < ny) {
@@ -122,7 +278,7 @@ __device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, con
         if (!in[k] || at >= part.hi[2] || implicit::IsNan(value[k])) continue;
         const float place = (value[k] - low) * scale;
         const uint32_t word =
-            scratch.table[place > 0 ? (place >= 255.0f ? 255 : static_cast<uint32_t>(place)) : 0];
+            near.table[place > 0 ? (place >= 255.0f ? 255 : static_cast<uint32_t>(place)) : 0];
         if (word != 0) atomicMax(&words[IndexInRegion(x, y, at)], word);
       }
     }
@@ -225,8 +381,9 @@ __device__ void DrawSamplesOf(const TableEntry& entry, const SampleView& view, c
                  : DrawNumbers<Number, false>(entry, view, part, words, scratch);
 }
 
-static __device__ __noinline__ void DrawSamples(const TableEntry& entry, const Box3& box,
-                                                uint32_t* words, SampleScratch& scratch) {
+static __device__ __noinline__ void DrawSamples(const TableEntry& entry, const Box3& box) {
+  uint32_t* const words = SharedRegion().words;
+  SampleScratch& scratch = SharedBehind<SampleScratch>();
   const Box3 part = Intersect(box, entry.source.solid.bounds);
   if (IsEmpty(part)) return;  // the same for every thread
   const SampleView view{entry.source.indices};

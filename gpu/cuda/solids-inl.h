@@ -141,4 +141,135 @@ __device__ inline void DrawSolidByWarp(const TableEntry& entry, const Box3& box,
   }
 }
 
+// Solids so small that a warp works out all that one has in a region as columns along z, with a rim of one voxel.
+struct SmallSolids {
+  static constexpr int32_t kReach = 8;  // voxels from the origin's
+  static constexpr int32_t kSide = 2 * kReach + 1;
+  static constexpr uint32_t kColumns = (kSide + 2) * (kSide + 2);
+
+  // Each warp's, x fastest: bit i is voxel i − 1 along z of what is drawn.
+  uint32_t columns[kDrawWarps][kColumns];
+
+  __device__ static bool Has(const Solid& s) {
+    for (int a = 0; a < 3; ++a) {
+      if (s.origin[a] - s.bounds.lo[a] > kReach || s.bounds.hi[a] - s.origin[a] > kReach + 1) {
+        return false;
+      }
+    }
+    return true;
+  }
+};
+
+// Of `count` voxels along z, as bits from `bit` on, those inside. base: the part of canonical coordinates that does not
+// change; step: what they change by with dz.
+template <class Shape>
+__device__ inline uint32_t InsideColumn(const float base[3], const float step[3], float dz,
+                                        uint32_t bit, int32_t count) {
+  uint32_t inside = 0;
+#pragma unroll 3
+  for (; count > 0; --count) {
+    float q[3];
+    for (int r = 0; r < 3; ++r) q[r] = base[r] + step[r] * dz;
+    if (Shape::Contains(q)) inside |= bit;
+    bit <<= 1;
+    dz += 1.0f;  // exact: not far from the origin
+  }
+  return inside;
+}
+
+__device__ inline uint32_t InsideColumn(PrimitiveKind kind, const float base[3],
+                                        const float step[3], float dz, uint32_t bit,
+                                        int32_t count) {
+  switch (kind) {
+    case PrimitiveKind::kBox:
+      return InsideColumn<Box>(base, step, dz, bit, count);
+    case PrimitiveKind::kSphere:
+      return InsideColumn<Sphere>(base, step, dz, bit, count);
+    default:
+      return InsideColumn<Cylinder>(base, step, dz, bit, count);
+  }
+}
+
+// Of a column, which lies at `at` among others, `width` in a row, those voxels whose neighbours are all inside.
+__device__ inline uint32_t EnclosedInColumn(const uint32_t* at, int32_t width, SurfaceRule rule) {
+  const auto along = [](uint32_t column) { return column & column << 1 & column >> 1; };
+  if (rule == SurfaceRule::kThin) return along(*at) & at[-1] & at[1] & at[-width] & at[width];
+  uint32_t all = kAllLanes;
+  for (int32_t dy = -width; dy <= width; dy += width) {
+    for (int32_t dx = -1; dx <= 1; ++dx) all &= along(at[dy + dx]);
+  }
+  return all;
+}
+
+// bits: as SmallSolids has them; place: of bit 0.
+__device__ inline void RaiseColumn(uint32_t* words, uint32_t place, uint32_t bits, uint32_t word) {
+  for (; bits != 0; bits &= bits - 1) {
+    const uint32_t bit = static_cast<uint32_t>(__ffs(static_cast<int>(bits))) - 1;
+    atomicMax(&words[place + (bit << 10)], word);
+  }
+}
+
+// A small solid in a region, by a warp. columns: the warp's.
+__device__ inline void DrawSmallSolid(const TableEntry& entry, const Box3& region, uint32_t* words,
+                                      uint32_t* columns) {
+  const Solid& s = entry.source.solid;
+  const Box3 part = Intersect(region, s.bounds);
+  if (IsEmpty(part)) return;  // the same for every lane
+  const bool surface = entry.record.fill == Fill::kSurface;
+  const uint32_t word = MakeWord(entry.priority, entry.erase != 0, entry.source.UniformColor());
+  // What is looked at: of a surface the rim as well, beyond the bounds there is nothing.
+  const int32_t rim = surface ? 1 : 0;
+  int32_t lo[3], hi[3], origin[3], rest[3];
+  for (int a = 0; a < 3; ++a) {
+    lo[a] = Max(part.lo[a] - rim, s.bounds.lo[a]);
+    hi[a] = Min(part.hi[a] + rim, s.bounds.hi[a]);
+    origin[a] = static_cast<int32_t>(s.origin[a]);
+    rest[a] = kHalfVoxel - static_cast<int32_t>(s.rest[a]);
+  }
+  // Solid::Distance, in 32 bits.
+  const auto distance = [&](int a, int32_t voxel) {
+    return static_cast<float>((voxel - origin[a]) * static_cast<int32_t>(kUnitsPerVoxel) +
+                              rest[a]) *
+           0.00390625f;
+  };
+  const int32_t begin = part.lo[2] - 1, height = part.hi[2] - part.lo[2];
+  const uint32_t drawn = (2u << height) - 2;
+  const uint32_t origin_bit =
+      Contains(part, origin[0], origin[1], origin[2]) ? 1u << (origin[2] - begin) : 0;
+  const int32_t width = hi[0] - lo[0], count = width * (hi[1] - lo[1]), row = width + 2;
+  const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
+  if (surface) {
+    for (int32_t i = lane; i < row * (hi[1] - lo[1] + 2); i += 32) columns[i] = 0;
+    __syncwarp();
+  }
+  const int32_t per = 65536 / width + 1;  // i·per / 65536 is i / width: they are few
+  const float step[3] = {s.inverse[0][2], s.inverse[1][2], s.inverse[2][2]};
+  const float dz = distance(2, lo[2]);
+  for (int32_t i = lane; i < count; i += 32) {
+    const int32_t j = i * per >> 16, x = lo[0] + i - j * width, y = lo[1] + j;
+    const float dx = distance(0, x), dy = distance(1, y);
+    float base[3];
+    for (int r = 0; r < 3; ++r) base[r] = s.inverse[r][0] * dx + s.inverse[r][1] * dy;
+    const uint32_t inside =
+        InsideColumn(entry.record.kind, base, step, dz, 1u << (lo[2] - begin), hi[2] - lo[2]);
+    uint32_t raised = x == origin[0] && y == origin[1] ? origin_bit & ~inside : 0;
+    if (surface) {
+      columns[(j + 1) * row + i - j * width + 1] = inside;
+    } else {
+      raised |= inside;
+    }
+    RaiseColumn(words, IndexInRegion(x, y, begin + 1) - (1u << 10), raised, word);
+  }
+  if (!surface) return;
+  __syncwarp();
+  for (int32_t i = lane; i < count; i += 32) {
+    const int32_t j = i * per >> 16, x = lo[0] + i - j * width, y = lo[1] + j;
+    if (x < part.lo[0] || x >= part.hi[0] || y < part.lo[1] || y >= part.hi[1]) continue;
+    const uint32_t* const at = columns + (j + 1) * row + i - j * width + 1;
+    const uint32_t seen = *at & drawn & ~EnclosedInColumn(at, row, entry.record.rule);
+    RaiseColumn(words, IndexInRegion(x, y, begin + 1) - (1u << 10), seen, word);
+  }
+  __syncwarp();
+}
+
 }  // namespace voxeld::gpu::cuda

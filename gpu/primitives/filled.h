@@ -178,9 +178,11 @@ struct Filled {
   template <class Emit>
   VOXELD_HD static void EmitTiles(const Source& source, uint32_t i, const TileGrid& grid,
                                   Emit&& emit) {
+    const bool noted = source.inside_tiles != nullptr;
+    if (noted && source.inside_tiles[i] == 0) return;
     EmitTilesOfBox(BlockOf(source, i), grid, [&](uint32_t tile) {
       const Box3 box = Intersect(grid.VoxelsOf(tile), source.solid.bounds);
-      if (source.inside == nullptr || HasAny(source, box)) emit(tile);
+      if (noted || source.inside == nullptr || HasAny(source, box)) emit(tile);
     });
   }
 
