@@ -31,11 +31,17 @@ struct CoveredScratch {
   float p[kCoveredRim][kCoveredAcross];  // by place along x, then row: y first, then z
   // By row: bit x + 1 is voxel x of the tile: whether it is inside; whether it may lie within the shell.
   uint32_t inside[kCoveredAcross], near[kCoveredAcross];
+  // Of the tile's own rows, y first, then z: bit x: what is covered.
+  uint32_t covered[kCoveredRows];
+  // Voxels to be looked at by whoever is free: x, then y, then z, four bits each.
+  uint32_t doubtful;
+  uint16_t list[kCoveredRows * kCoveredEdge];
 };
 
 // An item's voxels that lie in the bounds.
 struct CoveredTile {
   int32_t lo[3], size[3];
+  int32_t skipped[3];  // voxels of the tile before them
 
   __device__ CoveredTile(const CoveredView& view, uint32_t item) {
     const uint32_t nx = static_cast<uint32_t>(view.blocks[0]),
@@ -44,6 +50,7 @@ struct CoveredTile {
     for (int a = 0; a < 3; ++a) {
       const int32_t begin = (view.first[a] + static_cast<int32_t>(at[a])) * kCoveredEdge;
       lo[a] = begin > view.lo[a] ? begin : view.lo[a];
+      skipped[a] = lo[a] - begin;
       const int32_t end = begin + kCoveredEdge < view.hi[a] ? begin + kCoveredEdge : view.hi[a];
       size[a] = end - lo[a];
     }
@@ -54,7 +61,8 @@ struct CoveredTile {
   }
   // Of row (y, z), bits that there are; the first voxel's is bit 0.
   __device__ uint32_t Within(int32_t y, int32_t z) const {
-    return y < size[1] && z < size[2] ? (1u << size[0]) - 1 : 0;
+    const bool is_there = y >= 0 && z >= 0 && y < size[1] && z < size[2];
+    return is_there ? (1u << size[0]) - 1 : 0;
   }
 };
 
@@ -123,30 +131,74 @@ __device__ void FindCoveredValues(const CoveredView& view, const typename Formul
   __syncthreads();
 }
 
-// Of the tile's row (y, z) the voxels that are covered.
+// Lists voxels of the tile's row `own`, bits. By a whole warp.
+__device__ inline void ListDoubtful(uint32_t bits, uint32_t own, CoveredScratch& s) {
+  const uint32_t lane = threadIdx.x % 32, count = static_cast<uint32_t>(__popc(bits));
+  uint32_t until = count;
+  for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
+    const uint32_t other = __shfl_up_sync(0xFFFFFFFFu, until, lanes);
+    if (lane >= lanes) until += other;
+  }
+  uint32_t place = 0;
+  if (lane == 31 && until != 0) place = atomicAdd(&s.doubtful, until);
+  place = __shfl_sync(0xFFFFFFFFu, place, 31) + until - count;
+  for (; bits != 0; bits &= bits - 1) {
+    const uint32_t x = static_cast<uint32_t>(__ffs(static_cast<int>(bits))) - 1;
+    s.list[place++] = static_cast<uint16_t>(own << 4 | x);
+  }
+}
+
+// A listed voxel.
+struct DoubtfulVoxel {
+  uint32_t own, x, y, z;
+
+  __device__ explicit DoubtfulVoxel(uint32_t listed)
+      : own(listed >> 4), x(listed & 15), y(listed >> 4 & 15), z(listed >> 8) {}
+  __device__ uint32_t row() const { return (z + 1) * kCoveredRim + y + 1; }
+};
+
+// f(voxel) of those listed: whether it is covered; none is listed then. By the whole block.
+template <class F>
+__device__ void JudgeDoubtful(CoveredScratch& s, F&& f) {
+  __syncthreads();
+  const uint32_t count = s.doubtful;
+  for (uint32_t i = threadIdx.x; i < count; i += kCoveredThreads) {
+    const DoubtfulVoxel voxel(s.list[i]);
+    if (f(voxel)) atomicOr(&s.covered[voxel.own], 1u << voxel.x);
+  }
+  __syncthreads();
+  if (threadIdx.x == 0) s.doubtful = 0;
+  __syncthreads();
+}
+
+// Which voxels of the tile a surface covers. By the whole block.
 template <class Formula>
-__device__ uint32_t CoveredInRow(const CoveredView& view, const typename Formula::Of& of,
-                                 const CoveredTile& tile, int32_t y, int32_t z,
-                                 const CoveredScratch& s) {
-  const uint32_t row = static_cast<uint32_t>((z + 1) * kCoveredRim + y + 1);
-  const uint32_t there = tile.Within(y, z);
-  if (view.solid) return s.inside[row] >> 1 & there;
-  uint32_t left = BesideOthers(s, row, view.cover) >> 1 & there, covered = 0;
-  while (left != 0) {
-    const int32_t x = __ffs(static_cast<int>(left)) - 1;
-    left &= left - 1;
-    if (IsNearest(s, row, x + 1, view.cover)) covered |= 1u << x;
+__device__ void FindCoveredSurface(const CoveredView& view, const typename Formula::Of& of,
+                                   const CoveredTile& tile, CoveredScratch& s) {
+  const uint32_t own = threadIdx.x;
+  const uint32_t row = (own / kCoveredEdge + 1) * kCoveredRim + own % kCoveredEdge + 1;
+  uint32_t there = 0;
+  if (own < kCoveredRows) {
+    there = tile.Within(static_cast<int32_t>(own % kCoveredEdge),
+                        static_cast<int32_t>(own / kCoveredEdge));
+    const uint32_t beside = BesideOthers(s, row, view.cover) >> 1 & there;
+    // Without a shell it is covered where P is 0.
+    const uint32_t zero = view.half == 0 ? s.near[row] >> 1 & there : 0;
+    s.covered[own] = zero;
+    ListDoubtful(beside & ~zero, own, s);
   }
-  const uint32_t near = s.near[row] >> 1 & there & ~covered;
-  if (view.half == 0) return covered | near;  // there P is 0
-  if (near == 0) return covered;
-  const Formula formula(view, of, tile.PlaceBefore(view, 1) + 1 + static_cast<uint32_t>(y),
-                        tile.PlaceBefore(view, 2) + 1 + static_cast<uint32_t>(z));
-  for (left = near; left != 0; left &= left - 1) {
-    const uint32_t x = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
-    if (formula.IsWithin(tile.PlaceBefore(view, 0) + 1 + x)) covered |= 1u << x;
+  JudgeDoubtful(s, [&](const DoubtfulVoxel& voxel) {
+    return IsNearest(s, voxel.row(), static_cast<int32_t>(voxel.x) + 1, view.cover);
+  });
+  if (view.half == 0) return;
+  if (own < kCoveredRows) {
+    ListDoubtful(s.near[row] >> 1 & there & ~s.covered[own], own, s);
   }
-  return covered;
+  JudgeDoubtful(s, [&](const DoubtfulVoxel& voxel) {
+    const Formula formula(view, of, tile.PlaceBefore(view, 1) + 1 + voxel.y,
+                          tile.PlaceBefore(view, 2) + 1 + voxel.z);
+    return formula.IsWithin(tile.PlaceBefore(view, 0) + 1 + voxel.x);
+  });
 }
 
 // An item's rows. By the whole block.
@@ -154,13 +206,20 @@ template <class Formula>
 __device__ void FindCoveredTile(const CoveredView& view, const typename Formula::Of& of,
                                 uint32_t item, float reach, bool whole, CoveredScratch& s) {
   const CoveredTile tile(view, item);
-  if (!whole) FindCoveredValues<Formula>(view, of, tile, reach, s);
+  if (!whole) {
+    FindCoveredValues<Formula>(view, of, tile, reach, s);
+    if (!view.solid) FindCoveredSurface<Formula>(view, of, tile, s);
+  }
   if (threadIdx.x < kCoveredRows) {
-    const int32_t y = static_cast<int32_t>(threadIdx.x) % kCoveredEdge,
-                  z = static_cast<int32_t>(threadIdx.x) / kCoveredEdge;
-    const uint32_t covered =
-        whole ? tile.Within(y, z) : CoveredInRow<Formula>(view, of, tile, y, z, s);
-    view.rows[size_t{item} * kCoveredRows + threadIdx.x] = static_cast<uint16_t>(covered);
+    const int32_t y = static_cast<int32_t>(threadIdx.x) % kCoveredEdge - tile.skipped[1],
+                  z = static_cast<int32_t>(threadIdx.x) / kCoveredEdge - tile.skipped[2];
+    uint32_t covered = tile.Within(y, z);
+    if (covered != 0 && !whole) {
+      covered &= view.solid ? s.inside[(z + 1) * kCoveredRim + y + 1] >> 1
+                            : s.covered[z * kCoveredEdge + y];
+    }
+    view.rows[size_t{item} * kCoveredRows + threadIdx.x] =
+        static_cast<uint16_t>(covered << tile.skipped[0]);
   }
   __syncthreads();
 }
@@ -172,6 +231,7 @@ inline constexpr float kCoversNothing = -1, kCoversEverything = -2;
 template <class Formula>
 __device__ void FindCoveredItems(const CoveredView& view, const typename Formula::Of& of,
                                  CoveredScratch& s) {
+  if (threadIdx.x == 0) s.doubtful = 0;  // before the first barrier
   for (uint32_t i = 0; i < kCoveredAtOnce; ++i) {
     const uint32_t item = blockIdx.x * kCoveredAtOnce + i;
     if (item >= view.items) return;  // the same for every thread, as what follows

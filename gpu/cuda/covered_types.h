@@ -33,7 +33,7 @@ inline constexpr uint32_t kCoveredSpare = 2 + kCoveredEdge + 6;
 // A shape in its bounds, cut into tiles, its items.
 struct CoveredView {
   float* reach = nullptr;  // of each item what is known of it (Implicit::ReachOf)
-  // Of each item its rows of 16 voxels, y first, then z: bit x. Null: they are not looked for, nor what is
+  // Of each item that has anything its rows of 16 voxels, y first, then z: bit x of the tile. Null: they are not looked for, nor what is
   // along the axes.
   uint16_t* rows = nullptr;
   const uint32_t* hoisted = nullptr;  // implicit/hoisted.h

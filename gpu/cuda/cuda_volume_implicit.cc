@@ -137,20 +137,22 @@ absl::Status CudaVolume::ForViews(std::span<const CoveredView> all, F&& f) {
 }
 
 absl::Status CudaVolume::FindImplicit() {
-  std::vector<CoveredView> all, bounded;
+  std::vector<CoveredView> all, with_rows, bounded;
   absl::btree_map<cudaKernel_t, std::vector<CoveredView>> by_formula;
   for (const PlacedImplicit& placed : placed_) {
     all.push_back(placed.view);
     if (placed.view.rows == nullptr) continue;
+    with_rows.push_back(placed.view);
     by_formula[placed.formula].push_back(placed.view);
     if (placed.view.bounded) bounded.push_back(placed.view);
   }
   const TableEntry* const table = table_.as<TableEntry>();
   const cudaStream_t stream = device_.stream();
   absl::Status status = ForViews(all, [&](const CoveredViews& views) {
-    absl::Status queued =
-        device_.Run("FindTiles", [&] { return FindTiles(table, views, stream); });
-    if (!queued.ok()) return queued;
+    return device_.Run("FindTiles", [&] { return FindTiles(table, views, stream); });
+  });
+  if (!status.ok()) return status;
+  status = ForViews(with_rows, [&](const CoveredViews& views) {
     return device_.Run("FindAlong", [&] { return FindAlong(table, views, stream); });
   });
   for (const auto& [formula, views_of] : by_formula) {

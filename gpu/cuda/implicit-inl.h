@@ -10,7 +10,6 @@
 
 #include "gpu/cuda/covered_types.h"
 #include "gpu/cuda/draw_types.h"
-#include "gpu/cuda/filled-inl.h"
 #include "gpu/cuda/region_scratch-inl.h"
 #include "gpu/cuda/warp-inl.h"
 #include "gpu/implicit/field.h"
@@ -321,37 +320,46 @@ static __device__ __noinline__ void DrawImplicit(const TableEntry& entry, uint32
   __syncthreads();
 }
 
-// The same where its rows are known.
-static __device__ __noinline__ void DrawCovered(const TableEntry& entry, uint32_t item,
-                                                const Box3& box, uint32_t* words,
-                                                FilledScratch& scratch) {
-  const Source& source = entry.source;
-  const Box3 part = Intersect(box, source.solid.bounds);
-  if (IsEmpty(part)) return;  // the same for every thread
-  const uint16_t* const rows = source.implicit.rows + size_t{item} * kCoveredRows;
-  const int32_t dx = part.lo[0] - box.lo[0], dy = part.lo[1] - box.lo[1],
-                dz = part.lo[2] - box.lo[2];
-  for (uint32_t row = threadIdx.x; row < kCoveredRows; row += kDrawThreads) {
-    const int32_t y = static_cast<int32_t>(row & 15) - dy, z = static_cast<int32_t>(row >> 4) - dz;
-    scratch.rows[row] = y < 0 || z < 0 ? 0 : static_cast<uint32_t>(__ldg(&rows[z << 4 | y])) << dx;
+// Of the tile at (i, j, k) its row (y, z), voxels of the tile, as far as the shape is bounded; bit x.
+__device__ inline uint32_t CoveredRow(const Source& source, int32_t i, int32_t j, int32_t k,
+                                      uint32_t row) {
+  const ImplicitPlace& place = source.implicit;
+  const int32_t at[3] = {i - place.first[0], j - place.first[1], k - place.first[2]};
+  uint32_t item = 0;
+  for (int a = 2; a >= 0; --a) {
+    if (at[a] < 0 || at[a] >= place.blocks[a]) return 0;
+    item = item * static_cast<uint32_t>(place.blocks[a]) + static_cast<uint32_t>(at[a]);
   }
-  __syncthreads();
+  // What has nothing has no rows.
+  if (__ldg(&place.reach[item]) == Implicit::kNothing) return 0;
+  return __ldg(&place.rows[size_t{item} * kCoveredRows + row]);
+}
+
+// The same where its rows are known, in a whole region, `box`: a thread looks up a row, a warp raises a plane.
+static __device__ __noinline__ void DrawCovered(const TableEntry& entry, const Box3& box) {
+  static_assert(RegionBits(0) == 5 && RegionBits(1) == 5 && kDrawWarps == 1u << RegionBits(2));
+  const Source& source = entry.source;
+  if (IsEmpty(Intersect(box, source.solid.bounds))) return;  // the same for every thread
+  const uint32_t lane = threadIdx.x % 32, plane = threadIdx.x / 32;
+  const int32_t i = box.lo[0] / kTileSize, j = box.lo[1] / kTileSize + static_cast<int32_t>(lane / 16),
+                k = box.lo[2] / kTileSize;
+  const uint32_t in_tile = plane << 4 | lane % 16;
+  const uint32_t row =
+      CoveredRow(source, i, j, k, in_tile) | CoveredRow(source, i + 1, j, k, in_tile) << 16;
   const implicit::Field field(source);
   const bool uniform = field.is_uniform();
   uint32_t word = MakeWord(entry.priority, entry.erase != 0, source.UniformColor());
-  uint32_t* const at = words + IndexInRegion(box.lo[0], box.lo[1], box.lo[2]);
-  const uint32_t x = threadIdx.x & 15;
-#pragma unroll 1
-  for (uint32_t row = threadIdx.x >> 4; row < kCoveredRows; row += kDrawThreads / 16) {
-    if ((scratch.rows[row] >> x & 1) == 0) continue;
+  uint32_t* const at = SharedRegion().words + (plane << 10 | lane);
+  for (uint32_t left = __ballot_sync(kAllLanes, row != 0); left != 0; left &= left - 1) {
+    const uint32_t r = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
+    if ((__shfl_sync(kAllLanes, row, r) >> lane & 1) == 0) continue;
     if (!uniform) {
       word = ImplicitColor(field, entry.priority, entry.erase != 0,
-                           box.lo[0] + static_cast<int32_t>(x),
-                           box.lo[1] + static_cast<int32_t>(row & 15),
-                           box.lo[2] + static_cast<int32_t>(row >> 4));
+                           box.lo[0] + static_cast<int32_t>(lane),
+                           box.lo[1] + static_cast<int32_t>(r),
+                           box.lo[2] + static_cast<int32_t>(plane));
     }
-    uint32_t& voxel = at[x | (row & 15) << 5 | row >> 4 << 10];
-    voxel = Max(voxel, word);  // nobody else has this voxel now
+    at[r << 5] = Max(at[r << 5], word);  // nobody else has this voxel now
   }
   __syncthreads();
 }

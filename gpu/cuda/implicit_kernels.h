@@ -11,10 +11,10 @@ namespace voxeld::gpu::cuda {
 
 // Sets `reach`.
 cudaError_t FindTiles(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
-// Sets `axis`.
+// Sets what `axis` points to. Every view has rows, here and below.
 cudaError_t FindAlong(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
 // Sets `rows`, from what the two before have set, of tiles that may have anything: what P says to be
-// covered. Every view has rows. Programs are interpreted.
+// covered. Programs are interpreted.
 cudaError_t FindCovered(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
 // The same by a kernel that was compiled for a program that all of them have (compiled_formulas.h).
 cudaError_t FindCoveredBy(cudaKernel_t kernel, const CoveredViews& views, cudaStream_t stream);

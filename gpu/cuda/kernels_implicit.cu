@@ -72,7 +72,7 @@ __global__ void FindAlongKernel(const TableEntry* table, const __grid_constant__
   uint64_t place = Thread();
   int a = 0;
   for (; a < 3 && place >= view.axis[a].places; ++a) place -= view.axis[a].places;
-  if (a == 3 || view.rows == nullptr) return;
+  if (a == 3) return;
   const CoveredAxis& axis = view.axis[a];
   const Source& source = table[view.slot].source;
   const float d = source.solid.Distance(a, int64_t{view.lo[a]} - 1 + static_cast<int64_t>(place));
@@ -106,9 +106,11 @@ __global__ void BoundCoveredKernel(const TableEntry* table,
   uint32_t covered = view.rows[i];
   for (uint32_t left = covered; left != 0; left &= left - 1) {
     const int32_t x = __ffs(static_cast<int>(left)) - 1;
+    const int32_t at[3] = {x, static_cast<int32_t>(row) % kCoveredEdge,
+                           static_cast<int32_t>(row) / kCoveredEdge};
     float q[3];
-    field.CoordinatesOf(tile.lo[0] + x, tile.lo[1] + static_cast<int32_t>(row) % kCoveredEdge,
-                        tile.lo[2] + static_cast<int32_t>(row) / kCoveredEdge, q);
+    field.CoordinatesOf(tile.lo[0] - tile.skipped[0] + at[0], tile.lo[1] - tile.skipped[1] + at[1],
+                        tile.lo[2] - tile.skipped[2] + at[2], q);
     if (!field.IsBounded(q)) covered &= ~(1u << x);
   }
   view.rows[i] = static_cast<uint16_t>(covered);

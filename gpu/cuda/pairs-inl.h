@@ -191,7 +191,9 @@ __device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, 
       case PrimitiveKind::kImplicit: {
         const uint32_t item = static_cast<uint32_t>(scratch.heavy[i]);
         if (entry.source.implicit.rows != nullptr) {
-          DrawCovered(entry, item, box, words, scratch.filled);
+          if (!IsListedBefore(scratch, i)) {
+            DrawCovered(entry, RegionAround(grid, scratch.tiles[i]));
+          }
         } else {
           DrawImplicit(entry, item, box, words, scratch.implicit);
         }
