@@ -305,6 +305,27 @@ TEST_F(CommandsTest, RefusalsAreToldWithTheirIssues) {
   EXPECT_TRUE(server_.log().clears.empty()) << "the old scene stays";
 }
 
+TEST_F(CommandsTest, WhatARefusalSaysByItselfIsNotSaidAgain) {
+  server_.Set({.refuse_commits_with = "1 was refused; the first: define_object.definition: of no use"});
+  const std::string err = RunTool({"play", DataFile("points.ply")}).err;
+  EXPECT_EQ(err,
+            "voxelctl: the server refused the scene: 1 was refused; the first: "
+            "define_object.definition: of no use\n");
+}
+
+TEST_F(CommandsTest, IssuesThatAreNoRefusalsAreToldAsNotes) {
+  server_.Set({.note_commits = true});
+  const json summary = RunJson({"play", DataFile("points.ply")});
+  ASSERT_EQ(summary["issues"].size(), 1u);
+  EXPECT_EQ(summary["issues"][0]["applied"], true);
+  EXPECT_EQ(summary["refused_operations"], 0);
+  EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err, HasSubstr("note: /1: drawn otherwise"));
+  server_.Set({.lose_entities = true});
+  const json lost =
+      RunJson({"play", DataFile("points.ply"), "--spin", "--fps", "100", "--duration", "0.3"});
+  EXPECT_EQ(lost["issues"][0]["applied"], false);
+}
+
 TEST_F(CommandsTest, GlobeWantsAMap) {
   EXPECT_THAT(RunTool({"play", DataFile("points.ply"), "--globe"}).err,
               HasSubstr("--globe is for maps"));

@@ -26,6 +26,7 @@ class FakeServer final {
   // Set before the calls that they are for.
   struct Behaviour {
     std::string refuse_commits_with;  // not empty: every commit is refused, with an issue
+    bool note_commits = false;        // every commit has an issue that is no refusal
     bool lose_entities = false;       // SetTransform is answered by an Issue NOT_FOUND
     bool no_outcomes = false;         // outcomes are owed for ever
     bool short_volume = false;        // CaptureVolume leaves out its last slice
