@@ -355,6 +355,22 @@ TEST_F(CommandsTest, SnapshotsAreWrittenWholeOrNotAtAll) {
   EXPECT_EQ(ReadAll(path), sheet);
 }
 
+TEST_F(CommandsTest, ASnapshotIsOfAllThatIsUp) {
+  const std::string path = folder_.Path("a.png");
+  EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], true);
+  ASSERT_EQ(server_.log().captures.size(), 1u);
+  EXPECT_EQ(server_.log().captures[0].at_least_snapshot(), 4u) << "what the scene's watch says";
+
+  server_.Set({.behind = true});
+  EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], false);
+  ASSERT_EQ(server_.log().captures.size(), 3u);
+  EXPECT_EQ(server_.log().captures[2].at_least_snapshot(), 0u);
+  const Result result = RunTool({"snapshot", path});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.err, HasSubstr("is not shown yet"));
+  EXPECT_THAT(result.err, HasSubstr("the newest has 3"));
+}
+
 TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
   EXPECT_EQ(RunTool({"pattern", "white"}).code, 0);
   EXPECT_EQ(RunTool({"clear"}).code, 0);

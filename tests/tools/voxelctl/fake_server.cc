@@ -303,6 +303,9 @@ class FakeServer::Display final : public v1::DisplayService::Service {
     bool short_volume = false, lattice = false;
     {
       sync::MutexLock lock(server_.mutex_);
+      server_.log_.captures.push_back(*request);
+      if (server_.behaviour_.behind && request->at_least_snapshot() != 0)
+        return {grpc::StatusCode::DEADLINE_EXCEEDED, "the newest has 3"};
       short_volume = server_.behaviour_.short_volume;
       lattice = server_.behaviour_.lattice;
     }
