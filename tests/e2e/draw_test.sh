@@ -63,8 +63,15 @@ grep -q 'there is no shape spere; did you mean sphere?' "$work/error" || fail "$
 "$voxelctl" pattern corners
 draws 16000 17500 "sphere radius=0.5 fill=solid"
 
-"$voxelctl" --json gallery "$work/gallery.png" >"$work/gallery.json"
+"$voxelctl" --json gallery "$work/gallery.png" --each "$work/each/shape" >"$work/gallery.json"
 [ "$(field "$work/gallery.json" 'd["shapes"] > 10 and d["width"] > 1000')" = True ] || fail "$(cat "$work/gallery.json")"
 [ "$(head -c 8 "$work/gallery.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+# A file of each, all of them different pictures with a palette (colour type 3 at byte 25).
+[ "$(find "$work/each/shape" -name '*.png' | wc -l)" = "$(field "$work/gallery.json" 'd["shapes"]')" ] || fail "$(ls "$work/each/shape")"
+[ "$(cat "$work"/each/shape/*.png | wc -c)" -lt 500000 ] || fail "$(ls -l "$work/each/shape")"
+[ "$(md5sum "$work"/each/shape/*.png | cut -d' ' -f1 | sort | uniq -d)" = "" ] || fail "two shapes look alike"
+for name in torus points-soft mesh-a-colour-a-triangle; do
+  [ "$(od -An -tu1 -j25 -N1 "$work/each/shape/$name.png" | tr -d ' ')" = 3 ] || fail "$name.png has no palette"
+done
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" 'len(d.get("entities", []))')" = 0 ] || fail "the gallery left something up"
