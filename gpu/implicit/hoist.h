@@ -2,8 +2,8 @@
 // once for each place along it, in a tile, rather than for each voxel. The operations and their
 // arguments stay the same, so every value does.
 //
-// As words: HoistedHeader; for each value hoisted the slot that it is left in (hoisted values come axis
-// by axis); instructions, two words each, of the three axes and of the rest, in which
+// As words: HoistedHeader; for each value hoisted the slot that it is left in (hoisted values come
+// axis by axis); instructions, two words each, of the three axes and of the rest, in which
 // Op::kHoisted stands for a value.
 #pragma once
 

@@ -27,7 +27,8 @@ struct ImplicitPlace {
   // Items: blocks of `edge` voxels.
   int32_t edge = 0, first[3] = {}, blocks[3] = {};
   const uint32_t* hoisted = nullptr;  // implicit/hoist.h
-  // Of each item, which is a tile then, what is known (implicit.h); null: it is found out when asked for.
+  // Of each item, which is a tile then, what is known (implicit.h); null: it is found out when
+  // asked for.
   const float* reach = nullptr;
 };
 
