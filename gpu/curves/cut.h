@@ -1,6 +1,11 @@
 // Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space,
 // so that the error is one of voxels whatever the transform: an eighth of one (kCurveError). On the
 // host, in IEEE double, in the order written there; every engine draws what comes out.
+//
+// Guarantee: segments are within an eighth of a voxel (kCurveError) of the curve, triangles within
+// a quarter (kPatchError) of the patch, and they meet; so a thick curve is what lies within half
+// its thickness of the curve, and a thin one goes along it, but for an eighth of a voxel, without
+// gaps (EUCLIDEAN may have some) or beads.
 #pragma once
 
 #include <cstdint>

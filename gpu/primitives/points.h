@@ -6,6 +6,9 @@
 // lower sides included. Cells side by side leave no gaps, whatever the transform: a voxel's centre
 // lies in one of them. The voxel of a middle may have its own centre in the next cell, if cells are
 // turned and small; then it is of both.
+//
+// Guarantee: a thick point is the voxels whose centres lie within half its thickness, and its own;
+// cells side by side are the solid box that they fill, without gaps or voxels beside it.
 #pragma once
 
 #include "gpu/primitives/capsule.h"

@@ -13,6 +13,10 @@
 //   level    inside is where v ≥ level. SOLID covers what is inside; SURFACE by
 //            |level − v| ≤ h·|∇v|, and the neighbours on either side, as gpu/implicit/field.h has
 //            it, with nothing as outside and infinite.
+//
+// Guarantee: numbers at voxels' centres are within 10⁻⁴ of those of double precision, a colour
+// within one of the 256 steps of its table; isosurfaces are as gpu/implicit/field.h has surfaces,
+// and their volumes are right within 1 % at a radius of 20 voxels.
 #pragma once
 
 #include "gpu/implicit/number.h"

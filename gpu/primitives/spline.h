@@ -2,6 +2,9 @@
 // half of the way between neighbours), or near them (uniform cubic B-splines), and Béziers as they
 // are. An open one goes on past its ends in a straight line, so it begins and ends in its end
 // points.
+//
+// Guarantee: a curve begins and ends in its end points; Catmull–Rom goes through all its points;
+// it and B-splines are smooth.
 #pragma once
 
 #include <cstdint>

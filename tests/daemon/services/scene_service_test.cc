@@ -66,10 +66,11 @@ TEST(ApplyUpdate, StrictIsRefusedWhole) {
   *request.add_operations() = SphereIn("layer", "bad", -1);
   const auto [status, response] = Apply(daemon, request);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(status.error_message(),
-              StartsWith("the session is strict and 1 operation was refused, so nothing of the "
-                         "commit was applied; the first: layer/bad, "
-                         "operations[1].upsert.entity.primitive.sphere.radius: is -1; give"));
+  EXPECT_THAT(
+      status.error_message(),
+      StartsWith("the session is strict and 1 operation was refused, so nothing of the "
+                 "commit was applied; the first: layer/bad, "
+                 "operations[1].upsert.entity.primitive.sphere.radius: radius is -1; give"));
   EXPECT_EQ(Occurrences("is -1", status.error_message()), 1) << "said once";
   EXPECT_EQ(daemon.Entities().total(), 0u);
 }
