@@ -46,7 +46,8 @@ std::string ShowBytes(uint64_t bytes, uint64_t element_bytes, std::string_view e
   const std::string text = absl::StrCat(bytes, " bytes");
   if (bytes == 0 || bytes % element_bytes != 0) return text;
   const uint64_t count = bytes / element_bytes;
-  return absl::StrCat(text, ", ", count, " ", element, count == 1 ? "" : "s");
+  return absl::StrCat(text, ", ", count, " ", absl::string_view(element.data(), element.size()),
+                      count == 1 ? "" : "s");
 }
 
 std::string Quote(std::string_view text) {
