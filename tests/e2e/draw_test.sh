@@ -56,6 +56,10 @@ if "$voxelctl" draw "sphere radius=1" "x +" 2>"$work/error"; then fail "x + was 
 grep -q "at character 4: found the end where a number, a name or ( would be right" "$work/error" || fail "$(cat "$work/error")"
 if "$voxelctl" draw "spere radius=1" 2>"$work/error"; then fail "a spere was drawn"; fi
 grep -q 'there is no shape spere; did you mean sphere?' "$work/error" || fail "$(cat "$work/error")"
+# What the server refuses is said once, with the shape that it is of.
+if "$voxelctl" draw "sphere radius=1" "sphere radius=0" 2>"$work/error"; then fail "a sphere of no radius was drawn"; fi
+grep -q "1 operation was refused.*the first: voxelctl/draw 2, .*sphere.radius: radius is 0; give" "$work/error" || fail "$(cat "$work/error")"
+[ "$(grep -o "radius is 0" "$work/error" | wc -l)" = 1 ] || fail "said again: $(cat "$work/error")"
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" 'len(d["entities"])')" = 3 ] || fail "a refused shape took something away"
 
