@@ -52,6 +52,7 @@ Color Mean(const std::vector<Counted>& colors, const Group& group) {
     pixels += colors[i].pixels;
     for (size_t c = 0; c < 3; ++c) sums[c] += colors[i].pixels * colors[i].color[c];
   }
+  pixels = std::max<uint64_t>(pixels, 1);
   Color mean;
   for (size_t c = 0; c < 3; ++c) mean[c] = static_cast<uint8_t>((sums[c] + pixels / 2) / pixels);
   return mean;
