@@ -237,16 +237,16 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   refusals.TellOfThoseLeftOut(commit.sequence, session.sink.get(), limits.max_issues_per_commit);
 
   if (!result.applied) {
-    RefuseCommit(session, commit, result.refused_operations,
-                 result.abandoned
-                     ? std::string("the daemon is being stopped, so nothing of the commit was "
-                                   "applied; send it again to one that runs")
-                     : absl::StrFormat("the session is strict and %d %s refused, so nothing of "
-                                       "the commit was applied; the first: %s",
-                                       result.refused_operations,
-                                       result.refused_operations == 1 ? "operation was"
-                                                                      : "operations were",
-                                       first));
+    RefuseCommit(
+        session, commit, result.refused_operations,
+        result.abandoned
+            ? std::string("the daemon is being stopped, so nothing of the commit was "
+                          "applied; send it again to one that runs")
+            : absl::StrFormat("the session is strict and %d %s refused, so nothing of "
+                              "the commit was applied; the first: %s",
+                              result.refused_operations,
+                              result.refused_operations == 1 ? "operation was" : "operations were",
+                              first));
     session.intake->Done(std::move(commit));
     return Publish();  // what had expired
   }

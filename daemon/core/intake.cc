@@ -181,10 +181,9 @@ void Intake::Stage(Operation operation, uint64_t credit) {
   const uint64_t mine = staged_.bytes + detached_bytes_ + bytes;
   const uint64_t all = budget_->used_bytes(Budget::Use::kStaged) + bytes;
   if (staged_.operations.size() >= limits_.max_operations_per_commit) {
-    over(
-        absl::StrFormat("%d %s for a commit, which is max_operations_per_commit; commit first",
-                        staged_.operations.size(),
-                        staged_.operations.size() == 1 ? "operation waits" : "operations wait"));
+    over(absl::StrFormat("%d %s for a commit, which is max_operations_per_commit; commit first",
+                         staged_.operations.size(),
+                         staged_.operations.size() == 1 ? "operation waits" : "operations wait"));
   } else if (mine > limits_.max_uncommitted_bytes) {
     over(absl::StrFormat(
         "%d bytes would wait for a commit, or for a commit's present_at; max_uncommitted_bytes is "

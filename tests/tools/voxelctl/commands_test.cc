@@ -306,7 +306,8 @@ TEST_F(CommandsTest, RefusalsAreToldWithTheirIssues) {
 }
 
 TEST_F(CommandsTest, WhatARefusalSaysByItselfIsNotSaidAgain) {
-  server_.Set({.refuse_commits_with = "1 was refused; the first: define_object.definition: of no use"});
+  server_.Set(
+      {.refuse_commits_with = "1 was refused; the first: define_object.definition: of no use"});
   const std::string err = RunTool({"play", DataFile("points.ply")}).err;
   EXPECT_EQ(err,
             "voxelctl: the server refused the scene: 1 was refused; the first: "
@@ -319,7 +320,8 @@ TEST_F(CommandsTest, IssuesThatAreNoRefusalsAreToldAsNotes) {
   ASSERT_EQ(summary["issues"].size(), summary["commits"].get<size_t>());
   EXPECT_EQ(summary["issues"][0]["applied"], true);
   EXPECT_EQ(summary["refused_operations"], 0);
-  EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err, HasSubstr("note: /1: drawn otherwise"));
+  EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err,
+              HasSubstr("note: /1: drawn otherwise"));
   server_.Set({.lose_entities = true});
   const json lost =
       RunJson({"play", DataFile("points.ply"), "--spin", "--fps", "100", "--duration", "0.3"});

@@ -62,8 +62,8 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
     request.set_at_least_snapshot(0);
     request.set_timeout_ns(sync::kSecond);
     if (!Capture(request, connection, &captured).ok()) return status;
-    console.Say(absl::StrCat("what is up now is not shown yet, this is from before: ",
-                             status.message()));
+    console.Say(
+        absl::StrCat("what is up now is not shown yet, this is from before: ", status.message()));
     status = absl::OkStatus();
   }
   if (!status.ok()) return status;
