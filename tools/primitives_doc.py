@@ -13,8 +13,8 @@ PROTO = ROOT / "proto/voxeld/v1/primitives.proto"
 HEADERS = ROOT / "gpu/primitives"
 EXAMPLES = ROOT / "tools/voxelctl/shape/examples.cc"
 OUT = ROOT / "docs/primitives.md"
+PICTURES = "images/primitives"
 
-# The header of a primitive that is not called as its message.
 # What headers say of a shape, if it is not the one that is called as the shape is.
 _SOLID, _FIELD, _CURVE = ["solid.h", "solid_voxels.h"], ["../implicit/field.h"], ["../curves/cut.h"]
 HEADERS_OF = {
@@ -31,16 +31,70 @@ HEADERS_OF = {
     "Volume": ["samples.h"], "Isosurface": ["samples.h"],
     "Instance": [],
 }
+# Within rims another distance counts than the general method's.
+FLAT = ("Disc", "Patch", "Polygon")
+
+# Of fields that say nothing in brackets: unit and default, by their type.
+BY_TYPE = {
+    "Vertices": ("–", "needed"), "Grid": ("–", "needed"),
+    "Thickness": ("voxels or length", "0: one voxel"),
+    "bool": ("–", "false"),
+}
+# What is meant where a field of that name says nothing.
+BY_NAME = {"shell": "how thick the surface is", "thickness": "how thick it is"}
 
 HEAD = """# Primitives
 
 <!-- Written by tools/primitives_doc.py from proto/voxeld/v1/primitives.proto, gpu/primitives/ and the gallery's examples. -->
 
 What can be drawn, by the name of its field in `Primitive`. Coordinates are in the entity's own space: its transform, its layer's and
-the display's view follow. Lengths are in the entity's units unless said otherwise; colours 0xRRGGBB. Defaults are zero, or
-what a field says. `voxelctl draw "SHAPE NAME=VALUE …"` takes the same names. Both engines cover the same voxels.
+the display's view follow. Both engines cover the same voxels. `voxelctl draw "SHAPE NAME=VALUE …"` takes the same names, and of
+every shape
+
+| also | unit | default | |
+|---|---|---|---|
+| `color` | 0xRRGGBB | white | of everything without colours of its own; `#rrggbb` or a plain name |
+| `color_scale` | – | none | colours by numbers: [ColorScale](#colorscale) |
+| `scale` | times | 1, 1, 1 | along each axis, first |
+| `turn` | degrees | 0, 0, 0 | about x, then y, then z |
+| `at` | length | 0, 0, 0 | by how much it is moved, last |
+| `priority` | 0 to 126 | 0 | the higher shows where several cover a voxel |
+| `erase` | – | false | takes away what is of lower or equal priority in its layer |
+| `lifetime` | seconds | it stays | |
+| `label` | – | as it was typed | for people |
+
+**Units.** A *length* is in the entity's own units, as coordinates are; of a *direction* the length does not matter; *voxels* are the
+display's. *0 to 1* and the like are ranges, other words counts; – has none. **Defaults** are what holds where a field is not set;
+without what is *needed* a shape is refused. **Guarantees** are what the tests hold each shape to; h is half of a shell's thickness, in
+voxels. `voxelctl gallery` made the pictures, of what a display of 128³ voxels shows.
 
 ![Every shape, each as a display shows it](images/gallery.png)
+"""
+
+
+BESIDE = """## Beside shapes
+
+`voxelctl draw` takes these as well, in any order, in the same command; each stands for a message of
+[scene.proto](../proto/voxeld/v1/scene.proto).
+
+| | |
+|---|---|
+| `object NAME: SHAPE …` | a part of an object, which draws nothing itself; `instance object=NAME` draws it |
+| `mask: SHAPE …` | the others are seen only in voxels that such shapes cover; these are not seen themselves |
+| `clip_plane a= b= c= d=` | what lies where a·x + b·y + c·z + d < 0 is cut off |
+| `clip_box size=x,y,z` | what lies beyond the box is cut off; also `center`, and `scale`, `turn` and `at` as of shapes |
+| `clip_cylinder start=x,y,z end=x,y,z radius=` | what lies beyond the cylinder is cut off |
+
+Clips and masks are of all shapes of the command; of several clips only what lies within all of them is left. Their coordinates are the
+scene's.
+
+```
+voxelctl draw "sphere radius=0.9 fill=solid" "clip_box size=2,1,2 at=0,0.5,0" "clip_cylinder start=0,0,-1 end=0,0,1 radius=0.6"
+```
+
+```
+voxelctl draw "implicit surface='z = 0.3*sin(5*x)*cos(5*y)' level='z+0.5' colormap=viridis" "mask: sphere radius=0.8 fill=solid"
+```
 """
 
 
@@ -48,7 +102,8 @@ def comment_above(lines: list[str], at: int) -> str:
     begin = at
     while begin > 0 and lines[begin - 1].startswith("//"):
         begin -= 1
-    return " ".join(line[2:].strip() for line in lines[begin:at])
+    text = "\n".join(line[2:].strip() for line in lines[begin:at])
+    return "\n\n".join(part.replace("\n", " ") for part in text.split("\n\n"))
 
 
 def messages() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
@@ -100,23 +155,48 @@ def enums() -> dict[str, list[tuple[str, str]]]:
 
 
 def words(values: list[tuple[str, str]]) -> str:
-    """`a` unless told, `b` or `c`."""
-    unless = values[0][1].lower()
-    named = [f"`{value}`" + (" (unless told)" if value == unless else "") for value, _ in values[1:]]
-    return ", ".join(named[:-1]) + " or " + named[-1]
+    """`a`, `b` or `c`."""
+    named = [f"`{value}`" for value, _ in values]
+    return " or ".join(filter(None, [", ".join(named[:-1]), named[-1]]))
+
+
+def unless_told(values: list[tuple[str, str]]) -> str:
+    """What UNSPECIFIED says that it is."""
+    return values[0][1].lower()
+
+
+def allowed(values: list[tuple[str, str]], said: str) -> tuple[list[tuple[str, str]], str]:
+    """The values that a field takes, by "not SOLID" or "SURFACE or SOLID" in what is said of it; and what else is said."""
+    taken = values[1:]
+    if only := re.match(r"([A-Z]+) or ([A-Z]+)(; |$)", said):
+        taken = [v for v in taken if v[0].upper() in only.groups()]
+        said = said[only.end():]
+    elif never := re.match(r"not ([A-Z]+)(; |$)", said):
+        taken = [v for v in taken if v[0].upper() != never[1]]
+        said = said[never.end():]
+    return taken, said
 
 
 def table(message: str, fields: list[tuple[str, str, str]], values: dict[str, list[tuple[str, str]]]) -> list[str]:
     """The fields of a message, and what its own words mean."""
-    out, own = ["| field | type | |\n|---|---|---|"], []
+    out, own = ["| field | type | unit | default | |\n|---|---|---|---|---|"], []
     for kind, name, said in fields:
+        unit, default = BY_TYPE.get(kind, ("", ""))
         of = values.get(f"{message}.{kind}", values.get(kind))
         if of and len(of) <= 8:
-            named = words(of).replace(" (unless told)", "") if "UNSPECIFIED" in said else words(of)
-            said = "; ".join(filter(None, [named, said]))
+            unit, default = "–", f"`{unless_told(of)}`"
+        if brackets := re.search(r"\s*\[([^\[\];]+); ([^\[\]]+)\]$", said):
+            unit, default = brackets[1], brackets[2]
+            said = said[:brackets.start()]
+        if not unit:
+            sys.exit(f"{PROTO.relative_to(ROOT)}: {message}.{name} says no unit and default, as [length; 0]")
+        if of and len(of) <= 8:
+            taken, said = allowed(of, said)
+            said = "; ".join(filter(None, [words(taken), said]))
         if f"{message}.{kind}" in values:
             own += [f"- `{value}`: {comment}" for value, comment in values[f"{message}.{kind}"][1:] if comment]
-        out.append(f"| `{name}` | {kind} | {said.replace('|', chr(92) + '|')} |")
+        row = [f"`{name}`", kind, unit, default, said or BY_NAME.get(name, "")]
+        out.append("| " + " | ".join(cell.replace("|", chr(92) + "|") for cell in row) + " |")
     return [*out, "", *own, *([""] if own else [])]
 
 
@@ -127,26 +207,43 @@ def kinds() -> list[tuple[str, str]]:
     return re.findall(r"(\w+) (\w+) = \d+;", body[1])
 
 
-def guarantees(message: str) -> list[tuple[str, str]]:
-    """(header, what it says) of each that says which voxels a shape covers."""
+def paragraphs(text: str) -> tuple[str, str]:
+    """What a comment says, and what it guarantees."""
+    parts = text.split("\n\n")
+    said = [part for part in parts if not part.startswith("Guarantee: ")]
+    promised = [part.removeprefix("Guarantee: ").replace("\n", " ") for part in parts if part.startswith("Guarantee: ")]
+    return "\n\n".join(said), " ".join(part[0].upper() + part[1:] for part in promised)
+
+
+def headers(message: str) -> list[tuple[str, str, str]]:
+    """(header, what it says, what it guarantees) of each that says which voxels a shape covers."""
     found = []
     for name in HEADERS_OF.get(message, [f"{message.lower()}.h"]):
         path = (HEADERS / name).resolve()
         text = path.read_text().split("#pragma once")[0]
-        said = "\n".join(line[2:].strip() for line in text.split("\n") if line.startswith("//"))
-        found.append((str(path.relative_to(ROOT)), said))
+        said, promised = paragraphs("\n".join(line[2:].rstrip() for line in text.split("\n") if line.startswith("//"))
+                                    .replace("\n ", "\n").strip())
+        found.append((str(path.relative_to(ROOT)), said, promised))
     return found
 
 
-def examples() -> dict[str, list[str]]:
-    """By field: the gallery's texts."""
+def picture(name: str) -> str:
+    """An example's, as the gallery calls it; it must be there."""
+    file = re.sub(r"[^a-z0-9_]+", "-", name.lower()) + ".png"
+    if not (OUT.parent / PICTURES / file).exists():
+        sys.exit(f"docs/{PICTURES}/{file} is missing; voxelctl gallery docs/images/gallery.png --each docs/{PICTURES}")
+    return f"![{name}]({PICTURES}/{file})"
+
+
+def examples() -> dict[str, list[tuple[str, str]]]:
+    """By field: (name, text) of each of the gallery's."""
     text = EXAMPLES.read_text()
     body = text[text.index("kExamples[]"):text.index("std::span<const ShapeExample> ShapeExamples")]
-    result: dict[str, list[str]] = {}
+    result: dict[str, list[tuple[str, str]]] = {}
     for entry in re.finditer(r'\{("[^{}]*?")\}', re.sub(r'"\s*\n\s*"', "", body)):
         parts = re.findall(r'"((?:[^"\\]|\\.)*)"', entry[1])
         field = parts[0].split(" ")[0].rstrip(",")
-        result.setdefault(field, []).append(parts[1])
+        result.setdefault(field, []).append((parts[0], parts[1]))
     return result
 
 
@@ -156,12 +253,16 @@ def page() -> str:
     pages: dict[str, str] = {}  # where a header's words stand
     for message, field in kinds():
         above, fields = all_messages[message]
+        about, promised = paragraphs(above)
+        guarantees = [promised] if promised else []
         out.append(f"## {field}\n")
-        if above:
-            out.append(above + "\n")
+        if about:
+            out.append(about + "\n")
         out += table(message, fields, values)
         elsewhere = []
-        for path, said in guarantees(message):
+        for path, said, promised in headers(message):
+            if promised and not (message in FLAT and path.startswith("gpu/implicit/")):
+                guarantees.append(promised)
             if path in pages:
                 elsewhere.append(f"`{path}`, under [{pages[path]}](#{pages[path]})")
             else:
@@ -169,9 +270,12 @@ def page() -> str:
                 out.append(f"**What it covers** (`{path}`): {said}\n")
         if elsewhere:
             out.append(f"**What it covers**, as others do: {'; '.join(elsewhere)}.\n")
-        for text in shown.get(field, []):
+        if not guarantees:
+            sys.exit(f"nothing says what {message} guarantees: a header's comment, or the message's, has \"Guarantee: …\"")
+        out.append(f"**Guarantee**: {' '.join(guarantees)}\n")
+        for name, text in shown.get(field, []):
             shapes = " \\\n    ".join(f'"{shape}"' for shape in re.split(r"(?<!\\)\\n", text))
-            out.append(f"```\nvoxelctl draw {shapes}\n```\n")
+            out.append(f"{picture(name)}\n\n```\nvoxelctl draw {shapes}\n```\n")
     out.append("## Types that several have\n")
     for message in ("Vertices", "Thickness", "Texture", "ColorScale", "Grid", "Transfer", "Expression", "Boundary"):
         above, fields = all_messages[message]
@@ -179,8 +283,9 @@ def page() -> str:
         if fields:
             out += table(message, fields, values)
     for name in ("Fill", "SurfaceRule", "LineSampling"):
-        out.append(f"### {name}\n\n{words(values[name]).capitalize()}.\n")
+        out.append(f"### {name}\n\n{words(values[name][1:])}; `{unless_told(values[name])}` unless told.\n")
         out += [*(f"- `{value}`: {comment}" for value, comment in values[name][1:] if comment), ""]
+    out.append(BESIDE)
     out.append("[Expressions](expressions.md) have a page of their own; colour maps are those of "
                "`proto/voxeld/v1/colormaps.txt`.\n")
     return "\n".join(out)

@@ -227,9 +227,8 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   CommitResult result = store_.Apply(author, std::move(commit.operations), now,
                                      session.options.strict, refusals.refused());
   std::string first = refusals.first();
-  if (first.empty() && !result.issues.empty()) {
-    const Issue& issue = result.issues.front();
-    first = absl::StrFormat("%s: %s", issue.field, issue.message);
+  for (size_t i = 0; first.empty() && i < result.issues.size(); ++i) {
+    if (!result.issues[i].applied) first = RefusalTally::Describe(result.issues[i]);
   }
   for (const Issue& issue : result.issues) {
     refusals.Tell(issue, session.sink.get(), limits.max_issues_per_commit);
@@ -238,13 +237,16 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   refusals.TellOfThoseLeftOut(commit.sequence, session.sink.get(), limits.max_issues_per_commit);
 
   if (!result.applied) {
-    RefuseCommit(session, commit, result.refused_operations,
-                 result.abandoned
-                     ? std::string("the daemon is being stopped, so nothing of the commit was "
-                                   "applied; send it again to one that runs")
-                     : absl::StrFormat("the session is strict and %d operations were refused, so "
-                                       "nothing of the commit was applied; the first: %s",
-                                       result.refused_operations, first));
+    RefuseCommit(
+        session, commit, result.refused_operations,
+        result.abandoned
+            ? std::string("the daemon is being stopped, so nothing of the commit was "
+                          "applied; send it again to one that runs")
+            : absl::StrFormat("the session is strict and %d %s refused, so nothing of "
+                              "the commit was applied; the first: %s",
+                              result.refused_operations,
+                              result.refused_operations == 1 ? "operation was" : "operations were",
+                              first));
     session.intake->Done(std::move(commit));
     return Publish();  // what had expired
   }

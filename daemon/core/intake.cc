@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "daemon/scene/commit_applier.h"
 #include "daemon/scene/draft.h"
@@ -67,7 +68,15 @@ constexpr uint64_t kCommitBytes = sizeof(WaitingCommit);
 void RefusalTally::Count(const Issue& issue) {
   if (issue.applied) return;
   ++refused_;
-  if (first_.empty()) first_ = absl::StrFormat("%s: %s", issue.field, issue.message);
+  if (first_.empty()) first_ = Describe(issue);
+}
+
+std::string RefusalTally::Describe(const Issue& issue) {
+  std::string text = issue.layer;
+  if (!issue.id.empty()) absl::StrAppend(&text, "/", issue.id);
+  if (!issue.field.empty()) absl::StrAppend(&text, text.empty() ? "" : ", ", issue.field);
+  if (!text.empty()) text += ": ";
+  return text + issue.message;
 }
 
 void RefusalTally::Tell(const Issue& issue, SessionSink* sink, uint64_t most) {
@@ -172,10 +181,9 @@ void Intake::Stage(Operation operation, uint64_t credit) {
   const uint64_t mine = staged_.bytes + detached_bytes_ + bytes;
   const uint64_t all = budget_->used_bytes(Budget::Use::kStaged) + bytes;
   if (staged_.operations.size() >= limits_.max_operations_per_commit) {
-    over(
-        absl::StrFormat("%d operations wait for a commit, which is max_operations_per_commit; "
-                        "commit first",
-                        staged_.operations.size()));
+    over(absl::StrFormat("%d %s for a commit, which is max_operations_per_commit; commit first",
+                         staged_.operations.size(),
+                         staged_.operations.size() == 1 ? "operation waits" : "operations wait"));
   } else if (mine > limits_.max_uncommitted_bytes) {
     over(absl::StrFormat(
         "%d bytes would wait for a commit, or for a commit's present_at; max_uncommitted_bytes is "

@@ -49,7 +49,10 @@ struct IncomingMessage {
 class RefusalTally {
  public:
   uint64_t refused() const { return refused_; }
-  const std::string& first() const { return first_; }  // "field: message"
+  const std::string& first() const { return first_; }  // as Describe has it
+
+  // "layer/id, field: message", without what the issue has not.
+  static std::string Describe(const Issue& issue);
 
   // Counts one, if it is a refusal; does not tell it.
   void Count(const Issue& issue);

@@ -41,7 +41,6 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   void OnIssue(const Issue& issue) override {
     sync::MutexLock lock(mutex_);
     if (answered_) return;
-    if (first_issue_.empty()) first_issue_ = issue.message;
     wire::Encode(issue, response_.add_issues());
   }
 
@@ -55,8 +54,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
       if (const auto* accepted = std::get_if<Accepted>(&receipt.what)) {
         response_.set_snapshot(accepted->snapshot);
       } else if (const auto* refused = std::get_if<Refused>(&receipt.what)) {
-        status = absl::InvalidArgumentError(
-            absl::StrCat(refused->message, first_issue_.empty() ? "" : ": ", first_issue_));
+        status = absl::InvalidArgumentError(refused->message);  // which names the first
       } else {
         return;
       }
@@ -90,7 +88,6 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t incarnation_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool answered_ VOXELD_GUARDED_BY(mutex_) = false;
-  std::string first_issue_ VOXELD_GUARDED_BY(mutex_);
 };
 
 }  // namespace

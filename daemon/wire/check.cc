@@ -42,6 +42,14 @@ bool Singular(const gpu::Affine& a) {
 std::string Show(double value) { return ShowNumber(value); }
 std::string Show(float value) { return ShowNumber(value); }
 
+std::string ShowBytes(uint64_t bytes, uint64_t element_bytes, std::string_view element) {
+  const std::string text = absl::StrCat(bytes, " bytes");
+  if (bytes == 0 || bytes % element_bytes != 0) return text;
+  const uint64_t count = bytes / element_bytes;
+  return absl::StrCat(text, ", ", count, " ", absl::string_view(element.data(), element.size()),
+                      count == 1 ? "" : "s");
+}
+
 std::string Quote(std::string_view text) {
   size_t size = std::min(text.size(), kQuotedBytes);
   if (size < text.size()) {  // between characters, so that the message stays valid UTF-8

@@ -33,6 +33,9 @@ using MaybeFault = std::optional<Fault>;
 std::string Show(double value);
 std::string Show(float value);
 
+// The size of a payload, in its elements too where it has whole ones: "24 bytes, 6 samples".
+std::string ShowBytes(uint64_t bytes, uint64_t element_bytes, std::string_view element);
+
 // Text from a client, quoted, with what is not printable escaped,
 // cut to a length fit for a message.
 std::string Quote(std::string_view text);

@@ -91,8 +91,8 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
   } else {
     if (in.scalars().size() != count * sizeof(float)) {
       return Fault{FieldPath(path, "scalars").ToString(), Reason::kSizeMismatch,
-                   absl::StrCat("has ", in.scalars().size(), " bytes; ", count, " vertices take ",
-                                count * sizeof(float))};
+                   absl::StrCat("has ", ShowBytes(in.scalars().size(), sizeof(float), "number"),
+                                "; ", count, " vertices take ", count * sizeof(float))};
     }
     for (size_t i = 0; i < count; ++i) {
       float number;

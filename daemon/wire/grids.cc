@@ -139,8 +139,8 @@ MaybeFault ToGrid(const FieldPath& path, const v1::Grid& in, bool colors, const 
   const FieldPath samples(path, "samples");
   if (in.samples().size() != out->samples * each) {
     return Fault{samples.ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", in.samples().size(), " bytes; ", out->samples,
-                              " samples take ", out->samples * each)};
+                 absl::StrCat("has ", ShowBytes(in.samples().size(), each, "sample"), "; ",
+                              out->samples, " samples take ", out->samples * each)};
   }
   out->bytes = &in.samples();
   for (uint64_t i = 0; out->head.format == SampleFormat::kF32 && i < out->samples; ++i) {

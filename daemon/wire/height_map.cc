@@ -52,13 +52,13 @@ MaybeFault CheckGrid(const FieldPath& path, const v1::HeightMap& in, const Limit
   }
   if (in.heights().size() != samples * bytes) {
     return Fault{FieldPath(path, "heights").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", in.heights().size(), " bytes; ", samples, " samples take ",
-                              samples * bytes)};
+                 absl::StrCat("has ", ShowBytes(in.heights().size(), bytes, "height"), "; ",
+                              samples, " samples take ", samples * bytes)};
   }
   if (!in.colors().empty() && in.colors().size() != samples * 3) {
     return Fault{FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", in.colors().size(), " bytes; ", samples, " samples take ",
-                              samples * 3)};
+                 absl::StrCat("has ", ShowBytes(in.colors().size(), 3, "colour"), "; ", samples,
+                              " samples take ", samples * 3)};
   }
   return {};
 }

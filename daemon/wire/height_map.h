@@ -1,4 +1,6 @@
 // Height maps (voxeld.v1.HeightMap) into triangles.
+//
+// Guarantee: as its triangles (gpu/primitives/triangle.h): nothing gets through.
 #pragma once
 
 #include "daemon/wire/check.h"

@@ -1,4 +1,7 @@
 // Text: letters of the server's fonts into polygons, solids, curves or strokes, whose voxels they then have.
+//
+// Guarantee: filled letters hold what their outlines do, but for 1/1500 of a capital's height; flat
+// ones are as thick as they are said to be, outlines and strokes are curves (gpu/curves/cut.h).
 #pragma once
 
 #include "daemon/wire/check.h"

@@ -64,9 +64,10 @@ MaybeFault ToTexture(const FieldPath& path, const v1::Texture& in, const DecodeC
                      GeometryData* out) {
   const uint64_t want = uint64_t{out->record.vertex_count} * 2 * sizeof(float);
   if (in.coordinates().size() != want) {
-    return Fault{FieldPath(path, "coordinates").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", in.coordinates().size(), " bytes; two F32 of each of ",
-                              out->record.vertex_count, " vertices take ", want)};
+    return Fault{
+        FieldPath(path, "coordinates").ToString(), Reason::kSizeMismatch,
+        absl::StrCat("has ", ShowBytes(in.coordinates().size(), 2 * sizeof(float), "place"),
+                     "; two F32 of each of ", out->record.vertex_count, " vertices take ", want)};
   }
   std::vector<float> places(want / sizeof(float));
   std::memcpy(places.data(), in.coordinates().data(), want);

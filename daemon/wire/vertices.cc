@@ -78,8 +78,8 @@ MaybeFault CheckArray(const FieldPath& path, uint64_t count, uint64_t element_by
   if (array->range == nullptr) {
     if (sent == want) return {};
     return Fault{FieldPath(path, array->name).ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", sent, " bytes; ", count, " elements of ", element_bytes,
-                              " bytes need ", want)};
+                 absl::StrCat("has ", ShowBytes(sent, element_bytes, "element"), "; ", count,
+                              " elements of ", element_bytes, " bytes need ", want)};
   }
   const FieldPath in(path, array->range_name);
   if (sent != 0) {

@@ -182,8 +182,14 @@ __device__ void TellAndClear(volatile Counters& counters, Counters& told) {
   told.slices_drawn = counters.slices_drawn;
   told.pictures_changed = counters.pictures_changed;
   told.lit_voxels = counters.lit_voxels;
-  counters.tiles_drawn = counters.slices_drawn = counters.pictures_changed = counters.ended = 0;
-  for (uint32_t g = 0; g < kMostDrawGroups; ++g) counters.dirty[g] = counters.taken[g] = 0;
+  counters.tiles_drawn = 0;
+  counters.slices_drawn = 0;
+  counters.pictures_changed = 0;
+  counters.ended = 0;
+  for (uint32_t g = 0; g < kMostDrawGroups; ++g) {
+    counters.dirty[g] = 0;
+    counters.taken[g] = 0;
+  }
 }
 
 __global__ void EndSlicesKernel(SliceIndexView index, SliceView view, uint32_t begin,

@@ -1,6 +1,11 @@
-// Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space, so
-// that the error is one of voxels whatever the transform: an eighth of one (kCurveError). On the host, in IEEE double, in the order
-// written there; every engine draws what comes out.
+// Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space,
+// so that the error is one of voxels whatever the transform: an eighth of one (kCurveError). On the
+// host, in IEEE double, in the order written there; every engine draws what comes out.
+//
+// Guarantee: segments are within an eighth of a voxel (kCurveError) of the curve, triangles within
+// a quarter (kPatchError) of the patch, and they meet; so a thick curve is what lies within half
+// its thickness of the curve, and a thin one goes along it, but for an eighth of a voxel, without
+// gaps (EUCLIDEAN may have some) or beads.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +24,8 @@ inline constexpr double kCurveError = 0.125;
 inline constexpr double kPatchError = 0.25;
 // Of a patch along each of its sides, whatever its error.
 inline constexpr int32_t kMostPatchPieces = 512;
-// Of a geometry, whatever its error: when so many segments have been made, each further span is one; patches are cut so
-// that there are no more vertices.
+// Of a geometry, whatever its error: when so many segments have been made, each further span is
+// one; patches are cut so that there are no more vertices.
 inline constexpr size_t kMostCurveSegments = 1u << 20;
 inline constexpr size_t kMostPatchVertices = 1u << 20;
 
@@ -35,8 +40,8 @@ struct Cut {
   }
 };
 
-// `g`: IsCurved. `map` takes its coordinates to the voxels of `grid`. What lies outside of it is not cut
-// finely. Of curves a list of segments, two vertices each; of patches triangles, indexed.
+// `g`: IsCurved. `map` takes its coordinates to the voxels of `grid`. What lies outside of it is
+// not cut finely. Of curves a list of segments, two vertices each; of patches triangles, indexed.
 Cut CutCurved(const GeometryView& g, const Affine& map, const TileGrid& grid);
 
 namespace curves {
@@ -45,8 +50,8 @@ struct Point {
   double at[3] = {};
 };
 
-// Whether the hull of control points is out of reach: all of it past one face of the volume, widened by
-// `room` voxels.
+// Whether the hull of control points is out of reach: all of it past one face of the volume,
+// widened by `room` voxels.
 bool IsOutside(const Point* points, int count, const TileGrid& grid, double room);
 std::vector<Point> MapPoints(const GeometryView& g, const Affine& map);
 Int3 SnapOf(const Point& p);

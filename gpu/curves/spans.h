@@ -1,5 +1,5 @@
-// Cubic Béziers as they are put together: straight lines, arcs, handles. Words only; a list of 4 points
-// each, as kCurves has them.
+// Cubic Béziers as they are put together: straight lines, arcs, handles. Words only; a list of 4
+// points each, as kCurves has them.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,8 @@ class Spans {
   void Quadratic(const Vector& a, const Vector& b, const Vector& c) {
     Curve(a, a + (2.0 / 3) * (b - a), c + (2.0 / 3) * (b - c), c);
   }
-  // center + cos t·a + sin t·b, and `rise` per radian, from `start` on, through `sweep` radians. Of radius r
-  // it is no farther off than 7e-8·r; where it rises the place along that is.
+  // center + cos t·a + sin t·b, and `rise` per radian, from `start` on, through `sweep` radians. Of
+  // radius r it is no farther off than 7e-8·r; where it rises the place along that is.
   void Arc(const Vector& center, const Vector& a, const Vector& b, double start, double sweep,
            const Vector& rise = {}) {
     Spiral(center, a, b, start, sweep, rise, 0);
@@ -72,8 +72,9 @@ class Spans {
   std::vector<Vector> points_;
 };
 
-// How many even parts of a span's 4 points are no farther from it than `error`: max|B″|/(8n²), where |B″| is at most 6 times the
-// greater of the points' second differences. A whole number, at least 1.
+// How many even parts of a span's 4 points are no farther from it than `error`: max|B″|/(8n²),
+// where |B″| is at most 6 times the greater of the points' second differences. A whole number, at
+// least 1.
 inline double PartsOfSpan(const implicit::Vector* p, double error) {
   const double bend =
       std::max(implicit::Length(p[0] - 2 * p[1] + p[2]), implicit::Length(p[1] - 2 * p[2] + p[3]));
@@ -86,9 +87,9 @@ inline implicit::Vector OnSpan(const implicit::Vector* p, double t) {
   return s * s * s * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] + t * t * t * p[3];
 }
 
-// Two unit vectors across `axis`, and across one another: the first on the side of `toward`, as far as
-// that lies across; the second a quarter turn on, counter-clockwise as seen from where the axis points to.
-// False if there is none.
+// Two unit vectors across `axis`, and across one another: the first on the side of `toward`, as far
+// as that lies across; the second a quarter turn on, counter-clockwise as seen from where the axis
+// points to. False if there is none.
 inline bool FrameOf(const implicit::Vector& axis, const implicit::Vector& toward,
                     implicit::Vector* u, implicit::Vector* v) {
   const double length = implicit::Length(axis);

@@ -1,6 +1,6 @@
-// Forward-mode derivatives: a value and its gradient along the three axes of voxel space, over single
-// precision or over intervals of it. Over intervals the same operations are taken in the same order,
-// so that the intervals hold what single precision computes.
+// Forward-mode derivatives: a value and its gradient along the three axes of voxel space, over
+// single precision or over intervals of it. Over intervals the same operations are taken in the
+// same order, so that the intervals hold what single precision computes.
 #pragma once
 
 #include "gpu/implicit/interval.h"

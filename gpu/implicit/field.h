@@ -1,15 +1,22 @@
-// An implicit shape in voxel space: which voxels it covers, in which colours, and what is known of a
-// box of voxels without looking at each. Host and device.
+// An implicit shape in voxel space: which voxels it covers, in which colours, and what is known of
+// a box of voxels without looking at each. Host and device.
 //
 // P, Φ and the colour are functions of the shape's own coordinates at a voxel's centre (solid.h). A
-// voxel is inside if P ≤ 0; what is not a number is outside. The solid is what is inside. The surface,
-// of half-width h voxels, is each voxel with
+// voxel is inside if P ≤ 0; what is not a number is outside. The solid is what is inside. The
+// surface, of half-width h voxels, is each voxel with
 //   |P| ≤ h·|∇P|, the gradient in voxel space; for h = 0: P = 0; or with
 //   a neighbour on the other side whose |P| is not less (what is not a number is infinite),
-// among the 6 neighbours that share a face (THIN) or all 26 (COVER). Of any two neighbours on different
-// sides one is covered, so no path of such steps leads from one side to the other past the surface.
-// Of either only those voxels are covered at whose centre Φ ≤ 0 and which lie within the rings: the
-// closed curves, projected along an axis, by the even-odd rule.
+// among the 6 neighbours that share a face (THIN) or all 26 (COVER). Of any two neighbours on
+// different sides one is covered, so no path of such steps leads from one side to the other past
+// the surface. Of either only those voxels are covered at whose centre Φ ≤ 0 and which lie within
+// the rings: the closed curves, projected along an axis, by the even-odd rule.
+//
+// Guarantee: where P is the distance, a solid is the voxels whose centres the shape holds, but for
+// 0.006 voxel (its origin is snapped to 2⁻⁸), and its volume is right within 1 % at a radius of 20
+// voxels; of a surface no voxel nearer than h is missing, and none farther than h and half a
+// voxel's diagonal (√¾) is lit. Past edges shells are mitred. At any thickness no path of steps
+// across faces gets through a THIN surface (6-separating), no path at all through a COVER one
+// (26-separating). A shift by whole voxels shifts the result.
 #pragma once
 
 #include "gpu/implicit/hoisted.h"

@@ -1,5 +1,6 @@
-// A primitive that is drawn by the general method: its surface and bounds as nodes of a graph, where it
-// lies, and the curves that bound it. The headers of such primitives (gpu/primitives/) make these.
+// A primitive that is drawn by the general method: its surface and bounds as nodes of a graph,
+// where it lies, and the curves that bound it. The headers of such primitives (gpu/primitives/)
+// make these.
 #pragma once
 
 #include <algorithm>
@@ -41,8 +42,8 @@ struct FieldShape {
   uint32_t ring_axis = 2;
 };
 
-// What a thinner solid, or a smaller surface, is drawn as, so that it is not lost between the voxels'
-// centres: no point is farther from one of these than √¾ voxel.
+// What a thinner solid, or a smaller surface, is drawn as, so that it is not lost between the
+// voxels' centres: no point is farther from one of these than √¾ voxel.
 inline Node AtLeastAVoxel(Graph& g, double radius) {
   return g.Max(g.Constant(radius), g.Mul(g.Constant(0.87), g.Voxel()));
 }

@@ -1,5 +1,5 @@
-// Expressions as graphs: made node by node, with what is alike made once and constants computed, and
-// compiled into programs (program.h).
+// Expressions as graphs: made node by node, with what is alike made once and constants computed,
+// and compiled into programs (program.h).
 #pragma once
 
 #include <cstdint>
@@ -44,8 +44,8 @@ class Graph {
   Node Max(Node a, Node b) { return Binary(Op::kMax, a, b); }
   Node Atan2(Node y, Node x) { return Binary(Op::kAtan2, y, x); }
 
-  // a^b: by squaring where b is a whole constant, a root where it is ½ or ⅓, else exp(b·log a), which
-  // is not a number for a < 0.
+  // a^b: by squaring where b is a whole constant, a root where it is ½ or ⅓, else exp(b·log a),
+  // which is not a number for a < 0.
   Node Pow(Node a, Node b);
   Node Tan(Node a) { return Div(Sin(a), Cos(a)); }
   Node Asin(Node a);
@@ -94,11 +94,13 @@ struct ProgramSource {
   uint32_t ring_axis = 2;
 };
 
-// Appends instructions that leave `roots` in `root_slots`, and answers how many; errors as Compile's.
+// Appends instructions that leave `roots` in `root_slots`, and answers how many; errors as
+// Compile's.
 absl::StatusOr<uint32_t> CompilePart(const Graph& graph, std::span<const Graph::Node> roots,
                                      std::span<uint32_t> root_slots, std::vector<uint32_t>& words);
 
-// ResourceExhausted if one of the three takes more than kMostInstructions or kMostSlots: says how many.
+// ResourceExhausted if one of the three takes more than kMostInstructions or kMostSlots: says how
+// many.
 absl::StatusOr<std::vector<uint32_t>> Compile(const Graph& graph, const ProgramSource& source);
 
 }  // namespace voxeld::gpu::implicit

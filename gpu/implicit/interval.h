@@ -1,11 +1,11 @@
 // Interval arithmetic that holds what single precision computes.
 //
 // An interval holds every value that the functions of number.h may give for arguments within the
-// given intervals: if `nan` is false all lie in [lo, hi]; if it is true some may be no numbers as well.
-// The four operations, squares, roots and floors are rounded correctly, so they are monotonic where
-// the exact ones are, and their values at the ends bound those within: nothing need be widened. What
-// is a polynomial is widened by more than twice its error, kSlack. Where an exact function would be
-// undefined or unbounded the answer is everything.
+// given intervals: if `nan` is false all lie in [lo, hi]; if it is true some may be no numbers as
+// well. The four operations, squares, roots and floors are rounded correctly, so they are monotonic
+// where the exact ones are, and their values at the ends bound those within: nothing need be
+// widened. What is a polynomial is widened by more than twice its error, kSlack. Where an exact
+// function would be undefined or unbounded the answer is everything.
 //
 // Ends may be infinite, and are never NaN.
 #pragma once
@@ -37,8 +37,8 @@ VOXELD_HD inline Interval Hull(const Interval& a, const Interval& b) {
 VOXELD_HD inline Interval Checked(float lo, float hi, bool nan) {
   return IsNan(lo) || IsNan(hi) ? Interval::Everything() : Interval{lo, hi, nan};
 }
-// Ends of monotonic sums of infinities of both signs may come out as numbers though what lies between
-// does not.
+// Ends of monotonic sums of infinities of both signs may come out as numbers though what lies
+// between does not.
 VOXELD_HD inline bool Bounded(const Interval& a) { return IsFinite(a.lo) && IsFinite(a.hi); }
 
 VOXELD_HD inline Interval Add(const Interval& a, const Interval& b) {
@@ -89,7 +89,8 @@ VOXELD_HD inline Interval Floor(const Interval& a) { return {Floor(a.lo), Floor(
 // Down and up in proportion, by kSlack.
 VOXELD_HD inline float Below(float x) { return x - (Abs(x) * kSlack + 1.0e-44f); }
 VOXELD_HD inline float Above(float x) { return x + (Abs(x) * kSlack + 1.0e-44f); }
-// Infinite ends stay as they are; no more than that is left of one that was infinite by rounding alone.
+// Infinite ends stay as they are; no more than that is left of one that was infinite by rounding
+// alone.
 VOXELD_HD inline float BelowEnd(float x) {
   return x == Infinity() ? 3.0e38f : (x == -Infinity() ? x : Below(x));
 }

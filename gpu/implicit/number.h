@@ -34,8 +34,8 @@ VOXELD_HD inline float Neg(float a) { return -a; }
 VOXELD_HD inline float Abs(float a) { return a < 0 ? -a : a; }
 VOXELD_HD inline float Square(float a) { return a * a; }
 
-// What is not a number counts as outside: greater than everything. So a union has what the other part
-// has, and an intersection nothing.
+// What is not a number counts as outside: greater than everything. So a union has what the other
+// part has, and an intersection nothing.
 VOXELD_HD inline bool FirstIsMin(float a, float b) { return !IsNan(a) && (IsNan(b) || a <= b); }
 VOXELD_HD inline float Min(float a, float b) { return FirstIsMin(a, b) ? a : b; }
 VOXELD_HD inline bool FirstIsMax(float a, float b) { return IsNan(a) || (!IsNan(b) && a >= b); }

@@ -11,11 +11,12 @@
 //   power      = atom [ "^" signed ]
 //   atom       = number | name | name "(" sum { "," sum } ")" | "(" sum ")"
 //
-// Names are x, y, z, the constants pi, tau and e, `voxel` (the edge of a voxel in the shape's units) and
-// the caller's parameters. Functions: sqrt cbrt abs floor square sin cos tan asin acos atan atan2 sinh cosh
-// tanh exp log (ln) pow root mod min max (of two or more) clamp length smin smax (smooth, within k) union
-// intersection difference. × · ÷ − ≤ ≥ ** stand for what they look like. "<" means "<=": sides are
-// told apart by P ≤ 0. What is true is ≤ 0: "and" is the maximum, "or" the minimum, "not" the negative.
+// Names are x, y, z, the constants pi, tau and e, `voxel` (the edge of a voxel in the shape's
+// units) and the caller's parameters. Functions: sqrt cbrt abs floor square sin cos tan asin acos
+// atan atan2 sinh cosh tanh exp log (ln) pow root mod min max (of two or more) clamp length smin
+// smax (smooth, within k) union intersection difference. × · ÷ − ≤ ≥ ** stand for what they look
+// like. "<" means "<=": sides are told apart by P ≤ 0. What is true is ≤ 0: "and" is the maximum,
+// "or" the minimum, "not" the negative.
 #pragma once
 
 #include <map>

@@ -6,7 +6,8 @@
 
 namespace voxeld::gpu {
 
-// Cuts `box`, the part of the volume that may hold the drawable, into blocks of `tiles` tiles along an edge.
+// Cuts `box`, the part of the volume that may hold the drawable, into blocks of `tiles` tiles along
+// an edge.
 inline void SetBlocks(const Box3& box, int32_t tiles, Solid& solid, ImplicitPlace& place) {
   solid.bounds = box;
   place.edge = tiles * kTileSize;
@@ -36,7 +37,8 @@ VOXELD_HD inline Box3 BlockOf(const Source& source, uint32_t i) {
   return Intersect(box, source.solid.bounds);
 }
 
-// Voxels around a box of the geometry's coordinates, two of room on each side, that lie in the volume.
+// Voxels around a box of the geometry's coordinates, two of room on each side, that lie in the
+// volume.
 inline Box3 VoxelsAround(const double low[3], const double high[3], const Affine& map,
                          const TileGrid& grid, double more) {
   const Box3 all{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};

@@ -4,6 +4,9 @@
 // Evaluated in IEEE double, in the order written here, relative to the voxel that holds the
 // lexicographically smaller end: the same from both ends, and a shift by whole voxels shifts the
 // result. Positions are in units; up to 2²⁶ they and their squares are exact.
+//
+// Guarantee: thick ones are exactly the voxels whose centres lie within half the thickness, in
+// double precision, round at ends and joints.
 #pragma once
 
 #include "gpu/primitives/fixed.h"

@@ -6,13 +6,13 @@
 // of them are below 2¹⁴, and they are less than 2¹⁴ + 2⁸ away from the centre of any voxel in the
 // bounds, so that normals and edge functions are below 2²⁹·⁵.
 //
-// Sides. In the projection along an axis a triangle of normal n_a ≠ 0 is what is on the inner side of
-// its three edges: edge functions ≥ 0, with the sign of n_a. A square of one voxel meets it if their
-// bounds meet and each edge function, raised by half a voxel's extent along the edge's normal, is ≥ 0
-// at its centre: two convex sets that are apart are so by an edge of one of them, beyond it.
-// triangle.h bounds each of the nine functions on both sides; together with the bounds both say that
-// the projections meet. Where n_a = 0 the projection is a piece of a line, in which all edges lie,
-// and any of them bounds it on both sides.
+// Sides. In the projection along an axis a triangle of normal n_a ≠ 0 is what is on the inner side
+// of its three edges: edge functions ≥ 0, with the sign of n_a. A square of one voxel meets it if
+// their bounds meet and each edge function, raised by half a voxel's extent along the edge's
+// normal, is ≥ 0 at its centre: two convex sets that are apart are so by an edge of one of them,
+// beyond it. triangle.h bounds each of the nine functions on both sides; together with the bounds
+// both say that the projections meet. Where n_a = 0 the projection is a piece of a line, in which
+// all edges lie, and any of them bounds it on both sides.
 //
 // Depths. ⌊x / d⌋ of whole numbers is ⌊(x + ½) / d⌋, whose argument is at least ½/d from any whole
 // number. Here |x| < 2⁴⁶, so x + ½ and its sums are exact in double, and the product with 1/d,
@@ -177,8 +177,8 @@ VOXELD_HD inline int32_t PickAxis(const int32_t v[3], int a) {
 struct CompactSides {
   int32_t at[3], step_b[3], step_c[3];  // at one voxel; to the next along either axis
 
-  // b and c: the axes that follow; n: the normal's component. At voxel (vb, vc), relative. `kCover`:
-  // where the voxel meets it, not the voxel's centre.
+  // b and c: the axes that follow; n: the normal's component. At voxel (vb, vc), relative.
+  // `kCover`: where the voxel meets it, not the voxel's centre.
   template <bool kCover>
   VOXELD_HD static CompactSides Of(const CompactAxis& b, const CompactAxis& c, int32_t n,
                                    int32_t vb, int32_t vc) {
@@ -337,8 +337,8 @@ VOXELD_HD void EmitCompactVertices(const CompactTriangle& t, const CompactPart& 
   }
 }
 
-// The colour of a voxel, relative, of a triangle with area: as TriangleSetup::ColorAt has it. The sum
-// of the weights is below 2³², and totals with a half are exact in double.
+// The colour of a voxel, relative, of a triangle with area: as TriangleSetup::ColorAt has it. The
+// sum of the weights is below 2³², and totals with a half are exact in double.
 VOXELD_HD inline uint32_t CompactColorAt(const CompactTriangle& t, const uint32_t color[3],
                                          const int32_t voxel[3]) {
   const CompactAxis x = CompactAxis::Of(t, 0), y = CompactAxis::Of(t, 1), z = CompactAxis::Of(t, 2);

@@ -1,8 +1,8 @@
-// What two circles across a line, or two spheres along it, have between them: cones, truncated ones,
-// cylinders and capsules, each with two radii. P is the distance from the surface, outside of it; past
-// the rim of a flat end it is that from the planes and the mantle, whichever is greater. Inside it is that from the nearer of the
-// surfaces that it is made of, which where a round end meets the mantle is less by up to about the square of the depth over the
-// diameter.
+// What two circles across a line, or two spheres along it, have between them: cones, truncated
+// ones, cylinders and capsules, each with two radii. P is the distance from the surface, outside of
+// it; past the rim of a flat end it is that from the planes and the mantle, whichever is greater.
+// Inside it is that from the nearer of the surfaces that it is made of, which where a round end
+// meets the mantle is less by up to about the square of the depth over the diameter.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"
@@ -29,13 +29,14 @@ struct Cone {
                                               : implicit::AtLeastAVoxel(g, end_radius);
     const Node along = implicit::Along(g, axis, implicit::Dot(axis, start));
     const Node across = implicit::DistanceFromAxis(g, start, axis);
-    // The mantle's slope: per unit along the axis the radius falls by b, of which a and b are the normal.
+    // The mantle's slope: per unit along the axis the radius falls by b, of which a and b are the
+    // normal.
     const Node fall = g.Div(g.Sub(r0, r1), g.Constant(length));
     implicit::FieldShape shape;
     if (round) {
       const Node b = fall, a = g.Sqrt(g.Sub(g.Constant(1), g.Square(b)));
-      // The mantle touches the spheres where the foot of the point, along the normal, lies between their
-      // centres.
+      // The mantle touches the spheres where the foot of the point, along the normal, lies between
+      // their centres.
       const Node foot = g.Sub(along, g.Mul(across, g.Div(b, a)));
       const Node mantle = g.Sub(g.Add(g.Mul(across, a), g.Mul(along, b)), r0);
       const Node head = g.Sub(implicit::DistanceFrom(g, end), r1);

@@ -94,8 +94,8 @@ VOXELD_HD void EmitTilesOfBox(const Box3& box, const TileGrid& grid, Emit&& emit
   }
 }
 
-// Beyond the axis of a line, or of the capsule of `radius` units around it, how far its voxels reach:
-// the radius, half a voxel from a cell to its centre, and room for rounding.
+// Beyond the axis of a line, or of the capsule of `radius` units around it, how far its voxels
+// reach: the radius, half a voxel from a cell to its centre, and room for rounding.
 VOXELD_HD inline double ReachOf(int64_t radius) {
   return radius > 0 ? static_cast<double>(radius) + kHalfVoxel + 2 : 2;
 }

@@ -1,4 +1,7 @@
 // A line that winds around another, a coil or, with two radii, a cone's.
+//
+// Guarantee: before it is cut the curve is within 2·10⁻⁴ of its greater radius, and begins and ends
+// where it should.
 #pragma once
 
 #include "gpu/curves/spans.h"

@@ -10,6 +10,10 @@
 // number. The cells in a box are those between the last entry and the first exit.
 //
 // N = 0 gives the voxels of S and E, in their colours.
+//
+// Guarantee: the same voxels from both ends, and a shift by whole voxels shifts them. THIN:
+// 26-connected, an inner voxel has two neighbours and no more; COVER: 6-connected, every cell that
+// the line crosses; EUCLIDEAN: steps of one voxel along the line.
 #pragma once
 
 #include "gpu/delta.h"

@@ -1,10 +1,14 @@
 // Points: the voxel ⌊P⌋ each; with a thickness also the ball around P, one that fades, or a cube.
 //
-// Or cells, of which sparse voxels are: of the lattice of whole numbers in the geometry's own coordinates each point names the one
-// that it lies in, P is that cell's middle, and besides its voxel all those are covered whose centres' coordinates
-// (Solid::Canonical) lie in the cell, its lower sides included. Cells side by side leave no gaps, whatever the transform: a voxel's
-// centre lies in one of them. The voxel of a middle may have its own centre in the next cell, if cells are turned and small; then
-// it is of both.
+// Or cells, of which sparse voxels are: of the lattice of whole numbers in the geometry's own
+// coordinates each point names the one that it lies in, P is that cell's middle, and besides its
+// voxel all those are covered whose centres' coordinates (Solid::Canonical) lie in the cell, its
+// lower sides included. Cells side by side leave no gaps, whatever the transform: a voxel's centre
+// lies in one of them. The voxel of a middle may have its own centre in the next cell, if cells are
+// turned and small; then it is of both.
+//
+// Guarantee: a thick point is the voxels whose centres lie within half its thickness, and its own;
+// cells side by side are the solid box that they fill, without gaps or voxels beside it.
 #pragma once
 
 #include "gpu/primitives/capsule.h"

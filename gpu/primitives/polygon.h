@@ -1,5 +1,10 @@
-// A plane polygon of closed curves, holes included, by the even-odd rule: its plane, bounded by the curves
-// projected along the axis nearest to its normal.
+// A plane polygon of closed curves, holes included, by the even-odd rule: its plane, bounded by the
+// curves projected along the axis nearest to its normal.
+//
+// Guarantee: what is lit lies within h of the plane, or half a voxel (COVER: half a voxel's
+// diagonal) where that is more, and within the rim; all that lies within h and the rim is lit, but
+// for 0.02 voxel at the rim; within the rim no step gets through. Rims are cut along the axis
+// nearest to the normal, so a shell's edge leans, by h·√2 at most.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +18,10 @@ struct Polygon {
   std::span<const implicit::Vector> points;
   std::span<const uint32_t> ends;  // of each curve among the points
 
-  // Of any length; zero if all points lie along one line. Twice the area along the normal of the greatest
-  // curve by Newell's sums, so that holes do not take from it; of curves that cross themselves so that
-  // nothing is left, across the farthest point and the one that is farthest from the line to it.
+  // Of any length; zero if all points lie along one line. Twice the area along the normal of the
+  // greatest curve by Newell's sums, so that holes do not take from it; of curves that cross
+  // themselves so that nothing is left, across the farthest point and the one that is farthest from
+  // the line to it.
   implicit::Vector Normal() const {
     implicit::Vector normal;
     uint32_t begin = 0;

@@ -1,4 +1,5 @@
-// What closed curves in the plane z = 0 hold, by the even-odd rule, from there down to z = −depth: a solid.
+// What closed curves in the plane z = 0 hold, by the even-odd rule, from there down to z = −depth:
+// a solid.
 #pragma once
 
 #include <span>

@@ -1,5 +1,8 @@
 // The voxels of a solid, filled or as its surface: the inside voxels with a neighbour outside,
 // among the 6 that share a face (THIN: 6-separating) or among all 26 (COVER). Host and device.
+//
+// Guarantee: the surface lies within the solid; no path of steps across faces gets through a THIN
+// one, no path at all through a COVER one.
 #pragma once
 
 #include "gpu/primitives/grid.h"

@@ -27,9 +27,11 @@ struct ImplicitPlace {
   // Items: blocks of `edge` voxels.
   int32_t edge = 0, first[3] = {}, blocks[3] = {};
   const uint32_t* hoisted = nullptr;  // implicit/hoisted.h
-  // Of each item, which is a tile then, what is known (implicit.h); null: it is found out when asked for.
+  // Of each item, which is a tile then, what is known (implicit.h); null: it is found out when
+  // asked for.
   const float* reach = nullptr;
-  // On a device, of each item the voxels that are covered, as rows (cuda/covered_types.h); null: likewise.
+  // On a device, of each item the voxels that are covered, as rows (cuda/covered_types.h); null:
+  // likewise.
   const uint16_t* rows = nullptr;
 };
 

@@ -1,6 +1,10 @@
-// Smooth curves along points, as cubic Béziers: through them all (Catmull–Rom, whose tangents are half of
-// the way between neighbours), or near them (uniform cubic B-splines), and Béziers as they are. An open one
-// goes on past its ends in a straight line, so it begins and ends in its end points.
+// Smooth curves along points, as cubic Béziers: through them all (Catmull–Rom, whose tangents are
+// half of the way between neighbours), or near them (uniform cubic B-splines), and Béziers as they
+// are. An open one goes on past its ends in a straight line, so it begins and ends in its end
+// points.
+//
+// Guarantee: a curve begins and ends in its end points; Catmull–Rom goes through all its points;
+// it and B-splines are smooth.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +34,8 @@ struct Spline {
     }
   }
 
-  // each(from, to): the points that a span goes from and to, or, of a B-spline, that its ends lie nearest to.
+  // each(from, to): the points that a span goes from and to, or, of a B-spline, that its ends lie
+  // nearest to.
   template <typename Each>
   void ForEachJoint(Each&& each) const {
     const size_t step = form == SplineForm::kBezier ? 3 : form == SplineForm::kQuadratic ? 2 : 1;

@@ -1,12 +1,13 @@
 // Pictures on triangles.
 //
-// A texture is kept in levels: the first as it is, each of the others of half the sides of the one before, rounded down,
-// until both are 1. A triangle takes the first level whose texels are on the average no smaller than half a voxel's face
-// along its normal's greatest component, or the last. A voxel takes the texel at the place that its centre has, weighted as
-// colours are (triangle.h); a vertex's voxel that at the vertex's.
+// A texture is kept in levels: the first as it is, each of the others of half the sides of the one
+// before, rounded down, until both are 1. A triangle takes the first level whose texels are on the
+// average no smaller than half a voxel's face along its normal's greatest component, or the last. A
+// voxel takes the texel at the place that its centre has, weighted as colours are (triangle.h); a
+// vertex's voxel that at the vertex's.
 //
-// Places: (0, 0) is the picture's upper left corner, (1, 1) its lower right one; beyond them it repeats. A whole number above
-// 0 is the end of a repetition, not the beginning of the next.
+// Places: (0, 0) is the picture's upper left corner, (1, 1) its lower right one; beyond them it
+// repeats. A whole number above 0 is the end of a repetition, not the beginning of the next.
 #pragma once
 
 #include <cstddef>

@@ -1,24 +1,25 @@
-// Lines one voxel wide, of one colour, within a bounded space: the same voxels as line.h's in 32-bit
-// arithmetic, cut into spans that each lie in one box of a grid of boxes.
+// Lines one voxel wide, of one colour, within a bounded space: the same voxels as line.h's in
+// 32-bit arithmetic, cut into spans that each lie in one box of a grid of boxes.
 //
 // Of voxel_k = ⌊(S·N + D·k) / (256·N)⌋ (line.h; S and D = E − S in units) three things are needed.
 //
 // Crossings: the least k whose voxel lies at or beyond a face b on an axis. An estimate in single
-// precision, k ≈ (b − S)·N / D, is off by less than ½ (relative error 3·2⁻²³, N ≤ kMaxThinSteps), so
-// rounded to nearest it is the answer or one less, and the sign of (S − b)·N + D·k tells which. At
-// such a k that number is less than 3·|D|, so it may be computed modulo 2³².
+// precision, k ≈ (b − S)·N / D, is off by less than ½ (relative error 3·2⁻²³, N ≤ kMaxThinSteps),
+// so rounded to nearest it is the answer or one less, and the sign of (S − b)·N + D·k tells which.
+// At such a k that number is less than 3·|D|, so it may be computed modulo 2³².
 //
 // Boxes: which box holds voxel_k: an estimate is off by one at most, and the same number tells.
 //
 // Steps: inside a box of 2^b voxels a coordinate is kept in 32 bits, b before the point, modulo 2^b
-// (b: kTrackBits); let a unit be the last of them, 2⁻²⁷ voxel or less. A line keeps its step δ =
-// D / (256·N) in 64 bits: at least δ, and too great by less than 2.2·2⁻⁴⁶. So k times it, its upper
+// (b: kTrackBits); let a unit be the last of them, 2⁻²⁷ voxel or less. A line keeps its step δ = D
+// / (256·N) in 64 bits: at least δ, and too great by less than 2.2·2⁻⁴⁶. So k times it, its upper
 // half and a unit more are beyond what they stand for, by less than 1.04 units while k ≤
 // kMaxThinSteps; and its own upper half and a unit more by at most 1.01. After j ≤ kMaxSpan − 1
 // steps a position is too great, by less than 1.04 + 1.01·j units. Exact positions are multiples of
-// 1 / (256·N): the next whole number above one that is not whole is at least that far away, so floors
-// agree while (1.04 + 1.01·j)·2⁻²⁷ < 1 / (256·N). In a box no line has more than kMaxSpan voxels
-// (EUCLIDEAN lines advance by 1/√3 on their greatest axis at least), and (1.04 + 1.01·56)·8,700 < 2¹⁹.
+// 1 / (256·N): the next whole number above one that is not whole is at least that far away, so
+// floors agree while (1.04 + 1.01·j)·2⁻²⁷ < 1 / (256·N). In a box no line has more than kMaxSpan
+// voxels (EUCLIDEAN lines advance by 1/√3 on their greatest axis at least), and (1.04 +
+// 1.01·56)·8,700 < 2¹⁹.
 #pragma once
 
 #include <cstdint>
@@ -63,7 +64,8 @@ VOXELD_HD inline uint64_t TrackAxis(int32_t s, int32_t d, int32_t m, int axis) {
          (static_cast<uint32_t>(s) & ((1u << (bits + 8)) - 1));
 }
 
-// Whether all lines with both ends in a box of these positions (in voxels, closed) can be thin lines.
+// Whether all lines with both ends in a box of these positions (in voxels, closed) can be thin
+// lines.
 VOXELD_HD inline bool AreThin(const double lo[3], const double hi[3]) {
   double square = 0;
   for (int a = 0; a < 3; ++a) {
@@ -198,8 +200,8 @@ VOXELD_HD void WalkThin(const ThinLine& line, int32_t k, const int32_t at[3], co
     if (end > k && !f(box, k, end)) return;
     if (end > n) return;
     k = end;
-    // One face after the other, also where several are met at one voxel: whatever the axis, the same
-    // instructions.
+    // One face after the other, also where several are met at one voxel: whatever the axis, the
+    // same instructions.
     const bool in_x = x.next == k, in_y = !in_x && y.next == k;
     const int32_t d = in_x ? line.d[0] : in_y ? line.d[1] : line.d[2];
     const int32_t size = 256 << (in_x ? bits[0] : in_y ? bits[1] : bits[2]);

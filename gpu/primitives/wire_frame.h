@@ -1,5 +1,5 @@
-// Shapes as lines, and as dots where those meet: edges of what has any, of what is round meridians and
-// parallels, 45° apart.
+// Shapes as lines, and as dots where those meet: edges of what has any, of what is round meridians
+// and parallels, 45° apart.
 #pragma once
 
 #include <numbers>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/cpp/src/encode.h"
 
@@ -301,8 +302,11 @@ absl::StatusOr<Receipt> SessionCore::AnswerOf(uint64_t frame) const {
       std::string text = absl::StrCat("the server refused commit ", frame, ": ", receipt->message);
       const std::vector<Issue>& issues = receipt->issues;
       constexpr size_t kMost = 20;
-      for (size_t i = 0; i < issues.size() && i < kMost; ++i)
-        absl::StrAppend(&text, "\n  ", DescribeIssue(issues[i]));
+      for (size_t i = 0; i < issues.size() && i < kMost; ++i) {
+        const std::string described = DescribeIssue(issues[i]);
+        if (absl::StrContains(receipt->message, described)) continue;  // the first: it is there
+        absl::StrAppend(&text, "\n  ", described);
+      }
       if (issues.size() > kMost) absl::StrAppend(&text, "\n  and ", issues.size() - kMost, " more");
       return absl::FailedPreconditionError(text);
     }

@@ -49,6 +49,7 @@ class Connection(BaseConnection):
             raise ConnectionLost(self._transport.last_error or f"no voxeld answered at {self.server} in {timeout} s")
 
     async def flush(self, timeout: Optional[float] = None) -> None:
+        """As voxeld.Connection.flush: until all has been sent, whatever became of it."""
         if not await asyncio.to_thread(self._transport.wait_until, self._session.idle, timeout):
             raise asyncio.TimeoutError(f"after {timeout} s {self.counts['waiting_commits']} commits still wait to be sent")
 

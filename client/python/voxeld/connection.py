@@ -27,7 +27,9 @@ class Connection(BaseConnection):
             raise ConnectionLost(self._transport.last_error or f"no voxeld answered at {self.server} in {timeout} s")
 
     def flush(self, timeout: Optional[float] = None) -> None:
-        """Until everything drawn so far has been sent. TimeoutError if it was not."""
+        """Until everything drawn so far has been sent. TimeoutError if it was not. What became of it is not told here: not that
+        the server refused it, nor that it was too large to be sent (max_message_bytes); frame.wait() and wait_shown() raise
+        CommitRefused then."""
         if not self._transport.wait_until(self._session.idle, timeout):
             raise TimeoutError(f"after {timeout} s {self.counts['waiting_commits']} commits still wait to be sent")
 

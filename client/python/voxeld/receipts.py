@@ -130,7 +130,8 @@ class Issue:
 
     def __str__(self) -> str:
         where = "/".join(part for part in (self.layer, self.id) if part)
-        return f"{where or 'commit'}: {self.field} {self.message} ({self.reason.lower()})"
+        what = " ".join(part for part in (self.field, self.message) if part)
+        return f"{where or 'commit'}: {what} ({self.reason.lower()})"
 
     @staticmethod
     def of(issue: pb.Issue) -> "Issue":
@@ -200,7 +201,9 @@ class Frame:
 
     def raise_if_failed(self) -> "Frame":
         if self.state == "refused":
-            raise CommitRefused("; ".join([self.reason, *map(str, self.issues)]), self.issues)
+            # The reason names the first.
+            more = [str(issue) for issue in self.issues if not issue.message or issue.message not in self.reason]
+            raise CommitRefused("; ".join([self.reason, *more]), self.issues)
         if self.state == "dropped":
             raise CommitDropped(self.reason)
         if self.state in ("lost", "unknown"):

@@ -64,7 +64,7 @@ class Session:
         self.resumed = 0
         self.restored = 0                      # how often the scene was sent anew
         self.answered = 0                      # commits; those that send the scene anew do not count
-        self.on_issue: Callable[[Issue], None] = lambda issue: None  # called from answer()
+        self.on_issue: Callable[[Issue], None] = lambda issue: None  # called with what is refused, here or there
         self.done: Done = resolve              # resolves the futures that others have of frames
         self._next_frame = settings.first_frame
         self._again: Deque[Unit] = deque()    # to be sent before what waits in the outbox
@@ -102,7 +102,7 @@ class Session:
         too_large = self._too_large(unit)
         if too_large:
             self.book.add(unit.frame)
-            self.book.refuse(unit.frame, too_large)
+            self._refuse(unit, too_large)
             return True
         gone = self.outbox.push(unit, newest_only=not self.open)
         if gone is None:
@@ -123,6 +123,11 @@ class Session:
             return ""
         return (f"an operation of the commit has {unit.largest} bytes and the server takes messages of at most "
                 f"{self.most_bytes} (max_message_bytes); nothing of the commit was sent; make several things of it")
+
+    def _refuse(self, unit: Unit, reason: str) -> None:
+        """A commit that the server is not even asked about; told as what the server refuses is."""
+        self.book.refuse(unit.frame, reason)
+        self.on_issue(Issue("", "", "", "QUOTA_EXCEEDED", reason))
 
     def open_request(self) -> bytes:
         """The first message of a stream."""
@@ -204,7 +209,7 @@ class Session:
                     unit.frame.state = "sent"
                 return unit
             self.outbox.unreported_drops += unit.drops
-            self.book.refuse(unit.frame, too_large)
+            self._refuse(unit, too_large)
 
     def next_due_ns(self) -> Optional[int]:
         """When to ask again even if nothing else happens."""

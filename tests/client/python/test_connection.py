@@ -288,7 +288,8 @@ class Faults(Case):
                 v._transport.wait_until(lambda: False, LONG)
 
     def test_what_is_too_large_is_refused_before_there_is_a_connection(self) -> None:
-        v = voxel.connect(f"unix:{self.path}", wait=False)
+        told: list[voxel.Issue] = []
+        v = voxel.connect(f"unix:{self.path}", wait=False, on_issue=told.append)
         self.addCleanup(v.close)
         with v.object("huge") as block:
             for number in range(18):
@@ -299,7 +300,10 @@ class Faults(Case):
             block.frame.wait(LONG)  # type: ignore[union-attr]
         after.wait(LONG)  # type: ignore[union-attr]
         self.assertEqual((self.ids(served), v.counts["streams_opened"]), (["after"], 1))
+        v.flush(LONG)  # which is for what is sent alone
         v.close()
+        self.assertEqual([issue.reason for issue in told], ["QUOTA_EXCEEDED"])
+        self.assertRegex(str(told[0]), r"^commit: an operation of the commit has \d+ bytes .*max_message_bytes")
 
     def test_pauses_grow_while_nothing_is_answered(self) -> None:
         plain = PlainServer(max_message_bytes=1 << 20)

@@ -82,6 +82,13 @@ class Waiting(unittest.TestCase):
         with self.assertRaisesRegex(CommitRefused, "strict.*NaN") as caught:
             first.wait(0)
         self.assertEqual(caught.exception.issues, first.issues)
+        second = Frame(2)
+        book.add(second)
+        whole = "strict; the first: l/i, upsert.entity: is NaN"
+        book.receipt(pb.Receipt(frame_id=2, refused=pb.Refused(message=whole)), [issue])
+        with self.assertRaises(CommitRefused) as again:
+            second.wait(0)
+        self.assertEqual(str(again.exception), whole, "said once")
 
     def test_words_of_newer_servers_are_borne(self) -> None:
         book, frame = Book(), Frame(1)

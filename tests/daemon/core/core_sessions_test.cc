@@ -203,8 +203,10 @@ TEST(CoreSessions, AStrictSessionIsToldWhichOperationWasOneTooMany) {
   auto client = sim.Open(options);
   sim.Send(client, 1, Put("a", "1"), testing::Begin("a"));
   ASSERT_EQ(client.sink->Of<Refused>().size(), 1u);
-  EXPECT_THAT(client.sink->Of<Refused>()[0].second.message,
-              HasSubstr("the first: frame_begin: 1 operations wait for a commit"));
+  EXPECT_THAT(
+      client.sink->Of<Refused>()[0].second.message,
+      HasSubstr("strict and 1 operation was refused, so nothing of the commit was applied; the "
+                "first: a, frame_begin: 1 operation waits for a commit"));
 }
 
 TEST(CoreSessions, WhatWaitsForACommitIsLimitedOverAllSessions) {

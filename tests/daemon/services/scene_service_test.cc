@@ -13,6 +13,14 @@ namespace voxeld::daemon::services {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// How often `part` stands in `text`.
+int Occurrences(std::string_view part, std::string_view text) {
+  int count = 0;
+  for (size_t at = text.find(part); at != text.npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
 
 // One call, with its status and answer.
 template <typename Response, typename Method, typename Request>
@@ -58,7 +66,12 @@ TEST(ApplyUpdate, StrictIsRefusedWhole) {
   *request.add_operations() = SphereIn("layer", "bad", -1);
   const auto [status, response] = Apply(daemon, request);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(status.error_message(), HasSubstr("radius is -1"));
+  EXPECT_THAT(
+      status.error_message(),
+      StartsWith("the session is strict and 1 operation was refused, so nothing of the "
+                 "commit was applied; the first: layer/bad, "
+                 "operations[1].upsert.entity.primitive.sphere.radius: radius is -1; give"));
+  EXPECT_EQ(Occurrences("is -1", status.error_message()), 1) << "said once";
   EXPECT_EQ(daemon.Entities().total(), 0u);
 }
 

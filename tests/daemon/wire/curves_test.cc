@@ -109,7 +109,8 @@ const FaultCase kCases[] = {
        p.mutable_color_scale()->clear_along();
        p.mutable_color_scale()->set_scalars("1234");
      },
-     "primitive.color_scale.scalars", Reason::kSizeMismatch, "has 4 bytes; 3 vertices take 12"},
+     "primitive.color_scale.scalars", Reason::kSizeMismatch,
+     "has 4 bytes, 1 number; 3 vertices take 12"},
     {"scale_one_color", Scaled,
      [](P& p) {
        p.mutable_color_scale()->clear_colormap();

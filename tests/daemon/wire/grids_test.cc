@@ -60,7 +60,8 @@ const FaultCase kCases[] = {
     {"size", Volume, [](P& p) { p.mutable_volume()->mutable_grid()->set_size_b(0); },
      "primitive.volume.grid.size_b", Reason::kInvalidValue, "is 0; give 1 to 65536"},
     {"samples", Volume, [](P& p) { p.mutable_volume()->mutable_grid()->set_size_a(3); },
-     "primitive.volume.grid.samples", Reason::kSizeMismatch, "has 24 bytes; 9 samples take 36"},
+     "primitive.volume.grid.samples", Reason::kSizeMismatch,
+     "has 24 bytes, 6 samples; 9 samples take 36"},
     {"huge", Volume,
      [](P& p) {
        p.mutable_volume()->mutable_grid()->set_size_a(65536);

@@ -68,6 +68,9 @@ TEST(CommandLine, WhatIsWrongIsSaid) {
   EXPECT_THAT(Refusal({"paper", "--from", "/nowhere.json"}), HasSubstr("/nowhere.json"));
   EXPECT_THAT(Refusal({"frame"}), HasSubstr("--scene"));
   EXPECT_THAT(Refusal({"frame", "--scene", "none"}), HasSubstr("none"));
+  EXPECT_THAT(Refusal({"frame", "--scene", "short", "--svg", "a.svg"}),
+              HasSubstr("not with short"));
+  EXPECT_THAT(Refusal({"frame", "--from", "/nonexistent.json"}), HasSubstr("/nonexistent.json"));
   EXPECT_THAT(Refusal({"frame", "--scene", "short", "--threads", "0"}), HasSubstr("--threads"));
   EXPECT_THAT(Refusal({"frame", "--scene", "short", "--gpus", "0"}), HasSubstr("--gpus"));
   EXPECT_THAT(Refusal({"overload", "--rounds", "3"}), HasSubstr("--rounds"));

@@ -10,6 +10,7 @@
 
 #include "tools/bench/frame/frame_bench.h"
 #include "tools/bench/frame/plain_lines.h"
+#include "tools/bench/frame/resolution_figure.h"
 #include "tools/bench/frame/scene.h"
 
 namespace voxeld::bench::frame {
@@ -245,6 +246,7 @@ TEST(FrameBench, RowsHaveTheirFields) {
   for (const nlohmann::json& row : rows) {
     EXPECT_EQ(row["scene"], "lines30m");
     EXPECT_EQ(row["engine"], "cpu");
+    EXPECT_EQ(row["grid"], (nlohmann::json{512, 512, 256}));
     EXPECT_EQ(row["gpus"], 0);
     EXPECT_EQ(row["rounds"], 3);
     EXPECT_EQ(row["voxels_are"], "drawn");
@@ -341,6 +343,31 @@ TEST(FrameBench, SaysWhatIsWrongWithTheOptions) {
   EXPECT_THAT(Refusal({.scene = "short", .rounds = 0}), HasSubstr("--rounds is 0"));
   EXPECT_THAT(Refusal({.scene = "short", .share = 0}), HasSubstr("--share is 0"));
   EXPECT_THAT(Refusal({.scene = "short", .share = 1.5}), HasSubstr("--share is 1.5"));
+}
+
+nlohmann::json Row(const char* scene, int side, const char* engine, double ms) {
+  return {{"scene", scene}, {"grid", {side, side, side}},   {"engine", engine}, {"device", "a GPU"},
+          {"threads", 1},   {"device_ms", {{"median", ms}}}};
+}
+
+TEST(ResolutionFigure, HasACurveForEachMachineAndTheSquareBesideTheSlowest) {
+  const nlohmann::json rows = {Row("implicit sphere, 256\xC2\xB3", 256, "cpu", 40),
+                               Row("lines1g", 512, "cpu", 1),
+                               Row("implicit sphere, 128\xC2\xB3", 128, "cpu", 10),
+                               Row("implicit sphere, 128\xC2\xB3", 128, "cuda", 1),
+                               Row("implicit sphere, 512\xC2\xB3", 512, "cpu", 100),
+                               Row("implicit sphere, 512\xC2\xB3", 512, "cuda", 10)};
+  const std::string svg = ResolutionSvg(rows);
+  EXPECT_THAT(svg, HasSubstr("CPU, 1 thread<"));
+  EXPECT_THAT(svg, HasSubstr("a GPU<"));
+  for (const char* side : {">128<", ">256<", ">512<"}) EXPECT_THAT(svg, HasSubstr(side));
+  // 560 by 410 pixels from the lower left: two doublings, and from 1 to 100 ms.
+  EXPECT_THAT(svg, HasSubstr("points=\"90.0,255.0 370.0,131.6 650.0,50.0 \""))
+      << "in order of sides";
+  EXPECT_THAT(svg, HasSubstr("points=\"90.0,460.0 650.0,255.0 \""));
+  // 60, 15 and 3.75 ms.
+  EXPECT_THAT(svg, HasSubstr("points=\"90.0,342.3 370.0,218.9 650.0,95.5 \""));
+  EXPECT_EQ(ResolutionSvg(nlohmann::json::array({Row("lines1g", 512, "cpu", 1)})), "");
 }
 
 TEST(FrameBench, EndsWhenItIsInterrupted) {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "tools/bench/log_plot.h"
 #include "tools/bench/paper/figures.h"
-#include "tools/bench/paper/log_plot.h"
 #include "tools/bench/paper/paper_bench.h"
 #include "tools/bench/paper/workload.h"
 
@@ -128,6 +128,14 @@ TEST(LogPlot, PutsDecadesAtEqualDistancesAndEscapesText) {
   EXPECT_THAT(svg, HasSubstr("one &amp; all"));
   // Two decades over 560 and 410 pixels from the lower left.
   EXPECT_THAT(svg, HasSubstr("points=\"90.0,460.0 370.0,255.0 650.0,50.0 \""));
+  // With marks of its own an axis ends where they do.
+  const std::string marked =
+      LogLogSvg("t", "x", "y",
+                {{.name = "g", .points = {{2, 1}, {4, 10}, {8, 100}}, .guide = true}}, {2, 4, 8});
+  EXPECT_THAT(marked, HasSubstr("points=\"90.0,460.0 370.0,255.0 650.0,50.0 \""));
+  EXPECT_THAT(marked, HasSubstr(">4</text>"));
+  EXPECT_THAT(marked, HasSubstr("stroke-dasharray"));
+  EXPECT_THAT(svg, Not(HasSubstr("stroke-dasharray")));
   EXPECT_THAT(LogLogSvg("t", "x", "y", {}), HasSubstr("</svg>"));
   EXPECT_THAT(LogBarsSvg("t", "l", {{"b", false, 5}}), HasSubstr("<rect"));
 }

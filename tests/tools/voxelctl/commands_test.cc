@@ -305,6 +305,29 @@ TEST_F(CommandsTest, RefusalsAreToldWithTheirIssues) {
   EXPECT_TRUE(server_.log().clears.empty()) << "the old scene stays";
 }
 
+TEST_F(CommandsTest, WhatARefusalSaysByItselfIsNotSaidAgain) {
+  server_.Set(
+      {.refuse_commits_with = "1 was refused; the first: define_object.definition: of no use"});
+  const std::string err = RunTool({"play", DataFile("points.ply")}).err;
+  EXPECT_EQ(err,
+            "voxelctl: the server refused the scene: 1 was refused; the first: "
+            "define_object.definition: of no use\n");
+}
+
+TEST_F(CommandsTest, IssuesThatAreNoRefusalsAreToldAsNotes) {
+  server_.Set({.note_commits = true});
+  const json summary = RunJson({"play", DataFile("points.ply")});
+  ASSERT_EQ(summary["issues"].size(), summary["commits"].get<size_t>());
+  EXPECT_EQ(summary["issues"][0]["applied"], true);
+  EXPECT_EQ(summary["refused_operations"], 0);
+  EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err,
+              HasSubstr("note: /1: drawn otherwise"));
+  server_.Set({.lose_entities = true});
+  const json lost =
+      RunJson({"play", DataFile("points.ply"), "--spin", "--fps", "100", "--duration", "0.3"});
+  EXPECT_EQ(lost["issues"][0]["applied"], false);
+}
+
 TEST_F(CommandsTest, GlobeWantsAMap) {
   EXPECT_THAT(RunTool({"play", DataFile("points.ply"), "--globe"}).err,
               HasSubstr("--globe is for maps"));
@@ -332,6 +355,22 @@ TEST_F(CommandsTest, SnapshotsAreWrittenWholeOrNotAtAll) {
   EXPECT_EQ(result.code, 1);
   EXPECT_THAT(result.err, HasSubstr("1 of the volume's 16 slices did not come"));
   EXPECT_EQ(ReadAll(path), sheet);
+}
+
+TEST_F(CommandsTest, ASnapshotIsOfAllThatIsUp) {
+  const std::string path = folder_.Path("a.png");
+  EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], true);
+  ASSERT_EQ(server_.log().captures.size(), 1u);
+  EXPECT_EQ(server_.log().captures[0].at_least_snapshot(), 4u) << "what the scene's watch says";
+
+  server_.Set({.behind = true});
+  EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], false);
+  ASSERT_EQ(server_.log().captures.size(), 3u);
+  EXPECT_EQ(server_.log().captures[2].at_least_snapshot(), 0u);
+  const Result result = RunTool({"snapshot", path});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.err, HasSubstr("is not shown yet"));
+  EXPECT_THAT(result.err, HasSubstr("the newest has 3"));
 }
 
 TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {

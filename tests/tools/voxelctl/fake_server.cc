@@ -117,6 +117,13 @@ class FakeServer::Scene final : public v1::SceneService::Service {
             log.objects.insert(objects.begin(), objects.end());
             if (replace) log.entities.clear();
             log.entities.insert(entities.begin(), entities.end());
+            if (server_.behaviour_.note_commits) {
+              v1::Issue* issue = response.add_issues();
+              issue->set_id("1");
+              issue->set_message("drawn otherwise");
+              issue->set_applied(true);
+              stream->Write(response);
+            }
             Accept(request.commit(), server_.behaviour_.no_outcomes, stream);
             log.most_unanswered = std::max(log.most_unanswered, owed_);
           } else {
@@ -296,6 +303,9 @@ class FakeServer::Display final : public v1::DisplayService::Service {
     bool short_volume = false, lattice = false;
     {
       sync::MutexLock lock(server_.mutex_);
+      server_.log_.captures.push_back(*request);
+      if (server_.behaviour_.behind && request->at_least_snapshot() != 0)
+        return {grpc::StatusCode::DEADLINE_EXCEEDED, "the newest has 3"};
       short_volume = server_.behaviour_.short_volume;
       lattice = server_.behaviour_.lattice;
     }

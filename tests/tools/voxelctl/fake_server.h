@@ -26,10 +26,12 @@ class FakeServer final {
   // Set before the calls that they are for.
   struct Behaviour {
     std::string refuse_commits_with;  // not empty: every commit is refused, with an issue
+    bool note_commits = false;        // every commit has an issue that is no refusal
     bool lose_entities = false;       // SetTransform is answered by an Issue NOT_FOUND
     bool no_outcomes = false;         // outcomes are owed for ever
     bool short_volume = false;        // CaptureVolume leaves out its last slice
     bool hold_streams = false;        // a stream whose client is done is not ended
+    bool behind = false;              // no volume ever shows the newest snapshot
     bool lattice = false;  // the display is one of two slices of three lights, one absent
   };
   void Set(const Behaviour& behaviour);
@@ -41,6 +43,7 @@ class FakeServer final {
     uint64_t commits = 0, transforms = 0, largest_message = 0, most_unanswered = 0;
     std::vector<v1::ClearLayerRequest> clears;
     std::vector<v1::UpdateDisplayRequest> updates;
+    std::vector<v1::CaptureVolumeRequest> captures;
     bool deleted_all_mine = false;
   };
   Log log() const;

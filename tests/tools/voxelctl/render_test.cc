@@ -340,6 +340,39 @@ TEST(WritePng, ReadsBackAndReplacesWhole) {
   EXPECT_EQ(files, 1u);
 }
 
+TEST(Palette, KeepsAFewColoursAndMeansOfMany) {
+  Image image{16, 16, {}};
+  for (int i = 0; i < 256; ++i) {
+    const auto level = static_cast<uint8_t>(i);
+    image.rgb.insert(image.rgb.end(), {level, static_cast<uint8_t>(i % 2 * 255), 7});
+  }
+  const PaletteImage exact = ReduceColors(image, 256);
+  EXPECT_EQ(exact.colors.size(), 256u);
+  for (size_t i = 0; i < 256; ++i) {
+    const std::array<uint8_t, 3> want = {image.rgb[i * 3], image.rgb[i * 3 + 1], 7};
+    EXPECT_EQ(exact.colors[exact.indices[i]], want) << i;
+  }
+  const PaletteImage few = ReduceColors(image, 8);
+  EXPECT_EQ(few.colors.size(), 8u);
+  for (size_t i = 0; i < 256; ++i) {
+    const std::array<uint8_t, 3>& color = few.colors[few.indices[i]];
+    // Four colours to each of the two rows of 128 levels: 64 levels a colour, its mean in their middle.
+    EXPECT_NEAR(color[0], image.rgb[i * 3], 32) << i;
+    EXPECT_EQ(color[1], image.rgb[i * 3 + 1]) << i << ": what differs most is told apart first";
+    EXPECT_EQ(color[2], 7);
+  }
+  EXPECT_EQ(ReduceColors({2, 1, {1, 2, 3, 1, 2, 3}}, 1).indices, (std::vector<uint8_t>{0, 0}));
+}
+
+TEST(Palette, IsInTheFile) {
+  const TempFolder folder;
+  const std::string path = folder.Path("picture.png");
+  const PaletteImage image{3, 1, {{10, 20, 30}, {200, 0, 5}}, {1, 0, 1}};
+  ASSERT_THAT(WritePalettePng(path, image), IsOk());
+  EXPECT_EQ(ReadPng(path).rgb, (std::vector<uint8_t>{200, 0, 5, 10, 20, 30, 200, 0, 5}));
+  EXPECT_EQ(ReadAll(path)[25], 3) << "PNG's colour type";
+}
+
 TEST(WritePng, SaysWhereItCannot) {
   EXPECT_THAT(WritePng("/nonexistent/folder/a.png", {1, 1, {1, 2, 3}}),
               Fails(Words{"/nonexistent/folder/a.png", "No such file"}));

@@ -141,20 +141,25 @@ TEST(ShapeText, WhatIsWrongIsSaid) {
   EXPECT_THAT(ErrorOf("box color=purpel"),
               HasSubstr("color is \"purpel\"; #rrggbb would be right, or one of black"));
   EXPECT_THAT(ErrorOf("points vertices=1,2"), HasSubstr("these are 2 numbers"));
+  EXPECT_EQ(ErrorOf("sphere radius=1 color=red radius=2"),
+            "sphere has radius twice, \"1\" and \"2\"; one of them would be right");
 }
 
-TEST(ShapeText, NumbersAreOfTheTypeBeforeThem) {
+TEST(ShapeText, NumbersAreOfTheirType) {
   const auto samples = [](const char* text) {
     return Parsed(text).primitive().volume().grid().samples();
   };
   EXPECT_EQ(samples("volume grid.type=u8 grid.samples=1,255"), "\x01\xFF");
   EXPECT_EQ(samples("volume grid.type=u16 grid.samples=258"), "\x02\x01");
   EXPECT_EQ(samples("volume grid.type=rgba8 grid.samples=1,2,3,4"), "\x01\x02\x03\x04");
+  EXPECT_EQ(samples("volume grid.samples=1,255 grid.type=u8"), "\x01\xFF") << "in any order";
   EXPECT_EQ(samples("volume grid.samples=1").size(), 4u);
   EXPECT_EQ(Parsed("height_map height_type=u16 heights=258").primitive().height_map().heights(),
             "\x02\x01");
   EXPECT_EQ(ErrorOf("volume grid.type=u8 grid.samples=256"),
-            "samples is \"256\"; whole numbers of the type before it would be right");
+            "samples is \"256\"; whole numbers from 0 to 255 would be right for the type u8");
+  EXPECT_EQ(ErrorOf("height_map height_type=u16 heights=1,-2"),
+            "heights is \"-2\"; whole numbers from 0 to 65535 would be right for the type u16");
 }
 
 TEST(ShapeText, BoundariesBeginWithAxisAndForm) {
@@ -191,6 +196,8 @@ TEST(ShapeText, ClipsAreNoShapes) {
   EXPECT_EQ(ParseClipText("clip_plane a", &clip).status().message(),
             "after clip_plane is \"a\"; NAME=VALUE would be right");
   EXPECT_FALSE(ParseClipText("clip_cylinder at=1", &clip).ok()) << "its ends say where it is";
+  EXPECT_EQ(ParseClipText("clip_plane a=1 a=2", &clip).status().message(),
+            "clip_plane has a twice, \"1\" and \"2\"; one of them would be right");
 }
 
 // The gallery has every shape that there is.

@@ -146,7 +146,9 @@ json RowOf(const Scene& scene, const FrameOptions& options, int threads, const S
   const auto rate = [&](const std::vector<double>& ms) {
     return static_cast<double>(voxels) / Median(ms) / 1e6;
   };
+  const display::VoxelGrid& grid = scene.target.geometry.grid;
   json row = {{"scene", scene.name},
+              {"grid", {grid.nx, grid.ny, grid.nz}},
               {"engine", options.engine},
               {"device", subject.info().device},
               {"threads", threads},

@@ -13,6 +13,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -28,11 +29,13 @@ struct FrameOptions {
   // Over so many GPUs (0 to gpus − 1), each in a process of its own, in turns with one of them alone;
   // 0: one, in this process. Of the CPU engine: processes.
   int gpus = 0;
-  std::string nccl;         // where NCCL is: gpu::EngineOptions::nccl
-  bool keep_tiles = false;  // cuda::Tuning::pack_as_drawn is off
+  std::string nccl;               // where NCCL is: gpu::EngineOptions::nccl
+  bool keep_tiles = false;        // cuda::Tuning::pack_as_drawn is off
+  std::vector<std::string> from;  // reports (JSON) to show again instead of measuring; empty: none
+  std::string svg;                // a file for the figure (resolution_figure.h); empty: none
 };
 
-// {rows: [{scene, engine, device, threads, gpus, voxels, voxels_are ("drawn" or "lit"), scene_voxels, lit_voxels,
+// {rows: [{scene, grid [x, y, z], engine, device, threads, gpus, voxels, voxels_are ("drawn" or "lit"), scene_voxels, lit_voxels,
 // rounds, packed_as_drawn, device_ms {median, least, greatest}, host_ms {…}, apply_ms {…}, gvoxel_per_s (device), host_gvoxel_per_s,
 // ceiling {name, ms}, ratio (of the host's time to it, or of slicing alone), peers: [{name, ms, ratio (of the device's
 // time)}], stages {apply, assemble, slice, copy, door: share of
@@ -43,6 +46,9 @@ struct FrameOptions {
 absl::StatusOr<nlohmann::json> MeasureFrames(
     const FrameOptions& options, const std::function<void(const std::string&)>& progress,
     const std::function<bool()>& go_on);
+
+// "CPU, 2 threads", or the device.
+std::string MachineText(const nlohmann::json& row);
 
 // A row as one line, and the report as lines for people.
 std::string RowText(const nlohmann::json& row);

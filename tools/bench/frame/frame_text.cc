@@ -12,16 +12,16 @@ std::string SpreadText(const json& spread) {
                          double(spread["least"]), double(spread["greatest"]));
 }
 
-std::string Machine(const json& row) {
+}  // namespace
+
+std::string MachineText(const json& row) {
   if (row["engine"] == "cuda") return row["device"];
   return absl::StrFormat("CPU, %d thread%s", int(row["threads"]), row["threads"] == 1 ? "" : "s");
 }
 
-}  // namespace
-
 std::string RowText(const json& row) {
   return absl::StrFormat("%s, %s: %s %s, host %s, %.3g Gvoxel/s, %.3g of its ceiling's time",
-                         std::string(row["scene"]), Machine(row),
+                         std::string(row["scene"]), MachineText(row),
                          row["slicing_only"] ? "slicing" : "device", SpreadText(row["device_ms"]),
                          SpreadText(row["host_ms"]), double(row["gvoxel_per_s"]),
                          double(row["ratio"]));
@@ -30,8 +30,9 @@ std::string RowText(const json& row) {
 std::string FrameText(const json& report) {
   std::string out;
   for (const json& row : report["rows"]) {
-    absl::StrAppendFormat(&out, "%s, %s: %d voxels %s\n", std::string(row["scene"]), Machine(row),
-                          uint64_t(row["voxels"]), std::string(row["voxels_are"]));
+    absl::StrAppendFormat(&out, "%s, %s: %d voxels %s\n", std::string(row["scene"]),
+                          MachineText(row), uint64_t(row["voxels"]),
+                          std::string(row["voxels_are"]));
     absl::StrAppendFormat(&out, "  %-8s %s, %.4g Gvoxel/s\n",
                           row["slicing_only"] ? "slicing" : "device", SpreadText(row["device_ms"]),
                           double(row["gvoxel_per_s"]));

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
-#include "tools/bench/paper/log_plot.h"
+#include "tools/bench/log_plot.h"
 #include "tools/bench/paper/tables.h"
 
 namespace voxeld::bench::paper {

@@ -153,9 +153,20 @@ CLI::App* AddFrame(CLI::App& app, FrameOptions& options) {
   CLI::App* command = app.add_subcommand(
       "frame",
       "Whole frames through the engine's door: a draw list to packed slices, beside ceilings");
-  command->add_option("--scene", options.scene, "Which")
-      ->required()
+  command->add_option("--scene", options.scene, "Which; needed but with --from")
       ->check(CLI::IsMember(frame::SceneNames()));
+  command
+      ->add_option("--from", options.from,
+                   "Shows these reports instead (--json wrote them); may be repeated")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile)
+      ->expected(1)
+      ->take_all()
+      ->excludes("--scene");
+  command
+      ->add_option("--svg", options.svg,
+                   "Draws time against resolution there, of the scene implicit")
+      ->type_name("FILE");
   CLI::Option* const gpus =
       command
           ->add_option("--gpus", options.gpus,
@@ -227,6 +238,13 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
     return out;
   } catch (const CLI::ParseError& error) {
     return absl::InvalidArgumentError(absl::StrCat(error.what(), " (see --help)"));
+  }
+  if (frame_command->parsed() && frame.scene.empty() && frame.from.empty()) {
+    return absl::InvalidArgumentError("frame wants --scene, or --from (see --help)");
+  }
+  if (!frame.svg.empty() && frame.from.empty() && frame.scene != "implicit") {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--svg goes with --scene implicit, which has several resolutions, not with ", frame.scene));
   }
   if (ingest_command->parsed()) out.command = ingest;
   if (latency_command->parsed()) out.command = latency;

@@ -192,6 +192,9 @@ class Parser {
                       "shows of each\ninto one picture. What voxelctl put up before goes.");
     c->add_option("OUT.png", gallery_.file,
                   "Where the picture goes; an old one is replaced when the new one is whole");
+    c->add_option("--each", gallery_.each,
+                  "A folder for a small picture of each shape too, named as the shape is")
+        ->type_name("DIR");
     c->add_option("--display", gallery_.display, "Which display (default: the first)")
         ->type_name("NAME");
   }

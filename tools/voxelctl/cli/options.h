@@ -43,6 +43,7 @@ struct SnapshotOptions {
 
 struct GalleryOptions {
   std::string file;
+  std::string each;     // a folder for a picture of each shape; empty: none
   std::string display;  // empty: the first
 };
 

@@ -25,6 +25,8 @@ absl::Status Draw(const DrawOptions& options, const Connector& connect, Console&
 // Every shape by itself, as the display shows it, in one picture; the layer is empty afterwards.
 absl::Status Gallery(const GalleryOptions& options, Connection& connection, Interrupt& interrupt,
                      Console& console);
+// Of a volume that shows all that was up when it was called; of an older one, which is told, if none
+// comes in the options' time.
 absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console);
 absl::Status Displays(Connection& connection, Console& console);
 absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,

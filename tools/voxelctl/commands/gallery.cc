@@ -1,10 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "absl/algorithm/container.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "daemon/text/stroke_font.h"
@@ -14,6 +17,7 @@
 #include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/commands/put_shapes.h"
 #include "tools/voxelctl/render/label.h"
+#include "tools/voxelctl/render/palette.h"
 #include "tools/voxelctl/render/png_file.h"
 #include "tools/voxelctl/render/render_volume.h"
 #include "tools/voxelctl/shape/drawing.h"
@@ -27,6 +31,8 @@ namespace {
 
 constexpr int kTile = 320, kMargin = 12;
 constexpr double kLetters = 13;
+constexpr int kEachWidth = 240, kEachHeight = 200, kEachColors = 64;
+constexpr ViewAngles kAngles = {24, 20};
 
 absl::StatusOr<Volume> Capture(const GalleryOptions& options, Connection& connection) {
   v1::CaptureVolumeRequest request;
@@ -71,6 +77,27 @@ absl::Status Empty(const GalleryOptions& options, Connection& connection, Interr
   return volume.status();
 }
 
+// As files are called: "points, soft" is points-soft.png.
+std::string FileName(absl::string_view name) {
+  std::string out;
+  for (const char c : name) {
+    if (absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_') {
+      out += absl::ascii_tolower(static_cast<unsigned char>(c));
+    } else if (!out.empty() && out.back() != '-') {
+      out += '-';
+    }
+  }
+  return out + ".png";
+}
+
+// A shape by itself, without a label.
+absl::Status WriteEach(const std::string& folder, const char* name, const Volume& volume) {
+  const Image image =
+      RenderVolume(volume, {.width = kEachWidth, .height = kEachHeight, .angles = kAngles});
+  return WritePalettePng(std::filesystem::path(folder) / FileName(name),
+                         ReduceColors(image, kEachColors));
+}
+
 // With the tile's ground.
 void Cover(const Image& tile, Image& sheet) {
   for (size_t i = 0; i < sheet.rgb.size(); ++i) sheet.rgb[i] = tile.rgb[i % 3];
@@ -94,6 +121,14 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
                      Console& console) {
   const absl::StatusOr<text::StrokeFont> font = text::StrokeFont::Load("futural");
   if (!font.ok()) return font.status();
+  if (!options.each.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(options.each, error);
+    if (error) {
+      return absl::PermissionDeniedError(absl::StrCat(
+          EscapeForTerminal(options.each), ": no folder can be made there: ", error.message()));
+    }
+  }
   const std::span<const ShapeExample> examples = ShapeExamples();
   const int columns = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(examples.size()))));
   const int rows = (static_cast<int>(examples.size()) + columns - 1) / columns;
@@ -121,11 +156,15 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     volume = CaptureNext(options, last, connection, interrupt);
     if (!volume.ok()) return volume.status();
     last = volume->number;
-    Image tile = RenderVolume(*volume, {.width = kTile, .height = kTile, .angles = {24, 20}});
+    Image tile = RenderVolume(*volume, {.width = kTile, .height = kTile, .angles = kAngles});
     DrawLabel(*font, examples[i].name, kMargin, kMargin + kLetters, kLetters, tile);
     if (i == 0) Cover(tile, sheet);
     Paste(tile, static_cast<int>(i) % columns * kTile, static_cast<int>(i) / columns * kTile,
           sheet);
+    if (!options.each.empty()) {
+      const absl::Status status = WriteEach(options.each, examples[i].name, *volume);
+      if (!status.ok()) return status;
+    }
     if (absl::Status status = Empty(options, connection, interrupt, &last); !status.ok())
       return status;
   }

@@ -55,7 +55,8 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
                       {"id", issue.id},
                       {"field", issue.field},
                       {"reason", client::ReasonName(issue.reason)},
-                      {"message", issue.message}});
+                      {"message", issue.message},
+                      {"applied", issue.applied}});
   }
   return {{"layer", s.layer},
           {"owner", s.owner},
@@ -120,7 +121,7 @@ void Report(PlaySummary summary, Console& console) {
     }
   }
   for (const client::Issue& issue : summary.tally.issues)
-    console.Say(absl::StrCat("issue: ", IssueForTerminal(issue)));
+    console.Say(absl::StrCat(issue.applied ? "note: " : "issue: ", IssueForTerminal(issue)));
   if (summary.still_up)
     console.Say(
         absl::StrCat("it stays up in the layer ", summary.layer, " until `voxelctl clear`"));

@@ -1,6 +1,9 @@
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "display/sync/clock.h"
 #include "tools/voxelctl/commands/captured_volume.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/render/png_file.h"
@@ -20,6 +23,26 @@ uint64_t LitPixels(const Volume& volume) {
   return lit;
 }
 
+// The number of the scene's newest snapshot. A watch of an owner that nobody is begins with it alone.
+absl::StatusOr<uint64_t> NewestSnapshot(Connection& connection) {
+  v1::WatchSceneRequest request;
+  request.set_owner(std::numeric_limits<uint64_t>::max());
+  uint64_t newest = 0;
+  const absl::Status status =
+      connection.WatchScene(request, [&](const v1::WatchSceneResponse& message) {
+        newest = message.in_sync();
+        return newest == 0;
+      });
+  if (newest == 0) return status.ok() ? absl::UnavailableError("the scene was not told") : status;
+  return newest;
+}
+
+absl::Status Capture(const v1::CaptureVolumeRequest& request, Connection& connection,
+                     CapturedVolume* out) {
+  return connection.CaptureVolume(request,
+                                  [&](const v1::VolumeChunk& chunk) { return out->Add(chunk); });
+}
+
 }  // namespace
 
 absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console) {
@@ -27,9 +50,22 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
   request.set_name(options.display);
   request.set_timeout_ns(std::llround(options.timeout_s * 1e9));
   console.Progress("waiting for a volume …");
+  // What was up when the command was given is in the picture.
+  const absl::StatusOr<uint64_t> newest = NewestSnapshot(connection);
+  if (!newest.ok()) return newest.status();
+  request.set_at_least_snapshot(*newest);
   CapturedVolume captured;
-  absl::Status status = connection.CaptureVolume(
-      request, [&](const v1::VolumeChunk& chunk) { return captured.Add(chunk); });
+  absl::Status status = Capture(request, connection, &captured);
+  const bool behind = absl::IsDeadlineExceeded(status);
+  if (behind) {
+    captured = CapturedVolume();
+    request.set_at_least_snapshot(0);
+    request.set_timeout_ns(sync::kSecond);
+    if (!Capture(request, connection, &captured).ok()) return status;
+    console.Say(
+        absl::StrCat("what is up now is not shown yet, this is from before: ", status.message()));
+    status = absl::OkStatus();
+  }
   if (!status.ok()) return status;
   const bool decoded = captured.header().source() == v1::VolumeHeader::DECODED_FROM_SENT;
   const absl::StatusOr<Volume> volume = std::move(captured).Finish();
@@ -54,6 +90,7 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
                            {"slice_width", volume->width},
                            {"slice_height", volume->height},
                            {"lit_pixels", lit},
+                           {"up_to_date", !behind},
                            {"source", decoded ? "DECODED_FROM_SENT" : "REPORTED_BY_DEVICE"},
                            {"width", image.width},
                            {"height", image.height}},

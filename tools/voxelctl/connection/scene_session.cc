@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -53,8 +54,11 @@ absl::Status SceneSession::CommitAndWait(sync::TimeNs timeout) {
   std::string text =
       absl::StrCat("the server refused the scene: ", EscapeForTerminal(receipt->message));
   const client::Tally tally = client_->GetTally();
-  for (const client::Issue& issue : tally.issues)
+  for (const client::Issue& issue : tally.issues) {
+    // The message has the first.
+    if (absl::StrContains(receipt->message, client::DescribeIssue(issue))) continue;
     absl::StrAppend(&text, "\n  ", IssueForTerminal(issue));
+  }
   if (tally.issue_count > tally.issues.size())
     absl::StrAppend(&text, "\n  and ", tally.issue_count - tally.issues.size(), " more");
   return absl::FailedPreconditionError(text);

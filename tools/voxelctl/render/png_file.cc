@@ -31,28 +31,7 @@ int OpenTemporary(const std::string& path, std::string* temporary) {
   return -1;
 }
 
-}  // namespace
-
-absl::Status WritePng(const std::string& path, const Image& image) {
-  png_image png = {};
-  png.version = PNG_IMAGE_VERSION;
-  png.width = static_cast<png_uint_32>(image.width);
-  png.height = static_cast<png_uint_32>(image.height);
-  png.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = 0;
-  std::vector<png_byte> bytes;
-  const int stride = image.width * 3;
-  if (png_image_write_to_memory(&png, nullptr, &size, 0, image.rgb.data(), stride, nullptr) != 0) {
-    bytes.resize(size);
-    if (png_image_write_to_memory(&png, bytes.data(), &size, 0, image.rgb.data(), stride,
-                                  nullptr) != 0)
-      bytes.resize(size);
-  }
-  if (PNG_IMAGE_FAILED(png) || bytes.empty()) {
-    return absl::InternalError(
-        absl::StrCat(path, ": the picture could not be encoded: ", png.message));
-  }
-
+absl::Status WriteFile(const std::string& path, const std::vector<png_byte>& bytes) {
   std::string temporary;
   const int file = OpenTemporary(path, &temporary);
   if (file < 0) return SystemError(path, "cannot be written");
@@ -69,6 +48,43 @@ absl::Status WritePng(const std::string& path, const Image& image) {
     return SystemError(path, "could not be put in place");
   std::move(remove).Cancel();
   return absl::OkStatus();
+}
+
+// `png` has size and format; `pixels` and `colors` are as it says.
+absl::Status Write(const std::string& path, png_image& png, const void* pixels, int stride,
+                   const void* colors) {
+  png.version = PNG_IMAGE_VERSION;
+  png_alloc_size_t size = 0;
+  std::vector<png_byte> bytes;
+  if (png_image_write_to_memory(&png, nullptr, &size, 0, pixels, stride, colors) != 0) {
+    bytes.resize(size);
+    if (png_image_write_to_memory(&png, bytes.data(), &size, 0, pixels, stride, colors) != 0)
+      bytes.resize(size);
+  }
+  if (PNG_IMAGE_FAILED(png) || bytes.empty()) {
+    return absl::InternalError(
+        absl::StrCat(path, ": the picture could not be encoded: ", png.message));
+  }
+  return WriteFile(path, bytes);
+}
+
+}  // namespace
+
+absl::Status WritePng(const std::string& path, const Image& image) {
+  png_image png = {};
+  png.width = static_cast<png_uint_32>(image.width);
+  png.height = static_cast<png_uint_32>(image.height);
+  png.format = PNG_FORMAT_RGB;
+  return Write(path, png, image.rgb.data(), image.width * 3, nullptr);
+}
+
+absl::Status WritePalettePng(const std::string& path, const PaletteImage& image) {
+  png_image png = {};
+  png.width = static_cast<png_uint_32>(image.width);
+  png.height = static_cast<png_uint_32>(image.height);
+  png.format = PNG_FORMAT_RGB_COLORMAP;
+  png.colormap_entries = static_cast<png_uint_32>(image.colors.size());
+  return Write(path, png, image.indices.data(), image.width, image.colors.data());
 }
 
 }  // namespace voxeld::voxelctl

@@ -64,7 +64,7 @@ constexpr ShapeExample kExamples[] = {
     {"arrow",
      "arrow start=-0.7,-0.5,-0.6 end=0.6,0.5,0.7 shaft_radius=0.08 head_radius=0.25 color=red"},
     {"text",
-     "text text='Aa ßΩ' height=0.55 position=0,-0.25,0 alignment=center facing=0,-1,0.4 up=0,0,1 "
+     "text text='Aa ßΩ' height=0.42 position=0,-0.25,0 alignment=center facing=0,-1,0.4 up=0,0,1 "
      "depth=0.15 color=gold"},
     {"text, outline",
      "text text=Rose style=outline height=0.5 position=0,0,-0.25 alignment=center facing=0,-1,0 "

@@ -162,22 +162,28 @@ v1::ElementType TypeBeside(const Message& message) {
   return v1::ELEMENT_TYPE_UNSPECIFIED;
 }
 
-// One number of a packed array; false: the type has no such number.
-bool AppendNumber(double number, v1::ElementType type, std::string* out) {
+// One number of a packed array; InvalidArgument: the type has no such number.
+absl::Status AppendNumber(absl::string_view name, double number, v1::ElementType type,
+                          std::string* out) {
   const auto append = [&](auto value) {
     out->append(reinterpret_cast<const char*>(&value), sizeof(value));
-    return true;
+    return absl::OkStatus();
   };
   if (type == v1::ELEMENT_TYPE_UNSPECIFIED || type == v1::ELEMENT_TYPE_F32) {
     return append(static_cast<float>(number));
   }
   const double most = type == v1::ELEMENT_TYPE_U16 ? 65535 : 255;  // RGBA8: four numbers a sample
-  if (number != std::floor(number) || number < 0 || number > most) return false;
+  if (number != std::floor(number) || number < 0 || number > most) {
+    const auto* value = v1::ElementType_descriptor()->FindValueByNumber(type);
+    return Wrong(name, absl::StrCat(number),
+                 absl::StrCat("whole numbers from 0 to ", most, " would be right for the type ",
+                              value == nullptr ? "" : ShortName(*value)));
+  }
   return type == v1::ELEMENT_TYPE_U16 ? append(static_cast<uint16_t>(number))
                                       : append(static_cast<uint8_t>(number));
 }
 
-// Packed arrays: colours, or numbers of the type told before them, else in single precision.
+// Packed arrays: colours, or numbers of the type that the message has, else in single precision.
 absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Message* out) {
   if (field.name() == "picture") return SetPicture(field, text, out);
   std::string bytes;
@@ -193,9 +199,8 @@ absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Mess
     if (!numbers.ok()) return numbers.status();
     const v1::ElementType type = TypeBeside(*out);
     for (const double number : *numbers) {
-      if (AppendNumber(number, type, &bytes)) continue;
-      return Wrong(field.name(), absl::StrCat(number),
-                   "whole numbers of the type before it would be right");
+      const absl::Status status = AppendNumber(field.name(), number, type, &bytes);
+      if (!status.ok()) return status;
     }
   }
   out->GetReflection()->SetString(out, &field, std::move(bytes));

@@ -120,8 +120,18 @@ absl::StatusOr<std::vector<Setting>> SettingsOf(const std::vector<std::string>& 
     if (!absl::StrContains(words[w], '=')) {
       return Wrong(absl::StrCat("after ", words.front()), words[w], "NAME=VALUE would be right");
     }
+    for (const Setting& before : settings) {
+      if (before.name != parts.first) continue;
+      return absl::InvalidArgumentError(
+          absl::StrCat(words.front(), " has ", EscapeForTerminal(parts.first), " twice, \"",
+                       EscapeForTerminal(before.value), "\" and \"",
+                       EscapeForTerminal(parts.second), "\"; one of them would be right"));
+    }
     settings.push_back({parts.first, parts.second});
   }
+  // Arrays are put into bytes by their types, wherever these stand.
+  absl::c_stable_partition(settings,
+                           [](const Setting& s) { return absl::EndsWith(s.name, "type"); });
   return settings;
 }
 

@@ -1,4 +1,4 @@
-#include "tools/bench/paper/log_plot.h"
+#include "tools/bench/log_plot.h"
 
 #include <algorithm>
 #include <array>
@@ -8,13 +8,13 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_replace.h"
 
-namespace voxeld::bench::paper {
+namespace voxeld::bench {
 namespace {
 
 constexpr double kWidth = 900, kHeight = 520, kLeft = 90, kRight = 250, kTop = 50, kBottom = 60;
 constexpr double kRow = 30;
-constexpr std::array kColours = {"#8a8a8a", "#b08d57", "#6b8fb2", "#8fae7a", "#a37aa3",
-                                 "#1f6fb2", "#c8501e", "#2e8b57", "#7a2e8b"};
+constexpr std::array kColours = {"#8a8a8a", "#b08d57", "#6b8fb2", "#8fae7a", "#a37aa3"};
+constexpr std::array kOurColours = {"#1f6fb2", "#c8501e", "#2e8b57", "#7a2e8b"};
 
 std::string Escape(const std::string& text) {
   return absl::StrReplaceAll(text,
@@ -42,29 +42,32 @@ std::string Begin(double height, const std::string& title) {
          Text(kLeft, 26, "start", title);
 }
 
-// Whole decades around all values.
-struct Decades {
-  int first = 0, last = 1;
+struct Axis {
+  std::vector<double> marks;  // two or more, the ends among them
   double begin = 0, length = 1;
 
-  static Decades Of(const std::vector<double>& values, double begin, double length) {
+  // Whole decades around all values.
+  static Axis OfDecades(const std::vector<double>& values, double begin, double length) {
     const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
-    Decades d{static_cast<int>(std::floor(std::log10(*least))),
-              static_cast<int>(std::ceil(std::log10(*greatest))), begin, length};
-    d.last = std::max(d.last, d.first + 1);
-    return d;
+    const int first = static_cast<int>(std::floor(std::log10(*least)));
+    const int last = std::max(first + 1, static_cast<int>(std::ceil(std::log10(*greatest))));
+    Axis axis{{}, begin, length};
+    for (int p = first; p <= last; ++p) axis.marks.push_back(std::pow(10, p));
+    return axis;
   }
   double At(double value) const {
+    const double first = std::log10(marks.front()), last = std::log10(marks.back());
     return begin + (std::log10(value) - first) / (last - first) * length;
   }
 };
 
-std::string PowerName(int power) { return absl::StrFormat("%g", std::pow(10, power)); }
+std::string MarkName(double mark) { return absl::StrFormat("%g", mark); }
 
 }  // namespace
 
 std::string LogLogSvg(const std::string& title, const std::string& x_label,
-                      const std::string& y_label, const std::vector<Curve>& curves) {
+                      const std::string& y_label, const std::vector<Curve>& curves,
+                      const std::vector<double>& x_marks) {
   std::vector<double> xs, ys;
   for (const Curve& curve : curves) {
     for (const auto& [x, y] : curve.points) {
@@ -75,24 +78,29 @@ std::string LogLogSvg(const std::string& title, const std::string& x_label,
   std::string out = Begin(kHeight, title);
   if (xs.empty()) return out + "</svg>\n";
   const double width = kWidth - kLeft - kRight, height = kHeight - kTop - kBottom;
-  const Decades x = Decades::Of(xs, kLeft, width), y = Decades::Of(ys, kTop + height, -height);
-  for (int p = x.first; p <= x.last; ++p) {
-    const double at = x.At(std::pow(10, p));
-    out += Line(at, kTop, at, kTop + height) + Text(at, kTop + height + 18, "middle", PowerName(p));
+  const Axis x =
+      x_marks.size() < 2 ? Axis::OfDecades(xs, kLeft, width) : Axis{x_marks, kLeft, width};
+  const Axis y = Axis::OfDecades(ys, kTop + height, -height);
+  for (const double mark : x.marks) {
+    const double at = x.At(mark);
+    out +=
+        Line(at, kTop, at, kTop + height) + Text(at, kTop + height + 18, "middle", MarkName(mark));
   }
-  for (int p = y.first; p <= y.last; ++p) {
-    const double at = y.At(std::pow(10, p));
-    out += Line(kLeft, at, kLeft + width, at) + Text(kLeft - 6, at + 4, "end", PowerName(p));
+  for (const double mark : y.marks) {
+    const double at = y.At(mark);
+    out += Line(kLeft, at, kLeft + width, at) + Text(kLeft - 6, at + 4, "end", MarkName(mark));
   }
   out += Text(kLeft + width / 2, kHeight - 14, "middle", x_label) +
          Text(kLeft, kTop - 8, "start", y_label);
   double legend = kTop + 8;
-  for (size_t i = 0; i < curves.size(); ++i) {
-    const Curve& curve = curves[i];
-    const char* colour = kColours[i % kColours.size()];
-    absl::StrAppendFormat(&out,
-                          "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"%s\" points=\"",
-                          colour, curve.ours ? "2.4" : "1.2");
+  size_t ours = 0, others = 0;
+  for (const Curve& curve : curves) {
+    const char* colour = curve.guide  ? "#888"
+                         : curve.ours ? kOurColours[ours++ % kOurColours.size()]
+                                      : kColours[others++ % kColours.size()];
+    absl::StrAppendFormat(
+        &out, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"%s\"%s points=\"", colour,
+        curve.ours ? "2.4" : "1.2", curve.guide ? " stroke-dasharray=\"6 5\"" : "");
     for (const auto& [px, py] : curve.points)
       absl::StrAppendFormat(&out, "%.1f,%.1f ", x.At(px), y.At(py));
     out += "\"/>\n" + Text(kLeft + width + 14, legend, "start", curve.name, colour);
@@ -110,11 +118,11 @@ std::string LogBarsSvg(const std::string& title, const std::string& label,
   values.reserve(bars.size());
   for (const Bar& bar : bars) values.push_back(bar.value);
   constexpr double kNames = 230, kNumbers = 110;
-  const Decades x = Decades::Of(values, kNames, kWidth - kNames - kNumbers);
+  const Axis x = Axis::OfDecades(values, kNames, kWidth - kNames - kNumbers);
   const double bottom = kTop + static_cast<double>(bars.size()) * kRow;
-  for (int p = x.first; p <= x.last; ++p) {
-    const double at = x.At(std::pow(10, p));
-    out += Line(at, kTop, at, bottom) + Text(at, bottom + 18, "middle", PowerName(p));
+  for (const double mark : x.marks) {
+    const double at = x.At(mark);
+    out += Line(at, kTop, at, bottom) + Text(at, bottom + 18, "middle", MarkName(mark));
   }
   out += Text(kNames + (kWidth - kNames - kNumbers) / 2, bottom + 44, "middle", label);
   for (size_t i = 0; i < bars.size(); ++i) {
@@ -130,4 +138,4 @@ std::string LogBarsSvg(const std::string& title, const std::string& label,
   return out + "</svg>\n";
 }
 
-}  // namespace voxeld::bench::paper
+}  // namespace voxeld::bench
