@@ -32,6 +32,7 @@ CudaVolume::CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning)
                                 tuning.index_share_kept)},
       index_(device, list_budget_),
       lines_(device, list_budget_, tuning.few_lines),
+      points_(device, list_budget_, tuning.points_each, tuning.few_points),
       triangles_(device, list_budget_),
       formulas_(device.api(), tuning.compile_formulas),
       least_crowd_(tuning.least_crowd) {}
@@ -101,8 +102,10 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   counted_ = true;
   index_.Clear();
   lines_.Reset(tiles_.grid, tiles_.owned_here);
+  points_.Reset(tiles_.grid, tiles_.owned_here);
   triangles_.Reset(tiles_.grid, tiles_.owned_here);
   lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
+  points_suit_ = PointIndex::Suits(device_.api(), tiles_.grid);
   pass_planes_ = INT32_MAX;
   slots_.clear();
   free_slots_.clear();
@@ -233,10 +236,10 @@ absl::Status CudaVolume::MarkLeft() {
       return slots_[slot].indexed_by == IndexedBy::kPairs;
     });
     absl::Status status = MarkPairs({marks_.begin(), of_regions});
-    // Either looks for its own.
-    for (RegionIndex* index : {&IndexOf(IndexedBy::kLines), &IndexOf(IndexedBy::kTriangles)}) {
+    // Each looks for its own.
+    for (const IndexedBy by : kByRegion) {
       if (!status.ok()) return status;
-      status = index->Mark({of_regions, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
+      status = IndexOf(by).Mark({of_regions, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
     }
     if (!status.ok()) return status;
     for (const uint32_t slot : marks_) dirty_.Add(slots_[slot].box);
@@ -246,8 +249,8 @@ absl::Status CudaVolume::MarkLeft() {
   if (absl::Status status = KillPairs(); !status.ok()) return status;
   index_.Forget(left_);
   absl::Status status;
-  for (RegionIndex* index : {&IndexOf(IndexedBy::kLines), &IndexOf(IndexedBy::kTriangles)}) {
-    if (status = index->Drop(left_); !status.ok()) return status;
+  for (const IndexedBy by : kByRegion) {
+    if (status = IndexOf(by).Drop(left_); !status.ok()) return status;
   }
   for (const uint32_t slot : left_) {
     dirty_.Add(slots_[slot].box);
@@ -317,6 +320,7 @@ absl::StatusOr<DrawView> CudaVolume::ViewForDrawing(uint32_t group) {
   view.cylinders = cylinders_.as<VoxelCylinder>();
   view.pairs = index_.view();
   view.lines = lines_.view();
+  view.points = points_.view();
   view.triangles = triangles_.view();
   view.volume = tiles_.view();
   view.regions = tiles_.regions;
@@ -340,12 +344,16 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
     list.count = kept;
   };
   keep_drawn(view.lines);
+  keep_drawn(view.points);
   keep_drawn(view.triangles);
   const LayerLook first = layers.empty() ? LayerLook() : looks_now_[*layers.begin()];
   view.clipped = first.half_spaces != 0 || first.cylinders != 0;
   bool any = masked || view.pairs.count > 0 || view.unlisted.items > 0;
   for (uint32_t b = 0; b < view.lines.count; ++b) {
     any |= view.lines.batches[b].lists.spans == nullptr;
+  }
+  for (uint32_t b = 0; b < view.points.count; ++b) {
+    any |= view.points.batches[b].records == nullptr;
   }
   for (uint32_t b = 0; b < view.triangles.count; ++b) {
     any |= view.triangles.batches[b].begin == nullptr;
@@ -358,7 +366,7 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
 }
 
 double CudaVolume::ItemsToDraw() const {
-  const uint64_t items = live_items_ + lines_.live() + triangles_.live();
+  const uint64_t items = live_items_ + lines_.live() + points_.live() + triangles_.live();
   return static_cast<double>(items) * dirty_.ShareOf(tiles_.regions);
 }
 
@@ -367,10 +375,10 @@ absl::Status CudaVolume::TakeIn() {
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = MoveCrowds(); !status.ok()) return status;
   if (absl::Status status = Enter(); !status.ok()) return status;
-  if (absl::Status status = lines_.Merge(); !status.ok()) return status;
-  if (absl::Status status = lines_.SortDeferred(); !status.ok()) return status;
-  if (absl::Status status = triangles_.Merge(); !status.ok()) return status;
-  if (absl::Status status = triangles_.SortDeferred(); !status.ok()) return status;
+  for (const IndexedBy by : kByRegion) {
+    if (absl::Status status = IndexOf(by).Merge(); !status.ok()) return status;
+    if (absl::Status status = IndexOf(by).SortDeferred(); !status.ok()) return status;
+  }
   return index_.AddDeferred(table_.as<TableEntry>(), tiles_.view());
 }
 

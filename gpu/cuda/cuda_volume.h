@@ -1,6 +1,6 @@
 // The voxel volume on the device: the scene's table of drawables, the indices of what may lie in which
-// tile (pair_index.h), of thin lines (line_index.h) and of small triangles (triangle_index.h), and the
-// drawing of the regions that changed.
+// tile (pair_index.h), of thin lines (line_index.h), of points (point_index.h) and of small triangles
+// (triangle_index.h), and the drawing of the regions that changed.
 //
 // Each index is a few batches: a change adds one, batches of like size are merged, and what has gone
 // is dropped on the way; so an index of n costs O(log n) each, and what has gone never costs more
@@ -28,6 +28,7 @@
 #include "gpu/cuda/line_index.h"
 #include "gpu/cuda/list_budget.h"
 #include "gpu/cuda/pair_index.h"
+#include "gpu/cuda/point_index.h"
 #include "gpu/cuda/triangle_index.h"
 #include "gpu/cuda/tuning.h"
 #include "gpu/cuda/types.h"
@@ -112,7 +113,7 @@ class CudaVolume final : private SceneObserver {
 
  private:
   // By which index a drawable's items are drawn.
-  enum class IndexedBy : uint8_t { kPairs, kLines, kTriangles };
+  enum class IndexedBy : uint8_t { kPairs, kLines, kPoints, kTriangles };
   // What the host knows of a slot of the table.
   struct Slot {
     uint32_t items = 0;
@@ -144,8 +145,12 @@ class CudaVolume final : private SceneObserver {
                    Slot& slot) const;
   static void ChooseIndexOf(IndexedBy by, const RoughBox& box, const double extent[3], Slot& slot);
   static void ChooseIndexOfCut(IndexedBy by, const Cut& cut, Slot& slot);
+  static constexpr IndexedBy kByRegion[] = {IndexedBy::kLines, IndexedBy::kPoints,
+                                            IndexedBy::kTriangles};
   RegionIndex& IndexOf(IndexedBy by) {
-    return by == IndexedBy::kLines ? static_cast<RegionIndex&>(lines_) : triangles_;
+    if (by == IndexedBy::kLines) return lines_;
+    if (by == IndexedBy::kPoints) return points_;
+    return triangles_;
   }
   absl::Status KillPairs();
   absl::Status MarkLeft();
@@ -154,8 +159,8 @@ class CudaVolume final : private SceneObserver {
   // `entries`: null, or what the table does not have of these drawables, which then come together.
   absl::Status EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
                             std::span<const uint32_t> slots, const FewEntries* entries);
-  // Whether they are lines, of one layer, and so few that an index of them puts them into the table.
-  bool AreFewLines(std::span<const uint32_t> slots, std::span<const TableEntry> entries) const;
+  // Whether they are lines, or points, of one layer, and so few that an index of them puts them into the table.
+  bool AreFew(std::span<const uint32_t> slots, std::span<const TableEntry> entries) const;
   // Of one layer, no more than may come at once.
   struct Arriving {
     std::vector<uint32_t> slots;
@@ -252,7 +257,8 @@ class CudaVolume final : private SceneObserver {
   ListBudget list_budget_;
   PairIndex index_;  // of all that the others do not have
   LineIndex lines_;
-  bool lines_suit_ = false;  // the volume is not too large for them
+  PointIndex points_;
+  bool lines_suit_ = false, points_suit_ = false;  // the volume is not too large for them
   TriangleIndex triangles_;
   CompiledFormulas formulas_;
   // Of blocks of regions: a pass that failed last, with so many items without lists, halved. As many

@@ -112,13 +112,14 @@ CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
   if (record.kind == PrimitiveKind::kTriangles && record.texture_width == 0) {
     return IndexedBy::kTriangles;
   }
+  if (record.thickness != 0) return IndexedBy::kPairs;
+  if (record.kind == PrimitiveKind::kPoints) return IndexedBy::kPoints;
   const bool line =
-      record.kind == PrimitiveKind::kPoints ||
-      (record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover);
-  return line && record.thickness == 0 ? IndexedBy::kLines : IndexedBy::kPairs;
+      record.kind == PrimitiveKind::kSegments && record.sampling != LineSampling::kCover;
+  return line ? IndexedBy::kLines : IndexedBy::kPairs;
 }
 
-// Where all geometries lie whose items may be thin lines or small triangles, and how large these are:
+// Where all geometries lie whose items may be thin lines, points or small triangles, and how large these are:
 // large geometries are looked through on the device.
 absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   std::vector<const GeometryView*> large;

@@ -1,4 +1,4 @@
-// Drawables that come: into the table, and into the index of pairs, of lines or of triangles.
+// Drawables that come: into the table, and into the index of pairs, of lines, of points or of triangles.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -17,9 +17,11 @@ namespace voxeld::gpu::cuda {
 
 void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, const Cut* cut,
                              Slot& slot) const {
-  const IndexedBy by = IndexFor(entry.record);
+  IndexedBy by = IndexFor(entry.record);
   if (by == IndexedBy::kPairs) return;
-  if (by == IndexedBy::kLines && (!lines_suit_ || entry.source.radius > 0)) return;
+  if (by == IndexedBy::kPoints && !points_suit_) by = IndexedBy::kLines;
+  if (by == IndexedBy::kLines && !lines_suit_) return;
+  if (by != IndexedBy::kTriangles && entry.source.radius > 0) return;
   if (cut != nullptr) return ChooseIndexOfCut(by, *cut, slot);
   const auto* const arrays = static_cast<const DeviceArrays*>(drawable.geometry->memory.get());
   if (arrays == nullptr || !arrays->bounds) return;
@@ -55,12 +57,13 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
 // `box` holds all vertices, of which those of a triangle are at most `extent` apart, voxels.
 void CudaVolume::ChooseIndexOf(IndexedBy by, const RoughBox& box, const double extent[3],
                                Slot& slot) {
-  if (by == IndexedBy::kLines ? !AreThin(box.lo, box.hi) : !AreCompact(box.lo, box.hi, extent)) {
-    return;
-  }
+  const bool suits = by == IndexedBy::kLines    ? AreThin(box.lo, box.hi)
+                     : by == IndexedBy::kPoints ? AreNear(box.lo, box.hi)
+                                                : AreCompact(box.lo, box.hi, extent);
+  if (!suits) return;
   slot.indexed_by = by;
   slot.box = box;
-  if (by == IndexedBy::kLines) return;
+  if (by != IndexedBy::kTriangles) return;
   // Snapping, voxels only touched, and that the last one counts.
   int32_t voxels[3];
   for (int a = 0; a < 3; ++a) voxels[a] = static_cast<int32_t>(extent[a]) + 4;
@@ -256,16 +259,18 @@ FewEntries FewOf(std::span<const uint32_t> slots, std::span<const TableEntry> en
 
 }  // namespace
 
-bool CudaVolume::AreFewLines(std::span<const uint32_t> slots,
-                             std::span<const TableEntry> entries) const {
+bool CudaVolume::AreFew(std::span<const uint32_t> slots,
+                        std::span<const TableEntry> entries) const {
   if (slots.size() > kFewRows) return false;
+  const IndexedBy by = slots_[slots[0]].indexed_by;
+  if (by != IndexedBy::kLines && by != IndexedBy::kPoints) return false;
   uint64_t items = 0;
   for (size_t i = 0; i < slots.size(); ++i) {
     const Slot& slot = slots_[slots[i]];
-    if (slot.indexed_by != IndexedBy::kLines || entries[i].layer != entries[0].layer) return false;
+    if (slot.indexed_by != by || entries[i].layer != entries[0].layer) return false;
     items += slot.items;
   }
-  return items > 0 && items <= kMostFewLines;
+  return items > 0 && items <= (by == IndexedBy::kLines ? kMostFewLines : kMostFewPoints);
 }
 
 absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
@@ -301,8 +306,9 @@ absl::Status CudaVolume::Enter() {
   bool uploads = false;
   absl::Status status;
   uint32_t singular = 0;
-  uint64_t coming[3] = {};  // items, by index
-  absl::flat_hash_set<uint32_t> layers[] = {{}, lines_.Layers(), triangles_.Layers()};  // by index
+  uint64_t coming[4] = {};  // items, by index
+  absl::flat_hash_set<uint32_t> layers[4];  // by index
+  for (const IndexedBy by : kByRegion) layers[static_cast<size_t>(by)] = IndexOf(by).Layers();
   for (const Drawable* drawable : drawables) {
     const uint32_t slot = TakeSlot();
     WorkedOut& mine = worked_out.emplace_back();
@@ -351,9 +357,9 @@ absl::Status CudaVolume::Enter() {
     const absl::Status waited = device_.Wait();
     if (status.ok()) status = waited;
   }
-  const bool few_lines = status.ok() && AreFewLines(slots, entries);
+  const bool few = status.ok() && AreFew(slots, entries);
   if (status.ok()) status = GrowTable();
-  if (status.ok() && !few_lines) status = PutDrawables(slots, entries);
+  if (status.ok() && !few) status = PutDrawables(slots, entries);
   if (status.ok()) status = FindImplicit();
   if (!status.ok()) {
     for (const uint32_t taken : slots) slots_[taken] = {};
@@ -368,14 +374,15 @@ absl::Status CudaVolume::Enter() {
     pairs.push_back({slots[i], entries[i].layer, slot.items});
     live_items_ += slot.items;
   }
-  if (few_lines) {
-    const FewEntries few = FewOf(slots, entries);
-    status = EnterRegions(IndexedBy::kLines, drawables, slots, &few);
+  if (few) {
+    const FewEntries them = FewOf(slots, entries);
+    status = EnterRegions(slots_[slots[0]].indexed_by, drawables, slots, &them);
   } else {
     status = EnterCrowds(drawables, slots, formed, pairs);
     if (status.ok()) status = EnterPairs(pairs);
-    if (status.ok()) status = EnterRegions(IndexedBy::kLines, drawables, slots, nullptr);
-    if (status.ok()) status = EnterRegions(IndexedBy::kTriangles, drawables, slots, nullptr);
+    for (const IndexedBy by : kByRegion) {
+      if (status.ok()) status = EnterRegions(by, drawables, slots, nullptr);
+    }
   }
   if (!status.ok()) {
     // They go again, and come anew with the next frame.
@@ -424,7 +431,7 @@ absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* co
     arriving.drawn = drawable.layer->drawn;
     arriving.regions_each = std::max(arriving.regions_each, slot.regions_each);
     const GeometryRecord& record = drawable.geometry->view.record;
-    arriving.mixed |= record.kind != PrimitiveKind::kPoints &&
+    arriving.mixed |= by != IndexedBy::kPoints && record.kind != PrimitiveKind::kPoints &&
                       record.color_mode == ColorMode::kPerVertex && drawable.record.erase == 0;
   }
   for (const auto& [layer, groups] : layers) {

@@ -19,7 +19,8 @@ int AxisToCut(const int32_t lo[3], const int32_t hi[3]) {
 }  // namespace
 
 uint64_t CudaVolume::CountDeferred(const Seen& seen) const {
-  return index_.CountDeferred(seen) + lines_.CountDeferred(seen) + triangles_.CountDeferred(seen);
+  return index_.CountDeferred(seen) + lines_.CountDeferred(seen) + points_.CountDeferred(seen) +
+         triangles_.CountDeferred(seen);
 }
 
 absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to, cudaStream_t stream) {
@@ -38,15 +39,18 @@ absl::Status CudaVolume::DrawListed(DrawView& view, DrawTo to, cudaStream_t stre
 absl::StatusOr<bool> CudaVolume::SortPass(const RegionGrid& pass, const Seen& seen, bool some) {
   absl::StatusOr<bool> lines = lines_.SortWithin(pass, seen, some);
   if (!lines.ok() || (!*lines && !some)) return lines;
+  absl::StatusOr<bool> points = points_.SortWithin(pass, seen, some);
+  if (!points.ok() || (!*points && !some)) return points;
   absl::StatusOr<bool> triangles = triangles_.SortWithin(pass, seen, some);
   if (!triangles.ok() || (!*triangles && !some)) return triangles;
   absl::StatusOr<bool> pairs = index_.SortWithin(table_.as<TableEntry>(), tiles_.view(), pass);
   if (!pairs.ok()) return pairs;
-  return *lines && *triangles && *pairs;
+  return *lines && *points && *triangles && *pairs;
 }
 
 void CudaVolume::EndPass() {
   lines_.EndPass();
+  points_.EndPass();
   triangles_.EndPass();
   index_.EndPass();
 }
@@ -96,6 +100,7 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Seen
     view.pairs = index_.view();
     view.unlisted = index_.unlisted();
     view.lines = lines_.view();
+    view.points = points_.view();
     view.triangles = triangles_.view();
     view.list = list->as<uint32_t>();
     view.listed = &picked_there->count;

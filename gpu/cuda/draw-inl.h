@@ -6,26 +6,31 @@
 
 #include "gpu/cuda/flush-inl.h"
 #include "gpu/cuda/pairs-inl.h"
+#include "gpu/cuda/points-inl.h"
 #include "gpu/cuda/spans-inl.h"
 #include "gpu/cuda/triangles-inl.h"
 #include "gpu/cuda/unsorted-inl.h"
 
 namespace voxeld::gpu::cuda {
 
-// What a drawing has to reckon with: thin lines and small triangles that have lists, of one layer that
+// What a drawing has to reckon with: thin lines, points and small triangles that have lists, of one layer that
 // is seen as it is; of any layers; or anything.
 enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 
 template <DrawWhat kWhat>
 struct DrawScratch {
   RegionScratch region;
-  SpanScratch spans;
+  union {  // one after the other
+    SpanScratch spans;
+    PointScratch points;
+  };
 };
 template <>
 struct DrawScratch<DrawWhat::kAll> {
   RegionScratch region;
   union {  // one after the other
     SpanScratch spans;
+    PointScratch points;
     PairScratch pairs;
   };
   PairRows rows;
@@ -148,6 +153,16 @@ __device__ void RaiseLayer(const DrawView& view, DrawScratch<kWhat>& all) {
     }
     DrawSpans(batch);
   }
+  for (uint32_t left = scratch.point_batches; left != 0; left &= left - 1) {
+    const PointBatchView& batch = view.points.batches[__ffs(static_cast<int>(left)) - 1];
+    if constexpr (kWhat == DrawWhat::kAll) {
+      if (batch.records == nullptr) {
+        DrawUnsortedPoints(batch.points, batch.count);
+        continue;
+      }
+    }
+    DrawPoints(batch);
+  }
   for (uint32_t left = scratch.triangle_batches; left != 0; left &= left - 1) {
     DrawTriangles<kWhat != DrawWhat::kAll>(
         view, static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1);
@@ -258,6 +273,7 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
     if (kWhat == DrawWhat::kOneLayer && !view.clipped) {
       // All batches are of the layer.
       for (uint32_t b = 0; b < view.lines.count; ++b) DrawSpans(view.lines.batches[b]);
+      for (uint32_t b = 0; b < view.points.count; ++b) DrawPoints(view.points.batches[b]);
       for (uint32_t b = 0; b < view.triangles.count; ++b) {
         if (view.triangles.batches[b].Has<true>(region)) DrawTriangles<true>(view, b);
       }

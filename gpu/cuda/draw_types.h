@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "gpu/clip.h"
+#include "gpu/cuda/point_types.h"
 #include "gpu/cuda/triangle_types.h"
 
 namespace voxeld::gpu::cuda {
@@ -51,6 +52,7 @@ struct DrawView {
   BatchList pairs;
   UnlistedItems unlisted;
   LineBatchList lines;
+  PointBatchList points;
   TriangleBatchList triangles;
   VolumeView volume;
   RegionGrid regions;
@@ -64,7 +66,8 @@ struct DrawView {
   // Where several layers are drawn: for each block of threads, colours of a region's voxels. Null: of one.
   uint32_t* below = nullptr;
 };
-static_assert(sizeof(DrawView) <= 4096, "arguments have 4 KB");
+// Of devices of compute capability 7.0 and later, since CUDA 12.1.
+static_assert(sizeof(DrawView) <= 32764, "arguments have 32 KB");
 
 // Regions that were picked from a list: how many, and the box of their blocks.
 struct PickedRegions {

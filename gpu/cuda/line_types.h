@@ -44,6 +44,40 @@ struct RegionGrid {
     }
     return true;
   }
+  VOXELD_HD bool DrawsAll() const {
+    bool all = true;
+    for (int a = 0; a < 3; ++a) all &= drawn_lo[a] == 0 && drawn_hi[a] == blocks[a];
+    return all;
+  }
+  VOXELD_HD bool Draws(uint32_t region) const {
+    int32_t block[3];
+    BlockCoordinates(region / kRegionsInBlock, block);
+    return DrawsBlock(block);
+  }
+  // Regions that are drawn, and the number of one of them among these; of a block of such, its own number.
+  VOXELD_HD uint32_t drawn_count() const {
+    uint32_t count = kRegionsInBlock;
+    for (int a = 0; a < 3; ++a) count *= static_cast<uint32_t>(drawn_hi[a] - drawn_lo[a]);
+    return count;
+  }
+  VOXELD_HD uint32_t NumberDrawn(uint32_t region) const {
+    if (DrawsAll()) return region;
+    int32_t at[3];
+    BlockCoordinates(region / kRegionsInBlock, at);
+    for (int a = 0; a < 3; ++a) at[a] -= drawn_lo[a];
+    const int32_t nx = drawn_hi[0] - drawn_lo[0], ny = drawn_hi[1] - drawn_lo[1];
+    return static_cast<uint32_t>((at[2] * ny + at[1]) * nx + at[0]) * kRegionsInBlock +
+           region % kRegionsInBlock;
+  }
+  VOXELD_HD uint32_t DrawnBlock(uint32_t number) const {
+    if (DrawsAll()) return number;
+    const uint32_t nx = static_cast<uint32_t>(drawn_hi[0] - drawn_lo[0]),
+                   ny = static_cast<uint32_t>(drawn_hi[1] - drawn_lo[1]);
+    const int32_t at[3] = {drawn_lo[0] + static_cast<int32_t>(number % nx),
+                           drawn_lo[1] + static_cast<int32_t>(number / nx % ny),
+                           drawn_lo[2] + static_cast<int32_t>(number / nx / ny)};
+    return BlockAt(at);
+  }
   VOXELD_HD uint32_t BlockAt(const int32_t at[3]) const {
     return static_cast<uint32_t>((at[2] * blocks[1] + at[1]) * blocks[0] + at[0]);
   }

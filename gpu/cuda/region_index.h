@@ -96,6 +96,7 @@ class RegionIndex {
     Block items, colors;  // `colors` only if mixed
     // By region, as the kind has it.
     Block begin, base, offsets, regions, spans;
+    RegionGrid within;  // what the lists are of, where their kind wants to know
     // There was no room for all that: of it there is `regions`, at the most.
     bool deferred = false;
     // Bytes that the lists took, or would have taken at least; and with what was needed to make them.

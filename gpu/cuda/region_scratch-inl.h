@@ -43,13 +43,13 @@ struct LayerWanted {
 struct RegionScratch {
   // 0 whenever the drawing of a region begins: who writes it out leaves it so.
   alignas(16) uint32_t words[kRegionVoxels];
-  uint32_t line_batches, triangle_batches;  // bits: those of the layer under way
-  uint32_t layer;                           // its slot; kAllLanes: no more
-  uint32_t cutting;                         // bits: which of its half-spaces cut the region
-  uint32_t outside;                         // not 0: all of the region lies outside one of them
-  uint32_t region;                          // kAllLanes: there is none any more
-  uint32_t place;                           // in the list, of the one after it
-  alignas(16) uint32_t least[64];           // PackedView::least of the first sub-frame
+  uint32_t line_batches, point_batches, triangle_batches;  // bits: those of the layer under way
+  uint32_t layer;                  // its slot; kAllLanes: no more
+  uint32_t cutting;                // bits: which of its half-spaces cut the region
+  uint32_t outside;                // not 0: all of the region lies outside one of them
+  uint32_t region;                 // kAllLanes: there is none any more
+  uint32_t place;                  // in the list, of the one after it
+  alignas(16) uint32_t least[64];  // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
   uint32_t pairs;                 // not 0: the layer has some here, or items that are not listed
@@ -68,6 +68,13 @@ struct SpanScratch {
   uint32_t segments, spans_found;
 };
 
+// What points are drawn with: rows of records that are more than a thread draws by itself.
+struct PointScratch {
+  const PlacedPoint* from[kDrawThreads];
+  uint32_t count[kDrawThreads];
+  uint32_t segments;
+};
+
 // What a block of threads draws, first in its shared memory; and behind it, what for.
 __device__ inline unsigned char* SharedMemory() {
   extern __shared__ __align__(16) unsigned char shared_memory[];
@@ -83,6 +90,10 @@ __device__ inline Scratch& SharedBehind() {
   return *reinterpret_cast<Scratch*>(SharedMemory() + sizeof(RegionScratch));
 }
 __device__ inline SpanScratch& SharedSpans() { return SharedBehind<SpanScratch>(); }
+
+__device__ inline PointScratch& SharedPoints() {
+  return *reinterpret_cast<PointScratch*>(SharedMemory() + sizeof(RegionScratch));
+}
 
 // Of the layer under way: rows of pairs, of a tile and a batch each.
 struct PairRows {
@@ -204,7 +215,8 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
     }
     return look.rank;
   };
-  const int32_t line_rank = rank_here(view.lines), triangle_rank = rank_here(view.triangles);
+  const int32_t line_rank = rank_here(view.lines), point_rank = rank_here(view.points),
+                triangle_rank = rank_here(view.triangles);
   const int32_t mine = least;
   for (int lanes = 16; lanes > 0; lanes /= 2) {
     least = Min(least, __shfl_xor_sync(kAllLanes, least, lanes));
@@ -222,11 +234,13 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
   }
   const uint32_t any_pairs = __ballot_sync(kAllLanes, pairs);
   const uint32_t lines = __ballot_sync(kAllLanes, line_rank == least && least != kNone);
+  const uint32_t points = __ballot_sync(kAllLanes, point_rank == least && least != kNone);
   const uint32_t triangles = __ballot_sync(kAllLanes, triangle_rank == least && least != kNone);
   if (lane == 0) {
     scratch.layer = kAllLanes;
     scratch.pairs = any_pairs;
     scratch.line_batches = lines;
+    scratch.point_batches = points;
     scratch.triangle_batches = triangles;
   }
   __syncwarp();

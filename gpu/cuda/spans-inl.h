@@ -35,6 +35,10 @@ class RegionWords {
   __device__ void Raise(const ThinCursor& cursor, uint32_t word) const {
     asm volatile("red.shared.max.u32 [%0], %1;" ::"r"(At(cursor)), "r"(word) : "memory");
   }
+  // By its place in the region.
+  __device__ void RaiseAt(uint32_t voxel, uint32_t word) const {
+    asm volatile("red.shared.max.u32 [%0], %1;" ::"r"(at_ + voxel * 4), "r"(word) : "memory");
+  }
   // If kLess < count.
   template <uint32_t kLess>
   __device__ void RaiseIf(uint32_t count, const ThinCursor& cursor, uint32_t word) const {
@@ -53,8 +57,9 @@ class RegionWords {
 #else
   __device__ explicit RegionWords(uint32_t* words) : words_(words) {}
   __device__ void Raise(const ThinCursor& cursor, uint32_t word) const {
-    atomicMax(&words_[IndexOf(cursor)], word);
+    RaiseAt(IndexOf(cursor), word);
   }
+  __device__ void RaiseAt(uint32_t voxel, uint32_t word) const { atomicMax(&words_[voxel], word); }
   template <uint32_t kLess>
   __device__ void RaiseIf(uint32_t count, const ThinCursor& cursor, uint32_t word) const {
     if (count > kLess) Raise(cursor, word);

@@ -36,11 +36,13 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few) {
   cuda::Tuning groups;
   groups.few_items = 0;
   groups.group_bytes = 1;
-  groups.few_lines = 0;
+  groups.few_lines = groups.few_points = 0;
+  groups.points_each = 1;
   groups.least_crowd = 1;
   groups.compile_formulas = cuda::CompileFormulas::kNever;
   // With no list at all; and with none that stays.
   cuda::Tuning tight = groups, passes = groups;
+  passes.points_each = 4;
   tight.index_bytes = 1;
   passes.index_bytes = 1 << 20;
   passes.index_share_kept = 0;

@@ -82,6 +82,13 @@ void PutTriangles(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t trian
   g.record.vertex_count = 3 * triangles;
 }
 
+// Ends of such lines.
+void PutPoints(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t points,
+               const display::VoxelGrid& grid) {
+  PutLines(scene, id, layer, points / 2, 20, grid);
+  scene.geometries[id].record.kind = PrimitiveKind::kPoints;
+}
+
 // Thick ones: in pairs with the tiles that they touch.
 void PutCapsules(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t lines, float length,
                  const display::VoxelGrid& grid) {
@@ -143,6 +150,15 @@ const Kind kKinds[] = {
      {1, 200'000, 400'000, 1'000'000, 3'000'000},
      3'000'000,
      7},
+    {"points",
+     [](SceneModel& scene, const display::VoxelGrid& grid) {
+       PutPoints(scene, 1, 1, 20'000, grid);
+       PutPoints(scene, 2, 2, 4'000, grid);
+     },
+     200,
+     {1, 20'000, 60'000, 110'000, 150'000},
+     150'000,
+     4},
     {"triangles",
      [](SceneModel& scene, const display::VoxelGrid& grid) {
        PutTriangles(scene, 1, 1, 4'000, 50, grid);
@@ -168,6 +184,7 @@ const Kind kKinds[] = {
        PutTriangles(scene, 2, 2, 2'000, 30, grid);
        PutCapsules(scene, 3, 2, 200, 30, grid);
        PutBall(scene, 4, 1, 70, 60, 60, 40);
+       PutPoints(scene, 5, 2, 4'000, grid);
      },
      100,
      {1, 50'000, 100'000, 300'000},
@@ -267,6 +284,53 @@ TEST(ListBudget, SomeLinesWithinItAndSomeNot) {
   last.Drop(Op::kDropDrawable, 3);
   ASSERT_TRUE(engine.Apply(last).ok());
   expect("without those in front");
+}
+
+// Points whose lists do not fit leave, one drawable after the other, and have room at last.
+TEST(ListBudget, PointsThatLeaveUntilTheyFit) {
+  const Target target = StackOf(150, 140, 150);
+  SceneModel scene;
+  constexpr uint64_t kClouds = 8;
+  for (uint64_t id = 1; id <= kClouds; ++id) {
+    PutPoints(scene, id, 1 + id % 2, 4'000, target.geometry.grid);
+  }
+  for (const uint32_t each : {1u, 4u, 16u}) {
+    SCOPED_TRACE(std::to_string(each) + " a thread");
+    SceneModel left = scene;
+    EngineDriver engine(CaseWith({.few_items = 0, .points_each = each, .index_bytes = 200'000}),
+                        {.threads = 1});
+    ASSERT_TRUE(engine.SetTarget(target).ok());
+    DeltaBuffer delta;
+    delta.PutWhole(left);
+    for (uint64_t id = kClouds;; --id) {
+      SCOPED_TRACE(std::to_string(id) + " clouds");
+      ASSERT_TRUE(engine.Apply(delta).ok());
+      const Drawn want(left, target);
+      const absl::StatusOr<FrameResult> frame = engine.Frame();
+      ASSERT_TRUE(frame.ok()) << frame.status();
+      EXPECT_TRUE(engine.pictures() == want.pictures);
+      EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+      if (id == 0) break;
+      left.drawables.erase(id);
+      delta = {};
+      delta.Drop(Op::kDropDrawable, id);
+    }
+  }
+}
+
+// There they go with the thin lines.
+TEST(ListBudget, PointsInMoreRegionsThanCanBeSorted) {
+  const Target target = StackOf(8192, 4096, 1);  // 131,072
+  SceneModel scene;
+  PutPoints(scene, 1, 1, 3'000, target.geometry.grid);
+  const Drawn want(scene, target);
+  EngineDriver engine(CaseWith({}), {.threads = 1});
+  ASSERT_TRUE(engine.SetTarget(target).ok());
+  ASSERT_TRUE(engine.Apply(want.delta).ok());
+  const absl::StatusOr<FrameResult> frame = engine.Frame();
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_GT(frame->lit_voxels, 0u);
+  EXPECT_TRUE(engine.pictures() == want.pictures);
 }
 
 TEST(ListBudget, SomeTrianglesAndPairsWithinItAndSomeNot) {
