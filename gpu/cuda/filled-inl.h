@@ -7,27 +7,28 @@
 
 namespace voxeld::gpu::cuda {
 
-// box: of the region's voxels.
+// box: the region's voxels, or some of them.
 static __device__ __noinline__ void DrawFilled(const TableEntry& entry, const Box3& box) {
   static_assert(RegionBits(0) == 5 && RegionBits(1) == 5 && kDrawWarps == 1u << RegionBits(2));
   const Source& source = entry.source;
   const Box3 part = Intersect(box, source.solid.bounds);
   if (IsEmpty(part)) return;  // the same for every thread
   const uint32_t lane = threadIdx.x % 32, plane = threadIdx.x / 32;
-  const int32_t y = box.lo[1] + static_cast<int32_t>(lane),
-                z = box.lo[2] + static_cast<int32_t>(plane);
+  int32_t at[3];  // the region's first voxel
+  for (int a = 0; a < 3; ++a) at[a] = box.lo[a] & -(1 << RegionBits(a));
+  const int32_t y = at[1] + static_cast<int32_t>(lane), z = at[2] + static_cast<int32_t>(plane);
   uint32_t row = 0;  // bit i: voxel i along x
   if (Contains(part, part.lo[0], y, z)) {
-    const uint32_t first = static_cast<uint32_t>(part.lo[0] - box.lo[0]),
-                   beyond = static_cast<uint32_t>(32 - (part.hi[0] - box.lo[0]));
+    const uint32_t first = static_cast<uint32_t>(part.lo[0] - at[0]),
+                   beyond = static_cast<uint32_t>(32 - (part.hi[0] - at[0]));
     row = Filled::InsideAround(source, part.lo[0], y, z) & kAllLanes << first & kAllLanes >> beyond;
   }
   const uint32_t word = MakeWord(entry.priority, entry.erase != 0, source.UniformColor());
-  uint32_t* const at = SharedRegion().words + (plane << 10 | lane);
+  uint32_t* const words = SharedRegion().words + (plane << 10 | lane);
   for (uint32_t left = __ballot_sync(kAllLanes, row != 0); left != 0; left &= left - 1) {
     const uint32_t r = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
     if ((__shfl_sync(kAllLanes, row, r) >> lane & 1) == 0) continue;
-    at[r << 5] = Max(at[r << 5], word);  // nobody else has this voxel now
+    words[r << 5] = Max(words[r << 5], word);  // nobody else has this voxel now
   }
   __syncthreads();
 }

@@ -203,7 +203,12 @@ __device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, 
         DrawSamples(entry, box);
         break;
       case PrimitiveKind::kFilled:
-        if (!IsListedBefore(scratch, i)) DrawFilled(entry, RegionAround(grid, scratch.tiles[i]));
+        // All that the region has at once, unless it takes a look at all triangles.
+        if (entry.source.inside == nullptr) {
+          DrawFilled(entry, box);
+        } else if (!IsListedBefore(scratch, i)) {
+          DrawFilled(entry, RegionAround(grid, scratch.tiles[i]));
+        }
         break;
       default:
         break;
