@@ -96,8 +96,8 @@ struct GeometryRecord {
   Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder, kImplicit, kSamples
   Topology topology = Topology::kList;          // kSegments, kCurves
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  // Diameter of points and segments, of surfaces of kImplicit and kSamples their thickness; 0: one voxel. kUnits:
-  // scaled by ∛|det| of the map.
+  // Diameter of points and segments, of surfaces of kTriangles, kPatches, kImplicit and kSamples
+  // their thickness; 0: one voxel. kUnits: scaled by ∛|det| of the map.
   float thickness = 0;
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand

@@ -133,7 +133,9 @@ MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
   bool framed;
   if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
-  if (in.has_texture() && (framed || out->record.fill != gpu::Fill::kSurface)) {
+  const bool surface = !framed && out->record.fill == gpu::Fill::kSurface;
+  if (auto fault = ToShell(path, in.shell(), surface, context, &out->record)) return fault;
+  if (in.has_texture() && !surface) {
     return Fault{FieldPath(path, "texture").ToString(), Reason::kInvalidValue,
                  "is given, but only a surface takes one; leave it out, or fill"};
   }

@@ -138,6 +138,9 @@ void AddSurfaces(std::vector<Named>& all) {
                                               {"textured mesh", textured}}) {
       g.record.rule = rule;
       all.emplace_back(name, g);
+      if (g.record.kind == PrimitiveKind::kFilled) continue;
+      g.record.thickness = 3.3F;
+      all.emplace_back("thick " + name, g);
     }
   }
 }

@@ -30,6 +30,8 @@ class Curves(unittest.TestCase):
         self.assertEqual((ellipse.axis_a.x, ellipse.axis_b.y, ellipse.sweep), (2, 1, 0))
         helix = parsed(curves.helix((0, 0, 0), (0, 0, 3), 1, -2, end_radius=0, width=1)).helix
         self.assertEqual((helix.end.z, helix.turns, helix.HasField("end_radius")), (3, -2, True))
+        thick = parsed(curves.bezier_surface(np.zeros((4, 4, 3)), shell=2)).bezier_surface
+        self.assertEqual(thick.shell.value, 2)
         surface = parsed(curves.bezier_surface(np.zeros((2, 4, 4, 3)))).bezier_surface
         self.assertEqual(surface.vertices.count, 32)
         arrow = parsed(curves.arrow((0, 0, 0), (1, 0, 0), head_length=0.5, fill="solid")).arrow

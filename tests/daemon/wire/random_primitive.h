@@ -42,8 +42,8 @@ class RandomPrimitives {
       }
       case 2:
         *primitive.mutable_mesh()->mutable_vertices() = Corners(3 * (1 + random_() % most), true);
-        primitive.mutable_mesh()->set_rule(Rule());
         if (random_() % 4 == 0) SetTexture(primitive.mutable_mesh());
+        SetShell(primitive.mutable_mesh());
         break;
       case 3:
         SetVec3(primitive.mutable_box()->mutable_center(), Coordinate(), Coordinate(),
@@ -141,7 +141,7 @@ class RandomPrimitives {
         if (random_() % 2 == 0)
           map->set_colors(Values<uint8_t>(3 * samples, [&] { return random_(); }));
         if (random_() % 4 == 0) map->set_picture(Picture());
-        return map->set_rule(Rule());
+        return SetShell(map);
       }
       case 0:
         SetPoint(out->mutable_ellipsoid()->mutable_center());
