@@ -197,7 +197,7 @@ struct Instance {
 };
 
 // Colours by numbers, from one end of a row of colours to the other. Along a direction for all but Implicit, which has a level,
-// volumes, isosurfaces and instances; numbers for what has vertices, or samples of heights.
+// volumes and instances; numbers for what has vertices, or samples of heights.
 struct ColorScale {
   std::string colormap;       // a name of matplotlib's, as "viridis";
   std::vector<Color> colors;  // or 2 to 256 colours, evenly apart

@@ -92,6 +92,8 @@ class Curves(unittest.TestCase):
         self.assertEqual((list(shape.transfer.values), list(shape.transfer.colors)), ([0, 10, 23], [0, 0xFF0000, 0xFFFFFF]))
         colored = parsed(grids.grid(np.zeros((2, 2, 2, 4), np.uint8))).volume
         self.assertEqual((colored.grid.type, len(colored.grid.samples)), (pb.ELEMENT_TYPE_RGBA8, 32))
+        scaled = parsed(grids.isosurface(field, 11.5, color=voxel.Gradient("plasma", along=(0, 1, 0)))).color_scale
+        self.assertEqual((scaled.colormap, scaled.along.y), ("plasma", 1))
         surface = parsed(grids.isosurface(field.astype(float), 11.5, fill="solid", extent=((0, 0, 0), (1, 2, 3)))).isosurface
         self.assertEqual((surface.level, surface.fill, surface.grid.edge_b.y), (11.5, pb.FILL_SOLID, 2))
         self.assertEqual(surface.grid.type, pb.ELEMENT_TYPE_F32)

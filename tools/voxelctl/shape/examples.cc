@@ -155,7 +155,8 @@ constexpr ShapeExample kExamples[] = {
     {"isosurface",
      "isosurface level=0.4 grid.corner=-0.9,-0.9,-0.9 grid.edge_a=1.8,0,0 grid.edge_b=0,1.8,0 "
      "grid.edge_c=0,0,1.8 "
-     "grid.size_a=6 grid.size_b=6 grid.size_c=6 color=pink grid.samples="
+     "grid.size_a=6 grid.size_b=6 grid.size_c=6 color_scale.along=0,0,1 "
+     "color_scale.colormap=plasma grid.samples="
      ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.1,.2,.2,.2,.2,.1,.1,.2,.3,.4,.5,.2,.0,.1,.1,.3,.3,.1,.0,"
