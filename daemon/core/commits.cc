@@ -227,11 +227,10 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   CommitResult result = store_.Apply(author, std::move(commit.operations), now,
                                      session.options.strict, refusals.refused());
   std::string first = refusals.first();
-  if (first.empty() && !result.issues.empty()) {
-    const Issue& issue = result.issues.front();
-    first = absl::StrFormat("%s: %s", issue.field, issue.message);
-  }
   for (const Issue& issue : result.issues) {
+    if (first.empty() && !issue.applied) {
+      first = absl::StrFormat("%s: %s", issue.field, issue.message);
+    }
     refusals.Tell(issue, session.sink.get(), limits.max_issues_per_commit);
   }
   refusals.LeaveOut(result.more_issues);
