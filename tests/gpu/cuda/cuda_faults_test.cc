@@ -78,7 +78,9 @@ void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
 const Way kWays[] = {{"plain", kEvery, {}},
                      {"passes",
                       kEvery == 1 ? 11 : 2 * kEvery,
-                      {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1 << 16}}};
+                      {.few_items = 0, .group_bytes = 1, .few_lines = 0, .index_bytes = 1 << 16}},
+                     // Layers of solids are moved by the device, however few.
+                     {"crowds", kEvery == 1 ? 7 : 2 * kEvery, {.least_crowd = 2}}};
 
 class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:
