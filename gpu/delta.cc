@@ -61,11 +61,6 @@ absl::Status FirstError(std::initializer_list<absl::Status> statuses) {
   return absl::OkStatus();
 }
 
-bool IsSolid(PrimitiveKind kind) {
-  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
-         kind == PrimitiveKind::kCylinder;
-}
-
 absl::Status CheckSizes(const Checker& check, const GeometryRecord& g) {
   const int first = 3;
   const int count = g.kind == PrimitiveKind::kBox ? 3 : g.kind == PrimitiveKind::kSphere ? 1 : 2;

@@ -26,6 +26,7 @@
 #include "absl/status/status.h"
 #include "gpu/affine.h"
 #include "gpu/bulk/bulk_block.h"
+#include "gpu/portable.h"
 
 namespace voxeld::gpu {
 
@@ -51,9 +52,16 @@ enum class PrimitiveKind : uint32_t {
                    // with params[6] = 1 only from params[0..2] to params[3..5]
   kCurves = 8,  // cubic Béziers: list (4 points each) or strip (they share ends), drawn as segments
   kPatches = 9,   // bicubic Béziers: 16 points each, along u first, drawn as triangles
-  kSamples = 10,  // a grid of samples (primitives/samples.h), which the indices hold; no positions
+  kSamples = 10,  // a grid of samples (primitives/samples.h), which the indices hold; no positions;
+                  // of a surface coloured by its place params[0..3] say how
   kFilled = 11,   // what triangles enclose (primitives/filled.h), indexed or not; of one colour
 };
+
+// Worked out through the inverse of its map, and kept in its parameters alone.
+VOXELD_HD constexpr bool IsSolid(PrimitiveKind kind) {
+  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
+         kind == PrimitiveKind::kCylinder;
+}
 
 // Made of control points, and cut into straight pieces where it is drawn (gpu/curves/).
 constexpr bool IsCurved(PrimitiveKind kind) {
@@ -96,8 +104,8 @@ struct GeometryRecord {
   Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder, kImplicit, kSamples
   Topology topology = Topology::kList;          // kSegments, kCurves
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  // Diameter of points and segments, of surfaces of kImplicit and kSamples their thickness; 0: one voxel. kUnits:
-  // scaled by ∛|det| of the map.
+  // Diameter of points and segments, of surfaces of kTriangles, kPatches, kImplicit and kSamples
+  // their thickness; 0: one voxel. kUnits: scaled by ∛|det| of the map.
   float thickness = 0;
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand

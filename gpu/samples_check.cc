@@ -31,8 +31,8 @@ absl::Status CheckSamples(std::span<const uint32_t> words) {
   if (static_cast<uint32_t>(head.filter) > 1) {
     return wrong("filter", static_cast<uint32_t>(head.filter), "0 or 1");
   }
-  if (head.by_level > 1) return wrong("by_level", head.by_level, "0 or 1");
-  if (head.by_level == 1 && head.format == SampleFormat::kRgba8) {
+  if (head.by_level > 2) return wrong("by_level", head.by_level, "0 to 2");
+  if (head.by_level != 0 && head.format == SampleFormat::kRgba8) {
     return wrong("by_level", head.by_level, "0 for colours");
   }
   if (!std::isfinite(head.low) || !std::isfinite(head.scale) || !std::isfinite(head.level)) {

@@ -19,14 +19,14 @@ PICTURES = "images/primitives"
 _SOLID, _FIELD, _CURVE = ["solid.h", "solid_voxels.h"], ["../implicit/field.h"], ["../curves/cut.h"]
 HEADERS_OF = {
     "Segments": ["segments.h", "line.h", "capsule.h"],
-    "Mesh": ["triangle.h", "filled.h", "texture.h"],
+    "Mesh": ["triangle.h", "thick_triangle.h", "filled.h", "texture.h"],
     "Box": ["box.h", *_SOLID], "Sphere": ["sphere.h", *_SOLID], "Cylinder": ["cylinder.h", *_SOLID],
     "Implicit": ["implicit.h", *_FIELD],
     **{shape: [f"{shape.lower()}.h", *_FIELD]
        for shape in ("Ellipsoid", "Torus", "Cone", "Parallelepiped", "Disc", "Patch", "Polygon", "Arrow")},
-    "HeightMap": ["../../daemon/wire/height_map.h", "triangle.h"],
+    "HeightMap": ["../../daemon/wire/height_map.h", "triangle.h", "thick_triangle.h"],
     "Curve": ["spline.h", *_CURVE], "Arc": _CURVE, "Ellipse": _CURVE, "Helix": ["helix.h", *_CURVE],
-    "BezierSurface": [*_CURVE, "triangle.h"],
+    "BezierSurface": [*_CURVE, "triangle.h", "thick_triangle.h"],
     "Text": ["../../daemon/wire/text.h"],
     "Volume": ["samples.h"], "Isosurface": ["samples.h"],
     "Instance": [],

@@ -85,6 +85,10 @@ class CommitApplier {
   // What is wrong with `in_layer` on some display; nothing if it is in range on all.
   std::optional<std::string> OutOfRange(const gpu::Affine& layer_transform,
                                         const Bounds& in_layer) const;
+  // Tells it where an entity, which has been put or moved, may be drawn coarser than its curves'
+  // error on some display.
+  void TellIfCoarse(const Operation& operation, const std::string& layer, const std::string& id,
+                    const EntityData& entity, const char* field);
   // What is wrong if the author came to draw `drawables` and hold `bytes`;
   // nothing if quotas allow it.
   std::optional<std::string> OverQuota(uint64_t drawables, uint64_t bytes) const;

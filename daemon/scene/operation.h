@@ -16,6 +16,7 @@
 #include "daemon/scene/clip.h"
 #include "display/sync/clock.h"
 #include "gpu/affine.h"
+#include "gpu/curves/cut_need.h"
 #include "gpu/delta.h"
 #include "gpu/geometry_arrays.h"
 
@@ -120,6 +121,7 @@ struct GeometryData {
   // as it was sent.
   const char* kind = nullptr;
   std::string as_sent;
+  gpu::CutNeed need;  // of curves and patches
 
   uint64_t bytes() const {
     return sizeof(*this) + as_sent.size() + arrays.positions().size_bytes() +

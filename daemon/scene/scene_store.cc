@@ -32,7 +32,7 @@ CommitResult SceneStore::Apply(const Author& author, std::vector<Operation> oper
   applier.End();
 
   result.issues = applier.refusals().issues;
-  result.more_issues = applier.refusals().more;
+  result.more_issues = applier.refusals().more + applier.refusals().more_applied;
   result.refused_operations = applier.refused() + refused_before;
   result.abandoned = abandoned_;
   if (result.abandoned || (strict && result.refused_operations > 0)) return result;

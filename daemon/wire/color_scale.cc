@@ -19,25 +19,6 @@ namespace {
 
 using gpu::implicit::Vector;
 
-MaybeFault ToTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* out) {
-  std::optional<ColorTable> map;
-  if (auto fault = ToColorRow(path, in.colormap(), in.colors(), &map)) return fault;
-  if (map.has_value()) {
-    *out = *map;
-    return {};
-  }
-  if (in.colors_size() < 2 || in.colors_size() > 256) {
-    return Fault{FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
-                 absl::StrCat("has ", in.colors_size(), "; give 2 to 256")};
-  }
-  for (size_t i = 0; i < out->size(); ++i) {
-    const double place = static_cast<double>(i) / 255 * (in.colors_size() - 1);
-    const int first = std::min(static_cast<int>(place), in.colors_size() - 2);
-    (*out)[i] = gpu::curves::MixColors(in.colors(first), in.colors(first + 1), place - first);
-  }
-  return {};
-}
-
 MaybeFault ToEnds(const FieldPath& path, const v1::ColorScale& in) {
   if (auto fault = CheckFloat(FieldPath(path, "low"), in.low())) return fault;
   if (auto fault = CheckFloat(FieldPath(path, "high"), in.high())) return fault;
@@ -63,10 +44,29 @@ MaybeFault ToAlong(const FieldPath& path, const v1::ColorScale& in, Vector* out)
 
 }  // namespace
 
+MaybeFault ToScaleTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* out) {
+  std::optional<ColorTable> map;
+  if (auto fault = ToColorRow(path, in.colormap(), in.colors(), &map)) return fault;
+  if (map.has_value()) {
+    *out = *map;
+    return {};
+  }
+  if (in.colors_size() < 2 || in.colors_size() > 256) {
+    return Fault{FieldPath(path, "colors").ToString(), Reason::kSizeMismatch,
+                 absl::StrCat("has ", in.colors_size(), "; give 2 to 256")};
+  }
+  for (size_t i = 0; i < out->size(); ++i) {
+    const double place = static_cast<double>(i) / 255 * (in.colors_size() - 1);
+    const int first = std::min(static_cast<int>(place), in.colors_size() - 2);
+    (*out)[i] = gpu::curves::MixColors(in.colors(first), in.colors(first + 1), place - first);
+  }
+  return {};
+}
+
 MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
                           const DecodeContext& context, GeometryData* out) {
   ScaleTable table;
-  if (auto fault = ToTable(path, in, &table)) return fault;
+  if (auto fault = ToScaleTable(path, in, &table)) return fault;
   if (auto fault = ToEnds(path, in)) return fault;
   if (out->record.color_mode == gpu::ColorMode::kPerVertex) {
     return Fault{path.ToString(), Reason::kInvalidValue,
@@ -156,7 +156,7 @@ MaybeFault ToLevel(const FieldPath& path, const v1::ColorScale& in, const double
                    const double max[3], gpu::implicit::Graph& graph,
                    gpu::implicit::Graph::Node* level, ScaleTable* table) {
   ScaleEnds ends;
-  if (auto fault = ToTable(path, in, table)) return fault;
+  if (auto fault = ToScaleTable(path, in, table)) return fault;
   if (auto fault = ToScaleEnds(path, in, min, max, &ends)) return fault;
   *level = graph.Mul(gpu::implicit::Along(graph, ends.along, ends.low),
                      graph.Constant(1 / (ends.high - ends.low)));

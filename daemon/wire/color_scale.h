@@ -18,6 +18,9 @@ namespace voxeld::daemon::wire {
 
 using ScaleTable = std::array<uint32_t, 256>;  // 0x00RRGGBB
 
+// The colours of a scale, from the low end to the high one.
+MaybeFault ToScaleTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* out);
+
 // Gives the vertices of `out`, which have none, the colours that `path`, a scale of the primitive's, says.
 MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
                           const DecodeContext& context, GeometryData* out);

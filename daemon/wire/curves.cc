@@ -186,6 +186,7 @@ MaybeFault ReadBezierSurface(const FieldPath& path, const v1::BezierSurface& in,
                  "is FILL_SOLID, but it has no inside; give FILL_SURFACE, FILL_LINES or FILL_DOTS"};
   }
   if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
+  if (auto fault = ToShell(path, in.shell(), !framed, context, &out->record)) return fault;
   return ToVertices(FieldPath(path, "vertices"), in.vertices(), true, context, out);
 }
 

@@ -131,6 +131,7 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
       [[fallthrough]];
     case gpu::PrimitiveKind::kTriangles:
       out->mutable_mesh()->set_rule(RuleToWire(record.rule));
+      if (record.thickness != 0) ThicknessToWire(record, out->mutable_mesh()->mutable_shell());
       return VerticesToWire(in, out->mutable_mesh()->mutable_vertices());
     case gpu::PrimitiveKind::kBox: {
       v1::Box* box = out->mutable_box();

@@ -41,6 +41,16 @@ MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Lim
   return {};
 }
 
+MaybeFault ToShell(const FieldPath& path, const v1::Thickness& in, bool is_surface,
+                   const Limits& limits, gpu::GeometryRecord* out) {
+  const FieldPath shell(path, "shell");
+  if (auto fault = ToThickness(shell, in, limits, out)) return fault;
+  if (is_surface || out->thickness == 0) return {};
+  return Fault{FieldPath(shell, "value").ToString(), Reason::kInvalidValue,
+               absl::StrCat("is ", Show(in.value()),
+                            ", but only a surface has a shell; leave it out, or fill")};
+}
+
 MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out) {
   switch (in) {
     case v1::SURFACE_RULE_UNSPECIFIED:

@@ -9,6 +9,9 @@ namespace voxeld::daemon::wire {
 
 MaybeFault ToThickness(const FieldPath& path, const v1::Thickness& in, const Limits& limits,
                        gpu::GeometryRecord* out);
+// Of a surface of triangles; any but 0 is refused where it is drawn as something else.
+MaybeFault ToShell(const FieldPath& path, const v1::Thickness& in, bool is_surface,
+                   const Limits& limits, gpu::GeometryRecord* out);
 MaybeFault ToVector(const FieldPath& path, const v1::Vec3& in, gpu::implicit::Vector* out);
 // As CheckFloat, and 0 or greater.
 MaybeFault CheckNotNegative(const FieldPath& path, double value);

@@ -12,8 +12,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "daemon/scene/bounds.h"
+#include "daemon/wire/color_scale.h"
 #include "daemon/wire/colors.h"
 #include "daemon/wire/fields.h"
+#include "daemon/wire/shapes.h"
 #include "gpu/curves/mix_colors.h"
 #include "gpu/implicit/field_shape.h"
 #include "gpu/primitives/samples.h"
@@ -244,6 +246,36 @@ void SetHalf(const ReadGrid& grid, uint32_t color, SampleHead* head, Table* out)
   }
 }
 
+// In the primitive's coordinates.
+Bounds BoundsOf(const ReadGrid& grid) {
+  Bounds box;
+  box.empty = false;
+  for (int a = 0; a < 3; ++a) box.max[a] = grid.head.size[a];
+  return MapBounds(grid.map, box);
+}
+
+// Of a surface: which entry of the table a place of the samples has.
+MaybeFault ToColorsByPlace(const FieldPath& path, const v1::ColorScale& in, ReadGrid* grid,
+                           gpu::GeometryRecord* look, Table* out) {
+  if (auto fault = ToScaleTable(path, in, out)) return fault;
+  for (uint32_t& entry : *out) entry |= SampleHead::kDrawn;
+  const Bounds bounds = BoundsOf(*grid);
+  ScaleEnds ends;
+  if (auto fault = ToScaleEnds(path, in, bounds.min, bounds.max, &ends)) return fault;
+  const double each = SampleHead::kTableEntries / (ends.high - ends.low);
+  for (int c = 0; c < 4; ++c) {
+    double along = c == 3 ? -ends.low : 0;
+    for (int r = 0; r < 3; ++r) along += ends.along[r] * grid->map.m[r * 4 + c];
+    look->params[c] = static_cast<float>(along * each);
+    if (std::isfinite(look->params[c])) continue;
+    return Fault{FieldPath(path, "high").ToString(), Reason::kOutOfRange,
+                 absl::StrCat("is ", Show(in.high()), " and low ", Show(in.low()),
+                              ", too near to one another for single precision; give others")};
+  }
+  grid->head.by_level = 2;
+  return {};
+}
+
 MaybeFault Finish(const FieldPath& path, const ReadGrid& grid, const Table& table,
                   const gpu::GeometryRecord& look, const DecodeContext& context, GroupData* out) {
   auto data = std::make_shared<GeometryData>();
@@ -273,10 +305,8 @@ MaybeFault Finish(const FieldPath& path, const ReadGrid& grid, const Table& tabl
     }
   }
   gpu::FillBricks(record, all);
-  Bounds box;
-  box.empty = false;
-  for (int a = 0; a < 3; ++a) box.max[a] = data->max[a] = grid.head.size[a];
-  const Bounds mapped = MapBounds(grid.map, box);
+  for (int a = 0; a < 3; ++a) data->max[a] = grid.head.size[a];
+  const Bounds mapped = BoundsOf(grid);
   std::copy_n(mapped.min, 3, out->min);
   std::copy_n(mapped.max, 3, out->max);
   out->color = look.color;
@@ -308,7 +338,8 @@ MaybeFault ToVolume(const FieldPath& path, const v1::Volume& in, uint32_t color,
 }
 
 MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_t color,
-                        const DecodeContext& context, GroupData* out) {
+                        const ShapeContext& shape, GroupData* out) {
+  const DecodeContext& context = shape.context;
   ReadGrid grid;
   gpu::GeometryRecord look;
   look.color = color;
@@ -330,7 +361,13 @@ MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_
     }
     look.thickness = static_cast<float>(thickness);
   }
-  return Finish(path, grid, {}, look, context, out);
+  Table table = {};
+  if (shape.scale != nullptr) {
+    if (auto fault = ToColorsByPlace(shape.scale_path, *shape.scale, &grid, &look, &table)) {
+      return fault;
+    }
+  }
+  return Finish(path, grid, table, look, context, out);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -11,11 +11,14 @@ class Volume;
 
 namespace voxeld::daemon::wire {
 
+struct ShapeContext;
+
 // A group of one: the samples, under the map from their own coordinates. `color`: 0xRRGGBB. What it is called,
 // and what was sent, is the caller's.
 MaybeFault ToVolume(const FieldPath& path, const v1::Volume& in, uint32_t color,
                     const DecodeContext& context, GroupData* out);
+// By `shape` also the scale, if there is one.
 MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_t color,
-                        const DecodeContext& context, GroupData* out);
+                        const ShapeContext& shape, GroupData* out);
 
 }  // namespace voxeld::daemon::wire

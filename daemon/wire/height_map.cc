@@ -159,6 +159,8 @@ MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const Dec
   if (auto fault = ToRule(path, in.rule(), &record)) return fault;
 
   if (auto fault = ToFill(path, in, &record)) return fault;
+  const bool surface = record.kind == gpu::PrimitiveKind::kTriangles;
+  if (auto fault = ToShell(path, in.shell(), surface, context, &record)) return fault;
   if (!in.colors().empty()) record.color_mode = gpu::ColorMode::kPerVertex;
   absl::StatusOr<gpu::GeometryArrays> kept = gpu::GeometryArrays::Allocate(record, context.pool);
   if (!kept.ok()) {

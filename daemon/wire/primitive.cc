@@ -133,7 +133,9 @@ MaybeFault ToMesh(const FieldPath& path, const v1::Mesh& in, const DecodeContext
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
   bool framed;
   if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
-  if (in.has_texture() && (framed || out->record.fill != gpu::Fill::kSurface)) {
+  const bool surface = !framed && out->record.fill == gpu::Fill::kSurface;
+  if (auto fault = ToShell(path, in.shell(), surface, context, &out->record)) return fault;
+  if (in.has_texture() && !surface) {
     return Fault{FieldPath(path, "texture").ToString(), Reason::kInvalidValue,
                  "is given, but only a surface takes one; leave it out, or fill"};
   }
@@ -317,7 +319,6 @@ MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const Decode
       return ToVertexColors(scale, in.color_scale(), context, out);
     case v1::Primitive::kImplicit:
     case v1::Primitive::kVolume:
-    case v1::Primitive::kIsosurface:
       break;
     default:
       if (implicit) return {};  // it has them
@@ -336,10 +337,12 @@ MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const Decode
 MaybeFault ToSamples(const FieldPath& path, const v1::Primitive& in, uint32_t color,
                      const DecodeContext& context, Content* out) {
   auto group = std::make_shared<GroupData>();
-  const FieldPath volume(path, "volume"), isosurface(path, "isosurface");
+  const FieldPath volume(path, "volume"), isosurface(path, "isosurface"),
+      scale(path, "color_scale");
+  const ShapeContext shape{context, scale, in.has_color_scale() ? &in.color_scale() : nullptr};
   if (auto fault = in.has_volume()
                        ? ToVolume(volume, in.volume(), color, context, group.get())
-                       : ToIsosurface(isosurface, in.isosurface(), color, context, group.get())) {
+                       : ToIsosurface(isosurface, in.isosurface(), color, shape, group.get())) {
     return fault;
   }
   group->kind = in.has_volume() ? "volume" : "isosurface";
@@ -356,7 +359,7 @@ MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const Deco
     if (auto fault = ToRgb(FieldPath(path, "color"), in.color(), &color)) return fault;
   }
   if (in.has_text() || in.has_volume() || in.has_isosurface()) {
-    if (in.has_color_scale() && !in.has_text()) return ToColors(path, in, context, nullptr);
+    if (in.has_color_scale() && in.has_volume()) return ToColors(path, in, context, nullptr);
     if (in.has_text()) return ToText(path, in, color, context, out);
     return ToSamples(path, in, color, context, out);
   }
@@ -376,6 +379,9 @@ MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const Deco
   }
   if (converted) {
     if (auto fault = Convert(path, in, context, data.get())) return fault;
+  }
+  if (gpu::IsCurved(data->record.kind)) {
+    data->need = gpu::CutNeed::Of(data->record, data->arrays.positions());
   }
   if (IsKeptAsSent(in, *data)) {
     data->kind = in.GetDescriptor()->FindFieldByNumber(in.kind_case())->name().c_str();

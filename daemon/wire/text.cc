@@ -225,7 +225,23 @@ v1::ColorScale ScaleOf(const v1::ColorScale& scale, const gpu::Affine& part) {
   return own;
 }
 
-// Letters in colours of a scale: each is one of its own.
+// Before they are made: each letter takes what the plain one does, and a table. `plain`: all of
+// them.
+MaybeFault CheckColored(const FieldPath& path, const GroupData& plain,
+                        const DecodeContext& context) {
+  if (context.decoded_bytes == nullptr) return {};
+  uint64_t bytes = 0;
+  for (const GroupData::Part& part : plain.parts)
+    bytes += sizeof(part) + part.geometry->bytes() + sizeof(ScaleTable);
+  const uint64_t most = context.limits.max_uncommitted_bytes;
+  if (*context.decoded_bytes + bytes <= most) return {};
+  return Fault{FieldPath(path, "text").ToString(), Reason::kQuotaExceeded,
+               absl::StrCat("makes ", plain.parts.size(), " letters in colours of their own, ",
+                            bytes, " bytes after ", *context.decoded_bytes,
+                            " of others; max_uncommitted_bytes is ", most)};
+}
+
+// Letters in colours of a scale: each is one of its own. `out` has the plain ones.
 MaybeFault ToColoredLetters(const FieldPath& path, const v1::ColorScale& in,
                             const text::LaidOut& laid, const Place& place, double depth,
                             const gpu::GeometryRecord& look, const ShapeContext& context,
@@ -235,6 +251,7 @@ MaybeFault ToColoredLetters(const FieldPath& path, const v1::ColorScale& in,
   if (auto fault = ToScaleEnds(context.scale_path, in, out->min, out->max, &ends)) return fault;
   scale.set_low(ends.low);
   scale.set_high(ends.high);
+  if (auto fault = CheckColored(path, *out, context.context)) return fault;
   out->parts.clear();
   for (const text::PlacedGlyph& placed : laid.glyphs) {
     const gpu::Affine map = place.Map(placed.x, placed.y);

@@ -357,8 +357,15 @@ MaybeFault ToElementColors(const FieldPath& path, const v1::Vertices& in,
   CopyColors(colors.payload, ColorBytes(in.color_type()), of_elements);
   for (size_t i = 0; i < corners; ++i) {
     const size_t vertex = VertexOfCorner(out->record, out->arrays.indices(), i);
-    std::copy_n(&out->arrays.positions()[vertex * 3], 3, &kept->writable_positions()[i * 3]);
+    const float* const position = &out->arrays.positions()[vertex * 3];
+    std::copy_n(position, 3, &kept->writable_positions()[i * 3]);
     kept->writable_colors()[i] = of_elements[i / each];
+    // Of the vertices that are kept.
+    for (int a = 0; a < 3; ++a) {
+      const double value = double{position[a]};
+      out->min[a] = i == 0 ? value : std::min(out->min[a], value);
+      out->max[a] = i == 0 ? value : std::max(out->max[a], value);
+    }
   }
   out->record = record;
   out->arrays = *std::move(kept);

@@ -296,8 +296,8 @@ bool BinItems(const Source& source, const TileGrid& grid, std::span<const uint8_
     const std::span<FoundSpans> parts = std::span(scratch.parts).first(part_count);
     const bool walks = std::is_same_v<Primitive, Segments> && source.radius == 0 &&
                        source.record->sampling != LineSampling::kCover;
-    const bool triangles =
-        std::is_same_v<Primitive, Triangles> && source.record->rule == SurfaceRule::kThin;
+    const bool triangles = std::is_same_v<Primitive, Triangles> && source.radius == 0 &&
+                           source.record->rule == SurfaceRule::kThin;
     const bool choose_walks = walks && limits.choose;
     bins.chosen = choose_walks;
     // Rows begin at 32 bits.

@@ -180,7 +180,7 @@ class CudaVolume final : private SceneObserver {
     uint32_t layer = 0;               // its slot
     bool moved = false;               // and not yet placed anew
     bool marks = false;               // where they were is to be drawn anew
-    Block there, firsts, transforms;  // on the device, once they have moved
+    Block there, firsts, transforms;  // on the device, once they are needed
 
     uint32_t count() const { return static_cast<uint32_t>(slots.size()); }
   };
@@ -193,6 +193,7 @@ class CudaVolume final : private SceneObserver {
   absl::Status MoveCrowds();
   // False: it cannot stay together.
   absl::StatusOr<bool> MoveCrowd(const Layer& layer, Crowd& crowd);
+  // What is needed of it there and is not; its transforms only if it has moved.
   absl::Status BringCrowd(Crowd& crowd);
   // A layer's drawables are on their own again: one comes, or goes.
   void Disperse(const Layer* layer);

@@ -109,7 +109,8 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
 
 CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
   if (record.drawn_by == DrawnBy::kCpu || IsCells(record)) return IndexedBy::kPairs;
-  if (record.kind == PrimitiveKind::kTriangles && record.texture_width == 0) {
+  if (record.kind == PrimitiveKind::kTriangles && record.texture_width == 0 &&
+      record.thickness == 0) {
     return IndexedBy::kTriangles;
   }
   if (record.thickness != 0) return IndexedBy::kPairs;

@@ -7,14 +7,6 @@
 #include "gpu/cuda/kernels.h"
 
 namespace voxeld::gpu::cuda {
-namespace {
-
-bool IsSolidKind(PrimitiveKind kind) {
-  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
-         kind == PrimitiveKind::kCylinder;
-}
-
-}  // namespace
 
 absl::Status CudaVolume::EnterCrowds(std::span<const Drawable* const> drawables,
                                      std::span<const uint32_t> slots, Crowds& formed,
@@ -22,7 +14,7 @@ absl::Status CudaVolume::EnterCrowds(std::span<const Drawable* const> drawables,
   if (pairs.size() < least_crowd_) return absl::OkStatus();
   for (size_t i = 0; i < drawables.size(); ++i) {
     const GeometryRecord& record = drawables[i]->geometry->view.record;
-    if (!IsSolidKind(record.kind) || record.drawn_by == DrawnBy::kCpu) continue;
+    if (!IsSolid(record.kind) || record.drawn_by == DrawnBy::kCpu) continue;
     if (slots_[slots[i]].items != 1) continue;  // without an inverse
     Crowd& crowd = formed[drawables[i]->layer];
     crowd.layer = layer_slots_.at(drawables[i]->layer->record.id);
@@ -66,26 +58,32 @@ bool CudaVolume::OnLayerMove(Layer& layer) {
 
 absl::Status CudaVolume::BringCrowd(Crowd& crowd) {
   std::vector<Affine> transforms;
-  transforms.reserve(crowd.drawables.size());
-  for (const Drawable* drawable : crowd.drawables) transforms.push_back(drawable->record.transform);
-  std::vector<uint64_t> firsts(crowd.slots.size() + 1);
-  std::iota(firsts.begin(), firsts.end(), uint64_t{0});
-  absl::StatusOr<Block> block = device_.Upload(transforms.data(), transforms.size());
-  if (!block.ok()) return block.status();
-  crowd.transforms = *std::move(block);
-  block = device_.Upload(firsts.data(), firsts.size());
-  if (!block.ok()) return block.status();
-  crowd.firsts = *std::move(block);
-  block = device_.Upload(crowd.slots.data(), crowd.slots.size());
-  if (!block.ok()) return block.status();
-  crowd.there = *std::move(block);
+  std::vector<uint64_t> firsts;
+  absl::StatusOr<Block> block;
+  if (crowd.there.size() == 0) {
+    firsts.resize(crowd.slots.size() + 1);
+    std::iota(firsts.begin(), firsts.end(), uint64_t{0});
+    block = device_.Upload(firsts.data(), firsts.size());
+    if (!block.ok()) return block.status();
+    crowd.firsts = *std::move(block);
+    block = device_.Upload(crowd.slots.data(), crowd.slots.size());
+    if (!block.ok()) return block.status();
+    crowd.there = *std::move(block);
+  }
+  if (crowd.moved && crowd.transforms.size() == 0) {
+    transforms.reserve(crowd.drawables.size());
+    for (const Drawable* drawable : crowd.drawables)
+      transforms.push_back(drawable->record.transform);
+    block = device_.Upload(transforms.data(), transforms.size());
+    if (!block.ok()) return block.status();
+    crowd.transforms = *std::move(block);
+  }
   // What goes over lies in memory that goes with this call.
-  return device_.Wait();
+  return firsts.empty() && transforms.empty() ? absl::OkStatus() : device_.Wait();
 }
 
 absl::StatusOr<bool> CudaVolume::MoveCrowd(const Layer& layer, Crowd& crowd) {
-  absl::Status status;
-  if (crowd.there.size() == 0) status = BringCrowd(crowd);
+  absl::Status status = BringCrowd(crowd);
   if (absl::IsResourceExhausted(status)) return false;
   ItemList list;
   list.slots = crowd.there.as<uint32_t>();
@@ -98,7 +96,8 @@ absl::StatusOr<bool> CudaVolume::MoveCrowd(const Layer& layer, Crowd& crowd) {
     });
   }
   if (!status.ok()) return status;
-  dirty_ = RoughBox::Everything();
+  // Of a hidden one nothing is to be drawn, here or there.
+  if (crowd.marks || layer.drawn) dirty_ = RoughBox::Everything();
   crowd.marks = false;
   if (!crowd.moved) return true;
   const absl::StatusOr<Block> singular = device_.Zeros(sizeof(uint32_t));

@@ -54,6 +54,15 @@ __device__ void DrawItem(const TableEntry& entry, uint32_t item, const Box3& box
                         });
 }
 
+// Triangles without a thickness.
+struct ThinTriangles {
+  template <class Emit>
+  __device__ static void EmitVoxels(const Source& source, uint32_t i, const Box3& box,
+                                    Emit&& emit) {
+    EmitTriangle(Triangles::ItemOf(source, i), box, emit);
+  }
+};
+
 // Whether an item is better drawn by many threads: thick ones, solids, large triangles.
 __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box3& box) {
   switch (entry.record.kind) {
@@ -61,6 +70,7 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
     case PrimitiveKind::kSegments:
       return entry.source.radius > 0;
     case PrimitiveKind::kTriangles: {
+      if (entry.source.radius > 0) return true;
       const Box3 part = Intersect(box, BoundsOf(Triangles::ItemOf(entry.source, item)));
       constexpr int32_t kSmall = 128;  // voxels
       return (part.hi[0] - part.lo[0]) * (part.hi[1] - part.lo[1]) * (part.hi[2] - part.lo[2]) >
@@ -233,7 +243,7 @@ __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t
       bounds = BoundsOf(Segments::ItemOf(entry.source, item), entry.source.radius);
       break;
     case PrimitiveKind::kTriangles:
-      bounds = BoundsOf(Triangles::ItemOf(entry.source, item));
+      bounds = BoundsOf(Triangles::ItemOf(entry.source, item), entry.source.radius);
       break;
     case PrimitiveKind::kImplicit:
     case PrimitiveKind::kSamples:
@@ -284,7 +294,7 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t 
   } else if (entry.record.kind == PrimitiveKind::kSegments) {
     DrawItem<Segments>(entry, item, box, region.words);
   } else {
-    DrawItem<Triangles>(entry, item, box, region.words);
+    DrawItem<ThinTriangles>(entry, item, box, region.words);
   }
   return heavy;
 }

@@ -321,7 +321,8 @@ __device__ void DrawLevel(const TableEntry& entry, const SampleView& view, const
   }
   __syncthreads();
   const bool solid = source.record->fill == Fill::kSolid,
-             cover = source.record->rule == SurfaceRule::kCover, shell = source.implicit.half > 0;
+             cover = source.record->rule == SurfaceRule::kCover, shell = source.implicit.half > 0,
+             colored = view.head().by_level == 2;
   const uint32_t word = MakeWord(entry.priority, entry.erase != 0, source.UniformColor());
   const int32_t n[3] = {part.hi[0] - part.lo[0], part.hi[1] - part.lo[1], part.hi[2] - part.lo[2]};
   for (int32_t i = static_cast<int32_t>(threadIdx.x); i < n[0] * n[1] * n[2]; i += kDrawThreads) {
@@ -348,7 +349,11 @@ __device__ void DrawLevel(const TableEntry& entry, const SampleView& view, const
                                        depth);
     }
     if (covered) {
-      atomicMax(&words[IndexInRegion(part.lo[0] + x, part.lo[1] + y, part.lo[2] + z)], word);
+      const int32_t at_x = part.lo[0] + x, at_y = part.lo[1] + y, at_z = part.lo[2] + z;
+      atomicMax(&words[IndexInRegion(at_x, at_y, at_z)],
+                colored ? MakeWord(entry.priority, entry.erase != 0,
+                                   Samples::ColorAtLevel(source, view, at_x, at_y, at_z))
+                        : word);
     }
   }
   __syncthreads();

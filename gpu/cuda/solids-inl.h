@@ -6,11 +6,6 @@
 
 namespace voxeld::gpu::cuda {
 
-__device__ inline bool IsSolid(PrimitiveKind kind) {
-  return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
-         kind == PrimitiveKind::kCylinder;
-}
-
 // A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
 // them.
 template <class Shape>

@@ -36,15 +36,6 @@ Int3 SnapOf(const Point& p) {
   return r;
 }
 
-double SecondDifference(const Point& a, const Point& b, const Point& c) {
-  double square = 0;
-  for (int i = 0; i < 3; ++i) {
-    const double d = (a.at[i] - b.at[i]) + (c.at[i] - b.at[i]);
-    square += d * d;
-  }
-  return std::sqrt(square);
-}
-
 Point PointOn(const Point p[4], double t) {
   const Point a = Mix(p[0], p[1], t), b = Mix(p[1], p[2], t), c = Mix(p[2], p[3], t);
   return Mix(Mix(a, b, t), Mix(b, c, t), t);

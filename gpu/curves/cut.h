@@ -1,5 +1,5 @@
 // Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space,
-// so that the error is one of voxels whatever the transform: an eighth of one (kCurveError). On the
+// so that the error is one of voxels whatever the transform: an eighth of one (cut_need.h). On the
 // host, in IEEE double, in the order written there; every engine draws what comes out.
 //
 // Guarantee: segments are within an eighth of a voxel (kCurveError) of the curve, triangles within
@@ -12,22 +12,12 @@
 #include <vector>
 
 #include "gpu/affine.h"
+#include "gpu/curves/cut_need.h"
 #include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/grid.h"
 
 namespace voxeld::gpu {
-
-// No point of a curve is farther from its segments than this, nor of a patch from its triangles,
-// voxels; snapping to a unit comes on top.
-inline constexpr double kCurveError = 0.125;
-inline constexpr double kPatchError = 0.25;
-// Of a patch along each of its sides, whatever its error.
-inline constexpr int32_t kMostPatchPieces = 512;
-// Of a geometry, whatever its error: when so many segments have been made, each further span is
-// one; patches are cut so that there are no more vertices.
-inline constexpr size_t kMostCurveSegments = 1u << 20;
-inline constexpr size_t kMostPatchVertices = 1u << 20;
 
 // As a source's arrays, of kSegments or kTriangles.
 struct Cut {
@@ -46,10 +36,6 @@ Cut CutCurved(const GeometryView& g, const Affine& map, const TileGrid& grid);
 
 namespace curves {
 
-struct Point {
-  double at[3] = {};
-};
-
 // Whether the hull of control points is out of reach: all of it past one face of the volume,
 // widened by `room` voxels.
 bool IsOutside(const Point* points, int count, const TileGrid& grid, double room);
@@ -60,8 +46,6 @@ inline Point Mix(const Point& a, const Point& b, double t) {
   for (int i = 0; i < 3; ++i) m.at[i] = a.at[i] + (b.at[i] - a.at[i]) * t;
   return m;
 }
-// |a − 2b + c|.
-double SecondDifference(const Point& a, const Point& b, const Point& c);
 // The point of a cubic Bézier at `t`, by de Casteljau; at 0 and 1 its ends.
 Point PointOn(const Point p[4], double t);
 

@@ -1,7 +1,4 @@
 // Cubic Béziers into segments.
-//
-// A piece of n even parts is no farther from the curve than max|B″|/(8n²), and |B″| is at most 6 times the
-// greater of the two second differences of its control points.
 #include <algorithm>
 #include <cmath>
 
@@ -19,9 +16,7 @@ class Cutter {
 
   // From `from` to `to` of the colours' way, both in 0 to 1.
   void Add(const Point p[4], double from, double to, const uint32_t* colors, int halvings) {
-    const double bend =
-        std::max(SecondDifference(p[0], p[1], p[2]), SecondDifference(p[1], p[2], p[3]));
-    const double square = 0.75 * bend / kCurveError;
+    const double square = SquareOfParts(p);
     if (!(square > 1) || IsOutside(p, 4, grid_, room_)) {
       Segment(p[0], p[3], from, to, colors);
       return;

@@ -1,8 +1,5 @@
 // Bicubic Béziers into triangles: all patches of a geometry in as many parts along u and v, so that those
 // which share a side share its vertices.
-//
-// A patch cut into n × n squares of two triangles each is no farther from them than
-// (|Suu| + 2|Suv| + |Svv|)/(8n²), with 6, 9 and 6 times the greatest differences of its control points.
 #include <algorithm>
 #include <cmath>
 
@@ -14,35 +11,6 @@ namespace {
 
 constexpr int kSide = 4;
 constexpr int kPoints = kSide * kSide;
-
-double Twist(const Point& a, const Point& b, const Point& c, const Point& d) {
-  double square = 0;
-  for (int i = 0; i < 3; ++i) {
-    const double t = (a.at[i] - b.at[i]) - (c.at[i] - d.at[i]);
-    square += t * t;
-  }
-  return std::sqrt(square);
-}
-
-// 8·n² times the error.
-double BendOf(const Point p[kPoints]) {
-  double along_u = 0, along_v = 0, twist = 0;
-  for (int i = 0; i < kSide; ++i) {
-    for (int k = 0; k + 2 < kSide; ++k) {
-      const Point* row = p + i * kSide + k;
-      along_u = std::max(along_u, SecondDifference(row[0], row[1], row[2]));
-      const Point* column = p + k * kSide + i;
-      along_v = std::max(along_v, SecondDifference(column[0], column[kSide], column[2 * kSide]));
-    }
-  }
-  for (int v = 0; v + 1 < kSide; ++v) {
-    for (int u = 0; u + 1 < kSide; ++u) {
-      const Point* at = p + v * kSide + u;
-      twist = std::max(twist, Twist(at[0], at[1], at[kSide], at[kSide + 1]));
-    }
-  }
-  return 6 * along_u + 18 * twist + 6 * along_v;
-}
 
 Point PointAt(const Point p[kPoints], double u, double v) {
   Point across[kSide];
@@ -56,18 +24,18 @@ void CutPatches(const GeometryView& g, const std::vector<Point>& points, const T
                 double room, Cut& cut) {
   cut.record.kind = PrimitiveKind::kTriangles;
   std::vector<size_t> near;
-  double bend = 0;
+  double square = 0;
   for (size_t first = 0; first + kPoints <= points.size(); first += kPoints) {
     if (IsOutside(&points[first], kPoints, grid, room)) continue;
     near.push_back(first);
-    bend = std::max(bend, BendOf(&points[first]));
+    square = std::max(square, SquareOfPatchParts(&points[first]));
   }
   if (near.empty()) return;
   const double most = std::floor(std::sqrt(static_cast<double>(kMostPatchVertices) /
                                            static_cast<double>(near.size()))) -
                       1;
-  const int parts = static_cast<int>(std::clamp(std::ceil(std::sqrt(bend / (8 * kPatchError))), 1.0,
-                                                std::clamp(most, 1.0, 1.0 * kMostPatchPieces)));
+  const int parts = static_cast<int>(
+      std::clamp(std::ceil(std::sqrt(square)), 1.0, std::clamp(most, 1.0, 1.0 * kMostPatchPieces)));
   const uint32_t line = static_cast<uint32_t>(parts) + 1;
   for (const size_t first : near) {
     const uint32_t base = static_cast<uint32_t>(cut.vertices.size());

@@ -14,6 +14,22 @@
 
 namespace voxeld::gpu {
 
+// Whether a point, `w` from where a segment starts, lies within `r` of it. `axis`: the segment's
+// end from there; `length2`: |axis|².
+VOXELD_HD inline bool IsNearSegment(const double w[3], const double axis[3], double length2,
+                                    double r) {
+  const double dot = (w[0] * axis[0] + w[1] * axis[1]) + w[2] * axis[2];
+  if (dot <= 0) return (w[0] * w[0] + w[1] * w[1]) + w[2] * w[2] <= r * r;
+  if (dot >= length2) {
+    const double u0 = w[0] - axis[0], u1 = w[1] - axis[1], u2 = w[2] - axis[2];
+    return (u0 * u0 + u1 * u1) + u2 * u2 <= r * r;
+  }
+  const double c0 = w[1] * axis[2] - w[2] * axis[1];
+  const double c1 = w[2] * axis[0] - w[0] * axis[2];
+  const double c2 = w[0] * axis[1] - w[1] * axis[0];
+  return (c0 * c0 + c1 * c1) + c2 * c2 <= r * r * length2;
+}
+
 struct Capsule {
   int64_t origin[3];  // voxel
   double start[3];    // of the axis, from the origin's corner, units
@@ -48,16 +64,7 @@ struct Capsule {
 
   // Whether offset `w` lies within `r` of the axis.
   VOXELD_HD bool Within(const double w[3], double r) const {
-    const double dot = (w[0] * axis[0] + w[1] * axis[1]) + w[2] * axis[2];
-    if (dot <= 0) return (w[0] * w[0] + w[1] * w[1]) + w[2] * w[2] <= r * r;
-    if (dot >= length2) {
-      const double u0 = w[0] - axis[0], u1 = w[1] - axis[1], u2 = w[2] - axis[2];
-      return (u0 * u0 + u1 * u1) + u2 * u2 <= r * r;
-    }
-    const double c0 = w[1] * axis[2] - w[2] * axis[1];
-    const double c1 = w[2] * axis[0] - w[0] * axis[2];
-    const double c2 = w[0] * axis[1] - w[1] * axis[0];
-    return (c0 * c0 + c1 * c1) + c2 * c2 <= r * r * length2;
+    return IsNearSegment(w, axis, length2, r);
   }
 
   VOXELD_HD bool Covers(int64_t x, int64_t y, int64_t z) const {

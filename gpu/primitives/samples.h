@@ -12,7 +12,9 @@
 //            c·a/255, nothing where a is 0.
 //   level    inside is where v ≥ level. SOLID covers what is inside; SURFACE by
 //            |level − v| ≤ h·|∇v|, and the neighbours on either side, as gpu/implicit/field.h has
-//            it, with nothing as outside and infinite.
+//            it, with nothing as outside and infinite. In the geometry's colour; or by the place of
+//            the voxel's centre q: the entry ⌊((p0·qx + p1·qy) + p2·qz) + p3⌋ of the table, 0 to 255,
+//            p being the record's params.
 //
 // Guarantee: numbers at voxels' centres are within 10⁻⁴ of those of double precision, a colour
 // within one of the 256 steps of its table; isosurfaces are as gpu/implicit/field.h has surfaces,
@@ -45,7 +47,7 @@ struct SampleHead {
   uint32_t size[3];  // samples, 1 or more each
   SampleFormat format;
   SampleFilter filter;
-  uint32_t by_level;  // 1: the surface, or the solid, at `level`
+  uint32_t by_level;  // the surface, or the solid, at `level`; 2: coloured by the place
   float low, scale;   // of the table
   float level;
   uint32_t
@@ -135,7 +137,7 @@ struct Samples {
     const SampleView view{source.indices};
     if (view.head().by_level != 0) {
       if (!IsAtLevel(source, view, x, y, z)) return false;
-      *rgb = source.UniformColor();
+      *rgb = ColorAtLevel(source, view, x, y, z);
       return true;
     }
     Cell cell;
@@ -155,9 +157,19 @@ struct Samples {
 
   // Of the table.
   VOXELD_HD static uint32_t EntryOf(const SampleHead& head, float value) {
-    const float place = (value - head.low) * head.scale;
-    if (!(place > 0)) return 0;
-    return place >= 255.0f ? 255 : static_cast<uint32_t>(place);
+    return EntryAt((value - head.low) * head.scale);
+  }
+
+  // Of a voxel that is covered by a level.
+  VOXELD_HD static uint32_t ColorAtLevel(const Source& source, const SampleView& view, int32_t x,
+                                         int32_t y, int32_t z) {
+    if (view.head().by_level == 1) return source.UniformColor();
+    const Solid& s = source.solid;
+    float q[3];
+    s.Canonical(s.Distance(0, x), s.Distance(1, y), s.Distance(2, z), q);
+    const float(&p)[8] = source.record->params;
+    const float place = ((p[0] * q[0] + p[1] * q[1]) + p[2] * q[2]) + p[3];
+    return Tinted(view.table()[EntryAt(place)], source.tint);
   }
 
   // Whether some voxel of a box, which is not empty, may be covered: by the bricks around it.
@@ -236,6 +248,11 @@ struct Samples {
   }
 
  private:
+  VOXELD_HD static uint32_t EntryAt(float place) {
+    if (!(place > 0)) return 0;
+    return place >= 255.0f ? 255 : static_cast<uint32_t>(place);
+  }
+
   // Where a voxel's centre lies: the samples around it, and how far it is from the first to the
   // last.
   struct Cell {

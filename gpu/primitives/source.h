@@ -45,7 +45,7 @@ struct Source {
   const uint32_t* indices = nullptr;  // record->index_count
   const uint32_t* colors = nullptr;   // ColorCount(*record)
   uint32_t tint = 0x00FFFFFF;         // DrawableRecord
-  int64_t radius = 0;                 // of points and segments, units; 0: one voxel
+  int64_t radius = 0;                 // of points, segments and triangles, units; 0: one voxel
   Solid solid;                        // kBox, kSphere, kCylinder, kImplicit; of kFilled the bounds
   ImplicitPlace implicit;  // kImplicit, whose program `indices` are; of kFilled the blocks
   const uint32_t* inside =

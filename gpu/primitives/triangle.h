@@ -39,12 +39,13 @@ struct Triangle {
   }
 };
 
-// All voxels whose closed boxes the triangle's bounding box meets.
-VOXELD_HD inline Box3 BoundsOf(const Triangle& t) {
+// All voxels whose closed boxes the triangle's bounding box meets; with a radius (units) also all
+// whose centres are within it.
+VOXELD_HD inline Box3 BoundsOf(const Triangle& t, int64_t radius = 0) {
   Box3 b;
   for (int a = 0; a < 3; ++a) {
-    const int64_t low = Min(t.v[0][a], Min(t.v[1][a], t.v[2][a]));
-    const int64_t high = Max(t.v[0][a], Max(t.v[1][a], t.v[2][a]));
+    const int64_t low = Min(t.v[0][a], Min(t.v[1][a], t.v[2][a])) - radius;
+    const int64_t high = Max(t.v[0][a], Max(t.v[1][a], t.v[2][a])) + radius;
     b.lo[a] = ToVoxel32(VoxelOf(low - 1));
     b.hi[a] = ToVoxel32(VoxelOf(high) + 1);
   }

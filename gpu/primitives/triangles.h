@@ -1,18 +1,21 @@
-// Triangles, indexed or not: three corners each (triangle.h).
+// Triangles, indexed or not: three corners each; one voxel wide by their rule (triangle.h); with a
+// thickness what lies within half of it as well (thick_triangle.h).
 #pragma once
 
 #include "gpu/primitives/grid.h"
 #include "gpu/primitives/source.h"
+#include "gpu/primitives/thick_triangle.h"
 #include "gpu/primitives/triangle.h"
 
 namespace voxeld::gpu {
 
-// Whether the triangle may meet a box of voxels: separating axes in double, with room for rounding.
-VOXELD_HD inline bool MayMeet(const Triangle& t, const Box3& box) {
-  constexpr double kRoom = 2;  // units
+// Whether the triangle, or what lies within `radius` units of it, may meet a box of voxels:
+// separating axes in double, with room for rounding.
+VOXELD_HD inline bool MayMeet(const Triangle& t, const Box3& box, int64_t radius = 0) {
+  const double room = static_cast<double>(radius) + 2;
   double half[3], p[3][3], e[3][3];
   for (int a = 0; a < 3; ++a) {
-    half[a] = (box.hi[a] - box.lo[a]) * 128.0 + kRoom;
+    half[a] = (box.hi[a] - box.lo[a]) * 128.0 + room;
     const int64_t centre = (static_cast<int64_t>(box.lo[a]) + box.hi[a]) * kHalfVoxel;
     for (int i = 0; i < 3; ++i) p[i][a] = static_cast<double>(t.v[i][a] - centre);
   }
@@ -65,20 +68,22 @@ struct Triangles {
   VOXELD_HD static void EmitTiles(const Source& source, uint32_t i, const TileGrid& grid,
                                   Emit&& emit) {
     const Triangle t = ItemOf(source, i);
-    const Box3 bounds = BoundsOf(t);
+    const Box3 bounds = BoundsOf(t, source.radius);
     const Box3 tiles = grid.TilesOf(bounds);
     const int32_t x = tiles.hi[0] - tiles.lo[0], y = tiles.hi[1] - tiles.lo[1],
                   z = tiles.hi[2] - tiles.lo[2];
     // In two tiles or fewer there is little to win.
     if (static_cast<int64_t>(x) * y * z <= 2) return EmitTilesOfBox(bounds, grid, emit);
     EmitTilesOfBox(bounds, grid, [&](uint32_t tile) {
-      if (MayMeet(t, grid.VoxelsOf(tile))) emit(tile);
+      if (MayMeet(t, grid.VoxelsOf(tile), source.radius)) emit(tile);
     });
   }
 
   template <class Emit>
   VOXELD_HD static void EmitVoxels(const Source& source, uint32_t i, const Box3& box, Emit&& emit) {
-    EmitTriangle(ItemOf(source, i), box, emit);
+    const Triangle t = ItemOf(source, i);
+    EmitTriangle(t, box, emit);
+    if (source.radius > 0) EmitThick(t, source.radius, box, emit);
   }
 };
 

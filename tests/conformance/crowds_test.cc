@@ -115,6 +115,109 @@ TEST_P(Crowds, MoveLikeTheOracle) {
   }
 }
 
+// A look that changes, however often, moves none of them; nor does hiding and showing.
+TEST_P(Crowds, LookOtherwiseWhereTheyAre) {
+  const Target target = CubeTarget(kSide);
+  EngineDriver engine = Make();
+  PutUp(engine, scene_, target);
+  LayerRecord& layer = scene_.layers[1];
+  const auto expect = [&](const char* what) {
+    SCOPED_TRACE(what);
+    DeltaBuffer delta;
+    delta.Put(layer);
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    ExpectLikeOracle(engine, scene_, target);
+  };
+  layer.opacity = 100;
+  expect("fainter");
+  layer.blend = BlendMode::kAdd;
+  expect("added");
+  layer.plane_count = 1;
+  layer.planes[0] = {1, 0.5, -0.25, -20};
+  expect("cut");
+  Move(1);
+  expect("moved");
+  layer.opacity = 220;
+  expect("less faint, after a move");
+  layer.visible = 0;
+  expect("hidden");
+  Move(1);
+  expect("moved where nobody sees it");
+  Move(1);
+  layer.opacity = 150;
+  expect("again, and fainter");
+  layer.visible = 1;
+  expect("shown");
+  layer.visible = 0;
+  Move(1);
+  expect("hidden as it moves");
+  layer.visible = 1;
+  Move(1);
+  expect("shown as it moves");
+}
+
+TEST_P(Crowds, HiddenOnesThatMoveDrawNothingAnew) {
+  const Target target = CubeTarget(kSide);
+  EngineDriver engine = Make();
+  scene_.layers[1].visible = 0;
+  PutUp(engine, scene_, target);
+  for (int move = 0; move < 2; ++move) {
+    DeltaBuffer delta;
+    delta.Put(Move(1));
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    const absl::StatusOr<FrameResult> frame = engine.Frame();
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_EQ(frame->tiles_drawn, 0u);
+    EXPECT_FALSE(frame->changed);
+  }
+}
+
+// One masks another layer, seen or not, and is masked itself.
+TEST_P(Crowds, MaskAndAreMasked) {
+  const Target target = CubeTarget(kSide);
+  scene_.geometries[4] = SolidBox(4, {24, 24, 24}, {40, 36, 30}, 0x3060FF);
+  scene_.layers[3] = {.id = 3, .order = 3, .has_mask = 1, .mask = 1};
+  scene_.drawables[1000] = {.id = 1000, .geometry = 4, .layer = 3};
+  EngineDriver engine = Make();
+  PutUp(engine, scene_, target);
+  for (int move = 0; move < 6; ++move) {
+    SCOPED_TRACE(move);
+    DeltaBuffer delta;
+    LayerRecord& crowd = Move(1);
+    crowd.visible = move % 3 != 1;
+    crowd.has_mask = move > 2 ? 1 : 0;  // now and then by the one that it masks
+    crowd.mask = 3;
+    delta.Put(crowd);
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    ExpectLikeOracle(engine, scene_, target);
+  }
+}
+
+TEST_P(Crowds, AreForgottenAndComeAnew) {
+  const Target target = CubeTarget(kSide);
+  EngineDriver engine = Make();
+  PutUp(engine, scene_, target);
+  for (int round = 0; round < 3; ++round) {
+    SCOPED_TRACE(round);
+    // A move that is never drawn, and then all of it anew, or only what is alone.
+    DeltaBuffer delta;
+    delta.Put(Move(1));
+    delta.Reset();
+    SceneModel scene = scene_;
+    if (round == 1) {
+      std::erase_if(scene.drawables, [](const auto& d) { return d.second.layer == 1; });
+    }
+    delta.PutWhole(scene);
+    ASSERT_TRUE(engine.Apply(delta).ok());
+    ExpectLikeOracle(engine, scene, target);
+    if (round == 1) continue;
+    DeltaBuffer moved;
+    moved.Put(Move(1));
+    ASSERT_TRUE(engine.Apply(moved).ok());
+    ExpectLikeOracle(engine, scene_, target);
+  }
+}
+
 // More of them than there is room for lists of their own, at first where none of them is seen.
 TEST_P(Crowds, MayBeOfManyLayers) {
   constexpr uint64_t kLayers = 40;

@@ -129,6 +129,7 @@ void PlotCurved(const ModelGeometry& g, const Affine& map, const DenseVolume& gr
     }
     t.rule = g.record.rule;
     PlotTriangle(t, grid, plot);
+    if (radius > 0) PlotThick(t, radius, grid, plot);
   }
 }
 
@@ -246,11 +247,12 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
     for (size_t i = 0; i < corners; ++i) segment(i, i);
   } else if (record.kind == PrimitiveKind::kTriangles) {
     for (size_t i = 0; i < corners; i += 3) {
-      PlotTriangle({{at[i], at[i + 1], at[i + 2]},
-                    {colors[i], colors[i + 1], colors[i + 2]},
-                    record.rule,
-                    on_texture(i)},
-                   grid, plot);
+      const OracleTriangle triangle{{at[i], at[i + 1], at[i + 2]},
+                                    {colors[i], colors[i + 1], colors[i + 2]},
+                                    record.rule,
+                                    on_texture(i)};
+      PlotTriangle(triangle, grid, plot);
+      if (radius > 0) PlotThick(triangle, radius, grid, plot);
     }
   } else if (record.kind == PrimitiveKind::kFilled) {
     std::vector<OracleTriangle> triangles;

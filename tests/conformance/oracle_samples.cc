@@ -147,6 +147,17 @@ void PlotSamples(const ModelGeometry& g, const Affine& map, const DenseVolume& g
           if (IsAtLevel(g, words, frame, half, x, y, z)) plot(x, y, z, g.record.color);
           continue;
         }
+        if (g.indices[5] == 2) {
+          if (!IsAtLevel(g, words, frame, half, x, y, z)) continue;
+          float q[3];
+          frame.Coordinates(x, y, z, q);
+          float place = q[0] * g.record.params[0] + q[1] * g.record.params[1];
+          place = place + q[2] * g.record.params[2];
+          place = std::floor(place + g.record.params[3]);
+          const float entry = place >= 0 ? std::min(place, 255.0f) : 0.0f;
+          plot(x, y, z, words.entry(static_cast<size_t>(entry)) & 0xFFFFFF);
+          continue;
+        }
         const std::optional<Around> around = Look(words, frame, x, y, z);
         if (!around) continue;
         const std::array<float, 4> value = ValueOf(words, *around);

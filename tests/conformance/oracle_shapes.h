@@ -54,6 +54,8 @@ void PlotLine(const OracleLine& line, const DenseVolume& grid, const Plot& plot)
 // Centres within `radius` units of the segment.
 void PlotCapsule(const OracleLine& line, int64_t radius, const DenseVolume& grid, const Plot& plot);
 void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& plot);
+// Centres within `radius` units of the triangle.
+void PlotThick(const OracleTriangle& t, int64_t radius, const DenseVolume& grid, const Plot& plot);
 // Half the thickness in units.
 // Tests keep to maps for which a cube root by libm rounds to the same unit.
 int64_t OracleRadius(const GeometryRecord& g, const Affine& map);

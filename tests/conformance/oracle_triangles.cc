@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "tests/conformance/oracle_shapes.h"
 
@@ -230,6 +233,134 @@ void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& 
                                        MeetsHalfOpen(tri, {centre.x, corner.y, centre.z}, 1) ||
                                        MeetsHalfOpen(tri, {centre.x, centre.y, corner.z}, 2);
         if (covered) plot(x, y, z, ColorOf(t, tri, centre));
+      }
+    }
+  }
+}
+
+namespace {
+
+using Real3 = std::array<double, 3>;
+
+double Product(const Real3& a, const Real3& b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+Real3 Across(const Real3& a, const Real3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// As thick_triangle.h has it, a second time; thick_triangles_test.cc says in other words what it
+// means.
+struct ThickOracle {
+  OracleTriangle given;
+  OracleTriangle t;  // corners in order
+  Real3 edge[3], side[3], normal;
+  double normal2, radius;
+
+  ThickOracle(const OracleTriangle& triangle, int64_t units) : given(triangle), t(triangle) {
+    std::array<size_t, 3> order = {0, 1, 2};
+    std::stable_sort(order.begin(), order.end(), [&](size_t i, size_t j) {
+      return std::lexicographical_compare(given.v[i].v, given.v[i].v + 3, given.v[j].v,
+                                          given.v[j].v + 3);
+    });
+    for (size_t i = 0; i < 3; ++i) {
+      t.v[i] = given.v[order[i]];
+      t.color[i] = given.color[order[i]];
+      std::copy_n(given.texture.at[order[i]], 2, t.texture.at[i]);
+    }
+    radius = static_cast<double>(units);
+    Vec p[3];
+    for (int i = 0; i < 3; ++i) p[i] = {t.v[i].v[0], t.v[i].v[1], t.v[i].v[2]};
+    const Vec n = Cross(p[1] - p[0], p[2] - p[0]);
+    for (int a = 0; a < 3; ++a)
+      normal[static_cast<size_t>(a)] = Sign(n[a]) * Rounded(Magnitude(n[a]));
+    normal2 = Product(normal, normal);
+    for (size_t i = 0; i < 3; ++i) {
+      const Units &from = t.v[i], &to = t.v[(i + 1) % 3];
+      for (size_t a = 0; a < 3; ++a) edge[i][a] = static_cast<double>(to.v[a] - from.v[a]);
+      side[i] = Across(normal, edge[i]);
+    }
+  }
+
+  // The colour of a voxel, or nothing.
+  std::optional<uint32_t> At(int64_t x, int64_t y, int64_t z) const {
+    const int64_t centre[3] = {x * 256 + 128, y * 256 + 128, z * 256 + 128};
+    Real3 w[3];
+    bool beyond[3];
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t a = 0; a < 3; ++a) w[i][a] = static_cast<double>(centre[a] - t.v[i].v[a]);
+      beyond[i] = Product(side[i], w[i]) < 0;
+    }
+    if (normal2 > 0 && !beyond[0] && !beyond[1] && !beyond[2]) {
+      const double height = Product(normal, w[0]);
+      if (height * height > radius * radius * normal2) return {};
+      return ColorBy({Product(side[1], w[1]), Product(side[2], w[2]), Product(side[0], w[0])});
+    }
+    bool near = false;
+    double least = std::numeric_limits<double>::infinity();
+    Real3 weights = {};
+    for (size_t i = 0; i < 3; ++i) {
+      if (normal2 > 0 && !beyond[i]) continue;
+      const size_t j = (i + 1) % 3;
+      const double along = Product(w[i], edge[i]), length2 = Product(edge[i], edge[i]);
+      Real3 here = {};
+      double square;
+      if (along <= 0) {
+        square = Product(w[i], w[i]);
+        here[i] = 1;
+        near = near || square <= radius * radius;
+      } else if (along >= length2) {
+        square = Product(w[j], w[j]);
+        here[j] = 1;
+        near = near || square <= radius * radius;
+      } else {
+        const Real3 c = Across(w[i], edge[i]);
+        near = near || Product(c, c) <= radius * radius * length2;
+        square = Product(c, c) / length2;
+        here[i] = length2 - along;
+        here[j] = along;
+      }
+      if (square < least) least = square, weights = here;
+    }
+    if (!near) return {};
+    return ColorBy(weights);
+  }
+
+  uint32_t ColorBy(const Real3& weights) const {
+    const bool textured = t.texture.texels != nullptr;
+    if (!textured && t.color[0] == t.color[1] && t.color[1] == t.color[2]) return t.color[0];
+    // All but the weights that are none are added up in the order of the corners.
+    const double sum = (weights[0] + weights[1]) + weights[2];
+    uint32_t rgb = 0;
+    for (int shift = 0; shift < 24; shift += 8) {
+      Real3 channel;
+      for (size_t i = 0; i < 3; ++i) channel[i] = t.color[i] >> shift & 255;
+      rgb |= static_cast<uint32_t>(std::floor(Product(weights, channel) / sum + 0.5)) << shift;
+    }
+    if (!textured) return rgb;
+    double place[2];
+    for (size_t k = 0; k < 2; ++k) {
+      Real3 on_picture;
+      for (size_t i = 0; i < 3; ++i) on_picture[i] = static_cast<double>(t.texture.at[i][k]);
+      place[k] = Product(weights, on_picture) / sum;
+    }
+    return OracleTint(rgb, TexelOf(given, place[0], place[1]));
+  }
+};
+
+}  // namespace
+
+void PlotThick(const OracleTriangle& t, int64_t radius, const DenseVolume& grid, const Plot& plot) {
+  const ThickOracle thick(t, radius);
+  const int64_t size[3] = {grid.nx, grid.ny, grid.nz};
+  int64_t begin[3], end[3];
+  for (int a = 0; a < 3; ++a) {
+    const auto [low, high] = std::minmax({t.v[0].v[a], t.v[1].v[a], t.v[2].v[a]});
+    begin[a] = std::clamp<int64_t>((low - radius) / 256 - 3, 0, size[a]);
+    end[a] = std::clamp<int64_t>((high + radius) / 256 + 3, 0, size[a]);
+  }
+  for (int64_t z = begin[2]; z < end[2]; ++z) {
+    for (int64_t y = begin[1]; y < end[1]; ++y) {
+      for (int64_t x = begin[0]; x < end[0]; ++x) {
+        if (const std::optional<uint32_t> rgb = thick.At(x, y, z)) plot(x, y, z, *rgb);
       }
     }
   }

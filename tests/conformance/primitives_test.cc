@@ -193,6 +193,35 @@ TEST(Primitives, TrianglesEqualTheOracleInEveryBox) {
   EXPECT_GT(hits, 6000u);
 }
 
+TEST(Primitives, ThickTrianglesEqualTheOracleInEveryBox) {
+  const uint64_t seed = SeedOr(60);
+  std::cout << "VOXELD_SEED=" << seed << "\n";
+  SceneGenerator generator(seed);
+  HardCoordinates hard(generator);
+  const DenseVolume grid = Grid();
+  size_t hits = 0;
+  for (int i = 0; i < 600; ++i) {
+    const int far = i % 5 == 0 ? 38 : i % 5 == 1 ? 31 : 13;
+    OracleTriangle t{
+        {hard.Next(far), hard.Next(far), hard.Next(far)}, {0x102030, 0xFFEE01, 0x00FF80}, {}};
+    if (generator.Chance(0.1)) t.v[2] = t.v[0];  // no area
+    const int64_t radius = generator.Int(1, i % 7 == 0 ? 4000 : 700);
+    SCOPED_TRACE(
+        absl::StrCat(Text(t.v[0]), ", ", Text(t.v[1]), ", ", Text(t.v[2]), ", radius ", radius));
+    const Voxels want = FromOracle([&](const Plot& plot) { PlotThick(t, radius, grid, plot); });
+    Triangle ours;
+    for (int v = 0; v < 3; ++v) {
+      ours.v[v] = ToInt3(t.v[v]);
+      ours.color[v] = t.color[v];
+    }
+    hits += want.size();
+    ASSERT_TRUE(InBoxes(kSteps[generator.Int(0, 2)], [&](const Box3& box, const auto& emit) {
+                  EmitThick(ours, radius, box, emit);
+                }) == want);
+  }
+  EXPECT_GT(hits, 20000u);
+}
+
 // 64 and 128 bits must agree where both are allowed.
 TEST(Primitives, NarrowTrianglesEqualWideOnes) {
   SceneGenerator generator(SeedOr(40));

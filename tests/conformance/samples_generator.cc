@@ -17,6 +17,11 @@ void AddSamples(SceneGenerator& random, ModelGeometry& g) {
   head.format = static_cast<SampleFormat>(random.Int(0, 3));
   head.filter = random.Chance(0.3) ? SampleFilter::kNearest : SampleFilter::kLinear;
   head.by_level = head.format != SampleFormat::kRgba8 && random.Chance(0.5) ? 1 : 0;
+  if (head.by_level == 1 && random.Chance(0.5)) {
+    head.by_level = 2;
+    for (int i = 0; i < 4; ++i)
+      g.record.params[i] = static_cast<float>(i < 3 ? random.Real(-12, 12) : random.Real(-50, 300));
+  }
   const double most = head.format == SampleFormat::kU16   ? 60000
                       : head.format == SampleFormat::kF32 ? 7.5
                                                           : 250;

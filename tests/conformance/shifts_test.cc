@@ -1,6 +1,9 @@
 // A shift by whole voxels shifts the result, whatever is drawn; on every engine.
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -138,6 +141,9 @@ void AddSurfaces(std::vector<Named>& all) {
                                               {"textured mesh", textured}}) {
       g.record.rule = rule;
       all.emplace_back(name, g);
+      if (g.record.kind == PrimitiveKind::kFilled) continue;
+      g.record.thickness = 3.3F;
+      all.emplace_back("thick " + name, g);
     }
   }
 }
@@ -149,6 +155,12 @@ void AddGrids(std::vector<Named>& all) {
   for (const SampleFilter filter : {SampleFilter::kLinear, SampleFilter::kNearest}) {
     all.emplace_back("volume", GridGeometry(11, filter, waves, false, 0));
     all.emplace_back("isosurface", GridGeometry(11, filter, waves, true, 140, {.thickness = 1.5F}));
+    // By the place along a direction.
+    ModelGeometry colored = GridGeometry(11, filter, waves, true, 140);
+    colored.indices[offsetof(SampleHead, by_level) / sizeof(uint32_t)] = 2;
+    const float by_place[] = {11.5F, -7.25F, 9, 100};
+    std::copy(std::begin(by_place), std::end(by_place), colored.record.params);
+    all.emplace_back("coloured isosurface", colored);
     all.emplace_back("solid isosurface",
                      GridGeometry(11, filter, waves, true, 140, {.fill = Fill::kSolid}));
   }

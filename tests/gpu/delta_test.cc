@@ -269,6 +269,8 @@ TEST(Delta, SamplesAreLookedAt) {
                 h.format = SampleFormat::kRgba8;
               }),
               HasSubstr("samples.by_level is 1, must be 0 for colours"));
+  EXPECT_THAT(message([](SampleHead& h) { h.by_level = 3; }),
+              HasSubstr("samples.by_level is 3, must be 0 to 2"));
   EXPECT_THAT(message([](SampleHead& h) { h.scale = 1.0f / 0.0f; }), HasSubstr("finite"));
   words.resize(5);
   GeometryRecord g;

@@ -130,6 +130,7 @@ struct ShapeEncoder {
     std::string fields;
     AppendUnsigned(v1::Mesh::kRuleFieldNumber, AfterUnspecified(mesh.rule), &fields);
     AppendUnsigned(v1::Mesh::kFillFieldNumber, AfterUnspecified(mesh.fill), &fields);
+    if (mesh.shell.value != 0) AppendThickness(v1::Mesh::kShellFieldNumber, mesh.shell, &fields);
     absl::StatusOr<Rope> vertices = EncodeVertices(mesh.vertices);
     if (!vertices.ok()) return vertices.status();
     Rope rope = Wrap(fields, v1::Mesh::kVerticesFieldNumber, *std::move(vertices));
@@ -160,6 +161,8 @@ struct ShapeEncoder {
     std::string fields;
     AppendUnsigned(v1::BezierSurface::kRuleFieldNumber, AfterUnspecified(surface.rule), &fields);
     AppendUnsigned(v1::BezierSurface::kFillFieldNumber, AfterUnspecified(surface.fill), &fields);
+    if (surface.shell.value != 0)
+      AppendThickness(v1::BezierSurface::kShellFieldNumber, surface.shell, &fields);
     return OverVertices(surface.vertices, v1::BezierSurface::kVerticesFieldNumber, fields,
                         v1::Primitive::kBezierSurfaceFieldNumber);
   }
@@ -214,6 +217,7 @@ struct ShapeEncoder {
     AppendUnsigned(v1::HeightMap::kRowsFieldNumber, map.rows, &fields);
     AppendUnsigned(v1::HeightMap::kRuleFieldNumber, AfterUnspecified(map.rule), &fields);
     AppendUnsigned(v1::HeightMap::kFillFieldNumber, AfterUnspecified(map.fill), &fields);
+    if (map.shell.value != 0) AppendThickness(v1::HeightMap::kShellFieldNumber, map.shell, &fields);
     Rope rope(std::move(fields));
     AppendPayload(v1::HeightMap::kPictureFieldNumber, map.picture, &rope);
     AppendPayload(v1::HeightMap::kColorsFieldNumber, map.colors, &rope);

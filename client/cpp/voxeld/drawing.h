@@ -90,6 +90,7 @@ struct Mesh {
   SurfaceRule rule = SurfaceRule::kThin;
   Fill fill = Fill::kSurface;
   std::optional<Texture> texture;  // of a surface
+  Thickness shell;                 // of a surface, in the middle of it
 };
 
 // A smooth line along points: through them all (Catmull–Rom), near them (B-spline), or Béziers: an end, two
@@ -108,6 +109,7 @@ struct BezierSurface {
   Vertices vertices;
   SurfaceRule rule = SurfaceRule::kThin;
   Fill fill = Fill::kSurface;  // or lines, the edges of each, or dots, their corners
+  Thickness shell;             // of a surface
 };
 
 // A surface over a grid of heights, row by row.
@@ -122,7 +124,8 @@ struct HeightMap {
   SurfaceRule rule = SurfaceRule::kThin;
   Fill fill = Fill::kSurface;  // or lines, which are rows and columns, or dots
   Array<uint8_t>
-      picture;  // a PNG or JPEG file over all of it, from the first sample on; empty: none
+      picture;      // a PNG or JPEG file over all of it, from the first sample on; empty: none
+  Thickness shell;  // of a surface
 };
 
 // Samples in the middles of cells that fill what three edges span from a corner.
@@ -194,7 +197,7 @@ struct Instance {
 };
 
 // Colours by numbers, from one end of a row of colours to the other. Along a direction for all but Implicit, which has a level,
-// volumes, isosurfaces and instances; numbers for what has vertices, or samples of heights.
+// volumes and instances; numbers for what has vertices, or samples of heights.
 struct ColorScale {
   std::string colormap;       // a name of matplotlib's, as "viridis";
   std::vector<Color> colors;  // or 2 to 256 colours, evenly apart

@@ -87,7 +87,7 @@ def helix(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, turns: float,
 
 
 def bezier_surface(patches: npt.ArrayLike, *, colors: Color = None, rule: str = "thin",
-                   fill: str = "surface") -> list[wire.Packed]:
+                   fill: str = "surface", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     """`patches`: (4, 4, 3), or (n, 4, 4, 3)."""
     field = as_array(patches, "patches")
     if field.ndim not in (3, 4) or field.shape[-3:] != (4, 4, 3):
@@ -96,7 +96,8 @@ def bezier_surface(patches: npt.ArrayLike, *, colors: Color = None, rule: str = 
     color, each = split_colors(colors_.many(colors, len(array)))
     vertices = wire.vertices(array, element, each)
     _within_a_piece(len(vertices), "patches")
-    head = pb.BezierSurface(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill")).SerializeToString()
+    head = pb.BezierSurface(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"),
+                            shell=thickness(shell, unit, "shell")).SerializeToString()
     return [packed("bezier_surface", head, vertices, color)]
 
 

@@ -59,14 +59,17 @@ class Draw(DrawCurves[Drawn]):
     def mesh(self, name: str, vertices: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *,
              colors: Optional[Colors] = None, cmap: Optional[str] = None, face_colors: Optional[Colors] = None,
              texture: Optional[PictureFile] = None, uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface",
+             shell: Optional[float] = None, unit: str = "voxels",
              transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
              lifetime: Optional[float] = None, label: str = "") -> Drawn:
         """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover".
         `fill`: "surface", "lines", "dots" or "solid": what a closed mesh encloses, in one colour. `texture` is a PNG or
         JPEG file's path or bytes, which multiplies colours, `uv` (n, 2) where vertices are on it: from (0, 0), its upper
-        left corner, to (1, 1); beyond it repeats. `face_colors`, in place of `colors`: of each triangle."""
+        left corner, to (1, 1); beyond it repeats. `face_colors`, in place of `colors`: of each triangle.
+        `shell`: how thick the surface is, in "voxels" or "units"."""
         return self._draw(name, shapes.mesh, (vertices, faces),
-                          dict(colors=colors, cmap=cmap, face_colors=face_colors, texture=texture, uv=uv, rule=rule, fill=fill), Look.of(transform, priority, erase, lifetime, label))
+                          dict(colors=colors, cmap=cmap, face_colors=face_colors, texture=texture, uv=uv, rule=rule, fill=fill,
+                               shell=shell, unit=unit), Look.of(transform, priority, erase, lifetime, label))
 
     def box(self, name: str, center: npt.ArrayLike = (0, 0, 0), size: npt.ArrayLike = 1.0, *, color: Optional[Colors] = None,
             fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",

@@ -51,9 +51,11 @@ class DrawCurves(DrawMeasured[Drawn]):
                           Look.of(**look))
 
     def bezier_surface(self, name: str, patches: npt.ArrayLike, *, colors: Optional[Colors] = None, rule: str = "thin",
-                       fill: str = "surface", **look: Any) -> Drawn:
-        """Bicubic patches, (4, 4, 3) or (n, 4, 4, 3) control points. `fill`: "surface", "lines", their edges, or "dots"."""
-        return self._draw(name, curves.bezier_surface, (patches,), dict(colors=colors, rule=rule, fill=fill), Look.of(**look))
+                       fill: str = "surface", shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
+        """Bicubic patches, (4, 4, 3) or (n, 4, 4, 3) control points. `fill`: "surface", "lines", their edges, or "dots".
+        `shell`: how thick the surface is, in "voxels" or "units"."""
+        return self._draw(name, curves.bezier_surface, (patches,),
+                          dict(colors=colors, rule=rule, fill=fill, shell=shell, unit=unit), Look.of(**look))
 
     def arrow(self, name: str, start: npt.ArrayLike = (0, 0, 0), end: npt.ArrayLike = (0, 0, 1), *, shaft_radius: float = 0.0,
               head_length: Optional[float] = None, head_radius: Optional[float] = None, color: Optional[Colors] = None,

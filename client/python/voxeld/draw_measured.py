@@ -78,13 +78,14 @@ class DrawMeasured(Generic[Drawn]):
     def height_map(self, name: str, heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
                    edges: npt.ArrayLike = ((2, 0, 0), (0, 2, 0)), up: npt.ArrayLike = (0, 0, 1),
                    colors: Optional[Colors] = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
-                   fill: str = "surface", rule: str = "thin", **look: Any) -> Drawn:
+                   fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
+                   **look: Any) -> Drawn:
         """A surface over a grid of heights, (rows, columns): along `edges[0]` in a row, along `edges[1]` from row to row.
         `colors` is one, (rows, columns, 3), or, with a `cmap`, (rows, columns) numbers. `texture`, a PNG or JPEG file's
         path or bytes, lies over all of it and multiplies colours. `fill`: "surface", "lines" (rows and columns), "dots"."""
         return self._draw(name, measured.height_map, (heights,),
                           dict(corner=corner, edges=edges, up=up, colors=colors, cmap=cmap, texture=texture, fill=fill,
-                               rule=rule), Look.of(**look))
+                               rule=rule, shell=shell, unit=unit), Look.of(**look))
 
     def implicit(self, name: str, surface: Formula, *, bound: Optional[Formula] = None, boundary: Optional[Curves] = None,
                  boundary_axis: str = "z", boundary_form: str = "polyline",

@@ -108,7 +108,8 @@ def polygon(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], *, color: Col
 def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
                edges: npt.ArrayLike = ((2, 0, 0), (0, 2, 0)), up: npt.ArrayLike = (0, 0, 1),
                colors: Color = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
-               fill: str = "surface", rule: str = "thin") -> list[wire.Packed]:
+               fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
+               unit: str = "voxels") -> list[wire.Packed]:
     """`heights`: (rows, columns). `colors`: one, (rows, columns, 3), or with a map (rows, columns) numbers."""
     field = as_array(heights, "heights")
     if field.ndim != 2 or min(field.shape) < 2:
@@ -126,7 +127,7 @@ def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
     found = colors_.many(each, rows * columns, cmap)
     uniform = found if isinstance(found, int) else None
     rgb = None if found is None or isinstance(found, int) else np.ascontiguousarray(found[:, :3])
-    look: dict[str, Any] = dict(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"))
+    look: dict[str, Any] = dict(fill=choice(FILLS, fill, "fill"), **_rule(rule, shell, unit))
     most = max(2, PIECE_BYTES // (columns * (4 if rgb is None else 7)))
     if texture is not None:
         look["picture"] = picture_bytes(texture)

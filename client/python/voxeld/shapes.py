@@ -138,14 +138,15 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
 
 def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Optional[Colors] = None,
          cmap: Optional[str] = None, face_colors: Optional[Colors] = None, texture: Optional[PictureFile] = None,
-         uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface") -> list[wire.Packed]:
+         uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface", shell: Optional[float] = None,
+         unit: str = "voxels") -> list[wire.Packed]:
     """Triangles: of `faces`, or of the vertices three by three. `face_colors`: of each triangle."""
     if face_colors is not None and (colors is not None or texture is not None):
         raise InvalidValue(f"face_colors are given, and so is {'colors' if colors is not None else 'a texture'}; give one of them")
     array, element = positions(at, "vertices")
     color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap if face_colors is None else None))
     head = pb.Mesh(rule=choice(RULES, rule, "rule"), fill=choice(FILLS, fill, "fill"),
-                   texture=to_texture(texture, uv, len(array))).SerializeToString()
+                   texture=to_texture(texture, uv, len(array)), shell=thickness(shell, unit, "shell")).SerializeToString()
     index = None if faces is None else indices(faces, len(array))
     if index is None and len(array) % 3:
         raise InvalidArray(f"vertices: got {len(array)} without faces; triangles need a multiple of 3")

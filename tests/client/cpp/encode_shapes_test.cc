@@ -68,6 +68,23 @@ TEST(EncodeShapes, ShellsOfBoxesSpheresAndCylinders) {
   EXPECT_FALSE(Parse(Box{}).box().has_shell());
 }
 
+TEST(EncodeShapes, ShellsOfMeshesHeightMapsAndPatches) {
+  const Vertices corners{.positions = std::vector<float>(48)};
+  EXPECT_EQ(Parse(Mesh{.vertices = corners, .shell = {3}}).mesh().shell().value(), 3);
+  EXPECT_FALSE(Parse(Mesh{.vertices = corners}).mesh().has_shell());
+  EXPECT_EQ(Parse(BezierSurface{.vertices = corners, .shell = {2, Thickness::Unit::kUnits}})
+                .bezier_surface()
+                .shell()
+                .unit(),
+            v1::Thickness::UNITS);
+  EXPECT_FALSE(Parse(BezierSurface{.vertices = corners}).bezier_surface().has_shell());
+  HeightMap map{.columns = 2, .rows = 2, .heights = {0, 1, 2, 3}};
+  EXPECT_FALSE(Parse(map).height_map().has_shell());
+  map.shell = {4.5f};
+  EXPECT_EQ(Parse(map).height_map().shell().value(), 4.5f);
+  EXPECT_EQ(Parse(map).height_map().shell().unit(), v1::Thickness::VOXELS);
+}
+
 TEST(EncodeShapes, BoundariesAreLinesOrSmooth) {
   Implicit shape{.surface = "z = 0", .boundary = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
   EXPECT_EQ(Parse(shape).implicit().boundary().form(), v1::Boundary::POLYLINE);

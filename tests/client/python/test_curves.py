@@ -30,6 +30,8 @@ class Curves(unittest.TestCase):
         self.assertEqual((ellipse.axis_a.x, ellipse.axis_b.y, ellipse.sweep), (2, 1, 0))
         helix = parsed(curves.helix((0, 0, 0), (0, 0, 3), 1, -2, end_radius=0, width=1)).helix
         self.assertEqual((helix.end.z, helix.turns, helix.HasField("end_radius")), (3, -2, True))
+        thick = parsed(curves.bezier_surface(np.zeros((4, 4, 3)), shell=2)).bezier_surface
+        self.assertEqual(thick.shell.value, 2)
         surface = parsed(curves.bezier_surface(np.zeros((2, 4, 4, 3)))).bezier_surface
         self.assertEqual(surface.vertices.count, 32)
         arrow = parsed(curves.arrow((0, 0, 0), (1, 0, 0), head_length=0.5, fill="solid")).arrow
@@ -90,6 +92,8 @@ class Curves(unittest.TestCase):
         self.assertEqual((list(shape.transfer.values), list(shape.transfer.colors)), ([0, 10, 23], [0, 0xFF0000, 0xFFFFFF]))
         colored = parsed(grids.grid(np.zeros((2, 2, 2, 4), np.uint8))).volume
         self.assertEqual((colored.grid.type, len(colored.grid.samples)), (pb.ELEMENT_TYPE_RGBA8, 32))
+        scaled = parsed(grids.isosurface(field, 11.5, color=voxel.Gradient("plasma", along=(0, 1, 0)))).color_scale
+        self.assertEqual((scaled.colormap, scaled.along.y), ("plasma", 1))
         surface = parsed(grids.isosurface(field.astype(float), 11.5, fill="solid", extent=((0, 0, 0), (1, 2, 3)))).isosurface
         self.assertEqual((surface.level, surface.fill, surface.grid.edge_b.y), (11.5, pb.FILL_SOLID, 2))
         self.assertEqual(surface.grid.type, pb.ELEMENT_TYPE_F32)

@@ -33,6 +33,8 @@ class Measured(unittest.TestCase):
         self.assertEqual(parsed(measured.patch((0, 0, 0), np.eye(3)[:2], fill="dots")).patch.fill, pb.FILL_DOTS)
         self.assertEqual(parsed(measured.polygon(np.eye(3), fill="lines")).polygon.fill, pb.FILL_LINES)
         self.assertEqual(parsed(measured.height_map(np.zeros((2, 2)), fill="dots")).height_map.fill, pb.FILL_DOTS)
+        thick = parsed(measured.height_map(np.zeros((2, 2)), shell=3, rule="cover")).height_map
+        self.assertEqual((thick.shell.value, thick.shell.unit, thick.rule), (3, pb.Thickness.VOXELS, pb.SURFACE_RULE_COVER))
 
     def test_a_picture_lies_over_a_whole_height_map(self) -> None:
         self.assertEqual(parsed(measured.height_map(np.zeros((2, 2)), texture=b"file")).height_map.picture, b"file")

@@ -183,6 +183,13 @@ class ColorsOfElements(unittest.TestCase):
             self.assertEqual(getattr(parsed(shape)[0], kind).shell.value, 3)
         self.assertFalse(parsed(shapes.sphere((0, 0, 0), 1))[0].sphere.HasField("shell"))
 
+    def test_shells_of_meshes(self) -> None:
+        mesh = parsed(shapes.mesh(np.eye(3), shell=2.5, unit="units"))[0].mesh
+        self.assertEqual((mesh.shell.value, mesh.shell.unit), (2.5, pb.Thickness.UNITS))
+        self.assertFalse(parsed(shapes.mesh(np.eye(3)))[0].mesh.HasField("shell"))
+        with self.assertRaisesRegex(InvalidArray, "shell must be at least 0, got -1"):
+            shapes.mesh(np.eye(3), shell=-1)
+
 
 class Textures(unittest.TestCase):
     AT = np.eye(3, dtype=np.float32)

@@ -334,5 +334,41 @@ TEST_F(DrawnGrids, IsosurfacesAreAsThickAsTheirShells) {
   }
 }
 
+// From the first of two colours to the second, along a direction that is none of the grid's.
+TEST_F(DrawnGrids, IsosurfacesHaveTheColoursOfTheirPlaces) {
+  const Reference grid = Waves(false);
+  const Vector along{0.5, -1.5, 1};
+  for (const bool solid : {false, true}) {
+    P p;
+    grid.Write(p.mutable_isosurface()->mutable_grid());
+    p.mutable_isosurface()->set_level(0.1);
+    if (solid) p.mutable_isosurface()->set_fill(v1::FILL_SOLID);
+    const Drawn plain = Draw(p, placed_.map);
+    p.mutable_color_scale()->add_colors(0x00FF40);
+    p.mutable_color_scale()->add_colors(0xFF0040);
+    Set(p.mutable_color_scale()->mutable_along(), along);
+    p.mutable_color_scale()->set_low(-1);
+    p.mutable_color_scale()->set_high(1.5);
+    const Drawn drawn = Draw(p, placed_.map);
+    uint64_t lit = 0, wrong = 0, clamped = 0;
+    drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
+      wrong += drawn.Lit(x, y, z) != plain.Lit(x, y, z);
+      if (!drawn.Lit(x, y, z)) return;
+      ++lit;
+      const double number = Dot(placed_.Back(x, y, z), along) / Dot(along, along);
+      const double level = std::clamp((number + 1) / 2.5, 0.0, 1.0);
+      clamped += level == 0 || level == 1;
+      // One of 256 steps, and the rounding of colours.
+      const Color got = Channels(drawn.At(x, y, z));
+      wrong += std::fabs(got[0] - 255 * level) > 1.6 ||
+               std::fabs(got[1] - 255 * (1 - level)) > 1.6 || got[2] != 0x40;
+    });
+    EXPECT_GT(lit, 2000u);
+    EXPECT_GT(clamped, 20u);
+    EXPECT_LT(clamped, lit / 2);
+    EXPECT_EQ(wrong, 0u) << (solid ? "solid" : "surface");
+  }
+}
+
 }  // namespace
 }  // namespace voxeld::daemon::drawn

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/text/stroke_font.h"
 #include "gpu/curves/cut.h"
 #include "tests/daemon/drawn/drawn.h"
 
@@ -172,6 +173,82 @@ TEST_F(DrawnText, OutlinesAreWithinTheirRadius) {
   EXPECT_GT(lit, 1000u);
   EXPECT_EQ(far, 0u);
   EXPECT_EQ(missing, 0u);
+}
+
+TEST_F(DrawnText, StrokesAreWithinTheirRadius) {
+  constexpr double kRadius = 1.4;
+  constexpr const char* kAscii = "Rq";
+  P p = Text();
+  p.mutable_text()->set_text(kAscii);
+  p.mutable_text()->set_style(v1::Text::STROKES);
+  p.mutable_text()->set_font("futural");
+  p.mutable_text()->mutable_thickness()->set_value(2 * kRadius);
+  const Drawn drawn = Draw(p, placed_.map);
+  const absl::StatusOr<text::StrokeFont> font = text::StrokeFont::Load("futural");
+  ASSERT_TRUE(font.ok()) << font.status();
+  const text::StrokeFont::Line line = font->Lay(kAscii);
+  ASSERT_GT(line.strokes.size(), 3u);
+  Distances distances(kSize, kRadius + 0.5);
+  for (const text::Stroke& stroke : line.strokes) {
+    for (size_t i = 0; i + 1 < stroke.size(); ++i) {
+      for (int k = 0; k <= 1000; ++k) {
+        const double t = k / 1000.0;
+        distances.Add(
+            placed_.Forth(FromText({(1 - t) * double{stroke[i].x} + t * double{stroke[i + 1].x},
+                                    (1 - t) * double{stroke[i].y} + t * double{stroke[i + 1].y}})));
+      }
+    }
+  }
+  constexpr double kError = kSnapped + 0.01;
+  uint64_t lit = 0, far = 0, missing = 0;
+  drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
+    const double d = distances.At(x, y, z);
+    lit += drawn.Lit(x, y, z);
+    far += drawn.Lit(x, y, z) && d > kRadius + kError;
+    missing += !drawn.Lit(x, y, z) && d < kRadius - kError;
+  });
+  EXPECT_GT(lit, 500u);
+  EXPECT_EQ(far, 0u);
+  EXPECT_EQ(missing, 0u);
+}
+
+// From green to red along a direction that is none of the text's; of letters each by its own place.
+TEST_F(DrawnText, ColouredLettersHaveTheColoursOfTheirPlaces) {
+  const Vector along{1, 0.5, -0.25};
+  for (const double depth : {0.0, 1.3}) {
+    P p = Text();
+    p.mutable_text()->set_depth(depth);
+    if (depth == 0) p.mutable_text()->mutable_thickness()->set_value(3);
+    const Drawn plain = Draw(p, placed_.map);
+    p.mutable_color_scale()->add_colors(0x00FF40);
+    p.mutable_color_scale()->add_colors(0xFF0040);
+    Set(p.mutable_color_scale()->mutable_along(), along);
+    p.mutable_color_scale()->set_low(-5);
+    p.mutable_color_scale()->set_high(6);
+    const Drawn drawn = Draw(p, placed_.map);
+    uint64_t lit = 0, otherwise = 0, wrong = 0;
+    double least = 1, greatest = 0;
+    drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
+      otherwise += drawn.Lit(x, y, z) != plain.Lit(x, y, z);
+      if (!drawn.Lit(x, y, z)) return;
+      ++lit;
+      const double number =
+          gpu::implicit::Dot(placed_.Back(x, y, z), along) / gpu::implicit::Dot(along, along);
+      const double level = std::clamp((number + 5) / 11, 0.0, 1.0);
+      least = std::min(least, level);
+      greatest = std::max(greatest, level);
+      // One of 256 steps, and the rounding of colours.
+      const uint32_t rgb = drawn.At(x, y, z);
+      wrong += std::fabs(static_cast<double>(rgb >> 16) - 255 * level) > 1.6 ||
+               std::fabs(static_cast<double>(rgb >> 8 & 255) - 255 * (1 - level)) > 1.6 ||
+               (rgb & 255) != 0x40;
+    });
+    EXPECT_GT(lit, 1000u);
+    EXPECT_LT(least, 0.2);
+    EXPECT_GT(greatest, 0.8);
+    EXPECT_EQ(otherwise, 0u);
+    EXPECT_EQ(wrong, 0u) << "depth " << depth;
+  }
 }
 
 }  // namespace

@@ -263,12 +263,40 @@ class Generator {
     if (Chance(0.5)) {
       const bool four = Chance(0.5);
       if (four) out->set_color_type(v1::ELEMENT_TYPE_RGBX8);
-      out->set_colors(Values<uint8_t>((four ? 4 : 3) * count, 256));
+      uint32_t colors = count;
+      if (Chance(0.3)) {  // of triangles, of pairs, of all but one: right for some
+        out->set_colors_of(Chance(0.05) ? static_cast<v1::Vertices::ColorsOf>(Below(9))
+                                        : v1::Vertices::ELEMENTS);
+        const uint32_t corners = indices > 0 ? indices : count;
+        const uint32_t elements[] = {corners / 3, corners / 2, corners > 0 ? corners - 1 : 0};
+        colors = elements[Below(3)];
+      }
+      out->set_colors(Values<uint8_t>(size_t{four ? 4u : 3u} * colors, 256));
     }
   }
 
+  void Fill(v1::Thickness* out) {
+    out->set_value(Chance(0.1)   ? std::numeric_limits<float>::quiet_NaN()
+                   : Chance(0.1) ? -1.5f
+                                 : static_cast<float>(Below(6000)));
+    out->set_unit(static_cast<v1::Thickness::Unit>(Below(Chance(0.05) ? 9 : 3)));
+  }
+
+  // Curves of any form, of too few points at times, and with ends that do not ascend.
+  void Fill(v1::Boundary* out) {
+    out->set_form(static_cast<v1::Boundary::Form>(Below(Chance(0.05) ? 9 : 4)));
+    out->set_axis(static_cast<v1::Boundary::Axis>(Below(Chance(0.05) ? 9 : 4)));
+    const uint32_t count = Below(20);
+    std::uniform_real_distribution<double> any(-3, 3);
+    for (uint32_t i = 0; i < 3 * count; ++i) {
+      out->add_points(Chance(0.01) ? std::numeric_limits<double>::infinity() : any(random_));
+    }
+    if (Chance(0.3)) out->mutable_points()->Truncate(static_cast<int>(Below(3 * count + 1)));
+    for (uint32_t end = Below(8); end <= count && Chance(0.7); end += Below(8)) out->add_ends(end);
+  }
+
   void Fill(v1::Primitive* out) {
-    switch (Below(6)) {
+    switch (Below(7)) {
       case 0:
         Fill(out->mutable_points()->mutable_vertices());
         break;
@@ -280,6 +308,12 @@ class Generator {
       case 3:
       case 4:
         Fill(out->mutable_mesh()->mutable_vertices());
+        if (Chance(0.3)) Fill(out->mutable_mesh()->mutable_shell());
+        if (Chance(0.3)) out->mutable_mesh()->set_fill(static_cast<v1::Fill>(Below(6)));
+        break;
+      case 5:
+        out->mutable_implicit()->mutable_surface()->set_text("z = sin(x)");
+        Fill(out->mutable_implicit()->mutable_boundary());
         break;
       default:
         out->mutable_sphere()->set_radius(1);

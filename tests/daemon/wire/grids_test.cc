@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "daemon/wire/encode_primitive.h"
 #include "daemon/wire/primitive.h"
@@ -18,6 +19,8 @@
 namespace voxeld::daemon::wire {
 namespace {
 
+using ::testing::ElementsAre;
+using ::testing::FloatEq;
 using ::testing::HasSubstr;
 
 using P = v1::Primitive;
@@ -217,6 +220,59 @@ TEST(Grids, TheyAreToldAsTheyWereSent) {
     EXPECT_EQ(told.SerializeAsString(), make().SerializeAsString());
     EXPECT_LE(told.ByteSizeLong(), EncodedBytes(content));
   }
+}
+
+// A sample is 2 units wide along every axis but the last, where the grid's one is 1 wide.
+TEST(Grids, ScalesColorIsosurfacesByThePlace) {
+  P p = Isosurface();
+  p.mutable_color_scale()->add_colors(0x000000);
+  p.mutable_color_scale()->add_colors(0xFF0000);
+  Set(p.mutable_color_scale()->mutable_along(), 0, 2, 0);
+  Content content;
+  const auto by_place = [&](double low, double high) {
+    p.mutable_color_scale()->set_low(low);
+    p.mutable_color_scale()->set_high(high);
+    const MaybeFault fault = FaultOf(p, &content);
+    EXPECT_FALSE(fault.has_value()) << fault->field << " " << fault->message;
+    const gpu::GeometryRecord& record = GroupOf(content).parts[0].geometry->record;
+    return std::vector<float>(record.params, record.params + 4);
+  };
+  // y / 2 from 0 to 3: 256 entries over 3 samples.
+  EXPECT_THAT(by_place(0, 0), ElementsAre(0, FloatEq(256.0f / 3), 0, 0));
+  EXPECT_EQ(ViewOf(content).head().by_level, 2u);
+  EXPECT_EQ(ViewOf(content).table()[0], gpu::SampleHead::kDrawn);
+  EXPECT_EQ(ViewOf(content).table()[255], gpu::SampleHead::kDrawn | 0xFF0000);
+  EXPECT_THAT(by_place(1, 3), ElementsAre(0, 128, 0, -128));
+  EXPECT_THAT(by_place(3, 1), ElementsAre(0, -128, 0, 384));
+  Set(p.mutable_isosurface()->mutable_grid()->mutable_corner(), 7, 4, 7);
+  EXPECT_THAT(by_place(1, 3), ElementsAre(0, 128, 0, 128));
+  P told;
+  Encode(content, &told);
+  EXPECT_EQ(told.SerializeAsString(), p.SerializeAsString());
+}
+
+TEST(Grids, WhatIsWrongWithTheScaleOfAnIsosurfaceIsSaid) {
+  const auto scaled = [] {
+    P p = Isosurface();
+    p.mutable_color_scale()->set_colormap("viridis");
+    Set(p.mutable_color_scale()->mutable_along(), 0, 0, 1);
+    return p;
+  };
+  const FaultCase cases[] = {
+      {"scalars", scaled, [](P& p) { p.mutable_color_scale()->set_scalars(Packed<float>({1})); },
+       "primitive.color_scale.scalars", Reason::kInvalidValue, "has no vertices; give along"},
+      {"along", scaled, [](P& p) { p.mutable_color_scale()->clear_along(); },
+       "primitive.color_scale.along", Reason::kInvalidValue, "has no direction"},
+      {"colormap", scaled, [](P& p) { p.mutable_color_scale()->set_colormap("sepia"); },
+       "primitive.color_scale.colormap", Reason::kNotFound, "give a name of matplotlib's"},
+      {"ends", scaled,
+       [](P& p) {
+         p.mutable_color_scale()->set_low(0);
+         p.mutable_color_scale()->set_high(1e-38);
+       },
+       "primitive.color_scale.high", Reason::kOutOfRange, "too near to one another"},
+  };
+  ExpectFaults(cases, [](const P& p, Content* content) { return FaultOf(p, content); });
 }
 
 TEST(Grids, ShellsInUnitsAreOfThePrimitives) {

@@ -38,12 +38,25 @@ class RandomPrimitives {
         segments->set_sampling(Pick({v1::LINE_SAMPLING_UNSPECIFIED, v1::LINE_SAMPLING_THIN,
                                      v1::LINE_SAMPLING_EUCLIDEAN, v1::LINE_SAMPLING_COVER}));
         SetThickness(segments);
+        const uint32_t corners = CornersOf(segments->vertices());
+        const bool pairs = segments->topology() == v1::Segments::TOPOLOGY_UNSPECIFIED ||
+                           segments->topology() == v1::Segments::LIST;
+        const bool loop = segments->topology() == v1::Segments::LOOP;
+        SetElementColors(pairs  ? corners / 2
+                         : loop ? corners
+                                : corners - 1,
+                         segments->mutable_vertices());
         break;
       }
       case 2:
         *primitive.mutable_mesh()->mutable_vertices() = Corners(3 * (1 + random_() % most), true);
-        primitive.mutable_mesh()->set_rule(Rule());
-        if (random_() % 4 == 0) SetTexture(primitive.mutable_mesh());
+        if (random_() % 4 == 0) {
+          SetTexture(primitive.mutable_mesh());
+        } else {
+          v1::Vertices* const vertices = primitive.mutable_mesh()->mutable_vertices();
+          SetElementColors(CornersOf(*vertices) / 3, vertices);
+        }
+        SetShell(primitive.mutable_mesh());
         break;
       case 3:
         SetVec3(primitive.mutable_box()->mutable_center(), Coordinate(), Coordinate(),
@@ -101,6 +114,15 @@ class RandomPrimitives {
     out->mutable_thickness()->set_unit(
         Pick({v1::Thickness::UNIT_UNSPECIFIED, v1::Thickness::VOXELS, v1::Thickness::UNITS}));
   }
+  static uint32_t CornersOf(const v1::Vertices& in) {
+    return in.index_count() != 0 ? in.index_count() : in.count();
+  }
+  void SetElementColors(uint32_t elements, v1::Vertices* out) {
+    if (random_() % 4 != 0) return;
+    out->set_colors_of(v1::Vertices::ELEMENTS);
+    out->set_color_type(v1::ELEMENT_TYPE_RGB8);
+    out->set_colors(Values<uint8_t>(size_t{3} * elements, [&] { return random_(); }));
+  }
   template <typename T>
   void SetSurface(T* out) {
     out->set_fill(Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_SOLID}));
@@ -141,7 +163,7 @@ class RandomPrimitives {
         if (random_() % 2 == 0)
           map->set_colors(Values<uint8_t>(3 * samples, [&] { return random_(); }));
         if (random_() % 4 == 0) map->set_picture(Picture());
-        return map->set_rule(Rule());
+        return SetShell(map);
       }
       case 0:
         SetPoint(out->mutable_ellipsoid()->mutable_center());
@@ -206,6 +228,20 @@ class RandomPrimitives {
       }
       tree->add_values(Coordinate());
       tree->set_names("r");
+    }
+    if (random_() % 2 == 0) {
+      v1::Boundary* const boundary = out->mutable_boundary();
+      boundary->set_form(Pick({v1::Boundary::FORM_UNSPECIFIED, v1::Boundary::POLYLINE,
+                               v1::Boundary::CATMULL_ROM, v1::Boundary::B_SPLINE}));
+      boundary->set_axis(Pick({v1::Boundary::AXIS_UNSPECIFIED, v1::Boundary::Z, v1::Boundary::X}));
+      for (const double number : {-5, -4, 1, 4, -5, 2, 5, 5, 3, -4, 4, 4}) {
+        boundary->add_points(number + Length() / 1e4);
+      }
+      if (random_() % 2 == 0) {
+        for (const double number : {-1, -1, 0, 1, -1, 0, 0, 1, 0}) boundary->add_points(number);
+        boundary->add_ends(4);
+        boundary->add_ends(7);
+      }
     }
     if (random_() % 2 == 0) {
       out->mutable_level()->set_text("z / r");

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/wire/color_scale.h"
 #include "tests/daemon/wire/curve_messages.h"
 
 namespace voxeld::daemon::wire {
@@ -60,6 +61,34 @@ TEST_F(ScalesTest, ScalesColorLettersOverTheWholeText) {
     const GeometryData& lines = Geometry(p);
     EXPECT_EQ(lines.arrays.colors().size(), lines.record.vertex_count);
   }
+}
+
+TEST_F(ScalesTest, LettersInTheirOwnColoursAreCountedBeforeTheyAreMade) {
+  P p = Text();
+  p.mutable_text()->set_text(std::string(1000, 'A'));
+  uint64_t decoded = 0;
+  const DecodeContext context{.limits = limits_, .fonts = &fonts_, .decoded_bytes = &decoded};
+  const auto fault_of = [&](const P& primitive) {
+    return ToContent(FieldPath("primitive"), primitive, context, &content_);
+  };
+  ASSERT_FALSE(fault_of(p).has_value());
+  const uint64_t plain = decoded;
+  *p.mutable_color_scale() = Scaled().color_scale();
+  ASSERT_FALSE(fault_of(p).has_value());
+  const uint64_t colored = decoded - plain;
+  EXPECT_GT(colored, 1000 * sizeof(ScaleTable));
+  EXPECT_LT(plain, colored / 10) << "plain ones share one letter";
+  // About as much as that they were reckoned to take.
+  decoded = 0;
+  limits_.max_uncommitted_bytes = colored * 19 / 20;
+  const MaybeFault fault = fault_of(p);
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->field, "primitive.text.text");
+  EXPECT_EQ(fault->reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(fault->message, ::testing::HasSubstr("makes 1000 letters in colours of their own"));
+  EXPECT_EQ(decoded, 0u);
+  limits_.max_uncommitted_bytes = colored * 21 / 20;
+  EXPECT_FALSE(fault_of(p).has_value());
 }
 
 TEST_F(ScalesTest, ScalesAreForWhatCanHaveThem) {

@@ -162,6 +162,42 @@ std::vector<FaultStep> FaultScenario() {
   script.Apply("a ball in a new layer");
   script.Frame("under the second target");
 
+  // Many solids and nothing else: they move, look otherwise, are hidden, and mask.
+  LayerRecord crowd{.id = 4, .order = 1, .opacity = 210};
+  script.Put(crowd);
+  script.PutGeometry(Ball(600, 0, 0, 0, 2, 0xFFC040));
+  for (uint64_t i = 0; i < 40; ++i) {
+    const auto at = static_cast<double>(i);
+    DrawableRecord ball{.id = 600 + i, .geometry = 600, .layer = crowd.id};
+    ball.transform.m[3] = 4 + at, ball.transform.m[7] = 44 - at, ball.transform.m[11] = at * 0.7;
+    script.Put(ball);
+  }
+  script.Apply("a crowd");
+  script.Frame("with the crowd");
+  const auto change = [&](const std::string& how) {
+    script.Put(crowd);
+    script.Apply(how);
+    script.Frame(how + ", drawn");
+  };
+  crowd.opacity = 90;
+  change("the crowd is fainter");
+  crowd.transform.m[3] = 1.5, crowd.transform.m[1] = 0.2;
+  change("the crowd has moved");
+  crowd.transform.m[7] = -2;
+  crowd.visible = 0;
+  change("the crowd has moved away");
+  crowd.transform.m[11] = 3;
+  change("the crowd has moved out of sight");
+  script.Put(LayerRecord{.id = 3, .order = 2, .has_mask = 1, .mask = crowd.id});
+  crowd.transform.m[5] = 0.9;
+  crowd.visible = 1;
+  change("the crowd is back, and masks a layer");
+  DrawableRecord out = script.drawable(610);
+  out.layer = 1;
+  script.Put(out);
+  crowd.transform.m[0] = 1.1;
+  change("one leaves the crowd, which moves");
+
   Target planes = darker;
   planes.layout.format = display::PixelFormat::kBitPlanes3;
   planes.layout.sub_frames = 2;

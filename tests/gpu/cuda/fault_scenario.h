@@ -21,8 +21,9 @@ struct FaultStep {
   conformance::SceneModel scene;   // after the step
 };
 
-// Targets, among them one of the same layout; lines that the CPU draws; deltas that add, replace, drop, hide, and outgrow
-// tables; more that goes than an index keeps; frames between; voxels read. Ends in a frame.
+// Targets, among them one of the same layout; lines that the CPU draws; a crowd that moves; deltas
+// that add, replace, drop, hide, and outgrow tables; more that goes than an index keeps; frames
+// between; voxels read. Ends in a frame.
 std::vector<FaultStep> FaultScenario();
 
 // What can be seen of an engine after a step.

@@ -244,6 +244,85 @@ TEST(CutPatches, TrianglesStayWithinTheStatedErrorAndNeighboursMeet) {
   EXPECT_GT(worst, kPatchError / 20) << "finer than anyone needs";
 }
 
+// Any turn, stretch and shear that leaves what is within 1 of the origin within the volume.
+Affine RandomMap(std::mt19937& random) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  const double scale = std::pow(2, 3 + 2 * number(random));
+  Affine map;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) map.m[r * 4 + c] = scale * number(random);
+    map.m[r * 4 + 3] = kSize / 2;
+  }
+  return map;
+}
+
+TEST(CutNeeds, HoldWhatCuttingTakesUnderAnyMap) {
+  std::mt19937 random(4);
+  double all_said = 0, all_made = 0;
+  for (int round = 0; round < 200; ++round) {
+    const bool patches = round % 2 == 1;
+    const std::vector<float> points = RandomPoints(random, patches ? 32 : 40, -1, 1);
+    const GeometryView view =
+        View(points, patches ? PrimitiveKind::kPatches : PrimitiveKind::kCurves,
+             round % 4 == 0 && !patches ? Topology::kStrip : Topology::kList);
+    const Affine map = RandomMap(random);
+    const CutNeed need = CutNeed::Of(view.record, points);
+    const Cut cut = CutCurved(view, map, TileGrid::Of(kSize, kSize, kSize));
+    const double made = static_cast<double>(cut.vertices.size()) / (patches ? 1 : 2);
+    const double said = need.Pieces(StretchOf(map));
+    EXPECT_GE(said, made) << "round " << round;
+    EXPECT_TRUE(need.IsMet(StretchOf(map)));
+    all_said += said;
+    all_made += made;
+  }
+  EXPECT_LT(all_said, 3 * all_made) << "much more than it takes";
+}
+
+TEST(CutNeeds, AreNotMetWhereCuttingComesToAnEnd) {
+  std::vector<float> points;
+  for (int i = 0; i < 20'000; ++i) {
+    for (const float c :
+         {0.0f, 0.0f, 0.0f, 400.0f, 400.0f, 0.0f, -200.0f, 400.0f, 0.0f, 200.0f, 0.0f, 0.0f}) {
+      points.push_back(c);
+    }
+  }
+  const GeometryView curves = View(points, PrimitiveKind::kCurves, Topology::kList);
+  EXPECT_FALSE(CutNeed::Of(curves.record, points).IsMet(1));
+  EXPECT_TRUE(CutNeed::Of(curves.record, points).IsMet(0.1));
+  std::mt19937 random(5);
+  const std::vector<float> patch = RandomPoints(random, 16, -1, 1);
+  const CutNeed need =
+      CutNeed::Of(View(patch, PrimitiveKind::kPatches, Topology::kList).record, patch);
+  EXPECT_TRUE(need.IsMet(1e3));
+  EXPECT_FALSE(need.IsMet(1e6)) << "more than 512 along a side";
+  const CutNeed none = CutNeed::Of(View({}, PrimitiveKind::kPatches, Topology::kList).record, {});
+  EXPECT_TRUE(none.IsMet(1e30));
+}
+
+TEST(CutNeeds, NoDistanceBecomesLongerThanTheStretch) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> number(-1, 1);
+  for (int round = 0; round < 300; ++round) {
+    const Affine map = RandomMap(random);
+    const double stretch = StretchOf(map);
+    double longest = 0;
+    for (int i = 0; i < 300; ++i) {
+      const double d[3] = {number(random), number(random), number(random)};
+      double square = 0;
+      for (int r = 0; r < 3; ++r) {
+        const double at = map.m[r * 4] * d[0] + map.m[r * 4 + 1] * d[1] + map.m[r * 4 + 2] * d[2];
+        square += at * at;
+      }
+      longest = std::max(longest, std::sqrt(square / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])));
+    }
+    EXPECT_LE(longest, stretch * (1 + 1e-12));
+    EXPECT_GT(longest, stretch / 2);
+  }
+  Affine scale;
+  scale.m[0] = 3, scale.m[5] = -7, scale.m[10] = 2;
+  EXPECT_EQ(StretchOf(scale), 7);
+}
+
 TEST(CutPatches, FarOnesAreLeftOutAndAllHaveAnEnd) {
   std::vector<float> away(48, -5000.0f);
   EXPECT_TRUE(CutCurved(View(away, PrimitiveKind::kPatches, Topology::kList), Affine(),

@@ -31,6 +31,10 @@ constexpr ShapeExample kExamples[] = {
      "mesh vertices='-0.8,-0.8,-0.6 0.8,-0.8,-0.6 0,0,0.8 0.8,-0.8,-0.6 0,0.8,-0.6 0,0,0.8 "
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8 -0.8,-0.8,-0.6 0,0.8,-0.6 0.8,-0.8,-0.6' "
      "fill=solid color=pink"},
+    {"mesh, with a shell",
+     "mesh vertices='-0.8,-0.8,-0.5 0.8,-0.6,-0.3 0,0.2,0.6 0.8,-0.6,-0.3 0.5,0.8,-0.5 0,0.2,0.6' "
+     "shell=12 vertices.colors='red gold white gold skyblue white'\n"
+     "clip_plane a=1 b=1 d=0.6"},
     {"mesh, textured",
      "mesh vertices='-0.8,-0.8,-0.5 0.8,-0.8,-0.5 0,0,0.7 0.8,-0.8,-0.5 0.8,0.8,-0.5 0,0,0.7 "
      "0.8,0.8,-0.5 -0.8,0.8,-0.5 0,0,0.7 -0.8,0.8,-0.5 -0.8,-0.8,-0.5 0,0,0.7' "
@@ -61,6 +65,13 @@ constexpr ShapeExample kExamples[] = {
      "0.27,-0.27,1.1 0.8,-0.27,0.2 -0.8,0.27,0.2 -0.27,0.27,1.1 0.27,0.27,1.1 0.8,0.27,0.2 "
      "-0.8,0.8,-0.6 "
      "-0.27,0.8,0.2 0.27,0.8,0.2 0.8,0.8,-0.6' fill=lines color=teal"},
+    {"bezier_surface, with a shell",
+     "bezier_surface vertices='-0.8,-0.8,-0.6 -0.27,-0.8,0.2 0.27,-0.8,0.2 0.8,-0.8,-0.6 "
+     "-0.8,-0.27,0.2 -0.27,-0.27,1.1 "
+     "0.27,-0.27,1.1 0.8,-0.27,0.2 -0.8,0.27,0.2 -0.27,0.27,1.1 0.27,0.27,1.1 0.8,0.27,0.2 "
+     "-0.8,0.8,-0.6 "
+     "-0.27,0.8,0.2 0.27,0.8,0.2 0.8,0.8,-0.6' shell=0.16u color=teal\n"
+     "clip_plane b=1 d=0.1"},
     {"arrow",
      "arrow start=-0.7,-0.5,-0.6 end=0.6,0.5,0.7 shaft_radius=0.08 head_radius=0.25 color=red"},
     {"text",
@@ -105,6 +116,11 @@ constexpr ShapeExample kExamples[] = {
      "-0.3,-0.3,-0.5,-0.2,0.3,0.5,0.3,-0.2,-0.5,-0.3,-0.3,-0.5,-0.3,0.1,0.3,0.1,-0.3,-0.5,"
      "-0.3,-0.1,-0.4,-0.5,-0.3,-0.2,-0.3,-0.5,-0.4,-0.1,0.1,-0.2,-0.4,-0.5,-0.5,-0.5,-0.4,"
      "-0.2,0.1,0.4,0.1,-0.1,-0.3,-0.3,-0.3,-0.1,0.1,0.4"},
+    {"height_map, with a shell",
+     "height_map corner=-0.9,-0.9,-0.1 edge_a=1.8,0,0 edge_b=0,1.8,0 columns=5 rows=5 shell=10 "
+     "heights=-0.3,0,0.2,0,-0.3,0,0.3,0.5,0.3,0,0.2,0.5,0.7,0.5,0.2,0,0.3,0.5,0.3,0,-0.3,0,0.2,0,-"
+     "0.3 color_scale.along=0,0,1 color_scale.colormap=viridis\n"
+     "clip_plane a=-1 b=1 d=0.2"},
     {"height_map, textured",
      "height_map corner=-0.9,-0.9,0 edge_a=1.8,0,0 edge_b=0,1.8,0 columns=5 rows=5 "
      "heights=-0.3,0,0.2,0,-0.3,0,0.3,0.5,0.3,0,0.2,0.5,0.7,0.5,0.2,0,0.3,0.5,0.3,0,-0.3,0,0.2,0,-"
@@ -139,7 +155,8 @@ constexpr ShapeExample kExamples[] = {
     {"isosurface",
      "isosurface level=0.4 grid.corner=-0.9,-0.9,-0.9 grid.edge_a=1.8,0,0 grid.edge_b=0,1.8,0 "
      "grid.edge_c=0,0,1.8 "
-     "grid.size_a=6 grid.size_b=6 grid.size_c=6 color=pink grid.samples="
+     "grid.size_a=6 grid.size_b=6 grid.size_c=6 color_scale.along=0,0,1 "
+     "color_scale.colormap=plasma grid.samples="
      ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.1,.2,.2,.2,.2,.1,.1,.2,.3,.4,.5,.2,.0,.1,.1,.3,.3,.1,.0,"
