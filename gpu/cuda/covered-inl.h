@@ -21,7 +21,8 @@ namespace voxeld::gpu::cuda {
 
 using Six = implicit::Lanes<6>;
 
-inline constexpr int32_t kCoveredRim = kCoveredEdge + 2;  // voxels of a tile's row and those around it
+inline constexpr int32_t kCoveredRim =
+    kCoveredEdge + 2;  // voxels of a tile's row and those around it
 inline constexpr uint32_t kCoveredAcross = kCoveredRim * kCoveredRim;
 inline constexpr uint32_t kCoveredThreads = (kCoveredAcross + 31) / 32 * 32;
 inline constexpr uint32_t kCoveredBlocks = 3;  // of a multiprocessor
@@ -287,8 +288,9 @@ struct CoveredAt {
       return implicit::Mul(implicit::ConstantLike(like, a), d);
     };
     const M sum = implicit::Add(
-        implicit::Add(times(row[0], CoveredDistance(view.axis[0], x, like)),
-                      times(row[1], implicit::Spread(CoveredDistance(view.axis[1], y, 0.0f), like))),
+        implicit::Add(
+            times(row[0], CoveredDistance(view.axis[0], x, like)),
+            times(row[1], implicit::Spread(CoveredDistance(view.axis[1], y, 0.0f), like))),
         times(row[2], implicit::Spread(CoveredDistance(view.axis[2], z, 0.0f), like)));
     return implicit::Add(sum, implicit::ConstantLike(like, 0.0f));
   }

@@ -306,7 +306,7 @@ absl::Status CudaVolume::Enter() {
   bool uploads = false;
   absl::Status status;
   uint32_t singular = 0;
-  uint64_t coming[4] = {};  // items, by index
+  uint64_t coming[4] = {};                  // items, by index
   absl::flat_hash_set<uint32_t> layers[4];  // by index
   for (const IndexedBy by : kByRegion) layers[static_cast<size_t>(by)] = IndexOf(by).Layers();
   for (const Drawable* drawable : drawables) {
@@ -319,8 +319,8 @@ absl::Status CudaVolume::Enter() {
     const bool by_cpu = entry.record.drawn_by == DrawnBy::kCpu;
     uploads |= mine.cut != nullptr || !mine.hoisted.empty();
     held += mine.cut != nullptr ? mine.cut->bytes() : 0;
-    status = by_cpu ? DrawInto(entry, *drawable, slots_[slot])
-                    : Place(*drawable, mine, entry, slot);
+    status =
+        by_cpu ? DrawInto(entry, *drawable, slots_[slot]) : Place(*drawable, mine, entry, slot);
     if (!status.ok()) break;
     if (!by_cpu) {
       WithPrimitive(entry.record.kind, [&](auto primitive) {

@@ -115,7 +115,8 @@ absl::Status CudaVolume::PlaceImplicit(const Drawable& drawable, std::span<const
 template <typename F>
 absl::Status CudaVolume::ForViews(std::span<const CoveredView> all, F&& f) {
   for (size_t begin = 0; begin < all.size(); begin += kMostViews) {
-    const std::span<const CoveredView> some = all.subspan(begin, std::min(kMostViews, all.size() - begin));
+    const std::span<const CoveredView> some =
+        all.subspan(begin, std::min(kMostViews, all.size() - begin));
     CoveredViews views;
     views.count = static_cast<uint32_t>(some.size());
     for (const CoveredView& view : some) {

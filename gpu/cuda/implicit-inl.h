@@ -341,7 +341,8 @@ static __device__ __noinline__ void DrawCovered(const TableEntry& entry, const B
   const Source& source = entry.source;
   if (IsEmpty(Intersect(box, source.solid.bounds))) return;  // the same for every thread
   const uint32_t lane = threadIdx.x % 32, plane = threadIdx.x / 32;
-  const int32_t i = box.lo[0] / kTileSize, j = box.lo[1] / kTileSize + static_cast<int32_t>(lane / 16),
+  const int32_t i = box.lo[0] / kTileSize,
+                j = box.lo[1] / kTileSize + static_cast<int32_t>(lane / 16),
                 k = box.lo[2] / kTileSize;
   const uint32_t in_tile = plane << 4 | lane % 16;
   const uint32_t row =
@@ -354,10 +355,9 @@ static __device__ __noinline__ void DrawCovered(const TableEntry& entry, const B
     const uint32_t r = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
     if ((__shfl_sync(kAllLanes, row, r) >> lane & 1) == 0) continue;
     if (!uniform) {
-      word = ImplicitColor(field, entry.priority, entry.erase != 0,
-                           box.lo[0] + static_cast<int32_t>(lane),
-                           box.lo[1] + static_cast<int32_t>(r),
-                           box.lo[2] + static_cast<int32_t>(plane));
+      word = ImplicitColor(
+          field, entry.priority, entry.erase != 0, box.lo[0] + static_cast<int32_t>(lane),
+          box.lo[1] + static_cast<int32_t>(r), box.lo[2] + static_cast<int32_t>(plane));
     }
     at[r << 5] = Max(at[r << 5], word);  // nobody else has this voxel now
   }

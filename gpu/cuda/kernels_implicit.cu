@@ -57,7 +57,8 @@ class InterpretedFormula {
   const uint32_t y_, z_;
 };
 
-__global__ void FindTilesKernel(const TableEntry* table, const __grid_constant__ CoveredViews views) {
+__global__ void FindTilesKernel(const TableEntry* table,
+                                const __grid_constant__ CoveredViews views) {
   const CoveredView& view = views.at(blockIdx.y);
   const uint64_t i = Thread();
   if (i >= view.items) return;
@@ -67,7 +68,8 @@ __global__ void FindTilesKernel(const TableEntry* table, const __grid_constant__
       IsEmpty(box) ? Implicit::kNothing : Implicit::ReachOf(implicit::Field(source), box);
 }
 
-__global__ void FindAlongKernel(const TableEntry* table, const __grid_constant__ CoveredViews views) {
+__global__ void FindAlongKernel(const TableEntry* table,
+                                const __grid_constant__ CoveredViews views) {
   const CoveredView& view = views.at(blockIdx.y);
   uint64_t place = Thread();
   int a = 0;
@@ -124,12 +126,12 @@ dim3 CoveredBlocks(const CoveredViews& views) {
 
 cudaError_t FindTiles(const TableEntry* table, const CoveredViews& views, cudaStream_t stream) {
   FindTilesKernel<<<dim3(Blocks(views.most_items), views.count), kItemThreads, 0, stream>>>(table,
-                                                                                           views);
+                                                                                            views);
   return cudaGetLastError();
 }
 cudaError_t FindAlong(const TableEntry* table, const CoveredViews& views, cudaStream_t stream) {
   FindAlongKernel<<<dim3(Blocks(views.most_places), views.count), kItemThreads, 0, stream>>>(table,
-                                                                                            views);
+                                                                                             views);
   return cudaGetLastError();
 }
 cudaError_t FindCovered(const TableEntry* table, const CoveredViews& views, cudaStream_t stream) {

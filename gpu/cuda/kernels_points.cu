@@ -71,8 +71,7 @@ __device__ void MakeSome(const TableEntry& entry, uint32_t item, uint32_t end,
       if (item + offset >= end) continue;
       int32_t voxel[3];
       VoxelOfPoint(map, position[i], voxel);
-      StorePoint(Placed(grid, voxel, MakeWord(priority, erase, Tinted(rgb[i], tint))),
-                 to + offset);
+      StorePoint(Placed(grid, voxel, MakeWord(priority, erase, Tinted(rgb[i], tint))), to + offset);
     }
   }
 }
@@ -209,7 +208,7 @@ __device__ uint32_t SumRegions(const PointSort& sort, uint32_t chunk, uint32_t r
 // are drawn.
 template <uint32_t kEach, bool kAll>
 __device__ __forceinline__ void SortChunk(const PointSort& sort, uint32_t chunk, uint32_t regions,
-                          PlacedPoint mine[kEach]) {
+                                          PlacedPoint mine[kEach]) {
   __shared__ uint32_t shared_base;
   PlacedPoint* const sorted = reinterpret_cast<PlacedPoint*>(SortMemory());
   uint32_t* const counts = reinterpret_cast<uint32_t*>(sorted + kPointThreads * kEach);
@@ -252,8 +251,8 @@ __device__ __forceinline__ void SortChunk(const PointSort& sort, uint32_t chunk,
 
 template <uint32_t kEach>
 __device__ void ClearCounts(uint32_t regions) {
-  uint32_t* const counts = reinterpret_cast<uint32_t*>(
-      SortMemory() + sizeof(PlacedPoint) * kPointThreads * kEach);
+  uint32_t* const counts =
+      reinterpret_cast<uint32_t*>(SortMemory() + sizeof(PlacedPoint) * kPointThreads * kEach);
   for (uint32_t i = threadIdx.x; i < regions / 2; i += kPointThreads) counts[i] = 0;
 }
 
@@ -396,9 +395,8 @@ cudaError_t SortPoints(const PointSort& sort, const PlacedPoint* points, uint32_
 
 cudaError_t SortFewPoints(const FewPoints& few, cudaStream_t stream) {
   const size_t shared = SortPointsShared(few.sort.within.drawn_count(), 1);
-  const cudaError_t error =
-      cudaFuncSetAttribute(SortFewPointsKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                           static_cast<int>(shared));
+  const cudaError_t error = cudaFuncSetAttribute(
+      SortFewPointsKernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared));
   if (error != cudaSuccess) return error;
   SortFewPointsKernel<<<1, kPointThreads, shared, stream>>>(few);
   return cudaGetLastError();

@@ -12,8 +12,8 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-constexpr int kSuccess = 0;            // NVRTC_SUCCESS
-constexpr int kErrorOfTheSource = 6;   // NVRTC_ERROR_COMPILATION
+constexpr int kSuccess = 0;             // NVRTC_SUCCESS
+constexpr int kErrorOfTheSource = 6;    // NVRTC_ERROR_COMPILATION
 constexpr size_t kMostOfTheLog = 2000;  // bytes of it that are told
 
 }  // namespace
@@ -36,13 +36,13 @@ Nvrtc::Nvrtc(void* library, std::string place)
 // It may have threads: it is not closed.
 Nvrtc::~Nvrtc() = default;
 
-std::vector<std::string> Nvrtc::Places(
-    const std::function<std::string(const char*)>& environment) {
+std::vector<std::string> Nvrtc::Places(const std::function<std::string(const char*)>& environment) {
   const std::string named = environment("VOXELD_NVRTC");
   if (named == "off") return {};
   std::vector<std::string> places;
   if (!named.empty()) places.push_back(named);
-  places.insert(places.end(), {"libnvrtc.so.13", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"});
+  places.insert(places.end(),
+                {"libnvrtc.so.13", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"});
   return places;
 }
 

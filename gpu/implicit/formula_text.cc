@@ -126,7 +126,8 @@ class Writer {
       }
     }
     return absl::StrCat("struct Formula {\n  template <class N>\n  struct Row {\n", fields,
-                        "    template <class At>\n    VOXELD_HD explicit Row(const At& at) {\n", row,
+                        "    template <class At>\n    VOXELD_HD explicit Row(const At& at) {\n",
+                        row,
                         "    }\n  };\n  template <class M, class N, class At>\n"
                         "  static VOXELD_HD M Value(const Row<N>& row, const At& at) {\n",
                         voxel, "    return ", Argument(root_, /*once=*/false), ";\n  }\n};\n");
@@ -177,8 +178,7 @@ class Writer {
       default:
         break;
     }
-    std::string value =
-        absl::StrCat(FunctionOf(in.op()), "(", Argument(arguments_[i][0], once));
+    std::string value = absl::StrCat(FunctionOf(in.op()), "(", Argument(arguments_[i][0], once));
     if (IsBinary(in.op())) absl::StrAppend(&value, ", ", Argument(arguments_[i][1], once));
     if (in.op() == Op::kPowI) absl::StrAppend(&value, ", ", static_cast<int32_t>(in.immediate));
     return value + ")";

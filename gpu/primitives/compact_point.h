@@ -33,9 +33,8 @@ VOXELD_HD inline int32_t VoxelNear(double at) {
 
 // The voxel of a position (of Source::positions).
 VOXELD_HD inline void VoxelOfPoint(const Affine& map, const float position[3], int32_t voxel[3]) {
-  const Point3d at =
-      Map(map, static_cast<double>(position[0]), static_cast<double>(position[1]),
-          static_cast<double>(position[2]));
+  const Point3d at = Map(map, static_cast<double>(position[0]), static_cast<double>(position[1]),
+                         static_cast<double>(position[2]));
   voxel[0] = VoxelNear(at.x);
   voxel[1] = VoxelNear(at.y);
   voxel[2] = VoxelNear(at.z);

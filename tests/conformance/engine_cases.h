@@ -57,9 +57,8 @@ inline std::vector<EngineCase> EngineCases() {
   std::vector<EngineCase> cases = CudaCases("cuda", false);
   // With formulas that are compiled before anything is drawn.
   cases.push_back({"cuda_formulas", [](const EngineOptions& options) {
-                     return CreateCudaEngine(
-                         options, "a test", {},
-                         {.compile_formulas = cuda::CompileFormulas::kAtOnce});
+                     return CreateCudaEngine(options, "a test", {},
+                                             {.compile_formulas = cuda::CompileFormulas::kAtOnce});
                    }});
   cases.push_back(CaseOf("cuda_worker", EngineKind::kCuda, true));
   return cases;

@@ -68,7 +68,8 @@ TEST_P(PointClouds, InOrder) {
   const auto place = [&](uint32_t i) {
     return std::array{std::floor(g.positions[i * 3 + 2] / 16), g.positions[i * 3]};
   };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
   g.indices = order;
   g.record.index_count = g.record.vertex_count;
   ExpectDrawn();

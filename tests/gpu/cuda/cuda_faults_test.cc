@@ -85,10 +85,10 @@ const Way kWays[] = {{"plain", kEvery, {.compile_formulas = cuda::CompileFormula
                        .points_each = 1,
                        .index_bytes = 1 << 16,
                        .compile_formulas = cuda::CompileFormulas::kNever}},
-                      // Layers of solids are moved by the device, however few.
-                      {"crowds",
-                       kEvery == 1 ? 7 : 2 * kEvery,
-                       {.least_crowd = 2, .compile_formulas = cuda::CompileFormulas::kNever}}};
+                     // Layers of solids are moved by the device, however few.
+                     {"crowds",
+                      kEvery == 1 ? 7 : 2 * kEvery,
+                      {.least_crowd = 2, .compile_formulas = cuda::CompileFormulas::kNever}}};
 
 class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:

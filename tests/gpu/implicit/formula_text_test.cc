@@ -136,9 +136,9 @@ class Library {
     if (library_ != nullptr) dlclose(library_);
   }
   Compiled* Find(const char* what, size_t i) const {
-    return library_ == nullptr ? nullptr
-                               : reinterpret_cast<Compiled*>(
-                                     dlsym(library_, absl::StrCat(what, i).c_str()));
+    return library_ == nullptr
+               ? nullptr
+               : reinterpret_cast<Compiled*>(dlsym(library_, absl::StrCat(what, i).c_str()));
   }
 
  private:
@@ -213,15 +213,16 @@ TEST(FormulaText, GivesWhatRunningTheProgramGives) {
           const float* const d = asked.gradients[r];
           dual[r] = {q[r], {d[0], d[1], d[2]}};
         }
-        const float want = RestOf(view, q, asked.voxel,
-                                  [&](uint32_t v) { return asked.hoisted[v][lane][0]; });
+        const float want =
+            RestOf(view, q, asked.voxel, [&](uint32_t v) { return asked.hoisted[v][lane][0]; });
         const Dual<float> want_dual = RestOf(view, dual, asked.voxel, [&](uint32_t v) {
           const float* const h = asked.hoisted[v][lane];
           return Dual<float>{h[0], {h[1], h[2], h[3]}};
         });
         numbers += IsFinite(want) ? 1 : 0;
         differing += Same(got[lane], want) && Same(got_dual[lane][0], want_dual.value) ? 0 : 1;
-        for (int a = 0; a < 3; ++a) differing += Same(got_dual[lane][1 + a], want_dual.d[a]) ? 0 : 1;
+        for (int a = 0; a < 3; ++a)
+          differing += Same(got_dual[lane][1 + a], want_dual.d[a]) ? 0 : 1;
       }
     }
     EXPECT_EQ(differing, 0u) << "program " << i << ":\n" << FormulaText(programs[i]);
@@ -243,7 +244,8 @@ std::vector<uint32_t> WaveOf(double wave, double shift, bool add) {
 }
 
 TEST(FormulaText, ProgramsThatDifferInConstantsShareIt) {
-  const auto one = WaveOf(0.5, 3, true), other = WaveOf(0.25, 7, true), third = WaveOf(0.5, 3, false);
+  const auto one = WaveOf(0.5, 3, true), other = WaveOf(0.25, 7, true),
+             third = WaveOf(0.5, 3, false);
   EXPECT_NE(one, other);
   EXPECT_EQ(FormulaKey(one), FormulaKey(other));
   EXPECT_EQ(FormulaText(one), FormulaText(other));
@@ -255,7 +257,7 @@ TEST(FormulaText, WhatIsTheSameAlongXIsWorkedOutOnceARow) {
   const std::string text = FormulaText(WaveOf(0.5, 3, true));
   const size_t voxel = text.find("static VOXELD_HD M Value");
   ASSERT_NE(voxel, std::string::npos);
-  EXPECT_THAT(text.substr(0, voxel), HasSubstr("Mul("));            // y·z
+  EXPECT_THAT(text.substr(0, voxel), HasSubstr("Mul("));  // y·z
   EXPECT_THAT(text.substr(voxel), Not(HasSubstr("Mul(")));
   EXPECT_THAT(text.substr(voxel), HasSubstr("at.Hoisted(0, 0)"));  // the sine
   EXPECT_THAT(text, Not(HasSubstr("Sin(")));                       // is hoisted

@@ -48,8 +48,9 @@ class DeviceToHost final : public Ceiling {
 
 absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options,
                                                             bool keep_tiles) {
-  return gpu::CreateCudaEngine(options, "a benchmark", {}, {.pack_as_drawn = !keep_tiles,
-                                .compile_formulas = gpu::cuda::CompileFormulas::kAtOnce});
+  return gpu::CreateCudaEngine(
+      options, "a benchmark", {},
+      {.pack_as_drawn = !keep_tiles, .compile_formulas = gpu::cuda::CompileFormulas::kAtOnce});
 }
 
 void PinFrame(std::span<std::byte> bytes) { gpu::cuda::PinMemory(bytes); }

@@ -88,8 +88,8 @@ cudaError_t cudaEventElapsedTime(float* ms, cudaEvent_t from, cudaEvent_t to);
 // Modules are for devices that there are.
 using cudaLibrary_t = struct CUlib_st*;
 using cudaKernel_t = struct CUkern_st*;
-inline cudaError_t cudaLibraryLoadData(cudaLibrary_t*, const void*, const void*, const void*, unsigned,
-                                       const void*, const void*, unsigned) {
+inline cudaError_t cudaLibraryLoadData(cudaLibrary_t*, const void*, const void*, const void*,
+                                       unsigned, const void*, const void*, unsigned) {
   return cudaErrorNotSupported;
 }
 inline cudaError_t cudaLibraryGetKernel(cudaKernel_t*, cudaLibrary_t, const char*) {
