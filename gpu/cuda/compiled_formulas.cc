@@ -7,7 +7,8 @@
 
 namespace voxeld::gpu::cuda {
 
-CompiledFormulas::CompiledFormulas(Api& api, CompileFormulas when) : api_(api), when_(when) {}
+CompiledFormulas::CompiledFormulas(Api& api, CompileFormulas when, size_t most_kept)
+    : api_(api), when_(when), most_kept_(most_kept) {}
 
 CompiledFormulas::~CompiledFormulas() {
   {
@@ -40,10 +41,12 @@ absl::StatusOr<cudaKernel_t> CompiledFormulas::Find(std::span<const uint32_t> ho
   if (when_ == CompileFormulas::kNever) return nullptr;
   if (absl::Status status = TakeDone(); !status.ok()) return status;
   Key key = implicit::FormulaKey(hoisted);
-  const auto found = formulas_.find(key);
-  const bool is_new = found == formulas_.end();
-  if (is_new && formulas_.size() >= kMostKernels) return nullptr;
-  Formula& formula = is_new ? formulas_[key] : found->second;
+  const bool is_new = !formulas_.contains(key);
+  if (is_new && formulas_.size() >= most_kept_) {
+    if (absl::Status status = Forget(); !status.ok()) return status;
+  }
+  Formula& formula = formulas_[key];
+  formula.asked = ++asked_;
   if (formula.state != State::kSeen) return formula.kernel;
   if (is_new && when_ == CompileFormulas::kLater) return nullptr;
   if (implicit::FormulaWeight(hoisted) > kMostWeight || !HasCompiler()) {
@@ -63,6 +66,23 @@ absl::StatusOr<cudaKernel_t> CompiledFormulas::Find(std::span<const uint32_t> ho
   if (!thread_.joinable()) thread_ = std::thread([this] { CompileQueued(); });
   queued_.NotifyOne();
   return nullptr;
+}
+
+absl::Status CompiledFormulas::Forget() {
+  auto oldest = formulas_.end();
+  for (auto it = formulas_.begin(); it != formulas_.end(); ++it) {
+    if (it->second.state == State::kAsked) continue;
+    if (oldest == formulas_.end() || it->second.asked < oldest->second.asked) oldest = it;
+  }
+  if (oldest == formulas_.end()) return absl::OkStatus();
+  if (cudaLibrary_t library = oldest->second.library; library != nullptr) {
+    absl::Status status =
+        api_.Call("cudaDeviceSynchronize", [] { return cudaDeviceSynchronize(); });
+    if (!status.ok()) return status;
+    cudaLibraryUnload(library);
+  }
+  formulas_.erase(oldest);
+  return absl::OkStatus();
 }
 
 absl::Status CompiledFormulas::TakeDone() {

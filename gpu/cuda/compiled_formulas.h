@@ -27,12 +27,14 @@ namespace voxeld::gpu::cuda {
 // Thread-bound, but for its own thread, which compiles and knows no device.
 class CompiledFormulas {
  public:
-  // Beyond as many kernels no more are made. A program heavier than kMostWeight (FormulaWeight) is left to be
-  // interpreted: its code would be compiled for seconds.
-  static constexpr size_t kMostKernels = 512;
+  // A program heavier than kMostWeight (FormulaWeight) is left to be interpreted: its code would be
+  // compiled for seconds.
+  static constexpr size_t kMostKept = 512;
   static constexpr uint64_t kMostWeight = 600;
 
-  CompiledFormulas(Api& api, CompileFormulas when);
+  // Of no more programs than `most_kept`, if they are not being compiled, is anything kept: the one that was
+  // asked for the longest ago goes, with its kernel.
+  CompiledFormulas(Api& api, CompileFormulas when, size_t most_kept = kMostKept);
   ~CompiledFormulas();
   CompiledFormulas(const CompiledFormulas&) = delete;
   CompiledFormulas& operator=(const CompiledFormulas&) = delete;
@@ -42,7 +44,9 @@ class CompiledFormulas {
   // stays is drawn once.
   absl::StatusOr<cudaKernel_t> Find(std::span<const uint32_t> hoisted);
 
+  // So far, also of what has gone.
   size_t compiled() const { return loaded_; }
+  size_t kept() const { return formulas_.size(); }
 
  private:
   using Key = std::vector<uint32_t>;
@@ -51,6 +55,7 @@ class CompiledFormulas {
     State state = State::kSeen;
     cudaLibrary_t library = nullptr;
     cudaKernel_t kernel = nullptr;
+    uint64_t asked = 0;  // when last, by asked_
   };
   struct Work {
     Key key;
@@ -67,13 +72,17 @@ class CompiledFormulas {
   absl::Status TakeDone() VOXELD_EXCLUDES(mutex_);
   absl::Status Load(Formula& formula, const absl::StatusOr<std::string>& module);
   void CompileQueued() VOXELD_EXCLUDES(mutex_);
+  // Makes room for one more. What a kernel was launched for may still be under way: it is waited for.
+  absl::Status Forget();
 
   Api& api_;
   const CompileFormulas when_;
+  const size_t most_kept_;
   bool looked_for_ = false;
   std::shared_ptr<const Nvrtc> nvrtc_;
   absl::flat_hash_map<Key, Formula> formulas_;
   size_t loaded_ = 0;
+  uint64_t asked_ = 0;
 
   sync::Mutex mutex_;
   sync::CondVar queued_;

@@ -6,6 +6,7 @@
 #include "gpu/core_engine.h"
 #include "gpu/cuda/cuda_core.h"
 #include "gpu/cuda/draw_kernels.h"
+#include "gpu/cuda/nvrtc.h"
 
 namespace voxeld::gpu {
 
@@ -22,6 +23,11 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& op
         " bytes of shared memory; drawing takes ", cuda::DrawShared()));
   }
   (*device)->api().SetFaults(faults);
+  if (tuning.compile_formulas != cuda::CompileFormulas::kNever) {
+    if (const absl::Status compiler = cuda::Nvrtc::Open().status(); !compiler.ok()) {
+      absl::StrAppend(&reason, "; expressions are interpreted: ", compiler.message());
+    }
+  }
   const EngineInfo info = {EngineKind::kCuda, (*device)->api().device().name, std::move(reason)};
   cuda::Tuning chosen = tuning;
   if (options.index_bytes != 0) chosen.index_bytes = options.index_bytes;

@@ -42,7 +42,7 @@ std::vector<std::string> Nvrtc::Places(const std::function<std::string(const cha
   std::vector<std::string> places;
   if (!named.empty()) places.push_back(named);
   places.insert(places.end(),
-                {"libnvrtc.so.13", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"});
+                {"libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"});
   return places;
 }
 

@@ -29,6 +29,11 @@ std::vector<uint32_t> Waves(double shift, int more) {
 class CompiledFormulasTest : public ::testing::Test {
  protected:
   CompiledFormulasTest() : api_(*Api::Open(0)) {}
+  // All of these need it: without it they fail, and say so.
+  void SetUp() override {
+    const auto nvrtc = Nvrtc::Open();
+    ASSERT_TRUE(nvrtc.ok()) << nvrtc.status();
+  }
   const std::unique_ptr<Api> api_;
 };
 
@@ -65,6 +70,20 @@ TEST_F(CompiledFormulasTest, NeitherNeverNorForWhatIsTooHeavy) {
   EXPECT_GT(implicit::FormulaWeight(heavy), CompiledFormulas::kMostWeight);
   EXPECT_EQ(Find(at_once, heavy), nullptr);
   EXPECT_EQ(at_once.compiled(), 0u);
+}
+
+TEST_F(CompiledFormulasTest, WhatWasAskedForTheLongestAgoGoes) {
+  CompiledFormulas formulas(*api_, CompileFormulas::kAtOnce, 2);
+  const cudaKernel_t first = Find(formulas, Waves(0.5, 0));
+  Find(formulas, Waves(0.5, 1));
+  EXPECT_EQ(Find(formulas, Waves(0.5, 0)), first);
+  EXPECT_NE(Find(formulas, Waves(0.5, 2)), nullptr);  // in place of the second
+  EXPECT_EQ(formulas.kept(), 2u);
+  EXPECT_EQ(formulas.compiled(), 3u);
+  EXPECT_EQ(Find(formulas, Waves(0.5, 0)), first);
+  EXPECT_EQ(formulas.compiled(), 3u);
+  EXPECT_NE(Find(formulas, Waves(0.5, 1)), nullptr);
+  EXPECT_EQ(formulas.compiled(), 4u);
 }
 
 TEST_F(CompiledFormulasTest, AFaultOfTheDeviceIsTold) {

@@ -95,6 +95,7 @@ inline cudaError_t cudaLibraryLoadData(cudaLibrary_t*, const void*, const void*,
 inline cudaError_t cudaLibraryGetKernel(cudaKernel_t*, cudaLibrary_t, const char*) {
   return cudaErrorNotSupported;
 }
+inline cudaError_t cudaDeviceSynchronize() { return cudaSuccess; }
 inline cudaError_t cudaLibraryUnload(cudaLibrary_t) { return cudaErrorNotSupported; }
 inline cudaError_t cudaLaunchKernel(cudaKernel_t, dim3, dim3, void**, size_t, cudaStream_t) {
   return cudaErrorNotSupported;
