@@ -1,4 +1,5 @@
-// Drawables that come: into the table, and into the index of pairs, of lines, of points or of triangles.
+// Drawables that come: into the table, and into the index of pairs, of lines, of points or of
+// triangles.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -332,7 +333,7 @@ absl::Status CudaVolume::Enter() {
   bool uploads = false;
   absl::Status status;
   uint32_t singular = 0;
-  uint64_t coming[4] = {};  // items, by index
+  uint64_t coming[4] = {};                  // items, by index
   absl::flat_hash_set<uint32_t> layers[4];  // by index
   for (const IndexedBy by : kByRegion) layers[static_cast<size_t>(by)] = IndexOf(by).Layers();
   for (const Drawable* drawable : drawables) {

@@ -44,7 +44,7 @@ struct RegionScratch {
   // 0 whenever the drawing of a region begins: who writes it out leaves it so.
   alignas(16) uint32_t words[kRegionVoxels];
   uint32_t line_batches, point_batches, triangle_batches;  // bits: those of the layer under way
-  uint32_t layer;                  // its slot; kAllLanes: no more
+  uint32_t layer;                                          // its slot; kAllLanes: no more
   uint32_t cutting;                // bits: which of its half-spaces cut the region
   uint32_t outside;                // not 0: all of the region lies outside one of them
   uint32_t region;                 // kAllLanes: there is none any more

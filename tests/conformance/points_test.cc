@@ -1,4 +1,5 @@
-// Points without thickness, however they lie: many in one place, in order, nowhere; in several layers; coming and leaving.
+// Points without thickness, however they lie: many in one place, in order, nowhere; in several
+// layers; coming and leaving.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -68,7 +69,8 @@ TEST_P(PointClouds, InOrder) {
   const auto place = [&](uint32_t i) {
     return std::array{std::floor(g.positions[i * 3 + 2] / 16), g.positions[i * 3]};
   };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return place(a) < place(b); });
   g.indices = order;
   g.record.index_count = g.record.vertex_count;
   ExpectDrawn();

@@ -78,7 +78,12 @@ void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
 const Way kWays[] = {{"plain", kEvery, {}},
                      {"passes",
                       kEvery == 1 ? 11 : 2 * kEvery,
-                      {.few_items = 0, .group_bytes = 1, .few_lines = 0, .few_points = 0, .points_each = 1, .index_bytes = 1 << 16}}};
+                      {.few_items = 0,
+                       .group_bytes = 1,
+                       .few_lines = 0,
+                       .few_points = 0,
+                       .points_each = 1,
+                       .index_bytes = 1 << 16}}};
 
 class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:

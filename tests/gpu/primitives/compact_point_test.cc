@@ -11,9 +11,7 @@ namespace voxeld::gpu {
 namespace {
 
 TEST(VoxelNear, IsTheVoxelThatAPositionSnapsTo) {
-  const auto expect = [](double at) {
-    EXPECT_EQ(VoxelNear(at), VoxelOf(Snap(at))) << at;
-  };
+  const auto expect = [](double at) { EXPECT_EQ(VoxelNear(at), VoxelOf(Snap(at))) << at; };
   std::mt19937_64 random(7);
   for (int i = 0; i < 100'000; ++i) {
     expect(std::uniform_real_distribution<double>(-kMostNear, kMostNear)(random));
