@@ -1,5 +1,6 @@
 #include "gpu/cuda/compiled_formulas.h"
 
+#include <system_error>
 #include <utility>
 
 #include "gpu/cuda/formula_source.h"
@@ -18,6 +19,7 @@ CompiledFormulas::~CompiledFormulas() {
   }
   queued_.NotifyAll();
   if (thread_.joinable()) thread_.join();
+  if (loaded_ != 0) cudaDeviceSynchronize();  // they may be at work
   for (const auto& [key, formula] : formulas_) {
     if (formula.library != nullptr) cudaLibraryUnload(formula.library);
   }
@@ -58,12 +60,22 @@ absl::StatusOr<cudaKernel_t> CompiledFormulas::Find(std::span<const uint32_t> ho
     if (absl::Status status = Load(formula, Compile(source)); !status.ok()) return status;
     return formula.kernel;
   }
-  formula.state = State::kAsked;
   {
     const sync::MutexLock lock(mutex_);
+    if (queue_.size() >= kMostQueued) return nullptr;
     queue_.push_back({std::move(key), std::move(source)});
   }
-  if (!thread_.joinable()) thread_ = std::thread([this] { CompileQueued(); });
+  formula.state = State::kAsked;
+  if (!thread_.joinable()) {
+    try {
+      thread_ = std::thread([this] { CompileQueued(); });
+    } catch (const std::system_error&) {  // there is none to be had now
+      const sync::MutexLock lock(mutex_);
+      queue_.clear();
+      formula.state = State::kSeen;
+      return nullptr;
+    }
+  }
   queued_.NotifyOne();
   return nullptr;
 }
@@ -71,7 +83,7 @@ absl::StatusOr<cudaKernel_t> CompiledFormulas::Find(std::span<const uint32_t> ho
 absl::Status CompiledFormulas::Forget() {
   auto oldest = formulas_.end();
   for (auto it = formulas_.begin(); it != formulas_.end(); ++it) {
-    if (it->second.state == State::kAsked) continue;
+    if (it->second.state == State::kAsked || it->second.asked > begun_) continue;
     if (oldest == formulas_.end() || it->second.asked < oldest->second.asked) oldest = it;
   }
   if (oldest == formulas_.end()) return absl::OkStatus();
@@ -91,31 +103,45 @@ absl::Status CompiledFormulas::TakeDone() {
     const sync::MutexLock lock(mutex_);
     done.swap(done_);
   }
+  absl::Status status;
   for (const Done& one : done) {
-    if (absl::Status status = Load(formulas_[one.key], one.module); !status.ok()) return status;
+    const auto found = formulas_.find(one.key);
+    if (found == formulas_.end()) continue;
+    if (status.ok()) {
+      status = Load(found->second, one.module);
+    } else {
+      found->second.state = State::kSeen;  // it is compiled anew when it comes again
+    }
   }
-  return absl::OkStatus();
+  return status;
 }
 
 // A module that the device does not take is as good as none.
 absl::Status CompiledFormulas::Load(Formula& formula, const absl::StatusOr<std::string>& module) {
   formula.state = State::kNone;
   if (!module.ok()) return absl::OkStatus();
-  return api_.Call("cudaLibraryLoadData", [&] {
+  const absl::Status status = api_.Call("cudaLibraryLoadData", [&] {
     cudaError_t error = cudaLibraryLoadData(&formula.library, module->data(), nullptr, nullptr, 0,
                                             nullptr, nullptr, 0);
     if (error == cudaSuccess) {
       error = cudaLibraryGetKernel(&formula.kernel, formula.library, kFormulaKernel);
     }
+    // Modules may be brought to the device as late as they are asked for something.
+    cudaFuncAttributes attributes;
+    if (error == cudaSuccess) error = cudaFuncGetAttributes(&attributes, formula.kernel);
     if (error == cudaSuccess) {
       formula.state = State::kLoaded;
       ++loaded_;
-    } else {
-      formula.kernel = nullptr;
-      cudaGetLastError();
+      return cudaSuccess;
     }
+    cudaGetLastError();
+    if (formula.library != nullptr) cudaLibraryUnload(formula.library);
+    formula.library = nullptr;
+    formula.kernel = nullptr;
     return cudaSuccess;
   });
+  if (!status.ok()) formula.state = State::kSeen;
+  return status;
 }
 
 void CompiledFormulas::CompileQueued() {

@@ -30,15 +30,19 @@ class CompiledFormulas {
   // A program heavier than kMostWeight (FormulaWeight) is left to be interpreted: its code would be
   // compiled for seconds.
   static constexpr size_t kMostKept = 512;
+  // So many wait to be compiled; what comes then is to ask again.
+  static constexpr size_t kMostQueued = 32;
   static constexpr uint64_t kMostWeight = 600;
 
-  // Of no more programs than `most_kept`, if they are not being compiled, is anything kept: the one that was
+  // Of no more programs than `most_kept`, but for those that a frame needs, if they are not being compiled, is anything kept: the one that was
   // asked for the longest ago goes, with its kernel.
   CompiledFormulas(Api& api, CompileFormulas when, size_t most_kept = kMostKept);
   ~CompiledFormulas();
   CompiledFormulas(const CompiledFormulas&) = delete;
   CompiledFormulas& operator=(const CompiledFormulas&) = delete;
 
+  // What is found from here on stays until the next call: kernels may be launched later.
+  void BeginFrame() { begun_ = asked_; }
   // The kernel for a program (implicit/hoisted.h); null: there is none, or not yet. An error is one of the
   // device's. With kLater a program is compiled when it comes for the second time: one that comes once and
   // stays is drawn once.
@@ -82,7 +86,7 @@ class CompiledFormulas {
   std::shared_ptr<const Nvrtc> nvrtc_;
   absl::flat_hash_map<Key, Formula> formulas_;
   size_t loaded_ = 0;
-  uint64_t asked_ = 0;
+  uint64_t asked_ = 0, begun_ = 0;
 
   sync::Mutex mutex_;
   sync::CondVar queued_;

@@ -1,6 +1,6 @@
 // The voxel volume on the device: the scene's table of drawables, the indices of what may lie in which
-// tile (pair_index.h), of thin lines (line_index.h), of points (point_index.h) and of small triangles
-// (triangle_index.h), and the drawing of the regions that changed.
+// tile (pair_index.h), of thin lines (line_index.h), of points (point_index.h) and of small
+// triangles (triangle_index.h), and the drawing of the regions that changed.
 //
 // Each index is a few batches: a change adds one, batches of like size are merged, and what has gone
 // is dropped on the way; so an index of n costs O(log n) each, and what has gone never costs more
@@ -159,7 +159,8 @@ class CudaVolume final : private SceneObserver {
   // `entries`: null, or what the table does not have of these drawables, which then come together.
   absl::Status EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
                             std::span<const uint32_t> slots, const FewEntries* entries);
-  // Whether they are lines, or points, of one layer, and so few that an index of them puts them into the table.
+  // Whether they are lines, or points, of one layer, and so few that an index of them puts them
+  // into the table.
   bool AreFew(std::span<const uint32_t> slots, std::span<const TableEntry> entries) const;
   // Of one layer, no more than may come at once.
   struct Arriving {
@@ -240,7 +241,7 @@ class CudaVolume final : private SceneObserver {
   // (cuda_volume_implicit.cc).
   absl::Status FindImplicit();
   template <typename F>
-  absl::Status ForViews(std::span<const CoveredView> all, F&& f);
+  absl::Status ForViews(std::vector<CoveredView> all, F&& f);
   absl::StatusOr<std::optional<Block>> RoomToKeep(uint64_t bytes);
   // Has the CPU draw it; the result goes over, and into `slot`.
   absl::Status DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot);

@@ -120,8 +120,8 @@ CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
   return line ? IndexedBy::kLines : IndexedBy::kPairs;
 }
 
-// Where all geometries lie whose items may be thin lines, points or small triangles, and how large these are:
-// large geometries are looked through on the device.
+// Where all geometries lie whose items may be thin lines, points or small triangles, and how large
+// these are: large geometries are looked through on the device.
 absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   std::vector<const GeometryView*> large;
   for (const DeltaStep& step : plan.steps) {

@@ -1,4 +1,5 @@
-// Drawables that come: into the table, and into the index of pairs, of lines, of points or of triangles.
+// Drawables that come: into the table, and into the index of pairs, of lines, of points or of
+// triangles.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -188,12 +189,12 @@ Box3 CudaVolume::BoundsOf(const Drawable& d, const Affine& map) const {
 
 absl::Status CudaVolume::PlaceFilled(TableEntry& entry, Slot& slot) {
   const uint64_t bytes = InsideRows{entry.source.solid.bounds}.size() * sizeof(uint32_t);
-  if (bytes == 0 || list_budget_.KeepsTooMuch()) return absl::OkStatus();
-  absl::StatusOr<Block> block = list_budget_.pool.Acquire(bytes + Filled::Count(entry.source));
+  if (bytes == 0) return absl::OkStatus();
+  absl::StatusOr<std::optional<Block>> room = RoomToKeep(bytes + Filled::Count(entry.source));
+  if (!room.ok()) return room.status();
   // Without room for it, tiles look at all triangles.
-  if (absl::IsResourceExhausted(block.status())) return absl::OkStatus();
-  if (!block.ok()) return block.status();
-  slot.inside = *std::move(block);
+  if (!room->has_value()) return absl::OkStatus();
+  slot.inside = **std::move(room);
   uint32_t* const inside = slot.inside.as<uint32_t>();
   if (absl::Status status = device_.Zero(inside, bytes); !status.ok()) return status;
   uint8_t* const tiles = slot.inside.as<uint8_t>() + bytes;
@@ -299,6 +300,7 @@ absl::Status CudaVolume::Enter() {
   std::vector<uint32_t> slots;
   std::vector<TableEntry> entries;
   placed_.clear();
+  formulas_.BeginFrame();
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   std::deque<WorkedOut> worked_out;

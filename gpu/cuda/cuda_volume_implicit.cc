@@ -1,6 +1,8 @@
 // Implicit shapes that come: room for what is known of their tiles and for the voxels that they cover, which
 // are found before anything is drawn.
 #include <algorithm>
+#include <bit>
+#include <utility>
 #include <vector>
 
 #include "absl/container/btree_map.h"
@@ -22,7 +24,7 @@ uint64_t LayOut(const TableEntry& entry, const implicit::HoistedView& hoisted, s
   const auto take = [&](uint64_t bytes) {
     const uint64_t begin = at;
     at += (bytes + 15) / 16 * 16;
-    return base + begin;
+    return base == nullptr ? nullptr : base + begin;
   };
   const Box3& bounds = entry.source.solid.bounds;
   for (int a = 0; a < 3; ++a) {
@@ -69,9 +71,9 @@ uint32_t PlacesOf(const CoveredView& view) {
 
 }  // namespace
 
-// Room for what stays; none if lists keep too much already.
+// Room for what stays; none if lists would keep too much with it.
 absl::StatusOr<std::optional<Block>> CudaVolume::RoomToKeep(uint64_t bytes) {
-  if (list_budget_.KeepsTooMuch()) return std::nullopt;
+  if (list_budget_.pool.used() + bytes > list_budget_.most_kept) return std::nullopt;
   absl::StatusOr<Block> block = list_budget_.pool.Acquire(bytes);
   if (absl::IsResourceExhausted(block.status())) return std::nullopt;
   if (!block.ok()) return block.status();
@@ -111,26 +113,32 @@ absl::Status CudaVolume::PlaceImplicit(const Drawable& drawable, std::span<const
   return absl::OkStatus();
 }
 
-// f(views) of them all, as many at once as one kernel takes.
+// f(views) of them all, as many at once as one kernel takes, of about the same size: a kernel is launched
+// for so many tiles of each as the largest has.
 template <typename F>
-absl::Status CudaVolume::ForViews(std::span<const CoveredView> all, F&& f) {
-  for (size_t begin = 0; begin < all.size(); begin += kMostViews) {
-    const std::span<const CoveredView> some =
-        all.subspan(begin, std::min(kMostViews, all.size() - begin));
+absl::Status CudaVolume::ForViews(std::vector<CoveredView> all, F&& f) {
+  std::sort(all.begin(), all.end(),
+            [](const CoveredView& a, const CoveredView& b) { return a.items < b.items; });
+  for (size_t begin = 0, end; begin < all.size(); begin = end) {
     CoveredViews views;
-    views.count = static_cast<uint32_t>(some.size());
-    for (const CoveredView& view : some) {
-      views.most_items = std::max(views.most_items, view.items);
-      views.most_places = std::max(views.most_places, PlacesOf(view));
+    for (end = begin; end < all.size() && end - begin < kMostViews; ++end) {
+      if (std::bit_width(all[end].items) != std::bit_width(all[begin].items)) break;
+      views.most_items = all[end].items;
+      views.most_places = std::max(views.most_places, PlacesOf(all[end]));
     }
+    const std::span<const CoveredView> some(&all[begin], end - begin);
+    views.count = static_cast<uint32_t>(some.size());
     Block uploaded;
     if (some.size() <= kFewCovered) {
       std::copy(some.begin(), some.end(), views.few);
     } else {
       absl::StatusOr<Block> block = device_.Upload(some.data(), some.size());
+      // What goes over lies in memory that goes with this call.
       if (!block.ok()) return block.status();
       uploaded = *std::move(block);
       views.views = uploaded.as<CoveredView>();
+      // What goes over lies in memory that goes with this call.
+      if (absl::Status status = device_.Wait(); !status.ok()) return status;
     }
     if (absl::Status status = f(views); !status.ok()) return status;
   }

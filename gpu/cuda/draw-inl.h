@@ -13,8 +13,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// What a drawing has to reckon with: thin lines, points and small triangles that have lists, of one layer that
-// is seen as it is; of any layers; or anything.
+// What a drawing has to reckon with: thin lines, points and small triangles that have lists, of one
+// layer that is seen as it is; of any layers; or anything.
 enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 
 template <DrawWhat kWhat>

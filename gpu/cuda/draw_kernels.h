@@ -20,9 +20,9 @@ cudaError_t ListDirty(const VolumeView& volume, const RegionGrid& regions, const
 cudaError_t PickRegions(const DrawView& view, const RegionGrid& within, uint32_t* list,
                         PickedRegions* picked, cudaStream_t stream);
 
-// Draw the regions listed. Where there are thin lines, points and small triangles alone, with lists all, in one
-// visible layer that is seen as it is (OVER, opacity 255); where there are these alone; whatever
-// there is.
+// Draw the regions listed. Where there are thin lines, points and small triangles alone, with lists
+// all, in one visible layer that is seen as it is (OVER, opacity 255); where there are these alone;
+// whatever there is.
 cudaError_t DrawOneLayer(const DrawView& view, DrawTo to, uint32_t multiprocessors,
                          cudaStream_t stream);
 cudaError_t DrawLines(const DrawView& view, DrawTo to, uint32_t multiprocessors,

@@ -42,7 +42,8 @@ constexpr uint32_t kMadeByBlock = kMakeThreads * kMadeEach;
 constexpr uint32_t kMadeAtOnce = 4;  // of these, as far as loading goes
 static_assert(kMadeEach % kMadeAtOnce == 0);
 
-// Items `item` + e·kMakeThreads, as far as they are less than `end`; `to` is the first one's. By arrays of positions, as they stand.
+// Items `item` + e·kMakeThreads, as far as they are less than `end`; `to` is the first one's. Of
+// arrays of positions as they stand.
 __device__ void MakeSome(const TableEntry& entry, uint32_t item, uint32_t end,
                          const RegionGrid& grid, PlacedPoint* to) {
   const Source& source = entry.source;
@@ -120,8 +121,8 @@ __global__ void CountPointsKernel(const PlacedPoint* points, uint32_t count, Reg
   if (threadIdx.x % 32 == 0 && lanes != 0) atomicAdd(found, static_cast<uint32_t>(__popc(lanes)));
 }
 
-// A chunk's records in order; behind them, 16 bits each, by region: how many there are, then the place of
-// the next.
+// A chunk's records in order; behind them, 16 bits each, by region: how many there are, then the
+// place of the next.
 __device__ unsigned char* SortMemory() {
   extern __shared__ __align__(16) unsigned char sort_memory[];
   return sort_memory;
@@ -133,8 +134,8 @@ __device__ uint32_t CountOne(uint32_t* counts, uint32_t l) {
   return atomicAdd(&counts[l / 2], 1u << shift) >> shift & 0xFFFF;
 }
 
-// Which of kRegionsEach regions have any, from the l-th on, bits in `any`; and, where nobody has said so yet,
-// that they are to be drawn anew. By whole warps; a block of regions has 8 lanes.
+// Which of kRegionsEach regions have any, from the l-th on, bits in `any`; and, where nobody has
+// said so yet, that they are to be drawn anew. By whole warps; a block of regions has 8 lanes.
 __device__ void NoteRegions(const PointSort& sort, uint32_t l, uint32_t any) {
   static_assert(kRegionsInBlock == 8 * kRegionsEach);
   const uint32_t lane = threadIdx.x % 32, shift = lane % 8 * kRegionsEach;
@@ -161,8 +162,8 @@ __device__ void NoteRegions(const PointSort& sort, uint32_t l, uint32_t any) {
   }
 }
 
-// From how many points each region has to the place of its first, of the regions that are drawn; also into the
-// lists. How many there are in all.
+// From how many points each region has to the place of its first, of the regions that are drawn;
+// also into the lists. How many there are in all.
 __device__ uint32_t SumRegions(const PointSort& sort, uint32_t chunk, uint32_t regions,
                                uint32_t* counts) {
   using Scan = cub::BlockScan<uint32_t, kPointThreads>;
@@ -204,8 +205,8 @@ __device__ uint32_t SumRegions(const PointSort& sort, uint32_t chunk, uint32_t r
   return total;
 }
 
-// A chunk of points, of which a thread has some. By the whole block; `counts` are 0 and all know it. kAll: all regions
-// are drawn.
+// A chunk of points, of which a thread has some. By the whole block; `counts` are 0 and all know
+// it. kAll: all regions are drawn.
 template <uint32_t kEach, bool kAll>
 __device__ __forceinline__ void SortChunk(const PointSort& sort, uint32_t chunk, uint32_t regions,
                                           PlacedPoint mine[kEach]) {

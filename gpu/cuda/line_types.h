@@ -54,7 +54,8 @@ struct RegionGrid {
     BlockCoordinates(region / kRegionsInBlock, block);
     return DrawsBlock(block);
   }
-  // Regions that are drawn, and the number of one of them among these; of a block of such, its own number.
+  // Regions that are drawn, and the number of one of them among these; of a block of such, its own
+  // number.
   VOXELD_HD uint32_t drawn_count() const {
     uint32_t count = kRegionsInBlock;
     for (int a = 0; a < 3; ++a) count *= static_cast<uint32_t>(drawn_hi[a] - drawn_lo[a]);

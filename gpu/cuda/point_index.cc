@@ -52,7 +52,7 @@ PointBatchList PointIndex::view() const {
   return list;
 }
 
-// ------------------------------------------------------------------------------------------ sorting
+// ----------------------------------------------------------------------------------------- sorting
 
 absl::StatusOr<PointSort> PointIndex::TakeLists(Batch& batch, const RegionGrid& within,
                                                 uint32_t records) {
@@ -186,7 +186,8 @@ absl::Status PointIndex::MarkAll(const Batch& batch, uint8_t* region_dirty) {
   });
 }
 
-// Records say nothing of the items that they are of: what has gone is taken out by sorting its chunks anew.
+// Records say nothing of the items that they are of: what has gone is taken out by sorting its
+// chunks anew.
 absl::Status PointIndex::Touch(const ItemList& list, uint32_t count, const Batch& batch,
                                uint8_t* region_dirty) {
   if (region_dirty != nullptr) {

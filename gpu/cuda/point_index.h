@@ -1,5 +1,5 @@
-// Points without thickness by the regions that they lie in: sorted in chunks, as they come, so that what a chunk has in
-// a region is a row. What is deferred keeps `regions`, a bit for each.
+// Points without thickness by the regions that they lie in: sorted in chunks, as they come, so that
+// what a chunk has in a region is a row. What is deferred keeps `regions`, a bit for each.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// A batch's `base`, `offsets`, `regions` and `spans` are PointBatchView's arrays, `spans` its records; `begin` says which
-// chunks are touched, and `within` what the lists are of.
+// A batch's `base`, `offsets`, `regions` and `spans` are PointBatchView's arrays, `spans` its
+// records; `begin` says which chunks are touched, and `within` what the lists are of.
 class PointIndex final : public RegionIndex {
  public:
   // `points_each`, `few_points`: Tuning's.

@@ -1,5 +1,5 @@
-// Points without thickness on the device (gpu/primitives/compact_point.h), sorted by the regions of the
-// volume that they lie in. Plain data, as host and device see it.
+// Points without thickness on the device (gpu/primitives/compact_point.h), sorted by the regions of
+// the volume that they lie in. Plain data, as host and device see it.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@ namespace voxeld::gpu::cuda {
 
 // A voxel and the word that it is raised to; 0: none.
 struct alignas(8) PlacedPoint {
-  // The voxel's place in its region, as it is drawn; of an item, not of a list, above it the region.
+  // The voxel's place in its region, as it is drawn; of an item, not of a list, above it the
+  // region.
   uint32_t at = 0;
   uint32_t word = 0;
 
@@ -31,9 +32,9 @@ inline constexpr uint32_t kPointThreads = 1024;
 inline constexpr uint32_t kMostPointsEach = 16;
 static_assert(kPointThreads * kMostPointsEach < 1u << 16, "places in a chunk have 16 bits");
 
-// Points of one layer. Those of a chunk c in region r, r being the l-th of those that `within` draws, are
-// records[base[c] + offsets[c][l]] to records[base[c] + offsets[c][l + 1]]. Without records (null), of the lists
-// there is `regions` alone, and who draws looks through all points.
+// Points of one layer. Those of a chunk c in region r, r being the l-th of those that `within`
+// draws, are records[base[c] + offsets[c][l]] to records[base[c] + offsets[c][l + 1]]. Without
+// records (null), of the lists there is `regions` alone, and who draws looks through all points.
 struct PointBatchView {
   const PlacedPoint* points = nullptr;
   const PlacedPoint* records = nullptr;
@@ -62,8 +63,8 @@ struct PointBatchList {
 struct PointSort {
   RegionGrid within;
   uint32_t each = 1;  // points of a thread in a chunk
-  // Records that there are, 0 at first: chunks take their places one behind the other. Null: a chunk's
-  // begin where its points do.
+  // Records that there are, 0 at first: chunks take their places one behind the other. Null: a
+  // chunk's begin where its points do.
   uint32_t* taken = nullptr;
   uint32_t capacity = 0;  // of `records`
   // What the lists are to have.

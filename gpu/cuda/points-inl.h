@@ -7,7 +7,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// Of a region's points in a chunk, each thread of the first draws few by itself; many are drawn by a warp, the more by all.
+// What a chunk has in a region is drawn by one thread if it is few, by a warp if it is more, and by
+// all if it is many.
 inline constexpr uint32_t kFewPointsOfChunk = 16;
 inline constexpr uint32_t kPointsHeld = 6;  // asked for together
 inline constexpr uint32_t kManyPointsOfChunk = 2048;

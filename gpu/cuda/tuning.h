@@ -25,7 +25,8 @@ struct Tuning {
   uint32_t few_lines = 1024;
   // As many points that come together at most are made and sorted by one, too.
   uint32_t few_points = 1024;
-  // A block of threads sorts so many points a thread at once, where there is the shared memory: 16, 4 or 1.
+  // A block of threads sorts so many points a thread at once, where there is the shared memory: 16,
+  // 4 or 1.
   uint32_t points_each = 16;
   // As many boxes, spheres and cylinders at least, if they are all that a layer has, move together with it on the device.
   uint32_t least_crowd = 256;

@@ -1,7 +1,8 @@
-// Points without thickness, within a bounded space: the same voxels as points.h's in 32-bit arithmetic.
+// Points without thickness, within a bounded space: the same voxels as points.h's in 32-bit
+// arithmetic.
 //
-// A coordinate times 256 and a half is rounded once, as Snap does, and is below 2³⁰ then: its floor fits 32 bits,
-// whichever way it is taken.
+// A coordinate times 256 and a half is rounded once, as Snap does, and is below 2³⁰ then: its floor
+// fits 32 bits, whichever way it is taken.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,8 @@ namespace voxeld::gpu {
 // Voxels that positions may be from the origin, at most.
 inline constexpr double kMostNear = 1048576.0;
 
-// Whether all points in a box of these positions (in voxels, closed) may be asked for their voxels below.
+// Whether all points in a box of these positions (in voxels, closed) may be asked for their voxels
+// below.
 VOXELD_HD inline bool AreNear(const double lo[3], const double hi[3]) {
   for (int a = 0; a < 3; ++a) {
     if (!(lo[a] > -kMostNear && hi[a] < kMostNear)) return false;

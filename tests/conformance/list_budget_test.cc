@@ -127,6 +127,14 @@ struct Drawn {
   }
 };
 
+void ExpectDrawn(EngineDriver& engine, const SceneModel& scene, const Target& target) {
+  const Drawn want(scene, target);
+  const absl::StatusOr<FrameResult> frame = engine.Frame();
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_TRUE(engine.pictures() == want.pictures);
+  EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+}
+
 constexpr uint64_t kPlenty = uint64_t{1} << 30;
 
 // What is put into a scene of two layers and drawn under several budgets.
@@ -243,11 +251,7 @@ TEST(ListBudget, SomeLinesWithinItAndSomeNot) {
   ASSERT_TRUE(engine.SetTarget(target).ok());
   const auto expect = [&](const std::string& what) {
     SCOPED_TRACE(what);
-    const Drawn want(scene, target);
-    const absl::StatusOr<FrameResult> frame = engine.Frame();
-    ASSERT_TRUE(frame.ok()) << frame.status();
-    EXPECT_TRUE(engine.pictures() == want.pictures);
-    EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+    ExpectDrawn(engine, scene, target);
   };
   DeltaBuffer first;
   first.PutWhole(scene);
@@ -288,16 +292,16 @@ TEST(ListBudget, SomeLinesWithinItAndSomeNot) {
 
 // Points whose lists do not fit leave, one drawable after the other, and have room at last.
 TEST(ListBudget, PointsThatLeaveUntilTheyFit) {
-  const Target target = StackOf(150, 140, 150);
+  const Target target = StackOf(70, 60, 100);
   SceneModel scene;
-  constexpr uint64_t kClouds = 8;
+  constexpr uint64_t kClouds = 5;
   for (uint64_t id = 1; id <= kClouds; ++id) {
-    PutPoints(scene, id, 1 + id % 2, 4'000, target.geometry.grid);
+    PutPoints(scene, id, 1 + id % 2, 2'000, target.geometry.grid);
   }
   for (const uint32_t each : {1u, 4u, 16u}) {
     SCOPED_TRACE(std::to_string(each) + " a thread");
     SceneModel left = scene;
-    EngineDriver engine(CaseWith({.few_items = 0, .points_each = each, .index_bytes = 200'000}),
+    EngineDriver engine(CaseWith({.few_items = 0, .points_each = each, .index_bytes = 80'000}),
                         {.threads = 1});
     ASSERT_TRUE(engine.SetTarget(target).ok());
     DeltaBuffer delta;
@@ -305,11 +309,7 @@ TEST(ListBudget, PointsThatLeaveUntilTheyFit) {
     for (uint64_t id = kClouds;; --id) {
       SCOPED_TRACE(std::to_string(id) + " clouds");
       ASSERT_TRUE(engine.Apply(delta).ok());
-      const Drawn want(left, target);
-      const absl::StatusOr<FrameResult> frame = engine.Frame();
-      ASSERT_TRUE(frame.ok()) << frame.status();
-      EXPECT_TRUE(engine.pictures() == want.pictures);
-      EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+      ExpectDrawn(engine, left, target);
       if (id == 0) break;
       left.drawables.erase(id);
       delta = {};
@@ -320,7 +320,7 @@ TEST(ListBudget, PointsThatLeaveUntilTheyFit) {
 
 // There they go with the thin lines.
 TEST(ListBudget, PointsInMoreRegionsThanCanBeSorted) {
-  const Target target = StackOf(8192, 4096, 1);  // 131,072
+  const Target target = StackOf(16'384, 1, 833);  // 114,688
   SceneModel scene;
   PutPoints(scene, 1, 1, 3'000, target.geometry.grid);
   const Drawn want(scene, target);
@@ -344,11 +344,7 @@ TEST(ListBudget, SomeTrianglesAndPairsWithinItAndSomeNot) {
   const auto expect = [&](const std::string& what, const DeltaBuffer& delta) {
     SCOPED_TRACE(what);
     ASSERT_TRUE(engine.Apply(delta).ok());
-    const Drawn want(scene, target);
-    const absl::StatusOr<FrameResult> frame = engine.Frame();
-    ASSERT_TRUE(frame.ok()) << frame.status();
-    EXPECT_TRUE(engine.pictures() == want.pictures);
-    EXPECT_EQ(FirstDifference(engine.Voxels(), want.voxels, target), "");
+    ExpectDrawn(engine, scene, target);
   };
   DeltaBuffer first;
   first.PutWhole(scene);

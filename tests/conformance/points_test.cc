@@ -1,4 +1,5 @@
-// Points without thickness, however they lie: many in one place, in order, nowhere; in several layers; coming and leaving.
+// Points without thickness, however they lie: many in one place, in order, nowhere; in several
+// layers; coming and leaving.
 #include <algorithm>
 #include <array>
 #include <cmath>

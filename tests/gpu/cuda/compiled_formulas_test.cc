@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <thread>
+
 #include "gpu/implicit/formula_text.h"
 #include "gpu/implicit/graph.h"
 #include "gpu/implicit/hoist.h"
@@ -58,7 +61,14 @@ TEST_F(CompiledFormulasTest, LaterItIsCompiledForWhatComesAgain) {
   CompiledFormulas formulas(*api_, CompileFormulas::kLater);
   EXPECT_EQ(Find(formulas, Waves(0.5, 0)), nullptr);
   EXPECT_EQ(Find(formulas, Waves(0.5, 1)), nullptr);
-  while (Find(formulas, Waves(0.5, 0)) == nullptr) std::this_thread::yield();
+  // It is compiled within a second, or not at all.
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  cudaKernel_t found = nullptr;
+  while (found == nullptr && std::chrono::steady_clock::now() < until) {
+    found = Find(formulas, Waves(0.5, 0));
+    std::this_thread::yield();
+  }
+  EXPECT_NE(found, nullptr);
   EXPECT_EQ(formulas.compiled(), 1u);
 }
 
@@ -76,6 +86,7 @@ TEST_F(CompiledFormulasTest, WhatWasAskedForTheLongestAgoGoes) {
   CompiledFormulas formulas(*api_, CompileFormulas::kAtOnce, 2);
   const cudaKernel_t first = Find(formulas, Waves(0.5, 0));
   Find(formulas, Waves(0.5, 1));
+  formulas.BeginFrame();
   EXPECT_EQ(Find(formulas, Waves(0.5, 0)), first);
   EXPECT_NE(Find(formulas, Waves(0.5, 2)), nullptr);  // in place of the second
   EXPECT_EQ(formulas.kept(), 2u);
@@ -84,6 +95,25 @@ TEST_F(CompiledFormulasTest, WhatWasAskedForTheLongestAgoGoes) {
   EXPECT_EQ(formulas.compiled(), 3u);
   EXPECT_NE(Find(formulas, Waves(0.5, 1)), nullptr);
   EXPECT_EQ(formulas.compiled(), 4u);
+}
+
+TEST_F(CompiledFormulasTest, WhatAFrameHasFoundStaysForIt) {
+  CompiledFormulas formulas(*api_, CompileFormulas::kAtOnce, 1);
+  formulas.BeginFrame();
+  for (int more = 0; more < 3; ++more) EXPECT_NE(Find(formulas, Waves(0.5, more)), nullptr);
+  EXPECT_EQ(formulas.kept(), 3u);
+  formulas.BeginFrame();
+  Find(formulas, Waves(0.5, 3));
+  EXPECT_EQ(formulas.kept(), 3u);  // one has gone
+}
+
+TEST_F(CompiledFormulasTest, MayGoWhileItCompiles) {
+  for (int i = 0; i < 3; ++i) {
+    CompiledFormulas formulas(*api_, CompileFormulas::kLater);
+    for (int round = 0; round < 2; ++round) {
+      for (int more = 0; more < 4; ++more) Find(formulas, Waves(0.5, more));
+    }
+  }
 }
 
 TEST_F(CompiledFormulasTest, AFaultOfTheDeviceIsTold) {

@@ -95,6 +95,10 @@ inline cudaError_t cudaLibraryLoadData(cudaLibrary_t*, const void*, const void*,
 inline cudaError_t cudaLibraryGetKernel(cudaKernel_t*, cudaLibrary_t, const char*) {
   return cudaErrorNotSupported;
 }
+struct cudaFuncAttributes {};
+inline cudaError_t cudaFuncGetAttributes(cudaFuncAttributes*, cudaKernel_t) {
+  return cudaErrorNotSupported;
+}
 inline cudaError_t cudaDeviceSynchronize() { return cudaSuccess; }
 inline cudaError_t cudaLibraryUnload(cudaLibrary_t) { return cudaErrorNotSupported; }
 inline cudaError_t cudaLaunchKernel(cudaKernel_t, dim3, dim3, void**, size_t, cudaStream_t) {
