@@ -1,4 +1,5 @@
-// The inside of a mesh in a region, by a block of threads: a thread looks up a row, a warp raises a plane.
+// The inside of a mesh in a region, by a block of threads: a thread looks up a row, a warp raises a
+// plane.
 #pragma once
 
 #include "gpu/cuda/draw_types.h"

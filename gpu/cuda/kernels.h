@@ -42,8 +42,8 @@ cudaError_t FillPairs(const TableEntry* table, const LayerLook* layers, const It
                       const VolumeView& volume, uint64_t* keys, uint64_t* values,
                       cudaStream_t stream);
 // Sets `inside` (InsideRows, of the source's bounds, zeros before) to which voxels are inside of the source's triangles
-// (kernels_filled.cu), and `tiles` to which of its items have any, each of which is a tile. Pointers of the source are the
-// device's.
+// (kernels_filled.cu), and `tiles` to which of its items have any, each of which is a tile.
+// Pointers of the source are the device's.
 cudaError_t FindInside(const Source& source, const GeometryRecord& record, uint32_t* inside,
                        uint8_t* tiles, cudaStream_t stream);
 // Pairs of items [begin, end) of the list and tiles in the blocks that `within` draws, in any order, of

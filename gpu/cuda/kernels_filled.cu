@@ -44,8 +44,8 @@ __global__ void SumKernel(uint32_t* bits, uint64_t rows, uint32_t words) {
   for (uint32_t i = lane; before != 0 && i < words; i += 32) at[i] = 0;
 }
 
-// Of a row of tiles along x, by a block of threads: tiles[i] is whether item i has any. A lane has a word of 32 voxels
-// along x, half of it a tile's.
+// Of a row of tiles along x, by a block of threads: tiles[i] is whether item i has any. A lane has
+// a word of 32 voxels along x, half of it a tile's.
 __global__ void NoteTilesKernel(Source source, const uint32_t* bits, uint8_t* tiles) {
   __shared__ uint32_t any[32];
   static_assert(kTileSize == 16);

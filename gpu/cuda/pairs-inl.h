@@ -299,8 +299,8 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t 
   return heavy;
 }
 
-// The layer's pairs of all tiles, by the whole block. What is heavy is listed: it is drawn together, at the end, or when there is
-// no more room for what may come.
+// The layer's pairs of all tiles, by the whole block. What is heavy is listed: it is drawn
+// together, at the end, or when there is no more room for what may come.
 __device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, RegionScratch& region,
                                  PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;

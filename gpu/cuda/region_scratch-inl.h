@@ -83,7 +83,8 @@ __device__ inline unsigned char* SharedMemory() {
 __device__ inline RegionScratch& SharedRegion() {
   return *reinterpret_cast<RegionScratch*>(SharedMemory());
 }
-// Behind the region. Who is not inlined asks here for what it needs, so that it is known to lie in shared memory.
+// Behind the region. Who is not inlined asks here for what it needs, so that it is known to lie in
+// shared memory.
 template <class Scratch>
 __device__ inline Scratch& SharedBehind() {
   static_assert(sizeof(RegionScratch) % 16 == 0);
@@ -164,7 +165,8 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
 }
 
 // The layer of the least rank that is wanted and has something in the region, and what. By the first
-// warp: a lane looks after a batch, of pairs after a tile's part of some. kAll: there may be pairs, and what has no lists.
+// warp: a lane looks after a batch, of pairs after a tile's part of some. kAll: there may be pairs,
+// and what has no lists.
 template <bool kAll>
 __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
                              const LayerWanted& wanted, RegionScratch& scratch, PairRows* rows) {

@@ -1,7 +1,7 @@
 // A grid of samples in a tile, by a block of threads: what primitives/samples.h says of each voxel, with what
-// is the same for a column of them worked out once. Of LINEAR numbers, the samples around the tile go into shared memory first,
-// if they are not too many: a voxel reads eight of them. At a level, depths go there, of the tile
-// and one voxel around it, so that each is worked out once.
+// is the same for a column of them worked out once. Of LINEAR numbers, the samples around the tile
+// go into shared memory first, if they are not too many: a voxel reads eight of them. At a level,
+// depths go there, of the tile and one voxel around it, so that each is worked out once.
 #pragma once
 
 #include <type_traits>
@@ -127,7 +127,8 @@ __device__ inline void FindNear(const Solid& s, const SampleHead& head, const Bo
     size = NearSamples::kMost + 1;
     constexpr double kFar = 1e9;
     if (low > -kFar && high < kFar) {
-      // From the first sample of the first voxel to the second of the last, as far as there are any and their edge.
+      // From the first sample of the first voxel to the second of the last, as far as there are any
+      // and their edge.
       const double first = Clamp(low - room - 0.5, -1.0, samples - 1),
                    last = Clamp(high + room - 0.5, -1.0, samples - 1);
       lo = static_cast<int32_t>(FloorToInt(first));
@@ -172,7 +173,8 @@ inline constexpr uint32_t kSampleColumns = kTileSize * kTileSize,
                           kSampleStep = kDrawThreads / kSampleColumns;
 static_assert(kDrawThreads % kSampleColumns == 0);
 
-// Numbers through the table, by samples in shared memory. kPlain: all voxels lie within the grid, and all numbers are some.
+// Numbers through the table, by samples in shared memory. kPlain: all voxels lie within the grid,
+// and all numbers are some.
 template <bool kPlain>
 __device__ inline void DrawNear(const Solid& s, const SampleHead& head, const Box3& part,
                                 uint32_t* words, const NearSamples& near) {

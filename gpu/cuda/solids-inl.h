@@ -136,7 +136,8 @@ __device__ inline void DrawSolidByWarp(const TableEntry& entry, const Box3& box,
   }
 }
 
-// Solids so small that a warp works out all that one has in a region as columns along z, with a rim of one voxel.
+// Solids so small that a warp works out all that one has in a region as columns along z, with a rim
+// of one voxel.
 struct SmallSolids {
   static constexpr int32_t kReach = 8;  // voxels from the origin's
   static constexpr int32_t kSide = 2 * kReach + 1;
@@ -155,8 +156,8 @@ struct SmallSolids {
   }
 };
 
-// Of `count` voxels along z, as bits from `bit` on, those inside. base: the part of canonical coordinates that does not
-// change; step: what they change by with dz.
+// Of `count` voxels along z, as bits from `bit` on, those inside. base: the part of canonical
+// coordinates that does not change; step: what they change by with dz.
 template <class Shape>
 __device__ inline uint32_t InsideColumn(const float base[3], const float step[3], float dz,
                                         uint32_t bit, int32_t count) {
@@ -185,7 +186,8 @@ __device__ inline uint32_t InsideColumn(PrimitiveKind kind, const float base[3],
   }
 }
 
-// Of a column, which lies at `at` among others, `width` in a row, those voxels whose neighbours are all inside.
+// Of a column, which lies at `at` among others, `width` in a row, those voxels whose neighbours are
+// all inside.
 __device__ inline uint32_t EnclosedInColumn(const uint32_t* at, int32_t width, SurfaceRule rule) {
   const auto along = [](uint32_t column) { return column & column << 1 & column >> 1; };
   if (rule == SurfaceRule::kThin) return along(*at) & at[-1] & at[1] & at[-width] & at[width];

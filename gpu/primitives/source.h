@@ -50,7 +50,8 @@ struct Source {
   ImplicitPlace implicit;  // kImplicit, whose program `indices` are; of kFilled the blocks
   const uint32_t* inside =
       nullptr;  // kFilled: InsideRows (filled.h); null: found out anew each time
-  // Of each item, which is a tile then, whether anything in it is inside; null: found out from `inside`.
+  // Of each item, which is a tile then, whether anything in it is inside; null: found out from
+  // `inside`.
   const uint8_t* inside_tiles = nullptr;
 
   // Corners are what indices name, or the vertices as they stand.

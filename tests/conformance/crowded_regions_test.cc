@@ -1,5 +1,6 @@
-// What engines draw in other ways where there is much of it, or where it is small, full or empty: many solids about each size at
-// which ways change, meshes that fill tiles or leave them out, grids of numbers around tiles and at their rims.
+// What engines draw in other ways where there is much of it, or where it is small, full or empty:
+// many solids about each size at which ways change, meshes that fill tiles or leave them out, grids
+// of numbers around tiles and at their rims.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -64,7 +65,8 @@ class CrowdedRegions : public EngineConformance {
     return d;
   }
 
-  // Of `samples` along each axis, a little fewer along others; waves, of floats here and there no number at all.
+  // Of `samples` along each axis, a little fewer along others; waves, of floats here and there no
+  // number at all.
   void PutGrid(SampleFormat format, uint32_t samples) {
     SampleHead head = {};
     for (uint32_t a = 0; a < 3; ++a) head.size[a] = samples - a;

@@ -152,7 +152,8 @@ inline uint32_t __vimin3_u32(uint32_t a, uint32_t b, uint32_t c) { return min(mi
 inline uint32_t __float_as_uint(float x) { return std::bit_cast<uint32_t>(x); }
 inline int __float_as_int(float x) { return std::bit_cast<int>(x); }
 inline float __int2float_rn(int x) { return static_cast<float>(x); }
-// Of addends whose exponents are not too far apart the sum in double is exact; of others it lies on the right side.
+// Of addends whose exponents are not too far apart the sum in double is exact; of others it lies on
+// the right side.
 inline float __fadd_rd(float a, float b) {
   const double sum = static_cast<double>(a) + static_cast<double>(b);
   const float near = static_cast<float>(sum);
