@@ -133,6 +133,15 @@ class Issue:
         what = " ".join(part for part in (self.field, self.message) if part)
         return f"{where or 'commit'}: {what} ({self.reason.lower()})"
 
+    def is_told_in(self, refusal: str) -> bool:
+        """Whether a refusal's text has this issue: it tells the first as "layer/id, field: message", the commit's own by its
+        message alone."""
+        if not self.message:
+            return False
+        whose = "/".join(part for part in (self.layer, self.id) if part)
+        where = ", ".join(part for part in (whose, self.field) if part)
+        return (f"{where}: {self.message}" if whose else self.message) in refusal
+
     @staticmethod
     def of(issue: pb.Issue) -> "Issue":
         try:
@@ -201,8 +210,7 @@ class Frame:
 
     def raise_if_failed(self) -> "Frame":
         if self.state == "refused":
-            # The reason names the first.
-            more = [str(issue) for issue in self.issues if not issue.message or issue.message not in self.reason]
+            more = [str(issue) for issue in self.issues if not issue.is_told_in(self.reason)]
             raise CommitRefused("; ".join([self.reason, *more]), self.issues)
         if self.state == "dropped":
             raise CommitDropped(self.reason)

@@ -90,6 +90,28 @@ class Waiting(unittest.TestCase):
             second.wait(0)
         self.assertEqual(str(again.exception), whole, "said once")
 
+    def test_each_of_several_that_have_the_same_fault_is_named(self) -> None:
+        book, frame = Book(), Frame(1)
+        book.add(frame)
+        issues = [Issue.of(pb.Issue(layer="l", id=name, field="upsert.entity", reason=types_pb2.REASON_INVALID_VALUE,
+                                    message="is NaN")) for name in ("i", "j", "k")]
+        whole = "strict; the first: l/i, upsert.entity: is NaN"
+        book.receipt(pb.Receipt(frame_id=1, refused=pb.Refused(message=whole)), issues)
+        with self.assertRaises(CommitRefused) as caught:
+            frame.wait(0)
+        self.assertEqual(str(caught.exception), whole + "; l/j: upsert.entity is NaN (invalid_value); "
+                                                        "l/k: upsert.entity is NaN (invalid_value)")
+
+    def test_what_is_wrong_with_the_commit_itself_is_told_once(self) -> None:
+        book, frame = Book(), Frame(1)
+        book.add(frame)
+        issue = Issue.of(pb.Issue(field="commit.present_at_ns", reason=types_pb2.REASON_QUOTA_EXCEEDED, message="too many wait"))
+        whole = "nothing of the commit was applied: too many wait"
+        book.receipt(pb.Receipt(frame_id=1, refused=pb.Refused(message=whole)), [issue])
+        with self.assertRaises(CommitRefused) as caught:
+            frame.wait(0)
+        self.assertEqual(str(caught.exception), whole)
+
     def test_words_of_newer_servers_are_borne(self) -> None:
         book, frame = Book(), Frame(1)
         book.add(frame)
