@@ -85,6 +85,10 @@ const Way kWays[] = {{"plain", kEvery, {.compile_formulas = cuda::CompileFormula
                        .points_each = 1,
                        .index_bytes = 1 << 16,
                        .compile_formulas = cuda::CompileFormulas::kNever}},
+#if !defined(VOXELD_TEST_SIMT)
+                     // With formulas that are compiled: fewer faults, as each run compiles them anew.
+                     {"formulas", 29, {.compile_formulas = cuda::CompileFormulas::kAtOnce}},
+#endif
                      // Layers of solids are moved by the device, however few.
                      {"crowds",
                       kEvery == 1 ? 7 : 2 * kEvery,

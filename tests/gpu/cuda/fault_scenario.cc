@@ -3,6 +3,8 @@
 #include <random>
 #include <utility>
 
+#include "gpu/implicit/graph.h"
+
 namespace voxeld::gpu {
 namespace {
 
@@ -57,6 +59,25 @@ ModelGeometry Ball(uint64_t id, float x, float y, float z, float radius, uint32_
 }
 
 // Writes a scenario, step by step.
+// The lower half of a ball's shell, by an expression and its bound: all of them by one program.
+ModelGeometry Bowl(uint64_t id, double x, double y, double z, double radius) {
+  implicit::Graph graph;
+  const double center[3] = {x, y, z};
+  implicit::Graph::Node sum = graph.Constant(-radius * radius);
+  for (int a = 0; a < 3; ++a) {
+    sum = graph.Add(sum, graph.Square(graph.Sub(graph.Axis(a), graph.Constant(center[a]))));
+  }
+  ModelGeometry g;
+  g.record.id = id;
+  g.record.kind = PrimitiveKind::kImplicit;
+  g.record.color = 0x60C0FF;
+  g.record.thickness = 1.5F;
+  g.indices = *implicit::Compile(
+      graph, {.surface = sum, .bound = graph.Sub(graph.Axis(2), graph.Constant(z))});
+  g.record.index_count = static_cast<uint32_t>(g.indices.size());
+  return g;
+}
+
 class Script {
  public:
   void SetTarget(const std::string& name, const Target& target) {
@@ -143,6 +164,13 @@ std::vector<FaultStep> FaultScenario() {
   script.Apply("a cloud");
   script.Frame("with the cloud");
   script.Voxels("with the cloud, voxels");
+
+  for (uint64_t i = 0; i < 6; ++i) {
+    const auto at = static_cast<double>(i);
+    script.Put(Bowl(600 + i, 8 + 6 * at, 40 - 5 * at, 10 + 2 * at, 5), 1);
+  }
+  script.Apply("bowls");
+  script.Frame("with bowls");
 
   script.Drop(500);
   script.Put(LayerRecord{
