@@ -227,8 +227,8 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   CommitResult result = store_.Apply(author, std::move(commit.operations), now,
                                      session.options.strict, refusals.refused());
   std::string first = refusals.first();
-  for (size_t i = 0; first.empty() && i < result.issues.size(); ++i) {
-    if (!result.issues[i].applied) first = RefusalTally::Describe(result.issues[i]);
+  if (first.empty() && result.first_refusal.has_value()) {
+    first = RefusalTally::Describe(*result.first_refusal);
   }
   for (const Issue& issue : result.issues) {
     refusals.Tell(issue, session.sink.get(), limits.max_issues_per_commit);

@@ -71,6 +71,12 @@ void RefusalTally::Count(const Issue& issue) {
   if (first_.empty()) first_ = Describe(issue);
 }
 
+void RefusalTally::CountMore(uint64_t more, const std::optional<Issue>& first) {
+  if (more == 0) return;
+  refused_ += more;
+  if (first_.empty() && first.has_value()) first_ = Describe(*first);
+}
+
 std::string RefusalTally::Describe(const Issue& issue) {
   std::string text = issue.layer;
   if (!issue.id.empty()) absl::StrAppend(&text, "/", issue.id);
@@ -145,7 +151,7 @@ bool Intake::Take(IncomingMessage message) {
     staged_.refusals.Tell(issue, sink_.get(), limits_.max_issues_per_commit);
   }
   staged_.refusals.LeaveOut(message.refused.more + message.refused.more_applied);
-  staged_.refusals.CountMore(message.refused.more);
+  staged_.refusals.CountMore(message.refused.more, message.refused.first);
   // What decoding refused counts for the commit that it came before.
   size_t counted = 0;
   const auto count_up_to = [&](uint64_t sequence) VOXELD_REQUIRES(mutex_) {

@@ -56,7 +56,8 @@ class RefusalTally {
 
   // Counts one, if it is a refusal; does not tell it.
   void Count(const Issue& issue);
-  void CountMore(uint64_t more) { refused_ += more; }
+  // Counts so many that are not told; `first` may be the commit's first refusal.
+  void CountMore(uint64_t more, const std::optional<Issue>& first);
   // Tells `sink` (null: nobody), unless it has been told `most`.
   void Tell(const Issue& issue, SessionSink* sink, uint64_t most);
   void LeaveOut(uint64_t more) { left_out_ += more; }

@@ -116,29 +116,6 @@ std::optional<std::string> CommitApplier::OutOfRange(const gpu::Affine& layer_tr
   return std::nullopt;
 }
 
-void CommitApplier::TellIfCoarse(const Operation& operation, const std::string& layer,
-                                 const std::string& id, const EntityData& entity,
-                                 const char* field) {
-  const auto* geometry = std::get_if<GeometryPtr>(&entity.content);
-  if (geometry == nullptr || (*geometry)->need.count == 0) return;
-  const gpu::CutNeed& need = (*geometry)->need;
-  const gpu::Affine map = gpu::Compose(draft_.FindLayer(Key(layer))->transform, entity.transform);
-  for (const DisplayView& view : views_) {
-    const double stretch = gpu::StretchOf(gpu::Compose(view.scene_to_voxel, map));
-    if (need.IsMet(stretch)) continue;
-    const bool patches = need.kind == gpu::PrimitiveKind::kPatches;
-    Issue issue{operation.sequence, layer, id, field, Reason::kQuotaExceeded, "", true};
-    issue.message = absl::StrFormat(
-        "takes up to %.0f %s on display \"%s\" to be within %g of a voxel; %d are made%s, so it "
-        "may "
-        "be drawn coarser: put it up as several entities, or smaller",
-        need.Pieces(stretch), patches ? "vertices" : "straight pieces", view.display,
-        patches ? gpu::kPatchError : gpu::kCurveError, gpu::CutNeed::Most(need.kind),
-        patches ? absl::StrFormat(", %d squares along a side", gpu::kMostPatchPieces) : "");
-    return refusals_.Add(std::move(issue), limits_.max_issues_per_commit);
-  }
-}
-
 bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::string& layer,
                                     const std::string& field) {
   if (draft_.FindLayer(Key(layer)) != nullptr) return false;
@@ -341,6 +318,9 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
   layer.order = state.order.value_or(layer.order);
   layer.blend = state.blend.value_or(layer.blend);
   layer.transform = state.transform.value_or(layer.transform);
+  if (state.transform.has_value()) {
+    TellOfCoarseIn(operation, state.layer, layer, "layer_state.transform");
+  }
   if (state.clip != nullptr) layer.clip = *state.clip;
   layer.region = state.region.value_or(layer.region);
   layer.mask = state.mask.value_or(layer.mask);

@@ -85,10 +85,19 @@ class CommitApplier {
   // What is wrong with `in_layer` on some display; nothing if it is in range on all.
   std::optional<std::string> OutOfRange(const gpu::Affine& layer_transform,
                                         const Bounds& in_layer) const;
-  // Tells it where an entity, which has been put or moved, may be drawn coarser than its curves'
-  // error on some display.
+
+  // ---- curves that may be drawn coarser than their error on some display (coarse_curves.cc)
+  // So many geometries are looked at for an operation, so that a layer may be moved at every frame.
+  static constexpr int kMostLookedAt = 4096;
+  // What is wrong with the first such geometry of `content`, which is drawn by `map`; counts `left`, of the geometries
+  // that may be looked at, down.
+  std::optional<Issue> CoarseOf(const Content& content, const gpu::Affine& map, int* left) const;
+  // Tells of one entity, or of those that a layer holds: what is met with the first kMostLookedAt.
   void TellIfCoarse(const Operation& operation, const std::string& layer, const std::string& id,
-                    const EntityData& entity, const char* field);
+                    const EntityData& entity, const char* field, int* left = nullptr);
+  void TellOfCoarseIn(const Operation& operation, const std::string& name, const Layer& layer,
+                      const char* field);
+
   // What is wrong if the author came to draw `drawables` and hold `bytes`;
   // nothing if quotas allow it.
   std::optional<std::string> OverQuota(uint64_t drawables, uint64_t bytes) const;

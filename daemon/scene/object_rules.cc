@@ -163,6 +163,16 @@ void CommitApplier::Do(Operation& operation, DefineObject& define) {
   std::vector<std::pair<std::string, Object>> derived = Derive(define.object, define.data);
   if (RefusedDerived(operation, define, derived)) return;
   for (auto& [name, object] : derived) draft_.PutObject(Key(name), std::move(object));
+  // Of instances that were there before. Each looks at one geometry at least.
+  int left = kMostLookedAt;
+  for (const auto& [name, object] : derived) {
+    for (const UseKey& use : InstancesOf(name, static_cast<size_t>(std::max(left, 0)))) {
+      if (left-- <= 0) break;
+      TellIfCoarse(operation, use.layer, use.id, (*draft_.FindEntity(Key(use.layer), use.id))->data,
+                   "define_object.definition", &left);
+    }
+    if (left <= 0) break;
+  }
   ++applied_;
   objects_touched_ = true;
 }

@@ -53,12 +53,14 @@ struct Issue {
 };
 
 // Operations that were refused together, and such as were carried out otherwise: the first max_issues_per_commit one
-// by one, of the others their numbers.
+// by one, of the others their numbers; and the first refusal, which may not be among those.
 struct Refusals {
   std::vector<Issue> issues;
   uint64_t more = 0, more_applied = 0;
+  std::optional<Issue> first;
 
   void Add(Issue issue, uint64_t most) {
+    if (!first.has_value() && !issue.applied) first = issue;
     if (issues.size() < most) {
       issues.push_back(std::move(issue));
     } else {

@@ -32,6 +32,7 @@ CommitResult SceneStore::Apply(const Author& author, std::vector<Operation> oper
   applier.End();
 
   result.issues = applier.refusals().issues;
+  result.first_refusal = applier.refusals().first;
   result.more_issues = applier.refusals().more + applier.refusals().more_applied;
   result.refused_operations = applier.refused() + refused_before;
   result.abandoned = abandoned_;

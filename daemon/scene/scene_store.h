@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "daemon/scene/commit_applier.h"
@@ -19,9 +20,10 @@ struct CommitResult {
   bool applied = false;    // false: a strict commit with a refusal; nothing was changed
   bool abandoned = false;  // not applied because of Abandon
   uint64_t applied_operations = 0, refused_operations = 0;
-  std::vector<Issue> issues;  // the first max_issues_per_commit
-  uint64_t more_issues = 0;   // that there would have been beyond them
-  bool hidden = false;        // see CommitApplier::hidden
+  std::vector<Issue> issues;           // the first max_issues_per_commit
+  std::optional<Issue> first_refusal;  // though it may not be among them
+  uint64_t more_issues = 0;            // that there would have been beyond them
+  bool hidden = false;                 // see CommitApplier::hidden
 };
 
 class SceneStore {

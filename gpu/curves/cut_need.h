@@ -18,7 +18,7 @@ inline constexpr double kPatchError = 0.25;
 // Of a patch along each of its sides, whatever its error.
 inline constexpr int32_t kMostPatchPieces = 512;
 // Of a geometry, whatever its error: when so many segments have been made, each further span is
-// one; patches are cut so that there are no more vertices.
+// one; patches are cut so that there are no more vertices, unless the four corners of each are more.
 inline constexpr size_t kMostCurveSegments = 1u << 20;
 inline constexpr size_t kMostPatchVertices = 1u << 20;
 

@@ -98,6 +98,21 @@ TEST_F(IntakeTest, WhatIsCarriedOutOtherwiseIsToldAndNoRefusal) {
   EXPECT_EQ(commit.refusals.first(), "f: no");
 }
 
+TEST_F(IntakeTest, TheFirstRefusalIsKnownThoughNotesLeaveNoRoomForIt) {
+  limits.max_issues_per_commit = 2;
+  Make();
+  Refusals told;
+  for (const bool applied : {true, true, false, false}) {
+    told.Add({.sequence = 1, .field = "f", .message = applied ? "so" : "no", .applied = applied},
+             limits.max_issues_per_commit);
+  }
+  std::vector<Operation> all = testing::Sequence(sequence, Put("a", "x"), EndCommit(1));
+  intake->Take({std::move(all), std::move(told), 10, 1, 2, 0});
+  const WaitingCommit commit = Pop();
+  EXPECT_EQ(commit.refusals.refused(), 2u);
+  EXPECT_EQ(commit.refusals.first(), "f: no");
+}
+
 TEST_F(IntakeTest, WhatWaitsForItsTurnHoldsItsCredit) {
   Make();
   EXPECT_FALSE(Take(600, Put("a", "x"), EndCommit(1)));

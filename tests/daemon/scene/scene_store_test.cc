@@ -113,49 +113,6 @@ TEST(SceneStore, OutOfRangeNamesTheDisplayAndTheValue) {
   EXPECT_EQ(f.Get("a", "x"), before);
 }
 
-// So many spans, each of which takes 5 pieces, and 36 if it is 64 times as large.
-GeometryPtr Waves(uint32_t count) {
-  auto data = std::make_shared<GeometryData>();
-  data->record.kind = gpu::PrimitiveKind::kCurves;
-  data->record.vertex_count = 4 * count;
-  data->arrays = *gpu::GeometryArrays::Allocate(data->record, nullptr);
-  const std::span<float> out = data->arrays.writable_positions();
-  for (size_t i = 0; i < out.size(); i += 12) {
-    constexpr float kSpan[] = {0, 0, 0, 1, 1, 0, 1, -1, 0, 2, 0, 0};
-    std::copy(std::begin(kSpan), std::end(kSpan), out.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  data->max[0] = 2;
-  data->need = gpu::CutNeed::Of(data->record, data->arrays.positions());
-  return data;
-}
-
-TEST(SceneStore, WhatMayBeDrawnCoarserIsToldAndTaken) {
-  StoreFixture f;
-  f.strict = true;  // it is no refusal
-  f.store.SetViews({{"coarse", Scale(1, 1, 1)}, {"fine", Scale(64, 64, 64)}});
-  EXPECT_TRUE(f.Commit(Put("a", "few", Entity1(Waves(1000)))).issues.empty());
-  const CommitResult result = f.Commit(Put("a", "many", Entity1(Waves(60'000))));
-  EXPECT_TRUE(result.applied);
-  EXPECT_EQ(result.refused_operations, 0u);
-  EXPECT_NE(f.Get("a", "many"), nullptr);
-  ASSERT_EQ(result.issues.size(), 1u);
-  const Issue& issue = result.issues[0];
-  EXPECT_TRUE(issue.applied);
-  EXPECT_EQ(issue.field, "upsert.entity");
-  EXPECT_EQ(issue.id, "many");
-  EXPECT_EQ(issue.layer, "a");
-  EXPECT_EQ(issue.sequence, f.last_sequence);
-  EXPECT_THAT(issue.message, HasSubstr("straight pieces on display \"fine\" to be within 0.125 of "
-                                       "a voxel; 1048576 are made, so it may be drawn coarser"));
-  // Smaller it is fine; larger it is not again.
-  EXPECT_TRUE(f.Commit(Move("a", "many", Scale(0.1, 0.1, 0.1))).issues.empty());
-  const CommitResult moved = f.Commit(Move("a", "many", Scale(1, 2, 1)));
-  ASSERT_EQ(moved.issues.size(), 1u);
-  EXPECT_TRUE(moved.issues[0].applied);
-  EXPECT_EQ(moved.issues[0].field, "set_transform.transform");
-  EXPECT_EQ(f.Get("a", "many")->data.transform.m[5], 2);
-}
-
 TEST(SceneStore, ALayersTransformIsCheckedAgainstAllThatItHolds) {
   StoreFixture f;
   f.store.SetViews({{"d", gpu::Affine()}});
