@@ -41,8 +41,8 @@ std::vector<std::string> Nvrtc::Places(const std::function<std::string(const cha
   if (named == "off") return {};
   std::vector<std::string> places;
   if (!named.empty()) places.push_back(named);
-  places.insert(places.end(),
-                {"libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"});
+  places.insert(places.end(), {"libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so",
+                               "/usr/local/cuda/lib64/libnvrtc.so"});
   return places;
 }
 

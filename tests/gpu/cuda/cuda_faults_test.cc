@@ -75,24 +75,25 @@ struct Way {
   cuda::Tuning tuning;
 };
 void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
-const Way kWays[] = {{"plain", kEvery, {.compile_formulas = cuda::CompileFormulas::kNever}},
-                     {"passes",
-                      kEvery == 1 ? 11 : 2 * kEvery,
-                      {.few_items = 0,
-                       .group_bytes = 1,
-                       .few_lines = 0,
-                       .few_points = 0,
-                       .points_each = 1,
-                       .index_bytes = 1 << 16,
-                       .compile_formulas = cuda::CompileFormulas::kNever}},
+const Way kWays[] = {
+    {"plain", kEvery, {.compile_formulas = cuda::CompileFormulas::kNever}},
+    {"passes",
+     kEvery == 1 ? 11 : 2 * kEvery,
+     {.few_items = 0,
+      .group_bytes = 1,
+      .few_lines = 0,
+      .few_points = 0,
+      .points_each = 1,
+      .index_bytes = 1 << 16,
+      .compile_formulas = cuda::CompileFormulas::kNever}},
 #if !defined(VOXELD_TEST_SIMT)
-                     // With formulas that are compiled: fewer faults, as each run compiles them anew.
-                     {"formulas", 29, {.compile_formulas = cuda::CompileFormulas::kAtOnce}},
+    // With formulas that are compiled: fewer faults, as each run compiles them anew.
+    {"formulas", 29, {.compile_formulas = cuda::CompileFormulas::kAtOnce}},
 #endif
-                     // Layers of solids are moved by the device, however few.
-                     {"crowds",
-                      kEvery == 1 ? 7 : 2 * kEvery,
-                      {.least_crowd = 2, .compile_formulas = cuda::CompileFormulas::kNever}}};
+    // Layers of solids are moved by the device, however few.
+    {"crowds",
+     kEvery == 1 ? 7 : 2 * kEvery,
+     {.least_crowd = 2, .compile_formulas = cuda::CompileFormulas::kNever}}};
 
 class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:

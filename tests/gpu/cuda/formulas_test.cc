@@ -29,11 +29,12 @@ std::function<std::string(const char*)> Environment(std::map<std::string, std::s
 }
 
 TEST(Nvrtc, IsLookedForByTheVariableThenTheLoader) {
-  EXPECT_THAT(
-      Nvrtc::Places(Environment({{"VOXELD_NVRTC", "/b"}})),
-      ElementsAre("/b", "libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"));
+  EXPECT_THAT(Nvrtc::Places(Environment({{"VOXELD_NVRTC", "/b"}})),
+              ElementsAre("/b", "libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so",
+                          "/usr/local/cuda/lib64/libnvrtc.so"));
   EXPECT_THAT(Nvrtc::Places(Environment({})),
-              ElementsAre("libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so", "/usr/local/cuda/lib64/libnvrtc.so"));
+              ElementsAre("libnvrtc.so.13", "libnvrtc.so.12", "libnvrtc.so",
+                          "/usr/local/cuda/lib64/libnvrtc.so"));
   EXPECT_THAT(Nvrtc::Places(Environment({{"VOXELD_NVRTC", "off"}})), IsEmpty());
 }
 
