@@ -167,7 +167,7 @@ std::vector<FaultStep> FaultScenario() {
 
   for (uint64_t i = 0; i < 6; ++i) {
     const auto at = static_cast<double>(i);
-    script.Put(Bowl(600 + i, 8 + 6 * at, 40 - 5 * at, 10 + 2 * at, 5), 1);
+    script.Put(Bowl(5000 + i, 8 + 6 * at, 40 - 5 * at, 10 + 2 * at, 5), 1);
   }
   script.Apply("bowls");
   script.Frame("with bowls");
