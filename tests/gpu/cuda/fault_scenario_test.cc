@@ -30,7 +30,7 @@ TEST(FaultScenario, DrawsWhatItSaysAndSomethingNewWithEveryFrame) {
     EXPECT_EQ(player.seen().pictures == before, out_of_sight) << step.name;
     before = player.seen().pictures;
   }
-  EXPECT_EQ(frames, 13);
+  EXPECT_EQ(frames, 14);
 }
 
 }  // namespace
