@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "colormaps_text.h"  // kColormapsText, made of the file
+#include "daemon/suggest/suggest.h"
 
 namespace voxeld {
 namespace {
@@ -28,9 +29,22 @@ void ForEachMap(F&& f) {
   }
 }
 
+// "viridis_r" is viridis from its end.
+constexpr std::string_view kReversed = "_r";
+
+std::string_view WithoutReversed(std::string_view name) {
+  return name.ends_with(kReversed) ? name.substr(0, name.size() - kReversed.size()) : name;
+}
+
 }  // namespace
 
 std::optional<ColorTable> FindColormap(std::string_view name) {
+  if (const std::string_view plain = WithoutReversed(name);
+      plain != name && !plain.ends_with(kReversed)) {
+    std::optional<ColorTable> table = FindColormap(plain);
+    if (table.has_value()) std::reverse(table->begin(), table->end());
+    return table;
+  }
   std::vector<uint32_t> stops;
   ForEachMap([&](std::string_view found, std::string_view colors) {
     if (found != name) return false;
@@ -66,6 +80,18 @@ std::vector<std::string> ColormapNames() {
     return false;
   });
   return names;
+}
+
+std::string ColormapAdvice(std::string_view wrong) {
+  const std::vector<std::string> names = ColormapNames();
+  std::string near = Nearest(WithoutReversed(wrong), names);
+  if (!near.empty()) {
+    if (wrong.ends_with(kReversed)) near += kReversed;
+    return "did you mean \"" + near + "\"?";
+  }
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return "there are " + all + ", each also turned round, as viridis_r";
 }
 
 }  // namespace voxeld

@@ -22,8 +22,7 @@ MaybeFault ToColorRow(const FieldPath& path, const std::string& colormap,
   *map = FindColormap(colormap);
   if (map->has_value()) return {};
   return Fault{name.ToString(), Reason::kNotFound,
-               absl::StrCat("is ", Quote(colormap),
-                            ", which is none; give a name of matplotlib's, as viridis")};
+               absl::StrCat("is ", Quote(colormap), ", which is none; ", ColormapAdvice(colormap))};
 }
 
 }  // namespace voxeld::daemon::wire

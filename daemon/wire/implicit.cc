@@ -9,7 +9,6 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "daemon/colormaps/colormaps.h"
 #include "daemon/wire/boundary.h"
 #include "daemon/wire/expression.h"
@@ -86,8 +85,8 @@ MaybeFault ToColor(const FieldPath& path, const v1::Implicit& in, const Expressi
   const std::optional<ColorTable> found = FindColormap(in.colormap());
   if (!found.has_value()) {
     return Fault{FieldPath(path, "colormap").ToString(), Reason::kNotFound,
-                 absl::StrCat("is ", Quote(in.colormap()), "; there are ",
-                              absl::StrJoin(ColormapNames(), ", "))};
+                 absl::StrCat("is ", Quote(in.colormap()), ", which is none; ",
+                              ColormapAdvice(in.colormap()))};
   }
   table->assign(found->begin(), found->end());
   source->table = *table;

@@ -264,7 +264,7 @@ TEST(Grids, WhatIsWrongWithTheScaleOfAnIsosurfaceIsSaid) {
       {"along", scaled, [](P& p) { p.mutable_color_scale()->clear_along(); },
        "primitive.color_scale.along", Reason::kInvalidValue, "has no direction"},
       {"colormap", scaled, [](P& p) { p.mutable_color_scale()->set_colormap("sepia"); },
-       "primitive.color_scale.colormap", Reason::kNotFound, "give a name of matplotlib's"},
+       "primitive.color_scale.colormap", Reason::kNotFound, "each also turned round, as viridis_r"},
       {"ends", scaled,
        [](P& p) {
          p.mutable_color_scale()->set_low(0);
