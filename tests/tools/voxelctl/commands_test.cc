@@ -373,6 +373,18 @@ TEST_F(CommandsTest, ASnapshotIsOfAllThatIsUp) {
   EXPECT_THAT(result.err, HasSubstr("the newest has 3"));
 }
 
+TEST_F(CommandsTest, ASnapshotIsTakenThoughNoMoreWatchesAreGiven) {
+  const std::string path = folder_.Path("a.png");
+  server_.Set({.no_watches = true});
+  EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], false);
+  ASSERT_EQ(server_.log().captures.size(), 1u);
+  EXPECT_EQ(server_.log().captures[0].at_least_snapshot(), 0u);
+  const Result result = RunTool({"snapshot", path});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.err, HasSubstr("may be from before the newest commits"));
+  EXPECT_THAT(result.err, HasSubstr("max_scene_watches"));
+}
+
 TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
   EXPECT_EQ(RunTool({"pattern", "white"}).code, 0);
   EXPECT_EQ(RunTool({"clear"}).code, 0);

@@ -145,6 +145,13 @@ class FakeServer::Scene final : public v1::SceneService::Service {
   // Three change sets, the first in two messages; then it fails.
   grpc::Status WatchScene(grpc::ServerContext*, const v1::WatchSceneRequest* request,
                           grpc::ServerWriter<v1::WatchSceneResponse>* writer) override {
+    {
+      sync::MutexLock lock(server_.mutex_);
+      if (server_.behaviour_.no_watches) {
+        return {grpc::StatusCode::RESOURCE_EXHAUSTED,
+                "8 watch the scene, which is max_scene_watches"};
+      }
+    }
     const auto key = [](const char* id) {
       v1::EntityKey k;
       k.set_owner(7);

@@ -32,6 +32,7 @@ class FakeServer final {
     bool short_volume = false;        // CaptureVolume leaves out its last slice
     bool hold_streams = false;        // a stream whose client is done is not ended
     bool behind = false;              // no volume ever shows the newest snapshot
+    bool no_watches = false;          // all of the scene's are in use
     bool lattice = false;  // the display is one of two slices of three lights, one absent
   };
   void Set(const Behaviour& behaviour);

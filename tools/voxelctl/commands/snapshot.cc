@@ -52,11 +52,17 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
   console.Progress("waiting for a volume …");
   // What was up when the command was given is in the picture.
   const absl::StatusOr<uint64_t> newest = NewestSnapshot(connection);
-  if (!newest.ok()) return newest.status();
-  request.set_at_least_snapshot(*newest);
+  const bool unknown = absl::IsResourceExhausted(newest.status());
+  if (!newest.ok() && !unknown) return newest.status();
+  if (unknown) {
+    console.Say(absl::StrCat("this is what is shown, which may be from before the newest commits: ",
+                             newest.status().message()));
+  } else {
+    request.set_at_least_snapshot(*newest);
+  }
   CapturedVolume captured;
   absl::Status status = Capture(request, connection, &captured);
-  const bool behind = absl::IsDeadlineExceeded(status);
+  const bool behind = !unknown && absl::IsDeadlineExceeded(status);
   if (behind) {
     captured = CapturedVolume();
     request.set_at_least_snapshot(0);
@@ -90,7 +96,7 @@ absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Co
                            {"slice_width", volume->width},
                            {"slice_height", volume->height},
                            {"lit_pixels", lit},
-                           {"up_to_date", !behind},
+                           {"up_to_date", !behind && !unknown},
                            {"source", decoded ? "DECODED_FROM_SENT" : "REPORTED_BY_DEVICE"},
                            {"width", image.width},
                            {"height", image.height}},
