@@ -28,7 +28,8 @@ CompiledFormulas::~CompiledFormulas() {
 bool CompiledFormulas::HasCompiler() {
   if (!looked_for_) {
     looked_for_ = true;
-    if (absl::StatusOr<std::shared_ptr<const Nvrtc>> opened = Nvrtc::Open(); opened.ok()) {
+    absl::StatusOr<std::shared_ptr<const Nvrtc>> opened = Nvrtc::Open();
+    if (opened.ok() && (*opened)->Supports(api_.device().major, api_.device().minor).ok()) {
       nvrtc_ = *std::move(opened);
     }
   }

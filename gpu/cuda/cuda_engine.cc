@@ -24,7 +24,10 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& op
   }
   (*device)->api().SetFaults(faults);
   if (tuning.compile_formulas != cuda::CompileFormulas::kNever) {
-    if (const absl::Status compiler = cuda::Nvrtc::Open().status(); !compiler.ok()) {
+    const absl::StatusOr<std::shared_ptr<const cuda::Nvrtc>> nvrtc = cuda::Nvrtc::Open();
+    const absl::Status compiler =
+        nvrtc.ok() ? (*nvrtc)->Supports(properties.major, properties.minor) : nvrtc.status();
+    if (!compiler.ok()) {
       absl::StrAppend(&reason, "; expressions are interpreted: ", compiler.message());
     }
   }

@@ -1,13 +1,10 @@
 #include "gpu/cuda/nccl.h"
 
-#include <dlfcn.h>
-
-#include <cstdlib>
 #include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
+#include "gpu/cuda/opened_library.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
@@ -36,10 +33,8 @@ struct Nccl::Functions {
   int (*all_reduce)(const void*, void*, size_t, int, int, void*, CUstream_st*) = nullptr;
 };
 
-Nccl::Nccl(void* library, std::string place)
-    : library_(library), place_(std::move(place)), functions_(std::make_unique<Functions>()) {}
+Nccl::Nccl() : functions_(std::make_unique<Functions>()) {}
 
-// Its threads may outlive a communicator: it is not closed.
 Nccl::~Nccl() = default;
 
 std::vector<std::string> Nccl::Places(const std::string& path,
@@ -52,50 +47,26 @@ std::vector<std::string> Nccl::Places(const std::string& path,
 }
 
 absl::StatusOr<std::shared_ptr<const Nccl>> Nccl::Open(const std::vector<std::string>& places) {
-  std::vector<std::string> why;
-  for (const std::string& place : places) {
-    void* const library = dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library == nullptr) {
-      const char* const error = dlerror();  // begins with the name
-      why.push_back(error != nullptr ? error : absl::StrCat(place, ": cannot be opened"));
-      continue;
-    }
-    std::shared_ptr<Nccl> nccl(new Nccl(library, place));
-    const absl::Status status = nccl->Find();
-    if (status.ok()) return nccl;
-    dlclose(library);
-    why.emplace_back(status.message());
-  }
-  return absl::FailedPreconditionError(
-      absl::StrCat("NCCL is not to be had; tried ", absl::StrJoin(why, "; ")));
+  std::shared_ptr<Nccl> nccl(new Nccl());
+  Functions& functions = *nccl->functions_;
+  const WantedFunction wanted[] = {
+      {"ncclGetVersion", functions.get_version},
+      {"ncclGetErrorString", functions.get_error_string},
+      {"ncclGetUniqueId", functions.get_unique_id},
+      {"ncclCommInitRank", functions.comm_init_rank},
+      {"ncclCommAbort", functions.comm_abort},
+      {"ncclCommGetAsyncError", functions.comm_get_async_error},
+      {"ncclBroadcast", functions.broadcast},
+      {"ncclAllReduce", functions.all_reduce},
+  };
+  absl::StatusOr<std::string> place = OpenLibrary("NCCL", places, wanted);
+  if (!place.ok()) return place.status();
+  nccl->place_ = *std::move(place);
+  return nccl;
 }
 
 absl::StatusOr<std::shared_ptr<const Nccl>> Nccl::Open(const std::string& path) {
-  return Open(Places(path, [](const char* name) -> std::string {
-    const char* const value = std::getenv(name);
-    return value != nullptr ? value : "";
-  }));
-}
-
-absl::Status Nccl::Find() {
-  absl::Status status;
-  const auto find = [&](const char* name, auto& function) {
-    void* const found = dlsym(library_, name);
-    if (found == nullptr && status.ok()) {
-      status = absl::FailedPreconditionError(absl::StrCat(place_, ": has no ", name));
-    }
-    static_assert(sizeof(function) == sizeof(found));
-    std::memcpy(&function, &found, sizeof(found));
-  };
-  find("ncclGetVersion", functions_->get_version);
-  find("ncclGetErrorString", functions_->get_error_string);
-  find("ncclGetUniqueId", functions_->get_unique_id);
-  find("ncclCommInitRank", functions_->comm_init_rank);
-  find("ncclCommAbort", functions_->comm_abort);
-  find("ncclCommGetAsyncError", functions_->comm_get_async_error);
-  find("ncclBroadcast", functions_->broadcast);
-  find("ncclAllReduce", functions_->all_reduce);
-  return status;
+  return Open(Places(path, Environment));
 }
 
 absl::Status Nccl::Told(const char* what, int result) const {

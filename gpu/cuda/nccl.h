@@ -41,12 +41,10 @@ class Nccl {
  private:
   friend class NcclComm;
   struct Functions;
-  Nccl(void* library, std::string place);
-  absl::Status Find();
+  Nccl();
   absl::Status Told(const char* what, int result) const;
 
-  void* const library_;
-  const std::string place_;
+  std::string place_;
   const std::unique_ptr<Functions> functions_;
 };
 

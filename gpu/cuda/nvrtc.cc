@@ -1,13 +1,10 @@
 #include "gpu/cuda/nvrtc.h"
 
-#include <dlfcn.h>
-
-#include <cstdlib>
-#include <cstring>
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
+#include "gpu/cuda/opened_library.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
@@ -20,6 +17,8 @@ constexpr size_t kMostOfTheLog = 2000;  // bytes of it that are told
 
 struct Nvrtc::Functions {
   const char* (*get_error_string)(int) = nullptr;
+  int (*get_num_supported_archs)(int*) = nullptr;
+  int (*get_supported_archs)(int*) = nullptr;
   int (*create)(void**, const char*, const char*, int, const char* const*,
                 const char* const*) = nullptr;
   int (*destroy)(void**) = nullptr;
@@ -30,10 +29,8 @@ struct Nvrtc::Functions {
   int (*get_log)(void*, char*) = nullptr;
 };
 
-Nvrtc::Nvrtc(void* library, std::string place)
-    : library_(library), place_(std::move(place)), functions_(std::make_unique<Functions>()) {}
+Nvrtc::Nvrtc() : functions_(std::make_unique<Functions>()) {}
 
-// It may have threads: it is not closed.
 Nvrtc::~Nvrtc() = default;
 
 std::vector<std::string> Nvrtc::Places(const std::function<std::string(const char*)>& environment) {
@@ -48,50 +45,41 @@ std::vector<std::string> Nvrtc::Places(const std::function<std::string(const cha
 
 absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::Open(const std::vector<std::string>& places) {
   if (places.empty()) return absl::FailedPreconditionError("VOXELD_NVRTC is 'off'");
-  std::vector<std::string> why;
-  for (const std::string& place : places) {
-    void* const library = dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library == nullptr) {
-      const char* const error = dlerror();  // begins with the name
-      why.push_back(error != nullptr ? error : absl::StrCat(place, ": cannot be opened"));
-      continue;
-    }
-    std::shared_ptr<Nvrtc> nvrtc(new Nvrtc(library, place));
-    const absl::Status status = nvrtc->Find();
-    if (status.ok()) return nvrtc;
-    dlclose(library);
-    why.emplace_back(status.message());
-  }
-  return absl::FailedPreconditionError(
-      absl::StrCat("NVRTC is not to be had; tried ", absl::StrJoin(why, "; ")));
-}
-
-absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::Open() {
-  return Open(Places([](const char* name) -> std::string {
-    const char* const value = std::getenv(name);
-    return value != nullptr ? value : "";
-  }));
-}
-
-absl::Status Nvrtc::Find() {
-  absl::Status status;
-  const auto find = [&](const char* name, auto& function) {
-    void* const found = dlsym(library_, name);
-    if (found == nullptr && status.ok()) {
-      status = absl::FailedPreconditionError(absl::StrCat(place_, ": has no ", name));
-    }
-    static_assert(sizeof(function) == sizeof(found));
-    std::memcpy(&function, &found, sizeof(found));
+  std::shared_ptr<Nvrtc> nvrtc(new Nvrtc());
+  Functions& functions = *nvrtc->functions_;
+  const WantedFunction wanted[] = {
+      {"nvrtcGetErrorString", functions.get_error_string},
+      {"nvrtcGetNumSupportedArchs", functions.get_num_supported_archs},
+      {"nvrtcGetSupportedArchs", functions.get_supported_archs},
+      {"nvrtcCreateProgram", functions.create},
+      {"nvrtcDestroyProgram", functions.destroy},
+      {"nvrtcCompileProgram", functions.compile},
+      {"nvrtcGetCUBINSize", functions.get_cubin_size},
+      {"nvrtcGetCUBIN", functions.get_cubin},
+      {"nvrtcGetProgramLogSize", functions.get_log_size},
+      {"nvrtcGetProgramLog", functions.get_log},
   };
-  find("nvrtcGetErrorString", functions_->get_error_string);
-  find("nvrtcCreateProgram", functions_->create);
-  find("nvrtcDestroyProgram", functions_->destroy);
-  find("nvrtcCompileProgram", functions_->compile);
-  find("nvrtcGetCUBINSize", functions_->get_cubin_size);
-  find("nvrtcGetCUBIN", functions_->get_cubin);
-  find("nvrtcGetProgramLogSize", functions_->get_log_size);
-  find("nvrtcGetProgramLog", functions_->get_log);
-  return status;
+  absl::StatusOr<std::string> place = OpenLibrary("NVRTC", places, wanted);
+  if (!place.ok()) return place.status();
+  nvrtc->place_ = *std::move(place);
+  return nvrtc;
+}
+
+absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::Open() { return Open(Places(Environment)); }
+
+absl::Status Nvrtc::Supports(int major, int minor) const {
+  int count = 0;
+  int result = functions_->get_num_supported_archs(&count);
+  std::vector<int> archs(static_cast<size_t>(std::max(count, 0)));
+  if (result == kSuccess) result = functions_->get_supported_archs(archs.data());
+  if (result != kSuccess) {
+    return absl::FailedPreconditionError(absl::StrCat("nvrtcGetSupportedArchs (", place_,
+                                                      "): ", functions_->get_error_string(result)));
+  }
+  if (std::find(archs.begin(), archs.end(), major * 10 + minor) != archs.end()) return {};
+  return absl::FailedPreconditionError(
+      absl::StrCat(place_, " compiles nothing for compute capability ", major, ".", minor,
+                   "; install the NVRTC of a newer CUDA, or name it by VOXELD_NVRTC"));
 }
 
 absl::StatusOr<std::string> Nvrtc::Compile(const std::string& source,

@@ -35,6 +35,8 @@ class Nvrtc {
   Nvrtc(const Nvrtc&) = delete;
   Nvrtc& operator=(const Nvrtc&) = delete;
 
+  // FailedPrecondition if it compiles nothing for devices of that compute capability, as one that is older than the device may.
+  absl::Status Supports(int major, int minor) const;
   const std::string& place() const { return place_; }
   // A module for devices of that compute capability, rounded as the engine's own kernels are. Takes tenths of
   // a second and more. InvalidArgument has what the compiler says of a source that it does not take.
@@ -44,11 +46,9 @@ class Nvrtc {
 
  private:
   struct Functions;
-  Nvrtc(void* library, std::string place);
-  absl::Status Find();
+  Nvrtc();
 
-  void* const library_;
-  const std::string place_;
+  std::string place_;
   const std::unique_ptr<Functions> functions_;
 };
 

@@ -8,7 +8,7 @@ set(VOXELD_CUDA_KERNEL_PARTS
   triangles-inl.h unsorted-inl.h warp-inl.h)
 set(VOXELD_CUDA_HOST
   api.cc broadcast_plan.cc compiled_formulas.cc cpu_voxels.cc cuda_core.cc cuda_engine.cc cuda_generator.cc cuda_pictures.cc cuda_volume.cc
-  cuda_volume_arrays.cc cuda_volume_crowds.cc cuda_volume_enter.cc cuda_volume_implicit.cc cuda_volume_passes.cc device.cc formula_source.cc line_index.cc nccl.cc nvrtc.cc packed_plan.cc pair_index.cc pin.cc point_index.cc pool.cc
+  cuda_volume_arrays.cc cuda_volume_crowds.cc cuda_volume_enter.cc cuda_volume_implicit.cc cuda_volume_passes.cc device.cc formula_source.cc line_index.cc nccl.cc nvrtc.cc opened_library.cc packed_plan.cc pair_index.cc pin.cc point_index.cc pool.cc
   region_index.cc stopwatch.cc triangle_index.cc upload_plan.cc uploader.cc)
 # What a kernel that is compiled at run time includes: the host's part has it as text.
 set(VOXELD_FORMULA_SOURCES

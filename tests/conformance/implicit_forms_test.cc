@@ -1,6 +1,6 @@
 // Every built-in surface that is drawn by the general method equals its own implicit form, an expression that is read as a client's
 // is. What differs from that lies where kError decides: whether a voxel is within the shell, or which of two neighbours on either
-// side is nearer.
+// side is nearer; and of rims that are closed curves, where kRimError does.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -17,6 +17,8 @@
 #include "gpu/primitives/ellipsoid.h"
 #include "gpu/primitives/parallelepiped.h"
 #include "gpu/primitives/patch.h"
+#include "gpu/primitives/polygon.h"
+#include "gpu/primitives/prism.h"
 #include "gpu/primitives/torus.h"
 #include "tests/conformance/placed.h"
 
@@ -27,6 +29,8 @@ constexpr int32_t kSize = 48;
 // Voxels: a dozen roundings of 2⁻²⁴ (docs/expressions.md) of numbers below 100. Places are snapped to 2⁻⁸ voxel
 // (gpu/primitives/solid.h), so the origin is at such a one.
 constexpr double kError = 1e-4;
+// Voxels: what a polygon's rim is said to keep to (gpu/primitives/polygon.h).
+constexpr double kRimError = 0.02;
 
 // An expression as it is written, so that one function gives both text and numbers.
 struct Words {
@@ -66,6 +70,7 @@ struct Form {
   std::string text;
   std::function<double(const Vector&)> surface, bound;
   bool solid;
+  double bound_error = kError;
 };
 
 template <typename Shape, typename Surface>
@@ -84,6 +89,34 @@ Form Flat(std::string name, const Shape& shape, Surface p, Bound bound) {
   form.bound = [bound](const Vector& v) { return bound(v.x, v.y, v.z); };
   form.solid = false;
   return form;
+}
+// Of the two squares, one within the other, that HollowSquare makes.
+template <typename Surface>
+Form Hollow(std::string name, bool solid, std::function<FieldShape(Graph&)> make, Surface p) {
+  struct None {
+    FieldShape Make(Graph&) const { return {}; }
+  };
+  Form form = Flat(std::move(name), None(), p,
+                   [](auto x, auto y, auto) { return Abs(Max(Abs(x), Abs(y)) - 11.0) - 4.0; });
+  form.make = std::move(make);
+  form.solid = solid;
+  form.bound_error = kRimError;
+  return form;
+}
+// A shape of two closed curves: squares of 15 and 7 from middle to side, z a quarter of x.
+template <typename Shape>
+FieldShape HollowSquare(Graph& g, Shape shape) {
+  std::vector<Vector> points;
+  for (const double size : {15.0, 7.0}) {
+    for (const auto& [x, y] :
+         std::vector<std::pair<double, double>>{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}) {
+      points.push_back({x * size, y * size, 0.25 * x * size});
+    }
+  }
+  const std::vector<uint32_t> ends = {4, 8};
+  shape.points = points;
+  shape.ends = ends;
+  return shape.Make(g);
 }
 
 std::vector<Form> Forms() {
@@ -164,6 +197,13 @@ std::vector<Form> Forms() {
           [](auto x, auto y, auto z) {
             return Max(Abs(x) - 12.0, Abs(0.8 * (y + 10.0) + 0.6 * (z + 4.0) - 10.0) - 10.0);
           }),
+      Hollow(
+          "polygon", false, [](Graph& g) { return HollowSquare(g, Polygon{}); },
+          [=](auto x, auto, auto z) { return (z - 0.25 * x) * (4 / std::sqrt(17.0)); }),
+      Hollow(
+          "prism", true,
+          [](Graph& g) { return HollowSquare(g, Prism{.points = {}, .ends = {}, .depth = 9}); },
+          [](auto, auto, auto z) { return Abs(z + 4.5) - 4.5; }),
   };
 }
 
@@ -180,8 +220,13 @@ class Rule {
   }
   std::optional<bool> Wants(const Drawn& drawn, int32_t x, int32_t y, int32_t z) const {
     const double bound = form_.bound(placed_.Back(x, y, z)) * placed_.scale;
-    if (std::fabs(bound) < kError) return std::nullopt;
-    if (bound > 0) return false;
+    if (bound > form_.bound_error) return false;
+    const std::optional<bool> of_surface = OfSurface(drawn, x, y, z);
+    return bound > -form_.bound_error && of_surface != false ? std::nullopt : of_surface;
+  }
+
+ private:
+  std::optional<bool> OfSurface(const Drawn& drawn, int32_t x, int32_t y, int32_t z) const {
     const double p = values_[drawn.Index(x, y, z)], error = kError * SlopeAt(x, y, z);
     if (look_.fill == Fill::kSolid)
       return std::fabs(p) < error ? std::nullopt : std::optional(p < 0);
@@ -202,8 +247,6 @@ class Rule {
     });
     return !lit && doubtful ? std::nullopt : std::optional(lit);
   }
-
- private:
   double SlopeAt(int32_t x, int32_t y, int32_t z) const {
     constexpr double kAside = 1e-5;
     double square = 0;

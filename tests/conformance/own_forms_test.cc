@@ -1,5 +1,5 @@
-// Boxes, spheres and cylinders, which have coverage of their own, against the same shapes by the general method,
-// on every engine: the same solids but where a centre lies on the surface; surfaces that are nowhere farther apart
+// Boxes, spheres and cylinders, which have coverage of their own, against the same shapes by the general method, and by the
+// expressions that they are, on every engine: the same solids but where a centre lies on the surface; surfaces that are nowhere farther apart
 // than a voxel. What is far from the surface is worked out in double precision.
 #include <algorithm>
 #include <array>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "gpu/implicit/parse.h"
 #include "gpu/primitives/cone.h"
 #include "gpu/primitives/ellipsoid.h"
 #include "gpu/primitives/parallelepiped.h"
@@ -28,6 +29,7 @@ struct Form {
   PrimitiveKind kind;
   std::array<float, 3> measures;  // params[3] and on
   std::function<FieldShape(Graph&)> make;
+  std::string text;
   std::function<double(const Vector&)> distance;  // signed; past edges that of the planes
 };
 
@@ -39,6 +41,7 @@ std::vector<Form> Forms() {
        [](Graph& g) {
          return Parallelepiped{{}, {{22, 0, 0}, {0, 15, 0}, {0, 0, 9}}}.Make(g);
        },
+       "max(abs(x) - 11, max(abs(y) - 7.5, abs(z) - 4.5)) = 0",
        [](const Vector& p) {
          return std::max({std::fabs(p.x) - 11, std::fabs(p.y) - 7.5, std::fabs(p.z) - 4.5});
        }},
@@ -48,6 +51,7 @@ std::vector<Form> Forms() {
        [](Graph& g) {
          return Ellipsoid{{}, {13.3, 13.3, 13.3}}.Make(g);
        },
+       "x^2 + y^2 + z^2 = 13.3^2",
        [](const Vector& p) { return implicit::Length(p) - 13.3; }},
       {"cylinder",
        PrimitiveKind::kCylinder,
@@ -55,6 +59,7 @@ std::vector<Form> Forms() {
        [](Graph& g) {
          return Cone{{0, 0, -10.5}, {0, 0, 10.5}, 8.2, 8.2, false}.Make(g);
        },
+       "max(length(x, y) - 8.2, abs(z) - 10.5) = 0",
        [](const Vector& p) { return std::max(std::hypot(p.x, p.y) - 8.2, std::fabs(p.z) - 10.5); }},
   };
 }
@@ -85,10 +90,22 @@ class OwnForms : public EngineConformance {
     std::copy(form.measures.begin(), form.measures.end(), g.record.params + 3);
     return Draw(std::move(g), map);
   }
+  std::vector<uint32_t> DrawText(const Form& form, const GeometryRecord& look, const Affine& map) {
+    Graph graph;
+    const auto parsed = implicit::ParseShape(form.text, {}, {}, graph);
+    EXPECT_TRUE(parsed.ok()) << parsed.status();
+    FieldShape shape;
+    shape.surface = parsed->surface;
+    shape.bound = parsed->bound;
+    return DrawField(graph, shape, look, map);
+  }
   std::vector<uint32_t> DrawGeneral(const Form& form, const GeometryRecord& look,
                                     const Affine& map) {
     Graph graph;
-    const FieldShape shape = form.make(graph);
+    return DrawField(graph, form.make(graph), look, map);
+  }
+  std::vector<uint32_t> DrawField(Graph& graph, const FieldShape& shape, const GeometryRecord& look,
+                                  const Affine& map) {
     ModelGeometry g{.record = look, .positions = {}, .indices = {}, .colors = {}};
     g.record.kind = PrimitiveKind::kImplicit;
     g.indices = *implicit::Compile(graph, {.surface = shape.surface, .bound = shape.bound});
@@ -141,11 +158,13 @@ TEST_P(OwnForms, SolidsAreTheSame) {
       look.fill = Fill::kSolid;
       const std::vector<uint32_t> own = DrawOwn(form, look, map);
       const std::vector<uint32_t> general = DrawGeneral(form, look, map);
+      const std::vector<uint32_t> text = DrawText(form, look, map);
       ForEachVoxel([&](int32_t x, int32_t y, int32_t z) {
         const double d = form.distance(Back(map, x, y, z));
         if (std::fabs(d) < kMargin) return;
         EXPECT_EQ(own[At(x, y, z)] != 0, d < 0) << d;
         EXPECT_EQ(general[At(x, y, z)] != 0, d < 0) << d;
+        EXPECT_EQ(text[At(x, y, z)] != 0, d < 0) << d;
         inside += d < 0;
       });
     }
@@ -161,18 +180,19 @@ TEST_P(OwnForms, SurfacesAreWithinAVoxelOfOneAnother) {
       const Affine map = Turned(0.6, 0.9);
       GeometryRecord look;
       look.rule = rule;
-      const std::vector<uint32_t> surfaces[2] = {DrawOwn(form, look, map),
-                                                 DrawGeneral(form, look, map)};
+      const std::vector<uint32_t> surfaces[3] = {
+          DrawOwn(form, look, map), DrawGeneral(form, look, map), DrawText(form, look, map)};
       // A neighbour on the other side is as far away at most.
       const double most = (rule == SurfaceRule::kThin ? 1 : std::sqrt(3.0)) + kMargin;
-      for (int which = 0; which < 2; ++which) {
+      for (int which = 0; which < 3; ++which) {
+        const std::vector<uint32_t>& other = surfaces[which == 0 ? 2 : 0];
         ForEachVoxel([&](int32_t x, int32_t y, int32_t z) {
           if (surfaces[which][At(x, y, z)] == 0) return;
           ++lit;
           EXPECT_LE(std::fabs(form.distance(Back(map, x, y, z))), most) << which;
           bool near = false;
           for (int n = 0; n < 27; ++n) {
-            near |= surfaces[1 - which][At(x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1)] != 0;
+            near |= other[At(x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1)] != 0;
           }
           EXPECT_TRUE(near) << which << ": (" << x << ", " << y << ", " << z << ") is alone";
         });

@@ -151,7 +151,17 @@ class RandomPrimitives {
 
   // What is drawn by the general method.
   void SetMeasured(v1::Primitive* out) {
-    switch (random_() % 9) {
+    switch (random_() % 11) {
+      case 10:
+        SetIsosurface(out->mutable_isosurface());
+        if (random_() % 2 == 0) SetScale(out->mutable_color_scale());
+        return;
+      case 9:
+        *out->mutable_bezier_surface()->mutable_vertices() = Corners(16, false);
+        out->mutable_bezier_surface()->set_fill(
+            Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_LINES, v1::FILL_DOTS}));
+        if (out->bezier_surface().fill() < v1::FILL_LINES) SetShell(out->mutable_bezier_surface());
+        return;
       case 8: {
         v1::HeightMap* const map = out->mutable_height_map();
         SetVec3(map->mutable_edge_a(), 1, 0, 0.5);
@@ -210,6 +220,37 @@ class RandomPrimitives {
       default:
         return SetImplicit(out->mutable_implicit());
     }
+  }
+
+  void SetIsosurface(v1::Isosurface* out) {
+    v1::Grid* const grid = out->mutable_grid();
+    SetPoint(grid->mutable_corner());
+    SetVec3(grid->mutable_edge_a(), 1, 0, 0.5);
+    SetVec3(grid->mutable_edge_b(), 0, 1 + Length() / 1e4, 0);
+    SetVec3(grid->mutable_edge_c(), -0.25, 0, 2);
+    grid->set_size_a(1 + random_() % 6);
+    grid->set_size_b(1 + random_() % 6);
+    grid->set_size_c(1 + random_() % 6);
+    const size_t samples = size_t{grid->size_a()} * grid->size_b() * grid->size_c();
+    grid->set_type(Pick({v1::ELEMENT_TYPE_F32, v1::ELEMENT_TYPE_U16, v1::ELEMENT_TYPE_U8}));
+    const auto sample = [&] { return random_() % 256; };
+    grid->set_samples(grid->type() == v1::ELEMENT_TYPE_F32   ? Values<float>(samples, sample)
+                      : grid->type() == v1::ELEMENT_TYPE_U16 ? Values<uint16_t>(samples, sample)
+                                                             : Values<uint8_t>(samples, sample));
+    out->set_level(random_() % 256);
+    out->set_fill(Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_SOLID}));
+    SetShell(out);
+    if (out->fill() == v1::FILL_SOLID) out->clear_shell();
+  }
+  void SetScale(v1::ColorScale* out) {
+    if (random_() % 2 == 0) {
+      out->set_colormap("magma_r");
+    } else {
+      for (int i = 0; i < 3; ++i) out->add_colors(random_() & 0xFFFFFF);
+    }
+    SetVec3(out->mutable_along(), 1, 0, Length());
+    out->set_low(-1);
+    out->set_high(Length());
   }
 
   void SetImplicit(v1::Implicit* out) {

@@ -75,6 +75,15 @@ TEST(Nvrtc, CompilesAFormulaForADevice) {
   EXPECT_THAT(*module, HasSubstr(kFormulaKernel));
 }
 
+TEST(Nvrtc, SaysWhichDevicesItCompilesFor) {
+  const auto nvrtc = Open();
+  EXPECT_EQ(nvrtc->Supports(9, 0), absl::OkStatus());
+  const absl::Status status = nvrtc->Supports(99, 9);
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(status.message()),
+              HasSubstr("compiles nothing for compute capability 99.9; install"));
+}
+
 TEST(Nvrtc, CompilesWhateverProgramsHave) {
   const auto nvrtc = Open();
   conformance::SceneGenerator random(conformance::SeedOr(8));

@@ -1,0 +1,54 @@
+#include "gpu/cuda/opened_library.h"
+
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <cstring>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
+namespace voxeld::gpu::cuda {
+namespace {
+
+// The name of what it lacks; empty if it has all.
+std::string_view Find(void* library, std::span<const WantedFunction> wanted) {
+  for (const WantedFunction& function : wanted) {
+    void* const found = dlsym(library, function.name());
+    if (found == nullptr) return function.name();
+    function.Set(found);
+  }
+  return {};
+}
+
+}  // namespace
+
+void WantedFunction::Set(void* found) const { std::memcpy(function_, &found, sizeof(found)); }
+
+absl::StatusOr<std::string> OpenLibrary(std::string_view what,
+                                        const std::vector<std::string>& places,
+                                        std::span<const WantedFunction> wanted) {
+  std::vector<std::string> why;
+  for (const std::string& place : places) {
+    void* const library = dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library == nullptr) {
+      const char* const error = dlerror();  // begins with the name
+      why.push_back(error != nullptr ? error : absl::StrCat(place, ": cannot be opened"));
+      continue;
+    }
+    const std::string_view missing = Find(library, wanted);
+    if (missing.empty()) return place;
+    dlclose(library);
+    why.push_back(absl::StrCat(place, ": has no ", missing));
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat(what, " is not to be had; tried ", absl::StrJoin(why, "; ")));
+}
+
+std::string Environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value != nullptr ? value : "";
+}
+
+}  // namespace voxeld::gpu::cuda
