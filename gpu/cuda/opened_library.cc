@@ -12,22 +12,21 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// The name of what it lacks; empty if it has all.
-std::string_view Find(void* library, std::span<const WantedFunction> wanted) {
+// The name of what it lacks; null if it has all.
+const char* Find(void* library, std::span<const WantedFunction> wanted) {
   for (const WantedFunction& function : wanted) {
     void* const found = dlsym(library, function.name());
     if (found == nullptr) return function.name();
     function.Set(found);
   }
-  return {};
+  return nullptr;
 }
 
 }  // namespace
 
 void WantedFunction::Set(void* found) const { std::memcpy(function_, &found, sizeof(found)); }
 
-absl::StatusOr<std::string> OpenLibrary(std::string_view what,
-                                        const std::vector<std::string>& places,
+absl::StatusOr<std::string> OpenLibrary(const char* what, const std::vector<std::string>& places,
                                         std::span<const WantedFunction> wanted) {
   std::vector<std::string> why;
   for (const std::string& place : places) {
@@ -37,8 +36,8 @@ absl::StatusOr<std::string> OpenLibrary(std::string_view what,
       why.push_back(error != nullptr ? error : absl::StrCat(place, ": cannot be opened"));
       continue;
     }
-    const std::string_view missing = Find(library, wanted);
-    if (missing.empty()) return place;
+    const char* const missing = Find(library, wanted);
+    if (missing == nullptr) return place;
     dlclose(library);
     why.push_back(absl::StrCat(place, ": has no ", missing));
   }

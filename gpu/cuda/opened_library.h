@@ -3,7 +3,6 @@
 
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -29,8 +28,7 @@ class WantedFunction {
 // Opens the first of `places` (paths, or names that the loader knows) that can be and has all of `wanted`; says which. It stays
 // open for good: it may have threads of its own. FailedPrecondition names `what` and all that were tried, and why not; what is wanted may
 // then point anywhere.
-absl::StatusOr<std::string> OpenLibrary(std::string_view what,
-                                        const std::vector<std::string>& places,
+absl::StatusOr<std::string> OpenLibrary(const char* what, const std::vector<std::string>& places,
                                         std::span<const WantedFunction> wanted);
 
 // A variable of this process's environment; empty if it is not set.

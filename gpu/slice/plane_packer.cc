@@ -23,6 +23,18 @@ bool AreAlike(const uint32_t* row) {
   return differs == 0;
 }
 
+// Whether a tile is of one colour from end to end.
+bool IsUniform(const uint32_t* colors, const TileRows& rows) {
+  if (!(rows == TileRows::All())) return false;
+  constexpr size_t kPlane = kTileSize * kTileSize;
+  for (size_t begin = 0; begin < kTileVoxels; begin += kPlane) {
+    uint32_t differs = 0;
+    for (size_t i = begin; i < begin + kPlane; ++i) differs |= colors[i] ^ colors[0];
+    if (differs != 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::optional<PlanePacker> PlanePacker::Create(const Sampler& sampler,
@@ -166,11 +178,29 @@ void PlanePacker::Put(size_t picture, const Place& place, uint32_t rows, const P
   }
 }
 
+// The planes of a tile of one colour have the same bits.
+void PlanePacker::PutUniform(uint32_t tile, int32_t tile_z, const uint32_t* colors,
+                             const Place& place) {
+  constexpr uint32_t kAll = (1u << kTileSize) - 1;
+  RunBits run;
+  for (uint32_t sub = 0; sub < sub_frames_; ++sub) {
+    PlaneBits bits = {};
+    CollectBits(colors, kAll, sub, run, bits);
+    for (size_t z = 0; z < kTileSize; ++z) {
+      for (const uint32_t slice : slices_[static_cast<size_t>(tile_z * kTileSize) + z]) {
+        Put(slice * sub_frames_ + sub, place, kAll, bits);
+      }
+    }
+  }
+  rows_[tile].fill(static_cast<uint16_t>(kAll));
+}
+
 void PlanePacker::OnTile(uint32_t tile, const uint32_t* colors, const TileRows& rows) {
   int32_t ijk[3];
   grid_.Coordinates(tile, ijk);
   const std::optional<Place> place = PlaceOf(ijk);
   if (!place) return;
+  if (IsUniform(colors, rows)) return PutUniform(tile, ijk[2], colors, *place);
   PlaneBits bits = {};  // zeros between planes
   RunBits run;
   for (size_t z = 0; z < kTileSize; ++z) {

@@ -72,6 +72,7 @@ class PlanePacker final : public TileObserver {
   Under UnderOf(uint32_t word) const;
   uint32_t CollectBits(const uint32_t* colors, uint32_t lit_rows, uint32_t sub, RunBits& run,
                        PlaneBits& bits) const;
+  void PutUniform(uint32_t tile, int32_t tile_z, const uint32_t* colors, const Place& place);
   void Put(size_t picture, const Place& place, uint32_t rows, const PlaneBits& bits);
 
   TileGrid grid_;
