@@ -20,12 +20,7 @@
 
 namespace voxeld::daemon::wire {
 
-// Everything that decoding an entity's primitive gives.
-inline std::string InWords(const Content& content) {
-  if (const auto* instance = std::get_if<InstanceRef>(&content)) {
-    return absl::StrCat("of ", instance->object, " #", absl::Hex(instance->tint));
-  }
-  const GeometryData& g = *std::get<GeometryPtr>(content);
+inline std::string InWords(const GeometryData& g) {
   const gpu::GeometryRecord& r = g.record;
   std::string text = absl::StrCat(
       static_cast<int>(r.kind), " #", absl::Hex(r.color), " ", static_cast<int>(r.color_mode), " ",
@@ -50,6 +45,20 @@ inline std::string InWords(const Content& content) {
 inline std::string InWords(const gpu::Affine& map) {
   return absl::StrJoin(
       map.m, ",", [](std::string* out, double value) { absl::StrAppendFormat(out, "%a", value); });
+}
+
+// Everything that decoding an entity's primitive gives.
+inline std::string InWords(const Content& content) {
+  if (const auto* instance = std::get_if<InstanceRef>(&content)) {
+    return absl::StrCat("of ", instance->object, " #", absl::Hex(instance->tint));
+  }
+  if (const auto* geometry = std::get_if<GeometryPtr>(&content)) return InWords(**geometry);
+  const GroupData& group = *std::get<GroupPtr>(content);
+  std::string text = absl::StrCat(group.kind, " #", absl::Hex(group.color));
+  for (const GroupData::Part& part : group.parts) {
+    absl::StrAppend(&text, " [", InWords(*part.geometry), " at ", InWords(part.transform), "]");
+  }
+  return text;
 }
 
 inline std::string InWords(const v1::Affine& map) {
@@ -91,6 +100,8 @@ inline SceneInWords InWords(const Snapshot& scene, const v1::WatchSceneRequest& 
       if (geometry != nullptr) {
         kind = (*geometry)->kind != nullptr ? (*geometry)->kind
                                             : kKinds[static_cast<int>((*geometry)->record.kind)];
+      } else if (const auto* group = std::get_if<GroupPtr>(&data.content)) {
+        kind = (*group)->kind;
       }
       words.entities[{key.owner, key.name, id}] = absl::StrCat(
           kind, " ", geometry == nullptr ? 0 : (*geometry)->record.vertex_count, " ", entity->bytes,

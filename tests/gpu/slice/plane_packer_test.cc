@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <memory>
 #include <random>
@@ -82,6 +83,23 @@ class StackEngine {
       g.color_mode = ColorMode::kPerVertex;
       g.vertex_count = static_cast<uint32_t>(lines) * 2;
       w.PutGeometry(g, positions, {}, colors);
+      w.PutDrawable({.id = id, .geometry = geometries_, .layer = 1});
+    });
+  }
+
+  // A box as drawable `id`, from the corner of the volume on.
+  void PutBox(uint64_t id, uint32_t rgb, std::array<float, 3> size) {
+    Apply([&](DeltaWriter& w) {
+      GeometryRecord g;
+      g.id = ++geometries_;
+      g.kind = PrimitiveKind::kBox;
+      g.fill = Fill::kSolid;
+      g.color = rgb;
+      for (size_t a = 0; a < 3; ++a) {
+        g.params[a] = size[a] / 2;
+        g.params[3 + a] = size[a];
+      }
+      w.PutGeometry(g, {}, {}, {});
       w.PutDrawable({.id = id, .geometry = geometries_, .layer = 1});
     });
   }
@@ -172,6 +190,27 @@ TEST(PlanePacker, ShowsTheVolumeAndTellsWhatChanged) {
     EXPECT_GT(engine.ExpectFrame(), 0);
     engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 1); });
     EXPECT_GT(engine.ExpectFrame(), 0) << "dark again";
+  }
+}
+
+TEST(PlanePacker, TilesOfOneColourBecomeOthersAndBack) {
+  for (const int sub_frames : {1, 3}) {
+    StackEngine engine(StackTarget(sub_frames, display::Dither::kOrdered));
+    const int all = kSlices * sub_frames;
+    engine.PutBox(1, 0xC04080, {kWidth, kHeight, kSlices});
+    EXPECT_EQ(engine.ExpectFrame(), all);
+    engine.PutBox(1, 0xC04080, {kWidth, kHeight, kSlices});
+    EXPECT_EQ(engine.ExpectFrame(), 0) << "the same once more";
+    engine.PutBox(1, 0x30A060, {kWidth, kHeight, kSlices});
+    EXPECT_EQ(engine.ExpectFrame(), all) << "another colour";
+    engine.PutLines(2, 5, 2);
+    EXPECT_GT(engine.ExpectFrame(), 0) << "no longer of one";
+    engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 2); });
+    EXPECT_GT(engine.ExpectFrame(), 0);
+    engine.PutBox(1, 0x30A060, {16, 20, 7});
+    EXPECT_EQ(engine.ExpectFrame(), all) << "a part";
+    engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 1); });
+    EXPECT_EQ(engine.ExpectFrame(), 7 * sub_frames) << "dark again";
   }
 }
 
