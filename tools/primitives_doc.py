@@ -63,6 +63,13 @@ every shape
 | `lifetime` | seconds | it stays | |
 | `label` | – | as it was typed | for people |
 
+How values are typed there: vectors `x,y,z`, or one number for all three; a box its corners, `x,y,z:x,y,z`; vertices `x,y,z x,y,z …`;
+what has spaces in quotes; thicknesses numbers of voxels, or of the shape's units with a `u` behind (`shell=0.16u`); enumerations their last
+word (`fill=solid`); colours `#rrggbb` or plain names; pictures the path of a PNG or JPEG file, or `base64:` and its bytes; numbers of grids
+and heights as many as there are samples, of the type given (`grid.type=u8`), or `file:` and the path of a raw file of that type,
+little-endian; a boundary `x,y,z` of each vertex, the axis and its form before them (`y b_spline 1,0,0 …`). Counts and element types
+of vertices follow of themselves.
+
 **Units.** A *length* is in the entity's own units, as coordinates are; of a *direction* the length does not matter; *voxels* are the
 display's. *0 to 1* and the like are ranges, other words counts; – has none. **Defaults** are what holds where a field is not set;
 without what is *needed* a shape is refused. **Guarantees** are what the tests hold each shape to; h is half of a shell's thickness, in

@@ -29,7 +29,8 @@ MaybeFault ToLook(const FieldPath& path, const Message& in, const ShapeContext& 
   bool framed;
   if (auto fault = ToFill(path, in.fill(), &out->record, &framed)) return fault;
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  return ToThickness(FieldPath(path, "shell"), in.shell(), context.context, &out->record);
+  return ToShell(path, in.shell(), !framed && out->record.fill == gpu::Fill::kSurface,
+                 context.context, &out->record);
 }
 
 // The look, and the shape itself.

@@ -50,7 +50,8 @@ MaybeFault ToLines(const FieldPath& path, const std::vector<Vector>& vertices, g
     for (size_t s = 0; s < spans.size(); ++s) {
       const Vector* const p = &spans.points()[s * 4];
       const double parts = gpu::PartsOfSpan(p, error);
-      const auto made = static_cast<double>(points->size() / 3);
+      const size_t vertices = points->size() / 3;
+      const auto made = static_cast<double>(vertices);
       if (!(made + parts <= limits.max_boundary_points)) {
         return Fault{FieldPath(path, "points").ToString(), Reason::kQuotaExceeded,
                      absl::StrCat("are of smooth curves that make more lines than "
@@ -100,8 +101,11 @@ MaybeFault ToRings(const FieldPath& path, const google::protobuf::RepeatedField<
     if (end < begin + 3 || end > vertices) {
       return Fault{FieldPath(path, "ends", static_cast<int64_t>(i)).ToString(),
                    Reason::kIndexOutOfRange,
-                   absl::StrCat("is ", end, "; a curve has 3 vertices at least: give ", begin + 3,
-                                " to ", vertices)};
+                   begin + 3 > vertices
+                       ? absl::StrCat("is ", end, " after ", begin, ", of ", vertices,
+                                      " vertices; a curve has 3 at least: give more")
+                       : absl::StrCat("is ", end, "; a curve has 3 vertices at least: give ",
+                                      begin + 3, " to ", vertices)};
     }
     begin = end;
   }

@@ -20,7 +20,9 @@ using Node = Graph::Node;
 Fault FromParser(const FieldPath& path, const absl::Status& status) {
   const bool limit = status.code() == absl::StatusCode::kResourceExhausted;
   return {FieldPath(path, "text").ToString(),
-          limit ? Reason::kQuotaExceeded : Reason::kInvalidValue, std::string(status.message())};
+          limit ? Reason::kQuotaExceeded : Reason::kInvalidValue,
+          absl::StrCat(status.message(),
+                       limit ? ", the most of max_expression_depth or max_expression_nodes" : "")};
 }
 
 // How many numbers an operation takes.
@@ -123,7 +125,8 @@ class TreeReader {
       left.push_back(node);
       if (context_.graph.size() > context_.limits.nodes) {
         return Fault{FieldPath(path_, "ops").ToString(), Reason::kQuotaExceeded,
-                     absl::StrCat("has more than ", context_.limits.nodes, " operations")};
+                     absl::StrCat("has more than ", context_.limits.nodes,
+                                  " operations, max_expression_nodes")};
       }
     }
     if (left.size() != 1) {

@@ -48,7 +48,7 @@ MaybeFault ToShell(const FieldPath& path, const v1::Thickness& in, bool is_surfa
   if (is_surface || out->thickness == 0) return {};
   return Fault{FieldPath(shell, "value").ToString(), Reason::kInvalidValue,
                absl::StrCat("is ", Show(in.value()),
-                            ", but only a surface has a shell; leave it out, or fill")};
+                            ", but only what is drawn as FILL_SURFACE has a shell; leave one of the two out")};
 }
 
 MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out) {

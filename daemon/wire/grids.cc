@@ -204,8 +204,9 @@ MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* he
   }
   int stop = 0;
   for (size_t i = 0; i < out->size(); ++i) {
+    // The first and the last are the ends', which go on before and after.
     const double value =
-        low + (static_cast<double>(i) + 0.5) / SampleHead::kTableEntries * (high - low);
+        low + static_cast<double>(i) / (SampleHead::kTableEntries - 1) * (high - low);
     while (stop + 2 < in.values_size() && in.values(stop + 1) <= value) ++stop;
     const double from = in.values(stop), to = in.values(stop + 1);
     const double t = to > from ? std::clamp((value - from) / (to - from), 0.0, 1.0) : 1;
@@ -347,7 +348,8 @@ MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_
   if (auto fault = CheckFloat(FieldPath(path, "level"), in.level())) return fault;
   if (auto fault = ToFill(path, in.fill(), &look)) return fault;
   if (auto fault = ToRule(path, in.rule(), &look)) return fault;
-  if (auto fault = ToThickness(FieldPath(path, "shell"), in.shell(), context, &look)) return fault;
+  const bool surface = look.fill == gpu::Fill::kSurface;
+  if (auto fault = ToShell(path, in.shell(), surface, context, &look)) return fault;
   grid.head.by_level = 1;
   grid.head.level = static_cast<float>(in.level());
   // Thickness in the primitive's units, of which a sample is as many as its cell's edge.

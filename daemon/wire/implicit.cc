@@ -175,7 +175,8 @@ MaybeFault ToImplicit(const FieldPath& path, const v1::Implicit& in, const Decod
     return fault;
   }
   if (auto fault = ToRule(path, in.rule(), &record)) return fault;
-  if (auto fault = ToThickness(FieldPath(path, "shell"), in.shell(), limits, &record)) return fault;
+  const bool surface = record.fill == gpu::Fill::kSurface;
+  if (auto fault = ToShell(path, in.shell(), surface, limits, &record)) return fault;
   return ToProgram(path, graph, source, points, out);
 }
 

@@ -38,7 +38,7 @@ MaybeFault ToLook(const FieldPath& path, const Message& in, const Limits& limits
                   gpu::GeometryRecord* out) {
   if (auto fault = ToFill(path, in.fill(), out)) return fault;
   if (auto fault = ToRule(path, in.rule(), out)) return fault;
-  return ToThickness(FieldPath(path, "shell"), in.shell(), limits, out);
+  return ToShell(path, in.shell(), out->fill == gpu::Fill::kSurface, limits, out);
 }
 
 template <typename Shape>
@@ -64,6 +64,7 @@ MaybeFault ToLookOrFrame(const FieldPath& path, const Message& in, const ShapeCo
   if (auto fault = ToFill(path, in.fill(), &out->record, done)) return fault;
   if (!*done) return ToLook(path, in, context.context, &out->record);
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
+  if (auto fault = ToShell(path, in.shell(), false, context.context, &out->record)) return fault;
   return ToWireFrame(path, gpu::WireFrameOf(shape), in.fill() == v1::FILL_DOTS, context.context,
                      out);
 }

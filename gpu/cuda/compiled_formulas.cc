@@ -28,10 +28,9 @@ CompiledFormulas::~CompiledFormulas() {
 bool CompiledFormulas::HasCompiler() {
   if (!looked_for_) {
     looked_for_ = true;
-    absl::StatusOr<std::shared_ptr<const Nvrtc>> opened = Nvrtc::Open();
-    if (opened.ok() && (*opened)->Supports(api_.device().major, api_.device().minor).ok()) {
-      nvrtc_ = *std::move(opened);
-    }
+    absl::StatusOr<std::shared_ptr<const Nvrtc>> opened =
+        Nvrtc::OpenFor(api_.device().major, api_.device().minor);
+    if (opened.ok()) nvrtc_ = *std::move(opened);
   }
   return nvrtc_ != nullptr;
 }

@@ -24,9 +24,7 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& op
   }
   (*device)->api().SetFaults(faults);
   if (tuning.compile_formulas != cuda::CompileFormulas::kNever) {
-    const absl::StatusOr<std::shared_ptr<const cuda::Nvrtc>> nvrtc = cuda::Nvrtc::Open();
-    const absl::Status compiler =
-        nvrtc.ok() ? (*nvrtc)->Supports(properties.major, properties.minor) : nvrtc.status();
+    const absl::Status compiler = cuda::Nvrtc::OpenFor(properties.major, properties.minor).status();
     if (!compiler.ok()) {
       absl::StrAppend(&reason, "; expressions are interpreted: ", compiler.message());
     }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "gpu/cuda/opened_library.h"
 
 namespace voxeld::gpu::cuda {
@@ -65,7 +66,22 @@ absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::Open(const std::vector<std::
   return nvrtc;
 }
 
-absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::Open() { return Open(Places(Environment)); }
+absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::OpenFor(const std::vector<std::string>& places,
+                                                            int major, int minor) {
+  if (places.empty()) return Open(places);
+  std::vector<std::string> why;
+  for (const std::string& place : places) {
+    absl::StatusOr<std::shared_ptr<const Nvrtc>> opened = Open({place});
+    const absl::Status status = opened.ok() ? (*opened)->Supports(major, minor) : opened.status();
+    if (status.ok()) return opened;
+    why.emplace_back(status.message());
+  }
+  return absl::FailedPreconditionError(absl::StrJoin(why, "; "));
+}
+
+absl::StatusOr<std::shared_ptr<const Nvrtc>> Nvrtc::OpenFor(int major, int minor) {
+  return OpenFor(Places(Environment), major, minor);
+}
 
 absl::Status Nvrtc::Supports(int major, int minor) const {
   int count = 0;
@@ -79,7 +95,7 @@ absl::Status Nvrtc::Supports(int major, int minor) const {
   if (std::find(archs.begin(), archs.end(), major * 10 + minor) != archs.end()) return {};
   return absl::FailedPreconditionError(
       absl::StrCat(place_, " compiles nothing for compute capability ", major, ".", minor,
-                   "; install the NVRTC of a newer CUDA, or name it by VOXELD_NVRTC"));
+                   "; install that of a CUDA that does, or name it by VOXELD_NVRTC"));
 }
 
 absl::StatusOr<std::string> Nvrtc::Compile(const std::string& source,

@@ -30,7 +30,10 @@ class Nvrtc {
       const std::function<std::string(const char*)>& environment);
   // The first that there is. FailedPrecondition names all that were tried, and why not.
   static absl::StatusOr<std::shared_ptr<const Nvrtc>> Open(const std::vector<std::string>& places);
-  static absl::StatusOr<std::shared_ptr<const Nvrtc>> Open();
+  // The first of Places that compiles for devices of that compute capability.
+  static absl::StatusOr<std::shared_ptr<const Nvrtc>> OpenFor(
+      const std::vector<std::string>& places, int major, int minor);
+  static absl::StatusOr<std::shared_ptr<const Nvrtc>> OpenFor(int major, int minor);
   ~Nvrtc();
   Nvrtc(const Nvrtc&) = delete;
   Nvrtc& operator=(const Nvrtc&) = delete;

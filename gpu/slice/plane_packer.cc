@@ -69,7 +69,7 @@ std::optional<PlanePacker> PlanePacker::Create(const Sampler& sampler,
       out.dither_.push_back(DitherColumn(u, sub, static_cast<uint32_t>(out.sub_frames_)));
     }
   }
-  out.slices_.resize(static_cast<size_t>(out.grid_.tiles[2] * kTileSize));
+  out.slices_.resize(static_cast<size_t>(out.grid_.tiles[2]) * kTileSize);
   for (int32_t slice = begin; slice < end; ++slice) {
     const int32_t z = sampler.planes()[static_cast<size_t>(slice)];
     out.slices_[static_cast<size_t>(z)].push_back(static_cast<uint32_t>(slice - begin));
@@ -84,7 +84,7 @@ void PlanePacker::SetPictures(std::span<uint8_t> bytes) { pictures_ = bytes; }
 bool PlanePacker::TakeDiffers(size_t picture) { return std::exchange(differs_[picture], 0) != 0; }
 
 std::optional<PlanePacker::Place> PlanePacker::PlaceOf(const int32_t (&ijk)[3]) const {
-  const size_t u0 = static_cast<size_t>(ijk[0] * kTileSize);
+  const size_t u0 = static_cast<size_t>(ijk[0]) * kTileSize;
   const int32_t v0 = ijk[1] * kTileSize - first_row_;  // of y 0 of the tile
   if (u0 >= width_) return std::nullopt;
   Place place;

@@ -185,16 +185,17 @@ TEST_P(OwnForms, SurfacesAreWithinAVoxelOfOneAnother) {
       // A neighbour on the other side is as far away at most.
       const double most = (rule == SurfaceRule::kThin ? 1 : std::sqrt(3.0)) + kMargin;
       for (int which = 0; which < 3; ++which) {
-        const std::vector<uint32_t>& other = surfaces[which == 0 ? 2 : 0];
         ForEachVoxel([&](int32_t x, int32_t y, int32_t z) {
           if (surfaces[which][At(x, y, z)] == 0) return;
           ++lit;
           EXPECT_LE(std::fabs(form.distance(Back(map, x, y, z))), most) << which;
-          bool near = false;
-          for (int n = 0; n < 27; ++n) {
-            near |= other[At(x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1)] != 0;
+          for (const std::vector<uint32_t>& other : surfaces) {
+            bool near = false;
+            for (int n = 0; n < 27; ++n) {
+              near |= other[At(x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1)] != 0;
+            }
+            EXPECT_TRUE(near) << which << ": (" << x << ", " << y << ", " << z << ") is alone";
           }
-          EXPECT_TRUE(near) << which << ": (" << x << ", " << y << ", " << z << ") is alone";
         });
       }
     }

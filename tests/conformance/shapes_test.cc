@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "gpu/primitives/arrow.h"
 #include "gpu/primitives/cone.h"
 #include "gpu/primitives/disc.h"
 #include "gpu/primitives/ellipsoid.h"
@@ -329,6 +330,36 @@ TEST_P(MeasuredShapes, NothingGetsThroughTheirSurfaces) {
         EXPECT_GT(inside, 100u);
       }
     }
+  }
+}
+
+TEST_P(MeasuredShapes, NothingGetsIntoAnArrow) {
+  const Arrow arrow{{-9, -8, -7}, {9, 8, 7}, 4, 12, 9};
+  const Vector unit = 1 / Norm(arrow.end - arrow.start) * (arrow.end - arrow.start);
+  const double length = Norm(arrow.end - arrow.start);
+  for (const SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
+    SceneGenerator random(78);
+    const Affine map = Placed(random, 1);
+    Graph graph;
+    const std::vector<uint32_t> voxels = Draw(arrow.Make(graph), graph, {.rule = rule}, map);
+    const std::vector<uint8_t> outside = Flood(voxels, rule == SurfaceRule::kCover);
+    uint64_t inside = 0;
+    for (int32_t z = 0; z < kSize; ++z) {
+      for (int32_t y = 0; y < kSize; ++y) {
+        for (int32_t x = 0; x < kSize; ++x) {
+          const Vector p = Back(map, x, y, z, 1);
+          const double along = Along(p, arrow.start, unit);
+          const double across = Norm(p - (arrow.start + along * unit));
+          const bool shaft = along > 2 && along < length - 12 && across < 2;
+          const double left = length - along;  // to the tip
+          const bool head = left > 2 && left < 10 && across < left * 0.75 - 2.5;
+          if (!shaft && !head) continue;
+          ++inside;
+          ASSERT_EQ(outside[At(x, y, z)], 0) << "(" << x << ", " << y << ", " << z << ")";
+        }
+      }
+    }
+    EXPECT_GT(inside, 300u);
   }
 }
 

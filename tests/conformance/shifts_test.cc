@@ -11,8 +11,12 @@
 #include "gpu/implicit/parse.h"
 #include "gpu/primitives/arrow.h"
 #include "gpu/primitives/cone.h"
+#include "gpu/primitives/disc.h"
 #include "gpu/primitives/ellipsoid.h"
 #include "gpu/primitives/parallelepiped.h"
+#include "gpu/primitives/patch.h"
+#include "gpu/primitives/polygon.h"
+#include "gpu/primitives/prism.h"
 #include "gpu/primitives/torus.h"
 #include "tests/conformance/placed.h"
 
@@ -68,6 +72,16 @@ void AddFields(std::vector<Named>& all) {
     all.emplace_back("parallelepiped",
                      FieldGeometry(Parallelepiped{{}, {{9, 1, 0}, {2, 8, 1}, {0, 3, 9}}}, look));
     all.emplace_back("arrow", FieldGeometry(Arrow{{-6, -5, -4}, {6, 5, 4}, 1, 5, 3}, look));
+    const std::vector<Vector> corners = {{-8, -7, -2},  {8, -6, 2},      {7, 8, 1.75},
+                                         {-6, 7, -1.5}, {-3, -3, -0.75}, {3, -2, 0.75},
+                                         {0, 4, 0}};
+    const std::vector<uint32_t> ends = {4, 7};
+    all.emplace_back("prism", FieldGeometry(Prism{corners, ends, 6}, look));
+    if (fill == Fill::kSurface) {
+      all.emplace_back("disc", FieldGeometry(Disc{{}, {1, 2, 3}, 9, 4}, look));
+      all.emplace_back("patch", FieldGeometry(Patch{{-6, -5, 3}, {12, 2, -6}, {-2, 10, 5}}, look));
+      all.emplace_back("polygon", FieldGeometry(Polygon{corners, ends}, look));
+    }
     Graph graph;
     const auto parsed = implicit::ParseShape(
         "sin(x)*cos(0.7*y) + sin(0.8*z) = 0.2 where length(x, y, z) <= 9", {}, {}, graph);

@@ -199,7 +199,7 @@ struct Instance {
 // Colours by numbers, from one end of a row of colours to the other. Along a direction for all but Implicit, which has a level,
 // volumes and instances; numbers for what has vertices, or samples of heights.
 struct ColorScale {
-  std::string colormap;       // as "viridis", or "viridis_r": turned round;
+  std::string colormap;       // matplotlib's, as "viridis", or "viridis_r": turned round;
   std::vector<Color> colors;  // or 2 to 256 colours, evenly apart
   double low = 0,
          high = 0;  // the numbers at the two ends; both 0: the least and the greatest there are

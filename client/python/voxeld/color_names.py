@@ -1,5 +1,9 @@
-"""The names of colours: CSS's 148, and matplotlib's tab: palette with its letters."""
+"""The names of colours: CSS's 148, and matplotlib's tab: palette with its letters; and of colour maps."""
 from __future__ import annotations
+
+import functools
+import importlib.resources
+from typing import Optional
 
 _CSS = """
 aliceblue f0f8ff antiquewhite faebd7 aqua 00ffff aquamarine 7fffd4 azure f0ffff beige f5f5dc bisque ffe4c4 black 000000
@@ -38,12 +42,18 @@ _LETTERS = "b 0000ff g 008000 r ff0000 c 00bfbf m bf00bf y bfbf00 k 000000 w fff
 _words = f"{_CSS} {_TAB} {_LETTERS}".split()
 NAMES: dict[str, int] = {name: int(value, 16) for name, value in zip(_words[::2], _words[1::2])}
 
-# Colours at even distances from 0 to 1; between them they run straight.
-MAPS: dict[str, tuple[int, ...]] = {
-    "gray": (0x000000, 0xFFFFFF),
-    "viridis": (0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30, 0xFDE725),
-    "inferno": (0x000004, 0x210C4A, 0x57106E, 0x8A226A, 0xBC3754, 0xE45A31, 0xF98E09, 0xF9CB35, 0xFCFFA4),
-    "coolwarm": (0x3B4CC0, 0x6788EE, 0x9ABBFF, 0xC9D7F0, 0xEDD1C2, 0xF7A889, 0xE26952, 0xB40426),
-    "hot": (0x0B0000, 0xFF0000, 0xFFFF00, 0xFFFFFF),
-    "hsv": (0xFF0000, 0xFFFF00, 0x00FF00, 0x00FFFF, 0x0000FF, 0xFF00FF, 0xFF0000),
-}
+
+@functools.cache
+def maps() -> dict[str, tuple[int, ...]]:
+    """The colour maps by name, as the server has them: colours at even distances from 0 to 1; between them they run straight."""
+    text = importlib.resources.files(__package__).joinpath("colormaps.txt").read_text()
+    lines = (line.split() for line in text.splitlines() if line and not line.startswith("#"))
+    return {name: tuple(int(color, 16) for color in colors) for name, *colors in lines}
+
+
+def map_named(name: str) -> Optional[tuple[int, ...]]:
+    """A colour map, turned round with "_r" behind its name; None: there is none of that name."""
+    if name.endswith("_r"):
+        turned = maps().get(name[:-2])
+        return turned[::-1] if turned is not None else None
+    return maps().get(name)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Array, as_array, number, require_finite, vector
-from .color_names import MAPS, NAMES
+from .color_names import NAMES, map_named, maps
 from .errors import InvalidColor
 from .v1 import primitives_pb2, types_pb2
 
@@ -120,8 +120,13 @@ def along(value: Optional[Colors], positions: Array) -> Optional[Colors]:
 def mapped(values: npt.ArrayLike, cmap: Union[str, Sequence[Any]], low: Optional[float] = None,
            high: Optional[float] = None) -> npt.NDArray[np.uint8]:
     """A colour for each number: `low` (default: the least) is the map's first, `high` its last."""
-    if isinstance(cmap, str) and cmap not in MAPS:
-        raise InvalidColor(f"there is no colour map {cmap!r}; there are {', '.join(MAPS)}")
+    if isinstance(cmap, str):
+        named = map_named(cmap)
+        if named is None:
+            raise InvalidColor(f"there is no colour map {cmap!r}; {_map_hint(cmap)}")
+        stops = rgb_of(named).astype(np.float64)
+    else:
+        stops = rgb_of([one(color) for color in cmap]).astype(np.float64)
     array = as_array(values, "colors").astype(np.float64)
     require_finite(array, "colors")
     if array.size == 0:
@@ -129,11 +134,22 @@ def mapped(values: npt.ArrayLike, cmap: Union[str, Sequence[Any]], low: Optional
     first = float(array.min()) if low is None else float(low)
     last = float(array.max()) if high is None else float(high)
     at = np.clip((array - first) / (last - first), 0, 1) if last > first else np.zeros_like(array)
-    stops = rgb_of(MAPS[cmap] if isinstance(cmap, str) else [one(color) for color in cmap]).astype(np.float64)
     place = np.linspace(0, 1, len(stops))
+    if isinstance(cmap, str):  # in 256 steps, as the server has them: maps of few colours keep their edges
+        at = np.rint(at * 255) / 255
     channels = np.stack([np.interp(at, place, stops[:, c]) for c in range(3)], axis=-1)
     result: npt.NDArray[np.uint8] = np.rint(channels).astype(np.uint8)
     return result
+
+
+def _map_hint(wrong: str) -> str:
+    turned = "_r" if wrong.endswith("_r") else ""
+    plain = wrong.removesuffix("_r")
+    by_folded = {name.lower(): name for name in maps()}
+    near = difflib.get_close_matches(plain.lower(), by_folded, n=1)
+    if near:
+        return f"did you mean {by_folded[near[0]] + turned!r}?"
+    return f"there are {', '.join(maps())}, each also turned round, as viridis_r"
 
 
 def numbers_each(value: Optional[Colors]) -> bool:

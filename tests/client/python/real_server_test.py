@@ -106,6 +106,41 @@ class RealServer(unittest.TestCase):
     def ids(self, v: voxel.Connection) -> list[str]:
         return sorted(entity.key.id for entity in v.entities(timeout=LONG))
 
+    def test_every_shape_is_accepted(self) -> None:
+        v = self.connect()
+        corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+        numbers = np.arange(3.0)
+        with v.frame("all") as f:
+            f.points("points", corners, colors=numbers, cmap="plasma_r")
+            f.voxels("voxels", corners)
+            f.lines("lines", corners, colors=numbers, cmap="tab10")
+            f.mesh("mesh", corners, shell=2)
+            f.box("box", shell=1)
+            f.sphere("sphere")
+            f.cylinder("cylinder")
+            f.volume("cells", np.ones((2, 2, 2)), cmap="turbo")
+            f.curve("curve", corners, colors=numbers, cmap="viridis")
+            f.arc("arc", sweep=2)
+            f.ellipse("ellipse")
+            f.helix("helix", turns=3)
+            f.bezier_surface("patches", np.random.default_rng(1).uniform(-1, 1, (4, 4, 3)), shell=2)
+            f.arrow("arrow")
+            f.text("text", "A")
+            f.grid("grid", np.ones((2, 2, 2), np.uint8))
+            f.isosurface("isosurface", np.arange(8.0).reshape(2, 2, 2), 3.5)
+            f.ellipsoid("ellipsoid")
+            f.torus("torus")
+            f.cone("cone")
+            f.parallelepiped("parallelepiped", (0, 0, 0), np.eye(3))
+            f.disc("disc", inner_radius=0.2)
+            f.patch("patch", (0, 0, 0), np.eye(3)[:2])
+            f.polygon("polygon", [corners])
+            f.height_map("height map", np.arange(4.0).reshape(2, 2), colors=np.arange(4.0).reshape(2, 2), cmap="Spectral_r", shell=2)
+            f.implicit("implicit", "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1")
+        self.assertEqual(f.wait(LONG).state, "accepted")
+        self.assertEqual(len(self.ids(v)), 26)
+        self.assertEqual(v.issues, [])
+
     def test_a_cut_connection_is_resumed_and_nothing_is_lost(self) -> None:
         for policy in ("clear", "keep", 30.0):
             with self.subTest(policy):

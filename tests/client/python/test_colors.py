@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 
 from voxeld import InvalidArray, InvalidColor, colors
-from voxeld.color_names import MAPS, NAMES
+from voxeld.color_names import NAMES, map_named, maps
 
 
 class One(unittest.TestCase):
@@ -63,11 +63,30 @@ class Many(unittest.TestCase):
         self.assertEqual(colors.many((0.0, 1.0, 0.0), 9), 0x00FF00)
         self.assertIsNone(colors.many(None, 9))
 
-    def test_maps_run_straight_from_stop_to_stop(self) -> None:
-        for name, stops in MAPS.items():
-            place = np.linspace(5, 7, len(stops))
-            got = colors.mapped(place, name)
-            np.testing.assert_array_equal(got, [[c >> 16, c >> 8 & 255, c & 255] for c in stops])
+    def test_maps_are_the_servers(self) -> None:
+        self.assertGreater(len(maps()), 80)
+        for name, stops in maps().items():
+            ends = np.array([[c >> 16, c >> 8 & 255, c & 255] for c in (stops[0], stops[-1])])
+            np.testing.assert_array_equal(colors.mapped([5, 7], name), ends)
+            np.testing.assert_array_equal(colors.mapped([5, 7], name + "_r"), ends[::-1])
+            self.assertEqual(map_named(name + "_r"), stops[::-1])
+        steps = colors.mapped(np.linspace(0, 1, 256), "tab10")
+        self.assertEqual(len(np.unique(steps, axis=0)), 10)
+        np.testing.assert_array_equal(colors.mapped([0.5], "viridis", 0, 1), [[0x21, 0x91, 0x8C]])
+        for name in ("viridis_r_r", "_r", "sepia"):
+            self.assertIsNone(map_named(name))
+
+    def test_maps_of_ones_own_run_straight_from_stop_to_stop(self) -> None:
+        got = colors.mapped([5, 5.5, 6, 7], ["#000000", "#ff8000", "#ffffff"])
+        np.testing.assert_array_equal(got, [[0] * 3, [128, 64, 0], [255, 128, 0], [255] * 3])
+
+    def test_maps_by_wrong_names_are_told_the_nearest(self) -> None:
+        for wrong, hint in (("virdis", "'viridis'?"), ("Viridis_r", "'viridis_r'?"), ("sepia", "turned round, as viridis_r")):
+            with self.assertRaises(InvalidColor) as caught:
+                colors.mapped([0, 1], wrong)
+            self.assertIn(hint, str(caught.exception))
+
+    def test_maps_run_from_the_least_to_the_most(self) -> None:
         np.testing.assert_array_equal(colors.mapped([0, 0.5, 1], "gray"), [[0] * 3, [128] * 3, [255] * 3])
         np.testing.assert_array_equal(colors.mapped([-9, 9], "gray", 0, 1), [[0] * 3, [255] * 3])
         np.testing.assert_array_equal(colors.mapped([3, 3], "gray"), [[0] * 3] * 2)

@@ -163,6 +163,9 @@ TEST(Grids, TransferFunctionsAreTables) {
     return view.table()[gpu::Samples::EntryOf(view.head(), value)];
   };
   EXPECT_EQ(look(8), look(100)) << "as the last";
+  EXPECT_EQ(look(8), 0x808000u | gpu::SampleHead::kDrawn);
+  EXPECT_EQ(look(0), 0u) << "as the first, which is nothing";
+  EXPECT_EQ(look(-100), 0u);
   EXPECT_EQ(look(4) >> 24, 1u);
   EXPECT_NEAR(look(4) >> 16 & 255, 255, 3);
   EXPECT_NEAR(look(2) >> 16 & 255, 64, 2) << "half red, half its light";

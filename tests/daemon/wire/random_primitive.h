@@ -1,4 +1,4 @@
-// Primitives of every kind, with every type of array, at random; good ones all.
+// Primitives of every kind but Text, with every type of array, at random; good ones all.
 #pragma once
 
 #include <random>
@@ -151,8 +151,38 @@ class RandomPrimitives {
 
   // What is drawn by the general method.
   void SetMeasured(v1::Primitive* out) {
-    switch (random_() % 11) {
+    switch (random_() % 16) {
+      case 15:
+        *out->mutable_curve()->mutable_vertices() = Corners(7, false);
+        out->mutable_curve()->set_form(
+            Pick({v1::Curve::FORM_UNSPECIFIED, v1::Curve::CATMULL_ROM, v1::Curve::B_SPLINE,
+                  v1::Curve::BEZIER, v1::Curve::QUADRATIC}));
+        return SetThickness(out->mutable_curve());
+      case 14:
+        SetPoint(out->mutable_arc()->mutable_center());
+        out->mutable_arc()->set_radius(Length());
+        out->mutable_arc()->set_start(random_() % 6);
+        out->mutable_arc()->set_sweep(random_() % 6);
+        return SetThickness(out->mutable_arc());
+      case 13:
+        SetVec3(out->mutable_ellipse()->mutable_axis_a(), 2, Length(), 0);
+        SetVec3(out->mutable_ellipse()->mutable_axis_b(), -1, 0, 3);
+        return SetThickness(out->mutable_ellipse());
+      case 12:
+        SetVec3(out->mutable_helix()->mutable_start(), 0, 1, 2);
+        SetVec3(out->mutable_helix()->mutable_end(), 3, Length(), 2);
+        out->mutable_helix()->set_radius(Length());
+        out->mutable_helix()->set_turns(1 + random_() % 9);
+        return SetThickness(out->mutable_helix());
+      case 11:
+        SetVec3(out->mutable_arrow()->mutable_start(), 0, 1, 2);
+        SetVec3(out->mutable_arrow()->mutable_end(), 3, 5 + Length(), 2);
+        return SetShell(out->mutable_arrow());
       case 10:
+        if (random_() % 2 == 0) {
+          SetGrid(out->mutable_volume()->mutable_grid());
+          return;
+        }
         SetIsosurface(out->mutable_isosurface());
         if (random_() % 2 == 0) SetScale(out->mutable_color_scale());
         return;
@@ -178,8 +208,9 @@ class RandomPrimitives {
       case 0:
         SetPoint(out->mutable_ellipsoid()->mutable_center());
         SetVec3(out->mutable_ellipsoid()->mutable_radii(), Length(), Length(), Length());
+        if (random_() % 2 == 0) return SetShell(out->mutable_ellipsoid());
         out->mutable_ellipsoid()->set_fill(v1::FILL_SOLID);
-        return SetShell(out->mutable_ellipsoid());
+        return out->mutable_ellipsoid()->set_rule(Rule());
       case 1:
         SetPoint(out->mutable_torus()->mutable_center());
         out->mutable_torus()->set_radius(Length());
@@ -222,8 +253,7 @@ class RandomPrimitives {
     }
   }
 
-  void SetIsosurface(v1::Isosurface* out) {
-    v1::Grid* const grid = out->mutable_grid();
+  void SetGrid(v1::Grid* grid) {
     SetPoint(grid->mutable_corner());
     SetVec3(grid->mutable_edge_a(), 1, 0, 0.5);
     SetVec3(grid->mutable_edge_b(), 0, 1 + Length() / 1e4, 0);
@@ -237,6 +267,9 @@ class RandomPrimitives {
     grid->set_samples(grid->type() == v1::ELEMENT_TYPE_F32   ? Values<float>(samples, sample)
                       : grid->type() == v1::ELEMENT_TYPE_U16 ? Values<uint16_t>(samples, sample)
                                                              : Values<uint8_t>(samples, sample));
+  }
+  void SetIsosurface(v1::Isosurface* out) {
+    SetGrid(out->mutable_grid());
     out->set_level(random_() % 256);
     out->set_fill(Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_SOLID}));
     SetShell(out);
@@ -294,6 +327,7 @@ class RandomPrimitives {
     }
     out->set_fill(Pick({v1::FILL_UNSPECIFIED, v1::FILL_SURFACE, v1::FILL_SOLID}));
     SetShell(out);
+    if (out->fill() != v1::FILL_SURFACE) out->clear_shell();
   }
 
   template <typename T>

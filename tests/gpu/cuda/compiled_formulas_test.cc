@@ -34,7 +34,7 @@ class CompiledFormulasTest : public ::testing::Test {
   CompiledFormulasTest() : api_(*Api::Open(0)) {}
   // All of these need it: without it they fail, and say so.
   void SetUp() override {
-    const auto nvrtc = Nvrtc::Open();
+    const auto nvrtc = Nvrtc::OpenFor(9, 0);
     ASSERT_TRUE(nvrtc.ok()) << nvrtc.status();
   }
   const std::unique_ptr<Api> api_;

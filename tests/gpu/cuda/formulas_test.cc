@@ -84,6 +84,16 @@ TEST(Nvrtc, SaysWhichDevicesItCompilesFor) {
               HasSubstr("compiles nothing for compute capability 99.9; install"));
 }
 
+TEST(Nvrtc, TakesTheFirstThatCompilesForTheDevice) {
+  const auto nvrtc = Nvrtc::OpenFor({"/nowhere/libnvrtc.so", VOXELD_HAVE_NVRTC}, 9, 0);
+  ASSERT_TRUE(nvrtc.ok()) << nvrtc.status();
+  EXPECT_EQ((*nvrtc)->place(), VOXELD_HAVE_NVRTC);
+  const absl::Status none =
+      Nvrtc::OpenFor({"/nowhere/libnvrtc.so", VOXELD_HAVE_NVRTC}, 99, 9).status();
+  EXPECT_THAT(std::string(none.message()),
+              AllOf(HasSubstr("/nowhere/libnvrtc.so"), HasSubstr("compiles nothing for")));
+}
+
 TEST(Nvrtc, CompilesWhateverProgramsHave) {
   const auto nvrtc = Open();
   conformance::SceneGenerator random(conformance::SeedOr(8));

@@ -115,8 +115,15 @@ TEST(ShapeText, PicturesAreFilesOrTheirBytes) {
   EXPECT_EQ(Parsed("mesh texture.picture=base64:iVBORwAh").primitive().mesh().texture().picture(),
             bytes);
   EXPECT_THAT(ErrorOf("height_map picture=" + folder.Path("none")),
-              HasSubstr("the path of a PNG or JPEG file would be right, one that can be read"));
-  EXPECT_THAT(ErrorOf("height_map picture=" + folder.Path("")), HasSubstr("one that can be read"));
+              HasSubstr("the path of a PNG or JPEG file that can be read would be right"));
+  EXPECT_THAT(ErrorOf("height_map picture=" + folder.Path("")),
+              HasSubstr("the path of a PNG or JPEG file that can be read would be right"));
+  const std::string raw = folder.Write("samples.raw", std::string("\x01\x02\x03\xFF", 4));
+  EXPECT_EQ(
+      Parsed("volume grid.type=u8 grid.samples=file:" + raw).primitive().volume().grid().samples(),
+      std::string("\x01\x02\x03\xFF", 4));
+  EXPECT_THAT(ErrorOf("volume grid.samples=file:/nowhere/x.raw"),
+              HasSubstr("samples is \"/nowhere/x.raw\"; the path of a file that can be read"));
   EXPECT_EQ(ErrorOf("height_map picture=base64:*"),
             "picture is \"base64:*\"; base64 would be right, or a file's path");
 }

@@ -22,7 +22,7 @@ inline constexpr const char* kDrawAbout =
     "  voxelctl draw \"object pin: cone end=0,0,0.4 start_radius=0 end_radius=0.1\" "
     "\"object pin: sphere center=0,0,0.45 radius=0.1\"\n"
     "                \"instance object=pin at=0.5,0,0 tint=red\" \"instance object=pin\"\n"
-    "  voxelctl draw \"sphere radius=0.8\" \"clip_plane c=1\" \"mask: box size=1\"\n"
+    "  voxelctl draw \"sphere radius=0.8\" \"clip_plane c=1\" \"mask: box size=1 fill=solid\"\n"
     "The last shows what is in a mask, above a plane; clip_box and clip_cylinder clip too.\n"
     "Values are the fields of the shape (docs/primitives.md), and color, at, scale, turn "
     "(degrees), "

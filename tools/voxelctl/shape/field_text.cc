@@ -130,6 +130,17 @@ absl::Status SetMessage(const FieldDescriptor& field, absl::string_view text, Me
   return absl::InvalidArgumentError(absl::StrCat(name, " is nothing that can be typed here"));
 }
 
+absl::Status ReadFile(const FieldDescriptor& field, absl::string_view path, absl::string_view what,
+                      std::string* out) {
+  std::ifstream file{std::string(path), std::ios::binary};
+  std::ostringstream whole;
+  if (!file || !(whole << file.rdbuf())) {
+    return Wrong(field.name(), path, absl::StrCat("the path of ", what, " would be right"));
+  }
+  *out = std::move(whole).str();
+  return absl::OkStatus();
+}
+
 // A file by its path, or its bytes.
 absl::Status SetPicture(const FieldDescriptor& field, absl::string_view text, Message* out) {
   std::string bytes;
@@ -139,13 +150,9 @@ absl::Status SetPicture(const FieldDescriptor& field, absl::string_view text, Me
       return Wrong(field.name(), text, "base64 would be right, or a file's path");
     }
   } else {
-    std::ifstream file{std::string(text), std::ios::binary};
-    std::ostringstream whole;
-    if (!file || !(whole << file.rdbuf())) {
-      return Wrong(field.name(), text,
-                   "the path of a PNG or JPEG file would be right, one that can be read");
-    }
-    bytes = std::move(whole).str();
+    const absl::Status status =
+        ReadFile(field, text, "a PNG or JPEG file that can be read", &bytes);
+    if (!status.ok()) return status;
   }
   out->GetReflection()->SetString(out, &field, std::move(bytes));
   return absl::OkStatus();
@@ -183,10 +190,18 @@ absl::Status AppendNumber(absl::string_view name, double number, v1::ElementType
                                       : append(static_cast<uint8_t>(number));
 }
 
-// Packed arrays: colours, or numbers of the type that the message has, else in single precision.
+// Packed arrays: colours, or numbers of the type that the message has, else in single precision; or a file's bytes, as they are.
 absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Message* out) {
   if (field.name() == "picture") return SetPicture(field, text, out);
   std::string bytes;
+  if (absl::ConsumePrefix(&text, "file:")) {
+    if (absl::Status status = ReadFile(field, text, "a file that can be read", &bytes);
+        !status.ok()) {
+      return status;
+    }
+    out->GetReflection()->SetString(out, &field, std::move(bytes));
+    return absl::OkStatus();
+  }
   if (field.name() == "colors") {
     for (const absl::string_view part : absl::StrSplit(text, ' ', absl::SkipEmpty())) {
       v1::Color color;

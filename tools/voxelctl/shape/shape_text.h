@@ -8,7 +8,8 @@
 // x,y,z, or one number for all three; boxes two corners x,y,z:x,y,z; vertices x,y,z x,y,z …; thicknesses
 // numbers of voxels, or of the shape's units with a u behind; colours #rrggbb or plain names; pictures the path of a PNG or JPEG
 // file, or base64: and its bytes. A boundary is x,y,z of each vertex, the axis and its form before them: "y b_spline 1,0,0 …".
-// Numbers of grids and heights are of their type: "grid.type=u8 grid.samples=…", else single precision. None is given twice.
+// Numbers of grids and heights are of their type: "grid.type=u8 grid.samples=…", else single precision; file: and a path are a
+// file's bytes of that type, little-endian. None is given twice.
 //
 //   clip_plane a= b= c= d=, clip_box center= size= at= scale= turn=, clip_cylinder start= end= radius=
 //                           no shapes, but what the others are clipped to
