@@ -118,7 +118,7 @@ class RealServer(unittest.TestCase):
             f.box("box", shell=1)
             f.sphere("sphere")
             f.cylinder("cylinder")
-            f.volume("cells", np.ones((2, 2, 2)), cmap="turbo")
+            f.volume("cells", np.arange(8.0).reshape(2, 2, 2), cmap="turbo")
             f.curve("curve", corners, colors=numbers, cmap="viridis")
             f.arc("arc", sweep=2)
             f.ellipse("ellipse")
@@ -138,8 +138,8 @@ class RealServer(unittest.TestCase):
             f.height_map("height map", np.arange(4.0).reshape(2, 2), colors=np.arange(4.0).reshape(2, 2), cmap="Spectral_r", shell=2)
             f.implicit("implicit", "x^2 + y^2 - z = 0 where x^2 + y^2 <= 1")
         self.assertEqual(f.wait(LONG).state, "accepted")
-        self.assertEqual(len(self.ids(v)), 26)
         self.assertEqual(v.issues, [])
+        self.assertEqual(len(self.ids(v)), 26)
 
     def test_a_cut_connection_is_resumed_and_nothing_is_lost(self) -> None:
         for policy in ("clear", "keep", 30.0):

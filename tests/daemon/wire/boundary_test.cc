@@ -195,7 +195,7 @@ TEST(Boundaries, WhatIsWrongIsSaid) {
        "primitive.implicit.boundary.form", Reason::kInvalidValue, "CATMULL_ROM"},
       {"two vertices", Smooth,
        [](P& p) { p.mutable_implicit()->mutable_boundary()->mutable_points()->Truncate(6); },
-       "primitive.implicit.boundary.ends[0]", Reason::kIndexOutOfRange, "3 vertices at least"},
+       "primitive.implicit.boundary.ends[0]", Reason::kIndexOutOfRange, "a curve has 3 at least"},
       {"infinite", Smooth,
        [](P& p) { p.mutable_implicit()->mutable_boundary()->set_points(4, HUGE_VAL); },
        "primitive.implicit.boundary.points[4]", Reason::kInvalidValue, ""},

@@ -94,7 +94,7 @@ TEST(ShellsOfTriangles, OfNothingAreAsIfTheyWereNotThere) {
   EXPECT_FALSE(encoded.mesh().has_shell());
 }
 
-const char* const kNoSurface = "is 2.5, but only a surface has a shell; leave it out, or fill";
+const char* const kNoSurface = "is 2.5, but only what is drawn as FILL_SURFACE has a shell";
 
 const FaultCase kCases[] = {
     {"mesh_negative", Mesh, [](P& p) { p.mutable_mesh()->mutable_shell()->set_value(-1); },
