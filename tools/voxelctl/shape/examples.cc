@@ -32,9 +32,10 @@ constexpr ShapeExample kExamples[] = {
      "0,0.8,-0.6 -0.8,-0.8,-0.6 0,0,0.8 -0.8,-0.8,-0.6 0,0.8,-0.6 0.8,-0.8,-0.6' "
      "fill=solid color=pink"},
     {"mesh, with a shell",
-     "mesh vertices='-0.8,-0.8,-0.5 0.8,-0.6,-0.3 0,0.2,0.6 0.8,-0.6,-0.3 0.5,0.8,-0.5 0,0.2,0.6' "
-     "shell=12 vertices.colors='red gold white gold skyblue white'\n"
-     "clip_plane a=1 b=1 d=0.6"},
+     "mesh vertices='-0.9,-0.6,-0.6 0,0.6,0.4 -0.9,0.6,-0.6 -0.9,-0.6,-0.6 0,-0.6,0.4 0,0.6,0.4 "
+     "0,-0.6,0.4 0.9,0.6,-0.6 "
+     "0,0.6,0.4 0,-0.6,0.4 0.9,-0.6,-0.6 0.9,0.6,-0.6' shell=9 "
+     "vertices.colors='red gold orange red gold gold gold skyblue gold gold blue skyblue'"},
     {"mesh, textured",
      "mesh vertices='-0.8,-0.8,-0.5 0.8,-0.8,-0.5 0,0,0.7 0.8,-0.8,-0.5 0.8,0.8,-0.5 0,0,0.7 "
      "0.8,0.8,-0.5 -0.8,0.8,-0.5 0,0,0.7 -0.8,0.8,-0.5 -0.8,-0.8,-0.5 0,0,0.7' "
@@ -137,8 +138,8 @@ constexpr ShapeExample kExamples[] = {
     {"volume",
      "volume grid.corner=-0.9,-0.9,-0.9 grid.edge_a=1.8,0,0 grid.edge_b=0,1.8,0 "
      "grid.edge_c=0,0,1.8 grid.size_a=6 "
-     "grid.size_b=6 grid.size_c=6 transfer.values=0.2,0.6,1.1 transfer.colors='blue red yellow' "
-     "transfer.opacities=0,0.6,1 "
+     "grid.size_b=6 grid.size_c=6 transfer.values=0.1,0.4,0.8 transfer.colors='blue red yellow' "
+     "transfer.opacities=0,0.8,1 "
      "grid.samples="
      ".0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.0,.1,.1,.0,.0,.0,.0,.0,.0,.0,.0,"
      ".0,.0,.0,.0,.0,"
