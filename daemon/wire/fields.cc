@@ -46,9 +46,11 @@ MaybeFault ToShell(const FieldPath& path, const v1::Thickness& in, bool is_surfa
   const FieldPath shell(path, "shell");
   if (auto fault = ToThickness(shell, in, limits, out)) return fault;
   if (is_surface || out->thickness == 0) return {};
-  return Fault{FieldPath(shell, "value").ToString(), Reason::kInvalidValue,
-               absl::StrCat("is ", Show(in.value()),
-                            ", but only what is drawn as FILL_SURFACE has a shell; leave one of the two out")};
+  return Fault{
+      FieldPath(shell, "value").ToString(), Reason::kInvalidValue,
+      absl::StrCat(
+          "is ", Show(in.value()),
+          ", but only what is drawn as FILL_SURFACE has a shell; leave one of the two out")};
 }
 
 MaybeFault ToRule(const FieldPath& path, v1::SurfaceRule in, gpu::GeometryRecord* out) {
