@@ -12,6 +12,7 @@ install(FILES ${packaging}/voxeld.service DESTINATION lib/systemd/system)
 install(FILES ${packaging}/voxeld.sysusers DESTINATION lib/sysusers.d RENAME voxeld.conf)
 install(FILES ${packaging}/70-voxeld.rules DESTINATION lib/udev/rules.d)
 install(FILES ${packaging}/voxeld.toml DESTINATION ${doc}/examples)
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/display/profiles/ DESTINATION share/voxeld/profiles FILES_MATCHING PATTERN "*.toml")
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md DESTINATION ${doc})
 

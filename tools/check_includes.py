@@ -12,6 +12,7 @@ ALLOWED = {
     "display/crc": [],
     "display/api": ["display/sync"],
     "display/geometry": ["display/api"],
+    "display/profiles": [],
     "display/usb": ["display/api", "display/sync"],
     "display/conformance": ["display/sync", "display/usb"],
     "display/emulator": ["display/api", "display/sync", "display/usb", "display/geometry",
@@ -33,6 +34,8 @@ ALLOWED = {
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
               # What an address looks like, and what was meant: alike at both ends.
               "daemon/address", "daemon/suggest",
+              # What a display's geometry is, on the wire.
+              "daemon/geometry_wire",
               # Strokes of letters: in scenes and in pictures of them.
               "daemon/text"],
     # Emulated devices are of display; this is their program.
@@ -45,6 +48,10 @@ ALLOWED = {
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",
                               "daemon/config/display_view", "tools/voxelctl"],
+    # And this reads descriptions of displays as the daemon does.
+    "tools/voxelctl/profile": ["display/api", "display/drivers/options", "display/drivers/usb_options",
+                               "display/drivers/simulated", "display/geometry", "display/profiles",
+                               "tools/voxelctl"],
     # Its own headers are "voxeld/…", as its users write them.
     "client": ["voxeld", "display/sync", "daemon/address"],
     # What users see has neither protobuf nor anything else of ours.

@@ -14,6 +14,7 @@
 #include "daemon/config/config.h"
 #include "daemon/config/fields.h"
 #include "daemon/suggest/suggest.h"
+#include "display/profiles/toml_options.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -225,46 +226,30 @@ class FileReader {
   }
 
   DisplayConfig ReadDisplay(const toml::table& table) {
-    DisplayConfig display;
-    display.source = Where(table.source());
+    DisplayConfig config;
+    config.source = Where(table.source());
     for (const auto& [key, node] : table) {
       const std::string text(key.str());
-      const std::optional<std::string> value = OptionText(node);
+      const std::optional<std::string> value = display::OptionText(node);
       if (!value.has_value()) {
         Wrong(node, text, "is no text, number, boolean, or array of these");
       } else if (text == "name") {
         if (absl::Status status = CheckDisplayName(*value); !status.ok()) {
           Wrong(node, text, absl::StrCat("is refused: ", status.message()));
         }
-        display.name = *value;
+        config.name = *value;
       } else if (text == "driver") {
-        display.driver = *value;
+        config.driver = *value;
       } else {
-        display.options.emplace(text, *value);
+        config.options.emplace(text, *value);
       }
     }
-    for (const auto& [key, value] :
-         {std::pair("name", &display.name), {"driver", &display.driver}}) {
+    for (const auto& [key, value] : {std::pair("name", &config.name), {"driver", &config.driver}}) {
       if (value->empty()) {
         Error(table.source(), absl::StrCat("a display without ", key, "; give name and driver"));
       }
     }
-    return display;
-  }
-
-  // As it would stand on the command line; an array's elements are joined by semicolons.
-  static std::optional<std::string> OptionText(const toml::node& node) {
-    if (auto text = node.value_exact<std::string>()) return text;
-    if (node.is_number() || node.is_boolean()) return Show(node);
-    const toml::array* items = node.as_array();
-    if (items == nullptr) return {};
-    std::vector<std::string> texts;
-    for (const toml::node& item : *items) {
-      std::optional<std::string> text = item.is_array() ? std::nullopt : OptionText(item);
-      if (!text.has_value()) return {};
-      texts.push_back(*std::move(text));
-    }
-    return absl::StrJoin(texts, ";");
+    return config;
   }
 
   std::string Where(const toml::source_region& source) const {

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "daemon/suggest/suggest.h"
+#include "display/profiles/profile.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -79,6 +80,17 @@ absl::Status CheckGpus(const std::vector<int>& gpus, gpu::EngineKind kind, int32
 absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display) {
   DisplayOptions split;
   split.driver = display.options;
+  if (const auto named = split.driver.extract("profile")) {
+    const absl::StatusOr<display::Profile> profile = display::LoadProfile(named.mapped());
+    if (!profile.ok()) return profile.status();
+    if (!profile->driver.empty() && profile->driver != display.driver) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("driver is ", display.driver, ", but the profile ", named.mapped(),
+                       " is for ", profile->driver, "; give that one, or another profile"));
+    }
+    // What is given with the display comes before what the profile says.
+    split.driver.insert(profile->options.begin(), profile->options.end());
+  }
   if (const auto view = split.driver.extract("view")) {
     const absl::StatusOr<ViewOptions::Mode> mode = ParseMode(view.mapped());
     if (!mode.ok()) return mode.status();

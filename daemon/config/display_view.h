@@ -21,7 +21,8 @@ struct DisplayOptions {
   std::map<std::string, std::string> driver;  // what is left
 };
 
-// `view` is fit, millimetres or voxels; with fit, `view_box` may be x0;y0;z0;x1;y1;z1 in scene
+// `profile` is the name or path of a profile (display/profiles/profile.h), whose options are added to those that are given. `view` is
+// fit, millimetres or voxels; with fit, `view_box` may be x0;y0;z0;x1;y1;z1 in scene
 // units. `gpus` is numbers of GPUs, apart by semicolons. InvalidArgument with the value and what would
 // be right.
 absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display);

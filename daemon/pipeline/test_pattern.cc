@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "display/geometry/corrector.h"
 #include "gpu/delta.h"
 
 namespace voxeld::daemon {
@@ -18,15 +19,20 @@ namespace {
 
 constexpr uint64_t kFirstPatternNumber = uint64_t{1} << 63;
 
-// How far the corners lie from the grid's edge, in voxels: in the edge voxels, but in a rotor on the
-// box that stands in the cylinder that its panels sweep.
+// How far the corners lie from the grid's edge, in voxels: in the edge voxels, but in a rotor or a helix on the
+// box that stands in the cylinder that its panels or blades sweep.
 double CornerInset(const display::Geometry& geometry, double cells, double pitch_mm) {
   constexpr double kEdge = 0.5;
-  const auto* rotor = std::get_if<display::Rotor>(&geometry.shape);
-  if (rotor == nullptr) return kEdge;
   double radius_mm = 0;
-  for (const display::Rotor::Panel& panel : rotor->panels) {
-    radius_mm = std::max(radius_mm, rotor->width_px * panel.pitch_u_mm / 2);
+  if (const auto* rotor = std::get_if<display::Rotor>(&geometry.shape)) {
+    for (const display::Rotor::Panel& panel : rotor->panels) {
+      radius_mm = std::max(radius_mm, rotor->width_px * panel.pitch_u_mm / 2);
+    }
+  } else if (const auto* helix = std::get_if<display::Helix>(&geometry.shape)) {
+    radius_mm = std::min({helix->radius_mm, helix->width_px * helix->pitch_u_mm / 2,
+                          helix->height_px * helix->pitch_v_mm / 2});
+  } else {
+    return kEdge;
   }
   constexpr double kHalfDiagonal = 0.70710678;
   return std::max(kEdge, cells / 2 - radius_mm * kHalfDiagonal / pitch_mm + 1);
@@ -38,8 +44,10 @@ std::vector<std::optional<display::Vec3>> LightsOf(const display::Geometry& geom
   if (lattice == nullptr) return {};
   const display::VoxelGrid& grid = geometry.grid;
   std::vector<std::optional<display::Vec3>> lights = lattice->points_mm;
+  const display::Corrector corrector(geometry.correction);
   for (std::optional<display::Vec3>& light : lights) {
     if (!light.has_value()) continue;
+    light = corrector.ToTrue(*light);
     light = {std::floor((light->x - grid.origin_mm.x) / grid.pitch_mm.x) + 0.5,
              std::floor((light->y - grid.origin_mm.y) / grid.pitch_mm.y) + 0.5,
              std::floor((light->z - grid.origin_mm.z) / grid.pitch_mm.z) + 0.5};

@@ -4,6 +4,7 @@
 
 #include "absl/status/statusor.h"
 #include "daemon/core/core.h"
+#include "daemon/geometry_wire/geometry_wire.h"
 #include "daemon/scene/operation.h"
 #include "display/api/display.h"
 #include "voxeld/v1/display.pb.h"
@@ -21,11 +22,9 @@ v1::PixelFormat ToWire(display::PixelFormat format);
 v1::TestPattern ToWire(TestPattern pattern);
 v1::VolumeHeader::Source ToWire(display::DecodedVolume::Source source);
 
-void ToWire(const display::Vec3& in, v1::Vec3* out);
 void ToWire(const gpu::Affine& in, v1::Affine* out);  // always 12 values
 void ToWire(const Clip& in, v1::Clip* out);
 void ToWire(const gpu::Region& in, v1::Box3* out);
-void ToWire(const display::Geometry& in, v1::Geometry* out);
 void ToWire(const display::FrameLayout& in, v1::FrameLayout* out);
 void ToWire(const ViewOptions& in, v1::View* out);
 
@@ -40,8 +39,6 @@ absl::StatusOr<display::PixelFormat> FromWire(v1::PixelFormat format);
 absl::StatusOr<TestPattern> FromWire(v1::TestPattern pattern);
 absl::StatusOr<display::DecodedVolume::Source> FromWire(v1::VolumeHeader::Source source);
 
-display::Vec3 FromWire(const v1::Vec3& in);
-absl::StatusOr<display::Geometry> FromWire(const v1::Geometry& in);
 absl::StatusOr<display::FrameLayout> FromWire(const v1::FrameLayout& in);
 absl::StatusOr<ViewOptions> FromWire(const v1::View& in);
 absl::StatusOr<DisplayUpdate> FromWire(const v1::UpdateDisplayRequest& in);

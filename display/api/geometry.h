@@ -5,6 +5,7 @@
 // the volume. Voxel (i,j,k) is the half-open cell origin_mm + [i,i+1)×[j,j+1)×[k,k+1) · pitch_mm.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -35,10 +36,13 @@ struct PlanarStack {
   Normal normal = Normal::kZ;
   int32_t width_px = 0, height_px = 0;    // 1 to 16384
   double pitch_u_mm = 1, pitch_v_mm = 1;  // > 0
-  // Where each slice stands on the normal's axis, mm, strictly ascending; 1 to 16384 of them. Slice
-  // s stands for the slab from half-way to its predecessor to half-way to its successor; the outer
-  // two reach as far outward as inward (a single slice: thickness_mm).
+  // Where each slice stands on the normal's axis, mm, in the order in which they go out; 1 to 16384
+  // of them. They are as many in each stroke, strictly ascending or descending within it, and a
+  // second stroke goes the other way. Each stroke shows the whole depth by itself: a slice stands for
+  // the slab from half-way to one neighbour in its stroke to half-way to the other; the outer two
+  // reach as far outward as inward (a single slice: thickness_mm).
   std::vector<double> positions_mm;
+  int32_t strokes = 1;      // 1 or 2
   double thickness_mm = 1;  // of the slab of a single slice only
   bool mirror_u = false, mirror_v = false;
   bool operator==(const PlanarStack&) const = default;
@@ -52,9 +56,12 @@ struct Rotor {
     double pitch_u_mm = 1, pitch_v_mm = 1;  // > 0
     double eccentricity_mm = 0;             // distance of the panel's plane from the axis; signed
     double shift_u_mm = 0;                  // of the panel's middle along u
-    double shift_v_mm = 0;                  // of the panel's middle along +z
+    double shift_v_mm = 0;                  // of the panel's middle along its v axis
     double phase_turns = 0;  // [0,1): angle of the panel at turn angle 0, always counter-clockwise
     bool mirror_u = false, mirror_v = false;
+    // The panel leans about its u axis: v runs along cos·(+z) + sin·(the direction in which
+    // eccentricity counts). −60 to 60.
+    float tilt_deg = 0;
     bool operator==(const Panel&) const = default;
   };
   int32_t slices_per_turn = 0;          // 1 to 16384
@@ -62,6 +69,26 @@ struct Rotor {
   std::vector<Panel> panels;            // 1 to 16
   bool clockwise = false;
   bool operator==(const Rotor&) const = default;
+};
+
+// A screen of helical blades that turns about the vertical axis under a picture from above or below:
+// u runs along +x, v along +y. A blade begins at the bottom, at the turn angle plus
+// (phase_turns + its number / blades) of a turn, and rises evenly to height_mm while it goes on by
+// `span_turns` of a turn counter-clockwise seen from above, as a right-handed screw.
+// Turning is counter-clockwise, unless `clockwise`.
+struct Helix {
+  int32_t slices_per_turn = 0;            // 1 to 16384
+  int32_t width_px = 0, height_px = 0;    // 1 to 16384
+  double pitch_u_mm = 1, pitch_v_mm = 1;  // > 0
+  int32_t blades = 1;                     // 1 to 10
+  double span_turns = 1;                  // of a blade: 0.1 to 1, at most 1 / blades
+  double height_mm = 1;                   // > 0; the blades' middle is at z = 0
+  double hub_mm = 0, radius_mm = 1;       // there is a blade from the one distance to the other
+  double phase_turns = 0;                 // [0,1)
+  bool left_handed = false;               // it goes on clockwise
+  bool clockwise = false;
+  bool mirror_u = false, mirror_v = false;
+  bool operator==(const Helix&) const = default;
 };
 
 // Lights at points, in whatever arrangement: an LED lattice. A slice is what goes out together (a
@@ -77,13 +104,40 @@ struct Lattice {
   bool operator==(const Lattice&) const = default;
 };
 
+// Displacements in mm, at nx·ny·nz places evenly from low_mm to high_mm (x fastest), between them trilinear, beyond as at
+// the border. 2 to 64 places along each axis.
+struct DisplacementGrid {
+  int32_t nx = 0, ny = 0, nz = 0;
+  Vec3 low_mm, high_mm;
+  std::vector<Vec3> at_mm;
+  bool operator==(const DisplacementGrid&) const = default;
+};
+
+// By how much the light of a display is not where its shape says, as measured. A true place p comes
+// of the nominal one A·p + D(p), and in a planar stack or a helix the nominal places of a slice's
+// pixels are moved by a homography of the picture before.
+struct Correction {
+  // Rows of A, 3 by 4, millimetres in the last column. Its determinant is from 1/8 to 8, its norm and its inverse's
+  // (the roots of the sums of squares) at most 16.
+  std::array<double, 12> affine{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  // D. How much it changes over a distance, at its steepest along x, y and z (the root of the sum of squares), times the norm
+  // of A's inverse, is at most 0.9.
+  std::optional<DisplacementGrid> displacement = {};
+  // None, one for all slices or one for each: 3 by 3, row by row, takes (u, v, 1), mm from the middle
+  // of the picture, to where it is: (x/w, y/w). Over all of the picture w is from 1/8 to 8, and it
+  // keeps its orientation.
+  std::vector<std::array<double, 9>> homographies;
+  bool operator==(const Correction&) const = default;
+};
+
 // Slices are numbered as they go out: for a PlanarStack slice s is positions_mm[s];
 // for a Rotor slice s·panels + p is panel p while the rotor turns
-// through [s−½, s+½) / slices_per_turn of a turn; for a Lattice pixel u of slice s is
-// points_mm[s·width_px + u].
+// through [s−½, s+½) / slices_per_turn of a turn; for a Helix slice s is the picture of such a part of
+// a turn; for a Lattice pixel u of slice s is points_mm[s·width_px + u].
 struct Geometry {
-  std::variant<PlanarStack, Rotor, Lattice> shape;
+  std::variant<PlanarStack, Rotor, Lattice, Helix> shape;
   VoxelGrid grid;
+  std::optional<Correction> correction = {};
   bool operator==(const Geometry&) const = default;
 };
 

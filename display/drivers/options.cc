@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "display/drivers/geometry_options.h"
 #include "display/geometry/footprint.h"
 
 namespace voxeld::display {
@@ -16,82 +19,6 @@ namespace {
 constexpr int32_t kMostPixels = 16384;
 constexpr double kMostNumber = 1e6;
 constexpr uint64_t kMostVolumeBytes = uint64_t{1} << 30;
-
-Geometry ReadPlanar(OptionReader& reader, double pitch) {
-  PlanarStack planar;
-  planar.normal = static_cast<PlanarStack::Normal>(reader.Choice("normal", {"z", "y"}, 0));
-  planar.positions_mm = reader.Numbers("positions_mm");
-  const bool listed = !planar.positions_mm.empty();
-  const double slice_pitch = reader.Number("slice_pitch_mm", pitch, 1e-6, kMostNumber);
-  const auto count = static_cast<int32_t>(
-      std::min<size_t>(planar.positions_mm.size(), static_cast<size_t>(kMostPixels)));
-  const std::vector<int32_t> size =
-      reader.Size("size", {128, 128, listed ? count : 128}, listed ? 2 : 3, 3);
-  planar.width_px = size[0];
-  planar.height_px = size[1];
-  planar.pitch_u_mm = planar.pitch_v_mm = pitch;
-  planar.thickness_mm = slice_pitch;
-  if (listed) {
-    if (reader.has("slice_pitch_mm")) {
-      reader.Refuse("slice_pitch_mm", "left out where positions_mm are listed");
-    }
-    if (size.size() == 3 && static_cast<size_t>(size[2]) != planar.positions_mm.size()) {
-      reader.Refuse("size", absl::StrCat("of ", planar.positions_mm.size(),
-                                         " slices, as many as positions_mm, or WxH"));
-    }
-    if (std::adjacent_find(planar.positions_mm.begin(), planar.positions_mm.end(),
-                           std::greater_equal<>()) != planar.positions_mm.end()) {
-      reader.Refuse("positions_mm", "strictly ascending");
-    }
-  } else {
-    const double middle = (size[2] - 1) / 2.0;
-    for (int32_t s = 0; s < size[2]; ++s) {
-      planar.positions_mm.push_back((s - middle) * slice_pitch);
-    }
-  }
-  planar.mirror_u = reader.Flag("mirror_u", false);
-  planar.mirror_v = reader.Flag("mirror_v", false);
-  return Geometry{.shape = std::move(planar), .grid = {}};
-}
-
-Geometry ReadRotor(OptionReader& reader, double pitch) {
-  Rotor rotor;
-  const std::vector<int32_t> size = reader.Size("size", {128, 128}, 2, 2);
-  rotor.width_px = size[0];
-  rotor.height_px = size[1];
-  rotor.slices_per_turn = static_cast<int32_t>(reader.Integer("slices", 360, 1, kMostPixels));
-  rotor.clockwise = reader.Flag("clockwise", false);
-  std::vector<double> eccentricity = reader.Numbers("eccentricity");
-  if (eccentricity.empty()) eccentricity.push_back(0);
-  if (eccentricity.size() > 16) {
-    reader.Refuse("eccentricity", "a list of 1 to 16 panels");
-    eccentricity.resize(16);
-  }
-  const size_t panels = eccentricity.size();
-  const auto list = [&](const std::string& key) {
-    std::vector<double> values = reader.Numbers(key);
-    if (!values.empty() && values.size() != panels) {
-      reader.Refuse(key, absl::StrCat("a list of ", panels, ", as eccentricity has panels"));
-    }
-    values.resize(panels);
-    return values;
-  };
-  const std::vector<double> phase = list("panel_phase"), shift_u = list("shift_u"),
-                            shift_v = list("shift_v");
-  const bool mirror_u = reader.Flag("mirror_u", false), mirror_v = reader.Flag("mirror_v", false);
-  for (size_t p = 0; p < panels; ++p) {
-    if (!(phase[p] >= 0 && phase[p] < 1)) reader.Refuse("panel_phase", "turns from 0 to below 1");
-    rotor.panels.push_back({.pitch_u_mm = pitch,
-                            .pitch_v_mm = pitch,
-                            .eccentricity_mm = eccentricity[p] * pitch,
-                            .shift_u_mm = shift_u[p] * pitch,
-                            .shift_v_mm = shift_v[p] * pitch,
-                            .phase_turns = phase[p],
-                            .mirror_u = mirror_u,
-                            .mirror_v = mirror_v});
-  }
-  return Geometry{.shape = std::move(rotor), .grid = {}};
-}
 
 }  // namespace
 
@@ -135,6 +62,23 @@ double OptionReader::Number(const std::string& key, double fallback, double leas
 
 bool OptionReader::Flag(const std::string& key, bool fallback) {
   return Choice(key, {"false", "true"}, fallback ? 1 : 0) == 1;
+}
+
+std::vector<bool> OptionReader::Flags(const std::string& key, size_t count) {
+  std::vector<bool> flags(count, false);
+  const std::string* text = Find(key);
+  if (text == nullptr) return flags;
+  const std::vector<std::string> parts = absl::StrSplit(*text, ';');
+  if (parts.size() != 1 && parts.size() != count) {
+    Refuse(key, absl::StrCat("true or false, once or ", count, " times"));
+    return flags;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const std::string& part = parts[parts.size() == 1 ? 0 : i];
+    if (part != "true" && part != "false") Refuse(key, "true or false");
+    flags[i] = part == "true";
+  }
+  return flags;
 }
 
 size_t OptionReader::Choice(const std::string& key, std::initializer_list<std::string_view> choices,
@@ -199,8 +143,7 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
   info.name = options.name;
   info.driver = options.driver;
   const double pitch = reader.Number("pitch_mm", 1, 1e-6, kMostNumber);
-  const bool rotor = reader.Choice("geometry", {"planar", "rotor"}, 0) == 1;
-  info.geometry = rotor ? ReadRotor(reader, pitch) : ReadPlanar(reader, pitch);
+  info.geometry = ReadGeometry(reader, pitch);
   FrameLayout& layout = info.layout;
   layout.format =
       static_cast<PixelFormat>(reader.Choice("format", {"rgb888", "rgb332", "bitplanes3"}, 0));
@@ -213,15 +156,16 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
   const absl::Status status = reader.Finish();
   if (!status.ok()) return status;
 
+  const auto refused = [&](const absl::Status& why) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("display \"", options.name, "\": ", why.message()));
+  };
+  if (const absl::Status valid = ValidateShape(info.geometry); !valid.ok()) return refused(valid);
   info.tone = MakeTone(gamma, brightness, dither, sampling);
   layout.slices = SliceCount(info.geometry);
-  if (const auto* planar = std::get_if<PlanarStack>(&info.geometry.shape)) {
-    layout.width = planar->width_px;
-    layout.height = planar->height_px;
-  } else {
-    layout.width = std::get<Rotor>(info.geometry.shape).width_px;
-    layout.height = std::get<Rotor>(info.geometry.shape).height_px;
-  }
+  std::tie(layout.width, layout.height) =
+      std::visit([](const auto& shape) { return std::pair(shape.width_px, shape.height_px); },
+                 info.geometry.shape);
   if (layout.bytes() > kMostVolumeBytes) {
     return absl::InvalidArgumentError(absl::StrCat(
         "display \"", options.name, "\": a volume of ", layout.slices, " slices of ", layout.width,
@@ -229,11 +173,8 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
         " bytes; at most ", kMostVolumeBytes, " are possible"));
   }
   info.geometry.grid = DefaultGrid(info.geometry);
-  const absl::Status valid = ValidateGeometry(info.geometry);
-  if (!valid.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("display \"", options.name, "\": ", valid.message()));
-  }
+  if (const absl::Status valid = ValidateGeometry(info.geometry); !valid.ok())
+    return refused(valid);
   return info;
 }
 

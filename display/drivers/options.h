@@ -33,6 +33,8 @@ class OptionReader {
   int64_t Integer(const std::string& key, int64_t fallback, int64_t least, int64_t most);
   double Number(const std::string& key, double fallback, double least, double most);
   bool Flag(const std::string& key, bool fallback);  // true, false
+  // One for all `count`, or one each; false where it is not given.
+  std::vector<bool> Flags(const std::string& key, size_t count);
   // The index of the value in `choices`.
   size_t Choice(const std::string& key, std::initializer_list<std::string_view> choices,
                 size_t fallback);
@@ -58,22 +60,45 @@ class OptionReader {
 };
 
 // Everything of DisplayInfo but name and driver:
-//   geometry=planar|rotor   planar
+//   geometry=planar|rotor|helix|lattice   planar
 //   size=WxHxS              planar: pixels by slices, 128x128x128; rotor: WxH pixels a panel,
 //                           128x128
 //   pitch_mm=P              distance of pixels, 1
 // planar:
 //   normal=z|y              z
 //   slice_pitch_mm=P        distance of slices, pitch_mm
-//   positions_mm=A;B;…      of slices, ascending, instead of slice_pitch_mm
+//   positions_mm=A;B;…      of slices, as they go out, instead of slice_pitch_mm
+//   motion=stepped|sawtooth|sine   stepped: slice_pitch_mm apart; else evenly in time along
+//   travel_mm=L             from end to end of a stroke, slices·slice_pitch_mm
+//   dead_begin= dead_end=   shares of a stroke's time at its ends in which nothing is lit, 0
+//   strokes=up|down|both    up; both: so many slices up, as many down
 // rotor:
 //   slices=N                slices a turn, 360
 //   eccentricity=E;…        of each panel, in pitches, 0 (one panel)
 //   panel_phase=T;…         turns, of each panel, 0
 //   shift_u=U;… shift_v=V;… of each panel's middle, in pitches, 0
+//   tilt=D;…                degrees, of each panel about its u axis, 0
+//   panel_pitch_u_mm=P;… panel_pitch_v_mm=P;…   of each panel, pitch_mm
 //   clockwise=true|false    false
+// helix:
+//   size=WxH                of the picture, 128x128
+//   slices=N                a turn, 180
+//   blades=N span=T         blades, and how much of a turn each spans: 1, 1/blades
+//   travel_mm=H             that a blade rises by, twice radius_mm
+//   radius_mm=R hub_mm=R    of the blades: half of the picture, 0
+//   phase=T left_handed= clockwise=   0, false, false
+// lattice:
+//   size=XxYxZ              lights in rows, a slice a layer, 8x8x8
+//   points_mm=x;y;z;… width=N   instead: where each light is; N lights a slice, 64
+//   cell_mm=L               the size of the box for which a light stands, pitch_mm
+// all, as measured:
+//   keystone_mm=U;V;…       where the corners (−u −v), (+u −v), (+u +v), (−u +v) of pictures are,
+//                           once or for each slice; planar and helix
+//   affine=…                12 numbers, three rows of four: nominal to true places, mm
+//   displacement_size=XxYxZ displacement_low_mm=x;y;z displacement_high_mm=x;y;z
+//   displacement_mm=x;y;z;…   besides, at places of a grid, x fastest
 // both:
-//   mirror_u= mirror_v=     true|false, false
+//   mirror_u= mirror_v=     true|false, false; of a rotor one for all panels or one each
 //   format=rgb888|rgb332|bitplanes3, sub_frames=1…64, rate=volumes/s (30; a rotor with n panels
 //     still counts turns), gamma=1, brightness=0…1 (1), dither=none|ordered (ordered),
 //     sampling=max|weighted (max)

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <variant>
@@ -6,6 +7,7 @@
 
 #include "display/geometry/fixed_point.h"
 #include "display/geometry/footprint.h"
+#include "display/geometry/helix.h"
 #include "display/geometry/lattice.h"
 #include "display/geometry/planar_stack.h"
 #include "display/geometry/rotor.h"
@@ -35,11 +37,13 @@ DepthCells CellsAlong(const PlanarStack& stack) {
   const double depth = ends.high_mm - ends.low_mm;
   const std::vector<double>& p = stack.positions_mm;
   double least = depth, greatest = 0;
+  const size_t of_stroke = p.size() / static_cast<size_t>(stack.strokes);
   for (size_t s = 1; s < p.size(); ++s) {
-    least = std::min(least, p[s] - p[s - 1]);
-    greatest = std::max(greatest, p[s] - p[s - 1]);
+    if (s % of_stroke == 0) continue;
+    least = std::min(least, std::abs(p[s] - p[s - 1]));
+    greatest = std::max(greatest, std::abs(p[s] - p[s - 1]));
   }
-  int64_t count = static_cast<int64_t>(p.size());
+  int64_t count = static_cast<int64_t>(p.size()) / stack.strokes;
   if (count > 1 && greatest - least > kEven * greatest) {
     // Past the limit the quotient itself may be past any integer.
     const double wanted = std::min(depth / least, static_cast<double>(kMostUnevenCells));
@@ -70,8 +74,9 @@ VoxelGrid RotorGrid(const Rotor& rotor) {
   double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
   for (const Rotor::Panel& panel : rotor.panels) {
     const PixelRow row = PanelRowV(rotor, panel);
-    low = std::min(low, row.PositionMm(0));
-    high = std::max(high, row.PositionMm(2 * row.count));
+    const double upright = LeanOf(panel).cos;
+    low = std::min(low, row.PositionMm(0) * upright);
+    high = std::max(high, row.PositionMm(2 * row.count) * upright);
   }
   const int32_t across = static_cast<int32_t>(std::min<int64_t>(
       2 * int64_t{CellsOver(RadiusMm(rotor), pitch_u)}, std::numeric_limits<int32_t>::max() - 1));
@@ -80,6 +85,22 @@ VoxelGrid RotorGrid(const Rotor& rotor) {
           CellsOver(high - low, pitch_v),
           {pitch_u, pitch_u, pitch_v},
           {-0.5 * across * pitch_u, -0.5 * across * pitch_u, low}};
+}
+
+VoxelGrid HelixGrid(const Helix& helix) {
+  const auto across = [&](const PixelRow& row) {
+    const double most = std::min(helix.radius_mm, row.PositionMm(2 * row.count));
+    return 2 * CellsOver(most, row.pitch_mm);
+  };
+  const int32_t nx = across(HelixRowU(helix)), ny = across(HelixRowV(helix));
+  const double rising = helix.slices_per_turn * helix.span_turns;
+  const auto nz =
+      static_cast<int32_t>(std::clamp<int64_t>(RoundHalfUp(rising), 1, kMostUnevenCells));
+  return {nx,
+          ny,
+          nz,
+          {helix.pitch_u_mm, helix.pitch_v_mm, helix.height_mm / nz},
+          {-0.5 * nx * helix.pitch_u_mm, -0.5 * ny * helix.pitch_v_mm, -0.5 * helix.height_mm}};
 }
 
 VoxelGrid LatticeGrid(const Lattice& lattice) {
@@ -98,6 +119,7 @@ VoxelGrid LatticeGrid(const Lattice& lattice) {
 VoxelGrid DefaultGrid(const Geometry& geometry) {
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) return StackGrid(*stack);
   if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) return LatticeGrid(*lattice);
+  if (const auto* helix = std::get_if<Helix>(&geometry.shape)) return HelixGrid(*helix);
   return RotorGrid(std::get<Rotor>(geometry.shape));
 }
 

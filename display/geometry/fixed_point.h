@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 namespace voxeld::display {
 
@@ -20,5 +21,12 @@ inline int64_t RoundHalfUp(double value) {
 
 // A length or position in millimetres, in cells of `pitch_mm`.
 inline Fixed ToFixed(double mm, double pitch_mm) { return RoundHalfUp(mm / pitch_mm * 65536.0); }
+
+// The same of a place that may be anywhere, also nowhere (NaN): nothing if it is 2²⁴ cells away or farther.
+inline std::optional<Fixed> ToFixedNear(double mm, double pitch_mm) {
+  constexpr double kFar = 16777216;
+  if (!(mm / pitch_mm > -kFar && mm / pitch_mm < kFar)) return std::nullopt;
+  return ToFixed(mm, pitch_mm);
+}
 
 }  // namespace voxeld::display

@@ -20,7 +20,10 @@
 // in every slice, any other twice a turn. And on each axis the voxel that holds the pixel's centre,
 // at the slice's own position or at the middle of its interval. Of a lattice: those whose centre
 // lies in the light's half-open box, and the one that holds the light; a pixel without a light has
-// none (docs/adr/0010-lattice-footprints.md).
+// none (docs/adr/0010-lattice-footprints.md). Of a helix: those whose centre a blade passes under the
+// pixel's rectangle in the slice's part of a turn; one on the axis in every slice. With a correction:
+// as said, of the nominal places of voxels' centres (docs/adr/0024-flat-footprints.md); but a lattice's lights
+// are where they truly are, and their boxes around them as large and as straight as without one.
 //
 // Which weights. kMax: 255. kWeighted: a voxel between the positions (or middle angles) of two
 // neighbouring slices is in the footprints of both: 255 in the nearer one's, at distance d, and
@@ -42,6 +45,8 @@
 #include "display/api/slice_frame.h"
 
 namespace voxeld::display {
+
+class Corrector;  // display/geometry/corrector.h
 
 inline constexpr uint16_t kFullWeight = 255;
 inline constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
@@ -67,6 +72,10 @@ enum class Axis : uint8_t { kX, kY, kZ };
 
 struct FootprintTable {
   int32_t slices = 0, width = 0, height = 0;
+  // Where footprints are no products (of a helix, of a tilted panel, with a correction): each pixel has a list of its own,
+  // row after row of so many, a multiple of 8 that holds a picture's row, and `width` is all of them, `height` 1: pixel (u, v)
+  // is column v·flat_row + u here. 0: they are products.
+  int32_t flat_row = 0;
   // Slices take the inner lists in turn: slice s those of set s % inner_sets. One set, but for a
   // rotor whose panels differ along v: one a panel.
   int32_t inner_sets = 1;
@@ -102,6 +111,9 @@ int32_t SliceCount(const Geometry& geometry);
 //   as many as the least spacing goes into the depth, 4096 at the most.
 // - Rotor: cells of the first panel's pitches (u for x and y, v for z); nx = ny even, over the
 //   circle that the farthest corner describes; nz over the height of all panels.
+// - Helix: cells of the pitches along x and y, over the circle of the blades as far as the picture
+//   reaches; along z as many as slices a blade takes to rise, 4096 at the most.
+// A correction is not looked at.
 // - Lattice: cells of cell_mm, from the lowest corner of all lights' boxes to their highest; so of
 //   a regular lattice whose cell is its pitch a light is a voxel.
 VoxelGrid DefaultGrid(const Geometry& geometry);
@@ -109,10 +121,14 @@ VoxelGrid DefaultGrid(const Geometry& geometry);
 // `geometry` must be valid.
 FootprintTable BuildFootprints(const Geometry& geometry, Sampling sampling);
 
-// The centre of pixel (u, v) of `slice` in display millimetres (a rotor's at the middle of its
-// sweep; of a lattice's pixel without a light: NaN). `geometry` must be valid and the pixel one of
+// The true place of the centre of pixel (u, v) of `slice` in display millimetres (a rotor's and a
+// helix' at the middle of its sweep; NaN: of a lattice's pixel without a light, of a helix' pixel
+// without a blade). `geometry` must be valid and the pixel one of
 // its own. The grid plays no part.
 Vec3 PixelPosition(const Geometry& geometry, int32_t slice, int32_t u, int32_t v);
+// The same, of many: `corrector` is of the geometry's correction.
+Vec3 PixelPosition(const Geometry& geometry, const Corrector& corrector, int32_t slice, int32_t u,
+                   int32_t v);
 
 // Which slices look at which tiles: a slice is named if and only if some pixel of it has a voxel of
 // the tile in its footprint. Tiles are boxes of tx·ty·tz voxels (each ≥ 1), tile (i, j, k) from

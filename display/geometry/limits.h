@@ -16,6 +16,13 @@ inline constexpr int64_t kMaxPixels = int64_t{1} << 34;  // slices·width·heigh
 inline constexpr int64_t kMaxFootprintEntries = int64_t{1} << 28;
 // slices·width_px of a lattice, each of which has its place in memory (32 bytes), light or no light.
 inline constexpr int64_t kMaxLatticePixels = int64_t{1} << 24;
+// slices·width·height where footprints are kept pixel by pixel: of a helix, of a panel that is tilted,
+// and with a correction.
+inline constexpr int64_t kMaxFlatPixels = int64_t{1} << 27;
+inline constexpr int32_t kMaxDisplacements = 64;  // along an axis
+inline constexpr double kMaxTiltDeg = 60;
+inline constexpr double kMinSpanTurns = 0.1;
+inline constexpr int64_t kMaxBlades = 10;
 inline constexpr double kMinPitchMm = 1e-4, kMaxPitchMm = 1e4;
 inline constexpr double kMaxPositionMm = 1e6;  // either side of the middle
 // A rotor's grid and panels lie within this many of the grid's

@@ -6,7 +6,7 @@
 
 #include "display/geometry/fixed_point.h"
 #include "display/geometry/list_builder.h"
-#include "display/geometry/weight_between.h"
+#include "display/geometry/rotor_passes.h"
 
 namespace voxeld::display {
 namespace {
@@ -29,7 +29,7 @@ class ColumnScatter {
   ColumnScatter(const Rotor& rotor, const VoxelGrid& grid, Sampling sampling)
       : rotor_(rotor),
         grid_(grid),
-        weighted_(sampling == Sampling::kWeighted),
+        sampling_(sampling),
         unit_mm_(std::min(grid.pitch_mm.x, grid.pitch_mm.y)),
         x_(Centres(grid.nx, grid.pitch_mm.x, grid.origin_mm.x, unit_mm_)),
         y_(Centres(grid.ny, grid.pitch_mm.y, grid.origin_mm.y, unit_mm_)),
@@ -66,7 +66,7 @@ class ColumnScatter {
       along_x.push_back(ToFixed(row.CentreMm(u), pitch_x));
       along_y.push_back(ToFixed(row.CentreMm(u), pitch_y));
     }
-    const uint16_t weight = weighted_ ? kOwnWeight : kFullWeight;
+    const uint16_t weight = sampling_ == Sampling::kWeighted ? kOwnWeight : kFullWeight;
     for (int32_t step = 0; step < rotor_.slices_per_turn; ++step) {
       const Direction d = DirectionOf(PanelTurn(rotor_, panel(), step));
       for (int32_t u = 0; u < row.count; ++u) {
@@ -84,58 +84,20 @@ class ColumnScatter {
   // The panel's plane passes a column at distance ρ from the axis where the column's place along u,
   // a, is ±√(ρ² − e²).
   void AddPasses() {
-    const PixelRow row = PanelRowU(rotor_, panel());
-    std::vector<Fixed> edges;
-    for (int32_t place = 0; place <= row.count; ++place) {
-      edges.push_back(ToFixed(row.PositionMm(2 * place), unit_mm_));
-    }
-    // The pixel with edge ≤ a < next edge; an edge is an integer,
-    // so ⌊a⌋ decides as a would. −1: none.
-    const auto pixel_at = [&](Fixed a) {
-      const auto above = std::upper_bound(edges.begin(), edges.end(), a);
-      if (above == edges.begin() || above == edges.end()) return -1;
-      return row.Place(static_cast<int32_t>(above - edges.begin()) - 1);
-    };
+    const PixelEdges row(PanelRowU(rotor_, panel()), unit_mm_);
     const Fixed e = ToFixed(panel().eccentricity_mm, unit_mm_);
     for (int32_t j = 0; j < grid_.ny; ++j) {
       for (int32_t i = 0; i < grid_.nx; ++i) {
-        const Fixed x = x_[static_cast<size_t>(i)], y = y_[static_cast<size_t>(j)];
-        const Fixed square = x * x + y * y - e * e;
-        if (square < 0) continue;
-        const Fixed root = FloorSqrt(square);
-        const int32_t u_plus = pixel_at(root);
-        const int32_t u_minus = pixel_at(root * root == square ? -root : -root - 1);
-        if (x == 0 && y == 0) {
-          for (int32_t step = 0; u_plus >= 0 && step < rotor_.slices_per_turn; ++step) {
-            Add(static_cast<uint32_t>(step), u_plus, i, j, kFullWeight);
-          }
-          continue;
-        }
-        if (u_plus >= 0) AddPass(u_plus, i, j, TurnOf(x, y) - TurnOf(root, e));
-        if (u_minus >= 0) AddPass(u_minus, i, j, TurnOf(x, y) - TurnOf(-root, e));
+        ForEachPass(rotor_, panel(), row, x_[static_cast<size_t>(i)], y_[static_cast<size_t>(j)], e,
+                    sampling_,
+                    [&](uint32_t step, int32_t u, uint16_t weight) { Add(step, u, i, j, weight); });
       }
     }
   }
 
-  // Column (i, j) is passed by pixel u when the panel's u axis points to `turn`.
-  void AddPass(int32_t u, int32_t i, int32_t j, Turn turn) {
-    Turn since_start = turn - TurnFromFraction(panel().phase_turns);
-    if (rotor_.clockwise) since_start = Turn{0} - since_start;
-    const uint32_t steps = static_cast<uint32_t>(rotor_.slices_per_turn);
-    const uint64_t progress = static_cast<uint64_t>(since_start) * steps + (uint64_t{1} << 31);
-    const uint32_t step = static_cast<uint32_t>(progress >> 32) % steps;
-    if (!weighted_) return Add(step, u, i, j, kFullWeight);
-    // From the middle of the step, in 2⁻³² step: −½ to ½.
-    const int64_t offset = static_cast<int64_t>(progress & 0xFFFFFFFF) - (int64_t{1} << 31);
-    const uint64_t distance = static_cast<uint64_t>(offset < 0 ? -offset : offset);
-    Add(step, u, i, j, kFullWeight);
-    const uint16_t beside = WeightBetween((uint64_t{1} << 32) - distance, distance);
-    if (beside > 0) Add((step + (offset < 0 ? steps - 1 : 1)) % steps, u, i, j, beside);
-  }
-
   const Rotor& rotor_;
   const VoxelGrid& grid_;
-  const bool weighted_;
+  const Sampling sampling_;
   const double unit_mm_;  // of x_, y_ and everything compared with them
   const std::vector<Fixed> x_, y_;
   size_t panel_ = 0;
@@ -159,13 +121,28 @@ Turn PanelTurn(const Rotor& rotor, const Rotor::Panel& panel, int32_t step) {
   return rotor.clockwise ? phase - turned : phase + turned;
 }
 
+Lean LeanOf(const Rotor::Panel& panel) {
+  const double turns = panel.tilt_deg / 360.0;
+  const Direction d = DirectionOf(TurnFromFraction(turns < 0 ? turns + 1 : turns));
+  constexpr double kUnit = 1.0 / (1 << kDirectionBits);
+  return {d.cos * kUnit, d.sin * kUnit};
+}
+
+bool IsTilted(const Rotor& rotor) {
+  return std::any_of(rotor.panels.begin(), rotor.panels.end(),
+                     [](const Rotor::Panel& panel) { return panel.tilt_deg != 0; });
+}
+
 double RadiusMm(const Rotor& rotor) {
   double square = 0;
   for (const Rotor::Panel& panel : rotor.panels) {
-    const PixelRow row = PanelRowU(rotor, panel);
-    const double near = row.PositionMm(0), far = row.PositionMm(2 * row.count);
-    square = std::max(
-        square, std::max(near * near, far * far) + panel.eccentricity_mm * panel.eccentricity_mm);
+    const PixelRow u = PanelRowU(rotor, panel), v = PanelRowV(rotor, panel);
+    const double near = u.PositionMm(0), far = u.PositionMm(2 * u.count);
+    const double along = std::max(near * near, far * far), lean = LeanOf(panel).sin;
+    for (const double w : {v.PositionMm(0), v.PositionMm(2 * v.count)}) {
+      const double e = panel.eccentricity_mm + w * lean;
+      square = std::max(square, along + e * e);
+    }
   }
   return std::sqrt(square);
 }
@@ -202,8 +179,10 @@ Vec3 RotorPixelPosition(const Rotor& rotor, int32_t slice, int32_t u, int32_t v)
   const Direction d = DirectionOf(PanelTurn(rotor, panel, slice / panels));
   constexpr double kUnit = 1.0 / (1 << kDirectionBits);
   const double cos = d.cos * kUnit, sin = d.sin * kUnit;
-  const double a = PanelRowU(rotor, panel).CentreMm(u), e = panel.eccentricity_mm;
-  return {a * cos - e * sin, a * sin + e * cos, PanelRowV(rotor, panel).CentreMm(v)};
+  const Lean lean = LeanOf(panel);
+  const double a = PanelRowU(rotor, panel).CentreMm(u), w = PanelRowV(rotor, panel).CentreMm(v);
+  const double e = panel.eccentricity_mm + w * lean.sin;
+  return {a * cos - e * sin, a * sin + e * cos, w * lean.cos};
 }
 
 }  // namespace voxeld::display

@@ -12,12 +12,19 @@
 namespace voxeld::display {
 
 // The pictures' axes on a panel: u along its plane, measured from the foot of the perpendicular
-// from the axis; v along z.
+// from the axis; v along z, of a tilted panel along its own v axis.
 PixelRow PanelRowU(const Rotor& rotor, const Rotor::Panel& panel);
 PixelRow PanelRowV(const Rotor& rotor, const Rotor::Panel& panel);
 
 // Where u points at the middle of step `step` (0 to slices_per_turn − 1).
 Turn PanelTurn(const Rotor& rotor, const Rotor::Panel& panel, int32_t step);
+
+// Of a panel's v axis: how much of it is along z, and how much away from the axis.
+struct Lean {
+  double cos, sin;
+};
+Lean LeanOf(const Rotor::Panel& panel);
+bool IsTilted(const Rotor& rotor);
 
 // The greatest distance from the axis of any point of any panel.
 double RadiusMm(const Rotor& rotor);

@@ -3,13 +3,16 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "display/geometry/cells.h"
+#include "display/geometry/corrector.h"
 #include "display/geometry/fixed_point.h"
+#include "display/geometry/flat_footprints.h"
 #include "display/geometry/footprint.h"
 #include "display/geometry/limits.h"
 #include "display/geometry/planar_stack.h"
@@ -66,16 +69,23 @@ void CheckStack(Checker& check, const PlanarStack& stack) {
   check.Pitch("pitch_v_mm", stack.pitch_v_mm);
   const std::vector<double>& p = stack.positions_mm;
   check.Count("the number of positions_mm", static_cast<int64_t>(p.size()), kMaxSliceSteps);
+  check.Require(stack.strokes == 1 || stack.strokes == 2, "strokes", stack.strokes, "1 or 2");
+  if (!check.ok()) return;
+  check.Require(p.size() % static_cast<size_t>(stack.strokes) == 0, "the number of positions_mm",
+                p.size(), "even: as many in each of two strokes");
+  const size_t of_stroke = p.size() / static_cast<size_t>(stack.strokes);
   for (size_t s = 0; check.ok() && s < p.size(); ++s) {
     const std::string field = absl::StrCat("positions_mm[", s, "]");
     check.Position(field, p[s]);
-    if (s > 0) {
-      check.Require(p[s] > p[s - 1], field, p[s],
-                    absl::StrCat("above positions_mm[", s - 1, "], ", p[s - 1],
-                                 ": positions ascend strictly"));
-    }
+    if (s % of_stroke == 0) continue;
+    // As its stroke begins; the second the other way.
+    const bool first_up = p[1] > p[0], up = s < of_stroke ? first_up : !first_up;
+    check.Require(up ? p[s] > p[s - 1] : p[s] < p[s - 1], field, p[s],
+                  absl::StrCat(up ? "above" : "below", " positions_mm[", s - 1, "], ", p[s - 1],
+                               ": positions ascend or descend strictly within a stroke, and a "
+                               "second stroke goes the other way"));
   }
-  if (p.size() == 1) check.Pitch("thickness_mm", stack.thickness_mm);
+  if (of_stroke == 1) check.Pitch("thickness_mm", stack.thickness_mm);
   CheckPictures(check, static_cast<int64_t>(p.size()), stack.width_px, stack.height_px);
 }
 
@@ -92,6 +102,8 @@ void CheckRotor(Checker& check, const Rotor& rotor) {
     check.Position(name + "eccentricity_mm", panel.eccentricity_mm);
     check.Position(name + "shift_u_mm", panel.shift_u_mm);
     check.Position(name + "shift_v_mm", panel.shift_v_mm);
+    check.Require(std::abs(panel.tilt_deg) <= kMaxTiltDeg, name + "tilt_deg", panel.tilt_deg,
+                  absl::StrCat("from -", kMaxTiltDeg, " to ", kMaxTiltDeg));
     check.Require(panel.phase_turns >= 0 && panel.phase_turns < 1, name + "phase_turns",
                   panel.phase_turns, "at least 0 and below 1");
   }
@@ -126,11 +138,35 @@ void CheckLattice(Checker& check, const Lattice& lattice) {
   check.Pitch("cell_mm.z", lattice.cell_mm.z);
 }
 
+void CheckHelix(Checker& check, const Helix& helix) {
+  check.Count("slices_per_turn", helix.slices_per_turn, kMaxSliceSteps);
+  check.Count("width_px", helix.width_px, kMaxPixelsPerAxis);
+  check.Count("height_px", helix.height_px, kMaxPixelsPerAxis);
+  check.Pitch("pitch_u_mm", helix.pitch_u_mm);
+  check.Pitch("pitch_v_mm", helix.pitch_v_mm);
+  check.Count("blades", helix.blades, kMaxBlades);
+  const double most = check.ok() ? 1.0 / helix.blades : 1;
+  check.Require(helix.span_turns >= kMinSpanTurns && helix.span_turns <= most * (1 + 1e-12),
+                "span_turns", helix.span_turns,
+                absl::StrCat("from ", kMinSpanTurns, " to 1 / blades, ", most,
+                             ": blades do not lie over one another"));
+  check.Pitch("height_mm", helix.height_mm);
+  check.Number("hub_mm", helix.hub_mm, 0, kMaxPositionMm);
+  check.Number("radius_mm", helix.radius_mm, kMinPitchMm, kMaxPositionMm);
+  check.Require(helix.hub_mm < helix.radius_mm, "hub_mm", helix.hub_mm,
+                absl::StrCat("below radius_mm, ", helix.radius_mm));
+  check.Require(helix.phase_turns >= 0 && helix.phase_turns < 1, "phase_turns", helix.phase_turns,
+                "at least 0 and below 1");
+  CheckPictures(check, helix.slices_per_turn, helix.width_px, helix.height_px);
+}
+
 void CheckShape(Checker& check, const Geometry& geometry) {
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
     CheckStack(check, *stack);
   } else if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) {
     CheckLattice(check, *lattice);
+  } else if (const auto* helix = std::get_if<Helix>(&geometry.shape)) {
+    CheckHelix(check, *helix);
   } else {
     CheckRotor(check, std::get<Rotor>(geometry.shape));
   }
@@ -163,8 +199,10 @@ void CheckStackInGrid(Checker& check, const PlanarStack& stack, const VoxelGrid&
   const bool flat = stack.normal == PlanarStack::Normal::kZ;
   const double pitch = flat ? grid.pitch_mm.z : grid.pitch_mm.y;
   const std::vector<double>& p = stack.positions_mm;
+  const size_t of_stroke = p.size() / static_cast<size_t>(stack.strokes);
   for (size_t s = 1; check.ok() && s < p.size(); ++s) {
-    check.Require((p[s] - p[s - 1]) / pitch >= kMinSpacingVoxels,
+    if (s % of_stroke == 0) continue;
+    check.Require(std::abs(p[s] - p[s - 1]) / pitch >= kMinSpacingVoxels,
                   absl::StrCat("positions_mm[", s, "] − positions_mm[", s - 1, "]"),
                   p[s] - p[s - 1],
                   absl::StrCat("at least 1/1024 of the grid's pitch along the normal, ",
@@ -173,7 +211,7 @@ void CheckStackInGrid(Checker& check, const PlanarStack& stack, const VoxelGrid&
   // A column of voxels is in one list of each slice that sees it; a depth in two slices at the
   // most. Each pixel and each slice may add the one that holds its centre.
   const int64_t slices = static_cast<int64_t>(p.size());
-  const int64_t depths = 2 * int64_t{flat ? grid.nz : grid.ny} + slices;
+  const int64_t depths = 2 * int64_t{flat ? grid.nz : grid.ny} * stack.strokes + slices;
   CheckTable(check, (int64_t{grid.nx} + stack.width_px) * depths);
 }
 
@@ -211,12 +249,36 @@ void CheckLatticeInGrid(Checker& check, const Lattice& lattice, const VoxelGrid&
   CheckTable(check, lights * (box + 1));
 }
 
+// Lists are kept of each pixel, and a voxel is in two of each time that it is passed.
+void CheckFlatInGrid(Checker& check, const Geometry& geometry) {
+  const auto [width, height] = std::visit(
+      [](const auto& shape) { return std::pair(shape.width_px, shape.height_px); }, geometry.shape);
+  const int64_t lists = int64_t{SliceCount(geometry)} * FlatRow(width) * height;
+  check.Require(lists <= kMaxFlatPixels,
+                absl::StrCat("slices·width_px·height_px, rows in whole bytes (",
+                             SliceCount(geometry), "·", FlatRow(width), "·", height, ")"),
+                lists,
+                absl::StrCat("at most ", kMaxFlatPixels,
+                             " where footprints are kept pixel by pixel: of a helix, of tilted "
+                             "panels, with a correction"));
+  int64_t passes = 2;
+  if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) passes = 2 * stack->strokes;
+  if (const auto* rotor = std::get_if<Rotor>(&geometry.shape)) {
+    passes = 4 * static_cast<int64_t>(rotor->panels.size());
+  }
+  if (const auto* helix = std::get_if<Helix>(&geometry.shape)) passes = 2 * helix->blades;
+  const VoxelGrid& grid = geometry.grid;
+  // A voxel on the axis of what turns is passed in every slice, and so may be the one beside it.
+  CheckTable(check, passes * grid.nx * grid.ny * grid.nz + lists +
+                        2 * int64_t{grid.nz} * SliceCount(geometry));
+}
+
 }  // namespace
 
 absl::Status ValidateShape(const Geometry& geometry) {
   Checker check;
   CheckShape(check, geometry);
-  return check.status();
+  return check.ok() ? CheckCorrection(geometry) : check.status();
 }
 
 absl::Status ValidateGeometry(const Geometry& geometry) {
@@ -224,10 +286,15 @@ absl::Status ValidateGeometry(const Geometry& geometry) {
   CheckShape(check, geometry);
   CheckGrid(check, geometry.grid);
   if (!check.ok()) return check.status();
+  if (absl::Status status = CheckCorrection(geometry); !status.ok()) return status;
+  if (IsFlat(geometry)) CheckFlatInGrid(check, geometry);
+  if (!check.ok()) return check.status();
   if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
     CheckStackInGrid(check, *stack, geometry.grid);
   } else if (const auto* lattice = std::get_if<Lattice>(&geometry.shape)) {
     CheckLatticeInGrid(check, *lattice, geometry.grid);
+  } else if (std::holds_alternative<Helix>(geometry.shape)) {
+    return check.status();
   } else {
     CheckRotorInGrid(check, std::get<Rotor>(geometry.shape), geometry.grid);
   }

@@ -28,7 +28,7 @@ local REQUESTS = {
   [9] = "SET_BLANK",
 }
 local FORMATS = { [0] = "RGB888", [1] = "RGB332", [2] = "three bit planes" }
-local SHAPES = { [1] = "planar stack", [2] = "rotor" }
+local SHAPES = { [1] = "planar stack", [2] = "rotor", [3] = "helix", [4] = "lattice" }
 local REASONS = {
   [1] = "by the host", [2] = "superseded", [3] = "base not held", [4] = "volume unknown",
   [5] = "does not fit the mode",
@@ -59,7 +59,7 @@ local P = ProtoField
 local KINDS = {  -- what makes the field, how it is shown, how many bytes it has
   u8 = { P.uint8, base.DEC, 1 }, u16 = { P.uint16, base.DEC, 2 }, u32 = { P.uint32, base.DEC, 4 },
   x8 = { P.uint8, base.HEX, 1 }, x16 = { P.uint16, base.HEX, 2 }, x32 = { P.uint32, base.HEX, 4 },
-  u64 = { P.uint64, base.DEC, 8 }, i16 = { P.int16, base.DEC, 2 }, f64 = { P.double, nil, 8 },
+  u64 = { P.uint64, base.DEC, 8 }, i16 = { P.int16, base.DEC, 2 }, f32 = { P.float, nil, 4 }, f64 = { P.double, nil, 8 },
 }
 
 -- Of { offset, kind, name, label, words for values, bits = { { mask, name, label }… } }….
@@ -228,6 +228,7 @@ local KIND = layout({ { 0, "u8", "shape.kind", "Shape", SHAPES } })
 local PLANAR = layout({
   { 1, "u8", "shape.normal", "Normal", { [0] = "slices lie flat", [1] = "slices stand" } },
   { 2, "x8", "shape.mirror", "Mirrored", bits = MIRROR_BITS },
+  { 3, "u8", "shape.strokes", "Strokes" },
   { 4, "u32", "shape.positions", "Positions" },
   { 8, "f64", "shape.pitch_u_mm", "Pitch along rows (mm)" },
   { 16, "f64", "shape.pitch_v_mm", "Pitch along columns (mm)" },
@@ -247,8 +248,30 @@ local PANEL = layout({
   { 32, "f64", "shape.shift_v_mm", "Shift along Z (mm)" },
   { 40, "f64", "shape.phase_turns", "Phase (turns)" },
   { 48, "x8", "shape.mirror", "Mirrored", bits = MIRROR_BITS },
+  { 52, "f32", "shape.tilt_deg", "Tilt (degrees)" },
 })
 local PANEL_SIZE = 56
+local LATTICE = layout({
+  { 4, "u32", "shape.lights", "Lights" },
+  { 8, "f64", "shape.cell_x_mm", "Cell along x (mm)" },
+  { 16, "f64", "shape.cell_y_mm", "Cell along y (mm)" },
+  { 24, "f64", "shape.cell_z_mm", "Cell along z (mm)" },
+})
+local HELIX = layout({
+  { 1, "x8", "shape.helix_flags", "Flags", bits = {
+    { 0x01, "shape.helix_flags.clockwise", "Clockwise" }, { 0x02, "shape.helix_flags.left_handed", "Left-handed" },
+  } },
+  { 2, "x8", "shape.mirror", "Mirrored", bits = MIRROR_BITS },
+  { 3, "u8", "shape.blades", "Blades" },
+  { 4, "u32", "shape.slices_per_turn", "Slices a turn" },
+  { 8, "f64", "shape.pitch_u_mm", "Pitch along rows (mm)" },
+  { 16, "f64", "shape.pitch_v_mm", "Pitch along columns (mm)" },
+  { 24, "f64", "shape.span_turns", "Span of a blade (turns)" },
+  { 32, "f64", "shape.height_mm", "Height (mm)" },
+  { 40, "f64", "shape.hub_mm", "Hub (mm)" },
+  { 48, "f64", "shape.radius_mm", "Radius (mm)" },
+  { 56, "f64", "shape.phase_turns", "Phase (turns)" },
+})
 
 -- §4.3, §4.4
 local MODE = layout({
@@ -582,6 +605,10 @@ local function add_shape(tree, bytes)
     for at = ROTOR.size, bytes:len() - PANEL_SIZE, PANEL_SIZE do
       add(tree:add(voxlink, bytes(at, PANEL_SIZE), "Panel"), PANEL, bytes, at)
     end
+  elseif kind == 3 and bytes:len() >= HELIX.size then
+    add(tree, HELIX, bytes)
+  elseif kind == 4 and bytes:len() >= LATTICE.size then
+    add(tree, LATTICE, bytes)
   end
 end
 

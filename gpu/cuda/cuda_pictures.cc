@@ -66,8 +66,10 @@ absl::Status CudaPictures::PutTables(const display::FootprintTable& table,
   view_.outer.entries = put(table.outer.entries.data(), table.outer.entries.size());
   view_.inner.begin = put(table.inner.begin.data(), table.inner.begin.size());
   view_.inner.entries = put(table.inner.entries.data(), table.inner.entries.size());
-  view_.width = static_cast<uint32_t>(table.width);
-  view_.height = static_cast<uint32_t>(table.height);
+  view_.width = static_cast<uint32_t>(plan_.layout.width);
+  view_.height = static_cast<uint32_t>(plan_.layout.height);
+  view_.columns = static_cast<uint32_t>(table.width);
+  view_.flat_row = static_cast<uint32_t>(table.flat_row);
   view_.inner_sets = static_cast<uint32_t>(table.inner_sets);
   view_.inner_axis = static_cast<uint32_t>(table.inner_axis);
   for (const display::FootprintEntry& entry : table.inner.entries) {

@@ -37,7 +37,7 @@ struct Rows {
 };
 
 __device__ Rows OuterOf(const SliceView& view, uint32_t slice, uint32_t u) {
-  const uint32_t* row = view.outer.begin + static_cast<size_t>(slice) * view.width + u;
+  const uint32_t* row = view.outer.begin + static_cast<size_t>(slice) * view.columns + u;
   return {view.outer.entries + row[0], view.outer.entries + row[1]};
 }
 
@@ -105,6 +105,46 @@ __device__ bool PutPixel(const SliceView& view, uint32_t u, uint32_t v, bool ins
   return false;
 }
 
+// A pixel's colour into the pictures of slice `s`, by 8 neighbouring lanes at once.
+__device__ void PutToned(const SliceView& view, Levels levels, uint32_t s, uint32_t u, uint32_t v,
+                         bool inside, uint32_t rgb) {
+  for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
+    // A pixel without light is at the lowest level whatever the threshold.
+    const uint32_t threshold = Threshold(view.dither, u, v, sub, view.sub_frames);
+    Levels q = {0, 0, 0};
+    if (rgb != 0) {
+      q = {Quantize(view.lut[rgb >> 16], levels.r, threshold),
+           Quantize(view.lut[rgb >> 8 & 0xFF], levels.g, threshold),
+           Quantize(view.lut[rgb & 0xFF], levels.b, threshold)};
+    }
+    const uint32_t picture = s * view.sub_frames + sub;
+    if (PutPixel(view, u, v, inside, q,
+                 view.bytes + static_cast<size_t>(picture) * view.bytes_per_picture)) {
+      view.differs[picture] = 1;
+    }
+  }
+}
+
+// Where each pixel has a list of its own, a thread each.
+__global__ void DrawFlatKernel(VolumeView volume, SliceIndexView index, SliceView view,
+                               uint32_t begin) {
+  const uint32_t s = begin + blockIdx.y;
+  if (index.dirty[s] == 0) return;
+  const bool blank = index.lit_tiles[s] == 0;
+  if (blank && view.blank[s] != 0) return;
+  const uint32_t slice = static_cast<uint32_t>(index.first) + s;
+  const uint32_t pixel = blockIdx.x * kThreads + threadIdx.x;
+  const uint32_t u = pixel % view.flat_row, v = pixel / view.flat_row;
+  const bool inside = v < view.height && u < view.width;
+  uint32_t rgb = 0;
+  if (inside && !blank) {
+    rgb = view.sampling == display::Sampling::kWeighted
+              ? SampleWeighted(volume, view, slice, pixel, 0)
+              : SampleMax(volume, view, slice, pixel, 0, nullptr);
+  }
+  PutToned(view, LevelsOf(view.format), s, u, v, inside, rgb);
+}
+
 __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceView view,
                                  uint32_t begin, bool with_line) {
   extern __shared__ uint32_t lines[];  // kColumns of view.line voxels
@@ -141,21 +181,7 @@ __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceV
                 : SampleMax(volume, view, slice, u, v,
                             with_line ? lines + column * view.line : nullptr);
     }
-    for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
-      // A pixel without light is at the lowest level whatever the threshold.
-      const uint32_t threshold = Threshold(view.dither, u, v, sub, view.sub_frames);
-      Levels q = {0, 0, 0};
-      if (rgb != 0) {
-        q = {Quantize(view.lut[rgb >> 16], levels.r, threshold),
-             Quantize(view.lut[rgb >> 8 & 0xFF], levels.g, threshold),
-             Quantize(view.lut[rgb & 0xFF], levels.b, threshold)};
-      }
-      const uint32_t picture = s * view.sub_frames + sub;
-      if (PutPixel(view, u, v, inside, q,
-                   view.bytes + static_cast<size_t>(picture) * view.bytes_per_picture)) {
-        view.differs[picture] = 1;
-      }
-    }
+    PutToned(view, levels, s, u, v, inside, rgb);
   }
 }
 
@@ -213,8 +239,11 @@ cudaError_t DrawSlices(const VolumeView& volume, const SliceIndexView& index, co
                        cudaStream_t stream) {
   const size_t line_bytes = sizeof(uint32_t) * kColumns * view.line;
   const bool with_line = view.sampling == display::Sampling::kMax && line_bytes <= kLineBytes;
-  const dim3 grid((view.width + kColumns - 1) / kColumns, count);
-  if (count > 0) {
+  if (count > 0 && view.flat_row > 0) {
+    const dim3 grid((view.columns + kThreads - 1) / kThreads, count);
+    DrawFlatKernel<<<grid, kThreads, 0, stream>>>(volume, index, view, begin);
+  } else if (count > 0) {
+    const dim3 grid((view.width + kColumns - 1) / kColumns, count);
     DrawSlicesKernel<<<grid, kThreads, with_line ? line_bytes : 0, stream>>>(volume, index, view,
                                                                              begin, with_line);
   }

@@ -150,7 +150,9 @@ struct ListsView {
 struct SliceView {
   ListsView outer, inner;
   uint32_t width = 0, height = 0, inner_sets = 1, inner_axis = 2;
-  uint32_t line = 0;  // voxels along the inner axis that inner lists reach
+  uint32_t columns = 0;   // outer lists of a slice
+  uint32_t flat_row = 0;  // as FootprintTable has it
+  uint32_t line = 0;      // voxels along the inner axis that inner lists reach
   display::Sampling sampling = display::Sampling::kMax;
   display::Dither dither = display::Dither::kNone;
   display::PixelFormat format = display::PixelFormat::kRgb888;

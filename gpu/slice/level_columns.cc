@@ -67,7 +67,8 @@ std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& 
                                                  const display::FrameLayout& layout,
                                                  const display::Tone& tone, int32_t begin,
                                                  int32_t end) {
-  if (layout.format != display::PixelFormat::kRgb332 || tone.sampling != display::Sampling::kMax) {
+  if (layout.format != display::PixelFormat::kRgb332 || tone.sampling != display::Sampling::kMax ||
+      table.flat_row != 0) {
     return std::nullopt;
   }
   const int axis = static_cast<int>(table.inner_axis);

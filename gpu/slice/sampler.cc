@@ -324,6 +324,12 @@ void Sampler::Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) co
     out.lines.resize(places_ * kColumns);
     for (uint32_t u = 0; u < width; u += kColumns) SampleMax(tiles, slice, u, out);
   }
+  if (table_.flat_row == 0) return;
+  const auto row = static_cast<uint32_t>(table_.flat_row);
+  for (SlicePixels::Pixel& pixel : out.lit) {
+    pixel.v = pixel.u / row;
+    pixel.u %= row;
+  }
 }
 
 }  // namespace voxeld::gpu

@@ -82,6 +82,7 @@ void Fields(Io& io, S& s)
   io.Value(s.normal), io.Value(s.width_px), io.Value(s.height_px);
   io.Value(s.pitch_u_mm), io.Value(s.pitch_v_mm);
   io.List(s.positions_mm, [&](auto& position) { io.Value(position); });
+  io.Value(s.strokes);
   io.Value(s.thickness_mm), io.Value(s.mirror_u), io.Value(s.mirror_v);
 }
 
@@ -92,8 +93,35 @@ void Fields(Io& io, R& r)
   io.Value(r.slices_per_turn), io.Value(r.width_px), io.Value(r.height_px), io.Value(r.clockwise);
   io.List(r.panels, [&](auto& p) {
     io.Value(p.pitch_u_mm), io.Value(p.pitch_v_mm), io.Value(p.eccentricity_mm);
-    io.Value(p.shift_u_mm), io.Value(p.shift_v_mm), io.Value(p.phase_turns);
+    io.Value(p.shift_u_mm), io.Value(p.shift_v_mm), io.Value(p.tilt_deg);
+    io.Value(p.phase_turns);
     io.Value(p.mirror_u), io.Value(p.mirror_v);
+  });
+}
+
+template <typename Io, typename H>
+void Fields(Io& io, H& h)
+  requires std::is_same_v<std::remove_const_t<H>, display::Helix>
+{
+  io.Value(h.slices_per_turn), io.Value(h.width_px), io.Value(h.height_px);
+  io.Value(h.pitch_u_mm), io.Value(h.pitch_v_mm), io.Value(h.blades), io.Value(h.span_turns);
+  io.Value(h.height_mm), io.Value(h.hub_mm), io.Value(h.radius_mm), io.Value(h.phase_turns);
+  io.Value(h.left_handed), io.Value(h.clockwise), io.Value(h.mirror_u), io.Value(h.mirror_v);
+}
+
+template <typename Io, typename C>
+void Fields(Io& io, C& c)
+  requires std::is_same_v<std::remove_const_t<C>, display::Correction>
+{
+  for (auto& a : c.affine) io.Value(a);
+  io.Optional(c.displacement, [&](auto& d) {
+    io.Value(d.nx), io.Value(d.ny), io.Value(d.nz);
+    Fields(io, d.low_mm);
+    Fields(io, d.high_mm);
+    io.List(d.at_mm, [&](auto& at) { Fields(io, at); });
+  });
+  io.List(c.homographies, [&](auto& h) {
+    for (auto& m : h) io.Value(m);
   });
 }
 
@@ -116,6 +144,7 @@ void Fields(Io& io, T& t)
   io.Value(grid.nx), io.Value(grid.ny), io.Value(grid.nz);
   Fields(io, grid.pitch_mm);
   Fields(io, grid.origin_mm);
+  io.Optional(t.geometry.correction, [&](auto& correction) { Fields(io, correction); });
   auto& layout = t.layout;
   io.Value(layout.slices), io.Value(layout.width), io.Value(layout.height);
   io.Value(layout.sub_frames), io.Value(layout.format);
@@ -139,7 +168,9 @@ absl::StatusOr<Target> DecodeTarget(std::span<const std::byte> bytes) {
   Target target;
   uint64_t shape = 0;
   reader.Value(shape);
-  if (shape == 2) {
+  if (shape == 3) {
+    Fields(reader, target.geometry.shape.emplace<display::Helix>());
+  } else if (shape == 2) {
     Fields(reader, target.geometry.shape.emplace<display::Lattice>());
   } else if (shape == 1) {
     Fields(reader, target.geometry.shape.emplace<display::Rotor>());

@@ -37,8 +37,9 @@ OracleFootprints::OracleFootprints(const Target& target) : target_(target) {
 std::vector<OracleVoxel> OracleFootprints::Of(int32_t slice, int32_t u, int32_t v) const {
   if (std::holds_alternative<display::Lattice>(target_.geometry.shape)) return OfLight(slice, u);
   std::vector<OracleVoxel> voxels;
-  for (const display::FootprintEntry& o : table_.Outer(slice, u)) {
-    for (const display::FootprintEntry& i : table_.Inner(slice, v)) {
+  const bool flat = table_.flat_row > 0;
+  for (const display::FootprintEntry& o : table_.Outer(slice, flat ? v * table_.flat_row + u : u)) {
+    for (const display::FootprintEntry& i : table_.Inner(slice, flat ? 0 : v)) {
       voxels.push_back(
           {o.x + i.x, o.y + i.y, o.z + i.z, (uint32_t{o.weight} * i.weight + 127) / 255});
     }
@@ -49,8 +50,9 @@ std::vector<OracleVoxel> OracleFootprints::Of(int32_t slice, int32_t u, int32_t 
 std::vector<OracleVoxel> OracleFootprints::OfLight(int32_t slice, int32_t u) const {
   const auto& lattice = std::get<display::Lattice>(target_.geometry.shape);
   const display::VoxelGrid& grid = target_.geometry.grid;
-  const std::optional<display::Vec3>& light =
+  std::optional<display::Vec3> light =
       lattice.points_mm[static_cast<size_t>(slice * lattice.width_px + u)];
+  if (light.has_value()) light = display::PixelPosition(target_.geometry, slice, u, 0);
   std::vector<OracleVoxel> voxels;
   if (!light.has_value()) return voxels;
   const Cells x = CellsOf(light->x, lattice.cell_mm.x, grid.nx, grid.pitch_mm.x, grid.origin_mm.x);

@@ -35,81 +35,12 @@ uint64_t SceneGenerator::RandomId(const auto& map) {
   return std::next(map.begin(), Int(0, static_cast<int64_t>(map.size()) - 1))->first;
 }
 
-display::PlanarStack SceneGenerator::RandomStack() {
-  display::PlanarStack stack;
-  stack.normal = Chance(0.5) ? display::PlanarStack::Normal::kZ : display::PlanarStack::Normal::kY;
-  stack.width_px = static_cast<int32_t>(Int(1, 40));
-  stack.height_px = static_cast<int32_t>(Int(1, 40));
-  stack.pitch_u_mm = Real(0.7, 1.5);
-  stack.pitch_v_mm = Real(0.7, 1.5);
-  double position = Real(-10, 0);
-  for (int64_t n = Int(1, 30); n > 0; --n) {
-    stack.positions_mm.push_back(position);
-    position += Real(0.5, 2);
-  }
-  stack.mirror_u = Chance(0.3);
-  return stack;
-}
-
-display::Rotor SceneGenerator::RandomRotor() {
-  display::Rotor rotor;
-  rotor.slices_per_turn = static_cast<int32_t>(Int(1, 40));
-  rotor.width_px = static_cast<int32_t>(Int(2, 40));
-  rotor.height_px = static_cast<int32_t>(Int(1, 40));
-  rotor.panels.resize(static_cast<size_t>(Int(1, 2)));
-  for (display::Rotor::Panel& panel : rotor.panels) {
-    panel.eccentricity_mm = Chance(0.5) ? 0 : Real(-3, 3);
-    panel.phase_turns = Chance(0.5) ? 0 : Real(0, 0.99);
-    panel.shift_v_mm = Chance(0.7) ? 0 : Real(-5, 5);
-    panel.mirror_u = Chance(0.2);
-    panel.mirror_v = Chance(0.2);
-  }
-  rotor.clockwise = Chance(0.3);
-  return rotor;
-}
-
-// In rows with gaps, or scattered.
-display::Lattice SceneGenerator::RandomLattice() {
-  display::Lattice lattice;
-  lattice.width_px = static_cast<int32_t>(Int(1, 60));
-  lattice.cell_mm = {Real(0.7, 1.5), Real(0.7, 1.5), Real(0.7, 1.5)};
-  const int64_t pixels = lattice.width_px * Int(1, 30);
-  const double gaps = Chance(0.5) ? 0 : Real(0, 0.7);
-  const bool scattered = Chance(0.5);
-  const int64_t nx = Int(1, 20), ny = Int(1, 20);
-  for (int64_t n = 0; n < pixels; ++n) {
-    display::Vec3 at;
-    if (scattered) {
-      at = {Real(-14, 14), Real(-14, 14), Real(-14, 14)};
-    } else {
-      at = {static_cast<double>(n % nx) * lattice.cell_mm.x,
-            static_cast<double>(n / nx % ny) * lattice.cell_mm.y,
-            static_cast<double>(n / nx / ny % 30) * lattice.cell_mm.z};
-    }
-    const bool gap = n > 0 && Chance(gaps);
-    lattice.points_mm.push_back(gap ? std::nullopt : std::optional(at));
-  }
-  return lattice;
-}
-
-// Of a lattice also a grid that is finer, coarser or beside its lights.
-display::VoxelGrid SceneGenerator::RandomGrid(const display::Geometry& geometry) {
-  display::VoxelGrid grid = display::DefaultGrid(geometry);
-  if (!std::holds_alternative<display::Lattice>(geometry.shape) || Chance(0.5)) return grid;
-  const double finer = Real(0.5, 1.5);
-  for (int32_t* cells : {&grid.nx, &grid.ny, &grid.nz}) {
-    *cells = std::clamp(static_cast<int32_t>(*cells * finer), 1, 45);
-  }
-  for (double* pitch : {&grid.pitch_mm.x, &grid.pitch_mm.y, &grid.pitch_mm.z}) *pitch /= finer;
-  for (double* origin : {&grid.origin_mm.x, &grid.origin_mm.y, &grid.origin_mm.z}) {
-    *origin += Chance(0.5) ? 0 : Real(-4, 4);
-  }
-  return grid;
-}
-
 Target SceneGenerator::RandomTarget() {
   Target target;
-  switch (Int(0, 2)) {
+  switch (Int(0, 3)) {
+    case 3:
+      target.geometry.shape = RandomHelix();
+      break;
     case 0:
       target.geometry.shape = RandomStack();
       break;
@@ -120,6 +51,7 @@ Target SceneGenerator::RandomTarget() {
       target.geometry.shape = RandomLattice();
       break;
   }
+  if (Chance(0.25)) target.geometry.correction = RandomCorrection(target.geometry);
   target.geometry.grid = RandomGrid(target.geometry);
   target.layout.slices = display::SliceCount(target.geometry);
   std::visit(

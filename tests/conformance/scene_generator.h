@@ -38,6 +38,8 @@ class SceneGenerator {
  private:
   display::PlanarStack RandomStack();
   display::Rotor RandomRotor();
+  display::Helix RandomHelix();
+  display::Correction RandomCorrection(const display::Geometry& geometry);
   display::Lattice RandomLattice();
   display::VoxelGrid RandomGrid(const display::Geometry& geometry);
   LayerRecord RandomLayer(uint64_t id);

@@ -42,6 +42,14 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/share/doc/voxeld/README.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/copyright
 -rw-r--r-- root/root ./usr/share/doc/voxeld/examples/voxeld.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/depthcube.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/helix.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/lattice-20.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/lattice-8.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/perspecta.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/vortex.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/vx1.toml
+-rw-r--r-- root/root ./usr/share/voxeld/profiles/vx2-xl.toml
 EOT
 diff <(sort -k3 "$work/expected") <(sort -k3 "$work/contents") || fail "its contents differ (>)"
 grep -q 'Apache License' "$root/usr/share/doc/voxeld/copyright" || fail "no licence in copyright"

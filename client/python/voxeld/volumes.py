@@ -12,6 +12,7 @@ from .v1 import display_pb2 as pb
 
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 
 
 def _row(count: int, pitch_mm: float, middle_mm: float, mirror: bool) -> Floats:
@@ -61,20 +62,77 @@ class Volume:
         geometry = self.header.geometry
         shape = geometry.WhichOneof("shape")
         if shape == "planar_stack":
-            stack = geometry.planar_stack
-            across = _row(stack.width_px, stack.pitch_u_mm, 0, stack.mirror_u)[u]
-            up = _row(stack.height_px, stack.pitch_v_mm, 0, stack.mirror_v)[v]
-            along = np.array(list(stack.positions_mm))[s]
-            flat = stack.normal == pb.PlanarStack.Z
-            return np.stack([across, up, along] if flat else [across, along, up], axis=1), colors
-        if shape == "rotor":
-            return self._rotor_points(s, v, u), colors
-        lattice = geometry.lattice
-        at = np.zeros((lattice.slices * lattice.width_px, 3))
-        at[list(lattice.pixels)] = np.stack([list(lattice.x_mm), list(lattice.y_mm), list(lattice.z_mm)], axis=1)
-        return at[s * lattice.width_px + u], colors
+            at = self._stack_points(s, v, u)
+        elif shape == "rotor":
+            at = self._rotor_points(s, v, u)
+        elif shape == "helix":
+            at = self._helix_points(s, v, u)
+        elif shape == "lattice":
+            lattice = geometry.lattice
+            lights = np.zeros((lattice.slices * lattice.width_px, 3))
+            lights[list(lattice.pixels)] = np.stack([list(lattice.x_mm), list(lattice.y_mm), list(lattice.z_mm)], axis=1)
+            at = lights[s * lattice.width_px + u]
+        else:
+            raise VoxelError("the display's geometry is of a kind that this client does not know")
+        return self._corrected(at), colors
 
-    def _rotor_points(self, s: npt.NDArray[np.intp], v: npt.NDArray[np.intp], u: npt.NDArray[np.intp]) -> Floats:
+    def _picture(self, s: Places, across: Floats, up: Floats) -> tuple[Floats, Floats]:
+        """Where pictures' places are by their homographies."""
+        numbers = self.header.geometry.correction.homographies
+        if not numbers:
+            return across, up
+        maps = np.array(list(numbers)).reshape(-1, 3, 3)
+        m = maps[s if len(maps) > 1 else np.zeros_like(s)]
+        x, y, w = (m[:, row, 0] * across + m[:, row, 1] * up + m[:, row, 2] for row in range(3))
+        return x / w, y / w
+
+    def _corrected(self, at: Floats) -> Floats:
+        """True places of nominal ones."""
+        correction = self.header.geometry.correction
+        result = at
+        if correction.affine:
+            affine = np.array(list(correction.affine)).reshape(3, 4)
+            result = at @ affine[:, :3].T + affine[:, 3]
+        if correction.HasField("displacement"):
+            grid = correction.displacement
+            size = np.array([grid.nx, grid.ny, grid.nz])
+            low = np.array([grid.low_mm.x, grid.low_mm.y, grid.low_mm.z])
+            high = np.array([grid.high_mm.x, grid.high_mm.y, grid.high_mm.z])
+            numbers = np.array(list(grid.at_mm)).reshape(grid.nz, grid.ny, grid.nx, 3)
+            place = np.clip((at - low) / (high - low) * (size - 1), 0, size - 1)
+            first = np.minimum(place.astype(int), size - 2)
+            share = place - first
+            moved = np.zeros_like(at)
+            for corner in range(8):
+                step = np.array([corner & 1, corner >> 1 & 1, corner >> 2])
+                weight = np.where(step == 1, share, 1 - share).prod(axis=1)
+                i, j, k = (first + step).T
+                moved += weight[:, None] * numbers[k, j, i]
+            result = result + moved
+        return result
+
+    def _stack_points(self, s: Places, v: Places, u: Places) -> Floats:
+        stack = self.header.geometry.planar_stack
+        across, up = self._picture(s, _row(stack.width_px, stack.pitch_u_mm, 0, stack.mirror_u)[u],
+                                   _row(stack.height_px, stack.pitch_v_mm, 0, stack.mirror_v)[v])
+        along = np.array(list(stack.positions_mm))[s]
+        flat = stack.normal == pb.PlanarStack.Z
+        return np.stack([across, up, along] if flat else [across, along, up], axis=1)
+
+    def _helix_points(self, s: Places, v: Places, u: Places) -> Floats:
+        helix = self.header.geometry.helix
+        x, y = self._picture(s, _row(helix.width_px, helix.pitch_u_mm, 0, helix.mirror_u)[u],
+                             _row(helix.height_px, helix.pitch_v_mm, 0, helix.mirror_v)[v])
+        turned = s / helix.slices_per_turn
+        begin = helix.phase_turns + (-turned if helix.clockwise else turned)
+        z = np.zeros(len(s))
+        for blade in range(helix.blades):
+            way = np.arctan2(y, x) / (2 * np.pi) - begin - blade / helix.blades
+            share = np.mod(-way if helix.left_handed else way, 1) / helix.span_turns
+            z = np.where(share < 1, (share - 0.5) * helix.height_mm, z)
+        return np.stack([x, y, z], axis=1)
+
+    def _rotor_points(self, s: Places, v: Places, u: Places) -> Floats:
         rotor = self.header.geometry.rotor
         result = np.zeros((len(s), 3))
         for number, panel in enumerate(rotor.panels):
@@ -83,8 +141,9 @@ class Volume:
             angle = 2 * np.pi * (panel.phase_turns + (-turned if rotor.clockwise else turned))
             along = _row(rotor.width_px, panel.pitch_u_mm, panel.shift_u_mm, panel.mirror_u)[u[mine]]
             up = _row(rotor.height_px, panel.pitch_v_mm, panel.shift_v_mm, panel.mirror_v)[v[mine]]
-            cos, sin, off = np.cos(angle), np.sin(angle), panel.eccentricity_mm
-            result[mine] = np.stack([along * cos - off * sin, along * sin + off * cos, up], axis=1)
+            tilt = np.radians(panel.tilt_deg)
+            cos, sin, off = np.cos(angle), np.sin(angle), panel.eccentricity_mm + up * np.sin(tilt)
+            result[mine] = np.stack([along * cos - off * sin, along * sin + off * cos, up * np.cos(tilt)], axis=1)
         return result
 
     def corners(self) -> Floats:

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
+#include <limits>
+#include <optional>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "display/geometry/footprint.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::display::voxlink {
@@ -24,6 +28,7 @@ void EncodePlanar(std::vector<std::byte>& out, const PlanarStack& planar) {
   shape.kind = kShapePlanar;
   shape.normal = static_cast<uint8_t>(planar.normal);
   shape.mirror = MirrorBits(planar.mirror_u, planar.mirror_v);
+  shape.strokes = static_cast<uint8_t>(planar.strokes);
   shape.positions = static_cast<uint32_t>(planar.positions_mm.size());
   shape.pitch_u_mm = planar.pitch_u_mm;
   shape.pitch_v_mm = planar.pitch_v_mm;
@@ -48,7 +53,39 @@ void EncodeRotor(std::vector<std::byte>& out, const Rotor& rotor) {
     wire.shift_v_mm = panel.shift_v_mm;
     wire.phase_turns = panel.phase_turns;
     wire.mirror = MirrorBits(panel.mirror_u, panel.mirror_v);
+    wire.tilt_deg = panel.tilt_deg;
     Append(out, wire);
+  }
+}
+
+void EncodeHelix(std::vector<std::byte>& out, const Helix& helix) {
+  HelixShape shape{};
+  shape.kind = kShapeHelix;
+  shape.flags = static_cast<uint8_t>((helix.clockwise ? 1 : 0) | (helix.left_handed ? 2 : 0));
+  shape.mirror = MirrorBits(helix.mirror_u, helix.mirror_v);
+  shape.blades = static_cast<uint8_t>(helix.blades);
+  shape.slices_per_turn = static_cast<uint32_t>(helix.slices_per_turn);
+  shape.pitch_u_mm = helix.pitch_u_mm;
+  shape.pitch_v_mm = helix.pitch_v_mm;
+  shape.span_turns = helix.span_turns;
+  shape.height_mm = helix.height_mm;
+  shape.hub_mm = helix.hub_mm;
+  shape.radius_mm = helix.radius_mm;
+  shape.phase_turns = helix.phase_turns;
+  Append(out, shape);
+}
+
+void EncodeLattice(std::vector<std::byte>& out, const Lattice& lattice) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  LatticeShape shape{};
+  shape.kind = kShapeLattice;
+  shape.lights = static_cast<uint32_t>(lattice.points_mm.size());
+  const Vec3& cell = lattice.cell_mm;
+  std::copy_n(std::initializer_list<double>{cell.x, cell.y, cell.z}.begin(), 3, shape.cell_mm);
+  Append(out, shape);
+  for (const std::optional<Vec3>& light : lattice.points_mm) {
+    const Vec3 at = light.value_or(Vec3{kNone, kNone, kNone});
+    for (const double mm : {at.x, at.y, at.z}) Append(out, mm);
   }
 }
 
@@ -60,6 +97,12 @@ absl::Status Bad(const char* field, auto value, const std::string& right) {
 absl::Status CheckLength(size_t have, size_t want) {
   if (have == want) return absl::OkStatus();
   return Bad("length of the shape", have, absl::StrCat(want));
+}
+
+absl::StatusOr<Geometry> Checked(Geometry geometry) {
+  const absl::Status valid = ValidateShape(geometry);
+  if (valid.ok()) return geometry;
+  return absl::DataLossError(absl::StrCat("the device's capabilities: ", valid.message()));
 }
 
 absl::StatusOr<Geometry> ParsePlanar(std::span<const std::byte> block, const Capabilities& fixed) {
@@ -83,19 +126,14 @@ absl::StatusOr<Geometry> ParsePlanar(std::span<const std::byte> block, const Cap
   planar.thickness_mm = shape.thickness_mm;
   planar.mirror_u = (shape.mirror & 1) != 0;
   planar.mirror_v = (shape.mirror & 2) != 0;
+  planar.strokes = std::max<int32_t>(shape.strokes, 1);
   planar.positions_mm.resize(shape.positions);
   std::memcpy(planar.positions_mm.data(), block.data() + sizeof(PlanarShape),
               sizeof(double) * shape.positions);
-  for (size_t i = 0; i < planar.positions_mm.size(); ++i) {
-    const double position = planar.positions_mm[i];
-    if (!std::isfinite(position) || (i > 0 && position <= planar.positions_mm[i - 1])) {
-      return Bad("position", position, "finite and above the one before");
-    }
-  }
   for (const double pitch : {planar.pitch_u_mm, planar.pitch_v_mm, planar.thickness_mm}) {
     if (!(pitch > 0) || !std::isfinite(pitch)) return Bad("pitch", pitch, "above 0");
   }
-  return Geometry{.shape = std::move(planar), .grid = {}};
+  return Checked({.shape = std::move(planar), .grid = {}, .correction = {}});
 }
 
 absl::StatusOr<Geometry> ParseRotor(std::span<const std::byte> block, const Capabilities& fixed) {
@@ -127,6 +165,7 @@ absl::StatusOr<Geometry> ParseRotor(std::span<const std::byte> block, const Capa
     panel.phase_turns = wire.phase_turns;
     panel.mirror_u = (wire.mirror & 1) != 0;
     panel.mirror_v = (wire.mirror & 2) != 0;
+    panel.tilt_deg = wire.tilt_deg;
     for (const double pitch : {panel.pitch_u_mm, panel.pitch_v_mm}) {
       if (!(pitch > 0) || !std::isfinite(pitch)) return Bad("pitch", pitch, "above 0");
     }
@@ -138,11 +177,63 @@ absl::StatusOr<Geometry> ParseRotor(std::span<const std::byte> block, const Capa
     }
     rotor.panels.push_back(panel);
   }
-  return Geometry{.shape = std::move(rotor), .grid = {}};
+  return Checked({.shape = std::move(rotor), .grid = {}, .correction = {}});
+}
+
+absl::StatusOr<Geometry> ParseHelix(std::span<const std::byte> block, const Capabilities& fixed) {
+  const auto length = CheckLength(block.size(), sizeof(HelixShape));
+  if (!length.ok()) return length;
+  const auto shape = Load<HelixShape>(block);
+  if (shape.slices_per_turn != fixed.slices) {
+    return Bad("slices_per_turn", shape.slices_per_turn,
+               absl::StrCat(fixed.slices, ", as many as slices"));
+  }
+  Helix helix;
+  helix.slices_per_turn = static_cast<int32_t>(shape.slices_per_turn);
+  helix.width_px = static_cast<int32_t>(fixed.width);
+  helix.height_px = static_cast<int32_t>(fixed.height);
+  helix.pitch_u_mm = shape.pitch_u_mm;
+  helix.pitch_v_mm = shape.pitch_v_mm;
+  helix.blades = shape.blades;
+  helix.span_turns = shape.span_turns;
+  helix.height_mm = shape.height_mm;
+  helix.hub_mm = shape.hub_mm;
+  helix.radius_mm = shape.radius_mm;
+  helix.phase_turns = shape.phase_turns;
+  helix.clockwise = (shape.flags & 1) != 0;
+  helix.left_handed = (shape.flags & 2) != 0;
+  helix.mirror_u = (shape.mirror & 1) != 0;
+  helix.mirror_v = (shape.mirror & 2) != 0;
+  return Checked({.shape = helix, .grid = {}, .correction = {}});
+}
+
+absl::StatusOr<Geometry> ParseLattice(std::span<const std::byte> block, const Capabilities& fixed) {
+  if (block.size() < sizeof(LatticeShape)) {
+    return Bad("length of the shape", block.size(), absl::StrCat(sizeof(LatticeShape), " or more"));
+  }
+  const auto shape = Load<LatticeShape>(block);
+  if (fixed.height != 1) return Bad("height", fixed.height, "1: slices of a lattice are rows");
+  if (shape.lights != uint64_t{fixed.slices} * fixed.width) {
+    return Bad("lights", shape.lights,
+               absl::StrCat(uint64_t{fixed.slices} * fixed.width, ", slices · width"));
+  }
+  const auto length =
+      CheckLength(block.size(), sizeof(LatticeShape) + 3 * sizeof(double) * shape.lights);
+  if (!length.ok()) return length;
+  Lattice lattice;
+  lattice.width_px = static_cast<int32_t>(fixed.width);
+  lattice.cell_mm = {shape.cell_mm[0], shape.cell_mm[1], shape.cell_mm[2]};
+  for (size_t i = 0; i < shape.lights; ++i) {
+    double at[3];
+    std::memcpy(at, block.data() + sizeof(LatticeShape) + i * sizeof(at), sizeof(at));
+    const bool none = std::isnan(at[0]) && std::isnan(at[1]) && std::isnan(at[2]);
+    lattice.points_mm.push_back(none ? std::nullopt : std::optional(Vec3{at[0], at[1], at[2]}));
+  }
+  return Checked({.shape = std::move(lattice), .grid = {}, .correction = {}});
 }
 
 std::string Describe(const Geometry& geometry, const FrameLayout& layout) {
-  const char* const kinds[] = {"a planar stack", "a rotor", "a lattice"};
+  const char* const kinds[] = {"a planar stack", "a rotor", "a lattice", "a helix"};
   return absl::StrCat(kinds[geometry.shape.index()], " of ", layout.slices, " slices of ",
                       layout.width, "x", layout.height, " pixels");
 }
@@ -158,10 +249,15 @@ std::vector<std::byte> EncodeCapabilities(const DeviceCapabilities& capabilities
     fixed.width = static_cast<uint32_t>(planar->width_px);
     fixed.height = static_cast<uint32_t>(planar->height_px);
   } else if (const auto* lattice = std::get_if<Lattice>(&capabilities.geometry.shape)) {
-    Append(shape, RotorShape{});  // as long as the shortest shape, of kind 0: none
+    EncodeLattice(shape, *lattice);
     fixed.width = static_cast<uint32_t>(std::max(lattice->width_px, 1));
     fixed.height = 1;
     fixed.slices = static_cast<uint32_t>(lattice->points_mm.size()) / fixed.width;
+  } else if (const auto* helix = std::get_if<Helix>(&capabilities.geometry.shape)) {
+    EncodeHelix(shape, *helix);
+    fixed.slices = static_cast<uint32_t>(helix->slices_per_turn);
+    fixed.width = static_cast<uint32_t>(helix->width_px);
+    fixed.height = static_cast<uint32_t>(helix->height_px);
   } else {
     const Rotor& rotor = std::get<Rotor>(capabilities.geometry.shape);
     EncodeRotor(shape, rotor);
@@ -237,8 +333,15 @@ absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> 
     case kShapeRotor:
       geometry = ParseRotor(shape, fixed);
       break;
+    case kShapeHelix:
+      geometry = ParseHelix(shape, fixed);
+      break;
+    case kShapeLattice:
+      geometry = ParseLattice(shape, fixed);
+      break;
     default:
-      return Bad("shape", std::to_integer<int>(shape[0]), "1 (planar stack) or 2 (rotor)");
+      return Bad("shape", std::to_integer<int>(shape[0]),
+                 "1 (planar stack), 2 (rotor), 3 (helix) or 4 (lattice)");
   }
   if (!geometry.ok()) return geometry.status();
   device.geometry = *std::move(geometry);
@@ -248,11 +351,6 @@ absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> 
 absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
                                const FrameLayout& layout) {
   const Capabilities& fixed = device.fixed;
-  if (std::holds_alternative<Lattice>(geometry.shape)) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("the display is configured as ", Describe(geometry, layout),
-                     ", which voxlink cannot describe; it must be a planar stack or a rotor"));
-  }
   FrameLayout theirs = layout;
   theirs.slices = static_cast<int32_t>(fixed.slices);
   theirs.width = static_cast<int32_t>(fixed.width);

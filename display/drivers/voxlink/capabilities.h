@@ -20,15 +20,14 @@ struct DeviceCapabilities {
 };
 
 // The block as GET_CAPABILITIES sends it, page after page; `fixed.total_length`, `slices`, `width`
-// and `height` are set from the geometry. voxlink cannot describe a lattice: a block without a
-// shape, which ParseCapabilities refuses.
+// and `height` are set from the geometry.
 std::vector<std::byte> EncodeCapabilities(const DeviceCapabilities& capabilities);
 
 // From an unknown device: every field is checked. DataLoss with the field and its value.
 absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> block);
 
 // FailedPrecondition, with what was asked for and what the device has, if it cannot show `layout`
-// on `geometry` (grids are not compared); always for a lattice.
+// on `geometry` (grids and corrections are not compared).
 absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
                                const FrameLayout& layout);
 

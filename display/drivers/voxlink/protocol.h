@@ -79,8 +79,8 @@ enum Feature : uint32_t {
 struct PlanarShape {
   uint8_t kind;  // 1
   uint8_t normal;
-  uint8_t mirror;  // bit 0: u, bit 1: v
-  uint8_t reserved;
+  uint8_t mirror;      // bit 0: u, bit 1: v
+  uint8_t strokes;     // 1 or 2; 0: 1
   uint32_t positions;  // f64 each, follow
   double pitch_u_mm, pitch_v_mm, thickness_mm;
 };
@@ -98,12 +98,33 @@ static_assert(sizeof(RotorShape) == 8);
 struct RotorPanel {
   double pitch_u_mm, pitch_v_mm, eccentricity_mm, shift_u_mm, shift_v_mm, phase_turns;
   uint8_t mirror;  // bit 0: u, bit 1: v
-  uint8_t reserved[7];
+  uint8_t reserved[3];
+  float tilt_deg;
 };
 static_assert(sizeof(RotorPanel) == 56);
 
+struct HelixShape {
+  uint8_t kind;    // 3
+  uint8_t flags;   // bit 0: clockwise, bit 1: left-handed
+  uint8_t mirror;  // bit 0: u, bit 1: v
+  uint8_t blades;
+  uint32_t slices_per_turn;
+  double pitch_u_mm, pitch_v_mm, span_turns, height_mm, hub_mm, radius_mm, phase_turns;
+};
+static_assert(sizeof(HelixShape) == 64);
+
+struct LatticeShape {
+  uint8_t kind;  // 4
+  uint8_t reserved[3];
+  uint32_t lights;  // f64 × 3 each, x, y and z, follow; NaN: there is none
+  double cell_mm[3];
+};
+static_assert(sizeof(LatticeShape) == 32);
+
 inline constexpr uint8_t kShapePlanar = 1;
 inline constexpr uint8_t kShapeRotor = 2;
+inline constexpr uint8_t kShapeHelix = 3;
+inline constexpr uint8_t kShapeLattice = 4;
 
 // §4.3 Mode
 struct Mode {

@@ -44,7 +44,8 @@ absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& o
   absl::StatusOr<std::unique_ptr<UsbTransport>> transport =
       MakeUsbTransport(read->usb, options.name, context);
   if (!transport.ok()) return transport.status();
-  static constexpr std::string_view kGeometry[] = {"geometry", "size", "slices", "positions_mm"};
+  static constexpr std::string_view kGeometry[] = {"geometry",  "size",    "slices", "positions_mm",
+                                                   "points_mm", "strokes", "motion", "blades"};
   const bool configured = std::any_of(std::begin(kGeometry), std::end(kGeometry), [&](auto key) {
     return options.options.contains(std::string(key));
   });

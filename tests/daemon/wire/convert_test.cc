@@ -65,12 +65,53 @@ TEST(Convert, GeometriesBothWays) {
   ASSERT_TRUE(back.ok()) << back.status();
   EXPECT_EQ(*back, Stack());
 
+  display::Geometry corrected = Stack();
+  std::get<display::PlanarStack>(corrected.shape).strokes = 2;
+  corrected.correction.emplace();
+  corrected.correction->affine[3] = 0.5;
+  corrected.correction->homographies = {{1, 2, 3, 4, 5, 6, 7, 8, 9}, {9, 8, 7, 6, 5, 4, 3, 2, 1}};
+  corrected.correction->displacement = {
+      2, 2, 2, {0, 1, 2}, {3, 4, 5}, std::vector<display::Vec3>(8, {0.25, -1, 7})};
+  message.Clear();
+  ToWire(corrected, &message);
+  back = FromWire(message);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(*back, corrected);
+  message.mutable_correction()->add_homographies(1);
+  EXPECT_THAT(std::string(FromWire(message).status().message()),
+              HasSubstr("correction.homographies has 19 values"));
+  message.mutable_correction()->clear_homographies();
+  message.mutable_correction()->add_affine(1);
+  EXPECT_THAT(std::string(FromWire(message).status().message()),
+              HasSubstr("correction.affine has 13 values"));
+
+  display::Helix helix;
+  helix.slices_per_turn = 90;
+  helix.width_px = 20;
+  helix.height_px = 18;
+  helix.pitch_u_mm = 0.5;
+  helix.pitch_v_mm = 0.75;
+  helix.blades = 2;
+  helix.span_turns = 0.25;
+  helix.height_mm = 30;
+  helix.hub_mm = 1;
+  helix.radius_mm = 8;
+  helix.phase_turns = 0.5;
+  helix.left_handed = helix.mirror_u = true;
+  const display::Geometry turning{helix, {1, 2, 3, {1, 1, 1}, {0, 0, 0}}};
+  message.Clear();
+  ToWire(turning, &message);
+  back = FromWire(message);
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(*back, turning);
+
   display::Rotor rotor;
   rotor.slices_per_turn = 360;
   rotor.width_px = 64;
   rotor.height_px = 32;
   rotor.clockwise = true;
-  rotor.panels = {{1, 2, 3, 4, 5, 0.25, true, false}, {0.5, 0.5, -3, 0, 0, 0.75, false, true}};
+  rotor.panels = {{1, 2, 3, 4, 5, 0.25, true, false},
+                  {0.5, 0.5, -3, 0, 0, 0.75, false, true, 12.5F}};
   const display::Geometry spinning{rotor, {1, 2, 3, {1, 1, 1}, {0, 0, 0}}};
   message.Clear();
   ToWire(spinning, &message);

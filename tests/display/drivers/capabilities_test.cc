@@ -203,22 +203,62 @@ TEST(Capabilities, TheDeviceMustBeAsConfigured) {
   EXPECT_FALSE(CheckCapabilities(device, geometry, layout).ok());
 }
 
-TEST(CapabilitiesTest, ALatticeCannotBeDescribed) {
+DeviceCapabilities With(Geometry geometry) {
   DeviceCapabilities device = Planar();
-  device.geometry = LatticeGeometry();
-  const absl::Status parsed = ParseCapabilities(EncodeCapabilities(device)).status();
-  EXPECT_EQ(parsed.code(), absl::StatusCode::kDataLoss);
-  EXPECT_NE(parsed.message().find("shape is 0; it must be 1 (planar stack) or 2 (rotor)"),
-            std::string::npos)
-      << parsed;
-  const FrameLayout layout{.slices = 1, .width = 2, .height = 1};
-  const absl::Status fits = CheckCapabilities(Planar(), LatticeGeometry(), layout);
-  EXPECT_EQ(fits.code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_NE(fits.message().find("a lattice of 1 slices of 2x1 pixels, which voxlink cannot"),
-            std::string::npos)
-      << fits;
-  // Nor is a device ever taken for one.
-  EXPECT_FALSE(CheckCapabilities(device, Planar().geometry, LayoutOf(Planar())).ok());
+  device.geometry = std::move(geometry);
+  return device;
+}
+
+TEST(Capabilities, EveryShapeGoesThereAndBack) {
+  Helix helix;
+  helix.slices_per_turn = 90;
+  helix.width_px = 20;
+  helix.height_px = 18;
+  helix.pitch_v_mm = 1.25;
+  helix.blades = 2;
+  helix.span_turns = 0.4;
+  helix.height_mm = 33;
+  helix.hub_mm = 2;
+  helix.radius_mm = 9;
+  helix.phase_turns = 0.125;
+  helix.left_handed = true;
+  helix.mirror_v = true;
+  PlanarStack strokes = std::get<PlanarStack>(Planar().geometry.shape);
+  strokes.strokes = 2;
+  strokes.positions_mm = {-1, 0, 2, 3, 0.5, -2};
+  Rotor tilted = std::get<Rotor>(RotorDevice().geometry.shape);
+  tilted.panels[1].tilt_deg = -12.7F;
+  for (const Geometry& geometry :
+       {Geometry{.shape = helix, .grid = {}}, Geometry{.shape = strokes, .grid = {}},
+        Geometry{.shape = tilted, .grid = {}}, LatticeGeometry()}) {
+    const auto block = EncodeCapabilities(With(geometry));
+    const auto parsed = ParseCapabilities(block);
+    ASSERT_TRUE(parsed.ok()) << parsed.status();
+    EXPECT_EQ(parsed->geometry, geometry);
+    EXPECT_EQ(EncodeCapabilities(*parsed), block);
+    EXPECT_EQ(CheckCapabilities(*parsed, geometry, LayoutOf(*parsed)), absl::OkStatus());
+    for (size_t size = 0; size < block.size(); ++size) {
+      EXPECT_FALSE(ParseCapabilities(std::span(block).first(size)).ok()) << size;
+    }
+  }
+}
+
+TEST(Capabilities, WhatIsWrongWithAShapeIsSaid) {
+  auto block = EncodeCapabilities(With(LatticeGeometry()));
+  block[64 + 4] = std::byte{3};  // lights
+  EXPECT_NE(ParseCapabilities(block).status().message().find("lights is 3; it must be 2"),
+            std::string::npos);
+  Helix helix;
+  helix.slices_per_turn = 9;
+  helix.width_px = helix.height_px = 4;
+  helix.blades = 3;
+  helix.span_turns = 0.5;
+  const absl::Status status =
+      ParseCapabilities(EncodeCapabilities(With({.shape = helix, .grid = {}}))).status();
+  EXPECT_NE(status.message().find("span_turns is 0.5"), std::string::npos) << status;
+  // Nor is one shape taken for another.
+  EXPECT_FALSE(
+      CheckCapabilities(With(LatticeGeometry()), Planar().geometry, LayoutOf(Planar())).ok());
 }
 
 }  // namespace

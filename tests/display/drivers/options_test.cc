@@ -1,5 +1,6 @@
 #include "display/drivers/options.h"
 
+#include <cmath>
 #include <map>
 #include <string>
 
@@ -35,6 +36,105 @@ TEST(Options, DefaultsAreAPlanarCube) {
   EXPECT_EQ(info->geometry.grid.nx, 128);
   EXPECT_EQ(info->geometry.grid.nz, 128);
   for (int c = 0; c < 256; ++c) EXPECT_EQ(info->tone.lut[static_cast<size_t>(c)], c * 257);
+}
+
+TEST(Options, StrokesAndMotions) {
+  const auto info = Read({{"size", "8x6x10"},
+                          {"motion", "sine"},
+                          {"travel_mm", "20"},
+                          {"dead_begin", "0.1"},
+                          {"strokes", "both"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  const auto& planar = std::get<PlanarStack>(info->geometry.shape);
+  EXPECT_EQ(planar.strokes, 2);
+  ASSERT_EQ(planar.positions_mm.size(), 20u);
+  EXPECT_NEAR(planar.positions_mm[0], -10 * std::cos(3.14159265358979 * (0.1 + 0.045)), 1e-6);
+  EXPECT_EQ(planar.positions_mm[10], -planar.positions_mm[0]);
+  EXPECT_EQ(info->layout.slices, 20);
+  EXPECT_NE(Refusal({{"motion", "sine"}, {"slice_pitch_mm", "2"}}).find("travel_mm says how far"),
+            std::string::npos);
+  EXPECT_NE(Refusal({{"travel_mm", "2"}}).find("left out where the motion is stepped"),
+            std::string::npos);
+  EXPECT_NE(Refusal({{"positions_mm", "1;2;2"}}).find("positions_mm[2] is 2"), std::string::npos);
+}
+
+TEST(Options, AHelix) {
+  const auto info = Read({{"geometry", "helix"},
+                          {"size", "40x30"},
+                          {"pitch_mm", "2"},
+                          {"slices", "60"},
+                          {"blades", "3"},
+                          {"hub_mm", "5"},
+                          {"travel_mm", "50"},
+                          {"left_handed", "true"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  const auto& helix = std::get<Helix>(info->geometry.shape);
+  EXPECT_EQ(helix.span_turns, 1.0 / 3);
+  EXPECT_EQ(helix.radius_mm, 30);
+  EXPECT_EQ(helix.height_mm, 50);
+  EXPECT_TRUE(helix.left_handed);
+  EXPECT_EQ(info->layout, (FrameLayout{.slices = 60, .width = 40, .height = 30}));
+  EXPECT_NE(Refusal({{"geometry", "helix"}, {"blades", "3"}, {"span", "0.5"}}).find("span_turns"),
+            std::string::npos);
+}
+
+TEST(Options, ALattice) {
+  const auto info = Read({{"geometry", "lattice"}, {"size", "4x3x2"}, {"pitch_mm", "10"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  const auto& lattice = std::get<Lattice>(info->geometry.shape);
+  EXPECT_EQ(lattice.width_px, 12);
+  ASSERT_EQ(lattice.points_mm.size(), 24u);
+  EXPECT_EQ(*lattice.points_mm[13], (Vec3{-5, -10, 5}));
+  EXPECT_EQ(info->geometry.grid.nx, 4);
+  const auto listed =
+      Read({{"geometry", "lattice"}, {"points_mm", "0;0;0;1;2;3;4;5;6"}, {"width", "2"}});
+  ASSERT_TRUE(listed.ok()) << listed.status();
+  EXPECT_EQ(std::get<Lattice>(listed->geometry.shape).points_mm[3], std::nullopt);
+  EXPECT_EQ(listed->layout.slices, 2);
+  EXPECT_NE(Refusal({{"geometry", "lattice"}, {"size", "100x100x5"}}).find("40000"),
+            std::string::npos);
+  std::string many = "0;0;0";
+  for (int i = 0; i < 2600; ++i) many += ";1;2;3";
+  EXPECT_NE(
+      Refusal({{"geometry", "lattice"}, {"points_mm", many}, {"width", "16384"}}).find("accepted"),
+      std::string::npos);
+  for (int i = 0; i < 40'000; ++i) many += ";1;2;3";
+  EXPECT_NE(Refusal({{"geometry", "lattice"}, {"points_mm", many}}).find("at most 40000"),
+            std::string::npos);
+}
+
+TEST(Options, PanelsTiltAndCorrections) {
+  const auto info = Read({{"geometry", "rotor"},
+                          {"size", "16x8"},
+                          {"slices", "40"},
+                          {"eccentricity", "2;0"},
+                          {"tilt", "10;-5"},
+                          {"panel_pitch_u_mm", "1;2"},
+                          {"mirror_u", "true;false"},
+                          {"affine", "1;0;0;0.5;0;1;0;0;0;0;1;0"},
+                          {"displacement_size", "2x2x2"},
+                          {"displacement_low_mm", "-9;-9;-9"},
+                          {"displacement_high_mm", "9;9;9"},
+                          {"displacement_mm", "0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;0;1;0;0"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  const auto& rotor = std::get<Rotor>(info->geometry.shape);
+  EXPECT_EQ(rotor.panels[0].tilt_deg, 10);
+  EXPECT_EQ(rotor.panels[1].pitch_u_mm, 2);
+  EXPECT_EQ(rotor.panels[1].pitch_v_mm, 1);
+  EXPECT_TRUE(rotor.panels[0].mirror_u);
+  EXPECT_FALSE(rotor.panels[1].mirror_u);
+  ASSERT_TRUE(info->geometry.correction.has_value());
+  EXPECT_EQ(info->geometry.correction->affine[3], 0.5);
+  EXPECT_EQ(info->geometry.correction->displacement->at_mm[7], (Vec3{1, 0, 0}));
+  const auto keystone = Read({{"size", "8x8x2"}, {"keystone_mm", "-4;-4;4;-4;3;4;-3;4"}});
+  ASSERT_TRUE(keystone.ok()) << keystone.status();
+  EXPECT_EQ(keystone->geometry.correction->homographies.size(), 1u);
+  EXPECT_NE(
+      Refusal({{"geometry", "rotor"}, {"keystone_mm", "1;2"}}).find("of a planar stack or a helix"),
+      std::string::npos);
+  EXPECT_NE(Refusal({{"affine", "1;2"}}).find("12 numbers"), std::string::npos);
+  EXPECT_NE(Refusal({{"geometry", "rotor"}, {"tilt", "80"}}).find("panels[0].tilt_deg is 80"),
+            std::string::npos);
 }
 
 TEST(Options, PlanarInFull) {
@@ -83,15 +183,16 @@ TEST(Options, RotorInFull) {
 }
 
 TEST(Options, RefusalsNameKeyValueAndWhatIsRight) {
-  EXPECT_EQ(Refusal({{"geometry", "helix"}}),
-            "display \"d\": geometry is \"helix\"; it must be one of planar, rotor");
+  EXPECT_EQ(Refusal({{"geometry", "cone"}}),
+            "display \"d\": geometry is \"cone\"; it must be one of planar, rotor, helix, lattice");
   EXPECT_EQ(Refusal({{"size", "12x0x4"}}),
             "display \"d\": size is \"12x0x4\"; it must be WxHxS, each from 1 to 16384");
   EXPECT_EQ(Refusal({{"rate", "nan"}}),
             "display \"d\": rate is \"nan\"; it must be a number from 0.5 to 10000");
   EXPECT_EQ(Refusal({{"sub_frames", "65"}}),
             "display \"d\": sub_frames is \"65\"; it must be a whole number from 1 to 64");
-  EXPECT_NE(Refusal({{"positions_mm", "1;0"}}).find("strictly ascending"), std::string::npos);
+  EXPECT_NE(Refusal({{"positions_mm", "1;0;0.5"}}).find("strictly within a stroke"),
+            std::string::npos);
   EXPECT_NE(Refusal({{"positions_mm", "1;;0"}}).find("numbers with ';'"), std::string::npos);
   EXPECT_NE(Refusal({{"size", "8x8x3"}, {"positions_mm", "0;1"}}).find("2 slices"),
             std::string::npos);
@@ -102,7 +203,9 @@ TEST(Options, RefusalsNameKeyValueAndWhatIsRight) {
   EXPECT_NE(Refusal({{"colour", "red"}}).find("there is no option colour (\"red\")"),
             std::string::npos);
   EXPECT_NE(Refusal({{"slices", "100"}}).find("there is no option slices"), std::string::npos);
-  EXPECT_NE(Refusal({{"size", "16384x16384x16384"}}).find("bytes; at most"), std::string::npos);
+  EXPECT_NE(Refusal({{"size", "16384x16384x16384"}}).find("at most 17179869184 pixels"),
+            std::string::npos);
+  EXPECT_NE(Refusal({{"size", "16384x16384x2"}}).find("bytes; at most"), std::string::npos);
 }
 
 TEST(Options, ToneCurve) {

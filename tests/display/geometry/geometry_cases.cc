@@ -92,6 +92,11 @@ std::vector<GeometryCase> StackCases() {
 
   cases.push_back(WithGrid("DenserThanVoxels", Stack(8, 8, EvenPositions(40, 0.23)),
                            CentredGrid(8, 8, 10, {1, 1, 1})));
+  PlanarStack strokes = Stack(11, 9, {4, 2.5, 1.25, 0, -2, -2, 0.5, 1, 3, 4.5});
+  strokes.strokes = 2;
+  cases.push_back(WithDefaultGrid("TwoStrokes", strokes));
+  cases.push_back(
+      WithGrid("Descending", Stack(10, 9, {6, 3, 2.5, -1, -4}), CentredGrid(10, 9, 13, {1, 1, 1})));
   PlanarStack single = Stack(12, 10, {2});
   single.thickness_mm = 5.3;
   cases.push_back(WithGrid("SingleSlice", single, CentredGrid(12, 10, 16, {1, 1, 1})));

@@ -17,6 +17,7 @@ std::vector<GeometryCase> StackCases();
 std::vector<GeometryCase> RotorCases();
 std::vector<GeometryCase> LatticeCases();  // lattice_cases.cc
 std::vector<GeometryCase> AllCases();
+std::vector<GeometryCase> FlatCases();  // flat_cases.cc; not among all
 
 // `count` positions, `spacing_mm` apart, about `middle_mm`.
 std::vector<double> EvenPositions(int count, double spacing_mm, double middle_mm = 0);

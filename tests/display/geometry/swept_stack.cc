@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "tests/display/geometry/swept_solid.h"
@@ -15,8 +16,10 @@ class SweptStack : public SweptSolid {
   SweptStack(const PlanarStack& stack, const VoxelGrid& grid) : stack_(stack), grid_(grid) {}
 
   Where Locate(const Vec3& point) const override {
-    const size_t last = stack_.positions_mm.size() - 1;
-    const Interval depth{Slab(0).low, Slab(last).high};
+    Interval depth = Slab(0);
+    for (size_t s = 0; s < stack_.positions_mm.size(); ++s) {
+      depth = {std::min(depth.low, Slab(s).low), std::max(depth.high, Slab(s).high)};
+    }
     const Interval u{-0.5 * stack_.width_px * stack_.pitch_u_mm,
                      0.5 * stack_.width_px * stack_.pitch_u_mm};
     const Interval v{-0.5 * stack_.height_px * stack_.pitch_v_mm,
@@ -60,8 +63,13 @@ class SweptStack : public SweptSolid {
     const bool shows_x = pixel.Holds(voxel.x, SlackX()) ||
                          std::abs(middle - voxel.x) <= 0.5 * grid_.pitch_mm.x + SlackX();
     Interval depth = Slab(s);
-    if (reach == 2 && s > 0) depth.low = stack_.positions_mm[s - 1];
-    if (reach == 2 && s + 1 < stack_.positions_mm.size()) depth.high = stack_.positions_mm[s + 1];
+    const size_t count = stack_.positions_mm.size() / static_cast<size_t>(stack_.strokes);
+    for (const size_t beside : {s - 1, s + 1}) {
+      if (reach < 2 || beside / count != s / count || beside >= stack_.positions_mm.size())
+        continue;
+      depth.low = std::min(depth.low, stack_.positions_mm[beside]);
+      depth.high = std::max(depth.high, stack_.positions_mm[beside]);
+    }
     const double half = 0.5 * Normal(grid_.pitch_mm) + SlackNormal();
     return shows_x && (depth.Holds(Normal(voxel), SlackNormal()) ||
                        std::abs(stack_.positions_mm[s] - Normal(voxel)) <= half);
@@ -96,9 +104,11 @@ class SweptStack : public SweptSolid {
   Interval Slab(size_t s) const {
     const std::vector<double>& p = stack_.positions_mm;
     if (p.size() == 1) return {p[0] - stack_.thickness_mm / 2, p[0] + stack_.thickness_mm / 2};
-    const double below = s > 0 ? p[s] - p[s - 1] : p[1] - p[0];
-    const double above = s + 1 < p.size() ? p[s + 1] - p[s] : p[s] - p[s - 1];
-    return {p[s] - below / 2, p[s] + above / 2};
+    const size_t count = p.size() / static_cast<size_t>(stack_.strokes);
+    const double before = s % count > 0 ? p[s] - p[s - 1] : p[s + 1] - p[s];
+    const double after = s % count + 1 < count ? p[s + 1] - p[s] : p[s] - p[s - 1];
+    const double a = p[s] - before / 2, b = p[s] + after / 2;
+    return {std::min(a, b), std::max(a, b)};
   }
 
   const PlanarStack stack_;

@@ -80,7 +80,8 @@ TEST(ValidateTest, Stacks) {
           {[](S& s, G&) { s.positions_mm[3] = kNan; }, {"positions_mm[3] is nan"}},
           {[](S& s, G&) { s.positions_mm[7] = 2e6; }, {"positions_mm[7] is 2e+06", "1e+06 mm"}},
           {[](S& s, G&) { s.positions_mm[2] = s.positions_mm[1]; },
-           {"positions_mm[2] is -2.5", "above positions_mm[1], -2.5", "ascend strictly"}},
+           {"positions_mm[2] is -2.5", "above positions_mm[1], -2.5",
+            "ascend or descend strictly within a stroke"}},
           {[](S& s, G&) { s.positions_mm[2] = s.positions_mm[1] + 1e-6; },
            {"positions_mm[2] − positions_mm[1] is 1e-06", "1/1024", "0.000976562 mm"}},
           {[](S& s, G&) { s.positions_mm = {0}, s.thickness_mm = 0; }, {"thickness_mm is 0"}},
@@ -231,6 +232,48 @@ TEST(ValidateTest, WhatIsAtTheLimitsIsBuilt) {
   std::get<Lattice>(lattice.shape).cell_mm = {1e4, 1e-4, 1e4};
   ASSERT_TRUE(ValidateGeometry(lattice).ok()) << ValidateGeometry(lattice);
   EXPECT_FALSE(BuildFootprints(lattice, Sampling::kMax).outer.entries.empty());
+}
+
+TEST(ValidateTest, Helices) {
+  Helix helix;
+  helix.slices_per_turn = 20;
+  helix.width_px = helix.height_px = 16;
+  helix.blades = 2;
+  helix.span_turns = 0.5;
+  helix.height_mm = 10;
+  helix.hub_mm = 1;
+  helix.radius_mm = 8;
+  Geometry good{helix, {}};
+  good.grid = DefaultGrid(good);
+  ExpectRefused<Helix>(
+      good,
+      {{[](Helix& h, VoxelGrid&) { h.slices_per_turn = 0; }, {"slices_per_turn is 0"}},
+       {[](Helix& h, VoxelGrid&) { h.blades = 11; }, {"blades is 11", "from 1 to 10"}},
+       {[](Helix& h, VoxelGrid&) { h.span_turns = 0.6; }, {"span_turns is 0.6", "1 / blades, 0.5"}},
+       {[](Helix& h, VoxelGrid&) { h.span_turns = 0.05; }, {"span_turns is 0.05", "from 0.1"}},
+       {[](Helix& h, VoxelGrid&) { h.height_mm = 0; }, {"height_mm is 0"}},
+       {[](Helix& h, VoxelGrid&) { h.hub_mm = 8; }, {"hub_mm is 8", "below radius_mm"}},
+       {[](Helix& h, VoxelGrid&) { h.radius_mm = NAN; }, {"radius_mm is nan"}},
+       {[](Helix& h, VoxelGrid&) { h.phase_turns = 1; }, {"phase_turns is 1"}},
+       {[](Helix& h, VoxelGrid&) { h.width_px = h.height_px = h.slices_per_turn = 1024; },
+        {"at most 134217728", "pixel by pixel"}}});
+}
+
+TEST(ValidateTest, TiltsAndAxes) {
+  Rotor rotor;
+  rotor.slices_per_turn = 16384;
+  rotor.width_px = 8;
+  rotor.height_px = 1;
+  rotor.panels.resize(16);
+  for (Rotor::Panel& panel : rotor.panels) panel.pitch_v_mm = 9000;
+  Geometry geometry{rotor, {1, 1, 16384, {1, 1, 0.5}, {-0.5, -0.5, -4096}}, Correction{}};
+  // Each of its voxels is on the axis, in every slice.
+  EXPECT_THAT(std::string(ValidateGeometry(geometry).message()),
+              testing::HasSubstr("the bound on the footprint table"));
+  rotor.panels.resize(1);
+  rotor.panels[0].tilt_deg = -61;
+  EXPECT_THAT(std::string(ValidateShape({rotor, {}}).message()),
+              testing::HasSubstr("panels[0].tilt_deg is -61"));
 }
 
 }  // namespace

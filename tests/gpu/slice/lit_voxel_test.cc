@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "display/geometry/footprint.h"
@@ -16,6 +17,7 @@
 #include "gpu/slice/quantize.h"
 #include "gpu/slice/weight.h"
 #include "tests/display/geometry/geometry_cases.h"
+#include "tests/display/geometry/swept_flat.h"
 #include "tests/display/geometry/swept_solid.h"
 
 namespace voxeld::gpu {
@@ -109,7 +111,10 @@ std::vector<uint32_t> LitVoxels(const display::FootprintTable& table, const LitB
         for (int32_t v = 0; v < table.height; ++v) {
           for (const FootprintEntry& i : table.Inner(slice, v)) {
             const size_t x = o.x + size_t{i.x}, y = o.y + size_t{i.y}, z = o.z + size_t{i.z};
-            lit.at((z * ny + y) * nx + x) |= lit_by.mask(FootprintWeight(o.weight, i.weight), u, v);
+            const int32_t row = table.flat_row;
+            lit.at((z * ny + y) * nx + x) |=
+                lit_by.mask(FootprintWeight(o.weight, i.weight), row == 0 ? u : u % row,
+                            row == 0 ? v : u / row);
           }
         }
       }
@@ -124,10 +129,15 @@ TEST_P(LitVoxelTest, EveryReachableVoxelOfFullWhiteLightsAPixel) {
   const std::vector<Finish> finishes = Finishes();
   const uint32_t all = (uint32_t{1} << finishes.size()) - 1;
   const LitBy lit_by(GetParam());
-  for (const display::GeometryCase& c : display::AllCases()) {
+  std::vector<display::GeometryCase> cases = display::AllCases();
+  const size_t products = cases.size();
+  for (display::GeometryCase& c : display::FlatCases()) cases.push_back(std::move(c));
+  for (const display::GeometryCase& c : cases) {
     SCOPED_TRACE(c.name);
     const display::VoxelGrid& grid = c.geometry.grid;
-    const auto solid = display::MakeSweptSolid(c.geometry);
+    const bool is_product = &c < &cases[products];
+    const auto solid = is_product ? display::MakeSweptSolid(c.geometry) : nullptr;
+    const display::SweptFlat flat(c.geometry);
     const std::vector<uint32_t> lit =
         LitVoxels(display::BuildFootprints(c.geometry, GetParam()), lit_by, grid);
     std::vector<int64_t> dark(finishes.size());
@@ -137,8 +147,10 @@ TEST_P(LitVoxelTest, EveryReachableVoxelOfFullWhiteLightsAPixel) {
       for (int32_t j = 0; j < grid.ny; ++j) {
         for (int32_t i = 0; i < grid.nx; ++i) {
           const uint32_t missing = all & ~lit[voxel++];
-          const auto where = solid->Locate(display::VoxelCentre(grid, i, j, k));
+          const display::Vec3 centre = display::VoxelCentre(grid, i, j, k);
+          const auto where = is_product ? solid->Locate(centre) : flat.Locate(centre);
           if (where != display::SweptSolid::Where::kInside) continue;
+          if (!is_product && flat.Doubtful(centre)) continue;
           ++reachable;
           for (size_t n = 0; n < finishes.size(); ++n) dark[n] += missing >> n & 1;
         }

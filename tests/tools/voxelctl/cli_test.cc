@@ -113,6 +113,8 @@ TEST(CommandLine, TheOthers) {
   EXPECT_EQ(std::get<PatternOptions>(Parse("pattern axes").command).pattern, v1::TEST_PATTERN_AXES);
   EXPECT_EQ(std::get<PatternOptions>(Parse("pattern none --display d").command).display, "d");
   EXPECT_TRUE(std::get<PatternOptions>(Parse("pattern list").command).list);
+  EXPECT_EQ(std::get<ProfileOptions>(Parse("profile check ./a.toml").command).profile, "./a.toml");
+  EXPECT_TRUE(std::get<ProfileOptions>(Parse("profile list").command).list);
   EXPECT_THAT(PatternNames(), ElementsAre("axes", "corners", "grid", "ramp", "white"));
 }
 
@@ -190,6 +192,9 @@ INSTANTIATE_TEST_SUITE_P(
               {"--owner is 18446744073709551616; an owner's number"}},
         Wrong{"clear --all --layer x", {"do not go together"}},
         Wrong{"pattern", {"pattern wants a name", "axes", "list"}},
+        Wrong{"profile", {"check PROFILE, or list"}},
+        Wrong{"profile chek x", {"the action chek is not known", "check"}},
+        Wrong{"profile check", {"profile check wants a PROFILE"}},
         Wrong{"pattern axs", {"did you mean axes?"}},
         Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
 

@@ -280,8 +280,9 @@ gpu::Target LatticeTarget(int32_t n) {
   return TargetOf(std::move(geometry), PixelFormat::kRgb888);
 }
 
-// Two panels of 128×64, 360 slices a turn, in 128×128×64 voxels that are all lit, also when they have moved.
-Scene LitRotor(uint64_t seed) {
+// Two panels of 128×64, 360 slices a turn, in 128×128×64 voxels that are all lit, also when they have moved. Where panels
+// are tilted footprints are kept pixel by pixel.
+Scene LitRotor(const char* name, float tilt_deg, uint64_t seed) {
   display::Rotor rotor;
   rotor.slices_per_turn = 360;
   rotor.width_px = 128;
@@ -289,8 +290,9 @@ Scene LitRotor(uint64_t seed) {
   rotor.panels.resize(2);
   rotor.panels[0].eccentricity_mm = 13.5;
   rotor.panels[1].eccentricity_mm = 0.375;
+  for (display::Rotor::Panel& panel : rotor.panels) panel.tilt_deg = tilt_deg;
   Scene scene = OneLayer(
-      "rotor", TargetOf({rotor, {128, 128, 64, {1, 1, 1}, {-64, -64, -32}}}, PixelFormat::kRgb332));
+      name, TargetOf({rotor, {128, 128, 64, {1, 1, 1}, {-64, -64, -32}}}, PixelFormat::kRgb332));
   for (size_t c = 0; c < 256; ++c) {
     scene.target.tone.lut[c] =
         static_cast<uint16_t>(std::lround(65535 * std::pow(static_cast<double>(c) / 255, 2.2)));
@@ -433,7 +435,11 @@ constexpr Named kScenes[] = {
      }},
     {"rotor",
      [](uint64_t seed, double) -> std::vector<MakeScene> {
-       return {[=] { return LitRotor(seed); }};
+       return {[=] { return LitRotor("rotor", 0, seed); }};
+     }},
+    {"tilted",
+     [](uint64_t seed, double) -> std::vector<MakeScene> {
+       return {[=] { return LitRotor("tilted", 10, seed); }};
      }},
 };
 

@@ -100,6 +100,7 @@ class Parser {
     AddClear();
     AddPattern();
     AddVerify();
+    AddProfile();
   }
 
   ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
@@ -269,6 +270,14 @@ class Parser {
         ->type_name("NAME");
   }
 
+  void AddProfile() {
+    CLI::App* c = Add("profile",
+                      "check: reads a display's description and says what it comes to, without a "
+                      "daemon. list: names those that are installed.");
+    c->add_option("ACTION", profile_action_, "check or list");
+    c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
+  }
+
   void AddVerify() {
     CLI::App* c = Add("verify", kVerifyAbout);
     c->add_option("DISPLAY", verify_.display, "[NAME=]DRIVER[,KEY=VALUE…]");
@@ -351,6 +360,7 @@ class Parser {
               : name == "gallery" ? &gallery_.file
               : name == "pattern" ? &pattern_name_
               : name == "verify"  ? &verify_.display
+              : name == "profile" ? &profile_.profile
                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "gallery") {
@@ -361,6 +371,7 @@ class Parser {
     }
     if (name == "pattern") return FillInPattern();
     if (name == "verify") return FillInVerify();
+    if (name == "profile") return FillInProfile();
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "watch") options_.command = watch_;
@@ -426,6 +437,21 @@ class Parser {
     options_.command = pattern_;
   }
 
+  void FillInProfile() {
+    if (profile_action_.empty()) {
+      throw UsageError{"profile wants to know what to do: check PROFILE, or list"};
+    }
+    profile_.list =
+        Choose("the action", profile_action_, Choices<bool>{{"check", false}, {"list", true}});
+    if (!profile_.list && profile_.profile.empty()) {
+      throw UsageError{"profile check wants a PROFILE: a path such as ./rotor.toml, or a name"};
+    }
+    if (profile_.list && !profile_.profile.empty()) {
+      throw UsageError{"profile list takes no PROFILE"};
+    }
+    options_.command = profile_;
+  }
+
   void FillInVerify() {
     if (verify_.display.empty()) {
       throw UsageError{
@@ -455,6 +481,8 @@ class Parser {
   ClearOptions clear_;
   PatternOptions pattern_;
   VerifyOptions verify_;
+  ProfileOptions profile_;
+  std::string profile_action_;
   std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
   double duration_ = std::nan("");
 };

@@ -84,12 +84,17 @@ struct VerifyOptions {
   double wait_s = 0;  // for the device to be attached
 };
 
+struct ProfileOptions {
+  bool list = false;    // else check
+  std::string profile;  // a name or a path
+};
+
 struct Options {
   std::string server;  // empty: see ChooseServer
   bool json = false;
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
-               VerifyOptions>
+               VerifyOptions, ProfileOptions>
       command;
 };
 

@@ -5,100 +5,14 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "display/geometry/limits.h"
+#include "daemon/geometry_wire/geometry_wire.h"
 #include "tools/voxelctl/render/render_volume.h"
 
 namespace voxeld::voxelctl {
-namespace {
-
-display::Vec3 FromWire(const v1::Vec3& in) { return {in.x(), in.y(), in.z()}; }
-
-display::PlanarStack FromWire(const v1::PlanarStack& in) {
-  display::PlanarStack out;
-  out.normal = in.normal() == v1::PlanarStack::Y ? display::PlanarStack::Normal::kY
-                                                 : display::PlanarStack::Normal::kZ;
-  out.width_px = in.width_px();
-  out.height_px = in.height_px();
-  out.pitch_u_mm = in.pitch_u_mm();
-  out.pitch_v_mm = in.pitch_v_mm();
-  out.positions_mm.assign(in.positions_mm().begin(), in.positions_mm().end());
-  out.thickness_mm = in.thickness_mm();
-  out.mirror_u = in.mirror_u();
-  out.mirror_v = in.mirror_v();
-  return out;
-}
-
-display::Rotor FromWire(const v1::Rotor& in) {
-  display::Rotor out;
-  out.slices_per_turn = in.slices_per_turn();
-  out.width_px = in.width_px();
-  out.height_px = in.height_px();
-  out.clockwise = in.clockwise();
-  for (const v1::Rotor::Panel& panel : in.panels()) {
-    out.panels.push_back({panel.pitch_u_mm(), panel.pitch_v_mm(), panel.eccentricity_mm(),
-                          panel.shift_u_mm(), panel.shift_v_mm(), panel.phase_turns(),
-                          panel.mirror_u(), panel.mirror_v()});
-  }
-  return out;
-}
-
-// Looks at sizes before it takes memory: a short message may name many pixels without a light.
-absl::StatusOr<display::Lattice> FromWire(const v1::Lattice& in) {
-  const int64_t pixels = int64_t{in.slices()} * in.width_px();
-  const int lights = in.pixels_size();
-  if (in.width_px() < 1 || in.slices() < 1 || pixels > display::kMaxLatticePixels) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the server sent a lattice of ", in.slices(), " slices of ", in.width_px(),
-                     " pixels; at most ", display::kMaxLatticePixels, " together are taken"));
-  }
-  if (in.x_mm_size() != lights || in.y_mm_size() != lights || in.z_mm_size() != lights) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "the server sent a lattice of ", lights, " lights with ", in.x_mm_size(), ", ",
-        in.y_mm_size(), " and ", in.z_mm_size(), " coordinates; each has one along x, y and z"));
-  }
-  display::Lattice out;
-  out.width_px = in.width_px();
-  out.cell_mm = FromWire(in.cell_mm());
-  out.points_mm.resize(static_cast<size_t>(pixels));
-  for (int n = 0; n < lights; ++n) {
-    if (in.pixels(n) >= pixels) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "the server sent a lattice of ", pixels, " pixels with a light in pixel ", in.pixels(n)));
-    }
-    out.points_mm[in.pixels(n)] = {in.x_mm(n), in.y_mm(n), in.z_mm(n)};
-  }
-  return out;
-}
-
-}  // namespace
-
-absl::StatusOr<display::Geometry> GeometryFromWire(const v1::Geometry& in) {
-  display::Geometry out;
-  switch (in.shape_case()) {
-    case v1::Geometry::kPlanarStack:
-      out.shape = FromWire(in.planar_stack());
-      break;
-    case v1::Geometry::kRotor:
-      out.shape = FromWire(in.rotor());
-      break;
-    case v1::Geometry::kLattice: {
-      absl::StatusOr<display::Lattice> lattice = FromWire(in.lattice());
-      if (!lattice.ok()) return lattice.status();
-      out.shape = *std::move(lattice);
-      break;
-    }
-    case v1::Geometry::SHAPE_NOT_SET:
-      return absl::InvalidArgumentError(
-          "the display's geometry is of a kind that this voxelctl does not know");
-  }
-  out.grid = {in.grid().nx(), in.grid().ny(), in.grid().nz(), FromWire(in.grid().pitch_mm()),
-              FromWire(in.grid().origin_mm())};
-  return out;
-}
 
 absl::Status CapturedVolume::Begin(const v1::VolumeHeader& header) {
   if (begun_) return absl::InvalidArgumentError("the server sent two volumes");
-  absl::StatusOr<display::Geometry> geometry = GeometryFromWire(header.geometry());
+  absl::StatusOr<display::Geometry> geometry = daemon::wire::FromWire(header.geometry());
   if (!geometry.ok()) return geometry.status();
   const v1::FrameLayout& layout = header.layout();
   // Each is at most 2¹⁴ by the displays' own limits, with room for panels;

@@ -10,9 +10,6 @@
 
 namespace voxeld::voxelctl {
 
-// InvalidArgument for a shape that is not set or has sizes beyond reason.
-absl::StatusOr<display::Geometry> GeometryFromWire(const v1::Geometry& in);
-
 // A header first, then slices in any order, each once or more. Not thread-safe.
 class CapturedVolume {
  public:

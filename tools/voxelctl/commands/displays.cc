@@ -26,6 +26,9 @@ std::string ShapeText(const v1::Geometry& geometry) {
     case v1::Geometry::kLattice:
       return absl::StrCat("lattice, ", geometry.lattice().pixels_size(),
                           geometry.lattice().pixels_size() == 1 ? " light" : " lights");
+    case v1::Geometry::kHelix:
+      return absl::StrCat("helix, ", geometry.helix().blades(),
+                          geometry.helix().blades() == 1 ? " blade" : " blades");
     case v1::Geometry::SHAPE_NOT_SET:
       return "unknown";
   }

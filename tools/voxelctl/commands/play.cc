@@ -73,7 +73,8 @@ absl::StatusOr<DisplaySpace> CommonSpace(std::span<const v1::DisplayDescription*
     std::copy(display->scene_to_voxel().m().begin(), display->scene_to_voxel().m().end(), view.m);
     const v1::VoxelGrid& grid = display->geometry().grid();
     absl::StatusOr<DisplaySpace> space =
-        VisibleSpace(grid.nx(), grid.ny(), grid.nz(), view, display->geometry().has_rotor());
+        VisibleSpace(grid.nx(), grid.ny(), grid.nz(), view,
+                     display->geometry().has_rotor() || display->geometry().has_helix());
     if (!space.ok()) return space.status();
     common = common ? Intersection(*common, *space) : *space;
   }

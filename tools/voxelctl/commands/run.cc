@@ -2,6 +2,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/profile/profile.h"
 #include "tools/voxelctl/verify/verify.h"
 
 namespace voxeld::voxelctl {
@@ -20,6 +21,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   }
   if (const auto* verify = std::get_if<VerifyOptions>(&options.command))
     return Verify(*verify, interrupt, console);
+  if (const auto* profile = std::get_if<ProfileOptions>(&options.command))
+    return ShowProfile(*profile, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
   if (!connected.ok()) return connected.status();
   Connection& connection = **connected;
@@ -51,6 +54,10 @@ int ExitCode(const Options& options, const absl::Status& status) {
   if (std::holds_alternative<VerifyOptions>(options.command)) {
     if (absl::IsInvalidArgument(status)) return kExitUsage;
     if (absl::IsUnavailable(status)) return kExitNoDevice;
+  }
+  if (std::holds_alternative<ProfileOptions>(options.command) &&
+      (absl::IsInvalidArgument(status) || absl::IsNotFound(status))) {
+    return kExitUsage;
   }
   return kExitFailure;
 }

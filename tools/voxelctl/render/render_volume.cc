@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "display/geometry/corrector.h"
+#include "display/geometry/flat_footprints.h"
 #include "display/geometry/footprint.h"
 #include "tools/voxelctl/render/canvas.h"
 
@@ -66,7 +68,10 @@ std::vector<Edge> Outline(const display::Geometry& geometry) {
   const Vec3 low = grid.origin_mm;
   const Vec3 high =
       Plus(low, {grid.nx * grid.pitch_mm.x, grid.ny * grid.pitch_mm.y, grid.nz * grid.pitch_mm.z});
-  if (!std::holds_alternative<display::Rotor>(geometry.shape)) return BoxOutline(low, high);
+  if (!std::holds_alternative<display::Rotor>(geometry.shape) &&
+      !std::holds_alternative<display::Helix>(geometry.shape)) {
+    return BoxOutline(low, high);
+  }
   return CylinderOutline(std::min(high.x - low.x, high.y - low.y) / 2, low.z, high.z);
 }
 
@@ -75,6 +80,7 @@ int32_t Neighbour(const display::Geometry& geometry, int32_t slice, int32_t slic
   if (const auto* rotor = std::get_if<display::Rotor>(&geometry.shape)) {
     return (slice + static_cast<int32_t>(rotor->panels.size())) % slices;
   }
+  if (std::holds_alternative<display::Helix>(geometry.shape)) return (slice + 1) % slices;
   return slice + 1 < slices ? slice + 1 : std::max(slice - 1, 0);
 }
 
@@ -96,12 +102,52 @@ class Painter {
     const std::array<Vec3, 3> axes = {camera_.Rotate({radius, 0, 0}),
                                       camera_.Rotate({0, radius, 0}),
                                       camera_.Rotate({0, 0, radius})};
+    const display::Corrector corrector(volume_.geometry.correction);
     for (int32_t slice = 0; slice < volume_.slices; ++slice) {
       for (int32_t u = 0; u < volume_.width; ++u) {
         const uint8_t* pixel = volume_.pixel(slice, u, 0);
-        const Vec3 at = display::PixelPosition(volume_.geometry, slice, u, 0);
-        if ((pixel[0] | pixel[1] | pixel[2]) == 0 || std::isnan(at.x)) continue;
+        if ((pixel[0] | pixel[1] | pixel[2]) == 0) continue;
+        const Vec3 at = display::PixelPosition(volume_.geometry, corrector, slice, u, 0);
+        if (std::isnan(at.x)) continue;
         PaintCell(camera_.ToCamera(at), axes, pixel, 1);
+      }
+    }
+  }
+
+  // Pixels that lie in no straight columns: each by itself, as far as half-way to its neighbours.
+  void PaintPixels(int32_t slice) {
+    const display::Geometry& geometry = volume_.geometry;
+    const display::Corrector corrector(geometry.correction);
+    const int32_t beside = Neighbour(geometry, slice, volume_.slices);
+    const Vec3& pitch = geometry.grid.pitch_mm;
+    const double widest = std::max({pitch.x, pitch.y, pitch.z}), far = 4 * widest * widest;
+    const auto next = [](int32_t i, int32_t count) {
+      return i + 1 < count ? i + 1 : std::max(i - 1, 0);
+    };
+    for (int32_t v = 0; v < volume_.height; ++v) {
+      for (int32_t u = 0; u < volume_.width; ++u) {
+        const uint8_t* pixel = volume_.pixel(slice, u, v);
+        if ((pixel[0] | pixel[1] | pixel[2]) == 0) continue;
+        const Vec3 at = display::PixelPosition(geometry, corrector, slice, u, v);
+        if (std::isnan(at.x)) continue;
+        const auto half_way = [&](int32_t s, int32_t i, int32_t j) {
+          const Vec3 to = display::PixelPosition(geometry, corrector, s, i, j);
+          return std::isnan(to.x) ? Vec3{} : Times(Minus(to, at), 0.5);
+        };
+        std::array<Vec3, 3> axes = {half_way(slice, next(u, volume_.width), v),
+                                    half_way(slice, u, next(v, volume_.height)),
+                                    half_way(beside, u, v)};
+        // Where a blade begins anew its neighbours are far away.
+        for (Vec3& axis : axes) {
+          if (Length2(axis) > far) axis = {};
+        }
+        // Where slices crowd, near a rotor's axis, each counts for less of the glow.
+        const double crowding = std::sqrt(Length2(axes[2]) / std::max(Length2(axes[0]), 1e-18));
+        const bool crowds =
+            std::holds_alternative<display::Rotor>(geometry.shape) && beside != slice;
+        const auto weight = static_cast<float>(crowds ? std::clamp(crowding, 0.05, 1.0) : 1);
+        for (Vec3& axis : axes) axis = camera_.Rotate(Times(axis, kCellSize));
+        PaintCell(camera_.ToCamera(at), axes, pixel, weight);
       }
     }
   }
@@ -250,6 +296,8 @@ Image RenderVolume(const Volume& volume, const RenderOptions& options) {
   Painter painter(volume, camera, &canvas);
   if (const auto* lattice = std::get_if<display::Lattice>(&volume.geometry.shape)) {
     painter.PaintLights(*lattice);
+  } else if (display::IsFlat(volume.geometry)) {
+    for (int32_t slice = 0; slice < volume.slices; ++slice) painter.PaintPixels(slice);
   } else {
     for (int32_t slice = 0; slice < volume.slices; ++slice) {
       for (int32_t u = 0; u < volume.width; ++u) painter.PaintColumn(slice, u);

@@ -1,0 +1,112 @@
+#include "display/profiles/profile.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "display/profiles/toml_options.h"
+
+namespace voxeld::display {
+namespace {
+
+constexpr const char* kEnding = ".toml";
+
+std::string ProgramFolder() {
+  std::error_code error;
+  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path().string();
+}
+
+}  // namespace
+
+absl::StatusOr<Profile> ReadProfile(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(absl::StrCat("there is no file ", path));
+  }
+  toml::table root;
+  try {
+    root = toml::parse_file(path);
+  } catch (const toml::parse_error& wrong) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ":", wrong.source().begin.line, ":",
+                                                   wrong.source().begin.column, ": ",
+                                                   std::string(wrong.description())));
+  }
+  Profile profile;
+  for (const auto& [key, node] : root) {
+    const std::string name(key.str());
+    const std::optional<std::string> value = OptionText(node);
+    if (!value.has_value() || name == "name" || name == "profile") {
+      return absl::InvalidArgumentError(absl::StrCat(
+          path, ":", node.source().begin.line, ":", node.source().begin.column, ": ", name,
+          value.has_value() ? " has no place in a profile: it is given where the display is"
+                            : " is no text, number, boolean, or array of these"));
+    }
+    if (name == "title") {
+      profile.title = *value;
+    } else if (name == "driver") {
+      profile.driver = *value;
+    } else {
+      profile.options.emplace(name, *value);
+    }
+  }
+  return profile;
+}
+
+std::vector<std::string> ProfilePlaces(const std::function<std::string(const char*)>& environment,
+                                       const std::string& program_folder) {
+  std::vector<std::string> places;
+  if (std::string named = environment("VOXELD_PROFILES"); !named.empty()) places.push_back(named);
+  if (!program_folder.empty()) places.push_back(program_folder + "/../share/voxeld/profiles");
+  places.emplace_back("/usr/share/voxeld/profiles");
+  return places;
+}
+
+std::vector<std::string> ProfilesIn(const std::string& place) {
+  std::vector<std::string> names;
+  std::error_code error;
+  std::filesystem::directory_iterator entry(place, error);
+  for (const std::filesystem::directory_iterator end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == kEnding) names.push_back(entry->path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+absl::StatusOr<std::string> FindProfile(const std::string& name,
+                                        const std::vector<std::string>& places) {
+  if (absl::StrContains(name, "/") || absl::EndsWith(name, kEnding)) return name;
+  std::set<std::string> known;
+  for (const std::string& place : places) {
+    std::error_code error;
+    const std::filesystem::path path = std::filesystem::path(place) / (name + kEnding);
+    if (std::filesystem::is_regular_file(path, error)) return path.string();
+    for (std::string& one : ProfilesIn(place)) known.insert(std::move(one));
+  }
+  return absl::NotFoundError(
+      absl::StrCat("there is no profile \"", name, "\" in ", absl::StrJoin(places, ", "),
+                   known.empty() ? "; give a path, as ./rotor.toml"
+                                 : absl::StrCat("; there are ", absl::StrJoin(known, ", "),
+                                                ", or give a path, as ./rotor.toml")));
+}
+
+absl::StatusOr<Profile> LoadProfile(const std::string& name) {
+  const auto environment = [](const char* variable) -> std::string {
+    const char* const value = std::getenv(variable);
+    return value != nullptr ? value : "";
+  };
+  const absl::StatusOr<std::string> path =
+      FindProfile(name, ProfilePlaces(environment, ProgramFolder()));
+  if (!path.ok()) return path.status();
+  return ReadProfile(*path);
+}
+
+}  // namespace voxeld::display
