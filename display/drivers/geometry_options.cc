@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "display/geometry/corrector.h"
 #include "display/geometry/keystone.h"
 #include "display/geometry/motion.h"
 
@@ -196,19 +197,6 @@ Geometry ReadLattice(OptionReader& reader, double pitch) {
     }
   }
   return {.shape = std::move(lattice), .grid = {}, .correction = {}};
-}
-
-// Half the sides of a picture, mm; none: pictures are not projected.
-std::optional<PicturePlace> HalfPicture(const Geometry& geometry) {
-  if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
-    return PicturePlace{stack->width_px * stack->pitch_u_mm / 2,
-                        stack->height_px * stack->pitch_v_mm / 2};
-  }
-  if (const auto* helix = std::get_if<Helix>(&geometry.shape)) {
-    return PicturePlace{helix->width_px * helix->pitch_u_mm / 2,
-                        helix->height_px * helix->pitch_v_mm / 2};
-  }
-  return std::nullopt;
 }
 
 void ReadKeystone(OptionReader& reader, const Geometry& geometry, Correction& correction) {

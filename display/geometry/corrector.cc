@@ -141,11 +141,7 @@ absl::Status CheckDisplacement(const Correction& correction) {
                             ": measure at more places, or put what is common into affine"));
 }
 
-struct Extent {
-  double u, v;  // half the picture's sides, mm
-};
-
-absl::Status CheckHomography(const std::string& field, const Homography& h, Extent half) {
+absl::Status CheckHomography(const std::string& field, const Homography& h, PicturePlace half) {
   for (const double m : h.m) {
     if (!std::isfinite(m)) return Wrong(field, absl::StrCat(m), "of finite numbers");
   }
@@ -240,6 +236,18 @@ PicturePlace Corrector::PictureToNominal(int32_t slice, PicturePlace place) cons
   return homographies_.empty() ? place : Of(inverse_homographies_, slice).At(place);
 }
 
+std::optional<PicturePlace> HalfPicture(const Geometry& geometry) {
+  if (const auto* stack = std::get_if<PlanarStack>(&geometry.shape)) {
+    return PicturePlace{stack->width_px * stack->pitch_u_mm / 2,
+                        stack->height_px * stack->pitch_v_mm / 2};
+  }
+  if (const auto* helix = std::get_if<Helix>(&geometry.shape)) {
+    return PicturePlace{helix->width_px * helix->pitch_u_mm / 2,
+                        helix->height_px * helix->pitch_v_mm / 2};
+  }
+  return std::nullopt;
+}
+
 absl::Status CheckCorrection(const Geometry& geometry) {
   if (!geometry.correction.has_value()) return absl::OkStatus();
   const Correction& correction = *geometry.correction;
@@ -248,9 +256,8 @@ absl::Status CheckCorrection(const Geometry& geometry) {
     if (absl::Status status = CheckDisplacement(correction); !status.ok()) return status;
   }
   if (correction.homographies.empty()) return absl::OkStatus();
-  const auto* const stack = std::get_if<PlanarStack>(&geometry.shape);
-  const auto* const helix = std::get_if<Helix>(&geometry.shape);
-  if (stack == nullptr && helix == nullptr) {
+  const std::optional<PicturePlace> half = HalfPicture(geometry);
+  if (!half.has_value()) {
     return Wrong("the number of homographies", absl::StrCat(correction.homographies.size()),
                  "0: only a planar stack and a helix have projected pictures");
   }
@@ -260,13 +267,9 @@ absl::Status CheckCorrection(const Geometry& geometry) {
     return Wrong("the number of homographies", absl::StrCat(count),
                  absl::StrCat("1, or one for each of the ", slices, " slices"));
   }
-  const Extent half = stack != nullptr ? Extent{stack->width_px * stack->pitch_u_mm / 2,
-                                                stack->height_px * stack->pitch_v_mm / 2}
-                                       : Extent{helix->width_px * helix->pitch_u_mm / 2,
-                                                helix->height_px * helix->pitch_v_mm / 2};
   for (size_t i = 0; i < count; ++i) {
     const absl::Status status =
-        CheckHomography(absl::StrCat("homographies[", i, "]"), {correction.homographies[i]}, half);
+        CheckHomography(absl::StrCat("homographies[", i, "]"), {correction.homographies[i]}, *half);
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

@@ -1,4 +1,5 @@
-// A display's correction as maps: the nominal place of what its shape says, the true one of its light.
+// A display's correction as maps: the nominal place of what its shape says, the true one of its
+// light.
 #pragma once
 
 #include <array>
@@ -38,6 +39,9 @@ class Corrector {
   std::optional<DisplacementGrid> displacement_;
   std::vector<Homography> homographies_, inverse_homographies_;
 };
+
+// Half the sides of a shape's pictures, mm; none: it has no projected pictures.
+std::optional<PicturePlace> HalfPicture(const Geometry& geometry);
 
 // InvalidArgument with the first field of a geometry's correction that is wrong. Its shape is valid.
 absl::Status CheckCorrection(const Geometry& geometry);

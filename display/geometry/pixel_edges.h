@@ -20,14 +20,14 @@ class PixelEdges {
       edges_.push_back(ToFixed(row.PositionMm(2 * place) - origin_mm, unit_mm));
     }
   }
-  // The pixel with edge ≤ at < next edge.
-  std::optional<int32_t> PixelAt(std::optional<Fixed> at) const {
-    return at.has_value() ? PixelAt(*at) : std::nullopt;
-  }
+  // The pixel with edge ≤ at < next edge; none beyond the row's ends, and of no place.
   std::optional<int32_t> PixelAt(Fixed at) const {
     const auto above = std::upper_bound(edges_.begin(), edges_.end(), at);
     if (above == edges_.begin() || above == edges_.end()) return std::nullopt;
     return row_.Place(static_cast<int32_t>(above - edges_.begin()) - 1);
+  }
+  std::optional<int32_t> PixelAt(std::optional<Fixed> at) const {
+    return at.has_value() ? PixelAt(*at) : std::nullopt;
   }
 
  private:

@@ -19,11 +19,6 @@ namespace {
 
 constexpr const char* kEnding = ".toml";
 
-std::string ProgramFolder() {
-  std::error_code error;
-  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path().string();
-}
-
 }  // namespace
 
 absl::StatusOr<Profile> ReadProfile(const std::string& path) {
@@ -69,6 +64,16 @@ std::vector<std::string> ProfilePlaces(const std::function<std::string(const cha
   return places;
 }
 
+std::vector<std::string> ProfilePlaces() {
+  const auto environment = [](const char* variable) -> std::string {
+    const char* const value = std::getenv(variable);
+    return value != nullptr ? value : "";
+  };
+  std::error_code error;
+  return ProfilePlaces(
+      environment, std::filesystem::read_symlink("/proc/self/exe", error).parent_path().string());
+}
+
 std::vector<std::string> ProfilesIn(const std::string& place) {
   std::vector<std::string> names;
   std::error_code error;
@@ -99,12 +104,7 @@ absl::StatusOr<std::string> FindProfile(const std::string& name,
 }
 
 absl::StatusOr<Profile> LoadProfile(const std::string& name) {
-  const auto environment = [](const char* variable) -> std::string {
-    const char* const value = std::getenv(variable);
-    return value != nullptr ? value : "";
-  };
-  const absl::StatusOr<std::string> path =
-      FindProfile(name, ProfilePlaces(environment, ProgramFolder()));
+  const absl::StatusOr<std::string> path = FindProfile(name, ProfilePlaces());
   if (!path.ok()) return path.status();
   return ReadProfile(*path);
 }

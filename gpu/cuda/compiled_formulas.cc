@@ -21,7 +21,7 @@ CompiledFormulas::~CompiledFormulas() {
   if (thread_.joinable()) thread_.join();
   if (loaded_ != 0) cudaDeviceSynchronize();  // they may be at work
   for (const auto& [key, formula] : formulas_) {
-    if (formula.library != nullptr) cudaLibraryUnload(formula.library);
+    if (formula.code != nullptr) cudaLibraryUnload(formula.code);
   }
 }
 
@@ -87,11 +87,11 @@ absl::Status CompiledFormulas::Forget() {
     if (oldest == formulas_.end() || it->second.asked < oldest->second.asked) oldest = it;
   }
   if (oldest == formulas_.end()) return absl::OkStatus();
-  if (cudaLibrary_t library = oldest->second.library; library != nullptr) {
+  if (cudaLibrary_t code = oldest->second.code; code != nullptr) {
     absl::Status status =
         api_.Call("cudaDeviceSynchronize", [] { return cudaDeviceSynchronize(); });
     if (!status.ok()) return status;
-    cudaLibraryUnload(library);
+    cudaLibraryUnload(code);
   }
   formulas_.erase(oldest);
   return absl::OkStatus();
@@ -121,10 +121,10 @@ absl::Status CompiledFormulas::Load(Formula& formula, const absl::StatusOr<std::
   formula.state = State::kNone;
   if (!module.ok()) return absl::OkStatus();
   const absl::Status status = api_.Call("cudaLibraryLoadData", [&] {
-    cudaError_t error = cudaLibraryLoadData(&formula.library, module->data(), nullptr, nullptr, 0,
+    cudaError_t error = cudaLibraryLoadData(&formula.code, module->data(), nullptr, nullptr, 0,
                                             nullptr, nullptr, 0);
     if (error == cudaSuccess) {
-      error = cudaLibraryGetKernel(&formula.kernel, formula.library, kFormulaKernel);
+      error = cudaLibraryGetKernel(&formula.kernel, formula.code, kFormulaKernel);
     }
     // Modules may be brought to the device as late as they are asked for something.
     cudaFuncAttributes attributes;
@@ -135,8 +135,8 @@ absl::Status CompiledFormulas::Load(Formula& formula, const absl::StatusOr<std::
       return cudaSuccess;
     }
     cudaGetLastError();
-    if (formula.library != nullptr) cudaLibraryUnload(formula.library);
-    formula.library = nullptr;
+    if (formula.code != nullptr) cudaLibraryUnload(formula.code);
+    formula.code = nullptr;
     formula.kernel = nullptr;
     return cudaSuccess;
   });

@@ -57,7 +57,7 @@ class CompiledFormulas {
   enum class State : uint8_t { kSeen, kAsked, kLoaded, kNone };
   struct Formula {
     State state = State::kSeen;
-    cudaLibrary_t library = nullptr;
+    cudaLibrary_t code = nullptr;
     cudaKernel_t kernel = nullptr;
     uint64_t asked = 0;  // when last, by asked_
   };

@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -16,54 +15,11 @@
 #include "absl/strings/str_split.h"
 #include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/cli/about.h"
+#include "tools/voxelctl/cli/argument_checks.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {
-
-struct UsageError {
-  std::string message;
-};
-
-template <typename T>
-using Choices = std::vector<std::pair<std::string, T>>;
-
-template <typename T>
-T Choose(const char* option, const std::string& value, const Choices<T>& choices) {
-  std::vector<std::string> names;
-  for (const auto& [name, result] : choices) {
-    if (name == value) return result;
-    names.push_back(name);
-  }
-  throw UsageError{absl::StrCat(option, " ", EscapeForTerminal(value), " is not known",
-                                Suggestion(value, names))};
-}
-
-void CheckRange(const char* option, double value, double least, double most) {
-  if (value >= least && value <= most) return;
-  throw UsageError{absl::StrCat(option, " is ", value, "; ", least, " to ", most, " is expected")};
-}
-
-// Has CLI11 refuse, before it converts, a text that is no number from `least` to `most`.
-void WantNumber(CLI::Option* option, double least, double most) {
-  option->check([option, least, most](const std::string& text) {
-    double value = 0;
-    const bool spaced = text != absl::StripAsciiWhitespace(text);
-    if (!spaced && absl::SimpleAtod(text, &value) && value >= least && value <= most) return "";
-    throw UsageError{absl::StrCat(option->get_name(), " is ", EscapeForTerminal(text),
-                                  "; a number from ", least, " to ", most, " is expected")};
-  });
-}
-
-// A name that promises another format than PNG would be a lie.
-void CheckPictureName(const std::string& file) {
-  std::filesystem::path path(file);
-  const std::string extension = path.extension().string();
-  if (extension.empty() || absl::EqualsIgnoreCase(extension, ".png")) return;
-  throw UsageError{absl::StrCat("the picture's name ", EscapeForTerminal(file), " ends in ",
-                                EscapeForTerminal(extension), "; snapshot writes PNG: name it ",
-                                EscapeForTerminal(path.replace_extension(".png").string()))};
-}
 
 const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
 const Choices<FillStyle> kFills = {

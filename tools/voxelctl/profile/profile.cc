@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -128,14 +125,7 @@ absl::StatusOr<display::DisplayInfo> InfoOf(const std::string& name,
 
 absl::Status List(Console& console) {
   std::map<std::string, std::string> titles;
-  const auto environment = [](const char* name) -> std::string {
-    const char* const value = std::getenv(name);
-    return value != nullptr ? value : "";
-  };
-  std::error_code error;
-  const std::string folder =
-      std::filesystem::read_symlink("/proc/self/exe", error).parent_path().string();
-  for (const std::string& place : display::ProfilePlaces(environment, folder)) {
+  for (const std::string& place : display::ProfilePlaces()) {
     for (const std::string& name : display::ProfilesIn(place)) {
       const auto path = display::FindProfile(name, {place});
       const auto profile = path.ok() ? display::ReadProfile(*path) : path.status();
