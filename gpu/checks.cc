@@ -35,10 +35,9 @@ absl::Status CheckLayout(const Target& target) {
   if (layout.sub_frames < 1 || layout.sub_frames > 64) {
     return Wrong("layout.sub_frames", layout.sub_frames, "1 to 64");
   }
-  if (layout.format > display::PixelFormat::kBitPlanes3) {
-    return Wrong("layout.format", static_cast<int>(layout.format), "0 to 2");
-  }
-  return absl::OkStatus();
+  absl::Status format = display::ValidateFormat(layout);
+  return format.ok() ? format
+                     : absl::InvalidArgumentError(absl::StrCat("target: ", format.message()));
 }
 
 }  // namespace
@@ -46,9 +45,15 @@ absl::Status CheckLayout(const Target& target) {
 absl::Status CheckTarget(const Target& target, SlicePart part) {
   if (absl::Status status = display::ValidateGeometry(target.geometry); !status.ok()) return status;
   if (absl::Status status = CheckLayout(target); !status.ok()) return status;
-  if (target.tone.lut[0] != 0) return Wrong("tone.lut[0]", target.tone.lut[0], "0");
-  if (target.tone.dither > display::Dither::kOrdered) {
-    return Wrong("tone.dither", static_cast<int>(target.tone.dither), "0 or 1");
+  for (size_t c = 0; c < target.tone.lut.size(); ++c) {
+    if (target.tone.lut[c][0] == 0) continue;
+    return Wrong(absl::StrCat("tone.lut[", c, "][0]").c_str(), target.tone.lut[c][0], "0");
+  }
+  if (target.tone.dither > display::Dither::kBlueNoise) {
+    return Wrong("tone.dither", static_cast<int>(target.tone.dither), "0 to 2");
+  }
+  if (target.tone.density > display::Density::kEven) {
+    return Wrong("tone.density", static_cast<int>(target.tone.density), "0 or 1");
   }
   if (target.tone.sampling > display::Sampling::kWeighted) {
     return Wrong("tone.sampling", static_cast<int>(target.tone.sampling), "0 or 1");

@@ -48,6 +48,9 @@ ALLOWED = {
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",
                               "daemon/config/display_view", "tools/voxelctl"],
+    # A profile that was written is tried as the daemon would.
+    "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
+                            "tools/voxelctl"],
     # And this reads descriptions of displays as the daemon does.
     "tools/voxelctl/profile": ["display/api", "display/drivers/options", "display/drivers/usb_options",
                                "display/drivers/simulated", "display/geometry", "display/profiles",

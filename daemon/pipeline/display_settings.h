@@ -22,7 +22,17 @@ struct ViewOptions {
   gpu::Affine transform;
 };
 
-enum class TestPattern : uint8_t { kNone, kAxes, kCorners, kGrid, kRamp, kWhite };
+enum class TestPattern : uint8_t {
+  kNone,
+  kAxes,
+  kCorners,
+  kGrid,
+  kRamp,
+  kWhite,
+  kBars,
+  kDensity,
+  kSlices
+};
 
 struct DisplayDescription {
   display::DisplayInfo info;

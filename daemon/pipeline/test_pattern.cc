@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/pipeline/slice_numbers.h"
 #include "display/geometry/corrector.h"
 #include "gpu/delta.h"
 
@@ -147,7 +148,7 @@ class Pattern {
     Add("dots", std::move(dots), 0);
   }
 
-  void Ramp() {
+  void Ramp(bool whole) {
     // Boxes a voxel thick along x: one for each level,
     // or each voxel where there are fewer of those.
     const int steps = int(std::min(256.0, nx_));
@@ -155,7 +156,7 @@ class Pattern {
       const double x0 = std::floor(nx_ * i / steps), x1 = std::floor(nx_ * (i + 1) / steps);
       const auto level = uint32_t(steps == 1 ? 255 : i * 255 / (steps - 1));
       const uint32_t grey = level << 16 | level << 8 | level;
-      if (!lights_.empty()) {
+      if (whole || !lights_.empty()) {
         Box(absl::StrCat("x", i), {x0, 0, 0}, {x1, ny_, nz_}, grey);
         continue;
       }
@@ -163,6 +164,24 @@ class Pattern {
       Box(absl::StrCat("z", i), {x0, 0, z}, {x1, ny_, z + 1}, grey);
       Box(absl::StrCat("y", i), {x0, y, 0}, {x1, y + 1, nz_}, grey);
     }
+  }
+
+  void Bars() {
+    constexpr uint32_t kBars[8] = {0xFFFFFF, 0xFFFF00, 0x00FFFF, 0x00FF00,
+                                   0xFF00FF, 0xFF0000, 0x0000FF, 0};
+    for (int i = 0; i < 8; ++i) {
+      const double x0 = std::floor(nx_ * i / 8), x1 = std::floor(nx_ * (i + 1) / 8);
+      if (x1 > x0) Box(absl::StrCat("bar", i), {x0, 0, 0}, {x1, ny_, nz_}, kBars[i]);
+    }
+  }
+
+  void Slices(const display::Geometry& geometry) {
+    Shape pixels;
+    pixels.data.record.kind = gpu::PrimitiveKind::kPoints;
+    for (const NumberedVoxel& voxel : SliceNumbers(geometry)) {
+      pixels.Vertex(voxel.at.x, voxel.at.y, voxel.at.z, voxel.rgb);
+    }
+    Add("numbers", std::move(pixels), 0);
   }
 
   void White() { Box("white", {0, 0, 0}, {nx_, ny_, nz_}, 0xFFFFFF); }
@@ -248,10 +267,19 @@ SnapshotPtr MakePattern(TestPattern pattern, const display::Geometry& geometry, 
       made.Grid();
       break;
     case TestPattern::kRamp:
-      made.Ramp();
+      made.Ramp(false);
       break;
     case TestPattern::kWhite:
       made.White();
+      break;
+    case TestPattern::kBars:
+      made.Bars();
+      break;
+    case TestPattern::kDensity:
+      made.Ramp(true);
+      break;
+    case TestPattern::kSlices:
+      made.Slices(geometry);
       break;
   }
   return made.Finish(number);

@@ -15,6 +15,9 @@ namespace voxeld::daemon {
 //   kGrid     dots of one voxel, eight apart on every axis
 //   kRamp     brightness from 0 to 255 along x, on three middle planes
 //   kWhite    every voxel
+//   kBars     eight bars along x: white, yellow, cyan, green, magenta, red, blue and black, in the whole volume
+//   kDensity  brightness from 0 to 255 along x in the whole volume: what is uneven shows
+//   kSlices   the number of every slice in its own pixels (slice_numbers.h)
 // In a lattice three of them keep to where lights are:
 //   kCorners  each corner moves to the light that is nearest to it
 //   kGrid     every eighth pixel of each slice, where it has a light

@@ -57,12 +57,15 @@ void ToWire(const display::FrameLayout& in, v1::FrameLayout* out) {
   out->set_height(in.height);
   out->set_sub_frames(in.sub_frames);
   out->set_format(ToWire(in.format));
+  out->set_bits(in.bits_per_channel());
 }
 
 absl::StatusOr<display::FrameLayout> FromWire(const v1::FrameLayout& in) {
   absl::StatusOr<display::PixelFormat> format = FromWire(in.format());
   if (!format.ok()) return format.status();
-  return display::FrameLayout{in.slices(), in.width(), in.height(), in.sub_frames(), *format};
+  display::FrameLayout layout{in.slices(), in.width(), in.height(), in.sub_frames(), *format};
+  if (in.bits() != layout.bits_per_channel()) layout.bits = in.bits();
+  return layout;
 }
 
 void ToWire(const ViewOptions& in, v1::View* out) {

@@ -58,19 +58,24 @@ constexpr Table<display::DisplayState, v1::DisplayState, 5> kStates = {{
     {display::DisplayState::kLost, v1::DISPLAY_STATE_LOST},
 }};
 
-constexpr Table<display::PixelFormat, v1::PixelFormat, 3> kFormats = {{
+constexpr Table<display::PixelFormat, v1::PixelFormat, 5> kFormats = {{
     {display::PixelFormat::kRgb888, v1::PIXEL_FORMAT_RGB888},
     {display::PixelFormat::kRgb332, v1::PIXEL_FORMAT_RGB332},
-    {display::PixelFormat::kBitPlanes3, v1::PIXEL_FORMAT_BIT_PLANES_3},
+    {display::PixelFormat::kBitPlanes, v1::PIXEL_FORMAT_BIT_PLANES},
+    {display::PixelFormat::kHub75, v1::PIXEL_FORMAT_HUB75},
+    {display::PixelFormat::kPlanes24, v1::PIXEL_FORMAT_PLANES24},
 }};
 
-constexpr Table<TestPattern, v1::TestPattern, 6> kPatterns = {{
+constexpr Table<TestPattern, v1::TestPattern, 9> kPatterns = {{
     {TestPattern::kNone, v1::TEST_PATTERN_NONE},
     {TestPattern::kAxes, v1::TEST_PATTERN_AXES},
     {TestPattern::kCorners, v1::TEST_PATTERN_CORNERS},
     {TestPattern::kGrid, v1::TEST_PATTERN_GRID},
     {TestPattern::kRamp, v1::TEST_PATTERN_RAMP},
     {TestPattern::kWhite, v1::TEST_PATTERN_WHITE},
+    {TestPattern::kBars, v1::TEST_PATTERN_BARS},
+    {TestPattern::kDensity, v1::TEST_PATTERN_DENSITY},
+    {TestPattern::kSlices, v1::TEST_PATTERN_SLICES},
 }};
 
 constexpr Table<display::DecodedVolume::Source, v1::VolumeHeader::Source, 2> kSources = {{

@@ -1,39 +1,80 @@
 #include "display/api/pixels.h"
 
+#include <algorithm>
+#include <cstring>
+
 namespace voxeld::display {
 namespace {
 
 uint8_t Expand(int value, int max) { return static_cast<uint8_t>((value * 510 + max) / (2 * max)); }
 
+// A pixel's three levels out of one picture.
+struct Levels {
+  int rgb[3] = {};
+};
+
+int BitAt(std::span<const std::byte> bytes, size_t byte, size_t bit) {
+  return std::to_integer<int>(bytes[byte]) >> bit & 1;
+}
+
+Levels LevelsAt(const FrameLayout& layout, std::span<const std::byte> picture, size_t x, size_t y) {
+  const size_t width = static_cast<size_t>(layout.width);
+  const size_t height = static_cast<size_t>(layout.height);
+  const size_t pixel = y * width + x;
+  const size_t bits = static_cast<size_t>(layout.bits_per_channel());
+  Levels levels;
+  switch (layout.format) {
+    case PixelFormat::kRgb888:
+      for (size_t c = 0; c < 3; ++c) levels.rgb[c] = std::to_integer<int>(picture[3 * pixel + c]);
+      break;
+    case PixelFormat::kRgb332: {
+      const int packed = std::to_integer<int>(picture[pixel]);
+      levels = {{packed >> 5, packed >> 2 & 7, packed & 3}};
+      break;
+    }
+    case PixelFormat::kBitPlanes: {
+      const size_t stride = (width + 7) / 8;
+      for (size_t plane = 0; plane < 3 * bits; ++plane) {
+        int& level = levels.rgb[plane % 3];
+        level = level << 1 | BitAt(picture, (plane * height + y) * stride + x / 8, 7 - x % 8);
+      }
+      break;
+    }
+    case PixelFormat::kHub75: {
+      const size_t half = height / 2;
+      for (size_t bit = 0; bit < bits; ++bit) {
+        for (size_t c = 0; c < 3; ++c) {
+          levels.rgb[c] = levels.rgb[c] << 1 |
+                          BitAt(picture, (bit * half + y % half) * width + x, y < half ? c : c + 3);
+        }
+      }
+      break;
+    }
+    case PixelFormat::kPlanes24:
+      for (size_t plane = 0; plane < 24; ++plane) {
+        levels.rgb[plane % 3] += BitAt(picture, 3 * pixel + plane / 8, plane % 8);
+      }
+      break;
+  }
+  return levels;
+}
+
 // One picture as 8-bit light into `rgb`.
 void PictureToRgb(const FrameLayout& layout, std::span<const std::byte> picture,
                   std::span<uint8_t> rgb) {
-  const size_t width = static_cast<size_t>(layout.width);
-  const size_t height = static_cast<size_t>(layout.height);
-  switch (layout.format) {
-    case PixelFormat::kRgb888:
-      for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = std::to_integer<uint8_t>(picture[i]);
-      return;
-    case PixelFormat::kRgb332:
-      for (size_t i = 0; i < width * height; ++i) {
-        const int packed = std::to_integer<int>(picture[i]);
-        rgb[3 * i] = Expand(packed >> 5, 7);
-        rgb[3 * i + 1] = Expand((packed >> 2) & 7, 7);
-        rgb[3 * i + 2] = Expand(packed & 3, 3);
-      }
-      return;
-    case PixelFormat::kBitPlanes3: {
-      const size_t stride = (width + 7) / 8;
-      for (size_t plane = 0; plane < 3; ++plane) {
-        for (size_t y = 0; y < height; ++y) {
-          const std::byte* row = picture.data() + (plane * height + y) * stride;
-          for (size_t x = 0; x < width; ++x) {
-            const int bit = std::to_integer<int>(row[x / 8]) >> (7 - x % 8) & 1;
-            rgb[(y * width + x) * 3 + plane] = bit != 0 ? 255 : 0;
-          }
-        }
-      }
-      return;
+  if (layout.format == PixelFormat::kRgb888 && layout.bits_per_channel() == 8) {
+    std::memcpy(rgb.data(), picture.data(), rgb.size());
+    return;
+  }
+  const int most = layout.format == PixelFormat::kPlanes24 ? kProjectorParts
+                                                           : (1 << layout.bits_per_channel()) - 1;
+  const int most_of[3] = {most, most, layout.format == PixelFormat::kRgb332 ? 3 : most};
+  size_t at = 0;
+  for (size_t y = 0; y < static_cast<size_t>(layout.height); ++y) {
+    for (size_t x = 0; x < static_cast<size_t>(layout.width); ++x) {
+      const Levels levels = LevelsAt(layout, picture, x, y);
+      for (size_t c = 0; c < 3; ++c)
+        rgb[at++] = Expand(std::min(levels.rgb[c], most_of[c]), most_of[c]);
     }
   }
 }

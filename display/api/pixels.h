@@ -12,7 +12,8 @@ namespace voxeld::display {
 
 // The light of one slice: `pictures` are its layout.sub_frames pictures, each of
 // layout.bytes_per_slice() bytes; `rgb` takes width·height·3 bytes, row-major. A channel of n bits
-// at value v is v·255/(2ⁿ−1), rounded to the nearest; sub-frames are averaged, a half rounded up.
+// at value v is v·255/(2ⁿ−1), rounded to the nearest (in kPlanes24 the eight parts are
+// averaged before); sub-frames are averaged, a half rounded up.
 void SliceToRgb(const FrameLayout& layout, std::span<const std::span<const std::byte>> pictures,
                 std::span<uint8_t> rgb);
 

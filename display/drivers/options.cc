@@ -1,7 +1,9 @@
 #include "display/drivers/options.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <tuple>
 #include <utility>
 #include <variant>
@@ -19,6 +21,65 @@ namespace {
 constexpr int32_t kMostPixels = 16384;
 constexpr double kMostNumber = 1e6;
 constexpr uint64_t kMostVolumeBytes = uint64_t{1} << 30;
+constexpr size_t kMostCurve = 256;
+
+// Three numbers from `least` to `most`, or one for all.
+std::array<double, 3> ReadThree(OptionReader& reader, const std::string& key, double fallback,
+                                double least, double most) {
+  std::array<double, 3> three = {fallback, fallback, fallback};
+  const std::vector<double> values = reader.Numbers(key);
+  if (values.empty()) return three;
+  const bool right =
+      (values.size() == 1 || values.size() == 3) &&
+      std::all_of(values.begin(), values.end(), [&](double v) { return v >= least && v <= most; });
+  if (!right) {
+    reader.Refuse(key, absl::StrCat("a number from ", least, " to ", most, ", or three"));
+    return three;
+  }
+  for (size_t i = 0; i < 3; ++i) three[i] = values[values.size() == 1 ? 0 : i];
+  return three;
+}
+
+std::vector<double> ReadCurve(OptionReader& reader, const std::string& key) {
+  std::vector<double> curve = reader.Numbers(key);
+  if (curve.empty()) return curve;
+  if (curve.size() < 2 || curve.size() > kMostCurve || curve.front() != 0 || curve.back() > 1 ||
+      !std::is_sorted(curve.begin(), curve.end())) {
+    reader.Refuse(key, absl::StrCat("2 to ", kMostCurve, " ascending numbers from 0 to at most 1"));
+    return {};
+  }
+  return curve;
+}
+
+// At `at` (0 to 1) of values at even steps.
+double AlongCurve(const std::vector<double>& values, double at) {
+  const double place = at * static_cast<double>(values.size() - 1);
+  const size_t i = std::min(static_cast<size_t>(place), values.size() - 2);
+  const double share = place - static_cast<double>(i);
+  return values[i] + (values[i + 1] - values[i]) * share;
+}
+
+std::optional<Vec3> ReadVoxelPitch(OptionReader& reader) {
+  if (!reader.has("voxel_mm")) return std::nullopt;
+  const std::array<double, 3> pitch = ReadThree(reader, "voxel_mm", 1, 1e-6, kMostNumber);
+  return Vec3{pitch[0], pitch[1], pitch[2]};
+}
+
+// A grid around the same middle, just large enough.
+VoxelGrid WithPitch(const VoxelGrid& grid, const Vec3& pitch) {
+  VoxelGrid out;
+  out.pitch_mm = pitch;
+  const auto along = [](int32_t n, double old_pitch, double old_origin, double new_pitch,
+                        int32_t& count, double& origin) {
+    const double extent = n * old_pitch;
+    count = static_cast<int32_t>(std::min(1e6, std::ceil(extent / new_pitch - 1e-6)));
+    origin = old_origin + (extent - count * new_pitch) / 2;
+  };
+  along(grid.nx, grid.pitch_mm.x, grid.origin_mm.x, pitch.x, out.nx, out.origin_mm.x);
+  along(grid.ny, grid.pitch_mm.y, grid.origin_mm.y, pitch.y, out.ny, out.origin_mm.y);
+  along(grid.nz, grid.pitch_mm.z, grid.origin_mm.z, pitch.z, out.nz, out.origin_mm.z);
+  return out;
+}
 
 }  // namespace
 
@@ -145,14 +206,13 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
   const double pitch = reader.Number("pitch_mm", 1, 1e-6, kMostNumber);
   info.geometry = ReadGeometry(reader, pitch);
   FrameLayout& layout = info.layout;
-  layout.format =
-      static_cast<PixelFormat>(reader.Choice("format", {"rgb888", "rgb332", "bitplanes3"}, 0));
+  layout.format = static_cast<PixelFormat>(
+      reader.Choice("format", {"rgb888", "rgb332", "bitplanes", "hub75", "planes24"}, 0));
+  layout.bits = static_cast<int32_t>(reader.Integer("bits", 0, 1, 8));
   layout.sub_frames = static_cast<int32_t>(reader.Integer("sub_frames", 1, 1, 64));
   info.volumes_per_second = reader.Number("rate", 30, 0.5, 10'000);
-  const double gamma = reader.Number("gamma", 1, 0.1, 10);
-  const double brightness = reader.Number("brightness", 1, 1e-3, 1);
-  const auto dither = static_cast<Dither>(reader.Choice("dither", {"none", "ordered"}, 1));
-  const auto sampling = static_cast<Sampling>(reader.Choice("sampling", {"max", "weighted"}, 0));
+  info.tone = MakeTone(ReadTone(reader));
+  const std::optional<Vec3> voxel_mm = ReadVoxelPitch(reader);
   const absl::Status status = reader.Finish();
   if (!status.ok()) return status;
 
@@ -161,11 +221,11 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
         absl::StrCat("display \"", options.name, "\": ", why.message()));
   };
   if (const absl::Status valid = ValidateShape(info.geometry); !valid.ok()) return refused(valid);
-  info.tone = MakeTone(gamma, brightness, dither, sampling);
   layout.slices = SliceCount(info.geometry);
   std::tie(layout.width, layout.height) =
       std::visit([](const auto& shape) { return std::pair(shape.width_px, shape.height_px); },
                  info.geometry.shape);
+  if (const absl::Status valid = ValidateFormat(layout); !valid.ok()) return refused(valid);
   if (layout.bytes() > kMostVolumeBytes) {
     return absl::InvalidArgumentError(absl::StrCat(
         "display \"", options.name, "\": a volume of ", layout.slices, " slices of ", layout.width,
@@ -173,18 +233,40 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
         " bytes; at most ", kMostVolumeBytes, " are possible"));
   }
   info.geometry.grid = DefaultGrid(info.geometry);
+  if (voxel_mm) info.geometry.grid = WithPitch(info.geometry.grid, *voxel_mm);
   if (const absl::Status valid = ValidateGeometry(info.geometry); !valid.ok())
     return refused(valid);
   return info;
 }
 
-Tone MakeTone(double gamma, double brightness, Dither dither, Sampling sampling) {
+ToneOptions ReadTone(OptionReader& reader) {
+  ToneOptions tone;
+  tone.gamma = ReadThree(reader, "gamma", 1, 0.1, 10);
+  tone.white = ReadThree(reader, "white", 1, 1e-3, 1);
+  tone.brightness = reader.Number("brightness", 1, 1e-3, 1);
+  const char* const curves[] = {"curve_red", "curve_green", "curve_blue"};
+  for (size_t i = 0; i < 3; ++i) tone.curves[i] = ReadCurve(reader, curves[i]);
+  tone.dither = static_cast<Dither>(reader.Choice("dither", {"none", "ordered", "blue"}, 1));
+  tone.sampling = static_cast<Sampling>(reader.Choice("sampling", {"max", "weighted"}, 0));
+  tone.density = static_cast<Density>(reader.Choice("density", {"full", "even"}, 0));
+  return tone;
+}
+
+Tone MakeTone(const ToneOptions& options) {
   Tone tone;
-  tone.dither = dither;
-  tone.sampling = sampling;
-  for (size_t c = 1; c < tone.lut.size(); ++c) {
-    const double light = 65535 * brightness * std::pow(static_cast<double>(c) / 255, gamma);
-    tone.lut[c] = static_cast<uint16_t>(std::clamp(std::lround(light), 1L, 65535L));
+  tone.dither = options.dither;
+  tone.sampling = options.sampling;
+  tone.density = options.density;
+  for (size_t channel = 0; channel < 3; ++channel) {
+    Tone::Curve& curve = tone.lut[channel];
+    const double full = 65535 * options.white[channel] * options.brightness;
+    for (size_t c = 1; c < curve.size(); ++c) {
+      const double at = static_cast<double>(c) / 255;
+      const double share = options.curves[channel].empty()
+                               ? std::pow(at, options.gamma[channel])
+                               : AlongCurve(options.curves[channel], at);
+      curve[c] = static_cast<uint16_t>(std::clamp(std::lround(full * share), 1L, 65535L));
+    }
   }
   return tone;
 }

@@ -1,6 +1,7 @@
 // A display's options, as configuration files and command lines state them: "key=value".
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <initializer_list>
 #include <map>
@@ -99,13 +100,37 @@ class OptionReader {
 //   displacement_mm=x;y;z;…   besides, at places of a grid, x fastest
 // both:
 //   mirror_u= mirror_v=     true|false, false; of a rotor one for all panels or one each
-//   format=rgb888|rgb332|bitplanes3, sub_frames=1…64, rate=volumes/s (30; a rotor with n panels
-//     still counts turns), gamma=1, brightness=0…1 (1), dither=none|ordered (ordered),
-//     sampling=max|weighted (max)
+//   voxel_mm=P | x;y;z      pitch of the voxels, instead of the one that suits the shape (DefaultGrid)
+//   format=rgb888|rgb332|bitplanes|hub75|planes24   rgb888
+//   bits=1…8                a channel; rgb888 8, bitplanes and hub75 1
+//   sub_frames=1…64         1
+//   rate=volumes/s          30; a rotor with n panels still counts turns
+//   gamma=G | r;g;b         1
+//   white=r;g;b             how much light full red, green and blue are to have, 1;1;1
+//   brightness=0…1          1
+//   curve_red= curve_green= curve_blue=A;B;…   light, 0 to 1, at even steps of the channel from black to full, linear between,
+//                           instead of gamma; 2 to 256 values, the first 0, ascending
+//   dither=none|ordered|blue   ordered
+//   sampling=max|weighted   max
+//   density=full|even       full; even: pixels that crowd are dimmed
 absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, OptionReader& reader);
 
-// lut[0] = 0, lut[255] = 65535·brightness; between, 65535·brightness·(c/255)^gamma, rounded, at
-// least 1 (so that what is lit is never quite dark). gamma > 0, brightness in (0, 1].
-Tone MakeTone(double gamma, double brightness, Dither dither, Sampling sampling);
+// How colours become light.
+struct ToneOptions {
+  std::array<double, 3> gamma{1, 1, 1};       // > 0
+  std::array<double, 3> white{1, 1, 1};       // (0, 1]
+  std::array<std::vector<double>, 3> curves;  // instead of gamma, where there are values
+  double brightness = 1;                      // (0, 1]
+  Dither dither = Dither::kOrdered;
+  Sampling sampling = Sampling::kMax;
+  Density density = Density::kFull;
+};
+
+// gamma to density, as ReadDisplayInfo has them.
+ToneOptions ReadTone(OptionReader& reader);
+
+// Of each channel lut[0] = 0, lut[255] = 65535·white·brightness; between, that times (c/255)^gamma or the curve at c/255,
+// rounded, at least 1 (so that what is lit is never quite dark).
+Tone MakeTone(const ToneOptions& options);
 
 }  // namespace voxeld::display

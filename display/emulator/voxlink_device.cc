@@ -4,6 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <utility>
+#include <variant>
+
+#include "display/geometry/footprint.h"
 
 namespace voxeld::display::emulator {
 namespace {
@@ -29,6 +32,11 @@ std::vector<std::byte> MakeCapabilities(const VoxlinkDeviceConfig& config) {
   voxlink::Capabilities& fixed = device.fixed;
   fixed.version = voxlink::kVersion;
   fixed.formats = config.formats;
+  const int32_t height =
+      std::visit([](const auto& shape) { return shape.height_px; }, config.geometry.shape);
+  if (height % 2 != 0) {
+    fixed.formats &= static_cast<uint8_t>(~(1u << static_cast<int>(PixelFormat::kHub75)));
+  }
   fixed.max_sub_frames = config.max_sub_frames;
   fixed.features = voxlink::kFeatureBrightness | voxlink::kFeaturePowerLimit |
                    voxlink::kFeatureTemperature |
@@ -343,6 +351,7 @@ std::optional<std::vector<std::byte>> VoxlinkDevice::ReadRequest(const UsbSetup&
       if (setup.value != 0) return std::nullopt;
       return BytesOf(voxlink::Mode{.format = static_cast<uint8_t>(layout_.format),
                                    .sub_frames = static_cast<uint8_t>(layout_.sub_frames),
+                                   .bits = static_cast<uint8_t>(layout_.bits),
                                    .reserved0 = 0,
                                    .rate_mhz = rate_mhz_,
                                    .reserved1 = {}});
@@ -410,11 +419,14 @@ bool VoxlinkDevice::SetMode(std::span<const std::byte> data) {
       mode.rate_mhz > fixed.max_rate_mhz) {
     return false;
   }
-  layout_.slices = static_cast<int32_t>(fixed.slices);
-  layout_.width = static_cast<int32_t>(fixed.width);
-  layout_.height = static_cast<int32_t>(fixed.height);
-  layout_.sub_frames = mode.sub_frames;
-  layout_.format = static_cast<PixelFormat>(mode.format);
+  const FrameLayout layout{.slices = static_cast<int32_t>(fixed.slices),
+                           .width = static_cast<int32_t>(fixed.width),
+                           .height = static_cast<int32_t>(fixed.height),
+                           .sub_frames = mode.sub_frames,
+                           .format = static_cast<PixelFormat>(mode.format),
+                           .bits = mode.bits};
+  if (!ValidateFormat(layout).ok()) return false;
+  layout_ = layout;
   rate_mhz_ = mode.rate_mhz;
   return true;
 }

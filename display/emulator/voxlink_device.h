@@ -24,7 +24,7 @@ namespace voxeld::display::emulator {
 struct VoxlinkDeviceConfig {
   Geometry geometry;  // must be valid; the grid does not matter
   double volumes_per_second = 30;
-  uint8_t formats = 0x07;  // bit n: PixelFormat n
+  uint8_t formats = 0x1F;  // bit n: PixelFormat n; of an odd height without kHub75
   uint8_t max_sub_frames = 64;
   uint32_t receive_buffer = 4u << 20;
   uint32_t max_payload = 65536;

@@ -100,6 +100,8 @@ struct FootprintTable {
 // shape and grid. The limits are in display/geometry/limits.h.
 absl::Status ValidateShape(const Geometry& geometry);
 absl::Status ValidateGeometry(const Geometry& geometry);
+// Whether a layout's format, bits and height go together; else InvalidArgument as above.
+absl::Status ValidateFormat(const FrameLayout& layout);
 
 // A Geometry's slices, as FrameLayout counts them. The shape must be valid.
 int32_t SliceCount(const Geometry& geometry);

@@ -301,4 +301,25 @@ absl::Status ValidateGeometry(const Geometry& geometry) {
   return check.status();
 }
 
+absl::Status ValidateFormat(const FrameLayout& layout) {
+  const auto wrong = [](const char* field, int64_t value, const char* right) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("layout.", field, " is ", value, ", must be ", right));
+  };
+  if (static_cast<uint8_t>(layout.format) >= kPixelFormats) {
+    return wrong("format", static_cast<int64_t>(layout.format), "0 to 4");
+  }
+  if (layout.bits < 0 || layout.bits > 8) return wrong("bits", layout.bits, "0 to 8");
+  if (layout.format == PixelFormat::kRgb332 && layout.bits_per_channel() != 3) {
+    return wrong("bits", layout.bits, "0 or 3, as rgb332 has");
+  }
+  if (layout.format == PixelFormat::kPlanes24 && layout.bits_per_channel() != 1) {
+    return wrong("bits", layout.bits, "0 or 1, as planes24 has");
+  }
+  if (layout.format == PixelFormat::kHub75 && layout.height % 2 != 0) {
+    return wrong("height", layout.height, "even, as hub75 has");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace voxeld::display

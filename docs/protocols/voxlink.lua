@@ -27,7 +27,8 @@ local REQUESTS = {
   [5] = "START", [6] = "STOP", [7] = "SET_BRIGHTNESS", [8] = "SET_POWER_LIMIT",
   [9] = "SET_BLANK",
 }
-local FORMATS = { [0] = "RGB888", [1] = "RGB332", [2] = "three bit planes" }
+local FORMATS = { [0] = "RGB888", [1] = "RGB332", [2] = "bit planes", [3] = "HUB75",
+  [4] = "24 planes" }
 local SHAPES = { [1] = "planar stack", [2] = "rotor", [3] = "helix", [4] = "lattice" }
 local REASONS = {
   [1] = "by the host", [2] = "superseded", [3] = "base not held", [4] = "volume unknown",
@@ -277,6 +278,7 @@ local HELIX = layout({
 local MODE = layout({
   { 0, "u8", "mode.format", "Pixel format", FORMATS },
   { 1, "u8", "mode.sub_frames", "Sub-frames" },
+  { 2, "u8", "mode.bits", "Bits a channel" },
   { 4, "u32", "mode.rate", "Sweeps in 1,000 s" },
 })
 local STATUS = layout({

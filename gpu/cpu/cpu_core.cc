@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "display/sync/clock.h"
 #include "gpu/checks.h"
+#include "gpu/slice/light_plan.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
@@ -20,13 +21,14 @@ absl::Status CpuCore::SetTarget(Target target) {
   display::FootprintTable table = display::BuildFootprints(target.geometry, target.tone.sampling);
   const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz, Sampler::FastestAxis(table));
   display::TileToSlices tile_to_slices(table, voxels, kTileSize, kTileSize, kTileSize);
+  LightPlan light = LightPlan::Of(table, voxels, target.layout, target.tone);
   absl::StatusOr<Sampler> sampler = Sampler::Create(std::move(table), grid, target.tone.sampling);
   if (!sampler.ok()) return sampler.status();
 
   const auto [begin, end] = part_.Within(target.layout.slices);
   volume_.SetView(grid, target.view, OwnedTiles(tile_to_slices, grid, part_, target.layout.slices));
-  pictures_.SetPlan(
-      {target.layout, target.tone, begin, end, *std::move(sampler), std::move(tile_to_slices)});
+  pictures_.SetPlan({target.layout, target.tone, begin, end, std::move(light), *std::move(sampler),
+                     std::move(tile_to_slices)});
   unsliced_ = {};
   unobserved_.clear();
   layout_ = target.layout;

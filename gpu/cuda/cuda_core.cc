@@ -8,6 +8,7 @@
 #include "display/sync/clock.h"
 #include "gpu/checks.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/slice/light_plan.h"
 #include "gpu/slice/sampler.h"
 
 namespace voxeld::gpu::cuda {
@@ -33,15 +34,16 @@ absl::Status CudaCore::SetTarget(const Target& target) {
                          static_cast<uint64_t>(target.layout.sub_frames) *
                          target.layout.bytes_per_slice();
   std::optional<PackedPlan> packed;
-  if (tuning_.pack_as_drawn) {
+  const LightPlan light = LightPlan::Of(table, voxels, target.layout, target.tone);
+  if (tuning_.pack_as_drawn && light.plain(target.layout)) {
     const auto groups =
         std::clamp<uint64_t>(bytes / tuning_.group_bytes, 2, PackedPlan::kMostGroups);
     packed = PackedPlan::Of(table, voxels, target.layout, target.tone, begin, end,
                             static_cast<int32_t>(groups));
   }
   absl::StatusOr<std::unique_ptr<CudaPictures>> pictures =
-      CudaPictures::Make(*device_, {target.layout, target.tone, begin, end}, table, tile_to_slices,
-                         packed, pictures_.get());
+      CudaPictures::Make(*device_, {target.layout, target.tone, begin, end}, light, table,
+                         tile_to_slices, packed, pictures_.get());
   if (!pictures.ok()) return pictures.status();
   absl::StatusOr<DeviceTiles> tiles = DeviceTiles::Make(
       *device_, grid, OwnedTiles(tile_to_slices, grid, part_, target.layout.slices),

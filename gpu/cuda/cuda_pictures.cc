@@ -17,11 +17,13 @@ static_assert(PackedPlan::kGroupGrain == 1 << RegionBits(2));
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<CudaPictures>> CudaPictures::Make(
-    Device& device, const PicturesPlan& plan, const display::FootprintTable& table,
-    const display::TileToSlices& tile_to_slices, const std::optional<PackedPlan>& packed,
-    const CudaPictures* before) {
+    Device& device, const PicturesPlan& plan, const LightPlan& light,
+    const display::FootprintTable& table, const display::TileToSlices& tile_to_slices,
+    const std::optional<PackedPlan>& packed, const CudaPictures* before) {
   std::unique_ptr<CudaPictures> made(new CudaPictures(device, plan));
-  if (absl::Status status = made->PutTables(table, tile_to_slices); !status.ok()) return status;
+  if (absl::Status status = made->PutTables(light, table, tile_to_slices); !status.ok()) {
+    return status;
+  }
   if (absl::Status status = made->PutPictures(before); !status.ok()) return status;
   if (absl::Status status = made->PutPacked(packed); !status.ok()) return status;
   return made;
@@ -35,7 +37,7 @@ CudaPictures::~CudaPictures() {
   if (counters_ != nullptr) cudaFreeHost(counters_);
 }
 
-absl::Status CudaPictures::PutTables(const display::FootprintTable& table,
+absl::Status CudaPictures::PutTables(const LightPlan& light, const display::FootprintTable& table,
                                      const display::TileToSlices& tile_to_slices) {
   absl::Status status;
   const auto put = [&](const auto* data, size_t count) {
@@ -76,11 +78,14 @@ absl::Status CudaPictures::PutTables(const display::FootprintTable& table,
     view_.line = std::max<uint32_t>(view_.line, std::max({entry.x, entry.y, entry.z}) + 1u);
   }
   view_.sampling = plan_.tone.sampling;
-  view_.dither = plan_.tone.dither;
-  view_.format = plan_.layout.format;
+  view_.finish = light.finish(plan_.layout, plan_.tone);
   view_.sub_frames = static_cast<uint32_t>(plan_.layout.sub_frames);
   view_.bytes_per_picture = static_cast<uint32_t>(plan_.layout.bytes_per_slice());
-  view_.lut = put(plan_.tone.lut.data(), plan_.tone.lut.size());
+  view_.finish.curves = put(light.curves.data(), light.curves.size());
+  if (!light.noise.empty()) view_.finish.noise = put(light.noise.data(), light.noise.size());
+  if (!light.factors.empty()) {
+    view_.finish.factors = put(light.factors.data(), light.factors.size());
+  }
   return status;
 }
 
@@ -113,7 +118,9 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   for (const Wanted& wanted :
        {Wanted{&lit_tiles_, slices * sizeof(uint32_t), nullptr},
         {&differs_, pictures * sizeof(uint32_t), same ? &before->differs_ : nullptr},
-        {&bytes_, pictures * view_.bytes_per_picture, same ? &before->bytes_ : nullptr},
+        // Whole words: neighbours may be changed together.
+        {&bytes_, (pictures * view_.bytes_per_picture + 3) / 4 * 4,
+         same ? &before->bytes_ : nullptr},
         {&changed_in_, pictures * sizeof(uint64_t), same ? &before->changed_in_ : nullptr},
         // Of pictures packed as they were drawn it is not known.
         {&blank_, slices * sizeof(uint32_t),

@@ -19,6 +19,7 @@
 #include "gpu/cuda/stopwatch.h"
 #include "gpu/cuda/types.h"
 #include "gpu/engine.h"
+#include "gpu/slice/light_plan.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -34,9 +35,9 @@ class CudaPictures {
   // Everything is to be sliced anew. With the layout of `before` (may be null) pictures that come
   // out the same keep the frame of their last change.
   static absl::StatusOr<std::unique_ptr<CudaPictures>> Make(
-      Device& device, const PicturesPlan& plan, const display::FootprintTable& table,
-      const display::TileToSlices& tile_to_slices, const std::optional<PackedPlan>& packed,
-      const CudaPictures* before);
+      Device& device, const PicturesPlan& plan, const LightPlan& light,
+      const display::FootprintTable& table, const display::TileToSlices& tile_to_slices,
+      const std::optional<PackedPlan>& packed, const CudaPictures* before);
   ~CudaPictures();
   CudaPictures(const CudaPictures&) = delete;
   CudaPictures& operator=(const CudaPictures&) = delete;
@@ -68,7 +69,7 @@ class CudaPictures {
 
  private:
   CudaPictures(Device& device, const PicturesPlan& plan) : device_(device), plan_(plan) {}
-  absl::Status PutTables(const display::FootprintTable& table,
+  absl::Status PutTables(const LightPlan& light, const display::FootprintTable& table,
                          const display::TileToSlices& tile_to_slices);
   absl::Status PutPacked(const std::optional<PackedPlan>& packed);
   absl::Status PutPictures(const CudaPictures* before);

@@ -246,7 +246,7 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
     scratch.words[i] = 0;
   }
   if constexpr (kTo == DrawTo::kPictures) {
-    if (threadIdx.x < 64 && view.packed.slices.format == display::PixelFormat::kBitPlanes3) {
+    if (threadIdx.x < 64 && view.packed.slices.finish.format == display::PixelFormat::kBitPlanes) {
       scratch.least[threadIdx.x] = view.packed.least[threadIdx.x];
     }
   }

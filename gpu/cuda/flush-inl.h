@@ -118,11 +118,12 @@ __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u,
   Levels q = {0, 0, 0};
   if (color != 0) {
     const uint32_t rgb = Deinterleave(color);
-    const Levels levels = LevelsOf(view.format);
-    const uint32_t threshold = Threshold(view.dither, u, v, sub, view.sub_frames);
-    q = {Quantize(view.lut[rgb >> 16], levels.r, threshold),
-         Quantize(view.lut[rgb >> 8 & 0xFF], levels.g, threshold),
-         Quantize(view.lut[rgb & 0xFF], levels.b, threshold)};
+    const Finish& finish = view.finish;
+    const Levels levels = LevelsOf(finish.format, finish.bits);
+    const Light light = finish.LightOf(rgb);
+    const uint32_t threshold = Threshold(finish.dither, u, v, sub, view.sub_frames);
+    q = {Quantize(light.r, levels.r, threshold), Quantize(light.g, levels.g, threshold),
+         Quantize(light.b, levels.b, threshold)};
   }
   return PutLevels(view, u, v, q, picture);
 }
@@ -259,7 +260,7 @@ struct PicturesHeld {
     if (slice < 0) return;
     slice_dirty = packed.slice_dirty[slice];
     differs = packed.slices.differs[static_cast<uint32_t>(slice) * packed.slices.sub_frames];
-    if (packed.slices.format == display::PixelFormat::kBitPlanes3) {
+    if (packed.slices.finish.format == display::PixelFormat::kBitPlanes) {
       BitsPlace(packed, place, slice, 0).Load(held);
     }
   }
@@ -319,7 +320,7 @@ __device__ inline void FlushToPictures(const DrawView& view, const RegionPlace& 
   const int32_t limit[2] = {inside ? place.box.hi[0] - place.box.lo[0] : 0,
                             inside ? place.box.hi[1] - place.box.lo[1] : 0};
   uint32_t pictures = 0;
-  if (slices.format == display::PixelFormat::kBitPlanes3) {
+  if (slices.finish.format == display::PixelFormat::kBitPlanes) {
     pictures = FlushPlane(packed, place, before, limit, scratch);
   } else {
     const int32_t x = place.box.lo[0] + static_cast<int32_t>(lane);

@@ -2,7 +2,7 @@
 // with what they were, in one pass.
 #include "gpu/cuda/kernels.h"
 #include "gpu/cuda/pixels-inl.h"
-#include "gpu/slice/pack.h"
+#include "gpu/slice/finish.h"
 #include "gpu/slice/weight.h"
 #include "gpu/word.h"
 
@@ -81,44 +81,77 @@ __device__ uint32_t SampleWeighted(const VolumeView& volume, const SliceView& vi
   return rgb;
 }
 
-// A pixel's levels into its picture, by 8 neighbouring lanes at once (bit planes: a byte of each
-// plane is theirs together).
+// Bit planes: a byte of each plane is 8 neighbouring lanes' together.
+__device__ bool PutBits(const SliceView& view, uint32_t u, uint32_t v, bool inside, Levels q,
+                        uint8_t* picture) {
+  const size_t row = (view.width + 7) / 8, plane = row * view.height;
+  const uint32_t first = threadIdx.x % 32 & ~7u;
+  bool differs = false;
+  const uint32_t levels[3] = {q.r, q.g, q.b};
+  uint8_t* byte = picture + v * row + u / 8;
+  for (uint32_t bit = view.finish.bits; bit-- > 0;) {
+    for (size_t c = 0; c < 3; ++c, byte += plane) {
+      const uint32_t lanes = __ballot_sync(kAll, inside && (levels[c] >> bit & 1) != 0);
+      const uint32_t value = __brev(lanes >> first & 0xFF) >> 24;
+      if (inside && u % 8 == 0) differs |= PutByte(byte, value);
+    }
+  }
+  return differs;
+}
+
+// Rows side by side: a byte has a pixel of the upper half and one of the lower, which threads apart put there.
+__device__ bool PutPaired(const SliceView& view, uint32_t u, uint32_t v, Levels q,
+                          uint8_t* picture) {
+  const uint32_t half = view.height / 2, shift = v < half ? 0 : 3;
+  uint8_t* byte = picture + static_cast<size_t>(v % half) * view.width + u;
+  bool differs = false;
+  for (uint32_t bit = view.finish.bits; bit-- > 0; byte += static_cast<size_t>(half) * view.width) {
+    const uint32_t rgb = (q.r >> bit & 1) | (q.g >> bit & 1) << 1 | (q.b >> bit & 1) << 2;
+    const uintptr_t place = reinterpret_cast<uintptr_t>(byte), within = place % sizeof(uint32_t);
+    uint32_t* const word = reinterpret_cast<uint32_t*>(place - within);
+    const uint32_t at = static_cast<uint32_t>(within) * 8 + shift;
+    // These bits are this thread's alone.
+    const uint32_t change = (*static_cast<volatile uint32_t*>(word) >> at & 7) ^ rgb;
+    if (change == 0) continue;
+    atomicXor(word, change << at);
+    differs = true;
+  }
+  return differs;
+}
+
+// A pixel's levels into its picture, by 8 neighbouring lanes at once.
 __device__ bool PutPixel(const SliceView& view, uint32_t u, uint32_t v, bool inside, Levels q,
                          uint8_t* picture) {
-  switch (view.format) {
+  switch (view.finish.format) {
     case display::PixelFormat::kRgb888:
     case display::PixelFormat::kRgb332:
+    case display::PixelFormat::kPlanes24:
       return inside && PutLevels(view, u, v, q, picture);
-    case display::PixelFormat::kBitPlanes3: {
-      const size_t row = (view.width + 7) / 8, plane = row * view.height;
-      const uint32_t first = threadIdx.x % 32 & ~7u;
-      bool differs = false;
-      const uint32_t levels[3] = {q.r, q.g, q.b};
-      for (size_t p = 0; p < 3; ++p) {
-        const uint32_t lanes = __ballot_sync(kAll, inside && levels[p] != 0);
-        const uint32_t byte = __brev(lanes >> first & 0xFF) >> 24;
-        if (inside && u % 8 == 0) differs |= PutByte(picture + p * plane + v * row + u / 8, byte);
-      }
-      return differs;
-    }
+    case display::PixelFormat::kBitPlanes:
+      return PutBits(view, u, v, inside, q, picture);
+    case display::PixelFormat::kHub75:
+      return inside && PutPaired(view, u, v, q, picture);
   }
   return false;
 }
 
-// A pixel's colour into the pictures of slice `s`, by 8 neighbouring lanes at once.
-__device__ void PutToned(const SliceView& view, Levels levels, uint32_t s, uint32_t u, uint32_t v,
-                         bool inside, uint32_t rgb) {
+// A pixel's place: of a picture, and of the outer footprints.
+struct PixelPlace {
+  uint32_t slice, u, v;  // of all slices
+  size_t row;
+  bool inside;
+};
+
+// A pixel's colour into the pictures of slice `s` of those owned, by 8 neighbouring lanes at once.
+__device__ void PutToned(const SliceView& view, uint32_t s, const PixelPlace& at, uint32_t rgb) {
+  const Finish& finish = view.finish;
+  const Light light = rgb != 0 ? finish.LightAt(rgb, at.row) : Light{0, 0, 0};
   for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
     // A pixel without light is at the lowest level whatever the threshold.
-    const uint32_t threshold = Threshold(view.dither, u, v, sub, view.sub_frames);
     Levels q = {0, 0, 0};
-    if (rgb != 0) {
-      q = {Quantize(view.lut[rgb >> 16], levels.r, threshold),
-           Quantize(view.lut[rgb >> 8 & 0xFF], levels.g, threshold),
-           Quantize(view.lut[rgb & 0xFF], levels.b, threshold)};
-    }
+    if (rgb != 0) q = finish.LevelsAt(light, at.slice, at.u, at.v, sub);
     const uint32_t picture = s * view.sub_frames + sub;
-    if (PutPixel(view, u, v, inside, q,
+    if (PutPixel(view, at.u, at.v, at.inside, q,
                  view.bytes + static_cast<size_t>(picture) * view.bytes_per_picture)) {
       view.differs[picture] = 1;
     }
@@ -142,7 +175,7 @@ __global__ void DrawFlatKernel(VolumeView volume, SliceIndexView index, SliceVie
               ? SampleWeighted(volume, view, slice, pixel, 0)
               : SampleMax(volume, view, slice, pixel, 0, nullptr);
   }
-  PutToned(view, LevelsOf(view.format), s, u, v, inside, rgb);
+  PutToned(view, s, {slice, u, v, static_cast<size_t>(slice) * view.columns + pixel, inside}, rgb);
 }
 
 __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceView view,
@@ -169,7 +202,6 @@ __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceV
     }
     __syncthreads();
   }
-  const Levels levels = LevelsOf(view.format);
   const uint32_t pixels = kColumns * view.height;
   for (uint32_t p = threadIdx.x; p < (pixels + kThreads - 1) / kThreads * kThreads; p += kThreads) {
     const uint32_t column = p % kColumns, u = u0 + column, v = p / kColumns;
@@ -181,7 +213,7 @@ __global__ void DrawSlicesKernel(VolumeView volume, SliceIndexView index, SliceV
                 : SampleMax(volume, view, slice, u, v,
                             with_line ? lines + column * view.line : nullptr);
     }
-    PutToned(view, levels, s, u, v, inside, rgb);
+    PutToned(view, s, {slice, u, v, static_cast<size_t>(slice) * view.columns + u, inside}, rgb);
   }
 }
 

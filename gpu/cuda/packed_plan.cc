@@ -14,20 +14,28 @@ constexpr int32_t kMostSubFrames = 32;
 
 bool PutLeast(const display::FrameLayout& layout, const display::Tone& tone,
               std::vector<uint32_t>& least) {
-  if (layout.format != display::PixelFormat::kBitPlanes3) return true;
-  if (!std::is_sorted(tone.lut.begin(), tone.lut.end())) return false;
+  if (layout.format != display::PixelFormat::kBitPlanes) return true;
+  const display::Tone::Curve& curve = tone.lut[0];
+  if (tone.lut[1] != curve || tone.lut[2] != curve) return false;
+  if (!std::is_sorted(curve.begin(), curve.end())) return false;
   const uint32_t sub_frames = static_cast<uint32_t>(layout.sub_frames);
   for (uint32_t sub = 0; sub < sub_frames; ++sub) {
     for (uint32_t v = 0; v < 8; ++v) {
       for (uint32_t u = 0; u < 8; ++u) {
         const uint32_t threshold = Threshold(tone.dither, u, v, sub, sub_frames);
         uint32_t level = 0;
-        while (level < 256 && Quantize(tone.lut[level], 2, threshold) == 0) ++level;
+        while (level < 256 && Quantize(curve[level], 2, threshold) == 0) ++level;
         least.push_back(level < 256 ? Spread3(level) : 1u << 24);
       }
     }
   }
   return true;
+}
+
+bool HasPackedForm(const display::FrameLayout& layout) {
+  if (layout.format == display::PixelFormat::kBitPlanes) return layout.bits_per_channel() == 1;
+  return layout.format == display::PixelFormat::kRgb888 ||
+         layout.format == display::PixelFormat::kRgb332;
 }
 
 std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, int32_t slices,
@@ -68,7 +76,7 @@ std::optional<PackedPlan> PackedPlan::Of(const display::FootprintTable& table,
                                          int32_t most_groups) {
   if (tone.sampling != display::Sampling::kMax || table.inner_sets != 1 ||
       table.inner_axis != display::Axis::kY || table.width > grid.nx ||
-      layout.sub_frames > kMostSubFrames) {
+      layout.sub_frames > kMostSubFrames || !HasPackedForm(layout)) {
     return std::nullopt;
   }
   PackedPlan plan;

@@ -16,12 +16,16 @@ __device__ inline bool PutByte(uint8_t* at, uint32_t value) {
   return true;
 }
 
-// The pixel (u, v) of a picture, of a format that is not of bit planes; true if it was another.
+// The pixel (u, v) of a picture of bytes that are a pixel's alone; true if it was another.
 __device__ inline bool PutLevels(const SliceView& view, uint32_t u, uint32_t v, Levels q,
                                  uint8_t* picture) {
   const size_t pixel = static_cast<size_t>(v) * view.width + u;
-  if (view.format == display::PixelFormat::kRgb332) {
+  if (view.finish.format == display::PixelFormat::kRgb332) {
     return PutByte(picture + pixel, q.r << 5 | q.g << 2 | q.b);
+  }
+  if (view.finish.format == display::PixelFormat::kPlanes24) {
+    const uint32_t word = Planes24(q);
+    q = {word & 0xFF, word >> 8 & 0xFF, word >> 16};
   }
   bool differs = PutByte(picture + pixel * 3, q.r);
   differs |= PutByte(picture + pixel * 3 + 1, q.g);

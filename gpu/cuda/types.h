@@ -7,6 +7,7 @@
 #include "display/geometry/footprint.h"
 #include "gpu/primitives/grid.h"
 #include "gpu/primitives/source.h"
+#include "gpu/slice/finish.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -154,12 +155,10 @@ struct SliceView {
   uint32_t flat_row = 0;  // as FootprintTable has it
   uint32_t line = 0;      // voxels along the inner axis that inner lists reach
   display::Sampling sampling = display::Sampling::kMax;
-  display::Dither dither = display::Dither::kNone;
-  display::PixelFormat format = display::PixelFormat::kRgb888;
+  Finish finish;
   uint32_t sub_frames = 1;
   uint32_t bytes_per_picture = 0;
-  const uint16_t* lut = nullptr;  // 256
-  uint8_t* bytes = nullptr;       // pictures of the owned slices
+  uint8_t* bytes = nullptr;  // pictures of the owned slices
   uint64_t* changed_in = nullptr;
   uint64_t* told = nullptr;     // the same, in the host's memory
   uint32_t* differs = nullptr;  // of each picture: its bytes are not what they were

@@ -115,7 +115,7 @@ std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& 
   out.lit_.assign(columns, 0);
   out.SortColumns(grid);
   out.IndexPillars(grid);
-  out.tables_ = LevelTables::OfRgb332(tone);
+  out.tables_ = LevelTables::OfRgb332(layout, tone);
   const auto sub_frames = static_cast<uint32_t>(layout.sub_frames);
   for (uint32_t sub = 0; sub < sub_frames; ++sub) {
     for (uint32_t u = 0; u < 8; ++u) out.dither_.push_back(DitherColumn(u, sub, sub_frames));

@@ -10,8 +10,8 @@ constexpr uint32_t kThresholds = 64;
 
 }  // namespace
 
-LevelTables LevelTables::Of(display::PixelFormat format, const display::Tone& tone) {
-  const Levels levels = LevelsOf(format);
+LevelTables LevelTables::Of(const display::FrameLayout& layout, const display::Tone& tone) {
+  const Levels levels = LevelsOf(layout.format, static_cast<uint32_t>(layout.bits_per_channel()));
   const uint32_t levels_of[3] = {levels.r, levels.g, levels.b};
   uint32_t thresholds[kThresholds] = {};  // by the matrix' value
   for (uint32_t v = 0; v < 8; ++v) {
@@ -20,12 +20,12 @@ LevelTables LevelTables::Of(display::PixelFormat format, const display::Tone& to
     }
   }
   LevelTables tables;
-  for (int channel = 0; channel < 3; ++channel) {
+  for (size_t channel = 0; channel < 3; ++channel) {
     for (uint32_t c = 0; c < 256; ++c) {
-      const uint32_t base = Quantize(tone.lut[c], levels_of[channel], thresholds[0]);
+      const uint32_t base = Quantize(tone.lut[channel][c], levels_of[channel], thresholds[0]);
       uint32_t rise = 0;
       for (const uint32_t threshold : thresholds) {
-        rise += Quantize(tone.lut[c], levels_of[channel], threshold) - base;
+        rise += Quantize(tone.lut[channel][c], levels_of[channel], threshold) - base;
       }
       tables.base[channel][c] = static_cast<uint8_t>(base);
       tables.rise[channel][c] = static_cast<uint8_t>(rise);
@@ -34,9 +34,9 @@ LevelTables LevelTables::Of(display::PixelFormat format, const display::Tone& to
   return tables;
 }
 
-LevelTables LevelTables::OfRgb332(const display::Tone& tone) {
+LevelTables LevelTables::OfRgb332(const display::FrameLayout& layout, const display::Tone& tone) {
   constexpr int kShift[3] = {5, 2, 0};
-  LevelTables tables = Of(display::PixelFormat::kRgb332, tone);
+  LevelTables tables = Of(layout, tone);
   for (size_t channel = 0; channel < 3; ++channel) {
     for (uint8_t& base : tables.base[channel]) base = static_cast<uint8_t>(base << kShift[channel]);
   }

@@ -8,6 +8,15 @@
 #include "gpu/slice/pack.h"
 
 namespace voxeld::gpu {
+namespace {
+
+template <display::PixelFormat kFormat>
+PictureShape ShapeOf(const display::FrameLayout& layout) {
+  return {kFormat, static_cast<uint32_t>(layout.bits_per_channel()),
+          static_cast<uint32_t>(layout.width), static_cast<uint32_t>(layout.height)};
+}
+
+}  // namespace
 
 void Pictures::SetPlan(SlicePlan plan) {
   const bool same_pictures =
@@ -20,11 +29,15 @@ void Pictures::SetPlan(SlicePlan plan) {
     changed_in_.assign(count, 0);
     blank_.assign(slices, 1);
   }
-  levels_ = LevelTables::Of(plan_->layout.format, plan_->tone);
-  columns_ = LevelColumns::Create(plan_->sampler.table(), plan_->sampler.grid(), plan_->layout,
-                                  plan_->tone, plan_->begin, plan_->end);
-  packer_ =
-      PlanePacker::Create(plan_->sampler, plan_->layout, plan_->tone, plan_->begin, plan_->end);
+  columns_.reset();
+  packer_.reset();
+  if (plan_->light.plain(plan_->layout)) {
+    levels_ = LevelTables::Of(plan_->layout, plan_->tone);
+    columns_ = LevelColumns::Create(plan_->sampler.table(), plan_->sampler.grid(), plan_->layout,
+                                    plan_->tone, plan_->begin, plan_->end);
+    packer_ =
+        PlanePacker::Create(plan_->sampler, plan_->layout, plan_->tone, plan_->begin, plan_->end);
+  }
   if (packer_) {
     before_ = std::exchange(bytes_, std::vector<uint8_t>(bytes_.size()));
     packer_->SetPictures(bytes_);
@@ -70,8 +83,7 @@ void Pictures::MarkSlices(const TileStore& tiles, const Volume::Changes& changes
 template <display::PixelFormat kFormat>
 void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
   const display::FrameLayout& layout = plan_->layout;
-  const uint32_t width = static_cast<uint32_t>(layout.width);
-  const uint32_t height = static_cast<uint32_t>(layout.height);
+  const PictureShape shape = ShapeOf<kFormat>(layout);
   uint64_t below[8];  // repeats every 8 pixels
   for (uint32_t u = 0; u < 8; ++u) {
     below[u] = DitherColumn(u, sub, static_cast<uint32_t>(layout.sub_frames));
@@ -84,18 +96,44 @@ void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture)
     const Levels q = {level(LevelTables::kRed, rgb >> 16),
                       level(LevelTables::kGreen, (rgb >> 8) & 0xFF),
                       level(LevelTables::kBlue, rgb & 0xFF)};
-    PackPixel(kFormat, width, height, u, v, q, picture);
+    PackPixel(shape, u, v, q, picture);
   }
 }
 
-void Pictures::Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const {
+// As the definition has it, pixel by pixel.
+template <display::PixelFormat kFormat>
+void Pictures::FinishAs(const SlicePixels& pixels, int32_t slice, uint32_t sub,
+                        uint8_t* picture) const {
+  const PictureShape shape = ShapeOf<kFormat>(plan_->layout);
+  const display::FootprintTable& table = plan_->sampler.table();
+  Finish finish = plan_->light.finish(plan_->layout, plan_->tone);
+  finish.format = kFormat;
+  const size_t first = static_cast<size_t>(slice) * static_cast<size_t>(table.width);
+  const auto row = static_cast<uint32_t>(table.flat_row);
+  for (const auto& [rgb, u, v] : pixels.lit) {
+    const Light light = finish.LightAt(rgb, first + v * row + u);
+    PackPixel(shape, u, v, finish.LevelsAt(light, static_cast<uint32_t>(slice), u, v, sub),
+              picture);
+  }
+}
+
+void Pictures::Pack(const SlicePixels& pixels, int32_t slice, uint32_t sub,
+                    uint8_t* picture) const {
+  const bool plain = plan_->light.plain(plan_->layout);
+  const auto as = [&]<display::PixelFormat kFormat>() {
+    plain ? PackAs<kFormat>(pixels, sub, picture) : FinishAs<kFormat>(pixels, slice, sub, picture);
+  };
   switch (plan_->layout.format) {
     case display::PixelFormat::kRgb888:
-      return PackAs<display::PixelFormat::kRgb888>(pixels, sub, picture);
+      return as.template operator()<display::PixelFormat::kRgb888>();
     case display::PixelFormat::kRgb332:
-      return PackAs<display::PixelFormat::kRgb332>(pixels, sub, picture);
-    case display::PixelFormat::kBitPlanes3:
-      return PackAs<display::PixelFormat::kBitPlanes3>(pixels, sub, picture);
+      return as.template operator()<display::PixelFormat::kRgb332>();
+    case display::PixelFormat::kBitPlanes:
+      return as.template operator()<display::PixelFormat::kBitPlanes>();
+    case display::PixelFormat::kHub75:
+      return as.template operator()<display::PixelFormat::kHub75>();
+    case display::PixelFormat::kPlanes24:
+      return as.template operator()<display::PixelFormat::kPlanes24>();
   }
 }
 
@@ -133,7 +171,7 @@ bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slice
     for (size_t sub = 0; sub < sub_frames; ++sub) {
       if (!blank || !was_blank) {
         scratch.picture.assign(layout.bytes_per_slice(), 0);
-        Pack(scratch.pixels, static_cast<uint32_t>(sub), scratch.picture.data());
+        Pack(scratch.pixels, slice, static_cast<uint32_t>(sub), scratch.picture.data());
         changed |= Keep(index_of(slice, sub), scratch.picture, frame);
       } else if (uint64_t& in = changed_in_[index_of(slice, sub)]; in == 0) {
         in = frame;

@@ -15,6 +15,7 @@
 #include "gpu/engine.h"
 #include "gpu/slice/level_columns.h"
 #include "gpu/slice/levels.h"
+#include "gpu/slice/light_plan.h"
 #include "gpu/slice/plane_packer.h"
 #include "gpu/slice/sampler.h"
 
@@ -25,6 +26,7 @@ struct SlicePlan {
   display::FrameLayout layout;
   display::Tone tone;
   int32_t begin = 0, end = 0;  // the slices owned
+  LightPlan light;
   Sampler sampler;
   display::TileToSlices tile_to_slices;
 };
@@ -72,11 +74,13 @@ class Pictures {
   bool TakePacked(const TileStore& tiles, std::span<const uint32_t> unobserved, uint64_t frame);
   template <display::PixelFormat kFormat>
   void PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
-  void Pack(const SlicePixels& pixels, uint32_t sub, uint8_t* picture) const;
+  template <display::PixelFormat kFormat>
+  void FinishAs(const SlicePixels& pixels, int32_t slice, uint32_t sub, uint8_t* picture) const;
+  void Pack(const SlicePixels& pixels, int32_t slice, uint32_t sub, uint8_t* picture) const;
 
   Executor& executor_;
   std::optional<SlicePlan> plan_;
-  LevelTables levels_;                   // of the plan's format and tone
+  LevelTables levels_;                   // of the plan's format and tone; where it is plain
   std::optional<LevelColumns> columns_;  // where it applies
   std::optional<PlanePacker> packer_;    // where it applies: then it alone writes pictures
   std::vector<uint8_t> bytes_;           // the owned slices' pictures, from the first on

@@ -41,13 +41,13 @@ std::optional<PlanePacker> PlanePacker::Create(const Sampler& sampler,
                                                const display::FrameLayout& layout,
                                                const display::Tone& tone, int32_t begin,
                                                int32_t end) {
-  if (layout.format != display::PixelFormat::kBitPlanes3 ||
+  if (layout.format != display::PixelFormat::kBitPlanes || layout.bits_per_channel() != 1 ||
       tone.sampling != display::Sampling::kMax || sampler.planes().empty()) {
     return std::nullopt;
   }
   PlanePacker out;
   out.grid_ = sampler.grid();
-  const LevelTables levels = LevelTables::Of(layout.format, tone);
+  const LevelTables levels = LevelTables::Of(layout, tone);
   for (size_t channel = 0; channel < kChannels; ++channel) {
     for (size_t c = 0; c < 256; ++c) {
       const int under = levels.base[channel][c] * 64 + levels.rise[channel][c];

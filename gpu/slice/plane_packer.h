@@ -20,7 +20,7 @@ namespace voxeld::gpu {
 
 class PlanePacker final : public TileObserver {
  public:
-  // Nothing where it does not apply: bit planes, of slices that are planes of the grid (Sampler::planes).
+  // Nothing where it does not apply: one bit a channel in planes, of slices that are planes of the grid (Sampler::planes).
   // [begin, end): the slices owned.
   static std::optional<PlanePacker> Create(const Sampler& sampler,
                                            const display::FrameLayout& layout,

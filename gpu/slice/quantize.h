@@ -1,4 +1,4 @@
-// From linear light to the levels that a display has, with ordered dither. Host and device.
+// From linear light to the levels that a display has, with dither. Host and device.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,12 @@
 #include "gpu/portable.h"
 
 namespace voxeld::gpu {
+
+// Blue noise: ranks of a square of pixels, each number from 0 to kNoiseRanks − 1 once (blue_noise.h).
+inline constexpr uint32_t kNoiseSide = 64, kNoiseRanks = kNoiseSide * kNoiseSide;
+// By how much ranks turn from slice to slice: the golden section of all, so that a column of pixels through the slices runs
+// through evenly spread thresholds too. Odd.
+inline constexpr uint32_t kNoiseTurn = 2531;
 
 // 8×8 Bayer matrix, 0 to 63: column u, row v; the lowest bits of u and v weigh most.
 VOXELD_HD inline uint32_t Bayer8(uint32_t u, uint32_t v) {
@@ -18,12 +24,19 @@ VOXELD_HD inline uint32_t Bayer8(uint32_t u, uint32_t v) {
 }
 
 // What is added before rounding down: 0 to 65534. Over sub-frames the matrix' values rotate, so
-// that each pixel runs through evenly spread thresholds.
+// that each pixel runs through evenly spread thresholds. kNone and kOrdered.
 VOXELD_HD inline uint32_t Threshold(display::Dither dither, uint32_t u, uint32_t v, uint32_t sub,
                                     uint32_t sub_frames) {
   if (dither == display::Dither::kNone) return 32767;
   const uint32_t b = (Bayer8(u, v) + sub * 64 / sub_frames) % 64;
   return (2 * b + 1) * 65535 / 128;
+}
+
+// The same of kBlueNoise, by a pixel's rank. 7 to 65527.
+VOXELD_HD inline uint32_t NoiseThreshold(uint32_t rank, uint32_t slice, uint32_t sub,
+                                         uint32_t sub_frames) {
+  const uint32_t b = (rank + slice * kNoiseTurn + sub * kNoiseRanks / sub_frames) % kNoiseRanks;
+  return (2 * b + 1) * 65535 / (2 * kNoiseRanks);
 }
 
 // Light 0 to 65535 → 0 to levels − 1. Full light is always the highest level, none the lowest.

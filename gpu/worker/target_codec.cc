@@ -147,9 +147,11 @@ void Fields(Io& io, T& t)
   io.Optional(t.geometry.correction, [&](auto& correction) { Fields(io, correction); });
   auto& layout = t.layout;
   io.Value(layout.slices), io.Value(layout.width), io.Value(layout.height);
-  io.Value(layout.sub_frames), io.Value(layout.format);
-  for (auto& light : t.tone.lut) io.Value(light);
-  io.Value(t.tone.dither), io.Value(t.tone.sampling);
+  io.Value(layout.sub_frames), io.Value(layout.format), io.Value(layout.bits);
+  for (auto& curve : t.tone.lut) {
+    for (auto& light : curve) io.Value(light);
+  }
+  io.Value(t.tone.dither), io.Value(t.tone.sampling), io.Value(t.tone.density);
   for (auto& m : t.view.m) io.Value(m);
 }
 

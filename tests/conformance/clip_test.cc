@@ -24,7 +24,7 @@ Target StackTarget(const Affine& view = {}) {
   target.geometry.shape = stack;
   target.geometry.grid = {48, 48, 32, {1, 1, 1}, {-24, -24, -0.5}};
   target.layout = {.slices = 32, .width = 48, .height = 48};
-  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   target.view = view;
   return target;
 }

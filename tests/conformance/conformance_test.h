@@ -42,7 +42,7 @@ inline Target CubeTarget(int32_t size) {
   target.geometry.shape = stack;
   target.geometry.grid = {size, size, size, {1, 1, 1}, {-size / 2.0, -size / 2.0, -0.5}};
   target.layout = {.slices = size, .width = size, .height = size};
-  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 

@@ -19,7 +19,7 @@ Target StackTarget() {
   target.geometry.shape = stack;
   target.geometry.grid = {48, 48, 32, {1, 1, 1}, {-24, -24, -0.5}};
   target.layout = {.slices = 32, .width = 48, .height = 48};
-  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 
@@ -311,7 +311,9 @@ TEST_P(EngineContract, BadTargetsAreRefusedAndTheOldOneStays) {
   add("sub_frames").layout.sub_frames = 0;
   add("too many sub_frames").layout.sub_frames = 65;
   add("format").layout.format = static_cast<display::PixelFormat>(9);
-  add("lut").tone.lut[0] = 1;
+  add("lut").tone.lut[1][0] = 1;
+  add("density").tone.density = static_cast<display::Density>(2);
+  add("bits").layout.bits = 9;
   add("view").view.m[5] = std::numeric_limits<double>::infinity();
   add("grid").geometry.grid.nx = 0;
   for (const auto& [name, target] : bad) {
@@ -325,7 +327,9 @@ TEST_P(EngineContract, BadTargetsAreRefusedAndTheOldOneStays) {
 TEST_P(EngineContract, ANewToneKeepsBlackPictures) {
   MustFrame();
   Target darker = target_;
-  for (uint16_t& light : darker.tone.lut) light /= 2;
+  for (display::Tone::Curve& curve : darker.tone.lut) {
+    for (uint16_t& light : curve) light /= 2;
+  }
   // By hand, since the driver's SetTarget forgets what its buffer holds.
   std::vector<std::byte> bytes(target_.layout.bytes());
   std::vector<uint64_t> numbers(target_.layout.pictures());

@@ -28,8 +28,8 @@ Target StackOf(int32_t width, int32_t height, int32_t slices) {
   target.layout = {.slices = slices,
                    .width = width,
                    .height = height,
-                   .format = display::PixelFormat::kBitPlanes3};
-  for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(c * 257);
+                   .format = display::PixelFormat::kBitPlanes};
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 

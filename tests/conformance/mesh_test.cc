@@ -19,7 +19,7 @@ Target StackOf(int32_t width, int32_t height, int32_t slices, display::PixelForm
   target.geometry.shape = stack;
   target.geometry.grid = display::DefaultGrid(target.geometry);
   target.layout = {.slices = slices, .width = width, .height = height, .format = format};
-  for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(c * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 
@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(Engines, Meshes, testing::ValuesIn(EngineCases()),
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(Meshes, OverAllEdgesEqualTheOracle) {
-  for (const auto format : {display::PixelFormat::kBitPlanes3, display::PixelFormat::kRgb888}) {
+  for (const auto format : {display::PixelFormat::kBitPlanes, display::PixelFormat::kRgb888}) {
     const Target target = StackOf(75, 70, 37, format);
     const SceneModel scene = OneLayer(target.geometry.grid, 400);
     EngineDriver engine = Make();
@@ -129,7 +129,7 @@ TEST_P(Meshes, SlicedAnotherWayEqualTheOracle) {
 
 // One region and one triangle in it, or a thousand: whoever shares them out.
 TEST_P(Meshes, FewAndManyInAPlaceEqualTheOracle) {
-  const Target target = StackOf(32, 32, 16, display::PixelFormat::kBitPlanes3);
+  const Target target = StackOf(32, 32, 16, display::PixelFormat::kBitPlanes);
   for (const uint32_t triangles : {1u, 3u, 9u, 40u, 1000u}) {
     for (const SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
       SceneModel scene;
@@ -146,7 +146,7 @@ TEST_P(Meshes, FewAndManyInAPlaceEqualTheOracle) {
 
 // More vertices than are looked through one by one.
 TEST_P(Meshes, LargeOnesWithOneLargeTriangleEqualTheOracle) {
-  const Target target = StackOf(100, 40, 30, display::PixelFormat::kBitPlanes3);
+  const Target target = StackOf(100, 40, 30, display::PixelFormat::kBitPlanes);
   SceneModel scene;
   scene.layers[1].id = 1;
   scene.geometries[1] = Mesh(1, SurfaceRule::kThin, 1500, 5, target.geometry.grid);

@@ -12,17 +12,6 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// Bits of green, red, blue from the top, bit by bit.
-uint32_t Interleaved(uint32_t rgb) {
-  uint32_t word = 0;
-  for (int bit = 7; bit >= 0; --bit) {
-    word = word << 1 | (rgb >> (8 + bit) & 1);
-    word = word << 1 | (rgb >> (16 + bit) & 1);
-    word = word << 1 | (rgb >> bit & 1);
-  }
-  return word;
-}
-
 // A voxel of one layer.
 struct LayerVoxel {
   bool covered = false, erased = false;
@@ -146,35 +135,17 @@ uint32_t Blended(uint32_t below, uint32_t rgb, const LayerRecord& layer) {
   return result;
 }
 
-constexpr int kBayer[8][8] = {{0, 32, 8, 40, 2, 34, 10, 42},  {48, 16, 56, 24, 50, 18, 58, 26},
-                              {12, 44, 4, 36, 14, 46, 6, 38}, {60, 28, 52, 20, 62, 30, 54, 22},
-                              {3, 35, 11, 43, 1, 33, 9, 41},  {51, 19, 59, 27, 49, 17, 57, 25},
-                              {15, 47, 7, 39, 13, 45, 5, 37}, {63, 31, 55, 23, 61, 29, 53, 21}};
-
-uint32_t Level(uint32_t channel, uint32_t levels, int u, int v, int sub, const Target& target) {
-  uint32_t threshold = 32767;
-  if (target.tone.dither == display::Dither::kOrdered) {
-    const int b = (kBayer[v % 8][u % 8] + sub * 64 / target.layout.sub_frames) % 64;
-    threshold = static_cast<uint32_t>((2 * b + 1) * 65535 / 128);
-  }
-  return static_cast<uint32_t>((uint64_t{target.tone.lut[channel]} * (levels - 1) + threshold) /
-                               65535);
-}
-
-uint32_t PixelOf(const DenseVolume& volume, const OracleFootprints& footprints, int32_t slice,
-                 int32_t u, int32_t v, display::Sampling sampling) {
-  uint32_t best = 0, red = 0, green = 0, blue = 0;
-  for (const OracleVoxel& voxel : footprints.Of(slice, u, v)) {
-    const uint32_t rgb = volume.rgb[volume.Index(voxel.x, voxel.y, voxel.z)], w = voxel.weight;
-    if (Interleaved(rgb) > Interleaved(best)) best = rgb;
-    red = std::max(red, (w * (rgb >> 16) + 127) / 255);
-    green = std::max(green, (w * (rgb >> 8 & 255) + 127) / 255);
-    blue = std::max(blue, (w * (rgb & 255) + 127) / 255);
-  }
-  return sampling == display::Sampling::kMax ? best : red << 16 | green << 8 | blue;
-}
-
 }  // namespace
+
+uint32_t Interleaved(uint32_t rgb) {
+  uint32_t word = 0;
+  for (int bit = 7; bit >= 0; --bit) {
+    word = word << 1 | (rgb >> (8 + bit) & 1);
+    word = word << 1 | (rgb >> (16 + bit) & 1);
+    word = word << 1 | (rgb >> bit & 1);
+  }
+  return word;
+}
 
 uint32_t OracleTint(uint32_t rgb, uint32_t tint) {
   uint32_t result = 0;
@@ -339,52 +310,6 @@ std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target)
     }
   }
   return seen;
-}
-
-std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& target) {
-  const OracleFootprints footprints(target);
-  const display::FrameLayout& layout = target.layout;
-  std::vector<std::byte> bytes(layout.bytes());
-  const size_t width = static_cast<size_t>(layout.width);
-  const size_t height = static_cast<size_t>(layout.height);
-  const auto set = [&](size_t at, uint32_t bits) { bytes[at] |= static_cast<std::byte>(bits); };
-  for (int32_t slice = 0; slice < layout.slices; ++slice) {
-    for (size_t v = 0; v < height; ++v) {
-      for (size_t u = 0; u < width; ++u) {
-        const uint32_t rgb = PixelOf(volume, footprints, slice, static_cast<int32_t>(u),
-                                     static_cast<int32_t>(v), target.tone.sampling);
-        for (int32_t sub = 0; sub < layout.sub_frames; ++sub) {
-          const size_t picture =
-              (static_cast<size_t>(slice) * static_cast<size_t>(layout.sub_frames) +
-               static_cast<size_t>(sub)) *
-              layout.bytes_per_slice();
-          const auto level = [&](int shift, uint32_t levels) {
-            return Level(rgb >> shift & 255, levels, static_cast<int>(u), static_cast<int>(v), sub,
-                         target);
-          };
-          switch (layout.format) {
-            case display::PixelFormat::kRgb888:
-              for (size_t channel = 0; channel < 3; ++channel) {
-                set(picture + (v * width + u) * 3 + channel,
-                    level(16 - 8 * static_cast<int>(channel), 256));
-              }
-              break;
-            case display::PixelFormat::kRgb332:
-              set(picture + v * width + u, level(16, 8) * 32 + level(8, 8) * 4 + level(0, 4));
-              break;
-            case display::PixelFormat::kBitPlanes3:
-              for (size_t channel = 0; channel < 3; ++channel) {
-                const size_t row = (width + 7) / 8;
-                set(picture + channel * row * height + v * row + u / 8,
-                    level(16 - 8 * static_cast<int>(channel), 2) * (0x80u >> u % 8));
-              }
-              break;
-          }
-        }
-      }
-    }
-  }
-  return bytes;
 }
 
 }  // namespace voxeld::gpu::conformance

@@ -32,6 +32,9 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target);
 // An engine may leave out what no slice looks at.
 std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target);
 
+// Bits of green, red, blue from the top, bit by bit.
+uint32_t Interleaved(uint32_t rgb);
+
 // All pictures of the volume, as target.layout has them.
 std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& target);
 

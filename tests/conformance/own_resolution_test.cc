@@ -18,7 +18,7 @@ Target StackOf(int32_t width, int32_t height, int32_t slices, display::PixelForm
   target.geometry.shape = stack;
   target.geometry.grid = display::DefaultGrid(target.geometry);
   target.layout = {.slices = slices, .width = width, .height = height, .format = format};
-  for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(c * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 
@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Engines, OwnResolution, testing::ValuesIn(EngineCases()
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(OwnResolution, LinesOverAllEdgesEqualTheOracle) {
-  for (const auto format : {display::PixelFormat::kBitPlanes3, display::PixelFormat::kRgb888,
+  for (const auto format : {display::PixelFormat::kBitPlanes, display::PixelFormat::kRgb888,
                             display::PixelFormat::kRgb332}) {
     Target target = StackOf(43, 70, 20, format);
     target.layout.sub_frames = 2;
@@ -87,7 +87,7 @@ TEST_P(OwnResolution, LinesOverAllEdgesEqualTheOracle) {
 
 // More lines in each neighbourhood than any list of an engine takes at once.
 TEST_P(OwnResolution, CrowdsEqualTheOracle) {
-  const Target target = StackOf(120, 100, 60, display::PixelFormat::kBitPlanes3);
+  const Target target = StackOf(120, 100, 60, display::PixelFormat::kBitPlanes);
   const SceneModel scene = RandomLines(Seed() + 2, 40'000, target.geometry.grid);
   EngineDriver engine = Make();
   ASSERT_TRUE(engine.SetTarget(target).ok());
@@ -96,7 +96,7 @@ TEST_P(OwnResolution, CrowdsEqualTheOracle) {
 }
 
 TEST_P(OwnResolution, PartsJoinedEqualTheWhole) {
-  const Target target = StackOf(64, 40, 50, display::PixelFormat::kBitPlanes3);
+  const Target target = StackOf(64, 40, 50, display::PixelFormat::kBitPlanes);
   const SceneModel scene = RandomLines(Seed() + 1, 150, target.geometry.grid);
   const std::vector<std::byte> want = OraclePictures(OracleVoxels(scene, target), target);
   std::vector<std::byte> joined(target.layout.bytes());
@@ -162,7 +162,7 @@ TEST_P(OwnResolution, DrawablesWithoutLinesComeAndGo) {
 // What was drawn for a reader of voxels is told with the next frame, also if the target is set in
 // between; and nothing of it stays where a target is sliced another way.
 TEST_P(OwnResolution, ChangesBetweenTargetsAreTold) {
-  Target target = StackOf(48, 48, 20, display::PixelFormat::kBitPlanes3);
+  Target target = StackOf(48, 48, 20, display::PixelFormat::kBitPlanes);
   const SceneModel before = RandomLines(Seed() + 2, 50, target.geometry.grid);
   EngineDriver engine = Make();
   ASSERT_TRUE(engine.SetTarget(target).ok());

@@ -62,13 +62,25 @@ Target SceneGenerator::RandomTarget() {
       target.geometry.shape);
   const int32_t sub_frames[] = {1, 1, 2, 3, 8};
   target.layout.sub_frames = sub_frames[Int(0, 4)];
-  target.layout.format = static_cast<display::PixelFormat>(Int(0, 2));
-  target.tone.dither = static_cast<display::Dither>(Int(0, 1));
+  target.layout.format = static_cast<display::PixelFormat>(Int(0, display::kPixelFormats - 1));
+  if (target.layout.format == display::PixelFormat::kHub75 && target.layout.height % 2 != 0) {
+    target.layout.format = display::PixelFormat::kBitPlanes;
+  }
+  const bool any_bits = target.layout.format != display::PixelFormat::kRgb332 &&
+                        target.layout.format != display::PixelFormat::kPlanes24;
+  if (any_bits && Chance(0.5)) target.layout.bits = static_cast<int32_t>(Int(1, 8));
+  target.tone.dither = static_cast<display::Dither>(Int(0, 2));
+  if (Chance(0.3)) target.tone.density = display::Density::kEven;
   target.tone.sampling = static_cast<display::Sampling>(Int(0, 1));
-  const double gamma = Real(0.5, 3);
-  for (size_t i = 0; i < 256; ++i) {
-    target.tone.lut[i] =
-        static_cast<uint16_t>(std::lround(65535 * std::pow(static_cast<double>(i) / 255, gamma)));
+  const bool alike = Chance(0.5);  // of all channels
+  display::Tone::Curve curve{};
+  for (size_t c = 0; c < 3; ++c) {
+    const double gamma = Real(0.5, 3), white = alike ? 1 : Real(0.2, 1);
+    for (size_t i = 0; i < 256 && (c == 0 || !alike); ++i) {
+      curve[i] = static_cast<uint16_t>(
+          std::lround(65535 * white * std::pow(static_cast<double>(i) / 255, gamma)));
+    }
+    target.tone.lut[c] = curve;
   }
   if (Chance(0.3)) target.view = RandomTransform(20);
   return target;

@@ -219,9 +219,7 @@ class Frames {
     target.geometry = display::Geometry{stack, {}};
     target.geometry.grid = display::DefaultGrid(target.geometry);
     target.layout = {slices, width, height, 1, format};
-    for (int c = 0; c < 256; ++c) {
-      target.tone.lut[static_cast<size_t>(c)] = static_cast<uint16_t>(c * 257);
-    }
+    target.tone.SetCurve(display::Tone::Linear());
     bytes_.resize(target.layout.bytes());
     changed_.resize(target.layout.pictures());
     size_[0] = target.geometry.grid.nx;
@@ -314,7 +312,7 @@ Draft Threads(uint64_t seed, size_t count, float length, const int32_t size[3]) 
 }
 
 void Vx1(benchmark::State& state) {
-  Frames frames(912, 1140, 192, display::PixelFormat::kBitPlanes3,
+  Frames frames(912, 1140, 192, display::PixelFormat::kBitPlanes,
                 static_cast<int>(state.range(0)));
   const Draft scenes[2] = {Threads(5, 20'000, 100, frames.size()),
                            Threads(6, 20'000, 100, frames.size())};

@@ -93,7 +93,7 @@ gpu::Target StackTarget(int32_t n) {
   target.geometry = {stack, {}};
   target.geometry.grid = display::DefaultGrid(target.geometry);
   target.layout = {.slices = n, .width = n, .height = n};
-  for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(c * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 

@@ -47,7 +47,7 @@ using display::Display;
 using display::SliceFrame;
 using sync::TimeNs;
 
-constexpr const char* kVx1 = "size=912x1140x64,format=bitplanes3,rate=15,pacing=400000000";
+constexpr const char* kVx1 = "size=912x1140x64,format=bitplanes,rate=15,pacing=400000000";
 
 [[noreturn]] void Fail(const std::string& why) {
   std::fprintf(stderr, "voxel-link-bench: %s\n", why.c_str());

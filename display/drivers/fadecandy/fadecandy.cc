@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "display/drivers/fadecandy/boards.h"
 #include "display/drivers/fadecandy/fadecandy_display.h"
-#include "display/drivers/fadecandy/layout.h"
 #include "display/drivers/fadecandy/protocol.h"
 #include "display/drivers/fadecandy/verify/suite.h"
 #include "display/drivers/usb_options.h"
@@ -112,8 +112,8 @@ absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& option
   info.layout = {.slices = count, .width = kPixels, .height = 1};
   info.volumes_per_second = reader.Number("rate", 60, 0.5, kMostVolumesPerSecond);
   // The curve is the board's.
-  info.tone = MakeTone(1, 1, Dither::kNone, Sampling::kMax);
-  absl::StatusOr<Lattice> lattice = ReadLattice(reader, count);
+  info.tone = MakeTone({.dither = Dither::kNone});
+  absl::StatusOr<Lattice> lattice = wiring::ReadLattice(reader, PixelsOf(count));
   const std::string record = ReadUsbRecord(reader);
   if (absl::Status status = reader.Finish(); !status.ok()) return status;
   absl::Status status = lattice.status();

@@ -130,7 +130,8 @@ inline constexpr uint8_t kShapeLattice = 4;
 struct Mode {
   uint8_t format;
   uint8_t sub_frames;
-  uint16_t reserved0;
+  uint8_t bits;  // a channel; 0: the format's own
+  uint8_t reserved0;
   uint32_t rate_mhz;  // 0: nominal
   uint32_t reserved1[2];
 };

@@ -201,6 +201,7 @@ void VoxlinkDisplay::Configure() {
   link_.Write(Request::kStop, 0);
   Mode mode{};
   mode.format = static_cast<uint8_t>(info().layout.format);
+  mode.bits = static_cast<uint8_t>(info().layout.bits);
   mode.sub_frames = static_cast<uint8_t>(info().layout.sub_frames);
   mode.rate_mhz = static_cast<uint32_t>(std::lround(info().volumes_per_second * 1000));
   link_.Write(Request::kSetMode, 0, BytesOf(mode));

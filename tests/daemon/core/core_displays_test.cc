@@ -165,8 +165,10 @@ TEST(CoreDisplays, APatternTakesTheScenesPlaceForAWhile) {
   EXPECT_EQ(sim.engine().scene->geometries().begin()->second.record.kind, gpu::PrimitiveKind::kBox);
   EXPECT_EQ(sim.engine().targets.back().view, gpu::Affine());
 
-  for (const TestPattern pattern : {TestPattern::kAxes, TestPattern::kCorners, TestPattern::kGrid,
-                                    TestPattern::kRamp, TestPattern::kWhite, TestPattern::kNone}) {
+  for (const TestPattern pattern :
+       {TestPattern::kAxes, TestPattern::kCorners, TestPattern::kGrid, TestPattern::kRamp,
+        TestPattern::kWhite, TestPattern::kBars, TestPattern::kDensity, TestPattern::kSlices,
+        TestPattern::kNone}) {
     update.pattern = pattern;
     ASSERT_TRUE(sim.Update(update).ok());
     EXPECT_TRUE(sim.Show());

@@ -24,9 +24,7 @@ inline display::DisplayInfo SmallDisplay(std::string name) {
   info.geometry.shape = stack;
   info.geometry.grid = {8, 8, 2, {1, 1, 1}, {-4, -4, -1}};
   info.layout = {2, 8, 8, 1, display::PixelFormat::kRgb888};
-  for (size_t i = 0; i < info.tone.lut.size(); ++i) {
-    info.tone.lut[i] = static_cast<uint16_t>(257 * i);
-  }
+  info.tone.SetCurve(display::Tone::Linear());
   info.volumes_per_second = 30;
   return info;
 }

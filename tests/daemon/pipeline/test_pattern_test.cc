@@ -11,9 +11,11 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <string>
 #include <variant>
 #include <vector>
 
+#include "daemon/pipeline/slice_numbers.h"
 #include "daemon/scene/engine_delta.h"
 #include "display/geometry/footprint.h"
 #include "gpu/engine.h"
@@ -41,7 +43,7 @@ class Drawn {
     auto engine = *gpu::CreateEngine(options);
     gpu::Target target;
     target.geometry = geometry;
-    for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = uint16_t(c * 257);
+    target.tone.SetCurve(display::Tone::Linear());
     target.layout.slices = display::SliceCount(geometry);
     std::visit(
         [&](const auto& shape) {
@@ -190,6 +192,77 @@ TEST(TestPattern, ALatticesRampReachesEveryLight) {
 TEST(TestPattern, ALatticeIsAllWhite) {
   std::vector<uint32_t> lights = Drawn(TestPattern::kWhite, Ring()).Lights();
   EXPECT_EQ(std::count(lights.begin(), lights.end(), 0xFFFFFFu), 39);
+}
+
+TEST(TestPattern, BarsAreEightColoursAlongX) {
+  const Drawn drawn(TestPattern::kBars);
+  EXPECT_EQ(drawn.At(0, 3, 4), 0xFFFFFFu);
+  EXPECT_EQ(drawn.At(2, 0, 9), 0xFFFF00u);  // bars of 2 and 3 voxels in turn
+  EXPECT_EQ(drawn.At(16, 11, 0), 0x0000FFu);
+  EXPECT_EQ(drawn.At(kNx - 1, 3, 4), 0u);
+  EXPECT_EQ(drawn.Colors().size(), 8u);
+}
+
+TEST(TestPattern, DensityIsARampInTheWholeVolume) {
+  const Drawn drawn(TestPattern::kDensity);
+  for (int x = 0; x < kNx; ++x) {
+    const uint32_t level = static_cast<uint32_t>(x * 255 / (kNx - 1));
+    for (const int y : {0, kNy - 1}) EXPECT_EQ(drawn.At(x, y, 3), level * 0x010101);
+  }
+}
+
+// A slice of its own resolution: the voxels are the digits' pixels, three wide and five high.
+TEST(TestPattern, SlicesShowTheirNumbers) {
+  const Drawn drawn(TestPattern::kSlices);
+  const auto picture = [&](int x0, int z) {
+    std::vector<std::string> rows;
+    for (int y = 7; y >= 3; --y) {
+      std::string row;
+      for (int x = x0; x < x0 + 3; ++x) row += drawn.At(x, y, z) != 0 ? '#' : '.';
+      rows.push_back(row);
+    }
+    return rows;
+  };
+  EXPECT_THAT(picture(0, 0), ::testing::ElementsAre("###", "#.#", "#.#", "#.#", "###"));
+  EXPECT_THAT(picture(5, 1), ::testing::ElementsAre(".#.", "##.", ".#.", ".#.", "###"));
+  EXPECT_THAT(picture(15, 7), ::testing::ElementsAre("###", "..#", "..#", ".#.", ".#."));
+  EXPECT_EQ(drawn.At(0, 3, 0), 0xFF0000u);
+  EXPECT_EQ(drawn.At(5, 3, 1), 0x00FF00u);
+}
+
+TEST(TestPattern, SlicesOfALatticeBeginWithWhite) {
+  const std::vector<uint32_t> lights = Drawn(TestPattern::kSlices, Ring()).Lights();
+  EXPECT_EQ(lights[0], 0xFFFFFFu);
+  EXPECT_EQ(lights[1], 0xFF0000u);
+  EXPECT_EQ(lights[7], 0u);  // there is no light
+  EXPECT_EQ(lights[20], 0xFFFFFFu);
+  EXPECT_EQ(lights[21], 0x00FF00u);
+}
+
+// Every pixel of a number lights in its own slice, in every geometry.
+TEST(TestPattern, NumbersStandInTheirSlices) {
+  display::Rotor rotor;
+  rotor.slices_per_turn = 40;
+  rotor.width_px = 48;
+  rotor.height_px = 24;
+  rotor.panels.resize(2);
+  rotor.panels[1].eccentricity_mm = 3;
+  rotor.panels[1].mirror_u = true;
+  display::Helix helix;
+  helix.slices_per_turn = 60;
+  helix.width_px = helix.height_px = 48;
+  helix.height_mm = 40;
+  helix.radius_mm = 24;
+  for (display::Geometry geometry : {display::Geometry{rotor, {}}, display::Geometry{helix, {}}}) {
+    geometry.grid = display::DefaultGrid(geometry);
+    const std::vector<NumberedVoxel> voxels = SliceNumbers(geometry);
+    EXPECT_GT(voxels.size(), 400u);
+    for (const NumberedVoxel& voxel : voxels) {
+      EXPECT_TRUE(voxel.at.x >= 0 && voxel.at.x < geometry.grid.nx && voxel.at.y >= 0 &&
+                  voxel.at.y < geometry.grid.ny && voxel.at.z >= 0 &&
+                  voxel.at.z < geometry.grid.nz);
+    }
+  }
 }
 
 }  // namespace

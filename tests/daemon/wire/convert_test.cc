@@ -124,7 +124,7 @@ TEST(Convert, GeometriesBothWays) {
   EXPECT_THAT(std::string(FromWire(message).status().message()), HasSubstr("planar_stack.normal"));
 
   v1::FrameLayout layout;
-  const display::FrameLayout ours{3, 4, 5, 6, display::PixelFormat::kBitPlanes3};
+  const display::FrameLayout ours{3, 4, 5, 6, display::PixelFormat::kBitPlanes};
   ToWire(ours, &layout);
   EXPECT_EQ(*FromWire(layout), ours);
 }

@@ -27,8 +27,7 @@ TEST(Pixels, Rgb332SpreadsOverTheRange) {
 
 TEST(Pixels, BitPlanesAreRowsOfBitsFromTheLeft) {
   // 9 pixels wide: two bytes a row; two rows; planes R, G, B.
-  const FrameLayout layout{
-      .slices = 1, .width = 9, .height = 2, .format = PixelFormat::kBitPlanes3};
+  const FrameLayout layout{.slices = 1, .width = 9, .height = 2, .format = PixelFormat::kBitPlanes};
   const std::vector<uint8_t> light =
       Light(layout, {0x80, 0x80, 0, 0, /*G*/ 0, 0, 0x40, 0, /*B*/ 0, 0, 0, 0x80});
   std::vector<uint8_t> expected(9 * 2 * 3);
@@ -37,6 +36,32 @@ TEST(Pixels, BitPlanesAreRowsOfBitsFromTheLeft) {
   expected[(9 + 1) * 3 + 1] = 255;  // G of (1, 1)
   expected[(9 + 8) * 3 + 2] = 255;  // B of (8, 1)
   EXPECT_EQ(light, expected);
+}
+
+TEST(Pixels, BytesOfFewBitsAreLevels) {
+  const FrameLayout layout{.slices = 1, .width = 1, .height = 1, .bits = 4};
+  EXPECT_EQ(Light(layout, {0, 5, 15}), (std::vector<uint8_t>{0, 85, 255}));
+}
+
+TEST(Pixels, BitPlanesOfSeveralBitsBeginWithTheHighest) {
+  const FrameLayout layout{
+      .slices = 1, .width = 8, .height = 1, .format = PixelFormat::kBitPlanes, .bits = 2};
+  const std::vector<uint8_t> light = Light(layout, {0x80, 0, 0x01, /*low*/ 0, 0x80, 0x01});
+  EXPECT_EQ(light[0], 170);          // R of pixel 0: 2 of 3
+  EXPECT_EQ(light[1], 85);           // G
+  EXPECT_EQ(light[7 * 3 + 2], 255);  // B of pixel 7
+}
+
+TEST(Pixels, Hub75HasTwoRowsInAByte) {
+  const FrameLayout layout{.slices = 1, .width = 1, .height = 2, .format = PixelFormat::kHub75};
+  EXPECT_EQ(Light(layout, {0b010'101}), (std::vector<uint8_t>{255, 0, 255, 0, 255, 0}));
+}
+
+TEST(Pixels, Planes24AreAveragedOverTheirParts) {
+  const FrameLayout layout{.slices = 1, .width = 1, .height = 1, .format = PixelFormat::kPlanes24};
+  // Red in all eight parts, green in parts 0 and 2, blue in none: bits 0, 3, 6, …; 1 and 7.
+  EXPECT_EQ(Light(layout, {0b1100'1011, 0b1001'0010, 0b0010'0100}),
+            (std::vector<uint8_t>{255, 64, 0}));
 }
 
 TEST(Pixels, SubFramesAreAveraged) {

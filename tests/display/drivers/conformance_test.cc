@@ -13,6 +13,7 @@
 #include "display/sync/mutex.h"
 #include "gtest/gtest.h"
 #include "tests/display/drivers/fadecandy/fadecandy_rig.h"
+#include "tests/display/drivers/network/heard.h"
 #include "tests/display/drivers/rig.h"
 
 namespace voxeld::display {
@@ -91,7 +92,7 @@ TEST_P(DriverConformance, InfoHoldsTogether) {
   EXPECT_GT(info.layout.bytes(), 0u);
   EXPECT_GT(info.geometry.grid.nx, 0);
   EXPECT_GT(info.volumes_per_second, 0);
-  EXPECT_EQ(info.tone.lut[0], 0);
+  for (const Tone::Curve& curve : info.tone.lut) EXPECT_EQ(curve[0], 0);
 }
 
 TEST_P(DriverConformance, PresentsEveryVolumeThatWaitsForItsTurn) {
@@ -224,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(
                                 {"size", "32x16"},
                                 {"slices", "60"},
                                 {"eccentricity", "0.5;4"},
-                                {"format", "bitplanes3"},
+                                {"format", "bitplanes"},
                                 {"sub_frames", "2"},
                                 {"rate", "60"}}}},
         DriverCase{"SimulatedSlow",
@@ -241,6 +242,22 @@ INSTANTIATE_TEST_SUITE_P(
                     .options = {{"cube", "8x8x16"}, {"boards", "2"}, {"serpentine", "rows"}}},
                    false,
                    &fadecandy::CreateEmulated},
+        DriverCase{"NetworkDdp",
+                   {.name = "wall",
+                    .driver = "network",
+                    .options = {{"address", "127.0.0.1"}, {"cube", "12x12x12"}}},
+                   true,
+                   &network::CreateHeard},
+        DriverCase{"NetworkE131",
+                   {.name = "wall",
+                    .driver = "network",
+                    .options = {{"address", "127.0.0.1"},
+                                {"protocol", "e131"},
+                                {"sync_universe", "7"},
+                                {"color_order", "grb"},
+                                {"rate", "60"}}},
+                   true,
+                   &network::CreateHeard},
         DriverCase{"FadecandyFading",
                    {.name = "cube", .driver = "fadecandy", .options = {{"interpolate", "true"}}},
                    false,

@@ -35,7 +35,7 @@ TEST(Options, DefaultsAreAPlanarCube) {
   EXPECT_EQ(planar.positions_mm.back(), 63.5);
   EXPECT_EQ(info->geometry.grid.nx, 128);
   EXPECT_EQ(info->geometry.grid.nz, 128);
-  for (int c = 0; c < 256; ++c) EXPECT_EQ(info->tone.lut[static_cast<size_t>(c)], c * 257);
+  for (const Tone::Curve& curve : info->tone.lut) EXPECT_EQ(curve, Tone::Linear());
 }
 
 TEST(Options, StrokesAndMotions) {
@@ -144,7 +144,7 @@ TEST(Options, PlanarInFull) {
                           {"pitch_mm", "0.5"},
                           {"positions_mm", "-3;0;4.5"},
                           {"mirror_u", "true"},
-                          {"format", "bitplanes3"},
+                          {"format", "bitplanes"},
                           {"sub_frames", "4"},
                           {"rate", "20"},
                           {"dither", "none"},
@@ -158,7 +158,7 @@ TEST(Options, PlanarInFull) {
                                        .width = 64,
                                        .height = 48,
                                        .sub_frames = 4,
-                                       .format = PixelFormat::kBitPlanes3}));
+                                       .format = PixelFormat::kBitPlanes}));
   EXPECT_EQ(info->tone.dither, Dither::kNone);
   EXPECT_EQ(info->tone.sampling, Sampling::kWeighted);
 }
@@ -211,24 +211,62 @@ TEST(Options, RefusalsNameKeyValueAndWhatIsRight) {
 TEST(Options, ToneCurve) {
   for (const double gamma : {0.5, 1.0, 2.2, 10.0}) {
     for (const double brightness : {1.0, 0.5, 0.001}) {
-      const Tone tone = MakeTone(gamma, brightness, Dither::kNone, Sampling::kMax);
-      EXPECT_EQ(tone.lut[0], 0);
-      EXPECT_EQ(tone.lut[255], std::lround(65535 * brightness));
-      for (size_t c = 1; c < 256; ++c) {
-        EXPECT_GE(tone.lut[c], 1);
-        EXPECT_GE(tone.lut[c], tone.lut[c - 1]);
+      const Tone tone = MakeTone({.gamma = {gamma, gamma, gamma}, .brightness = brightness});
+      for (const Tone::Curve& curve : tone.lut) {
+        EXPECT_EQ(curve[0], 0);
+        EXPECT_EQ(curve[255], std::lround(65535 * brightness));
+        for (size_t c = 1; c < 256; ++c) {
+          EXPECT_GE(curve[c], 1);
+          EXPECT_GE(curve[c], curve[c - 1]);
+        }
       }
     }
   }
 }
 
+TEST(Options, ToneOfEachChannel) {
+  const auto info = Read({{"gamma", "1;2;1"},
+                          {"white", "1;0.5;0.25"},
+                          {"curve_blue", "0;0;1"},
+                          {"dither", "blue"},
+                          {"density", "even"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  EXPECT_EQ(info->tone.dither, Dither::kBlueNoise);
+  EXPECT_EQ(info->tone.density, Density::kEven);
+  EXPECT_EQ(info->tone.lut[0][51], 13107);
+  EXPECT_EQ(info->tone.lut[1][51], std::lround(65535 * 0.5 * 0.04));
+  EXPECT_EQ(info->tone.lut[1][255], 32768);
+  EXPECT_EQ(info->tone.lut[2][51], 1);  // lit is never quite dark
+  EXPECT_EQ(info->tone.lut[2][204], std::lround(65535 * 0.25 * 0.6));
+  EXPECT_NE(Refusal({{"white", "1;1"}}).find("white is \"1;1\"; it must be a number"),
+            std::string::npos);
+  EXPECT_NE(Refusal({{"curve_red", "0.1;1"}}).find("ascending numbers from 0"), std::string::npos);
+}
+
+TEST(Options, FormatsAndBits) {
+  const auto info = Read({{"size", "8x8x8"}, {"format", "hub75"}, {"bits", "6"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  EXPECT_EQ(info->layout.format, PixelFormat::kHub75);
+  EXPECT_EQ(info->layout.bytes(), size_t{8 * 8 * 4 * 6});
+  EXPECT_EQ(Read({{"size", "8x8x8"}, {"format", "planes24"}})->layout.bytes(), size_t{8 * 64 * 3});
+  EXPECT_NE(Refusal({{"format", "rgb332"}, {"bits", "4"}}).find("0 or 3, as rgb332 has"),
+            std::string::npos);
+}
+
+TEST(Options, PitchOfVoxels) {
+  const auto info = Read({{"size", "8x8x8"}, {"voxel_mm", "1;1;3"}});
+  ASSERT_TRUE(info.ok()) << info.status();
+  EXPECT_EQ(info->geometry.grid, (VoxelGrid{8, 8, 3, {1, 1, 3}, {-4, -4, -4.5}}));
+}
+
 TEST(Registry, KnowsItsDrivers) {
-  EXPECT_EQ(DriverNames(), (std::vector<std::string>{"fadecandy", "simulated", "voxlink"}));
+  EXPECT_EQ(DriverNames(),
+            (std::vector<std::string>{"fadecandy", "network", "simulated", "voxlink"}));
   sync::FakeClock clock;
   const auto unknown = CreateDisplay({.name = "d", .driver = "hologram"}, clock);
-  EXPECT_EQ(
-      unknown.status().message(),
-      "display \"d\": there is no driver \"hologram\"; there are fadecandy, simulated, voxlink");
+  EXPECT_EQ(unknown.status().message(),
+            "display \"d\": there is no driver \"hologram\"; there are fadecandy, network, "
+            "simulated, voxlink");
   const auto bad = CreateDisplay(
       {.name = "d", .driver = "simulated", .options = {{"faults", "fire@t1"}}}, clock);
   EXPECT_EQ(bad.status().code(), absl::StatusCode::kInvalidArgument);

@@ -178,7 +178,7 @@ INSTANTIATE_TEST_SUITE_P(
               {"receive_buffer", "65536"},
               {"max_payload", "4096"},
               {"pacing", "400000"}}},
-        Case{"BitPlanes", {{"size", "17x9x40"}, {"format", "bitplanes3"}, {"sub_frames", "3"}}},
+        Case{"BitPlanes", {{"size", "17x9x40"}, {"format", "bitplanes"}, {"sub_frames", "3"}}},
         Case{"Rotor",
              {{"geometry", "rotor"},
               {"size", "8x6"},

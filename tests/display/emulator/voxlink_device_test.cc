@@ -341,19 +341,23 @@ TEST_F(Device, BrightnessAndPowerLimit) {
 }
 
 TEST_F(Device, ModesAreCheckedAndFixedInASession) {
-  const auto mode = [](uint8_t format, uint8_t sub_frames, uint32_t rate) {
+  const auto mode = [](uint8_t format, uint8_t sub_frames, uint32_t rate, uint8_t bits = 0) {
     return voxlink::BytesOf(
-        voxlink::Mode{.format = format, .sub_frames = sub_frames, .rate_mhz = rate});
+        voxlink::Mode{.format = format, .sub_frames = sub_frames, .bits = bits, .rate_mhz = rate});
   };
   EXPECT_EQ(bench_.Out(Request::kSetMode, 0, mode(0, 1, 0))->status, TransferStatus::kStall);
   bench_.Out(Request::kStop);
   EXPECT_EQ(bench_.Out(Request::kSetMode, 0, mode(2, 3, 5000))->status, TransferStatus::kOk);
   const auto got = bench_.In(Request::kGetMode, 0, 16);
   EXPECT_EQ(voxlink::Load<voxlink::Mode>(got->in).sub_frames, 3);
-  EXPECT_EQ(bench_.device().layout().format, PixelFormat::kBitPlanes3);
-  for (const auto& bad : {mode(3, 1, 0), mode(0, 65, 0), mode(0, 1, 10'001), mode(0, 1, 1)}) {
+  EXPECT_EQ(bench_.device().layout().format, PixelFormat::kBitPlanes);
+  for (const auto& bad : {mode(5, 1, 0), mode(0, 65, 0), mode(0, 1, 10'001), mode(0, 1, 1),
+                          mode(0, 1, 0, 9), mode(1, 1, 0, 2), mode(4, 1, 0, 2)}) {
     EXPECT_EQ(bench_.Out(Request::kSetMode, 0, bad)->status, TransferStatus::kStall);
   }
+  EXPECT_EQ(bench_.Out(Request::kSetMode, 0, mode(2, 1, 0, 4))->status, TransferStatus::kOk);
+  EXPECT_EQ(voxlink::Load<voxlink::Mode>(bench_.In(Request::kGetMode, 0, 16)->in).bits, 4);
+  EXPECT_EQ(bench_.device().layout().bits_per_channel(), 4);
 }
 
 TEST_F(Device, StartForgetsTheSessionBefore) {

@@ -276,5 +276,20 @@ TEST(ValidateTest, TiltsAndAxes) {
               testing::HasSubstr("panels[0].tilt_deg is -61"));
 }
 
+TEST(Validate, FormatsThatDoNotGoTogetherAreRefused) {
+  const auto refusal = [](FrameLayout layout) {
+    return std::string(ValidateFormat(layout).message());
+  };
+  EXPECT_TRUE(ValidateFormat({.height = 2, .format = PixelFormat::kHub75, .bits = 8}).ok());
+  EXPECT_EQ(refusal({.height = 3, .format = PixelFormat::kHub75}),
+            "layout.height is 3, must be even, as hub75 has");
+  EXPECT_EQ(refusal({.format = PixelFormat::kRgb332, .bits = 2}),
+            "layout.bits is 2, must be 0 or 3, as rgb332 has");
+  EXPECT_EQ(refusal({.format = PixelFormat::kPlanes24, .bits = 8}),
+            "layout.bits is 8, must be 0 or 1, as planes24 has");
+  EXPECT_EQ(refusal({.bits = 9}), "layout.bits is 9, must be 0 to 8");
+  EXPECT_EQ(refusal({.format = static_cast<PixelFormat>(5)}), "layout.format is 5, must be 0 to 4");
+}
+
 }  // namespace
 }  // namespace voxeld::display

@@ -24,7 +24,7 @@ Target StackTarget() {
   target.geometry.shape = stack;
   target.geometry.grid = {kSize, kSize, kDepth, {1, 1, 1}, {-24, -24, -0.5}};
   target.layout = {.slices = kDepth, .width = kSize, .height = kSize};
-  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 
@@ -179,7 +179,9 @@ std::vector<FaultStep> FaultScenario() {
   script.Frame("without the cloud");
 
   Target darker = StackTarget();
-  for (uint16_t& light : darker.tone.lut) light /= 2;
+  for (display::Tone::Curve& curve : darker.tone.lut) {
+    for (uint16_t& light : curve) light /= 2;
+  }
   darker.view.m[3] = 1.25;
   script.SetTarget("the same layout", darker);
   script.Put(LayerRecord{.id = 3, .order = 2});
@@ -227,7 +229,7 @@ std::vector<FaultStep> FaultScenario() {
   change("one leaves the crowd, which moves");
 
   Target planes = darker;
-  planes.layout.format = display::PixelFormat::kBitPlanes3;
+  planes.layout.format = display::PixelFormat::kBitPlanes;
   planes.layout.sub_frames = 2;
   script.SetTarget("another layout", planes);
   script.Put(LayerRecord{.id = 2, .visible = 0});

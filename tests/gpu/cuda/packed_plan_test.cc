@@ -26,8 +26,8 @@ struct Display {
     layout.slices = slices;
     layout.width = width;
     layout.height = height;
-    layout.format = display::PixelFormat::kBitPlanes3;
-    for (size_t c = 0; c < 256; ++c) tone.lut[c] = static_cast<uint16_t>(c * 257);
+    layout.format = display::PixelFormat::kBitPlanes;
+    tone.SetCurve(display::Tone::Linear());
     geometry.shape = stack;
     geometry.grid = display::DefaultGrid(geometry);
   }
@@ -115,7 +115,7 @@ TEST(PackedPlan, LeavesEverythingElseToSlicing) {
   EXPECT_FALSE(many.Plan(0, 8));
 
   Display bent(16, 16, 8);
-  std::swap(bent.tone.lut[10], bent.tone.lut[200]);
+  for (display::Tone::Curve& curve : bent.tone.lut) std::swap(curve[10], curve[200]);
   EXPECT_FALSE(bent.Plan(0, 8));
   bent.layout.format = display::PixelFormat::kRgb332;  // where any tone will do
   EXPECT_TRUE(bent.Plan(0, 8));
@@ -125,7 +125,9 @@ TEST(PackedPlan, LeastLevelsAreThoseThatQuantizeToLight) {
   Display display(16, 16, 2);
   display.layout.sub_frames = 3;
   display.tone.dither = display::Dither::kOrdered;
-  for (size_t c = 0; c < 256; ++c) display.tone.lut[c] = static_cast<uint16_t>(c * c);
+  display::Tone::Curve square;
+  for (size_t c = 0; c < 256; ++c) square[c] = static_cast<uint16_t>(c * c);
+  display.tone.SetCurve(square);
   const std::optional<PackedPlan> plan = display.Plan(0, 2);
   ASSERT_TRUE(plan);
   ASSERT_EQ(plan->least.size(), 3u * 64);
@@ -136,7 +138,7 @@ TEST(PackedPlan, LeastLevelsAreThoseThatQuantizeToLight) {
         const uint32_t threshold = Threshold(display.tone.dither, u, v, sub, 3);
         for (uint32_t c = 0; c < 256; ++c) {
           EXPECT_EQ((Interleave(c) & 0x249249) >= least,
-                    Quantize(display.tone.lut[c], 2, threshold) == 1)
+                    Quantize(square[c], 2, threshold) == 1)
               << "level " << c << " at " << u << ", " << v << ", sub-frame " << sub;
         }
       }

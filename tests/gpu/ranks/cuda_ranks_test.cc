@@ -59,8 +59,8 @@ Target Cube(int32_t n) {
   target.geometry.shape = stack;
   target.geometry.grid = display::DefaultGrid(target.geometry);
   target.layout = {
-      .slices = n, .width = n, .height = n, .format = display::PixelFormat::kBitPlanes3};
-  for (size_t i = 0; i < 256; ++i) target.tone.lut[i] = static_cast<uint16_t>(i * 257);
+      .slices = n, .width = n, .height = n, .format = display::PixelFormat::kBitPlanes};
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 

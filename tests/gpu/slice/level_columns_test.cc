@@ -24,8 +24,10 @@ namespace {
 display::Tone RandomTone(std::mt19937& random, display::Dither dither) {
   display::Tone tone;
   tone.dither = dither;
-  for (size_t c = 1; c < 256; ++c) tone.lut[c] = static_cast<uint16_t>(random() % 65536);
-  tone.lut[255] = 65535;
+  for (display::Tone::Curve& curve : tone.lut) {
+    for (size_t c = 1; c < 256; ++c) curve[c] = static_cast<uint16_t>(random() % 65536);
+    curve[255] = 65535;
+  }
   return tone;
 }
 
@@ -33,7 +35,8 @@ TEST(LevelTables, AreTheLevelsOfEveryChannelUnderEveryThreshold) {
   std::mt19937 random(1);
   for (const display::Dither dither : {display::Dither::kOrdered, display::Dither::kNone}) {
     const display::Tone tone = RandomTone(random, dither);
-    const LevelTables tables = LevelTables::OfRgb332(tone);
+    const LevelTables tables =
+        LevelTables::OfRgb332({.format = display::PixelFormat::kRgb332}, tone);
     for (const uint32_t sub_frames : {1u, 3u, 64u}) {
       for (uint32_t sub = 0; sub < sub_frames; sub += sub_frames / 3 + 1) {
         for (uint32_t u = 0; u < 8; ++u) {
@@ -46,7 +49,7 @@ TEST(LevelTables, AreTheLevelsOfEveryChannelUnderEveryThreshold) {
               for (size_t k = 0; k < 3; ++k) {
                 const uint32_t lifted = tables.rise[k][c] > below ? 1 : 0;
                 ASSERT_EQ(tables.base[k][c] + (lifted << shifts[k]),
-                          Quantize(tone.lut[c], levels[k], threshold) << shifts[k])
+                          Quantize(tone.lut[k][c], levels[k], threshold) << shifts[k])
                     << "channel " << k << " of " << c << " at " << u << ", " << v;
               }
             }
@@ -161,10 +164,10 @@ uint8_t PixelOf(const At& at, const display::FootprintTable& table, const displa
   const uint32_t threshold =
       Threshold(tone.dither, static_cast<uint32_t>(u), static_cast<uint32_t>(v), sub, sub_frames);
   uint8_t pixel = 0;
-  PackPixel(display::PixelFormat::kRgb332, 1, 1, 0, 0,
-            {Quantize(tone.lut[rgb >> 16], 8, threshold),
-             Quantize(tone.lut[rgb >> 8 & 0xFF], 8, threshold),
-             Quantize(tone.lut[rgb & 0xFF], 4, threshold)},
+  PackPixel({display::PixelFormat::kRgb332, 3, 1, 1}, 0, 0,
+            {Quantize(tone.lut[0][rgb >> 16], 8, threshold),
+             Quantize(tone.lut[1][rgb >> 8 & 0xFF], 8, threshold),
+             Quantize(tone.lut[2][rgb & 0xFF], 4, threshold)},
             &pixel);
   return pixel;
 }

@@ -38,8 +38,7 @@ struct Finish {
 
 std::vector<Finish> Finishes() {
   std::vector<Finish> finishes;
-  for (PixelFormat format :
-       {PixelFormat::kRgb888, PixelFormat::kRgb332, PixelFormat::kBitPlanes3}) {
+  for (PixelFormat format : {PixelFormat::kRgb888, PixelFormat::kRgb332, PixelFormat::kBitPlanes}) {
     for (Dither dither : {Dither::kNone, Dither::kOrdered}) {
       for (uint32_t sub_frames : {1u, 3u}) {
         for (double gamma : {1.0, 2.2}) finishes.push_back({format, dither, sub_frames, gamma});
@@ -62,14 +61,16 @@ bool Lights(const Finish& finish, uint32_t rgb, uint32_t u, uint32_t v) {
   const auto light = [&](uint32_t c) {
     return static_cast<uint32_t>(std::lround(65535 * std::pow(c / 255.0, finish.gamma)));
   };
-  const Levels levels = LevelsOf(finish.format);
+  const auto bits =
+      static_cast<uint32_t>(display::FrameLayout{.format = finish.format}.bits_per_channel());
+  const Levels levels = LevelsOf(finish.format, bits);
   std::array<uint8_t, kPeriod * kPeriod * 3> picture{};
   for (uint32_t sub = 0; sub < finish.sub_frames; ++sub) {
     const uint32_t threshold = Threshold(finish.dither, u, v, sub, finish.sub_frames);
     const Levels q = {Quantize(light(rgb >> 16), levels.r, threshold),
                       Quantize(light(rgb >> 8 & 255), levels.g, threshold),
                       Quantize(light(rgb & 255), levels.b, threshold)};
-    PackPixel(finish.format, kPeriod, kPeriod, u, v, q, picture.data());
+    PackPixel({finish.format, bits, kPeriod, kPeriod}, u, v, q, picture.data());
   }
   return std::any_of(picture.begin(), picture.end(), [](uint8_t byte) { return byte != 0; });
 }

@@ -33,10 +33,12 @@ Target StackTarget(int32_t sub_frames, display::Dither dither) {
                    .width = kWidth,
                    .height = kHeight,
                    .sub_frames = sub_frames,
-                   .format = display::PixelFormat::kBitPlanes3};
+                   .format = display::PixelFormat::kBitPlanes};
   std::mt19937 random(3);
-  for (size_t c = 1; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(random() % 65536);
-  target.tone.lut[255] = 65535;
+  for (display::Tone::Curve& curve : target.tone.lut) {
+    for (size_t c = 1; c < 256; ++c) curve[c] = static_cast<uint16_t>(random() % 65536);
+    curve[255] = 65535;
+  }
   target.tone.dither = dither;
   return target;
 }
@@ -126,9 +128,9 @@ class StackEngine {
           const uint32_t t =
               Threshold(target_.tone.dither, u, v, static_cast<uint32_t>(picture % subs), subs);
           const auto level = [&](int shift) {
-            return Quantize(target_.tone.lut[rgb >> shift & 0xFF], 2, t);
+            return Quantize(target_.tone.lut[2 - shift / 8][rgb >> shift & 0xFF], 2, t);
           };
-          PackPixel(layout.format, kWidth, kHeight, u, v, {level(16), level(8), level(0)}, to);
+          PackPixel({layout.format, 1, kWidth, kHeight}, u, v, {level(16), level(8), level(0)}, to);
         }
       }
     }

@@ -1,11 +1,16 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <bit>
 #include <optional>
 #include <random>
 #include <set>
 #include <utility>
+#include <vector>
 
+#include "gpu/slice/blue_noise.h"
+#include "gpu/slice/finish.h"
+#include "gpu/slice/light_plan.h"
 #include "gpu/slice/pack.h"
 #include "gpu/slice/quantize.h"
 #include "gpu/slice/sampler.h"
@@ -77,14 +82,14 @@ TEST(Quantize, LightIsKeptOnAverage) {
 
 TEST(Pack, Rgb888) {
   uint8_t picture[2 * 2 * 3] = {};
-  PackPixel(display::PixelFormat::kRgb888, 2, 2, 1, 1, {1, 2, 3}, picture);
+  PackPixel({display::PixelFormat::kRgb888, 8, 2, 2}, 1, 1, {1, 2, 3}, picture);
   const uint8_t want[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3};
   EXPECT_TRUE(std::equal(std::begin(want), std::end(want), picture));
 }
 
 TEST(Pack, Rgb332) {
   uint8_t picture[2] = {};
-  PackPixel(display::PixelFormat::kRgb332, 2, 1, 1, 0, {7, 2, 1}, picture);
+  PackPixel({display::PixelFormat::kRgb332, 3, 2, 1}, 1, 0, {7, 2, 1}, picture);
   EXPECT_EQ(picture[0], 0);
   EXPECT_EQ(picture[1], 0b11101001);
 }
@@ -92,11 +97,118 @@ TEST(Pack, Rgb332) {
 // Nine pixels a row: two bytes; three planes of 2 × 2 bytes.
 TEST(Pack, BitPlanes) {
   uint8_t picture[12] = {};
-  PackPixel(display::PixelFormat::kBitPlanes3, 9, 2, 0, 0, {1, 0, 1}, picture);
-  PackPixel(display::PixelFormat::kBitPlanes3, 9, 2, 8, 1, {0, 1, 1}, picture);
-  PackPixel(display::PixelFormat::kBitPlanes3, 9, 2, 7, 0, {1, 0, 0}, picture);
+  PackPixel({display::PixelFormat::kBitPlanes, 1, 9, 2}, 0, 0, {1, 0, 1}, picture);
+  PackPixel({display::PixelFormat::kBitPlanes, 1, 9, 2}, 8, 1, {0, 1, 1}, picture);
+  PackPixel({display::PixelFormat::kBitPlanes, 1, 9, 2}, 7, 0, {1, 0, 0}, picture);
   const uint8_t want[12] = {0x81, 0, 0, 0, 0, 0, 0, 0x80, 0x80, 0, 0, 0x80};
   for (int i = 0; i < 12; ++i) EXPECT_EQ(picture[i], want[i]) << i;
+}
+
+// Two bits: the planes of the higher bit of red, green and blue, then of the lower.
+TEST(Pack, BitPlanesOfSeveralBits) {
+  uint8_t picture[6] = {};
+  PackPixel({display::PixelFormat::kBitPlanes, 2, 8, 1}, 0, 0, {2, 1, 3}, picture);
+  PackPixel({display::PixelFormat::kBitPlanes, 2, 8, 1}, 7, 0, {1, 0, 0}, picture);
+  const uint8_t want[6] = {0x80, 0, 0x80, 0x01, 0x80, 0x80};
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(picture[i], want[i]) << i;
+}
+
+// Four rows of two: rows 0 and 2, 1 and 3 side by side; the higher bit first.
+TEST(Pack, Hub75) {
+  uint8_t picture[8] = {};
+  const PictureShape shape{display::PixelFormat::kHub75, 2, 2, 4};
+  PackPixel(shape, 0, 0, {2, 0, 1}, picture);
+  PackPixel(shape, 0, 2, {3, 2, 0}, picture);
+  PackPixel(shape, 1, 3, {0, 0, 1}, picture);
+  const uint8_t want[8] = {0b011'001, 0, 0, 0, 0b001'100, 0, 0, 0b100'000};
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(picture[i], want[i]) << i;
+}
+
+TEST(Pack, Planes24) {
+  uint8_t picture[6] = {};
+  // Red in parts 0 and 7, green in part 2, blue in part 5.
+  PackPixel({display::PixelFormat::kPlanes24, 1, 2, 1}, 1, 0, {0b10000001, 0b100, 0b100000},
+            picture);
+  const uint8_t want[6] = {0, 0, 0, 0b1000'0001, 0, 0b0010'0010};
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(picture[i], want[i]) << i;
+}
+
+TEST(Finish, DimsLightByTheRowsFactor) {
+  std::vector<uint16_t> curves(768);
+  curves[255] = 65535;
+  curves[256 + 255] = 30000;
+  const uint16_t factors[2] = {65535, 32768};
+  Finish finish;
+  finish.curves = curves.data();
+  EXPECT_EQ(finish.LightAt(0xFFFFFF, 1).r, 65535u);
+  finish.factors = factors;
+  EXPECT_EQ(finish.LightAt(0xFFFFFF, 0).r, 65535u);
+  EXPECT_EQ(finish.LightAt(0xFFFFFF, 0).g, 30000u);
+  EXPECT_EQ(finish.LightAt(0xFFFFFF, 1).r, 32768u);
+  EXPECT_EQ(finish.LightAt(0xFFFFFF, 1).g, 15000u);
+  EXPECT_EQ(finish.LightAt(0xFFFFFF, 1).b, 0u);
+}
+
+// Eight parts of each sub-frame run through evenly spread thresholds: of light n/16 the bits of two sub-frames are n.
+TEST(Finish, PartsOfPlanes24AreDitheredOverTime) {
+  std::vector<uint16_t> curves(768);
+  Finish finish;
+  finish.format = display::PixelFormat::kPlanes24;
+  finish.dither = display::Dither::kOrdered;
+  finish.bits = 1;
+  finish.sub_frames = 2;
+  finish.curves = curves.data();
+  for (uint32_t n = 0; n <= 16; ++n) {
+    int lit = 0;
+    for (uint32_t sub = 0; sub < 2; ++sub) {
+      const Levels q = finish.LevelsAt({n * 65535 / 16, 0, 65535}, 0, 3, 5, sub);
+      lit += std::popcount(q.r);
+      EXPECT_EQ(q.g, 0u);
+      EXPECT_EQ(q.b, 0xFFu);
+    }
+    EXPECT_EQ(lit, static_cast<int>(n));
+  }
+}
+
+// The factor that promises light: a step below it there is a pixel that stays dark.
+TEST(LeastFactor, LightsEveryPixelAndNoLessDoes) {
+  const std::vector<uint16_t> noise = MakeBlueNoise();
+  for (const display::PixelFormat format :
+       {display::PixelFormat::kRgb332, display::PixelFormat::kBitPlanes,
+        display::PixelFormat::kPlanes24}) {
+    for (const display::Dither dither :
+         {display::Dither::kNone, display::Dither::kOrdered, display::Dither::kBlueNoise}) {
+      for (const int32_t sub_frames : {1, 3}) {
+        display::Tone tone;
+        tone.SetCurve(display::Tone::Linear());
+        tone.dither = dither;
+        const display::FrameLayout layout{
+            .slices = 1, .width = 64, .height = 64, .sub_frames = sub_frames, .format = format};
+        const std::vector<uint16_t> curves(768, 65535);
+        const uint32_t least = LeastFactor(layout, tone);
+        Finish finish;
+        finish.format = format;
+        finish.dither = dither;
+        finish.bits = static_cast<uint32_t>(layout.bits_per_channel());
+        finish.sub_frames = static_cast<uint32_t>(sub_frames);
+        finish.curves = curves.data();
+        finish.noise = noise.data();
+        const auto dark = [&](uint32_t factor) {
+          int count = 0;
+          for (uint32_t pixel = 0; pixel < 4096; ++pixel) {
+            uint32_t lit = 0;
+            for (uint32_t sub = 0; sub < finish.sub_frames; ++sub) {
+              lit |= finish.LevelsAt({Dim(65535, factor), 0, 0}, 0, pixel % 64, pixel / 64, sub).r;
+            }
+            count += lit == 0;
+          }
+          return count;
+        };
+        EXPECT_EQ(dark(least), 0) << static_cast<int>(format) << " " << static_cast<int>(dither);
+        EXPECT_GT(dark(least - least / 64 - 2), 0);
+      }
+    }
+  }
 }
 
 TEST(Weight, RoundsAsTheDefinitionSays) {

@@ -75,7 +75,7 @@ TEST(FrameScenes, LinesHaveAsManyVoxelsAsTheySay) {
                  {grid.nx - 1.0, static_cast<double>(grid.ny), static_cast<double>(grid.nz)});
     EXPECT_EQ(scene.target.layout.slices, 256);
     EXPECT_EQ(scene.target.layout.width, grid.nx) << "pixels are voxels";
-    EXPECT_EQ(scene.target.layout.format, display::PixelFormat::kBitPlanes3);
+    EXPECT_EQ(scene.target.layout.format, display::PixelFormat::kBitPlanes);
   }
 }
 

@@ -149,6 +149,30 @@ TEST_P(RenderTest, NearerIsBrighterAndLarger) {
   EXPECT_GT(near.area, far.area * 1.2);
 }
 
+// Near the axis many pixels show one place: if each has less light for that, the place looks as bright as one at the rim. From
+// above, so that both are as near.
+TEST(Render, PixelsThatCrowdAreSeenTogether) {
+  for (const bool even : {false, true}) {
+    Volume volume = Spinner();
+    Light(&volume, {3, 0, 8}, 1.6, 240, 0, 0);
+    Light(&volume, {0, -13, 8}, 1.6, 0, 240, 0);
+    for (int s = 0; even && s < volume.slices; ++s) {
+      for (int u = 0; u < volume.width; ++u) {
+        for (int v = 0; v < volume.height; ++v) {
+          uint8_t* pixel = PixelOf(&volume, s, u, v);
+          const double share = std::abs(u - 15.5) / 15.5;
+          for (int c = 0; c < 3; ++c) pixel[c] = static_cast<uint8_t>(pixel[c] * share);
+        }
+      }
+    }
+    const Image image = RenderVolume(volume, {.width = 320, .height = 320, .angles = {0, 89}});
+    const Spot inner = Find(image, 0), outer = Find(image, 1);
+    ASSERT_GT(inner.area, 20);
+    ASSERT_GT(outer.area, 20);
+    EXPECT_NEAR(inner.brightest, outer.brightest, 30) << "even: " << even;
+  }
+}
+
 TEST_P(RenderTest, WalkingRoundTheDisplay) {
   Volume volume = NewVolume();
   Light(&volume, {9, 0, 0}, 1.6, 255, 0, 0);

@@ -24,7 +24,7 @@ gpu::Target TargetOf(display::Geometry geometry, PixelFormat format) {
       geometry.shape);
   target.layout.format = format;
   target.geometry = std::move(geometry);
-  for (size_t c = 0; c < 256; ++c) target.tone.lut[c] = static_cast<uint16_t>(c * 257);
+  target.tone.SetCurve(display::Tone::Linear());
   return target;
 }
 
@@ -71,7 +71,7 @@ Scene UniformLines(const std::string& name, gpu::Target target, uint64_t voxels,
 }
 
 Scene ShortLines(uint64_t count, uint64_t seed) {
-  Scene scene = OneLayer("short", Stack(512, 512, 256, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("short", Stack(512, 512, 256, PixelFormat::kBitPlanes));
   const Extent extent = ExtentOf(scene.target, true);
   LineSet lines(seed);
   while (lines.lines() < count) lines.AddOfLength(extent, 20);
@@ -100,7 +100,7 @@ constexpr int32_t kMovingVoxels = 20;
 // most `most` of them: they change, and stay in it.
 Scene MovingInBox(uint64_t count, double side, size_t most, const std::string& where,
                   uint64_t seed) {
-  Scene scene = OneLayer("", Stack(512, 512, 256, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("", Stack(512, 512, 256, PixelFormat::kBitPlanes));
   const Extent all = ExtentOf(scene.target, false);
   Extent box{{0, 0, 0}, {}};
   for (size_t a = 0; a < 3; ++a) {
@@ -173,7 +173,7 @@ Content UvSphere(double radius, double middle, int bands, int around) {
 Scene Mesh(gpu::SurfaceRule rule, double share) {
   const bool thin = rule == gpu::SurfaceRule::kThin;
   Scene scene =
-      OneLayer(thin ? "mesh, THIN" : "mesh, COVER", Stack(512, 512, 512, PixelFormat::kBitPlanes3));
+      OneLayer(thin ? "mesh, THIN" : "mesh, COVER", Stack(512, 512, 512, PixelFormat::kBitPlanes));
   Content sphere =
       UvSphere(250, 255.5, 159, static_cast<int>(std::max<uint64_t>(3, Share(320, share))));
   sphere.record.rule = rule;
@@ -190,7 +190,7 @@ Scene FilledMesh(double share) {
 }
 
 Scene Points(uint64_t count, uint64_t seed) {
-  Scene scene = OneLayer("points", Stack(512, 512, 256, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("points", Stack(512, 512, 256, PixelFormat::kBitPlanes));
   const Extent extent = ExtentOf(scene.target, true);
   std::mt19937_64 random(seed);
   Content points;
@@ -293,10 +293,12 @@ Scene LitRotor(const char* name, float tilt_deg, uint64_t seed) {
   for (display::Rotor::Panel& panel : rotor.panels) panel.tilt_deg = tilt_deg;
   Scene scene = OneLayer(
       name, TargetOf({rotor, {128, 128, 64, {1, 1, 1}, {-64, -64, -32}}}, PixelFormat::kRgb332));
+  display::Tone::Curve curve;
   for (size_t c = 0; c < 256; ++c) {
-    scene.target.tone.lut[c] =
+    curve[c] =
         static_cast<uint16_t>(std::lround(65535 * std::pow(static_cast<double>(c) / 255, 2.2)));
   }
+  scene.target.tone.SetCurve(curve);
   std::mt19937_64 random(seed);
   Content points;
   points.record.kind = gpu::PrimitiveKind::kPoints;
@@ -316,7 +318,7 @@ Scene LitRotor(const char* name, float tilt_deg, uint64_t seed) {
   return scene;
 }
 
-gpu::Target LargeStack() { return Stack(1024, 1024, 256, PixelFormat::kBitPlanes3); }
+gpu::Target LargeStack() { return Stack(1024, 1024, 256, PixelFormat::kBitPlanes); }
 
 // What changes lies in a part of the volume, and what is dirty with it.
 std::vector<MakeScene> MovingRows(uint64_t seed, double share) {
@@ -338,7 +340,7 @@ struct Named {
 
 // Lines from anywhere to anywhere: 1,100 voxels each, on the average, in 2048³.
 Scene HugeLines(uint64_t count, uint64_t seed) {
-  Scene scene = OneLayer("huge", Stack(2048, 2048, 2048, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("huge", Stack(2048, 2048, 2048, PixelFormat::kBitPlanes));
   const Extent extent = ExtentOf(scene.target, true);
   LineSet lines(seed);
   while (lines.lines() < count) lines.AddUniform(extent);
@@ -363,7 +365,7 @@ constexpr Named kScenes[] = {
     {"lines30m",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] {
-         Scene scene = UniformLines("lines30m", Stack(512, 512, 256, PixelFormat::kBitPlanes3),
+         Scene scene = UniformLines("lines30m", Stack(512, 512, 256, PixelFormat::kBitPlanes),
                                     Share(3e7, share), seed);
          scene.plain_peer = true;
          return scene;
@@ -423,7 +425,7 @@ constexpr Named kScenes[] = {
     {"vx1",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] {
-         Scene scene = Replaced("vx1", Stack(912, 1140, 64, PixelFormat::kBitPlanes3),
+         Scene scene = Replaced("vx1", Stack(912, 1140, 64, PixelFormat::kBitPlanes),
                                 Share(20'000, share), 100, seed);
          scene.volumes_per_second = 15;
          return scene;

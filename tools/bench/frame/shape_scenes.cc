@@ -38,7 +38,7 @@ int32_t SideOf(double share) {
 
 Scene Gyroid(double share) {
   const int32_t n = SideOf(share);
-  Scene scene = OneLayer("gyroid", Stack(n, n, n, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("gyroid", Stack(n, n, n, PixelFormat::kBitPlanes));
   Graph graph;
   Graph::Node sum = graph.Constant(0);
   for (int a = 0; a < 3; ++a) {
@@ -55,7 +55,7 @@ Scene Gyroid(double share) {
 
 Scene ImplicitSphere(int32_t n) {
   Scene scene = OneLayer(absl::StrCat("implicit sphere, ", n, "\xC2\xB3"),
-                         Stack(n, n, n, PixelFormat::kBitPlanes3));
+                         Stack(n, n, n, PixelFormat::kBitPlanes));
   Graph graph;
   Graph::Node sum = graph.Square(graph.Axis(0));
   for (int a = 1; a < 3; ++a) sum = graph.Add(sum, graph.Square(graph.Axis(a)));
@@ -65,7 +65,7 @@ Scene ImplicitSphere(int32_t n) {
 }
 
 Scene InstancedSpheres(uint64_t count, uint64_t seed) {
-  Scene scene = OneLayer("spheres", Stack(512, 512, 512, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("spheres", Stack(512, 512, 512, PixelFormat::kBitPlanes));
   std::mt19937_64 random(seed);
   Content sphere;
   sphere.record.kind = gpu::PrimitiveKind::kSphere;
@@ -81,7 +81,7 @@ Scene InstancedSpheres(uint64_t count, uint64_t seed) {
 }
 
 Scene CubePoints(uint64_t count, uint64_t seed) {
-  Scene scene = OneLayer("cloud", Stack(512, 512, 512, PixelFormat::kBitPlanes3));
+  Scene scene = OneLayer("cloud", Stack(512, 512, 512, PixelFormat::kBitPlanes));
   std::mt19937_64 random(seed);
   Content points;
   points.record.kind = gpu::PrimitiveKind::kPoints;
@@ -101,7 +101,7 @@ Scene SampledVolume(bool by_level, double share) {
   const int32_t side = SideOf(share);
   const uint32_t count = static_cast<uint32_t>(side) / 2;
   Scene scene = OneLayer(by_level ? "isosurface" : "volume",
-                         Stack(side, side, side, PixelFormat::kBitPlanes3));
+                         Stack(side, side, side, PixelFormat::kBitPlanes));
   Content content;
   content.record.kind = gpu::PrimitiveKind::kSamples;
   content.record.color = 0x40C0FF;

@@ -25,9 +25,11 @@ const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z
 const Choices<FillStyle> kFills = {
     {"dots", FillStyle::kDots}, {"lines", FillStyle::kLines}, {"surface", FillStyle::kSurface}};
 const Choices<v1::TestPattern> kPatterns = {
-    {"axes", v1::TEST_PATTERN_AXES},   {"corners", v1::TEST_PATTERN_CORNERS},
-    {"grid", v1::TEST_PATTERN_GRID},   {"ramp", v1::TEST_PATTERN_RAMP},
-    {"white", v1::TEST_PATTERN_WHITE}, {"none", v1::TEST_PATTERN_NONE}};
+    {"axes", v1::TEST_PATTERN_AXES},       {"corners", v1::TEST_PATTERN_CORNERS},
+    {"grid", v1::TEST_PATTERN_GRID},       {"ramp", v1::TEST_PATTERN_RAMP},
+    {"white", v1::TEST_PATTERN_WHITE},     {"bars", v1::TEST_PATTERN_BARS},
+    {"density", v1::TEST_PATTERN_DENSITY}, {"slices", v1::TEST_PATTERN_SLICES},
+    {"none", v1::TEST_PATTERN_NONE}};
 
 // The command line as declared, and the values that it fills in.
 class Parser {
@@ -57,6 +59,13 @@ class Parser {
     AddPattern();
     AddVerify();
     AddProfile();
+    Add("init",
+        "Asks how an LED lattice is wired (start corner, direction, zig-zag) and writes its "
+        "profile; needs no daemon")
+        ->add_option("FILE.toml", init_.file, "Where the profile goes");
+    Add("doctor",
+        "Says what of this machine keeps voxeld from its work, and the command that mends it; "
+        "needs no daemon");
   }
 
   ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
@@ -219,8 +228,8 @@ class Parser {
 
   void AddPattern() {
     CLI::App* c = Add("pattern",
-                      "Shows a test pattern instead of the scene: axes, corners, grid, ramp or "
-                      "white; none ends it, list names them");
+                      "Shows a test pattern instead of the scene: axes, corners, grid, ramp, "
+                      "white, bars, density or slices; none ends it, list names them");
     c->add_option("NAME", pattern_name_, "The pattern, none, or list");
     c->add_option("--display", pattern_.display, "Only on this display (default: on all)")
         ->type_name("NAME");
@@ -317,6 +326,7 @@ class Parser {
               : name == "pattern" ? &pattern_name_
               : name == "verify"  ? &verify_.display
               : name == "profile" ? &profile_.profile
+              : name == "init"    ? &init_.file
                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "gallery") {
@@ -328,6 +338,11 @@ class Parser {
     if (name == "pattern") return FillInPattern();
     if (name == "verify") return FillInVerify();
     if (name == "profile") return FillInProfile();
+    if (name == "doctor") options_.command = DoctorOptions();
+    if (name == "init") {
+      if (init_.file.empty()) throw UsageError{"init wants the name of a file, such as cube.toml"};
+      options_.command = init_;
+    }
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "watch") options_.command = watch_;
@@ -438,6 +453,7 @@ class Parser {
   PatternOptions pattern_;
   VerifyOptions verify_;
   ProfileOptions profile_;
+  InitOptions init_;
   std::string profile_action_;
   std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
   double duration_ = std::nan("");

@@ -89,12 +89,18 @@ struct ProfileOptions {
   std::string profile;  // a name or a path
 };
 
+struct DoctorOptions {};
+
+struct InitOptions {
+  std::string file;  // where the profile goes: must not be there yet
+};
+
 struct Options {
   std::string server;  // empty: see ChooseServer
   bool json = false;
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
-               VerifyOptions, ProfileOptions>
+               VerifyOptions, ProfileOptions, DoctorOptions, InitOptions>
       command;
 };
 

@@ -1,7 +1,10 @@
+#include <iostream>
 #include <type_traits>
 
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/doctor/doctor.h"
+#include "tools/voxelctl/init/init.h"
 #include "tools/voxelctl/profile/profile.h"
 #include "tools/voxelctl/verify/verify.h"
 
@@ -21,6 +24,10 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   }
   if (const auto* verify = std::get_if<VerifyOptions>(&options.command))
     return Verify(*verify, interrupt, console);
+  if (std::holds_alternative<DoctorOptions>(options.command)) return Doctor(ThisMachine(), console);
+  if (const auto* init = std::get_if<InitOptions>(&options.command)) {
+    return Init(*init, std::cin, console);
+  }
   if (const auto* profile = std::get_if<ProfileOptions>(&options.command))
     return ShowProfile(*profile, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();

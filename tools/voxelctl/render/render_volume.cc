@@ -172,15 +172,32 @@ class Painter {
     // Where slices crowd, near a rotor's axis, each counts for less of the glow.
     const double crowding = std::sqrt(Length2(axes[2]) / std::max(Length2(axes[0]), 1e-18));
     const auto weight = static_cast<float>(beside == slice ? 1 : std::clamp(crowding, 0.05, 1.0));
+    // The surface is one pixel's; an eye sees the light of all that crowd there, beside what the sparsest have.
+    const bool turns = std::holds_alternative<display::Rotor>(geometry.shape) && beside != slice;
+    const double sparse = turns ? SparsestStep(geometry, slice, beside) : 0;
+    const double step = std::sqrt(Length2(axes[2]));
+    const auto together =
+        static_cast<float>(turns ? std::clamp(sparse / std::max(step, 1e-9), 1.0, 255.0) : 1);
     for (Vec3& axis : axes) axis = camera_.Rotate(Times(axis, kCellSize));
     for (int32_t v = bottom; v < volume_.height; ++v) {
       const uint8_t* pixel = volume_.pixel(slice, u, v);
       if ((pixel[0] | pixel[1] | pixel[2]) == 0) continue;
-      PaintCell(camera_.ToCamera(Plus(base, Times(step_v, v))), axes, pixel, weight);
+      PaintCell(camera_.ToCamera(Plus(base, Times(step_v, v))), axes, pixel, weight, together);
     }
   }
 
  private:
+  // Half the way from a slice's first or last column to the next slice's, whichever is farther.
+  double SparsestStep(const display::Geometry& geometry, int32_t slice, int32_t beside) const {
+    double most = 0;
+    for (const int32_t u : {0, volume_.width - 1}) {
+      const Vec3 way = Minus(display::PixelPosition(geometry, beside, u, 0),
+                             display::PixelPosition(geometry, slice, u, 0));
+      most = std::max(most, std::sqrt(Length2(way)) / 2);
+    }
+    return most;
+  }
+
   int32_t FirstLit(int32_t slice, int32_t u) const {
     for (int32_t v = 0; v < volume_.height; ++v) {
       const uint8_t* pixel = volume_.pixel(slice, u, v);
@@ -190,7 +207,7 @@ class Painter {
   }
 
   void PaintCell(const Vec3& at, const std::array<Vec3, 3>& axes, const uint8_t* pixel,
-                 float weight) {
+                 float weight, float together = 1) {
     Ellipse shape{.x = camera_.ScreenX(at),
                   .y = camera_.ScreenY(at),
                   .xx = kLeastRadius * kLeastRadius,
@@ -206,9 +223,13 @@ class Painter {
     }
     const double depth = camera_.Depth(at);
     const auto cue = static_cast<float>(1 + (kFarBrightness - 1) * std::clamp(depth, 0.0, 1.0));
-    canvas_->Splat(shape, static_cast<float>(depth),
-                   {linear_[pixel[0]] * cue, linear_[pixel[1]] * cue, linear_[pixel[2]] * cue},
-                   weight);
+    // No brighter than full, and of the same colour.
+    const float most = std::max({pixel[0], pixel[1], pixel[2]});
+    const float times = std::max(1.0f, std::min(together, 255 / most));
+    const auto light = [&](int channel) {
+      return linear_[static_cast<size_t>(std::lround(pixel[channel] * times))] * cue;
+    };
+    canvas_->Splat(shape, static_cast<float>(depth), {light(0), light(1), light(2)}, weight);
   }
 
   const Volume& volume_;

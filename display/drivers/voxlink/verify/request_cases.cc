@@ -148,7 +148,7 @@ void ModeRoundTrip(Probe& probe) {
     if ((fixed.formats >> format & 1) == 0) continue;
     for (const uint8_t subs : {uint8_t{1}, fixed.max_sub_frames}) {
       for (const uint32_t rate : {0u, fixed.min_rate_mhz, fixed.max_rate_mhz}) {
-        Mode want{.format = format, .sub_frames = subs, .reserved0 = 0, .rate_mhz = rate};
+        Mode want{.format = format, .sub_frames = subs, .bits = 0, .reserved0 = 0, .rate_mhz = rate};
         session.Do(Request::kSetMode, 0, BytesOf(want));
         if (rate == 0) want.rate_mhz = fixed.nominal_rate_mhz;
         const Mode got = session.GetMode();
@@ -172,6 +172,7 @@ void ModeRefused(Probe& probe) {
   };
   with([](Mode& m) { m.format = 8; });
   with([](Mode& m) { m.format = 255; });
+  with([](Mode& m) { m.bits = 9; });
   with([](Mode& m) { m.sub_frames = 0; });
   if (fixed.max_sub_frames < 255) {
     with([&](Mode& m) { m.sub_frames = static_cast<uint8_t>(fixed.max_sub_frames + 1); });
@@ -192,7 +193,7 @@ void ModeRefused(Probe& probe) {
 void ModeReserved(Probe& probe) {
   Session session(probe);
   Mode mode = session.SmallestMode();
-  mode.reserved0 = 0xFFFF;
+  mode.reserved0 = 0xFF;
   mode.reserved1[0] = mode.reserved1[1] = 0xFFFFFFFF;
   session.Do(Request::kSetMode, 0, BytesOf(mode));
 }

@@ -149,12 +149,13 @@ FrameLayout Session::LayoutOf(const Mode& mode) {
           .width = static_cast<int32_t>(fixed.width),
           .height = static_cast<int32_t>(fixed.height),
           .sub_frames = mode.sub_frames,
-          .format = static_cast<PixelFormat>(mode.format)};
+          .format = static_cast<PixelFormat>(mode.format),
+          .bits = mode.bits};
 }
 
 Mode Session::SmallestMode() {
   std::optional<Mode> best;
-  for (uint8_t format = 0; format < 3; ++format) {
+  for (uint8_t format = 0; format < kPixelFormats; ++format) {
     if ((capabilities().fixed.formats >> format & 1) == 0) continue;
     const Mode mode{.format = format, .sub_frames = 1};
     if (!best || LayoutOf(mode).bytes() < LayoutOf(*best).bytes()) best = mode;

@@ -51,7 +51,7 @@ void EveryFormat(Probe& probe) {
     Session session(probe);
     return session.capabilities().fixed.formats;
   }();
-  for (uint8_t format = 0; probe.check().ok() && format < 3; ++format) {
+  for (uint8_t format = 0; probe.check().ok() && format < kPixelFormats; ++format) {
     if ((formats >> format & 1) == 0) continue;
     Session session(probe);
     session.Start({.format = format, .sub_frames = 1});

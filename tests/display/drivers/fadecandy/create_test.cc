@@ -30,7 +30,7 @@ TEST(FadecandyOptions, ACubeOfEightByDefault) {
   EXPECT_EQ(info.layout, (FrameLayout{.slices = 1, .width = 512, .height = 1}));
   EXPECT_EQ(info.volumes_per_second, 60);
   EXPECT_EQ(info.tone.dither, Dither::kNone);
-  for (size_t c = 0; c < 256; ++c) EXPECT_EQ(info.tone.lut[c], c * 257);
+  for (const Tone::Curve& curve : info.tone.lut) EXPECT_EQ(curve, Tone::Linear());
   EXPECT_EQ(info.geometry.grid.nx, 8);
   EXPECT_EQ(info.geometry.grid.ny, 8);
   EXPECT_EQ(info.geometry.grid.nz, 8);

@@ -1,4 +1,4 @@
-#include "display/drivers/fadecandy/layout.h"
+#include "display/drivers/wiring/wiring.h"
 
 #include <cmath>
 #include <cstdio>
@@ -9,6 +9,7 @@
 #include <string>
 #include <tuple>
 
+#include "display/drivers/fadecandy/boards.h"
 #include "gtest/gtest.h"
 
 namespace voxeld::display::fadecandy {
@@ -19,7 +20,7 @@ using Values = std::map<std::string, std::string>;
 absl::StatusOr<Lattice> Read(Values values, int32_t boards = 1) {
   const DisplayOptions options{.name = "d", .driver = "fadecandy", .options = std::move(values)};
   OptionReader reader(options);
-  absl::StatusOr<Lattice> lattice = ReadLattice(reader, boards);
+  absl::StatusOr<Lattice> lattice = wiring::ReadLattice(reader, PixelsOf(boards));
   if (absl::Status status = reader.Finish(); !status.ok()) return status;
   return lattice;
 }
@@ -32,7 +33,7 @@ std::string Refusal(Values values, int32_t boards = 1) {
 }
 
 std::string Wrong(std::string_view json, int32_t boards = 1) {
-  const auto lattice = ParseLayout(json, boards, 1);
+  const auto lattice = wiring::ParseLayout(json, PixelsOf(boards), 1);
   return lattice.ok() ? "accepted" : std::string(lattice.status().message());
 }
 
@@ -208,8 +209,8 @@ TEST(FadecandyLayout, BoardsByNumberOrSerial) {
 }
 
 TEST(FadecandyLayout, PointsOfAFile) {
-  const auto lattice =
-      ParseLayout(R"([{"point": [0, 0, 0]}, null, {"point": [1, 2.5, -4]}, {}])", 1, 10);
+  const auto lattice = wiring::ParseLayout(
+      R"([{"point": [0, 0, 0]}, null, {"point": [1, 2.5, -4]}, {}])", PixelsOf(1), 10);
   ASSERT_TRUE(lattice.ok()) << lattice.status();
   EXPECT_EQ(Points(*lattice, 0, 5), "-5,-12.5,20 - 5,12.5,-20 - -");
   EXPECT_EQ(lattice->cell_mm, (Vec3{10, 10, 10}));

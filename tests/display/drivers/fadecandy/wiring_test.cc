@@ -4,12 +4,16 @@
 #include <string>
 #include <vector>
 
-#include "display/drivers/fadecandy/layout.h"
+#include "display/drivers/fadecandy/boards.h"
+#include "display/drivers/wiring/wiring.h"
 #include "display/geometry/footprint.h"
 #include "tests/display/drivers/fadecandy/display_fixture.h"
 
 namespace voxeld::display::fadecandy {
 namespace {
+
+using wiring::CubeLattice;
+using wiring::CubeWiring;
 
 struct Led {
   size_t board, strip, place;
@@ -22,7 +26,8 @@ class FadecandyWiring : public Fadecandy {
   template <typename LedOf>
   void Check(CubeWiring wiring, size_t boards, LedOf led_of) {
     Start(boards);
-    const absl::StatusOr<Lattice> lattice = CubeLattice(wiring, static_cast<int32_t>(boards), 10);
+    const absl::StatusOr<Lattice> lattice =
+        CubeLattice(wiring, PixelsOf(static_cast<int32_t>(boards)), 10);
     ASSERT_TRUE(lattice.ok()) << lattice.status();
     Geometry geometry;
     geometry.shape = *lattice;

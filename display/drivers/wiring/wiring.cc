@@ -1,4 +1,4 @@
-#include "display/drivers/fadecandy/layout.h"
+#include "display/drivers/wiring/wiring.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,23 +10,21 @@
 #include <tuple>
 #include <utility>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
-namespace voxeld::display::fadecandy {
+namespace voxeld::display::wiring {
 namespace {
 
 using Json = nlohmann::json;
 
 constexpr double kMostMm = 1e6;
 constexpr size_t kMostLayoutBytes = size_t{16} << 20;
-constexpr int32_t kMostPixels = static_cast<int32_t>(kMostBoards * kPixels);
 
-Lattice EmptyLattice(int32_t boards, double pitch_mm) {
+Lattice EmptyLattice(const PixelNumbers& pixels, double pitch_mm) {
   Lattice lattice;
-  lattice.width_px = kPixels;
-  lattice.points_mm.resize(static_cast<size_t>(boards) * kPixels);
+  lattice.width_px = pixels.a_slice;
+  lattice.points_mm.resize(static_cast<size_t>(pixels.count()));
   lattice.cell_mm = {pitch_mm, pitch_mm, pitch_mm};
   return lattice;
 }
@@ -157,7 +155,7 @@ void ReadFlip(OptionReader& reader, CubeWiring& wiring) {
   }
 }
 
-CubeWiring ReadWiring(OptionReader& reader) {
+CubeWiring ReadWiring(OptionReader& reader, const PixelNumbers& pixels) {
   CubeWiring wiring;
   const std::vector<int32_t> size = reader.Size("cube", {8, 8, 8}, 3, 3);
   std::copy(size.begin(), size.end(), wiring.size.begin());
@@ -167,43 +165,20 @@ CubeWiring ReadWiring(OptionReader& reader) {
   wiring.reverse = reader.Flag("reverse", false);
   ReadFlip(reader, wiring);
   wiring.quarter_turns = static_cast<int>(reader.Choice("rotate", {"0", "90", "180", "270"}, 0));
-  wiring.per_strip = static_cast<int32_t>(
-      reader.Integer("per_strip", static_cast<int64_t>(kStripPixels), 1, kStripPixels));
-  wiring.first = static_cast<int32_t>(reader.Integer("first", 0, 0, kMostPixels - 1));
+  wiring.per_strip =
+      static_cast<int32_t>(reader.Integer("per_strip", pixels.a_strip, 1, pixels.a_strip));
+  wiring.first = static_cast<int32_t>(reader.Integer("first", 0, 0, pixels.count() - 1));
   return wiring;
 }
 
 }  // namespace
 
-Boards ReadBoards(OptionReader& reader) {
-  const std::string text = reader.Text("boards", "1");
-  int64_t count = 0;
-  if (absl::SimpleAtoi(text, &count)) {
-    if (count < 1 || count > kMostBoards) {
-      reader.Refuse("boards", absl::StrCat("from 1 to ", kMostBoards,
-                                           ", or serial numbers with ';' "
-                                           "between them"));
-      count = 1;
-    }
-    return {std::vector<std::string>(static_cast<size_t>(count))};
-  }
-  Boards boards{absl::StrSplit(text, ';')};
-  std::vector<std::string> sorted = boards.serials;
-  std::sort(sorted.begin(), sorted.end());
-  if (sorted.size() > static_cast<size_t>(kMostBoards) || sorted.front().empty() ||
-      std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
-    reader.Refuse("boards", absl::StrCat("1 to ", kMostBoards,
-                                         " serial numbers, each once, with ';' between them"));
-    return {{""}};
-  }
-  return boards;
-}
-
-absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, int32_t boards, double pitch_mm) {
-  Lattice lattice = EmptyLattice(boards, pitch_mm);
+absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, const PixelNumbers& numbers,
+                                    double pitch_mm) {
+  Lattice lattice = EmptyLattice(numbers, pitch_mm);
   const int64_t lights = int64_t{wiring.size[0]} * wiring.size[1] * wiring.size[2];
   const auto pixel_of = [&](int64_t light) {
-    return wiring.first + light / wiring.per_strip * static_cast<int64_t>(kStripPixels) +
+    return wiring.first + light / wiring.per_strip * static_cast<int64_t>(numbers.a_strip) +
            light % wiring.per_strip;
   };
   const auto pixels = static_cast<int64_t>(lattice.points_mm.size());
@@ -212,7 +187,7 @@ absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, int32_t boards, do
         absl::StrCat("a cube of ", wiring.size[0], "x", wiring.size[1], "x", wiring.size[2],
                      " lights, ", wiring.per_strip, " on a strip, from pixel ", wiring.first,
                      " on, ends at pixel ", pixel_of(lights - 1), "; the last one there is, with ",
-                     kPixels, " a board, is ", pixels - 1));
+                     numbers.a_slice, " a ", numbers.unit, ", is ", pixels - 1));
   }
   for (int64_t light = 0; light < lights; ++light) {
     const int64_t index = wiring.reverse ? lights - 1 - light : light;
@@ -222,18 +197,19 @@ absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, int32_t boards, do
   return lattice;
 }
 
-absl::StatusOr<Lattice> ParseLayout(std::string_view json, int32_t boards, double pitch_mm) {
+absl::StatusOr<Lattice> ParseLayout(std::string_view json, const PixelNumbers& numbers,
+                                    double pitch_mm) {
   const Json entries = Json::parse(json, nullptr, false);
   if (!entries.is_array()) {
     return absl::InvalidArgumentError(
         entries.is_discarded() ? "it is not JSON, or has a number beyond all bounds"
                                : "it is not an array; it must be one, with an entry a pixel");
   }
-  Lattice lattice = EmptyLattice(boards, pitch_mm);
+  Lattice lattice = EmptyLattice(numbers, pitch_mm);
   if (entries.size() > lattice.points_mm.size()) {
-    return absl::InvalidArgumentError(absl::StrCat("it has ", entries.size(),
-                                                   " entries; there are ", lattice.points_mm.size(),
-                                                   " pixels, ", kPixels, " a board"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("it has ", entries.size(), " entries; there are ", lattice.points_mm.size(),
+                     " pixels, ", numbers.a_slice, " a ", numbers.unit));
   }
   for (size_t i = 0; i < entries.size(); ++i) {
     absl::StatusOr<std::optional<Vec3>> point = ParsePoint(i, entries[i], pitch_mm);
@@ -245,7 +221,7 @@ absl::StatusOr<Lattice> ParseLayout(std::string_view json, int32_t boards, doubl
   return lattice;
 }
 
-absl::StatusOr<Lattice> ReadLattice(OptionReader& reader, int32_t boards) {
+absl::StatusOr<Lattice> ReadLattice(OptionReader& reader, const PixelNumbers& numbers) {
   const double pitch = reader.Number("pitch_mm", 1, 1e-6, kMostMm);
   const std::vector<double> cell = reader.Numbers("cell_mm");
   if (!cell.empty() && cell.size() != 1 && cell.size() != 3) {
@@ -258,17 +234,17 @@ absl::StatusOr<Lattice> ReadLattice(OptionReader& reader, int32_t boards) {
   if (const std::string path = reader.Text("layout", ""); !path.empty()) {
     if (reader.has("cube")) reader.Refuse("cube", "left out where there is a layout");
     absl::StatusOr<std::string> json = ReadFile(path);
-    lattice = json.ok() ? ParseLayout(*json, boards, pitch) : json.status();
+    lattice = json.ok() ? ParseLayout(*json, numbers, pitch) : json.status();
     if (!lattice.ok()) {
       return absl::InvalidArgumentError(
           absl::StrCat("layout \"", path, "\": ", lattice.status().message()));
     }
   } else {
-    lattice = CubeLattice(ReadWiring(reader), boards, pitch);
+    lattice = CubeLattice(ReadWiring(reader, numbers), numbers, pitch);
     if (!lattice.ok()) return lattice.status();
   }
   if (!cell.empty()) lattice->cell_mm = {cell[0], cell[cell.size() / 2], cell.back()};
   return lattice;
 }
 
-}  // namespace voxeld::display::fadecandy
+}  // namespace voxeld::display::wiring

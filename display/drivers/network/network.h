@@ -1,0 +1,32 @@
+// Displays behind a controller on the network, from options. README.md lists them.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "display/api/display.h"
+#include "display/conformance/suite.h"
+#include "display/drivers/driver_context.h"
+#include "display/drivers/network/link.h"
+#include "display/drivers/network/packets.h"
+#include "display/drivers/options.h"
+
+namespace voxeld::display::network {
+
+absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
+                                                const DriverContext& context);
+
+// Unimplemented: controllers answer nothing that could be checked.
+absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
+                                                         const DriverContext& context);
+
+// What carries packets of that protocol there.
+using MakeLink = std::function<std::unique_ptr<Link>(Protocol protocol, const Endpoint& to)>;
+
+// A stopped display. InvalidArgument for an unknown option or a bad value, with what would be right.
+absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& options,
+                                                    sync::Clock& clock, const MakeLink& make_link);
+
+}  // namespace voxeld::display::network

@@ -1,0 +1,223 @@
+#include "display/geometry/density.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+
+namespace voxeld::display {
+namespace {
+
+constexpr int kRounds = 24;
+constexpr int kRoundsBeforeKeepers = 6;
+constexpr int32_t kCube = kDensityCube;
+constexpr uint32_t kNoRow = UINT32_MAX;
+constexpr size_t kSparseShare = 50;  // one cube of so many may be darker than the rest
+constexpr float kNearlyFull = 0.995F;
+
+// The outer voxels of footprints (the inner axis, along which all is alike, is one voxel here), with a margin so that cubes
+// may reach over the edges.
+class Field {
+ public:
+  Field(const FootprintTable& table, const VoxelGrid& grid) {
+    const bool product = table.flat_row == 0 && HasInner(table);
+    const std::array<int32_t, 3> n = {grid.nx, grid.ny, grid.nz};
+    for (size_t a = 0; a < 3; ++a) {
+      const bool along = !(product && a == static_cast<size_t>(table.inner_axis)) && n[a] > 1;
+      margin_[a] = along ? kCube - 1 : 0;
+      size_[a] = static_cast<size_t>((along ? n[a] : 1) + 2 * margin_[a]);
+      cube_ *= along ? static_cast<float>(std::min(kCube, n[a])) : 1.0F;
+    }
+  }
+
+  size_t count() const { return size_[0] * size_[1] * size_[2]; }
+  float cube() const { return cube_; }  // voxels of one
+  size_t At(const FootprintEntry& e) const {
+    const auto along = [&](size_t a, uint16_t i) {
+      return margin_[a] == 0 ? 0 : static_cast<size_t>(i + margin_[a]);
+    };
+    return (along(2, e.z) * size_[1] + along(1, e.y)) * size_[0] + along(0, e.x);
+  }
+
+  // Sums over the cubes that begin (forward) or end at each voxel, as far as these lie in the field.
+  void Sum(std::vector<float>& of, bool forward) const {
+    size_t step = 1;
+    for (size_t a = 0; a < 3; step *= size_[a], ++a) {
+      if (margin_[a] > 0) SumAlong(of, step, size_[a], forward);
+    }
+  }
+
+ private:
+  static bool HasInner(const FootprintTable& table) {
+    return std::any_of(table.inner.entries.begin(), table.inner.entries.end(),
+                       [](const FootprintEntry& e) { return e.x != 0 || e.y != 0 || e.z != 0; }) ||
+           table.height > 1;
+  }
+
+  static void SumAlong(std::vector<float>& of, size_t step, size_t size, bool forward) {
+    for (size_t block = 0; block < of.size(); block += step * size) {
+      for (size_t i = 0; i < step; ++i) {
+        float* const line = &of[block + i];
+        for (size_t n = 0; n < size; ++n) {
+          const size_t at = forward ? n : size - 1 - n;
+          float sum = 0;
+          for (size_t d = 0; d < static_cast<size_t>(kCube) && n + d < size; ++d) {
+            sum += line[(forward ? at + d : at - d) * step];
+          }
+          line[at * step] = sum;
+        }
+      }
+    }
+  }
+
+  std::array<size_t, 3> size_{};
+  std::array<int32_t, 3> margin_{};
+  float cube_ = 1;
+};
+
+class Evener {
+ public:
+  Evener(const FootprintTable& table, const VoxelGrid& grid)
+      : table_(table),
+        field_(table, grid),
+        factors_(table.outer.begin.size() - 1, 1.0F),
+        floors_(factors_.size(), 0.0F) {
+    reach_.assign(field_.count(), 0);
+    for (const FootprintEntry& e : table.outer.entries) reach_[field_.At(e)] = 1;
+    field_.Sum(reach_, true);
+    light_ = LightOfCubes();
+    std::vector<float> whole;
+    for (size_t i = 0; i < light_.size(); ++i) {
+      if (reach_[i] >= field_.cube()) whole.push_back(light_[i]);
+    }
+    if (whole.empty()) return;
+    const auto sparse = whole.begin() + static_cast<ptrdiff_t>(whole.size() / kSparseShare);
+    std::nth_element(whole.begin(), sparse, whole.end());
+    target_ = *sparse / field_.cube();
+  }
+
+  // Whether any cube lies within reach whole.
+  bool has_target() const { return target_ > 0; }
+  const std::vector<float>& factors() const { return factors_; }
+  bool kept(size_t row) const { return floors_[row] > 0; }
+
+  // Towards the light of the sparsest cube, by as much as the cubes of a row's voxels have too much or too little.
+  void Round() {
+    for (size_t i = 0; i < light_.size(); ++i) {
+      light_[i] = light_[i] > 0 ? target_ * reach_[i] / light_[i] * reach_[i] : 0;
+    }
+    field_.Sum(light_, false);
+    std::vector<float> weights = reach_;
+    field_.Sum(weights, false);
+    for (size_t row = 0; row < factors_.size(); ++row) {
+      float want = 0, all = 0;
+      for (const FootprintEntry& e : table_.outer.list(row)) {
+        const size_t at = field_.At(e);
+        want += static_cast<float>(e.weight) * light_[at] / weights[at];
+        all += static_cast<float>(e.weight);
+      }
+      if (all == 0) continue;
+      factors_[row] = std::clamp(factors_[row] * want / all, floors_[row], 1.0F);
+    }
+    light_ = LightOfCubes();
+  }
+
+  // Rows that between them have every voxel whole, in each set of inner lists; few of them: a voxel that no row yet has takes
+  // the one of its rows that has most such voxels, of these the one with most light.
+  void Keep(float least) {
+    for (int32_t set = 0; set < table_.inner_sets; ++set) KeepOf(set, least);
+    light_ = LightOfCubes();
+  }
+
+ private:
+  void KeepOf(int32_t set, float least) {
+    // Rows by voxel.
+    std::vector<uint32_t> begin(field_.count() + 1);
+    const auto each = [&](auto call) {
+      for (int32_t slice = set; slice < table_.slices; slice += table_.inner_sets) {
+        for (int32_t u = 0; u < table_.width; ++u) {
+          const auto row = static_cast<uint32_t>(slice) * static_cast<uint32_t>(table_.width) +
+                           static_cast<uint32_t>(u);
+          for (const FootprintEntry& e : table_.outer.list(row)) {
+            if (e.weight == kFullWeight) call(row, field_.At(e));
+          }
+        }
+      }
+    };
+    each([&](uint32_t, size_t voxel) { ++begin[voxel + 1]; });
+    for (size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+    std::vector<uint32_t> rows(begin.back()), next(begin.begin(), begin.end() - 1);
+    each([&](uint32_t row, size_t voxel) { rows[next[voxel]++] = row; });
+
+    std::vector<uint8_t> kept(field_.count());
+    const auto wants = [&](uint32_t row) {
+      return std::count_if(table_.outer.list(row).begin(), table_.outer.list(row).end(),
+                           [&](const FootprintEntry& e) {
+                             return e.weight == kFullWeight && kept[field_.At(e)] == 0;
+                           });
+    };
+    for (size_t voxel = 0; voxel < field_.count(); ++voxel) {
+      if (kept[voxel] != 0 || begin[voxel] == begin[voxel + 1]) continue;
+      uint32_t best = kNoRow;
+      ptrdiff_t most = 0;
+      for (uint32_t i = begin[voxel]; i < begin[voxel + 1]; ++i) {
+        const ptrdiff_t count = wants(rows[i]);
+        if (count < most) continue;
+        if (count == most && factors_[rows[i]] <= factors_[best]) continue;
+        best = rows[i];
+        most = count;
+      }
+      floors_[best] = least;
+      factors_[best] = std::max(factors_[best], least);
+      for (const FootprintEntry& e : table_.outer.list(best)) {
+        if (e.weight == kFullWeight) kept[field_.At(e)] = 1;
+      }
+    }
+  }
+
+  std::vector<float> LightOfCubes() const {
+    std::vector<float> light(field_.count());
+    for (size_t row = 0; row < factors_.size(); ++row) {
+      const std::span<const FootprintEntry> list = table_.outer.list(row);
+      float all = 0;
+      for (const FootprintEntry& e : list) all += static_cast<float>(e.weight);
+      for (const FootprintEntry& e : list) {
+        light[field_.At(e)] += factors_[row] * static_cast<float>(e.weight) / all;
+      }
+    }
+    field_.Sum(light, true);
+    return light;
+  }
+
+  const FootprintTable& table_;
+  const Field field_;
+  std::vector<float> factors_, floors_;
+  std::vector<float> reach_;  // voxels within reach of the cube that begins at each
+  std::vector<float> light_;  // of these cubes
+  float target_ = 0;          // a voxel
+};
+
+}  // namespace
+
+std::vector<uint16_t> EvenFactors(const FootprintTable& table, const VoxelGrid& grid,
+                                  uint16_t least) {
+  Evener evener(table, grid);
+  if (!evener.has_target()) return {};
+  for (int round = 0; round < kRounds; ++round) {
+    if (round == kRoundsBeforeKeepers) evener.Keep(static_cast<float>(least) / 65535);
+    evener.Round();
+  }
+  const std::vector<float>& factors = evener.factors();
+  if (std::all_of(factors.begin(), factors.end(), [](float f) { return f >= kNearlyFull; })) {
+    return {};
+  }
+  std::vector<uint16_t> out(factors.size());
+  for (size_t row = 0; row < out.size(); ++row) {
+    const int32_t factor = static_cast<int32_t>(factors[row] * 65535.0F + 0.5F);
+    out[row] = static_cast<uint16_t>(
+        std::clamp(factor, evener.kept(row) ? int32_t{least} : 1, int32_t{65535}));
+  }
+  return out;
+}
+
+}  // namespace voxeld::display

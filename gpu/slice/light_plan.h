@@ -1,0 +1,34 @@
+// The tables by which a target's pixels become light (finish.h), made on the host for every engine.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "display/api/slice_frame.h"
+#include "display/geometry/footprint.h"
+#include "gpu/slice/finish.h"
+
+namespace voxeld::gpu {
+
+struct LightPlan {
+  std::vector<uint16_t> curves;   // 256 each of red, green and blue
+  std::vector<uint16_t> noise;    // of kBlueNoise, else none
+  std::vector<uint16_t> factors;  // of each outer row of the footprints; none: all are full
+
+  static LightPlan Of(const display::FootprintTable& table, const display::VoxelGrid& grid,
+                      const display::FrameLayout& layout, const display::Tone& tone);
+
+  // Ordered dither or none, and all that a pixel's place decides is its threshold: what is worked out once for many places
+  // (levels.h) holds.
+  bool plain(const display::FrameLayout& layout) const {
+    return noise.empty() && factors.empty() && layout.format != display::PixelFormat::kPlanes24;
+  }
+
+  // Refers to this.
+  Finish finish(const display::FrameLayout& layout, const display::Tone& tone) const;
+};
+
+// The factor of light with which full white lights every pixel, whatever its threshold, in a sub-frame at least; 1 to 65535.
+uint16_t LeastFactor(const display::FrameLayout& layout, const display::Tone& tone);
+
+}  // namespace voxeld::gpu
