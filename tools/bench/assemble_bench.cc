@@ -312,8 +312,7 @@ Draft Threads(uint64_t seed, size_t count, float length, const int32_t size[3]) 
 }
 
 void Vx1(benchmark::State& state) {
-  Frames frames(912, 1140, 192, display::PixelFormat::kBitPlanes,
-                static_cast<int>(state.range(0)));
+  Frames frames(912, 1140, 192, display::PixelFormat::kBitPlanes, static_cast<int>(state.range(0)));
   const Draft scenes[2] = {Threads(5, 20'000, 100, frames.size()),
                            Threads(6, 20'000, 100, frames.size())};
   WholeFrames(state, frames, scenes);

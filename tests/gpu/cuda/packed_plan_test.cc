@@ -137,8 +137,7 @@ TEST(PackedPlan, LeastLevelsAreThoseThatQuantizeToLight) {
         const uint32_t least = plan->least[(sub * 8 + v) * 8 + u];
         const uint32_t threshold = Threshold(display.tone.dither, u, v, sub, 3);
         for (uint32_t c = 0; c < 256; ++c) {
-          EXPECT_EQ((Interleave(c) & 0x249249) >= least,
-                    Quantize(square[c], 2, threshold) == 1)
+          EXPECT_EQ((Interleave(c) & 0x249249) >= least, Quantize(square[c], 2, threshold) == 1)
               << "level " << c << " at " << u << ", " << v << ", sub-frame " << sub;
         }
       }

@@ -148,7 +148,8 @@ void ModeRoundTrip(Probe& probe) {
     if ((fixed.formats >> format & 1) == 0) continue;
     for (const uint8_t subs : {uint8_t{1}, fixed.max_sub_frames}) {
       for (const uint32_t rate : {0u, fixed.min_rate_mhz, fixed.max_rate_mhz}) {
-        Mode want{.format = format, .sub_frames = subs, .bits = 0, .reserved0 = 0, .rate_mhz = rate};
+        Mode want{
+            .format = format, .sub_frames = subs, .bits = 0, .reserved0 = 0, .rate_mhz = rate};
         session.Do(Request::kSetMode, 0, BytesOf(want));
         if (rate == 0) want.rate_mhz = fixed.nominal_rate_mhz;
         const Mode got = session.GetMode();
