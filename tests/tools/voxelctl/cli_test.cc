@@ -115,7 +115,8 @@ TEST(CommandLine, TheOthers) {
   EXPECT_TRUE(std::get<PatternOptions>(Parse("pattern list").command).list);
   EXPECT_EQ(std::get<ProfileOptions>(Parse("profile check ./a.toml").command).profile, "./a.toml");
   EXPECT_TRUE(std::get<ProfileOptions>(Parse("profile list").command).list);
-  EXPECT_THAT(PatternNames(), ElementsAre("axes", "corners", "grid", "ramp", "white"));
+  EXPECT_THAT(PatternNames(),
+              ElementsAre("axes", "corners", "grid", "ramp", "white", "bars", "density", "slices"));
 }
 
 struct Wrong {

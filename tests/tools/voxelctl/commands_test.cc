@@ -78,7 +78,7 @@ TEST_F(CommandsTest, EveryReportIsOneJsonDocument) {
   EXPECT_EQ(entities["layers"][0]["owner"], 7);
 
   EXPECT_EQ(RunJson({"clear"})["entities"], 2);
-  EXPECT_EQ(RunJson({"pattern", "list"})["patterns"].size(), 5u);
+  EXPECT_EQ(RunJson({"pattern", "list"})["patterns"].size(), 8u);
   EXPECT_EQ(RunJson({"pattern", "axes"})["displays"][0]["test_pattern"], "TEST_PATTERN_AXES");
   EXPECT_EQ(RunJson({"snapshot", folder_.Path("a.png")})["lit_pixels"], 256);
   EXPECT_EQ(RunJson({"play", DataFile("points.ply")})["files"][0]["vertices"], 3);
