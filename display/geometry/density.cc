@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <span>
 
@@ -25,7 +26,7 @@ class Field {
     for (size_t a = 0; a < 3; ++a) {
       const bool along = !(product && a == static_cast<size_t>(table.inner_axis)) && n[a] > 1;
       margin_[a] = along ? kCube - 1 : 0;
-      size_[a] = static_cast<size_t>((along ? n[a] : 1) + 2 * margin_[a]);
+      size_[a] = static_cast<size_t>(along ? n[a] : 1) + 2 * static_cast<size_t>(margin_[a]);
       cube_ *= along ? static_cast<float>(std::min(kCube, n[a])) : 1.0F;
     }
   }
@@ -213,7 +214,7 @@ std::vector<uint16_t> EvenFactors(const FootprintTable& table, const VoxelGrid& 
   }
   std::vector<uint16_t> out(factors.size());
   for (size_t row = 0; row < out.size(); ++row) {
-    const int32_t factor = static_cast<int32_t>(factors[row] * 65535.0F + 0.5F);
+    const auto factor = static_cast<int32_t>(std::lround(factors[row] * 65535.0F));
     out[row] = static_cast<uint16_t>(
         std::clamp(factor, evener.kept(row) ? int32_t{least} : 1, int32_t{65535}));
   }

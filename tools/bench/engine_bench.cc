@@ -148,7 +148,7 @@ void LinesFrame(benchmark::State& state, const display::Geometry& geometry,
                                         RandomSegments(random, bench.grid(), count, length)};
   size_t turn = 0;
   uint64_t lit = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     bench.PutSegments(scenes[turn++ % 2]);
     lit += bench.Frame().lit_voxels;
   }
@@ -162,7 +162,7 @@ void CopyFrame(benchmark::State& state, const display::Geometry& geometry,
                display::PixelFormat format) {
   Bench bench(geometry, format);
   std::vector<char> from(bench.frame_bytes(), 1), to(bench.frame_bytes());
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     std::memcpy(to.data(), from.data(), from.size());
     benchmark::DoNotOptimize(to.data());
     benchmark::ClobberMemory();

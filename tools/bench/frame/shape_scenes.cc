@@ -142,7 +142,8 @@ Scene SampledVolume(bool by_level, double share) {
       content.transform.m[row * 4 + col] = kScale * turn[row * 3 + col];
       middle += content.transform.m[row * 4 + col] * count / 2;
     }
-    content.transform.m[row * 4 + 3] = side / 2 - middle;
+    const auto half = side / 2;
+    content.transform.m[row * 4 + 3] = half - middle;
   }
   scene.contents.push_back(std::move(content));
   return scene;

@@ -75,6 +75,7 @@ class Asker {
           }
           if (meant.size() == 1) return meant.front();
           std::vector<std::string> words;
+          words.reserve(choices.size());
           for (const Choice& choice : choices) words.push_back(choice.word);
           return absl::InvalidArgumentError(absl::StrCat("one of ", absl::StrJoin(words, ", ")));
         });
