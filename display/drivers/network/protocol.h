@@ -58,7 +58,7 @@ inline constexpr int32_t kPixels = 16384;  // of a message here; 21,845 are poss
 // Of a DMX universe of 512 slots: whole pixels.
 inline constexpr int32_t kUniversePixels = 170;
 
-// What a controller is told once in so long although nothing changed, and how many times when a stream falls silent.
+// After so long without a packet a controller is told all again.
 inline constexpr int64_t kRefreshNs = 800'000'000;
 
 }  // namespace voxeld::display::network

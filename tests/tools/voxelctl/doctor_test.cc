@@ -130,10 +130,10 @@ TEST_F(DoctorTest, Gpus) {
   Write("sys/bus/pci/devices/0000:01:00.0/class", "0x030000\n");
   EXPECT_EQ(Of("cuda")[0].state, State::kBad);
   EXPECT_THAT(Of("cuda")[0].fix, HasSubstr("apt install nvidia-driver"));
-  cuda_ = {.library = true, .error = 999};
+  cuda_ = {.installed = true, .error = 999};
   EXPECT_EQ(Of("cuda")[0].state, State::kBad);
   EXPECT_THAT(Of("cuda")[0].text, HasSubstr("error 999"));
-  cuda_ = {.library = true, .devices = {"NVIDIA H200"}};
+  cuda_ = {.installed = true, .devices = {"NVIDIA H200"}};
   EXPECT_EQ(Of("cuda")[0].state, State::kGood);
   EXPECT_EQ(Of("cuda")[0].text, "NVIDIA H200");
 }

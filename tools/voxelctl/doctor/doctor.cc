@@ -129,7 +129,7 @@ bool HasNvidiaCard(const Machine& machine) {
 
 Finding OfCuda(const Machine& machine) {
   const CudaState cuda = machine.cuda();
-  if (!cuda.library) {
+  if (!cuda.installed) {
     if (!HasNvidiaCard(machine)) {
       return {"cuda", State::kGood, "no NVIDIA GPU: the CPU draws", ""};
     }

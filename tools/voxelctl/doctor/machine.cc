@@ -27,7 +27,7 @@ CudaState LookAtCuda() {
   CudaState state;
   void* const library = dlopen("libcuda.so.1", RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) return state;
-  state.library = true;
+  state.installed = true;
   const auto init = reinterpret_cast<Init>(dlsym(library, "cuInit"));
   const auto count = reinterpret_cast<Count>(dlsym(library, "cuDeviceGetCount"));
   const auto name = reinterpret_cast<Name>(dlsym(library, "cuDeviceGetName"));

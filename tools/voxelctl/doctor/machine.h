@@ -10,8 +10,8 @@ namespace voxeld::voxelctl {
 
 // What NVIDIA's driver answers.
 struct CudaState {
-  bool library = false;  // libcuda.so.1 can be opened
-  int error = 0;         // of cuInit, of counting; 0: none
+  bool installed = false;  // libcuda.so.1 can be opened
+  int error = 0;           // of cuInit, of counting; 0: none
   std::vector<std::string> devices;
 };
 
