@@ -97,11 +97,22 @@ if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(voxeld_common_headers PRIVATE -pthread)
 endif()
 
-# voxeld_library(NAME SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. Each of HEADERS is also compiled with
+# voxeld_unwatched(SOURCE …): sources that share nothing with other threads; ThreadSanitizer is not asked to look on.
+function(voxeld_unwatched)
+  if(VOXELD_SANITIZE STREQUAL "thread")
+    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -fno-sanitize=thread SKIP_PRECOMPILE_HEADERS ON)
+  endif()
+endfunction()
+
+# voxeld_library(NAME [SINGLE_THREADED] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
+# functions and objects that no two threads share (voxeld_unwatched). Each of HEADERS is also compiled with
 # nothing before it (but under a sanitizer), so none leans on what its includer happened to include: by its own .cc, which
 # includes it first (tools/check_includes.py), or alone.
 function(voxeld_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED" "" "SOURCES;HEADERS;LINK" ${ARGN})
+  if(ARG_SINGLE_THREADED)
+    voxeld_unwatched(${ARG_SOURCES})
+  endif()
   set(alone "")
   if(VOXELD_SANITIZE)
     set(ARG_HEADERS "")

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -44,31 +45,26 @@ class Field {
   void Sum(std::vector<float>& of, bool forward) const {
     size_t step = 1;
     for (size_t a = 0; a < 3; step *= size_[a], ++a) {
-      if (margin_[a] > 0) SumAlong(of, step, size_[a], forward);
+      if (margin_[a] == 0) continue;
+      for (size_t block = 0; block < of.size(); block += step * size_[a]) {
+        const std::span<float> lines = std::span(of).subspan(block, step * size_[a]);
+        for (size_t d = step; d < step * static_cast<size_t>(kCube); d *= 2) {
+          if (forward) {
+            for (size_t i = 0; i + d < lines.size(); ++i) lines[i] += lines[i + d];
+          } else {
+            for (size_t i = lines.size(); i-- > d;) lines[i] += lines[i - d];
+          }
+        }
+      }
     }
   }
 
  private:
+  static_assert(std::has_single_bit(static_cast<unsigned>(kCube)), "sums double");
   static bool HasInner(const FootprintTable& table) {
     return std::any_of(table.inner.entries.begin(), table.inner.entries.end(),
                        [](const FootprintEntry& e) { return e.x != 0 || e.y != 0 || e.z != 0; }) ||
            table.height > 1;
-  }
-
-  static void SumAlong(std::vector<float>& of, size_t step, size_t size, bool forward) {
-    for (size_t block = 0; block < of.size(); block += step * size) {
-      for (size_t i = 0; i < step; ++i) {
-        float* const line = &of[block + i];
-        for (size_t n = 0; n < size; ++n) {
-          const size_t at = forward ? n : size - 1 - n;
-          float sum = 0;
-          for (size_t d = 0; d < static_cast<size_t>(kCube) && n + d < size; ++d) {
-            sum += line[(forward ? at + d : at - d) * step];
-          }
-          line[at * step] = sum;
-        }
-      }
-    }
   }
 
   std::array<size_t, 3> size_{};
@@ -83,9 +79,21 @@ class Evener {
         field_(table, grid),
         factors_(table.outer.begin.size() - 1, 1.0F),
         floors_(factors_.size(), 0.0F) {
+    entries_.reserve(table.outer.entries.size());
+    for (size_t row = 0; row < factors_.size(); ++row) {
+      const std::span<const FootprintEntry> list = table.outer.list(row);
+      float all = 0;
+      for (const FootprintEntry& e : list) all += static_cast<float>(e.weight);
+      for (const FootprintEntry& e : list) {
+        entries_.push_back(
+            {static_cast<uint32_t>(field_.At(e)), static_cast<float>(e.weight) / all});
+      }
+    }
     reach_.assign(field_.count(), 0);
-    for (const FootprintEntry& e : table.outer.entries) reach_[field_.At(e)] = 1;
+    for (const Entry& e : entries_) reach_[e.at] = 1;
     field_.Sum(reach_, true);
+    about_ = reach_;
+    field_.Sum(about_, false);
     light_ = LightOfCubes();
     std::vector<float> whole;
     for (size_t i = 0; i < light_.size(); ++i) {
@@ -108,17 +116,11 @@ class Evener {
       light_[i] = light_[i] > 0 ? target_ * reach_[i] / light_[i] * reach_[i] : 0;
     }
     field_.Sum(light_, false);
-    std::vector<float> weights = reach_;
-    field_.Sum(weights, false);
     for (size_t row = 0; row < factors_.size(); ++row) {
-      float want = 0, all = 0;
-      for (const FootprintEntry& e : table_.outer.list(row)) {
-        const size_t at = field_.At(e);
-        want += static_cast<float>(e.weight) * light_[at] / weights[at];
-        all += static_cast<float>(e.weight);
-      }
-      if (all == 0) continue;
-      factors_[row] = std::clamp(factors_[row] * want / all, floors_[row], 1.0F);
+      if (list(row).empty()) continue;
+      float want = 0;
+      for (const Entry& e : list(row)) want += e.share * light_[e.at] / about_[e.at];
+      factors_[row] = std::clamp(factors_[row] * want, floors_[row], 1.0F);
     }
     light_ = LightOfCubes();
   }
@@ -179,21 +181,28 @@ class Evener {
   std::vector<float> LightOfCubes() const {
     std::vector<float> light(field_.count());
     for (size_t row = 0; row < factors_.size(); ++row) {
-      const std::span<const FootprintEntry> list = table_.outer.list(row);
-      float all = 0;
-      for (const FootprintEntry& e : list) all += static_cast<float>(e.weight);
-      for (const FootprintEntry& e : list) {
-        light[field_.At(e)] += factors_[row] * static_cast<float>(e.weight) / all;
-      }
+      for (const Entry& e : list(row)) light[e.at] += factors_[row] * e.share;
     }
     field_.Sum(light, true);
     return light;
   }
 
+  // A voxel of a row, and how much of the row's light is its.
+  struct Entry {
+    uint32_t at;
+    float share;
+  };
+  std::span<const Entry> list(size_t row) const {
+    const std::vector<uint32_t>& begin = table_.outer.begin;
+    return std::span(entries_).subspan(begin[row], begin[row + 1] - begin[row]);
+  }
+
   const FootprintTable& table_;
   const Field field_;
+  std::vector<Entry> entries_;  // as the table's outer ones
   std::vector<float> factors_, floors_;
   std::vector<float> reach_;  // voxels within reach of the cube that begins at each
+  std::vector<float> about_;  // sums of these over the cubes that have a voxel
   std::vector<float> light_;  // of these cubes
   float target_ = 0;          // a voxel
 };

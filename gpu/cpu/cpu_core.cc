@@ -5,7 +5,6 @@
 #include "absl/strings/str_cat.h"
 #include "display/sync/clock.h"
 #include "gpu/checks.h"
-#include "gpu/slice/light_plan.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
@@ -21,7 +20,8 @@ absl::Status CpuCore::SetTarget(Target target) {
   display::FootprintTable table = display::BuildFootprints(target.geometry, target.tone.sampling);
   const TileGrid grid = TileGrid::Of(voxels.nx, voxels.ny, voxels.nz, Sampler::FastestAxis(table));
   display::TileToSlices tile_to_slices(table, voxels, kTileSize, kTileSize, kTileSize);
-  LightPlan light = LightPlan::Of(table, voxels, target.layout, target.tone);
+  std::shared_ptr<const LightPlan> light =
+      lights_.Of(table, target.geometry, target.layout, target.tone);
   absl::StatusOr<Sampler> sampler = Sampler::Create(std::move(table), grid, target.tone.sampling);
   if (!sampler.ok()) return sampler.status();
 

@@ -12,6 +12,7 @@
 #include "gpu/assemble/volume.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/engine.h"
+#include "gpu/slice/light_plan.h"
 #include "gpu/slice/pictures.h"
 
 namespace voxeld::gpu {
@@ -35,6 +36,7 @@ class CpuCore {
   std::optional<display::FrameLayout> layout_;  // the target's
   Volume volume_;
   Pictures pictures_;
+  LightPlanner lights_;
   Volume::Changes unsliced_;  // changes to the volume that no frame has shown yet
   std::vector<uint32_t>
       unobserved_;  // of their tiles those whose drawing the pictures did not observe

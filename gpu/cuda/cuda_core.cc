@@ -8,7 +8,6 @@
 #include "display/sync/clock.h"
 #include "gpu/checks.h"
 #include "gpu/cuda/kernels.h"
-#include "gpu/slice/light_plan.h"
 #include "gpu/slice/sampler.h"
 
 namespace voxeld::gpu::cuda {
@@ -34,15 +33,16 @@ absl::Status CudaCore::SetTarget(const Target& target) {
                          static_cast<uint64_t>(target.layout.sub_frames) *
                          target.layout.bytes_per_slice();
   std::optional<PackedPlan> packed;
-  const LightPlan light = LightPlan::Of(table, voxels, target.layout, target.tone);
-  if (tuning_.pack_as_drawn && light.plain(target.layout)) {
+  const std::shared_ptr<const LightPlan> light =
+      lights_.Of(table, target.geometry, target.layout, target.tone);
+  if (tuning_.pack_as_drawn && light->plain(target.layout)) {
     const auto groups =
         std::clamp<uint64_t>(bytes / tuning_.group_bytes, 2, PackedPlan::kMostGroups);
     packed = PackedPlan::Of(table, voxels, target.layout, target.tone, begin, end,
                             static_cast<int32_t>(groups));
   }
   absl::StatusOr<std::unique_ptr<CudaPictures>> pictures =
-      CudaPictures::Make(*device_, {target.layout, target.tone, begin, end}, light, table,
+      CudaPictures::Make(*device_, {target.layout, target.tone, begin, end}, *light, table,
                          tile_to_slices, packed, pictures_.get());
   if (!pictures.ok()) return pictures.status();
   absl::StatusOr<DeviceTiles> tiles = DeviceTiles::Make(

@@ -15,6 +15,7 @@
 #include "gpu/cuda/tuning.h"
 #include "gpu/cuda/uploader.h"
 #include "gpu/engine.h"
+#include "gpu/slice/light_plan.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -38,6 +39,7 @@ class CudaCore {
   Stopwatch stopwatch_;
   CudaVolume volume_;
   std::unique_ptr<CudaPictures> pictures_;
+  LightPlanner lights_;
   uint64_t last_frame_ = 0;
 };
 

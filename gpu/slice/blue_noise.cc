@@ -3,8 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <random>
-
-#include "gpu/slice/quantize.h"
+#include <vector>
 
 namespace voxeld::gpu {
 namespace {
@@ -12,12 +11,13 @@ namespace {
 constexpr size_t kSide = kNoiseSide, kCount = kNoiseRanks;
 constexpr double kSigma =
     1.5;  // of the Gaussian by which pixels weigh on each other, as the paper has it
+constexpr size_t kReach = 9;  // farther off a weight is less than half of the least there is
 constexpr size_t kFirstOnes = kCount / 10;
 
 // Which pixels are ones, and how much these weigh on every pixel, in whole numbers: sums do not depend on their order.
 class Pattern {
  public:
-  Pattern() : kernel_(kCount), weight_(kCount), ones_(kCount) {
+  Pattern() : kernel_(kCount), weight_(kCount), ones_(kCount), extremes_(kSide) {
     for (size_t y = 0; y < kSide; ++y) {
       for (size_t x = 0; x < kSide; ++x) {
         const double dx = static_cast<double>(x < kSide / 2 ? x : kSide - x);
@@ -26,38 +26,60 @@ class Pattern {
             std::llround(std::exp(-(dx * dx + dy * dy) / (2 * kSigma * kSigma)) * (1 << 24));
       }
     }
+    for (size_t y = 0; y < kSide; ++y) extremes_[y] = ExtremesOf(y);
   }
 
   bool one(size_t at) const { return ones_[at] != 0; }
   void Set(size_t at, bool one) {
     ones_[at] = one;
     const size_t x0 = at % kSide, y0 = at / kSide;
-    for (size_t y = 0; y < kSide; ++y) {
-      const int64_t* const row = &kernel_[(y + kSide - y0) % kSide * kSide];
-      for (size_t x = 0; x < kSide; ++x) {
-        const int64_t weight = row[(x + kSide - x0) % kSide];
-        weight_[y * kSide + x] += one ? weight : -weight;
+    for (size_t dy = kSide - kReach; dy <= kSide + kReach; ++dy) {
+      const size_t y = (y0 + dy) % kSide;
+      for (size_t dx = kSide - kReach; dx <= kSide + kReach; ++dx) {
+        const int64_t weight = kernel_[dy % kSide * kSide + dx % kSide];
+        weight_[y * kSide + (x0 + dx) % kSide] += one ? weight : -weight;
       }
+      extremes_[y] = ExtremesOf(y);
     }
   }
   // The one that others weigh on most; the zero that ones weigh on least. The first of several.
-  size_t TightestCluster() const { return Extreme(true); }
-  size_t LargestVoid() const { return Extreme(false); }
-
- private:
-  size_t Extreme(bool one) const {
-    size_t best = kCount;
-    for (size_t i = 0; i < kCount; ++i) {
-      if ((ones_[i] != 0) != one) continue;
-      if (best == kCount || (one ? weight_[i] > weight_[best] : weight_[i] < weight_[best])) {
-        best = i;
-      }
+  size_t TightestCluster() const {
+    size_t best = kNone;
+    for (const Extremes& row : extremes_) {
+      if (row.one != kNone && (best == kNone || weight_[row.one] > weight_[best])) best = row.one;
+    }
+    return best;
+  }
+  size_t LargestVoid() const {
+    size_t best = kNone;
+    for (const Extremes& row : extremes_) {
+      if (row.zero != kNone && (best == kNone || weight_[row.zero] < weight_[best]))
+        best = row.zero;
     }
     return best;
   }
 
+ private:
+  static constexpr size_t kNone = kCount;
+  struct Extremes {
+    size_t one = kNone, zero = kNone;
+  };
+
+  Extremes ExtremesOf(size_t y) const {
+    Extremes row;
+    for (size_t at = y * kSide; at < (y + 1) * kSide; ++at) {
+      if (one(at)) {
+        if (row.one == kNone || weight_[at] > weight_[row.one]) row.one = at;
+      } else if (row.zero == kNone || weight_[at] < weight_[row.zero]) {
+        row.zero = at;
+      }
+    }
+    return row;
+  }
+
   std::vector<int64_t> kernel_, weight_;
   std::vector<uint8_t> ones_;
+  std::vector<Extremes> extremes_;  // of each row
 };
 
 // Ones at random, moved from clusters into voids until that changes nothing.
@@ -78,12 +100,10 @@ void Relax(Pattern& pattern) {
   }
 }
 
-}  // namespace
-
-std::vector<uint16_t> MakeBlueNoise() {
+std::array<uint16_t, kCount> MakeRanks() {
   Pattern pattern;
   Relax(pattern);
-  std::vector<uint16_t> ranks(kCount);
+  std::array<uint16_t, kCount> ranks{};
   Pattern first = pattern;
   for (size_t rank = kFirstOnes; rank-- > 0;) {
     const size_t at = first.TightestCluster();
@@ -96,6 +116,13 @@ std::vector<uint16_t> MakeBlueNoise() {
     pattern.Set(at, true);
     ranks[at] = static_cast<uint16_t>(rank);
   }
+  return ranks;
+}
+
+}  // namespace
+
+const std::array<uint16_t, kNoiseRanks>& BlueNoise() {
+  static const std::array<uint16_t, kNoiseRanks> ranks = MakeRanks();
   return ranks;
 }
 

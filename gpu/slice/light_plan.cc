@@ -54,11 +54,23 @@ LightPlan LightPlan::Of(const display::FootprintTable& table, const display::Vox
   for (const display::Tone::Curve& curve : tone.lut) {
     plan.curves.insert(plan.curves.end(), curve.begin(), curve.end());
   }
-  if (tone.dither == display::Dither::kBlueNoise) plan.noise = MakeBlueNoise();
+  if (tone.dither == display::Dither::kBlueNoise)
+    plan.noise.assign(BlueNoise().begin(), BlueNoise().end());
   if (tone.density == display::Density::kEven) {
     plan.factors = display::EvenFactors(table, grid, LeastFactor(layout, tone));
   }
   return plan;
+}
+
+std::shared_ptr<const LightPlan> LightPlanner::Of(const display::FootprintTable& table,
+                                                  const display::Geometry& geometry,
+                                                  const display::FrameLayout& layout,
+                                                  const display::Tone& tone) {
+  if (!made_ || made_->geometry != geometry || made_->layout != layout || made_->tone != tone) {
+    made_ = {geometry, layout, tone,
+             std::make_shared<const LightPlan>(LightPlan::Of(table, geometry.grid, layout, tone))};
+  }
+  return made_->plan;
 }
 
 Finish LightPlan::finish(const display::FrameLayout& layout, const display::Tone& tone) const {

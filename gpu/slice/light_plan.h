@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <vector>
 
+#include "display/api/geometry.h"
 #include "display/api/slice_frame.h"
 #include "display/geometry/footprint.h"
 #include "gpu/slice/finish.h"
@@ -26,6 +29,26 @@ struct LightPlan {
 
   // Refers to this.
   Finish finish(const display::FrameLayout& layout, const display::Tone& tone) const;
+};
+
+// Makes a target's plan, which can take a while, and keeps it for the next target: one that has another view alone has the
+// same. Thread-bound.
+class LightPlanner {
+ public:
+  // `table`: the footprints of `geometry`, as the tone samples them.
+  std::shared_ptr<const LightPlan> Of(const display::FootprintTable& table,
+                                      const display::Geometry& geometry,
+                                      const display::FrameLayout& layout,
+                                      const display::Tone& tone);
+
+ private:
+  struct Made {
+    display::Geometry geometry;
+    display::FrameLayout layout;
+    display::Tone tone;
+    std::shared_ptr<const LightPlan> plan;
+  };
+  std::optional<Made> made_;
 };
 
 // The factor of light with which full white lights every pixel, whatever its threshold, in a sub-frame at least; 1 to 65535.

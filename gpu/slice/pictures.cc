@@ -31,7 +31,7 @@ void Pictures::SetPlan(SlicePlan plan) {
   }
   columns_.reset();
   packer_.reset();
-  if (plan_->light.plain(plan_->layout)) {
+  if (plan_->light->plain(plan_->layout)) {
     levels_ = LevelTables::Of(plan_->layout, plan_->tone);
     columns_ = LevelColumns::Create(plan_->sampler.table(), plan_->sampler.grid(), plan_->layout,
                                     plan_->tone, plan_->begin, plan_->end);
@@ -106,7 +106,7 @@ void Pictures::FinishAs(const SlicePixels& pixels, int32_t slice, uint32_t sub,
                         uint8_t* picture) const {
   const PictureShape shape = ShapeOf<kFormat>(plan_->layout);
   const display::FootprintTable& table = plan_->sampler.table();
-  Finish finish = plan_->light.finish(plan_->layout, plan_->tone);
+  Finish finish = plan_->light->finish(plan_->layout, plan_->tone);
   finish.format = kFormat;
   const size_t first = static_cast<size_t>(slice) * static_cast<size_t>(table.width);
   const auto row = static_cast<uint32_t>(table.flat_row);
@@ -119,7 +119,7 @@ void Pictures::FinishAs(const SlicePixels& pixels, int32_t slice, uint32_t sub,
 
 void Pictures::Pack(const SlicePixels& pixels, int32_t slice, uint32_t sub,
                     uint8_t* picture) const {
-  const bool plain = plan_->light.plain(plan_->layout);
+  const bool plain = plan_->light->plain(plan_->layout);
   const auto as = [&]<display::PixelFormat kFormat>() {
     plain ? PackAs<kFormat>(pixels, sub, picture) : FinishAs<kFormat>(pixels, slice, sub, picture);
   };

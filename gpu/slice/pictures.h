@@ -26,7 +26,7 @@ struct SlicePlan {
   display::FrameLayout layout;
   display::Tone tone;
   int32_t begin = 0, end = 0;  // the slices owned
-  LightPlan light;
+  std::shared_ptr<const LightPlan> light;
   Sampler sampler;
   display::TileToSlices tile_to_slices;
 };

@@ -4,6 +4,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <cstdint>
@@ -19,7 +20,7 @@ namespace {
 
 constexpr uint32_t kSide = kNoiseSide, kWidth = 768, kRows = 64, kScale = 4;
 
-using Ranks = std::vector<uint16_t>;
+using Ranks = std::array<uint16_t, kNoiseRanks>;
 
 uint32_t ThresholdAt(const Ranks* noise, uint32_t u, uint32_t v, uint32_t slice) {
   if (noise == nullptr) return Threshold(display::Dither::kOrdered, u, v, 0, 1);
@@ -72,7 +73,7 @@ void PutSpectrum(Picture& picture, uint32_t left, uint32_t top, const Ranks* noi
 }
 
 int Write(const char* path) {
-  const Ranks noise = MakeBlueNoise();
+  const Ranks& noise = BlueNoise();
   constexpr uint32_t kTile = kSide * kScale, kGap = 8;
   Picture picture{kWidth, 4 * (kRows + kGap) + 2 * kTile + kGap};
   for (uint32_t y = 0; y < kRows; ++y) {

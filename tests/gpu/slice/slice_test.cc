@@ -172,7 +172,7 @@ TEST(Finish, PartsOfPlanes24AreDitheredOverTime) {
 
 // The factor that promises light: a step below it there is a pixel that stays dark.
 TEST(LeastFactor, LightsEveryPixelAndNoLessDoes) {
-  const std::vector<uint16_t> noise = MakeBlueNoise();
+  const std::array<uint16_t, kNoiseRanks>& noise = BlueNoise();
   for (const display::PixelFormat format :
        {display::PixelFormat::kRgb332, display::PixelFormat::kBitPlanes,
         display::PixelFormat::kPlanes24}) {
