@@ -48,7 +48,7 @@ int Fail(int code, const absl::Status& status) {
 
 struct WantedDisplay {
   std::unique_ptr<display::Display> display;
-  ViewOptions view;
+  DisplaySetup setup;
   std::vector<int> gpus;
 };
 using Displays = std::vector<WantedDisplay>;
@@ -65,14 +65,14 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, const display::Drive
         {.name = wanted.name, .driver = wanted.driver, .options = options->driver}, context);
     if (!made.ok()) return wrong(made.status());
     const absl::StatusOr<gpu::Affine> map =
-        SceneToVoxel(options->view, (*made)->info().geometry.grid);
+        SceneToVoxel(options->setup.view, (*made)->info().geometry.grid);
     if (!map.ok()) return wrong(map.status());
     if (absl::Status status =
             CheckGpus(options->gpus, config.engine.kind, (*made)->info().layout.slices);
         !status.ok()) {
       return wrong(status);
     }
-    displays.push_back({*std::move(made), options->view, options->gpus});
+    displays.push_back({*std::move(made), options->setup, options->gpus});
   }
   return displays;
 }
@@ -184,8 +184,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                   .worker_deadline_ns = config.engine.worker_deadline_ns,
                                   .staging_limit_bytes = config.engine.staging_limit_bytes,
                                   .index_bytes = config.engine.index_bytes};
-  for (auto& [display, view, gpus] : displays) {
-    if (absl::Status status = core.AddDisplay(std::move(display), EngineOf(engine, gpus), view);
+  for (auto& [display, setup, gpus] : displays) {
+    if (absl::Status status = core.AddDisplay(std::move(display), EngineOf(engine, gpus), setup);
         !status.ok()) {
       return Fail(1, status);
     }

@@ -18,6 +18,8 @@ constexpr std::pair<const char*, ViewOptions::Mode> kModes[] = {
     {"millimetres", ViewOptions::Mode::kMillimetres},
     {"voxels", ViewOptions::Mode::kVoxels}};
 
+constexpr int kMostWatts = 1'000'000;
+
 absl::StatusOr<ViewOptions::Mode> ParseMode(const std::string& text) {
   std::vector<std::string> known;
   for (const auto& [name, mode] : kModes) {
@@ -94,12 +96,28 @@ absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display)
   if (const auto view = split.driver.extract("view")) {
     const absl::StatusOr<ViewOptions::Mode> mode = ParseMode(view.mapped());
     if (!mode.ok()) return mode.status();
-    split.view.mode = *mode;
+    split.setup.view.mode = *mode;
   }
   if (const auto box = split.driver.extract("view_box")) {
     const auto parsed = ParseBox(box.mapped());
     if (!parsed.ok()) return parsed.status();
-    split.view.box = *parsed;
+    split.setup.view.box = *parsed;
+  }
+  if (const auto genlock = split.driver.extract("genlock")) {
+    split.setup.genlock = genlock.mapped();
+    if (split.setup.genlock.empty()) {
+      return absl::InvalidArgumentError(
+          "genlock is \"\"; give the name of a group, or leave it out");
+    }
+  }
+  for (const auto& [name, watts] : {std::pair("power_limit", &split.setup.power_limit_w),
+                                    std::pair("power_full", &split.setup.power_full_w)}) {
+    const auto text = split.driver.extract(name);
+    if (text.empty()) continue;
+    if (!absl::SimpleAtod(text.mapped(), watts) || !(*watts > 0 && *watts <= kMostWatts)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(name, " is \"", text.mapped(), "\"; give watts, above 0 to ", kMostWatts));
+    }
   }
   if (const auto gpus = split.driver.extract("gpus")) {
     absl::StatusOr<std::vector<int>> parsed = ParseGpus(gpus.mapped());

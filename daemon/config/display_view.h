@@ -1,5 +1,5 @@
-// A display's options that are the daemon's own, not its driver's: how the scene is laid into it, and
-// which GPUs draw it.
+// A display's options that are the daemon's own, not its driver's: how the scene is laid into it, which GPUs draw it, with
+// which others it goes in step, and how much power it may draw.
 #pragma once
 
 #include <cstdint>
@@ -16,14 +16,15 @@
 namespace voxeld::daemon {
 
 struct DisplayOptions {
-  ViewOptions view;
+  DisplaySetup setup;
   std::vector<int> gpus;                      // empty: as the engine's configuration says
   std::map<std::string, std::string> driver;  // what is left
 };
 
 // `profile` is the name or path of a profile (display/profiles/profile.h), whose options are added to those that are given. `view` is
 // fit, millimetres or voxels; with fit, `view_box` may be x0;y0;z0;x1;y1;z1 in scene
-// units. `gpus` is numbers of GPUs, apart by semicolons. InvalidArgument with the value and what would
+// units. `gpus` is numbers of GPUs, apart by semicolons. `genlock` is the name of a group; `power_limit` and `power_full` are
+// watts. InvalidArgument with the value and what would
 // be right.
 absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display);
 

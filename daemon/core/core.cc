@@ -39,8 +39,8 @@ const Limits& Core::limits() const { return impl_->options().limits; }
 gpu::BulkPool& Core::bulk() const { return *impl_->options().bulk; }
 
 absl::Status Core::AddDisplay(std::unique_ptr<display::Display> display,
-                              const gpu::EngineOptions& engine, const ViewOptions& view) {
-  return impl_->AddDisplay(std::move(display), engine, view);
+                              const gpu::EngineOptions& engine, const DisplaySetup& setup) {
+  return impl_->AddDisplay(std::move(display), engine, setup);
 }
 
 absl::Status Core::Start() { return impl_->Start(impl_); }

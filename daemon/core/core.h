@@ -162,7 +162,7 @@ class Core {
 
   // Before Start. The name must be new. The engine is made here; its failure is the answer.
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
-                          const gpu::EngineOptions& engine, const ViewOptions& view = {});
+                          const gpu::EngineOptions& engine, const DisplaySetup& setup = {});
   absl::Status Start();
 
   // Ends displays and threads; what is owed by then counts as lost or undelivered, and a commit

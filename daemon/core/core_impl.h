@@ -37,7 +37,7 @@ class Core::Impl {
   const std::shared_ptr<Budget>& budget() const { return budget_; }
   CaptureId NewCapture() { return next_capture_++; }
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
-                          const gpu::EngineOptions& engine, const ViewOptions& view);
+                          const gpu::EngineOptions& engine, const DisplaySetup& setup);
   // `self` keeps this alive while the core's thread runs.
   absl::Status Start(std::shared_ptr<Impl> self);
   absl::Status Stop(sync::TimeNs limit);
@@ -143,6 +143,7 @@ class Core::Impl {
   struct DisplaySlot {
     display::DisplayInfo info;
     gpu::Affine scene_to_voxel;
+    std::string genlock;
     std::vector<gpu::Affine> coming;  // views on their way to the pipeline, in that order
     std::shared_ptr<Host> host;
   };
@@ -157,6 +158,10 @@ class Core::Impl {
     std::string name;
     std::thread thread;
   };
+
+  // The group of that name, for a display that can be its member.
+  absl::StatusOr<std::shared_ptr<Genlock>> JoinGenlock(const display::Display& display,
+                                                       const std::string& name);
 
   // ---- threads (threads.cc)
   void Launch(std::string name, std::function<void()> body);
@@ -234,6 +239,7 @@ class Core::Impl {
 
   // Grows before Start only; a slot's scene_to_voxel is the core thread's.
   std::vector<std::unique_ptr<DisplaySlot>> displays_;
+  std::map<std::string, std::shared_ptr<Genlock>> genlocks_;  // by name
 
   const std::shared_ptr<Budget> budget_;
   SceneWatch scene_watch_;

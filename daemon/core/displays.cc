@@ -30,8 +30,34 @@ MemoryFigures MemoryOf(const Budget& budget) {
 
 }  // namespace
 
+absl::StatusOr<std::shared_ptr<Genlock>> Core::Impl::JoinGenlock(const display::Display& display,
+                                                                 const std::string& name) {
+  const display::DisplayInfo& info = display.info();
+  if (!display.can_hold()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "display \"", info.name, "\" is in genlock \"", name, "\", and displays of driver ",
+        info.driver,
+        " cannot hold a volume until it is ordered shown; voxlink and simulated ones can"));
+  }
+  for (const auto& slot : displays_) {
+    if (slot->genlock == name && slot->info.volumes_per_second != info.volumes_per_second) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("display \"", info.name, "\" has ", info.volumes_per_second,
+                       " volumes/s and \"", slot->info.name, "\", of the same genlock \"", name,
+                       "\", ", slot->info.volumes_per_second, "; give them the same rate"));
+    }
+  }
+  std::shared_ptr<Genlock>& genlock = genlocks_[name];
+  if (genlock == nullptr) {
+    genlock = std::make_shared<Genlock>(clock_, [loop = loop_](std::shared_ptr<const void> what) {
+      loop->Post([what = std::move(what)] {});
+    });
+  }
+  return genlock;
+}
+
 absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
-                                    const gpu::EngineOptions& engine, const ViewOptions& view) {
+                                    const gpu::EngineOptions& engine, const DisplaySetup& setup) {
   const display::DisplayInfo info = display->info();
   if (phase_ != Phase::kNew) {
     return absl::FailedPreconditionError(
@@ -47,7 +73,12 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.display = std::move(display);
   options.make_engine = options_.make_engine ? options_.make_engine : gpu::CreateEngine;
   options.engine = engine;
-  options.view = view;
+  options.setup = setup;
+  if (!setup.genlock.empty()) {
+    absl::StatusOr<std::shared_ptr<Genlock>> genlock = JoinGenlock(*options.display, setup.genlock);
+    if (!genlock.ok()) return genlock.status();
+    options.genlock = *std::move(genlock);
+  }
   options.work = std::make_shared<Loop>(clock_);
   options.clock = &clock_;
   options.budget = budget_;
@@ -83,6 +114,7 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   auto slot = std::make_unique<DisplaySlot>();
   slot->info = info;
   slot->scene_to_voxel = host->pipeline->Describe().scene_to_voxel;
+  slot->genlock = setup.genlock;
   slot->host = std::move(host);
   displays_.push_back(std::move(slot));
   return absl::OkStatus();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "display/api/outcome.h"
+#include "display/sync/sweep_clock.h"
 
 namespace voxeld::daemon {
 
@@ -28,6 +29,15 @@ struct DisplayFigures {
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   // Of the engine's part: drawing the volume; slicing it; copying pictures from the device. Where they
   // are packed as the volume is drawn there is no slicing.
+  uint64_t volumes_late = 0;  // they missed the sweep before which their sending began
+  // Of a display that tells of its sweeps, else as begun.
+  sync::SweepLock sweeps;
+  // Of a display in a genlock: rounds shown by all; dropped by all, put off, out of step.
+  uint64_t genlock_volumes = 0, genlock_dropped = 0, genlock_postponed = 0, genlock_slips = 0;
+  // Light that the daemon leaves the display, of 1, where its device has no brightness or power limit of its own;
+  // what the display draws by its light, where it is measured; whether a limit is set that nobody keeps.
+  double light = 1, power_w = 0;
+  bool power_unlimited = false;
   LatencyStats commit_to_last_byte, commit_to_presented, assemble, slice, copy;
   bool packed_as_drawn = false;
   // Of commits presented: applied to drawing, sliced to transferred, transferred to shown.

@@ -124,6 +124,16 @@ constexpr Row<DisplayFigures> kDisplayRows[] = {
      "Slices sent again at the device's request"},
     {"voxeld_display_underruns_total", &DisplayFigures::underruns, MetricType::Counter,
      "Sweeps that repeated a volume while a newer was on its way"},
+    {"voxeld_display_volumes_late_total", &DisplayFigures::volumes_late, MetricType::Counter,
+     "Volumes that missed the sweep before which their sending began"},
+    {"voxeld_display_genlock_volumes_total", &DisplayFigures::genlock_volumes, MetricType::Counter,
+     "Volumes that all displays of the genlock have shown"},
+    {"voxeld_display_genlock_dropped_total", &DisplayFigures::genlock_dropped, MetricType::Counter,
+     "Volumes dropped by all displays of the genlock, since one could not have them"},
+    {"voxeld_display_genlock_postponed_total", &DisplayFigures::genlock_postponed,
+     MetricType::Counter, "Orders to show a volume that were put off"},
+    {"voxeld_display_genlock_slips_total", &DisplayFigures::genlock_slips, MetricType::Counter,
+     "Volumes that not all displays of the genlock have shown at one time"},
     {"voxeld_display_attaches_total", &DisplayFigures::attaches, MetricType::Counter,
      "Times that the device was set up"},
     {"voxeld_display_commits_owed_total", &DisplayFigures::commits_owed, MetricType::Counter,
@@ -225,6 +235,27 @@ void AddLatency(MetricFamily* family, const Labels& labels, const LatencyStats& 
   }
 }
 
+void AddSweeps(const std::vector<DisplayFigures>& displays, Families* out) {
+  MetricFamily* lock = out->New("voxeld_display_sweep_locked", MetricType::Gauge,
+                                "1 while the display's sweeps are known well, else 0");
+  MetricFamily* losses = out->New("voxeld_display_sweep_losses_total", MetricType::Counter,
+                                  "Times that the lock to the sweeps was lost");
+  MetricFamily* drift = out->New("voxeld_display_sweep_drift_ppm", MetricType::Gauge,
+                                 "Of the rate of sweeps against the nominal one");
+  MetricFamily* light = out->New("voxeld_display_light", MetricType::Gauge,
+                                 "That the daemon leaves the picture, 0 to 1");
+  MetricFamily* power = out->New("voxeld_display_power_watts", MetricType::Gauge,
+                                 "By the picture's light, where the daemon keeps the power limit");
+  for (const DisplayFigures& display : displays) {
+    const bool locked = display.sweeps.state == sync::SweepLock::State::kLocked;
+    Add(lock, {{"display", display.name}}, locked ? 1 : 0);
+    Add(losses, {{"display", display.name}}, static_cast<double>(display.sweeps.losses));
+    Add(drift, {{"display", display.name}}, display.sweeps.drift_ppm);
+    Add(light, {{"display", display.name}}, display.light);
+    Add(power, {{"display", display.name}}, display.power_w);
+  }
+}
+
 void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
   for (const auto& row : kDisplayRows) {
     MetricFamily* family = out->New(row.name, row.type, row.help);
@@ -243,6 +274,7 @@ void AddDisplays(const std::vector<DisplayFigures>& displays, Families* out) {
   for (const DisplayFigures& display : displays) {
     Add(rate, {{"display", display.name}}, display.volumes_per_second);
   }
+  AddSweeps(displays, out);
   MetricFamily* degraded =
       out->New("voxeld_display_engine_degraded", MetricType::Gauge,
                "1 while the engine is not as was asked for; 2 while the last volume is held");

@@ -34,12 +34,22 @@ enum class TestPattern : uint8_t {
   kSlices
 };
 
+// What the configuration says of a display beyond its driver's part.
+struct DisplaySetup {
+  ViewOptions view;
+  std::string genlock;       // the name of its group; empty: it goes by itself
+  double power_limit_w = 0;  // 0: none
+  double power_full_w = 0;   // what the display draws at full white; 0: not known
+};
+
 struct DisplayDescription {
   display::DisplayInfo info;
   display::DisplayState state = display::DisplayState::kStopped;
   std::string state_reason;
   double brightness = 1;
   bool blank = false;
+  double power_limit_w = 0;
+  std::string genlock;
   TestPattern pattern = TestPattern::kNone;
   ViewOptions view;
   gpu::Affine scene_to_voxel;
@@ -48,6 +58,7 @@ struct DisplayDescription {
 struct DisplayUpdate {
   std::optional<double> brightness;
   std::optional<bool> blank;
+  std::optional<double> power_limit_w;
   std::optional<TestPattern> pattern;
   std::optional<ViewOptions> view;
 };

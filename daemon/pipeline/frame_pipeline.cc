@@ -14,12 +14,13 @@ namespace {
 
 // After a failure of the engine, without a new commit.
 constexpr sync::TimeNs kEngineRetryDelay = sync::kSecond;
+constexpr double kLeastFullPower = 1e-3;  // W; stands for one that is not known
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<FramePipeline>> FramePipeline::Create(Options options) {
   const absl::StatusOr<gpu::Affine> map =
-      SceneToVoxel(options.view, options.display->info().geometry.grid);
+      SceneToVoxel(options.setup.view, options.display->info().geometry.grid);
   if (!map.ok()) return map.status();
   const auto tell_engine = options.tell_engine;
   std::unique_ptr<FramePipeline> pipeline(new FramePipeline(std::move(options)));
@@ -37,12 +38,20 @@ FramePipeline::FramePipeline(Options options)
       tell_(std::move(options.tell)),
       retire_(std::move(options.retire)),
       tell_state_(std::move(options.tell_state)),
-      view_(options.view),
+      genlock_(std::move(options.genlock)),
+      setup_(options.setup),
+      wanted_limit_w_(options.setup.power_limit_w),
+      limiter_(std::max(options.setup.power_full_w, kLeastFullPower)),
+      view_(options.setup.view),
       scene_(std::make_unique<EngineScene>([this] { Breathe(); })),
       pool_(display_->info().layout),
       riders_(display_->info().name,
               [this](const Rider& rider, const CommitOutcome& outcome) { Told(rider, outcome); }),
-      budget_(std::move(options.budget)) {}
+      budget_(std::move(options.budget)) {
+  if (genlock_ == nullptr) return;
+  display_->SetHolding();
+  member_ = genlock_->Add([work = work_] { work->Post([] {}); });
+}
 
 FramePipeline::~FramePipeline() { Stop(); }
 
@@ -69,6 +78,10 @@ absl::Status FramePipeline::Open(std::function<void(EngineEvent)> tell) {
 }
 
 absl::Status FramePipeline::Start() {
+  if (wanted_limit_w_ > 0) {
+    // Whether its device keeps one turns out when there is one.
+    if (absl::Status status = display_->SetPowerLimit(wanted_limit_w_); !status.ok()) return status;
+  }
   const absl::Status status = display_->Start(this, [work = work_] { work->Wake(); });
   started_ = status.ok();
   return status;
@@ -97,12 +110,15 @@ void FramePipeline::SetEngineBytes(uint64_t bytes) {
 
 sync::TimeNs FramePipeline::Step() {
   if (!started_) return sync::kNever;
+  sync::TimeNs next_round = sync::kNever;
   do {
+    if (genlock_ != nullptr) next_round = StepGenlock();
+    if (limiter_.Rise(clock_.Now())) target_stale_ = settings_changed_ = true;
     next_tick_ = display_->Tick();
     ServeCaptures();
   } while (MaybeDraw());
   sweeps_->Set(showing() ? display_->ComingSweeps(2) : std::vector<sync::TimeNs>());
-  sync::TimeNs next = next_tick_;
+  sync::TimeNs next = std::min({next_tick_, next_round, limiter_.next()});
   if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
   if (show_again_ && !drawing_.has_value() && showing() && display_->mailbox_free()) {
@@ -124,7 +140,9 @@ void FramePipeline::Show(SnapshotPtr snapshot) {
   Retire(std::exchange(newest_, std::move(snapshot)));
 }
 
-void FramePipeline::Show(SnapshotPtr snapshot, const Rider& rider, bool hidden, bool urgent) {
+void FramePipeline::Show(SnapshotPtr snapshot, const Rider& commit, bool hidden, bool urgent) {
+  Rider rider = commit;
+  rider.snapshot = snapshot->number;
   Show(std::move(snapshot));
   switch (display_->state()) {
     case display::DisplayState::kStopped:
@@ -194,7 +212,8 @@ void FramePipeline::TakeReturned() {
 
 gpu::Target FramePipeline::CurrentTarget() const {
   const display::DisplayInfo& info = display_->info();
-  return {info.geometry, info.layout, info.tone,
+  return {info.geometry, info.layout,
+          light_steps() == kLightSteps ? info.tone : Dimmed(info.tone, light_steps()),
           pattern_ == TestPattern::kNone ? scene_to_voxel_ : gpu::Affine()};
 }
 
@@ -212,18 +231,23 @@ bool FramePipeline::MaybeDraw() {
   if (drawing_.has_value()) return false;
   if (care_ != nullptr && care_->ready()) TakeReturned();
   if (newest_ == nullptr || !showing() || !(display_->mailbox_free() || urgent_)) return false;
-  const bool changed = newest_->number != drawn_snapshot_ || settings_changed_;
-  if (!changed && !(show_again_ && clock_.Now() >= show_again_at_)) return false;
-  draw_from_ = DrawFrom();
-  if (clock_.Now() < draw_from_) return false;
+  const bool due = newest_->number != drawn_snapshot_ || settings_changed_ ||
+                   (show_again_ && clock_.Now() >= show_again_at_);
+  const std::optional<Genlock::Round> round = genlock_ == nullptr ? std::nullopt : RoundToDraw(due);
+  if (genlock_ == nullptr ? !due : !round.has_value()) return false;
+  if (genlock_ == nullptr) {
+    draw_from_ = DrawFrom();
+    if (clock_.Now() < draw_from_) return false;
+  }
 
   urgent_ = false;
-  const SnapshotPtr newest = newest_;
+  const SnapshotPtr newest = round.has_value() ? round->snapshot : newest_;
   if (care_ != nullptr) care_->Prune(*newest, pattern_scene_.get());
   drawn_snapshot_ = newest->number;
   settings_changed_ = false;
-  riders_.Draw();
+  riders_.Draw(newest->number);
   if (!HaveEngine()) {
+    if (round.has_value()) genlock_->Failed(member_, round->volume, engine_info_.reason);
     OnEngineFailure(absl::UnavailableError(absl::StrCat("no engine: ", engine_info_.reason)),
                     clock_.Now());
     return true;
@@ -231,7 +255,8 @@ bool FramePipeline::MaybeDraw() {
   SnapshotPtr held = scene_->held();
   const size_t size = scene_->Plan(pattern_scene_ != nullptr ? pattern_scene_ : newest);
   Retire(std::move(held));
-  if (size == 0 && !target_stale_ && !show_again_ && last_submitted_ != 0) {
+  const bool wanted = show_again_ || last_submitted_ == 0 || round.has_value();
+  if (size == 0 && !target_stale_ && !wanted) {
     KeepUnchanged({newest->number, settings_});
     return true;
   }
@@ -239,15 +264,18 @@ bool FramePipeline::MaybeDraw() {
   Drawing& drawing = drawing_.emplace(Drawing{});
   drawing.began = clock_.Now();
   drawing.contents = {newest->number, settings_};
-  drawing.volume = ++last_volume_;
+  last_volume_ = round.has_value() ? round->volume : last_volume_ + 1;
+  drawing.volume = last_volume_;
   drawing.lease = pool_.Acquire();
   if (target_stale_) {
     target_stale_ = false;
     target_ = CurrentTarget();
+    target_steps_ = light_steps();
     made_.engine->SetTarget(target_, Completion(&FramePipeline::OnCallDone));
   }
   if (const absl::Status status = ApplyDelta(size); !status.ok()) {
     const sync::TimeNs began = drawing.began;
+    if (round.has_value()) genlock_->Failed(member_, round->volume, status.ToString());
     drawing_.reset();
     OnEngineFailure(status, began);
     return true;
@@ -292,8 +320,11 @@ void FramePipeline::OnCallDone(const absl::Status& status) {
 void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   Drawing drawing = *std::move(drawing_);
   drawing_.reset();
-  if (!drawing.status.ok()) return OnEngineFailure(drawing.status, drawing.began);
-  if (!result.ok()) return OnEngineFailure(result.status(), drawing.began);
+  const absl::Status drawn = drawing.status.ok() ? result.status() : drawing.status;
+  if (!drawn.ok()) {
+    if (genlock_ != nullptr) genlock_->Failed(member_, drawing.volume, drawn.ToString());
+    return OnEngineFailure(drawn, drawing.began);
+  }
 
   lost_engine_ = false;
   refused_.clear();
@@ -321,9 +352,15 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
     riders_.LoseUnsubmitted(WhyNotShowing(), false);
     return ShowAgain(0);
   }
+  if (genlock_ != nullptr && !IsOfRound(drawing.volume)) {  // the group has given it up
+    riders_.Redraw();
+    drawn_snapshot_.reset();
+    return ShowAgain(0);
+  }
+  if (!Admit(drawing)) return;
   for (uint64_t& number : drawing.lease.frame->changed_in) number = std::max(number, first_volume_);
   const bool changed = std::exchange(engine_is_new_, false) || result->changed;
-  if (!changed && !show_again_ && last_submitted_ != 0) {
+  if (!changed && !show_again_ && last_submitted_ != 0 && genlock_ == nullptr) {
     ++volumes_unchanged_;
     return KeepUnchanged(drawing.contents);
   }
@@ -342,6 +379,7 @@ void FramePipeline::KeepUnchanged(const Contents& contents) {
 }
 
 bool FramePipeline::HasNewer() const {
+  if (genlock_ != nullptr) return true;  // what the others show, with the next round
   if (newest_ == nullptr) return false;
   return drawing_.has_value() || show_again_ || newest_->number != drawn_snapshot_ ||
          settings_changed_;
@@ -392,7 +430,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs sin
   }
   refused_ = std::string(status.message());
   riders_.LoseUnsubmitted(absl::StrCat("the engine failed: ", status.ToString()), false);
-  display_->ShowCurrent();
+  if (genlock_ == nullptr) display_->ShowCurrent();
   ShowAgain(kEngineRetryDelay);
 }
 
@@ -413,14 +451,21 @@ void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
     // A display that still shows sends what it lost again by itself; when it comes back it gets it
     // anew. What is to be drawn again sooner, since the engine failed, stays so.
     show_again_ = true;
-    show_again_at_ = sync::kNever;
+    show_again_at_ = genlock_ == nullptr ? sync::kNever : clock_.Now();
   }
+  if (genlock_ != nullptr && EndRound(outcome)) return riders_.Reboard(outcome.volume);
   riders_.OnOutcome(outcome);
 }
 
 void FramePipeline::OnState(display::DisplayState state, const std::string& reason) {
   if (tell_state_) tell_state_(state, reason);
+  if (genlock_ != nullptr) {
+    const bool present = state == display::DisplayState::kShowing;
+    genlock_->SetPresent(member_, present);
+    if (present) ShowAgain(0);
+  }
   if (state == display::DisplayState::kShowing) {
+    FollowDevice();
     if (show_again_) show_again_at_ = std::min(show_again_at_, clock_.Now());
     return;
   }

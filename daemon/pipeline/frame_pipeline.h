@@ -21,6 +21,8 @@
 // - If the volume handed over last was lost, the next drawn is handed over even if it
 //   looks the same.
 // - While a test pattern is shown, commits are NOT_SHOWN(hidden).
+// - A member of a genlock draws what its group's rounds say, under their numbers, whether or not its own picture
+//   changes (genlock.h); then every round ends PRESENTED or LOST.
 // - Volumes are numbered as the engine's frames are: ascending, with gaps where one
 //   came out the same.
 // - An engine that is lost (DataLoss) is replaced by the CPU's in this process, which gets the whole
@@ -45,7 +47,9 @@
 #include "daemon/pipeline/engine_care.h"
 #include "daemon/pipeline/engine_event.h"
 #include "daemon/pipeline/frame_pool.h"
+#include "daemon/pipeline/genlock.h"
 #include "daemon/pipeline/loop.h"
+#include "daemon/pipeline/power_limiter.h"
 #include "daemon/pipeline/rider_book.h"
 #include "daemon/pipeline/sliding_window.h"
 #include "daemon/pipeline/sweep_outlook.h"
@@ -66,7 +70,7 @@ class FramePipeline final : private display::Display::Listener {
     std::unique_ptr<display::Display> display;
     MakeEngine make_engine;
     gpu::EngineOptions engine;
-    ViewOptions view;
+    DisplaySetup setup;
     // Where wakes and the engine's completions go: the queue of the thread
     // that this pipeline is bound to.
     std::shared_ptr<Loop> work;
@@ -80,6 +84,8 @@ class FramePipeline final : private display::Display::Listener {
     std::function<void(EngineEvent)> tell_engine;  // what becomes of the engine; may be empty
     // The display's state, whenever it or its reason changes; may be empty.
     std::function<void(display::DisplayState, const std::string&)> tell_state;
+    // Whose member the display is, which can hold volumes; null: it goes by itself.
+    std::shared_ptr<Genlock> genlock;
   };
 
   // Makes the engine. Its failure, or a view that cannot be, is the answer.
@@ -144,6 +150,8 @@ class FramePipeline final : private display::Display::Listener {
   void OnOutcome(const display::VolumeOutcome& outcome) override;
   void OnState(display::DisplayState state, const std::string& reason) override;
   bool HasNewer() const override;
+  void OnHeld(uint64_t volume) override;
+  void OnOrdered(uint64_t volume, sync::TimeNs at, bool taken) override;
 
   bool showing() const { return display_->state() == display::DisplayState::kShowing; }
   std::string WhyNotShowing() const;
@@ -152,6 +160,21 @@ class FramePipeline final : private display::Display::Listener {
   // where sweeps are not known, and for all that is not a plain commit.
   sync::TimeNs DrawFrom() const;
   bool MaybeDraw();
+  // Genlock (frame_pipeline_genlock.cc), of a member: what its group has for it to do; answers when there may be more.
+  sync::TimeNs StepGenlock();
+  // The round to draw now, if there is one; `due`: this display has something new itself.
+  std::optional<Genlock::Round> RoundToDraw(bool due);
+  bool IsOfRound(uint64_t volume) const;  // and still to be drawn
+  // The outcome of a volume of a round. True: its riders ride again.
+  bool EndRound(const display::VolumeOutcome& outcome);
+  // Light (frame_pipeline_light.cc), where the device has no brightness or power limit of its own.
+  absl::Status SetBrightness(double brightness);
+  absl::Status SetPowerLimit(double watts);
+  bool LimitsPower() const;
+  void FollowDevice();         // what of the wanted the device does by itself
+  bool Admit(const Drawing&);  // whether the volume may be shown; else it is to be drawn darker
+  int light_steps() const;
+  void AddLight(DisplayFigures& figures) const;
   absl::StatusOr<EngineCare::Made> Make(gpu::EngineOptions options);
   bool HaveEngine();
   void TakeReturned();
@@ -193,7 +216,15 @@ class FramePipeline final : private display::Display::Listener {
   gpu::EngineInfo engine_info_;       // of the engine, or why there is none
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   bool started_ = false;
+  const std::shared_ptr<Genlock> genlock_;
+  Genlock::Member member_ = 0;
+  uint64_t dropping_ = 0;  // the volume that the genlock had dropped last
 
+  const DisplaySetup setup_;
+  double wanted_brightness_ = 1, wanted_limit_w_ = 0;
+  LightMeter meter_;
+  PowerLimiter limiter_;
+  int target_steps_ = kLightSteps;  // that the engine draws with
   ViewOptions view_;
   gpu::Affine scene_to_voxel_;
   TestPattern pattern_ = TestPattern::kNone;

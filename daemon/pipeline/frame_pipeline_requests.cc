@@ -28,15 +28,17 @@ absl::Status FramePipeline::Update(const DisplayUpdate& update) {
   }
   // The device's own refusals come before anything that cannot be refused;
   // what it refuses is taken back.
-  const double brightness = display_->brightness();
+  const double brightness = wanted_brightness_, limit_w = wanted_limit_w_;
   const bool blank = display_->blanked();
   absl::Status status;
-  if (update.brightness.has_value()) status = display_->SetBrightness(*update.brightness);
+  if (update.power_limit_w.has_value()) status = SetPowerLimit(*update.power_limit_w);
+  if (status.ok() && update.brightness.has_value()) status = SetBrightness(*update.brightness);
   if (status.ok() && update.blank.has_value()) status = display_->SetBlank(*update.blank);
   if (!status.ok()) {
     absl::Status back;
     if (display_->blanked() != blank) back.Update(display_->SetBlank(blank));
-    if (display_->brightness() != brightness) back.Update(display_->SetBrightness(brightness));
+    if (wanted_brightness_ != brightness) back.Update(SetBrightness(brightness));
+    if (wanted_limit_w_ != limit_w) back.Update(SetPowerLimit(limit_w));
     if (back.ok()) return status;
     return absl::Status(status.code(),
                         absl::StrCat(status.message(), "; and taking it back: ", back.message()));
@@ -68,7 +70,9 @@ DisplayDescription FramePipeline::Describe() const {
   description.info = info();
   description.state = display_->state();
   description.state_reason = display_->state_reason();
-  description.brightness = display_->brightness();
+  description.brightness = wanted_brightness_;
+  description.power_limit_w = wanted_limit_w_;
+  description.genlock = setup_.genlock;
   description.blank = display_->blanked();
   description.pattern = pattern_;
   description.view = view_;
@@ -99,6 +103,16 @@ DisplayFigures FramePipeline::Figures() const {
   figures.slices_resent = display.slices_resent;
   figures.underruns = display.underruns;
   figures.attaches = display.attaches;
+  figures.volumes_late = display.volumes_late;
+  figures.sweeps = display_->Sweeps().value_or(sync::SweepLock());
+  if (genlock_ != nullptr) {
+    const Genlock::Figures lock = genlock_->figures();
+    figures.genlock_volumes = lock.volumes;
+    figures.genlock_dropped = lock.dropped;
+    figures.genlock_postponed = lock.postponed;
+    figures.genlock_slips = lock.slips;
+  }
+  AddLight(figures);
   figures.commit_to_last_byte = commit_to_last_byte_.Summary(now);
   figures.commit_to_presented = commit_to_presented_.Summary(now);
   if (care_ != nullptr) care_->AddTo(figures);

@@ -78,7 +78,21 @@ void RiderBook::NotShown(const Rider& rider, CommitOutcome::NotShown why) {
   Give(rider, std::move(outcome));
 }
 
-void RiderBook::Draw() { Merge(drawing_, std::exchange(waiting_, {})); }
+void RiderBook::Draw(uint64_t snapshot) {
+  const auto later = std::stable_partition(waiting_.begin(), waiting_.end(),
+                                           [&](const Rider& r) { return r.snapshot <= snapshot; });
+  const std::vector<Rider> aboard(waiting_.begin(), later);
+  waiting_.erase(waiting_.begin(), later);
+  Merge(drawing_, aboard);
+}
+
+void RiderBook::Reboard(uint64_t volume) {
+  const auto node = submitted_.extract(volume);
+  if (node.empty()) return;
+  const Volume& lost = node.mapped();
+  waiting_.insert(waiting_.begin(), lost.unchanged.begin(), lost.unchanged.end());
+  waiting_.insert(waiting_.begin(), lost.riders.begin(), lost.riders.end());
+}
 
 void RiderBook::Redraw() {
   waiting_.insert(waiting_.begin(), drawing_.begin(), drawing_.end());

@@ -35,6 +35,7 @@ struct Rider {
   uint64_t incarnation = 0;  // of the session; sequences begin anew with each
   bool asked = true;         // its client wants the outcomes
   Stages stages;             // up to applied_ns
+  uint64_t snapshot = 0;     // the first that contains it
 };
 
 class RiderBook {
@@ -52,10 +53,12 @@ class RiderBook {
   // It was applied, but by rule 1 will not be shown.
   void NotShown(const Rider& rider, CommitOutcome::NotShown why);
 
-  // Those that wait ride in the volume that is about to be drawn.
-  void Draw();
+  // Those that wait and are in `snapshot` ride in the volume that is about to be drawn from it.
+  void Draw(uint64_t snapshot = UINT64_MAX);
   // The volume under way comes to nothing: its riders wait again, before those who came later.
   void Redraw();
+  // `volume`, submitted, comes to nothing, and what it shows will be drawn again: its riders wait as above.
+  void Reboard(uint64_t volume);
   // `volume`, drawn, goes to the display; its outcome comes by OnOutcome. Of `drawn`: from drawing_ns
   // to sliced_ns.
   void Submit(uint64_t volume, const Stages& drawn = {});

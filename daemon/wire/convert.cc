@@ -137,6 +137,7 @@ absl::StatusOr<DisplayUpdate> FromWire(const v1::UpdateDisplayRequest& in) {
     out.brightness = in.brightness();
   }
   if (in.has_blank()) out.blank = in.blank();
+  if (in.has_power_limit_w()) out.power_limit_w = in.power_limit_w();
   if (in.test_pattern() != v1::TEST_PATTERN_UNSPECIFIED) {
     absl::StatusOr<TestPattern> pattern = FromWire(in.test_pattern());
     if (!pattern.ok()) return pattern.status();

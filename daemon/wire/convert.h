@@ -18,6 +18,7 @@ v1::BlendMode ToWire(gpu::BlendMode blend);
 v1::Evidence ToWire(display::Evidence evidence);
 v1::NotShown::Why ToWire(CommitOutcome::NotShown why);
 v1::DisplayState ToWire(display::DisplayState state);
+v1::SweepLock ToWire(sync::SweepLock::State state);
 v1::PixelFormat ToWire(display::PixelFormat format);
 v1::TestPattern ToWire(TestPattern pattern);
 v1::VolumeHeader::Source ToWire(display::DecodedVolume::Source source);

@@ -66,6 +66,12 @@ constexpr Table<display::PixelFormat, v1::PixelFormat, 5> kFormats = {{
     {display::PixelFormat::kPlanes24, v1::PIXEL_FORMAT_PLANES24},
 }};
 
+constexpr Table<sync::SweepLock::State, v1::SweepLock, 3> kSweepLocks = {{
+    {sync::SweepLock::State::kUnknown, v1::SWEEP_LOCK_UNKNOWN},
+    {sync::SweepLock::State::kLocking, v1::SWEEP_LOCK_LOCKING},
+    {sync::SweepLock::State::kLocked, v1::SWEEP_LOCK_LOCKED},
+}};
+
 constexpr Table<TestPattern, v1::TestPattern, 9> kPatterns = {{
     {TestPattern::kNone, v1::TEST_PATTERN_NONE},
     {TestPattern::kAxes, v1::TEST_PATTERN_AXES},
@@ -110,6 +116,7 @@ v1::BlendMode ToWire(gpu::BlendMode blend) { return Forth(kBlendModes, blend); }
 v1::Evidence ToWire(display::Evidence evidence) { return Forth(kEvidence, evidence); }
 v1::NotShown::Why ToWire(CommitOutcome::NotShown why) { return Forth(kWhys, why); }
 v1::DisplayState ToWire(display::DisplayState state) { return Forth(kStates, state); }
+v1::SweepLock ToWire(sync::SweepLock::State state) { return Forth(kSweepLocks, state); }
 v1::PixelFormat ToWire(display::PixelFormat format) { return Forth(kFormats, format); }
 v1::TestPattern ToWire(TestPattern pattern) { return Forth(kPatterns, pattern); }
 v1::VolumeHeader::Source ToWire(display::DecodedVolume::Source source) {

@@ -212,6 +212,8 @@ void Encode(const DisplayDescription& in, v1::DisplayDescription* out) {
   out->set_volumes_per_second(in.info.volumes_per_second);
   out->set_brightness(in.brightness);
   out->set_blank(in.blank);
+  out->set_power_limit_w(in.power_limit_w);
+  out->set_genlock(in.genlock);
   out->set_test_pattern(ToWire(in.pattern));
   ToWire(in.view, out->mutable_view());
   ToWire(in.scene_to_voxel, out->mutable_scene_to_voxel());

@@ -7,6 +7,11 @@
 #include "display/api/pixels.h"
 
 namespace voxeld::display {
+namespace {
+
+constexpr double kMostWatts = 1'000'000;
+
+}  // namespace
 
 std::vector<uint8_t> DecodedVolume::Rgb(int32_t first, int32_t count) const {
   const size_t per_slice =
@@ -136,6 +141,21 @@ absl::Status Display::SetBrightness(double brightness) {
   return status;
 }
 
+absl::Status Display::SetPowerLimit(double watts) {
+  if (!(watts >= 0 && watts <= kMostWatts)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("power_limit_w is ", watts, "; it must be from 0 (none) to ", kMostWatts));
+  }
+  const absl::Status status = attached() ? DoSetPowerLimit(watts) : absl::OkStatus();
+  if (status.ok()) power_limit_w_ = watts;
+  return status;
+}
+
+absl::Status Display::DoSetPowerLimit(double /*watts*/) {
+  return absl::UnimplementedError(
+      absl::StrCat("the device of display \"", info_.name, "\" keeps no power limit"));
+}
+
 absl::Status Display::SetBlank(bool blank) {
   if (blank == blanked_) return absl::OkStatus();
   if (attached()) {
@@ -148,6 +168,7 @@ absl::Status Display::SetBlank(bool blank) {
     if (in_flight_ != nullptr && owed_) {
       owed_ = false;
       ReportLost(in_flight_->volume, "blanked", 0);
+      if (holding_) DoDropHeld("blanked");
     }
     LoseWaiting("blanked");
     FinishCaptures(absl::UnavailableError("the display was blanked"));
@@ -157,7 +178,7 @@ absl::Status Display::SetBlank(bool blank) {
     SetState(DisplayState::kBlanked, "blanked");
   } else {
     SetState(DisplayState::kShowing, "showing");
-    if (full_next_ && newest_ != nullptr) resend_at_ = clock_.Now();
+    if (full_next_ && newest_ != nullptr && !holding_) resend_at_ = clock_.Now();
     SendNext();
   }
   return absl::OkStatus();
@@ -221,12 +242,32 @@ void Display::DeviceLost(const std::string& reason, uint64_t bytes) {
   FinishCaptures(absl::UnavailableError(absl::StrCat("the display was lost: ", reason)));
 }
 
+void Display::OrderShown(uint64_t volume, sync::TimeNs at, uint32_t ahead) {
+  if (in_flight_ == nullptr || !in_flight_held_ || in_flight_->volume != volume) return;
+  DoOrderShown(at, ahead);
+}
+
+void Display::DropHeld(uint64_t volume, const std::string& reason) {
+  if (waiting_ != nullptr && waiting_->volume == volume) return LoseWaiting(reason);
+  if (in_flight_ != nullptr && owed_ && in_flight_->volume == volume) DoDropHeld(reason);
+}
+
+void Display::FrameHeld() {
+  in_flight_held_ = true;
+  if (owed_) listener_->OnHeld(in_flight_->volume);
+}
+
+void Display::FrameOrdered(sync::TimeNs at, bool taken) {
+  if (in_flight_ != nullptr && owed_) listener_->OnOrdered(in_flight_->volume, at, taken);
+}
+
 void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,
                         uint64_t bytes) {
   if (in_flight_ == nullptr) return;
   const SliceFramePtr frame = std::move(in_flight_);
   in_flight_ = nullptr;
   resend_.Reset();
+  if (due_ != 0 && shown_ns > due_ + due_period_ / 2) ++stats_.volumes_late;
   full_next_ = frame->volume == 0;  // a black one of our own is no base for what the engine counts
   if (owed_) {
     owed_ = false;
@@ -258,7 +299,7 @@ void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs l
 void Display::FrameLost(const std::string& reason, uint64_t bytes) {
   if (in_flight_ == nullptr) return;
   full_next_ = true;
-  resend_at_ = clock_.Now() + resend_.Next();
+  resend_at_ = holding_ ? sync::kNever : clock_.Now() + resend_.Next();
   decoder_ = nullptr;
   LoseInFlight(reason, bytes);
   SendNext();
@@ -332,6 +373,12 @@ void Display::SendNext() {
     }
     in_flight_ = newest_ != nullptr ? newest_ : BlackFrame(info_.layout);
     owed_ = owed;
+    in_flight_held_ = false;
+    due_ = 0;
+    if (!holds_in_flight()) {
+      const std::vector<sync::TimeNs> coming = ComingSweeps(2);
+      if (coming.size() == 2) due_ = coming[0], due_period_ = coming[1] - coming[0];
+    }
     resend_at_ = sync::kNever;
     decoder_status_ = absl::OkStatus();
     decoder_ = captures_.empty() ? nullptr : DoMakeDecoder();

@@ -25,6 +25,7 @@
 #include "display/api/slice_frame.h"
 #include "display/sync/backoff.h"
 #include "display/sync/clock.h"
+#include "display/sync/sweep_clock.h"
 
 namespace voxeld::display {
 
@@ -49,6 +50,8 @@ struct DisplayStats {
   uint64_t slices_resent = 0;
   // Sweeps for which the device had to repeat a volume while a newer was on its way.
   uint64_t underruns = 0;
+  // Volumes whose sending began before a sweep that they then missed: shown at a later one.
+  uint64_t volumes_late = 0;
   uint64_t attaches = 0;
 };
 
@@ -91,6 +94,10 @@ class Display {
     // Asked when the device is set up: true if the volume that the display had last is not the newest
     // that there is to show. Then nothing is shown before a Submit, or ShowCurrent: no stale picture.
     virtual bool HasNewer() const { return false; }
+    // Of a display that holds: the device has the volume whole, and waits for the order to show it.
+    virtual void OnHeld(uint64_t /*volume*/) {}
+    // What came of an order: `taken`, the volume will be shown then unless another order comes in time.
+    virtual void OnOrdered(uint64_t /*volume*/, sync::TimeNs /*at*/, bool /*taken*/) {}
   };
   // Called where a listener's functions are; must not call back.
   using CaptureDone = std::function<void(absl::StatusOr<DecodedVolume>)>;
@@ -136,7 +143,11 @@ class Display {
   // is in flight when the display is blanked gets kLost; light again brings back the volume before.
   absl::Status SetBrightness(double brightness);
   absl::Status SetBlank(bool blank);
+  // The most that the device may draw, in watts, 0 for no limit. Unimplemented where the device cannot keep one; else as
+  // with brightness.
+  absl::Status SetPowerLimit(double watts);
   double brightness() const { return brightness_; }
+  double power_limit_w() const { return power_limit_w_; }
   bool blanked() const { return blanked_; }
 
   // The next volume shown, rebuilt from the bytes that go out; if no new one comes, the display
@@ -149,6 +160,20 @@ class Display {
 
   // Predicted starts of coming sweeps (owner's clock), nearest first; empty if not known.
   virtual std::vector<sync::TimeNs> ComingSweeps(int /*count*/) const { return {}; }
+  // How well these are known; nothing: the display has no sweeps, or says nothing of them.
+  virtual std::optional<sync::SweepLock> Sweeps() const { return std::nullopt; }
+
+  // ---- Genlock: volumes are held until they are ordered shown.
+  virtual bool can_hold() const { return false; }
+  // Before Start, of one that can. From then on nothing submitted is shown without an order, and nothing
+  // lost or left from before is sent again by itself.
+  void SetHolding() { holding_ = true; }
+  bool holding() const { return holding_; }
+  // Of the volume held, else nothing happens: to be shown at the sweep that begins nearest to `at`. Another order
+  // takes the first one's place. The device takes it only while that sweep is `ahead` or more after the last one begun.
+  void OrderShown(uint64_t volume, sync::TimeNs at, uint32_t ahead);
+  // The volume, held or on its way there, is not to be shown: it is kLost.
+  void DropHeld(uint64_t volume, const std::string& reason);
 
  protected:
   Display(DisplayInfo info, sync::Clock& clock);
@@ -166,11 +191,17 @@ class Display {
   // Only while attached; set-up applies brightness() and blanked() by itself.
   virtual absl::Status DoSetBrightness(double brightness) = 0;
   virtual absl::Status DoSetBlank(bool blank) = 0;
+  // Of drivers whose devices may keep one; set-up applies power_limit_w() where it is not 0.
+  virtual absl::Status DoSetPowerLimit(double watts);
   virtual std::unique_ptr<WireDecoder> DoMakeDecoder() const = 0;
+  // Of drivers that can hold. What is in flight is held, or is not to be: FrameLost follows.
+  virtual void DoOrderShown(sync::TimeNs /*at*/, uint32_t /*ahead*/) {}
+  virtual void DoDropHeld(const std::string& /*reason*/) {}
 
   // For drivers, on the owner's thread.
   void Attached();  // the device is set up: the current frame goes out first
   void HasNoBrightness() { brightness_ = 1; }  // found while attaching
+  void HasNoPowerLimit() { power_limit_w_ = 0; }
   // What it is that is looked for, while there is none.
   void NoDevice(const std::string& reason);
   // Whatever is in flight (`bytes` of it sent) is lost; DoTick attaches again.
@@ -178,6 +209,10 @@ class Display {
   void FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs last_byte_ns,
                  uint64_t bytes);
   void FrameLost(const std::string& reason, uint64_t bytes);
+  // Whether what is in flight is to be held when it is whole; then FrameHeld instead of showing it.
+  bool holds_in_flight() const { return holding_ && owed_; }
+  void FrameHeld();
+  void FrameOrdered(sync::TimeNs at, bool taken);
   // Every outgoing byte of a volume.
   void TapOut(uint8_t endpoint, std::span<const std::byte> bytes, size_t device = 0);
   bool tapped() const { return decoder_ != nullptr; }
@@ -221,15 +256,19 @@ class Display {
   std::string state_reason_;
   DisplayStats stats_;
   double brightness_ = 1;
+  double power_limit_w_ = 0;
   bool blanked_ = false;
 
   SliceFramePtr in_flight_, waiting_;
-  SliceFramePtr newest_;      // the newest volume given to DoSend: what belongs on the display
-  bool owed_ = false;         // in_flight_ still owes its outcome (false: a re-send of our own)
-  bool held_ = false;         // since the attach, until there is the newest volume
-  bool full_next_ = true;     // the next volume may leave out nothing
-  bool sending_ = false;      // inside SendNext
-  uint64_t last_volume_ = 0;  // newest number submitted
+  SliceFramePtr newest_;   // the newest volume given to DoSend: what belongs on the display
+  bool owed_ = false;      // in_flight_ still owes its outcome (false: a re-send of our own)
+  bool held_ = false;      // since the attach, until there is the newest volume
+  bool full_next_ = true;  // the next volume may leave out nothing
+  bool sending_ = false;   // inside SendNext
+  bool holding_ = false;
+  bool in_flight_held_ = false;
+  sync::TimeNs due_ = 0, due_period_ = 0;  // the sweep that in_flight_ is for; 0: not known
+  uint64_t last_volume_ = 0;               // newest number submitted
   sync::TimeNs resend_at_ = sync::kNever;  // newest_ goes out again, if nothing newer did before
   sync::Backoff resend_{100 * sync::kMillisecond, 5 * sync::kSecond};
 

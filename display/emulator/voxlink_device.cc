@@ -38,8 +38,9 @@ std::vector<std::byte> MakeCapabilities(const VoxlinkDeviceConfig& config) {
     fixed.formats &= static_cast<uint8_t>(~(1u << static_cast<int>(PixelFormat::kHub75)));
   }
   fixed.max_sub_frames = config.max_sub_frames;
-  fixed.features = voxlink::kFeatureBrightness | voxlink::kFeaturePowerLimit |
-                   voxlink::kFeatureTemperature |
+  fixed.features = voxlink::kFeatureTemperature | voxlink::kFeatureShowAhead |
+                   (config.brightness ? voxlink::kFeatureBrightness : 0u) |
+                   (config.power_limit ? voxlink::kFeaturePowerLimit : 0u) |
                    (config.watchdog ? voxlink::kFeatureWatchdog : 0u);
   fixed.receive_buffer = config.receive_buffer;
   fixed.max_payload = config.max_payload;

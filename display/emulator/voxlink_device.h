@@ -30,6 +30,7 @@ struct VoxlinkDeviceConfig {
   uint32_t max_payload = 65536;
   uint64_t bytes_per_second = 0;  // at which the receive buffer is emptied; 0: at once
   bool watchdog = true;
+  bool brightness = true, power_limit = true;  // whether it has them
   UsbSpeed speed = UsbSpeed::kSuper;
   int16_t temperature = 300;  // 0.1 °C
   std::string serial = "simulated";

@@ -169,7 +169,9 @@ void VoxlinkScreen::OnPacket(const PacketHeader& header, std::span<const std::by
   const bool plain = type == PacketType::kEnd || type == PacketType::kAbort ||
                      type == PacketType::kDrop || type == PacketType::kKeepalive;
   if ((plain && !payload.empty()) ||
-      (type == PacketType::kShow && payload.size() != sizeof(voxlink::ShowPayload))) {
+      (type == PacketType::kShow && payload.size() != ((header.flags & voxlink::kShowAhead) != 0
+                                                           ? sizeof(voxlink::ShowAheadPayload)
+                                                           : sizeof(voxlink::ShowPayload)))) {
     return EmitError(ErrorCode::kBadLength, header, header.length);
   }
   switch (type) {
@@ -254,8 +256,19 @@ void VoxlinkScreen::Show(const PacketHeader& header, std::span<const std::byte> 
   if (!waiting_ || waiting_->volume->number != header.volume) {
     return EmitVolume(EventType::kDropped, header.volume, Reason::kUnknownVolume);
   }
-  waiting_->show = true;
-  waiting_->sweep = voxlink::Load<voxlink::ShowPayload>(payload).sweep;
+  if ((header.flags & voxlink::kShowAhead) == 0) {
+    waiting_->show = true;
+    waiting_->sweep = voxlink::Load<voxlink::ShowPayload>(payload).sweep;
+    return;
+  }
+  const auto order = voxlink::Load<voxlink::ShowAheadPayload>(payload);
+  const bool taken = order.sweep >= sweep_ && order.sweep - sweep_ >= order.ahead;
+  if (taken) {
+    waiting_->show = true;
+    waiting_->sweep = order.sweep;
+  }
+  emit_(EventType::kOrdered, taken ? voxlink::kOrderTaken : 0,
+        BytesOf(voxlink::OrderedEvent{.volume = header.volume, .sweep = order.sweep}));
 }
 
 void VoxlinkScreen::Drop(const PacketHeader& header) {

@@ -20,7 +20,7 @@ local PACKETS = {
 local EVENTS = {
   [1] = "READY", [2] = "CREDIT", [3] = "SWEEP", [4] = "COMPLETE", [5] = "MISSING",
   [6] = "ABORTED", [7] = "SHOWN", [8] = "DROPPED", [9] = "UNDERRUN", [10] = "HEALTH",
-  [11] = "ERROR", [12] = "LIGHT",
+  [11] = "ERROR", [12] = "LIGHT", [13] = "ORDERED",
 }
 local REQUESTS = {
   [1] = "GET_CAPABILITIES", [2] = "GET_STATUS", [3] = "SET_MODE", [4] = "GET_MODE",
@@ -95,7 +95,7 @@ local PACKET = layout({
   { 0, "x32", "magic", "Magic" },
   { 4, "u8", "type", "Type", PACKETS },
   { 5, "x8", "flags", "Flags", bits = {
-    { 0x01, "flags.show", "VOLUME_END: show it from the next sweep on" },
+    { 0x01, "flags.show", "VOLUME_END: show it from the next sweep on; SHOW: only if it comes ahead" },
   } },
   { 6, "u16", "sub_frame", "Sub-frame" },
   { 8, "u64", "volume", "Volume" },
@@ -110,12 +110,16 @@ local BEGIN = layout({
   { 8, "u32", "begin.pictures", "Pictures" },
 })
 local SHOW = layout({ { 0, "u64", "show.sweep", "From sweep" } })
+local SHOW_AHEAD = layout({
+  { 0, "u64", "show.sweep", "From sweep" },
+  { 8, "u32", "show.ahead", "Sweeps ahead at least" },
+})
 
 -- §6
 local EVENT = layout({
   { 0, "u8", "event.type", "Type", EVENTS },
   { 1, "x8", "event.flags", "Flags", bits = {
-    { 0x01, "event.flags.bit0", "MISSING: the list ends here; SHOWN: the device was dark" },
+    { 0x01, "event.flags.bit0", "MISSING: the list ends here; SHOWN: the device was dark; ORDERED: taken" },
   } },
   { 2, "u16", "event.length", "Length" },
   { 4, "u32", "event.sequence", "Sequence" },
@@ -164,6 +168,10 @@ local BODIES = {
     { 0, "u32", "event.lit", "Lit" },
     { 4, "u32", "event.light_cause", "Cause", LIGHTS },
   }),
+  [13] = layout({
+    { 0, "u64", "event.volume", "Volume" },
+    { 8, "u64", "event.sweep", "Sweep" },
+  }),
 }
 local RUN = layout({
   { 0, "u32", "event.run.first", "First picture" },
@@ -172,6 +180,7 @@ local RUN = layout({
 -- By type: what else to say of an event in a line.
 local SAYS = {
   [3] = first_u64, [4] = first_u64, [5] = first_u64, [7] = first_u64,
+  [13] = first_u64,
   [11] = function(body) return ERRORS[body(0, 4):le_uint()] or "?" end,
   [12] = function(body) return LIGHTS[body(4, 4):le_uint()] or "?" end,
 }
@@ -464,7 +473,7 @@ local function add_packet(buffer, tree)
     if kind == 1 then
       add_begin(packet, payload)
     elseif kind == 5 and length >= 8 then
-      add(packet, SHOW, payload)
+      add(packet, buffer(5, 1):uint() % 2 == 1 and SHOW_AHEAD or SHOW, payload)
     elseif kind ~= 2 then
       item:add_proto_expert_info(e.short)
     end

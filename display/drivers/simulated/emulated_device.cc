@@ -31,6 +31,8 @@ absl::StatusOr<EmulatedDevice> ReadEmulatedDevice(const DisplayOptions& options)
       static_cast<uint32_t>(reader.Integer("receive_buffer", 4 << 20, 64 << 10, 1 << 30));
   config.max_payload = static_cast<uint32_t>(reader.Integer("max_payload", 65536, 1024, 1 << 24));
   config.watchdog = reader.Flag("watchdog", true);
+  config.brightness = reader.Flag("device_brightness", true);
+  config.power_limit = reader.Flag("device_power_limit", true);
   config.serial = reader.Text("serial", options.name);
   absl::StatusOr<emulator::FaultPlan> plan = emulator::ParseFaultPlan(reader.Text("faults", ""));
   absl::StatusOr<DisplayInfo> info = ReadDisplayInfo(options, reader);

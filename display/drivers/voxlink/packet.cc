@@ -69,6 +69,16 @@ void PacketWriter::Show(Bytes& out, uint64_t volume, uint64_t sweep) {
 }
 
 template <typename Bytes>
+void PacketWriter::ShowAhead(Bytes& out, uint64_t volume, uint64_t sweep, uint32_t ahead) {
+  PacketHeader header{};
+  header.type = static_cast<uint8_t>(PacketType::kShow);
+  header.flags = kShowAhead;
+  header.volume = volume;
+  const ShowAheadPayload show{.sweep = sweep, .ahead = ahead, .reserved = 0};
+  Put(out, header, std::as_bytes(std::span(&show, 1)), {});
+}
+
+template <typename Bytes>
 void PacketWriter::Plain(Bytes& out, PacketType type, uint64_t volume) {
   PacketHeader header{};
   header.type = static_cast<uint8_t>(type);
@@ -82,7 +92,7 @@ template void PacketWriter::Slice(TransferBytes&, uint64_t, uint32_t, uint16_t, 
 template void PacketWriter::Begin(TransferBytes&, uint64_t, uint64_t, uint32_t,
                                   std::span<const std::byte>);
 template void PacketWriter::End(TransferBytes&, uint64_t, bool);
-template void PacketWriter::Show(TransferBytes&, uint64_t, uint64_t);
+template void PacketWriter::ShowAhead(TransferBytes&, uint64_t, uint64_t, uint32_t);
 template void PacketWriter::Plain(TransferBytes&, PacketType, uint64_t);
 template void PacketWriter::Slice(Vector&, uint64_t, uint32_t, uint16_t, uint32_t,
                                   std::span<const std::byte>);
@@ -90,6 +100,7 @@ template void PacketWriter::Begin(Vector&, uint64_t, uint64_t, uint32_t,
                                   std::span<const std::byte>);
 template void PacketWriter::End(Vector&, uint64_t, bool);
 template void PacketWriter::Show(Vector&, uint64_t, uint64_t);
+template void PacketWriter::ShowAhead(Vector&, uint64_t, uint64_t, uint32_t);
 template void PacketWriter::Plain(Vector&, PacketType, uint64_t);
 
 void PacketParser::Reset() {

@@ -31,6 +31,8 @@ class PacketWriter {
   void End(Bytes& out, uint64_t volume, bool show);
   template <typename Bytes>
   void Show(Bytes& out, uint64_t volume, uint64_t sweep);
+  template <typename Bytes>
+  void ShowAhead(Bytes& out, uint64_t volume, uint64_t sweep, uint32_t ahead);
   // ABORT, DROP and KEEPALIVE carry nothing (volume 0 for the last).
   template <typename Bytes>
   void Plain(Bytes& out, PacketType type, uint64_t volume);

@@ -73,6 +73,7 @@ enum Feature : uint32_t {
   kFeatureBrightness = 1u << 1,
   kFeaturePowerLimit = 1u << 2,
   kFeatureTemperature = 1u << 3,
+  kFeatureShowAhead = 1u << 4,
 };
 
 // §4.2 Shapes
@@ -202,6 +203,14 @@ static_assert(sizeof(BeginPayload) == 16);
 struct ShowPayload {
   uint64_t sweep;  // 0: the next
 };
+inline constexpr uint8_t kShowAhead =
+    1u << 0;  // flags: taken only ahead, and answered; then its payload is
+struct ShowAheadPayload {
+  uint64_t sweep;
+  uint32_t ahead;  // sweep − the last one begun must be at least that, or nothing changes
+  uint32_t reserved;
+};
+static_assert(sizeof(ShowAheadPayload) == 16);
 static_assert(sizeof(ShowPayload) == 8);
 
 // §6 Events
@@ -218,6 +227,7 @@ enum class EventType : uint8_t {
   kHealth = 10,
   kError = 11,
   kLight = 12,
+  kOrdered = 13,
 };
 
 struct EventHeader {
@@ -337,6 +347,14 @@ struct LightEvent {
   uint32_t reason;  // 1 host silent, 2 blanked, 3 host is back, 4 unblanked
 };
 static_assert(sizeof(LightEvent) == 8);
+
+inline constexpr uint8_t kOrderTaken = 1u << 0;  // flags of ORDERED
+
+struct OrderedEvent {
+  uint64_t volume;
+  uint64_t sweep;
+};
+static_assert(sizeof(OrderedEvent) == 16);
 
 // §8 Times
 inline constexpr int64_t kKeepaliveNs = 100'000'000;  // the host's longest silence

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -18,6 +17,12 @@ constexpr sync::TimeNs kReadyLimit = sync::kSecond;
 // Earlier than the protocol's 100 ms, for the jitter of the owner's thread.
 constexpr sync::TimeNs kKeepaliveAfter = 70 * sync::kMillisecond;
 constexpr sync::TimeNs kClockWindow = 5 * sync::kSecond;
+// What a device says of sweeps farther from now is not believed.
+constexpr sync::TimeNs kOldestSweep = 60 * sync::kSecond;
+
+double NominalPeriod(const DisplayInfo& info) {
+  return static_cast<double>(sync::kSecond) / std::max(info.volumes_per_second, 1e-3);
+}
 
 // An interface of the protocol with its two endpoints, in a configuration descriptor.
 absl::Status CheckDescriptor(std::span<const std::byte> descriptor) {
@@ -48,7 +53,9 @@ uint16_t WireBrightness(double brightness) {
 
 VoxlinkDisplay::VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> transport,
                                sync::Clock& clock, VoxlinkLink::Options options)
-    : Display(std::move(info), clock), link_(std::move(transport), clock, this, options) {}
+    : Display(std::move(info), clock),
+      link_(std::move(transport), clock, this, options),
+      sweeps_(NominalPeriod(this->info())) {}
 
 VoxlinkDisplay::~VoxlinkDisplay() { Stop(); }
 
@@ -74,6 +81,7 @@ void VoxlinkDisplay::ClockMap::Note(uint64_t device_ns, sync::TimeNs host_ns) {
 absl::Status VoxlinkDisplay::DoStart() {
   link_.transport().SetWake([this] { Wake(); });
   phase_ = Phase::kDetached;
+  configured_power_limit_w_ = 0;
   attach_at_ = clock().Now();
   failed_at_ = 0;
   retry_.Reset();
@@ -97,12 +105,15 @@ void VoxlinkDisplay::OnLinkFailed(const std::string& reason) {
   RetryLater(clock().Now());
   const uint64_t bytes = sending_.bytes;
   sending_ = Sending{};
-  sweep_.reset();
+  sweeps_.Restart();
+  // Another may come, or this one after its power was cut: none has a limit yet, as far as is known.
+  configured_power_limit_w_ = 0;
   DeviceLost(reason, bytes);
 }
 
 sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
   link_.Poll();
+  sweeps_.Advance(now);
   if (phase_ == Phase::kDetached && link_.transport().TakeArrival()) {
     // A device that comes and goes is tried no faster than one that fails.
     attach_at_ = std::min(attach_at_, failed_at_ + retry_.first());
@@ -192,6 +203,12 @@ void VoxlinkDisplay::OnCapabilities(std::span<const std::byte> page) {
         "the display is configured for ", info().volumes_per_second, " volumes/s; the device has ",
         parsed->fixed.min_rate_mhz / 1000.0, " to ", parsed->fixed.max_rate_mhz / 1000.0));
   }
+  if (holding() && (parsed->fixed.features & kFeatureShowAhead) == 0) {
+    return OnLinkFailed(
+        "the display is in a genlock, for which its device must take SHOW a sweep ahead (feature "
+        "bit 4); "
+        "this one does not");
+  }
   capabilities_ = *std::move(parsed);
   Configure();
 }
@@ -211,6 +228,12 @@ void VoxlinkDisplay::Configure() {
   } else {
     HasNoBrightness();
   }
+  if ((capabilities_.fixed.features & kFeaturePowerLimit) == 0) {
+    HasNoPowerLimit();
+  } else if (power_limit_w() != configured_power_limit_w_) {
+    configured_power_limit_w_ = power_limit_w();
+    WritePowerLimit(power_limit_w());
+  }
   configured_blank_ = blanked();
   link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   link_.Write(Request::kStart, 0);
@@ -225,6 +248,11 @@ void VoxlinkDisplay::Ready() {
       brightness() != configured_brightness_) {
     link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
   }
+  if ((capabilities_.fixed.features & kFeaturePowerLimit) != 0 &&
+      power_limit_w() != configured_power_limit_w_) {
+    configured_power_limit_w_ = power_limit_w();
+    WritePowerLimit(power_limit_w());
+  }
   if (blanked() != configured_blank_) link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   Attached();
 }
@@ -236,9 +264,9 @@ void VoxlinkDisplay::OnReply(Request request, std::span<const std::byte> data) {
   writer_.Restart();
   sending_ = Sending{};
   last_number_ = complete_number_ = complete_frame_ = 0;
-  to_abort_.clear();
+  commands_.clear();
   clock_map_ = ClockMap{};
-  sweep_.reset();
+  sweeps_.Restart();
   session_underruns_ = 0;
   phase_ = Phase::kWaitingReady;
   ready_by_ = clock().Now() + kReadyLimit;
@@ -251,6 +279,20 @@ absl::Status VoxlinkDisplay::DoSetBrightness(double brightness) {
         absl::StrCat("the device of display \"", info().name, "\" has no brightness"));
   }
   link_.Write(Request::kSetBrightness, WireBrightness(brightness));
+  return absl::OkStatus();
+}
+
+void VoxlinkDisplay::WritePowerLimit(double watts) {
+  const auto milliwatts = static_cast<uint32_t>(std::lround(watts * 1000));
+  link_.Write(Request::kSetPowerLimit, 0, BytesOf(milliwatts));
+}
+
+absl::Status VoxlinkDisplay::DoSetPowerLimit(double watts) {
+  if ((capabilities_.fixed.features & kFeaturePowerLimit) == 0) {
+    return Display::DoSetPowerLimit(watts);
+  }
+  configured_power_limit_w_ = watts;
+  WritePowerLimit(watts);
   return absl::OkStatus();
 }
 
@@ -280,8 +322,7 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
       return Ready();
     case EventType::kSweep:
       if (!fits(sizeof(SweepEvent))) break;
-      sweep_ = Load<SweepEvent>(body);
-      return NoteUnderruns(sweep_->underruns);
+      return NoteSweep(Load<SweepEvent>(body));
     case EventType::kUnderrun:
       if (!fits(sizeof(UnderrunEvent))) break;
       return NoteUnderruns(Load<UnderrunEvent>(body).total);
@@ -302,6 +343,9 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
       const auto shown = Load<ShownEvent>(body);
       return OnShown(shown.volume, shown.start_ns, (header.flags & kShownDark) != 0);
     }
+    case EventType::kOrdered:
+      if (!fits(sizeof(OrderedEvent))) break;
+      return OnOrdered(Load<OrderedEvent>(body), (header.flags & kOrderTaken) != 0);
     case EventType::kCredit:
     case EventType::kHealth:
     case EventType::kError:  // what an error damaged, VOLUME_END brings to light
@@ -313,16 +357,15 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
       absl::StrCat("event ", static_cast<int>(header.type), " has only ", body.size(), " bytes"));
 }
 
+void VoxlinkDisplay::NoteSweep(const SweepEvent& event) {
+  NoteUnderruns(event.underruns);
+  const sync::TimeNs now = clock().Now(), start = clock_map_.ToHost(event.start_ns);
+  if (start < now - kOldestSweep || start > now + kOldestSweep) return;
+  sweeps_.Note(event.sweep, start, event.period_ns);
+}
+
 std::vector<sync::TimeNs> VoxlinkDisplay::ComingSweeps(int count) const {
-  std::vector<sync::TimeNs> starts;
-  if (!sweep_ || sweep_->period_ns == 0 || count <= 0) return starts;
-  const sync::TimeNs period = sweep_->period_ns;
-  const sync::TimeNs last = clock_map_.ToHost(sweep_->start_ns);
-  if (std::abs(last / 2) > std::numeric_limits<sync::TimeNs>::max() / 4) return starts;
-  const sync::TimeNs since = std::max<sync::TimeNs>(clock().Now() - last, 0);
-  sync::TimeNs next = last + (since / period + 1) * period;
-  for (int i = 0; i < count; ++i, next += period) starts.push_back(next);
-  return starts;
+  return sweeps_.Coming(clock().Now(), count);
 }
 
 }  // namespace voxeld::display::voxlink

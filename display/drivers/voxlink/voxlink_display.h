@@ -13,6 +13,7 @@
 #include "display/drivers/voxlink/packet.h"
 #include "display/drivers/voxlink/voxlink_link.h"
 #include "display/sync/backoff.h"
+#include "display/sync/sweep_clock.h"
 
 namespace voxeld::display::voxlink {
 
@@ -24,10 +25,12 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   ~VoxlinkDisplay() override;
 
   std::vector<sync::TimeNs> ComingSweeps(int count) const override;
+  std::optional<sync::SweepLock> Sweeps() const override { return sweeps_.lock(); }
+  bool can_hold() const override { return true; }
 
  private:
   enum class Phase : uint8_t { kDetached, kSettingUp, kWaitingReady, kReady };
-  enum class Stage : uint8_t { kIdle, kBegin, kPictures, kEnd, kAwaitComplete, kAwaitShown };
+  enum class Stage : uint8_t { kIdle, kBegin, kPictures, kEnd, kAwaitComplete, kHeld, kAwaitShown };
 
   // The volume on its way.
   struct Sending {
@@ -46,6 +49,17 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
     uint64_t end_mark = 0;       // kAwaitComplete: link_.sent() after VOLUME_END
     sync::TimeNs answer_by = 0;  // when to ask at the latest; 0: not known yet
     sync::TimeNs asked_ns = 0;
+    bool hold = false;
+    uint64_t ordered_sweep = 0;  // in the newest order to show it; 0: none
+    sync::TimeNs ordered_at = 0;
+  };
+
+  // A packet that is no part of a volume on its way: ABORT, SHOW or DROP.
+  struct Command {
+    PacketType type;
+    uint64_t volume;
+    uint64_t sweep = 0;  // of SHOW
+    uint32_t ahead = 0;
   };
 
   // Device's clock → ours: the smallest difference seen lately is the least delayed one.
@@ -65,7 +79,10 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   sync::TimeNs DoTick(sync::TimeNs now) override;
   absl::Status DoSetBrightness(double brightness) override;
   absl::Status DoSetBlank(bool blank) override;
+  absl::Status DoSetPowerLimit(double watts) override;
   std::unique_ptr<WireDecoder> DoMakeDecoder() const override;
+  void DoOrderShown(sync::TimeNs at, uint32_t ahead) override;
+  void DoDropHeld(const std::string& reason) override;
 
   void OnEvent(const EventHeader& header, std::span<const std::byte> body) override;
   void OnReply(Request request, std::span<const std::byte> data) override;
@@ -80,6 +97,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   void RetryLater(sync::TimeNs now);
   void OnCapabilities(std::span<const std::byte> page);
   void Configure();
+  void WritePowerLimit(double watts);
   void Ready();
 
   // Volumes.
@@ -90,6 +108,10 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   void OnMissing(const EventHeader& header, const MissingEvent& event);
   void OnComplete(uint64_t volume);
   void OnShown(uint64_t volume, uint64_t start_ns, bool dark);
+  void OnOrdered(const OrderedEvent& event, bool taken);
+  void NoteSweep(const SweepEvent& event);
+  void SendCommands();
+  void AwaitShown(sync::TimeNs from);
   void OnRefused(const VolumeEvent& event, bool dropped);
   void SendAgain(const char* why);
   void Lose(const std::string& reason);
@@ -105,20 +127,21 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   int failed_setups_ = 0;  // in a row
   sync::TimeNs ready_by_ = 0;
   double configured_brightness_ = 1;  // what the device was given
+  double configured_power_limit_w_ = 0;
   bool configured_blank_ = false;
   std::vector<std::byte> capability_bytes_;
   DeviceCapabilities capabilities_;
 
   PacketWriter writer_;
   Sending sending_;
-  uint64_t last_number_ = 0;        // wire number of the newest volume of this session
-  uint64_t complete_number_ = 0;    // the last one that the device completed; 0: none
-  uint64_t complete_frame_ = 0;     // and the frame that it was
-  size_t fragment_ = 0;             // the most of a picture that one packet carries
-  std::vector<uint64_t> to_abort_;  // volumes given up, whose ABORT has to go out
+  uint64_t last_number_ = 0;       // wire number of the newest volume of this session
+  uint64_t complete_number_ = 0;   // the last one that the device completed; 0: none
+  uint64_t complete_frame_ = 0;    // and the frame that it was
+  size_t fragment_ = 0;            // the most of a picture that one packet carries
+  std::vector<Command> commands_;  // that have to go out
 
   ClockMap clock_map_;
-  std::optional<SweepEvent> sweep_;
+  sync::SweepClock sweeps_;
   uint32_t session_underruns_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // VoxlinkDisplay's way with volumes: docs/protocols/voxlink.md §5 and §10.
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -29,6 +30,7 @@ void VoxlinkDisplay::Begin(const SliceFramePtr& frame, bool full) {
   sending_.rounds = rounds;
   sending_.stage = Stage::kBegin;
   sending_.number = ++last_number_;
+  sending_.hold = holds_in_flight();
   sending_.base = full ? 0 : complete_number_;
   const size_t pictures = info().layout.pictures();
   sending_.announced.assign(pictures, true);
@@ -88,7 +90,7 @@ void VoxlinkDisplay::WritePacket(TransferBytes& out) {
       return;
     }
     case Stage::kEnd:
-      writer_.End(out, sending_.number, true);
+      writer_.End(out, sending_.number, !sending_.hold);
       sending_.stage = Stage::kAwaitComplete;
       return;
     default:
@@ -96,16 +98,25 @@ void VoxlinkDisplay::WritePacket(TransferBytes& out) {
   }
 }
 
-void VoxlinkDisplay::Pump() {
-  while (!to_abort_.empty() && link_.Room() >= sizeof(PacketHeader)) {
+void VoxlinkDisplay::SendCommands() {
+  while (!commands_.empty() && link_.Room() >= sizeof(PacketHeader) + sizeof(ShowAheadPayload)) {
+    const Command command = commands_.front();
+    commands_.erase(commands_.begin());
     TransferBytes buffer = link_.TakeBuffer();
-    writer_.Plain(buffer, PacketType::kAbort, to_abort_.front());
-    to_abort_.erase(to_abort_.begin());
+    if (command.type == PacketType::kShow) {
+      writer_.ShowAhead(buffer, command.volume, command.sweep, command.ahead);
+    } else {
+      writer_.Plain(buffer, command.type, command.volume);
+    }
     mutable_stats().bytes_out += buffer.size();
     TapOut(kBulkOut, buffer);
     link_.Send(std::move(buffer));
   }
-  if (!to_abort_.empty()) return;
+}
+
+void VoxlinkDisplay::Pump() {
+  SendCommands();
+  if (!commands_.empty()) return;
   const auto has_packet = [this] {
     return sending_.stage != Stage::kIdle && sending_.stage < Stage::kAwaitComplete;
   };
@@ -127,16 +138,52 @@ void VoxlinkDisplay::Pump() {
 
 void VoxlinkDisplay::OnComplete(uint64_t volume) {
   if (volume != sending_.number || sending_.stage == Stage::kIdle ||
-      sending_.stage == Stage::kAwaitShown) {
+      sending_.stage >= Stage::kHeld) {
     return;
   }
   link_.NoteProgress();
   complete_number_ = volume;
   complete_frame_ = in_flight()->volume;
-  sending_.stage = Stage::kAwaitShown;
   sending_.queries = 0;
-  const sync::TimeNs period = sweep_ ? sweep_->period_ns : sync::kSecond;
-  sending_.answer_by = clock().Now() + 2 * period + kAnswerLimit;
+  if (sending_.hold) {
+    sending_.stage = Stage::kHeld;
+    return FrameHeld();
+  }
+  AwaitShown(clock().Now());
+}
+
+void VoxlinkDisplay::AwaitShown(sync::TimeNs from) {
+  sending_.stage = Stage::kAwaitShown;
+  const sync::TimeNs period =
+      sweeps_.known() ? std::llround(sweeps_.lock().period_ns) : sync::kSecond;
+  sending_.answer_by = from + 2 * period + kAnswerLimit;
+}
+
+void VoxlinkDisplay::DoOrderShown(sync::TimeNs at, uint32_t ahead) {
+  if (sending_.stage < Stage::kHeld) return;
+  if (!sweeps_.known()) return FrameOrdered(at, false);
+  sending_.ordered_at = at;
+  sending_.ordered_sweep = sweeps_.Nearest(at);
+  commands_.push_back({PacketType::kShow, sending_.number, sending_.ordered_sweep, ahead});
+  Pump();
+}
+
+void VoxlinkDisplay::OnOrdered(const OrderedEvent& event, bool taken) {
+  if (event.volume != sending_.number || sending_.stage < Stage::kHeld ||
+      event.sweep != sending_.ordered_sweep) {
+    return;
+  }
+  if (taken) AwaitShown(std::max(clock().Now(), sending_.ordered_at));
+  FrameOrdered(sending_.ordered_at, taken);
+}
+
+void VoxlinkDisplay::DoDropHeld(const std::string& reason) {
+  if (sending_.stage == Stage::kIdle) return;
+  const bool held = sending_.stage >= Stage::kHeld;
+  commands_.push_back({held ? PacketType::kDrop : PacketType::kAbort, sending_.number});
+  if (held) complete_number_ = 0;
+  Lose(reason);
+  Pump();
 }
 
 void VoxlinkDisplay::OnShown(uint64_t volume, uint64_t start_ns, bool dark) {
@@ -156,7 +203,7 @@ void VoxlinkDisplay::OnMissing(const EventHeader& header, const MissingEvent& ev
   if ((header.flags & kMissingLast) == 0) return;
   const std::vector<PictureRun> runs = std::exchange(sending_.missing, {});
   if (++sending_.rounds > kMaxResends) {
-    to_abort_.push_back(sending_.number);
+    commands_.push_back({PacketType::kAbort, sending_.number});
     return Lose(
         absl::StrCat("slices did not arrive, though they were sent ", kMaxResends, " times again"));
   }
@@ -213,7 +260,7 @@ void VoxlinkDisplay::OnStatus(const Status& status, bool settled) {
 }
 
 sync::TimeNs VoxlinkDisplay::CheckOnVolume(sync::TimeNs now) {
-  if (sending_.stage == Stage::kIdle) return sync::kNever;
+  if (sending_.stage == Stage::kIdle || sending_.stage == Stage::kHeld) return sync::kNever;
   if (sending_.stage == Stage::kAwaitComplete && sending_.answer_by == 0 &&
       link_.consumed() >= sending_.end_mark) {
     sending_.answer_by = now + kAnswerLimit;

@@ -39,8 +39,8 @@ class SimulatedDaemon {
     engine.kind = gpu::EngineKind::kCpu;
     engine.threads = 1;
     engine.inline_execution = true;
-    ViewOptions voxels;
-    voxels.mode = ViewOptions::Mode::kVoxels;
+    DisplaySetup voxels;
+    voxels.view.mode = ViewOptions::Mode::kVoxels;
     const absl::Status added = core->AddDisplay(std::move(parts->display), engine, voxels);
     EXPECT_TRUE(added.ok()) << added;
     EXPECT_TRUE(core->Start().ok());

@@ -366,6 +366,9 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.volumes_unchanged = 19, d.volumes_presented = 23;
   d.volumes_replaced = 24, d.volumes_lost = 25, d.volumes_per_second = 26, d.bytes_out = 27;
   d.slices_sent = 28, d.slices_resent = 29, d.underruns = 30, d.attaches = 31;
+  d.volumes_late = 131, d.sweeps = {sync::SweepLock::State::kLocked, 132, 133, 134, 135};
+  d.genlock_volumes = 136, d.genlock_dropped = 137, d.genlock_postponed = 138;
+  d.genlock_slips = 139, d.light = 140, d.power_w = 141, d.power_unlimited = true;
   d.commits_owed = 32, d.commits_presented = 33, d.commits_unchanged = 34;
   d.commits_superseded = 35, d.commits_lost = 36, d.commits_not_shown = 37, d.commits_pending = 38;
   d.commit_to_last_byte = {41, 42, 43, 44}, d.commit_to_presented = {45, 46, 47, 48};
@@ -386,6 +389,7 @@ TEST(Encode, StatsHaveEveryFigure) {
   EXPECT_EQ(message.displays(0).assemble().p50_ns(), 50);
   EXPECT_EQ(message.displays(0).slice().max_ns(), 56);
   EXPECT_EQ(message.displays(0).copy().max_ns(), 86);
+  EXPECT_EQ(message.displays(0).sweep_lock(), v1::SWEEP_LOCK_LOCKED);
   d.packed_as_drawn = false;
   message.Clear();
   Encode(stats, &message);

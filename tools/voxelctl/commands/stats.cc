@@ -29,6 +29,15 @@ std::string Engine(const v1::DisplayStats& d) {
                                    : absl::StrCat(d.engine(), " (", d.engine_device(), ")");
 }
 
+std::string SweepText(const v1::DisplayStats& d) {
+  std::string text =
+      absl::AsciiStrToLower(absl::StripPrefix(v1::SweepLock_Name(d.sweep_lock()), "SWEEP_LOCK_"));
+  if (d.sweep_lock() == v1::SWEEP_LOCK_LOCKED) {
+    absl::StrAppendFormat(&text, ", %+.0f ppm", d.sweep_drift_ppm());
+  }
+  return text;
+}
+
 std::string Full(const v1::Stats& stats) {
   std::vector<Table::Column> columns = {{"DISPLAY"}};
   for (const v1::DisplayStats& d : stats.displays())
@@ -74,6 +83,14 @@ std::string Full(const v1::Stats& stats) {
   row("slices sent", [](const D& d) { return Grouped(d.slices_sent()); });
   row("  again", [](const D& d) { return Grouped(d.slices_resent()); });
   row("underruns", [](const D& d) { return Grouped(d.underruns()); });
+  row("late", [](const D& d) { return Grouped(d.volumes_late()); });
+  row("sweeps", [](const D& d) { return SweepText(d); });
+  row("  lock lost", [](const D& d) { return Grouped(d.sweep_losses()); });
+  row("genlock", [](const D& d) { return Grouped(d.genlock_volumes()); });
+  row("  dropped", [](const D& d) { return Grouped(d.genlock_dropped()); });
+  row("  put off", [](const D& d) { return Grouped(d.genlock_postponed()); });
+  row("  slips", [](const D& d) { return Grouped(d.genlock_slips()); });
+  row("light", [](const D& d) { return absl::StrFormat("%.0f %%", d.light() * 100); });
   row("engine faults", [](const D& d) { return Grouped(d.engine_faults()); });
   row("  returns", [](const D& d) { return Grouped(d.engine_returns()); });
   std::string text = absl::StrCat(Server(stats), "\n", table.Text());

@@ -64,6 +64,10 @@ std::string Describe(const Event& event) {
                       "), volume ", body.volume, ", detail ", body.detail);
       break;
     }
+    case EventType::kOrdered:
+      absl::StrAppend(&text, " volume ", event.As<OrderedEvent>().volume, ", sweep ",
+                      event.As<OrderedEvent>().sweep);
+      break;
     case EventType::kLight:
       absl::StrAppend(&text, event.As<LightEvent>().lit != 0 ? " on" : " off", ", cause ",
                       event.As<LightEvent>().reason);

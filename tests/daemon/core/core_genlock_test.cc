@@ -1,0 +1,257 @@
+// Displays in genlock: what their devices show, sweep by sweep, in one thread under a clock that stands still.
+//
+// The oracle knows nothing of volumes and orders: the scene is a number in lit voxels, and what each device shows in
+// each of its sweeps is read from its pictures.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <deque>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "daemon/core/core.h"
+#include "display/drivers/simulated/simulated.h"
+#include "display/emulator/fault_injector.h"
+#include "display/emulator/voxlink_device.h"
+#include "display/sync/fake_clock.h"
+#include "display/usb/in_process.h"
+#include "tests/daemon/fakes/simulation.h"
+
+namespace voxeld::daemon {
+namespace {
+
+using testing::Dots;
+using testing::Entity1;
+using testing::Put;
+using testing::RecordingSink;
+
+constexpr int kBits = 20;  // of the number shown
+constexpr int kRate = 200;
+constexpr sync::TimeNs kPeriod = sync::kSecond / kRate;
+
+// A device, and the number that its eye sees; nothing: it is dark, or shows what was before the first number.
+struct Screen {
+  std::string name;
+  display::simulated::Parts parts;
+  std::optional<uint64_t> shown;
+  uint64_t changes = 0;
+};
+
+class Wall {
+ public:
+  explicit Wall(std::vector<std::map<std::string, std::string>> displays) {
+    CoreOptions options;
+    options.threads = false;
+    core_.emplace(std::move(options), clock_);
+    for (size_t i = 0; i < displays.size(); ++i) {
+      displays[i].merge(std::map<std::string, std::string>{
+          {"size", "10x2x3"}, {"dither", "none"}, {"rate", std::to_string(kRate)}});
+      screens_.push_back(std::make_unique<Screen>());
+      Screen& screen = *screens_.back();
+      screen.name = "d" + std::to_string(i);
+      absl::StatusOr<display::simulated::Parts> parts =
+          display::simulated::CreateParts({screen.name, "simulated", displays[i]}, clock_, false);
+      EXPECT_TRUE(parts.ok()) << parts.status();
+      screen.parts = *std::move(parts);
+      gpu::EngineOptions engine;
+      engine.kind = gpu::EngineKind::kCpu;
+      engine.threads = 1;
+      engine.inline_execution = true;
+      DisplaySetup setup;
+      setup.view.mode = ViewOptions::Mode::kVoxels;
+      setup.genlock = "wall";
+      const absl::Status added = core_->AddDisplay(std::move(screen.parts.display), engine, setup);
+      EXPECT_TRUE(added.ok()) << added;
+    }
+    EXPECT_TRUE(core_->Start().ok());
+    core_->OpenSession({}, 0, sink_, [this](auto info) { session_ = *info; });
+    Settle();
+  }
+
+  sync::TimeNs now() const { return clock_.Now(); }
+  Screen& screen(size_t i) { return *screens_[i]; }
+  // Times that screens have shown different numbers for longer than their sweeps lie apart.
+  uint64_t differences() const { return differences_; }
+
+  // Puts up the number, as dots.
+  void Show(uint64_t number) {
+    std::vector<Operation> all;
+    for (int bit = 0; bit < kBits; ++bit) {
+      const uint32_t colour =
+          number >> bit & 1 ? 0xFFFFFF : 0x0000FF;  // blue counts as lit and as 0
+      if (((number ^ before_) >> bit & 1) == 0 && before_ != 0) continue;
+      auto put = testing::Sequence(
+          sequence_,
+          Put("a", std::to_string(bit),
+              Entity1(Dots(0, colour), testing::Shift(bit % 10 + 0.5, bit / 10 + 0.5, 1.5))));
+      sequence_ += put.size();
+      all.insert(all.end(), put.begin(), put.end());
+    }
+    before_ = number;
+    auto end = testing::Sequence(sequence_, testing::EndCommit(++frame_));
+    sequence_ += end.size();
+    all.insert(all.end(), end.begin(), end.end());
+    session_.intake->Take({std::move(all), {}, 100});
+    core_->Step();
+    sink_->receipts.clear();
+  }
+
+  void RunFor(sync::TimeNs span) {
+    const sync::TimeNs end = clock_.Now() + span;
+    while (clock_.Now() < end) {
+      const sync::TimeNs next = Settle();
+      clock_.AdvanceTo(std::clamp(next, clock_.Now() + 1000, end));
+    }
+    Settle();
+  }
+
+  Stats GetStats() {
+    Stats stats;
+    core_->GetStats([&](absl::StatusOr<Stats> s) { stats = *s; });
+    Settle();
+    return stats;
+  }
+
+ private:
+  sync::TimeNs Settle() {
+    sync::TimeNs next = sync::kNever;
+    for (int i = 0; i < 4; ++i) {
+      next = core_->Step();
+      for (const auto& screen : screens_) {
+        next = std::min(next, screen->parts.transport->Pump());
+      }
+      Look();
+    }
+    return next;
+  }
+
+  static std::optional<uint64_t> Read(const Screen& screen) {
+    const std::optional<display::DecodedVolume> seen = screen.parts.device->Seen();
+    if (!seen.has_value()) return std::nullopt;
+    const std::vector<uint8_t> rgb = seen->Rgb(1, 1);
+    uint64_t number = 0;
+    bool any = false;
+    for (int bit = 0; bit < kBits; ++bit) {
+      const size_t at = (static_cast<size_t>(bit / 10) * 10 + bit % 10) * 3;
+      any = any || rgb[at + 2] != 0;
+      if (rgb[at] != 0) number |= uint64_t{1} << bit;
+    }
+    if (!any) return std::nullopt;  // the scene from before the first number
+    return number;
+  }
+
+  // When one changes, others follow with their own sweeps, which begin within half a period of its own.
+  void Look() {
+    bool differ = false;
+    std::optional<uint64_t> first;
+    for (const auto& screen : screens_) {
+      const std::optional<uint64_t> number = Read(*screen);
+      if (number != screen->shown && number.has_value()) ++screen->changes;
+      screen->shown = number;
+      if (!number.has_value()) continue;
+      differ = differ || (first.has_value() && *first != *number);
+      first = number;
+    }
+    if (!differ) {
+      differ_since_ = sync::kNever;
+    } else if (differ_since_ == sync::kNever) {
+      differ_since_ = clock_.Now();
+    } else if (!told_ && clock_.Now() - differ_since_ > kPeriod / 2 + 10'000) {
+      ++differences_;
+      std::cout << "after " << frame_ << " commits the screens show";
+      for (const auto& screen : screens_) {
+        std::cout << " " << (screen->shown ? std::to_string(*screen->shown) : "nothing");
+      }
+      std::cout << "\n";
+    }
+    told_ = differ && differ_since_ != sync::kNever &&
+            clock_.Now() - differ_since_ > kPeriod / 2 + 10'000;
+  }
+
+  sync::FakeClock clock_;
+  std::optional<Core> core_;
+  std::shared_ptr<RecordingSink> sink_ = std::make_shared<RecordingSink>();
+  SessionInfo session_;
+  uint64_t sequence_ = 0, frame_ = 0, before_ = 0;
+  std::vector<std::unique_ptr<Screen>> screens_;
+  uint64_t differences_ = 0;
+  sync::TimeNs differ_since_ = sync::kNever;
+  bool told_ = false;
+};
+
+uint64_t VolumesWanted() {
+  const char* wanted = std::getenv("VOXELD_GENLOCK_VOLUMES");
+  return wanted == nullptr ? 2000 : std::strtoull(wanted, nullptr, 10);
+}
+
+TEST(CoreGenlock, DisplaysShowTheSameNumberOrNone) {
+  Wall wall({{}, {}});
+  wall.RunFor(sync::kSecond);
+  for (uint64_t n = 1; n <= 100; ++n) {
+    wall.Show(n);
+    wall.RunFor(kPeriod * 5 + kPeriod / 7);
+    for (size_t i = 0; i < 2; ++i) EXPECT_EQ(wall.screen(i).shown, n) << "screen " << i;
+  }
+  EXPECT_EQ(wall.differences(), 0u);
+  const Stats stats = wall.GetStats();
+  EXPECT_GE(stats.displays[0].genlock_volumes, 100u);
+  EXPECT_EQ(stats.displays[0].genlock_dropped, 0u);
+  EXPECT_EQ(stats.displays[0].genlock_slips, 0u);
+}
+
+// One has a slow link, on which transfers stall for as long as several sweeps and its answers come late by as much as the lock
+// allows for; it is also pulled and plugged in again now and then. The other is pulled once.
+TEST(CoreGenlock, NeitherDelayNorRestartMakesThemDiffer) {
+  Wall wall({{}, {{"pacing", "200000"}}});
+  std::mt19937 random(7);
+  Screen& slow = wall.screen(1);
+  const auto fault = [&](Screen& screen, display::emulator::Fault::What what, uint8_t endpoint,
+                         sync::TimeNs amount) {
+    using Fault = display::emulator::Fault;
+    screen.parts.transport->WithDevice([&](display::UsbDeviceModel&) {
+      screen.parts.faults->Add({.when = Fault::When::kTime,
+                                .at = 0,
+                                .endpoint = endpoint,
+                                .what = what,
+                                .amount = static_cast<uint64_t>(amount)});
+    });
+  };
+  using What = display::emulator::Fault::What;
+  const uint64_t wanted = VolumesWanted();
+  uint64_t number = 0, volumes = 0, restarts = 0;
+  for (uint64_t step = 0; volumes < wanted; ++step) {
+    ASSERT_LT(step, 30 * wanted) << volumes << " volumes so far";
+    if (random() % 2 == 0) wall.Show(++number);
+    if (random() % 16 == 0) fault(slow, What::kNak, 0x01, random() % (6 * kPeriod));
+    if (random() % 16 == 0) fault(slow, What::kDelay, 0x82, random() % (kPeriod / 8));
+    if (step % 2000 == 999)
+      fault(slow, What::kUnplug, 0x01, kPeriod * (1 + random() % 100)), ++restarts;
+    if (step == 3000) fault(wall.screen(0), What::kUnplug, 0x01, kPeriod * 50);
+    wall.RunFor(static_cast<sync::TimeNs>(random() % (2 * kPeriod)));
+    if (step % 64 == 0) volumes = wall.GetStats().displays[0].genlock_volumes;
+  }
+  const DisplayFigures figures = wall.GetStats().displays[1];
+  std::cout << figures.genlock_volumes << " volumes shown by all, " << figures.genlock_dropped
+            << " dropped, " << figures.genlock_postponed << " orders put off, "
+            << figures.genlock_slips << " slips; " << restarts << " restarts; "
+            << wall.screen(0).changes << " and " << slow.changes << " changes seen\n";
+  EXPECT_EQ(wall.differences(), 0u);
+  EXPECT_EQ(figures.genlock_slips, 0u);
+  EXPECT_GT(figures.genlock_postponed, 0u) << "nothing was delayed";
+  EXPECT_GT(restarts, 0u);
+  // Both come to show the newest once the faults are over.
+  wall.RunFor(sync::kSecond);
+  wall.Show(++number);
+  wall.RunFor(sync::kSecond);
+  EXPECT_EQ(wall.screen(0).shown, number);
+  EXPECT_EQ(slow.shown, number);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon
