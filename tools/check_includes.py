@@ -48,6 +48,10 @@ ALLOWED = {
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",
                               "daemon/config/display_view", "tools/voxelctl"],
+    # What is calibrated is shown as the daemon would.
+    "tools/voxelctl/calibrate": ["display/drivers/registry", "display/drivers/options", "display/drivers/driver_context",
+                                 "display/profiles", "display/sync", "display/api", "display/usb", "gpu", "daemon/config",
+                                 "daemon/core", "tools/voxelctl"],
     # A profile that was written is tried as the daemon would.
     "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
                             "tools/voxelctl"],

@@ -31,7 +31,9 @@ enum class TestPattern : uint8_t {
   kWhite,
   kBars,
   kDensity,
-  kSlices
+  kSlices,
+  kPosts,
+  kFrames
 };
 
 // What the configuration says of a display beyond its driver's part.

@@ -184,6 +184,43 @@ class Pattern {
     Add("numbers", std::move(pixels), 0);
   }
 
+  // Upright lines at a quarter, a half and three quarters of the way from the middle to each side: red along +x, green along
+  // +y, white on the other two. What should be one and is drawn twice, or as an arc, tells of a panel that is not where it
+  // is thought to be.
+  void Posts() {
+    Shape posts;
+    posts.data.record.kind = gpu::PrimitiveKind::kSegments;
+    const double x = nx_ / 2, y = ny_ / 2;
+    for (const double share : {0.25, 0.5, 0.75}) {
+      const auto post = [&](double px, double py, uint32_t color) {
+        Segment(posts, {px, py, 0.5}, {px, py, nz_ - 0.5}, color);
+      };
+      post(x + share * x, y, 0xFF0000);
+      post(x, y + share * y, 0x00FF00);
+      post(x - share * x, y, 0xFFFFFF);
+      post(x, y - share * y, 0xFFFFFF);
+    }
+    Add("posts", std::move(posts), 0);
+  }
+
+  // Lying rectangles with their diagonals at the bottom, in the middle and at the top, their corners as those of the corners'
+  // pattern. Straight lines that are not seen straight, and right angles that are not, tell of keystone.
+  void Frames() {
+    Shape frames;
+    frames.data.record.kind = gpu::PrimitiveKind::kSegments;
+    for (const double z : {0.5, std::floor(nz_ / 2) + 0.5, nz_ - 0.5}) {
+      const display::Vec3 a{inset_x_, inset_y_, z}, b{nx_ - inset_x_, inset_y_, z};
+      const display::Vec3 c{nx_ - inset_x_, ny_ - inset_y_, z}, d{inset_x_, ny_ - inset_y_, z};
+      Segment(frames, a, b, 0xFFFFFF);
+      Segment(frames, b, c, 0xFFFFFF);
+      Segment(frames, c, d, 0xFFFFFF);
+      Segment(frames, d, a, 0xFFFFFF);
+      Segment(frames, a, c, 0x808080);
+      Segment(frames, b, d, 0x808080);
+    }
+    Add("frames", std::move(frames), 0);
+  }
+
   void White() { Box("white", {0, 0, 0}, {nx_, ny_, nz_}, 0xFFFFFF); }
 
   SnapshotPtr Finish(uint64_t number) {
@@ -280,6 +317,12 @@ SnapshotPtr MakePattern(TestPattern pattern, const display::Geometry& geometry, 
       break;
     case TestPattern::kSlices:
       made.Slices(geometry);
+      break;
+    case TestPattern::kPosts:
+      made.Posts();
+      break;
+    case TestPattern::kFrames:
+      made.Frames();
       break;
   }
   return made.Finish(number);

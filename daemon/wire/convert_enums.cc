@@ -72,7 +72,7 @@ constexpr Table<sync::SweepLock::State, v1::SweepLock, 3> kSweepLocks = {{
     {sync::SweepLock::State::kLocked, v1::SWEEP_LOCK_LOCKED},
 }};
 
-constexpr Table<TestPattern, v1::TestPattern, 9> kPatterns = {{
+constexpr Table<TestPattern, v1::TestPattern, 11> kPatterns = {{
     {TestPattern::kNone, v1::TEST_PATTERN_NONE},
     {TestPattern::kAxes, v1::TEST_PATTERN_AXES},
     {TestPattern::kCorners, v1::TEST_PATTERN_CORNERS},
@@ -82,6 +82,8 @@ constexpr Table<TestPattern, v1::TestPattern, 9> kPatterns = {{
     {TestPattern::kBars, v1::TEST_PATTERN_BARS},
     {TestPattern::kDensity, v1::TEST_PATTERN_DENSITY},
     {TestPattern::kSlices, v1::TEST_PATTERN_SLICES},
+    {TestPattern::kPosts, v1::TEST_PATTERN_POSTS},
+    {TestPattern::kFrames, v1::TEST_PATTERN_FRAMES},
 }};
 
 constexpr Table<display::DecodedVolume::Source, v1::VolumeHeader::Source, 2> kSources = {{

@@ -142,7 +142,7 @@ std::vector<bool> OptionReader::Flags(const std::string& key, size_t count) {
   return flags;
 }
 
-size_t OptionReader::Choice(const std::string& key, std::initializer_list<std::string_view> choices,
+size_t OptionReader::Choice(const std::string& key, std::span<const std::string_view> choices,
                             size_t fallback) {
   const std::string* text = Find(key);
   if (text == nullptr) return fallback;

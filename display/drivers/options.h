@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,8 +38,11 @@ class OptionReader {
   // One for all `count`, or one each; false where it is not given.
   std::vector<bool> Flags(const std::string& key, size_t count);
   // The index of the value in `choices`.
+  size_t Choice(const std::string& key, std::span<const std::string_view> choices, size_t fallback);
   size_t Choice(const std::string& key, std::initializer_list<std::string_view> choices,
-                size_t fallback);
+                size_t fallback) {
+    return Choice(key, std::span(choices.begin(), choices.size()), fallback);
+  }
   // Finite numbers within ±1e6.
   std::vector<double> Numbers(const std::string& key);
   // "128x128x64": at least `least` and at most `most` numbers, each from 1 to 16384.

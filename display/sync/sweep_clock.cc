@@ -102,7 +102,7 @@ uint64_t SweepClock::Nearest(TimeNs at) const {
 std::vector<TimeNs> SweepClock::Coming(TimeNs now, int count) const {
   std::vector<TimeNs> starts;
   if (!known() || count <= 0) return starts;
-  uint64_t number = std::max(number_, Nearest(now));
+  uint64_t number = Nearest(now);
   while (StartOf(number) <= now) ++number;
   for (int i = 0; i < count; ++i) starts.push_back(StartOf(number + static_cast<uint64_t>(i)));
   return starts;

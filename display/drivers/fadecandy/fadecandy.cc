@@ -11,7 +11,6 @@
 #include "display/drivers/fadecandy/protocol.h"
 #include "display/drivers/fadecandy/verify/suite.h"
 #include "display/drivers/usb_options.h"
-#include "display/geometry/footprint.h"
 
 namespace voxeld::display::fadecandy {
 namespace {
@@ -116,18 +115,8 @@ absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& option
   absl::StatusOr<Lattice> lattice = wiring::ReadLattice(reader, PixelsOf(count));
   const std::string record = ReadUsbRecord(reader);
   if (absl::Status status = reader.Finish(); !status.ok()) return status;
-  absl::Status status = lattice.status();
-  if (status.ok()) {
-    info.geometry.shape = *std::move(lattice);
-    status = ValidateShape(info.geometry);
-  }
-  if (status.ok()) {
-    info.geometry.grid = DefaultGrid(info.geometry);
-    status = ValidateGeometry(info.geometry);
-  }
-  if (!status.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("display \"", options.name, "\": ", status.message()));
+  if (absl::Status status = wiring::TakeLattice(info, std::move(lattice)); !status.ok()) {
+    return status;
   }
   std::vector<FadecandyDisplay::Wire> wires;
   for (size_t i = 0; i < boards.serials.size(); ++i) {

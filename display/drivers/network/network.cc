@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <span>
 #include <string>
 #include <utility>
@@ -10,18 +11,20 @@
 #include "display/crc/crc32c.h"
 #include "display/drivers/network/network_display.h"
 #include "display/drivers/wiring/wiring.h"
-#include "display/geometry/footprint.h"
 
 namespace voxeld::display::network {
 namespace {
 
 constexpr double kMostVolumesPerSecond = 1000;
 
-// E1.31 wants one number that is a sender's for good: of the display's name, and of this host's where that has one.
+// E1.31 wants one number that is a sender's for good: of the display's name and of this machine's own number, where it has
+// one (machine-id(5)).
 std::array<uint8_t, 16> CidOf(const std::string& name) {
+  std::string machine;
+  std::getline(std::ifstream("/etc/machine-id"), machine);
   std::array<uint8_t, 16> cid{};
   for (size_t word = 0; word < 4; ++word) {
-    const std::string text = absl::StrCat("voxeld", word, name);
+    const std::string text = absl::StrCat("voxeld", word, machine, name);
     const uint32_t sum = Crc32c(std::as_bytes(std::span(text)));
     for (size_t i = 0; i < 4; ++i) cid[word * 4 + i] = static_cast<uint8_t>(sum >> (8 * i));
   }
@@ -100,8 +103,7 @@ absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& option
   NetworkDisplay::Settings settings;
   settings.stream = ReadStream(reader, options.name);
   const Protocol protocol = settings.stream.protocol;
-  settings.order = ColorOrderOf(
-      kColorOrders[reader.Choice("color_order", {"rgb", "rbg", "grb", "gbr", "brg", "bgr"}, 0)]);
+  settings.order = ColorOrderOf(kColorOrders[reader.Choice("color_order", kColorOrders, 0)]);
   Endpoint to;
   if (absl::StatusOr<Endpoint> endpoint =
           ParseEndpoint(reader.Text("address", ""), PortOf(protocol));
@@ -125,22 +127,14 @@ absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& option
   info.tone = MakeTone(ReadTone(reader));
   absl::StatusOr<Lattice> lattice = wiring::ReadLattice(reader, numbers);
   if (absl::Status status = reader.Finish(); !status.ok()) return status;
-  absl::Status status = lattice.status();
-  if (status.ok()) {
+  if (lattice.ok()) {
     Trim(*lattice, numbers.a_slice);
     info.layout = {.slices = static_cast<int32_t>(lattice->points_mm.size()) / lattice->width_px,
                    .width = lattice->width_px,
                    .height = 1};
-    info.geometry.shape = *std::move(lattice);
-    status = ValidateShape(info.geometry);
   }
-  if (status.ok()) {
-    info.geometry.grid = DefaultGrid(info.geometry);
-    status = ValidateGeometry(info.geometry);
-  }
-  if (!status.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("display \"", options.name, "\": ", status.message()));
+  if (absl::Status status = wiring::TakeLattice(info, std::move(lattice)); !status.ok()) {
+    return status;
   }
   return std::make_unique<NetworkDisplay>(std::move(info), std::move(settings),
                                           make_link(protocol, to), clock);

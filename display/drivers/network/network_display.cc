@@ -110,6 +110,7 @@ void NetworkDisplay::LookAtLink(sync::TimeNs now) {
     SetLight(brightness(), blanked());
     // What was lit before comes again, and black where nothing was.
     QueueWhole();
+    if (writer_.Leap()) QueueWhole();
   }
   if (phase_ == Phase::kProving && queue_.empty()) {
     if (proved_at_ == sync::kNever) proved_at_ = datagrams() ? now + kProof : now;

@@ -235,6 +235,13 @@ std::vector<std::byte> PacketWriter::Opc(int32_t slice, std::span<const uint8_t>
   return out;
 }
 
+bool PacketWriter::Leap() {
+  if (options_.protocol != Protocol::kE131) return false;
+  for (uint8_t& sequence : universe_sequences_) sequence = static_cast<uint8_t>(sequence + 128);
+  sync_sequence_ = static_cast<uint8_t>(sync_sequence_ + 128);
+  return true;
+}
+
 std::vector<std::byte> PacketWriter::Sync() {
   if (options_.sync_universe == 0) return {};
   if (options_.protocol == Protocol::kArtNet) {

@@ -39,6 +39,10 @@ class PacketWriter {
   std::vector<std::byte> Pixels(int32_t slice, std::span<const uint8_t> rgb, bool last);
   // What makes controllers show what they have; empty where there is no such packet.
   std::vector<std::byte> Sync();
+  // E1.31: numbers go on half their range further on. A receiver passes over the 20 numbers up to the last that it had
+  // from this source (ANSI E1.31 §6.7.2), be it in a daemon's life before this: of a picture sent before and after, one passes.
+  // False: the protocol's receivers have no such memory.
+  bool Leap();
   // What tells them that this stream ends, of a slice; empty where there is none.
   std::vector<std::byte> End(int32_t slice, std::span<const uint8_t> rgb);
 

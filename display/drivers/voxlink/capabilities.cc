@@ -348,8 +348,31 @@ absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> 
   return device;
 }
 
+namespace {
+
+using Shape = decltype(Geometry::shape);
+
+// What is the same however a display was put together.
+Shape AsBuilt(Shape shape) {
+  if (auto* planar = std::get_if<PlanarStack>(&shape)) {
+    planar->mirror_u = planar->mirror_v = false;
+    std::sort(planar->positions_mm.begin(), planar->positions_mm.end());
+  } else if (auto* rotor = std::get_if<Rotor>(&shape)) {
+    rotor->clockwise = false;
+    for (Rotor::Panel& panel : rotor->panels) {
+      panel = {.pitch_u_mm = panel.pitch_u_mm, .pitch_v_mm = panel.pitch_v_mm};
+    }
+  } else if (auto* helix = std::get_if<Helix>(&shape)) {
+    helix->clockwise = helix->left_handed = helix->mirror_u = helix->mirror_v = false;
+    helix->phase_turns = 0;
+  }
+  return shape;
+}
+
+}  // namespace
+
 absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
-                               const FrameLayout& layout) {
+                               const FrameLayout& layout, bool calibrated) {
   const Capabilities& fixed = device.fixed;
   FrameLayout theirs = layout;
   theirs.slices = static_cast<int32_t>(fixed.slices);
@@ -360,7 +383,10 @@ absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry&
         absl::StrCat("the display is configured as ", Describe(geometry, layout),
                      ", but the device is ", Describe(device.geometry, theirs)));
   }
-  if (device.geometry.shape != geometry.shape) {
+  const auto compared = [calibrated](const Geometry& g) {
+    return calibrated ? AsBuilt(g.shape) : g.shape;
+  };
+  if (compared(device.geometry) != compared(geometry)) {
     return absl::FailedPreconditionError(
         absl::StrCat("the device is ", Describe(device.geometry, theirs),
                      " as configured, but its pitches, positions or panels differ"));

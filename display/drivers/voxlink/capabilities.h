@@ -28,7 +28,9 @@ absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> 
 
 // FailedPrecondition, with what was asked for and what the device has, if it cannot show `layout`
 // on `geometry` (grids and corrections are not compared).
+// `calibrated`: the geometry was measured on the display, so that what the device says of mirrors, axes, tilts, phases and
+// directions does not count.
 absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
-                               const FrameLayout& layout);
+                               const FrameLayout& layout, bool calibrated = false);
 
 }  // namespace voxeld::display::voxlink

@@ -12,16 +12,18 @@ namespace {
 
 struct Read {
   UsbOptions usb;
+  bool calibrated;
   DisplayInfo info;
 };
 
 absl::StatusOr<Read> ReadOptions(const DisplayOptions& options) {
   OptionReader reader(options);
   UsbOptions usb{ReadUsbMatch(reader), ReadUsbRecord(reader)};
+  const bool calibrated = reader.Flag("calibrated", false);
   usb.match.interface = {kInterfaceClass, kInterfaceSubclass, kInterfaceProtocol};
   absl::StatusOr<DisplayInfo> info = ReadDisplayInfo(options, reader);
   if (!info.ok()) return info.status();
-  return Read{std::move(usb), *std::move(info)};
+  return Read{std::move(usb), calibrated, *std::move(info)};
 }
 
 }  // namespace
@@ -34,7 +36,7 @@ absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
       MakeUsbTransport(read->usb, options.name, context);
   if (!transport.ok()) return transport.status();
   return std::make_unique<VoxlinkDisplay>(std::move(read->info), *std::move(transport),
-                                          context.clock);
+                                          context.clock, VoxlinkLink::Options(), read->calibrated);
 }
 
 absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,

@@ -52,9 +52,10 @@ uint16_t WireBrightness(double brightness) {
 }  // namespace
 
 VoxlinkDisplay::VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> transport,
-                               sync::Clock& clock, VoxlinkLink::Options options)
+                               sync::Clock& clock, VoxlinkLink::Options options, bool calibrated)
     : Display(std::move(info), clock),
       link_(std::move(transport), clock, this, options),
+      calibrated_(calibrated),
       sweeps_(NominalPeriod(this->info())) {}
 
 VoxlinkDisplay::~VoxlinkDisplay() { Stop(); }
@@ -195,7 +196,7 @@ void VoxlinkDisplay::OnCapabilities(std::span<const std::byte> page) {
   }
   absl::StatusOr<DeviceCapabilities> parsed = ParseCapabilities(capability_bytes_);
   if (!parsed.ok()) return OnLinkFailed(std::string(parsed.status().message()));
-  const absl::Status fits = CheckCapabilities(*parsed, info().geometry, info().layout);
+  const absl::Status fits = CheckCapabilities(*parsed, info().geometry, info().layout, calibrated_);
   if (!fits.ok()) return OnLinkFailed(std::string(fits.message()));
   const double rate_mhz = std::round(info().volumes_per_second * 1000);
   if (rate_mhz < parsed->fixed.min_rate_mhz || rate_mhz > parsed->fixed.max_rate_mhz) {

@@ -19,9 +19,10 @@ namespace voxeld::display::voxlink {
 
 class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
  public:
-  // `info` is what the device must be: attaching to another ends in a state reason that names both.
+  // `info` is what the device must be: attaching to another ends in a state reason that names both. `calibrated`: but for how it
+  // was put together (CheckCapabilities).
   VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> transport, sync::Clock& clock,
-                 VoxlinkLink::Options options = {});
+                 VoxlinkLink::Options options = {}, bool calibrated = false);
   ~VoxlinkDisplay() override;
 
   std::vector<sync::TimeNs> ComingSweeps(int count) const override;
@@ -120,6 +121,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   void NoteUnderruns(uint32_t total);
 
   VoxlinkLink link_;
+  const bool calibrated_;
   Phase phase_ = Phase::kDetached;
   sync::TimeNs attach_at_ = 0;
   sync::TimeNs failed_at_ = 0;

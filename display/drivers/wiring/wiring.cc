@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "display/geometry/footprint.h"
 
 namespace voxeld::display::wiring {
 namespace {
@@ -245,6 +246,21 @@ absl::StatusOr<Lattice> ReadLattice(OptionReader& reader, const PixelNumbers& nu
   }
   if (!cell.empty()) lattice->cell_mm = {cell[0], cell[cell.size() / 2], cell.back()};
   return lattice;
+}
+
+absl::Status TakeLattice(DisplayInfo& info, absl::StatusOr<Lattice> lattice) {
+  absl::Status status = lattice.status();
+  if (status.ok()) {
+    info.geometry.shape = *std::move(lattice);
+    status = ValidateShape(info.geometry);
+  }
+  if (status.ok()) {
+    info.geometry.grid = DefaultGrid(info.geometry);
+    status = ValidateGeometry(info.geometry);
+  }
+  if (status.ok()) return status;
+  return absl::InvalidArgumentError(
+      absl::StrCat("display \"", info.name, "\": ", status.message()));
 }
 
 }  // namespace voxeld::display::wiring

@@ -10,7 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "display/api/display.h"
 #include "display/api/geometry.h"
 #include "display/drivers/options.h"
 
@@ -57,5 +59,9 @@ absl::StatusOr<Lattice> ParseLayout(std::string_view json, const PixelNumbers& n
 
 // cube=… or layout=FILE and what belongs to them. A bad value is Refused.
 absl::StatusOr<Lattice> ReadLattice(OptionReader& reader, const PixelNumbers& numbers);
+
+// The lattice as the geometry of `info`, with the grid that suits it. InvalidArgument, naming the display, for one that cannot
+// be, and for what ReadLattice said.
+absl::Status TakeLattice(DisplayInfo& info, absl::StatusOr<Lattice> lattice);
 
 }  // namespace voxeld::display::wiring

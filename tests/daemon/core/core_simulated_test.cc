@@ -9,6 +9,7 @@
 
 #include "daemon/core/core.h"
 #include "display/drivers/simulated/simulated.h"
+#include "display/emulator/voxlink_device.h"
 #include "display/sync/fake_clock.h"
 #include "display/usb/in_process.h"
 #include "tests/daemon/fakes/simulation.h"
@@ -25,13 +26,15 @@ using Kind = CommitOutcome::Kind;
 // 12 × 10 × 6 voxels of 1 mm.
 class SimulatedDaemon {
  public:
-  explicit SimulatedDaemon(std::map<std::string, std::string> options = {}) {
+  explicit SimulatedDaemon(std::map<std::string, std::string> options = {},
+                           DisplaySetup voxels = {}) {
     options["size"] = "12x10x6";
     options["dither"] = "none";
     absl::StatusOr<display::simulated::Parts> parts =
         display::simulated::CreateParts({"main", "simulated", options}, clock, false);
     EXPECT_TRUE(parts.ok()) << parts.status();
     transport_ = parts->transport;
+    device_ = parts->device;
     CoreOptions core_options;
     core_options.threads = false;
     core.emplace(std::move(core_options), clock);
@@ -39,7 +42,6 @@ class SimulatedDaemon {
     engine.kind = gpu::EngineKind::kCpu;
     engine.threads = 1;
     engine.inline_execution = true;
-    DisplaySetup voxels;
     voxels.view.mode = ViewOptions::Mode::kVoxels;
     const absl::Status added = core->AddDisplay(std::move(parts->display), engine, voxels);
     EXPECT_TRUE(added.ok()) << added;
@@ -70,6 +72,8 @@ class SimulatedDaemon {
     core->Step();
   }
 
+  std::optional<display::DecodedVolume> Seen() const { return device_->Seen(); }
+
   absl::StatusOr<display::DecodedVolume> Capture(uint64_t at_least) {
     absl::StatusOr<display::DecodedVolume> volume = absl::UnknownError("no answer");
     core->Capture("main", 10 * sync::kSecond, at_least, [&](auto v) { volume = std::move(v); });
@@ -83,6 +87,7 @@ class SimulatedDaemon {
 
  private:
   display::InProcessTransport* transport_ = nullptr;
+  display::emulator::VoxlinkDevice* device_ = nullptr;
   SessionInfo session_;
   uint64_t sequence_ = 0;
 };
@@ -111,6 +116,91 @@ TEST(CoreSimulated, AVoxelGoesInAndItsPixelComesOut) {
   }
   EXPECT_EQ(lit, 1);
   EXPECT_EQ(PixelAt(*volume, 7, 3, 4), 0x40C0FFu);
+}
+
+absl::StatusOr<DisplayDescription> Update(SimulatedDaemon& daemon, DisplayUpdate update) {
+  absl::StatusOr<DisplayDescription> result = absl::UnknownError("no answer");
+  daemon.core->UpdateDisplay("main", std::move(update), [&](auto r) { result = std::move(r); });
+  daemon.RunFor(sync::kSecond);
+  return result;
+}
+
+DisplayFigures FiguresOf(SimulatedDaemon& daemon) {
+  DisplayFigures figures;
+  daemon.core->GetStats([&](absl::StatusOr<Stats> s) { figures = s->displays[0]; });
+  daemon.RunFor(0);
+  return figures;
+}
+
+double LightOf(const display::DecodedVolume& volume) {
+  double sum = 0;
+  for (const uint8_t b : volume.Rgb()) sum += b;
+  return sum / 255 / static_cast<double>(volume.Rgb().size());
+}
+
+TEST(CoreSimulated, ADeviceWithoutBrightnessIsDimmedInSteps) {
+  SimulatedDaemon daemon({{"device_brightness", "false"}});
+  daemon.Send(Put("a", "x", Entity1(Dots(0, 0xFFFFFF), testing::Shift(7.5, 3.5, 4.5))),
+              testing::EndCommit(1));
+  for (const auto& [brightness, level] :
+       {std::pair(0.5, 127), std::pair(0.001, 3), std::pair(0.0, 0), std::pair(1.0, 255)}) {
+    const auto updated = Update(daemon, {.brightness = brightness});
+    ASSERT_TRUE(updated.ok()) << updated.status();
+    EXPECT_EQ(updated->brightness, brightness);
+    const auto volume = daemon.Capture(1);
+    ASSERT_TRUE(volume.ok()) << volume.status();
+    EXPECT_NEAR(PixelAt(*volume, 7, 3, 4) & 255, level, 1) << brightness;
+  }
+}
+
+TEST(CoreSimulated, ADeviceWithoutAPowerLimitIsKeptBelowItByItsLight) {
+  DisplaySetup setup;
+  setup.power_full_w = 100;
+  setup.power_limit_w = 20;
+  SimulatedDaemon daemon({{"device_power_limit", "false"}}, setup);
+  double most = 0;
+  const auto watch = [&] {
+    for (int i = 0; i < 60; ++i) {
+      daemon.RunFor(50 * sync::kMillisecond);
+      if (const auto seen = daemon.Seen(); seen.has_value()) most = std::max(most, LightOf(*seen));
+    }
+  };
+  ASSERT_TRUE(Update(daemon, {.pattern = TestPattern::kWhite}).ok());
+  watch();
+  EXPECT_GT(LightOf(*daemon.Seen()), 0.17);
+  EXPECT_LT(FiguresOf(daemon).light, 0.21);
+  EXPECT_NEAR(FiguresOf(daemon).power_w, 100 * LightOf(*daemon.Seen()), 0.5);
+  // A dim scene has all its light again.
+  ASSERT_TRUE(Update(daemon, {.pattern = TestPattern::kAxes}).ok());
+  watch();
+  EXPECT_EQ(FiguresOf(daemon).light, 1);
+  ASSERT_TRUE(Update(daemon, {.pattern = TestPattern::kWhite}).ok());
+  watch();
+  EXPECT_LE(most, 0.2) << "of 100 W";
+  // Another limit, and none.
+  ASSERT_TRUE(Update(daemon, {.power_limit_w = 50}).ok());
+  watch();
+  EXPECT_GT(LightOf(*daemon.Seen()), 0.4);
+  EXPECT_LE(most, 0.5);
+  ASSERT_TRUE(Update(daemon, {.power_limit_w = 0}).ok());
+  daemon.RunFor(sync::kSecond);
+  EXPECT_EQ(LightOf(*daemon.Seen()), 1);
+}
+
+TEST(CoreSimulated, ALimitThatNobodyKeepsIsRefusedOrTold) {
+  SimulatedDaemon daemon({{"device_power_limit", "false"}});
+  const auto refused = Update(daemon, {.brightness = 0.5, .power_limit_w = 20});
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(refused.status().message(), ::testing::HasSubstr("power_full"));
+  EXPECT_EQ(Update(daemon, {})->brightness, 1) << "all or nothing";
+  DisplaySetup setup;
+  setup.power_limit_w = 20;
+  SimulatedDaemon told({{"device_power_limit", "false"}}, setup);
+  told.RunFor(sync::kSecond);
+  EXPECT_TRUE(FiguresOf(told).power_unlimited);
+  SimulatedDaemon kept({}, setup);
+  kept.RunFor(sync::kSecond);
+  EXPECT_FALSE(FiguresOf(kept).power_unlimited);
 }
 
 TEST(CoreSimulated, AnInstanceAFrameAndALayersStateAreSeen) {

@@ -224,6 +224,57 @@ TEST(RiderBook, ReplacedByWhatHasEndedIsLost) {
   EXPECT_EQ(book.pending(), 0u);
 }
 
+Rider RiderOf(uint64_t session, uint64_t frame, uint64_t snapshot) {
+  Rider rider;
+  rider.session = session;
+  rider.frame_id = rider.sequence = frame;
+  rider.snapshot = snapshot;
+  return rider;
+}
+
+TEST(RiderBook, WhatTheSnapshotDoesNotContainWaits) {
+  std::vector<Told> told;
+  RiderBook book("d",
+                 [&](const Rider& r, const CommitOutcome& o) { told.push_back(Flatten(r, o)); });
+  book.Board(RiderOf(1, 1, 4));
+  book.Board(RiderOf(2, 2, 5));
+  book.Board(RiderOf(1, 3, 6));
+  book.Draw(5);
+  book.Submit(1);
+  display::VolumeOutcome shown;
+  shown.kind = display::VolumeOutcome::Kind::kPresented;
+  shown.volume = 1;
+  book.OnOutcome(shown);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(std::get<0>(told[0]), 1u);
+  EXPECT_EQ(std::get<0>(told[1]), 2u);
+  EXPECT_EQ(book.pending(), 1u);
+  book.Draw(6);
+  book.Submit(2);
+  shown.volume = 2;
+  book.OnOutcome(shown);
+  EXPECT_EQ(std::get<0>(told.back()), 3u);
+}
+
+TEST(RiderBook, RidersOfAVolumeThatIsDrawnAgainRideAgainBeforeLaterOnes) {
+  std::vector<Told> told;
+  RiderBook book("d",
+                 [&](const Rider& r, const CommitOutcome& o) { told.push_back(Flatten(r, o)); });
+  book.Board(RiderOf(1, 1, 1));
+  book.Draw(1);
+  book.Submit(1);
+  book.Board(RiderOf(1, 2, 2));
+  book.Reboard(1);
+  book.Reboard(7);  // that there is not
+  EXPECT_TRUE(told.empty());
+  EXPECT_EQ(book.pending(), 2u);
+  book.Draw(2);
+  book.Submit(2);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0], (Told{1, Kind::kSuperseded, 2, ""}));
+  EXPECT_EQ(book.counts().owed, 2u);
+}
+
 TEST(RiderBook, WhatWaitsMayBeHidden) {
   std::vector<CommitOutcome> told;
   RiderBook book("d", [&](const Rider&, const CommitOutcome& o) { told.push_back(o); });

@@ -1,7 +1,9 @@
 #include "display/drivers/voxlink/capabilities.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <random>
 #include <string>
@@ -201,6 +203,41 @@ TEST(Capabilities, TheDeviceMustBeAsConfigured) {
   EXPECT_FALSE(CheckCapabilities(device, geometry, other).ok());
   std::get<PlanarStack>(geometry.shape).positions_mm[1] = 0.01;
   EXPECT_FALSE(CheckCapabilities(device, geometry, layout).ok());
+}
+
+// What was measured is how it was put together; what it is made of must still be the device's.
+TEST(Capabilities, OfACalibratedDisplayWhatItWasPutTogetherLikeDoesNotCount) {
+  const DeviceCapabilities device = RotorDevice();
+  const FrameLayout layout = LayoutOf(device);
+  const auto check = [&](const std::function<void(Rotor&)>& change, bool calibrated) {
+    Geometry geometry = device.geometry;
+    change(std::get<Rotor>(geometry.shape));
+    return CheckCapabilities(device, geometry, layout, calibrated).ok();
+  };
+  const std::function<void(Rotor&)> put_together[] = {
+      [](Rotor& r) { r.clockwise = !r.clockwise; },
+      [](Rotor& r) { r.panels[0].eccentricity_mm += 0.2; },
+      [](Rotor& r) { r.panels[0].shift_u_mm = 7; },
+      [](Rotor& r) { r.panels[1].shift_v_mm = 7; },
+      [](Rotor& r) { r.panels[1].phase_turns = 0.25; },
+      [](Rotor& r) { r.panels[1].mirror_u = true; },
+      [](Rotor& r) { r.panels[0].tilt_deg = 3; }};
+  for (const auto& change : put_together) {
+    EXPECT_FALSE(check(change, false));
+    EXPECT_TRUE(check(change, true));
+  }
+  EXPECT_FALSE(check([](Rotor& r) { r.panels[0].pitch_u_mm = 3; }, true));
+  EXPECT_FALSE(check([](Rotor& r) { r.panels.pop_back(); }, true));
+
+  const DeviceCapabilities stack = Planar();
+  Geometry turned = stack.geometry;
+  auto& planar = std::get<PlanarStack>(turned.shape);
+  planar.mirror_u = !planar.mirror_u;
+  std::reverse(planar.positions_mm.begin(), planar.positions_mm.end());
+  EXPECT_FALSE(CheckCapabilities(stack, turned, LayoutOf(stack)).ok());
+  EXPECT_TRUE(CheckCapabilities(stack, turned, LayoutOf(stack), true).ok());
+  planar.positions_mm[0] += 0.1;
+  EXPECT_FALSE(CheckCapabilities(stack, turned, LayoutOf(stack), true).ok());
 }
 
 DeviceCapabilities With(Geometry geometry) {

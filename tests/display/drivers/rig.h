@@ -27,11 +27,22 @@ struct Recorder final : Display::Listener {
     states.emplace_back(state, reason);
   }
   bool HasNewer() const override { return has_newer; }
+  void OnHeld(uint64_t volume) override { held.push_back(volume); }
+  void OnOrdered(uint64_t volume, sync::TimeNs at, bool taken) override {
+    orders.push_back({volume, at, taken});
+  }
   // Outcomes of one volume.
   int Count(uint64_t volume) const;
   const VolumeOutcome* Of(uint64_t volume) const;
 
+  struct Order {
+    uint64_t volume;
+    sync::TimeNs at;
+    bool taken;
+  };
   bool has_newer = false;
+  std::vector<uint64_t> held;
+  std::vector<Order> orders;
   std::vector<VolumeOutcome> outcomes;
   std::vector<std::pair<DisplayState, std::string>> states;
 };

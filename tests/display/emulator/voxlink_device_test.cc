@@ -249,6 +249,44 @@ TEST_F(Device, HoldsShowsAndDrops) {
   EXPECT_EQ(bench_.Seen(0), 7);
 }
 
+// §5.5: an order that must come ahead changes nothing if it does not.
+TEST_F(Device, AnOrderAheadIsTakenInTimeOnly) {
+  const auto order = [&](uint64_t sweep, uint32_t ahead) {
+    std::vector<std::byte> show;
+    bench_.writer().ShowAhead(show, 1, sweep, ahead);
+    bench_.Bulk(show);
+    const auto events = bench_.Events();
+    EXPECT_EQ(events.back().type(), EventType::kOrdered);
+    EXPECT_EQ(events.back().As<voxlink::OrderedEvent>().volume, 1u);
+    EXPECT_EQ(events.back().As<voxlink::OrderedEvent>().sweep, sweep);
+    return (events.back().header.flags & voxlink::kOrderTaken) != 0;
+  };
+  bench_.SendWhole(1, 7, false);
+  PassAlive(250 * kMillisecond);  // sweep 2 has begun
+  EXPECT_FALSE(order(3, 2));
+  EXPECT_FALSE(order(2, 0) && order(1, 0)) << "past ones, whatever they ask for";
+  PassAlive(100 * kMillisecond);
+  EXPECT_EQ(bench_.Seen(0), 7) << "0 ahead: the sweep that runs is not past";
+}
+
+TEST_F(Device, ALaterOrderTakesTheFirstOnesPlaceInTime) {
+  const auto order = [&](uint64_t sweep) {
+    std::vector<std::byte> show;
+    bench_.writer().ShowAhead(show, 1, sweep, 2);
+    bench_.Bulk(show);
+    return (bench_.Events().back().header.flags & voxlink::kOrderTaken) != 0;
+  };
+  bench_.SendWhole(1, 7, false);
+  EXPECT_TRUE(order(3));
+  PassAlive(250 * kMillisecond);  // sweep 2 has begun
+  EXPECT_TRUE(order(5));
+  PassAlive(200 * kMillisecond);  // sweep 4
+  EXPECT_FALSE(order(5)) << "too late, and nothing changes by it";
+  EXPECT_EQ(bench_.Seen(0), -1);
+  PassAlive(100 * kMillisecond);
+  EXPECT_EQ(bench_.Seen(0), 7);
+}
+
 TEST_F(Device, EndAsksAgainAsOftenAsTheHostLikes) {
   bench_.SendWhole(1, 7);
   bench_.Bulk(bench_.End(1));

@@ -59,7 +59,7 @@ void ExpectInside(const std::vector<Content>& contents, const double (&least)[3]
 Scene Only(const std::string& name, uint64_t seed, double share) {
   std::vector<MakeScene> rows = ScenesOf(name, seed, share);
   EXPECT_THAT(rows, SizeIs(1));
-  return rows.at(0)();
+  return rows.at(0)().value();
 }
 
 TEST(FrameScenes, LinesHaveAsManyVoxelsAsTheySay) {
@@ -96,6 +96,7 @@ TEST(FrameScenes, ShortLinesHaveTwentyVoxelsEach) {
 }
 
 TEST(FrameScenes, OneSeedOneSceneAnotherAnother) {
+  setenv("VOXELD_PROFILES", VOXELD_PROFILES_DIR, 1);
   for (const std::string& name : SceneNames()) {
     if (name == "mesh" || name == "gyroid" || name == "implicit" || name == "volume" ||
         name == "isosurface" || name == "filled") {
@@ -105,7 +106,7 @@ TEST(FrameScenes, OneSeedOneSceneAnotherAnother) {
     const auto other = ScenesOf(name, 6, 1e-4);
     ASSERT_EQ(first.size(), again.size());
     for (size_t row = 0; row < first.size(); ++row) {
-      const Scene a = first[row](), b = again[row](), c = other[row]();
+      const Scene a = first[row]().value(), b = again[row]().value(), c = other[row]().value();
       EXPECT_EQ(a.name, b.name);
       ASSERT_EQ(a.contents.size(), b.contents.size()) << a.name;
       bool differs = false;
@@ -131,7 +132,7 @@ TEST(FrameScenes, OneSeedOneSceneAnotherAnother) {
 TEST(FrameScenes, OfWhatMovesTheStatedPartIsNew) {
   const auto rows = ScenesOf("moving", 2, 0.1);
   ASSERT_THAT(rows, SizeIs(6));
-  const Scene cube = rows[0]();
+  const Scene cube = rows[0]().value();
   const Counted inside = CountLines(cube.changing[0]);
   EXPECT_GT(inside.lines, 50u) << "of 100,000 / 512 that begin in it";
   EXPECT_LE(inside.lines, 1000u);
@@ -143,7 +144,7 @@ TEST(FrameScenes, OfWhatMovesTheStatedPartIsNew) {
   EXPECT_EQ(CountLines(cube.contents).lines + inside.lines, 100'000u);
   const double shares[] = {0, 0.01, 0.05, 0.2, 0.5, 1};
   for (size_t row = 1; row < rows.size(); ++row) {
-    const Scene scene = rows[row]();
+    const Scene scene = rows[row]().value();
     // Those that reach out of their part of the volume stay.
     const uint64_t changed = CountLines(scene.changing[0]).lines;
     EXPECT_LE(static_cast<double>(changed), shares[row] * 100'000 * 1.2) << scene.name;
@@ -179,11 +180,22 @@ TEST(FrameScenes, DisplaysAreThoseThatAreNamed) {
   EXPECT_EQ(rotor.voxels, 128u * 128 * 64);
 }
 
+TEST(FrameScenes, ProfilesAreTheShippedOnes) {
+  setenv("VOXELD_PROFILES", VOXELD_PROFILES_DIR, 1);
+  const auto rows = ScenesOf("profiles", 1, 0.01);
+  ASSERT_THAT(rows, SizeIs(8));
+  const Scene vortex = rows[0]().value();
+  EXPECT_EQ(vortex.name, "slicing, vortex");
+  EXPECT_EQ(vortex.target.layout.bytes(), 720u * 128 * 64);
+  EXPECT_EQ(vortex.target.tone.density, display::Density::kEven);
+  EXPECT_TRUE(vortex.slicing_only);
+}
+
 // Every edge has two triangles, one in each direction.
 TEST(FrameScenes, TheMeshIsClosed) {
   const auto rows = ScenesOf("mesh", 1, 1);
   ASSERT_THAT(rows, SizeIs(2));
-  const Scene thin = rows[0](), cover = rows[1]();
+  const Scene thin = rows[0]().value(), cover = rows[1]().value();
   EXPECT_EQ(thin.contents[0].record.rule, gpu::SurfaceRule::kThin);
   EXPECT_EQ(cover.contents[0].record.rule, gpu::SurfaceRule::kCover);
   const std::vector<uint32_t>& indices = thin.contents[0].indices;

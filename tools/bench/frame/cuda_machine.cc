@@ -44,6 +44,37 @@ class DeviceToHost final : public Ceiling {
   void* host_ = nullptr;
 };
 
+class DeviceCopy final : public Ceiling {
+ public:
+  static absl::StatusOr<std::unique_ptr<Ceiling>> Create(size_t bytes) {
+    std::unique_ptr<DeviceCopy> copy(new DeviceCopy(bytes));
+    for (void** place : {&copy->from_, &copy->to_}) {
+      const absl::Status status = ToStatus("cudaMalloc", cudaMalloc(place, bytes));
+      if (!status.ok()) return status;
+    }
+    return copy;
+  }
+  ~DeviceCopy() override {
+    cudaFree(from_);
+    cudaFree(to_);
+  }
+  std::string name() const override {
+    return absl::StrCat("copy of ", bytes_, " bytes within the device");
+  }
+  absl::Status Run() override {
+    const absl::Status status =
+        ToStatus("cudaMemcpy", cudaMemcpyAsync(to_, from_, bytes_, cudaMemcpyDeviceToDevice));
+    if (!status.ok()) return status;
+    return ToStatus("cudaDeviceSynchronize", cudaDeviceSynchronize());
+  }
+
+ private:
+  explicit DeviceCopy(size_t bytes) : bytes_(bytes) {}
+  const size_t bytes_;
+  void* from_ = nullptr;
+  void* to_ = nullptr;
+};
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options,
@@ -51,6 +82,10 @@ absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOpt
   return gpu::CreateCudaEngine(
       options, "a benchmark", {},
       {.pack_as_drawn = !keep_tiles, .compile_formulas = gpu::cuda::CompileFormulas::kAtOnce});
+}
+
+absl::StatusOr<std::unique_ptr<Ceiling>> DeviceCopyCeiling(size_t bytes) {
+  return DeviceCopy::Create(bytes);
 }
 
 void PinFrame(std::span<std::byte> bytes) { gpu::cuda::PinMemory(bytes); }

@@ -22,4 +22,7 @@ void UnpinFrame(std::span<std::byte> bytes);
 // That many bytes from the device to pinned memory.
 absl::StatusOr<std::unique_ptr<Ceiling>> DeviceToHostCeiling(size_t bytes);
 
+// That many bytes within the device's memory.
+absl::StatusOr<std::unique_ptr<Ceiling>> DeviceCopyCeiling(size_t bytes);
+
 }  // namespace voxeld::bench::frame

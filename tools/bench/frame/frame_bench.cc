@@ -65,7 +65,8 @@ struct Beside {
 absl::StatusOr<Beside> BesideOf(const Scene& scene, bool cuda, int threads) {
   Beside out;
   if (cuda) {
-    auto ceiling = DeviceToHostCeiling(scene.target.layout.bytes());
+    auto ceiling = scene.slicing_only ? DeviceCopyCeiling(BytesCopied(scene))
+                                      : DeviceToHostCeiling(scene.target.layout.bytes());
     if (!ceiling.ok()) return ceiling.status();
     out.ceiling = *std::move(ceiling);
   } else {
@@ -255,7 +256,9 @@ absl::StatusOr<json> MeasureFrames(const FrameOptions& options,
   if (absl::Status status = CheckOptions(options); !status.ok()) return status;
   json report = {{"rows", json::array()}};
   for (const MakeScene& make : ScenesOf(options.scene, options.seed, options.share)) {
-    const Scene scene = make();
+    const absl::StatusOr<Scene> made_scene = make();
+    if (!made_scene.ok()) return made_scene.status();
+    const Scene& scene = *made_scene;
     for (const int threads : ThreadsOf(options, scene)) {
       Subject::Machine machine{options.engine, threads, options.gpus, options.nccl,
                                options.keep_tiles};

@@ -14,4 +14,8 @@ absl::StatusOr<std::unique_ptr<Ceiling>> DeviceToHostCeiling(size_t) {
   return MakeCudaEngine({}, false).status();
 }
 
+absl::StatusOr<std::unique_ptr<Ceiling>> DeviceCopyCeiling(size_t) {
+  return MakeCudaEngine({}, false).status();
+}
+
 }  // namespace voxeld::bench::frame

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
 
@@ -48,8 +49,8 @@ struct Scene {
   bool plain_peer = false;  // measured beside a plain loop over the same lines
 };
 
-// Made when it is its turn: some are large.
-using MakeScene = std::function<Scene()>;
+// Made when it is its turn: some are large. An error: a description that it is made of cannot be read.
+using MakeScene = std::function<absl::StatusOr<Scene>()>;
 
 // "lines1g", …
 std::vector<std::string> SceneNames();

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "display/geometry/footprint.h"
 #include "tools/bench/frame/line_set.h"
+#include "tools/bench/frame/profile_scenes.h"
 #include "tools/bench/frame/shape_scenes.h"
 
 namespace voxeld::bench::frame {
@@ -350,6 +351,10 @@ Scene HugeLines(uint64_t count, uint64_t seed) {
 }
 
 constexpr Named kScenes[] = {
+    {"profiles",
+     [](uint64_t seed, double share) -> std::vector<MakeScene> {
+       return ProfileScenes(seed, share);
+     }},
     {"lines1g",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] { return UniformLines("lines1g", LargeStack(), Share(1e9, share), seed); }};

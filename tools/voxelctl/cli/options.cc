@@ -29,6 +29,7 @@ const Choices<v1::TestPattern> kPatterns = {
     {"grid", v1::TEST_PATTERN_GRID},       {"ramp", v1::TEST_PATTERN_RAMP},
     {"white", v1::TEST_PATTERN_WHITE},     {"bars", v1::TEST_PATTERN_BARS},
     {"density", v1::TEST_PATTERN_DENSITY}, {"slices", v1::TEST_PATTERN_SLICES},
+    {"posts", v1::TEST_PATTERN_POSTS},     {"frames", v1::TEST_PATTERN_FRAMES},
     {"none", v1::TEST_PATTERN_NONE}};
 
 // The command line as declared, and the values that it fills in.
@@ -57,6 +58,8 @@ class Parser {
     AddWatch();
     AddClear();
     AddPattern();
+    AddSet();
+    AddCalibrate();
     AddVerify();
     AddProfile();
     Add("init",
@@ -227,12 +230,33 @@ class Parser {
   }
 
   void AddPattern() {
-    CLI::App* c = Add("pattern",
-                      "Shows a test pattern instead of the scene: axes, corners, grid, ramp, "
-                      "white, bars, density or slices; none ends it, list names them");
+    CLI::App* c =
+        Add("pattern",
+            "Shows a test pattern instead of the scene: axes, corners, grid, ramp, "
+            "white, bars, density, slices, posts or frames; none ends it, list names them");
     c->add_option("NAME", pattern_name_, "The pattern, none, or list");
     c->add_option("--display", pattern_.display, "Only on this display (default: on all)")
         ->type_name("NAME");
+  }
+
+  void AddSet() {
+    CLI::App* c = Add("set", "Sets a display's brightness, blank and power limit");
+    c->add_option("--display", set_.display, "Only on this display (default: on all)")
+        ->type_name("NAME");
+    AddNumber(c, "--brightness", &set_brightness_, 0, 1, "Of the display, 0 to 1", "SHARE");
+    c->add_option("--blank", set_blank_, "on: dark; off: light again")->type_name("on|off");
+    AddNumber(c, "--power-limit", &set_power_, 0, 1e6, "The most that it may draw; 0: no limit",
+              "WATTS");
+  }
+
+  void AddCalibrate() {
+    CLI::App* c = Add(
+        "calibrate",
+        "Shows patterns on a display, which it opens itself (voxeld must not have it), asks what "
+        "is seen, and writes the display's profile with what was found: orientation, mirrors, "
+        "eccentricity, keystone");
+    c->add_option("DISPLAY", calibrate_.display, "[NAME=]DRIVER[,KEY=VALUE…], as for verify");
+    c->add_option("FILE", calibrate_.file, "Where the profile goes; must not be there yet");
   }
 
   void AddProfile() {
@@ -343,6 +367,15 @@ class Parser {
       if (init_.file.empty()) throw UsageError{"init wants the name of a file, such as cube.toml"};
       options_.command = init_;
     }
+    if (name == "set") return FillInSet();
+    if (name == "calibrate") {
+      if (calibrate_.file.empty()) {
+        throw UsageError{
+            "calibrate wants a DISPLAY and the name of a file: calibrate "
+            "voxlink,profile=./mine.toml measured.toml"};
+      }
+      options_.command = calibrate_;
+    }
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "watch") options_.command = watch_;
@@ -408,6 +441,18 @@ class Parser {
     options_.command = pattern_;
   }
 
+  void FillInSet() {
+    if (!std::isnan(set_brightness_)) set_.brightness = set_brightness_;
+    if (!std::isnan(set_power_)) set_.power_limit_w = set_power_;
+    if (!set_blank_.empty()) {
+      set_.blank = Choose("--blank", set_blank_, Choices<bool>{{"on", true}, {"off", false}});
+    }
+    if (!set_.brightness && !set_.power_limit_w && !set_.blank) {
+      throw UsageError{"set wants something to set: --brightness, --blank or --power-limit"};
+    }
+    options_.command = set_;
+  }
+
   void FillInProfile() {
     if (profile_action_.empty()) {
       throw UsageError{"profile wants to know what to do: check PROFILE, or list"};
@@ -451,6 +496,10 @@ class Parser {
   WatchOptions watch_;
   ClearOptions clear_;
   PatternOptions pattern_;
+  SetOptions set_;
+  CalibrateOptions calibrate_;
+  double set_brightness_ = std::nan(""), set_power_ = std::nan("");
+  std::string set_blank_;
   VerifyOptions verify_;
   ProfileOptions profile_;
   InitOptions init_;

@@ -75,6 +75,17 @@ struct PatternOptions {
   std::string display;  // empty: all
 };
 
+struct SetOptions {
+  std::string display;  // empty: all
+  std::optional<double> brightness, power_limit_w;
+  std::optional<bool> blank;
+};
+
+struct CalibrateOptions {
+  std::string display;  // "[NAME=]DRIVER[,KEY=VALUE…]"
+  std::string file;     // where the profile goes: must not be there yet
+};
+
 struct VerifyOptions {
   std::string display;  // "[NAME=]DRIVER[,KEY=VALUE…]"
   std::string filter;   // of cases' ids, as file names are matched; empty: all
@@ -100,7 +111,8 @@ struct Options {
   bool json = false;
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
-               VerifyOptions, ProfileOptions, DoctorOptions, InitOptions>
+               SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
+               InitOptions>
       command;
 };
 

@@ -1,5 +1,6 @@
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/commands/display_names.h"
 #include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/text/escape.h"
@@ -41,17 +42,10 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
 }
 
 absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console) {
-  std::vector<std::string> names = {options.display};
-  if (options.display.empty()) {
-    const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
-    if (!displays.ok()) return displays.status();
-    names.clear();
-    for (const v1::DisplayDescription& display : displays->displays())
-      names.push_back(display.name());
-    if (names.empty()) return absl::FailedPreconditionError("the server has no display");
-  }
+  const absl::StatusOr<std::vector<std::string>> names = DisplayNames(options.display, connection);
+  if (!names.ok()) return names.status();
   v1::ListDisplaysResponse updated;
-  for (const std::string& name : names) {
+  for (const std::string& name : *names) {
     v1::UpdateDisplayRequest request;
     request.set_name(name);
     request.set_test_pattern(options.pattern);

@@ -36,6 +36,7 @@ absl::Status Watch(const WatchOptions& options, Connection& connection, Interrup
                    Console& console);
 absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console);
 absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console);
+absl::Status Set(const SetOptions& options, Connection& connection, Console& console);
 void ListPatterns(Console& console);
 
 // Connects if the command needs it, runs it, says what went wrong; the exit code.

@@ -2,6 +2,7 @@
 #include <type_traits>
 
 #include "absl/strings/str_cat.h"
+#include "tools/voxelctl/calibrate/calibrate.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/doctor/doctor.h"
 #include "tools/voxelctl/init/init.h"
@@ -28,6 +29,9 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   if (const auto* init = std::get_if<InitOptions>(&options.command)) {
     return Init(*init, std::cin, console);
   }
+  if (const auto* calibrate = std::get_if<CalibrateOptions>(&options.command)) {
+    return Calibrate(*calibrate, std::cin, console);
+  }
   if (const auto* profile = std::get_if<ProfileOptions>(&options.command))
     return ShowProfile(*profile, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
@@ -52,6 +56,7 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
           return Clear(command, connection, console);
         if constexpr (std::is_same_v<Command, PatternOptions>)
           return Pattern(command, connection, console);
+        if constexpr (std::is_same_v<Command, SetOptions>) return Set(command, connection, console);
         return absl::OkStatus();
       },
       options.command);

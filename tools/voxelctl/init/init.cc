@@ -17,88 +17,11 @@
 #include "display/drivers/registry.h"
 #include "display/profiles/profile.h"
 #include "display/sync/clock.h"
+#include "tools/voxelctl/ask/asker.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {
-
-// What an answer comes to, or what would be right.
-using Understand = std::function<absl::StatusOr<std::string>(const std::string& answer)>;
-
-struct Choice {
-  std::string word;   // what is typed, or its beginning
-  std::string about;  // what it means
-};
-
-class Asker {
- public:
-  Asker(std::istream& in, Console& console) : in_(in), console_(console) {}
-
-  // The answers have ended: what comes back from here on means nothing.
-  bool ended() const { return ended_; }
-
-  std::string Ask(const std::string& question, const std::string& fallback,
-                  const Understand& understand) {
-    // The default stands behind the question's first line.
-    std::string shown = question;
-    if (!fallback.empty()) {
-      shown.insert(std::min(shown.find('\n'), shown.size()), absl::StrCat(" [", fallback, "]"));
-    }
-    while (!ended_) {
-      console_.Say(shown);
-      std::string line;
-      if (!std::getline(in_, line)) {
-        ended_ = true;
-        break;
-      }
-      std::string answer(absl::StripAsciiWhitespace(line));
-      if (answer.empty()) answer = fallback;
-      absl::StatusOr<std::string> understood = understand(answer);
-      if (understood.ok()) return *std::move(understood);
-      console_.Say(absl::StrCat("  ", EscapeForTerminal(answer),
-                                " will not do: ", understood.status().message()));
-    }
-    return "";
-  }
-
-  // One of `choices`, by a beginning that no other has; its word.
-  std::string Choose(const std::string& question, const std::vector<Choice>& choices) {
-    std::string all = question;
-    for (const Choice& choice : choices)
-      absl::StrAppend(&all, "\n  ", choice.word, choice.about.empty() ? "" : ": ", choice.about);
-    return Ask(
-        all, choices.front().word, [&](const std::string& answer) -> absl::StatusOr<std::string> {
-          std::vector<std::string> meant;
-          for (const Choice& choice : choices) {
-            if (absl::EqualsIgnoreCase(choice.word, answer)) return choice.word;
-            if (absl::StartsWithIgnoreCase(choice.word, answer)) meant.push_back(choice.word);
-          }
-          if (meant.size() == 1) return meant.front();
-          std::vector<std::string> words;
-          words.reserve(choices.size());
-          for (const Choice& choice : choices) words.push_back(choice.word);
-          return absl::InvalidArgumentError(absl::StrCat("one of ", absl::StrJoin(words, ", ")));
-        });
-  }
-
-  std::string Number(const std::string& question, const std::string& fallback, double least,
-                     double most, bool whole) {
-    return Ask(question, fallback, [&](const std::string& answer) -> absl::StatusOr<std::string> {
-      double value = 0;
-      if (absl::SimpleAtod(answer, &value) && value >= least && value <= most &&
-          (!whole || value == static_cast<int64_t>(value))) {
-        return answer;
-      }
-      return absl::InvalidArgumentError(
-          absl::StrCat("a ", whole ? "whole " : "", "number from ", least, " to ", most));
-    });
-  }
-
- private:
-  std::istream& in_;
-  Console& console_;
-  bool ended_ = false;
-};
 
 // Lines of the profile.
 class Profile {

@@ -84,6 +84,47 @@ void ShowAt(Probe& probe) {
   }
 }
 
+// An order that must come ahead: refused where it does not, and then nothing changes; taken where it does, and then the
+// volume is shown at the sweep that the newest one names.
+void ShowAhead(Probe& probe) {
+  Session session(probe);
+  if (session.ok() && !session.Has(kFeatureShowAhead)) {
+    return probe.check().NotApplicable("the device does not take SHOW ahead (feature bit 4)");
+  }
+  session.Start();
+  session.Whole(1, false);
+  session.ExpectComplete(1);
+  session.Mark();
+  const Event sweep =
+      session.Await("SWEEP", 2 * session.period() + sync::kSecond,
+                    [](const Event& event) { return event.type() == EventType::kSweep; });
+  if (!session.ok()) return;
+  const auto ahead = static_cast<uint32_t>(500 * sync::kMillisecond / session.period() + 3);
+  const uint64_t now = sweep.As<SweepEvent>().sweep;
+  const auto order = [&](uint64_t at, uint32_t least, bool taken) {
+    session.ShowAhead(1, at, least);
+    session.Settle();
+    const Event ordered =
+        session.Await("ORDERED", session.period() + sync::kSecond, [&](const Event& event) {
+          return event.type() == EventType::kOrdered && event.As<OrderedEvent>().sweep == at;
+        });
+    if (!session.ok()) return;
+    probe.check().Equal("volume in ORDERED", uint64_t{1}, ordered.As<OrderedEvent>().volume);
+    probe.check().Equal("taken, in ORDERED", taken, (ordered.header.flags & kOrderTaken) != 0);
+  };
+  order(now + ahead, 4 * ahead, false);
+  ExpectNotShown(session, 2 * session.period(), "a volume is not shown by an order that came late");
+  order(now + 3 * ahead, 2, true);
+  order(now + 4 * ahead, 2, true);
+  const Event shown = session.Await(
+      "SHOWN", static_cast<sync::TimeNs>(5 * ahead) * session.period() + sync::kSecond,
+      [](const Event& event) { return event.type() == EventType::kShown; });
+  if (session.ok()) {
+    probe.check().Equal("sweep in which the volume was shown", now + 4 * ahead,
+                        shown.As<ShownEvent>().sweep);
+  }
+}
+
 // What is named is past: the next sweep.
 void ShowPast(Probe& probe) {
   Session session(probe);
@@ -167,6 +208,7 @@ void AddHoldCases(Cases& cases) {
   add("abort.complete", "ABORT of the last complete volume does nothing", &AbortComplete);
   add("hold.show", "a held volume is shown at SHOW, not before", &Hold);
   add("hold.show_at", "a held volume is shown at the sweep named", &ShowAt);
+  add("hold.ahead", "SHOW that must come ahead: taken in time only, and told", &ShowAhead);
   add("hold.show_past", "SHOW of a past sweep: the next one", &ShowPast);
   add("hold.drop", "DROP throws the waiting volume away, and the base with it", &Drop);
   add("hold.replaced", "a later complete volume replaces the one that waits", &Replaced);

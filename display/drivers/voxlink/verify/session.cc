@@ -125,6 +125,10 @@ void Session::Plain(PacketType type, uint64_t volume) { writer_.Plain(gathered_,
 
 void Session::Show(uint64_t volume, uint64_t sweep) { writer_.Show(gathered_, volume, sweep); }
 
+void Session::ShowAhead(uint64_t volume, uint64_t sweep, uint32_t ahead) {
+  writer_.ShowAhead(gathered_, volume, sweep, ahead);
+}
+
 void Session::Whole(uint64_t volume, bool show) {
   Begin(volume);
   for (uint32_t picture = 0; ok() && picture < pictures(); ++picture) Picture(volume, picture);

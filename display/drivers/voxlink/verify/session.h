@@ -94,6 +94,7 @@ class Session {
   void End(uint64_t volume, bool show = true);
   void Plain(PacketType type, uint64_t volume);
   void Show(uint64_t volume, uint64_t sweep);
+  void ShowAhead(uint64_t volume, uint64_t sweep, uint32_t ahead);
   void Whole(uint64_t volume, bool show = true);
   void Raw(std::span<const std::byte> bytes);
   std::vector<std::byte> PictureBytes(uint64_t volume, uint32_t picture) const;

@@ -73,6 +73,27 @@ TEST(E131, IsAsItsStandardHasIt) {
               ElementsAre(0x70, 11, 0, 0, 0, 1, 0, 0, 7, 0, 0));
 }
 
+// 6.7.2: a receiver passes over what is up to 20 behind the last number. Whatever that is, one of a packet before a leap and one
+// after it is taken.
+TEST(E131, OneOfTwoIsTakenWhateverTheReceiverRemembers) {
+  PacketWriter writer(Stream(Protocol::kE131, 1), 1);
+  const std::vector<uint8_t> rgb = {1, 2, 3};
+  const auto sequence = [&] { return Ints(writer.Pixels(0, rgb, true))[111]; };
+  for (int i = 0; i < 300; ++i) {
+    const int before = sequence();
+    ASSERT_TRUE(writer.Leap());
+    const int after = sequence();
+    for (int last = 0; last < 256; ++last) {
+      const auto taken = [last](int number) {
+        const auto ahead = static_cast<int8_t>(number - last);
+        return !(ahead <= 0 && ahead > -20);
+      };
+      EXPECT_TRUE(taken(before) || taken(after)) << before << ", " << after << " after " << last;
+    }
+  }
+  EXPECT_FALSE(PacketWriter(Stream(Protocol::kDdp, 0), 1).Leap());
+}
+
 TEST(ArtNet, IsAsItsSpecificationHasIt) {
   PacketWriter writer(Stream(Protocol::kArtNet, 0x01FE, 1), 1);
   const std::vector<uint8_t> rgb = {9, 8, 7};

@@ -341,6 +341,13 @@ std::vector<Planted> PacketDefects() {
          if (h.type == 5) std::fill(payload.begin(), payload.end(), std::byte{0});
        }),
        {}},
+      {"LateOrdersAreTaken",
+       {"hold.ahead"},
+       Packets([](PacketHeader& h, std::span<std::byte> payload) {
+         if (h.type == 5 && payload.size() == 16) std::fill_n(payload.begin() + 8, 4, std::byte{0});
+       }),
+       {}},
+      {"OrdersUnanswered", {"hold.ahead"}, Silent(EventType::kOrdered), {}},
       {"AbortUnanswered",
        {"abort.filling"},
        Events(

@@ -1,0 +1,17 @@
+// Slicing to the shipped profiles' displays.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tools/bench/frame/scene.h"
+
+namespace voxeld::bench::frame {
+
+// A row for each profile: 400 solid balls and 20,000 lines in colours of their own, all of which move a voxel to and fro. What is
+// measured is slicing, against a copy of as many bytes as the volume and the pictures have. Profiles are
+// found as the daemon finds them (display/profiles/profile.h).
+std::vector<MakeScene> ProfileScenes(uint64_t seed, double share);
+
+}  // namespace voxeld::bench::frame
