@@ -51,7 +51,7 @@ ALLOWED = {
     # What is calibrated is shown as the daemon would.
     "tools/voxelctl/calibrate": ["display/drivers/registry", "display/drivers/options", "display/drivers/driver_context",
                                  "display/profiles", "display/sync", "display/api", "display/usb", "gpu", "daemon/config",
-                                 "daemon/core", "tools/voxelctl"],
+                                 "daemon/core", "display/geometry", "tools/voxelctl"],
     # A profile that was written is tried as the daemon would.
     "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
                             "tools/voxelctl"],

@@ -246,7 +246,11 @@ void AddSweeps(const std::vector<DisplayFigures>& displays, Families* out) {
                                  "That the daemon leaves the picture, 0 to 1");
   MetricFamily* power = out->New("voxeld_display_power_watts", MetricType::Gauge,
                                  "By the picture's light, where the daemon keeps the power limit");
+  MetricFamily* unlimited =
+      out->New("voxeld_display_power_unlimited", MetricType::Gauge,
+               "1 while a power limit is set that neither the device nor the daemon keeps, else 0");
   for (const DisplayFigures& display : displays) {
+    Add(unlimited, {{"display", display.name}}, display.power_unlimited ? 1 : 0);
     const bool locked = display.sweeps.state == sync::SweepLock::State::kLocked;
     Add(lock, {{"display", display.name}}, locked ? 1 : 0);
     Add(losses, {{"display", display.name}}, static_cast<double>(display.sweeps.losses));

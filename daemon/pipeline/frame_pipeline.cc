@@ -79,8 +79,9 @@ absl::Status FramePipeline::Open(std::function<void(EngineEvent)> tell) {
 
 absl::Status FramePipeline::Start() {
   if (wanted_limit_w_ > 0) {
-    // Whether its device keeps one turns out when there is one.
-    if (absl::Status status = display_->SetPowerLimit(wanted_limit_w_); !status.ok()) return status;
+    const absl::Status limit = display_->SetPowerLimit(wanted_limit_w_);
+    if (!limit.ok() && !absl::IsUnimplemented(limit)) return limit;
+    FollowDevice();
   }
   const absl::Status status = display_->Start(this, [work = work_] { work->Wake(); });
   started_ = status.ok();
@@ -121,7 +122,9 @@ sync::TimeNs FramePipeline::Step() {
   sync::TimeNs next = std::min({next_tick_, next_round, limiter_.next()});
   if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
-  if (show_again_ && !drawing_.has_value() && showing() && display_->mailbox_free()) {
+  // Of a genlock's member it is for the group to say when.
+  const bool waits = genlock_ != nullptr && show_again_at_ <= clock_.Now();
+  if (show_again_ && !waits && !drawing_.has_value() && showing() && display_->mailbox_free()) {
     next = std::min(next, show_again_at_);
   }
   if (draw_from_ > clock_.Now()) next = std::min(next, draw_from_);
@@ -353,9 +356,7 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
     return ShowAgain(0);
   }
   if (genlock_ != nullptr && !IsOfRound(drawing.volume)) {  // the group has given it up
-    riders_.Redraw();
-    drawn_snapshot_.reset();
-    return ShowAgain(0);
+    return DrawAgain();
   }
   if (!Admit(drawing)) return;
   for (uint64_t& number : drawing.lease.frame->changed_in) number = std::max(number, first_volume_);
@@ -393,6 +394,13 @@ void FramePipeline::SubmitDrawn(Drawing drawing) {
   display_->Submit(std::move(drawing.lease.frame));
 }
 
+void FramePipeline::DrawAgain() {
+  riders_.Redraw();
+  if (pattern_ != TestPattern::kNone) riders_.HideWaiting();
+  drawn_snapshot_.reset();
+  ShowAgain(0);
+}
+
 void FramePipeline::ShowAgain(sync::TimeNs delay) {
   show_again_ = true;
   show_again_at_ = clock_.Now() + delay;
@@ -422,10 +430,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs sin
     takeover_ = absl::StrCat("took over from ", gpu::EngineKindName(engine_info_.kind), ": ",
                              status.message());
     if (!std::exchange(lost_engine_, true) && HaveEngine() && showing()) {
-      riders_.Redraw();
-      if (pattern_ != TestPattern::kNone) riders_.HideWaiting();
-      drawn_snapshot_.reset();
-      return ShowAgain(0);
+      return DrawAgain();
     }
   }
   refused_ = std::string(status.message());
@@ -453,7 +458,11 @@ void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
     show_again_ = true;
     show_again_at_ = genlock_ == nullptr ? sync::kNever : clock_.Now();
   }
-  if (genlock_ != nullptr && EndRound(outcome)) return riders_.Reboard(outcome.volume);
+  if (genlock_ != nullptr && EndRound(outcome)) {
+    riders_.Reboard(outcome.volume);
+    if (pattern_ != TestPattern::kNone) riders_.HideWaiting();
+    return;
+  }
   riders_.OnOutcome(outcome);
 }
 

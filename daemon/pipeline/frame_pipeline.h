@@ -152,6 +152,7 @@ class FramePipeline final : private display::Display::Listener {
   bool HasNewer() const override;
   void OnHeld(uint64_t volume) override;
   void OnOrdered(uint64_t volume, sync::TimeNs at, bool taken) override;
+  void OnStray() override;
 
   bool showing() const { return display_->state() == display::DisplayState::kShowing; }
   std::string WhyNotShowing() const;
@@ -188,6 +189,7 @@ class FramePipeline final : private display::Display::Listener {
   void SubmitDrawn(Drawing drawing);
   void KeepUnchanged(const Contents& contents);
   void ShowAgain(sync::TimeNs delay);
+  void DrawAgain();  // what was drawn comes to nothing: at once, with the same riders
   void ServeCaptures();
   void Breathe();
   void Retire(std::shared_ptr<const void> what);

@@ -56,6 +56,10 @@ void FramePipeline::OnOrdered(uint64_t volume, sync::TimeNs at, bool taken) {
   if (genlock_ != nullptr) genlock_->Ordered(member_, volume, at, taken);
 }
 
+void FramePipeline::OnStray() {
+  if (genlock_ != nullptr) genlock_->Stray();
+}
+
 bool FramePipeline::EndRound(const display::VolumeOutcome& outcome) {
   if (outcome.kind == display::VolumeOutcome::Kind::kPresented) {
     genlock_->Shown(member_, outcome.volume, outcome.time_ns);

@@ -16,8 +16,7 @@ int FramePipeline::light_steps() const {
 }
 
 bool FramePipeline::LimitsPower() const {
-  return wanted_limit_w_ > 0 && setup_.power_full_w > 0 &&
-         display_->power_limit_w() != wanted_limit_w_;
+  return wanted_limit_w_ > 0 && setup_.power_full_w > 0 && !display_->keeps_power_limit();
 }
 
 void FramePipeline::FollowDevice() {
@@ -32,12 +31,14 @@ absl::Status FramePipeline::SetBrightness(double brightness) {
   if (!status.ok() && !absl::IsUnimplemented(status)) return status;
   wanted_brightness_ = brightness;
   FollowDevice();
+  if (LimitsPower()) target_stale_ = settings_changed_ = true;  // to be measured anew
   return absl::OkStatus();
 }
 
 absl::Status FramePipeline::SetPowerLimit(double watts) {
   const absl::Status status = display_->SetPowerLimit(watts);
   if (absl::IsUnimplemented(status) && setup_.power_full_w == 0 && watts > 0) {
+    display_->SetPowerLimit(wanted_limit_w_).IgnoreError();  // as it was
     return absl::FailedPreconditionError(absl::StrCat(
         status.message(),
         ", and what it draws is not known; give the display power_full, what it draws at "
@@ -53,22 +54,22 @@ absl::Status FramePipeline::SetPowerLimit(double watts) {
 
 bool FramePipeline::Admit(const Drawing& drawing) {
   if (limiter_.limit_w() == 0) return true;
-  if (limiter_.Admit(meter_.Measure(*drawing.lease.frame), clock_.Now())) return true;
+  // What the device dims by itself does not show in the picture.
+  const double light = meter_.Measure(*drawing.lease.frame) * display_->brightness();
+  if (limiter_.Admit(light, clock_.Now())) return true;
   if (genlock_ != nullptr) {
     genlock_->Failed(member_, drawing.volume, "it would draw more than the power limit");
   }
-  riders_.Redraw();
   target_stale_ = true;
-  drawn_snapshot_.reset();
-  ShowAgain(0);
+  DrawAgain();
   return false;
 }
 
 void FramePipeline::AddLight(DisplayFigures& figures) const {
   figures.light = static_cast<double>(light_steps()) / kLightSteps;
   figures.power_w = limiter_.limit_w() > 0 ? limiter_.power_w() : 0;
-  figures.power_unlimited = showing() && wanted_limit_w_ > 0 &&
-                            display_->power_limit_w() != wanted_limit_w_ && !LimitsPower();
+  figures.power_unlimited =
+      showing() && wanted_limit_w_ > 0 && !display_->keeps_power_limit() && !LimitsPower();
 }
 
 }  // namespace voxeld::daemon

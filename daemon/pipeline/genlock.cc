@@ -12,6 +12,8 @@ constexpr sync::TimeNs kOrderShare = 4;  // of a period, for an order's way to t
 // Then what is held is dropped: a member that takes no orders must not hold the others' pictures.
 constexpr int kMostOrders = 32;
 constexpr sync::TimeNs kSweepsPause = 50 * sync::kMillisecond;
+// After which a device that is lost is dark, by its watchdog (250 ms from its host's last byte), and a sweep.
+constexpr sync::TimeNs kQuiet = 300 * sync::kMillisecond;
 
 }  // namespace
 
@@ -33,10 +35,9 @@ bool Genlock::Any(Stage stage) const {
                      [stage](const State& m) { return m.stage == stage; });
 }
 
-bool Genlock::AllOf(Stage stage) const {
-  return std::all_of(members_.begin(), members_.end(), [stage](const State& m) {
-    return m.stage == stage || m.stage == Stage::kOut;
-  });
+bool Genlock::SweepsKnown() const {
+  return std::all_of(members_.begin(), members_.end(),
+                     [](const State& m) { return m.stage == Stage::kOut || m.period != 0; });
 }
 
 Genlock::State* Genlock::Of(Member member, uint64_t volume) {
@@ -53,8 +54,10 @@ void Genlock::SetPresent(Member member, bool present) {
   if (!present) {
     state.wants = false;
     state.next_sweep = state.period = 0;
-    // It shows nothing from now on: the others are not held up.
+    // It shows nothing new from now on, and soon nothing: the others are held up no longer than that.
     if (state.stage != Stage::kShown) state.stage = Stage::kOut;
+    quiet_until_ = clock_.Now() + kQuiet;
+    if (open_ && order_ != 0 && !settled_ && dropping_.empty()) deadline_ = clock_.Now();
   }
   Decide();
 }
@@ -104,6 +107,11 @@ void Genlock::Ordered(Member member, uint64_t volume, sync::TimeNs at, bool take
     deadline_ = clock_.Now();  // there is no use in waiting for the others
   }
   Decide();
+}
+
+void Genlock::Stray() {
+  sync::MutexLock lock(mutex_);
+  ++figures_.slips;
 }
 
 void Genlock::Shown(Member member, uint64_t volume, sync::TimeNs at) {
@@ -158,18 +166,23 @@ void Genlock::Decide() {
   }
   if (!open_) return Open();
   if (!dropping_.empty() || settled_) return;
-  // What one shows, though not all have taken the order, all show as soon as they can.
-  if (order_ == 0 && !Any(Stage::kDrawing)) return Order(0);
-  if (order_ == 0) return;
-  if (!Any(Stage::kHeld)) {
-    settled_ = true;
-    deadline_ = sync::kNever;
-    return;
+  if (Any(Stage::kDrawing)) return;
+  if (order_ != 0 && !Any(Stage::kHeld)) {
+    // Those that have taken an order from before a member was lost are put off all the same.
+    const bool quiet = first_at_ >= quiet_until_;
+    if (quiet) {
+      settled_ = true;
+      deadline_ = sync::kNever;
+      return;
+    }
   }
-  if (clock_.Now() < deadline_) return;
-  ++figures_.postponed;
-  if (++tries_ == kMostOrders) return Drop("a display of the genlock took no order to show it");
-  Order(last_at_ + period_ / 2);
+  const bool first = order_ == 0 && (deadline_ == sync::kNever || SweepsKnown());
+  if (!first && clock_.Now() < deadline_) return;
+  if (order_ != 0) ++figures_.postponed;
+  if (!first && ++tries_ == kMostOrders) {
+    return Drop("a display of the genlock took no order to show it");
+  }
+  Order(order_ == 0 ? 0 : last_at_ + period_ / 2);
 }
 
 void Genlock::Open() {
@@ -201,8 +214,7 @@ sync::TimeNs Genlock::FirstAfter(const State& member, sync::TimeNs after) {
 
 void Genlock::Order(sync::TimeNs not_before) {
   const auto in = [](const State& m) { return m.stage != Stage::kOut; };
-  for (const State& member : members_) {
-    if (!in(member) || member.period != 0) continue;
+  if (!SweepsKnown()) {
     deadline_ = clock_.Now() + kSweepsPause;  // or as soon as they are known
     return;
   }
@@ -219,13 +231,15 @@ void Genlock::Order(sync::TimeNs not_before) {
       last = std::max(last, member.at);
     }
   };
-  sync::TimeNs at = FirstAfter(leads, std::max(clock_.Now(), not_before));
+  sync::TimeNs at =
+      FirstAfter(leads, std::max({clock_.Now(), not_before, quiet_until_ + period_ / 2}));
   for (place(at);; place(at += period_)) {
     ahead_ = last - first <= period_ / 2 ? 2 : 3;
     if (first - (ahead_ - 1) * period_ >= clock_.Now() + period_ / kOrderShare) break;
   }
   const sync::TimeNs cutoff = last - (ahead_ - 1) * period_;
   deadline_ = cutoff + (first - cutoff) / 2;
+  first_at_ = first;
   last_at_ = last;
   ++order_;
   for (State& member : members_) {
@@ -242,18 +256,17 @@ void Genlock::Drop(const std::string& why) {
 
 void Genlock::Close() {
   open_ = false;
-  sync::TimeNs first = sync::kNever, last = 0;
-  size_t shown = 0, failed = 0;
+  size_t shown = 0, failed = 0, apart = 0;
   for (State& member : members_) {
     if (member.stage == Stage::kShown) {
       ++shown;
-      first = std::min(first, member.shown_at);
-      last = std::max(last, member.shown_at);
+      const sync::TimeNs off = member.shown_at - member.at;
+      if (off > period_ / 2 || off < -period_ / 2) ++apart;
     }
     failed += member.stage == Stage::kFailed ? 1 : 0;
     member.stage = Stage::kOut;
   }
-  if (shown > 0 && (failed > 0 || last - first > period_ / 2 + period_ / 8)) {
+  if (shown > 0 && failed + apart > 0) {
     ++figures_.slips;
   } else if (shown > 0) {
     ++figures_.volumes;

@@ -10,7 +10,8 @@
 // take an order until (ahead − 1)·p before their sweep; then what is left until the first of them begins is halved, for the
 // answers' way here, and for the way of a new order.
 //
-// - A member that is not showing (absent, lost, blanked) is left out, and comes back with the next round.
+// - A member that is not showing (absent, lost, blanked) is left out, and comes back with the next round. One that is lost may go on
+//   showing what it showed until its watchdog darkens it: so long the others show nothing new.
 // - A volume that one member cannot have (its engine failed, its device gave it up) is dropped by all, and what it was to show
 //   comes with the next.
 // - What is shown stays until the next round is.
@@ -56,7 +57,7 @@ class Genlock {
     uint64_t volumes = 0;    // shown by all that took part
     uint64_t dropped = 0;    // by all, since one could not have it
     uint64_t postponed = 0;  // orders given anew
-    uint64_t slips = 0;      // shown by some at another time than by the others, or not by all
+    uint64_t slips = 0;      // shown by one at another time than ordered, or not by all
   };
 
   // `retire` takes snapshots that are done with; may be empty.
@@ -76,6 +77,8 @@ class Genlock {
 
   void Held(Member member, uint64_t volume);
   void Ordered(Member member, uint64_t volume, sync::TimeNs at, bool taken);
+  // A dropped volume was shown all the same.
+  void Stray();
   // The volume is shown, or will never be.
   void Shown(Member member, uint64_t volume, sync::TimeNs at);
   void Failed(Member member, uint64_t volume, const std::string& why);
@@ -86,7 +89,7 @@ class Genlock {
   sync::TimeNs Step();
 
   Figures figures() const;
-  // The newest volume that all who took part have shown; 0: none yet.
+  // The newest volume that was shown; 0: none yet.
   uint64_t shown() const;
 
  private:
@@ -111,7 +114,7 @@ class Genlock {
   };
 
   bool Any(Stage stage) const VOXELD_REQUIRES(mutex_);
-  bool AllOf(Stage stage) const VOXELD_REQUIRES(mutex_);
+  bool SweepsKnown() const VOXELD_REQUIRES(mutex_);  // of all who take part
   // Goes on as far as it goes now.
   void Decide() VOXELD_REQUIRES(mutex_);
   void Open() VOXELD_REQUIRES(mutex_);
@@ -133,11 +136,13 @@ class Genlock {
   uint64_t order_ VOXELD_GUARDED_BY(mutex_) = 0;  // counts orders; 0: none in this round
   int tries_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint32_t ahead_ VOXELD_GUARDED_BY(mutex_) = 0;
+  sync::TimeNs first_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs last_at_ VOXELD_GUARDED_BY(mutex_) = 0;  // of all members' in the newest order
   sync::TimeNs period_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs deadline_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
-  bool settled_ VOXELD_GUARDED_BY(mutex_) = false;  // all have taken the order
-  std::string dropping_ VOXELD_GUARDED_BY(mutex_);  // why; empty: it is not being dropped
+  bool settled_ VOXELD_GUARDED_BY(mutex_) = false;          // all have taken the order
+  std::string dropping_ VOXELD_GUARDED_BY(mutex_);          // why; empty: it is not being dropped
+  sync::TimeNs quiet_until_ VOXELD_GUARDED_BY(mutex_) = 0;  // a lost member may show what it showed
   sync::TimeNs open_from_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::Backoff pause_ VOXELD_GUARDED_BY(mutex_){20 * sync::kMillisecond, sync::kSecond};
   uint64_t shown_ VOXELD_GUARDED_BY(mutex_) = 0;

@@ -27,33 +27,22 @@ display::Tone Dimmed(const display::Tone& tone, int steps) {
 
 double LightMeter::Measure(const display::SliceFrame& frame) {
   const display::FrameLayout& layout = frame.layout;
-  const auto slices = static_cast<size_t>(layout.slices);
-  const auto subs = static_cast<size_t>(layout.sub_frames);
   if (layout != layout_) {
     layout_ = layout;
-    slices_.assign(slices, 0);
+    pictures_.assign(layout.pictures(), 0);
     measured_ = 0;
   }
   const size_t size = layout.bytes_per_slice();
-  std::vector<uint8_t> rgb(static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) *
-                           3);
   uint64_t newest = measured_;
-  std::vector<std::span<const std::byte>> pictures(subs);
-  for (size_t slice = 0; slice < slices; ++slice) {
-    bool changed = false;
-    for (size_t sub = 0; sub < subs; ++sub) {
-      const size_t picture = slice * subs + sub;
-      changed = changed || frame.changed_in[picture] > measured_;
-      newest = std::max(newest, frame.changed_in[picture]);
-      pictures[sub] = std::span(frame.bytes).subspan(picture * size, size);
-    }
-    if (!changed) continue;
-    display::SliceToRgb(layout, pictures, rgb);
-    const auto sum = std::accumulate(rgb.begin(), rgb.end(), uint64_t{0});
-    slices_[slice] = static_cast<double>(sum) / (255.0 * static_cast<double>(rgb.size()));
+  for (size_t picture = 0; picture < pictures_.size(); ++picture) {
+    if (frame.changed_in[picture] <= measured_) continue;
+    newest = std::max(newest, frame.changed_in[picture]);
+    pictures_[picture] =
+        display::LightOf(layout, std::span(frame.bytes).subspan(picture * size, size));
   }
   measured_ = newest;
-  return std::accumulate(slices_.begin(), slices_.end(), 0.0) / static_cast<double>(slices);
+  return std::accumulate(pictures_.begin(), pictures_.end(), 0.0) /
+         static_cast<double>(pictures_.size());
 }
 
 int PowerLimiter::Allowed(double share) const {

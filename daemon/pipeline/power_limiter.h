@@ -30,8 +30,8 @@ class LightMeter {
 
  private:
   display::FrameLayout layout_;
-  uint64_t measured_ = 0;       // the newest number of a picture looked at
-  std::vector<double> slices_;  // of each
+  uint64_t measured_ = 0;         // the newest number of a picture looked at
+  std::vector<double> pictures_;  // the light of each
 };
 
 class PowerLimiter {

@@ -64,7 +64,7 @@ absl::Status Display::Start(Listener* listener, std::function<void()> wake) {
   }
   listener_ = listener;
   wake_ = std::move(wake);
-  newest_ = nullptr;
+  newest_ = presented_ = nullptr;
   full_next_ = true;
   last_volume_ = 0;
   resend_at_ = sync::kNever;
@@ -146,12 +146,11 @@ absl::Status Display::SetPowerLimit(double watts) {
     return absl::InvalidArgumentError(
         absl::StrCat("power_limit_w is ", watts, "; it must be from 0 (none) to ", kMostWatts));
   }
-  const absl::Status status = attached() ? DoSetPowerLimit(watts) : absl::OkStatus();
-  if (status.ok()) power_limit_w_ = watts;
-  return status;
-}
-
-absl::Status Display::DoSetPowerLimit(double /*watts*/) {
+  power_limit_w_ = watts;
+  if (may_keep_power_limit() && (!attached() || keeps_power_limit_)) {
+    if (attached()) DoSetPowerLimit(watts);
+    return absl::OkStatus();
+  }
   return absl::UnimplementedError(
       absl::StrCat("the device of display \"", info_.name, "\" keeps no power limit"));
 }
@@ -168,10 +167,10 @@ absl::Status Display::SetBlank(bool blank) {
     if (in_flight_ != nullptr && owed_) {
       owed_ = false;
       ReportLost(in_flight_->volume, "blanked", 0);
-      if (holding_) DoDropHeld("blanked");
     }
     LoseWaiting("blanked");
     FinishCaptures(absl::UnavailableError("the display was blanked"));
+    if (holding_ && in_flight_ != nullptr) DoDropHeld("blanked");
   }
   if (!attached()) return absl::OkStatus();
   if (blank) {
@@ -239,6 +238,7 @@ void Display::DeviceLost(const std::string& reason, uint64_t bytes) {
   full_next_ = true;
   resend_at_ = sync::kNever;
   LoseInFlight(reason, bytes);
+  if (holding_) LoseWaiting(reason);  // of a round that goes on without this display
   FinishCaptures(absl::UnavailableError(absl::StrCat("the display was lost: ", reason)));
 }
 
@@ -257,6 +257,8 @@ void Display::FrameHeld() {
   if (owed_) listener_->OnHeld(in_flight_->volume);
 }
 
+void Display::FrameStray() { listener_->OnStray(); }
+
 void Display::FrameOrdered(sync::TimeNs at, bool taken) {
   if (in_flight_ != nullptr && owed_) listener_->OnOrdered(in_flight_->volume, at, taken);
 }
@@ -267,10 +269,11 @@ void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs l
   const SliceFramePtr frame = std::move(in_flight_);
   in_flight_ = nullptr;
   resend_.Reset();
-  if (due_ != 0 && shown_ns > due_ + due_period_ / 2) ++stats_.volumes_late;
+  if (owed_ && due_ != 0 && shown_ns > due_ + due_period_ / 2) ++stats_.volumes_late;
   full_next_ = frame->volume == 0;  // a black one of our own is no base for what the engine counts
   if (owed_) {
     owed_ = false;
+    presented_ = frame;
     VolumeOutcome outcome;
     outcome.kind = VolumeOutcome::Kind::kPresented;
     outcome.volume = frame->volume;
@@ -371,7 +374,9 @@ void Display::SendNext() {
       const bool due = resend_at_ == sync::kNever ? !captures_.empty() : resend_at_ <= clock_.Now();
       if (!due || (newest_ == nullptr && captures_.empty())) break;
     }
-    in_flight_ = newest_ != nullptr ? newest_ : BlackFrame(info_.layout);
+    // Nothing that was not ordered shown is shown for a capture.
+    const SliceFramePtr& next = holding_ && !owed ? presented_ : newest_;
+    in_flight_ = next != nullptr ? next : BlackFrame(info_.layout);
     owed_ = owed;
     in_flight_held_ = false;
     due_ = 0;

@@ -98,6 +98,8 @@ class Display {
     virtual void OnHeld(uint64_t /*volume*/) {}
     // What came of an order: `taken`, the volume will be shown then unless another order comes in time.
     virtual void OnOrdered(uint64_t /*volume*/, sync::TimeNs /*at*/, bool /*taken*/) {}
+    // A volume that was dropped, after it had been ordered shown, was shown all the same.
+    virtual void OnStray() {}
   };
   // Called where a listener's functions are; must not call back.
   using CaptureDone = std::function<void(absl::StatusOr<DecodedVolume>)>;
@@ -143,11 +145,13 @@ class Display {
   // is in flight when the display is blanked gets kLost; light again brings back the volume before.
   absl::Status SetBrightness(double brightness);
   absl::Status SetBlank(bool blank);
-  // The most that the device may draw, in watts, 0 for no limit. Unimplemented where the device cannot keep one; else as
-  // with brightness.
+  // The most that the device may draw, in watts, 0 for no limit: kept here, also for a device that comes later. Unimplemented if
+  // the device that is there, or any of the driver's, keeps none.
   absl::Status SetPowerLimit(double watts);
   double brightness() const { return brightness_; }
   double power_limit_w() const { return power_limit_w_; }
+  // Of the device that is there.
+  bool keeps_power_limit() const { return keeps_power_limit_; }
   bool blanked() const { return blanked_; }
 
   // The next volume shown, rebuilt from the bytes that go out; if no new one comes, the display
@@ -191,8 +195,10 @@ class Display {
   // Only while attached; set-up applies brightness() and blanked() by itself.
   virtual absl::Status DoSetBrightness(double brightness) = 0;
   virtual absl::Status DoSetBlank(bool blank) = 0;
-  // Of drivers whose devices may keep one; set-up applies power_limit_w() where it is not 0.
-  virtual absl::Status DoSetPowerLimit(double watts);
+  // Of drivers whose devices may keep one: whether they may, and to set it, of one that does; set-up says
+  // KeepsPowerLimit, and applies power_limit_w().
+  virtual bool may_keep_power_limit() const { return false; }
+  virtual void DoSetPowerLimit(double /*watts*/) {}
   virtual std::unique_ptr<WireDecoder> DoMakeDecoder() const = 0;
   // Of drivers that can hold. What is in flight is held, or is not to be: FrameLost follows.
   virtual void DoOrderShown(sync::TimeNs /*at*/, uint32_t /*ahead*/) {}
@@ -201,7 +207,7 @@ class Display {
   // For drivers, on the owner's thread.
   void Attached();  // the device is set up: the current frame goes out first
   void HasNoBrightness() { brightness_ = 1; }  // found while attaching
-  void HasNoPowerLimit() { power_limit_w_ = 0; }
+  void KeepsPowerLimit(bool keeps) { keeps_power_limit_ = keeps; }
   // What it is that is looked for, while there is none.
   void NoDevice(const std::string& reason);
   // Whatever is in flight (`bytes` of it sent) is lost; DoTick attaches again.
@@ -213,6 +219,7 @@ class Display {
   bool holds_in_flight() const { return holding_ && owed_; }
   void FrameHeld();
   void FrameOrdered(sync::TimeNs at, bool taken);
+  void FrameStray();
   // Every outgoing byte of a volume.
   void TapOut(uint8_t endpoint, std::span<const std::byte> bytes, size_t device = 0);
   bool tapped() const { return decoder_ != nullptr; }
@@ -257,14 +264,16 @@ class Display {
   DisplayStats stats_;
   double brightness_ = 1;
   double power_limit_w_ = 0;
+  bool keeps_power_limit_ = false;
   bool blanked_ = false;
 
   SliceFramePtr in_flight_, waiting_;
-  SliceFramePtr newest_;   // the newest volume given to DoSend: what belongs on the display
-  bool owed_ = false;      // in_flight_ still owes its outcome (false: a re-send of our own)
-  bool held_ = false;      // since the attach, until there is the newest volume
-  bool full_next_ = true;  // the next volume may leave out nothing
-  bool sending_ = false;   // inside SendNext
+  SliceFramePtr presented_;  // the newest shown: of a display that holds, what captures show again
+  SliceFramePtr newest_;     // the newest volume given to DoSend: what belongs on the display
+  bool owed_ = false;        // in_flight_ still owes its outcome (false: a re-send of our own)
+  bool held_ = false;        // since the attach, until there is the newest volume
+  bool full_next_ = true;    // the next volume may leave out nothing
+  bool sending_ = false;     // inside SendNext
   bool holding_ = false;
   bool in_flight_held_ = false;
   sync::TimeNs due_ = 0, due_period_ = 0;  // the sweep that in_flight_ is for; 0: not known

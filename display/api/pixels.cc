@@ -1,6 +1,7 @@
 #include "display/api/pixels.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 namespace voxeld::display {
@@ -93,6 +94,65 @@ void SliceToRgb(const FrameLayout& layout, std::span<const std::span<const std::
   for (size_t i = 0; i < rgb.size(); ++i) {
     rgb[i] = static_cast<uint8_t>((2 * sums[i] + count) / (2 * count));
   }
+}
+
+namespace {
+
+uint64_t BitsIn(std::span<const std::byte> bytes, uint64_t mask) {
+  uint64_t count = 0;
+  size_t at = 0;
+  for (; at + sizeof(uint64_t) <= bytes.size(); at += sizeof(uint64_t)) {
+    uint64_t word = 0;
+    std::memcpy(&word, bytes.data() + at, sizeof(word));
+    count += static_cast<uint64_t>(std::popcount(word & mask));
+  }
+  for (; at < bytes.size(); ++at) {
+    const auto byte = std::to_integer<uint64_t>(bytes[at]);
+    count += static_cast<uint64_t>(std::popcount(byte & mask));
+  }
+  return count;
+}
+
+uint64_t SumOf(std::span<const std::byte> bytes) {
+  uint64_t sum = 0;
+  for (const std::byte byte : bytes) sum += std::to_integer<uint64_t>(byte);
+  return sum;
+}
+
+}  // namespace
+
+double LightOf(const FrameLayout& layout, std::span<const std::byte> picture) {
+  const double channels = 3.0 * layout.width * layout.height;
+  const auto bits = static_cast<size_t>(layout.bits_per_channel());
+  const double most = static_cast<double>((1u << bits) - 1);
+  switch (layout.format) {
+    case PixelFormat::kRgb888:
+      return static_cast<double>(SumOf(picture)) / (most * channels);
+    case PixelFormat::kRgb332: {
+      double sum = 0;
+      for (const std::byte byte : picture) {
+        const int v = std::to_integer<int>(byte);
+        sum += ((v >> 5) + (v >> 2 & 7)) / 7.0 + (v & 3) / 3.0;
+      }
+      return sum / channels;
+    }
+    case PixelFormat::kBitPlanes:
+    case PixelFormat::kHub75: {
+      // Planes of one weight lie together, the highest first; of HUB75 six bits of a byte are lights.
+      const uint64_t mask =
+          layout.format == PixelFormat::kHub75 ? 0x3F3F3F3F3F3F3F3F : ~uint64_t{0};
+      const size_t size = picture.size() / bits;
+      double sum = 0;
+      for (size_t bit = 0; bit < bits; ++bit) {
+        const auto weight = static_cast<double>(1u << (bits - 1 - bit));
+        sum += weight * static_cast<double>(BitsIn(picture.subspan(bit * size, size), mask));
+      }
+      return sum / (most * channels);
+    }
+    case PixelFormat::kPlanes24:
+      return static_cast<double>(BitsIn(picture, ~uint64_t{0})) / (kProjectorParts * channels);
+  }
+  return 0;
 }
 
 std::vector<uint8_t> FrameToRgb(const SliceFrame& frame) {

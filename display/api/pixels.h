@@ -17,6 +17,9 @@ namespace voxeld::display {
 void SliceToRgb(const FrameLayout& layout, std::span<const std::span<const std::byte>> pictures,
                 std::span<uint8_t> rgb);
 
+// How much of a picture's full light is on, 0 to 1: the mean of its levels.
+double LightOf(const FrameLayout& layout, std::span<const std::byte> picture);
+
 // The whole of a frame, slice after slice.
 std::vector<uint8_t> FrameToRgb(const SliceFrame& frame);
 

@@ -37,10 +37,12 @@ uint16_t LeastFactor(const display::FrameLayout& layout, const display::Tone& to
   const uint32_t below = kFullLight - WorstThreshold(tone.dither, parts);
   const Levels levels = LevelsOf(layout.format, static_cast<uint32_t>(layout.bits_per_channel()));
   const uint32_t of[3] = {levels.r, levels.g, levels.b};
+  const uint64_t brightest = std::max({tone.lut[0][255], tone.lut[1][255], tone.lut[2][255]});
   uint64_t least = kFullLight;
   for (size_t c = 0; c < 3; ++c) {
-    const uint64_t white = tone.lut[c][255];
-    if (white == 0) continue;
+    if (tone.lut[c][255] == 0) continue;
+    // As it would be undimmed.
+    const uint64_t white = tone.lut[c][255] * uint64_t{kFullLight} / brightest;
     const uint64_t light = (below + of[c] - 2) / (of[c] - 1);
     // Dim rounds: a whole step more is enough.
     least = std::min(least, (light * kFullLight + white - 1) / white + 1);
@@ -48,14 +50,20 @@ uint16_t LeastFactor(const display::FrameLayout& layout, const display::Tone& to
   return static_cast<uint16_t>(std::clamp<uint64_t>(least, 1, kFullLight));
 }
 
-LightPlan LightPlan::Of(const display::FootprintTable& table, const display::VoxelGrid& grid,
-                        const display::FrameLayout& layout, const display::Tone& tone) {
+LightPlan LightPlan::WithoutFactors(const display::Tone& tone) {
   LightPlan plan;
   for (const display::Tone::Curve& curve : tone.lut) {
     plan.curves.insert(plan.curves.end(), curve.begin(), curve.end());
   }
-  if (tone.dither == display::Dither::kBlueNoise)
+  if (tone.dither == display::Dither::kBlueNoise) {
     plan.noise.assign(BlueNoise().begin(), BlueNoise().end());
+  }
+  return plan;
+}
+
+LightPlan LightPlan::Of(const display::FootprintTable& table, const display::VoxelGrid& grid,
+                        const display::FrameLayout& layout, const display::Tone& tone) {
+  LightPlan plan = WithoutFactors(tone);
   if (tone.density == display::Density::kEven) {
     plan.factors = display::EvenFactors(table, grid, LeastFactor(layout, tone));
   }
@@ -66,11 +74,15 @@ std::shared_ptr<const LightPlan> LightPlanner::Of(const display::FootprintTable&
                                                   const display::Geometry& geometry,
                                                   const display::FrameLayout& layout,
                                                   const display::Tone& tone) {
-  if (!made_ || made_->geometry != geometry || made_->layout != layout || made_->tone != tone) {
-    made_ = {geometry, layout, tone,
-             std::make_shared<const LightPlan>(LightPlan::Of(table, geometry.grid, layout, tone))};
+  const uint16_t least = LeastFactor(layout, tone);
+  const bool same = even_ && even_->geometry == geometry && even_->sampling == tone.sampling &&
+                    even_->least == least;
+  if (tone.density == display::Density::kEven && !same) {
+    even_ = {geometry, tone.sampling, least, display::EvenFactors(table, geometry.grid, least)};
   }
-  return made_->plan;
+  auto plan = std::make_shared<LightPlan>(LightPlan::WithoutFactors(tone));
+  if (tone.density == display::Density::kEven) plan->factors = even_->factors;
+  return plan;
 }
 
 Finish LightPlan::finish(const display::FrameLayout& layout, const display::Tone& tone) const {

@@ -20,6 +20,8 @@ struct LightPlan {
 
   static LightPlan Of(const display::FootprintTable& table, const display::VoxelGrid& grid,
                       const display::FrameLayout& layout, const display::Tone& tone);
+  // The same, where all rows are full.
+  static LightPlan WithoutFactors(const display::Tone& tone);
 
   // Ordered dither or none, and all that a pixel's place decides is its threshold: what is worked out once for many places
   // (levels.h) holds.
@@ -31,8 +33,8 @@ struct LightPlan {
   Finish finish(const display::FrameLayout& layout, const display::Tone& tone) const;
 };
 
-// Makes a target's plan, which can take a while, and keeps it for the next target: one that has another view alone has the
-// same. Thread-bound.
+// Makes a target's plan, and keeps the factors, which can take a while, for the next target: one with another view, or
+// dimmed, has the same. Thread-bound.
 class LightPlanner {
  public:
   // `table`: the footprints of `geometry`, as the tone samples them.
@@ -42,16 +44,18 @@ class LightPlanner {
                                       const display::Tone& tone);
 
  private:
-  struct Made {
+  // What the factors were made of.
+  struct Even {
     display::Geometry geometry;
-    display::FrameLayout layout;
-    display::Tone tone;
-    std::shared_ptr<const LightPlan> plan;
+    display::Sampling sampling;
+    uint16_t least;
+    std::vector<uint16_t> factors;
   };
-  std::optional<Made> made_;
+  std::optional<Even> even_;
 };
 
-// The factor of light with which full white lights every pixel, whatever its threshold, in a sub-frame at least; 1 to 65535.
+// The factor of light with which full white lights every pixel, whatever its threshold, in a sub-frame at least; 1 to 65535. White is
+// the tone's at full brightness: how far it is dimmed plays no part.
 uint16_t LeastFactor(const display::FrameLayout& layout, const display::Tone& tone);
 
 }  // namespace voxeld::gpu

@@ -69,7 +69,8 @@ void VoxlinkDecoder::OnPacket(const PacketHeader& header, std::span<const std::b
       if (!payload.empty()) return Fail(header, ErrorCodeName(ErrorCode::kBadLength));
       return End(header);
     case PacketType::kShow:
-      if (payload.size() != sizeof(ShowPayload)) {
+      if (payload.size() !=
+          ((header.flags & kShowAhead) != 0 ? sizeof(ShowAheadPayload) : sizeof(ShowPayload))) {
         Fail(header, ErrorCodeName(ErrorCode::kBadLength));
       }
       return;

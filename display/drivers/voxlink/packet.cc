@@ -92,6 +92,7 @@ template void PacketWriter::Slice(TransferBytes&, uint64_t, uint32_t, uint16_t, 
 template void PacketWriter::Begin(TransferBytes&, uint64_t, uint64_t, uint32_t,
                                   std::span<const std::byte>);
 template void PacketWriter::End(TransferBytes&, uint64_t, bool);
+template void PacketWriter::Show(TransferBytes&, uint64_t, uint64_t);
 template void PacketWriter::ShowAhead(TransferBytes&, uint64_t, uint64_t, uint32_t);
 template void PacketWriter::Plain(TransferBytes&, PacketType, uint64_t);
 template void PacketWriter::Slice(Vector&, uint64_t, uint32_t, uint16_t, uint32_t,

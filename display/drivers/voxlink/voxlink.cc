@@ -51,7 +51,7 @@ absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& o
   const bool configured = std::any_of(std::begin(kGeometry), std::end(kGeometry), [&](auto key) {
     return options.options.contains(std::string(key));
   });
-  const Configured said{read->info.geometry, read->info.layout};
+  const Configured said{read->info.geometry, read->info.layout, read->calibrated};
   std::vector<conformance::Subject> subjects;
   subjects.push_back(
       {options.name, *std::move(transport), MakeSuite(configured ? &said : nullptr)});

@@ -17,9 +17,6 @@ constexpr sync::TimeNs kReadyLimit = sync::kSecond;
 // Earlier than the protocol's 100 ms, for the jitter of the owner's thread.
 constexpr sync::TimeNs kKeepaliveAfter = 70 * sync::kMillisecond;
 constexpr sync::TimeNs kClockWindow = 5 * sync::kSecond;
-// What a device says of sweeps farther from now is not believed.
-constexpr sync::TimeNs kOldestSweep = 60 * sync::kSecond;
-
 double NominalPeriod(const DisplayInfo& info) {
   return static_cast<double>(sync::kSecond) / std::max(info.volumes_per_second, 1e-3);
 }
@@ -82,7 +79,6 @@ void VoxlinkDisplay::ClockMap::Note(uint64_t device_ns, sync::TimeNs host_ns) {
 absl::Status VoxlinkDisplay::DoStart() {
   link_.transport().SetWake([this] { Wake(); });
   phase_ = Phase::kDetached;
-  configured_power_limit_w_ = 0;
   attach_at_ = clock().Now();
   failed_at_ = 0;
   retry_.Reset();
@@ -107,8 +103,6 @@ void VoxlinkDisplay::OnLinkFailed(const std::string& reason) {
   const uint64_t bytes = sending_.bytes;
   sending_ = Sending{};
   sweeps_.Restart();
-  // Another may come, or this one after its power was cut: none has a limit yet, as far as is known.
-  configured_power_limit_w_ = 0;
   DeviceLost(reason, bytes);
 }
 
@@ -204,11 +198,12 @@ void VoxlinkDisplay::OnCapabilities(std::span<const std::byte> page) {
         "the display is configured for ", info().volumes_per_second, " volumes/s; the device has ",
         parsed->fixed.min_rate_mhz / 1000.0, " to ", parsed->fixed.max_rate_mhz / 1000.0));
   }
-  if (holding() && (parsed->fixed.features & kFeatureShowAhead) == 0) {
+  const uint32_t holds = kFeatureShowAhead | kFeatureWatchdog;
+  if (holding() && (parsed->fixed.features & holds) != holds) {
     return OnLinkFailed(
-        "the display is in a genlock, for which its device must take SHOW a sweep ahead (feature "
-        "bit 4); "
-        "this one does not");
+        "the display is in a genlock, for which its device must have a watchdog (feature bit 0) "
+        "and take SHOW ahead "
+        "(bit 4); this one does not");
   }
   capabilities_ = *std::move(parsed);
   Configure();
@@ -229,12 +224,10 @@ void VoxlinkDisplay::Configure() {
   } else {
     HasNoBrightness();
   }
-  if ((capabilities_.fixed.features & kFeaturePowerLimit) == 0) {
-    HasNoPowerLimit();
-  } else if (power_limit_w() != configured_power_limit_w_) {
-    configured_power_limit_w_ = power_limit_w();
-    WritePowerLimit(power_limit_w());
-  }
+  const bool limits = (capabilities_.fixed.features & kFeaturePowerLimit) != 0;
+  KeepsPowerLimit(limits);
+  configured_power_limit_w_ = power_limit_w();
+  if (limits) DoSetPowerLimit(power_limit_w());  // one from before may be in force
   configured_blank_ = blanked();
   link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   link_.Write(Request::kStart, 0);
@@ -249,10 +242,8 @@ void VoxlinkDisplay::Ready() {
       brightness() != configured_brightness_) {
     link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
   }
-  if ((capabilities_.fixed.features & kFeaturePowerLimit) != 0 &&
-      power_limit_w() != configured_power_limit_w_) {
-    configured_power_limit_w_ = power_limit_w();
-    WritePowerLimit(power_limit_w());
+  if (keeps_power_limit() && power_limit_w() != configured_power_limit_w_) {
+    DoSetPowerLimit(power_limit_w());
   }
   if (blanked() != configured_blank_) link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   Attached();
@@ -264,7 +255,7 @@ void VoxlinkDisplay::OnReply(Request request, std::span<const std::byte> data) {
   // The session is there: READY waits for the first read.
   writer_.Restart();
   sending_ = Sending{};
-  last_number_ = complete_number_ = complete_frame_ = 0;
+  last_number_ = complete_number_ = complete_frame_ = dropped_ordered_ = 0;
   commands_.clear();
   clock_map_ = ClockMap{};
   sweeps_.Restart();
@@ -283,21 +274,19 @@ absl::Status VoxlinkDisplay::DoSetBrightness(double brightness) {
   return absl::OkStatus();
 }
 
-void VoxlinkDisplay::WritePowerLimit(double watts) {
+void VoxlinkDisplay::DoSetPowerLimit(double watts) {
   const auto milliwatts = static_cast<uint32_t>(std::lround(watts * 1000));
   link_.Write(Request::kSetPowerLimit, 0, BytesOf(milliwatts));
 }
 
-absl::Status VoxlinkDisplay::DoSetPowerLimit(double watts) {
-  if ((capabilities_.fixed.features & kFeaturePowerLimit) == 0) {
-    return Display::DoSetPowerLimit(watts);
-  }
-  configured_power_limit_w_ = watts;
-  WritePowerLimit(watts);
-  return absl::OkStatus();
-}
-
 absl::Status VoxlinkDisplay::DoSetBlank(bool blank) {
+  if (!blank && holding()) {
+    // Dark until the genlock's next volume: a device that is lit again shows its old one.
+    OnLinkFailed("begins anew after it was blanked");
+    attach_at_ = clock().Now();
+    Wake();
+    return absl::OkStatus();
+  }
   link_.Write(Request::kSetBlank, blank ? 1 : 0);
   return absl::OkStatus();
 }

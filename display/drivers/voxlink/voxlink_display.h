@@ -17,6 +17,9 @@
 
 namespace voxeld::display::voxlink {
 
+// What a device says of sweeps farther from now is not believed.
+inline constexpr sync::TimeNs kOldestSweep = 60 * sync::kSecond;
+
 class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
  public:
   // `info` is what the device must be: attaching to another ends in a state reason that names both. `calibrated`: but for how it
@@ -80,7 +83,8 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   sync::TimeNs DoTick(sync::TimeNs now) override;
   absl::Status DoSetBrightness(double brightness) override;
   absl::Status DoSetBlank(bool blank) override;
-  absl::Status DoSetPowerLimit(double watts) override;
+  bool may_keep_power_limit() const override { return true; }
+  void DoSetPowerLimit(double watts) override;
   std::unique_ptr<WireDecoder> DoMakeDecoder() const override;
   void DoOrderShown(sync::TimeNs at, uint32_t ahead) override;
   void DoDropHeld(const std::string& reason) override;
@@ -98,7 +102,6 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   void RetryLater(sync::TimeNs now);
   void OnCapabilities(std::span<const std::byte> page);
   void Configure();
-  void WritePowerLimit(double watts);
   void Ready();
 
   // Volumes.
@@ -136,6 +139,7 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
 
   PacketWriter writer_;
   Sending sending_;
+  uint64_t dropped_ordered_ = 0;   // dropped after it was ordered shown: it may be shown yet
   uint64_t last_number_ = 0;       // wire number of the newest volume of this session
   uint64_t complete_number_ = 0;   // the last one that the device completed; 0: none
   uint64_t complete_frame_ = 0;    // and the frame that it was

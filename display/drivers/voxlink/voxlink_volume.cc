@@ -182,17 +182,26 @@ void VoxlinkDisplay::DoDropHeld(const std::string& reason) {
   const bool held = sending_.stage >= Stage::kHeld;
   commands_.push_back({held ? PacketType::kDrop : PacketType::kAbort, sending_.number});
   if (held) complete_number_ = 0;
+  if (sending_.ordered_sweep != 0) dropped_ordered_ = sending_.number;
   Lose(reason);
   Pump();
 }
 
 void VoxlinkDisplay::OnShown(uint64_t volume, uint64_t start_ns, bool dark) {
+  if (volume == dropped_ordered_) {
+    dropped_ordered_ = 0;
+    if (!dark) FrameStray();
+  }
   if (volume != sending_.number || sending_.stage == Stage::kIdle) return;
   OnComplete(volume);  // its own event may have been lost
   retry_.Reset();
   if (dark && !blanked()) return Lose("the device was dark when the volume's sweep began");
   const Sending done = std::exchange(sending_, Sending{});
-  FrameDone(clock_map_.ToHost(start_ns), Evidence::kDevice, done.last_byte_ns, done.bytes);
+  // A device may say anything.
+  const sync::TimeNs now = clock().Now();
+  const sync::TimeNs shown =
+      std::clamp(clock_map_.ToHost(start_ns), now - kOldestSweep, now + kOldestSweep);
+  FrameDone(shown, Evidence::kDevice, done.last_byte_ns, done.bytes);
 }
 
 void VoxlinkDisplay::OnMissing(const EventHeader& header, const MissingEvent& event) {

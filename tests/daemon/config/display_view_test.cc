@@ -16,24 +16,24 @@ absl::StatusOr<DisplayOptions> Split(const char* text) {
 TEST(DisplayView, IsFitUnlessItSaysOtherwise) {
   const auto split = Split("sim=simulated,geometry=rotor");
   ASSERT_TRUE(split.ok()) << split.status();
-  EXPECT_EQ(split->view.mode, ViewOptions::Mode::kFit);
-  EXPECT_FALSE(split->view.box.has_value());
+  EXPECT_EQ(split->setup.view.mode, ViewOptions::Mode::kFit);
+  EXPECT_FALSE(split->setup.view.box.has_value());
   EXPECT_THAT(split->driver, ElementsAre(Pair("geometry", "rotor")));
 }
 
 TEST(DisplayView, IsTakenOutOfTheDriversOptions) {
   const auto split = Split("sim=simulated,view=millimetres,size=8x8");
   ASSERT_TRUE(split.ok()) << split.status();
-  EXPECT_EQ(split->view.mode, ViewOptions::Mode::kMillimetres);
+  EXPECT_EQ(split->setup.view.mode, ViewOptions::Mode::kMillimetres);
   EXPECT_THAT(split->driver, ElementsAre(Pair("size", "8x8")));
-  EXPECT_EQ(Split("sim=simulated,view=voxels")->view.mode, ViewOptions::Mode::kVoxels);
+  EXPECT_EQ(Split("sim=simulated,view=voxels")->setup.view.mode, ViewOptions::Mode::kVoxels);
 }
 
 TEST(DisplayView, ABoxIsSixNumbers) {
   const auto split = Split("sim=simulated,view_box=-1;-2;-3;1;2.5;3e1");
   ASSERT_TRUE(split.ok()) << split.status();
-  EXPECT_EQ(split->view.box->first, (display::Vec3{-1, -2, -3}));
-  EXPECT_EQ(split->view.box->second, (display::Vec3{1, 2.5, 30}));
+  EXPECT_EQ(split->setup.view.box->first, (display::Vec3{-1, -2, -3}));
+  EXPECT_EQ(split->setup.view.box->second, (display::Vec3{1, 2.5, 30}));
   for (const char* wrong : {"", "1;2;3", "1;2;3;4;5;6;7", "1;2;3;4;5;six", "1,2,3,4,5,6"}) {
     DisplayConfig config;
     config.options["view_box"] = wrong;
@@ -45,6 +45,28 @@ TEST(DisplayView, ABoxIsSixNumbers) {
 TEST(DisplayView, AnUnknownOneIsAnsweredWithWhatIsMeant) {
   EXPECT_THAT(Split("sim=simulated,view=voxel").status().message(),
               HasSubstr("view is \"voxel\"; did you mean voxels?"));
+}
+
+TEST(DisplayView, ALockAndAPowerLimitAreTheDaemonsOwn) {
+  const auto split = Split("sim=simulated,genlock=wall,power_limit=12.5,power_full=40,size=8x8");
+  ASSERT_TRUE(split.ok()) << split.status();
+  EXPECT_EQ(split->setup.genlock, "wall");
+  EXPECT_EQ(split->setup.power_limit_w, 12.5);
+  EXPECT_EQ(split->setup.power_full_w, 40);
+  EXPECT_THAT(split->driver, ElementsAre(Pair("size", "8x8")));
+  EXPECT_EQ(Split("sim=simulated")->setup.power_limit_w, 0);
+  for (const char* key : {"power_limit", "power_full"}) {
+    for (const char* wrong : {"", "0", "-1", "nan", "inf", "1e7", "40W"}) {
+      DisplayConfig config;
+      config.options[key] = wrong;
+      EXPECT_THAT(SplitDisplayOptions(config).status().message(),
+                  HasSubstr(std::string(key) + " is \"" + wrong + "\"; give watts"))
+          << wrong;
+    }
+  }
+  DisplayConfig unnamed;
+  unnamed.options["genlock"] = "";
+  EXPECT_THAT(SplitDisplayOptions(unnamed).status().message(), HasSubstr("the name of a group"));
 }
 
 TEST(DisplayView, GpusAreNumbersEachOnce) {

@@ -30,9 +30,15 @@ TEST(CoreDisplays, NamesAreUniqueAndDisplaysComeBeforeStart) {
   const auto add = [&](std::string name, const ViewOptions& view = {}) {
     return sim.core->AddDisplay(std::make_unique<testing::ScriptedDisplay>(
                                     testing::SmallDisplay(std::move(name)), sim.clock),
-                                {}, view);
+                                {}, {.view = view});
   };
   EXPECT_EQ(add("main").code(), absl::StatusCode::kAlreadyExists);
+  // A scripted display shows what it gets: it holds nothing.
+  const absl::Status unlocked = sim.core->AddDisplay(
+      std::make_unique<testing::ScriptedDisplay>(testing::SmallDisplay("locked"), sim.clock), {},
+      {.genlock = "wall"});
+  EXPECT_EQ(unlocked.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(unlocked.message(), HasSubstr("driver scripted cannot hold a volume"));
   ViewOptions bad;
   bad.transform.m[0] = 0;
   EXPECT_EQ(add("second", bad).code(), absl::StatusCode::kInvalidArgument);

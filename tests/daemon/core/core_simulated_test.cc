@@ -23,11 +23,12 @@ using testing::Put;
 using testing::RecordingSink;
 using Kind = CommitOutcome::Kind;
 
+using Options = std::map<std::string, std::string>;
+
 // 12 × 10 × 6 voxels of 1 mm.
 class SimulatedDaemon {
  public:
-  explicit SimulatedDaemon(std::map<std::string, std::string> options = {},
-                           DisplaySetup voxels = {}) {
+  explicit SimulatedDaemon(Options options = {}, DisplaySetup voxels = {}) {
     options["size"] = "12x10x6";
     options["dither"] = "none";
     absl::StatusOr<display::simulated::Parts> parts =
@@ -139,7 +140,7 @@ double LightOf(const display::DecodedVolume& volume) {
 }
 
 TEST(CoreSimulated, ADeviceWithoutBrightnessIsDimmedInSteps) {
-  SimulatedDaemon daemon({{"device_brightness", "false"}});
+  SimulatedDaemon daemon(Options{{"device_brightness", "false"}});
   daemon.Send(Put("a", "x", Entity1(Dots(0, 0xFFFFFF), testing::Shift(7.5, 3.5, 4.5))),
               testing::EndCommit(1));
   for (const auto& [brightness, level] :
@@ -157,7 +158,7 @@ TEST(CoreSimulated, ADeviceWithoutAPowerLimitIsKeptBelowItByItsLight) {
   DisplaySetup setup;
   setup.power_full_w = 100;
   setup.power_limit_w = 20;
-  SimulatedDaemon daemon({{"device_power_limit", "false"}}, setup);
+  SimulatedDaemon daemon(Options{{"device_power_limit", "false"}}, setup);
   double most = 0;
   const auto watch = [&] {
     for (int i = 0; i < 60; ++i) {
@@ -188,17 +189,17 @@ TEST(CoreSimulated, ADeviceWithoutAPowerLimitIsKeptBelowItByItsLight) {
 }
 
 TEST(CoreSimulated, ALimitThatNobodyKeepsIsRefusedOrTold) {
-  SimulatedDaemon daemon({{"device_power_limit", "false"}});
+  SimulatedDaemon daemon(Options{{"device_power_limit", "false"}});
   const auto refused = Update(daemon, {.brightness = 0.5, .power_limit_w = 20});
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(refused.status().message(), ::testing::HasSubstr("power_full"));
   EXPECT_EQ(Update(daemon, {})->brightness, 1) << "all or nothing";
   DisplaySetup setup;
   setup.power_limit_w = 20;
-  SimulatedDaemon told({{"device_power_limit", "false"}}, setup);
+  SimulatedDaemon told(Options{{"device_power_limit", "false"}}, setup);
   told.RunFor(sync::kSecond);
   EXPECT_TRUE(FiguresOf(told).power_unlimited);
-  SimulatedDaemon kept({}, setup);
+  SimulatedDaemon kept(Options{}, setup);
   kept.RunFor(sync::kSecond);
   EXPECT_FALSE(FiguresOf(kept).power_unlimited);
 }

@@ -69,5 +69,39 @@ TEST(Pixels, SubFramesAreAveraged) {
   EXPECT_EQ(Light(layout, {0, 10, 255, 255, 11, 255}), (std::vector<uint8_t>{128, 11, 255}));
 }
 
+// Against the light of every pixel, which another function finds.
+TEST(Pixels, LightIsTheMeanOfAllLevels) {
+  std::mt19937 random(5);
+  for (const PixelFormat format :
+       {PixelFormat::kRgb888, PixelFormat::kRgb332, PixelFormat::kBitPlanes, PixelFormat::kHub75,
+        PixelFormat::kPlanes24}) {
+    for (const int32_t bits : {0, 1, 3, 8}) {
+      if (bits != 0 && (format == PixelFormat::kRgb332 || format == PixelFormat::kPlanes24))
+        continue;
+      const FrameLayout layout{
+          .slices = 1, .width = 13, .height = 6, .sub_frames = 1, .format = format, .bits = bits};
+      std::vector<std::byte> picture(layout.bytes_per_slice());
+      EXPECT_EQ(LightOf(layout, picture), 0);
+      const int most = (1 << layout.bits_per_channel()) - 1;
+      for (std::byte& byte : picture) {
+        const auto value = static_cast<int>(random());
+        byte = static_cast<std::byte>(format == PixelFormat::kRgb888  ? value & most
+                                      : format == PixelFormat::kHub75 ? value & 0x3F
+                                                                      : value);
+      }
+      if (format == PixelFormat::kBitPlanes) {  // beyond a row's end there is nothing
+        for (size_t end = 1; end < picture.size(); end += 2) picture[end] &= std::byte{0xF8};
+      }
+      std::vector<uint8_t> rgb(13 * 6 * 3);
+      const std::span<const std::byte> pictures[] = {picture};
+      SliceToRgb(layout, pictures, rgb);
+      double sum = 0;
+      for (const uint8_t light : rgb) sum += light;
+      EXPECT_NEAR(LightOf(layout, picture), sum / 255 / static_cast<double>(rgb.size()), 0.002)
+          << static_cast<int>(format) << ", " << bits;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace voxeld::display

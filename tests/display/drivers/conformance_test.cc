@@ -208,7 +208,7 @@ TEST_P(DriverConformance, SweepsArePredicted) {
   ASSERT_EQ(sweeps.size(), GetParam().predicts_sweeps ? 3u : 0u);
   if (!GetParam().predicts_sweeps) return;
   const double period = 1e9 / display_->info().volumes_per_second;
-  EXPECT_NEAR(static_cast<double>(sweeps[1] - sweeps[0]), period, 1000);
+  EXPECT_NEAR(static_cast<double>(sweeps[1] - sweeps[0]), period, period / 100);
   const double phase = static_cast<double>(sweeps[0] - recorder_.Of(5)->time_ns) / period;
   EXPECT_NEAR(phase, std::round(phase), 0.25);
 }

@@ -11,7 +11,7 @@
 #include "display/api/pixels.h"
 #include "display/drivers/voxlink/voxlink_display.h"
 #include "gtest/gtest.h"
-#include "tests/display/drivers/rig.h"
+#include "tests/display/drivers/driver_fixture.h"
 
 namespace voxeld::display {
 namespace {
@@ -20,37 +20,6 @@ using emulator::Fault;
 using sync::kMillisecond;
 using sync::kSecond;
 using Kind = VolumeOutcome::Kind;
-
-class Driver : public testing::Test {
- protected:
-  void Make(std::map<std::string, std::string> options = {}) {
-    rig_ = std::make_unique<Rig>(std::move(options));
-    source_ = std::make_unique<FrameSource>(rig_->display().info().layout, 1);
-  }
-  void Start(std::map<std::string, std::string> options = {}) {
-    Make(std::move(options));
-    rig_->Start();
-    ASSERT_EQ(rig_->display().state(), DisplayState::kShowing) << rig_->display().state_reason();
-  }
-  // Submits a volume and runs until it is presented.
-  void Show(double share = 1) {
-    frame_ = source_->Next(share);
-    rig_->display().Submit(frame_);
-    ASSERT_TRUE(rig_->RunUntilOutcome(frame_->volume));
-    const VolumeOutcome& outcome = *rig_->recorder().Of(frame_->volume);
-    ASSERT_EQ(outcome.kind, Kind::kPresented) << outcome.reason;
-    ASSERT_TRUE(SeesFrame());
-  }
-  bool SeesFrame() const {
-    const auto seen = rig_->device().Seen();
-    return seen.has_value() && seen->Rgb() == FrameToRgb(*frame_);
-  }
-  const VolumeOutcome& Newest() const { return rig_->recorder().outcomes.back(); }
-
-  std::unique_ptr<Rig> rig_;
-  std::unique_ptr<FrameSource> source_;
-  SliceFramePtr frame_;
-};
 
 TEST_F(Driver, AttachesAndShowsAVolume) {
   Start();
@@ -384,140 +353,6 @@ TEST_F(Driver, PredictsSweeps) {
   rig_->clock().Advance(period);  // the sweep that begins now is not a coming one
   EXPECT_EQ(rig_->display().ComingSweeps(1), (std::vector<sync::TimeNs>{shown + 2 * period}));
   EXPECT_TRUE(rig_->display().ComingSweeps(0).empty());
-}
-
-TEST_F(Driver, SaysHowWellItKnowsItsSweeps) {
-  Start();
-  EXPECT_EQ(rig_->display().Sweeps()->state, sync::SweepLock::State::kUnknown);
-  Show();
-  EXPECT_EQ(rig_->display().Sweeps()->state, sync::SweepLock::State::kLocking);
-  rig_->RunFor(kSecond);
-  EXPECT_EQ(rig_->display().Sweeps()->state, sync::SweepLock::State::kLocked);
-  EXPECT_NEAR(rig_->display().Sweeps()->drift_ppm, 0, 1);
-  EXPECT_EQ(rig_->display().Sweeps()->losses, 0u);
-  // Its word does not come any more: a loss, once. Then it does.
-  rig_->faults().Add(
-      {.endpoint = 0x82, .what = emulator::Fault::What::kNak, .amount = 450 * kMillisecond});
-  rig_->RunFor(400 * kMillisecond);
-  EXPECT_EQ(rig_->display().Sweeps()->state, sync::SweepLock::State::kUnknown);
-  EXPECT_EQ(rig_->display().Sweeps()->losses, 1u);
-  EXPECT_TRUE(rig_->display().ComingSweeps(1).empty());
-  rig_->RunFor(kSecond);
-  EXPECT_EQ(rig_->display().Sweeps()->state, sync::SweepLock::State::kLocked);
-  EXPECT_EQ(rig_->display().Sweeps()->losses, 1u);
-}
-
-// A link on which a volume takes a sweep and a half: each misses the sweep before which it was begun.
-TEST_F(Driver, CountsVolumesThatMissTheirSweep) {
-  // A volume of 1368 bytes in 50 ms.
-  Start({{"pacing", "27360"}});
-  Show();
-  EXPECT_EQ(rig_->display().stats().volumes_late, 0u)
-      << "before the first sweep there was none to miss";
-  for (int i = 0; i < 5; ++i) Show();
-  EXPECT_EQ(rig_->display().stats().volumes_late, 5u);
-  Show(0);  // one picture alone is in time, begun just after a sweep
-  EXPECT_EQ(rig_->display().stats().volumes_late, 5u);
-}
-
-TEST_F(Driver, HoldsVolumesUntilTheyAreOrderedShown) {
-  Make();
-  rig_->display().SetHolding();
-  rig_->recorder().has_newer = true;
-  rig_->Start();
-  frame_ = source_->Next(1);
-  rig_->display().Submit(frame_);
-  rig_->RunFor(kSecond);
-  ASSERT_EQ(rig_->recorder().held, std::vector<uint64_t>{1});
-  EXPECT_TRUE(rig_->recorder().outcomes.empty());
-  EXPECT_FALSE(rig_->device().Seen().has_value());
-  const std::vector<sync::TimeNs> coming = rig_->display().ComingSweeps(6);
-  ASSERT_EQ(coming.size(), 6u);
-  // Not as far ahead as it must come; then as far; then later.
-  rig_->display().OrderShown(1, coming[0], 2);
-  rig_->display().OrderShown(7, coming[3], 2);  // that is not held
-  rig_->display().OrderShown(1, coming[2] + 1000, 2);
-  rig_->RunFor(kMillisecond);
-  rig_->display().OrderShown(1, coming[4], 2);
-  rig_->RunFor(kMillisecond);
-  const auto& orders = rig_->recorder().orders;
-  ASSERT_EQ(orders.size(), 2u);  // the first one's answer is to an order that has been replaced
-  EXPECT_EQ(orders[0].at, coming[2] + 1000);
-  EXPECT_TRUE(orders[0].taken);
-  EXPECT_EQ(orders[1].at, coming[4]);
-  EXPECT_TRUE(orders[1].taken);
-  ASSERT_TRUE(rig_->RunUntilOutcome(1));
-  EXPECT_EQ(Newest().kind, Kind::kPresented);
-  EXPECT_NEAR(static_cast<double>(Newest().time_ns), static_cast<double>(coming[4]), 1000);
-  EXPECT_TRUE(SeesFrame());
-  EXPECT_EQ(rig_->display().stats().volumes_late, 0u) << "it was not late but held";
-}
-
-TEST_F(Driver, WhatIsHeldOrOnItsWayCanBeDropped) {
-  Make();
-  rig_->display().SetHolding();
-  rig_->recorder().has_newer = true;
-  rig_->Start();
-  const auto show = [&] {
-    frame_ = source_->Next(1);
-    rig_->display().Submit(frame_);
-    rig_->RunFor(kSecond);
-    rig_->display().OrderShown(frame_->volume, rig_->display().ComingSweeps(3)[2], 2);
-    ASSERT_TRUE(rig_->RunUntilOutcome(frame_->volume));
-    ASSERT_EQ(Newest().kind, Kind::kPresented) << Newest().reason;
-    ASSERT_TRUE(SeesFrame());
-  };
-  show();
-  const SliceFramePtr shown = frame_;
-  for (const bool held : {true, false}) {
-    SCOPED_TRACE(held);
-    const SliceFramePtr dropped = source_->Next(1);
-    rig_->display().Submit(dropped);
-    if (held) rig_->RunFor(kSecond);
-    rig_->display().DropHeld(dropped->volume, "another could not have it");
-    EXPECT_EQ(Newest().volume, dropped->volume);
-    EXPECT_EQ(Newest().kind, Kind::kLost);
-    EXPECT_EQ(Newest().reason, "another could not have it");
-    rig_->RunFor(kSecond);
-    EXPECT_EQ(rig_->recorder().Count(dropped->volume), 1);
-    EXPECT_TRUE(SeesFrame()) << "what was shown stays, and is not sent again";
-    EXPECT_EQ(rig_->display().state(), DisplayState::kShowing);
-    show();
-  }
-  // Dark and light again: nothing is shown that was not ordered.
-  const SliceFramePtr waits = source_->Next(1);
-  rig_->display().Submit(waits);
-  rig_->RunFor(kSecond);
-  ASSERT_TRUE(rig_->display().SetBlank(true).ok());
-  EXPECT_EQ(Newest().kind, Kind::kLost);
-  rig_->RunFor(kSecond);
-  ASSERT_TRUE(rig_->display().SetBlank(false).ok());
-  rig_->RunFor(kSecond);
-  EXPECT_TRUE(SeesFrame());
-  show();
-}
-
-TEST_F(Driver, TheDeviceKeepsThePowerLimit) {
-  Start();
-  EXPECT_EQ(rig_->device().power_limit_mw(), 0u);
-  ASSERT_TRUE(rig_->display().SetPowerLimit(12.5).ok());
-  rig_->RunFor(100 * kMillisecond);
-  EXPECT_EQ(rig_->device().power_limit_mw(), 12500u);
-  // One that comes again has it again, one from before the limit was taken away has none.
-  rig_->SetPlugged(false);
-  rig_->RunFor(100 * kMillisecond);
-  rig_->SetPlugged(true);
-  rig_->RunFor(2 * kSecond);
-  EXPECT_EQ(rig_->device().power_limit_mw(), 12500u);
-  ASSERT_TRUE(rig_->display().SetPowerLimit(0).ok());
-  rig_->RunFor(100 * kMillisecond);
-  EXPECT_EQ(rig_->device().power_limit_mw(), 0u);
-  for (const double wrong : {-1.0, 2e6, std::nan("")}) {
-    EXPECT_EQ(rig_->display().SetPowerLimit(wrong).code(), absl::StatusCode::kInvalidArgument);
-  }
-  Start({{"device_power_limit", "false"}});
-  EXPECT_EQ(rig_->display().SetPowerLimit(5).code(), absl::StatusCode::kUnimplemented);
-  EXPECT_EQ(rig_->display().power_limit_w(), 0);
 }
 
 // The device's clock starts when it is plugged in: its times are mapped to ours.

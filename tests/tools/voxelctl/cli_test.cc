@@ -115,8 +115,19 @@ TEST(CommandLine, TheOthers) {
   EXPECT_TRUE(std::get<PatternOptions>(Parse("pattern list").command).list);
   EXPECT_EQ(std::get<ProfileOptions>(Parse("profile check ./a.toml").command).profile, "./a.toml");
   EXPECT_TRUE(std::get<ProfileOptions>(Parse("profile list").command).list);
-  EXPECT_THAT(PatternNames(),
-              ElementsAre("axes", "corners", "grid", "ramp", "white", "bars", "density", "slices"));
+  const auto set = std::get<SetOptions>(
+      Parse("set --display d --brightness 0.5 --blank on --power-limit 40").command);
+  EXPECT_EQ(set.display, "d");
+  EXPECT_EQ(set.brightness, 0.5);
+  EXPECT_EQ(set.blank, true);
+  EXPECT_EQ(set.power_limit_w, 40);
+  EXPECT_FALSE(std::get<SetOptions>(Parse("set --blank off").command).brightness.has_value());
+  const auto calibrate =
+      std::get<CalibrateOptions>(Parse("calibrate voxlink,profile=./a.toml b.toml").command);
+  EXPECT_EQ(calibrate.display, "voxlink,profile=./a.toml");
+  EXPECT_EQ(calibrate.file, "b.toml");
+  EXPECT_THAT(PatternNames(), ElementsAre("axes", "corners", "grid", "ramp", "white", "bars",
+                                          "density", "slices", "posts", "frames"));
 }
 
 struct Wrong {
@@ -196,6 +207,10 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"profile", {"check PROFILE, or list"}},
         Wrong{"profile chek x", {"the action chek is not known", "check"}},
         Wrong{"profile check", {"profile check wants a PROFILE"}},
+        Wrong{"set", {"set wants something to set", "--power-limit"}},
+        Wrong{"set --brightness 2", {"--brightness", "2"}},
+        Wrong{"set --blank maybe", {"--blank", "maybe"}},
+        Wrong{"calibrate simulated", {"calibrate wants a DISPLAY and the name of a file"}},
         Wrong{"pattern axs", {"did you mean axes?"}},
         Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
 

@@ -399,6 +399,21 @@ TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
   EXPECT_EQ(RunTool({"clear", "--layer", "absent"}).code, 0);
 }
 
+TEST_F(CommandsTest, SetSetsWhatItSays) {
+  const Result result = RunTool({"set", "--brightness", "0.25", "--power-limit", "40"});
+  EXPECT_EQ(result.code, 0) << result.err;
+  FakeServer::Log log = server_.log();
+  ASSERT_EQ(log.updates.size(), 1u);
+  EXPECT_EQ(log.updates[0].brightness(), 0.25);
+  EXPECT_EQ(log.updates[0].power_limit_w(), 40);
+  EXPECT_FALSE(log.updates[0].has_blank());
+  EXPECT_EQ(RunTool({"set", "--blank", "on", "--display", "main"}).code, 0);
+  log = server_.log();
+  EXPECT_TRUE(log.updates[1].blank());
+  EXPECT_EQ(log.updates[1].name(), "main");
+  EXPECT_FALSE(log.updates[1].has_brightness());
+}
+
 TEST_F(CommandsTest, NobodyThere) {
   const Result result = RunAnywhere({"--server", "unix:" + folder_.Path("nobody"), "stats"});
   EXPECT_EQ(result.code, 1);

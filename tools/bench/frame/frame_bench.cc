@@ -65,8 +65,8 @@ struct Beside {
 absl::StatusOr<Beside> BesideOf(const Scene& scene, bool cuda, int threads) {
   Beside out;
   if (cuda) {
-    auto ceiling = scene.slicing_only ? DeviceCopyCeiling(BytesCopied(scene))
-                                      : DeviceToHostCeiling(scene.target.layout.bytes());
+    auto ceiling = scene.in_device ? DeviceCopyCeiling(BytesCopied(scene))
+                                   : DeviceToHostCeiling(scene.target.layout.bytes());
     if (!ceiling.ok()) return ceiling.status();
     out.ceiling = *std::move(ceiling);
   } else {

@@ -34,6 +34,7 @@ absl::StatusOr<Scene> SceneOf(const std::string& name, uint64_t seed, double sha
                          {display->geometry, display->layout, display->tone, {}});
   scene.slicing_only = true;
   scene.traffic = Traffic::kVolumeAndPictures;
+  scene.in_device = true;
   const display::VoxelGrid& grid = display->geometry.grid;
   std::mt19937_64 random(seed);
   const auto at = [&](double lo, double hi) {

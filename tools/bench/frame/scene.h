@@ -46,6 +46,8 @@ struct Scene {
   double volumes_per_second = 0;  // that the display shows; 0: as fast as may be
   bool slicing_only = false;      // what is measured is slice_ns
   Traffic traffic = Traffic::kPictures;
+  bool in_device =
+      false;  // on a GPU that copy is within its memory; else of the pictures to the host
   bool plain_peer = false;  // measured beside a plain loop over the same lines
 };
 

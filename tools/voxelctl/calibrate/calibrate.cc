@@ -1,5 +1,6 @@
 #include "tools/voxelctl/calibrate/calibrate.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -16,6 +17,7 @@
 #include "absl/strings/str_split.h"
 #include "daemon/config/display_config.h"
 #include "daemon/config/display_view.h"
+#include "display/geometry/corrector.h"
 #include "display/profiles/profile.h"
 #include "display/usb/libusb/libusb_bus.h"
 #include "tools/voxelctl/ask/asker.h"
@@ -95,7 +97,6 @@ class Walk {
       changed_ = true;
       return status;
     }
-    if (!absl::IsInvalidArgument(status)) return status;
     console_.Say(absl::StrCat("  that will not do: ", EscapeForTerminal(status.message())));
     display_.options = before;
     return Try(pattern);
@@ -119,6 +120,8 @@ class Walk {
   std::vector<Choice> Turns() const {
     std::vector<Choice> turns = {{"ok", "that is what is seen"}};
     if (As<display::Lattice>() != nullptr) {
+      // Others' lights are where their list says.
+      if (display_.driver != "fadecandy" && display_.driver != "network") return turns;
       for (const char* axis : {"x", "y", "z"}) {
         turns.push_back({absl::StrCat("flip-", axis), absl::StrCat("the other way along ", axis)});
       }
@@ -126,8 +129,9 @@ class Walk {
     }
     turns.push_back({"mirror-u", "each picture's left and right"});
     turns.push_back({"mirror-v", "each picture's top and bottom"});
-    if (As<display::PlanarStack>() != nullptr) {
-      turns.push_back({"reverse", "the first slice is where the last one is thought to be"});
+    if (const auto* planar = As<display::PlanarStack>()) {
+      if (planar->strokes == 1)
+        turns.push_back({"reverse", "the first slice is where the last one is thought to be"});
     } else {
       turns.push_back({"direction", "it turns the other way"});
       turns.push_back({"quarter", "red is where green should be: a quarter of a turn on"});
@@ -183,7 +187,9 @@ class Walk {
     const auto* rotor = As<display::Rotor>();
     if (rotor == nullptr) return absl::OkStatus();
     const size_t panels = rotor->panels.size();
-    const double pitch = rotor->panels.front().pitch_u_mm;
+    const double pitch = display_.options.contains("pitch_mm")
+                             ? Numbers(display_.options, "pitch_mm", 1).front()
+                             : 1;
     if (absl::Status status = trial_->Show(TestPattern::kPosts); !status.ok()) return status;
     console_.Say(
         "Twelve upright posts stand in a cross. A panel that is not as far from the axis as it is "
@@ -222,20 +228,15 @@ class Walk {
     }
   }
 
-  // Half the picture's sides, mm; nothing of a shape whose pictures have no keystone.
-  std::optional<std::pair<double, double>> HalfPicture() const {
-    const auto half = [](const auto& shape) {
-      return std::pair(shape.width_px * shape.pitch_u_mm / 2,
-                       shape.height_px * shape.pitch_v_mm / 2);
-    };
-    if (const auto* planar = As<display::PlanarStack>()) return half(*planar);
-    if (const auto* helix = As<display::Helix>()) return half(*helix);
-    return std::nullopt;
-  }
-
   absl::Status Keystone() {
-    const auto half = HalfPicture();
+    const std::optional<display::PicturePlace> half = display::HalfPicture(trial_->info().geometry);
     if (!half.has_value()) return absl::OkStatus();
+    const auto given = display_.options.find("keystone_mm");
+    if (given != display_.options.end() &&
+        std::count(given->second.begin(), given->second.end(), ';') > 7) {
+      console_.Say("Its keystone is given for each slice: that is left as it is.");
+      return absl::OkStatus();
+    }
     if (absl::Status status = trial_->Show(TestPattern::kFrames); !status.ok()) return status;
     console_.Say(
         "Three lying rectangles with their diagonals, at the bottom, in the middle and at the top. "
@@ -253,16 +254,14 @@ class Walk {
       OptionMap options = display_.options;
       options.erase("keystone_mm");
       if (what == "measure") {
-        const double at[4][2] = {{-half->first, -half->second},
-                                 {half->first, -half->second},
-                                 {half->first, half->second},
-                                 {-half->first, half->second}};
+        const double at[4][2] = {
+            {-half->u, -half->v}, {half->u, -half->v}, {half->u, half->v}, {-half->u, half->v}};
         const std::vector<double> now = Numbers(display_.options, "keystone_mm", 8);
-        const bool given = display_.options.contains("keystone_mm");
+        const bool known = display_.options.contains("keystone_mm");
         std::vector<std::string> corners;
         for (size_t corner = 0; corner < 4; ++corner) {
           for (size_t axis = 0; axis < 2; ++axis) {
-            const double where = given ? now[corner * 2 + axis] : at[corner][axis];
+            const double where = known ? now[corner * 2 + axis] : at[corner][axis];
             corners.push_back(
                 asker_.Number(absl::StrCat("The ", kCorners[corner], " corner: millimetres to the ",
                                            axis == 0 ? "right of" : "back of", " the middle?"),
@@ -295,15 +294,18 @@ std::string Quoted(const std::string& text) {
 }
 
 // The display's own profile's options and those that were given, in one.
-absl::StatusOr<daemon::DisplayConfig> ReadDisplay(const std::string& text, std::string* title) {
+absl::StatusOr<daemon::DisplayConfig> ReadDisplay(const std::string& text,
+                                                  display::Profile* profile) {
   const std::string first = text.substr(0, text.find(','));
   absl::StatusOr<daemon::DisplayConfig> display = daemon::ParseDisplayOption(
       absl::StrContains(first, '=') ? text : absl::StrCat(first, "=", text));
   if (!display.ok()) return display;
+  // As the daemon would: whether profile and driver go together, among all else.
+  if (const auto split = daemon::SplitDisplayOptions(*display); !split.ok()) return split.status();
   if (const auto named = display->options.extract("profile")) {
-    const absl::StatusOr<display::Profile> profile = display::LoadProfile(named.mapped());
-    if (!profile.ok()) return profile.status();
-    *title = profile->title;
+    absl::StatusOr<display::Profile> loaded = display::LoadProfile(named.mapped());
+    if (!loaded.ok()) return loaded.status();
+    *profile = *std::move(loaded);
     display->options.insert(profile->options.begin(), profile->options.end());
   }
   return display;
@@ -316,8 +318,8 @@ absl::Status Calibrate(const CalibrateOptions& options, std::istream& in, Consol
     return absl::AlreadyExistsError(absl::StrCat(EscapeForTerminal(options.file),
                                                  " is there already; give the name of a new file"));
   }
-  std::string title;
-  absl::StatusOr<daemon::DisplayConfig> display = ReadDisplay(options.display, &title);
+  display::Profile profile;
+  absl::StatusOr<daemon::DisplayConfig> display = ReadDisplay(options.display, &profile);
   if (!display.ok()) return display.status();
   const std::string driver = display->driver, name = display->name;
   // From here on what the device says of how it was put together does not count.
@@ -326,7 +328,8 @@ absl::Status Calibrate(const CalibrateOptions& options, std::istream& in, Consol
   if (absl::Status status = walk.Run(); !status.ok()) return status;
 
   std::ofstream file(options.file, std::ios::binary);
-  if (!title.empty()) file << "title = " << Quoted(title) << "\n";
+  if (!profile.title.empty()) file << "title = " << Quoted(profile.title) << "\n";
+  if (!profile.driver.empty()) file << "driver = " << Quoted(profile.driver) << "\n";
   for (const auto& [key, value] : walk.options()) file << key << " = " << Quoted(value) << "\n";
   file.close();
   if (!file) {

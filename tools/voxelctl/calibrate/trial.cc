@@ -47,10 +47,8 @@ absl::StatusOr<std::unique_ptr<Trial>> Trial::Start(const daemon::DisplayConfig&
   if (absl::Status status = trial->core_.Start(); !status.ok()) return status;
   if (absl::Status status = trial->Show(pattern); !status.ok()) return status;
   // The next volume that is shown has the pattern.
-  const absl::StatusOr<display::DecodedVolume> shown =
-      Await<display::DecodedVolume>([&](auto reply) {
-        trial->core_.Capture("", limit, 0, std::move(reply));
-      });
+  const absl::StatusOr<display::DecodedVolume> shown = Await<display::DecodedVolume>(
+      [&](auto reply) { trial->core_.Capture("", limit, 0, std::move(reply)); });
   if (!shown.ok()) {
     return absl::UnavailableError(
         absl::StrCat("display \"", display.name, "\" does not show: ", shown.status().message()));

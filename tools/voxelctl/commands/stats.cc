@@ -91,6 +91,11 @@ std::string Full(const v1::Stats& stats) {
   row("  put off", [](const D& d) { return Grouped(d.genlock_postponed()); });
   row("  slips", [](const D& d) { return Grouped(d.genlock_slips()); });
   row("light", [](const D& d) { return absl::StrFormat("%.0f %%", d.light() * 100); });
+  row("power", [](const D& d) {
+    return d.power_unlimited() ? std::string("limit not kept")
+           : d.power_w() > 0   ? absl::StrFormat("%.3g W", d.power_w())
+                               : std::string("-");
+  });
   row("engine faults", [](const D& d) { return Grouped(d.engine_faults()); });
   row("  returns", [](const D& d) { return Grouped(d.engine_returns()); });
   std::string text = absl::StrCat(Server(stats), "\n", table.Text());

@@ -3,16 +3,15 @@
 
 #include <vector>
 
-#include "display/api/geometry.h"
-#include "display/api/slice_frame.h"
 #include "display/conformance/suite.h"
+#include "display/drivers/voxlink/verify/suite.h"
 
 namespace voxeld::display::voxlink {
 
 using Cases = std::vector<conformance::Case>;
 
 // That the device can be driven as a display's options say.
-conformance::Case ConfiguredCase(const Geometry& geometry, const FrameLayout& layout);
+conformance::Case ConfiguredCase(const Configured& configured);
 
 void AddUsbCases(Cases& cases);      // §3
 void AddRequestCases(Cases& cases);  // §4.1 to §4.4

@@ -208,11 +208,12 @@ void ModeInSession(Probe& probe) {
   session.RoundTrip();
 }
 
-void Configured(Probe& probe, const Geometry& geometry, const FrameLayout& layout) {
+void IsAsConfigured(Probe& probe, const Configured& configured) {
   Session session(probe);
   const DeviceCapabilities& device = session.capabilities();
   if (!session.ok()) return;
-  const absl::Status status = CheckCapabilities(device, geometry, layout);
+  const absl::Status status =
+      CheckCapabilities(device, configured.geometry, configured.layout, configured.calibrated);
   probe.check().Expect(status.ok(), "a device that is what the display's options say",
                        std::string(status.message()));
 }
@@ -292,9 +293,9 @@ void AddRequestCases(Cases& cases) {
   add("status.clock", "time_ns counts nanoseconds", "6", &StatusClock);
 }
 
-conformance::Case ConfiguredCase(const Geometry& geometry, const FrameLayout& layout) {
+conformance::Case ConfiguredCase(const Configured& configured) {
   return {"capabilities.configured", "the device is what the display's options say", "4.2",
-          [geometry, layout](Probe& probe) { Configured(probe, geometry, layout); }};
+          [configured](Probe& probe) { IsAsConfigured(probe, configured); }};
 }
 
 }  // namespace voxeld::display::voxlink

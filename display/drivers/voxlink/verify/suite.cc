@@ -15,7 +15,7 @@ conformance::Suite MakeSuite(const Configured* configured) {
   AddUsbCases(suite.cases);
   AddRequestCases(suite.cases);
   if (configured != nullptr) {
-    suite.cases.push_back(ConfiguredCase(configured->geometry, configured->layout));
+    suite.cases.push_back(ConfiguredCase(*configured));
   }
   AddSessionCases(suite.cases);
   AddStreamCases(suite.cases);

@@ -10,6 +10,7 @@ namespace voxeld::display::voxlink {
 struct Configured {
   Geometry geometry;
   FrameLayout layout;
+  bool calibrated = false;  // as CheckCapabilities has it
 };
 
 // `configured`: what the device is said to be; null: nothing is said.

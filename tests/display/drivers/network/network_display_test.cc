@@ -111,6 +111,26 @@ TEST_F(Network, WhatIsSentIsTheVolume) {
   }
 }
 
+// After each attach the picture comes twice, with numbers half their range apart.
+TEST_F(Network, AReceiverThatRemembersE131sNumbersTakesTheFirstPicture) {
+  Make({{"cube", "20x20x20"}, {"protocol", "e131"}});
+  ASSERT_TRUE(display_->Start(&recorder_, [] {}).ok());
+  ASSERT_TRUE(RunUntil([&] { return display_->state() == DisplayState::kShowing; }));
+  ASSERT_EQ(wire_.packets.size(), 2u * 48);
+  for (size_t slice = 0; slice < 48; ++slice) {
+    const auto number = [&](size_t i) { return std::to_integer<int>(wire_.packets[i][111]); };
+    EXPECT_EQ((number(48 + slice) - number(slice) + 256) % 256, 129) << slice;
+  }
+}
+
+TEST_F(Network, KeepsNoPowerLimitWhetherItIsThereOrNot) {
+  Make({{"cube", "4x4x4"}});
+  EXPECT_EQ(display_->SetPowerLimit(5).code(), absl::StatusCode::kUnimplemented);
+  Start();
+  EXPECT_EQ(display_->SetPowerLimit(5).code(), absl::StatusCode::kUnimplemented);
+  EXPECT_FALSE(display_->keeps_power_limit());
+}
+
 TEST_F(Network, OnlyWhatChangedIsSentAndTheLastPushes) {
   Make({{"cube", "20x20x20"}});
   Start();
