@@ -38,7 +38,7 @@ line() {
 # Sessions of the driver (device 1) and by hand (device 2); times are of day.
 driver='usb.device_address==1' hand='usb.device_address==2'
 expect 'frame.number==1' frame.time_epoch=1750000001.000000000
-expect "$driver && voxlink.request && usb.urb_type=='S'" voxlink.request=1,6,3,7,9,5,6
+expect "$driver && voxlink.request && usb.urb_type=='S'" voxlink.request=1,6,3,7,8,9,5,6
 
 # Requests and their answers.
 expect "$driver && voxlink.request==1 && usb.urb_type=='S'" voxlink.request.page=0

@@ -351,10 +351,6 @@ Scene HugeLines(uint64_t count, uint64_t seed) {
 }
 
 constexpr Named kScenes[] = {
-    {"profiles",
-     [](uint64_t seed, double share) -> std::vector<MakeScene> {
-       return ProfileScenes(seed, share);
-     }},
     {"lines1g",
      [](uint64_t seed, double share) -> std::vector<MakeScene> {
        return {[=] { return UniformLines("lines1g", LargeStack(), Share(1e9, share), seed); }};
@@ -447,6 +443,10 @@ constexpr Named kScenes[] = {
     {"tilted",
      [](uint64_t seed, double) -> std::vector<MakeScene> {
        return {[=] { return LitRotor("tilted", 10, seed); }};
+     }},
+    {"profiles",
+     [](uint64_t seed, double share) -> std::vector<MakeScene> {
+       return ProfileScenes(seed, share);
      }},
 };
 
