@@ -2,6 +2,7 @@
 #include <pthread.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -24,6 +25,7 @@
 #include "daemon/listen/counters.h"
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
+#include "daemon/pipeline/genlock.h"
 #include "daemon/pipeline/view.h"
 #include "daemon/process/process.h"
 #include "daemon/services/server.h"
@@ -71,6 +73,15 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, const display::Drive
             CheckGpus(options->gpus, config.engine.kind, (*made)->info().layout.slices);
         !status.ok()) {
       return wrong(status);
+    }
+    if (const std::string& genlock = options->setup.genlock; !genlock.empty()) {
+      const auto other = std::find_if(displays.begin(), displays.end(),
+                                      [&](const auto& d) { return d.setup.genlock == genlock; });
+      const display::DisplayInfo* info =
+          other == displays.end() ? nullptr : &other->display->info();
+      if (absl::Status status = CheckGenlock(genlock, **made, info); !status.ok()) {
+        return wrong(status);
+      }
     }
     displays.push_back({*std::move(made), options->setup, options->gpus});
   }

@@ -40,8 +40,8 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
   app.footer(
       "ADDR is HOST:PORT or unix:PATH. Without --config the first of $XDG_CONFIG_HOME/voxeld/"
       "voxeld.toml\n(~/.config), /etc/voxeld/voxeld.toml is read. --listen and --display replace "
-      "the defaults and the file's.\nOf every display are view, view_box, and gpus (such as "
-      "gpus=0;1: the slices shared out over these GPUs).");
+      "the defaults and the file's.\nOf every display are profile, view, view_box, gpus (such as "
+      "gpus=0;1: the slices shared out over these GPUs), genlock, power_limit and power_full.");
   app.add_option("--config", out.config, "Configuration file (TOML)")->type_name("FILE");
   app.add_option("--listen", out.listen, "Where to serve gRPC; may be repeated")
       ->type_name("ADDR")

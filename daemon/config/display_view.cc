@@ -114,9 +114,9 @@ absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display)
                                     std::pair("power_full", &split.setup.power_full_w)}) {
     const auto text = split.driver.extract(name);
     if (text.empty()) continue;
-    if (!absl::SimpleAtod(text.mapped(), watts) || !(*watts > 0 && *watts <= kMostWatts)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(name, " is \"", text.mapped(), "\"; give watts, above 0 to ", kMostWatts));
+    if (!absl::SimpleAtod(text.mapped(), watts) || !(*watts >= 0 && *watts <= kMostWatts)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          name, " is \"", text.mapped(), "\"; give watts, from 0 (none) to ", kMostWatts));
     }
   }
   if (const auto gpus = split.driver.extract("gpus")) {

@@ -1,4 +1,5 @@
 // Core's displays: what is asked of their pipelines, and the answers brought together.
+#include <algorithm>
 #include <set>
 #include <utility>
 
@@ -32,21 +33,10 @@ MemoryFigures MemoryOf(const Budget& budget) {
 
 absl::StatusOr<std::shared_ptr<Genlock>> Core::Impl::JoinGenlock(const display::Display& display,
                                                                  const std::string& name) {
-  const display::DisplayInfo& info = display.info();
-  if (!display.can_hold()) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "display \"", info.name, "\" is in genlock \"", name, "\", and displays of driver ",
-        info.driver,
-        " cannot hold a volume until it is ordered shown; voxlink and simulated ones can"));
-  }
-  for (const auto& slot : displays_) {
-    if (slot->genlock == name && slot->info.volumes_per_second != info.volumes_per_second) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("display \"", info.name, "\" has ", info.volumes_per_second,
-                       " volumes/s and \"", slot->info.name, "\", of the same genlock \"", name,
-                       "\", ", slot->info.volumes_per_second, "; give them the same rate"));
-    }
-  }
+  const auto other = std::find_if(displays_.begin(), displays_.end(),
+                                  [&](const auto& slot) { return slot->genlock == name; });
+  const display::DisplayInfo* info = other == displays_.end() ? nullptr : &(*other)->info;
+  if (absl::Status status = CheckGenlock(name, display, info); !status.ok()) return status;
   std::shared_ptr<Genlock>& genlock = genlocks_[name];
   if (genlock == nullptr) {
     genlock = std::make_shared<Genlock>(clock_, [loop = loop_](std::shared_ptr<const void> what) {

@@ -17,6 +17,24 @@ constexpr sync::TimeNs kQuiet = 300 * sync::kMillisecond;
 
 }  // namespace
 
+absl::Status CheckGenlock(const std::string& genlock, const display::Display& display,
+                          const display::DisplayInfo* other) {
+  const display::DisplayInfo& info = display.info();
+  if (!display.can_hold()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "display \"", info.name, "\" is in genlock \"", genlock, "\", and displays of driver ",
+        info.driver,
+        " cannot hold a volume until it is ordered shown; voxlink and simulated ones can"));
+  }
+  if (other != nullptr && other->volumes_per_second != info.volumes_per_second) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("display \"", info.name, "\" has ", info.volumes_per_second,
+                     " volumes/s and \"", other->name, "\", of the same genlock \"", genlock,
+                     "\", ", other->volumes_per_second, "; give them the same rate"));
+  }
+  return absl::OkStatus();
+}
+
 Genlock::Genlock(sync::Clock& clock, std::function<void(std::shared_ptr<const void>)> retire)
     : clock_(clock), retire_(std::move(retire)) {}
 

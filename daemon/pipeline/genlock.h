@@ -30,12 +30,18 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "daemon/scene/snapshot.h"
+#include "display/api/display.h"
 #include "display/sync/backoff.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
 
 namespace voxeld::daemon {
+
+// Whether a display can be a member of the group `genlock`, beside one that is (null: it is the first). InvalidArgument says why not.
+absl::Status CheckGenlock(const std::string& genlock, const display::Display& display,
+                          const display::DisplayInfo* other);
 
 class Genlock {
  public:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <variant>
@@ -49,6 +50,20 @@ std::pair<bool, bool> MirroredIn(const Geometry& geometry, int32_t slice) {
   return {helix.mirror_u, helix.mirror_v};
 }
 
+// Of a turning display the slices from one number to the next, so that at their inner end, which begins at column `left`, they
+// stand four pixels apart; all of one panel.
+int32_t Apart(const Geometry& geometry, int32_t slices, int32_t left) {
+  constexpr double kPixelsApart = 4;
+  const auto* rotor = std::get_if<display::Rotor>(&geometry.shape);
+  const auto panels = rotor == nullptr ? 1 : static_cast<int32_t>(rotor->panels.size());
+  const int32_t width =
+      std::visit([](const auto& shape) { return shape.width_px; }, geometry.shape);
+  const double radius = std::max(1.0, std::max(0, left) - width / 2.0);
+  const auto every =
+      static_cast<int32_t>(std::ceil(kPixelsApart * slices / (2 * std::numbers::pi * radius)));
+  return std::min(slices, (every + panels - 1) / panels * panels);
+}
+
 std::vector<NumberedVoxel> OfLights(const Geometry& geometry, const display::Lattice& lattice) {
   const display::Corrector corrector(geometry.correction);
   std::vector<NumberedVoxel> out;
@@ -71,13 +86,14 @@ std::vector<NumberedVoxel> SliceNumbers(const Geometry& geometry) {
   const auto [width, height] = std::visit(
       [](const auto& shape) { return std::pair(shape.width_px, shape.height_px); }, geometry.shape);
   const int32_t slices = display::SliceCount(geometry);
-  const int32_t every = (slices + kMostNumbers - 1) / kMostNumbers;
   const bool turns = !std::holds_alternative<display::PlanarStack>(geometry.shape);
   const auto digits = static_cast<int32_t>(std::to_string(slices - 1).size());
   const int32_t scale = std::max(1, std::min(height / 40, width / (16 * digits)));
   const int32_t wide = (digits * kAdvance - 1) * scale;
   // Side by side, so that they do not hide each other: in a turning display they stand on a ring anyway.
   const int32_t places = turns ? 1 : std::max(1, width / (wide + 2 * scale));
+  const int32_t every = std::max((slices + kMostNumbers - 1) / kMostNumbers,
+                                 turns ? Apart(geometry, slices, width - wide - width / 16) : 1);
   const display::Corrector corrector(geometry.correction);
   std::vector<NumberedVoxel> out;
   for (int32_t slice = 0; slice < slices; slice += every) {

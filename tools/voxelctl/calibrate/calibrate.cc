@@ -1,5 +1,7 @@
 #include "tools/voxelctl/calibrate/calibrate.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -317,6 +319,12 @@ absl::Status Calibrate(const CalibrateOptions& options, std::istream& in, Consol
   if (std::filesystem::exists(options.file)) {
     return absl::AlreadyExistsError(absl::StrCat(EscapeForTerminal(options.file),
                                                  " is there already; give the name of a new file"));
+  }
+  const std::filesystem::path folder = std::filesystem::absolute(options.file).parent_path();
+  if (access(folder.c_str(), W_OK) != 0) {
+    return absl::InvalidArgumentError(absl::StrCat(EscapeForTerminal(options.file),
+                                                   " cannot be written; give a file in a folder "
+                                                   "that is there and yours"));
   }
   display::Profile profile;
   absl::StatusOr<daemon::DisplayConfig> display = ReadDisplay(options.display, &profile);

@@ -50,8 +50,11 @@ absl::StatusOr<std::unique_ptr<Trial>> Trial::Start(const daemon::DisplayConfig&
   const absl::StatusOr<display::DecodedVolume> shown = Await<display::DecodedVolume>(
       [&](auto reply) { trial->core_.Capture("", limit, 0, std::move(reply)); });
   if (!shown.ok()) {
-    return absl::UnavailableError(
-        absl::StrCat("display \"", display.name, "\" does not show: ", shown.status().message()));
+    const auto state = Await<daemon::DisplayDescription>(
+        [&](auto reply) { trial->core_.GetDisplay("", std::move(reply)); });
+    return absl::UnavailableError(absl::StrCat(
+        "display \"", display.name, "\" does not show within ", limit / sync::kSecond,
+        " s: ", state.ok() ? state->state_reason : std::string(state.status().message())));
   }
   return trial;
 }

@@ -243,10 +243,13 @@ class Parser {
     CLI::App* c = Add("set", "Sets a display's brightness, blank and power limit");
     c->add_option("--display", set_.display, "Only on this display (default: on all)")
         ->type_name("NAME");
-    AddNumber(c, "--brightness", &set_brightness_, 0, 1, "Of the display, 0 to 1", "SHARE");
+    WantNumber(c->add_option("--brightness", set_brightness_, "Of the display, 0 to 1")
+                   ->type_name("SHARE"),
+               0, 1);
     c->add_option("--blank", set_blank_, "on: dark; off: light again")->type_name("on|off");
-    AddNumber(c, "--power-limit", &set_power_, 0, 1e6, "The most that it may draw; 0: no limit",
-              "WATTS");
+    WantNumber(c->add_option("--power-limit", set_power_, "The most that it may draw; 0: no limit")
+                   ->type_name("WATTS"),
+               0, 1e6);
   }
 
   void AddCalibrate() {

@@ -62,6 +62,8 @@ absl::Status Displays(Connection& connection, Console& console) {
                {"PIXELS"},
                {"VOLUMES/s", Align::kRight},
                {"BRIGHTNESS", Align::kRight},
+               {"LIMIT W", Align::kRight},
+               {"GENLOCK"},
                {"PATTERN"}});
   for (const v1::DisplayDescription& d : response->displays()) {
     const v1::VoxelGrid& grid = d.geometry().grid();
@@ -74,6 +76,8 @@ absl::Status Displays(Connection& connection, Console& console) {
                absl::StrCat(d.layout().width(), "x", d.layout().height()),
                absl::StrFormat("%.4g", d.volumes_per_second()),
                absl::StrFormat("%.0f %%", d.brightness() * 100),
+               d.power_limit_w() > 0 ? absl::StrFormat("%.4g", d.power_limit_w()) : "-",
+               d.genlock().empty() ? "-" : d.genlock(),
                Word(v1::TestPattern_Name(d.test_pattern()), "TEST_PATTERN_")});
   }
   console.Data(table.Text());

@@ -86,12 +86,15 @@ class Socket {
 
 PortState LookAtPort(uint16_t port) {
   if (Socket(port).Bind()) return PortState::kFree;
-  const std::string answer =
+  // Clients' port speaks HTTP/2, begins with its settings (RFC 9113 §3.4), and cuts what begins otherwise.
+  using namespace std::string_literals;
+  const std::string settings =
+      Socket(port).Ask("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0"s);
+  if (settings.size() >= 9 && settings[3] == 4 && settings[0] == 0) return PortState::kVoxeld;
+  // The http port says how it is.
+  const std::string health =
       Socket(port).Ask("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n");
-  // The http port says how it is; the other one speaks HTTP/2, and begins with its settings (RFC 9113 §3.4).
-  const bool healthz = absl::StrContains(answer, "\"reasons\"");
-  const bool http2 = answer.size() >= 9 && answer[3] == 4 && answer[0] == 0;
-  return healthz || http2 ? PortState::kVoxeld : PortState::kOther;
+  return absl::StrContains(health, "\"reasons\"") ? PortState::kVoxeld : PortState::kOther;
 }
 
 }  // namespace
