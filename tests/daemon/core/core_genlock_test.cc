@@ -108,7 +108,7 @@ class Wall {
       const sync::TimeNs next = Settle();
       ++turns_;
       if (core_->Step() <= clock_.Now()) ++spins_;
-      clock_.AdvanceTo(std::clamp(next, clock_.Now() + 1000, end));
+      clock_.AdvanceTo(std::min(end, std::max(next, clock_.Now() + 1000)));
     }
     Settle();
   }

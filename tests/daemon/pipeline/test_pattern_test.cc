@@ -256,7 +256,7 @@ TEST(TestPattern, NumbersStandInTheirSlices) {
   for (display::Geometry geometry : {display::Geometry{rotor, {}}, display::Geometry{helix, {}}}) {
     geometry.grid = display::DefaultGrid(geometry);
     const std::vector<NumberedVoxel> voxels = SliceNumbers(geometry);
-    EXPECT_GT(voxels.size(), 400u);
+    EXPECT_GT(voxels.size(), 300u);
     for (const NumberedVoxel& voxel : voxels) {
       EXPECT_TRUE(voxel.at.x >= 0 && voxel.at.x < geometry.grid.nx && voxel.at.y >= 0 &&
                   voxel.at.y < geometry.grid.ny && voxel.at.z >= 0 &&

@@ -1,5 +1,7 @@
 #include "display/api/pixels.h"
 
+#include <random>
+#include <span>
 #include <vector>
 
 #include "gtest/gtest.h"
