@@ -42,7 +42,8 @@ struct Moment {
 class Toner {
  public:
   explicit Toner(const Target& target) : target_(target) {
-    if (target.tone.dither == display::Dither::kBlueNoise) noise_.assign(BlueNoise().begin(), BlueNoise().end());
+    if (target.tone.dither == display::Dither::kBlueNoise)
+      noise_.assign(BlueNoise().begin(), BlueNoise().end());
     if (target.tone.density == display::Density::kEven) {
       table_ = display::BuildFootprints(target.geometry, target.tone.sampling);
       factors_ = display::EvenFactors(table_, target.geometry.grid,
