@@ -83,13 +83,13 @@ class Wall {
   void Show(uint64_t number) {
     std::vector<Operation> all;
     for (int bit = 0; bit < kBits; ++bit) {
+      const int column = bit % 10, row = bit / 10;
       const uint32_t colour =
           number >> bit & 1 ? 0xFFFFFF : 0x0000FF;  // blue counts as lit and as 0
       if (((number ^ before_) >> bit & 1) == 0 && before_ != 0) continue;
       auto put = testing::Sequence(
-          sequence_,
-          Put("a", std::to_string(bit),
-              Entity1(Dots(0, colour), testing::Shift(bit % 10 + 0.5, bit / 10 + 0.5, 1.5))));
+          sequence_, Put("a", std::to_string(bit),
+                         Entity1(Dots(0, colour), testing::Shift(column + 0.5, row + 0.5, 1.5))));
       sequence_ += put.size();
       all.insert(all.end(), put.begin(), put.end());
     }

@@ -25,7 +25,7 @@ absl::StatusOr<T> Await(const Call& call) {
 }  // namespace
 
 Trial::Trial(display::DisplayInfo info, sync::Clock& clock)
-    : info_(std::move(info)), clock_(clock), core_({.version = "calibrate"}, clock) {}
+    : info_(std::move(info)), core_({.version = "calibrate"}, clock) {}
 
 Trial::~Trial() { core_.Stop(kStopLimit).IgnoreError(); }
 

@@ -33,7 +33,6 @@ class Trial {
   Trial(display::DisplayInfo info, sync::Clock& clock);
 
   const display::DisplayInfo info_;
-  sync::Clock& clock_;
   daemon::Core core_;
 };
 
