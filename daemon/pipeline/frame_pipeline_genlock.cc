@@ -12,7 +12,7 @@ sync::TimeNs FramePipeline::StepGenlock() {
   genlock_->SetSweeps(member_, known ? coming[0] : 0, known ? coming[1] - coming[0] : 0);
   const sync::TimeNs next = genlock_->Step();
   while (true) {
-    const Genlock::Command command = genlock_->ToDo(member_);
+    const Genlock::Command command = genlock_->NextCommand(member_);
     switch (command.what) {
       case Genlock::Command::What::kNothing:
         return next;

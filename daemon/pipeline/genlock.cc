@@ -150,7 +150,7 @@ void Genlock::Failed(Member member, uint64_t volume, const std::string& why) {
   Decide();
 }
 
-Genlock::Command Genlock::ToDo(Member member) {
+Genlock::Command Genlock::NextCommand(Member member) {
   sync::MutexLock lock(mutex_);
   State& state = members_[member];
   if (!open_ || state.stage == Stage::kOut) return {};

@@ -20,7 +20,7 @@
 // least) may show the volume though the others have been put off; so may one to which the new order comes too late.
 // It is counted: `slips`.
 //
-// Thread-safe. Members are woken when there may be something for them to do; they ask by ToDraw and ToDo.
+// Thread-safe. Members are woken when there may be something for them to do; they ask by ToDraw and NextCommand.
 #pragma once
 
 #include <cstdint>
@@ -90,7 +90,7 @@ class Genlock {
   void Failed(Member member, uint64_t volume, const std::string& why);
 
   // What it has to do with a volume; each order is given once.
-  Command ToDo(Member member);
+  Command NextCommand(Member member);
   // Does what is due; when to call again at the latest.
   sync::TimeNs Step();
 

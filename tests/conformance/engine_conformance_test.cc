@@ -14,7 +14,8 @@ INSTANTIATE_TEST_SUITE_P(Engines, EngineConformance, testing::ValuesIn(EngineCas
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(EngineConformance, RandomScenesEqualTheOracle) {
-  const uint64_t seed = SeedOr(20269044);
+  constexpr uint64_t kScenes = 20269044;
+  const uint64_t seed = SeedOr(kScenes);
   EngineDriver engine = Make();
   uint64_t lit = 0;
   for (uint64_t i = 0; i < 120; ++i) {
@@ -32,7 +33,7 @@ TEST_P(EngineConformance, RandomScenesEqualTheOracle) {
     lit += CountLit(engine.Voxels());
   }
   std::cout << lit << " voxels lit\n";
-  EXPECT_GT(lit, 2000u);
+  EXPECT_GT(lit, seed == kScenes ? 10000u : 2000u) << "others may be sparser";
 }
 
 TEST_P(EngineConformance, PartsJoinedEqualTheWhole) {

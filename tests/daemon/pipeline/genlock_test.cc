@@ -42,7 +42,7 @@ class Locked : public ::testing::Test {
     if (!round.has_value()) return 0;
     EXPECT_EQ(round->snapshot->number, snapshot);
     for (size_t m = 0; m < members_; ++m) {
-      EXPECT_EQ(genlock_.ToDo(m).what, What::kNothing);
+      EXPECT_EQ(genlock_.NextCommand(m).what, What::kNothing);
       EXPECT_EQ(genlock_.ToDraw(m)->volume, round->volume);
     }
     for (size_t m = 0; m < members_; ++m) genlock_.Held(m, round->volume);
@@ -51,9 +51,9 @@ class Locked : public ::testing::Test {
   std::vector<Genlock::Command> Orders(What what = What::kShow) {
     std::vector<Genlock::Command> orders;
     for (size_t m = 0; m < members_; ++m) {
-      orders.push_back(genlock_.ToDo(m));
+      orders.push_back(genlock_.NextCommand(m));
       EXPECT_EQ(orders.back().what, what) << "member " << m;
-      EXPECT_EQ(genlock_.ToDo(m).what, What::kNothing) << "twice";
+      EXPECT_EQ(genlock_.NextCommand(m).what, What::kNothing) << "twice";
     }
     return orders;
   }
@@ -73,7 +73,7 @@ TEST_F(Locked, AllAreOrderedOnceAllHold) {
   EXPECT_EQ(genlock_.ToDraw(1)->volume, 1u);
   genlock_.Held(0, 1);
   EXPECT_FALSE(genlock_.ToDraw(0).has_value());
-  EXPECT_EQ(genlock_.ToDo(0).what, What::kNothing) << "the other does not hold it yet";
+  EXPECT_EQ(genlock_.NextCommand(0).what, What::kNothing) << "the other does not hold it yet";
   genlock_.Held(1, 1);
   const std::vector<Genlock::Command> orders = Orders();
   // Each at a sweep of its own, which begins with the other's.
@@ -106,7 +106,7 @@ TEST_F(Locked, AnOrderThatOneHasNotTakenInTimeIsPutOffForAll) {
   EXPECT_LT(deadline, first[0].at);
   clock_.AdvanceTo(deadline - 1);
   genlock_.Step();
-  EXPECT_EQ(genlock_.ToDo(0).what, What::kNothing);
+  EXPECT_EQ(genlock_.NextCommand(0).what, What::kNothing);
   clock_.AdvanceTo(deadline);
   genlock_.Step();
   EXPECT_EQ(genlock_.figures().postponed, 1u);
@@ -141,9 +141,9 @@ TEST_F(Locked, WhatOneCannotHaveAllDropAndDrawAgain) {
   genlock_.Want(0, SnapshotOf(5));
   genlock_.Held(0, 1);
   genlock_.Failed(1, 1, "its engine failed");
-  EXPECT_EQ(genlock_.ToDo(1).what, What::kNothing) << "it has nothing to drop";
+  EXPECT_EQ(genlock_.NextCommand(1).what, What::kNothing) << "it has nothing to drop";
   for (const size_t m : {0u, 2u}) {
-    const Genlock::Command drop = genlock_.ToDo(m);
+    const Genlock::Command drop = genlock_.NextCommand(m);
     EXPECT_EQ(drop.what, What::kDrop);
     EXPECT_EQ(drop.volume, 1u);
     EXPECT_EQ(drop.why, "its engine failed");
@@ -172,7 +172,7 @@ TEST_F(Locked, WhoShowsNothingHoldsNobodyUp) {
   genlock_.Want(0, SnapshotOf(1));
   EXPECT_FALSE(genlock_.ToDraw(1).has_value());
   genlock_.Held(0, 1);
-  EXPECT_EQ(genlock_.ToDo(0).what, What::kShow);
+  EXPECT_EQ(genlock_.NextCommand(0).what, What::kShow);
   // It comes back: with the next round, though the first is still to be shown.
   genlock_.SetPresent(1, true);
   genlock_.SetSweeps(1, 100 * kPeriod, kPeriod);
@@ -183,9 +183,9 @@ TEST_F(Locked, WhoShowsNothingHoldsNobodyUp) {
   EXPECT_EQ(genlock_.ToDraw(1)->volume, 2u);
   // It goes in the middle of a round: the other's goes on.
   genlock_.Held(0, 2);
-  EXPECT_EQ(genlock_.ToDo(0).what, What::kNothing);
+  EXPECT_EQ(genlock_.NextCommand(0).what, What::kNothing);
   genlock_.SetPresent(1, false);
-  EXPECT_EQ(genlock_.ToDo(0).what, What::kShow);
+  EXPECT_EQ(genlock_.NextCommand(0).what, What::kShow);
 }
 
 TEST_F(Locked, SweepsFarApartAreOrderedAWholeOneEarlier) {
@@ -201,7 +201,7 @@ TEST_F(Locked, OrdersWaitUntilSweepsAreKnown) {
   Join({0, 0});
   genlock_.SetSweeps(1, 0, 0);
   Hold(1);
-  EXPECT_EQ(genlock_.ToDo(0).what, What::kNothing);
+  EXPECT_EQ(genlock_.NextCommand(0).what, What::kNothing);
   genlock_.SetSweeps(1, 100 * kPeriod, kPeriod);
   EXPECT_EQ(Orders().size(), 2u);
 }
@@ -229,14 +229,14 @@ TEST_F(Locked, AMemberThatTakesNoOrderLosesTheVolumeForAll) {
   const uint64_t volume = Hold(1);
   int orders = 0;
   for (; orders < 1000; ++orders) {
-    const Genlock::Command command = genlock_.ToDo(0);
+    const Genlock::Command command = genlock_.NextCommand(0);
     if (command.what != What::kShow) break;
     genlock_.Ordered(0, volume, command.at, true);
     clock_.AdvanceTo(genlock_.Step());
     genlock_.Step();
   }
   EXPECT_EQ(orders, 32);
-  EXPECT_EQ(genlock_.ToDo(1).what, What::kDrop);
+  EXPECT_EQ(genlock_.NextCommand(1).what, What::kDrop);
 }
 
 }  // namespace

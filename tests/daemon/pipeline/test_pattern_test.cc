@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <array>
 
 #include <algorithm>
 #include <cmath>
@@ -257,7 +258,11 @@ TEST(TestPattern, NumbersStandInTheirSlices) {
     geometry.grid = display::DefaultGrid(geometry);
     const std::vector<NumberedVoxel> voxels = SliceNumbers(geometry);
     EXPECT_GT(voxels.size(), 300u);
+    std::map<std::array<int, 3>, uint32_t> colours;
     for (const NumberedVoxel& voxel : voxels) {
+      const std::array<int, 3> cell = {int(voxel.at.x), int(voxel.at.y), int(voxel.at.z)};
+      EXPECT_EQ(colours.try_emplace(cell, voxel.rgb).first->second, voxel.rgb)
+          << "two numbers in one voxel";
       EXPECT_TRUE(voxel.at.x >= 0 && voxel.at.x < geometry.grid.nx && voxel.at.y >= 0 &&
                   voxel.at.y < geometry.grid.ny && voxel.at.z >= 0 &&
                   voxel.at.z < geometry.grid.nz);

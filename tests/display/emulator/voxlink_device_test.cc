@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "tests/display/emulator/bench.h"
+#include "tests/display/emulator/voxlink_fixture.h"
 
 namespace voxeld::display::emulator {
 namespace {
@@ -16,42 +16,6 @@ using voxlink::ErrorCode;
 using voxlink::EventType;
 using voxlink::Reason;
 using voxlink::Request;
-
-std::vector<EventType> Types(const std::vector<SeenEvent>& events) {
-  std::vector<EventType> types;
-  for (const SeenEvent& event : events) types.push_back(event.type());
-  return types;
-}
-
-class Device : public testing::Test {
- protected:
-  Device() {
-    bench_.StartSession();
-    bench_.Events();
-  }
-  void Keep() {
-    std::vector<std::byte> out;
-    bench_.writer().Plain(out, voxlink::PacketType::kKeepalive, 0);
-    bench_.Bulk(out);
-  }
-  // Time passes with a host that keeps alive.
-  void PassAlive(sync::TimeNs duration) {
-    for (sync::TimeNs left = duration; left > 0; left -= 50 * kMillisecond) {
-      bench_.Pass(std::min(left, 50 * kMillisecond));
-      Keep();
-    }
-  }
-  void ExpectVolumeEvent(const SeenEvent& event, EventType type, uint64_t volume, Reason reason) {
-    EXPECT_EQ(event.type(), type);
-    EXPECT_EQ(event.As<voxlink::VolumeEvent>().volume, volume);
-    EXPECT_EQ(event.As<voxlink::VolumeEvent>().reason, static_cast<uint32_t>(reason));
-  }
-  ErrorCode CodeOf(const SeenEvent& event) {
-    EXPECT_EQ(event.type(), EventType::kError);
-    return static_cast<ErrorCode>(event.As<voxlink::ErrorEvent>().code);
-  }
-  Bench bench_;
-};
 
 TEST_F(Device, ShowsAWholeVolumeAtTheNextSweep) {
   bench_.Pass(30 * kMillisecond);

@@ -8,6 +8,7 @@
 #include "absl/strings/str_split.h"
 #include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/cli/options.h"
+#include "tools/voxelctl/cli/patterns.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -34,11 +34,32 @@ inline constexpr const char* kSnapshotAbout =
     "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
     "perspective, dimmer with\n"
     "distance, with the outline of its volume; with --slices all its slices side by side.";
+inline constexpr const char* kCalibrateAbout =
+    "Shows patterns on a display, which it opens itself (voxeld must not have it), asks what is "
+    "seen, "
+    "and writes the\n"
+    "display's profile with what was found: orientation, mirrors, eccentricity, keystone.";
 inline constexpr const char* kVerifyAbout =
     "Holds a display's device to its protocol, case by case, and says what is not as it must be. "
     "Opens the device\n"
     "itself: no voxeld may have it. DISPLAY is what voxeld's --display takes, such as\n"
     "voxlink,serial=A1 or fadecandy; simulated,size=32x32x16 is the emulated device, to try it.\n"
     "Ends with 0 if no case failed, 1 if one did, 3 if there is no device.";
+inline constexpr const char* kPatternAbout =
+    "Shows a test pattern instead of the scene: axes, corners, grid, ramp, "
+    "white, bars, density, slices, posts or frames; none ends it, list names them";
+inline constexpr const char* kProfileAbout =
+    "check: reads a display's description and says what it comes to, without a "
+    "daemon. list: names those that are installed.";
+inline constexpr const char* kWatchAbout =
+    "Lists layers and entities, then what comes (+), changes (~) and goes (-), until "
+    "Ctrl-C; with --json one object a change set, each the scene's step to the next "
+    "state that the server told";
+inline constexpr const char* kInitAbout =
+    "Asks how an LED lattice is wired (start corner, direction, zig-zag) and writes its "
+    "profile; needs no daemon";
+inline constexpr const char* kDoctorAbout =
+    "Says what of this machine keeps voxeld from its work, and the command that mends it; "
+    "needs no daemon";
 
 }  // namespace voxeld::voxelctl

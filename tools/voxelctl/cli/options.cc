@@ -16,6 +16,7 @@
 #include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
+#include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -24,14 +25,6 @@ namespace {
 const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
 const Choices<FillStyle> kFills = {
     {"dots", FillStyle::kDots}, {"lines", FillStyle::kLines}, {"surface", FillStyle::kSurface}};
-const Choices<v1::TestPattern> kPatterns = {
-    {"axes", v1::TEST_PATTERN_AXES},       {"corners", v1::TEST_PATTERN_CORNERS},
-    {"grid", v1::TEST_PATTERN_GRID},       {"ramp", v1::TEST_PATTERN_RAMP},
-    {"white", v1::TEST_PATTERN_WHITE},     {"bars", v1::TEST_PATTERN_BARS},
-    {"density", v1::TEST_PATTERN_DENSITY}, {"slices", v1::TEST_PATTERN_SLICES},
-    {"posts", v1::TEST_PATTERN_POSTS},     {"frames", v1::TEST_PATTERN_FRAMES},
-    {"none", v1::TEST_PATTERN_NONE}};
-
 // The command line as declared, and the values that it fills in.
 class Parser {
  public:
@@ -62,13 +55,8 @@ class Parser {
     AddCalibrate();
     AddVerify();
     AddProfile();
-    Add("init",
-        "Asks how an LED lattice is wired (start corner, direction, zig-zag) and writes its "
-        "profile; needs no daemon")
-        ->add_option("FILE.toml", init_.file, "Where the profile goes");
-    Add("doctor",
-        "Says what of this machine keeps voxeld from its work, and the command that mends it; "
-        "needs no daemon");
+    Add("init", kInitAbout)->add_option("FILE.toml", init_.file, "Where the profile goes");
+    Add("doctor", kDoctorAbout);
   }
 
   ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
@@ -214,13 +202,7 @@ class Parser {
     AddFilter(Add("entities", "Lists layers and entities"), &entities_.layer, &entities_.owner);
   }
 
-  void AddWatch() {
-    AddFilter(Add("watch",
-                  "Lists layers and entities, then what comes (+), changes (~) and goes (-), until "
-                  "Ctrl-C; with --json one object a change set, each the scene's step to the next "
-                  "state that the server told"),
-              &watch_.layer, &watch_.owner);
-  }
+  void AddWatch() { AddFilter(Add("watch", kWatchAbout), &watch_.layer, &watch_.owner); }
 
   void AddClear() {
     CLI::App* c = Add("clear", "Takes down what voxelctl put up: its layer and test patterns");
@@ -230,10 +212,7 @@ class Parser {
   }
 
   void AddPattern() {
-    CLI::App* c =
-        Add("pattern",
-            "Shows a test pattern instead of the scene: axes, corners, grid, ramp, "
-            "white, bars, density, slices, posts or frames; none ends it, list names them");
+    CLI::App* c = Add("pattern", kPatternAbout);
     c->add_option("NAME", pattern_name_, "The pattern, none, or list");
     c->add_option("--display", pattern_.display, "Only on this display (default: on all)")
         ->type_name("NAME");
@@ -263,9 +242,7 @@ class Parser {
   }
 
   void AddProfile() {
-    CLI::App* c = Add("profile",
-                      "check: reads a display's description and says what it comes to, without a "
-                      "daemon. list: names those that are installed.");
+    CLI::App* c = Add("profile", kProfileAbout);
     c->add_option("ACTION", profile_action_, "check or list");
     c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
   }
@@ -437,7 +414,7 @@ class Parser {
                                     ", none or list")};
     pattern_.list = pattern_name_ == "list";
     if (!pattern_.list) {
-      Choices<v1::TestPattern> choices = kPatterns;
+      Choices<v1::TestPattern> choices = Patterns();
       choices.emplace_back("list", v1::TEST_PATTERN_UNSPECIFIED);
       pattern_.pattern = Choose("the pattern", pattern_name_, choices);
     }
@@ -515,14 +492,6 @@ class Parser {
 
 ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments) {
   return Parser().Parse(arguments);
-}
-
-std::vector<std::string> PatternNames() {
-  std::vector<std::string> names;
-  for (const auto& [name, pattern] : kPatterns) {
-    if (pattern != v1::TEST_PATTERN_NONE) names.push_back(name);
-  }
-  return names;
 }
 
 }  // namespace voxeld::voxelctl

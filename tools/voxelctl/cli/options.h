@@ -134,7 +134,4 @@ struct ParsedCommandLine {
 // A usage error says what was not understood, the nearest that would have been, and where help is.
 ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments);
 
-// "axes", "corners", …: the names of the test patterns, without none.
-std::vector<std::string> PatternNames();
-
 }  // namespace voxeld::voxelctl

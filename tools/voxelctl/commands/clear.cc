@@ -1,4 +1,5 @@
 #include "absl/strings/str_cat.h"
+#include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/display_names.h"
 #include "tools/voxelctl/commands/end_patterns.h"

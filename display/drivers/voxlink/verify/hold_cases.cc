@@ -59,15 +59,19 @@ void Hold(Probe& probe) {
   session.ExpectNoErrors();
 }
 
-void ShowAt(Probe& probe) {
-  Session session(probe);
+// A session with volume 1 held; the sweep that is told next.
+Event HoldUntilASweep(Session& session) {
   session.Start();
   session.Whole(1, false);
   session.ExpectComplete(1);
   session.Mark();
-  const Event sweep =
-      session.Await("SWEEP", 2 * session.period() + sync::kSecond,
-                    [](const Event& event) { return event.type() == EventType::kSweep; });
+  return session.Await("SWEEP", 2 * session.period() + sync::kSecond,
+                       [](const Event& event) { return event.type() == EventType::kSweep; });
+}
+
+void ShowAt(Probe& probe) {
+  Session session(probe);
+  const Event sweep = HoldUntilASweep(session);
   // Far enough that SHOW comes in time.
   const auto ahead = static_cast<uint64_t>(500 * sync::kMillisecond / session.period() + 3);
   const uint64_t wanted = sweep.As<SweepEvent>().sweep + ahead;
@@ -91,13 +95,7 @@ void ShowAhead(Probe& probe) {
   if (session.ok() && !session.Has(kFeatureShowAhead)) {
     return probe.check().NotApplicable("the device does not take SHOW ahead (feature bit 4)");
   }
-  session.Start();
-  session.Whole(1, false);
-  session.ExpectComplete(1);
-  session.Mark();
-  const Event sweep =
-      session.Await("SWEEP", 2 * session.period() + sync::kSecond,
-                    [](const Event& event) { return event.type() == EventType::kSweep; });
+  const Event sweep = HoldUntilASweep(session);
   if (!session.ok()) return;
   const auto ahead = static_cast<uint32_t>(500 * sync::kMillisecond / session.period() + 3);
   const uint64_t now = sweep.As<SweepEvent>().sweep;
