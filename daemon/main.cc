@@ -17,6 +17,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "daemon/access/access.h"
+#include "daemon/access/audit.h"
+#include "daemon/access/ticker.h"
+#include "daemon/access/tls_store.h"
 #include "daemon/config/config.h"
 #include "daemon/config/display_view.h"
 #include "daemon/core/core.h"
@@ -169,8 +173,52 @@ void LogDisplays(Core& core, Logger& log) {
   }
 }
 
+// Who may do what. Files are looked at every second, and when asked.
+class Security {
+ public:
+  static constexpr sync::TimeNs kLookInterval = sync::kSecond;
+
+  static absl::StatusOr<std::unique_ptr<Security>> Open(const Config& config, Logger& log) {
+    const absl::StatusOr<access::AccessOptions> options = AccessOf(config.security);
+    if (!options.ok()) return options.status();
+    auto security = std::make_unique<Security>();
+    security->access =
+        std::make_unique<access::Access>(*options, access::Access::SystemWallClock(), &log);
+    if (absl::Status status = security->access->Look(); !status.ok()) return status;
+    if (config.security.tls.any()) {
+      auto tls =
+          access::TlsStore::Open(config.security.tls, access::Access::SystemWallClock(), &log);
+      if (!tls.ok()) return tls.status();
+      security->tls = *std::move(tls);
+    }
+    auto audit = access::Audit::Open(config.log.audit, &log);
+    if (!audit.ok()) return audit.status();
+    security->audit = *std::move(audit);
+    return security;
+  }
+
+  void Look(bool again) {
+    (void)access->Look(again);  // what is wrong is logged, and in trouble()
+    if (tls != nullptr) (void)tls->Look(again);
+  }
+
+  std::string trouble() const {
+    std::string trouble = access->trouble();
+    const std::string of_tls = tls == nullptr ? "" : tls->trouble();
+    if (!trouble.empty() && !of_tls.empty()) trouble += "; ";
+    return trouble + of_tls;
+  }
+
+  std::unique_ptr<access::Access> access;
+  std::unique_ptr<access::TlsStore> tls;  // may be none
+  std::unique_ptr<access::Audit> audit;
+};
+
 int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
           Logger& log) {
+  absl::StatusOr<std::unique_ptr<Security>> opened = Security::Open(config, log);
+  if (!opened.ok()) return Fail(1, opened.status());
+  const std::unique_ptr<Security> security = *std::move(opened);
   EngineWatch watch(log);
   const auto counters = std::make_shared<listen::Counters>();
   Core core({.limits = config.limits,
@@ -183,7 +231,12 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                    log.Log(lost ? Logger::Level::kWarn : Logger::Level::kInfo,
                            DisplayStateName(state), {{"display", display}, {"why", reason}});
                  },
-             .connections = [counters] { return counters->Read(); }},
+             .connections =
+                 [counters, security = security.get()] {
+                   ListenFigures figures = counters->Read();
+                   figures.access_trouble = security->trouble();
+                   return figures;
+                 }},
             clock);
   const gpu::EngineOptions engine{.kind = config.engine.kind,
                                   .threads = static_cast<int>(config.engine.threads),
@@ -241,8 +294,19 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
        .keepalive_interval_ns = config.server.keepalive_interval_ns,
        .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
        .local = local,
+       .access = security->access.get(),
+       .tls = security->tls.get(),
+       .audit = security->audit.get(),
        .log = &log});
   if (!server.ok()) return Fail(1, server.status());
+  security->access->SetOnChange([server = server->get(), &log] {
+    const size_t ended = server->EndRevoked();
+    if (ended > 0)
+      log.Info("calls ended: their callers may not make them any more",
+               {{"calls", absl::StrCat(ended)}});
+  });
+  auto ticker = std::make_unique<access::Ticker>(clock, Security::kLookInterval,
+                                                 [&security] { security->Look(false); });
 
   watch.Tell(server->get());
 
@@ -256,8 +320,15 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
   int signal = 0;
-  while (sigwait(&signals, &signal) != 0) {
+  while (sigwait(&signals, &signal) != 0 || signal == SIGHUP) {
+    if (signal != SIGHUP) continue;
+    log.Info("asked to read its files again");
+    security->audit->Reopen();
+    security->Look(true);
+    signal = 0;
   }
+  ticker.reset();
+  security->access->SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
   *draining = true;
   watch.Tell(nullptr);
@@ -281,6 +352,7 @@ int Main(int argc, char** argv) {
   if (absl::Status status = ApplyCommandLine(*command_line, &*config); !status.ok()) {
     return Fail(kUsageError, status);
   }
+  if (absl::Status status = CheckSecurity(*config); !status.ok()) return Fail(1, status);
   const absl::StatusOr<Logger::Level> level = Logger::ParseLevel(config->log.level);
   const absl::StatusOr<Logger::Format> format = Logger::ParseFormat(config->log.format);
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
@@ -293,6 +365,7 @@ int Main(int argc, char** argv) {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays make threads: main alone waits
 
   sync::SystemClock clock;

@@ -30,6 +30,7 @@ ALLOWED = {
     "daemon/scene": ["gpu", "display/api", "display/sync"],
     "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
     "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
+    "daemon/access": ["display/sync", "daemon/address", "daemon/log", "daemon/suggest"],
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
               # What an address looks like, and what was meant: alike at both ends.
@@ -55,6 +56,8 @@ ALLOWED = {
     # A profile that was written is tried as the daemon would.
     "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
                             "tools/voxelctl"],
+    # Tokens are made as the daemon reads them.
+    "tools/voxelctl/token": ["daemon/access", "daemon/address", "tools/voxelctl"],
     # And this reads descriptions of displays as the daemon does.
     "tools/voxelctl/profile": ["display/api", "display/drivers/options", "display/drivers/usb_options",
                                "display/drivers/simulated", "display/geometry", "display/profiles",
@@ -62,7 +65,7 @@ ALLOWED = {
     # Its own headers are "voxeld/…", as its users write them.
     "client": ["voxeld", "display/sync", "daemon/address"],
     # What users see has neither protobuf nor anything else of ours.
-    "client/cpp/voxeld": ["voxeld/address.h", "voxeld/basics.h", "voxeld/drawing.h", "voxeld/expression.h",
+    "client/cpp/voxeld": ["voxeld/address.h", "voxeld/basics.h", "voxeld/credentials.h", "voxeld/drawing.h", "voxeld/expression.h",
                           "voxeld/receipt.h", "voxeld/shapes.h"],
     "client/cpp/examples": ["voxeld/client.h"],
     "tests": ["daemon", "gpu", "display", "voxeld", "tools", "client"],

@@ -1,5 +1,7 @@
 #include "daemon/address/address.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -20,6 +22,7 @@ namespace voxeld::daemon {
 namespace {
 
 constexpr std::string_view kUnixPrefix = "unix:";
+constexpr std::string_view kTlsPrefix = "tls:";
 constexpr size_t kPathBytes = sizeof(sockaddr_un::sun_path) - 1;
 
 absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
@@ -27,8 +30,8 @@ absl::string_view View(std::string_view text) { return {text.data(), text.size()
 absl::Status Wrong(std::string_view text, absl::string_view why) {
   return absl::InvalidArgumentError(
       absl::StrCat("the address \"", View(text), "\" ", why,
-                   "; give HOST:PORT or unix:PATH, such as "
-                   "127.0.0.1:50551 or unix:/run/voxeld/voxeld.sock"));
+                   "; give HOST:PORT, tls:HOST:PORT or unix:PATH, such as "
+                   "127.0.0.1:50551, tls:0.0.0.0:50552 or unix:/run/voxeld/voxeld.sock"));
 }
 
 absl::StatusOr<Address> ParseUnix(std::string_view text) {
@@ -99,29 +102,42 @@ absl::Status PrepareUnix(const Address& address) {
 std::string Address::ToString() const {
   if (unix_socket) return absl::StrCat("unix:", path);
   const bool brackets = host.find(':') != std::string::npos;
-  return absl::StrCat(brackets ? "[" : "", host, brackets ? "]:" : ":", port);
+  return absl::StrCat(tls ? View(kTlsPrefix) : "", brackets ? "[" : "", host, brackets ? "]:" : ":",
+                      port);
+}
+
+bool Address::is_local() const {
+  if (unix_socket || host == "localhost") return true;
+  in_addr v4;
+  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
+  in6_addr v6;
+  return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
 absl::StatusOr<Address> ParseAddress(std::string_view text) {
   if (text.starts_with(kUnixPrefix)) return ParseUnix(text);
+  const std::string_view whole = text;
+  const bool tls = text.starts_with(kTlsPrefix);
+  if (tls) text.remove_prefix(kTlsPrefix.size());
   const size_t colon = text.rfind(':');
-  if (colon == std::string_view::npos) return Wrong(text, "has no port");
+  if (colon == std::string_view::npos) return Wrong(whole, "has no port");
   Address address;
+  address.tls = tls;
   std::string_view host = text.substr(0, colon);
   if (host.starts_with('[') && host.ends_with(']')) {
     host = host.substr(1, host.size() - 2);
   } else if (host.find(':') != std::string_view::npos) {
-    return Wrong(text, "has more than one colon (write an IPv6 number as [::1]:50551)");
+    return Wrong(whole, "has more than one colon (write an IPv6 number as [::1]:50551)");
   }
-  if (host.empty()) return Wrong(text, "has no host");
+  if (host.empty()) return Wrong(whole, "has no host");
   if (host.find_first_of(" \t\r\n/[]") != std::string_view::npos) {
-    return Wrong(text, "has a host that is none");
+    return Wrong(whole, "has a host that is none");
   }
   address.host = std::string(host);
   const std::string_view port = text.substr(colon + 1);
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), address.port);
   if (parsed.ec != std::errc() || parsed.ptr != port.data() + port.size()) {
-    return Wrong(text, absl::StrCat("has the port \"", View(port), "\", which is not 0 to 65535"));
+    return Wrong(whole, absl::StrCat("has the port \"", View(port), "\", which is not 0 to 65535"));
   }
   return address;
 }

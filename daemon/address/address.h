@@ -1,4 +1,4 @@
-// Where a server listens: HOST:PORT or unix:PATH, the same everywhere.
+// Where a server listens: HOST:PORT, tls:HOST:PORT or unix:PATH, the same everywhere.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,14 @@ namespace voxeld::daemon {
 
 struct Address {
   bool unix_socket = false;
+  bool tls = false;   // not of a unix socket
   std::string host;   // name or number; an IPv6 number without its brackets
   uint16_t port = 0;  // 0: any that is free
   std::string path;   // unix_socket: absolute
 
   std::string ToString() const;  // as it was written
+  // Whether only this machine can connect to it: a unix socket, "localhost", a loopback number.
+  bool is_local() const;
   bool operator==(const Address&) const = default;
 };
 

@@ -29,7 +29,7 @@ constexpr uintmax_t kGreatestFileBytes = 16u << 20;
 std::string DefaultSocket(const Environment& environment) {
   const std::optional<std::string> folder = environment("XDG_RUNTIME_DIR");
   if (folder.has_value() && folder->starts_with('/')) return *folder + "/voxeld.sock";
-  if (access(kSystemRunFolder, W_OK | X_OK) == 0) {
+  if (::access(kSystemRunFolder, W_OK | X_OK) == 0) {
     return absl::StrCat(kSystemRunFolder, "/voxeld.sock");
   }
   return absl::StrCat("/tmp/voxeld-", geteuid(), "/voxeld.sock");
@@ -115,6 +115,7 @@ struct ChoiceSetter {
   void Real(const char*, double&, double, double) {}
   void Flag(const char*, bool&) {}
   void Text(const char*, std::string&) {}
+  void Scopes(const char*, std::string&, bool) {}
 };
 
 absl::Status ApplyChoice(const char* key, const char* option,
@@ -191,6 +192,57 @@ absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& co
     if (address.ok()) return std::optional<Address>(*std::move(address));
   }
   return std::optional<Address>();
+}
+
+absl::Status CheckScopes(std::string_view text, bool auto_too) {
+  return auto_too && text == "auto" ? absl::OkStatus() : access::ParseScopes(text).status();
+}
+
+absl::StatusOr<access::AccessOptions> AccessOf(const SecurityConfig& config) {
+  access::AccessOptions options{.grants = config.grants};
+  const bool by_default = config.anonymous_scopes == "auto";
+  const std::string anonymous = !by_default             ? config.anonymous_scopes
+                                : config.grants.empty() ? "all"
+                                                        : "none";
+  for (const auto& [text, scopes] : {std::pair(&anonymous, &options.anonymous),
+                                     {&config.certificate_scopes, &options.certificate},
+                                     {&config.unix_scopes, &options.unix_users}}) {
+    const absl::StatusOr<access::Scopes> parsed = access::ParseScopes(*text);
+    if (!parsed.ok()) return parsed.status();
+    *scopes = *parsed;
+  }
+  return options;
+}
+
+absl::Status CheckSecurity(const Config& config) {
+  std::vector<Address> plain = config.server.listen;
+  if (config.server.http.has_value()) {
+    if (config.server.http->tls) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("http is ", config.server.http->ToString(),
+                       "; /healthz and /metrics are served without TLS: give HOST:PORT, and let a "
+                       "proxy add it"));
+    }
+    plain.push_back(*config.server.http);
+  }
+  bool tls = false;
+  for (const Address& address : plain) {
+    tls = tls || address.tls;
+    if (address.tls || address.is_local() || config.security.allow_plain_beyond_loopback) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        address.ToString(),
+        " can be reached from other machines, and all that goes over it could be read and changed; "
+        "give tls:",
+        address.ToString(),
+        " with tls_certificate, tls_key and tls_client_ca, an "
+        "address of this machine, or security.allow_plain_beyond_loopback = true"));
+  }
+  if (tls && !config.security.tls.any()) {
+    return absl::InvalidArgumentError(
+        "an address of listen speaks TLS, and security.tls_certificate, tls_key and tls_client_ca "
+        "are not given");
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CheckLocalSocket(std::string_view text) {

@@ -11,6 +11,8 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "daemon/access/access.h"
+#include "daemon/access/tls_store.h"
 #include "daemon/address/address.h"
 #include "daemon/config/command_line.h"
 #include "daemon/config/display_config.h"
@@ -82,6 +84,19 @@ struct EngineConfig {
 struct LogConfig {
   std::string level = "info";   // trace, debug, info, warn, error, off
   std::string format = "text";  // text, json
+  std::string audit;            // a file for who did what; empty: the log
+};
+
+struct SecurityConfig {
+  std::string grants;  // the file of tokens, certificates and users (access/grants.h); empty: none
+  // PEM, for addresses that speak TLS: all three or none.
+  access::TlsFiles tls;
+  // What callers have that no grant names, as ParseScopes takes it. "auto": all, and none once there is
+  // a grants file.
+  std::string anonymous_scopes = "auto";
+  std::string certificate_scopes = "none", unix_scopes = "all";
+  // Addresses beyond this machine may be without TLS.
+  bool allow_plain_beyond_loopback = false;
 };
 
 struct Config {
@@ -89,6 +104,7 @@ struct Config {
   ServerConfig server;
   EngineConfig engine;
   LogConfig log;
+  SecurityConfig security;
   Limits limits;
   std::vector<DisplayConfig> displays;
 };
@@ -121,6 +137,13 @@ absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config);
 // Where the local socket is, by what is in force; nothing: there is none. InvalidArgument for what
 // CheckLocalSocket refuses, and for an address of `listen`.
 absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& config);
+
+// What is in force for callers. InvalidArgument for scopes that there are not.
+absl::StatusOr<access::AccessOptions> AccessOf(const SecurityConfig& config);
+
+// InvalidArgument if an address is not to be had as it is: beyond this machine without TLS, or TLS
+// without its files.
+absl::Status CheckSecurity(const Config& config);
 
 // As a file that would read back the same.
 std::string ToToml(const Config& config);

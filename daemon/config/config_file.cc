@@ -112,6 +112,15 @@ class FileReader {
     out = *std::move(text);
   }
 
+  void Scopes(const char* key, std::string& out, bool auto_too) {
+    std::optional<std::string> text = QuotedText(key);
+    if (!text.has_value()) return;
+    if (absl::Status status = CheckScopes(*text, auto_too); !status.ok()) {
+      return Wrong(*Find(key), key, absl::StrCat("is refused: ", status.message()));
+    }
+    out = *std::move(text);
+  }
+
   void Choice(const char* key, std::string& out, std::initializer_list<const char*> values) {
     const std::optional<std::string> text = QuotedText(key);
     if (!text.has_value()) return;
@@ -301,6 +310,7 @@ class Printer {
   void Real(const char* key, double value, double, double) { Line(key, Plain(value)); }
   void Flag(const char* key, bool value) { Line(key, value ? "true" : "false"); }
   void Text(const char* key, const std::string& value) { Line(key, Quoted(value)); }
+  void Scopes(const char* key, const std::string& value, bool) { Line(key, Quoted(value)); }
 
   void Display(const DisplayConfig& display) {
     absl::StrAppend(&out_, "\n[[display]]\n");

@@ -20,6 +20,7 @@ namespace voxeld::daemon {
 //   Real(key, double&, least, greatest)
 //   Flag(key, bool&)
 //   Text(key, string&)                    any
+//   Scopes(key, string&, auto_too)        what access::ParseScopes takes, or "auto"
 template <typename Visitor, typename ConfigType>
 void VisitFields(ConfigType& config, Visitor& visitor) {
   constexpr int64_t kMost = std::numeric_limits<int64_t>::max();
@@ -80,6 +81,18 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Section("log");
   visitor.Choice("level", config.log.level, {"trace", "debug", "info", "warn", "error", "off"});
   visitor.Choice("format", config.log.format, {"text", "json"});
+  visitor.Text("audit", config.log.audit);
+
+  auto& security = config.security;
+  visitor.Section("security");
+  visitor.Text("grants", security.grants);
+  visitor.Text("tls_certificate", security.tls.certificate);
+  visitor.Text("tls_key", security.tls.key);
+  visitor.Text("tls_client_ca", security.tls.client_ca);
+  visitor.Scopes("anonymous_scopes", security.anonymous_scopes, true);
+  visitor.Scopes("certificate_scopes", security.certificate_scopes, false);
+  visitor.Scopes("unix_scopes", security.unix_scopes, false);
+  visitor.Flag("allow_plain_beyond_loopback", security.allow_plain_beyond_loopback);
 
   auto& limits = config.limits;
   visitor.Section("limits");
@@ -127,6 +140,9 @@ std::string EngineKindText(gpu::EngineKind kind);
 
 // An address, or "off".
 absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text);
+
+// "auto" if that is possible, or what access::ParseScopes takes.
+absl::Status CheckScopes(std::string_view text, bool auto_too);
 
 // "auto", nothing, an absolute path, or that as unix:PATH.
 absl::Status CheckLocalSocket(std::string_view text);

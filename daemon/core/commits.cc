@@ -221,8 +221,8 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   Stages stages = StagesOf(session, commit);
   store_.Expire(now);
   const Owner& owner = owners_.at(session.owner);
-  const Author author{session.owner, session.writer, owner.hidden, owner.max_bytes,
-                      owner.max_entities};
+  const Author author{session.owner,   session.writer,    owner.hidden, session.options.may_erase,
+                      owner.max_bytes, owner.max_entities};
   RefusalTally& refusals = commit.refusals;
   CommitResult result = store_.Apply(author, std::move(commit.operations), now,
                                      session.options.strict, refusals.refused());

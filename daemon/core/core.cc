@@ -95,10 +95,13 @@ void Core::GetEntity(EntityKey key, Reply<EntityInfo> reply) {
       });
 }
 
-void Core::ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<Cleared> reply) {
+void Core::ClearLayer(uint64_t owner, std::string layer, bool keep_state,
+                      std::optional<std::string> principal, Reply<Cleared> reply) {
   Ask(impl_->loop(), std::move(reply),
-      [impl = impl_.get(), owner, layer = std::move(layer), keep_state](
-          const Reply<Cleared>& answer) { impl->ClearLayer(owner, layer, keep_state, answer); });
+      [impl = impl_.get(), owner, layer = std::move(layer), keep_state,
+       principal = std::move(principal)](const Reply<Cleared>& answer) {
+        impl->ClearLayer(owner, layer, keep_state, principal, answer);
+      });
 }
 
 void Core::ListOwners(Reply<std::vector<OwnerInfo>> reply) {

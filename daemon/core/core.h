@@ -79,6 +79,7 @@ struct SessionInfo {
 
 struct OwnerInfo {
   uint64_t owner = 0;
+  std::string principal;  // empty: nobody in particular
   std::vector<std::string> client_names;
   uint64_t sessions = 0, layers = 0, orphaned_layers = 0, entities = 0, objects = 0, bytes = 0;
   bool hidden = false;
@@ -196,7 +197,10 @@ class Core {
   SceneWatch& scene_watch();
   void ListEntities(EntityQuery query, Reply<EntityPage> reply);
   void GetEntity(EntityKey key, Reply<EntityInfo> reply);
-  void ClearLayer(uint64_t owner, std::string layer, bool keep_state, Reply<Cleared> reply);
+  // `principal`: of its owner's layers alone; empty text: of nobody's in particular, so PermissionDenied.
+  // Nothing: of everybody's.
+  void ClearLayer(uint64_t owner, std::string layer, bool keep_state,
+                  std::optional<std::string> principal, Reply<Cleared> reply);
   // Ascending.
   void ListOwners(Reply<std::vector<OwnerInfo>> reply);
   // NotFound, InvalidArgument for a quota above the limits'. After `evict` the answer is what was.

@@ -54,7 +54,7 @@ class Core::Impl {
 
   // ---- owners (owners.cc)
   void ClearLayer(uint64_t owner, const std::string& layer, bool keep_state,
-                  const Reply<Cleared>& reply);
+                  const std::optional<std::string>& principal, const Reply<Cleared>& reply);
   std::vector<OwnerInfo> ListOwners() const;
   absl::StatusOr<OwnerInfo> ControlOwner(const OwnerControl& control);
 
@@ -120,6 +120,7 @@ class Core::Impl {
 
   struct Owner {
     std::string token;
+    std::string principal;  // empty: nobody in particular
     bool hidden = false;
     uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;  // as an operator set them
   };
@@ -183,6 +184,7 @@ class Core::Impl {
   // Drops the objects of an owner who has neither session nor layers, and the owner when nothing is left at all.
   void ForgetOwner(uint64_t owner);
   bool OwnerIsOpen(uint64_t owner) const;
+  std::string PrincipalOf(SessionId id) const;  // of a session's owner
   void PurgeLingering();
   bool HasLayers(SessionId session) const;  // that it last wrote
   absl::Status TooManySessions() const;
@@ -248,6 +250,7 @@ class Core::Impl {
   std::map<std::string, SessionId> resume_tokens_;  // of sessions and dormant ones
   std::map<uint64_t, Owner> owners_;
   std::map<std::string, uint64_t> owner_tokens_;
+  std::map<std::string, uint64_t> owners_by_principal_;
   std::multimap<sync::TimeNs, Timed> timed_;  // by the time at which they are due
   std::set<SessionId> holding_;
   std::multimap<sync::TimeNs, Lingering> lingering_;

@@ -9,7 +9,19 @@
 namespace voxeld::daemon {
 
 void Core::Impl::ClearLayer(uint64_t owner, const std::string& layer, bool keep_state,
+                            const std::optional<std::string>& principal,
                             const Reply<Cleared>& reply) {
+  if (principal.has_value()) {
+    const auto own = owners_by_principal_.find(*principal);
+    const bool none = principal->empty() || own == owners_by_principal_.end();
+    if (none || (owner != 0 && owner != own->second)) {
+      return reply(absl::PermissionDeniedError(
+          absl::StrFormat("clearing others' layers takes the scope control; %s",
+                          none ? "the caller has none of its own"
+                               : absl::StrFormat("its own owner is %d", own->second))));
+    }
+    owner = own->second;
+  }
   const SceneStore::Removed removed = store_.RemoveLayers(
       [&](const OwnedName& key, const Layer&) {
         return (owner == 0 || key.owner == owner) && (layer.empty() || key.name == layer);
@@ -25,6 +37,7 @@ std::vector<OwnerInfo> Core::Impl::ListOwners() const {
   for (const auto& [number, owner] : owners_) {
     OwnerInfo& info = infos[number];
     info.owner = number;
+    info.principal = owner.principal;
     info.hidden = owner.hidden;
     info.max_bytes = std::min(owner.max_bytes, options_.limits.max_bytes_per_owner);
     info.max_entities = std::min(owner.max_entities, options_.limits.max_entities_per_owner);

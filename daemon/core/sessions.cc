@@ -28,15 +28,21 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::NewSession(const OpenOptions& op
     return TooManySessions();
   }
   Session session;
-  if (options.owner_token.empty()) {
+  const auto known = options.principal.empty() ? owners_by_principal_.end()
+                                               : owners_by_principal_.find(options.principal);
+  if (options.owner_token.empty() && known != owners_by_principal_.end()) {
+    session.owner = known->second;
+  } else if (options.owner_token.empty()) {
     absl::StatusOr<std::string> token = NewToken();
     if (!token.ok()) return token.status();
     session.owner = next_owner_++;
     owner_tokens_.emplace(*token, session.owner);
-    owners_[session.owner].token = *std::move(token);
+    owners_[session.owner] = {.token = *std::move(token), .principal = options.principal};
+    if (!options.principal.empty()) owners_by_principal_.emplace(options.principal, session.owner);
   } else {
     const auto owner = owner_tokens_.find(options.owner_token);
-    if (owner == owner_tokens_.end()) {
+    // Somebody else's is as good as none.
+    if (owner == owner_tokens_.end() || owners_.at(owner->second).principal != options.principal) {
       return absl::NotFoundError(
           "open.owner_token names no owner: it is wrong, or the owner has left and nothing of it "
           "is "
@@ -49,10 +55,19 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::NewSession(const OpenOptions& op
   return session;
 }
 
+std::string Core::Impl::PrincipalOf(SessionId id) const {
+  const auto live = sessions_.find(id);
+  const auto dormant = dormant_.find(id);
+  if (live == sessions_.end() && dormant == dormant_.end()) return "";
+  const uint64_t owner = live != sessions_.end() ? live->second.owner : dormant->second.owner;
+  const auto found = owners_.find(owner);
+  return found == owners_.end() ? "" : found->second.principal;
+}
+
 absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& options,
                                                        std::deque<Receipt>* outcomes) {
   const auto token = resume_tokens_.find(options.resume_token);
-  if (token == resume_tokens_.end()) {
+  if (token == resume_tokens_.end() || PrincipalOf(token->second) != options.principal) {
     return absl::NotFoundError(
         "open.resume_token names no session: it has been used, or the session's time is over; open "
         "without it, and send again what should be in the scene");
@@ -269,6 +284,7 @@ void Core::Impl::ForgetOwner(uint64_t owner) {
   const auto it = owners_.find(owner);
   if (it == owners_.end()) return;
   owner_tokens_.erase(it->second.token);
+  owners_by_principal_.erase(it->second.principal);
   owners_.erase(it);
 }
 

@@ -75,7 +75,10 @@ struct ListenFigures {
   uint64_t cut_for_greeting = 0, cut_for_flooding = 0;
   uint64_t accept_failures = 0;  // out of descriptors, say; tried again until it works
   uint64_t probe_failures = 0;   // of connections to itself
-  std::string unreachable;       // empty: they work; else why they do not
+  // Calls whose callers may not make them; those ended since their callers may not any more.
+  uint64_t calls_turned_away = 0, calls_revoked = 0;
+  std::string unreachable;     // empty: they work; else why they do not
+  std::string access_trouble;  // what is wrong with grants, certificate or key; empty: nothing
 };
 
 struct Stats {

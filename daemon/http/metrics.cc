@@ -99,6 +99,10 @@ constexpr Row<ListenFigures> kConnectionRows[] = {
      "Times that no connection could be accepted, out of descriptors say"},
     {"voxeld_probe_failures_total", &ListenFigures::probe_failures, MetricType::Counter,
      "Connections of the daemon to itself that failed"},
+    {"voxeld_calls_turned_away_total", &ListenFigures::calls_turned_away, MetricType::Counter,
+     "Calls whose callers may not make them"},
+    {"voxeld_calls_revoked_total", &ListenFigures::calls_revoked, MetricType::Counter,
+     "Calls ended since their callers may not make them any more"},
 };
 
 constexpr Row<DisplayFigures> kDisplayRows[] = {

@@ -22,6 +22,7 @@ class Counters {
   Count cut_for_greeting = 0, cut_for_flooding = 0;
   Count accept_failures = 0;
   Count probe_failures = 0;
+  Count calls_turned_away = 0, calls_revoked = 0;
 
   // Why nobody can connect, as the probe sees it; empty: all is well.
   void SetUnreachable(std::string why) {
@@ -41,7 +42,9 @@ class Counters {
                       .cut_for_greeting = cut_for_greeting,
                       .cut_for_flooding = cut_for_flooding,
                       .accept_failures = accept_failures,
-                      .probe_failures = probe_failures};
+                      .probe_failures = probe_failures,
+                      .calls_turned_away = calls_turned_away,
+                      .calls_revoked = calls_revoked};
     sync::MutexLock lock(mutex_);
     out.unreachable = unreachable_;
     return out;

@@ -31,7 +31,7 @@ Greeting::Verdict Greeting::Read(std::string_view received) {
     if (received.substr(0, some) != kPreface.substr(0, some)) {
       const std::string_view shown = received.substr(0, kShownBytes);
       return Wrong(absl::StrCat("it begins with \"", absl::CHexEscape({shown.data(), shown.size()}),
-                                "\"; give HTTP/2 without TLS"));
+                                "\"; this address speaks HTTP/2 without TLS"));
     }
     if (some < kPreface.size()) return Await(kPreface.size());
     at_ = kPreface.size();
@@ -46,6 +46,27 @@ Greeting::Verdict Greeting::Read(std::string_view received) {
     const Verdict verdict = ReadFrame(received, head);
     if (verdict != Verdict::kMore || at_ == before) return verdict;
   }
+}
+
+Greeting::Verdict Greeting::ReadTls(std::string_view received) {
+  constexpr std::string_view kHandshake("\x16\x03", 2);  // of version 3.x, as all are
+  constexpr size_t kRecordHead = 5, kHelloHead = 4;
+  constexpr char kClientHello = 1;
+  received = received.substr(0, kMostBytes);
+  const size_t some = std::min(received.size(), kHandshake.size());
+  if (received.substr(0, some) != kHandshake.substr(0, some)) {
+    const std::string_view shown = received.substr(0, kShownBytes);
+    return Wrong(absl::StrCat("it begins with \"", absl::CHexEscape({shown.data(), shown.size()}),
+                              "\"; this address speaks TLS"));
+  }
+  if (received.size() < kRecordHead + kHelloHead) return Await(kRecordHead + kHelloHead);
+  const size_t record = BigEndian(received.substr(3, 2));
+  const size_t hello = BigEndian(received.substr(kRecordHead + 1, 3));
+  if (received[kRecordHead] != kClientHello || hello + kHelloHead != record) {
+    return Wrong("its first record is no whole ClientHello");
+  }
+  if (received.size() < kRecordHead + record) return Await(kRecordHead + record);
+  return Verdict::kCall;
 }
 
 Greeting::Verdict Greeting::ReadFrame(std::string_view received, const Head& head) {

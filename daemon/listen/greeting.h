@@ -7,6 +7,9 @@
 //   DATA                 up to the length of the call's first message; what the message says is
 //                        gRPC's
 //
+// Over TLS (RFC 8446) it is a ClientHello, whole in one record; gRPC gets the handshake, and nothing that
+// is parsed as HTTP/2 before a client's certificate is verified.
+//
 // All this within kMostBytes. What clients send before the daemon's SETTINGS have come is the preface
 // and SETTINGS alone, so whoever reads a greeting sends kServerSettings in between.
 #pragma once
@@ -38,6 +41,8 @@ class Greeting {
   // `received`: all that has come so far, from the connection's first byte on; kMostBytes of it are
   // enough. After kCall and kWrong it is not asked again.
   Verdict Read(std::string_view received);
+  // The same for a connection that is to speak TLS. One of the two is asked, always the same.
+  Verdict ReadTls(std::string_view received);
 
   // Fewer bytes than this, from the first on, have nothing new to say.
   size_t needed() const { return needed_; }

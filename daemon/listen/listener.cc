@@ -199,10 +199,12 @@ class Listener::Impl {
   bool Take(const ListeningSocket& socket, const SocketName& name, Descriptor connection) {
     Peer peer = PeerOf(name.address, name.length);
     const bool own = own_.Has(peer.name);
+    Accepted accepted{.listening = socket.descriptor(), .tls = socket.address().tls};
     if (peer.unix_socket) {
       const absl::StatusOr<PeerCredentials> who = CredentialsOf(connection.get());
       if (!who.ok()) return true;  // it is gone
       peer.address = absl::StrCat("user ", who->user);
+      accepted.user = who->user;
       if (!own) {
         gate_.Log(Logger::Level::kInfo, "local connection", peer.name,
                   absl::StrCat("user ", who->user, ", process ", who->process));
@@ -229,14 +231,16 @@ class Listener::Impl {
       return false;
     }
     if (peer.unix_socket) {
-      serve_(socket.descriptor(), std::move(connection));
+      if (!serve_(accepted, std::move(connection))) {
+        gate_.Log(Logger::Level::kWarn, "connection refused", peer.name,
+                  absl::StrCat(peer.address, " is one more than are known apart"));
+      }
       return true;
     }
     const int descriptor = connection.get();
-    const auto stranger = strangers_
-                              .try_emplace(*id, socket.descriptor(), std::move(connection),
-                                           guard_.most_first_message())
-                              .first;
+    const auto stranger =
+        strangers_.try_emplace(*id, accepted, std::move(connection), guard_.most_first_message())
+            .first;
     // What has come already is an edge as well.
     if (!Watch(descriptor, EPOLLIN | EPOLLRDHUP | EPOLLET, kConnections + *id)) Drop(stranger);
     return true;
@@ -244,9 +248,9 @@ class Listener::Impl {
 
   // A connection over TCP of which no call has begun.
   struct Stranger {
-    Stranger(int listening, Descriptor connection, uint64_t most_message)
-        : listening(listening), connection(std::move(connection)), greeting(most_message) {}
-    int listening;
+    Stranger(const Accepted& accepted, Descriptor connection, uint64_t most_message)
+        : accepted(accepted), connection(std::move(connection)), greeting(most_message) {}
+    Accepted accepted;
     Descriptor connection;
     Greeting greeting;
     bool answered = false;  // with the daemon's SETTINGS
@@ -263,7 +267,11 @@ class Listener::Impl {
         static_cast<size_t>(bytes) >= stranger.greeting.needed()) {
       std::array<char, Greeting::kMostBytes> buffer;
       const ssize_t n = recv(descriptor, buffer.data(), buffer.size(), MSG_PEEK | MSG_DONTWAIT);
-      if (n > 0) verdict = stranger.greeting.Read({buffer.data(), static_cast<size_t>(n)});
+      const std::string_view got(buffer.data(), static_cast<size_t>(std::max<ssize_t>(0, n)));
+      if (n > 0) {
+        verdict =
+            stranger.accepted.tls ? stranger.greeting.ReadTls(got) : stranger.greeting.Read(got);
+      }
     }
     switch (verdict) {
       case Greeting::Verdict::kWrong:
@@ -281,10 +289,10 @@ class Listener::Impl {
     }
     epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, descriptor, nullptr);
     SocketWire::Narrow(descriptor);
-    const int listening = stranger.listening;
+    const Accepted accepted = stranger.accepted;
     Descriptor connection = std::move(stranger.connection);
     strangers_.erase(at);
-    serve_(listening, std::move(connection));
+    serve_(accepted, std::move(connection));
   }
 
   // The guard's descriptor is closed when the watcher sees the end.

@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -45,9 +46,16 @@ class OwnPeers {
   std::set<std::string> names_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// Takes an accepted connection, whose descriptor is non-blocking and now theirs. Called on the
-// listener's thread.
-using Serve = std::function<void(int listening, Descriptor connection)>;
+// What is known of an accepted connection.
+struct Accepted {
+  int listening = -1;            // the socket that it came to
+  bool tls = false;              // what it speaks
+  std::optional<uint32_t> user;  // of a unix socket: whose it is, by the kernel's word
+};
+
+// Takes an accepted connection, whose descriptor is non-blocking and now theirs. False: it was closed,
+// as nobody can serve it. Called on the listener's thread.
+using Serve = std::function<bool(const Accepted& accepted, Descriptor connection)>;
 
 struct ListenerOptions {
   // A connection whose other end does not acknowledge what is sent is given up after it.

@@ -1,6 +1,8 @@
 #include "daemon/listen/probe.h"
 
 #include <netinet/in.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
 #include <poll.h>
 #include <sys/un.h>
 
@@ -8,6 +10,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -78,6 +81,37 @@ class Attempt {
     socklen_t length = sizeof(error);
     getsockopt(descriptor_, SOL_SOCKET, SO_ERROR, &error, &length);
     return error == 0 ? absl::OkStatus() : absl::ErrnoToStatus(error, "connect");
+  }
+
+  // Until the daemon has shown its certificate, or has answered with an alert.
+  absl::Status ShakeHands() {
+    const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(
+        SSL_CTX_new(TLS_client_method()), &SSL_CTX_free);
+    if (context == nullptr) return absl::ResourceExhaustedError("TLS");
+    constexpr unsigned char kHttp2[] = {2, 'h', '2'};
+    SSL_CTX_set_alpn_protos(context.get(), kHttp2, sizeof(kHttp2));
+    SSL_CTX_set_verify(context.get(), SSL_VERIFY_NONE, nullptr);  // it is our own
+    const std::unique_ptr<SSL, decltype(&SSL_free)> ssl(SSL_new(context.get()), &SSL_free);
+    if (ssl == nullptr || SSL_set_fd(ssl.get(), descriptor_) != 1) {
+      return absl::ResourceExhaustedError("TLS");
+    }
+    for (;;) {
+      ERR_clear_error();
+      const int done = SSL_connect(ssl.get());
+      if (done == 1) return absl::OkStatus();
+      switch (SSL_get_error(ssl.get(), done)) {
+        case SSL_ERROR_WANT_READ:
+          if (absl::Status status = Await(POLLIN); !status.ok()) return status;
+          break;
+        case SSL_ERROR_WANT_WRITE:
+          if (absl::Status status = Await(POLLOUT); !status.ok()) return status;
+          break;
+        case SSL_ERROR_SSL:  // it speaks TLS, and did not like us
+          return absl::OkStatus();
+        default:
+          return absl::UnavailableError("the connection was closed without an answer");
+      }
+    }
   }
 
   absl::Status Ask() {
@@ -165,7 +199,7 @@ absl::Status Reach(const ProbeTarget& target, OwnPeers& own, sync::TimeNs limit)
   own.Add(*peer);
   Attempt attempt(descriptor.get(), limit);
   absl::Status status = attempt.Connect(name);
-  if (status.ok()) status = attempt.Ask();
+  if (status.ok()) status = target.tls ? attempt.ShakeHands() : attempt.Ask();
   own.Remove(*peer);
   return status;
 }

@@ -22,10 +22,12 @@ namespace voxeld::daemon::listen {
 struct ProbeTarget {
   SocketName name;   // that a listening socket has
   std::string text;  // for people
+  bool tls = false;  // what it speaks
 };
 
 // Connects (to itself, if `target` is every address), asks for the health over HTTP/2, waits for the
-// beginning of an answer. The socket is among `own` while it is open. Blocks, `limit` at most.
+// beginning of an answer; over TLS, for which it has no certificate that is trusted, for that of the
+// handshake. The socket is among `own` while it is open. Blocks, `limit` at most.
 absl::Status Reach(const ProbeTarget& target, OwnPeers& own, sync::TimeNs limit);
 
 // Asks every interval, by the clock, on a thread of its own. Thread-safe.

@@ -312,6 +312,11 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
                     *std::move(wrong));
     }
   }
+  if (state.blend == gpu::BlendMode::kErase && !author_.may_erase) {
+    return Refuse(operation, state.layer, "", "layer_state.blend", Reason::kPermissionDenied,
+                  "blend is ERASE, which acts on others' layers and takes the scope control; give "
+                  "OVER or ADD, or erase within the layer by Entity.erase");
+  }
   Layer& layer = EditLayer(key);
   layer.visible = state.visible.value_or(layer.visible);
   layer.opacity = state.opacity.value_or(layer.opacity);

@@ -24,6 +24,7 @@ struct Author {
   uint64_t owner = 0;
   WriterPtr writer;
   bool suppressed = false;  // hidden by an operator
+  bool may_erase = true;    // OpenOptions::may_erase
   // The owner's quotas, if an operator set any.
   uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;
 };

@@ -189,6 +189,9 @@ struct OpenOptions {
   uint32_t drop_oldest_frames = 0;        // kDropOldest: how many stay
   std::string resume_token, owner_token;  // empty: a new session, a new owner
   bool resumable = true;                  // false: nobody is told its token
+  // Who the client is, by its credentials: all its sessions are one owner. Empty: nobody in particular.
+  std::string principal;
+  bool may_erase = true;  // layers that erase, others' included
 };
 
 struct Upsert {

@@ -36,6 +36,19 @@ void ActiveCalls::EndAll(const absl::Status& status) {
   for (const auto& call : calls) call->End(status);
 }
 
+size_t ActiveCalls::EndRevoked(const std::function<absl::Status(const access::Caller&)>& check) {
+  std::vector<std::pair<std::shared_ptr<ActiveCall>, absl::Status>> revoked;
+  {
+    sync::MutexLock lock(mutex_);
+    for (const auto& [key, call] : calls_) {
+      absl::Status status = check(call->caller());
+      if (!status.ok()) revoked.emplace_back(call, std::move(status));
+    }
+  }
+  for (const auto& [call, status] : revoked) call->End(status);
+  return revoked.size();
+}
+
 size_t ActiveCalls::AwaitNone(sync::Clock& clock, sync::TimeNs deadline) {
   sync::MutexLock lock(mutex_);
   while (!calls_.empty() && clock.Now() < deadline) clock.WaitUntil(mutex_, removed_, deadline);

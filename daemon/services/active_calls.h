@@ -1,11 +1,14 @@
 // Calls that are open. At shutdown each is told to end.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "absl/status/status.h"
+#include "daemon/access/access.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
 
@@ -17,6 +20,13 @@ class ActiveCall {
   // Ends the call with `status` once what is queued for its client has been written. May be called
   // from any thread, and more than once.
   virtual void End(const absl::Status& status) = 0;
+
+  // Whose it is; set before it is among others.
+  void SetCaller(access::Caller caller) { caller_ = std::move(caller); }
+  const access::Caller& caller() const { return caller_; }
+
+ private:
+  access::Caller caller_;
 };
 
 // Thread-safe.
@@ -27,6 +37,8 @@ class ActiveCalls {
   void Remove(const ActiveCall* call);
 
   void EndAll(const absl::Status& status);
+  // Ends those of whose callers `check` says something else than OK, with that. Answers how many.
+  size_t EndRevoked(const std::function<absl::Status(const access::Caller&)>& check);
   // Until none is left, or `deadline` of `clock`. Answers how many are.
   size_t AwaitNone(sync::Clock& clock, sync::TimeNs deadline);
 

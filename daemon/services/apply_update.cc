@@ -92,14 +92,16 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
 
 }  // namespace
 
-void ApplyUpdate(ServiceContext& context, std::span<const std::string_view> slices,
-                 UpdateDone done) {
+void ApplyUpdate(ServiceContext& context, const access::Caller& caller,
+                 std::span<const std::string_view> slices, UpdateDone done) {
   wire::Decoded decoded =
       wire::DecodeUpdate(slices, context.core.limits(), &context.core.bulk(), &context.fonts);
   if (!decoded.open.has_value()) return done(decoded.status, v1::ApplyUpdateResponse());
   uint64_t bytes = 0;
   for (const std::string_view slice : slices) bytes += slice.size();
   OpenOptions open = *std::move(decoded.open);
+  open.principal = caller.principal;
+  open.may_erase = caller.scopes.Has(access::Scope::kControl);
   Budget& budget = *context.core.budget();
   if (!budget.Charge(Budget::Use::kArriving, bytes)) {
     return done(absl::ResourceExhaustedError(absl::StrCat(

@@ -19,7 +19,7 @@ namespace voxeld::daemon::services {
 using UpdateDone = std::function<void(const absl::Status&, const v1::ApplyUpdateResponse&)>;
 
 // `slices` are an ApplyUpdateRequest, read before the call returns.
-void ApplyUpdate(ServiceContext& context, std::span<const std::string_view> slices,
-                 UpdateDone done);
+void ApplyUpdate(ServiceContext& context, const access::Caller& caller,
+                 std::span<const std::string_view> slices, UpdateDone done);
 
 }  // namespace voxeld::daemon::services

@@ -6,7 +6,11 @@
 #include <memory>
 #include <string>
 
+#include "daemon/access/access.h"
+#include "daemon/access/audit.h"
 #include "daemon/core/core.h"
+#include "daemon/listen/counters.h"
+#include "daemon/listen/log_gate.h"
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/active_calls.h"
@@ -32,12 +36,16 @@ struct StreamLimits {
 struct ServiceContext {
   Core& core;
   sync::Clock& clock;
+  listen::Counters& counters;
   std::string version;
   Logger* log = nullptr;  // may be none
   StreamLimits limits;
   uint32_t max_scene_watches = 64;
   uint32_t max_stats_watches = 64;
+  const access::Access* access = nullptr;  // none: everybody may do everything
+  access::Audit* audit = nullptr;          // none: nobody asks
 
+  listen::LogGate turned_away_gate{clock, log};
   ActiveCalls calls;        // streams, watches, captures
   ActiveCalls short_calls;  // all others
   std::atomic<uint32_t> scene_watches = 0;

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/services/audited.h"
+#include "daemon/services/caller.h"
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/services/unary_call.h"
@@ -15,15 +17,14 @@
 namespace voxeld::daemon::services {
 namespace {
 
+using access::Scope;
 using grpc::CallbackServerContext;
 using grpc::ServerUnaryReactor;
 
-class RefusedWatch final : public grpc::ServerWriteReactor<v1::VolumeChunk> {
+template <typename Response>
+class RefusedWatch final : public grpc::ServerWriteReactor<Response> {
  public:
-  RefusedWatch() {
-    Finish(ToGrpc(absl::UnimplementedError(
-        "WatchVolume is not implemented in this version of the server: use CaptureVolume")));
-  }
+  explicit RefusedWatch(const absl::Status& status) { this->Finish(ToGrpc(status)); }
   void OnDone() override { delete this; }
 };
 
@@ -42,36 +43,64 @@ class DisplayService final : public v1::DisplayService::CallbackService {
 
   ServerUnaryReactor* ListDisplays(CallbackServerContext* call, const v1::ListDisplaysRequest*,
                                    v1::ListDisplaysResponse* response) override {
+    if (absl::Status status = May(call, "ListDisplays"); !status.ok()) return Refuse(call, status);
     return DoListDisplays(call->DefaultReactor(), response);
   }
 
   ServerUnaryReactor* GetDisplay(CallbackServerContext* call, const v1::GetDisplayRequest* request,
                                  v1::DisplayDescription* response) override {
+    if (absl::Status status = May(call, "GetDisplay"); !status.ok()) return Refuse(call, status);
     return DoGetDisplay(call->DefaultReactor(), *request, response);
   }
 
   ServerUnaryReactor* UpdateDisplay(CallbackServerContext* call,
                                     const v1::UpdateDisplayRequest* request,
                                     v1::DisplayDescription* response) override {
-    return DoUpdateDisplay(call->DefaultReactor(), *request, response);
+    Audited audited(context_, *call, "UpdateDisplay", *request);
+    const absl::StatusOr<access::Caller> caller =
+        Authorise(context_, *call, Scope::kControl, "UpdateDisplay");
+    if (!caller.ok()) return Refuse(call, audited.Done(caller.status()));
+    audited.By(*caller);
+    return DoUpdateDisplay(call->DefaultReactor(), audited, *request, response);
   }
 
-  grpc::ServerWriteReactor<v1::Stats>* WatchStats(CallbackServerContext*,
+  grpc::ServerWriteReactor<v1::Stats>* WatchStats(CallbackServerContext* call,
                                                   const v1::WatchStatsRequest* request) override {
-    return NewStatsWatch(context_, *request);
+    absl::StatusOr<access::Caller> caller = Authorise(context_, *call, Scope::kView, "WatchStats");
+    if (!caller.ok()) return new RefusedWatch<v1::Stats>(caller.status());
+    return NewStatsWatch(context_, *std::move(caller), *request);
   }
 
-  grpc::ServerWriteReactor<v1::VolumeChunk>* WatchVolume(CallbackServerContext*,
+  grpc::ServerWriteReactor<v1::VolumeChunk>* WatchVolume(CallbackServerContext* call,
                                                          const v1::WatchVolumeRequest*) override {
-    return new RefusedWatch;
+    absl::Status status = May(call, "WatchVolume");
+    if (status.ok()) {
+      status = absl::UnimplementedError(
+          "WatchVolume is not implemented in this version of the server: use CaptureVolume");
+    }
+    return new RefusedWatch<v1::VolumeChunk>(status);
   }
 
   grpc::ServerWriteReactor<v1::VolumeChunk>* CaptureVolume(
-      CallbackServerContext*, const v1::CaptureVolumeRequest* request) override {
-    return NewCapture(context_, *request);
+      CallbackServerContext* call, const v1::CaptureVolumeRequest* request) override {
+    absl::StatusOr<access::Caller> caller =
+        Authorise(context_, *call, Scope::kView, "CaptureVolume");
+    if (!caller.ok()) return new RefusedWatch<v1::VolumeChunk>(caller.status());
+    return NewCapture(context_, *std::move(caller), *request);
   }
 
  private:
+  static ServerUnaryReactor* Refuse(CallbackServerContext* call, const absl::Status& status) {
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    reactor->Finish(ToGrpc(status));
+    return reactor;
+  }
+
+  // Whether the caller may look.
+  absl::Status May(CallbackServerContext* call, const char* method) {
+    return Authorise(context_, *call, Scope::kView, method).status();
+  }
+
   ServerUnaryReactor* DoListDisplays(ServerUnaryReactor* reactor,
                                      v1::ListDisplaysResponse* response) {
     context_.core.ListDisplays(
@@ -95,16 +124,17 @@ class DisplayService final : public v1::DisplayService::CallbackService {
     return reactor;
   }
 
-  ServerUnaryReactor* DoUpdateDisplay(ServerUnaryReactor* reactor,
+  ServerUnaryReactor* DoUpdateDisplay(ServerUnaryReactor* reactor, const Audited& audited,
                                       const v1::UpdateDisplayRequest& request,
                                       v1::DisplayDescription* response) {
     absl::StatusOr<DisplayUpdate> update = wire::FromWire(request);
     if (!update.ok()) {
-      reactor->Finish(ToGrpc(update.status()));
+      reactor->Finish(ToGrpc(audited.Done(update.status())));
       return reactor;
     }
-    context_.core.UpdateDisplay(request.name(), *std::move(update),
-                                Answer(UnaryCall::Begin(context_.short_calls, reactor), response));
+    context_.core.UpdateDisplay(
+        request.name(), *std::move(update),
+        audited.Watching(Answer(UnaryCall::Begin(context_.short_calls, reactor), response)));
     return reactor;
   }
 

@@ -246,16 +246,19 @@ class Capture final : public Sender<v1::VolumeChunk> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context,
+grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context, access::Caller caller,
                                                    const v1::WatchStatsRequest& request) {
   const auto watch = std::make_shared<StatsWatch>(context);
+  watch->SetCaller(std::move(caller));
   watch->Start(request);
   return watch.get();
 }
 
 grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
+                                                      access::Caller caller,
                                                       const v1::CaptureVolumeRequest& request) {
   const auto capture = std::make_shared<Capture>(context);
+  capture->SetCaller(std::move(caller));
   capture->Start(request);
   return capture.get();
 }

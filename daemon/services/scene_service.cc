@@ -5,12 +5,16 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/services/apply_update.h"
+#include "daemon/services/audited.h"
+#include "daemon/services/caller.h"
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/services/unary_call.h"
@@ -21,12 +25,20 @@
 namespace voxeld::daemon::services {
 namespace {
 
+using access::Caller;
+using access::Scope;
 using grpc::CallbackServerContext;
 using grpc::ServerUnaryReactor;
 
 constexpr uint32_t kPageSize = 1000;
 
-// A reactor for a method that has no working server side: it finishes at once.
+// Reactors of calls that are refused: they finish at once.
+class RefusedStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
+ public:
+  explicit RefusedStream(const absl::Status& status) { Finish(ToGrpc(status)); }
+  void OnDone() override { delete this; }
+};
+
 template <typename Request>
 class RefusedReads final : public grpc::ServerReadReactor<Request> {
  public:
@@ -64,38 +76,55 @@ class SceneService final : public SceneBase {
   explicit SceneService(ServiceContext& context) : context_(context) {}
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Stream(
-      CallbackServerContext*) override {
-    return NewStream(context_);
+      CallbackServerContext* call) override {
+    absl::StatusOr<Caller> caller = Authorise(context_, *call, Scope::kDraw, "Stream");
+    if (!caller.ok()) return new RefusedStream(caller.status());
+    return NewStream(context_, *std::move(caller));
   }
 
   ServerUnaryReactor* ApplyUpdate(CallbackServerContext* call, const grpc::ByteBuffer* request,
                                   grpc::ByteBuffer* response) override {
-    return DoApplyUpdate(call->DefaultReactor(), *request, response);
+    absl::StatusOr<Caller> caller = Authorise(context_, *call, Scope::kDraw, "ApplyUpdate");
+    if (!caller.ok()) return Refuse(call, caller.status());
+    return DoApplyUpdate(call->DefaultReactor(), *std::move(caller), *request, response);
   }
 
-  grpc::ServerWriteReactor<grpc::ByteBuffer>* WatchScene(CallbackServerContext*,
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* WatchScene(CallbackServerContext* call,
                                                          const grpc::ByteBuffer* request) override {
-    return DoWatchScene(*request);
+    absl::StatusOr<Caller> caller = Authorise(context_, *call, Scope::kView, "WatchScene");
+    if (!caller.ok()) return new RefusedWrites<grpc::ByteBuffer>(caller.status());
+    return DoWatchScene(*std::move(caller), *request);
   }
 
   ServerUnaryReactor* ListEntities(CallbackServerContext* call,
                                    const v1::ListEntitiesRequest* request,
                                    v1::ListEntitiesResponse* response) override {
+    if (absl::Status status = May(call, Scope::kView, "ListEntities"); !status.ok()) {
+      return Refuse(call, status);
+    }
     return DoListEntities(call->DefaultReactor(), *request, response);
   }
 
   ServerUnaryReactor* GetEntity(CallbackServerContext* call, const v1::GetEntityRequest* request,
                                 v1::GetEntityResponse* response) override {
+    if (absl::Status status = May(call, Scope::kView, "GetEntity"); !status.ok()) {
+      return Refuse(call, status);
+    }
     return DoGetEntity(call->DefaultReactor(), *request, response);
   }
 
   ServerUnaryReactor* ClearLayer(CallbackServerContext* call, const v1::ClearLayerRequest* request,
                                  v1::ClearLayerResponse* response) override {
-    return DoClearLayer(call->DefaultReactor(), *request, response);
+    absl::StatusOr<Caller> caller = Authorise(context_, *call, Scope::kDraw, "ClearLayer");
+    if (!caller.ok()) return Refuse(call, caller.status());
+    return DoClearLayer(call, *std::move(caller), *request, response);
   }
 
   ServerUnaryReactor* ListOwners(CallbackServerContext* call, const v1::ListOwnersRequest*,
                                  v1::ListOwnersResponse* response) override {
+    if (absl::Status status = May(call, Scope::kView, "ListOwners"); !status.ok()) {
+      return Refuse(call, status);
+    }
     ServerUnaryReactor* reactor = call->DefaultReactor();
     context_.core.ListOwners(
         Answer<std::vector<OwnerInfo>>(UnaryCall::Begin(context_.short_calls, reactor), response));
@@ -105,23 +134,41 @@ class SceneService final : public SceneBase {
   ServerUnaryReactor* ControlOwner(CallbackServerContext* call,
                                    const v1::ControlOwnerRequest* request,
                                    v1::OwnerInfo* response) override {
+    Audited audited(context_, *call, "ControlOwner", *request);
+    const absl::StatusOr<Caller> caller =
+        Authorise(context_, *call, Scope::kControl, "ControlOwner");
+    if (!caller.ok()) return Refuse(call, audited.Done(caller.status()));
+    audited.By(*caller);
     ServerUnaryReactor* reactor = call->DefaultReactor();
-    context_.core.ControlOwner(
-        wire::FromWire(*request),
-        Answer<OwnerInfo>(UnaryCall::Begin(context_.short_calls, reactor), response));
+    context_.core.ControlOwner(wire::FromWire(*request),
+                               audited.Watching(Answer<OwnerInfo>(
+                                   UnaryCall::Begin(context_.short_calls, reactor), response)));
     return reactor;
   }
 
-  grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(CallbackServerContext*,
+  grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(CallbackServerContext* call,
                                                                v1::UploadAssetResponse*) override {
+    if (absl::Status status = May(call, Scope::kDraw, "UploadAsset"); !status.ok()) {
+      return new RefusedReads<v1::UploadAssetRequest>(status);
+    }
     return new RefusedReads<v1::UploadAssetRequest>(absl::UnimplementedError(
         "UploadAsset is not implemented in this version of the server: send geometry in Upsert or "
         "Batch"));
   }
 
  private:
-  ServerUnaryReactor* DoApplyUpdate(ServerUnaryReactor* reactor, const grpc::ByteBuffer& request,
-                                    grpc::ByteBuffer* response) {
+  static ServerUnaryReactor* Refuse(CallbackServerContext* call, const absl::Status& status) {
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    reactor->Finish(ToGrpc(status));
+    return reactor;
+  }
+
+  absl::Status May(CallbackServerContext* call, Scope scope, const char* method) {
+    return Authorise(context_, *call, scope, method).status();
+  }
+
+  ServerUnaryReactor* DoApplyUpdate(ServerUnaryReactor* reactor, const Caller& caller,
+                                    const grpc::ByteBuffer& request, grpc::ByteBuffer* response) {
     const auto call = UnaryCall::Begin(context_.short_calls, reactor);
     std::vector<grpc::Slice> slices;
     if (!request.Dump(&slices).ok()) {
@@ -134,7 +181,7 @@ class SceneService final : public SceneBase {
       views.emplace_back(reinterpret_cast<const char*>(slice.begin()), slice.size());
     }
     services::ApplyUpdate(
-        context_, views,
+        context_, caller, views,
         [call, response](const absl::Status& status, const v1::ApplyUpdateResponse& answer) {
           call->Answer(status, [&] {
             const grpc::Slice slice(answer.SerializeAsString());
@@ -144,7 +191,8 @@ class SceneService final : public SceneBase {
     return reactor;
   }
 
-  grpc::ServerWriteReactor<grpc::ByteBuffer>* DoWatchScene(grpc::ByteBuffer request) {
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* DoWatchScene(Caller caller,
+                                                           grpc::ByteBuffer request) {
     v1::WatchSceneRequest parsed;
     const grpc::Status status =
         grpc::SerializationTraits<v1::WatchSceneRequest>::Deserialize(&request, &parsed);
@@ -152,7 +200,7 @@ class SceneService final : public SceneBase {
       return new RefusedWrites<grpc::ByteBuffer>(
           absl::InvalidArgumentError("the message is no WatchSceneRequest"));
     }
-    return NewSceneWatch(context_, parsed);
+    return NewSceneWatch(context_, std::move(caller), parsed);
   }
 
   ServerUnaryReactor* DoListEntities(ServerUnaryReactor* reactor,
@@ -183,12 +231,18 @@ class SceneService final : public SceneBase {
     return reactor;
   }
 
-  ServerUnaryReactor* DoClearLayer(ServerUnaryReactor* reactor,
+  ServerUnaryReactor* DoClearLayer(CallbackServerContext* call, const Caller& caller,
                                    const v1::ClearLayerRequest& request,
                                    v1::ClearLayerResponse* response) {
+    Audited audited(context_, *call, "ClearLayer", request);
+    audited.By(caller);
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    // Without control one's own alone.
     context_.core.ClearLayer(
         request.owner(), request.layer(), request.keep_state(),
-        Answer<Cleared>(UnaryCall::Begin(context_.short_calls, reactor), response));
+        caller.scopes.Has(Scope::kControl) ? std::optional<std::string>() : caller.principal,
+        audited.Watching(
+            Answer<Cleared>(UnaryCall::Begin(context_.short_calls, reactor), response)));
     return reactor;
   }
 

@@ -192,8 +192,10 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 }  // namespace
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* NewSceneWatch(ServiceContext& context,
+                                                          access::Caller caller,
                                                           const v1::WatchSceneRequest& request) {
   const auto call = std::make_shared<SceneWatchCall>(context, request);
+  call->SetCaller(std::move(caller));
   call->Start();
   return call.get();
 }

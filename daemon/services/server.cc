@@ -5,7 +5,6 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/impl/service_type.h>
 #include <grpcpp/resource_quota.h>
-#include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
@@ -18,6 +17,7 @@
 #include "daemon/listen/listener.h"
 #include "daemon/listen/probe.h"
 #include "daemon/listen/socket.h"
+#include "daemon/services/acceptors.h"
 #include "daemon/services/call_meter.h"
 #include "daemon/services/call_watch.h"
 #include "daemon/services/services.h"
@@ -58,16 +58,20 @@ int MillisecondsOrNever(sync::TimeNs time) {
 class Server::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ServerOptions options)
-      : context_{core,
-                 clock,
-                 options.version,
-                 options.log,
-                 options.streams,
-                 options.max_scene_watches,
-                 options.max_stats_watches},
-        options_(std::move(options)),
+      : options_(std::move(options)),
         counters_(options_.counters != nullptr ? options_.counters
                                                : std::make_shared<listen::Counters>()),
+        context_{.core = core,
+                 .clock = clock,
+                 .counters = *counters_,
+                 .version = options_.version,
+                 .log = options_.log,
+                 .limits = options_.streams,
+                 .max_scene_watches = options_.max_scene_watches,
+                 .max_stats_watches = options_.max_stats_watches,
+                 .access = options_.access,
+                 .audit = options_.audit},
+        acceptors_(options_.tls),
         guard_(LimitsOf(options_.connections, core), clock, *counters_, options_.log),
         scene_(MakeSceneService(context_)),
         display_(MakeDisplayService(context_)) {}
@@ -80,11 +84,17 @@ class Server::Impl {
     }
     std::vector<listen::ListeningSocket> sockets;
     for (const Address& address : options_.listen) {
+      if (address.tls && options_.tls == nullptr) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(address.ToString(),
+                         " is to speak TLS, and there is no certificate; give "
+                         "tls_certificate, tls_key and tls_client_ca"));
+      }
       auto made = listen::ListeningSocket::Listen(address);
       if (!made.ok()) return made.status();
       addresses_.push_back(made->front().address());
       for (listen::ListeningSocket& socket : *made) {
-        targets_.push_back({socket.name(), socket.address().ToString()});
+        targets_.push_back({socket.name(), socket.address().ToString(), address.tls});
         sockets.push_back(std::move(socket));
       }
     }
@@ -98,11 +108,8 @@ class Server::Impl {
     if (absl::Status status = Build(); !status.ok()) return status;
     auto listener = listen::Listener::Start(
         std::move(sockets), guard_, *counters_, own_, context_.clock,
-        [this](int listening, Descriptor connection) {
-          grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
-          parameters.listener_fd = listening;
-          parameters.fd = connection.Release();
-          acceptor_->HandleNewConnection(&parameters);
+        [this](const listen::Accepted& accepted, Descriptor connection) {
+          return acceptors_.Take(accepted, std::move(connection));
         },
         {.send_limit_ns = options_.keepalive_timeout_ns, .log = options_.log});
     if (!listener.ok()) return listener.status();
@@ -157,9 +164,7 @@ class Server::Impl {
     std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> watches;
     watches.push_back(MakeCallWatch(guard_));
     builder.experimental().SetInterceptorCreators(std::move(watches));
-    acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
-        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-        grpc::InsecureServerCredentials());
+    acceptors_.AddTo(builder);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::InternalError("the gRPC server could not be started");
     for (const char* service : kServices) {
@@ -187,6 +192,16 @@ class Server::Impl {
       server_->GetHealthCheckService()->SetServingStatus(service, serving);
     }
     server_->GetHealthCheckService()->SetServingStatus("", serving);
+  }
+
+  size_t EndRevoked() {
+    if (options_.access == nullptr) return 0;
+    const size_t ended =
+        context_.calls.EndRevoked([access = options_.access](const access::Caller& caller) {
+          return access->Recheck(caller);
+        });
+    counters_->calls_revoked += ended;
+    return ended;
   }
 
   void Shutdown(sync::TimeNs limit) {
@@ -225,14 +240,14 @@ class Server::Impl {
   const std::vector<Address>& addresses() const { return addresses_; }
 
  private:
-  ServiceContext context_;
   const ServerOptions options_;
   const std::shared_ptr<listen::Counters> counters_;
+  ServiceContext context_;
+  Acceptors acceptors_;
   listen::Guard guard_;
   listen::OwnPeers own_;
   std::vector<listen::ProbeTarget> targets_;
   const std::unique_ptr<grpc::Service> scene_, display_;
-  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<listen::Listener> listener_;
   std::unique_ptr<CallMeter> meter_;
@@ -256,6 +271,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(Core& core, sync::Clock& c
 
 const std::vector<Address>& Server::addresses() const { return impl_->addresses(); }
 void Server::SetServing(bool serving) { impl_->SetServing(serving); }
+size_t Server::EndRevoked() { return impl_->EndRevoked(); }
 void Server::Shutdown(sync::TimeNs limit) { impl_->Shutdown(limit); }
 
 }  // namespace voxeld::daemon::services

@@ -9,6 +9,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "daemon/access/access.h"
+#include "daemon/access/audit.h"
+#include "daemon/access/tls_store.h"
 #include "daemon/address/address.h"
 #include "daemon/core/core.h"
 #include "daemon/listen/counters.h"
@@ -44,6 +47,11 @@ struct ServerOptions {
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
   // Where producers on this machine hand over memory, charged to the core's budget; nothing: nowhere.
   std::optional<local::LocalSocketOptions> local;
+  // All three outlive the server. No access: everybody may do everything. No tls: no address may ask
+  // for it.
+  const access::Access* access = nullptr;
+  const access::TlsStore* tls = nullptr;
+  access::Audit* audit = nullptr;
   Logger* log = nullptr;  // outlives the server; may be none
 };
 
@@ -64,6 +72,9 @@ class Server {
   // What health answers, for every service, until Shutdown: also while the server cannot be reached,
   // by its own probe's word, it is NOT_SERVING.
   void SetServing(bool serving);
+
+  // Ends the long calls of whoever may not make them any more (Access::Recheck). Answers how many.
+  size_t EndRevoked();
 
   // Health answers NOT_SERVING, nothing new is accepted, every long call ends with
   // `Unavailable: shutting down` after what is queued for it. Returns when all calls have ended,

@@ -30,12 +30,15 @@ std::unique_ptr<grpc::Service> MakeDisplayService(ServiceContext& context);
 
 // Reactors that own themselves until gRPC is done with them.
 // Requests are read before the call returns.
-grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context);
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context,
+                                                                       access::Caller caller);
 grpc::ServerWriteReactor<grpc::ByteBuffer>* NewSceneWatch(ServiceContext& context,
+                                                          access::Caller caller,
                                                           const v1::WatchSceneRequest& request);
-grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context,
+grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context, access::Caller caller,
                                                    const v1::WatchStatsRequest& request);
 grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
+                                                      access::Caller caller,
                                                       const v1::CaptureVolumeRequest& request);
 
 }  // namespace voxeld::daemon::services

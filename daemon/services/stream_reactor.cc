@@ -43,8 +43,9 @@ class Received final : public ReceivedMessage {
 class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                             public StreamPort {
  public:
-  explicit StreamReactor(ServiceContext& context)
+  StreamReactor(ServiceContext& context, access::Caller caller)
       : session_(std::make_shared<StreamSession>(context, this)) {
+    session_->SetCaller(std::move(caller));
     session_->Start();
   }
 
@@ -105,8 +106,9 @@ class StreamReactor final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grp
 
 }  // namespace
 
-grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context) {
-  return new StreamReactor(context);
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context,
+                                                                       access::Caller caller) {
+  return new StreamReactor(context, std::move(caller));
 }
 
 }  // namespace voxeld::daemon::services

@@ -152,6 +152,8 @@ void StreamSession::TakeOpen(OpenOptions open, wire::Decoded decoded, const Arri
       sequence_ = decoded.sequence;
       no_outcomes_ = open.no_outcomes;
       client_name_ = open.client_name;
+      open.principal = caller().principal;
+      open.may_erase = caller().scopes.Has(access::Scope::kControl);
       state_ = State::kOpening;
     }
   }

@@ -82,6 +82,7 @@ void Encode(const SessionInfo& in, v1::Opened* out) {
 
 void Encode(const OwnerInfo& in, v1::OwnerInfo* out) {
   out->set_owner(in.owner);
+  out->set_principal(in.principal);
   out->mutable_client_names()->Assign(in.client_names.begin(), in.client_names.end());
   out->set_sessions(in.sessions);
   out->set_layers(in.layers);

@@ -52,7 +52,9 @@ absl::StatusOr<std::string> ServerTarget(std::string_view address) {
         absl::StrCat("the address \"", std::string(address),
                      "\" has the port 0; give HOST:PORT or unix:PATH, the port 1 to 65535"));
   }
-  return absl::StrCat("dns:///", parsed->ToString());
+  daemon::Address plain = *parsed;
+  plain.tls = false;
+  return absl::StrCat("dns:///", plain.ToString());
 }
 
 }  // namespace voxeld::client

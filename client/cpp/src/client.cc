@@ -175,11 +175,12 @@ absl::Status Layer::Set(const LayerLook& look) const {
 
 absl::StatusOr<std::unique_ptr<Session>> Session::Open(Options options) {
   if (options.address.empty()) options.address = DefaultAddress();
-  const absl::StatusOr<std::string> target = ServerTarget(options.address);
-  if (!target.ok()) return target.status();
   const absl::Status checked = Check(options);
   if (!checked.ok()) return checked;
-  auto running = std::make_shared<RunningCore>(std::move(options), MakeGrpcTransport(*target));
+  absl::StatusOr<std::unique_ptr<Transport>> transport =
+      MakeGrpcTransport(options.address, options.credentials.value_or(DefaultCredentials()));
+  if (!transport.ok()) return transport.status();
+  auto running = std::make_shared<RunningCore>(std::move(options), *std::move(transport));
   return std::unique_ptr<Session>(new Session(std::move(running)));
 }
 

@@ -3,9 +3,7 @@
 #include <grpc/grpc.h>
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
-#include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
-#include <grpcpp/security/credentials.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/channel_arguments.h>
 #include <grpcpp/support/client_callback.h>
@@ -16,6 +14,7 @@
 
 #include "client/cpp/src/local_socket.h"
 #include "display/sync/mutex.h"
+#include "voxeld/channel.h"
 #include "voxeld/v1/scene.grpc.pb.h"  // how gRPC reads answers
 
 namespace voxeld::client {
@@ -100,10 +99,32 @@ class GrpcStream final : public Stream,
 
 class GrpcTransport final : public Transport {
  public:
-  GrpcTransport(std::string target, Keepalive keepalive)
-      : target_(std::move(target)), keepalive_(keepalive) {}
+  GrpcTransport(std::string address, Credentials credentials, Keepalive keepalive)
+      : address_(std::move(address)), credentials_(std::move(credentials)), keepalive_(keepalive) {}
+
+  absl::Status MakeFirst() {
+    auto made = Make();
+    if (!made.ok()) return made.status();
+    last_ = *std::move(made);
+    return absl::OkStatus();
+  }
 
   std::unique_ptr<Stream> Start(Stream::Events* events) override {
+    // The first is the one that was made to see whether it can be.
+    if (std::exchange(started_, true)) {
+      if (auto made = Make(); made.ok()) last_ = *std::move(made);
+    }
+    return std::make_unique<GrpcStream>(last_, events);
+  }
+
+  std::unique_ptr<MemoryChannel> OpenMemory(const std::string& path, const std::string& token,
+                                            MemoryChannel::Events* events) override {
+    if (!address_.starts_with("unix:")) return nullptr;
+    return ConnectLocalSocket(path, token, events);
+  }
+
+ private:
+  absl::StatusOr<std::shared_ptr<grpc::Channel>> Make() const {
     grpc::ChannelArguments arguments;
     arguments.SetMaxReceiveMessageSize(kMostAnswerBytes);
     // The server is near; what a web proxy is set for is not meant for it.
@@ -114,29 +135,29 @@ class GrpcTransport final : public Transport {
     arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(keepalive_.timeout.count()));
     // Else it asks twice, and then no more until data goes out.
     arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-    return std::make_unique<GrpcStream>(
-        grpc::CreateCustomChannel(target_, grpc::InsecureChannelCredentials(), arguments), events);
+    return MakeChannel(address_, credentials_, arguments);
   }
 
-  std::unique_ptr<MemoryChannel> OpenMemory(const std::string& path, const std::string& token,
-                                            MemoryChannel::Events* events) override {
-    if (!target_.starts_with("unix:")) return nullptr;
-    return ConnectLocalSocket(path, token, events);
-  }
-
- private:
-  const std::string target_;
+  const std::string address_;
+  const Credentials credentials_;
   const Keepalive keepalive_;
+  std::shared_ptr<grpc::Channel> last_;
+  bool started_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Transport> MakeGrpcTransport(std::string target, Keepalive keepalive) {
+absl::StatusOr<std::unique_ptr<Transport>> MakeGrpcTransport(std::string address,
+                                                             Credentials credentials,
+                                                             Keepalive keepalive) {
   // gRPC stays up from now on: shutting it down waits, up to 10 s, for sockets that it is still taking
   // down, and it would be at the end of whichever session happened to be the last.
   static const bool up = (grpc_init(), true);
   static_cast<void>(up);
-  return std::make_unique<GrpcTransport>(std::move(target), keepalive);
+  auto transport =
+      std::make_unique<GrpcTransport>(std::move(address), std::move(credentials), keepalive);
+  if (absl::Status status = transport->MakeFirst(); !status.ok()) return status;
+  return transport;
 }
 
 }  // namespace voxeld::client

@@ -5,7 +5,9 @@
 #include <memory>
 #include <string>
 
+#include "absl/status/statusor.h"
 #include "client/cpp/src/transport.h"
+#include "voxeld/credentials.h"
 
 namespace voxeld::client {
 
@@ -17,7 +19,10 @@ struct Keepalive {
   std::chrono::milliseconds timeout{10'000};
 };
 
-// `target` as gRPC writes it (voxeld/address.h).
-std::unique_ptr<Transport> MakeGrpcTransport(std::string target, Keepalive keepalive = {});
+// `address` as users write it (voxeld/address.h). Fails as MakeChannel does. Each stream has a channel of
+// its own, for which files are read anew; where that fails it is the last one's.
+absl::StatusOr<std::unique_ptr<Transport>> MakeGrpcTransport(std::string address,
+                                                             Credentials credentials = {},
+                                                             Keepalive keepalive = {});
 
 }  // namespace voxeld::client

@@ -21,7 +21,7 @@ std::string DefaultAddress(const Environment& environment);
 // Of this process's environment.
 std::string DefaultAddress();
 
-// HOST:PORT or unix:PATH as gRPC writes it, for calls of one's own; InvalidArgument with the text and
+// HOST:PORT, tls:HOST:PORT (without saying so) or unix:PATH as gRPC writes it, for calls of one's own; InvalidArgument with the text and
 // what would be right.
 absl::StatusOr<std::string> ServerTarget(std::string_view address);
 

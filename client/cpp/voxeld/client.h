@@ -31,6 +31,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "voxeld/credentials.h"
 #include "voxeld/drawing.h"
 #include "voxeld/receipt.h"
 
@@ -73,8 +74,9 @@ struct ConnectionChange {
 };
 
 struct Options {
-  std::string address;      // HOST:PORT or unix:PATH; empty: DefaultAddress()
-  std::string client_name;  // a label for people
+  std::string address;  // HOST:PORT, tls:HOST:PORT or unix:PATH; empty: DefaultAddress()
+  std::optional<Credentials> credentials;  // nothing: DefaultCredentials()
+  std::string client_name;                 // a label for people
   OnDisconnect on_disconnect = OnDisconnect::kClear;
   Duration linger{0};
   bool strict = false;   // a refused operation refuses its whole commit

@@ -8,6 +8,7 @@ from . import aio
 from .clip import ClipBox, ClipCylinder
 from .colors import Gradient
 from .connection import Connection, connect
+from .credentials import Credentials
 from .errors import (BufferFull, CommitDropped, CommitRefused, ConnectionLost, InvalidArray, InvalidColor, InvalidValue,
                      VoxelError)
 from .handles import FrameBlock, Handle, Layer, ObjectBlock
@@ -19,6 +20,7 @@ from .volumes import Volume
 __version__ = "0.1.0"
 
 __all__ = [
-    "Accepted", "BufferFull", "ChangeSet", "ClipBox", "ClipCylinder", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Frame",
+    "Accepted", "BufferFull", "ChangeSet", "ClipBox", "ClipCylinder", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Credentials",
+    "Frame",
     "FrameBlock", "Gradient", "Handle", "InvalidArray", "InvalidColor", "InvalidValue", "Issue", "Layer", "ObjectBlock", "Outcome",
     "Stages", "VoxelError", "Volume", "aio", "connect", "identity", "rotate", "scale", "translate"]

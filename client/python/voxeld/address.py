@@ -1,6 +1,7 @@
-"""Where the server is: HOST:PORT or unix:PATH, found as voxelctl finds it."""
+"""Where the server is: HOST:PORT, tls:HOST:PORT or unix:PATH, found as voxelctl finds it."""
 from __future__ import annotations
 
+import ipaddress
 import os
 import stat
 from typing import Mapping
@@ -39,12 +40,30 @@ def choose(address: str | None = None, environment: Mapping[str, str] | None = N
     return DEFAULT_TCP
 
 
+def is_tls(address: str) -> bool:
+    return address.startswith("tls:")
+
+
+def is_local(address: str) -> bool:
+    """Whether what is sent there stays on this machine."""
+    if address.startswith("unix:"):
+        return True
+    host = address.removeprefix("tls:").rpartition(":")[0].strip("[]")
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
 def target(address: str) -> str:
-    """The address in gRPC's words."""
+    """The address in gRPC's words, which do not say that it speaks TLS."""
 
     def wrong(why: str) -> InvalidValue:
         return InvalidValue(
-            f"the address {address!r} {why}; give HOST:PORT or unix:PATH, such as {DEFAULT_TCP} or unix:{SERVICE_SOCKET}")
+            f"the address {address!r} {why}; give HOST:PORT, tls:HOST:PORT or unix:PATH, such as {DEFAULT_TCP} or "
+            f"unix:{SERVICE_SOCKET}")
 
     if address.startswith("unix:"):
         path = address[len("unix:"):]
@@ -53,7 +72,8 @@ def target(address: str) -> str:
         if not path.startswith("/"):
             raise wrong("has no absolute path")
         return f"unix:{path}"
-    host, colon, port = address.rpartition(":")
+    plain = address.removeprefix("tls:")
+    host, colon, port = plain.rpartition(":")
     if not colon:
         raise wrong("has no port")
     if not host:
@@ -62,4 +82,4 @@ def target(address: str) -> str:
         raise wrong("has more than one colon (write an IPv6 number as [::1]:50551)")
     if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
         raise wrong(f"has the port {port!r}, which is not 1 to 65535")
-    return f"dns:///{address}"
+    return f"dns:///{plain}"

@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import AsyncIterator, Callable, Optional, Type, Union
 
 from .base import BaseConnection, settings
+from .credentials import Credentials
 from .errors import ConnectionLost
 from .handles import FrameBlock
 from .queries import ChangeSet
@@ -87,10 +88,11 @@ async def connect(server: Optional[str] = None, *, name: Optional[str] = None, t
                   autocommit: bool = True, flow: str = "reliable", keep_frames: int = 1,
                   on_disconnect: Union[str, float] = "clear", strict: bool = False, outcomes: bool = True,
                   buffer_bytes: int = 256 << 20, owner_token: bytes = b"", resume_token: bytes = b"",
-                  on_issue: Optional[Callable[[Issue], None]] = None) -> Connection:
+                  on_issue: Optional[Callable[[Issue], None]] = None,
+                  credentials: Optional[Credentials] = None) -> Connection:
     """As voxeld.connect(). A full buffer raises BufferFull; flush() waits for room."""
     options = settings(name, flow, keep_frames, on_disconnect, strict, outcomes, buffer_bytes, owner_token, resume_token)
-    connection = Connection(server, options, autocommit, "raise", on_issue)
+    connection = Connection(server, options, autocommit, "raise", on_issue, credentials)
     if wait:
         try:
             await connection.wait_connected(timeout)

@@ -15,6 +15,7 @@ from typing import Any, Callable, Iterator, Mapping, Optional, Sequence, Union
 import numpy.typing as npt
 
 from . import address, operations, picture, transforms
+from .credentials import Credentials
 from .clip import ClipPart
 from .draw import Draw, Look, Make, checked_name
 from .errors import InvalidValue, VoxelError
@@ -78,7 +79,7 @@ class BaseConnection(Draw[Handle]):
     """
 
     def __init__(self, server: Optional[str], options: Settings, autocommit: bool, when_full: str,
-                 on_issue: Optional[Callable[[Issue], None]]) -> None:
+                 on_issue: Optional[Callable[[Issue], None]], credentials: Optional[Credentials]) -> None:
         if when_full not in ("raise", "wait"):
             raise InvalidValue(f"when_full is {when_full!r}; give 'raise' or 'wait'")
         self.server = address.choose(server)
@@ -88,8 +89,9 @@ class BaseConnection(Draw[Handle]):
         self._staged: list[Step] = []
         self._pieces = Pieces()  # under the transport's lock
         self._session = Session(options)
-        self._transport = Transport(self.server, self._session, on_issue or (lambda issue: log.warning("%s", issue)))
-        self._queries = Queries(self.server)
+        who = Credentials.from_environment() if credentials is None else credentials
+        self._transport = Transport(self.server, who, self._session, on_issue or (lambda issue: log.warning("%s", issue)))
+        self._queries = Queries(self.server, who)
         _transports.add(self._transport)
         # Its threads would go on without it, and what it drew stay lit.
         self._abandoned = weakref.finalize(self, _abandon, self._transport, self._queries)

@@ -5,6 +5,7 @@ from types import TracebackType
 from typing import Callable, Iterator, Optional, Type, Union
 
 from .base import BaseConnection, settings
+from .credentials import Credentials
 from .errors import ConnectionLost
 from .queries import ChangeSet
 from .receipts import Issue
@@ -66,8 +67,9 @@ def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout
             autocommit: bool = True, flow: str = "reliable", keep_frames: int = 1,
             on_disconnect: Union[str, float] = "clear", strict: bool = False, outcomes: bool = True,
             buffer_bytes: int = 256 << 20, when_full: str = "raise", owner_token: bytes = b"", resume_token: bytes = b"",
-            on_issue: Optional[Callable[[Issue], None]] = None) -> Connection:
-    """Connects to voxeld at `server`, HOST:PORT or unix:PATH; by default where voxelctl looks.
+            on_issue: Optional[Callable[[Issue], None]] = None,
+            credentials: Optional[Credentials] = None) -> Connection:
+    """Connects to voxeld at `server`, HOST:PORT, tls:HOST:PORT or unix:PATH; by default where voxelctl looks.
 
     wait           until the server has answered, at most `timeout` seconds; else it is tried in the background
     flow           which frames are given up when they come faster than they go: "reliable" none, "latest" all but the
@@ -77,13 +79,14 @@ def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout
     outcomes       whether displays' outcomes are wanted, beside whether commits were accepted
     buffer_bytes   how much may wait to be sent, and when_full what a call does when it is too much: "raise" or "wait"
     owner_token    joins that owner; resume_token takes up that session, if the server knows it still
+    credentials    who you are, and whom you trust; by default what the environment says (voxeld.Credentials)
     on_issue       is called with each refused operation, on a thread of its own; by default it is logged ("voxeld")
 
     A lost connection is tried again for ever, at growing intervals; the session is resumed, or the scene sent anew. It is
     closed by close(), at the end of a `with`, or when nothing holds it or one of its handles any more.
     """
     options = settings(name, flow, keep_frames, on_disconnect, strict, outcomes, buffer_bytes, owner_token, resume_token)
-    connection = Connection(server, options, autocommit, when_full, on_issue)
+    connection = Connection(server, options, autocommit, when_full, on_issue, credentials)
     if wait:
         try:
             connection.wait_connected(timeout)

@@ -6,7 +6,8 @@ from typing import Any, Callable, Iterator, Optional, Sequence
 import grpc
 from google.protobuf.message import Message
 
-from . import address
+from . import credentials
+from .credentials import Credentials
 from .errors import ConnectionLost, VoxelError
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
@@ -22,8 +23,9 @@ def _failed(error: grpc.RpcError) -> VoxelError:
 class Queries:
     """On a channel of their own, so that they neither wait for the stream's bulk nor end with it."""
 
-    def __init__(self, server: str) -> None:
-        self._channel = grpc.insecure_channel(address.target(server), options=[
+    def __init__(self, server: str, who: Credentials) -> None:
+        self._metadata = credentials.metadata(server, who)
+        self._channel = credentials.open_channel(server, who, [
             ("grpc.max_receive_message_length", -1), ("grpc.use_local_subchannel_pool", 1),
             ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.min_reconnect_backoff_ms", 100),
             ("grpc.max_reconnect_backoff_ms", 1000)])
@@ -41,13 +43,14 @@ class Queries:
     def _one(self, method: str, request: Message, answer: Callable[[bytes], Any], timeout: Optional[float]) -> Any:
         call = self._usable().unary_unary(method, type(request).SerializeToString, answer)
         try:
-            return call(request, timeout=timeout)
+            return call(request, timeout=timeout, metadata=self._metadata)
         except grpc.RpcError as error:
             raise _failed(error) from None
 
     def _stream(self, method: str, request: Message, answer: Callable[[bytes], Any],
                 timeout: Optional[float]) -> Iterator[Any]:
-        call = self._usable().unary_stream(method, type(request).SerializeToString, answer)(request, timeout=timeout)
+        call = self._usable().unary_stream(method, type(request).SerializeToString, answer)(
+            request, timeout=timeout, metadata=self._metadata)
         try:
             yield from call
         except grpc.RpcError as error:

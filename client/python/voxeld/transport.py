@@ -15,9 +15,10 @@ from typing import Callable, Iterator, Optional
 
 import grpc
 
-from . import address
+from . import credentials
 from .callbacks import Callbacks
-from .errors import BufferFull, ConnectionLost
+from .credentials import Credentials
+from .errors import BufferFull, ConnectionLost, InvalidValue
 from .operations import Unit
 from .receipts import Frame, Issue
 from .session import Session
@@ -55,10 +56,13 @@ def backoff_s(attempt: int, draw: Callable[[], float]) -> float:
 class Transport:
     """`on_issue` is called on a thread that does nothing else, without any lock; it may draw and wait."""
 
-    def __init__(self, server: str, session: Session, on_issue: Callable[[Issue], None]) -> None:
+    def __init__(self, server: str, who: Credentials, session: Session, on_issue: Callable[[Issue], None]) -> None:
         self.server = server
         self.last_error = ""
-        self._target = address.target(server)
+        self._credentials = who
+        self._metadata = credentials.metadata(server, who)
+        # What is wrong with a file is said at once. Each stream reads it anew.
+        credentials.open_channel(server, who, CHANNEL_OPTIONS).close()
         self._session = session
         self._callbacks = Callbacks(on_issue)
         session.on_issue, session.done = self._callbacks.issue, self._callbacks.done
@@ -213,14 +217,18 @@ class Transport:
 
     def _one_stream(self) -> Optional[Exception]:
         """Reads one stream to its end."""
-        channel = grpc.insecure_channel(self._target, options=CHANNEL_OPTIONS)
+        try:
+            channel = credentials.open_channel(self.server, self._credentials, CHANNEL_OPTIONS)
+            self._metadata = credentials.metadata(self.server, self._credentials)
+        except InvalidValue as error:
+            return error
         try:
             stream_call: grpc.StreamStreamMultiCallable[bytes, pb.StreamResponse] = channel.stream_stream(
                 STREAM, request_serializer=None, response_deserializer=pb.StreamResponse.FromString)
             with self._changed:
                 if self._stopped:
                     return None
-                call = self._call = stream_call(self._requests(self._stream))
+                call = self._call = stream_call(self._requests(self._stream), metadata=self._metadata)
             for response in call:
                 now = time.monotonic_ns()
                 with self._changed:
@@ -239,6 +247,8 @@ class Transport:
 def _words(server: str, error: Optional[Exception], stood: bool) -> str:
     if error is None:
         return f"voxeld at {server} ended the stream"
+    if isinstance(error, InvalidValue):
+        return f"no connection to voxeld at {server} can be made: {error}"
     if not isinstance(error, grpc.RpcError):
         return f"an answer of voxeld at {server} could not be taken: {error!r}"
     code, details = error.code(), error.details()

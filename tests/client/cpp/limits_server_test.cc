@@ -82,7 +82,7 @@ TEST_F(BehindARelay, AnEndThatHasGoneIsNoticedWhileAMessageIsBeingWritten) {
     changed.NotifyAll();
   };
   Relay relay(path(), daemon_path());
-  SessionCore core(options, MakeGrpcTransport("unix:" + path(), {500ms, 500ms}), clock);
+  SessionCore core(options, *MakeGrpcTransport("unix:" + path(), {}, {500ms, 500ms}), clock);
   std::thread thread([&core] { core.Run(); });
   ASSERT_TRUE(core.WaitOpened(kPatience).ok());
   relay.FallSilent();

@@ -244,7 +244,7 @@ TEST_F(WithDaemon, SessionsOfOneOwnerShareItsLayers) {
 // A transport whose streams the test can cut.
 class CutTransport final : public Transport {
  public:
-  explicit CutTransport(const std::string& target) : inner_(MakeGrpcTransport(target)) {}
+  explicit CutTransport(const std::string& target) : inner_(*MakeGrpcTransport(target)) {}
   std::unique_ptr<Stream> Start(Stream::Events* events) override {
     std::unique_ptr<Stream> stream = inner_->Start(events);
     newest_ = stream.get();

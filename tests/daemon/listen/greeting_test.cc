@@ -176,5 +176,57 @@ TEST(Greeting, OfGarbageComesToAnEnd) {
   }
 }
 
+// A ClientHello of `size` bytes in one record (RFC 8446, 4.1.2 and 5.1), whatever is in it.
+std::string Hello(size_t size) {
+  const auto byte = [](size_t value) { return static_cast<char>(value & 0xff); };
+  return std::string("\x16\x03\x01") + byte((size + 4) >> 8) + byte(size + 4) + "\x01" +
+         byte(size >> 16) + byte(size >> 8) + byte(size) + std::string(size, 'x');
+}
+
+Read DripTls(const std::string& bytes, size_t step) {
+  Greeting greeting(kMostMessage);
+  Read out;
+  for (size_t n = step; out.verdict == Verdict::kMore; n += step) {
+    n = std::min(n, bytes.size());
+    if (n >= greeting.needed())
+      out.verdict = greeting.ReadTls(std::string_view(bytes).substr(0, n));
+    out.decided_at = n;
+    if (n == bytes.size()) break;
+  }
+  out.why = greeting.why();
+  return out;
+}
+
+TEST(TlsGreeting, IsOneWholeClientHello) {
+  for (const size_t size : {40u, 517u, 1500u, 11000u}) {
+    const std::string hello = Hello(size);
+    for (const size_t step : {size_t{1}, size_t{7}, hello.size()}) {
+      const Read read = DripTls(hello, step);
+      EXPECT_EQ(read.verdict, Verdict::kCall) << size << " " << step << read.why;
+      EXPECT_EQ(read.decided_at, hello.size());
+    }
+    EXPECT_EQ(DripTls(hello.substr(0, hello.size() - 1), 1).verdict, Verdict::kMore);
+  }
+}
+
+TEST(TlsGreeting, AnythingElseIsWrongAsSoonAsItIs) {
+  EXPECT_THAT(DripTls(kBegin, 1).why, HasSubstr("speaks TLS"));
+  EXPECT_EQ(DripTls(kBegin, 1).decided_at, 1u);
+  EXPECT_THAT(DripTls("GET / HTTP/1.1\r\n", 4).why, HasSubstr("GET"));
+  std::string server = Hello(100);
+  server[5] = 2;
+  EXPECT_EQ(DripTls(server, 1).verdict, Verdict::kWrong);
+  std::string cut = Hello(100);
+  cut[8] = 101;  // it goes on in another record
+  EXPECT_EQ(DripTls(cut, 1).verdict, Verdict::kWrong);
+  EXPECT_THAT(Drip(Hello(100), 1).why, HasSubstr("without TLS"));
+}
+
+TEST(TlsGreeting, OneThatNeverEndsIsNotWaitedFor) {
+  Greeting greeting(kMostMessage);
+  const std::string hello = Hello(16000);
+  EXPECT_NE(greeting.ReadTls(hello), Verdict::kCall);
+}
+
 }  // namespace
 }  // namespace voxeld::daemon::listen

@@ -111,9 +111,11 @@ class ListenerTest : public ::testing::Test {
     for (const ListeningSocket& socket : *sockets) names.push_back(socket.name());
     guard_ = std::make_unique<Guard>(limits, clock_, counters_, nullptr);
     auto listener = Listener::Start(*std::move(sockets), *guard_, counters_, own_, clock_,
-                                    [this](int, Descriptor connection) {
+                                    [this](const Accepted& accepted, Descriptor connection) {
                                       sync::MutexLock lock(mutex_);
+                                      accepted_ = accepted;
                                       served_.push_back(std::move(connection));
+                                      return true;
                                     },
                                     {});
     EXPECT_TRUE(listener.ok()) << listener.status();
@@ -129,6 +131,10 @@ class ListenerTest : public ::testing::Test {
     sync::MutexLock lock(mutex_);
     return served_[i].get();
   }
+  Accepted last_accepted() {
+    sync::MutexLock lock(mutex_);
+    return accepted_;
+  }
   uint64_t accepted() { return counters_.Read().accepted; }
   void CloseServed() {
     sync::MutexLock lock(mutex_);
@@ -141,6 +147,7 @@ class ListenerTest : public ::testing::Test {
   OwnPeers own_;
   std::string folder_;
   sync::Mutex mutex_;
+  Accepted accepted_ VOXELD_GUARDED_BY(mutex_);
   std::vector<Descriptor> served_ VOXELD_GUARDED_BY(mutex_);
   std::unique_ptr<Guard> guard_;
   std::unique_ptr<Listener> listener_;

@@ -35,7 +35,12 @@ std::unique_ptr<display::Display> StuckDisplay(const std::string& name, sync::Cl
 
 Daemon::Daemon(DaemonOptions options)
     : folder_(NewFolder()), target_(absl::StrCat("unix:", folder_, "/voxeld.sock")) {
-  core_ = std::make_unique<Core>(CoreOptions{.limits = options.limits, .version = "9.8.7"}, clock_);
+  const auto counters = std::make_shared<listen::Counters>();
+  core_ =
+      std::make_unique<Core>(CoreOptions{.limits = options.limits,
+                                         .version = "9.8.7",
+                                         .connections = [counters] { return counters->Read(); }},
+                             clock_);
   for (const std::string& name : options.displays) {
     const absl::Status added =
         core_->AddDisplay(options.stuck ? StuckDisplay(name, clock_) : QuickDisplay(name, clock_),
@@ -49,16 +54,22 @@ Daemon::Daemon(DaemonOptions options)
     local = {.listen = *ParseAddress(target_ + ".local"),
              .limits = {.max_bytes = options.limits.max_local_bytes}};
   }
+  std::vector<Address> listen = {*ParseAddress(target_)};
+  for (const std::string& address : options.listen) listen.push_back(*ParseAddress(address));
   auto server = Server::Start(*core_, clock_,
-                              {.listen = {*ParseAddress(target_)},
+                              {.listen = listen,
                                .version = "9.8.7",
                                .streams = {.open_limit_ns = options.open_limit_ns,
                                            .drain_limit_ns = options.drain_limit_ns,
                                            .max_queued_answers = options.max_queued_answers,
                                            .watch_write_limit_ns = options.watch_write_limit_ns},
+                               .counters = counters,
                                .max_scene_watches = options.max_scene_watches,
                                .max_stats_watches = options.max_stats_watches,
-                               .local = local});
+                               .local = local,
+                               .access = options.access,
+                               .tls = options.tls,
+                               .audit = options.audit});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);
   channel_ = NewChannel();

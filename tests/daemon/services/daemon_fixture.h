@@ -41,7 +41,11 @@ struct DaemonOptions {
   uint32_t max_scene_watches = 64;
   uint32_t max_stats_watches = 64;
   bool local_socket = false;
-  bool stuck = false;  // displays that take volumes and never show one
+  bool stuck = false;               // displays that take volumes and never show one
+  std::vector<std::string> listen;  // more addresses
+  const access::Access* access = nullptr;
+  const access::TlsStore* tls = nullptr;
+  access::Audit* audit = nullptr;
 };
 
 class Daemon {
@@ -52,7 +56,8 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   const std::string& target() const { return target_; }
-  std::shared_ptr<grpc::Channel> NewChannel() const;  // a connection of its own
+  const std::string& folder() const { return folder_; }  // for a test's own files
+  std::shared_ptr<grpc::Channel> NewChannel() const;     // a connection of its own
   v1::SceneService::Stub& scene() { return *scene_; }
   v1::DisplayService::Stub& displays() { return *displays_; }
   Server& server() { return *server_; }

@@ -115,7 +115,8 @@ TEST(ApplyUpdate, IsAnsweredAlsoByACoreThatStops) {
     sync::FakeClock clock;
     Core core({.version = "1", .threads = false}, clock);
     ASSERT_TRUE(core.Start().ok());
-    ServiceContext context{core, clock, "1"};
+    listen::Counters counters;
+    ServiceContext context{core, clock, counters, "1"};
     v1::ApplyUpdateRequest request;
     *request.add_operations() = SphereIn("layer", "ball");
     const std::string bytes = request.SerializeAsString();
@@ -124,7 +125,7 @@ TEST(ApplyUpdate, IsAnsweredAlsoByACoreThatStops) {
     if (!opened) {
       ASSERT_TRUE(core.Stop(sync::kSecond).ok());
     }
-    ApplyUpdate(context, std::span(&view, 1),
+    ApplyUpdate(context, {}, std::span(&view, 1),
                 [&](const absl::Status& status, const v1::ApplyUpdateResponse&) {
                   answers.push_back(status);
                 });

@@ -57,8 +57,9 @@ class StreamSessionTest : public ::testing::Test {
   void Begin(Limits limits = {}, StreamLimits streams = {}) {
     sim_.emplace(limits, 0);
     sim_->Start();
-    context_.reset(new ServiceContext{*sim_->core, sim_->clock, "1", nullptr, streams});
+    context_.reset(new ServiceContext{*sim_->core, sim_->clock, counters_, "1", nullptr, streams});
     session_ = std::make_shared<StreamSession>(*context_, &port_);
+    session_->SetCaller({.scopes = access::Scopes::All()});
     session_->Start();
     v1::StreamRequest open;
     open.mutable_open();
@@ -109,6 +110,7 @@ class StreamSessionTest : public ::testing::Test {
   }
 
   std::optional<Simulation> sim_;
+  listen::Counters counters_;
   std::unique_ptr<ServiceContext> context_;
   Port port_;
   std::shared_ptr<StreamSession> session_;

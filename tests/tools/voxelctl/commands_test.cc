@@ -118,7 +118,7 @@ TEST_F(CommandsTest, StatsAreWatchedUntilAnInterrupt) {
   // The fake sends without pause; the interrupt comes after the first line.
   std::ostringstream out, err;
   Console console(out, err, true, false);
-  auto connection = Connection::Connect(server_.address(), interrupt_);
+  auto connection = Connection::Connect(server_.address(), {}, interrupt_);
   ASSERT_TRUE(connection.ok());
   v1::WatchStatsRequest request;
   int seen = 0;

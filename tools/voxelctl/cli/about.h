@@ -58,6 +58,9 @@ inline constexpr const char* kWatchAbout =
 inline constexpr const char* kInitAbout =
     "Asks how an LED lattice is wired (start corner, direction, zig-zag) and writes its "
     "profile; needs no daemon";
+inline constexpr const char* kTokenAbout =
+    "Makes a token that shows who a client is (VOXELD_TOKEN), and its entry for the daemon's "
+    "grants file; needs no daemon";
 inline constexpr const char* kDoctorAbout =
     "Says what of this machine keeps voxeld from its work, and the command that mends it; "
     "needs no daemon";

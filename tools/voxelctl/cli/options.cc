@@ -17,6 +17,7 @@
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
 #include "tools/voxelctl/cli/patterns.h"
+#include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -32,10 +33,7 @@ class Parser {
     app_.set_version_flag("--version", absl::StrCat("voxelctl ", VOXELD_VERSION),
                           "Print the version and end");
     app_.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    app_.add_option("--server", options_.server,
-                    "Address of voxeld: HOST:PORT or unix:PATH (default: VOXELD_SERVER, else its "
-                    "socket, else 127.0.0.1:50551)")
-        ->type_name("ADDR");
+    AddServerOptions(app_, &options_.server, &options_.credentials);
     app_.add_flag("--json", options_.json,
                   "Write data as one JSON document (a line each with stats --watch and watch)");
     app_.require_subcommand(0, 1);
@@ -56,6 +54,7 @@ class Parser {
     AddVerify();
     AddProfile();
     Add("init", kInitAbout)->add_option("FILE.toml", init_.file, "Where the profile goes");
+    AddToken();
     Add("doctor", kDoctorAbout);
   }
 
@@ -247,6 +246,16 @@ class Parser {
     c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
   }
 
+  void AddToken() {
+    CLI::App* c = Add("token", kTokenAbout);
+    c->add_option("NAME", token_.name, "Whose it is: all that is drawn with it belongs to it");
+    c->add_option("--scopes", token_.scopes, "What it allows: view, draw, control")
+        ->type_name("LIST")
+        ->capture_default_str();
+    c->add_option("--grants", token_.grants, "Append the entry to this file")->type_name("FILE");
+    AddNumber(c, "--days", &token_.days, 0, 36500, "Days until it expires; 0: never", "N");
+  }
+
   void AddVerify() {
     CLI::App* c = Add("verify", kVerifyAbout);
     c->add_option("DISPLAY", verify_.display, "[NAME=]DRIVER[,KEY=VALUE…]");
@@ -271,7 +280,7 @@ class Parser {
       throw UsageError{absl::StrCat("a command is expected: ", absl::StrJoin(names_, ", "))};
     for (size_t i = 0; i < arguments.size(); ++i) {
       const std::string& word = arguments[i];
-      if (word == "--server") {
+      if (IsServerOption(word)) {
         ++i;
       } else if (!absl::StartsWith(word, "-") || word == "-") {
         if (std::find(names_.begin(), names_.end(), word) != names_.end()) return;
@@ -331,6 +340,7 @@ class Parser {
               : name == "verify"  ? &verify_.display
               : name == "profile" ? &profile_.profile
               : name == "init"    ? &init_.file
+              : name == "token"   ? &token_.name
                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "gallery") {
@@ -346,6 +356,10 @@ class Parser {
     if (name == "init") {
       if (init_.file.empty()) throw UsageError{"init wants the name of a file, such as cube.toml"};
       options_.command = init_;
+    }
+    if (name == "token") {
+      if (token_.name.empty()) throw UsageError{"token wants a NAME, such as stage-left"};
+      options_.command = token_;
     }
     if (name == "set") return FillInSet();
     if (name == "calibrate") {
@@ -483,6 +497,7 @@ class Parser {
   VerifyOptions verify_;
   ProfileOptions profile_;
   InitOptions init_;
+  TokenOptions token_;
   std::string profile_action_;
   std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
   double duration_ = std::nan("");

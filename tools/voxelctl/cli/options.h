@@ -9,6 +9,7 @@
 
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/scene/look.h"
+#include "voxeld/credentials.h"
 #include "voxeld/v1/display.pb.h"
 
 namespace voxeld::voxelctl {
@@ -106,13 +107,21 @@ struct InitOptions {
   std::string file;  // where the profile goes: must not be there yet
 };
 
+struct TokenOptions {
+  std::string name;                  // the principal
+  std::string scopes = "view,draw";  // as the grants file has them
+  double days = 0;                   // until it expires; 0: never
+  std::string grants;                // the file that gets the entry; empty: none
+};
+
 struct Options {
-  std::string server;  // empty: see ChooseServer
+  std::string server;               // empty: see ChooseServer
+  client::Credentials credentials;  // as given; see ChooseCredentials
   bool json = false;
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions>
+               InitOptions, TokenOptions>
       command;
 };
 

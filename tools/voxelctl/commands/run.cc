@@ -3,10 +3,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/calibrate/calibrate.h"
+#include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/doctor/doctor.h"
 #include "tools/voxelctl/init/init.h"
 #include "tools/voxelctl/profile/profile.h"
+#include "tools/voxelctl/token/token.h"
 #include "tools/voxelctl/verify/verify.h"
 
 namespace voxeld::voxelctl {
@@ -28,6 +30,9 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   if (std::holds_alternative<DoctorOptions>(options.command)) return Doctor(ThisMachine(), console);
   if (const auto* init = std::get_if<InitOptions>(&options.command)) {
     return Init(*init, std::cin, console);
+  }
+  if (const auto* token = std::get_if<TokenOptions>(&options.command)) {
+    return MakeToken(*token, console);
   }
   if (const auto* calibrate = std::get_if<CalibrateOptions>(&options.command)) {
     return Calibrate(*calibrate, std::cin, console);
@@ -83,7 +88,10 @@ int Run(const Options& options, const Environment& environment, Interrupt& inter
     console.Say(absl::StrCat("voxelctl: ", target.status().message()));
     return kExitUsage;
   }
-  const auto connect = [&] { return Connection::Connect(server, interrupt); };
+  const auto connect = [&] {
+    return Connection::Connect(server, ChooseCredentials(options.credentials, environment),
+                               interrupt);
+  };
   const absl::Status status = Dispatch(options, connect, interrupt, console);
   console.EndProgress();
   if (status.ok()) return kExitOk;

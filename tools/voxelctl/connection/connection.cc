@@ -2,8 +2,6 @@
 
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 #include <grpcpp/support/channel_arguments.h>
 
 #include <chrono>
@@ -12,8 +10,9 @@
 
 #include "absl/strings/match.h"
 #include "display/sync/mutex.h"
-#include "tools/voxelctl/connection/address.h"
 #include "tools/voxelctl/connection/status.h"
+#include "tools/voxelctl/text/escape.h"
+#include "voxeld/channel.h"
 #include "voxeld/v1/display.grpc.pb.h"
 #include "voxeld/v1/scene.grpc.pb.h"
 
@@ -32,8 +31,10 @@ constexpr int kMostMessageBytes = 64 << 20;  // a slice of 16384² pixels would 
 
 class Connection::Impl {
  public:
-  Impl(std::string address, std::shared_ptr<grpc::Channel> channel, Interrupt& interrupt)
+  Impl(std::string address, client::Credentials credentials, std::shared_ptr<grpc::Channel> channel,
+       Interrupt& interrupt)
       : address_(std::move(address)),
+        credentials_(std::move(credentials)),
         channel_(std::move(channel)),
         displays_(v1::DisplayService::NewStub(channel_)),
         scene_(v1::SceneService::NewStub(channel_)),
@@ -94,6 +95,7 @@ class Connection::Impl {
   v1::DisplayService::Stub& displays() { return *displays_; }
   v1::SceneService::Stub& scene() { return *scene_; }
   const std::string& address() const { return address_; }
+  const client::Credentials& credentials() const { return credentials_; }
   Interrupt& interrupt() { return interrupt_; }
 
  private:
@@ -103,6 +105,7 @@ class Connection::Impl {
   }
 
   const std::string address_;
+  const client::Credentials credentials_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::DisplayService::Stub> displays_;
   std::unique_ptr<v1::SceneService::Stub> scene_;
@@ -115,28 +118,32 @@ class Connection::Impl {
 Connection::Connection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Connection::~Connection() = default;
 
-absl::StatusOr<std::unique_ptr<Connection>> Connection::Connect(const std::string& address,
-                                                                Interrupt& interrupt) {
-  const absl::StatusOr<std::string> target = ServerTarget(address);
-  if (!target.ok()) return target.status();
+absl::StatusOr<std::unique_ptr<Connection>> Connection::Connect(
+    const std::string& address, const client::Credentials& credentials, Interrupt& interrupt) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMostMessageBytes);
   // The server is near; what a web proxy is set for is not meant for it.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  std::shared_ptr<grpc::Channel> channel =
-      grpc::CreateCustomChannel(*target, grpc::InsecureChannelCredentials(), arguments);
+  absl::StatusOr<std::shared_ptr<grpc::Channel>> made =
+      client::MakeChannel(address, credentials, arguments);
+  if (!made.ok())
+    return absl::Status(made.status().code(), EscapeForTerminal(made.status().message()));
+  std::shared_ptr<grpc::Channel> channel = *std::move(made);
   const system_clock::time_point deadline = system_clock::now() + kConnectTime;
   for (grpc_connectivity_state state = channel->GetState(true); state != GRPC_CHANNEL_READY;
        state = channel->GetState(true)) {
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) {
-      return Unreachable(address, "nobody listens there, or what does is no voxeld");
+      return Unreachable(address, absl::StartsWith(address, "tls:")
+                                      ? "nobody listens there, or its certificate or yours is not "
+                                        "taken by the other"
+                                      : "nobody listens there, or what does is no voxeld");
     }
     if (system_clock::now() >= deadline) return Unreachable(address, "no answer in 5 s");
     channel->WaitForStateChange(state, system_clock::now() + kConnectStep);
   }
   return std::unique_ptr<Connection>(
-      new Connection(std::make_unique<Impl>(address, std::move(channel), interrupt)));
+      new Connection(std::make_unique<Impl>(address, credentials, std::move(channel), interrupt)));
 }
 
 absl::StatusOr<v1::ListDisplaysResponse> Connection::ListDisplays() {
@@ -218,6 +225,7 @@ absl::Status Connection::CaptureVolume(
 
 absl::StatusOr<std::unique_ptr<SceneSession>> Connection::OpenSession(client::Options options) {
   options.address = impl_->address();
+  options.credentials = impl_->credentials();
   return SceneSession::Open(std::move(options), impl_->interrupt());
 }
 

@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/process/interrupt.h"
+#include "voxeld/credentials.h"
 #include "voxeld/v1/display.pb.h"
 #include "voxeld/v1/scene.pb.h"
 
@@ -21,8 +22,9 @@ namespace voxeld::voxelctl {
 class Connection {
  public:
   // `interrupt` must outlive it. Unavailable if the server does not answer in time.
-  static absl::StatusOr<std::unique_ptr<Connection>> Connect(const std::string& address,
-                                                             Interrupt& interrupt);
+  // Statuses of the credentials' files are as they are.
+  static absl::StatusOr<std::unique_ptr<Connection>> Connect(
+      const std::string& address, const client::Credentials& credentials, Interrupt& interrupt);
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;

@@ -1,0 +1,32 @@
+// Certificates for tests: an authority of the test's own, and what it signs.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace voxeld::daemon::access {
+
+struct Issued {
+  std::string certificate, key;  // PEM
+};
+
+class TestAuthority {
+ public:
+  explicit TestAuthority(const std::string& name);
+  ~TestAuthority();
+
+  const std::string& certificate() const { return certificate_; }  // PEM
+  // For the DNS name `name` and 127.0.0.1. Valid from and until so many seconds from now.
+  Issued Issue(const std::string& name, int64_t from_s = -3600, int64_t until_s = 3600);
+
+ private:
+  struct Keys;
+  std::unique_ptr<Keys> keys_;
+  std::string certificate_;
+};
+
+// Writes a file with that mode in place of what is there.
+void PutFile(const std::string& path, const std::string& text, unsigned mode = 0600);
+
+}  // namespace voxeld::daemon::access
