@@ -14,7 +14,8 @@ install(FILES ${packaging}/70-voxeld.rules DESTINATION lib/udev/rules.d)
 install(FILES ${packaging}/voxeld.toml DESTINATION ${doc}/examples)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/display/profiles/ DESTINATION share/voxeld/profiles FILES_MATCHING PATTERN "*.toml")
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
-install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md DESTINATION ${doc})
+install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md ${CMAKE_SOURCE_DIR}/docs/operations.md
+              ${CMAKE_SOURCE_DIR}/docs/configuration.md DESTINATION ${doc})
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME voxeld)

@@ -17,10 +17,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "daemon/access/access.h"
-#include "daemon/access/audit.h"
+#include "daemon/access/security.h"
 #include "daemon/access/ticker.h"
-#include "daemon/access/tls_store.h"
 #include "daemon/config/config.h"
 #include "daemon/config/display_view.h"
 #include "daemon/core/core.h"
@@ -33,6 +31,7 @@
 #include "daemon/pipeline/view.h"
 #include "daemon/process/process.h"
 #include "daemon/services/server.h"
+#include "daemon/state/kept_state.h"
 #include "daemon/version/version.h"
 #include "display/drivers/registry.h"
 #include "display/sync/clock.h"
@@ -173,52 +172,21 @@ void LogDisplays(Core& core, Logger& log) {
   }
 }
 
-// Who may do what. Files are looked at every second, and when asked.
-class Security {
- public:
-  static constexpr sync::TimeNs kLookInterval = sync::kSecond;
-
-  static absl::StatusOr<std::unique_ptr<Security>> Open(const Config& config, Logger& log) {
-    const absl::StatusOr<access::AccessOptions> options = AccessOf(config.security);
-    if (!options.ok()) return options.status();
-    auto security = std::make_unique<Security>();
-    security->access =
-        std::make_unique<access::Access>(*options, access::Access::SystemWallClock(), &log);
-    if (absl::Status status = security->access->Look(); !status.ok()) return status;
-    if (config.security.tls.any()) {
-      auto tls =
-          access::TlsStore::Open(config.security.tls, access::Access::SystemWallClock(), &log);
-      if (!tls.ok()) return tls.status();
-      security->tls = *std::move(tls);
-    }
-    auto audit = access::Audit::Open(config.log.audit, &log);
-    if (!audit.ok()) return audit.status();
-    security->audit = *std::move(audit);
-    return security;
-  }
-
-  void Look(bool again) {
-    (void)access->Look(again);  // what is wrong is logged, and in trouble()
-    if (tls != nullptr) (void)tls->Look(again);
-  }
-
-  std::string trouble() const {
-    std::string trouble = access->trouble();
-    const std::string of_tls = tls == nullptr ? "" : tls->trouble();
-    if (!trouble.empty() && !of_tls.empty()) trouble += "; ";
-    return trouble + of_tls;
-  }
-
-  std::unique_ptr<access::Access> access;
-  std::unique_ptr<access::TlsStore> tls;  // may be none
-  std::unique_ptr<access::Audit> audit;
-};
-
 int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
           Logger& log) {
-  absl::StatusOr<std::unique_ptr<Security>> opened = Security::Open(config, log);
+  const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
+  if (!access_options.ok()) return Fail(1, access_options.status());
+  absl::StatusOr<std::unique_ptr<access::Security>> opened =
+      access::Security::Open(*access_options, config.security.tls, config.log.audit, log);
   if (!opened.ok()) return Fail(1, opened.status());
-  const std::unique_ptr<Security> security = *std::move(opened);
+  const std::unique_ptr<access::Security> security = *std::move(opened);
+  std::unique_ptr<state::KeptState> kept;  // none: nothing outlives the daemon
+  if (!config.state.dir.empty()) {
+    absl::StatusOr<std::unique_ptr<state::KeptState>> state =
+        state::KeptState::Open(config.state.dir, config.state.interval_ns, clock, log);
+    if (!state.ok()) return Fail(1, state.status());
+    kept = *std::move(state);
+  }
   EngineWatch watch(log);
   const auto counters = std::make_shared<listen::Counters>();
   Core core({.limits = config.limits,
@@ -231,6 +199,9 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                    log.Log(lost ? Logger::Level::kWarn : Logger::Level::kInfo,
                            DisplayStateName(state), {{"display", display}, {"why", reason}});
                  },
+             .state = kept == nullptr ? nullptr : kept->sink(),
+             .state_figures =
+                 [kept = kept.get()] { return kept == nullptr ? StateFigures() : kept->figures(); },
              .connections =
                  [counters, security = security.get()] {
                    ListenFigures figures = counters->Read();
@@ -253,6 +224,9 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
         !status.ok()) {
       return Fail(1, status);
     }
+  }
+  if (kept != nullptr) {
+    if (absl::Status status = kept->Restore(core); !status.ok()) return Fail(1, status);
   }
   if (absl::Status status = core.Start(); !status.ok()) return Fail(1, status);
 
@@ -294,19 +268,19 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
        .keepalive_interval_ns = config.server.keepalive_interval_ns,
        .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
        .local = local,
-       .access = security->access.get(),
-       .tls = security->tls.get(),
-       .audit = security->audit.get(),
+       .access = &security->access(),
+       .tls = security->tls(),
+       .audit = &security->audit(),
        .log = &log});
   if (!server.ok()) return Fail(1, server.status());
-  security->access->SetOnChange([server = server->get(), &log] {
+  security->access().SetOnChange([server = server->get(), &log] {
     const size_t ended = server->EndRevoked();
     if (ended > 0)
       log.Info("calls ended: their callers may not make them any more",
                {{"calls", absl::StrCat(ended)}});
   });
-  auto ticker = std::make_unique<access::Ticker>(clock, Security::kLookInterval,
-                                                 [&security] { security->Look(false); });
+  auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval,
+                                                 [&security] { security->Look(); });
 
   watch.Tell(server->get());
 
@@ -323,17 +297,17 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   while (sigwait(&signals, &signal) != 0 || signal == SIGHUP) {
     if (signal != SIGHUP) continue;
     log.Info("asked to read its files again");
-    security->audit->Reopen();
-    security->Look(true);
+    security->Reload();
     signal = 0;
   }
   ticker.reset();
-  security->access->SetOnChange(nullptr);
+  security->access().SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
   *draining = true;
   watch.Tell(nullptr);
   (*server)->Shutdown(kServerLimit);
   const absl::Status stopped = core.Stop(kCoreLimit);
+  if (kept != nullptr) kept->Stop();
   http->reset();
   if (!stopped.ok()) log.Error("not all ended", {{"why", std::string(stopped.message())}});
   log.Info("stopped");

@@ -38,7 +38,8 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
   CLI::App app("Volumetric display driver: takes 3D primitives over gRPC, shows them on displays.",
                "voxeld");
   app.footer(
-      "ADDR is HOST:PORT or unix:PATH. Without --config the first of $XDG_CONFIG_HOME/voxeld/"
+      "ADDR is HOST:PORT, tls:HOST:PORT or unix:PATH. Without --config the first of "
+      "$XDG_CONFIG_HOME/voxeld/"
       "voxeld.toml\n(~/.config), /etc/voxeld/voxeld.toml is read. --listen and --display replace "
       "the defaults and the file's.\nOf every display are profile, view, view_box, gpus (such as "
       "gpus=0;1: the slices shared out over these GPUs), genlock, power_limit and power_full.");
@@ -54,6 +55,9 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
       ->expected(1)
       ->take_all();
   app.add_option("--engine", out.engine, "Volume engine")->type_name("auto|cpu|cuda");
+  app.add_option("--state-dir", out.state_dir,
+                 "Where layers that clients keep, and their owners, outlive the daemon")
+      ->type_name("DIR");
   app.add_option("--log-level", out.log_level, "How much is logged")
       ->type_name("trace|debug|info|warn|error|off");
   app.add_option("--log-format", out.log_format, "How it is logged")->type_name("text|json");

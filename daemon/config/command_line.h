@@ -17,6 +17,7 @@ struct CommandLine {
   std::optional<std::string> engine;  // --engine auto|cpu|cuda
   std::optional<std::string> log_level;
   std::optional<std::string> log_format;
+  std::optional<std::string> state_dir;  // --state-dir DIR
   bool check_config = false;
   std::string print_and_exit;  // not empty: the answer to --help or --version
 };

@@ -316,6 +316,7 @@ absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config) {
     }
     config->engine.kind = *kind;
   }
+  if (command_line.state_dir.has_value()) config->state.dir = *command_line.state_dir;
   if (absl::Status status = ApplyChoice("log.level", "--log-level", command_line.log_level, config);
       !status.ok()) {
     return status;

@@ -87,6 +87,12 @@ struct LogConfig {
   std::string audit;            // a file for who did what; empty: the log
 };
 
+struct StateConfig {
+  std::string dir;  // where what outlives the daemon is kept; empty: nothing does
+  int64_t interval_ns =
+      100 * sync::kMillisecond;  // how long what nobody waits for may be unwritten
+};
+
 struct SecurityConfig {
   std::string grants;  // the file of tokens, certificates and users (access/grants.h); empty: none
   // PEM, for addresses that speak TLS: all three or none.
@@ -105,6 +111,7 @@ struct Config {
   EngineConfig engine;
   LogConfig log;
   SecurityConfig security;
+  StateConfig state;
   Limits limits;
   std::vector<DisplayConfig> displays;
 };

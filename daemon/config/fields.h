@@ -94,6 +94,10 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Scopes("unix_scopes", security.unix_scopes, false);
   visitor.Flag("allow_plain_beyond_loopback", security.allow_plain_beyond_loopback);
 
+  visitor.Section("state");
+  visitor.Text("dir", config.state.dir);
+  visitor.Integer("interval_ns", config.state.interval_ns, 0, kHour);
+
   auto& limits = config.limits;
   visitor.Section("limits");
   visitor.Integer("max_message_bytes", limits.max_message_bytes, 1024, 2 * kGiB - 1);

@@ -273,6 +273,7 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   accepted.late = commit.late;
   accepted.dropped_frames = commit.dropped_frames;
   accepted.stages = stages;
+  accepted.durable = commit.commit.durable && WillBeDurable(session, commit);
   if (!session.options.no_outcomes) {
     for (const auto& slot : displays_) accepted.displays.push_back(slot->info.name);
   }
@@ -287,6 +288,7 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
 void Core::Impl::Ride(Session& session, const WaitingCommit& commit, const Stages& stages,
                       bool hidden) {
   published_ = store_.snapshot();
+  OfferState(undurable_.contains(published_->number));
   budget_->Set(Budget::Use::kScene, published_->total.bytes);
   if (commit.commit.must_show && !displays_.empty() && !session.closing) {
     session.hold = Hold();

@@ -43,6 +43,12 @@ absl::Status Core::AddDisplay(std::unique_ptr<display::Display> display,
   return impl_->AddDisplay(std::move(display), engine, setup);
 }
 
+std::vector<Issue> Core::Restore(RestoredScene scene) { return impl_->Restore(std::move(scene)); }
+
+void Core::OnDurable(uint64_t snapshot) {
+  impl_->loop().Post([impl = impl_.get(), snapshot] { impl->OnDurable(snapshot); });
+}
+
 absl::Status Core::Start() { return impl_->Start(impl_); }
 
 absl::Status Core::Stop(sync::TimeNs limit) { return impl_->Stop(limit); }

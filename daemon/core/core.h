@@ -29,6 +29,7 @@
 #include "daemon/core/intake.h"
 #include "daemon/core/receipt.h"
 #include "daemon/core/session_sink.h"
+#include "daemon/core/state_sink.h"
 #include "daemon/core/stats.h"
 #include "daemon/pipeline/display_settings.h"
 #include "daemon/pipeline/engine_event.h"
@@ -61,6 +62,9 @@ struct CoreOptions {
   std::function<void(const std::string& display, display::DisplayState state,
                      const std::string& reason)>
       state_event;
+  // Keeps what outlives the daemon, and lives longer than the core; none: nothing does.
+  StateSink* state = nullptr;
+  std::function<StateFigures()> state_figures;  // for Stats; from any thread. May be empty
   // The listener's figures, for Stats; from any thread. May be empty.
   std::function<ListenFigures()> connections;
 };
@@ -164,6 +168,9 @@ class Core {
   // Before Start. The name must be new. The engine is made here; its failure is the answer.
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
                           const gpu::EngineOptions& engine, const DisplaySetup& setup = {});
+  // Before Start, after AddDisplay: what was kept. What cannot be had any more, by limits that are lower
+  // now say, is left out, and an Issue says why.
+  std::vector<Issue> Restore(RestoredScene scene);
   absl::Status Start();
 
   // Ends displays and threads; what is owed by then counts as lost or undelivered, and a commit
@@ -188,6 +195,8 @@ class Core {
   void CloseSession(SessionId session, uint64_t incarnation, bool gone, std::function<void()> done);
   // Outcomes that the session's sink was given and could not deliver: for a resume, else counted as undelivered.
   void GiveBack(SessionId session, std::vector<Receipt> receipts);
+  // From the state's thread: that snapshot is on the disk, with what is kept of those before.
+  void OnDurable(uint64_t snapshot);
   // A session's stream was ended because its client did not read: for the figures.
   void CountOverrun();
 

@@ -53,6 +53,10 @@ class Core::Impl {
   void GiveBack(SessionId id, const Receipt& receipt);
 
   // ---- owners (owners.cc)
+  // ---- what outlives the daemon (kept.cc)
+  std::vector<Issue> Restore(RestoredScene scene);
+  void OnDurable(uint64_t snapshot);
+
   void ClearLayer(uint64_t owner, const std::string& layer, bool keep_state,
                   const std::optional<std::string>& principal, const Reply<Cleared>& reply);
   std::vector<OwnerInfo> ListOwners() const;
@@ -123,6 +127,12 @@ class Core::Impl {
     std::string principal;  // empty: nobody in particular
     bool hidden = false;
     uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;  // as an operator set them
+  };
+
+  // A commit whose client waits for it to be on the disk.
+  struct Undurable {
+    SessionId session = 0;
+    uint64_t incarnation = 0, frame_id = 0, sequence = 0;
   };
 
   struct Timed {
@@ -207,6 +217,11 @@ class Core::Impl {
   void ReleaseHold(Session& session);
   sync::TimeNs RunTimed(sync::TimeNs now);
 
+  // ---- what outlives the daemon (kept.cc)
+  void OfferState(bool at_once);
+  // Whether the commit will be told Durable; tells what stands against it.
+  bool WillBeDurable(const Session& session, const WaitingCommit& commit);
+
   // ---- owners
   void Evict(uint64_t owner);
 
@@ -251,7 +266,9 @@ class Core::Impl {
   std::map<uint64_t, Owner> owners_;
   std::map<std::string, uint64_t> owner_tokens_;
   std::map<std::string, uint64_t> owners_by_principal_;
-  std::multimap<sync::TimeNs, Timed> timed_;  // by the time at which they are due
+  std::shared_ptr<const OwnerRecords> owner_records_;  // none: they have changed since
+  std::multimap<uint64_t, Undurable> undurable_;       // by the snapshot that they made
+  std::multimap<sync::TimeNs, Timed> timed_;           // by the time at which they are due
   std::set<SessionId> holding_;
   std::multimap<sync::TimeNs, Lingering> lingering_;
   static constexpr size_t kLeastLingering = 64;

@@ -228,6 +228,7 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.applying = applying_.Summary(stats.time_ns);
   stats.memory = MemoryOf(*budget_);
   if (options_.connections) stats.connections = options_.connections();
+  if (options_.state_figures) stats.state = options_.state_figures();
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;

@@ -39,7 +39,7 @@ void Core::Impl::Deliver(SessionId id, const Receipt& receipt) {
 }
 
 void Core::Impl::GiveBack(SessionId id, const Receipt& receipt) {
-  if (!std::holds_alternative<CommitOutcome>(receipt.what)) return;
+  if (!IsOwed(receipt)) return;
   const auto live = sessions_.find(id);
   // Taken up meanwhile; its own stream's end may still be on its way, and would bounce it back.
   if (live != sessions_.end() && live->second.sink != nullptr &&

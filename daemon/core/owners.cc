@@ -91,11 +91,13 @@ absl::StatusOr<OwnerInfo> Core::Impl::ControlOwner(const OwnerControl& control) 
   };
   set(control.max_bytes, owner.max_bytes);
   set(control.max_entities, owner.max_entities);
+  owner_records_ = nullptr;
   if (control.hidden.has_value()) {
     owner.hidden = *control.hidden;
     store_.Suppress(control.owner, owner.hidden);
     Publish();
   }
+  OfferState(false);
   OwnerInfo answer;
   for (OwnerInfo& info : ListOwners()) {
     if (info.owner == control.owner) answer = std::move(info);

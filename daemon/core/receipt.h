@@ -25,12 +25,18 @@ struct Accepted {
   std::vector<std::string> displays;  // each gives exactly one outcome
   bool late = false;                  // its present_at had passed when it came
   uint64_t dropped_frames = 0;        // of its own, given up by the session's FlowPolicy
+  bool durable = false;               // Durable comes as well
   Stages stages;                      // up to applied_ns
 };
 
 // A timed commit waits.
 struct Scheduled {
   sync::TimeNs present_at_ns = 0;
+};
+
+// What the commit made is on the disk, as part of this snapshot or a later one.
+struct Durable {
+  uint64_t snapshot = 0;
 };
 
 struct Refused {
@@ -58,8 +64,14 @@ struct CommitOutcome {
 struct Receipt {
   uint64_t frame_id = 0;
   uint64_t sequence = 0;
-  std::variant<Accepted, Refused, CommitOutcome, Scheduled> what;
+  std::variant<Accepted, Refused, CommitOutcome, Scheduled, Durable> what;
   uint64_t incarnation = 0;  // of the session that sent the commit
 };
+
+// What comes after the answer to a commit, also to a stream that takes its session up.
+inline bool IsOwed(const Receipt& receipt) {
+  return std::holds_alternative<CommitOutcome>(receipt.what) ||
+         std::holds_alternative<Durable>(receipt.what);
+}
 
 }  // namespace voxeld::daemon

@@ -38,6 +38,7 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::NewSession(const OpenOptions& op
     session.owner = next_owner_++;
     owner_tokens_.emplace(*token, session.owner);
     owners_[session.owner] = {.token = *std::move(token), .principal = options.principal};
+    owner_records_ = nullptr;
     if (!options.principal.empty()) owners_by_principal_.emplace(options.principal, session.owner);
   } else {
     const auto owner = owner_tokens_.find(options.owner_token);
@@ -51,7 +52,10 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::NewSession(const OpenOptions& op
     session.owner = owner->second;
   }
   session.id = next_session_++;
-  session.writer = std::make_shared<const Writer>(Writer{session.id, options.client_name});
+  session.writer = std::make_shared<const Writer>(
+      Writer{.session = session.id,
+             .client_name = options.client_name,
+             .keep = options.on_disconnect == DisconnectPolicy::kKeep});
   return session;
 }
 
@@ -99,7 +103,10 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& option
   session.id = id;
   session.incarnation = dormant.incarnation + 1;
   session.owner = dormant.owner;
-  session.writer = std::make_shared<const Writer>(Writer{id, options.client_name});
+  session.writer = std::make_shared<const Writer>(
+      Writer{.session = id,
+             .client_name = options.client_name,
+             .keep = options.on_disconnect == DisconnectPolicy::kKeep});
   store_.HandOver(id, session.writer);
   Publish();
   session.owed_outcomes = dormant.owed_outcomes;
@@ -191,8 +198,11 @@ void Core::Impl::FinishClose(SessionId id) {
       break;
   }
   if (layers_until > now) {
-    store_.HandOver(id,
-                    std::make_shared<const Writer>(Writer{id, session.writer->client_name, true}));
+    store_.HandOver(
+        id, std::make_shared<const Writer>(Writer{.session = id,
+                                                  .client_name = session.writer->client_name,
+                                                  .ended = true,
+                                                  .keep = session.writer->keep}));
   }
   // Before its layers go: while it can be taken up its owner is remembered.
   if (session.options.resumable) {
@@ -286,6 +296,7 @@ void Core::Impl::ForgetOwner(uint64_t owner) {
   owner_tokens_.erase(it->second.token);
   owners_by_principal_.erase(it->second.principal);
   owners_.erase(it);
+  owner_records_ = nullptr;
 }
 
 sync::TimeNs Core::Impl::RunDue() {
@@ -319,6 +330,7 @@ sync::TimeNs Core::Impl::RunDue() {
 void Core::Impl::Publish() {
   if (published_ == store_.snapshot()) return;
   published_ = store_.snapshot();
+  OfferState(false);
   scene_watch_.Publish(published_);
   budget_->Set(Budget::Use::kScene, published_->total.bytes);
   for (const auto& slot : displays_) {

@@ -81,6 +81,13 @@ struct ListenFigures {
   std::string access_trouble;  // what is wrong with grants, certificate or key; empty: nothing
 };
 
+// What is kept over the daemon's end.
+struct StateFigures {
+  uint64_t durable_snapshot = 0;  // that is on the disk; 0: nothing is kept
+  uint64_t transactions = 0, rows = 0, bytes = 0, failures = 0;
+  std::string trouble;  // why it cannot be kept, or what was put aside; empty: all is well
+};
+
 struct Stats {
   int64_t time_ns = 0;
   std::string version;
@@ -102,6 +109,7 @@ struct Stats {
   LatencyStats sending, decoding, applying;
   MemoryFigures memory;
   ListenFigures connections;
+  StateFigures state;
   std::vector<DisplayFigures> displays;
 };
 

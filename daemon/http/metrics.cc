@@ -105,6 +105,19 @@ constexpr Row<ListenFigures> kConnectionRows[] = {
      "Calls ended since their callers may not make them any more"},
 };
 
+constexpr Row<StateFigures> kStateRows[] = {
+    {"voxeld_state_durable_snapshot", &StateFigures::durable_snapshot, MetricType::Gauge,
+     "The newest snapshot that is on the disk; 0: nothing is kept"},
+    {"voxeld_state_transactions_total", &StateFigures::transactions, MetricType::Counter,
+     "Transactions that wrote what is kept"},
+    {"voxeld_state_rows_total", &StateFigures::rows, MetricType::Counter,
+     "Rows written or removed by them"},
+    {"voxeld_state_bytes_total", &StateFigures::bytes, MetricType::Counter,
+     "Bytes written by them"},
+    {"voxeld_state_failures_total", &StateFigures::failures, MetricType::Counter,
+     "Transactions that failed, and are tried again"},
+};
+
 constexpr Row<DisplayFigures> kDisplayRows[] = {
     {"voxeld_display_lit_voxels", &DisplayFigures::lit_voxels, MetricType::Gauge,
      "Voxels that are not black"},
@@ -352,6 +365,10 @@ std::string MetricsText(const Stats& stats) {
   for (const auto& row : kConnectionRows) {
     Add(families.New(row.name, row.type, row.help), {},
         static_cast<double>(stats.connections.*row.figure));
+  }
+  for (const auto& row : kStateRows) {
+    Add(families.New(row.name, row.type, row.help), {},
+        static_cast<double>(stats.state.*row.figure));
   }
   AddDisplays(stats.displays, &families);
   return families.Text();

@@ -40,6 +40,9 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
     reasons.push_back({{"what", "not reachable"}, {"why", stats.connections.unreachable}});
   }
   const bool fails = !reasons.empty();
+  if (!stats.state.trouble.empty()) {
+    reasons.push_back({{"what", "state"}, {"why", stats.state.trouble}});
+  }
   if (!stats.connections.access_trouble.empty()) {
     reasons.push_back({{"what", "access"}, {"why", stats.connections.access_trouble}});
   }

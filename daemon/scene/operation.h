@@ -239,6 +239,7 @@ struct Commit {
   uint64_t client_drops = 0;
   sync::TimeNs present_at_ns = 0;  // 0: at once
   bool must_show = false;
+  bool durable = false;  // a receipt is wanted when it is on the disk
 };
 
 struct Operation {

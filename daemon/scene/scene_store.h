@@ -4,6 +4,7 @@
 // Single-threaded but for Abandon; the snapshots that it gives away may be used anywhere.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -34,6 +35,9 @@ class SceneStore {
 
   // The newest; number 1 is the empty scene (0 is none).
   const SnapshotPtr& snapshot() const { return snapshot_; }
+
+  // What is made from now on, layers too, has greater numbers than this.
+  void SkipNumbers(uint64_t greatest) { next_number_ = std::max(next_number_, greatest + 1); }
 
   // What coordinates are checked against from now on.
   void SetViews(std::vector<DisplayView> views) { views_ = std::move(views); }

@@ -23,6 +23,7 @@ struct Writer {
   uint64_t session = 0;
   std::string client_name;
   bool ended = false;  // its layers are orphaned
+  bool keep = false;   // they outlive it, and the daemon
   bool operator==(const Writer&) const = default;
 };
 using WriterPtr = std::shared_ptr<const Writer>;

@@ -66,7 +66,7 @@ std::string AnswerQueue::Pop(sync::TimeNs now) {
       const Receipt& receipt = std::get<Receipt>(answer);
       wire::Encode(receipt, message->add_receipts());
       bytes += BytesOf(receipt);
-      if (std::holds_alternative<CommitOutcome>(receipt.what)) popped_.push_back(receipt);
+      if (IsOwed(receipt)) popped_.push_back(receipt);
     }
     PopFront();
   }
@@ -85,7 +85,7 @@ std::vector<Receipt> AnswerQueue::TakeOutcomes() {
   std::vector<Receipt> outcomes = std::exchange(popped_, {});
   while (!answers_.empty()) {
     if (auto* receipt = std::get_if<Receipt>(&answers_.front());
-        receipt != nullptr && std::holds_alternative<CommitOutcome>(receipt->what)) {
+        receipt != nullptr && IsOwed(*receipt)) {
       outcomes.push_back(*receipt);
     }
     PopFront();

@@ -20,6 +20,7 @@
 #include "daemon/services/acceptors.h"
 #include "daemon/services/call_meter.h"
 #include "daemon/services/call_watch.h"
+#include "daemon/services/grpc_log.h"
 #include "daemon/services/services.h"
 
 namespace voxeld::daemon::services {
@@ -244,6 +245,8 @@ class Server::Impl {
   const std::shared_ptr<listen::Counters> counters_;
   ServiceContext context_;
   Acceptors acceptors_;
+  listen::LogGate grpc_gate_{context_.clock, options_.log};
+  GrpcLog grpc_log_{grpc_gate_};
   listen::Guard guard_;
   listen::OwnPeers own_;
   std::vector<listen::ProbeTarget> targets_;

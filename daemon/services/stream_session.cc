@@ -394,14 +394,16 @@ void StreamSession::Tell(const Answer& answer) {
     sync::MutexLock lock(mutex_);
     session = session_;
     if constexpr (std::is_same_v<Answer, Receipt>) {
-      if (std::holds_alternative<CommitOutcome>(answer.what)) {
+      if (IsOwed(answer)) {
         // One of a former stream's was never counted here.
         inherited = answer.incarnation != incarnation_;
         if (!inherited && outcomes_owed_ > 0) --outcomes_owed_;
       } else if (!std::holds_alternative<Scheduled>(answer.what)) {
         if (unanswered_ > 0) --unanswered_;
         const auto* accepted = std::get_if<Accepted>(&answer.what);
-        if (accepted != nullptr) outcomes_owed_ += accepted->displays.size();
+        if (accepted != nullptr) {
+          outcomes_owed_ += accepted->displays.size() + (accepted->durable ? 1 : 0);
+        }
       }
     }
     const bool listening = Listening();

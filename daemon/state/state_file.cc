@@ -234,16 +234,16 @@ absl::Status StateFile::Carry(const Change& change) {
       if (absl::Status status = run(Statements::kRemoveNamed, key, nullptr); !status.ok()) {
         return status;
       }
-      [[fallthrough]];
-    }
-    case Change::What::kRemoveEntities:
       key.kind = RowKind::kEntity;
       return run(Statements::kRemoveNamed, key, nullptr);
+    }
+    case Change::What::kRemoveAll:
+      return Run("DELETE FROM rows");
   }
   return absl::InternalError("a change of no kind");
 }
 
-absl::Status StateFile::Apply(const std::vector<Change>& changes) {
+absl::Status StateFile::Apply(const Source& next) {
   if (statements_ == nullptr) return absl::FailedPreconditionError("the state file is closed");
   const auto step = [&](size_t which, const char* what) {
     sqlite3_stmt* const statement = statements_->all[which];
@@ -253,9 +253,13 @@ absl::Status StateFile::Apply(const std::vector<Change>& changes) {
     return status;
   };
   absl::Status status = step(Statements::kBegin, "beginning a transaction");
-  for (const Change& change : changes) {
-    if (!status.ok()) break;
-    status = Carry(change);
+  while (status.ok()) {
+    const std::vector<Change> changes = next();
+    if (changes.empty()) break;
+    for (const Change& change : changes) {
+      status = Carry(change);
+      if (!status.ok()) break;
+    }
   }
   if (status.ok()) status = step(Statements::kCommit, "committing a transaction");
   // Some faults have rolled it back themselves.

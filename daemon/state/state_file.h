@@ -25,11 +25,11 @@ struct sqlite3;
 namespace voxeld::daemon::state {
 
 // What a row is of. Numbers are in the file.
-enum class RowKind : uint8_t { kOwner = 1, kObject = 2, kLayer = 3, kEntity = 4, kFact = 5 };
+enum class RowKind : uint8_t { kOwner = 1, kObject = 2, kLayer = 3, kEntity = 4 };
 
 // `name` within the owner: an object's or a layer's; `id` within the layer.
 struct RowKey {
-  RowKind kind = RowKind::kFact;
+  RowKind kind = RowKind::kEntity;
   uint64_t owner = 0;
   std::string name, id;
   auto operator<=>(const RowKey&) const = default;
@@ -37,10 +37,10 @@ struct RowKey {
 
 struct Change {
   enum class What : uint8_t {
-    kPut,            // in place of what has the key
-    kRemove,         // that row
-    kRemoveLayer,    // the layer `key` names and all its entities
-    kRemoveEntities  // those of the layer
+    kPut,          // in place of what has the key
+    kRemove,       // that row
+    kRemoveLayer,  // the layer `key` names and all its entities
+    kRemoveAll     // whatever there is
   };
   What what = What::kPut;
   RowKey key;
@@ -74,9 +74,11 @@ class StateFile {
   // All rows, by kind, owner, name, id. DataLoss if the file turns out to be damaged.
   absl::Status Read(const std::function<void(const RowKey&, std::string_view)>& row);
 
+  // Gives the next changes; none: that was all.
+  using Source = std::function<std::vector<Change>()>;
   // All changes, in their order, or none. OK when they are on the disk. ResourceExhausted if the disk is
   // full, DataLoss if the file is damaged, else Unavailable.
-  absl::Status Apply(const std::vector<Change>& changes);
+  absl::Status Apply(const Source& next);
 
   // Puts the file aside, as damaged, and begins an empty one.
   absl::Status StartAnew(const std::string& why);

@@ -55,6 +55,7 @@ struct ReceiptEncoder {
     to->mutable_displays()->Assign(in.displays.begin(), in.displays.end());
     to->set_late(in.late);
     to->set_dropped_frames(in.dropped_frames);
+    to->set_durable(in.durable);
     EncodeStages(in.stages, to->mutable_stages());
   }
   void operator()(const Refused& in) const {
@@ -65,6 +66,7 @@ struct ReceiptEncoder {
   void operator()(const Scheduled& in) const {
     out->mutable_scheduled()->set_present_at_ns(in.present_at_ns);
   }
+  void operator()(const Durable& in) const { out->mutable_durable()->set_snapshot(in.snapshot); }
 };
 
 }  // namespace

@@ -136,6 +136,13 @@ void Encode(const Stats& in, v1::Stats* out) {
   EncodeLatency(in.applying, out->mutable_applying());
   EncodeMemory(in.memory, out->mutable_memory());
   EncodeConnections(in.connections, out->mutable_connections());
+  v1::StateStats* state = out->mutable_state();
+  state->set_durable_snapshot(in.state.durable_snapshot);
+  state->set_transactions(in.state.transactions);
+  state->set_rows(in.state.rows);
+  state->set_bytes(in.state.bytes);
+  state->set_failures(in.state.failures);
+  state->set_trouble(in.state.trouble);
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

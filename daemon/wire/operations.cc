@@ -243,7 +243,7 @@ MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& l
   return CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes);
 }
 
-// What a Commit asks for that this version has not; the commit itself is carried out.
+// What is wrong with a Commit; it itself is carried out.
 MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
   *out = {in.frame_id(), in.send_time_ns(), in.client_drops(), 0, in.must_show()};
   if (in.present_at_ns() < 0) {
@@ -253,10 +253,7 @@ MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit
                               "for at once")};
   }
   out->present_at_ns = in.present_at_ns();
-  if (in.durable()) {
-    return Unimplemented(FieldPath(path, "durable"),
-                         "the scene is kept in memory only; leave it false");
-  }
+  out->durable = in.durable();
   return {};
 }
 

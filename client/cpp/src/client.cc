@@ -220,6 +220,10 @@ absl::StatusOr<Receipt> Session::WaitAccepted(uint64_t frame, Duration timeout) 
 absl::StatusOr<Receipt> Session::WaitShown(uint64_t frame, Duration timeout) const {
   return core_->WaitShown(frame, timeout);
 }
+
+absl::StatusOr<Receipt> Session::WaitDurable(uint64_t frame, Duration timeout) const {
+  return core_->WaitDurable(frame, timeout);
+}
 absl::Status Session::WaitSettled(Duration timeout) const { return core_->WaitSettled(timeout); }
 void Session::Interrupt() { core_->Interrupt(); }
 std::optional<Receipt> Session::FindReceipt(uint64_t frame) const {

@@ -481,6 +481,7 @@ Rope EncodeCommit(const CommitRecord& commit) {
   AppendSigned(v1::Commit::kSendTimeNsFieldNumber, commit.send_time_ns, &fields);
   AppendSigned(v1::Commit::kPresentAtNsFieldNumber, commit.present_at_ns, &fields);
   AppendUnsigned(v1::Commit::kMustShowFieldNumber, commit.must_show ? 1 : 0, &fields);
+  AppendUnsigned(v1::Commit::kDurableFieldNumber, commit.durable ? 1 : 0, &fields);
   AppendUnsigned(v1::Commit::kClientDropsFieldNumber, commit.client_drops, &fields);
   return Request(StreamRequest::kCommitFieldNumber, std::move(fields));
 }

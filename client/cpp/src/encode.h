@@ -59,6 +59,7 @@ struct CommitRecord {
   int64_t send_time_ns = 0;
   int64_t present_at_ns = 0;
   bool must_show = false;
+  bool durable = false;
   uint64_t client_drops = 0;
 };
 Rope EncodeCommit(const CommitRecord& commit);

@@ -87,6 +87,7 @@ std::shared_ptr<Transaction> MakeTransaction(std::vector<Operation> operations,
   auto transaction = std::make_shared<Transaction>();
   transaction->present_at_ns = options.present_at_ns;
   transaction->must_show = options.must_show;
+  transaction->durable = options.durable;
   Batcher batcher(most_bytes == 0 ? kBatchBytes : std::min(kBatchBytes, BatchBytes(most_bytes)));
   Transaction::Piece plain;
   const auto add = [](Rope message, size_t count, Transaction::Piece* piece) {
@@ -359,6 +360,7 @@ void Outbox::DropFrame(const WaitingFrame& frame) {
   ++unreported_drops_;
   const bool nothing_left =
       transaction.next_piece == 0 && transaction.next_message == 0 && !transaction.must_show &&
+      !transaction.durable &&
       std::all_of(transaction.pieces.begin(), transaction.pieces.end(),
                   [](const Transaction::Piece& other) { return other.dropped; });
   drops_.push_back({transaction.frame_id, 1, nothing_left});
@@ -420,6 +422,7 @@ std::optional<Outbox::Outgoing> Outbox::Next(int64_t now_ns) {
                               .send_time_ns = now_ns,
                               .present_at_ns = t.present_at_ns,
                               .must_show = t.must_show,
+                              .durable = t.durable,
                               .client_drops = t.reported_drops});
   Sent(&out.message);
   out.sequence = sequence_;

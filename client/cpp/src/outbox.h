@@ -40,6 +40,7 @@ struct Transaction {
   uint64_t frame_id = 0;
   int64_t present_at_ns = 0;
   bool must_show = false;
+  bool durable = false;
   bool restores = false;  // puts up what was there before, and nothing that anybody asked for
   std::vector<Operation> operations;  // for the book of what is retained; given up frames are empty
   std::vector<Piece> pieces;

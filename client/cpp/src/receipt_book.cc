@@ -86,7 +86,8 @@ void ReceiptBook::Settle(Entry* entry) {
 void ReceiptBook::SettleIfComplete(Entry* entry) {
   const Receipt& receipt = entry->receipt;
   if (receipt.state == Receipt::State::kAccepted &&
-      (!outcomes_ || receipt.outcomes.size() >= receipt.displays.size())) {
+      (!outcomes_ || receipt.outcomes.size() >= receipt.displays.size()) &&
+      (!receipt.durable_owed || receipt.durable)) {
     Settle(entry);
   }
 }
@@ -150,6 +151,7 @@ void ReceiptBook::Told(const v1::Receipt& wire, int64_t now_ns) {
       receipt.refused_operations = accepted.refused_operations();
       receipt.applied_time_ns = accepted.applied_time_ns();
       receipt.late = accepted.late();
+      receipt.durable_owed = accepted.durable();
       receipt.dropped_frames = accepted.dropped_frames();
       receipt.stages = FromWire(accepted.stages());
       receipt.displays.assign(accepted.displays().begin(), accepted.displays().end());
@@ -175,6 +177,8 @@ void ReceiptBook::Told(const v1::Receipt& wire, int64_t now_ns) {
       TellOutcome(wire.outcome(), now_ns, entry);
       break;
     case v1::Receipt::kDurable:
+      receipt.durable = true;
+      break;
     case v1::Receipt::WHAT_NOT_SET:
       return;
   }

@@ -343,6 +343,24 @@ absl::StatusOr<Receipt> SessionCore::WaitShown(uint64_t frame, Duration timeout)
   return AnswerOf(frame);
 }
 
+absl::StatusOr<Receipt> SessionCore::WaitDurable(uint64_t frame, Duration timeout) {
+  const absl::Status waited =
+      Wait(timeout, true, "word that it is durable", [this, frame]() VOXELD_REQUIRES(mutex_) {
+        const Receipt* receipt = receipts_.Find(frame);
+        if (receipt == nullptr || receipt->settled || receipt->durable) return true;
+        return receipt->state == Receipt::State::kAccepted && !receipt->durable_owed;
+      });
+  if (!waited.ok()) return waited;
+  sync::MutexLock lock(mutex_);
+  absl::StatusOr<Receipt> receipt = AnswerOf(frame);
+  if (!receipt.ok() || receipt->durable) return receipt;
+  for (const Issue& issue : receipt->issues) {
+    if (issue.field == "commit.durable") return absl::FailedPreconditionError(issue.message);
+  }
+  return absl::FailedPreconditionError(
+      "the commit is applied and not durable: it was made without CommitOptions::durable");
+}
+
 absl::Status SessionCore::WaitSettled(Duration timeout) {
   const absl::Status waited = Wait(timeout, false, "outcomes", [this]() VOXELD_REQUIRES(mutex_) {
     return receipts_.unsettled() == 0;

@@ -59,6 +59,7 @@ class SessionCore {
   absl::Status WaitForRoom(Duration timeout) VOXELD_EXCLUDES(mutex_);
   absl::StatusOr<Receipt> WaitAccepted(uint64_t frame, Duration timeout) VOXELD_EXCLUDES(mutex_);
   absl::StatusOr<Receipt> WaitShown(uint64_t frame, Duration timeout) VOXELD_EXCLUDES(mutex_);
+  absl::StatusOr<Receipt> WaitDurable(uint64_t frame, Duration timeout) VOXELD_EXCLUDES(mutex_);
   absl::Status WaitSettled(Duration timeout) VOXELD_EXCLUDES(mutex_);
   absl::Status Close(Duration timeout) VOXELD_EXCLUDES(mutex_);
   void Interrupt() VOXELD_EXCLUDES(mutex_);

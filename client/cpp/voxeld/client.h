@@ -151,6 +151,9 @@ struct CommitOptions {
   int64_t present_at_ns = 0;
   // Later commits wait until every display has given its outcome of this one.
   bool must_show = false;
+  // The server is to say when it is on its disk (Session::WaitDurable): for layers of a session that keeps
+  // them, in a server that keeps state; an Issue says if it cannot.
+  bool durable = false;
 };
 
 // An entity that stays until it is removed. Copies mean the same one. What is called on it after its
@@ -265,6 +268,9 @@ class Session {
   absl::StatusOr<Receipt> WaitAccepted(uint64_t frame, Duration timeout) const;
   // When every display has given its outcome.
   absl::StatusOr<Receipt> WaitShown(uint64_t frame, Duration timeout) const;
+  // Until the commit, made with CommitOptions::durable, is on the server's disk. FailedPrecondition with the
+  // server's word if it will not be.
+  absl::StatusOr<Receipt> WaitDurable(uint64_t frame, Duration timeout) const;
   // Until every commit is settled; Interrupt does not end it.
   absl::Status WaitSettled(Duration timeout) const;
   // All waits but WaitSettled and Close, now and later, return Cancelled. For signal handlers' threads.

@@ -97,6 +97,8 @@ struct Receipt {
   std::vector<std::string> displays;   // those that owe an outcome
   std::vector<Outcome> outcomes;       // those that came
   std::vector<Issue> issues;           // the first 100
+  bool durable_owed = false;           // the server will say when it is on its disk
+  bool durable = false;                // it has
   bool settled = false;                // no more is owed
 };
 

@@ -173,23 +173,26 @@ class BaseConnection(Draw[Handle]):
                 return batch
         return None
 
-    def commit(self, *, present_in: Optional[float] = None, present_at_ns: int = 0, must_show: bool = False) -> Frame:
+    def commit(self, *, present_in: Optional[float] = None, present_at_ns: int = 0, must_show: bool = False,
+               durable: bool = False) -> Frame:
         """Everything drawn since the last one takes effect together. Without anything drawn it tells when all that came
         before has been shown. `present_in`: seconds from now until it is to be shown; `present_at_ns`: when, by the
-        server's monotonic clock. `must_show`: later commits wait until the displays have shown this one."""
+        server's monotonic clock. `must_show`: later commits wait until the displays have shown this one. `durable`:
+        frame.wait_durable() tells when it is on the server's disk."""
         if self._batched() is not None:
             raise InvalidValue("commit() within v.batch(): a batch is committed at its end")
         with self._staging:
             staged, self._staged = self._staged, []
         try:
-            return self._submit(lambda draft: _all(staged, draft), present_in, present_at_ns, must_show)
+            return self._submit(lambda draft: _all(staged, draft), present_in, present_at_ns, must_show, durable)
         except VoxelError:
             with self._staging:
                 self._staged = staged + self._staged  # to be tried again
             raise
 
-    def _submit(self, step: Step, present_in: Optional[float], present_at_ns: int, must_show: bool) -> Frame:
-        options = pb.Commit(present_at_ns=present_at_ns, must_show=must_show)
+    def _submit(self, step: Step, present_in: Optional[float], present_at_ns: int, must_show: bool,
+                durable: bool = False) -> Frame:
+        options = pb.Commit(present_at_ns=present_at_ns, must_show=must_show, durable=durable)
         if present_in is not None:
             options.present_at_ns = self.server_time_ns() + int(present_in * 1e9)
 

@@ -197,7 +197,7 @@ class Unit:
     @property
     def droppable(self) -> bool:
         """A flow policy may give up its frames."""
-        return not self.commit.must_show and not self.timed
+        return not self.commit.must_show and not self.commit.durable and not self.timed
 
     def _messages(self) -> Iterator[Union[Sequence[wire.Put], Request]]:
         """All but the commit. Puts side by side share messages."""

@@ -69,6 +69,7 @@ class Accepted:
     late: bool
     dropped_frames: int
     stages: Stages
+    durable: bool = False  # the server will say when it is on its disk
 
 
 @dataclass(frozen=True)
@@ -176,6 +177,7 @@ class Frame:
         self.outcomes: dict[str, Outcome] = {}
         self.client_dropped_frames = 0  # immediate frames of it that the flow policy gave up unsent
         self.reason = ""                # refused, dropped, lost, unknown: why
+        self.durable = False            # it is on the server's disk
         self.scheduled_ns = 0           # a timed commit: when it will be applied, by the server's clock
         self._wants_outcomes = wants_outcomes
         self._done = False
@@ -240,6 +242,15 @@ class Frame:
     def wait_shown(self, timeout: Optional[float] = None) -> dict[str, Outcome]:
         """Until every display has said what became of it: that, by the display's name. Raises as wait() does."""
         return self._wait(timeout, True).raise_if_failed().outcomes
+
+    def wait_durable(self, timeout: Optional[float] = None) -> "Frame":
+        """Until it is on the server's disk, as commit(durable=True) asked. Raises as wait() does, and CommitRefused if it will
+        not be there: the server keeps nothing, or the session's layers go with it (on_disconnect)."""
+        frame = self.wait(timeout)
+        if frame.accepted is not None and not frame.accepted.durable:
+            why = [issue for issue in frame.issues if issue.field == "commit.durable"]
+            raise CommitRefused("; ".join(map(str, why)) or "it was committed without durable=True", why)
+        return self._wait(timeout, True)
 
     def _wait(self, timeout: Optional[float], shown: bool) -> "Frame":
         try:
@@ -334,13 +345,20 @@ class Book:
         self.counts["accepted"] += 1
         self.counts["refused_operations"] += accepted.refused_operations
         self.counts["server_drops"] += accepted.dropped_frames
-        if not frame._wants_outcomes or all(d in frame.outcomes for d in accepted.displays):
+        if self._is_complete(frame):
             self._close(frame)
         else:
             self._owed[frame.id] = frame
             while len(self._owed) > MAX_OWED:
                 self.give_up([next(iter(self._owed.values()))], "too many commits wait for outcomes")
         frame._tell()
+
+    @staticmethod
+    def _is_complete(frame: Frame) -> bool:
+        a = frame.accepted
+        if a is None or a.durable and not frame.durable:
+            return False
+        return not frame._wants_outcomes or all(d in frame.outcomes for d in a.displays)
 
     def receipt(self, receipt: pb.Receipt, issues: Iterable[Issue] = ()) -> Optional[Frame]:
         """Enters it, with the issues of its commit. The frame it belongs to, if that is open."""
@@ -351,7 +369,7 @@ class Book:
         if what == "accepted":
             a = receipt.accepted
             self.accept(frame, Accepted(a.snapshot, a.refused_operations, a.applied_time_ns, tuple(a.displays), a.late,
-                                        a.dropped_frames, Stages.of(a.stages)), issues)
+                                        a.dropped_frames, Stages.of(a.stages), a.durable), issues)
         elif what == "refused":
             self.refuse(frame, receipt.refused.message, issues, receipt.refused.refused_operations)
         elif what == "outcome":
@@ -359,7 +377,12 @@ class Book:
             if outcome.display not in frame.outcomes:
                 frame.outcomes[outcome.display] = outcome
                 self.counts[outcome.kind] += 1
-            if frame.accepted is not None and all(d in frame.outcomes for d in frame.accepted.displays):
+            if self._is_complete(frame):
+                self._close(frame)
+            frame._tell()
+        elif what == "durable":
+            frame.durable = True
+            if self._is_complete(frame):
                 self._close(frame)
             frame._tell()
         elif what == "scheduled":
