@@ -25,11 +25,13 @@
 #include "daemon/http/http_server.h"
 #include "daemon/http/monitor.h"
 #include "daemon/listen/counters.h"
+#include "daemon/listen/socket.h"
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/genlock.h"
 #include "daemon/pipeline/view.h"
 #include "daemon/process/process.h"
+#include "daemon/process/supervisor.h"
 #include "daemon/services/server.h"
 #include "daemon/state/kept_state.h"
 #include "daemon/version/version.h"
@@ -172,8 +174,38 @@ void LogDisplays(Core& core, Logger& log) {
   }
 }
 
+// Sockets that whoever started the daemon has opened; those with the name "tls" speak it.
+absl::StatusOr<std::vector<listen::ListeningSocket>> AdoptSockets(const Config& config,
+                                                                  Supervisor& supervisor) {
+  std::vector<listen::ListeningSocket> sockets;
+  for (InheritedSocket& inherited : supervisor.TakeSockets()) {
+    const bool tls = inherited.name == "tls";
+    absl::StatusOr<listen::ListeningSocket> socket =
+        listen::ListeningSocket::Adopt(std::move(inherited.descriptor), tls);
+    if (!socket.ok()) return socket.status();
+    if (absl::Status status = CheckReach(socket->address(), config.security); !status.ok()) {
+      return status;
+    }
+    if (tls && !config.security.tls.any()) {
+      return absl::InvalidArgumentError(
+          "a socket that the daemon was given is to speak TLS, and security.tls_certificate, "
+          "tls_key "
+          "and tls_client_ca are not given");
+    }
+    sockets.push_back(*std::move(socket));
+  }
+  return sockets;
+}
+
+// Tells the supervisor that the daemon lives: that its core answers, and that it can be reached.
+void FeedWatchdog(Core& core, const Supervisor& supervisor) {
+  core.GetStats([&supervisor](const absl::StatusOr<Stats>& stats) {
+    if (stats.ok() && stats->connections.unreachable.empty()) supervisor.Alive();
+  });
+}
+
 int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
-          Logger& log) {
+          Supervisor& supervisor, Logger& log) {
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
   absl::StatusOr<std::unique_ptr<access::Security>> opened =
@@ -219,6 +251,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                   .worker_deadline_ns = config.engine.worker_deadline_ns,
                                   .staging_limit_bytes = config.engine.staging_limit_bytes,
                                   .index_bytes = config.engine.index_bytes};
+  const size_t core_displays = displays.size();
   for (auto& [display, setup, gpus] : displays) {
     if (absl::Status status = core.AddDisplay(std::move(display), EngineOf(engine, gpus), setup);
         !status.ok()) {
@@ -243,6 +276,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                         .max_bytes = config.limits.max_local_bytes},
              .log = &log};
   }
+  absl::StatusOr<std::vector<listen::ListeningSocket>> inherited = AdoptSockets(config, supervisor);
+  if (!inherited.ok()) return Fail(1, inherited.status());
   absl::StatusOr<std::unique_ptr<services::Server>> server = services::Server::Start(
       core, clock,
       {.listen = config.server.listen,
@@ -271,7 +306,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
        .access = &security->access(),
        .tls = security->tls(),
        .audit = &security->audit(),
-       .log = &log});
+       .log = &log},
+      *std::move(inherited));
   if (!server.ok()) return Fail(1, server.status());
   security->access().SetOnChange([server = server->get(), &log] {
     const size_t ended = server->EndRevoked();
@@ -293,6 +329,14 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
+  supervisor.Ready(absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays"));
+  std::unique_ptr<access::Ticker> watchdog;
+  if (supervisor.watchdog_ns() > 0) {
+    watchdog =
+        std::make_unique<access::Ticker>(clock, supervisor.watchdog_ns() / 3,
+                                         [&core, &supervisor] { FeedWatchdog(core, supervisor); });
+  }
+
   int signal = 0;
   while (sigwait(&signals, &signal) != 0 || signal == SIGHUP) {
     if (signal != SIGHUP) continue;
@@ -300,6 +344,8 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
     security->Reload();
     signal = 0;
   }
+  watchdog.reset();
+  supervisor.Stopping();
   ticker.reset();
   security->access().SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
@@ -331,6 +377,8 @@ int Main(int argc, char** argv) {
   const absl::StatusOr<Logger::Format> format = Logger::ParseFormat(config->log.format);
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
 
+  Supervisor supervisor =
+      Supervisor::OfProcess();  // before there are other descriptors and threads
   RaiseDescriptorLimit();
   TuneProcess();
   umask(0007);  // sockets are for the user and the group from the moment that they exist
@@ -362,7 +410,7 @@ int Main(int argc, char** argv) {
   }
 
   Logger log(*level, *format);
-  return Serve(*config, *std::move(displays), signals, clock, log);
+  return Serve(*config, *std::move(displays), signals, clock, supervisor, log);
 }
 
 }  // namespace

@@ -56,6 +56,7 @@ ALLOWED = {
     # A profile that was written is tried as the daemon would.
     "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
                             "tools/voxelctl"],
+    "tools/recording": ["voxeld/v1", "tools/recording"],
     # Tokens are made as the daemon reads them.
     "tools/voxelctl/token": ["daemon/access", "daemon/address", "tools/voxelctl"],
     # And this reads descriptions of displays as the daemon does.

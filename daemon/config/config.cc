@@ -214,6 +214,19 @@ absl::StatusOr<access::AccessOptions> AccessOf(const SecurityConfig& config) {
   return options;
 }
 
+absl::Status CheckReach(const Address& address, const SecurityConfig& security) {
+  if (address.tls || address.is_local() || security.allow_plain_beyond_loopback) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrCat(
+      address.ToString(),
+      " can be reached from other machines, and all that goes over it could be read and changed; "
+      "give tls:",
+      address.ToString(),
+      " with tls_certificate, tls_key and tls_client_ca, an "
+      "address of this machine, or security.allow_plain_beyond_loopback = true"));
+}
+
 absl::Status CheckSecurity(const Config& config) {
   std::vector<Address> plain = config.server.listen;
   if (config.server.http.has_value()) {
@@ -228,14 +241,7 @@ absl::Status CheckSecurity(const Config& config) {
   bool tls = false;
   for (const Address& address : plain) {
     tls = tls || address.tls;
-    if (address.tls || address.is_local() || config.security.allow_plain_beyond_loopback) continue;
-    return absl::InvalidArgumentError(absl::StrCat(
-        address.ToString(),
-        " can be reached from other machines, and all that goes over it could be read and changed; "
-        "give tls:",
-        address.ToString(),
-        " with tls_certificate, tls_key and tls_client_ca, an "
-        "address of this machine, or security.allow_plain_beyond_loopback = true"));
+    if (absl::Status status = CheckReach(address, config.security); !status.ok()) return status;
   }
   if (tls && !config.security.tls.any()) {
     return absl::InvalidArgumentError(

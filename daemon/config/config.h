@@ -152,6 +152,9 @@ absl::StatusOr<access::AccessOptions> AccessOf(const SecurityConfig& config);
 // without its files.
 absl::Status CheckSecurity(const Config& config);
 
+// The same for one address, wherever it is from.
+absl::Status CheckReach(const Address& address, const SecurityConfig& security);
+
 // As a file that would read back the same.
 std::string ToToml(const Config& config);
 

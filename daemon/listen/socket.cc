@@ -1,5 +1,7 @@
 #include "daemon/listen/socket.h"
 
+#include <arpa/inet.h>
+#include <fcntl.h>
 #include <linux/tcp.h>  // tcp_info with bytes_received, which glibc's has not
 #include <netdb.h>
 #include <netinet/in.h>
@@ -12,6 +14,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 
@@ -61,6 +64,57 @@ absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Listen(const Addre
                                                                      int type) {
   if (absl::Status ready = PrepareToListen(address); !ready.ok()) return ready;
   return address.unix_socket ? ListenUnix(address, type) : ListenTcp(address);
+}
+
+absl::StatusOr<ListeningSocket> ListeningSocket::Adopt(Descriptor descriptor, bool tls) {
+  const auto option = [&](int name) {
+    int value = -1;
+    socklen_t length = sizeof(value);
+    return getsockopt(descriptor.get(), SOL_SOCKET, name, &value, &length) == 0 ? value : -1;
+  };
+  ListeningSocket made;
+  if (option(SO_ACCEPTCONN) != 1 || option(SO_TYPE) != SOCK_STREAM ||
+      getsockname(descriptor.get(), made.name_.get(), &made.name_.length) != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the descriptor ", descriptor.get(),
+                     " that the daemon was given is no socket that listens for streams"));
+  }
+  char host[INET6_ADDRSTRLEN] = {};
+  switch (made.name_.address.ss_family) {
+    case AF_UNIX: {
+      const auto* name = reinterpret_cast<const sockaddr_un*>(&made.name_.address);
+      if (tls || name->sun_path[0] != '/') {
+        return absl::InvalidArgumentError(
+            "a unix socket that the daemon was given has no path, or is to speak TLS");
+      }
+      made.address_.unix_socket = true;
+      made.address_.path = name->sun_path;
+      break;
+    }
+    case AF_INET:
+      inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(&made.name_.address)->sin_addr, host,
+                sizeof(host));
+      break;
+    case AF_INET6:
+      inet_ntop(AF_INET6, &reinterpret_cast<const sockaddr_in6*>(&made.name_.address)->sin6_addr,
+                host, sizeof(host));
+      break;
+    default:
+      return absl::InvalidArgumentError(
+          "a socket that the daemon was given is neither TCP nor a unix socket");
+  }
+  if (!made.address_.unix_socket) {
+    made.address_.host = host;
+    made.address_.port = PortOf(made.name_);
+    made.address_.tls = tls;
+    if (LetBufferGo(descriptor.get())) {
+      Set(descriptor.get(), SOL_SOCKET, SO_RCVBUF, SocketWire::kUnreadBytes);
+      LetBufferGo(descriptor.get());
+    }
+  }
+  fcntl(descriptor.get(), F_SETFL, fcntl(descriptor.get(), F_GETFL) | O_NONBLOCK);
+  made.descriptor_ = std::move(descriptor);
+  return made;
 }
 
 absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const Address& address,

@@ -32,6 +32,10 @@ class ListeningSocket {
   static absl::StatusOr<std::vector<ListeningSocket>> Listen(const Address& address,
                                                              int type = SOCK_STREAM);
 
+  // One that was open when the process began and listens for streams; whoever made it keeps it, and a unix
+  // socket's file. `tls`: what its connections speak. InvalidArgument if it is something else.
+  static absl::StatusOr<ListeningSocket> Adopt(Descriptor descriptor, bool tls);
+
   ListeningSocket(ListeningSocket&&) = default;
   ListeningSocket& operator=(ListeningSocket&&) = delete;
   ~ListeningSocket();

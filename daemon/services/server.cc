@@ -79,12 +79,16 @@ class Server::Impl {
 
   ~Impl() { Shutdown(0); }
 
-  absl::Status Start() {
-    if (options_.listen.empty()) {
+  absl::Status Start(std::vector<listen::ListeningSocket> sockets) {
+    if (options_.listen.empty() && sockets.empty()) {
       return absl::InvalidArgumentError("no address to listen on; give at least one");
     }
-    std::vector<listen::ListeningSocket> sockets;
+    for (const listen::ListeningSocket& socket : sockets) {
+      addresses_.push_back(socket.address());
+      targets_.push_back({socket.name(), socket.address().ToString(), socket.address().tls});
+    }
     for (const Address& address : options_.listen) {
+      if (std::find(addresses_.begin(), addresses_.end(), address) != addresses_.end()) continue;
       if (address.tls && options_.tls == nullptr) {
         return absl::InvalidArgumentError(
             absl::StrCat(address.ToString(),
@@ -265,10 +269,11 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
-absl::StatusOr<std::unique_ptr<Server>> Server::Start(Core& core, sync::Clock& clock,
-                                                      ServerOptions options) {
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(
+    Core& core, sync::Clock& clock, ServerOptions options,
+    std::vector<listen::ListeningSocket> inherited) {
   auto impl = std::make_unique<Impl>(core, clock, std::move(options));
-  if (absl::Status status = impl->Start(); !status.ok()) return status;
+  if (absl::Status status = impl->Start(std::move(inherited)); !status.ok()) return status;
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 

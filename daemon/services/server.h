@@ -16,6 +16,7 @@
 #include "daemon/core/core.h"
 #include "daemon/listen/counters.h"
 #include "daemon/listen/limits.h"
+#include "daemon/listen/socket.h"
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/context.h"
@@ -60,8 +61,11 @@ class Server {
  public:
   // Listens and serves, or says which address could not be had: AlreadyExists if somebody listens
   // there. Unix sockets get the mode 0660.
-  static absl::StatusOr<std::unique_ptr<Server>> Start(Core& core, sync::Clock& clock,
-                                                       ServerOptions options);
+  // `inherited`: sockets that listen already; an address of `listen` that one of them has is not asked
+  // for again.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(
+      Core& core, sync::Clock& clock, ServerOptions options,
+      std::vector<listen::ListeningSocket> inherited = {});
   ~Server();  // shuts down, if that has not been done
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

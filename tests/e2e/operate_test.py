@@ -284,5 +284,148 @@ class State(unittest.TestCase):
             self.assertIn("another daemon has it", ended.stderr)
 
 
+class Recording(unittest.TestCase):
+    def setUp(self) -> None:
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.socket = f"unix:{self.folder.name}/voxeld.sock"
+        self.file = f"{self.folder.name}/show.mcap"
+        daemon = Daemon(f'[server]\nlisten = ["{self.socket}"]\nhttp = "off"\n{DISPLAY}')
+        self.addCleanup(daemon.__exit__, None, None, None)
+
+    def tool(self, *arguments: str) -> "subprocess.Popen[str]":
+        return subprocess.Popen([os.environ["VOXELCTL"], "--server", self.socket, *arguments], stdin=subprocess.PIPE,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def record(self) -> "subprocess.Popen[str]":
+        recorder = self.tool("record", self.file)
+        deadline = time.monotonic() + LONG
+        with voxel.connect(self.socket, timeout=LONG) as v:
+            while not os.path.exists(self.file) or os.path.getsize(self.file) < 100:  # its first change set is on the disk
+                self.assertLess(time.monotonic(), deadline)
+                v.sphere("wake", radius=0.1)
+                v.commit().wait(LONG)
+        return recorder
+
+    def show(self, told: float = 0.3) -> dict[int, np.ndarray[Any, Any]]:
+        """States of a scene, each for long enough to be told by itself: what is shown of each, by its snapshot."""
+        shown: dict[int, np.ndarray[Any, Any]] = {}
+        rng = np.random.default_rng(3)
+
+        def see(v: voxel.Connection) -> None:
+            accepted = v.commit().wait(LONG).accepted
+            assert accepted is not None
+            time.sleep(told)
+            shown[accepted.snapshot] = v.capture(at_least_snapshot=accepted.snapshot, timeout=LONG).rgb.copy()
+
+        with voxel.connect(self.socket, timeout=LONG, autocommit=False) as v, \
+                voxel.connect(self.socket, timeout=LONG, autocommit=False) as w:
+            v.layer("one").sphere("ball", radius=0.6, color="tab:orange")
+            v.layer("two", opacity=0.5).box("cube", size=0.9, color="tab:blue")
+            see(v)
+            w.layer("one").points("cloud", rng.uniform(-1, 1, (2000, 3)), colors=rng.integers(0, 255, (2000, 3)).astype(np.uint8))
+            see(w)
+            with v.object("wheel") as wheel:
+                wheel.cylinder("hub", radius=0.3, height=0.2, color="red")
+            v.layer("two").instance("left", "wheel", transform=voxel.translate(-0.5, 0, 0))
+            v.layer("two").text("word", "voxeld", height=0.4, color="white")
+            see(v)
+            v.layer("one", visible=False)
+            v.layer("two", transform=voxel.translate(0.2, 0.1, 0))
+            see(v)
+            v.layer("one", visible=True, mask="two")
+            v.clear("two")
+            see(v)
+        return shown
+
+    def replayed(self, *options: str) -> Iterator[tuple[int, np.ndarray[Any, Any]]]:
+        """What is shown after each change set, by the snapshot that it was recorded of."""
+        replay = self.tool("--json", "replay", self.file, "--step", *options)
+        assert replay.stdin is not None and replay.stdout is not None
+        with voxel.connect(self.socket, timeout=LONG) as v:
+            while replay.poll() is None:
+                with contextlib.suppress(BrokenPipeError):
+                    replay.stdin.write("\n")
+                    replay.stdin.flush()
+                line = replay.stdout.readline()
+                if not line:
+                    break
+                step = json.loads(line)
+                yield step["recorded"], v.capture(at_least_snapshot=step["snapshot"], timeout=LONG).rgb.copy()
+        with contextlib.suppress(BrokenPipeError):
+            replay.stdin.close()
+        errors = replay.stderr.read() if replay.stderr is not None else ""
+        self.assertEqual(replay.wait(LONG), 0, errors)
+
+    def test_what_is_replayed_is_shown_the_same_and_others_read_it(self) -> None:
+        recorder = self.record()
+        shown = self.show()
+        recorder.send_signal(signal.SIGINT)
+        _, words = recorder.communicate(timeout=LONG)
+        self.assertEqual(recorder.returncode, 0, words)
+        compared = 0
+        for snapshot, picture in self.replayed():
+            if snapshot in shown:
+                np.testing.assert_array_equal(picture, shown[snapshot], f"snapshot {snapshot}")
+                compared += 1
+        self.assertGreaterEqual(compared, len(shown) - 1)  # one may have been told together with the next
+        self.assertEqual(len({picture.tobytes() for picture in shown.values()}), len(shown), "all differ")
+        with voxel.connect(self.socket, timeout=LONG) as v:
+            self.assertEqual(v.entities(), [], "what replay put up went with it")
+
+        read = subprocess.run(["node", str(Path(__file__).with_name("check_mcap.js")), self.file], capture_output=True, text=True,
+                              timeout=LONG, env={**os.environ, "NODE_PATH": os.environ["NODE_MODULES"]})
+        self.assertEqual(read.returncode, 0, read.stderr)
+        told = json.loads(read.stdout)
+        self.assertEqual(set(told["topics"]), {"voxeld/scene", "scene"})
+        self.assertEqual(told["times"], sorted(told["times"], key=int))
+        self.assertGreaterEqual(told["shapes"]["triangles"], 3)
+        self.assertGreaterEqual(told["shapes"]["points"], 4000)
+        self.assertGreater(told["shapes"]["deletions"], 0)
+
+    def test_from_somewhere_in_it_the_whole_scene_is_there(self) -> None:
+        recorder = self.record()
+        shown = self.show()
+        recorder.send_signal(signal.SIGINT)
+        recorder.communicate(timeout=LONG)
+        compared = [snapshot for snapshot, picture in self.replayed("--from", "1.0")
+                    if snapshot in shown and np.array_equal(picture, shown[snapshot])]
+        self.assertGreaterEqual(len(compared), 1)
+        self.assertLess(len(compared), len(shown))
+        refused = voxelctl("--server", self.socket, "replay", self.file, "--from", "1000")
+        self.assertIn("the recording has", refused.stderr)
+
+    def test_what_kills_the_recorder_takes_the_last_second_at_most(self) -> None:
+        recorder = self.record()
+        with voxel.connect(self.socket, timeout=LONG, autocommit=False) as v:
+            v.layer("one").sphere("ball", radius=0.6)
+            accepted = v.commit().wait(LONG).accepted
+            assert accepted is not None
+            picture = v.capture(at_least_snapshot=accepted.snapshot, timeout=LONG).rgb.copy()
+            time.sleep(1.0)
+            recorder.kill()
+            recorder.communicate(timeout=LONG)
+        states = dict(self.replayed())
+        np.testing.assert_array_equal(states[accepted.snapshot], picture)
+
+    def test_speed_and_loop(self) -> None:
+        recorder = self.record()
+        self.show()
+        recorder.send_signal(signal.SIGINT)
+        recorder.communicate(timeout=LONG)
+        began = time.monotonic()
+        fast = voxelctl("--server", self.socket, "replay", self.file, "--speed", "100")
+        self.assertEqual(fast.returncode, 0, fast.stderr)
+        self.assertLess(time.monotonic() - began, 1.5)  # it was longer than that when it was recorded
+        looping = self.tool("--json", "replay", self.file, "--speed", "50", "--loop")
+        assert looping.stdout is not None
+        last = -1
+        while (now := json.loads(looping.stdout.readline())["time_ns"]) >= last:  # until it has begun again
+            last = now
+        looping.send_signal(signal.SIGINT)
+        looping.communicate(timeout=LONG)
+        self.assertEqual(looping.returncode, 130)
+
+
 if __name__ == "__main__":
     unittest.main()

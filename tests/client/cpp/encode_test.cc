@@ -245,7 +245,7 @@ TEST(Encode, Operations) {
   EXPECT_EQ(Parse(EncodeFrameEnd("l")).frame_end().layer(), "l");
   EXPECT_EQ(Parse(EncodePing(-5)).ping().client_time_ns(), -5);
 
-  Rope commit = EncodeCommit({1, 2, 3, true, 4});
+  Rope commit = EncodeCommit({1, 2, 3, true, true, 4});
   AddSequence(300, &commit);
   request = Parse(commit);
   EXPECT_EQ(request.sequence(), 300u);
@@ -253,6 +253,7 @@ TEST(Encode, Operations) {
   EXPECT_EQ(request.commit().send_time_ns(), 2);
   EXPECT_EQ(request.commit().present_at_ns(), 3);
   EXPECT_TRUE(request.commit().must_show());
+  EXPECT_TRUE(request.commit().durable());
   EXPECT_EQ(request.commit().client_drops(), 4u);
 }
 

@@ -23,7 +23,7 @@ OpenOptions Policy(DisconnectPolicy policy, int64_t linger_ns = 0) {
 
 Cleared Clear(Simulation& sim, uint64_t owner, std::string layer, bool keep_state = false) {
   Cleared cleared;
-  sim.core->ClearLayer(owner, std::move(layer), keep_state, [&](auto c) { cleared = *c; });
+  sim.core->ClearLayer(owner, std::move(layer), keep_state, {}, [&](auto c) { cleared = *c; });
   sim.core->Step();
   return cleared;
 }

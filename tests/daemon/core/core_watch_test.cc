@@ -130,7 +130,7 @@ TEST(CoreWatch, EveryNewSnapshotIsTold) {
   sim.Close(client);  // its layers are orphaned
   EXPECT_EQ(told.size(), 5u);
   EXPECT_TRUE(watch.newest()->FindLayer({client.info.owner, "b"})->writer->ended);
-  sim.core->ClearLayer(0, "", false, [](absl::StatusOr<Cleared>) {});
+  sim.core->ClearLayer(0, "", false, {}, [](absl::StatusOr<Cleared>) {});
   sim.core->Step();
   EXPECT_EQ(told.size(), 6u);
   EXPECT_EQ(watch.newest()->layers.size(), 0u);

@@ -58,6 +58,12 @@ inline constexpr const char* kWatchAbout =
 inline constexpr const char* kInitAbout =
     "Asks how an LED lattice is wired (start corner, direction, zig-zag) and writes its "
     "profile; needs no daemon";
+inline constexpr const char* kRecordAbout =
+    "Records the scene, with all that changes, into an MCAP file, until Ctrl-C; other viewers show "
+    "its "
+    "channel \"scene\"";
+inline constexpr const char* kReplayAbout =
+    "Puts a recorded scene up again, at the pace at which it was, bit for bit; it goes at the end";
 inline constexpr const char* kTokenAbout =
     "Makes a token that shows who a client is (VOXELD_TOKEN), and its entry for the daemon's "
     "grants file; needs no daemon";

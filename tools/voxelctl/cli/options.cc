@@ -18,6 +18,7 @@
 #include "tools/voxelctl/cli/argument_checks.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/cli/server_options.h"
+#include "tools/voxelctl/cli/service_options.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -51,10 +52,12 @@ class Parser {
     AddPattern();
     AddSet();
     AddCalibrate();
-    AddVerify();
+    AddVerifyOptions(Add("verify", kVerifyAbout), &verify_);
     AddProfile();
     Add("init", kInitAbout)->add_option("FILE.toml", init_.file, "Where the profile goes");
-    AddToken();
+    AddTokenOptions(Add("token", kTokenAbout), &token_);
+    AddRecordOptions(Add("record", kRecordAbout), &record_);
+    AddReplayOptions(Add("replay", kReplayAbout), &replay_);
     Add("doctor", kDoctorAbout);
   }
 
@@ -246,34 +249,6 @@ class Parser {
     c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
   }
 
-  void AddToken() {
-    CLI::App* c = Add("token", kTokenAbout);
-    c->add_option("NAME", token_.name, "Whose it is: all that is drawn with it belongs to it");
-    c->add_option("--scopes", token_.scopes, "What it allows: view, draw, control")
-        ->type_name("LIST")
-        ->capture_default_str();
-    c->add_option("--grants", token_.grants, "Append the entry to this file")->type_name("FILE");
-    AddNumber(c, "--days", &token_.days, 0, 36500, "Days until it expires; 0: never", "N");
-  }
-
-  void AddVerify() {
-    CLI::App* c = Add("verify", kVerifyAbout);
-    c->add_option("DISPLAY", verify_.display, "[NAME=]DRIVER[,KEY=VALUE…]");
-    c->add_option("--filter", verify_.filter,
-                  "Only the cases whose names match: 'volume.*', '@(volume|end).*', '!(usb.*)'")
-        ->type_name("GLOB");
-    c->add_flag("--list", verify_.list, "Name the cases and end; no device is needed");
-    c->add_option("--junit", verify_.junit, "Write JUnit's XML too, for build servers")
-        ->type_name("FILE");
-    c->add_option("--seed", verify_.seed,
-                  "What the cases choose by chance: sizes of transfers, order of pictures")
-        ->type_name("N")
-        ->capture_default_str();
-    WantNumber(c->get_option("--seed"), 0, 4294967295.0);
-    AddNumber(c, "--wait", &verify_.wait_s, 0, 3600,
-              "Seconds to wait for the device, such as after its firmware was written", "S");
-  }
-
   // CLI11 says nothing useful about a command that is not there.
   void CheckCommand(const std::vector<std::string>& arguments) const {
     if (arguments.empty())
@@ -341,6 +316,8 @@ class Parser {
               : name == "profile" ? &profile_.profile
               : name == "init"    ? &init_.file
               : name == "token"   ? &token_.name
+              : name == "record"  ? &record_.file
+              : name == "replay"  ? &replay_.file
                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "gallery") {
@@ -357,10 +334,9 @@ class Parser {
       if (init_.file.empty()) throw UsageError{"init wants the name of a file, such as cube.toml"};
       options_.command = init_;
     }
-    if (name == "token") {
-      if (token_.name.empty()) throw UsageError{"token wants a NAME, such as stage-left"};
-      options_.command = token_;
-    }
+    if (name == "token") FillInChecked(token_, CheckTokenOptions);
+    if (name == "record") FillInChecked(record_, CheckRecordOptions);
+    if (name == "replay") FillInChecked(replay_, CheckReplayOptions);
     if (name == "set") return FillInSet();
     if (name == "calibrate") {
       if (calibrate_.file.empty()) {
@@ -381,6 +357,12 @@ class Parser {
         throw UsageError{"--all and --layer do not go together"};
       options_.command = clear_;
     }
+  }
+
+  template <typename T>
+  void FillInChecked(const T& options, void (*check)(const T&)) {
+    check(options);
+    options_.command = options;
   }
 
   // The only positional argument of a command, null if it has none.
@@ -498,6 +480,8 @@ class Parser {
   ProfileOptions profile_;
   InitOptions init_;
   TokenOptions token_;
+  RecordOptions record_;
+  ReplayOptions replay_;
   std::string profile_action_;
   std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
   double duration_ = std::nan("");

@@ -114,6 +114,17 @@ struct TokenOptions {
   std::string grants;                // the file that gets the entry; empty: none
 };
 
+struct RecordOptions {
+  std::string file;       // must not be there yet
+  double duration_s = 0;  // 0: until an interrupt
+};
+
+struct ReplayOptions {
+  std::string file;
+  double speed = 1, from_s = 0;
+  bool loop = false, step = false, keep = false;
+};
+
 struct Options {
   std::string server;               // empty: see ChooseServer
   client::Credentials credentials;  // as given; see ChooseCredentials
@@ -121,7 +132,7 @@ struct Options {
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions, TokenOptions>
+               InitOptions, TokenOptions, RecordOptions, ReplayOptions>
       command;
 };
 

@@ -8,6 +8,7 @@
 #include "tools/voxelctl/doctor/doctor.h"
 #include "tools/voxelctl/init/init.h"
 #include "tools/voxelctl/profile/profile.h"
+#include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/token/token.h"
 #include "tools/voxelctl/verify/verify.h"
 
@@ -62,6 +63,10 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
         if constexpr (std::is_same_v<Command, PatternOptions>)
           return Pattern(command, connection, console);
         if constexpr (std::is_same_v<Command, SetOptions>) return Set(command, connection, console);
+        if constexpr (std::is_same_v<Command, RecordOptions>)
+          return Record(command, connection, interrupt, console);
+        if constexpr (std::is_same_v<Command, ReplayOptions>)
+          return Replay(command, connection, interrupt, std::cin, console);
         return absl::OkStatus();
       },
       options.command);

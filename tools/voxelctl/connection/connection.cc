@@ -95,6 +95,7 @@ class Connection::Impl {
   v1::DisplayService::Stub& displays() { return *displays_; }
   v1::SceneService::Stub& scene() { return *scene_; }
   const std::string& address() const { return address_; }
+  const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
   const client::Credentials& credentials() const { return credentials_; }
   Interrupt& interrupt() { return interrupt_; }
 
@@ -221,6 +222,10 @@ absl::Status Connection::CaptureVolume(
     return reader->Finish();
   });
   return refused.ok() ? status : refused;
+}
+
+absl::StatusOr<std::unique_ptr<RawStream>> Connection::OpenRawStream(v1::Open open) {
+  return RawStream::Open(impl_->channel(), impl_->address(), std::move(open), impl_->interrupt());
 }
 
 absl::StatusOr<std::unique_ptr<SceneSession>> Connection::OpenSession(client::Options options) {

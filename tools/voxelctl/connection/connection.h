@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "tools/voxelctl/connection/raw_stream.h"
 #include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/process/interrupt.h"
 #include "voxeld/credentials.h"
@@ -23,8 +24,9 @@ class Connection {
  public:
   // `interrupt` must outlive it. Unavailable if the server does not answer in time.
   // Statuses of the credentials' files are as they are.
-  static absl::StatusOr<std::unique_ptr<Connection>> Connect(
-      const std::string& address, const client::Credentials& credentials, Interrupt& interrupt);
+  static absl::StatusOr<std::unique_ptr<Connection>> Connect(const std::string& address,
+                                                             const client::Credentials& credentials,
+                                                             Interrupt& interrupt);
   ~Connection();
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -43,6 +45,9 @@ class Connection {
                           const std::function<bool(const v1::WatchSceneResponse&)>& each);
   absl::Status CaptureVolume(const v1::CaptureVolumeRequest& request,
                              const std::function<absl::Status(const v1::VolumeChunk&)>& each);
+
+  // A stream of the wire's own requests, over this connection.
+  absl::StatusOr<std::unique_ptr<RawStream>> OpenRawStream(v1::Open open);
 
   // A session with this server, over a connection of its own.
   absl::StatusOr<std::unique_ptr<SceneSession>> OpenSession(client::Options options);

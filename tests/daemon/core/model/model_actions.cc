@@ -303,7 +303,7 @@ void ModelRun::ClearLayer(uint64_t owner, const std::string& layer, bool keep_st
     *expected = plain_.ClearLayer(owner, layer, keep_state);
   }));
   ++replies_due_;
-  sim_.core->ClearLayer(owner, layer, keep_state, [this, id, expected](auto cleared) {
+  sim_.core->ClearLayer(owner, layer, keep_state, {}, [this, id, expected](auto cleared) {
     --replies_due_;
     if (!wrong_.empty()) return;
     RunEffects(id);

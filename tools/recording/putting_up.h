@@ -1,0 +1,47 @@
+// What has to be sent so that a daemon's scene becomes what a recording says, change set by change set.
+//
+// All that was recorded becomes one client's: a layer goes by its owner, name and number ("7/map/12"), an
+// object by its owner and name, so that whatever several had stays apart. Layers are made in the order of
+// their numbers, as they blend by it.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tools/recording/scene_mirror.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::recording {
+
+// Not thread-safe.
+class PuttingUp {
+ public:
+  // The requests of one commit that leads from what was put up to `changes`, a change set in one message.
+  std::vector<v1::StreamRequest> Step(const v1::WatchSceneResponse& changes);
+
+  // Only remembers: what it leads to is in the next Whole.
+  void Skip(const v1::WatchSceneResponse& changes) { mirror_.Apply(changes); }
+  // All of it, for a scene that has nothing of it yet.
+  std::vector<v1::StreamRequest> Whole();
+
+  // Layers that have been emptied since this was asked last, and can be removed.
+  std::vector<std::string> TakeEmptied();
+
+ private:
+  std::string NameOf(const LayerName& layer) const;  // in the daemon's scene
+  static std::string ObjectOf(uint64_t owner, const std::string& name);
+  static void Rename(uint64_t owner, v1::Primitive* primitive);
+  void PutLayers(std::vector<v1::LayerInfo> layers, std::vector<v1::StreamRequest>* out);
+  void PutObjects(const std::map<std::pair<uint64_t, std::string>, v1::Object>& objects,
+                  std::vector<v1::StreamRequest>* out) const;
+  void PutEntity(const v1::WatchedEntity& entity, std::vector<v1::StreamRequest>* out) const;
+  // Masks go by names, and a mask's layer may have become another.
+  void PutMasks(std::vector<v1::StreamRequest>* out);
+
+  SceneMirror mirror_;
+  std::map<LayerName, std::string> masks_;  // as they were put up last
+  std::vector<std::string> emptied_;
+};
+
+}  // namespace voxeld::recording

@@ -1,0 +1,23 @@
+// Commands for those who run a daemon and test devices: their arguments, and what these may be. Within this folder wrong ones
+// are thrown (UsageError).
+#pragma once
+
+#include "tools/voxelctl/cli/options.h"
+
+namespace CLI {
+class App;
+}
+
+namespace voxeld::voxelctl {
+
+// What is given lives as long as the app.
+void AddTokenOptions(CLI::App* command, TokenOptions* options);
+void AddVerifyOptions(CLI::App* command, VerifyOptions* options);
+void AddRecordOptions(CLI::App* command, RecordOptions* options);
+void AddReplayOptions(CLI::App* command, ReplayOptions* options);
+
+void CheckTokenOptions(const TokenOptions& options);
+void CheckRecordOptions(const RecordOptions& options);
+void CheckReplayOptions(const ReplayOptions& options);
+
+}  // namespace voxeld::voxelctl
