@@ -14,7 +14,8 @@ std::string Beyond(std::string key) {
 OwnedName Beyond(const OwnedName& key) { return {key.owner, Beyond(key.name)}; }
 
 bool LooksSame(const WriterPtr& a, const WriterPtr& b) {
-  return a == b || (a->client_name == b->client_name && a->ended == b->ended);  // what is kept is not told
+  return a == b ||
+         (a->client_name == b->client_name && a->ended == b->ended);  // what is kept is not told
 }
 
 bool LooksSame(const Layer& a, const Layer& b) {
