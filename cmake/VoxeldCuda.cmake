@@ -1,7 +1,7 @@
 # Finds CUDA by itself, also where nvcc is not on the PATH. Sets VOXELD_HAVE_CUDA.
 #
 # VOXELD_CUDA: AUTO takes it if it is there, ON asks for it, OFF leaves it out.
-# VOXELD_CUDA_HASTY: kernels are compiled in a tenth of the time and run several times slower: for machines without a GPU,
+# VOXELD_HASTY: kernels are compiled in a tenth of the time and run several times slower: for machines without a GPU,
 # where all that can be seen of them is that they compile and link.
 set(VOXELD_HAVE_CUDA OFF)
 if(VOXELD_CUDA STREQUAL "OFF")
@@ -35,9 +35,8 @@ if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
   set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION "-std=c++20")
   set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION "-std=c++20")
 endif()
-option(VOXELD_CUDA_HASTY "Compile CUDA's kernels quickly instead of well" OFF)
 set(VOXELD_CUDA_HASTE)
-if(VOXELD_CUDA_HASTY)
+if(VOXELD_HASTY)
   if(CMAKE_CUDA_COMPILER_VERSION VERSION_GREATER_EQUAL 13.0)
     set(VOXELD_CUDA_HASTE --Ofast-compile=max)
   else()

@@ -152,6 +152,20 @@ if(VOXELD_TESTS AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   voxeld_test_options(voxeld_test_headers)
 endif()
 
+# voxeld_test_objects(NAME SOURCES … LINK …): cases that several programs run, compiled once; each links NAME.
+function(voxeld_test_objects name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_library(${name} OBJECT ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK})
+  voxeld_test_options(${name})
+  # As the programs are.
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+  target_compile_options(${name} PRIVATE -fPIE)
+  if(VOXELD_TEST_HEADERS)
+    target_precompile_headers(${name} REUSE_FROM voxeld_test_headers)
+  endif()
+endfunction()
+
 # voxeld_test(NAME [SINGLE_THREADED] LABELS … SOURCES … LINK … LONG …): an executable `NAME` in bin/tests; each of its cases is a
 # ctest test. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LONG: patterns of cases that are
 # left out where VOXELD_LONG_TESTS is off. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.

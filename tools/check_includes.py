@@ -56,6 +56,9 @@ ALLOWED = {
     # A profile that was written is tried as the daemon would.
     "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
                             "tools/voxelctl"],
+    # What comes in by the protocols by which pictures go out.
+    "tools/lights": ["display/drivers/network/protocol", "display/sync", "daemon/address", "tools/lights"],
+    "tools/voxelctl/lights": ["display/drivers/wiring", "display/sync", "gpu/affine", "voxeld", "tools/lights", "tools/voxelctl"],
     "tools/recording": ["voxeld/v1", "tools/recording"],
     # Tokens are made as the daemon reads them.
     "tools/voxelctl/token": ["daemon/access", "daemon/address", "tools/voxelctl"],

@@ -86,6 +86,17 @@ TEST(Bench, IngestComparesEveryCaseWithTheSink) {
                   daemon["values"][i].get<double>() / sink["values"][i].get<double>(), 1e-9);
     }
   }
+  // Over TLS and recorded: beside a daemon without.
+  for (const std::string name : {"batch_tls", "batch_unix_recorded"}) {
+    const nlohmann::json& daemon = Figure(report, name + ".daemon");
+    const nlohmann::json& without = Figure(report, name + ".without");
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_GT(without["values"][i], 0);
+      EXPECT_NEAR(Figure(report, name + ".ratio")["values"][i],
+                  daemon["values"][i].get<double>() / without["values"][i].get<double>(), 1e-9);
+    }
+  }
+  EXPECT_GT(report["recorded"]["batch_unix_recorded"]["change_sets"], 0);
   // Two entities of 4096 lines of 28 bytes, and their heads.
   EXPECT_GT(report["message_bytes"]["batch_unix"], 2 * 4096 * 28);
   EXPECT_LT(report["message_bytes"]["batch_unix"], 2 * 4096 * 28 + 1000);

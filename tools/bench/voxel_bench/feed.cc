@@ -11,7 +11,7 @@ constexpr sync::TimeNs kTakeLimit = 60 * sync::kSecond;
 
 class DaemonFeed final : public Feed {
  public:
-  DaemonFeed(Loop& loop, const std::string& target, Frames frames, Flush flush)
+  DaemonFeed(Loop& loop, const Target& target, Frames frames, Flush flush)
       : loop_(loop),
         connection_(target),
         session_(loop, connection_, OpenAsked()),
@@ -112,8 +112,8 @@ class SinkFeed final : public Feed {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const std::string& target,
-                                                 Frames frames, Flush flush) {
+absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const Target& target, Frames frames,
+                                                 Flush flush) {
   auto feed = std::make_unique<DaemonFeed>(loop, target, std::move(frames), flush);
   if (absl::Status opened = feed->WaitOpened(); !opened.ok()) return opened;
   return feed;

@@ -38,8 +38,8 @@ class Feed {
 };
 
 // One session for all rounds, so that after the first frame everything is replaced.
-absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const std::string& target,
-                                                 Frames frames, Flush flush);
+absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const Target& target, Frames frames,
+                                                 Flush flush);
 // One call a round.
 std::unique_ptr<Feed> FeedSink(Loop& loop, const std::string& target, Frames frames, Flush flush);
 

@@ -1,4 +1,5 @@
-// How much of what bare gRPC takes in the daemon takes in: the same bytes to both, in turns.
+// How much of what bare gRPC takes in the daemon takes in, and how much of what it takes in otherwise it takes in
+// over TLS and while it is recorded: the same bytes to both, in turns.
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "tools/bench/voxel_bench/content.h"
 #include "tools/bench/voxel_bench/feed.h"
 #include "tools/bench/voxel_bench/memory_feed.h"
+#include "tools/bench/voxel_bench/recorder.h"
 #include "tools/bench/voxel_bench/report.h"
 #include "tools/bench/voxel_bench/run.h"
 #include "tools/bench/voxel_bench/servers.h"
@@ -22,18 +24,33 @@ constexpr int kVariants = 2;  // of each frame, so that something changes
 
 enum class Shape : uint8_t { kBatch, kUpsert, kUpsertGathered, kMemory, kMemoryAgain };
 
+enum class With : uint8_t { kNothing, kDisplay, kTls, kRecorder };
+
 struct Case {
   const char* name;
   Shape shape;
-  bool tcp, display;
+  bool tcp;
+  With with = With::kNothing;
 };
-constexpr Case kCases[] = {{"batch_unix", Shape::kBatch, false, false},
-                           {"batch_tcp", Shape::kBatch, true, false},
-                           {"batch_unix_display", Shape::kBatch, false, true},
-                           {"upsert_unix", Shape::kUpsert, false, false},
-                           {"upsert_unix_gathered", Shape::kUpsertGathered, false, false},
-                           {"memfd", Shape::kMemory, false, false},
-                           {"memfd_again", Shape::kMemoryAgain, false, false}};
+constexpr Case kCases[] = {{"batch_unix", Shape::kBatch, false},
+                           {"batch_tcp", Shape::kBatch, true},
+                           {"batch_unix_display", Shape::kBatch, false, With::kDisplay},
+                           {"upsert_unix", Shape::kUpsert, false},
+                           {"upsert_unix_gathered", Shape::kUpsertGathered, false},
+                           {"memfd", Shape::kMemory, false},
+                           {"memfd_again", Shape::kMemoryAgain, false},
+                           {"batch_tls", Shape::kBatch, true, With::kTls},
+                           {"batch_unix_recorded", Shape::kBatch, false, With::kRecorder}};
+
+// What the last two are measured beside is a daemon without it; all others, the bare sink.
+bool BesideAnotherDaemon(const Case& item) {
+  return item.with == With::kTls || item.with == With::kRecorder;
+}
+
+const char* UnitOfRatio(const Case& item) {
+  if (item.with == With::kTls) return "of plain TCP";
+  return item.with == With::kRecorder ? "of the same, not recorded" : "of the bare sink";
+}
 
 bool IsUpsert(Shape shape) { return shape == Shape::kUpsert || shape == Shape::kUpsertGathered; }
 
@@ -78,7 +95,7 @@ Frames UpsertFrames(LineForm form) {
 
 // Both ends' rates of one case, a second.
 struct Rates {
-  std::vector<double> daemon, sink, daemon_cores;
+  std::vector<double> daemon, beside, daemon_cores;
   double bytes_an_item = 0;
 };
 
@@ -112,17 +129,30 @@ class Ingest {
   LineForm form() const { return static_cast<LineForm>(options_.line_bytes); }
 
   absl::Status RunCase(const Case& item, nlohmann::json& report) {
-    DaemonOptions wanted{.program = with_.daemon};
-    if (item.display) wanted.displays = {absl::StrCat("sim=simulated,", options_.display)};
+    DaemonOptions wanted{.program = with_.daemon, .tls = item.with == With::kTls};
+    if (item.with == With::kDisplay) {
+      wanted.displays = {absl::StrCat("sim=simulated,", options_.display)};
+    }
     absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(wanted);
     if (!daemon.ok()) return daemon.status();
+    absl::StatusOr<std::unique_ptr<ServerProcess>> other;
+    if (BesideAnotherDaemon(item)) {
+      other = ServerProcess::StartDaemon({.program = with_.daemon});
+      if (!other.ok()) return other.status();
+    }
+    std::unique_ptr<Recorder> recorder;
+    if (item.with == With::kRecorder) {
+      absl::StatusOr<std::unique_ptr<Recorder>> started = Recorder::Start((*daemon)->unix_target());
+      if (!started.ok()) return started.status();
+      recorder = *std::move(started);
+    }
     const bool upserts = IsUpsert(item.shape);
     // For memory the sink gets what the daemon would without it.
     const Frames frames = upserts ? UpsertFrames(form()) : BatchFrames(options_.batch, form());
     const size_t message = frames[0][0].bytes();
     with_.progress(absl::StrFormat("ingest %s: messages of %d bytes", item.name, message));
     const absl::StatusOr<Rates> rates =
-        Alternate(item, **daemon, frames, options_.rounds, options_.seconds);
+        Alternate(item, **daemon, other.ok() ? other->get() : nullptr, frames);
     if (absl::IsUnimplemented(rates.status())) {
       with_.progress(absl::StrCat("ingest ", item.name, ": ", rates.status().message()));
       report["left_out"][item.name] = std::string(rates.status().message());
@@ -131,13 +161,18 @@ class Ingest {
     if (!rates.ok()) return rates.status();
     const std::string unit = upserts ? "upserts/s" : "lines/s", name = item.name;
     const Spread daemon_rate = SpreadOf(rates->daemon);
-    AddFigure(report, name + ".ratio", "of the bare sink", RatiosOf(rates->daemon, rates->sink));
+    AddFigure(report, name + ".ratio", UnitOfRatio(item), RatiosOf(rates->daemon, rates->beside));
     AddFigure(report, name + ".daemon", unit, daemon_rate);
-    AddFigure(report, name + ".sink", unit, SpreadOf(rates->sink));
+    AddFigure(report, name + (BesideAnotherDaemon(item) ? ".without" : ".sink"), unit,
+              SpreadOf(rates->beside));
     AddFigure(report, name + ".daemon_bytes", "MB/s",
               daemon_rate.median * rates->bytes_an_item / 1e6);
     AddFigure(report, name + ".daemon_cores", "cores", SpreadOf(rates->daemon_cores));
     report["message_bytes"][name] = message;
+    if (recorder == nullptr) return absl::OkStatus();
+    const absl::StatusOr<nlohmann::json> recorded = recorder->Stop();
+    if (!recorded.ok()) return recorded.status();
+    report["recorded"][name] = *recorded;
     return absl::OkStatus();
   }
 
@@ -147,7 +182,10 @@ class Ingest {
 
   absl::StatusOr<std::unique_ptr<Feed>> ToDaemon(const Case& item, const ServerProcess& daemon,
                                                  const Frames& frames) {
-    const std::string& target = item.tcp ? daemon.tcp_target() : daemon.unix_target();
+    const Target target =
+        daemon.tls_target().certificate.empty()
+            ? Target{item.tcp ? daemon.tcp_target() : daemon.unix_target(), {}, {}}
+            : daemon.tls_target();
     if (item.shape == Shape::kBatch || IsUpsert(item.shape)) {
       return FeedDaemon(loop_, target, frames, FlushOf(item));
     }
@@ -157,18 +195,22 @@ class Ingest {
       whole.push_back(Batch(variant, 0, kEntities, form()));
     }
     const MemoryUse use = item.shape == Shape::kMemory ? MemoryUse::kFresh : MemoryUse::kAgain;
-    return FeedMemory(loop_, target, whole, use);
+    return FeedMemory(loop_, target.address, whole, use);
   }
 
-  absl::StatusOr<Rates> Alternate(const Case& item, ServerProcess& daemon, const Frames& frames,
-                                  int rounds, double seconds) {
-    const auto duration = static_cast<sync::TimeNs>(seconds * sync::kSecond);
+  // `other`: the daemon that it is measured beside; null: the bare sink.
+  absl::StatusOr<Rates> Alternate(const Case& item, ServerProcess& daemon,
+                                  const ServerProcess* other, const Frames& frames) {
+    const auto duration = static_cast<sync::TimeNs>(options_.seconds * sync::kSecond);
     const double items =
         IsUpsert(item.shape) ? double{kEntities} : double{kEntities} * kLinesAnEntity;
     const absl::StatusOr<std::unique_ptr<Feed>> to_daemon = ToDaemon(item, daemon, frames);
     if (!to_daemon.ok()) return to_daemon.status();
-    const std::unique_ptr<Feed> to_sink = FeedSink(
-        loop_, item.tcp ? sink_->tcp_target() : sink_->unix_target(), frames, FlushOf(item));
+    absl::StatusOr<std::unique_ptr<Feed>> to_other =
+        other != nullptr ? ToDaemon(item, *other, frames)
+                         : FeedSink(loop_, item.tcp ? sink_->tcp_target() : sink_->unix_target(),
+                                    frames, FlushOf(item));
+    if (!to_other.ok()) return to_other.status();
     Rates rates;
     const auto round = [&](Feed& feed, std::vector<double>& out) -> absl::StatusOr<Fed> {
       const absl::StatusOr<Fed> fed = feed.Round(duration);
@@ -181,8 +223,11 @@ class Ingest {
     };
     std::vector<double> warm;
     if (auto fed = round(**to_daemon, warm); !fed.ok()) return fed.status();
-    for (int i = 0; i < rounds; ++i) {
-      if (auto fed = round(*to_sink, rates.sink); !fed.ok()) return fed.status();
+    if (other != nullptr) {
+      if (auto fed = round(**to_other, warm); !fed.ok()) return fed.status();
+    }
+    for (int i = 0; i < options_.rounds; ++i) {
+      if (auto fed = round(**to_other, rates.beside); !fed.ok()) return fed.status();
       const absl::StatusOr<int64_t> before = daemon.ProcessorNs();
       const absl::StatusOr<Fed> fed = round(**to_daemon, rates.daemon);
       if (!fed.ok()) return fed.status();

@@ -42,7 +42,13 @@ absl::StatusOr<std::unique_ptr<ServerProcess>> ServerProcess::StartDaemon(
   std::unique_ptr<ServerProcess> server(new ServerProcess(*std::move(folder)));
   const std::string& path = server->folder_.path();
   const std::string config = absl::StrCat(path, "/voxeld.toml");
-  std::ofstream(config) << "display = []\n" << options.config;
+  std::string security;
+  if (options.tls) {
+    absl::StatusOr<std::string> made = server->MakeCertificate();
+    if (!made.ok()) return made.status();
+    security = *std::move(made);
+  }
+  std::ofstream(config) << "display = []\n" << options.config << security;
   server->unix_target_ = absl::StrCat("unix:", path, "/voxeld.sock");
   std::vector<std::string> arguments = {
       options.program.empty() ? child::ProgramBeside("voxeld") : options.program,
@@ -51,7 +57,7 @@ absl::StatusOr<std::unique_ptr<ServerProcess>> ServerProcess::StartDaemon(
       "--listen",
       server->unix_target_,
       "--listen",
-      kAnyPort,
+      options.tls ? absl::StrCat("tls:", kAnyPort) : kAnyPort,
       "--http",
       "off",
       "--engine",
@@ -69,8 +75,31 @@ absl::StatusOr<std::unique_ptr<ServerProcess>> ServerProcess::StartDaemon(
   if (!ready.has_value()) return NotReady(arguments[0], *server->process_);
   const nlohmann::json line = nlohmann::json::parse(*ready, nullptr, false);
   const std::string listen = line.is_object() ? line.value("listen", "") : "";
-  server->tcp_target_ = listen.substr(listen.rfind(' ') + 1);
+  absl::string_view port = absl::string_view(listen).substr(listen.rfind(' ') + 1);
+  if (options.tls) {
+    absl::ConsumePrefix(&port, "tls:");
+    server->tls_target_ = {std::string(port), FileText(absl::StrCat(path, "/certificate.pem")),
+                           FileText(absl::StrCat(path, "/key.pem"))};
+  } else {
+    server->tcp_target_ = std::string(port);
+  }
   return server;
+}
+
+absl::StatusOr<std::string> ServerProcess::MakeCertificate() {
+  const std::string certificate = absl::StrCat(folder_.path(), "/certificate.pem");
+  const std::string key = absl::StrCat(folder_.path(), "/key.pem");
+  absl::StatusOr<std::unique_ptr<child::ChildProcess>> openssl = child::ChildProcess::Start(
+      {"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256",
+       "-nodes", "-days", "1", "-subj", "/CN=voxel-bench", "-addext", "subjectAltName=IP:127.0.0.1",
+       "-keyout", key, "-out", certificate});
+  if (!openssl.ok()) return openssl.status();
+  if ((*openssl)->Wait() != 0) {
+    return absl::UnavailableError(
+        absl::StrCat("openssl made no certificate; it said:\n", (*openssl)->output()));
+  }
+  return absl::StrCat("[security]\ntls_certificate = \"", certificate, "\"\ntls_key = \"", key,
+                      "\"\ncertificate_scopes = \"all\"\ntls_client_ca = \"", certificate, "\"\n");
 }
 
 absl::StatusOr<std::unique_ptr<ServerProcess>> ServerProcess::StartSink() {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "tools/bench/voxel_bench/wire.h"
 #include "tools/child/child_process.h"
 
 namespace voxeld::bench {
@@ -15,6 +16,7 @@ struct DaemonOptions {
   std::string program;                // empty: voxeld beside this program
   std::vector<std::string> displays;  // as of --display; empty: none at all
   std::string config;                 // more of the configuration file, from its first section on
+  bool tls = false;                   // on its port; by a certificate made for it (by openssl)
 };
 
 // One that serves on a unix socket and on a port of the system's choice; it ends with this object.
@@ -26,7 +28,8 @@ class ServerProcess {
   static absl::StatusOr<std::unique_ptr<ServerProcess>> StartSink();
 
   const std::string& unix_target() const { return unix_target_; }
-  const std::string& tcp_target() const { return tcp_target_; }
+  const std::string& tcp_target() const { return tcp_target_; }  // not of one with TLS
+  const Target& tls_target() const { return tls_target_; }
 
   // Of its memory that is resident; an error if it has ended.
   absl::StatusOr<uint64_t> ResidentBytes() const;
@@ -34,10 +37,14 @@ class ServerProcess {
   absl::StatusOr<int64_t> ProcessorNs() const;
 
  private:
+  // Into its folder. The section of the configuration that names the files.
+  absl::StatusOr<std::string> MakeCertificate();
+
   explicit ServerProcess(child::TemporaryFolder folder) : folder_(std::move(folder)) {}
 
   child::TemporaryFolder folder_;
   std::string unix_target_, tcp_target_;
+  Target tls_target_;
   std::unique_ptr<child::ChildProcess> process_;
 };
 

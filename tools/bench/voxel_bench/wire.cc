@@ -247,12 +247,17 @@ absl::Status Loop::RunTo(sync::TimeNs time) {
 
 // ------------------------------------------------------------------------------------- connection
 
-Connection::Connection(const std::string& target) {
+Connection::Connection(const Target& target) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  channel_ = grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
+  const std::shared_ptr<grpc::ChannelCredentials> credentials =
+      target.certificate.empty() ? grpc::InsecureChannelCredentials()
+                                 : grpc::SslCredentials({.pem_root_certs = target.certificate,
+                                                         .pem_private_key = target.key,
+                                                         .pem_cert_chain = target.certificate});
+  channel_ = grpc::CreateCustomChannel(target.address, credentials, arguments);
 }
 Connection::~Connection() = default;
 Connection::Connection(Connection&&) noexcept = default;

@@ -71,10 +71,17 @@ class Loop {
   std::unique_ptr<Impl> impl_;
 };
 
+// Where to, and over TLS, by what certificate: both ends', and the authority of both.
+struct Target {
+  std::string address;
+  std::string certificate, key;  // PEM; empty: no TLS
+};
+
 // A connection of its own, for any number of calls.
 class Connection {
  public:
-  explicit Connection(const std::string& target);
+  explicit Connection(const Target& target);
+  explicit Connection(const std::string& address) : Connection(Target{address, {}, {}}) {}
   ~Connection();
   Connection(Connection&&) noexcept;
   Connection& operator=(Connection&&) = delete;

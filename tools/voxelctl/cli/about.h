@@ -64,6 +64,16 @@ inline constexpr const char* kRecordAbout =
     "channel \"scene\"";
 inline constexpr const char* kReplayAbout =
     "Puts a recorded scene up again, at the pace at which it was, bit for bit; it goes at the end";
+inline constexpr const char* kInputAbout =
+    "Takes lights in from what feeds LED controllers, until Ctrl-C: PROTOCOL is opc (Open Pixel "
+    "Control), ddp,\n"
+    "e131 (sACN) or artnet. Light n is the display's own, if that is a lattice; else --size or "
+    "--layout says where it is.\n"
+    "The newest picture is shown; those that came too fast are counted, and told.";
+inline constexpr const char* kPipeAbout =
+    "Shows raw pictures from standard input, one after another: red, green and blue of each light, "
+    "a byte each,\n"
+    "x fastest, then y, then z.  makes-light | voxelctl pipe --size 16x16x16";
 inline constexpr const char* kTokenAbout =
     "Makes a token that shows who a client is (VOXELD_TOKEN), and its entry for the daemon's "
     "grants file; needs no daemon";

@@ -16,6 +16,7 @@
 #include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
+#include "tools/voxelctl/cli/light_options.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/cli/service_options.h"
@@ -58,6 +59,8 @@ class Parser {
     AddTokenOptions(Add("token", kTokenAbout), &token_);
     AddRecordOptions(Add("record", kRecordAbout), &record_);
     AddReplayOptions(Add("replay", kReplayAbout), &replay_);
+    input_texts_.Add(Add("input", kInputAbout));
+    pipe_texts_.Add(Add("pipe", kPipeAbout));
     Add("doctor", kDoctorAbout);
   }
 
@@ -337,6 +340,8 @@ class Parser {
     if (name == "token") FillInChecked(token_, CheckTokenOptions);
     if (name == "record") FillInChecked(record_, CheckRecordOptions);
     if (name == "replay") FillInChecked(replay_, CheckReplayOptions);
+    if (name == "input") options_.command = input_texts_.Read();
+    if (name == "pipe") options_.command = pipe_texts_.Read();
     if (name == "set") return FillInSet();
     if (name == "calibrate") {
       if (calibrate_.file.empty()) {
@@ -482,6 +487,8 @@ class Parser {
   TokenOptions token_;
   RecordOptions record_;
   ReplayOptions replay_;
+  InputArguments input_texts_;
+  PipeArguments pipe_texts_;
   std::string profile_action_;
   std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
   double duration_ = std::nan("");

@@ -1,12 +1,14 @@
 // What the command line says.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "tools/lights/datagram.h"
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/scene/look.h"
 #include "voxeld/credentials.h"
@@ -125,6 +127,30 @@ struct ReplayOptions {
   bool loop = false, step = false, keep = false;
 };
 
+// Which lights, and the layer that they are put into.
+struct LightsOptions {
+  std::optional<std::array<int, 3>> size;  // a box of them; else
+  std::string layout;                      // a layout of Open Pixel Control; else the display's own
+  std::string display;                     // empty: the first
+  std::string layer = "lights";
+};
+
+struct InputOptions {
+  lights::Protocol protocol = lights::Protocol::kOpc;
+  LightsOptions lights;
+  std::string listen;          // HOST:PORT
+  int32_t first_universe = 1;  // E1.31, Art-Net
+  int32_t a_channel = 0;       // lights of a channel of Open Pixel Control; 0: as many as there are
+  double gather_ms = 4;
+  bool multicast = false;  // E1.31
+};
+
+struct PipeOptions {
+  LightsOptions lights;
+  double fps = 0;  // 0: as they come
+  bool keep = false;
+};
+
 struct Options {
   std::string server;               // empty: see ChooseServer
   client::Credentials credentials;  // as given; see ChooseCredentials
@@ -132,7 +158,7 @@ struct Options {
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions, TokenOptions, RecordOptions, ReplayOptions>
+               InitOptions, TokenOptions, RecordOptions, ReplayOptions, InputOptions, PipeOptions>
       command;
 };
 

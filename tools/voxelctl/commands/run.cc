@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <iostream>
 #include <type_traits>
 
@@ -7,6 +9,7 @@
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/doctor/doctor.h"
 #include "tools/voxelctl/init/init.h"
+#include "tools/voxelctl/lights/lights.h"
 #include "tools/voxelctl/profile/profile.h"
 #include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/token/token.h"
@@ -67,6 +70,10 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
           return Record(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, ReplayOptions>)
           return Replay(command, connection, interrupt, std::cin, console);
+        if constexpr (std::is_same_v<Command, InputOptions>)
+          return Input(command, connection, interrupt, console);
+        if constexpr (std::is_same_v<Command, PipeOptions>)
+          return Pipe(command, connection, interrupt, STDIN_FILENO, console);
         return absl::OkStatus();
       },
       options.command);

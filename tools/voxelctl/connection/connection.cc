@@ -234,4 +234,11 @@ absl::StatusOr<std::unique_ptr<SceneSession>> Connection::OpenSession(client::Op
   return SceneSession::Open(std::move(options), impl_->interrupt());
 }
 
+absl::StatusOr<std::unique_ptr<client::Session>> Connection::OpenLastingSession(
+    client::Options options) {
+  options.address = impl_->address();
+  options.credentials = impl_->credentials();
+  return client::Session::Open(std::move(options));
+}
+
 }  // namespace voxeld::voxelctl

@@ -51,6 +51,8 @@ class Connection {
 
   // A session with this server, over a connection of its own.
   absl::StatusOr<std::unique_ptr<SceneSession>> OpenSession(client::Options options);
+  // The client's own, which opens a lost connection again; it begins to connect. For commands that stay.
+  absl::StatusOr<std::unique_ptr<client::Session>> OpenLastingSession(client::Options options);
 
  private:
   class Impl;

@@ -1,0 +1,10 @@
+// With a CPU for a GPU: not each of the engine's ways by itself. No device takes what would be compiled.
+#include "tests/conformance/cuda_cases.h"
+
+namespace voxeld::gpu::conformance {
+
+std::vector<EngineCase> EngineCases() {
+  return CudaCases("cuda_simt", true, cuda::CompileFormulas::kNever);
+}
+
+}  // namespace voxeld::gpu::conformance

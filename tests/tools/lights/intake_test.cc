@@ -1,0 +1,239 @@
+#include "tools/lights/intake.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "display/drivers/network/packets.h"
+
+namespace voxeld::lights {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using Bytes = std::vector<uint8_t>;
+
+constexpr sync::TimeNs kMs = sync::kMillisecond;
+
+Bytes Bytes3(size_t lights, uint8_t value) { return Bytes(lights * 3, value); }
+
+// Packets as this project's drivers send them: read here by code that shares none of theirs.
+class Sender {
+ public:
+  explicit Sender(display::network::StreamOptions options, int32_t pixels = 170)
+      : writer_(std::move(options), pixels) {}
+  Bytes Pixels(int32_t slice, const Bytes& rgb, bool last = false) {
+    return Plain(writer_.Pixels(slice, rgb, last));
+  }
+  Bytes Sync() { return Plain(writer_.Sync()); }
+  Bytes End(int32_t slice, const Bytes& rgb) { return Plain(writer_.End(slice, rgb)); }
+
+ private:
+  static Bytes Plain(const std::vector<std::byte>& bytes) {
+    Bytes out(bytes.size());
+    std::memcpy(out.data(), bytes.data(), bytes.size());
+    return out;
+  }
+  display::network::PacketWriter writer_;
+};
+
+display::network::StreamOptions E131Stream(uint8_t priority, uint8_t id, int32_t sync = 0) {
+  display::network::StreamOptions options;
+  options.protocol = Protocol::kE131;
+  options.priority = priority;
+  options.sync_universe = sync;
+  options.cid[0] = id;
+  return options;
+}
+
+void ExpectSound(const IntakeTally& in, const Intake& intake) {
+  EXPECT_EQ(in.messages, in.set + in.shows + in.ended + in.other + in.outside + in.outranked +
+                             in.stale + in.malformed);
+  EXPECT_EQ(in.pictures, in.taken + in.superseded + (intake.waiting() ? 1 : 0));
+}
+
+OpcReader::Message Opc(uint8_t channel, const Bytes& data, uint8_t command = 0) {
+  return {channel, command, data};
+}
+
+TEST(Intake, AnOpcMessageIsAPicture) {
+  Intake intake({.protocol = Protocol::kOpc, .lights = 2});
+  EXPECT_FALSE(intake.Take().has_value());
+  intake.AddMessage(Opc(0, {1, 2, 3}), 0);
+  EXPECT_THAT(*intake.Take(), ElementsAre(1, 2, 3, 0, 0, 0));
+  EXPECT_FALSE(intake.Take().has_value());
+  // More than there are: the rest is nobody's. Two: the second is shown.
+  intake.AddMessage(Opc(0, {9, 9, 9, 9, 9, 9, 9, 9, 9}), 0);
+  intake.AddMessage(Opc(0, {4, 5, 6, 7, 8, 9}), 0);
+  EXPECT_THAT(*intake.Take(), ElementsAre(4, 5, 6, 7, 8, 9));
+  EXPECT_EQ(intake.tally().superseded, 1u);
+  intake.AddMessage(Opc(0, {}), 0);
+  EXPECT_EQ(intake.tally().outside, 1u);
+  intake.AddMessage(Opc(0, {0, 1, 0, 2}, 255), 0);  // system exclusive
+  EXPECT_EQ(intake.tally().other, 1u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, OpcChannelsAreParts) {
+  Intake intake({.protocol = Protocol::kOpc, .lights = 4, .a_channel = 2, .gather_ns = 4 * kMs});
+  intake.AddMessage(Opc(1, Bytes3(2, 10)), 0);
+  EXPECT_EQ(intake.due(), 4 * kMs);
+  intake.AddMessage(Opc(2, Bytes3(5, 20)), 1 * kMs);  // three lights too many
+  intake.Tick(3 * kMs);
+  EXPECT_FALSE(intake.waiting());
+  intake.Tick(4 * kMs);
+  EXPECT_THAT(*intake.Take(), ElementsAre(10, 10, 10, 10, 10, 10, 20, 20, 20, 20, 20, 20));
+  // A part that comes again ends the picture before, which has none of it.
+  intake.AddMessage(Opc(1, Bytes3(2, 30)), 5 * kMs);
+  intake.AddMessage(Opc(1, Bytes3(2, 40)), 6 * kMs);
+  EXPECT_EQ((*intake.Take())[0], 30);
+  intake.AddMessage(Opc(3, Bytes3(2, 50)), 7 * kMs);
+  EXPECT_EQ(intake.tally().outside, 1u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, DdpShowsWhatIsPushed) {
+  display::network::StreamOptions stream;  // DDP
+  Sender sender(stream, 100);
+  Intake intake({.protocol = Protocol::kDdp, .lights = 200});
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(100, 1)), 0).ok());
+  EXPECT_FALSE(intake.waiting());
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(1, Bytes3(100, 2), true), 0).ok());
+  const auto picture = intake.Take();
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_THAT(picture->first(300), Each(1));
+  EXPECT_THAT(picture->subspan(300), Each(2));
+  // Without a push it is shown after a while.
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(100, 3)), 10 * kMs).ok());
+  intake.Tick(intake.due());
+  EXPECT_TRUE(intake.waiting());
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, CountsWhatIsLostByItsNumbers) {
+  display::network::StreamOptions stream;
+  Sender ddp(stream, 1);
+  Intake intake({.protocol = Protocol::kDdp, .lights = 1});
+  for (int i = 0; i < 100; ++i) {
+    const Bytes packet = ddp.Pixels(0, Bytes3(1, 1), true);
+    if (i % 10 == 5) continue;
+    ASSERT_TRUE(intake.AddDatagram(packet, 0).ok());
+  }
+  EXPECT_EQ(intake.tally().lost, 10u);
+  EXPECT_EQ(intake.tally().set, 90u);
+
+  stream.protocol = Protocol::kArtNet;
+  stream.first_universe = 0;
+  Sender artnet(stream, 170);
+  Intake universe({.protocol = Protocol::kArtNet, .lights = 170, .first_universe = 0});
+  for (int i = 0; i < 600; ++i) {
+    const Bytes packet = artnet.Pixels(0, Bytes3(170, 1));
+    if (i % 100 == 50) continue;
+    ASSERT_TRUE(universe.AddDatagram(packet, i * kMs).ok());
+  }
+  EXPECT_EQ(universe.tally().lost, 6u);
+  ExpectSound(universe.tally(), universe);
+}
+
+TEST(Intake, UniversesAreParts) {
+  Sender sender(E131Stream(100, 1));
+  Intake intake({.protocol = Protocol::kE131, .lights = 200});
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 1)), 0).ok());
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(1, Bytes3(170, 2)), 1 * kMs).ok());
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(2, Bytes3(170, 3)), 1 * kMs).ok());
+  EXPECT_EQ(intake.tally().outside, 1u);
+  // The next picture's first part comes before the gathering's end.
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 4)), 2 * kMs).ok());
+  const auto picture = intake.Take();
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_THAT(picture->first(510), Each(1));
+  EXPECT_THAT(picture->subspan(510), Each(2));
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, WaitsForSynchronisationWhereThereIsOne) {
+  Sender sender(E131Stream(100, 1, 7));
+  Intake intake({.protocol = Protocol::kE131, .lights = 340});
+  // Until the first has come nothing is waited for.
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 1)), 100 * sync::kSecond).ok());
+  EXPECT_EQ(intake.due(), 100 * sync::kSecond + 4 * kMs);
+  ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 100 * sync::kSecond).ok());
+  EXPECT_TRUE(intake.Take().has_value());
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(intake.AddDatagram(sender.Pixels(i, Bytes3(170, 2)), 101 * sync::kSecond).ok());
+  }
+  intake.Tick(101 * sync::kSecond + 100 * kMs);
+  EXPECT_FALSE(intake.waiting());
+  ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 101 * sync::kSecond + 200 * kMs).ok());
+  EXPECT_THAT(*intake.Take(), Each(2));
+  // When none comes any more, pictures go on without.
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 3)), 102 * sync::kSecond).ok());
+  intake.Tick(106 * sync::kSecond);
+  EXPECT_TRUE(intake.waiting());
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, TheHighestPriorityHasAUniverse) {
+  Sender low(E131Stream(90, 1)), high(E131Stream(110, 2));
+  Intake intake({.protocol = Protocol::kE131, .lights = 170, .gather_ns = 0});
+  const auto shown = [&](const Bytes& packet, sync::TimeNs now) {
+    EXPECT_TRUE(intake.AddDatagram(packet, now).ok());
+    intake.Tick(now);
+    const auto picture = intake.Take();
+    return picture ? (*picture)[0] : -1;
+  };
+  EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 1)), 0), 1);
+  EXPECT_EQ(shown(high.Pixels(0, Bytes3(170, 2)), 1 * kMs), 2);
+  EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 3)), 2 * kMs), -1);
+  EXPECT_EQ(intake.tally().outranked, 1u);
+  // It ends, or falls silent: the other one has it.
+  EXPECT_EQ(shown(high.End(0, Bytes3(170, 2)), 3 * kMs), -1);
+  EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 4)), 4 * kMs), 4);
+  EXPECT_EQ(shown(high.Pixels(0, Bytes3(170, 5)), 5 * kMs), 5);
+  EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 6)), 6 * kMs), -1);
+  EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 7)), 5 * kMs + Intake::kSourceLife + 1), 7);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, PassesOverWhatComesLate) {
+  Sender sender(E131Stream(100, 1));
+  Intake intake({.protocol = Protocol::kE131, .lights = 170});
+  std::vector<Bytes> packets;
+  for (int i = 0; i < 40; ++i) packets.push_back(sender.Pixels(0, Bytes3(170, uint8_t(i))));
+  ASSERT_TRUE(intake.AddDatagram(packets[5], 0).ok());
+  ASSERT_TRUE(intake.AddDatagram(packets[3], 0).ok());
+  EXPECT_EQ(intake.tally().stale, 1u);
+  ASSERT_TRUE(intake.AddDatagram(packets[30], 0).ok());
+  EXPECT_EQ(intake.tally().lost, 24u);
+  ASSERT_TRUE(intake.AddDatagram(packets[5], 0).ok());  // 25 behind: its sender began anew
+  EXPECT_EQ(intake.tally().stale, 1u);
+  EXPECT_EQ(intake.tally().set, 3u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, AccountsForWhateverComes) {
+  std::mt19937 random(3);
+  for (const Protocol protocol : {Protocol::kDdp, Protocol::kE131, Protocol::kArtNet}) {
+    display::network::StreamOptions stream = E131Stream(100, 1);
+    stream.protocol = protocol;
+    Sender sender(stream, 100);
+    Intake intake({.protocol = protocol, .lights = 250});
+    for (int i = 0; i < 50'000; ++i) {
+      Bytes packet = sender.Pixels(static_cast<int32_t>(random() % 4), Bytes3(100, 1), i % 4 == 0);
+      if (random() % 3 == 0) packet[random() % packet.size()] = static_cast<uint8_t>(random());
+      if (random() % 16 == 0) packet.resize(random() % packet.size());
+      intake.AddDatagram(packet, i * kMs).status().IgnoreError();
+      intake.Tick(i * kMs);
+      if (random() % 5 == 0) intake.Take();
+    }
+    EXPECT_EQ(intake.tally().messages, 50'000u);
+    EXPECT_GT(intake.tally().malformed, 0u);
+    EXPECT_FALSE(intake.malformed().ok());
+    ExpectSound(intake.tally(), intake);
+  }
+}
+
+}  // namespace
+}  // namespace voxeld::lights

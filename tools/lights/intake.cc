@@ -1,0 +1,181 @@
+#include "tools/lights/intake.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace voxeld::lights {
+namespace {
+
+constexpr size_t kUniverseBytes = size_t{display::network::kUniversePixels} * 3;
+// Most sources of a universe that are told apart.
+constexpr size_t kMostSources = 16;
+// After so long without a sync packet pictures are shown without one (Art-Net 4, ArtSync; E1.31 §6.2.4.2's time-out).
+constexpr sync::TimeNs kSyncLife = 4 * sync::kSecond;
+
+}  // namespace
+
+Intake::Intake(const IntakeOptions& options)
+    : options_(options), values_(options.lights * 3), picture_(options.lights * 3) {}
+
+absl::StatusOr<Datagram> Intake::AddDatagram(std::span<const uint8_t> packet, sync::TimeNs now) {
+  ++tally_.messages;
+  tally_.bytes += packet.size();
+  absl::StatusOr<Datagram> read = ReadDatagram(options_.protocol, packet);
+  if (!read.ok()) {
+    ++tally_.malformed;
+    malformed_ = read.status();
+    return read;
+  }
+  switch (read->kind) {
+    case Datagram::Kind::kLights:
+      AddLights(*read, now);
+      break;
+    case Datagram::Kind::kShow:
+      // Another synchronisation's is not this one's word.
+      if (options_.protocol == Protocol::kE131 && read->universe != sync_universe_) {
+        ++tally_.other;
+        break;
+      }
+      ++tally_.shows;
+      synchronised_ = options_.protocol == Protocol::kArtNet;
+      sync_heard_ns_ = now;
+      if (due_ != sync::kNever) Show();
+      break;
+    case Datagram::Kind::kEnd: {
+      ++tally_.ended;
+      const auto universe = sources_.find(read->universe);
+      if (universe != sources_.end()) universe->second.erase(read->source);
+      break;
+    }
+    case Datagram::Kind::kAsk:
+    case Datagram::Kind::kOther:
+      ++tally_.other;
+      break;
+  }
+  return read;
+}
+
+void Intake::AddLights(const Datagram& packet, sync::TimeNs now) {
+  if (options_.protocol == Protocol::kDdp) {
+    CountLost(packet.sequence, 0, 15);
+    const bool set = Set(static_cast<int64_t>(packet.first_byte), packet.first_byte, packet.values,
+                         packet.push ? More::kNo : More::kPerhaps, now + options_.gather_ns);
+    ++(set ? tally_.set : tally_.outside);
+    if (!set && packet.push && due_ != sync::kNever) Show();
+    return;
+  }
+  const int64_t index = int64_t{packet.universe} - options_.first_universe;
+  if (index < 0 || static_cast<uint64_t>(index) * kUniverseBytes >= values_.size()) {
+    ++tally_.outside;
+    return;
+  }
+  if (options_.protocol == Protocol::kE131) {
+    if (!TakesFrom(packet, now)) return;
+    sync_universe_ = packet.sync_universe;
+  } else {
+    CountLost(packet.sequence, packet.universe, 255);
+  }
+  // Where sync packets come, a picture waits for them; if they stop, for no longer than they may be apart.
+  const bool told = (synchronised_ || sync_universe_ != 0) && now - sync_heard_ns_ < kSyncLife;
+  const bool set = Set(packet.universe, static_cast<size_t>(index) * kUniverseBytes,
+                       packet.values.first(std::min(packet.values.size(), kUniverseBytes)),
+                       told ? More::kTold : More::kPerhaps,
+                       told ? sync_heard_ns_ + kSyncLife : now + options_.gather_ns);
+  ++(set ? tally_.set : tally_.outside);  // not set: a packet of no values
+}
+
+bool Intake::TakesFrom(const Datagram& packet, sync::TimeNs now) {
+  std::map<SourceKey, Source>& sources = sources_[packet.universe];
+  std::erase_if(sources,
+                [now](const auto& source) { return now - source.second.heard_ns > kSourceLife; });
+  if (sources.size() >= kMostSources && !sources.contains(packet.source)) {
+    ++tally_.outranked;
+    return false;
+  }
+  Source& source = sources[packet.source];
+  source.heard_ns = now;
+  source.priority = packet.priority;
+  const std::optional<uint8_t> before = std::exchange(source.sequence, packet.sequence);
+  if (before.has_value()) {
+    // §6.7.2: up to 20 numbers behind, it is late; farther behind, its sender has begun anew.
+    const auto ahead = static_cast<int8_t>(*packet.sequence - *before);
+    if (ahead <= 0 && ahead > -20) {
+      source.sequence = before;
+      ++tally_.stale;
+      return false;
+    }
+    if (ahead > 1) tally_.lost += static_cast<uint64_t>(ahead - 1);
+  }
+  for (const auto& [key, other] : sources) {
+    if (other.priority <= packet.priority) continue;
+    ++tally_.outranked;
+    return false;
+  }
+  return true;
+}
+
+void Intake::CountLost(std::optional<uint8_t> sequence, int32_t of, int numbers) {
+  if (!sequence.has_value()) return;
+  const auto [at, fresh] = sequences_.try_emplace(of, *sequence);
+  if (!fresh) {
+    // Numbers run from 1 to `numbers`. One that comes out of turn is not told from one that starts anew.
+    const int ahead = (*sequence - at->second + numbers) % numbers;
+    if (ahead > 1 && ahead <= numbers / 2) tally_.lost += static_cast<uint64_t>(ahead - 1);
+    at->second = *sequence;
+  }
+}
+
+void Intake::AddMessage(const OpcReader::Message& message, sync::TimeNs now) {
+  ++tally_.messages;
+  tally_.bytes += display::network::opc::kHeader + message.data.size();
+  if (message.command != display::network::opc::kSetPixels) {
+    ++tally_.other;
+    return;
+  }
+  const size_t lights = options_.a_channel == 0 ? options_.lights : options_.a_channel;
+  const size_t first = message.channel == 0 ? 0 : (message.channel - size_t{1}) * lights;
+  std::span<const uint8_t> values = message.data;
+  // What is more than a channel has is nobody's.
+  if (message.channel != 0) values = values.first(std::min(values.size(), lights * 3));
+  // A message for all is a picture; of those for channels, each is a part.
+  const bool all = message.channel == 0 || options_.a_channel == 0;
+  const bool set = Set(message.channel, first * 3, values, all ? More::kNo : More::kPerhaps,
+                       now + options_.gather_ns);
+  ++(set ? tally_.set : tally_.outside);
+}
+
+bool Intake::Set(int64_t part, size_t first_byte, std::span<const uint8_t> values, More more,
+                 sync::TimeNs until) {
+  if (values.empty() || first_byte >= values_.size()) return false;
+  if (more != More::kTold && parts_.contains(part)) Show();  // it begins the next
+  const size_t count = std::min(values.size(), values_.size() - first_byte);
+  std::copy_n(values.begin(), count, values_.begin() + static_cast<std::ptrdiff_t>(first_byte));
+  if (more == More::kNo) {
+    Show();
+    return true;
+  }
+  parts_.insert(part);
+  if (due_ == sync::kNever || more == More::kTold) due_ = until;
+  return true;
+}
+
+void Intake::Tick(sync::TimeNs now) {
+  if (due_ != sync::kNever && now >= due_) Show();
+}
+
+void Intake::Show() {
+  due_ = sync::kNever;
+  parts_.clear();
+  ++tally_.pictures;
+  if (waiting_) ++tally_.superseded;
+  waiting_ = true;
+  picture_ = values_;
+}
+
+std::optional<std::span<const uint8_t>> Intake::Take() {
+  if (!std::exchange(waiting_, false)) return std::nullopt;
+  ++tally_.taken;
+  return std::span<const uint8_t>(picture_);
+}
+
+}  // namespace voxeld::lights

@@ -1,0 +1,194 @@
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "display/sync/clock.h"
+#include "display/sync/mutex.h"
+#include "tools/lights/intake.h"
+#include "tools/lights/receiver.h"
+#include "tools/voxelctl/lights/choose_lights.h"
+#include "tools/voxelctl/lights/lights.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr sync::TimeNs kRoomEvery =
+    sync::kMillisecond;  // how often it is asked for, while a picture waits
+constexpr sync::TimeNs kTellEvery = sync::kSecond;
+constexpr std::chrono::seconds kOpenTime(15);
+
+const char* NameOf(lights::Protocol protocol) {
+  switch (protocol) {
+    case lights::Protocol::kDdp:
+      return "DDP";
+    case lights::Protocol::kE131:
+      return "E1.31";
+    case lights::Protocol::kArtNet:
+      return "Art-Net";
+    case lights::Protocol::kOpc:
+      break;
+  }
+  return "Open Pixel Control";
+}
+
+// What the session's own thread says.
+class Ending {
+ public:
+  void Told(const client::ConnectionChange& change) {
+    if (change.kind != client::ConnectionChange::Kind::kEnded) return;
+    const sync::MutexLock lock(mutex_);
+    status_ =
+        change.status.ok() ? absl::UnavailableError("the server ended the session") : change.status;
+    ended_.store(true);
+  }
+  bool ended() const { return ended_.load(); }
+  absl::Status status() const {
+    const sync::MutexLock lock(mutex_);
+    return status_;
+  }
+
+ private:
+  mutable sync::Mutex mutex_;
+  absl::Status status_ VOXELD_GUARDED_BY(mutex_);
+  std::atomic<bool> ended_ = false;
+};
+
+nlohmann::ordered_json TallyJson(const lights::Intake& intake, const lights::Receiver& receiver,
+                                 const client::Tally& session) {
+  const lights::IntakeTally& in = intake.tally();
+  const lights::ReceiverTally peers = receiver.tally();
+  return {{"event", "tally"},
+          {"messages", in.messages},
+          {"set", in.set},
+          {"shows", in.shows},
+          {"ended", in.ended},
+          {"other", in.other},
+          {"outside", in.outside},
+          {"outranked", in.outranked},
+          {"stale", in.stale},
+          {"malformed", in.malformed},
+          {"malformed_last", std::string(intake.malformed().message())},
+          {"lost", in.lost},
+          {"bytes", in.bytes},
+          {"pictures", in.pictures},
+          {"superseded", in.superseded},
+          {"waiting", intake.waiting() ? 1 : 0},
+          {"committed", in.taken},
+          {"accepted", session.accepted},
+          {"refused", session.refused},
+          {"connections", peers.connections},
+          {"connections_refused", peers.refused},
+          {"connections_cut_off", peers.cut_off},
+          {"connections_open", peers.open}};
+}
+
+std::string TallyText(const lights::IntakeTally& in) {
+  std::string text = absl::StrFormat("%d messages, %d pictures: %d put up, %d superseded",
+                                     in.messages, in.pictures, in.taken, in.superseded);
+  for (const auto& [count, what] :
+       {std::pair{in.lost, "lost"}, std::pair{in.malformed, "malformed"},
+        std::pair{in.outside, "for lights that are not there"},
+        std::pair{in.outranked, "of lower priority"}, std::pair{in.stale, "late"}}) {
+    if (count > 0) absl::StrAppend(&text, ", ", count, " ", what);
+  }
+  return text;
+}
+
+}  // namespace
+
+absl::Status Input(const InputOptions& options, Connection& connection, Interrupt& interrupt,
+                   Console& console) {
+  const absl::StatusOr<LightMap> map = ChooseLights(options.lights, connection);
+  if (!map.ok()) return map.status();
+  sync::SystemClock clock;
+  lights::IntakeOptions wanted;
+  wanted.protocol = options.protocol;
+  wanted.lights = map->lights;
+  wanted.first_universe = options.first_universe;
+  wanted.a_channel = static_cast<size_t>(options.a_channel);
+  wanted.gather_ns = static_cast<sync::TimeNs>(options.gather_ms * sync::kMillisecond);
+  lights::Intake intake(wanted);
+  absl::StatusOr<std::unique_ptr<lights::Receiver>> opened = lights::Receiver::Open(
+      {.listen = options.listen, .multicast = options.multicast}, wanted, intake, clock);
+  if (!opened.ok()) {
+    return {opened.status().code(), EscapeForTerminal(opened.status().message())};
+  }
+  lights::Receiver& receiver = **opened;
+
+  Ending ending;
+  client::Options asked;
+  asked.client_name = absl::StrCat("voxelctl input ", NameOf(options.protocol));
+  asked.flow = client::Flow::kLatest;
+  asked.outcomes = false;
+  asked.on_connection = [&ending](const client::ConnectionChange& change) { ending.Told(change); };
+  absl::StatusOr<std::unique_ptr<client::Session>> session =
+      connection.OpenLastingSession(std::move(asked));
+  if (!session.ok()) return session.status();
+  const int listener = interrupt.AddListener([&] {
+    (*session)->Interrupt();
+    receiver.Wake();
+  });
+  const absl::Cleanup no_listener = [&] { interrupt.RemoveListener(listener); };
+  if (absl::Status open = (*session)->WaitOpened(kOpenTime); !open.ok()) {
+    return {open.code(), EscapeForTerminal(open.message())};
+  }
+  const client::Layer layer = (*session)->GetLayer(options.lights.layer);
+  if (console.json()) {
+    console.Data(nlohmann::ordered_json{{"event", "ready"},
+                                        {"protocol", NameOf(options.protocol)},
+                                        {"listen", receiver.address()},
+                                        {"groups", receiver.tally().groups},
+                                        {"lights", map->lights}}
+                     .dump() +
+                 "\n");
+  } else {
+    console.Say(absl::StrCat("takes ", NameOf(options.protocol), " on ", receiver.address(),
+                             " for ", map->where, "; Ctrl-C ends it"));
+  }
+
+  const auto tell = [&] {
+    if (!console.json()) return console.Progress(TallyText(intake.tally()));
+    console.Data(TallyJson(intake, receiver, (*session)->GetTally()).dump() + "\n");
+  };
+  sync::TimeNs tell_at = clock.Now() + kTellEvery;
+  absl::Status status;
+  while (status.ok() && !interrupt.requested() && !ending.ended()) {
+    const sync::TimeNs now = clock.Now();
+    const sync::TimeNs next =
+        std::min({intake.due(), tell_at, intake.waiting() ? now + kRoomEvery : sync::kNever});
+    receiver.Run(std::max<sync::TimeNs>(0, next - now));
+    intake.Tick(clock.Now());
+    if (intake.waiting() && (*session)->HasRoom()) {
+      status =
+          layer.Put("lights", map->Picture(*intake.Take()), {.transform = map->transform}).status();
+      if (status.ok()) status = (*session)->Commit().status();
+    }
+    if (clock.Now() >= tell_at) {
+      tell();
+      tell_at = clock.Now() + kTellEvery;
+    }
+  }
+  console.EndProgress();
+  if (status.ok() && ending.ended()) status = ending.status();
+  const client::Tally tally = (*session)->GetTally();
+  if (status.ok() && tally.refused > 0 && !tally.issues.empty()) {
+    status = absl::FailedPreconditionError(client::DescribeIssue(tally.issues.front()));
+  }
+  const absl::Status closed = (*session)->Close();
+  if (status.ok()) status = closed;
+  if (console.json()) {
+    tell();
+  } else {
+    console.Say(TallyText(intake.tally()));
+  }
+  return {status.code(), EscapeForTerminal(status.message())};
+}
+
+}  // namespace voxeld::voxelctl
