@@ -77,6 +77,53 @@ TEST(CommandLine, Verify) {
   EXPECT_THAT(none.err, HasSubstr("voxlink,serial=A1"));
 }
 
+TEST(CommandLine, Input) {
+  const auto input = std::get<InputOptions>(
+      Parse("input e131 --universe 7 --size 16x8x4 --multicast --gather 2.5 --layer fire").command);
+  EXPECT_EQ(input.protocol, lights::Protocol::kE131);
+  EXPECT_EQ(input.first_universe, 7);
+  EXPECT_THAT(*input.lights.size, ElementsAre(16, 8, 4));
+  EXPECT_TRUE(input.multicast);
+  EXPECT_EQ(input.gather_ms, 2.5);
+  EXPECT_EQ(input.lights.layer, "fire");
+  EXPECT_EQ(input.listen, "0.0.0.0:5568");
+  const auto opc = std::get<InputOptions>(Parse("input opc --per-channel 64").command);
+  EXPECT_EQ(opc.listen, "127.0.0.1:7890");
+  EXPECT_EQ(opc.a_channel, 64);
+  EXPECT_FALSE(opc.lights.size.has_value());
+  EXPECT_EQ(std::get<InputOptions>(Parse("input e131").command).first_universe, 1);
+  const auto artnet = std::get<InputOptions>(Parse("input artnet --listen 0.0.0.0:99").command);
+  EXPECT_EQ(artnet.first_universe, 0);
+  EXPECT_EQ(artnet.listen, "0.0.0.0:99");
+  EXPECT_EQ(std::get<InputOptions>(Parse("input ddp").command).listen, "127.0.0.1:4048");
+  const std::vector<std::pair<const char*, const char*>> wrong = {
+      {"input", "wants a PROTOCOL"},
+      {"input opcc", "PROTOCOL opcc is not known"},
+      {"input opc --universe 1", "--universe is for e131 and artnet"},
+      {"input e131 --universe 0", "--universe 0; e131 has 1 to 63999"},
+      {"input artnet --universe 40000", "artnet has 0 to 32767"},
+      {"input ddp --per-channel 2", "--per-channel is for opc"},
+      {"input artnet --multicast", "--multicast is for e131"},
+      {"input opc --size 4x4", "--size 4x4 is no box of lights, such as 16x16x16"},
+      {"input opc --size 4x4x0", "no box of lights"},
+      {"pipe --size 4x4x4 --layout a.json", "--size and --layout do not go together"}};
+  for (const auto& [line, words] : wrong) {
+    const ParsedCommandLine parsed = ParseCommandLine(Split(line));
+    EXPECT_EQ(parsed.exit_code, kExitUsage) << line;
+    EXPECT_THAT(parsed.err, HasSubstr(words));
+  }
+}
+
+TEST(CommandLine, Pipe) {
+  const auto pipe =
+      std::get<PipeOptions>(Parse("pipe --layout a.json --display d --fps 30 --keep").command);
+  EXPECT_EQ(pipe.lights.layout, "a.json");
+  EXPECT_EQ(pipe.lights.display, "d");
+  EXPECT_EQ(pipe.lights.layer, "lights");
+  EXPECT_EQ(pipe.fps, 30);
+  EXPECT_TRUE(pipe.keep);
+}
+
 TEST(CommandLine, AFileMayBeCalledLikeACommandOrAnOption) {
   EXPECT_THAT(std::get<PlayOptions>(Parse("play stats").command).files, ElementsAre("stats"));
   EXPECT_THAT(std::get<PlayOptions>(Parse("play -- --spin").command).files, ElementsAre("--spin"));
