@@ -9,7 +9,6 @@
 #include <future>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,12 +31,12 @@
 #include "daemon/pipeline/view.h"
 #include "daemon/process/process.h"
 #include "daemon/process/supervisor.h"
+#include "daemon/services/health_watch.h"
 #include "daemon/services/server.h"
 #include "daemon/state/kept_state.h"
 #include "daemon/version/version.h"
 #include "display/drivers/registry.h"
 #include "display/sync/clock.h"
-#include "display/sync/mutex.h"
 #include "display/usb/libusb/libusb_bus.h"
 #include "gpu/worker/worker_pool.h"
 
@@ -120,43 +119,6 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
   return none;
 }
 
-// Logs what becomes of engines, and has health say so while a display's last volume is held.
-class EngineWatch {
- public:
-  explicit EngineWatch(Logger& log) : log_(log) {}
-
-  // Null: nobody is to be told. Thread-safe, as is OnEvent.
-  void Tell(services::Server* server) {
-    sync::MutexLock lock(mutex_);
-    server_ = server;
-    if (server_ != nullptr) server_->SetServing(held_.empty());
-  }
-
-  void OnEvent(const EngineEvent& event) {
-    const char* what = EngineEventName(event.what);
-    if (event.what == EngineEvent::What::kTookOver || event.what == EngineEvent::What::kReturned) {
-      const double ms = static_cast<double>(event.took_ns) / sync::kMillisecond;
-      log_.Info(what, {{"display", event.display},
-                       {"took_ms", absl::StrFormat("%.1f", ms)},
-                       {"was_lost", event.why}});
-    } else {
-      log_.Warn(what, {{"display", event.display}, {"why", event.why}});
-    }
-    sync::MutexLock lock(mutex_);
-    if (event.what == EngineEvent::What::kHolding) held_.insert(event.display);
-    if (event.what == EngineEvent::What::kTookOver || event.what == EngineEvent::What::kNotHeld) {
-      held_.erase(event.display);
-    }
-    if (server_ != nullptr) server_->SetServing(held_.empty());
-  }
-
- private:
-  Logger& log_;
-  sync::Mutex mutex_;
-  std::set<std::string> held_ VOXELD_GUARDED_BY(mutex_);
-  services::Server* server_ VOXELD_GUARDED_BY(mutex_) = nullptr;
-};
-
 void LogDisplays(Core& core, Logger& log) {
   std::promise<absl::StatusOr<Stats>> promise;
   core.GetStats([&promise](absl::StatusOr<Stats> stats) { promise.set_value(std::move(stats)); });
@@ -219,18 +181,14 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
     if (!state.ok()) return Fail(1, state.status());
     kept = *std::move(state);
   }
-  EngineWatch watch(log);
+  services::HealthWatch watch(log);
   const auto counters = std::make_shared<listen::Counters>();
   Core core({.limits = config.limits,
              .version = Version(),
-             .engine_event = [&watch](const EngineEvent& event) { watch.OnEvent(event); },
+             .engine_event = [&watch](const EngineEvent& event) { watch.OnEngine(event); },
              .state_event =
-                 [&log](const std::string& display, display::DisplayState state,
-                        const std::string& reason) {
-                   const bool lost = state == display::DisplayState::kLost;
-                   log.Log(lost ? Logger::Level::kWarn : Logger::Level::kInfo,
-                           DisplayStateName(state), {{"display", display}, {"why", reason}});
-                 },
+                 [&watch](const std::string& display, display::DisplayState state,
+                          const std::string& reason) { watch.OnDisplay(display, state, reason); },
              .state = kept == nullptr ? nullptr : kept->sink(),
              .state_figures =
                  [kept = kept.get()] { return kept == nullptr ? StateFigures() : kept->figures(); },
@@ -318,7 +276,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
   auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval,
                                                  [&security] { security->Look(); });
 
-  watch.Tell(server->get());
+  watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
 
   log.Info("voxeld",
            {{"version", Version()}, {"config", config.file.empty() ? "defaults" : config.file}});
@@ -410,6 +368,7 @@ int Main(int argc, char** argv) {
   }
 
   Logger log(*level, *format);
+  log.LimitEach(config->log.max_lines_per_second, clock);
   return Serve(*config, *std::move(displays), signals, clock, supervisor, log);
 }
 

@@ -82,9 +82,10 @@ struct EngineConfig {
 };
 
 struct LogConfig {
-  std::string level = "info";   // trace, debug, info, warn, error, off
-  std::string format = "text";  // text, json
-  std::string audit;            // a file for who did what; empty: the log
+  std::string level = "info";           // trace, debug, info, warn, error, off
+  std::string format = "text";          // text, json
+  std::string audit;                    // a file for who did what; empty: the log
+  uint32_t max_lines_per_second = 100;  // of one event; 0: any number
 };
 
 struct StateConfig {

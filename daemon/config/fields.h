@@ -82,6 +82,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Choice("level", config.log.level, {"trace", "debug", "info", "warn", "error", "off"});
   visitor.Choice("format", config.log.format, {"text", "json"});
   visitor.Text("audit", config.log.audit);
+  visitor.Integer("max_lines_per_second", config.log.max_lines_per_second, 0, 1000000);
 
   auto& security = config.security;
   visitor.Section("security");

@@ -56,18 +56,21 @@ std::string TextValue(std::string_view text) {
   return absl::StrCat("\"", absl::CHexEscape(View(text)), "\"");
 }
 
-std::string LineOf(Logger::Format format, std::string_view event, Logger::Fields fields) {
+std::string LineOf(Logger::Format format, std::string_view event, Logger::Fields fields,
+                   uint64_t left_out = 0) {
   std::string line;
   if (format == Logger::Format::kJson) {
     line = absl::StrCat("\"event\":", JsonText(event));
     for (const LogField& field : fields) {
       absl::StrAppend(&line, ",", JsonText(field.key), ":", JsonText(field.value));
     }
+    if (left_out > 0) absl::StrAppend(&line, ",\"lines_left_out\":\"", left_out, "\"");
   } else {
     line = std::string(event);
     for (const LogField& field : fields) {
       absl::StrAppend(&line, " ", View(field.key), "=", TextValue(field.value));
     }
+    if (left_out > 0) absl::StrAppend(&line, " lines_left_out=", left_out);
   }
   return line;
 }
@@ -104,9 +107,35 @@ absl::StatusOr<Logger::Format> Logger::ParseFormat(std::string_view text) {
       absl::StrCat("the log format \"", View(text), "\" is not text or json"));
 }
 
+void Logger::LimitEach(uint32_t lines_per_second, sync::Clock& clock) {
+  lines_per_second_ = lines_per_second;
+  clock_ = lines_per_second == 0 ? nullptr : &clock;
+}
+
+bool Logger::TakeShare(std::string_view event, uint64_t* left_out) {
+  const sync::MutexLock lock(mutex_);
+  const sync::TimeNs now = clock_->Now();
+  auto at = shares_.find(event);
+  if (at == shares_.end()) at = shares_.emplace(event, Share{.since = now}).first;
+  Share& share = at->second;
+  if (now - share.since >= sync::kSecond) {
+    share.since = now;
+    share.lines = 0;
+  }
+  if (share.lines >= lines_per_second_) {
+    ++share.left_out;
+    return false;
+  }
+  ++share.lines;
+  *left_out = std::exchange(share.left_out, 0);
+  return true;
+}
+
 void Logger::Log(Level level, std::string_view event, Fields fields) {
   if (!logger_->should_log(ToSpdlog(level))) return;
-  const std::string line = LineOf(format_, event, fields);
+  uint64_t left_out = 0;
+  if (clock_ != nullptr && !TakeShare(event, &left_out)) return;
+  const std::string line = LineOf(format_, event, fields, left_out);
   logger_->log(ToSpdlog(level), spdlog::string_view_t(line.data(), line.size()));
 }
 

@@ -1,17 +1,22 @@
 // Structured logs on stderr: an event and its fields, as text or as a JSON object, one a line.
 // Whatever comes from clients and devices is escaped, so that a line is always one line. A reader
-// that does not read holds nobody up: lines are left out then, and a later one says how many.
+// that does not read holds nobody up: lines are left out then, and a later one says how many. So they are
+// where one event comes more often than a limit.
 //
 //   text  2026-01-31T12:00:00.000+0000 info session opened session=3 client="a \"b\""
 //   json  {"time":"…","level":"info","event":"session opened","session":"3","client":"a \"b\""}
 #pragma once
 
+#include <functional>
 #include <initializer_list>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
 
 #include "absl/status/statusor.h"
+#include "display/sync/clock.h"
+#include "display/sync/mutex.h"
 
 namespace spdlog {
 class logger;
@@ -41,6 +46,10 @@ class Logger {
   Logger(const Logger&) = delete;
   Logger& operator=(const Logger&) = delete;
 
+  // From now on at most so many lines a second of one event; the next one of it that is written has `lines_left_out`.
+  // 0: any number. `clock` outlives the logger. To be called before others log.
+  void LimitEach(uint32_t lines_per_second, sync::Clock& clock);
+
   // "trace" … "off", "text", "json"; InvalidArgument lists them.
   static absl::StatusOr<Level> ParseLevel(std::string_view text);
   static absl::StatusOr<Format> ParseFormat(std::string_view text);
@@ -53,7 +62,19 @@ class Logger {
   void Error(std::string_view event, Fields fields = {}) { Log(Level::kError, event, fields); }
 
  private:
+  struct Share {
+    sync::TimeNs since = 0;
+    uint32_t lines = 0;
+    uint64_t left_out = 0;
+  };
+  // Events are the program's own words, so there are not many.
+  bool TakeShare(std::string_view event, uint64_t* left_out) VOXELD_EXCLUDES(mutex_);
+
   const Format format_;
+  sync::Clock* clock_ = nullptr;  // null: no limit
+  uint32_t lines_per_second_ = 0;
+  sync::Mutex mutex_;
+  std::map<std::string, Share, std::less<>> shares_ VOXELD_GUARDED_BY(mutex_);
   const std::unique_ptr<spdlog::logger> logger_;
 };
 

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "display/sync/fake_clock.h"
+
 namespace voxeld::daemon {
 namespace {
 
@@ -51,6 +53,33 @@ TEST(Logger, JsonIsAnObjectALine) {
   EXPECT_EQ(line["event"], "failed");
   EXPECT_EQ(line["why"], "a \"b\"\n2026 error fake=1 \x1b[31m\xEF\xBF\xBD é");
   EXPECT_TRUE(line.contains("time"));
+}
+
+TEST(Logger, OneEventDoesNotDrownTheOthers) {
+  sync::FakeClock clock;
+  for (const Logger::Format format : {Logger::Format::kText, Logger::Format::kJson}) {
+    Lines lines(Logger::Level::kInfo, format);
+    lines.logger.LimitEach(2, clock);
+    const auto count = [&lines] {
+      const std::string text = lines.Take();
+      return std::count(text.begin(), text.end(), '\n');
+    };
+    for (int i = 0; i < 1000; ++i) lines.logger.Info("often", {{"i", std::to_string(i)}});
+    EXPECT_EQ(count(), 2);
+    lines.logger.Info("seldom");
+    EXPECT_EQ(count(), 1);
+    clock.Advance(sync::kSecond);
+    lines.logger.Info("often");
+    const std::string line = lines.Take();
+    EXPECT_THAT(line,
+                testing::HasSubstr(format == Logger::Format::kJson ? R"("lines_left_out":"998")"
+                                                                   : "lines_left_out=998"));
+    lines.logger.Info("often");
+    EXPECT_THAT(lines.Take(), testing::Not(testing::HasSubstr("left_out")));
+    lines.logger.LimitEach(0, clock);
+    for (int i = 0; i < 1000; ++i) lines.logger.Info("often");
+    EXPECT_EQ(count(), 1000);
+  }
 }
 
 TEST(Logger, LevelsFilter) {

@@ -1,0 +1,37 @@
+// What health answers for: that every display is there, and is drawn for. It tells the log too.
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+
+#include "daemon/log/logger.h"
+#include "daemon/pipeline/engine_event.h"
+#include "display/api/outcome.h"
+#include "display/sync/mutex.h"
+
+namespace voxeld::daemon::services {
+
+// Thread-safe.
+class HealthWatch {
+ public:
+  explicit HealthWatch(Logger& log) : log_(log) {}
+
+  // Called at once, and with every change: false while a display is lost, or its last volume is held since nothing is
+  // drawn. It must not call back. Null: nobody is to be told any more; returns when no call is in progress.
+  void Tell(std::function<void(bool serving)> tell);
+
+  void OnEngine(const EngineEvent& event);
+  void OnDisplay(const std::string& display, display::DisplayState state,
+                 const std::string& reason);
+
+ private:
+  void Changed() VOXELD_REQUIRES(mutex_);
+
+  Logger& log_;
+  sync::Mutex mutex_;
+  std::set<std::string> lost_ VOXELD_GUARDED_BY(mutex_), held_ VOXELD_GUARDED_BY(mutex_);
+  std::function<void(bool)> tell_ VOXELD_GUARDED_BY(mutex_);
+};
+
+}  // namespace voxeld::daemon::services

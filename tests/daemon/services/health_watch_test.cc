@@ -1,0 +1,57 @@
+#include "daemon/services/health_watch.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <optional>
+
+namespace voxeld::daemon::services {
+namespace {
+
+using display::DisplayState;
+using What = EngineEvent::What;
+
+class HealthWatchTest : public ::testing::Test {
+ protected:
+  Logger log_{Logger::Level::kOff, Logger::Format::kText};
+  HealthWatch watch_{log_};
+  std::optional<bool> serving_;
+};
+
+TEST_F(HealthWatchTest, IsOfEveryDisplay) {
+  watch_.Tell([this](bool serving) { serving_ = serving; });
+  EXPECT_EQ(serving_, true);
+  watch_.OnDisplay("a", DisplayState::kShowing, "");
+  watch_.OnDisplay("b", DisplayState::kLost, "unplugged");
+  EXPECT_EQ(serving_, false);
+  watch_.OnDisplay("a", DisplayState::kShowing, "");
+  EXPECT_EQ(serving_, false);
+  watch_.OnDisplay("b", DisplayState::kAttaching, "");  // not back yet
+  EXPECT_EQ(serving_, false);
+  watch_.OnDisplay("b", DisplayState::kShowing, "");
+  EXPECT_EQ(serving_, true);
+  watch_.OnDisplay("b", DisplayState::kLost, "");
+  watch_.OnDisplay("b", DisplayState::kBlanked, "");
+  EXPECT_EQ(serving_, true);
+}
+
+TEST_F(HealthWatchTest, IsOfWhatIsDrawnToo) {
+  watch_.OnEngine({"a", What::kLost, "hung"});
+  watch_.OnEngine({"a", What::kHolding, "hung"});
+  watch_.Tell([this](bool serving) { serving_ = serving; });
+  EXPECT_EQ(serving_, false);  // as it is, not as it was when somebody began to listen
+  watch_.OnDisplay("a", DisplayState::kLost, "unplugged");
+  watch_.OnEngine({"a", What::kTookOver, "hung", 5});
+  EXPECT_EQ(serving_, false);
+  watch_.OnDisplay("a", DisplayState::kShowing, "");
+  EXPECT_EQ(serving_, true);
+  watch_.OnEngine({"a", What::kHolding, ""});
+  watch_.OnEngine({"a", What::kNotHeld, ""});
+  EXPECT_EQ(serving_, true);
+  watch_.Tell(nullptr);
+  watch_.OnDisplay("a", DisplayState::kLost, "");
+  EXPECT_EQ(serving_, true);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::services
