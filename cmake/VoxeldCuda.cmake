@@ -25,6 +25,9 @@ endif()
 # Hopper natively, others by way of PTX: the generator from Turing on, the engine from Ampere on, whose blocks of threads
 # have the shared memory that it draws in.
 set(CMAKE_CUDA_ARCHITECTURES 75-virtual 90-real)
+if(VOXELD_HASTY)
+  set(CMAKE_CUDA_ARCHITECTURES 90-real)
+endif()
 set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
 if(VOXELD_CCACHE)
   set(CMAKE_CUDA_COMPILER_LAUNCHER ${VOXELD_CCACHE})

@@ -14,7 +14,7 @@ struct Credentials {
   std::string token;
   std::string token_file;  // where `token` is empty: what is in this file, read with the others
   // For tls:HOST:PORT: the authorities of the server's certificate (empty: the system's), and this
-  // client's certificate and key (a server asks for them beyond its own machine).
+  // client's certificate and key, which the server asks for.
   std::string ca, certificate, key;
   // The name that the server's certificate must have, where it is not the address's host.
   std::string server_name;

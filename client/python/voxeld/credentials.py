@@ -20,7 +20,7 @@ class Credentials:
     token        a bearer token, sent with every call; `token_file` has it where `token` is empty. Only to addresses of this
                  machine or over TLS: elsewhere it could be read on its way, which is an error
     ca           for tls:HOST:PORT: the authorities of the server's certificate (empty: the system's)
-    certificate  this client's, and its `key`: a server asks for them beyond its own machine
+    certificate  this client's, and its `key`: the server asks for them
     server_name  that the server's certificate must have, where it is not the address's host
     """
     token: str = ""
