@@ -64,6 +64,10 @@ if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-restrict
                                                    -Wno-stringop-overflow -Wno-stringop-overread)
 endif()
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # What a source has to itself is in a file that another includes.
+  target_compile_options(voxeld_warnings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
+endif()
 if(VOXELD_WERROR)
   target_compile_options(voxeld_warnings INTERFACE -Werror)
 endif()
@@ -104,14 +108,21 @@ function(voxeld_unwatched)
   endif()
 endfunction()
 
+# voxeld_apart(SOURCE …): where sources are compiled several at a time (CMAKE_UNITY_BUILD), these are compiled alone, for names
+# of their own are others' names too.
+function(voxeld_apart)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # voxeld_library(NAME [SINGLE_THREADED] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
 # functions and objects that no two threads share (voxeld_unwatched). Each of HEADERS is also compiled with
 # nothing before it (but under a sanitizer), so none leans on what its includer happened to include: by its own .cc, which
 # includes it first (tools/check_includes.py), or alone.
 function(voxeld_library name)
   cmake_parse_arguments(ARG "SINGLE_THREADED" "" "SOURCES;HEADERS;LINK" ${ARGN})
-  if(ARG_SINGLE_THREADED)
-    voxeld_unwatched(${ARG_SOURCES})
+  set(unwatched OFF)
+  if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
+    set(unwatched ON)
   endif()
   set(alone "")
   if(VOXELD_SANITIZE)
@@ -132,7 +143,9 @@ function(voxeld_library name)
   endforeach()
   add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
-  if(VOXELD_COMMON_HEADERS)
+  if(unwatched)
+    target_compile_options(voxeld_${name} PRIVATE -fno-sanitize=thread)
+  elseif(VOXELD_COMMON_HEADERS)
     target_compile_options(voxeld_${name} PRIVATE -pthread)
     target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers)
   endif()
