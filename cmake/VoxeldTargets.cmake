@@ -61,7 +61,7 @@ target_compile_options(voxeld_warnings INTERFACE -Wall -Wextra -Wno-unused-param
 if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC's flow analysis cannot see through the checks that a sanitizer inserts; nor does it know headers that were compiled
   # before as the system's, whose own warnings are none of ours.
-  target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-restrict
+  target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-nonnull -Wno-restrict
                                                    -Wno-stringop-overflow -Wno-stringop-overread)
 endif()
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
