@@ -180,7 +180,7 @@ function(voxeld_test_objects name)
 endfunction()
 
 # voxeld_test(NAME [SINGLE_THREADED] LABELS … SOURCES … LINK … LONG …): an executable `NAME` in bin/tests; each of its cases is a
-# ctest test. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LONG: patterns of cases that are
+# ctest test, or with VOXELD_WHOLE_TESTS all of them together are one. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LONG: patterns of cases that are
 # left out where VOXELD_LONG_TESTS is off. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
 function(voxeld_test name)
   cmake_parse_arguments(ARG "SINGLE_THREADED" "TIMEOUT" "SOURCES;LINK;LABELS;LONG" ${ARGN})
@@ -204,10 +204,21 @@ function(voxeld_test name)
   if("gpu" IN_LIST ARG_LABELS)
     set(prefix "gpu.${name}.")
   endif()
-  set(chosen "")
+  set(filter "*")
   if(ARG_LONG AND NOT VOXELD_LONG_TESTS)
     list(JOIN ARG_LONG ":" long)
-    set(chosen TEST_FILTER "-${long}")
+    set(filter "-${long}")
+  endif()
+  if(VOXELD_WHOLE_TESTS)
+    string(REGEX REPLACE "\\.$" "" whole ${prefix})
+    math(EXPR timeout "5 * ${ARG_TIMEOUT}")
+    add_test(NAME ${whole} COMMAND ${name} --gtest_filter=${filter} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+    set_tests_properties(${whole} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${timeout})
+    return()
+  endif()
+  set(chosen "")
+  if(NOT filter STREQUAL "*")
+    set(chosen TEST_FILTER ${filter})
   endif()
   gtest_discover_tests(${name} ${chosen} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
