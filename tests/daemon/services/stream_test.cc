@@ -218,7 +218,7 @@ TEST(Stream, OutOfOrderIsAnIssue) {
   EXPECT_EQ(client.answers[0].accepted().refused_operations(), 2u);
 }
 
-TEST(Stream, WhatIsNotImplementedSaysSo) {
+TEST(Stream, ACommitThatCannotBeDurableIsCarriedOutAndSaysSo) {
   Daemon daemon;
   Client client(daemon.scene());
   client.Open();
@@ -229,7 +229,9 @@ TEST(Stream, WhatIsNotImplementedSaysSo) {
   ASSERT_THAT(client.issues, SizeIs(1));
   EXPECT_EQ(client.issues[0].reason(), v1::REASON_UNIMPLEMENTED);
   EXPECT_EQ(client.issues[0].field(), "commit.durable");
-  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 1u);
+  EXPECT_TRUE(client.issues[0].applied());
+  EXPECT_EQ(client.answers[0].accepted().refused_operations(), 0u);
+  EXPECT_FALSE(client.answers[0].accepted().durable());
 }
 
 TEST(Stream, PingsAreAnsweredOutOfTurn) {
