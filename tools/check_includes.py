@@ -30,6 +30,7 @@ ALLOWED = {
     "daemon/scene": ["gpu", "display/api", "display/sync"],
     "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
     "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
+    "daemon/explain": ["gpu", "display/api", "display/sync", "daemon/scene"],
     "daemon/access": ["display/sync", "daemon/address", "daemon/log", "daemon/suggest"],
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",

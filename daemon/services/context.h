@@ -9,6 +9,7 @@
 #include "daemon/access/access.h"
 #include "daemon/access/audit.h"
 #include "daemon/core/core.h"
+#include "daemon/explain/explainer.h"
 #include "daemon/listen/counters.h"
 #include "daemon/listen/log_gate.h"
 #include "daemon/local/local_socket.h"
@@ -55,6 +56,10 @@ struct ServiceContext {
   std::shared_ptr<std::atomic<uint32_t>> captures = std::make_shared<std::atomic<uint32_t>>(0);
   std::unique_ptr<local::LocalSocket> local;  // may be none
   text::Fonts fonts;
+  // Shared, as the core's answers come to it, which may be when the server is gone.
+  static constexpr size_t kMostExplanationsWaiting = 8;
+  std::shared_ptr<ExplainerThread> explainer =
+      std::make_shared<ExplainerThread>(kMostExplanationsWaiting);
 };
 
 }  // namespace voxeld::daemon::services

@@ -15,6 +15,7 @@
 #include "daemon/services/apply_update.h"
 #include "daemon/services/audited.h"
 #include "daemon/services/caller.h"
+#include "daemon/services/explain_entity.h"
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/services/unary_call.h"
@@ -64,12 +65,12 @@ Core::Reply<T> Answer(std::shared_ptr<UnaryCall> call, Response* response) {
 }
 
 using SceneStub = v1::SceneService;
-using SceneBase =
-    SceneStub::WithRawCallbackMethod_Stream<SceneStub::WithRawCallbackMethod_ApplyUpdate<
-        SceneStub::WithRawCallbackMethod_WatchScene<SceneStub::WithCallbackMethod_ListEntities<
-            SceneStub::WithCallbackMethod_GetEntity<SceneStub::WithCallbackMethod_ClearLayer<
+using SceneBase = SceneStub::WithRawCallbackMethod_Stream<
+    SceneStub::WithRawCallbackMethod_ApplyUpdate<SceneStub::WithRawCallbackMethod_WatchScene<
+        SceneStub::WithCallbackMethod_ListEntities<SceneStub::WithCallbackMethod_GetEntity<
+            SceneStub::WithCallbackMethod_ExplainEntity<SceneStub::WithCallbackMethod_ClearLayer<
                 SceneStub::WithCallbackMethod_ListOwners<SceneStub::WithCallbackMethod_ControlOwner<
-                    SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>>>;
+                    SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>>>>;
 
 class SceneService final : public SceneBase {
  public:
@@ -111,6 +112,22 @@ class SceneService final : public SceneBase {
       return Refuse(call, status);
     }
     return DoGetEntity(call->DefaultReactor(), *request, response);
+  }
+
+  ServerUnaryReactor* ExplainEntity(CallbackServerContext* call,
+                                    const v1::ExplainEntityRequest* request,
+                                    v1::ExplainEntityResponse* response) override {
+    absl::Status status = May(call, Scope::kView, "ExplainEntity");
+    if (status.ok()) status = CheckKey(request->key());
+    if (!status.ok()) return Refuse(call, status);
+    ServerUnaryReactor* reactor = call->DefaultReactor();
+    services::ExplainEntity(
+        context_, *request,
+        [answer = UnaryCall::Begin(context_.short_calls, reactor), response](
+            const absl::Status& explained, const v1::ExplainEntityResponse& explanation) {
+          answer->Answer(explained, [&] { *response = explanation; });
+        });
+    return reactor;
   }
 
   ServerUnaryReactor* ClearLayer(CallbackServerContext* call, const v1::ClearLayerRequest* request,
@@ -161,6 +178,13 @@ class SceneService final : public SceneBase {
     ServerUnaryReactor* reactor = call->DefaultReactor();
     reactor->Finish(ToGrpc(status));
     return reactor;
+  }
+
+  static absl::Status CheckKey(const v1::EntityKey& key) {
+    if (!key.layer().empty() && !key.id().empty()) return absl::OkStatus();
+    return absl::InvalidArgumentError(
+        absl::StrCat("key.", key.layer().empty() ? "layer" : "id",
+                     " is empty; an entity is asked for by its layer and id"));
   }
 
   absl::Status May(CallbackServerContext* call, Scope scope, const char* method) {
@@ -219,10 +243,8 @@ class SceneService final : public SceneBase {
   ServerUnaryReactor* DoGetEntity(ServerUnaryReactor* reactor, const v1::GetEntityRequest& request,
                                   v1::GetEntityResponse* response) {
     const v1::EntityKey& key = request.key();
-    if (key.layer().empty() || key.id().empty()) {
-      reactor->Finish(ToGrpc(absl::InvalidArgumentError(
-          absl::StrCat("key.", key.layer().empty() ? "layer" : "id",
-                       " is empty; an entity is asked for by its layer and id"))));
+    if (absl::Status status = CheckKey(key); !status.ok()) {
+      reactor->Finish(ToGrpc(status));
       return reactor;
     }
     context_.core.GetEntity({key.owner(), key.layer(), key.id()},

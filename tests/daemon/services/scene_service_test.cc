@@ -211,6 +211,62 @@ TEST(GetEntity, ByKeyOrNotFound) {
   EXPECT_THAT(get("layer", "").first.error_message(), HasSubstr("key.id is empty"));
 }
 
+TEST(ExplainEntity, SaysWhyItIsSeenOrNot) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  *update.add_operations() = SphereIn("layer", "ball");
+  *update.add_operations() = SphereIn("layer", "black");
+  update.mutable_operations(1)
+      ->mutable_upsert()
+      ->mutable_entity()
+      ->mutable_primitive()
+      ->mutable_color()
+      ->set_rgb(0);
+  ASSERT_TRUE(Apply(daemon, update).first.ok());
+  const auto why = [&](const std::string& id, const std::string& display = "") {
+    v1::ExplainEntityRequest request;
+    request.mutable_key()->set_layer("layer");
+    request.mutable_key()->set_id(id);
+    request.set_display(display);
+    return Call<v1::ExplainEntityResponse>(daemon.scene(), &v1::SceneService::Stub::ExplainEntity,
+                                           request);
+  };
+  const auto black = why("black");
+  ASSERT_TRUE(black.first.ok()) << black.first.error_message();
+  EXPECT_EQ(black.second.visibility(), v1::VISIBILITY_BLACK);
+  EXPECT_GT(black.second.covered_voxels(), 0u);
+  EXPECT_THAT(black.second.text(), HasSubstr("black"));
+  EXPECT_EQ(black.second.info().key().id(), "black");
+  EXPECT_FALSE(black.second.display().empty());
+  const auto ball = why("ball");
+  ASSERT_TRUE(ball.first.ok()) << ball.first.error_message();
+  EXPECT_EQ(ball.second.seen_voxels(), ball.second.lit_voxels());
+  EXPECT_GT(ball.second.voxels().max().x(), ball.second.voxels().min().x());
+  EXPECT_EQ(why("cube").first.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(why("").first.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(why("ball", "none").first.error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
+TEST(ExplainEntity, ADisplayThatIsBlankedIsDark) {
+  Daemon daemon;
+  v1::ApplyUpdateRequest update;
+  *update.add_operations() = SphereIn("layer", "ball");
+  ASSERT_TRUE(Apply(daemon, update).first.ok());
+  v1::UpdateDisplayRequest blank;
+  blank.set_blank(true);
+  grpc::ClientContext context;
+  v1::DisplayDescription display;
+  ASSERT_TRUE(daemon.displays().UpdateDisplay(&context, blank, &display).ok());
+  v1::ExplainEntityRequest request;
+  request.mutable_key()->set_layer("layer");
+  request.mutable_key()->set_id("ball");
+  const auto why = Call<v1::ExplainEntityResponse>(daemon.scene(),
+                                                   &v1::SceneService::Stub::ExplainEntity, request);
+  ASSERT_TRUE(why.first.ok()) << why.first.error_message();
+  EXPECT_EQ(why.second.visibility(), v1::VISIBILITY_DARK);
+  EXPECT_THAT(why.second.text(), HasSubstr("is blanked"));
+}
+
 TEST(ClearLayer, RemovesWhatMatches) {
   Daemon daemon;
   v1::ApplyUpdateRequest update;

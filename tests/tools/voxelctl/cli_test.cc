@@ -153,6 +153,11 @@ TEST(CommandLine, TheOthers) {
       std::get<EntitiesOptions>(Parse("entities --layer l --owner 18446744073709551615").command);
   EXPECT_EQ(entities.layer, "l");
   EXPECT_EQ(entities.owner, UINT64_MAX);
+  const auto why = std::get<WhyOptions>(Parse("why ball --layer l --owner 3 --display d").command);
+  EXPECT_EQ(why.id, "ball");
+  EXPECT_EQ(why.layer, "l");
+  EXPECT_EQ(why.owner, 3u);
+  EXPECT_EQ(why.display, "d");
   const auto watch = std::get<WatchOptions>(Parse("watch --layer l --owner 7").command);
   EXPECT_EQ(watch.layer, "l");
   EXPECT_EQ(watch.owner, 7u);
@@ -250,6 +255,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"entities --owner 010", {"--owner is 010; an owner's number"}},
         Wrong{"entities --owner 18446744073709551616",
               {"--owner is 18446744073709551616; an owner's number"}},
+        Wrong{"why", {"why wants the ID"}}, Wrong{"why a b", {"\"b\"", "too many"}},
         Wrong{"clear --all --layer x", {"do not go together"}},
         Wrong{"pattern", {"pattern wants a name", "axes", "list"}},
         Wrong{"profile", {"check PROFILE, or list"}},

@@ -96,6 +96,23 @@ TEST_F(CommandsTest, TablesAreDataAndNothingFromTheServerReachesTheTerminalRaw) 
   EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("1,234,567"));
 }
 
+TEST_F(CommandsTest, WhySaysWhatTheServerFound) {
+  const json why = RunJson({"why", "one"});
+  EXPECT_EQ(why["visibility"], "VISIBILITY_BLACK");
+  EXPECT_EQ(why["info"]["key"]["owner"], 7);
+  const Result told = RunTool({"why", "two\x1b[2J"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(told.out,
+            "box \"two\\u{1b}[2J\" in layer \"voxelctl\" of owner 7, on display \"fake\":\n"
+            "it is \\u{1b}[2Jblack\nvoxels that it covers 1,234; that it lights 0; that clip and "
+            "mask leave 0; that are other by it 0\n");
+  const Result near = RunTool({"why", "onee"});
+  EXPECT_EQ(near.code, kExitFailure);
+  EXPECT_THAT(near.err, HasSubstr("no entity \"onee\" is in the scene; did you mean one?"));
+  EXPECT_THAT(RunTool({"why", "quite different"}).err,
+              HasSubstr("its commit has not come; known are one, two"));
+}
+
 TEST_F(CommandsTest, ALatticeIsListedAndPictured) {
   server_.Set({.lattice = true});
   EXPECT_THAT(RunTool({"displays"}).out, HasSubstr("lattice, 5 lights"));

@@ -214,6 +214,17 @@ class FakeServer::Scene final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
+  grpc::Status ExplainEntity(grpc::ServerContext*, const v1::ExplainEntityRequest* request,
+                             v1::ExplainEntityResponse* response) override {
+    *response->mutable_info()->mutable_key() = request->key();
+    response->mutable_info()->set_kind("box");
+    response->set_display(kDisplay);
+    response->set_visibility(v1::VISIBILITY_BLACK);
+    response->set_text("it is \x1b[2Jblack");
+    response->set_covered_voxels(1234);
+    return grpc::Status::OK;
+  }
+
   grpc::Status ClearLayer(grpc::ServerContext*, const v1::ClearLayerRequest* request,
                           v1::ClearLayerResponse* response) override {
     sync::MutexLock lock(server_.mutex_);

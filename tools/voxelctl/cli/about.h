@@ -55,6 +55,11 @@ inline constexpr const char* kWatchAbout =
     "Lists layers and entities, then what comes (+), changes (~) and goes (-), until "
     "Ctrl-C; with --json one object a change set, each the scene's step to the next "
     "state that the server told";
+inline constexpr const char* kWhyAbout =
+    "Says why an entity is, or is not, to be seen: outside, black, clipped, masked, hidden, "
+    "covered and by "
+    "what, or where the display has no light. The server finds out by drawing, which may take "
+    "seconds";
 inline constexpr const char* kInitAbout =
     "Asks how an LED lattice is wired (start corner, direction, zig-zag) and writes its "
     "profile; needs no daemon";

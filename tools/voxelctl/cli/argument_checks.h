@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,13 @@ void CheckRange(const char* option, double value, double least, double most);
 
 // Has CLI11 refuse, before it converts, a text that is no number from `least` to `most`.
 void WantNumber(CLI::Option* option, double least, double most);
+
+// A number and its range; what it holds now is the default.
+void AddNumber(CLI::App* command, const char* name, double* value, double least, double most,
+               const char* about, const char* unit);
+
+// --layer and --owner; the number of an owner is checked.
+void AddFilter(CLI::App* command, std::string* layer, uint64_t* owner);
 
 // A name that promises another format than PNG would be a lie.
 void CheckPictureName(const std::string& file);

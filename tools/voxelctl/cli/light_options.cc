@@ -20,11 +20,10 @@ const Choices<Protocol> kProtocols = {{"opc", Protocol::kOpc},
                                       {"e131", Protocol::kE131},
                                       {"artnet", Protocol::kArtNet}};
 
-void AddNumber(CLI::App* command, const char* name, double* value, double least, double most,
-               const char* about, const char* unit) {
-  CLI::Option* option = command->add_option(name, *value, about);
-  option->type_name(unit);
-  WantNumber(option, least, most);
+// A number and its range, which the text about it says, with what holds without it.
+void AddPlainNumber(CLI::App* command, const char* name, double* value, double least, double most,
+                    const char* about, const char* unit) {
+  WantNumber(command->add_option(name, *value, about)->type_name(unit), least, most);
 }
 
 int32_t Whole(const char* option, double value) {
@@ -80,14 +79,15 @@ void InputArguments::Add(CLI::App* command) {
                    "protocol's port. 0.0.0.0:PORT: from everywhere")
       ->type_name("HOST:PORT");
   lights_.Add(command);
-  AddNumber(command, "--universe", &universe_, 0, network::e131::kMostUniverse,
-            "e131, artnet: the universe of the first 170 lights; without it 1 and 0", "N");
-  AddNumber(command, "--per-channel", &a_channel_, 0, 21845,
-            "opc: lights of a channel, 1's first; without it every channel has them all", "N");
-  AddNumber(command, "--gather", &options_.gather_ms, 0, 1000,
-            "Milliseconds that parts of a picture wait for the rest, where nothing says that it is "
-            "whole; without it 4",
-            "MS");
+  AddPlainNumber(command, "--universe", &universe_, 0, network::e131::kMostUniverse,
+                 "e131, artnet: the universe of the first 170 lights; without it 1 and 0", "N");
+  AddPlainNumber(command, "--per-channel", &a_channel_, 0, 21845,
+                 "opc: lights of a channel, 1's first; without it every channel has them all", "N");
+  AddPlainNumber(
+      command, "--gather", &options_.gather_ms, 0, 1000,
+      "Milliseconds that parts of a picture wait for the rest, where nothing says that it is "
+      "whole; without it 4",
+      "MS");
   command->add_flag("--multicast", options_.multicast, "e131: join its universes' groups");
 }
 
@@ -128,8 +128,8 @@ InputOptions InputArguments::Read() const {
 
 void PipeArguments::Add(CLI::App* command) {
   lights_.Add(command);
-  AddNumber(command, "--fps", &options_.fps, 0, 1000,
-            "Pictures a second; without it, and with 0, as they come", "N");
+  AddPlainNumber(command, "--fps", &options_.fps, 0, 1000,
+                 "Pictures a second; without it, and with 0, as they come", "N");
   command->add_flag("--keep", options_.keep, "Leave the last picture up");
 }
 

@@ -48,6 +48,7 @@ class Parser {
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
     AddEntities();
+    AddWhyOptions(Add("why", kWhyAbout), &why_);
     AddWatch();
     AddClear();
     AddPattern();
@@ -103,14 +104,6 @@ class Parser {
     command->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     names_.emplace_back(name);
     return command;
-  }
-
-  // A number and its range; what it holds now is the default.
-  static void AddNumber(CLI::App* command, const char* name, double* value, double least,
-                        double most, const char* about, const char* unit) {
-    CLI::Option* option = command->add_option(name, *value, about);
-    option->type_name(unit)->capture_default_str();
-    WantNumber(option, least, most);
   }
 
   void AddPlay() {
@@ -185,22 +178,6 @@ class Parser {
     c->add_flag("--watch", stats_.watch, "Again and again, until Ctrl-C");
     AddNumber(c, "--interval", &stats_.interval_s, 0.01, 3600, "Seconds between, 0.01 to 3600",
               "S");
-  }
-
-  // Only some layers: of that name, of that owner.
-  static void AddFilter(CLI::App* command, std::string* layer, uint64_t* owner) {
-    command->add_option("--layer", *layer, "Only this layer's")->type_name("NAME");
-    command->add_option("--owner", *owner, "Only this owner's")
-        ->type_name("N")
-        ->check([](const std::string& text) {
-          uint64_t number = 0;
-          const bool plain =
-              absl::c_all_of(text, absl::ascii_isdigit) && !absl::StartsWith(text, "0");
-          if (plain && absl::SimpleAtoi(text, &number)) return "";
-          throw UsageError{absl::StrCat("--owner is ", EscapeForTerminal(text),
-                                        "; an owner's number is expected, such as 7 (voxelctl "
-                                        "entities lists them)")};
-        });
   }
 
   void AddEntities() {
@@ -321,6 +298,7 @@ class Parser {
               : name == "token"   ? &token_.name
               : name == "record"  ? &record_.file
               : name == "replay"  ? &replay_.file
+              : name == "why"     ? &why_.id
                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "gallery") {
@@ -340,6 +318,7 @@ class Parser {
     if (name == "token") FillInChecked(token_, CheckTokenOptions);
     if (name == "record") FillInChecked(record_, CheckRecordOptions);
     if (name == "replay") FillInChecked(replay_, CheckReplayOptions);
+    if (name == "why") FillInChecked(why_, CheckWhyOptions);
     if (name == "input") options_.command = input_texts_.Read();
     if (name == "pipe") options_.command = pipe_texts_.Read();
     if (name == "set") return FillInSet();
@@ -474,6 +453,7 @@ class Parser {
   SnapshotOptions snapshot_;
   StatsOptions stats_;
   EntitiesOptions entities_;
+  WhyOptions why_;
   WatchOptions watch_;
   ClearOptions clear_;
   PatternOptions pattern_;

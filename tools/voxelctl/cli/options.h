@@ -62,6 +62,13 @@ struct EntitiesOptions {
   uint64_t owner = 0;  // 0: all
 };
 
+struct WhyOptions {
+  std::string id;       // an entity's
+  std::string layer;    // empty: the only one that has it
+  uint64_t owner = 0;   // 0: the only one that has it
+  std::string display;  // empty: the first
+};
+
 struct WatchOptions {
   std::string layer;   // empty: all
   uint64_t owner = 0;  // 0: all
@@ -158,7 +165,8 @@ struct Options {
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions, TokenOptions, RecordOptions, ReplayOptions, InputOptions, PipeOptions>
+               InitOptions, TokenOptions, RecordOptions, ReplayOptions, InputOptions, PipeOptions,
+               WhyOptions>
       command;
 };
 

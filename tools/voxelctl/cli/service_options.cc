@@ -8,17 +8,6 @@
 #include "tools/voxelctl/cli/argument_checks.h"
 
 namespace voxeld::voxelctl {
-namespace {
-
-// A number and its range; what it holds now is the default.
-void AddNumber(CLI::App* command, const char* name, double* value, double least, double most,
-               const char* about, const char* unit) {
-  CLI::Option* option = command->add_option(name, *value, about);
-  option->type_name(unit)->capture_default_str();
-  WantNumber(option, least, most);
-}
-
-}  // namespace
 
 void AddTokenOptions(CLI::App* command, TokenOptions* options) {
   command->add_option("NAME", options->name,
@@ -65,6 +54,17 @@ void CheckRecordOptions(const RecordOptions& options) {
   if (!absl::EndsWithIgnoreCase(options.file, ".mcap")) {
     throw UsageError{"record writes MCAP: give the file a name that ends with .mcap"};
   }
+}
+
+void AddWhyOptions(CLI::App* command, WhyOptions* options) {
+  command->add_option("ID", options->id, "The entity's id (voxelctl entities lists them)");
+  AddFilter(command, &options->layer, &options->owner);
+  command->add_option("--display", options->display, "On this display (default: the first)")
+      ->type_name("NAME");
+}
+
+void CheckWhyOptions(const WhyOptions& options) {
+  if (options.id.empty()) throw UsageError{"why wants the ID of an entity; entities lists them"};
 }
 
 void AddReplayOptions(CLI::App* command, ReplayOptions* options) {

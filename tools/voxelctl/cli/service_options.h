@@ -15,9 +15,11 @@ void AddTokenOptions(CLI::App* command, TokenOptions* options);
 void AddVerifyOptions(CLI::App* command, VerifyOptions* options);
 void AddRecordOptions(CLI::App* command, RecordOptions* options);
 void AddReplayOptions(CLI::App* command, ReplayOptions* options);
+void AddWhyOptions(CLI::App* command, WhyOptions* options);
 
 void CheckTokenOptions(const TokenOptions& options);
 void CheckRecordOptions(const RecordOptions& options);
 void CheckReplayOptions(const ReplayOptions& options);
+void CheckWhyOptions(const WhyOptions& options);
 
 }  // namespace voxeld::voxelctl

@@ -32,6 +32,8 @@ absl::Status Displays(Connection& connection, Console& console);
 absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,
                        Console& console);
 absl::Status Entities(const EntitiesOptions& options, Connection& connection, Console& console);
+// What the server says of an entity's visibility.
+absl::Status Why(const WhyOptions& options, Connection& connection, Console& console);
 absl::Status Watch(const WatchOptions& options, Connection& connection, Interrupt& interrupt,
                    Console& console);
 absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console);

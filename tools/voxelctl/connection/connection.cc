@@ -25,6 +25,7 @@ using std::chrono::system_clock;
 constexpr milliseconds kConnectTime(5000);
 constexpr milliseconds kConnectStep(100);
 constexpr milliseconds kCallTime(15000);
+constexpr milliseconds kDrawnTime(300000);   // of an answer for which the server draws the scene
 constexpr int kMostMessageBytes = 64 << 20;  // a slice of 16384² pixels would not come in less
 
 }  // namespace
@@ -65,10 +66,10 @@ class Connection::Impl {
   }
 
   template <typename Response, typename Call>
-  absl::StatusOr<Response> Unary(Call call) {
+  absl::StatusOr<Response> Unary(Call call, milliseconds limit = kCallTime) {
     Response response;
     const absl::Status status =
-        Invoke(kCallTime, [&](grpc::ClientContext* context) { return call(context, &response); });
+        Invoke(limit, [&](grpc::ClientContext* context) { return call(context, &response); });
     if (!status.ok()) return status;
     return response;
   }
@@ -175,6 +176,15 @@ absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntiti
     request.set_page_token(page->next_page_token());
   } while (!request.page_token().empty());
   return all;
+}
+
+absl::StatusOr<v1::ExplainEntityResponse> Connection::ExplainEntity(
+    const v1::ExplainEntityRequest& request) {
+  return impl_->Unary<v1::ExplainEntityResponse>(
+      [&](grpc::ClientContext* context, v1::ExplainEntityResponse* response) {
+        return impl_->scene().ExplainEntity(context, request, response);
+      },
+      kDrawnTime);
 }
 
 absl::StatusOr<v1::ClearLayerResponse> Connection::ClearLayer(

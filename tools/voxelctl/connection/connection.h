@@ -35,6 +35,7 @@ class Connection {
   absl::StatusOr<v1::DisplayDescription> UpdateDisplay(const v1::UpdateDisplayRequest& request);
   // All pages in one answer.
   absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request);
+  absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(const v1::ExplainEntityRequest& request);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
   absl::StatusOr<v1::ApplyUpdateResponse> ApplyUpdate(const v1::ApplyUpdateRequest& request);
 

@@ -1,0 +1,84 @@
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/suggest/suggest.h"
+#include "tools/voxelctl/commands/commands.h"
+#include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/proto_json.h"
+#include "tools/voxelctl/text/table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+std::string Name(const v1::EntityKey& key) {
+  return absl::StrCat("\"", EscapeForTerminal(key.id()), "\" in layer \"",
+                      EscapeForTerminal(key.layer()), "\" of owner ", key.owner());
+}
+
+// The one entity that is meant.
+absl::StatusOr<v1::EntityKey> Find(const WhyOptions& options, Connection& connection) {
+  v1::ListEntitiesRequest request;
+  request.set_owner(options.owner);
+  request.set_layer(options.layer);
+  request.set_id_prefix(options.id);
+  const auto matching = connection.ListEntities(request);
+  if (!matching.ok()) return matching.status();
+  std::vector<v1::EntityKey> found;
+  for (const v1::EntityInfo& entity : matching->entities()) {
+    if (entity.key().id() == options.id) found.push_back(entity.key());
+  }
+  if (found.size() == 1) return found.front();
+  if (found.size() > 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(found.size(), " entities have this id: ", Name(found[0]), ", ", Name(found[1]),
+                     found.size() > 2 ? ", …" : "", "; say which by --layer or --owner"));
+  }
+  request.clear_id_prefix();
+  request.set_page_size(1000);
+  const auto all = connection.ListEntities(request);
+  if (!all.ok()) return all.status();
+  std::vector<std::string> ids;
+  for (const v1::EntityInfo& entity : all->entities()) ids.push_back(entity.key().id());
+  // A few are listed.
+  constexpr size_t kFew = 12;
+  const std::string nearest = Nearest(options.id, ids);
+  std::string hint;
+  if (ids.size() <= kFew && !ids.empty()) {
+    hint = EscapeForTerminal(Suggestion(options.id, ids));
+  } else if (!nearest.empty()) {
+    hint = absl::StrCat("; did you mean ", EscapeForTerminal(nearest), "?");
+  }
+  return absl::NotFoundError(absl::StrCat(
+      "no entity \"", EscapeForTerminal(options.id), "\" is in the scene",
+      options.layer.empty() && options.owner == 0 ? "" : ", as far as you asked",
+      nearest.empty() ? ": it has expired, was taken down, or its commit has not come" : "", hint));
+}
+
+}  // namespace
+
+absl::Status Why(const WhyOptions& options, Connection& connection, Console& console) {
+  const absl::StatusOr<v1::EntityKey> key = Find(options, connection);
+  if (!key.ok()) return key.status();
+  v1::ExplainEntityRequest request;
+  *request.mutable_key() = *key;
+  request.set_display(options.display);
+  const absl::StatusOr<v1::ExplainEntityResponse> answer = connection.ExplainEntity(request);
+  if (!answer.ok()) return answer.status();
+  if (console.json()) {
+    console.Data(JsonText(ToJson(*answer), false));
+    return absl::OkStatus();
+  }
+  const v1::EntityInfo& info = answer->info();
+  std::string text = absl::StrCat(info.kind(), " ", Name(info.key()), ", on display \"",
+                                  EscapeForTerminal(answer->display()), "\":\n",
+                                  EscapeForTerminal(answer->text()), "\n");
+  absl::StrAppend(&text, "voxels that it covers ", Grouped(answer->covered_voxels()),
+                  "; that it lights ", Grouped(answer->lit_voxels()), "; that clip and mask leave ",
+                  Grouped(answer->left_voxels()), "; that are other by it ",
+                  Grouped(answer->seen_voxels()), "\n");
+  console.Data(text);
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::voxelctl
