@@ -185,6 +185,8 @@ systemd-sysusers --root="$root" voxeld.conf 2>/dev/null
 grep -q '^voxeld:.*:/usr/sbin/nologin$' "$root/etc/passwd" || fail "no user voxeld: $(cat "$root/etc/passwd")"
 grep -q '^video:.*:voxeld$' "$root/etc/group" || fail "not in video: $(cat "$root/etc/group")"
 cp -an /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/" # the targets that every unit has around it
+mkdir -p "$root/bin"
+cp /bin/kill "$root/bin/" # of a package that it depends on
 said=$(systemd-analyze verify --root="$root" voxeld.service voxeld.socket 2>&1) || fail "systemd-analyze verify: $said"
 [ -z "$said" ] || fail "systemd-analyze verify: $said"
 systemd-analyze security --offline=true --root="$root" --threshold=19 voxeld.service >"$work/security" ||
