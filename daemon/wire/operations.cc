@@ -246,6 +246,7 @@ MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& l
 // What is wrong with a Commit; it itself is carried out.
 MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
   *out = {in.frame_id(), in.send_time_ns(), in.client_drops(), 0, in.must_show()};
+  out->durable = in.durable();
   if (in.present_at_ns() < 0) {
     return Fault{FieldPath(path, "present_at_ns").ToString(), Reason::kInvalidValue,
                  absl::StrCat("is ", in.present_at_ns(),
@@ -253,7 +254,6 @@ MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit
                               "for at once")};
   }
   out->present_at_ns = in.present_at_ns();
-  out->durable = in.durable();
   return {};
 }
 

@@ -15,7 +15,9 @@ fail() {
 cat >"$work/expected" <<'EOT'
 ./include/voxeld/address.h
 ./include/voxeld/basics.h
+./include/voxeld/channel.h
 ./include/voxeld/client.h
+./include/voxeld/credentials.h
 ./include/voxeld/drawing.h
 ./include/voxeld/expression.h
 ./include/voxeld/receipt.h
