@@ -38,4 +38,4 @@ cp -r "$source/client/cpp/examples" "$work/examples"
   >"$work/log" 2>&1 || fail "$(cat "$work/log")"
 "$cmake" --build "$work/build" --target example_01_hello_line >"$work/log" 2>&1 || fail "$(cat "$work/log")"
 if "$work/build/example_01_hello_line" nonsense >"$work/log" 2>&1; then fail "it took a wrong address"; fi
-grep -q 'give HOST:PORT or unix:PATH' "$work/log" || fail "it said: $(cat "$work/log")"
+grep -q 'give HOST:PORT, tls:HOST:PORT or unix:PATH' "$work/log" || fail "it said: $(cat "$work/log")"
