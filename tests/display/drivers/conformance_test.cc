@@ -1,6 +1,8 @@
 // What every display driver keeps to, whatever its device: to hold a driver to it, add a line at
 // the end. Runs on the real clock, with the driver's own threads.
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <ostream>
@@ -209,17 +211,19 @@ TEST_P(DriverConformance, SweepsArePredicted) {
   if (!GetParam().predicts_sweeps) return;
   const double period = 1e9 / display_->info().volumes_per_second;
   EXPECT_NEAR(static_cast<double>(sweeps[1] - sweeps[0]), period, period / 100);
-  // A busy machine may be late with one; a wrong prediction is wrong for all.
-  double off = 1;
-  for (uint64_t volume = 5; off > 0.25 && volume < 30; ++volume) {
+  // A busy machine may be late with some: most must be where they were predicted.
+  constexpr uint64_t kVolumes = 9;
+  std::vector<double> off;
+  for (uint64_t volume = 5; volume < 5 + kVolumes; ++volume) {
     const std::vector<sync::TimeNs> next = display_->ComingSweeps(1);
     ASSERT_EQ(next.size(), 1u);
     const double phase = static_cast<double>(next[0] - recorder_.Of(volume)->time_ns) / period;
-    off = std::abs(phase - std::round(phase));
+    off.push_back(std::abs(phase - std::round(phase)));
     display_->Submit(source.Next(1));
     ASSERT_TRUE(RunUntilOutcome(volume + 1));
   }
-  EXPECT_LE(off, 0.25);
+  std::sort(off.begin(), off.end());
+  EXPECT_LE(off[kVolumes / 2], 0.25);
 }
 
 INSTANTIATE_TEST_SUITE_P(
