@@ -3,11 +3,9 @@
 
 #include <atomic>
 #include <cstddef>
-#include <deque>
 #include <functional>
-#include <thread>
 
-#include "display/sync/mutex.h"
+#include "gpu/call_queue.h"
 
 namespace voxeld::daemon {
 
@@ -18,22 +16,18 @@ class ExplainerThread {
   using Work = std::function<void(const std::atomic<bool>& stopping)>;
 
   explicit ExplainerThread(size_t most_waiting) : most_waiting_(most_waiting) {}
-  ~ExplainerThread();
+  ~ExplainerThread() { stopping_ = true; }
   ExplainerThread(const ExplainerThread&) = delete;
   ExplainerThread& operator=(const ExplainerThread&) = delete;
 
-  // False if as many are waiting already. The first starts the thread.
+  // False if as many are waiting already.
   bool Post(Work work);
 
  private:
-  void Run();
-
   const size_t most_waiting_;
-  sync::Mutex mutex_;
-  sync::CondVar changed_;
-  std::deque<Work> waiting_ VOXELD_GUARDED_BY(mutex_);
-  std::thread thread_ VOXELD_GUARDED_BY(mutex_);
+  std::atomic<size_t> waiting_ = 0;
   std::atomic<bool> stopping_ = false;
+  gpu::CallQueue queue_{/*run_inline=*/false};  // the first to end
 };
 
 }  // namespace voxeld::daemon

@@ -38,9 +38,8 @@ void AppendPayload(int field, const Array<T>& values, Rope* out) {
   } else if (values.owner() != nullptr) {
     out->AppendShared(values.owner(), bytes);
   } else {
-    auto copy = std::make_shared<const std::string>(bytes);
-    const std::string_view view = *copy;
-    out->AppendShared(std::move(copy), view);
+    const auto copy = std::make_shared<const std::string>(bytes);
+    out->AppendShared(copy, *copy);
   }
 }
 
