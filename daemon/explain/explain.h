@@ -20,7 +20,6 @@ enum class Visibility : uint8_t {
   kSeen,
   kOutside,  // all of it lies outside the display's volume
   kNothing,  // it covers no voxel, though it lies there: too small, no inverse, nothing solid in it
-  kErases,   // it takes light away, and there it does
   kBlack,    // it covers voxels, and lights none
   kClipped,  // the layer's clip or region leaves none of what it lights
   kMasked,   // the layer's mask leaves none
@@ -29,6 +28,7 @@ enum class Visibility : uint8_t {
   kTransparent,  // the layer's opacity lets nothing through
   kCovered,      // others cover it, or look alike where it is
   kNoLight,  // the volume has it, no pixel of the display does: by the geometry, or by tone and dither
+  kErases,  // it takes light away, and that is seen
 };
 
 struct Explanation {
