@@ -24,7 +24,7 @@ if(VOXELD_CCACHE)
 endif()
 
 find_program(VOXELD_MOLD mold)
-if(VOXELD_MOLD AND NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+if(VOXELD_MOLD)
   add_link_options(-fuse-ld=mold)
 endif()
 
@@ -42,6 +42,7 @@ endif()
 if(VOXELD_SANITIZE)
   target_compile_options(voxeld_options INTERFACE -fsanitize=${VOXELD_SANITIZE}
                                                   -fno-omit-frame-pointer)
+  target_compile_definitions(voxeld_options INTERFACE VOXELD_SANITIZED)
   target_link_options(voxeld_options INTERFACE -fsanitize=${VOXELD_SANITIZE})
   if(VOXELD_SANITIZE MATCHES "undefined")
     # The check of virtual tables opens a pipe to look at an object, and takes
@@ -64,6 +65,10 @@ if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-nonnull -Wno-restrict
                                                    -Wno-stringop-overflow -Wno-stringop-overread)
 endif()
+if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  # What is for GCC alone stands in some sources; the checks that Clang alone has are tools/check's.
+  target_compile_options(voxeld_warnings INTERFACE -Wno-unknown-warning-option)
+endif()
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # What a source has to itself is in a file that another includes.
   target_compile_options(voxeld_warnings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
@@ -81,7 +86,10 @@ function(voxeld_test_options name)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${name} PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)
   endif()
-  if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_SANITIZE)
+  if(VOXELD_SANITIZE AND NOT ARG_HEAVY)
+    # Optimising what a sanitizer has put its checks into takes several times as long.
+    target_compile_options(${name} PRIVATE -O0)
+  elseif(CMAKE_BUILD_TYPE STREQUAL "Release")
     # What is tested is built as it is shipped; the test itself compiles faster so.
     target_compile_options(${name} PRIVATE -O1)
   endif()
@@ -89,7 +97,7 @@ endfunction()
 
 # Under a sanitizer, where no header is compiled alone anyway, what most files include is compiled once for all of them.
 set(VOXELD_COMMON_HEADERS OFF)
-if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+if(VOXELD_SANITIZE)
   set(VOXELD_COMMON_HEADERS ON)
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/common.cc CONTENT "int voxeld_common_headers;\n" @ONLY)
   add_library(voxeld_common_headers OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/common.cc)
@@ -116,7 +124,7 @@ endfunction()
 
 # voxeld_library(NAME [SINGLE_THREADED] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
 # functions and objects that no two threads share (voxeld_unwatched). Each of HEADERS is also compiled with
-# nothing before it (but under a sanitizer), so none leans on what its includer happened to include: by its own .cc, which
+# nothing before it (but under a sanitizer or in haste, where tools/check looks at those that changed), so none leans on what its includer happened to include: by its own .cc, which
 # includes it first (tools/check_includes.py), or alone.
 function(voxeld_library name)
   cmake_parse_arguments(ARG "SINGLE_THREADED" "" "SOURCES;HEADERS;LINK" ${ARGN})
@@ -125,7 +133,7 @@ function(voxeld_library name)
     set(unwatched ON)
   endif()
   set(alone "")
-  if(VOXELD_SANITIZE)
+  if(VOXELD_SANITIZE OR VOXELD_HASTY)
     set(ARG_HEADERS "")
   endif()
   foreach(header ${ARG_HEADERS})
@@ -151,9 +159,9 @@ function(voxeld_library name)
   endif()
 endfunction()
 
-# What most tests include, compiled once for all of them. Clang, which checks includes, reads them each time.
+# What most tests include, compiled once for all of them. Where Clang checks includes, it reads them each time.
 set(VOXELD_TEST_HEADERS OFF)
-if(VOXELD_TESTS AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+if(VOXELD_TESTS AND (VOXELD_SANITIZE OR CMAKE_CXX_COMPILER_ID STREQUAL "GNU"))
   set(VOXELD_TEST_HEADERS ON)
   find_package(GTest REQUIRED)
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/tests.cc CONTENT "int main() {}\n" @ONLY)
@@ -179,11 +187,16 @@ function(voxeld_test_objects name)
   endif()
 endfunction()
 
-# voxeld_test(NAME [SINGLE_THREADED] LABELS … SOURCES … LINK … LONG …): an executable `NAME` in bin/tests; each of its cases is a
-# ctest test, or with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which may run at once. SINGLE_THREADED: neither it nor what it tests has threads, so it is left out of ThreadSanitizer's build. LONG: patterns of cases that are
-# left out where VOXELD_LONG_TESTS is off. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e.
+# voxeld_test(NAME [SINGLE_THREADED] [OPTIMISED] [HEAVY] LABELS … SOURCES … LINK … LONG … ONE_THREAD … SHARDS n TIMEOUT s): an executable `NAME` in
+# bin/tests. Each of its cases is a ctest test, or with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
+# may run at once. HEAVY: its own code computes much, and is optimised under a sanitizer as well. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e. What is run where:
+#   SINGLE_THREADED  neither it nor what it tests has threads: left out of ThreadSanitizer's build
+#   ONE_THREAD       patterns of cases that have no threads: left out under ThreadSanitizer
+#   LONG             patterns of cases that are left out where VOXELD_LONG_TESTS is off
+#   e2e              not where VOXELD_E2E_TESTS is off
+#   OPTIMISED        also where VOXELD_UNIT_TESTS is off; of the others with the label host their LONG cases alone run there
 function(voxeld_test name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED" "TIMEOUT;SHARDS" "SOURCES;LINK;LABELS;LONG" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;OPTIMISED;HEAVY" "TIMEOUT;SHARDS" "SOURCES;LINK;LABELS;LONG;ONE_THREAD" ${ARGN})
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     return()
   endif()
@@ -199,7 +212,7 @@ function(voxeld_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINK})
   voxeld_test_options(${name})
-  if(VOXELD_TEST_HEADERS)
+  if(VOXELD_TEST_HEADERS AND NOT (VOXELD_SANITIZE AND ARG_HEAVY))
     target_precompile_headers(${name} REUSE_FROM voxeld_test_headers)
   endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
@@ -208,9 +221,32 @@ function(voxeld_test name)
     set(prefix "gpu.${name}.")
   endif()
   set(filter "*")
-  if(ARG_LONG AND NOT VOXELD_LONG_TESTS)
-    list(JOIN ARG_LONG ":" long)
-    set(filter "-${long}")
+  list(JOIN ARG_LONG ":" long)
+  set(left_out OFF)
+  set(without "")
+  if(NOT VOXELD_LONG_TESTS)
+    list(APPEND without ${ARG_LONG})
+  endif()
+  if(VOXELD_SANITIZE STREQUAL "thread")
+    list(APPEND without ${ARG_ONE_THREAD})
+  endif()
+  if(without)
+    list(JOIN without ":" without)
+    set(filter "-${without}")
+  endif()
+  if(NOT VOXELD_UNIT_TESTS AND NOT ARG_OPTIMISED AND "host" IN_LIST ARG_LABELS)
+    if(ARG_LONG)
+      set(filter ${long})
+    else()
+      set(left_out ON)
+    endif()
+  endif()
+  if(NOT VOXELD_E2E_TESTS AND "e2e" IN_LIST ARG_LABELS)
+    set(left_out ON)
+  endif()
+  if(left_out)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    return()
   endif()
   if(VOXELD_WHOLE_TESTS)
     string(REGEX REPLACE "\\.$" "" whole ${prefix})

@@ -31,6 +31,7 @@
 #include "daemon/pipeline/view.h"
 #include "daemon/process/process.h"
 #include "daemon/process/supervisor.h"
+#include "daemon/reload/reloader.h"
 #include "daemon/services/health_watch.h"
 #include "daemon/services/server.h"
 #include "daemon/state/kept_state.h"
@@ -166,8 +167,8 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
   });
 }
 
-int Serve(const Config& config, Displays displays, const sigset_t& signals, sync::Clock& clock,
-          Supervisor& supervisor, Logger& log) {
+int Serve(const Config& config, const CommandLine& command_line, Displays displays,
+          const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
   absl::StatusOr<std::unique_ptr<access::Security>> opened =
@@ -182,6 +183,7 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
     kept = *std::move(state);
   }
   services::HealthWatch watch(log);
+  std::atomic<reload::Reloader*> reloads = nullptr;  // there is one once the core is
   const auto counters = std::make_shared<listen::Counters>();
   Core core({.limits = config.limits,
              .version = Version(),
@@ -193,9 +195,11 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
              .state_figures =
                  [kept = kept.get()] { return kept == nullptr ? StateFigures() : kept->figures(); },
              .connections =
-                 [counters, security = security.get()] {
+                 [counters, security = security.get(), &reloads] {
                    ListenFigures figures = counters->Read();
                    figures.access_trouble = security->trouble();
+                   const reload::Reloader* reloader = reloads;
+                   if (reloader != nullptr) figures.config_trouble = reloader->trouble();
                    return figures;
                  }},
             clock);
@@ -287,7 +291,9 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
-  supervisor.Ready(absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays"));
+  const std::string displays_text =
+      absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays");
+  supervisor.Ready(displays_text);
   std::unique_ptr<access::Ticker> watchdog;
   if (supervisor.watchdog_ns() > 0) {
     watchdog =
@@ -295,11 +301,17 @@ int Serve(const Config& config, Displays displays, const sigset_t& signals, sync
                                          [&core, &supervisor] { FeedWatchdog(core, supervisor); });
   }
 
+  reload::Reloader reloader(config, command_line, ProcessEnvironment(),
+                            {.access = security->access(), .core = core, .log = log});
+  reloads = &reloader;
   int signal = 0;
   while (sigwait(&signals, &signal) != 0 || signal == SIGHUP) {
     if (signal != SIGHUP) continue;
     log.Info("asked to read its files again");
+    supervisor.Reloading();
+    (void)reloader.Reload();  // it says in the log what came of it
     security->Reload();
+    supervisor.Ready(displays_text);
     signal = 0;
   }
   watchdog.reset();
@@ -369,7 +381,7 @@ int Main(int argc, char** argv) {
 
   Logger log(*level, *format);
   log.LimitEach(config->log.max_lines_per_second, clock);
-  return Serve(*config, *std::move(displays), signals, clock, supervisor, log);
+  return Serve(*config, *command_line, *std::move(displays), signals, clock, supervisor, log);
 }
 
 }  // namespace

@@ -38,13 +38,13 @@ void Access::SetOnChange(std::function<void()> on_change) {
 }
 
 absl::Status Access::Look(bool again) {
-  if (options_.grants.empty()) return absl::OkStatus();
-  const std::optional<FileStamp> stamp = StampOf(options_.grants);
   const int64_t now = now_();
   std::function<void()> tell;
   absl::Status status;
   {
     sync::MutexLock lock(mutex_);
+    if (options_.grants.empty()) return absl::OkStatus();
+    const std::optional<FileStamp> stamp = StampOf(options_.grants);
     const bool read = !looked_ || again || stamp != stamp_;
     if (read) {
       const bool first = !std::exchange(looked_, true);
@@ -77,6 +77,30 @@ absl::Status Access::Look(bool again) {
   }
   if (tell) tell();
   return status;
+}
+
+absl::Status Access::Change(AccessOptions options) {
+  Grants grants;
+  std::optional<FileStamp> stamp;
+  if (!options.grants.empty()) {
+    stamp = StampOf(options.grants);
+    absl::StatusOr<Grants> read = ReadGrants(options.grants);
+    if (!read.ok()) return read.status();
+    grants = *std::move(read);
+  }
+  std::function<void()> tell;
+  {
+    sync::MutexLock lock(mutex_);
+    options_ = std::move(options);
+    grants_ = std::move(grants);
+    stamp_ = stamp;
+    looked_ = true;
+    trouble_.clear();
+    looked_s_ = now_();
+    tell = on_change_;
+  }
+  if (tell) tell();
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Caller> Access::Find(Caller::By by, const std::string& key) const {

@@ -74,6 +74,9 @@ class Access {
   // Reads the file if it is another than last time, or `again`. Answers what is wrong with it. Tells
   // on_change if the file was read, or if a token has expired since the last look.
   absl::Status Look(bool again = false);
+  // Other options, with their file as it is now: InvalidArgument or so if that is wrong, and those in force
+  // stay. Tells on_change.
+  absl::Status Change(AccessOptions options);
   // After a Look that may have taken something from somebody. Called by whoever calls Look.
   void SetOnChange(std::function<void()> on_change);
 
@@ -88,7 +91,7 @@ class Access {
  private:
   absl::StatusOr<Caller> Find(Caller::By by, const std::string& key) const VOXELD_REQUIRES(mutex_);
 
-  const AccessOptions options_;
+  AccessOptions options_ VOXELD_GUARDED_BY(mutex_);
   const WallClock now_;
   Logger* const log_;
   mutable sync::Mutex mutex_;

@@ -79,6 +79,7 @@ struct ListenFigures {
   uint64_t calls_turned_away = 0, calls_revoked = 0;
   std::string unreachable;     // empty: they work; else why they do not
   std::string access_trouble;  // what is wrong with grants, certificate or key; empty: nothing
+  std::string config_trouble;  // why the configuration was not taken when it was read again
 };
 
 // What is kept over the daemon's end.

@@ -46,6 +46,9 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   if (!stats.connections.access_trouble.empty()) {
     reasons.push_back({{"what", "access"}, {"why", stats.connections.access_trouble}});
   }
+  if (!stats.connections.config_trouble.empty()) {
+    reasons.push_back({{"what", "configuration"}, {"why", stats.connections.config_trouble}});
+  }
   for (const DisplayFigures& figures : stats.displays) {
     held = held || figures.volume_held;
     if (figures.engine_degraded.empty()) continue;

@@ -108,9 +108,15 @@ absl::StatusOr<Logger::Format> Logger::ParseFormat(std::string_view text) {
 }
 
 void Logger::LimitEach(uint32_t lines_per_second, sync::Clock& clock) {
+  clock_ = &clock;
   lines_per_second_ = lines_per_second;
-  clock_ = lines_per_second == 0 ? nullptr : &clock;
 }
+
+void Logger::SetLinesPerSecond(uint32_t lines_per_second) {
+  if (clock_ != nullptr) lines_per_second_ = lines_per_second;
+}
+
+void Logger::SetLevel(Level level) { logger_->set_level(ToSpdlog(level)); }
 
 bool Logger::TakeShare(std::string_view event, uint64_t* left_out) {
   const sync::MutexLock lock(mutex_);
@@ -134,7 +140,7 @@ bool Logger::TakeShare(std::string_view event, uint64_t* left_out) {
 void Logger::Log(Level level, std::string_view event, Fields fields) {
   if (!logger_->should_log(ToSpdlog(level))) return;
   uint64_t left_out = 0;
-  if (clock_ != nullptr && !TakeShare(event, &left_out)) return;
+  if (lines_per_second_ > 0 && !TakeShare(event, &left_out)) return;
   const std::string line = LineOf(format_, event, fields, left_out);
   logger_->log(ToSpdlog(level), spdlog::string_view_t(line.data(), line.size()));
 }

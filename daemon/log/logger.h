@@ -7,6 +7,8 @@
 //   json  {"time":"…","level":"info","event":"session opened","session":"3","client":"a \"b\""}
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <map>
@@ -49,6 +51,9 @@ class Logger {
   // From now on at most so many lines a second of one event; the next one of it that is written has `lines_left_out`.
   // 0: any number. `clock` outlives the logger. To be called before others log.
   void LimitEach(uint32_t lines_per_second, sync::Clock& clock);
+  // Another number, if LimitEach gave a clock; another level.
+  void SetLinesPerSecond(uint32_t lines_per_second);
+  void SetLevel(Level level);
 
   // "trace" … "off", "text", "json"; InvalidArgument lists them.
   static absl::StatusOr<Level> ParseLevel(std::string_view text);
@@ -72,7 +77,7 @@ class Logger {
 
   const Format format_;
   sync::Clock* clock_ = nullptr;  // null: no limit
-  uint32_t lines_per_second_ = 0;
+  std::atomic<uint32_t> lines_per_second_ = 0;
   sync::Mutex mutex_;
   std::map<std::string, Share, std::less<>> shares_ VOXELD_GUARDED_BY(mutex_);
   const std::unique_ptr<spdlog::logger> logger_;

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -65,6 +66,12 @@ Supervisor Supervisor::OfProcess() {
 
 void Supervisor::Ready(std::string_view status) const {
   Tell(absl::StrCat("READY=1\nSTATUS=", absl::string_view(status.data(), status.size())));
+}
+void Supervisor::Reloading() const {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  const int64_t us = int64_t{now.tv_sec} * 1'000'000 + now.tv_nsec / 1000;
+  Tell(absl::StrCat("RELOADING=1\nMONOTONIC_USEC=", us, "\nSTATUS=reading its files again"));
 }
 void Supervisor::Alive() const { Tell("WATCHDOG=1"); }
 void Supervisor::Stopping() const { Tell("STOPPING=1\nSTATUS=shutting down"); }

@@ -41,6 +41,7 @@ class Supervisor {
 
   void Ready(std::string_view status) const;
   void Alive() const;
+  void Reloading() const;  // until Ready is told again
   void Stopping() const;
   void Status(std::string_view status) const;  // a line for people
 

@@ -103,6 +103,7 @@ void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
   out->set_calls_turned_away(in.calls_turned_away);
   out->set_calls_revoked(in.calls_revoked);
   out->set_access_trouble(in.access_trouble);
+  out->set_config_trouble(in.config_trouble);
 }
 
 }  // namespace

@@ -109,8 +109,11 @@ HWY_ATTR inline VBytes LookUp(const uint8_t* table, VBytes index) {
   VBytes out = hn::Zero(d);
   for (uint8_t high = 0; high < 16; ++high) {
     // Below 0x80 only where the upper nibble is `high`; from there on the look-up gives 0.
-    const VBytes at = hn::SaturatedAdd(hn::Xor(index, hn::Set(d, static_cast<uint8_t>(high << 4))),
-                                       hn::Set(d, 0x70));
+    VBytes at = hn::SaturatedAdd(hn::Xor(index, hn::Set(d, static_cast<uint8_t>(high << 4))),
+                                 hn::Set(d, 0x70));
+#if !HWY_ARCH_X86 || HWY_TARGET == HWY_EMU128
+    at = hn::And(at, hn::Set(d, 0x8F));  // the others look at the bits between as well
+#endif
     out = hn::Or(out, hn::TableLookupBytesOr0(hn::LoadDup128(d, table + 16 * high), at));
   }
   return out;

@@ -225,7 +225,7 @@ class Wall {
 uint64_t VolumesWanted() {
   const char* wanted = std::getenv("VOXELD_GENLOCK_VOLUMES");
   if (wanted != nullptr) return std::strtoull(wanted, nullptr, 10);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(VOXELD_SANITIZED)
   return 2000;
 #else
   return 100'000;

@@ -40,7 +40,7 @@ constexpr char kAttacker[] = "127.0.0.2";
 // What comes before the listener has a connection, its greeting, comes besides.
 constexpr uint64_t kGreetingBytes = 1024;
 constexpr size_t kLarge = 1u << 20;
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(VOXELD_SANITIZED)
 constexpr bool kMemoryTells = false;  // sanitizers keep what was freed
 #else
 constexpr bool kMemoryTells = true;

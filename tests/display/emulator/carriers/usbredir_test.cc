@@ -45,7 +45,7 @@ TEST_F(Usbredir, TellsOfTheDevice) {
   EXPECT_EQ(host_.device->vendor_id, 0x1209);
   EXPECT_EQ(host_.device->product_id, 0x0001);
   EXPECT_EQ(host_.device->device_version_bcd, 0x0100);
-  ASSERT_EQ(host_.interfaces.interface_count, 1u);
+  ASSERT_EQ(uint32_t{host_.interfaces.interface_count}, 1u);
   EXPECT_EQ(host_.interfaces.interface_class[0], 0xFF);
   EXPECT_EQ(host_.endpoints.type[0x01], usb_redir_type_bulk);
   EXPECT_EQ(host_.endpoints.max_packet_size[0x01], 512);
