@@ -39,11 +39,11 @@ void PuttingUp::PutLayers(std::vector<v1::LayerInfo> layers, std::vector<v1::Str
   }
 }
 
-void PuttingUp::PutObjects(const std::map<std::pair<uint64_t, std::string>, v1::Object>& objects,
+void PuttingUp::PutObjects(const std::map<ObjectName, v1::Object>& objects,
                            std::vector<v1::StreamRequest>* out) const {
-  std::set<std::pair<uint64_t, std::string>> begun;
+  std::set<ObjectName> begun;
   // Those that others refer to come first.
-  const auto put = [&](const auto& self, const std::pair<uint64_t, std::string>& key) -> void {
+  const auto put = [&](const auto& self, const ObjectName& key) -> void {
     const auto found = objects.find(key);
     if (found == objects.end() || !begun.insert(key).second) return;
     for (const v1::Object::Part& part : found->second.parts()) {
@@ -90,6 +90,29 @@ void PuttingUp::PutMasks(std::vector<v1::StreamRequest>* out) {
   }
 }
 
+std::vector<PuttingUp::ObjectName> PuttingUp::InOrderOfLeaving(
+    const v1::WatchSceneResponse& changes) const {
+  std::set<ObjectName> left;
+  for (const v1::ObjectKey& key : changes.removed_objects()) {
+    left.insert({key.owner(), key.object()});
+  }
+  std::vector<ObjectName> order;
+  const auto go = [&](const auto& self, const ObjectName& name) -> void {
+    if (left.erase(name) == 0) return;
+    const auto found = mirror_.objects().find(name);
+    if (found != mirror_.objects().end()) {
+      for (const v1::Object::Part& part : found->second.parts()) {
+        if (!part.primitive().has_instance()) continue;
+        self(self, {name.first, part.primitive().instance().object()});
+      }
+    }
+    order.push_back(name);
+  };
+  while (!left.empty()) go(go, ObjectName(*left.begin()));
+  std::reverse(order.begin(), order.end());  // parts were found first
+  return order;
+}
+
 std::vector<v1::StreamRequest> PuttingUp::Step(const v1::WatchSceneResponse& changes) {
   std::vector<v1::StreamRequest> out;
   const auto empty = [&](const LayerName& layer) {
@@ -116,8 +139,9 @@ std::vector<v1::StreamRequest> PuttingUp::Step(const v1::WatchSceneResponse& cha
     remove->set_layer(NameOf({key.owner(), key.layer()}));
     remove->set_id(key.id());
   }
+  const std::vector<ObjectName> leaving = InOrderOfLeaving(changes);
   mirror_.Apply(changes);
-  std::map<std::pair<uint64_t, std::string>, v1::Object> objects;
+  std::map<ObjectName, v1::Object> objects;
   for (const v1::WatchedObject& object : changes.objects()) {
     objects[{object.key().owner(), object.key().object()}] = object.definition();
   }
@@ -125,9 +149,9 @@ std::vector<v1::StreamRequest> PuttingUp::Step(const v1::WatchSceneResponse& cha
   PutLayers({changes.layers().begin(), changes.layers().end()}, &out);
   PutMasks(&out);
   for (const v1::WatchedEntity& entity : changes.entities()) PutEntity(entity, &out);
-  // Whatever referred to them is gone, or refers to others now.
-  for (const v1::ObjectKey& key : changes.removed_objects()) {
-    out.emplace_back().mutable_delete_object()->set_object(ObjectOf(key.owner(), key.object()));
+  // Whatever else referred to them is gone, or refers to others now.
+  for (const auto& [owner, object] : leaving) {
+    out.emplace_back().mutable_delete_object()->set_object(ObjectOf(owner, object));
   }
   return out;
 }

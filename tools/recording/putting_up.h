@@ -7,6 +7,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tools/recording/scene_mirror.h"
@@ -29,13 +30,17 @@ class PuttingUp {
   std::vector<std::string> TakeEmptied();
 
  private:
+  using ObjectName = std::pair<uint64_t, std::string>;  // owner, object
+
   std::string NameOf(const LayerName& layer) const;  // in the daemon's scene
   static std::string ObjectOf(uint64_t owner, const std::string& name);
   static void Rename(uint64_t owner, v1::Primitive* primitive);
   void PutLayers(std::vector<v1::LayerInfo> layers, std::vector<v1::StreamRequest>* out);
-  void PutObjects(const std::map<std::pair<uint64_t, std::string>, v1::Object>& objects,
+  void PutObjects(const std::map<ObjectName, v1::Object>& objects,
                   std::vector<v1::StreamRequest>* out) const;
   void PutEntity(const v1::WatchedEntity& entity, std::vector<v1::StreamRequest>* out) const;
+  // Those that `changes` removes: whichever has others as parts before these.
+  std::vector<ObjectName> InOrderOfLeaving(const v1::WatchSceneResponse& changes) const;
   // Masks go by names, and a mask's layer may have become another.
   void PutMasks(std::vector<v1::StreamRequest>* out);
 

@@ -124,7 +124,7 @@ class SceneRecording : public ::testing::Test {
 };
 
 TEST_F(SceneRecording, RandomScenesComeUpAgainTheSameAfterEveryChange) {
-  for (uint32_t seed = 1; seed <= 30; ++seed) {
+  for (uint32_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(seed);
     std::filesystem::remove(path_);
     std::mt19937 random(seed);
@@ -204,6 +204,34 @@ TEST_F(SceneRecording, RandomScenesComeUpAgainTheSameAfterEveryChange) {
     }
     if (HasFailure()) return;
   }
+}
+
+TEST(Objects, ThatLeaveTogetherLeaveBeforeTheirParts) {
+  v1::WatchSceneResponse defined, removed;
+  for (const char* name : {"a", "b", "c"}) {
+    v1::WatchedObject* object = defined.add_objects();
+    object->mutable_key()->set_owner(7);
+    object->mutable_key()->set_object(name);
+    *removed.add_removed_objects() = object->key();
+  }
+  // b has a, and c has b.
+  const auto part = [&](int of) {
+    return defined.mutable_objects(of)->mutable_definition()->add_parts()->mutable_primitive();
+  };
+  part(0)->mutable_sphere();
+  part(1)->mutable_instance()->set_object("a");
+  part(2)->mutable_instance()->set_object("b");
+  PuttingUp up;
+  const auto names = [](const std::vector<v1::StreamRequest>& requests) {
+    std::vector<std::string> out;
+    for (const v1::StreamRequest& request : requests) {
+      out.push_back(request.has_define_object() ? "+" + request.define_object().object()
+                                                : "-" + request.delete_object().object());
+    }
+    return out;
+  };
+  EXPECT_THAT(names(up.Step(defined)), ::testing::ElementsAre("+7/a", "+7/b", "+7/c"));
+  EXPECT_THAT(names(up.Step(removed)), ::testing::ElementsAre("-7/c", "-7/b", "-7/a"));
 }
 
 TEST_F(SceneRecording, AFileWithoutASceneSaysSo) {
