@@ -95,18 +95,20 @@ function(voxeld_test_options name)
   endif()
 endfunction()
 
-# Under a sanitizer, where no header is compiled alone anyway, what most files include is compiled once for all of them.
-set(VOXELD_COMMON_HEADERS OFF)
+# Under a sanitizer, where no header is compiled alone anyway, what most files include is compiled once for all of them: for those that
+# are optimised, and for the others (VOXELD_PLAIN).
 if(VOXELD_SANITIZE)
-  set(VOXELD_COMMON_HEADERS ON)
-  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/common.cc CONTENT "int voxeld_common_headers;\n" @ONLY)
-  add_library(voxeld_common_headers OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/common.cc)
-  target_precompile_headers(voxeld_common_headers PRIVATE
-    <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
-    <algorithm> <array> <chrono> <cmath> <functional> <map> <memory> <optional> <span> <string> <thread> <utility> <variant>
-    <vector>)
-  target_link_libraries(voxeld_common_headers PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::statusor absl::strings)
-  target_compile_options(voxeld_common_headers PRIVATE -pthread)
+  foreach(headers voxeld_common_headers voxeld_common_headers_plain)
+    file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${headers}.cc CONTENT "int ${headers};\n" @ONLY)
+    add_library(${headers} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${headers}.cc)
+    target_precompile_headers(${headers} PRIVATE
+      <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
+      <algorithm> <array> <chrono> <cmath> <functional> <map> <memory> <optional> <span> <string> <thread> <utility> <variant>
+      <vector>)
+    target_link_libraries(${headers} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::statusor absl::strings)
+    target_compile_options(${headers} PRIVATE -pthread)
+  endforeach()
+  target_compile_options(voxeld_common_headers_plain PRIVATE -O0)
 endif()
 
 # voxeld_unwatched(SOURCE …): sources that share nothing with other threads; ThreadSanitizer is not asked to look on.
@@ -153,9 +155,13 @@ function(voxeld_library name)
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
   if(unwatched)
     target_compile_options(voxeld_${name} PRIVATE -fno-sanitize=thread)
-  elseif(VOXELD_COMMON_HEADERS)
+  elseif(VOXELD_SANITIZE)
     target_compile_options(voxeld_${name} PRIVATE -pthread)
-    target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers)
+    if(VOXELD_PLAIN)
+      target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers_plain)
+    else()
+      target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers)
+    endif()
   endif()
 endfunction()
 

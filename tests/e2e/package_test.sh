@@ -34,6 +34,7 @@ dpkg-deb -c "$deb" | awk '$1 !~ /^d/ { print $1, $2, $6 }' >"$work/contents"
 cat >"$work/expected" <<'EOT'
 -rwxr-xr-x root/root ./usr/bin/voxelctl
 -rwxr-xr-x root/root ./usr/bin/voxeld
+-rw-r--r-- root/root ./usr/lib/systemd/system/voxeld-playlist.service
 -rw-r--r-- root/root ./usr/lib/systemd/system/voxeld.service
 -rw-r--r-- root/root ./usr/lib/systemd/system/voxeld.socket
 -rw-r--r-- root/root ./usr/lib/systemd/user/voxeld.service
@@ -187,9 +188,12 @@ grep -q '^video:.*:voxeld$' "$root/etc/group" || fail "not in video: $(cat "$roo
 cp -an /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/" # the targets that every unit has around it
 mkdir -p "$root/bin"
 cp /bin/kill "$root/bin/" # of a package that it depends on
-said=$(systemd-analyze verify --root="$root" voxeld.service voxeld.socket 2>&1) || fail "systemd-analyze verify: $said"
+said=$(systemd-analyze verify --root="$root" voxeld.service voxeld.socket voxeld-playlist.service 2>&1) || fail "systemd-analyze verify: $said"
 [ -z "$said" ] || fail "systemd-analyze verify: $said"
 systemd-analyze security --offline=true --root="$root" --threshold=19 voxeld.service >"$work/security" ||
+  fail "exposed: $(cat "$work/security")"
+tail -n 1 "$work/security"
+systemd-analyze security --offline=true --root="$root" --threshold=10 voxeld-playlist.service >"$work/security" ||
   fail "exposed: $(cat "$work/security")"
 tail -n 1 "$work/security"
 
@@ -223,7 +227,7 @@ run prerm upgrade 9 && run postrm upgrade 9 && run postinst abort-upgrade 9 || f
 called </dev/null
 run prerm remove && run postrm remove || fail "a removal: $(cat "$work/said")"
 called <<'EOT'
-systemctl disable --now voxeld.service
+systemctl disable --now voxeld-playlist.service voxeld.service
 udevadm control --reload
 systemctl daemon-reload
 EOT

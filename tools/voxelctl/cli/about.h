@@ -69,6 +69,9 @@ inline constexpr const char* kRecordAbout =
     "channel \"scene\"";
 inline constexpr const char* kReplayAbout =
     "Puts a recorded scene up again, at the pace at which it was, bit for bit; it goes at the end";
+inline constexpr const char* kPlaylistAbout =
+    "Plays recordings and presets one after another by a playlist, cross-faded, each at its hours, "
+    "until Ctrl-C";
 inline constexpr const char* kInputAbout =
     "Takes lights in from what feeds LED controllers, until Ctrl-C: PROTOCOL is opc (Open Pixel "
     "Control), ddp,\n"

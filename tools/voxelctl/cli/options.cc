@@ -60,6 +60,7 @@ class Parser {
     AddTokenOptions(Add("token", kTokenAbout), &token_);
     AddRecordOptions(Add("record", kRecordAbout), &record_);
     AddReplayOptions(Add("replay", kReplayAbout), &replay_);
+    AddPlaylistOptions(Add("playlist", kPlaylistAbout), &playlist_);
     input_texts_.Add(Add("input", kInputAbout));
     pipe_texts_.Add(Add("pipe", kPipeAbout));
     Add("doctor", kDoctorAbout);
@@ -289,17 +290,18 @@ class Parser {
       options_.command = draw_;
       return;
     }
-    TakePlain(name == "snapshot"  ? &snapshot_.file
-              : name == "gallery" ? &gallery_.file
-              : name == "pattern" ? &pattern_name_
-              : name == "verify"  ? &verify_.display
-              : name == "profile" ? &profile_.profile
-              : name == "init"    ? &init_.file
-              : name == "token"   ? &token_.name
-              : name == "record"  ? &record_.file
-              : name == "replay"  ? &replay_.file
-              : name == "why"     ? &why_.id
-                                  : nullptr);
+    TakePlain(name == "snapshot"   ? &snapshot_.file
+              : name == "gallery"  ? &gallery_.file
+              : name == "pattern"  ? &pattern_name_
+              : name == "verify"   ? &verify_.display
+              : name == "profile"  ? &profile_.profile
+              : name == "init"     ? &init_.file
+              : name == "token"    ? &token_.name
+              : name == "record"   ? &record_.file
+              : name == "replay"   ? &replay_.file
+              : name == "playlist" ? &playlist_.file
+              : name == "why"      ? &why_.id
+                                   : nullptr);
     if (name == "snapshot") return FillInSnapshot();
     if (name == "gallery") {
       if (gallery_.file.empty()) throw UsageError{"gallery wants the name of a file, OUT.png"};
@@ -318,6 +320,7 @@ class Parser {
     if (name == "token") FillInChecked(token_, CheckTokenOptions);
     if (name == "record") FillInChecked(record_, CheckRecordOptions);
     if (name == "replay") FillInChecked(replay_, CheckReplayOptions);
+    if (name == "playlist") FillInChecked(playlist_, CheckPlaylistOptions);
     if (name == "why") FillInChecked(why_, CheckWhyOptions);
     if (name == "input") options_.command = input_texts_.Read();
     if (name == "pipe") options_.command = pipe_texts_.Read();
@@ -467,6 +470,7 @@ class Parser {
   TokenOptions token_;
   RecordOptions record_;
   ReplayOptions replay_;
+  PlaylistOptions playlist_;
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
   std::string profile_action_;

@@ -126,6 +126,12 @@ struct TokenOptions {
 struct RecordOptions {
   std::string file;       // must not be there yet
   double duration_s = 0;  // 0: until an interrupt
+  bool still = false;     // the scene as it is, and no more
+};
+
+struct PlaylistOptions {
+  std::string file;
+  bool check = false;  // only say what is in it
 };
 
 struct ReplayOptions {
@@ -165,8 +171,8 @@ struct Options {
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions, TokenOptions, RecordOptions, ReplayOptions, InputOptions, PipeOptions,
-               WhyOptions>
+               InitOptions, TokenOptions, RecordOptions, ReplayOptions, PlaylistOptions,
+               InputOptions, PipeOptions, WhyOptions>
       command;
 };
 

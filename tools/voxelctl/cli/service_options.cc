@@ -47,12 +47,17 @@ void AddRecordOptions(CLI::App* command, RecordOptions* options) {
   command->add_option("FILE.mcap", options->file, "Where it goes; must not be there yet");
   AddNumber(command, "--duration", &options->duration_s, 0, 1e9,
             "End after so many seconds; 0: at Ctrl-C", "S");
+  command->add_flag("--still", options->still,
+                    "The scene as it is now, and end: a preset, for replay --keep and playlists");
 }
 
 void CheckRecordOptions(const RecordOptions& options) {
   if (options.file.empty()) throw UsageError{"record wants the name of a file, such as show.mcap"};
   if (!absl::EndsWithIgnoreCase(options.file, ".mcap")) {
     throw UsageError{"record writes MCAP: give the file a name that ends with .mcap"};
+  }
+  if (options.still && options.duration_s > 0) {
+    throw UsageError{"--still and --duration do not go together"};
   }
 }
 
@@ -65,6 +70,18 @@ void AddWhyOptions(CLI::App* command, WhyOptions* options) {
 
 void CheckWhyOptions(const WhyOptions& options) {
   if (options.id.empty()) throw UsageError{"why wants the ID of an entity; entities lists them"};
+}
+
+void AddPlaylistOptions(CLI::App* command, PlaylistOptions* options) {
+  command->add_option("FILE.toml", options->file, "What is played, and when");
+  command->add_flag("--check", options->check,
+                    "Say what is wrong with it, or what it would play now; needs no daemon");
+}
+
+void CheckPlaylistOptions(const PlaylistOptions& options) {
+  if (options.file.empty()) {
+    throw UsageError{"playlist wants the name of a file, such as week.toml"};
+  }
 }
 
 void AddReplayOptions(CLI::App* command, ReplayOptions* options) {

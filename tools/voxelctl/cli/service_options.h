@@ -14,6 +14,8 @@ namespace voxeld::voxelctl {
 void AddTokenOptions(CLI::App* command, TokenOptions* options);
 void AddVerifyOptions(CLI::App* command, VerifyOptions* options);
 void AddRecordOptions(CLI::App* command, RecordOptions* options);
+void AddPlaylistOptions(CLI::App* command, PlaylistOptions* options);
+void CheckPlaylistOptions(const PlaylistOptions& options);
 void AddReplayOptions(CLI::App* command, ReplayOptions* options);
 void AddWhyOptions(CLI::App* command, WhyOptions* options);
 

@@ -15,8 +15,6 @@
 
 namespace voxeld::voxelctl {
 
-using Connector = std::function<absl::StatusOr<std::unique_ptr<Connection>>()>;
-
 // Reads the files before it connects: nothing is put up unless all of them can be.
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console);

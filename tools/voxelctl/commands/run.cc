@@ -10,6 +10,7 @@
 #include "tools/voxelctl/doctor/doctor.h"
 #include "tools/voxelctl/init/init.h"
 #include "tools/voxelctl/lights/lights.h"
+#include "tools/voxelctl/playlist/play_list.h"
 #include "tools/voxelctl/profile/profile.h"
 #include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/token/token.h"
@@ -43,6 +44,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   }
   if (const auto* profile = std::get_if<ProfileOptions>(&options.command))
     return ShowProfile(*profile, console);
+  if (const auto* playlist = std::get_if<PlaylistOptions>(&options.command))
+    return PlayList(*playlist, connect, LocalWeekMinute, interrupt, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
   if (!connected.ok()) return connected.status();
   Connection& connection = **connected;

@@ -61,4 +61,7 @@ class Connection {
   std::unique_ptr<Impl> impl_;
 };
 
+// Makes the connection when it is needed.
+using Connector = std::function<absl::StatusOr<std::unique_ptr<Connection>>()>;
+
 }  // namespace voxeld::voxelctl

@@ -101,8 +101,9 @@ absl::Status Record(const RecordOptions& options, Connection& connection, Interr
   absl::Status wrong;
   absl::Status status = connection.WatchScene(request, [&](const v1::WatchSceneResponse& message) {
     wrong = taping.Add(message);
-    if (message.in_sync() != 0) console.Progress(absl::StrCat("recording  ", taping.Figures()));
-    return wrong.ok();
+    if (message.in_sync() == 0) return wrong.ok();
+    console.Progress(absl::StrCat("recording  ", taping.Figures()));
+    return wrong.ok() && !options.still;  // the first change set is the whole scene
   });
   console.EndProgress();
   if (wrong.ok()) wrong = taping.Close();

@@ -8,9 +8,8 @@
 #include "absl/strings/str_format.h"
 #include "display/sync/clock.h"
 #include "tools/recording/mcap.h"
-#include "tools/recording/putting_up.h"
 #include "tools/recording/scene_recording.h"
-#include "tools/voxelctl/connection/raw_stream.h"
+#include "tools/voxelctl/record/playback.h"
 #include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -35,51 +34,30 @@ class Run {
         from_ns_(static_cast<uint64_t>(options.from_s * sync::kSecond)) {}
 
   absl::Status Begin() {
-    v1::Open open;
-    open.set_client_name("voxelctl replay");
-    open.set_on_disconnect(options_.keep ? v1::DISCONNECT_POLICY_KEEP
-                                         : v1::DISCONNECT_POLICY_CLEAR);
-    absl::StatusOr<std::unique_ptr<RawStream>> stream = connection_.OpenRawStream(std::move(open));
-    if (!stream.ok()) return stream.status();
-    stream_ = *std::move(stream);
+    absl::StatusOr<std::unique_ptr<Playback>> playback =
+        Playback::Begin({.client_name = "voxelctl replay", .keep = options_.keep}, connection_);
+    if (!playback.ok()) return playback.status();
+    playback_ = *std::move(playback);
     began_ = clock_.Now();
     return absl::OkStatus();
   }
 
-  absl::Status Take(recording::ChangeSet set) {
+  absl::Status Take(const recording::ChangeSet& set) {
     const uint64_t at = set.time_ns - std::min(set.time_ns, summary_.start_ns);
     if (at < from_ns_) {
-      scene_.Skip(set.changes);
-      skipped_ = true;
+      playback_->Skip(set.changes);
       return absl::OkStatus();
     }
     if (absl::Status status = Await(at); !status.ok()) return status;
-    std::vector<v1::StreamRequest> requests;
-    if (std::exchange(skipped_, false)) {
-      scene_.Skip(set.changes);
-      requests = scene_.Whole();
-    } else {
-      requests = scene_.Step(set.changes);
-    }
-    for (const v1::StreamRequest& request : requests) {
-      if (absl::Status status = stream_->Send(request); !status.ok()) return status;
-    }
-    absl::StatusOr<v1::Accepted> accepted = stream_->Commit();
-    if (!accepted.ok()) return accepted.status();
-    for (const v1::Issue& issue : stream_->TakeIssues()) {
+    const absl::StatusOr<uint64_t> snapshot = playback_->Put(set.changes);
+    if (!snapshot.ok()) return snapshot.status();
+    for (const v1::Issue& issue : playback_->TakeIssues()) {
       if (++issues_ > kMostSaid || issue.applied()) continue;
       console_.Say(absl::StrCat("not as recorded: ", EscapeForTerminal(issue.layer()), " ",
                                 EscapeForTerminal(issue.id()), ": ",
                                 EscapeForTerminal(issue.message())));
     }
-    // Empty by now, and to be made anew where they come again.
-    for (const std::string& layer : scene_.TakeEmptied()) {
-      v1::ClearLayerRequest clear;
-      clear.set_owner(stream_->owner());
-      clear.set_layer(layer);
-      if (absl::Status status = connection_.ClearLayer(clear).status(); !status.ok()) return status;
-    }
-    return Tell(at, set.snapshot, accepted->snapshot());
+    return Tell(at, set.snapshot, *snapshot);
   }
 
   // With --step, after one more line: what is up goes then.
@@ -87,7 +65,7 @@ class Run {
     if (options_.step) {
       if (absl::Status status = Await(0); !status.ok()) return status;
     }
-    return stream_->Close();
+    return playback_->End();
   }
 
  private:
@@ -127,9 +105,7 @@ class Run {
   const uint64_t from_ns_;
   sync::SystemClock clock_;
   sync::TimeNs began_ = 0;
-  std::unique_ptr<RawStream> stream_;
-  recording::PuttingUp scene_;
-  bool skipped_ = false;
+  std::unique_ptr<Playback> playback_;
   size_t issues_ = 0;
 };
 
@@ -159,7 +135,7 @@ absl::Status Replay(const ReplayOptions& options, Connection& connection, Interr
     if (absl::Status status = run.Begin(); !status.ok()) return status;
     absl::Status wrong;
     absl::Status read = recording::ReadScene(reader, [&](recording::ChangeSet set) {
-      wrong = run.Take(std::move(set));
+      wrong = run.Take(set);
       return wrong.ok();
     });
     console.EndProgress();

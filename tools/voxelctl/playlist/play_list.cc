@@ -1,0 +1,169 @@
+#include "tools/voxelctl/playlist/play_list.h"
+
+#include <algorithm>
+#include <ctime>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "display/sync/clock.h"
+#include "tools/voxelctl/playlist/showing.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr sync::TimeNs kFadeStep = sync::kSecond / 30;
+constexpr sync::TimeNs kLook = sync::kSecond / 5;  // at the time of day, and at what is on
+
+bool IsOfTheServer(const absl::Status& status) {
+  return absl::IsUnavailable(status) || absl::IsUnauthenticated(status) ||
+         absl::IsPermissionDenied(status);
+}
+
+std::string LinesForTerminal(absl::string_view lines) {
+  return absl::StrJoin(
+      absl::StrSplit(lines, '\n'), "\n",
+      [](std::string* out, absl::string_view line) { out->append(EscapeForTerminal(line)); });
+}
+
+class Player {
+ public:
+  Player(const Playlist& playlist, Connection& connection, const std::function<WeekMinute()>& now,
+         Interrupt& interrupt, Console& console)
+      : playlist_(playlist),
+        connection_(connection),
+        now_(now),
+        interrupt_(interrupt),
+        console_(console) {}
+
+  absl::Status Run() {
+    std::optional<size_t> at;
+    size_t failed = 0;  // one after another
+    while (!interrupt_.requested()) {
+      const std::optional<size_t> next = NextItem(playlist_, at, now_());
+      if (!next.has_value()) {
+        const bool over = !playlist_.loop && at.has_value();
+        if (absl::Status status = FadeTo(nullptr); !status.ok() || over) {
+          return interrupt_.requested() ? absl::OkStatus() : status;
+        }
+        if (Wait(kLook)) break;
+        continue;
+      }
+      const PlaylistItem& item = playlist_.items[*next];
+      const bool stays = shown_ != nullptr && next == at && shown_->still();
+      absl::Status status;
+      if (!stays) status = Show(item);
+      at = next;
+      if (status.ok()) status = Stay(item);
+      if (interrupt_.requested()) break;
+      if (status.ok()) {
+        failed = 0;
+        continue;
+      }
+      if (IsOfTheServer(status) || ++failed == playlist_.items.size()) return status;
+      console_.Say(absl::StrCat(EscapeForTerminal(item.file),
+                                " is passed over: ", EscapeForTerminal(status.message())));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  // As long as what is shown is to be on.
+  absl::Status Stay(const PlaylistItem& item) {
+    const sync::TimeNs end =
+        clock_.Now() + static_cast<sync::TimeNs>(shown_->seconds() * sync::kSecond);
+    while (clock_.Now() < end && IsWithin(item.hours, now_())) {
+      if (Wait(std::min(kLook, end - clock_.Now()))) break;
+      if (absl::Status status = shown_->status(); !status.ok()) return status;
+    }
+    return absl::OkStatus();
+  }
+
+  bool Wait(sync::TimeNs time) { return interrupt_.WaitUntil(clock_, clock_.Now() + time); }
+
+  absl::Status Show(const PlaylistItem& item) {
+    const bool fades = playlist_.cross_fade_s > 0;
+    absl::StatusOr<std::unique_ptr<Showing>> showing =
+        Showing::Begin(item, fades ? 0 : 1, connection_, clock_);
+    if (!showing.ok()) return showing.status();
+    if (console_.json()) {
+      const nlohmann::ordered_json line = {{"file", item.file}, {"seconds", (*showing)->seconds()}};
+      if (!console_.Data(line.dump() + "\n")) return absl::CancelledError("nobody reads any more");
+    } else {
+      console_.Say(
+          absl::StrFormat("%s, %.1f s", EscapeForTerminal(item.file), (*showing)->seconds()));
+    }
+    return FadeTo(*std::move(showing));
+  }
+
+  // From what is shown to `next`, which may be nothing.
+  absl::Status FadeTo(std::unique_ptr<Showing> next) {
+    const sync::TimeNs begin = clock_.Now();
+    const auto length = static_cast<sync::TimeNs>(playlist_.cross_fade_s * sync::kSecond);
+    absl::Status status;
+    double part = length > 0 ? 0 : 1;
+    while (length > 0 && part < 1 && status.ok() && (shown_ != nullptr || next != nullptr)) {
+      if (Wait(kFadeStep)) break;
+      part = std::min(1.0, static_cast<double>(clock_.Now() - begin) / static_cast<double>(length));
+      if (next != nullptr) status = next->SetOpacity(part);
+      if (shown_ != nullptr && status.ok()) status = shown_->SetOpacity(1 - part);
+      if (next != nullptr && status.ok()) status = next->status();
+    }
+    shown_ = std::move(next);
+    return status;
+  }
+
+  const Playlist& playlist_;
+  Connection& connection_;
+  const std::function<WeekMinute()>& now_;
+  Interrupt& interrupt_;
+  Console& console_;
+  sync::SystemClock clock_;
+  std::unique_ptr<Showing> shown_;
+};
+
+absl::Status Check(const Playlist& playlist, WeekMinute now, Console& console) {
+  const std::optional<size_t> next = NextItem(playlist, std::nullopt, now);
+  const std::string on = next.has_value() ? playlist.items[*next].file : "";
+  if (console.json()) {
+    const nlohmann::ordered_json line = {{"items", playlist.items.size()}, {"first_now", on}};
+    console.Data(line.dump() + "\n");
+  } else {
+    console.Data(absl::StrCat(
+        playlist.items.size(), playlist.items.size() == 1 ? " item" : " items", "; now ",
+        on.empty() ? "nothing is on" : absl::StrCat("it begins with ", EscapeForTerminal(on)),
+        "\n"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+WeekMinute LocalWeekMinute() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  const int day = (local.tm_wday + 6) % 7;  // from Monday
+  return day * kDayMinutes + local.tm_hour * 60 + local.tm_min;
+}
+
+absl::Status PlayList(const PlaylistOptions& options, const Connector& connect,
+                      const std::function<WeekMinute()>& now, Interrupt& interrupt,
+                      Console& console) {
+  const absl::StatusOr<Playlist> playlist = ReadPlaylist(options.file);
+  if (!playlist.ok()) {
+    return {playlist.status().code(), LinesForTerminal(playlist.status().message())};
+  }
+  if (options.check) return Check(*playlist, now(), console);
+  const absl::StatusOr<std::unique_ptr<Connection>> connection = connect();
+  if (!connection.ok()) return connection.status();
+  return Player(*playlist, **connection, now, interrupt, console).Run();
+}
+
+}  // namespace voxeld::voxelctl

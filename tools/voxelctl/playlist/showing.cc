@@ -1,0 +1,121 @@
+#include "tools/voxelctl/playlist/showing.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "tools/recording/scene_recording.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr double kLeastLength = 0.1;  // seconds; what is shorter is not played over and over
+
+}  // namespace
+
+Showing::Showing(const PlaylistItem& item, double opacity, Connection& connection,
+                 sync::Clock& clock)
+    : item_(item), connection_(connection), clock_(clock), opacity_(opacity) {}
+
+absl::StatusOr<std::unique_ptr<Showing>> Showing::Begin(const PlaylistItem& item, double opacity,
+                                                        Connection& connection,
+                                                        sync::Clock& clock) {
+  std::unique_ptr<Showing> showing(new Showing(item, opacity, connection, clock));
+  auto reader = recording::McapReader::Open(item.file);
+  if (!reader.ok()) return reader.status();
+  showing->reader_ = *std::move(reader);
+  const absl::StatusOr<recording::McapSummary> summary = showing->reader_->Summarise();
+  if (!summary.ok()) return summary.status();
+  const double length =
+      static_cast<double>(summary->end_ns - summary->start_ns) / sync::kSecond / item.speed;
+  showing->start_ns_ = summary->start_ns;
+  showing->still_ = length < kLeastLength;
+  if (showing->still_ && !item.seconds.has_value()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(item.file, " is one state of a scene; give its item seconds"));
+  }
+  showing->seconds_ = item.seconds.value_or(length);
+  showing->thread_ = std::thread([it = showing.get()] { it->Run(); });
+  return showing;
+}
+
+Showing::~Showing() {
+  {
+    const sync::MutexLock lock(mutex_);
+    stop_ = true;
+    changed_.NotifyAll();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+absl::Status Showing::status() const {
+  const sync::MutexLock lock(mutex_);
+  return status_;
+}
+
+absl::Status Showing::SetOpacity(double opacity) {
+  const sync::MutexLock lock(mutex_);
+  opacity_ = opacity;
+  return playback_ == nullptr ? absl::OkStatus() : playback_->SetOpacity(opacity);
+}
+
+bool Showing::AwaitOrStop(sync::TimeNs due) {
+  const sync::MutexLock lock(mutex_);
+  while (!stop_ && clock_.Now() < due) clock_.WaitUntil(mutex_, changed_, due);
+  return !stop_;
+}
+
+void Showing::Run() {
+  absl::Status status;
+  do {
+    status = PlayOnce();
+  } while (status.ok());
+  std::shared_ptr<Playback> last;
+  {
+    const sync::MutexLock lock(mutex_);
+    status_ = status;
+    last = std::exchange(playback_, nullptr);
+  }
+  if (last != nullptr) (void)last->End();  // on its way out
+}
+
+// Through the file; Cancelled when it is to stop. What the time before has put up goes when the first state is there.
+absl::Status Showing::PlayOnce() {
+  double opacity = 0;
+  {
+    const sync::MutexLock lock(mutex_);
+    if (stop_) return absl::CancelledError("stopped");
+    opacity = opacity_;
+  }
+  absl::StatusOr<std::unique_ptr<Playback>> begun =
+      Playback::Begin({.client_name = "voxelctl playlist", .opacity = opacity}, connection_);
+  if (!begun.ok()) return begun.status();
+  const std::shared_ptr<Playback> playback = *std::move(begun);
+  const sync::TimeNs began = clock_.Now();
+  std::shared_ptr<Playback> before;
+  bool first = true;
+  absl::Status wrong;
+  reader_->Rewind();
+  const absl::Status read = recording::ReadScene(*reader_, [&](const recording::ChangeSet& set) {
+    const auto at = static_cast<double>(set.time_ns - std::min(set.time_ns, start_ns_));
+    if (!AwaitOrStop(began + static_cast<sync::TimeNs>(at / item_.speed))) {
+      wrong = absl::CancelledError("stopped");
+      return false;
+    }
+    wrong = playback->Put(set.changes).status();
+    if (wrong.ok() && std::exchange(first, false)) {
+      const sync::MutexLock lock(mutex_);
+      before = std::exchange(playback_, playback);
+      if (opacity_ != opacity) wrong = playback->SetOpacity(opacity_);  // told while it came up
+    }
+    if (before != nullptr && wrong.ok()) wrong = std::exchange(before, nullptr)->End();
+    return wrong.ok();
+  });
+  if (!wrong.ok()) return wrong;
+  if (!read.ok()) return read;
+  // One state stays up until it is told to go.
+  if (still_) (void)AwaitOrStop(sync::kNever);
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::voxelctl
