@@ -72,6 +72,9 @@ inline constexpr const char* kReplayAbout =
 inline constexpr const char* kPlaylistAbout =
     "Plays recordings and presets one after another by a playlist, cross-faded, each at its hours, "
     "until Ctrl-C";
+inline constexpr const char* kMarkersAbout =
+    "Shows what a robot's programs send to their viewers (foxglove.SceneUpdate, from a Foxglove "
+    "WebSocket server), until Ctrl-C";
 inline constexpr const char* kInputAbout =
     "Takes lights in from what feeds LED controllers, until Ctrl-C: PROTOCOL is opc (Open Pixel "
     "Control), ddp,\n"

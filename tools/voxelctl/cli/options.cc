@@ -61,6 +61,7 @@ class Parser {
     AddRecordOptions(Add("record", kRecordAbout), &record_);
     AddReplayOptions(Add("replay", kReplayAbout), &replay_);
     AddPlaylistOptions(Add("playlist", kPlaylistAbout), &playlist_);
+    AddMarkersOptions(Add("markers", kMarkersAbout), &markers_);
     input_texts_.Add(Add("input", kInputAbout));
     pipe_texts_.Add(Add("pipe", kPipeAbout));
     Add("doctor", kDoctorAbout);
@@ -300,6 +301,7 @@ class Parser {
               : name == "record"   ? &record_.file
               : name == "replay"   ? &replay_.file
               : name == "playlist" ? &playlist_.file
+              : name == "markers"  ? &markers_.url
               : name == "why"      ? &why_.id
                                    : nullptr);
     if (name == "snapshot") return FillInSnapshot();
@@ -320,6 +322,7 @@ class Parser {
     if (name == "token") FillInChecked(token_, CheckTokenOptions);
     if (name == "record") FillInChecked(record_, CheckRecordOptions);
     if (name == "replay") FillInChecked(replay_, CheckReplayOptions);
+    if (name == "markers") FillInChecked(markers_, CheckMarkersOptions);
     if (name == "playlist") FillInChecked(playlist_, CheckPlaylistOptions);
     if (name == "why") FillInChecked(why_, CheckWhyOptions);
     if (name == "input") options_.command = input_texts_.Read();
@@ -471,6 +474,7 @@ class Parser {
   RecordOptions record_;
   ReplayOptions replay_;
   PlaylistOptions playlist_;
+  MarkersOptions markers_;
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
   std::string profile_action_;

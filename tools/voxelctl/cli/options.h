@@ -158,6 +158,12 @@ struct InputOptions {
   bool multicast = false;  // E1.31
 };
 
+struct MarkersOptions {
+  std::string url;                  // ws://HOST:PORT
+  std::vector<std::string> topics;  // empty: all that have a scene
+  std::string layer = "markers";
+};
+
 struct PipeOptions {
   LightsOptions lights;
   double fps = 0;  // 0: as they come
@@ -172,7 +178,7 @@ struct Options {
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
                InitOptions, TokenOptions, RecordOptions, ReplayOptions, PlaylistOptions,
-               InputOptions, PipeOptions, WhyOptions>
+               InputOptions, MarkersOptions, PipeOptions, WhyOptions>
       command;
 };
 

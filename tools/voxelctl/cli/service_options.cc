@@ -84,6 +84,26 @@ void CheckPlaylistOptions(const PlaylistOptions& options) {
   }
 }
 
+void AddMarkersOptions(CLI::App* command, MarkersOptions* options) {
+  command->add_option("URL", options->url,
+                      "A Foxglove WebSocket server, such as ws://localhost:8765");
+  command
+      ->add_option("--topic", options->topics,
+                   "Only this one; may be given again. Else all that have a scene")
+      ->type_name("NAME")
+      ->expected(1);
+  command->add_option("--layer", options->layer, "The layer that they are put into")
+      ->type_name("NAME")
+      ->capture_default_str();
+}
+
+void CheckMarkersOptions(const MarkersOptions& options) {
+  if (options.url.empty()) {
+    throw UsageError{"markers wants the URL of a Foxglove server, such as ws://localhost:8765"};
+  }
+  if (options.layer.empty()) throw UsageError{"--layer wants a name"};
+}
+
 void AddReplayOptions(CLI::App* command, ReplayOptions* options) {
   command->add_option("FILE.mcap", options->file, "What record has written");
   AddNumber(command, "--speed", &options->speed, 0.001, 1000, "Times as fast as it was", "X");

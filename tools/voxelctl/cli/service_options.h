@@ -16,6 +16,8 @@ void AddVerifyOptions(CLI::App* command, VerifyOptions* options);
 void AddRecordOptions(CLI::App* command, RecordOptions* options);
 void AddPlaylistOptions(CLI::App* command, PlaylistOptions* options);
 void CheckPlaylistOptions(const PlaylistOptions& options);
+void AddMarkersOptions(CLI::App* command, MarkersOptions* options);
+void CheckMarkersOptions(const MarkersOptions& options);
 void AddReplayOptions(CLI::App* command, ReplayOptions* options);
 void AddWhyOptions(CLI::App* command, WhyOptions* options);
 

@@ -10,6 +10,7 @@
 #include "tools/voxelctl/doctor/doctor.h"
 #include "tools/voxelctl/init/init.h"
 #include "tools/voxelctl/lights/lights.h"
+#include "tools/voxelctl/markers/follow.h"
 #include "tools/voxelctl/playlist/play_list.h"
 #include "tools/voxelctl/profile/profile.h"
 #include "tools/voxelctl/record/record.h"
@@ -78,6 +79,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
           return Input(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, PipeOptions>)
           return Pipe(command, connection, interrupt, STDIN_FILENO, console);
+        if constexpr (std::is_same_v<Command, MarkersOptions>)
+          return FollowMarkers(command, connection, interrupt, console);
         return absl::OkStatus();
       },
       options.command);

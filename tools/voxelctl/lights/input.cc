@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <atomic>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -9,9 +8,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "display/sync/clock.h"
-#include "display/sync/mutex.h"
 #include "tools/lights/intake.h"
 #include "tools/lights/receiver.h"
+#include "tools/voxelctl/connection/session_end.h"
 #include "tools/voxelctl/lights/choose_lights.h"
 #include "tools/voxelctl/lights/lights.h"
 #include "tools/voxelctl/text/escape.h"
@@ -37,28 +36,6 @@ const char* NameOf(lights::Protocol protocol) {
   }
   return "Open Pixel Control";
 }
-
-// What the session's own thread says.
-class Ending {
- public:
-  void Told(const client::ConnectionChange& change) {
-    if (change.kind != client::ConnectionChange::Kind::kEnded) return;
-    const sync::MutexLock lock(mutex_);
-    status_ =
-        change.status.ok() ? absl::UnavailableError("the server ended the session") : change.status;
-    ended_.store(true);
-  }
-  bool ended() const { return ended_.load(); }
-  absl::Status status() const {
-    const sync::MutexLock lock(mutex_);
-    return status_;
-  }
-
- private:
-  mutable sync::Mutex mutex_;
-  absl::Status status_ VOXELD_GUARDED_BY(mutex_);
-  std::atomic<bool> ended_ = false;
-};
 
 nlohmann::ordered_json TallyJson(const lights::Intake& intake, const lights::Receiver& receiver,
                                  const client::Tally& session) {
@@ -122,7 +99,7 @@ absl::Status Input(const InputOptions& options, Connection& connection, Interrup
   }
   lights::Receiver& receiver = **opened;
 
-  Ending ending;
+  SessionEnd ending;
   client::Options asked;
   asked.client_name = absl::StrCat("voxelctl input ", NameOf(options.protocol));
   asked.flow = client::Flow::kLatest;

@@ -48,7 +48,7 @@ TEST_F(Usbredir, TellsOfTheDevice) {
   ASSERT_EQ(uint32_t{host_.interfaces.interface_count}, 1u);
   EXPECT_EQ(host_.interfaces.interface_class[0], 0xFF);
   EXPECT_EQ(host_.endpoints.type[0x01], usb_redir_type_bulk);
-  EXPECT_EQ(host_.endpoints.max_packet_size[0x01], 512);
+  EXPECT_EQ(uint16_t{host_.endpoints.max_packet_size[0x01]}, 512);
   EXPECT_EQ(host_.endpoints.type[0x12], usb_redir_type_interrupt);  // IN 2
   EXPECT_EQ(host_.endpoints.interval[0x12], 1);
   EXPECT_EQ(host_.endpoints.type[0x03], usb_redir_type_invalid);
