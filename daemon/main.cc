@@ -314,6 +314,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
     supervisor.Ready(displays_text);
     signal = 0;
   }
+  reloads = nullptr;
   watchdog.reset();
   supervisor.Stopping();
   ticker.reset();

@@ -14,14 +14,13 @@
 namespace voxeld::daemon::reload {
 namespace {
 
-constexpr std::string_view kFieldsAtOnce[] = {
-    "log.level",
-    "log.max_lines_per_second",
-    "security.grants",
-    "security.anonymous_scopes",
-    "security.certificate_scopes",
-    "security.unix_scopes",
-};
+constexpr std::string_view kFieldsAtOnce[] = {"log.level", "log.max_lines_per_second"};
+constexpr std::string_view kAccess[] = {"security.grants", "security.anonymous_scopes",
+                                        "security.certificate_scopes", "security.unix_scopes"};
+// Who can come at all: what those who come may do is not changed before it.
+constexpr std::string_view kReach[] = {"server.listen", "security.tls_certificate",
+                                       "security.tls_key", "security.tls_client_ca",
+                                       "security.allow_plain_beyond_loopback"};
 constexpr std::string_view kDisplayOptionsAtOnce[] = {"view", "view_box", "power_limit"};
 
 template <size_t n>
@@ -95,10 +94,19 @@ void CompareDisplays(const std::string& prefix, const DisplayConfig& in_force,
 Changes Compare(const Config& in_force, const Config& wanted) {
   Changes changes;
   const Values before(in_force), after(wanted);
+  std::vector<std::string> differ;
   for (size_t i = 0; i < before.all().size(); ++i) {
     const auto& [key, value] = before.all()[i];
-    if (value == after.all()[i].second) continue;
-    (IsIn(kFieldsAtOnce, key) ? changes.at_once : changes.at_restart).push_back(key);
+    if (value != after.all()[i].second) differ.push_back(key);
+  }
+  const auto are = [&](const auto& list) {
+    return std::any_of(differ.begin(), differ.end(),
+                       [&](const std::string& key) { return IsIn(list, key); });
+  };
+  changes.access = are(kAccess) && !are(kReach);
+  for (const std::string& key : differ) {
+    const bool at_once = IsIn(kFieldsAtOnce, key) || (changes.access && IsIn(kAccess, key));
+    (at_once ? changes.at_once : changes.at_restart).push_back(key);
   }
   const auto displays = ByName(in_force), wanted_displays = ByName(wanted);
   std::set<std::string> names;
@@ -121,10 +129,12 @@ Config Taken(const Config& in_force, const Config& wanted) {
   Config taken = in_force;
   taken.log.level = wanted.log.level;
   taken.log.max_lines_per_second = wanted.log.max_lines_per_second;
-  taken.security.grants = wanted.security.grants;
-  taken.security.anonymous_scopes = wanted.security.anonymous_scopes;
-  taken.security.certificate_scopes = wanted.security.certificate_scopes;
-  taken.security.unix_scopes = wanted.security.unix_scopes;
+  if (Compare(in_force, wanted).access) {
+    taken.security.grants = wanted.security.grants;
+    taken.security.anonymous_scopes = wanted.security.anonymous_scopes;
+    taken.security.certificate_scopes = wanted.security.certificate_scopes;
+    taken.security.unix_scopes = wanted.security.unix_scopes;
+  }
   const auto displays = ByName(wanted);
   for (DisplayConfig& display : taken.displays) {
     const auto at = displays.find(display.name);

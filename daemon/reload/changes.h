@@ -13,6 +13,8 @@ struct Changes {
   // name. A display that came or went is "display.rotor".
   std::vector<std::string> at_once;     // a running daemon takes them
   std::vector<std::string> at_restart;  // it does not
+  // Of at_once some say who may do what. They wait for the restart with what says who can come at all.
+  bool access = false;
 };
 
 Changes Compare(const Config& in_force, const Config& wanted);

@@ -64,10 +64,19 @@ Reloader::Reloader(Config in_force, CommandLine command_line, Environment enviro
       parts_(parts) {}
 
 absl::StatusOr<Config> Reloader::Read() const {
-  absl::StatusOr<Config> config = LoadConfig(command_line_.config, environment_);
+  const std::optional<std::string> file =
+      in_force_.file.empty() ? command_line_.config : std::optional(in_force_.file);
+  absl::StatusOr<Config> config = LoadConfig(file, environment_);
   if (!config.ok()) return config;
   if (absl::Status status = ApplyCommandLine(command_line_, &*config); !status.ok()) return status;
   if (absl::Status status = CheckSecurity(*config); !status.ok()) return status;
+  if (const auto local = LocalSocketAddress(config->server); !local.ok()) return local.status();
+  for (const DisplayConfig& display : config->displays) {
+    const absl::Status status = SplitDisplayOptions(display).status();
+    if (!status.ok()) {
+      return absl::Status(status.code(), absl::StrCat(display.source, ": ", status.message()));
+    }
+  }
   return config;
 }
 
@@ -102,7 +111,8 @@ absl::StatusOr<Changes> Reloader::Take(const Config& wanted) {
   Config taken = Taken(in_force_, wanted);
   std::vector<NamedUpdate> undo;
   absl::Status status = TakeDisplays(taken, &undo);
-  if (status.ok()) status = parts_.access.Change(*options);
+  // A file of grants that alone is new is its own reader's.
+  if (status.ok() && changes.access) status = parts_.access.Change(*options);
   if (!status.ok()) {
     for (NamedUpdate& before : undo) (void)Update(parts_.core, std::move(before));
     return status;

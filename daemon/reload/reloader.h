@@ -1,5 +1,6 @@
 // Reads the daemon's configuration again while it runs. What is wrong in it changes nothing at all: the one in
-// force stays, and trouble() says why. What only a restart changes is told, and left as it is.
+// force stays, and trouble() says why. What only a restart changes is told, and left as it is: of it, what takes opening a
+// device or a port to find out is not found out. The file is the one that was read at the start; that it has gone is wrong too.
 //
 // Taken while running: log.level, log.max_lines_per_second, security.grants and the scopes beside it, and of a
 // display view, view_box and power_limit. A display's setting that the file does not change stays as clients

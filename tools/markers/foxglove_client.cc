@@ -9,6 +9,7 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
 #include <boost/endian/conversion.hpp>
+#include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -26,11 +27,13 @@ namespace beast = boost::beast;
 using Json = nlohmann::json;
 using Stream = beast::websocket::stream<asio::ip::tcp::socket>;
 
-constexpr char kProtocol[] = "foxglove.websocket.v1";
+// The same protocol by the name that it had, and by the one that newer servers want.
+constexpr char kProtocol[] = "foxglove.websocket.v1", kNewProtocol[] = "foxglove.sdk.v1";
+constexpr std::chrono::seconds kOpenTime(10);
 constexpr char kSchema[] = "foxglove.SceneUpdate";
 constexpr size_t kHeaderBytes = 13;  // kind, subscription, time
 constexpr uint8_t kMessageData = 1;
-constexpr size_t kMostPassedOver = 100;
+constexpr size_t kMostPassedOver = 100, kMostChannels = 10'000, kMostNameBytes = 1024;
 
 std::string TextOf(const Json& object, const char* key) {
   const auto at = object.find(key);
@@ -86,7 +89,11 @@ class FoxgloveClient::Impl {
     beast::error_code error;
     asio::ip::tcp::resolver resolver(io_);
     const auto found = resolver.resolve(url.host, url.port, error);
-    if (!error) asio::connect(stream_.next_layer(), found, error);
+    if (!error) {
+      asio::async_connect(stream_.next_layer(), found,
+                          [&error](beast::error_code code, const auto&) { error = code; });
+      Finish(&error);
+    }
     if (error) {
       return absl::UnavailableError(
           absl::StrCat("no Foxglove server at ", where, ": ", error.message()));
@@ -94,17 +101,22 @@ class FoxgloveClient::Impl {
     stream_.read_message_max(options_.most_message_bytes);
     stream_.set_option(
         beast::websocket::stream_base::decorator([](beast::websocket::request_type& request) {
-          request.set(beast::http::field::sec_websocket_protocol, kProtocol);
+          request.set(beast::http::field::sec_websocket_protocol,
+                      absl::StrCat(kNewProtocol, ", ", kProtocol));
         }));
     beast::websocket::response_type response;
-    stream_.handshake(response, where, url.path, error);
+    stream_.async_handshake(response, where, url.path,
+                            [&error](beast::error_code code) { error = code; });
+    Finish(&error);
     if (error) {
       return absl::FailedPreconditionError(
           absl::StrCat(where, " does not speak WebSocket: ", error.message()));
     }
-    if (response[beast::http::field::sec_websocket_protocol] != kProtocol) {
-      return absl::FailedPreconditionError(
-          absl::StrCat(where, " does not speak ", kProtocol, ", which Foxglove's servers do"));
+    const auto spoken = response[beast::http::field::sec_websocket_protocol];
+    if (spoken != kProtocol && spoken != kNewProtocol) {
+      return absl::FailedPreconditionError(absl::StrCat(where, " speaks neither ", kProtocol,
+                                                        " nor ", kNewProtocol,
+                                                        ", as Foxglove's servers do"));
     }
     return absl::OkStatus();
   }
@@ -114,6 +126,11 @@ class FoxgloveClient::Impl {
       beast::flat_buffer buffer;
       beast::error_code error;
       stream_.read(buffer, error);
+      if (error == beast::websocket::error::message_too_big) {
+        return absl::ResourceExhaustedError(
+            absl::StrCat("the Foxglove server sent a message of more than ",
+                         options_.most_message_bytes, " bytes"));
+      }
       if (error) {
         return absl::UnavailableError(
             absl::StrCat("the Foxglove server has gone: ", error.message()));
@@ -144,6 +161,17 @@ class FoxgloveClient::Impl {
   size_t subscribed() const { return channels_.size(); }
 
  private:
+  // What was begun, or what became of it in time.
+  void Finish(beast::error_code* error) {
+    io_.restart();
+    io_.run_for(kOpenTime);
+    if (io_.stopped()) return;
+    beast::error_code ignored;
+    stream_.next_layer().close(ignored);
+    io_.run();
+    *error = asio::error::timed_out;
+  }
+
   struct Channel {
     std::string topic;
     Encoding encoding = Encoding::kProtobuf;
@@ -175,7 +203,14 @@ class FoxgloveClient::Impl {
       const std::optional<uint64_t> id = NumberOf(channel, "id");
       const std::string topic = TextOf(channel, "topic"), encoding = TextOf(channel, "encoding"),
                         schema = TextOf(channel, "schemaName");
-      if (!id.has_value() || *id > UINT32_MAX) continue;
+      if (!id.has_value() || *id > UINT32_MAX || topic.size() > kMostNameBytes ||
+          schema.size() > kMostNameBytes || encoding.size() > kMostNameBytes) {
+        continue;
+      }
+      if (channels_.size() >= kMostChannels) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("the server has more than ", kMostChannels, " channels; name the topics"));
+      }
       const bool asked =
           options_.topics.empty() ||
           std::find(options_.topics.begin(), options_.topics.end(), topic) != options_.topics.end();

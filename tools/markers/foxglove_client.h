@@ -1,4 +1,4 @@
-// A client of a Foxglove WebSocket server, as viewers are (the protocol foxglove.websocket.v1, by its specification): takes in
+// A client of a Foxglove WebSocket server, as viewers are (the protocol foxglove.websocket.v1, or foxglove.sdk.v1, by its specification): takes in
 // every channel of SceneUpdate.
 #pragma once
 
@@ -33,14 +33,14 @@ struct FoxgloveMessage {
 // For one thread, but for Interrupt.
 class FoxgloveClient {
  public:
-  // Connects. Unavailable says why not; FailedPrecondition if the other end speaks something else.
+  // Connects, within ten seconds. Unavailable says why not; FailedPrecondition if the other end speaks something else.
   static absl::StatusOr<std::unique_ptr<FoxgloveClient>> Open(const FoxgloveOptions& options);
   ~FoxgloveClient();
   FoxgloveClient(const FoxgloveClient&) = delete;
   FoxgloveClient& operator=(const FoxgloveClient&) = delete;
 
   // Blocks until there is one. Channels are subscribed to as the server tells of them. Unavailable at the connection's end, and
-  // after Interrupt; InvalidArgument for what is not of the protocol: the next call goes on.
+  // after Interrupt; ResourceExhausted when a message was too large; InvalidArgument for what is not of the protocol: the next call goes on.
   absl::StatusOr<FoxgloveMessage> Next();
 
   // What the server has that is no SceneUpdate here, or in an encoding that is not read: "/tf (foxglove.FrameTransform)".

@@ -77,8 +77,10 @@ class Maker {
  public:
   explicit Maker(const foxglove::SceneEntity& entity) {
     if (entity.has_lifetime()) {
-      lifetime_ = std::chrono::seconds(entity.lifetime().seconds()) +
-                  std::chrono::nanoseconds(entity.lifetime().nanos());
+      constexpr int64_t kMostSeconds = int64_t{1} << 32;
+      lifetime_ =
+          std::chrono::seconds(std::clamp<int64_t>(entity.lifetime().seconds(), 0, kMostSeconds)) +
+          std::chrono::nanoseconds(std::clamp(entity.lifetime().nanos(), 0, 999'999'999));
     }
     for (const auto& arrow : entity.arrows()) Arrow(arrow);
     for (const auto& cube : entity.cubes()) Cube(cube);
@@ -186,7 +188,7 @@ void MendTimes(Json& value) {
     }
     const auto part = [&](const char* name) {
       const auto at = inside.find(name);
-      return at != inside.end() && at->is_number() ? at->get<int64_t>() : int64_t{0};
+      return at != inside.end() && at->is_number_integer() ? at->get<int64_t>() : int64_t{0};
     };
     const int64_t seconds = part("sec"), nanos = part("nsec");
     if (is_duration) {
@@ -197,6 +199,38 @@ void MendTimes(Json& value) {
                                 absl::UTCTimeZone());
     }
   }
+}
+
+// How deep brackets stand in brackets, outside of texts.
+int DepthOf(std::string_view json) {
+  int depth = 0, most = 0;
+  bool in_text = false;
+  for (size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (in_text) {
+      if (c == '\\') ++i;
+      in_text = c != '"';
+    } else if (c == '"') {
+      in_text = true;
+    } else if (c == '[' || c == '{') {
+      most = std::max(most, ++depth);
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return most;
+}
+
+absl::Status CheckSize(const foxglove::SceneUpdate& update) {
+  int64_t pieces = 0;
+  for (const foxglove::SceneEntity& entity : update.entities()) {
+    pieces += int64_t{1} + entity.arrows_size() + entity.cubes_size() + entity.spheres_size() +
+              entity.cylinders_size() + entity.lines_size() + entity.triangles_size() +
+              entity.texts_size();
+  }
+  if (pieces <= kMostPieces) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "an update has ", pieces, " entities and pieces of them; ", kMostPieces, " are the most"));
 }
 
 }  // namespace
@@ -211,7 +245,12 @@ absl::StatusOr<foxglove::SceneUpdate> ParseSceneUpdate(std::string_view bytes, E
       return absl::InvalidArgumentError(
           absl::StrCat("a message of ", bytes.size(), " bytes is no foxglove.SceneUpdate"));
     }
+    if (absl::Status status = CheckSize(update); !status.ok()) return status;
     return update;
+  }
+  if (const int depth = DepthOf(bytes); depth > kMostDepth) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("a message of JSON is ", depth, " deep; ", kMostDepth, " is the most"));
   }
   Json json = Json::parse(bytes, nullptr, false);
   if (!json.is_object()) {
@@ -226,6 +265,7 @@ absl::StatusOr<foxglove::SceneUpdate> ParseSceneUpdate(std::string_view bytes, E
     return absl::InvalidArgumentError(
         absl::StrCat("a message is no foxglove.SceneUpdate: ", std::string(parsed.message())));
   }
+  if (absl::Status status = CheckSize(update); !status.ok()) return status;
   return update;
 }
 

@@ -43,7 +43,7 @@ class ReloaderTest : public ::testing::Test {
 
   void Begin(const std::string& text, CommandLine command_line = {}) {
     Put(file_, text);
-    command_line.config = file_;
+    if (names_file_) command_line.config = file_;
     absl::StatusOr<Config> config = LoadConfig(file_, nothing_);
     ASSERT_TRUE(config.ok()) << config.status();
     ASSERT_TRUE(ApplyCommandLine(command_line, &*config).ok());
@@ -87,6 +87,7 @@ class ReloaderTest : public ::testing::Test {
   }
   std::string AnonymousScopes() { return access_->Identify({})->scopes.ToString(); }
 
+  bool names_file_ = true;  // on the command line; else it is found by itself
   const std::string folder_ = absl::StrCat(::testing::TempDir(), "/voxeld-reload-", getpid());
   const std::string file_ = folder_ + "/voxeld.toml", grants_ = folder_ + "/grants.toml";
   const Environment nothing_ = [](const char*) { return std::nullopt; };
@@ -202,12 +203,46 @@ TEST_F(ReloaderTest, TheCommandLineGoesOverTheFileAsAtTheStart) {
   EXPECT_THAT(changes->at_once, IsEmpty());
 }
 
-TEST_F(ReloaderTest, AFileThatIsGoneChangesNothing) {
-  Begin(absl::StrCat(kDisplay, "view = \"voxels\"\n"));
-  std::filesystem::remove(file_);
-  EXPECT_FALSE(reloader_->Reload().ok());
-  EXPECT_THAT(reloader_->trouble(), HasSubstr("voxeld.toml"));
-  EXPECT_EQ(Cube().view.mode, ViewOptions::Mode::kVoxels);
+TEST_F(ReloaderTest, AFileThatIsGoneChangesNothingHoweverItWasFound) {
+  for (const bool named : {true, false}) {
+    names_file_ = named;
+    Begin(
+        absl::StrCat("[security]\nanonymous_scopes = \"none\"\n", kDisplay, "view = \"voxels\"\n"));
+    std::filesystem::remove(file_);
+    EXPECT_FALSE(reloader_->Reload().ok());
+    EXPECT_THAT(reloader_->trouble(), HasSubstr("voxeld.toml"));
+    EXPECT_EQ(Cube().view.mode, ViewOptions::Mode::kVoxels);
+    EXPECT_NE(AnonymousScopes(), "view draw control");
+    ASSERT_TRUE(core_->Stop(10 * sync::kSecond).ok());
+    core_ = nullptr;
+  }
+}
+
+TEST_F(ReloaderTest, WhoMayDoWhatWaitsWithWhoCanCome) {
+  Begin(absl::StrCat("[security]\nanonymous_scopes = \"view\"\n", kDisplay));
+  const auto changes = Reload(absl::StrCat(
+      "[server]\nlisten = [\"unix:/run/elsewhere.sock\"]\n[security]\nanonymous_scopes = \"all\"\n",
+      kDisplay));
+  ASSERT_TRUE(changes.ok()) << changes.status();
+  EXPECT_THAT(changes->at_once, IsEmpty());
+  EXPECT_THAT(changes->at_restart, ElementsAre("server.listen", "security.anonymous_scopes"));
+  EXPECT_EQ(AnonymousScopes(), "view") << "the old address is open still";
+}
+
+TEST_F(ReloaderTest, DisplaysThatAreToComeAreLookedAtToo) {
+  Begin(kDisplay);
+  const auto changes = Reload(absl::StrCat(
+      kDisplay, "[[display]]\nname = \"new\"\ndriver = \"simulated\"\nview = \"sideways\"\n"));
+  ASSERT_FALSE(changes.ok());
+  EXPECT_THAT(changes.status().message(), HasSubstr("sideways"));
+}
+
+TEST_F(ReloaderTest, AGrantsFileAloneIsItsOwnReaders) {
+  Put(grants_, "");
+  Begin(absl::StrCat("[security]\ngrants = \"", grants_, "\"\n", kDisplay));
+  Put(grants_, "[[token]]\nname = \"left\"\n");  // wrong
+  ASSERT_TRUE(reloader_->Reload().ok());
+  EXPECT_EQ(reloader_->trouble(), "");
 }
 
 }  // namespace

@@ -222,9 +222,9 @@ std::vector<std::string> Ids(const voxelctl::MarkerScene::Changes& changes) {
 
 TEST(MarkerScene, PutsPiecesAndRemovesThoseThatAreNoMore) {
   voxelctl::MarkerScene scene;
-  EXPECT_THAT(Ids(scene.Apply("/t", Cubes({{"a", 3}, {"b", 1}}))),
+  EXPECT_THAT(Ids(scene.Apply("/t", Cubes({{"a", 3}, {"b", 1}}), 0)),
               ElementsAre("/t a#0", "/t a#1", "/t a#2", "/t b#0"));
-  const auto fewer = scene.Apply("/t", Cubes({{"a", 1}}));
+  const auto fewer = scene.Apply("/t", Cubes({{"a", 1}}), 0);
   EXPECT_THAT(Ids(fewer), ElementsAre("/t a#0"));
   EXPECT_THAT(fewer.remove, ElementsAre("/t a#1", "/t a#2"));
   EXPECT_EQ(scene.tally().entities, 3u);
@@ -232,20 +232,60 @@ TEST(MarkerScene, PutsPiecesAndRemovesThoseThatAreNoMore) {
 
 TEST(MarkerScene, DeletionsAreOfTheirTopicAndOfWhatWasBefore) {
   voxelctl::MarkerScene scene;
-  scene.Apply("/s", Cubes({{"a", 1}}));
-  scene.Apply("/t", Cubes({{"a", 1}, {"b", 1}}));
+  scene.Apply("/s", Cubes({{"a", 1}}), 0);
+  scene.Apply("/t", Cubes({{"a", 1}, {"b", 1}}), 0);
   foxglove::SceneUpdate update = Cubes({{"a", 1}});
   update.add_deletions()->set_id("b");
   update.add_deletions()->set_id("nobody");
-  const auto one = scene.Apply("/t", update);
+  const auto one = scene.Apply("/t", update, 0);
   EXPECT_THAT(one.remove, ElementsAre("/t b#0"));
   EXPECT_THAT(Ids(one), ElementsAre("/t a#0"));
   foxglove::SceneUpdate all = Cubes({{"c", 1}});
   all.add_deletions()->set_type(foxglove::SceneEntityDeletion::ALL);
-  const auto anew = scene.Apply("/t", all);
+  const auto anew = scene.Apply("/t", all, 0);
   EXPECT_THAT(anew.remove, ElementsAre("/t a#0"));
   EXPECT_THAT(Ids(anew), ElementsAre("/t c#0"));
-  EXPECT_THAT(scene.Apply("/s", Cubes({})).remove, IsEmpty());
+  EXPECT_THAT(scene.Apply("/s", Cubes({}), 0).remove, IsEmpty());
+}
+
+TEST(MarkerScene, ForgetsWhatHasHadItsTimeAndWhatIsEmpty) {
+  voxelctl::MarkerScene scene;
+  foxglove::SceneUpdate update = Cubes({{"a", 1}, {"b", 1}, {"empty", 0}});
+  update.mutable_entities(0)->mutable_lifetime()->set_seconds(2);
+  scene.Apply("/t", update, 10);
+  EXPECT_EQ(scene.size(), 2u);
+  scene.Apply("/t", Cubes({}), 10 + 2 * sync::kSecond - 1);
+  EXPECT_EQ(scene.size(), 2u);
+  scene.Apply("/t", Cubes({}), 10 + 2 * sync::kSecond);
+  EXPECT_EQ(scene.size(), 1u);
+  for (int i = 0; i < 3; ++i) scene.Apply("/t", Cubes({{"empty", 0}}), 0);
+  EXPECT_EQ(scene.size(), 1u);
+}
+
+TEST(ParseSceneUpdate, HasItsLimits) {
+  foxglove::SceneUpdate update;
+  foxglove::SceneEntity* entity = update.add_entities();
+  for (int i = 0; i < kMostPieces; ++i) entity->add_cubes();
+  EXPECT_THAT(ParseSceneUpdate(update.SerializeAsString(), Encoding::kProtobuf).status().message(),
+              HasSubstr("100001 entities and pieces"));
+  entity->mutable_cubes()->RemoveLast();
+  EXPECT_TRUE(ParseSceneUpdate(update.SerializeAsString(), Encoding::kProtobuf).ok());
+  const auto deep = [](int depth) {
+    return "{\"x\":" + std::string(static_cast<size_t>(depth - 1), '[') +
+           std::string(static_cast<size_t>(depth - 1), ']') + "}";
+  };
+  EXPECT_TRUE(ParseSceneUpdate(deep(kMostDepth), Encoding::kJson).ok());
+  EXPECT_THAT(ParseSceneUpdate(deep(1'000'000), Encoding::kJson).status().message(),
+              HasSubstr("1000000 deep"));
+  EXPECT_TRUE(ParseSceneUpdate(R"({"x":"[[[[\"[[["})", Encoding::kJson).ok());
+}
+
+TEST(Markers, TimesThatNoClockHasAreTheMost) {
+  foxglove::SceneEntity entity;
+  entity.add_cubes();
+  entity.mutable_lifetime()->set_seconds(std::numeric_limits<int64_t>::max());
+  entity.mutable_lifetime()->set_nanos(-1);
+  EXPECT_EQ(PiecesOf(entity).pieces[0].look.lifetime, std::chrono::seconds(int64_t{1} << 32));
 }
 
 }  // namespace

@@ -63,6 +63,8 @@ class Follower {
                                          {"deletions", tally.deletions},
                                          {"malformed", tally.malformed},
                                          {"malformed_last", tally.malformed_last},
+                                         {"refused", session_.GetTally().refused_operations},
+                                         {"refused_first", Refused()},
                                          {"left_out", tally.left_out}}
                       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
                   "\n");
@@ -76,6 +78,10 @@ class Follower {
       absl::StrAppend(&text, ", ", tally.malformed, " not read (",
                       EscapeForTerminal(tally.malformed_last), ")");
     }
+    if (const std::string refused = Refused(); !refused.empty()) {
+      absl::StrAppend(&text, ", ", session_.GetTally().refused_operations, " refused (",
+                      EscapeForTerminal(refused), ")");
+    }
     if (!tally.left_out.empty()) {
       absl::StrAppend(&text, ", not drawn: ", absl::StrJoin(tally.left_out, ", "));
     }
@@ -87,6 +93,13 @@ class Follower {
   }
 
  private:
+  // What the server said of the first that it refused; nothing: it refused none.
+  std::string Refused() const {
+    const client::Tally tally = session_.GetTally();
+    if (tally.refused_operations == 0 || tally.issues.empty()) return "";
+    return client::DescribeIssue(tally.issues.front());
+  }
+
   void Malformed(const absl::Status& status) {
     ++scene_.tally().malformed;
     scene_.tally().malformed_last = std::string(status.message());
@@ -103,7 +116,7 @@ class Follower {
     while (!session_.HasRoom() && !end_.ended()) {
       if (interrupt_.WaitUntil(clock_, clock_.Now() + kRoomEvery)) return absl::OkStatus();
     }
-    MarkerScene::Changes changes = scene_.Apply(message.topic, *update);
+    MarkerScene::Changes changes = scene_.Apply(message.topic, *update, clock_.Now());
     for (const std::string& id : changes.remove) {
       if (absl::Status status = layer_.Remove(id); !status.ok()) return status;
     }
@@ -112,6 +125,7 @@ class Follower {
           layer_.Put(id, std::move(piece.shape), std::move(piece.look)).status();
       if (absl::IsInvalidArgument(status)) {
         Malformed(status);
+        if (absl::Status gone = layer_.Remove(id); !gone.ok()) return gone;  // what it was
       } else if (!status.ok()) {
         return status;
       }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -21,6 +22,9 @@ namespace {
 constexpr sync::TimeNs kFadeStep = sync::kSecond / 30;
 constexpr sync::TimeNs kLook = sync::kSecond / 5;  // at the time of day, and at what is on
 
+constexpr sync::TimeNs kRest = sync::kSecond;  // after an item that cannot be played
+
+// Of what is being played, when its file could be opened.
 bool IsOfTheServer(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsUnauthenticated(status) ||
          absl::IsPermissionDenied(status);
@@ -44,7 +48,7 @@ class Player {
 
   absl::Status Run() {
     std::optional<size_t> at;
-    size_t failed = 0;  // one after another
+    std::set<size_t> failed;  // one after another
     while (!interrupt_.requested()) {
       const std::optional<size_t> next = NextItem(playlist_, at, now_());
       if (!next.has_value()) {
@@ -63,12 +67,15 @@ class Player {
       if (status.ok()) status = Stay(item);
       if (interrupt_.requested()) break;
       if (status.ok()) {
-        failed = 0;
+        failed.clear();
         continue;
       }
-      if (IsOfTheServer(status) || ++failed == playlist_.items.size()) return status;
+      failed.insert(*next);
+      const bool of_the_server = opened_ && IsOfTheServer(status);
+      if (of_the_server || failed.size() == playlist_.items.size()) return status;
       console_.Say(absl::StrCat(EscapeForTerminal(item.file),
                                 " is passed over: ", EscapeForTerminal(status.message())));
+      if (Wait(kRest)) break;
     }
     return absl::OkStatus();
   }
@@ -76,8 +83,10 @@ class Player {
  private:
   // As long as what is shown is to be on.
   absl::Status Stay(const PlaylistItem& item) {
-    const sync::TimeNs end =
-        clock_.Now() + static_cast<sync::TimeNs>(shown_->seconds() * sync::kSecond);
+    // One that is on for its own length plays while it comes and while it goes.
+    const double fades = shown_->of_its_own_length() ? 2 * playlist_.cross_fade_s : 0;
+    const double seconds = std::max(shown_->seconds() - fades, 0.0);
+    const sync::TimeNs end = clock_.Now() + static_cast<sync::TimeNs>(seconds * sync::kSecond);
     while (clock_.Now() < end && IsWithin(item.hours, now_())) {
       if (Wait(std::min(kLook, end - clock_.Now()))) break;
       if (absl::Status status = shown_->status(); !status.ok()) return status;
@@ -88,10 +97,12 @@ class Player {
   bool Wait(sync::TimeNs time) { return interrupt_.WaitUntil(clock_, clock_.Now() + time); }
 
   absl::Status Show(const PlaylistItem& item) {
+    opened_ = false;
     const bool fades = playlist_.cross_fade_s > 0;
     absl::StatusOr<std::unique_ptr<Showing>> showing =
         Showing::Begin(item, fades ? 0 : 1, connection_, clock_);
     if (!showing.ok()) return showing.status();
+    opened_ = true;
     if (console_.json()) {
       const nlohmann::ordered_json line = {{"file", item.file}, {"seconds", (*showing)->seconds()}};
       if (!console_.Data(line.dump() + "\n")) return absl::CancelledError("nobody reads any more");
@@ -104,15 +115,18 @@ class Player {
 
   // From what is shown to `next`, which may be nothing.
   absl::Status FadeTo(std::unique_ptr<Showing> next) {
-    const sync::TimeNs begin = clock_.Now();
     const auto length = static_cast<sync::TimeNs>(playlist_.cross_fade_s * sync::kSecond);
     absl::Status status;
+    while (next != nullptr && !next->up() && status.ok() && !Wait(sync::kMillisecond)) {
+      status = next->status();
+    }
+    const sync::TimeNs begin = clock_.Now();
     double part = length > 0 ? 0 : 1;
     while (length > 0 && part < 1 && status.ok() && (shown_ != nullptr || next != nullptr)) {
       if (Wait(kFadeStep)) break;
       part = std::min(1.0, static_cast<double>(clock_.Now() - begin) / static_cast<double>(length));
       if (next != nullptr) status = next->SetOpacity(part);
-      if (shown_ != nullptr && status.ok()) status = shown_->SetOpacity(1 - part);
+      if (shown_ != nullptr) (void)shown_->SetOpacity(1 - part);  // it goes, in any case
       if (next != nullptr && status.ok()) status = next->status();
     }
     shown_ = std::move(next);
@@ -126,6 +140,7 @@ class Player {
   Console& console_;
   sync::SystemClock clock_;
   std::unique_ptr<Showing> shown_;
+  bool opened_ = false;  // the file of the item that came last
 };
 
 absl::Status Check(const Playlist& playlist, WeekMinute now, Console& console) {

@@ -17,7 +17,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr std::string_view kDays[] = {"mon", "tue", "wed", "thu", "fri", "sat", "sun"};
-constexpr double kMostSeconds = 1e7;
+constexpr double kMostSeconds = 1e7;  // a hundred days
 
 // "22:00" in minutes; "24:00" is the end of the day.
 std::optional<int> ParseTime(const std::string& text) {

@@ -10,6 +10,17 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kLeastLength = 0.1;  // seconds; what is shorter is not played over and over
+constexpr double kMostWait = 1e8;     // seconds
+
+// Whether the file has more than one state; what is wrong with it.
+absl::StatusOr<bool> HasChanges(recording::McapReader& reader) {
+  int sets = 0;
+  absl::Status status =
+      recording::ReadScene(reader, [&sets](const recording::ChangeSet&) { return ++sets < 2; });
+  reader.Rewind();
+  if (!status.ok()) return status;
+  return sets > 1;
+}
 
 }  // namespace
 
@@ -29,7 +40,9 @@ absl::StatusOr<std::unique_ptr<Showing>> Showing::Begin(const PlaylistItem& item
   const double length =
       static_cast<double>(summary->end_ns - summary->start_ns) / sync::kSecond / item.speed;
   showing->start_ns_ = summary->start_ns;
-  showing->still_ = length < kLeastLength;
+  const absl::StatusOr<bool> changes = HasChanges(*showing->reader_);
+  if (!changes.ok()) return changes.status();
+  showing->still_ = !*changes || length < kLeastLength;
   if (showing->still_ && !item.seconds.has_value()) {
     return absl::InvalidArgumentError(
         absl::StrCat(item.file, " is one state of a scene; give its item seconds"));
@@ -46,6 +59,11 @@ Showing::~Showing() {
     changed_.NotifyAll();
   }
   if (thread_.joinable()) thread_.join();
+}
+
+bool Showing::up() const {
+  const sync::MutexLock lock(mutex_);
+  return playback_ != nullptr;
 }
 
 absl::Status Showing::status() const {
@@ -98,7 +116,8 @@ absl::Status Showing::PlayOnce() {
   reader_->Rewind();
   const absl::Status read = recording::ReadScene(*reader_, [&](const recording::ChangeSet& set) {
     const auto at = static_cast<double>(set.time_ns - std::min(set.time_ns, start_ns_));
-    if (!AwaitOrStop(began + static_cast<sync::TimeNs>(at / item_.speed))) {
+    if (!AwaitOrStop(began + static_cast<sync::TimeNs>(
+                                 std::min(at / item_.speed, kMostWait * sync::kSecond)))) {
       wrong = absl::CancelledError("stopped");
       return false;
     }

@@ -20,8 +20,8 @@ namespace voxeld::voxelctl {
 // Thread-safe.
 class Showing {
  public:
-  // Opens a session, whose `opacity` is the first; plays from now on, on a thread of its own, over and over. DataLoss and the
-  // like of the file; of the connection what the server said. `connection` and `clock` outlive it.
+  // Opens the file, and plays it from now on, on a thread of its own, over and over, in sessions whose `opacity` is the first. What
+  // is wrong with the file. `connection` and `clock` outlive it.
   static absl::StatusOr<std::unique_ptr<Showing>> Begin(const PlaylistItem& item, double opacity,
                                                         Connection& connection, sync::Clock& clock);
   ~Showing();  // what is up goes
@@ -29,8 +29,11 @@ class Showing {
   Showing& operator=(const Showing&) = delete;
 
   absl::Status SetOpacity(double opacity);
-  // How long it is to be on, in seconds.
+  // How long it is to be on, in seconds; and whether that is as long as the recording itself is.
   double seconds() const { return seconds_; }
+  bool of_its_own_length() const { return !item_.seconds.has_value(); }
+  // Its first state is to be seen.
+  bool up() const;
   // A state of the scene, and nothing that changes.
   bool still() const { return still_; }
   // Why it does not play any more; OK: it does.
