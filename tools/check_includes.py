@@ -60,7 +60,7 @@ ALLOWED = {
     # What comes in by the protocols by which pictures go out.
     "tools/lights": ["display/drivers/network/protocol", "display/sync", "daemon/address", "tools/lights"],
     "tools/voxelctl/lights": ["display/drivers/wiring", "display/sync", "gpu/affine", "voxeld", "tools/lights", "tools/voxelctl"],
-    "tools/markers": ["voxeld", "scene_update", "tools/markers"],
+    "tools/markers": ["voxeld", "scene_update", "tools/json", "tools/markers"],
     "tools/recording": ["voxeld/v1", "tools/recording"],
     # Tokens are made as the daemon reads them.
     "tools/voxelctl/token": ["daemon/access", "daemon/address", "tools/voxelctl"],

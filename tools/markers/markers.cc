@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/time/time.h"
+#include "tools/json/json_depth.h"
 
 namespace voxeld::markers {
 namespace {
@@ -201,26 +202,6 @@ void MendTimes(Json& value) {
   }
 }
 
-// How deep brackets stand in brackets, outside of texts.
-int DepthOf(std::string_view json) {
-  int depth = 0, most = 0;
-  bool in_text = false;
-  for (size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (in_text) {
-      if (c == '\\') ++i;
-      in_text = c != '"';
-    } else if (c == '"') {
-      in_text = true;
-    } else if (c == '[' || c == '{') {
-      most = std::max(most, ++depth);
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-  }
-  return most;
-}
-
 absl::Status CheckSize(const foxglove::SceneUpdate& update) {
   int64_t pieces = 0;
   for (const foxglove::SceneEntity& entity : update.entities()) {
@@ -248,9 +229,9 @@ absl::StatusOr<foxglove::SceneUpdate> ParseSceneUpdate(std::string_view bytes, E
     if (absl::Status status = CheckSize(update); !status.ok()) return status;
     return update;
   }
-  if (const int depth = DepthOf(bytes); depth > kMostDepth) {
+  if (const int depth = json::Depth(bytes); depth > json::kMaxDepth) {
     return absl::InvalidArgumentError(
-        absl::StrCat("a message of JSON is ", depth, " deep; ", kMostDepth, " is the most"));
+        absl::StrCat("a message of JSON is ", depth, " deep; ", json::kMaxDepth, " is the most"));
   }
   Json json = Json::parse(bytes, nullptr, false);
   if (!json.is_object()) {

@@ -26,9 +26,8 @@ struct Pieces {
   std::string left_out;
 };
 
-// Entities and pieces of one update, and how deep JSON may be: InvalidArgument of ParseSceneUpdate beyond.
+// Entities and pieces of one update, InvalidArgument of ParseSceneUpdate beyond, as JSON is that is deeper than json::kMaxDepth.
 inline constexpr int kMostPieces = 100'000;
-inline constexpr int kMostDepth = 64;
 
 // In the order of the message's fields. A piece that has nothing in it (no points, no text) is left out without a word.
 Pieces PiecesOf(const foxglove::SceneEntity& entity);

@@ -1,35 +1,12 @@
 #include "tools/voxelctl/import/json_text.h"
 
-#include <algorithm>
-
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "tools/json/json_depth.h"
 
 namespace voxeld::voxelctl {
-
-int JsonDepth(absl::string_view text) {
-  int depth = 0, deepest = 0;
-  bool in_string = false;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (in_string) {
-      if (c == '\\') {
-        ++i;
-      } else if (c == '"') {
-        in_string = false;
-      }
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      deepest = std::max(deepest, ++depth);
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return deepest;
-}
 
 absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_view text) {
   if (absl::StartsWith(text, "\xef\xbb\xbf")) text.remove_prefix(3);
@@ -37,9 +14,9 @@ absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_vi
   if (body.empty() || (body.front() != '{' && body.front() != '[')) {
     return FileError(file, absl::StrCat("is ", DescribeContents(text)), "JSON is expected");
   }
-  if (const int depth = JsonDepth(text); depth > kMaxJsonDepth) {
+  if (const int depth = json::Depth({text.data(), text.size()}); depth > json::kMaxDepth) {
     return FileError(file, absl::StrCat("nests ", depth, " deep"),
-                     absl::StrCat("at most ", kMaxJsonDepth, " are read"));
+                     absl::StrCat("at most ", json::kMaxDepth, " are read"));
   }
   try {
     return nlohmann::json::parse(text);

@@ -9,11 +9,6 @@
 
 namespace voxeld::voxelctl {
 
-inline constexpr int kMaxJsonDepth = 64;
-
-// How deep brackets nest outside strings; does not recurse.
-int JsonDepth(absl::string_view text);
-
 // `text` is the whole of `file` or a part of it.
 // InvalidArgument: what is wrong, and at which byte or depth.
 absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_view text);

@@ -21,10 +21,9 @@ namespace {
 
 constexpr sync::TimeNs kFadeStep = sync::kSecond / 30;
 constexpr sync::TimeNs kLook = sync::kSecond / 5;  // at the time of day, and at what is on
+constexpr sync::TimeNs kRest = sync::kSecond;      // after an item that cannot be played
 
-constexpr sync::TimeNs kRest = sync::kSecond;  // after an item that cannot be played
-
-// Of what is being played, when its file could be opened.
+// Of a status of what is being played, when its file could be opened.
 bool IsOfTheServer(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsUnauthenticated(status) ||
          absl::IsPermissionDenied(status);
@@ -60,7 +59,8 @@ class Player {
         continue;
       }
       const PlaylistItem& item = playlist_.items[*next];
-      const bool stays = shown_ != nullptr && next == at && shown_->still();
+      const bool stays =
+          shown_ != nullptr && next == at && shown_->still() && shown_->status().ok();
       absl::Status status;
       if (!stays) status = Show(item);
       at = next;
