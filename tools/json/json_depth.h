@@ -5,12 +5,12 @@
 #include <cstddef>
 #include <string_view>
 
-namespace voxeld::json {
+namespace voxeld {
 
-inline constexpr int kMaxDepth = 64;
+inline constexpr int kMaxJsonDepth = 64;
 
 // How deep brackets nest outside strings; does not recurse. Of what is no JSON, some number.
-inline int Depth(std::string_view text) {
+inline int JsonDepth(std::string_view text) {
   int depth = 0, deepest = 0;
   bool in_string = false;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -32,4 +32,4 @@ inline int Depth(std::string_view text) {
   return deepest;
 }
 
-}  // namespace voxeld::json
+}  // namespace voxeld

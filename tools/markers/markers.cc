@@ -229,9 +229,9 @@ absl::StatusOr<foxglove::SceneUpdate> ParseSceneUpdate(std::string_view bytes, E
     if (absl::Status status = CheckSize(update); !status.ok()) return status;
     return update;
   }
-  if (const int depth = json::Depth(bytes); depth > json::kMaxDepth) {
+  if (const int depth = JsonDepth(bytes); depth > kMaxJsonDepth) {
     return absl::InvalidArgumentError(
-        absl::StrCat("a message of JSON is ", depth, " deep; ", json::kMaxDepth, " is the most"));
+        absl::StrCat("a message of JSON is ", depth, " deep; ", kMaxJsonDepth, " is the most"));
   }
   Json json = Json::parse(bytes, nullptr, false);
   if (!json.is_object()) {

@@ -26,7 +26,7 @@ struct Pieces {
   std::string left_out;
 };
 
-// Entities and pieces of one update, InvalidArgument of ParseSceneUpdate beyond, as JSON is that is deeper than json::kMaxDepth.
+// Entities and pieces of one update, InvalidArgument of ParseSceneUpdate beyond, as JSON is that is deeper than kMaxJsonDepth.
 inline constexpr int kMostPieces = 100'000;
 
 // In the order of the message's fields. A piece that has nothing in it (no points, no text) is left out without a word.

@@ -3,6 +3,8 @@
 #include <fstream>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+
 namespace voxeld::display {
 namespace {
 
@@ -22,10 +24,9 @@ size_t ReadUsbfsLimit() {
 }
 
 std::string UsbfsLimitHint() {
-  return std::string(
-             "all programs together may have usbfs_memory_mb in flight; raise it with "
-             "`echo 256 > ") +
-         kParameter + "`, for good with the kernel's parameter usbcore.usbfs_memory_mb=256";
+  return absl::StrCat(
+      "all programs together may have usbfs_memory_mb in flight; raise it with `echo 256 > ",
+      kParameter, "`, for good with the kernel's parameter usbcore.usbfs_memory_mb=256");
 }
 
 UsbfsBudget::UsbfsBudget(size_t limit, std::function<void()> room)

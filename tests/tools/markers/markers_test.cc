@@ -275,7 +275,7 @@ TEST(ParseSceneUpdate, HasItsLimits) {
     return "{\"x\":" + std::string(static_cast<size_t>(depth - 1), '[') +
            std::string(static_cast<size_t>(depth - 1), ']') + "}";
   };
-  EXPECT_TRUE(ParseSceneUpdate(deep(json::kMaxDepth), Encoding::kJson).ok());
+  EXPECT_TRUE(ParseSceneUpdate(deep(kMaxJsonDepth), Encoding::kJson).ok());
   EXPECT_THAT(ParseSceneUpdate(deep(1'000'000), Encoding::kJson).status().message(),
               HasSubstr("1000000 deep"));
   EXPECT_TRUE(ParseSceneUpdate(R"({"x":"[[[[\"[[["})", Encoding::kJson).ok());

@@ -14,9 +14,9 @@ absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_vi
   if (body.empty() || (body.front() != '{' && body.front() != '[')) {
     return FileError(file, absl::StrCat("is ", DescribeContents(text)), "JSON is expected");
   }
-  if (const int depth = json::Depth({text.data(), text.size()}); depth > json::kMaxDepth) {
+  if (const int depth = JsonDepth({text.data(), text.size()}); depth > kMaxJsonDepth) {
     return FileError(file, absl::StrCat("nests ", depth, " deep"),
-                     absl::StrCat("at most ", json::kMaxDepth, " are read"));
+                     absl::StrCat("at most ", kMaxJsonDepth, " are read"));
   }
   try {
     return nlohmann::json::parse(text);
