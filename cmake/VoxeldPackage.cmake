@@ -8,7 +8,8 @@ set(packaging ${CMAKE_SOURCE_DIR}/packaging)
 install(TARGETS voxeld voxelctl RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 # Where voxeld looks for it: gpu/worker/worker_engine.h.
 install(TARGETS voxeld-engine RUNTIME DESTINATION libexec/voxeld)
-install(FILES ${packaging}/voxeld.service ${packaging}/voxeld.socket ${packaging}/voxeld-playlist.service DESTINATION lib/systemd/system)
+install(FILES ${packaging}/voxeld.service ${packaging}/voxeld.socket ${packaging}/voxeld-playlist.service
+              ${packaging}/voxeld-engine.socket ${packaging}/voxeld-engine@.service DESTINATION lib/systemd/system)
 install(FILES ${packaging}/user/voxeld.service ${packaging}/user/voxeld.socket DESTINATION lib/systemd/user)
 install(FILES ${packaging}/voxeld.sysusers DESTINATION lib/sysusers.d RENAME voxeld.conf)
 install(FILES ${packaging}/70-voxeld.rules DESTINATION lib/udev/rules.d)

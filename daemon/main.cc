@@ -18,6 +18,7 @@
 #include "absl/strings/str_join.h"
 #include "daemon/access/security.h"
 #include "daemon/access/ticker.h"
+#include "daemon/assets/asset_store.h"
 #include "daemon/config/config.h"
 #include "daemon/config/display_view.h"
 #include "daemon/core/core.h"
@@ -182,6 +183,16 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
     if (!state.ok()) return Fail(1, state.status());
     kept = *std::move(state);
   }
+  std::unique_ptr<assets::AssetStore> assets;  // none: none are taken
+  if (config.limits.max_assets_bytes > 0) {
+    absl::StatusOr<std::unique_ptr<assets::AssetStore>> store = assets::AssetStore::Open(
+        config.state.dir.empty() ? "" : absl::StrCat(config.state.dir, "/assets"),
+        {.max_asset_bytes = config.limits.max_asset_bytes,
+         .max_bytes = config.limits.max_assets_bytes},
+        clock, &log);
+    if (!store.ok()) return Fail(1, store.status());
+    assets = *std::move(store);
+  }
   services::HealthWatch watch(log);
   std::atomic<reload::Reloader*> reloads = nullptr;  // there is one once the core is
   const auto counters = std::make_shared<listen::Counters>();
@@ -194,6 +205,10 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
              .state = kept == nullptr ? nullptr : kept->sink(),
              .state_figures =
                  [kept = kept.get()] { return kept == nullptr ? StateFigures() : kept->figures(); },
+             .asset_figures =
+                 [assets = assets.get()] {
+                   return assets == nullptr ? AssetFigures() : assets->figures();
+                 },
              .connections =
                  [counters, security = security.get(), &reloads] {
                    ListenFigures figures = counters->Read();
@@ -268,6 +283,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
        .access = &security->access(),
        .tls = security->tls(),
        .audit = &security->audit(),
+       .assets = assets.get(),
        .log = &log},
       *std::move(inherited));
   if (!server.ok()) return Fail(1, server.status());

@@ -137,6 +137,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("must_show_timeout_ns", limits.must_show_timeout_ns, 0, kHour);
   visitor.Integer("max_drop_oldest_frames", limits.max_drop_oldest_frames, 1, kMost32);
   visitor.Integer("max_local_bytes", limits.max_local_bytes, 0, kMost);
+  visitor.Integer("max_asset_bytes", limits.max_asset_bytes, 1, kMost);
+  visitor.Integer("max_assets_bytes", limits.max_assets_bytes, 0, kMost);
 }
 
 // "auto", "cpu", "cuda".

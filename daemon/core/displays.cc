@@ -229,6 +229,7 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.memory = MemoryOf(*budget_);
   if (options_.connections) stats.connections = options_.connections();
   if (options_.state_figures) stats.state = options_.state_figures();
+  if (options_.asset_figures) stats.assets = options_.asset_figures();
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;

@@ -144,8 +144,8 @@ bool Intake::Take(IncomingMessage message) {
   received_ += message.bytes;
   bytes_in_->fetch_add(message.bytes, std::memory_order_relaxed);
   staged_.credit += message.bytes;
-  staged_.local_bytes += message.local_bytes;
-  local_bytes_ += message.local_bytes;
+  staged_.named_bytes += message.named_bytes;
+  named_bytes_ += message.named_bytes;
 
   for (const Issue& issue : message.refused.issues) {
     staged_.refusals.Tell(issue, sink_.get(), limits_.max_issues_per_commit);
@@ -299,7 +299,7 @@ void Intake::DropFrame(const std::string& layer, const FrameRef& frame) {
 
 bool Intake::Room() const {
   return received_ - returned_ < limits_.credit_bytes &&
-         local_bytes_ / kLocalMessages < limits_.max_message_bytes &&
+         named_bytes_ / kLocalMessages < limits_.max_message_bytes &&
          queue_.size() < limits_.max_riding_commits;
 }
 
@@ -316,12 +316,12 @@ void Intake::Wake() {
 void Intake::ReturnStaged() {
   if (!queue_.empty() || under_way_ > 0) return;
   staged_returned_ = staged_.operations.size();
-  Return(std::exchange(staged_.credit, 0), std::exchange(staged_.local_bytes, 0));
+  Return(std::exchange(staged_.credit, 0), std::exchange(staged_.named_bytes, 0));
 }
 
-void Intake::Return(uint64_t credit, uint64_t local_bytes) {
+void Intake::Return(uint64_t credit, uint64_t named_bytes) {
   returned_ += credit;
-  local_bytes_ -= local_bytes;
+  named_bytes_ -= named_bytes;
   if (sink_ == nullptr) return;
   const uint64_t total = returned_ + limits_.credit_bytes;
   if (total - told_credit_ >= limits_.credit_bytes / 4 && total > told_credit_) {
@@ -364,7 +364,7 @@ void Intake::Detach(WaitingCommit& commit) {
   detached_bytes_ += commit.bytes;
   commit.costs.clear();
   commit.detached = true;
-  Return(std::exchange(commit.credit, 0), std::exchange(commit.local_bytes, 0));
+  Return(std::exchange(commit.credit, 0), std::exchange(commit.named_bytes, 0));
   ReturnStaged();
 }
 
@@ -377,7 +377,7 @@ void Intake::Done(WaitingCommit commit) {
   } else {
     --under_way_;
   }
-  Return(commit.credit, commit.local_bytes);
+  Return(commit.credit, commit.named_bytes);
   ReturnStaged();
 }
 

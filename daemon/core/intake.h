@@ -42,7 +42,7 @@ struct IncomingMessage {
   Refusals refused;  // what decoding refused
   uint64_t bytes = 0;
   sync::TimeNs received_ns = 0, decoded_ns = 0;
-  uint64_t local_bytes = 0;  // copied from local memory, beside its own bytes
+  uint64_t named_bytes = 0;  // copied from local memory, beside its own bytes
 };
 
 // A commit's refusals so far, and how many Issues its session was told one by one. Single-threaded.
@@ -79,7 +79,7 @@ struct WaitingCommit {
   sync::TimeNs received_ns = 0, decoded_ns = 0;
   uint64_t bytes = 0;  // charged to kWaiting
   // Of its messages, not given back yet.
-  uint64_t credit = 0, local_bytes = 0;
+  uint64_t credit = 0, named_bytes = 0;
   bool detached = false;
   bool late = false;  // its time had passed when it came
 
@@ -133,7 +133,7 @@ class Intake {
   void GiveUpFrames(uint64_t commit) VOXELD_REQUIRES(mutex_);
   void DropFrame(const std::string& layer, const FrameRef& frame) VOXELD_REQUIRES(mutex_);
   void ReturnStaged() VOXELD_REQUIRES(mutex_);
-  void Return(uint64_t credit, uint64_t local_bytes) VOXELD_REQUIRES(mutex_);
+  void Return(uint64_t credit, uint64_t named_bytes) VOXELD_REQUIRES(mutex_);
   bool Room() const VOXELD_REQUIRES(mutex_);
 
   const Limits& limits_;
@@ -157,7 +157,7 @@ class Intake {
   uint64_t received_ VOXELD_GUARDED_BY(mutex_);
   uint64_t returned_ VOXELD_GUARDED_BY(mutex_);
   uint64_t told_credit_ VOXELD_GUARDED_BY(mutex_);
-  uint64_t local_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;  // outstanding
+  uint64_t named_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;  // outstanding
 };
 
 }  // namespace voxeld::daemon

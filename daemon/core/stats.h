@@ -89,6 +89,13 @@ struct StateFigures {
   std::string trouble;  // why it cannot be kept, or what was put aside; empty: all is well
 };
 
+// Content by its hash.
+struct AssetFigures {
+  uint64_t count = 0;  // whole ones
+  uint64_t bytes = 0;  // of these, of parts, and promised to uploads under way
+  uint64_t uploaded = 0, evicted = 0, damaged = 0, bytes_in = 0;
+};
+
 struct Stats {
   int64_t time_ns = 0;
   std::string version;
@@ -111,6 +118,7 @@ struct Stats {
   MemoryFigures memory;
   ListenFigures connections;
   StateFigures state;
+  AssetFigures assets;
   std::vector<DisplayFigures> displays;
 };
 

@@ -118,6 +118,20 @@ constexpr Row<StateFigures> kStateRows[] = {
      "Transactions that failed, and are tried again"},
 };
 
+constexpr Row<AssetFigures> kAssetRows[] = {
+    {"voxeld_assets", &AssetFigures::count, MetricType::Gauge, "Whole assets that are here"},
+    {"voxeld_asset_bytes", &AssetFigures::bytes, MetricType::Gauge,
+     "Bytes of assets, of parts of them, and promised to uploads under way"},
+    {"voxeld_assets_uploaded_total", &AssetFigures::uploaded, MetricType::Counter,
+     "Assets that came whole"},
+    {"voxeld_assets_evicted_total", &AssetFigures::evicted, MetricType::Counter,
+     "Assets and parts of them that went for others"},
+    {"voxeld_assets_damaged_total", &AssetFigures::damaged, MetricType::Counter,
+     "Assets that had another hash on the disk than when they came"},
+    {"voxeld_asset_bytes_in_total", &AssetFigures::bytes_in, MetricType::Counter,
+     "Bytes of assets that came"},
+};
+
 constexpr Row<DisplayFigures> kDisplayRows[] = {
     {"voxeld_display_lit_voxels", &DisplayFigures::lit_voxels, MetricType::Gauge,
      "Voxels that are not black"},
@@ -369,6 +383,10 @@ std::string MetricsText(const Stats& stats) {
   for (const auto& row : kStateRows) {
     Add(families.New(row.name, row.type, row.help), {},
         static_cast<double>(stats.state.*row.figure));
+  }
+  for (const auto& row : kAssetRows) {
+    Add(families.New(row.name, row.type, row.help), {},
+        static_cast<double>(stats.assets.*row.figure));
   }
   AddDisplays(stats.displays, &families);
   return families.Text();

@@ -8,6 +8,7 @@
 
 #include "daemon/access/access.h"
 #include "daemon/access/audit.h"
+#include "daemon/assets/asset_store.h"
 #include "daemon/core/core.h"
 #include "daemon/explain/explainer.h"
 #include "daemon/listen/counters.h"
@@ -17,6 +18,7 @@
 #include "daemon/services/active_calls.h"
 #include "daemon/text/fonts.h"
 #include "display/sync/clock.h"
+#include "gpu/call_queue.h"
 
 namespace voxeld::daemon::services {
 
@@ -33,7 +35,7 @@ struct StreamLimits {
   sync::TimeNs watch_write_limit_ns = 30 * sync::kSecond;
 };
 
-// Outlives the services; the core and the clock outlive it.
+// Outlives the services; the core, the clock and the assets outlive it.
 struct ServiceContext {
   Core& core;
   sync::Clock& clock;
@@ -45,6 +47,7 @@ struct ServiceContext {
   uint32_t max_stats_watches = 64;
   const access::Access* access = nullptr;  // none: everybody may do everything
   access::Audit* audit = nullptr;          // none: nobody asks
+  assets::AssetStore* assets = nullptr;    // none: none are kept
 
   listen::LogGate turned_away_gate{clock, log};
   ActiveCalls calls;        // streams, watches, captures
@@ -60,6 +63,9 @@ struct ServiceContext {
   static constexpr size_t kMostExplanationsWaiting = 8;
   std::shared_ptr<ExplainerThread> explainer =
       std::make_shared<ExplainerThread>(kMostExplanationsWaiting);
+  // What uploads bring is written here: the first to end, as its calls know of all of this.
+  std::unique_ptr<gpu::CallQueue> asset_calls =
+      std::make_unique<gpu::CallQueue>(/*run_inline=*/false);
 };
 
 }  // namespace voxeld::daemon::services

@@ -70,7 +70,8 @@ using SceneBase = SceneStub::WithRawCallbackMethod_Stream<
         SceneStub::WithCallbackMethod_ListEntities<SceneStub::WithCallbackMethod_GetEntity<
             SceneStub::WithCallbackMethod_ExplainEntity<SceneStub::WithCallbackMethod_ClearLayer<
                 SceneStub::WithCallbackMethod_ListOwners<SceneStub::WithCallbackMethod_ControlOwner<
-                    SceneStub::WithCallbackMethod_UploadAsset<SceneStub::Service>>>>>>>>>>;
+                    SceneStub::WithCallbackMethod_UploadAsset<
+                        SceneStub::WithCallbackMethod_ListAssets<SceneStub::Service>>>>>>>>>>>;
 
 class SceneService final : public SceneBase {
  public:
@@ -163,14 +164,20 @@ class SceneService final : public SceneBase {
     return reactor;
   }
 
-  grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(CallbackServerContext* call,
-                                                               v1::UploadAssetResponse*) override {
-    if (absl::Status status = May(call, Scope::kDraw, "UploadAsset"); !status.ok()) {
-      return new RefusedReads<v1::UploadAssetRequest>(status);
-    }
-    return new RefusedReads<v1::UploadAssetRequest>(absl::UnimplementedError(
-        "UploadAsset is not implemented in this version of the server: send geometry in Upsert or "
-        "Batch"));
+  grpc::ServerReadReactor<v1::UploadAssetRequest>* UploadAsset(
+      CallbackServerContext* call, v1::UploadAssetResponse* response) override {
+    absl::StatusOr<Caller> caller = Authorise(context_, *call, Scope::kDraw, "UploadAsset");
+    absl::Status status = caller.status();
+    if (status.ok()) status = CheckAssets(context_);
+    if (!status.ok()) return new RefusedReads<v1::UploadAssetRequest>(status);
+    return NewUpload(context_, *std::move(caller), response);
+  }
+
+  ServerUnaryReactor* ListAssets(CallbackServerContext* call, const v1::ListAssetsRequest* request,
+                                 v1::ListAssetsResponse* response) override {
+    absl::Status status = May(call, Scope::kView, "ListAssets");
+    if (status.ok()) status = services::ListAssets(context_, *request, response);
+    return Refuse(call, status);
   }
 
  private:

@@ -53,7 +53,8 @@ struct ServerOptions {
   const access::Access* access = nullptr;
   const access::TlsStore* tls = nullptr;
   access::Audit* audit = nullptr;
-  Logger* log = nullptr;  // outlives the server; may be none
+  assets::AssetStore* assets = nullptr;  // outlives the server; none: none are kept
+  Logger* log = nullptr;                 // outlives the server; may be none
 };
 
 // Thread-safe. The core must run, outlive the server, and be stopped after it.

@@ -11,13 +11,19 @@ class ByteBuffer;
 class Service;
 template <class Request, class Response>
 class ServerBidiReactor;
+template <class Request>
+class ServerReadReactor;
 template <class Response>
 class ServerWriteReactor;
 }  // namespace grpc
 
 namespace voxeld::v1 {
 class CaptureVolumeRequest;
+class ListAssetsRequest;
+class ListAssetsResponse;
 class Stats;
+class UploadAssetRequest;
+class UploadAssetResponse;
 class VolumeChunk;
 class WatchSceneRequest;
 class WatchStatsRequest;
@@ -40,5 +46,14 @@ grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context, acce
 grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
                                                       access::Caller caller,
                                                       const v1::CaptureVolumeRequest& request);
+// `response` is gRPC's, which keeps it until the call has ended. There are assets (CheckAssets).
+grpc::ServerReadReactor<v1::UploadAssetRequest>* NewUpload(ServiceContext& context,
+                                                           access::Caller caller,
+                                                           v1::UploadAssetResponse* response);
+
+// FailedPrecondition: this server keeps none.
+absl::Status CheckAssets(const ServiceContext& context);
+absl::Status ListAssets(ServiceContext& context, const v1::ListAssetsRequest& request,
+                        v1::ListAssetsResponse* response);
 
 }  // namespace voxeld::daemon::services

@@ -132,8 +132,9 @@ void StreamSession::TakeMessage(std::span<const std::string_view> slices, Arriva
                                                          arrival.bytes, " bytes; open has at most ",
                                                          kOpenBytes, ": send it alone")));
   }
-  wire::Decoded decoded = wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(),
-                                                    memory.get(), &context_.fonts);
+  wire::Decoded decoded =
+      wire::DecodeStreamRequest(slices, core_.limits(), previous, &core_.bulk(),
+                                {memory.get(), context_.assets}, &context_.fonts);
   arrival.decoded_ns = context_.clock.Now();
   if (!decoded.status.ok()) return End(decoded.status);
   if (decoded.open.has_value()) {
@@ -234,7 +235,7 @@ void StreamSession::TakeOperations(wire::Decoded decoded, const Arrival& arrival
                                     .bytes = arrival.bytes,
                                     .received_ns = arrival.received_ns,
                                     .decoded_ns = arrival.decoded_ns,
-                                    .local_bytes = decoded.local_bytes});
+                                    .named_bytes = decoded.named_bytes});
   if (!filled) return;
   sync::MutexLock lock(mutex_);
   ++full_;

@@ -5,7 +5,7 @@
 
 #include "daemon/scene/operation.h"
 #include "daemon/wire/check.h"
-#include "daemon/wire/local_ranges.h"
+#include "daemon/wire/named_ranges.h"
 #include "daemon/wire/payload.h"
 #include "gpu/bulk/bulk_pool.h"
 
@@ -20,7 +20,7 @@ struct DecodeContext {
   gpu::BulkPool* pool = nullptr;  // where large arrays go; null: ordinary memory
   // What the bytes fields of Vertices name; null: they hold it themselves.
   const PayloadTable* payloads = nullptr;
-  LocalRanges* ranges = nullptr;  // in place of payloads; null: they are refused
+  NamedRanges* ranges = nullptr;  // in place of payloads; null: they are refused
   text::Fonts* fonts = nullptr;   // null: text is refused
   // Of the request under way, what those primitives take that have become something else; null: nobody counts.
   uint64_t* decoded_bytes = nullptr;

@@ -17,7 +17,7 @@
 #include "daemon/wire/check.h"
 #include "daemon/wire/context.h"
 #include "daemon/wire/element_count.h"
-#include "daemon/wire/local_ranges.h"
+#include "daemon/wire/named_ranges.h"
 #include "daemon/wire/operations.h"
 #include "daemon/wire/skeleton.h"
 #include "daemon/wire/slice_stream.h"
@@ -261,9 +261,9 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const DecodeC
   DecodeOperation(path, request, out->sequence, context, {&out->operations, &out->refused});
 }
 
-// `memory` is what the context's ranges are of; null: it has none.
+// `sources` are what the context's ranges are of.
 Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t previous_sequence,
-               const MemorySource* memory) {
+               const Sources& sources) {
   Decoded out;
   if (request.op_case() == v1::StreamRequest::kOpen) {
     absl::StatusOr<OpenOptions> open = DecodeOpen(request.open(), context);
@@ -277,17 +277,20 @@ Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t
     out.sequence = std::max(request.sequence(), previous_sequence);
     return out;
   }
-  std::optional<LocalRanges> ranges;
-  if (memory != nullptr) context.ranges = &ranges.emplace(*memory, context.limits);
+  NamedRanges ranges(sources, context.limits);
+  context.ranges = &ranges;
   uint64_t decoded = 0;
   context.decoded_bytes = &decoded;
   Take(FieldPath(""), request, context, previous_sequence, &out);
-  if (ranges.has_value()) out.local_bytes = ranges->bytes_read();
+  out.named_bytes = ranges.bytes_read();
   return out;
 }
 
-Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context) {
+Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context, AssetSource* assets) {
   Decoded out;
+  const Sources sources{nullptr, assets};
+  NamedRanges ranges(sources, context.limits);
+  context.ranges = &ranges;
   uint64_t decoded = 0;
   context.decoded_bytes = &decoded;
   if (const auto count = static_cast<uint64_t>(request.operations_size());
@@ -322,6 +325,7 @@ Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context) {
   }
   out.open = *std::move(open);
   out.operations.push_back({++out.sequence, Commit{}});
+  out.named_bytes = ranges.bytes_read();
   return out;
 }
 
@@ -334,14 +338,14 @@ absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limit
 }
 
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
-                            uint64_t previous_sequence, gpu::BulkPool* pool,
-                            const MemorySource* memory, text::Fonts* fonts) {
-  return Decode(request, {limits, pool, nullptr, nullptr, fonts}, previous_sequence, memory);
+                            uint64_t previous_sequence, gpu::BulkPool* pool, const Sources& sources,
+                            text::Fonts* fonts) {
+  return Decode(request, {limits, pool, nullptr, nullptr, fonts}, previous_sequence, sources);
 }
 
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
-                            uint64_t previous_sequence, gpu::BulkPool* pool,
-                            const MemorySource* memory, text::Fonts* fonts) {
+                            uint64_t previous_sequence, gpu::BulkPool* pool, const Sources& sources,
+                            text::Fonts* fonts) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   const ElementRow rows[] = {
@@ -357,11 +361,11 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
     return Failed(status);
   }
   return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts},
-                previous_sequence, memory);
+                previous_sequence, sources);
 }
 
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
-                     gpu::BulkPool* pool, text::Fonts* fonts) {
+                     gpu::BulkPool* pool, AssetSource* assets, text::Fonts* fonts) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   if (absl::Status status = CheckUpdateElements(slices, size, limits); !status.ok()) {
@@ -371,12 +375,12 @@ Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& lim
   if (absl::Status status = parsed.Parse(slices, size, Root::kApplyUpdateRequest); !status.ok()) {
     return Failed(status);
   }
-  return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts});
+  return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts}, assets);
 }
 
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
-                     gpu::BulkPool* pool, text::Fonts* fonts) {
-  return Decode(request, {limits, pool, nullptr, nullptr, fonts});
+                     gpu::BulkPool* pool, AssetSource* assets, text::Fonts* fonts) {
+  return Decode(request, {limits, pool, nullptr, nullptr, fonts}, assets);
 }
 
 }  // namespace voxeld::daemon::wire

@@ -41,7 +41,7 @@ struct Decoded {
   Refusals refused;
   std::optional<int64_t> ping_client_time_ns;  // the message was a Ping
   uint64_t sequence = 0;                       // of the last request
-  uint64_t local_bytes = 0;  // copied from local memory, beside the message's own bytes
+  uint64_t named_bytes = 0;  // copied from local memory and assets, beside the message's own bytes
 };
 
 // One StreamRequest. The large arrays of primitives go to `pool` (null: ordinary memory), copied
@@ -51,32 +51,34 @@ struct Decoded {
 // A Commit is passed on whatever is wrong with it, after an Issue, so that it is answered like
 // every other: its receipt counts the refusal, or refuses it if the session is strict.
 //
-// `memory` is what its ranges of local memory name (null: they are refused); what they name has been
-// copied when the call returns. All that one request names is at most max_uncommitted_bytes.
+// `sources` are what its ranges name (none: they are refused); what they name has been copied when
+// the call returns. All that one request names is at most max_uncommitted_bytes.
 //
 // Status: InvalidArgument (not a StreamRequest; an Open that cannot be taken),
 // ResourceExhausted (greater than max_message_bytes),
 // Unimplemented (an Open that asks for what this version has not).
 Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limits& limits,
                             uint64_t previous_sequence, gpu::BulkPool* pool = nullptr,
-                            const MemorySource* memory = nullptr, text::Fonts* fonts = nullptr);
+                            const Sources& sources = {}, text::Fonts* fonts = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limits,
                             uint64_t previous_sequence, gpu::BulkPool* pool = nullptr,
-                            const MemorySource* memory = nullptr, text::Fonts* fonts = nullptr);
+                            const Sources& sources = {}, text::Fonts* fonts = nullptr);
 
 // An ApplyUpdateRequest: `open` is always set (KEEP unless it says otherwise), the operations end
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].". It has no local
-// memory.
+// memory; `assets` may be none.
 //
 // Status: as above, and InvalidArgument for more than max_operations_per_commit operations.
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
-                     gpu::BulkPool* pool = nullptr, text::Fonts* fonts = nullptr);
+                     gpu::BulkPool* pool = nullptr, AssetSource* assets = nullptr,
+                     text::Fonts* fonts = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
-                     gpu::BulkPool* pool = nullptr, text::Fonts* fonts = nullptr);
+                     gpu::BulkPool* pool = nullptr, AssetSource* assets = nullptr,
+                     text::Fonts* fonts = nullptr);
 
 absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);
 

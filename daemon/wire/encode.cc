@@ -153,6 +153,8 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_must_show_timeout_ns(in.must_show_timeout_ns);
   out->set_max_drop_oldest_frames(in.max_drop_oldest_frames);
   out->set_max_local_bytes(in.max_local_bytes);
+  out->set_max_asset_bytes(in.max_asset_bytes);
+  out->set_max_assets_bytes(in.max_assets_bytes);
 }
 
 void Encode(const EntityKey& in, v1::EntityKey* out) {

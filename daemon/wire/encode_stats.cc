@@ -144,6 +144,13 @@ void Encode(const Stats& in, v1::Stats* out) {
   state->set_bytes(in.state.bytes);
   state->set_failures(in.state.failures);
   state->set_trouble(in.state.trouble);
+  v1::AssetStats* assets = out->mutable_assets();
+  assets->set_count(in.assets.count);
+  assets->set_bytes(in.assets.bytes);
+  assets->set_uploaded(in.assets.uploaded);
+  assets->set_evicted(in.assets.evicted);
+  assets->set_damaged(in.assets.damaged);
+  assets->set_bytes_in(in.assets.bytes_in);
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

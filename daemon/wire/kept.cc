@@ -27,7 +27,7 @@ absl::Status Parse(std::string_view bytes, Message* out) {
 absl::StatusOr<Operation> TheOperation(const v1::StreamRequest& request, const Limits& limits,
                                        gpu::BulkPool* pool, text::Fonts* fonts) {
   // It was taken whole once, in one message or in several.
-  Decoded decoded = DecodeStreamRequest(request, limits, 0, pool, nullptr, fonts);
+  Decoded decoded = DecodeStreamRequest(request, limits, 0, pool, {}, fonts);
   if (!decoded.status.ok()) return decoded.status;
   if (decoded.refused.first.has_value()) {
     const Issue& issue = *decoded.refused.first;

@@ -1,5 +1,5 @@
-// Memory that a request may name in place of payloads (voxeld.v1.MemoryRange). The decoder reads
-// it through this; where it comes from (daemon/local) is not its business.
+// What a request may name in place of payloads (voxeld.v1.MemoryRange). The decoder reads it through
+// this; where it comes from (daemon/local, daemon/assets) is not its business.
 #pragma once
 
 #include <cstdint>
@@ -27,6 +27,25 @@ class MemorySource {
   // memory.
   virtual absl::StatusOr<MappedRange> Find(uint64_t memory, uint64_t offset,
                                            uint64_t size) const = 0;
+};
+
+class AssetSource {
+ public:
+  virtual ~AssetSource() = default;
+
+  // `size` bytes from `offset` of the content whose SHA-256 is `digest`, 32 bytes. It counts as used.
+  // Thread-safe; reads a file.
+  //
+  // NotFound: it is not here, or not yet whole. OutOfRange: it ends before. Anything else: it cannot be
+  // read now. Messages as above: asset, size, asset.
+  virtual absl::StatusOr<MappedRange> FindAsset(std::string_view digest, uint64_t offset,
+                                                uint64_t size) = 0;
+};
+
+// Either may be none.
+struct Sources {
+  const MemorySource* memory = nullptr;
+  AssetSource* assets = nullptr;
 };
 
 }  // namespace voxeld::daemon::wire

@@ -15,6 +15,7 @@
 #include "daemon/wire/grids.h"
 #include "daemon/wire/height_map.h"
 #include "daemon/wire/implicit.h"
+#include "daemon/wire/named_ranges.h"
 #include "daemon/wire/open_edges.h"
 #include "daemon/wire/shapes.h"
 #include "daemon/wire/text.h"
@@ -413,6 +414,11 @@ MaybeFault ToContent(const FieldPath& path, const v1::Primitive& in, const Decod
     return Fault{path.ToString(), Reason::kQuotaExceeded,
                  absl::StrCat("comes after primitives that take ", *context.decoded_bytes,
                               " bytes; max_uncommitted_bytes is ", most, ": commit less at once")};
+  }
+  if (NamesMore(in)) {
+    v1::Primitive whole;
+    if (auto fault = PutInPlace(path, in, context, &whole)) return fault;
+    return ToContent(path, whole, context, out);
   }
   if (auto fault = ToWhatItIs(path, in, context, out)) return fault;
   if (counted) *context.decoded_bytes += MadeBytes(in, *out);

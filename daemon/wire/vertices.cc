@@ -71,7 +71,7 @@ struct Array {
 
 // Finds the bytes, and holds their number against what is wanted.
 MaybeFault CheckArray(const FieldPath& path, uint64_t count, uint64_t element_bytes,
-                      LocalRanges* ranges, Array* array) {
+                      const DecodeContext& context, Array* array) {
   // count < 2³² and element_bytes ≤ 12: no overflow.
   const uint64_t want = count * element_bytes;
   const uint64_t sent = array->payload.size();
@@ -92,9 +92,8 @@ MaybeFault CheckArray(const FieldPath& path, uint64_t count, uint64_t element_by
                  absl::StrCat("is ", array->range->size(), "; ", count, " elements of ",
                               element_bytes, " bytes need ", want)};
   }
-  if (ranges == nullptr) return NoLocalMemory(in, *array->range);
   MappedRange mapped;
-  if (auto fault = ranges->Read(in, *array->range, &mapped)) return fault;
+  if (auto fault = ReadRange(in, *array->range, context, &mapped)) return fault;
   array->payload = Payload(mapped.bytes);
   array->mapping = std::move(mapped.mapping);
   return {};
@@ -285,11 +284,11 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
     return fault;
   }
   const bool colored = arrays.colors.given() || in.color_type() != v1::ELEMENT_TYPE_UNSPECIFIED;
-  if (auto fault = CheckArray(path, in.count(), PositionBytes(in.position_type()), context.ranges,
+  if (auto fault = CheckArray(path, in.count(), PositionBytes(in.position_type()), context,
                               &arrays.positions)) {
     return fault;
   }
-  if (auto fault = CheckArray(path, in.index_count(), IndexBytes(in.index_type()), context.ranges,
+  if (auto fault = CheckArray(path, in.index_count(), IndexBytes(in.index_type()), context,
                               &arrays.indices)) {
     return fault;
   }
@@ -297,8 +296,8 @@ MaybeFault ToVertices(const FieldPath& path, const v1::Vertices& in, bool with_i
   if (auto fault = CheckColorsOf(path, in, colored, out->record.kind, &of_elements)) return fault;
   const bool of_vertices = colored && !of_elements;
   if (of_vertices) {
-    if (auto fault = CheckArray(path, in.count(), ColorBytes(in.color_type()), context.ranges,
-                                &arrays.colors)) {
+    if (auto fault =
+            CheckArray(path, in.count(), ColorBytes(in.color_type()), context, &arrays.colors)) {
       return fault;
     }
   }
@@ -333,7 +332,7 @@ MaybeFault ToElementColors(const FieldPath& path, const v1::Vertices& in,
   const size_t each = out->record.kind == gpu::PrimitiveKind::kTriangles ? 3 : 2;
   Array colors = ArraysOf(in, context).colors;
   if (auto fault =
-          CheckArray(path, corners / each, ColorBytes(in.color_type()), context.ranges, &colors)) {
+          CheckArray(path, corners / each, ColorBytes(in.color_type()), context, &colors)) {
     return fault;
   }
   if (auto fault = CheckCount(path, "colors_of", corners, context.limits.max_vertices_per_entity,

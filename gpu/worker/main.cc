@@ -1,4 +1,5 @@
-// voxeld-engine: an engine in a process of its own. Started by its owner, never by hand.
+// voxeld-engine: an engine in a process of its own. Started by its owner, or by a service manager for a
+// connection to its socket; never by hand.
 #include <sys/socket.h>
 
 #include <cstdio>

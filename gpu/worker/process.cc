@@ -5,10 +5,13 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstring>
+#include <string_view>
 #include <system_error>
 #include <thread>
 
@@ -19,7 +22,29 @@ extern char** environ;
 
 namespace voxeld::gpu {
 
+absl::StatusOr<std::shared_ptr<WorkerProcess>> WorkerProcess::ConnectTo(const std::string& path) {
+  const auto failed = [&path](int error) {
+    return absl::FailedPreconditionError(absl::StrCat("no worker at the socket ", path, ": ",
+                                                      std::generic_category().message(error)));
+  };
+  sockaddr_un address = {};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof(address.sun_path)) return failed(ENAMETOOLONG);
+  std::memcpy(address.sun_path, path.data(), path.size());
+  const int control = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (control < 0) return failed(errno);
+  if (connect(control, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+    const int error = errno;
+    close(control);
+    return failed(error);
+  }
+  return std::shared_ptr<WorkerProcess>(new WorkerProcess(0, control));
+}
+
 absl::StatusOr<std::shared_ptr<WorkerProcess>> WorkerProcess::Start(const std::string& program) {
+  if (constexpr std::string_view kSocket = "unix:"; program.starts_with(kSocket)) {
+    return ConnectTo(program.substr(kSocket.size()));
+  }
   int sockets[2];
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, sockets) != 0) {
     return absl::FailedPreconditionError(
@@ -79,6 +104,10 @@ absl::StatusOr<int> WorkerProcess::Connect() {
 
 void WorkerProcess::Kill() {
   if (killed_.exchange(true)) return;
+  if (pid_ == 0) {
+    shutdown(control_, SHUT_RDWR);
+    return;
+  }
   kill(pid_, SIGKILL);
   // One that hangs in its driver dies when that lets go of it.
   try {

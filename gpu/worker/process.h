@@ -15,7 +15,9 @@ namespace voxeld::gpu {
 class WorkerProcess {
  public:
   // Starts `program` with its end of a socket pair as descriptor 3, and nothing else open but the
-  // standard streams. FailedPrecondition if it cannot be started.
+  // standard streams. Or, where `program` is unix:PATH, connects to a socket (SOCK_SEQPACKET) whose
+  // listener starts one for each connection, as a service manager does that keeps it apart.
+  // FailedPrecondition if neither can be done.
   static absl::StatusOr<std::shared_ptr<WorkerProcess>> Start(const std::string& program);
   ~WorkerProcess();
   WorkerProcess(const WorkerProcess&) = delete;
@@ -24,14 +26,16 @@ class WorkerProcess {
   // A connection for one engine: this end of it, the caller's to close; it does not block. The
   // other is on its way to the process. Unavailable if that is gone.
   absl::StatusOr<int> Connect();
-  // Ends the process, whatever it does; nobody waits for it. Its connections end with it.
+  // Ends the process, whatever it does; nobody waits for it. Its connections end with it. One that
+  // somebody else has started is told to end by its connection's end, which a stopped one does not hear.
   void Kill();
   // It has ended, or been killed.
   bool lost() const;
-  pid_t pid() const { return pid_; }
+  pid_t pid() const { return pid_; }  // 0: somebody else's
 
  private:
   WorkerProcess(pid_t pid, int control) : pid_(pid), control_(control) {}
+  static absl::StatusOr<std::shared_ptr<WorkerProcess>> ConnectTo(const std::string& path);
 
   const pid_t pid_;
   const int control_;  // connections go over this

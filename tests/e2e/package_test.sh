@@ -188,12 +188,16 @@ grep -q '^video:.*:voxeld$' "$root/etc/group" || fail "not in video: $(cat "$roo
 cp -an /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/" # the targets that every unit has around it
 mkdir -p "$root/bin"
 cp /bin/kill "$root/bin/" # of a package that it depends on
-said=$(systemd-analyze verify --root="$root" voxeld.service voxeld.socket voxeld-playlist.service 2>&1) || fail "systemd-analyze verify: $said"
+said=$(systemd-analyze verify --root="$root" voxeld.service voxeld.socket voxeld-playlist.service voxeld-engine.socket \
+        voxeld-engine@0.service 2>&1) || fail "systemd-analyze verify: $said"
 [ -z "$said" ] || fail "systemd-analyze verify: $said"
 systemd-analyze security --offline=true --root="$root" --threshold=19 voxeld.service >"$work/security" ||
   fail "exposed: $(cat "$work/security")"
 tail -n 1 "$work/security"
 systemd-analyze security --offline=true --root="$root" --threshold=10 voxeld-playlist.service >"$work/security" ||
+  fail "exposed: $(cat "$work/security")"
+tail -n 1 "$work/security"
+systemd-analyze security --offline=true --root="$root" --threshold=6 voxeld-engine@0.service >"$work/security" ||
   fail "exposed: $(cat "$work/security")"
 tail -n 1 "$work/security"
 

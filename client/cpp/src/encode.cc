@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cpp/src/encode_parts.h"
+#include "client/cpp/src/encode_payload.h"
 #include "client/cpp/src/encode_shapes.h"
 #include "voxeld/v1/primitives.pb.h"
 #include "voxeld/v1/scene.pb.h"
@@ -16,32 +17,6 @@ namespace {
 // Numbers of fields are those of the generated code, so that there is one place for each.
 using v1::Batch;
 using v1::StreamRequest;
-
-// Smaller payloads are not worth a piece of their own.
-constexpr size_t kSharedBytes = 4096;
-
-template <typename T>
-std::string_view Bytes(std::span<const T> values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
-}
-
-template <typename T>
-void AppendPayload(int field, const Array<T>& values, Rope* out) {
-  if (values.empty()) return;
-  const std::string_view bytes = Bytes(values.view());
-  std::string tag;
-  AppendVarint(static_cast<uint64_t>(field) << 3 | 2, &tag);
-  AppendVarint(bytes.size(), &tag);
-  out->Append(tag);
-  if (bytes.size() < kSharedBytes) {
-    out->Append(bytes);
-  } else if (values.owner() != nullptr) {
-    out->AppendShared(values.owner(), bytes);
-  } else {
-    const auto copy = std::make_shared<const std::string>(bytes);
-    out->AppendShared(copy, *copy);
-  }
-}
 
 absl::StatusOr<Rope> EncodeVertices(const Vertices& v) {
   const size_t count = v.positions.size() / 3;
@@ -79,10 +54,14 @@ absl::StatusOr<Rope> EncodeVertices(const Vertices& v) {
     AppendUnsigned(v1::Vertices::kIndexCountFieldNumber, indices, &head);
   }
   Rope rope(std::move(head));
-  AppendPayload(v1::Vertices::kIndicesFieldNumber, v.indices, &rope);
-  AppendPayload(v1::Vertices::kIndicesFieldNumber, v.short_indices, &rope);
-  AppendPayload(v1::Vertices::kColorsFieldNumber, v.colors, &rope);
-  AppendPayload(v1::Vertices::kPositionsFieldNumber, v.positions, &rope);
+  AppendPayload(v1::Vertices::kIndicesFieldNumber, v1::Vertices::kIndicesInFieldNumber, v.indices,
+                &rope);
+  AppendPayload(v1::Vertices::kIndicesFieldNumber, v1::Vertices::kIndicesInFieldNumber,
+                v.short_indices, &rope);
+  AppendPayload(v1::Vertices::kColorsFieldNumber, v1::Vertices::kColorsInFieldNumber, v.colors,
+                &rope);
+  AppendPayload(v1::Vertices::kPositionsFieldNumber, v1::Vertices::kPositionsInFieldNumber,
+                v.positions, &rope);
   return rope;
 }
 
@@ -141,8 +120,10 @@ struct ShapeEncoder {
                          " numbers for ", count, " vertices; ", 2 * count, " are right"));
       }
       Rope texture;
-      AppendPayload(v1::Texture::kPictureFieldNumber, mesh.texture->picture, &texture);
-      AppendPayload(v1::Texture::kCoordinatesFieldNumber, mesh.texture->coordinates, &texture);
+      AppendPayload(v1::Texture::kPictureFieldNumber, v1::Texture::kPictureInFieldNumber,
+                    mesh.texture->picture, &texture);
+      AppendPayload(v1::Texture::kCoordinatesFieldNumber, v1::Texture::kCoordinatesInFieldNumber,
+                    mesh.texture->coordinates, &texture);
       rope.Append(Wrap("", v1::Mesh::kTextureFieldNumber, std::move(texture)));
     }
     return Wrap(before, v1::Primitive::kMeshFieldNumber, std::move(rope));
@@ -218,9 +199,12 @@ struct ShapeEncoder {
     AppendUnsigned(v1::HeightMap::kFillFieldNumber, AfterUnspecified(map.fill), &fields);
     if (map.shell.value != 0) AppendThickness(v1::HeightMap::kShellFieldNumber, map.shell, &fields);
     Rope rope(std::move(fields));
-    AppendPayload(v1::HeightMap::kPictureFieldNumber, map.picture, &rope);
-    AppendPayload(v1::HeightMap::kColorsFieldNumber, map.colors, &rope);
-    AppendPayload(v1::HeightMap::kHeightsFieldNumber, map.heights, &rope);
+    AppendPayload(v1::HeightMap::kPictureFieldNumber, v1::HeightMap::kPictureInFieldNumber,
+                  map.picture, &rope);
+    AppendPayload(v1::HeightMap::kColorsFieldNumber, v1::HeightMap::kColorsInFieldNumber,
+                  map.colors, &rope);
+    AppendPayload(v1::HeightMap::kHeightsFieldNumber, v1::HeightMap::kHeightsInFieldNumber,
+                  map.heights, &rope);
     return Wrap(before, v1::Primitive::kHeightMapFieldNumber, std::move(rope));
   }
   absl::StatusOr<Rope> operator()(const Volume& volume) const {
@@ -292,7 +276,10 @@ struct ShapeEncoder {
     AppendUnsigned(v1::Grid::kFilterFieldNumber, AfterUnspecified(grid.filter), &fields);
     Rope rope(std::move(fields));
     std::visit(
-        [&](const auto& array) { AppendPayload(v1::Grid::kSamplesFieldNumber, array, &rope); },
+        [&](const auto& array) {
+          AppendPayload(v1::Grid::kSamplesFieldNumber, v1::Grid::kSamplesInFieldNumber, array,
+                        &rope);
+        },
         grid.samples);
     return rope;
   }
@@ -406,6 +393,10 @@ absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color,
     AppendPresentBytes(v1::Primitive::kColorFieldNumber, rgb, &before);
   }
   if (scale.has_value()) {
+    if (scale->scalars.asset().has_value()) {
+      return absl::InvalidArgumentError(
+          "the scalars of a colour scale are an asset; give the numbers themselves");
+    }
     AppendPresentBytes(v1::Primitive::kColorScaleFieldNumber, EncodeColorScale(*scale), &before);
   }
   return std::visit(ShapeEncoder{std::move(before)}, shape);

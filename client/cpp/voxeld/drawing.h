@@ -22,9 +22,16 @@
 
 namespace voxeld::client {
 
+// Content that the server has by its SHA-256 (UploadAsset, voxeld/assets.h).
+struct Asset {
+  std::string sha256;  // 32 bytes
+  uint64_t size = 0;   // in bytes
+};
+
 // A packed array of numbers. Made of an lvalue or a span it is a view, which must stay until the
 // call that it is given to returns; that call copies it once. Made of an rvalue vector or a list it
-// owns what it holds, and large ones go to the wire without another copy.
+// owns what it holds, and large ones go to the wire without another copy. Made of an asset it is that
+// asset's content, little-endian, which is named and not sent.
 template <typename T>
 class Array {
  public:
@@ -37,14 +44,17 @@ class Array {
   Array(std::vector<T>&& whole)                                   // NOLINT: implicit
       : owner_(std::make_shared<const std::vector<T>>(std::move(whole))), view_(*owner_) {}
   Array(std::initializer_list<T> list) : Array(std::vector<T>(list)) {}
+  Array(Asset asset) : asset_(std::move(asset)) {}  // NOLINT: implicit
 
-  size_t size() const { return view_.size(); }
-  bool empty() const { return view_.empty(); }
-  std::span<const T> view() const { return view_; }
+  size_t size() const { return asset_.has_value() ? asset_->size / sizeof(T) : view_.size(); }
+  bool empty() const { return size() == 0; }
+  std::span<const T> view() const { return view_; }  // of an asset nothing
   // Null for a view.
   const std::shared_ptr<const std::vector<T>>& owner() const { return owner_; }
+  const std::optional<Asset>& asset() const { return asset_; }
 
  private:
+  std::optional<Asset> asset_;
   std::shared_ptr<const std::vector<T>> owner_;
   std::span<const T> view_;
 };

@@ -5,6 +5,7 @@
     v.lines("axes", [[-1, 0, 0], [1, 0, 0]], colors="tab:orange")
 """
 from . import aio
+from .assets import Asset
 from .clip import ClipBox, ClipCylinder
 from .colors import Gradient
 from .connection import Connection, connect
@@ -20,7 +21,7 @@ from .volumes import Volume
 __version__ = "0.1.0"
 
 __all__ = [
-    "Accepted", "BufferFull", "ChangeSet", "ClipBox", "ClipCylinder", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Credentials",
+    "Accepted", "Asset", "BufferFull", "ChangeSet", "ClipBox", "ClipCylinder", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Credentials",
     "Frame",
     "FrameBlock", "Gradient", "Handle", "InvalidArray", "InvalidColor", "InvalidValue", "Issue", "Layer", "ObjectBlock", "Outcome",
     "Stages", "VoxelError", "Volume", "aio", "connect", "identity", "rotate", "scale", "translate"]

@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from types import TracebackType
 from typing import AsyncIterator, Callable, Optional, Type, Union
 
+from .assets import Asset, Content
 from .base import BaseConnection, settings
 from .credentials import Credentials
 from .errors import ConnectionLost
@@ -72,6 +73,10 @@ class Connection(BaseConnection):
 
     async def layers(self, owner: int = 0, timeout: Optional[float] = 5.0) -> list[scene_pb2.LayerInfo]:
         return await asyncio.to_thread(self._queries.layers, owner, timeout)
+
+    async def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None) -> Asset:
+        """As Connection.upload(); `progress` is called in another thread."""
+        return await asyncio.to_thread(self._queries.upload, content, progress)
 
     async def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
                           timeout: Optional[float] = None) -> AsyncIterator[ChangeSet]:

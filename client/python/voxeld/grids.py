@@ -1,7 +1,7 @@
 """Volumes and isosurfaces, as wire bytes."""
 from __future__ import annotations
 
-from typing import Any, Optional, Sequence
+from typing import Any, Optional, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,7 @@ import numpy.typing as npt
 from . import colors as colors_
 from . import wire
 from .arrays import as_array, number, vector
+from .assets import Asset, samples, x_fastest
 from .colors import Colors
 from .errors import InvalidArray, InvalidValue
 from .shapes import FILLS, RULES, WHOLE_BYTES, choice, solid, thickness, vec
@@ -21,10 +22,12 @@ _FILTERS = {"linear": pb.Grid.LINEAR, "nearest": pb.Grid.NEAREST}
 _TYPES = {np.dtype(np.uint8): pb.ELEMENT_TYPE_U8, np.dtype(np.uint16): pb.ELEMENT_TYPE_U16}
 
 
-def _grid(array: npt.ArrayLike, extent: Extent, filter: str, colors: bool) -> pb.Grid:
-    """`array`: (nx, ny, nz), or, of colours, (nx, ny, nz, 4)."""
-    field = as_array(array, "array")
-    if field.ndim != (4 if colors else 3) or 0 in field.shape or (colors and field.shape[3] != 4):
+def _grid(array: Union[npt.ArrayLike, Asset], extent: Extent, filter: str, colors: bool) -> pb.Grid:
+    """`array`: (nx, ny, nz), or, of colours, (nx, ny, nz, 4); or an asset of one."""
+    field = array if isinstance(array, Asset) else as_array(array, "array")
+    if field.shape is None:
+        raise InvalidValue("the asset is no array's; upload the array itself, so that its shape is known")
+    if len(field.shape) != (4 if colors else 3) or 0 in field.shape or (colors and field.shape[3] != 4):
         raise InvalidArray(f"array must be of shape {'(nx, ny, nz, 4)' if colors else '(nx, ny, nz)'}, got {field.shape}")
     shape = np.array(field.shape[:3])
     if extent is None:
@@ -34,27 +37,29 @@ def _grid(array: npt.ArrayLike, extent: Extent, filter: str, colors: bool) -> pb
         first, last = np.array(vector(extent[0], "extent[0]")), np.array(vector(extent[1], "extent[1]"))
         if not (first < last).all():
             raise InvalidArray(f"extent goes from {first.tolist()} to {last.tolist()}; the first must be less on every axis")
-    element = pb.ELEMENT_TYPE_RGBA8 if colors else _TYPES.get(field.dtype, pb.ELEMENT_TYPE_F32)
     if colors and field.dtype != np.uint8:
         raise InvalidArray(f"array of colours must be uint8, got {field.dtype}")
-    if element == pb.ELEMENT_TYPE_F32:
-        field = field.astype(np.float32)
-        if np.isinf(field).any():
-            raise InvalidArray("array has infinite numbers; give finite ones, or NaN where there is nothing")
-    if field.nbytes > WHOLE_BYTES:
-        raise InvalidArray(f"array takes {field.nbytes} bytes, more than the {WHOLE_BYTES} that go at once; give fewer samples, or "
-                           "narrower ones (uint8)")
-    samples = np.ascontiguousarray(np.swapaxes(field, 0, 2)).tobytes()  # x fastest
+    if not isinstance(field, Asset):
+        field = samples(field)
+        if field.nbytes > WHOLE_BYTES:
+            raise InvalidArray(f"array takes {field.nbytes} bytes, more than the {WHOLE_BYTES} that go at once; give fewer samples, or "
+                               "narrower ones (uint8)")
+    element = pb.ELEMENT_TYPE_RGBA8 if colors else _TYPES.get(field.dtype, pb.ELEMENT_TYPE_F32)
     edges = np.diag(last - first)
-    return pb.Grid(corner=vec(first, "extent"), edge_a=vec(edges[0], "extent"), edge_b=vec(edges[1], "extent"),
+    grid = pb.Grid(corner=vec(first, "extent"), edge_a=vec(edges[0], "extent"), edge_b=vec(edges[1], "extent"),
                    edge_c=vec(edges[2], "extent"), size_a=shape[0], size_b=shape[1], size_c=shape[2], type=element,
-                   filter=choice(_FILTERS, filter, "filter"), samples=samples)
+                   filter=choice(_FILTERS, filter, "filter"))
+    if isinstance(field, Asset):
+        grid.samples_in.CopyFrom(field.range())
+    else:
+        grid.samples = x_fastest(field)
+    return grid
 
 
-def grid(array: npt.ArrayLike, *, values: Optional[Sequence[float]] = None, colors: Optional[Sequence[Any]] = None,
+def grid(array: Union[npt.ArrayLike, Asset], *, values: Optional[Sequence[float]] = None, colors: Optional[Sequence[Any]] = None,
          cmap: Optional[str] = None, opacities: Optional[Sequence[float]] = None, extent: Extent = None, filter: str = "linear",
          color: Color = None) -> list[wire.Packed]:
-    is_colors = np.ndim(array) == 4
+    is_colors = (len(array.shape or ()) if isinstance(array, Asset) else np.ndim(array)) == 4
     shape = pb.Volume(grid=_grid(array, extent, filter, is_colors))
     if values is None:
         if colors is not None or cmap is not None or opacities is not None:
@@ -74,7 +79,7 @@ def grid(array: npt.ArrayLike, *, values: Optional[Sequence[float]] = None, colo
     return solid(color, volume=shape)
 
 
-def isosurface(array: npt.ArrayLike, level: float, *, extent: Extent = None, filter: str = "linear", color: Color = None,
+def isosurface(array: Union[npt.ArrayLike, Asset], level: float, *, extent: Extent = None, filter: str = "linear", color: Color = None,
                fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
     return solid(color, isosurface=pb.Isosurface(
         grid=_grid(array, extent, filter, False), level=number(level, "level"), fill=choice(FILLS, fill, "fill"),

@@ -13,7 +13,7 @@ from .colors import Colors
 from .errors import InvalidArray, InvalidValue
 from .expressions import Expression
 from .shapes import FILLS, PIECE_BYTES, RULES, choice, solid, thickness, vec
-from .texture import PictureFile, picture_bytes
+from .texture import PictureFile, picture_fields
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
@@ -130,7 +130,7 @@ def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
     look: dict[str, Any] = dict(fill=choice(FILLS, fill, "fill"), **_rule(rule, shell, unit))
     most = max(2, PIECE_BYTES // (columns * (4 if rgb is None else 7)))
     if texture is not None:
-        look["picture"] = picture_bytes(texture)
+        look.update(picture_fields(texture))
         if most < rows:
             raise InvalidArray(f"heights: {rows} by {columns} are more than go at once, and a picture lies over all of them; "
                                "leave out rows and columns, or give colors")

@@ -1,17 +1,20 @@
 """Calls beside the stream: displays, statistics, pictures, what is in the scene. They block."""
 from __future__ import annotations
 
+import time
 from typing import Any, Callable, Iterator, Optional, Sequence
 
 import grpc
 from google.protobuf.message import Message
 
 from . import credentials
+from .assets import Asset, Content, pack
 from .credentials import Credentials
 from .errors import ConnectionLost, VoxelError
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
 
+_PIECE_BYTES = 1 << 20
 _DISPLAYS = "/voxeld.v1.DisplayService/"
 _SCENE = "/voxeld.v1.SceneService/"
 
@@ -102,6 +105,43 @@ class Queries:
         return Watch(self._usable().unary_stream(
             _SCENE + "WatchScene", scene_pb2.WatchSceneRequest.SerializeToString,
             scene_pb2.WatchSceneResponse.FromString)(request, timeout=timeout))
+
+
+    def assets(self, digests: Sequence[bytes] = (), timeout: Optional[float] = 5.0) -> list[scene_pb2.AssetInfo]:
+        answer: scene_pb2.ListAssetsResponse = self._one(
+            _SCENE + "ListAssets", scene_pb2.ListAssetsRequest(sha256=digests), scene_pb2.ListAssetsResponse.FromString, timeout)
+        return list(answer.assets)
+
+    def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None, patience: float = 15.0) -> Asset:
+        data, asset = pack(content)
+        send = self._usable().stream_unary(_SCENE + "UploadAsset", scene_pb2.UploadAssetRequest.SerializeToString,
+                                           scene_pb2.UploadAssetResponse.FromString)
+        stored, until = 0, time.monotonic() + patience
+        while True:
+            there = self.assets([asset.sha256], patience)[0]
+            if there.complete:
+                return asset
+            if there.stored > stored:
+                until = time.monotonic() + patience
+            stored = there.stored
+            try:
+                send(_upload_pieces(data, asset, stored % len(data), progress), metadata=self._metadata, wait_for_ready=True)
+                return asset
+            except grpc.RpcError as error:
+                goes_on = error.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.ABORTED, grpc.StatusCode.OUT_OF_RANGE)
+                if not goes_on or time.monotonic() >= until:
+                    raise _failed(error) from None
+            time.sleep(0.1)
+
+
+def _upload_pieces(data: bytes, asset: Asset, start: int,
+                   progress: Optional[Callable[[int, int], None]]) -> Iterator[scene_pb2.UploadAssetRequest]:
+    for at in range(start, len(data), _PIECE_BYTES):
+        piece = data[at:at + _PIECE_BYTES]
+        first = at == start
+        yield scene_pb2.UploadAssetRequest(sha256=asset.sha256 if first else b"", size=len(data) if first else 0, offset=at, data=piece)
+        if progress is not None:
+            progress(at + len(piece), len(data))
 
 
 class Watch(Iterator["ChangeSet"]):

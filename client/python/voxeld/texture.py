@@ -2,21 +2,28 @@
 from __future__ import annotations
 
 import os
-from typing import Optional, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from .arrays import as_array, require_finite
+from .assets import Asset
 from .errors import InvalidArray, InvalidValue
 from .v1 import primitives_pb2 as pb
 
-PictureFile = Union[str, "os.PathLike[str]", bytes, bytearray, memoryview]
-"""A PNG or JPEG file: its path, or its bytes."""
+PictureFile = Union[str, "os.PathLike[str]", bytes, bytearray, memoryview, Asset]
+"""A PNG or JPEG file: its path, its bytes, or an asset of them."""
 
 
-def picture_bytes(texture: PictureFile) -> bytes:
-    """Of the file; OSError if it cannot be read."""
+def picture_fields(texture: PictureFile) -> dict[str, Any]:
+    """A message's picture, or what stands in its place; OSError if the file cannot be read."""
+    if isinstance(texture, Asset):
+        return {"picture_in": texture.range()}
+    return {"picture": _picture_bytes(texture)}
+
+
+def _picture_bytes(texture: Union[str, "os.PathLike[str]", bytes, bytearray, memoryview]) -> bytes:
     if isinstance(texture, (bytes, bytearray, memoryview)):
         return bytes(texture)
     if not isinstance(texture, (str, os.PathLike)):
@@ -35,4 +42,4 @@ def to_texture(texture: Optional[PictureFile], uv: Optional[npt.ArrayLike], coun
     if places.shape != (count, 2):
         raise InvalidArray(f"uv must be of shape ({count}, 2), got {places.shape}")
     require_finite(places, "uv")
-    return pb.Texture(picture=picture_bytes(texture), coordinates=np.ascontiguousarray(places, np.float32).tobytes())
+    return pb.Texture(coordinates=np.ascontiguousarray(places, np.float32).tobytes(), **picture_fields(texture))

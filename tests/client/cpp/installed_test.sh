@@ -14,6 +14,7 @@ fail() {
 (cd "$work/prefix" && find . -type f | LC_ALL=C sort | sed "s|-$(sed -n 's/^CMAKE_BUILD_TYPE:[^=]*=//p' "$build/CMakeCache.txt" | tr A-Z a-z)\.|-TYPE.|") >"$work/files"
 cat >"$work/expected" <<'EOT'
 ./include/voxeld/address.h
+./include/voxeld/assets.h
 ./include/voxeld/basics.h
 ./include/voxeld/channel.h
 ./include/voxeld/client.h

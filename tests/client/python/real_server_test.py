@@ -17,6 +17,10 @@ import voxeld as voxel
 
 LONG = 60.0
 
+# One red pixel, as a PNG.
+PICTURE = bytes.fromhex("89504e470d0a1a0a0000000d494844520000000100000001080200000090"
+                        "7753de0000000c49444154789c63f8cfc0000003010100c9fe92ef0000000049454e44ae426082")
+
 
 class Daemon:
     def __init__(self, folder: str, *options: str) -> None:
@@ -140,6 +144,36 @@ class RealServer(unittest.TestCase):
         self.assertEqual(f.wait(LONG).state, "accepted")
         self.assertEqual(v.issues, [])
         self.assertEqual(len(self.ids(v)), 26)
+
+    def test_what_was_uploaded_is_named_and_drawn_alike(self) -> None:
+        v = self.connect()
+        field = np.random.default_rng(3).integers(0, 256, (6, 5, 4), np.uint8)
+        told: list[tuple[int, int]] = []
+        asset = v.upload(field, progress=lambda sent, size: told.append((sent, size)))
+        self.assertEqual(told, [(120, 120)])
+        again = v.upload(field, progress=lambda sent, size: self.fail("it is there"))
+        self.assertEqual(again, asset)
+        self.assertEqual(v.upload(field.astype(float)).size, 480, "other numbers are float32")
+
+        pictures = []
+        for samples in (field, asset):
+            with v.frame("l") as f:
+                f.grid("grid", samples)
+            accepted = f.wait(LONG).accepted
+            assert accepted is not None
+            pictures.append(v.capture(at_least_snapshot=accepted.snapshot, timeout=LONG))
+        self.assertTrue(np.array_equal(pictures[0].rgb, pictures[1].rgb))
+        self.assertTrue(pictures[0].rgb.any())
+
+        corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+        picture = v.upload(PICTURE)
+        with v.frame("m") as f:
+            f.mesh("textured", corners, texture=picture, uv=corners[:, :2])
+            f.height_map("map", np.zeros((2, 2)), texture=picture)
+        self.assertEqual(f.wait(LONG).state, "accepted")
+        self.assertEqual(v.issues, [])
+        with self.assertRaisesRegex(voxel.VoxelError, "no array's"):
+            v.grid("no", picture)
 
     def test_a_cut_connection_is_resumed_and_nothing_is_lost(self) -> None:
         for policy in ("clear", "keep", 30.0):

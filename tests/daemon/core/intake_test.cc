@@ -33,7 +33,7 @@ class IntakeTest : public ::testing::Test {
   bool Take(uint64_t bytes, Ops... ops) {
     std::vector<Operation> all = testing::Sequence(sequence, std::move(ops)...);
     sequence += all.size();
-    return intake->Take({std::move(all), {}, bytes, 1, 2, local_bytes});
+    return intake->Take({std::move(all), {}, bytes, 1, 2, named_bytes});
   }
 
   // The layers and ids of what a commit would put.
@@ -60,7 +60,7 @@ class IntakeTest : public ::testing::Test {
   std::shared_ptr<testing::RecordingSink> sink = std::make_shared<testing::RecordingSink>();
   std::optional<Intake> intake;
   uint64_t sequence = 0;
-  uint64_t local_bytes = 0;  // that Take's messages name
+  uint64_t named_bytes = 0;  // that Take's messages name
   int scheduled = 0;
 };
 
@@ -283,7 +283,7 @@ TEST_F(IntakeTest, ATimedCommitHoldsNoCreditButMemory) {
 
 TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
   limits.max_message_bytes = 100;
-  local_bytes = 150;
+  named_bytes = 150;
   Make();
   for (int i = 0; i < 10; ++i) {
     Take(1, Put("a", "x"));
@@ -291,10 +291,10 @@ TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
   }
   Take(1, EndCommit(1));
   Take(1, Put("a", "y"), EndCommit(2));
-  local_bytes = 99;
+  named_bytes = 99;
   Take(1, Put("a", "z"));
   EXPECT_TRUE(intake->HasRoom()) << "399 bytes of 400";
-  local_bytes = 1;
+  named_bytes = 1;
   Take(1, Put("a", "z"));
   EXPECT_FALSE(intake->HasRoom()) << "400 bytes of 400";
   EXPECT_THAT(sink->credits, IsEmpty()) << "it is no credit";
@@ -304,7 +304,7 @@ TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
   intake->Done(std::move(one));
   EXPECT_EQ(sink->rooms, 1);
   EXPECT_TRUE(intake->HasRoom());
-  local_bytes = 1000;
+  named_bytes = 1000;
   Take(1, EndCommit(3));
   EXPECT_FALSE(intake->HasRoom());
   WaitingCommit two = Pop(), three = Pop();
@@ -314,10 +314,10 @@ TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
   intake->Detach(three);
   EXPECT_EQ(sink->rooms, 2);
   intake->Done(std::move(three));
-  local_bytes = 399;
+  named_bytes = 399;
   Take(1, EndCommit(4));
   EXPECT_TRUE(intake->HasRoom());
-  local_bytes = 1;
+  named_bytes = 1;
   Take(1, EndCommit(5));
   EXPECT_FALSE(intake->HasRoom());
   EXPECT_EQ(sink->rooms, 2);
@@ -325,7 +325,7 @@ TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
 
 TEST_F(IntakeTest, AFrameGivenUpKeepsItsLocalBytesUntilItsCommitIsDone) {
   limits.max_message_bytes = 100;
-  local_bytes = 200;
+  named_bytes = 200;
   Make(FlowPolicy::kLatest);
   for (int i = 0; i < 2; ++i) {
     Take(1, Begin("a"), Put("a", "x"), End("a"), EndCommit(i));

@@ -114,21 +114,14 @@ class ServicesAccess : public ::testing::Test {
 // What each method takes, written down a second time: a method that is added must be added here.
 const std::map<std::string, std::string>& ScopesOfMethods() {
   static const std::map<std::string, std::string> scopes = {
-      {"SceneService/Stream", "draw"},
-      {"SceneService/ApplyUpdate", "draw"},
-      {"SceneService/WatchScene", "view"},
-      {"SceneService/ListEntities", "view"},
-      {"SceneService/GetEntity", "view"},
-      {"SceneService/ClearLayer", "draw"},
-      {"SceneService/ExplainEntity", "view"},
-      {"SceneService/ListOwners", "view"},
-      {"SceneService/ControlOwner", "control"},
-      {"SceneService/UploadAsset", "draw"},
-      {"DisplayService/ListDisplays", "view"},
-      {"DisplayService/GetDisplay", "view"},
-      {"DisplayService/UpdateDisplay", "control"},
-      {"DisplayService/WatchStats", "view"},
-      {"DisplayService/WatchVolume", "view"},
+      {"SceneService/Stream", "draw"},          {"SceneService/ApplyUpdate", "draw"},
+      {"SceneService/WatchScene", "view"},      {"SceneService/ListEntities", "view"},
+      {"SceneService/GetEntity", "view"},       {"SceneService/ClearLayer", "draw"},
+      {"SceneService/ExplainEntity", "view"},   {"SceneService/ListOwners", "view"},
+      {"SceneService/ControlOwner", "control"}, {"SceneService/UploadAsset", "draw"},
+      {"SceneService/ListAssets", "view"},      {"DisplayService/ListDisplays", "view"},
+      {"DisplayService/GetDisplay", "view"},    {"DisplayService/UpdateDisplay", "control"},
+      {"DisplayService/WatchStats", "view"},    {"DisplayService/WatchVolume", "view"},
       {"DisplayService/CaptureVolume", "view"}};
   return scopes;
 }

@@ -36,11 +36,15 @@ std::unique_ptr<display::Display> StuckDisplay(const std::string& name, sync::Cl
 Daemon::Daemon(DaemonOptions options)
     : folder_(NewFolder()), target_(absl::StrCat("unix:", folder_, "/voxeld.sock")) {
   const auto counters = std::make_shared<listen::Counters>();
-  core_ =
-      std::make_unique<Core>(CoreOptions{.limits = options.limits,
-                                         .version = "9.8.7",
-                                         .connections = [counters] { return counters->Read(); }},
-                             clock_);
+  core_ = std::make_unique<Core>(
+      CoreOptions{.limits = options.limits,
+                  .version = "9.8.7",
+                  .asset_figures =
+                      [assets = options.assets] {
+                        return assets == nullptr ? AssetFigures() : assets->figures();
+                      },
+                  .connections = [counters] { return counters->Read(); }},
+      clock_);
   for (const std::string& name : options.displays) {
     const absl::Status added =
         core_->AddDisplay(options.stuck ? StuckDisplay(name, clock_) : QuickDisplay(name, clock_),
@@ -69,7 +73,8 @@ Daemon::Daemon(DaemonOptions options)
                                .local = local,
                                .access = options.access,
                                .tls = options.tls,
-                               .audit = options.audit});
+                               .audit = options.audit,
+                               .assets = options.assets});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);
   channel_ = NewChannel();

@@ -46,6 +46,7 @@ struct DaemonOptions {
   const access::Access* access = nullptr;
   const access::TlsStore* tls = nullptr;
   access::Audit* audit = nullptr;
+  assets::AssetStore* assets = nullptr;  // outlives the daemon
 };
 
 class Daemon {

@@ -331,17 +331,5 @@ TEST(SceneService, OwnersAreListedAndControlled) {
   EXPECT_EQ(control(request).first.error_code(), grpc::StatusCode::NOT_FOUND);
 }
 
-TEST(SceneService, WhatIsNotImplementedSaysWhy) {
-  Daemon daemon;
-  grpc::ClientContext upload;
-  SetDeadline(upload);
-  v1::UploadAssetResponse stored;
-  const auto asset = daemon.scene().UploadAsset(&upload, &stored);
-  asset->WritesDone();
-  const grpc::Status status = asset->Finish();
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("Upsert"));
-}
-
 }  // namespace
 }  // namespace voxeld::daemon::services

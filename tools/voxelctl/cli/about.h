@@ -75,6 +75,9 @@ inline constexpr const char* kPlaylistAbout =
 inline constexpr const char* kMarkersAbout =
     "Shows what a robot's programs send to their viewers (foxglove.SceneUpdate, from a Foxglove "
     "WebSocket server), until Ctrl-C";
+inline constexpr const char* kAssetsAbout =
+    "Brings files to the server, which keeps them by their SHA-256 for clients to name (pictures, "
+    "samples, vertices);\nwithout FILE: what it has of them";
 inline constexpr const char* kInputAbout =
     "Takes lights in from what feeds LED controllers, until Ctrl-C: PROTOCOL is opc (Open Pixel "
     "Control), ddp,\n"

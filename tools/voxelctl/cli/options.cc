@@ -62,6 +62,7 @@ class Parser {
     AddReplayOptions(Add("replay", kReplayAbout), &replay_);
     AddPlaylistOptions(Add("playlist", kPlaylistAbout), &playlist_);
     AddMarkersOptions(Add("markers", kMarkersAbout), &markers_);
+    Add("assets", kAssetsAbout)->add_option("FILE", assets_.files, "What to bring to the server");
     input_texts_.Add(Add("input", kInputAbout));
     pipe_texts_.Add(Add("pipe", kPipeAbout));
     Add("doctor", kDoctorAbout);
@@ -291,6 +292,11 @@ class Parser {
       options_.command = draw_;
       return;
     }
+    if (name == "assets") {
+      assets_.files.insert(assets_.files.end(), plain_.begin(), plain_.end());
+      options_.command = assets_;
+      return;
+    }
     TakePlain(name == "snapshot"   ? &snapshot_.file
               : name == "gallery"  ? &gallery_.file
               : name == "pattern"  ? &pattern_name_
@@ -475,6 +481,7 @@ class Parser {
   ReplayOptions replay_;
   PlaylistOptions playlist_;
   MarkersOptions markers_;
+  AssetsOptions assets_;
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
   std::string profile_action_;

@@ -164,6 +164,10 @@ struct MarkersOptions {
   std::string layer = "markers";
 };
 
+struct AssetsOptions {
+  std::vector<std::string> files;  // to upload; empty: what is there is listed
+};
+
 struct PipeOptions {
   LightsOptions lights;
   double fps = 0;  // 0: as they come
@@ -178,7 +182,7 @@ struct Options {
                StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
                SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
                InitOptions, TokenOptions, RecordOptions, ReplayOptions, PlaylistOptions,
-               InputOptions, MarkersOptions, PipeOptions, WhyOptions>
+               InputOptions, MarkersOptions, PipeOptions, WhyOptions, AssetsOptions>
       command;
 };
 

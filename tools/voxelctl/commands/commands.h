@@ -31,6 +31,8 @@ absl::Status ShowStats(const StatsOptions& options, Connection& connection, Inte
                        Console& console);
 absl::Status Entities(const EntitiesOptions& options, Connection& connection, Console& console);
 // What the server says of an entity's visibility.
+absl::Status Assets(const AssetsOptions& options, Connection& connection, Interrupt& interrupt,
+                    Console& console);
 absl::Status Why(const WhyOptions& options, Connection& connection, Console& console);
 absl::Status Watch(const WatchOptions& options, Connection& connection, Interrupt& interrupt,
                    Console& console);

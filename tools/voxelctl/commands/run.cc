@@ -64,6 +64,8 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
         if constexpr (std::is_same_v<Command, EntitiesOptions>)
           return Entities(command, connection, console);
         if constexpr (std::is_same_v<Command, WhyOptions>) return Why(command, connection, console);
+        if constexpr (std::is_same_v<Command, AssetsOptions>)
+          return Assets(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, WatchOptions>)
           return Watch(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, ClearOptions>)

@@ -163,6 +163,23 @@ absl::StatusOr<v1::DisplayDescription> Connection::UpdateDisplay(
       });
 }
 
+absl::StatusOr<v1::ListAssetsResponse> Connection::ListAssets() {
+  return impl_->Unary<v1::ListAssetsResponse>(
+      [&](grpc::ClientContext* context, v1::ListAssetsResponse* response) {
+        return impl_->scene().ListAssets(context, {}, response);
+      });
+}
+
+absl::StatusOr<client::Asset> Connection::UploadAsset(
+    absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress) {
+  const absl::StatusOr<client::Asset> asset =
+      client::UploadAsset({bytes.data(), bytes.size()}, {.address = impl_->address(),
+                                                         .credentials = impl_->credentials(),
+                                                         .progress = std::move(progress)});
+  if (asset.ok()) return asset;
+  return absl::Status(asset.status().code(), EscapeForTerminal(asset.status().message()));
+}
+
 absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntitiesRequest request) {
   v1::ListEntitiesResponse all;
   do {

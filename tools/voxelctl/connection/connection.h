@@ -8,9 +8,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "tools/voxelctl/connection/raw_stream.h"
 #include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/process/interrupt.h"
+#include "voxeld/assets.h"
 #include "voxeld/credentials.h"
 #include "voxeld/v1/display.pb.h"
 #include "voxeld/v1/scene.pb.h"
@@ -37,6 +39,10 @@ class Connection {
   absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request);
   absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(const v1::ExplainEntityRequest& request);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
+  absl::StatusOr<v1::ListAssetsResponse> ListAssets();
+  // `progress` as of client::UploadOptions; what breaks off goes on.
+  absl::StatusOr<client::Asset> UploadAsset(
+      absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress);
   absl::StatusOr<v1::ApplyUpdateResponse> ApplyUpdate(const v1::ApplyUpdateRequest& request);
 
   // Calls `each` with every answer until that returns false, or the stream ends.

@@ -3,12 +3,15 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <map>
 #include <random>
+#include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/encode_primitive.h"
 #include "tests/daemon/wire/requests.h"
 
 namespace voxeld::daemon::wire {
@@ -53,11 +56,35 @@ class Strings final : public MemorySource {
 };
 
 Decoded DecodeWith(const v1::StreamRequest& request, const MemorySource* source,
-                   const Limits& limits = {}) {
+                   const Limits& limits = {}, AssetSource* assets = nullptr) {
   const std::string bytes = request.SerializeAsString();
   const std::string_view slice = bytes;
-  return DecodeStreamRequest(std::span(&slice, 1), limits, 0, nullptr, source);
+  return DecodeStreamRequest(std::span(&slice, 1), limits, 0, nullptr, {source, assets});
 }
+
+// Assets that are strings, under names of 32 bytes.
+class Contents final : public AssetSource {
+ public:
+  absl::StatusOr<MappedRange> FindAsset(std::string_view digest, uint64_t offset,
+                                        uint64_t size) override {
+    const auto found = contents.find(std::string(digest));
+    if (found == contents.end()) return absl::NotFoundError("is 00; gone");
+    if (offset + size > found->second.size()) return absl::OutOfRangeError("is 9; beyond");
+    const auto copy = std::make_shared<std::string>(found->second.substr(offset, size));
+    return MappedRange{*copy, copy};
+  }
+
+  // Out of a field, into an asset of its own that begins with three other bytes.
+  void Move(std::string* bytes, v1::MemoryRange* range) {
+    std::string digest(32, static_cast<char>(contents.size()));
+    range->set_asset(digest);
+    range->set_offset(3);
+    range->set_size(bytes->size());
+    contents[digest] = "***" + std::exchange(*bytes, {});
+  }
+
+  std::map<std::string, std::string> contents;
+};
 
 v1::Vertices* VerticesOf(v1::StreamRequest& request) {
   v1::Primitive* primitive = PrimitiveOf(request);
@@ -102,7 +129,7 @@ void ExpectSame(const Decoded& got, const Decoded& want) {
   EXPECT_TRUE(std::equal(a.max, a.max + 3, b.max));
 }
 
-TEST(LocalRanges, AreReadAsPayloadsAre) {
+TEST(NamedRanges, AreReadAsPayloadsAre) {
   std::mt19937 random(7);
   const auto below = [&](uint32_t end) {
     return std::uniform_int_distribution<uint32_t>(0, end - 1)(random);
@@ -154,18 +181,18 @@ TEST(LocalRanges, AreReadAsPayloadsAre) {
       vertices->set_colors(bytes(size_t{count} * (four ? 4 : 3)));
     }
     const Decoded want = Decode(request);
-    EXPECT_EQ(want.local_bytes, 0u);
+    EXPECT_EQ(want.named_bytes, 0u);
     const size_t payload =
         vertices->positions().size() + vertices->indices().size() + vertices->colors().size();
     Strings memory;
     MoveOut(vertices, &memory);
     const Decoded got = DecodeWith(request, &memory);
     ExpectSame(got, want);
-    EXPECT_EQ(got.local_bytes, payload);
+    EXPECT_EQ(got.named_bytes, payload);
   }
 }
 
-TEST(LocalRanges, AnObjectsPartsMayLieThere) {
+TEST(NamedRanges, AnObjectsPartsMayLieThere) {
   Strings memory;
   v1::StreamRequest request;
   request.mutable_define_object()->set_object("object");
@@ -182,7 +209,7 @@ TEST(LocalRanges, AnObjectsPartsMayLieThere) {
   const auto& parts = std::get<DefineObject>(decoded.operations[0].op).data->parts;
   EXPECT_THAT(std::get<GeometryPtr>(parts.at(0).content)->arrays.positions(),
               ::testing::ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
-  EXPECT_EQ(decoded.local_bytes, 36u);
+  EXPECT_EQ(decoded.named_bytes, 36u);
 }
 
 struct Case {
@@ -258,10 +285,10 @@ TEST_P(WrongRange, IsAnIssueWithTheFieldsPath) {
   EXPECT_THAT(issue.message, HasSubstr(GetParam().message));
 }
 
-INSTANTIATE_TEST_SUITE_P(LocalRanges, WrongRange, ::testing::ValuesIn(kCases),
+INSTANTIATE_TEST_SUITE_P(NamedRanges, WrongRange, ::testing::ValuesIn(kCases),
                          [](const auto& info) { return std::string(info.param.name); });
 
-TEST(LocalRanges, PointsTakeNoIndices) {
+TEST(NamedRanges, PointsTakeNoIndices) {
   v1::StreamRequest request = PointsRequest();
   VerticesOf(request)->mutable_indices_in();
   Strings memory;
@@ -271,7 +298,7 @@ TEST(LocalRanges, PointsTakeNoIndices) {
   EXPECT_THAT(decoded.refused.issues[0].message, HasSubstr("points take no indices"));
 }
 
-TEST(LocalRanges, NeedALocalSocket) {
+TEST(NamedRanges, NeedALocalSocket) {
   v1::StreamRequest request = MeshRequest();
   Strings memory;
   MoveOut(VerticesOf(request), &memory);
@@ -289,7 +316,7 @@ TEST(LocalRanges, NeedALocalSocket) {
             "operations[0].upsert.entity.primitive.mesh.vertices.positions_in");
 }
 
-TEST(LocalRanges, OneRequestReadsAtMostWhatMayBeUncommitted) {
+TEST(NamedRanges, OneRequestReadsAtMostWhatMayBeUncommitted) {
   Strings memory;
   v1::StreamRequest request;
   for (int i = 0; i < 1000; ++i) {
@@ -301,15 +328,117 @@ TEST(LocalRanges, OneRequestReadsAtMostWhatMayBeUncommitted) {
   }
   const Decoded decoded = DecodeWith(request, &memory, {.max_uncommitted_bytes = 36 * 7 + 35});
   EXPECT_THAT(decoded.operations, SizeIs(7));
-  EXPECT_EQ(decoded.local_bytes, 36u * 7);
+  EXPECT_EQ(decoded.named_bytes, 36u * 7);
   EXPECT_EQ(memory.asked, 7) << "beyond, nothing is even looked for";
   EXPECT_EQ(decoded.refused.issues.size(), 993u);
   EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kQuotaExceeded);
   EXPECT_EQ(decoded.refused.issues[0].field,
             "batch.upserts[7].entity.primitive.points.vertices.positions_in.size");
   EXPECT_THAT(decoded.refused.issues[0].message,
-              HasSubstr("is 36 after 252 bytes that this request has read from memory; "
+              HasSubstr("is 36 after 252 bytes that this request has read from memory and assets; "
                         "max_uncommitted_bytes allows 287 in one"));
+}
+
+// What is kept of it, as it goes to whoever watches.
+v1::Primitive Kept(const Decoded& decoded) {
+  v1::Primitive out;
+  Encode(std::get<Upsert>(decoded.operations.at(0).op).entity.content, &out);
+  return out;
+}
+
+v1::StreamRequest VolumeRequest() {
+  v1::StreamRequest request = UpsertRequest();
+  v1::Grid* grid = PrimitiveOf(request)->mutable_volume()->mutable_grid();
+  grid->mutable_edge_a()->set_x(2);
+  grid->mutable_edge_b()->set_y(2);
+  grid->mutable_edge_c()->set_z(2);
+  grid->set_size_a(2);
+  grid->set_size_b(2);
+  grid->set_size_c(1);
+  grid->set_type(v1::ELEMENT_TYPE_RGBA8);
+  grid->set_samples("abcdefghijklmnop");
+  return request;
+}
+
+v1::StreamRequest HeightsRequest() {
+  v1::StreamRequest request = UpsertRequest();
+  v1::HeightMap* map = PrimitiveOf(request)->mutable_height_map();
+  map->mutable_edge_a()->set_x(4);
+  map->mutable_edge_b()->set_y(4);
+  map->set_columns(2);
+  map->set_rows(2);
+  map->set_heights(Packed<float>({0, 1, 2, 3}));
+  map->set_colors("rgbRGBxyzXYZ");
+  return request;
+}
+
+TEST(NamedRanges, OfAssetsAreReadAsPayloadsAre) {
+  v1::StreamRequest request = MeshRequest();
+  VerticesOf(request)->set_colors("rgbRGBxyz");
+  const Decoded want = Decode(request);
+  Contents assets;
+  v1::Vertices* vertices = VerticesOf(request);
+  assets.Move(vertices->mutable_positions(), vertices->mutable_positions_in());
+  assets.Move(vertices->mutable_colors(), vertices->mutable_colors_in());
+  const Decoded got = DecodeWith(request, nullptr, {}, &assets);
+  ExpectSame(got, want);
+  EXPECT_EQ(got.named_bytes, 36u + 9u);
+
+  v1::ApplyUpdateRequest update;
+  *update.add_operations() = request;
+  EXPECT_THAT(DecodeUpdate(update, {}, nullptr, &assets).refused.issues, IsEmpty());
+}
+
+TEST(NamedRanges, StandForSamplesHeightsAndColoursToo) {
+  Contents assets;
+  v1::StreamRequest volume = VolumeRequest(), heights = HeightsRequest();
+  const Decoded wanted_volume = Decode(volume), wanted_heights = Decode(heights);
+  ASSERT_THAT(wanted_volume.refused.issues, IsEmpty());
+  ASSERT_THAT(wanted_heights.refused.issues, IsEmpty());
+  v1::Grid* grid = PrimitiveOf(volume)->mutable_volume()->mutable_grid();
+  assets.Move(grid->mutable_samples(), grid->mutable_samples_in());
+  v1::HeightMap* map = PrimitiveOf(heights)->mutable_height_map();
+  assets.Move(map->mutable_heights(), map->mutable_heights_in());
+  assets.Move(map->mutable_colors(), map->mutable_colors_in());
+
+  const Decoded got_volume = DecodeWith(volume, nullptr, {}, &assets);
+  const Decoded got_heights = DecodeWith(heights, nullptr, {}, &assets);
+  ASSERT_THAT(got_volume.refused.issues, IsEmpty());
+  ExpectSame(got_heights, wanted_heights);
+  EXPECT_EQ(Kept(got_volume).SerializeAsString(), Kept(wanted_volume).SerializeAsString())
+      << "what is kept has the bytes, and no names of assets that may go";
+  EXPECT_EQ(Kept(got_heights).SerializeAsString(), Kept(wanted_heights).SerializeAsString());
+  EXPECT_EQ(got_volume.named_bytes, 16u);
+}
+
+TEST(NamedRanges, OfAssetsThatAreWrong) {
+  const auto issue = [](const std::function<void(v1::MemoryRange*)>& spoil, bool keeps = true) {
+    Contents assets;
+    v1::StreamRequest request = VolumeRequest();
+    v1::Grid* grid = PrimitiveOf(request)->mutable_volume()->mutable_grid();
+    assets.Move(grid->mutable_samples(), grid->mutable_samples_in());
+    spoil(grid->mutable_samples_in());
+    const Decoded decoded =
+        DecodeWith(request, nullptr, {.max_uncommitted_bytes = 100}, keeps ? &assets : nullptr);
+    EXPECT_THAT(decoded.refused.issues, SizeIs(1));
+    const Issue& first = decoded.refused.issues.at(0);
+    return absl::StrCat(first.field, " ", first.message);
+  };
+  const std::string in = "upsert.entity.primitive.volume.grid.samples_in.";
+  EXPECT_THAT(issue([](auto* range) { range->set_asset("short"); }),
+              HasSubstr(in + "asset has 5 bytes; a SHA-256 has 32"));
+  EXPECT_THAT(issue([](auto* range) { range->set_memory(1); }),
+              HasSubstr(in + "asset is set, and memory is 1"));
+  EXPECT_THAT(issue([](auto* range) { range->set_asset(std::string(32, 'x')); }),
+              HasSubstr(in + "asset is 00; gone"));
+  EXPECT_THAT(issue([](auto* range) { range->set_size(17); }), HasSubstr(in + "size is 9; beyond"));
+  EXPECT_THAT(issue([](auto* range) { range->set_size(101); }),
+              HasSubstr(in + "size is 101 after 0 bytes"));
+  EXPECT_THAT(issue([](auto*) {}, false), HasSubstr("this server keeps no assets"));
+  EXPECT_THAT(issue([](auto* range) { range->set_size(15); }),
+              HasSubstr("volume.grid.samples has 15 bytes"));
+  EXPECT_THAT(issue([](auto* range) { range->clear_asset(); }),
+              HasSubstr("this call has no local socket"));
 }
 
 }  // namespace

@@ -1,0 +1,46 @@
+// Arrays as fields of bytes, or as ranges of assets in their place.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "client/cpp/src/wire.h"
+#include "voxeld/drawing.h"
+#include "voxeld/v1/primitives.pb.h"
+
+namespace voxeld::client {
+
+// Smaller payloads are not worth a piece of their own.
+inline constexpr size_t kSharedBytes = 4096;
+
+// `in_field` is the MemoryRange that stands in place of `field`. Nothing of an empty one.
+template <typename T>
+void AppendPayload(int field, int in_field, const Array<T>& values, Rope* out) {
+  if (values.empty()) return;
+  if (values.asset().has_value()) {
+    std::string range, tagged;
+    AppendUnsigned(v1::MemoryRange::kSizeFieldNumber, values.asset()->size, &range);
+    AppendBytes(v1::MemoryRange::kAssetFieldNumber, values.asset()->sha256, &range);
+    AppendPresentBytes(in_field, range, &tagged);
+    return out->Append(tagged);
+  }
+  const std::string_view bytes(reinterpret_cast<const char*>(values.view().data()),
+                               values.view().size_bytes());
+  std::string tag;
+  AppendVarint(static_cast<uint64_t>(field) << 3 | 2, &tag);
+  AppendVarint(bytes.size(), &tag);
+  out->Append(tag);
+  if (bytes.size() < kSharedBytes) {
+    out->Append(bytes);
+  } else if (values.owner() != nullptr) {
+    out->AppendShared(values.owner(), bytes);
+  } else {
+    const auto copy = std::make_shared<const std::string>(bytes);
+    out->AppendShared(copy, *copy);
+  }
+}
+
+}  // namespace voxeld::client

@@ -1,0 +1,112 @@
+// The client brings content, goes on where it broke off, and draws by what it brought.
+#include "voxeld/assets.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "daemon/assets/asset_store.h"
+#include "display/sync/clock.h"
+#include "tests/daemon/services/daemon_fixture.h"
+#include "voxeld/client.h"
+
+namespace voxeld::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr auto kPatience = std::chrono::seconds(60);
+
+class WithAssets : public ::testing::Test {
+ protected:
+  absl::StatusOr<Asset> Upload(std::string_view bytes,
+                               std::function<bool(uint64_t, uint64_t)> progress = nullptr) {
+    return UploadAsset(bytes, {.address = daemon_.target(), .progress = std::move(progress)});
+  }
+
+  sync::SystemClock clock_;
+  std::unique_ptr<daemon::assets::AssetStore> store_ =
+      *daemon::assets::AssetStore::Open("", {.max_asset_bytes = 8u << 20}, clock_, nullptr);
+  daemon::services::Daemon daemon_{{.assets = store_.get()}};
+};
+
+std::string BytesOf(const std::vector<float>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float)};
+}
+
+TEST_F(WithAssets, ShapesNameWhatWasBrought) {
+  const auto positions = Upload(BytesOf({0, 0, 0, 1, 0, 0, 0, 1, 0}));
+  ASSERT_TRUE(positions.ok()) << positions.status();
+  const auto samples = Upload(std::string("\x00\xff\x00\xff\x00\xff\x00\xff", 8));
+  const auto heights = Upload(BytesOf({0, 0.5, 0.25, 1}));
+  ASSERT_TRUE(samples.ok() && heights.ok());
+
+  auto session = *Session::Open({.address = daemon_.target(), .strict = true});
+  const Layer layer = session->GetLayer("l");
+  ASSERT_TRUE(layer.Put("mesh", Mesh{.vertices = {.positions = *positions}}).ok());
+  Grid grid{.size_a = 2, .size_b = 2, .size_c = 2};
+  grid.samples = Array<uint8_t>(*samples);
+  ASSERT_TRUE(layer.Put("volume", Volume{.grid = grid}).ok());
+  ASSERT_TRUE(layer.Put("heights", HeightMap{.columns = 2, .rows = 2, .heights = *heights}).ok());
+  const auto frame = session->Commit();
+  ASSERT_TRUE(frame.ok());
+  const auto receipt = session->WaitAccepted(*frame, kPatience);
+  EXPECT_TRUE(receipt.ok()) << receipt.status();
+  EXPECT_EQ(daemon_.Entities().total(), 3u);
+
+  const auto scale =
+      layer.Put("no", Points{.vertices = {.positions = *positions}},
+                {.color_scale = ColorScale{.colormap = "viridis", .scalars = *heights}});
+  EXPECT_TRUE(absl::IsInvalidArgument(scale.status()));
+}
+
+TEST_F(WithAssets, WhatIsThereIsNotSentAgain) {
+  const std::string bytes(3u << 20, 'v');
+  std::vector<uint64_t> told;
+  const auto first = Upload(bytes, [&](uint64_t stored, uint64_t size) {
+    EXPECT_EQ(size, bytes.size());
+    told.push_back(stored);
+    return true;
+  });
+  ASSERT_TRUE(first.ok()) << first.status();
+  EXPECT_EQ(first->sha256, AssetOf(bytes).sha256);
+  EXPECT_THAT(told, ::testing::ElementsAre(1u << 20, 2u << 20, 3u << 20));
+  const auto second = Upload(bytes, [](uint64_t, uint64_t) {
+    ADD_FAILURE() << "sent again";
+    return true;
+  });
+  EXPECT_TRUE(second.ok());
+  EXPECT_EQ(store_->figures().bytes_in, bytes.size());
+}
+
+TEST_F(WithAssets, WhatWasStoppedGoesOnWhereItStopped) {
+  const std::string bytes(4u << 20, 'w');
+  const auto stopped = Upload(bytes, [](uint64_t stored, uint64_t) { return stored < (2u << 20); });
+  EXPECT_TRUE(absl::IsCancelled(stopped.status()));
+  uint64_t first = 0;
+  const auto rest = Upload(bytes, [&first](uint64_t stored, uint64_t) {
+    if (first == 0) first = stored;
+    return true;
+  });
+  ASSERT_TRUE(rest.ok()) << rest.status();
+  EXPECT_EQ(store_->figures().bytes_in, bytes.size()) << "every byte came once";
+  EXPECT_EQ(store_->figures().count, 1u);
+}
+
+TEST_F(WithAssets, WhatIsTooLargeIsSaid) {
+  const auto large = Upload(std::string((8u << 20) + 1, 'x'));
+  EXPECT_TRUE(absl::IsInvalidArgument(large.status()));
+  EXPECT_THAT(std::string(large.status().message()), HasSubstr("which is max_asset_bytes"));
+  EXPECT_TRUE(absl::IsInvalidArgument(Upload("").status()));
+}
+
+TEST(Assets, AServerThatIsAwayIsGivenUp) {
+  const auto away = UploadAsset(
+      "x", {.address = "unix:/nowhere/voxeld.sock", .patience = std::chrono::milliseconds(50)});
+  EXPECT_FALSE(away.ok());
+}
+
+}  // namespace
+}  // namespace voxeld::client

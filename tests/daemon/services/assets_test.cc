@@ -1,0 +1,190 @@
+// Assets over the wire: brought piece by piece, over calls that break off, and drawn by their hash.
+#include <gmock/gmock.h>
+
+#include <cstring>
+
+#include "absl/strings/escaping.h"
+#include "daemon/assets/asset_store.h"
+#include "tests/daemon/services/daemon_fixture.h"
+
+namespace voxeld::daemon::services {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Twelve bytes, the point (1, 2, 3) as floats; by sha256sum.
+const std::string kPoint = absl::HexStringToBytes("0000803f0000004000004040");
+const std::string kPointHash =
+    absl::HexStringToBytes("8e628779e6a74ee0b36991c10158f63cafec7d340ad4e075592502c8708524dd");
+
+class Assets : public ::testing::Test {
+ protected:
+  void Start(bool keeps = true) {
+    auto opened =
+        assets::AssetStore::Open("", {.max_asset_bytes = 1000, .max_bytes = 2000}, clock_, nullptr);
+    ASSERT_TRUE(opened.ok());
+    store_ = *std::move(opened);
+    daemon_ = std::make_unique<Daemon>(DaemonOptions{.assets = keeps ? store_.get() : nullptr});
+  }
+
+  struct Piece {
+    std::string bytes;
+    uint64_t offset = 0;
+  };
+  // `break_off`: the call is cancelled once the pieces are there.
+  grpc::Status Upload(const std::string& hash, uint64_t size, const std::vector<Piece>& pieces,
+                      uint64_t stored_before_break = 0) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    response_.Clear();
+    const auto call = daemon_->scene().UploadAsset(&context, &response_);
+    bool first = true;
+    for (const Piece& piece : pieces) {
+      v1::UploadAssetRequest request;
+      if (first) {
+        request.set_sha256(hash);
+        request.set_size(size);
+      }
+      first = false;
+      request.set_offset(piece.offset);
+      request.set_data(piece.bytes);
+      if (!call->Write(request)) break;
+    }
+    if (stored_before_break > 0) {
+      while (List(hash).assets(0).stored() < stored_before_break) continue;
+      context.TryCancel();
+    }
+    call->WritesDone();
+    return call->Finish();
+  }
+
+  v1::ListAssetsResponse List(const std::string& hash = "") {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::ListAssetsRequest request;
+    if (!hash.empty()) request.add_sha256(hash);
+    v1::ListAssetsResponse response;
+    const grpc::Status status = daemon_->scene().ListAssets(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response;
+  }
+
+  static v1::StreamRequest DrawByHash(const std::string& hash) {
+    v1::StreamRequest request;
+    v1::Upsert* upsert = request.mutable_upsert();
+    upsert->set_layer("l");
+    upsert->set_id("point");
+    v1::Vertices* vertices =
+        upsert->mutable_entity()->mutable_primitive()->mutable_points()->mutable_vertices();
+    vertices->set_count(1);
+    vertices->mutable_positions_in()->set_asset(hash);
+    vertices->mutable_positions_in()->set_size(12);
+    return request;
+  }
+
+  sync::SystemClock clock_;
+  std::unique_ptr<assets::AssetStore> store_;
+  std::unique_ptr<Daemon> daemon_;
+  v1::UploadAssetResponse response_;
+};
+
+TEST_F(Assets, AreBroughtInPiecesAndDrawnByManyRequests) {
+  Start();
+  const grpc::Status status =
+      Upload(kPointHash, 12, {{kPoint.substr(0, 5), 0}, {kPoint.substr(5), 5}});
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response_.stored(), 12u);
+  EXPECT_EQ(response_.sha256(), kPointHash);
+  const v1::ListAssetsResponse all = List();
+  ASSERT_EQ(all.assets_size(), 1);
+  EXPECT_TRUE(all.assets(0).complete());
+  EXPECT_EQ(all.used_bytes(), 12u);
+
+  Client client(daemon_->scene());
+  const v1::Opened opened = client.Open();
+  EXPECT_EQ(opened.limits().max_assets_bytes(), 512u << 20) << "as configured";
+  client.Send(DrawByHash(kPointHash));
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  EXPECT_TRUE(client.issues.empty());
+
+  v1::ApplyUpdateRequest update;
+  *update.add_operations() = DrawByHash(kPointHash);
+  v1::ApplyUpdateResponse updated;
+  grpc::ClientContext context;
+  SetDeadline(context);
+  ASSERT_TRUE(daemon_->scene().ApplyUpdate(&context, update, &updated).ok());
+  EXPECT_EQ(updated.issues_size(), 0);
+  EXPECT_EQ(daemon_->Stats().assets().uploaded(), 1u);
+  EXPECT_EQ(daemon_->Stats().entities(), 2u);
+
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(0, 5), 0}}).ok()) << "it is here already";
+  EXPECT_EQ(response_.stored(), 12u);
+}
+
+TEST_F(Assets, GoOnAfterACallThatBrokeOff) {
+  Start();
+  EXPECT_EQ(Upload(kPointHash, 12, {{kPoint.substr(0, 7), 0}}, 7).error_code(),
+            grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(List(kPointHash).assets(0).stored(), 7u);
+  EXPECT_FALSE(List(kPointHash).assets(0).complete());
+  grpc::Status status;
+  do {  // the call that was cancelled may have to be heard of first
+    status = Upload(kPointHash, 12, {{kPoint.substr(7), 7}});
+  } while (status.error_code() == grpc::StatusCode::ABORTED);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_TRUE(List(kPointHash).assets(0).complete());
+}
+
+TEST_F(Assets, WhatIsWrongIsSaid) {
+  Start();
+  const auto expect = [this](const grpc::Status& status, grpc::StatusCode code,
+                             const std::string& why) {
+    EXPECT_EQ(status.error_code(), code) << why;
+    EXPECT_THAT(status.error_message(), HasSubstr(why));
+    EXPECT_EQ(List().used_bytes(), 0u);
+  };
+  expect(Upload("short", 12, {{kPoint}}), grpc::StatusCode::INVALID_ARGUMENT,
+         "sha256 has 5 bytes; give the 32");
+  expect(Upload(kPointHash, 1001, {{kPoint}}), grpc::StatusCode::INVALID_ARGUMENT,
+         "size is 1001; an asset has 1 to 1000 bytes, which is max_asset_bytes");
+  expect(Upload(kPointHash, 12, {{kPoint, 3}}), grpc::StatusCode::OUT_OF_RANGE,
+         "offset is 3, and 0 bytes of it are here");
+  expect(Upload(kPointHash, 12, {{std::string(12, 'x')}}), grpc::StatusCode::DATA_LOSS,
+         "what came has the SHA-256");
+  expect(Upload(kPointHash, 12, {}), grpc::StatusCode::INVALID_ARGUMENT, "without a piece");
+
+  Client client(daemon_->scene());
+  client.Open();
+  client.Send(DrawByHash(kPointHash));
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  ASSERT_EQ(client.issues.size(), 1u);
+  EXPECT_EQ(client.issues[0].reason(), v1::REASON_NOT_FOUND);
+  EXPECT_THAT(client.issues[0].message(), HasSubstr("not here, or not any more; bring it"));
+}
+
+TEST_F(Assets, AServerMayKeepNone) {
+  Start(false);
+  const grpc::Status status = Upload(kPointHash, 12, {{kPoint}});
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_THAT(status.error_message(), HasSubstr("max_assets_bytes is 0"));
+}
+
+TEST_F(Assets, AnUploadUnderWayEndsWithTheServer) {
+  Start();
+  grpc::ClientContext context;
+  SetDeadline(context);
+  const auto call = daemon_->scene().UploadAsset(&context, &response_);
+  v1::UploadAssetRequest request;
+  request.set_sha256(kPointHash);
+  request.set_size(12);
+  request.set_data(kPoint.substr(0, 4));
+  ASSERT_TRUE(call->Write(request));
+  while (List(kPointHash).assets(0).stored() < 4) continue;
+  daemon_->server().Shutdown(5 * sync::kSecond);
+  EXPECT_EQ(call->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::services
