@@ -204,17 +204,19 @@ void MendTimes(Json& value) {
 
 absl::Status CheckSize(const foxglove::SceneUpdate& update) {
   int64_t pieces = 0;
-  for (const foxglove::SceneEntity& entity : update.entities()) {
-    pieces += int64_t{1} + entity.arrows_size() + entity.cubes_size() + entity.spheres_size() +
-              entity.cylinders_size() + entity.lines_size() + entity.triangles_size() +
-              entity.texts_size();
-  }
+  for (const foxglove::SceneEntity& entity : update.entities()) pieces += CountPieces(entity);
   if (pieces <= kMostPieces) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "an update has ", pieces, " entities and pieces of them; ", kMostPieces, " are the most"));
 }
 
 }  // namespace
+
+int64_t CountPieces(const foxglove::SceneEntity& entity) {
+  return int64_t{1} + entity.arrows_size() + entity.cubes_size() + entity.spheres_size() +
+         entity.cylinders_size() + entity.lines_size() + entity.triangles_size() +
+         entity.texts_size();
+}
 
 Pieces PiecesOf(const foxglove::SceneEntity& entity) { return Maker(entity).Take(); }
 

@@ -29,6 +29,9 @@ struct Pieces {
 // Entities and pieces of one update, InvalidArgument of ParseSceneUpdate beyond, as JSON is that is deeper than kMaxJsonDepth.
 inline constexpr int kMostPieces = 100'000;
 
+// The entity and what it is made of, as kMostPieces counts.
+int64_t CountPieces(const foxglove::SceneEntity& entity);
+
 // In the order of the message's fields. A piece that has nothing in it (no points, no text) is left out without a word.
 Pieces PiecesOf(const foxglove::SceneEntity& entity);
 

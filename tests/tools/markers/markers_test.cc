@@ -9,7 +9,7 @@
 
 #include "tools/json/json_depth.h"
 #include "tools/markers/foxglove_client.h"
-#include "tools/voxelctl/markers/marker_scene.h"
+#include "tools/markers/marker_scene.h"
 
 namespace voxeld::markers {
 namespace {
@@ -215,14 +215,14 @@ foxglove::SceneUpdate Cubes(std::initializer_list<std::pair<const char*, int>> e
   return update;
 }
 
-std::vector<std::string> Ids(const voxelctl::MarkerScene::Changes& changes) {
+std::vector<std::string> Ids(const MarkerScene::Changes& changes) {
   std::vector<std::string> ids;
   for (const auto& [id, piece] : changes.put) ids.push_back(id);
   return ids;
 }
 
 TEST(MarkerScene, PutsPiecesAndRemovesThoseThatAreNoMore) {
-  voxelctl::MarkerScene scene;
+  MarkerScene scene;
   EXPECT_THAT(Ids(scene.Apply("/t", Cubes({{"a", 3}, {"b", 1}}), 0)),
               ElementsAre("/t a#0", "/t a#1", "/t a#2", "/t b#0"));
   const auto fewer = scene.Apply("/t", Cubes({{"a", 1}}), 0);
@@ -232,7 +232,7 @@ TEST(MarkerScene, PutsPiecesAndRemovesThoseThatAreNoMore) {
 }
 
 TEST(MarkerScene, DeletionsAreOfTheirTopicAndOfWhatWasBefore) {
-  voxelctl::MarkerScene scene;
+  MarkerScene scene;
   scene.Apply("/s", Cubes({{"a", 1}}), 0);
   scene.Apply("/t", Cubes({{"a", 1}, {"b", 1}}), 0);
   foxglove::SceneUpdate update = Cubes({{"a", 1}});
@@ -250,7 +250,7 @@ TEST(MarkerScene, DeletionsAreOfTheirTopicAndOfWhatWasBefore) {
 }
 
 TEST(MarkerScene, ForgetsWhatHasHadItsTimeAndWhatIsEmpty) {
-  voxelctl::MarkerScene scene;
+  MarkerScene scene;
   foxglove::SceneUpdate update = Cubes({{"a", 1}, {"b", 1}, {"empty", 0}});
   update.mutable_entities(0)->mutable_lifetime()->set_seconds(2);
   scene.Apply("/t", update, 10);

@@ -17,6 +17,15 @@ TEST(EscapeForTerminal, LeavesTextAlone) {
   EXPECT_EQ(EscapeForTerminal("Grüße, 体積 ✓"), "Grüße, 体積 ✓");
 }
 
+TEST(IsUtf8, IsOfTheWholeText) {
+  for (const char* text : {"", "a", "Grüße, 体積 ✓", "\xf4\x8f\xbf\xbf"})
+    EXPECT_TRUE(IsUtf8(text)) << text;
+  for (const char* text :
+       {"\xff", "a\xe2\x82", "\xc0\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\x80 a"}) {
+    EXPECT_FALSE(IsUtf8(text));
+  }
+}
+
 TEST(EscapeForTerminal, TakesTheStingOut) {
   EXPECT_EQ(EscapeForTerminal("\x1b]0;title\x07"), "\\u{1b}]0;title\\u{7}");
   EXPECT_EQ(EscapeForTerminal("a\nb\tc\\"), "a\\u{a}b\\u{9}c\\\\");

@@ -60,4 +60,14 @@ std::string EscapeForTerminal(absl::string_view text) {
   return out;
 }
 
+bool IsUtf8(absl::string_view text) {
+  uint32_t code = 0;
+  while (!text.empty()) {
+    const size_t length = Decode(text, &code);
+    if (length == 0) return false;
+    text.remove_prefix(length);
+  }
+  return true;
+}
+
 }  // namespace voxeld::voxelctl

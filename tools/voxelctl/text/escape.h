@@ -12,4 +12,7 @@ namespace voxeld::voxelctl {
 // move a cursor or set a title.
 std::string EscapeForTerminal(absl::string_view text);
 
+// Whether all of it is UTF-8, as protobuf's strings must be.
+bool IsUtf8(absl::string_view text);
+
 }  // namespace voxeld::voxelctl

@@ -1,10 +1,10 @@
-#include "tools/voxelctl/markers/marker_scene.h"
+#include "tools/markers/marker_scene.h"
 
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
 
-namespace voxeld::voxelctl {
+namespace voxeld::markers {
 
 std::string MarkerScene::IdOf(const Key& key, size_t piece) {
   return absl::StrCat(key.first, " ", key.second, "#", piece);
@@ -41,7 +41,7 @@ MarkerScene::Changes MarkerScene::Apply(const std::string& topic,
   }
   for (const foxglove::SceneEntity& entity : update.entities()) {
     ++tally_.entities;
-    markers::Pieces made = markers::PiecesOf(entity);
+    Pieces made = PiecesOf(entity);
     if (!made.left_out.empty()) tally_.left_out.insert(made.left_out);
     const Key key{topic, entity.id()};
     if (up_.size() >= kMostEntities && !up_.contains(key)) {
@@ -65,4 +65,4 @@ MarkerScene::Changes MarkerScene::Apply(const std::string& topic,
   return changes;
 }
 
-}  // namespace voxeld::voxelctl
+}  // namespace voxeld::markers

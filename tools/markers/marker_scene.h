@@ -12,7 +12,7 @@
 #include "scene_update.pb.h"
 #include "tools/markers/markers.h"
 
-namespace voxeld::voxelctl {
+namespace voxeld::markers {
 
 struct MarkerTally {
   uint64_t updates = 0, entities = 0, deletions = 0;
@@ -25,7 +25,7 @@ class MarkerScene {
  public:
   struct Changes {
     std::vector<std::string> remove;  // ids within the layer, before
-    std::vector<std::pair<std::string, markers::Piece>> put;
+    std::vector<std::pair<std::string, Piece>> put;
   };
   // Entities that are up at once; further ones are left out, and told.
   static constexpr size_t kMostEntities = 100'000;
@@ -53,4 +53,4 @@ class MarkerScene {
   MarkerTally tally_;
 };
 
-}  // namespace voxeld::voxelctl
+}  // namespace voxeld::markers
