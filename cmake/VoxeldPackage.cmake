@@ -6,6 +6,10 @@ set(VOXELD_MAINTAINER "voxeld maintainers <maintainers@voxeld.invalid>" CACHE ST
 set(doc ${CMAKE_INSTALL_DATADIR}/doc/voxeld)
 set(packaging ${CMAKE_SOURCE_DIR}/packaging)
 install(TARGETS voxeld voxelctl RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+# Not of the package, which would depend on ROS: cmake --install BUILD --component ros
+if(TARGET voxeld-ros)
+  install(TARGETS voxeld-ros RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ros EXCLUDE_FROM_ALL)
+endif()
 # Where voxeld looks for it: gpu/worker/worker_engine.h.
 install(TARGETS voxeld-engine RUNTIME DESTINATION libexec/voxeld)
 install(FILES ${packaging}/voxeld.service ${packaging}/voxeld.socket ${packaging}/voxeld-playlist.service
