@@ -17,8 +17,6 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr auto kPatience = std::chrono::seconds(60);
-
 class WithAssets : public ::testing::Test {
  protected:
   absl::StatusOr<Asset> Upload(std::string_view bytes,
@@ -52,7 +50,7 @@ TEST_F(WithAssets, ShapesNameWhatWasBrought) {
   ASSERT_TRUE(layer.Put("heights", HeightMap{.columns = 2, .rows = 2, .heights = *heights}).ok());
   const auto frame = session->Commit();
   ASSERT_TRUE(frame.ok());
-  const auto receipt = session->WaitAccepted(*frame, kPatience);
+  const auto receipt = session->WaitAccepted(*frame, std::chrono::seconds(60));
   EXPECT_TRUE(receipt.ok()) << receipt.status();
   EXPECT_EQ(daemon_.Entities().total(), 3u);
 

@@ -426,17 +426,18 @@ TEST(NamedRanges, OfAssetsThatAreWrong) {
   };
   const std::string in = "upsert.entity.primitive.volume.grid.samples_in.";
   EXPECT_THAT(issue([](auto* range) { range->set_asset("short"); }),
-              HasSubstr(in + "asset has 5 bytes; a SHA-256 has 32"));
+              HasSubstr(in + "asset asset has 5 bytes; a SHA-256 has 32"));
   EXPECT_THAT(issue([](auto* range) { range->set_memory(1); }),
-              HasSubstr(in + "asset is set, and memory is 1"));
+              HasSubstr(in + "asset asset is set, and memory is 1"));
   EXPECT_THAT(issue([](auto* range) { range->set_asset(std::string(32, 'x')); }),
-              HasSubstr(in + "asset is 00; gone"));
-  EXPECT_THAT(issue([](auto* range) { range->set_size(17); }), HasSubstr(in + "size is 9; beyond"));
+              HasSubstr(in + "asset asset is 00; gone"));
+  EXPECT_THAT(issue([](auto* range) { range->set_size(17); }),
+              HasSubstr(in + "size size is 9; beyond"));
   EXPECT_THAT(issue([](auto* range) { range->set_size(101); }),
-              HasSubstr(in + "size is 101 after 0 bytes"));
+              HasSubstr(in + "size size is 101 after 0 bytes"));
   EXPECT_THAT(issue([](auto*) {}, false), HasSubstr("this server keeps no assets"));
   EXPECT_THAT(issue([](auto* range) { range->set_size(15); }),
-              HasSubstr("volume.grid.samples has 15 bytes"));
+              HasSubstr("volume.grid.samples samples has 15 bytes"));
   EXPECT_THAT(issue([](auto* range) { range->clear_asset(); }),
               HasSubstr("this call has no local socket"));
 }
