@@ -6,10 +6,14 @@
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
+#include "tools/voxelctl/import/las_points.h"
 #include "tools/voxelctl/import/mesh_checks.h"
+#include "tools/voxelctl/import/pcd_points.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
+#include "tools/voxelctl/import/text_points.h"
+#include "tools/voxelctl/import/vox_model.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -56,13 +60,22 @@ absl::StatusOr<Model> Read(const SourceFile& file, bool globe) {
   if (extension == "stl") return ReadMesh(file, CheckStl(file));
   if (extension == "gltf" || extension == "glb") return ReadMesh(file, CheckGltf(file));
   if (extension == "ply") return ReadPly(file);
+  if (extension == "xyz" || extension == "txt" || extension == "asc" || extension == "pts" ||
+      extension == "csv") {
+    return ReadTextPoints(file);
+  }
+  if (extension == "pcd") return ReadPcdPoints(file);
+  if (extension == "las" || extension == "laz") return ReadLasPoints(file);
+  if (extension == "vox") return ReadVoxModel(file);
   if (extension == "json" || extension == "geojson" || extension == "topojson")
     return ReadMap(file, globe);
-  return FileError(file,
-                   extension.empty() ? "its name has no extension"
-                                     : absl::StrCat("files of type .", EscapeForTerminal(extension),
-                                                    " are not read"),
-                   "play reads .obj, .stl, .ply, .gltf, .glb, .geojson, .topojson and .json");
+  return FileError(
+      file,
+      extension.empty()
+          ? "its name has no extension"
+          : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
+      "play reads meshes (.obj, .stl, .ply, .gltf, .glb), voxels (.vox), points (.ply, .pcd, "
+      ".las, .xyz, .txt, .asc, .pts, .csv) and maps (.geojson, .topojson, .json)");
 }
 
 // What every reader promises, held to: a slip in a library must not reach the server.

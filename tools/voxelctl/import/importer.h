@@ -26,7 +26,7 @@ class MeshImporter {
 std::unique_ptr<MeshImporter> NewMeshImporter();
 
 // Reads `path` by its extension, having checked that the contents are of that kind: obj, stl, ply,
-// gltf, glb, geojson, topojson, json. Every index is in range and every number finite in what is
+// gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json. Every index is in range and every number finite in what is
 // returned, and it is not empty. An error's message begins with the path and says what was found
 // and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);

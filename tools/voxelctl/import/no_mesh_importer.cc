@@ -11,7 +11,8 @@ class NoMeshImporter final : public MeshImporter {
     return absl::UnimplementedError(
         absl::StrCat(file.path,
                      ": this voxelctl is built without mesh importers (VOXELD_IMPORTERS=OFF); "
-                     "it reads point clouds (.ply) and maps (.geojson, .topojson)"));
+                     "it reads point clouds (.ply, .pcd, .las, .xyz), voxels (.vox) and maps "
+                     "(.geojson, .topojson)"));
   }
 };
 

@@ -1,0 +1,66 @@
+// Points that come as rows of numbers, whatever file they are from: which column is what, and a row
+// after another into a model.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+// What a column may be. Its value is its place in a row.
+enum class PointColumn : uint8_t {
+  kX,
+  kY,
+  kZ,
+  kNormalX,
+  kNormalY,
+  kNormalZ,
+  kRed,
+  kGreen,
+  kBlue,
+  kIntensity
+};
+inline constexpr size_t kPointColumns = 10;
+using PointRow = std::array<double, kPointColumns>;
+
+// By the names that files use, in any case: "x", "easting", "nx", "normal_x", "r", "red", "diffuse_red",
+// "i", "intensity", … Nothing: another column.
+std::optional<PointColumn> PointColumnOf(absl::string_view name);
+
+// Rows become points: intensities become greys where there are no colours, stretched from the least to
+// the greatest.
+class PointTable {
+ public:
+  // Without x, y and z InvalidArgument. `full_scale`: the value of a colour's channel that is as bright as
+  // can be.
+  static absl::StatusOr<PointTable> Make(const SourceFile& file,
+                                         const std::array<bool, kPointColumns>& has,
+                                         double full_scale);
+
+  void Reserve(uint64_t count);
+  // InvalidArgument: a coordinate is not finite, or there are more than kMaxModelVertices; `what` names
+  // the row, as in "point 3" or "line 17".
+  absl::Status Add(const SourceFile& file, const PointRow& row, absl::string_view what);
+  size_t size() const { return part_.positions.size(); }
+
+  Model Finish(const SourceFile& file, std::string format) &&;
+
+ private:
+  bool Has(PointColumn column) const { return has_[static_cast<size_t>(column)]; }
+
+  std::array<bool, kPointColumns> has_ = {};
+  double full_scale_ = 1;
+  Part part_;
+  std::vector<float> intensities_;
+};
+
+}  // namespace voxeld::voxelctl

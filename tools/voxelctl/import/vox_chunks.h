@@ -1,0 +1,48 @@
+// What a .vox file holds, read and checked; how that becomes a model is vox_model.cc's.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+struct VoxVoxel {
+  uint8_t x = 0, y = 0, z = 0, color = 0;
+};
+
+struct VoxGrid {
+  std::array<uint32_t, 3> size = {};  // 1 to 256 each; voxels lie within
+  std::vector<VoxVoxel> voxels;
+};
+
+// A turn by quarters, with mirrors: row r has `sign[r]` in the column `column[r]`.
+struct VoxTurn {
+  std::array<uint8_t, 3> column = {0, 1, 2};
+  std::array<int8_t, 3> sign = {1, 1, 1};
+};
+
+struct VoxNode {
+  enum class Kind : uint8_t { kTransform, kGroup, kShape };
+  Kind kind = Kind::kGroup;
+  bool hidden = false;
+  std::vector<int32_t> children;  // of a shape its grids
+  std::array<int32_t, 3> move = {};
+  VoxTurn turn;
+};
+
+struct VoxScene {
+  std::vector<VoxGrid> grids;
+  std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 is none
+  std::map<int32_t, VoxNode> nodes;   // 0 is the root; empty: there are none
+};
+
+absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file);
+
+}  // namespace voxeld::voxelctl

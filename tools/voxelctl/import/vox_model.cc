@@ -1,0 +1,158 @@
+#include "tools/voxelctl/import/vox_model.h"
+
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/vox_chunks.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr int kMostDepth = 64;
+constexpr uint64_t kMostVisits = 1'000'000;
+
+using Cell = std::array<int64_t, 3>;
+
+// Where a grid's cells go: first turned, then moved.
+struct Place {
+  VoxTurn turn;
+  Cell move = {};
+
+  Cell Turned(const Cell& v) const {
+    Cell out;
+    for (int r = 0; r < 3; ++r) out[r] = turn.sign[r] * v[turn.column[r]];
+    return out;
+  }
+  // What is put at `inner`, which is put here.
+  Place operator*(const VoxNode& inner) const {
+    Place out;
+    for (int r = 0; r < 3; ++r) {
+      out.turn.column[r] = inner.turn.column[turn.column[r]];
+      out.turn.sign[r] = static_cast<int8_t>(turn.sign[r] * inner.turn.sign[turn.column[r]]);
+    }
+    out.move = Turned({inner.move[0], inner.move[1], inner.move[2]});
+    for (int r = 0; r < 3; ++r) out.move[r] += move[r];
+    return out;
+  }
+};
+
+class Builder {
+ public:
+  Builder(const SourceFile& file, const VoxScene& scene) : file_(file), scene_(scene) {
+    part_.kind = Kind::kTriangles;
+  }
+
+  absl::StatusOr<Model> Build() {
+    absl::Status status;
+    if (scene_.nodes.empty()) {
+      for (size_t g = 0; g < scene_.grids.size() && status.ok(); ++g) {
+        status = Put(static_cast<int32_t>(g), Place());
+      }
+    } else {
+      status = Visit(0, Place(), 0);
+    }
+    if (!status.ok()) return status;
+    if (part_.positions.empty()) {
+      return FileError(file_, "has no voxel that is to be seen", "at least one is expected");
+    }
+    Model model;
+    model.path = file_.path;
+    model.format = "MagicaVoxel";
+    model.up = Up::kZ;
+    model.lit_already = true;
+    model.parts.push_back(std::move(part_));
+    return model;
+  }
+
+ private:
+  absl::Status Visit(int32_t number, const Place& place, int depth) {
+    const auto at = scene_.nodes.find(number);
+    if (at == scene_.nodes.end()) {
+      return FileError(file_, absl::StrCat("refers to node ", number), "there is none");
+    }
+    if (depth > kMostDepth || ++visits_ > kMostVisits) {
+      return FileError(file_, "has nodes within nodes without end",
+                       absl::StrCat("at most ", kMostDepth, " deep are read"));
+    }
+    const VoxNode& node = at->second;
+    if (node.hidden) return absl::OkStatus();
+    const Place here = node.kind == VoxNode::Kind::kTransform ? place * node : place;
+    for (const int32_t child : node.children) {
+      const absl::Status status =
+          node.kind == VoxNode::Kind::kShape ? Put(child, here) : Visit(child, here, depth + 1);
+      if (!status.ok()) return status;
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Put(int32_t number, const Place& place) {
+    if (number < 0 || static_cast<size_t>(number) >= scene_.grids.size()) {
+      return FileError(file_, absl::StrCat("refers to model ", number),
+                       absl::StrCat("it has ", scene_.grids.size()));
+    }
+    const VoxGrid& grid = scene_.grids[static_cast<size_t>(number)];
+    const auto index = [&grid](uint32_t x, uint32_t y, uint32_t z) {
+      return (size_t{z} * grid.size[1] + y) * grid.size[0] + x;
+    };
+    std::vector<bool> filled(index(0, 0, grid.size[2]));
+    for (const VoxVoxel& v : grid.voxels) filled[index(v.x, v.y, v.z)] = true;
+    for (const VoxVoxel& v : grid.voxels) {
+      const std::array<uint32_t, 3> cell = {v.x, v.y, v.z};
+      for (int axis = 0; axis < 3; ++axis) {
+        for (const int side : {0, 1}) {
+          std::array<uint32_t, 3> next = cell;
+          next[axis] += side == 1 ? 1 : -1;  // wraps beyond the first, and is beyond the last then
+          if (next[axis] < grid.size[axis] && filled[index(next[0], next[1], next[2])]) continue;
+          if (absl::Status status = AddFace(grid, cell, axis, side, place, scene_.palette[v.color]);
+              !status.ok()) {
+            return status;
+          }
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status AddFace(const VoxGrid& grid, const std::array<uint32_t, 3>& cell, int axis, int side,
+                       const Place& place, const Rgb& color) {
+    const auto first = static_cast<uint32_t>(part_.positions.size());
+    if (first + 4 > kMaxModelVertices) {
+      return FileError(file_,
+                       absl::StrCat("has more than ", kMaxModelVertices / 4, " faces to be seen"),
+                       "take a part of it");
+    }
+    const int u = (axis + 1) % 3, w = (axis + 2) % 3;
+    for (const auto& [du, dw] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
+      // Grids are turned about the corner of cells that is their middle.
+      Cell corner;
+      for (int a = 0; a < 3; ++a) corner[a] = int64_t{cell[a]} - grid.size[a] / 2;
+      corner[axis] += side;
+      corner[u] += du;
+      corner[w] += dw;
+      const Cell at = place.Turned(corner);
+      part_.positions.push_back({static_cast<double>(at[0] + place.move[0]),
+                                 static_cast<double>(at[1] + place.move[1]),
+                                 static_cast<double>(at[2] + place.move[2])});
+      part_.colors.push_back(color);
+    }
+    for (const uint32_t i : {0u, 1u, 2u, 0u, 2u, 3u}) part_.indices.push_back(first + i);
+    return absl::OkStatus();
+  }
+
+  const SourceFile& file_;
+  const VoxScene& scene_;
+  uint64_t visits_ = 0;
+  Part part_;
+};
+
+}  // namespace
+
+absl::StatusOr<Model> ReadVoxModel(const SourceFile& file) {
+  const absl::StatusOr<VoxScene> scene = ReadVoxChunks(file);
+  if (!scene.ok()) return scene.status();
+  return Builder(file, *scene).Build();
+}
+
+}  // namespace voxeld::voxelctl
