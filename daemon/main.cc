@@ -185,13 +185,12 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   }
   std::unique_ptr<assets::AssetStore> assets;  // none: none are taken
   if (config.limits.max_assets_bytes > 0) {
-    absl::StatusOr<std::unique_ptr<assets::AssetStore>> store = assets::AssetStore::Open(
+    assets = assets::AssetStore::Open(
         config.state.dir.empty() ? "" : absl::StrCat(config.state.dir, "/assets"),
         {.max_asset_bytes = config.limits.max_asset_bytes,
-         .max_bytes = config.limits.max_assets_bytes},
+         .max_bytes = config.limits.max_assets_bytes,
+         .max_assets = config.limits.max_assets},
         clock, &log);
-    if (!store.ok()) return Fail(1, store.status());
-    assets = *std::move(store);
   }
   services::HealthWatch watch(log);
   std::atomic<reload::Reloader*> reloads = nullptr;  // there is one once the core is

@@ -1,10 +1,13 @@
 #include "daemon/assets/asset_store.h"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <system_error>
 #include <tuple>
@@ -12,7 +15,6 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 
@@ -26,6 +28,8 @@ std::string Hex(std::string_view digest) {
   return absl::BytesToHexString(absl::string_view(digest.data(), digest.size()));
 }
 
+uint64_t CostOf(uint64_t size) { return std::max(size, AssetStore::kLeastCost); }
+
 // A file's name as the store gives it; nothing: it is none of ours.
 struct Name {
   std::string digest;
@@ -33,11 +37,8 @@ struct Name {
 };
 std::optional<Name> ReadName(absl::string_view name) {
   const bool part = absl::ConsumeSuffix(&name, kPart);
-  if (name.size() != 2 * kDigestBytes || !std::ranges::all_of(name, [](char c) {
-        return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
-      })) {
-    return std::nullopt;
-  }
+  const auto is_hex = [](char c) { return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f'); };
+  if (name.size() != 2 * kDigestBytes || !std::ranges::all_of(name, is_hex)) return std::nullopt;
   return Name{absl::HexStringToBytes(name), !part};
 }
 
@@ -45,130 +46,205 @@ absl::Status Because(const absl::Status& status, std::string_view digest) {
   return absl::Status(status.code(), absl::StrCat("asset ", Hex(digest), " ", status.message()));
 }
 
+void RemoveFiles(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) (void)unlink(path.c_str());
+}
+
+absl::Status GaveWay() {
+  return absl::AbortedError(
+      "the upload brought nothing for long, and another had its place or its room; ask ListAssets "
+      "where to go on");
+}
+
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<AssetStore>> AssetStore::Open(const std::string& folder,
-                                                             const AssetLimits& limits,
-                                                             sync::Clock& clock, Logger* log) {
-  std::unique_ptr<AssetStore> store(new AssetStore(folder, limits, clock, log));
-  if (absl::Status status = store->ReadFolder(); !status.ok()) return status;
+std::unique_ptr<AssetStore> AssetStore::Open(const std::string& folder, const AssetLimits& limits,
+                                             sync::Clock& clock, Logger* log) {
+  std::unique_ptr<AssetStore> store(new AssetStore(limits, clock, log));
+  if (folder.empty()) return store;
+  if (absl::Status status = store->ReadFolder(folder); !status.ok()) {
+    const std::string why = absl::StrCat(std::string(status.message()),
+                                         "; assets are in memory, and go with the daemon");
+    if (log != nullptr) log->Error("the folder of assets cannot be used", {{"why", why}});
+    sync::MutexLock lock(store->mutex_);
+    store->figures_.trouble = why;
+  }
   return store;
 }
 
 std::string AssetStore::PathOf(std::string_view digest, bool complete) const {
-  if (folder_.empty()) return "";
   return absl::StrCat(folder_, "/", Hex(digest), complete ? "" : kPart);
 }
 
-absl::Status AssetStore::ReadFolder() {
-  if (folder_.empty()) return absl::OkStatus();
-  const auto failed = [this](const std::error_code& error) {
-    return absl::UnavailableError(
-        absl::StrCat("the folder of assets, ", folder_, ", cannot be used: ", error.message()));
+absl::Status AssetStore::ReadFolder(const std::string& folder) {
+  const auto failed = [&folder](const std::error_code& error) {
+    return absl::UnavailableError(absl::StrCat(folder, ": ", error.message()));
   };
-  std::error_code error;
-  if (mkdir(folder_.c_str(), S_IRWXU) != 0 && errno != EEXIST) {
+  if (mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST) {
+    return failed(std::error_code(errno, std::generic_category()));
+  }
+  if (access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
     return failed(std::error_code(errno, std::generic_category()));
   }
   struct Found {
     std::filesystem::file_time_type used;
     Name name;
+    uint64_t size = 0;
   };
   std::vector<Found> found;
-  for (std::filesystem::directory_iterator at(folder_, error), end; !error && at != end;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
        at.increment(error)) {
-    const std::string name = at->path().filename();
     std::error_code gone;
     const auto used = at->last_write_time(gone);
-    if (auto read = ReadName(name); read.has_value() && !gone) {
-      found.push_back({used, *std::move(read)});
-    }
+    const uint64_t size = gone ? 0 : at->file_size(gone);
+    auto name = ReadName(at->path().filename().string());
+    if (name.has_value() && !gone) found.push_back({used, *std::move(name), size});
   }
   if (error) return failed(error);
   std::ranges::sort(found, {}, [](const Found& f) { return std::tie(f.used, f.name.digest); });
+  folder_ = folder;
 
-  sync::MutexLock lock(mutex_);
-  for (const auto& [used, name] : found) {
-    uint64_t size = 0;
-    auto file = AssetFile::Open(PathOf(name.digest, name.complete), &size);
-    if (!file.ok()) {
-      if (log_ != nullptr) {
-        log_->Warn("an asset cannot be had",
-                   {{"sha256", Hex(name.digest)}, {"why", std::string(file.status().message())}});
-      }
-      continue;
+  Paths gone;
+  {
+    sync::MutexLock lock(mutex_);
+    for (const auto& [used, name, size] : found) {
+      Asset& asset = assets_[name.digest];
+      const bool better = name.complete || !asset.complete;
+      if (size == 0 || !better) gone.push_back(PathOf(name.digest, name.complete));
+      if (size == 0 || !better) continue;
+      if (asset.stored > 0) gone.push_back(PathOf(name.digest, false));
+      SetSize(&asset, size);
+      asset.stored = size;
+      asset.complete = name.complete;
+      asset.used = ++uses_;
     }
-    auto& asset = assets_[name.digest];
-    if (asset.file != nullptr && asset.complete) {  // and a part of it
-      (*file)->Remove();
-      continue;
-    }
-    reserved_ += size - asset.size;
-    if (asset.file != nullptr) asset.file->Remove();
-    asset = {.file = *std::move(file),
-             .size = size,
-             .stored = size,
-             .complete = name.complete,
-             .used = ++uses_};
+    std::erase_if(assets_, [](const auto& entry) { return entry.second.stored == 0; });
+    (void)MakeRoom("", 0, 0, &gone);  // where there was more room once
   }
-  return MakeRoom("", 0);
+  RemoveFiles(gone);
+  return absl::OkStatus();
 }
 
 bool AssetStore::IsIdle(const Asset& asset) const {
   return asset.upload == 0 || clock_.Now() - asset.heard >= limits_.idle_limit_ns;
 }
 
-void AssetStore::Drop(Assets::iterator at) {
-  reserved_ -= at->second.size;
-  at->second.file->Remove();
+void AssetStore::SetSize(Asset* asset, uint64_t size) {
+  if (asset->size > 0) reserved_ -= CostOf(asset->size);
+  if (size > 0) reserved_ += CostOf(size);
+  asset->size = size;
+}
+
+void AssetStore::Drop(Assets::iterator at, Paths* gone) {
+  uploads_.erase(at->second.upload);
+  SetSize(&at->second, 0);
+  if (!folder_.empty()) gone->push_back(PathOf(at->first, at->second.complete));
   assets_.erase(at);
 }
 
-absl::Status AssetStore::MakeRoom(std::string_view digest, uint64_t bytes) {
-  while (reserved_ + bytes > limits_.max_bytes) {
-    auto oldest = assets_.end();
-    for (auto at = assets_.begin(); at != assets_.end(); ++at) {
-      if (at->first == digest || !IsIdle(at->second)) continue;
-      if (oldest == assets_.end() || at->second.used < oldest->second.used) oldest = at;
-    }
-    if (oldest == assets_.end()) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat(bytes, " bytes more do not fit beside ", reserved_,
-                       " of uploads under way; max_assets_bytes allows ", limits_.max_bytes,
-                       ": try again when they are done"));
-    }
-    ++figures_.evicted;
-    Drop(oldest);
+void AssetStore::EndUpload(Assets::iterator at, Paths* gone) {
+  Asset& asset = at->second;
+  uploads_.erase(std::exchange(asset.upload, 0));
+  if (asset.stored == 0) return Drop(at, gone);
+  if (!asset.complete) SetSize(&asset, asset.stored);
+}
+
+absl::Status AssetStore::MakeRoom(std::string_view digest, uint64_t cost, uint64_t more,
+                                  Paths* gone) {
+  std::vector<Assets::iterator> idle;
+  for (auto at = assets_.begin(); at != assets_.end(); ++at) {
+    if (at->first != digest && IsIdle(at->second)) idle.push_back(at);
   }
+  std::ranges::sort(idle, {}, [](Assets::iterator at) { return at->second.used; });
+  uint64_t bytes = reserved_ + cost, count = assets_.size() + more;
+  size_t goes = 0;
+  const auto fits = [&] { return bytes <= limits_.max_bytes && count <= limits_.max_assets; };
+  for (; !fits() && goes < idle.size(); ++goes, --count) bytes -= CostOf(idle[goes]->second.size);
+  if (!fits()) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(cost, " bytes more do not fit beside ", bytes - cost, " of ", count - more,
+                     " uploads under way; max_assets_bytes allows ", limits_.max_bytes,
+                     ", max_assets ", limits_.max_assets, ": try again when they are done"));
+  }
+  for (size_t i = 0; i < goes; ++i) Drop(idle[i], gone);
+  figures_.evicted += goes;
   return absl::OkStatus();
 }
 
-absl::Status AssetStore::CheckUploads() {
-  size_t under_way = 0;
-  Asset* idle = nullptr;
-  for (auto& [digest, asset] : assets_) {
-    if (asset.upload == 0) continue;
-    ++under_way;
-    if (IsIdle(asset) && (idle == nullptr || asset.heard < idle->heard)) idle = &asset;
+absl::StatusOr<AssetStore::Assets::iterator> AssetStore::UploadToDisplace() {
+  if (uploads_.size() < limits_.max_uploads) return assets_.end();
+  auto idle = assets_.end();
+  for (const auto& [id, digest] : uploads_) {
+    const auto at = assets_.find(digest);
+    if (!IsIdle(at->second)) continue;
+    if (idle == assets_.end() || at->second.heard < idle->second.heard) idle = at;
   }
-  if (under_way < limits_.max_uploads) return absl::OkStatus();
-  if (idle == nullptr) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        under_way, " uploads are under way, which is the most; try again when one is done"));
+  if (idle != assets_.end()) return idle;
+  return absl::ResourceExhaustedError(absl::StrCat(
+      uploads_.size(), " uploads are under way, which is the most; try again when one is done"));
+}
+
+absl::StatusOr<AssetStore::UploadId> AssetStore::Admit(std::string_view digest, uint64_t size,
+                                                       uint64_t offset, Paths* gone) {
+  sync::MutexLock lock(mutex_);
+  auto at = assets_.find(digest);
+  const uint64_t stored = at == assets_.end() ? 0 : at->second.stored;
+  if (at != assets_.end() && !IsIdle(at->second)) {
+    return absl::AbortedError(
+        absl::StrCat("another upload of asset ", Hex(digest),
+                     " is under way; ask ListAssets how far it is, and wait, or try again"));
   }
-  idle->upload = 0;
-  return absl::OkStatus();
+  if (offset != 0 && (offset != stored || offset >= size)) {
+    return absl::OutOfRangeError(
+        stored < size
+            ? absl::StrCat("offset is ", offset, ", and ", stored,
+                           " bytes of it are here; go on at ", stored, ", or begin anew at 0")
+            : absl::StrCat("offset is ", offset, ", and ", stored, " bytes are here for a size of ",
+                           size, "; begin anew at 0"));
+  }
+  const absl::StatusOr<Assets::iterator> displaced = UploadToDisplace();
+  if (!displaced.ok()) return displaced.status();
+  const uint64_t had = at == assets_.end() || at->second.size == 0 ? 0 : CostOf(at->second.size);
+  const uint64_t cost = CostOf(size) > had ? CostOf(size) - had : 0;
+  if (absl::Status status = MakeRoom(digest, cost, at == assets_.end() ? 1 : 0, gone);
+      !status.ok()) {
+    return status;
+  }
+  // One that had to go for its room has been dropped already.
+  if (uploads_.size() >= limits_.max_uploads) EndUpload(*displaced, gone);
+  at = assets_.try_emplace(std::string(digest)).first;
+  Asset& asset = at->second;
+  uploads_.erase(asset.upload);
+  if (offset == 0) asset.stored = 0;
+  if (folder_.empty() && (asset.memory == nullptr || asset.size != size)) {
+    const std::shared_ptr<char[]> memory = std::make_shared_for_overwrite<char[]>(size);
+    if (asset.stored > 0) std::memcpy(memory.get(), asset.memory.get(), asset.stored);
+    asset.memory = memory;
+  }
+  SetSize(&asset, size);
+  asset.used = ++uses_;
+  asset.heard = clock_.Now();
+  asset.upload = ++last_upload_;
+  uploads_[asset.upload] = std::string(digest);
+  return asset.upload;
 }
 
 absl::StatusOr<AssetStore::UploadId> AssetStore::Begin(std::string_view digest, uint64_t size,
                                                        uint64_t offset) {
-  sync::MutexLock lock(mutex_);
-  auto at = assets_.find(digest);
-  const bool known = at != assets_.end();
-  if (known && at->second.complete) {
-    at->second.used = ++uses_;
-    at->second.file->Touch();
-    return absl::AlreadyExistsError("it is here");
+  uint64_t whole = 0;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto at = assets_.find(digest);
+    if (at != assets_.end() && at->second.complete) {
+      whole = at->second.size;
+      at->second.used = ++uses_;
+    }
+  }
+  if (whole > 0) {
+    const absl::StatusOr<bool> right = Check(std::string(digest), whole);
+    if (!right.ok()) return Because(right.status(), digest);
+    if (*right) return absl::AlreadyExistsError("it is here");
   }
   const uint64_t most = std::min(limits_.max_asset_bytes, limits_.max_bytes);
   if (size == 0 || size > most) {
@@ -177,58 +253,35 @@ absl::StatusOr<AssetStore::UploadId> AssetStore::Begin(std::string_view digest, 
                                                        ? " bytes, which is max_asset_bytes"
                                                        : " bytes, which is max_assets_bytes"));
   }
-  if (known && !IsIdle(at->second)) {
-    return absl::AbortedError(
-        absl::StrCat("another upload of asset ", Hex(digest),
-                     " is under way; ask ListAssets how far it is, and wait, or try again"));
+  Paths gone;
+  const absl::StatusOr<UploadId> upload = Admit(digest, size, offset, &gone);
+  RemoveFiles(gone);
+  if (!upload.ok() || folder_.empty()) return upload;
+  absl::StatusOr<AssetFile> file = AssetFile::Open(PathOf(digest, false), offset == 0);
+  if (!file.ok()) {
+    Abandon(*upload);
+    return Because(file.status(), digest);
   }
-  const uint64_t stored = known ? at->second.stored : 0;
-  if (offset != 0 && (offset != stored || offset > size)) {
-    return absl::OutOfRangeError(absl::StrCat("offset is ", offset, ", and ", stored,
-                                              " bytes of it are here; go on at ", stored,
-                                              ", or begin anew at 0"));
-  }
-  if (absl::Status status = CheckUploads(); !status.ok()) return status;
-  const uint64_t had = known ? at->second.size : 0;
-  if (size > had) {
-    if (absl::Status status = MakeRoom(digest, size - had); !status.ok()) return status;
-  }
-  if (!known) {
-    uint64_t there = 0;
-    auto file = AssetFile::Open(PathOf(digest, false), &there);
-    if (!file.ok()) return Because(file.status(), digest);
-    at = assets_.emplace(std::string(digest), Asset{.file = *std::move(file)}).first;
-  }
-  Asset& asset = at->second;
-  if (offset == 0) {
-    if (absl::Status status = asset.file->Empty(); !status.ok()) return Because(status, digest);
-    asset.stored = 0;
-  }
-  reserved_ += size - asset.size;
-  asset.size = size;
-  asset.used = ++uses_;
-  asset.heard = clock_.Now();
-  return asset.upload = ++last_upload_;
+  files_.emplace(*upload, *std::move(file));
+  return upload;
 }
 
 AssetStore::Assets::iterator AssetStore::FindUpload(UploadId upload) {
-  return std::ranges::find_if(assets_, [upload](const auto& entry) {
-    return upload != 0 && entry.second.upload == upload;
-  });
+  const auto at = uploads_.find(upload);
+  return at == uploads_.end() ? assets_.end() : assets_.find(at->second);
 }
 
 absl::Status AssetStore::Append(UploadId upload, uint64_t offset, std::string_view bytes) {
-  std::shared_ptr<AssetFile> file;
   std::string digest;
+  std::shared_ptr<char[]> memory;
   {
     sync::MutexLock lock(mutex_);
     const auto at = FindUpload(upload);
-    if (at == assets_.end()) {
-      return absl::AbortedError(
-          "another upload took this one's place, as it brought nothing for long; ask ListAssets "
-          "where to go on");
+    if (at == assets_.end()) return GaveWay();
+    const Asset& asset = at->second;
+    if (bytes.empty()) {
+      return absl::InvalidArgumentError("a piece is empty; each brings one byte or more");
     }
-    Asset& asset = at->second;
     if (offset != asset.stored) {
       return absl::OutOfRangeError(absl::StrCat("offset is ", offset, " after ", asset.stored,
                                                 " bytes; pieces follow one another"));
@@ -238,81 +291,137 @@ absl::Status AssetStore::Append(UploadId upload, uint64_t offset, std::string_vi
                                                 " bytes, and the size was said to be ",
                                                 asset.size));
     }
-    asset.heard = clock_.Now();
-    file = asset.file;
     digest = at->first;
+    memory = asset.memory;
   }
-  const absl::Status written = file->Write(offset, bytes);
-  sync::MutexLock lock(mutex_);
-  const auto at = FindUpload(upload);
-  if (at == assets_.end()) return absl::AbortedError("its room was needed; begin anew");
+  absl::Status written;
+  if (folder_.empty()) {
+    std::memcpy(memory.get() + offset, bytes.data(), bytes.size());
+  } else {
+    written = files_.at(upload).Write(offset, bytes);
+  }
   if (!written.ok()) {
-    at->second.upload = 0;
+    Abandon(upload);
     return Because(written, digest);
   }
-  at->second.stored += bytes.size();
-  at->second.heard = clock_.Now();
+  sync::MutexLock lock(mutex_);
+  Asset& asset = assets_.find(digest)->second;  // an upload under way, and this is who ends those
+  asset.stored += bytes.size();
+  asset.heard = clock_.Now();
   figures_.bytes_in += bytes.size();
   return absl::OkStatus();
 }
 
 absl::StatusOr<uint64_t> AssetStore::Finish(UploadId upload) {
-  std::shared_ptr<AssetFile> file;
   std::string digest;
-  uint64_t size = 0;
+  uint64_t size = 0, stored = 0;
+  std::shared_ptr<char[]> memory;
   {
     sync::MutexLock lock(mutex_);
     const auto at = FindUpload(upload);
-    if (at == assets_.end()) return absl::AbortedError("its room was needed; begin anew");
-    Asset& asset = at->second;
-    if (asset.stored < asset.size) {
-      asset.upload = 0;
-      return absl::OutOfRangeError(absl::StrCat("the upload ends after ", asset.stored, " of ",
-                                                asset.size, " bytes; go on there"));
-    }
-    asset.heard = clock_.Now();
-    file = asset.file;
+    if (at == assets_.end()) return GaveWay();
     digest = at->first;
-    size = asset.size;
+    size = at->second.size;
+    stored = at->second.stored;
+    memory = at->second.memory;
   }
-  const absl::StatusOr<std::string> hash = file->Hash(size);
+  if (stored < size) {
+    Abandon(upload);
+    return absl::OutOfRangeError(
+        absl::StrCat("the upload ends after ", stored, " of ", size, " bytes; go on there"));
+  }
+  const absl::StatusOr<std::string> hash = folder_.empty()
+                                               ? HashBytes({memory.get(), size})
+                                               : HashAssetFile(PathOf(digest, false), size);
   const bool right = hash.ok() && *hash == digest;
   absl::Status kept = hash.status();
-  if (right) kept = file->Keep(PathOf(digest, true));
+  if (right && !folder_.empty()) kept = files_.at(upload).Keep(PathOf(digest, true));
+  files_.erase(upload);
 
-  sync::MutexLock lock(mutex_);
-  const auto at = FindUpload(upload);
-  if (at == assets_.end()) {
-    file->Remove();  // also what has got another name meanwhile
-    return absl::AbortedError("its room was needed; begin anew");
+  Paths gone;
+  absl::Status result;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto at = assets_.find(digest);
+    if (!kept.ok()) {
+      EndUpload(at, &gone);
+      result = Because(kept, digest);
+    } else if (!right) {
+      Drop(at, &gone);
+      result = absl::DataLossError(absl::StrCat("what came has the SHA-256 ", Hex(*hash),
+                                                " and was said to have ", Hex(digest),
+                                                "; it is not kept: send it anew"));
+    } else {
+      at->second.complete = at->second.checked = true;
+      EndUpload(at, &gone);
+      ++figures_.uploaded;
+    }
   }
-  at->second.upload = 0;
-  if (!kept.ok()) return Because(kept, digest);
-  if (!right) {
-    Drop(at);
-    return absl::DataLossError(absl::StrCat("what came has the SHA-256 ", Hex(*hash),
-                                            " and was said to have ", Hex(digest),
-                                            "; it is not kept: send it anew"));
-  }
-  at->second.complete = at->second.checked = true;
-  ++figures_.uploaded;
+  RemoveFiles(gone);
+  if (!result.ok()) return result;
   return size;
 }
 
 void AssetStore::Abandon(UploadId upload) {
+  files_.erase(upload);
+  Paths gone;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto at = FindUpload(upload);
+    if (at != assets_.end()) EndUpload(at, &gone);
+  }
+  RemoveFiles(gone);
+}
+
+void AssetStore::Heard(UploadId upload) {
   sync::MutexLock lock(mutex_);
   const auto at = FindUpload(upload);
-  if (at != assets_.end()) at->second.upload = 0;
+  if (at != assets_.end()) at->second.heard = clock_.Now();
+}
+
+void AssetStore::DropDamaged(const std::string& digest) {
+  Paths gone;
+  {
+    sync::MutexLock lock(mutex_);
+    const auto at = assets_.find(digest);
+    if (at == assets_.end() || !at->second.complete) return;
+    ++figures_.damaged;
+    Drop(at, &gone);
+  }
+  RemoveFiles(gone);
+  if (log_ != nullptr) {
+    log_->Error("an asset was damaged, and is gone", {{"sha256", Hex(digest)}});
+  }
+}
+
+absl::StatusOr<bool> AssetStore::Check(const std::string& digest, uint64_t size) {
+  if (folder_.empty()) return true;
+  sync::MutexLock one(check_mutex_);
+  {
+    sync::MutexLock lock(mutex_);
+    const auto at = assets_.find(digest);
+    if (at == assets_.end() || !at->second.complete) return false;
+    if (at->second.checked) return true;
+  }
+  const absl::StatusOr<std::string> hash = HashAssetFile(PathOf(digest, true), size);
+  if (!hash.ok() && !absl::IsOutOfRange(hash.status())) return hash.status();
+  if (!hash.ok() || *hash != digest) {
+    DropDamaged(digest);
+    return false;
+  }
+  sync::MutexLock lock(mutex_);
+  const auto at = assets_.find(digest);
+  if (at != assets_.end() && at->second.complete) at->second.checked = true;
+  return true;
 }
 
 absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest, uint64_t offset,
                                                         uint64_t size) {
-  std::shared_ptr<AssetFile> file;
-  uint64_t has = 0;
-  bool checked = false;
   const auto missing = [&digest](absl::string_view why) {
     return absl::NotFoundError(absl::StrCat("is ", Hex(digest), ", which is ", why));
   };
+  uint64_t has = 0;
+  std::shared_ptr<char[]> memory;
   {
     sync::MutexLock lock(mutex_);
     const auto at = assets_.find(digest);
@@ -322,30 +431,26 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
       return missing(absl::StrCat("not whole: ", asset.stored, " bytes are here; bring the rest"));
     }
     asset.used = ++uses_;
-    file = asset.file;
     has = asset.size;
-    checked = asset.checked;
+    memory = asset.memory;
   }
   if (offset > has || size > has - offset) {
     return absl::OutOfRangeError(
         absl::StrCat("is ", size, " from ", offset, " on; the asset has ", has, " bytes"));
   }
-  if (!checked) {
-    const absl::StatusOr<std::string> hash = file->Hash(has);
-    if (!hash.ok()) return hash.status();
-    sync::MutexLock lock(mutex_);
-    const auto at = assets_.find(digest);
-    if (*hash != digest) {
-      if (at != assets_.end() && at->second.file == file) Drop(at);
-      ++figures_.damaged;
-      if (log_ != nullptr)
-        log_->Error("an asset was damaged, and is gone", {{"sha256", Hex(digest)}});
-      return missing("damaged on the disk; bring it anew by UploadAsset");
-    }
-    if (at != assets_.end() && at->second.file == file) at->second.checked = true;
+  if (folder_.empty()) return wire::MappedRange{{memory.get() + offset, size}, memory};
+  const std::string name(digest), path = PathOf(digest, true);
+  const absl::StatusOr<bool> right = Check(name, has);
+  if (!right.ok()) return right.status();
+  absl::StatusOr<wire::MappedRange> bytes = absl::OutOfRangeError("");
+  if (*right) bytes = ReadAssetFile(path, offset, size);
+  if (absl::IsOutOfRange(
+          bytes.status())) {  // cut while the daemon runs, or gone for another's room
+    DropDamaged(name);
+    return missing("damaged on the disk, or gone meanwhile; bring it anew by UploadAsset");
   }
-  file->Touch();
-  return file->Read(offset, size);
+  if (bytes.ok()) TouchAssetFile(path);
+  return bytes;
 }
 
 std::vector<AssetState> AssetStore::List(std::span<const std::string> digests) const {
@@ -360,10 +465,12 @@ std::vector<AssetState> AssetStore::List(std::span<const std::string> digests) c
 }
 
 std::vector<AssetState> AssetStore::ListAll() const {
-  sync::MutexLock lock(mutex_);
   std::vector<std::pair<uint64_t, AssetState>> all;
-  for (const auto& [digest, asset] : assets_) {
-    all.push_back({asset.used, {digest, asset.stored, asset.complete}});
+  {
+    sync::MutexLock lock(mutex_);
+    for (const auto& [digest, asset] : assets_) {
+      all.push_back({asset.used, {digest, asset.stored, asset.complete}});
+    }
   }
   std::ranges::sort(all, std::greater(), [](const auto& entry) { return entry.first; });
   std::vector<AssetState> out;

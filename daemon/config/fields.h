@@ -139,6 +139,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_local_bytes", limits.max_local_bytes, 0, kMost);
   visitor.Integer("max_asset_bytes", limits.max_asset_bytes, 1, kMost);
   visitor.Integer("max_assets_bytes", limits.max_assets_bytes, 0, kMost);
+  visitor.Integer("max_assets", limits.max_assets, 1, 1 << 20);
 }
 
 // "auto", "cpu", "cuda".

@@ -299,7 +299,7 @@ void Intake::DropFrame(const std::string& layer, const FrameRef& frame) {
 
 bool Intake::Room() const {
   return received_ - returned_ < limits_.credit_bytes &&
-         named_bytes_ / kLocalMessages < limits_.max_message_bytes &&
+         named_bytes_ / kNamedMessages < limits_.max_message_bytes &&
          queue_.size() < limits_.max_riding_commits;
 }
 

@@ -10,8 +10,8 @@
 // of the session waits, until it is staged: what is staged for a commit that has not come waits for the client, and
 // max_uncommitted_bytes is its limit.
 //
-// Local memory that messages name costs their client nothing to send, and so no credit; what was copied of it is
-// outstanding in the same way, and nothing is read on while that is as much as kLocalMessages of the greatest messages
+// Local memory and assets that messages name cost their client nothing to send, and so no credit; what was copied of it is
+// outstanding in the same way, and nothing is read on while that is as much as kNamedMessages of the greatest messages
 // could have brought themselves.
 //
 // Threads: Take belongs to one thread at a time, Pop and Done to the core's; all are thread-safe
@@ -91,7 +91,7 @@ struct WaitingCommit {
 
 class Intake {
  public:
-  static constexpr uint64_t kLocalMessages = 4;
+  static constexpr uint64_t kNamedMessages = 4;
 
   // `open_bytes`: of the Open, which counts against the credit.
   // `bytes_in` counts what all sessions have sent.

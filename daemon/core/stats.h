@@ -94,6 +94,7 @@ struct AssetFigures {
   uint64_t count = 0;  // whole ones
   uint64_t bytes = 0;  // of these, of parts, and promised to uploads under way
   uint64_t uploaded = 0, evicted = 0, damaged = 0, bytes_in = 0;
+  std::string trouble;  // why they are not kept where they should be; empty: all is well
 };
 
 struct Stats {

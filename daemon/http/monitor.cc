@@ -43,6 +43,9 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   if (!stats.state.trouble.empty()) {
     reasons.push_back({{"what", "state"}, {"why", stats.state.trouble}});
   }
+  if (!stats.assets.trouble.empty()) {
+    reasons.push_back({{"what", "assets"}, {"why", stats.assets.trouble}});
+  }
   if (!stats.connections.access_trouble.empty()) {
     reasons.push_back({{"what", "access"}, {"why", stats.connections.access_trouble}});
   }

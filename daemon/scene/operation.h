@@ -107,6 +107,7 @@ struct Limits {
   uint64_t max_local_bytes = uint64_t{1} << 30;  // of one session's sealed memory
   uint64_t max_asset_bytes = 256u << 20;         // of one asset
   uint64_t max_assets_bytes = 512u << 20;        // of all; 0: there are none
+  uint64_t max_assets = 4096;                    // whole ones and parts
   // Of one shape's expressions together: operations, and how deep text nests.
   uint32_t max_expression_nodes = 1024;
   uint32_t max_expression_depth = 64;

@@ -54,6 +54,9 @@ struct ServiceContext {
   ActiveCalls short_calls;  // all others
   std::atomic<uint32_t> scene_watches = 0;
   std::atomic<uint32_t> stats_watches = 0;
+  static constexpr uint32_t kMostUploads =
+      32;  // calls; the assets say how many of them have something under way
+  std::atomic<uint32_t> uploads = 0;
   // Captures under way, those included whose client is gone and that the core has not let go of.
   // Shared, as the core may hold them longer than the server lives.
   std::shared_ptr<std::atomic<uint32_t>> captures = std::make_shared<std::atomic<uint32_t>>(0);

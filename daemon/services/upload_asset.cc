@@ -1,9 +1,11 @@
 // SceneService.UploadAsset: pieces are written in the assets' own thread, one after another; the next is
 // read when the last has been written, so that no call holds more than one.
+#include <grpcpp/alarm.h>
 #include <grpcpp/support/server_callback.h>
 
+#include <algorithm>
+#include <atomic>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -16,6 +18,8 @@ namespace voxeld::daemon::services {
 namespace {
 
 constexpr size_t kDigestBytes = 32;
+constexpr sync::TimeNs kSilenceLimit = 30 * sync::kSecond;
+constexpr uint64_t kBesideData = 256;  // of a message, at the most
 
 absl::Status CheckDigest(const std::string& digest) {
   if (digest.size() == kDigestBytes) return absl::OkStatus();
@@ -29,12 +33,19 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
                          public std::enable_shared_from_this<UploadCall> {
  public:
   UploadCall(ServiceContext& context, v1::UploadAssetResponse* response)
-      : context_(context), budget_(*context.core.budget()), response_(response) {}
+      : context_(context), budget_(context.core.budget()), response_(response) {}
 
   void Start() {
     self_ = shared_from_this();
     context_.calls.Add(self_);
+    if (++context_.uploads > ServiceContext::kMostUploads) {
+      return End(absl::ResourceExhaustedError(
+          absl::StrCat(ServiceContext::kMostUploads,
+                       " uploads are open, which is the most; try again when one has ended")));
+    }
     Read();
+    sync::MutexLock lock(mutex_);
+    LookForSilenceAt(context_.clock.Now() + kSilenceLimit);
   }
 
   void End(const absl::Status& status) override {
@@ -45,16 +56,32 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
 
   void OnReadDone(bool ok) override {
     const uint64_t bytes = ok ? request_.ByteSizeLong() : 0;
-    budget_.ChargeAnyway(Budget::Use::kArriving, bytes);
+    heard_ = context_.clock.Now();
+    if (!budget_->Charge(Budget::Use::kArriving, bytes)) {
+      return End(absl::ResourceExhaustedError(
+          absl::StrCat("a piece of ", bytes, " bytes would be held beside ", budget_->used_bytes(),
+                       " of all clients; max_memory_bytes allows ", budget_->limit_bytes(),
+                       "; go on when others have taken something away")));
+    }
+    context_.assets->Heard(upload_);
     context_.asset_calls->Post([self = shared_from_this(), ok, bytes](bool cancelled) {
-      if (!cancelled) self->Take(ok);
-      self->budget_.Release(Budget::Use::kArriving, bytes);
+      const bool more = !cancelled && self->Take(ok);
+      v1::UploadAssetRequest().Swap(&self->request_);  // lets go of its memory
+      self->budget_->Release(Budget::Use::kArriving, bytes);
+      if (more) self->Read();
     });
   }
 
   void OnCancel() override { End(absl::CancelledError("the client is gone")); }
 
   void OnDone() override {
+    std::unique_ptr<grpc::Alarm> alarm;
+    {
+      sync::MutexLock lock(mutex_);
+      alarm = std::move(alarm_);
+    }
+    alarm.reset();
+    --context_.uploads;
     context_.calls.Remove(this);
     context_.asset_calls->Post(
         [self = std::move(self_)](bool) { self->context_.assets->Abandon(self->upload_); });
@@ -66,20 +93,47 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
     if (!ended_) StartRead(&request_);
   }
 
-  // In the assets' thread.
-  void Take(bool ok) {
+  void LookForSilenceAt(sync::TimeNs at) VOXELD_REQUIRES(mutex_) {
+    if (ended_) return;
+    const sync::TimeNs wait = std::max<sync::TimeNs>(0, at - context_.clock.Now());
+    alarm_ = std::make_unique<grpc::Alarm>();
+    alarm_->Set(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_nanos(wait, GPR_TIMESPAN)),
+                [self = shared_from_this()](bool due) {
+                  if (due) self->LookForSilence();
+                });
+  }
+
+  void LookForSilence() {
+    const sync::TimeNs due = heard_ + kSilenceLimit;
+    if (context_.clock.Now() >= due) {
+      return End(absl::DeadlineExceededError(
+          absl::StrCat("nothing came for ", kSilenceLimit / sync::kSecond,
+                       " s; what came before stays for a while: ask ListAssets where to go on")));
+    }
+    std::unique_ptr<grpc::Alarm> fired;  // goes without the lock
+    sync::MutexLock lock(mutex_);
+    fired = std::move(alarm_);
+    LookForSilenceAt(due);
+  }
+
+  // In the assets' thread. True: the next piece may come.
+  bool Take(bool ok) {
     {
       sync::MutexLock lock(mutex_);
-      if (ended_) return;
+      if (ended_) return false;
     }
     const absl::Status taken = ok ? TakePiece() : Complete();
-    if (!taken.ok()) return End(taken);
-    if (ok && !here_) return Read();
+    if (!taken.ok()) {
+      End(taken);
+      return false;
+    }
+    if (ok && !here_) return true;
     sync::MutexLock lock(mutex_);
-    if (std::exchange(ended_, true)) return;
+    if (std::exchange(ended_, true)) return false;
     response_->set_sha256(digest_);
     response_->set_stored(size_);
     Finish(grpc::Status::OK);
+    return false;
   }
 
   absl::Status TakePiece() {
@@ -107,22 +161,24 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
       return absl::InvalidArgumentError(
           "the call ended without a piece; the first tells sha256 and size");
     }
-    return context_.assets->Finish(std::exchange(upload_, 0)).status();
+    return context_.assets->Finish(upload_).status();
   }
 
   ServiceContext& context_;
-  Budget& budget_;
+  const std::shared_ptr<Budget> budget_;
   v1::UploadAssetResponse* const response_;  // while the call has not ended
   v1::UploadAssetRequest request_;           // gRPC's while it reads, else the assets' thread's
+  std::atomic<sync::TimeNs> heard_ = context_.clock.Now();
 
-  // The assets' thread's.
+  // The assets' thread's; all may ask for the upload's number.
   std::string digest_;
   uint64_t size_ = 0;
-  assets::AssetStore::UploadId upload_ = 0;
+  std::atomic<assets::AssetStore::UploadId> upload_ = 0;
   bool here_ = false;  // all of it, already
 
   sync::Mutex mutex_;
   bool ended_ VOXELD_GUARDED_BY(mutex_) = false;
+  std::unique_ptr<grpc::Alarm> alarm_ VOXELD_GUARDED_BY(mutex_);
   std::shared_ptr<UploadCall> self_;
 };
 
@@ -163,6 +219,7 @@ absl::Status ListAssets(ServiceContext& context, const v1::ListAssetsRequest& re
     info->set_complete(asset.complete);
   }
   response->set_used_bytes(context.assets->figures().bytes);
+  response->set_max_piece_bytes(context.core.limits().max_message_bytes - kBesideData);
   return absl::OkStatus();
 }
 

@@ -286,9 +286,9 @@ Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t
   return out;
 }
 
-Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context, AssetSource* assets) {
+Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context,
+               const Sources& sources) {
   Decoded out;
-  const Sources sources{nullptr, assets};
   NamedRanges ranges(sources, context.limits);
   context.ranges = &ranges;
   uint64_t decoded = 0;
@@ -365,7 +365,7 @@ Decoded DecodeStreamRequest(std::span<const std::string_view> slices, const Limi
 }
 
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
-                     gpu::BulkPool* pool, AssetSource* assets, text::Fonts* fonts) {
+                     gpu::BulkPool* pool, const Sources& sources, text::Fonts* fonts) {
   uint64_t size = 0;
   if (absl::Status status = CheckSize(slices, limits, &size); !status.ok()) return Failed(status);
   if (absl::Status status = CheckUpdateElements(slices, size, limits); !status.ok()) {
@@ -375,12 +375,12 @@ Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& lim
   if (absl::Status status = parsed.Parse(slices, size, Root::kApplyUpdateRequest); !status.ok()) {
     return Failed(status);
   }
-  return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts}, assets);
+  return Decode(parsed.message(), {limits, pool, parsed.payloads(), nullptr, fonts}, sources);
 }
 
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
-                     gpu::BulkPool* pool, AssetSource* assets, text::Fonts* fonts) {
-  return Decode(request, {limits, pool, nullptr, nullptr, fonts}, assets);
+                     gpu::BulkPool* pool, const Sources& sources, text::Fonts* fonts) {
+  return Decode(request, {limits, pool, nullptr, nullptr, fonts}, sources);
 }
 
 }  // namespace voxeld::daemon::wire

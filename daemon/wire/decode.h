@@ -68,16 +68,16 @@ Decoded DecodeStreamRequest(const v1::StreamRequest& request, const Limits& limi
 
 // An ApplyUpdateRequest: `open` is always set (KEEP unless it says otherwise), the operations end
 // with a Commit of frame 0, and the fields of issues begin with "operations[i].". It has no local
-// memory; `assets` may be none.
+// memory.
 //
 // Status: as above, and InvalidArgument for more than max_operations_per_commit operations.
 Decoded DecodeUpdate(std::span<const std::string_view> slices, const Limits& limits,
-                     gpu::BulkPool* pool = nullptr, AssetSource* assets = nullptr,
+                     gpu::BulkPool* pool = nullptr, const Sources& sources = {},
                      text::Fonts* fonts = nullptr);
 
 // The same for a request that is parsed already.
 Decoded DecodeUpdate(const v1::ApplyUpdateRequest& request, const Limits& limits,
-                     gpu::BulkPool* pool = nullptr, AssetSource* assets = nullptr,
+                     gpu::BulkPool* pool = nullptr, const Sources& sources = {},
                      text::Fonts* fonts = nullptr);
 
 absl::StatusOr<OpenOptions> DecodeOpen(const v1::Open& open, const Limits& limits);

@@ -155,6 +155,7 @@ void Encode(const Limits& in, v1::Limits* out) {
   out->set_max_local_bytes(in.max_local_bytes);
   out->set_max_asset_bytes(in.max_asset_bytes);
   out->set_max_assets_bytes(in.max_assets_bytes);
+  out->set_max_assets(in.max_assets);
 }
 
 void Encode(const EntityKey& in, v1::EntityKey* out) {

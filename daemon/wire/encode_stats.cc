@@ -151,6 +151,7 @@ void Encode(const Stats& in, v1::Stats* out) {
   assets->set_evicted(in.assets.evicted);
   assets->set_damaged(in.assets.damaged);
   assets->set_bytes_in(in.assets.bytes_in);
+  assets->set_trouble(in.assets.trouble);
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

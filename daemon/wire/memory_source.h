@@ -8,6 +8,10 @@
 
 #include "absl/status/statusor.h"
 
+namespace voxeld::daemon {
+class Budget;
+}
+
 namespace voxeld::daemon::wire {
 
 // Bytes that stay there, and as they are, for as long as `mapping` lives.
@@ -42,10 +46,12 @@ class AssetSource {
                                                 uint64_t size) = 0;
 };
 
-// Either may be none.
+// Each may be none.
 struct Sources {
   const MemorySource* memory = nullptr;
   AssetSource* assets = nullptr;
+  // What has what was read of assets, while a request is decoded; none: nothing is charged.
+  Budget* budget = nullptr;
 };
 
 }  // namespace voxeld::daemon::wire

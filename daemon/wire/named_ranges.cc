@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/core/budget.h"
 #include "daemon/wire/context.h"
 #include "voxeld/v1/primitives.pb.h"
 
@@ -87,6 +88,10 @@ MaybeFault ReadRange(const FieldPath& path, const v1::MemoryRange& range,
   return context.ranges->Read(path, range, out);
 }
 
+NamedRanges::~NamedRanges() {
+  if (charged_ > 0) sources_.budget->Release(Budget::Use::kArriving, charged_);
+}
+
 MaybeFault NamedRanges::Read(const FieldPath& path, const v1::MemoryRange& range,
                              MappedRange* out) {
   const bool asset = !range.asset().empty();
@@ -115,6 +120,16 @@ MaybeFault NamedRanges::Read(const FieldPath& path, const v1::MemoryRange& range
     return Fault{FieldPath(path, "asset").ToString(), Reason::kUnimplemented,
                  "is set, and this server keeps no assets (max_assets_bytes is 0); send the bytes "
                  "themselves"};
+  }
+  if (asset && sources_.budget != nullptr) {
+    if (!sources_.budget->Charge(Budget::Use::kArriving, range.size())) {
+      return Fault{FieldPath(path, "size").ToString(), Reason::kQuotaExceeded,
+                   absl::StrCat("is ", range.size(), ", beside ", sources_.budget->used_bytes(),
+                                " bytes that are held for all clients; max_memory_bytes allows ",
+                                sources_.budget->limit_bytes(),
+                                ": try again when others have taken something away")};
+    }
+    charged_ += range.size();
   }
   absl::StatusOr<MappedRange> found =
       asset ? sources_.assets->FindAsset(range.asset(), range.offset(), range.size())

@@ -22,6 +22,7 @@ class NamedRanges {
   // `sources` outlive it.
   NamedRanges(const Sources& sources, const Limits& limits)
       : sources_(sources), limit_(limits.max_uncommitted_bytes) {}
+  ~NamedRanges();
   NamedRanges(const NamedRanges&) = delete;
   NamedRanges& operator=(const NamedRanges&) = delete;
 
@@ -34,6 +35,7 @@ class NamedRanges {
   const Sources& sources_;
   const uint64_t limit_;
   uint64_t bytes_read_ = 0;
+  uint64_t charged_ = 0;  // of the budget, until the request is decoded
 };
 
 // The same, by what the decoder is given.

@@ -21,16 +21,18 @@ step "a Debian with nothing else"
 mkdir -p "$root"
 root=$(realpath "$root")
 debootstrap --variant=minbase --include=ca-certificates bookworm "$root" >"$root.log" || fail "debootstrap: $(tail -5 "$root.log")"
+# Its process is the one that is started, as it is in a subshell: `in_root … &`.
+start_in_root() { exec chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 "$@"; }
 in_root() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
-mount --bind /proc "$root/proc"
-mount --bind /dev "$root/dev"
 daemons=()
 finish() {
   for pid in "${daemons[@]}"; do kill "$pid" 2>/dev/null || true; done
   wait || true
-  umount "$root/dev" "$root/proc"
+  umount "$root/dev" "$root/proc" 2>/dev/null || true
 }
 trap finish EXIT
+mount --bind /proc "$root/proc"
+mount --bind /dev "$root/dev"
 
 step "install"
 cp "$package" "$root/tmp/voxeld.deb"
@@ -60,7 +62,7 @@ in_root voxeld --check-config | grep -E '^(listen|grants|tls_certificate|http) '
 
 step "the daemon, as its unit starts it"
 install -d -o "$(in_root id -u voxeld)" -g "$(in_root id -g voxeld)" -m 0750 "$root/run/voxeld" "$root/var/lib/voxeld"
-in_root setpriv --reuid voxeld --regid voxeld --init-groups --no-new-privs \
+start_in_root setpriv --reuid voxeld --regid voxeld --init-groups --no-new-privs \
   voxeld --state-dir /var/lib/voxeld >"$root.voxeld.log" 2>&1 &
 daemons+=($!)
 for _ in $(seq 300); do grep -q ' ready ' "$root.voxeld.log" && break; sleep 0.1; done
@@ -79,7 +81,7 @@ block "Watching it" 1 >"$root/etc/prometheus/prometheus.yml"
 sed -i '1i global:\n  scrape_interval: 1s' "$root/etc/prometheus/prometheus.yml"
 in_root promtool check config /etc/prometheus/prometheus.yml | sed 's/^/   /'
 curl -sf http://127.0.0.1:8088/metrics | in_root promtool check metrics && echo "   promtool check metrics: nothing to say"
-in_root prometheus --config.file=/etc/prometheus/prometheus.yml --storage.tsdb.path=/tmp/prometheus \
+start_in_root prometheus --config.file=/etc/prometheus/prometheus.yml --storage.tsdb.path=/tmp/prometheus \
   --web.listen-address=127.0.0.1:9099 >"$root.prometheus.log" 2>&1 &
 daemons+=($!)
 ask() { curl -sf --get http://127.0.0.1:9099/api/v1/query --data-urlencode "query=$1"; }

@@ -98,8 +98,13 @@ class Service(unittest.TestCase):
                              [(hashlib.sha256(b"small").hexdigest(), 5, True)], "the older one went, as there is less room")
             text = voxelctl("--server", self.socket, "assets").stdout
             self.assertRegex(text, r"(?m)^[0-9a-f]{64} +5 B +whole")
-            refused = voxelctl("--server", self.socket, "assets", str(big))
-            self.assertEqual(refused.returncode, 0, refused.stderr)
+            again = voxelctl("--server", self.socket, "assets", str(big))
+            self.assertEqual(again.returncode, 0, again.stderr)
+            empty = self.folder / "empty.raw"
+            empty.touch()
+            refused = voxelctl("--server", self.socket, "assets", str(empty))
+            self.assertEqual(refused.returncode, 1)
+            self.assertIn("an asset has 1 byte at least", refused.stderr)
 
     def test_what_runs_is_configured_anew(self) -> None:
         config = self.folder / "voxeld.toml"

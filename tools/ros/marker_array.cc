@@ -269,7 +269,7 @@ std::string WhatIsWrong(const Marker& marker) {
       points >= markers::kMostPieces) {
     return absl::StrCat("has ", points, " points; fewer than ", markers::kMostPieces, " are taken");
   }
-  if (marker.lifetime.sec < 0) {
+  if (marker.lifetime.sec < 0 || marker.lifetime.nsec < 0) {
     return absl::StrCat("has a lifetime of ", marker.lifetime.sec, " s");
   }
   if (!voxelctl::IsUtf8(View(marker.text)) || !voxelctl::IsUtf8(View(marker.mesh_resource))) {
@@ -353,7 +353,7 @@ void PendingMarkers::Put(foxglove::SceneEntity entity) {
   const size_t bytes = entity.SpaceUsedLong();
   if (pieces_ + pieces > markers::kMostPieces || bytes_ + bytes > kMostBytes) {
     left_out_.insert("markers beyond what one update may have");
-    return;
+    return Delete(id);  // what it was is not so any more
   }
   pieces_ += pieces;
   bytes_ += bytes;

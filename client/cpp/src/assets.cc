@@ -17,13 +17,14 @@
 namespace voxeld::client {
 namespace {
 
-// Small enough for progress, large enough to cost nothing, and for every server's max_message_bytes.
-constexpr size_t kPieceBytes = 1u << 20;
-
+// Small enough for progress over slow links, large enough to cost nothing.
+constexpr size_t kPieceBytes = 256u << 10;
 constexpr int kKeepaliveMs = 20'000;  // a dead connection is noticed
 
-using Clock = std::chrono::system_clock;
+using Clock = std::chrono::steady_clock;
 
+// One question waits no longer, so that whoever wants to stop is heard.
+constexpr std::chrono::milliseconds kAskTime(1000);
 // Between two attempts.
 constexpr std::chrono::milliseconds kPause(100);
 
@@ -32,7 +33,8 @@ absl::Status FromGrpc(const grpc::Status& status) {
 }
 
 bool MayGoOn(const absl::Status& status) {
-  return absl::IsUnavailable(status) || absl::IsAborted(status) || absl::IsOutOfRange(status);
+  return absl::IsUnavailable(status) || absl::IsAborted(status) || absl::IsOutOfRange(status) ||
+         absl::IsDeadlineExceeded(status);
 }
 
 // One asset on its way.
@@ -42,38 +44,71 @@ class Upload {
          const UploadOptions& options)
       : stub_(stub), bytes_(bytes), asset_(asset), options_(options) {}
 
+  // Until it is there, or has not moved for the patience.
+  absl::Status Run() {
+    uint64_t stored = 0;
+    bool anew = false;  // what was there is wrong
+    absl::Status last = absl::UnavailableError("the server does not answer");
+    Clock::time_point moved = Clock::now();
+    for (;; std::this_thread::sleep_for(kPause)) {
+      const absl::StatusOr<v1::ListAssetsResponse> there = Ask();
+      if (there.ok() && there->assets_size() == 1) {
+        if (there->assets(0).complete()) return absl::OkStatus();
+        if (there->assets(0).stored() > stored) moved = Clock::now();
+        stored = there->assets(0).stored();
+        const uint64_t from = anew || stored >= bytes_.size() ? 0 : stored;
+        last = Send(
+            from, std::max<uint64_t>(1, std::min<uint64_t>(kPieceBytes, there->max_piece_bytes())));
+        if (last.ok()) return last;
+        // A part that somebody else began with other bytes: once more, all of it.
+        if (absl::IsDataLoss(last) && from > 0) {
+          anew = true;
+          continue;
+        }
+      } else if (!there.ok()) {
+        last = there.status();
+      }
+      if (!MayGoOn(last)) return last;
+      if (Clock::now() - moved >= options_.patience) return last;
+      if (!Told(stored)) return absl::CancelledError("the upload was stopped; what came stays");
+    }
+  }
+
+ private:
+  bool Told(uint64_t stored) const {
+    return !options_.progress || options_.progress(stored, bytes_.size());
+  }
+
   // How much is there.
-  absl::StatusOr<v1::AssetInfo> Ask(Clock::time_point until) {
+  absl::StatusOr<v1::ListAssetsResponse> Ask() {
     grpc::ClientContext context;
     context.set_wait_for_ready(true);
-    context.set_deadline(until);
+    context.set_deadline(std::chrono::system_clock::now() + kAskTime);
     v1::ListAssetsRequest request;
     request.add_sha256(asset_.sha256);
     v1::ListAssetsResponse response;
     const absl::Status status = FromGrpc(stub_.ListAssets(&context, request, &response));
     if (!status.ok()) return status;
-    if (response.assets_size() != 1) return absl::InternalError("the server told of no asset");
-    return response.assets(0);
+    return response;
   }
 
   // From there to the end, in one call.
-  absl::Status Send(uint64_t from) {
+  absl::Status Send(uint64_t from, uint64_t piece_bytes) {
     grpc::ClientContext context;
-    context.set_wait_for_ready(true);
     v1::UploadAssetResponse response;
     const auto call = stub_.UploadAsset(&context, &response);
     bool stopped = false;
-    for (uint64_t at = from; at < bytes_.size() && !stopped; at += kPieceBytes) {
+    for (uint64_t at = from; at < bytes_.size() && !stopped; at += piece_bytes) {
       v1::UploadAssetRequest request;
       if (at == from) {
         request.set_sha256(asset_.sha256);
         request.set_size(bytes_.size());
       }
       request.set_offset(at);
-      const std::string_view piece = bytes_.substr(at, kPieceBytes);
+      const std::string_view piece = bytes_.substr(at, piece_bytes);
       request.set_data(piece.data(), piece.size());
       if (!call->Write(request)) break;
-      stopped = options_.progress && !options_.progress(at + piece.size(), bytes_.size());
+      stopped = !Told(at + piece.size());
     }
     if (stopped) context.TryCancel();
     call->WritesDone();
@@ -81,7 +116,6 @@ class Upload {
     return stopped ? absl::CancelledError("the upload was stopped; what came stays") : status;
   }
 
- private:
   v1::SceneService::Stub& stub_;
   const std::string_view bytes_;
   const Asset& asset_;
@@ -108,22 +142,8 @@ absl::StatusOr<Asset> UploadAsset(std::string_view bytes, const UploadOptions& o
   if (!channel.ok()) return channel.status();
   const auto stub = v1::SceneService::NewStub(*channel);
   const Asset asset = AssetOf(bytes);
-  Upload upload(*stub, bytes, asset, options);
-
-  uint64_t before = 0;
-  auto until = Clock::now() + options.patience;
-  for (;;) {
-    const absl::StatusOr<v1::AssetInfo> there = upload.Ask(until);
-    if (!there.ok()) return there.status();
-    if (there->complete()) return asset;
-    if (there->stored() > before) until = Clock::now() + options.patience;  // it moves
-    before = there->stored();
-    const uint64_t from = before < bytes.size() ? before : 0;
-    const absl::Status sent = upload.Send(from);
-    if (sent.ok()) return asset;
-    if (!MayGoOn(sent) || Clock::now() >= until) return sent;
-    std::this_thread::sleep_for(kPause);
-  }
+  if (absl::Status status = Upload(*stub, bytes, asset, options).Run(); !status.ok()) return status;
+  return asset;
 }
 
 }  // namespace voxeld::client

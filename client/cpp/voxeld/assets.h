@@ -24,11 +24,13 @@ namespace voxeld::client {
 struct UploadOptions {
   std::string address;                     // empty: DefaultAddress()
   std::optional<Credentials> credentials;  // nothing: DefaultCredentials()
-  // How long the server may be away, or busy with another upload of the same, before it is given up.
+  // How long the server may be away, or busy with another upload of the same, without a byte more being
+  // there, before it is given up. A server that is there and takes nothing is waited for.
   std::chrono::nanoseconds patience = std::chrono::seconds(15);
-  // Called after each piece, in the caller's thread: bytes that are there. False ends the upload
+  // Called after each piece, and now and then while there is none, in the caller's thread: bytes that have
+  // been sent. False ends the upload
   // (Cancelled); what came stays there, and the next upload goes on from it.
-  std::function<bool(uint64_t stored, uint64_t size)> progress;
+  std::function<bool(uint64_t sent, uint64_t size)> progress;
 };
 
 // The asset of those bytes; nothing is sent.

@@ -47,7 +47,7 @@ class Array {
   Array(Asset asset) : asset_(std::move(asset)) {}  // NOLINT: implicit
 
   size_t size() const { return asset_.has_value() ? asset_->size / sizeof(T) : view_.size(); }
-  bool empty() const { return size() == 0; }
+  bool empty() const { return asset_.has_value() ? asset_->size == 0 : view_.empty(); }
   std::span<const T> view() const { return view_; }  // of an asset nothing
   // Null for a view.
   const std::shared_ptr<const std::vector<T>>& owner() const { return owner_; }

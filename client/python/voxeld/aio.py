@@ -74,9 +74,10 @@ class Connection(BaseConnection):
     async def layers(self, owner: int = 0, timeout: Optional[float] = 5.0) -> list[scene_pb2.LayerInfo]:
         return await asyncio.to_thread(self._queries.layers, owner, timeout)
 
-    async def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None) -> Asset:
+    async def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None, *,
+                     patience: float = 15.0) -> Asset:
         """As Connection.upload(); `progress` is called in another thread."""
-        return await asyncio.to_thread(self._queries.upload, content, progress)
+        return await asyncio.to_thread(self._queries.upload, content, progress, patience)
 
     async def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
                           timeout: Optional[float] = None) -> AsyncIterator[ChangeSet]:

@@ -58,10 +58,11 @@ class Connection(BaseConnection):
     def layers(self, owner: int = 0, timeout: Optional[float] = 5.0) -> list[scene_pb2.LayerInfo]:
         return self._queries.layers(owner, timeout)
 
-    def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None) -> Asset:
+    def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None, *, patience: float = 15.0) -> Asset:
         """Brings a file (its path or its bytes) or an array of samples to the server, unless it has that already; shapes name it
-        from then on. What breaks off goes on. `progress(sent, size)` after each piece."""
-        return self._queries.upload(content, progress)
+        from then on. What breaks off goes on, unless nothing more is there after `patience` seconds. `progress(sent, size)` after
+        each piece."""
+        return self._queries.upload(content, progress, patience)
 
     def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
                     timeout: Optional[float] = None) -> Iterator[ChangeSet]:

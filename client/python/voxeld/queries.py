@@ -14,7 +14,8 @@ from .errors import ConnectionLost, VoxelError
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
 
-_PIECE_BYTES = 1 << 20
+_PIECE_BYTES = 256 << 10
+_GOES_ON = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.ABORTED, grpc.StatusCode.OUT_OF_RANGE, grpc.StatusCode.DEADLINE_EXCEEDED)
 _DISPLAYS = "/voxeld.v1.DisplayService/"
 _SCENE = "/voxeld.v1.SceneService/"
 
@@ -114,30 +115,38 @@ class Queries:
 
     def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None, patience: float = 15.0) -> Asset:
         data, asset = pack(content)
-        send = self._usable().stream_unary(_SCENE + "UploadAsset", scene_pb2.UploadAssetRequest.SerializeToString,
-                                           scene_pb2.UploadAssetResponse.FromString)
-        stored, until = 0, time.monotonic() + patience
+        call = self._usable()
+        ask = call.unary_unary(_SCENE + "ListAssets", scene_pb2.ListAssetsRequest.SerializeToString,
+                               scene_pb2.ListAssetsResponse.FromString)
+        send = call.stream_unary(_SCENE + "UploadAsset", scene_pb2.UploadAssetRequest.SerializeToString,
+                                 scene_pb2.UploadAssetResponse.FromString)
+        stored, anew, moved = 0, False, time.monotonic()
         while True:
-            there = self.assets([asset.sha256], patience)[0]
-            if there.complete:
-                return asset
-            if there.stored > stored:
-                until = time.monotonic() + patience
-            stored = there.stored
+            start = 0
             try:
-                send(_upload_pieces(data, asset, stored % len(data), progress), metadata=self._metadata, wait_for_ready=True)
+                answer: scene_pb2.ListAssetsResponse = ask(scene_pb2.ListAssetsRequest(sha256=[asset.sha256]), timeout=patience,
+                                                           metadata=self._metadata, wait_for_ready=True)
+                there = answer.assets[0]
+                if there.complete:
+                    return asset
+                if there.stored > stored:
+                    moved = time.monotonic()
+                stored = there.stored
+                start = 0 if anew or stored >= len(data) else stored
+                send(_upload_pieces(data, asset, start, min(_PIECE_BYTES, answer.max_piece_bytes), progress), metadata=self._metadata)
                 return asset
             except grpc.RpcError as error:
-                goes_on = error.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.ABORTED, grpc.StatusCode.OUT_OF_RANGE)
-                if not goes_on or time.monotonic() >= until:
+                if error.code() == grpc.StatusCode.DATA_LOSS and start > 0:
+                    anew = True  # a part that somebody began with other bytes
+                elif error.code() not in _GOES_ON or time.monotonic() - moved >= patience:
                     raise _failed(error) from None
             time.sleep(0.1)
 
 
-def _upload_pieces(data: bytes, asset: Asset, start: int,
+def _upload_pieces(data: bytes, asset: Asset, start: int, size: int,
                    progress: Optional[Callable[[int, int], None]]) -> Iterator[scene_pb2.UploadAssetRequest]:
-    for at in range(start, len(data), _PIECE_BYTES):
-        piece = data[at:at + _PIECE_BYTES]
+    for at in range(start, len(data), size):
+        piece = data[at:at + size]
         first = at == start
         yield scene_pb2.UploadAssetRequest(sha256=asset.sha256 if first else b"", size=len(data) if first else 0, offset=at, data=piece)
         if progress is not None:

@@ -7,9 +7,11 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -44,12 +46,14 @@ class AssetStoreTest : public ::testing::TestWithParam<bool> {
   ~AssetStoreTest() override { std::filesystem::remove_all(folder_); }
 
   // Again, as after an end.
-  void Open(AssetLimits limits = {.max_asset_bytes = 10, .max_bytes = 12, .max_uploads = 3}) {
+  void Open(AssetLimits limits = {
+                .max_asset_bytes = 10, .max_bytes = 4 * kSmall, .max_uploads = 3}) {
     store_.reset();
-    auto opened = AssetStore::Open(on_disk() ? folder_ : "", limits, clock_, nullptr);
-    ASSERT_TRUE(opened.ok()) << opened.status();
-    store_ = *std::move(opened);
+    store_ = AssetStore::Open(on_disk() ? folder_ : "", limits, clock_, nullptr);
+    EXPECT_EQ(store_->figures().trouble, "");
   }
+  // Of the budget, what few bytes take.
+  static constexpr uint64_t kSmall = AssetStore::kLeastCost;
   bool on_disk() const { return GetParam(); }
 
   void Upload(const Content& content) {
@@ -96,7 +100,7 @@ TEST_P(AssetStoreTest, WhatCameIsFoundByItsHash) {
   EXPECT_TRUE(absl::IsOutOfRange(store_->FindAsset(kAbc.digest(), ~uint64_t{0}, 2).status()));
   EXPECT_TRUE(absl::IsAlreadyExists(store_->Begin(kAbc.digest(), 3, 0).status()));
   EXPECT_EQ(store_->figures().count, 1u);
-  EXPECT_EQ(store_->figures().bytes, 3u);
+  EXPECT_EQ(store_->figures().bytes, kSmall);
   EXPECT_EQ(store_->figures().bytes_in, 3u);
 }
 
@@ -114,6 +118,7 @@ TEST_P(AssetStoreTest, AnUploadGoesOnWhereItBrokeOff) {
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_TRUE(absl::IsOutOfRange(store_->Append(*second, 0, "lo")));
   EXPECT_TRUE(absl::IsOutOfRange(store_->Append(*second, 3, "lo!")));
+  EXPECT_TRUE(absl::IsInvalidArgument(store_->Append(*second, 3, "")));
   ASSERT_TRUE(store_->Append(*second, 3, "lo").ok());
   ASSERT_TRUE(store_->Finish(*second).ok());
   EXPECT_EQ(Find(kHello), "hello");
@@ -141,12 +146,13 @@ TEST_P(AssetStoreTest, WhatHasAnotherHashIsNotKept) {
 }
 
 TEST_P(AssetStoreTest, WhatWasUsedLeastRecentlyGoes) {
+  Open({.max_asset_bytes = 10, .max_bytes = 2 * kSmall});
   Upload(kAbc);
   Upload(kHello);
   EXPECT_EQ(Find(kAbc), "abc");  // so hello is the older one
   const auto kept = store_->FindAsset(kHello.digest(), 0, 5);
   Find(kAbc);
-  Upload(kWorld);  // 3 + 5 + 5 is beyond 12
+  Upload(kWorld);  // there is room for two
   EXPECT_THAT(Find(kHello), HasSubstr("not here"));
   EXPECT_EQ(Find(kAbc), "abc");
   EXPECT_EQ(Find(kWorld), "world");
@@ -158,22 +164,100 @@ TEST_P(AssetStoreTest, WhatWasUsedLeastRecentlyGoes) {
 }
 
 TEST_P(AssetStoreTest, UploadsUnderWayAreNotPushedOut) {
-  const auto slow = store_->Begin(kHello.digest(), 10, 0);
+  Open({.max_asset_bytes = 4 * kSmall, .max_bytes = 4 * kSmall});
+  Upload(kAbc);
+  const auto slow = store_->Begin(kHello.digest(), 2 * kSmall, 0);
   ASSERT_TRUE(slow.ok());
-  const auto large = store_->Begin(kWorld.digest(), 5, 0);
+  const auto large = store_->Begin(kWorld.digest(), 3 * kSmall, 0);
   EXPECT_TRUE(absl::IsResourceExhausted(large.status()));
   EXPECT_THAT(std::string(large.status().message()),
-              HasSubstr("5 bytes more do not fit beside 10 of uploads under way"));
+              HasSubstr("12288 bytes more do not fit beside 8192 of 1 uploads under way"));
+  EXPECT_EQ(Find(kAbc), "abc") << "what is refused takes nobody's place";
+  clock_.Advance(20 * sync::kSecond);
+  store_->Heard(*slow);  // something has come, and waits
+  clock_.Advance(20 * sync::kSecond);
+  EXPECT_FALSE(store_->Begin(kWorld.digest(), 3 * kSmall, 0).ok());
   clock_.Advance(10 * sync::kSecond);  // and brought nothing
-  EXPECT_TRUE(store_->Begin(kWorld.digest(), 5, 0).ok());
+  EXPECT_TRUE(store_->Begin(kWorld.digest(), 3 * kSmall, 0).ok());
   EXPECT_TRUE(absl::IsAborted(store_->Append(*slow, 0, "x")));
+}
+
+TEST_P(AssetStoreTest, WhatWasPromisedAndDoesNotComeIsNoLongerKept) {
+  Open({.max_asset_bytes = 4 * kSmall, .max_bytes = 4 * kSmall});
+  const auto nothing = store_->Begin(kHello.digest(), 4 * kSmall, 0);
+  ASSERT_TRUE(nothing.ok());
+  EXPECT_EQ(store_->figures().bytes, 4 * kSmall);
+  store_->Abandon(*nothing);
+  EXPECT_EQ(store_->figures().bytes, 0u);
+  EXPECT_THAT(store_->ListAll(), IsEmpty());
+  const auto something = store_->Begin(kHello.digest(), 4 * kSmall, 0);
+  ASSERT_TRUE(store_->Append(*something, 0, std::string(kSmall + 1, 'x')).ok());
+  store_->Abandon(*something);
+  EXPECT_EQ(store_->figures().bytes, kSmall + 1) << "what came alone";
+  Upload(kAbc);
+  EXPECT_EQ(store_->ListAll().size(), 2u);
+}
+
+TEST_P(AssetStoreTest, TheirNumberHasALimit) {
+  Open({.max_asset_bytes = 10, .max_bytes = 100 * kSmall, .max_assets = 2});
+  Upload(kAbc);
+  Upload(kHello);
+  Upload(kWorld);
+  EXPECT_THAT(Find(kAbc), HasSubstr("not here"));
+  EXPECT_EQ(store_->figures().count, 2u);
+}
+
+TEST_P(AssetStoreTest, APartOfAnotherSizeIsBegunAnew) {
+  const auto first = store_->Begin(kHello.digest(), 9, 0);
+  ASSERT_TRUE(store_->Append(*first, 0, "hello, x").ok());
+  store_->Abandon(*first);
+  const auto beyond = store_->Begin(kHello.digest(), 5, 8);
+  EXPECT_TRUE(absl::IsOutOfRange(beyond.status()));
+  EXPECT_THAT(std::string(beyond.status().message()),
+              HasSubstr("8 bytes are here for a size of 5; begin anew at 0"));
+  Upload(kHello);
+  EXPECT_EQ(Find(kHello), "hello");
+}
+
+// Named and pushed out at once, by several threads.
+TEST_P(AssetStoreTest, MayBeNamedWhileOthersGo) {
+  Open({.max_asset_bytes = 10, .max_bytes = 2 * kSmall});
+  std::atomic<bool> stop = false;
+  std::vector<std::thread> readers;
+  for (int i = 0; i < 3; ++i) {
+    readers.emplace_back([&] {
+      while (!stop) {
+        for (const Content& content : {kAbc, kHello, kWorld}) {
+          const auto found = store_->FindAsset(content.digest(), 1, 2);
+          if (found.ok()) {
+            EXPECT_EQ(found->bytes, std::string_view(content.bytes).substr(1, 2));
+          } else {
+            EXPECT_TRUE(absl::IsNotFound(found.status())) << found.status();
+          }
+          store_->figures();
+        }
+      }
+    });
+  }
+  for (int i = 0; i < 100; ++i) {
+    for (const Content& content : {kAbc, kHello, kWorld}) {
+      const std::string_view bytes = content.bytes;
+      const auto upload = store_->Begin(content.digest(), bytes.size(), 0);
+      if (!upload.ok()) continue;  // it is here still
+      EXPECT_TRUE(store_->Append(*upload, 0, bytes).ok());
+      EXPECT_TRUE(store_->Finish(*upload).ok());
+    }
+  }
+  stop = true;
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_GE(store_->figures().evicted, 100u);
 }
 
 TEST_P(AssetStoreTest, OneUploadOfAContentAtATime) {
   const auto first = store_->Begin(kHello.digest(), 5, 0);
   const auto second = store_->Begin(kHello.digest(), 5, 0);
   EXPECT_TRUE(absl::IsAborted(second.status()));
-  clock_.Advance(10 * sync::kSecond - 1);
+  clock_.Advance(30 * sync::kSecond - 1);
   EXPECT_TRUE(absl::IsAborted(store_->Begin(kHello.digest(), 5, 0).status()));
   clock_.Advance(1);
   EXPECT_TRUE(store_->Begin(kHello.digest(), 5, 0).ok());
@@ -188,7 +272,7 @@ TEST_P(AssetStoreTest, SoManyAtOnceAndNoMore) {
     ASSERT_TRUE(store_->Begin(digest, 1, 0).ok());
   }
   EXPECT_TRUE(absl::IsResourceExhausted(store_->Begin(kAbc.digest(), 3, 0).status()));
-  clock_.Advance(10 * sync::kSecond);
+  clock_.Advance(30 * sync::kSecond);
   EXPECT_TRUE(store_->Begin(kAbc.digest(), 3, 0).ok());
 }
 
@@ -227,7 +311,7 @@ TEST_P(AssetFolderTest, WhatWasUsedIsRememberedOverTheEnd) {
   using namespace std::chrono_literals;  // as if abc had been used a minute later
   const auto at = std::filesystem::last_write_time(folder_ + "/" + kHello.sha256);
   std::filesystem::last_write_time(folder_ + "/" + kAbc.sha256, at + 1min);
-  Open({.max_asset_bytes = 10, .max_bytes = 7, .max_uploads = 3});
+  Open({.max_asset_bytes = 10, .max_bytes = kSmall});
   EXPECT_THAT(Files(), ElementsAre(kAbc.sha256)) << "less room than there was";
   EXPECT_EQ(store_->figures().evicted, 1u);
 }
@@ -244,10 +328,33 @@ TEST_P(AssetFolderTest, WhatIsDamagedIsNeverGivenOut) {
   EXPECT_EQ(Find(kAbc), "abc");
 }
 
-TEST_P(AssetFolderTest, ShorterThanItWasIsAnError) {
+TEST_P(AssetFolderTest, WhatIsCutWhileItIsUsedCanBeBroughtAnew) {
   Upload(kAbc);
   std::filesystem::resize_file(folder_ + "/" + kAbc.sha256, 1);
-  EXPECT_THAT(Find(kAbc), HasSubstr("shorter than it was"));
+  EXPECT_THAT(Find(kAbc), HasSubstr("damaged on the disk"));
+  EXPECT_EQ(store_->figures().damaged, 1u);
+  Upload(kAbc);
+  EXPECT_EQ(Find(kAbc), "abc");
+}
+
+TEST_P(AssetFolderTest, WhatIsSaidToBeHereHasBeenLookedAt) {
+  Upload(kAbc);
+  std::ofstream(folder_ + "/" + kAbc.sha256) << "abd";
+  Open();
+  EXPECT_TRUE(store_->Begin(kAbc.digest(), 3, 0).ok()) << "not ALREADY_EXISTS";
+}
+
+TEST_P(AssetFolderTest, AnUploadThatWasKilledGoesOn) {
+  const auto upload = store_->Begin(kHello.digest(), 5, 0);
+  ASSERT_TRUE(store_->Append(*upload, 0, "hel").ok());
+  // As SIGKILL leaves it: a part whose owner said nothing more, and one that has only just begun.
+  std::filesystem::copy_file(folder_ + "/" + kHello.sha256 + ".part", folder_ + "/kept");
+  store_.reset();
+  std::filesystem::rename(folder_ + "/kept", folder_ + "/" + kHello.sha256 + ".part");
+  std::ofstream(folder_ + "/" + kWorld.sha256 + ".part");
+  Open();
+  EXPECT_EQ(store_->List(std::vector{kHello.digest()}).front().stored, 3u);
+  EXPECT_THAT(Files(), ElementsAre(std::string(kHello.sha256) + ".part")) << "nothing in it: gone";
 }
 
 TEST_P(AssetFolderTest, ADiskThatIsFullIsSaidAndWhatCameStays) {
@@ -267,11 +374,29 @@ TEST_P(AssetFolderTest, ADiskThatIsFullIsSaidAndWhatCameStays) {
   EXPECT_TRUE(store_->Begin(kHello.digest(), 5, 3).ok()) << "there is room again";
 }
 
-TEST(AssetStore, AFolderThatCannotBeUsedIsAnError) {
+TEST_P(AssetFolderTest, AFullDiskAtTheBeginningTakesNothing) {
+  Upload(kAbc);
+  rlimit before;
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;  // no descriptor is to be had
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  const auto begun = store_->Begin(kHello.digest(), 5, 0);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_TRUE(absl::IsResourceExhausted(begun.status())) << begun.status();
+  EXPECT_EQ(store_->figures().bytes, kSmall);
+  EXPECT_EQ(Find(kAbc), "abc");
+}
+
+TEST(AssetStore, AFolderThatCannotBeUsedIsToldAndMemoryIsUsed) {
   sync::FakeClock clock;
   const auto store = AssetStore::Open("/proc/voxeld-assets", {}, clock, nullptr);
-  EXPECT_TRUE(absl::IsUnavailable(store.status()));
-  EXPECT_THAT(std::string(store.status().message()), HasSubstr("/proc/voxeld-assets"));
+  EXPECT_THAT(store->figures().trouble, HasSubstr("/proc/voxeld-assets"));
+  const auto upload = store->Begin(kAbc.digest(), 3, 0);
+  ASSERT_TRUE(upload.ok());
+  ASSERT_TRUE(store->Append(*upload, 0, "abc").ok());
+  ASSERT_TRUE(store->Finish(*upload).ok());
+  EXPECT_EQ(store->FindAsset(kAbc.digest(), 0, 3)->bytes, "abc");
 }
 
 }  // namespace

@@ -20,10 +20,8 @@ const std::string kPointHash =
 class Assets : public ::testing::Test {
  protected:
   void Start(bool keeps = true) {
-    auto opened =
-        assets::AssetStore::Open("", {.max_asset_bytes = 1000, .max_bytes = 2000}, clock_, nullptr);
-    ASSERT_TRUE(opened.ok());
-    store_ = *std::move(opened);
+    store_ = assets::AssetStore::Open("", {.max_asset_bytes = 1000, .max_bytes = 100'000}, clock_,
+                                      nullptr);
     daemon_ = std::make_unique<Daemon>(DaemonOptions{.assets = keeps ? store_.get() : nullptr});
   }
 
@@ -98,7 +96,8 @@ TEST_F(Assets, AreBroughtInPiecesAndDrawnByManyRequests) {
   const v1::ListAssetsResponse all = List();
   ASSERT_EQ(all.assets_size(), 1);
   EXPECT_TRUE(all.assets(0).complete());
-  EXPECT_EQ(all.used_bytes(), 12u);
+  EXPECT_EQ(all.used_bytes(), 4096u);
+  EXPECT_GT(all.max_piece_bytes(), 100'000u);
 
   Client client(daemon_->scene());
   const v1::Opened opened = client.Open();
@@ -184,6 +183,88 @@ TEST_F(Assets, AnUploadUnderWayEndsWithTheServer) {
   while (List(kPointHash).assets(0).stored() < 4) continue;
   daemon_->server().Shutdown(5 * sync::kSecond);
   EXPECT_EQ(call->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST_F(Assets, TwoAtOnceOfOneContent) {
+  Start();
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::UploadAssetResponse response;
+  const auto call = daemon_->scene().UploadAsset(&context, &response);
+  v1::UploadAssetRequest request;
+  request.set_sha256(kPointHash);
+  request.set_size(12);
+  request.set_data(kPoint.substr(0, 4));
+  ASSERT_TRUE(call->Write(request));
+  while (List(kPointHash).assets(0).stored() < 4) continue;
+  const grpc::Status second = Upload(kPointHash, 12, {{kPoint, 0}});
+  EXPECT_EQ(second.error_code(), grpc::StatusCode::ABORTED);
+  EXPECT_THAT(second.error_message(), HasSubstr("another upload"));
+  request.set_offset(4);
+  request.set_data(kPoint.substr(4));
+  ASSERT_TRUE(call->Write(request));
+  call->WritesDone();
+  EXPECT_TRUE(call->Finish().ok());
+}
+
+TEST_F(Assets, OneCallBringsOne) {
+  Start();
+  grpc::ClientContext context;
+  SetDeadline(context);
+  const auto call = daemon_->scene().UploadAsset(&context, &response_);
+  v1::UploadAssetRequest request;
+  request.set_sha256(kPointHash);
+  request.set_size(12);
+  request.set_data(kPoint.substr(0, 4));
+  ASSERT_TRUE(call->Write(request));
+  request.set_sha256(std::string(32, 'x'));
+  request.set_offset(4);
+  ASSERT_TRUE(call->Write(request));
+  const grpc::Status status = call->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("one call brings one asset"));
+}
+
+TEST_F(Assets, ManyCallsAreNotHeld) {
+  Start();
+  struct Open {
+    grpc::ClientContext context;
+    v1::UploadAssetResponse response;
+    std::unique_ptr<grpc::ClientWriter<v1::UploadAssetRequest>> call;
+  };
+  std::vector<std::unique_ptr<Open>> calls;
+  for (int i = 0; i < 40; ++i) {
+    calls.push_back(std::make_unique<Open>());
+    Open& open = *calls.back();
+    SetDeadline(open.context);
+    open.call = daemon_->scene().UploadAsset(&open.context, &open.response);
+  }
+  int refused = 0;
+  for (const auto& open : calls) {
+    open->call->WritesDone();
+    const grpc::Status status = open->call->Finish();
+    if (status.error_code() != grpc::StatusCode::RESOURCE_EXHAUSTED) continue;
+    EXPECT_THAT(status.error_message(), HasSubstr("32 uploads are open"));
+    ++refused;
+  }
+  EXPECT_EQ(refused, 8);
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint, 0}}).ok()) << "they have ended, and others come in";
+}
+
+TEST_F(Assets, WhatIsAskedForIsLookedAt) {
+  Start();
+  const auto ask = [this](const v1::ListAssetsRequest& request) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    v1::ListAssetsResponse response;
+    return daemon_->scene().ListAssets(&context, request, &response);
+  };
+  v1::ListAssetsRequest request;
+  request.add_sha256("short");
+  EXPECT_THAT(ask(request).error_message(), HasSubstr("sha256 has 5 bytes; give the 32"));
+  request.clear_sha256();
+  for (int i = 0; i < 1001; ++i) request.add_sha256(kPointHash);
+  EXPECT_THAT(ask(request).error_message(), HasSubstr("sha256 has 1001 entries; give 1000"));
 }
 
 }  // namespace

@@ -321,7 +321,7 @@ TEST_F(CurvesTest, AMessageMakesNoMoreThanMayWait) {
     helix.mutable_helix()->set_turns(200);
     *operation->mutable_upsert()->mutable_entity()->mutable_primitive() = helix;
   }
-  const Decoded decoded = DecodeUpdate(request, limits_, nullptr, nullptr, &fonts_);
+  const Decoded decoded = DecodeUpdate(request, limits_, nullptr, {}, &fonts_);
   ASSERT_TRUE(decoded.status.ok());
   EXPECT_EQ(decoded.refused.issues.size(), 13u) << "each takes 154 kB";
   EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kQuotaExceeded);

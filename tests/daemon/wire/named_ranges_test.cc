@@ -386,7 +386,7 @@ TEST(NamedRanges, OfAssetsAreReadAsPayloadsAre) {
 
   v1::ApplyUpdateRequest update;
   *update.add_operations() = request;
-  EXPECT_THAT(DecodeUpdate(update, {}, nullptr, &assets).refused.issues, IsEmpty());
+  EXPECT_THAT(DecodeUpdate(update, {}, nullptr, {nullptr, &assets}).refused.issues, IsEmpty());
 }
 
 TEST(NamedRanges, StandForSamplesHeightsAndColoursToo) {

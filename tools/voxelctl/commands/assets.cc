@@ -1,6 +1,6 @@
 #include <cerrno>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 #include <string>
 
 #include "absl/strings/escaping.h"
@@ -37,13 +37,14 @@ absl::Status List(Connection& connection, Console& console) {
 }
 
 absl::StatusOr<std::string> Read(const std::string& path) {
+  errno = 0;
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  if (!file || !(bytes << file.rdbuf())) {
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file.is_open() || file.bad() || errno != 0) {
     return absl::ErrnoToStatus(errno == 0 ? EIO : errno,
                                absl::StrCat("\"", EscapeForTerminal(path), "\" cannot be read"));
   }
-  return bytes.str();
+  return bytes;
 }
 
 }  // namespace
