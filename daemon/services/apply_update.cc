@@ -94,8 +94,9 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
 
 void ApplyUpdate(ServiceContext& context, const access::Caller& caller,
                  std::span<const std::string_view> slices, UpdateDone done) {
-  wire::Decoded decoded = wire::DecodeUpdate(slices, context.core.limits(), &context.core.bulk(),
-                                             {nullptr, context.assets, context.core.budget().get()}, &context.fonts);
+  wire::Decoded decoded =
+      wire::DecodeUpdate(slices, context.core.limits(), &context.core.bulk(),
+                         {nullptr, context.assets, context.core.budget().get()}, &context.fonts);
   if (!decoded.open.has_value()) return done(decoded.status, v1::ApplyUpdateResponse());
   uint64_t bytes = 0;
   for (const std::string_view slice : slices) bytes += slice.size();

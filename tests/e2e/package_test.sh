@@ -34,6 +34,8 @@ dpkg-deb -c "$deb" | awk '$1 !~ /^d/ { print $1, $2, $6 }' >"$work/contents"
 cat >"$work/expected" <<'EOT'
 -rwxr-xr-x root/root ./usr/bin/voxelctl
 -rwxr-xr-x root/root ./usr/bin/voxeld
+-rw-r--r-- root/root ./usr/lib/systemd/system/voxeld-engine.socket
+-rw-r--r-- root/root ./usr/lib/systemd/system/voxeld-engine@.service
 -rw-r--r-- root/root ./usr/lib/systemd/system/voxeld-playlist.service
 -rw-r--r-- root/root ./usr/lib/systemd/system/voxeld.service
 -rw-r--r-- root/root ./usr/lib/systemd/system/voxeld.socket

@@ -1,7 +1,7 @@
 """Volumes and isosurfaces, as wire bytes."""
 from __future__ import annotations
 
-from typing import Any, Optional, Sequence, Union
+from typing import Any, Optional, Sequence, Union, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,8 @@ _TYPES = {np.dtype(np.uint8): pb.ELEMENT_TYPE_U8, np.dtype(np.uint16): pb.ELEMEN
 
 def _grid(array: Union[npt.ArrayLike, Asset], extent: Extent, filter: str, colors: bool) -> pb.Grid:
     """`array`: (nx, ny, nz), or, of colours, (nx, ny, nz, 4); or an asset of one."""
-    field = array if isinstance(array, Asset) else as_array(array, "array")
+    asset = array if isinstance(array, Asset) else None
+    field: Any = asset if asset is not None else as_array(cast(npt.ArrayLike, array), "array")
     if field.shape is None:
         raise InvalidValue("the asset is no array's; upload the array itself, so that its shape is known")
     if len(field.shape) != (4 if colors else 3) or 0 in field.shape or (colors and field.shape[3] != 4):
@@ -39,7 +40,7 @@ def _grid(array: Union[npt.ArrayLike, Asset], extent: Extent, filter: str, color
             raise InvalidArray(f"extent goes from {first.tolist()} to {last.tolist()}; the first must be less on every axis")
     if colors and field.dtype != np.uint8:
         raise InvalidArray(f"array of colours must be uint8, got {field.dtype}")
-    if not isinstance(field, Asset):
+    if asset is None:
         field = samples(field)
         if field.nbytes > WHOLE_BYTES:
             raise InvalidArray(f"array takes {field.nbytes} bytes, more than the {WHOLE_BYTES} that go at once; give fewer samples, or "
@@ -49,8 +50,8 @@ def _grid(array: Union[npt.ArrayLike, Asset], extent: Extent, filter: str, color
     grid = pb.Grid(corner=vec(first, "extent"), edge_a=vec(edges[0], "extent"), edge_b=vec(edges[1], "extent"),
                    edge_c=vec(edges[2], "extent"), size_a=shape[0], size_b=shape[1], size_c=shape[2], type=element,
                    filter=choice(_FILTERS, filter, "filter"))
-    if isinstance(field, Asset):
-        grid.samples_in.CopyFrom(field.range())
+    if asset is not None:
+        grid.samples_in.CopyFrom(asset.range())
     else:
         grid.samples = x_fastest(field)
     return grid
@@ -59,7 +60,7 @@ def _grid(array: Union[npt.ArrayLike, Asset], extent: Extent, filter: str, color
 def grid(array: Union[npt.ArrayLike, Asset], *, values: Optional[Sequence[float]] = None, colors: Optional[Sequence[Any]] = None,
          cmap: Optional[str] = None, opacities: Optional[Sequence[float]] = None, extent: Extent = None, filter: str = "linear",
          color: Color = None) -> list[wire.Packed]:
-    is_colors = (len(array.shape or ()) if isinstance(array, Asset) else np.ndim(array)) == 4
+    is_colors = (len(array.shape or ()) if isinstance(array, Asset) else np.ndim(cast(npt.ArrayLike, array))) == 4
     shape = pb.Volume(grid=_grid(array, extent, filter, is_colors))
     if values is None:
         if colors is not None or cmap is not None or opacities is not None:

@@ -42,7 +42,7 @@ void ExpectColor(const foxglove::Color& is, double r, double g, double b, double
 std::array<double, 3> Posed(const foxglove::Pose& pose, double x, double y, double z) {
   foxglove::SceneEntity entity;
   *entity.add_cubes()->mutable_pose() = pose;
-  const client::Affine& a = markers::PiecesOf(entity).pieces.at(0).look.transform;
+  const client::Affine a = markers::PiecesOf(entity).pieces.at(0).look.transform;
   const auto row = [&](size_t i) {
     return a.m[i] * x + a.m[i + 1] * y + a.m[i + 2] * z + a.m[i + 3];
   };
