@@ -456,6 +456,7 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
 std::vector<AssetState> AssetStore::List(std::span<const std::string> digests) const {
   sync::MutexLock lock(mutex_);
   std::vector<AssetState> out;
+  out.reserve(digests.size());
   for (const std::string& digest : digests) {
     const auto at = assets_.find(digest);
     out.push_back({digest, 0, false});
@@ -474,6 +475,7 @@ std::vector<AssetState> AssetStore::ListAll() const {
   }
   std::ranges::sort(all, std::greater(), [](const auto& entry) { return entry.first; });
   std::vector<AssetState> out;
+  out.reserve(all.size());
   for (auto& [used, state] : all) out.push_back(std::move(state));
   return out;
 }
