@@ -7,7 +7,9 @@ inline constexpr const char* kAbout =
     "Puts files into the volumetric displays of a voxeld server, and shows how they do.\n"
     "Data goes to standard output, words to standard error; --json makes the data JSON.";
 inline constexpr const char* kPlayAbout =
-    "Puts files up: meshes (.obj .stl .ply .gltf .glb), point clouds (.ply), maps (.geojson "
+    "Puts files up: meshes (.obj .stl .ply .gltf .glb), voxels (.vox), point clouds (.ply .pcd "
+    ".las .xyz "
+    ".txt .asc .pts .csv), maps (.geojson "
     ".topojson .json).\n"
     "The scene is turned upright, centred and made as large as fits. Light is baked into the "
     "colours by the\n"
