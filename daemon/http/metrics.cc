@@ -256,10 +256,11 @@ class Families {
 };
 
 void AddLatency(MetricFamily* family, const Labels& labels, const LatencyStats& latency) {
-  for (const auto& [quantile, ns] :
-       {std::pair("0.5", latency.p50_ns), {"0.99", latency.p99_ns}, {"1", latency.max_ns}}) {
+  // Gauges: of what was just now. A summary's numbers are of all since the start.
+  for (const auto& [stat, ns] :
+       {std::pair("p50", latency.p50_ns), {"p99", latency.p99_ns}, {"max", latency.max_ns}}) {
     Labels all = labels;
-    all.emplace_back("quantile", quantile);
+    all.emplace_back("stat", stat);
     Add(family, all,
         latency.count == 0 ? std::numeric_limits<double>::quiet_NaN()
                            : static_cast<double>(ns) / kNsPerSecond);

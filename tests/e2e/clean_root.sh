@@ -72,7 +72,7 @@ step "a client over TLS, a token over it"
 {
   block "Other machines" 3 | sed 's/display.example/127.0.0.1/'
   echo 'export VOXELD_TLS_NAME=display.example VOXELD_TOKEN_FILE=stage-left.token'
-  echo 'voxelctl draw --keep "sphere radius=0.7 color=orange"; voxelctl entities'
+  echo 'voxelctl draw "sphere radius=0.7 color=orange"; voxelctl entities'
 } >"$root/tmp/client.sh"
 in_root bash -uc 'cd /root/work; . /tmp/client.sh' 2>&1 | sed 's/^/   /'
 

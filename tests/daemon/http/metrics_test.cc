@@ -30,7 +30,7 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   stats.applying = {3, 1'000'000, 2, 3};
   const std::string text = MetricsText(stats);
   EXPECT_THAT(text, HasSubstr("voxeld_memory_bytes{use=\"answers\"} 88\n"));
-  EXPECT_THAT(text, HasSubstr("voxeld_commit_applying_seconds{quantile=\"0.5\"} 0.001\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_commit_applying_seconds{stat=\"p50\"} 0.001\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_info{version=\"1.2\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_uptime_seconds 1.5\n"));
   EXPECT_THAT(text, HasSubstr("# TYPE voxeld_commits_accepted_total counter\n"));
@@ -38,10 +38,9 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   EXPECT_THAT(text, HasSubstr("voxeld_display_bytes_out_total{display=\"one\"} 77\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_bytes_out_total{display=\"two\"} 77\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_commit_to_presented_seconds{display=\"one\","
-                              "quantile=\"0.99\"} 0.25\n"));
+                              "stat=\"p99\"} 0.25\n"));
   // Without a value there is none.
-  EXPECT_THAT(text,
-              HasSubstr("voxeld_display_assemble_seconds{display=\"one\",quantile=\"0.5\"} Nan"));
+  EXPECT_THAT(text, HasSubstr("voxeld_display_assemble_seconds{display=\"one\",stat=\"p50\"} Nan"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"lost\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"showing\"} 0\n"));
 
