@@ -69,9 +69,10 @@ for _ in $(seq 300); do grep -q ' ready ' "$root.voxeld.log" && break; sleep 0.1
 grep ' ready ' "$root.voxeld.log" || fail "not ready: $(cat "$root.voxeld.log")"
 
 step "a client over TLS, a token over it"
+echo "127.0.0.1 display.example" >>"$root/etc/hosts"
 {
-  block "Other machines" 3 | sed 's/display.example/127.0.0.1/'
-  echo 'export VOXELD_TLS_NAME=display.example VOXELD_TOKEN_FILE=stage-left.token'
+  block "Other machines" 3
+  echo 'export VOXELD_TOKEN_FILE=stage-left.token; voxelctl displays'
   echo 'voxelctl draw "sphere radius=0.7 color=orange"; voxelctl entities'
 } >"$root/tmp/client.sh"
 in_root bash -uc 'cd /root/work; . /tmp/client.sh' 2>&1 | sed 's/^/   /'
