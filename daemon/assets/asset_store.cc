@@ -22,7 +22,6 @@ namespace voxeld::daemon::assets {
 namespace {
 
 constexpr absl::string_view kPart = ".part";
-constexpr size_t kDigestBytes = 32;
 
 std::string Hex(std::string_view digest) {
   return absl::BytesToHexString(absl::string_view(digest.data(), digest.size()));
@@ -38,7 +37,8 @@ struct Name {
 std::optional<Name> ReadName(absl::string_view name) {
   const bool part = absl::ConsumeSuffix(&name, kPart);
   const auto is_hex = [](char c) { return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f'); };
-  if (name.size() != 2 * kDigestBytes || !std::ranges::all_of(name, is_hex)) return std::nullopt;
+  if (name.size() != 2 * wire::AssetSource::kDigestBytes || !std::ranges::all_of(name, is_hex))
+    return std::nullopt;
   return Name{absl::HexStringToBytes(name), !part};
 }
 

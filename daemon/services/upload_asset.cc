@@ -17,7 +17,7 @@
 namespace voxeld::daemon::services {
 namespace {
 
-constexpr size_t kDigestBytes = 32;
+constexpr size_t kDigestBytes = wire::AssetSource::kDigestBytes;
 constexpr sync::TimeNs kSilenceLimit = 30 * sync::kSecond;
 constexpr uint64_t kBesideData = 256;  // of a message, at the most
 

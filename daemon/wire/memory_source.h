@@ -2,6 +2,7 @@
 // this; where it comes from (daemon/local, daemon/assets) is not its business.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string_view>
@@ -35,9 +36,11 @@ class MemorySource {
 
 class AssetSource {
  public:
+  static constexpr size_t kDigestBytes = 32;
+
   virtual ~AssetSource() = default;
 
-  // `size` bytes from `offset` of the content whose SHA-256 is `digest`, 32 bytes. It counts as used.
+  // `size` bytes from `offset` of the content whose SHA-256 is `digest`, so many bytes. It counts as used.
   // Thread-safe; reads a file.
   //
   // NotFound: it is not here, or not yet whole. OutOfRange: it ends before. Anything else: it cannot be

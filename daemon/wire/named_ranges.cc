@@ -12,7 +12,6 @@ namespace voxeld::daemon::wire {
 namespace {
 
 constexpr uint64_t kAlignment = 4;
-constexpr size_t kDigestBytes = 32;
 
 Fault NoLocalMemory(const FieldPath& path, const v1::MemoryRange& range) {
   return {path.ToString(), Reason::kNotFound,
@@ -95,10 +94,10 @@ NamedRanges::~NamedRanges() {
 MaybeFault NamedRanges::Read(const FieldPath& path, const v1::MemoryRange& range,
                              MappedRange* out) {
   const bool asset = !range.asset().empty();
-  if (asset && range.asset().size() != kDigestBytes) {
-    return Fault{
-        FieldPath(path, "asset").ToString(), Reason::kInvalidValue,
-        absl::StrCat("has ", range.asset().size(), " bytes; a SHA-256 has ", kDigestBytes)};
+  if (asset && range.asset().size() != AssetSource::kDigestBytes) {
+    return Fault{FieldPath(path, "asset").ToString(), Reason::kInvalidValue,
+                 absl::StrCat("has ", range.asset().size(), " bytes; a SHA-256 has ",
+                              AssetSource::kDigestBytes)};
   }
   if (asset && range.memory() != 0) {
     return Fault{FieldPath(path, "asset").ToString(), Reason::kInvalidValue,

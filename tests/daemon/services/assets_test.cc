@@ -29,7 +29,7 @@ class Assets : public ::testing::Test {
     std::string bytes;
     uint64_t offset = 0;
   };
-  // `break_off`: the call is cancelled once the pieces are there.
+  // `stored_before_break`: not 0: the call is cancelled once so many bytes are there.
   grpc::Status Upload(const std::string& hash, uint64_t size, const std::vector<Piece>& pieces,
                       uint64_t stored_before_break = 0) {
     grpc::ClientContext context;
