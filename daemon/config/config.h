@@ -52,6 +52,7 @@ struct ServerConfig {
   uint32_t max_scene_watches = 64;  // WatchScene calls at once, of all connections
   uint32_t max_stats_watches = 64;  // WatchStats calls
   int64_t watch_write_limit_ns = 30 * sync::kSecond;
+  int64_t upload_silence_limit_ns = 30 * sync::kSecond;
   uint64_t max_arriving_bytes = uint64_t{1} << 30;
   int64_t open_limit_ns = 5 * sync::kSecond;  // how long a new stream waits for its Open
   // How long a stream that its client has half-closed waits for outcomes, and an ending one for its

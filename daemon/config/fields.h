@@ -40,6 +40,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_scene_watches", config.server.max_scene_watches, 1, 65536);
   visitor.Integer("max_stats_watches", config.server.max_stats_watches, 1, 65536);
   visitor.Integer("watch_write_limit_ns", config.server.watch_write_limit_ns, kSecond / 10, kHour);
+  visitor.Integer("upload_silence_limit_ns", config.server.upload_silence_limit_ns, kSecond / 10,
+                  kHour);
   auto& connections = config.server.connections;
   visitor.Integer("max_connections", connections.max_connections, 1, 1 << 20);
   visitor.Integer("max_connections_per_address", connections.max_connections_per_address, 1,

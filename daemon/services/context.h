@@ -33,6 +33,8 @@ struct StreamLimits {
   size_t max_queued_bytes = 16u << 20;
   // How long a message of WatchScene may wait for its client before the watch ends.
   sync::TimeNs watch_write_limit_ns = 30 * sync::kSecond;
+  // An upload of which nothing has come for so long ends; what came stays for a while.
+  sync::TimeNs upload_silence_limit_ns = 30 * sync::kSecond;
 };
 
 // Outlives the services; the core, the clock and the assets outlive it.

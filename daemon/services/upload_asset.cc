@@ -18,7 +18,6 @@ namespace voxeld::daemon::services {
 namespace {
 
 constexpr size_t kDigestBytes = wire::AssetSource::kDigestBytes;
-constexpr sync::TimeNs kSilenceLimit = 30 * sync::kSecond;
 constexpr uint64_t kBesideData = 256;  // of a message, at the most
 
 absl::Status CheckDigest(const std::string& digest) {
@@ -45,7 +44,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
     }
     Read();
     sync::MutexLock lock(mutex_);
-    LookForSilenceAt(context_.clock.Now() + kSilenceLimit);
+    LookForSilenceAt(context_.clock.Now() + SilenceLimit());
   }
 
   void End(const absl::Status& status) override {
@@ -88,6 +87,8 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
   }
 
  private:
+  sync::TimeNs SilenceLimit() const { return context_.limits.upload_silence_limit_ns; }
+
   void Read() {
     sync::MutexLock lock(mutex_);
     if (!ended_) StartRead(&request_);
@@ -104,11 +105,12 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
   }
 
   void LookForSilence() {
-    const sync::TimeNs due = heard_ + kSilenceLimit;
+    const sync::TimeNs due = heard_ + SilenceLimit();
     if (context_.clock.Now() >= due) {
       return End(absl::DeadlineExceededError(
-          absl::StrCat("nothing came for ", kSilenceLimit / sync::kSecond,
-                       " s; what came before stays for a while: ask ListAssets where to go on")));
+          absl::StrCat("nothing came for ", SilenceLimit() / sync::kMillisecond,
+                       " ms, which is upload_silence_limit_ns; what came before stays for a while: "
+                       "ask ListAssets where to go on")));
     }
     std::unique_ptr<grpc::Alarm> fired;  // goes without the lock
     sync::MutexLock lock(mutex_);

@@ -28,9 +28,17 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   }
   stats.memory.answers = 88;
   stats.applying = {3, 1'000'000, 2, 3};
+  stats.assets = {
+      .count = 4, .bytes = 55, .uploaded = 6, .evicted = 7, .damaged = 1, .bytes_in = 66};
   const std::string text = MetricsText(stats);
   EXPECT_THAT(text, HasSubstr("voxeld_memory_bytes{use=\"answers\"} 88\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_commit_applying_seconds{stat=\"p50\"} 0.001\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_assets 4\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_asset_bytes 55\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_assets_uploaded_total 6\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_assets_evicted_total 7\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_assets_damaged_total 1\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_asset_bytes_in_total 66\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_info{version=\"1.2\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_uptime_seconds 1.5\n"));
   EXPECT_THAT(text, HasSubstr("# TYPE voxeld_commits_accepted_total counter\n"));

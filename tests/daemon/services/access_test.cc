@@ -15,6 +15,7 @@
 #include "daemon/access/access.h"
 #include "daemon/access/audit.h"
 #include "daemon/access/tls_store.h"
+#include "daemon/assets/asset_store.h"
 #include "tests/daemon/access/certificates.h"
 #include "tests/daemon/services/daemon_fixture.h"
 
@@ -62,7 +63,8 @@ class ServicesAccess : public ::testing::Test {
         DaemonOptions{.listen = {kAnyPort, tls == nullptr ? kAnyPort : "tls:127.0.0.1:0"},
                       .access = access_.get(),
                       .tls = tls,
-                      .audit = audit_.get()});
+                      .audit = audit_.get(),
+                      .assets = store_.get()});
     daemon_->server().addresses();
     access_->SetOnChange([this] { daemon_->server().EndRevoked(); });
   }
@@ -106,6 +108,9 @@ class ServicesAccess : public ::testing::Test {
   const std::string folder_ =
       absl::StrCat(::testing::TempDir(), "/voxeld-services-access-", getpid());
   const std::string grants_ = folder_ + "/grants.toml";
+  sync::SystemClock clock_;
+  const std::unique_ptr<assets::AssetStore> store_ =
+      assets::AssetStore::Open("", {}, clock_, nullptr);
   std::unique_ptr<Access> access_;
   std::unique_ptr<access::Audit> audit_;
   std::unique_ptr<Daemon> daemon_;
@@ -285,6 +290,18 @@ TEST_F(ServicesAccess, ATokenThatIsTakenAwayEndsItsCallsAndNobodyElses) {
   const auto watch = displays->WatchStats(&viewers, request);
   v1::Stats stats;
   ASSERT_TRUE(watch->Read(&stats));
+  const std::string hash(32, 'h');
+  grpc::ClientContext uploaders;
+  SetDeadline(uploaders);
+  uploaders.AddMetadata("authorization", "Bearer painter");
+  v1::UploadAssetResponse response;
+  const auto upload = scene->UploadAsset(&uploaders, &response);
+  v1::UploadAssetRequest piece;
+  piece.set_sha256(hash);
+  piece.set_size(12);
+  piece.set_data("four");
+  ASSERT_TRUE(upload->Write(piece));
+  while (store_->List({&hash, 1}).front().stored < 4) ASSERT_TRUE(watch->Read(&stats));
 
   PutFile(grants_, Grant("viewer", "view"));
   ASSERT_TRUE(access_->Look(true).ok());
@@ -294,8 +311,12 @@ TEST_F(ServicesAccess, ATokenThatIsTakenAwayEndsItsCallsAndNobodyElses) {
   const grpc::Status ended = stream->Finish();
   EXPECT_EQ(ended.error_code(), StatusCode::UNAUTHENTICATED);
   EXPECT_THAT(ended.error_message(), HasSubstr("revoked"));
-  while (stats.connections().calls_revoked() == 0) ASSERT_TRUE(watch->Read(&stats));
-  EXPECT_EQ(stats.connections().calls_revoked(), 1u);
+  const grpc::Status cut = upload->Finish();
+  EXPECT_EQ(cut.error_code(), StatusCode::UNAUTHENTICATED);
+  EXPECT_THAT(cut.error_message(), HasSubstr("revoked"));
+  EXPECT_EQ(store_->List({&hash, 1}).front().stored, 4u) << "whoever may can go on with it";
+  while (stats.connections().calls_revoked() < 2) ASSERT_TRUE(watch->Read(&stats));
+  EXPECT_EQ(stats.connections().calls_revoked(), 2u);
   EXPECT_EQ(stats.sessions(), 0u);
 
   // A file that is wrong takes nothing from who is there.

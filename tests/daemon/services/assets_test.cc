@@ -1,9 +1,14 @@
 // Assets over the wire: brought piece by piece, over calls that break off, and drawn by their hash.
 #include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <cstring>
+#include <filesystem>
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
 #include "daemon/assets/asset_store.h"
 #include "tests/daemon/services/daemon_fixture.h"
 
@@ -19,10 +24,19 @@ const std::string kPointHash =
 
 class Assets : public ::testing::Test {
  protected:
-  void Start(bool keeps = true) {
-    store_ = assets::AssetStore::Open("", {.max_asset_bytes = 1000, .max_bytes = 100'000}, clock_,
-                                      nullptr);
-    daemon_ = std::make_unique<Daemon>(DaemonOptions{.assets = keeps ? store_.get() : nullptr});
+  void TearDown() override {
+    daemon_ = nullptr;
+    store_ = nullptr;
+    std::filesystem::remove_all(folder_);
+  }
+
+  // `folder`: empty: in memory.
+  void Start(bool keeps = true, sync::TimeNs silence = 30 * sync::kSecond,
+             const std::string& folder = "") {
+    store_ = assets::AssetStore::Open(folder, {.max_asset_bytes = 1000, .max_bytes = 100'000},
+                                      clock_, nullptr);
+    daemon_ = std::make_unique<Daemon>(DaemonOptions{.upload_silence_limit_ns = silence,
+                                                     .assets = keeps ? store_.get() : nullptr});
   }
 
   struct Piece {
@@ -80,6 +94,8 @@ class Assets : public ::testing::Test {
     return request;
   }
 
+  const std::string folder_ =
+      absl::StrCat(::testing::TempDir(), "/voxeld-assets-over-the-wire-", getpid());
   sync::SystemClock clock_;
   std::unique_ptr<assets::AssetStore> store_;
   std::unique_ptr<Daemon> daemon_;
@@ -183,6 +199,40 @@ TEST_F(Assets, AnUploadUnderWayEndsWithTheServer) {
   while (List(kPointHash).assets(0).stored() < 4) continue;
   daemon_->server().Shutdown(5 * sync::kSecond);
   EXPECT_EQ(call->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST_F(Assets, AnUploadThatFallsSilentEnds) {
+  Start(true, sync::kSecond / 5);
+  grpc::ClientContext context;
+  SetDeadline(context);
+  const auto call = daemon_->scene().UploadAsset(&context, &response_);
+  v1::UploadAssetRequest request;
+  request.set_sha256(kPointHash);
+  request.set_size(12);
+  request.set_data(kPoint.substr(0, 4));
+  ASSERT_TRUE(call->Write(request));
+  const grpc::Status silent = call->Finish();  // the client says nothing more
+  EXPECT_EQ(silent.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_THAT(silent.error_message(), HasSubstr("upload_silence_limit_ns"));
+  EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u);
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(4), 4}}).ok()) << "another call goes on";
+}
+
+TEST_F(Assets, AFullDiskIsSaidAndTheServerGoesOn) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  Start(true, 30 * sync::kSecond, folder_);
+  rlimit before;
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit small = before;
+  small.rlim_cur = 6;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const grpc::Status full =
+      Upload(kPointHash, 12, {{kPoint.substr(0, 4), 0}, {kPoint.substr(4), 4}});
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_EQ(full.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(full.error_message(), HasSubstr(absl::BytesToHexString(kPointHash)));
+  EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u) << "what came before it was full";
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(4), 4}}).ok()) << "there is room again";
 }
 
 TEST_F(Assets, TwoAtOnceOfOneContent) {

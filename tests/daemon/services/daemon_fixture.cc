@@ -60,21 +60,23 @@ Daemon::Daemon(DaemonOptions options)
   }
   std::vector<Address> listen = {*ParseAddress(target_)};
   for (const std::string& address : options.listen) listen.push_back(*ParseAddress(address));
-  auto server = Server::Start(*core_, clock_,
-                              {.listen = listen,
-                               .version = "9.8.7",
-                               .streams = {.open_limit_ns = options.open_limit_ns,
-                                           .drain_limit_ns = options.drain_limit_ns,
-                                           .max_queued_answers = options.max_queued_answers,
-                                           .watch_write_limit_ns = options.watch_write_limit_ns},
-                               .counters = counters,
-                               .max_scene_watches = options.max_scene_watches,
-                               .max_stats_watches = options.max_stats_watches,
-                               .local = local,
-                               .access = options.access,
-                               .tls = options.tls,
-                               .audit = options.audit,
-                               .assets = options.assets});
+  auto server =
+      Server::Start(*core_, clock_,
+                    {.listen = listen,
+                     .version = "9.8.7",
+                     .streams = {.open_limit_ns = options.open_limit_ns,
+                                 .drain_limit_ns = options.drain_limit_ns,
+                                 .max_queued_answers = options.max_queued_answers,
+                                 .watch_write_limit_ns = options.watch_write_limit_ns,
+                                 .upload_silence_limit_ns = options.upload_silence_limit_ns},
+                     .counters = counters,
+                     .max_scene_watches = options.max_scene_watches,
+                     .max_stats_watches = options.max_stats_watches,
+                     .local = local,
+                     .access = options.access,
+                     .tls = options.tls,
+                     .audit = options.audit,
+                     .assets = options.assets});
   EXPECT_TRUE(server.ok()) << server.status();
   server_ = *std::move(server);
   channel_ = NewChannel();
