@@ -277,6 +277,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
        .connection_age_grace_ns = config.server.connection_age_grace_ns,
        .max_scene_watches = config.server.max_scene_watches,
        .max_stats_watches = config.server.max_stats_watches,
+       .max_volume_watches = config.server.max_volume_watches,
        .keepalive_interval_ns = config.server.keepalive_interval_ns,
        .keepalive_timeout_ns = config.server.keepalive_timeout_ns,
        .local = local,

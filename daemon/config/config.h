@@ -49,8 +49,9 @@ struct ServerConfig {
   int64_t connection_idle_limit_ns = 0;
   int64_t connection_age_limit_ns = 0;
   int64_t connection_age_grace_ns = 60 * sync::kSecond;
-  uint32_t max_scene_watches = 64;  // WatchScene calls at once, of all connections
-  uint32_t max_stats_watches = 64;  // WatchStats calls
+  uint32_t max_scene_watches = 64;   // WatchScene calls at once, of all connections
+  uint32_t max_stats_watches = 64;   // WatchStats calls
+  uint32_t max_volume_watches = 16;  // WatchVolume calls
   int64_t watch_write_limit_ns = 30 * sync::kSecond;
   int64_t upload_silence_limit_ns = 30 * sync::kSecond;
   uint64_t max_arriving_bytes = uint64_t{1} << 30;

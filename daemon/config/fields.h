@@ -39,6 +39,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_calls_per_connection", config.server.max_calls_per_connection, 1, 65536);
   visitor.Integer("max_scene_watches", config.server.max_scene_watches, 1, 65536);
   visitor.Integer("max_stats_watches", config.server.max_stats_watches, 1, 65536);
+  visitor.Integer("max_volume_watches", config.server.max_volume_watches, 1, 65536);
   visitor.Integer("watch_write_limit_ns", config.server.watch_write_limit_ns, kSecond / 10, kHour);
   visitor.Integer("upload_silence_limit_ns", config.server.upload_silence_limit_ns, kSecond / 10,
                   kHour);

@@ -166,4 +166,17 @@ void Core::CancelCapture(std::string name, CaptureId id) {
   });
 }
 
+WatchId Core::WatchVolumes(std::string name, display::Display::Watcher watcher) {
+  const WatchId id = impl_->NewCapture();
+  const bool posted = impl_->loop().Post([impl = impl_.get(), name = std::move(name), id, watcher] {
+    impl->Watch(name, id, watcher);
+  });
+  if (!posted) watcher(absl::UnavailableError("the daemon is shutting down"));
+  return id;
+}
+
+void Core::UnwatchVolumes(std::string name, WatchId id) {
+  impl_->loop().Post([impl = impl_.get(), name = std::move(name), id] { impl->Unwatch(name, id); });
+}
+
 }  // namespace voxeld::daemon

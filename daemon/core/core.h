@@ -44,6 +44,7 @@ namespace voxeld::daemon {
 class SceneWatch;
 using SessionId = uint64_t;
 using display::CaptureId;
+using WatchId = uint64_t;  // from 1
 
 struct CoreOptions {
   Limits limits;
@@ -225,6 +226,11 @@ class Core {
                     Reply<display::DecodedVolume> reply);
   // Nobody waits for it any more: its reply gets Cancelled, unless it has had its answer.
   void CancelCapture(std::string name, CaptureId id);
+  // Every volume of the display as it is shown, rebuilt from the bytes that go out, from the newest on: `watcher` is
+  // called on its pipeline's thread, must only post, and is let go after UnwatchVolumes or an error.
+  // Watching costs the display's decoding; nothing is kept for a watcher but the newest volume.
+  WatchId WatchVolumes(std::string name, display::Display::Watcher watcher);
+  void UnwatchVolumes(std::string name, WatchId id);
 
  private:
   class Impl;

@@ -35,7 +35,7 @@ class Core::Impl {
   Loop& loop() { return *loop_; }
   SceneWatch& scene_watch() { return scene_watch_; }
   const std::shared_ptr<Budget>& budget() const { return budget_; }
-  CaptureId NewCapture() { return next_capture_++; }
+  CaptureId NewCapture() { return next_capture_++; }  // watches count along
   absl::Status AddDisplay(std::unique_ptr<display::Display> display,
                           const gpu::EngineOptions& engine, const DisplaySetup& setup);
   // `self` keeps this alive while the core's thread runs.
@@ -75,6 +75,8 @@ class Core::Impl {
   void Capture(const std::string& name, CaptureId id, sync::TimeNs timeout,
                uint64_t at_least_snapshot, Reply<display::DecodedVolume> reply);
   void CancelCapture(const std::string& name, CaptureId id);
+  void Watch(const std::string& name, WatchId id, const display::Display::Watcher& watcher);
+  void Unwatch(const std::string& name, WatchId id);
 
  private:
   // What an outcome weighs that is to come, or is kept.

@@ -299,4 +299,21 @@ void Core::Impl::CancelCapture(const std::string& name, CaptureId id) {
   host.work->Post([id, pipeline = host.pipeline.get()] { pipeline->CancelCapture(id); });
 }
 
+void Core::Impl::Watch(const std::string& name, WatchId id,
+                       const display::Display::Watcher& watcher) {
+  const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
+  if (!slot.ok()) return watcher(slot.status());
+  const Host& host = *(*slot)->host;
+  const bool posted = host.work->Post(
+      [id, watcher, pipeline = host.pipeline.get()] { pipeline->Watch(id, watcher); });
+  if (!posted) watcher(Ended((*slot)->info.name));
+}
+
+void Core::Impl::Unwatch(const std::string& name, WatchId id) {
+  const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
+  if (!slot.ok()) return;
+  const Host& host = *(*slot)->host;
+  host.work->Post([id, pipeline = host.pipeline.get()] { pipeline->Unwatch(id); });
+}
+
 }  // namespace voxeld::daemon

@@ -91,6 +91,7 @@ absl::Status FramePipeline::Start() {
 void FramePipeline::Stop() {
   if (started_) display_->Stop();
   started_ = false;
+  TellWatchers(absl::UnavailableError("the display was stopped"));
   riders_.LoseUnsubmitted("the display was stopped", true);
   // The engine's end comes before the buffer that it may be writing into is let go.
   alive_ = nullptr;

@@ -120,6 +120,10 @@ class FramePipeline final : private display::Display::Listener {
                display::CaptureId id = 0);
   // Ends the captures of that name with Cancelled.
   void CancelCapture(display::CaptureId id);
+  // Display::Watch for many, until Unwatch or an error: each begins with the newest volume. Watchers are
+  // called inside any call to the pipeline, and must only post.
+  void Watch(uint64_t id, display::Display::Watcher watcher);
+  void Unwatch(uint64_t id);
 
  private:
   // What a volume shows: a snapshot, through the view or pattern that was set last but `settings`
@@ -191,6 +195,7 @@ class FramePipeline final : private display::Display::Listener {
   void ShowAgain(sync::TimeNs delay);
   void DrawAgain();  // what was drawn comes to nothing: at once, with the same riders
   void ServeCaptures();
+  void TellWatchers(const absl::StatusOr<display::DecodedVolume>& volume);
   void Breathe();
   void Retire(std::shared_ptr<const void> what);
   void Told(const Rider& rider, const CommitOutcome& outcome);
@@ -252,6 +257,8 @@ class FramePipeline final : private display::Display::Listener {
   std::map<uint64_t, Contents> in_display_;  // by volume handed over, without outcome
   std::optional<Contents> shown_;
   std::vector<PendingCapture> captures_;
+  std::map<uint64_t, display::Display::Watcher> watchers_;  // by id
+  std::optional<display::DecodedVolume> watched_;           // what they were told last
   sync::TimeNs next_tick_ = 0;
 
   RiderBook riders_;

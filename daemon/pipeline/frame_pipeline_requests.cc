@@ -161,6 +161,32 @@ void FramePipeline::CancelCapture(display::CaptureId id) {
   display_->CancelCapture(id);
 }
 
+void FramePipeline::Watch(uint64_t id, display::Display::Watcher watcher) {
+  if (!started_) return watcher(absl::UnavailableError(WhyNotShowing()));
+  if (watched_.has_value()) watcher(*watched_);
+  const bool first = watchers_.empty();
+  watchers_[id] = std::move(watcher);
+  if (!first) return;
+  display_->Watch(
+      [this](const absl::StatusOr<display::DecodedVolume>& volume) { TellWatchers(volume); });
+}
+
+void FramePipeline::Unwatch(uint64_t id) {
+  if (watchers_.erase(id) == 0 || !watchers_.empty()) return;
+  watched_.reset();
+  display_->Unwatch();
+}
+
+void FramePipeline::TellWatchers(const absl::StatusOr<display::DecodedVolume>& volume) {
+  if (volume.ok()) {
+    watched_ = *volume;
+    for (const auto& [id, watcher] : watchers_) watcher(volume);
+    return;
+  }
+  watched_.reset();
+  for (const auto& [id, watcher] : std::exchange(watchers_, {})) watcher(volume);
+}
+
 void FramePipeline::ServeCaptures() {
   const sync::TimeNs now = clock_.Now();
   std::vector<PendingCapture> waiting;

@@ -47,6 +47,7 @@ struct ServiceContext {
   StreamLimits limits;
   uint32_t max_scene_watches = 64;
   uint32_t max_stats_watches = 64;
+  uint32_t max_volume_watches = 16;
   const access::Access* access = nullptr;  // none: everybody may do everything
   access::Audit* audit = nullptr;          // none: nobody asks
   assets::AssetStore* assets = nullptr;    // none: none are kept
@@ -56,6 +57,7 @@ struct ServiceContext {
   ActiveCalls short_calls;  // all others
   std::atomic<uint32_t> scene_watches = 0;
   std::atomic<uint32_t> stats_watches = 0;
+  std::atomic<uint32_t> volume_watches = 0;
   static constexpr uint32_t kMostUploads =
       32;  // calls; the assets say how many of them have something under way
   std::atomic<uint32_t> uploads = 0;

@@ -71,14 +71,11 @@ class DisplayService final : public v1::DisplayService::CallbackService {
     return NewStatsWatch(context_, *std::move(caller), *request);
   }
 
-  grpc::ServerWriteReactor<v1::VolumeChunk>* WatchVolume(CallbackServerContext* call,
-                                                         const v1::WatchVolumeRequest*) override {
-    absl::Status status = May(call, "WatchVolume");
-    if (status.ok()) {
-      status = absl::UnimplementedError(
-          "WatchVolume is not implemented in this version of the server: use CaptureVolume");
-    }
-    return new RefusedWatch<v1::VolumeChunk>(status);
+  grpc::ServerWriteReactor<v1::VolumeChunk>* WatchVolume(
+      CallbackServerContext* call, const v1::WatchVolumeRequest* request) override {
+    absl::StatusOr<access::Caller> caller = Authorise(context_, *call, Scope::kView, "WatchVolume");
+    if (!caller.ok()) return new RefusedWatch<v1::VolumeChunk>(caller.status());
+    return NewVolumeWatch(context_, *std::move(caller), *request);
   }
 
   grpc::ServerWriteReactor<v1::VolumeChunk>* CaptureVolume(

@@ -1,4 +1,4 @@
-// The long calls of DisplayService: WatchStats and CaptureVolume.
+// The long calls of DisplayService: WatchStats, WatchVolume and CaptureVolume.
 #include <grpcpp/alarm.h>
 #include <grpcpp/support/server_callback.h>
 
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/core/volume_feed.h"
 #include "daemon/services/services.h"
 #include "daemon/services/status.h"
 #include "daemon/wire/encode.h"
@@ -149,11 +150,122 @@ class StatsWatch final : public Sender<v1::Stats> {
   bool once_ = false;
 };
 
+// At least one.
+int32_t SlicesOfAChunk(const display::FrameLayout& layout) {
+  constexpr size_t kChunkBytes = 1u << 20;
+  const size_t each = static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) * 3;
+  return static_cast<int32_t>(std::max<size_t>(1, kChunkBytes / std::max<size_t>(1, each)));
+}
+
+v1::VolumeChunk Chunk(const display::DecodedVolume& volume, int32_t first, int32_t count) {
+  v1::VolumeChunk chunk;
+  chunk.mutable_slices()->set_first_slice(first);
+  const std::vector<uint8_t> rgb = volume.Rgb(first, count);
+  chunk.mutable_slices()->set_rgb(rgb.data(), rgb.size());
+  return chunk;
+}
+
+// What a client has taken is told to the feed by its reading: the next volume is asked for when the last message of
+// the one before has gone out.
+class VolumeWatch final : public Sender<v1::VolumeChunk> {
+ public:
+  using Sender::Sender;
+
+  void Start(const v1::WatchVolumeRequest& request) {
+    Begin();
+    if (++context_.volume_watches > context_.max_volume_watches) {
+      return End(absl::ResourceExhaustedError(
+          absl::StrCat(context_.max_volume_watches,
+                       " watches of volumes are open, which is max_volume_watches; try again when "
+                       "one has ended")));
+    }
+    context_.core.GetDisplay(
+        request.name(), [self = Self()](absl::StatusOr<DisplayDescription> display) {
+          if (!display.ok()) return self->End(display.status());
+          self->display_ = *std::move(display);
+          // Not held by the feed, which is held by it.
+          std::weak_ptr<VolumeWatch> weak = self;
+          const auto feed = VolumeFeed::Open(self->context_.core, self->context_.clock,
+                                             self->display_.info.name, [weak] {
+                                               if (const auto watch = weak.lock()) watch->WakeUp();
+                                             });
+          bool next = false;
+          {
+            sync::MutexLock lock(self->feeding_);
+            if (!self->over_) self->feed_ = feed;
+            next = std::exchange(self->ready_, false);
+          }
+          if (next) self->Next();
+        });
+  }
+
+ private:
+  std::shared_ptr<VolumeWatch> Self() {
+    return std::static_pointer_cast<VolumeWatch>(shared_from_this());
+  }
+
+  // From the display's thread: decoding and copying are for gRPC's.
+  void WakeUp() {
+    sync::MutexLock lock(feeding_);
+    if (over_) return;
+    ready_ = feed_ == nullptr;
+    if (!ready_) SetAlarm(0);
+  }
+
+  void OnAlarm() override { Next(); }
+
+  void Next() {
+    std::shared_ptr<VolumeFeed> feed;
+    {
+      sync::MutexLock lock(feeding_);
+      feed = feed_;
+    }
+    if (feed == nullptr) return;
+    absl::StatusOr<std::optional<VolumeFeed::Change>> change = feed->Take();
+    if (!change.ok()) return End(change.status());
+    if (!change->has_value()) return;  // WakeUp comes
+    change_ = **std::move(change);
+    next_ = 0;
+    v1::VolumeChunk chunk;
+    wire::Encode(display_, change_.volume, chunk.mutable_header());
+    Send(std::move(chunk));
+  }
+
+  void OnSent() override {
+    if (next_ == change_.slices.size()) return Next();
+    const int32_t first = change_.slices[next_];
+    const auto most = static_cast<size_t>(SlicesOfAChunk(change_.volume.layout));
+    size_t count = 1;
+    while (count < most && next_ + count < change_.slices.size() &&
+           change_.slices[next_ + count] == first + static_cast<int32_t>(count)) {
+      ++count;
+    }
+    next_ += count;
+    Send(Chunk(change_.volume, first, static_cast<int32_t>(count)));
+  }
+
+  void OnEnded() override {
+    --context_.volume_watches;
+    sync::MutexLock lock(feeding_);
+    over_ = true;
+    feed_ = nullptr;
+  }
+
+  // Set before the feed is there, then touched by one reaction after another.
+  DisplayDescription display_;
+  VolumeFeed::Change change_;
+  size_t next_ = 0;  // of change_.slices
+
+  sync::Mutex feeding_;
+  std::shared_ptr<VolumeFeed> feed_ VOXELD_GUARDED_BY(feeding_);
+  bool ready_ VOXELD_GUARDED_BY(feeding_) = false;  // before the feed was there
+  bool over_ VOXELD_GUARDED_BY(feeding_) = false;
+};
+
 class Capture final : public Sender<v1::VolumeChunk> {
  public:
   static constexpr int64_t kDefaultNs = 5 * sync::kSecond;
   static constexpr int64_t kGreatestNs = 60 * sync::kSecond;
-  static constexpr size_t kChunkBytes = 1u << 20;
 
   explicit Capture(ServiceContext& context)
       : Sender(context), core_(context.core), captures_(context.captures) {}
@@ -214,22 +326,12 @@ class Capture final : public Sender<v1::VolumeChunk> {
     if (asked.has_value()) core_.CancelCapture(display_.info.name, *asked);
   }
 
-  // Whole slices, as many as fit into a chunk, but at least one.
   void OnSent() override {
-    const display::FrameLayout& layout = volume_.layout;
-    if (next_slice_ >= layout.slices) return End(absl::OkStatus());
-    const size_t slice_bytes =
-        static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) * 3;
-    const size_t fit = std::max<size_t>(1, kChunkBytes / std::max<size_t>(1, slice_bytes));
-    const auto count = static_cast<int32_t>(
-        std::min<size_t>(fit, static_cast<size_t>(layout.slices - next_slice_)));
-    v1::VolumeChunk chunk;
-    v1::VolumeSlices* slices = chunk.mutable_slices();
-    slices->set_first_slice(next_slice_);
-    const std::vector<uint8_t> rgb = volume_.Rgb(next_slice_, count);
-    slices->set_rgb(rgb.data(), rgb.size());
+    const int32_t left = volume_.layout.slices - next_slice_;
+    if (left == 0) return End(absl::OkStatus());
+    const int32_t count = std::min(left, SlicesOfAChunk(volume_.layout));
+    Send(Chunk(volume_, next_slice_, count));
     next_slice_ += count;
-    Send(std::move(chunk));
   }
 
   Core& core_;
@@ -249,6 +351,15 @@ class Capture final : public Sender<v1::VolumeChunk> {
 grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context, access::Caller caller,
                                                    const v1::WatchStatsRequest& request) {
   const auto watch = std::make_shared<StatsWatch>(context);
+  watch->SetCaller(std::move(caller));
+  watch->Start(request);
+  return watch.get();
+}
+
+grpc::ServerWriteReactor<v1::VolumeChunk>* NewVolumeWatch(ServiceContext& context,
+                                                          access::Caller caller,
+                                                          const v1::WatchVolumeRequest& request) {
+  const auto watch = std::make_shared<VolumeWatch>(context);
   watch->SetCaller(std::move(caller));
   watch->Start(request);
   return watch.get();

@@ -70,6 +70,7 @@ class Server::Impl {
                  .limits = options_.streams,
                  .max_scene_watches = options_.max_scene_watches,
                  .max_stats_watches = options_.max_stats_watches,
+                 .max_volume_watches = options_.max_volume_watches,
                  .access = options_.access,
                  .audit = options_.audit,
                  .assets = options_.assets},

@@ -43,6 +43,7 @@ struct ServerOptions {
   sync::TimeNs connection_age_grace_ns = 60 * sync::kSecond;
   uint32_t max_scene_watches = 64;
   uint32_t max_stats_watches = 64;
+  uint32_t max_volume_watches = 16;
   // An idle connection is probed this often, and closed when no answer comes in time.
   sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;

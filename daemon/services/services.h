@@ -27,6 +27,7 @@ class UploadAssetResponse;
 class VolumeChunk;
 class WatchSceneRequest;
 class WatchStatsRequest;
+class WatchVolumeRequest;
 }  // namespace voxeld::v1
 
 namespace voxeld::daemon::services {
@@ -46,6 +47,9 @@ grpc::ServerWriteReactor<v1::Stats>* NewStatsWatch(ServiceContext& context, acce
 grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
                                                       access::Caller caller,
                                                       const v1::CaptureVolumeRequest& request);
+grpc::ServerWriteReactor<v1::VolumeChunk>* NewVolumeWatch(ServiceContext& context,
+                                                          access::Caller caller,
+                                                          const v1::WatchVolumeRequest& request);
 // `response` is gRPC's, which keeps it until the call has ended. There are assets (CheckAssets).
 grpc::ServerReadReactor<v1::UploadAssetRequest>* NewUpload(ServiceContext& context,
                                                            access::Caller caller,

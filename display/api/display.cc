@@ -85,6 +85,7 @@ void Display::Stop() {
   LoseInFlight("the display was stopped", 0);
   LoseWaiting("the display was stopped");
   FinishCaptures(absl::UnavailableError("the display was stopped"));
+  Unwatch();
   SetState(DisplayState::kStopped, "stopped");
   listener_ = nullptr;
   wake_ = nullptr;
@@ -188,7 +189,7 @@ std::vector<Display::PendingCapture> Display::TakeCaptures(Goes goes) {
   std::vector<PendingCapture> taken;
   std::copy_if(captures_.begin(), captures_.end(), std::back_inserter(taken), goes);
   std::erase_if(captures_, goes);
-  if (captures_.empty()) decoder_ = nullptr;
+  if (captures_.empty() && !watcher_) decoder_ = nullptr;
   return taken;
 }
 
@@ -208,6 +209,25 @@ void Display::CancelCapture(CaptureId id) {
        TakeCaptures([id](const PendingCapture& pending) { return pending.id == id; })) {
     capture.done(absl::CancelledError("the capture was cancelled"));
   }
+}
+
+void Display::Watch(Watcher watcher) {
+  watcher_ = std::move(watcher);
+  watch_due_ = true;
+  SendNext();
+}
+
+void Display::Unwatch() {
+  watcher_ = nullptr;
+  watch_due_ = false;
+  if (captures_.empty()) decoder_ = nullptr;
+}
+
+void Display::TellWatcher(const absl::StatusOr<DecodedVolume>& volume) {
+  if (!watcher_) return;
+  watch_due_ = false;
+  const Watcher watcher = volume.ok() ? watcher_ : std::exchange(watcher_, nullptr);
+  watcher(volume);
 }
 
 void Display::Attached() {
@@ -235,6 +255,7 @@ void Display::NoDevice(const std::string& reason) {
 
 void Display::DeviceLost(const std::string& reason, uint64_t bytes) {
   SetState(DisplayState::kLost, reason);
+  decoder_ = nullptr;
   full_next_ = true;
   resend_at_ = sync::kNever;
   LoseInFlight(reason, bytes);
@@ -284,19 +305,22 @@ void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs l
     Report(std::move(outcome));
   }
   if (decoder_ != nullptr) {
-    std::optional<DecodedVolume> decoded = decoder_->TakeVolume();
-    if (!decoder_status_.ok()) {
-      FinishCaptures(decoder_status_);
-    } else if (!decoded.has_value()) {
-      FinishCaptures(
-          absl::InternalError(absl::StrCat("the bytes sent hold no whole volume, though volume ",
-                                           frame->volume, " was reported shown")));
-    } else {
-      decoded->volume = frame->volume;
-      FinishCaptures(*std::move(decoded));
-    }
+    const absl::StatusOr<DecodedVolume> seen = Decoded(frame->volume);
+    TellWatcher(seen);
+    FinishCaptures(seen);
   }
   SendNext();
+}
+
+absl::StatusOr<DecodedVolume> Display::Decoded(uint64_t volume) {
+  if (!decoder_status_.ok()) return decoder_status_;
+  std::optional<DecodedVolume> decoded = decoder_->TakeVolume();
+  if (!decoded.has_value()) {
+    return absl::InternalError(absl::StrCat("the bytes sent hold no whole volume, though volume ",
+                                            volume, " was reported shown"));
+  }
+  decoded->volume = volume;
+  return *std::move(decoded);
 }
 
 void Display::FrameLost(const std::string& reason, uint64_t bytes) {
@@ -371,8 +395,9 @@ void Display::SendNext() {
       held_ = false;
     } else {
       if (held_) break;
-      const bool due = resend_at_ == sync::kNever ? !captures_.empty() : resend_at_ <= clock_.Now();
-      if (!due || (newest_ == nullptr && captures_.empty())) break;
+      const bool asked = !captures_.empty() || watch_due_;
+      const bool due = resend_at_ == sync::kNever ? asked : resend_at_ <= clock_.Now();
+      if (!due || (newest_ == nullptr && !asked)) break;
     }
     // Nothing that was not ordered shown is shown for a capture.
     const SliceFramePtr& next = holding_ && !owed ? presented_ : newest_;
@@ -385,15 +410,19 @@ void Display::SendNext() {
       if (coming.size() == 2) due_ = coming[0], due_period_ = coming[1] - coming[0];
     }
     resend_at_ = sync::kNever;
-    decoder_status_ = absl::OkStatus();
-    decoder_ = captures_.empty() ? nullptr : DoMakeDecoder();
-    DoSend(SliceFramePtr(in_flight_), full_next_ || decoder_ != nullptr);
+    // Who watches has the volume before as the base of the next; a capture begins by itself.
+    const bool begins = !captures_.empty() || (watcher_ && decoder_ == nullptr);
+    if (begins || !watcher_) {
+      decoder_status_ = absl::OkStatus();
+      decoder_ = begins ? DoMakeDecoder() : nullptr;
+    }
+    DoSend(SliceFramePtr(in_flight_), full_next_ || begins);
   }
   sending_ = false;
 }
 
 void Display::FinishCaptures(const absl::StatusOr<DecodedVolume>& result) {
-  decoder_ = nullptr;
+  if (!watcher_) decoder_ = nullptr;
   const std::vector<PendingCapture> captures = std::move(captures_);
   captures_.clear();
   for (const PendingCapture& capture : captures) capture.done(result);

@@ -101,8 +101,9 @@ class Display {
     // A volume that was dropped, after it had been ordered shown, was shown all the same.
     virtual void OnStray() {}
   };
-  // Called where a listener's functions are; must not call back.
+  // Both called where a listener's functions are; must not call back.
   using CaptureDone = std::function<void(absl::StatusOr<DecodedVolume>)>;
+  using Watcher = std::function<void(absl::StatusOr<DecodedVolume>)>;
 
   virtual ~Display() = default;  // a driver's destructor calls Stop
   Display(const Display&) = delete;
@@ -161,6 +162,14 @@ class Display {
   void Capture(sync::TimeNs timeout, CaptureDone done, CaptureId id = 0);
   // Ends the captures of that name, inside the call, with Cancelled.
   void CancelCapture(CaptureId id);
+
+  // Every volume as it is shown, rebuilt from the bytes that go out, until Unwatch: first the current
+  // one, which is sent again whole for it if nothing newer comes, or a black one if there was none.
+  // Pictures that did not change are the same objects from one volume to the next where the driver leaves
+  // them out. Of what is not shown (blanked, lost) nothing is told; of what comes after that, all.
+  // An error is the last word: bytes that break the protocol. Another Watch takes the first one's place.
+  void Watch(Watcher watcher);
+  void Unwatch();
 
   // Predicted starts of coming sweeps (owner's clock), nearest first; empty if not known.
   virtual std::vector<sync::TimeNs> ComingSweeps(int /*count*/) const { return {}; }
@@ -248,10 +257,13 @@ class Display {
   void LoseInFlight(const std::string& reason, uint64_t bytes);
   void LoseWaiting(const std::string& reason);
   void SendNext();
-  // The capture's volume is in `decoder_`, or an error is to be told; ends the tap.
+  // The capture's volume is in `decoder_`, or an error is to be told; ends the tap, if nobody watches.
   void FinishCaptures(const absl::StatusOr<DecodedVolume>& result);
   void ExpireCaptures(sync::TimeNs now);
-  // Takes out those for which `goes` holds; without any left the tap ends.
+  // What the decoder has, after the volume of that number was shown. There is a decoder.
+  absl::StatusOr<DecodedVolume> Decoded(uint64_t volume);
+  void TellWatcher(const absl::StatusOr<DecodedVolume>& volume);
+  // Takes out those for which `goes` holds; without any left, and nobody watching, the tap ends.
   template <typename Goes>
   std::vector<PendingCapture> TakeCaptures(Goes goes);
 
@@ -284,6 +296,8 @@ class Display {
   std::unique_ptr<WireDecoder> decoder_;
   absl::Status decoder_status_;
   std::vector<PendingCapture> captures_;
+  Watcher watcher_;         // empty: nobody watches
+  bool watch_due_ = false;  // it has had no volume yet
 };
 
 }  // namespace voxeld::display

@@ -53,6 +53,7 @@ class ScriptedDisplay final : public display::Display {
     return true;
   }
   using Display::in_flight;
+  using Display::tapped;
   // The sweeps that it announces, if their period is not 0.
   sync::TimeNs sweep_start_ns = 0, sweep_period_ns = 0;
   std::vector<sync::TimeNs> ComingSweeps(int count) const override {
@@ -87,15 +88,26 @@ class ScriptedDisplay final : public display::Display {
   absl::Status DoSetBrightness(double) override { return refuse_brightness; }
   absl::Status DoSetBlank(bool) override { return refuse_blank; }
   std::unique_ptr<display::WireDecoder> DoMakeDecoder() const override {
+    // Every volume differs from the one before in its first picture.
     struct Decoder final : display::WireDecoder {
+      explicit Decoder(const display::FrameLayout& layout) : layout(layout) {}
       absl::Status OnBytes(uint8_t, std::span<const std::byte>, size_t) override {
         return absl::OkStatus();
       }
       std::optional<display::DecodedVolume> TakeVolume() override {
-        return display::DecodedVolume();
+        display::DecodedVolume decoded{.volume = 0, .layout = layout};
+        for (size_t i = 0; i < layout.pictures(); ++i) {
+          std::vector<std::byte> picture(layout.bytes_per_slice());
+          if (i == 0) picture[0] = static_cast<std::byte>(++volumes);
+          decoded.pictures.push_back(
+              std::make_shared<const std::vector<std::byte>>(std::move(picture)));
+        }
+        return decoded;
       }
+      const display::FrameLayout layout;
+      uint8_t volumes = 0;
     };
-    return std::make_unique<Decoder>();
+    return std::make_unique<Decoder>(info().layout);
   }
 
  private:

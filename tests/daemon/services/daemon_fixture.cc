@@ -72,6 +72,7 @@ Daemon::Daemon(DaemonOptions options)
                      .counters = counters,
                      .max_scene_watches = options.max_scene_watches,
                      .max_stats_watches = options.max_stats_watches,
+                     .max_volume_watches = options.max_volume_watches,
                      .local = local,
                      .access = options.access,
                      .tls = options.tls,

@@ -41,6 +41,7 @@ struct DaemonOptions {
   sync::TimeNs upload_silence_limit_ns = 30 * sync::kSecond;
   uint32_t max_scene_watches = 64;
   uint32_t max_stats_watches = 64;
+  uint32_t max_volume_watches = 16;
   bool local_socket = false;
   bool stuck = false;               // displays that take volumes and never show one
   std::vector<std::string> listen;  // more addresses

@@ -269,16 +269,107 @@ TEST(Stats, AreWatchedByNoMoreAtOnceThanAllowed) {
   }
 }
 
-TEST(WatchVolume, SaysWhyNot) {
-  Daemon daemon;
+// What a client puts together from a watch.
+struct Watched {
+  explicit Watched(Daemon& daemon, const std::string& name = "") {
+    SetDeadline(context);
+    v1::WatchVolumeRequest request;
+    request.set_name(name);
+    call = daemon.displays().WatchVolume(&context, request);
+  }
+  ~Watched() { context.TryCancel(); }
+
+  // One more message.
+  bool Read() {
+    v1::VolumeChunk chunk;
+    if (!call->Read(&chunk)) return false;
+    if (chunk.has_header()) {
+      header = chunk.header();
+      const v1::FrameLayout& layout = header.layout();
+      each = static_cast<size_t>(layout.width()) * static_cast<size_t>(layout.height()) * 3;
+      rgb.resize(each * static_cast<size_t>(layout.slices()), '?');
+      ++volumes;
+      slices.clear();
+      return true;
+    }
+    const size_t first = static_cast<size_t>(chunk.slices().first_slice());
+    rgb.replace(first * each, chunk.slices().rgb().size(), chunk.slices().rgb());
+    for (size_t i = 0; i < chunk.slices().rgb().size() / each; ++i) slices.push_back(first + i);
+    return true;
+  }
+
   grpc::ClientContext context;
-  SetDeadline(context);
-  const auto call = daemon.displays().WatchVolume(&context, {});
-  v1::VolumeChunk chunk;
-  EXPECT_FALSE(call->Read(&chunk));
-  const grpc::Status status = call->Finish();
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("CaptureVolume"));
+  std::unique_ptr<grpc::ClientReader<v1::VolumeChunk>> call;
+  v1::VolumeHeader header;
+  std::string rgb;
+  size_t each = 0;
+  std::vector<size_t> slices;  // of the newest volume
+  int volumes = 0;
+};
+
+TEST(WatchVolume, TellsWhatChangesAndIsWhatACaptureTells) {
+  Daemon daemon;
+  ASSERT_TRUE(daemon.Await(AllShowing));
+  Client client(daemon.scene());
+  client.Open();
+  client.Send(SphereIn("l", "small", 0.1));
+  client.Commit(1);
+  client.ReadOutcomes(1);
+  Watched watch(daemon);
+  while (watch.slices.size() < 4) ASSERT_TRUE(watch.Read());
+  EXPECT_EQ(watch.header.display(), "sim");
+  EXPECT_EQ(watch.rgb, Capture(daemon, {}).rgb);
+  EXPECT_THAT(watch.rgb, HasSubstr(std::string(1, '\xff')));
+
+  // A point in one slice alone: that slice alone comes.
+  v1::StreamRequest point;
+  point.mutable_upsert()->set_layer("l");
+  point.mutable_upsert()->set_id("point");
+  v1::Primitive* primitive = point.mutable_upsert()->mutable_entity()->mutable_primitive();
+  v1::Vertices* vertices = primitive->mutable_points()->mutable_vertices();
+  vertices->set_count(1);
+  const float at[3] = {-0.9f, -0.9f, -0.9f};
+  vertices->set_positions(std::string(reinterpret_cast<const char*>(at), 12));
+  client.Send(point);
+  client.Commit(2);
+  while (watch.volumes < 2 || watch.slices.empty()) ASSERT_TRUE(watch.Read());
+  EXPECT_EQ(watch.slices.size(), 1u);
+  EXPECT_EQ(watch.rgb, Capture(daemon, {}).rgb);
+  client.Cancel();
+}
+
+TEST(WatchVolume, NamesThatAreNotThereAndTooMany) {
+  DaemonOptions options;
+  options.max_volume_watches = 1;
+  Daemon daemon(options);
+  {
+    Watched wrong(daemon, "no such");
+    EXPECT_FALSE(wrong.Read());
+    const grpc::Status status = wrong.call->Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+    EXPECT_THAT(status.error_message(), HasSubstr("there are: \"sim\""));
+  }
+  bool open = false;
+  while (!open) {  // until the first one's place is free
+    Watched watch(daemon);
+    open = watch.Read();
+    if (!open) continue;
+    Watched second(daemon);
+    EXPECT_FALSE(second.Read());
+    const grpc::Status refused = second.call->Finish();
+    EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    EXPECT_THAT(refused.error_message(), HasSubstr("max_volume_watches"));
+  }
+}
+
+TEST(WatchVolume, EndsWithTheServer) {
+  Daemon daemon;
+  ASSERT_TRUE(daemon.Await(AllShowing));
+  Watched watch(daemon);
+  ASSERT_TRUE(watch.Read());
+  daemon.server().Shutdown(10 * sync::kSecond);
+  while (watch.Read()) continue;
+  EXPECT_EQ(watch.call->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
 TEST(Watches, EndAtShutdown) {

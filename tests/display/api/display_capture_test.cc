@@ -141,5 +141,40 @@ TEST_F(DisplayTest, CaptureTellsOfBytesThatBreakTheProtocol) {
   EXPECT_TRUE(absl::IsInternal(torn->status()));
 }
 
+TEST_F(DisplayTest, AWatchBeginsWholeAndGoesOnWithWhatChanges) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  std::vector<uint64_t> seen;
+  display_.Watch([&](const absl::StatusOr<DecodedVolume>& volume) {
+    ASSERT_TRUE(volume.ok());
+    seen.push_back(volume->volume);
+  });
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+  display_.Done();
+  display_.Submit(Frame(2));
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{2, false}));
+  display_.Done();
+  EXPECT_EQ(seen, (std::vector<uint64_t>{1, 2}));
+  EXPECT_EQ(display_.sent.size(), 3u) << "nothing is sent for a watcher while nothing is new";
+  EXPECT_TRUE(display_.tapped());
+
+  // What is lost is told again whole.
+  display_.Submit(Frame(3));
+  display_.FrameLost("script", 3);
+  clock_.Advance(kSecond);
+  display_.Tick();
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{3, true}));
+  display_.Done();
+  EXPECT_EQ(seen.back(), 3u);
+  display_.Unwatch();
+  EXPECT_FALSE(display_.tapped());
+  display_.Submit(Frame(4));
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{4, false}));
+  display_.Done();
+  EXPECT_EQ(seen.back(), 3u);
+  EXPECT_EQ(log_.outcomes.size(), 4u) << "of each volume one, and none of what was sent again";
+}
+
 }  // namespace
 }  // namespace voxeld::display

@@ -33,9 +33,10 @@ class PlainDecoder final : public WireDecoder {
     if (bytes_.size() != kLayout.bytes()) return std::nullopt;
     DecodedVolume decoded{.volume = 99, .layout = kLayout};
     const size_t each = kLayout.bytes_per_slice();
-    for (size_t at = 0; at < bytes_.size(); at += each) {
+    const std::vector<std::byte> bytes = std::exchange(bytes_, {});
+    for (size_t at = 0; at < bytes.size(); at += each) {
       decoded.pictures.push_back(std::make_shared<const std::vector<std::byte>>(
-          bytes_.data() + at, bytes_.data() + at + each));
+          bytes.data() + at, bytes.data() + at + each));
     }
     return decoded;
   }

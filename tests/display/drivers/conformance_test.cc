@@ -164,6 +164,38 @@ TEST_P(DriverConformance, CapturesWhatWasSubmitted) {
   EXPECT_EQ(recorder_.outcomes.size(), 3u);
 }
 
+TEST_P(DriverConformance, WatchersSeeEveryVolumeThatIsShown) {
+  Start();
+  FrameSource source(display_->info().layout, 6);
+  SliceFramePtr frame = source.Next(0.3);
+  display_->Submit(frame);
+  ASSERT_TRUE(RunUntilOutcome(1));
+  std::vector<DecodedVolume> seen;
+  display_->Watch([&](absl::StatusOr<DecodedVolume> volume) {
+    ASSERT_TRUE(volume.ok()) << volume.status();
+    seen.push_back(*std::move(volume));
+  });
+  ASSERT_TRUE(RunUntil([&] { return !seen.empty(); })) << "the current one, sent again";
+  EXPECT_EQ(seen.back().volume, 1u);
+  EXPECT_EQ(seen.back().Rgb(), FrameToRgb(*frame));
+  for (uint64_t volume = 2; volume <= 6; ++volume) {
+    frame = source.Next(volume % 2 == 0 ? 0.2 : 1);
+    display_->Submit(frame);
+    ASSERT_TRUE(RunUntil([&] { return seen.back().volume == volume; }));
+    EXPECT_EQ(seen.back().Rgb(), FrameToRgb(*frame)) << volume;
+    if (volume != 4) continue;
+    std::optional<absl::StatusOr<DecodedVolume>> captured;  // beside it
+    display_->Capture(kLimit, [&](absl::StatusOr<DecodedVolume> v) { captured = std::move(v); });
+    ASSERT_TRUE(RunUntil([&] { return captured.has_value(); }));
+    EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*frame));
+  }
+  display_->Unwatch();
+  const size_t told = seen.size();
+  display_->Submit(source.Next(1));
+  ASSERT_TRUE(RunUntilOutcome(7));
+  EXPECT_EQ(seen.size(), told);
+}
+
 TEST_P(DriverConformance, BlankAndBrightness) {
   Start();
   FrameSource source(display_->info().layout, 5);

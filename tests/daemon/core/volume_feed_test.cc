@@ -1,0 +1,111 @@
+// What a viewer gets of a display's volumes: the newest, and what of it differs.
+#include "daemon/core/volume_feed.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/daemon/fakes/simulation.h"
+
+namespace voxeld::daemon {
+namespace {
+
+using testing::Put;
+using testing::Simulation;
+
+struct Viewer {
+  Viewer(Simulation& sim, const std::string& display = "main")
+      : sim(sim), feed(VolumeFeed::Open(*sim.core, sim.clock, display, [this] { ++readies; })) {
+    sim.core->Step();
+  }
+  // All that the display has to show is shown.
+  void Show() {
+    sim.core->Step();
+    while (sim.Show()) {
+    }
+  }
+
+  Simulation& sim;
+  int readies = 0;
+  std::shared_ptr<VolumeFeed> feed;
+};
+
+TEST(VolumeFeed, BeginsWithAllAndGoesOnWithWhatDiffers) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x", 1));
+  Viewer viewer(sim);
+  viewer.Show();
+  EXPECT_EQ(viewer.readies, 1);
+  auto change = viewer.feed->Take();
+  ASSERT_TRUE(change.ok() && change->has_value());
+  EXPECT_TRUE((*change)->whole);
+  EXPECT_EQ((*change)->slices.size(), static_cast<size_t>((*change)->volume.layout.slices));
+  change = viewer.feed->Take();
+  ASSERT_TRUE(change.ok());
+  EXPECT_FALSE(change->has_value());
+
+  sim.Send(client, 2, Put("a", "y", 2));
+  viewer.Show();
+  EXPECT_EQ(viewer.readies, 2);
+  change = viewer.feed->Take();
+  ASSERT_TRUE(change.ok() && change->has_value());
+  EXPECT_FALSE((*change)->whole);
+  EXPECT_EQ((*change)->slices, std::vector<int32_t>{0});
+}
+
+TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x", 1));
+  Viewer viewer(sim);
+  viewer.Show();
+  sim.Send(client, 2, Put("a", "x", 2));
+  viewer.Show();
+  EXPECT_EQ(viewer.readies, 1) << "told once, though two came";
+  EXPECT_FALSE(viewer.feed->asleep());
+  sim.clock.Advance(VolumeFeed::kPatience);
+  sim.Send(client, 3, Put("a", "x", 3));
+  viewer.Show();
+  EXPECT_TRUE(viewer.feed->asleep());
+  sim.core->Step();
+  EXPECT_FALSE(sim.display().tapped()) << "nothing is decoded for a sleeper";
+
+  auto change = viewer.feed->Take();  // awake
+  ASSERT_TRUE(change.ok());
+  EXPECT_FALSE(change->has_value());
+  EXPECT_FALSE(viewer.feed->asleep());
+  viewer.Show();
+  change = viewer.feed->Take();
+  ASSERT_TRUE(change.ok() && change->has_value());
+  EXPECT_TRUE((*change)->whole);
+}
+
+TEST(VolumeFeed, TwoWatchOneDisplayAndTheLastToGoEndsIt) {
+  Simulation sim;
+  sim.Start();
+  auto client = sim.Open();
+  sim.Send(client, 1, Put("a", "x", 1));
+  Viewer first(sim);
+  first.Show();
+  auto second = std::make_unique<Viewer>(sim);
+  second->Show();
+  EXPECT_EQ(second->readies, 1) << "the newest, at once";
+  second.reset();
+  sim.core->Step();
+  EXPECT_TRUE(sim.display().tapped());
+  first.feed.reset();
+  sim.core->Step();
+  EXPECT_FALSE(sim.display().tapped());
+}
+
+TEST(VolumeFeed, ANameThatIsNotThereIsTheEnd) {
+  Simulation sim;
+  sim.Start();
+  Viewer viewer(sim, "none");
+  EXPECT_EQ(viewer.readies, 1);
+  EXPECT_TRUE(absl::IsNotFound(viewer.feed->Take().status()));
+}
+
+}  // namespace
+}  // namespace voxeld::daemon
