@@ -330,8 +330,8 @@ class Capture final : public Sender<v1::VolumeChunk> {
     const int32_t left = volume_.layout.slices - next_slice_;
     if (left == 0) return End(absl::OkStatus());
     const int32_t count = std::min(left, SlicesOfAChunk(volume_.layout));
-    Send(Chunk(volume_, next_slice_, count));
-    next_slice_ += count;
+    const int32_t first = std::exchange(next_slice_, next_slice_ + count);  // before it can be sent
+    Send(Chunk(volume_, first, count));
   }
 
   Core& core_;

@@ -307,6 +307,12 @@ struct Watched {
   int volumes = 0;
 };
 
+std::string Whole(Daemon& daemon) {
+  const Captured captured = Capture(daemon, {});
+  EXPECT_TRUE(captured.status.ok()) << captured.status.error_message();
+  return captured.rgb;
+}
+
 TEST(WatchVolume, TellsWhatChangesAndIsWhatACaptureTells) {
   Daemon daemon;
   ASSERT_TRUE(daemon.Await(AllShowing));
@@ -318,7 +324,7 @@ TEST(WatchVolume, TellsWhatChangesAndIsWhatACaptureTells) {
   Watched watch(daemon);
   while (watch.slices.size() < 4) ASSERT_TRUE(watch.Read());
   EXPECT_EQ(watch.header.display(), "sim");
-  EXPECT_EQ(watch.rgb, Capture(daemon, {}).rgb);
+  EXPECT_EQ(watch.rgb, Whole(daemon));
   EXPECT_THAT(watch.rgb, HasSubstr(std::string(1, '\xff')));
 
   // A point in one slice alone: that slice alone comes.
@@ -332,9 +338,11 @@ TEST(WatchVolume, TellsWhatChangesAndIsWhatACaptureTells) {
   vertices->set_positions(std::string(reinterpret_cast<const char*>(at), 12));
   client.Send(point);
   client.Commit(2);
-  while (watch.volumes < 2 || watch.slices.empty()) ASSERT_TRUE(watch.Read());
+  while (watch.volumes < 2 || watch.slices.empty()) {
+    if (!watch.Read()) FAIL() << watch.call->Finish().error_message();
+  }
   EXPECT_EQ(watch.slices.size(), 1u);
-  EXPECT_EQ(watch.rgb, Capture(daemon, {}).rgb);
+  EXPECT_EQ(watch.rgb, Whole(daemon));
   client.Cancel();
 }
 
