@@ -334,7 +334,7 @@ TEST(WatchVolume, TellsWhatChangesAndIsWhatACaptureTells) {
   v1::Primitive* primitive = point.mutable_upsert()->mutable_entity()->mutable_primitive();
   v1::Vertices* vertices = primitive->mutable_points()->mutable_vertices();
   vertices->set_count(1);
-  const float at[3] = {-0.9f, -0.9f, -0.9f};
+  const float at[3] = {-0.9f, -0.9f, 0.1f};
   vertices->set_positions(std::string(reinterpret_cast<const char*>(at), 12));
   client.Send(point);
   client.Commit(2);
