@@ -1,6 +1,7 @@
 // voxeld: wiring only.
 #include <pthread.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -16,6 +17,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
 #include "daemon/access/security.h"
 #include "daemon/access/ticker.h"
 #include "daemon/assets/asset_store.h"
@@ -37,6 +39,7 @@
 #include "daemon/services/server.h"
 #include "daemon/state/kept_state.h"
 #include "daemon/version/version.h"
+#include "daemon/viewer/viewer.h"
 #include "display/drivers/registry.h"
 #include "display/sync/clock.h"
 #include "display/usb/libusb/libusb_bus.h"
@@ -107,14 +110,14 @@ gpu::EngineOptions EngineOf(gpu::EngineOptions engine, const std::vector<int>& g
 
 absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
     const ServerConfig& config, Core& core, std::shared_ptr<const std::atomic<bool>> draining,
-    Logger& log) {
+    viewer::Viewer& viewer, Logger& log) {
   std::unique_ptr<http::Server> none;
   if (!config.http.has_value()) return none;
-  absl::StatusOr<std::unique_ptr<http::Server>> server =
-      http::Server::Start({.listen = *config.http,
-                           .max_connections = config.max_http_connections,
-                           .idle_limit_ns = config.http_idle_limit_ns},
-                          http::MonitorHandler(core, std::move(draining)));
+  absl::StatusOr<std::unique_ptr<http::Server>> server = http::Server::Start(
+      {.listen = *config.http,
+       .max_connections = config.max_http_connections,
+       .idle_limit_ns = config.http_idle_limit_ns},
+      viewer.Handler(http::MonitorHandler(core, std::move(draining))), viewer.Upgrade());
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
   log.Warn("no http port", {{"why", std::string(server.status().message())},
                             {"hint", "choose another with --http ADDR, or none with --http off"}});
@@ -136,6 +139,37 @@ void LogDisplays(Core& core, Logger& log) {
                          {"device", display.engine_device},
                          {"engine_why", display.engine_reason}});
   }
+}
+
+// For whoever started it by hand: where to look, what to try, what draws. The address that gives control is for a
+// terminal alone: what is kept of the output must not give it.
+void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer) {
+  if (http != nullptr && !http->address().unix_socket) {
+    const std::string page = viewer::Viewer::PageAddress(http->address());
+    const std::string control = viewer.ControlAddress(http->address());
+    if (!viewer::Viewer::HasPage()) {
+      std::printf("see:    no page: this voxeld was built without it\n");
+    } else if (isatty(STDOUT_FILENO) != 0 && !control.empty()) {
+      std::printf("see:    %s   (to look; with control, once: %s)\n", page.c_str(),
+                  control.c_str());
+    } else {
+      std::printf("see:    %s\n", page.c_str());
+    }
+  } else {
+    std::printf("see:    voxelctl snapshot picture.png (http is off)\n");
+  }
+  std::printf("try:    voxelctl demo\n");
+  std::promise<absl::StatusOr<Stats>> promise;
+  core.GetStats([&promise](absl::StatusOr<Stats> stats) { promise.set_value(std::move(stats)); });
+  const absl::StatusOr<Stats> stats = promise.get_future().get();
+  if (!stats.ok() || stats->displays.empty()) {
+    std::printf("engine: none: there is no display\n");
+  } else {
+    const DisplayFigures& first = stats->displays.front();
+    std::printf("engine: %s, %s%s%s\n", first.engine.c_str(), first.engine_device.c_str(),
+                first.engine_reason.empty() ? "" : ": ", first.engine_reason.c_str());
+  }
+  std::fflush(stdout);
 }
 
 // Sockets that whoever started the daemon has opened; those with the name "tls" speak it.
@@ -240,8 +274,15 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   if (absl::Status status = core.Start(); !status.ok()) return Fail(1, status);
 
   const auto draining = std::make_shared<std::atomic<bool>>(false);
+  absl::StatusOr<std::unique_ptr<viewer::Viewer>> viewer = viewer::Viewer::Make(
+      core, clock,
+      {.version = Version(),
+       .hosts = absl::StrSplit(config.server.http_hosts, ',', absl::SkipWhitespace()),
+       .control = config.server.http_control,
+       .audit = &security->audit()});
+  if (!viewer.ok()) return Fail(1, viewer.status());
   absl::StatusOr<std::unique_ptr<http::Server>> http =
-      StartHttp(config.server, core, draining, log);
+      StartHttp(config.server, core, draining, **viewer, log);
   if (!http.ok()) return Fail(1, http.status());
   const absl::StatusOr<std::optional<Address>> local_address = LocalSocketAddress(config.server);
   if (!local_address.ok()) return Fail(1, local_address.status());
@@ -307,6 +348,8 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   log.Info("ready", {{"listen", absl::StrJoin(addresses, " ")},
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
+
+  Welcome(core, http->get(), **viewer);
 
   const std::string displays_text =
       absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays");

@@ -64,6 +64,8 @@ struct ServerConfig {
   int64_t keepalive_timeout_ns = 10 * sync::kSecond;
   uint32_t max_http_connections = 64;
   int64_t http_idle_limit_ns = 10 * sync::kSecond;
+  std::string http_hosts;    // names, between commas, that browsers may know this machine by
+  bool http_control = true;  // a browser may be given control, by an address that serves once
 };
 
 struct EngineConfig {

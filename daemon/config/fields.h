@@ -69,6 +69,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("keepalive_timeout_ns", config.server.keepalive_timeout_ns, kSecond, kHour);
   visitor.Integer("max_http_connections", config.server.max_http_connections, 1, 4096);
   visitor.Integer("http_idle_limit_ns", config.server.http_idle_limit_ns, kSecond / 10, kHour);
+  visitor.Text("http_hosts", config.server.http_hosts);
+  visitor.Flag("http_control", config.server.http_control);
 
   visitor.Section("engine");
   visitor.Engine("kind", config.engine.kind);

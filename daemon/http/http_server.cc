@@ -4,15 +4,14 @@
 #include <unistd.h>
 
 #include <boost/asio/basic_socket_acceptor.hpp>
-#include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core/basic_stream.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
 #include <cstring>
 #include <optional>
@@ -21,6 +20,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/http/connection_stream.h"
+#include "daemon/http/web_socket_session.h"
 
 namespace voxeld::daemon::http {
 namespace {
@@ -28,9 +29,8 @@ namespace {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace wire = boost::beast::http;
-using Protocol = asio::generic::stream_protocol;
 using Acceptor = asio::basic_socket_acceptor<Protocol, asio::io_context::executor_type>;
-using Stream = beast::basic_stream<Protocol, asio::io_context::executor_type>;
+using Stream = ConnectionStream;
 using Parser = wire::request_parser<wire::string_body>;
 using boost::system::error_code;
 
@@ -42,17 +42,22 @@ Response Plain(unsigned status, std::string text) {
   return {status, "text/plain; charset=utf-8", std::move(text) + "\n"};
 }
 
+std::string_view View(boost::beast::string_view text) { return {text.data(), text.size()}; }
+
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(std::shared_ptr<asio::io_context> io, Stream::socket_type socket,
-             const ServerOptions& options, const Handler& handler,
-             std::function<void(Connection*)> closed)
+             const ServerOptions& options, const Handler& handler, const Upgrade& upgrade,
+             std::function<void(Connection*)> closed,
+             std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded)
       : io_(std::move(io)),
         stream_(std::move(socket)),
         timer_(io_->get_executor()),
         options_(options),
         handler_(handler),
-        closed_(std::move(closed)) {}
+        upgrade_(upgrade),
+        closed_(std::move(closed)),
+        upgraded_(std::move(upgraded)) {}
 
   void Read() {
     parser_ = std::make_unique<Parser>();
@@ -93,11 +98,25 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (request.method() != wire::verb::get && !head_) {
       return Write(Plain(405, "only GET and HEAD are answered"), close);
     }
-    std::string_view path(request.target().data(), request.target().size());
-    path = path.substr(0, path.find('?'));
+    const std::string_view target = View(request.target());
+    const size_t query = target.find('?');
+    const Request asked = {
+        .path = target.substr(0, query),
+        .query = query == std::string_view::npos ? std::string_view() : target.substr(query + 1),
+        .host = View(request[wire::field::host]),
+        .origin = View(request[wire::field::origin]),
+        .cookie = View(request[wire::field::cookie]),
+        .accept_encoding = View(request[wire::field::accept_encoding])};
+    if (upgrade_ && beast::websocket::is_upgrade(request)) {
+      const absl::StatusOr<ServeWebSocket> serve = upgrade_(asked);
+      if (serve.ok()) return GiveAway(*serve);
+      return Write(Plain(absl::IsNotFound(serve.status()) ? 404 : 403,
+                         std::string(serve.status().message())),
+                   true);
+    }
     const uint64_t number = ++number_;
     // The answer may come when the connection, or the whole server, is gone.
-    const bool known = handler_(path, [weak = weak_from_this(), number, close](Response answer) {
+    const bool known = handler_(asked, [weak = weak_from_this(), number, close](Response answer) {
       const std::shared_ptr<Connection> open = weak.lock();
       if (open == nullptr) return;
       asio::post(*open->io_, [weak, number, close, answer = std::move(answer)]() mutable {
@@ -112,6 +131,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
     });
   }
 
+  void GiveAway(const ServeWebSocket& serve) {
+    const RequestMessage request = parser_->release();
+    stream_.expires_never();
+    upgraded_(std::move(stream_), request, serve);
+    if (auto closed = std::exchange(closed_, nullptr)) closed(this);
+  }
+
   // The first answer to request `number` counts.
   void OnAnswer(uint64_t number, Response answer, bool close) {
     if (number != number_ || !closed_) return;
@@ -124,6 +150,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     response_.emplace(static_cast<wire::status>(answer.status), 11);
     response_->set(wire::field::content_type, answer.content_type);
     response_->set(wire::field::cache_control, "no-store");
+    for (const auto& [name, value] : answer.headers) response_->set(name, value);
     if (answer.status == 405) response_->set(wire::field::allow, "GET, HEAD");
     response_->keep_alive(!close);
     response_->content_length(answer.body.size());
@@ -146,7 +173,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   asio::steady_timer timer_;
   const ServerOptions& options_;
   const Handler& handler_;
+  const Upgrade& upgrade_;
   std::function<void(Connection*)> closed_;  // empty once closed
+  const std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded_;
   beast::flat_buffer buffer_;
   std::unique_ptr<Parser> parser_;
   std::optional<wire::response<wire::string_body>> response_;
@@ -175,9 +204,10 @@ absl::StatusOr<Protocol::endpoint> Endpoint(const Address& address, asio::io_con
 // Everything but Start and the destructor runs on the one thread.
 class Server::Impl {
  public:
-  Impl(ServerOptions options, Handler handler)
+  Impl(ServerOptions options, Handler handler, Upgrade upgrade)
       : options_(std::move(options)),
         handler_(std::move(handler)),
+        upgrade_(std::move(upgrade)),
         io_(std::make_shared<asio::io_context>(1)),
         acceptor_(io_->get_executor()),
         retry_(io_->get_executor()) {}
@@ -192,6 +222,8 @@ class Server::Impl {
       retry_.cancel();
       const std::set<std::shared_ptr<Connection>> connections = connections_;
       for (const auto& connection : connections) connection->Close();
+      const std::set<std::shared_ptr<WebSocketSession>> sockets = sockets_;
+      for (const auto& socket : sockets) socket->Close();
     });
     thread_.join();
   }
@@ -232,15 +264,20 @@ class Server::Impl {
 
  private:
   void Accept() {
-    if (accepting_ || stopping_ || connections_.size() >= options_.max_connections) return;
+    if (accepting_ || stopping_ ||
+        connections_.size() + sockets_.size() >= options_.max_connections)
+      return;
     accepting_ = true;
     acceptor_.async_accept([this](error_code error, Stream::socket_type socket) {
       accepting_ = false;
       if (stopping_) return;
       if (error) return AcceptLater();
-      const auto connection =
-          std::make_shared<Connection>(io_, std::move(socket), options_, handler_,
-                                       [this](Connection* closed) { OnClosed(closed); });
+      const auto connection = std::make_shared<Connection>(
+          io_, std::move(socket), options_, handler_, upgrade_,
+          [this](Connection* closed) { OnClosed(closed); },
+          [this](Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
+            OnUpgraded(std::move(stream), request, serve);
+          });
       connections_.insert(connection);
       connection->Read();
       Accept();
@@ -260,12 +297,22 @@ class Server::Impl {
     Accept();
   }
 
+  void OnUpgraded(Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
+    sockets_.insert(
+        StartWebSocket(io_, std::move(stream), request, serve, [this](WebSocketSession* closed) {
+          std::erase_if(sockets_, [closed](const auto& socket) { return socket.get() == closed; });
+          Accept();
+        }));
+  }
+
   ServerOptions options_;
   const Handler handler_;
+  const Upgrade upgrade_;
   const std::shared_ptr<asio::io_context> io_;
   Acceptor acceptor_;
   asio::steady_timer retry_;
   std::set<std::shared_ptr<Connection>> connections_;
+  std::set<std::shared_ptr<WebSocketSession>> sockets_;
   bool accepting_ = false, stopping_ = false;
   std::thread thread_;
 };
@@ -273,8 +320,9 @@ class Server::Impl {
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
-absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options, Handler handler) {
-  auto impl = std::make_unique<Impl>(std::move(options), std::move(handler));
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options, Handler handler,
+                                                      Upgrade upgrade) {
+  auto impl = std::make_unique<Impl>(std::move(options), std::move(handler), std::move(upgrade));
   if (absl::Status status = impl->Start(); !status.ok()) return status;
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }

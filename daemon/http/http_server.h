@@ -1,5 +1,5 @@
 // A small HTTP/1.1 server for people's and machines' questions about the daemon: GET and HEAD of a
-// few paths, one thread, asynchronous, bounded in connections, request size and time.
+// few paths, and WebSockets (web_socket.h); one thread, asynchronous, bounded in connections, request size and time.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,12 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "daemon/address/address.h"
+#include "daemon/http/web_socket.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::daemon::http {
@@ -18,12 +21,27 @@ struct Response {
   unsigned status = 200;
   std::string content_type = "text/plain; charset=utf-8";
   std::string body;
+  std::vector<std::pair<std::string, std::string>> headers;  // beside those that all have
+};
+
+// Of a GET or HEAD; what it points to lives as long as the call that it is given to.
+struct Request {
+  std::string_view path;   // begins with '/', without the query
+  std::string_view query;  // behind '?'
+  // Headers; empty: it has none.
+  std::string_view host, origin, cookie, accept_encoding;
 };
 
 // Answers a path by calling `done` once, from any thread, at once or later. False: there is no such
 // path, and `done` will not be called. Called on the server's thread; must not block.
 using Done = std::function<void(Response)>;
-using Handler = std::function<bool(std::string_view path, Done done)>;
+using Handler = std::function<bool(const Request& request, Done done)>;
+
+// Serves a request for a WebSocket, or says why not: NotFound, PermissionDenied (403). Called on the
+// server's thread. Empty: there are none.
+using ServeWebSocket =
+    std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>;
+using Upgrade = std::function<absl::StatusOr<ServeWebSocket>(const Request& request)>;
 
 struct ServerOptions {
   Address listen;
@@ -38,7 +56,8 @@ struct ServerOptions {
 class Server {
  public:
   // AlreadyExists if somebody listens there.
-  static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options, Handler handler);
+  static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options, Handler handler,
+                                                       Upgrade upgrade = nullptr);
   // Closes every connection and joins the thread; `done` functions may be called later still.
   ~Server();
   Server(const Server&) = delete;

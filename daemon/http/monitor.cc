@@ -69,7 +69,8 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
 }
 
 Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<bool>> draining) {
-  return [&core, draining](std::string_view path, Done done) {
+  return [&core, draining](const Request& request, Done done) {
+    const std::string_view path = request.path;
     if (path == "/metrics") {
       core.GetStats([done](absl::StatusOr<Stats> stats) {
         if (!stats.ok()) return done(Unavailable(stats.status()));

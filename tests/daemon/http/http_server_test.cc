@@ -73,7 +73,8 @@ class HttpServer : public ::testing::Test {
  protected:
   void Start(ServerOptions options = {}) {
     if (!options.listen.unix_socket) options.listen = *ParseAddress("127.0.0.1:0");
-    auto server = Server::Start(options, [this](std::string_view path, Done done) {
+    auto server = Server::Start(options, [this](const Request& request, Done done) {
+      const std::string_view path = request.path;
       if (path == "/hello") done({.body = "hello\n"});
       if (path == "/later") {
         sync::MutexLock lock(mutex_);
@@ -204,7 +205,7 @@ TEST_F(HttpServer, ServesAUnixSocketAndRemovesIt) {
 TEST_F(HttpServer, ABusyPortIsAnError) {
   Start();
   const auto second =
-      Server::Start({.listen = server_->address()}, [](std::string_view, Done) { return false; });
+      Server::Start({.listen = server_->address()}, [](const Request&, Done) { return false; });
   EXPECT_TRUE(absl::IsAlreadyExists(second.status())) << second.status();
 }
 

@@ -1,0 +1,157 @@
+#include "daemon/http/web_socket_session.h"
+
+#include <boost/asio/post.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <deque>
+#include <string>
+#include <utility>
+
+namespace voxeld::daemon::http {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = boost::beast::websocket;
+using boost::system::error_code;
+
+constexpr auto kHandshakeLimit = std::chrono::seconds(10);
+constexpr auto kSilenceLimit = std::chrono::seconds(60);  // half of it: a ping
+constexpr size_t kMostReason = 123;
+
+class Session final : public WebSocketSession, public std::enable_shared_from_this<Session> {
+ public:
+  Session(std::shared_ptr<asio::io_context> io, ConnectionStream stream,
+          std::function<void(WebSocketSession*)> closed)
+      : io_(std::move(io)), socket_(std::move(stream)), closed_(std::move(closed)) {}
+
+  void Start(const RequestMessage& request,
+             const std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>&
+                 serve) {
+    service_ = serve(std::make_shared<Peer>(io_, weak_from_this()));
+    beast::get_lowest_layer(socket_).expires_never();
+    socket_.set_option(websocket::stream_base::timeout{kHandshakeLimit, kSilenceLimit, true});
+    socket_.read_message_max(kGreatestMessage);
+    socket_.auto_fragment(false);
+    socket_.async_accept(request, [self = shared_from_this()](error_code error) {
+      if (error) return self->End();
+      self->accepted_ = true;
+      self->Write();
+      self->Read();
+    });
+  }
+
+  void Close() override {
+    error_code ignored;
+    beast::get_lowest_layer(socket_).socket().shutdown(ConnectionStream::socket_type::shutdown_both,
+                                                       ignored);
+    beast::get_lowest_layer(socket_).close();
+    End();
+  }
+
+ private:
+  struct Outgoing {
+    std::string bytes;
+    bool binary = false, close = false;
+  };
+
+  class Peer final : public WebSocketPeer {
+   public:
+    Peer(std::shared_ptr<asio::io_context> io, std::weak_ptr<Session> session)
+        : io_(std::move(io)), session_(std::move(session)) {}
+    void Send(std::string message, bool binary) override {
+      Pass({std::move(message), binary, false});
+    }
+    void Post(std::function<void()> what) override {
+      asio::post(*io_, [session = session_, what = std::move(what)] {
+        const auto self = session.lock();
+        if (self != nullptr && self->closed_) what();
+      });
+    }
+    void Close(std::string why) override {
+      why.resize(std::min(why.size(), kMostReason));
+      Pass({std::move(why), false, true});
+    }
+
+   private:
+    void Pass(Outgoing message) {
+      asio::post(*io_, [session = session_, message = std::move(message)]() mutable {
+        if (const auto self = session.lock()) self->Enqueue(std::move(message));
+      });
+    }
+
+    const std::shared_ptr<asio::io_context> io_;
+    const std::weak_ptr<Session> session_;
+  };
+
+  void Enqueue(Outgoing message) {
+    if (!closed_) return;
+    waiting_.push_back(std::move(message));
+    Write();
+  }
+
+  void Write() {
+    if (!accepted_ || writing_ || waiting_.empty()) return;
+    writing_ = true;
+    Outgoing& next = waiting_.front();
+    if (next.close) {
+      return socket_.async_close({websocket::close_code::policy_error, next.bytes},
+                                 [self = shared_from_this()](error_code) { self->End(); });
+    }
+    socket_.binary(next.binary);
+    socket_.async_write(asio::buffer(next.bytes),
+                        [self = shared_from_this()](error_code error, size_t) {
+                          self->writing_ = false;
+                          if (error) return self->End();
+                          self->waiting_.pop_front();
+                          self->Write();
+                        });
+  }
+
+  void Read() {
+    socket_.async_read(buffer_, [self = shared_from_this()](error_code error, size_t) {
+      if (error) return self->End();
+      const bool text = self->socket_.got_text();
+      std::string message = beast::buffers_to_string(self->buffer_.data());
+      self->buffer_.consume(self->buffer_.size());
+      if (!self->closed_) return;
+      if (text) {
+        self->service_->OnText(std::move(message));
+      } else {
+        self->Enqueue({"text is expected", false, true});
+      }
+      self->Read();
+    });
+  }
+
+  void End() {
+    auto closed = std::exchange(closed_, nullptr);
+    if (!closed) return;
+    service_ = nullptr;
+    closed(this);
+  }
+
+  const std::shared_ptr<asio::io_context> io_;
+  websocket::stream<ConnectionStream> socket_;
+  std::function<void(WebSocketSession*)> closed_;  // empty once closed
+  std::unique_ptr<WebSocketService> service_;
+  beast::flat_buffer buffer_;
+  std::deque<Outgoing> waiting_;  // the first is being written
+  bool accepted_ = false, writing_ = false;
+};
+
+}  // namespace
+
+std::shared_ptr<WebSocketSession> StartWebSocket(
+    std::shared_ptr<asio::io_context> io, ConnectionStream stream, const RequestMessage& request,
+    const std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>& serve,
+    std::function<void(WebSocketSession*)> closed) {
+  const auto session =
+      std::make_shared<Session>(std::move(io), std::move(stream), std::move(closed));
+  session->Start(request, serve);
+  return session;
+}
+
+}  // namespace voxeld::daemon::http

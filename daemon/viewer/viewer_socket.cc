@@ -1,0 +1,291 @@
+#include "daemon/viewer/viewer_socket.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/core/volume_feed.h"
+#include "daemon/viewer/volume_message.h"
+#include "daemon/wire/convert.h"
+#include "daemon/wire/encode.h"
+#include "voxeld/v1/display.pb.h"
+#include "voxeld/v1/scene.pb.h"
+
+namespace voxeld::daemon::viewer {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr size_t kMostWatches = 16;
+constexpr size_t kMostDark = 100'000;
+
+std::string ToJson(const google::protobuf::Message& message) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  options.always_print_primitive_fields = true;
+  std::string text;
+  if (!google::protobuf::util::MessageToJsonString(message, &text, options).ok()) return "null";
+  return text;
+}
+
+// What a page needs of it: not where every light of a lattice is.
+std::string DisplayJson(const DisplayDescription& display) {
+  v1::DisplayDescription message;
+  wire::Encode(display, &message);
+  if (message.geometry().has_lattice()) {
+    v1::Lattice* lattice = message.mutable_geometry()->mutable_lattice();
+    lattice->clear_pixels();
+    lattice->clear_x_mm();
+    lattice->clear_y_mm();
+    lattice->clear_z_mm();
+  }
+  message.mutable_geometry()->clear_correction();
+  return ToJson(message);
+}
+
+Json VecJson(const display::Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+
+std::string Text(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
+ public:
+  ViewerSocket(std::shared_ptr<ViewerShared> shared, std::shared_ptr<http::WebSocketPeer> peer,
+               bool control)
+      : shared_(std::move(shared)), peer_(std::move(peer)), control_(control) {}
+
+  void OnText(const std::string& text) {
+    const Json message = Json::parse(text, nullptr, false);
+    if (!message.is_object()) return Complain("a message is a JSON object");
+    if (message.contains("hello")) return Hello();
+    if (message.contains("watch")) return Watch(message);
+    if (message.contains("shown")) return Shown(message["shown"]);
+    if (message.contains("unwatch")) return Unwatch(message["unwatch"]);
+    if (message.contains("dark")) return Dark(message["dark"]);
+    if (message.contains("stats")) return Stats();
+    if (message.contains("layers")) return Layers();
+    if (message.contains("update")) return Update(message["update"]);
+    if (message.contains("clear")) return Clear(message["clear"]);
+    Complain("there is no such message; see docs/protocols/viewer.md");
+  }
+
+ private:
+  struct Watched {
+    std::string display;
+    std::shared_ptr<PixelPlaces> places;
+    std::shared_ptr<VolumeFeed> feed;
+    bool credit = true;  // the page has shown the last one
+  };
+
+  void Complain(const std::string& why) { peer_->Send(Text({{"error", why}}), false); }
+
+  // `what` on the http server's thread, if the socket is still there, with what `reply` is given.
+  template <typename T>
+  Core::Reply<T> Then(std::function<void(ViewerSocket&, absl::StatusOr<T>)> what) {
+    return
+        [weak = weak_from_this(), peer = peer_, what = std::move(what)](absl::StatusOr<T> value) {
+          peer->Post([weak, what, value = std::move(value)]() mutable {
+            if (const auto self = weak.lock()) what(*self, std::move(value));
+          });
+        };
+  }
+
+  void Hello() {
+    using Displays = std::vector<DisplayDescription>;
+    shared_->core.ListDisplays(
+        Then<Displays>([](ViewerSocket& self, absl::StatusOr<Displays> displays) {
+          if (!displays.ok()) return self.Complain(std::string(displays.status().message()));
+          std::string text =
+              absl::StrCat("{\"hello\":{\"version\":", Text(self.shared_->options.version),
+                           ",\"control\":", self.control_ ? "true" : "false", ",\"displays\":[");
+          for (size_t i = 0; i < displays->size(); ++i) {
+            absl::StrAppend(&text, i == 0 ? "" : ",", DisplayJson((*displays)[i]));
+          }
+          self.peer_->Send(text + "]}}", false);
+        }));
+  }
+
+  static std::optional<uint16_t> Number(const Json& json) {
+    if (!json.is_number_unsigned() || json.get<uint64_t>() > UINT16_MAX) return std::nullopt;
+    return json.get<uint16_t>();
+  }
+
+  void Watch(const Json& message) {
+    const std::optional<uint16_t> id = Number(message.value("id", Json()));
+    if (!id.has_value() || !message["watch"].is_string()) {
+      return Complain("watch names a display, and id is a number from 0 to 65535");
+    }
+    if (watches_.contains(*id) || watches_.size() >= kMostWatches) {
+      return Complain(absl::StrCat("a page has ", kMostWatches, " watches with different ids"));
+    }
+    watches_[*id].display = message["watch"].get<std::string>();
+    shared_->core.GetDisplay(watches_[*id].display,
+                             Then<DisplayDescription>([id = *id](ViewerSocket& self, auto display) {
+                               self.Begin(id, std::move(display));
+                             }));
+  }
+
+  void Begin(uint16_t id, const absl::StatusOr<DisplayDescription>& display) {
+    const auto found = watches_.find(id);
+    if (found == watches_.end()) return;
+    if (!display.ok()) return End(id, display.status());
+    Watched& watch = found->second;
+    watch.places = PlacesOf(*display);
+    const PlaceBox& box = watch.places->box();
+    peer_->Send(absl::StrCat("{\"watching\":{\"id\":", id, ",\"low_mm\":",
+                             Text(VecJson(box.low_mm)), ",\"high_mm\":", Text(VecJson(box.high_mm)),
+                             ",\"pitch_mm\":", Text(Json(watch.places->pitch_mm())),
+                             ",\"display\":", DisplayJson(*display), "}}"),
+                false);
+    watch.feed = VolumeFeed::Open(shared_->core, shared_->clock, display->info.name,
+                                  [weak = weak_from_this(), peer = peer_, id] {
+                                    peer->Post([weak, id] {
+                                      if (const auto self = weak.lock()) self->Pump(id);
+                                    });
+                                  });
+  }
+
+  std::shared_ptr<PixelPlaces> PlacesOf(const DisplayDescription& display) {
+    std::weak_ptr<PixelPlaces>& known = shared_->places[display.info.name];
+    std::shared_ptr<PixelPlaces> places = known.lock();
+    if (places == nullptr) {
+      places = std::make_shared<PixelPlaces>(display.info.geometry);
+      known = places;
+    }
+    return places;
+  }
+
+  // The next change, if the page is ready for it and there is one.
+  void Pump(uint16_t id) {
+    const auto found = watches_.find(id);
+    if (found == watches_.end() || found->second.feed == nullptr || !found->second.credit) return;
+    Watched& watch = found->second;
+    absl::StatusOr<std::optional<VolumeFeed::Change>> change = watch.feed->Take();
+    if (!change.ok()) return End(id, change.status());
+    if (!change->has_value()) return;
+    watch.credit = false;
+    peer_->Send(VolumeMessage(id, **change, *watch.places), true);
+  }
+
+  void Shown(const Json& which) {
+    const std::optional<uint16_t> id = Number(which);
+    const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
+    if (found == watches_.end()) return;  // it may have ended meanwhile
+    found->second.credit = true;
+    Pump(*id);
+  }
+
+  void Unwatch(const Json& which) {
+    if (const std::optional<uint16_t> id = Number(which)) watches_.erase(*id);
+  }
+
+  void End(uint16_t id, const absl::Status& why) {
+    watches_.erase(id);
+    peer_->Send(Text({{"ended", {{"id", id}, {"why", std::string(why.message())}}}}), false);
+  }
+
+  void Dark(const Json& which) {
+    const std::optional<uint16_t> id = Number(which);
+    const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
+    if (found == watches_.end() || found->second.places == nullptr) return;
+    peer_->Send(DarkMessage(*id, kMostDark, *found->second.places), true);
+  }
+
+  void Stats() {
+    shared_->core.GetStats(
+        Then<daemon::Stats>([](ViewerSocket& self, absl::StatusOr<daemon::Stats> stats) {
+          if (!stats.ok()) return self.Complain(std::string(stats.status().message()));
+          v1::Stats message;
+          wire::Encode(*stats, &message);
+          self.peer_->Send(absl::StrCat("{\"stats\":", ToJson(message), "}"), false);
+        }));
+  }
+
+  void Layers() {
+    EntityQuery query;
+    query.page_size = 1;
+    shared_->core.ListEntities(
+        query, Then<EntityPage>([](ViewerSocket& self, absl::StatusOr<EntityPage> page) {
+          if (!page.ok()) return self.Complain(std::string(page.status().message()));
+          page->entities.clear();
+          v1::ListEntitiesResponse message;
+          wire::Encode(*page, &message);
+          self.peer_->Send(absl::StrCat("{\"layers\":", ToJson(message), "}"), false);
+        }));
+  }
+
+  // Whether what is asked is a control's to ask, and reads as the message that it has to be.
+  bool ReadControl(const Json& json, google::protobuf::Message* message) {
+    if (!control_) {
+      Complain(
+          "this page may only look: control is for the address that voxeld printed at its start");
+      return false;
+    }
+    const auto status = google::protobuf::util::JsonStringToMessage(Text(json), message);
+    if (!status.ok()) Complain(std::string(status.message()));
+    return status.ok();
+  }
+
+  void Audit(const char* method, const google::protobuf::Message& request,
+             const absl::Status& result) {
+    access::Audit* const audit = shared_->options.audit;
+    if (audit == nullptr) return;
+    audit->Record("page", "http", method, request.ShortDebugString(), result);
+  }
+
+  void Update(const Json& json) {
+    v1::UpdateDisplayRequest request;
+    if (!ReadControl(json, &request)) return;
+    absl::StatusOr<DisplayUpdate> update = wire::FromWire(request);
+    if (!update.ok()) return Complain(std::string(update.status().message()));
+    shared_->core.UpdateDisplay(
+        request.name(), *std::move(update),
+        Then<DisplayDescription>([request](ViewerSocket& self, auto display) {
+          self.Audit("UpdateDisplay", request, display.status());
+          if (!display.ok()) return self.Complain(std::string(display.status().message()));
+          self.peer_->Send(absl::StrCat("{\"display\":", DisplayJson(*display), "}"), false);
+        }));
+  }
+
+  void Clear(const Json& json) {
+    v1::ClearLayerRequest request;
+    if (!ReadControl(json, &request)) return;
+    shared_->core.ClearLayer(request.owner(), request.layer(), false, std::nullopt,
+                             Then<Cleared>([request](ViewerSocket& self, auto cleared) {
+                               self.Audit("ClearLayer", request, cleared.status());
+                               if (!cleared.ok()) {
+                                 return self.Complain(std::string(cleared.status().message()));
+                               }
+                               self.Layers();
+                             }));
+  }
+
+  const std::shared_ptr<ViewerShared> shared_;
+  const std::shared_ptr<http::WebSocketPeer> peer_;
+  const bool control_;
+  std::map<uint16_t, Watched> watches_;
+};
+
+class Service final : public http::WebSocketService {
+ public:
+  explicit Service(std::shared_ptr<ViewerSocket> socket) : socket_(std::move(socket)) {}
+  void OnText(std::string message) override { socket_->OnText(message); }
+
+ private:
+  const std::shared_ptr<ViewerSocket> socket_;  // what others hold of it is weak
+};
+
+}  // namespace
+
+std::unique_ptr<http::WebSocketService> NewViewerSocket(std::shared_ptr<ViewerShared> shared,
+                                                        std::shared_ptr<http::WebSocketPeer> peer,
+                                                        bool control) {
+  return std::make_unique<Service>(
+      std::make_shared<ViewerSocket>(std::move(shared), std::move(peer), control));
+}
+
+}  // namespace voxeld::daemon::viewer

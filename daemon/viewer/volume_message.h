@@ -1,0 +1,21 @@
+// A change of a volume as bytes for the page (docs/protocols/viewer.md §3).
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "daemon/core/volume_feed.h"
+#include "daemon/viewer/pixel_places.h"
+
+namespace voxeld::daemon::viewer {
+
+// What the first byte of a binary message says.
+enum class MessageKind : uint8_t { kVolume = 1, kDark = 2 };
+
+// The slices of `change` with all their lit pixels, for the watch of that number. `change` is of the display that
+// `places` is of.
+std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places);
+// Where pixels are, lit or not: `most` at the most, spread over the display.
+std::string DarkMessage(uint16_t watch, size_t most, PixelPlaces& places);
+
+}  // namespace voxeld::daemon::viewer

@@ -1,0 +1,93 @@
+// One display on the page: its canvas, what draws it, and where it is looked at from.
+import { Orbit, kHome, viewOf } from "./camera";
+import { OutlineColors, drawOutline } from "./outline";
+import { Watching } from "./protocol";
+import { Drawn, Renderer, Scene, Sweep, wholeSweep } from "./renderer";
+
+export interface Look {
+  exposure: number;
+  dark: boolean;
+  outline: boolean;
+  sweep: Sweep | null; // null: all slices
+}
+
+export class DisplayView {
+  readonly element = document.createElement("div");
+  readonly canvas = document.createElement("canvas");
+  private readonly overlay = document.createElement("canvas");
+  private readonly label = document.createElement("div");
+  readonly renderer: Renderer;
+  watching: Watching | null = null;
+  drawn: Drawn = { volume: 0, points: 0, milliseconds: 0 };
+  frames = 0;
+  onDrawn: (drawn: Drawn) => void = () => {};
+  private readonly observer: ResizeObserver;
+  private size: [number, number] = [0, 0];
+
+  constructor(readonly name: string, makeRenderer: (canvas: HTMLCanvasElement) => Renderer, private readonly redraw: () => void) {
+    this.element.className = "view";
+    this.overlay.className = "overlay";
+    this.overlay.setAttribute("aria-hidden", "true");
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", `What display ${name} shows`);
+    this.label.className = "label";
+    this.label.textContent = name;
+    this.element.append(this.canvas, this.overlay, this.label);
+    this.renderer = makeRenderer(this.canvas);
+    this.renderer.onDrawn = (drawn) => {
+      this.drawn = drawn;
+      ++this.frames;
+      this.onDrawn(drawn);
+    };
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(this.element);
+  }
+
+  begin(watching: Watching): void {
+    this.watching = watching;
+    this.renderer.begin(watching);
+  }
+
+  say(text: string): void {
+    this.label.textContent = text;
+  }
+
+  draw(orbit: Orbit, look: Look, colors: OutlineColors): void {
+    const { watching } = this;
+    if (watching === null || this.size[0] === 0) return;
+    const scene: Scene = {
+      orbit, exposure: look.exposure, dark: look.dark,
+      sweep: look.sweep ?? wholeSweep(watching.display.layout.slices),
+    };
+    this.renderer.draw(scene);
+    const context = this.overlay.getContext("2d");
+    if (context === null) return;
+    const [width, height] = this.size;
+    context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    if (look.outline) drawOutline(context, this.view(orbit), watching, width, height, colors);
+    else context.clearRect(0, 0, width, height);
+  }
+
+  // As the renderers have it.
+  view(orbit: Orbit = kHome): Float64Array {
+    const { low_mm, high_mm } = this.watching!;
+    const middle = low_mm.map((low, i) => (low + high_mm[i]!) / 2);
+    return viewOf(orbit, middle, Math.hypot(...low_mm.map((low, i) => (high_mm[i]! - low) / 2)));
+  }
+
+  dispose(): void {
+    this.observer.disconnect();
+    this.renderer.dispose();
+    this.element.remove();
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (width === 0 || height === 0) return;
+    this.size = [width, height];
+    this.overlay.width = Math.round(width * devicePixelRatio);
+    this.overlay.height = Math.round(height * devicePixelRatio);
+    this.renderer.resize(width, height, devicePixelRatio);
+    this.redraw();
+  }
+}
