@@ -39,6 +39,7 @@ set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
     "Networked clients stream 3D primitives in over gRPC; voxeld assembles the voxel\nscene, slices it, and pushes whole volumes of light to the display. With the\nclient voxelctl, udev rules and a systemd service.")
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "passwd, procps")  # for postinst and reload
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "fonts-dejavu-core, hershey-fonts-data")  # text
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "ffmpeg")  # voxelctl render to MP4
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)

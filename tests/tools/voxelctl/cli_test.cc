@@ -114,6 +114,49 @@ TEST(CommandLine, Input) {
   }
 }
 
+TEST(CommandLine, RenderAndExport) {
+  const auto render = std::get<TurntableOptions>(
+      Parse("render a.MP4 --frames 10 --fps 30 --size 640x480 --azimuth 5 --elevation -6 --turns "
+            "-0.5 --live --display d --timeout 2")
+          .command);
+  EXPECT_EQ(render.file, "a.MP4");
+  EXPECT_EQ(render.format, PictureFormat::kMp4);
+  EXPECT_EQ(render.frames, 10);
+  EXPECT_EQ(render.fps, 30);
+  EXPECT_EQ(render.width, 640);
+  EXPECT_EQ(render.azimuth_degrees, 5);
+  EXPECT_EQ(render.elevation_degrees, -6);
+  EXPECT_EQ(render.turns, -0.5);
+  EXPECT_TRUE(render.live);
+  EXPECT_EQ(render.display, "d");
+  const auto gif = std::get<TurntableOptions>(Parse("render a.gif").command);
+  EXPECT_EQ(gif.frames, 72);
+  EXPECT_EQ(gif.fps, 24);
+  EXPECT_EQ(gif.width, 720);
+  EXPECT_EQ(std::get<TurntableOptions>(Parse("render -- -#.png").command).frames, 72);
+  EXPECT_EQ(std::get<TurntableOptions>(Parse("render a.png").command).frames, 1);
+  EXPECT_EQ(std::get<ExportOptions>(Parse("export a.npz --display d").command).format,
+            ExportFormat::kNpz);
+  const std::vector<std::pair<const char*, const char*>> wrong = {
+      {"render", "render wants the name of a file, such as turn.gif"},
+      {"render a.mpg", "the name a.mpg ends in .mpg; render goes by it; did you mean .mp4?"},
+      {"render turn", "the name turn has no ending; render goes by it, such as turn.gif"},
+      {"render a.png --frames 3", "--frames is of moving pictures, and a.png is one"},
+      {"render #/a.png --live", "have #### for the pictures' numbers in the name"},
+      {"render a.gif --fps 60", "--fps is 60; a GIF's pictures last 0.02 s at least"},
+      {"render a.mp4 --size 641x480", "the sides of an MP4 are even, such as 640x480"},
+      {"render a.gif --frames 2.5", "--frames wants a whole number"},
+      {"render a.gif --frames 0", "--frames is 0; a number from 1 to 10000 is expected"},
+      {"export a.obj",
+       "the name a.obj ends in .obj; export goes by it; known are .ply, .vox, .npz"},
+      {"export a.ply b.ply", "\"b.ply\" is one argument too many"}};
+  for (const auto& [line, words] : wrong) {
+    const ParsedCommandLine parsed = ParseCommandLine(Split(line));
+    EXPECT_EQ(parsed.exit_code, kExitUsage) << line;
+    EXPECT_THAT(parsed.err, HasSubstr(words));
+  }
+}
+
 TEST(CommandLine, Pipe) {
   const auto pipe =
       std::get<PipeOptions>(Parse("pipe --layout a.json --display d --fps 30 --keep").command);

@@ -9,15 +9,14 @@
 #include "absl/algorithm/container.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "absl/strings/str_split.h"
 #include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
 #include "tools/voxelctl/cli/light_options.h"
 #include "tools/voxelctl/cli/patterns.h"
+#include "tools/voxelctl/cli/picture_options.h"
 #include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/cli/service_options.h"
 #include "tools/voxelctl/text/escape.h"
@@ -43,8 +42,10 @@ class Parser {
     app_.allow_extras();
     AddPlay();
     AddDraw();
-    AddSnapshot();
-    AddGallery();
+    snapshot_texts_.Add(Add("snapshot", kSnapshotAbout));
+    render_texts_.Add(Add("render", kRenderAbout));
+    export_texts_.Add(Add("export", kExportAbout));
+    AddGalleryOptions(Add("gallery", kGalleryAbout), &gallery_);
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
     AddEntities();
@@ -142,38 +143,6 @@ class Parser {
     c->add_option("SHAPE", draw_.shapes, "Shapes or expressions, each in quotes")
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     c->add_flag("--add", draw_.add, "Leave up what voxelctl put up before");
-  }
-
-  void AddGallery() {
-    CLI::App* c = Add("gallery",
-                      "Draws an example of every shape, one after another, and puts what a display "
-                      "shows of each\ninto one picture. What voxelctl put up before goes.");
-    c->add_option("OUT.png", gallery_.file,
-                  "Where the picture goes; an old one is replaced when the new one is whole");
-    c->add_option("--each", gallery_.each,
-                  "A folder for a small picture of each shape too, named as the shape is")
-        ->type_name("DIR");
-    c->add_option("--display", gallery_.display, "Which display (default: the first)")
-        ->type_name("NAME");
-  }
-
-  void AddSnapshot() {
-    CLI::App* c = Add("snapshot", kSnapshotAbout);
-    c->add_option("OUT.png", snapshot_.file,
-                  "Where the picture goes; an old one is replaced when the new one is whole");
-    c->add_option("--display", snapshot_.display, "Which display (default: the first)")
-        ->type_name("NAME");
-    c->add_option("--size", size_, "Size of the picture, 64x64 to 8192x8192")
-        ->type_name("WxH")
-        ->capture_default_str();
-    AddNumber(c, "--azimuth", &snapshot_.azimuth_degrees, -3600, 3600,
-              "Degrees that the viewer has walked to the right from the front", "DEG");
-    AddNumber(c, "--elevation", &snapshot_.elevation_degrees, -89, 89,
-              "Degrees that the viewer stands above the middle, -89 to 89", "DEG");
-    c->add_flag("--slices", snapshot_.slices,
-                "A contact sheet of all slices instead, as large as they make it");
-    AddNumber(c, "--timeout", &snapshot_.timeout_s, 0.01, 60,
-              "Seconds to wait for a volume, up to 60", "S");
   }
 
   void AddStats() {
@@ -297,7 +266,9 @@ class Parser {
       options_.command = assets_;
       return;
     }
-    TakePlain(name == "snapshot"   ? &snapshot_.file
+    TakePlain(name == "snapshot"   ? snapshot_texts_.file()
+              : name == "render"   ? render_texts_.file()
+              : name == "export"   ? export_texts_.file()
               : name == "gallery"  ? &gallery_.file
               : name == "pattern"  ? &pattern_name_
               : name == "verify"   ? &verify_.display
@@ -310,13 +281,10 @@ class Parser {
               : name == "markers"  ? &markers_.url
               : name == "why"      ? &why_.id
                                    : nullptr);
-    if (name == "snapshot") return FillInSnapshot();
-    if (name == "gallery") {
-      if (gallery_.file.empty()) throw UsageError{"gallery wants the name of a file, OUT.png"};
-      CheckPictureName(gallery_.file);
-      options_.command = gallery_;
-      return;
-    }
+    if (name == "snapshot") options_.command = snapshot_texts_.Read(*chosen);
+    if (name == "render") options_.command = render_texts_.Read(*chosen);
+    if (name == "export") options_.command = export_texts_.Read();
+    if (name == "gallery") FillInChecked(gallery_, CheckGalleryOptions);
     if (name == "pattern") return FillInPattern();
     if (name == "verify") return FillInVerify();
     if (name == "profile") return FillInProfile();
@@ -377,27 +345,6 @@ class Parser {
     play_.fill = Choose("--fill", fill_, kFills);
     if (!std::isnan(duration_)) play_.duration_s = duration_;
     options_.command = play_;
-  }
-
-  void FillInSnapshot() {
-    if (snapshot_.file.empty()) throw UsageError{"snapshot wants the name of a file, OUT.png"};
-    CheckPictureName(snapshot_.file);
-    for (const char* option : {"--size", "--azimuth", "--elevation"}) {
-      if (snapshot_.slices && Chosen()->count(option) > 0) {
-        throw UsageError{absl::StrCat(option,
-                                      " does not go with --slices: a contact sheet has no "
-                                      "viewer, and its size follows from the slices")};
-      }
-    }
-    const std::vector<std::string> sides = absl::StrSplit(size_, absl::ByAnyChar("xX"));
-    if (sides.size() != 2 || !absl::SimpleAtoi(sides[0], &snapshot_.width) ||
-        !absl::SimpleAtoi(sides[1], &snapshot_.height)) {
-      throw UsageError{absl::StrCat("--size is ", EscapeForTerminal(size_),
-                                    "; WIDTHxHEIGHT is expected, such as 1200x1000")};
-    }
-    CheckRange("the width in --size", snapshot_.width, 64, 8192);
-    CheckRange("the height in --size", snapshot_.height, 64, 8192);
-    options_.command = snapshot_;
   }
 
   void FillInPattern() {
@@ -462,7 +409,9 @@ class Parser {
   PlayOptions play_;
   DrawOptions draw_;
   GalleryOptions gallery_;
-  SnapshotOptions snapshot_;
+  SnapshotArguments snapshot_texts_;
+  RenderArguments render_texts_;
+  ExportArguments export_texts_;
   StatsOptions stats_;
   EntitiesOptions entities_;
   WhyOptions why_;
@@ -485,7 +434,7 @@ class Parser {
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
   std::string profile_action_;
-  std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
+  std::string up_ = "auto", fill_ = "surface", pattern_name_;
   double duration_ = std::nan("");
 };
 

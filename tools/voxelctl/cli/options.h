@@ -44,6 +44,30 @@ struct SnapshotOptions {
   double timeout_s = 5;
 };
 
+enum class PictureFormat : uint8_t { kGif, kMp4, kPng };
+
+struct TurntableOptions {
+  std::string file;  // PNGs: with a run of "#"s, or one frame
+  PictureFormat format = PictureFormat::kGif;
+  std::string display;  // empty: the first
+  int frames = 72;
+  double fps = 24;
+  int width = 720, height = 600;  // of an MP4 even
+  double azimuth_degrees = 24, elevation_degrees = 20;
+  double turns = 1;  // in all frames; the last is a step before the first
+  bool live = false;
+  double timeout_s = 5;
+};
+
+enum class ExportFormat : uint8_t { kPly, kVox, kNpz };
+
+struct ExportOptions {
+  std::string file;
+  ExportFormat format = ExportFormat::kPly;
+  std::string display;  // empty: the first
+  double timeout_s = 5;
+};
+
 struct GalleryOptions {
   std::string file;
   std::string each;     // a folder for a picture of each shape; empty: none
@@ -178,11 +202,12 @@ struct Options {
   std::string server;               // empty: see ChooseServer
   client::Credentials credentials;  // as given; see ChooseCredentials
   bool json = false;
-  std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
-               StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
-               SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions, TokenOptions, RecordOptions, ReplayOptions, PlaylistOptions,
-               InputOptions, MarkersOptions, PipeOptions, WhyOptions, AssetsOptions>
+  std::variant<PlayOptions, DrawOptions, SnapshotOptions, TurntableOptions, ExportOptions,
+               GalleryOptions, DisplaysOptions, StatsOptions, EntitiesOptions, WatchOptions,
+               ClearOptions, PatternOptions, SetOptions, CalibrateOptions, VerifyOptions,
+               ProfileOptions, DoctorOptions, InitOptions, TokenOptions, RecordOptions,
+               ReplayOptions, PlaylistOptions, InputOptions, MarkersOptions, PipeOptions,
+               WhyOptions, AssetsOptions>
       command;
 };
 

@@ -55,6 +55,10 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
         using Command = std::decay_t<decltype(command)>;
         if constexpr (std::is_same_v<Command, SnapshotOptions>)
           return Snapshot(command, connection, console);
+        if constexpr (std::is_same_v<Command, TurntableOptions>)
+          return Render(command, connection, interrupt, console);
+        if constexpr (std::is_same_v<Command, ExportOptions>)
+          return Export(command, connection, console);
         if constexpr (std::is_same_v<Command, GalleryOptions>)
           return Gallery(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, DisplaysOptions>)
