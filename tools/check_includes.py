@@ -35,13 +35,13 @@ ALLOWED = {
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
               # What an address looks like, and what was meant: alike at both ends.
-              "daemon/address", "daemon/suggest",
+              "daemon/address", "daemon/suggest", "daemon/usage",
               # What a display's geometry is, on the wire.
               "daemon/geometry_wire",
               # Strokes of letters: in scenes and in pictures of them.
               "daemon/text"],
     # Emulated devices are of display; this is their program.
-    "tools/emulator": ["display", "tools/emulator"],
+    "tools/emulator": ["display", "daemon/usage", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
     "tools/bench/voxel_bench": ["display/sync", "voxeld/v1", "tools/child", "daemon/process",
                                 "tools/bench/frame",

@@ -6,28 +6,20 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "daemon/suggest/suggest.h"
+#include "daemon/usage/usage_error.h"
 
 namespace voxeld::daemon {
 namespace {
 
-std::vector<std::string> OptionNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  return names;
-}
-
-absl::Status UnknownArgument(const CLI::App& app) {
+// What kept voxeld from being understood.
+absl::Status Explain(const CLI::App& app, const CLI::ParseError& error) {
   const std::string wrong = app.remaining().empty() ? "" : app.remaining().front();
-  if (wrong.empty() || wrong.front() != '-') {
+  if (!wrong.empty() && wrong.front() != '-') {
     return absl::InvalidArgumentError(
         absl::StrCat("\"", wrong, "\" is not expected; voxeld takes options only (see --help)"));
   }
-  const std::string name = wrong.substr(0, wrong.find('='));
   return absl::InvalidArgumentError(
-      absl::StrCat("unknown option ", name, Suggestion(name, OptionNames(app))));
+      absl::StrCat(usage::ExplainError(error, {&app}), " (see --help)"));
 }
 
 }  // namespace
@@ -71,10 +63,8 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
     out.print_and_exit = app.help();
   } catch (const CLI::CallForVersion& call) {
     out.print_and_exit = absl::StrCat(call.what(), "\n");
-  } catch (const CLI::ExtrasError&) {
-    return UnknownArgument(app);
   } catch (const CLI::ParseError& error) {
-    return absl::InvalidArgumentError(absl::StrCat(error.what(), " (see --help)"));
+    return Explain(app, error);
   }
   return out;
 }

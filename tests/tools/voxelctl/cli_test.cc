@@ -309,6 +309,12 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"set --blank maybe", {"--blank", "maybe"}},
         Wrong{"calibrate simulated", {"calibrate wants a DISPLAY and the name of a file"}},
         Wrong{"pattern axs", {"did you mean axes?"}},
+        Wrong{"--sevrer a:1 stats", {"--sevrer is no option here", "did you mean --server?"}},
+        Wrong{"--watch stats", {"--watch is an option of stats, and belongs behind it"}},
+        Wrong{"stats --interval", {"--interval wants a value, S: Seconds between, 0.01 to 3600\n"}},
+        Wrong{"set --blank", {"--blank wants a value, on|off"}},
+        Wrong{"stats --watch=\x1bmaybe", {"--watch is \\u{1b}maybe; it takes no value"}},
+        Wrong{"rendre a.gif", {"did you mean render?"}},
         Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
 
 TEST(CommandLine, HelpAndVersionAreData) {

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/suggest/suggest.h"
+#include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
 #include "tools/voxelctl/cli/light_options.h"
@@ -93,7 +94,7 @@ class Parser {
     } catch (const CLI::CallForVersion& version) {
       result.out = absl::StrCat(version.what(), "\n");
     } catch (const CLI::Error& error) {
-      result.err = Usage(EscapeForTerminal(error.what()));
+      result.err = Usage(EscapeForTerminal(usage::ExplainError(error, {Chosen(), &app_})));
       result.exit_code = kExitUsage;
     }
     return result;
@@ -215,8 +216,22 @@ class Parser {
                                       Suggestion(word, names_))};
       } else if (word == "--help" || word == "-h" || word == "--version") {
         return;
+      } else {
+        CheckBefore(word);
       }
     }
+  }
+
+  // An option before the command is one of all commands: what is not may take the next word, or not.
+  void CheckBefore(const std::string& word) const {
+    const std::string name = word.substr(0, word.find('='));
+    if (app_.get_option_no_throw(name) != nullptr) return;
+    for (const CLI::App* command : app_.get_subcommands([](const CLI::App*) { return true; })) {
+      if (command->get_option_no_throw(name) == nullptr) continue;
+      throw UsageError{absl::StrCat(EscapeForTerminal(name), " is an option of ",
+                                    command->get_name(), ", and belongs behind it")};
+    }
+    throw UsageError{EscapeForTerminal(usage::UnknownOption(word, {&app_}))};
   }
 
   const CLI::App* Chosen() const {
@@ -232,18 +247,7 @@ class Parser {
     if (!absl::StartsWith(extra, "-")) {
       throw UsageError{absl::StrCat("\"", EscapeForTerminal(extra), "\" is one argument too many")};
     }
-    std::vector<std::string> known;
-    for (const CLI::App* app : {Chosen(), &app_}) {
-      for (const CLI::Option* option : app->get_options()) {
-        for (const std::string& name : option->get_lnames())
-          known.push_back(absl::StrCat("--", name));
-      }
-    }
-    std::sort(known.begin(), known.end());
-    known.erase(std::unique(known.begin(), known.end()), known.end());
-    const std::string name = extra.substr(0, extra.find('='));
-    throw UsageError{
-        absl::StrCat(EscapeForTerminal(name), " is no option here", Suggestion(name, known))};
+    throw UsageError{EscapeForTerminal(usage::UnknownOption(extra, {Chosen(), &app_}))};
   }
 
   void FillIn() {
