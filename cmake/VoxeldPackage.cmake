@@ -23,6 +23,20 @@ install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md ${CMAKE_SOURCE_DIR}/docs/operations.md
               ${CMAKE_SOURCE_DIR}/docs/configuration.md DESTINATION ${doc})
 
+# Manual pages and completions, which the programs write: into share/, as they are installed.
+find_program(VOXELD_GZIP gzip REQUIRED)
+set(written ${CMAKE_BINARY_DIR}/share)
+add_custom_command(
+  OUTPUT ${CMAKE_BINARY_DIR}/share.stamp
+  COMMAND ${CMAKE_COMMAND} -DVOXELD=$<TARGET_FILE:voxeld> -DVOXELCTL=$<TARGET_FILE:voxelctl> -DGZIP=${VOXELD_GZIP} -DOUT=${written}
+          -P ${CMAKE_SOURCE_DIR}/cmake/MakeManual.cmake
+  COMMAND ${CMAKE_COMMAND} -E touch ${CMAKE_BINARY_DIR}/share.stamp
+  DEPENDS voxeld voxelctl ${CMAKE_SOURCE_DIR}/cmake/MakeManual.cmake
+  COMMENT "Writing manual pages and completions"
+  VERBATIM)
+add_custom_target(voxeld_manual ALL DEPENDS ${CMAKE_BINARY_DIR}/share.stamp)
+install(DIRECTORY ${written}/ DESTINATION share)
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME voxeld)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})

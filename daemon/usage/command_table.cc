@@ -49,7 +49,9 @@ CommandEntry DescribeCommand(const CLI::App& app) {
   entry.about = app.get_description();
   entry.footer = app.get_footer();
   for (const CLI::Option* option : app.get_options()) {
-    if (option->get_group().empty()) continue;
+    // Help is of the program, and of each command anew.
+    const bool again = app.get_parent() != nullptr && option == app.get_help_ptr();
+    if (option->get_group().empty() || again) continue;
     (option->get_positional() ? entry.arguments : entry.options).push_back(Describe(*option));
   }
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {

@@ -16,6 +16,8 @@
 namespace voxeld::usage {
 namespace {
 
+constexpr size_t kLine = 78;
+
 // One code point, taken from the front of well-formed UTF-8.
 uint32_t TakeCodePoint(absl::string_view* text) {
   const auto first = static_cast<unsigned char>(text->front());
@@ -64,6 +66,21 @@ std::string Roff(absl::string_view text) {
   return absl::StartsWith(out, ".") ? absl::StrCat("\\&", out) : out;
 }
 
+// Words in lines of a decent length, each of which ends; what they look like is roff's business.
+std::string Filled(absl::string_view roff) {
+  std::string out;
+  size_t length = 0;
+  for (const absl::string_view word : absl::StrSplit(roff, ' ', absl::SkipEmpty())) {
+    const bool begins = length == 0 || length + 1 + word.size() > kLine;
+    if (begins && length > 0) out += '\n';
+    if (begins) length = 0;
+    const bool request = begins && word.front() == '.';
+    absl::StrAppend(&out, begins ? "" : " ", request ? "\\&" : "", word);
+    length += word.size() + (begins ? 0 : 1);
+  }
+  return out + "\n";
+}
+
 std::string Quoted(absl::string_view text) {
   return absl::StrCat("\"", absl::StrJoin(absl::StrSplit(Roff(text), '"'), "\\(dq"), "\"");
 }
@@ -80,8 +97,11 @@ std::string Paragraphs(absl::string_view text) {
     const bool is_example = absl::StartsWith(line, "  ");
     if (is_example != example) out += is_example ? ".PP\n.nf\n.RS 4\n" : ".RE\n.fi\n.PP\n";
     example = is_example;
-    absl::StrAppend(&out, Roff(is_example ? line.substr(2) : absl::StripAsciiWhitespace(line)),
-                    "\n");
+    if (is_example) {
+      absl::StrAppend(&out, Roff(line.substr(2)), "\n");
+    } else {
+      out += Filled(Roff(line));
+    }
   }
   if (example) out += ".RE\n.fi\n";
   return out;
@@ -95,9 +115,9 @@ std::string Sections(const std::vector<std::pair<std::string, std::string>>& sec
       const std::pair<absl::string_view, absl::string_view> entry =
           absl::StrSplit(line, absl::MaxSplits('\t', 1));
       if (absl::StrContains(line, '\t')) {
-        absl::StrAppend(&out, ".TP\n", Bold(entry.first), "\n", Roff(entry.second), "\n");
+        absl::StrAppend(&out, ".TP\n", Bold(entry.first), "\n", Filled(Roff(entry.second)));
       } else {
-        absl::StrAppend(&out, Roff(line), "\n");
+        out += Filled(Roff(line));
       }
     }
   }
@@ -128,7 +148,7 @@ std::string Entries(const std::vector<OptionEntry>& options) {
     }
     if (!option.fallback.empty()) absl::StrAppend(&about, " (default: ", option.fallback, ")");
     if (about.empty()) about = "As it says.";
-    absl::StrAppend(&out, "\n", Roff(absl::StrJoin(absl::StrSplit(about, '\n'), " ")), "\n");
+    absl::StrAppend(&out, "\n", Filled(Roff(absl::StrJoin(absl::StrSplit(about, '\n'), " "))));
   }
   return out;
 }
@@ -151,9 +171,9 @@ std::string ManPage(const CommandEntry& command, const ManualInfo& info) {
   const std::string name =
       info.program.empty() ? command.name : absl::StrCat(info.program, "-", command.name);
   std::string out = absl::StrCat(
-      ".TH ", Quoted(absl::AsciiStrToUpper(name)), " ", Quoted(info.section), " ", Quoted(Date()),
-      " ", Quoted(info.source), "\n.SH NAME\n", Roff(name), " \\- ", Roff(Summary(command)),
-      "\n.SH SYNOPSIS\n",
+      ".TH ", Quoted(absl::AsciiStrToUpper(name)), " ", Quoted(info.section), " ",
+      absl::StrCat("\"", Date(), "\""), " ", Quoted(info.source), "\n.SH NAME\n",
+      Filled(absl::StrCat(Roff(name), " \\- ", Roff(Summary(command)))), ".SH SYNOPSIS\n",
       info.program.empty() ? Bold(name) : Bold(absl::StrCat(info.program, " ", command.name)), " [",
       Italic("OPTION"), " ...]");
   if (!command.commands.empty()) {
@@ -172,8 +192,10 @@ std::string ManPage(const CommandEntry& command, const ManualInfo& info) {
   if (!command.commands.empty()) {
     absl::StrAppend(&out, ".SH COMMANDS\n");
     for (const CommandEntry& each : command.commands) {
-      absl::StrAppend(&out, ".TP\n", Bold(each.name), "\n", Roff(Summary(each)), ": see ",
-                      Bold(absl::StrCat(name, "-", each.name)), "(", Roff(info.section), ")\n");
+      absl::StrAppend(&out, ".TP\n", Bold(each.name), "\n",
+                      Filled(absl::StrCat(Roff(Summary(each)), ": see ",
+                                          Bold(absl::StrCat(name, "-", each.name)), "(",
+                                          Roff(info.section), ")")));
     }
   }
   if (!command.options.empty()) absl::StrAppend(&out, ".SH OPTIONS\n", Entries(command.options));

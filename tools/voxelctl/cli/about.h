@@ -110,6 +110,12 @@ inline constexpr const char* kPipeAbout =
 inline constexpr const char* kTokenAbout =
     "Makes a token that shows who a client is (VOXELD_TOKEN), and its entry for the daemon's "
     "grants file; needs no daemon";
+inline constexpr const char* kCompletionAbout =
+    "Prints the script by which a shell completes voxelctl, the server's names too (Debian's "
+    "package "
+    "has them installed)\n"
+    "  source <(voxelctl completion bash)\n"
+    "  voxelctl completion fish >~/.config/fish/completions/voxelctl.fish";
 inline constexpr const char* kDoctorAbout =
     "Says what of this machine keeps voxeld from its work, and the command that mends it; "
     "needs no daemon";

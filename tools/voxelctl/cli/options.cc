@@ -15,6 +15,7 @@
 #include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
+#include "tools/voxelctl/cli/completion_options.h"
 #include "tools/voxelctl/cli/light_options.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/cli/picture_options.h"
@@ -68,6 +69,8 @@ class Parser {
     input_texts_.Add(Add("input", kInputAbout));
     pipe_texts_.Add(Add("pipe", kPipeAbout));
     Add("doctor", kDoctorAbout);
+    completion_texts_.Add(Add("completion", kCompletionAbout), AddHidden("__complete"),
+                          AddHidden("__manual"));
   }
 
   ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
@@ -84,7 +87,11 @@ class Parser {
       app_.parse(std::move(reversed));
       CheckExtras();
       FillIn();
-      result.options = options_;
+      if (printed_.empty()) {
+        result.options = options_;
+      } else {
+        result.out = printed_;
+      }
     } catch (const UsageError& error) {
       result.err = Usage(error.message);
       result.exit_code = kExitUsage;
@@ -101,6 +108,14 @@ class Parser {
   }
 
  private:
+  // Not for people, so it is not named to them.
+  CLI::App* AddHidden(const char* name) {
+    CLI::App* command = Add(name, "");
+    names_.pop_back();
+    hidden_.emplace_back(name);
+    return command;
+  }
+
   CLI::App* Add(const char* name, const char* about) {
     CLI::App* command = app_.add_subcommand(name, about);
     command->fallthrough();
@@ -122,10 +137,10 @@ class Parser {
     c->add_option("--up", up_,
                   "The files' axis that points up: auto, x, y or z. auto: y for glTF, OBJ and flat "
                   "maps, z for STL and PLY; y up has +z in front, z and x up have -y in front")
-        ->type_name("AXIS")
+        ->type_name("auto|x|y|z")
         ->capture_default_str();
     c->add_option("--fill", fill_, "Draw meshes as dots, lines or surface")
-        ->type_name("STYLE")
+        ->type_name("dots|lines|surface")
         ->capture_default_str();
     AddNumber(c, "--fps", &play_.fps, 0.1, 240, "Frames a second while spinning, 0.1 to 240", "N");
     c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
@@ -168,7 +183,8 @@ class Parser {
 
   void AddPattern() {
     CLI::App* c = Add("pattern", kPatternAbout);
-    c->add_option("NAME", pattern_name_, "The pattern, none, or list");
+    c->add_option("NAME", pattern_name_, "The pattern, none, or list")
+        ->type_name(absl::StrCat(absl::StrJoin(PatternNames(), "|"), "|none|list"));
     c->add_option("--display", pattern_.display, "Only on this display (default: on all)")
         ->type_name("NAME");
   }
@@ -198,7 +214,7 @@ class Parser {
 
   void AddProfile() {
     CLI::App* c = Add("profile", kProfileAbout);
-    c->add_option("ACTION", profile_action_, "check or list");
+    c->add_option("ACTION", profile_action_, "check or list")->type_name("check|list");
     c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
   }
 
@@ -211,7 +227,7 @@ class Parser {
       if (IsServerOption(word)) {
         ++i;
       } else if (!absl::StartsWith(word, "-") || word == "-") {
-        if (std::find(names_.begin(), names_.end(), word) != names_.end()) return;
+        if (absl::c_linear_search(names_, word) || absl::c_linear_search(hidden_, word)) return;
         throw UsageError{absl::StrCat("\"", EscapeForTerminal(word), "\" is no command",
                                       Suggestion(word, names_))};
       } else if (word == "--help" || word == "-h" || word == "--version") {
@@ -314,6 +330,9 @@ class Parser {
       }
       options_.command = calibrate_;
     }
+    if (name == "completion") printed_ = completion_texts_.Script(app_);
+    if (name == "__complete") options_.command = completion_texts_.ReadComplete();
+    if (name == "__manual") options_.command = completion_texts_.ReadManual(app_);
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "watch") options_.command = watch_;
@@ -407,8 +426,9 @@ class Parser {
   }
 
   CLI::App app_;
-  std::vector<std::string> names_;
+  std::vector<std::string> names_, hidden_;
   std::vector<std::string> plain_;  // arguments after --
+  std::string printed_;             // what the command prints at once, if it does
   Options options_;
   PlayOptions play_;
   DrawOptions draw_;
@@ -435,6 +455,7 @@ class Parser {
   PlaylistOptions playlist_;
   MarkersOptions markers_;
   AssetsOptions assets_;
+  CompletionArguments completion_texts_;
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
   std::string profile_action_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -198,6 +199,18 @@ struct PipeOptions {
   bool keep = false;
 };
 
+// Names that begin so, for a shell that completes one.
+struct CompleteOptions {
+  std::string kind;
+  std::string beginning;
+};
+
+// Manual pages, made by the parser, which knows what they are about.
+struct ManualOptions {
+  std::string folder;
+  std::vector<std::pair<std::string, std::string>> pages;  // names of files, and what is in them
+};
+
 struct Options {
   std::string server;               // empty: see ChooseServer
   client::Credentials credentials;  // as given; see ChooseCredentials
@@ -207,7 +220,7 @@ struct Options {
                ClearOptions, PatternOptions, SetOptions, CalibrateOptions, VerifyOptions,
                ProfileOptions, DoctorOptions, InitOptions, TokenOptions, RecordOptions,
                ReplayOptions, PlaylistOptions, InputOptions, MarkersOptions, PipeOptions,
-               WhyOptions, AssetsOptions>
+               WhyOptions, AssetsOptions, CompleteOptions, ManualOptions>
       command;
 };
 

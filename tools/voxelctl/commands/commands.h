@@ -45,6 +45,10 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
 absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console);
 absl::Status Set(const SetOptions& options, Connection& connection, Console& console);
 void ListPatterns(Console& console);
+// Names for a shell, a line each; none, and no word, where the server does not answer at once.
+absl::Status Complete(const CompleteOptions& options, const Connector& connect,
+                      Interrupt& interrupt, Console& console);
+absl::Status WriteManual(const ManualOptions& options);
 
 // Connects if the command needs it, runs it, says what went wrong; the exit code.
 int Run(const Options& options, const Environment& environment, Interrupt& interrupt,

@@ -45,6 +45,10 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   }
   if (const auto* profile = std::get_if<ProfileOptions>(&options.command))
     return ShowProfile(*profile, console);
+  if (const auto* complete = std::get_if<CompleteOptions>(&options.command))
+    return Complete(*complete, connect, interrupt, console);
+  if (const auto* manual = std::get_if<ManualOptions>(&options.command))
+    return WriteManual(*manual);
   if (const auto* playlist = std::get_if<PlaylistOptions>(&options.command))
     return PlayList(*playlist, connect, LocalWeekMinute, interrupt, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();

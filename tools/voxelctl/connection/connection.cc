@@ -180,7 +180,8 @@ absl::StatusOr<client::Asset> Connection::UploadAsset(
   return absl::Status(asset.status().code(), EscapeForTerminal(asset.status().message()));
 }
 
-absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntitiesRequest request) {
+absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntitiesRequest request,
+                                                                  bool first_page_only) {
   v1::ListEntitiesResponse all;
   do {
     absl::StatusOr<v1::ListEntitiesResponse> page = impl_->Unary<v1::ListEntitiesResponse>(
@@ -191,7 +192,7 @@ absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntiti
     all.MergeFrom(*page);
     all.set_next_page_token(page->next_page_token());
     request.set_page_token(page->next_page_token());
-  } while (!request.page_token().empty());
+  } while (!first_page_only && !request.page_token().empty());
   return all;
 }
 
