@@ -77,6 +77,7 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-snapshot.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-stats.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-token.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-top.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-verify.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-watch.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-why.1.gz

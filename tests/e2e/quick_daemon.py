@@ -18,6 +18,9 @@ class QuickDaemon:
         self.server = f"unix:{self.folder}/s"
         self.environment = {**os.environ, "VOXELD_SERVER": self.server, "HOME": self._folder.name}
         self.environment.pop("XDG_CONFIG_HOME", None)
+        self.start()
+
+    def start(self) -> None:
         self.process = subprocess.Popen(
             [os.environ["VOXELD"], "--listen", self.server, "--http", "off", "--log-level", "warn",
              "--display", "stack=simulated,geometry=planar,size=16x16x16", "--display", "rotor=simulated,geometry=rotor,size=16x16,slices=60"],

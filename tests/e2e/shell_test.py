@@ -44,7 +44,7 @@ class Completions(unittest.TestCase):
     def test_commands_options_and_values(self) -> None:
         self.assertEqual(self.complete("voxelctl pl"), ["play", "playlist"])
         commands = self.complete("voxelctl ")
-        for command in ("render", "export", "completion"):
+        for command in ("render", "export", "top", "completion"):
             self.assertIn(command, commands)
         self.assertFalse([command for command in commands if command.startswith("_")], "what is hidden is not offered")
         self.assertEqual(self.complete("voxelctl --serv"), ["--server"])
@@ -127,7 +127,7 @@ class Manual(unittest.TestCase):
 
     def test_there_is_a_page_of_every_command(self) -> None:
         pages = {path.name for path in self.folder.iterdir()}
-        for command in ("play", "render", "export", "completion"):
+        for command in ("play", "render", "export", "top", "completion"):
             self.assertIn(f"voxelctl-{command}.1", pages)
         self.assertFalse([name for name in pages if "__" in name])
         first = (self.folder / "voxelctl.1").read_text(encoding="ascii")

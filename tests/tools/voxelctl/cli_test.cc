@@ -192,6 +192,10 @@ TEST(CommandLine, TheOthers) {
   const auto stats = std::get<StatsOptions>(Parse("stats --watch --interval 0.5").command);
   EXPECT_TRUE(stats.watch);
   EXPECT_EQ(stats.interval_s, 0.5);
+  const auto top = std::get<TopOptions>(Parse("top --once --interval 2 --display d").command);
+  EXPECT_TRUE(top.once);
+  EXPECT_EQ(top.interval_s, 2);
+  EXPECT_EQ(top.display, "d");
   const auto entities =
       std::get<EntitiesOptions>(Parse("entities --layer l --owner 18446744073709551615").command);
   EXPECT_EQ(entities.layer, "l");
@@ -315,6 +319,10 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"set --blank", {"--blank wants a value, on|off"}},
         Wrong{"stats --watch=\x1bmaybe", {"--watch is \\u{1b}maybe; it takes no value"}},
         Wrong{"rendre a.gif", {"did you mean render?"}},
+        Wrong{"top --interval 0.01", {"--interval is 0.01; a number from 0.1 to 3600"}},
+        Wrong{"completion", {"completion wants a SHELL: bash, zsh or fish"}},
+        Wrong{"completion basch", {"the shell basch is not known", "did you mean bash?"}},
+        Wrong{"__complet", {"is no command"}},
         Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
 
 TEST(CommandLine, HelpAndVersionAreData) {
@@ -329,6 +337,24 @@ TEST(CommandLine, HelpAndVersionAreData) {
   const ParsedCommandLine version = ParseCommandLine({"--version"});
   EXPECT_EQ(version.exit_code, 0);
   EXPECT_THAT(version.out, testing::MatchesRegex("voxelctl [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST(CommandLine, WhatIsForScriptsIsHidden) {
+  EXPECT_EQ(std::get<CompleteOptions>(Parse("__complete layers vox").command).beginning, "vox");
+  const ManualOptions manual = std::get<ManualOptions>(Parse("__manual out").command);
+  EXPECT_EQ(manual.folder, "out");
+  ASSERT_GT(manual.pages.size(), 25u);
+  EXPECT_EQ(manual.pages[0].first, "voxelctl.1");
+  for (const auto& [name, page] : manual.pages) {
+    EXPECT_THAT(page, testing::Not(HasSubstr("__"))) << name;
+    EXPECT_THAT(page, HasSubstr(".SH SEE ALSO")) << name;
+  }
+  EXPECT_THAT(ParseCommandLine({"--help"}).out, testing::Not(HasSubstr("__complete")));
+  EXPECT_THAT(ParseCommandLine({"xyzzy"}).err, testing::Not(HasSubstr("__")));
+  const ParsedCommandLine script = ParseCommandLine({"completion", "bash"});
+  EXPECT_FALSE(script.options.has_value());
+  EXPECT_EQ(script.exit_code, 0);
+  EXPECT_THAT(script.out, HasSubstr("complete -F _voxelctl voxelctl\n"));
 }
 
 TEST(EditDistance, CountsAddDropChangeSwap) {

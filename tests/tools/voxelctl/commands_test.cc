@@ -33,6 +33,9 @@ TEST_F(CommandsTest, EveryReportIsOneJsonDocument) {
     EXPECT_TRUE(display.contains(field)) << field;
   }
 
+  EXPECT_EQ(RunJson({"top", "--once"})["stats"]["displays"][0]["name"], "fake");
+  EXPECT_THAT(RunTool({"top", "--once"}).out, testing::Not(HasSubstr("\x1b")));
+
   const json entities = RunJson({"entities", "--layer", "voxelctl"});
   EXPECT_EQ(entities["entities"].size(), 2u) << "both pages";
   EXPECT_EQ(entities["layers"][0]["owner"], 7);

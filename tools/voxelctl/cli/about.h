@@ -110,6 +110,14 @@ inline constexpr const char* kPipeAbout =
 inline constexpr const char* kTokenAbout =
     "Makes a token that shows who a client is (VOXELD_TOKEN), and its entry for the daemon's "
     "grants file; needs no daemon";
+inline constexpr const char* kTopAbout =
+    "Shows how the server and its displays do, live: state, volumes a second, latency by stage, "
+    "what "
+    "was lost and\n"
+    "superseded, clients, memory, connections. q ends it, p pauses, tab and arrows choose a "
+    "display. "
+    "Where there is no\n"
+    "terminal, tables instead; with --json a line each. NO_COLOR: no colours.";
 inline constexpr const char* kCompletionAbout =
     "Prints the script by which a shell completes voxelctl, the server's names too (Debian's "
     "package "

@@ -50,6 +50,7 @@ class Parser {
     AddGalleryOptions(Add("gallery", kGalleryAbout), &gallery_);
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
+    AddTopOptions(Add("top", kTopAbout), &top_);
     AddEntities();
     AddWhyOptions(Add("why", kWhyAbout), &why_);
     AddWatch();
@@ -336,9 +337,8 @@ class Parser {
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "watch") options_.command = watch_;
-    if (name == "stats") {
-      options_.command = stats_;
-    }
+    if (name == "stats") options_.command = stats_;
+    if (name == "top") options_.command = top_;
     if (name == "clear") {
       if (clear_.all && !clear_.layer.empty())
         throw UsageError{"--all and --layer do not go together"};
@@ -437,6 +437,7 @@ class Parser {
   RenderArguments render_texts_;
   ExportArguments export_texts_;
   StatsOptions stats_;
+  TopOptions top_;
   EntitiesOptions entities_;
   WhyOptions why_;
   WatchOptions watch_;

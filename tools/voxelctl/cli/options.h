@@ -82,6 +82,12 @@ struct StatsOptions {
   double interval_s = 1;
 };
 
+struct TopOptions {
+  bool once = false;
+  double interval_s = 1;
+  std::string display;  // that is looked at first; empty: the first
+};
+
 struct EntitiesOptions {
   std::string layer;   // empty: all
   uint64_t owner = 0;  // 0: all
@@ -216,11 +222,11 @@ struct Options {
   client::Credentials credentials;  // as given; see ChooseCredentials
   bool json = false;
   std::variant<PlayOptions, DrawOptions, SnapshotOptions, TurntableOptions, ExportOptions,
-               GalleryOptions, DisplaysOptions, StatsOptions, EntitiesOptions, WatchOptions,
-               ClearOptions, PatternOptions, SetOptions, CalibrateOptions, VerifyOptions,
-               ProfileOptions, DoctorOptions, InitOptions, TokenOptions, RecordOptions,
-               ReplayOptions, PlaylistOptions, InputOptions, MarkersOptions, PipeOptions,
-               WhyOptions, AssetsOptions, CompleteOptions, ManualOptions>
+               GalleryOptions, DisplaysOptions, StatsOptions, TopOptions, EntitiesOptions,
+               WatchOptions, ClearOptions, PatternOptions, SetOptions, CalibrateOptions,
+               VerifyOptions, ProfileOptions, DoctorOptions, InitOptions, TokenOptions,
+               RecordOptions, ReplayOptions, PlaylistOptions, InputOptions, MarkersOptions,
+               PipeOptions, WhyOptions, AssetsOptions, CompleteOptions, ManualOptions>
       command;
 };
 

@@ -170,6 +170,13 @@ absl::StatusOr<v1::ListAssetsResponse> Connection::ListAssets() {
       });
 }
 
+absl::StatusOr<v1::ListOwnersResponse> Connection::ListOwners() {
+  return impl_->Unary<v1::ListOwnersResponse>(
+      [&](grpc::ClientContext* context, v1::ListOwnersResponse* response) {
+        return impl_->scene().ListOwners(context, {}, response);
+      });
+}
+
 absl::StatusOr<client::Asset> Connection::UploadAsset(
     absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress) {
   const absl::StatusOr<client::Asset> asset =

@@ -41,6 +41,7 @@ class Connection {
   absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(const v1::ExplainEntityRequest& request);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
   absl::StatusOr<v1::ListAssetsResponse> ListAssets();
+  absl::StatusOr<v1::ListOwnersResponse> ListOwners();
   // `progress` as of client::UploadOptions; what breaks off goes on.
   absl::StatusOr<client::Asset> UploadAsset(
       absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress);
