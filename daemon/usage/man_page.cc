@@ -136,6 +136,7 @@ std::string Entries(const std::vector<OptionEntry>& options) {
   std::string out;
   for (const OptionEntry& option : options) {
     std::vector<std::string> names;
+    names.reserve(option.names.size() + 1);
     for (const std::string& name : option.names) names.push_back(Bold(name));
     if (names.empty()) names.push_back(Italic(option.argument));
     absl::StrAppend(&out, ".TP\n", absl::StrJoin(names, ", "));

@@ -1,6 +1,7 @@
 """What a shell and a reader of manuals have of the programs: completions, by bash itself, and manual pages."""
 import os
 import re
+import select
 import shutil
 import subprocess
 import tempfile
@@ -108,6 +109,36 @@ class Completions(unittest.TestCase):
                                   env={**self.daemon.environment, "PATH": f"{Path(VOXELCTL).parent}:{os.environ['PATH']}"},
                                   capture_output=True, text=True, timeout=LONG)
             self.assertIn("auto", made.stdout.split())
+
+    def test_zsh_completes(self) -> None:
+        if shutil.which("zsh") is None:
+            self.skipTest("there is no zsh")
+        master, slave = os.openpty()
+        self.addCleanup(os.close, master)
+        environment = {**self.daemon.environment, "TERM": "vt100", "PATH": f"{Path(VOXELCTL).parent}:{os.environ['PATH']}"}
+        zsh = subprocess.Popen(["zsh", "-f", "-i"], stdin=slave, stdout=slave, stderr=slave, env=environment, start_new_session=True,
+                               cwd=self.daemon.folder)
+        os.close(slave)
+        self.addCleanup(zsh.wait)
+        self.addCleanup(zsh.kill)
+        said = ""
+
+        def until(words: str) -> None:
+            nonlocal said
+            end = time.monotonic() + LONG
+            while words not in said:
+                if select.select([master], [], [], 0.1)[0]:
+                    said += re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|\x1b[()=>]|\x0f", "", os.read(master, 1 << 16).decode("utf-8", "replace"))
+                assert time.monotonic() < end, f"{words!r} is not in {said!r}"
+
+        os.write(master, b"autoload -U compinit; compinit -u -D; source <(voxelctl completion zsh); echo rea''dy\n")
+        until("ready")
+        for typed, completed in (("snapshot --display r", "rotor"), ("snapshot a.png --display=st", "stack"), ("clear --layer vo", "--layer voxelctl"),
+                                 ("play --fill su", "surface"), ("pattern pos", "posts")):
+            said = ""
+            os.write(master, f"voxelctl {typed}\t".encode())
+            until(completed)
+            os.write(master, b"\x15")
 
     def test_an_unknown_shell_is_told(self) -> None:
         made = subprocess.run([VOXELCTL, "completion", "bsh"], capture_output=True, text=True, timeout=LONG)

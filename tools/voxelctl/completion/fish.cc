@@ -71,7 +71,7 @@ complete -c voxelctl -f
   for (const usage::OptionEntry& option : program.options) out += OptionLine("", "", option);
   for (const usage::CommandEntry& command : program.commands) {
     absl::StrAppend(&out, "complete -c voxelctl -n __fish_use_subcommand -a ", command.name, " -d ",
-                    Quoted(Brief(command.about)), "\n");
+                    Quoted(FirstSentence(command.about)), "\n");
     const std::string condition =
         absl::StrCat(" -n '__fish_seen_subcommand_from ", command.name, "'");
     for (const usage::OptionEntry& option : command.options)

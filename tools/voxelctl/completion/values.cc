@@ -35,6 +35,12 @@ std::string Brief(const std::string& about) {
   return about.substr(0, std::min(about.find('\n'), about.size()));
 }
 
+std::string FirstSentence(const std::string& about) {
+  std::string first = Brief(about);
+  for (const char* end : {". ", ": ", "; "}) first = first.substr(0, first.find(end));
+  return first;
+}
+
 std::string CompletionScript(Shell shell, const usage::CommandEntry& program) {
   switch (shell) {
     case Shell::kBash:

@@ -21,8 +21,9 @@ Values ValuesOf(const std::string& command, const usage::OptionEntry& option);
 // In single quotes for bash and zsh.
 std::string ShellQuoted(const std::string& text);
 
-// The first line of what is said about it, without its example.
+// The first line of what is said about an option; the first sentence of what is said of a command.
 std::string Brief(const std::string& about);
+std::string FirstSentence(const std::string& about);
 
 std::string BashCompletion(const usage::CommandEntry& program);
 std::string ZshCompletion(const usage::CommandEntry& program);

@@ -16,7 +16,8 @@ std::string Action(const Values& values) {
     case Values::Kind::kWords:
       return absl::StrCat("(", absl::StrJoin(values.words, " "), ")");
     case Values::Kind::kLive:
-      return absl::StrCat("_voxelctl_live ", values.of);
+      // With the space, what _arguments would add for others is left out.
+      return absl::StrCat(" _voxelctl_live ", values.of);
     case Values::Kind::kFiles:
       return values.of.empty() ? "_files" : absl::StrCat("_files -g \"*", values.of, "\"");
     case Values::Kind::kFolders:
@@ -59,9 +60,9 @@ std::string Specs(const usage::CommandEntry& command, const std::string& name) {
 std::string ZshCompletion(const usage::CommandEntry& program) {
   std::string commands, cases;
   for (const usage::CommandEntry& command : program.commands) {
-    absl::StrAppend(&commands, "    ",
-                    ShellQuoted(absl::StrCat(command.name, ":", Escaped(Brief(command.about)))),
-                    "\n");
+    absl::StrAppend(
+        &commands, "    ",
+        ShellQuoted(absl::StrCat(command.name, ":", Escaped(FirstSentence(command.about)))), "\n");
     absl::StrAppend(&cases, "    ", command.name, ")\n      _arguments \"${common[@]}\"",
                     Specs(command, command.name), "\n      ;;\n");
   }
