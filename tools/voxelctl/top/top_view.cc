@@ -1,6 +1,7 @@
 #include "tools/voxelctl/top/top_view.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -39,9 +40,13 @@ std::string Cut(const std::string& text, int width) {
   return text;
 }
 
+std::string Marks(double share) {
+  return std::string(static_cast<size_t>(std::lround(std::clamp(share, 0.0, 1.0) * kBar)), '#');
+}
+
 std::string Bar(double share) {
-  const auto filled = static_cast<size_t>(std::clamp(share, 0.0, 1.0) * kBar + 0.5);
-  return absl::StrCat("[", std::string(filled, '#'), std::string(kBar - filled, '.'), "]");
+  const std::string filled = Marks(share);
+  return absl::StrCat("[", filled, std::string(kBar - filled.size(), '.'), "]");
 }
 
 // A table's heading and rows, each with its style.
@@ -232,8 +237,7 @@ void TopView::AddStages(std::vector<TopLine>* out) const {
   for (const auto& [stage, latency] : stages) {
     const double share = static_cast<double>(latency->p50_ns()) / static_cast<double>(most);
     table.Add({stage, Duration(latency->p50_ns()), Duration(latency->p99_ns()),
-               Duration(latency->max_ns()),
-               std::string(static_cast<size_t>(std::clamp(share, 0.0, 1.0) * kBar + 0.5), '#')});
+               Duration(latency->max_ns()), Marks(share)});
   }
   AddTable(table, {}, out);
 }
