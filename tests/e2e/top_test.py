@@ -197,6 +197,8 @@ class TopTest(unittest.TestCase):
         ends: list[tuple[str, Callable[[Top], object], int]] = [
             ("q", lambda top: top.press(b"q"), 0),
             ("Ctrl-C", lambda top: top.press(b"\x03"), 0),
+            ("Ctrl-C in haste", lambda top: top.press(b"\x03\x03\x03"), 0),
+            ("SIGINT", lambda top: top.process.send_signal(signal.SIGINT), 0),
             ("SIGTERM", lambda top: top.process.send_signal(signal.SIGTERM), 0),
             ("Ctrl-\\", lambda top: top.press(b"\x1c"), -signal.SIGQUIT),
             ("SIGHUP", lambda top: top.process.send_signal(signal.SIGHUP), -signal.SIGHUP),

@@ -176,6 +176,32 @@ TEST(WriteVox, ARotorsPixelsAreInTheVoxelsWhereTheyAre) {
   EXPECT_NEAR(grid.origin_mm.z + middle[2] * grid.pitch_mm.z, at.z, 0.51 * grid.pitch_mm.z);
 }
 
+TEST(Exports, LightsThatAreMissingAreNowhere) {
+  TempFolder folder;
+  display::Lattice lattice;
+  lattice.width_px = 3;
+  lattice.points_mm = {display::Vec3{-5, 0, 0}, std::nullopt, display::Vec3{5, 0, 0}};
+  Volume volume = DarkVolume({.shape = lattice, .grid = {}}, 3, 1);
+  for (int u = 0; u < 3; ++u) SetPixel(&volume, 0, u, 0, {1, 2, 3});
+  ExportSummary summary;
+  ASSERT_THAT(WritePly(folder.Path("a.ply"), volume, &summary), IsOk());
+  EXPECT_EQ(summary.items, 2u);
+  EXPECT_EQ(summary.left_out, 1u);
+  ASSERT_THAT(WriteVox(folder.Path("a.vox"), volume, &summary), IsOk());
+  EXPECT_EQ(summary.items, 2u);
+  EXPECT_EQ(summary.left_out, 1u);
+  ASSERT_THAT(WriteNpz(folder.Path("a.npz"), volume, &summary), IsOk());
+  EXPECT_EQ(summary.items, 3u) << "as many positions as lit pixels";
+  EXPECT_EQ(summary.left_out, 1u);
+  auto python = child::ChildProcess::Start(
+      {"/usr/bin/python3", "-c",
+       "import sys, numpy; print(numpy.load(sys.argv[1])['positions_mm'][:, 0].tolist())",
+       folder.Path("a.npz")});
+  ASSERT_THAT(python, IsOk());
+  EXPECT_EQ((*python)->Wait(), 0);
+  EXPECT_EQ((*python)->output(), "[-5.0, nan, 5.0]\n");
+}
+
 TEST(WriteNpz, IsReadByNumpy) {
   TempFolder folder;
   Volume volume = DarkStack(4, 6, 8);

@@ -1,5 +1,6 @@
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -47,10 +48,8 @@ class Mp4 : public MovingPicture {
       return SystemError("ffmpeg gets no pipe");
     pipe_ = ends[0];
     const absl::Cleanup close_theirs = [&] { ::close(ends[1]); };
-    char said[] = "/tmp/voxelctl-ffmpeg-XXXXXX";
-    said_ = ::mkostemp(said, O_CLOEXEC);
+    said_ = ::memfd_create("ffmpeg", MFD_CLOEXEC);
     if (said_ < 0) return SystemError("there is no file for what ffmpeg says");
-    ::unlink(said);
 
     posix_spawn_file_actions_t actions;
     ::posix_spawn_file_actions_init(&actions);

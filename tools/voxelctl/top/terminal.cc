@@ -81,6 +81,13 @@ std::unique_ptr<Terminal> Terminal::Open(bool colors) {
     ::sigaction(kEnding[i], &action, &g_actions[i]);
   }
   ::cbreak();
+  // Ctrl-C is a key here: two of them in haste would otherwise end the process before it could tidy up.
+  termios keys;
+  if (::tcgetattr(STDIN_FILENO, &keys) == 0) {
+    keys.c_cc[VINTR] = _POSIX_VDISABLE;
+    ::tcsetattr(STDIN_FILENO, TCSANOW, &keys);
+    ::def_prog_mode();
+  }
   ::noecho();
   ::nonl();
   ::keypad(stdscr, TRUE);
@@ -127,6 +134,7 @@ TopKey Terminal::Wait(int milliseconds) {
   switch (::getch()) {
     case 'q':
     case 'Q':
+    case 3:   // Ctrl-C
     case 4:   // Ctrl-D
     case 27:  // Escape
       return TopKey::kQuit;
