@@ -62,7 +62,7 @@ ALLOWED = {
     "tools/voxelctl/lights": ["display/drivers/wiring", "display/sync", "gpu/affine", "voxeld", "tools/lights", "tools/voxelctl"],
     "tools/markers": ["voxeld", "scene_update", "display/sync", "tools/json", "tools/markers"],
     # A program of its own over what of voxelctl makes its connection and shows what comes in.
-    "tools/ros": ["voxeld/credentials", "display/sync", "tools/markers", "tools/voxelctl/cli/server_options",
+    "tools/ros": ["voxeld/credentials", "daemon/usage", "display/sync", "tools/markers", "tools/voxelctl/cli/server_options",
                   "tools/voxelctl/commands/console", "tools/voxelctl/connection/address", "tools/voxelctl/connection/connection",
                   "tools/voxelctl/feed", "tools/voxelctl/process", "tools/voxelctl/text", "tools/ros"],
     "tools/recording": ["voxeld/v1", "tools/recording"],
