@@ -23,6 +23,20 @@ install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md ${CMAKE_SOURCE_DIR}/docs/operations.md
               ${CMAKE_SOURCE_DIR}/docs/configuration.md DESTINATION ${doc})
 
+# Manual pages and completions, which the programs write: into share/, as they are installed.
+find_program(VOXELD_GZIP gzip REQUIRED)
+set(written ${CMAKE_BINARY_DIR}/share)
+add_custom_command(
+  OUTPUT ${CMAKE_BINARY_DIR}/share.stamp
+  COMMAND ${CMAKE_COMMAND} -DVOXELD=$<TARGET_FILE:voxeld> -DVOXELCTL=$<TARGET_FILE:voxelctl> -DGZIP=${VOXELD_GZIP} -DOUT=${written}
+          -P ${CMAKE_SOURCE_DIR}/cmake/MakeManual.cmake
+  COMMAND ${CMAKE_COMMAND} -E touch ${CMAKE_BINARY_DIR}/share.stamp
+  DEPENDS voxeld voxelctl ${CMAKE_SOURCE_DIR}/cmake/MakeManual.cmake
+  COMMENT "Writing manual pages and completions"
+  VERBATIM)
+add_custom_target(voxeld_manual ALL DEPENDS ${CMAKE_BINARY_DIR}/share.stamp)
+install(DIRECTORY ${written}/ DESTINATION share)
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME voxeld)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
@@ -39,6 +53,7 @@ set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
     "Networked clients stream 3D primitives in over gRPC; voxeld assembles the voxel\nscene, slices it, and pushes whole volumes of light to the display. With the\nclient voxelctl, udev rules and a systemd service.")
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "passwd, procps")  # for postinst and reload
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "fonts-dejavu-core, hershey-fonts-data")  # text
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "ffmpeg")  # voxelctl render to MP4
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)

@@ -35,13 +35,13 @@ ALLOWED = {
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
               # What an address looks like, and what was meant: alike at both ends.
-              "daemon/address", "daemon/suggest",
+              "daemon/address", "daemon/suggest", "daemon/usage",
               # What a display's geometry is, on the wire.
               "daemon/geometry_wire",
               # Strokes of letters: in scenes and in pictures of them.
               "daemon/text"],
     # Emulated devices are of display; this is their program.
-    "tools/emulator": ["display", "tools/emulator"],
+    "tools/emulator": ["display", "daemon/usage", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
     "tools/bench/voxel_bench": ["display/sync", "voxeld/v1", "tools/child", "daemon/process",
                                 "tools/bench/frame",
@@ -62,7 +62,7 @@ ALLOWED = {
     "tools/voxelctl/lights": ["display/drivers/wiring", "display/sync", "gpu/affine", "voxeld", "tools/lights", "tools/voxelctl"],
     "tools/markers": ["voxeld", "scene_update", "display/sync", "tools/json", "tools/markers"],
     # A program of its own over what of voxelctl makes its connection and shows what comes in.
-    "tools/ros": ["voxeld/credentials", "display/sync", "tools/markers", "tools/voxelctl/cli/server_options",
+    "tools/ros": ["voxeld/credentials", "daemon/usage", "display/sync", "tools/markers", "tools/voxelctl/cli/server_options",
                   "tools/voxelctl/commands/console", "tools/voxelctl/connection/address", "tools/voxelctl/connection/connection",
                   "tools/voxelctl/feed", "tools/voxelctl/process", "tools/voxelctl/text", "tools/ros"],
     "tools/recording": ["voxeld/v1", "tools/recording"],

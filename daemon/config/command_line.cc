@@ -6,28 +6,44 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "daemon/suggest/suggest.h"
+#include "daemon/usage/command_table.h"
+#include "daemon/usage/man_page.h"
+#include "daemon/usage/usage_error.h"
 
 namespace voxeld::daemon {
 namespace {
 
-std::vector<std::string> OptionNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  return names;
-}
-
-absl::Status UnknownArgument(const CLI::App& app) {
+// What kept voxeld from being understood.
+absl::Status Explain(const CLI::App& app, const CLI::ParseError& error) {
   const std::string wrong = app.remaining().empty() ? "" : app.remaining().front();
-  if (wrong.empty() || wrong.front() != '-') {
+  if (!wrong.empty() && wrong.front() != '-') {
     return absl::InvalidArgumentError(
         absl::StrCat("\"", wrong, "\" is not expected; voxeld takes options only (see --help)"));
   }
-  const std::string name = wrong.substr(0, wrong.find('='));
   return absl::InvalidArgumentError(
-      absl::StrCat("unknown option ", name, Suggestion(name, OptionNames(app))));
+      absl::StrCat(usage::ExplainError(error, {&app}), " (see --help)"));
+}
+
+std::string Manual(const CLI::App& app, const std::string& version) {
+  usage::ManualInfo info;
+  info.section = "8";
+  info.source = absl::StrCat("voxeld ", version);
+  info.sections = {
+      {"FILES",
+       "/etc/voxeld/voxeld.toml\tthe configuration, where the user has none; an example is in "
+       "/usr/share/doc/voxeld/examples, and each field's meaning in "
+       "/usr/share/doc/voxeld/configuration.md.\n"
+       "$XDG_CONFIG_HOME/voxeld/voxeld.toml\tthe user's own.\n"
+       "/usr/share/voxeld/profiles\tdescriptions of displays."},
+      {"SIGNALS",
+       "SIGTERM, SIGINT\tend it, clients told.\n"
+       "SIGHUP\thas it read its configuration, grants and certificates again."},
+      {"EXIT STATUS",
+       "0\tit ended as it was told to.\n"
+       "1\tit could not begin or go on; its log says why.\n"
+       "2\tthe command line or the configuration was not understood."}};
+  info.see_also = {"voxelctl(1)"};
+  return usage::ManPage(usage::DescribeCommand(app), info);
 }
 
 }  // namespace
@@ -63,6 +79,8 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
   app.add_option("--log-format", out.log_format, "How it is logged")->type_name("text|json");
   app.add_flag("--check-config", out.check_config,
                "Print the configuration in force, or what is wrong with it, and exit");
+  bool manual = false;
+  app.add_flag("--help-man", manual)->group("");
   app.set_version_flag("--version", "voxeld " + version, "Print the version and exit");
 
   try {
@@ -71,11 +89,10 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
     out.print_and_exit = app.help();
   } catch (const CLI::CallForVersion& call) {
     out.print_and_exit = absl::StrCat(call.what(), "\n");
-  } catch (const CLI::ExtrasError&) {
-    return UnknownArgument(app);
   } catch (const CLI::ParseError& error) {
-    return absl::InvalidArgumentError(absl::StrCat(error.what(), " (see --help)"));
+    return Explain(app, error);
   }
+  if (manual) out.print_and_exit = Manual(app, version);
   return out;
 }
 

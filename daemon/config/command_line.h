@@ -22,7 +22,8 @@ struct CommandLine {
   std::string print_and_exit;  // not empty: the answer to --help or --version
 };
 
-// InvalidArgument for a usage error, with what would be right.
+// InvalidArgument for a usage error, with what would be right. --help-man, which is for the build, is answered by the manual's
+// page.
 absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
                                              const std::string& version);
 

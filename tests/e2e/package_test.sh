@@ -44,12 +44,45 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/lib/sysusers.d/voxeld.conf
 -rw-r--r-- root/root ./usr/lib/udev/rules.d/70-voxeld.rules
 -rwxr-xr-x root/root ./usr/libexec/voxeld/voxeld-engine
+-rw-r--r-- root/root ./usr/share/bash-completion/completions/voxelctl
 -rw-r--r-- root/root ./usr/share/doc/voxeld/CHANGELOG.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/README.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/configuration.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/copyright
 -rw-r--r-- root/root ./usr/share/doc/voxeld/examples/voxeld.toml
 -rw-r--r-- root/root ./usr/share/doc/voxeld/operations.md
+-rw-r--r-- root/root ./usr/share/fish/vendor_completions.d/voxelctl.fish
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-assets.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-calibrate.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-clear.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-completion.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-displays.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-doctor.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-draw.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-entities.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-export.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-gallery.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-init.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-input.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-markers.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-pattern.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-pipe.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-play.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-playlist.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-profile.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-record.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-render.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-replay.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-set.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-snapshot.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-stats.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-token.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-top.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-verify.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-watch.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-why.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl.1.gz
+-rw-r--r-- root/root ./usr/share/man/man8/voxeld.8.gz
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/depthcube.toml
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/helix.toml
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/lattice-20.toml
@@ -58,9 +91,17 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/vortex.toml
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/vx1.toml
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/vx2-xl.toml
+-rw-r--r-- root/root ./usr/share/zsh/vendor-completions/_voxelctl
 EOT
 diff <(sort -k3 "$work/expected") <(sort -k3 "$work/contents") || fail "its contents differ (>)"
 grep -q 'Apache License' "$root/usr/share/doc/voxeld/copyright" || fail "no licence in copyright"
+
+# ---- manual pages and completions are this version's
+zcat "$root/usr/share/man/man8/voxeld.8.gz" | head -n 1 | grep -qF "\"voxeld $version\"" || fail "the manual page is another version's"
+bash -n "$root/usr/share/bash-completion/completions/voxelctl" || fail "bash cannot read its completion"
+for page in "$root"/usr/share/man/man?/*.gz; do
+  zcat "$page" | grep -q '^\.SH NAME$' || fail "$page is no manual page"
+done
 
 # ---- programs: the system's libraries, each from a package that is depended on
 programs=("$root/usr/bin/voxeld" "$root/usr/bin/voxelctl" "$root/usr/libexec/voxeld/voxeld-engine")

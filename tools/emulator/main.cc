@@ -24,6 +24,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "daemon/usage/usage_error.h"
 #include "display/emulator/carriers/usbip.h"
 #include "display/emulator/carriers/usbredir.h"
 #include "tools/emulator/control_socket.h"
@@ -285,7 +286,15 @@ int Main(int argc, char** argv) {
   app.add_option(
       "--control", options.control,
       "unix socket for lines: fault WHAT@WHEN, clear, hostile SEED, unplug, plug, status");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::printf("%s", app.help().c_str());
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "voxeld-emulator: %s\n", usage::ExplainError(error, {&app}).c_str());
+    return 2;
+  }
   const auto fail = [](int code, const absl::Status& status) {
     std::fprintf(stderr, "voxeld-emulator: %s\n", std::string(status.message()).c_str());
     return code;

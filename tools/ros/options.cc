@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -76,7 +77,7 @@ ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments,
     result.out = absl::StrCat(version.what(), "\n");
     return result;
   } catch (const CLI::Error& error) {
-    return Usage(error.what());
+    return Usage(usage::ExplainError(error, {&app}));
   }
   if (options.layer.empty()) return Usage("--layer wants a name");
   if (std::count(options.ros.topics.begin(), options.ros.topics.end(), "") > 0) {

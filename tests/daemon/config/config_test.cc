@@ -387,7 +387,7 @@ TEST(CommandLine, HelpAndVersion) {
 
 TEST(CommandLine, UsageErrorsSuggest) {
   EXPECT_THAT(std::string(Parse({"--lisen", "a:1"}).status().message()),
-              HasSubstr("unknown option --lisen; did you mean --listen?"));
+              HasSubstr("--lisen is no option here; did you mean --listen?"));
   EXPECT_THAT(std::string(Parse({"--dispaly=a"}).status().message()),
               HasSubstr("did you mean --display?"));
   EXPECT_THAT(std::string(Parse({"serve"}).status().message()),

@@ -52,6 +52,14 @@ class Program : public testing::Test {
   std::unique_ptr<e2e::Process> process_;
 };
 
+TEST(CommandLine, AWrongOneEndsWithTwoAndSaysWhatWasMeant) {
+  e2e::Process process(Emulator({kDevice, "--usbredr", "x"}));
+  EXPECT_EQ(process.Wait(), 2);
+  EXPECT_NE(process.output().find("--usbredr is no option here; did you mean --usbredir?"),
+            std::string::npos)
+      << process.output();
+}
+
 class OverUsbip : public Program {
  protected:
   void SetUp() override {

@@ -54,6 +54,13 @@ TEST(Options, WrongOnesAreUsageErrors) {
   }
 }
 
+TEST(Options, WrongOnesAreToldWithWhatWasMeant) {
+  EXPECT_THAT(Parse({"--topc", "/a"}).err,
+              HasSubstr("--topc is no option here; did you mean --topic?"));
+  EXPECT_THAT(Parse({"/a"}).err, HasSubstr("\"/a\" is one argument too many"));
+  EXPECT_THAT(Parse({"--topic"}).err, HasSubstr("--topic wants a value, NAME: Only this one"));
+}
+
 TEST(Options, HelpAndVersionArePrinted) {
   EXPECT_THAT(Parse({"--help"}).out, HasSubstr("--topic"));
   EXPECT_THAT(Parse({"--version"}).out, HasSubstr("voxeld-ros "));

@@ -114,6 +114,49 @@ TEST(CommandLine, Input) {
   }
 }
 
+TEST(CommandLine, RenderAndExport) {
+  const auto render = std::get<TurntableOptions>(
+      Parse("render a.MP4 --frames 10 --fps 30 --size 640x480 --azimuth 5 --elevation -6 --turns "
+            "-0.5 --live --display d --timeout 2")
+          .command);
+  EXPECT_EQ(render.file, "a.MP4");
+  EXPECT_EQ(render.format, PictureFormat::kMp4);
+  EXPECT_EQ(render.frames, 10);
+  EXPECT_EQ(render.fps, 30);
+  EXPECT_EQ(render.width, 640);
+  EXPECT_EQ(render.azimuth_degrees, 5);
+  EXPECT_EQ(render.elevation_degrees, -6);
+  EXPECT_EQ(render.turns, -0.5);
+  EXPECT_TRUE(render.live);
+  EXPECT_EQ(render.display, "d");
+  const auto gif = std::get<TurntableOptions>(Parse("render a.gif").command);
+  EXPECT_EQ(gif.frames, 72);
+  EXPECT_EQ(gif.fps, 24);
+  EXPECT_EQ(gif.width, 720);
+  EXPECT_EQ(std::get<TurntableOptions>(Parse("render -- -#.png").command).frames, 72);
+  EXPECT_EQ(std::get<TurntableOptions>(Parse("render a.png").command).frames, 1);
+  EXPECT_EQ(std::get<ExportOptions>(Parse("export a.npz --display d").command).format,
+            ExportFormat::kNpz);
+  const std::vector<std::pair<const char*, const char*>> wrong = {
+      {"render", "render wants the name of a file, such as turn.gif"},
+      {"render a.mpg", "the name a.mpg ends in .mpg; render goes by it; did you mean .mp4?"},
+      {"render turn", "the name turn has no ending; render goes by it, such as turn.gif"},
+      {"render a.png --frames 3", "--frames is of moving pictures, and a.png is one"},
+      {"render #/a.png --live", "have #### for the pictures' numbers in the name"},
+      {"render a.gif --fps 60", "--fps is 60; a GIF's pictures last 0.02 s at least"},
+      {"render a.mp4 --size 641x480", "the sides of an MP4 are even, such as 640x480"},
+      {"render a.gif --frames 2.5", "--frames wants a whole number"},
+      {"render a.gif --frames 0", "--frames is 0; a number from 1 to 10000 is expected"},
+      {"export a.obj",
+       "the name a.obj ends in .obj; export goes by it; known are .ply, .vox, .npz"},
+      {"export a.ply b.ply", "\"b.ply\" is one argument too many"}};
+  for (const auto& [line, words] : wrong) {
+    const ParsedCommandLine parsed = ParseCommandLine(Split(line));
+    EXPECT_EQ(parsed.exit_code, kExitUsage) << line;
+    EXPECT_THAT(parsed.err, HasSubstr(words));
+  }
+}
+
 TEST(CommandLine, Pipe) {
   const auto pipe =
       std::get<PipeOptions>(Parse("pipe --layout a.json --display d --fps 30 --keep").command);
@@ -149,6 +192,10 @@ TEST(CommandLine, TheOthers) {
   const auto stats = std::get<StatsOptions>(Parse("stats --watch --interval 0.5").command);
   EXPECT_TRUE(stats.watch);
   EXPECT_EQ(stats.interval_s, 0.5);
+  const auto top = std::get<TopOptions>(Parse("top --once --interval 2 --display d").command);
+  EXPECT_TRUE(top.once);
+  EXPECT_EQ(top.interval_s, 2);
+  EXPECT_EQ(top.display, "d");
   const auto entities =
       std::get<EntitiesOptions>(Parse("entities --layer l --owner 18446744073709551615").command);
   EXPECT_EQ(entities.layer, "l");
@@ -266,6 +313,16 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"set --blank maybe", {"--blank", "maybe"}},
         Wrong{"calibrate simulated", {"calibrate wants a DISPLAY and the name of a file"}},
         Wrong{"pattern axs", {"did you mean axes?"}},
+        Wrong{"--sevrer a:1 stats", {"--sevrer is no option here", "did you mean --server?"}},
+        Wrong{"--watch stats", {"--watch is an option of stats, and belongs behind it"}},
+        Wrong{"stats --interval", {"--interval wants a value, S: Seconds between, 0.01 to 3600\n"}},
+        Wrong{"set --blank", {"--blank wants a value, on|off"}},
+        Wrong{"stats --watch=\x1bmaybe", {"--watch is \\u{1b}maybe; it takes no value"}},
+        Wrong{"rendre a.gif", {"did you mean render?"}},
+        Wrong{"top --interval 0.01", {"--interval is 0.01; a number from 0.1 to 3600"}},
+        Wrong{"completion", {"completion wants a SHELL: bash, zsh or fish"}},
+        Wrong{"completion basch", {"the shell basch is not known", "did you mean bash?"}},
+        Wrong{"__complet", {"is no command"}},
         Wrong{"stats --wacth=1", {"--wacth", "did you mean --watch?"}}));
 
 TEST(CommandLine, HelpAndVersionAreData) {
@@ -280,6 +337,24 @@ TEST(CommandLine, HelpAndVersionAreData) {
   const ParsedCommandLine version = ParseCommandLine({"--version"});
   EXPECT_EQ(version.exit_code, 0);
   EXPECT_THAT(version.out, testing::MatchesRegex("voxelctl [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST(CommandLine, WhatIsForScriptsIsHidden) {
+  EXPECT_EQ(std::get<CompleteOptions>(Parse("__complete layers vox").command).beginning, "vox");
+  const ManualOptions manual = std::get<ManualOptions>(Parse("__manual out").command);
+  EXPECT_EQ(manual.folder, "out");
+  ASSERT_GT(manual.pages.size(), 25u);
+  EXPECT_EQ(manual.pages[0].first, "voxelctl.1");
+  for (const auto& [name, page] : manual.pages) {
+    EXPECT_THAT(page, testing::Not(HasSubstr("__"))) << name;
+    EXPECT_THAT(page, HasSubstr(".SH SEE ALSO")) << name;
+  }
+  EXPECT_THAT(ParseCommandLine({"--help"}).out, testing::Not(HasSubstr("__complete")));
+  EXPECT_THAT(ParseCommandLine({"xyzzy"}).err, testing::Not(HasSubstr("__")));
+  const ParsedCommandLine script = ParseCommandLine({"completion", "bash"});
+  EXPECT_FALSE(script.options.has_value());
+  EXPECT_EQ(script.exit_code, 0);
+  EXPECT_THAT(script.out, HasSubstr("complete -F _voxelctl voxelctl\n"));
 }
 
 TEST(EditDistance, CountsAddDropChangeSwap) {

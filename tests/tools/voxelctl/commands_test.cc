@@ -4,15 +4,11 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "tests/tools/voxelctl/fake_server.h"
-#include "tests/tools/voxelctl/temp_folder.h"
-#include "tools/voxelctl/cli/options.h"
-#include "tools/voxelctl/commands/commands.h"
+#include "tests/tools/voxelctl/commands_fixture.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -20,42 +16,6 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
-
-struct Result {
-  int code = -1;
-  std::string out, err;
-};
-
-class CommandsTest : public testing::Test {
- protected:
-  // Runs voxelctl with these arguments, as main would.
-  Result RunTool(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"--server", server_.address()});
-    return RunAnywhere(std::move(arguments));
-  }
-
-  Result RunAnywhere(const std::vector<std::string>& arguments) {
-    const ParsedCommandLine parsed = ParseCommandLine(arguments);
-    if (!parsed.options) return {parsed.exit_code, parsed.out, parsed.err};
-    std::ostringstream out, err;
-    Console console(out, err, parsed.options->json, false);
-    const int code = voxelctl::Run(
-        *parsed.options, [](const char*) { return std::string(); }, interrupt_, console);
-    return {code, out.str(), err.str()};
-  }
-
-  // The one document that is all of the data.
-  json RunJson(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), "--json");
-    const Result result = RunTool(std::move(arguments));
-    EXPECT_EQ(result.code, 0) << result.err;
-    return json::parse(result.out, nullptr, false);
-  }
-
-  TempFolder folder_;
-  FakeServer server_{folder_.Path("s")};
-  Interrupt interrupt_{Interrupt::Watch::kNothing};
-};
 
 TEST_F(CommandsTest, EveryReportIsOneJsonDocument) {
   EXPECT_EQ(RunJson({"displays"})["displays"][0]["name"], "fake");
@@ -72,6 +32,9 @@ TEST_F(CommandsTest, EveryReportIsOneJsonDocument) {
                             "commits_lost", "bytes_out"}) {
     EXPECT_TRUE(display.contains(field)) << field;
   }
+
+  EXPECT_EQ(RunJson({"top", "--once"})["stats"]["displays"][0]["name"], "fake");
+  EXPECT_THAT(RunTool({"top", "--once"}).out, testing::Not(HasSubstr("\x1b")));
 
   const json entities = RunJson({"entities", "--layer", "voxelctl"});
   EXPECT_EQ(entities["entities"].size(), 2u) << "both pages";

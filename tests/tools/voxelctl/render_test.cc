@@ -138,6 +138,24 @@ TEST_P(RenderTest, RightIsRightAndUpIsUp) {
   EXPECT_NEAR(up.x, 160, 6);
 }
 
+TEST_P(RenderTest, WhatIsOnTheAxisStaysWhereItIsAsTheViewerWalksAround) {
+  Volume volume = NewVolume();
+  Light(&volume, {0, 0, 9}, 1.6, 0, 255, 0);
+  const auto spot_at = [&](double azimuth) {
+    return Find(RenderVolume(
+                    volume, {.width = 320, .height = 320, .angles = {azimuth, 20}, .around = true}),
+                1);
+  };
+  const Spot first = spot_at(0);
+  EXPECT_NEAR(first.x, 160, 2);
+  for (const double azimuth : {30.0, 45.0, 77.0, 200.0}) {
+    const Spot spot = spot_at(azimuth);
+    EXPECT_NEAR(spot.x, first.x, 2) << azimuth;
+    EXPECT_NEAR(spot.y, first.y, 2) << azimuth;
+    EXPECT_NEAR(spot.area, first.area, 0.2 * first.area) << azimuth;
+  }
+}
+
 TEST_P(RenderTest, NearerIsBrighterAndLarger) {
   Volume volume = NewVolume();
   Light(&volume, {-6, -9, 0}, 1.6, 255, 0, 0);

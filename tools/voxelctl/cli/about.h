@@ -36,6 +36,23 @@ inline constexpr const char* kSnapshotAbout =
     "Draws what a display shows, rebuilt from the bytes that go out to it, as a PNG: in "
     "perspective, dimmer with\n"
     "distance, with the outline of its volume; with --slices all its slices side by side.";
+inline constexpr const char* kRenderAbout =
+    "Draws what a display shows as a viewer sees it who walks around it: a GIF, an MP4 (by the "
+    "program ffmpeg),\n"
+    "numbered PNGs, or one PNG. It is one volume in all pictures; with --live, what is shown at "
+    "the time of each.\n"
+    "  voxelctl render turn.gif\n"
+    "  voxelctl render turn.mp4 --frames 240 --fps 30 --turns 2 --size 1280x960\n"
+    "  voxelctl render 'turn/####.png' --frames 36";
+inline constexpr const char* kExportAbout =
+    "Writes the volume as a display shows it: .ply has its lit pixels as coloured points in "
+    "millimetres, .vox its voxels\n"
+    "for MagicaVoxel in 255 colours, .npz for numpy rgb (slices, height, width, 3), positions_mm "
+    "of the lit ones in the\n"
+    "order of rgb.any(axis=3).nonzero(), and metadata, which is JSON.";
+inline constexpr const char* kGalleryAbout =
+    "Draws an example of every shape, one after another, and puts what a display shows of each\n"
+    "into one picture. What voxelctl put up before goes.";
 inline constexpr const char* kCalibrateAbout =
     "Shows patterns on a display, which it opens itself (voxeld must not have it), asks what is "
     "seen, "
@@ -93,6 +110,20 @@ inline constexpr const char* kPipeAbout =
 inline constexpr const char* kTokenAbout =
     "Makes a token that shows who a client is (VOXELD_TOKEN), and its entry for the daemon's "
     "grants file; needs no daemon";
+inline constexpr const char* kTopAbout =
+    "Shows how the server and its displays do, live: state, volumes a second, latency by stage, "
+    "what "
+    "was lost and\n"
+    "superseded, clients, memory, connections. q ends it, p pauses, tab and arrows choose a "
+    "display. "
+    "Where there is no\n"
+    "terminal, tables instead; with --json a line each. NO_COLOR: no colours.";
+inline constexpr const char* kCompletionAbout =
+    "Prints the script by which a shell completes voxelctl, the server's names too (Debian's "
+    "package "
+    "has them installed)\n"
+    "  source <(voxelctl completion bash)\n"
+    "  voxelctl completion fish >~/.config/fish/completions/voxelctl.fish";
 inline constexpr const char* kDoctorAbout =
     "Says what of this machine keeps voxeld from its work, and the command that mends it; "
     "needs no daemon";

@@ -72,7 +72,8 @@ LightsOptions LightArguments::Read() const {
 }
 
 void InputArguments::Add(CLI::App* command) {
-  command->add_option("PROTOCOL", protocol_, "opc, ddp, e131 or artnet");
+  command->add_option("PROTOCOL", protocol_, "opc, ddp, e131 or artnet")
+      ->type_name("opc|ddp|e131|artnet");
   command
       ->add_option("--listen", options_.listen,
                    "Where it comes in, by number; without it this machine's loopback and the "

@@ -9,15 +9,16 @@
 #include "absl/algorithm/container.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "absl/strings/str_split.h"
 #include "daemon/suggest/suggest.h"
+#include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
+#include "tools/voxelctl/cli/completion_options.h"
 #include "tools/voxelctl/cli/light_options.h"
 #include "tools/voxelctl/cli/patterns.h"
+#include "tools/voxelctl/cli/picture_options.h"
 #include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/cli/service_options.h"
 #include "tools/voxelctl/text/escape.h"
@@ -43,10 +44,13 @@ class Parser {
     app_.allow_extras();
     AddPlay();
     AddDraw();
-    AddSnapshot();
-    AddGallery();
+    snapshot_texts_.Add(Add("snapshot", kSnapshotAbout));
+    render_texts_.Add(Add("render", kRenderAbout));
+    export_texts_.Add(Add("export", kExportAbout));
+    AddGalleryOptions(Add("gallery", kGalleryAbout), &gallery_);
     Add("displays", "Lists the displays, their geometry and state");
     AddStats();
+    AddTopOptions(Add("top", kTopAbout), &top_);
     AddEntities();
     AddWhyOptions(Add("why", kWhyAbout), &why_);
     AddWatch();
@@ -66,6 +70,8 @@ class Parser {
     input_texts_.Add(Add("input", kInputAbout));
     pipe_texts_.Add(Add("pipe", kPipeAbout));
     Add("doctor", kDoctorAbout);
+    completion_texts_.Add(Add("completion", kCompletionAbout), AddHidden("__complete"),
+                          AddHidden("__manual"));
   }
 
   ParsedCommandLine Parse(const std::vector<std::string>& arguments) {
@@ -82,7 +88,11 @@ class Parser {
       app_.parse(std::move(reversed));
       CheckExtras();
       FillIn();
-      result.options = options_;
+      if (printed_.empty()) {
+        result.options = options_;
+      } else {
+        result.out = printed_;
+      }
     } catch (const UsageError& error) {
       result.err = Usage(error.message);
       result.exit_code = kExitUsage;
@@ -92,13 +102,21 @@ class Parser {
     } catch (const CLI::CallForVersion& version) {
       result.out = absl::StrCat(version.what(), "\n");
     } catch (const CLI::Error& error) {
-      result.err = Usage(EscapeForTerminal(error.what()));
+      result.err = Usage(EscapeForTerminal(usage::ExplainError(error, {Chosen(), &app_})));
       result.exit_code = kExitUsage;
     }
     return result;
   }
 
  private:
+  // Not for people, so it is not named to them.
+  CLI::App* AddHidden(const char* name) {
+    CLI::App* command = Add(name, "");
+    names_.pop_back();
+    hidden_.emplace_back(name);
+    return command;
+  }
+
   CLI::App* Add(const char* name, const char* about) {
     CLI::App* command = app_.add_subcommand(name, about);
     command->fallthrough();
@@ -120,10 +138,10 @@ class Parser {
     c->add_option("--up", up_,
                   "The files' axis that points up: auto, x, y or z. auto: y for glTF, OBJ and flat "
                   "maps, z for STL and PLY; y up has +z in front, z and x up have -y in front")
-        ->type_name("AXIS")
+        ->type_name("auto|x|y|z")
         ->capture_default_str();
     c->add_option("--fill", fill_, "Draw meshes as dots, lines or surface")
-        ->type_name("STYLE")
+        ->type_name("dots|lines|surface")
         ->capture_default_str();
     AddNumber(c, "--fps", &play_.fps, 0.1, 240, "Frames a second while spinning, 0.1 to 240", "N");
     c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
@@ -142,38 +160,6 @@ class Parser {
     c->add_option("SHAPE", draw_.shapes, "Shapes or expressions, each in quotes")
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     c->add_flag("--add", draw_.add, "Leave up what voxelctl put up before");
-  }
-
-  void AddGallery() {
-    CLI::App* c = Add("gallery",
-                      "Draws an example of every shape, one after another, and puts what a display "
-                      "shows of each\ninto one picture. What voxelctl put up before goes.");
-    c->add_option("OUT.png", gallery_.file,
-                  "Where the picture goes; an old one is replaced when the new one is whole");
-    c->add_option("--each", gallery_.each,
-                  "A folder for a small picture of each shape too, named as the shape is")
-        ->type_name("DIR");
-    c->add_option("--display", gallery_.display, "Which display (default: the first)")
-        ->type_name("NAME");
-  }
-
-  void AddSnapshot() {
-    CLI::App* c = Add("snapshot", kSnapshotAbout);
-    c->add_option("OUT.png", snapshot_.file,
-                  "Where the picture goes; an old one is replaced when the new one is whole");
-    c->add_option("--display", snapshot_.display, "Which display (default: the first)")
-        ->type_name("NAME");
-    c->add_option("--size", size_, "Size of the picture, 64x64 to 8192x8192")
-        ->type_name("WxH")
-        ->capture_default_str();
-    AddNumber(c, "--azimuth", &snapshot_.azimuth_degrees, -3600, 3600,
-              "Degrees that the viewer has walked to the right from the front", "DEG");
-    AddNumber(c, "--elevation", &snapshot_.elevation_degrees, -89, 89,
-              "Degrees that the viewer stands above the middle, -89 to 89", "DEG");
-    c->add_flag("--slices", snapshot_.slices,
-                "A contact sheet of all slices instead, as large as they make it");
-    AddNumber(c, "--timeout", &snapshot_.timeout_s, 0.01, 60,
-              "Seconds to wait for a volume, up to 60", "S");
   }
 
   void AddStats() {
@@ -198,7 +184,8 @@ class Parser {
 
   void AddPattern() {
     CLI::App* c = Add("pattern", kPatternAbout);
-    c->add_option("NAME", pattern_name_, "The pattern, none, or list");
+    c->add_option("NAME", pattern_name_, "The pattern, none, or list")
+        ->type_name(absl::StrCat(absl::StrJoin(PatternNames(), "|"), "|none|list"));
     c->add_option("--display", pattern_.display, "Only on this display (default: on all)")
         ->type_name("NAME");
   }
@@ -228,7 +215,7 @@ class Parser {
 
   void AddProfile() {
     CLI::App* c = Add("profile", kProfileAbout);
-    c->add_option("ACTION", profile_action_, "check or list");
+    c->add_option("ACTION", profile_action_, "check or list")->type_name("check|list");
     c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
   }
 
@@ -241,13 +228,27 @@ class Parser {
       if (IsServerOption(word)) {
         ++i;
       } else if (!absl::StartsWith(word, "-") || word == "-") {
-        if (std::find(names_.begin(), names_.end(), word) != names_.end()) return;
+        if (absl::c_linear_search(names_, word) || absl::c_linear_search(hidden_, word)) return;
         throw UsageError{absl::StrCat("\"", EscapeForTerminal(word), "\" is no command",
                                       Suggestion(word, names_))};
       } else if (word == "--help" || word == "-h" || word == "--version") {
         return;
+      } else {
+        CheckBefore(word);
       }
     }
+  }
+
+  // An option before the command is one of all commands: what is not may take the next word, or not.
+  void CheckBefore(const std::string& word) const {
+    const std::string name = word.substr(0, word.find('='));
+    if (app_.get_option_no_throw(name) != nullptr) return;
+    for (const CLI::App* command : app_.get_subcommands([](const CLI::App*) { return true; })) {
+      if (command->get_option_no_throw(name) == nullptr) continue;
+      throw UsageError{absl::StrCat(EscapeForTerminal(name), " is an option of ",
+                                    command->get_name(), ", and belongs behind it")};
+    }
+    throw UsageError{EscapeForTerminal(usage::UnknownOption(word, {&app_}))};
   }
 
   const CLI::App* Chosen() const {
@@ -263,18 +264,7 @@ class Parser {
     if (!absl::StartsWith(extra, "-")) {
       throw UsageError{absl::StrCat("\"", EscapeForTerminal(extra), "\" is one argument too many")};
     }
-    std::vector<std::string> known;
-    for (const CLI::App* app : {Chosen(), &app_}) {
-      for (const CLI::Option* option : app->get_options()) {
-        for (const std::string& name : option->get_lnames())
-          known.push_back(absl::StrCat("--", name));
-      }
-    }
-    std::sort(known.begin(), known.end());
-    known.erase(std::unique(known.begin(), known.end()), known.end());
-    const std::string name = extra.substr(0, extra.find('='));
-    throw UsageError{
-        absl::StrCat(EscapeForTerminal(name), " is no option here", Suggestion(name, known))};
+    throw UsageError{EscapeForTerminal(usage::UnknownOption(extra, {Chosen(), &app_}))};
   }
 
   void FillIn() {
@@ -297,7 +287,9 @@ class Parser {
       options_.command = assets_;
       return;
     }
-    TakePlain(name == "snapshot"   ? &snapshot_.file
+    TakePlain(name == "snapshot"   ? snapshot_texts_.file()
+              : name == "render"   ? render_texts_.file()
+              : name == "export"   ? export_texts_.file()
               : name == "gallery"  ? &gallery_.file
               : name == "pattern"  ? &pattern_name_
               : name == "verify"   ? &verify_.display
@@ -310,13 +302,10 @@ class Parser {
               : name == "markers"  ? &markers_.url
               : name == "why"      ? &why_.id
                                    : nullptr);
-    if (name == "snapshot") return FillInSnapshot();
-    if (name == "gallery") {
-      if (gallery_.file.empty()) throw UsageError{"gallery wants the name of a file, OUT.png"};
-      CheckPictureName(gallery_.file);
-      options_.command = gallery_;
-      return;
-    }
+    if (name == "snapshot") options_.command = snapshot_texts_.Read(*chosen);
+    if (name == "render") options_.command = render_texts_.Read(*chosen);
+    if (name == "export") options_.command = export_texts_.Read();
+    if (name == "gallery") FillInChecked(gallery_, CheckGalleryOptions);
     if (name == "pattern") return FillInPattern();
     if (name == "verify") return FillInVerify();
     if (name == "profile") return FillInProfile();
@@ -342,12 +331,14 @@ class Parser {
       }
       options_.command = calibrate_;
     }
+    if (name == "completion") printed_ = completion_texts_.Script(app_);
+    if (name == "__complete") options_.command = completion_texts_.ReadComplete();
+    if (name == "__manual") options_.command = completion_texts_.ReadManual(app_);
     if (name == "displays") options_.command = DisplaysOptions();
     if (name == "entities") options_.command = entities_;
     if (name == "watch") options_.command = watch_;
-    if (name == "stats") {
-      options_.command = stats_;
-    }
+    if (name == "stats") options_.command = stats_;
+    if (name == "top") options_.command = top_;
     if (name == "clear") {
       if (clear_.all && !clear_.layer.empty())
         throw UsageError{"--all and --layer do not go together"};
@@ -377,27 +368,6 @@ class Parser {
     play_.fill = Choose("--fill", fill_, kFills);
     if (!std::isnan(duration_)) play_.duration_s = duration_;
     options_.command = play_;
-  }
-
-  void FillInSnapshot() {
-    if (snapshot_.file.empty()) throw UsageError{"snapshot wants the name of a file, OUT.png"};
-    CheckPictureName(snapshot_.file);
-    for (const char* option : {"--size", "--azimuth", "--elevation"}) {
-      if (snapshot_.slices && Chosen()->count(option) > 0) {
-        throw UsageError{absl::StrCat(option,
-                                      " does not go with --slices: a contact sheet has no "
-                                      "viewer, and its size follows from the slices")};
-      }
-    }
-    const std::vector<std::string> sides = absl::StrSplit(size_, absl::ByAnyChar("xX"));
-    if (sides.size() != 2 || !absl::SimpleAtoi(sides[0], &snapshot_.width) ||
-        !absl::SimpleAtoi(sides[1], &snapshot_.height)) {
-      throw UsageError{absl::StrCat("--size is ", EscapeForTerminal(size_),
-                                    "; WIDTHxHEIGHT is expected, such as 1200x1000")};
-    }
-    CheckRange("the width in --size", snapshot_.width, 64, 8192);
-    CheckRange("the height in --size", snapshot_.height, 64, 8192);
-    options_.command = snapshot_;
   }
 
   void FillInPattern() {
@@ -456,14 +426,18 @@ class Parser {
   }
 
   CLI::App app_;
-  std::vector<std::string> names_;
+  std::vector<std::string> names_, hidden_;
   std::vector<std::string> plain_;  // arguments after --
+  std::string printed_;             // what the command prints at once, if it does
   Options options_;
   PlayOptions play_;
   DrawOptions draw_;
   GalleryOptions gallery_;
-  SnapshotOptions snapshot_;
+  SnapshotArguments snapshot_texts_;
+  RenderArguments render_texts_;
+  ExportArguments export_texts_;
   StatsOptions stats_;
+  TopOptions top_;
   EntitiesOptions entities_;
   WhyOptions why_;
   WatchOptions watch_;
@@ -482,10 +456,11 @@ class Parser {
   PlaylistOptions playlist_;
   MarkersOptions markers_;
   AssetsOptions assets_;
+  CompletionArguments completion_texts_;
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
   std::string profile_action_;
-  std::string up_ = "auto", fill_ = "surface", size_ = "1200x1000", pattern_name_;
+  std::string up_ = "auto", fill_ = "surface", pattern_name_;
   double duration_ = std::nan("");
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -44,6 +45,30 @@ struct SnapshotOptions {
   double timeout_s = 5;
 };
 
+enum class PictureFormat : uint8_t { kGif, kMp4, kPng };
+
+struct TurntableOptions {
+  std::string file;  // PNGs: with a run of "#"s, or one frame
+  PictureFormat format = PictureFormat::kGif;
+  std::string display;  // empty: the first
+  int frames = 72;
+  double fps = 24;
+  int width = 720, height = 600;  // of an MP4 even
+  double azimuth_degrees = 24, elevation_degrees = 20;
+  double turns = 1;  // in all frames; the last is a step before the first
+  bool live = false;
+  double timeout_s = 5;
+};
+
+enum class ExportFormat : uint8_t { kPly, kVox, kNpz };
+
+struct ExportOptions {
+  std::string file;
+  ExportFormat format = ExportFormat::kPly;
+  std::string display;  // empty: the first
+  double timeout_s = 5;
+};
+
 struct GalleryOptions {
   std::string file;
   std::string each;     // a folder for a picture of each shape; empty: none
@@ -55,6 +80,12 @@ struct DisplaysOptions {};
 struct StatsOptions {
   bool watch = false;
   double interval_s = 1;
+};
+
+struct TopOptions {
+  bool once = false;
+  double interval_s = 1;
+  std::string display;  // that is looked at first; empty: the first
 };
 
 struct EntitiesOptions {
@@ -174,15 +205,28 @@ struct PipeOptions {
   bool keep = false;
 };
 
+// Names that begin so, for a shell that completes one.
+struct CompleteOptions {
+  std::string kind;
+  std::string beginning;
+};
+
+// Manual pages, made by the parser, which knows what they are about.
+struct ManualOptions {
+  std::string folder;
+  std::vector<std::pair<std::string, std::string>> pages;  // names of files, and what is in them
+};
+
 struct Options {
   std::string server;               // empty: see ChooseServer
   client::Credentials credentials;  // as given; see ChooseCredentials
   bool json = false;
-  std::variant<PlayOptions, DrawOptions, SnapshotOptions, GalleryOptions, DisplaysOptions,
-               StatsOptions, EntitiesOptions, WatchOptions, ClearOptions, PatternOptions,
-               SetOptions, CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions,
-               InitOptions, TokenOptions, RecordOptions, ReplayOptions, PlaylistOptions,
-               InputOptions, MarkersOptions, PipeOptions, WhyOptions, AssetsOptions>
+  std::variant<PlayOptions, DrawOptions, SnapshotOptions, TurntableOptions, ExportOptions,
+               GalleryOptions, DisplaysOptions, StatsOptions, TopOptions, EntitiesOptions,
+               WatchOptions, ClearOptions, PatternOptions, SetOptions, CalibrateOptions,
+               VerifyOptions, ProfileOptions, DoctorOptions, InitOptions, TokenOptions,
+               RecordOptions, ReplayOptions, PlaylistOptions, InputOptions, MarkersOptions,
+               PipeOptions, WhyOptions, AssetsOptions, CompleteOptions, ManualOptions>
       command;
 };
 

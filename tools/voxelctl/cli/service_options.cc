@@ -9,6 +9,14 @@
 
 namespace voxeld::voxelctl {
 
+void AddTopOptions(CLI::App* command, TopOptions* options) {
+  command->add_flag("--once", options->once, "As a table, and end");
+  AddNumber(command, "--interval", &options->interval_s, 0.1, 3600, "Seconds between, 0.1 to 3600",
+            "S");
+  command->add_option("--display", options->display, "Look at this one first (default: the first)")
+      ->type_name("NAME");
+}
+
 void AddTokenOptions(CLI::App* command, TokenOptions* options) {
   command->add_option("NAME", options->name,
                       "Whose it is: all that is drawn with it belongs to it");

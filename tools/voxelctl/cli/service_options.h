@@ -11,6 +11,8 @@ class App;
 namespace voxeld::voxelctl {
 
 // What is given lives as long as the app.
+void AddTopOptions(CLI::App* command, TopOptions* options);
+
 void AddTokenOptions(CLI::App* command, TokenOptions* options);
 void AddVerifyOptions(CLI::App* command, VerifyOptions* options);
 void AddRecordOptions(CLI::App* command, RecordOptions* options);

@@ -26,6 +26,11 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
 // Of a volume that shows all that was up when it was called; of an older one, which is told, if none
 // comes in the options' time.
 absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console);
+// A turntable of what a display shows; nothing is left of one that an interrupt ends, but PNGs that were whole.
+absl::Status Render(const TurntableOptions& options, Connection& connection, Interrupt& interrupt,
+                    Console& console);
+// The volume as it is shown, in a file for other programs.
+absl::Status Export(const ExportOptions& options, Connection& connection, Console& console);
 absl::Status Displays(Connection& connection, Console& console);
 absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,
                        Console& console);
@@ -40,6 +45,10 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
 absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console);
 absl::Status Set(const SetOptions& options, Connection& connection, Console& console);
 void ListPatterns(Console& console);
+// Names for a shell, a line each; none, and no word, where the server does not answer at once.
+absl::Status Complete(const CompleteOptions& options, const Connector& connect,
+                      Interrupt& interrupt, Console& console);
+absl::Status WriteManual(const ManualOptions& options);
 
 // Connects if the command needs it, runs it, says what went wrong; the exit code.
 int Run(const Options& options, const Environment& environment, Interrupt& interrupt,

@@ -15,13 +15,14 @@
 #include "tools/voxelctl/profile/profile.h"
 #include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/token/token.h"
+#include "tools/voxelctl/top/top.h"
 #include "tools/voxelctl/verify/verify.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
-absl::Status Dispatch(const Options& options, const Connector& connect, Interrupt& interrupt,
-                      Console& console) {
+absl::Status Dispatch(const Options& options, const Environment& environment,
+                      const Connector& connect, Interrupt& interrupt, Console& console) {
   if (const auto* play = std::get_if<PlayOptions>(&options.command))
     return Play(*play, connect, interrupt, console);
   if (const auto* draw = std::get_if<DrawOptions>(&options.command))
@@ -45,6 +46,10 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
   }
   if (const auto* profile = std::get_if<ProfileOptions>(&options.command))
     return ShowProfile(*profile, console);
+  if (const auto* complete = std::get_if<CompleteOptions>(&options.command))
+    return Complete(*complete, connect, interrupt, console);
+  if (const auto* manual = std::get_if<ManualOptions>(&options.command))
+    return WriteManual(*manual);
   if (const auto* playlist = std::get_if<PlaylistOptions>(&options.command))
     return PlayList(*playlist, connect, LocalWeekMinute, interrupt, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
@@ -55,12 +60,18 @@ absl::Status Dispatch(const Options& options, const Connector& connect, Interrup
         using Command = std::decay_t<decltype(command)>;
         if constexpr (std::is_same_v<Command, SnapshotOptions>)
           return Snapshot(command, connection, console);
+        if constexpr (std::is_same_v<Command, TurntableOptions>)
+          return Render(command, connection, interrupt, console);
+        if constexpr (std::is_same_v<Command, ExportOptions>)
+          return Export(command, connection, console);
         if constexpr (std::is_same_v<Command, GalleryOptions>)
           return Gallery(command, connection, interrupt, console);
         if constexpr (std::is_same_v<Command, DisplaysOptions>)
           return Displays(connection, console);
         if constexpr (std::is_same_v<Command, StatsOptions>)
           return ShowStats(command, connection, interrupt, console);
+        if constexpr (std::is_same_v<Command, TopOptions>)
+          return Top(command, environment("NO_COLOR").empty(), connection, interrupt, console);
         if constexpr (std::is_same_v<Command, EntitiesOptions>)
           return Entities(command, connection, console);
         if constexpr (std::is_same_v<Command, WhyOptions>) return Why(command, connection, console);
@@ -113,7 +124,7 @@ int Run(const Options& options, const Environment& environment, Interrupt& inter
     return Connection::Connect(server, ChooseCredentials(options.credentials, environment),
                                interrupt);
   };
-  const absl::Status status = Dispatch(options, connect, interrupt, console);
+  const absl::Status status = Dispatch(options, environment, connect, interrupt, console);
   console.EndProgress();
   if (status.ok()) return kExitOk;
   if (absl::IsCancelled(status) && interrupt.requested()) {

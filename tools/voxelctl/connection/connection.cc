@@ -170,6 +170,13 @@ absl::StatusOr<v1::ListAssetsResponse> Connection::ListAssets() {
       });
 }
 
+absl::StatusOr<v1::ListOwnersResponse> Connection::ListOwners() {
+  return impl_->Unary<v1::ListOwnersResponse>(
+      [&](grpc::ClientContext* context, v1::ListOwnersResponse* response) {
+        return impl_->scene().ListOwners(context, {}, response);
+      });
+}
+
 absl::StatusOr<client::Asset> Connection::UploadAsset(
     absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress) {
   const absl::StatusOr<client::Asset> asset =
@@ -180,7 +187,8 @@ absl::StatusOr<client::Asset> Connection::UploadAsset(
   return absl::Status(asset.status().code(), EscapeForTerminal(asset.status().message()));
 }
 
-absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntitiesRequest request) {
+absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntitiesRequest request,
+                                                                  bool first_page_only) {
   v1::ListEntitiesResponse all;
   do {
     absl::StatusOr<v1::ListEntitiesResponse> page = impl_->Unary<v1::ListEntitiesResponse>(
@@ -191,7 +199,7 @@ absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntiti
     all.MergeFrom(*page);
     all.set_next_page_token(page->next_page_token());
     request.set_page_token(page->next_page_token());
-  } while (!request.page_token().empty());
+  } while (!first_page_only && !request.page_token().empty());
   return all;
 }
 

@@ -35,11 +35,13 @@ class Connection {
 
   absl::StatusOr<v1::ListDisplaysResponse> ListDisplays();
   absl::StatusOr<v1::DisplayDescription> UpdateDisplay(const v1::UpdateDisplayRequest& request);
-  // All pages in one answer.
-  absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request);
+  // All pages in one answer, or the first alone, which has all layers.
+  absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request,
+                                                        bool first_page_only = false);
   absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(const v1::ExplainEntityRequest& request);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
   absl::StatusOr<v1::ListAssetsResponse> ListAssets();
+  absl::StatusOr<v1::ListOwnersResponse> ListOwners();
   // `progress` as of client::UploadOptions; what breaks off goes on.
   absl::StatusOr<client::Asset> UploadAsset(
       absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress);

@@ -147,6 +147,14 @@ absl::Status List(Console& console) {
 
 }  // namespace
 
+std::vector<std::string> ProfileNames() {
+  std::vector<std::string> names;
+  for (const std::string& place : display::ProfilePlaces()) {
+    for (std::string& name : display::ProfilesIn(place)) names.push_back(std::move(name));
+  }
+  return names;
+}
+
 absl::Status ShowProfile(const ProfileOptions& options, Console& console) {
   if (options.list) return List(console);
   const absl::StatusOr<display::Profile> profile = display::LoadProfile(options.profile);

@@ -10,21 +10,25 @@ namespace {
 using display::Vec3;
 
 constexpr double kDistance = 3.4;  // in radii of the outline's sphere
-constexpr double kFill = 0.92;     // of the picture's width or height
+constexpr int kViewsAround = 360;
+constexpr double kFill = 0.92;  // of the picture's width or height
 
 double Dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 }  // namespace
 
-Camera::Camera(const ViewAngles& angles, std::span<const Vec3> outline, int width, int height) {
-  const double azimuth = angles.azimuth_degrees * std::numbers::pi / 180;
-  const double elevation = angles.elevation_degrees * std::numbers::pi / 180;
+void Camera::Turn(double azimuth_degrees, double elevation_degrees) {
+  const double azimuth = azimuth_degrees * std::numbers::pi / 180;
+  const double elevation = elevation_degrees * std::numbers::pi / 180;
   const double ca = std::cos(azimuth), sa = std::sin(azimuth);
   const double ce = std::cos(elevation), se = std::sin(elevation);
   right_ = {ca, sa, 0};
   away_ = {-sa * ce, ca * ce, -se};
   up_ = {-sa * se, ca * se, ce};
+}
 
+Camera::Camera(const ViewAngles& angles, std::span<const Vec3> outline, int width, int height,
+               bool around) {
   Vec3 low = outline.front(), high = outline.front();
   for (const Vec3& p : outline) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
@@ -38,12 +42,21 @@ Camera::Camera(const ViewAngles& angles, std::span<const Vec3> outline, int widt
   distance_ = radius_ * kDistance;
 
   double x0 = HUGE_VAL, x1 = -HUGE_VAL, y0 = HUGE_VAL, y1 = -HUGE_VAL;
-  for (const Vec3& p : outline) {
-    const Vec3 c = ToCamera(p);
-    x0 = std::min(x0, c.x / c.z);
-    x1 = std::max(x1, c.x / c.z);
-    y0 = std::min(y0, c.y / c.z);
-    y1 = std::max(y1, c.y / c.z);
+  const int views = around ? kViewsAround : 1;
+  for (int view = 0; view < views; ++view) {
+    Turn(around ? 360.0 * view / views : angles.azimuth_degrees, angles.elevation_degrees);
+    for (const Vec3& p : outline) {
+      const Vec3 c = ToCamera(p);
+      x0 = std::min(x0, c.x / c.z);
+      x1 = std::max(x1, c.x / c.z);
+      y0 = std::min(y0, c.y / c.z);
+      y1 = std::max(y1, c.y / c.z);
+    }
+  }
+  if (around) {
+    x1 = std::max(x1, -x0);
+    x0 = -x1;
+    Turn(angles.azimuth_degrees, angles.elevation_degrees);
   }
   focal_ = kFill * std::min(width / std::max(x1 - x0, 1e-9), height / std::max(y1 - y0, 1e-9));
   middle_x_ = width / 2.0 - focal_ * (x0 + x1) / 2;

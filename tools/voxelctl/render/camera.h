@@ -19,8 +19,10 @@ class Camera {
  public:
   // Looks at the middle of `outline` from a distance in proportion to its size,
   // so near that depth can be told, and frames all of it in width·height elements
-  // with a margin. `outline` is not empty.
-  Camera(const ViewAngles& angles, std::span<const display::Vec3> outline, int width, int height);
+  // with a margin: all that can be seen at this elevation from any side where it is
+  // to walk `around`, so that nothing grows and shrinks. `outline` is not empty.
+  Camera(const ViewAngles& angles, std::span<const display::Vec3> outline, int width, int height,
+         bool around = false);
 
   display::Vec3 ToCamera(const display::Vec3& point) const;
   display::Vec3 Rotate(const display::Vec3& direction) const;
@@ -34,6 +36,8 @@ class Camera {
   double Depth(const display::Vec3& p) const { return (p.z - distance_ + radius_) / (2 * radius_); }
 
  private:
+  void Turn(double azimuth_degrees, double elevation_degrees);
+
   display::Vec3 right_, up_, away_, center_;
   double distance_ = 1, radius_ = 1, focal_ = 1, middle_x_ = 0, middle_y_ = 0;
 };

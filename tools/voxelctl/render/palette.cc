@@ -1,15 +1,12 @@
 #include "tools/voxelctl/render/palette.h"
 
 #include <algorithm>
-#include <map>
 
 namespace voxeld::voxelctl {
 namespace {
 
-using Color = std::array<uint8_t, 3>;
-
 struct Counted {
-  Color color;
+  Color8 color;
   uint64_t pixels = 0;
 };
 
@@ -46,29 +43,48 @@ size_t Middle(const std::vector<Counted>& colors, const Group& group) {
   return at;
 }
 
-Color Mean(const std::vector<Counted>& colors, const Group& group) {
+Color8 Mean(const std::vector<Counted>& colors, const Group& group) {
   uint64_t pixels = 0, sums[3] = {};
   for (size_t i = group.begin; i < group.end; ++i) {
     pixels += colors[i].pixels;
     for (size_t c = 0; c < 3; ++c) sums[c] += colors[i].pixels * colors[i].color[c];
   }
   pixels = std::max<uint64_t>(pixels, 1);
-  Color mean;
+  Color8 mean;
   for (size_t c = 0; c < 3; ++c) mean[c] = static_cast<uint8_t>((sums[c] + pixels / 2) / pixels);
   return mean;
 }
 
 }  // namespace
 
-PaletteImage ReduceColors(const Image& image, int most) {
-  std::map<Color, uint64_t> pixels;
-  const auto color_at = [&](size_t i) {
-    return Color{image.rgb[i], image.rgb[i + 1], image.rgb[i + 2]};
-  };
-  for (size_t i = 0; i < image.rgb.size(); i += 3) ++pixels[color_at(i)];
+void ColorCount::Add(const Image& image) {
+  // Pictures are mostly runs of one colour.
+  uint32_t last = 0;
+  uint64_t* count = nullptr;
+  for (size_t i = 0; i < image.rgb.size(); i += 3) {
+    const uint32_t key = Key({image.rgb[i], image.rgb[i + 1], image.rgb[i + 2]});
+    if (count == nullptr || key != last) count = &pixels_[key];
+    last = key;
+    ++*count;
+  }
+}
+
+std::vector<Color8> ColorCount::Cut(int most) const {
+  absl::flat_hash_map<uint32_t, uint8_t> unused;
+  return Cut(most, &unused);
+}
+
+std::vector<Color8> ColorCount::Cut(int most,
+                                    absl::flat_hash_map<uint32_t, uint8_t>* places) const {
   std::vector<Counted> colors;
-  colors.reserve(pixels.size());
-  for (const auto& [color, count] : pixels) colors.push_back({color, count});
+  colors.reserve(pixels_.size());
+  for (const auto& [key, count] : pixels_) {
+    colors.push_back({{static_cast<uint8_t>(key >> 16), static_cast<uint8_t>(key >> 8),
+                       static_cast<uint8_t>(key)},
+                      count});
+  }
+  std::sort(colors.begin(), colors.end(),
+            [](const Counted& a, const Counted& b) { return a.color < b.color; });
 
   std::vector<Group> groups;
   if (!colors.empty()) groups.push_back(Group::Of(colors, 0, colors.size()));
@@ -89,16 +105,26 @@ PaletteImage ReduceColors(const Image& image, int most) {
     groups.push_back(Group::Of(colors, middle, group.end));
   }
 
-  PaletteImage out{image.width, image.height, {}, {}};
-  std::map<Color, uint8_t> index_of;
+  std::vector<Color8> out;
   for (const Group& group : groups) {
     for (size_t i = group.begin; i < group.end; ++i) {
-      index_of[colors[i].color] = static_cast<uint8_t>(out.colors.size());
+      (*places)[Key(colors[i].color)] = static_cast<uint8_t>(out.size());
     }
-    out.colors.push_back(Mean(colors, group));
+    out.push_back(Mean(colors, group));
   }
+  return out;
+}
+
+PaletteImage ReduceColors(const Image& image, int most) {
+  ColorCount count;
+  count.Add(image);
+  absl::flat_hash_map<uint32_t, uint8_t> places;
+  PaletteImage out{image.width, image.height, count.Cut(most, &places), {}};
   out.indices.reserve(image.rgb.size() / 3);
-  for (size_t i = 0; i < image.rgb.size(); i += 3) out.indices.push_back(index_of[color_at(i)]);
+  for (size_t i = 0; i < image.rgb.size(); i += 3) {
+    out.indices.push_back(
+        places.at(ColorCount::Key({image.rgb[i], image.rgb[i + 1], image.rgb[i + 2]})));
+  }
   return out;
 }
 

@@ -5,18 +5,40 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "tools/voxelctl/render/volume.h"
 
 namespace voxeld::voxelctl {
 
+using Color8 = std::array<uint8_t, 3>;
+
 struct PaletteImage {
   int width = 0, height = 0;
-  std::vector<std::array<uint8_t, 3>> colors;  // at most 256
-  std::vector<uint8_t> indices;                // of each pixel, in an Image's order
+  std::vector<Color8> colors;    // at most 256
+  std::vector<uint8_t> indices;  // of each pixel, in an Image's order
 };
 
-// With at most `most` colours, 1 to 256: its own if there are no more, else means of those that are
-// alike (median cut: Heckbert, "Color image quantization for frame buffer display", 1982).
+// Which colours there are, and how often; of as many pictures as are added. Not thread-safe.
+class ColorCount {
+ public:
+  void Add(const Color8& color) { ++pixels_[Key(color)]; }
+  void Add(const Image& image);
+
+  // Means of those that are alike (median cut: Heckbert, "Color image quantization for frame buffer display", 1982),
+  // at most `most` (1 to 256); the colours themselves if there are no more of them.
+  std::vector<Color8> Cut(int most) const;
+  // The same; the place in it of what each colour became.
+  std::vector<Color8> Cut(int most, absl::flat_hash_map<uint32_t, uint8_t>* places) const;
+
+  static uint32_t Key(const Color8& c) {
+    return static_cast<uint32_t>(c[0]) << 16 | static_cast<uint32_t>(c[1]) << 8 | c[2];
+  }
+
+ private:
+  absl::flat_hash_map<uint32_t, uint64_t> pixels_;
+};
+
+// With at most `most` colours, 1 to 256, as ColorCount cuts them.
 PaletteImage ReduceColors(const Image& image, int most);
 
 }  // namespace voxeld::voxelctl

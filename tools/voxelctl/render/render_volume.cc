@@ -312,7 +312,7 @@ Image RenderVolume(const Volume& volume, const RenderOptions& options) {
   const std::vector<Edge> outline = Outline(volume.geometry);
   std::vector<Vec3> corners;
   for (const Edge& edge : outline) corners.insert(corners.end(), {edge.from, edge.to});
-  const Camera camera(options.angles, corners, width, height);
+  const Camera camera(options.angles, corners, width, height, options.around);
   Canvas canvas(width, height);
   Painter painter(volume, camera, &canvas);
   if (const auto* lattice = std::get_if<display::Lattice>(&volume.geometry.shape)) {

@@ -11,6 +11,7 @@ namespace voxeld::voxelctl {
 struct RenderOptions {
   int width = 1200, height = 1000;  // 64 to 8192
   ViewAngles angles;
+  bool around = false;  // as large as it is from any side: of pictures that turn
 };
 
 // InvalidArgument if the geometry is not valid, or its slices are not the volume's.

@@ -1,0 +1,17 @@
+// The pixels of a volume that are lit, and where they are.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "display/api/geometry.h"
+#include "tools/voxelctl/render/volume.h"
+
+namespace voxeld::voxelctl {
+
+// Calls `each` with the place in millimetres (x is NaN where the pixel lies nowhere) and the three bytes of colour, in the
+// volume's order: slice, then v, then u.
+void ForEachLit(const Volume& volume,
+                const std::function<void(const display::Vec3& at, const uint8_t* rgb)>& each);
+
+}  // namespace voxeld::voxelctl

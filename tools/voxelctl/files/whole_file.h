@@ -1,0 +1,46 @@
+// Files that are there whole or not at all.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace voxeld::voxelctl {
+
+// A new file beside `path` that Commit() renames there: a reader sees the old file or the new one. Without Commit()
+// nothing of it stays. Its permissions are those that any new file of the user's has. Messages of errors begin with
+// the path, made fit for a terminal. Not thread-safe.
+class WholeFile {
+ public:
+  // PermissionDenied if there can be none.
+  static absl::StatusOr<std::unique_ptr<WholeFile>> Create(const std::string& path);
+  ~WholeFile();
+  WholeFile(const WholeFile&) = delete;
+  WholeFile& operator=(const WholeFile&) = delete;
+
+  // At the end of what is there.
+  absl::Status Write(absl::string_view bytes);
+
+  // On the disk, and in place; nothing can be written any more.
+  absl::Status Commit();
+
+  // Where it is until then, for another program that writes it.
+  const std::string& temporary() const { return temporary_; }
+
+ private:
+  WholeFile(std::string path, std::string temporary, int file)
+      : path_(std::move(path)), temporary_(std::move(temporary)), file_(file) {}
+  absl::Status SystemError(const char* what) const;
+
+  const std::string path_, temporary_;
+  const int file_;
+  bool in_place_ = false;
+};
+
+// All at once.
+absl::Status WriteWholeFile(const std::string& path, absl::string_view bytes);
+
+}  // namespace voxeld::voxelctl
