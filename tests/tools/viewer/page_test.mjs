@@ -1,0 +1,308 @@
+// The page in a browser: Debian's Chromium without a screen. What it draws is held against a camera worked out here, and
+// picture elements are counted one by one. NODE_MODULES is where playwright-core and the others are.
+import assert from "node:assert/strict";
+import { createRequire } from "node:module";
+import { request } from "node:http";
+import { join } from "node:path";
+import { after, before, describe, test } from "node:test";
+import { Daemon } from "./daemon.mjs";
+
+const require = createRequire(join(process.env.NODE_MODULES, "x"));
+const { chromium } = require("playwright-core");
+const { PNG } = require("pngjs");
+const axe = require("axe-core");
+
+const kPatience = 120_000; // a busy machine's first page may take half a minute
+const kSoftware = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+const kCube = "cube=simulated,size=16x16x16,view=voxels";
+const kRotor = "rotor=simulated,geometry=rotor,size=32x16,slices=60";
+
+let browser, daemon;
+
+async function launch(more = []) {
+  return chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", ...more], timeout: kPatience });
+}
+
+// A page that has drawn the first display, and what it was up to meanwhile.
+async function open(address, { width = 800, height = 600, panel = false, browserOf = browser, ...more } = {}) {
+  const context = await browserOf.newContext({ viewport: { width, height }, deviceScaleFactor: 1, ...more });
+  const page = await context.newPage();
+  page.setDefaultTimeout(kPatience);
+  const seen = { errors: [], requests: [] };
+  page.on("pageerror", (error) => seen.errors.push(error.message));
+  page.on("console", (message) => message.type() === "error" && seen.errors.push(message.text()));
+  page.on("request", (asked) => seen.requests.push(asked.url()));
+  page.on("websocket", (socket) => seen.requests.push(socket.url()));
+  await page.goto(address, { timeout: kPatience });
+  if (!panel) await page.click("#toggle");
+  await page.waitForFunction(() => globalThis.voxeld?.inspect().frames > 0);
+  return { page, seen, context };
+}
+
+const inspect = (page) => page.evaluate(() => {
+  const { renderer, drawn, frames } = globalThis.voxeld.inspect();
+  return { renderer, drawn, frames };
+});
+
+async function drawnPoints(page, points) {
+  await page.waitForFunction((wanted) => globalThis.voxeld.inspect().drawn.points === wanted, points);
+}
+
+// The canvas of a display, without what lies over it.
+async function picture(page, index = 0) {
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+  await page.evaluate(() => document.querySelectorAll(".overlay, .label").forEach((over) => (over.style.visibility = "hidden")));
+  const shot = await page.locator(".view canvas:first-child").nth(index).screenshot();
+  await page.evaluate(() => document.querySelectorAll(".overlay, .label").forEach((over) => (over.style.visibility = "")));
+  return PNG.sync.read(shot);
+}
+
+const at = (image, x, y) => [...image.data.subarray((y * image.width + x) * 4, (y * image.width + x) * 4 + 3)];
+
+// Places that are not the page's ground, as a box.
+function lit(image, of = () => true) {
+  let box = null;
+  let count = 0;
+  for (let y = 0; y < image.height; ++y) {
+    for (let x = 0; x < image.width; ++x) {
+      const color = at(image, x, y);
+      if (Math.max(...color) < 40 || !of(color)) continue;
+      ++count;
+      box = box === null ? [x, y, x, y] : [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)];
+    }
+  }
+  return { box, count };
+}
+
+// A pinhole of 30 degrees, in front (towards −y) and level, 1.08 of the distance from which the lights' sphere just fits. `at`
+// and the sphere in millimetres about the middle; `pitch` of the display's pixels.
+function expectedSquare(where, [x, y, z], radius, pitch) {
+  const half = Math.min(where.width, where.height) / 2;
+  const focal = half / Math.tan(Math.PI / 12);
+  const w = (radius / Math.sin(Math.PI / 12)) * 1.08 + y;
+  const side = Math.floor((focal * pitch) / w + 0.5);
+  const left = Math.floor(where.width / 2 + (focal * x) / w - side / 2 + 0.5);
+  const top = Math.floor(where.height / 2 - (focal * z) / w - side / 2 + 0.5);
+  return { side, box: [left, top, left + side - 1, top + side - 1] };
+}
+
+const level = "#camera=0,0,1,0,0,0";
+
+before(async () => {
+  browser = await launch();
+  daemon = await Daemon.start([kCube, kRotor]);
+}, { timeout: kPatience });
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+describe("the page", { timeout: 5 * kPatience }, () => {
+  test("asks for nothing beyond its origin, and weighs little", async () => {
+    const { seen, page, context } = await open(daemon.page);
+    assert.deepEqual(seen.errors, []);
+    assert.ok(seen.requests.length >= 4, "page, styles, script and socket at least");
+    for (const url of seen.requests) assert.equal(new URL(url).host, `127.0.0.1:${daemon.port}`, url);
+    const sizes = await page.evaluate(() => performance.getEntriesByType("resource").map((entry) => entry.encodedBodySize));
+    const weight = sizes.reduce((sum, size) => sum + size, 0);
+    assert.ok(weight > 10_000 && weight < 400_000, `${weight} bytes`);
+    await context.close();
+  });
+
+  test("a voxel is where it should be, exactly", async () => {
+    await daemon.voxelctl("draw", "points at=3.5,8.5,12.5 color=#ffffff", "points at=12.5,8.5,2.5 color=#ff8000");
+    const { page, context } = await open(`${daemon.page}?renderer=2d${level}`);
+    assert.equal((await inspect(page)).renderer, "2D");
+    await drawnPoints(page, 2);
+    const image = await picture(page);
+    const middle = (place) => place.map((v) => v - 8); // of a grid of 16 cells of 1 mm
+    const radius = Math.hypot(7.5, 7.5, 7.5); // lights are in the middle of cells
+    for (const [place, color] of [[[3.5, 8.5, 12.5], [1, 1, 1]], [[12.5, 8.5, 2.5], [1, 0x80 / 255, 0]]]) {
+      const wanted = expectedSquare(image, middle(place), radius, 1);
+      const found = lit(image, ([r, g, b]) => (color[2] === 0 ? b < r / 2 : b >= r / 2));
+      assert.deepEqual(found.box, wanted.box);
+      assert.equal(found.count, wanted.side ** 2);
+      // Light fades with the distance: nothing else changes the colour.
+      const [r, g, b] = at(image, wanted.box[0], wanted.box[1]);
+      assert.ok(Math.abs(g - r * color[1]) <= 1 && Math.abs(b - r * color[2]) <= 1, `${r},${g},${b}`);
+    }
+    await context.close();
+  });
+
+  test("both renderers draw the same", async () => {
+    await daemon.voxelctl("draw", "sphere radius=5 at=8,8,8 color=#40c0ff", "line from=1,1,1 to=15,15,15 color=#ff4000");
+    const software = await launch(kSoftware);
+    try {
+      const pictures = [];
+      for (const renderer of ["2d", "gl"]) {
+        const { page, seen, context } = await open(`${daemon.page}?renderer=${renderer}`, { browserOf: software });
+        assert.equal((await inspect(page)).renderer, renderer === "2d" ? "2D" : "WebGL2");
+        await page.waitForFunction(() => globalThis.voxeld.inspect().drawn.points > 50);
+        pictures.push(await picture(page));
+        assert.deepEqual(seen.errors, []);
+        await context.close();
+      }
+      const [a, b] = pictures;
+      assert.equal(a.width * a.height, b.width * b.height);
+      let differ = 0;
+      for (let i = 0; i < a.data.length; i += 4) {
+        const most = Math.max(...[0, 1, 2].map((c) => Math.abs(a.data[i + c] - b.data[i + c])));
+        if (most > 12) ++differ;
+      }
+      const { count } = lit(a);
+      assert.ok(count > 2000, `${count} are lit`);
+      assert.ok(differ < count * 0.02, `${differ} of ${count} differ`);
+    } finally {
+      await software.close();
+    }
+  });
+
+  test("one slice, a slow sweep, and an address that keeps what is looked at", async () => {
+    await daemon.voxelctl("draw", "box size=8,8,8 at=8,8,8 fill=solid color=white");
+    const { page, context } = await open(daemon.page);
+    await drawnPoints(page, 512);
+    await page.locator("#slice").fill("5");
+    await drawnPoints(page, 64);
+    assert.ok(await page.isChecked("#one"));
+    assert.equal(await page.textContent("#slice-number"), "6 of 16");
+    assert.match(page.url(), /slice=5/);
+    await page.locator("#slice").fill("0");
+    await drawnPoints(page, 0);
+    const again = await open(page.url().replace("slice=0", "slice=6"));
+    await drawnPoints(again.page, 64);
+    assert.equal(await again.page.inputValue("#slice"), "6");
+    await again.context.close();
+    await page.check("#sweep");
+    await page.waitForFunction(() => [64, 128, 192].includes(globalThis.voxeld.inspect().drawn.points));
+    await page.waitForFunction(() => globalThis.voxeld.inspect().drawn.points === 0);
+    await page.uncheck("#sweep");
+    await drawnPoints(page, 512);
+    await context.close();
+  });
+
+  test("keys, mouse and wheel", async () => {
+    const { page, context } = await open(daemon.page);
+    const home = await page.evaluate(() => globalThis.voxeld.inspect().place(1, 2, 3));
+    await page.mouse.move(300, 300);
+    await page.mouse.down();
+    await page.mouse.move(400, 330);
+    await page.mouse.up();
+    await page.mouse.wheel(0, 300);
+    assert.notDeepEqual(await page.evaluate(() => globalThis.voxeld.inspect().place(1, 2, 3)), home);
+    const camera = new URLSearchParams(new URL(page.url()).hash.slice(1)).get("camera").split(",").map(Number);
+    assert.equal(camera[0], 24 - 40);
+    assert.equal(camera[1], 20 + 12);
+    assert.ok(camera[2] > 1.2);
+    await page.keyboard.press("f");
+    assert.match(page.url(), /camera=-16%2C32%2C1%2C/);
+    await page.keyboard.press("r");
+    assert.deepEqual(await page.evaluate(() => globalThis.voxeld.inspect().place(1, 2, 3)), home);
+    assert.equal(await page.isChecked("#dark"), false);
+    await page.keyboard.press("S");
+    assert.equal(await page.isChecked("#dark"), true);
+    await page.waitForFunction(async () => true);
+    await context.close();
+  });
+
+  test("several displays, and several pages of one", async () => {
+    await daemon.voxelctl("draw", "sphere radius=4 at=8,8,8 color=lime");
+    const { page, context } = await open(daemon.page, { width: 1000 });
+    const other = await open(`${daemon.page}#display=rotor`);
+    assert.equal(await other.page.inputValue("#display"), "rotor");
+    await page.selectOption("#display", "");
+    await page.waitForFunction(() => document.querySelectorAll(".view").length === 2);
+    assert.deepEqual(await page.locator(".view .label").allTextContents(), ["cube", "rotor"]);
+    await page.waitForFunction(() => Number(document.getElementById("views").dataset.volume) > 0);
+    assert.ok(lit(await picture(page, 0)).count > 100);
+    await daemon.voxelctl("draw", "points at=8.5,8.5,8.5 color=white");
+    await page.selectOption("#display", "cube");
+    await drawnPoints(page, 1);
+    await other.page.waitForFunction(() => globalThis.voxeld.inspect().drawn.points > 0);
+    await context.close();
+    await other.context.close();
+  });
+
+  test("comes back when the daemon does", async () => {
+    const own = await Daemon.start([kCube]);
+    const { page, context } = await open(own.page);
+    await own.stop({ keep: true });
+    await page.waitForSelector("#offline:not([hidden])");
+    const next = await Daemon.start([kCube], { port: own.port, folder: own.folder });
+    try {
+      await page.waitForSelector("#offline", { state: "hidden" });
+      await next.voxelctl("draw", "points at=1.5,1.5,1.5");
+      await drawnPoints(page, 1);
+    } finally {
+      await context.close();
+      await next.stop();
+    }
+  });
+
+  test("looks unless it was given control, which an address gives once", async () => {
+    const own = await Daemon.start([kCube], { terminal: true });
+    try {
+      assert.match(own.control ?? "", /^http:\/\/127\.0\.0\.1:\d+\/control\?key=[0-9a-f]{32}$/);
+      const { page, context } = await open(own.page, { panel: true });
+      assert.equal(await page.isVisible("#control"), false);
+      await page.goto(own.control);
+      await page.waitForSelector("#control:not([hidden])");
+      assert.doesNotMatch(page.url(), /key/);
+      await page.selectOption("#pattern", "TEST_PATTERN_WHITE");
+      await drawnPoints(page, 16 ** 3);
+      await page.check("#blank");
+      await page.waitForSelector(".view.unlit");
+      await page.uncheck("#blank");
+      await page.waitForFunction(() => document.querySelector(".view.unlit") === null);
+      const stranger = await browser.newContext();
+      const refused = await (await stranger.newPage()).goto(own.control);
+      assert.equal(refused.status(), 403);
+      await stranger.close();
+      await context.close();
+    } finally {
+      await own.stop();
+    }
+  });
+
+  test("tells figures and layers, whatever clients call theirs", async () => {
+    const name = '<img src=x onerror="globalThis.broken=1">';
+    await daemon.voxelctl("draw", "--layer", name, "points at=8.5,8.5,8.5").catch(() => {});
+    const { page, seen, context } = await open(daemon.page, { panel: true });
+    await page.waitForFunction(() => /in all/.test(document.getElementById("volumes").textContent));
+    await page.waitForFunction(() => document.querySelectorAll("#layers tr").length > 0);
+    assert.equal(await page.textContent("#state"), "showing");
+    assert.match(await page.textContent("#engine"), /cpu/);
+    assert.equal(await page.evaluate(() => globalThis.broken), undefined);
+    assert.deepEqual(seen.errors, []);
+    await context.close();
+  });
+
+  for (const [name, options] of Object.entries({
+    dark: { colorScheme: "dark" }, light: { colorScheme: "light" }, phone: { width: 390, height: 844, hasTouch: true, isMobile: true, colorScheme: "dark" },
+  })) {
+    test(`can be used by everybody: ${name}`, async () => {
+      const { page, context } = await open(daemon.page, { panel: true, ...options });
+      await page.waitForFunction(() => document.querySelectorAll("#layers tr").length > 0);
+      const cdp = await context.newCDPSession(page);
+      await cdp.send("Page.setBypassCSP", { enabled: true });
+      await page.evaluate(axe.source);
+      const { violations } = await page.evaluate(() => globalThis.axe.run());
+      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(" ")}`), []);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      assert.ok(wide <= 0, `${wide} too wide`);
+      await context.close();
+    });
+  }
+
+  test("other origins and other names get nothing", async () => {
+    const ask = (headers) => new Promise((resolve, reject) => {
+      request({ host: "127.0.0.1", port: daemon.port, path: "/volumes", headers: {
+        Connection: "Upgrade", Upgrade: "websocket", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", ...headers } })
+        .on("response", (response) => resolve(response.statusCode)).on("upgrade", (response, socket) => { socket.destroy(); resolve(response.statusCode); })
+        .on("error", reject).end();
+    });
+    assert.equal(await ask({}), 101);
+    assert.equal(await ask({ Origin: `http://127.0.0.1:${daemon.port}` }), 101);
+    assert.equal(await ask({ Origin: "http://evil.example" }), 403);
+    assert.equal(await ask({ Host: "evil.example" }), 403);
+  });
+});
