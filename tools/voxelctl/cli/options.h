@@ -10,7 +10,9 @@
 
 #include "tools/lights/datagram.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/raw_volume.h"
 #include "tools/voxelctl/scene/look.h"
+#include "tools/voxelctl/scene/volume.h"
 #include "voxeld/credentials.h"
 #include "voxeld/v1/display.pb.h"
 
@@ -28,6 +30,8 @@ struct PlayOptions {
   double fps = 20;  // 0.1 to 240
   std::optional<double> duration_s;
   std::string display;  // whose space is filled; empty: all of them fit
+  std::optional<RawLayout> raw;
+  VolumeLook volume;
 };
 
 struct DrawOptions {

@@ -43,7 +43,8 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
     console.ProgressBar("reading",
                         static_cast<double>(i) / static_cast<double>(options.files.size()),
                         EscapeForTerminal(options.files[i]));
-    absl::StatusOr<Model> model = ImportFile(options.files[i], {.globe = options.globe});
+    absl::StatusOr<Model> model =
+        ImportFile(options.files[i], {.globe = options.globe, .raw = options.raw});
     if (model.ok()) {
       if (!model->note.empty()) console.Say(EscapeForTerminal(model->note));
       models.push_back(*std::move(model));
@@ -183,8 +184,9 @@ class Player {
     staged_bytes_ += bytes;
     ++staged_operations_;
     sent_bytes_ += bytes;
-    console_.ProgressBar("sending", static_cast<double>(sent_bytes_) / static_cast<double>(total),
-                         absl::StrCat(Bytes(sent_bytes_), " of about ", Bytes(total)));
+    console_.ProgressBar(
+        "sending", std::min(1.0, static_cast<double>(sent_bytes_) / static_cast<double>(total)),
+        absl::StrCat(Bytes(sent_bytes_), " of about ", Bytes(total)));
     return session_->client().DefineObject(object, std::move(parts));
   }
 
@@ -193,17 +195,26 @@ class Player {
     for (const Model& model : models) {
       for (const Part& part : model.parts)
         total += part.positions.size() * 15 + part.indices.size() * 2;
+      for (const SampledVolume& volume : model.volumes) total += volume.samples.size();
     }
     for (size_t i = 0; i < models.size(); ++i) {
       const absl::StatusOr<PackedSizes> sizes = PackObject(
           models[i], Object(i), session_->server().limits,
           [&](const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
             return SendDefinition(object, std::move(parts), bytes, total);
-          });
+          },
+          options_.volume);
       if (!sizes.ok()) return sizes.status();
-      summary_.files.push_back({models[i].path, models[i].format, models[i].note, sizes->vertices,
-                                sizes->indices, sizes->objects, sizes->bytes});
+      std::string note = models[i].note;
+      if (!sizes->note.empty()) {
+        const std::string more = absl::StrCat(models[i].path, ": ", sizes->note);
+        console_.Say(EscapeForTerminal(more));
+        note = note.empty() ? more : absl::StrCat(note, "; ", more);
+      }
+      summary_.files.push_back({models[i].path, models[i].format, std::move(note), sizes->vertices,
+                                sizes->indices, sizes->samples, sizes->objects, sizes->bytes});
       models[i].parts = {};  // sent; the memory is not needed any more
+      models[i].volumes = {};
     }
     if (staged_operations_ > 0) {
       absl::Status status = CommitAndWait();

@@ -2,16 +2,19 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/raw_volume.h"
 #include "tools/voxelctl/import/source_file.h"
 
 namespace voxeld::voxelctl {
 
 struct ImportOptions {
   bool globe = false;  // longitude and latitude of maps go on a sphere; meshes do not care
+  std::optional<RawLayout> raw;  // what .raw files are
 };
 
 // Reads meshes. Stateless between calls; thread-safe. Exceptions of a library do not leave it.
@@ -26,8 +29,9 @@ class MeshImporter {
 std::unique_ptr<MeshImporter> NewMeshImporter();
 
 // Reads `path` by its extension, having checked that the contents are of that kind: obj, stl, ply,
-// gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json. Every index is in range and every number finite in what is
-// returned, and it is not empty. An error's message begins with the path and says what was found
+// gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json; nii, nii.gz, nrrd, nhdr, raw, dcm, and folders of
+// DICOM slices. Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
+// empty. An error's message begins with the path and says what was found
 // and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
 
