@@ -10,6 +10,7 @@
 
 #include "tools/lights/datagram.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/pdb_molecule.h"
 #include "tools/voxelctl/import/raw_volume.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/volume.h"
@@ -32,6 +33,7 @@ struct PlayOptions {
   std::string display;  // whose space is filled; empty: all of them fit
   std::optional<RawLayout> raw;
   VolumeLook volume;
+  MoleculeStyle style = MoleculeStyle::kBalls;
 };
 
 struct DrawOptions {

@@ -16,6 +16,8 @@ namespace {
 const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
 const Choices<FillStyle> kFills = {
     {"dots", FillStyle::kDots}, {"lines", FillStyle::kLines}, {"surface", FillStyle::kSurface}};
+const Choices<MoleculeStyle> kStyles = {{"balls", MoleculeStyle::kBalls},
+                                        {"space", MoleculeStyle::kSpace}};
 const Choices<SampleType> kTypes = {{"u8", SampleType::kU8},   {"i8", SampleType::kI8},
                                     {"u16", SampleType::kU16}, {"i16", SampleType::kI16},
                                     {"u32", SampleType::kU32}, {"i32", SampleType::kI32},
@@ -48,6 +50,10 @@ void PlayArguments::Add(CLI::App* c) {
   c->add_option("--display", options_.display, "Fill this display's volume (default: fit into all)")
       ->type_name("NAME");
   c->add_flag("--clear", options_.clear, "Take the scene down at the end");
+  c->add_option("--style", style_,
+                "Of molecules: balls with bonds between them, or space, atoms as large as they are")
+      ->type_name("STYLE")
+      ->capture_default_str();
   c->add_option("--colormap", options_.volume.colormap,
                 "Of volumes: colours by a map's name, such as viridis (default: grey)")
       ->type_name("NAME");
@@ -106,6 +112,7 @@ PlayOptions PlayArguments::Read(const std::vector<std::string>& plain) {
   if (options_.files.empty()) throw UsageError{"play wants at least one FILE"};
   options_.up = Choose("--up", up_, kUps);
   options_.fill = Choose("--fill", fill_, kFills);
+  options_.style = Choose("--style", style_, kStyles);
   if (!std::isnan(duration_)) options_.duration_s = duration_;
   ReadVolume();
   return options_;

@@ -24,7 +24,7 @@ class PlayArguments {
   void ReadVolume();
 
   PlayOptions options_;
-  std::string up_ = "auto", fill_ = "surface";
+  std::string up_ = "auto", fill_ = "surface", style_ = "balls";
   std::string size_, type_, window_;
   bool big_endian_ = false;
   double duration_ = std::nan(""), level_ = std::nan("");

@@ -43,8 +43,8 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
     console.ProgressBar("reading",
                         static_cast<double>(i) / static_cast<double>(options.files.size()),
                         EscapeForTerminal(options.files[i]));
-    absl::StatusOr<Model> model =
-        ImportFile(options.files[i], {.globe = options.globe, .raw = options.raw});
+    absl::StatusOr<Model> model = ImportFile(
+        options.files[i], {.globe = options.globe, .raw = options.raw, .style = options.style});
     if (model.ok()) {
       if (!model->note.empty()) console.Say(EscapeForTerminal(model->note));
       models.push_back(*std::move(model));

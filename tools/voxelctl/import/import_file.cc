@@ -17,6 +17,7 @@
 #include "tools/voxelctl/import/nifti_volume.h"
 #include "tools/voxelctl/import/nrrd_volume.h"
 #include "tools/voxelctl/import/pcd_points.h"
+#include "tools/voxelctl/import/pdb_molecule.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
@@ -82,6 +83,7 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
     return ReadNiftiVolume(file);
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
+  if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
   return FileError(
@@ -90,8 +92,8 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
           ? "its name has no extension"
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
       "play reads meshes (.obj, .stl, .ply, .gltf, .glb), voxels (.vox), points (.ply, .pcd, "
-      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json) and volumes (.nii, "
-      ".nii.gz, .nrrd, .nhdr, .raw, .dcm)");
+      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
+      ".nii.gz, .nrrd, .nhdr, .raw, .dcm) and molecules (.pdb, .ent)");
 }
 
 // What every reader promises, held to: a slip in a library must not reach the server.

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/pdb_molecule.h"
 #include "tools/voxelctl/import/raw_volume.h"
 #include "tools/voxelctl/import/source_file.h"
 
@@ -15,6 +16,7 @@ namespace voxeld::voxelctl {
 struct ImportOptions {
   bool globe = false;  // longitude and latitude of maps go on a sphere; meshes do not care
   std::optional<RawLayout> raw;  // what .raw files are
+  MoleculeStyle style = MoleculeStyle::kBalls;
 };
 
 // Reads meshes. Stateless between calls; thread-safe. Exceptions of a library do not leave it.
@@ -30,7 +32,7 @@ std::unique_ptr<MeshImporter> NewMeshImporter();
 
 // Reads `path` by its extension, having checked that the contents are of that kind: obj, stl, ply,
 // gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json; nii, nii.gz, nrrd, nhdr, raw, dcm, and folders of
-// DICOM slices. Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
+// DICOM slices; pdb, ent. Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
 // empty. An error's message begins with the path and says what was found
 // and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
