@@ -22,6 +22,7 @@
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
 #include "tools/voxelctl/import/raw_volume.h"
+#include "tools/voxelctl/import/svg_lines.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
 #include "tools/voxelctl/text/escape.h"
@@ -84,6 +85,7 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
   if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
+  if (extension == "svg") return ReadSvgLines(file);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
   return FileError(
@@ -93,7 +95,7 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
       "play reads meshes (.obj, .stl, .ply, .gltf, .glb), voxels (.vox), points (.ply, .pcd, "
       ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
-      ".nii.gz, .nrrd, .nhdr, .raw, .dcm) and molecules (.pdb, .ent)");
+      ".nii.gz, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings (.svg)");
 }
 
 // What every reader promises, held to: a slip in a library must not reach the server.

@@ -32,7 +32,7 @@ std::unique_ptr<MeshImporter> NewMeshImporter();
 
 // Reads `path` by its extension, having checked that the contents are of that kind: obj, stl, ply,
 // gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json; nii, nii.gz, nrrd, nhdr, raw, dcm, and folders of
-// DICOM slices; pdb, ent. Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
+// DICOM slices; pdb, ent; svg. Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
 // empty. An error's message begins with the path and says what was found
 // and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
