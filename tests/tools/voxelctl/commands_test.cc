@@ -260,6 +260,27 @@ TEST_F(CommandsTest, SpinningSendsTransformsOnly) {
   EXPECT_TRUE(summary["still_up"]);
 }
 
+TEST_F(CommandsTest, ASequenceReplacesEachByTheNext) {
+  std::string many;
+  for (int i = 0; i < 30000; ++i) many += "0 0 1\n";
+  folder_.Write("f_1.xyz", many);  // in several pieces, of which the third frame has no use
+  folder_.Write("f_2.xyz", "0 0 0\n1 1 1\n");
+  folder_.Write("f_3.xyz", "0 0 0\n1 1 1\n");
+  const json summary = RunJson({"play", folder_.Path("f_#.xyz"), "--fps", "20"});
+  EXPECT_EQ(summary["frames"].get<int>() + summary["frames_skipped"].get<int>(), 3);
+  EXPECT_EQ(summary["unanswered"], 0);
+  EXPECT_TRUE(summary["still_up"]);
+  const FakeServer::Log log = server_.log();
+  ASSERT_EQ(log.entities.size(), 1u);
+  EXPECT_EQ(log.entities.at("1").label(), "f_3.xyz");
+  const json looped =
+      RunJson({"play", "--sequence", folder_.Path("f_2.xyz"), folder_.Path("f_3.xyz"), "--loop",
+               "--fps", "50", "--duration", "0.5"});
+  EXPECT_GE(looped["frames"], 5);
+  EXPECT_THAT(RunTool({"play", folder_.Path("f_2.xyz"), "--loop"}).err, HasSubstr("--loop is for"));
+  EXPECT_THAT(RunTool({"play", folder_.Path("g_#.xyz")}).err, HasSubstr("there is no such file"));
+}
+
 TEST_F(CommandsTest, ASlowDisplayMakesNoQueue) {
   server_.Set({.no_outcomes = true});
   const Result result =

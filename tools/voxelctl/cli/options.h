@@ -28,12 +28,14 @@ struct PlayOptions {
   bool each = false;
   Up up = Up::kAuto;
   FillStyle fill = FillStyle::kSurface;
-  double fps = 20;  // 0.1 to 240
+  double fps = 20;  // 0.1 to 240: of spins, sequences and animations
   std::optional<double> duration_s;
   std::string display;  // whose space is filled; empty: all of them fit
   std::optional<RawLayout> raw;
   VolumeLook volume;
   MoleculeStyle style = MoleculeStyle::kBalls;
+  bool sequence = false;  // the files one after another, at `fps`
+  bool loop = false;      // a sequence or animation begins again at its end
 };
 
 struct DrawOptions {

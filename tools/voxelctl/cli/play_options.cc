@@ -40,7 +40,11 @@ void PlayArguments::Add(CLI::App* c) {
   c->add_option("--fill", fill_, "Draw meshes as dots, lines or surface")
       ->type_name("STYLE")
       ->capture_default_str();
-  AddNumber(c, "--fps", &options_.fps, 0.1, 240, "Frames a second while spinning, 0.1 to 240", "N");
+  AddNumber(c, "--fps", &options_.fps, 0.1, 240, "Frames a second of what moves, 0.1 to 240", "N");
+  c->add_flag("--sequence", options_.sequence,
+              "One file after another, --fps a second, instead of all at once; a FILE such as "
+              "'frame_####.obj' or 'frame_%04d.obj' is such a sequence");
+  c->add_flag("--loop", options_.loop, "A sequence begins again at its end, until Ctrl-C");
   c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
   WantNumber(c->get_option("--duration"), 0, 1e9);
   c->add_flag("--globe", options_.globe,

@@ -115,6 +115,17 @@ Reach Measure(std::span<Model*> group) {
   return reach;
 }
 
+void TurnUpright(Up wanted, Model* model) {
+  const Up up = wanted == Up::kAuto ? model->up : wanted;
+  for (Part& part : model->parts) {
+    for (Point3& p : part.positions) p = Upright(p, up);
+    for (Point3& n : part.normals) n = Upright(n, up);
+  }
+  for (SampledVolume& volume : model->volumes) {
+    for (Point3& p : volume.corners) p = Upright(p, up);
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<DisplaySpace> VisibleSpace(int nx, int ny, int nz, const gpu::Affine& scene_to_voxel,
@@ -183,14 +194,7 @@ void PlaceModels(std::span<Model> models, const DisplaySpace& space,
       has_globe = true;
       continue;
     }
-    const Up up = options.up == Up::kAuto ? model.up : options.up;
-    for (Part& part : model.parts) {
-      for (Point3& p : part.positions) p = Upright(p, up);
-      for (Point3& n : part.normals) n = Upright(n, up);
-    }
-    for (SampledVolume& volume : model.volumes) {
-      for (Point3& p : volume.corners) p = Upright(p, up);
-    }
+    TurnUpright(options.up, &model);
     if (options.each || groups.empty()) groups.emplace_back();
     groups.back().push_back(&model);
   }
@@ -203,6 +207,37 @@ void PlaceModels(std::span<Model> models, const DisplaySpace& space,
     Scale(group, has_globe ? Ratio(globe * kInsideGlobe, std::max(reach.sphere, 1e-9))
                            : FitScale(reach, space, round));
   }
+}
+
+void FramePlacement::Measure(const Model& model) {
+  const Up up = up_ == Up::kAuto ? model.up : up_;
+  Bounds bounds{min_, max_};
+  for (const Part& part : model.parts) {
+    for (const Point3& p : part.positions) bounds.Add(Upright(p, up), part.thickness / 2);
+  }
+  for (const SampledVolume& volume : model.volumes) {
+    for (const Point3& p : volume.corners) bounds.Add(Upright(p, up), 0);
+  }
+  min_ = bounds.min;
+  max_ = bounds.max;
+}
+
+void FramePlacement::Fit(const DisplaySpace& space, bool spin) {
+  Reach reach;
+  reach.x = max_.x / 2 - min_.x / 2;
+  reach.y = max_.y / 2 - min_.y / 2;
+  reach.z = max_.z / 2 - min_.z / 2;
+  reach.radius = std::hypot(reach.x, reach.y);
+  scale_ = FitScale(reach, space, space.round || spin);
+}
+
+void FramePlacement::Place(Model* model) const {
+  TurnUpright(up_, model);
+  const Point3 center = Bounds{min_, max_}.Center();
+  ForEachPosition({&model, 1}, [&](Point3& p) {
+    p = {p.x - center.x, p.y - center.y, p.z - center.z};
+  });
+  Scale({&model, 1}, scale_);
 }
 
 gpu::Affine InstanceTransform(const DisplaySpace& space, double turns) {
