@@ -57,6 +57,18 @@ TEST(CommandLine, Play) {
   EXPECT_FALSE(plain.duration_s.has_value());
 }
 
+TEST(CommandLine, PlayOfWhatMoves) {
+  const auto play = [](const std::string& line) {
+    return std::get<PlayOptions>(Parse(line).command);
+  };
+  EXPECT_EQ(play("play a.glb").animation, std::nullopt);
+  EXPECT_EQ(play("play a.glb --animate").animation, 1u);
+  EXPECT_EQ(play("play a.glb --animate 3 --loop").animation, 3u);
+  EXPECT_EQ(play("play a.glb --animate --loop").animation, 1u);
+  EXPECT_THAT(play("play --animate a.glb").files, ElementsAre("a.glb"));
+  EXPECT_TRUE(play("play a b --sequence --loop").loop);
+}
+
 TEST(CommandLine, PlayOfVolumes) {
   const auto play = std::get<PlayOptions>(
       Parse(
@@ -223,6 +235,9 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"snap o.png", {"did you mean snapshot?"}},
         Wrong{"--json stat", {"did you mean stats?"}},
         Wrong{"--server a:1 claer", {"did you mean clear?"}},
+        Wrong{"play a b --animate", {"--animate wants one FILE"}},
+        Wrong{"play a --animate 0", {"the first animation is 1"}},
+        Wrong{"play a --animate --sequence", {"do not go together"}},
         Wrong{"play a.nii --window 5", {"--window is 5; LOW:HIGH is expected"}},
         Wrong{"play a.nii --window 5:5", {"LOW:HIGH is expected"}},
         Wrong{"play a.nii --window 1:5 --level 3", {"do not go together"}},

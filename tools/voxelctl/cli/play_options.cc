@@ -44,7 +44,13 @@ void PlayArguments::Add(CLI::App* c) {
   c->add_flag("--sequence", options_.sequence,
               "One file after another, --fps a second, instead of all at once; a FILE such as "
               "'frame_####.obj' or 'frame_%04d.obj' is such a sequence");
-  c->add_flag("--loop", options_.loop, "A sequence begins again at its end, until Ctrl-C");
+  animate_option_ = c->add_option("--animate", animate_,
+                                  "Play an animation of a glTF, FBX, COLLADA or BVH file, the "
+                                  "first or number N, --fps frames a second")
+                        ->type_name("[N]")
+                        ->expected(0, 1);
+  c->add_flag("--loop", options_.loop,
+              "A sequence or animation begins again at its end, until Ctrl-C");
   c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
   WantNumber(c->get_option("--duration"), 0, 1e9);
   c->add_flag("--globe", options_.globe,
@@ -73,6 +79,26 @@ void PlayArguments::Add(CLI::App* c) {
   c->add_option("--type", type_, "Of .raw files: u8, i8, u16, i16, u32, i32, f32 or f64")
       ->type_name("TYPE");
   c->add_flag("--big-endian", big_endian_, "Of .raw files: the highest byte comes first");
+}
+
+void PlayArguments::ReadAnimation() {
+  if (animate_option_->count() == 0) return;
+  options_.animation = 1;
+  for (const std::string& word : animate_) {
+    uint32_t number = 0;
+    if (word.empty()) continue;
+    if (!absl::SimpleAtoi(word, &number)) {
+      // --animate walk.glb
+      options_.files.push_back(word);
+    } else if (number < 1) {
+      throw UsageError{
+          absl::StrCat("--animate is ", EscapeForTerminal(word), "; the first animation is 1")};
+    } else {
+      options_.animation = number;
+    }
+  }
+  if (options_.files.size() > 1) throw UsageError{"--animate wants one FILE"};
+  if (options_.sequence) throw UsageError{"--animate and --sequence do not go together"};
 }
 
 void PlayArguments::ReadVolume() {
@@ -113,6 +139,7 @@ void PlayArguments::ReadVolume() {
 
 PlayOptions PlayArguments::Read(const std::vector<std::string>& plain) {
   options_.files.insert(options_.files.end(), plain.begin(), plain.end());
+  ReadAnimation();
   if (options_.files.empty()) throw UsageError{"play wants at least one FILE"};
   options_.up = Choose("--up", up_, kUps);
   options_.fill = Choose("--fill", fill_, kFills);

@@ -9,7 +9,8 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 namespace voxeld::voxelctl {
 
@@ -22,10 +23,13 @@ class PlayArguments {
 
  private:
   void ReadVolume();
+  void ReadAnimation();
 
   PlayOptions options_;
   std::string up_ = "auto", fill_ = "surface", style_ = "balls";
   std::string size_, type_, window_;
+  std::vector<std::string> animate_;  // with nothing, or a number, or what is a file
+  CLI::Option* animate_option_ = nullptr;
   bool big_endian_ = false;
   double duration_ = std::nan(""), level_ = std::nan("");
 };

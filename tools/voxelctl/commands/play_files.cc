@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
+#include "tools/voxelctl/import/animation.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -48,11 +49,15 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
 }
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& options) {
+  if (options.animation) {
+    return OpenAnimation(options.files[0], *options.animation, options.fps);
+  }
   const bool one = options.files.size() == 1 && IsSequence(options.files[0]);
   if (!options.sequence && !one) {
     if (!options.loop) return nullptr;
     return absl::InvalidArgumentError(
-        "--loop is for sequences ('frame_####.obj', or several files with --sequence)");
+        "--loop is for sequences ('frame_####.obj', or several files with --sequence) and "
+        "--animate");
   }
   if (!one) return std::make_unique<FileFrames>(options.files, OptionsOf(options));
   absl::StatusOr<std::vector<std::string>> files = FindSequence(options.files[0]);

@@ -17,7 +17,7 @@ namespace voxeld::voxelctl {
 absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
                                              Console& console);
 
-// Of a sequence. Null if all that there is stays as it is.
+// Of a sequence or an animation. Null if all that there is stays as it is.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& options);
 
 }  // namespace voxeld::voxelctl

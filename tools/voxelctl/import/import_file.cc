@@ -7,12 +7,14 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/dicom_check.h"
 #include "tools/voxelctl/import/dicom_volume.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
 #include "tools/voxelctl/import/las_points.h"
+#include "tools/voxelctl/import/mesh_beginning.h"
 #include "tools/voxelctl/import/mesh_checks.h"
 #include "tools/voxelctl/import/nifti_volume.h"
 #include "tools/voxelctl/import/nrrd_volume.h"
@@ -41,8 +43,8 @@ absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
                              : ReadGeoJson(file, *document, globe);
 }
 
-absl::StatusOr<Model> ReadMesh(const SourceFile& file, absl::Status checked) {
-  if (!checked.ok()) return checked;
+absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
+  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
   return NewMeshImporter()->Import(file);
 }
 
@@ -62,14 +64,13 @@ absl::StatusOr<Model> ReadPly(const SourceFile& file) {
     return model;
   }
   const bool surfaces = header->Find("face") != nullptr || header->Find("tristrips") != nullptr;
-  return surfaces ? ReadMesh(file, absl::OkStatus()) : ReadPlyPoints(file, *header);
+  return surfaces ? ReadMesh(file) : ReadPlyPoints(file, *header);
 }
 
 absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
-  if (extension == "obj") return ReadMesh(file, CheckObj(file));
-  if (extension == "stl") return ReadMesh(file, CheckStl(file));
-  if (extension == "gltf" || extension == "glb") return ReadMesh(file, CheckGltf(file));
+  if (extension == "obj" || extension == "stl" || extension == "gltf" || extension == "glb")
+    return ReadMesh(file);
   if (extension == "ply") return ReadPly(file);
   if (extension == "xyz" || extension == "txt" || extension == "asc" || extension == "pts" ||
       extension == "csv") {
@@ -88,12 +89,15 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
   if (extension == "svg") return ReadSvgLines(file);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
+  if (NewMeshImporter()->Reads(extension))
+    return ReadContained(file, [&file] { return ReadMesh(file); });
   return FileError(
       file,
       extension.empty()
           ? "its name has no extension"
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
-      "play reads meshes (.obj, .stl, .ply, .gltf, .glb), voxels (.vox), points (.ply, .pcd, "
+      "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
+      ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
       ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
       ".nii.gz, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings (.svg)");
 }
@@ -134,6 +138,14 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
 }
 
 }  // namespace
+
+absl::Status CheckMeshFile(const SourceFile& file) {
+  const std::string& extension = file.extension;
+  if (extension == "obj") return CheckObj(file);
+  if (extension == "stl") return CheckStl(file);
+  if (extension == "gltf" || extension == "glb") return CheckGltf(file);
+  return CheckMeshBeginning(file);
+}
 
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
   std::error_code ignored;
