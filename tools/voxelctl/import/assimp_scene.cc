@@ -298,15 +298,15 @@ constexpr Format kFormats[] = {{"glb", "glTF binary"},
                                {"obj", "Wavefront OBJ"},
                                {"stl", "STL", Up::kZ},
                                {"ply", "PLY mesh", Up::kZ},
-                               {"off", "OFF", Up::kZ},
+                               {"off", "OFF"},
                                {"fbx", "FBX"},
                                {"3mf", "3MF", Up::kZ},
                                {"dae", "COLLADA"},
                                {"blend", "Blender", Up::kZ},
-                               {"ifc", "IFC", Up::kZ},
+                               {"ifc", "IFC"},
                                {"bvh", "BVH"},
                                {"amf", "AMF", Up::kZ},
-                               {"dxf", "DXF", Up::kZ}};
+                               {"dxf", "DXF"}};
 
 Format FormatOf(const SourceFile& file) {
   for (const Format& format : kFormats) {

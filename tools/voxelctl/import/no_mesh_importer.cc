@@ -14,8 +14,9 @@ class NoMeshImporter final : public MeshImporter {
     return absl::UnimplementedError(
         absl::StrCat(file.path,
                      ": this voxelctl is built without mesh importers (VOXELD_IMPORTERS=OFF); "
-                     "it reads point clouds (.ply, .pcd, .las, .xyz), voxels (.vox) and maps "
-                     "(.geojson, .topojson)"));
+                     "it reads point clouds (.ply, .pcd, .las, .xyz), voxels (.vox), maps "
+                     "(.geojson, .topojson), volumes (.nii, .nrrd, .raw), molecules (.pdb) and "
+                     "drawings (.svg)"));
   }
 };
 
