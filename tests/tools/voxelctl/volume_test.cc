@@ -274,6 +274,43 @@ TEST_F(Volumes, ARealSlice) {
   }
 }
 
+TEST_F(Volumes, CompressedSlices) {
+  std::string bytes = Dicom("7", 0, 0x0101);
+  const std::string plain = "1.2.840.10008.1.2.1";
+  bytes[bytes.find(plain) + plain.size() - 1] = '5';  // run lengths
+  bytes.resize(bytes.rfind("OW") - 4);
+  // High bytes in a run of six, low ones as they are; a table of offsets before them.
+  std::string rle;
+  for (const uint32_t number : {2u, 64u, 66u}) Put(&rle, rle.size(), number);
+  rle.resize(64);
+  rle += std::string("\xfb\x01\x05\x01\x02\x03\x04\x05\x06\x00", 10);
+  const auto item = [](const std::string& content) {
+    std::string out("\xfe\xff\x00\xe0", 4);
+    Put(&out, 4, static_cast<uint32_t>(content.size()));
+    return out + content;
+  };
+  const std::string head = bytes + std::string("\xe0\x7f\x10\x00OB\0\0\xff\xff\xff\xff", 12);
+  const std::string end = std::string("\xfe\xff\xdd\xe0\0\0\0\0", 8);
+  EXPECT_THAT(Read("a.dcm", head + item("") + item(rle) + end).samples,
+              ElementsAre(-486, -484, -482, -480, -478, -476));
+  EXPECT_THAT(Error("a.dcm", head + item("") + end), HasSubstr("has no fragment"));
+  EXPECT_THAT(Error("a.dcm", head + item("") + item(std::string(70, '\0')) + end),
+              testing::AnyOf(HasSubstr("could not be decoded"), HasSubstr("crashed")));
+  std::mt19937 random(9);
+  for (int i = 0; i < 300; ++i) {
+    std::string damaged = rle;
+    damaged[random() % damaged.size()] = static_cast<char>(random());
+    (void)Import("a.dcm", head + item("") + item(damaged) + end);
+  }
+}
+
+TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
+  folder_.Write("a", ReadAll(kSlice));
+  const auto model = ImportFile(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4));
+}
+
 TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
   // By name the order would be another; a third has another series, a fourth is no DICOM.
   folder_.Write("1", Dicom("7", 9, 600));

@@ -214,7 +214,7 @@ class Player {
             return SendDefinition(object, std::move(parts), bytes, total);
           },
           options_.volume);
-      if (!sizes.ok()) return sizes.status();
+      if (!sizes.ok()) return About(models[i], sizes.status());
       Describe(models[i], *sizes);
       models[i].parts = {};  // sent; the memory is not needed any more
       models[i].volumes = {};
@@ -234,6 +234,12 @@ class Player {
     }
     status = frame.End();
     return status.ok() ? CommitAndWait() : status;
+  }
+
+  // What is wrong with a model, not with the connection.
+  static absl::Status About(const Model& model, const absl::Status& status) {
+    if (!absl::IsInvalidArgument(status)) return status;
+    return absl::InvalidArgumentError(absl::StrCat(model.path, ": ", status.message()));
   }
 
   void Describe(const Model& model, const PackedSizes& sizes) {
@@ -305,7 +311,7 @@ class Player {
           return Stage(name, std::move(parts), bytes);
         },
         options_.volume);
-    if (!sizes.ok()) return sizes.status();
+    if (!sizes.ok()) return About(model, sizes.status());
     // What the frame before last had more of.
     for (uint64_t piece = sizes->objects - 1; piece + 1 < pieces_[half]; ++piece) {
       const absl::Status status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));

@@ -31,7 +31,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr rlim_t kMostMemory = rlim_t{4} << 30;
+[[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30;
 constexpr rlim_t kMostSeconds = 120;
 
 class Writer {
@@ -147,7 +147,7 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   return model;
 }
 
-[[noreturn]] void RunChild(const std::function<absl::StatusOr<Model>()>& read, int descriptor) {
+[[noreturn]] void RunChild(const std::function<bool(int)>& write, int descriptor) {
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -167,16 +167,16 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
 #endif
   bool good = false;
   try {
-    good = WriteModel(read(), descriptor);
+    good = write(descriptor);
   } catch (const std::exception&) {
   }
   ::_exit(good ? 0 : 1);
 }
 
-}  // namespace
-
-absl::StatusOr<Model> ReadContained(const SourceFile& file,
-                                    const std::function<absl::StatusOr<Model>()>& read) {
+// What `write` puts into the descriptor that it is given, as `take` reads it.
+template <typename Taken>
+absl::StatusOr<Taken> Run(const SourceFile& file, const std::function<bool(int)>& write,
+                          const std::function<absl::StatusOr<Taken>(const char*, size_t)>& take) {
   const int descriptor = ::memfd_create("voxelctl-model", MFD_CLOEXEC);
   if (descriptor < 0) {
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
@@ -186,7 +186,7 @@ absl::StatusOr<Model> ReadContained(const SourceFile& file,
   if (child < 0) {
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
   }
-  if (child == 0) RunChild(read, descriptor);
+  if (child == 0) RunChild(write, descriptor);
   int state = 0;
   while (::waitpid(child, &state, 0) < 0 && errno == EINTR) {
   }
@@ -204,10 +204,42 @@ absl::StatusOr<Model> ReadContained(const SourceFile& file,
   if (bytes == MAP_FAILED) {
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
   }
-  absl::StatusOr<Model> model =
-      ReadModel(file, static_cast<const char*>(bytes), static_cast<size_t>(size));
+  absl::StatusOr<Taken> taken = take(static_cast<const char*>(bytes), static_cast<size_t>(size));
   ::munmap(bytes, static_cast<size_t>(size));
-  return model;
+  return taken;
+}
+
+}  // namespace
+
+absl::StatusOr<Model> ReadContained(const SourceFile& file,
+                                    const std::function<absl::StatusOr<Model>()>& read) {
+  return Run<Model>(
+      file, [&read](int descriptor) { return WriteModel(read(), descriptor); },
+      [&file](const char* bytes, size_t size) { return ReadModel(file, bytes, size); });
+}
+
+absl::StatusOr<std::string> ReadBytesContained(
+    const SourceFile& file, const std::function<absl::StatusOr<std::string>()>& read) {
+  return Run<std::string>(
+      file,
+      [&read](int descriptor) {
+        const absl::StatusOr<std::string> all = read();
+        Writer writer(descriptor);
+        const uint8_t good = all.ok();
+        writer.Bytes(&good, 1);
+        writer.All(good ? *all : std::string(all.status().message()));
+        return writer.ok();
+      },
+      [&file](const char* bytes, size_t size) -> absl::StatusOr<std::string> {
+        Reader reader(bytes, size);
+        uint8_t good = 0;
+        std::string all;
+        reader.Bytes(&good, 1);
+        reader.All(&all);
+        if (!reader.ok()) return Spoilt(file, "gave up");
+        if (!good) return absl::InvalidArgumentError(all);
+        return all;
+      });
 }
 
 }  // namespace voxeld::voxelctl

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/model.h"
@@ -13,5 +14,9 @@ namespace voxeld::voxelctl {
 // the processor: if it crashes, runs away or takes more, that is InvalidArgument, and nothing of it is left here.
 absl::StatusOr<Model> ReadContained(const SourceFile& file,
                                     const std::function<absl::StatusOr<Model>()>& read);
+
+// The same for bytes.
+absl::StatusOr<std::string> ReadBytesContained(
+    const SourceFile& file, const std::function<absl::StatusOr<std::string>()>& read);
 
 }  // namespace voxeld::voxelctl

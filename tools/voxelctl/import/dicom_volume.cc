@@ -19,6 +19,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/dicom_check.h"
 #include "tools/voxelctl/import/volume_samples.h"
 
@@ -152,7 +153,8 @@ absl::Status Decode(const SourceFile& file, const DicomFacts& facts, Slice* slic
   slice->size = {facts.columns, facts.rows, facts.frames};
   const uint64_t wanted = facts.columns * facts.rows * facts.frames * SampleBytes(code.type);
   if (facts.compressed) {
-    const absl::StatusOr<std::string> pixels = Decompress(file, facts, wanted);
+    const absl::StatusOr<std::string> pixels =
+        ReadBytesContained(file, [&] { return Decompress(file, facts, wanted); });
     if (!pixels.ok()) return pixels.status();
     DecodeSamples(*pixels, code, out);
   } else {
@@ -286,6 +288,10 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
   std::stable_sort(slices.begin(), slices.end(),
                    [](const Found& a, const Found& b) { return a.along < b.along; });
 
+  if (slices.size() == 1) {
+    const absl::StatusOr<SourceFile> file = ReadSourceFile(slices[0].path);
+    return file.ok() ? ReadDicomVolume(*file) : file.status();
+  }
   SampledVolume volume;
   Slice first;
   DicomFacts first_facts;
@@ -312,14 +318,12 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
                                     " pixels, all alike, are expected"));
     }
   }
-  double between = first.between;
   std::string note;
-  if (slices.size() > 1) {
-    between = (slices.back().along - slices.front().along) / static_cast<double>(slices.size() - 1);
-    for (size_t i = 1; i < slices.size() && note.empty(); ++i) {
-      if (std::abs(slices[i].along - slices[i - 1].along - between) > kEven * between) {
-        note = absl::StrCat(path, ": its slices are unevenly apart; shown as if they were even");
-      }
+  const double between =
+      (slices.back().along - slices.front().along) / static_cast<double>(slices.size() - 1);
+  for (size_t i = 1; i < slices.size() && note.empty(); ++i) {
+    if (std::abs(slices[i].along - slices[i - 1].along - between) > kEven * between) {
+      note = absl::StrCat(path, ": its slices are unevenly apart; shown as if they were even");
     }
   }
   const auto say = [&note, &path](const std::string& what) {
