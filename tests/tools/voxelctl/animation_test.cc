@@ -170,6 +170,32 @@ TEST(Animations, OfAMeshOnItsBones) {
   EXPECT_NE(first->parts[0].positions, later->parts[0].positions);
 }
 
+TEST(Animations, OfAMeshFromShapeToShape) {
+  const auto frames = OpenAnimation(
+      ModelFile("glTF2/glTF-Sample-Models/AnimatedMorphCube-glTF/AnimatedMorphCube.gltf"), 1, 10);
+  ASSERT_THAT(frames, IsOk());
+  ASSERT_GT((*frames)->count(), 2);
+  const auto first = (*frames)->Read(0), later = (*frames)->Read((*frames)->count() / 2);
+  ASSERT_THAT(first, IsOk());
+  ASSERT_THAT(later, IsOk());
+  EXPECT_NE(first->parts.at(0).positions, later->parts.at(0).positions);
+}
+
+TEST(Animations, OfASkinInGltf) {
+  const auto frames = OpenAnimation(ModelFile("glTF2/simple_skin/simple_skin.gltf"), 1, 10);
+  ASSERT_THAT(frames, IsOk());
+  const auto first = (*frames)->Read(0), later = (*frames)->Read((*frames)->count() / 4);
+  ASSERT_THAT(first, IsOk());
+  ASSERT_THAT(later, IsOk());
+  // Two bones, of which the upper one bends: the lower end of the strip stays.
+  ASSERT_EQ(first->parts.at(0).positions.size(), later->parts.at(0).positions.size());
+  size_t still = 0, moved = 0;
+  for (size_t i = 0; i < first->parts[0].positions.size(); ++i)
+    ++(first->parts[0].positions[i] == later->parts[0].positions[i] ? still : moved);
+  EXPECT_GT(still, 0u);
+  EXPECT_GT(moved, 0u);
+}
+
 TEST(Animations, ThatAreNotThere) {
   EXPECT_THAT(std::string(OpenAnimation(ModelFile("BVH/01_01.bvh"), 2, 20).status().message()),
               HasSubstr("has no animation 2; it has 1"));

@@ -260,6 +260,33 @@ TEST_F(CommandsTest, SpinningSendsTransformsOnly) {
   EXPECT_TRUE(summary["still_up"]);
 }
 
+TEST_F(CommandsTest, VolumesAreOneMessageEach) {
+  std::string samples(64 * 64 * 128, '\0');
+  for (size_t i = 0; i < samples.size(); i += 3) samples[i] = '\x60';
+  const std::string path = folder_.Write("a.raw", samples);
+  const json summary =
+      RunJson({"play", path, "--size", "64x64x128", "--colormap", "viridis", "--window", "0:96"});
+  EXPECT_THAT(summary["files"][0]["note"].get<std::string>(),
+              HasSubstr("more than the server takes"));
+  FakeServer::Log log = server_.log();
+  EXPECT_LE(log.largest_message, 256u << 10);
+  const std::string root = log.entities.at("1").primitive().instance().object();
+  const auto shape = [&log](const std::string& object) -> const v1::Primitive& {
+    return log.objects.at(object).parts(0).primitive();
+  };
+  const v1::Volume& volume = shape(shape(root).instance().object()).volume();
+  EXPECT_EQ(volume.transfer().colormap(), "viridis");
+  EXPECT_EQ(summary["files"][0]["samples"], volume.grid().samples().size());
+  EXPECT_EQ(RunTool({"play", path, "--size", "64x64x128", "--level", "50"}).code, 0);
+  EXPECT_TRUE(server_.log()
+                  .objects.at(shape(root).instance().object())
+                  .parts(0)
+                  .primitive()
+                  .has_isosurface());
+  EXPECT_THAT(RunTool({"play", path, "--size", "64x64x128", "--level", "500"}).err,
+              HasSubstr("a.raw: --level is 500"));
+}
+
 TEST_F(CommandsTest, ASequenceReplacesEachByTheNext) {
   std::string many;
   for (int i = 0; i < 30000; ++i) many += "0 0 1\n";

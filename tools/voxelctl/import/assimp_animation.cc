@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kTicks = 25;  // a second, where a file does not say
 constexpr double kMostFrames = 1e6;
+constexpr unsigned kMostShapes = 4096;  // of a mesh
 
 // The two keys around `time`, and how far it is from the first to the second.
 template <typename Key>
@@ -63,6 +64,16 @@ NodeMatrix MapOf(const aiVector3D& scale, const aiQuaternion& turn, const aiVect
           r.c1 * scale.x, r.c2 * scale.y, r.c3 * scale.z, move.z};
 }
 
+void AddWeights(const aiMeshMorphKey& key, double share, std::vector<double>* weights) {
+  if (key.mValues == nullptr || key.mWeights == nullptr) return;
+  for (unsigned i = 0; i < key.mNumValuesAndWeights; ++i) {
+    const unsigned shape = key.mValues[i];
+    if (shape >= kMostShapes) continue;
+    if (shape >= weights->size()) weights->resize(shape + 1);
+    (*weights)[shape] += share * key.mWeights[i];
+  }
+}
+
 Pose PoseAt(const aiScene& scene, const aiAnimation& animation, double time) {
   Pose pose;
   for (unsigned c = 0; c < animation.mNumChannels; ++c) {
@@ -73,10 +84,18 @@ Pose PoseAt(const aiScene& scene, const aiAnimation& animation, double time) {
     aiVector3D scale(1, 1, 1), move;
     aiQuaternion turn;
     node->mTransformation.Decompose(scale, turn, move);
-    pose[channel.mNodeName.C_Str()] =
+    pose.nodes[channel.mNodeName.C_Str()] =
         MapOf(VectorAt(channel.mScalingKeys, channel.mNumScalingKeys, time, scale),
               TurnAt(channel.mRotationKeys, channel.mNumRotationKeys, time, turn),
               VectorAt(channel.mPositionKeys, channel.mNumPositionKeys, time, move));
+  }
+  for (unsigned c = 0; c < animation.mNumMorphMeshChannels; ++c) {
+    const aiMeshMorphAnim& channel = *animation.mMorphMeshChannels[c];
+    if (channel.mNumKeys == 0 || channel.mKeys == nullptr) continue;
+    const auto [from, to, share] = Find(channel.mKeys, channel.mNumKeys, time);
+    std::vector<double>& weights = pose.shapes[channel.mName.C_Str()];
+    AddWeights(*from, 1 - share, &weights);
+    AddWeights(*to, share, &weights);
   }
   return pose;
 }

@@ -106,7 +106,8 @@ struct Context {
   const Pose* pose;
   uint64_t vertices = 0, indices = 0;
   Model* model;
-  Pose globals = {};  // where each node is, by its name; only with a pose
+  std::unordered_map<std::string, NodeMatrix> globals =
+      {};  // where each node is, by its name; only with a pose
 };
 
 // For each vertex the sum of its bones' maps by their weights; empty if the mesh has no bones, or they do nothing.
@@ -162,8 +163,41 @@ absl::Status CheckMesh(const SourceFile& file, const aiMesh& mesh) {
   return absl::OkStatus();
 }
 
+// Where a vertex is, or a normal, before the mesh is put anywhere: between the shapes that the mesh can take.
+class Shaped {
+ public:
+  Shaped(const aiMesh& mesh, const std::string& node, const Context& context) : mesh_(mesh) {
+    if (context.pose == nullptr) return;
+    const auto& all = context.pose->shapes;
+    auto found = all.find(node);
+    if (found == all.end()) found = all.find(mesh.mName.C_Str());
+    if (found != all.end()) weights_ = &found->second;
+  }
+  aiVector3D Position(unsigned v) const {
+    return Mix(v, mesh_.mVertices[v], &aiAnimMesh::mVertices);
+  }
+  aiVector3D Normal(unsigned v) const { return Mix(v, mesh_.mNormals[v], &aiAnimMesh::mNormals); }
+
+ private:
+  aiVector3D Mix(unsigned v, const aiVector3D& own, aiVector3D* aiAnimMesh::*of) const {
+    if (weights_ == nullptr) return own;
+    aiVector3D mixed = own;
+    for (unsigned i = 0; i < std::min<size_t>(mesh_.mNumAnimMeshes, weights_->size()); ++i) {
+      const aiAnimMesh& shape = *mesh_.mAnimMeshes[i];
+      if (shape.*of == nullptr || v >= shape.mNumVertices) continue;
+      mixed += ((shape.*of)[v] - own) * static_cast<ai_real>((*weights_)[i]);
+    }
+    return mixed;
+  }
+
+  const aiMesh& mesh_;
+  const std::vector<double>* weights_ = nullptr;
+};
+
 // Parts by kind: after sorting a mesh has faces of one kind, or of points only.
-absl::Status AddMesh(const aiMesh& mesh, const NodeMatrix& to_model, Context* context) {
+absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatrix& to_model,
+                     Context* context) {
+  const Shaped shaped(mesh, node, *context);
   const std::vector<NodeMatrix> skin = SkinOf(mesh, *context);
   const auto map_of = [&](unsigned v) -> const NodeMatrix& {
     return skin.empty() ? to_model : skin[v];
@@ -184,13 +218,13 @@ absl::Status AddMesh(const aiMesh& mesh, const NodeMatrix& to_model, Context* co
   part.kind = corners == 3 ? Kind::kTriangles : corners == 2 ? Kind::kSegments : Kind::kPoints;
   part.positions.reserve(mesh.mNumVertices);
   for (unsigned v = 0; v < mesh.mNumVertices; ++v)
-    part.positions.push_back(Map(map_of(v), mesh.mVertices[v]));
+    part.positions.push_back(Map(map_of(v), shaped.Position(v)));
   if (mesh.HasNormals()) {
     const NodeMatrix normal_matrix = NormalMatrix(to_model);
     part.normals.reserve(mesh.mNumVertices);
     for (unsigned v = 0; v < mesh.mNumVertices; ++v)
       part.normals.push_back(
-          Unit(Map(skin.empty() ? normal_matrix : NormalMatrix(skin[v]), mesh.mNormals[v])));
+          Unit(Map(skin.empty() ? normal_matrix : NormalMatrix(skin[v]), shaped.Normal(v))));
   }
   if (mesh.HasVertexColors(0)) {
     part.colors.reserve(mesh.mNumVertices);
@@ -216,8 +250,8 @@ absl::Status AddMesh(const aiMesh& mesh, const NodeMatrix& to_model, Context* co
 
 NodeMatrix LocalOf(const aiNode& node, const Pose* pose) {
   if (pose != nullptr) {
-    const auto moved = pose->find(node.mName.C_Str());
-    if (moved != pose->end()) return moved->second;
+    const auto moved = pose->nodes.find(node.mName.C_Str());
+    if (moved != pose->nodes.end()) return moved->second;
   }
   return FromAssimp(node.mTransformation);
 }
@@ -259,7 +293,8 @@ absl::Status AddNodes(Context* context) {
   return ForEachNode(
       root, context->pose, [context](const aiNode& node, const NodeMatrix& map, const NodeMatrix*) {
         for (unsigned m = 0; m < node.mNumMeshes; ++m) {
-          absl::Status status = AddMesh(*context->scene.mMeshes[node.mMeshes[m]], map, context);
+          absl::Status status =
+              AddMesh(*context->scene.mMeshes[node.mMeshes[m]], node.mName.C_Str(), map, context);
           if (!status.ok()) return status;
         }
         return absl::OkStatus();

@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 #include <unordered_map>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -20,8 +21,12 @@ namespace voxeld::voxelctl {
 // Row-major 3×4, in double precision: nodes nest.
 using NodeMatrix = std::array<double, 12>;
 
-// What moves in a frame: maps of nodes by their names, in place of their own.
-using Pose = std::unordered_map<std::string, NodeMatrix>;
+// What moves in a frame, by the names of nodes.
+struct Pose {
+  std::unordered_map<std::string, NodeMatrix> nodes;  // maps in place of their own
+  // How far their meshes go to each of the shapes that they can take.
+  std::unordered_map<std::string, std::vector<double>> shapes;
+};
 
 // Whether assimp has a reader for files with this extension.
 bool AssimpReads(const std::string& extension);
