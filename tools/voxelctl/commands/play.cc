@@ -303,6 +303,10 @@ class Player {
     const bool first = summary_.frames == 0;
     placement.Place(&model);
     ApplyLook({&model, 1}, {.fill = options_.fill, .flat = options_.flat});
+    // The first frame's window is that of all, or they would flicker.
+    if (first) frame_look_ = options_.volume;
+    if (first && !model.volumes.empty() && !frame_look_.window)
+      frame_look_.window = WindowOf(model.volumes[0]);
     const size_t half = summary_.frames % 2;
     const std::string object = absl::StrCat("voxelctl/frame", half);
     const absl::StatusOr<PackedSizes> sizes = PackObject(
@@ -310,7 +314,7 @@ class Player {
         [&](const std::string& name, std::vector<client::Part> parts, uint64_t bytes) {
           return Stage(name, std::move(parts), bytes);
         },
-        options_.volume);
+        frame_look_);
     if (!sizes.ok()) return About(model, sizes.status());
     // What the frame before last had more of.
     for (uint64_t piece = sizes->objects - 1; piece + 1 < pieces_[half]; ++piece) {
@@ -437,6 +441,7 @@ class Player {
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
   std::vector<uint64_t> before_;         // owners of what an earlier play left
   std::array<uint64_t, 2> pieces_ = {};  // objects of each frame that is defined
+  VolumeLook frame_look_;
   bool taken_down_ = false;
   PlaySummary summary_;
 };

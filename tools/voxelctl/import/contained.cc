@@ -33,6 +33,7 @@ namespace {
 
 [[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30;
 constexpr rlim_t kMostSeconds = 120;
+constexpr unsigned kMostWaiting = 600;  // s
 
 class Writer {
  public:
@@ -151,7 +152,7 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  for (const int signal : {SIGINT, SIGTERM, SIGABRT, SIGSEGV, SIGBUS, SIGFPE})
+  for (const int signal : {SIGINT, SIGTERM, SIGALRM, SIGABRT, SIGSEGV, SIGBUS, SIGFPE})
     ::signal(signal, SIG_DFL);
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   // What the library says is not for people, and what this process had yet to say is not said twice.
@@ -161,6 +162,7 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   const rlimit core = {0, 0}, seconds = {kMostSeconds, kMostSeconds};
   ::setrlimit(RLIMIT_CORE, &core);
   ::setrlimit(RLIMIT_CPU, &seconds);
+  ::alarm(kMostWaiting);
 #if !defined(VOXELD_SHADOW_MEMORY)
   const rlimit memory = {kMostMemory, kMostMemory};
   ::setrlimit(RLIMIT_AS, &memory);
@@ -193,8 +195,8 @@ absl::StatusOr<Taken> Run(const SourceFile& file, const std::function<bool(int)>
   if (WIFSIGNALED(state)) {
     const int signal = WTERMSIG(state);
     if (signal == SIGINT || signal == SIGTERM) return absl::CancelledError("interrupted");
-    if (signal == SIGXCPU || signal == SIGKILL)
-      return Spoilt(file, absl::StrCat("did not end within ", kMostSeconds, " s"));
+    if (signal == SIGXCPU || signal == SIGKILL || signal == SIGALRM)
+      return Spoilt(file, absl::StrCat("did not end within ", kMostSeconds, " s of the processor"));
     return Spoilt(file, absl::StrCat("crashed (", ::strsignal(signal), ")"));
   }
   if (WEXITSTATUS(state) != 0) return Spoilt(file, "wanted more than 4 GiB of memory, or gave up");

@@ -134,6 +134,10 @@ client::Vec3 ToClient(const Point3& p) { return {p.x, p.y, p.z}; }
 
 }  // namespace
 
+std::array<double, 2> WindowOf(const SampledVolume& volume) {
+  return volume.window ? *volume.window : FindWindow(volume.samples, RangeOf(volume.samples));
+}
+
 absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
                                         const client::Limits& limits) {
   const uint64_t each = look.level ? 2 : 1;
@@ -192,9 +196,7 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
     }
     return packed;
   }
-  const std::array<double, 2> window = look.window     ? *look.window
-                                       : volume.window ? *volume.window
-                                                       : FindWindow(volume.samples, range);
+  const std::array<double, 2> window = look.window ? *look.window : WindowOf(volume);
   grid.samples = client::Array<uint8_t>(
       Quantise<uint8_t>(volume, factors, packed.samples, window[0], window[1]));
   client::Transfer transfer;
