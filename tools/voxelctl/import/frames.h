@@ -24,8 +24,8 @@ class FrameSource {
 // A file for each.
 class FileFrames final : public FrameSource {
  public:
-  FileFrames(std::vector<std::string> paths, ImportOptions options)
-      : paths_(std::move(paths)), options_(std::move(options)) {}
+  FileFrames(std::vector<std::string> paths, const ImportOptions& options)
+      : paths_(std::move(paths)), options_(options) {}
   int64_t count() const override { return static_cast<int64_t>(paths_.size()); }
   absl::StatusOr<Model> Read(int64_t frame) override;
 

@@ -70,6 +70,7 @@ class Drawer {
     model.up = Up::kY;
     model.lit_already = true;
     std::vector<std::string> counts;
+    counts.reserve(left_out_.size());
     for (const auto& [what, count] : left_out_) counts.push_back(absl::StrCat(count, " ", what));
     if (!counts.empty()) {
       model.note = absl::StrCat(file_.path, ": left out are elements of the kinds ",
