@@ -110,7 +110,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
   });
 
   test("a voxel is where it should be, exactly", async () => {
-    await daemon.voxelctl("draw", "points at=3.5,8.5,12.5 color=#ffffff", "points at=12.5,8.5,2.5 color=#ff8000");
+    await daemon.voxelctl("draw", "points vertices='3.5,8.5,12.5' color=#ffffff", "points vertices='12.5,8.5,2.5' color=#ff8000");
     const { page, context } = await open(`${daemon.page}?renderer=2d${level}`);
     assert.equal((await inspect(page)).renderer, "2D");
     await drawnPoints(page, 2);
@@ -130,7 +130,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
   });
 
   test("both renderers draw the same", async () => {
-    await daemon.voxelctl("draw", "sphere radius=5 at=8,8,8 color=#40c0ff", "line from=1,1,1 to=15,15,15 color=#ff4000");
+    await daemon.voxelctl("draw", "sphere radius=5 at=8,8,8 color=#40c0ff", "segments vertices='1,1,1 15,15,15' color=#ff4000");
     const software = await launch(kSoftware);
     try {
       const pictures = [];
@@ -214,7 +214,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     assert.deepEqual(await page.locator(".view .label").allTextContents(), ["cube", "rotor"]);
     await page.waitForFunction(() => Number(document.getElementById("views").dataset.volume) > 0);
     assert.ok(lit(await picture(page, 0)).count > 100);
-    await daemon.voxelctl("draw", "points at=8.5,8.5,8.5 color=white");
+    await daemon.voxelctl("draw", "points vertices='8.5,8.5,8.5' color=white");
     await page.selectOption("#display", "cube");
     await drawnPoints(page, 1);
     await other.page.waitForFunction(() => globalThis.voxeld.inspect().drawn.points > 0);
@@ -230,7 +230,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     const next = await Daemon.start([kCube], { port: own.port, folder: own.folder });
     try {
       await page.waitForSelector("#offline", { state: "hidden" });
-      await next.voxelctl("draw", "points at=1.5,1.5,1.5");
+      await next.voxelctl("draw", "points vertices='1.5,1.5,1.5'");
       await drawnPoints(page, 1);
     } finally {
       await context.close();
@@ -265,7 +265,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
 
   test("tells figures and layers, whatever clients call theirs", async () => {
     const name = '<img src=x onerror="globalThis.broken=1">';
-    await daemon.voxelctl("draw", "--layer", name, "points at=8.5,8.5,8.5").catch(() => {});
+    await daemon.voxelctl("draw", "--layer", name, "points vertices='8.5,8.5,8.5'").catch(() => {});
     const { page, seen, context } = await open(daemon.page, { panel: true });
     await page.waitForFunction(() => /in all/.test(document.getElementById("volumes").textContent));
     await page.waitForFunction(() => document.querySelectorAll("#layers tr").length > 0);

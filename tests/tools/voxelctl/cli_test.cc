@@ -57,6 +57,32 @@ TEST(CommandLine, Play) {
   EXPECT_FALSE(plain.duration_s.has_value());
 }
 
+TEST(CommandLine, PlayOfWhatMoves) {
+  const auto play = [](const std::string& line) {
+    return std::get<PlayOptions>(Parse(line).command);
+  };
+  EXPECT_EQ(play("play a.glb").animation, std::nullopt);
+  EXPECT_EQ(play("play a.glb --animate").animation, 1u);
+  EXPECT_EQ(play("play a.glb --animate 3 --loop").animation, 3u);
+  EXPECT_EQ(play("play a.glb --animate --loop").animation, 1u);
+  EXPECT_THAT(play("play --animate a.glb").files, ElementsAre("a.glb"));
+  EXPECT_TRUE(play("play a b --sequence --loop").loop);
+}
+
+TEST(CommandLine, PlayOfVolumes) {
+  const auto play = std::get<PlayOptions>(
+      Parse(
+          "play a.raw --size 4x5x6 --type i16 --big-endian --colormap viridis --window -160:240.5")
+          .command);
+  ASSERT_TRUE(play.raw.has_value());
+  EXPECT_THAT(play.raw->size, ElementsAre(4, 5, 6));
+  EXPECT_EQ(play.raw->type, SampleType::kI16);
+  EXPECT_TRUE(play.raw->big_endian);
+  EXPECT_EQ(play.volume.colormap, "viridis");
+  EXPECT_THAT(*play.volume.window, ElementsAre(-160, 240.5));
+  EXPECT_EQ(std::get<PlayOptions>(Parse("play a.nii --level -5").command).volume.level, -5);
+}
+
 TEST(CommandLine, Verify) {
   const auto verify =
       std::get<VerifyOptions>(Parse("verify lab=voxlink,serial=A1 --filter volume.* --junit "
@@ -256,6 +282,16 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"snap o.png", {"did you mean snapshot?"}},
         Wrong{"--json stat", {"did you mean stats?"}},
         Wrong{"--server a:1 claer", {"did you mean clear?"}},
+        Wrong{"play a b --animate", {"--animate wants one FILE"}},
+        Wrong{"play a --animate 0", {"the first animation is 1"}},
+        Wrong{"play a --animate --sequence", {"do not go together"}},
+        Wrong{"play a.nii --window 5", {"--window is 5; LOW:HIGH is expected"}},
+        Wrong{"play a.nii --window 5:5", {"LOW:HIGH is expected"}},
+        Wrong{"play a.nii --window 1:5 --level 3", {"do not go together"}},
+        Wrong{"play a.raw --size 5x5", {"--size is 5x5; XxYxZ is expected"}},
+        Wrong{"play a.raw --size 5x5x0", {"XxYxZ is expected"}},
+        Wrong{"play a.raw --type u8", {"want --size too"}},
+        Wrong{"play a.raw --size 1x1x1 --type u9", {"--type u9 is not known", "u8"}},
         Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, draw, snapshot"}},
         Wrong{"pl\x1b[31m", {"pl\\u{1b}[31m"}},
         Wrong{"play", {"at least one FILE", "voxelctl play --help"}},

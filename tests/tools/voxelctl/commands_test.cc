@@ -223,6 +223,54 @@ TEST_F(CommandsTest, SpinningSendsTransformsOnly) {
   EXPECT_TRUE(summary["still_up"]);
 }
 
+TEST_F(CommandsTest, VolumesAreOneMessageEach) {
+  std::string samples(64 * 64 * 128, '\0');
+  for (size_t i = 0; i < samples.size(); i += 3) samples[i] = '\x60';
+  const std::string path = folder_.Write("a.raw", samples);
+  const json summary =
+      RunJson({"play", path, "--size", "64x64x128", "--colormap", "viridis", "--window", "0:96"});
+  EXPECT_THAT(summary["files"][0]["note"].get<std::string>(),
+              HasSubstr("more than the server takes"));
+  FakeServer::Log log = server_.log();
+  EXPECT_LE(log.largest_message, 256u << 10);
+  const std::string root = log.entities.at("1").primitive().instance().object();
+  const auto shape = [&log](const std::string& object) -> const v1::Primitive& {
+    return log.objects.at(object).parts(0).primitive();
+  };
+  const v1::Volume& volume = shape(shape(root).instance().object()).volume();
+  EXPECT_EQ(volume.transfer().colormap(), "viridis");
+  EXPECT_EQ(summary["files"][0]["samples"], volume.grid().samples().size());
+  EXPECT_EQ(RunTool({"play", path, "--size", "64x64x128", "--level", "50"}).code, 0);
+  EXPECT_TRUE(server_.log()
+                  .objects.at(shape(root).instance().object())
+                  .parts(0)
+                  .primitive()
+                  .has_isosurface());
+  EXPECT_THAT(RunTool({"play", path, "--size", "64x64x128", "--level", "500"}).err,
+              HasSubstr("a.raw: --level is 500"));
+}
+
+TEST_F(CommandsTest, ASequenceReplacesEachByTheNext) {
+  std::string many;
+  for (int i = 0; i < 30000; ++i) many += "0 0 1\n";
+  folder_.Write("f_1.xyz", many);  // in several pieces, of which the third frame has no use
+  folder_.Write("f_2.xyz", "0 0 0\n1 1 1\n");
+  folder_.Write("f_3.xyz", "0 0 0\n1 1 1\n");
+  const json summary = RunJson({"play", folder_.Path("f_#.xyz"), "--fps", "20"});
+  EXPECT_EQ(summary["frames"].get<int>() + summary["frames_skipped"].get<int>(), 3);
+  EXPECT_EQ(summary["unanswered"], 0);
+  EXPECT_TRUE(summary["still_up"]);
+  const FakeServer::Log log = server_.log();
+  ASSERT_EQ(log.entities.size(), 1u);
+  EXPECT_EQ(log.entities.at("1").label(), "f_3.xyz");
+  const json looped =
+      RunJson({"play", "--sequence", folder_.Path("f_2.xyz"), folder_.Path("f_3.xyz"), "--loop",
+               "--fps", "50", "--duration", "0.5"});
+  EXPECT_GE(looped["frames"], 5);
+  EXPECT_THAT(RunTool({"play", folder_.Path("f_2.xyz"), "--loop"}).err, HasSubstr("--loop is for"));
+  EXPECT_THAT(RunTool({"play", folder_.Path("g_#.xyz")}).err, HasSubstr("there is no such file"));
+}
+
 TEST_F(CommandsTest, ASlowDisplayMakesNoQueue) {
   server_.Set({.no_outcomes = true});
   const Result result =

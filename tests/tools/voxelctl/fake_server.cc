@@ -114,7 +114,7 @@ class FakeServer::Scene final : public v1::SceneService::Service {
         case v1::StreamRequest::kCommit:
           ++log.commits;
           if (server_.behaviour_.refuse_commits_with.empty()) {
-            log.objects.insert(objects.begin(), objects.end());
+            for (const auto& [name, object] : objects) log.objects[name] = object;
             if (replace) log.entities.clear();
             log.entities.insert(entities.begin(), entities.end());
             if (server_.behaviour_.note_commits) {

@@ -221,7 +221,7 @@ TEST(PlyPoints, MendsACloudWithNormalsThatWasCopiedAsText) {
 TEST(PlyPoints, MissingFileAndFolder) {
   TempFolder folder;
   EXPECT_THAT(ImportFile(folder.Path("none.ply"), {}), Fails(Words{"none.ply", "No such file"}));
-  EXPECT_THAT(ImportFile(folder.Path("."), {}), Fails(Words{"is a directory"}));
+  EXPECT_THAT(ImportFile(folder.Path("."), {}), Fails(Words{"is a folder"}));
 }
 
 TEST(ImportFile, NamesTheFormatsThatItReads) {

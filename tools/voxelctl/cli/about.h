@@ -7,10 +7,13 @@ inline constexpr const char* kAbout =
     "Puts files into the volumetric displays of a voxeld server, and shows how they do.\n"
     "Data goes to standard output, words to standard error; --json makes the data JSON.";
 inline constexpr const char* kPlayAbout =
-    "Puts files up: meshes (.obj .stl .ply .gltf .glb), voxels (.vox), point clouds (.ply .pcd "
-    ".las .xyz "
-    ".txt .asc .pts .csv), maps (.geojson "
-    ".topojson .json).\n"
+    "Puts files up: meshes (.obj .stl .ply .gltf .glb .off .fbx .3mf .dae .blend .ifc .bvh and "
+    "more), voxels (.vox),\n"
+    "point clouds (.ply .pcd .las .xyz .txt .asc .pts .csv), maps (.geojson .topojson .json), "
+    "volumes (.nii .nii.gz\n"
+    ".nrrd .nhdr .raw .dcm, a folder of DICOM slices), molecules (.pdb .ent), drawings (.svg); "
+    "sequences of them\n"
+    "('frame_####.obj') and animations (--animate).\n"
     "The scene is turned upright, centred and made as large as fits. Light is baked into the "
     "colours by the\n"
     "direction of each surface, so that shape can be read on a display that only glows (--flat: "

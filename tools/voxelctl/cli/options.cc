@@ -19,6 +19,7 @@
 #include "tools/voxelctl/cli/light_options.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/cli/picture_options.h"
+#include "tools/voxelctl/cli/play_options.h"
 #include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/cli/service_options.h"
 #include "tools/voxelctl/text/escape.h"
@@ -26,9 +27,6 @@
 namespace voxeld::voxelctl {
 namespace {
 
-const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
-const Choices<FillStyle> kFills = {
-    {"dots", FillStyle::kDots}, {"lines", FillStyle::kLines}, {"surface", FillStyle::kSurface}};
 // The command line as declared, and the values that it fills in.
 class Parser {
  public:
@@ -42,7 +40,7 @@ class Parser {
     app_.require_subcommand(0, 1);
     app_.fallthrough();
     app_.allow_extras();
-    AddPlay();
+    play_texts_.Add(Add("play", kPlayAbout));
     AddDraw();
     snapshot_texts_.Add(Add("snapshot", kSnapshotAbout));
     render_texts_.Add(Add("render", kRenderAbout));
@@ -125,34 +123,6 @@ class Parser {
     command->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     names_.emplace_back(name);
     return command;
-  }
-
-  void AddPlay() {
-    CLI::App* c = Add("play", kPlayAbout);
-    c->add_option("FILE", play_.files,
-                  "Files; several share one space, as parts of one thing (meshes beside a --globe "
-                  "come inside it)")
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    c->add_flag("--spin", play_.spin,
-                "Turn about the vertical axis, 8 s a turn, until Ctrl-C or --duration");
-    c->add_option("--up", up_,
-                  "The files' axis that points up: auto, x, y or z. auto: y for glTF, OBJ and flat "
-                  "maps, z for STL and PLY; y up has +z in front, z and x up have -y in front")
-        ->type_name("auto|x|y|z")
-        ->capture_default_str();
-    c->add_option("--fill", fill_, "Draw meshes as dots, lines or surface")
-        ->type_name("dots|lines|surface")
-        ->capture_default_str();
-    AddNumber(c, "--fps", &play_.fps, 0.1, 240, "Frames a second while spinning, 0.1 to 240", "N");
-    c->add_option("--duration", duration_, "End after so many seconds")->type_name("S");
-    WantNumber(c->get_option("--duration"), 0, 1e9);
-    c->add_flag("--globe", play_.globe,
-                "Put maps on a sphere by longitude and latitude, poles on the vertical axis");
-    c->add_flag("--flat", play_.flat, "Colours as they are in the file, without shading");
-    c->add_flag("--each", play_.each, "Fit every file by itself instead of all together");
-    c->add_option("--display", play_.display, "Fill this display's volume (default: fit into all)")
-        ->type_name("NAME");
-    c->add_flag("--clear", play_.clear, "Take the scene down at the end");
   }
 
   void AddDraw() {
@@ -273,8 +243,8 @@ class Parser {
       throw UsageError{absl::StrCat("a command is expected: ", absl::StrJoin(names_, ", "))};
     const std::string name = chosen->get_name();
     if (name == "play") {
-      play_.files.insert(play_.files.end(), plain_.begin(), plain_.end());
-      return FillInPlay();
+      options_.command = play_texts_.Read(plain_);
+      return;
     }
     if (name == "draw") {
       draw_.shapes.insert(draw_.shapes.end(), plain_.begin(), plain_.end());
@@ -362,14 +332,6 @@ class Parser {
     *argument = plain_.front();
   }
 
-  void FillInPlay() {
-    if (play_.files.empty()) throw UsageError{"play wants at least one FILE"};
-    play_.up = Choose("--up", up_, kUps);
-    play_.fill = Choose("--fill", fill_, kFills);
-    if (!std::isnan(duration_)) play_.duration_s = duration_;
-    options_.command = play_;
-  }
-
   void FillInPattern() {
     if (pattern_name_.empty())
       throw UsageError{absl::StrCat("pattern wants a name: ", absl::StrJoin(PatternNames(), ", "),
@@ -430,7 +392,6 @@ class Parser {
   std::vector<std::string> plain_;  // arguments after --
   std::string printed_;             // what the command prints at once, if it does
   Options options_;
-  PlayOptions play_;
   DrawOptions draw_;
   GalleryOptions gallery_;
   SnapshotArguments snapshot_texts_;
@@ -459,9 +420,8 @@ class Parser {
   CompletionArguments completion_texts_;
   InputArguments input_texts_;
   PipeArguments pipe_texts_;
-  std::string profile_action_;
-  std::string up_ = "auto", fill_ = "surface", pattern_name_;
-  double duration_ = std::nan("");
+  PlayArguments play_texts_;
+  std::string profile_action_, pattern_name_;
 };
 
 }  // namespace

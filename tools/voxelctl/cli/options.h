@@ -11,7 +11,10 @@
 
 #include "tools/lights/datagram.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/pdb_molecule.h"
+#include "tools/voxelctl/import/raw_volume.h"
 #include "tools/voxelctl/scene/look.h"
+#include "tools/voxelctl/scene/volume.h"
 #include "voxeld/credentials.h"
 #include "voxeld/v1/display.pb.h"
 
@@ -26,9 +29,15 @@ struct PlayOptions {
   bool each = false;
   Up up = Up::kAuto;
   FillStyle fill = FillStyle::kSurface;
-  double fps = 20;  // 0.1 to 240
+  double fps = 20;  // 0.1 to 240: of spins, sequences and animations
   std::optional<double> duration_s;
   std::string display;  // whose space is filled; empty: all of them fit
+  std::optional<RawLayout> raw;
+  VolumeLook volume;
+  MoleculeStyle style = MoleculeStyle::kBalls;
+  bool sequence = false;              // the files one after another, at `fps`
+  std::optional<uint32_t> animation;  // from 1 on: of the only file
+  bool loop = false;                  // a sequence or animation begins again at its end
 };
 
 struct DrawOptions {

@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -12,9 +14,10 @@
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/commands/own_layer.h"
+#include "tools/voxelctl/commands/play_files.h"
 #include "tools/voxelctl/commands/play_summary.h"
 #include "tools/voxelctl/connection/scene_session.h"
-#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/frames.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/pack.h"
 #include "tools/voxelctl/scene/placement.h"
@@ -33,36 +36,7 @@ constexpr sync::TimeNs kLiveLineTime = 200 * sync::kMillisecond;
 constexpr uint64_t kStagedBytes = 8 << 20;
 constexpr uint64_t kDefinitionBytes = 256;  // of a definition, beside its vertices, about
 constexpr size_t kLabelBytes = 200;
-
-absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
-                                             Console& console) {
-  std::vector<Model> models;
-  std::vector<std::string> errors;
-  for (size_t i = 0; i < options.files.size(); ++i) {
-    if (interrupt.requested()) return absl::CancelledError("interrupted");
-    console.ProgressBar("reading",
-                        static_cast<double>(i) / static_cast<double>(options.files.size()),
-                        EscapeForTerminal(options.files[i]));
-    absl::StatusOr<Model> model = ImportFile(options.files[i], {.globe = options.globe});
-    if (model.ok()) {
-      if (!model->note.empty()) console.Say(EscapeForTerminal(model->note));
-      models.push_back(*std::move(model));
-    } else {
-      errors.emplace_back(model.status().message());
-    }
-  }
-  if (!errors.empty()) {
-    if (options.files.size() > errors.size())
-      errors.emplace_back("nothing is put up unless all files can be");
-    return absl::InvalidArgumentError(absl::StrJoin(errors, "\n"));
-  }
-  const auto is_globe = [](const Model& model) { return model.globe; };
-  if (options.globe && std::none_of(models.begin(), models.end(), is_globe)) {
-    return absl::InvalidArgumentError(
-        "--globe is for maps (GeoJSON, TopoJSON), and none of the files is one");
-  }
-  return models;
-}
+constexpr int64_t kMeasuredFrames = 16;  // of a sequence, for its place
 
 // What all of `displays` show; the first one's, if they show nothing in common.
 absl::StatusOr<DisplaySpace> CommonSpace(std::span<const v1::DisplayDescription* const> displays) {
@@ -114,24 +88,55 @@ class Player {
       : options_(options), connection_(connection), interrupt_(interrupt), console_(console) {}
 
   absl::Status Run(std::vector<Model> models) {
-    absl::StatusOr<DisplaySpace> space = ChooseSpace(connection_, options_.display, console_);
-    if (!space.ok()) return space.status();
-    space_ = *space;
+    if (absl::Status status = FindSpace(); !status.ok()) return status;
     PlaceModels(models, space_, {.up = options_.up, .spin = options_.spin, .each = options_.each});
     ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
-
-    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore(connection_);
-    if (!before.ok()) return before.status();
-    absl::Status status = Open();
-    if (status.ok()) status = PutUp(std::move(models));
+    if (absl::Status status = Open(); !status.ok()) return status;
+    absl::Status status = PutUp(std::move(models));
     // After the new scene is in: for a moment both may be up, but never neither.
-    std::erase(*before, session_ == nullptr ? 0 : session_->server().owner);
-    if (status.ok()) status = TakeDown(*before, connection_);
+    if (status.ok()) status = TakeBeforeDown();
     if (!status.ok()) return status;
-    status = Stay();
+    return Finish(Stay());
+  }
+
+  // One after another, each at its time; those that come too late are left out.
+  absl::Status Run(FrameSource& source) {
+    if (absl::Status status = FindSpace(); !status.ok()) return status;
+    FramePlacement placement(options_.up);
+    const int64_t last = source.count() - 1;
+    const int64_t measured = std::min(last, kMeasuredFrames - 1);
+    for (int64_t i = 0; i <= measured; ++i) {
+      if (interrupt_.requested()) return absl::CancelledError("interrupted");
+      console_.ProgressBar("measuring", static_cast<double>(i) / static_cast<double>(measured + 1),
+                           "");
+      const absl::StatusOr<Model> model = source.Read(measured == 0 ? 0 : last * i / measured);
+      if (!model.ok()) return model.status();
+      placement.Measure(*model);
+    }
+    placement.Fit(space_, options_.spin);
+    FrameAhead ahead(source);
+    ahead.Ask(0);
+    if (absl::Status status = Open(); !status.ok()) return status;
+    const absl::Status status = ShowFrames(ahead, placement, source.count());
+    return status.ok() ? Finish(status) : status;
+  }
+
+ private:
+  absl::Status FindSpace() {
+    const absl::StatusOr<DisplaySpace> space = ChooseSpace(connection_, options_.display, console_);
+    if (space.ok()) space_ = *space;
+    return space.status();
+  }
+
+  absl::Status TakeBeforeDown() {
+    std::erase(before_, session_->server().owner);
+    return TakeDown(before_, connection_);
+  }
+
+  absl::Status Finish(absl::Status status) {
     if (status.ok() && options_.clear) status = ClearMine();
-    const absl::Status settled =
-        session_->WaitSettled(options_.spin ? kLastOutcomeTime : kOutcomeTime);
+    const bool moving = options_.spin || summary_.frames > 0;
+    const absl::Status settled = session_->WaitSettled(moving ? kLastOutcomeTime : kOutcomeTime);
     const absl::Status closed = session_->Close();
     summary_.duration_ns = clock_.Now() - start_;
     summary_.still_up = status.ok() && !options_.clear && !taken_down_;
@@ -142,8 +147,10 @@ class Player {
     return status.ok() ? closed : status;
   }
 
- private:
   absl::Status Open() {
+    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore(connection_);
+    if (!before.ok()) return before.status();
+    before_ = *std::move(before);
     client::Options open;
     open.client_name = "voxelctl play";
     open.on_disconnect =
@@ -166,8 +173,7 @@ class Player {
   }
 
   // Definitions draw nothing, so they may be committed in as many steps as the limits want.
-  absl::Status SendDefinition(const std::string& object, std::vector<client::Part> parts,
-                              uint64_t bytes, uint64_t total) {
+  absl::Status Stage(const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
     const client::Limits& limits = session_->server().limits;
     uint64_t most_bytes = kStagedBytes;
     if (limits.max_uncommitted_bytes > 0)
@@ -182,10 +188,16 @@ class Player {
     }
     staged_bytes_ += bytes;
     ++staged_operations_;
-    sent_bytes_ += bytes;
-    console_.ProgressBar("sending", static_cast<double>(sent_bytes_) / static_cast<double>(total),
-                         absl::StrCat(Bytes(sent_bytes_), " of about ", Bytes(total)));
     return session_->client().DefineObject(object, std::move(parts));
+  }
+
+  absl::Status SendDefinition(const std::string& object, std::vector<client::Part> parts,
+                              uint64_t bytes, uint64_t total) {
+    sent_bytes_ += bytes + kDefinitionBytes;
+    console_.ProgressBar(
+        "sending", std::min(1.0, static_cast<double>(sent_bytes_) / static_cast<double>(total)),
+        absl::StrCat(Bytes(sent_bytes_), " of about ", Bytes(total)));
+    return Stage(object, std::move(parts), bytes);
   }
 
   absl::Status PutUp(std::vector<Model> models) {
@@ -193,17 +205,19 @@ class Player {
     for (const Model& model : models) {
       for (const Part& part : model.parts)
         total += part.positions.size() * 15 + part.indices.size() * 2;
+      for (const SampledVolume& volume : model.volumes) total += volume.samples.size();
     }
     for (size_t i = 0; i < models.size(); ++i) {
       const absl::StatusOr<PackedSizes> sizes = PackObject(
           models[i], Object(i), session_->server().limits,
           [&](const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
             return SendDefinition(object, std::move(parts), bytes, total);
-          });
-      if (!sizes.ok()) return sizes.status();
-      summary_.files.push_back({models[i].path, models[i].format, models[i].note, sizes->vertices,
-                                sizes->indices, sizes->objects, sizes->bytes});
+          },
+          options_.volume);
+      if (!sizes.ok()) return About(models[i], sizes.status());
+      Describe(models[i], *sizes);
       models[i].parts = {};  // sent; the memory is not needed any more
+      models[i].volumes = {};
     }
     if (staged_operations_ > 0) {
       absl::Status status = CommitAndWait();
@@ -220,6 +234,107 @@ class Player {
     }
     status = frame.End();
     return status.ok() ? CommitAndWait() : status;
+  }
+
+  // What is wrong with a model, not with the connection.
+  static absl::Status About(const Model& model, const absl::Status& status) {
+    if (!absl::IsInvalidArgument(status)) return status;
+    return absl::InvalidArgumentError(absl::StrCat(model.path, ": ", status.message()));
+  }
+
+  void Describe(const Model& model, const PackedSizes& sizes) {
+    std::string note = model.note;
+    if (!sizes.note.empty()) {
+      const std::string more = absl::StrCat(model.path, ": ", sizes.note);
+      console_.Say(EscapeForTerminal(more));
+      note = note.empty() ? more : absl::StrCat(note, "; ", more);
+    }
+    summary_.files.push_back({model.path, model.format, std::move(note), sizes.vertices,
+                              sizes.indices, sizes.samples, sizes.objects, sizes.bytes});
+  }
+
+  absl::Status ShowFrames(FrameAhead& ahead, const FramePlacement& placement, int64_t count) {
+    sync::TimeNs began = 0, next_line = 0;
+    const double period_ns = 1e9 / options_.fps;
+    const sync::TimeNs end =
+        options_.duration_s ? start_ + std::llround(*options_.duration_s * 1e9) : sync::kNever;
+    const auto due = [&](int64_t frame) -> sync::TimeNs {
+      return began + std::llround(static_cast<double>(frame) * period_ns);
+    };
+    for (int64_t frame = 0; frame >= 0;) {
+      absl::StatusOr<Model> model = ahead.Take();
+      if (!model.ok()) return model.status();
+      if (frame == 0) began = clock_.Now();
+      if (frame > 0 && due(frame) >= end) break;
+      const auto now = static_cast<int64_t>(static_cast<double>(clock_.Now() - began) / period_ns);
+      int64_t next = std::max(frame + 1, now);
+      // The last one is never left out.
+      if (!options_.loop) next = frame == count - 1 ? -1 : std::min(next, count - 1);
+      if (next > frame) {
+        summary_.frames_skipped += static_cast<uint64_t>(next - frame - 1);
+        ahead.Ask(next % count);
+      }
+      if (interrupt_.WaitUntil(clock_, due(frame))) return absl::OkStatus();
+      if (frame == 0 || next < 0 || session_->client().HasRoom()) {
+        const double turns =
+            options_.spin ? static_cast<double>(clock_.Now() - began) / 1e9 / kSecondsPerTurn : 0;
+        absl::Status status = PutFrame(*std::move(model), placement, turns);
+        if (!status.ok()) return status;
+        ++summary_.frames;
+      } else {
+        ++summary_.frames_skipped;
+      }
+      if (session_->client().GetTally().refused > 0) {
+        return absl::FailedPreconditionError("the server refused a frame; the one before stays up");
+      }
+      if (console_.live() && clock_.Now() >= next_line) {
+        next_line = clock_.Now() + kLiveLineTime;
+        ShowLine("playing", static_cast<double>(clock_.Now() - began) / 1e9);
+      }
+      if (next < 0) interrupt_.WaitUntil(clock_, std::min<sync::TimeNs>(due(frame + 1), end));
+      frame = next;
+    }
+    if (end != sync::kNever) interrupt_.WaitUntil(clock_, end);
+    return absl::OkStatus();
+  }
+
+  // Frames are two objects in turn: one is defined anew while the other is up.
+  absl::Status PutFrame(Model model, const FramePlacement& placement, double turns) {
+    const bool first = summary_.frames == 0;
+    placement.Place(&model);
+    ApplyLook({&model, 1}, {.fill = options_.fill, .flat = options_.flat});
+    // The first frame's window is that of all, or they would flicker.
+    if (first) frame_look_ = options_.volume;
+    if (first && !model.volumes.empty() && !frame_look_.window)
+      frame_look_.window = WindowOf(model.volumes[0]);
+    const size_t half = summary_.frames % 2;
+    const std::string object = absl::StrCat("voxelctl/frame", half);
+    const absl::StatusOr<PackedSizes> sizes = PackObject(
+        model, object, session_->server().limits,
+        [&](const std::string& name, std::vector<client::Part> parts, uint64_t bytes) {
+          return Stage(name, std::move(parts), bytes);
+        },
+        frame_look_);
+    if (!sizes.ok()) return About(model, sizes.status());
+    // What the frame before last had more of.
+    for (uint64_t piece = sizes->objects - 1; piece + 1 < pieces_[half]; ++piece) {
+      const absl::Status status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));
+      if (!status.ok()) return status;
+    }
+    pieces_[half] = sizes->objects;
+    client::Frame frame = layer_->BeginFrame();
+    frame.Draw(
+        Id(0), client::Instance{object},
+        {.transform = ToClient(InstanceTransform(space_, turns)), .label = Label(model.path)});
+    if (absl::Status status = frame.End(); !status.ok()) return status;
+    if (!first) {
+      staged_bytes_ = staged_operations_ = 0;
+      return session_->Commit();
+    }
+    Describe(model, *sizes);
+    if (absl::Status status = TakePatternsDown(); !status.ok()) return status;
+    if (absl::Status status = CommitAndWait(); !status.ok()) return status;
+    return TakeBeforeDown();
   }
 
   // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
@@ -285,7 +400,7 @@ class Player {
       }
       if (console_.live() && now >= next_line) {
         next_line = now + kLiveLineTime;
-        ShowLine(static_cast<double>(now - began) / 1e9);
+        ShowLine("spinning", static_cast<double>(now - began) / 1e9);
       }
     }
   }
@@ -299,9 +414,9 @@ class Player {
     return session_->Commit();
   }
 
-  void ShowLine(double seconds) {
+  void ShowLine(absl::string_view doing, double seconds) {
     std::string line =
-        absl::StrFormat("spinning %.0f s, %s", seconds, Counted(summary_.frames, "frame"));
+        absl::StrFormat("%s %.0f s, %s", doing, seconds, Counted(summary_.frames, "frame"));
     for (const auto& [name, counts] : session_->client().GetTally().displays) {
       absl::StrAppend(&line, ", ", EscapeForTerminal(name), " ", Grouped(counts.presented),
                       " presented ", Grouped(counts.lost), " lost");
@@ -324,6 +439,9 @@ class Player {
   std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
+  std::vector<uint64_t> before_;         // owners of what an earlier play left
+  std::array<uint64_t, 2> pieces_ = {};  // objects of each frame that is defined
+  VolumeLook frame_look_;
   bool taken_down_ = false;
   PlaySummary summary_;
 };
@@ -332,11 +450,17 @@ class Player {
 
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console) {
-  absl::StatusOr<std::vector<Model>> models = ReadFiles(options, interrupt, console);
-  if (!models.ok()) return models.status();
+  const absl::StatusOr<std::unique_ptr<FrameSource>> frames = OpenFrames(options);
+  if (!frames.ok()) return frames.status();
+  absl::StatusOr<std::vector<Model>> models;
+  if (*frames == nullptr) {
+    models = ReadFiles(options, interrupt, console);
+    if (!models.ok()) return models.status();
+  }
   const absl::StatusOr<std::unique_ptr<Connection>> connection = connect();
   if (!connection.ok()) return connection.status();
-  return Player(options, **connection, interrupt, console).Run(*std::move(models));
+  Player player(options, **connection, interrupt, console);
+  return *frames != nullptr ? player.Run(**frames) : player.Run(*std::move(models));
 }
 
 }  // namespace voxeld::voxelctl

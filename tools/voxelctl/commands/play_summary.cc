@@ -38,6 +38,7 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
                      {"note", f.note},
                      {"vertices", f.vertices},
                      {"indices", f.indices},
+                     {"samples", f.samples},
                      {"objects", f.objects},
                      {"bytes", f.bytes}});
   }
@@ -89,13 +90,17 @@ void Report(PlaySummary summary, Console& console) {
     console.Data(JsonText(Json(summary, latency), false));
     return;
   }
-  uint64_t vertices = 0, bytes = 0;
+  uint64_t vertices = 0, samples = 0, bytes = 0;
   for (const PlayedFile& file : summary.files) {
     vertices += file.vertices;
+    samples += file.samples;
     bytes += file.bytes;
   }
-  std::string line = absl::StrCat(Counted(summary.files.size(), "entity", "entities"), ", ",
-                                  Counted(vertices, "vertex", "vertices"), ", ", Bytes(bytes));
+  std::string line =
+      absl::StrCat(Counted(summary.files.size(), "entity", "entities"), ", ",
+                   samples > 0 && vertices == 0 ? Counted(samples, "sample")
+                                                : Counted(vertices, "vertex", "vertices"),
+                   ", ", Bytes(bytes));
   if (summary.frames > 0) {
     absl::StrAppendFormat(&line, "; %s in %s", Counted(summary.frames, "frame"),
                           Duration(summary.duration_ns));

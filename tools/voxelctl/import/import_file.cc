@@ -1,17 +1,30 @@
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <system_error>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/contained.h"
+#include "tools/voxelctl/import/dicom_check.h"
+#include "tools/voxelctl/import/dicom_volume.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
 #include "tools/voxelctl/import/las_points.h"
+#include "tools/voxelctl/import/mesh_beginning.h"
 #include "tools/voxelctl/import/mesh_checks.h"
+#include "tools/voxelctl/import/nifti_volume.h"
+#include "tools/voxelctl/import/nrrd_volume.h"
 #include "tools/voxelctl/import/pcd_points.h"
+#include "tools/voxelctl/import/pdb_molecule.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
+#include "tools/voxelctl/import/raw_volume.h"
+#include "tools/voxelctl/import/svg_lines.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
 #include "tools/voxelctl/text/escape.h"
@@ -30,8 +43,8 @@ absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
                              : ReadGeoJson(file, *document, globe);
 }
 
-absl::StatusOr<Model> ReadMesh(const SourceFile& file, absl::Status checked) {
-  if (!checked.ok()) return checked;
+absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
+  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
   return NewMeshImporter()->Import(file);
 }
 
@@ -51,14 +64,13 @@ absl::StatusOr<Model> ReadPly(const SourceFile& file) {
     return model;
   }
   const bool surfaces = header->Find("face") != nullptr || header->Find("tristrips") != nullptr;
-  return surfaces ? ReadMesh(file, absl::OkStatus()) : ReadPlyPoints(file, *header);
+  return surfaces ? ReadMesh(file) : ReadPlyPoints(file, *header);
 }
 
-absl::StatusOr<Model> Read(const SourceFile& file, bool globe) {
+absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
-  if (extension == "obj") return ReadMesh(file, CheckObj(file));
-  if (extension == "stl") return ReadMesh(file, CheckStl(file));
-  if (extension == "gltf" || extension == "glb") return ReadMesh(file, CheckGltf(file));
+  if (extension == "obj" || extension == "stl" || extension == "gltf" || extension == "glb")
+    return ReadMesh(file);
   if (extension == "ply") return ReadPly(file);
   if (extension == "xyz" || extension == "txt" || extension == "asc" || extension == "pts" ||
       extension == "csv") {
@@ -68,14 +80,26 @@ absl::StatusOr<Model> Read(const SourceFile& file, bool globe) {
   if (extension == "las" || extension == "laz") return ReadLasPoints(file);
   if (extension == "vox") return ReadVoxModel(file);
   if (extension == "json" || extension == "geojson" || extension == "topojson")
-    return ReadMap(file, globe);
+    return ReadMap(file, options.globe);
+  if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
+    return ReadNiftiVolume(file);
+  if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
+  if (extension == "raw") return ReadRawVolume(file, options.raw);
+  if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
+  if (extension == "svg") return ReadSvgLines(file);
+  // Slices often have no extension, or what looks like one.
+  if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
+  if (NewMeshImporter()->Reads(extension))
+    return ReadContained(file, [&file] { return ReadMesh(file); });
   return FileError(
       file,
       extension.empty()
           ? "its name has no extension"
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
-      "play reads meshes (.obj, .stl, .ply, .gltf, .glb), voxels (.vox), points (.ply, .pcd, "
-      ".las, .xyz, .txt, .asc, .pts, .csv) and maps (.geojson, .topojson, .json)");
+      "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
+      ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
+      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
+      ".nii.gz, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings (.svg)");
 }
 
 // What every reader promises, held to: a slip in a library must not reach the server.
@@ -96,6 +120,18 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
       }
     }
   }
+  for (const SampledVolume& volume : model.volumes) {
+    const uint64_t samples = uint64_t{volume.size[0]} * volume.size[1] * volume.size[2];
+    if (samples == 0 || samples != volume.samples.size()) {
+      return FileError(file, absl::StrCat("holds ", volume.samples.size(), " samples"),
+                       absl::StrCat("its size makes ", samples));
+    }
+    if (std::none_of(volume.samples.begin(), volume.samples.end(),
+                     [](float v) { return std::isfinite(v); })) {
+      return FileError(file, "holds no sample that is a number", "at least one is expected");
+    }
+    ++vertices;
+  }
   if (vertices == 0)
     return FileError(file, "holds nothing to draw", "at least one vertex is expected");
   return absl::OkStatus();
@@ -103,10 +139,21 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
 
 }  // namespace
 
+absl::Status CheckMeshFile(const SourceFile& file) {
+  const std::string& extension = file.extension;
+  if (extension == "obj") return CheckObj(file);
+  if (extension == "stl") return CheckStl(file);
+  if (extension == "gltf" || extension == "glb") return CheckGltf(file);
+  return CheckMeshBeginning(file);
+}
+
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
-  const absl::StatusOr<SourceFile> file = ReadSourceFile(path);
+  std::error_code ignored;
+  const bool folder = std::filesystem::is_directory(path, ignored);
+  const absl::StatusOr<SourceFile> file =
+      folder ? SourceFile{.path = path, .extension = {}, .bytes = {}} : ReadSourceFile(path);
   if (!file.ok()) return file.status();
-  absl::StatusOr<Model> model = Read(*file, options.globe);
+  absl::StatusOr<Model> model = folder ? ReadDicomFolder(path) : Read(*file, options);
   if (!model.ok()) return model;
   const absl::Status status = CheckModel(*file, *model);
   if (!status.ok()) return status;

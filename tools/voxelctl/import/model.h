@@ -2,7 +2,9 @@
 // scene/normalise.h puts them into the display.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +30,18 @@ struct Part {
   std::vector<Rgb> colors;
   // Two a segment, three a triangle; none for points; all < positions.size().
   std::vector<uint32_t> indices;
+  // Diameter of points, which are balls then, and of segments, which have round ends; in the positions' unit. 0: one voxel.
+  double thickness = 0;
+};
+
+// Numbers at the centres of equal cells, that along the first axis side by side, then rows along the second.
+struct SampledVolume {
+  std::array<uint32_t, 3> size = {};  // each at least 1
+  std::vector<float> samples;         // finite, or not a number where there is nothing
+  // Of the whole: bit 0 of the index is for the far end of the first axis, bit 1 for that of the second, bit 2 of the third.
+  std::array<Point3, 8> corners = {};
+  // What the file says is to be seen, from dark to bright.
+  std::optional<std::array<double, 2>> window;
 };
 
 // Which of the file's axes points up. The smallest turn that brings it to +z is applied: +y up
@@ -42,10 +56,12 @@ struct Model {
   bool globe = false;        // on the unit sphere about the origin, upright already
   bool lit_already = false;  // its colours carry their light (scans): no shading is baked into them
   std::vector<Part> parts;
+  std::vector<SampledVolume> volumes;
 };
 
 // What one model may hold in all, so that no file makes the tool run out of memory.
 inline constexpr uint64_t kMaxModelVertices = 32'000'000;
 inline constexpr uint64_t kMaxModelIndices = 192'000'000;
+inline constexpr uint64_t kMaxModelSamples = uint64_t{1} << 28;
 
 }  // namespace voxeld::voxelctl

@@ -74,6 +74,7 @@ std::vector<uint32_t> Edges(const std::vector<uint32_t>& triangles) {
 
 void ApplyFill(FillStyle fill, Part* part) {
   if (fill == FillStyle::kDots) {
+    if (part->kind != Kind::kPoints) part->thickness = 0;
     part->kind = Kind::kPoints;
     part->indices.clear();
   } else if (fill == FillStyle::kLines && part->kind == Kind::kTriangles) {

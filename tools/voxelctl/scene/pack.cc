@@ -33,6 +33,9 @@ class Piece {
         most_indices_(AtMost(UINT32_MAX, limits.max_indices_per_entity)) {}
 
   Kind kind() const { return kind_; }
+  // Of all that it holds: a piece is flushed before this changes.
+  void set_thickness(double thickness) { thickness_ = thickness; }
+  double thickness() const { return thickness_; }
   bool empty() const { return count_ == 0; }
   uint64_t vertices() const { return count_; }
   uint64_t indices() const { return index_count_; }
@@ -68,9 +71,9 @@ class Piece {
     count_ = index_count_ = 0;
     switch (kind_) {
       case Kind::kPoints:
-        return client::Points{.vertices = std::move(vertices)};
+        return client::Points{.vertices = std::move(vertices), .thickness = ToThickness()};
       case Kind::kSegments:
-        return client::Segments{.vertices = std::move(vertices)};
+        return client::Segments{.vertices = std::move(vertices), .thickness = ToThickness()};
       case Kind::kTriangles:
         break;
     }
@@ -78,7 +81,13 @@ class Piece {
   }
 
  private:
+  client::Thickness ToThickness() const {
+    if (thickness_ == 0) return {};
+    return {static_cast<float>(thickness_), client::Thickness::Unit::kUnits};
+  }
+
   const Kind kind_;
+  double thickness_ = 0;
   const uint64_t most_bytes_, most_vertices_, most_indices_;
   uint32_t count_ = 0, index_count_ = 0;
   std::vector<float> positions_;
@@ -95,6 +104,10 @@ class Packer {
     const size_t corners = part.kind == Kind::kPoints ? 1 : part.kind == Kind::kSegments ? 2 : 3;
     const size_t elements =
         part.kind == Kind::kPoints ? part.positions.size() : part.indices.size() / corners;
+    if (part.thickness != piece->thickness()) {
+      if (absl::Status status = Flush(piece); !status.ok()) return status;
+      piece->set_thickness(part.thickness);
+    }
     std::vector<uint32_t> in_piece(part.positions.size(), kNone);
     std::vector<uint32_t> used;
     for (size_t e = 0; e < elements; ++e) {
@@ -117,22 +130,20 @@ class Packer {
     return absl::OkStatus();
   }
 
+  absl::Status AddVolume(const SampledVolume& volume, const VolumeLook& look) {
+    absl::StatusOr<PackedVolume> packed = PackVolume(volume, look, limits_);
+    if (!packed.ok()) return packed.status();
+    sizes_.samples += packed->samples;
+    if (sizes_.note.empty()) sizes_.note = packed->note;
+    return DefinePiece(std::move(packed->part), packed->bytes);
+  }
+
   absl::Status Flush(Piece* piece) {
     if (piece->empty()) return absl::OkStatus();
-    const uint64_t most_parts = AtMost(UINT64_MAX, limits_.max_parts_per_object);
-    if (root_.size() >= most_parts) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the model needs over ", most_parts,
-                       " pieces, which is the server's max_parts_per_object"));
-    }
     sizes_.vertices += piece->vertices();
     sizes_.indices += piece->indices();
-    const std::string name = absl::StrCat(object_, "/", root_.size());
     const uint64_t bytes = piece->bytes();
-    std::vector<client::Part> definition;
-    definition.push_back({.shape = piece->Take(), .color = {}, .transform = {}});
-    root_.push_back({.shape = client::Instance{name}, .color = {}, .transform = {}});
-    return Define(name, std::move(definition), bytes);
+    return DefinePiece({.shape = piece->Take(), .color = {}, .transform = {}}, bytes);
   }
 
   absl::StatusOr<PackedSizes> Finish() {
@@ -143,6 +154,20 @@ class Packer {
   }
 
  private:
+  absl::Status DefinePiece(client::Part part, uint64_t bytes) {
+    const uint64_t most_parts = AtMost(UINT64_MAX, limits_.max_parts_per_object);
+    if (root_.size() >= most_parts) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the model needs over ", most_parts,
+                       " pieces, which is the server's max_parts_per_object"));
+    }
+    const std::string name = absl::StrCat(object_, "/", root_.size());
+    std::vector<client::Part> definition;
+    definition.push_back(std::move(part));
+    root_.push_back({.shape = client::Instance{name}, .color = {}, .transform = {}});
+    return Define(name, std::move(definition), bytes);
+  }
+
   absl::Status Define(const std::string& name, std::vector<client::Part> parts, uint64_t bytes) {
     ++sizes_.objects;
     sizes_.bytes += bytes;
@@ -159,7 +184,8 @@ class Packer {
 }  // namespace
 
 absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& object,
-                                       const client::Limits& limits, const ObjectSink& sink) {
+                                       const client::Limits& limits, const ObjectSink& sink,
+                                       const VolumeLook& look) {
   Packer packer(object, limits, sink);
   for (const Kind kind : {Kind::kTriangles, Kind::kSegments, Kind::kPoints}) {
     Piece piece(kind, limits);
@@ -173,6 +199,10 @@ absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& ob
       if (!status.ok()) return status;
     }
     const absl::Status status = packer.Flush(&piece);
+    if (!status.ok()) return status;
+  }
+  for (const SampledVolume& volume : model.volumes) {
+    const absl::Status status = packer.AddVolume(volume, look);
     if (!status.ok()) return status;
   }
   return packer.Finish();

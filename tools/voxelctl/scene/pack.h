@@ -10,12 +10,14 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/scene/volume.h"
 #include "voxeld/client.h"
 
 namespace voxeld::voxelctl {
 
 struct PackedSizes {
-  uint64_t objects = 0, vertices = 0, indices = 0, bytes = 0;
+  uint64_t objects = 0, vertices = 0, indices = 0, samples = 0, bytes = 0;
+  std::string note;  // of what was left out; usually empty
 };
 
 // Takes a definition: the object's name, its parts, and how many bytes they are about.
@@ -24,9 +26,10 @@ using ObjectSink = std::function<absl::Status(const std::string& object,
 
 // Defines `object`: geometry in pieces of about half a MiB (less if `limits` want it), each an
 // object of its own, and an object of instances over them, last. So one SetTransform moves it all,
-// and no message is bulky. Stops at the first error of `sink`. ResourceExhausted if
+// and no message is bulky but those of volumes (scene/volume.h). Stops at the first error of `sink`. ResourceExhausted if
 // limits.max_parts_per_object is too small for so many pieces.
 absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& object,
-                                       const client::Limits& limits, const ObjectSink& sink);
+                                       const client::Limits& limits, const ObjectSink& sink,
+                                       const VolumeLook& look = {});
 
 }  // namespace voxeld::voxelctl

@@ -18,9 +18,9 @@ struct Bounds {
   Point3 min{HUGE_VAL, HUGE_VAL, HUGE_VAL};
   Point3 max{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
 
-  void Add(const Point3& p) {
-    min = {std::min(min.x, p.x), std::min(min.y, p.y), std::min(min.z, p.z)};
-    max = {std::max(max.x, p.x), std::max(max.y, p.y), std::max(max.z, p.z)};
+  void Add(const Point3& p, double r) {
+    min = {std::min(min.x, p.x - r), std::min(min.y, p.y - r), std::min(min.z, p.z - r)};
+    max = {std::max(max.x, p.x + r), std::max(max.y, p.y + r), std::max(max.z, p.z + r)};
   }
   // Halves first: their sum stays finite.
   Point3 Center() const {
@@ -47,12 +47,12 @@ struct Reach {
   double radius = 0;  // about the vertical axis
   double sphere = 0;  // about the centre
 
-  void Add(const Point3& p) {
-    x = std::max(x, std::abs(p.x));
-    y = std::max(y, std::abs(p.y));
-    z = std::max(z, std::abs(p.z));
-    radius = std::max(radius, std::hypot(p.x, p.y));
-    sphere = std::max(sphere, std::hypot(p.x, p.y, p.z));
+  void Add(const Point3& p, double r) {
+    x = std::max(x, std::abs(p.x) + r);
+    y = std::max(y, std::abs(p.y) + r);
+    z = std::max(z, std::abs(p.z) + r);
+    radius = std::max(radius, std::hypot(p.x, p.y) + r);
+    sphere = std::max(sphere, std::hypot(p.x, p.y, p.z) + r);
   }
 };
 
@@ -75,24 +75,55 @@ void ForEachPosition(std::span<Model*> group, Visit visit) {
     for (Part& part : model->parts) {
       for (Point3& p : part.positions) visit(p);
     }
+    for (SampledVolume& volume : model->volumes) {
+      for (Point3& p : volume.corners) visit(p);
+    }
+  }
+}
+
+// What is thick reaches beyond its positions.
+template <typename Visit>
+void ForEachReach(std::span<Model*> group, Visit visit) {
+  for (Model* model : group) {
+    for (Part& part : model->parts) {
+      const double radius = part.thickness / 2;
+      for (const Point3& p : part.positions) visit(p, radius);
+    }
+    for (const SampledVolume& volume : model->volumes) {
+      for (const Point3& p : volume.corners) visit(p, 0);
+    }
   }
 }
 
 void Center(std::span<Model*> group) {
   Bounds bounds;
-  ForEachPosition(group, [&](const Point3& p) { bounds.Add(p); });
+  ForEachReach(group, [&](const Point3& p, double r) { bounds.Add(p, r); });
   const Point3 center = bounds.Center();
   ForEachPosition(group, [&](Point3& p) { p = {p.x - center.x, p.y - center.y, p.z - center.z}; });
 }
 
 void Scale(std::span<Model*> group, double scale) {
   ForEachPosition(group, [&](Point3& p) { p = {p.x * scale, p.y * scale, p.z * scale}; });
+  for (Model* model : group) {
+    for (Part& part : model->parts) part.thickness *= scale;
+  }
 }
 
 Reach Measure(std::span<Model*> group) {
   Reach reach;
-  ForEachPosition(group, [&](const Point3& p) { reach.Add(p); });
+  ForEachReach(group, [&](const Point3& p, double r) { reach.Add(p, r); });
   return reach;
+}
+
+void TurnUpright(Up wanted, Model* model) {
+  const Up up = wanted == Up::kAuto ? model->up : wanted;
+  for (Part& part : model->parts) {
+    for (Point3& p : part.positions) p = Upright(p, up);
+    for (Point3& n : part.normals) n = Upright(n, up);
+  }
+  for (SampledVolume& volume : model->volumes) {
+    for (Point3& p : volume.corners) p = Upright(p, up);
+  }
 }
 
 }  // namespace
@@ -163,11 +194,7 @@ void PlaceModels(std::span<Model> models, const DisplaySpace& space,
       has_globe = true;
       continue;
     }
-    const Up up = options.up == Up::kAuto ? model.up : options.up;
-    for (Part& part : model.parts) {
-      for (Point3& p : part.positions) p = Upright(p, up);
-      for (Point3& n : part.normals) n = Upright(n, up);
-    }
+    TurnUpright(options.up, &model);
     if (options.each || groups.empty()) groups.emplace_back();
     groups.back().push_back(&model);
   }
@@ -180,6 +207,37 @@ void PlaceModels(std::span<Model> models, const DisplaySpace& space,
     Scale(group, has_globe ? Ratio(globe * kInsideGlobe, std::max(reach.sphere, 1e-9))
                            : FitScale(reach, space, round));
   }
+}
+
+void FramePlacement::Measure(const Model& model) {
+  const Up up = up_ == Up::kAuto ? model.up : up_;
+  Bounds bounds{min_, max_};
+  for (const Part& part : model.parts) {
+    for (const Point3& p : part.positions) bounds.Add(Upright(p, up), part.thickness / 2);
+  }
+  for (const SampledVolume& volume : model.volumes) {
+    for (const Point3& p : volume.corners) bounds.Add(Upright(p, up), 0);
+  }
+  min_ = bounds.min;
+  max_ = bounds.max;
+}
+
+void FramePlacement::Fit(const DisplaySpace& space, bool spin) {
+  Reach reach;
+  reach.x = max_.x / 2 - min_.x / 2;
+  reach.y = max_.y / 2 - min_.y / 2;
+  reach.z = max_.z / 2 - min_.z / 2;
+  reach.radius = std::hypot(reach.x, reach.y);
+  scale_ = FitScale(reach, space, space.round || spin);
+}
+
+void FramePlacement::Place(Model* model) const {
+  TurnUpright(up_, model);
+  const Point3 center = Bounds{min_, max_}.Center();
+  ForEachPosition({&model, 1}, [&](Point3& p) {
+    p = {p.x - center.x, p.y - center.y, p.z - center.z};
+  });
+  Scale({&model, 1}, scale_);
 }
 
 gpu::Affine InstanceTransform(const DisplaySpace& space, double turns) {

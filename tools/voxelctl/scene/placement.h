@@ -1,6 +1,7 @@
 // From a file's axes and units into a display: upright, centred, as large as fits.
 #pragma once
 
+#include <cmath>
 #include <span>
 
 #include "absl/status/statusor.h"
@@ -36,6 +37,23 @@ struct PlacementOptions {
 // inside it. Every model must have a vertex.
 void PlaceModels(std::span<Model> models, const DisplaySpace& space,
                  const PlacementOptions& options);
+
+// One place for models that follow one another: the same map for each, so that they move as they do among themselves.
+class FramePlacement {
+ public:
+  explicit FramePlacement(Up up) : up_(up) {}
+  // Takes a model's reach in, before Fit. A few of many are enough where frames are much alike.
+  void Measure(const Model& model);
+  // Finds the map that puts all that was measured into `space`, as PlaceModels would.
+  void Fit(const DisplaySpace& space, bool spin);
+  // Turns and moves a model's vertices in place.
+  void Place(Model* model) const;
+
+ private:
+  const Up up_;  // kAuto: each format's own
+  Point3 min_{HUGE_VAL, HUGE_VAL, HUGE_VAL}, max_{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  double scale_ = 1;
+};
 
 // To space.center, after a turn about z: the map of an instance.
 gpu::Affine InstanceTransform(const DisplaySpace& space, double turns);

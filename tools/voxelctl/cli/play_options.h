@@ -1,0 +1,37 @@
+// The arguments of play, and what these may be. Within this folder wrong ones are thrown (UsageError).
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tools/voxelctl/cli/options.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace voxeld::voxelctl {
+
+class PlayArguments {
+ public:
+  // The app must not outlive it.
+  void Add(CLI::App* command);
+  // `plain`: files that stand behind --.
+  PlayOptions Read(const std::vector<std::string>& plain);
+
+ private:
+  void ReadVolume();
+  void ReadAnimation();
+
+  PlayOptions options_;
+  std::string up_ = "auto", fill_ = "surface", style_ = "balls";
+  std::string size_, type_, window_;
+  std::vector<std::string> animate_;  // with nothing, or a number, or what is a file
+  CLI::Option* animate_option_ = nullptr;
+  bool big_endian_ = false;
+  double duration_ = std::nan(""), level_ = std::nan("");
+};
+
+}  // namespace voxeld::voxelctl

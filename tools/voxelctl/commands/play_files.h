@@ -1,0 +1,23 @@
+// What play is given, as models or as frames.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/cli/options.h"
+#include "tools/voxelctl/commands/console.h"
+#include "tools/voxelctl/import/frames.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/process/interrupt.h"
+
+namespace voxeld::voxelctl {
+
+// Of all files; what each is to have said of it is said. InvalidArgument names all files that are wrong.
+absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
+                                             Console& console);
+
+// Of a sequence or an animation. Null if all that there is stays as it is.
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& options);
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,58 @@
+#include "tools/voxelctl/import/inflate.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr int kGzipAlone = 15 + 16;  // zlib's word for: a header of gzip, the largest window
+constexpr uint64_t kStep = 1 << 20;
+
+}  // namespace
+
+absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed,
+                                    uint64_t most) {
+  z_stream stream = {};
+  if (inflateInit2(&stream, kGzipAlone) != Z_OK) {
+    return absl::ResourceExhaustedError(absl::StrCat(file.path, ": no memory to decompress it"));
+  }
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
+  std::string out;
+  size_t read = 0;
+  while (out.size() < most) {
+    const size_t before = out.size();
+    // Grows with what comes, so that a short file that promises much takes little.
+    out.resize(std::min(most, before + std::max<uint64_t>(kStep, before)));
+    const size_t given = std::min<size_t>(packed.size() - read, uint64_t{1} << 30);
+    const size_t room = std::min<size_t>(out.size() - before, uint64_t{1} << 30);
+    // zlib does not write there.
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data() + read));
+    stream.avail_in = static_cast<uInt>(given);
+    stream.next_out = reinterpret_cast<Bytef*>(out.data() + before);
+    stream.avail_out = static_cast<uInt>(room);
+    const int result = inflate(&stream, Z_NO_FLUSH);
+    read += given - stream.avail_in;
+    out.resize(before + room - stream.avail_out);
+    if (result == Z_STREAM_END) {
+      // Some programs write several streams, one after another.
+      if (packed.size() - read < 2 || packed.substr(read, 2) != "\x1f\x8b") break;
+      if (inflateReset(&stream) != Z_OK) break;
+      continue;
+    }
+    if (result != Z_OK || (out.size() == before && read == packed.size())) {
+      return FileError(file,
+                       absl::StrCat("its compressed data are ",
+                                    read == packed.size() ? "cut off" : "damaged", " after byte ",
+                                    read, " (", stream.msg != nullptr ? stream.msg : "no end", ")"),
+                       "copy the file again");
+    }
+  }
+  return out;
+}
+
+}  // namespace voxeld::voxelctl

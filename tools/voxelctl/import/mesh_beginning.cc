@@ -1,0 +1,51 @@
+#include "tools/voxelctl/import/mesh_beginning.h"
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr uint64_t kMostBytes = uint64_t{512} << 20;
+constexpr size_t kHead = 4096;
+
+struct Beginning {
+  absl::string_view extension;
+  std::vector<absl::string_view> at_front;  // one of these stands there; or
+  absl::string_view within;                 // this within the first 4096 bytes
+  absl::string_view expected;
+};
+
+}  // namespace
+
+absl::Status CheckMeshBeginning(const SourceFile& file) {
+  if (file.bytes.size() > kMostBytes) {
+    return FileError(file, absl::StrCat("has ", file.bytes.size(), " bytes"),
+                     absl::StrCat("meshes of this kind of at most ", kMostBytes, " are read"));
+  }
+  const Beginning beginnings[] = {
+      {"off", {}, "OFF", "a file that begins with \"OFF\" is expected"},
+      {"fbx", {"Kaydara FBX Binary"}, "FBX", "binary or ASCII FBX is expected"},
+      {"3mf", {"PK\x03\x04"}, "", "a ZIP archive, as 3MF is, is expected"},
+      // A byte order mark: UTF-16, where words are not to be found as they stand.
+      {"dae", {"\xff\xfe", "\xfe\xff"}, "<COLLADA", "XML of <COLLADA> is expected"},
+      {"blend", {"BLENDER", "\x1f\x8b"}, "", "a Blender file is expected"},
+      {"ifc", {"ISO-10303-21"}, "", "a STEP file (\"ISO-10303-21\") is expected"},
+      {"bvh", {"HIERARCHY"}, "HIERARCHY", "a file that begins with \"HIERARCHY\" is expected"},
+  };
+  const absl::string_view head = absl::string_view(file.bytes).substr(0, kHead);
+  for (const Beginning& b : beginnings) {
+    if (b.extension != file.extension) continue;
+    bool good = !b.within.empty() && absl::StrContains(head, b.within);
+    for (const absl::string_view front : b.at_front) good |= absl::StartsWith(head, front);
+    if (!good)
+      return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)), b.expected);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::voxelctl

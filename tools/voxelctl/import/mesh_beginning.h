@@ -1,0 +1,13 @@
+// Files of meshes that have no check of their own in mesh_checks.h: how they must begin.
+#pragma once
+
+#include "absl/status/status.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+// InvalidArgument unless an .off, .fbx, .3mf, .dae, .blend, .ifc or .bvh begins as such a file does and has 512 MiB at most. Others
+// may begin as they like.
+absl::Status CheckMeshBeginning(const SourceFile& file);
+
+}  // namespace voxeld::voxelctl

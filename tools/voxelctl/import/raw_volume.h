@@ -1,0 +1,24 @@
+// Volumes that are nothing but samples (.raw): what they are has to be told.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+#include "tools/voxelctl/import/volume_samples.h"
+
+namespace voxeld::voxelctl {
+
+struct RawLayout {
+  std::array<uint64_t, 3> size = {};
+  SampleType type = SampleType::kU8;
+  bool big_endian = false;
+};
+
+// Cubes of length 1, z up. InvalidArgument if nothing is told, or the file does not have just as many bytes.
+absl::StatusOr<Model> ReadRawVolume(const SourceFile& file, const std::optional<RawLayout>& layout);
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,216 @@
+#include "tools/voxelctl/scene/volume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr uint64_t kMessageOverhead = 4096;
+constexpr uint64_t kMostBytes = 64u << 20;  // where the server names no limit
+constexpr uint32_t kMostAlong = 65536;
+constexpr size_t kBins = 1024;
+constexpr double kOutliers = 0.001;
+constexpr client::Color kSurfaceColor = {150, 200, 255};
+
+using Size = std::array<uint32_t, 3>;
+
+struct Range {
+  double least = HUGE_VAL, greatest = -HUGE_VAL;
+};
+
+Range RangeOf(const std::vector<float>& samples) {
+  Range range;
+  for (const float v : samples) {
+    if (std::isnan(v)) continue;
+    range.least = std::min(range.least, double{v});
+    range.greatest = std::max(range.greatest, double{v});
+  }
+  return range;
+}
+
+// Otsu: where the two sides' means differ most, weighted by how many they are.
+std::array<double, 2> FindWindow(const std::vector<float>& samples, const Range& range) {
+  if (!(range.least < range.greatest)) return {range.least - 1, range.least};
+  std::vector<uint64_t> counts(kBins);
+  const double per_bin = (range.greatest - range.least) / kBins;
+  uint64_t all = 0;
+  for (const float v : samples) {
+    if (std::isnan(v)) continue;
+    ++counts[std::min(kBins - 1, static_cast<size_t>((v - range.least) / per_bin))];
+    ++all;
+  }
+  size_t top = kBins;
+  for (double beyond = 0; top > 1; --top) {
+    beyond += static_cast<double>(counts[top - 1]);
+    if (beyond > kOutliers * static_cast<double>(all)) break;
+  }
+  double sum = 0, below = 0, below_sum = 0, best = -1;
+  for (size_t i = 0; i < kBins; ++i) {
+    sum += static_cast<double>(counts[i]) * static_cast<double>(std::min(i, top));
+  }
+  size_t parting = 1;
+  for (size_t i = 0; i + 1 < top; ++i) {
+    below += static_cast<double>(counts[i]);
+    below_sum += static_cast<double>(counts[i]) * static_cast<double>(i);
+    const double above = static_cast<double>(all) - below;
+    if (below == 0 || above == 0) continue;
+    const double apart = below_sum / below - (sum - below_sum) / above;
+    if (below * above * apart * apart > best) best = below * above * apart * apart, parting = i + 1;
+  }
+  const double low = range.least + static_cast<double>(std::min(parting, top - 1)) * per_bin;
+  return {low, std::max(range.least + static_cast<double>(top) * per_bin, low + per_bin)};
+}
+
+// Samples of a cell along each axis: the cells that are shortest grow first, until so many are left.
+Size Factors(const SampledVolume& volume, uint64_t most) {
+  std::array<double, 3> step;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const Point3 &from = volume.corners[0], &to = volume.corners[size_t{1} << axis];
+    step[axis] = std::hypot(to.x - from.x, to.y - from.y, to.z - from.z) / volume.size[axis];
+  }
+  Size factors = {1, 1, 1};
+  const auto along = [&](size_t axis) -> uint64_t {
+    return (volume.size[axis] + factors[axis] - 1) / factors[axis];
+  };
+  while (along(0) * along(1) * along(2) > std::max<uint64_t>(most, 1)) {
+    size_t shortest = 3;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (along(axis) == 1) continue;
+      if (shortest == 3 || step[axis] * factors[axis] < step[shortest] * factors[shortest])
+        shortest = axis;
+    }
+    ++factors[shortest];
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    while (along(axis) > kMostAlong) ++factors[axis];
+  }
+  return factors;
+}
+
+// Calls `put` with the mean of each cell's numbers, not a number where it has none.
+template <typename Put>
+void ForEachCell(const SampledVolume& volume, const Size& factors, Put put) {
+  const auto& [nx, ny, nz] = volume.size;
+  for (uint32_t z = 0; z < nz; z += factors[2]) {
+    for (uint32_t y = 0; y < ny; y += factors[1]) {
+      for (uint32_t x = 0; x < nx; x += factors[0]) {
+        double sum = 0;
+        uint32_t count = 0;
+        for (uint32_t w = z; w < std::min(nz, z + factors[2]); ++w) {
+          for (uint32_t v = y; v < std::min(ny, y + factors[1]); ++v) {
+            const float* row = &volume.samples[(uint64_t{w} * ny + v) * nx];
+            for (uint32_t u = x; u < std::min(nx, x + factors[0]); ++u) {
+              if (!std::isnan(row[u])) sum += row[u], ++count;
+            }
+          }
+        }
+        put(count > 0 ? sum / count : std::nan(""));
+      }
+    }
+  }
+}
+
+// Whole numbers from 0 at `low` to their greatest at `high`.
+template <typename T>
+std::vector<T> Quantise(const SampledVolume& volume, const Size& factors, uint64_t count,
+                        double low, double high) {
+  std::vector<T> out;
+  out.reserve(count);
+  constexpr double kTop = static_cast<T>(~T{0});
+  ForEachCell(volume, factors, [&](double v) {
+    const double share = std::isnan(v) ? 0 : std::clamp((v - low) / (high - low), 0.0, 1.0);
+    out.push_back(static_cast<T>(std::lround(share * kTop)));
+  });
+  return out;
+}
+
+client::Vec3 ToClient(const Point3& p) { return {p.x, p.y, p.z}; }
+
+}  // namespace
+
+std::array<double, 2> WindowOf(const SampledVolume& volume) {
+  return volume.window ? *volume.window : FindWindow(volume.samples, RangeOf(volume.samples));
+}
+
+absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
+                                        const client::Limits& limits) {
+  const uint64_t each = look.level ? 2 : 1;
+  uint64_t bytes = kMostBytes;
+  if (limits.max_message_bytes > 0) bytes = std::min(bytes, limits.max_message_bytes);
+  if (limits.max_uncommitted_bytes > 0) bytes = std::min(bytes, limits.max_uncommitted_bytes);
+  bytes -= std::min(bytes / 2, kMessageOverhead);
+  if (limits.max_indices_per_entity > 0) bytes = std::min(bytes, limits.max_indices_per_entity * 4);
+  const Size factors = Factors(volume, bytes / each);
+
+  client::Grid grid;
+  Size size;
+  std::array<Point3, 3> edges;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    size[axis] = (volume.size[axis] + factors[axis] - 1) / factors[axis];
+    // The last cell may reach beyond the volume.
+    const double stretch =
+        static_cast<double>(uint64_t{size[axis]} * factors[axis]) / volume.size[axis];
+    const Point3 &from = volume.corners[0], &to = volume.corners[size_t{1} << axis];
+    edges[axis] = {(to.x - from.x) * stretch, (to.y - from.y) * stretch, (to.z - from.z) * stretch};
+  }
+  grid.corner = ToClient(volume.corners[0]);
+  grid.edge_a = ToClient(edges[0]);
+  grid.edge_b = ToClient(edges[1]);
+  grid.edge_c = ToClient(edges[2]);
+  grid.size_a = size[0];
+  grid.size_b = size[1];
+  grid.size_c = size[2];
+  PackedVolume packed;
+  packed.samples = uint64_t{size[0]} * size[1] * size[2];
+  packed.bytes = packed.samples * each;
+  if (factors != Size{1, 1, 1}) {
+    packed.note = absl::StrFormat(
+        "%d by %d by %d samples are more than the server takes; averaged over %d by %d by %d of "
+        "them",
+        volume.size[0], volume.size[1], volume.size[2], factors[0], factors[1], factors[2]);
+  }
+  const Range range = RangeOf(volume.samples);
+  if (look.level) {
+    if (!(*look.level > range.least) || *look.level > range.greatest) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--level is ", *look.level, ", and the samples go from ", range.least,
+                       " to ", range.greatest, "; give a level above the least of them"));
+    }
+    grid.samples = client::Array<uint16_t>(
+        Quantise<uint16_t>(volume, factors, packed.samples, range.least, range.greatest));
+    packed.part.shape = client::Isosurface{
+        .grid = std::move(grid),
+        .level = (*look.level - range.least) / (range.greatest - range.least) * 65535};
+    packed.part.color = kSurfaceColor;
+    if (!look.colormap.empty()) {
+      client::ColorScale scale;
+      scale.colormap = look.colormap;
+      scale.along = client::Vec3{0, 0, 1};
+      packed.part.color_scale = std::move(scale);
+    }
+    return packed;
+  }
+  const std::array<double, 2> window = look.window ? *look.window : WindowOf(volume);
+  grid.samples = client::Array<uint8_t>(
+      Quantise<uint8_t>(volume, factors, packed.samples, window[0], window[1]));
+  client::Transfer transfer;
+  transfer.colormap = look.colormap.empty() ? "gray" : look.colormap;
+  if (look.colormap.empty()) {
+    // Greys are dark at their beginning already.
+    transfer.values = {0, 1, 255};
+    transfer.opacities = {0, 1, 1};
+  } else {
+    transfer.values = {0, 255};
+    transfer.opacities = {0, 1};
+  }
+  packed.part.shape = client::Volume{.grid = std::move(grid), .transfer = std::move(transfer)};
+  return packed;
+}
+
+}  // namespace voxeld::voxelctl
