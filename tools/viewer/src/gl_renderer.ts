@@ -8,10 +8,9 @@ import { PointStore } from "./point_store";
 import { Points, Watching, kDark, kPlaceSteps, readPoints } from "./protocol";
 import { Adaptation } from "./adaptation";
 import { Drawn, Renderer, Scene, depthCue, kFarLight, sideOf, wholeSweep } from "./renderer";
-import { kFocal } from "./splat";
+import { kFocal, kLargest } from "./splat";
 
 const kMostChunks = 64;
-const kLargest = 15;
 
 const kVertex = `
 precision highp float;

@@ -6,7 +6,7 @@ import { PointStore } from "./point_store";
 import { Adaptation } from "./adaptation";
 import { Sweep, depthCue, kFarLight, lightOf, sideOf, tone } from "./renderer";
 
-const kLargest = 7; // side of a square
+export const kLargest = 24; // side of a square
 const kUnit = 16384; // the full light of one pixel
 export const kFocal = 1 / Math.tan(Math.PI / 12); // of camera.ts
 
