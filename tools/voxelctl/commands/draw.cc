@@ -20,12 +20,16 @@ absl::Status Draw(const DrawOptions& options, const Connector& connect, Console&
         return operation.has_upsert() && operation.upsert().layer() == kLayer;
       });
   if (console.json()) {
-    console.Data(JsonText(
-        {{"layer", kLayer}, {"shapes", shapes}, {"snapshot", put->snapshot}, {"notes", put->notes}},
-        false));
+    console.Data(JsonText({{"layer", kLayer},
+                           {"shapes", shapes},
+                           {"snapshot", put->snapshot},
+                           {"notes", put->notes},
+                           {"stay", put->stay}},
+                          false));
     return absl::OkStatus();
   }
   for (const std::string& note : put->notes) console.Say(note);
+  for (const std::string& sentence : put->stay) console.Say(sentence);
   console.Say(
       absl::StrCat(Counted(static_cast<uint64_t>(shapes), "shape"), " up, in the layer \"", kLayer,
                    "\"; `voxelctl snapshot OUT.png` shows what the display shows, `voxelctl "

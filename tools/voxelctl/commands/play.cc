@@ -120,13 +120,15 @@ class Player {
     PlaceModels(models, space_, {.up = options_.up, .spin = options_.spin, .each = options_.each});
     ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
 
-    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore(connection_);
+    absl::StatusOr<std::vector<OwnedLayer>> before = DrawnBefore(connection_);
     if (!before.ok()) return before.status();
     absl::Status status = Open();
+    had_layer_ = status.ok() && std::any_of(before->begin(), before->end(), [&](const auto& one) {
+                   return one.owner == session_->server().owner;
+                 });
     if (status.ok()) status = PutUp(std::move(models));
     // After the new scene is in: for a moment both may be up, but never neither.
-    std::erase(*before, session_ == nullptr ? 0 : session_->server().owner);
-    if (status.ok()) status = TakeDown(*before, connection_);
+    if (status.ok()) status = TakeOthersDown(*std::move(before));
     if (!status.ok()) return status;
     status = Stay();
     if (status.ok() && options_.clear) status = ClearMine();
@@ -212,6 +214,10 @@ class Player {
     absl::Status status = TakePatternsDown();
     if (!status.ok()) return status;
     // One frame replaces the layer whole, should this owner have had it before.
+    if (had_layer_) {
+      const client::LayerLook plain{.clip = std::vector<client::ClipPart>(), .mask = ""};
+      if (absl::Status set = layer_->Set(plain); !set.ok()) return set;
+    }
     client::Frame frame = layer_->BeginFrame();
     for (size_t i = 0; i < models.size(); ++i) {
       frame.Draw(
@@ -222,13 +228,26 @@ class Player {
     return status.ok() ? CommitAndWait() : status;
   }
 
+  absl::Status TakeOthersDown(std::vector<OwnedLayer> before) {
+    const uint64_t own = session_->server().owner;
+    // The layer was replaced whole; masks are never this command's.
+    std::erase_if(before, [own](const OwnedLayer& layer) {
+      return layer.owner == own && layer.layer == kLayer;
+    });
+    const absl::StatusOr<TakenDown> taken = TakeDown(before, connection_);
+    if (!taken.ok()) return taken.status();
+    if (!taken->stay.empty()) console_.Say(OthersStay(taken->stay));
+    return absl::OkStatus();
+  }
+
   // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
   absl::Status TakePatternsDown() {
-    const absl::StatusOr<std::vector<std::string>> ended = EndPatterns(connection_);
-    if (!ended.ok()) return ended.status();
-    for (const std::string& display : *ended) {
+    const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection_);
+    if (!patterns.ok()) return patterns.status();
+    for (const std::string& display : patterns->ended) {
       console_.Say(absl::StrCat("ended the test pattern on ", EscapeForTerminal(display)));
     }
+    if (!patterns->stay.empty()) console_.Say(PatternsStay(*patterns));
     return absl::OkStatus();
   }
 
@@ -325,6 +344,7 @@ class Player {
   sync::TimeNs start_ = 0;
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
   bool taken_down_ = false;
+  bool had_layer_ = false;  // of a command before, of the same owner: who has a token has one owner
   PlaySummary summary_;
 };
 
