@@ -106,7 +106,10 @@ absl::Status Showing::PlayOnce() {
     opacity = opacity_;
   }
   absl::StatusOr<std::unique_ptr<Playback>> begun =
-      Playback::Begin({.client_name = "voxelctl playlist", .opacity = opacity}, connection_);
+      Playback::Begin({.client_name = "voxelctl playlist",
+                       .layer_prefix = RecordingName(item_.file) + ": ",
+                       .opacity = opacity},
+                      connection_);
   if (!begun.ok()) return begun.status();
   const std::shared_ptr<Playback> playback = *std::move(begun);
   const sync::TimeNs began = clock_.Now();
