@@ -135,7 +135,7 @@ class Access(unittest.TestCase):
             self.assertIn("this takes the scope view", refused.stderr)
             self.assertIn("sim", voxelctl("--server", plain, "--token-file", painter, "displays").stdout)
             refused = voxelctl("--server", plain, "--token-file", painter, "set", "--brightness", "0.5")
-            self.assertIn("takes the scope control, and token stage-left has view draw", refused.stderr)
+            self.assertIn("takes the scope control, and token stage-left has view and draw", refused.stderr)
             done = voxelctl("--server", plain, "set", "--brightness", "0.5", VOXELD_TOKEN_FILE=boss)
             self.assertEqual(done.returncode, 0, done.stderr)
 
