@@ -229,6 +229,7 @@ TEST_F(CommandsTest, ASlowDisplayMakesNoQueue) {
       RunTool({"play", DataFile("points.ply"), "--spin", "--fps", "200", "--duration", "0.3"});
   EXPECT_EQ(result.code, 0);
   EXPECT_LE(server_.log().most_unanswered, 4u);
+  EXPECT_THAT(result.err, HasSubstr("it is up and spins for 0.3 s; Ctrl-C ends it before\n"));
   EXPECT_THAT(result.err, HasSubstr("left out while a display was behind"));
   EXPECT_THAT(result.err, HasSubstr("no outcome yet"));
 }
@@ -240,6 +241,7 @@ TEST_F(CommandsTest, CtrlCEndsASpinCleanlyAndTheSceneStays) {
   interrupt_.Request();
   player.join();
   EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("it is up and spins until Ctrl-C\n"));
   EXPECT_THAT(result.err, HasSubstr("stays up"));
   EXPECT_FALSE(server_.log().deleted_all_mine);
 }

@@ -266,10 +266,17 @@ class Player {
     return options_.spin || options_.clear ? sync::kNever : start_;
   }
 
+  std::string UntilWhen() const {
+    return absl::StrCat(options_.spin ? "it is up and spins " : "it is up ",
+                        options_.duration_s ? absl::StrFormat("for %g s; Ctrl-C ends it before",
+                                                              *options_.duration_s)
+                                            : "until Ctrl-C");
+  }
+
   absl::Status Stay() {
+    if (End() > clock_.Now()) console_.Say(UntilWhen());
     if (options_.spin) return Spin();
     if (End() > clock_.Now()) {
-      console_.Progress("up; Ctrl-C ends");
       interrupt_.WaitUntil(clock_, End());
     }
     return absl::OkStatus();
