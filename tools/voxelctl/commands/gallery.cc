@@ -8,6 +8,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "daemon/text/stroke_font.h"
 #include "display/sync/clock.h"
@@ -48,14 +49,34 @@ absl::StatusOr<Volume> Capture(const GalleryOptions& options, uint64_t snapshot,
   return std::move(captured).Finish();
 }
 
-// Empties the layer and its mask; answers the layers of others that stay, and are in all pictures.
-absl::StatusOr<std::vector<OwnedLayer>> Empty(Connection& connection) {
+// Takes away what earlier commands have drawn, as far as the caller may.
+absl::Status Empty(Connection& connection) {
   const absl::StatusOr<std::vector<OwnedLayer>> layers = DrawnBefore(connection);
   if (!layers.ok()) return layers.status();
-  absl::StatusOr<TakenDown> taken = TakeDown(*layers, connection);
-  if (!taken.ok()) return taken.status();
-  std::erase_if(taken->stay, [](const OwnedLayer& layer) { return layer.layer != kLayer; });
-  return std::move(taken->stay);
+  return TakeDown(*layers, connection).status();
+}
+
+// Layers that are up beside what is drawn, and so are in every picture.
+absl::StatusOr<std::vector<std::string>> Beside(Connection& connection) {
+  const absl::StatusOr<v1::ListEntitiesResponse> all =
+      connection.ListEntities({}, /*first_page_only=*/true);
+  if (!all.ok()) return all.status();
+  std::vector<std::string> beside;
+  for (const v1::LayerInfo& layer : all->layers()) {
+    if (!layer.visible() || layer.opacity() == 0 || layer.entities() == 0) continue;
+    beside.push_back(
+        absl::StrCat("\"", EscapeForTerminal(layer.layer()), "\" of owner ", layer.owner()));
+  }
+  return beside;
+}
+
+std::string BesideForTerminal(std::vector<std::string> layers) {
+  constexpr size_t kMostNamed = 3;
+  const size_t count = layers.size();
+  if (count > kMostNamed) layers.resize(kMostNamed);
+  return absl::StrCat("the pictures show what others have up too: ", absl::StrJoin(layers, ", "),
+                      count > kMostNamed ? absl::StrCat(" and ", count - kMostNamed, " more") : "",
+                      "; without it: voxelctl clear --all, which takes the scope control");
 }
 
 // As files are called: "points, soft" is points-soft.png.
@@ -117,8 +138,9 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
   sheet.rgb.resize(static_cast<size_t>(sheet.width) * static_cast<size_t>(sheet.height) * 3);
   const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
-  const absl::StatusOr<std::vector<OwnedLayer>> stay = Empty(connection);
-  if (!stay.ok()) return stay.status();
+  if (absl::Status status = Empty(connection); !status.ok()) return status;
+  const absl::StatusOr<std::vector<std::string>> beside = Beside(connection);
+  if (!beside.ok()) return beside.status();
   for (size_t i = 0; i < examples.size(); ++i) {
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     console.ProgressBar("drawing", static_cast<double>(i) / static_cast<double>(examples.size()),
@@ -139,7 +161,7 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
       const absl::Status status = WriteEach(options.each, examples[i].name, *volume);
       if (!status.ok()) return status;
     }
-    if (absl::Status status = Empty(connection).status(); !status.ok()) return status;
+    if (absl::Status status = Empty(connection); !status.ok()) return status;
   }
   if (absl::Status status = WritePng(options.file, sheet); !status.ok()) return status;
   if (console.json()) {
@@ -147,14 +169,11 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
                            {"shapes", examples.size()},
                            {"width", sheet.width},
                            {"height", sheet.height},
-                           {"stay", stay->size()}},
+                           {"beside", *beside}},
                           false));
     return absl::OkStatus();
   }
-  if (!stay->empty()) {
-    console.Say(absl::StrCat(OthersStay(*stay), ", and the pictures show ",
-                             stay->size() == 1 ? "it" : "them", " too"));
-  }
+  if (!beside->empty()) console.Say(BesideForTerminal(*beside));
   if (!patterns->stay.empty()) console.Say(PatternsStay(*patterns));
   console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", sheet.width, "x", sheet.height,
                            ", ", Counted(examples.size(), "shape"),
