@@ -97,7 +97,7 @@ class Layers(unittest.TestCase):
             said = self.does(who, "replay", "--keep", preset)
             self.assertIn("replays", said)
             self.assertIn("one state of a scene", said)
-            self.assertIn("1 change in ", said)
+            self.assertIn("logo.mcap: 1 change; what is up", said)
             self.assertIn("stays until `voxelctl clear`", said)
             layers, entities = self.scene()
             self.assertEqual(([name for _, name in layers], entities), (["logo: voxelctl"], 1))

@@ -98,7 +98,6 @@ class Run {
   }
 
   uint64_t changes() const { return changes_; }
-  double seconds() const { return static_cast<double>(clock_.Now() - began_) / sync::kSecond; }
 
   // With --step, after one more line: what is up goes then.
   absl::Status End() {
@@ -152,7 +151,7 @@ class Run {
   std::istream& in_;
   Console& console_;
   const uint64_t from_ns_;
-  mutable sync::SystemClock clock_;
+  sync::SystemClock clock_;
   sync::TimeNs began_ = 0;
   std::unique_ptr<Playback> playback_;
   std::vector<OwnedLayer> before_;
@@ -182,11 +181,17 @@ absl::Status Replay(const ReplayOptions& options, Connection& connection, Interr
   }
   if (!console.json()) console.Say(Announcement(options, seconds));
   uint64_t changes = 0;
-  double played_s = 0;
+  sync::SystemClock clock;
+  const sync::TimeNs began = clock.Now();
   const auto sum_up = [&] {
     if (console.json()) return;
+    const std::string time =
+        seconds <= 0 && !options.loop && !options.step
+            ? ""
+            : absl::StrFormat(" in %.1f s",
+                              static_cast<double>(clock.Now() - began) / sync::kSecond);
     console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", Counted(changes, "change"),
-                             " in ", absl::StrFormat("%.1f s", played_s),
+                             time,
                              options.keep ? "; what is up stays until `voxelctl clear`"
                                           : "; it is down again, --keep would leave it up"));
   };
@@ -201,7 +206,6 @@ absl::Status Replay(const ReplayOptions& options, Connection& connection, Interr
     });
     console.EndProgress();
     changes += run.changes();
-    played_s += run.seconds();
     if (absl::IsCancelled(wrong)) sum_up();
     if (!wrong.ok()) return wrong;
     if (!read.ok()) return Escaped(read);
