@@ -79,7 +79,8 @@ TEST(Playlist, IsOneOnlyWithItems) {
 }
 
 TEST(Playlist, TheExampleIsOne) {
-  const absl::StatusOr<Playlist> example = ReadPlaylist(VOXELD_SOURCE_DIR "/packaging/playlist.toml");
+  const absl::StatusOr<Playlist> example =
+      ReadPlaylist(VOXELD_SOURCE_DIR "/packaging/playlist.toml");
   ASSERT_TRUE(example.ok()) << example.status();
   EXPECT_EQ(example->items.size(), 3u);
 }
