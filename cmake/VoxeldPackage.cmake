@@ -17,11 +17,11 @@ install(FILES ${packaging}/voxeld.service ${packaging}/voxeld.socket ${packaging
 install(FILES ${packaging}/user/voxeld.service ${packaging}/user/voxeld.socket DESTINATION lib/systemd/user)
 install(FILES ${packaging}/voxeld.sysusers DESTINATION lib/sysusers.d RENAME voxeld.conf)
 install(FILES ${packaging}/70-voxeld.rules DESTINATION lib/udev/rules.d)
-install(FILES ${packaging}/voxeld.toml DESTINATION ${doc}/examples)
+install(FILES ${packaging}/voxeld.toml ${packaging}/playlist.toml DESTINATION ${doc}/examples)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/display/profiles/ DESTINATION share/voxeld/profiles FILES_MATCHING PATTERN "*.toml")
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md ${CMAKE_SOURCE_DIR}/docs/operations.md
-              ${CMAKE_SOURCE_DIR}/docs/configuration.md DESTINATION ${doc})
+              ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs/recordings.md DESTINATION ${doc})
 
 # Manual pages and completions, which the programs write: into share/, as they are installed.
 find_program(VOXELD_GZIP gzip REQUIRED)

@@ -173,8 +173,8 @@ absl::Status Access::Recheck(const Caller& caller) const {
   }
   if (!now->scopes.Hold(caller.scopes)) {
     return absl::PermissionDeniedError(
-        absl::StrCat(caller.who, " has the scopes ", now->scopes.ToString(), " now, and had ",
-                     caller.scopes.ToString(), "; begin again with what is left"));
+        absl::StrCat(caller.who, " has the scopes ", now->scopes.Sentence(), " now, and had ",
+                     caller.scopes.Sentence(), "; begin again with what is left"));
   }
   return absl::OkStatus();
 }

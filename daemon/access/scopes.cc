@@ -33,6 +33,19 @@ std::string Scopes::ToString() const {
   return names.empty() ? "none" : absl::StrJoin(names, " ");
 }
 
+std::string Scopes::Sentence() const {
+  std::string text;
+  int left = 0;
+  for (const Scope scope : kScopes) left += Has(scope) ? 1 : 0;
+  if (left == 0) return "none";
+  for (const Scope scope : kScopes) {
+    if (!Has(scope)) continue;
+    absl::StrAppend(&text, ScopeName(scope), left > 2 ? ", " : left == 2 ? " and " : "");
+    --left;
+  }
+  return text;
+}
+
 absl::StatusOr<Scopes> ParseScopes(std::string_view text) {
   const absl::string_view view(text.data(), text.size());
   if (view == "all") return Scopes::All();

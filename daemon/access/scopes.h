@@ -31,6 +31,7 @@ class Scopes {
   constexpr bool operator==(const Scopes&) const = default;
 
   std::string ToString() const;  // "view draw"; "none"
+  std::string Sentence() const;  // the same for people: "view, draw and control"
 
  private:
   explicit constexpr Scopes(uint8_t bits) : bits_(bits) {}

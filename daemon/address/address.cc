@@ -84,7 +84,8 @@ absl::Status PrepareUnix(const Address& address) {
   if (connect(probe.get(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0 ||
       errno == EAGAIN || errno == EINPROGRESS || errno == EPROTOTYPE) {
     return absl::AlreadyExistsError(
-        absl::StrCat("somebody listens on ", address.ToString(), " already"));
+        absl::StrCat("somebody listens on ", address.ToString(),
+                     " already; end that, or give another address with --listen"));
   }
   if (errno != ECONNREFUSED) {
     return absl::ErrnoToStatus(

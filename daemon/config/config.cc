@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
@@ -267,21 +268,33 @@ Environment ProcessEnvironment() {
 
 absl::Status ReadConfigFile(const std::string& path, Config* config) {
   std::error_code error;
-  const uintmax_t size = std::filesystem::file_size(path, error);
+  const std::filesystem::file_type type = std::filesystem::status(path, error).type();
+  if (type == std::filesystem::file_type::directory) error.assign(EISDIR, std::system_category());
   if (error) {
     return absl::ErrnoToStatus(error.value(), absl::StrCat("the configuration file ", path));
   }
-  if (size > kGreatestFileBytes) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        path, " has ", size, " bytes; a configuration has at most ", kGreatestFileBytes));
-  }
+  // As a stream: what a shell's <(…) names has no size.
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) {
+  std::string text;
+  std::array<char, 1 << 16> piece;
+  while (file && text.size() <= kGreatestFileBytes) {
+    file.read(piece.data(), piece.size());
+    text.append(piece.data(), static_cast<size_t>(file.gcount()));
+  }
+  if (text.size() > kGreatestFileBytes) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, " has more than the ", kGreatestFileBytes, " bytes of a configuration"));
+  }
+  if (!file.eof()) {
     return absl::ErrnoToStatus(errno, absl::StrCat("the configuration file ", path));
   }
-  return ReadConfigText(text.str(), path, config);
+  if (text.empty() && type == std::filesystem::file_type::fifo) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the configuration file ", path,
+        " is a pipe with nothing in it; what was read from one does not come again, so name a "
+        "regular file where the configuration is to be read anew"));
+  }
+  return ReadConfigText(text, path, config);
 }
 
 std::string FindConfigFile(const Environment& environment,

@@ -208,7 +208,8 @@ class Core {
   SceneWatch& scene_watch();
   void ListEntities(EntityQuery query, Reply<EntityPage> reply);
   void GetEntity(EntityKey key, Reply<EntityInfo> reply);
-  // `principal`: of its owner's layers alone; empty text: of nobody's in particular, so PermissionDenied.
+  // `principal`: of its owner's layers alone, and of none if it has none; empty text: of nobody's in particular, so
+  // PermissionDenied.
   // Nothing: of everybody's.
   void ClearLayer(uint64_t owner, std::string layer, bool keep_state,
                   std::optional<std::string> principal, Reply<Cleared> reply);

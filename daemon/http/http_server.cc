@@ -241,7 +241,8 @@ class Server::Impl {
     if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
     if (error == asio::error::address_in_use) {
       return absl::AlreadyExistsError(
-          absl::StrCat("somebody listens on ", options_.listen.ToString(), " already"));
+          absl::StrCat("somebody listens on ", options_.listen.ToString(),
+                       " already; end that, or give another address with --http, or off"));
     }
     if (error) {
       return absl::ErrnoToStatus(

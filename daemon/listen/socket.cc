@@ -29,7 +29,8 @@ constexpr int kFixedBytes = 4 << 20;  // of a buffer that the system cannot adju
 absl::Status Failed(int error, const Address& address) {
   if (error == EADDRINUSE) {
     return absl::AlreadyExistsError(
-        absl::StrCat("somebody listens on ", address.ToString(), " already"));
+        absl::StrCat("somebody listens on ", address.ToString(),
+                     " already; end that, or give another address with --listen"));
   }
   return absl::ErrnoToStatus(error, absl::StrCat(address.ToString(), " cannot be listened on"));
 }

@@ -33,6 +33,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
             sync::MutexLock lock(self->mutex_);
             self->session_ = info->session;
             self->incarnation_ = info->incarnation;
+            self->response_.set_owner(info->owner);
           }
           info->intake->Take({std::move(decoded.operations), std::move(decoded.refused)});
         });

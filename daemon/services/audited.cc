@@ -12,10 +12,11 @@ constexpr size_t kMostOfRequest = 512;
 }  // namespace
 
 Audited::Audited(ServiceContext& context, const grpc::CallbackServerContext& call,
-                 const char* method, const google::protobuf::Message& request)
+                 const char* method, const google::protobuf::Message& request,
+                 const char* without_fields)
     : audit_(context.audit), peer_(PeerOf(call)), method_(method) {
   if (audit_ == nullptr) return;
-  what_ = request.ShortDebugString();
+  what_ = request.ByteSizeLong() == 0 ? without_fields : request.ShortDebugString();
   if (what_.size() > kMostOfRequest) what_.resize(kMostOfRequest);
 }
 

@@ -21,8 +21,9 @@ namespace voxeld::daemon::services {
 // Copies stand for the same call; one of them is told what came of it, once.
 class Audited {
  public:
+  // `without_fields`: what a request asks for in which none is set.
   Audited(ServiceContext& context, const grpc::CallbackServerContext& call, const char* method,
-          const google::protobuf::Message& request);
+          const google::protobuf::Message& request, const char* without_fields = "nothing");
 
   // Who it is; before that, somebody who was turned away.
   void By(const access::Caller& caller) { who_ = caller.who; }

@@ -60,7 +60,7 @@ absl::StatusOr<access::Caller> Identified(ServiceContext& context,
   if (!credentials.ok()) return credentials.status();
   absl::StatusOr<access::Caller> caller = context.access->Identify(*credentials);
   if (!caller.ok() || caller->scopes.Has(scope)) return caller;
-  const std::string has = caller->scopes.ToString();
+  const std::string has = caller->scopes.Sentence();
   if (caller->by == access::Caller::By::kAnonymous) {
     return absl::UnauthenticatedError(absl::StrCat(
         "this takes the scope ", access::ScopeName(scope), ", and without a token a caller has ",

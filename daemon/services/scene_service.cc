@@ -263,7 +263,7 @@ class SceneService final : public SceneBase {
   ServerUnaryReactor* DoClearLayer(CallbackServerContext* call, const Caller& caller,
                                    const v1::ClearLayerRequest& request,
                                    v1::ClearLayerResponse* response) {
-    Audited audited(context_, *call, "ClearLayer", request);
+    Audited audited(context_, *call, "ClearLayer", request, "everything");
     audited.By(caller);
     ServerUnaryReactor* reactor = call->DefaultReactor();
     // Without control one's own alone.

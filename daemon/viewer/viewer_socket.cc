@@ -234,7 +234,9 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
              const absl::Status& result) {
     access::Audit* const audit = shared_->options.audit;
     if (audit == nullptr) return;
-    audit->Record("page", "http", method, request.ShortDebugString(), result);
+    std::string what = request.ShortDebugString();
+    if (what.empty()) what = std::string_view(method) == "ClearLayer" ? "everything" : "nothing";
+    audit->Record("page", "http", method, what, result);
   }
 
   void Update(const Json& json) {

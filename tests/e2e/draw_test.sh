@@ -58,8 +58,12 @@ if "$voxelctl" draw "spere radius=1" 2>"$work/error"; then fail "a spere was dra
 grep -q 'there is no shape spere; did you mean sphere?' "$work/error" || fail "$(cat "$work/error")"
 # What the server refuses is said once, with the shape that it is of.
 if "$voxelctl" draw "sphere radius=1" "sphere radius=0" 2>"$work/error"; then fail "a sphere of no radius was drawn"; fi
-grep -q "1 operation was refused.*the first: voxelctl/draw 2, .*sphere.radius: radius is 0; give" "$work/error" || fail "$(cat "$work/error")"
+grep -q '"sphere radius=0": radius is 0; give a number greater than 0' "$work/error" || fail "$(cat "$work/error")"
 [ "$(grep -o "radius is 0" "$work/error" | wc -l)" = 1 ] || fail "said again: $(cat "$work/error")"
+if "$voxelctl" draw "text text=HELLO" 2>"$work/error"; then fail "a text of no height was drawn"; fi
+grep -q '"text text=HELLO": height=… is missing; give a number greater than 0' "$work/error" || fail "$(cat "$work/error")"
+if "$voxelctl" draw "x^2+" 2>"$work/error"; then fail "x^2+ was drawn"; fi
+grep -q '"x^2+": at character 5: found the end where a number' "$work/error" || fail "$(cat "$work/error")"
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" 'len(d["entities"])')" = 3 ] || fail "a refused shape took something away"
 

@@ -234,6 +234,20 @@ class Lights(unittest.TestCase):
         self.assertEqual((tally["malformed"], tally["set"]), (300, 6))
         self.assertNotEqual(tally["malformed_last"], "")
 
+    def test_people_are_told_why_a_message_was_malformed(self) -> None:
+        told = subprocess.Popen([os.environ["VOXELCTL"], "--server", self.server, "input", "ddp", "--listen", "127.0.0.1:0"],
+                                stderr=subprocess.PIPE, text=True)
+        assert told.stderr is not None
+        first = told.stderr.readline()
+        port = int(first.split(" on 127.0.0.1:")[1].split(" ")[0])
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            sender.sendto(b"no", ("127.0.0.1", port))
+            time.sleep(0.3)
+        told.terminate()
+        _, words = told.communicate(timeout=LONG)
+        self.assertEqual(told.returncode, 0, words)
+        self.assertRegex(words, r"^1 message, 0 pictures: 0 put up, 0 superseded, 1 malformed \(.+\)\n$")
+
     def test_it_goes_on_after_the_daemon_came_back(self) -> None:
         reading, port = self.input("opc", "--display", "box", "--size", f"{X}x{Y}x{Z}")
         with socket.create_connection(("127.0.0.1", port)) as stream:

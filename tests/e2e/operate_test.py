@@ -135,7 +135,7 @@ class Access(unittest.TestCase):
             self.assertIn("this takes the scope view", refused.stderr)
             self.assertIn("sim", voxelctl("--server", plain, "--token-file", painter, "displays").stdout)
             refused = voxelctl("--server", plain, "--token-file", painter, "set", "--brightness", "0.5")
-            self.assertIn("takes the scope control, and token stage-left has view draw", refused.stderr)
+            self.assertIn("takes the scope control, and token stage-left has view and draw", refused.stderr)
             done = voxelctl("--server", plain, "set", "--brightness", "0.5", VOXELD_TOKEN_FILE=boss)
             self.assertEqual(done.returncode, 0, done.stderr)
 
@@ -145,7 +145,12 @@ class Access(unittest.TestCase):
             self.assertEqual(drawn.returncode, 0, drawn.stderr)
             stranger = voxelctl("--server", tls, "displays", VOXELD_TLS_CA=mine["VOXELD_TLS_CA"],
                                 VOXELD_TLS_NAME="display.example")
-            self.assertIn("not taken by the other", stranger.stderr)
+            self.assertIn("it asks for a certificate, and none is given", stranger.stderr)
+            for wrong, why in (({"VOXELD_TLS_NAME": ""}, "its certificate is not for this host; VOXELD_TLS_NAME says"),
+                               ({"VOXELD_TLS_CA": ""}, "not by an authority that this machine knows; VOXELD_TLS_CA names")):
+                self.assertIn(why, voxelctl("--server", tls, "displays", **{**mine, **wrong}).stderr)
+            self.assertIn("its host's name is not known to this machine",
+                          voxelctl("--server", "tls:no.such.host.invalid:1", "displays", **mine).stderr)
 
             # The Python client over both, and a token that is taken away in the middle of a stream.
             who = voxel.Credentials(token_file=painter, ca=mine["VOXELD_TLS_CA"], certificate=mine["VOXELD_TLS_CERT"],

@@ -49,8 +49,10 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/share/doc/voxeld/README.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/configuration.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/copyright
+-rw-r--r-- root/root ./usr/share/doc/voxeld/examples/playlist.toml
 -rw-r--r-- root/root ./usr/share/doc/voxeld/examples/voxeld.toml
 -rw-r--r-- root/root ./usr/share/doc/voxeld/operations.md
+-rw-r--r-- root/root ./usr/share/doc/voxeld/recordings.md
 -rw-r--r-- root/root ./usr/share/fish/vendor_completions.d/voxelctl.fish
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-assets.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-calibrate.1.gz

@@ -62,7 +62,7 @@ class Playlists(unittest.TestCase):
                         now[layer.owner, layer.layer] = layer.opacity
                     for key in change.removed_layers:
                         now.pop((key.owner, key.layer), None)
-                    seen.append({name.split("/")[1]: opacity for (_, name), opacity in now.items() if "/" in name})
+                    seen.append({name.split(": ")[1]: opacity for (_, name), opacity in now.items() if ": " in name})
                     if len(seen) > 20 and not now:
                         return
 
@@ -111,6 +111,15 @@ class Playlists(unittest.TestCase):
         none = voxelctl("--server", self.socket, "playlist", self.write('[[item]]\nfile = "b.mcap"\n'))
         self.assertEqual(none.returncode, 1)
         self.assertIn("give its item seconds", none.stderr)
+        checked = voxelctl("playlist", "--check", self.write(
+            '[[item]]\nfile = "gone.mcap"\n[[item]]\nfile = "a.mcap"\n[[item]]\nfile = "b.mcap"\nseconds = 1\n'))
+        self.assertEqual(checked.returncode, 1)
+        self.assertRegex(checked.stdout, r"^3 items; now it begins with .*b\.mcap\n$")
+        self.assertIn("list.toml: several items cannot be played and would be passed over:\nitem 1: ", checked.stderr)
+        self.assertIn("gone.mcap", checked.stderr)
+        self.assertRegex(checked.stderr, r"item 2: .*a\.mcap is one state of a scene; give its item seconds")
+        checked = voxelctl("playlist", "--check", self.write('[[item]]\nfile = "gone.mcap"\n'))
+        self.assertIn("1 item; now nothing is on", checked.stdout)
         wrong = voxelctl("playlist", "--check", self.write('[[item]]\nfile = "b.mcap"\nseconds = 0\nspeed = "x"\n'))
         self.assertEqual(wrong.returncode, 1)
         self.assertRegex(wrong.stderr, r"list.toml:3:11: seconds is 0")

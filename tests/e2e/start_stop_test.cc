@@ -94,7 +94,9 @@ TEST(Start, BusyAddressesAreErrors) {
     const Ended ended =
         RunToEnd(Voxeld({"--listen", address, "--http", "off"}), CleanEnvironment(folder));
     EXPECT_EQ(ended.code, 1) << ended.output;
-    EXPECT_THAT(ended.output, HasSubstr(absl::StrCat("somebody listens on ", address)));
+    EXPECT_THAT(ended.output, HasSubstr(absl::StrCat("somebody listens on ", address,
+                                                     " already; end that, or "
+                                                     "give another address with --listen")));
   }
   const Ended ended = RunToEnd(
       Voxeld({"--listen", absl::StrCat("unix:", folder.path(), "/b.sock"), "--http", first.http()}),

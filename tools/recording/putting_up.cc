@@ -7,11 +7,29 @@
 #include "absl/strings/str_cat.h"
 
 namespace voxeld::recording {
+namespace {
 
-std::string PuttingUp::NameOf(const LayerName& layer) const {
+constexpr size_t kMostNameBytes = 240;  // a number behind it still fits into max_id_bytes
+
+// At most so many bytes; no code point is cut.
+std::string UpTo(std::string text, size_t bytes) {
+  if (text.size() <= bytes) return text;
+  while (bytes > 0 && (text[bytes] & 0xc0) == 0x80) --bytes;
+  text.resize(bytes);
+  return text;
+}
+
+}  // namespace
+
+std::string PuttingUp::NameOf(const LayerName& layer) {
   const auto found = mirror_.layers().find(layer);
-  return absl::StrCat(layer.owner, "/", layer.layer, "/",
-                      found == mirror_.layers().end() ? 0 : found->second.number());
+  const uint64_t number = found == mirror_.layers().end() ? 0 : found->second.number();
+  std::string& name = names_[{layer.owner, layer.layer, number}];
+  if (!name.empty()) return name;
+  const std::string plain = UpTo(prefix_ + layer.layer, kMostNameBytes);
+  name = plain;
+  for (int n = 2; !taken_.insert(name).second; ++n) name = absl::StrCat(plain, " (", n, ")");
+  return name;
 }
 
 std::string PuttingUp::ObjectOf(uint64_t owner, const std::string& name) {
@@ -61,8 +79,7 @@ void PuttingUp::PutObjects(const std::map<ObjectName, v1::Object>& objects,
   for (const auto& [key, object] : objects) put(put, key);
 }
 
-void PuttingUp::PutEntity(const v1::WatchedEntity& entity,
-                          std::vector<v1::StreamRequest>* out) const {
+void PuttingUp::PutEntity(const v1::WatchedEntity& entity, std::vector<v1::StreamRequest>* out) {
   const v1::EntityInfo& info = entity.info();
   v1::Upsert* upsert = out->emplace_back().mutable_upsert();
   upsert->set_layer(NameOf({info.key().owner(), info.key().layer()}));
@@ -168,6 +185,12 @@ std::vector<v1::StreamRequest> PuttingUp::Whole() {
   return out;
 }
 
-std::vector<std::string> PuttingUp::TakeEmptied() { return std::exchange(emptied_, {}); }
+std::vector<std::string> PuttingUp::TakeEmptied() {
+  for (const std::string& name : emptied_) {
+    taken_.erase(name);
+    std::erase_if(names_, [&](const auto& one) { return one.second == name; });
+  }
+  return std::exchange(emptied_, {});
+}
 
 }  // namespace voxeld::recording

@@ -34,7 +34,7 @@ absl::Status Show(const Options& options, RosFeed& feed, voxelctl::Interrupt& in
       voxelctl::ChooseCredentials(options.credentials, EnvironmentVariable), interrupt);
   if (!connection.ok()) return connection.status();
   return voxelctl::ShowFeed({.source = options.ros.master,
-                             .channels = "topics",
+                             .channel = "topic",
                              .layer = options.layer,
                              .client_name = "voxeld-ros",
                              .reconnect = false},

@@ -39,5 +39,13 @@ class CommitRefused(VoxelError):
         self.issues = tuple(issues)
 
 
+class NotDurable(VoxelError):
+    """The commit was carried out, and will not be on the server's disk; `issues` says why."""
+
+    def __init__(self, message: str, issues: Sequence[Issue] = ()) -> None:
+        super().__init__(message)
+        self.issues = tuple(issues)
+
+
 class CommitDropped(VoxelError):
     """The flow policy gave up the commit before it was sent; the connection counts it in `client_drops`."""

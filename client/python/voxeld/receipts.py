@@ -8,7 +8,7 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import dataclass, fields
 from typing import Callable, Deque, Iterable, Optional
 
-from .errors import CommitDropped, CommitRefused, ConnectionLost
+from .errors import CommitDropped, CommitRefused, ConnectionLost, NotDurable
 from .v1 import scene_pb2 as pb
 from .v1 import types_pb2
 
@@ -244,12 +244,14 @@ class Frame:
         return self._wait(timeout, True).raise_if_failed().outcomes
 
     def wait_durable(self, timeout: Optional[float] = None) -> "Frame":
-        """Until it is on the server's disk, as commit(durable=True) asked. Raises as wait() does, and CommitRefused if it will
-        not be there: the server keeps nothing, or the session's layers go with it (on_disconnect)."""
+        """Until it is on the server's disk, as commit(durable=True) asked. Raises as wait() does, and NotDurable if it was carried
+        out and will not be there: the server keeps nothing (it has no --state-dir), or the session's layers go with it
+        (on_disconnect)."""
         frame = self.wait(timeout)
         if frame.accepted is not None and not frame.accepted.durable:
             why = [issue for issue in frame.issues if issue.field == "commit.durable"]
-            raise CommitRefused("; ".join(map(str, why)) or "it was committed without durable=True", why)
+            told = "; ".join(issue.message for issue in why) or "it was committed without durable=True"
+            raise NotDurable(f"the commit was carried out, and is not on the server's disk: {told}", why)
         return self._wait(timeout, True)
 
     def _wait(self, timeout: Optional[float], shown: bool) -> "Frame":

@@ -10,26 +10,33 @@ import voxeld as voxel
 
 # What an example has refused on purpose, and how many pictures it leaves.
 REFUSED = {"08_receipts_and_errors": 2}
-PICTURES = {"04_point_cloud": ["galaxy.png"]}
+PICTURES = {"04_point_cloud": ["tmp/galaxy.png"]}
+# Beside these; the first display is the one that examples capture.
+DISPLAYS = ["stack=simulated,geometry=planar,size=48x48x48", "rotor=simulated,geometry=rotor,size=48x48,slices=120"]
 
 
 def main() -> int:
     daemon_path, program, *arguments = sys.argv[1:]
     program = str(Path(program).resolve())
     name = Path(program).stem
+    displays = [one for one in [os.environ.get("FIRST_DISPLAY")] if one] + DISPLAYS
     with tempfile.TemporaryDirectory() as folder:
         server = f"unix:{folder}/voxeld.sock"
         with open(f"{folder}/daemon.log", "wb") as log:
             daemon = subprocess.Popen(
                 [daemon_path, "--listen", server, "--http", "off", "--log-level", "warn",
-                 "--display", "stack=simulated,geometry=planar,size=48x48x48",
-                 "--display", "rotor=simulated,geometry=rotor,size=48x48,slices=120"], stdout=log, stderr=log)
+                 *(word for display in displays for word in ("--display", display))], stdout=log, stderr=log)
         try:
             with voxel.connect(server, timeout=120, name="observer") as observer:
-                environment = {**os.environ, "VOXELD_SERVER": server}
-                done = subprocess.run([sys.executable, program, *arguments], cwd=folder, env=environment, timeout=240)
+                work, temporary = Path(folder, "work"), Path(folder, "tmp")
+                work.mkdir()
+                temporary.mkdir()
+                environment = {**os.environ, "VOXELD_SERVER": server, "TMPDIR": str(temporary)}
+                done = subprocess.run([sys.executable, program, *arguments], cwd=work, env=environment, timeout=240)
                 stats = observer.stats()
-                faults = []
+                faults: list[str] = []
+                if left := sorted(work.iterdir()):
+                    faults.append(f"it left {left} in the folder that it was started in")
                 if done.returncode != 0:
                     faults.append(f"{name} ended with {done.returncode}")
                 if stats.operations_refused != REFUSED.get(name, 0):
@@ -40,7 +47,7 @@ def main() -> int:
                     if not Path(folder, picture).exists() or Path(folder, picture).read_bytes()[:8] != b"\x89PNG\r\n\x1a\n":
                         faults.append(f"{picture} is no PNG file")
                     elif "KEEP_PICTURES" in os.environ:
-                        Path(os.environ["KEEP_PICTURES"], picture).write_bytes(Path(folder, picture).read_bytes())
+                        Path(os.environ["KEEP_PICTURES"], Path(picture).name).write_bytes(Path(folder, picture).read_bytes())
         finally:
             daemon.terminate()
             daemon.wait(60)

@@ -3,7 +3,7 @@ import random
 import threading
 import unittest
 
-from voxeld import CommitDropped, CommitRefused, ConnectionLost, receipts
+from voxeld import CommitDropped, CommitRefused, ConnectionLost, NotDurable, receipts
 from voxeld.receipts import Book, Frame, Issue, Stages
 from voxeld.v1 import scene_pb2 as pb
 from voxeld.v1 import types_pb2
@@ -111,6 +111,17 @@ class Waiting(unittest.TestCase):
         with self.assertRaises(CommitRefused) as caught:
             frame.wait(0)
         self.assertEqual(str(caught.exception), whole)
+
+    def test_a_commit_that_is_carried_out_and_not_kept_is_not_called_refused(self) -> None:
+        book, frame = Book(), Frame(1)
+        book.add(frame)
+        issue = Issue.of(pb.Issue(field="commit.durable", message="durable is true, and this server keeps nothing", applied=True))
+        book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted(displays=["d"])), [issue])
+        self.assertIs(frame.wait(0), frame)
+        with self.assertRaisesRegex(NotDurable, "was carried out.*this server keeps nothing") as caught:
+            frame.wait_durable(0)
+        self.assertEqual(caught.exception.issues, (issue,))
+        self.assertNotIsInstance(caught.exception, CommitRefused)
 
     def test_words_of_newer_servers_are_borne(self) -> None:
         book, frame = Book(), Frame(1)

@@ -113,7 +113,7 @@ TEST_F(AccessTest, WhatIsTakenAwayIsGoneFromCallsUnderWay) {
   EXPECT_EQ(changes_, 2);
   EXPECT_TRUE(absl::IsPermissionDenied(access->Recheck(*left)));
   EXPECT_THAT(std::string(access->Recheck(*left).message()),
-              HasSubstr("token left has the scopes view now, and had view draw"));
+              HasSubstr("token left has the scopes view now, and had view and draw"));
   EXPECT_TRUE(absl::IsUnauthenticated(access->Recheck(*right)));
   EXPECT_TRUE(access->Recheck(*trusted).ok());
   Put(Token("somebody", "secret", "\"view\", \"draw\""));

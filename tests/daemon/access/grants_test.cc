@@ -132,6 +132,10 @@ TEST(Scopes, ReadBackAsTheyAreWritten) {
     EXPECT_EQ(scopes->ToString(), text);
   }
   EXPECT_EQ(ParseScopes("draw,view")->ToString(), "view draw");
+  EXPECT_EQ(ParseScopes("draw,view")->Sentence(), "view and draw");
+  EXPECT_EQ(ParseScopes("all")->Sentence(), "view, draw and control");
+  EXPECT_EQ(ParseScopes("draw")->Sentence(), "draw");
+  EXPECT_EQ(ParseScopes("none")->Sentence(), "none");
   EXPECT_EQ(*ParseScopes("all"), Scopes::All());
   EXPECT_TRUE(ParseScopes("none")->empty());
   EXPECT_TRUE(absl::IsInvalidArgument(ParseScopes("").status()));

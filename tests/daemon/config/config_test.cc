@@ -1,6 +1,7 @@
 #include "daemon/config/config.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -350,6 +351,31 @@ TEST(ApplyCommandLine, UsageErrorsNameTheOption) {
 absl::StatusOr<CommandLine> Parse(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "voxeld");
   return ParseCommandLine(static_cast<int>(arguments.size()), arguments.data(), "1.2.3");
+}
+
+// As a shell's <(…) names it.
+TEST(ConfigFile, MayBeAPipeWhichIsReadOnce) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const std::string text = "[log]\nlevel = \"error\"\n";
+  ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  close(ends[1]);
+  const std::string path = absl::StrCat("/dev/fd/", ends[0]);
+  Config config;
+  const absl::Status first = ReadConfigFile(path, &config);
+  EXPECT_TRUE(first.ok()) << first;
+  EXPECT_THAT(ToToml(config), HasSubstr("level = 'error'"));
+  const absl::Status second = ReadConfigFile(path, &config);
+  EXPECT_THAT(std::string(second.message()), HasSubstr("is a pipe with nothing in it"));
+  close(ends[0]);
+}
+
+TEST(ConfigFile, OfNoSensibleSizeOrKindIsRefused) {
+  Config config;
+  EXPECT_THAT(std::string(ReadConfigFile("/dev/zero", &config).message()),
+              HasSubstr("/dev/zero has more than the 16777216 bytes of a configuration"));
+  EXPECT_THAT(std::string(ReadConfigFile("/", &config).message()), HasSubstr("Is a directory"));
+  EXPECT_EQ(ReadConfigFile("/nowhere.toml", &config).code(), absl::StatusCode::kNotFound);
 }
 
 TEST(CommandLine, HasEveryOption) {

@@ -256,6 +256,7 @@ TEST_F(ServicesAccess, LayersThatEraseAndOthersLayersTakeControl) {
   };
   EXPECT_EQ(daemon_->Entities().entities_size(), 2);
   EXPECT_EQ(clear("artist", 0), std::pair(StatusCode::OK, uint64_t{1})) << "its own alone";
+  EXPECT_EQ(clear("artist", 0), std::pair(StatusCode::OK, uint64_t{0})) << "it has none any more";
   ASSERT_EQ(daemon_->Entities().entities_size(), 1);
   const uint64_t painters = daemon_->Entities().entities(0).key().owner();
   EXPECT_EQ(clear("artist", painters).first, StatusCode::PERMISSION_DENIED);
@@ -268,6 +269,8 @@ TEST_F(ServicesAccess, LayersThatEraseAndOthersLayersTakeControl) {
   EXPECT_THAT(text, HasSubstr("\"who\":\"token boss\""));
   EXPECT_THAT(text, HasSubstr("\"method\":\"ClearLayer\""));
   EXPECT_THAT(text, HasSubstr("PERMISSION_DENIED"));
+  EXPECT_THAT(text, HasSubstr("\"what\":\"everything\"")) << "of owner 0, and all its layers";
+  EXPECT_THAT(text, Not(HasSubstr("\"what\":\"\"")));
 }
 
 TEST_F(ServicesAccess, ATokenThatIsTakenAwayEndsItsCallsAndNobodyElses) {

@@ -206,6 +206,39 @@ TEST_F(SceneRecording, RandomScenesComeUpAgainTheSameAfterEveryChange) {
   }
 }
 
+TEST(Layers, GoByTheirNamesAndByANumberWhereSeveralHaveOne) {
+  const auto layer = [](uint64_t owner, const std::string& name, uint64_t number) {
+    v1::LayerInfo info;
+    info.set_owner(owner);
+    info.set_layer(name);
+    info.set_number(number);
+    return info;
+  };
+  PuttingUp up("night: ");
+  const auto names = [&](const v1::WatchSceneResponse& changes) {
+    std::vector<std::string> out;
+    for (const v1::StreamRequest& request : up.Step(changes)) {
+      if (request.has_layer_state()) out.push_back("+" + request.layer_state().layer());
+      if (request.has_delete_()) out.push_back("-" + request.delete_().layer());
+    }
+    return out;
+  };
+  v1::WatchSceneResponse changes;
+  *changes.add_layers() = layer(58, "voxelctl", 127);
+  *changes.add_layers() = layer(59, "voxelctl", 128);
+  *changes.add_layers() = layer(59, std::string(254, 'a') + "é", 129);
+  EXPECT_THAT(names(changes), ::testing::ElementsAre("+night: voxelctl", "+night: voxelctl (2)",
+                                                     "+night: " + std::string(233, 'a')));
+  // Made again: it is another layer, while the first is there.
+  changes.Clear();
+  *changes.add_layers() = layer(58, "voxelctl", 130);
+  EXPECT_THAT(names(changes), ::testing::ElementsAre("-night: voxelctl", "+night: voxelctl (3)"));
+  EXPECT_THAT(up.TakeEmptied(), ::testing::ElementsAre("night: voxelctl"));
+  changes.Clear();
+  *changes.add_layers() = layer(60, "voxelctl", 131);
+  EXPECT_THAT(names(changes), ::testing::ElementsAre("+night: voxelctl")) << "it is free again";
+}
+
 TEST(Objects, ThatLeaveTogetherLeaveBeforeTheirParts) {
   v1::WatchSceneResponse defined, removed;
   for (const char* name : {"a", "b", "c"}) {

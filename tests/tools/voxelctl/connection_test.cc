@@ -1,4 +1,5 @@
 // What needs no server: addresses, issues, captured volumes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -14,6 +15,7 @@
 #include "tools/voxelctl/commands/captured_volume.h"
 #include "tools/voxelctl/connection/address.h"
 #include "tools/voxelctl/connection/scene_session.h"
+#include "tools/voxelctl/connection/status.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -54,6 +56,28 @@ TEST(ChooseServer, OptionThenVariableThenSocketThenPort) {
   variables["VOXELD_SERVER"] = "there:1";
   EXPECT_EQ(ChooseServer("", environment), "there:1");
   EXPECT_EQ(ChooseServer("here:2", environment), "here:2");
+}
+
+TEST(WhyUnreachable, TellsTheCausesApart) {
+  const std::string all = "failed to connect to all addresses; last error: ";
+  const std::string tls = "tls:there:1";
+  const client::Credentials none, mine{.ca = "a.pem", .certificate = "c.pem", .server_name = "x"};
+  EXPECT_EQ(WhyUnreachable("DNS resolution failed for there:1: Domain name not found", tls, mine),
+            "its host's name is not known to this machine");
+  EXPECT_EQ(WhyUnreachable(all + "Connection refused", tls, mine), "nobody listens there");
+  EXPECT_EQ(WhyUnreachable(all + "Peer name there is not in peer certificate", tls, none),
+            "its certificate is not for this host; VOXELD_TLS_NAME says which name it is for");
+  EXPECT_THAT(WhyUnreachable(all + "Peer name x is not in peer certificate", tls, mine),
+              ::testing::StartsWith("its certificate is not for \"x\""));
+  const std::string verify = all + "SSL routines::certificate verify failed";
+  EXPECT_THAT(WhyUnreachable(verify, tls, none), ::testing::HasSubstr("VOXELD_TLS_CA names"));
+  EXPECT_THAT(WhyUnreachable(verify, tls, mine), ::testing::HasSubstr("the authority in a.pem"));
+  EXPECT_THAT(WhyUnreachable(all + "Socket closed", tls, none),
+              ::testing::HasSubstr("asks for a certificate, and none is given"));
+  EXPECT_THAT(WhyUnreachable(all + "Socket closed", tls, mine),
+              ::testing::HasSubstr("the certificate in c.pem is not taken"));
+  EXPECT_EQ(WhyUnreachable(all + "Socket closed", "there:1", none),
+            "nobody listens there, or what does is no voxeld");
 }
 
 // ------------------------------------------------------------------------------------- issues

@@ -78,6 +78,13 @@ TEST(Playlist, IsOneOnlyWithItems) {
   EXPECT_TRUE(absl::IsNotFound(ReadPlaylist("/nowhere/w.toml").status()));
 }
 
+TEST(Playlist, TheExampleIsOne) {
+  const absl::StatusOr<Playlist> example =
+      ReadPlaylist(VOXELD_SOURCE_DIR "/packaging/playlist.toml");
+  ASSERT_TRUE(example.ok()) << example.status();
+  EXPECT_EQ(example->items.size(), 3u);
+}
+
 TEST(HoursOfItems, AreWithinTheirDay) {
   const Hours hours{.from = 8 * 60, .to = 20 * 60, .days = 1 << kTue};
   EXPECT_FALSE(IsWithin(hours, At(kTue, 7, 59)));

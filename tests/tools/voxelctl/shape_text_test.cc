@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_split.h"
 #include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/shape/as_typed.h"
 #include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/shape/examples.h"
 
@@ -205,6 +206,35 @@ TEST(ShapeText, ClipsAreNoShapes) {
   EXPECT_FALSE(ParseClipText("clip_cylinder at=1", &clip).ok()) << "its ends say where it is";
   EXPECT_EQ(ParseClipText("clip_plane a=1 a=2", &clip).status().message(),
             "clip_plane has a twice, \"1\" and \"2\"; one of them would be right");
+}
+
+TEST(AsTyped, ARefusalIsToldInTheWordsOfTheCommandLine) {
+  const std::string strict =
+      "the session is strict and 1 operation was refused, so nothing of the commit was applied; "
+      "the first: ";
+  const std::vector<std::string> shapes = {"clip_box size=1,1,1",  "object wheel: box size=1",
+                                           "object wheel: sphere", "mask: sphere radius=0",
+                                           "text text=HELLO",      "x^2+"};
+  const auto said = [&](const std::string& rest) {
+    const absl::Status status = AsTyped(absl::InvalidArgumentError(strict + rest), shapes);
+    EXPECT_TRUE(absl::IsInvalidArgument(status));
+    return std::string(status.message());
+  };
+  EXPECT_EQ(said("voxelctl/draw 1, operations[7].upsert.entity.primitive.text.height: height is 0; "
+                 "give a number greater than 0"),
+            "\"text text=HELLO\": height=… is missing; give a number greater than 0");
+  EXPECT_EQ(said("voxelctl/draw 2, operations[7].upsert.entity.primitive.implicit.surface.text: "
+                 "text at character 5: found the end where a number would be right"),
+            "\"x^2+\": at character 5: found the end where a number would be right");
+  EXPECT_EQ(said("voxelctl mask/mask 1, operations[0].upsert.entity.primitive.sphere.radius: "
+                 "radius is 0; give more"),
+            "\"mask: sphere radius=0\": radius is 0; give more");
+  EXPECT_EQ(said("/wheel, operations[0].define_object.definition.parts[1].primitive.sphere.radius: "
+                 "radius is 0; give more"),
+            "\"object wheel: sphere\": radius=… is missing; give more");
+  EXPECT_EQ(said("voxelctl/draw 9, operations[0].upsert.entity.primitive.sphere.radius: what"),
+            strict + "voxelctl/draw 9, operations[0].upsert.entity.primitive.sphere.radius: what");
+  EXPECT_EQ(AsTyped(absl::UnavailableError("gone"), shapes), absl::UnavailableError("gone"));
 }
 
 // The gallery has every shape that there is.

@@ -62,6 +62,14 @@ TEST_F(TokenTest, GoesIntoTheFileBesideThoseThatAreThere) {
   EXPECT_THAT(err_.str(), HasSubstr("added to"));
 }
 
+TEST_F(TokenTest, OneMoreOfANameIsAddedAndTheOthersAreTold) {
+  ASSERT_TRUE(Make({.name = "a", .scopes = "view", .grants = path_}).ok());
+  EXPECT_THAT(err_.str(), ::testing::Not(HasSubstr("stay valid")));
+  ASSERT_TRUE(Make({.name = "a", .scopes = "view", .grants = path_}).ok());
+  EXPECT_THAT(err_.str(), HasSubstr("tokens of the name a that were there stay valid: 1; take"));
+  EXPECT_EQ(daemon::access::ReadGrants(path_)->tokens.size(), 2u);
+}
+
 TEST_F(TokenTest, AFileThatIsWrongIsNotMadeWorse) {
   std::ofstream(path_) << "[[token";
   const std::uintmax_t before = std::filesystem::file_size(path_);

@@ -90,7 +90,12 @@ inline constexpr const char* kRecordAbout =
     "its "
     "channel \"scene\"";
 inline constexpr const char* kReplayAbout =
-    "Puts a recorded scene up again, at the pace at which it was, bit for bit; it goes at the end";
+    "Puts a recorded scene up again, at the pace at which it was, bit for bit; it goes at the end. "
+    "What an earlier replay of the file has left (--keep) goes when it is up";
+inline constexpr const char* kClearAbout =
+    "Takes down what voxelctl put up: the layer of play and draw, what replay --keep and pipe "
+    "--keep have left, and test patterns. Without the scope control the caller's own, and what "
+    "stays is told";
 inline constexpr const char* kPlaylistAbout =
     "Plays recordings and presets one after another by a playlist, cross-faded, each at its hours, "
     "until Ctrl-C";

@@ -146,7 +146,7 @@ class Parser {
   void AddWatch() { AddFilter(Add("watch", kWatchAbout), &watch_.layer, &watch_.owner); }
 
   void AddClear() {
-    CLI::App* c = Add("clear", "Takes down what voxelctl put up: its layer and test patterns");
+    CLI::App* c = Add("clear", kClearAbout);
     c->add_option("--layer", clear_.layer, "This layer instead, whoever owns it")
         ->type_name("NAME");
     c->add_flag("--all", clear_.all, "Every layer of every owner, and test patterns");

@@ -1,44 +1,91 @@
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/display_names.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/connection/owned_layers.h"
 #include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
-absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console) {
-  v1::ClearLayerRequest request;
-  if (!options.all) request.set_layer(options.layer.empty() ? kLayer : options.layer);
-  absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
-  // A layer that is not there is as clear as can be.
-  if (absl::IsNotFound(cleared.status())) cleared = v1::ClearLayerResponse();
-  if (!cleared.ok()) return cleared.status();
-  if (!options.all && options.layer.empty()) {
-    request.set_layer(kMaskLayer);
-    const absl::StatusOr<v1::ClearLayerResponse> masks = connection.ClearLayer(request);
-    if (!masks.ok() && !absl::IsNotFound(masks.status())) return masks.status();
-    if (masks.ok()) {
-      cleared->set_entities(cleared->entities() + masks->entities());
-      cleared->set_layers(cleared->layers() + masks->layers());
-    }
+namespace {
+
+// Everything that is the caller's, or everybody's if it may.
+absl::StatusOr<TakenDown> ClearAll(Connection& connection) {
+  const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer({});
+  TakenDown taken;
+  if (cleared.ok()) {
+    taken.entities = cleared->entities();
+    taken.layers = cleared->layers();
+  } else if (!TakesControl(cleared.status())) {
+    return cleared.status();
   }
-  absl::StatusOr<std::vector<std::string>> patterns = std::vector<std::string>();
+  const absl::StatusOr<v1::ListEntitiesResponse> left = connection.ListEntities({}, true);
+  if (!left.ok()) return left.status();
+  std::vector<OwnedLayer> layers;
+  for (const v1::LayerInfo& layer : left->layers())
+    layers.push_back({layer.owner(), layer.layer()});
+  if (layers.empty()) return taken;
+  // Others', or put up meanwhile by a client that runs. One is asked for, which tells: each refusal is a line in the
+  // server's audit log.
+  const absl::StatusOr<TakenDown> one = TakeDown({layers.front()}, connection);
+  if (!one.ok()) return one.status();
+  if (!one->stay.empty()) taken.stay = std::move(layers);
+  return taken;
+}
+
+absl::StatusOr<TakenDown> ClearSome(const std::string& name, Connection& connection) {
+  v1::ListEntitiesRequest request;
+  request.set_layer(name);
+  absl::StatusOr<v1::ListEntitiesResponse> found = connection.ListEntities(request, true);
+  if (!found.ok()) return found.status();
+  std::vector<OwnedLayer> layers;
+  for (const v1::LayerInfo& layer : found->layers()) {
+    const bool wanted = name.empty() ? layer.layer() == kLayer || layer.layer() == kMaskLayer ||
+                                           IsLeftByVoxelctl(layer)
+                                     : layer.layer() == name;
+    if (wanted) layers.push_back({layer.owner(), layer.layer()});
+  }
+  return TakeDown(layers, connection);
+}
+
+}  // namespace
+
+absl::Status Clear(const ClearOptions& options, Connection& connection, Console& console) {
+  const absl::StatusOr<TakenDown> taken =
+      options.all ? ClearAll(connection) : ClearSome(options.layer, connection);
+  if (!taken.ok()) return taken.status();
+  absl::StatusOr<EndedPatterns> patterns = EndedPatterns();
   if (options.layer.empty()) patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
   if (console.json()) {
-    nlohmann::ordered_json json = ToJson(*cleared);
-    json["patterns"] = patterns->size();
-    console.Data(JsonText(json, false));
+    nlohmann::ordered_json stay = nlohmann::ordered_json::array();
+    for (const OwnedLayer& layer : taken->stay) {
+      stay.push_back({{"owner", layer.owner}, {"layer", layer.layer}});
+    }
+    console.Data(JsonText({{"entities", taken->entities},
+                           {"layers", taken->layers},
+                           {"patterns", patterns->ended.size()},
+                           {"stay", stay},
+                           {"patterns_stay", patterns->stay}},
+                          false));
     return absl::OkStatus();
   }
   console.Say(absl::StrCat(
-      "cleared ", Counted(cleared->entities(), "entity", "entities"), " in ",
-      Counted(cleared->layers(), "layer"),
-      patterns->empty() ? ""
-                        : absl::StrCat(", ended ", Counted(patterns->size(), "test pattern"))));
+      "cleared ", Counted(taken->entities, "entity", "entities"), " in ",
+      Counted(taken->layers, "layer"),
+      patterns->ended.empty()
+          ? ""
+          : absl::StrCat(", ended ", Counted(patterns->ended.size(), "test pattern"))));
+  for (const std::string& sentence : {OthersStay(taken->stay), PatternsStay(*patterns)}) {
+    if (!sentence.empty()) console.Say(sentence);
+  }
   return absl::OkStatus();
 }
 

@@ -2,6 +2,7 @@
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/put_shapes.h"
+#include "tools/voxelctl/shape/as_typed.h"
 #include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
@@ -14,18 +15,22 @@ absl::Status Draw(const DrawOptions& options, const Connector& connect, Console&
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
   if (!connected.ok()) return connected.status();
   const absl::StatusOr<ShapesPut> put = PutShapes(*request, options.add, **connected);
-  if (!put.ok()) return put.status();
+  if (!put.ok()) return AsTyped(put.status(), options.shapes);
   const int64_t shapes =
       absl::c_count_if(request->operations(), [](const v1::StreamRequest& operation) {
         return operation.has_upsert() && operation.upsert().layer() == kLayer;
       });
   if (console.json()) {
-    console.Data(JsonText(
-        {{"layer", kLayer}, {"shapes", shapes}, {"snapshot", put->snapshot}, {"notes", put->notes}},
-        false));
+    console.Data(JsonText({{"layer", kLayer},
+                           {"shapes", shapes},
+                           {"snapshot", put->snapshot},
+                           {"notes", put->notes},
+                           {"stay", put->stay}},
+                          false));
     return absl::OkStatus();
   }
   for (const std::string& note : put->notes) console.Say(note);
+  for (const std::string& sentence : put->stay) console.Say(sentence);
   console.Say(
       absl::StrCat(Counted(static_cast<uint64_t>(shapes), "shape"), " up, in the layer \"", kLayer,
                    "\"; `voxelctl snapshot OUT.png` shows what the display shows, `voxelctl "

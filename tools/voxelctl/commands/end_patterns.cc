@@ -1,11 +1,16 @@
 #include "tools/voxelctl/commands/end_patterns.h"
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "tools/voxelctl/connection/owned_layers.h"
+#include "tools/voxelctl/text/escape.h"
+
 namespace voxeld::voxelctl {
 
-absl::StatusOr<std::vector<std::string>> EndPatterns(Connection& connection) {
+absl::StatusOr<EndedPatterns> EndPatterns(Connection& connection) {
   const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
   if (!displays.ok()) return displays.status();
-  std::vector<std::string> ended;
+  EndedPatterns patterns;
   for (const v1::DisplayDescription& display : displays->displays()) {
     if (display.test_pattern() == v1::TEST_PATTERN_NONE ||
         display.test_pattern() == v1::TEST_PATTERN_UNSPECIFIED)
@@ -14,10 +19,22 @@ absl::StatusOr<std::vector<std::string>> EndPatterns(Connection& connection) {
     request.set_name(display.name());
     request.set_test_pattern(v1::TEST_PATTERN_NONE);
     const absl::StatusOr<v1::DisplayDescription> updated = connection.UpdateDisplay(request);
-    if (!updated.ok()) return updated.status();
-    ended.push_back(display.name());
+    if (updated.ok()) {
+      patterns.ended.push_back(display.name());
+    } else if (TakesControl(updated.status())) {
+      patterns.stay.push_back(display.name());
+    } else {
+      return updated.status();
+    }
   }
-  return ended;
+  return patterns;
+}
+
+std::string PatternsStay(const EndedPatterns& patterns) {
+  if (patterns.stay.empty()) return "";
+  return absl::StrCat("a test pattern hides the scene on ",
+                      EscapeForTerminal(absl::StrJoin(patterns.stay, ", ")),
+                      "; ending it takes the scope control");
 }
 
 }  // namespace voxeld::voxelctl

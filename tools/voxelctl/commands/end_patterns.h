@@ -1,4 +1,4 @@
-// Ends test patterns, so that the scene is seen again.
+// Test patterns give way to the scene.
 #pragma once
 
 #include <string>
@@ -9,8 +9,15 @@
 
 namespace voxeld::voxelctl {
 
-// On every display of the server; the names of those that had one up, as the server spells them.
-// The first call that fails ends it: what was ended before stays so.
-absl::StatusOr<std::vector<std::string>> EndPatterns(Connection& connection);
+struct EndedPatterns {
+  std::vector<std::string> ended;  // displays
+  std::vector<std::string> stay;   // displays whose pattern the caller has not the scope to end
+};
+
+// Ends the test pattern of every display that shows one.
+absl::StatusOr<EndedPatterns> EndPatterns(Connection& connection);
+
+// A sentence about patterns that stay; nothing where none does. Fit for a terminal.
+std::string PatternsStay(const EndedPatterns& patterns);
 
 }  // namespace voxeld::voxelctl

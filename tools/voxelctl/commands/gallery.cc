@@ -6,15 +6,16 @@
 #include <utility>
 #include <vector>
 
-#include "absl/algorithm/container.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "daemon/text/stroke_font.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/captured_volume.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/commands/own_layer.h"
 #include "tools/voxelctl/commands/put_shapes.h"
 #include "tools/voxelctl/render/label.h"
 #include "tools/voxelctl/render/palette.h"
@@ -34,10 +35,13 @@ constexpr double kLetters = 13;
 constexpr int kEachWidth = 240, kEachHeight = 200, kEachColors = 64;
 constexpr ViewAngles kAngles = {24, 20};
 
-absl::StatusOr<Volume> Capture(const GalleryOptions& options, Connection& connection) {
+// The first volume that shows this snapshot, or any.
+absl::StatusOr<Volume> Capture(const GalleryOptions& options, uint64_t snapshot,
+                               Connection& connection) {
   v1::CaptureVolumeRequest request;
   request.set_name(options.display);
-  request.set_timeout_ns(5 * sync::kSecond);
+  request.set_timeout_ns(10 * sync::kSecond);
+  request.set_at_least_snapshot(snapshot);
   CapturedVolume captured;
   absl::Status status = connection.CaptureVolume(
       request, [&](const v1::VolumeChunk& chunk) { return captured.Add(chunk); });
@@ -45,36 +49,34 @@ absl::StatusOr<Volume> Capture(const GalleryOptions& options, Connection& connec
   return std::move(captured).Finish();
 }
 
-// The first after volume `last`: of one change, which is then all that it shows beside what was there.
-absl::StatusOr<Volume> CaptureNext(const GalleryOptions& options, uint64_t last,
-                                   Connection& connection, Interrupt& interrupt) {
-  constexpr sync::TimeNs kLongest = 10 * sync::kSecond, kStep = 10 * sync::kMillisecond;
-  sync::SystemClock clock;
-  const sync::TimeNs end = clock.Now() + kLongest;
-  for (;;) {
-    absl::StatusOr<Volume> volume = Capture(options, connection);
-    if (!volume.ok() || volume->number > last) return volume;
-    if (interrupt.requested()) return absl::CancelledError("interrupted");
-    if (clock.Now() > end) {
-      return absl::DeadlineExceededError(
-          "the display shows nothing new; `voxelctl displays` tells how it is");
-    }
-    interrupt.WaitUntil(clock, clock.Now() + kStep);
-  }
+// Takes away what earlier commands have drawn, as far as the caller may.
+absl::Status Empty(Connection& connection) {
+  const absl::StatusOr<std::vector<OwnedLayer>> layers = DrawnBefore(connection);
+  if (!layers.ok()) return layers.status();
+  return TakeDown(*layers, connection).status();
 }
 
-// Empties the layer; `last` is then the volume that shows it so.
-absl::Status Empty(const GalleryOptions& options, Connection& connection, Interrupt& interrupt,
-                   uint64_t* last) {
-  v1::ClearLayerRequest request;
-  request.set_layer(kLayer);
-  const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer(request);
-  if (absl::IsNotFound(cleared.status())) return absl::OkStatus();
-  if (!cleared.ok()) return cleared.status();
-  if (cleared->entities() == 0) return absl::OkStatus();
-  const absl::StatusOr<Volume> volume = CaptureNext(options, *last, connection, interrupt);
-  if (volume.ok()) *last = volume->number;
-  return volume.status();
+// Layers that are up beside what is drawn, and so are in every picture.
+absl::StatusOr<std::vector<std::string>> Beside(Connection& connection) {
+  const absl::StatusOr<v1::ListEntitiesResponse> all =
+      connection.ListEntities({}, /*first_page_only=*/true);
+  if (!all.ok()) return all.status();
+  std::vector<std::string> beside;
+  for (const v1::LayerInfo& layer : all->layers()) {
+    if (!layer.visible() || layer.opacity() == 0 || layer.entities() == 0) continue;
+    beside.push_back(
+        absl::StrCat("\"", EscapeForTerminal(layer.layer()), "\" of owner ", layer.owner()));
+  }
+  return beside;
+}
+
+std::string BesideForTerminal(std::vector<std::string> layers) {
+  constexpr size_t kMostNamed = 3;
+  const size_t count = layers.size();
+  if (count > kMostNamed) layers.resize(kMostNamed);
+  return absl::StrCat("the pictures show what others have up too: ", absl::StrJoin(layers, ", "),
+                      count > kMostNamed ? absl::StrCat(" and ", count - kMostNamed, " more") : "",
+                      "; without it: voxelctl clear --all, which takes the scope control");
 }
 
 // As files are called: "points, soft" is points-soft.png.
@@ -134,16 +136,11 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
   const int rows = (static_cast<int>(examples.size()) + columns - 1) / columns;
   Image sheet{columns * kTile, rows * kTile, {}};
   sheet.rgb.resize(static_cast<size_t>(sheet.width) * static_cast<size_t>(sheet.height) * 3);
-  absl::StatusOr<Volume> volume = Capture(options, connection);
-  if (!volume.ok()) return volume.status();
-  const absl::StatusOr<std::vector<std::string>> patterns = EndPatterns(connection);
+  const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
-  if (absl::c_linear_search(*patterns, volume->display))
-    volume = CaptureNext(options, volume->number, connection, interrupt);
-  if (!volume.ok()) return volume.status();
-  uint64_t last = volume->number;
-  if (absl::Status status = Empty(options, connection, interrupt, &last); !status.ok())
-    return status;
+  if (absl::Status status = Empty(connection); !status.ok()) return status;
+  const absl::StatusOr<std::vector<std::string>> beside = Beside(connection);
+  if (!beside.ok()) return beside.status();
   for (size_t i = 0; i < examples.size(); ++i) {
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     console.ProgressBar("drawing", static_cast<double>(i) / static_cast<double>(examples.size()),
@@ -153,9 +150,8 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
     if (!request.ok()) return request.status();
     const absl::StatusOr<ShapesPut> put = PutShapes(*request, /*add=*/true, connection);
     if (!put.ok()) return put.status();
-    volume = CaptureNext(options, last, connection, interrupt);
+    const absl::StatusOr<Volume> volume = Capture(options, put->snapshot, connection);
     if (!volume.ok()) return volume.status();
-    last = volume->number;
     Image tile = RenderVolume(*volume, {.width = kTile, .height = kTile, .angles = kAngles});
     DrawLabel(*font, examples[i].name, kMargin, kMargin + kLetters, kLetters, tile);
     if (i == 0) Cover(tile, sheet);
@@ -165,18 +161,20 @@ absl::Status Gallery(const GalleryOptions& options, Connection& connection, Inte
       const absl::Status status = WriteEach(options.each, examples[i].name, *volume);
       if (!status.ok()) return status;
     }
-    if (absl::Status status = Empty(options, connection, interrupt, &last); !status.ok())
-      return status;
+    if (absl::Status status = Empty(connection); !status.ok()) return status;
   }
   if (absl::Status status = WritePng(options.file, sheet); !status.ok()) return status;
   if (console.json()) {
     console.Data(JsonText({{"file", options.file},
                            {"shapes", examples.size()},
                            {"width", sheet.width},
-                           {"height", sheet.height}},
+                           {"height", sheet.height},
+                           {"beside", *beside}},
                           false));
     return absl::OkStatus();
   }
+  if (!beside->empty()) console.Say(BesideForTerminal(*beside));
+  if (!patterns->stay.empty()) console.Say(PatternsStay(*patterns));
   console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", sheet.width, "x", sheet.height,
                            ", ", Counted(examples.size(), "shape"),
                            ", each decoded from what the display was sent"));

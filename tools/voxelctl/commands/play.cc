@@ -128,9 +128,22 @@ class Player {
     return space.status();
   }
 
+  // A frame replaces the layer whole, but not how a command before, of the same owner, had it look.
+  absl::Status LookPlain() {
+    if (!had_layer_) return absl::OkStatus();
+    return layer_->Set({.clip = std::vector<client::ClipPart>(), .mask = ""});
+  }
+
   absl::Status TakeBeforeDown() {
-    std::erase(before_, session_->server().owner);
-    return TakeDown(before_, connection_);
+    const uint64_t own = session_->server().owner;
+    // The layer was replaced whole; masks are never this command's.
+    std::erase_if(before_, [own](const OwnedLayer& layer) {
+      return layer.owner == own && layer.layer == kLayer;
+    });
+    const absl::StatusOr<TakenDown> taken = TakeDown(before_, connection_);
+    if (!taken.ok()) return taken.status();
+    if (!taken->stay.empty()) console_.Say(OthersStay(taken->stay));
+    return absl::OkStatus();
   }
 
   absl::Status Finish(absl::Status status) {
@@ -148,7 +161,7 @@ class Player {
   }
 
   absl::Status Open() {
-    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore(connection_);
+    absl::StatusOr<std::vector<OwnedLayer>> before = DrawnBefore(connection_);
     if (!before.ok()) return before.status();
     before_ = *std::move(before);
     client::Options open;
@@ -164,6 +177,8 @@ class Player {
     start_ = clock_.Now();
     summary_.layer = kLayer;
     summary_.owner = session_->server().owner;
+    had_layer_ = std::any_of(before_.begin(), before_.end(),
+                             [&](const OwnedLayer& one) { return one.owner == summary_.owner; });
     return absl::OkStatus();
   }
 
@@ -225,7 +240,7 @@ class Player {
     }
     absl::Status status = TakePatternsDown();
     if (!status.ok()) return status;
-    // One frame replaces the layer whole, should this owner have had it before.
+    if (absl::Status plain = LookPlain(); !plain.ok()) return plain;
     client::Frame frame = layer_->BeginFrame();
     for (size_t i = 0; i < models.size(); ++i) {
       frame.Draw(
@@ -307,6 +322,7 @@ class Player {
     if (first) frame_look_ = options_.volume;
     if (first && !model.volumes.empty() && !frame_look_.window)
       frame_look_.window = WindowOf(model.volumes[0]);
+    if (absl::Status plain = first ? LookPlain() : absl::OkStatus(); !plain.ok()) return plain;
     const size_t half = summary_.frames % 2;
     const std::string object = absl::StrCat("voxelctl/frame", half);
     const absl::StatusOr<PackedSizes> sizes = PackObject(
@@ -339,11 +355,12 @@ class Player {
 
   // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
   absl::Status TakePatternsDown() {
-    const absl::StatusOr<std::vector<std::string>> ended = EndPatterns(connection_);
-    if (!ended.ok()) return ended.status();
-    for (const std::string& display : *ended) {
+    const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection_);
+    if (!patterns.ok()) return patterns.status();
+    for (const std::string& display : patterns->ended) {
       console_.Say(absl::StrCat("ended the test pattern on ", EscapeForTerminal(display)));
     }
+    if (!patterns->stay.empty()) console_.Say(PatternsStay(*patterns));
     return absl::OkStatus();
   }
 
@@ -362,10 +379,17 @@ class Player {
     return options_.spin || options_.clear ? sync::kNever : start_;
   }
 
+  std::string UntilWhen() const {
+    return absl::StrCat(options_.spin ? "it is up and spins " : "it is up ",
+                        options_.duration_s ? absl::StrFormat("for %g s; Ctrl-C ends it before",
+                                                              *options_.duration_s)
+                                            : "until Ctrl-C");
+  }
+
   absl::Status Stay() {
+    if (End() > clock_.Now()) console_.Say(UntilWhen());
     if (options_.spin) return Spin();
     if (End() > clock_.Now()) {
-      console_.Progress("up; Ctrl-C ends");
       interrupt_.WaitUntil(clock_, End());
     }
     return absl::OkStatus();
@@ -439,10 +463,11 @@ class Player {
   std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
-  std::vector<uint64_t> before_;         // owners of what an earlier play left
+  std::vector<OwnedLayer> before_;       // what an earlier command left
   std::array<uint64_t, 2> pieces_ = {};  // objects of each frame that is defined
   VolumeLook frame_look_;
   bool taken_down_ = false;
+  bool had_layer_ = false;  // of a command before, of the same owner: who has a token has one owner
   PlaySummary summary_;
 };
 

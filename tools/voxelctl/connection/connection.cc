@@ -8,7 +8,6 @@
 #include <set>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "display/sync/mutex.h"
 #include "tools/voxelctl/connection/status.h"
 #include "tools/voxelctl/text/escape.h"
@@ -24,9 +23,20 @@ using std::chrono::system_clock;
 
 constexpr milliseconds kConnectTime(5000);
 constexpr milliseconds kConnectStep(100);
+constexpr milliseconds kLastErrorTime(1000);
 constexpr milliseconds kCallTime(15000);
 constexpr milliseconds kDrawnTime(300000);   // of an answer for which the server draws the scene
 constexpr int kMostMessageBytes = 64 << 20;  // a slice of 16384² pixels would not come in less
+
+// Why the channel has no connection, in gRPC's words, which only a call is told.
+std::string LastError(const std::shared_ptr<grpc::Channel>& channel) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + kLastErrorTime);
+  v1::ListDisplaysResponse response;
+  return v1::DisplayService::NewStub(channel)
+      ->ListDisplays(&context, v1::ListDisplaysRequest(), &response)
+      .error_message();
+}
 
 }  // namespace
 
@@ -136,10 +146,7 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Connect(
        state = channel->GetState(true)) {
     if (interrupt.requested()) return absl::CancelledError("interrupted");
     if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) {
-      return Unreachable(address, absl::StartsWith(address, "tls:")
-                                      ? "nobody listens there, or its certificate or yours is not "
-                                        "taken by the other"
-                                      : "nobody listens there, or what does is no voxeld");
+      return Unreachable(address, WhyUnreachable(LastError(channel), address, credentials));
     }
     if (system_clock::now() >= deadline) return Unreachable(address, "no answer in 5 s");
     channel->WaitForStateChange(state, system_clock::now() + kConnectStep);

@@ -2,6 +2,8 @@
 
 #include <grpcpp/support/status.h>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -19,6 +21,37 @@ absl::Status FromGrpc(const grpc::Status& status, const std::string& address) {
         absl::StrCat("voxeld at ", address, " did not answer in time: ", message));
   }
   return {static_cast<absl::StatusCode>(status.error_code()), message};
+}
+
+std::string WhyUnreachable(absl::string_view grpc_says, const std::string& address,
+                           const client::Credentials& credentials) {
+  const std::string said = absl::AsciiStrToLower(grpc_says);
+  const auto says = [&](absl::string_view words) { return absl::StrContains(said, words); };
+  if (says("dns resolution failed") || says("domain name not found")) {
+    return "its host's name is not known to this machine";
+  }
+  if (says("connection refused")) return "nobody listens there";
+  if (!absl::StartsWith(address, "tls:")) return "nobody listens there, or what does is no voxeld";
+  if (says("is not in peer certificate")) {
+    return absl::StrCat("its certificate is not for ",
+                        credentials.server_name.empty()
+                            ? "this host"
+                            : absl::StrCat("\"", EscapeForTerminal(credentials.server_name), "\""),
+                        "; VOXELD_TLS_NAME says which name it is for");
+  }
+  if (says("certificate verify failed") || says("certificate_verify_failed")) {
+    return credentials.ca.empty()
+               ? "its certificate is not by an authority that this machine knows; VOXELD_TLS_CA "
+                 "names the file of the one that it is by"
+               : absl::StrCat("its certificate is not by the authority in ",
+                              EscapeForTerminal(credentials.ca), ", or it has expired");
+  }
+  return credentials.certificate.empty()
+             ? "it ended the connection: it asks for a certificate, and none is given; "
+               "VOXELD_TLS_CERT and VOXELD_TLS_KEY name one's files"
+             : absl::StrCat("it ended the connection: the certificate in ",
+                            EscapeForTerminal(credentials.certificate),
+                            " is not taken, or what listens there is no voxeld with TLS");
 }
 
 absl::Status Unreachable(const std::string& address, const std::string& why) {

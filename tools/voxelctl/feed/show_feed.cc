@@ -7,12 +7,12 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "display/sync/clock.h"
 #include "tools/markers/marker_scene.h"
 #include "tools/voxelctl/connection/session_end.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -32,7 +32,7 @@ class Follower {
  public:
   Follower(const FeedShowing& showing, client::Session& session, markers::MarkerFeed& feed,
            const SessionEnd& end, Interrupt& interrupt, Console& console)
-      : channels_(showing.channels),
+      : channel_(showing.channel),
         layer_(session.GetLayer(showing.layer)),
         session_(session),
         feed_(feed),
@@ -76,8 +76,9 @@ class Follower {
 
   std::string Text() {
     const MarkerTally& tally = scene_.tally();
-    std::string text = absl::StrFormat("%d %s, %d updates, %d entities", feed_.subscribed(),
-                                       channels_, tally.updates, tally.entities);
+    std::string text =
+        absl::StrCat(Counted(feed_.subscribed(), channel_), ", ", Counted(tally.updates, "update"),
+                     ", ", Counted(tally.entities, "entity", "entities"));
     for (const auto& [name, count] : feed_.counts()) {
       if (count > 0) absl::StrAppend(&text, ", ", count, " ", name);
     }
@@ -150,7 +151,7 @@ class Follower {
   }
 
   MarkerScene scene_;
-  const std::string channels_;
+  const std::string channel_;
   client::Layer layer_;
   client::Session& session_;
   markers::MarkerFeed& feed_;

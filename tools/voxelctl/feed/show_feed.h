@@ -12,8 +12,8 @@
 namespace voxeld::voxelctl {
 
 struct FeedShowing {
-  std::string source;                 // whom it follows, for people
-  std::string channels = "channels";  // what it is subscribed to, for people
+  std::string source;               // whom it follows, for people
+  std::string channel = "channel";  // what it is subscribed to, one of them, for people
   std::string layer;
   std::string client_name;
   bool reconnect = true;  // waits for a server that has gone; else that is the end

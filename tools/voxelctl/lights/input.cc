@@ -14,6 +14,7 @@
 #include "tools/voxelctl/lights/choose_lights.h"
 #include "tools/voxelctl/lights/lights.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -22,6 +23,7 @@ constexpr sync::TimeNs kRoomEvery =
     sync::kMillisecond;  // how often it is asked for, while a picture waits
 constexpr sync::TimeNs kTellEvery = sync::kSecond;
 constexpr std::chrono::seconds kOpenTime(15);
+constexpr const char* kMalformed = "malformed";
 
 const char* NameOf(lights::Protocol protocol) {
   switch (protocol) {
@@ -66,14 +68,20 @@ nlohmann::ordered_json TallyJson(const lights::Intake& intake, const lights::Rec
           {"connections_open", peers.open}};
 }
 
-std::string TallyText(const lights::IntakeTally& in) {
-  std::string text = absl::StrFormat("%d messages, %d pictures: %d put up, %d superseded",
-                                     in.messages, in.pictures, in.taken, in.superseded);
+std::string TallyText(const lights::Intake& intake) {
+  const lights::IntakeTally& in = intake.tally();
+  std::string text =
+      absl::StrCat(Counted(in.messages, "message"), ", ", Counted(in.pictures, "picture"), ": ",
+                   in.taken, " put up, ", in.superseded, " superseded");
   for (const auto& [count, what] :
-       {std::pair{in.lost, "lost"}, std::pair{in.malformed, "malformed"},
+       {std::pair{in.lost, "lost"}, std::pair{in.malformed, kMalformed},
         std::pair{in.outside, "for lights that are not there"},
         std::pair{in.outranked, "of lower priority"}, std::pair{in.stale, "late"}}) {
     if (count > 0) absl::StrAppend(&text, ", ", count, " ", what);
+    if (count > 0 && what == kMalformed) {
+      absl::StrAppend(&text, count == 1 ? " (" : " (the last: ",
+                      EscapeForTerminal(intake.malformed().message()), ")");
+    }
   }
   return text;
 }
@@ -131,7 +139,7 @@ absl::Status Input(const InputOptions& options, Connection& connection, Interrup
   }
 
   const auto tell = [&] {
-    if (!console.json()) return console.Progress(TallyText(intake.tally()));
+    if (!console.json()) return console.Progress(TallyText(intake));
     console.Data(TallyJson(intake, receiver, (*session)->GetTally()).dump() + "\n");
   };
   sync::TimeNs tell_at = clock.Now() + kTellEvery;
@@ -163,7 +171,7 @@ absl::Status Input(const InputOptions& options, Connection& connection, Interrup
   if (console.json()) {
     tell();
   } else {
-    console.Say(TallyText(intake.tally()));
+    console.Say(TallyText(intake));
   }
   return {status.code(), EscapeForTerminal(status.message())};
 }

@@ -12,6 +12,7 @@
 #include "tools/voxelctl/lights/choose_lights.h"
 #include "tools/voxelctl/lights/lights.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -83,7 +84,7 @@ absl::Status Pipe(const PipeOptions& options, Connection& connection, Interrupt&
     if (status.ok()) status = client.Commit().status();
     if (status.ok()) {
       ++pictures;
-      console.Progress(absl::StrCat("showing  ", pictures, " pictures"));
+      console.Progress(absl::StrCat("showing  ", Counted(pictures, "picture")));
     }
   }
   console.EndProgress();
@@ -100,7 +101,9 @@ absl::Status Pipe(const PipeOptions& options, Connection& connection, Interrupt&
                      .dump() +
                  "\n");
   } else {
-    console.Say(absl::StrCat(pictures, " pictures of ", map->where));
+    console.Say(absl::StrCat(
+        Counted(pictures, "picture"), " of ", map->where,
+        options.keep && pictures > 0 ? "; the last stays up until `voxelctl clear`" : ""));
   }
   const absl::Status closed = (*session)->Close();
   if (status.ok()) status = closed;

@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -15,6 +17,7 @@
 #include "display/sync/clock.h"
 #include "tools/voxelctl/playlist/showing.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -143,19 +146,36 @@ class Player {
   bool opened_ = false;  // the file of the item that came last
 };
 
-absl::Status Check(const Playlist& playlist, WeekMinute now, Console& console) {
-  const std::optional<size_t> next = NextItem(playlist, std::nullopt, now);
-  const std::string on = next.has_value() ? playlist.items[*next].file : "";
+absl::Status Check(const Playlist& playlist, const std::string& path, WeekMinute now,
+                   Console& console) {
+  std::set<size_t> passed_over;
+  std::vector<std::string> faults;
+  for (size_t i = 0; i < playlist.items.size(); ++i) {
+    const absl::Status status = CheckPlayable(playlist.items[i]);
+    if (status.ok()) continue;
+    passed_over.insert(i);
+    faults.push_back(
+        absl::StrCat("item ", i + 1, ": ", EscapeForTerminal(std::string(status.message()))));
+  }
+  std::optional<size_t> first = NextItem(playlist, std::nullopt, now);
+  for (size_t n = 1; first.has_value() && passed_over.contains(*first); ++n) {
+    first = n < playlist.items.size() ? NextItem(playlist, first, now) : std::nullopt;
+  }
+  const std::string on = first.has_value() ? playlist.items[*first].file : "";
   if (console.json()) {
-    const nlohmann::ordered_json line = {{"items", playlist.items.size()}, {"first_now", on}};
+    const nlohmann::ordered_json line = {
+        {"items", playlist.items.size()}, {"first_now", on}, {"faults", faults}};
     console.Data(line.dump() + "\n");
   } else {
     console.Data(absl::StrCat(
-        playlist.items.size(), playlist.items.size() == 1 ? " item" : " items", "; now ",
+        Counted(playlist.items.size(), "item"), "; now ",
         on.empty() ? "nothing is on" : absl::StrCat("it begins with ", EscapeForTerminal(on)),
         "\n"));
   }
-  return absl::OkStatus();
+  if (faults.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(EscapeForTerminal(path), ": ", faults.size() == 1 ? "one item" : "several items",
+                   " cannot be played and would be passed over:\n", absl::StrJoin(faults, "\n")));
 }
 
 }  // namespace
@@ -175,7 +195,7 @@ absl::Status PlayList(const PlaylistOptions& options, const Connector& connect,
   if (!playlist.ok()) {
     return {playlist.status().code(), LinesForTerminal(playlist.status().message())};
   }
-  if (options.check) return Check(*playlist, now(), console);
+  if (options.check) return Check(*playlist, options.file, now(), console);
   const absl::StatusOr<std::unique_ptr<Connection>> connection = connect();
   if (!connection.ok()) return connection.status();
   return Player(*playlist, **connection, now, interrupt, console).Run();

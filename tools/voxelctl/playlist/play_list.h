@@ -17,7 +17,8 @@ WeekMinute LocalWeekMinute();
 
 // Until an interrupt, which is no error, or, without `loop`, the end of the last. An item that cannot be played is told and
 // passed over; when none can, or the server goes away, that is the error. With --json a line for each item as it comes up.
-// With `check` the file alone is read, and what would be on now is told. `connect` is called when it is to be played.
+// With `check` the files alone are read, and what would be on now is told; InvalidArgument has every item that would be
+// passed over. `connect` is called when it is to be played.
 absl::Status PlayList(const PlaylistOptions& options, const Connector& connect,
                       const std::function<WeekMinute()>& now, Interrupt& interrupt,
                       Console& console);

@@ -22,7 +22,37 @@ absl::StatusOr<bool> HasChanges(recording::McapReader& reader) {
   return sets > 1;
 }
 
+// An item's file, opened, and what it takes to play it.
+struct Opened {
+  std::unique_ptr<recording::McapReader> reader;
+  uint64_t start_ns = 0;
+  double seconds = 0;
+  bool still = false;
+};
+
+absl::StatusOr<Opened> OpenItem(const PlaylistItem& item) {
+  auto reader = recording::McapReader::Open(item.file);
+  if (!reader.ok()) return reader.status();
+  Opened opened{.reader = *std::move(reader)};
+  const absl::StatusOr<recording::McapSummary> summary = opened.reader->Summarise();
+  if (!summary.ok()) return summary.status();
+  const double length =
+      static_cast<double>(summary->end_ns - summary->start_ns) / sync::kSecond / item.speed;
+  opened.start_ns = summary->start_ns;
+  const absl::StatusOr<bool> changes = HasChanges(*opened.reader);
+  if (!changes.ok()) return changes.status();
+  opened.still = !*changes || length < kLeastLength;
+  if (opened.still && !item.seconds.has_value()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(item.file, " is one state of a scene; give its item seconds"));
+  }
+  opened.seconds = item.seconds.value_or(length);
+  return opened;
+}
+
 }  // namespace
+
+absl::Status CheckPlayable(const PlaylistItem& item) { return OpenItem(item).status(); }
 
 Showing::Showing(const PlaylistItem& item, double opacity, Connection& connection,
                  sync::Clock& clock)
@@ -32,22 +62,12 @@ absl::StatusOr<std::unique_ptr<Showing>> Showing::Begin(const PlaylistItem& item
                                                         Connection& connection,
                                                         sync::Clock& clock) {
   std::unique_ptr<Showing> showing(new Showing(item, opacity, connection, clock));
-  auto reader = recording::McapReader::Open(item.file);
-  if (!reader.ok()) return reader.status();
-  showing->reader_ = *std::move(reader);
-  const absl::StatusOr<recording::McapSummary> summary = showing->reader_->Summarise();
-  if (!summary.ok()) return summary.status();
-  const double length =
-      static_cast<double>(summary->end_ns - summary->start_ns) / sync::kSecond / item.speed;
-  showing->start_ns_ = summary->start_ns;
-  const absl::StatusOr<bool> changes = HasChanges(*showing->reader_);
-  if (!changes.ok()) return changes.status();
-  showing->still_ = !*changes || length < kLeastLength;
-  if (showing->still_ && !item.seconds.has_value()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(item.file, " is one state of a scene; give its item seconds"));
-  }
-  showing->seconds_ = item.seconds.value_or(length);
+  absl::StatusOr<Opened> opened = OpenItem(item);
+  if (!opened.ok()) return opened.status();
+  showing->reader_ = std::move(opened->reader);
+  showing->start_ns_ = opened->start_ns;
+  showing->still_ = opened->still;
+  showing->seconds_ = opened->seconds;
   showing->thread_ = std::thread([it = showing.get()] { it->Run(); });
   return showing;
 }
@@ -106,7 +126,10 @@ absl::Status Showing::PlayOnce() {
     opacity = opacity_;
   }
   absl::StatusOr<std::unique_ptr<Playback>> begun =
-      Playback::Begin({.client_name = "voxelctl playlist", .opacity = opacity}, connection_);
+      Playback::Begin({.client_name = "voxelctl playlist",
+                       .layer_prefix = RecordingName(item_.file) + ": ",
+                       .opacity = opacity},
+                      connection_);
   if (!begun.ok()) return begun.status();
   const std::shared_ptr<Playback> playback = *std::move(begun);
   const sync::TimeNs began = clock_.Now();

@@ -17,6 +17,9 @@
 
 namespace voxeld::voxelctl {
 
+// What is wrong with an item's file, or with its item for such a file: what would have it passed over.
+absl::Status CheckPlayable(const PlaylistItem& item);
+
 // Thread-safe.
 class Showing {
  public:

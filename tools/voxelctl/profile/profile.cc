@@ -141,7 +141,10 @@ absl::Status List(Console& console) {
   for (const auto& [name, title] : titles) {
     console.Data(absl::StrCat(EscapeForTerminal(name), ": ", EscapeForTerminal(title), "\n"));
   }
-  if (titles.empty()) console.Say("no profile is installed; VOXELD_PROFILES names a folder");
+  if (titles.empty())
+    console.Say(
+        "no profile is installed; VOXELD_PROFILES names a folder of some, in a clone "
+        "display/profiles");
   return absl::OkStatus();
 }
 

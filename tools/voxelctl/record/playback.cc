@@ -1,9 +1,27 @@
 #include "tools/voxelctl/record/playback.h"
 
 #include <cmath>
+#include <filesystem>
 #include <utility>
 
+#include "tools/voxelctl/text/escape.h"
+
 namespace voxeld::voxelctl {
+
+namespace {
+
+constexpr size_t kMostNameBytes = 80;
+
+}  // namespace
+
+std::string RecordingName(const std::string& file) {
+  std::string name = EscapeForTerminal(std::filesystem::path(file).stem().string());
+  if (name.size() <= kMostNameBytes) return name;
+  size_t end = kMostNameBytes;
+  while (end > 0 && (name[end] & 0xc0) == 0x80) --end;
+  name.resize(end);
+  return name;
+}
 
 absl::StatusOr<std::unique_ptr<Playback>> Playback::Begin(const Options& options,
                                                           Connection& connection) {
@@ -12,7 +30,7 @@ absl::StatusOr<std::unique_ptr<Playback>> Playback::Begin(const Options& options
   open.set_on_disconnect(options.keep ? v1::DISCONNECT_POLICY_KEEP : v1::DISCONNECT_POLICY_CLEAR);
   absl::StatusOr<std::unique_ptr<RawStream>> stream = connection.OpenRawStream(std::move(open));
   if (!stream.ok()) return stream.status();
-  std::unique_ptr<Playback> playback(new Playback(options.opacity, connection));
+  std::unique_ptr<Playback> playback(new Playback(options, connection));
   const sync::MutexLock lock(playback->mutex_);
   playback->stream_ = *std::move(stream);
   return playback;
@@ -69,6 +87,11 @@ absl::Status Playback::SetOpacity(double opacity) {
   }
   if (own_opacity_.empty()) return absl::OkStatus();
   return stream_->Commit().status();
+}
+
+uint64_t Playback::owner() const {
+  const sync::MutexLock lock(mutex_);
+  return stream_->owner();
 }
 
 std::vector<v1::Issue> Playback::TakeIssues() {

@@ -17,12 +17,17 @@
 
 namespace voxeld::voxelctl {
 
+// What a recording is called in the scene: its file's name without folder and ending, not longer than fits into the
+// names of sessions and layers; fit for a terminal.
+std::string RecordingName(const std::string& file);
+
 // Thread-safe. Statuses are the server's.
 class Playback {
  public:
   struct Options {
     std::string client_name;
-    bool keep = false;  // what is up at the end stays
+    std::string layer_prefix;  // of the names of its layers
+    bool keep = false;         // what is up at the end stays
     double opacity = 1;
   };
   // `connection` outlives it.
@@ -39,9 +44,11 @@ class Playback {
   std::vector<v1::Issue> TakeIssues();
   // What is up goes, unless it is to stay.
   absl::Status End();
+  uint64_t owner() const;  // whose layers they are
 
  private:
-  Playback(double opacity, Connection& connection) : opacity_(opacity), connection_(connection) {}
+  Playback(const Options& options, Connection& connection)
+      : scene_(options.layer_prefix), opacity_(options.opacity), connection_(connection) {}
   uint32_t Faded(uint32_t own) const VOXELD_REQUIRES(mutex_);
 
   mutable sync::Mutex mutex_;

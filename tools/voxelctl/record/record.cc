@@ -13,6 +13,7 @@
 #include "display/sync/mutex.h"
 #include "tools/recording/scene_recording.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -59,8 +60,8 @@ class Taping {
   bool over() const { return end_.has_value() && clock_.Now() >= *end_; }
   std::string Figures() const {
     sync::MutexLock lock(mutex_);
-    return absl::StrFormat("%d changes, %.1f MB", recorder_->change_sets(),
-                           static_cast<double>(recorder_->bytes()) / 1e6);
+    return absl::StrCat(Counted(recorder_->change_sets(), "change"), ", ",
+                        Bytes(recorder_->bytes()));
   }
   const recording::SceneRecorder& recorder() const { return *recorder_; }
 

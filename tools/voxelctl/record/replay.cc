@@ -1,23 +1,44 @@
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "display/sync/clock.h"
 #include "tools/recording/mcap.h"
 #include "tools/recording/scene_recording.h"
+#include "tools/voxelctl/connection/owned_layers.h"
 #include "tools/voxelctl/record/playback.h"
 #include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/text/escape.h"
+#include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
 absl::Status Escaped(const absl::Status& status) {
   return {status.code(), EscapeForTerminal(status.message())};
+}
+
+std::string Announcement(const ReplayOptions& options, double seconds) {
+  const double left = seconds - options.from_s;
+  std::string text = absl::StrCat("replays ", EscapeForTerminal(options.file), ", ");
+  if (seconds <= 0) {
+    absl::StrAppend(&text, "one state of a scene");
+  } else if (options.step) {
+    absl::StrAppendFormat(&text, "%.1f s, a change for each line of standard input", left);
+  } else {
+    absl::StrAppendFormat(&text, "%.1f s", left / options.speed);
+  }
+  if (options.speed != 1 && !options.step && seconds > 0) {
+    absl::StrAppendFormat(&text, " at %g times its speed", options.speed);
+  }
+  if (options.loop) absl::StrAppend(&text, ", again and again until Ctrl-C");
+  return text;
 }
 
 // One run through the file, and what it has put up.
@@ -34,10 +55,24 @@ class Run {
         from_ns_(static_cast<uint64_t>(options.from_s * sync::kSecond)) {}
 
   absl::Status Begin() {
+    const std::string name = RecordingName(options_.file);
+    const std::string client_name = absl::StrCat("voxelctl replay ", name);
+    absl::StatusOr<std::vector<OwnedLayer>> before = LayersLeftBy(client_name, connection_);
+    if (!before.ok()) return before.status();
     absl::StatusOr<std::unique_ptr<Playback>> playback =
-        Playback::Begin({.client_name = "voxelctl replay", .keep = options_.keep}, connection_);
+        Playback::Begin({.client_name = client_name,
+                         .layer_prefix = absl::StrCat(name, ": "),
+                         .keep = options_.keep},
+                        connection_);
     if (!playback.ok()) return playback.status();
     playback_ = *std::move(playback);
+    // Who has a token has one owner, in whose layers the same names come again.
+    const auto others = std::stable_partition(
+        before->begin(), before->end(),
+        [&](const OwnedLayer& layer) { return layer.owner == playback_->owner(); });
+    before_.assign(others, before->end());
+    before->erase(others, before->end());
+    if (absl::Status status = TakeDown(*before, connection_).status(); !status.ok()) return status;
     began_ = clock_.Now();
     return absl::OkStatus();
   }
@@ -51,6 +86,8 @@ class Run {
     if (absl::Status status = Await(at); !status.ok()) return status;
     const absl::StatusOr<uint64_t> snapshot = playback_->Put(set.changes);
     if (!snapshot.ok()) return snapshot.status();
+    ++changes_;
+    if (absl::Status status = TakeBeforeDown(); !status.ok()) return status;
     for (const v1::Issue& issue : playback_->TakeIssues()) {
       if (++issues_ > kMostSaid || issue.applied()) continue;
       console_.Say(absl::StrCat("not as recorded: ", EscapeForTerminal(issue.layer()), " ",
@@ -59,6 +96,8 @@ class Run {
     }
     return Tell(at, set.snapshot, *snapshot);
   }
+
+  uint64_t changes() const { return changes_; }
 
   // With --step, after one more line: what is up goes then.
   absl::Status End() {
@@ -70,6 +109,15 @@ class Run {
 
  private:
   static constexpr size_t kMostSaid = 20;
+
+  // What a replay of the file before this has left, when what is to be in its place is up.
+  absl::Status TakeBeforeDown() {
+    if (before_.empty()) return absl::OkStatus();
+    const absl::StatusOr<TakenDown> taken = TakeDown(std::exchange(before_, {}), connection_);
+    if (!taken.ok()) return taken.status();
+    if (!taken->stay.empty()) console_.Say(OthersStay(taken->stay));
+    return absl::OkStatus();
+  }
 
   absl::Status Await(uint64_t at) {
     if (options_.step) {
@@ -106,7 +154,9 @@ class Run {
   sync::SystemClock clock_;
   sync::TimeNs began_ = 0;
   std::unique_ptr<Playback> playback_;
+  std::vector<OwnedLayer> before_;
   size_t issues_ = 0;
+  uint64_t changes_ = 0;
 };
 
 }  // namespace
@@ -129,6 +179,22 @@ absl::Status Replay(const ReplayOptions& options, Connection& connection, Interr
     return absl::InvalidArgumentError(
         absl::StrFormat("--from is %g s, and the recording has %g s", options.from_s, seconds));
   }
+  if (!console.json()) console.Say(Announcement(options, seconds));
+  uint64_t changes = 0;
+  sync::SystemClock clock;
+  const sync::TimeNs began = clock.Now();
+  const auto sum_up = [&] {
+    if (console.json()) return;
+    const std::string time =
+        seconds <= 0 && !options.loop && !options.step
+            ? ""
+            : absl::StrFormat(" in %.1f s",
+                              static_cast<double>(clock.Now() - began) / sync::kSecond);
+    console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", Counted(changes, "change"),
+                             time,
+                             options.keep ? "; what is up stays until `voxelctl clear`"
+                                          : "; it is down again, --keep would leave it up"));
+  };
   do {
     reader.Rewind();
     Run run(options, *summary, connection, interrupt, in, console);
@@ -139,10 +205,13 @@ absl::Status Replay(const ReplayOptions& options, Connection& connection, Interr
       return wrong.ok();
     });
     console.EndProgress();
+    changes += run.changes();
+    if (absl::IsCancelled(wrong)) sum_up();
     if (!wrong.ok()) return wrong;
     if (!read.ok()) return Escaped(read);
     if (absl::Status status = run.End(); !status.ok()) return status;
   } while (options.loop);
+  sum_up();
   return absl::OkStatus();
 }
 

@@ -37,10 +37,15 @@ absl::StatusOr<std::string> NewToken() {
   return absl::StrCat("vx_", text);
 }
 
-absl::Status Append(const std::string& path, const std::string& text) {
+// Answers how many tokens of that name were there before.
+absl::StatusOr<size_t> Append(const std::string& path, const std::string& name,
+                              const std::string& text) {
   struct stat found;
+  size_t of_that_name = 0;
   if (stat(path.c_str(), &found) == 0) {
-    if (absl::Status status = access::ReadGrants(path).status(); !status.ok()) return status;
+    const absl::StatusOr<access::Grants> grants = access::ReadGrants(path);
+    if (!grants.ok()) return grants.status();
+    for (const auto& [hash, grant] : grants->tokens) of_that_name += grant.name == name ? 1 : 0;
   }
   const daemon::Descriptor file(
       open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
@@ -50,7 +55,7 @@ absl::Status Append(const std::string& path, const std::string& text) {
       fsync(file.get()) != 0) {
     return absl::ErrnoToStatus(errno, absl::StrCat(path, " could not be written whole"));
   }
-  return absl::OkStatus();
+  return of_that_name;
 }
 
 }  // namespace
@@ -79,9 +84,9 @@ absl::Status MakeToken(const TokenOptions& options, Console& console) {
   if (absl::Status status = access::ParseGrants(entry, "the token").status(); !status.ok()) {
     return absl::InvalidArgumentError(status.message());
   }
-  if (!options.grants.empty()) {
-    if (absl::Status status = Append(options.grants, "\n" + entry); !status.ok()) return status;
-  }
+  absl::StatusOr<size_t> before = size_t{0};
+  if (!options.grants.empty()) before = Append(options.grants, options.name, "\n" + entry);
+  if (!before.ok()) return before.status();
   if (console.json()) {
     console.Data(nlohmann::ordered_json{{"token", *token}, {"entry", entry}}.dump() + "\n");
     return absl::OkStatus();
@@ -90,6 +95,10 @@ absl::Status MakeToken(const TokenOptions& options, Console& console) {
   console.Say(options.grants.empty()
                   ? absl::StrCat("for the file that security.grants names:\n\n", entry)
                   : absl::StrCat("added to ", options.grants, "; it is valid within a second"));
+  if (*before > 0) {
+    console.Say(absl::StrCat("tokens of the name ", options.name, " that were there stay valid: ",
+                             *before, "; take their entries out when nobody uses them"));
+  }
   return absl::OkStatus();
 }
 

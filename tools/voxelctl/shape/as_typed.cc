@@ -1,0 +1,89 @@
+#include "tools/voxelctl/shape/as_typed.h"
+
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
+#include "tools/voxelctl/shape/drawing.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+enum class Kind : uint8_t { kShape, kMask, kObject, kClip };
+
+Kind KindOf(const std::string& text) {
+  if (absl::StartsWith(text, "mask:")) return Kind::kMask;
+  if (absl::StartsWith(text, "object ")) return Kind::kObject;
+  return absl::StartsWith(text, "clip_") ? Kind::kClip : Kind::kShape;
+}
+
+// The `number`-th of a kind, from 1; nothing if there is none.
+std::string Nth(std::span<const std::string> shapes, Kind kind, size_t number) {
+  for (const std::string& shape : shapes) {
+    if (KindOf(shape) == kind && --number == 0) return shape;
+  }
+  return "";
+}
+
+std::string OfObject(std::span<const std::string> shapes, const std::string& name, size_t part) {
+  for (const std::string& shape : shapes) {
+    if (absl::StartsWith(shape, absl::StrCat("object ", name, ":")) && part-- == 0) return shape;
+  }
+  return "";
+}
+
+// `path` is the field's, within its shape: "height", "surface.text".
+std::string Said(const std::string& path, const std::string& typed, absl::string_view text) {
+  if (absl::EndsWith(path, ".text")) (void)absl::ConsumePrefix(&text, "text ");
+  const std::string field = path.substr(0, path.find_first_of(".["));
+  for (const char* const unset : {" is 0; ", " is \"\"; ", " is empty; "}) {
+    if (absl::StrContains(typed, absl::StrCat(field, "="))) break;
+    if (absl::ConsumePrefix(&text, absl::StrCat(field, unset)))
+      return absl::StrCat(field, "=… is missing; ", EscapeForTerminal(text));
+  }
+  return EscapeForTerminal(text);
+}
+
+// Takes what is before `end`, and `end`; false, and nothing taken, where it does not come.
+bool TakeUpTo(absl::string_view end, absl::string_view* text, absl::string_view* taken) {
+  const size_t at = text->find(end);
+  if (at == absl::string_view::npos) return false;
+  *taken = text->substr(0, at);
+  text->remove_prefix(at + end.size());
+  return true;
+}
+
+size_t NumberIn(absl::string_view text) {
+  size_t number = 0;
+  return absl::SimpleAtoi(text, &number) ? number : 0;
+}
+
+}  // namespace
+
+absl::Status AsTyped(const absl::Status& refused, std::span<const std::string> shapes) {
+  absl::string_view rest = refused.message(), before, layer, id, path, shape;
+  if (!TakeUpTo("; the first: ", &rest, &before) || !TakeUpTo("/", &rest, &layer) ||
+      !TakeUpTo(", ", &rest, &id) || !TakeUpTo(": ", &rest, &path)) {
+    return refused;
+  }
+  std::string typed;
+  absl::string_view field = path, whole;
+  if (!TakeUpTo(".primitive.", &field, &whole) || !TakeUpTo(".", &field, &shape)) return refused;
+  if (absl::string_view part = whole, skipped; TakeUpTo("definition.parts[", &part, &skipped)) {
+    typed = OfObject(shapes, std::string(id), NumberIn(absl::StripSuffix(part, "]")));
+  } else if (const size_t space = id.rfind(' '); space != absl::string_view::npos) {
+    typed = Nth(shapes, layer == kMaskLayer ? Kind::kMask : Kind::kShape,
+                NumberIn(id.substr(space + 1)));
+  }
+  if (typed.empty()) return refused;
+  std::string text =
+      absl::StrCat("\"", EscapeForTerminal(typed), "\": ", Said(std::string(field), typed, rest));
+  if (!absl::StrContains(before, " 1 operation ")) {
+    absl::StrAppend(&text, "\nnothing is put up; more is wrong, and this is the first");
+  }
+  return {refused.code(), text};
+}
+
+}  // namespace voxeld::voxelctl
