@@ -35,7 +35,7 @@ export class Daemon {
     await new Promise((resolve, reject) => {
       daemon.process.stdout.on("data", (text) => {
         daemon.output += text;
-        if (/^engine: .*\n/m.test(daemon.output)) resolve();
+        if (/^engine: [^\n]*\n/m.test(daemon.output)) resolve();
       });
       daemon.process.on("exit", (code) => reject(new Error(`voxeld ended with ${code}:\n${daemon.output}`)));
     });
