@@ -44,7 +44,7 @@ absl::Status ListScenes(const DemoOptions& options, Console& console) {
   Table table({{"SCENE"}, {"WHAT IS SEEN"}, {"FROM"}, {"DATA"}});
   for (const SceneAbout& scene : Scenes()) {
     if (!IsChosen(options, scene)) continue;
-    const absl::StatusOr<std::vector<std::string>> files = FindDataFiles(scene.needs, roots);
+    const absl::StatusOr<std::vector<std::string>> files = FindSceneFiles(scene.needs, roots);
     const std::string missing = files.ok() ? "" : std::string(files.status().message());
     table.Add({scene.name, scene.seen, scene.source,
                !files.ok()      ? "missing: " + missing.substr(missing.rfind("; ") + 2)
@@ -251,7 +251,7 @@ absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrup
   std::vector<Playable> scenes;
   for (const SceneAbout& scene : Scenes()) {
     if (!IsChosen(options, scene)) continue;
-    absl::StatusOr<std::vector<std::string>> files = FindDataFiles(scene.needs, roots);
+    absl::StatusOr<std::vector<std::string>> files = FindSceneFiles(scene.needs, roots);
     if (files.ok()) {
       scenes.push_back({&scene, *std::move(files)});
     } else {

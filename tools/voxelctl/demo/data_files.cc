@@ -40,8 +40,8 @@ std::string ProgramPath() {
   return error ? "" : path.string();
 }
 
-absl::StatusOr<std::string> FindDataFile(const DataFile& file,
-                                         const std::vector<std::string>& roots) {
+absl::StatusOr<std::string> FindSceneFile(const SceneFile& file,
+                                          const std::vector<std::string>& roots) {
   for (const std::string& name : file.names) {
     for (size_t i = 0; i < roots.size(); ++i) {
       const fs::path root(roots[i]);
@@ -57,11 +57,11 @@ absl::StatusOr<std::string> FindDataFile(const DataFile& file,
                                           file.brought_by, " brings it"));
 }
 
-absl::StatusOr<std::vector<std::string>> FindDataFiles(const std::vector<DataFile>& files,
-                                                       const std::vector<std::string>& roots) {
+absl::StatusOr<std::vector<std::string>> FindSceneFiles(const std::vector<SceneFile>& files,
+                                                        const std::vector<std::string>& roots) {
   std::vector<std::string> found;
-  for (const DataFile& file : files) {
-    absl::StatusOr<std::string> path = FindDataFile(file, roots);
+  for (const SceneFile& file : files) {
+    absl::StatusOr<std::string> path = FindSceneFile(file, roots);
     if (!path.ok()) return path.status();
     found.push_back(*std::move(path));
   }

@@ -9,7 +9,7 @@
 namespace voxeld::voxelctl {
 
 // One file that a scene needs.
-struct DataFile {
+struct SceneFile {
   // Below a root, the best first: any of them will do.
   std::vector<std::string> names;
   std::string brought_by;  // for people: "Debian's package pymol-data"
@@ -25,11 +25,11 @@ std::string ProgramPath();
 
 // The first that is there: each name below each root, below its node_modules, and, in the first root, by the last part of the
 // name alone. NotFound says which files would have done and what brings one.
-absl::StatusOr<std::string> FindDataFile(const DataFile& file,
-                                         const std::vector<std::string>& roots);
+absl::StatusOr<std::string> FindSceneFile(const SceneFile& file,
+                                          const std::vector<std::string>& roots);
 
 // All of them, in order; the first that is missing is told.
-absl::StatusOr<std::vector<std::string>> FindDataFiles(const std::vector<DataFile>& files,
-                                                       const std::vector<std::string>& roots);
+absl::StatusOr<std::vector<std::string>> FindSceneFiles(const std::vector<SceneFile>& files,
+                                                        const std::vector<std::string>& roots);
 
 }  // namespace voxeld::voxelctl

@@ -20,7 +20,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kEarthTilt = 23.4;
-constexpr int kCoarse = 64;  // a display of fewer voxels has no room for every border
+constexpr int kCoarse = 100;  // a display of fewer voxels has no room for every border
 constexpr uint64_t kGalaxySeed = 20;
 constexpr Rgb kCoastColor = {70, 215, 190}, kDimCoastColor = {18, 75, 85};
 constexpr Rgb kGraticuleColor = {8, 24, 60};

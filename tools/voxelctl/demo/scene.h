@@ -35,7 +35,7 @@ struct SceneAbout {
   const char* name;
   const char* seen;    // what is seen
   const char* source;  // where its data are from
-  std::vector<DataFile> needs;
+  std::vector<SceneFile> needs;
   // Reads and computes all that takes time; for any thread. An error is of the files.
   absl::StatusOr<std::unique_ptr<Scene>> (*make)(const SceneSettings& settings);
 };

@@ -10,7 +10,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-DataFile Atlas() {
+SceneFile Atlas() {
   return {
       {"world-atlas/countries-50m.json", "world-atlas/land-50m.json", "world-atlas/land-110m.json"},
       "tools/setup (npm's world-atlas)"};
