@@ -25,9 +25,10 @@ std::vector<std::string> DataRoots(const std::string& given, const std::string& 
   if (!given.empty()) roots.push_back(given);
   if (!program.empty()) {
     const fs::path bin = fs::path(program).parent_path();
-    // build/PRESET/bin/voxelctl, and PREFIX/bin/voxelctl.
+    // build/PRESET/bin/voxelctl, PREFIX/bin/voxelctl and BUNDLE/bin/voxelctl.
     roots.push_back((bin.parent_path().parent_path() / "data").string());
     roots.push_back((bin.parent_path() / "share/voxeld/data").string());
+    roots.push_back((bin.parent_path() / "data").string());
   }
   roots.emplace_back("/usr/share/voxeld/data");
   roots.emplace_back("/usr/share");
@@ -43,11 +44,9 @@ std::string ProgramPath() {
 absl::StatusOr<std::string> FindSceneFile(const SceneFile& file,
                                           const std::vector<std::string>& roots) {
   for (const std::string& name : file.names) {
-    for (size_t i = 0; i < roots.size(); ++i) {
-      const fs::path root(roots[i]);
-      std::vector<fs::path> places = {root / name, root / "node_modules" / name};
-      if (i == 0) places.push_back(root / fs::path(name).filename());
-      for (const fs::path& place : places) {
+    for (const fs::path root : roots) {
+      for (const fs::path& place :
+           {root / name, root / "node_modules" / name, root / fs::path(name).filename()}) {
         if (IsFile(place)) return place.string();
       }
     }

@@ -15,16 +15,15 @@ struct SceneFile {
   std::string brought_by;  // for people: "Debian's package pymol-data"
 };
 
-// Where data may lie, in the order in which it is looked for: `given` (--data, empty: none); build/data and share/voxeld/data
-// as they lie beside a `program` (its path) that was built or installed; /usr/share/voxeld/data; /usr/share, for Debian's
-// packages.
+// Where data may lie, in the order in which it is looked for: `given` (--data, empty: none); build/data, share/voxeld/data and
+// data as they lie beside a `program` (its path) that was built, installed or unpacked from a bundle; /usr/share/voxeld/data;
+// /usr/share, for Debian's packages.
 std::vector<std::string> DataRoots(const std::string& given, const std::string& program);
 
 // This program's own path; empty where the system does not say.
 std::string ProgramPath();
 
-// The first that is there: each name below each root, below its node_modules, and, in the first root, by the last part of the
-// name alone. NotFound says which files would have done and what brings one.
+// The first that is there: each name below each root, below its node_modules, and by its last part alone. NotFound says which files would have done and what brings one.
 absl::StatusOr<std::string> FindSceneFile(const SceneFile& file,
                                           const std::vector<std::string>& roots);
 
