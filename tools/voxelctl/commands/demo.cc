@@ -67,6 +67,16 @@ bool IsOfTheScene(const absl::Status& status) {
          absl::IsPermissionDenied(status);
 }
 
+void PassOver(const SceneAbout& about, const absl::Status& why, Console& console) {
+  if (console.json()) {
+    const nlohmann::ordered_json line = {{"scene", about.name},
+                                         {"passed_over", std::string(why.message())}};
+    console.Data(absl::StrCat(line.dump(), "\n"));
+  } else {
+    console.Say(absl::StrCat(about.name, " is passed over: ", why.message()));
+  }
+}
+
 class DemoPlayer {
  public:
   DemoPlayer(const DemoOptions& options, Connection& connection, Interrupt& interrupt,
@@ -218,18 +228,6 @@ class DemoPlayer {
 
   void Line(const nlohmann::ordered_json& line) { console_.Data(absl::StrCat(line.dump(), "\n")); }
 
- public:
-  static void PassOver(const SceneAbout& about, const absl::Status& why, Console& console) {
-    if (console.json()) {
-      const nlohmann::ordered_json line = {{"scene", about.name},
-                                           {"passed_over", std::string(why.message())}};
-      console.Data(absl::StrCat(line.dump(), "\n"));
-    } else {
-      console.Say(absl::StrCat(about.name, " is passed over: ", why.message()));
-    }
-  }
-
- private:
   const DemoOptions& options_;
   Connection& connection_;
   Interrupt& interrupt_;
@@ -255,7 +253,7 @@ absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrup
     if (files.ok()) {
       scenes.push_back({&scene, *std::move(files)});
     } else {
-      DemoPlayer::PassOver(scene, files.status(), console);
+      PassOver(scene, files.status(), console);
     }
   }
   if (scenes.empty()) return absl::NotFoundError("none of these scenes can be played");

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -28,11 +29,11 @@ constexpr Rgb kGraticuleColor = {8, 24, 60};
 // Placed and coloured models, each an object, that move together.
 class ModelScene final : public Scene {
  public:
-  ModelScene(const SceneSettings& settings, std::vector<Model> models, Motion motion,
+  ModelScene(const SceneSettings& settings, std::vector<Model> models, const Motion& motion,
              VolumeLook look = {})
       : space_(settings.space),
         models_(std::move(models)),
-        motion_(std::move(motion)),
+        motion_(motion),
         look_(std::move(look)) {}
 
   absl::Status Begin(Stage& stage) override {
@@ -135,7 +136,6 @@ absl::StatusOr<Model> ReadAtlas(const SceneSettings& settings) {
 std::unique_ptr<Scene> SpunModels(const SceneSettings& settings, std::vector<Model> models,
                                   const Motion& motion) {
   PlaceModels(models, settings.space, {.spin = true});
-  // Turned on its tilted axis it may need the room of a ball, which globes have already.
   ApplyLook(models, {});
   return std::make_unique<ModelScene>(settings, std::move(models), motion);
 }
@@ -228,7 +228,8 @@ absl::StatusOr<std::unique_ptr<Scene>> MakeGalaxy(const SceneSettings& settings)
   std::vector<Model> models;
   models.push_back(GalaxyModel(kGalaxySeed, std::clamp(side * side, 300u, 24000u)));
   // What is tilted reaches higher.
-  const double sine = std::sin(kTilt * M_PI / 180), cosine = std::cos(kTilt * M_PI / 180);
+  const double sine = std::sin(kTilt * std::numbers::pi / 180),
+               cosine = std::cos(kTilt * std::numbers::pi / 180);
   const double radius = FitRadius(settings.space, sine + kGalaxyHeight * cosine) /
                         std::max(1.0, cosine + kGalaxyHeight * sine);
   for (Point3& p : models[0].parts[0].positions) p = {p.x * radius, p.y * radius, p.z * radius};
