@@ -147,7 +147,7 @@ class Demo(unittest.TestCase):
             events = [json.loads(line) for line in words.splitlines()]
             told = {event["scene"]: event["passed_over"] for event in events if "passed_over" in event}
             self.assertEqual(list(told), missing)
-            self.assertRegex(told["globe"], r"^no world-atlas/countries-50m.json or .* in .*; tools/setup \(npm's world-atlas\) brings it$")
+            self.assertRegex(told["globe"], r"^tools/setup \(npm's world-atlas\) brings world-atlas/countries-50m.json or .*, which is in none of /.*$")
             self.assertEqual([event["scene"] for event in events if "seen" in event], [name for name in NAMES if name not in missing])
 
             alone = daemon.demo("globe", program=program)

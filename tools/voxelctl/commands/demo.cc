@@ -46,10 +46,12 @@ absl::Status ListScenes(const DemoOptions& options, Console& console) {
     if (!IsChosen(options, scene)) continue;
     const absl::StatusOr<std::vector<std::string>> files = FindSceneFiles(scene.needs, roots);
     const std::string missing = files.ok() ? "" : std::string(files.status().message());
+    const auto first = absl::c_find_if(
+        scene.needs, [&](const SceneFile& file) { return !FindSceneFile(file, roots).ok(); });
     table.Add({scene.name, scene.seen, scene.source,
-               !files.ok()      ? "missing: " + missing.substr(missing.rfind("; ") + 2)
-               : files->empty() ? "none needed"
-                                : "there"});
+               first != scene.needs.end() ? absl::StrCat("missing: ", first->brought_by)
+               : scene.needs.empty()      ? "none needed"
+                                          : "there"});
     list.push_back({{"scene", scene.name},
                     {"seen", scene.seen},
                     {"source", scene.source},

@@ -51,9 +51,9 @@ absl::StatusOr<std::string> FindSceneFile(const SceneFile& file,
       }
     }
   }
-  return absl::NotFoundError(absl::StrCat("no ", absl::StrJoin(file.names, " or "), " in ",
-                                          EscapeForTerminal(absl::StrJoin(roots, ", ")), "; ",
-                                          file.brought_by, " brings it"));
+  return absl::NotFoundError(
+      absl::StrCat(file.brought_by, " brings ", absl::StrJoin(file.names, " or "),
+                   ", which is in none of ", EscapeForTerminal(absl::StrJoin(roots, ", "))));
 }
 
 absl::StatusOr<std::vector<std::string>> FindSceneFiles(const std::vector<SceneFile>& files,

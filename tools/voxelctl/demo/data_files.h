@@ -23,7 +23,7 @@ std::vector<std::string> DataRoots(const std::string& given, const std::string& 
 // This program's own path; empty where the system does not say.
 std::string ProgramPath();
 
-// The first that is there: each name below each root, below its node_modules, and by its last part alone. NotFound says which files would have done and what brings one.
+// The first that is there: each name below each root, below its node_modules, and by its last part alone. NotFound says what brings one, and which would have done.
 absl::StatusOr<std::string> FindSceneFile(const SceneFile& file,
                                           const std::vector<std::string>& roots);
 

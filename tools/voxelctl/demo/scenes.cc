@@ -11,9 +11,8 @@ namespace voxeld::voxelctl {
 namespace {
 
 SceneFile Atlas() {
-  return {
-      {"world-atlas/countries-50m.json", "world-atlas/land-50m.json", "world-atlas/land-110m.json"},
-      "tools/setup (npm's world-atlas)"};
+  return {{"world-atlas/countries-50m.json", "world-atlas/land-110m.json"},
+          "tools/setup (npm's world-atlas)"};
 }
 
 }  // namespace
