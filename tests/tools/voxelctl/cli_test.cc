@@ -26,6 +26,26 @@ Options Parse(const std::string& line) {
   return parsed.options.value_or(Options());
 }
 
+TEST(CommandLine, DemoTakesScenesByName) {
+  const auto all = std::get<DemoOptions>(Parse("demo").command);
+  EXPECT_TRUE(all.scenes.empty());
+  EXPECT_EQ(all.seconds, 20);
+  EXPECT_FALSE(all.once || all.list);
+  const auto some = std::get<DemoOptions>(
+      Parse("demo life --seconds 5 globe --once --display desk --data /d -- clock").command);
+  EXPECT_THAT(some.scenes, ElementsAre("life", "globe", "clock"));
+  EXPECT_EQ(some.seconds, 5);
+  EXPECT_TRUE(some.once);
+  EXPECT_EQ(some.display, "desk");
+  EXPECT_EQ(some.data, "/d");
+  EXPECT_TRUE(std::get<DemoOptions>(Parse("demo --list").command).list);
+  const ParsedCommandLine wrong = ParseCommandLine({"demo", "glob"});
+  EXPECT_EQ(wrong.exit_code, kExitUsage);
+  EXPECT_THAT(wrong.err,
+              HasSubstr("there is no scene \"glob\"; did you mean globe?; there are globe,"));
+  EXPECT_EQ(ParseCommandLine({"demo", "--seconds", "0"}).exit_code, kExitUsage);
+}
+
 TEST(CommandLine, GlobalOptionsBeforeAndAfterTheCommand) {
   for (const char* line : {"--server unix:/a --json displays", "displays --json --server unix:/a",
                            "--json displays --server=unix:/a"}) {
@@ -292,7 +312,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"play a.raw --size 5x5x0", {"XxYxZ is expected"}},
         Wrong{"play a.raw --type u8", {"want --size too"}},
         Wrong{"play a.raw --size 1x1x1 --type u9", {"--type u9 is not known", "u8"}},
-        Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, draw, snapshot"}},
+        Wrong{"xyzzy", {"\"xyzzy\" is no command", "known are play, demo, draw, snapshot"}},
         Wrong{"pl\x1b[31m", {"pl\\u{1b}[31m"}},
         Wrong{"play", {"at least one FILE", "voxelctl play --help"}},
         Wrong{"play a.obj --sipn", {"--sipn", "did you mean --spin?"}},

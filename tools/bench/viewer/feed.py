@@ -20,8 +20,8 @@ with voxel.connect(server, name="feed") as v:
         places[:, 2] = (places[:, 2] + 0.51) % 1.0 - 0.5
         made = time.time() * 1000
         cloud = v.points("cloud", places, colors=colors)
-        outcomes = cloud.frame.wait_shown(timeout=20).outcomes
-        volume = next(iter(outcomes.values())).volume
+        (outcome,) = cloud.frame.wait_shown(timeout=20).values()
+        volume = outcome.volume
         print(json.dumps({"made": made, "volume": volume, "shown": time.time() * 1000}), flush=True)
         left = began + (step + 1) / rate - time.monotonic()
         if left > 0:

@@ -20,6 +20,15 @@ inline constexpr const char* kPlayAbout =
     "not).\n"
     "What is up stays when this ends, in the layer \"voxelctl\", until the next play, or clear.\n"
     "A test pattern that is up ends.";
+inline constexpr const char* kDemoAbout =
+    "Plays scenes that are worth a look, one after another, until Ctrl-C; a SCENE that is named "
+    "stays up alone.\n"
+    "  voxelctl demo\n"
+    "  voxelctl demo globe life --seconds 60\n"
+    "  voxelctl demo --list\n"
+    "Those whose data are not on this machine are passed over, and what brings them is said. At "
+    "the end it takes down\n"
+    "what it put up. What voxelctl put up before goes.";
 inline constexpr const char* kDrawAbout =
     "Puts up shapes, each in quotes: a name with values, or an expression.\n"
     "  voxelctl draw \"sphere radius=0.8 color=orange\" \"box size=1,0.5,0.2 turn=0,0,30\"\n"

@@ -16,6 +16,7 @@
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"
 #include "tools/voxelctl/cli/completion_options.h"
+#include "tools/voxelctl/cli/demo_options.h"
 #include "tools/voxelctl/cli/light_options.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/cli/picture_options.h"
@@ -41,6 +42,7 @@ class Parser {
     app_.fallthrough();
     app_.allow_extras();
     play_texts_.Add(Add("play", kPlayAbout));
+    AddDemoOptions(Add("demo", kDemoAbout), &demo_);
     AddDraw();
     snapshot_texts_.Add(Add("snapshot", kSnapshotAbout));
     render_texts_.Add(Add("render", kRenderAbout));
@@ -246,6 +248,10 @@ class Parser {
       options_.command = play_texts_.Read(plain_);
       return;
     }
+    if (name == "demo") {
+      options_.command = ReadDemoOptions(demo_, plain_);
+      return;
+    }
     if (name == "draw") {
       draw_.shapes.insert(draw_.shapes.end(), plain_.begin(), plain_.end());
       if (draw_.shapes.empty()) throw UsageError{"draw wants at least one SHAPE"};
@@ -392,6 +398,7 @@ class Parser {
   std::vector<std::string> plain_;  // arguments after --
   std::string printed_;             // what the command prints at once, if it does
   Options options_;
+  DemoOptions demo_;
   DrawOptions draw_;
   GalleryOptions gallery_;
   SnapshotArguments snapshot_texts_;

@@ -40,6 +40,15 @@ struct PlayOptions {
   bool loop = false;                  // a sequence or animation begins again at its end
 };
 
+struct DemoOptions {
+  std::vector<std::string> scenes;  // of kSceneNames; empty: all
+  bool list = false;                // only says which there are
+  bool once = false;                // ends after the last
+  double seconds = 20;              // of each
+  std::string display;              // whose space is filled; empty: all of them fit
+  std::string data;                 // a folder that is looked at first; empty: none
+};
+
 struct DrawOptions {
   std::vector<std::string> shapes;  // at least one, as shape/shape_text.h has them
   bool add = false;                 // to what voxelctl put up before
@@ -230,12 +239,13 @@ struct Options {
   std::string server;               // empty: see ChooseServer
   client::Credentials credentials;  // as given; see ChooseCredentials
   bool json = false;
-  std::variant<PlayOptions, DrawOptions, SnapshotOptions, TurntableOptions, ExportOptions,
-               GalleryOptions, DisplaysOptions, StatsOptions, TopOptions, EntitiesOptions,
-               WatchOptions, ClearOptions, PatternOptions, SetOptions, CalibrateOptions,
-               VerifyOptions, ProfileOptions, DoctorOptions, InitOptions, TokenOptions,
-               RecordOptions, ReplayOptions, PlaylistOptions, InputOptions, MarkersOptions,
-               PipeOptions, WhyOptions, AssetsOptions, CompleteOptions, ManualOptions>
+  std::variant<PlayOptions, DemoOptions, DrawOptions, SnapshotOptions, TurntableOptions,
+               ExportOptions, GalleryOptions, DisplaysOptions, StatsOptions, TopOptions,
+               EntitiesOptions, WatchOptions, ClearOptions, PatternOptions, SetOptions,
+               CalibrateOptions, VerifyOptions, ProfileOptions, DoctorOptions, InitOptions,
+               TokenOptions, RecordOptions, ReplayOptions, PlaylistOptions, InputOptions,
+               MarkersOptions, PipeOptions, WhyOptions, AssetsOptions, CompleteOptions,
+               ManualOptions>
       command;
 };
 

@@ -18,6 +18,9 @@ namespace voxeld::voxelctl {
 // Reads the files before it connects: nothing is put up unless all of them can be.
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console);
+// Reads what it plays while it plays what is before it; all that it put up is gone at its end.
+absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrupt& interrupt,
+                  Console& console);
 // Nothing is put up unless all shapes are understood, and taken by the server.
 absl::Status Draw(const DrawOptions& options, const Connector& connect, Console& console);
 // Every shape by itself, as the display shows it, in one picture; the layer is empty afterwards.

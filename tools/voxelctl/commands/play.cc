@@ -9,8 +9,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/str_join.h"
 #include "display/sync/clock.h"
+#include "tools/voxelctl/commands/choose_space.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/commands/own_layer.h"
@@ -37,41 +37,6 @@ constexpr uint64_t kStagedBytes = 8 << 20;
 constexpr uint64_t kDefinitionBytes = 256;  // of a definition, beside its vertices, about
 constexpr size_t kLabelBytes = 200;
 constexpr int64_t kMeasuredFrames = 16;  // of a sequence, for its place
-
-// What all of `displays` show; the first one's, if they show nothing in common.
-absl::StatusOr<DisplaySpace> CommonSpace(std::span<const v1::DisplayDescription* const> displays) {
-  std::optional<DisplaySpace> common;
-  for (const v1::DisplayDescription* display : displays) {
-    if (display->scene_to_voxel().m_size() != 12) continue;
-    gpu::Affine view;
-    std::copy(display->scene_to_voxel().m().begin(), display->scene_to_voxel().m().end(), view.m);
-    const v1::VoxelGrid& grid = display->geometry().grid();
-    absl::StatusOr<DisplaySpace> space =
-        VisibleSpace(grid.nx(), grid.ny(), grid.nz(), view,
-                     display->geometry().has_rotor() || display->geometry().has_helix());
-    if (!space.ok()) return space.status();
-    common = common ? Intersection(*common, *space) : *space;
-  }
-  return common.value_or(DisplaySpace());
-}
-
-absl::StatusOr<DisplaySpace> ChooseSpace(Connection& connection, const std::string& name,
-                                         Console& console) {
-  const absl::StatusOr<v1::ListDisplaysResponse> all = connection.ListDisplays();
-  if (!all.ok()) return all.status();
-  std::vector<const v1::DisplayDescription*> displays;
-  std::vector<std::string> names;
-  for (const v1::DisplayDescription& display : all->displays()) {
-    names.push_back(EscapeForTerminal(display.name()));
-    if (name.empty() || display.name() == name) displays.push_back(&display);
-  }
-  if (!name.empty() && displays.empty()) {
-    return absl::NotFoundError(absl::StrCat("there is no display \"", EscapeForTerminal(name),
-                                            "\"; there are ", absl::StrJoin(names, ", ")));
-  }
-  if (displays.empty()) console.Say("the server has no display: the scene is put up unseen");
-  return CommonSpace(displays);
-}
 
 // At most kLabelBytes of what a person calls the file; no code point is cut.
 std::string Label(const std::string& path) {
@@ -123,9 +88,9 @@ class Player {
 
  private:
   absl::Status FindSpace() {
-    const absl::StatusOr<DisplaySpace> space = ChooseSpace(connection_, options_.display, console_);
-    if (space.ok()) space_ = *space;
-    return space.status();
+    const absl::StatusOr<Room> room = ChooseSpace(connection_, options_.display, console_);
+    if (room.ok()) space_ = room->space;
+    return room.status();
   }
 
   // A frame replaces the layer whole, but not how a command before, of the same owner, had it look.

@@ -25,6 +25,8 @@ absl::Status Dispatch(const Options& options, const Environment& environment,
                       const Connector& connect, Interrupt& interrupt, Console& console) {
   if (const auto* play = std::get_if<PlayOptions>(&options.command))
     return Play(*play, connect, interrupt, console);
+  if (const auto* demo = std::get_if<DemoOptions>(&options.command))
+    return Demo(*demo, connect, interrupt, console);
   if (const auto* draw = std::get_if<DrawOptions>(&options.command))
     return Draw(*draw, connect, console);
   if (const auto* pattern = std::get_if<PatternOptions>(&options.command);

@@ -1,0 +1,56 @@
+#include "tools/voxelctl/commands/choose_space.h"
+
+#include <algorithm>
+#include <climits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+// What all of `displays` show; the first one's, if they show nothing in common.
+absl::StatusOr<Room> CommonRoom(std::span<const v1::DisplayDescription* const> displays) {
+  std::optional<DisplaySpace> common;
+  int least_side = INT_MAX;
+  for (const v1::DisplayDescription* display : displays) {
+    if (display->scene_to_voxel().m_size() != 12) continue;
+    gpu::Affine view;
+    std::copy(display->scene_to_voxel().m().begin(), display->scene_to_voxel().m().end(), view.m);
+    const v1::VoxelGrid& grid = display->geometry().grid();
+    absl::StatusOr<DisplaySpace> space =
+        VisibleSpace(grid.nx(), grid.ny(), grid.nz(), view,
+                     display->geometry().has_rotor() || display->geometry().has_helix());
+    if (!space.ok()) return space.status();
+    common = common ? Intersection(*common, *space) : *space;
+    least_side = std::min({least_side, static_cast<int>(grid.nx()), static_cast<int>(grid.ny()),
+                           static_cast<int>(grid.nz())});
+  }
+  return common ? Room{*common, least_side} : Room();
+}
+
+}  // namespace
+
+absl::StatusOr<Room> ChooseSpace(Connection& connection, const std::string& name,
+                                 Console& console) {
+  const absl::StatusOr<v1::ListDisplaysResponse> all = connection.ListDisplays();
+  if (!all.ok()) return all.status();
+  std::vector<const v1::DisplayDescription*> displays;
+  std::vector<std::string> names;
+  for (const v1::DisplayDescription& display : all->displays()) {
+    names.push_back(EscapeForTerminal(display.name()));
+    if (name.empty() || display.name() == name) displays.push_back(&display);
+  }
+  if (!name.empty() && displays.empty()) {
+    return absl::NotFoundError(absl::StrCat("there is no display \"", EscapeForTerminal(name),
+                                            "\"; there are ", absl::StrJoin(names, ", ")));
+  }
+  if (displays.empty()) console.Say("the server has no display: the scene is put up unseen");
+  return CommonRoom(displays);
+}
+
+}  // namespace voxeld::voxelctl

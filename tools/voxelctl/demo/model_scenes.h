@@ -1,0 +1,23 @@
+// Scenes of models that move as a whole: files, and what code makes once.
+#pragma once
+
+#include <memory>
+
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/demo/scene.h"
+#include "tools/voxelctl/import/model.h"
+
+namespace voxeld::voxelctl {
+
+absl::StatusOr<std::unique_ptr<Scene>> MakeGlobe(const SceneSettings& settings);
+absl::StatusOr<std::unique_ptr<Scene>> MakeEarthquakes(const SceneSettings& settings);
+absl::StatusOr<std::unique_ptr<Scene>> MakeHouse(const SceneSettings& settings);
+absl::StatusOr<std::unique_ptr<Scene>> MakeEngine(const SceneSettings& settings);
+absl::StatusOr<std::unique_ptr<Scene>> MakeBrain(const SceneSettings& settings);
+absl::StatusOr<std::unique_ptr<Scene>> MakeMolecule(const SceneSettings& settings);
+absl::StatusOr<std::unique_ptr<Scene>> MakeGalaxy(const SceneSettings& settings);
+
+// What of a volume is above `low`, and nothing around it. All of it if nothing is.
+SampledVolume Cropped(const SampledVolume& volume, double low);
+
+}  // namespace voxeld::voxelctl
