@@ -167,7 +167,6 @@ void FramePipeline::Show(SnapshotPtr snapshot, const Rider& commit, bool hidden,
 }
 
 // ----------------------------------------------------------------------------------- drawing
-
 absl::StatusOr<EngineCare::Made> FramePipeline::Make(gpu::EngineOptions options) {
   const uint64_t id = ++engines_made_;
   options.lost = [this, id, work = work_,
