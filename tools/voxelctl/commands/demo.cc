@@ -102,7 +102,7 @@ class DemoPlayer {
     const absl::StatusOr<Room> room = ChooseSpace(connection_, options_.display, console_);
     if (!room.ok()) return room.status();
     room_ = *room;
-    absl::StatusOr<std::vector<uint64_t>> before = OwnersBefore(connection_);
+    const absl::StatusOr<std::vector<OwnedLayer>> before = DrawnBefore(connection_);
     if (!before.ok()) return before.status();
     client::Options open;
     open.client_name = "voxelctl demo";
@@ -111,9 +111,13 @@ class DemoPlayer {
         connection_.OpenSession(std::move(open));
     if (!session.ok()) return session.status();
     session_ = *std::move(session);
-    std::erase(*before, session_->server().owner);
-    if (absl::Status status = TakeDown(*before, connection_); !status.ok()) return status;
-    return EndPatterns(connection_).status();
+    const absl::StatusOr<TakenDown> taken = TakeDown(*before, connection_);
+    if (!taken.ok()) return taken.status();
+    if (!taken->stay.empty()) console_.Say(OthersStay(taken->stay));
+    const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection_);
+    if (!patterns.ok()) return patterns.status();
+    if (!patterns->stay.empty()) console_.Say(PatternsStay(*patterns));
+    return absl::OkStatus();
   }
 
   // The next one is made while one is up.
