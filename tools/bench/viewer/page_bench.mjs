@@ -12,7 +12,7 @@ import { fileURLToPath } from "node:url";
 import { parseArgs } from "node:util";
 
 const { values: options } = parseArgs({ options: {
-  bin: { type: "string" }, wheel: { type: "string" }, modules: { type: "string" }, points: { type: "string", default: "225000" },
+  bin: { type: "string" }, wheel: { type: "string" }, modules: { type: "string" }, points: { type: "string", default: "235000" },
   seconds: { type: "string", default: "10" }, json: { type: "boolean", default: false },
 } });
 if (!options.bin || !options.wheel || !options.modules) {
