@@ -16,25 +16,16 @@ import unittest
 import urllib.parse
 import urllib.request
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 import voxeld as voxel
 
 from ola_peer_test import free_port
+from polling import LONG, until
 
-LONG = 60.0
 X, Y, Z = 8, 6, 5
 LIGHTS = X * Y * Z  # two universes: 170 lights and 70
-
-
-def until(done: Callable[[], bool], what: str) -> None:
-    """Asks again and again; what is asked takes its own time."""
-    deadline = time.monotonic() + LONG
-    while not done():
-        if time.monotonic() > deadline:
-            raise AssertionError(f"not in {LONG} s: {what}")
-        time.sleep(0.01)
 
 
 class Reading:

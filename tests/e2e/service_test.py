@@ -1,30 +1,23 @@
 """voxeld as systemd runs it, and what a long-running one goes through: engines that somebody else starts, assets that outlive it,
 a configuration that changes. Paths are in VOXELD and VOXELCTL."""
+import contextlib
 import hashlib
 import json
 import os
 import signal
 import subprocess
 import tempfile
-import time
 import unittest
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 import voxeld as voxel
 
 from operate_test import DISPLAY, LONG, Daemon, voxelctl
+from polling import until
 
 ACTIVATE = "/usr/bin/systemd-socket-activate"
-
-
-def until(right: Callable[[], Any]) -> Any:
-    end = time.monotonic() + LONG
-    while not (found := right()):
-        assert time.monotonic() < end, "it did not come about"
-        time.sleep(0.01)
-    return found
 
 
 class Service(unittest.TestCase):
@@ -53,8 +46,12 @@ class Service(unittest.TestCase):
 
     def engines(self, manager: int) -> list[int]:
         """Processes that the manager of the socket has started."""
-        children = Path(f"/proc/{manager}/task/{manager}/children").read_text(encoding="ascii").split()
-        return [int(child) for child in children if "voxeld-engine" in Path(f"/proc/{child}/comm").read_text(encoding="ascii")]
+        found = []
+        for child in Path(f"/proc/{manager}/task/{manager}/children").read_text(encoding="ascii").split():
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
+                if "voxeld-engine" in Path(f"/proc/{child}/comm").read_text(encoding="ascii"):
+                    found.append(int(child))
+        return found
 
     def test_an_engine_that_a_service_manager_starts(self) -> None:
         path = self.folder / "engine.sock"
@@ -62,7 +59,7 @@ class Service(unittest.TestCase):
         manager = subprocess.Popen([ACTIVATE, "--accept", "--seqpacket", f"--listen={path}", str(engine)], stderr=subprocess.DEVNULL)
         self.addCleanup(manager.wait, LONG)
         self.addCleanup(manager.kill)
-        until(path.exists)
+        until(path.exists, "the socket")
         apart = f'[engine]\nkind = "cpu"\nin_worker = true\nworker = "unix:{path}"\n'
         with self.daemon(apart):
             v = self.connect()
@@ -71,11 +68,11 @@ class Service(unittest.TestCase):
             self.assertEqual(len(first), 1)
             os.kill(first[0], signal.SIGKILL)
             self.assertFalse(np.array_equal(self.picture(v, 0.4).rgb, shown.rgb), "the daemon draws by itself meanwhile")
-            until(lambda: len(self.engines(manager.pid)) == 1 and self.engines(manager.pid) != first)
+            until(lambda: len(self.engines(manager.pid)) == 1 and self.engines(manager.pid) != first, "another engine")
             again = self.picture(v, 0.7)
             self.assertTrue(np.array_equal(again.rgb, shown.rgb))
             self.assertIn("cpu", json.loads(voxelctl("--server", self.socket, "--json", "stats").stdout)["displays"][0]["engine"])
-        until(lambda: not self.engines(manager.pid))
+        until(lambda: not self.engines(manager.pid), "the engine's end")
         with self.daemon('[engine]\nkind = "cpu"\n'):
             self.assertTrue(np.array_equal(self.picture(self.connect(), 0.7).rgb, shown.rgb))
 
@@ -133,12 +130,13 @@ class Service(unittest.TestCase):
         config.write_text(text + 'view = "voxels"\n', encoding="utf-8")
         process.send_signal(signal.SIGHUP)
         next_line("asked to read its files again")
-        until(lambda: view() != before)
+        until(lambda: view() != before, "the new view")
         after = view()
         config.write_text(text + "view = 7\n", encoding="utf-8")
         process.send_signal(signal.SIGHUP)
         next_line("asked to read its files again")
-        stats = until(lambda: json.loads(voxelctl("--server", self.socket, "--json", "stats").stdout).get("connections", {}).get("config_trouble"))
+        stats = until(lambda: json.loads(voxelctl("--server", self.socket, "--json", "stats").stdout).get("connections", {}).get("config_trouble"),
+                      "word of the trouble")
         self.assertIn("view", stats)
         self.assertEqual(view(), after, "nothing of a wrong file is taken")
 
