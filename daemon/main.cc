@@ -277,7 +277,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   absl::StatusOr<std::unique_ptr<viewer::Viewer>> viewer = viewer::Viewer::Make(
       core, clock,
       {.version = Version(),
-       .hosts = absl::StrSplit(config.server.http_hosts, ',', absl::SkipWhitespace()),
+       .hosts = absl::StrSplit(config.server.http_hosts, absl::ByAnyChar(", "), absl::SkipEmpty()),
        .control = config.server.http_control,
        .audit = &security->audit()});
   if (!viewer.ok()) return Fail(1, viewer.status());

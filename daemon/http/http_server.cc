@@ -110,9 +110,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (upgrade_ && beast::websocket::is_upgrade(request)) {
       const absl::StatusOr<ServeWebSocket> serve = upgrade_(asked);
       if (serve.ok()) return GiveAway(*serve);
-      return Write(Plain(absl::IsNotFound(serve.status()) ? 404 : 403,
-                         std::string(serve.status().message())),
-                   true);
+      const unsigned code = absl::IsNotFound(serve.status())            ? 404
+                            : absl::IsResourceExhausted(serve.status()) ? 503
+                                                                        : 403;
+      return Write(Plain(code, std::string(serve.status().message())), true);
     }
     const uint64_t number = ++number_;
     // The answer may come when the connection, or the whole server, is gone.
@@ -207,7 +208,7 @@ class Server::Impl {
   Impl(ServerOptions options, Handler handler, Upgrade upgrade)
       : options_(std::move(options)),
         handler_(std::move(handler)),
-        upgrade_(std::move(upgrade)),
+        upgrade_(Bounded(std::move(upgrade))),
         io_(std::make_shared<asio::io_context>(1)),
         acceptor_(io_->get_executor()),
         retry_(io_->get_executor()) {}
@@ -283,6 +284,18 @@ class Server::Impl {
       connection->Read();
       Accept();
     });
+  }
+
+  // A part of the connections is for those that come and go.
+  Upgrade Bounded(Upgrade upgrade) {
+    if (!upgrade) return nullptr;
+    return [this, upgrade = std::move(upgrade)](
+               const Request& request) -> absl::StatusOr<ServeWebSocket> {
+      const size_t most = (options_.max_connections * 3 + 3) / 4;
+      if (sockets_.size() < most) return upgrade(request);
+      return absl::ResourceExhaustedError(absl::StrCat(
+          most, " WebSockets are open, which is three quarters of max_http_connections"));
+    };
   }
 
   // Out of descriptors, say: what is open may close.

@@ -37,7 +37,7 @@ struct Request {
 using Done = std::function<void(Response)>;
 using Handler = std::function<bool(const Request& request, Done done)>;
 
-// Serves a request for a WebSocket, or says why not: NotFound, PermissionDenied (403). Called on the
+// Serves a request for a WebSocket, or says why not: NotFound, ResourceExhausted (503), else 403. Called on the
 // server's thread. Empty: there are none.
 using ServeWebSocket =
     std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>;

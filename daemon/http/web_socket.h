@@ -12,8 +12,8 @@ namespace voxeld::daemon::http {
 class WebSocketPeer {
  public:
   virtual ~WebSocketPeer() = default;
-  // In the order of the calls. Dropped once it is closed. What waits to be sent is not bounded here: serve by
-  // what the other end asks for.
+  // In the order of the calls. Dropped once it is closed. While more than a megabyte waits nothing is read: serve by
+  // what the other end asks for, a bounded number of answers for each message.
   virtual void Send(std::string message, bool binary) = 0;
   // Calls `what` on the server's thread, unless it is closed by then: for answers that come elsewhere.
   virtual void Post(std::function<void()> what) = 0;

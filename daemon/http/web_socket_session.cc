@@ -1,6 +1,7 @@
 #include "daemon/http/web_socket_session.h"
 
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
@@ -19,13 +20,19 @@ using boost::system::error_code;
 
 constexpr auto kHandshakeLimit = std::chrono::seconds(10);
 constexpr auto kSilenceLimit = std::chrono::seconds(60);  // half of it: a ping
+constexpr auto kWriteLimit = std::chrono::seconds(30);    // of one message
 constexpr size_t kMostReason = 123;
+// Waiting to be sent; beyond, nothing more is read that could ask for more.
+constexpr size_t kMostWaitingBytes = 1 << 20, kMostWaiting = 64;
 
 class Session final : public WebSocketSession, public std::enable_shared_from_this<Session> {
  public:
   Session(std::shared_ptr<asio::io_context> io, ConnectionStream stream,
           std::function<void(WebSocketSession*)> closed)
-      : io_(std::move(io)), socket_(std::move(stream)), closed_(std::move(closed)) {}
+      : io_(std::move(io)),
+        socket_(std::move(stream)),
+        write_timer_(io_->get_executor()),
+        closed_(std::move(closed)) {}
 
   void Start(const RequestMessage& request,
              const std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>&
@@ -88,6 +95,7 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
 
   void Enqueue(Outgoing message) {
     if (!closed_) return;
+    waiting_bytes_ += message.bytes.size();
     waiting_.push_back(std::move(message));
     Write();
   }
@@ -101,16 +109,26 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
                                  [self = shared_from_this()](error_code) { self->End(); });
     }
     socket_.binary(next.binary);
+    write_timer_.expires_after(kWriteLimit);
+    write_timer_.async_wait([self = shared_from_this()](error_code error) {
+      if (!error) self->Close();  // who does not read
+    });
     socket_.async_write(asio::buffer(next.bytes),
                         [self = shared_from_this()](error_code error, size_t) {
                           self->writing_ = false;
+                          self->write_timer_.cancel();
                           if (error) return self->End();
+                          self->waiting_bytes_ -= self->waiting_.front().bytes.size();
                           self->waiting_.pop_front();
                           self->Write();
+                          if (self->held_ && !self->Full()) self->Read();
                         });
   }
 
+  bool Full() const { return waiting_bytes_ > kMostWaitingBytes || waiting_.size() > kMostWaiting; }
+
   void Read() {
+    held_ = false;
     socket_.async_read(buffer_, [self = shared_from_this()](error_code error, size_t) {
       if (error) return self->End();
       const bool text = self->socket_.got_text();
@@ -120,9 +138,10 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
       if (text) {
         self->service_->OnText(std::move(message));
       } else {
-        self->Enqueue({"text is expected", false, true});
+        return self->Enqueue({"text is expected", false, true});
       }
-      self->Read();
+      self->held_ = self->Full();
+      if (!self->held_) self->Read();
     });
   }
 
@@ -130,16 +149,20 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
     auto closed = std::exchange(closed_, nullptr);
     if (!closed) return;
     service_ = nullptr;
+    write_timer_.cancel();
     closed(this);
   }
 
   const std::shared_ptr<asio::io_context> io_;
   websocket::stream<ConnectionStream> socket_;
+  asio::steady_timer write_timer_;
   std::function<void(WebSocketSession*)> closed_;  // empty once closed
   std::unique_ptr<WebSocketService> service_;
   beast::flat_buffer buffer_;
   std::deque<Outgoing> waiting_;  // the first is being written
+  size_t waiting_bytes_ = 0;
   bool accepted_ = false, writing_ = false;
+  bool held_ = false;  // too much waits: nothing is read
 };
 
 }  // namespace

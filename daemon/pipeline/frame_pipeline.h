@@ -121,7 +121,9 @@ class FramePipeline final : private display::Display::Listener {
   // Ends the captures of that name with Cancelled.
   void CancelCapture(display::CaptureId id);
   // Display::Watch for many, until Unwatch or an error: each begins with the newest volume. Watchers are
-  // called inside any call to the pipeline, and must only post.
+  // called inside any call to the pipeline, and must only post. After the last has gone the display stays watched for
+  // kWatchLinger: who comes and goes must not have it send volumes again and again.
+  static constexpr sync::TimeNs kWatchLinger = 5 * sync::kSecond;
   void Watch(uint64_t id, display::Display::Watcher watcher);
   void Unwatch(uint64_t id);
 
@@ -196,6 +198,7 @@ class FramePipeline final : private display::Display::Listener {
   void DrawAgain();  // what was drawn comes to nothing: at once, with the same riders
   void ServeCaptures();
   void TellWatchers(const absl::StatusOr<display::DecodedVolume>& volume);
+  sync::TimeNs LetGoOfWatch();  // when it is due; answers when
   void Breathe();
   void Retire(std::shared_ptr<const void> what);
   void Told(const Rider& rider, const CommitOutcome& outcome);
@@ -259,6 +262,8 @@ class FramePipeline final : private display::Display::Listener {
   std::vector<PendingCapture> captures_;
   std::map<uint64_t, display::Display::Watcher> watchers_;  // by id
   std::optional<display::DecodedVolume> watched_;           // what they were told last
+  bool watching_ = false;                                   // the display
+  sync::TimeNs let_go_at_ = sync::kNever;
   sync::TimeNs next_tick_ = 0;
 
   RiderBook riders_;

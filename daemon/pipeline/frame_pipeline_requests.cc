@@ -164,17 +164,24 @@ void FramePipeline::CancelCapture(display::CaptureId id) {
 void FramePipeline::Watch(uint64_t id, display::Display::Watcher watcher) {
   if (!started_) return watcher(absl::UnavailableError(WhyNotShowing()));
   if (watched_.has_value()) watcher(*watched_);
-  const bool first = watchers_.empty();
   watchers_[id] = std::move(watcher);
-  if (!first) return;
+  let_go_at_ = sync::kNever;
+  if (std::exchange(watching_, true)) return;
   display_->Watch(
       [this](const absl::StatusOr<display::DecodedVolume>& volume) { TellWatchers(volume); });
 }
 
 void FramePipeline::Unwatch(uint64_t id) {
-  if (watchers_.erase(id) == 0 || !watchers_.empty()) return;
+  if (watchers_.erase(id) > 0 && watchers_.empty()) let_go_at_ = clock_.Now() + kWatchLinger;
+}
+
+sync::TimeNs FramePipeline::LetGoOfWatch() {
+  if (clock_.Now() < let_go_at_) return let_go_at_;
+  let_go_at_ = sync::kNever;
+  watching_ = false;
   watched_.reset();
   display_->Unwatch();
+  return sync::kNever;
 }
 
 void FramePipeline::TellWatchers(const absl::StatusOr<display::DecodedVolume>& volume) {
@@ -184,6 +191,8 @@ void FramePipeline::TellWatchers(const absl::StatusOr<display::DecodedVolume>& v
     return;
   }
   watched_.reset();
+  watching_ = false;
+  let_go_at_ = sync::kNever;
   for (const auto& [id, watcher] : std::exchange(watchers_, {})) watcher(volume);
 }
 

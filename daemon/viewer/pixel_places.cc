@@ -179,19 +179,23 @@ size_t PixelPlaces::Append(int32_t slice, std::span<const uint8_t> rgb, Points* 
   return out->size() - before;
 }
 
-void PixelPlaces::AppendEvery(size_t stride, Points* out) {
+const Points& PixelPlaces::Sample() {
+  if (sample_.size() > 0) return sample_;
   const size_t pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
-  for (size_t i = 0; i < pixels * static_cast<size_t>(slices_); i += stride) {
+  const size_t all = pixels * static_cast<size_t>(slices_);
+  const size_t stride = std::max<size_t>(1, (all + kSample - 1) / kSample);
+  for (size_t i = 0; i < all; i += stride) {
     const auto u = static_cast<int32_t>(i % static_cast<size_t>(width_));
     const auto v = static_cast<int32_t>(i % pixels / static_cast<size_t>(width_));
     const Vec3 mm = Position(static_cast<int32_t>(i / pixels), u, v);
     if (std::isnan(mm.x)) continue;
     const Place place = Quantise(mm);
-    out->x.push_back(place.x);
-    out->y.push_back(place.y);
-    out->z.push_back(place.z);
-    out->rgb.insert(out->rgb.end(), 3, 0);
+    sample_.x.push_back(place.x);
+    sample_.y.push_back(place.y);
+    sample_.z.push_back(place.z);
+    sample_.rgb.insert(sample_.rgb.end(), 3, 0);
   }
+  return sample_;
 }
 
 }  // namespace voxeld::daemon::viewer

@@ -44,8 +44,9 @@ class PixelPlaces {
   // Appends the pixels of `slice` that are not black, row by row. `rgb`: height · width · 3 bytes, row-major. A pixel
   // without a light is passed over. Answers how many came.
   size_t Append(int32_t slice, std::span<const uint8_t> rgb, Points* out);
-  // Appends every `stride`-th pixel of the display, counted through slices and rows, in `rgb`'s place with black.
-  void AppendEvery(size_t stride, Points* out);
+  // Where pixels are, lit or not, in black: about kSample at the most, evenly chosen through slices and rows.
+  static constexpr size_t kSample = 100'000;
+  const Points& Sample();
 
   int32_t slices() const { return slices_; }
   int32_t width() const { return width_; }
@@ -77,6 +78,7 @@ class PixelPlaces {
   std::vector<std::vector<Column>> columns_;  // by slice; empty: not yet
   std::vector<std::vector<Place>> places_;
   std::vector<Place> unkept_;
+  Points sample_;  // empty: not yet
   size_t kept_bytes_ = 0;
 };
 

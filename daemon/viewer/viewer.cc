@@ -20,12 +20,14 @@ namespace {
 
 constexpr std::string_view kSocketPath = "/volumes";
 constexpr std::string_view kControlPath = "/control";
-constexpr std::string_view kCookie = "voxeld_control=";
+constexpr char kCookie[] = "voxeld_control_";  // and what is the daemon's own: cookies know no port
 // Its own files and its own socket, and nothing from anywhere else.
 constexpr char kContentPolicy[] =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'";
+
+constexpr size_t kNameDigits = 8;
 
 // Without its port.
 std::string HostName(std::string_view host) {
@@ -62,7 +64,8 @@ class Viewer::Impl {
   Impl(Core& core, sync::Clock& clock, ViewerOptions options, std::string key, std::string session)
       : shared_(std::make_shared<ViewerShared>(ViewerShared{core, clock, std::move(options), {}})),
         key_(std::move(key)),
-        session_(std::move(session)) {}
+        session_(session.substr(kNameDigits)),
+        cookie_(absl::StrCat(kCookie, session.substr(0, kNameDigits), "=")) {}
 
   // A name that was made to resolve to here is no name of this machine; a number cannot be made to.
   bool KnownHost(std::string_view header) const {
@@ -91,8 +94,8 @@ class Viewer::Impl {
   bool HasControl(const http::Request& request) const {
     for (const std::string& cookie :
          std::vector<std::string>(absl::StrSplit(std::string(request.cookie), "; "))) {
-      if (cookie.starts_with(kCookie) &&
-          SameSecret(std::string_view(cookie).substr(kCookie.size()), session_)) {
+      if (cookie.starts_with(cookie_) &&
+          SameSecret(std::string_view(cookie).substr(cookie_.size()), session_)) {
         return true;
       }
     }
@@ -145,10 +148,10 @@ class Viewer::Impl {
     }
     key_.clear();
     http::Response response = Plain(303, "control");
-    response.headers = {{"Location", "/"},
-                        {"Referrer-Policy", "no-referrer"},
-                        {"Set-Cookie", absl::StrCat(std::string(kCookie), session_,
-                                                    "; Path=/; HttpOnly; SameSite=Strict")}};
+    response.headers = {
+        {"Location", "/"},
+        {"Referrer-Policy", "no-referrer"},
+        {"Set-Cookie", absl::StrCat(cookie_, session_, "; Path=/; HttpOnly; SameSite=Strict")}};
     return response;
   }
 
@@ -172,7 +175,7 @@ class Viewer::Impl {
 
   const std::shared_ptr<ViewerShared> shared_;
   std::string key_;  // empty: none, or used up
-  const std::string session_;
+  const std::string session_, cookie_;
 };
 
 absl::StatusOr<std::unique_ptr<Viewer>> Viewer::Make(Core& core, sync::Clock& clock,

@@ -2,6 +2,7 @@
 
 #include <google/protobuf/util/json_util.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -20,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kMostWatches = 16;
-constexpr size_t kMostDark = 100'000;
+constexpr size_t kMostWatchesInAll = 64;
 
 std::string ToJson(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
@@ -57,6 +58,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   ViewerSocket(std::shared_ptr<ViewerShared> shared, std::shared_ptr<http::WebSocketPeer> peer,
                bool control)
       : shared_(std::move(shared)), peer_(std::move(peer)), control_(control) {}
+  ~ViewerSocket() { shared_->watches -= watches_.size(); }
 
   void OnText(const std::string& text) {
     const Json message = Json::parse(text, nullptr, false);
@@ -74,8 +76,13 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   }
 
  private:
+  // What one of is under way at a time: a second that comes meanwhile is passed over.
+  enum class Asked : uint8_t { kHello, kStats, kLayers };
+  bool Begin(Asked what) { return !std::exchange(asked_[static_cast<size_t>(what)], true); }
+  void End(Asked what) { asked_[static_cast<size_t>(what)] = false; }
+
   struct Watched {
-    std::string display;
+    uint64_t serial = 0;  // ids may be used again
     std::shared_ptr<PixelPlaces> places;
     std::shared_ptr<VolumeFeed> feed;
     bool credit = true;  // the page has shown the last one
@@ -95,9 +102,11 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   }
 
   void Hello() {
+    if (!Begin(Asked::kHello)) return;
     using Displays = std::vector<DisplayDescription>;
     shared_->core.ListDisplays(
         Then<Displays>([](ViewerSocket& self, absl::StatusOr<Displays> displays) {
+          self.End(Asked::kHello);
           if (!displays.ok()) return self.Complain(std::string(displays.status().message()));
           std::string text =
               absl::StrCat("{\"hello\":{\"version\":", Text(self.shared_->options.version),
@@ -122,16 +131,22 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     if (watches_.contains(*id) || watches_.size() >= kMostWatches) {
       return Complain(absl::StrCat("a page has ", kMostWatches, " watches with different ids"));
     }
-    watches_[*id].display = message["watch"].get<std::string>();
-    shared_->core.GetDisplay(watches_[*id].display,
-                             Then<DisplayDescription>([id = *id](ViewerSocket& self, auto display) {
-                               self.Begin(id, std::move(display));
-                             }));
+    if (shared_->watches >= kMostWatchesInAll) {
+      return Complain(absl::StrCat("all pages together have ", kMostWatchesInAll, " watches"));
+    }
+    ++shared_->watches;
+    const uint64_t serial = ++last_serial_;
+    watches_[*id].serial = serial;
+    shared_->core.GetDisplay(
+        message["watch"].get<std::string>(),
+        Then<DisplayDescription>([id = *id, serial](ViewerSocket& self, auto display) {
+          self.Start(id, serial, std::move(display));
+        }));
   }
 
-  void Begin(uint16_t id, const absl::StatusOr<DisplayDescription>& display) {
+  void Start(uint16_t id, uint64_t serial, const absl::StatusOr<DisplayDescription>& display) {
     const auto found = watches_.find(id);
-    if (found == watches_.end()) return;
+    if (found == watches_.end() || found->second.serial != serial) return;
     if (!display.ok()) return End(id, display.status());
     Watched& watch = found->second;
     watch.places = PlacesOf(*display);
@@ -142,21 +157,23 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
                              ",\"display\":", DisplayJson(*display), "}}"),
                 false);
     watch.feed = VolumeFeed::Open(shared_->core, shared_->clock, display->info.name,
-                                  [weak = weak_from_this(), peer = peer_, id] {
-                                    peer->Post([weak, id] {
-                                      if (const auto self = weak.lock()) self->Pump(id);
+                                  [weak = weak_from_this(), peer = peer_, id, serial] {
+                                    peer->Post([weak, id, serial] {
+                                      const auto self = weak.lock();
+                                      if (self != nullptr && self->Has(id, serial)) self->Pump(id);
                                     });
                                   });
   }
 
   std::shared_ptr<PixelPlaces> PlacesOf(const DisplayDescription& display) {
-    std::weak_ptr<PixelPlaces>& known = shared_->places[display.info.name];
-    std::shared_ptr<PixelPlaces> places = known.lock();
-    if (places == nullptr) {
-      places = std::make_shared<PixelPlaces>(display.info.geometry);
-      known = places;
-    }
-    return places;
+    std::shared_ptr<PixelPlaces>& known = shared_->places[display.info.name];
+    if (known == nullptr) known = std::make_shared<PixelPlaces>(display.info.geometry);
+    return known;
+  }
+
+  bool Has(uint16_t id, uint64_t serial) const {
+    const auto found = watches_.find(id);
+    return found != watches_.end() && found->second.serial == serial;
   }
 
   // The next change, if the page is ready for it and there is one.
@@ -173,6 +190,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
   void Shown(const Json& which) {
     const std::optional<uint16_t> id = Number(which);
+    if (!id.has_value()) return Complain("shown is the id of a watch, 0 to 65535");
     const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
     if (found == watches_.end()) return;  // it may have ended meanwhile
     found->second.credit = true;
@@ -180,24 +198,31 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   }
 
   void Unwatch(const Json& which) {
-    if (const std::optional<uint16_t> id = Number(which)) watches_.erase(*id);
+    const std::optional<uint16_t> id = Number(which);
+    if (!id.has_value()) return Complain("unwatch is the id of a watch, 0 to 65535");
+    Drop(*id);
   }
 
+  void Drop(uint16_t id) { shared_->watches -= watches_.erase(id); }
+
   void End(uint16_t id, const absl::Status& why) {
-    watches_.erase(id);
+    Drop(id);
     peer_->Send(Text({{"ended", {{"id", id}, {"why", std::string(why.message())}}}}), false);
   }
 
   void Dark(const Json& which) {
     const std::optional<uint16_t> id = Number(which);
+    if (!id.has_value()) return Complain("dark is the id of a watch, 0 to 65535");
     const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
     if (found == watches_.end() || found->second.places == nullptr) return;
-    peer_->Send(DarkMessage(*id, kMostDark, *found->second.places), true);
+    peer_->Send(DarkMessage(*id, *found->second.places), true);
   }
 
   void Stats() {
+    if (!Begin(Asked::kStats)) return;
     shared_->core.GetStats(
         Then<daemon::Stats>([](ViewerSocket& self, absl::StatusOr<daemon::Stats> stats) {
+          self.End(Asked::kStats);
           if (!stats.ok()) return self.Complain(std::string(stats.status().message()));
           v1::Stats message;
           wire::Encode(*stats, &message);
@@ -206,10 +231,12 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   }
 
   void Layers() {
+    if (!Begin(Asked::kLayers)) return;
     EntityQuery query;
     query.page_size = 1;
     shared_->core.ListEntities(
         query, Then<EntityPage>([](ViewerSocket& self, absl::StatusOr<EntityPage> page) {
+          self.End(Asked::kLayers);
           if (!page.ok()) return self.Complain(std::string(page.status().message()));
           page->entities.clear();
           v1::ListEntitiesResponse message;
@@ -230,13 +257,16 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     return status.ok();
   }
 
-  void Audit(const char* method, const google::protobuf::Message& request,
-             const absl::Status& result) {
-    access::Audit* const audit = shared_->options.audit;
-    if (audit == nullptr) return;
-    std::string what = request.ShortDebugString();
-    if (what.empty()) what = std::string_view(method) == "ClearLayer" ? "everything" : "nothing";
-    audit->Record("page", "http", method, what, result);
+  // `reply`, with the audit log's line written first, whether or not the socket is still there.
+  template <typename Request, typename T>
+  Core::Reply<T> Audited(const char* method, const Request& request, Core::Reply<T> reply) {
+    return [audit = shared_->options.audit, method, request,
+            reply = std::move(reply)](absl::StatusOr<T> value) {
+      if (audit != nullptr) {
+        audit->Record("page", "http", method, request.ShortDebugString(), value.status());
+      }
+      reply(std::move(value));
+    };
   }
 
   void Update(const Json& json) {
@@ -246,30 +276,31 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     if (!update.ok()) return Complain(std::string(update.status().message()));
     shared_->core.UpdateDisplay(
         request.name(), *std::move(update),
-        Then<DisplayDescription>([request](ViewerSocket& self, auto display) {
-          self.Audit("UpdateDisplay", request, display.status());
-          if (!display.ok()) return self.Complain(std::string(display.status().message()));
-          self.peer_->Send(absl::StrCat("{\"display\":", DisplayJson(*display), "}"), false);
-        }));
+        Audited("UpdateDisplay", request,
+                Then<DisplayDescription>([](ViewerSocket& self, auto display) {
+                  if (!display.ok()) return self.Complain(std::string(display.status().message()));
+                  self.peer_->Send(absl::StrCat("{\"display\":", DisplayJson(*display), "}"),
+                                   false);
+                })));
   }
 
   void Clear(const Json& json) {
     v1::ClearLayerRequest request;
     if (!ReadControl(json, &request)) return;
-    shared_->core.ClearLayer(request.owner(), request.layer(), false, std::nullopt,
-                             Then<Cleared>([request](ViewerSocket& self, auto cleared) {
-                               self.Audit("ClearLayer", request, cleared.status());
-                               if (!cleared.ok()) {
-                                 return self.Complain(std::string(cleared.status().message()));
-                               }
-                               self.Layers();
-                             }));
+    shared_->core.ClearLayer(
+        request.owner(), request.layer(), false, std::nullopt,
+        Audited("ClearLayer", request, Then<Cleared>([](ViewerSocket& self, auto cleared) {
+                  if (!cleared.ok()) return self.Complain(std::string(cleared.status().message()));
+                  self.Layers();
+                })));
   }
 
   const std::shared_ptr<ViewerShared> shared_;
   const std::shared_ptr<http::WebSocketPeer> peer_;
   const bool control_;
   std::map<uint16_t, Watched> watches_;
+  uint64_t last_serial_ = 0;
+  std::array<bool, 3> asked_{};
 };
 
 class Service final : public http::WebSocketService {

@@ -18,8 +18,9 @@ struct ViewerShared {
   Core& core;
   sync::Clock& clock;
   const ViewerOptions options;
-  // Of displays that somebody watches: finding places takes a while.
-  std::map<std::string, std::weak_ptr<PixelPlaces>> places;
+  // Of displays that somebody has watched: finding places takes a while.
+  std::map<std::string, std::shared_ptr<PixelPlaces>> places;
+  size_t watches = 0;  // of all sockets
 };
 
 // `control`: it may change displays and layers.

@@ -70,13 +70,9 @@ std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, Pixe
                  slices, points);
 }
 
-std::string DarkMessage(uint16_t watch, size_t most, PixelPlaces& places) {
-  const auto pixels = static_cast<size_t>(places.width()) * static_cast<size_t>(places.height()) *
-                      static_cast<size_t>(places.slices());
-  Points points;
-  places.AppendEvery(std::max<size_t>(1, (pixels + most - 1) / most), &points);
+std::string DarkMessage(uint16_t watch, PixelPlaces& places) {
   return Message({.kind = MessageKind::kDark, .whole = true, .watch = watch, .volume = 0}, {},
-                 points);
+                 places.Sample());
 }
 
 }  // namespace voxeld::daemon::viewer

@@ -15,7 +15,7 @@ enum class MessageKind : uint8_t { kVolume = 1, kDark = 2 };
 // The slices of `change` with all their lit pixels, for the watch of that number. `change` is of the display that
 // `places` is of.
 std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places);
-// Where pixels are, lit or not: `most` at the most, spread over the display.
-std::string DarkMessage(uint16_t watch, size_t most, PixelPlaces& places);
+// Where pixels are, lit or not (PixelPlaces::Sample).
+std::string DarkMessage(uint16_t watch, PixelPlaces& places);
 
 }  // namespace voxeld::daemon::viewer

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "daemon/pipeline/frame_pipeline.h"
 #include "tests/daemon/fakes/simulation.h"
 
 namespace voxeld::daemon {
@@ -69,6 +70,7 @@ TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
   viewer.Show();
   EXPECT_TRUE(viewer.feed->asleep());
   sim.core->Step();
+  sim.Advance(FramePipeline::kWatchLinger);
   EXPECT_FALSE(sim.display().tapped()) << "nothing is decoded for a sleeper";
 
   auto change = viewer.feed->Take();  // awake
@@ -96,6 +98,15 @@ TEST(VolumeFeed, TwoWatchOneDisplayAndTheLastToGoEndsIt) {
   EXPECT_TRUE(sim.display().tapped());
   first.feed.reset();
   sim.core->Step();
+  sim.Advance(FramePipeline::kWatchLinger - 1);
+  EXPECT_TRUE(sim.display().tapped()) << "who comes and goes costs the display nothing";
+  const int sent = sim.display().sent;
+  Viewer third(sim);
+  EXPECT_EQ(third.readies, 1) << "the newest, and nothing is sent again for it";
+  EXPECT_EQ(sim.display().sent, sent);
+  third.feed.reset();
+  sim.core->Step();
+  sim.Advance(FramePipeline::kWatchLinger);
   EXPECT_FALSE(sim.display().tapped());
 }
 

@@ -139,8 +139,7 @@ TEST(PixelPlaces, ALatticeHasItsLightsAlone) {
   EXPECT_EQ(places.Append(1, white, &points), 1u);
   EXPECT_EQ(points.x, (std::vector<uint16_t>{0, kPlaceSteps}));
   EXPECT_EQ(points.y, (std::vector<uint16_t>{kPlaceSteps, 0}));
-  Points dark;
-  places.AppendEvery(1, &dark);
+  const Points& dark = places.Sample();
   EXPECT_EQ(dark.size(), 2u);
   EXPECT_EQ(dark.rgb, std::vector<uint8_t>(6, 0));
 }

@@ -64,10 +64,10 @@ TEST(VolumeMessage, IsAsItIsDocumented) {
 
 TEST(VolumeMessage, DarkPixelsAreASample) {
   PixelPlaces places(ThreePlanes());
-  const std::string bytes = DarkMessage(1, 3, places);  // of six
+  const std::string bytes = DarkMessage(1, places);
   EXPECT_EQ(Read<uint8_t>(bytes, 0), 2);
-  EXPECT_EQ(Read<uint32_t>(bytes, 8), 3u);
-  EXPECT_EQ(bytes.size(), 24u + 27);
+  EXPECT_EQ(Read<uint32_t>(bytes, 8), 6u) << "all, where there are few";
+  EXPECT_EQ(bytes.size(), 24u + 54);
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ export class DisplayView {
   onDrawn: (drawn: Drawn) => void = () => {};
   private readonly observer: ResizeObserver;
   private size: [number, number] = [0, 0];
+  private over = "";
 
   constructor(readonly name: string, makeRenderer: (canvas: HTMLCanvasElement) => Renderer, private readonly redraw: () => void) {
     this.element.className = "view";
@@ -48,8 +49,18 @@ export class DisplayView {
     this.renderer.begin(watching);
   }
 
-  say(text: string): void {
-    this.label.textContent = text;
+  // Whether the display gives light, and why not.
+  light(lit: boolean, why: string): void {
+    if (this.over !== "") return;
+    this.element.classList.toggle("unlit", !lit);
+    this.label.textContent = lit ? this.name : `${this.name}: ${why}`;
+  }
+
+  // Nothing more will come of this watch.
+  end(why: string): void {
+    this.over = why;
+    this.element.classList.add("unlit");
+    this.label.textContent = `${this.name}: ${why}`;
   }
 
   draw(orbit: Orbit, look: Look, colors: OutlineColors): void {

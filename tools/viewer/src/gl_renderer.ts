@@ -77,7 +77,11 @@ export class GlRenderer implements Renderer {
   // Throws where there is no WebGL2, or no pictures of half floats.
   constructor(canvas: HTMLCanvasElement) {
     this.gl = new WebGLRenderer({ canvas, alpha: true, antialias: false, premultipliedAlpha: false, powerPreference: "high-performance" });
-    if (this.gl.getContext().getExtension("EXT_color_buffer_float") === null) throw new Error("no half floats to draw into");
+    if (this.gl.getContext().getExtension("EXT_color_buffer_float") === null) {
+      this.gl.dispose();
+      this.gl.forceContextLoss();
+      throw new Error("no half floats to draw into");
+    }
     this.gl.autoClear = false;
     this.target = new WebGLRenderTarget(1, 1, { type: HalfFloatType, depthBuffer: false, magFilter: NearestFilter, minFilter: NearestFilter });
     this.material = new RawShaderMaterial({
@@ -134,6 +138,7 @@ export class GlRenderer implements Renderer {
   }
 
   dispose(): void {
+    this.asked = this.watching = null;
     this.clear();
     this.target.dispose();
     this.gl.dispose();

@@ -11,6 +11,7 @@ import { SplatRenderer, trySplat } from "./splat_renderer";
 const kTrialPoints = 100_000;
 const kStatsEvery = 1000;
 const kMostViews = 6;
+const kAgainAfter = 2000;
 
 const byId = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const input = (id: string) => byId<HTMLInputElement>(id);
@@ -25,7 +26,7 @@ class Page {
   private readonly look: Look = { exposure: 1, dark: false, outline: true, sweep: null };
   private nextWatch = 0;
   private dirty = false;
-  private readonly owed = new Set<number>(); // watches whose newest volume has not been drawn yet
+  private readonly owed = new Map<number, number>(); // watches whose newest volume, of that number, has not been drawn yet
   private framesBefore = 0;
   private sweepAt = 0;
   private lastTick = 0;
@@ -54,7 +55,7 @@ class Page {
       this.slicesKnown();
       this.redraw();
     }
-    if (message.ended !== undefined) this.views.get(message.ended.id)?.say(message.ended.why);
+    if (message.ended !== undefined) this.ended(message.ended.id, message.ended.why);
     if (message.stats !== undefined) this.figures(message.stats);
     if (message.layers !== undefined) {
       this.panels.layers(message.layers.layers ?? [], this.hello?.control ?? false,
@@ -69,7 +70,7 @@ class Page {
     const watch = header.getUint16(2, true);
     const view = this.views.get(watch);
     if (view === undefined) return;
-    if (header.getUint8(0) === 1) this.owed.add(watch);
+    if (header.getUint8(0) === 1) this.owed.set(watch, Number(header.getBigUint64(16, true)));
     view.renderer.update(message);
     this.redraw();
   }
@@ -92,6 +93,16 @@ class Page {
 
   private wantsAll = new URLSearchParams(location.hash.slice(1)).get("display") === "";
 
+  // The display stopped, or its bytes could not be read: what is drawn is not what it shows any more.
+  private ended(id: number, why: string): void {
+    const view = this.views.get(id);
+    if (view === undefined) return;
+    view.end(why);
+    setTimeout(() => {
+      if (this.views.get(id) === view) this.watch();
+    }, kAgainAfter);
+  }
+
   private closed(): void {
     byId("offline").hidden = false;
     this.owed.clear();
@@ -111,7 +122,10 @@ class Page {
       const id = this.nextWatch++ % 65536;
       const view = new DisplayView(display.name, this.makeRenderer, () => this.redraw());
       view.onDrawn = () => {
-        if (this.owed.delete(id)) this.connection.send({ shown: id });
+        if (this.owed.get(id) === view.drawn.volume) {
+          this.owed.delete(id);
+          this.connection.send({ shown: id });
+        }
         byId("views").dataset["volume"] = String(view.drawn.volume);
       };
       this.views.set(id, view);
@@ -126,7 +140,7 @@ class Page {
   private figures(stats: NonNullable<FromDaemon["stats"]>): void {
     const view = this.first();
     const frames = [...this.views.values()].reduce((sum, each) => sum + each.frames, 0);
-    this.panels.figures(stats, view?.name ?? "", {
+    if (!byId("panel").hidden) this.panels.figures(stats, view?.name ?? "", {
       points: [...this.views.values()].reduce((sum, each) => sum + each.drawn.points, 0),
       frames: Math.max(0, frames - this.framesBefore),
       renderer: view?.renderer.name ?? "",
@@ -135,8 +149,7 @@ class Page {
     for (const each of this.views.values()) {
       const display = stats.displays.find((d) => d.name === each.name);
       const dark = display !== undefined && display.state !== "DISPLAY_STATE_SHOWING";
-      each.element.classList.toggle("unlit", dark);
-      each.say(dark ? `${each.name}: ${display.state_reason}` : each.name);
+      each.light(!dark, dark ? display.state_reason : "");
     }
   }
 
@@ -149,9 +162,9 @@ class Page {
   }
 
   private askForFigures(): void {
-    if (document.hidden || byId("panel").hidden) return;
-    this.connection.send({ stats: true });
-    this.connection.send({ layers: true });
+    if (document.hidden) return;
+    this.connection.send({ stats: true }); // of the displays' state, too
+    if (!byId("panel").hidden) this.connection.send({ layers: true });
   }
 
   private say(text: string): void {
@@ -263,6 +276,7 @@ class Page {
     });
     byId("display").addEventListener("change", () => {
       this.chosen = byId<HTMLSelectElement>("display").value;
+      this.wantsAll = this.chosen === "";
       this.watch();
       this.moved();
     });

@@ -65,7 +65,10 @@ export function trySplat(points: number): Promise<number> {
       worker.terminate();
       resolve(event.data.trial);
     };
-    worker.onerror = () => resolve(Infinity);
+    worker.onerror = () => {
+      worker.terminate();
+      resolve(Infinity);
+    };
     worker.postMessage({ trial: points } satisfies ToWorker);
   });
 }
