@@ -349,7 +349,8 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
-  Welcome(core, http->get(), **viewer);
+  // JSON is for programs, which may read both outputs as one.
+  if (config.log.format == "text") Welcome(core, http->get(), **viewer);
 
   const std::string displays_text =
       absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays");

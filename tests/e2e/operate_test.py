@@ -17,6 +17,8 @@ from typing import Any, Iterator, Optional
 import numpy as np
 import voxeld as voxel
 
+from polling import until
+
 LONG = 60.0
 KILLS = int(os.environ.get("KILLS", "5"))
 
@@ -226,6 +228,11 @@ class State(unittest.TestCase):
             with voxel.connect(self.socket) as brief:  # goes with its session
                 brief.sphere("gone", radius=0.9)
                 brief.commit().wait(LONG)
+            with voxel.connect(self.socket, timeout=LONG) as after:  # a volume that was drawn after it had gone
+                until(lambda: all(entity.key.id != "gone" for entity in after.entities()), "the end of what goes")
+                accepted = after.commit().wait(LONG).accepted
+                assert accepted is not None
+                after.capture(at_least_snapshot=accepted.snapshot, timeout=LONG)
             before = self.picture()
             self.assertGreater(int((before > 0).any(axis=-1).sum()), 500)
             daemon.kill()

@@ -144,7 +144,7 @@ TEST(Http, HealthAndMetricsOfTheRunningDaemon) {
   EXPECT_THAT(HttpGet(daemon.http(), "/healthz"), HasSubstr("{\"status\":\"ok\",\"reasons\":[]}"));
   EXPECT_THAT(metrics, StartsWith("HTTP/1.1 200 "));
   EXPECT_THAT(metrics, HasSubstr(kShowing));
-  EXPECT_THAT(HttpGet(daemon.http(), "/"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(HttpGet(daemon.http(), "/other"), StartsWith("HTTP/1.1 404 "));
 }
 
 class Stop : public ::testing::TestWithParam<int> {};
