@@ -58,6 +58,7 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-calibrate.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-clear.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-completion.1.gz
+-rw-r--r-- root/root ./usr/share/man/man1/voxelctl-demo.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-displays.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-doctor.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-draw.1.gz
