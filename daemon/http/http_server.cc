@@ -312,8 +312,9 @@ class Server::Impl {
   }
 
   void OnUpgraded(Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
-    sockets_.insert(
-        StartWebSocket(io_, std::move(stream), request, serve, [this](WebSocketSession* closed) {
+    sockets_.insert(StartWebSocket(
+        io_, std::move(stream), request, std::chrono::nanoseconds(options_.message_limit_ns), serve,
+        [this](WebSocketSession* closed) {
           std::erase_if(sockets_, [closed](const auto& socket) { return socket.get() == closed; });
           Accept();
         }));

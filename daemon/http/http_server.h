@@ -49,7 +49,8 @@ struct ServerOptions {
   uint32_t max_header_bytes = 8192;  // 431 beyond
   // For a request to come in, and for an answer to be read.
   sync::TimeNs idle_limit_ns = 10 * sync::kSecond;
-  sync::TimeNs answer_limit_ns = 5 * sync::kSecond;  // for the handler; then 503
+  sync::TimeNs answer_limit_ns = 5 * sync::kSecond;    // for the handler; then 503
+  sync::TimeNs message_limit_ns = 30 * sync::kSecond;  // for a WebSocket's message to be read
 };
 
 // Times are the system's: sockets know no other.

@@ -20,7 +20,6 @@ using boost::system::error_code;
 
 constexpr auto kHandshakeLimit = std::chrono::seconds(10);
 constexpr auto kSilenceLimit = std::chrono::seconds(60);  // half of it: a ping
-constexpr auto kWriteLimit = std::chrono::seconds(30);    // of one message
 constexpr size_t kMostReason = 123;
 // Waiting to be sent; beyond, nothing more is read that could ask for more.
 constexpr size_t kMostWaitingBytes = 1 << 20, kMostWaiting = 64;
@@ -28,9 +27,10 @@ constexpr size_t kMostWaitingBytes = 1 << 20, kMostWaiting = 64;
 class Session final : public WebSocketSession, public std::enable_shared_from_this<Session> {
  public:
   Session(std::shared_ptr<asio::io_context> io, ConnectionStream stream,
-          std::function<void(WebSocketSession*)> closed)
+          std::chrono::nanoseconds message_limit, std::function<void(WebSocketSession*)> closed)
       : io_(std::move(io)),
         socket_(std::move(stream)),
+        message_limit_(message_limit),
         write_timer_(io_->get_executor()),
         closed_(std::move(closed)) {}
 
@@ -109,7 +109,7 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
                                  [self = shared_from_this()](error_code) { self->End(); });
     }
     socket_.binary(next.binary);
-    write_timer_.expires_after(kWriteLimit);
+    write_timer_.expires_after(message_limit_);
     write_timer_.async_wait([self = shared_from_this()](error_code error) {
       if (!error) self->Close();  // who does not read
     });
@@ -155,6 +155,7 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
 
   const std::shared_ptr<asio::io_context> io_;
   websocket::stream<ConnectionStream> socket_;
+  const std::chrono::nanoseconds message_limit_;
   asio::steady_timer write_timer_;
   std::function<void(WebSocketSession*)> closed_;  // empty once closed
   std::unique_ptr<WebSocketService> service_;
@@ -169,10 +170,11 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
 
 std::shared_ptr<WebSocketSession> StartWebSocket(
     std::shared_ptr<asio::io_context> io, ConnectionStream stream, const RequestMessage& request,
+    std::chrono::nanoseconds message_limit,
     const std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>& serve,
     std::function<void(WebSocketSession*)> closed) {
   const auto session =
-      std::make_shared<Session>(std::move(io), std::move(stream), std::move(closed));
+      std::make_shared<Session>(std::move(io), std::move(stream), message_limit, std::move(closed));
   session->Start(request, serve);
   return session;
 }

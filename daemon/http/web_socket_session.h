@@ -1,6 +1,7 @@
 // A WebSocket's connection: reads whole messages, writes one after another, asks the other end for a sign of life.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 
@@ -16,11 +17,12 @@ class WebSocketSession {
   virtual void Close() = 0;  // at once
 };
 
-// On the server's thread. Answers `request`, an upgrade, and serves until either end closes; then `closed`, once.
+// On the server's thread. Answers `request`, an upgrade, and serves until either end closes, or a message has not been read
+// within `message_limit`; then `closed`, once.
 // The session keeps itself alive while it is open.
 std::shared_ptr<WebSocketSession> StartWebSocket(
     std::shared_ptr<boost::asio::io_context> io, ConnectionStream stream,
-    const RequestMessage& request,
+    const RequestMessage& request, std::chrono::nanoseconds message_limit,
     const std::function<std::unique_ptr<WebSocketService>(std::shared_ptr<WebSocketPeer>)>& serve,
     std::function<void(WebSocketSession*)> closed);
 

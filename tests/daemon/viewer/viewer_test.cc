@@ -40,7 +40,7 @@ class ViewerTest : public ::testing::Test {
     ASSERT_TRUE(viewer.ok());
     viewer_ = *std::move(viewer);
     auto server = http::Server::Start(
-        {.listen = *ParseAddress("127.0.0.1:0")},
+        {.listen = *ParseAddress("127.0.0.1:0"), .message_limit_ns = sync::kSecond},
         viewer_->Handler([](const http::Request&, http::Done) { return false; }),
         viewer_->Upgrade());
     ASSERT_TRUE(server.ok()) << server.status();
@@ -200,6 +200,28 @@ TEST_F(ViewerTest, WhatIsWrongIsSaidAndTheSocketGoesOn) {
   socket->write(asio::buffer(std::string(http::kGreatestMessage + 1, 'x')));
   EXPECT_THROW(while (true) Hear(*socket), boost::system::system_error);
   EXPECT_NO_THROW(Open());
+}
+
+// Answers that nobody reads wait in bounded room: nothing more is read of who asks for them, and others go on.
+TEST_F(ViewerTest, WhoDoesNotReadIsNotReadEither) {
+  const auto socket = Open();
+  Say(*socket, {{"watch", "one"}, {"id", 1}});
+  HearOf(*socket, "watching");
+  const std::string ask = Json{{"dark", 1}, {"more", std::string(8000, 'x')}}.dump();
+  boost::system::error_code error;
+  int taken = 0;
+  while (!error && ++taken < 20'000) socket->write(asio::buffer(ask), error);
+  EXPECT_TRUE(error) << "160 MB of requests were read, and their answers kept";  // it was closed
+  const auto other = Open();
+  Say(*other, {{"hello", true}});
+  EXPECT_EQ(HearOf(*other, "hello")["version"], "1.2");
+}
+
+TEST_F(ViewerTest, SocketsLeaveRoomForOthers) {
+  std::vector<std::unique_ptr<Socket>> sockets;
+  for (int i = 0; i < 48; ++i) sockets.push_back(Open());
+  EXPECT_THROW(Open(), boost::system::system_error);
+  EXPECT_NE(Get("/").result_int(), 503u);
 }
 
 TEST_F(ViewerTest, ControlIsForTheAddressThatServesOnce) {
