@@ -41,7 +41,8 @@ size_t NextLit(std::span<const uint8_t> bytes, size_t at) {
 }
 
 uint16_t Step(float value) {
-  return static_cast<uint16_t>(std::clamp(value, 0.0f, static_cast<float>(kSteps)) + 0.5f);
+  constexpr float kHalf = 0.5f;  // to the nearest: places are not negative
+  return static_cast<uint16_t>(std::clamp(value, 0.0f, static_cast<float>(kSteps)) + kHalf);
 }
 
 }  // namespace
@@ -159,15 +160,17 @@ size_t PixelPlaces::Append(int32_t slice, std::span<const uint8_t> rgb, Points* 
   const auto width = static_cast<size_t>(width_);
   for (size_t byte = NextLit(rgb, 0); byte < rgb.size();) {
     const size_t pixel = byte / 3;
-    if (straight_) {
+    if (columns != nullptr) {
       const Column& column = columns[pixel % width];
-      const auto v = static_cast<float>(pixel / width);
+      const size_t row = pixel / width;
+      const auto v = static_cast<float>(row);
       out->x.push_back(Step(column.base[0] + v * column.step[0]));
       out->y.push_back(Step(column.base[1] + v * column.step[1]));
       out->z.push_back(Step(column.base[2] + v * column.step[2]));
       out->rgb.insert(out->rgb.end(), rgb.begin() + static_cast<std::ptrdiff_t>(pixel * 3),
                       rgb.begin() + static_cast<std::ptrdiff_t>(pixel * 3 + 3));
-    } else if (const Place& place = places[pixel]; place.x != kNone.x) {
+    } else if (places != nullptr && places[pixel].x != kNone.x) {
+      const Place& place = places[pixel];
       out->x.push_back(place.x);
       out->y.push_back(place.y);
       out->z.push_back(place.z);
