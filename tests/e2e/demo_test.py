@@ -10,7 +10,8 @@ import time
 import unittest
 from pathlib import Path
 
-LONG = 60.0
+from polling import LONG, until
+
 VOXELCTL = os.environ["VOXELCTL"]
 DATA = os.environ["DATA"]
 NAMES = ["globe", "earthquakes", "house", "engine", "brain", "molecule", "gyroid", "galaxy", "life", "clock"]
@@ -34,10 +35,7 @@ class Daemon:
                                    env=self.environment, stdout=subprocess.DEVNULL)
         test.addCleanup(process.wait)
         test.addCleanup(process.terminate)
-        end = time.monotonic() + LONG
-        while self.run("displays").returncode != 0:
-            test.assertLess(time.monotonic(), end, "voxeld did not start")
-            time.sleep(0.05)
+        until(lambda: self.run("displays").returncode == 0, "voxeld, listening")
 
     def run(self, *words: str) -> "subprocess.CompletedProcess[str]":
         return subprocess.run([VOXELCTL, *words], env=self.environment, capture_output=True, text=True, timeout=LONG, check=False)
@@ -74,7 +72,7 @@ class Demo(unittest.TestCase):
         self.addCleanup(playing.kill)
         for name in NAMES:
             self.assertEqual(self.begins(playing)["scene"], name)
-            time.sleep(0.4)
+            time.sleep(0.4)  # what it shows is looked at while it moves
             shown[name] = [int(display["lit_voxels"]) for display in daemon.json("stats")["displays"]]
         words, errors = playing.communicate(timeout=LONG)
         self.assertEqual(playing.returncode, 0, errors)
@@ -104,7 +102,7 @@ class Demo(unittest.TestCase):
         daemon = Daemon(self, "stack")
         playing = daemon.demo("life", "--seconds", "0.2")
         self.assertEqual(self.begins(playing)["scene"], "life")
-        time.sleep(1)
+        time.sleep(1)  # it stays: longer than its time in a row of scenes
         self.assertEqual(len(daemon.json("entities")["layers"]), 1)
         playing.send_signal(signal.SIGINT)
         words, errors = playing.communicate(timeout=LONG)

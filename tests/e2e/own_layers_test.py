@@ -3,11 +3,11 @@ import json
 import os
 import subprocess
 import tempfile
-import time
 import unittest
 from pathlib import Path
 
-LONG = 60.0
+from polling import LONG, until
+
 VOXELCTL = os.environ["VOXELCTL"]
 
 
@@ -28,10 +28,7 @@ class Layers(unittest.TestCase):
                           '[[display]]\nname = "sim"\ndriver = "simulated"\nsize = "24x24x16"\nrate = 100\n')
         self.daemon = subprocess.Popen([os.environ["VOXELD"], "--config", str(config), "--log-level", "warn"])
         self.addCleanup(self.end)
-        stop = time.monotonic() + LONG
-        while self.run_as("boss", "displays").returncode != 0:
-            self.assertLess(time.monotonic(), stop)
-            time.sleep(0.05)
+        until(lambda: self.run_as("boss", "displays").returncode == 0, "voxeld, listening")
 
     def end(self) -> None:
         self.daemon.kill()
@@ -123,10 +120,7 @@ class Layers(unittest.TestCase):
         assert running.stdin is not None
         running.stdin.write(b"\n")
         running.stdin.flush()
-        stop = time.monotonic() + LONG
-        while self.scene()[1] == 0:
-            self.assertLess(time.monotonic(), stop)
-            time.sleep(0.05)
+        until(lambda: self.scene()[1] != 0, "the lights")
         self.does("boss", "clear")
         self.assertEqual(self.scene()[1], 1)
         running.communicate(b"\n", timeout=LONG)
@@ -141,10 +135,7 @@ class Layers(unittest.TestCase):
     def test_who_may_only_look_is_refused(self) -> None:
         grants = self.folder / "grants.toml"
         grants.write_text(grants.read_text().replace('["view", "draw"]', '["view"]'))
-        stop = time.monotonic() + LONG
-        while self.run_as("painter", "draw", "sphere radius=0.5").returncode == 0:  # the file is looked at every second
-            self.assertLess(time.monotonic(), stop)
-            time.sleep(0.1)
+        until(lambda: self.run_as("painter", "draw", "sphere radius=0.5").returncode != 0, "the file, which is looked at every second")
         self.does("boss", "draw", "sphere radius=0.5")
         refused = self.run_as("painter", "clear")
         self.assertEqual(refused.returncode, 1)

@@ -2,12 +2,12 @@
 import json
 import signal
 import subprocess
-import time
 import unittest
 from typing import Any
 
 import numpy as np
 
+from polling import until
 from quick_daemon import LONG, VOXELCTL, QuickDaemon
 
 
@@ -75,10 +75,7 @@ class Pictures(unittest.TestCase):
         self.addCleanup(process.stderr.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
-        end = time.monotonic() + LONG
-        while not list(self.daemon.folder.glob("a.gif.*.tmp")):
-            assert time.monotonic() < end and process.poll() is None
-            time.sleep(0.01)
+        until(lambda: list(self.daemon.folder.glob("a.gif.*.tmp")), "the picture's beginning")
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(LONG), 130)
         self.assertEqual(process.stderr.read(), "voxelctl: interrupted\n")

@@ -2,10 +2,10 @@
 import os
 import subprocess
 import tempfile
-import time
 from pathlib import Path
 
-LONG = 60.0
+from polling import LONG, until
+
 VOXELCTL = os.environ["VOXELCTL"]
 
 
@@ -25,10 +25,11 @@ class QuickDaemon:
             [os.environ["VOXELD"], "--listen", self.server, "--http", "off", "--log-level", "warn",
              "--display", "stack=simulated,geometry=planar,size=16x16x16", "--display", "rotor=simulated,geometry=rotor,size=16x16,slices=60"],
             env=self.environment)
-        end = time.monotonic() + LONG
-        while self.voxelctl("displays").returncode != 0:
-            assert self.process.poll() is None and time.monotonic() < end, "voxeld does not listen"
-            time.sleep(0.05)
+        until(self._listens, "voxeld, listening")
+
+    def _listens(self) -> bool:
+        assert self.process.poll() is None, "voxeld has ended"
+        return self.voxelctl("displays").returncode == 0
 
     def voxelctl(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([VOXELCTL, *arguments], env=self.environment, capture_output=True, text=True, timeout=LONG)

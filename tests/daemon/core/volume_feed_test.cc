@@ -12,6 +12,16 @@ namespace {
 using testing::Put;
 using testing::Simulation;
 
+// With something in the scene.
+struct Lit : Simulation {
+  Lit() {
+    Start();
+    client = Open();
+    Send(client, 1, Put("a", "x", 1));
+  }
+  Client client;
+};
+
 struct Viewer {
   Viewer(Simulation& sim, const std::string& display = "main")
       : sim(sim), feed(VolumeFeed::Open(*sim.core, sim.clock, display, [this] { ++readies; })) {
@@ -30,10 +40,7 @@ struct Viewer {
 };
 
 TEST(VolumeFeed, BeginsWithAllAndGoesOnWithWhatDiffers) {
-  Simulation sim;
-  sim.Start();
-  auto client = sim.Open();
-  sim.Send(client, 1, Put("a", "x", 1));
+  Lit sim;
   Viewer viewer(sim);
   viewer.Show();
   EXPECT_EQ(viewer.readies, 1);
@@ -45,7 +52,7 @@ TEST(VolumeFeed, BeginsWithAllAndGoesOnWithWhatDiffers) {
   ASSERT_TRUE(change.ok());
   EXPECT_FALSE(change->has_value());
 
-  sim.Send(client, 2, Put("a", "y", 2));
+  sim.Send(sim.client, 2, Put("a", "y", 2));
   viewer.Show();
   EXPECT_EQ(viewer.readies, 2);
   change = viewer.feed->Take();
@@ -55,18 +62,15 @@ TEST(VolumeFeed, BeginsWithAllAndGoesOnWithWhatDiffers) {
 }
 
 TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
-  Simulation sim;
-  sim.Start();
-  auto client = sim.Open();
-  sim.Send(client, 1, Put("a", "x", 1));
+  Lit sim;
   Viewer viewer(sim);
   viewer.Show();
-  sim.Send(client, 2, Put("a", "x", 2));
+  sim.Send(sim.client, 2, Put("a", "x", 2));
   viewer.Show();
   EXPECT_EQ(viewer.readies, 1) << "told once, though two came";
   EXPECT_FALSE(viewer.feed->asleep());
   sim.clock.Advance(VolumeFeed::kPatience);
-  sim.Send(client, 3, Put("a", "x", 3));
+  sim.Send(sim.client, 3, Put("a", "x", 3));
   viewer.Show();
   EXPECT_TRUE(viewer.feed->asleep());
   sim.core->Step();
@@ -84,10 +88,7 @@ TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
 }
 
 TEST(VolumeFeed, TwoWatchOneDisplayAndTheLastToGoEndsIt) {
-  Simulation sim;
-  sim.Start();
-  auto client = sim.Open();
-  sim.Send(client, 1, Put("a", "x", 1));
+  Lit sim;
   Viewer first(sim);
   first.Show();
   auto second = std::make_unique<Viewer>(sim);

@@ -70,6 +70,23 @@ class Assets : public ::testing::Test {
     return call->Finish();
   }
 
+  // A call that has brought the first four bytes of the point.
+  struct Begun {
+    explicit Begun(Assets& test) {
+      SetDeadline(context);
+      call = test.daemon_->scene().UploadAsset(&context, &response);
+      request.set_sha256(kPointHash);
+      request.set_size(12);
+      request.set_data(kPoint.substr(0, 4));
+      written = call->Write(request);
+    }
+    grpc::ClientContext context;
+    v1::UploadAssetResponse response;
+    v1::UploadAssetRequest request;
+    std::unique_ptr<grpc::ClientWriter<v1::UploadAssetRequest>> call;
+    bool written = false;
+  };
+
   v1::ListAssetsResponse List(const std::string& hash = "") {
     grpc::ClientContext context;
     SetDeadline(context);
@@ -188,30 +205,18 @@ TEST_F(Assets, AServerMayKeepNone) {
 
 TEST_F(Assets, AnUploadUnderWayEndsWithTheServer) {
   Start();
-  grpc::ClientContext context;
-  SetDeadline(context);
-  const auto call = daemon_->scene().UploadAsset(&context, &response_);
-  v1::UploadAssetRequest request;
-  request.set_sha256(kPointHash);
-  request.set_size(12);
-  request.set_data(kPoint.substr(0, 4));
-  ASSERT_TRUE(call->Write(request));
+  Begun begun(*this);
+  ASSERT_TRUE(begun.written);
   while (List(kPointHash).assets(0).stored() < 4) continue;
   daemon_->server().Shutdown(5 * sync::kSecond);
-  EXPECT_EQ(call->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(begun.call->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
 TEST_F(Assets, AnUploadThatFallsSilentEnds) {
   Start(true, sync::kSecond / 5);
-  grpc::ClientContext context;
-  SetDeadline(context);
-  const auto call = daemon_->scene().UploadAsset(&context, &response_);
-  v1::UploadAssetRequest request;
-  request.set_sha256(kPointHash);
-  request.set_size(12);
-  request.set_data(kPoint.substr(0, 4));
-  ASSERT_TRUE(call->Write(request));
-  const grpc::Status silent = call->Finish();  // the client says nothing more
+  Begun begun(*this);
+  ASSERT_TRUE(begun.written);
+  const grpc::Status silent = begun.call->Finish();  // the client says nothing more
   EXPECT_EQ(silent.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   EXPECT_THAT(silent.error_message(), HasSubstr("upload_silence_limit_ns"));
   EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u);
@@ -237,40 +242,27 @@ TEST_F(Assets, AFullDiskIsSaidAndTheServerGoesOn) {
 
 TEST_F(Assets, TwoAtOnceOfOneContent) {
   Start();
-  grpc::ClientContext context;
-  SetDeadline(context);
-  v1::UploadAssetResponse response;
-  const auto call = daemon_->scene().UploadAsset(&context, &response);
-  v1::UploadAssetRequest request;
-  request.set_sha256(kPointHash);
-  request.set_size(12);
-  request.set_data(kPoint.substr(0, 4));
-  ASSERT_TRUE(call->Write(request));
+  Begun begun(*this);
+  ASSERT_TRUE(begun.written);
   while (List(kPointHash).assets(0).stored() < 4) continue;
   const grpc::Status second = Upload(kPointHash, 12, {{kPoint, 0}});
   EXPECT_EQ(second.error_code(), grpc::StatusCode::ABORTED);
   EXPECT_THAT(second.error_message(), HasSubstr("another upload"));
-  request.set_offset(4);
-  request.set_data(kPoint.substr(4));
-  ASSERT_TRUE(call->Write(request));
-  call->WritesDone();
-  EXPECT_TRUE(call->Finish().ok());
+  begun.request.set_offset(4);
+  begun.request.set_data(kPoint.substr(4));
+  ASSERT_TRUE(begun.call->Write(begun.request));
+  begun.call->WritesDone();
+  EXPECT_TRUE(begun.call->Finish().ok());
 }
 
 TEST_F(Assets, OneCallBringsOne) {
   Start();
-  grpc::ClientContext context;
-  SetDeadline(context);
-  const auto call = daemon_->scene().UploadAsset(&context, &response_);
-  v1::UploadAssetRequest request;
-  request.set_sha256(kPointHash);
-  request.set_size(12);
-  request.set_data(kPoint.substr(0, 4));
-  ASSERT_TRUE(call->Write(request));
-  request.set_sha256(std::string(32, 'x'));
-  request.set_offset(4);
-  ASSERT_TRUE(call->Write(request));
-  const grpc::Status status = call->Finish();
+  Begun begun(*this);
+  ASSERT_TRUE(begun.written);
+  begun.request.set_sha256(std::string(32, 'x'));
+  begun.request.set_offset(4);
+  ASSERT_TRUE(begun.call->Write(begun.request));
+  const grpc::Status status = begun.call->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_THAT(status.error_message(), HasSubstr("one call brings one asset"));
 }

@@ -197,10 +197,17 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     assert.match(page.url(), /camera=-16%2C32%2C1%2C/);
     await page.keyboard.press("r");
     assert.deepEqual(await page.evaluate(() => globalThis.voxeld.inspect().place(1, 2, 3)), home);
-    assert.equal(await page.isChecked("#dark"), false);
+    const before = await picture(page);
     await page.keyboard.press("S");
     assert.equal(await page.isChecked("#dark"), true);
-    await page.waitForFunction(async () => true);
+    let differ = 0;
+    for (let turn = 0; differ < 100 && turn < 50; ++turn) { // as they come
+      const after = await picture(page);
+      differ = before.data.reduce((sum, value, i) => sum + (value !== after.data[i] ? 1 : 0), 0);
+    }
+    assert.ok(differ >= 100, `${differ} differ`);
+    await page.keyboard.press("s");
+    assert.equal(await page.isChecked("#dark"), false);
     await context.close();
   });
 

@@ -31,10 +31,8 @@ export class Adaptation {
         const column = Math.floor(((width / 2 + (half * (view[0]! * x[n]! + view[1]! * y[n]! + view[2]! * z[n]! + view[3]!)) / w) / width) * kColumns);
         const row = Math.floor(((height / 2 - (half * (view[4]! * x[n]! + view[5]! * y[n]! + view[6]! * z[n]! + view[7]!)) / w) / height) * kColumns);
         if (column < 0 || row < 0 || column >= kColumns || row >= kColumns) continue;
-        {
-          const at = row * kColumns + column;
-          this.cells[at] = this.cells[at]! + Math.max(rgb[n * 3]!, rgb[n * 3 + 1]!, rgb[n * 3 + 2]!) * light * area(w) * cue(w);
-        }
+        const at = row * kColumns + column;
+        this.cells[at] = this.cells[at]! + Math.max(rgb[n * 3]!, rgb[n * 3 + 1]!, rgb[n * 3 + 2]!) * light * area(w) * cue(w);
       }
     }
     this.sorted.length = 0;
