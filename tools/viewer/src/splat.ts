@@ -45,7 +45,7 @@ export class Splat {
     const focal = (Math.min(this.width, this.height) / 2) * scene.pitch * kFocal;
     const adapted = scene.exposure * this.adaptation.factor(store, scene.view, scene.sweep, this.width, this.height,
       (w) => sideOf(focal, w, kLargest) ** 2, (w) => depthCue((w - scene.near) / (scene.far - scene.near)));
-    if (dark !== null) this.add(dark, 0, 0, scene, [0.05, 0.06, 0.09]);
+    if (dark !== null) this.add(dark, 0, 1, scene, [0.05, 0.06, 0.09]);
     for (let i = 0; i < store.slices.length; ++i) {
       const slice = store.slices[i]!;
       const light = slice.count > 0 ? lightOf(scene.sweep, i, store.slices.length) : 0;
