@@ -166,6 +166,13 @@ void Core::CancelCapture(std::string name, CaptureId id) {
   });
 }
 
+void Core::GetShownScene(std::string name, Reply<ShownScene> reply) {
+  Ask(impl_->loop(), std::move(reply),
+      [impl = impl_.get(), name = std::move(name)](const Reply<ShownScene>& answer) {
+        impl->GetShownScene(name, answer);
+      });
+}
+
 WatchId Core::WatchVolumes(std::string name, display::Display::Watcher watcher) {
   const WatchId id = impl_->NewCapture();
   const bool posted = impl_->loop().Post([impl = impl_.get(), name = std::move(name), id, watcher] {

@@ -33,6 +33,7 @@
 #include "daemon/core/stats.h"
 #include "daemon/pipeline/display_settings.h"
 #include "daemon/pipeline/engine_event.h"
+#include "daemon/pipeline/shown_scene.h"
 #include "daemon/scene/operation.h"
 #include "display/api/display.h"
 #include "display/sync/clock.h"
@@ -232,6 +233,8 @@ class Core {
   // Watching costs the display's decoding; nothing is kept for a watcher but the newest volume.
   WatchId WatchVolumes(std::string name, display::Display::Watcher watcher);
   void UnwatchVolumes(std::string name, WatchId id);
+  // The volume that watchers of the display were told last, and the scene that it was drawn from: FramePipeline::Shown.
+  void GetShownScene(std::string name, Reply<ShownScene> reply);
 
  private:
   class Impl;

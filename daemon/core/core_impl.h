@@ -75,6 +75,7 @@ class Core::Impl {
   void Capture(const std::string& name, CaptureId id, sync::TimeNs timeout,
                uint64_t at_least_snapshot, Reply<display::DecodedVolume> reply);
   void CancelCapture(const std::string& name, CaptureId id);
+  void GetShownScene(const std::string& name, Reply<ShownScene> reply);
   void Watch(const std::string& name, WatchId id, const display::Display::Watcher& watcher);
   void Unwatch(const std::string& name, WatchId id);
 

@@ -299,6 +299,15 @@ void Core::Impl::CancelCapture(const std::string& name, CaptureId id) {
   host.work->Post([id, pipeline = host.pipeline.get()] { pipeline->CancelCapture(id); });
 }
 
+void Core::Impl::GetShownScene(const std::string& name, Reply<ShownScene> reply) {
+  const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);
+  if (!slot.ok()) return reply(slot.status());
+  const Host& host = *(*slot)->host;
+  const bool posted =
+      host.work->Post([reply, pipeline = host.pipeline.get()] { reply(pipeline->Shown()); });
+  if (!posted) reply(Ended((*slot)->info.name));
+}
+
 void Core::Impl::Watch(const std::string& name, WatchId id,
                        const display::Display::Watcher& watcher) {
   const absl::StatusOr<DisplaySlot*> slot = FindDisplay(name);

@@ -12,8 +12,6 @@
 namespace voxeld::daemon {
 namespace {
 
-// After a failure of the engine, without a new commit.
-constexpr sync::TimeNs kEngineRetryDelay = sync::kSecond;
 constexpr double kLeastFullPower = 1e-3;  // W; stands for one that is not known
 
 }  // namespace
@@ -55,28 +53,6 @@ FramePipeline::FramePipeline(Options options)
 
 FramePipeline::~FramePipeline() { Stop(); }
 
-absl::Status FramePipeline::Open(std::function<void(EngineEvent)> tell) {
-  absl::StatusOr<EngineCare::Made> made = Make(engine_options_);
-  if (!made.ok()) return made.status();
-  made_ = *std::move(made);
-  engine_info_ = made_.engine->info();
-  reason_ = engine_info_.reason;
-  if (engine_info_.kind == gpu::EngineKind::kCpu && !engine_options_.in_worker) {
-    return absl::OkStatus();
-  }
-  EngineCare::Options care;
-  care.make_engine = [this](const gpu::EngineOptions& options) { return Make(options); };
-  care.engine = engine_options_;
-  care.engine.kind = engine_info_.kind;
-  care.work = work_;
-  care.clock = &clock_;
-  care.breathe = [this] { Breathe(); };
-  care.retire = [this](std::shared_ptr<const void> what) { Retire(std::move(what)); };
-  care.tell = std::move(tell);
-  care_ = std::make_unique<EngineCare>(std::move(care));
-  return absl::OkStatus();
-}
-
 absl::Status FramePipeline::Start() {
   if (wanted_limit_w_ > 0) {
     const absl::Status limit = display_->SetPowerLimit(wanted_limit_w_);
@@ -102,14 +78,6 @@ void FramePipeline::Stop() {
   ServeCaptures();
 }
 
-void FramePipeline::SetEngineBytes(uint64_t bytes) {
-  if (budget_ == nullptr) return;
-  using Use = Budget::Use;
-  if (bytes > engine_bytes_) budget_->ChargeAnyway(Use::kEngines, bytes - engine_bytes_);
-  if (bytes < engine_bytes_) budget_->Release(Use::kEngines, engine_bytes_ - bytes);
-  engine_bytes_ = bytes;
-}
-
 sync::TimeNs FramePipeline::Step() {
   if (!started_) return sync::kNever;
   sync::TimeNs next_round = sync::kNever;
@@ -120,7 +88,8 @@ sync::TimeNs FramePipeline::Step() {
     ServeCaptures();
   } while (MaybeDraw());
   sweeps_->Set(showing() ? display_->ComingSweeps(2) : std::vector<sync::TimeNs>());
-  sync::TimeNs next = std::min({next_tick_, next_round, limiter_.next(), LetGoOfWatch()});
+  sync::TimeNs next =
+      std::min({next_tick_, next_round, limiter_.next(), LetGoOfWatch(), LetGoOfScenes()});
   if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
   // Of a genlock's member it is for the group to say when.
@@ -167,52 +136,6 @@ void FramePipeline::Show(SnapshotPtr snapshot, const Rider& commit, bool hidden,
 }
 
 // ----------------------------------------------------------------------------------- drawing
-absl::StatusOr<EngineCare::Made> FramePipeline::Make(gpu::EngineOptions options) {
-  const uint64_t id = ++engines_made_;
-  options.lost = [this, id, work = work_,
-                  alive = std::weak_ptr<bool>(alive_)](const absl::Status& status) {
-    work->Post([this, id, alive, status] {
-      if (alive.lock() != nullptr) OnEngineLost(id, status);
-    });
-  };
-  absl::StatusOr<std::unique_ptr<gpu::Engine>> engine = make_engine_(options);
-  if (!engine.ok()) return engine.status();
-  return EngineCare::Made{*std::move(engine), id};
-}
-
-bool FramePipeline::HaveEngine() {
-  if (made_.engine != nullptr) return true;
-  gpu::EngineOptions options = engine_options_;
-  options.kind = gpu::EngineKind::kCpu;
-  options.in_worker = false;
-  absl::StatusOr<EngineCare::Made> made = Make(options);
-  if (!made.ok()) {
-    engine_info_.reason = std::string(made.status().message());
-    return false;
-  }
-  made_ = *std::move(made);
-  engine_info_ = made_.engine->info();
-  if (!takeover_.empty()) engine_info_.reason = takeover_;
-  return true;
-}
-
-void FramePipeline::TakeReturned() {
-  Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
-  Retire(std::shared_ptr<EngineScene>(std::move(scene_)));
-  EngineCare::Returned returned = care_->Take();
-  made_ = std::move(returned.made);
-  scene_ = std::move(returned.scene);
-  engine_info_ = made_.engine->info();
-  engine_info_.reason = reason_;
-  takeover_.clear();
-  // What it has drawn so far no display has seen: buffers are new to it, and its pictures to the
-  // display.
-  target_stale_ = true;
-  pool_.Forget(last_volume_);
-  first_volume_ = last_volume_ + 1;
-  engine_is_new_ = true;
-}
-
 gpu::Target FramePipeline::CurrentTarget() const {
   const display::DisplayInfo& info = display_->info();
   return {info.geometry, info.layout,
@@ -375,6 +298,7 @@ void FramePipeline::KeepUnchanged(const Contents& contents) {
   } else {
     shown_ = contents;
   }
+  KeepScene(last_submitted_);
   riders_.Unchanged(last_submitted_);
   display_->ShowCurrent();
 }
@@ -390,6 +314,7 @@ void FramePipeline::SubmitDrawn(Drawing drawing) {
   show_again_ = false;
   last_submitted_ = drawing.volume;
   in_display_[drawing.volume] = drawing.contents;
+  KeepScene(drawing.volume);
   riders_.Submit(drawing.volume, drawing.stages);
   display_->Submit(std::move(drawing.lease.frame));
 }
@@ -404,39 +329,6 @@ void FramePipeline::DrawAgain() {
 void FramePipeline::ShowAgain(sync::TimeNs delay) {
   show_again_ = true;
   show_again_at_ = clock_.Now() + delay;
-}
-
-void FramePipeline::OnEngineLost(uint64_t id, const absl::Status& status) {
-  // A call under way has told it already, and there is another engine.
-  if (id == made_.id && made_.engine != nullptr && !drawing_.has_value()) {
-    OnEngineFailure(status, clock_.Now());
-  } else if (care_ != nullptr) {
-    care_->OnEngineLost(id, status);
-  }
-}
-
-void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs since) {
-  Retire(std::shared_ptr<EngineScene>(std::move(scene_)));
-  scene_ = std::make_unique<EngineScene>([this] { Breathe(); });
-  target_stale_ = true;
-  // A device that has no memory for the scene gives way too.
-  const bool gives_way = absl::IsResourceExhausted(status) && care_ != nullptr && !care_->away();
-  if (absl::IsDataLoss(status) || gives_way) {
-    Retire(std::shared_ptr<gpu::Engine>(std::move(made_.engine)));
-    pool_.Forget(last_volume_);
-    if (care_ != nullptr && !care_->away()) care_->OnLost(status, since);
-    if (care_ != nullptr && !showing()) care_->OnHidden();
-    // Whatever it was, the next is on the CPU, in this process: made at once, with the same bytes.
-    takeover_ = absl::StrCat("took over from ", gpu::EngineKindName(engine_info_.kind), ": ",
-                             status.message());
-    if (!std::exchange(lost_engine_, true) && HaveEngine() && showing()) {
-      return DrawAgain();
-    }
-  }
-  refused_ = std::string(status.message());
-  riders_.LoseUnsubmitted(absl::StrCat("the engine failed: ", status.ToString()), false);
-  if (genlock_ == nullptr) display_->ShowCurrent();
-  ShowAgain(kEngineRetryDelay);
 }
 
 // -------------------------------------------------------------------------- from the display

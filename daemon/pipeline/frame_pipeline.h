@@ -51,6 +51,7 @@
 #include "daemon/pipeline/loop.h"
 #include "daemon/pipeline/power_limiter.h"
 #include "daemon/pipeline/rider_book.h"
+#include "daemon/pipeline/shown_scene.h"
 #include "daemon/pipeline/sliding_window.h"
 #include "daemon/pipeline/sweep_outlook.h"
 #include "daemon/scene/engine_delta.h"
@@ -126,6 +127,11 @@ class FramePipeline final : private display::Display::Listener {
   static constexpr sync::TimeNs kWatchLinger = 5 * sync::kSecond;
   void Watch(uint64_t id, display::Display::Watcher watcher);
   void Unwatch(uint64_t id);
+  // The newest volume that watchers were told, and what it was drawn from. FailedPrecondition: nobody watches;
+  // Unavailable: what that volume was drawn from has gone, and will be known of the next. Who asks has scenes kept for
+  // kScenesLinger: a scene that was replaced lives on while a volume of it is still on its way.
+  static constexpr sync::TimeNs kScenesLinger = 5 * sync::kSecond;
+  absl::StatusOr<ShownScene> Shown();
 
  private:
   // What a volume shows: a snapshot, through the view or pattern that was set last but `settings`
@@ -199,6 +205,9 @@ class FramePipeline final : private display::Display::Listener {
   void ServeCaptures();
   void TellWatchers(const absl::StatusOr<display::DecodedVolume>& volume);
   sync::TimeNs LetGoOfWatch();  // when it is due; answers when
+  // Scenes (frame_pipeline_shown.cc), while somebody compares: that a volume is drawn from.
+  void KeepScene(uint64_t volume);
+  sync::TimeNs LetGoOfScenes();
   void Breathe();
   void Retire(std::shared_ptr<const void> what);
   void Told(const Rider& rider, const CommitOutcome& outcome);
@@ -264,6 +273,8 @@ class FramePipeline final : private display::Display::Listener {
   std::optional<display::DecodedVolume> watched_;           // what they were told last
   bool watching_ = false;                                   // the display
   sync::TimeNs let_go_at_ = sync::kNever;
+  std::map<uint64_t, DrawnFrom> scenes_;  // by volume, from the one told last on
+  sync::TimeNs keep_scenes_until_ = 0;
   sync::TimeNs next_tick_ = 0;
 
   RiderBook riders_;

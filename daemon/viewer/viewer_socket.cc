@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "daemon/core/volume_feed.h"
 #include "daemon/viewer/volume_message.h"
@@ -22,6 +23,7 @@ using Json = nlohmann::json;
 
 constexpr size_t kMostWatches = 16;
 constexpr size_t kMostWatchesInAll = 64;
+constexpr size_t kMostHidden = 256;  // layers
 
 std::string ToJson(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
@@ -49,6 +51,21 @@ std::string DisplayJson(const DisplayDescription& display) {
 
 Json VecJson(const display::Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
+Json ComparedJson(uint16_t id, uint64_t volume, const Comparison& comparison) {
+  return {{"id", id},
+          {"volume", std::to_string(volume)},
+          {"low_mm", VecJson(comparison.box.low_mm)},
+          {"high_mm", VecJson(comparison.box.high_mm)},
+          {"pitch_mm", comparison.pitch_mm},
+          {"voxels", comparison.voxels},
+          {"missing", comparison.missing},
+          {"pixels", comparison.pixels},
+          {"stray", comparison.stray},
+          {"off", comparison.off},
+          {"mean", comparison.mean},
+          {"most", comparison.most}};
+}
+
 std::string Text(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -68,6 +85,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     if (message.contains("shown")) return Shown(message["shown"]);
     if (message.contains("unwatch")) return Unwatch(message["unwatch"]);
     if (message.contains("dark")) return Dark(message["dark"]);
+    if (message.contains("compare")) return Compare(message);
     if (message.contains("stats")) return Stats();
     if (message.contains("layers")) return Layers();
     if (message.contains("update")) return Update(message["update"]);
@@ -77,12 +95,15 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
  private:
   // What one of is under way at a time: a second that comes meanwhile is passed over.
-  enum class Asked : uint8_t { kHello, kStats, kLayers };
+  enum class Asked : uint8_t { kHello, kStats, kLayers, kCompare };
   bool Begin(Asked what) { return !std::exchange(asked_[static_cast<size_t>(what)], true); }
   void End(Asked what) { asked_[static_cast<size_t>(what)] = false; }
 
   struct Watched {
     uint64_t serial = 0;  // ids may be used again
+    std::string display;
+    display::VoxelGrid grid;
+    Reach reach;
     std::shared_ptr<PixelPlaces> places;
     std::shared_ptr<VolumeFeed> feed;
     bool credit = true;  // the page has shown the last one
@@ -149,6 +170,9 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     if (found == watches_.end() || found->second.serial != serial) return;
     if (!display.ok()) return End(id, display.status());
     Watched& watch = found->second;
+    watch.display = display->info.name;
+    watch.grid = display->info.geometry.grid;
+    watch.reach = ReachOf(display->info.geometry, display->info.tone.sampling);
     watch.places = PlacesOf(*display);
     const PlaceBox& box = watch.places->box();
     peer_->Send(absl::StrCat("{\"watching\":{\"id\":", id, ",\"low_mm\":",
@@ -216,6 +240,68 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
     if (found == watches_.end() || found->second.places == nullptr) return;
     peer_->Send(DarkMessage(*id, *found->second.places), true);
+  }
+
+  void Compare(const Json& message) {
+    const std::optional<uint16_t> id = Number(message["compare"]);
+    if (!id.has_value()) return Complain("compare is the id of a watch, 0 to 65535");
+    const std::optional<std::vector<OwnedName>> hidden =
+        ReadLayers(message.value("without", Json::array()));
+    if (!hidden.has_value()) {
+      return Complain("without is a list of layers: {\"owner\": \"1\", \"layer\": \"name\"}");
+    }
+    const auto found = watches_.find(*id);
+    if (found == watches_.end() || found->second.feed == nullptr) return;
+    if (!Begin(Asked::kCompare)) return;
+    shared_->core.GetShownScene(
+        found->second.display,
+        Then<ShownScene>([id = *id, serial = found->second.serial, hidden = *hidden](
+                             ViewerSocket& self, absl::StatusOr<ShownScene> shown) {
+          self.HoldAgainst(id, serial, hidden, std::move(shown));
+        }));
+  }
+
+  // At most kMostHidden; nothing if it is no such list.
+  static std::optional<std::vector<OwnedName>> ReadLayers(const Json& json) {
+    std::vector<OwnedName> layers;
+    if (!json.is_array() || json.size() > kMostHidden) return std::nullopt;
+    for (const Json& each : json) {
+      uint64_t owner = 0;
+      if (!each.is_object() || !each.value("owner", Json()).is_string() ||
+          !each.value("layer", Json()).is_string() ||
+          !absl::SimpleAtoi(each["owner"].get<std::string>(), &owner)) {
+        return std::nullopt;
+      }
+      layers.push_back({owner, each["layer"].get<std::string>()});
+    }
+    return layers;
+  }
+
+  void HoldAgainst(uint16_t id, uint64_t serial, const std::vector<OwnedName>& hidden,
+                   absl::StatusOr<ShownScene> shown) {
+    if (!Has(id, serial)) return End(Asked::kCompare);
+    if (!shown.ok()) return Compared(id, serial, 0, shown.status());
+    Watched& watch = watches_[id];
+    const uint64_t volume = shown->volume.volume;
+    shared_->comparer->Post(
+        {watch.display, watch.grid, shown->volume.layout, watch.reach, std::move(shown->from),
+         hidden, watch.places->box(), LitPixels(shown->volume, *watch.places),
+         Then<Comparison>([id, serial, volume](ViewerSocket& self, auto comparison) {
+           self.Compared(id, serial, volume, comparison);
+         })});
+  }
+
+  void Compared(uint16_t id, uint64_t serial, uint64_t volume,
+                const absl::StatusOr<Comparison>& comparison) {
+    End(Asked::kCompare);
+    if (!Has(id, serial)) return;
+    if (!comparison.ok()) {
+      const std::string why(comparison.status().message());
+      return peer_->Send(Text({{"compared", {{"id", id}, {"why", why}}}}), false);
+    }
+    peer_->Send(Text({{"compared", ComparedJson(id, volume, *comparison)}}), false);
+    peer_->Send(PointsMessage(MessageKind::kSent, id, volume, comparison->sent), true);
+    peer_->Send(PointsMessage(MessageKind::kDifference, id, volume, comparison->difference), true);
   }
 
   void Stats() {
@@ -300,7 +386,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   const bool control_;
   std::map<uint16_t, Watched> watches_;
   uint64_t last_serial_ = 0;
-  std::array<bool, 3> asked_{};
+  std::array<bool, 4> asked_{};
 };
 
 class Service final : public http::WebSocketService {

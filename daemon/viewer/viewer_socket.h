@@ -7,6 +7,7 @@
 
 #include "daemon/core/core.h"
 #include "daemon/http/web_socket.h"
+#include "daemon/viewer/comparer.h"
 #include "daemon/viewer/pixel_places.h"
 #include "daemon/viewer/viewer.h"
 #include "display/sync/clock.h"
@@ -21,6 +22,7 @@ struct ViewerShared {
   // Of displays that somebody has watched: finding places takes a while.
   std::map<std::string, std::shared_ptr<PixelPlaces>> places;
   size_t watches = 0;  // of all sockets
+  std::unique_ptr<Comparer> comparer = std::make_unique<Comparer>(clock);
 };
 
 // `control`: it may change displays and layers.

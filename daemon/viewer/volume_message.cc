@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstring>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -39,30 +40,38 @@ std::string Message(Header header, const std::vector<uint32_t>& slices, const Po
   return out;
 }
 
-}  // namespace
-
-std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places) {
-  Points points;
+// Answers a pair of numbers for each of the slices, as Message takes them.
+std::vector<uint32_t> AppendSlices(const display::DecodedVolume& volume,
+                                   const std::vector<int32_t>& wanted, PixelPlaces& places,
+                                   Points* points) {
   std::vector<uint32_t> slices;
   const auto each = static_cast<size_t>(places.width()) * static_cast<size_t>(places.height()) * 3;
-  for (size_t i = 0; i < change.slices.size();) {
+  for (size_t i = 0; i < wanted.size();) {
     // A run of slices that follow one another is unpacked at once, some megabytes at the most.
-    const int32_t first = change.slices[i];
+    const int32_t first = wanted[i];
     const size_t most = std::max<size_t>(1, (size_t{4} << 20) / each);
     size_t count = 1;
-    while (count < most && i + count < change.slices.size() &&
-           change.slices[i + count] == first + static_cast<int32_t>(count)) {
+    while (count < most && i + count < wanted.size() &&
+           wanted[i + count] == first + static_cast<int32_t>(count)) {
       ++count;
     }
-    const std::vector<uint8_t> rgb = change.volume.Rgb(first, static_cast<int32_t>(count));
+    const std::vector<uint8_t> rgb = volume.Rgb(first, static_cast<int32_t>(count));
     for (size_t n = 0; n < count; ++n) {
       const int32_t slice = first + static_cast<int32_t>(n);
       slices.push_back(static_cast<uint32_t>(slice));
       slices.push_back(static_cast<uint32_t>(
-          places.Append(slice, std::span(rgb).subspan(n * each, each), &points)));
+          places.Append(slice, std::span(rgb).subspan(n * each, each), points)));
     }
     i += count;
   }
+  return slices;
+}
+
+}  // namespace
+
+std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places) {
+  Points points;
+  const std::vector<uint32_t> slices = AppendSlices(change.volume, change.slices, places, &points);
   return Message({.kind = MessageKind::kVolume,
                   .whole = change.whole,
                   .watch = watch,
@@ -73,6 +82,19 @@ std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, Pixe
 std::string DarkMessage(uint16_t watch, PixelPlaces& places) {
   return Message({.kind = MessageKind::kDark, .whole = true, .watch = watch, .volume = 0}, {},
                  places.Sample());
+}
+
+std::string PointsMessage(MessageKind kind, uint16_t watch, uint64_t volume, const Points& points) {
+  return Message({.kind = kind, .whole = true, .watch = watch, .volume = volume},
+                 {0, static_cast<uint32_t>(points.size())}, points);
+}
+
+Points LitPixels(const display::DecodedVolume& volume, PixelPlaces& places) {
+  std::vector<int32_t> all(static_cast<size_t>(volume.layout.slices));
+  std::iota(all.begin(), all.end(), 0);
+  Points points;
+  AppendSlices(volume, all, places, &points);
+  return points;
 }
 
 }  // namespace voxeld::daemon::viewer

@@ -10,12 +10,17 @@
 namespace voxeld::daemon::viewer {
 
 // What the first byte of a binary message says.
-enum class MessageKind : uint8_t { kVolume = 1, kDark = 2 };
+enum class MessageKind : uint8_t { kVolume = 1, kDark = 2, kSent = 3, kDifference = 4 };
 
 // The slices of `change` with all their lit pixels, for the watch of that number. `change` is of the display that
 // `places` is of.
 std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places);
 // Where pixels are, lit or not (PixelPlaces::Sample).
 std::string DarkMessage(uint16_t watch, PixelPlaces& places);
+// Points that are of no slice in particular.
+std::string PointsMessage(MessageKind kind, uint16_t watch, uint64_t volume, const Points& points);
+
+// All lit pixels of a volume, slice after slice.
+Points LitPixels(const display::DecodedVolume& volume, PixelPlaces& places);
 
 }  // namespace voxeld::daemon::viewer

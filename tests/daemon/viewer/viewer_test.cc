@@ -184,6 +184,30 @@ TEST_F(ViewerTest, APageIsToldDisplaysAndVolumesAndPacesThem) {
   EXPECT_TRUE(HearOf(*socket, "layers").is_object());
 }
 
+TEST_F(ViewerTest, WhatIsShownIsHeldAgainstWhatWasSent) {
+  const auto socket = Open();
+  Say(*socket, {{"update", {{"name", "one"}}}});  // not a page's to ask, and no harm
+  Say(*socket, {{"compare", 7}});                 // there is no such watch: passed over
+  Say(*socket, {{"watch", "one"}, {"id", 7}});
+  EXPECT_EQ(HearOf(*socket, "watching")["id"], 7);
+  EXPECT_EQ(Hear(*socket)[0], 1) << "the first volume";
+  Say(*socket, {{"compare", 7}, {"without", Json::array({{{"owner", "1"}, {"layer", "a"}}})}});
+  const Json compared = HearOf(*socket, "compared");
+  EXPECT_EQ(compared["id"], 7);
+  EXPECT_EQ(compared["voxels"], 0);
+  EXPECT_EQ(compared["pixels"], 0);
+  EXPECT_EQ(compared["low_mm"].size(), 3u);
+  const std::string sent = Hear(*socket), difference = Hear(*socket);
+  EXPECT_EQ(sent[0], 3);
+  EXPECT_EQ(difference[0], 4);
+  EXPECT_EQ(sent.size(), 24u + 8);
+  for (const Json& wrong : {Json{{"compare", "7"}}, Json{{"compare", 7}, {"without", 1}},
+                            Json{{"compare", 7}, {"without", {{{"owner", 1}, {"layer", "a"}}}}}}) {
+    Say(*socket, wrong);
+    EXPECT_TRUE(HearOf(*socket, "error").is_string()) << wrong;
+  }
+}
+
 TEST_F(ViewerTest, WhatIsWrongIsSaidAndTheSocketGoesOn) {
   const auto socket = Open();
   for (const char* wrong : {"nonsense", "[]", "{\"what\":1}", "{\"watch\":5,\"id\":1}",

@@ -229,6 +229,46 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     await other.context.close();
   });
 
+  test("the scene as sent stands beside what is shown, and where they differ", async () => {
+    await daemon.voxelctl("draw", "box size=4,4,4 at=8,8,8 fill=solid color=white", "points vertices='1.5,1.5,1.5 14.5,1.5,1.5' color=red");
+    const { page, seen, context } = await open(`${daemon.page}?renderer=2d`, { width: 1200, panel: true });
+    await drawnPoints(page, 66);
+    await page.keyboard.press("c");
+    assert.ok(await page.isChecked("#compare"));
+    const compared = (what, points) => page.waitForFunction(([key, wanted]) => globalThis.voxeld.inspect().compared[key]?.points === wanted, [what, points]);
+    await compared("sent", 66);
+    await compared("difference", 0);
+    assert.deepEqual(await page.locator(".view .label").allTextContents(), ["cube as shown", "as sent", "difference: blue is missing, orange too much"]);
+    assert.match(await page.textContent("#compared"), /of 66 voxels sent 0 have no light near \(0.0 %\); of 66 lit pixels 0 have no voxel near, and 0 differ/);
+    // The same from the same place: here pixels are voxels. A third of the page is no whole number of picture elements.
+    const [shown, sent] = [lit(await picture(page, 0)), lit(await picture(page, 1))];
+    sent.box.forEach((edge, i) => assert.ok(Math.abs(edge - shown.box[i]) <= 1, `${sent.box} and ${shown.box}`));
+    assert.ok(shown.count > 1000 && Math.abs(sent.count - shown.count) < shown.count * 0.05, `${sent.count} and ${shown.count}`);
+
+    // A scene that moves on is compared anew; a layer that is not wanted is left out of what was sent, and its light is stray then.
+    await daemon.voxelctl("draw", "box size=2,2,2 at=8,8,8 fill=solid color=white");
+    await compared("sent", 8);
+    await page.locator("#layers input").first().uncheck();
+    await compared("sent", 0);
+    await compared("difference", 8);
+    assert.match(await page.textContent("#compared"), /8 have no voxel near/);
+    await page.locator("#layers input").first().check();
+    await compared("difference", 0);
+
+    // Of several displays each is told how far off it is.
+    await page.selectOption("#display", "");
+    await page.waitForFunction(() => [...document.querySelectorAll(".view .label")].every((label) => /: missing 0.0 %, stray \S+ %, off \S+ %$/.test(label.textContent)));
+    assert.equal(await page.locator(".view").count(), 2);
+    assert.match(page.url(), /compare=1/);
+    const again = await open(page.url());
+    await again.page.waitForFunction(() => /missing/.test(document.querySelector(".view .label").textContent));
+    await again.context.close();
+    await page.uncheck("#compare");
+    await page.waitForFunction(() => document.querySelector(".view .label").textContent === "cube");
+    assert.deepEqual(seen.errors, []);
+    await context.close();
+  });
+
   test("comes back when the daemon does", async () => {
     const own = await Daemon.start([kCube]);
     const { page, context } = await open(own.page);

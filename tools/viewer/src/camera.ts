@@ -32,6 +32,16 @@ export function viewOf(orbit: Orbit, middle: readonly number[], radius: number):
   ]);
 }
 
+export interface Sphere { middle: number[]; radius: number }
+
+// What a camera looks at.
+export function sphereOf(low: readonly number[], high: readonly number[]): Sphere {
+  return {
+    middle: low.map((each, i) => (each + high[i]!) / 2),
+    radius: Math.hypot(...low.map((each, i) => (high[i]! - each) / 2)),
+  };
+}
+
 // The same for points in steps of a box.
 export function inSteps(view: View, low: readonly number[], high: readonly number[], steps: number): View {
   const out = new Float64Array(12);

@@ -1,5 +1,5 @@
 // One display on the page: its canvas, what draws it, and where it is looked at from.
-import { Orbit, kHome, viewOf } from "./camera";
+import { Orbit, kHome, sphereOf, viewOf } from "./camera";
 import { OutlineColors, drawOutline } from "./outline";
 import { Watching } from "./protocol";
 import { Drawn, Renderer, Scene, Sweep, wholeSweep } from "./renderer";
@@ -24,13 +24,16 @@ export class DisplayView {
   private readonly observer: ResizeObserver;
   private size: [number, number] = [0, 0];
   private over = "";
+  private noted = "";
+  private why = "";
 
-  constructor(readonly name: string, makeRenderer: (canvas: HTMLCanvasElement) => Renderer, private readonly redraw: () => void) {
+  // `told`: to those who do not see it.
+  constructor(readonly name: string, told: string, makeRenderer: (canvas: HTMLCanvasElement) => Renderer, private readonly redraw: () => void) {
     this.element.className = "view";
     this.overlay.className = "overlay";
     this.overlay.setAttribute("aria-hidden", "true");
     this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", `What display ${name} shows`);
+    this.canvas.setAttribute("aria-label", told);
     this.label.className = "label";
     this.label.textContent = name;
     this.element.append(this.canvas, this.overlay, this.label);
@@ -53,14 +56,22 @@ export class DisplayView {
   light(lit: boolean, why: string): void {
     if (this.over !== "") return;
     this.element.classList.toggle("unlit", !lit);
-    this.label.textContent = lit ? this.name : `${this.name}: ${why}`;
+    this.why = lit ? "" : why;
+    this.write();
+  }
+
+  // Beside the name, while it gives light.
+  note(text: string): void {
+    this.noted = text;
+    this.write();
   }
 
   // Nothing more will come of this watch.
   end(why: string): void {
     this.over = why;
     this.element.classList.add("unlit");
-    this.label.textContent = `${this.name}: ${why}`;
+    this.why = why;
+    this.write();
   }
 
   draw(orbit: Orbit, look: Look, colors: OutlineColors): void {
@@ -81,15 +92,19 @@ export class DisplayView {
 
   // As the renderers have it.
   view(orbit: Orbit = kHome): Float64Array {
-    const { low_mm, high_mm } = this.watching!;
-    const middle = low_mm.map((low, i) => (low + high_mm[i]!) / 2);
-    return viewOf(orbit, middle, Math.hypot(...low_mm.map((low, i) => (high_mm[i]! - low) / 2)));
+    const { low_mm, high_mm } = this.watching!.around ?? this.watching!;
+    const { middle, radius } = sphereOf(low_mm, high_mm);
+    return viewOf(orbit, middle, radius);
   }
 
   dispose(): void {
     this.observer.disconnect();
     this.renderer.dispose();
     this.element.remove();
+  }
+
+  private write(): void {
+    this.label.textContent = this.why === "" ? `${this.name}${this.noted}` : `${this.name}: ${this.why}`;
   }
 
   private resize(): void {

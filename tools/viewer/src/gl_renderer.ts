@@ -3,7 +3,7 @@ import {
   AddEquation, BufferAttribute, BufferGeometry, Camera, CustomBlending, DynamicDrawUsage, GLSL3, HalfFloatType, Mesh, NearestFilter,
   NoBlending, OneFactor, Points as PointCloud, RawShaderMaterial, Scene as Stage, Vector2, Vector4, WebGLRenderer, WebGLRenderTarget,
 } from "three";
-import { View, inSteps, project, viewOf } from "./camera";
+import { View, inSteps, project, sphereOf, viewOf } from "./camera";
 import { PointStore } from "./point_store";
 import { Points, Watching, kDark, kPlaceSteps, readPoints } from "./protocol";
 import { Adaptation } from "./adaptation";
@@ -259,8 +259,8 @@ export class GlRenderer implements Renderer {
 
   private render(watching: Watching, scene: Scene): void {
     const began = performance.now();
-    const middle = watching.low_mm.map((low, i) => (low + watching.high_mm[i]!) / 2);
-    const radius = Math.hypot(...watching.low_mm.map((low, i) => (watching.high_mm[i]! - low) / 2));
+    const { low_mm, high_mm } = watching.around ?? watching;
+    const { middle, radius } = sphereOf(low_mm, high_mm);
     const view: View = viewOf(scene.orbit, middle, radius);
     const centre = project(view, middle[0]!, middle[1]!, middle[2]!, 1, 1)[2];
     const rows = inSteps(view, watching.low_mm, watching.high_mm, kPlaceSteps);

@@ -1,5 +1,6 @@
 // The page: displays chosen, looked around, and told of. What is in the address (display, camera, slice) can be sent to others.
 import { Orbit, kHome, project } from "./camera";
+import { Comparison } from "./comparison";
 import { Connection } from "./connection";
 import { DisplayView, Look } from "./display_view";
 import { GlRenderer } from "./gl_renderer";
@@ -10,7 +11,7 @@ import { SplatRenderer, trySplat } from "./splat_renderer";
 
 const kTrialPoints = 100_000;
 const kStatsEvery = 1000;
-const kMostViews = 6;
+const kMostViews = 9;
 const kAgainAfter = 2000;
 
 const byId = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
@@ -24,6 +25,7 @@ class Page {
   private chosen = ""; // empty: all
   private orbit: Orbit = { ...kHome, target: [0, 0, 0] };
   private readonly look: Look = { exposure: 1, dark: false, outline: true, sweep: null };
+  private readonly comparison: Comparison;
   private nextWatch = 0;
   private dirty = false;
   private readonly owed = new Map<number, number>(); // watches whose newest volume, of that number, has not been drawn yet
@@ -32,6 +34,17 @@ class Page {
   private lastTick = 0;
 
   constructor(private readonly makeRenderer: (canvas: HTMLCanvasElement) => Renderer) {
+    this.comparison = new Comparison({
+      views: () => this.views,
+      ask: (id, without) => this.connection.send({ compare: id, without }),
+      makeView: (name, told) => {
+        const view = new DisplayView(name, told, this.makeRenderer, () => this.redraw());
+        byId("views").append(view.element);
+        return view;
+      },
+      redraw: () => this.redraw(),
+      tell: (text) => this.compared(text),
+    });
     this.readAddress();
     this.wire();
     this.connection = new Connection({
@@ -59,13 +72,21 @@ class Page {
     if (message.stats !== undefined) this.figures(message.stats);
     if (message.layers !== undefined) {
       this.panels.layers(message.layers.layers ?? [], this.hello?.control ?? false,
-        (layer) => this.connection.send({ clear: { owner: layer.owner, layer: layer.layer } }));
+        (layer) => this.connection.send({ clear: { owner: layer.owner, layer: layer.layer } }), {
+          isHidden: (layer) => this.comparison.isHidden(layer),
+          hide: (layer, hidden) => {
+            this.comparison.hide(layer, hidden);
+            this.compare(true);
+          },
+        });
     }
     if (message.display !== undefined) this.settings(message.display);
+    if (message.compared !== undefined) this.comparison.take(message.compared);
     if (message.error !== undefined) this.say(message.error);
   }
 
   private points(message: ArrayBuffer): void {
+    if (this.comparison.points(message)) return;
     const header = new DataView(message);
     const watch = header.getUint16(2, true);
     const view = this.views.get(watch);
@@ -117,10 +138,9 @@ class Page {
     this.owed.clear();
     this.panels.restart();
     const displays = (this.hello?.displays ?? []).filter((display) => this.chosen === "" || display.name === this.chosen).slice(0, kMostViews);
-    byId("views").dataset["count"] = String(displays.length);
     for (const display of displays) {
       const id = this.nextWatch++ % 65536;
-      const view = new DisplayView(display.name, this.makeRenderer, () => this.redraw());
+      const view = new DisplayView(display.name, `What display ${display.name} shows`, this.makeRenderer, () => this.redraw());
       view.onDrawn = () => {
         if (this.owed.get(id) === view.drawn.volume) {
           this.owed.delete(id);
@@ -132,6 +152,7 @@ class Page {
       byId("views").append(view.element);
       this.connection.send({ watch: display.name, id });
     }
+    this.comparison.restart();
     const first = displays[0];
     if (first !== undefined) this.settings(first);
     this.askForFigures();
@@ -186,6 +207,7 @@ class Page {
       const color = (name: string) => theme.getPropertyValue(name).trim();
       const colors = { line: color("--outline"), text: color("--dim"), axes: [color("--x"), color("--y"), color("--z")] as [string, string, string] };
       for (const view of this.views.values()) view.draw(this.orbit, this.look, colors);
+      this.comparison.draw(this.orbit, this.look, colors);
     });
   }
 
@@ -269,6 +291,7 @@ class Page {
       this.look.exposure = Math.pow(2, Number(input("exposure").value));
       this.redraw();
     });
+    input("compare").addEventListener("input", () => this.compare(input("compare").checked));
     input("dark").addEventListener("input", () => this.setDark(input("dark").checked));
     input("outline").addEventListener("input", () => {
       this.look.outline = input("outline").checked;
@@ -301,6 +324,7 @@ class Page {
       case "f": case "F": this.orbit.distance = 1; this.orbit.target = [0, 0, 0]; break;
       case "r": case "R": this.orbit = { ...kHome, target: [0, 0, 0] }; input("one").checked = input("sweep").checked = false; break;
       case "s": case "S": input("dark").checked = !this.look.dark; this.setDark(input("dark").checked); return;
+      case "c": case "C": this.compare(!this.comparison.active); return;
       case "ArrowLeft": if (onSlider) return; this.orbit.azimuth -= 5; break;
       case "ArrowRight": if (onSlider) return; this.orbit.azimuth += 5; break;
       case "ArrowUp": if (onSlider) return; this.orbit.elevation = Math.min(89, this.orbit.elevation + 5); break;
@@ -334,6 +358,17 @@ class Page {
     this.redraw();
   }
 
+  private compare(on: boolean): void {
+    input("compare").checked = on;
+    this.comparison.set(on);
+    this.moved();
+  }
+
+  private compared(text: string): void {
+    byId("compared").textContent = text;
+    byId("comparison").hidden = !this.comparison.active;
+  }
+
   private update(change: object): void {
     this.connection.send({ update: { name: this.first()?.name ?? "", ...change } });
   }
@@ -346,6 +381,7 @@ class Page {
       display: this.chosen, camera: [azimuth, elevation, distance, ...target].map((v) => Number(v.toFixed(3))).join(","),
     });
     if (input("one").checked) parts.set("slice", input("slice").value);
+    if (this.comparison.active) parts.set("compare", "1");
     history.replaceState(null, "", `#${parts.toString()}`);
     this.redraw();
   }
@@ -358,6 +394,8 @@ class Page {
       const [azimuth, elevation, distance, x, y, z] = camera as [number, number, number, number, number, number];
       this.orbit = { azimuth, elevation: Math.max(-89, Math.min(89, elevation)), distance: Math.max(0.15, Math.min(6, distance)), target: [x, y, z] };
     }
+    input("compare").checked = parts.get("compare") === "1";
+    this.comparison.set(input("compare").checked);
     const slice = parts.get("slice");
     if (slice !== null && /^\d+$/.test(slice)) {
       input("slice").max = slice; // until it is known how many there are
@@ -373,6 +411,7 @@ class Page {
       renderer: view?.renderer.name ?? "",
       drawn: view?.drawn,
       frames: view?.frames ?? 0,
+      compared: this.comparison.drawn(),
       place: (x: number, y: number, z: number) => view?.watching == null ? null
         : project(view.view(this.orbit), x, y, z, view.element.clientWidth, view.element.clientHeight),
     };

@@ -1,5 +1,6 @@
 // What the panel beside the volume tells: the display's figures, where time goes, and the layers of the scene.
 import uPlot from "uplot";
+import { layerKey } from "./comparison";
 import { DisplayStats, Latency, LayerInfo, Stats } from "./protocol";
 
 // Stages of a commit, in their order; those of the daemon first, then the display's own.
@@ -26,7 +27,14 @@ function state(text: string): string {
   return text.replace(/^DISPLAY_STATE_/, "").toLowerCase();
 }
 
+// Layers that are drawn in the scene as sent.
+export interface LayerChoice {
+  isHidden(layer: LayerInfo): boolean;
+  hide(layer: LayerInfo, hidden: boolean): void;
+}
+
 export class Panels {
+  private readonly rows = new Map<string, HTMLTableRowElement>();
   private readonly rate: uPlot;
   private readonly data: [number[], number[], number[]] = [[], [], []];
   private bytesBefore = 0;
@@ -79,30 +87,43 @@ export class Panels {
     this.timeBefore = 0;
   }
 
-  layers(all: LayerInfo[], control: boolean, clear: (layer: LayerInfo) => void): void {
-    const rows = all.map((layer) => {
-      const row = document.createElement("tr");
-      const cell = (text: string) => {
-        const made = document.createElement("td");
-        made.textContent = text; // whatever a client called it
-        row.append(made);
-        return made;
-      };
-      cell(layer.layer || "(default)");
-      cell(layer.client_name);
-      cell(layer.entities);
-      cell(layer.visible ? `${Math.round(layer.opacity / 2.55)} %` : "hidden");
-      if (control) {
-        const button = document.createElement("button");
-        button.textContent = "clear";
-        button.setAttribute("aria-label", `Clear layer ${layer.layer}`);
-        button.onclick = () => clear(layer);
-        cell("").append(button);
-      }
-      return row;
-    });
-    byId("layers").replaceChildren(...rows);
+  // Rows stay while their layers do: who is at one with the keyboard stays there.
+  layers(all: LayerInfo[], control: boolean, clear: (layer: LayerInfo) => void, choice: LayerChoice): void {
+    const body = byId("layers");
+    const keys = new Set(all.map(layerKey));
+    for (const [key, row] of this.rows) {
+      if (keys.has(key)) continue;
+      row.remove();
+      this.rows.delete(key);
+    }
+    for (const [i, layer] of all.entries()) {
+      const row = this.rows.get(layerKey(layer)) ?? this.addRow(layer, control, clear, choice);
+      const [box, name, client, entities, seen] = row.cells as unknown as HTMLTableCellElement[];
+      (box!.firstChild as HTMLInputElement).checked = !choice.isHidden(layer);
+      const texts = [layer.layer || "(default)", layer.client_name, layer.entities, layer.visible ? `${Math.round(layer.opacity / 2.55)} %` : "hidden"];
+      [name, client, entities, seen].forEach((cell, n) => (cell!.textContent = texts[n]!)); // whatever a client called it
+      if (body.children[i] !== row) body.insertBefore(row, body.children[i] ?? null);
+    }
     byId("no-layers").hidden = all.length > 0;
+  }
+
+  private addRow(layer: LayerInfo, control: boolean, clear: (layer: LayerInfo) => void, choice: LayerChoice): HTMLTableRowElement {
+    const row = document.createElement("tr");
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.setAttribute("aria-label", `Layer ${layer.layer || "(default)"} in the scene as sent`);
+    box.oninput = () => choice.hide(layer, !box.checked);
+    row.insertCell().append(box);
+    for (let i = 0; i < 4; ++i) row.insertCell();
+    if (control) {
+      const button = document.createElement("button");
+      button.textContent = "clear";
+      button.setAttribute("aria-label", `Clear layer ${layer.layer || "(default)"}`);
+      button.onclick = () => clear(layer);
+      row.insertCell().append(button);
+    }
+    this.rows.set(layerKey(layer), row);
+    return row;
   }
 
   // Medians one behind the other: together they are what a commit takes, no stage left out.

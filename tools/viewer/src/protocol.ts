@@ -76,6 +76,24 @@ export interface Watching {
   high_mm: [number, number, number];
   pitch_mm: number;
   display: DisplayDescription;
+  around?: { low_mm: [number, number, number]; high_mm: [number, number, number] }; // what a camera looks at; else all places
+}
+
+// What a display shows, held against what it was sent; or why it is not.
+export interface Compared {
+  id: number;
+  why?: string;
+  volume: string;
+  low_mm: [number, number, number];
+  high_mm: [number, number, number];
+  pitch_mm: number;
+  voxels: number;
+  missing: number;
+  pixels: number;
+  stray: number;
+  off: number;
+  mean: number;
+  most: number;
 }
 
 export interface Hello { version: string; control: boolean; displays: DisplayDescription[] }
@@ -87,12 +105,15 @@ export type FromDaemon = {
   stats?: Stats;
   layers?: { layers: LayerInfo[]; total: string };
   display?: DisplayDescription;
+  compared?: Compared;
   error?: string;
 };
 
 export const kPlaceSteps = 65534;
 export const kVolume = 1;
 export const kDark = 2;
+export const kSent = 3;
+export const kDifference = 4;
 const kHeaderBytes = 24;
 
 // A binary message, as views of its bytes: slices[2·i] has slices[2·i + 1] points, which follow one another.

@@ -1,5 +1,5 @@
 // The splat's thread: it has the volume, and draws into the page's canvas.
-import { Orbit, inSteps, project, viewOf } from "./camera";
+import { Orbit, inSteps, project, sphereOf, viewOf } from "./camera";
 import { PointStore } from "./point_store";
 import { Points, Watching, kDark, kPlaceSteps, readPoints } from "./protocol";
 import { Scene, wholeSweep } from "./renderer";
@@ -20,15 +20,10 @@ let store = new PointStore(0);
 let dark: PointStore | null = null;
 let image: ImageData | null = null;
 
-function boxOf(where: Watching): { middle: number[]; radius: number } {
-  const middle = where.low_mm.map((low, i) => (low + where.high_mm[i]!) / 2);
-  const radius = Math.hypot(...where.low_mm.map((low, i) => (where.high_mm[i]! - low) / 2));
-  return { middle, radius };
-}
-
 function draw(where: Watching, scene: Scene): void {
   const began = performance.now();
-  const { middle, radius } = boxOf(where);
+  const { low_mm, high_mm } = where.around ?? where;
+  const { middle, radius } = sphereOf(low_mm, high_mm);
   const view = viewOf(scene.orbit, middle, radius);
   const centre = project(view, middle[0]!, middle[1]!, middle[2]!, 1, 1)[2];
   const points = splat.draw(store, scene.dark ? dark : null, {

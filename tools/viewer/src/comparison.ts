@@ -1,0 +1,156 @@
+// The scene as it was sent beside what a display shows, and their difference. Asked of the daemon again whenever what is
+// shown has changed, one display after the other; where several are looked at, each is told how far off it is.
+import { Orbit } from "./camera";
+import { DisplayView, Look } from "./display_view";
+import { OutlineColors } from "./outline";
+import { Compared, LayerInfo, Watching, kDifference, kSent } from "./protocol";
+
+const kTick = 250;
+const kAgainAfter = 500; // an answer that there is none yet
+
+export const layerKey = (layer: { owner: string; layer: string }) => `${layer.owner}/${layer.layer}`;
+
+const count = (n: number) => n.toLocaleString("en");
+const share = (part: number, all: number) => (all === 0 ? "0 %" : `${((100 * part) / all).toPrecision(2)} %`);
+
+export function shortly(c: Compared): string {
+  return `missing ${share(c.missing, c.voxels)}, stray ${share(c.stray, c.pixels)}, off ${share(c.off, c.pixels)}`;
+}
+
+export function atLength(c: Compared): string {
+  return `volume ${c.volume}: of ${count(c.voxels)} voxels sent ${count(c.missing)} have no light near (${share(c.missing, c.voxels)}); ` +
+    `of ${count(c.pixels)} lit pixels ${count(c.stray)} have no voxel near, and ${count(c.off)} differ in light by more than a level; ` +
+    `on the average it is ${c.mean.toFixed(1)} of 255, at the most ${c.most}.`;
+}
+
+interface Asking {
+  volume: number;
+  layers: number; // the choice of layers, counted
+  notBefore: number;
+}
+
+export interface ComparisonPage {
+  views(): ReadonlyMap<number, DisplayView>; // of displays, by watch
+  ask(id: number, without: { owner: string; layer: string }[]): void;
+  makeView(name: string, told: string): DisplayView; // on the page, beside the others
+  redraw(): void;
+  tell(text: string): void;
+}
+
+export class Comparison {
+  private on = false;
+  private sent: DisplayView | null = null;
+  private difference: DisplayView | null = null;
+  private readonly known = new Map<number, Asking>();
+  private readonly hidden = new Map<string, { owner: string; layer: string }>();
+  private choice = 0;
+  private underWay: { id: number; since: number } | null = null;
+  private timer: ReturnType<typeof setInterval> | undefined;
+
+  constructor(private readonly page: ComparisonPage) {}
+
+  get active(): boolean {
+    return this.on;
+  }
+
+  set(on: boolean): void {
+    if (on === this.on) return;
+    this.on = on;
+    this.restart();
+  }
+
+  // Other displays are looked at, or the daemon was lost.
+  restart(): void {
+    clearInterval(this.timer);
+    this.sent?.dispose();
+    this.difference?.dispose();
+    this.sent = this.difference = this.underWay = null;
+    this.known.clear();
+    this.page.tell("");
+    for (const view of this.page.views().values()) view.note("");
+    if (!this.on) return this.page.redraw();
+    const [only, ...others] = this.page.views().values();
+    if (only !== undefined && others.length === 0) {
+      only.note(" as shown");
+      this.sent = this.page.makeView("as sent", `What ${only.name} was sent`);
+      this.difference = this.page.makeView("difference: blue is missing, orange too much", `Where ${only.name} differs from what it was sent`);
+    }
+    this.timer = setInterval(() => this.tick(), kTick);
+    this.tick();
+  }
+
+  isHidden(layer: LayerInfo): boolean {
+    return this.hidden.has(layerKey(layer));
+  }
+
+  hide(layer: LayerInfo, hidden: boolean): void {
+    if (hidden) this.hidden.set(layerKey(layer), { owner: layer.owner, layer: layer.layer });
+    else this.hidden.delete(layerKey(layer));
+    ++this.choice;
+    this.tick();
+  }
+
+  take(compared: Compared): void {
+    const view = this.page.views().get(compared.id);
+    const asked = this.known.get(compared.id);
+    const took = this.underWay === null ? 0 : performance.now() - this.underWay.since;
+    this.underWay = null;
+    if (view === undefined || asked === undefined || !this.on) return;
+    asked.notBefore = performance.now() + took; // half of the time at the most
+    if (compared.why !== undefined) {
+      asked.volume = -1;
+      asked.notBefore = performance.now() + kAgainAfter;
+      this.page.tell(`${view.name} is not compared: ${compared.why}.`);
+      return;
+    }
+    asked.volume = Number(compared.volume);
+    if (this.sent === null) view.note(`: ${shortly(compared)}`);
+    this.page.tell(`${view.name}, ${atLength(compared)}`);
+    if (view.watching === null) return;
+    for (const each of [this.sent, this.difference]) each?.begin(placesOf(compared, view.watching));
+  }
+
+  // Whether the message is one of a comparison's.
+  points(message: ArrayBuffer): boolean {
+    const kind = new DataView(message).getUint8(0);
+    if (kind !== kSent && kind !== kDifference) return false;
+    (kind === kSent ? this.sent : this.difference)?.renderer.update(message);
+    this.page.redraw();
+    return true;
+  }
+
+  draw(orbit: Orbit, look: Look, colors: OutlineColors): void {
+    const all: Look = { ...look, dark: false, sweep: null }; // these have no slices
+    this.sent?.draw(orbit, all, colors);
+    this.difference?.draw(orbit, all, colors);
+  }
+
+  // For tests.
+  drawn(): object {
+    return { sent: this.sent?.drawn, difference: this.difference?.drawn };
+  }
+
+  private tick(): void {
+    if (!this.on || this.underWay !== null || document.hidden) return;
+    const now = performance.now();
+    for (const [id, view] of this.page.views()) {
+      const asked = this.known.get(id);
+      if (view.watching === null || view.drawn.volume === 0) continue;
+      if (asked !== undefined && (now < asked.notBefore || (asked.volume === view.drawn.volume && asked.layers === this.choice))) continue;
+      this.known.delete(id); // to the end of the line
+      this.known.set(id, { volume: view.drawn.volume, layers: this.choice, notBefore: 0 });
+      this.underWay = { id, since: now };
+      this.page.ask(id, [...this.hidden.values()]);
+      return;
+    }
+  }
+}
+
+// Without slices, and looked at as the display is.
+function placesOf(compared: Compared, shown: Watching): Watching {
+  const { low_mm, high_mm, pitch_mm } = compared;
+  return {
+    id: compared.id, low_mm, high_mm, pitch_mm, around: { low_mm: shown.low_mm, high_mm: shown.high_mm },
+    display: { ...shown.display, layout: { ...shown.display.layout, slices: 1 } },
+  };
+}
