@@ -145,6 +145,12 @@ export class GlRenderer implements Renderer {
     this.gl.forceContextLoss();
   }
 
+  // Of all buffers of points.
+  gpuBytes(): number {
+    const clouds = [...this.chunks.map((chunk) => chunk?.cloud), this.dark];
+    return clouds.reduce((sum, cloud) => sum + Object.values(cloud?.geometry.attributes ?? {}).reduce((bytes, each) => bytes + each.array.byteLength, 0), 0);
+  }
+
   // Milliseconds for a picture of so many points, with all that the GPU has to do for it.
   static try(points: number): number {
     const canvas = document.createElement("canvas");
