@@ -1,5 +1,5 @@
 // The device's side of voxlink 1.0 (docs/protocols/voxlink.md) for a microcontroller: requests, packets, events, credit, and
-// which volume is lit. C99; no allocation, no operating system, no recursion; 3 KiB of state beside what voxlink_memory names.
+// which volume is lit. C99; no allocation, no operating system, no recursion; 2.5 KiB of state beside what voxlink_memory names.
 //
 // What is left to the firmware: the USB stack with the descriptors of §3, a clock, the start of each sweep, and putting the
 // pictures of voxlink_light to the lamps.
