@@ -91,7 +91,7 @@ class Reader:
         for name, path in (("voxelctl", os.environ["VOXELCTL"]), ("cmake", os.environ["VOXELD_CMAKE"]), ("python3", sys.executable)):
             (programs / name).symlink_to(path)
         self.environment = {**os.environ, "HOME": str(home), "VOXELD_SERVER": f"unix:{folder.name}/s",
-                            "PATH": f"{programs}:{os.environ['PATH']}"}
+                            "PATH": f"{programs}:{os.environ['PATH']}", "PIP_NO_INDEX": "1", "PIP_CONFIG_FILE": os.devnull}
         for name in ("PYTHONPATH", "XDG_CONFIG_HOME", "PYTHONDONTWRITEBYTECODE"):
             self.environment.pop(name, None)
         self._service: Optional["subprocess.Popen[str]"] = None
