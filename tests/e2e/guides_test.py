@@ -11,6 +11,7 @@ How a guide is written:
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,7 @@ from typing import NamedTuple, Optional
 from polling import LONG, until
 
 GUIDES = Path(os.environ["SOURCE"], "docs", "guides")
+COMPILING = 4 * LONG
 INTERPRETER = """
 import json, sys
 names = {"__name__": "__main__"}
@@ -125,18 +127,17 @@ class Reader:
         with tempfile.TemporaryFile("w+") as output:
             shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", text], cwd=self.folder, env=self.environment, stdout=output,
                                      stderr=subprocess.STDOUT, start_new_session=True)
-            self._case.addCleanup(self._end_group, shell.pid)
-            status = shell.wait(LONG)
+            try:
+                status = shell.wait(COMPILING)
+            except subprocess.TimeoutExpired:
+                os.killpg(shell.pid, signal.SIGKILL)
+                raise
+            if text.endswith("&\n"):
+                self._case.addCleanup(os.killpg, shell.pid, signal.SIGKILL)
             output.seek(0)
             said = output.read()
         self._case.assertEqual(status, 0, f"{text}\n{said}")
         return said
-
-    def _end_group(self, group: int) -> None:
-        try:
-            os.killpg(group, 9)
-        except ProcessLookupError:
-            pass
 
     def _serve(self, text: str) -> str:
         self._end_service()

@@ -1,16 +1,23 @@
 // The C99 device: the protocol page's own bytes, the suite that holds devices to the protocol, and the real driver over a sound
 // and over a bad cable.
 #include <algorithm>
+#include <array>
+#include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
 #include <ostream>
 #include <random>
+#include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "display/crc/crc32c.h"
 #include "display/drivers/simulated/emulated_device.h"
+#include "display/drivers/voxlink/protocol.h"
 #include "display/drivers/voxlink/verify/suite.h"
 #include "display/drivers/voxlink/voxlink_display.h"
 #include "display/emulator/fault_injector.h"
@@ -109,6 +116,127 @@ TEST(Firmware, AnswersThePagesExampleWithThePagesBytes) {
   const uint8_t* const light = voxlink_light(&device);
   ASSERT_NE(light, nullptr);
   EXPECT_EQ(std::vector<uint8_t>(light, light + 12), FromHex("FF0000 00FF00 0000FF FFFFFF"));
+}
+
+// ---- a host that means harm
+
+// A packet whose CRCs are right, whatever it says.
+std::vector<uint8_t> Packet(voxlink::PacketHeader header, std::span<const std::byte> payload) {
+  header.magic = voxlink::kMagic;
+  header.length = static_cast<uint32_t>(payload.size());
+  header.payload_crc = payload.empty() ? 0 : Crc32c(payload);
+  const std::span<const std::byte> head = std::as_bytes(std::span(&header, 1));
+  header.header_crc = Crc32c(head.first(voxlink::kHeaderCrcOffset));
+  std::vector<std::byte> bytes(head.begin(), head.end());
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+  std::vector<uint8_t> out(bytes.size());
+  std::memcpy(out.data(), bytes.data(), bytes.size());
+  return out;
+}
+
+TEST(Firmware, NothingThatAHostSendsLeavesItsMemory) {
+  // Of the page's example, two rows high and with 64 sub-frames: 128 pictures of 12 bytes at the most.
+  std::vector<uint8_t> capabilities = FromHex(
+      "70 00 00 00 00 01 1F 40 1F 00 00 00 00 00 01 00 00 04 00 00 02 00 00 00 02 00 00 00 02 00 "
+      "00 00 03 00 00 00 30 75 00 00 30 75 00 00 30 75 00 00 00 00 00 00 64 00 FA 00 00 00 00 00 "
+      "00 00 00 00");
+  capabilities.resize(0x70);
+  constexpr size_t kVolume = 128 * 12, kGuard = 64;
+  struct {
+    uint8_t before[kGuard], volumes[3 * kVolume], between[kGuard], payload[1024], behind[kGuard];
+    uint32_t filled[128], last[kGuard];
+  } memory;
+  std::memset(&memory, 0xA5, sizeof(memory));
+  const voxlink_memory given = {capabilities.data(), memory.volumes, kVolume, memory.filled, 128,
+                                memory.payload};
+  auto device = std::make_unique<voxlink_device>();
+  ASSERT_TRUE(voxlink_init(device.get(), &given));
+  std::mt19937 random(3);
+  const auto below = [&](uint32_t n) { return static_cast<uint32_t>(random() % n); };
+  const uint8_t* answer = nullptr;
+  uint8_t event[64];
+  uint64_t now = 0, events = 0, lit = 0;
+  uint32_t sequence = 0;
+  for (int i = 0; i < 200'000; ++i) {
+    now += below(2'000'000);
+    if (below(400) == 0) {
+      uint8_t data[16];
+      for (uint8_t& byte : data) byte = static_cast<uint8_t>(below(4) == 0 ? random() : below(3));
+      const uint16_t value = static_cast<uint16_t>(below(3) == 0 ? random() : 0);
+      const auto request = static_cast<uint8_t>(below(11));
+      const uint16_t length = request == 3 ? 16 : request == 8 ? 4 : 0;
+      const uint8_t type = below(2) == 0 ? 0xC1 : 0x41;
+      const int32_t got =
+          voxlink_request(device.get(), now, type, request, value, 0, data, length, &answer);
+      ASSERT_LE(got, 0x70);
+      if (request == 5 && got == 0) sequence = 0;
+    }
+    if (below(1000) == 0) {
+      const uint8_t mode[16] = {static_cast<uint8_t>(below(5)), static_cast<uint8_t>(1 + below(64)),
+                                static_cast<uint8_t>(below(9))};
+      voxlink_request(device.get(), now, 0x41, 6, 0, 0, nullptr, 0, &answer);
+      voxlink_request(device.get(), now, 0x41, 3, 0, 0, mode, 16, &answer);
+    }
+    if (!device->running) {
+      voxlink_request(device.get(), now, 0x41, 5, 0, 0, nullptr, 0, &answer);
+      sequence = 0;
+    }
+    std::vector<std::byte> payload;
+    voxlink::PacketHeader header{};
+    // Mostly what leads to a volume, so that volumes come about.
+    static constexpr uint8_t kRare[] = {0, 1, 3, 4, 5, 6, 7, 8};
+    header.type = below(12) != 0 ? 2 : kRare[below(8)];
+    if (device->filling == 0 && below(4) != 0) header.type = 1;
+    header.flags = static_cast<uint8_t>(below(3));
+    header.volume = device->last_begun + below(3);
+    header.sequence = sequence++;
+    if (header.type == 1) {
+      payload.resize(16 + below(2) * ((device->pictures + 7) / 8));
+      for (std::byte& byte : payload) byte = static_cast<std::byte>(random());
+      if (payload.size() > 16) payload.back() = std::byte{0};
+      const uint64_t base = payload.size() == 16 ? 0 : device->base;
+      const uint32_t pictures = device->pictures + (below(20) == 0 ? 1 : 0);
+      std::memcpy(payload.data(), &base, 8);
+      std::memcpy(payload.data() + 8, &pictures, 4);
+    } else if (header.type == 2) {
+      header.volume = device->filling;
+      uint32_t next = 0;  // the first picture that is not whole
+      while (next + 1 < device->pictures &&
+             (memory.filled[next] == ~0u || memory.filled[next] == device->picture_bytes)) {
+        ++next;
+      }
+      if (below(10) == 0) next = below(device->pictures);
+      const uint32_t subs = device->sub_frames;
+      header.slice = below(30) == 0 ? static_cast<uint32_t>(random()) >> below(31) : next / subs;
+      header.sub_frame = static_cast<uint16_t>(below(30) == 0 ? random() : next % subs);
+      header.offset = below(10) == 0   ? static_cast<uint32_t>(random() % 40 - 8)
+                      : below(10) == 0 ? memory.filled[next]
+                                       : 0;
+      payload.resize(below(10) == 0 ? below(1500) : device->picture_bytes);
+    } else if (header.type == 5) {
+      payload.resize(header.flags == 1 ? 16 : 8);
+    }
+    const std::vector<uint8_t> bytes = Packet(header, payload);
+    voxlink_bulk(device.get(), now, bytes.data(), bytes.size() - (below(100) == 0 ? 1 : 0));
+    voxlink_tick(device.get(), now);
+    if (below(3) == 0) voxlink_sweep(device.get(), now);
+    if (voxlink_light(device.get()) != nullptr) ++lit;
+    while (below(4) != 0) {
+      const size_t length = voxlink_event(device.get(), now, event);
+      ASSERT_LE(length, 64u);
+      if (length == 0) break;
+      ++events;
+    }
+  }
+  // It did get somewhere.
+  EXPECT_GT(events, 50'000u);
+  EXPECT_GT(lit, 1000u);
+  const auto whole = [](const auto& guard) {
+    const auto bytes = std::as_bytes(std::span(guard));
+    return std::ranges::all_of(bytes, [](std::byte byte) { return byte == std::byte{0xA5}; });
+  };
+  EXPECT_TRUE(whole(memory.before) && whole(memory.between) && whole(memory.behind) &&
+              whole(memory.last));
 }
 
 // ---- held to the protocol
