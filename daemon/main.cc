@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <future>
 #include <memory>
 #include <optional>
@@ -32,6 +33,7 @@
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/genlock.h"
 #include "daemon/pipeline/view.h"
+#include "daemon/process/end_limit.h"
 #include "daemon/process/process.h"
 #include "daemon/process/supervisor.h"
 #include "daemon/reload/reloader.h"
@@ -51,6 +53,7 @@ namespace {
 constexpr int kUsageError = 2;
 constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;  // together below the 5 s that we promise
 constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
+constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
 int Fail(int code, const absl::Status& status) {
   std::fprintf(stderr, "voxeld: %s\n", std::string(status.message()).c_str());
@@ -381,6 +384,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   ticker.reset();
   security->access().SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
+  const EndLimit end_limit(kEndLimit);
   *draining = true;
   watch.Tell(nullptr);
   (*server)->Shutdown(kServerLimit);
@@ -449,4 +453,11 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace voxeld::daemon
 
-int main(int argc, char** argv) { return voxeld::daemon::Main(argc, argv); }
+int main(int argc, char** argv) {
+  try {
+    return voxeld::daemon::Main(argc, argv);
+  } catch (const std::exception& error) {  // no memory, no threads, no descriptors
+    std::fprintf(stderr, "voxeld: it cannot go on: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,9 +1,11 @@
 #include "gpu/engine.h"
 
 #include <atomic>
+#include <exception>
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "gpu/cpu/cpu_engine.h"
 #include "gpu/ranks/ranked_engine.h"
 #include "gpu/worker/worker_engine.h"
@@ -31,8 +33,13 @@ absl::StatusOr<std::unique_ptr<Engine>> InWorkers(EngineOptions options, std::st
 }
 
 absl::StatusOr<std::unique_ptr<Engine>> OnCpu(const EngineOptions& options, std::string reason) {
-  return options.in_worker ? InWorkers(options, std::move(reason))
-                           : CreateCpuEngine(options, std::move(reason));
+  if (options.in_worker) return InWorkers(options, std::move(reason));
+  try {
+    return CreateCpuEngine(options, std::move(reason));
+  } catch (const std::exception& error) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("no thread or memory for an engine: ", error.what()));
+  }
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
 #include <cstring>
+#include <exception>
 #include <optional>
 #include <set>
 #include <thread>
@@ -337,9 +338,14 @@ Server::~Server() = default;
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options, Handler handler,
                                                       Upgrade upgrade) {
-  auto impl = std::make_unique<Impl>(std::move(options), std::move(handler), std::move(upgrade));
-  if (absl::Status status = impl->Start(); !status.ok()) return status;
-  return std::unique_ptr<Server>(new Server(std::move(impl)));
+  try {
+    auto impl = std::make_unique<Impl>(std::move(options), std::move(handler), std::move(upgrade));
+    if (absl::Status status = impl->Start(); !status.ok()) return status;
+    return std::unique_ptr<Server>(new Server(std::move(impl)));
+  } catch (const std::exception& error) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("no descriptor or thread for http: ", error.what()));
+  }
 }
 
 const Address& Server::address() const { return impl_->address(); }

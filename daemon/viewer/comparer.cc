@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 #include "daemon/scene/engine_delta.h"
@@ -114,10 +115,17 @@ Comparer::~Comparer() {
 }
 
 void Comparer::Post(Task task) {
-  sync::MutexLock lock(mutex_);
-  if (!thread_.joinable()) thread_ = std::thread([this] { Run(); });
-  tasks_.push_back(std::move(task));
-  wake_.NotifyOne();
+  {
+    sync::MutexLock lock(mutex_);
+    try {
+      if (!thread_.joinable()) thread_ = std::thread([this] { Run(); });
+      tasks_.push_back(std::move(task));
+      wake_.NotifyOne();
+      return;
+    } catch (const std::system_error&) {
+    }
+  }
+  task.done(absl::ResourceExhaustedError("there is no thread to be had for it now"));
 }
 
 void Comparer::Run() {

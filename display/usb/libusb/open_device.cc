@@ -83,8 +83,13 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
         "interface ", interface, " of ", NameOf(entry), " cannot be claimed: ",
         result == LIBUSB_ERROR_BUSY ? "another program has it" : libusb_error_name(result)));
   }
-  return std::unique_ptr<OpenDevice>(new OpenDevice(std::move(handle), entry, interface, budget,
-                                                    clock, first_id, std::move(wake)));
+  try {
+    return std::unique_ptr<OpenDevice>(new OpenDevice(std::move(handle), entry, interface, budget,
+                                                      clock, first_id, std::move(wake)));
+  } catch (const std::system_error& error) {
+    return absl::UnavailableError(
+        absl::StrCat("no thread for ", NameOf(entry), ": ", error.what()));
+  }
 }
 
 OpenDevice::OpenDevice(std::shared_ptr<DeviceHandle> handle, const UsbDeviceEntry& entry,
