@@ -60,8 +60,8 @@ class Comparer::Reference {
                                      .threads = 1,
                                      .inline_execution = true,
                                      .index_bytes = kIndexBytes});
-    if (engine.ok()) engine_ = *std::move(engine);
     status_ = engine.status();
+    if (engine.ok()) engine_ = *std::move(engine);
   }
 
   // An error is the end of it.

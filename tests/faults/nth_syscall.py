@@ -165,7 +165,7 @@ class Result:
     call: str
     error: str
     n: int
-    how: str  # lived, refused, ended, known: …
+    how: str  # lived, refused, ended, late, known: …
     wrong: str = ""
     failed: list[str] = field(default_factory=list)
 
@@ -227,8 +227,9 @@ def run(call: str, error: str, n: int, stacks: bool = False) -> Result:
             how = "refused"
             wrong = "" if said.strip() and status != 0 else f"it ended with {status} before it was ready, and said nothing"
         elif alive:
-            how = "lived"
-            wrong = wrong or ("" if status == 0 else f"it ended with {status} when it was asked to: {said.strip().splitlines()[-1:]}")
+            late = "did not end in time" in said  # others wait for threads that they did not get; it is ended, and says so
+            how = "late" if late else "lived"
+            wrong = wrong or ("" if status == 0 or late else f"it ended with {status} when it was asked to: {said.strip().splitlines()[-1:]}")
         else:
             how = "ended"
             wrong = wrong or ("" if reason or re.search(r"error|failed|cannot", said, re.I) else f"it ended with {status} and did not say why")
@@ -314,9 +315,9 @@ def main() -> int:
         table: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
         for result in results:
             table[result.call]["wrong" if result.wrong else result.how.split(":")[0]] += 1
-        print(f"{'call':<18}{'lived':>7}{'refused':>9}{'ended':>7}{'known':>7}{'wrong':>7}")
+        print(f"{'call':<18}{'lived':>7}{'refused':>9}{'ended':>7}{'late':>7}{'known':>7}{'wrong':>7}")
         for call, kinds in sorted(table.items()):
-            print(f"{call:<18}" + "".join(f"{kinds[kind]:>{width}}" for kind, width in (("lived", 7), ("refused", 9), ("ended", 7), ("known", 7), ("wrong", 7))))
+            print(f"{call:<18}" + "".join(f"{kinds[kind]:>{width}}" for kind, width in (("lived", 7), ("refused", 9), ("ended", 7), ("late", 7), ("known", 7), ("wrong", 7))))
         wrong = sum(1 for result in results if result.wrong)
         print(f"{len(results)} cases, {wrong} wrong")
     return 1 if any(result.wrong for result in results) else 0
