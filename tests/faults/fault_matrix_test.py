@@ -1,0 +1,455 @@
+"""Faults against loads, each cell a test: the real voxeld with a display that is hurt and one that is not, nobody, one client or fifty
+that stream, and one more that goes on through all of it.
+
+In every cell: the daemon lives (or ends and is started again, where a fault takes its memory away), the one that goes on misses nothing,
+every commit gets all that it is owed, both displays show the same in the end, and the fault's cause is told in the log, in health or in
+the metrics. Paths are in VOXELD and PYTHONPATH; LOADS says which (idle,one,fifty)."""
+import contextlib
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.error
+import urllib.request
+from pathlib import Path
+from typing import Any, Callable, Iterator, Optional
+
+import numpy as np
+import voxeld as voxel
+
+from polling import LONG, until
+from relay import Relay
+
+LOADS = {"idle": 0, "one": 1, "fifty": 50}
+WATCHDOG = 5.0  # seconds in which a daemon that has ended is there again, and serves
+DISPLAYS = 'driver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
+HERE = Path(__file__).parent
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Cell:
+    """A daemon under a load."""
+
+    def __init__(self, test: unittest.TestCase, clients: int, hurt: str = "", engine: str = "", environment: Optional[dict[str, str]] = None, tls: bool = False) -> None:
+        self.test = test
+        self.folder = tempfile.mkdtemp(prefix="voxeld-faults-")
+        self.server = f"unix:{self.folder}/s"
+        self.port, self.http = free_port(), free_port()
+        listen = f'"{self.server}", "127.0.0.1:{self.port}"'
+        security = ""
+        if tls:
+            self.certificate("first")
+            self.install("first")
+            listen = f'"{self.server}", "tls:127.0.0.1:{self.port}"'
+            security = (f'[security]\ntls_certificate = "{self.folder}/server.pem"\ntls_key = "{self.folder}/server.key"\n'
+                        f'tls_client_ca = "{self.folder}/first.pem"\n')
+        Path(self.folder, "voxeld.toml").write_text(
+            f'[server]\nlisten = [{listen}]\nhttp = "127.0.0.1:{self.http}"\n[state]\ndir = "{self.folder}/state"\n{security}'
+            f'[engine]\nkind = "cpu"\n{engine}[[display]]\nname = "hurt"\n{DISPLAYS}{hurt}[[display]]\nname = "well"\n{DISPLAYS}', encoding="utf-8")
+        self.environment = {**os.environ, **(environment or {})}
+        self.told = ""  # by health, now and then
+        self.start()
+        test.addCleanup(self.close)
+        self.via = self.server
+        self.clients = clients
+        self.load: Optional[subprocess.Popen[str]] = None
+
+    def start(self) -> None:
+        self.log = open(f"{self.folder}/log", "a", encoding="utf-8")
+        self.daemon = subprocess.Popen([os.environ["VOXELD"], "--config", f"{self.folder}/voxeld.toml", "--log-level", "info"],
+                                       stdin=subprocess.DEVNULL, stdout=self.log, stderr=subprocess.STDOUT, env=self.environment)
+        until(self.reachable, f"a daemon: {self.said()[-2000:]}")
+
+    def reachable(self) -> bool:
+        assert self.daemon.poll() is None, self.said()[-2000:]
+        with contextlib.suppress(OSError, urllib.error.URLError):
+            return "status" in self.health()
+        return False
+
+    def said(self) -> str:
+        return Path(f"{self.folder}/log").read_text(encoding="utf-8", errors="replace")
+
+    def health(self) -> str:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=LONG) as answer:
+                return str(answer.read().decode())
+        except urllib.error.HTTPError as error:
+            return str(error.read().decode())
+
+    def metrics(self) -> str:
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/metrics", timeout=LONG) as answer:
+            return str(answer.read().decode())
+
+    def watch_health(self, seconds: float) -> None:
+        """What it says meanwhile is kept; a daemon that is stopped says nothing."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            with contextlib.suppress(OSError, urllib.error.URLError):
+                with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=max(0.05, end - time.monotonic())) as answer:
+                    self.told += answer.read().decode() + "\n"
+            time.sleep(0.05)
+
+    def certificate(self, name: str) -> None:
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", f"/CN={name}",
+                        "-addext", "subjectAltName=DNS:display.example", "-keyout", f"{self.folder}/{name}.key", "-out", f"{self.folder}/{name}.pem"],
+                       check=True, capture_output=True)
+
+    def install(self, name: str) -> None:
+        for end in ("key", "pem"):
+            path = Path(self.folder, f"server.{end}.new")
+            path.write_bytes(Path(self.folder, f"{name}.{end}").read_bytes())
+            path.chmod(0o600)
+            path.rename(Path(self.folder, f"server.{end}"))
+
+    def begin_load(self, *more: str) -> None:
+        if self.clients == 0:
+            return
+        self.load = subprocess.Popen([sys.executable, str(HERE / "clients.py"), self.via, str(self.clients), "20" if self.clients == 1 else "4", *more],
+                                     stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self.load.stdout is not None
+        self.test.assertEqual(self.load.stdout.readline(), "ready\n")
+
+    def end_load(self) -> dict[str, int]:
+        """What became of everything; what was drawn stays up until close()."""
+        if self.load is None:
+            return {}
+        assert self.load.stdin is not None and self.load.stdout is not None
+        self.load.stdin.write("stop\n")
+        self.load.stdin.flush()
+        sums: dict[str, int] = json.loads(self.load.stdout.readline())
+        self.test.assertEqual(sums["clients"], self.clients)
+        self.test.assertEqual(sums["missing"], 0, sums)
+        return sums
+
+    def close(self) -> None:
+        if self.load is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self.load.send_signal(signal.SIGCONT)
+            self.load.kill()
+            self.load.communicate()
+        if self.daemon.poll() is None:
+            self.daemon.send_signal(signal.SIGCONT)
+            self.daemon.terminate()
+            try:
+                self.daemon.wait(LONG)
+            except subprocess.TimeoutExpired:
+                self.daemon.kill()
+                self.daemon.wait()
+        self.log.close()
+        subprocess.run(["rm", "-rf", self.folder], check=True)
+
+
+class GoesOn:
+    """A client that is to notice nothing: each commit is shown on the display that is well."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.commits, self.wrong = 0, ""
+        self.stop = threading.Event()
+        self.v = voxel.connect(cell.server, name="goes on", timeout=LONG)
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self) -> None:
+        try:
+            while not self.stop.is_set():
+                self.v.layer("goes on").sphere("ball", radius=0.1 + self.commits % 9 / 20, color="green")
+                outcome = self.v.commit().wait_shown(timeout=LONG)["well"]
+                self.commits += 1
+                if outcome.kind not in ("presented", "unchanged", "superseded"):
+                    self.wrong = f"commit {self.commits}: {outcome}"
+                self.stop.wait(0.03)
+        except (voxel.VoxelError, TimeoutError, KeyError) as error:
+            self.wrong = f"after {self.commits}: {type(error).__name__}: {error}"
+
+    def end(self) -> None:
+        self.stop.set()
+        self.thread.join(2 * LONG)
+        assert not self.thread.is_alive()
+
+
+def same_light(cell: Cell) -> None:
+    """Both displays have the same, and it is not darkness."""
+    with voxel.connect(cell.server, name="last", timeout=LONG) as v:
+        v.layer("last").box("box", size=(0.4, 0.4, 0.4), color="white", fill="solid")
+        frame = v.commit().wait(LONG)
+        assert frame.accepted is not None
+
+        def alike() -> bool:
+            with contextlib.suppress(voxel.VoxelError):
+                hurt, well = (v.capture(name, at_least_snapshot=frame.accepted.snapshot, timeout=LONG).rgb for name in ("hurt", "well"))
+                return bool(np.array_equal(hurt, well) and well.any())
+            return False
+
+        until(alike, "the same light on both displays")
+
+
+# ---- faults: what is done to the daemon, its clients or its surroundings, and where it is told
+
+
+class Fault:
+    cause = ""  # in the log, health, or a metric that has moved; empty: nothing is to be told
+    hurt, engine = "", ""  # options of the display that is hurt, and of the engine
+    tls = False
+    deadly = False  # the daemon may end, and is started again
+    clients_are_cut = False
+
+    def environment(self, folder: str) -> dict[str, str]:
+        return {}
+
+    def run(self, cell: Cell) -> None:
+        """Does it, and takes it back."""
+        cell.watch_health(1.5)
+
+
+class Usb(Fault):
+    """The display's own device: by its plan, a second and a half after the start, or from the 100th transfer on."""
+
+    def __init__(self, plan: str) -> None:
+        self.hurt = f'faults = "{plan}"\n'
+        # What a display has sent again, lost, or come back from.
+        self.cause = r"voxeld_display_(slices_resent|volumes_lost)_total\{[^}]*hurt[^}]*\} (?!0$)|voxeld_display_attaches_total\{[^}]*hurt[^}]*\} (?!1$)"
+
+    def run(self, cell: Cell) -> None:
+        cell.watch_health(4)
+
+
+class WorkerLost(Fault):
+    engine = "in_worker = true\nworker_deadline_ns = 500000000\n"
+    cause = r"engine|worker"
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def run(self, cell: Cell) -> None:
+        for pid in Path(f"/proc/{cell.daemon.pid}/task/{cell.daemon.pid}/children").read_text(encoding="ascii").split():
+            with contextlib.suppress(OSError):
+                if "voxeld-engine" in Path(f"/proc/{pid}/cmdline").read_text(encoding="ascii"):
+                    os.kill(int(pid), self.number)
+        cell.watch_health(2)
+
+
+class Refused(Fault):
+    """System calls of the running daemon fail for a while, all of them."""
+
+    def __init__(self, calls: str, error: str, cause: str) -> None:
+        self.calls, self.error, self.cause = calls, error, cause
+
+    def run(self, cell: Cell) -> None:
+        tracer = subprocess.Popen(["strace", "-f", "-qq", "-o", "/dev/null", "-e", f"trace={self.calls}", "-e", f"inject={self.calls}:error={self.error}", "-e", "signal=none",
+                                   "-p", str(cell.daemon.pid)], stderr=subprocess.DEVNULL)
+        with voxel.connect(cell.server, name="keeps", on_disconnect="keep", timeout=LONG) as v:
+            v.layer("kept").sphere("ball", radius=0.2)
+            frame = v.commit(durable=True)
+            frame.wait(LONG)
+            cell.watch_health(2)
+            tracer.send_signal(signal.SIGINT)
+            tracer.wait(LONG)
+            try:
+                frame.wait_durable(LONG)  # it was not lost: it waited, or was told not to be
+            except voxel.NotDurable:
+                pass
+            v.layer("kept").sphere("ball", radius=0.3)
+            v.commit(durable=True).wait_durable(LONG)
+
+
+class Memory(Fault):
+    deadly = clients_are_cut = True
+    cause = r"cannot go on|bad_alloc|out of memory|no memory|quota|memory"
+
+    def run(self, cell: Cell) -> None:
+        size = int(re.search(r"VmSize:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
+        subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--as={size + (8 << 20)}:unlimited"], check=True)
+        with contextlib.suppress(voxel.VoxelError, TimeoutError):
+            with voxel.connect(cell.server, name="large", timeout=5, on_issue=lambda issue: None) as v:
+                v.points("large", np.zeros((3_000_000, 3), np.float32))
+                v.commit().wait(5)
+        cell.watch_health(1)
+        if cell.daemon.poll() is None:
+            subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), "--as=unlimited"], check=True)
+
+
+class Descriptors(Fault):
+    cause = r"[Tt]oo many open files|descriptor|accept_failures_total (?!0$)|EMFILE"
+
+    def run(self, cell: Cell) -> None:
+        most = len(os.listdir(f"/proc/{cell.daemon.pid}/fd")) + 4
+        before = subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), "--nofile", "--output=SOFT,HARD", "--noheadings", "--raw"], check=True, capture_output=True, text=True).stdout.split()
+        subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--nofile={most}:{before[1]}"], check=True)
+        held = []
+        for _ in range(30):
+            with contextlib.suppress(OSError):
+                held.append(socket.create_connection(("127.0.0.1", cell.port), timeout=1))
+        time.sleep(1.5)
+        for each in held:
+            each.close()
+        subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--nofile={before[0]}:{before[1]}"], check=True)
+        cell.watch_health(0.5)
+
+
+class ClockSteps(Fault):
+    """An hour on, and two back. What is measured goes by the clock that does not step."""
+
+    def environment(self, folder: str) -> dict[str, str]:
+        self.stamp = Path(folder, "time")
+        self.stamp.write_text("+0", encoding="ascii")
+        return {"LD_PRELOAD": "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1", "FAKETIME_TIMESTAMP_FILE": str(self.stamp), "FAKETIME_NO_CACHE": "1",
+                "DONT_FAKE_MONOTONIC": "1", "FAKETIME_DONT_RESET": "1"}
+
+    def run(self, cell: Cell) -> None:
+        for step in ("+3600", "-3600", "+0"):
+            self.stamp.write_text(step, encoding="ascii")
+            cell.watch_health(0.7)
+
+
+class StopClient(Fault):
+    def run(self, cell: Cell) -> None:
+        stopped = cell.load or subprocess.Popen([sys.executable, str(HERE / "clients.py"), cell.server, "1", "20"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        if cell.load is None:
+            assert stopped.stdout is not None
+            stopped.stdout.readline()
+        stopped.send_signal(signal.SIGSTOP)
+        cell.watch_health(1.5)
+        stopped.send_signal(signal.SIGCONT)
+        if cell.load is None:
+            stopped.kill()
+            stopped.communicate()
+
+
+class StopDaemon(Fault):
+    def run(self, cell: Cell) -> None:
+        cell.daemon.send_signal(signal.SIGSTOP)
+        time.sleep(1.5)  # so long it is stopped
+        cell.daemon.send_signal(signal.SIGCONT)
+
+
+class StopViewer(Fault):
+    """A page that asks, and does not read."""
+
+    def run(self, cell: Cell) -> None:
+        with socket.create_connection(("127.0.0.1", cell.http)) as page:
+            page.sendall(f"GET /volumes HTTP/1.1\r\nHost: 127.0.0.1:{cell.http}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
+            assert b" 101 " in page.recv(4096)
+            for text in (b'{"watch":"well","id":1}', b'{"watch":"hurt","id":2}', *[b'{"stats":true}'] * 50):
+                page.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
+            cell.watch_health(2)
+
+
+class Network(Fault):
+    """The clients' way to it, and theirs alone."""
+
+    clients_are_cut = True
+
+    def __init__(self, how: str) -> None:
+        self.how = how
+
+    def run(self, cell: Cell) -> None:
+        relay = self.relay
+        if self.how == "stalls":
+            relay.stall()
+        elif self.how == "halves":
+            relay.half = True
+        else:
+            relay.cut()
+        cell.watch_health(1.5)
+        relay.go_on()
+
+
+class Certificates(Fault):
+    """The server's certificate is exchanged for one that its clients do not trust, and back. Who is there stays."""
+
+    tls = True
+
+    def run(self, cell: Cell) -> None:
+        def dial(ca: str) -> bool:
+            with contextlib.suppress(voxel.VoxelError, TimeoutError):
+                who = voxel.Credentials(ca=f"{cell.folder}/{ca}.pem", certificate=f"{cell.folder}/first.pem", key=f"{cell.folder}/first.key", server_name="display.example")
+                with voxel.connect(f"tls:127.0.0.1:{cell.port}", timeout=2, credentials=who):
+                    return True
+            return False
+
+        cell.certificate("second")
+        assert dial("first")
+        cell.install("second")
+        until(lambda: dial("second"), "the second certificate")
+        assert not dial("first")
+        cell.install("first")
+        until(lambda: dial("first"), "the first certificate")
+
+
+FAULTS: dict[str, Callable[[], Fault]] = {
+    "usb_stall": lambda: Usb("stall@t100"), "usb_time_out": lambda: Usb("nak:1500@t100"), "usb_babble": lambda: Usb("babble:2@t20/in"), "usb_protocol_error": lambda: Usb("error:8@t100"),
+    "usb_short": lambda: Usb("partial:100@t100"), "usb_unplug": lambda: Usb("unplug:600@1500ms"), "usb_reset": lambda: Usb("unplug:30@1500ms"),
+    "engine_killed": lambda: WorkerLost(signal.SIGKILL), "engine_hangs": lambda: WorkerLost(signal.SIGSTOP),
+    "disk_full": lambda: Refused("pwrite64,ftruncate,fallocate", "ENOSPC", r"voxeld_state_failures_total (?!0$)|disk|[Nn]o space|cannot be kept|trouble"),
+    "disk_read_only": lambda: Refused("pwrite64,fdatasync,fsync", "EROFS", r"voxeld_state_failures_total (?!0$)|[Rr]ead-only|cannot be kept|trouble"),
+    "memory_limit": Memory, "descriptors_out": Descriptors, "clock_steps": ClockSteps, "client_stopped": StopClient, "daemon_stopped": StopDaemon, "viewer_stopped": StopViewer,
+    "network_stalls": lambda: Network("stalls"), "network_halves": lambda: Network("halves"), "network_cut": lambda: Network("cut"), "certificates_swapped": Certificates,
+}
+
+
+class Matrix(unittest.TestCase):
+    def cell(self, fault: Fault, clients: int) -> None:
+        with tempfile.TemporaryDirectory(prefix="voxeld-fault-") as folder:
+            environment = fault.environment(folder)
+            cell = Cell(self, clients, fault.hurt, fault.engine, environment, fault.tls)
+            more: tuple[str, ...] = ()
+            if isinstance(fault, Network):
+                fault.relay = Relay(("127.0.0.1", cell.port))
+                self.addCleanup(fault.relay.close)
+                cell.via = f"127.0.0.1:{fault.relay.port}"
+            if fault.tls:
+                cell.via = f"tls:127.0.0.1:{cell.port}"
+                more = (f"{cell.folder}/first.pem", f"{cell.folder}/first.key", "display.example")
+            with contextlib.ExitStack() as stack:
+                goes_on = None
+                if not fault.deadly:
+                    goes_on = GoesOn(cell)
+                    stack.callback(goes_on.end)
+                cell.begin_load(*more)
+                cell.watch_health(0.5)
+                before = goes_on.commits if goes_on else 0
+                fault.run(cell)
+                if cell.daemon.poll() is not None:
+                    self.assertTrue(fault.deadly, cell.said()[-2000:])
+                    began = time.monotonic()
+                    cell.start()
+                    self.assertLess(time.monotonic() - began, WATCHDOG)
+                if goes_on:
+                    until(lambda: goes_on.commits > before + 10 or goes_on.wrong, "the one that goes on")
+                    goes_on.end()
+                    self.assertEqual(goes_on.wrong, "")
+                    goes_on.v.close()
+                sums = cell.end_load()
+                if not fault.clients_are_cut:
+                    self.assertEqual(sums.get("unknown", 0), 0, sums)
+                same_light(cell)
+                if fault.cause:
+                    told = cell.said() + cell.told + cell.metrics()
+                    self.assertTrue(re.search(fault.cause, told, re.M), f"nothing tells of it ({fault.cause}): {cell.said()[-2000:]}")
+                cell.daemon.terminate()
+                self.assertEqual(cell.daemon.wait(LONG), 0, cell.said()[-2000:])
+
+
+def add_cells() -> None:
+    for load in os.environ.get("LOADS", "idle,one,fifty").split(","):
+        for name, fault in FAULTS.items():
+            def test(self: Matrix, fault: Callable[[], Fault] = fault, load: str = load) -> None:
+                self.cell(fault(), LOADS[load])
+
+            setattr(Matrix, f"test_{name}_{load}", test)
+
+
+add_cells()
