@@ -32,6 +32,7 @@
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/genlock.h"
 #include "daemon/pipeline/view.h"
+#include "daemon/play/setup.h"
 #include "daemon/process/process.h"
 #include "daemon/process/supervisor.h"
 #include "daemon/reload/reloader.h"
@@ -113,11 +114,12 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
     viewer::Viewer& viewer, Logger& log) {
   std::unique_ptr<http::Server> none;
   if (!config.http.has_value()) return none;
-  absl::StatusOr<std::unique_ptr<http::Server>> server = http::Server::Start(
-      {.listen = *config.http,
-       .max_connections = config.max_http_connections,
-       .idle_limit_ns = config.http_idle_limit_ns},
-      viewer.Handler(http::MonitorHandler(core, std::move(draining))), viewer.Upgrade());
+  absl::StatusOr<std::unique_ptr<http::Server>> server =
+      http::Server::Start({.listen = *config.http,
+                           .max_connections = config.max_http_connections,
+                           .idle_limit_ns = config.http_idle_limit_ns},
+                          viewer.Handler(http::MonitorHandler(core, std::move(draining))),
+                          viewer.Upgrade(), viewer.Receive());
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
   log.Warn("no http port", {{"why", std::string(server.status().message())},
                             {"hint", "choose another with --http ADDR, or none with --http off"}});
@@ -273,13 +275,22 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   }
   if (absl::Status status = core.Start(); !status.ok()) return Fail(1, status);
 
+  play::PlaySetup play;
+  if (!config.server.http_play) {
+    play.why_not = "this voxeld plays no files of pages: server.http_play is false";
+  } else if (config.server.http.has_value() && config.server.http_control) {
+    play = play::SetUpPlaying(config.server.listen);
+  }
   const auto draining = std::make_shared<std::atomic<bool>>(false);
   absl::StatusOr<std::unique_ptr<viewer::Viewer>> viewer = viewer::Viewer::Make(
       core, clock,
       {.version = Version(),
        .hosts = absl::StrSplit(config.server.http_hosts, absl::ByAnyChar(", "), absl::SkipEmpty()),
        .control = config.server.http_control,
-       .audit = &security->audit()});
+       .audit = &security->audit(),
+       .play = {.player = play.player.get(),
+                .why_not = play.why_not,
+                .max_bytes = config.server.http_max_upload_bytes}});
   if (!viewer.ok()) return Fail(1, viewer.status());
   absl::StatusOr<std::unique_ptr<http::Server>> http =
       StartHttp(config.server, core, draining, **viewer, log);
@@ -295,9 +306,11 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   }
   absl::StatusOr<std::vector<listen::ListeningSocket>> inherited = AdoptSockets(config, supervisor);
   if (!inherited.ok()) return Fail(1, inherited.status());
+  std::vector<Address> listen = config.server.listen;
+  if (play.listen.has_value()) listen.push_back(*play.listen);
   absl::StatusOr<std::unique_ptr<services::Server>> server = services::Server::Start(
       core, clock,
-      {.listen = config.server.listen,
+      {.listen = listen,
        .version = Version(),
        .streams = {.open_limit_ns = config.server.open_limit_ns,
                    .drain_limit_ns = config.server.drain_limit_ns,
@@ -344,7 +357,9 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
            {{"version", Version()}, {"config", config.file.empty() ? "defaults" : config.file}});
   LogDisplays(core, log);
   std::vector<std::string> addresses;
-  for (const Address& address : (*server)->addresses()) addresses.push_back(address.ToString());
+  for (const Address& address : (*server)->addresses()) {
+    if (address != play.listen) addresses.push_back(address.ToString());
+  }
   log.Info("ready", {{"listen", absl::StrJoin(addresses, " ")},
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
@@ -383,6 +398,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
   *draining = true;
   watch.Tell(nullptr);
+  if (play.player != nullptr) play.player->End();
   (*server)->Shutdown(kServerLimit);
   const absl::Status stopped = core.Stop(kCoreLimit);
   if (kept != nullptr) kept->Stop();
