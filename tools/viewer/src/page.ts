@@ -2,6 +2,7 @@
 import { Orbit, kHome, project } from "./camera";
 import { Connection } from "./connection";
 import { DisplayView, Look } from "./display_view";
+import { Dropped } from "./dropped";
 import { GlRenderer } from "./gl_renderer";
 import { Panels } from "./panels";
 import { DisplayDescription, FromDaemon, Hello } from "./protocol";
@@ -19,6 +20,7 @@ const input = (id: string) => byId<HTMLInputElement>(id);
 class Page {
   private readonly connection: Connection;
   private readonly panels = new Panels();
+  private readonly dropped = new Dropped(document.querySelector("main")!, byId("control"), (message) => this.connection.send(message), (text) => this.say(text));
   private readonly views = new Map<number, DisplayView>();
   private hello: Hello | null = null;
   private chosen = ""; // empty: all
@@ -62,6 +64,7 @@ class Page {
         (layer) => this.connection.send({ clear: { owner: layer.owner, layer: layer.layer } }));
     }
     if (message.display !== undefined) this.settings(message.display);
+    this.dropped.told(message);
     if (message.error !== undefined) this.say(message.error);
   }
 

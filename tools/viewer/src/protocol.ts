@@ -80,6 +80,9 @@ export interface Watching {
 
 export interface Hello { version: string; control: boolean; displays: DisplayDescription[] }
 
+// Of files that are played: told to pages with control. `why_not`: none are.
+export interface Play { max_bytes?: number; playing?: string; failed?: string; why?: string; why_not?: string }
+
 export type FromDaemon = {
   hello?: Hello;
   watching?: Watching;
@@ -87,6 +90,7 @@ export type FromDaemon = {
   stats?: Stats;
   layers?: { layers: LayerInfo[]; total: string };
   display?: DisplayDescription;
+  play?: Play;
   error?: string;
 };
 
