@@ -146,15 +146,17 @@ class Player::Impl {
   ~Impl() { End(); }
 
   void Play(PlayFile file) {
-    const std::string name = file.name();
+    std::function<void()> tell;
     {
       const sync::MutexLock lock(mutex_);
       if (quit_) return;
+      state_ = {.name = file.name()};
       next_ = std::move(file);
       stop_ = false;
+      tell = on_change_;
     }
-    Tell({.name = name});
     Wake();
+    if (tell) tell();
   }
 
   void Stop() {
@@ -187,24 +189,18 @@ class Player::Impl {
     on_change_ = std::move(on_change);
   }
 
-  pid_t pid() const {
-    const sync::MutexLock lock(mutex_);
-    return pid_;
-  }
-
  private:
   void Wake() {
     const uint64_t one = 1;
     (void)!write(wake_.get(), &one, sizeof(one));
   }
 
-  void Tell(Playing state, std::optional<pid_t> pid = {}) {
+  // On the thread; of what it has played last, which another may be to take the place of by now.
+  void Tell(Playing state) {
     std::function<void()> tell;
     {
       const sync::MutexLock lock(mutex_);
-      if (pid.has_value()) pid_ = *pid;
-      // What has come meanwhile is the newer.
-      if (pid == pid_t{0} && next_.has_value()) return;
+      if (next_.has_value()) return;
       if (state == state_) return;
       state_ = std::move(state);
       tell = on_change_;
@@ -225,8 +221,8 @@ class Player::Impl {
         quit = quit_;
       }
       if (next.has_value() || stop || quit) EndChild();
-      if (quit) return Tell({}, 0);
-      if (stop && !next.has_value()) Tell({}, 0);
+      if (quit) return Tell({});
+      if (stop && !next.has_value()) Tell({});
       if (next.has_value()) StartChild(*std::move(next));
       Await(-1, true);
       if (child_.has_value() && HasEnded(0)) Reap();
@@ -237,10 +233,10 @@ class Player::Impl {
     const std::string name = file.name();
     absl::StatusOr<Child> child = Spawn(options_, std::move(file));
     if (!child.ok()) {
-      return Tell({.failed = name, .why = std::string(child.status().message())}, 0);
+      return Tell({.failed = name, .why = std::string(child.status().message())});
     }
     child_ = *std::move(child);
-    Tell({.name = name}, child_->pid);
+    Tell({.name = name});
   }
 
   // Until something is said or has happened, `milliseconds` at the most (−1: any time). `asked`: or until another thread wakes it.
@@ -282,7 +278,7 @@ class Player::Impl {
     const std::string why = WhyOf(*child_, status);
     child_.reset();
     const bool good = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    Tell(good ? Playing() : Playing{.failed = name, .why = why}, 0);
+    Tell(good ? Playing() : Playing{.failed = name, .why = why});
   }
 
   // Whoever it has started goes, too. Its number is nobody else's until it is waited for.
@@ -315,7 +311,6 @@ class Player::Impl {
   std::optional<PlayFile> next_ VOXELD_GUARDED_BY(mutex_);
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false, quit_ VOXELD_GUARDED_BY(mutex_) = false;
   Playing state_ VOXELD_GUARDED_BY(mutex_);
-  pid_t pid_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::function<void()> on_change_ VOXELD_GUARDED_BY(mutex_);
   std::optional<Child> child_;  // the thread's own
   std::thread thread_;
@@ -330,6 +325,5 @@ Playing Player::state() const { return impl_->state(); }
 void Player::SetOnChange(std::function<void()> on_change) {
   impl_->SetOnChange(std::move(on_change));
 }
-pid_t Player::pid() const { return impl_->pid(); }
 
 }  // namespace voxeld::daemon::play

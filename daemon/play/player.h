@@ -2,8 +2,6 @@
 // the next one takes the place of the last, and what a process has up goes with its session.
 #pragma once
 
-#include <sys/types.h>
-
 #include <functional>
 #include <memory>
 #include <string>
@@ -48,8 +46,6 @@ class Player {
   // Called on the player's thread, or on that which calls Play or Stop, when the state is another. Not once this has returned
   // with nothing, but for a call that is under way.
   void SetOnChange(std::function<void()> on_change);
-  // 0: none runs. For tests.
-  pid_t pid() const;
 
  private:
   class Impl;
