@@ -143,15 +143,20 @@ void LogDisplays(Core& core, Logger& log) {
   }
 }
 
-// For whoever started it by hand: where to look, what to try, what draws. The address that gives control is for a
-// terminal alone: what is kept of the output must not give it.
-void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer) {
+// The address that gives control is for people at a terminal alone: what is kept of the output must not give it.
+bool TellsControl(const Config& config) {
+  return config.log.format == "text" && isatty(STDOUT_FILENO) != 0;  // JSON is for programs
+}
+
+// For whoever started it by hand: where to look, what to try, what draws.
+void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
+             bool tells_control) {
   if (http != nullptr && !http->address().unix_socket) {
     const std::string page = viewer::Viewer::PageAddress(http->address());
     const std::string control = viewer.ControlAddress(http->address());
     if (!viewer::Viewer::HasPage()) {
       std::printf("see:    no page: this voxeld was built without it\n");
-    } else if (isatty(STDOUT_FILENO) != 0 && !control.empty()) {
+    } else if (tells_control && !control.empty()) {
       std::printf("see:    %s   (to look; with control, once: %s)\n", page.c_str(),
                   control.c_str());
     } else {
@@ -278,7 +283,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   play::PlaySetup play;
   if (!config.server.http_play) {
     play.why_not = "this voxeld plays no files of pages: server.http_play is false";
-  } else if (config.server.http.has_value() && config.server.http_control) {
+  } else if (config.server.http.has_value() && config.server.http_control && TellsControl(config)) {
     play = play::SetUpPlaying(config.server.listen);
   }
   const auto draining = std::make_shared<std::atomic<bool>>(false);
@@ -365,7 +370,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
   // JSON is for programs, which may read both outputs as one.
-  if (config.log.format == "text") Welcome(core, http->get(), **viewer);
+  if (config.log.format == "text") Welcome(core, http->get(), **viewer, TellsControl(config));
 
   const std::string displays_text =
       absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays");

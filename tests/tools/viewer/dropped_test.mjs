@@ -6,6 +6,7 @@ import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, test } from "node:test";
+import { setTimeout } from "node:timers/promises";
 import { Daemon, freePort } from "./daemon.mjs";
 
 const require = createRequire(join(process.env.NODE_MODULES, "x"));
@@ -15,14 +16,18 @@ const axe = require("axe-core");
 const kPatience = Number(process.env.PATIENCE_MS ?? 120_000);
 const kCube = "cube=simulated,size=16x16x16,view=voxels";
 const data = (name) => readFileSync(join(import.meta.dirname, "../data", name));
-const kept = () => readdirSync(process.env.TMPDIR ?? tmpdir()).filter((name) => name.startsWith("voxeld-play-"));
+process.env.TMPDIR = mkdtempSync(join(tmpdir(), "voxeld-dropped-"));
+const kept = () => readdirSync(process.env.TMPDIR).filter((name) => name.startsWith("voxeld-play-"));
 
 let browser;
 
 before(async () => {
   browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox"], timeout: kPatience });
 }, { timeout: kPatience });
-after(() => browser?.close());
+after(async () => {
+  await browser?.close();
+  rmSync(process.env.TMPDIR, { recursive: true, force: true });
+});
 
 async function open(address, more = {}) {
   const context = await browser.newContext({ viewport: { width: 900, height: 700 }, deviceScaleFactor: 1, ...more });
@@ -167,6 +172,30 @@ describe("a file dropped on the page", { timeout: 6 * kPatience }, () => {
     });
     assert.deepEqual(kept(), []);
     rmSync(folder, { recursive: true, force: true });
+  });
+
+  test("ends with a daemon that is killed", async () => {
+    const daemon = await Daemon.start([kCube], { terminal: true });
+    const page = await open(daemon.control);
+    await drop(page, ["arrow.obj", data("arrow.obj")]);
+    await lights(page, true);
+    const voxeld = voxeldOf(daemon.process.pid);
+    const player = readdirSync(`/proc/${voxeld}/task`)
+      .flatMap((task) => readFileSync(`/proc/${voxeld}/task/${task}/children`, "utf8").trim().split(" "))
+      .find((pid) => pid !== "" && readFileSync(`/proc/${pid}/comm`, "utf8") === "voxelctl\n");
+    assert.ok(player !== undefined);
+    process.kill(voxeld, "SIGKILL");
+    await daemon.ended;
+    for (let runs = true; runs; await setTimeout(20)) {
+      try {
+        runs = !/\) Z /.test(readFileSync(`/proc/${player}/stat`, "utf8"));
+      } catch {
+        runs = false;
+      }
+    }
+    await page.context().close();
+    await daemon.stop();
+    for (const left of kept()) rmSync(join(process.env.TMPDIR, left), { recursive: true, force: true });
   });
 
   for (const [name, options] of Object.entries({
