@@ -50,7 +50,8 @@ namespace voxeld::daemon {
 namespace {
 
 constexpr int kUsageError = 2;
-constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;  // together below the 5 s that we promise
+// With half a second for what plays a file together below the 5 s that we promise.
+constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
 
 int Fail(int code, const absl::Status& status) {

@@ -14,8 +14,8 @@ namespace voxeld::daemon::play {
 struct PlayerOptions {
   std::string program;  // voxelctl's path
   std::string server;   // where it finds the daemon, as --server has it
-  // From being asked to end to being killed.
-  sync::TimeNs grace_ns = 2 * sync::kSecond;
+  // From being asked to end to being killed. What it has up goes either way.
+  sync::TimeNs grace_ns = 500 * sync::kMillisecond;
 };
 
 struct Playing {

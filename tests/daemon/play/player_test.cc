@@ -100,7 +100,7 @@ TEST_F(PlayerTest, RunsVoxelctlWithTheFileAndNothingOfTheDaemons) {
   setenv("VOXELD_TOKEN", "secret", 1);
   Start(
       "printf '%s\\n' \"$@\" >$HERE/words; env >$HERE/environment; ls /proc/self/fd "
-      ">$HERE/descriptors; ps -o pgid= $$ >$HERE/group; cat \"$5\" >$HERE/contents");
+      ">$HERE/descriptors; cut -d' ' -f5 /proc/$$/stat >$HERE/group; cat \"$5\" >$HERE/contents");
   const Descriptor open_here(open("/dev/null", O_RDONLY));  // without CLOEXEC, as a library might
   absl::StatusOr<PlayFile> file = PlayFile::Make("my arrow.stl");
   ASSERT_TRUE(file.ok() && file->Append("solid").ok());
