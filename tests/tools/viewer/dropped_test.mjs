@@ -105,9 +105,12 @@ describe("a file dropped on the page", { timeout: 6 * kPatience }, () => {
       const page = await open(daemon.control);
       await drop(page, ["<img src=x onerror=broken=1>.stl", "these are words\n"]);
       await says(page, "not-played", "an STL begins with");
-      assert.match(await page.textContent("#not-played"), /^_img src=x onerror=broken=1_\.stl was not played: _img src=x onerror=broken=1_\.stl: is text that begins with/);
+      assert.match(await page.textContent("#not-played"), /^Not played: _img src=x onerror=broken=1_\.stl: is text that begins with/);
       assert.equal(await page.evaluate(() => globalThis.broken), undefined);
+      await page.click("#toggle"); // the panel is away
       await drop(page, ["../../what.docx", "PK"]);
+      await says(page, "said", "Not played: what.docx: files of type .docx are not read");
+      await page.click("#toggle");
       await says(page, "not-played", "files of type .docx are not read");
       await drop(page, ["a.obj", data("arrow.obj")], ["b.obj", data("arrow.obj")]);
       await says(page, "not-played", "2 files; one is played at a time");

@@ -86,12 +86,15 @@ export class Dropped {
     this.choose.disabled = whyNot !== undefined || this.sending !== null;
     this.stop.hidden = playing === undefined;
     this.state.textContent = playing !== undefined ? `playing ${playing}` : whyNot ?? "";
-    this.complain(failed !== undefined ? `${failed} was not played: ${why ?? ""}` : "");
+    if (failed === undefined) this.complain("");
+    else if (why?.startsWith(`${failed}: `)) this.complain(`Not played: ${why}`); // as it is of what is in the file
+    else this.complain(`${failed} was not played: ${why ?? ""}`);
   }
 
   private complain(text: string): void {
     this.trouble.textContent = text;
     this.trouble.hidden = text === "";
+    if (text !== "" && this.trouble.offsetParent === null) this.say(text); // the panel is put away
   }
 
   // Why no file is taken here; null: one is.
