@@ -69,8 +69,8 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
       absl::Status status;
       if (!held->file.has_value()) {
         absl::StatusOr<play::PlayFile> made = play::PlayFile::Make(name, write);
-        if (made.ok()) held->file.emplace(*std::move(made));
         status = made.status();
+        if (status.ok()) held->file.emplace(*std::move(made));
       }
       if (status.ok()) status = held->file->Append(piece);
       if (status.ok()) return then(std::nullopt);
