@@ -139,10 +139,9 @@ std::string WhyOf(const Child& child, int status) {
 
 class Player::Impl {
  public:
-  explicit Impl(PlayerOptions options)
-      : options_(std::move(options)),
-        wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
-        thread_([this] { Run(); }) {}
+  // `wake`: an eventfd that does not block.
+  Impl(PlayerOptions options, Descriptor wake)
+      : options_(std::move(options)), wake_(std::move(wake)), thread_([this] { Run(); }) {}
 
   ~Impl() { End(); }
 
@@ -317,7 +316,18 @@ class Player::Impl {
   std::thread thread_;
 };
 
-Player::Player(PlayerOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+absl::StatusOr<std::unique_ptr<Player>> Player::Make(PlayerOptions options) {
+  Descriptor wake(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  if (!wake.ok()) return absl::ErrnoToStatus(errno, "no descriptor for playing files");
+  try {
+    return std::unique_ptr<Player>(
+        new Player(std::make_unique<Impl>(std::move(options), std::move(wake))));
+  } catch (const std::system_error& error) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("no thread for playing files: ", error.what()));
+  }
+}
+Player::Player(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Player::~Player() = default;
 void Player::Play(PlayFile file) { impl_->Play(std::move(file)); }
 void Player::Stop() { impl_->Stop(); }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "absl/status/statusor.h"
 #include "daemon/play/play_file.h"
 #include "display/sync/clock.h"
 
@@ -30,7 +31,8 @@ inline constexpr size_t kLongestWhy = 600;
 // the player, and where there is setpriv(1) also with the daemon, however that ends. When memory is short it goes first.
 class Player {
  public:
-  explicit Player(PlayerOptions options);
+  // ResourceExhausted if the system has no descriptor or no thread for it.
+  static absl::StatusOr<std::unique_ptr<Player>> Make(PlayerOptions options);
   ~Player();
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
@@ -49,7 +51,8 @@ class Player {
 
  private:
   class Impl;
-  std::unique_ptr<Impl> impl_;
+  explicit Player(std::unique_ptr<Impl> impl);
+  const std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace voxeld::daemon::play

@@ -41,7 +41,14 @@ PlaySetup SetUpPlaying(const std::vector<Address>& listen) {
     }
     setup.listen = *own;
   }
-  setup.player = std::make_unique<Player>(PlayerOptions{.program = program, .server = server});
+  absl::StatusOr<std::unique_ptr<Player>> player =
+      Player::Make({.program = program, .server = server});
+  if (!player.ok()) {
+    setup.listen.reset();
+    setup.why_not = std::string(player.status().message());
+    return setup;
+  }
+  setup.player = *std::move(player);
   return setup;
 }
 

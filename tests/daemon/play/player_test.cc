@@ -41,8 +41,10 @@ class PlayerTest : public ::testing::Test {
     const std::string program = Path("voxelctl");
     std::ofstream(program) << "#!/bin/sh\nHERE=" << folder_->path() << "\n" << script << "\n";
     chmod(program.c_str(), 0700);
-    player_ = std::make_unique<Player>(
-        PlayerOptions{.program = program, .server = "unix:/run/v.sock", .grace_ns = grace});
+    auto player =
+        Player::Make({.program = program, .server = "unix:/run/v.sock", .grace_ns = grace});
+    ASSERT_TRUE(player.ok()) << player.status();
+    player_ = *std::move(player);
     player_->SetOnChange([this] {
       sync::MutexLock lock(mutex_);
       changed_.NotifyAll();

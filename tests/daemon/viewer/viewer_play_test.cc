@@ -58,8 +58,9 @@ class ViewerPlayTest : public ::testing::Test {
       const std::string program = folder_->path() + "/voxelctl";
       std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
       chmod(program.c_str(), 0700);
-      player_ = std::make_unique<play::Player>(
-          play::PlayerOptions{.program = program, .server = "unix:/nowhere"});
+      auto player = play::Player::Make({.program = program, .server = "unix:/nowhere"});
+      ASSERT_TRUE(player.ok()) << player.status();
+      player_ = *std::move(player);
       options.player = player_.get();
     }
     auto viewer =
