@@ -33,6 +33,7 @@
 #include "daemon/log/logger.h"
 #include "daemon/pipeline/genlock.h"
 #include "daemon/pipeline/view.h"
+#include "daemon/play/setup.h"
 #include "daemon/process/end_limit.h"
 #include "daemon/process/process.h"
 #include "daemon/process/supervisor.h"
@@ -51,7 +52,8 @@ namespace voxeld::daemon {
 namespace {
 
 constexpr int kUsageError = 2;
-constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;  // together below the 5 s that we promise
+// With half a second for what plays a file together below the 5 s that we promise.
+constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
@@ -116,11 +118,12 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
     viewer::Viewer& viewer, Logger& log) {
   std::unique_ptr<http::Server> none;
   if (!config.http.has_value()) return none;
-  absl::StatusOr<std::unique_ptr<http::Server>> server = http::Server::Start(
-      {.listen = *config.http,
-       .max_connections = config.max_http_connections,
-       .idle_limit_ns = config.http_idle_limit_ns},
-      viewer.Handler(http::MonitorHandler(core, std::move(draining))), viewer.Upgrade());
+  absl::StatusOr<std::unique_ptr<http::Server>> server =
+      http::Server::Start({.listen = *config.http,
+                           .max_connections = config.max_http_connections,
+                           .idle_limit_ns = config.http_idle_limit_ns},
+                          viewer.Handler(http::MonitorHandler(core, std::move(draining))),
+                          viewer.Upgrade(), viewer.Receive());
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
   log.Warn("no http port", {{"why", std::string(server.status().message())},
                             {"hint", "choose another with --http ADDR, or none with --http off"}});
@@ -144,15 +147,20 @@ void LogDisplays(Core& core, Logger& log) {
   }
 }
 
-// For whoever started it by hand: where to look, what to try, what draws. The address that gives control is for a
-// terminal alone: what is kept of the output must not give it.
-void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer) {
+// The address that gives control is for people at a terminal alone: what is kept of the output must not give it.
+bool TellsControl(const Config& config) {
+  return config.log.format == "text" && isatty(STDOUT_FILENO) != 0;  // JSON is for programs
+}
+
+// For whoever started it by hand: where to look, what to try, what draws.
+void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
+             bool tells_control) {
   if (http != nullptr && !http->address().unix_socket) {
     const std::string page = viewer::Viewer::PageAddress(http->address());
     const std::string control = viewer.ControlAddress(http->address());
     if (!viewer::Viewer::HasPage()) {
       std::printf("see:    no page: this voxeld was built without it\n");
-    } else if (isatty(STDOUT_FILENO) != 0 && !control.empty()) {
+    } else if (tells_control && !control.empty()) {
       std::printf("see:    %s   (to look; with control, once: %s)\n", page.c_str(),
                   control.c_str());
     } else {
@@ -276,13 +284,22 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   }
   if (absl::Status status = core.Start(); !status.ok()) return Fail(1, status);
 
+  play::PlaySetup play;
+  if (!config.server.http_play) {
+    play.why_not = "this voxeld plays no files of pages: server.http_play is false";
+  } else if (config.server.http.has_value() && config.server.http_control && TellsControl(config)) {
+    play = play::SetUpPlaying(config.server.listen);
+  }
   const auto draining = std::make_shared<std::atomic<bool>>(false);
   absl::StatusOr<std::unique_ptr<viewer::Viewer>> viewer = viewer::Viewer::Make(
       core, clock,
       {.version = Version(),
        .hosts = absl::StrSplit(config.server.http_hosts, absl::ByAnyChar(", "), absl::SkipEmpty()),
        .control = config.server.http_control,
-       .audit = &security->audit()});
+       .audit = &security->audit(),
+       .play = {.player = play.player.get(),
+                .why_not = play.why_not,
+                .max_bytes = config.server.http_max_upload_bytes}});
   if (!viewer.ok()) return Fail(1, viewer.status());
   absl::StatusOr<std::unique_ptr<http::Server>> http =
       StartHttp(config.server, core, draining, **viewer, log);
@@ -298,9 +315,11 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   }
   absl::StatusOr<std::vector<listen::ListeningSocket>> inherited = AdoptSockets(config, supervisor);
   if (!inherited.ok()) return Fail(1, inherited.status());
+  std::vector<Address> listen = config.server.listen;
+  if (play.listen.has_value()) listen.push_back(*play.listen);
   absl::StatusOr<std::unique_ptr<services::Server>> server = services::Server::Start(
       core, clock,
-      {.listen = config.server.listen,
+      {.listen = listen,
        .version = Version(),
        .streams = {.open_limit_ns = config.server.open_limit_ns,
                    .drain_limit_ns = config.server.drain_limit_ns,
@@ -347,13 +366,15 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
            {{"version", Version()}, {"config", config.file.empty() ? "defaults" : config.file}});
   LogDisplays(core, log);
   std::vector<std::string> addresses;
-  for (const Address& address : (*server)->addresses()) addresses.push_back(address.ToString());
+  for (const Address& address : (*server)->addresses()) {
+    if (address != play.listen) addresses.push_back(address.ToString());
+  }
   log.Info("ready", {{"listen", absl::StrJoin(addresses, " ")},
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
   // JSON is for programs, which may read both outputs as one.
-  if (config.log.format == "text") Welcome(core, http->get(), **viewer);
+  if (config.log.format == "text") Welcome(core, http->get(), **viewer, TellsControl(config));
 
   const std::string displays_text =
       absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays");
@@ -387,6 +408,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   const EndLimit end_limit(kEndLimit);
   *draining = true;
   watch.Tell(nullptr);
+  if (play.player != nullptr) play.player->End();
   (*server)->Shutdown(kServerLimit);
   const absl::Status stopped = core.Stop(kCoreLimit);
   if (kept != nullptr) kept->Stop();

@@ -66,6 +66,8 @@ struct ServerConfig {
   int64_t http_idle_limit_ns = 10 * sync::kSecond;
   std::string http_hosts;    // names, between commas, that browsers may know this machine by
   bool http_control = true;  // a browser may be given control, by an address that serves once
+  bool http_play = true;     // with control it may send files to be played
+  uint64_t http_max_upload_bytes = 256u << 20;  // of one of them
 };
 
 struct EngineConfig {

@@ -71,6 +71,8 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("http_idle_limit_ns", config.server.http_idle_limit_ns, kSecond / 10, kHour);
   visitor.Text("http_hosts", config.server.http_hosts);
   visitor.Flag("http_control", config.server.http_control);
+  visitor.Flag("http_play", config.server.http_play);
+  visitor.Integer("http_max_upload_bytes", config.server.http_max_upload_bytes, 1, 2 * kGiB);
 
   visitor.Section("engine");
   visitor.Engine("kind", config.engine.kind);

@@ -15,13 +15,16 @@
 #include <chrono>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <optional>
 #include <set>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/http/body_session.h"
 #include "daemon/http/connection_stream.h"
+#include "daemon/http/response_message.h"
 #include "daemon/http/web_socket_session.h"
 
 namespace voxeld::daemon::http {
@@ -39,35 +42,39 @@ constexpr auto kAcceptRetry = std::chrono::milliseconds(100);
 constexpr uint64_t kGreatestBody = 4096;  // read and thrown away
 constexpr mode_t kSocketMode = 0660;
 
-Response Plain(unsigned status, std::string text) {
-  return {status, "text/plain; charset=utf-8", std::move(text) + "\n"};
-}
+Response Plain(unsigned status, std::string text) { return PlainResponse(status, std::move(text)); }
 
 std::string_view View(boost::beast::string_view text) { return {text.data(), text.size()}; }
+
+// Who answers, and who takes over what a connection here does not serve itself.
+struct Served {
+  const Handler handler;
+  const Upgrade upgrade;
+  const Receive receive;
+  std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded;
+  std::function<void(Stream, beast::flat_buffer, std::unique_ptr<BodyParser>, Reception)> received;
+};
 
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(std::shared_ptr<asio::io_context> io, Stream::socket_type socket,
-             const ServerOptions& options, const Handler& handler, const Upgrade& upgrade,
-             std::function<void(Connection*)> closed,
-             std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded)
+             const ServerOptions& options, const Served& served,
+             std::function<void(Connection*)> closed)
       : io_(std::move(io)),
         stream_(std::move(socket)),
         timer_(io_->get_executor()),
         options_(options),
-        handler_(handler),
-        upgrade_(upgrade),
-        closed_(std::move(closed)),
-        upgraded_(std::move(upgraded)) {}
+        served_(served),
+        closed_(std::move(closed)) {}
 
   void Read() {
     parser_ = std::make_unique<Parser>();
     parser_->header_limit(options_.max_header_bytes);
-    parser_->body_limit(kGreatestBody);
+    parser_->body_limit(std::numeric_limits<uint64_t>::max());  // until it is known whose it is
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
-    wire::async_read(
+    wire::async_read_header(
         stream_, buffer_, *parser_,
-        [self = shared_from_this()](error_code error, size_t) { self->OnRead(error); });
+        [self = shared_from_this()](error_code error, size_t) { self->OnHeader(error); });
   }
 
   void Close() {
@@ -79,6 +86,20 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
  private:
+  void OnHeader(const error_code& error) {
+    if (error || !closed_) return OnRead(error);
+    if (parser_->get().method() == wire::verb::post && served_.receive) {
+      std::optional<Reception> reception = served_.receive(Asked());
+      if (reception.has_value()) return GiveBodyAway(*std::move(reception));
+    }
+    const auto length = parser_->content_length();
+    if (length.has_value() && *length > kGreatestBody) return OnRead(wire::error::body_limit);
+    parser_->body_limit(kGreatestBody);
+    wire::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](error_code failed, size_t) { self->OnRead(failed); });
+  }
+
   void OnRead(const error_code& error) {
     if (!error) return Answer();
     // What is no HTTP gets an answer too; what is no request any more does not.
@@ -92,6 +113,19 @@ class Connection : public std::enable_shared_from_this<Connection> {
     Write(Plain(400, absl::StrCat("bad request: ", error.message())), true);
   }
 
+  Request Asked() const {
+    const auto& request = parser_->get();
+    const std::string_view target = View(request.target());
+    const size_t query = target.find('?');
+    return {
+        .path = target.substr(0, query),
+        .query = query == std::string_view::npos ? std::string_view() : target.substr(query + 1),
+        .host = View(request[wire::field::host]),
+        .origin = View(request[wire::field::origin]),
+        .cookie = View(request[wire::field::cookie]),
+        .accept_encoding = View(request[wire::field::accept_encoding])};
+  }
+
   void Answer() {
     const auto& request = parser_->get();
     head_ = request.method() == wire::verb::head;
@@ -99,17 +133,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (request.method() != wire::verb::get && !head_) {
       return Write(Plain(405, "only GET and HEAD are answered"), close);
     }
-    const std::string_view target = View(request.target());
-    const size_t query = target.find('?');
-    const Request asked = {
-        .path = target.substr(0, query),
-        .query = query == std::string_view::npos ? std::string_view() : target.substr(query + 1),
-        .host = View(request[wire::field::host]),
-        .origin = View(request[wire::field::origin]),
-        .cookie = View(request[wire::field::cookie]),
-        .accept_encoding = View(request[wire::field::accept_encoding])};
-    if (upgrade_ && beast::websocket::is_upgrade(request)) {
-      const absl::StatusOr<ServeWebSocket> serve = upgrade_(asked);
+    const Request asked = Asked();
+    if (served_.upgrade && beast::websocket::is_upgrade(request)) {
+      const absl::StatusOr<ServeWebSocket> serve = served_.upgrade(asked);
       if (serve.ok()) return GiveAway(*serve);
       const unsigned code = absl::IsNotFound(serve.status())            ? 404
                             : absl::IsResourceExhausted(serve.status()) ? 503
@@ -118,13 +144,14 @@ class Connection : public std::enable_shared_from_this<Connection> {
     }
     const uint64_t number = ++number_;
     // The answer may come when the connection, or the whole server, is gone.
-    const bool known = handler_(asked, [weak = weak_from_this(), number, close](Response answer) {
-      const std::shared_ptr<Connection> open = weak.lock();
-      if (open == nullptr) return;
-      asio::post(*open->io_, [weak, number, close, answer = std::move(answer)]() mutable {
-        if (const auto self = weak.lock()) self->OnAnswer(number, std::move(answer), close);
-      });
-    });
+    const bool known =
+        served_.handler(asked, [weak = weak_from_this(), number, close](Response answer) {
+          const std::shared_ptr<Connection> open = weak.lock();
+          if (open == nullptr) return;
+          asio::post(*open->io_, [weak, number, close, answer = std::move(answer)]() mutable {
+            if (const auto self = weak.lock()) self->OnAnswer(number, std::move(answer), close);
+          });
+        });
     if (!known) return Write(Plain(404, "there is nothing here; try /healthz or /metrics"), close);
     stream_.expires_never();
     timer_.expires_after(std::chrono::nanoseconds(options_.answer_limit_ns));
@@ -136,7 +163,14 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void GiveAway(const ServeWebSocket& serve) {
     const RequestMessage request = parser_->release();
     stream_.expires_never();
-    upgraded_(std::move(stream_), request, serve);
+    served_.upgraded(std::move(stream_), request, serve);
+    if (auto closed = std::exchange(closed_, nullptr)) closed(this);
+  }
+
+  void GiveBodyAway(Reception reception) {
+    stream_.expires_never();
+    served_.received(std::move(stream_), std::move(buffer_),
+                     std::make_unique<BodyParser>(std::move(*parser_)), std::move(reception));
     if (auto closed = std::exchange(closed_, nullptr)) closed(this);
   }
 
@@ -149,14 +183,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
   void Write(Response answer, bool close) {
-    response_.emplace(static_cast<wire::status>(answer.status), 11);
-    response_->set(wire::field::content_type, answer.content_type);
-    response_->set(wire::field::cache_control, "no-store");
-    for (const auto& [name, value] : answer.headers) response_->set(name, value);
-    if (answer.status == 405) response_->set(wire::field::allow, "GET, HEAD");
-    response_->keep_alive(!close);
-    response_->content_length(answer.body.size());
-    if (!head_) response_->body() = std::move(answer.body);
+    response_.emplace(ToMessage(std::move(answer), close, head_));
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
     serializer_.emplace(*response_);
     const auto written = [self = shared_from_this(), close](error_code error, size_t) {
@@ -174,13 +201,11 @@ class Connection : public std::enable_shared_from_this<Connection> {
   Stream stream_;
   asio::steady_timer timer_;
   const ServerOptions& options_;
-  const Handler& handler_;
-  const Upgrade& upgrade_;
+  const Served& served_;
   std::function<void(Connection*)> closed_;  // empty once closed
-  const std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded_;
   beast::flat_buffer buffer_;
   std::unique_ptr<Parser> parser_;
-  std::optional<wire::response<wire::string_body>> response_;
+  std::optional<ResponseMessage> response_;
   std::optional<wire::response_serializer<wire::string_body>> serializer_;
   bool head_ = false;
   uint64_t number_ = 0;  // of the request that waits for its answer
@@ -206,10 +231,17 @@ absl::StatusOr<Protocol::endpoint> Endpoint(const Address& address, asio::io_con
 // Everything but Start and the destructor runs on the one thread.
 class Server::Impl {
  public:
-  Impl(ServerOptions options, Handler handler, Upgrade upgrade)
+  Impl(ServerOptions options, Handler handler, Upgrade upgrade, Receive receive)
       : options_(std::move(options)),
-        handler_(std::move(handler)),
-        upgrade_(Bounded(std::move(upgrade))),
+        served_{std::move(handler), Bounded(std::move(upgrade)), std::move(receive),
+                [this](Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
+                  OnUpgraded(std::move(stream), request, serve);
+                },
+                [this](Stream stream, beast::flat_buffer buffer, std::unique_ptr<BodyParser> parser,
+                       Reception reception) {
+                  OnReceived(std::move(stream), std::move(buffer), std::move(parser),
+                             std::move(reception));
+                }},
         io_(std::make_shared<asio::io_context>(1)),
         acceptor_(io_->get_executor()),
         retry_(io_->get_executor()) {}
@@ -226,6 +258,8 @@ class Server::Impl {
       for (const auto& connection : connections) connection->Close();
       const std::set<std::shared_ptr<WebSocketSession>> sockets = sockets_;
       for (const auto& socket : sockets) socket->Close();
+      const std::set<std::shared_ptr<BodySession>> bodies = bodies_;
+      for (const auto& body : bodies) body->Close();
     });
     thread_.join();
   }
@@ -267,20 +301,16 @@ class Server::Impl {
 
  private:
   void Accept() {
-    if (accepting_ || stopping_ ||
-        connections_.size() + sockets_.size() >= options_.max_connections)
-      return;
+    const size_t open = connections_.size() + sockets_.size() + bodies_.size();
+    if (accepting_ || stopping_ || open >= options_.max_connections) return;
     accepting_ = true;
     acceptor_.async_accept([this](error_code error, Stream::socket_type socket) {
       accepting_ = false;
       if (stopping_) return;
       if (error) return AcceptLater();
-      const auto connection = std::make_shared<Connection>(
-          io_, std::move(socket), options_, handler_, upgrade_,
-          [this](Connection* closed) { OnClosed(closed); },
-          [this](Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
-            OnUpgraded(std::move(stream), request, serve);
-          });
+      const auto connection =
+          std::make_shared<Connection>(io_, std::move(socket), options_, served_,
+                                       [this](Connection* closed) { OnClosed(closed); });
       connections_.insert(connection);
       connection->Read();
       Accept();
@@ -321,14 +351,25 @@ class Server::Impl {
         }));
   }
 
+  void OnReceived(Stream stream, beast::flat_buffer buffer, std::unique_ptr<BodyParser> parser,
+                  Reception reception) {
+    bodies_.insert(StartBody(io_, std::move(stream), std::move(buffer), std::move(parser),
+                             std::move(reception), options_, [this](BodySession* closed) {
+                               std::erase_if(bodies_, [closed](const auto& body) {
+                                 return body.get() == closed;
+                               });
+                               Accept();
+                             }));
+  }
+
   ServerOptions options_;
-  const Handler handler_;
-  const Upgrade upgrade_;
+  const Served served_;
   const std::shared_ptr<asio::io_context> io_;
   Acceptor acceptor_;
   asio::steady_timer retry_;
   std::set<std::shared_ptr<Connection>> connections_;
   std::set<std::shared_ptr<WebSocketSession>> sockets_;
+  std::set<std::shared_ptr<BodySession>> bodies_;
   bool accepting_ = false, stopping_ = false;
   std::thread thread_;
 };
@@ -337,9 +378,10 @@ Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options, Handler handler,
-                                                      Upgrade upgrade) {
+                                                      Upgrade upgrade, Receive receive) {
   try {
-    auto impl = std::make_unique<Impl>(std::move(options), std::move(handler), std::move(upgrade));
+    auto impl = std::make_unique<Impl>(std::move(options), std::move(handler), std::move(upgrade),
+                                       std::move(receive));
     if (absl::Status status = impl->Start(); !status.ok()) return status;
     return std::unique_ptr<Server>(new Server(std::move(impl)));
   } catch (const std::exception& error) {

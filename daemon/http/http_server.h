@@ -1,10 +1,12 @@
 // A small HTTP/1.1 server for people's and machines' questions about the daemon: GET and HEAD of a
-// few paths, and WebSockets (web_socket.h); one thread, asynchronous, bounded in connections, request size and time.
+// few paths, POST of bodies that somebody takes, and WebSockets (web_socket.h); one thread, asynchronous, bounded in
+// connections, request size and time.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -24,7 +26,7 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers;  // beside those that all have
 };
 
-// Of a GET or HEAD; what it points to lives as long as the call that it is given to.
+// Of a GET, HEAD or POST; what it points to lives as long as the call that it is given to.
 struct Request {
   std::string_view path;   // begins with '/', without the query
   std::string_view query;  // behind '?'
@@ -36,6 +38,29 @@ struct Request {
 // path, and `done` will not be called. Called on the server's thread; must not block.
 using Done = std::function<void(Response)>;
 using Handler = std::function<bool(const Request& request, Done done)>;
+
+// Takes a request's body as it comes: on the server's thread, one call after another, until it goes. It goes when all is
+// answered, or when the request was broken off. Must not block.
+class BodyReceiver {
+ public:
+  virtual ~BodyReceiver() = default;
+  // The next piece; another comes once `then` has been called, from any thread: with an answer, no other comes and that is
+  // answered.
+  virtual void Take(std::string piece, std::function<void(std::optional<Response>)> then) = 0;
+  // All of it has come. Answers by calling `done` once, from any thread.
+  virtual void Whole(Done done) = 0;
+};
+
+// What becomes of a POST.
+struct Reception {
+  std::unique_ptr<BodyReceiver> receiver;  // none: the answer is `refusal`
+  uint64_t max_bytes = 0;                  // 413 beyond
+  Response refusal;
+};
+
+// Whether bodies are taken at the request's path; nothing: they are not, and POST is answered with 405. Called on the server's
+// thread. Empty: there are none.
+using Receive = std::function<std::optional<Reception>(const Request& request)>;
 
 // Serves a request for a WebSocket, or says why not: NotFound, ResourceExhausted (503), else 403. Called on the
 // server's thread. Empty: there are none.
@@ -51,6 +76,8 @@ struct ServerOptions {
   sync::TimeNs idle_limit_ns = 10 * sync::kSecond;
   sync::TimeNs answer_limit_ns = 5 * sync::kSecond;    // for the handler; then 503
   sync::TimeNs message_limit_ns = 30 * sync::kSecond;  // for a WebSocket's message to be read
+  // Of a body that is taken something has to come within idle_limit_ns, and so much on the whole, counted from there.
+  uint64_t body_bytes_per_s = 32 << 10;
 };
 
 // Times are the system's: sockets know no other.
@@ -58,7 +85,8 @@ class Server {
  public:
   // AlreadyExists if somebody listens there.
   static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options, Handler handler,
-                                                       Upgrade upgrade = nullptr);
+                                                       Upgrade upgrade = nullptr,
+                                                       Receive receive = nullptr);
   // Closes every connection and joins the thread; `done` functions may be called later still.
   ~Server();
   Server(const Server&) = delete;

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -20,6 +21,7 @@ namespace {
 
 constexpr std::string_view kSocketPath = "/volumes";
 constexpr std::string_view kControlPath = "/control";
+constexpr std::string_view kPlayPath = "/play";
 constexpr char kCookie[] = "voxeld_control_";  // and what is the daemon's own: cookies know no port
 // Its own files and its own socket, and nothing from anywhere else.
 constexpr char kContentPolicy[] =
@@ -62,7 +64,9 @@ http::Response Plain(unsigned status, std::string text) {
 class Viewer::Impl {
  public:
   Impl(Core& core, sync::Clock& clock, ViewerOptions options, std::string key, std::string session)
-      : shared_(std::make_shared<ViewerShared>(ViewerShared{core, clock, std::move(options), {}})),
+      : play_(ViewerPlay::Make(options.play, options.audit)),
+        shared_(std::make_shared<ViewerShared>(
+            ViewerShared{core, clock, std::move(options), play_, {}})),
         key_(std::move(key)),
         session_(session.substr(kNameDigits)),
         cookie_(absl::StrCat(kCookie, session.substr(0, kNameDigits), "=")) {}
@@ -104,6 +108,12 @@ class Viewer::Impl {
 
   bool Serve(const http::Request& request, const http::Done& done) {
     const auto files = PageFiles();
+    if (request.path == kPlayPath) {
+      http::Response wrong = Plain(405, "files are sent by POST");
+      wrong.headers = {{"Allow", "POST"}};
+      done(std::move(wrong));
+      return true;
+    }
     const bool control = request.path == kControlPath;
     const auto file = std::find_if(files.begin(), files.end(),
                                    [&](const PageFile& f) { return f.path == request.path; });
@@ -133,6 +143,22 @@ class Viewer::Impl {
             control = HasControl(request)](std::shared_ptr<http::WebSocketPeer> peer) {
       return NewViewerSocket(shared, std::move(peer), control);
     };
+  }
+
+  // What other pages have a browser send is refused by its origin, which browsers always give here.
+  std::optional<http::Reception> Receive(const http::Request& request) const {
+    if (request.path != kPlayPath) return std::nullopt;
+    http::Reception refused;
+    if (absl::Status may = Check(request); !may.ok()) {
+      refused.refusal = Plain(403, std::string(may.message()));
+    } else if (request.origin.empty()) {
+      refused.refusal = Plain(403, "files are taken from pages, which say where they are from");
+    } else if (!HasControl(request)) {
+      refused.refusal = Plain(403, kOnlyLook);
+    } else {
+      return play_->Receive(request.query);
+    }
+    return refused;
   }
 
   const std::string& key() const { return key_; }
@@ -173,6 +199,7 @@ class Viewer::Impl {
     return response;
   }
 
+  const std::shared_ptr<ViewerPlay> play_;
   const std::shared_ptr<ViewerShared> shared_;
   std::string key_;  // empty: none, or used up
   const std::string session_, cookie_;
@@ -204,6 +231,10 @@ http::Handler Viewer::Handler(http::Handler others) {
 
 http::Upgrade Viewer::Upgrade() {
   return [impl = impl_](const http::Request& request) { return impl->Upgrade(request); };
+}
+
+http::Receive Viewer::Receive() {
+  return [impl = impl_](const http::Request& request) { return impl->Receive(request); };
 }
 
 std::string Viewer::PageAddress(const Address& http) {

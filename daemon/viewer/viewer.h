@@ -16,6 +16,7 @@
 #include "daemon/address/address.h"
 #include "daemon/core/core.h"
 #include "daemon/http/http_server.h"
+#include "daemon/viewer/viewer_play.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::daemon::viewer {
@@ -25,6 +26,7 @@ struct ViewerOptions {
   std::vector<std::string> hosts;  // further names that requests may give as the host
   bool control = true;             // there is an address with a key
   access::Audit* audit = nullptr;  // of what is controlled; none: nobody asks. Outlives the viewer
+  ViewerPlayOptions play;          // of files that pages with control send
 };
 
 // Its functions run on the http server's thread.
@@ -44,6 +46,7 @@ class Viewer {
   // viewer is gone.
   http::Handler Handler(http::Handler others);
   http::Upgrade Upgrade();
+  http::Receive Receive();
 
   // "http://127.0.0.1:8088/"; empty for a unix socket.
   static std::string PageAddress(const Address& http);

@@ -90,6 +90,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     if (message.contains("layers")) return Layers();
     if (message.contains("update")) return Update(message["update"]);
     if (message.contains("clear")) return Clear(message["clear"]);
+    if (message.contains("stop")) return control_ ? shared_->play->Stop() : Complain(kOnlyLook);
     Complain("there is no such message; see docs/protocols/viewer.md");
   }
 
@@ -136,6 +137,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
             absl::StrAppend(&text, i == 0 ? "" : ",", DisplayJson((*displays)[i]));
           }
           self.peer_->Send(text + "]}}", false);
+          if (self.control_) self.shared_->play->Join(self.peer_);
         }));
   }
 
@@ -334,8 +336,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   // Whether what is asked is a control's to ask, and reads as the message that it has to be.
   bool ReadControl(const Json& json, google::protobuf::Message* message) {
     if (!control_) {
-      Complain(
-          "this page may only look: control is for the address that voxeld printed at its start");
+      Complain(kOnlyLook);
       return false;
     }
     const auto status = google::protobuf::util::JsonStringToMessage(Text(json), message);

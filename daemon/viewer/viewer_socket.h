@@ -10,15 +10,20 @@
 #include "daemon/viewer/comparer.h"
 #include "daemon/viewer/pixel_places.h"
 #include "daemon/viewer/viewer.h"
+#include "daemon/viewer/viewer_play.h"
 #include "display/sync/clock.h"
 
 namespace voxeld::daemon::viewer {
+
+inline constexpr char kOnlyLook[] =
+    "this page may only look: control is for the address that voxeld printed at its start";
 
 // What the sockets of one viewer share; on the http server's thread.
 struct ViewerShared {
   Core& core;
   sync::Clock& clock;
   const ViewerOptions options;
+  const std::shared_ptr<ViewerPlay> play;
   // Of displays that somebody has watched: finding places takes a while.
   std::map<std::string, std::shared_ptr<PixelPlaces>> places;
   size_t watches = 0;  // of all sockets

@@ -1,18 +1,14 @@
 // The server, spoken to in bytes.
 #include "daemon/http/http_server.h"
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#include <cstring>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "display/sync/mutex.h"
+#include "tests/daemon/http/connection.h"
 
 namespace voxeld::daemon::http {
 namespace {
@@ -20,50 +16,6 @@ namespace {
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-// A blocking connection; every read has a deadline of its own.
-class Connection {
- public:
-  explicit Connection(const Address& address) {
-    const timeval limit = {30, 0};
-    if (address.unix_socket) {
-      fd_ = socket(AF_UNIX, SOCK_STREAM, 0);
-      sockaddr_un name = {};
-      name.sun_family = AF_UNIX;
-      std::memcpy(name.sun_path, address.path.c_str(), address.path.size());
-      EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
-    } else {
-      fd_ = socket(AF_INET, SOCK_STREAM, 0);
-      sockaddr_in name = {};
-      name.sin_family = AF_INET;
-      name.sin_port = htons(address.port);
-      inet_pton(AF_INET, address.host.c_str(), &name.sin_addr);
-      EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
-    }
-    setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
-  }
-  ~Connection() { close(fd_); }
-
-  void Send(const std::string& text) {
-    EXPECT_EQ(send(fd_, text.data(), text.size(), MSG_NOSIGNAL), static_cast<ssize_t>(text.size()));
-  }
-  // Up to and with `end`, or to the end of the connection.
-  std::string ReadTo(const std::string& end) {
-    std::string text;
-    char c = 0;
-    while (!text.ends_with(end) && recv(fd_, &c, 1, 0) == 1) text += c;
-    return text;
-  }
-  std::string ReadAll() {
-    std::string text;
-    char buffer[4096];
-    for (ssize_t n; (n = recv(fd_, buffer, sizeof(buffer), 0)) > 0;) text.append(buffer, n);
-    return text;
-  }
-
- private:
-  int fd_ = -1;
-};
 
 std::string Get(const std::string& path) {
   return absl::StrCat("GET ", path, " HTTP/1.1\r\nHost: x\r\n\r\n");

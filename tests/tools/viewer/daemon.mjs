@@ -1,6 +1,6 @@
 // A voxeld of a test's own, with a page, and voxelctl to draw into it. Paths are in VOXELD and VOXELCTL.
 import { execFile, spawn } from "node:child_process";
-import { mkdtempSync, rmSync } from "node:fs";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -17,14 +17,16 @@ export async function freePort() {
 }
 
 export class Daemon {
-  // `displays`: as after --display. `terminal`: its output is a terminal, so it prints the address that gives control.
-  static async start(displays, { terminal = false, port, folder } = {}) {
+  // `displays`: as after --display. `terminal`: its output is a terminal, so it prints the address that gives control. `config`: a
+  // file's text. `listen`: in place of a unix socket.
+  static async start(displays, { terminal = false, port, folder, config, listen } = {}) {
     const daemon = new Daemon();
     daemon.displays = displays;
     daemon.port = port ?? (await freePort());
     daemon.folder = folder ?? mkdtempSync(join(tmpdir(), "voxeld-page-"));
     daemon.server = `unix:${daemon.folder}/voxeld.sock`;
-    const command = [process.env.VOXELD, "--listen", daemon.server, "--http", `127.0.0.1:${daemon.port}`, "--log-level", "warn", "--engine", "cpu",
+    if (config !== undefined) writeFileSync(`${daemon.folder}/voxeld.toml`, config);
+    const command = [process.env.VOXELD, ...(config === undefined ? [] : ["--config", `${daemon.folder}/voxeld.toml`]), "--listen", listen ?? daemon.server, "--http", `127.0.0.1:${daemon.port}`, "--log-level", "warn", "--engine", "cpu",
       ...displays.flatMap((display) => ["--display", display])];
     const quoted = command.map((word) => `'${word}'`).join(" ");
     daemon.process = terminal

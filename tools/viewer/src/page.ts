@@ -3,6 +3,7 @@ import { Orbit, kHome, project } from "./camera";
 import { Comparison } from "./comparison";
 import { Connection } from "./connection";
 import { DisplayView, Look } from "./display_view";
+import { Dropped } from "./dropped";
 import { GlRenderer } from "./gl_renderer";
 import { Panels } from "./panels";
 import { DisplayDescription, FromDaemon, Hello } from "./protocol";
@@ -20,6 +21,7 @@ const input = (id: string) => byId<HTMLInputElement>(id);
 class Page {
   private readonly connection: Connection;
   private readonly panels = new Panels();
+  private readonly dropped = new Dropped(document.querySelector("main")!, byId("control"), (message) => this.connection.send(message), (text) => this.say(text));
   private readonly views = new Map<number, DisplayView>();
   private hello: Hello | null = null;
   private chosen = ""; // empty: all
@@ -82,6 +84,7 @@ class Page {
     }
     if (message.display !== undefined) this.settings(message.display);
     if (message.compared !== undefined) this.comparison.take(message.compared);
+    this.dropped.told(message);
     if (message.error !== undefined) this.say(message.error);
   }
 

@@ -98,6 +98,9 @@ export interface Compared {
 
 export interface Hello { version: string; control: boolean; displays: DisplayDescription[] }
 
+// Of files that are played: told to pages with control. `why_not`: none are.
+export interface Play { max_bytes?: number; playing?: string; failed?: string; why?: string; why_not?: string }
+
 export type FromDaemon = {
   hello?: Hello;
   watching?: Watching;
@@ -106,6 +109,7 @@ export type FromDaemon = {
   layers?: { layers: LayerInfo[]; total: string };
   display?: DisplayDescription;
   compared?: Compared;
+  play?: Play;
   error?: string;
 };
 

@@ -1,0 +1,180 @@
+#include "daemon/viewer/viewer_play.h"
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+
+namespace voxeld::daemon::viewer {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr size_t kLongestQueryName = 1024;
+
+http::Response Said(unsigned status, absl::string_view text) {
+  return {status, "text/plain; charset=utf-8", absl::StrCat(text, "\n"), {}};
+}
+
+http::Reception Refuse(unsigned status, absl::string_view why) {
+  http::Reception reception;
+  reception.refusal = Said(status, why);
+  return reception;
+}
+
+// Nothing: it is no such text.
+std::optional<std::string> PercentDecoded(std::string_view text) {
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      out += text[i];
+      continue;
+    }
+    if (i + 2 >= text.size() || !absl::ascii_isxdigit(static_cast<unsigned char>(text[i + 1])) ||
+        !absl::ascii_isxdigit(static_cast<unsigned char>(text[i + 2]))) {
+      return std::nullopt;
+    }
+    out += absl::HexStringToBytes(absl::string_view(text.data() + i + 1, 2));
+    i += 2;
+  }
+  return out;
+}
+
+// Who has the file while it comes: the upload, and the worker's pieces of work.
+struct Held {
+  std::optional<play::PlayFile> file;
+};
+
+}  // namespace
+
+// Writes on the worker, and keeps the others out while it lives.
+class ViewerPlay::Upload final : public http::BodyReceiver {
+ public:
+  Upload(std::shared_ptr<ViewerPlay> play, std::string name)
+      : play_(std::move(play)), name_(std::move(name)) {
+    play_->taking_ = true;
+  }
+  ~Upload() override {
+    play_->taking_ = false;
+    play_->worker_.Post([held = held_] { held->file.reset(); });
+  }
+
+  void Take(std::string piece, std::function<void(std::optional<http::Response>)> then) override {
+    play_->worker_.Post([held = held_, name = name_, write = play_->options_.write,
+                         piece = std::move(piece), then = std::move(then)] {
+      absl::Status status;
+      if (!held->file.has_value()) {
+        absl::StatusOr<play::PlayFile> made = play::PlayFile::Make(name, write);
+        status = made.status();
+        if (status.ok()) held->file.emplace(*std::move(made));
+      }
+      if (status.ok()) status = held->file->Append(piece);
+      if (status.ok()) return then(std::nullopt);
+      then(Said(absl::IsResourceExhausted(status) ? 507 : 500, status.message()));
+    });
+  }
+
+  void Whole(http::Done done) override {
+    play_->worker_.Post([held = held_, play = play_.get(), done = std::move(done)] {
+      if (!held->file.has_value()) return done(Said(400, "the file is empty"));
+      play->Record("Play", absl::StrCat("name=\"", absl::CHexEscape(held->file->name()),
+                                        "\" bytes=", held->file->bytes()));
+      play->options_.player->Play(*std::move(held->file));
+      held->file.reset();
+      done(Said(202, "it is being played"));
+    });
+  }
+
+ private:
+  const std::shared_ptr<ViewerPlay> play_;
+  const std::string name_;
+  const std::shared_ptr<Held> held_ = std::make_shared<Held>();
+};
+
+std::shared_ptr<ViewerPlay> ViewerPlay::Make(ViewerPlayOptions options, access::Audit* audit) {
+  std::shared_ptr<ViewerPlay> play(new ViewerPlay(std::move(options), audit));
+  play->self_ = play;
+  if (play->options_.player != nullptr) {
+    play->options_.player->SetOnChange([weak = play->self_] {
+      if (const auto self = weak.lock()) self->Tell();
+    });
+  }
+  return play;
+}
+
+ViewerPlay::~ViewerPlay() {
+  if (options_.player != nullptr) options_.player->SetOnChange(nullptr);
+}
+
+http::Reception ViewerPlay::Receive(std::string_view query) {
+  if (options_.player == nullptr) return Refuse(503, options_.why_not);
+  std::optional<std::string> name;
+  for (const absl::string_view part :
+       absl::StrSplit(absl::string_view(query.data(), query.size()), '&')) {
+    if (part.substr(0, 5) == "name=" && part.size() <= kLongestQueryName) {
+      name = PercentDecoded(std::string_view(part.data() + 5, part.size() - 5));
+    }
+  }
+  if (!name.has_value() || name->empty()) {
+    return Refuse(400,
+                  "the file's name is expected, percent-encoded, as in /play?name=teapot.obj: its "
+                  "extension says what it is");
+  }
+  if (taking_) return Refuse(409, "another file is being sent; try again when that is done");
+  http::Reception reception;
+  reception.max_bytes = options_.max_bytes;
+  reception.receiver = std::make_unique<Upload>(self_.lock(), *std::move(name));
+  return reception;
+}
+
+std::string ViewerPlay::Message() const {
+  Json what = Json::object();
+  if (options_.player == nullptr) {
+    what["why_not"] = options_.why_not;
+  } else {
+    const play::Playing state = options_.player->state();
+    what["max_bytes"] = options_.max_bytes;
+    if (!state.name.empty()) what["playing"] = state.name;
+    if (!state.failed.empty()) what["failed"] = state.failed;
+    if (!state.why.empty()) what["why"] = state.why;
+  }
+  return Json{{"play", std::move(what)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+void ViewerPlay::Tell() {
+  // Told in the lock, so that the newest is told last.
+  const sync::MutexLock lock(mutex_);
+  const std::string message = Message();
+  std::erase_if(pages_, [&message](const std::weak_ptr<http::WebSocketPeer>& page) {
+    const auto open = page.lock();
+    if (open != nullptr) open->Send(message, false);
+    return open == nullptr;
+  });
+}
+
+void ViewerPlay::Join(const std::shared_ptr<http::WebSocketPeer>& page) {
+  const sync::MutexLock lock(mutex_);
+  std::erase_if(pages_, [&page](const std::weak_ptr<http::WebSocketPeer>& other) {
+    const auto open = other.lock();
+    return open == nullptr || open == page;
+  });
+  pages_.push_back(page);
+  page->Send(Message(), false);
+}
+
+void ViewerPlay::Stop() {
+  if (options_.player == nullptr) return;
+  Record("StopPlaying",
+         absl::StrCat("name=\"", absl::CHexEscape(options_.player->state().name), "\""));
+  options_.player->Stop();
+}
+
+void ViewerPlay::Record(const char* method, const std::string& what) const {
+  if (audit_ != nullptr) audit_->Record("page", "http", method, what, absl::OkStatus());
+}
+
+}  // namespace voxeld::daemon::viewer

@@ -1,0 +1,282 @@
+// Files that pages send over HTTP: who may, and what all pages are told. Scripts are in voxelctl's place.
+#include "daemon/viewer/viewer_play.h"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <boost/asio/connect.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <cerrno>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "daemon/viewer/viewer.h"
+
+namespace voxeld::daemon::viewer {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr char kOrigin[] = "http://localhost:8088";
+
+class ViewerPlayTest : public ::testing::Test {
+ protected:
+  using Fields = std::vector<std::pair<std::string, std::string>>;
+  using Page = boost::beast::websocket::stream<boost::asio::ip::tcp::socket>;
+
+  void SetUp() override {
+    absl::StatusOr<play::PrivateFolder> folder = play::PrivateFolder::Make();
+    ASSERT_TRUE(folder.ok());
+    folder_.emplace(*std::move(folder));
+    auto audit = access::Audit::Open(folder_->path() + "/audit", nullptr);
+    ASSERT_TRUE(audit.ok());
+    audit_ = *std::move(audit);
+    core_ = std::make_unique<Core>(CoreOptions{.version = "1.2"}, clock_);
+    ASSERT_TRUE(core_->Start().ok());
+  }
+  void TearDown() override {
+    server_.reset();
+    viewer_.reset();
+    player_.reset();
+    EXPECT_TRUE(core_->Stop(10 * sync::kSecond).ok());
+  }
+
+  // `script`: none: nothing is played.
+  void Start(const std::string& script, ViewerPlayOptions options = {}) {
+    if (script.empty()) {
+      options.why_not = "there is no voxelctl";
+    } else {
+      const std::string program = folder_->path() + "/voxelctl";
+      std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
+      chmod(program.c_str(), 0700);
+      auto player = play::Player::Make({.program = program, .server = "unix:/nowhere"});
+      ASSERT_TRUE(player.ok()) << player.status();
+      player_ = *std::move(player);
+      options.player = player_.get();
+    }
+    auto viewer =
+        Viewer::Make(*core_, clock_, {.version = "1.2", .audit = audit_.get(), .play = options});
+    ASSERT_TRUE(viewer.ok());
+    viewer_ = *std::move(viewer);
+    auto server = http::Server::Start(
+        {.listen = *ParseAddress("127.0.0.1:0")},
+        viewer_->Handler([](const http::Request&, const http::Done&) { return false; }),
+        viewer_->Upgrade(), viewer_->Receive());
+    ASSERT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+    const std::string address = viewer_->ControlAddress(server_->address());
+    const auto given =
+        Ask(boost::beast::http::verb::get, address.substr(address.find("/control")), {}, "");
+    const auto field = given["Set-Cookie"];
+    cookie_ = std::string(field.data(), field.find(';'));
+  }
+
+  boost::asio::ip::tcp::socket Connect() {
+    boost::asio::ip::tcp::socket socket(io_);
+    socket.connect({boost::asio::ip::make_address("127.0.0.1"), server_->address().port});
+    return socket;
+  }
+
+  using Answer = boost::beast::http::response<boost::beast::http::string_body>;
+  Answer Ask(boost::beast::http::verb verb, const std::string& path, const Fields& fields,
+             const std::string& body) {
+    boost::asio::ip::tcp::socket socket = Connect();
+    boost::beast::http::request<boost::beast::http::string_body> request(verb, path, 11);
+    request.set(boost::beast::http::field::host, "localhost:8088");
+    for (const auto& [name, value] : fields) request.set(name, value);
+    request.body() = body;
+    request.prepare_payload();
+    boost::beast::http::write(socket, request);
+    boost::beast::flat_buffer buffer;
+    Answer response;
+    boost::beast::http::read(socket, buffer, response);
+    return response;
+  }
+  Answer Post(const std::string& path, const std::string& body = "v 0 0 0\n") {
+    return Ask(boost::beast::http::verb::post, path, {{"Origin", kOrigin}, {"Cookie", cookie_}},
+               body);
+  }
+
+  std::unique_ptr<Page> Open(bool control) {
+    auto page = std::make_unique<Page>(Connect());
+    page->set_option(boost::beast::websocket::stream_base::decorator(
+        [&](boost::beast::websocket::request_type& request) {
+          if (control) request.set("Cookie", cookie_);
+        }));
+    page->handshake("localhost:8088", "/volumes");
+    Say(*page, {{"hello", true}});
+    EXPECT_EQ(HearOf(*page, "hello")["control"], control);
+    return page;
+  }
+  static void Say(Page& page, const nlohmann::json& message) {
+    page.write(boost::asio::buffer(message.dump()));
+  }
+  // The next message, if it is the one that has `key`.
+  static nlohmann::json HearOf(Page& page, const std::string& key) {
+    boost::beast::flat_buffer buffer;
+    page.read(buffer);
+    const auto message =
+        nlohmann::json::parse(boost::beast::buffers_to_string(buffer.data()), nullptr, false);
+    EXPECT_TRUE(message.contains(key)) << message;
+    return message.value(key, nlohmann::json());
+  }
+
+  std::string Audited() {
+    std::ifstream file(folder_->path() + "/audit");
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+
+  sync::SystemClock clock_;
+  boost::asio::io_context io_;
+  std::optional<play::PrivateFolder> folder_;
+  std::unique_ptr<access::Audit> audit_;
+  std::unique_ptr<Core> core_;
+  std::unique_ptr<play::Player> player_;
+  std::unique_ptr<Viewer> viewer_;
+  std::unique_ptr<http::Server> server_;
+  std::string cookie_;
+};
+
+constexpr char kPlays[] = "exec tail -f /dev/null";
+
+TEST_F(ViewerPlayTest, PagesWithControlAreToldWhatPlays) {
+  Start(kPlays, {.max_bytes = 1000});
+  const auto one = Open(true), two = Open(true);
+  for (Page* page : {one.get(), two.get()}) {
+    EXPECT_EQ(HearOf(*page, "play"), (nlohmann::json{{"max_bytes", 1000}}));
+  }
+  const Answer taken = Post("/play?name=t%C3%A9a%20pot.obj");
+  EXPECT_EQ(taken.result_int(), 202u) << taken.body();
+  for (Page* page : {one.get(), two.get()}) {
+    EXPECT_EQ(HearOf(*page, "play"),
+              (nlohmann::json{{"max_bytes", 1000}, {"playing", "téa pot.obj"}}));
+  }
+  const auto late = Open(true);
+  EXPECT_EQ(HearOf(*late, "play")["playing"], "téa pot.obj");
+  Say(*two, {{"stop", true}});
+  for (Page* page : {one.get(), two.get(), late.get()}) {
+    EXPECT_EQ(HearOf(*page, "play"), (nlohmann::json{{"max_bytes", 1000}}));
+  }
+  EXPECT_THAT(Audited(), HasSubstr("\"method\":\"Play\""));
+  EXPECT_THAT(Audited(), HasSubstr("bytes=8"));
+  EXPECT_THAT(Audited(), HasSubstr("\"method\":\"StopPlaying\""));
+}
+
+TEST_F(ViewerPlayTest, TheyAreToldWhyItDoesNotPlay) {
+  Start("echo \"voxelctl: $5: is no model\" >&2; exit 1");
+  const auto page = Open(true);
+  HearOf(*page, "play");
+  EXPECT_EQ(Post("/play?name=bad.obj").result_int(), 202u);
+  nlohmann::json failed;
+  while (!failed.contains("failed"))
+    failed = HearOf(*page, "play");  // it may be told before that it plays
+  EXPECT_FALSE(failed.contains("playing"));
+  EXPECT_EQ(failed["failed"], "bad.obj");
+  EXPECT_EQ(failed["why"], "bad.obj: is no model");
+}
+
+TEST_F(ViewerPlayTest, IsForPagesOfThisOriginWithControl) {
+  Start(kPlays);
+  using boost::beast::http::verb;
+  const std::string path = "/play?name=a.obj";
+  const auto refused = [&](const Fields& fields) {
+    const Answer answer = Ask(verb::post, path, fields, "v 0 0 0\n");
+    EXPECT_EQ(answer.result_int(), 403u) << answer.body();
+    return answer.body();
+  };
+  EXPECT_THAT(refused({{"Origin", kOrigin}}), HasSubstr("may only look"));
+  EXPECT_THAT(refused({{"Origin", kOrigin}, {"Cookie", cookie_ + "0"}}),
+              HasSubstr("may only look"));
+  EXPECT_THAT(refused({{"Cookie", cookie_}}), HasSubstr("where they are from"));
+  EXPECT_THAT(refused({{"Cookie", cookie_}, {"Origin", "null"}}), HasSubstr("other origins"));
+  EXPECT_THAT(refused({{"Cookie", cookie_}, {"Origin", "http://evil.example"}}),
+              HasSubstr("other origins"));
+  EXPECT_THAT(
+      refused({{"Cookie", cookie_}, {"Origin", "http://evil.example"}, {"Host", "evil.example"}}),
+      HasSubstr("evil.example"));
+  EXPECT_EQ(player_->state(), play::Playing());
+
+  const auto looking = Open(false);  // is told nothing of it
+  EXPECT_EQ(Post(path).result_int(), 202u);
+  Say(*looking, {{"stop", true}});
+  EXPECT_THAT(HearOf(*looking, "error").get<std::string>(), HasSubstr("may only look"));
+  EXPECT_EQ(player_->state().name, "a.obj");
+  for (const verb other : {verb::get, verb::put, verb::delete_}) {
+    EXPECT_EQ(Ask(other, path, {{"Origin", kOrigin}, {"Cookie", cookie_}}, "").result_int(), 405u);
+  }
+  EXPECT_THAT(std::string(Ask(verb::get, path, {}, "")["Allow"]), "POST");
+}
+
+TEST_F(ViewerPlayTest, WhatIsNoFileIsRefused) {
+  Start(kPlays, {.max_bytes = 100});
+  for (const char* path :
+       {"/play", "/play?name=", "/play?name=a%2", "/play?name=a%zz.obj", "/play?title=a.obj"}) {
+    const Answer answer = Post(path);
+    EXPECT_EQ(answer.result_int(), 400u) << path;
+    EXPECT_THAT(answer.body(), HasSubstr("/play?name=teapot.obj")) << path;
+  }
+  EXPECT_EQ(Post("/play?name=" + std::string(5000, 'a')).result_int(), 400u);
+  EXPECT_THAT(Post("/play?name=a.obj", "").body(), HasSubstr("the file is empty"));
+  const Answer large = Post("/play?name=a.obj", std::string(101, 'v'));
+  EXPECT_EQ(large.result_int(), 413u);
+  EXPECT_THAT(large.body(), HasSubstr("100 bytes"));
+  EXPECT_EQ(player_->state(), play::Playing());
+  EXPECT_EQ(Post("/play?name=a.obj", std::string(100, 'v')).result_int(), 202u);
+}
+
+TEST_F(ViewerPlayTest, OneIsSentAtATime) {
+  Start(kPlays);
+  boost::asio::ip::tcp::socket first = Connect();
+  const std::string begun = absl::StrCat(
+      "POST /play?name=slow.obj HTTP/1.1\r\nHost: localhost:8088\r\nOrigin: ", kOrigin,
+      "\r\nCookie: ", cookie_, "\r\nExpect: 100-continue\r\nContent-Length: 8\r\n\r\n");
+  boost::asio::write(first, boost::asio::buffer(begun));
+  char answer[25];
+  boost::asio::read(first, boost::asio::buffer(answer));  // 100: it is awaited
+  const Answer second = Post("/play?name=b.obj");
+  EXPECT_EQ(second.result_int(), 409u);
+  EXPECT_THAT(second.body(), HasSubstr("another file is being sent"));
+  first.close();
+  // Until the daemon has seen that the first is gone.
+  while (Post("/play?name=b.obj").result_int() == 409u) {
+  }
+  EXPECT_EQ(player_->state().name, "b.obj");
+}
+
+TEST_F(ViewerPlayTest, ADiskThatIsFullIsSaidAndNothingStays) {
+  Start(kPlays, {.write = [room = 3](int, const char*, size_t size) mutable -> ssize_t {
+          if (size_t(room) >= size) return static_cast<ssize_t>(size);
+          errno = ENOSPC;
+          return -1;
+        }});
+  const Answer answer = Post("/play?name=a.obj");
+  EXPECT_EQ(answer.result_int(), 507u);
+  EXPECT_THAT(answer.body(), HasSubstr("No space left on device"));
+  EXPECT_EQ(player_->state(), play::Playing());
+  EXPECT_THAT(Audited(), Not(HasSubstr("Play")));
+  EXPECT_EQ(Post("/play?name=a.obj", "abc").result_int(), 202u) << "the next one may fit";
+}
+
+TEST_F(ViewerPlayTest, WhereNothingPlaysItIsSaidWhy) {
+  Start("");
+  const auto page = Open(true);
+  EXPECT_EQ(HearOf(*page, "play"), (nlohmann::json{{"why_not", "there is no voxelctl"}}));
+  const Answer answer = Post("/play?name=a.obj");
+  EXPECT_EQ(answer.result_int(), 503u);
+  EXPECT_THAT(answer.body(), HasSubstr("there is no voxelctl"));
+  Say(*page, {{"stop", true}});
+  Say(*page, {{"what", 1}});
+  EXPECT_TRUE(HearOf(*page, "error").is_string());
+}
+
+}  // namespace
+}  // namespace voxeld::daemon::viewer
