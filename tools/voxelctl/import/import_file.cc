@@ -24,7 +24,7 @@
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
 #include "tools/voxelctl/import/raw_volume.h"
-#include "tools/voxelctl/import/svg_lines.h"
+#include "tools/voxelctl/import/svg_drawing.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
 #include "tools/voxelctl/text/escape.h"
@@ -86,7 +86,7 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
   if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
-  if (extension == "svg") return ReadSvgLines(file);
+  if (extension == "svg") return ReadSvgDrawing(file);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
   if (NewMeshImporter()->Reads(extension))

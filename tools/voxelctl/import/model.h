@@ -32,7 +32,11 @@ struct Part {
   std::vector<uint32_t> indices;
   // Diameter of points, which are balls then, and of segments, which have round ends; in the positions' unit. 0: one voxel.
   double thickness = 0;
+  // Where parts of several levels cover one place the highest is seen; at most kMostLevel.
+  uint8_t level = 0;
 };
+
+inline constexpr uint8_t kMostLevel = 126;
 
 // Numbers at the centres of equal cells, that along the first axis side by side, then rows along the second.
 struct SampledVolume {
