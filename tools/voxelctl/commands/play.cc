@@ -310,20 +310,17 @@ class Player {
     return TakeBeforeDown();
   }
 
-  // What the frame before last had more of. Of a level the object itself comes after its pieces.
+  // What the frame before last had more of; an object before the pieces that it draws.
   absl::Status RemoveRest(const std::vector<PackedLevel>& before,
                           const std::vector<PackedLevel>& now) {
     for (size_t level = 0; level < before.size(); ++level) {
-      const std::string& object = before[level].object;
-      const uint64_t kept = level < now.size() ? now[level].objects - 1 : 0;
-      for (uint64_t piece = kept; piece + 1 < before[level].objects; ++piece) {
-        const absl::Status status =
-            session_->client().RemoveObject(absl::StrCat(object, "/", piece));
-        if (!status.ok()) return status;
-      }
-      if (level < now.size()) continue;
-      if (absl::Status status = session_->client().RemoveObject(object); !status.ok())
-        return status;
+      const auto& [object, objects] = before[level];
+      absl::Status status;
+      if (level >= now.size()) status = session_->client().RemoveObject(object);
+      for (uint64_t piece = level < now.size() ? now[level].objects - 1 : 0;
+           status.ok() && piece + 1 < objects; ++piece)
+        status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));
+      if (!status.ok()) return status;
     }
     return absl::OkStatus();
   }
