@@ -93,40 +93,69 @@ Size Factors(const SampledVolume& volume, uint64_t most) {
   return factors;
 }
 
-// Calls `put` with the mean of each cell's numbers, not a number where it has none.
-template <typename Put>
-void ForEachCell(const SampledVolume& volume, const Size& factors, Put put) {
-  const auto& [nx, ny, nz] = volume.size;
+// For each cell calls `begin`, `add` with the index of each of its samples, and `end` with how many they are.
+template <typename Begin, typename Add, typename End>
+void ForEachCell(const Size& size, const Size& factors, Begin begin, Add add, End end) {
+  const auto& [nx, ny, nz] = size;
   for (uint32_t z = 0; z < nz; z += factors[2]) {
     for (uint32_t y = 0; y < ny; y += factors[1]) {
       for (uint32_t x = 0; x < nx; x += factors[0]) {
-        double sum = 0;
-        uint32_t count = 0;
-        for (uint32_t w = z; w < std::min(nz, z + factors[2]); ++w) {
-          for (uint32_t v = y; v < std::min(ny, y + factors[1]); ++v) {
-            const float* row = &volume.samples[(uint64_t{w} * ny + v) * nx];
-            for (uint32_t u = x; u < std::min(nx, x + factors[0]); ++u) {
-              if (!std::isnan(row[u])) sum += row[u], ++count;
-            }
+        const uint32_t r = std::min(nx, x + factors[0]), b = std::min(ny, y + factors[1]),
+                       f = std::min(nz, z + factors[2]);
+        begin();
+        for (uint32_t w = z; w < f; ++w) {
+          for (uint32_t v = y; v < b; ++v) {
+            for (uint32_t u = x; u < r; ++u) add((uint64_t{w} * ny + v) * nx + u);
           }
         }
-        put(count > 0 ? sum / count : std::nan(""));
+        end(uint64_t{r - x} * (b - y) * (f - z));
       }
     }
   }
 }
 
-// Whole numbers from 0 at `low` to their greatest at `high`.
+// The mean of each cell's numbers, as whole numbers from 0 at `low`, or where there is none, to their greatest at `high`.
 template <typename T>
 std::vector<T> Quantise(const SampledVolume& volume, const Size& factors, uint64_t count,
                         double low, double high) {
   std::vector<T> out;
   out.reserve(count);
   constexpr double kTop = static_cast<T>(~T{0});
-  ForEachCell(volume, factors, [&](double v) {
-    const double share = std::isnan(v) ? 0 : std::clamp((v - low) / (high - low), 0.0, 1.0);
-    out.push_back(static_cast<T>(std::lround(share * kTop)));
-  });
+  double sum = 0;
+  uint32_t numbers = 0;
+  ForEachCell(
+      volume.size, factors, [&] { sum = 0, numbers = 0; },
+      [&](uint64_t i) {
+        const float v = volume.samples[i];
+        if (!std::isnan(v)) sum += v, ++numbers;
+      },
+      [&](uint64_t) {
+        const double v = numbers > 0 ? sum / numbers : low;
+        const double share = std::clamp((v - low) / (high - low), 0.0, 1.0);
+        out.push_back(static_cast<T>(std::lround(share * kTop)));
+      });
+  return out;
+}
+
+// Four bytes of each cell, r g b and 255; 0 where all is black.
+std::vector<uint8_t> Colors(const SampledVolume& volume, const Size& factors, uint64_t count) {
+  std::vector<uint8_t> out;
+  out.reserve(count * 4);
+  std::array<double, 3> sum = {};
+  ForEachCell(
+      volume.size, factors, [&sum] { sum = {}; },
+      [&](uint64_t i) {
+        const Rgb& c = volume.colors[i];
+        sum[0] += c.r, sum[1] += c.g, sum[2] += c.b;
+      },
+      [&](uint64_t cells) {
+        uint8_t brightest = 0;
+        for (const double channel : sum) {
+          out.push_back(static_cast<uint8_t>(std::lround(channel / static_cast<double>(cells))));
+          brightest = std::max(brightest, out.back());
+        }
+        out.push_back(brightest > 0 ? 255 : 0);
+      });
   return out;
 }
 
@@ -140,7 +169,9 @@ std::array<double, 2> WindowOf(const SampledVolume& volume) {
 
 absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
                                         const client::Limits& limits) {
-  const uint64_t each = look.level ? 2 : 1;
+  const bool colors =
+      !volume.colors.empty() && !look.level && !look.window && look.colormap.empty();
+  const uint64_t each = look.level ? 2 : colors ? 4 : 1;
   uint64_t bytes = kMostBytes;
   if (limits.max_message_bytes > 0) bytes = std::min(bytes, limits.max_message_bytes);
   if (limits.max_uncommitted_bytes > 0) bytes = std::min(bytes, limits.max_uncommitted_bytes);
@@ -194,6 +225,11 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
       scale.along = client::Vec3{0, 0, 1};
       packed.part.color_scale = std::move(scale);
     }
+    return packed;
+  }
+  if (colors) {
+    grid.samples = client::Array<uint8_t>(Colors(volume, factors, packed.samples));
+    packed.part.shape = client::Volume{.grid = std::move(grid), .colors = true, .transfer = {}};
     return packed;
   }
   const std::array<double, 2> window = look.window ? *look.window : WindowOf(volume);

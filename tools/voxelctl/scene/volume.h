@@ -29,7 +29,7 @@ struct PackedVolume {
 // The volume's own window, else one from where Otsu's method parts its numbers in two to above all but one of a thousand.
 std::array<double, 2> WindowOf(const SampledVolume& volume);
 
-// Through a transfer function that goes from nothing at the window's low end to the colour map's last at its high end; the
+// Colours are shown as they are, unless `look` asks for something else of their brightness. Numbers go through a transfer function that goes from nothing at the window's low end to the colour map's last at its high end; the
 // window is what `look` says, else WindowOf. Samples are sent in a byte each within the window, of an isosurface in two between the least and the greatest. What
 // `limits` have no room for is averaged over cells of whole numbers of samples, and said.
 // InvalidArgument if the level lies beyond all samples.
