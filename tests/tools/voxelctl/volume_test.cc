@@ -8,8 +8,10 @@
 #include <cstddef>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -388,6 +390,112 @@ TEST_F(Volumes, CompressedSlices) {
     damaged[random() % damaged.size()] = static_cast<char>(random());
     (void)Import("a.dcm", head + item("") + item(damaged) + end);
   }
+}
+
+// Of python3-pydicom, which tools/setup installs.
+const std::string kDicoms = "/usr/lib/python3/dist-packages/pydicom/data/test_files/";
+
+SampledVolume ReadReal(const std::string& name) {
+  const auto model = ImportFile(kDicoms + name, {});
+  EXPECT_TRUE(model.ok()) << model.status();
+  return model.ok() ? model->volumes.at(0) : SampledVolume();
+}
+
+// One picture in every way to write it.
+TEST_F(Volumes, RealSlicesHoweverTheyAreWritten) {
+  const SampledVolume plain = ReadReal("MR_small.dcm");
+  ASSERT_THAT(plain.size, ElementsAre(64, 64, 1));
+  // As the file has them, from its end: 64 by 64 numbers of 16 bits before 126 bytes of padding.
+  const std::string bytes = ReadAll(kDicoms + "MR_small.dcm");
+  const std::string mark = std::string("\xe0\x7f\x10\0OW\0\0\0\x20\0\0", 12);
+  const size_t at = bytes.rfind(mark);
+  ASSERT_NE(at, std::string::npos);
+  for (const size_t i : {0u, 100u, 4095u}) {
+    const auto* number = reinterpret_cast<const uint8_t*>(bytes.data() + at + mark.size() + 2 * i);
+    EXPECT_EQ(plain.samples[i], number[0] + 256 * number[1]);
+  }
+  for (const char* name :
+       {"MR_small_RLE.dcm", "MR_small_bigendian.dcm", "MR_small_implicit.dcm",
+        "MR_small_jp2klossless.dcm", "MR_small_jpeg_ls_lossless.dcm", "MR_small_padded.dcm"})
+    EXPECT_EQ(ReadReal(name).samples, plain.samples) << name;
+  EXPECT_EQ(ReadReal("rtdose.dcm").samples, ReadReal("rtdose_rle.dcm").samples);
+  EXPECT_EQ(ReadReal("rtdose.dcm").samples, ReadReal("rtdose_expb.dcm").samples);
+  EXPECT_THAT(ReadReal("rtdose.dcm").size, ElementsAre(10, 10, 15));
+  EXPECT_THAT(ReadReal("image_dfl.dcm").size, ElementsAre(512, 512, 1)) << "deflated";
+  for (const char* name : {"JPEG-lossy.dcm", "JPGExtended.dcm", "JPEG2000.dcm", "693_J2KI.dcm"})
+    EXPECT_GT(ReadReal(name).samples.size(), 1000u) << name;
+  const SampledVolume bits = ReadReal("liver_1frame.dcm");
+  EXPECT_EQ(bits.samples, ReadReal("liver_expb_1frame.dcm").samples);
+  EXPECT_THAT(bits.samples, testing::Each(testing::AnyOf(0, 1)));
+  EXPECT_THAT(bits.samples, testing::Contains(1));
+}
+
+// A test card of ten bars; what is compressed with a loss is near.
+TEST_F(Volumes, RealColoursHoweverTheyAreWritten) {
+  const Rgb bars[] = {{255, 0, 0},     {255, 128, 128}, {0, 255, 0}, {128, 255, 128},
+                      {0, 0, 255},     {128, 128, 255}, {0, 0, 0},   {64, 64, 64},
+                      {192, 192, 192}, {255, 255, 255}};
+  for (const auto& [name, off] : std::initializer_list<std::pair<const char*, int>>{
+           {"SC_rgb_rle.dcm", 0},
+           {"SC_rgb_rle_2frame.dcm", 0},
+           {"SC_rgb_jpeg_gdcm.dcm", 0},
+           {"SC_rgb_gdcm_KY.dcm", 0},
+           {"SC_rgb_dcmtk_+eb+cr.dcm", 0},
+           {"SC_rgb_dcmtk_+eb+cy+n1.dcm", 5},
+           {"SC_rgb_dcmtk_+eb+cy+np.dcm", 5},
+           {"SC_rgb_dcmtk_+eb+cy+s4.dcm", 5},
+           {"SC_rgb_jpeg_dcmtk.dcm", 5},
+           {"SC_ybr_full_422_uncompressed.dcm", 5}}) {
+    const SampledVolume volume = ReadReal(name);
+    ASSERT_GE(volume.colors.size(), 10000u) << name;
+    for (size_t bar = 0; bar < 10; ++bar) {
+      const Rgb c = volume.colors[(10 * bar + 5) * 100 + 50];
+      EXPECT_NEAR(c.r, bars[bar].r, off) << name << " " << bar;
+      EXPECT_NEAR(c.g, bars[bar].g, off) << name << " " << bar;
+      EXPECT_NEAR(c.b, bars[bar].b, off) << name << " " << bar;
+    }
+  }
+  EXPECT_THAT(std::string(ImportFile(kDicoms + "SC_rgb_rle_16bit.dcm", {}).status().message()),
+              HasSubstr("has colours of 16 bits, compressed by run lengths"));
+  EXPECT_THAT(std::string(ImportFile(kDicoms + "SC_rgb_rle_32bit.dcm", {}).status().message()),
+              HasSubstr("has 32 bits for each colour"));
+}
+
+TEST_F(Volumes, RealSlicesInAFolder) {
+  const auto model = ImportFile(kDicoms + "dicomdirtests/98892001/CT5N", {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->volumes.at(0).size[2], 5u);
+}
+
+TEST_F(Volumes, APalette) {
+  const auto palette = [](uint16_t bits, const std::string& red, uint16_t entries = 2) {
+    std::string all;
+    for (uint16_t k = 0; k < 3; ++k)
+      all += Element(0x28, static_cast<uint16_t>(0x1101 + k), "US",
+                     Short(entries) + Short(1) + Short(bits));
+    all += Element(0x28, 0x1201, "OW", red);
+    all += Element(0x28, 0x1202, "OW", std::string("\x0b\x00\x0d\x00", 4));
+    return all + Element(0x28, 0x1203, "OW", std::string("\x00\x0a\x00\x0c", 4));
+  };
+  const auto picture = [&](const std::string& more) {
+    std::string bytes = Dicom("7", 0, 0, more);
+    const std::string grey = Element(0x28, 4, "CS", "MONOCHROME2");
+    bytes.replace(bytes.find(grey), grey.size(), Element(0x28, 4, "CS", "PALETTE COLOR"));
+    return bytes;
+  };
+  // Numbers 0 to 5; entry 0 is for 1 and less, entry 1 for 2 and more. 16 bits: the upper 8 count.
+  const SampledVolume wide =
+      Read("a.dcm", picture(palette(16, std::string("\x99\x10\x99\x20", 4))));
+  EXPECT_THAT(wide.colors, ElementsAre(Rgb{16, 0, 10}, Rgb{16, 0, 10}, Rgb{32, 0, 12},
+                                       Rgb{32, 0, 12}, Rgb{32, 0, 12}, Rgb{32, 0, 12}));
+  const SampledVolume narrow = Read("a.dcm", picture(palette(8, "\x10\x20")));
+  EXPECT_EQ(narrow.colors[0], (Rgb{16, 11, 0}));
+  EXPECT_EQ(narrow.colors[5], (Rgb{32, 13, 0}));
+  EXPECT_THAT(Error("a.dcm", picture("")), HasSubstr("has no palette of red"));
+  EXPECT_THAT(Error("a.dcm", picture(palette(16, "\x10\x20"))),
+              HasSubstr("has 2 bytes for 2 entries of 16 bits"));
+  EXPECT_THAT(Error("a.dcm", picture(palette(8, "\x10\x20", 0))),
+              HasSubstr("has 2 bytes for 65536 entries"));
 }
 
 TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
