@@ -70,6 +70,53 @@ TEST(PackedVolumes, ColoursAsTheyAre) {
   EXPECT_THAT(bytes_of(PackVolume(volume, {}, limits)), ElementsAre(1, 1, 2, 255)) << "averaged";
 }
 
+TEST(PackedVolumes, LargeOnesGoAsAssets) {
+  client::Limits limits;
+  limits.max_message_bytes = 8192;
+  limits.max_asset_bytes = 1 << 20;
+  std::string brought;
+  const AssetSink upload = [&brought](absl::string_view bytes) {
+    brought = std::string(bytes);
+    return client::Asset{.sha256 = "hash", .size = bytes.size()};
+  };
+  ASSERT_THAT(PackVolume(Ramp(16, 16, 16), {}, limits, upload), IsOk());
+  EXPECT_EQ(brought, "") << "it fits a message";
+  const auto packed = PackVolume(Ramp(33, 16, 16), {.window = {{0, 255}}}, limits, upload);
+  ASSERT_THAT(packed, IsOk());
+  EXPECT_EQ(packed->note, "");
+  EXPECT_EQ(packed->samples, 33u * 16 * 16);
+  ASSERT_EQ(brought.size(), 33u * 16 * 16);
+  EXPECT_EQ(brought[32], 32);
+  const auto& grid = std::get<client::Volume>(packed->part.shape).grid;
+  ASSERT_TRUE(std::get<client::Array<uint8_t>>(grid.samples).asset());
+  EXPECT_EQ(std::get<client::Array<uint8_t>>(grid.samples).asset()->sha256, "hash");
+  // Of a surface two bytes each; more than the server takes of one asset is averaged.
+  ASSERT_THAT(PackVolume(Ramp(33, 16, 16), {.level = 5}, limits, upload), IsOk());
+  EXPECT_EQ(brought.size(), 2u * 33 * 16 * 16);
+  limits.max_asset_bytes = 5000;
+  const auto averaged = PackVolume(Ramp(33, 16, 16), {}, limits, upload);
+  ASSERT_THAT(averaged, IsOk());
+  EXPECT_LE(brought.size(), 5000u);
+  EXPECT_THAT(averaged->note, HasSubstr("are more than the server takes"));
+}
+
+TEST(PackedVolumes, WhereAssetsAreNotTakenTheyAreAveraged) {
+  client::Limits limits;
+  limits.max_message_bytes = 8192;
+  limits.max_asset_bytes = 1 << 20;
+  absl::Status status = absl::ResourceExhaustedError("there is no room");
+  const AssetSink upload = [&status](absl::string_view) -> absl::StatusOr<client::Asset> {
+    return status;
+  };
+  const auto packed = PackVolume(Ramp(33, 16, 16), {}, limits, upload);
+  ASSERT_THAT(packed, IsOk());
+  EXPECT_LE(packed->samples, 4096u);
+  EXPECT_THAT(packed->note,
+              HasSubstr("did not take it as an asset (there is no room); 33 by 16 by 16 samples"));
+  status = absl::CancelledError("interrupted");
+  EXPECT_TRUE(absl::IsCancelled(PackVolume(Ramp(33, 16, 16), {}, limits, upload).status()));
+}
+
 TEST(PackedVolumes, AsASurface) {
   const auto packed = PackVolume(Ramp(5, 1, 1), {.level = 1}, {});
   ASSERT_THAT(packed, IsOk());

@@ -193,7 +193,7 @@ class Player {
           [&](const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
             return SendDefinition(object, std::move(parts), bytes, total);
           },
-          options_.volume);
+          options_.volume, [&](absl::string_view bytes) { return Upload(models[i].path, bytes); });
       if (!packed.ok()) return About(models[i], packed.status());
       Describe(models[i], *packed);
       levels_.push_back(std::move(packed->levels));
@@ -209,6 +209,16 @@ class Player {
     for (size_t i = 0; i < models.size(); ++i) DrawLevels(i, levels_[i], 0, models[i].path, &frame);
     status = frame.End();
     return status.ok() ? CommitAndWait() : status;
+  }
+
+  // Samples that are more than a message takes.
+  absl::StatusOr<client::Asset> Upload(const std::string& path, absl::string_view bytes) {
+    return connection_.UploadAsset(bytes, [&](uint64_t stored, uint64_t size) {
+      console_.ProgressBar(EscapeForTerminal(path),
+                           static_cast<double>(stored) / static_cast<double>(size),
+                           absl::StrCat(Bytes(stored), " of ", Bytes(size)));
+      return !interrupt_.requested();
+    });
   }
 
   // What is wrong with a model, not with the connection.

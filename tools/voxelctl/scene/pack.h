@@ -30,7 +30,7 @@ using ObjectSink = std::function<absl::Status(const std::string& object,
 // limits.max_parts_per_object is too small for so many pieces.
 absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& object,
                                        const client::Limits& limits, const ObjectSink& sink,
-                                       const VolumeLook& look = {});
+                                       const VolumeLook& look = {}, const AssetSink& upload = {});
 
 // The object of a level, and how many were defined for it.
 struct PackedLevel {
@@ -48,6 +48,6 @@ struct PackedLevels {
 // and so on. Volumes are in the lowest. The model is left without parts and volumes.
 absl::StatusOr<PackedLevels> PackLevels(Model* model, const std::string& object,
                                         const client::Limits& limits, const ObjectSink& sink,
-                                        const VolumeLook& look = {});
+                                        const VolumeLook& look = {}, const AssetSink& upload = {});
 
 }  // namespace voxeld::voxelctl

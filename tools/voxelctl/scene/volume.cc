@@ -161,22 +161,44 @@ std::vector<uint8_t> Colors(const SampledVolume& volume, const Size& factors, ui
 
 client::Vec3 ToClient(const Point3& p) { return {p.x, p.y, p.z}; }
 
+bool AreColors(const SampledVolume& volume, const VolumeLook& look) {
+  return !volume.colors.empty() && !look.level && !look.window && look.colormap.empty();
+}
+
+uint64_t BytesEach(const SampledVolume& volume, const VolumeLook& look) {
+  return look.level ? 2 : AreColors(volume, look) ? 4 : 1;
+}
+
+// What becomes of bytes that go as an asset.
+struct Brought {
+  const AssetSink& upload;
+  absl::Status status;
+};
+
+// The numbers themselves, or the asset that they are now.
+template <typename T>
+client::Array<T> ToArray(std::vector<T> numbers, Brought* brought) {
+  if (brought == nullptr) return client::Array<T>(std::move(numbers));
+  const absl::StatusOr<client::Asset> asset = brought->upload(
+      absl::string_view(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)));
+  if (asset.ok()) return client::Array<T>(*asset);
+  brought->status = asset.status();
+  return client::Array<T>();
+}
+
 }  // namespace
 
 std::array<double, 2> WindowOf(const SampledVolume& volume) {
   return volume.window ? *volume.window : FindWindow(volume.samples, RangeOf(volume.samples));
 }
 
-absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
-                                        const client::Limits& limits) {
-  const bool colors =
-      !volume.colors.empty() && !look.level && !look.window && look.colormap.empty();
-  const uint64_t each = look.level ? 2 : colors ? 4 : 1;
-  uint64_t bytes = kMostBytes;
-  if (limits.max_message_bytes > 0) bytes = std::min(bytes, limits.max_message_bytes);
-  if (limits.max_uncommitted_bytes > 0) bytes = std::min(bytes, limits.max_uncommitted_bytes);
-  bytes -= std::min(bytes / 2, kMessageOverhead);
-  if (limits.max_indices_per_entity > 0) bytes = std::min(bytes, limits.max_indices_per_entity * 4);
+namespace {
+
+// In so many bytes; `brought`: they go as an asset.
+absl::StatusOr<PackedVolume> PackWithin(const SampledVolume& volume, const VolumeLook& look,
+                                        uint64_t bytes, Brought* brought) {
+  const bool colors = AreColors(volume, look);
+  const uint64_t each = BytesEach(volume, look);
   const Size factors = Factors(volume, bytes / each);
 
   client::Grid grid;
@@ -213,8 +235,8 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
           absl::StrCat("--level is ", *look.level, ", and the samples go from ", range.least,
                        " to ", range.greatest, "; give a level above the least of them"));
     }
-    grid.samples = client::Array<uint16_t>(
-        Quantise<uint16_t>(volume, factors, packed.samples, range.least, range.greatest));
+    grid.samples = ToArray(
+        Quantise<uint16_t>(volume, factors, packed.samples, range.least, range.greatest), brought);
     packed.part.shape = client::Isosurface{
         .grid = std::move(grid),
         .level = (*look.level - range.least) / (range.greatest - range.least) * 65535};
@@ -228,13 +250,13 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
     return packed;
   }
   if (colors) {
-    grid.samples = client::Array<uint8_t>(Colors(volume, factors, packed.samples));
+    grid.samples = ToArray(Colors(volume, factors, packed.samples), brought);
     packed.part.shape = client::Volume{.grid = std::move(grid), .colors = true, .transfer = {}};
     return packed;
   }
   const std::array<double, 2> window = look.window ? *look.window : WindowOf(volume);
-  grid.samples = client::Array<uint8_t>(
-      Quantise<uint8_t>(volume, factors, packed.samples, window[0], window[1]));
+  grid.samples =
+      ToArray(Quantise<uint8_t>(volume, factors, packed.samples, window[0], window[1]), brought);
   client::Transfer transfer;
   transfer.colormap = look.colormap.empty() ? "gray" : look.colormap;
   if (look.colormap.empty()) {
@@ -246,6 +268,43 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
     transfer.opacities = {0, 1};
   }
   packed.part.shape = client::Volume{.grid = std::move(grid), .transfer = std::move(transfer)};
+  return packed;
+}
+
+}  // namespace
+
+absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
+                                        const client::Limits& limits, const AssetSink& upload) {
+  const auto within = [](uint64_t most, uint64_t limit) {
+    return limit > 0 ? std::min(most, limit) : most;
+  };
+  const auto beside_all_else = [](uint64_t most) {
+    return most - std::min(most / 2, kMessageOverhead);
+  };
+  const uint64_t samples =
+      limits.max_indices_per_entity > 0 ? limits.max_indices_per_entity * 4 : UINT64_MAX;
+  const uint64_t message =
+      std::min(samples, beside_all_else(within(within(kMostBytes, limits.max_message_bytes),
+                                               limits.max_uncommitted_bytes)));
+  const uint64_t asset = std::min(
+      samples,
+      within(limits.max_asset_bytes,
+             limits.max_uncommitted_bytes > 0 ? beside_all_else(limits.max_uncommitted_bytes) : 0));
+  const uint64_t wanted = volume.samples.size() * BytesEach(volume, look);
+  if (!upload || wanted <= message || asset <= message)
+    return PackWithin(volume, look, message, nullptr);
+  Brought brought{.upload = upload, .status = {}};
+  absl::StatusOr<PackedVolume> packed = PackWithin(volume, look, asset, &brought);
+  if (brought.status.ok()) return packed;
+  if (absl::IsCancelled(brought.status) || absl::IsUnavailable(brought.status) ||
+      absl::IsDeadlineExceeded(brought.status)) {
+    return brought.status;
+  }
+  packed = PackWithin(volume, look, message, nullptr);
+  if (packed.ok()) {
+    packed->note = absl::StrCat("the server did not take it as an asset (",
+                                brought.status.message(), "); ", packed->note);
+  }
   return packed;
 }
 
