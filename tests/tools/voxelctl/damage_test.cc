@@ -258,6 +258,10 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
   Put<uint32_t>(&las, 107, 0xfffffff0);
   std::string vox = Vox();
   Put<uint32_t>(&vox, vox.find("XYZI") + 12, 0xfffffff0);
+  std::string lzf;
+  Put<uint32_t>(&lzf, 0, 40);
+  Put<uint32_t>(&lzf, 4, 360'000'000);
+  lzf.resize(48, '\x1f');
   const std::string zeros(size_t{100} << 20, '\0');
   const std::vector<Sample> huge = {
       {"a.nii", wide},
@@ -268,6 +272,13 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
            Gzip("1")},
       {"b.nrrd",
        "NRRD0004\ntype: double\ndimension: 3\nsizes: 640 640 640\nencoding: ascii\n\n1 2 3"},
+      {"b.pcd",
+       "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 0 0 0\nWIDTH 30000000\nHEIGHT "
+       "1\nPOINTS 30000000\nDATA binary\n"},
+      {"c.pcd",
+       "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 30000000\nHEIGHT "
+       "1\nPOINTS 30000000\nDATA binary_compressed\n" +
+           lzf},
       {"a.las", las},
       {"a.vox", vox},
       {"a.ply",

@@ -371,6 +371,25 @@ TEST_F(Drawings, WhatMultipliesEnds) {
       "");
 }
 
+// Rules, and text that is used again and again.
+TEST_F(Drawings, WhatIsParsedAgainEnds) {
+  std::string selectors = "b";
+  for (int i = 0; i < 100'000; ++i) selectors += ",a";
+  std::string body;
+  for (int i = 0; i < 4000; ++i) body += "fill:red;";
+  ASSERT_THAT(Import(Svg("<style>" + selectors + "{" + body + "}</style><path d='M0 0 1 1'/>")),
+              IsOk());
+  // A million times a megabyte of blanks, and of places where nothing is drawn.
+  for (const std::string& data :
+       {std::string(1'000'000, ' '), "M0 0" + std::string(500'000, 'z')}) {
+    std::string uses = "<path id='u0' d='" + data + "'/>";
+    for (int i = 1; i < 20; ++i)
+      uses += absl::StrCat("<g id='u", i, "'><use href='#u", i - 1, "'/><use href='#u", i - 1,
+                           "'/></g>");
+    EXPECT_THAT(Error(Svg(uses)), HasSubstr("without end"));
+  }
+}
+
 TEST_F(Drawings, DamagedOnesEndWell) {
   const std::string good =
       Svg("<style>.a{fill:red}</style><g transform='rotate(5 1 2)'><path class='a' "

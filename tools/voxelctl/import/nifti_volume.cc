@@ -68,7 +68,7 @@ struct Head {
 template <typename Header>
 Head HeadOf(const Header& header, bool apart) {
   Head head;
-  std::copy(std::begin(header.dim), std::end(header.dim), head.dim.begin());
+  for (size_t i = 0; i < head.dim.size(); ++i) head.dim[i] = header.dim[i];
   head.datatype = header.datatype;
   head.vox_offset = static_cast<double>(header.vox_offset);
   head.slope = header.scl_slope;
@@ -265,8 +265,9 @@ class Reader {
 
   const SourceFile& file_;
   Head head_;
+  // The second is packed; the library takes it for aligned.
   nifti_1_header first_ = {};
-  nifti_2_header second_ = {};
+  alignas(8) nifti_2_header second_ = {};
   bool is_second_ = false;  // which of them the file has
   SampleCode code_;
   size_t channels_ = 0;  // of colours; 0: numbers

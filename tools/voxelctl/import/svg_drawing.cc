@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -32,7 +33,8 @@ namespace {
 constexpr size_t kMostBytes = 64 << 20;
 constexpr int kMostDepth = 100;
 constexpr uint64_t kMostVisits = 1'000'000;
-constexpr double kLargest = 1e15;   // further out nothing is told apart
+constexpr double kLargest = 1e15;  // further out nothing is told apart
+constexpr size_t kBytesOfAVisit = 128;
 constexpr int kMostReferences = 8;  // from one gradient to another
 class Drawer {
  public:
@@ -91,11 +93,16 @@ class Drawer {
     }
   }
 
+  // Text that is parsed again wherever it is used counts as visits do.
+  void Charge(size_t bytes) const { visits_ += bytes / kBytesOfAVisit; }
+
   SvgStyle StyleOf(const xmlNode* node, SvgStyle style) const {
     for (const char* property : kSvgProperties) style.Set(property, SvgAttribute(node, property));
     const auto apply = [&](const std::string& selector) {
       const auto rule = rules_.find(selector);
-      if (rule != rules_.end()) style.SetAll(rule->second);
+      if (rule == rules_.end()) return;
+      Charge(rule->second.size());
+      style.SetAll(rule->second);
     };
     if (!rules_.empty()) {
       apply(std::string(SvgName(node)));
@@ -104,7 +111,9 @@ class Drawer {
         apply(absl::StrCat(".", word));
       apply(absl::StrCat("#", SvgAttribute(node, "id")));
     }
-    style.SetAll(SvgAttribute(node, "style"));
+    const std::string own = SvgAttribute(node, "style");
+    Charge(own.size());
+    style.SetAll(own);
     return style;
   }
 
@@ -153,6 +162,7 @@ class Drawer {
       return absl::OkStatus();
     }
     if (!style.visible) return absl::OkStatus();
+    Charge(SvgAttribute(node, name == "path" ? "d" : "points").size());
     absl::StatusOr<std::vector<Polyline>> lines = SvgShape(node, kMaxModelVertices - points_);
     if (!lines.ok()) {
       return absl::Status(lines.status().code(),
@@ -190,7 +200,12 @@ class Drawer {
   // Nothing of what is not painted.
   std::optional<Rgb> ColorOf(absl::string_view paint, const SvgStyle& style) const {
     if (absl::ConsumePrefix(&paint, "url(")) {
-      if (const std::optional<Rgb> color = GradientColor(paint)) return color;
+      const auto known = gradients_.find(paint);
+      const std::optional<Rgb> color =
+          known != gradients_.end()
+              ? known->second
+              : gradients_.emplace(std::string(paint), GradientColor(paint)).first->second;
+      if (color) return color;
       // Behind it may stand what is to be had without it. Patterns have no colour of their own.
       const size_t end = paint.find(')');
       paint =
@@ -279,7 +294,9 @@ class Drawer {
   std::map<std::string, xmlNode*> ids_;
   CssRules rules_;
   std::map<std::string, uint64_t> left_out_;
-  uint64_t visits_ = 0, points_ = 0, unfilled_ = 0;
+  mutable uint64_t visits_ = 0;
+  mutable std::map<std::string, std::optional<Rgb>, std::less<>> gradients_;  // by what names them
+  uint64_t points_ = 0, unfilled_ = 0;
   FillBudget budget_;
   std::vector<SvgLayer> layers_;
 };

@@ -55,8 +55,16 @@ class Levels {
  public:
   explicit Levels(const Box& all) : all_(all), seen_(kCells * kCells) {}
 
-  // The level of a layer of that colour, with a box for each of its pieces.
-  uint8_t Take(const std::vector<Box>& boxes, const Rgb& color) {
+  // The level of a layer of that colour, with a box for each of its pieces, which counts as one box if it is cheaper.
+  uint8_t Take(std::vector<Box> boxes, const Rgb& color) {
+    size_t cells = 0;
+    for (const Box& box : boxes) cells += Across(box) * Down(box);
+    if (cells > kCells * kCells) {
+      Box whole;
+      for (const Box& box : boxes)
+        whole.Add({box.left, box.top}), whole.Add({box.right, box.bottom});
+      boxes = {whole};
+    }
     int level = 0;
     ForEach(boxes, [&](const Seen& seen) {
       if (seen.level >= 0) level = std::max(level, seen.level + (seen.color == color ? 0 : 1));
@@ -78,6 +86,13 @@ class Levels {
     if (!(to > from)) return 0;
     return static_cast<size_t>(
         std::clamp((at - from) / (to - from) * kCells, 0.0, static_cast<double>(kCells - 1)));
+  }
+
+  size_t Across(const Box& box) const {
+    return Cell(box.right, all_.left, all_.right) - Cell(box.left, all_.left, all_.right) + 1;
+  }
+  size_t Down(const Box& box) const {
+    return Cell(box.bottom, all_.top, all_.bottom) - Cell(box.top, all_.top, all_.bottom) + 1;
   }
 
   template <typename Each>

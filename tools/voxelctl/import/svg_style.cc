@@ -16,7 +16,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr size_t kMostRules = 10'000;
+constexpr size_t kMostRules = 10'000, kMostRuleBytes = 4096;
 
 constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
     {"aliceblue", 0xf0f8ff},
@@ -168,6 +168,13 @@ constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
     {"yellowgreen", 0x9acd32},
 };
 
+void AddRule(absl::string_view selector, absl::string_view declarations, CssRules* rules) {
+  std::string& rule = (*rules)[std::string(selector)];
+  // Many selectors of one rule, and many rules of one selector, must not multiply.
+  if (rule.size() + declarations.size() <= kMostRuleBytes)
+    absl::StrAppend(&rule, ";", declarations);
+}
+
 Rgb FromNumber(uint32_t rgb) {
   return {static_cast<uint8_t>(rgb >> 16), static_cast<uint8_t>(rgb >> 8),
           static_cast<uint8_t>(rgb)};
@@ -253,8 +260,7 @@ void AddCssRules(absl::string_view sheet, CssRules* rules) {
     const size_t open = rest.find('{'), close = rest.find('}', std::min(open, rest.size()));
     if (open == absl::string_view::npos || close == absl::string_view::npos) return;
     for (const absl::string_view selector : absl::StrSplit(rest.substr(0, open), ','))
-      absl::StrAppend(&(*rules)[std::string(absl::StripAsciiWhitespace(selector))], ";",
-                      rest.substr(open + 1, close - open - 1));
+      AddRule(absl::StripAsciiWhitespace(selector), rest.substr(open + 1, close - open - 1), rules);
     rest.remove_prefix(close + 1);
   }
 }

@@ -39,7 +39,7 @@ inline constexpr const char* kSvgProperties[] = {
 
 // Declarations by simple selectors: an element's name, ".class", "#id".
 using CssRules = std::map<std::string, std::string>;
-// Adds those of a style sheet; what is none of these selectors is passed over.
+// Adds those of a style sheet, up to 4 KiB for each selector; what is none of these selectors is passed over.
 void AddCssRules(absl::string_view sheet, CssRules* rules);
 
 }  // namespace voxeld::voxelctl
