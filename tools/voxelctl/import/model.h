@@ -42,7 +42,7 @@ inline constexpr uint8_t kMostLevel = 126;
 struct SampledVolume {
   std::array<uint32_t, 3> size = {};  // each at least 1
   std::vector<float> samples;         // finite, or not a number where there is nothing
-  std::vector<Rgb> colors;            // of each, black where there is nothing; empty: there are numbers alone
+  std::vector<Rgb> colors;  // of each, black where there is nothing; empty: there are numbers alone
   // Of the whole: bit 0 of the index is for the far end of the first axis, bit 1 for that of the second, bit 2 of the third.
   std::array<Point3, 8> corners = {};
   // What the file says is to be seen, from dark to bright.
