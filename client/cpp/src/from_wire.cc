@@ -99,7 +99,8 @@ ServerInfo FromWire(const v1::Opened& opened) {
                      .max_uncommitted_bytes = limits.max_uncommitted_bytes(),
                      .max_parts_per_object = limits.max_parts_per_object(),
                      .max_timed_commits = limits.max_timed_commits(),
-                     .max_present_at_horizon_ns = limits.max_present_at_horizon_ns()}};
+                     .max_present_at_horizon_ns = limits.max_present_at_horizon_ns(),
+                     .max_asset_bytes = limits.max_asset_bytes()}};
 }
 
 std::string_view ReasonName(Reason reason) {

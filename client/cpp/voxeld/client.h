@@ -129,6 +129,7 @@ struct Limits {
   uint64_t max_parts_per_object = 0;
   uint64_t max_timed_commits = 0;
   int64_t max_present_at_horizon_ns = 0;
+  uint64_t max_asset_bytes = 0;  // of one; 0: the server takes none
 };
 
 struct ServerInfo {

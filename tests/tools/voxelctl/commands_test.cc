@@ -168,6 +168,23 @@ TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
   EXPECT_EQ(log.clears[0].layer(), "voxelctl");
 }
 
+TEST_F(CommandsTest, WhatADrawingPaintsLaterHasAHigherPriority) {
+  const std::string file = folder_.Write(
+      "a.svg",
+      "<svg xmlns='http://www.w3.org/2000/svg'><rect width='9' height='9' fill='red'/>"
+      "<circle cx='4' cy='4' r='2' fill='blue' stroke='gold'/></svg>");
+  const Result result = RunTool({"play", file, DataFile("points.ply")});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("4 entities"));
+  const FakeServer::Log log = server_.log();
+  ASSERT_EQ(log.entities.size(), 4u);
+  EXPECT_EQ(log.entities.at("1").priority(), 0u);
+  EXPECT_EQ(log.entities.at("1/over1").priority(), 1u);
+  EXPECT_EQ(log.entities.at("1/over2").priority(), 2u);
+  EXPECT_EQ(log.entities.at("1/over2").primitive().instance().object(), "voxelctl/1/over2");
+  EXPECT_EQ(log.entities.at("2").priority(), 0u);
+}
+
 TEST_F(CommandsTest, PlayEndsATestPatternThatIsUp) {
   EXPECT_EQ(RunTool({"pattern", "corners"}).code, 0);
   const Result result = RunTool({"play", DataFile("points.ply")});

@@ -116,7 +116,7 @@ TEST_F(Molecules, ThatAreWrong) {
   EXPECT_THAT(Error(bad), HasSubstr("line 1 has \"1e300\" in column 31"));
   std::string crowd;
   for (int i = 0; i < 1002; ++i) crowd += good;
-  EXPECT_THAT(Error(crowd), HasSubstr("more than 1000 atoms near (0, 0, 0)"));
+  EXPECT_THAT(Error(crowd), HasSubstr("more than 100 atoms near (0, 0, 0)"));
 }
 
 TEST_F(Molecules, DamagedOnesEndWell) {

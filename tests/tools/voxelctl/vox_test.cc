@@ -191,6 +191,18 @@ TEST_F(VoxFiles, ModelsThatMultiplyEnd) {
   EXPECT_THAT(Error(Vox(chunks + Shape(60, 0))), HasSubstr("without end"));
 }
 
+// A million times the largest model, with one voxel and with none.
+TEST_F(VoxFiles, LargeModelsShownOftenEnd) {
+  std::string often = Int(0) + Dictionary({}) + Int(1'200'000);
+  for (int i = 0; i < 1'200'000; ++i) often += Int(0) + Int(0);
+  for (const bool filled : {true, false}) {
+    const std::string model =
+        Model3(256, 256, 256, filled ? std::vector<V>{{1, 1, 1, 1}} : std::vector<V>());
+    EXPECT_THAT(Error(Vox(model + Chunk("nSHP", often))),
+                HasSubstr("shows more than 1000000 models"));
+  }
+}
+
 TEST_F(VoxFiles, DamagedOnesEndWell) {
   const std::string good =
       Vox(Model3(4, 4, 4, {{0, 0, 0, 1}, {1, 2, 3, 9}}) +

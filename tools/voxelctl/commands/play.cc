@@ -188,16 +188,15 @@ class Player {
       for (const SampledVolume& volume : model.volumes) total += volume.samples.size();
     }
     for (size_t i = 0; i < models.size(); ++i) {
-      const absl::StatusOr<PackedSizes> sizes = PackObject(
-          models[i], Object(i), session_->server().limits,
+      absl::StatusOr<PackedLevels> packed = PackLevels(
+          &models[i], Object(i), session_->server().limits,
           [&](const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
             return SendDefinition(object, std::move(parts), bytes, total);
           },
-          options_.volume);
-      if (!sizes.ok()) return About(models[i], sizes.status());
-      Describe(models[i], *sizes);
-      models[i].parts = {};  // sent; the memory is not needed any more
-      models[i].volumes = {};
+          options_.volume, [&](absl::string_view bytes) { return Upload(models[i].path, bytes); });
+      if (!packed.ok()) return About(models[i], packed.status());
+      Describe(models[i], *packed);
+      levels_.push_back(std::move(packed->levels));
     }
     if (staged_operations_ > 0) {
       absl::Status status = CommitAndWait();
@@ -207,13 +206,19 @@ class Player {
     if (!status.ok()) return status;
     if (absl::Status plain = LookPlain(); !plain.ok()) return plain;
     client::Frame frame = layer_->BeginFrame();
-    for (size_t i = 0; i < models.size(); ++i) {
-      frame.Draw(
-          Id(i), client::Instance{Object(i)},
-          {.transform = ToClient(InstanceTransform(space_, 0)), .label = Label(models[i].path)});
-    }
+    for (size_t i = 0; i < models.size(); ++i) DrawLevels(i, levels_[i], 0, models[i].path, &frame);
     status = frame.End();
     return status.ok() ? CommitAndWait() : status;
+  }
+
+  // Samples that are more than a message takes.
+  absl::StatusOr<client::Asset> Upload(const std::string& path, absl::string_view bytes) {
+    return connection_.UploadAsset(bytes, [&](uint64_t stored, uint64_t size) {
+      console_.ProgressBar(EscapeForTerminal(path),
+                           static_cast<double>(stored) / static_cast<double>(size),
+                           absl::StrCat(Bytes(stored), " of ", Bytes(size)));
+      return !interrupt_.requested();
+    });
   }
 
   // What is wrong with a model, not with the connection.
@@ -222,15 +227,17 @@ class Player {
     return absl::InvalidArgumentError(absl::StrCat(model.path, ": ", status.message()));
   }
 
-  void Describe(const Model& model, const PackedSizes& sizes) {
+  void Describe(const Model& model, const PackedLevels& packed) {
+    const PackedSizes& sizes = packed.sizes;
     std::string note = model.note;
     if (!sizes.note.empty()) {
       const std::string more = absl::StrCat(model.path, ": ", sizes.note);
       console_.Say(EscapeForTerminal(more));
       note = note.empty() ? more : absl::StrCat(note, "; ", more);
     }
-    summary_.files.push_back({model.path, model.format, std::move(note), sizes.vertices,
-                              sizes.indices, sizes.samples, sizes.objects, sizes.bytes});
+    summary_.files.push_back({model.path, model.format, std::move(note), packed.levels.size(),
+                              sizes.vertices, sizes.indices, sizes.samples, sizes.objects,
+                              sizes.bytes});
   }
 
   absl::Status ShowFrames(FrameAhead& ahead, const FramePlacement& placement, int64_t count) {
@@ -290,32 +297,53 @@ class Player {
     if (absl::Status plain = first ? LookPlain() : absl::OkStatus(); !plain.ok()) return plain;
     const size_t half = summary_.frames % 2;
     const std::string object = absl::StrCat("voxelctl/frame", half);
-    const absl::StatusOr<PackedSizes> sizes = PackObject(
-        model, object, session_->server().limits,
+    absl::StatusOr<PackedLevels> packed = PackLevels(
+        &model, object, session_->server().limits,
         [&](const std::string& name, std::vector<client::Part> parts, uint64_t bytes) {
           return Stage(name, std::move(parts), bytes);
         },
         frame_look_);
-    if (!sizes.ok()) return About(model, sizes.status());
-    // What the frame before last had more of.
-    for (uint64_t piece = sizes->objects - 1; piece + 1 < pieces_[half]; ++piece) {
-      const absl::Status status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));
-      if (!status.ok()) return status;
-    }
-    pieces_[half] = sizes->objects;
+    if (!packed.ok()) return About(model, packed.status());
+    const absl::Status less = RemoveRest(halves_[half], packed->levels);
+    if (!less.ok()) return less;
+    halves_[half] = packed->levels;
     client::Frame frame = layer_->BeginFrame();
-    frame.Draw(
-        Id(0), client::Instance{object},
-        {.transform = ToClient(InstanceTransform(space_, turns)), .label = Label(model.path)});
+    DrawLevels(0, packed->levels, turns, model.path, &frame);
     if (absl::Status status = frame.End(); !status.ok()) return status;
     if (!first) {
       staged_bytes_ = staged_operations_ = 0;
       return session_->Commit();
     }
-    Describe(model, *sizes);
+    Describe(model, *packed);
     if (absl::Status status = TakePatternsDown(); !status.ok()) return status;
     if (absl::Status status = CommitAndWait(); !status.ok()) return status;
     return TakeBeforeDown();
+  }
+
+  // What the frame before last had more of; an object before the pieces that it draws.
+  absl::Status RemoveRest(const std::vector<PackedLevel>& before,
+                          const std::vector<PackedLevel>& now) {
+    for (size_t level = 0; level < before.size(); ++level) {
+      const auto& [object, objects] = before[level];
+      absl::Status status;
+      if (level >= now.size()) status = session_->client().RemoveObject(object);
+      for (uint64_t piece = level < now.size() ? now[level].objects - 1 : 0;
+           status.ok() && piece + 1 < objects; ++piece)
+        status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));
+      if (!status.ok()) return status;
+    }
+    return absl::OkStatus();
+  }
+
+  // The later of the levels over those before.
+  void DrawLevels(size_t file, const std::vector<PackedLevel>& levels, double turns,
+                  const std::string& path, client::Frame* frame) const {
+    for (size_t level = 0; level < levels.size(); ++level) {
+      frame->Draw(Id(file, level), client::Instance{levels[level].object},
+                  {.transform = ToClient(InstanceTransform(space_, turns)),
+                   .priority = static_cast<uint32_t>(level),
+                   .label = Label(path)});
+    }
   }
 
   // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
@@ -329,7 +357,9 @@ class Player {
     return absl::OkStatus();
   }
 
-  static std::string Id(size_t file) { return absl::StrCat(file + 1); }
+  static std::string Id(size_t file, size_t level) {
+    return level == 0 ? absl::StrCat(file + 1) : absl::StrCat(file + 1, "/over", level);
+  }
   static std::string Object(size_t file) { return absl::StrCat("voxelctl/", file + 1); }
 
   static client::Affine ToClient(const gpu::Affine& transform) {
@@ -395,10 +425,12 @@ class Player {
   }
 
   absl::Status Turn(double turns) {
-    for (size_t i = 0; i < summary_.files.size(); ++i) {
-      const absl::Status status =
-          layer_->SetTransform(Id(i), ToClient(InstanceTransform(space_, turns)));
-      if (!status.ok()) return status;
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      for (size_t level = 0; level < levels_[i].size(); ++level) {
+        const absl::Status status =
+            layer_->SetTransform(Id(i, level), ToClient(InstanceTransform(space_, turns)));
+        if (!status.ok()) return status;
+      }
     }
     return session_->Commit();
   }
@@ -428,8 +460,9 @@ class Player {
   std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
-  std::vector<OwnedLayer> before_;       // what an earlier command left
-  std::array<uint64_t, 2> pieces_ = {};  // objects of each frame that is defined
+  std::vector<OwnedLayer> before_;                       // what an earlier command left
+  std::vector<std::vector<PackedLevel>> levels_;         // of each file
+  std::array<std::vector<PackedLevel>, 2> halves_ = {};  // of each frame that is defined
   VolumeLook frame_look_;
   bool taken_down_ = false;
   bool had_layer_ = false;  // of a command before, of the same owner: who has a token has one owner

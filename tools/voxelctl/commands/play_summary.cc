@@ -12,6 +12,12 @@
 namespace voxeld::voxelctl {
 namespace {
 
+uint64_t EntitiesOf(const PlaySummary& summary) {
+  uint64_t entities = 0;
+  for (const PlayedFile& file : summary.files) entities += file.entities;
+  return entities;
+}
+
 using nlohmann::ordered_json;
 
 struct Quantiles {
@@ -61,7 +67,7 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
   }
   return {{"layer", s.layer},
           {"owner", s.owner},
-          {"entities", s.files.size()},
+          {"entities", EntitiesOf(s)},
           {"files", files},
           {"duration_ns", s.duration_ns},
           {"frames", s.frames},
@@ -97,7 +103,7 @@ void Report(PlaySummary summary, Console& console) {
     bytes += file.bytes;
   }
   std::string line =
-      absl::StrCat(Counted(summary.files.size(), "entity", "entities"), ", ",
+      absl::StrCat(Counted(EntitiesOf(summary), "entity", "entities"), ", ",
                    samples > 0 && vertices == 0 ? Counted(samples, "sample")
                                                 : Counted(vertices, "vertex", "vertices"),
                    ", ", Bytes(bytes));

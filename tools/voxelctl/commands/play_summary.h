@@ -12,6 +12,7 @@ namespace voxeld::voxelctl {
 
 struct PlayedFile {
   std::string path, format, note;
+  uint64_t entities = 1;
   uint64_t vertices = 0, indices = 0, samples = 0, objects = 0, bytes = 0;
 };
 

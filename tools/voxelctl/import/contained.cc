@@ -105,6 +105,7 @@ bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
   for (const Part& part : model->parts) {
     writer.Bytes(&part.kind, sizeof(part.kind));
     writer.Bytes(&part.thickness, sizeof(part.thickness));
+    writer.Bytes(&part.level, sizeof(part.level));
     writer.All(part.positions);
     writer.All(part.normals);
     writer.All(part.colors);
@@ -138,6 +139,7 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
     Part part;
     reader.Bytes(&part.kind, sizeof(part.kind));
     reader.Bytes(&part.thickness, sizeof(part.thickness));
+    reader.Bytes(&part.level, sizeof(part.level));
     reader.All(&part.positions);
     reader.All(&part.normals);
     reader.All(&part.colors);

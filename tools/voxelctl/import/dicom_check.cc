@@ -1,6 +1,7 @@
 #include "tools/voxelctl/import/dicom_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "absl/strings/ascii.h"
@@ -8,7 +9,9 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/inflate.h"
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/text/escape.h"
 
@@ -20,6 +23,8 @@ constexpr int kMostDepth = 32;
 constexpr uint32_t kUndefined = UINT32_MAX;
 constexpr uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
 constexpr uint32_t kPixels = 0x7FE00010;
+constexpr absl::string_view kDeflated = "1.2.840.10008.1.2.1.99",
+                            kBigEndian = "1.2.840.10008.1.2.2", kRunLengths = "1.2.840.10008.1.2.5";
 // Two letters whose elements have lengths of 32 bits.
 constexpr absl::string_view kLong = "OB OD OF OL OV OW SQ SV UC UN UR UT UV";
 
@@ -27,20 +32,18 @@ class Walker {
  public:
   explicit Walker(const SourceFile& file) : file_(file), bytes_(file.bytes) {}
 
+  // Where what is deflated begins; 0 if nothing is.
+  absl::StatusOr<size_t> DeflatedFrom() {
+    size_t at = kPreamble + 4;
+    if (absl::Status status = Head(&at); !status.ok()) return status;
+    return facts_.transfer_syntax == kDeflated ? at : 0;
+  }
+
   absl::StatusOr<DicomFacts> Walk() {
     size_t at = kPreamble + 4;
-    // The second group says how the rest is written, and is itself always explicit.
-    explicit_ = true;
-    while (at + 8 <= bytes_.size() && U16(at) == 2) {
-      if (absl::Status status = Element(&at, bytes_.size(), 0); !status.ok()) return status;
-    }
+    if (absl::Status status = Head(&at); !status.ok()) return status;
     const std::string& syntax = facts_.transfer_syntax;
-    if (syntax == "1.2.840.10008.1.2.1.99" || syntax == "1.2.840.10008.1.2.2") {
-      return FileError(
-          file_,
-          absl::StrCat("is written ", absl::EndsWith(syntax, "99") ? "deflated" : "big-endian"),
-          "little-endian DICOM is read");
-    }
+    facts_.big_endian = syntax == kBigEndian;
     explicit_ = syntax != "1.2.840.10008.1.2";
     while (at < bytes_.size()) {
       if (absl::Status status = Element(&at, bytes_.size(), 0); !status.ok()) return status;
@@ -50,15 +53,24 @@ class Walker {
   }
 
  private:
+  // The second group says how the rest is written, and is itself always explicit.
+  absl::Status Head(size_t* at) {
+    explicit_ = true;
+    while (*at + 8 <= bytes_.size() && U16(*at) == 2) {
+      if (absl::Status status = Element(at, bytes_.size(), 0); !status.ok()) return status;
+    }
+    return absl::OkStatus();
+  }
+
   uint16_t U16(size_t at) const {
     uint16_t value;
     std::memcpy(&value, bytes_.data() + at, 2);
-    return value;
+    return facts_.big_endian ? __builtin_bswap16(value) : value;
   }
   uint32_t U32(size_t at) const {
     uint32_t value;
     std::memcpy(&value, bytes_.data() + at, 4);
-    return value;
+    return facts_.big_endian ? __builtin_bswap32(value) : value;
   }
   static std::string Name(uint32_t tag) {
     return absl::StrFormat("(%04x,%04x)", tag >> 16, tag & 0xffff);
@@ -156,6 +168,7 @@ class Walker {
     std::string* const anywhere = tag == 0x00200037   ? &facts_.orientation
                                   : tag == 0x00280030 ? &facts_.spacing
                                   : tag == 0x00180050 ? &facts_.slice_thickness
+                                  : tag == 0x00180088 ? &facts_.slices_apart
                                   : tag == 0x00281052 ? &facts_.intercept
                                   : tag == 0x00281053 ? &facts_.slope
                                   : tag == 0x00281050 ? &facts_.window_center
@@ -170,6 +183,18 @@ class Walker {
       return;
     }
     if (!top) return;
+    if (tag >= 0x00281101 && tag <= 0x00281103) {
+      DicomFacts::Palette& palette = facts_.palette[tag - 0x00281101];
+      palette.descriptor.clear();
+      for (size_t i = 0; i + 2 <= value.size(); i += 2)
+        palette.descriptor.push_back(U16(static_cast<size_t>(value.data() - bytes_.data()) + i));
+      return;
+    }
+    if (tag >= 0x00281201 && tag <= 0x00281203) {
+      facts_.palette[tag - 0x00281201].entries = {static_cast<size_t>(value.data() - bytes_.data()),
+                                                  value.size()};
+      return;
+    }
     const uint16_t number =
         value.size() >= 2 ? U16(static_cast<size_t>(value.data() - bytes_.data())) : uint16_t{0};
     switch (tag) {
@@ -184,6 +209,12 @@ class Walker {
         break;
       case 0x00280004:
         facts_.photometric = Text(value);
+        break;
+      case 0x00280006:
+        facts_.planar = number == 1;
+        break;
+      case 0x3004000C:
+        facts_.frame_offsets = Text(value);
         break;
       case 0x00280008:
         if (!absl::SimpleAtoi(Text(value), &facts_.frames)) facts_.frames = 0;
@@ -222,17 +253,31 @@ class Walker {
                                     facts_.rows, " pixels"),
                        "at least one is expected");
     }
-    if (facts_.samples_per_pixel != 1 || !absl::StartsWith(facts_.photometric, "MONOCHROME")) {
-      return FileError(file_,
-                       absl::StrCat("is an image in ", facts_.samples_per_pixel, " channels (",
-                                    EscapeForTerminal(facts_.photometric), ")"),
-                       "one of numbers (MONOCHROME1 or MONOCHROME2) is expected");
-    }
+    const std::string& photometric = facts_.photometric;
     const uint64_t bits = facts_.bits_allocated;
-    if (bits != 8 && bits != 16 && bits != 32) {
-      return FileError(file_, absl::StrCat("has ", bits, " bits for each pixel"),
-                       "8, 16 or 32 are read");
+    const bool colors = photometric == "RGB" || absl::StartsWith(photometric, "YBR_");
+    const bool palette = photometric == "PALETTE COLOR";
+    if ((!IsGrey(facts_) && !colors && !palette) ||
+        facts_.samples_per_pixel != (colors ? 3u : 1u)) {
+      return FileError(
+          file_,
+          absl::StrCat("is an image in ", facts_.samples_per_pixel, " channels (",
+                       EscapeForTerminal(photometric), ")"),
+          "one of numbers (MONOCHROME1, MONOCHROME2), RGB, YBR_… or PALETTE COLOR is expected");
     }
+    const bool one = bits == 1 && !colors && !palette && !facts_.compressed;
+    if (!one && bits != 8 && bits != 16 && (bits != 32 || colors || palette)) {
+      return FileError(
+          file_, absl::StrCat("has ", bits, " bits for each ", colors ? "colour" : "pixel"),
+          colors || palette ? "8 or 16 are read" : "8, 16, 32 or, uncompressed, 1 are read");
+    }
+    // The library that decodes them mixes the colours up.
+    if (colors && bits == 16 && facts_.transfer_syntax == kRunLengths) {
+      return FileError(file_, "has colours of 16 bits, compressed by run lengths",
+                       "8 bits, or another compression, are read");
+    }
+    if (absl::Status status = palette ? CheckPalette() : absl::OkStatus(); !status.ok())
+      return status;
     // At most 2³² of the first two, so that the product cannot wrap.
     const uint64_t pixels = facts_.rows * facts_.columns;
     if (facts_.frames > kMaxModelSamples / pixels) {
@@ -248,7 +293,16 @@ class Walker {
                                     " of the ", bits, " for each pixel"),
                        "bits from bit 0 on are expected");
     }
-    const uint64_t wanted = pixels * facts_.frames * bits / 8;
+    // Of YBR_FULL_422 two pixels share their colours.
+    const uint64_t halves = !colors ? 2 : photometric == "YBR_FULL_422" ? 4 : 6;
+    if (photometric == "YBR_FULL_422" && !facts_.compressed &&
+        (facts_.columns % 2 == 1 || bits != 8)) {
+      return FileError(file_,
+                       absl::StrCat("has rows of ", facts_.columns, " pixels of ", bits,
+                                    " bits in YBR_FULL_422"),
+                       "an even number of them, of 8 bits, is expected");
+    }
+    const uint64_t wanted = (pixels * facts_.frames * bits * halves / 2 + 7) / 8;
     if (!facts_.compressed) {
       const uint64_t given = facts_.pixels.empty() ? 0 : facts_.pixels[0].second;
       return given < wanted ? CutOff(kPixels, wanted, given) : absl::OkStatus();
@@ -261,6 +315,28 @@ class Walker {
       const auto& [at, length] = facts_.pixels[i];
       if (absl::Status status = CheckPicture(bytes_.substr(at, length)); !status.ok())
         return status;
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckPalette() const {
+    static constexpr const char* kNames[] = {"red", "green", "blue"};
+    for (size_t i = 0; i < 3; ++i) {
+      const auto& [descriptor, entries] = facts_.palette[i];
+      const auto& [at, length] = entries;
+      if (descriptor.size() != 3 || (descriptor[2] != 8 && descriptor[2] != 16)) {
+        return FileError(file_, absl::StrCat("has no palette of ", kNames[i], " that can be read"),
+                         "three numbers (entries, the first, 8 or 16 bits) are expected at "
+                         "(0028,1101) to (0028,1103)");
+      }
+      const uint64_t count = descriptor[0] == 0 ? 65536 : descriptor[0];
+      // Entries of 8 bits may have 16 bits of room.
+      if (length < count || (descriptor[2] == 16 && length < count * 2)) {
+        return FileError(file_,
+                         absl::StrCat("has ", length, " bytes for ", count, " entries of ",
+                                      descriptor[2], " bits in its palette of ", kNames[i]),
+                         "all of them are expected");
+      }
     }
     return absl::OkStatus();
   }
@@ -307,6 +383,35 @@ class Walker {
 };
 
 }  // namespace
+
+bool IsGrey(const DicomFacts& facts) { return absl::StartsWith(facts.photometric, "MONOCHROME"); }
+
+absl::StatusOr<std::optional<SourceFile>> InflateDicom(const SourceFile& file) {
+  if (!LooksLikeDicom(file)) return std::nullopt;
+  const absl::StatusOr<size_t> head = Walker(file).DeflatedFrom();
+  if (!head.ok()) return head.status();
+  if (*head == 0) return std::nullopt;
+  const absl::StatusOr<std::string> rest =
+      Inflate(file, absl::string_view(file.bytes).substr(*head), kMaxDeflated + 1, Deflated::kRaw);
+  if (!rest.ok()) return rest.status();
+  if (rest->size() > kMaxDeflated) {
+    return FileError(file, absl::StrCat("holds more than ", kMaxDeflated, " bytes, compressed"),
+                     "less is read");
+  }
+  SourceFile inflated{.path = file.path, .extension = file.extension, .bytes = {}};
+  inflated.bytes = absl::StrCat(absl::string_view(file.bytes).substr(0, *head), *rest);
+  return inflated;
+}
+
+std::vector<double> DicomNumbers(const std::string& text) {
+  std::vector<double> numbers;
+  for (const absl::string_view word : absl::StrSplit(text, '\\', absl::SkipEmpty())) {
+    double number = 0;
+    if (!absl::SimpleAtod(word, &number) || !std::isfinite(number)) return {};
+    numbers.push_back(number);
+  }
+  return numbers;
+}
 
 bool LooksLikeDicom(const SourceFile& file) {
   return file.bytes.size() > kPreamble + 12 && file.bytes.compare(kPreamble, 4, "DICM") == 0;

@@ -1,17 +1,12 @@
-// DICOM through gdcm.
+// DICOM: which slices there are, and where they lie.
 #include "tools/voxelctl/import/dicom_volume.h"
-
-#include <gdcmImageReader.h>
-#include <gdcmTrace.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <exception>
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -19,8 +14,8 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/dicom_check.h"
+#include "tools/voxelctl/import/dicom_pixels.h"
 #include "tools/voxelctl/import/volume_samples.h"
 
 namespace voxeld::voxelctl {
@@ -42,150 +37,32 @@ Point3 Cross(const Point3& a, const Point3& b) {
 double Dot(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Point3 Times(const Point3& p, double by) { return {p.x * by, p.y * by, p.z * by}; }
 
-// Numbers with backslashes between them.
-std::vector<double> Numbers(const std::string& text) {
-  std::vector<double> numbers;
-  for (const absl::string_view word : absl::StrSplit(text, '\\', absl::SkipEmpty())) {
-    double number = 0;
-    if (!absl::SimpleAtod(word, &number) || !std::isfinite(number)) return {};
-    numbers.push_back(number);
-  }
-  return numbers;
-}
-
-absl::Status Undecoded(const SourceFile& file, absl::string_view why) {
-  return FileError(file, absl::StrCat("its image could not be decoded (", why, ")"),
-                   "the file is damaged or compressed in a way that is not supported");
-}
-
-SampleType TypeOf(const DicomFacts& facts) {
-  switch (facts.bits_allocated) {
-    case 8:
-      return facts.is_signed ? SampleType::kI8 : SampleType::kU8;
-    case 16:
-      return facts.is_signed ? SampleType::kI16 : SampleType::kU16;
-    default:
-      return facts.is_signed ? SampleType::kI32 : SampleType::kU32;
-  }
-}
-
-void PutNumber(std::string* out, uint64_t value, size_t bytes) {
-  for (size_t i = 0; i < bytes; ++i) *out += static_cast<char>(value >> 8 * i);
-}
-
-// An element as every reader takes it.
-void PutElement(std::string* out, uint32_t tag, absl::string_view kind, std::string value) {
-  if (value.size() % 2 == 1) value += kind == "UI" ? '\0' : ' ';
-  PutNumber(out, tag >> 16, 2);
-  PutNumber(out, tag & 0xffff, 2);
-  absl::StrAppend(out, kind);
-  PutNumber(out, value.size(), 2);
-  *out += value;
-}
-
-void PutShort(std::string* out, uint32_t tag, uint64_t value) {
-  std::string bytes;
-  PutNumber(&bytes, value, 2);
-  PutElement(out, tag, "US", std::move(bytes));
-}
-
-// The library ends the program (by its assertions) at elements that are not as they should be. So it gets a file of our own
-// making with nothing in it but what the pixels need, and the compressed fragments.
-std::string Rewritten(const SourceFile& file, const DicomFacts& facts) {
-  std::string meta;
-  PutElement(&meta, 0x00020002, "UI", "1.2.840.10008.5.1.4.1.1.7");
-  PutElement(&meta, 0x00020003, "UI", "1.2.3");
-  PutElement(&meta, 0x00020010, "UI", facts.transfer_syntax);
-  std::string out, size;
-  out.resize(128);
-  out += "DICM";
-  PutNumber(&size, meta.size(), 4);
-  PutElement(&out, 0x00020000, "UL", size);
-  out += meta;
-  PutElement(&out, 0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.7");
-  PutElement(&out, 0x00080018, "UI", "1.2.3");
-  PutShort(&out, 0x00280002, 1);
-  PutElement(&out, 0x00280004, "CS", "MONOCHROME2");
-  PutElement(&out, 0x00280008, "IS", absl::StrCat(facts.frames));
-  PutShort(&out, 0x00280010, facts.rows);
-  PutShort(&out, 0x00280011, facts.columns);
-  PutShort(&out, 0x00280100, facts.bits_allocated);
-  PutShort(&out, 0x00280101, facts.bits_stored);
-  PutShort(&out, 0x00280102, facts.high_bit);
-  PutShort(&out, 0x00280103, facts.is_signed ? 1 : 0);
-  out += std::string("\xe0\x7f\x10\x00OB\0\0\xff\xff\xff\xff", 12);
-  for (size_t i = 0; i < facts.pixels.size(); ++i) {
-    // The table of offsets is left empty: nothing here needs it.
-    const auto [at, length] = i == 0 ? std::pair<size_t, size_t>(0, 0) : facts.pixels[i];
-    out += std::string("\xfe\xff\x00\xe0", 4);
-    PutNumber(&out, length + length % 2, 4);
-    out.append(file.bytes, at, length);
-    if (length % 2 == 1) out += '\0';
-  }
-  return out + std::string("\xfe\xff\xdd\xe0\0\0\0\0", 8);
-}
-
-absl::StatusOr<std::string> Decompress(const SourceFile& file, const DicomFacts& facts,
-                                       uint64_t wanted) {
-  gdcm::Trace::DebugOff();
-  gdcm::Trace::WarningOff();
-  gdcm::Trace::ErrorOff();
-  std::istringstream in(Rewritten(file, facts));
-  gdcm::ImageReader reader;
-  reader.SetStream(in);
-  if (!reader.Read()) return Undecoded(file, "it is none that is known");
-  const gdcm::Image& image = reader.GetImage();
-  if (image.GetBufferLength() != wanted) {
-    return Undecoded(file, absl::StrCat(image.GetBufferLength(), " bytes instead of ", wanted));
-  }
-  std::string pixels(wanted, '\0');
-  if (!image.GetBuffer(pixels.data())) return Undecoded(file, "its pixels are not whole");
-  return pixels;
-}
-
-// Appends the samples of a file that has passed its checks.
-absl::Status Decode(const SourceFile& file, const DicomFacts& facts, Slice* slice,
-                    std::vector<float>* out) {
-  SampleCode code{.type = TypeOf(facts)};
-  const std::vector<double> slope = Numbers(facts.slope), intercept = Numbers(facts.intercept);
-  if (!slope.empty() && slope[0] != 0) code.slope = slope[0];
-  if (!intercept.empty()) code.intercept = intercept[0];
-  slice->size = {facts.columns, facts.rows, facts.frames};
-  const uint64_t wanted = facts.columns * facts.rows * facts.frames * SampleBytes(code.type);
-  if (facts.compressed) {
-    const absl::StatusOr<std::string> pixels =
-        ReadBytesContained(file, [&] { return Decompress(file, facts, wanted); });
-    if (!pixels.ok()) return pixels.status();
-    DecodeSamples(*pixels, code, out);
-  } else {
-    DecodeSamples(absl::string_view(file.bytes).substr(facts.pixels[0].first, wanted), code, out);
-  }
-  const std::vector<double> spacing = Numbers(facts.spacing), o = Numbers(facts.orientation),
-                            thickness = Numbers(facts.slice_thickness);
+// Where a file's pixels lie.
+Slice Locate(const DicomFacts& facts) {
+  Slice slice;
+  slice.size = {facts.columns, facts.rows, facts.frames};
+  const std::vector<double> spacing = DicomNumbers(facts.spacing),
+                            o = DicomNumbers(facts.orientation),
+                            thickness = DicomNumbers(facts.slice_thickness),
+                            apart = DicomNumbers(facts.slices_apart),
+                            offsets = DicomNumbers(facts.frame_offsets);
   // Of rows first, which is from one row down to the next.
-  if (spacing.size() == 2) slice->spacing = {spacing[1], spacing[0]};
-  if (!thickness.empty()) slice->between = thickness[0];
-  if (o.size() == 6) slice->right = {o[0], o[1], o[2]}, slice->down = {o[3], o[4], o[5]};
+  if (spacing.size() == 2) slice.spacing = {spacing[1], spacing[0]};
+  if (!thickness.empty()) slice.between = thickness[0];
+  if (!apart.empty()) slice.between = apart[0];
+  if (offsets.size() > 1) slice.between = offsets[1] - offsets[0];
+  if (o.size() == 6) slice.right = {o[0], o[1], o[2]}, slice.down = {o[3], o[4], o[5]};
   const auto place = [&facts](size_t i) {
-    return i < facts.positions.size() ? Numbers(facts.positions[i]) : std::vector<double>();
+    return i < facts.positions.size() ? DicomNumbers(facts.positions[i]) : std::vector<double>();
   };
   const std::vector<double> p = place(0), q = place(1);
-  if (p.size() == 3) slice->origin = {p[0], p[1], p[2]};
+  if (p.size() == 3) slice.origin = {p[0], p[1], p[2]};
   if (p.size() == 3 && q.size() == 3 && facts.frames > 1) {
     const double along =
-        Dot(Cross(slice->right, slice->down), {q[0] - p[0], q[1] - p[1], q[2] - p[2]});
-    if (along != 0) slice->between = along;
+        Dot(Cross(slice.right, slice.down), {q[0] - p[0], q[1] - p[1], q[2] - p[2]});
+    if (along != 0) slice.between = along;
   }
-  return absl::OkStatus();
-}
-
-absl::Status DecodeSafely(const SourceFile& file, const DicomFacts& facts, Slice* slice,
-                          std::vector<float>* out) {
-  try {
-    return Decode(file, facts, slice, out);
-  } catch (const std::exception& error) {
-    return Undecoded(file, error.what());
-  }
+  return slice;
 }
 
 absl::StatusOr<Model> Finish(const SourceFile& file, const DicomFacts& facts, const Slice& first,
@@ -199,8 +76,8 @@ absl::StatusOr<Model> Finish(const SourceFile& file, const DicomFacts& facts, co
        Times(Cross(first.right, first.down), length(between))},
       &volume);
   if (!status.ok()) return status;
-  const std::vector<double> center = Numbers(facts.window_center),
-                            width = Numbers(facts.window_width);
+  const std::vector<double> center = DicomNumbers(facts.window_center),
+                            width = DicomNumbers(facts.window_width);
   if (!center.empty() && !width.empty() && width[0] > 0) {
     volume.window = {center[0] - width[0] / 2, center[0] + width[0] / 2};
   }
@@ -219,10 +96,19 @@ struct Found {
   Point3 right = {1, 0, 0}, down = {0, 1, 0};
 };
 
-Found Locate(const std::string& path, const DicomFacts& facts, size_t number) {
+// The file, without compression of the whole.
+absl::StatusOr<SourceFile> ReadPlain(const std::string& path) {
+  absl::StatusOr<SourceFile> file = ReadSourceFile(path);
+  if (!file.ok()) return file;
+  absl::StatusOr<std::optional<SourceFile>> inflated = InflateDicom(*file);
+  if (!inflated.ok()) return inflated.status();
+  return *inflated ? **std::move(inflated) : file;
+}
+
+Found LocateSlice(const std::string& path, const DicomFacts& facts, size_t number) {
   Found found{.path = path, .along = static_cast<double>(number)};
-  const std::vector<double> o = Numbers(facts.orientation),
-                            p = Numbers(facts.positions.empty() ? "" : facts.positions[0]);
+  const std::vector<double> o = DicomNumbers(facts.orientation),
+                            p = DicomNumbers(facts.positions.empty() ? "" : facts.positions[0]);
   if (o.size() == 6) found.right = {o[0], o[1], o[2]}, found.down = {o[3], o[4], o[5]};
   if (o.size() == 6 && p.size() == 3) {
     found.along = Dot(Cross(found.right, found.down), {p[0], p[1], p[2]});
@@ -233,13 +119,15 @@ Found Locate(const std::string& path, const DicomFacts& facts, size_t number) {
 }  // namespace
 
 absl::StatusOr<Model> ReadDicomVolume(const SourceFile& file) {
-  const absl::StatusOr<DicomFacts> facts = CheckDicom(file);
+  const absl::StatusOr<std::optional<SourceFile>> inflated = InflateDicom(file);
+  if (!inflated.ok()) return inflated.status();
+  const SourceFile& plain = *inflated ? **inflated : file;
+  const absl::StatusOr<DicomFacts> facts = CheckDicom(plain);
   if (!facts.ok()) return facts.status();
   SampledVolume volume;
-  Slice slice;
-  const absl::Status status = DecodeSafely(file, *facts, &slice, &volume.samples);
-  if (!status.ok()) return status;
-  return Finish(file, *facts, slice, slice.size[2], slice.between, std::move(volume));
+  if (absl::Status status = DecodeDicomPixels(plain, *facts, &volume); !status.ok()) return status;
+  const Slice slice = Locate(*facts);
+  return Finish(plain, *facts, slice, slice.size[2], slice.between, std::move(volume));
 }
 
 absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
@@ -262,7 +150,7 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
   size_t others = 0;
   absl::Status refused;
   for (size_t i = 0; i < paths.size(); ++i) {
-    const absl::StatusOr<SourceFile> file = ReadSourceFile(paths[i]);
+    const absl::StatusOr<SourceFile> file = ReadPlain(paths[i]);
     if (!file.ok() || !LooksLikeDicom(*file)) {
       ++others;
       continue;
@@ -273,7 +161,7 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
       ++others;
       continue;
     }
-    series[facts->series].push_back(Locate(paths[i], *facts, i));
+    series[facts->series].push_back(LocateSlice(paths[i], *facts, i));
   }
   if (series.empty()) {
     if (!refused.ok()) return refused;
@@ -296,7 +184,7 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
   Slice first;
   DicomFacts first_facts;
   for (size_t i = 0; i < slices.size(); ++i) {
-    const absl::StatusOr<SourceFile> file = ReadSourceFile(slices[i].path);
+    const absl::StatusOr<SourceFile> file = ReadPlain(slices[i].path);
     if (!file.ok()) return file.status();
     const absl::StatusOr<DicomFacts> facts = CheckDicom(*file);
     if (!facts.ok()) return facts.status();
@@ -304,9 +192,7 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
       const std::array<uint64_t, 3> size = {facts->columns, facts->rows, slices.size()};
       if (absl::Status status = CheckVolumeSize(folder, size); !status.ok()) return status;
     }
-    Slice slice;
-    if (absl::Status status = DecodeSafely(*file, *facts, &slice, &volume.samples); !status.ok())
-      return status;
+    const Slice slice = Locate(*facts);
     if (i == 0) first = slice, first_facts = *facts;
     if (slice.size != first.size || slice.size[2] != 1 ||
         Dot(slices[i].right, slices[0].right) < 0.999 ||
@@ -317,6 +203,8 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
                        absl::StrCat("single slices of ", first.size[0], " by ", first.size[1],
                                     " pixels, all alike, are expected"));
     }
+    if (absl::Status status = DecodeDicomPixels(*file, *facts, &volume); !status.ok())
+      return status;
   }
   std::string note;
   const double between =

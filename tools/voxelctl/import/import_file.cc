@@ -24,7 +24,7 @@
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
 #include "tools/voxelctl/import/raw_volume.h"
-#include "tools/voxelctl/import/svg_lines.h"
+#include "tools/voxelctl/import/svg_drawing.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
 #include "tools/voxelctl/text/escape.h"
@@ -83,10 +83,11 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
     return ReadMap(file, options.globe);
   if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
     return ReadNiftiVolume(file);
+  if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
   if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
-  if (extension == "svg") return ReadSvgLines(file);
+  if (extension == "svg") return ReadSvgDrawing(file);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
   if (NewMeshImporter()->Reads(extension))
@@ -99,7 +100,8 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
       "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
       ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
       ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
-      ".nii.gz, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings (.svg)");
+      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings "
+      "(.svg)");
 }
 
 // What every reader promises, held to: a slip in a library must not reach the server.
@@ -124,6 +126,10 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
     const uint64_t samples = uint64_t{volume.size[0]} * volume.size[1] * volume.size[2];
     if (samples == 0 || samples != volume.samples.size()) {
       return FileError(file, absl::StrCat("holds ", volume.samples.size(), " samples"),
+                       absl::StrCat("its size makes ", samples));
+    }
+    if (!volume.colors.empty() && volume.colors.size() != samples) {
+      return FileError(file, absl::StrCat("holds ", volume.colors.size(), " colours"),
                        absl::StrCat("its size makes ", samples));
     }
     if (std::none_of(volume.samples.begin(), volume.samples.end(),

@@ -36,7 +36,7 @@ std::unique_ptr<MeshImporter> NewMeshImporter();
 absl::Status CheckMeshFile(const SourceFile& file);
 
 // Reads `path` by its extension, having checked that the contents are of that kind: obj, stl, ply,
-// gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json; nii, nii.gz, nrrd, nhdr, raw, dcm, and folders of
+// gltf, glb; vox; pcd, las, xyz, txt, asc, pts, csv; geojson, topojson, json; nii, nii.gz, hdr, img, nrrd, nhdr, raw, dcm, and folders of
 // DICOM slices; pdb, ent; svg; off, fbx, 3mf, dae, blend, ifc, bvh, and what else assimp reads, in a process of its own
 // (contained.h). Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
 // empty. An error's message begins with the path and says what was found

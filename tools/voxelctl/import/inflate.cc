@@ -10,15 +10,16 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kGzipAlone = 15 + 16;  // zlib's word for: a header of gzip, the largest window
+// zlib's words for: the largest window; a header of gzip, or none.
+constexpr int kGzipAlone = 15 + 16, kNoHeader = -15;
 constexpr uint64_t kStep = 1 << 20;
 
 }  // namespace
 
-absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed,
-                                    uint64_t most) {
+absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed, uint64_t most,
+                                    Deflated kind) {
   z_stream stream = {};
-  if (inflateInit2(&stream, kGzipAlone) != Z_OK) {
+  if (inflateInit2(&stream, kind == Deflated::kGzip ? kGzipAlone : kNoHeader) != Z_OK) {
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": no memory to decompress it"));
   }
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
@@ -40,7 +41,9 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
     out.resize(before + room - stream.avail_out);
     if (result == Z_STREAM_END) {
       // Some programs write several streams, one after another.
-      if (packed.size() - read < 2 || packed.substr(read, 2) != "\x1f\x8b") break;
+      if (kind == Deflated::kRaw || packed.size() - read < 2 ||
+          packed.substr(read, 2) != "\x1f\x8b")
+        break;
       if (inflateReset(&stream) != Z_OK) break;
       continue;
     }

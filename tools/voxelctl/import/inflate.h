@@ -10,9 +10,11 @@
 
 namespace voxeld::voxelctl {
 
+enum class Deflated : uint8_t { kGzip, kRaw };  // kRaw: without a header, and one stream
+
 // The first `most` bytes of what `packed`, a part of `file`, decompresses to, or all if it is fewer. However much more there
 // would be, no more memory than for these is taken. InvalidArgument if it is damaged before that.
-absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed,
-                                    uint64_t most);
+absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed, uint64_t most,
+                                    Deflated kind = Deflated::kGzip);
 
 }  // namespace voxeld::voxelctl

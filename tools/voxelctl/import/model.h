@@ -32,12 +32,17 @@ struct Part {
   std::vector<uint32_t> indices;
   // Diameter of points, which are balls then, and of segments, which have round ends; in the positions' unit. 0: one voxel.
   double thickness = 0;
+  // Where parts of several levels cover one place the highest is seen; at most kMostLevel.
+  uint8_t level = 0;
 };
+
+inline constexpr uint8_t kMostLevel = 126;
 
 // Numbers at the centres of equal cells, that along the first axis side by side, then rows along the second.
 struct SampledVolume {
   std::array<uint32_t, 3> size = {};  // each at least 1
   std::vector<float> samples;         // finite, or not a number where there is nothing
+  std::vector<Rgb> colors;  // of each, black where there is nothing; empty: there are numbers alone
   // Of the whole: bit 0 of the index is for the far end of the first axis, bit 1 for that of the second, bit 2 of the third.
   std::array<Point3, 8> corners = {};
   // What the file says is to be seen, from dark to bright.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -12,10 +13,12 @@
 #include <utility>
 #include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
 #include "tools/voxelctl/import/inflate.h"
 #include "tools/voxelctl/import/volume_samples.h"
@@ -83,7 +86,7 @@ class Reader {
   explicit Reader(const SourceFile& file) : file_(file) {}
 
   absl::StatusOr<Model> Read() {
-    for (const auto step : {&Reader::ReadHeader, &Reader::ReadSizes, &Reader::ReadCode}) {
+    for (const auto step : {&Reader::ReadHeader, &Reader::ReadCode, &Reader::ReadSizes}) {
       if (absl::Status status = (this->*step)(); !status.ok()) return status;
     }
     SampledVolume volume;
@@ -92,12 +95,17 @@ class Reader {
     if (!beside.ok()) return beside.status();
     const absl::string_view data =
         beside->bytes.empty() ? absl::string_view(file_.bytes).substr(body_) : beside->bytes;
-    if (absl::Status status = ReadSamples(data, &volume.samples); !status.ok()) return status;
+    if (absl::Status status = ReadSamples(data, &volume); !status.ok()) return status;
     if (absl::Status status = Place(&volume); !status.ok()) return status;
     Model model;
     model.path = file_.path;
     model.format = "NRRD";
     model.up = Up::kZ;
+    if (volume.colors.empty() && each_ > 1)
+      model.note = absl::StrCat(file_.path, ": the first of the ", each_,
+                                " numbers of each sample is shown");
+    if (volumes_ > 1)
+      model.note = absl::StrCat(file_.path, ": the first of its ", volumes_, " volumes is shown");
     model.volumes.push_back(std::move(volume));
     return model;
   }
@@ -133,8 +141,12 @@ class Reader {
       const size_t colon = line.find(": ");
       // "key:=value" says nothing about the samples.
       if (ended || line.front() == '#' || colon == absl::string_view::npos) continue;
-      fields_[Plain(line.substr(0, colon))] =
-          std::string(absl::StripAsciiWhitespace(line.substr(colon + 2)));
+      const std::string name = Plain(line.substr(0, colon));
+      std::string& value = fields_[name];
+      value = std::string(absl::StripAsciiWhitespace(line.substr(colon + 2)));
+      // Vectors are words here, whatever blanks are in them.
+      if (absl::StartsWith(name, "space"))
+        absl::StrReplaceAll({{", ", ","}, {"( ", "("}, {" )", ")"}}, &value);
     }
     if (!ended && Field("datafile").empty()) {
       return FileError(file_, "has a header that does not end",
@@ -144,21 +156,58 @@ class Reader {
     return absl::OkStatus();
   }
 
+  // One axis more than three, or one that has no direction, counts what is at each place, if it is the first, or volumes.
   absl::Status ReadSizes() {
-    if (!absl::SimpleAtoi(Field("dimension"), &dimension_) || dimension_ < 2 || dimension_ > 3) {
-      return WrongField("dimension", "2 or 3 axes of numbers are read");
+    size_t dimension = 0;
+    if (!absl::SimpleAtoi(Field("dimension"), &dimension) || dimension < 2 || dimension > 4) {
+      return WrongField("dimension", "2 to 4 axes are read");
     }
-    const std::vector<absl::string_view> sizes =
-        absl::StrSplit(Field("sizes"), ' ', absl::SkipEmpty());
-    if (sizes.size() != static_cast<size_t>(dimension_)) {
-      return WrongField("sizes", absl::StrCat(dimension_, " numbers are expected"));
+    const std::vector<absl::string_view> words = Words("sizes");
+    std::vector<uint64_t> sizes(dimension);
+    bool good = words.size() == dimension;
+    for (size_t axis = 0; axis < dimension && good; ++axis)
+      good = absl::SimpleAtoi(words[axis], &sizes[axis]);
+    if (!good) return WrongField("sizes", absl::StrCat(dimension, " numbers are expected"));
+    const absl::StatusOr<std::optional<size_t>> extra = ExtraAxis(dimension);
+    if (!extra.ok()) return extra.status();
+    for (size_t axis = 0; axis < dimension; ++axis) {
+      if (*extra != axis) axes_.push_back(axis);
     }
-    for (size_t axis = 0; axis < sizes.size(); ++axis) {
-      if (!absl::SimpleAtoi(sizes[axis], &size_[axis])) {
-        return WrongField("sizes", absl::StrCat(dimension_, " numbers are expected"));
-      }
+    for (size_t i = 0; i < axes_.size(); ++i) size_[i] = sizes[axes_[i]];
+    if (absl::Status status = CheckVolumeSize(file_, size_); !status.ok()) return status;
+    if (!extra->has_value()) return absl::OkStatus();
+    uint64_t& count = **extra == 0 ? each_ : volumes_;
+    count = sizes[**extra];
+    if (count >= 1 && count <= kMaxModelSamples / (size_[0] * size_[1] * size_[2]))
+      return absl::OkStatus();
+    return WrongField("sizes", absl::StrCat("1 to ", kMaxModelSamples, " numbers in all are read"));
+  }
+
+  std::vector<absl::string_view> Words(absl::string_view field) const {
+    return absl::StrSplit(Field(field), absl::ByAnyChar(" \t"), absl::SkipEmpty());
+  }
+
+  // Which one says nothing of a place; nothing if there is none.
+  absl::StatusOr<std::optional<size_t>> ExtraAxis(size_t dimension) const {
+    const std::vector<absl::string_view> directions = Words("spacedirections"),
+                                         kinds = Words("kinds");
+    std::vector<size_t> found;
+    for (size_t axis = 0; axis < dimension; ++axis) {
+      const bool no_direction = axis < directions.size() && directions[axis] == "none";
+      const bool other_kind =
+          directions.empty() && axis < kinds.size() && !kinds[axis].empty() &&
+          !absl::c_linear_search(
+              std::initializer_list<absl::string_view>{"domain", "space", "???", "none"},
+              absl::AsciiStrToLower(kinds[axis]));
+      if (no_direction || other_kind) found.push_back(axis);
     }
-    return CheckVolumeSize(file_, size_);
+    if (found.empty() && dimension == 4) found.push_back(3);
+    if (found.empty()) return std::nullopt;
+    if (found.size() == 1 && dimension > 2 && (found[0] == 0 || found[0] == dimension - 1))
+      return found[0];
+    return WrongField(
+        directions.empty() ? "kinds" : "spacedirections",
+        "two or three axes of places, and one more at the most, the first or the last, are read");
   }
 
   absl::Status ReadCode() {
@@ -214,16 +263,26 @@ class Reader {
     return absl::OkStatus();
   }
 
-  absl::Status ReadSamples(absl::string_view data, std::vector<float>* out) const {
-    const uint64_t samples = size_[0] * size_[1] * size_[2];
+  // Bytes of three or four, red, green and blue, whatever the axis is called, if it says something of colours.
+  bool AreColors() const {
+    const std::vector<absl::string_view> kinds = Words("kinds");
+    const std::string kind = kinds.empty() ? "" : absl::AsciiStrToLower(kinds[0]);
+    return code_.type == SampleType::kU8 && encoding_ != "ascii" &&
+           absl::StrContains(kind, "color") && (each_ == 3 || each_ == 4);
+  }
+
+  absl::Status ReadSamples(absl::string_view data, SampledVolume* volume) const {
+    std::vector<float>* const out = &volume->samples;
+    // Of the first volume.
+    const uint64_t samples = size_[0] * size_[1] * size_[2] * each_;
     const uint64_t wanted = samples * SampleBytes(code_.type);
     if (encoding_ == "gzip") {
       const absl::StatusOr<std::string> all = Inflate(file_, data, wanted);
       if (!all.ok()) return all.status();
-      return Take(*all, wanted, out);
+      return Take(*all, wanted, volume);
     }
-    if (absl::Status status = Skip(&data, wanted); !status.ok()) return status;
-    if (encoding_ == "raw") return Take(data, wanted, out);
+    if (absl::Status status = Skip(&data, wanted * volumes_); !status.ok()) return status;
+    if (encoding_ == "raw") return Take(data, wanted, volume);
     while (out->size() < samples) {
       const size_t from = std::min(data.find_first_not_of(" \t\r\n,"), data.size());
       data.remove_prefix(from);
@@ -240,19 +299,32 @@ class Reader {
       out->push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());
       data.remove_prefix(word.size());
     }
-    if (out->size() == samples) return absl::OkStatus();
-    return FileError(file_, absl::StrCat("has ", out->size(), " samples of ", samples),
-                     "the file is truncated");
+    if (out->size() != samples) {
+      return FileError(file_, absl::StrCat("has ", out->size(), " samples of ", samples),
+                       "the file is truncated");
+    }
+    KeepFirstOfEach(out);
+    return absl::OkStatus();
   }
 
-  absl::Status Take(absl::string_view data, uint64_t wanted, std::vector<float>* out) const {
+  void KeepFirstOfEach(std::vector<float>* samples) const {
+    for (size_t i = 0; i * each_ < samples->size(); ++i) (*samples)[i] = (*samples)[i * each_];
+    samples->resize(samples->size() / each_);
+  }
+
+  absl::Status Take(absl::string_view data, uint64_t wanted, SampledVolume* volume) const {
     if (data.size() < wanted) {
       return FileError(file_,
                        absl::StrCat("has ", data.size(), " bytes of samples; ", size_[0], " by ",
                                     size_[1], " by ", size_[2], " take ", wanted),
                        "the file is truncated");
     }
-    DecodeSamples(data.substr(0, wanted), code_, out);
+    if (AreColors()) {
+      DecodeColors(data.substr(0, wanted), each_, volume);
+      return absl::OkStatus();
+    }
+    DecodeSamples(data.substr(0, wanted), code_, &volume->samples);
+    KeepFirstOfEach(&volume->samples);
     return absl::OkStatus();
   }
 
@@ -273,30 +345,24 @@ class Reader {
   absl::Status Place(SampledVolume* volume) const {
     std::array<Point3, 3> steps = {Point3{1, 0, 0}, Point3{0, 1, 0}, Point3{0, 0, 1}};
     Point3 first;
-    if (!Field("spacedirections").empty()) {
-      size_t axis = 0;
-      for (const absl::string_view word :
-           absl::StrSplit(Field("spacedirections"), ' ', absl::SkipEmpty())) {
-        const std::optional<Point3> step = Vector(word);
-        if (!step || axis >= static_cast<size_t>(dimension_)) {
+    const std::vector<absl::string_view> directions = Words("spacedirections"),
+                                         spacings = Words("spacings");
+    for (size_t i = 0; i < axes_.size(); ++i) {
+      if (!directions.empty()) {
+        const std::optional<Point3> step =
+            axes_[i] < directions.size() ? Vector(directions[axes_[i]]) : std::nullopt;
+        if (!step) {
           return WrongField("spacedirections", "a vector for each axis is expected, as (0,0,1)");
         }
-        steps[axis++] = *step;
-      }
-      if (axis != static_cast<size_t>(dimension_)) {
-        return WrongField("spacedirections", "a vector for each axis is expected, as (0,0,1)");
-      }
-    } else if (!Field("spacings").empty()) {
-      const std::vector<absl::string_view> words =
-          absl::StrSplit(Field("spacings"), ' ', absl::SkipEmpty());
-      double* const lengths[] = {&steps[0].x, &steps[1].y, &steps[2].z};
-      for (size_t axis = 0; axis < std::min<size_t>(words.size(), 3); ++axis) {
+        steps[i] = *step;
+      } else if (axes_[i] < spacings.size()) {
         double length = 0;
-        if (!absl::SimpleAtod(words[axis], &length)) {
+        if (!absl::SimpleAtod(spacings[axes_[i]], &length)) {
           return WrongField("spacings", "a number for each axis is expected");
         }
         // "nan": not known.
-        if (std::isfinite(length) && length != 0) *lengths[axis] = length;
+        double* const lengths[] = {&steps[0].x, &steps[1].y, &steps[2].z};
+        if (std::isfinite(length) && length != 0) *lengths[i] = length;
       }
     }
     if (!Field("spaceorigin").empty()) {
@@ -307,8 +373,9 @@ class Reader {
     // To the patient's left, back and head: the viewer stands before the face, on the side of -y.
     const std::string space = Plain(Field("space"));
     const bool right = absl::StartsWith(space, "right") && absl::StrContains(space, "superior");
-    const bool anterior = absl::StrContains(space, "anterior") || space == "ras" || space == "las";
-    const double x = right || space == "ras" ? -1 : 1, y = anterior ? -1 : 1;
+    const bool anterior = absl::StrContains(space, "anterior") || absl::StartsWith(space, "ras") ||
+                          absl::StartsWith(space, "las");
+    const double x = right || absl::StartsWith(space, "ras") ? -1 : 1, y = anterior ? -1 : 1;
     const auto turned = [x, y](const Point3& p) { return Point3{x * p.x, y * p.y, p.z}; };
     return PlaceVolume(file_, turned(first), {turned(steps[0]), turned(steps[1]), turned(steps[2])},
                        volume);
@@ -317,7 +384,8 @@ class Reader {
   const SourceFile& file_;
   std::map<std::string, std::string, std::less<>> fields_;  // by Plain()
   size_t body_ = 0;
-  int dimension_ = 3;
+  std::vector<size_t> axes_;  // of places, in the file's counting
+  uint64_t each_ = 1, volumes_ = 1;
   std::array<uint64_t, 3> size_ = {1, 1, 1};
   SampleCode code_;
   std::string encoding_;

@@ -42,6 +42,7 @@ struct Header {
 };
 
 constexpr uint64_t kMostPointBytes = 4096;
+constexpr uint64_t kMostExpanded = 100;  // times; LZF makes 264 bytes of 3 at the most
 
 using Words = std::vector<absl::string_view>;
 
@@ -63,7 +64,7 @@ absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, H
       if (!take(words[i + 1], &out->fields[i])) {
         return Wrong(file, line,
                      absl::StrCat("has ", key, " \"", EscapeForTerminal(words[i + 1]), "\""),
-                     "SIZE is 1, 2, 4 or 8, TYPE I, U or F, COUNT a number");
+                     "SIZE is 1, 2, 4 or 8, TYPE I, U or F, COUNT a number from 1 on");
       }
     }
     return absl::OkStatus();
@@ -86,7 +87,8 @@ absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, H
   }
   if (key == "COUNT") {
     return each([](absl::string_view word, Field* field) {
-      return absl::SimpleAtoi(word, &field->count) && field->count <= kMostPointBytes;
+      return absl::SimpleAtoi(word, &field->count) && field->count >= 1 &&
+             field->count <= kMostPointBytes;
     });
   }
   uint64_t* const number = key == "WIDTH"    ? width
@@ -280,7 +282,8 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const Header& hea
     std::memcpy(&packed, body.data(), 4);
     std::memcpy(&whole, body.data() + 4, 4);
   }
-  if (body.size() < 8 || packed > body.size() - 8 || whole != header.points * header.point_bytes) {
+  if (body.size() < 8 || packed > body.size() - 8 || whole != header.points * header.point_bytes ||
+      whole > packed * kMostExpanded) {
     return FileError(
         file,
         absl::StrCat("has ", packed, " compressed bytes of ", whole, " in ", body.size(),

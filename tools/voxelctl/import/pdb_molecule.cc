@@ -27,7 +27,7 @@ constexpr double kFarthest = 1e6;
 constexpr double kSlack = 0.45, kNearest = 0.4;  // of the length of a bond
 constexpr double kCell = 3.6;                    // no bond between elements that have any is longer
 constexpr double kRod = 0.3, kBall = 0.25;       // a rod's diameter; a ball's part of its atom
-constexpr size_t kMostInCell = 1000;             // where ten are to be expected
+constexpr size_t kMostInCell = 100;              // where ten are to be expected
 
 struct Atom {
   Point3 at;

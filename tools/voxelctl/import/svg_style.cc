@@ -16,8 +16,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kInk = 40;  // of the brightest channel
-constexpr size_t kMostRules = 10'000;
+constexpr size_t kMostRules = 10'000, kMostRuleBytes = 4096;
 
 constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
     {"aliceblue", 0xf0f8ff},
@@ -169,6 +168,13 @@ constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
     {"yellowgreen", 0x9acd32},
 };
 
+void AddRule(absl::string_view selector, absl::string_view declarations, CssRules* rules) {
+  std::string& rule = (*rules)[std::string(selector)];
+  // Many selectors of one rule, and many rules of one selector, must not multiply.
+  if (rule.size() + declarations.size() <= kMostRuleBytes)
+    absl::StrAppend(&rule, ";", declarations);
+}
+
 Rgb FromNumber(uint32_t rgb) {
   return {static_cast<uint8_t>(rgb >> 16), static_cast<uint8_t>(rgb >> 8),
           static_cast<uint8_t>(rgb)};
@@ -205,14 +211,32 @@ std::optional<Rgb> ParseCssColor(absl::string_view text) {
   return std::nullopt;
 }
 
+SvgStyle SvgStyle::Inherited() const {
+  SvgStyle inner = *this;
+  inner.outer_opacity *= inner.opacity;
+  inner.opacity = 1;
+  return inner;
+}
+
 void SvgStyle::Set(absl::string_view property, absl::string_view value) {
   value = absl::StripAsciiWhitespace(value.substr(0, value.find('!')));
   if (value.empty() || value == "inherit") return;
+  const auto share = [value](double* out) {
+    absl::string_view rest = value;
+    double number = 0;
+    if (!TakeNumber(&rest, &number)) return;
+    *out = std::clamp(rest == "%" ? number / 100 : number, 0.0, 1.0);
+  };
   if (property == "fill") fill = std::string(value);
   if (property == "stroke") stroke = std::string(value);
   if (property == "color") color = std::string(value);
-  if (property == "display") hidden |= value == "none";
-  if (property == "visibility") hidden |= value == "hidden" || value == "collapse";
+  if (property == "stop-color") stop_color = std::string(value);
+  if (property == "fill-rule") even_odd = value == "evenodd";
+  if (property == "fill-opacity") share(&fill_opacity);
+  if (property == "stroke-opacity") share(&stroke_opacity);
+  if (property == "opacity") share(&opacity);
+  if (property == "display") displayed = value != "none";
+  if (property == "visibility") visible = value == "visible";
 }
 
 void SvgStyle::SetAll(absl::string_view declarations) {
@@ -221,17 +245,6 @@ void SvgStyle::SetAll(absl::string_view declarations) {
     if (colon == absl::string_view::npos) continue;
     Set(absl::StripAsciiWhitespace(declaration.substr(0, colon)), declaration.substr(colon + 1));
   }
-}
-
-std::optional<Rgb> SvgStyle::LineColor() const {
-  for (absl::string_view paint : {absl::string_view(stroke), absl::string_view(fill)}) {
-    if (paint == "none" || paint == "transparent") continue;
-    if (absl::EqualsIgnoreCase(paint, "currentcolor")) paint = color;
-    // Gradients and patterns have no colour of their own.
-    const Rgb rgb = ParseCssColor(paint).value_or(Rgb{255, 255, 255});
-    return std::max({rgb.r, rgb.g, rgb.b}) < kInk ? Rgb{255, 255, 255} : rgb;
-  }
-  return std::nullopt;
 }
 
 void AddCssRules(absl::string_view sheet, CssRules* rules) {
@@ -247,8 +260,7 @@ void AddCssRules(absl::string_view sheet, CssRules* rules) {
     const size_t open = rest.find('{'), close = rest.find('}', std::min(open, rest.size()));
     if (open == absl::string_view::npos || close == absl::string_view::npos) return;
     for (const absl::string_view selector : absl::StrSplit(rest.substr(0, open), ','))
-      absl::StrAppend(&(*rules)[std::string(absl::StripAsciiWhitespace(selector))], ";",
-                      rest.substr(open + 1, close - open - 1));
+      AddRule(absl::StripAsciiWhitespace(selector), rest.substr(open + 1, close - open - 1), rules);
     rest.remove_prefix(close + 1);
   }
 }

@@ -94,6 +94,21 @@ void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<
   }
 }
 
+void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* volume) {
+  const size_t count = bytes.size() / bytes_each;
+  volume->colors.reserve(volume->colors.size() + count);
+  volume->samples.reserve(volume->samples.size() + count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto at = [&](size_t k) { return static_cast<uint8_t>(bytes[i * bytes_each + k]); };
+    const int alpha = bytes_each == 4 ? at(3) : 255;
+    const auto channel = [&](size_t k) { return static_cast<uint8_t>(at(k) * alpha / 255); };
+    const Rgb color = {channel(0), channel(1), channel(2)};
+    volume->colors.push_back(color);
+    volume->samples.push_back(
+        static_cast<float>(0.299 * color.r + 0.587 * color.g + 0.114 * color.b));
+  }
+}
+
 absl::Status PlaceVolume(const SourceFile& file, const Point3& first,
                          const std::array<Point3, 3>& steps, SampledVolume* volume) {
   const auto& [a, b, c] = steps;

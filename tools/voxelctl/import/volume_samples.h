@@ -31,6 +31,10 @@ struct SampleCode {
 // As many as `bytes` holds whole, behind those of `out`. What is not finite becomes not a number.
 void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<float>* out);
 
+// Colours of 3 bytes each (r g b), or of 4, the last of which says how opaque it is, behind those of `volume`; their brightness (0 to
+// 255, by ITU-R BT.601) as samples.
+void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* volume);
+
 // Where a volume lies: the centre of its first sample, and from one to the next along each axis. Few layers are made
 // thick enough to be seen, a twentieth of the greatest length together.
 // InvalidArgument if that is not finite, or spans nothing.

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/flat_hash_set.h"
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/import/vox_chunks.h"
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr int kMostDepth = 64;
 constexpr uint64_t kMostVisits = 1'000'000;
+constexpr size_t kSparse = 64;  // cells for each voxel
 
 using Cell = std::array<int64_t, 3>;
 
@@ -92,19 +94,34 @@ class Builder {
       return FileError(file_, absl::StrCat("refers to model ", number),
                        absl::StrCat("it has ", scene_.grids.size()));
     }
+    if (++visits_ > kMostVisits) {
+      return FileError(file_, absl::StrCat("shows more than ", kMostVisits, " models"),
+                       "take a part of it");
+    }
     const VoxGrid& grid = scene_.grids[static_cast<size_t>(number)];
     const auto index = [&grid](uint32_t x, uint32_t y, uint32_t z) {
       return (size_t{z} * grid.size[1] + y) * grid.size[0] + x;
     };
-    std::vector<bool> filled(index(0, 0, grid.size[2]));
-    for (const VoxVoxel& v : grid.voxels) filled[index(v.x, v.y, v.z)] = true;
+    // Few voxels in many cells must not cost what the cells do: a model may be shown many times.
+    const size_t cells = index(0, 0, grid.size[2]);
+    const bool dense = grid.voxels.size() >= cells / kSparse;
+    std::vector<bool> all(dense ? cells : 0);
+    absl::flat_hash_set<size_t> some;
+    for (const VoxVoxel& v : grid.voxels) {
+      if (dense) {
+        all[index(v.x, v.y, v.z)] = true;
+      } else {
+        some.insert(index(v.x, v.y, v.z));
+      }
+    }
+    const auto is_filled = [&](size_t at) { return dense ? all[at] : some.contains(at); };
     for (const VoxVoxel& v : grid.voxels) {
       const std::array<uint32_t, 3> cell = {v.x, v.y, v.z};
       for (int axis = 0; axis < 3; ++axis) {
         for (const int side : {0, 1}) {
           std::array<uint32_t, 3> next = cell;
           next[axis] += side == 1 ? 1 : -1;  // wraps beyond the first, and is beyond the last then
-          if (next[axis] < grid.size[axis] && filled[index(next[0], next[1], next[2])]) continue;
+          if (next[axis] < grid.size[axis] && is_filled(index(next[0], next[1], next[2]))) continue;
           if (absl::Status status = AddFace(grid, cell, axis, side, place, scene_.palette[v.color]);
               !status.ok()) {
             return status;

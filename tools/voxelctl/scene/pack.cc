@@ -1,6 +1,7 @@
 #include "tools/voxelctl/scene/pack.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -130,8 +131,9 @@ class Packer {
     return absl::OkStatus();
   }
 
-  absl::Status AddVolume(const SampledVolume& volume, const VolumeLook& look) {
-    absl::StatusOr<PackedVolume> packed = PackVolume(volume, look, limits_);
+  absl::Status AddVolume(const SampledVolume& volume, const VolumeLook& look,
+                         const AssetSink& upload) {
+    absl::StatusOr<PackedVolume> packed = PackVolume(volume, look, limits_, upload);
     if (!packed.ok()) return packed.status();
     sizes_.samples += packed->samples;
     if (sizes_.note.empty()) sizes_.note = packed->note;
@@ -185,7 +187,7 @@ class Packer {
 
 absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& object,
                                        const client::Limits& limits, const ObjectSink& sink,
-                                       const VolumeLook& look) {
+                                       const VolumeLook& look, const AssetSink& upload) {
   Packer packer(object, limits, sink);
   for (const Kind kind : {Kind::kTriangles, Kind::kSegments, Kind::kPoints}) {
     Piece piece(kind, limits);
@@ -202,10 +204,35 @@ absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& ob
     if (!status.ok()) return status;
   }
   for (const SampledVolume& volume : model.volumes) {
-    const absl::Status status = packer.AddVolume(volume, look);
+    const absl::Status status = packer.AddVolume(volume, look, upload);
     if (!status.ok()) return status;
   }
   return packer.Finish();
+}
+
+absl::StatusOr<PackedLevels> PackLevels(Model* model, const std::string& object,
+                                        const client::Limits& limits, const ObjectSink& sink,
+                                        const VolumeLook& look, const AssetSink& upload) {
+  std::map<uint8_t, Model> levels;
+  for (Part& part : std::exchange(model->parts, {}))
+    levels[part.level].parts.push_back(std::move(part));
+  if (levels.empty()) levels[0];
+  levels.begin()->second.volumes = std::exchange(model->volumes, {});
+  PackedLevels packed;
+  for (const auto& [level, content] : levels) {
+    const size_t over = packed.levels.size();
+    const std::string name = over == 0 ? object : absl::StrCat(object, "/over", over);
+    const absl::StatusOr<PackedSizes> sizes = PackObject(content, name, limits, sink, look, upload);
+    if (!sizes.ok()) return sizes.status();
+    packed.levels.push_back({name, sizes->objects});
+    packed.sizes.objects += sizes->objects;
+    packed.sizes.vertices += sizes->vertices;
+    packed.sizes.indices += sizes->indices;
+    packed.sizes.samples += sizes->samples;
+    packed.sizes.bytes += sizes->bytes;
+    if (packed.sizes.note.empty()) packed.sizes.note = sizes->note;
+  }
+  return packed;
 }
 
 }  // namespace voxeld::voxelctl

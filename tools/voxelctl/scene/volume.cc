@@ -93,44 +93,98 @@ Size Factors(const SampledVolume& volume, uint64_t most) {
   return factors;
 }
 
-// Calls `put` with the mean of each cell's numbers, not a number where it has none.
-template <typename Put>
-void ForEachCell(const SampledVolume& volume, const Size& factors, Put put) {
-  const auto& [nx, ny, nz] = volume.size;
+// For each cell calls `begin`, `add` with the index of each of its samples, and `end` with how many they are.
+template <typename Begin, typename Add, typename End>
+void ForEachCell(const Size& size, const Size& factors, Begin begin, Add add, End end) {
+  const auto& [nx, ny, nz] = size;
   for (uint32_t z = 0; z < nz; z += factors[2]) {
     for (uint32_t y = 0; y < ny; y += factors[1]) {
       for (uint32_t x = 0; x < nx; x += factors[0]) {
-        double sum = 0;
-        uint32_t count = 0;
-        for (uint32_t w = z; w < std::min(nz, z + factors[2]); ++w) {
-          for (uint32_t v = y; v < std::min(ny, y + factors[1]); ++v) {
-            const float* row = &volume.samples[(uint64_t{w} * ny + v) * nx];
-            for (uint32_t u = x; u < std::min(nx, x + factors[0]); ++u) {
-              if (!std::isnan(row[u])) sum += row[u], ++count;
-            }
+        const uint32_t r = std::min(nx, x + factors[0]), b = std::min(ny, y + factors[1]),
+                       f = std::min(nz, z + factors[2]);
+        begin();
+        for (uint32_t w = z; w < f; ++w) {
+          for (uint32_t v = y; v < b; ++v) {
+            for (uint32_t u = x; u < r; ++u) add((uint64_t{w} * ny + v) * nx + u);
           }
         }
-        put(count > 0 ? sum / count : std::nan(""));
+        end(uint64_t{r - x} * (b - y) * (f - z));
       }
     }
   }
 }
 
-// Whole numbers from 0 at `low` to their greatest at `high`.
+// The mean of each cell's numbers, as whole numbers from 0 at `low`, or where there is none, to their greatest at `high`.
 template <typename T>
 std::vector<T> Quantise(const SampledVolume& volume, const Size& factors, uint64_t count,
                         double low, double high) {
   std::vector<T> out;
   out.reserve(count);
   constexpr double kTop = static_cast<T>(~T{0});
-  ForEachCell(volume, factors, [&](double v) {
-    const double share = std::isnan(v) ? 0 : std::clamp((v - low) / (high - low), 0.0, 1.0);
-    out.push_back(static_cast<T>(std::lround(share * kTop)));
-  });
+  double sum = 0;
+  uint32_t numbers = 0;
+  ForEachCell(
+      volume.size, factors, [&] { sum = 0, numbers = 0; },
+      [&](uint64_t i) {
+        const float v = volume.samples[i];
+        if (!std::isnan(v)) sum += v, ++numbers;
+      },
+      [&](uint64_t) {
+        const double v = numbers > 0 ? sum / numbers : low;
+        const double share = std::clamp((v - low) / (high - low), 0.0, 1.0);
+        out.push_back(static_cast<T>(std::lround(share * kTop)));
+      });
+  return out;
+}
+
+// Four bytes of each cell, r g b and 255; 0 where all is black.
+std::vector<uint8_t> Colors(const SampledVolume& volume, const Size& factors, uint64_t count) {
+  std::vector<uint8_t> out;
+  out.reserve(count * 4);
+  std::array<double, 3> sum = {};
+  ForEachCell(
+      volume.size, factors, [&sum] { sum = {}; },
+      [&](uint64_t i) {
+        const Rgb& c = volume.colors[i];
+        sum[0] += c.r, sum[1] += c.g, sum[2] += c.b;
+      },
+      [&](uint64_t cells) {
+        uint8_t brightest = 0;
+        for (const double channel : sum) {
+          out.push_back(static_cast<uint8_t>(std::lround(channel / static_cast<double>(cells))));
+          brightest = std::max(brightest, out.back());
+        }
+        out.push_back(brightest > 0 ? 255 : 0);
+      });
   return out;
 }
 
 client::Vec3 ToClient(const Point3& p) { return {p.x, p.y, p.z}; }
+
+bool AreColors(const SampledVolume& volume, const VolumeLook& look) {
+  return !volume.colors.empty() && !look.level && !look.window && look.colormap.empty();
+}
+
+uint64_t BytesEach(const SampledVolume& volume, const VolumeLook& look) {
+  return look.level ? 2 : AreColors(volume, look) ? 4 : 1;
+}
+
+// What becomes of bytes that go as an asset.
+struct Brought {
+  const AssetSink& upload;
+  absl::Status status;
+};
+
+// The numbers themselves, or the asset that they are now.
+template <typename T>
+client::Array<T> ToArray(std::vector<T> numbers, Brought* brought) {
+  if (brought == nullptr) return client::Array<T>(std::move(numbers));
+  const absl::StatusOr<client::Asset> asset = brought->upload(
+      absl::string_view(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)));
+  if (asset.ok()) return client::Array<T>(*asset);
+  brought->status = asset.status();
+  return client::Array<T>();
+}
 
 }  // namespace
 
@@ -138,14 +192,13 @@ std::array<double, 2> WindowOf(const SampledVolume& volume) {
   return volume.window ? *volume.window : FindWindow(volume.samples, RangeOf(volume.samples));
 }
 
-absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
-                                        const client::Limits& limits) {
-  const uint64_t each = look.level ? 2 : 1;
-  uint64_t bytes = kMostBytes;
-  if (limits.max_message_bytes > 0) bytes = std::min(bytes, limits.max_message_bytes);
-  if (limits.max_uncommitted_bytes > 0) bytes = std::min(bytes, limits.max_uncommitted_bytes);
-  bytes -= std::min(bytes / 2, kMessageOverhead);
-  if (limits.max_indices_per_entity > 0) bytes = std::min(bytes, limits.max_indices_per_entity * 4);
+namespace {
+
+// In so many bytes; `brought`: they go as an asset.
+absl::StatusOr<PackedVolume> PackWithin(const SampledVolume& volume, const VolumeLook& look,
+                                        uint64_t bytes, Brought* brought) {
+  const bool colors = AreColors(volume, look);
+  const uint64_t each = BytesEach(volume, look);
   const Size factors = Factors(volume, bytes / each);
 
   client::Grid grid;
@@ -182,8 +235,8 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
           absl::StrCat("--level is ", *look.level, ", and the samples go from ", range.least,
                        " to ", range.greatest, "; give a level above the least of them"));
     }
-    grid.samples = client::Array<uint16_t>(
-        Quantise<uint16_t>(volume, factors, packed.samples, range.least, range.greatest));
+    grid.samples = ToArray(
+        Quantise<uint16_t>(volume, factors, packed.samples, range.least, range.greatest), brought);
     packed.part.shape = client::Isosurface{
         .grid = std::move(grid),
         .level = (*look.level - range.least) / (range.greatest - range.least) * 65535};
@@ -196,9 +249,14 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
     }
     return packed;
   }
+  if (colors) {
+    grid.samples = ToArray(Colors(volume, factors, packed.samples), brought);
+    packed.part.shape = client::Volume{.grid = std::move(grid), .colors = true, .transfer = {}};
+    return packed;
+  }
   const std::array<double, 2> window = look.window ? *look.window : WindowOf(volume);
-  grid.samples = client::Array<uint8_t>(
-      Quantise<uint8_t>(volume, factors, packed.samples, window[0], window[1]));
+  grid.samples =
+      ToArray(Quantise<uint8_t>(volume, factors, packed.samples, window[0], window[1]), brought);
   client::Transfer transfer;
   transfer.colormap = look.colormap.empty() ? "gray" : look.colormap;
   if (look.colormap.empty()) {
@@ -210,6 +268,43 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
     transfer.opacities = {0, 1};
   }
   packed.part.shape = client::Volume{.grid = std::move(grid), .transfer = std::move(transfer)};
+  return packed;
+}
+
+}  // namespace
+
+absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
+                                        const client::Limits& limits, const AssetSink& upload) {
+  const auto within = [](uint64_t most, uint64_t limit) {
+    return limit > 0 ? std::min(most, limit) : most;
+  };
+  const auto beside_all_else = [](uint64_t most) {
+    return most - std::min(most / 2, kMessageOverhead);
+  };
+  const uint64_t samples =
+      limits.max_indices_per_entity > 0 ? limits.max_indices_per_entity * 4 : UINT64_MAX;
+  const uint64_t message =
+      std::min(samples, beside_all_else(within(within(kMostBytes, limits.max_message_bytes),
+                                               limits.max_uncommitted_bytes)));
+  const uint64_t asset = std::min(
+      samples,
+      within(limits.max_asset_bytes,
+             limits.max_uncommitted_bytes > 0 ? beside_all_else(limits.max_uncommitted_bytes) : 0));
+  const uint64_t wanted = volume.samples.size() * BytesEach(volume, look);
+  if (!upload || wanted <= message || asset <= message)
+    return PackWithin(volume, look, message, nullptr);
+  Brought brought{.upload = upload, .status = {}};
+  absl::StatusOr<PackedVolume> packed = PackWithin(volume, look, asset, &brought);
+  if (brought.status.ok()) return packed;
+  if (absl::IsCancelled(brought.status) || absl::IsUnavailable(brought.status) ||
+      absl::IsDeadlineExceeded(brought.status)) {
+    return brought.status;
+  }
+  packed = PackWithin(volume, look, message, nullptr);
+  if (packed.ok()) {
+    packed->note = absl::StrCat("the server did not take it as an asset (",
+                                brought.status.message(), "); ", packed->note);
+  }
   return packed;
 }
 

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "tools/voxelctl/import/model.h"
 #include "voxeld/client.h"
 
@@ -19,6 +21,9 @@ struct VolumeLook {
   std::optional<double> level;  // the surface there instead
 };
 
+// Brings bytes to the server as an asset.
+using AssetSink = std::function<absl::StatusOr<client::Asset>(absl::string_view bytes)>;
+
 struct PackedVolume {
   client::Part part;
   uint64_t bytes = 0;    // about, on the wire
@@ -29,11 +34,12 @@ struct PackedVolume {
 // The volume's own window, else one from where Otsu's method parts its numbers in two to above all but one of a thousand.
 std::array<double, 2> WindowOf(const SampledVolume& volume);
 
-// Through a transfer function that goes from nothing at the window's low end to the colour map's last at its high end; the
+// Colours are shown as they are, unless `look` asks for something else of their brightness. Numbers go through a transfer function that goes from nothing at the window's low end to the colour map's last at its high end; the
 // window is what `look` says, else WindowOf. Samples are sent in a byte each within the window, of an isosurface in two between the least and the greatest. What
-// `limits` have no room for is averaged over cells of whole numbers of samples, and said.
-// InvalidArgument if the level lies beyond all samples.
+// one message has no room for goes as an asset, if there is an `upload` and the server takes assets; what `limits` have no room for
+// then is averaged over cells of whole numbers of samples, and said, as is an asset that the server has no room for.
+// InvalidArgument if the level lies beyond all samples; the upload's own errors.
 absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const VolumeLook& look,
-                                        const client::Limits& limits);
+                                        const client::Limits& limits, const AssetSink& upload = {});
 
 }  // namespace voxeld::voxelctl
