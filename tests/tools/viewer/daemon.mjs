@@ -1,4 +1,4 @@
-// A voxeld of a test's own, with a page, and voxelctl to draw into it. Paths are in VOXELD and VOXELCTL.
+// A voxeld of a test's own, with a page, and voxelctl to draw into it. Paths are in VOXELD, VOXELCTL and WHEEL.
 import { execFile, spawn } from "node:child_process";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:net";
@@ -55,6 +55,12 @@ export class Daemon {
 
   async voxelctl(...words) {
     return (await run(process.env.VOXELCTL, ["--server", this.server, ...words], { maxBuffer: 1 << 26 })).stdout;
+  }
+
+  // A client of another name, whose layers stay: Python, connected as `v`. WHEEL is where its module is.
+  async python(name, code) {
+    const program = `import voxeld\nwith voxeld.connect("${this.server}", name=${JSON.stringify(name)}, on_disconnect="keep") as v:\n${code.replace(/^/gm, "    ")}\n    v.commit().wait_shown(timeout=60)\n`;
+    await run("/usr/bin/python3", ["-c", program], { env: { ...process.env, PYTHONPATH: process.env.WHEEL } });
   }
 
   async stop({ keep = false } = {}) {

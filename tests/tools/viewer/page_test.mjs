@@ -246,14 +246,18 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     assert.ok(shown.count > 1000 && Math.abs(sent.count - shown.count) < shown.count * 0.05, `${sent.count} and ${shown.count}`);
 
     // A scene that moves on is compared anew; a layer that is not wanted is left out of what was sent, and its light is stray then.
-    await daemon.voxelctl("draw", "box size=2,2,2 at=8,8,8 fill=solid color=white");
+    await daemon.voxelctl("clear");
+    await daemon.python("other", 'v.layer("next").box("box", size=(2, 2, 2), center=(8, 8, 8), fill="solid", color="white")');
     await compared("sent", 8);
+    await page.waitForFunction(() => [...document.querySelectorAll("#layers tr")].map((row) => row.cells[1].textContent).join() === "next");
     await page.locator("#layers input").first().uncheck();
     await compared("sent", 0);
     await compared("difference", 8);
     assert.match(await page.textContent("#compared"), /8 have no voxel near/);
     await page.locator("#layers input").first().check();
     await compared("difference", 0);
+    await daemon.voxelctl("clear", "--layer", "next");
+    await daemon.voxelctl("draw", "sphere radius=4 at=8,8,8 color=lime");
 
     // Of several displays each is told how far off it is.
     await page.selectOption("#display", "");
@@ -312,10 +316,10 @@ describe("the page", { timeout: 5 * kPatience }, () => {
 
   test("tells figures and layers, whatever clients call theirs", async () => {
     const name = '<img src=x onerror="globalThis.broken=1">';
-    await daemon.voxelctl("draw", "--layer", name, "points vertices='8.5,8.5,8.5'").catch(() => {});
+    await daemon.python(name, `v.layer(${JSON.stringify(name)}).points("dot", [[8.5, 8.5, 8.5]], label=${JSON.stringify(name)})`);
     const { page, seen, context } = await open(daemon.page, { panel: true });
     await page.waitForFunction(() => /in all/.test(document.getElementById("volumes").textContent));
-    await page.waitForFunction(() => document.querySelectorAll("#layers tr").length > 0);
+    await page.waitForFunction((wanted) => [...document.querySelectorAll("#layers tr")].some((row) => row.cells[1].textContent === wanted && row.cells[2].textContent === wanted), name);
     assert.equal(await page.textContent("#state"), "showing");
     assert.match(await page.textContent("#engine"), /cpu/);
     assert.equal(await page.evaluate(() => globalThis.broken), undefined);
