@@ -27,6 +27,7 @@ struct DisplayFigures {
            volumes_lost = 0;
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
+  uint64_t transfers_failed = 0;  // overcome, or the device was lost
   // Of the engine's part: drawing the volume; slicing it; copying pictures from the device. Where they
   // are packed as the volume is drawn there is no slicing.
   uint64_t volumes_late = 0;  // they missed the sweep before which their sending began

@@ -167,6 +167,8 @@ constexpr Row<DisplayFigures> kDisplayRows[] = {
      "Volumes that not all displays of the genlock have shown at one time"},
     {"voxeld_display_attaches_total", &DisplayFigures::attaches, MetricType::Counter,
      "Times that the device was set up"},
+    {"voxeld_display_transfers_failed_total", &DisplayFigures::transfers_failed,
+     MetricType::Counter, "Transfers that failed, and were overcome or lost the device"},
     {"voxeld_display_commits_owed_total", &DisplayFigures::commits_owed, MetricType::Counter,
      "Commits accepted while the display existed"},
     {"voxeld_display_commits_presented_total", &DisplayFigures::commits_presented,

@@ -103,6 +103,7 @@ DisplayFigures FramePipeline::Figures() const {
   figures.slices_resent = display.slices_resent;
   figures.underruns = display.underruns;
   figures.attaches = display.attaches;
+  figures.transfers_failed = display.transfers_failed;
   figures.volumes_late = display.volumes_late;
   figures.sweeps = display_->Sweeps().value_or(sync::SweepLock());
   if (genlock_ != nullptr) {

@@ -43,6 +43,7 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_slices_resent(in.slices_resent);
   out->set_underruns(in.underruns);
   out->set_attaches(in.attaches);
+  out->set_transfers_failed(in.transfers_failed);
   out->set_volumes_late(in.volumes_late);
   out->set_sweep_lock(ToWire(in.sweeps.state));
   out->set_sweep_period_ns(in.sweeps.period_ns);

@@ -53,6 +53,7 @@ struct DisplayStats {
   // Volumes whose sending began before a sweep that they then missed: shown at a later one.
   uint64_t volumes_late = 0;
   uint64_t attaches = 0;
+  uint64_t transfers_failed = 0;  // that the driver overcame, and those that lost the device
 };
 
 // A volume rebuilt from wire bytes: what an eye would see. Cheap to copy; the pictures are shared.

@@ -54,7 +54,10 @@ class Cell:
             self.install("first")
             listen = f'"{self.server}", "tls:127.0.0.1:{self.port}"'
             security = (f'[security]\ntls_certificate = "{self.folder}/server.pem"\ntls_key = "{self.folder}/server.key"\n'
-                        f'tls_client_ca = "{self.folder}/first.pem"\n')
+                        f'tls_client_ca = "{self.folder}/first.pem"\ngrants = "{self.folder}/grants.toml"\n')
+            grants = Path(self.folder, "grants.toml")
+            grants.write_text('[[certificate]]\nname = "all"\nsubject = "first"\nscopes = ["view", "draw"]\n', encoding="utf-8")
+            grants.chmod(0o600)
         Path(self.folder, "voxeld.toml").write_text(
             f'[server]\nlisten = [{listen}]\nhttp = "127.0.0.1:{self.http}"\n[state]\ndir = "{self.folder}/state"\n{security}'
             f'[engine]\nkind = "cpu"\n{engine}[[display]]\nname = "hurt"\n{DISPLAYS}{hurt}[[display]]\nname = "well"\n{DISPLAYS}', encoding="utf-8")
@@ -183,12 +186,13 @@ def same_light(cell: Cell) -> None:
     """Both displays have the same, and it is not darkness."""
     with voxel.connect(cell.server, name="last", timeout=LONG) as v:
         v.layer("last").box("box", size=(0.4, 0.4, 0.4), color="white", fill="solid")
-        frame = v.commit().wait(LONG)
-        assert frame.accepted is not None
+        accepted = v.commit().wait(LONG).accepted
+        assert accepted is not None
+        snapshot = accepted.snapshot
 
         def alike() -> bool:
             with contextlib.suppress(voxel.VoxelError):
-                hurt, well = (v.capture(name, at_least_snapshot=frame.accepted.snapshot, timeout=LONG).rgb for name in ("hurt", "well"))
+                hurt, well = (v.capture(name, at_least_snapshot=snapshot, timeout=LONG).rgb for name in ("hurt", "well"))
                 return bool(np.array_equal(hurt, well) and well.any())
             return False
 
@@ -219,10 +223,10 @@ class Usb(Fault):
     def __init__(self, plan: str) -> None:
         self.hurt = f'faults = "{plan}"\n'
         # What a display has sent again, lost, or come back from.
-        self.cause = r"voxeld_display_(slices_resent|volumes_lost)_total\{[^}]*hurt[^}]*\} (?!0$)|voxeld_display_attaches_total\{[^}]*hurt[^}]*\} (?!1$)"
+        self.cause = r"voxeld_display_(slices_resent|volumes_lost|transfers_failed)_total\{[^}]*hurt[^}]*\} (?!0$)|voxeld_display_attaches_total\{[^}]*hurt[^}]*\} (?!1$)"
 
     def run(self, cell: Cell) -> None:
-        cell.watch_health(4)
+        cell.watch_health(5)
 
 
 class WorkerLost(Fault):
@@ -351,6 +355,7 @@ class Network(Fault):
     """The clients' way to it, and theirs alone."""
 
     clients_are_cut = True
+    relay: Relay
 
     def __init__(self, how: str) -> None:
         self.how = how
@@ -390,7 +395,7 @@ class Certificates(Fault):
 
 
 FAULTS: dict[str, Callable[[], Fault]] = {
-    "usb_stall": lambda: Usb("stall@t100"), "usb_time_out": lambda: Usb("nak:1500@t100"), "usb_babble": lambda: Usb("babble:2@t20/in"), "usb_protocol_error": lambda: Usb("error:8@t100"),
+    "usb_stall": lambda: Usb("stall@t100"), "usb_time_out": lambda: Usb("nak:2500@t100"), "usb_babble": lambda: Usb("babble:2@t20/in"), "usb_protocol_error": lambda: Usb("error:8@t100"),
     "usb_short": lambda: Usb("partial:100@t100"), "usb_unplug": lambda: Usb("unplug:600@1500ms"), "usb_reset": lambda: Usb("unplug:30@1500ms"),
     "engine_killed": lambda: WorkerLost(signal.SIGKILL), "engine_hangs": lambda: WorkerLost(signal.SIGSTOP),
     "disk_full": lambda: Refused("pwrite64,ftruncate,fallocate", "ENOSPC", r"voxeld_state_failures_total (?!0$)|disk|[Nn]o space|cannot be kept|trouble"),
@@ -428,7 +433,8 @@ class Matrix(unittest.TestCase):
                     cell.start()
                     self.assertLess(time.monotonic() - began, WATCHDOG)
                 if goes_on:
-                    until(lambda: goes_on.commits > before + 10 or goes_on.wrong, "the one that goes on")
+                    going = goes_on
+                    until(lambda: going.commits > before + 10 or going.wrong, "the one that goes on")
                     goes_on.end()
                     self.assertEqual(goes_on.wrong, "")
                     goes_on.v.close()

@@ -62,7 +62,7 @@ class Life:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.server = f"unix:{folder}/s"
-        self.port = 0
+        self.port, self.pid = 0, 0
         self.told = Told()
 
     def config(self) -> str:

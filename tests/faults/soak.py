@@ -175,10 +175,10 @@ def line_through(times: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> t
 
 
 def draw(path: str, rows: list[dict[str, float]]) -> None:
-    import matplotlib  # python3-matplotlib; for the picture alone
+    import matplotlib  # type: ignore[import]  # python3-matplotlib; for the picture alone
 
     matplotlib.use("svg")
-    import matplotlib.pyplot as plt
+    import matplotlib.pyplot as plt  # type: ignore[import]
 
     figure, axes = plt.subplots(len(GROWTH), 1, sharex=True, figsize=(8, 8))
     for axis, key in zip(axes, GROWTH):

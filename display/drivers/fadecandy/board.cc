@@ -212,6 +212,7 @@ void Board::OnBulkDone(TransferCompletion& completion) {
       return Fail(kUnplugged);
     case TransferStatus::kTimedOut:
       reset_due_ = true;
+      ++failed_transfers_;
       return Fail(absl::StrCat("it took no bytes for ", kTimeout / sync::kMillisecond, " ms"));
     case TransferStatus::kStall:
       halted_ = true;
@@ -237,6 +238,7 @@ void Board::Delivered() {
 }
 
 void Board::CountFailure(TransferStatus status) {
+  ++failed_transfers_;
   if (++failures_ <= kMostFailures) return;
   Fail(absl::StrCat("transfers failed ", failures_,
                     " times in a row, the last one: ", TransferStatusName(status)));

@@ -62,6 +62,8 @@ class Board {
   sync::TimeNs shown_ns() const { return shown_ns_; }
   // How often a frame had to be sent again since the last call.
   uint64_t TakeReloads() { return std::exchange(reloads_, 0); }
+  // Transfers that failed since then, but for those that a board that went took with it.
+  uint64_t TakeFailures() { return std::exchange(failed_transfers_, 0); }
 
   // Drains completions.
   void Poll();
@@ -108,7 +110,7 @@ class Board {
   std::span<const std::byte> rgb_;
   bool twice_ = false;
   sync::TimeNs shown_ns_ = 0;
-  uint64_t reloads_ = 0;
+  uint64_t reloads_ = 0, failed_transfers_ = 0;
 
   // The transfer that is in flight, or held back for want of room.
   TransferId bulk_ = 0;

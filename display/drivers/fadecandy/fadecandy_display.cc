@@ -79,6 +79,7 @@ void FadecandyDisplay::CheckBoards(sync::TimeNs now) {
   if (phase_ == Phase::kDetached) return;
   for (const auto& board : boards_) {
     mutable_stats().slices_resent += board->TakeReloads();
+    mutable_stats().transfers_failed += board->TakeFailures();
     if (!board->failure().empty()) {
       return Detach(now, absl::StrCat(board->Name(), ": ", board->failure()));
     }

@@ -108,6 +108,7 @@ void VoxlinkDisplay::OnLinkFailed(const std::string& reason) {
 
 sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
   link_.Poll();
+  mutable_stats().transfers_failed += link_.TakeFailures();
   sweeps_.Advance(now);
   if (phase_ == Phase::kDetached && link_.transport().TakeArrival()) {
     // A device that comes and goes is tried no faster than one that fails.

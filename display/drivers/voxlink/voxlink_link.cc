@@ -159,6 +159,7 @@ void VoxlinkLink::OnControlDone(TransferCompletion& completion) {
   const bool ok = completion.status == TransferStatus::kOk ||
                   (completion.status == TransferStatus::kShort && !completion.data.empty());
   if (!ok) {
+    ++failures_;
     return Fail(absl::StrCat("request ", static_cast<int>(request.setup.request), " (value ",
                              request.setup.value, "): ", TransferStatusName(completion.status)));
   }
@@ -215,6 +216,7 @@ void VoxlinkLink::OnEventDone(TransferCompletion& completion) {
     case TransferStatus::kCancelled:
       return;
     default:
+      ++failures_;
       if (++event_failures_ > kMostEventFailures) {
         return Fail(
             absl::StrCat("the event endpoint fails: ", TransferStatusName(completion.status)));
@@ -328,6 +330,7 @@ void VoxlinkLink::OnBulkDone(TransferCompletion& completion) {
       halted_ = true;
       [[fallthrough]];
     default:
+      ++failures_;
       Recover();
       break;
   }

@@ -88,6 +88,8 @@ class VoxlinkLink {
   sync::TimeNs last_sent() const { return last_sent_; }          // when bytes were last handed over
   sync::TimeNs last_progress() const { return last_progress_; }  // when the device last gave credit
   bool failed() const { return failed_; }                        // the next Poll tells
+  // Transfers that ended otherwise than they should, by whatever the device or the cable did, since the last call.
+  uint64_t TakeFailures() { return std::exchange(failures_, 0); }
   // The device did what it was asked to: failures are counted anew.
   void NoteProgress();
 
@@ -149,6 +151,7 @@ class VoxlinkLink {
   size_t bulk_bytes_ = 0;
   std::map<TransferId, size_t> bulk_;
   uint64_t sent_ = 0, credit_limit_ = 0;  // bytes since START
+  uint64_t failures_ = 0;
   sync::TimeNs last_sent_ = 0, last_progress_ = 0;
   Recovery recovery_ = Recovery::kNone;
   bool halted_ = false;

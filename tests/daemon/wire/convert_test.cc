@@ -365,7 +365,8 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.engine_reason = "r", d.lit_voxels = 21, d.singular_drawables = 20, d.volumes_drawn = 22,
   d.volumes_unchanged = 19, d.volumes_presented = 23;
   d.volumes_replaced = 24, d.volumes_lost = 25, d.volumes_per_second = 26, d.bytes_out = 27;
-  d.slices_sent = 28, d.slices_resent = 29, d.underruns = 30, d.attaches = 31;
+  d.slices_sent = 28, d.slices_resent = 29, d.underruns = 30, d.attaches = 31,
+  d.transfers_failed = 161;
   d.volumes_late = 131, d.sweeps = {sync::SweepLock::State::kLocked, 132, 133, 134, 135};
   d.genlock_volumes = 136, d.genlock_dropped = 137, d.genlock_postponed = 138;
   d.genlock_slips = 139, d.light = 140, d.power_w = 141, d.power_unlimited = true;

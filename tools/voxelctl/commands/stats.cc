@@ -83,6 +83,7 @@ std::string Full(const v1::Stats& stats) {
   row("slices sent", [](const D& d) { return Grouped(d.slices_sent()); });
   row("  again", [](const D& d) { return Grouped(d.slices_resent()); });
   row("underruns", [](const D& d) { return Grouped(d.underruns()); });
+  row("failed transfers", [](const D& d) { return Grouped(d.transfers_failed()); });
   row("late", [](const D& d) { return Grouped(d.volumes_late()); });
   row("sweeps", [](const D& d) { return SweepText(d); });
   row("  lock lost", [](const D& d) { return Grouped(d.sweep_losses()); });

@@ -130,6 +130,7 @@ TEST_F(Fadecandy, AStallIsClearedAndTheFrameGoesAgain) {
   rig_->RunFor(2 * kRefresh);
   EXPECT_TRUE(rig_->Sees(*frame_));
   EXPECT_EQ(stats().slices_resent, 2u);
+  EXPECT_EQ(stats().transfers_failed, 2u);
   EXPECT_EQ(stats().attaches, 1u);
   EXPECT_EQ(stats().volumes_lost, 0u);
 }
