@@ -252,9 +252,32 @@ void PlainCore::Tell(PlainTurn& turn, const Refusal& refusal) const {
   }
 }
 
-PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now) {
+bool PlainCore::MayBeDue(const PlainSession& session, uint64_t sequence, sync::TimeNs now) const {
+  return std::any_of(session.timed.begin(), session.timed.end(), [&](const PlainCommit& commit) {
+    return commit.sequence == sequence && commit.commit.present_at_ns - early <= now;
+  });
+}
+
+bool PlainCore::Uncertain(const PlainSession& session, sync::TimeNs now) const {
+  const auto near = [&](const PlainCommit& commit) {
+    const sync::TimeNs at = commit.commit.present_at_ns;
+    return at != 0 && at - early <= now && now < at + slack;
+  };
+  return std::any_of(session.timed.begin(), session.timed.end(), near) ||
+         std::any_of(session.queue.begin(), session.queue.end(), near);
+}
+
+PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Heard* heard) {
   PlainTurn turn;
   PlainCommit& commit = turn.commit;
+  if (heard != nullptr && MayBeDue(session, heard->sequence, now)) {
+    const auto it = std::find_if(
+        session.timed.begin(), session.timed.end(),
+        [&](const PlainCommit& waiting) { return waiting.sequence == heard->sequence; });
+    session.due.push_front(std::move(*it));
+    session.due.front().late_known = false;
+    session.timed.erase(it);
+  }
   if (!session.due.empty()) {
     commit = std::move(session.due.front());
     session.due.pop_front();
@@ -266,7 +289,8 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now) {
     figures.frames_dropped += commit.dropped_frames;
     const sync::TimeNs at = commit.commit.present_at_ns;
     commit.late = at != 0 && at < now;
-    if (at > now) {
+    const bool soon = heard != nullptr && !heard->scheduled && at - now <= early;
+    if (at > now && !soon) {
       const bool beyond = at - now > limits_.max_present_at_horizon_ns;
       if (!beyond && session.timed.size() < limits_.max_timed_commits) {
         turn.kind = PlainTurn::Kind::kScheduled;
@@ -370,15 +394,34 @@ void PlainCore::PassTime(sync::TimeNs now) {
                      [](const PlainCommit& a, const PlainCommit& b) {
                        return a.commit.present_at_ns < b.commit.present_at_ns;
                      });
-    while (!session.timed.empty() && session.timed.front().commit.present_at_ns <= now) {
+    while (!session.timed.empty() && session.timed.front().commit.present_at_ns + slack <= now) {
       PlainCommit commit = std::move(session.timed.front());
       session.timed.erase(session.timed.begin());
+      commit.late_known = slack == 0;
       commit.late = commit.late || !MayGo(session, session.owed_most);
       session.due.push_back(std::move(commit));
     }
   }
   std::erase_if(dormant, [now](const auto& entry) { return entry.second.until <= now; });
   Tidy();
+}
+
+sync::TimeNs PlainCore::NextDue() const {
+  sync::TimeNs next = lingering_.empty() ? sync::kNever : lingering_.begin()->first;
+  for (const auto& [number, owner] : scene.owners) {
+    for (const auto& [name, layer] : owner.layers) {
+      for (const auto& [id, entity] : layer.entities) {
+        if (entity.expires_ns != 0) next = std::min(next, entity.expires_ns);
+      }
+    }
+  }
+  for (const auto& [id, session] : sessions) {
+    for (const PlainCommit& commit : session.timed) {
+      next = std::min(next, commit.commit.present_at_ns + slack);
+    }
+  }
+  for (const auto& [id, kept] : dormant) next = std::min(next, kept.until);
+  return next;
 }
 
 Cleared PlainCore::ClearLayer(uint64_t owner, const std::string& layer, bool keep_state) {

@@ -26,6 +26,7 @@ struct PlainCommit {
   uint64_t told = 0, left_out = 0;
   uint64_t dropped_frames = 0;
   bool late = false;
+  bool late_known = true;
 };
 
 struct PlainHold {
@@ -86,6 +87,10 @@ class PlainCore {
   PlainCore(const Limits& limits, std::vector<std::string> displays)
       : scene(limits, !displays.empty()), limits_(limits), displays_(std::move(displays)) {}
 
+  // Where displays tell of their sweeps, a timed commit is applied for its sweep: at most so much before its time, and no
+  // later than so much after it.
+  sync::TimeNs early = 0, slack = 0;
+
   PlainScene scene;
   std::map<uint64_t, PlainSession> sessions;
   std::map<uint64_t, PlainDormant> dormant;
@@ -115,13 +120,24 @@ class PlainCore {
 
   // ---- turns
   bool MayGo(const PlainSession& session, uint64_t owed) const;
-  PlainTurn TakeTurn(PlainSession& session, sync::TimeNs now);
+  // What the core was heard to say of the turn; nothing, of a client that hears nothing.
+  struct Heard {
+    uint64_t sequence = 0;
+    bool scheduled = false;
+  };
+  PlainTurn TakeTurn(PlainSession& session, sync::TimeNs now, const Heard* heard);
+  // A commit that waits for its time, and may be applied by now.
+  bool MayBeDue(const PlainSession& session, uint64_t sequence, sync::TimeNs now) const;
+  // Whether a timed commit of the session may be due, or not yet: for the core to say.
+  bool Uncertain(const PlainSession& session, sync::TimeNs now) const;
   void Told(PlainSession& session, const std::string& display, uint64_t sequence);
 
   // ---- ends
   void Finish(uint64_t session, sync::TimeNs now);
   // What becomes due by time alone: entities, layers, timed commits, dormant sessions.
   void PassTime(sync::TimeNs now);
+  // When it has something to do next.
+  sync::TimeNs NextDue() const;
 
   // ---- operators
   Cleared ClearLayer(uint64_t owner, const std::string& layer, bool keep_state);
