@@ -178,7 +178,7 @@ absl::Status Display::SetBlank(bool blank) {
     SetState(DisplayState::kBlanked, "blanked");
   } else {
     SetState(DisplayState::kShowing, "showing");
-    if (full_next_ && newest_ != nullptr && !holding_) resend_at_ = clock_.Now();
+    if (full_next_ && newest_ != nullptr && !holding_ && !held_) resend_at_ = clock_.Now();
     SendNext();
   }
   return absl::OkStatus();

@@ -30,6 +30,7 @@ void CoreJudge::Fail(std::string what) {
 }
 
 void CoreJudge::Trace(const std::string& line) {
+  for (const char c : line) trace_hash_ = (trace_hash_ ^ static_cast<uint8_t>(c)) * 0x100000001B3;
   if (trace_ != nullptr) *trace_ << line << "\n";
 }
 
@@ -186,7 +187,7 @@ void CoreJudge::CheckTurn(PlainSession& session, uint64_t sequence) {
 void CoreJudge::Note(const PlainSession& session, const PlainTurn& turn, uint64_t snapshot) {
   OnApplied({session.id, session.incarnation, turn.commit.sequence,
                    turn.commit.commit.frame_id, snapshot, !session.options.no_outcomes,
-                   turn.verdict.hidden});
+                   turn.verdict.hidden, turn.commit.commit.present_at_ns});
 }
 
 void CoreJudge::OnReceipt(Stream& stream, const Receipt& receipt) {

@@ -5,6 +5,24 @@
 #include "tests/daemon/core/model/core_judge.h"
 
 namespace voxeld::daemon::model {
+namespace {
+
+const char* KindOf(const GeometryData& geometry) {
+  switch (geometry.record.kind) {
+    case gpu::PrimitiveKind::kPoints:
+      return "points";
+    case gpu::PrimitiveKind::kSegments:
+      return "segments";
+    case gpu::PrimitiveKind::kBox:
+      return "box";
+    case gpu::PrimitiveKind::kSphere:
+      return "sphere";
+    default:
+      return "no kind that is modelled";
+  }
+}
+
+}  // namespace
 
 void CoreJudge::Step() {
   if (!wrong_.empty()) return;
@@ -98,13 +116,13 @@ void CoreJudge::CheckScene() {
         }
         const EntityInfo& got = *entity++;
         const EntityData& data = expected.data;
-        const auto* dots = std::get_if<GeometryPtr>(&data.content);
+        const auto* geometry = std::get_if<GeometryPtr>(&data.content);
         if (got.sequence != expected.sequence || got.expires_ns != expected.expires_ns ||
             got.priority != data.priority || got.erase != data.erase || got.label != data.label ||
             got.transform != data.transform ||
-            got.kind != (dots != nullptr ? "points" : "instance") ||
-            (dots != nullptr && (got.color != (*dots)->record.color ||
-                                 got.vertices != (*dots)->record.vertex_count)) ||
+            got.kind != (geometry != nullptr ? KindOf(**geometry) : "instance") ||
+            (geometry != nullptr && (got.color != (*geometry)->record.color ||
+                                     got.vertices != (*geometry)->record.vertex_count)) ||
             got.bytes != PlainScene::EntityBytes(name, id, data)) {
           return Fail(absl::StrCat("entity ", number, "/", name, "/", id,
                                    " is otherwise: of sequence ", got.sequence, ", expected ",

@@ -4,6 +4,7 @@
 
 #include "absl/hash/hash.h"
 #include "absl/strings/str_cat.h"
+#include "tests/daemon/core/model/engine_picture.h"
 
 namespace voxeld::daemon::model {
 namespace {
@@ -12,25 +13,6 @@ std::vector<std::string> DisplayNames(int displays) {
   std::vector<std::string> names;
   for (int i = 0; i < displays; ++i) names.push_back(i == 0 ? "main" : absl::StrCat("display", i));
   return names;
-}
-
-PlainScene::Picture PictureOf(const testing::SceneModel& scene) {
-  PlainScene::Picture picture;
-  for (const auto& [number, layer] : scene.layers()) {
-    std::vector<std::string> drawables;
-    for (const auto& [id, drawable] : scene.drawables()) {
-      if (drawable.layer != number) continue;
-      const testing::SceneModel::Geometry& geometry = scene.geometries().at(drawable.geometry);
-      drawables.push_back(DrawableText(drawable.priority, drawable.erase != 0, drawable.transform,
-                                       geometry.record.color, geometry.record.vertex_count,
-                                       geometry.positions[0]));
-    }
-    picture.Add(layer.visible != 0,
-                LayerText(layer.order, layer.opacity, layer.blend, layer.transform, layer.planes,
-                          layer.plane_count, layer.has_region != 0 ? &layer.region : nullptr),
-                std::move(drawables));
-  }
-  return picture;
 }
 
 }  // namespace
