@@ -27,13 +27,15 @@ Look LookOf(const std::vector<display::Picture>& pictures) {
 
 void Eye::Asked(uint64_t volume, uint64_t snapshot, bool pattern, sync::TimeNs now) {
   drawn_.push_back(
-      {.volume = volume, .snapshot = snapshot, .asked_ns = now, .pattern = pattern});
+      {.volume = volume, .snapshot = snapshot, .oldest_snapshot = snapshot, .asked_ns = now, .pattern = pattern});
 }
 
-void Eye::Drew(uint64_t volume, Look look, uint64_t snapshot, sync::TimeNs now) {
+void Eye::Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t snapshot,
+               sync::TimeNs now) {
   const auto it = std::find_if(drawn_.rbegin(), drawn_.rend(),
                                [volume](const Drawn& drawn) { return drawn.volume == volume; });
   it->look = look;
+  it->oldest_snapshot = oldest_snapshot;
   it->snapshot = snapshot;
   it->drawn_ns = now;
   by_look_[look].push_back(static_cast<size_t>(drawn_.rend() - it) - 1);

@@ -98,16 +98,11 @@ void OutcomeJudge::TakeBack(uint64_t session, const Receipt& receipt) {
 bool OutcomeJudge::StayedSince(uint64_t from, uint64_t to, size_t d) const {
   const std::vector<Eye::Drawn>& drawn = screens_[d].eye.drawn();
   std::optional<Look> looked;
-  bool reached = false;
   for (const Eye::Drawn& volume : drawn) {
     if (volume.snapshot < from || !volume.drawn_ns.has_value()) continue;
     if (!looked.has_value()) looked = volume.look;
-    if (volume.snapshot >= to) {
-      reached = true;
-      if (volume.look == *looked) return true;
-    }
+    if (volume.snapshot >= to && volume.look == *looked) return true;
   }
-  if (reached) return false;
   // Nothing was drawn of it: nothing that an engine sees had changed.
   return looked.has_value() && SameScene(screens_[d].eye, *looked, to);
 }
@@ -139,7 +134,7 @@ uint64_t OutcomeJudge::Missing(uint64_t session, uint64_t incarnation, std::stri
 
 bool OutcomeJudge::ShownBetween(const Eye& eye, uint64_t from, uint64_t to, uint64_t before) {
   return std::any_of(eye.drawn().begin(), eye.drawn().end(), [&](const Eye::Drawn& drawn) {
-    return drawn.shown.has_value() && drawn.snapshot >= from &&
+    return drawn.shown.has_value() && drawn.oldest_snapshot >= from &&
            (to == 0 || drawn.snapshot < to) && drawn.volume < before;
   });
 }

@@ -179,9 +179,11 @@ Scenario MakeScenario(uint32_t seed) {
   Scenario scenario;
   scenario.seed = seed;
   scenario.limits = script.limits;
+  // How many commits wait for their time is for the core to say, where sweeps decide when that is.
+  scenario.limits.max_timed_commits = daemon::Limits().max_timed_commits;
   scenario.settles = script.settles;
   scenario.actions = std::move(script.actions);
-  scenario.actions.resize(std::min<size_t>(scenario.actions.size(), 25 + chance.Pick(60)));
+  scenario.actions.resize(std::min<size_t>(scenario.actions.size(), 40 + chance.Pick(160)));
   scenario.device_faults = chance.OneIn(3);
   scenario.transport_faults = chance.OneIn(8);
   scenario.engine_faults = chance.OneIn(3);

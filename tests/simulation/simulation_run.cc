@@ -107,7 +107,8 @@ Tally SimulationRun::tally() const {
 }
 
 void SimulationRun::RunToRest() {
-  if (!world_->RunToRest()) Fail("somebody spins: turn after turn, and time stands still");
+  if (world_->RunToRest()) return;
+  Fail(absl::StrCat("turn after turn, and time stands still: ", world_->Busy()));
 }
 
 daemon::model::RandomMessage SimulationRun::Compose(Chance& chance, uint64_t last_sequence,
@@ -221,24 +222,29 @@ void SimulationRun::OnFrame(size_t d, uint64_t volume, const daemon::testing::Sc
   OutcomeJudge::Screen& screen = judge_.screen(d);
   const Eye::Drawn* asked = screen.eye.Find(volume);
   if (asked == nullptr) return Fail("a volume was drawn that was not asked for");
-  uint64_t snapshot = asked->snapshot;
+  uint64_t snapshot = asked->snapshot, oldest = snapshot;
   if (!asked->pattern) {
     const PlainScene::Picture drawn = daemon::model::PictureOf(scene);
     const uint64_t whole = HashOf(drawn.shown) * 31 + HashOf(drawn.hidden);
-    // A genlock's round is of the snapshot that it began with.
-    const bool exact = world_->seats()[d].genlock.empty();
-    auto it = pictured_.upper_bound(snapshot);
-    while (it != pictured_.begin() && (--it)->second.whole != whole && !exact) {
+    const auto newest = std::prev(pictured_.upper_bound(snapshot));
+    bool found = newest->second.whole == whole;
+    if (!world_->seats()[d].genlock.empty()) {
+      // A genlock's round is of the snapshot that it began with.
+      found = false;
+      for (auto it = pictured_.begin(); it != std::next(newest); ++it) {
+        if (it->second.whole != whole) continue;
+        if (!std::exchange(found, true)) oldest = it->first;
+        snapshot = it->first;
+      }
     }
-    if (!pictured_.empty() && it->second.whole != whole) {
+    if (!found) {
       return Fail(absl::StrCat("volume ", volume, " on display ", d,
                                " was drawn from another scene than snapshot ", snapshot));
     }
-    if (!pictured_.empty() && !exact) snapshot = it->first;
   }
   const Look look = LookOf(bytes);
   Trace(absl::StrCat("    display ", d, ": volume ", volume, " looks ", look));
-  screen.eye.Drew(volume, look, snapshot, now());
+  screen.eye.Drew(volume, look, oldest, snapshot, now());
 }
 
 }  // namespace voxeld::simulation

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "display/drivers/simulated/emulated_device.h"
 #include "display/drivers/voxlink/voxlink_display.h"
 
@@ -100,6 +101,18 @@ void World::Gather(std::vector<Turn>& runnable) const {
     if (device_dirty_[i] || next_device_[i] <= now) runnable.push_back({Who::kDevice, i});
     if (seats_[i].engine->Next() <= now) runnable.push_back({Who::kEngine, i});
   }
+}
+
+std::string World::Busy() const {
+  static const char* const kNames[] = {"the core", "pipeline", "device", "engine"};
+  std::vector<Turn> runnable;
+  Gather(runnable);
+  std::string text;
+  for (const Turn& turn : runnable) {
+    absl::StrAppend(&text, text.empty() ? "" : ", ", kNames[static_cast<size_t>(turn.who)]);
+    if (turn.who != Who::kCore) absl::StrAppend(&text, " ", turn.seat);
+  }
+  return text;
 }
 
 void World::Take(const Turn& turn) {

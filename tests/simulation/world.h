@@ -66,6 +66,8 @@ class World {
   absl::Status Start();
   // Turns, in an order that chance says, until nobody has anything to do now. False: it does not come to an end.
   bool RunToRest();
+  // Who has something to do now.
+  std::string Busy() const;
   // When somebody has something to do next.
   sync::TimeNs Next() const;
   // Its device may have something to do: somebody has touched it.

@@ -247,6 +247,23 @@ TEST_F(DisplayTest, LitAgainItWaitsForTheNewerVolumeWithoutBeingAsked) {
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
 }
 
+// What was to be drawn for the device that went comes to nothing; for the one that comes there is something newer again.
+TEST_F(DisplayTest, WhatWasSaidOfALostDeviceDoesNotKeepTheNextOneBusy) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  display_.DeviceLost("unplugged");
+  log_.has_newer = true;
+  display_.Attached();
+  display_.DeviceLost("unplugged");
+  display_.ShowCurrent();
+  display_.Attached();
+  EXPECT_EQ(display_.sent.size(), 1u);
+  EXPECT_GT(display_.Tick(), clock_.Now());
+  display_.ShowCurrent();
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+}
+
 TEST_F(DisplayTest, StopLosesWhatIsOwed) {
   StartAttached();
   display_.Submit(Frame(1));

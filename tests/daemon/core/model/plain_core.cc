@@ -277,6 +277,15 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Hea
     session.due.push_front(std::move(*it));
     session.due.front().late_known = false;
     session.timed.erase(it);
+  } else if (heard != nullptr && early > 0 && !session.due.empty()) {
+    // Those that are for the same sweep go in the order in which they came.
+    const auto it = std::find_if(
+        session.due.begin(), session.due.end(),
+        [&](const PlainCommit& waiting) { return waiting.sequence == heard->sequence; });
+    if (it != session.due.end() && it->commit.present_at_ns <=
+                                       session.due.front().commit.present_at_ns + early) {
+      std::rotate(session.due.begin(), it, std::next(it));
+    }
   }
   if (!session.due.empty()) {
     commit = std::move(session.due.front());
@@ -290,7 +299,9 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Hea
     const sync::TimeNs at = commit.commit.present_at_ns;
     commit.late = at != 0 && at < now;
     const bool soon = heard != nullptr && !heard->scheduled && at - now <= early;
-    if (at > now && !soon) {
+    // Its sweep may be told to begin a little after its time.
+    const bool put_off = heard != nullptr && heard->scheduled && at != 0 && at + slack > now;
+    if ((at > now && !soon) || put_off) {
       const bool beyond = at - now > limits_.max_present_at_horizon_ns;
       if (!beyond && session.timed.size() < limits_.max_timed_commits) {
         turn.kind = PlainTurn::Kind::kScheduled;
