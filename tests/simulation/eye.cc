@@ -67,15 +67,22 @@ const Eye::Drawn* Eye::Find(uint64_t volume) const {
   return nullptr;
 }
 
+void Eye::Blinked(sync::TimeNs from, sync::TimeNs to) { blinks_.emplace_back(from, to); }
+
 bool Eye::WasShown(Look look, sync::TimeNs at, sync::TimeNs tolerance, sync::TimeNs since) const {
-  return std::any_of(shown_.begin(), shown_.end(), [&](const Shown& shown) {
+  const auto seen = [&](const Shown& shown) {
     return shown.look == look && shown.at >= since && std::abs(shown.at - at) <= tolerance;
-  });
+  };
+  return std::any_of(shown_.begin(), shown_.end(), seen) ||
+         std::any_of(blinks_.begin(), blinks_.end(), [at](const auto& blink) {
+           return blink.first <= at && at <= blink.second;
+         });
 }
 
-bool Eye::EverShown(Look look) const {
+bool Eye::EverShown(Look look, sync::TimeNs since) const {
   return std::any_of(shown_.begin(), shown_.end(),
-                     [look](const Shown& shown) { return shown.look == look; });
+                     [look](const Shown& shown) { return shown.look == look; }) ||
+         (!blinks_.empty() && blinks_.back().second >= since);
 }
 
 std::optional<std::pair<uint64_t, uint64_t>> Eye::VolumesLike(Look look) const {

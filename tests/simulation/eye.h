@@ -48,7 +48,9 @@ class Eye {
   const Drawn* Find(uint64_t volume) const;
   // Whether something that looks so was shown in a sweep that began then, or as near as `tolerance`, after `since`.
   bool WasShown(Look look, sync::TimeNs at, sync::TimeNs tolerance, sync::TimeNs since) const;
-  bool EverShown(Look look) const;
+  bool EverShown(Look look, sync::TimeNs since) const;
+  // From then to then nobody looked.
+  void Blinked(sync::TimeNs from, sync::TimeNs to);
   std::optional<Look> newest() const;
   // The oldest and the newest volume that look so; nothing: none does.
   std::optional<std::pair<uint64_t, uint64_t>> VolumesLike(Look look) const;
@@ -60,6 +62,7 @@ class Eye {
   std::vector<Drawn> drawn_;  // volumes ascend
   std::map<Look, std::vector<size_t>> by_look_;
   std::vector<Shown> shown_;
+  std::vector<std::pair<sync::TimeNs, sync::TimeNs>> blinks_;
   uint64_t newest_shown_ = 0;  // a volume that looks like what is shown: the oldest that it may be
 };
 

@@ -95,16 +95,14 @@ void OutcomeJudge::TakeBack(uint64_t session, const Receipt& receipt) {
   }
 }
 
-bool OutcomeJudge::StayedSince(uint64_t from, uint64_t to, size_t d) const {
-  const std::vector<Eye::Drawn>& drawn = screens_[d].eye.drawn();
-  std::optional<Look> looked;
-  for (const Eye::Drawn& volume : drawn) {
-    if (volume.snapshot < from || !volume.drawn_ns.has_value()) continue;
-    if (!looked.has_value()) looked = volume.look;
-    if (volume.snapshot >= to && volume.look == *looked) return true;
-  }
-  // Nothing was drawn of it: nothing that an engine sees had changed.
-  return looked.has_value() && SameScene(screens_[d].eye, *looked, to);
+bool OutcomeJudge::LooksLike(size_t d, Look look, uint64_t to) const {
+  const Eye& eye = screens_[d].eye;
+  const bool drawn = std::any_of(
+      eye.drawn().begin(), eye.drawn().end(), [look, to](const Eye::Drawn& volume) {
+        return volume.snapshot >= to && volume.drawn_ns.has_value() && volume.look == look;
+      });
+  // Else nothing was drawn of it: nothing that an engine sees had changed.
+  return drawn || SameScene(eye, look, to);
 }
 
 bool OutcomeJudge::SameScene(const Eye& eye, Look look, uint64_t from) const {
@@ -210,7 +208,7 @@ std::string OutcomeJudge::JudgeUnchanged(const Entry& entry, size_t d,
                                          const CommitOutcome& outcome) const {
   const Eye& eye = screens_[d].eye;
   const Eye::Drawn* same = eye.Find(outcome.volume);
-  if (same == nullptr || !same->drawn_ns.has_value() || !eye.EverShown(same->look)) {
+  if (same == nullptr || !same->drawn_ns.has_value() || !eye.EverShown(same->look, *same->drawn_ns)) {
     return absl::StrCat("UNCHANGED from volume ", outcome.volume, ", which was not shown");
   }
   for (const Eye::Drawn& drawn : eye.drawn()) {

@@ -59,9 +59,8 @@ class OutcomeJudge {
   // It comes again: the client did not get it.
   void TakeBack(uint64_t session, const daemon::Receipt& receipt);
 
-  // Whether a volume of snapshot `from` still shows what is to be seen of snapshot `to`: no volume drawn between looks
-  // otherwise.
-  bool StayedSince(uint64_t from, uint64_t to, size_t d) const;
+  // Whether that is what snapshot `to`, or a newer one, looks like on a display.
+  bool LooksLike(size_t d, Look look, uint64_t to) const;
   uint64_t Missing(uint64_t session, uint64_t incarnation, std::string* which) const;
   uint64_t owed() const { return owed_; }
   uint64_t told() const { return told_; }

@@ -126,6 +126,7 @@ void SimulationRun::DoToDisplay(const Action& action, Chance& chance, size_t d) 
       Update(d, {.pattern = screen.pattern ? TestPattern::kNone : TestPattern::kGrid});
       screen.pattern_changes = false;
       screen.pattern = !screen.pattern;
+      changed_ns_ = now();
       return;
     }
     case ActionKind::kEngineMode:
@@ -166,7 +167,10 @@ void SimulationRun::Jump(sync::TimeNs delta) {
   Step();
   if (!wrong_.empty()) return;
   Trace(absl::StrCat("time jumps by ", delta));
-  for (size_t d = 0; d < now_.size(); ++d) judge_.Disturb(d, now() + delta + kJumpAftermath);
+  for (size_t d = 0; d < now_.size(); ++d) {
+    judge_.Disturb(d, now() + delta + kJumpAftermath);
+    judge_.screen(d).eye.Blinked(now(), now() + delta);
+  }
   clock().Advance(delta);
   PassTime();
   Step();
@@ -227,6 +231,7 @@ void SimulationRun::Watch(size_t d) {
     return;
   }
   Trace(absl::StrCat("display ", d, " is watched"));
+  is.watched_since = now();
   is.watch = core().WatchVolumes(
       name, [this, d](const absl::StatusOr<display::DecodedVolume>& volume) {
         OnWatched(d, volume);

@@ -71,7 +71,7 @@ void SimulationRun::CheckPicture(size_t d) {
     return Fail(absl::StrCat("display ", d, " does not show the scene"));
   }
   const DisplayNow& is = now_[d];
-  if (is.watch != 0 && is.watched != LookOf(expected)) {
+  if (is.watch != 0 && is.watched_since < now() - kAtRest && is.watched != LookOf(expected)) {
     Fail(absl::StrCat("who watches display ", d, " sees something else than the scene"));
   }
 }
@@ -109,7 +109,7 @@ std::string SimulationRun::WrongWith(size_t d, const display::DecodedVolume& vol
   const Eye::Drawn* drawn = eye.Find(volume.volume);
   if (drawn == nullptr || !drawn->drawn_ns.has_value()) return "a volume that was not drawn";
   if (drawn->look != look) return absl::StrCat("volume ", volume.volume, " looks otherwise");
-  if (!eye.EverShown(look)) return absl::StrCat("volume ", volume.volume, " was not shown");
+  if (!eye.EverShown(look, *drawn->drawn_ns)) return absl::StrCat("volume ", volume.volume, " was not shown");
   return "";
 }
 
@@ -129,7 +129,7 @@ void SimulationRun::OnCaptured(size_t d, size_t number,
     if (capture.at_least == 0 || drawn == nullptr) return;
     // A newer snapshot that looks the same is shown by an older volume.
     if (drawn->snapshot < capture.at_least && !drawn->pattern &&
-        !judge_.StayedSince(drawn->snapshot, capture.at_least, d)) {
+        !judge_.LooksLike(d, drawn->look, capture.at_least)) {
       Fail(absl::StrCat("capture ", number, " of snapshot ", capture.at_least, " shows ",
                         drawn->snapshot));
     }

@@ -103,6 +103,7 @@ class SimulationRun final : public daemon::model::CoreJudge {
     uint64_t transport_hits = 0;
     display::voxlink::VolumePtr shown;
     daemon::WatchId watch = 0;
+    sync::TimeNs watched_since = 0;
     std::optional<Look> watched;
     uint64_t watched_volume = 0;
     sync::TimeNs apart_since = 0;  // of a genlock: it shows something else than the first; 0: it does not
