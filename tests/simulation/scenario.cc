@@ -97,6 +97,7 @@ std::map<std::string, std::string> RandomDevice(Chance& chance, const std::strin
       break;
     default:
       device["size"] = chance.OneIn(2) ? "8x8x8" : "8x6x4";
+      if (chance.OneIn(8)) device["size"] = "24x16x3";  // a picture takes several packets
   }
   switch (chance.Pick(6)) {
     case 0:
