@@ -3,7 +3,7 @@
 
     tests/simulation/mutants.py [--scratch DIR] [--seeds N] [--jobs N] [--json FILE] [NAME …]
 
-NAME: those whose file names hold it; none: all. A copy of what git tracks is built in DIR (build/mutants), by the
+NAME: those whose file names hold it; none: all. A copy of the tree is built in DIR (build/mutants), by the
 preset "host" without CUDA. Prints a table: the defect, the first seed that finds it, what was found wrong. Ends with 0 if all were
 found.
 """
@@ -25,8 +25,8 @@ def run(command, **options):
 
 
 def copy_tree(source):
-    """What git tracks, as it is in the working tree; files that have not changed keep their times."""
-    names = run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True).stdout.split("\n")
+    """What git tracks or would, as it is in the working tree; files that have not changed keep their times."""
+    names = run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True).stdout.split("\n")
     wanted = {name for name in names if name and (ROOT / name).is_file()}
     for name in wanted:
         new, old = ROOT / name, source / name
@@ -35,18 +35,18 @@ def copy_tree(source):
         old.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(new, old)
     for old in source.rglob("*"):
-        if old.is_file() and str(old.relative_to(source)) not in wanted:
+        if old.is_file() and not old.is_symlink() and str(old.relative_to(source)) not in wanted:
             old.unlink()
+    # What the build has fetched, if anything.
+    data = source / "build" / "data"
+    if (ROOT / "build" / "data").exists() and not data.exists():
+        data.parent.mkdir(exist_ok=True)
+        data.symlink_to((ROOT / "build" / "data").resolve())
 
 
 def configure(source, build):
     if (build / "build.ninja").exists():
         return
-    # build/data: what the build has fetched, if anything.
-    data = ROOT / "build" / "data"
-    if data.exists():
-        build.mkdir(parents=True, exist_ok=True)
-        (build / "data").symlink_to(data.resolve())
     run(["cmake", "--preset", "host", "-B", build, "-DVOXELD_CUDA=OFF", "-DVOXELD_UNIT_TESTS=ON"], cwd=source,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
