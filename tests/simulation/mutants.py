@@ -35,7 +35,8 @@ def copy_tree(source):
         old.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(new, old)
     for old in source.rglob("*"):
-        if old.is_file() and not old.is_symlink() and str(old.relative_to(source)) not in wanted:
+        name = str(old.relative_to(source))
+        if old.is_file() and not name.startswith("build/") and name not in wanted:
             old.unlink()
     # What the build has fetched, if anything.
     data = source / "build" / "data"
@@ -77,7 +78,7 @@ def main():
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("names", nargs="*")
     options = parser.parse_args()
-    source, build = options.scratch.resolve() / "source", options.scratch.resolve() / "build"
+    source, build = options.scratch.resolve(), options.scratch.resolve() / "build" / "host"
     patches = [patch for patch in sorted((HERE / "mutants").glob("*.patch"))
                if not options.names or any(name in patch.stem for name in options.names)]
     if not patches:

@@ -179,15 +179,16 @@ std::string OutcomeJudge::JudgePresented(Entry& entry, size_t d, const CommitOut
   }
   const bool disturbed = entry.applied_ns <= screen.disturbed_until;
   const sync::TimeNs tolerance = disturbed ? 10 * sync::kSecond : screen.tolerance;
-  if (!screen.eye.WasShown(volume->look, outcome.time_ns, tolerance, *volume->drawn_ns)) {
+  const bool lied = entry.applied_ns <= screen.lied_until;
+  if (!lied && !screen.eye.WasShown(volume->look, outcome.time_ns, tolerance, *volume->drawn_ns)) {
     return absl::StrCat("PRESENTED in volume ", outcome.volume, " at ", outcome.time_ns,
                         ", when nothing like it was shown");
   }
-  if (outcome.time_ns > now + tolerance) return "PRESENTED before it is";
+  if (!lied && outcome.time_ns > now + tolerance) return "PRESENTED before it is";
   if (volume->snapshot < entry.commit.snapshot) {
     return absl::StrCat("PRESENTED in volume ", outcome.volume, ", which is older");
   }
-  if (ShownBetween(screen.eye, entry.commit.snapshot, 0, outcome.volume)) {
+  if (!lied && ShownBetween(screen.eye, entry.commit.snapshot, 0, outcome.volume)) {
     return absl::StrCat("PRESENTED in volume ", outcome.volume,
                         ", though an earlier one with it was shown");
   }
@@ -208,7 +209,11 @@ std::string OutcomeJudge::JudgeUnchanged(const Entry& entry, size_t d,
                                          const CommitOutcome& outcome) const {
   const Eye& eye = screens_[d].eye;
   const Eye::Drawn* same = eye.Find(outcome.volume);
-  if (same == nullptr || !same->drawn_ns.has_value() || !eye.EverShown(same->look, *same->drawn_ns)) {
+  const bool lied = entry.applied_ns <= screens_[d].lied_until;
+  if (same == nullptr || !same->drawn_ns.has_value()) {
+    return absl::StrCat("UNCHANGED from volume ", outcome.volume, ", which was not drawn");
+  }
+  if (!lied && !eye.EverShown(same->look, *same->drawn_ns)) {
     return absl::StrCat("UNCHANGED from volume ", outcome.volume, ", which was not shown");
   }
   for (const Eye::Drawn& drawn : eye.drawn()) {

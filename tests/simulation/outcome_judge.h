@@ -31,6 +31,7 @@ class OutcomeJudge {
     std::string name;
     Eye eye;
     sync::TimeNs disturbed_until = 0;
+    sync::TimeNs lied_until = -1;    // what its device told until then need not be so
     sync::TimeNs tolerance = 0;  // of times that its device tells, while nothing disturbs it
     bool pattern = false;
     uint64_t patterns = 0;  // set so far

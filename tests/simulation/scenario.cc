@@ -189,9 +189,11 @@ Scenario MakeScenario(uint32_t seed) {
   scenario.transport_faults = chance.OneIn(8);
   scenario.engine_faults = chance.OneIn(3);
   scenario.jumps = chance.OneIn(6);
+  scenario.lies = chance.OneIn(10);
+  scenario.memory_ends = chance.OneIn(5);
   static const char* const kRates[] = {"20", "30", "60"};
   const uint32_t displays = chance.OneIn(8) ? 3 : chance.OneIn(3) ? 2 : 1;
-  const bool genlock = displays > 1 && chance.OneIn(2);
+  const bool genlock = displays > 1 && !scenario.lies && chance.OneIn(2);
   std::string rate = kRates[chance.Pick(3)];
   for (uint32_t i = 0; i < displays; ++i) {
     SeatOptions seat;

@@ -54,7 +54,9 @@ void SimulationRun::Do(const Action& action) {
     case ActionKind::kClose:
     case ActionKind::kResume:
     case ActionKind::kEvict:
-      // What a session that ends does with a commit whose time is coming could not be told.
+      // What a session that ends does with a commit whose time is coming could not be told; nor, of limits that all
+      // share, whether its last commits come before those of others.
+      Step();
       AwaitCertainty();
       break;
     case ActionKind::kStep:
@@ -70,6 +72,9 @@ void SimulationRun::Do(const Action& action) {
           now_[d].brightness = brightness;
           return;
         }
+        case 3:
+          if (scenario_.memory_ends) return FillMemory(!plain_.memory_full);
+          break;
         default:
           break;
       }
@@ -96,6 +101,7 @@ void SimulationRun::DoToDisplay(const Action& action, Chance& chance, size_t d) 
     case ActionKind::kAbort:
     case ActionKind::kCable: {
       if (!is.plugged) return Cable(d, true);
+      if (scenario_.lies && (is.lies || chance.OneIn(3))) return Lie(d, !is.lies, chance.Next());
       if (!scenario_.device_faults) return;
       if (action.kind == ActionKind::kCable && chance.OneIn(3)) return Cable(d, false);
       const display::emulator::Fault fault = RandomFault(chance);
@@ -176,6 +182,19 @@ void SimulationRun::Jump(sync::TimeNs delta) {
   Step();
 }
 
+void SimulationRun::FillMemory(bool full) {
+  using Use = daemon::Budget::Use;
+  daemon::Budget& budget = *core().budget();
+  Step();
+  Trace(full ? "memory is full" : "there is memory again");
+  if (full) {
+    budget.ChargeAnyway(Use::kArriving, 2 * budget.limit_bytes());
+  } else {
+    budget.Release(Use::kArriving, 2 * budget.limit_bytes());
+  }
+  plain_.memory_full = full;
+}
+
 void SimulationRun::AwaitCertainty() {
   const auto uncertain = [this] {
     return std::any_of(plain_.sessions.begin(), plain_.sessions.end(), [this](const auto& entry) {
@@ -192,6 +211,19 @@ void SimulationRun::Cable(size_t d, bool plugged) {
   world_->seats()[d].carrier->WithDevice(
       [&](display::UsbDeviceModel& device) { device.SetPlugged(plugged); });
   world_->Touch(d);
+  NoteDisturbances(d);
+  Step();
+}
+
+void SimulationRun::Lie(size_t d, bool lies, uint32_t seed) {
+  Trace(absl::StrCat("the device of display ", d, lies ? " lies" : " tells the truth"));
+  ++tally_.faults;
+  NoteDisturbances(d);
+  now_[d].lies = lies;
+  const Seat& seat = world_->seats()[d];
+  seat.carrier->WithDevice([&](display::UsbDeviceModel&) {
+    seat.liar->SetSeed(lies ? std::optional<uint64_t>(seed) : std::nullopt);
+  });
   NoteDisturbances(d);
   Step();
 }

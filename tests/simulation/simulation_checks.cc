@@ -109,7 +109,7 @@ std::string SimulationRun::WrongWith(size_t d, const display::DecodedVolume& vol
   const Eye::Drawn* drawn = eye.Find(volume.volume);
   if (drawn == nullptr || !drawn->drawn_ns.has_value()) return "a volume that was not drawn";
   if (drawn->look != look) return absl::StrCat("volume ", volume.volume, " looks otherwise");
-  if (!eye.EverShown(look, *drawn->drawn_ns)) return absl::StrCat("volume ", volume.volume, " was not shown");
+  if (judge_.screen(d).lied_until < 0 && !eye.EverShown(look, *drawn->drawn_ns)) return absl::StrCat("volume ", volume.volume, " was not shown");
   return "";
 }
 
@@ -173,10 +173,12 @@ void SimulationRun::OnWatched(size_t d, const absl::StatusOr<display::DecodedVol
 // Faults end, and everything is lit: then all is shown, and nobody is owed anything any more.
 void SimulationRun::Settle() {
   Trace("everything settles");
+  if (plain_.memory_full) FillMemory(false);
   for (size_t d = 0; d < now_.size() && wrong_.empty(); ++d) {
     const Seat& seat = world_->seats()[d];
     seat.engine->fail.reset();
     seat.engine->fail_staging = false;
+    if (now_[d].lies) Lie(d, false, 0);
     seat.carrier->WithDevice([&](display::UsbDeviceModel& device) {
       seat.faults->Clear();
       device.SetPlugged(true);

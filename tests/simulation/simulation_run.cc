@@ -17,6 +17,8 @@ using sync::kSecond;
 // How long after a disturbance a display may still lose something by it: its device is asked four times, half a
 // second each, before it is given up.
 constexpr sync::TimeNs kAftermath = 6 * kSecond;
+// What a device told of its clock is believed for two windows of 5 s.
+constexpr sync::TimeNs kLieAftermath = 15 * kSecond;
 // And after an engine's failure.
 constexpr sync::TimeNs kEngineAftermath = 2 * kSecond;
 // How far times that a device tells may lie from what they are.
@@ -113,7 +115,28 @@ void SimulationRun::RunToRest() {
 
 daemon::model::RandomMessage SimulationRun::Compose(Chance& chance, uint64_t last_sequence,
                                                     uint64_t* next_frame_id) {
-  return daemon::model::MakeMessage(chance, last_sequence, next_frame_id, now(), SmallPalette());
+  daemon::model::RandomMessage message =
+      daemon::model::MakeMessage(chance, last_sequence, next_frame_id, now(), SmallPalette());
+  for (daemon::Operation& operation : message.operations) {
+    auto* commit = std::get_if<daemon::Commit>(&operation.op);
+    if (commit == nullptr) continue;
+    // Of clients' clocks nothing is known: they jump.
+    switch (chance.Pick(6)) {
+      case 0:
+        commit->send_time_ns = now() + static_cast<int64_t>(chance.Next()) * 1000 - kSecond;
+        break;
+      case 1:
+        commit->send_time_ns = chance.OneIn(2) ? INT64_MAX : INT64_MIN;
+        break;
+      case 2:
+        break;
+      default:
+        commit->send_time_ns = now() + 3600 * kSecond;
+    }
+    // Whose device lies of its sweeps, its timed commits come at any time.
+    if (scenario_.lies) commit->present_at_ns = 0;
+  }
+  return message;
 }
 
 // -------------------------------------------------------------------------------- what is told
@@ -155,6 +178,10 @@ void SimulationRun::NoteDisturbances(size_t d) {
   if (std::exchange(is.faults_pending, pending) || pending) Disturb(d, now() + kAftermath);
   if (std::exchange(is.transport_hits, seat.cable->hits()) != seat.cable->hits()) {
     Disturb(d, now() + kAftermath);
+  }
+  if (is.lies) {
+    Disturb(d, now() + kLieAftermath);
+    judge_.screen(d).lied_until = now() + kLieAftermath;
   }
   const display::DisplayState state = seat.display->state();
   if (state != display::DisplayState::kShowing && state != display::DisplayState::kBlanked) {

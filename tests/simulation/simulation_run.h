@@ -78,7 +78,9 @@ class SimulationRun final : public daemon::model::CoreJudge {
   void Advance(sync::TimeNs delta);
   void Jump(sync::TimeNs delta);
   void AwaitCertainty();
+  void FillMemory(bool full);
   void Cable(size_t d, bool plugged);
+  void Lie(size_t d, bool lies, uint32_t seed);
   void Update(size_t d, const daemon::DisplayUpdate& update);
   void Capture(size_t d, Chance& chance);
   void Watch(size_t d);
@@ -97,7 +99,7 @@ class SimulationRun final : public daemon::model::CoreJudge {
   void Leave();
 
   struct DisplayNow {
-    bool plugged = true, blanked = false;
+    bool plugged = true, blanked = false, lies = false;
     double brightness = 1;
     bool faults_pending = false;
     uint64_t transport_hits = 0;

@@ -42,8 +42,10 @@ World::World(uint32_t seed, const daemon::Limits& limits, const std::vector<Seat
     seat.engine->clock = &clock_;
     auto device = std::make_unique<display::emulator::VoxlinkDevice>(emulated->config, clock_);
     seat.device = device.get();
+    auto liar = std::make_unique<display::emulator::HostileDevice>(std::move(device));
+    seat.liar = liar.get();
     auto faults = std::make_unique<display::emulator::FaultInjector>(
-        std::move(device), display::emulator::FaultPlan(), clock_);
+        std::move(liar), display::emulator::FaultPlan(), clock_);
     seat.faults = faults.get();
     display::InProcessTransport::Options carrier;
     carrier.own_thread = false;

@@ -14,6 +14,7 @@
 #include "daemon/core/core.h"
 #include "display/api/display.h"
 #include "display/emulator/fault_injector.h"
+#include "display/emulator/hostile_device.h"
 #include "display/emulator/voxlink_device.h"
 #include "display/sync/fake_clock.h"
 #include "display/usb/faulty_transport.h"
@@ -40,6 +41,7 @@ struct Seat {
   display::FaultyTransport* cable = nullptr;
   display::InProcessTransport* carrier = nullptr;
   display::emulator::FaultInjector* faults = nullptr;
+  display::emulator::HostileDevice* liar = nullptr;
   display::emulator::VoxlinkDevice* device = nullptr;
   std::shared_ptr<EngineStage> engine;
 };

@@ -249,6 +249,12 @@ void CoreJudge::CheckAccepted(const PlainSession& session, const PlainTurn& turn
   }
   if (Certain(session) && turn.commit.late_known && accepted.late != turn.commit.late) Fail("ACCEPTED late, or not, and it was not");
   if (accepted.applied_time_ns != clock().Now()) Fail("ACCEPTED at another time");
+  const Stages& stages = accepted.stages;
+  if (stages.applied_ns != clock().Now() || stages.received_ns > stages.applied_ns ||
+      stages.sent_ns < 0 || stages.sent_ns > stages.received_ns) {
+    Fail(absl::StrCat("ACCEPTED, sent at ", stages.sent_ns, ", received at ", stages.received_ns,
+                      ", applied at ", stages.applied_ns));
+  }
   const size_t displays = session.options.no_outcomes ? 0 : displays_.size();
   if (accepted.displays.size() != displays) Fail("ACCEPTED for other displays");
 }

@@ -164,7 +164,8 @@ void CoreJudge::Send(uint32_t place, Chance& chance, bool step) {
   refused.issues = message.malformed;
   stream.rooms = 0;
   stream.waits_for_room =
-      stream.info.intake->Take({std::move(message.operations), std::move(refused), message.bytes});
+      stream.info.intake->Take({std::move(message.operations), std::move(refused), message.bytes,
+                                clock().Now(), clock().Now()});
   if (stream.waits_for_room == plain_.HasRoom(session)) {
     return Fail(absl::StrCat("a message was ", stream.waits_for_room ? "" : "not ",
                              "said to fill session ", session.id));

@@ -174,6 +174,7 @@ std::vector<Refusal> PlainCore::Take(PlainSession& session,
     std::optional<Reason> wrong = PlainScene::WrongAlone(operation, limits_);
     const uint64_t weight = WeightOf(operation);
     if (TooMuchStaged(session, weight)) wrong = Reason::kQuotaExceeded;
+    if (memory_full && !wrong.has_value()) wrong = Reason::kQuotaExceeded;
     if (wrong.has_value()) {
       refuse(operation.sequence, *wrong);
     } else {

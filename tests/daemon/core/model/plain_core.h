@@ -91,6 +91,9 @@ class PlainCore {
   // later than so much after it.
   sync::TimeNs early = 0, slack = 0;
 
+  // Somebody else has all of max_memory_bytes.
+  bool memory_full = false;
+
   PlainScene scene;
   std::map<uint64_t, PlainSession> sessions;
   std::map<uint64_t, PlainDormant> dormant;
