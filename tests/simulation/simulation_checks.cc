@@ -209,6 +209,26 @@ void SimulationRun::Settle() {
   CheckStats();
   CheckQuiet();
   CheckNobodyWaits();
+  CheckUndisturbed();
+}
+
+// Where no device was ever disturbed nothing was sent twice, and each was found once.
+void SimulationRun::CheckUndisturbed() {
+  if (scenario_.device_faults || scenario_.transport_faults || scenario_.lies || scenario_.jumps) {
+    return;
+  }
+  const daemon::Stats stats = AskStats();
+  for (size_t d = 0; d < now_.size() && wrong_.empty(); ++d) {
+    const daemon::DisplayFigures& figures = stats.displays[d];
+    if (figures.slices_resent != 0) {
+      Fail(absl::StrCat("display ", d, " was sent ", figures.slices_resent,
+                        " slices again, and nothing was amiss"));
+    }
+    // A genlock's member begins anew when it is lit again.
+    if (figures.attaches != 1 && world_->seats()[d].genlock.empty()) {
+      Fail(absl::StrCat("display ", d, " was found ", figures.attaches, " times"));
+    }
+  }
 }
 
 void SimulationRun::Leave() {

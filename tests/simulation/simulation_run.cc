@@ -61,6 +61,7 @@ SimulationRun::SimulationRun(const Scenario& scenario, std::ostream* trace)
   hooks.after_device = [this](size_t d) { AfterDevice(d); };
   world_.emplace(scenario.seed, scenario.limits, scenario.seats, std::move(hooks));
   if (!world_->status().ok()) return;
+  plain_.keeps_state = true;
   judge_ = OutcomeJudge(ScreensOf(scenario, BlackOf(world_->seats())));
   for (size_t d = 0; d < now_.size(); ++d) {
     const Seat& seat = world_->seats()[d];
@@ -135,6 +136,7 @@ daemon::model::RandomMessage SimulationRun::Compose(Chance& chance, uint64_t las
     }
     // Whose device lies of its sweeps, its timed commits come at any time.
     if (scenario_.lies) commit->present_at_ns = 0;
+    commit->durable = chance.OneIn(6);
   }
   return message;
 }
@@ -157,6 +159,11 @@ void SimulationRun::OnPictured(uint64_t snapshot) {
 std::string SimulationRun::OnTold(uint64_t session, const daemon::Receipt& receipt,
                                   const CommitOutcome& outcome) {
   for (size_t d = 0; d < now_.size(); ++d) NoteDisturbances(d);
+  // What a cable damaged is sent again, and each time it takes another fault to damage it again.
+  if (outcome.reason.find("did not arrive") != std::string::npos && !scenario_.lies &&
+      tally_.faults < display::voxlink::kMaxResends && !scenario_.transport_faults) {
+    return absl::StrCat("LOST after ", tally_.faults, " faults: ", outcome.reason);
+  }
   return judge_.Told(session, receipt, outcome, now());
 }
 

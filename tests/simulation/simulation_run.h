@@ -55,6 +55,7 @@ class SimulationRun final : public daemon::model::CoreJudge {
   uint64_t Missing(uint64_t session, uint64_t incarnation, std::string* which) const override {
     return judge_.Missing(session, incarnation, which);
   }
+  bool IsOnDisk(uint64_t snapshot) const override { return world_->disk().written() >= snapshot; }
   bool Idle(size_t display) override;
 
   // ---- simulation_run.cc: as it happens
@@ -91,6 +92,7 @@ class SimulationRun final : public daemon::model::CoreJudge {
   void CheckQuiet();
   void CheckPicture(size_t d);
   void CheckGenlock();
+  void CheckUndisturbed();
   void CheckCaptures();
   void OnCaptured(size_t d, size_t capture, const absl::StatusOr<display::DecodedVolume>& volume);
   void OnWatched(size_t d, const absl::StatusOr<display::DecodedVolume>& volume);

@@ -14,6 +14,29 @@ constexpr int kMostTurns = 100'000;  // without time going on: somebody spins
 
 }  // namespace
 
+void Disk::Offer(daemon::SnapshotPtr snapshot, std::shared_ptr<const daemon::OwnerRecords> /*owners*/,
+                 bool at_once) {
+  offered_ = snapshot->number;
+  waits_ = waits_ || at_once;
+  if (writing_ == 0) {
+    Begin(at_once);
+  }
+}
+
+void Disk::Begin(bool at_once) {
+  writing_ = offered_;
+  waits_ = false;
+  due_ = clock_.Now() + (at_once ? 0 : 100 * sync::kMillisecond) +
+         chance_.Pick(40) * sync::kMillisecond;
+}
+
+uint64_t Disk::Run() {
+  written_ = std::exchange(writing_, 0);
+  due_ = sync::kNever;
+  if (offered_ > written_) Begin(waits_);
+  return written_;
+}
+
 World::World(uint32_t seed, const daemon::Limits& limits, const std::vector<SeatOptions>& seats,
              Hooks hooks)
     : hooks_(std::move(hooks)), chance_(seed ^ 0x5EED) {
@@ -21,6 +44,7 @@ World::World(uint32_t seed, const daemon::Limits& limits, const std::vector<Seat
   options.limits = limits;
   options.version = "simulation";
   options.threads = false;
+  options.state = &disk_;
   // An engine's device is the number of its display here.
   options.make_engine = [this](const gpu::EngineOptions& wanted)
       -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
@@ -87,7 +111,8 @@ absl::Status World::Start() {
 }
 
 sync::TimeNs World::Next() const {
-  sync::TimeNs next = *std::min_element(next_thread_.begin(), next_thread_.end());
+  sync::TimeNs next = disk_.Next();
+  next = std::min(next, *std::min_element(next_thread_.begin(), next_thread_.end()));
   for (size_t i = 0; i < seats_.size(); ++i) {
     next = std::min({next, next_device_[i], seats_[i].engine->Next()});
   }
@@ -98,6 +123,7 @@ void World::Gather(std::vector<Turn>& runnable) const {
   runnable.clear();
   const sync::TimeNs now = clock_.Now();
   if (next_thread_[0] <= now || core_->Ready(0)) runnable.push_back({Who::kCore, 0});
+  if (disk_.Next() <= now) runnable.push_back({Who::kDisk, 0});
   for (size_t i = 0; i < seats_.size(); ++i) {
     if (next_thread_[i + 1] <= now || core_->Ready(i + 1)) runnable.push_back({Who::kPipeline, i});
     if (device_dirty_[i] || next_device_[i] <= now) runnable.push_back({Who::kDevice, i});
@@ -106,7 +132,7 @@ void World::Gather(std::vector<Turn>& runnable) const {
 }
 
 std::string World::Busy() const {
-  static const char* const kNames[] = {"the core", "pipeline", "device", "engine"};
+  static const char* const kNames[] = {"the core", "pipeline", "device", "engine", "the disk"};
   std::vector<Turn> runnable;
   Gather(runnable);
   std::string text;
@@ -119,7 +145,7 @@ std::string World::Busy() const {
 
 void World::Take(const Turn& turn) {
   ++turns_;
-  Seat* const seat = turn.who == Who::kCore ? nullptr : &seats_[turn.seat];
+  Seat* const seat = &seats_[turn.seat];
   switch (turn.who) {
     case Who::kCore:
       next_thread_[0] = core_->Turn(0);
@@ -135,6 +161,8 @@ void World::Take(const Turn& turn) {
       return hooks_.after_device(turn.seat);
     case Who::kEngine:
       return seat->engine->Run();
+    case Who::kDisk:
+      return core_->OnDurable(disk_.Run());
   }
 }
 

@@ -46,10 +46,32 @@ struct Seat {
   std::shared_ptr<EngineStage> engine;
 };
 
+// What outlives the daemon is written here: one snapshot after another, the newest, each in its time.
+class Disk final : public daemon::StateSink {
+ public:
+  Disk(sync::Clock& clock, Chance& chance) : clock_(clock), chance_(chance) {}
+
+  void Offer(daemon::SnapshotPtr snapshot, std::shared_ptr<const daemon::OwnerRecords> owners,
+             bool at_once) override;
+  sync::TimeNs Next() const { return due_; }
+  // The write ends; the snapshot that is on the disk.
+  uint64_t Run();
+  uint64_t written() const { return written_; }
+
+ private:
+  void Begin(bool at_once);
+
+  sync::Clock& clock_;
+  Chance& chance_;
+  uint64_t offered_ = 0, writing_ = 0, written_ = 0;
+  bool waits_ = false;  // somebody, for what was offered
+  sync::TimeNs due_ = sync::kNever;
+};
+
 class World {
  public:
   // Who has a turn.
-  enum class Who : uint8_t { kCore, kPipeline, kDevice, kEngine };
+  enum class Who : uint8_t { kCore, kPipeline, kDevice, kEngine, kDisk };
   struct Hooks {
     std::function<void(size_t seat)> before_pipeline, after_pipeline, after_device;
   };
@@ -63,6 +85,7 @@ class World {
   daemon::Core& core() { return *core_; }
   sync::FakeClock& clock() { return clock_; }
   std::vector<Seat>& seats() { return seats_; }
+  const Disk& disk() const { return disk_; }
   Chance& chance() { return chance_; }
 
   absl::Status Start();
@@ -88,6 +111,7 @@ class World {
   Hooks hooks_;
   Chance chance_;
   sync::FakeClock clock_;
+  Disk disk_{clock_, chance_};
   absl::Status status_;
   std::vector<Seat> seats_;
   std::vector<sync::TimeNs> next_thread_;  // 0: the core's

@@ -160,6 +160,7 @@ void CoreJudge::ExpectIssues(Stream& stream, const std::vector<Refusal>& expecte
 void CoreJudge::CheckIssues(Stream& stream, const PlainTurn& turn) {
   std::vector<Refusal> expected = turn.issues;
   if (turn.tells_rest) expected.push_back({turn.commit.sequence, Reason::kQuotaExceeded});
+  if (turn.not_durable.has_value()) expected.push_back(*turn.not_durable);
   ExpectIssues(stream, expected);
 }
 
@@ -185,6 +186,10 @@ void CoreJudge::CheckTurn(PlainSession& session, uint64_t sequence) {
 }
 
 void CoreJudge::Note(const PlainSession& session, const PlainTurn& turn, uint64_t snapshot) {
+  if (turn.durable) {
+    undurable_[{session.id, session.incarnation, turn.commit.sequence}] = snapshot;
+    ++durables_owed_;
+  }
   OnApplied({session.id, session.incarnation, turn.commit.sequence,
                    turn.commit.commit.frame_id, snapshot, !session.options.no_outcomes,
                    turn.verdict.hidden, turn.commit.commit.present_at_ns});
@@ -195,6 +200,9 @@ void CoreJudge::OnReceipt(Stream& stream, const Receipt& receipt) {
   if (stream.gone) return Fail("a receipt for a client that has gone");
   if (const auto* outcome = std::get_if<CommitOutcome>(&receipt.what)) {
     return OnOutcome(stream, receipt, *outcome);
+  }
+  if (const auto* durable = std::get_if<Durable>(&receipt.what)) {
+    return OnDurable(stream, receipt, *durable);
   }
   const auto* accepted = std::get_if<Accepted>(&receipt.what);
   Explain(accepted != nullptr ? accepted->snapshot : UINT64_MAX);
@@ -249,6 +257,7 @@ void CoreJudge::CheckAccepted(const PlainSession& session, const PlainTurn& turn
   }
   if (Certain(session) && turn.commit.late_known && accepted.late != turn.commit.late) Fail("ACCEPTED late, or not, and it was not");
   if (accepted.applied_time_ns != clock().Now()) Fail("ACCEPTED at another time");
+  if (accepted.durable != turn.durable) Fail("ACCEPTED, to be durable or not, and otherwise");
   const Stages& stages = accepted.stages;
   if (stages.applied_ns != clock().Now() || stages.received_ns > stages.applied_ns ||
       stages.sent_ns < 0 || stages.sent_ns > stages.received_ns) {
@@ -284,6 +293,18 @@ void CoreJudge::OnOutcome(Stream& stream, const Receipt& receipt, const CommitOu
   if (receipt.incarnation != session->incarnation) return;
   --session->owed;
   plain_.Told(*session, outcome.display, receipt.sequence);
+}
+
+void CoreJudge::OnDurable(Stream& stream, const Receipt& receipt, const Durable& durable) {
+  const uint64_t session = stream.info.session;
+  Trace(absl::StrCat("    session ", session, " sequence ", receipt.sequence, " of ",
+                     receipt.incarnation, " DURABLE by snapshot ", durable.snapshot));
+  const auto it = undurable_.find({session, receipt.incarnation, receipt.sequence});
+  if (it == undurable_.end()) return Fail("DURABLE, and nobody waits for it");
+  if (durable.snapshot < it->second) return Fail("DURABLE by an older snapshot");
+  if (!IsOnDisk(it->second)) return Fail("DURABLE, and not on the disk");
+  undurable_.erase(it);
+  ++durables_told_;
 }
 
 void CoreJudge::OnCredit(Stream& stream, uint64_t total) {

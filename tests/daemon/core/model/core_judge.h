@@ -84,6 +84,8 @@ class CoreJudge {
   virtual void OnTakenBack(uint64_t session, const Receipt& receipt) = 0;
   // Outcomes of this incarnation of the session that were not told; the first is described.
   virtual uint64_t Missing(uint64_t session, uint64_t incarnation, std::string* which) const = 0;
+  // Whether what is kept of that snapshot, or of a newer one, has been written.
+  virtual bool IsOnDisk(uint64_t /*snapshot*/) const { return false; }
   // Whether a display shows and has nothing to do: then nobody is owed an outcome on it.
   virtual bool Idle(size_t display) = 0;
 
@@ -91,6 +93,7 @@ class CoreJudge {
   void OnIssue(Stream& stream, const Issue& issue);
   void OnReceipt(Stream& stream, const Receipt& receipt);
   void OnOutcome(Stream& stream, const Receipt& receipt, const CommitOutcome& outcome);
+  void OnDurable(Stream& stream, const Receipt& receipt, const Durable& durable);
   void OnCredit(Stream& stream, uint64_t total);
   void OnEnded(Stream& stream);
   void OnPublished();
@@ -172,6 +175,9 @@ class CoreJudge {
   bool stopping_ = false;
   uint64_t owed_unit_ = 0;  // bytes that an outcome weighs
   std::set<std::tuple<uint64_t, uint64_t, uint64_t, std::string>> given_back_;
+  // Session, incarnation and sequence of commits that are to be told DURABLE: their snapshots.
+  std::map<std::tuple<uint64_t, uint64_t, uint64_t>, uint64_t> undurable_;
+  uint64_t durables_owed_ = 0, durables_told_ = 0;
 };
 
 }  // namespace voxeld::daemon::model

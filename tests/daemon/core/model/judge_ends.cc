@@ -23,6 +23,12 @@ void CoreJudge::CheckNobodyWaits() {
     if (const uint64_t n = Missing(session->id, session->incarnation, &which); n > 0) {
       return Fail(absl::StrCat(n, " outcomes were never told, the first: ", which));
     }
+    const auto next = undurable_.lower_bound({session->id, session->incarnation, 0});
+    if (next != undurable_.end() && std::get<0>(next->first) == session->id &&
+        std::get<1>(next->first) == session->incarnation) {
+      return Fail(absl::StrCat("session ", session->id, " sequence ", std::get<2>(next->first),
+                               " was never told DURABLE"));
+    }
   }
 }
 
@@ -50,6 +56,8 @@ void CoreJudge::EvictEverybody() {
 
 void CoreJudge::CheckNothingIsHeld(uint64_t owed, uint64_t told) {
   CheckStats();
+  owed += durables_owed_;
+  told += durables_told_;
   if (owed != told) {
     Fail(absl::StrCat(owed, " outcomes were owed, and ", told,
                       " told or counted as undelivered"));

@@ -118,6 +118,7 @@ PlainSession& PlainCore::Open(const OpenOptions& options, const SessionInfo& inf
   PlainSession session;
   session.id = info.session;
   session.options = options;
+  session.keeps = options.on_disconnect == DisconnectPolicy::kKeep;
   session.token = info.resume_token;
   session.received = open_bytes;
   figures.bytes_in += open_bytes;
@@ -329,6 +330,11 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Hea
   if (turn.kind == PlainTurn::Kind::kRefused) {
     ++figures.refused;
     return turn;
+  }
+  turn.durable = commit.commit.durable && keeps_state && session.keeps;
+  if (commit.commit.durable && !turn.durable) {
+    turn.not_durable = {commit.sequence,
+                        keeps_state ? Reason::kInvalidValue : Reason::kUnimplemented};
   }
   ++figures.accepted;
   figures.operations_applied += turn.verdict.applied_operations;

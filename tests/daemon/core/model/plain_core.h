@@ -39,6 +39,7 @@ struct PlainSession {
   uint64_t id = 0, incarnation = 0, owner = 0;
   OpenOptions options;
   std::string token;
+  bool keeps = false;  // its layers
   bool closing = false;
   bool crowded = false;
   PlainCommit staged;
@@ -77,6 +78,8 @@ struct PlainTurn {
   uint64_t refused_operations = 0;
   std::vector<Refusal> issues;  // told with it
   bool tells_rest = false;      // one more, of those left out
+  bool durable = false;         // it is told when it is on the disk
+  std::optional<Refusal> not_durable;  // told last: it asks for that in vain
 };
 
 class PlainCore {
@@ -93,6 +96,7 @@ class PlainCore {
 
   // Somebody else has all of max_memory_bytes.
   bool memory_full = false;
+  bool keeps_state = false;  // what sessions KEEP outlives the daemon
 
   PlainScene scene;
   std::map<uint64_t, PlainSession> sessions;
