@@ -26,8 +26,11 @@ Look LookOf(const std::vector<display::Picture>& pictures) {
 }
 
 void Eye::Asked(uint64_t volume, uint64_t snapshot, bool pattern, sync::TimeNs now) {
-  drawn_.push_back(
-      {.volume = volume, .snapshot = snapshot, .oldest_snapshot = snapshot, .asked_ns = now, .pattern = pattern});
+  drawn_.push_back({.volume = volume,
+                    .snapshot = snapshot,
+                    .oldest_snapshot = snapshot,
+                    .asked_ns = now,
+                    .pattern = pattern});
 }
 
 void Eye::Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t snapshot,
@@ -48,9 +51,8 @@ std::string Eye::Sees(Look look, sync::TimeNs now) {
   const auto found = by_look_.find(look);
   if (found == by_look_.end()) return "the device shows what was never drawn";
   const std::vector<size_t>& like_it = found->second;
-  const auto next = std::find_if(like_it.begin(), like_it.end(), [this](size_t i) {
-    return drawn_[i].volume >= newest_shown_;
-  });
+  const auto next = std::find_if(like_it.begin(), like_it.end(),
+                                 [this](size_t i) { return drawn_[i].volume >= newest_shown_; });
   if (next == like_it.end()) {
     return absl::StrCat("the device shows volume ", drawn_[like_it.back()].volume,
                         " again, and has shown volume ", newest_shown_);
@@ -74,9 +76,8 @@ bool Eye::WasShown(Look look, sync::TimeNs at, sync::TimeNs tolerance, sync::Tim
     return shown.look == look && shown.at >= since && std::abs(shown.at - at) <= tolerance;
   };
   return std::any_of(shown_.begin(), shown_.end(), seen) ||
-         std::any_of(blinks_.begin(), blinks_.end(), [at](const auto& blink) {
-           return blink.first <= at && at <= blink.second;
-         });
+         std::any_of(blinks_.begin(), blinks_.end(),
+                     [at](const auto& blink) { return blink.first <= at && at <= blink.second; });
 }
 
 bool Eye::EverShown(Look look, sync::TimeNs since) const {

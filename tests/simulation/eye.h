@@ -28,8 +28,9 @@ class Eye {
     uint64_t snapshot = 0, oldest_snapshot = 0;  // the newest, and the oldest, that it may be of
     sync::TimeNs asked_ns = 0;
     std::optional<sync::TimeNs> drawn_ns;
-    Look look = 0;                       // once drawn
-    std::optional<sync::TimeNs> shown;   // at its sweep's start; where no other volume looks the same
+    Look look = 0;  // once drawn
+    std::optional<sync::TimeNs>
+        shown;  // at its sweep's start; where no other volume looks the same
     bool pattern = false;
   };
   struct Shown {
@@ -40,7 +41,8 @@ class Eye {
   explicit Eye(Look black) : black_(black) {}
 
   void Asked(uint64_t volume, uint64_t snapshot, bool pattern, sync::TimeNs now);
-  void Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t snapshot, sync::TimeNs now);
+  void Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t snapshot,
+            sync::TimeNs now);
   // The device shows another picture. What is wrong with that; empty: nothing.
   std::string Sees(Look look, sync::TimeNs now);
 

@@ -19,7 +19,8 @@ namespace voxeld::simulation {
 namespace {
 
 constexpr char kUsage[] =
-    "simulation [--seeds A..B] [--seed N] [--verbose] [--jobs N] [--json] [--most-failures N] [--quiet]\n"
+    "simulation [--seeds A..B] [--seed N] [--verbose] [--jobs N] [--json] [--most-failures N] "
+    "[--quiet]\n"
     "  --seeds A..B       runs seeds A to B, both included (1..1000)\n"
     "  --seed N           runs that one\n"
     "  --verbose          writes all that happens\n"
@@ -27,7 +28,8 @@ constexpr char kUsage[] =
     "  --json             the result as JSON\n"
     "  --most-failures N  gives up after so many (1)\n"
     "  --quiet            no progress\n"
-    "It ends with 0 if nothing was wrong, with 1 if something was, with 2 for a wrong command line.\n";
+    "It ends with 0 if nothing was wrong, with 1 if something was, with 2 for a wrong command "
+    "line.\n";
 
 struct Options {
   uint32_t first = 1, last = 1000;
@@ -121,8 +123,8 @@ void Print(const Options& options, const Sum& sum, double seconds) {
               << ", \"outcomes\": " << t.outcomes << ", \"presented\": " << kind(Kind::kPresented)
               << ", \"unchanged\": " << kind(Kind::kUnchanged)
               << ", \"superseded\": " << kind(Kind::kSuperseded)
-              << ", \"lost\": " << kind(Kind::kLost)
-              << ", \"not_shown\": " << kind(Kind::kNotShown) << ", \"volumes_shown\": " << t.volumes
+              << ", \"lost\": " << kind(Kind::kLost) << ", \"not_shown\": " << kind(Kind::kNotShown)
+              << ", \"volumes_shown\": " << t.volumes
               << ", \"pictures_compared\": " << t.pictures_compared
               << ", \"captures\": " << t.captures << ", \"watched\": " << t.watched
               << ", \"faults\": " << t.faults << ", \"trace_hash\": \""
@@ -134,17 +136,16 @@ void Print(const Options& options, const Sum& sum, double seconds) {
     std::cout << "]}\n";
     return;
   }
-  std::printf(
-      "%" PRIu64 " seeds in %.1f s (%.0f/s), %.0f s simulated, %" PRIu64 " turns: %" PRIu64
-      " commits, %" PRIu64 " outcomes (presented %" PRIu64 ", unchanged %" PRIu64
-      ", superseded %" PRIu64 ", lost %" PRIu64 ", not shown %" PRIu64 "), %" PRIu64
-      " volumes shown, %" PRIu64 " pictures compared, %" PRIu64 " captures, %" PRIu64
-      " watched, %" PRIu64 " faults; trace hash %016" PRIx64 "; %zu failed\n",
-      sum.seeds, seconds, static_cast<double>(sum.seeds) / seconds,
-      static_cast<double>(t.time_ns) / 1e9, t.turns, t.commits, t.outcomes, kind(Kind::kPresented),
-      kind(Kind::kUnchanged), kind(Kind::kSuperseded), kind(Kind::kLost), kind(Kind::kNotShown),
-      t.volumes, t.pictures_compared, t.captures, t.watched, t.faults, sum.hash,
-      sum.failures.size());
+  std::printf("%" PRIu64 " seeds in %.1f s (%.0f/s), %.0f s simulated, %" PRIu64 " turns: %" PRIu64
+              " commits, %" PRIu64 " outcomes (presented %" PRIu64 ", unchanged %" PRIu64
+              ", superseded %" PRIu64 ", lost %" PRIu64 ", not shown %" PRIu64 "), %" PRIu64
+              " volumes shown, %" PRIu64 " pictures compared, %" PRIu64 " captures, %" PRIu64
+              " watched, %" PRIu64 " faults; trace hash %016" PRIx64 "; %zu failed\n",
+              sum.seeds, seconds, static_cast<double>(sum.seeds) / seconds,
+              static_cast<double>(t.time_ns) / 1e9, t.turns, t.commits, t.outcomes,
+              kind(Kind::kPresented), kind(Kind::kUnchanged), kind(Kind::kSuperseded),
+              kind(Kind::kLost), kind(Kind::kNotShown), t.volumes, t.pictures_compared, t.captures,
+              t.watched, t.faults, sum.hash, sum.failures.size());
   for (const Failure& failure : sum.failures) {
     std::printf("seed %u: %s\n", failure.seed, failure.what.c_str());
   }

@@ -97,8 +97,8 @@ void OutcomeJudge::TakeBack(uint64_t session, const Receipt& receipt) {
 
 bool OutcomeJudge::LooksLike(size_t d, Look look, uint64_t to) const {
   const Eye& eye = screens_[d].eye;
-  const bool drawn = std::any_of(
-      eye.drawn().begin(), eye.drawn().end(), [look, to](const Eye::Drawn& volume) {
+  const bool drawn =
+      std::any_of(eye.drawn().begin(), eye.drawn().end(), [look, to](const Eye::Drawn& volume) {
         return volume.snapshot >= to && volume.drawn_ns.has_value() && volume.look == look;
       });
   // Else nothing was drawn of it: nothing that an engine sees had changed.
@@ -143,8 +143,8 @@ std::string OutcomeJudge::Judge(size_t index, size_t d, const CommitOutcome& out
   const OnScreen& on = entry.on[d];
   const Screen& screen = screens_[d];
   if (outcome.kind == Kind::kNotShown) {
-    const bool hidden_since = outcome.why == NotShown::kHidden && screen.patterns > on.patterns &&
-                              (on.may & kRides) != 0;
+    const bool hidden_since =
+        outcome.why == NotShown::kHidden && screen.patterns > on.patterns && (on.may & kRides) != 0;
     if ((on.may & Bit(outcome.why)) != 0 || hidden_since) return "";
     return absl::StrCat("NOT_SHOWN/", static_cast<int>(outcome.why), ", which it may not be (",
                         on.may, ")");
@@ -194,7 +194,8 @@ std::string OutcomeJudge::JudgePresented(Entry& entry, size_t d, const CommitOut
   }
   if (entry.commit.present_at != 0 && !disturbed &&
       outcome.time_ns < entry.commit.present_at - screen.tolerance) {
-    return absl::StrCat("PRESENTED at ", outcome.time_ns, ", before its time ", entry.commit.present_at);
+    return absl::StrCat("PRESENTED at ", outcome.time_ns, ", before its time ",
+                        entry.commit.present_at);
   }
   // Of one session's commits that ride in one volume only the newest is; later ones in later volumes.
   uint64_t& last = last_presented_[{d, entry.commit.session}];

@@ -31,10 +31,10 @@ class OutcomeJudge {
     std::string name;
     Eye eye;
     sync::TimeNs disturbed_until = 0;
-    sync::TimeNs lied_until = -1;    // what its device told until then need not be so
-    sync::TimeNs tolerance = 0;  // of times that its device tells, while nothing disturbs it
+    sync::TimeNs lied_until = -1;  // what its device told until then need not be so
+    sync::TimeNs tolerance = 0;    // of times that its device tells, while nothing disturbs it
     bool pattern = false;
-    uint64_t patterns = 0;  // set so far
+    uint64_t patterns = 0;                                // set so far
     bool pattern_changes = false, blank_changes = false;  // on its way to the display
   };
 
@@ -102,7 +102,7 @@ class OutcomeJudge {
   std::vector<size_t> boarding_from_ = std::vector<size_t>(screens_.size(), 0);
   std::vector<size_t> boarding_to_ = std::vector<size_t>(screens_.size(), 0);
   std::map<std::pair<uint64_t, uint64_t>, std::vector<size_t>> of_stream_;
-  std::map<uint64_t, uint64_t> pictures_;  // by snapshot
+  std::map<uint64_t, uint64_t> pictures_;                           // by snapshot
   std::map<std::pair<size_t, uint64_t>, uint64_t> last_presented_;  // display, session: volume
   std::set<uint64_t> taken_back_;  // sessions whose outcomes may come out of their order
   std::map<CommitOutcome::Kind, uint64_t> kinds_;

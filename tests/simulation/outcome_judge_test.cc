@@ -71,7 +71,8 @@ class OutcomeJudgeTest : public ::testing::Test {
     return outcome;
   }
 
-  OutcomeJudge judge_{{{.name = "main", .eye = Eye(kBlack), .disturbed_until = -1, .tolerance = 1}}};
+  OutcomeJudge judge_{
+      {{.name = "main", .eye = Eye(kBlack), .disturbed_until = -1, .tolerance = 1}}};
   DisplayState state_ = DisplayState::kShowing;
 };
 

@@ -88,8 +88,8 @@ std::vector<std::byte> DrawPlain(const PlainScene& scene, const display::Display
   size_t size = 0;
   for (const gpu::LayerRecord& layer : layers) size += gpu::DeltaWriter::SizeOf(layer);
   for (const Piece& piece : pieces) {
-    size += gpu::DeltaWriter::SizeOf(piece.geometry->record) +
-            gpu::DeltaWriter::SizeOf(piece.drawable);
+    size +=
+        gpu::DeltaWriter::SizeOf(piece.geometry->record) + gpu::DeltaWriter::SizeOf(piece.drawable);
   }
 
   gpu::EngineOptions options;
@@ -113,8 +113,9 @@ std::vector<std::byte> DrawPlain(const PlainScene& scene, const display::Display
   }
   std::vector<std::byte> bytes(info.layout.bytes());
   std::vector<uint64_t> changed_in(info.layout.pictures());
-  engine->SubmitFrame({.frame = 1}, {bytes, changed_in},
-                      [](const absl::StatusOr<gpu::FrameResult>& result) { Must(result.status()); });
+  engine->SubmitFrame(
+      {.frame = 1}, {bytes, changed_in},
+      [](const absl::StatusOr<gpu::FrameResult>& result) { Must(result.status()); });
   return bytes;
 }
 

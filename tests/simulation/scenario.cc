@@ -127,9 +127,9 @@ TransportFault RandomTransportFault(Chance& chance) {
   fault.at = 1 + chance.Pick(fault.where == TransportFault::Where::kOpen ? 2 : 150);
   fault.count = 1 + chance.Pick(3);
   if (fault.where != TransportFault::Where::kCompletion) return fault;
-  static constexpr TransferStatus kStatuses[] = {
-      TransferStatus::kTimedOut, TransferStatus::kStall, TransferStatus::kError,
-      TransferStatus::kOverflow, TransferStatus::kDisconnected};
+  static constexpr TransferStatus kStatuses[] = {TransferStatus::kTimedOut, TransferStatus::kStall,
+                                                 TransferStatus::kError, TransferStatus::kOverflow,
+                                                 TransferStatus::kDisconnected};
   if (chance.OneIn(3)) {
     fault.hold = chance.Pick(400) * sync::kMillisecond;
   } else {

@@ -18,7 +18,7 @@ struct Scenario {
   bool device_faults = false, transport_faults = false, engine_faults = false, jumps = false;
   bool lies = false;         // devices tell what is not so
   bool memory_ends = false;  // now and then there is none for clients
-  bool settles = true;  // ends when all is shown and everybody has left; else in the middle
+  bool settles = true;       // ends when all is shown and everybody has left; else in the middle
   std::vector<daemon::model::Action> actions;
 };
 

@@ -197,9 +197,8 @@ void SimulationRun::FillMemory(bool full) {
 
 void SimulationRun::AwaitCertainty() {
   const auto uncertain = [this] {
-    return std::any_of(plain_.sessions.begin(), plain_.sessions.end(), [this](const auto& entry) {
-      return plain_.Uncertain(entry.second, now());
-    });
+    return std::any_of(plain_.sessions.begin(), plain_.sessions.end(),
+                       [this](const auto& entry) { return plain_.Uncertain(entry.second, now()); });
   };
   while (wrong_.empty() && uncertain()) Advance(7 * kMillisecond);
 }
@@ -265,9 +264,8 @@ void SimulationRun::Watch(size_t d) {
   Trace(absl::StrCat("display ", d, " is watched"));
   is.watched_since = now();
   is.watch = core().WatchVolumes(
-      name, [this, d](const absl::StatusOr<display::DecodedVolume>& volume) {
-        OnWatched(d, volume);
-      });
+      name,
+      [this, d](const absl::StatusOr<display::DecodedVolume>& volume) { OnWatched(d, volume); });
   Step();
 }
 

@@ -61,11 +61,10 @@ void SimulationRun::CheckPicture(size_t d) {
   const std::vector<std::byte> expected = DrawPlain(plain_.scene, seat.display->info());
   const display::emulator::VoxlinkScreen& screen = seat.device->screen();
   if (!screen.lit()) {
-    return Fail(absl::StrCat("display ", d, " is dark, and nothing darkens it: ",
-                             screen.running() ? "" : "not started ",
-                             screen.shown() == nullptr ? "nothing to show " : "",
-                             screen.watchdog_dark() ? "its host is silent " : "",
-                             screen.blanked() ? "blanked " : ""));
+    return Fail(absl::StrCat(
+        "display ", d, " is dark, and nothing darkens it: ", screen.running() ? "" : "not started ",
+        screen.shown() == nullptr ? "nothing to show " : "",
+        screen.watchdog_dark() ? "its host is silent " : "", screen.blanked() ? "blanked " : ""));
   }
   if (LookOf(screen.shown()->pictures) != LookOf(expected)) {
     return Fail(absl::StrCat("display ", d, " does not show the scene"));
@@ -88,9 +87,11 @@ void SimulationRun::CheckGenlock() {
   };
   const auto first = newest(0), second = newest(1);
   const bool lit = first.has_value() && second.has_value() && !now_[0].blanked && !now_[1].blanked;
-  const bool calm = judge_.screen(0).disturbed_until < now() && judge_.screen(1).disturbed_until < now();
+  const bool calm =
+      judge_.screen(0).disturbed_until < now() && judge_.screen(1).disturbed_until < now();
   // Each shows one of the volumes that look like it; there is one that both may be.
-  const bool apart = lit && calm && (first->second < second->first || second->second < first->first);
+  const bool apart =
+      lit && calm && (first->second < second->first || second->second < first->first);
   if (!apart) {
     now_[1].apart_since = 0;
     return;
@@ -109,7 +110,8 @@ std::string SimulationRun::WrongWith(size_t d, const display::DecodedVolume& vol
   const Eye::Drawn* drawn = eye.Find(volume.volume);
   if (drawn == nullptr || !drawn->drawn_ns.has_value()) return "a volume that was not drawn";
   if (drawn->look != look) return absl::StrCat("volume ", volume.volume, " looks otherwise");
-  if (judge_.screen(d).lied_until < 0 && !eye.EverShown(look, *drawn->drawn_ns)) return absl::StrCat("volume ", volume.volume, " was not shown");
+  if (judge_.screen(d).lied_until < 0 && !eye.EverShown(look, *drawn->drawn_ns))
+    return absl::StrCat("volume ", volume.volume, " was not shown");
   return "";
 }
 
@@ -185,7 +187,8 @@ void SimulationRun::Settle() {
     });
     now_[d].plugged = true;
     world_->Touch(d);
-    if (now_[d].blanked) DoToDisplay({daemon::model::ActionKind::kBlank, 0, 0}, world_->chance(), d);
+    if (now_[d].blanked)
+      DoToDisplay({daemon::model::ActionKind::kBlank, 0, 0}, world_->chance(), d);
     if (judge_.screen(d).pattern) {
       DoToDisplay({daemon::model::ActionKind::kPattern, 0, 0}, world_->chance(), d);
     }
@@ -255,7 +258,8 @@ void SimulationRun::Leave() {
   stopping_ = true;
   if (wrong_.empty() && !core().Stop(kSecond).ok()) Fail("the core does not stop");
   if (core().budget()->used_bytes() != 0) {
-    Fail(absl::StrCat("the core has stopped, and ", core().budget()->used_bytes(), " bytes are held"));
+    Fail(absl::StrCat("the core has stopped, and ", core().budget()->used_bytes(),
+                      " bytes are held"));
   }
 }
 

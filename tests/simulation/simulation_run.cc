@@ -30,10 +30,12 @@ std::vector<std::string> NamesOf(const Scenario& scenario) {
   return names;
 }
 
-std::vector<OutcomeJudge::Screen> ScreensOf(const Scenario& scenario, const std::vector<Look>& black) {
+std::vector<OutcomeJudge::Screen> ScreensOf(const Scenario& scenario,
+                                            const std::vector<Look>& black) {
   std::vector<OutcomeJudge::Screen> screens;
   for (const SeatOptions& seat : scenario.seats) {
-    screens.push_back({.name = seat.name, .eye = Eye(black[screens.size()]), .tolerance = kTolerance});
+    screens.push_back(
+        {.name = seat.name, .eye = Eye(black[screens.size()]), .tolerance = kTolerance});
   }
   return screens;
 }
@@ -143,9 +145,7 @@ daemon::model::RandomMessage SimulationRun::Compose(Chance& chance, uint64_t las
 
 // -------------------------------------------------------------------------------- what is told
 
-void SimulationRun::OnApplied(const Applied& commit) {
-  judge_.OnApplied(commit, now());
-}
+void SimulationRun::OnApplied(const Applied& commit) { judge_.OnApplied(commit, now()); }
 
 void SimulationRun::OnPictured(uint64_t snapshot) {
   const PlainScene::Picture picture = plain_.scene.Draw();
@@ -244,8 +244,8 @@ void SimulationRun::OnSubmit(size_t d, uint64_t volume) {
 
 void SimulationRun::OnEngineFailed(size_t d, uint64_t volume, const absl::Status& status) {
   if (!wrong_.empty()) return;
-  Trace(absl::StrCat("    display ", d, ", volume ", volume, ": the engine fails: ",
-                     status.message()));
+  Trace(absl::StrCat("    display ", d, ", volume ", volume,
+                     ": the engine fails: ", status.message()));
   Disturb(d, now() + kEngineAftermath);
   ++tally_.faults;
 }

@@ -110,7 +110,8 @@ class SimulationRun final : public daemon::model::CoreJudge {
     sync::TimeNs watched_since = 0;
     std::optional<Look> watched;
     uint64_t watched_volume = 0;
-    sync::TimeNs apart_since = 0;  // of a genlock: it shows something else than the first; 0: it does not
+    sync::TimeNs apart_since =
+        0;  // of a genlock: it shows something else than the first; 0: it does not
   };
   struct Pending {
     size_t display = 0;

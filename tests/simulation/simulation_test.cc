@@ -31,7 +31,8 @@ TEST(Simulation, SeedsDiffer) {
   for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
     SimulationRun run(MakeScenario(seed));
     EXPECT_EQ(run.Run(), "") << "seed " << seed;
-    EXPECT_TRUE(by_hash.emplace(run.trace_hash(), seed).second) << "as seed " << by_hash[run.trace_hash()];
+    EXPECT_TRUE(by_hash.emplace(run.trace_hash(), seed).second)
+        << "as seed " << by_hash[run.trace_hash()];
   }
 }
 
@@ -50,8 +51,8 @@ TEST(Simulation, AllThatIsJudgedIsMet) {
     sum.watched += tally.watched;
     sum.faults += tally.faults;
   }
-  for (const Kind kind : {Kind::kPresented, Kind::kUnchanged, Kind::kSuperseded, Kind::kLost,
-                          Kind::kNotShown}) {
+  for (const Kind kind :
+       {Kind::kPresented, Kind::kUnchanged, Kind::kSuperseded, Kind::kLost, Kind::kNotShown}) {
     EXPECT_GT(kinds[kind], 20u) << static_cast<int>(kind);
   }
   EXPECT_GT(sum.volumes, 500u);

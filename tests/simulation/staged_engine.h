@@ -26,9 +26,9 @@ struct EngineStage {
   };
 
   sync::Clock* clock = nullptr;
-  std::function<sync::TimeNs()> takes;  // how long the next call does
-  std::optional<absl::Status> fail;     // the next frame ends in this, once
-  bool fail_staging = false;            // AcquireStaging is refused, once
+  std::function<sync::TimeNs()> takes;             // how long the next call does
+  std::optional<absl::Status> fail;                // the next frame ends in this, once
+  bool fail_staging = false;                       // AcquireStaging is refused, once
   std::function<void(uint64_t volume)> on_submit;  // as it is asked for
   std::function<void(uint64_t volume, const absl::Status&)> on_failed;
   // As it is drawn: from that scene, these bytes.

@@ -14,8 +14,8 @@ constexpr int kMostTurns = 100'000;  // without time going on: somebody spins
 
 }  // namespace
 
-void Disk::Offer(daemon::SnapshotPtr snapshot, std::shared_ptr<const daemon::OwnerRecords> /*owners*/,
-                 bool at_once) {
+void Disk::Offer(daemon::SnapshotPtr snapshot,
+                 std::shared_ptr<const daemon::OwnerRecords> /*owners*/, bool at_once) {
   offered_ = snapshot->number;
   waits_ = waits_ || at_once;
   if (writing_ == 0) {
@@ -46,8 +46,8 @@ World::World(uint32_t seed, const daemon::Limits& limits, const std::vector<Seat
   options.threads = false;
   options.state = &disk_;
   // An engine's device is the number of its display here.
-  options.make_engine = [this](const gpu::EngineOptions& wanted)
-      -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
+  options.make_engine =
+      [this](const gpu::EngineOptions& wanted) -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
     return MakeStagedEngine(seats_[static_cast<size_t>(wanted.device)].engine);
   };
   core_.emplace(std::move(options), clock_);

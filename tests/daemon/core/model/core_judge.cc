@@ -6,10 +6,7 @@
 
 namespace voxeld::daemon::model {
 CoreJudge::CoreJudge(const Limits& limits, std::vector<std::string> displays, std::ostream* trace)
-    : limits_(limits),
-      displays_(std::move(displays)),
-      trace_(trace),
-      plain_(limits, displays_) {}
+    : limits_(limits), displays_(std::move(displays)), trace_(trace), plain_(limits, displays_) {}
 
 void CoreJudge::Begin() {
   seen_ = checked_ = core().scene_watch().newest()->number;
@@ -190,9 +187,9 @@ void CoreJudge::Note(const PlainSession& session, const PlainTurn& turn, uint64_
     undurable_[{session.id, session.incarnation, turn.commit.sequence}] = snapshot;
     ++durables_owed_;
   }
-  OnApplied({session.id, session.incarnation, turn.commit.sequence,
-                   turn.commit.commit.frame_id, snapshot, !session.options.no_outcomes,
-                   turn.verdict.hidden, turn.commit.commit.present_at_ns});
+  OnApplied({session.id, session.incarnation, turn.commit.sequence, turn.commit.commit.frame_id,
+             snapshot, !session.options.no_outcomes, turn.verdict.hidden,
+             turn.commit.commit.present_at_ns});
 }
 
 void CoreJudge::OnReceipt(Stream& stream, const Receipt& receipt) {
@@ -255,7 +252,8 @@ void CoreJudge::CheckAccepted(const PlainSession& session, const PlainTurn& turn
     Fail(absl::StrCat("ACCEPTED with ", accepted.dropped_frames, " dropped frames, not ",
                       turn.commit.dropped_frames));
   }
-  if (Certain(session) && turn.commit.late_known && accepted.late != turn.commit.late) Fail("ACCEPTED late, or not, and it was not");
+  if (Certain(session) && turn.commit.late_known && accepted.late != turn.commit.late)
+    Fail("ACCEPTED late, or not, and it was not");
   if (accepted.applied_time_ns != clock().Now()) Fail("ACCEPTED at another time");
   if (accepted.durable != turn.durable) Fail("ACCEPTED, to be durable or not, and otherwise");
   const Stages& stages = accepted.stages;

@@ -154,8 +154,7 @@ void CoreJudge::Send(uint32_t place, Chance& chance, bool step) {
                              ", and should not"));
   }
   if (!room) return;
-  RandomMessage message =
-      Compose(chance, stream.last_sequence, &stream.next_frame_id);
+  RandomMessage message = Compose(chance, stream.last_sequence, &stream.next_frame_id);
   stream.last_sequence += message.operations.size() + message.malformed.size();
   Trace(absl::StrCat("session ", session.id, " sends ", message.bytes, " bytes:", message.text));
   const std::vector<Refusal> expected =

@@ -59,8 +59,7 @@ void CoreJudge::CheckNothingIsHeld(uint64_t owed, uint64_t told) {
   owed += durables_owed_;
   told += durables_told_;
   if (owed != told) {
-    Fail(absl::StrCat(owed, " outcomes were owed, and ", told,
-                      " told or counted as undelivered"));
+    Fail(absl::StrCat(owed, " outcomes were owed, and ", told, " told or counted as undelivered"));
   }
   for (size_t use = 0; use < Budget::kUses; ++use) {
     // An engine holds memory while there is one.
@@ -89,8 +88,7 @@ void CoreJudge::StopInTheMiddle() {
     if (!wrong_.empty()) return;
     if (!stream->ended) return Fail("a stream was not ended");
     std::string which;
-    if (const uint64_t n = Missing(stream->info.session, stream->info.incarnation, &which);
-        n > 0) {
+    if (const uint64_t n = Missing(stream->info.session, stream->info.incarnation, &which); n > 0) {
       return Fail(absl::StrCat(n, " outcomes were never told, the first: ", which));
     }
   }

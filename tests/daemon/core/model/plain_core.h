@@ -76,9 +76,9 @@ struct PlainTurn {
   PlainCommit commit;
   PlainVerdict verdict;
   uint64_t refused_operations = 0;
-  std::vector<Refusal> issues;  // told with it
-  bool tells_rest = false;      // one more, of those left out
-  bool durable = false;         // it is told when it is on the disk
+  std::vector<Refusal> issues;         // told with it
+  bool tells_rest = false;             // one more, of those left out
+  bool durable = false;                // it is told when it is on the disk
   std::optional<Refusal> not_durable;  // told last: it asks for that in vain
 };
 
