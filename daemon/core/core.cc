@@ -55,6 +55,10 @@ absl::Status Core::Stop(sync::TimeNs limit) { return impl_->Stop(limit); }
 
 sync::TimeNs Core::Step() { return impl_->Step(); }
 
+sync::TimeNs Core::Turn(size_t thread) { return impl_->ThreadTurn(thread); }
+
+bool Core::Ready(size_t thread) const { return impl_->Ready(thread); }
+
 const std::shared_ptr<Budget>& Core::budget() const { return impl_->budget(); }
 
 void Core::OpenSession(OpenOptions options, uint64_t open_bytes, std::shared_ptr<SessionSink> sink,

@@ -13,7 +13,7 @@
 // and answer by callback on the core's thread, or on the display's pipeline thread; callbacks must
 // only post). One more thread a display runs its pipeline. With CoreOptions::threads = false there
 // are none: Step() does everything that is due, in the caller's thread, so that a whole daemon can
-// be simulated under a FakeClock.
+// be simulated under a FakeClock; Turn() does what one of the threads would do next.
 #pragma once
 
 #include <cstdint>
@@ -183,6 +183,12 @@ class Core {
 
   // threads = false only: does all that is due and returns when more is.
   sync::TimeNs Step();
+  // threads = false only, for a simulation that chooses who comes next: one turn of one of the threads that there
+  // would be, as it has one whenever its wait ends; answers when the wait after it ends at the latest. Thread 0 is the
+  // core's, thread n that of the n-th display.
+  sync::TimeNs Turn(size_t thread);
+  // Whether its wait ends now, whatever the time.
+  bool Ready(size_t thread) const;
 
   // What is held for clients. Lives as long as anybody has it.
   const std::shared_ptr<Budget>& budget() const;

@@ -42,6 +42,8 @@ class Core::Impl {
   absl::Status Start(std::shared_ptr<Impl> self);
   absl::Status Stop(sync::TimeNs limit);
   sync::TimeNs Step();
+  sync::TimeNs ThreadTurn(size_t thread);
+  bool Ready(size_t thread) const;
 
   // ---- sessions (sessions.cc)
   absl::StatusOr<SessionInfo> OpenSession(OpenOptions options, uint64_t open_bytes,
@@ -182,6 +184,9 @@ class Core::Impl {
   // Waits until none of `names` runs; answers those that still do at `deadline`.
   std::set<std::string> AwaitEnd(const std::set<std::string>& names, sync::TimeNs deadline);
   absl::Status StartPipelines();
+  // One turn of the core's thread, of a display's: answers until when to wait.
+  sync::TimeNs CoreTurn();
+  static sync::TimeNs PipelineTurn(Host& host);
   void RunCore();
   void EndSessions();  // the core ends; whoever waits for an answer is told
   static void RunPipeline(Host& host);

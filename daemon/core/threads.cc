@@ -45,11 +45,13 @@ std::set<std::string> Core::Impl::AwaitEnd(const std::set<std::string>& names,
   }
 }
 
+sync::TimeNs Core::Impl::CoreTurn() {
+  loop_->RunPosted();
+  return RunDue();
+}
+
 void Core::Impl::RunCore() {
-  while (!loop_->closed()) {
-    loop_->RunPosted();
-    loop_->Wait(RunDue());
-  }
+  while (!loop_->closed()) loop_->Wait(CoreTurn());
   while (loop_->RunPosted()) {
   }
   EndSessions();
@@ -66,11 +68,13 @@ void Core::Impl::EndSessions() {
   }
 }
 
+sync::TimeNs Core::Impl::PipelineTurn(Host& host) {
+  host.work->RunPosted();
+  return host.pipeline->Step();
+}
+
 void Core::Impl::RunPipeline(Host& host) {
-  while (!host.work->closed()) {
-    host.work->RunPosted();
-    host.work->Wait(host.pipeline->Step());
-  }
+  while (!host.work->closed()) host.work->Wait(PipelineTurn(host));
   host.pipeline->Stop();
   while (host.work->RunPosted()) {
   }
@@ -181,6 +185,14 @@ sync::TimeNs Core::Impl::Step() {
     any = loop_->RunPosted() || any;
     if (!any) return next;
   }
+}
+
+sync::TimeNs Core::Impl::ThreadTurn(size_t thread) {
+  return thread == 0 ? CoreTurn() : PipelineTurn(*displays_[thread - 1]->host);
+}
+
+bool Core::Impl::Ready(size_t thread) const {
+  return thread == 0 ? loop_->Ready() : displays_[thread - 1]->host->work->Ready();
 }
 
 }  // namespace voxeld::daemon

@@ -43,9 +43,14 @@ bool Loop::RunPosted() {
   return !work.empty();
 }
 
+bool Loop::Ready() const {
+  sync::MutexLock lock(mutex_);
+  return ready();
+}
+
 void Loop::Wait(sync::TimeNs deadline) {
   sync::MutexLock lock(mutex_);
-  while (posted_.empty() && !woken_ && !closed_ && clock_.Now() < deadline) {
+  while (!ready() && clock_.Now() < deadline) {
     clock_.WaitUntil(mutex_, changed_, deadline);
   }
 }

@@ -30,8 +30,12 @@ class Loop {
   bool RunPosted();
   // Returns when something is posted, on Wake, or at `deadline`; at once if that was so already.
   void Wait(sync::TimeNs deadline);
+  // Whether a Wait would return at once, whatever its deadline.
+  bool Ready() const;
 
  private:
+  bool ready() const VOXELD_REQUIRES(mutex_) { return !posted_.empty() || woken_ || closed_; }
+
   sync::Clock& clock_;
   mutable sync::Mutex mutex_;
   sync::CondVar changed_;

@@ -178,7 +178,7 @@ absl::Status Display::SetBlank(bool blank) {
     SetState(DisplayState::kBlanked, "blanked");
   } else {
     SetState(DisplayState::kShowing, "showing");
-    if (full_next_ && newest_ != nullptr && !holding_) resend_at_ = clock_.Now();
+    if (full_next_ && newest_ != nullptr && !holding_ && !held_) resend_at_ = clock_.Now();
     SendNext();
   }
   return absl::OkStatus();
@@ -234,7 +234,7 @@ void Display::Attached() {
   full_next_ = true;
   resend_.Reset();
   held_ = waiting_ == nullptr && listener_->HasNewer();
-  if (newest_ != nullptr && !held_) resend_at_ = clock_.Now();
+  resend_at_ = newest_ != nullptr && !held_ ? clock_.Now() : sync::kNever;
   if (blanked_) {
     SetState(DisplayState::kBlanked, "blanked");
   } else {

@@ -188,5 +188,27 @@ TEST(CoreQueries, FiguresAddUp) {
   EXPECT_EQ(display.commits_unchanged, 1u);
 }
 
+// A simulation chooses who comes next: the core's thread is 0, the displays' follow.
+TEST(CoreQueries, AQuestionGoesFromThreadToThreadInTheirTurns) {
+  Simulation sim({}, 2);
+  sim.Start();
+  bool answered = false;
+  sim.core->ListDisplays([&](const auto& displays) { answered = displays.ok(); });
+  EXPECT_TRUE(sim.core->Ready(0));
+  EXPECT_FALSE(sim.core->Ready(1));
+  EXPECT_FALSE(sim.core->Ready(2));
+  sim.core->Turn(0);
+  EXPECT_FALSE(sim.core->Ready(0));
+  EXPECT_TRUE(sim.core->Ready(1));
+  sim.core->Turn(2);
+  EXPECT_FALSE(sim.core->Ready(2));
+  EXPECT_GT(sim.core->Turn(1), sim.clock.Now());
+  EXPECT_FALSE(answered);
+  EXPECT_TRUE(sim.core->Ready(0));
+  sim.core->Turn(0);
+  EXPECT_TRUE(answered);
+  EXPECT_FALSE(sim.core->Ready(0));
+}
+
 }  // namespace
 }  // namespace voxeld::daemon

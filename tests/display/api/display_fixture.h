@@ -102,6 +102,8 @@ class ScriptedDisplay final : public Display {
 struct Log final : Display::Listener {
   void OnOutcome(const VolumeOutcome& outcome) override { outcomes.push_back(outcome); }
   void OnState(DisplayState state, const std::string& reason) override { states.push_back(state); }
+  bool HasNewer() const override { return has_newer; }
+  bool has_newer = false;
   std::vector<VolumeOutcome> outcomes;
   std::vector<DisplayState> states;
 };

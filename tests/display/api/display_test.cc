@@ -230,6 +230,40 @@ TEST_F(DisplayTest, BlankedWhileAwayItComesBackDarkAndThenWithTheCurrentFrame) {
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
 }
 
+// Back while it was dark, and lit while a newer volume is being drawn: it waits for that, and has nothing to do meanwhile.
+TEST_F(DisplayTest, LitAgainItWaitsForTheNewerVolumeWithoutBeingAsked) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  display_.DeviceLost("unplugged");
+  ASSERT_TRUE(display_.SetBlank(true).ok());
+  log_.has_newer = true;
+  display_.Attached();
+  ASSERT_TRUE(display_.SetBlank(false).ok());
+  EXPECT_EQ(display_.sent.size(), 1u);
+  EXPECT_GT(display_.Tick(), clock_.Now());
+  // The newer one comes out the same.
+  display_.ShowCurrent();
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+}
+
+// What was to be drawn for the device that went comes to nothing; for the one that comes there is something newer again.
+TEST_F(DisplayTest, WhatWasSaidOfALostDeviceDoesNotKeepTheNextOneBusy) {
+  StartAttached();
+  display_.Submit(Frame(1));
+  display_.Done();
+  display_.DeviceLost("unplugged");
+  log_.has_newer = true;
+  display_.Attached();
+  display_.DeviceLost("unplugged");
+  display_.ShowCurrent();
+  display_.Attached();
+  EXPECT_EQ(display_.sent.size(), 1u);
+  EXPECT_GT(display_.Tick(), clock_.Now());
+  display_.ShowCurrent();
+  EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
+}
+
 TEST_F(DisplayTest, StopLosesWhatIsOwed) {
   StartAttached();
   display_.Submit(Frame(1));

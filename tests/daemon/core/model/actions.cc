@@ -47,14 +47,14 @@ GeometryPtr RandomDots(Chance& chance) {
   return testing::Dots(x, chance.OneIn(3) ? 0xFF0000 : 0xFFFFFF, 1 + chance.Pick(2));
 }
 
-EntityData RandomEntity(Chance& chance) {
+EntityData RandomEntity(Chance& chance, const Palette& palette) {
   EntityData data;
   if (chance.OneIn(4)) {
     data.content = InstanceRef{ObjectName(chance)};
   } else {
-    data.content = RandomDots(chance);
+    data.content = palette.geometry(chance);
   }
-  if (chance.OneIn(3)) data.transform = RandomMap(chance);
+  if (chance.OneIn(3)) data.transform = palette.map(chance);
   data.priority = chance.OneIn(4) ? chance.Pick(127) : 0;
   data.erase = chance.OneIn(10);
   if (chance.OneIn(5)) data.lifetime_ns = (1 + chance.Pick(40)) * 25 * sync::kMillisecond;
@@ -62,7 +62,7 @@ EntityData RandomEntity(Chance& chance) {
   return data;
 }
 
-LayerState RandomState(Chance& chance) {
+LayerState RandomState(Chance& chance, const Palette& palette) {
   LayerState state;
   state.layer = LayerName(chance);
   switch (chance.Pick(8)) {
@@ -80,7 +80,7 @@ LayerState RandomState(Chance& chance) {
       state.blend = static_cast<gpu::BlendMode>(chance.Pick(3));
       break;
     case 5:
-      state.transform = RandomMap(chance);
+      state.transform = palette.map(chance);
       break;
     case 6: {
       Clip clip;
@@ -128,14 +128,14 @@ Delete RandomDelete(Chance& chance, uint64_t last_sequence) {
   return del;
 }
 
-DefineObject RandomDefinition(Chance& chance) {
+DefineObject RandomDefinition(Chance& chance, const Palette& palette) {
   auto data = std::make_shared<ObjectData>();
   for (uint32_t i = chance.Pick(4); i > 0; --i) {
     ObjectPart part;
     if (chance.OneIn(3)) {
       part.content = InstanceRef{ObjectName(chance)};
     } else {
-      part.content = testing::Dots(static_cast<float>(chance.Pick(2)));
+      part.content = palette.geometry(chance);
     }
     if (chance.OneIn(3)) part.transform = testing::Shift(0, chance.Pick(3));
     data->parts.push_back(std::move(part));
@@ -182,6 +182,11 @@ std::string Describe(const Operation& operation) {
 }
 
 }  // namespace
+
+const Palette& DotPalette() {
+  static const Palette palette{RandomDots, RandomMap};
+  return palette;
+}
 
 Script MakeScript(uint32_t seed) {
   Chance chance(seed);
@@ -254,12 +259,12 @@ OpenOptions RandomOpen(Chance& chance) {
 }
 
 RandomMessage MakeMessage(Chance& chance, uint64_t last_sequence, uint64_t* next_frame_id,
-                          sync::TimeNs now) {
+                          sync::TimeNs now, const Palette& palette) {
   RandomMessage message;
   uint64_t sequence = last_sequence;
   const auto add = [&](auto op) { message.operations.push_back({++sequence, std::move(op)}); };
   const auto upsert = [&](const std::string& layer) {
-    add(Upsert{layer, Id(chance), RandomEntity(chance)});
+    add(Upsert{layer, Id(chance), RandomEntity(chance, palette)});
   };
   const auto any = [&] {
     switch (chance.Pick(20)) {
@@ -269,15 +274,15 @@ RandomMessage MakeMessage(Chance& chance, uint64_t last_sequence, uint64_t* next
         return add(RandomDelete(chance, last_sequence));
       case 3:
       case 4:
-        return add(SetTransform{LayerName(chance), Id(chance), RandomMap(chance)});
+        return add(SetTransform{LayerName(chance), Id(chance), palette.map(chance)});
       case 5:
       case 6:
       case 7:
-        return add(RandomState(chance));
+        return add(RandomState(chance, palette));
       case 8:
       case 9:
       case 10:
-        return add(RandomDefinition(chance));
+        return add(RandomDefinition(chance, palette));
       case 11:
         if (chance.OneIn(2)) return add(DeleteObject{ObjectName(chance), chance.OneIn(2)});
         if (chance.OneIn(2)) return add(FrameBegin{LayerName(chance)});

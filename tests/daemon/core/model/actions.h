@@ -77,7 +77,13 @@ struct RandomMessage {
   uint64_t bytes = 0;
   std::string text;  // for people
 };
+// What messages draw with.
+struct Palette {
+  GeometryPtr (*geometry)(Chance&);
+  gpu::Affine (*map)(Chance&);
+};
+const Palette& DotPalette();
 RandomMessage MakeMessage(Chance& chance, uint64_t last_sequence, uint64_t* next_frame_id,
-                          sync::TimeNs now);
+                          sync::TimeNs now, const Palette& palette = DotPalette());
 
 }  // namespace voxeld::daemon::model

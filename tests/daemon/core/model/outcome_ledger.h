@@ -24,6 +24,7 @@ class OutcomeLedger {
     uint64_t snapshot = 0;
     bool asked = true;  // its client wants outcomes
     bool hidden = false;
+    sync::TimeNs present_at = 0;  // 0: as soon as it may
   };
 
   // ---- what happened, as it happened

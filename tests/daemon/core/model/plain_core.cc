@@ -118,6 +118,7 @@ PlainSession& PlainCore::Open(const OpenOptions& options, const SessionInfo& inf
   PlainSession session;
   session.id = info.session;
   session.options = options;
+  session.keeps = options.on_disconnect == DisconnectPolicy::kKeep;
   session.token = info.resume_token;
   session.received = open_bytes;
   figures.bytes_in += open_bytes;
@@ -174,6 +175,7 @@ std::vector<Refusal> PlainCore::Take(PlainSession& session,
     std::optional<Reason> wrong = PlainScene::WrongAlone(operation, limits_);
     const uint64_t weight = WeightOf(operation);
     if (TooMuchStaged(session, weight)) wrong = Reason::kQuotaExceeded;
+    if (memory_full && !wrong.has_value()) wrong = Reason::kQuotaExceeded;
     if (wrong.has_value()) {
       refuse(operation.sequence, *wrong);
     } else {
@@ -252,9 +254,41 @@ void PlainCore::Tell(PlainTurn& turn, const Refusal& refusal) const {
   }
 }
 
-PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now) {
+bool PlainCore::MayBeDue(const PlainSession& session, uint64_t sequence, sync::TimeNs now) const {
+  return std::any_of(session.timed.begin(), session.timed.end(), [&](const PlainCommit& commit) {
+    return commit.sequence == sequence && commit.commit.present_at_ns - early <= now;
+  });
+}
+
+bool PlainCore::Uncertain(const PlainSession& session, sync::TimeNs now) const {
+  const auto near = [&](const PlainCommit& commit) {
+    const sync::TimeNs at = commit.commit.present_at_ns;
+    return at != 0 && at - early <= now && now < at + slack;
+  };
+  return std::any_of(session.timed.begin(), session.timed.end(), near) ||
+         std::any_of(session.queue.begin(), session.queue.end(), near);
+}
+
+PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Heard* heard) {
   PlainTurn turn;
   PlainCommit& commit = turn.commit;
+  if (heard != nullptr && MayBeDue(session, heard->sequence, now)) {
+    const auto it = std::find_if(
+        session.timed.begin(), session.timed.end(),
+        [&](const PlainCommit& waiting) { return waiting.sequence == heard->sequence; });
+    session.due.push_front(std::move(*it));
+    session.due.front().late_known = false;
+    session.timed.erase(it);
+  } else if (heard != nullptr && early > 0 && !session.due.empty()) {
+    // Those that are for the same sweep go in the order in which they came.
+    const auto it = std::find_if(
+        session.due.begin(), session.due.end(),
+        [&](const PlainCommit& waiting) { return waiting.sequence == heard->sequence; });
+    if (it != session.due.end() &&
+        it->commit.present_at_ns <= session.due.front().commit.present_at_ns + early) {
+      std::rotate(session.due.begin(), it, std::next(it));
+    }
+  }
   if (!session.due.empty()) {
     commit = std::move(session.due.front());
     session.due.pop_front();
@@ -266,7 +300,10 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now) {
     figures.frames_dropped += commit.dropped_frames;
     const sync::TimeNs at = commit.commit.present_at_ns;
     commit.late = at != 0 && at < now;
-    if (at > now) {
+    const bool soon = heard != nullptr && !heard->scheduled && at - now <= early;
+    // Its sweep may be told to begin a little after its time.
+    const bool put_off = heard != nullptr && heard->scheduled && at != 0 && at + slack > now;
+    if ((at > now && !soon) || put_off) {
       const bool beyond = at - now > limits_.max_present_at_horizon_ns;
       if (!beyond && session.timed.size() < limits_.max_timed_commits) {
         turn.kind = PlainTurn::Kind::kScheduled;
@@ -293,6 +330,11 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now) {
   if (turn.kind == PlainTurn::Kind::kRefused) {
     ++figures.refused;
     return turn;
+  }
+  turn.durable = commit.commit.durable && keeps_state && session.keeps;
+  if (commit.commit.durable && !turn.durable) {
+    turn.not_durable = {commit.sequence,
+                        keeps_state ? Reason::kInvalidValue : Reason::kUnimplemented};
   }
   ++figures.accepted;
   figures.operations_applied += turn.verdict.applied_operations;
@@ -370,9 +412,10 @@ void PlainCore::PassTime(sync::TimeNs now) {
                      [](const PlainCommit& a, const PlainCommit& b) {
                        return a.commit.present_at_ns < b.commit.present_at_ns;
                      });
-    while (!session.timed.empty() && session.timed.front().commit.present_at_ns <= now) {
+    while (!session.timed.empty() && session.timed.front().commit.present_at_ns + slack <= now) {
       PlainCommit commit = std::move(session.timed.front());
       session.timed.erase(session.timed.begin());
+      commit.late_known = slack == 0;
       commit.late = commit.late || !MayGo(session, session.owed_most);
       session.due.push_back(std::move(commit));
     }
@@ -381,85 +424,22 @@ void PlainCore::PassTime(sync::TimeNs now) {
   Tidy();
 }
 
-Cleared PlainCore::ClearLayer(uint64_t owner, const std::string& layer, bool keep_state) {
-  Cleared cleared;
-  for (auto& [number, who] : scene.owners) {
-    if (owner != 0 && owner != number) continue;
-    for (auto it = who.layers.begin(); it != who.layers.end();) {
-      auto& [name, state] = *it;
-      if ((!layer.empty() && layer != name) || (keep_state && state.entities.empty())) {
-        ++it;
-        continue;
+sync::TimeNs PlainCore::NextDue() const {
+  sync::TimeNs next = lingering_.empty() ? sync::kNever : lingering_.begin()->first;
+  for (const auto& [number, owner] : scene.owners) {
+    for (const auto& [name, layer] : owner.layers) {
+      for (const auto& [id, entity] : layer.entities) {
+        if (entity.expires_ns != 0) next = std::min(next, entity.expires_ns);
       }
-      cleared.entities += state.entities.size();
-      ++cleared.layers;
-      state.entities.clear();
-      it = keep_state ? std::next(it) : who.layers.erase(it);
     }
   }
-  Tidy();
-  return cleared;
-}
-
-absl::StatusCode PlainCore::MayControl(const OwnerControl& control) const {
-  if (!scene.owners.contains(control.owner)) return absl::StatusCode::kNotFound;
-  if (control.max_bytes.value_or(0) > limits_.max_bytes_per_owner ||
-      control.max_entities.value_or(0) > limits_.max_entities_per_owner) {
-    return absl::StatusCode::kInvalidArgument;
-  }
-  return absl::StatusCode::kOk;
-}
-
-void PlainCore::Control(const OwnerControl& control) {
-  PlainOwner& owner = scene.owners.at(control.owner);
-  if (control.hidden.has_value()) owner.hidden = *control.hidden;
-  const auto quota = [](uint64_t value) { return value == 0 ? UINT64_MAX : value; };
-  if (control.max_bytes.has_value()) owner.max_bytes = quota(*control.max_bytes);
-  if (control.max_entities.has_value()) owner.max_entities = quota(*control.max_entities);
-}
-
-void PlainCore::EndOwner(uint64_t number) {
-  scene.owners.at(number).layers.clear();
-  std::erase_if(dormant, [number](const auto& entry) { return entry.second.owner == number; });
-  Tidy();
-  std::erase_if(lingering_, [this](const auto& entry) { return !scene.HasLayers(entry.second); });
-}
-
-std::map<uint64_t, OwnerInfo> PlainCore::Owners() const {
-  std::map<uint64_t, OwnerInfo> infos;
-  for (const auto& [number, owner] : scene.owners) {
-    const PlainCount count = scene.Count(owner);
-    OwnerInfo& info = infos[number];
-    info.owner = number;
-    info.hidden = owner.hidden;
-    info.max_bytes = std::min(owner.max_bytes, limits_.max_bytes_per_owner);
-    info.max_entities = std::min(owner.max_entities, limits_.max_entities_per_owner);
-    info.layers = count.layers;
-    info.entities = count.entities;
-    info.objects = count.objects;
-    info.bytes = count.bytes;
-    for (const auto& [name, layer] : owner.layers) info.orphaned_layers += layer.orphaned;
-  }
   for (const auto& [id, session] : sessions) {
-    ++infos[session.owner].sessions;
-    infos[session.owner].client_names.push_back(session.options.client_name);
+    for (const PlainCommit& commit : session.timed) {
+      next = std::min(next, commit.commit.present_at_ns + slack);
+    }
   }
-  return infos;
-}
-
-void PlainCore::Tidy() {
-  for (auto& [number, owner] : scene.owners) {
-    const bool open = std::any_of(sessions.begin(), sessions.end(),
-                                  [&](const auto& entry) { return entry.second.owner == number; });
-    if (!open && owner.layers.empty()) owner.objects.clear();
-  }
-  std::erase_if(scene.owners, [&](const auto& entry) {
-    const auto is_its = [&](const auto& other) { return other.second.owner == entry.first; };
-    return entry.second.layers.empty() && !std::any_of(sessions.begin(), sessions.end(), is_its) &&
-           !std::any_of(dormant.begin(), dormant.end(), is_its);
-  });
-  std::erase_if(owner_tokens,
-                [&](const auto& entry) { return !scene.owners.contains(entry.second); });
+  for (const auto& [id, kept] : dormant) next = std::min(next, kept.until);
+  return next;
 }
 
 }  // namespace voxeld::daemon::model

@@ -26,6 +26,7 @@ struct PlainCommit {
   uint64_t told = 0, left_out = 0;
   uint64_t dropped_frames = 0;
   bool late = false;
+  bool late_known = true;
 };
 
 struct PlainHold {
@@ -38,6 +39,7 @@ struct PlainSession {
   uint64_t id = 0, incarnation = 0, owner = 0;
   OpenOptions options;
   std::string token;
+  bool keeps = false;  // its layers
   bool closing = false;
   bool crowded = false;
   PlainCommit staged;
@@ -74,8 +76,10 @@ struct PlainTurn {
   PlainCommit commit;
   PlainVerdict verdict;
   uint64_t refused_operations = 0;
-  std::vector<Refusal> issues;  // told with it
-  bool tells_rest = false;      // one more, of those left out
+  std::vector<Refusal> issues;         // told with it
+  bool tells_rest = false;             // one more, of those left out
+  bool durable = false;                // it is told when it is on the disk
+  std::optional<Refusal> not_durable;  // told last: it asks for that in vain
 };
 
 class PlainCore {
@@ -85,6 +89,14 @@ class PlainCore {
 
   PlainCore(const Limits& limits, std::vector<std::string> displays)
       : scene(limits, !displays.empty()), limits_(limits), displays_(std::move(displays)) {}
+
+  // Where displays tell of their sweeps, a timed commit is applied for its sweep: at most so much before its time, and no
+  // later than so much after it.
+  sync::TimeNs early = 0, slack = 0;
+
+  // Somebody else has all of max_memory_bytes.
+  bool memory_full = false;
+  bool keeps_state = false;  // what sessions KEEP outlives the daemon
 
   PlainScene scene;
   std::map<uint64_t, PlainSession> sessions;
@@ -115,13 +127,24 @@ class PlainCore {
 
   // ---- turns
   bool MayGo(const PlainSession& session, uint64_t owed) const;
-  PlainTurn TakeTurn(PlainSession& session, sync::TimeNs now);
+  // What the core was heard to say of the turn; nothing, of a client that hears nothing.
+  struct Heard {
+    uint64_t sequence = 0;
+    bool scheduled = false;
+  };
+  PlainTurn TakeTurn(PlainSession& session, sync::TimeNs now, const Heard* heard);
+  // A commit that waits for its time, and may be applied by now.
+  bool MayBeDue(const PlainSession& session, uint64_t sequence, sync::TimeNs now) const;
+  // Whether a timed commit of the session may be due, or not yet: for the core to say.
+  bool Uncertain(const PlainSession& session, sync::TimeNs now) const;
   void Told(PlainSession& session, const std::string& display, uint64_t sequence);
 
   // ---- ends
   void Finish(uint64_t session, sync::TimeNs now);
   // What becomes due by time alone: entities, layers, timed commits, dormant sessions.
   void PassTime(sync::TimeNs now);
+  // When it has something to do next.
+  sync::TimeNs NextDue() const;
 
   // ---- operators
   Cleared ClearLayer(uint64_t owner, const std::string& layer, bool keep_state);

@@ -83,14 +83,17 @@ std::string LayerText(int32_t order, uint32_t opacity, gpu::BlendMode blend,
 }
 
 std::string DrawableText(uint32_t priority, bool erase, const gpu::Affine& transform,
-                         uint32_t color, uint32_t vertices, float first_x) {
+                         const gpu::GeometryRecord& record, std::span<const float> positions) {
   std::string text = "drawable";
   Append(text, priority);
   Append(text, erase);
   AppendMap(text, transform);
-  Append(text, color);
-  Append(text, vertices);
-  Append(text, first_x);
+  Append(text, record.kind);
+  Append(text, record.color);
+  Append(text, record.params);
+  Append(text, record.fill);
+  Append(text, positions.size());
+  for (const float at : positions) Append(text, at);
   return text;
 }
 
@@ -220,13 +223,27 @@ bool PlainScene::Reaches(const PlainOwner& owner, const Content& content, const 
       return Reaches(owner, part.content, Product(outer, part.transform), limit);
     });
   }
-  const GeometryData& dots = *std::get<GeometryPtr>(content);
-  const std::span<const float> at = dots.arrays.positions();
-  for (size_t i = 0; i + 2 < at.size(); i += 3) {
+  const GeometryData& geometry = *std::get<GeometryPtr>(content);
+  const auto reaches = [&](double x, double y, double z) {
     for (int row = 0; row < 3; ++row) {
       const double* m = outer.m + size_t{4} * row;
-      if (std::abs(m[0] * at[i] + m[1] * at[i + 1] + m[2] * at[i + 2] + m[3]) > limit) return true;
+      if (std::abs(m[0] * x + m[1] * y + m[2] * z + m[3]) > limit) return true;
     }
+    return false;
+  };
+  if (gpu::IsSolid(geometry.record.kind)) {
+    const double* const low = geometry.min;
+    const double* const high = geometry.max;
+    bool far = false;
+    for (int corner = 0; corner < 8; ++corner) {
+      far = far || reaches(corner & 1 ? high[0] : low[0], corner & 2 ? high[1] : low[1],
+                           corner & 4 ? high[2] : low[2]);
+    }
+    return far;
+  }
+  const std::span<const float> at = geometry.arrays.positions();
+  for (size_t i = 0; i + 2 < at.size(); i += 3) {
+    if (reaches(at[i], at[i + 1], at[i + 2])) return true;
   }
   return false;
 }
@@ -326,9 +343,9 @@ void PlainScene::DrawContent(const PlainOwner& owner, const PlainEntity& entity,
     }
     return;
   }
-  const GeometryData& dots = *std::get<GeometryPtr>(content);
-  out.push_back(DrawableText(entity.data.priority, entity.data.erase, map, dots.record.color,
-                             dots.record.vertex_count, dots.arrays.positions()[0]));
+  const GeometryData& geometry = *std::get<GeometryPtr>(content);
+  out.push_back(DrawableText(entity.data.priority, entity.data.erase, map, geometry.record,
+                             geometry.arrays.positions()));
 }
 
 void PlainScene::Picture::Add(bool shows, const std::string& layer,

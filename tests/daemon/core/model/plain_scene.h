@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -133,6 +134,6 @@ std::string LayerText(int32_t order, uint32_t opacity, gpu::BlendMode blend,
                       const gpu::Affine& transform, const gpu::ClipPlane* planes, uint32_t count,
                       const gpu::Region* region);
 std::string DrawableText(uint32_t priority, bool erase, const gpu::Affine& transform,
-                         uint32_t color, uint32_t vertices, float first_x);
+                         const gpu::GeometryRecord& record, std::span<const float> positions);
 
 }  // namespace voxeld::daemon::model
