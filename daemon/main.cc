@@ -215,6 +215,7 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
 
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
           const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
+  std::optional<EndLimit> end_limit;  // of all that is below, to its last destructor
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
   absl::StatusOr<std::unique_ptr<access::Security>> opened =
@@ -405,7 +406,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   ticker.reset();
   security->access().SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
-  const EndLimit end_limit(kEndLimit);
+  end_limit.emplace(kEndLimit);
   *draining = true;
   watch.Tell(nullptr);
   if (play.player != nullptr) play.player->End();

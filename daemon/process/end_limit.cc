@@ -1,5 +1,6 @@
 #include "daemon/process/end_limit.h"
 
+#include <poll.h>
 #include <signal.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -12,7 +13,9 @@ namespace {
 void EndNow(int) {
   constexpr std::string_view kWhy =
       "voxeld: it did not end in time, and is ended; what was told to be durable is kept\n";
-  if (write(STDERR_FILENO, kWhy.data(), kWhy.size()) < 0) _exit(1);
+  pollfd out = {.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
+  // Nobody may read it any more.
+  if (poll(&out, 1, 0) == 1 && write(STDERR_FILENO, kWhy.data(), kWhy.size()) < 0) _exit(1);
   _exit(1);
 }
 

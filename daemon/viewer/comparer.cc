@@ -4,10 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <new>
 #include <system_error>
 #include <utility>
 
 #include "daemon/scene/engine_delta.h"
+#include "daemon/viewer/volume_message.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
 
@@ -83,6 +85,12 @@ class Comparer::Reference {
     return status_;
   }
 
+  // Where the display has its pixels, found with the first comparison.
+  PixelPlaces& PlacesOf(const display::Geometry& geometry) {
+    if (places_ == nullptr) places_ = std::make_unique<PixelPlaces>(geometry);
+    return *places_;
+  }
+
   absl::Status Read(int32_t z0, int32_t z1, std::span<uint32_t> out) {
     engine_->ReadVoxels({0, 0, z0, grid_.nx, grid_.ny, z1}, out,
                         [this](const absl::Status& status) { status_.Update(status); });
@@ -98,9 +106,55 @@ class Comparer::Reference {
   display::VoxelGrid grid_;
   gpu::Affine view_;
   bool drawn_ = false;
+  std::unique_ptr<PixelPlaces> places_;
 };
 
-Comparer::Comparer(sync::Clock& clock) : clock_(clock) {}
+namespace {
+
+// Of the budget's answers, while it is there.
+class Charge {
+ public:
+  Charge(Budget* budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {
+    if (budget_ != nullptr && !budget_->Charge(Budget::Use::kAnswers, bytes_)) {
+      budget_ = nullptr;
+      refused_ = true;
+    }
+  }
+  ~Charge() {
+    if (budget_ != nullptr) budget_->Release(Budget::Use::kAnswers, bytes_);
+  }
+  Charge(const Charge&) = delete;
+  Charge& operator=(const Charge&) = delete;
+  bool refused() const { return refused_; }
+
+ private:
+  Budget* budget_;
+  const uint64_t bytes_;
+  bool refused_ = false;
+};
+
+constexpr uint64_t kBytesPerPoint = 9;
+
+// Lit pixels until there are too many.
+absl::StatusOr<Points> LitOf(const display::DecodedVolume& volume, const display::VoxelGrid& grid,
+                             PixelPlaces& places) {
+  constexpr int32_t kAtOnce = 16;
+  Points points;
+  for (int32_t slice = 0; slice < volume.layout.slices; slice += kAtOnce) {
+    std::vector<int32_t> some;
+    for (int32_t i = slice; i < std::min(slice + kAtOnce, volume.layout.slices); ++i) {
+      some.push_back(i);
+    }
+    AppendLit(volume, some, places, &points);
+    if (absl::Status may = CheckComparable(grid, points.size()); !may.ok()) return may;
+  }
+  return points;
+}
+
+}  // namespace
+
+Comparer::Comparer(sync::Clock& clock, std::shared_ptr<Budget> budget)
+    : clock_(clock), budget_(std::move(budget)) {}
 
 Comparer::~Comparer() {
   std::deque<Task> left;
@@ -115,62 +169,92 @@ Comparer::~Comparer() {
 }
 
 void Comparer::Post(Task task) {
+  absl::Status refused =
+      absl::ResourceExhaustedError("too many are compared now; it is asked for again");
   {
     sync::MutexLock lock(mutex_);
     try {
       if (!thread_.joinable()) thread_ = std::thread([this] { Run(); });
-      tasks_.push_back(std::move(task));
-      wake_.NotifyOne();
-      return;
+      if (tasks_.size() < kMostTasks) {
+        tasks_.push_back(std::move(task));
+        wake_.NotifyOne();
+        return;
+      }
     } catch (const std::system_error&) {
+      refused = absl::ResourceExhaustedError("there is no thread to be had for it now");
     }
   }
-  task.done(absl::ResourceExhaustedError("there is no thread to be had for it now"));
+  task.done(refused);
 }
 
 void Comparer::Run() {
   // On Linux this is the thread's alone. Displays come first.
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   References references;
+  sync::TimeNs rests_until = 0;
   for (;;) {
     Task task;
     {
       sync::MutexLock lock(mutex_);
-      while (tasks_.empty() && !ends_) {
+      while (!ends_) {
+        const sync::TimeNs now = clock_.Now();
         sync::TimeNs next = sync::kNever;
         for (const auto& [name, reference] : references) {
           next = std::min(next, reference.used + kLinger);
         }
-        if (next <= clock_.Now()) break;
+        if (!tasks_.empty()) next = std::min(next, rests_until);
+        if (next <= now || (!tasks_.empty() && rests_until <= now)) break;
         clock_.WaitUntil(mutex_, wake_, next);
       }
       if (ends_) return;
-      if (!tasks_.empty()) {
+      if (!tasks_.empty() && rests_until <= clock_.Now()) {
         task = std::move(tasks_.front());
         tasks_.pop_front();
       }
     }
+    const sync::TimeNs began = clock_.Now();
     if (task.done) task.done(Serve(task, references));
     const sync::TimeNs now = clock_.Now();
+    if (task.done) rests_until = now + std::min(now - began, kMostRest);
     std::erase_if(references, [&](const auto& each) { return each.second.used + kLinger <= now; });
   }
 }
 
 absl::StatusOr<Comparison> Comparer::Serve(const Task& task, References& references) const {
-  if (absl::Status may = CheckComparable(task.grid); !may.ok()) return may;
-  Reference& reference = references[task.display];
-  const absl::Status status =
-      reference.Draw(task.grid, task.from.scene_to_voxel,
-                     task.hidden.empty() ? task.from.scene : Without(task.from.scene, task.hidden));
-  if (!status.ok()) {
-    references.erase(task.display);
-    return status;
+  if (absl::Status may = CheckComparable(task.info->geometry.grid); !may.ok()) return may;
+  absl::StatusOr<Comparison> comparison = absl::UnknownError("");
+  try {
+    Reference& reference = references[task.display];
+    comparison = Hold(task, reference);
+    reference.used = clock_.Now();
+  } catch (const std::bad_alloc&) {
+    comparison = absl::ResourceExhaustedError("there is no memory for it now");
   }
-  absl::StatusOr<Comparison> comparison = Compare(
-      task.grid, task.layout, task.from.tone, task.reach, task.box, task.shown,
-      [&](int32_t z0, int32_t z1, std::span<uint32_t> out) { return reference.Read(z0, z1, out); });
-  reference.used = clock_.Now();
+  if (!comparison.ok()) references.erase(task.display);
   return comparison;
+}
+
+absl::StatusOr<Comparison> Comparer::Hold(const Task& task, Reference& reference) const {
+  const display::Geometry& geometry = task.info->geometry;
+  const DrawnFrom& from = task.shown.from;
+  PixelPlaces& places = reference.PlacesOf(geometry);
+  const absl::StatusOr<Points> lit = LitOf(task.shown.volume, geometry.grid, places);
+  if (!lit.ok()) return lit.status();
+  const Charge charge(budget_.get(), lit->size() * (kBytesPerPoint + sizeof(PixelCell)) +
+                                         2 * Comparison::kMostPoints * kBytesPerPoint);
+  if (charge.refused()) {
+    return absl::ResourceExhaustedError("max_memory_bytes leaves no room for it now");
+  }
+  const absl::Status drawn =
+      reference.Draw(geometry.grid, from.scene_to_voxel,
+                     task.hidden.empty() ? from.scene : Without(from.scene, task.hidden));
+  if (!drawn.ok()) return drawn;
+  return Compare(geometry.grid, task.shown.volume.layout, from.tone,
+                 ReachOf(geometry, from.tone.sampling), places.box(), *lit,
+                 [&](int32_t z0, int32_t z1, std::span<uint32_t> out) -> absl::Status {
+                   if (ends_) return absl::CancelledError("the daemon is shutting down");
+                   return reference.Read(z0, z1, out);
+                 });
 }
 
 }  // namespace voxeld::daemon::viewer

@@ -84,6 +84,39 @@ class Planes {
   std::vector<uint32_t> voxels_;
 };
 
+// Points in a box, thinned out evenly where they are too many.
+class Thinned {
+ public:
+  Thinned(const PlaceBox& box, Points& points) : box_(box), points_(points) {}
+
+  void Add(const display::Vec3& mm, const Color& color) {
+    if (came_++ % stride_ != 0) return;
+    const auto step = [](double at, double low, double high) {
+      const double q = high > low ? std::lround((at - low) / (high - low) * kPlaceSteps) : 0;
+      return static_cast<uint16_t>(std::clamp(q, 0.0, static_cast<double>(kPlaceSteps)));
+    };
+    points_.x.push_back(step(mm.x, box_.low_mm.x, box_.high_mm.x));
+    points_.y.push_back(step(mm.y, box_.low_mm.y, box_.high_mm.y));
+    points_.z.push_back(step(mm.z, box_.low_mm.z, box_.high_mm.z));
+    for (const int channel : color) points_.rgb.push_back(static_cast<uint8_t>(channel));
+    if (points_.size() < Comparison::kMostPoints) return;
+    stride_ *= 2;
+    Halve(points_.x, 1), Halve(points_.y, 1), Halve(points_.z, 1), Halve(points_.rgb, 3);
+  }
+
+ private:
+  template <typename T>
+  static void Halve(std::vector<T>& values, size_t each) {
+    const size_t left = values.size() / each / 2;
+    for (size_t i = 0; i < left * each; ++i) values[i] = values[i / each * 2 * each + i % each];
+    values.resize(left * each);
+  }
+
+  const PlaceBox& box_;
+  Points& points_;
+  uint64_t came_ = 0, stride_ = 1;
+};
+
 class Comparing {
  public:
   Comparing(const display::VoxelGrid& grid, const display::FrameLayout& layout,
@@ -124,7 +157,7 @@ class Comparing {
   }
 
  private:
-  static constexpr int32_t kNowhere = INT32_MIN;  // beyond the reach of the grid
+  static constexpr int16_t kNowhere = INT16_MIN;  // beyond the reach of the grid
 
   static double At(uint16_t q, double low, double high) {
     return low + q * (high - low) / kPlaceSteps;
@@ -145,18 +178,6 @@ class Comparing {
     comparison_.pitch_mm = std::min({p.x, p.y, p.z});
   }
 
-  void Add(Points& points, const display::Vec3& mm, const Color& color) const {
-    const PlaceBox& box = comparison_.box;
-    const auto step = [](double at, double low, double high) {
-      const double q = high > low ? std::lround((at - low) / (high - low) * kPlaceSteps) : 0;
-      return static_cast<uint16_t>(std::clamp(q, 0.0, static_cast<double>(kPlaceSteps)));
-    };
-    points.x.push_back(step(mm.x, box.low_mm.x, box.high_mm.x));
-    points.y.push_back(step(mm.y, box.low_mm.y, box.high_mm.y));
-    points.z.push_back(step(mm.z, box.low_mm.z, box.high_mm.z));
-    for (const int channel : color) points.rgb.push_back(static_cast<uint8_t>(channel));
-  }
-
   display::Vec3 PlaceOf(size_t point) const {
     return {At(shown_.x[point], from_.low_mm.x, from_.high_mm.x),
             At(shown_.y[point], from_.low_mm.y, from_.high_mm.y),
@@ -169,8 +190,7 @@ class Comparing {
   }
 
   void Differs(const display::Vec3& mm, const Color& hue, int by) {
-    Add(comparison_.difference, mm,
-        {hue[0] * by / kFull, hue[1] * by / kFull, hue[2] * by / kFull});
+    difference_.Add(mm, {hue[0] * by / kFull, hue[1] * by / kFull, hue[2] * by / kFull});
   }
 
   void Stray(size_t point) {
@@ -184,16 +204,16 @@ class Comparing {
     pixels.reserve(shown_.size());
     const auto cell = [](double mm, double origin, double pitch, int32_t n, int32_t reach) {
       const double at = std::floor((mm - origin) / pitch);
-      return at < -reach || at >= n + reach ? kNowhere : static_cast<int32_t>(at);
+      return at < -reach || at >= n + reach ? kNowhere : static_cast<int16_t>(at);
     };
     const display::Vec3 &o = grid_.origin_mm, &p = grid_.pitch_mm;
     for (size_t point = 0; point < shown_.size(); ++point) {
       const display::Vec3 mm = PlaceOf(point);
-      const int32_t x = cell(mm.x, o.x, p.x, grid_.nx, reach_.x);
-      const int32_t y = cell(mm.y, o.y, p.y, grid_.ny, reach_.y);
-      const int32_t z = cell(mm.z, o.z, p.z, grid_.nz, reach_.z);
+      const int16_t x = cell(mm.x, o.x, p.x, grid_.nx, reach_.x);
+      const int16_t y = cell(mm.y, o.y, p.y, grid_.ny, reach_.y);
+      const int16_t z = cell(mm.z, o.z, p.z, grid_.nz, reach_.z);
       const bool nowhere = x == kNowhere || y == kNowhere || z == kNowhere;
-      pixels.push_back({x, y, nowhere ? kNowhere : z, point});
+      pixels.push_back({x, y, nowhere ? kNowhere : z, static_cast<uint32_t>(point)});
     }
     std::stable_sort(pixels.begin(), pixels.end(),
                      [](const PixelCell& a, const PixelCell& b) { return a.z < b.z; });
@@ -270,25 +290,13 @@ class Comparing {
         if (row[x] == 0) continue;
         const Color light = LightOf(tone_, row[x]);
         const display::Vec3 mm = CentreOf(x, y, z);
-        if (comparison_.voxels++ % stride_ == 0) Send(mm, light);
+        ++comparison_.voxels;
+        sent_.Add(mm, light);
         if (near_.At(x, y)) continue;
         ++comparison_.missing;
         Differs(mm, kMissing, std::max(1, Greatest(light)));
       }
     }
-  }
-
-  void Send(const display::Vec3& mm, const Color& light) {
-    Points& sent = comparison_.sent;
-    Add(sent, mm, light);
-    if (sent.size() < Comparison::kMostSent) return;
-    stride_ *= 2;
-    const auto halve = [](auto& values, size_t each) {
-      const size_t left = values.size() / each / 2;
-      for (size_t i = 0; i < left * each; ++i) values[i] = values[i / each * 2 * each + i % each];
-      values.resize(left * each);
-    };
-    halve(sent.x, 1), halve(sent.y, 1), halve(sent.z, 1), halve(sent.rgb, 3);
   }
 
   display::Vec3 CentreOf(int32_t x, int32_t y, int32_t z) const {
@@ -304,18 +312,25 @@ class Comparing {
   const Reach reach_;
   Planes planes_;
   NearPixels near_;
-  uint64_t stride_ = 1;
   int64_t sum_ = 0;
   Comparison comparison_;
+  Thinned sent_{comparison_.box, comparison_.sent};
+  Thinned difference_{comparison_.box, comparison_.difference};
 };
 
 }  // namespace
 
-absl::Status CheckComparable(const display::VoxelGrid& grid) {
+absl::Status CheckComparable(const display::VoxelGrid& grid, size_t lit_pixels) {
   const int64_t cells = int64_t{grid.nx} * grid.ny * grid.nz;
-  if (cells <= kMostCells) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "the display has %d voxels; displays of up to %d are compared", cells, kMostCells));
+  if (cells > kMostCells) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "the display has %d voxels; displays of up to %d are compared", cells, kMostCells));
+  }
+  if (lit_pixels > kMostPixels) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("more than %d pixels are lit; with fewer it is compared", kMostPixels));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Comparison> Compare(const display::VoxelGrid& grid,

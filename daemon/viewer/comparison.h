@@ -27,8 +27,8 @@ namespace voxeld::daemon::viewer {
 using ReadPlanes = std::function<absl::Status(int32_t z0, int32_t z1, std::span<uint32_t> out)>;
 
 struct Comparison {
-  // Of more lit voxels than this every second, fourth … is in `sent`; figures count all.
-  static constexpr size_t kMostSent = 4'000'000;
+  // Of more than this every second, fourth … is among the points; figures count all.
+  static constexpr size_t kMostPoints = 1'000'000;
   // Differences, of a channel's 255, up to this or to a level of the display, whichever is more, are not looked at: a pixel
   // is bound to make them, and dither evens them out.
   static constexpr int kSmall = 16;
@@ -50,8 +50,9 @@ struct Comparison {
 };
 
 inline constexpr int64_t kMostCells = int64_t{1} << 28;
-// InvalidArgument for a grid of more voxels than kMostCells.
-absl::Status CheckComparable(const display::VoxelGrid& grid);
+inline constexpr size_t kMostPixels = size_t{16} << 20;
+// InvalidArgument for a grid of more voxels than kMostCells, and for more lit pixels than kMostPixels.
+absl::Status CheckComparable(const display::VoxelGrid& grid, size_t lit_pixels = 0);
 
 // `shown`: the display's lit pixels, places in `box`. An error of `read` is the answer. `grid` is comparable.
 absl::StatusOr<Comparison> Compare(const display::VoxelGrid& grid,

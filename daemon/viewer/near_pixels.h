@@ -24,8 +24,8 @@ Reach ReachOf(const display::Geometry& geometry, display::Sampling sampling);
 
 // A pixel's light by its cell, which may lie outside the grid.
 struct PixelCell {
-  int32_t x = 0, y = 0, z = 0;
-  size_t point = 0;
+  int16_t x = 0, y = 0, z = 0;  // grids have 16384 cells along an axis at the most
+  uint32_t point = 0;
 };
 
 // Planes are added in their order, those within reach before the grid's first included, and the oldest dropped; near is

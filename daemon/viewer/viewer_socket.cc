@@ -102,9 +102,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
   struct Watched {
     uint64_t serial = 0;  // ids may be used again
-    std::string display;
-    display::VoxelGrid grid;
-    Reach reach;
+    std::shared_ptr<const display::DisplayInfo> info;
     std::shared_ptr<PixelPlaces> places;
     std::shared_ptr<VolumeFeed> feed;
     bool credit = true;  // the page has shown the last one
@@ -172,9 +170,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     if (found == watches_.end() || found->second.serial != serial) return;
     if (!display.ok()) return End(id, display.status());
     Watched& watch = found->second;
-    watch.display = display->info.name;
-    watch.grid = display->info.geometry.grid;
-    watch.reach = ReachOf(display->info.geometry, display->info.tone.sampling);
+    watch.info = std::make_shared<const display::DisplayInfo>(display->info);
     watch.places = PlacesOf(*display);
     const PlaceBox& box = watch.places->box();
     peer_->Send(absl::StrCat("{\"watching\":{\"id\":", id, ",\"low_mm\":",
@@ -253,10 +249,14 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
       return Complain("without is a list of layers: {\"owner\": \"1\", \"layer\": \"name\"}");
     }
     const auto found = watches_.find(*id);
-    if (found == watches_.end() || found->second.feed == nullptr) return;
-    if (!Begin(Asked::kCompare)) return;
+    if (found == watches_.end() || found->second.feed == nullptr) {
+      return Compared(*id, 0, absl::NotFoundError("there is no such watch"));
+    }
+    if (!Begin(Asked::kCompare)) {
+      return Compared(*id, 0, absl::FailedPreconditionError("another is compared for this page"));
+    }
     shared_->core.GetShownScene(
-        found->second.display,
+        found->second.info->name,
         Then<ShownScene>([id = *id, serial = found->second.serial, hidden = *hidden](
                              ViewerSocket& self, absl::StatusOr<ShownScene> shown) {
           self.HoldAgainst(id, serial, hidden, std::move(shown));
@@ -281,22 +281,23 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
   void HoldAgainst(uint16_t id, uint64_t serial, const std::vector<OwnedName>& hidden,
                    absl::StatusOr<ShownScene> shown) {
-    if (!Has(id, serial)) return End(Asked::kCompare);
-    if (!shown.ok()) return Compared(id, serial, 0, shown.status());
-    Watched& watch = watches_[id];
+    if (shown.ok() && !Has(id, serial)) shown = absl::NotFoundError("there is no such watch");
+    if (!shown.ok()) {
+      End(Asked::kCompare);
+      return Compared(id, 0, shown.status());
+    }
     const uint64_t volume = shown->volume.volume;
+    const auto& info = watches_[id].info;
     shared_->comparer->Post(
-        {watch.display, watch.grid, shown->volume.layout, watch.reach, std::move(shown->from),
-         hidden, watch.places->box(), LitPixels(shown->volume, *watch.places),
-         Then<Comparison>([id, serial, volume](ViewerSocket& self, auto comparison) {
-           self.Compared(id, serial, volume, comparison);
+        {info->name, info, *std::move(shown), hidden,
+         Then<Comparison>([id, volume](ViewerSocket& self, const auto& comparison) {
+           self.End(Asked::kCompare);
+           self.Compared(id, volume, comparison);
          })});
   }
 
-  void Compared(uint16_t id, uint64_t serial, uint64_t volume,
-                const absl::StatusOr<Comparison>& comparison) {
-    End(Asked::kCompare);
-    if (!Has(id, serial)) return;
+  // Each that asks has an answer.
+  void Compared(uint16_t id, uint64_t volume, const absl::StatusOr<Comparison>& comparison) {
     if (!comparison.ok()) {
       const std::string why(comparison.status().message());
       return peer_->Send(Text({{"compared", {{"id", id}, {"why", why}}}}), false);

@@ -27,7 +27,7 @@ struct ViewerShared {
   // Of displays that somebody has watched: finding places takes a while.
   std::map<std::string, std::shared_ptr<PixelPlaces>> places;
   size_t watches = 0;  // of all sockets
-  std::unique_ptr<Comparer> comparer = std::make_unique<Comparer>(clock);
+  std::unique_ptr<Comparer> comparer = std::make_unique<Comparer>(clock, core.budget());
 };
 
 // `control`: it may change displays and layers.

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cstring>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -40,10 +39,11 @@ std::string Message(Header header, const std::vector<uint32_t>& slices, const Po
   return out;
 }
 
-// Answers a pair of numbers for each of the slices, as Message takes them.
-std::vector<uint32_t> AppendSlices(const display::DecodedVolume& volume,
-                                   const std::vector<int32_t>& wanted, PixelPlaces& places,
-                                   Points* points) {
+}  // namespace
+
+std::vector<uint32_t> AppendLit(const display::DecodedVolume& volume,
+                                const std::vector<int32_t>& wanted, PixelPlaces& places,
+                                Points* points) {
   std::vector<uint32_t> slices;
   const auto each = static_cast<size_t>(places.width()) * static_cast<size_t>(places.height()) * 3;
   for (size_t i = 0; i < wanted.size();) {
@@ -67,11 +67,9 @@ std::vector<uint32_t> AppendSlices(const display::DecodedVolume& volume,
   return slices;
 }
 
-}  // namespace
-
 std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places) {
   Points points;
-  const std::vector<uint32_t> slices = AppendSlices(change.volume, change.slices, places, &points);
+  const std::vector<uint32_t> slices = AppendLit(change.volume, change.slices, places, &points);
   return Message({.kind = MessageKind::kVolume,
                   .whole = change.whole,
                   .watch = watch,
@@ -87,14 +85,6 @@ std::string DarkMessage(uint16_t watch, PixelPlaces& places) {
 std::string PointsMessage(MessageKind kind, uint16_t watch, uint64_t volume, const Points& points) {
   return Message({.kind = kind, .whole = true, .watch = watch, .volume = volume},
                  {0, static_cast<uint32_t>(points.size())}, points);
-}
-
-Points LitPixels(const display::DecodedVolume& volume, PixelPlaces& places) {
-  std::vector<int32_t> all(static_cast<size_t>(volume.layout.slices));
-  std::iota(all.begin(), all.end(), 0);
-  Points points;
-  AppendSlices(volume, all, places, &points);
-  return points;
 }
 
 }  // namespace voxeld::daemon::viewer

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "daemon/core/volume_feed.h"
 #include "daemon/viewer/pixel_places.h"
@@ -20,7 +21,9 @@ std::string DarkMessage(uint16_t watch, PixelPlaces& places);
 // Points that are of no slice in particular.
 std::string PointsMessage(MessageKind kind, uint16_t watch, uint64_t volume, const Points& points);
 
-// All lit pixels of a volume, slice after slice.
-Points LitPixels(const display::DecodedVolume& volume, PixelPlaces& places);
+// Appends the lit pixels of `wanted` slices; answers slice numbers and how many each has, in turns.
+std::vector<uint32_t> AppendLit(const display::DecodedVolume& volume,
+                                const std::vector<int32_t>& wanted, PixelPlaces& places,
+                                Points* points);
 
 }  // namespace voxeld::daemon::viewer

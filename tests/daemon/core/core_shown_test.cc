@@ -89,13 +89,15 @@ TEST(CoreShown, APictureThatStaysWasDrawnFromTheNewestSceneThatLooksSo) {
   Watched sim;
   sim.Watch();
   const uint64_t volume = sim.told;
-  sim.Send(sim.client, 2, Put("dark", "far", 1e9));  // nowhere to be seen
-  DisplayUpdate update;
-  update.view = ViewOptions{ViewOptions::Mode::kVoxels, {}, {}};
-  ASSERT_TRUE(sim.Update(update).ok());
+  EXPECT_EQ(sim.Names(), "first ");
+  // What is drawn anew with other entities and the same look: the same dot by two names, then by one.
+  sim.Send(sim.client, 2, Put("a", "again", 1));
   while (sim.Show()) {
   }
-  EXPECT_EQ(sim.Shown()->from.scene_to_voxel, gpu::Affine());
+  sim.Send(sim.client, 3, DeleteId("a", "first"));
+  while (sim.Show()) {
+  }
+  EXPECT_EQ(sim.Names(), "again ");
   EXPECT_GE(sim.told, volume);
 }
 

@@ -1,8 +1,11 @@
 #include "daemon/process/end_limit.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/time.h>
 #include <unistd.h>
+
+#include <array>
 
 namespace voxeld::daemon {
 namespace {
@@ -14,6 +17,22 @@ TEST(EndLimitDeathTest, WhatDoesNotEndIsEnded) {
         while (true) pause();
       },
       ::testing::ExitedWithCode(1), "did not end in time");
+}
+
+TEST(EndLimitDeathTest, ThoughNobodyReadsWhatItSays) {
+  EXPECT_EXIT(
+      {
+        int ends[2];
+        if (pipe(ends) != 0 || fcntl(ends[1], F_SETFL, O_NONBLOCK) != 0) _exit(9);
+        const std::array<char, 4096> full{};
+        while (write(ends[1], full.data(), full.size()) > 0) {
+        }
+        fcntl(ends[1], F_SETFL, 0);
+        dup2(ends[1], STDERR_FILENO);
+        const EndLimit limit(20 * sync::kMillisecond);
+        while (true) pause();
+      },
+      ::testing::ExitedWithCode(1), "");
 }
 
 TEST(EndLimitDeathTest, WhatEndsInTimeIsLeftAlone) {

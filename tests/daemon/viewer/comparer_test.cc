@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <future>
+#include <optional>
+#include <thread>
 
 #include "display/sync/clock.h"
 #include "tests/daemon/scene/store_fixture.h"
@@ -20,12 +23,25 @@ class ComparerTest : public ::testing::Test {
   Comparer::Task TaskOf(std::vector<OwnedName> hidden = {}) {
     Comparer::Task task;
     task.display = "main";
-    task.grid = {8, 8, 4, {1, 1, 2}, {-4, -4, -4}};
-    task.from.scene = scene_.store.snapshot();
-    task.from.tone.SetCurve(display::Tone::Linear());
+    task.info = InfoOf({8, 8, 4, {1, 1, 2}, {-4, -4, -4}});
+    task.shown.volume.layout = task.info->layout;
+    task.shown.volume.pictures.assign(
+        4, std::make_shared<std::vector<std::byte>>(task.info->layout.bytes_per_slice()));
+    task.shown.from.scene = scene_.store.snapshot();
+    task.shown.from.tone.SetCurve(display::Tone::Linear());
     task.hidden = std::move(hidden);
-    task.box = {{-4, -4, -4}, {4, 4, 4}};
     return task;
+  }
+
+  // Four dark planes of 8 by 8, whatever the grid.
+  static std::shared_ptr<const display::DisplayInfo> InfoOf(const display::VoxelGrid& grid) {
+    auto info = std::make_shared<display::DisplayInfo>();
+    display::PlanarStack stack;
+    stack.width_px = 8, stack.height_px = 8;
+    stack.positions_mm = {-3, -1, 1, 3};
+    info->geometry = {.shape = stack, .grid = grid};
+    info->layout = {.slices = 4, .width = 8, .height = 8};
+    return info;
   }
 
   absl::StatusOr<Comparison> Run(Comparer::Task task) {
@@ -37,7 +53,7 @@ class ComparerTest : public ::testing::Test {
 
   sync::SystemClock clock_;
   StoreFixture scene_;
-  Comparer comparer_{clock_};
+  Comparer comparer_{clock_, nullptr};
 };
 
 TEST_F(ComparerTest, VoxelsAreWhereTheSceneHasThem) {
@@ -47,10 +63,10 @@ TEST_F(ComparerTest, VoxelsAreWhereTheSceneHasThem) {
   EXPECT_EQ(c->voxels, 2u);
   EXPECT_EQ(c->missing, 2u) << "nothing is shown";
   ASSERT_EQ(c->sent.size(), 2u);
-  // Voxel (2, 0, 0) of cells of 1 by 1 by 2 mm from −4 on; the box is from −4 to 4.
-  EXPECT_NEAR(c->sent.x[0] * 8.0 / kPlaceSteps - 4, -1.5, 0.001);
-  EXPECT_NEAR(c->sent.y[0] * 8.0 / kPlaceSteps - 4, -3.5, 0.001);
-  EXPECT_NEAR(c->sent.z[0] * 8.0 / kPlaceSteps - 4, -3, 0.001);
+  // Voxel (2, 0, 0) of cells of 1 by 1 by 2 mm from −4 on; the box is around their centres.
+  EXPECT_NEAR(c->sent.x[0] * 7.0 / kPlaceSteps - 3.5, -1.5, 0.001);
+  EXPECT_NEAR(c->sent.y[0] * 7.0 / kPlaceSteps - 3.5, -3.5, 0.001);
+  EXPECT_NEAR(c->sent.z[0] * 6.0 / kPlaceSteps - 3, -3, 0.001);
   EXPECT_EQ(c->sent.rgb[0], 255);
 
   // The next scene, and the one before again: by what differs.
@@ -71,34 +87,73 @@ TEST_F(ComparerTest, AnotherViewAndAnotherGridAreDrawnAnew) {
   scene_.Commit(Put("a", "x", 2));
   EXPECT_EQ(Run(TaskOf())->voxels, 1u);
   Comparer::Task moved = TaskOf();
-  moved.from.scene_to_voxel = daemon::testing::Shift(20);
+  moved.shown.from.scene_to_voxel = daemon::testing::Shift(20);
   EXPECT_EQ(Run(moved)->voxels, 0u) << "it is outside";
   Comparer::Task wide = TaskOf();
-  wide.from.scene_to_voxel = daemon::testing::Shift(20);
-  wide.grid.nx = 32;
+  wide.shown.from.scene_to_voxel = daemon::testing::Shift(20);
+  wide.info = InfoOf({32, 8, 4, {1, 1, 2}, {-4, -4, -4}});
   EXPECT_EQ(Run(wide)->voxels, 1u);
 }
 
 TEST_F(ComparerTest, WhatCannotBeComparedSaysWhy) {
   Comparer::Task task = TaskOf();
-  task.grid = {4096, 4096, 4096, {1, 1, 1}, {}};
+  task.info = InfoOf({4096, 4096, 4096, {1, 1, 1}, {}});
   EXPECT_TRUE(absl::IsInvalidArgument(Run(task).status()));
 }
 
-TEST_F(ComparerTest, WhatIsNotBegunIsCancelledAtTheEnd) {
-  std::atomic<int> done = 0, cancelled = 0;
-  {
-    Comparer comparer(clock_);
-    for (int i = 0; i < 20; ++i) {
-      Comparer::Task task = TaskOf();
-      task.done = [&](const absl::StatusOr<Comparison>& c) {
-        ++done;
-        cancelled += absl::IsCancelled(c.status()) ? 1 : 0;
-      };
-      comparer.Post(std::move(task));
-    }
+TEST_F(ComparerTest, WhatIsShownIsHeldAgainstIt) {
+  scene_.Commit(Put("a", "x", 2));
+  Comparer::Task task = TaskOf();
+  std::vector<std::byte> first(task.info->layout.bytes_per_slice());
+  for (size_t i = 0; i < 3; ++i) first[2 * 3 + i] = std::byte{255};  // the pixel of that voxel
+  task.shown.volume.pictures[0] = std::make_shared<std::vector<std::byte>>(first);
+  const auto c = Run(std::move(task));
+  ASSERT_TRUE(c.ok()) << c.status();
+  EXPECT_EQ(c->pixels, 1u);
+  EXPECT_EQ(c->missing + c->stray + c->off, 0u);
+}
+
+TEST_F(ComparerTest, WithoutRoomInTheBudgetItIsRefusedAndNothingStaysCharged) {
+  const auto small = std::make_shared<Budget>(1000);
+  const auto large = std::make_shared<Budget>(1 << 30);
+  for (const auto& [budget, fits] : {std::pair(small, false), {large, true}}) {
+    Comparer comparer(clock_, budget);
+    std::promise<absl::Status> promise;
+    Comparer::Task task = TaskOf();
+    task.done = [&](const absl::StatusOr<Comparison>& c) { promise.set_value(c.status()); };
+    comparer.Post(std::move(task));
+    const absl::Status status = promise.get_future().get();
+    EXPECT_EQ(status.ok(), fits) << status;
+    EXPECT_EQ(budget->used_bytes(), 0u);
   }
-  EXPECT_EQ(done, 20) << "each has its answer, " << cancelled << " of them that it was cancelled";
+}
+
+TEST_F(ComparerTest, OneMoreThanMayWaitIsRefusedAndThoseThatWaitAreCancelledAtTheEnd) {
+  std::promise<void> first_is_done, go_on;
+  std::atomic<int> refused = 0, cancelled = 0, done = 0;
+  std::optional<Comparer> comparer(std::in_place, clock_, nullptr);
+  Comparer::Task first = TaskOf();
+  first.done = [&](const absl::StatusOr<Comparison>&) {
+    first_is_done.set_value();
+    go_on.get_future().wait();  // the thread is held up here, and nothing else is begun
+  };
+  comparer->Post(std::move(first));
+  first_is_done.get_future().wait();
+  for (size_t i = 0; i < Comparer::kMostTasks + 3; ++i) {
+    Comparer::Task task = TaskOf();
+    task.done = [&](const absl::StatusOr<Comparison>& c) {
+      ++done;
+      refused += absl::IsResourceExhausted(c.status()) ? 1 : 0;
+      cancelled += absl::IsCancelled(c.status()) ? 1 : 0;
+    };
+    comparer->Post(std::move(task));
+  }
+  EXPECT_EQ(refused, 3);
+  std::thread ends([&] { comparer.reset(); });
+  go_on.set_value();
+  ends.join();
+  EXPECT_EQ(done, static_cast<int>(Comparer::kMostTasks) + 3);
+  EXPECT_LE(cancelled, static_cast<int>(Comparer::kMostTasks));
 }
 
 }  // namespace

@@ -283,6 +283,31 @@ TEST_F(ComparisonTest, AFailedReadIsTheAnswer) {
   EXPECT_TRUE(absl::IsResourceExhausted(failed.status()));
 }
 
+TEST(CheckComparable, ManyLitPixelsAreNot) {
+  EXPECT_TRUE(CheckComparable({1, 1, 1, {1, 1, 1}, {}}, kMostPixels).ok());
+  EXPECT_TRUE(absl::IsInvalidArgument(CheckComparable({1, 1, 1, {1, 1, 1}, {}}, kMostPixels + 1)));
+}
+
+TEST_F(ComparisonTest, OfManyPointsAPartIsDrawnAndAllAreCounted) {
+  grid_ = {128, 128, 80, {1, 1, 1}, {0, 0, 0}};
+  const auto c = Compare(grid_, layout_, tone_, reach_, {{0, 0, 0}, {128, 128, 80}}, shown_,
+                         [](int32_t, int32_t, std::span<uint32_t> out) {
+                           std::fill(out.begin(), out.end(), 0xFFFFFFu);
+                           return absl::OkStatus();
+                         });
+  ASSERT_TRUE(c.ok());
+  EXPECT_EQ(c->voxels, 128u * 128 * 80);
+  EXPECT_EQ(c->missing, c->voxels);
+  for (const Points* points : {&c->sent, &c->difference}) {
+    EXPECT_LT(points->size(), Comparison::kMostPoints);
+    EXPECT_GE(points->size(), Comparison::kMostPoints / 2);
+    EXPECT_EQ(points->rgb.size(), 3 * points->size());
+    // Of the last plane as of the first.
+    EXPECT_LT(points->z.front(), kPlaceSteps / 80);
+    EXPECT_GT(points->z.back(), kPlaceSteps - kPlaceSteps / 80);
+  }
+}
+
 TEST(CheckComparable, LargeGridsAreNot) {
   EXPECT_TRUE(CheckComparable({512, 512, 1024, {1, 1, 1}, {}}).ok());
   EXPECT_TRUE(absl::IsInvalidArgument(CheckComparable({512, 512, 1025, {1, 1, 1}, {}})));

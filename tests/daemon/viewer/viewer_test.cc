@@ -187,7 +187,8 @@ TEST_F(ViewerTest, APageIsToldDisplaysAndVolumesAndPacesThem) {
 TEST_F(ViewerTest, WhatIsShownIsHeldAgainstWhatWasSent) {
   const auto socket = Open();
   Say(*socket, {{"update", {{"name", "one"}}}});  // not a page's to ask, and no harm
-  Say(*socket, {{"compare", 7}});                 // there is no such watch: passed over
+  Say(*socket, {{"compare", 7}});
+  EXPECT_THAT(HearOf(*socket, "compared")["why"].get<std::string>(), HasSubstr("no such watch"));
   Say(*socket, {{"watch", "one"}, {"id", 7}});
   EXPECT_EQ(HearOf(*socket, "watching")["id"], 7);
   EXPECT_EQ(Hear(*socket)[0], 1) << "the first volume";

@@ -7,6 +7,7 @@ import { Compared, LayerInfo, Watching, kDifference, kSent } from "./protocol";
 
 const kTick = 250;
 const kAgainAfter = 500; // an answer that there is none yet
+const kPatience = 60_000; // for an answer
 
 export const layerKey = (layer: { owner: string; layer: string }) => `${layer.owner}/${layer.layer}`;
 
@@ -45,6 +46,7 @@ export class Comparison {
   private readonly hidden = new Map<string, { owner: string; layer: string }>();
   private choice = 0;
   private underWay: { id: number; since: number } | null = null;
+  private came: Compared | null = null; // whose points are still to come
   private timer: ReturnType<typeof setInterval> | undefined;
 
   constructor(private readonly page: ComparisonPage) {}
@@ -59,12 +61,17 @@ export class Comparison {
     this.restart();
   }
 
-  // Other displays are looked at, or the daemon was lost.
+  // The daemon was lost: it answers nothing that it was asked.
+  lost(): void {
+    this.underWay = null;
+  }
+
+  // Other displays are looked at.
   restart(): void {
     clearInterval(this.timer);
     this.sent?.dispose();
     this.difference?.dispose();
-    this.sent = this.difference = this.underWay = null;
+    this.sent = this.difference = this.came = null;
     this.known.clear();
     this.page.tell("");
     for (const view of this.page.views().values()) view.note("");
@@ -98,7 +105,7 @@ export class Comparison {
     if (view === undefined || asked === undefined || !this.on) return;
     asked.notBefore = performance.now() + took; // half of the time at the most
     if (compared.why !== undefined) {
-      asked.volume = -1;
+      asked.volume = -1; // it is asked for again
       asked.notBefore = performance.now() + kAgainAfter;
       this.page.tell(`${view.name} is not compared: ${compared.why}.`);
       return;
@@ -106,17 +113,29 @@ export class Comparison {
     asked.volume = Number(compared.volume);
     if (this.sent === null) view.note(`: ${shortly(compared)}`);
     this.page.tell(`${view.name}, ${atLength(compared)}`);
-    if (view.watching === null) return;
-    for (const each of [this.sent, this.difference]) each?.begin(placesOf(compared, view.watching));
+    this.came = compared;
   }
 
-  // Whether the message is one of a comparison's.
+  // Whether the message is one of a comparison's. What was there stays until it is here.
   points(message: ArrayBuffer): boolean {
-    const kind = new DataView(message).getUint8(0);
+    const header = new DataView(message);
+    const kind = header.getUint8(0);
     if (kind !== kSent && kind !== kDifference) return false;
-    (kind === kSent ? this.sent : this.difference)?.renderer.update(message);
+    const id = header.getUint16(2, true);
+    const view = kind === kSent ? this.sent : this.difference;
+    const shown = this.page.views().get(id)?.watching ?? null;
+    if (view === null || shown === null || this.came?.id !== id) return true;
+    view.begin(placesOf(this.came, shown));
+    view.renderer.update(message);
+    view.note(`, of volume ${this.came.volume}`);
     this.page.redraw();
     return true;
+  }
+
+  // Layers that there are: what is not there any more is not left out either.
+  know(layers: LayerInfo[]): void {
+    const there = new Set(layers.map(layerKey));
+    for (const key of this.hidden.keys()) if (!there.has(key)) this.hidden.delete(key);
   }
 
   draw(orbit: Orbit, look: Look, colors: OutlineColors): void {
@@ -131,8 +150,9 @@ export class Comparison {
   }
 
   private tick(): void {
-    if (!this.on || this.underWay !== null || document.hidden) return;
     const now = performance.now();
+    if (this.underWay !== null && now - this.underWay.since > kPatience) this.underWay = null;
+    if (!this.on || this.underWay !== null || document.hidden) return;
     for (const [id, view] of this.page.views()) {
       const asked = this.known.get(id);
       if (view.watching === null || view.drawn.volume === 0) continue;

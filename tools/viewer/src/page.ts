@@ -73,6 +73,7 @@ class Page {
     if (message.ended !== undefined) this.ended(message.ended.id, message.ended.why);
     if (message.stats !== undefined) this.figures(message.stats);
     if (message.layers !== undefined) {
+      this.comparison.know(message.layers.layers ?? []);
       this.panels.layers(message.layers.layers ?? [], this.hello?.control ?? false,
         (layer) => this.connection.send({ clear: { owner: layer.owner, layer: layer.layer } }), {
           isHidden: (layer) => this.comparison.isHidden(layer),
@@ -130,6 +131,7 @@ class Page {
   private closed(): void {
     byId("offline").hidden = false;
     this.owed.clear();
+    this.comparison.lost();
   }
 
   private watch(): void {

@@ -23,6 +23,10 @@ export function bytes(count: number): string {
   return `${count.toPrecision(3)} ${units[unit]!}`;
 }
 
+function counted(n: string, one: string, many = `${one}s`): string {
+  return `${n} ${n === "1" ? one : many}`;
+}
+
 function state(text: string): string {
   return text.replace(/^DISPLAY_STATE_/, "").toLowerCase();
 }
@@ -54,7 +58,7 @@ export class Panels {
 
   figures(stats: Stats, name: string, drawn: { points: number; frames: number; renderer: string }): void {
     const display = stats.displays.find((d) => d.name === name);
-    byId("clients").textContent = `${stats.sessions} sessions, ${stats.layers} layers, ${stats.entities} entities`;
+    byId("clients").textContent = `${counted(stats.sessions, "session")}, ${counted(stats.layers, "layer")}, ${counted(stats.entities, "entity", "entities")}`;
     byId("drawn").textContent = `${drawn.points.toLocaleString("en")} lit pixels, ${drawn.frames} pictures/s (${drawn.renderer})`;
     if (display === undefined) return;
     const time = Number(stats.time_ns) / 1e9;
