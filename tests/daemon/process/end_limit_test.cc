@@ -19,20 +19,20 @@ TEST(EndLimitDeathTest, WhatDoesNotEndIsEnded) {
       ::testing::ExitedWithCode(1), "did not end in time");
 }
 
+void EndWithAFullPipe() {
+  int ends[2];
+  if (pipe(ends) != 0 || fcntl(ends[1], F_SETFL, O_NONBLOCK) != 0) _exit(9);
+  const std::array<char, 4096> full{};
+  while (write(ends[1], full.data(), full.size()) > 0) {
+  }
+  fcntl(ends[1], F_SETFL, 0);
+  dup2(ends[1], STDERR_FILENO);
+  const EndLimit limit(20 * sync::kMillisecond);
+  while (true) pause();
+}
+
 TEST(EndLimitDeathTest, ThoughNobodyReadsWhatItSays) {
-  EXPECT_EXIT(
-      {
-        int ends[2];
-        if (pipe(ends) != 0 || fcntl(ends[1], F_SETFL, O_NONBLOCK) != 0) _exit(9);
-        const std::array<char, 4096> full{};
-        while (write(ends[1], full.data(), full.size()) > 0) {
-        }
-        fcntl(ends[1], F_SETFL, 0);
-        dup2(ends[1], STDERR_FILENO);
-        const EndLimit limit(20 * sync::kMillisecond);
-        while (true) pause();
-      },
-      ::testing::ExitedWithCode(1), "");
+  EXPECT_EXIT(EndWithAFullPipe(), ::testing::ExitedWithCode(1), "");
 }
 
 TEST(EndLimitDeathTest, WhatEndsInTimeIsLeftAlone) {
