@@ -44,15 +44,16 @@ void Eye::Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t sn
   by_look_[look].push_back(static_cast<size_t>(drawn_.rend() - it) - 1);
 }
 
-std::string Eye::Sees(Look look, sync::TimeNs now) {
+std::string Eye::Sees(Look look, sync::TimeNs now, bool may_go_back) {
   shown_.push_back({look, now});
   // A display that had no volume yet shows a black one for who captures or watches.
-  if (look == black_ && newest_shown_ == 0) return "";
+  if (look == black_ && (newest_shown_ == 0 || may_go_back)) return "";
   const auto found = by_look_.find(look);
   if (found == by_look_.end()) return "the device shows what was never drawn";
   const std::vector<size_t>& like_it = found->second;
   const auto next = std::find_if(like_it.begin(), like_it.end(),
                                  [this](size_t i) { return drawn_[i].volume >= newest_shown_; });
+  if (next == like_it.end() && may_go_back) return "";
   if (next == like_it.end()) {
     return absl::StrCat("the device shows volume ", drawn_[like_it.back()].volume,
                         " again, and has shown volume ", newest_shown_);

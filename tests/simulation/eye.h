@@ -44,7 +44,8 @@ class Eye {
   void Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t snapshot,
             sync::TimeNs now);
   // The device shows another picture. What is wrong with that; empty: nothing.
-  std::string Sees(Look look, sync::TimeNs now);
+  // `may_go_back`: to what it showed before, or to black.
+  std::string Sees(Look look, sync::TimeNs now, bool may_go_back = false);
 
   const std::vector<Drawn>& drawn() const { return drawn_; }
   const Drawn* Find(uint64_t volume) const;

@@ -58,6 +58,11 @@ void SimulationRun::Do(const Action& action) {
       // share, whether its last commits come before those of others.
       Step();
       AwaitCertainty();
+      // Nor in which order commits for one sweep are applied at its end.
+      if (std::any_of(plain_.sessions.begin(), plain_.sessions.end(),
+                      [](const auto& entry) { return entry.second.due.size() > 1; })) {
+        return;
+      }
       break;
     case ActionKind::kStep:
       switch (chance.Pick(6)) {

@@ -19,7 +19,7 @@ namespace voxeld::simulation {
 
 struct Tally {
   uint64_t turns = 0, commits = 0, outcomes = 0, volumes = 0, pictures_compared = 0;
-  uint64_t captures = 0, watched = 0, faults = 0, attaches = 0;
+  uint64_t captures = 0, watched = 0, faults = 0;
   sync::TimeNs time_ns = 0;  // that passed
   std::map<CommitOutcome::Kind, uint64_t> kinds;
 };
