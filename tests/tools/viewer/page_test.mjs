@@ -139,6 +139,10 @@ describe("the page", { timeout: 5 * kPatience }, () => {
         assert.equal((await inspect(page)).renderer, renderer === "2d" ? "2D" : "WebGL2");
         await page.waitForFunction(() => globalThis.voxeld.inspect().drawn.points > 50);
         pictures.push(await picture(page));
+        const all = (await inspect(page)).drawn.points;
+        await page.locator("#slice").fill("8");
+        await page.waitForFunction((whole) => globalThis.voxeld.inspect().drawn.points > 0 && globalThis.voxeld.inspect().drawn.points < whole / 2, all);
+        await page.uncheck("#one");
         assert.deepEqual(seen.errors, []);
         await context.close();
       }

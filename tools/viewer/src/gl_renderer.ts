@@ -295,6 +295,6 @@ export class GlRenderer implements Renderer {
     this.gl.render(this.stage, this.camera);
     this.gl.setRenderTarget(null);
     this.gl.render(this.developing, this.camera);
-    this.onDrawn({ volume: this.store.volume, points: this.store.points(), milliseconds: performance.now() - began });
+    this.onDrawn({ volume: this.store.volume, points: this.store.lit(scene.sweep), milliseconds: performance.now() - began });
   }
 }

@@ -1,6 +1,7 @@
 // The rebuilt volume: the lit pixels of each slice, as they came last. What a slice had is overwritten in place, so that
 // memory grows with the most that was lit and not with how often it changed.
 import { Points } from "./protocol";
+import { Sweep, lightOf } from "./renderer";
 
 export interface Slice {
   count: number;
@@ -51,6 +52,11 @@ export class PointStore {
       from = to;
     }
     return came;
+  }
+
+  // Of the slices that give light.
+  lit(sweep: Sweep): number {
+    return this.slices.reduce((sum, slice, i) => sum + (lightOf(sweep, i, this.slices.length) > 0 ? slice.count : 0), 0);
   }
 
   points(): number {
