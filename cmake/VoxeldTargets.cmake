@@ -50,9 +50,8 @@ if(VOXELD_SANITIZE)
     # A null pointer faults without being looked for.
     target_compile_options(voxeld_options INTERFACE -fno-sanitize-recover=undefined -fno-sanitize=null,vptr)
   endif()
-else()
-  target_compile_options(voxeld_options INTERFACE -fstack-protector-strong)
 endif()
+include(VoxeldHardening)
 target_link_libraries(voxeld_options INTERFACE Threads::Threads)
 
 # Warnings are for our own code only, not for what protoc generates.
@@ -89,6 +88,7 @@ function(voxeld_test_options name)
   if((VOXELD_SANITIZE OR VOXELD_HASTY) AND NOT ARG_HEAVY)
     # Optimising what a sanitizer has put its checks into takes several times as long.
     target_compile_options(${name} PRIVATE -O0)
+    set_target_properties(${name} PROPERTIES VOXELD_UNOPTIMISED ON)
   elseif(CMAKE_BUILD_TYPE STREQUAL "Release")
     # What is tested is built as it is shipped; the test itself compiles faster so.
     target_compile_options(${name} PRIVATE -O1)
@@ -168,7 +168,7 @@ function(voxeld_library name)
     file(CONFIGURE OUTPUT ${file} CONTENT "#include \"${path}\"\n" @ONLY)
     list(APPEND alone ${file})
     # Nothing of it is ever run.
-    set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS -O0)
+    set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-O0;-U_FORTIFY_SOURCE")
   endforeach()
   add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
