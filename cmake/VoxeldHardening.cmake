@@ -6,20 +6,24 @@ option(VOXELD_HARDENING "Build with the compiler's and the linker's defences" ON
 
 # For a target whose own options say -O0: glibc's checks need an optimiser.
 define_property(TARGET PROPERTY VOXELD_UNOPTIMISED BRIEF_DOCS "Compiled with -O0")
+# For a library whose inner loops are what voxeld takes its time for: what costs those more than a fiftieth is left out.
+define_property(TARGET PROPERTY VOXELD_KERNELS BRIEF_DOCS "Compiled without VOXELD_NOT_IN_KERNELS")
+set(VOXELD_NOT_IN_KERNELS -ftrivial-auto-var-init=zero -D_GLIBCXX_ASSERTIONS)
 
 if(NOT VOXELD_SANITIZE)
   target_compile_options(voxeld_options INTERFACE -fstack-protector-strong)
 endif()
 
 if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE)
-  target_compile_options(voxeld_options INTERFACE
-    $<$<COMPILE_LANGUAGE:C,CXX>:-fstack-clash-protection -fcf-protection=full -ftrivial-auto-var-init=zero -Wformat
-    -Werror=format-security>)
+  set(optimised OFF)
   if(CMAKE_BUILD_TYPE MATCHES "^(Release|RelWithDebInfo|MinSizeRel)$")
-    target_compile_options(voxeld_options INTERFACE
-      "$<$<AND:$<COMPILE_LANGUAGE:C,CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_UNOPTIMISED>>>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=3>"
-      $<$<COMPILE_LANGUAGE:CXX>:-D_GLIBCXX_ASSERTIONS>)
+    set(optimised ON)
   endif()
+  target_compile_options(voxeld_options INTERFACE
+    "$<$<COMPILE_LANGUAGE:C,CXX>:-fstack-clash-protection;-fcf-protection=full;-Wformat;-Werror=format-security>"
+    "$<$<AND:$<COMPILE_LANGUAGE:C,CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_KERNELS>>>>:-ftrivial-auto-var-init=zero>"
+    "$<$<AND:$<BOOL:${optimised}>,$<COMPILE_LANGUAGE:CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_KERNELS>>>>:-D_GLIBCXX_ASSERTIONS>"
+    "$<$<AND:$<BOOL:${optimised}>,$<COMPILE_LANGUAGE:C,CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_UNOPTIMISED>>>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=3>")
   include(CheckPIESupported)
   check_pie_supported(LANGUAGES C CXX)
   add_link_options("LINKER:-z,relro,-z,now,-z,noexecstack,-z,shstk")

@@ -143,12 +143,12 @@ function(voxeld_apart)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# voxeld_library(NAME [SINGLE_THREADED] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
-# functions and objects that no two threads share (voxeld_unwatched). Each of HEADERS is also compiled with
+# voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
+# functions and objects that no two threads share (voxeld_unwatched). KERNELS: it has the inner loops (VoxeldHardening.cmake). Each of HEADERS is also compiled with
 # nothing before it (but under a sanitizer or in haste, where tools/check looks at those that changed), so none leans on what its includer happened to include: by its own .cc, which
 # includes it first (tools/check_includes.py), or alone.
 function(voxeld_library name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED" "" "SOURCES;HEADERS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;KERNELS" "" "SOURCES;HEADERS;LINK" ${ARGN})
   set(unwatched OFF)
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     set(unwatched ON)
@@ -172,9 +172,13 @@ function(voxeld_library name)
   endforeach()
   add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
+  if(ARG_KERNELS)
+    set_target_properties(voxeld_${name} PROPERTIES VOXELD_KERNELS ON)
+    set_property(GLOBAL APPEND PROPERTY VOXELD_KERNEL_TARGETS voxeld_${name})
+  endif()
   if(unwatched)
     target_compile_options(voxeld_${name} PRIVATE -fno-sanitize=thread)
-  elseif(VOXELD_COMMON_HEADERS)
+  elseif(VOXELD_COMMON_HEADERS AND NOT (ARG_KERNELS AND VOXELD_HARDENING AND NOT VOXELD_SANITIZE))  # whose flags are others
     target_compile_options(voxeld_${name} PRIVATE -pthread)
     if(VOXELD_PLAIN)
       target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers_plain)
