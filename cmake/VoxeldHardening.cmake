@@ -21,7 +21,8 @@ if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE)
   endif()
   target_compile_options(voxeld_options INTERFACE
     "$<$<COMPILE_LANGUAGE:C,CXX>:-fstack-clash-protection;-fcf-protection=full;-Wformat;-Werror=format-security>"
-    "$<$<AND:$<COMPILE_LANGUAGE:C,CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_KERNELS>>>>:-ftrivial-auto-var-init=zero>"
+    # Where it is looked for what nobody wrote, that is to be seen.
+    "$<$<AND:$<BOOL:${optimised}>,$<COMPILE_LANGUAGE:C,CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_KERNELS>>>>:-ftrivial-auto-var-init=zero>"
     "$<$<AND:$<BOOL:${optimised}>,$<COMPILE_LANGUAGE:CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_KERNELS>>>>:-D_GLIBCXX_ASSERTIONS>"
     "$<$<AND:$<BOOL:${optimised}>,$<COMPILE_LANGUAGE:C,CXX>,$<NOT:$<BOOL:$<TARGET_PROPERTY:VOXELD_UNOPTIMISED>>>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=3>")
   include(CheckPIESupported)
