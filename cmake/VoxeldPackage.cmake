@@ -21,7 +21,8 @@ install(FILES ${packaging}/voxeld.toml ${packaging}/playlist.toml DESTINATION ${
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/display/profiles/ DESTINATION share/voxeld/profiles FILES_MATCHING PATTERN "*.toml")
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${doc} RENAME copyright)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md ${CMAKE_SOURCE_DIR}/docs/operations.md
-              ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs/recordings.md DESTINATION ${doc})
+              ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs/recordings.md ${CMAKE_SOURCE_DIR}/SECURITY.md
+        DESTINATION ${doc})
 
 # Manual pages and completions, which the programs write: into share/, as they are installed.
 find_program(VOXELD_GZIP gzip REQUIRED)
@@ -36,6 +37,37 @@ add_custom_command(
   VERBATIM)
 add_custom_target(voxeld_manual ALL DEPENDS ${CMAKE_BINARY_DIR}/share.stamp)
 install(DIRECTORY ${written}/ DESTINATION share)
+
+# What all this is made of, told from the programs and from Ninja's log, and what must be said of it.
+set(sbom ${CMAKE_BINARY_DIR}/sbom)
+find_program(VOXELD_DPKG_QUERY dpkg-query)
+if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
+  set(arguments "")
+  if(TARGET voxeld_page)
+    get_target_property(page voxeld_page PAGE_FOLDER)
+    list(APPEND arguments --modules ${VOXELD_NODE_MODULES} --bundled ${page}/modules.json)
+  endif()
+  if(VOXELD_HAVE_CUDA)
+    list(APPEND arguments --cuda ${CUDAToolkit_VERSION})
+  endif()
+  foreach(tool ${CMAKE_CXX_COMPILER} ${VOXELD_MOLD} ${CMAKE_COMMAND} ${CMAKE_MAKE_PROGRAM} ${VOXELD_NODE} ${VOXELD_GRPC_PYTHON_PLUGIN})
+    list(APPEND arguments --tool ${tool})
+  endforeach()
+  file(GLOB scripts CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tools/sbom/*.py)
+  add_custom_command(
+    OUTPUT ${sbom}/voxeld.spdx.json ${sbom}/NOTICES
+    COMMAND ${VOXELD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tools/sbom/sbom.py --build ${CMAKE_BINARY_DIR} --version ${PROJECT_VERSION}
+            --epoch ${VOXELD_EPOCH} --program $<TARGET_FILE:voxeld> --program $<TARGET_FILE:voxelctl> --program $<TARGET_FILE:voxeld-engine>
+            --notice ${packaging}/notices/colormaps.txt --out ${sbom}/voxeld.spdx.json --out-notices ${sbom}/NOTICES ${arguments}
+    DEPENDS voxeld voxelctl voxeld-engine ${scripts} ${packaging}/notices/colormaps.txt
+    COMMENT "Listing what voxeld is made of"
+    VERBATIM)
+  add_custom_target(sbom ALL DEPENDS ${sbom}/voxeld.spdx.json ${sbom}/NOTICES)
+  install(FILES ${sbom}/voxeld.spdx.json ${sbom}/NOTICES DESTINATION ${doc})
+  file(MAKE_DIRECTORY ${sbom})
+else()
+  message(STATUS "voxeld is built without a list of what it is made of: that takes dpkg and Ninja")
+endif()
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME voxeld)
@@ -57,4 +89,11 @@ set(CPACK_DEBIAN_PACKAGE_SUGGESTS "ffmpeg")  # voxelctl render to MP4
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)
+# Archives carry the commit's time (cmake/VoxeldHardening.cmake), whenever they are made.
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/PackProject.cmake @ONLY CONTENT [[
+if(NOT DEFINED ENV{SOURCE_DATE_EPOCH})
+  set(ENV{SOURCE_DATE_EPOCH} @VOXELD_EPOCH@)
+endif()
+]])
+set(CPACK_PROJECT_CONFIG_FILE ${CMAKE_BINARY_DIR}/PackProject.cmake)
 include(CPack)

@@ -50,9 +50,8 @@ if(VOXELD_SANITIZE)
     # A null pointer faults without being looked for.
     target_compile_options(voxeld_options INTERFACE -fno-sanitize-recover=undefined -fno-sanitize=null,vptr)
   endif()
-else()
-  target_compile_options(voxeld_options INTERFACE -fstack-protector-strong)
 endif()
+include(VoxeldHardening)
 target_link_libraries(voxeld_options INTERFACE Threads::Threads)
 
 # Warnings are for our own code only, not for what protoc generates.
@@ -64,6 +63,11 @@ if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # before as the system's, whose own warnings are none of ours.
   target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-nonnull -Wno-restrict
                                                    -Wno-stringop-overflow -Wno-stringop-overread)
+endif()
+if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE AND NOT VOXELD_HASTY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # Nor all through the library's assertions, and the less the more is inlined: what it then warns of ends no build.
+  target_compile_options(voxeld_warnings INTERFACE -Wno-error=array-bounds -Wno-error=maybe-uninitialized -Wno-error=nonnull -Wno-error=restrict
+                                                   -Wno-error=stringop-overflow -Wno-error=stringop-overread)
 endif()
 if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   # What is for GCC alone stands in some sources; the checks that Clang alone has are tools/check's.
@@ -89,6 +93,7 @@ function(voxeld_test_options name)
   if((VOXELD_SANITIZE OR VOXELD_HASTY) AND NOT ARG_HEAVY)
     # Optimising what a sanitizer has put its checks into takes several times as long.
     target_compile_options(${name} PRIVATE -O0)
+    set_target_properties(${name} PROPERTIES VOXELD_UNOPTIMISED ON)
   elseif(CMAKE_BUILD_TYPE STREQUAL "Release")
     # What is tested is built as it is shipped; the test itself compiles faster so.
     target_compile_options(${name} PRIVATE -O1)
@@ -143,12 +148,12 @@ function(voxeld_apart)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# voxeld_library(NAME [SINGLE_THREADED] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
-# functions and objects that no two threads share (voxeld_unwatched). Each of HEADERS is also compiled with
+# voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
+# functions and objects that no two threads share (voxeld_unwatched). KERNELS: it has the inner loops (VoxeldHardening.cmake). Each of HEADERS is also compiled with
 # nothing before it (but under a sanitizer or in haste, where tools/check looks at those that changed), so none leans on what its includer happened to include: by its own .cc, which
 # includes it first (tools/check_includes.py), or alone.
 function(voxeld_library name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED" "" "SOURCES;HEADERS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;KERNELS" "" "SOURCES;HEADERS;LINK" ${ARGN})
   set(unwatched OFF)
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     set(unwatched ON)
@@ -168,13 +173,17 @@ function(voxeld_library name)
     file(CONFIGURE OUTPUT ${file} CONTENT "#include \"${path}\"\n" @ONLY)
     list(APPEND alone ${file})
     # Nothing of it is ever run.
-    set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS -O0)
+    set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-O0;-U_FORTIFY_SOURCE")
   endforeach()
   add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
+  if(ARG_KERNELS)
+    set_target_properties(voxeld_${name} PROPERTIES VOXELD_KERNELS ON)
+    set_property(GLOBAL APPEND PROPERTY VOXELD_KERNEL_TARGETS voxeld_${name})
+  endif()
   if(unwatched)
     target_compile_options(voxeld_${name} PRIVATE -fno-sanitize=thread)
-  elseif(VOXELD_COMMON_HEADERS)
+  elseif(VOXELD_COMMON_HEADERS AND NOT (ARG_KERNELS AND VOXELD_HARDENING AND NOT VOXELD_SANITIZE))  # whose flags are others
     target_compile_options(voxeld_${name} PRIVATE -pthread)
     if(VOXELD_PLAIN)
       target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers_plain)

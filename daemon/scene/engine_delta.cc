@@ -199,7 +199,10 @@ void EngineScene::PlanLayer(const OwnedName& key, const Layer* before, const Lay
   if (before == nullptr || !LooksSame(*before, *now)) PutLayer(key, *now);
   EntityMap::Diff(before == nullptr ? EntityMap() : before->entities, now->entities,
                   [&](const std::string& id, const EntityPtr* was, const EntityPtr* is) {
-                    if (is == nullptr) return Undraw(**was);
+                    if (is == nullptr) {
+                      if (was != nullptr) Undraw(**was);  // one of the two is there
+                      return;
+                    }
                     if (was != nullptr && (*was)->number != (*is)->number) Undraw(**was);
                     if (was != nullptr && LooksSame(**was, **is)) return;
                     redraw_.erase((*is)->number);

@@ -46,13 +46,16 @@ cat >"$work/expected" <<'EOT'
 -rwxr-xr-x root/root ./usr/libexec/voxeld/voxeld-engine
 -rw-r--r-- root/root ./usr/share/bash-completion/completions/voxelctl
 -rw-r--r-- root/root ./usr/share/doc/voxeld/CHANGELOG.md
+-rw-r--r-- root/root ./usr/share/doc/voxeld/NOTICES
 -rw-r--r-- root/root ./usr/share/doc/voxeld/README.md
+-rw-r--r-- root/root ./usr/share/doc/voxeld/SECURITY.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/configuration.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/copyright
 -rw-r--r-- root/root ./usr/share/doc/voxeld/examples/playlist.toml
 -rw-r--r-- root/root ./usr/share/doc/voxeld/examples/voxeld.toml
 -rw-r--r-- root/root ./usr/share/doc/voxeld/operations.md
 -rw-r--r-- root/root ./usr/share/doc/voxeld/recordings.md
+-rw-r--r-- root/root ./usr/share/doc/voxeld/voxeld.spdx.json
 -rw-r--r-- root/root ./usr/share/fish/vendor_completions.d/voxelctl.fish
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-assets.1.gz
 -rw-r--r-- root/root ./usr/share/man/man1/voxelctl-calibrate.1.gz

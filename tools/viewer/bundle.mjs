@@ -1,4 +1,5 @@
-// Bundles the page: TypeScript and styles from src/ into --out, each file as gzip, with the libraries in --modules.
+// Bundles the page: TypeScript and styles from src/ into --out, each file as gzip, with the libraries in --modules. Which of these are
+// in it, esbuild says: modules.json.
 import { createRequire } from "node:module";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
@@ -24,8 +25,17 @@ const built = await esbuild.build({
   legalComments: "eof",
   nodePaths: [resolve(values.modules)],
   logLevel: "warning",
+  metafile: true,
 });
 mkdirSync(values.out, { recursive: true });
 const files = built.outputFiles.map((file) => [file.path.slice(file.path.lastIndexOf("/") + 1), Buffer.from(file.contents)]);
 files.push(["index.html", readFileSync(join(source, "index.html"))]);
 for (const [name, contents] of files) writeFileSync(join(values.out, `${name}.gz`), gzipSync(contents, { level: 9 }));
+const bundled = new Set();
+for (const output of Object.values(built.metafile.outputs)) {
+  for (const [input, { bytesInOutput }] of Object.entries(output.inputs)) {
+    const name = input.match(/.*node_modules\/((?:@[^/]+\/)?[^/]+)\//)?.[1];
+    if (name && bytesInOutput > 0) bundled.add(name);
+  }
+}
+writeFileSync(join(values.out, "modules.json"), `${JSON.stringify([...bundled].sort())}\n`);
