@@ -107,29 +107,44 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
     const size_t size = piece_.size() - parser_->get().body().size;
     if (size == 0) return ReadPiece();
     received_ += size;
-    stream_.expires_never();
+    const uint64_t number = Await();
     receiver_->Take(std::string(piece_.data(), size),
-                    [io = io_, weak = weak_from_this()](std::optional<Response> refused) {
-                      asio::post(*io, [weak, refused = std::move(refused)]() mutable {
+                    [io = io_, weak = weak_from_this(), number](std::optional<Response> refused) {
+                      asio::post(*io, [weak, number, refused = std::move(refused)]() mutable {
                         const auto self = weak.lock();
-                        if (self == nullptr || !self->closed_) return;
+                        if (self == nullptr || !self->Awaits(number)) return;
                         if (refused.has_value()) return self->Answer(*std::move(refused));
+                        self->timer_.cancel();
+                        ++self->awaited_;
                         self->ReadPiece();
                       });
                     });
   }
 
   void Whole() {
-    receiver_->Whole([io = io_, weak = weak_from_this()](Response answer) {
-      asio::post(*io, [weak, answer = std::move(answer)]() mutable {
-        if (const auto self = weak.lock()) self->Answer(std::move(answer));
+    const uint64_t number = Await();
+    receiver_->Whole([io = io_, weak = weak_from_this(), number](Response answer) {
+      asio::post(*io, [weak, number, answer = std::move(answer)]() mutable {
+        const auto self = weak.lock();
+        if (self != nullptr && self->Awaits(number)) self->Answer(std::move(answer));
       });
     });
+  }
+
+  // From now on the receiver is to say something, and nothing is read meanwhile. Its number.
+  uint64_t Await() {
     stream_.expires_never();
+    const uint64_t number = ++awaited_;
     timer_.expires_after(std::chrono::nanoseconds(options_.answer_limit_ns));
-    timer_.async_wait([self = shared_from_this()](error_code error) {
-      if (!error) self->Answer(PlainResponse(503, "the daemon did not answer in time"));
+    timer_.async_wait([self = shared_from_this(), number](error_code error) {
+      // It may have been on its way when it was cancelled.
+      if (error || !self->Awaits(number)) return;
+      self->Answer(PlainResponse(503, "the daemon did not answer in time"));
     });
+    return number;
+  }
+  bool Awaits(uint64_t number) const {
+    return closed_ && !response_.has_value() && number == awaited_;
   }
 
   void TooLarge() {
@@ -172,6 +187,7 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
   const uint64_t max_bytes_;
   const steady_clock::time_point began_;
   uint64_t received_ = 0;
+  uint64_t awaited_ = 0;  // the number of what the receiver is to say next
   std::array<char, kPieceBytes> piece_;
   std::optional<ResponseMessage> response_;
   std::function<void(BodySession*)> closed_;  // empty once closed

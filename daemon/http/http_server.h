@@ -45,9 +45,9 @@ class BodyReceiver {
  public:
   virtual ~BodyReceiver() = default;
   // The next piece; another comes once `then` has been called, from any thread: with an answer, no other comes and that is
-  // answered.
+  // answered. Who does not call it within answer_limit_ns goes, as if the request was broken off.
   virtual void Take(std::string piece, std::function<void(std::optional<Response>)> then) = 0;
-  // All of it has come. Answers by calling `done` once, from any thread.
+  // All of it has come. Answers by calling `done` once, from any thread, and as soon.
   virtual void Whole(Done done) = 0;
 };
 
@@ -74,7 +74,7 @@ struct ServerOptions {
   uint32_t max_header_bytes = 8192;  // 431 beyond
   // For a request to come in, and for an answer to be read.
   sync::TimeNs idle_limit_ns = 10 * sync::kSecond;
-  sync::TimeNs answer_limit_ns = 5 * sync::kSecond;    // for the handler; then 503
+  sync::TimeNs answer_limit_ns = 5 * sync::kSecond;    // for handler and receiver; then 503
   sync::TimeNs message_limit_ns = 30 * sync::kSecond;  // for a WebSocket's message to be read
   // Of a body that is taken something has to come within idle_limit_ns, and so much on the whole, counted from there.
   uint64_t body_bytes_per_s = 32 << 10;

@@ -1,6 +1,9 @@
 #include "daemon/play/play_file.h"
 
+#include <dirent.h>
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,24 +16,96 @@
 
 namespace voxeld::daemon::play {
 
+namespace {
+
+constexpr char kFolderName[] = "voxeld-play-";
+constexpr mode_t kOwnersAlone = 0700;
+constexpr int kTries = 100;
+
+Descriptor OpenFolder(int at, const char* path) {
+  return Descriptor(openat(at, path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+}
+
+// 0, or an error's number; ENOENT, EWOULDBLOCK: RemoveLeft of another daemon has taken it for one that was left. Where the file
+// system has no locks, that does nothing, and neither does this.
+int Lock(const std::string& path, Descriptor& folder) {
+  folder = OpenFolder(AT_FDCWD, path.c_str());
+  if (!folder.ok()) return errno;
+  if (flock(folder.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return EWOULDBLOCK;
+  struct stat open = {}, named = {};
+  if (fstat(folder.get(), &open) != 0 || lstat(path.c_str(), &named) != 0) return errno;
+  return open.st_dev == named.st_dev && open.st_ino == named.st_ino ? 0 : ENOENT;
+}
+
+// With what is in it, but for folders: then it stays.
+bool RemoveFolder(int at, const char* name, const Descriptor& folder) {
+  const int listed = fcntl(folder.get(), F_DUPFD_CLOEXEC, 0);
+  DIR* const entries = listed < 0 ? nullptr : fdopendir(listed);
+  if (entries == nullptr) {
+    if (listed >= 0) close(listed);
+    return false;
+  }
+  while (const dirent* entry = readdir(entries)) unlinkat(folder.get(), entry->d_name, 0);
+  closedir(entries);
+  return unlinkat(at, name, AT_REMOVEDIR) == 0;
+}
+
+}  // namespace
+
 absl::StatusOr<PrivateFolder> PrivateFolder::Make() {
   std::error_code error;
-  std::string path = (std::filesystem::temp_directory_path(error) / "voxeld-play-XXXXXX").string();
-  if (error || mkdtemp(path.data()) == nullptr) {
+  const std::string pattern =
+      (std::filesystem::temp_directory_path(error) / absl::StrCat(kFolderName, "XXXXXX")).string();
+  const auto failed = [](int code, const std::string& path) {
     return absl::ErrnoToStatus(
-        error ? error.value() : errno,
-        absl::StrCat("no folder for files to be played can be made (", path, ")"));
+        code, absl::StrCat("no folder for files to be played can be made (", path, ")"));
+  };
+  if (error) return failed(error.value(), pattern);
+  for (int tries = 1;; ++tries) {
+    std::string path = pattern;
+    if (mkdtemp(path.data()) == nullptr) return failed(errno, path);
+    Descriptor folder;
+    const int why = Lock(path, folder);
+    if (why == 0) return PrivateFolder(std::move(path), std::move(folder));
+    rmdir(path.c_str());
+    if (tries == kTries || (why != ENOENT && why != EWOULDBLOCK)) return failed(why, path);
   }
-  return PrivateFolder(std::move(path));
+}
+
+size_t PrivateFolder::RemoveLeft() {
+  std::error_code error;
+  const std::filesystem::path where = std::filesystem::temp_directory_path(error);
+  const Descriptor all =
+      error ? Descriptor() : Descriptor(open(where.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const int listed = all.ok() ? fcntl(all.get(), F_DUPFD_CLOEXEC, 0) : -1;
+  DIR* const entries = listed < 0 ? nullptr : fdopendir(listed);
+  if (entries == nullptr) {
+    if (listed >= 0) close(listed);
+    return 0;
+  }
+  size_t removed = 0;
+  while (const dirent* entry = readdir(entries)) {
+    if (!std::string_view(entry->d_name).starts_with(kFolderName)) continue;
+    const Descriptor folder = OpenFolder(all.get(), entry->d_name);
+    struct stat found = {};
+    if (!folder.ok() || fstat(folder.get(), &found) != 0 || found.st_uid != geteuid() ||
+        (found.st_mode & 0777) != kOwnersAlone || flock(folder.get(), LOCK_EX | LOCK_NB) != 0) {
+      continue;
+    }
+    if (RemoveFolder(all.get(), entry->d_name, folder)) ++removed;
+  }
+  closedir(entries);
+  return removed;
 }
 
 PrivateFolder::PrivateFolder(PrivateFolder&& other) noexcept
-    : path_(std::exchange(other.path_, {})) {}
+    : path_(std::exchange(other.path_, {})), lock_(std::move(other.lock_)) {}
 
 PrivateFolder& PrivateFolder::operator=(PrivateFolder&& other) noexcept {
   if (this == &other) return *this;
   Remove();
   path_ = std::exchange(other.path_, {});
+  lock_ = std::move(other.lock_);
   return *this;
 }
 

@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -15,19 +16,26 @@
 
 namespace voxeld::daemon::play {
 
-// A folder of mode 0700 where the system has temporary files ($TMPDIR, else /tmp); removed with all that is in it.
+// A folder of mode 0700 where the system has temporary files ($TMPDIR, else /tmp); removed with all that is in it. Locked by
+// flock(2) while the object is there, which the system ends with the process.
 class PrivateFolder {
  public:
   static absl::StatusOr<PrivateFolder> Make();
+  // Removes those of this user that nobody has locked: whoever made them was killed. Of what has such a folder's name, only folders
+  // of mode 0700 that are this user's, by no link, and in them no further folders. Where the file system has no such locks none
+  // is. Returns how many went. Blocks as the disk does.
+  static size_t RemoveLeft();
   PrivateFolder(PrivateFolder&& other) noexcept;
   PrivateFolder& operator=(PrivateFolder&& other) noexcept;
   ~PrivateFolder();
   const std::string& path() const { return path_; }
 
  private:
-  explicit PrivateFolder(std::string path) : path_(std::move(path)) {}
+  PrivateFolder(std::string path, Descriptor lock)
+      : path_(std::move(path)), lock_(std::move(lock)) {}
   void Remove();
   std::string path_;  // empty: moved from
+  Descriptor lock_;   // of the folder itself
 };
 
 // What a file that somebody calls `name` is called here: its last part, with no bytes that a terminal, a shell or

@@ -209,6 +209,7 @@ class Player::Impl {
   }
 
   void Run() {
+    if (options_.remove_left) PrivateFolder::RemoveLeft();
     for (;;) {
       uint64_t count = 0;
       (void)!read(wake_.get(), &count, sizeof(count));

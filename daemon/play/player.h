@@ -17,6 +17,8 @@ struct PlayerOptions {
   std::string server;   // where it finds the daemon, as --server has it
   // From being asked to end to being killed. What it has up goes either way.
   sync::TimeNs grace_ns = 500 * sync::kMillisecond;
+  // Before all else, on its thread: removes what players of daemons that were killed have left (PrivateFolder::RemoveLeft).
+  bool remove_left = false;
 };
 
 struct Playing {

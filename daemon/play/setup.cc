@@ -42,7 +42,7 @@ PlaySetup SetUpPlaying(const std::vector<Address>& listen) {
     setup.listen = *own;
   }
   absl::StatusOr<std::unique_ptr<Player>> player =
-      Player::Make({.program = program, .server = server});
+      Player::Make({.program = program, .server = server, .remove_left = true});
   if (!player.ok()) {
     setup.listen.reset();
     setup.why_not = std::string(player.status().message());

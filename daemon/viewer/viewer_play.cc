@@ -1,13 +1,16 @@
 #include "daemon/viewer/viewer_play.h"
 
+#include <atomic>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "display/sync/mutex.h"
 
 namespace voxeld::daemon::viewer {
 namespace {
@@ -15,6 +18,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kLongestQueryName = 1024;
+// Pieces of work that wait for a disk; each upload adds two at the most. Beyond, nothing more is taken.
+constexpr size_t kMostWaiting = 16;
 
 http::Response Said(unsigned status, absl::string_view text) {
   return {status, "text/plain; charset=utf-8", absl::StrCat(text, "\n"), {}};
@@ -46,12 +51,62 @@ std::optional<std::string> PercentDecoded(std::string_view text) {
 
 // Who has the file while it comes: the upload, and the worker's pieces of work.
 struct Held {
-  std::optional<play::PlayFile> file;
+  std::optional<play::PlayFile> file;  // the worker's
+  std::atomic<bool> given_up = false;  // nobody waits for it any more
 };
 
 }  // namespace
 
-// Writes on the worker, and keeps the others out while it lives.
+// Who is told, and of what. Thread-safe.
+class ViewerPlay::Pages {
+ public:
+  explicit Pages(const ViewerPlayOptions& options)
+      : player_(options.player), why_not_(options.why_not), max_bytes_(options.max_bytes) {}
+
+  void Join(const std::shared_ptr<http::WebSocketPeer>& page) {
+    const sync::MutexLock lock(mutex_);
+    std::erase_if(pages_, [&page](const std::weak_ptr<http::WebSocketPeer>& other) {
+      const auto open = other.lock();
+      return open == nullptr || open == page;
+    });
+    pages_.push_back(page);
+    page->Send(Message(), false);
+  }
+
+  void Tell() {
+    // Told in the lock, so that the newest is told last.
+    const sync::MutexLock lock(mutex_);
+    const std::string message = Message();
+    std::erase_if(pages_, [&message](const std::weak_ptr<http::WebSocketPeer>& page) {
+      const auto open = page.lock();
+      if (open != nullptr) open->Send(message, false);
+      return open == nullptr;
+    });
+  }
+
+ private:
+  std::string Message() const {
+    Json what = Json::object();
+    if (player_ == nullptr) {
+      what["why_not"] = why_not_;
+    } else {
+      const play::Playing state = player_->state();
+      what["max_bytes"] = max_bytes_;
+      if (!state.name.empty()) what["playing"] = state.name;
+      if (!state.failed.empty()) what["failed"] = state.failed;
+      if (!state.why.empty()) what["why"] = state.why;
+    }
+    return Json{{"play", std::move(what)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+  }
+
+  play::Player* const player_;
+  const std::string why_not_;
+  const uint64_t max_bytes_;
+  sync::Mutex mutex_;
+  std::vector<std::weak_ptr<http::WebSocketPeer>> pages_ VOXELD_GUARDED_BY(mutex_);
+};
+
+// Writes on the worker, and keeps the others out while it lives. What the worker has not come to by then it gives up.
 class ViewerPlay::Upload final : public http::BodyReceiver {
  public:
   Upload(std::shared_ptr<ViewerPlay> play, std::string name)
@@ -60,48 +115,58 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
   }
   ~Upload() override {
     play_->taking_ = false;
-    play_->worker_.Post([held = held_] { held->file.reset(); });
+    if (held_ == nullptr) return;
+    held_->given_up = true;
+    // The disk is the worker's matter, also when the file goes. Without a thread there is no file.
+    (void)play_->worker_.Post([held = std::move(held_)] { held->file.reset(); });
   }
 
   void Take(std::string piece, std::function<void(std::optional<http::Response>)> then) override {
-    play_->worker_.Post([held = held_, name = name_, write = play_->options_.write,
-                         piece = std::move(piece), then = std::move(then)] {
-      absl::Status status;
-      if (!held->file.has_value()) {
-        absl::StatusOr<play::PlayFile> made = play::PlayFile::Make(name, write);
-        status = made.status();
-        if (status.ok()) held->file.emplace(*std::move(made));
-      }
-      if (status.ok()) status = held->file->Append(piece);
-      if (status.ok()) return then(std::nullopt);
-      then(Said(absl::IsResourceExhausted(status) ? 507 : 500, status.message()));
-    });
+    if (held_ == nullptr) held_ = std::make_shared<Held>();
+    const absl::Status posted =
+        play_->worker_.Post([held = held_, name = name_, write = play_->options_.write,
+                             piece = std::move(piece), then] {
+          if (held->given_up) return;
+          absl::Status status;
+          if (!held->file.has_value()) {
+            absl::StatusOr<play::PlayFile> made = play::PlayFile::Make(name, write);
+            status = made.status();
+            if (status.ok()) held->file.emplace(*std::move(made));
+          }
+          if (status.ok()) status = held->file->Append(piece);
+          if (status.ok()) return then(std::nullopt);
+          then(Said(absl::IsResourceExhausted(status) ? 507 : 500, status.message()));
+        });
+    if (!posted.ok()) then(Said(503, posted.message()));
   }
 
   void Whole(http::Done done) override {
-    play_->worker_.Post([held = held_, play = play_.get(), done = std::move(done)] {
-      if (!held->file.has_value()) return done(Said(400, "the file is empty"));
+    if (held_ == nullptr) return done(Said(400, "the file is empty"));
+    const absl::Status posted = play_->worker_.Post([held = held_, play = play_.get(), done] {
+      if (held->given_up || !held->file.has_value()) return;
       play->Record("Play", absl::StrCat("name=\"", absl::CHexEscape(held->file->name()),
                                         "\" bytes=", held->file->bytes()));
       play->options_.player->Play(*std::move(held->file));
       held->file.reset();
       done(Said(202, "it is being played"));
     });
+    if (!posted.ok()) done(Said(503, posted.message()));
   }
 
  private:
   const std::shared_ptr<ViewerPlay> play_;
   const std::string name_;
-  const std::shared_ptr<Held> held_ = std::make_shared<Held>();
+  std::shared_ptr<Held> held_;  // none before the first piece
 };
+
+ViewerPlay::ViewerPlay(ViewerPlayOptions options, access::Audit* audit)
+    : options_(std::move(options)), audit_(audit), pages_(std::make_shared<Pages>(options_)) {}
 
 std::shared_ptr<ViewerPlay> ViewerPlay::Make(ViewerPlayOptions options, access::Audit* audit) {
   std::shared_ptr<ViewerPlay> play(new ViewerPlay(std::move(options), audit));
   play->self_ = play;
   if (play->options_.player != nullptr) {
-    play->options_.player->SetOnChange([weak = play->self_] {
-      if (const auto self = weak.lock()) self->Tell();
-    });
+    play->options_.player->SetOnChange([pages = play->pages_] { pages->Tell(); });
   }
   return play;
 }
@@ -125,46 +190,18 @@ http::Reception ViewerPlay::Receive(std::string_view query) {
                   "extension says what it is");
   }
   if (taking_) return Refuse(409, "another file is being sent; try again when that is done");
+  if (worker_.waiting() >= kMostWaiting) {
+    return Refuse(503,
+                  "the disk that files are kept on while they play does not answer; free it, or "
+                  "start voxeld with another TMPDIR");
+  }
   http::Reception reception;
   reception.max_bytes = options_.max_bytes;
   reception.receiver = std::make_unique<Upload>(self_.lock(), *std::move(name));
   return reception;
 }
 
-std::string ViewerPlay::Message() const {
-  Json what = Json::object();
-  if (options_.player == nullptr) {
-    what["why_not"] = options_.why_not;
-  } else {
-    const play::Playing state = options_.player->state();
-    what["max_bytes"] = options_.max_bytes;
-    if (!state.name.empty()) what["playing"] = state.name;
-    if (!state.failed.empty()) what["failed"] = state.failed;
-    if (!state.why.empty()) what["why"] = state.why;
-  }
-  return Json{{"play", std::move(what)}}.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-void ViewerPlay::Tell() {
-  // Told in the lock, so that the newest is told last.
-  const sync::MutexLock lock(mutex_);
-  const std::string message = Message();
-  std::erase_if(pages_, [&message](const std::weak_ptr<http::WebSocketPeer>& page) {
-    const auto open = page.lock();
-    if (open != nullptr) open->Send(message, false);
-    return open == nullptr;
-  });
-}
-
-void ViewerPlay::Join(const std::shared_ptr<http::WebSocketPeer>& page) {
-  const sync::MutexLock lock(mutex_);
-  std::erase_if(pages_, [&page](const std::weak_ptr<http::WebSocketPeer>& other) {
-    const auto open = other.lock();
-    return open == nullptr || open == page;
-  });
-  pages_.push_back(page);
-  page->Send(Message(), false);
-}
+void ViewerPlay::Join(const std::shared_ptr<http::WebSocketPeer>& page) { pages_->Join(page); }
 
 void ViewerPlay::Stop() {
   if (options_.player == nullptr) return;

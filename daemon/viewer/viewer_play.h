@@ -1,12 +1,10 @@
-// Files that pages with control have played: taken as they are sent, and told of (docs/protocols/viewer.md, 5).
+// Files that pages with control have played: taken as they are sent, and told of (docs/protocols/viewer.md, 6).
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "daemon/access/audit.h"
 #include "daemon/http/http_server.h"
@@ -14,7 +12,6 @@
 #include "daemon/play/play_file.h"
 #include "daemon/play/player.h"
 #include "daemon/play/worker.h"
-#include "display/sync/mutex.h"
 
 namespace voxeld::daemon::viewer {
 
@@ -25,7 +22,8 @@ struct ViewerPlayOptions {
   play::PlayFile::Write write;  // of files; tests' own
 };
 
-// On the http server's thread, but for what says otherwise.
+// On the http server's thread. Nothing that other threads call (the worker, the player) has a share in it, so that it goes on
+// neither of these, whoever is the last to let it go: its end waits for the worker.
 class ViewerPlay {
  public:
   static std::shared_ptr<ViewerPlay> Make(ViewerPlayOptions options, access::Audit* audit);
@@ -40,19 +38,16 @@ class ViewerPlay {
   void Stop();
 
  private:
+  class Pages;
   class Upload;
-  ViewerPlay(ViewerPlayOptions options, access::Audit* audit)
-      : options_(std::move(options)), audit_(audit) {}
-  std::string Message() const;  // any thread
-  void Tell();                  // any thread
-  void Record(const char* method, const std::string& what) const;
+  ViewerPlay(ViewerPlayOptions options, access::Audit* audit);
+  void Record(const char* method, const std::string& what) const;  // any thread
 
   const ViewerPlayOptions options_;
   access::Audit* const audit_;
+  const std::shared_ptr<Pages> pages_;  // the player has it, too
   std::weak_ptr<ViewerPlay> self_;
   bool taking_ = false;  // one file at a time
-  sync::Mutex mutex_;
-  std::vector<std::weak_ptr<http::WebSocketPeer>> pages_ VOXELD_GUARDED_BY(mutex_);
   play::Worker worker_;  // writes; the first to go
 };
 

@@ -145,7 +145,7 @@ TEST_F(HttpBody, IsSentWhenItIsWanted) {
 // Nothing more than a piece is held here while whoever takes it is busy.
 TEST_F(HttpBody, WaitsForWhoeverTakesIt) {
   hold_ = true;
-  Start();
+  Start({.answer_limit_ns = 60 * sync::kSecond});
   const std::string body = Counting(300'000);
   Connection connection(server_->address());
   connection.Send(Head("/take", body.size()) + body);
@@ -206,7 +206,7 @@ TEST_F(HttpBody, EndsWithItsSender) {
 
 TEST_F(HttpBody, EndsWithTheServer) {
   hold_ = true;
-  Start();
+  Start({.answer_limit_ns = 60 * sync::kSecond});
   Connection connection(server_->address());
   connection.Send(Head("/take", 1000) + "half");
   Then then;
@@ -226,6 +226,30 @@ TEST_F(HttpBody, EndsWhereNothingComes) {
   connection.Send(Head("/take", 1000) + "half");
   EXPECT_EQ(connection.ReadAll(), "");
   AwaitGone();
+}
+
+// On a disk that hangs, say. What the receiver says later is not heard.
+TEST_F(HttpBody, EndsWhereItIsNotTaken) {
+  hold_ = true;
+  Start({.answer_limit_ns = 20 * sync::kMillisecond});
+  Connection connection(server_->address());
+  connection.Send(Head("/take", 1000) + "half");
+  EXPECT_THAT(connection.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 503 "));
+  EXPECT_THAT(connection.ReadTo("\n"), HasSubstr("did not answer in time"));
+  AwaitGone();
+  Then then;
+  {
+    sync::MutexLock lock(taken_.mutex);
+    then = *std::exchange(taken_.held, std::nullopt);
+  }
+  connection.Send("more");
+  then(std::nullopt);
+  then(Response{.status = 507});
+  Connection other(server_->address());  // answered after all that
+  other.Send("GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  EXPECT_THAT(other.ReadAll(), StartsWith("HTTP/1.1 404 "));
+  sync::MutexLock lock(taken_.mutex);
+  EXPECT_EQ(taken_.bytes, "half");
 }
 
 // Something always comes, but not enough.

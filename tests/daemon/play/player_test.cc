@@ -37,12 +37,13 @@ class PlayerTest : public ::testing::Test {
   }
 
   // `script` in place of voxelctl.
-  void Start(const std::string& script, sync::TimeNs grace = 60 * sync::kSecond) {
+  void Start(const std::string& script, PlayerOptions options = {.grace_ns = 60 * sync::kSecond}) {
     const std::string program = Path("voxelctl");
     std::ofstream(program) << "#!/bin/sh\nHERE=" << folder_->path() << "\n" << script << "\n";
     chmod(program.c_str(), 0700);
-    auto player =
-        Player::Make({.program = program, .server = "unix:/run/v.sock", .grace_ns = grace});
+    options.program = program;
+    options.server = "unix:/run/v.sock";
+    auto player = Player::Make(options);
     ASSERT_TRUE(player.ok()) << player.status();
     player_ = *std::move(player);
     player_->SetOnChange([this] {
@@ -191,7 +192,7 @@ TEST_F(PlayerTest, KeepsLittleOfWhoeverSaysMuch) {
 // It is asked to go, and then it has to; whoever it has started, too.
 TEST_F(PlayerTest, EndsWhoDoesNotListenWithItsChildren) {
   Start("trap '' TERM; tail -f /dev/null & echo $! $$ >$HERE/started; wait; wait; wait",
-        50 * sync::kMillisecond);
+        {.grace_ns = 50 * sync::kMillisecond});
   MakeFifo("started");
   Play("stubborn.stl");
   std::istringstream numbers(ReadFifo("started"));
@@ -202,6 +203,20 @@ TEST_F(PlayerTest, EndsWhoDoesNotListenWithItsChildren) {
   AwaitNothing();
   EXPECT_TRUE(HasEnded(script));
   EXPECT_TRUE(HasEnded(child));
+}
+
+TEST_F(PlayerTest, RemovesFirstWhatOthersHaveLeft) {
+  const char* const before = std::getenv("TMPDIR");
+  const std::string temporary = before == nullptr ? "" : before;
+  setenv("TMPDIR", folder_->path().c_str(), 1);
+  const std::string left = Path("voxeld-play-left");
+  ASSERT_EQ(mkdir(left.c_str(), 0700), 0);
+  Start("exit 0", {.remove_left = true});
+  Play("a.obj");
+  AwaitNothing();
+  EXPECT_NE(access(left.c_str(), F_OK), 0);
+  player_.reset();
+  before == nullptr ? unsetenv("TMPDIR") : setenv("TMPDIR", temporary.c_str(), 1);
 }
 
 TEST_F(PlayerTest, PlaysNothingOnceItHasEnded) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include <atomic>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read.hpp>
@@ -13,12 +14,18 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <cerrno>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/viewer/viewer.h"
+#include "tests/daemon/play/no_threads.h"
 
 namespace voxeld::daemon::viewer {
 namespace {
@@ -50,17 +57,22 @@ class ViewerPlayTest : public ::testing::Test {
     EXPECT_TRUE(core_->Stop(10 * sync::kSecond).ok());
   }
 
+  void StartPlayer(const std::string& script) {
+    const std::string program = folder_->path() + "/voxelctl";
+    std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
+    chmod(program.c_str(), 0700);
+    auto player = play::Player::Make({.program = program, .server = "unix:/nowhere"});
+    ASSERT_TRUE(player.ok()) << player.status();
+    player_ = *std::move(player);
+  }
+
   // `script`: none: nothing is played.
-  void Start(const std::string& script, ViewerPlayOptions options = {}) {
+  void Start(const std::string& script, ViewerPlayOptions options = {},
+             sync::TimeNs answer_limit = 60 * sync::kSecond) {
     if (script.empty()) {
       options.why_not = "there is no voxelctl";
     } else {
-      const std::string program = folder_->path() + "/voxelctl";
-      std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
-      chmod(program.c_str(), 0700);
-      auto player = play::Player::Make({.program = program, .server = "unix:/nowhere"});
-      ASSERT_TRUE(player.ok()) << player.status();
-      player_ = *std::move(player);
+      ASSERT_NO_FATAL_FAILURE(StartPlayer(script));
       options.player = player_.get();
     }
     auto viewer =
@@ -68,7 +80,7 @@ class ViewerPlayTest : public ::testing::Test {
     ASSERT_TRUE(viewer.ok());
     viewer_ = *std::move(viewer);
     auto server = http::Server::Start(
-        {.listen = *ParseAddress("127.0.0.1:0")},
+        {.listen = *ParseAddress("127.0.0.1:0"), .answer_limit_ns = answer_limit},
         viewer_->Handler([](const http::Request&, const http::Done&) { return false; }),
         viewer_->Upgrade(), viewer_->Receive());
     ASSERT_TRUE(server.ok()) << server.status();
@@ -264,6 +276,114 @@ TEST_F(ViewerPlayTest, ADiskThatIsFullIsSaidAndNothingStays) {
   EXPECT_EQ(player_->state(), play::Playing());
   EXPECT_THAT(Audited(), Not(HasSubstr("Play")));
   EXPECT_EQ(Post("/play?name=a.obj", "abc").result_int(), 202u) << "the next one may fit";
+}
+
+TEST_F(ViewerPlayTest, ADiskThatHangsKeepsNobodyOut) {
+  const auto temporary = play::PrivateFolder::Make();
+  ASSERT_TRUE(temporary.ok());
+  const char* const before = std::getenv("TMPDIR");
+  const std::string was = before == nullptr ? "" : before;
+  setenv("TMPDIR", temporary->path().c_str(), 1);
+  sync::Mutex mutex;
+  sync::CondVar changed;
+  bool hangs = true;
+  size_t written = 0;
+  const auto write = [&](int, const char*, size_t size) -> ssize_t {
+    const sync::MutexLock lock(mutex);
+    ++written;
+    while (hangs) changed.Wait(mutex);
+    return static_cast<ssize_t>(size);
+  };
+  Start(kPlays, {.write = write}, 20 * sync::kMillisecond);
+  for (const char* name : {"a.obj", "b.obj"}) {
+    const Answer answer = Post(absl::StrCat("/play?name=", name));
+    EXPECT_EQ(answer.result_int(), 503u);
+    EXPECT_THAT(answer.body(), HasSubstr("did not answer in time")) << name;
+  }
+  // What waits for it is bounded.
+  Answer answer = Post("/play?name=c.obj");
+  for (int i = 0; i < 20 && answer.body().find("TMPDIR") == std::string::npos; ++i) {
+    answer = Post("/play?name=c.obj");
+  }
+  EXPECT_EQ(answer.result_int(), 503u);
+  EXPECT_THAT(answer.body(), HasSubstr("does not answer"));
+  {
+    const sync::MutexLock lock(mutex);
+    EXPECT_LE(written, 1u) << "one at a time";
+    hangs = false;
+  }
+  changed.NotifyAll();
+  // What was given up is gone when it comes back, and not played.
+  while (Post("/play?name=late.obj").result_int() == 503u) {
+  }
+  EXPECT_EQ(player_->state().name, "late.obj");
+  for (const char* name : {"a.obj", "b.obj", "c.obj"}) {
+    EXPECT_THAT(Audited(), Not(HasSubstr(name)));
+  }
+  // Those that it took the place of, if it was sent twice, are about to go.
+  while (std::distance(std::filesystem::directory_iterator(temporary->path()), {}) > 1) {
+  }
+  server_.reset();
+  viewer_.reset();
+  player_.reset();
+  EXPECT_TRUE(std::filesystem::is_empty(temporary->path()));
+  before == nullptr ? unsetenv("TMPDIR") : setenv("TMPDIR", was.c_str(), 1);
+}
+
+TEST_F(ViewerPlayTest, WhereThereIsNoThreadItIsSaid) {
+  Start(kPlays);
+  {
+    const play::NoThreads none;
+    const Answer answer = Post("/play?name=a.obj");
+    EXPECT_EQ(answer.result_int(), 503u);
+    EXPECT_THAT(answer.body(), HasSubstr("no thread"));
+    EXPECT_EQ(player_->state(), play::Playing());
+  }
+  EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "there is one now";
+}
+
+// A page that does something when it is told.
+class TellingPeer final : public http::WebSocketPeer {
+ public:
+  explicit TellingPeer(std::function<void()> told) : told_(std::move(told)) {}
+  void Send(std::string, bool) override { told_(); }
+  void Post(std::function<void()>) override {}
+  void Close(std::string) override {}
+
+ private:
+  const std::function<void()> told_;
+};
+
+// Its end waits for the thread that writes, so it may not be that thread which has it last.
+TEST_F(ViewerPlayTest, MayEndWhilePagesAreTold) {
+  ASSERT_NO_FATAL_FAILURE(StartPlayer(kPlays));
+  std::shared_ptr<ViewerPlay> play = ViewerPlay::Make({.player = player_.get()}, nullptr);
+  const std::weak_ptr<ViewerPlay> known = play;
+  std::atomic<bool> joined = false, telling = false, let_go = false;
+  const auto page = std::make_shared<TellingPeer>([&] {
+    if (!joined) return;
+    telling = true;
+    while (!known.expired() && !let_go) std::this_thread::yield();
+  });
+  play->Join(page);
+  joined = true;
+  http::Reception reception = play->Receive("name=a.obj");
+  ASSERT_NE(reception.receiver, nullptr);
+  std::promise<std::optional<http::Response>> taken;
+  reception.receiver->Take("v 0 0 0\n", [&](std::optional<http::Response> refused) {
+    taken.set_value(std::move(refused));
+  });
+  EXPECT_FALSE(taken.get_future().get().has_value());
+  std::promise<unsigned> answered;
+  reception.receiver->Whole(
+      [&](const http::Response& answer) { answered.set_value(answer.status); });
+  while (!telling) std::this_thread::yield();
+  reception.receiver.reset();
+  play.reset();
+  let_go = true;
+  EXPECT_EQ(answered.get_future().get(), 202u);
+  EXPECT_TRUE(known.expired());
+  EXPECT_EQ(player_->state().name, "a.obj");
 }
 
 TEST_F(ViewerPlayTest, WhereNothingPlaysItIsSaidWhy) {

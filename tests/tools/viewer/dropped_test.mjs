@@ -54,6 +54,14 @@ async function drop(page, ...files) {
 const lights = (page, want) => page.waitForFunction((lit) => (globalThis.voxeld.inspect().drawn.points > 0) === lit, want);
 const says = (page, id, text) => page.waitForFunction(([where, what]) => document.getElementById(where).textContent.includes(what), [id, text]);
 
+async function until(what, is) {
+  const deadline = performance.now() + kPatience;
+  while (!is()) {
+    assert.ok(performance.now() < deadline, `not within ${kPatience} ms: ${what}`);
+    await setTimeout(20);
+  }
+}
+
 // What the terminal's program has started.
 function voxeldOf(pid) {
   if (readFileSync(`/proc/${pid}/comm`, "utf8") === "voxeld\n") return pid;
@@ -189,16 +197,17 @@ describe("a file dropped on the page", { timeout: 6 * kPatience }, () => {
     assert.ok(player !== undefined);
     process.kill(voxeld, "SIGKILL");
     await daemon.ended;
-    for (let runs = true; runs; await setTimeout(20)) {
+    await until("voxelctl has ended", () => {
       try {
-        runs = !/\) Z /.test(readFileSync(`/proc/${player}/stat`, "utf8"));
+        return /\) Z /.test(readFileSync(`/proc/${player}/stat`, "utf8"));
       } catch {
-        runs = false;
+        return true;
       }
-    }
+    });
     await page.context().close();
     await daemon.stop();
-    for (const left of kept()) rmSync(join(process.env.TMPDIR, left), { recursive: true, force: true });
+    assert.equal(kept().length, 1, "nobody was there to remove it");
+    await withDaemon({}, () => until("what was left is removed by the next one", () => kept().length === 0));
   });
 
   for (const [name, options] of Object.entries({
