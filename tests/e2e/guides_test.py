@@ -2,13 +2,13 @@
 looked for in what it prints. Paths are in VOXELD, VOXELCTL, EMULATOR, BUILD and SOURCE; VOXELD_CMAKE is the cmake that built them.
 
 How a guide is written:
-  sh      is run by bash; one that is nothing but a call of voxeld or voxeld-emulator is a terminal of its own: it runs on, and the one
+  sh      is run by bash, and goes on in the folder where the one before ended; one that is nothing but a call of voxeld or voxeld-emulator is a terminal of its own: it runs on, and the one
           before it ends
   python, c, cpp, cmake, toml
-          below a line that names a file in backticks and ends with a colon, is that file; other python is typed into one interpreter
+          below a line that names a file in backticks and ends with a colon, is that file; other python is pasted, as it stands, at the prompt of
+          one interpreter, and prints no more there than somebody would read
   text    is what the block before prints: each line is part of a line, in this order; a number stands for any, "…" for anything
   console and others are only read"""
-import json
 import os
 import re
 import signal
@@ -24,13 +24,7 @@ from polling import LONG, until
 
 GUIDES = Path(os.environ["SOURCE"], "docs", "guides")
 COMPILING = 4 * LONG
-INTERPRETER = """
-import json, sys
-names = {"__name__": "__main__"}
-for line in sys.stdin:
-    exec(compile(json.loads(line), "guide", "exec"), names)
-    print("\\0", flush=True)
-"""
+READABLE = 1500  # characters that one block prints at a prompt
 
 
 class Block(NamedTuple):
@@ -124,8 +118,8 @@ class Reader:
 
     def _shell(self, text: str) -> str:
         # What it leaves running ends with it: a process group of its own.
-        with tempfile.TemporaryFile("w+") as output:
-            shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", text], cwd=self.folder, env=self.environment, stdout=output,
+        with tempfile.TemporaryFile("w+") as output, tempfile.NamedTemporaryFile("r") as where:
+            shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", f"{text}pwd >{where.name}"], cwd=self.folder, env=self.environment, stdout=output,
                                      stderr=subprocess.STDOUT, start_new_session=True)
             try:
                 status = shell.wait(COMPILING)
@@ -136,7 +130,9 @@ class Reader:
                 self._case.addCleanup(os.killpg, shell.pid, signal.SIGKILL)
             output.seek(0)
             said = output.read()
+            ended = where.read().strip()
         self._case.assertEqual(status, 0, f"{text}\n{said}")
+        self.folder = Path(ended)
         return said
 
     def _serve(self, text: str) -> str:
@@ -169,15 +165,19 @@ class Reader:
 
     def _type(self, text: str) -> str:
         if self._interpreter is None:
-            self._interpreter = subprocess.Popen([f"{self.environment['HOME']}/voxel/bin/python", "-c", INTERPRETER], cwd=self.folder, text=True,
+            self._interpreter = subprocess.Popen([f"{self.environment['HOME']}/voxel/bin/python", "-i", "-q", "-u"], cwd=self.folder, text=True,
                                                  env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         assert self._interpreter.stdin is not None and self._interpreter.stdout is not None
-        self._interpreter.stdin.write(json.dumps(text) + "\n")
+        # Where the block is not at its end, its next line is wrong, and prints nothing.
+        self._interpreter.stdin.write(f"{text}print('next')\n\nprint('\\0')\n")
         self._interpreter.stdin.flush()
         said = ""
-        while (line := self._interpreter.stdout.readline()) != "\0\n":
+        while (line := re.sub(r"^((>>>|\.\.\.) )+", "", self._interpreter.stdout.readline())) != "\0\n":
             self._case.assertTrue(line, f"the interpreter has ended: {said}")
             said += line
+        self._case.assertTrue(said.endswith("next\n"), f"an empty line is missing at the end of\n{text}\n{said}")
+        self._case.assertNotRegex(said, r"(?m)^(\w*Error|Traceback)\b", text)
+        self._case.assertLess(len(said), READABLE, f"too much to read is printed by\n{text}\n{said}")
         return said
 
     def _end_interpreter(self) -> None:

@@ -10,8 +10,8 @@ from .clip import ClipBox, ClipCylinder
 from .colors import Gradient
 from .connection import Connection, connect
 from .credentials import Credentials
-from .errors import (BufferFull, CommitDropped, CommitRefused, ConnectionLost, InvalidArray, InvalidColor, InvalidValue,
-                     NotDurable, VoxelError)
+from .errors import (BufferFull, CommitDropped, CommitRefused, ConnectionLost, InvalidArray, InvalidColor, InvalidOption,
+                     InvalidValue, NotDurable, VoxelError)
 from .handles import FrameBlock, Handle, Layer, ObjectBlock
 from .queries import ChangeSet
 from .receipts import Accepted, Frame, Issue, Outcome, Stages
@@ -23,5 +23,5 @@ __version__ = "0.1.0"
 __all__ = [
     "Accepted", "Asset", "BufferFull", "ChangeSet", "ClipBox", "ClipCylinder", "CommitDropped", "CommitRefused", "Connection", "ConnectionLost", "Credentials",
     "Frame",
-    "FrameBlock", "Gradient", "Handle", "InvalidArray", "InvalidColor", "InvalidValue", "Issue", "Layer", "NotDurable", "ObjectBlock", "Outcome",
+    "FrameBlock", "Gradient", "Handle", "InvalidArray", "InvalidColor", "InvalidOption", "InvalidValue", "Issue", "Layer", "NotDurable", "ObjectBlock", "Outcome",
     "Stages", "VoxelError", "Volume", "aio", "connect", "identity", "rotate", "scale", "translate"]

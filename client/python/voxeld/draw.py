@@ -1,7 +1,7 @@
 """The drawing calls, alike wherever something can be drawn: the connection, a layer, a frame, an object."""
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy.typing as npt
 
@@ -11,6 +11,7 @@ from .draw_curves import DrawCurves
 from .draw_measured import Drawn, Make
 from .errors import InvalidValue
 from .look import Look
+from .options import named, no_call
 from .texture import PictureFile
 
 __all__ = ["Draw", "Look", "Make", "checked_name"]
@@ -22,11 +23,16 @@ def checked_name(name: str, what: str) -> str:
     return name
 
 
+@named
 class Draw(DrawCurves[Drawn]):
     """Each call puts up one thing under a name; the same name again replaces it. All take `transform` (4×4 or 3×4),
     `priority` (0 to 126, the higher wins within its layer), `erase` (takes away what is of lower or equal priority),
     `lifetime` in seconds and `label`, a text for people. Arguments are checked before anything is sent; arrays may be
     changed again as soon as the call is back."""
+
+    if not TYPE_CHECKING:  # a checker is to see what is not there
+        def __getattr__(self, name: str) -> Any:
+            raise no_call(self, name)
 
     def points(self, name: str, positions: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
                width: Optional[float] = None, unit: str = "voxels", splat: str = "ball",

@@ -9,8 +9,10 @@ from . import curves, grids
 from .colors import Colors
 from .draw_measured import Drawn, DrawMeasured
 from .look import Look
+from .options import named
 
 
+@named
 class DrawCurves(DrawMeasured[Drawn]):
     """Of lines, `width` is how thick they are, in "voxels" or "units" (by default one voxel), and `sampling` "thin",
     "euclidean" or "cover". `look` is `transform`, `priority`, `erase`, `lifetime` and `label`, as everywhere."""

@@ -9,6 +9,7 @@ from . import measured, wire
 from .colors import Colors
 from .look import Look
 from .measured import Formula
+from .options import named
 from .texture import PictureFile
 
 Drawn = TypeVar("Drawn", covariant=True)
@@ -16,6 +17,7 @@ Make = Callable[..., list[wire.Packed]]
 Curves = Union[npt.ArrayLike, Sequence[npt.ArrayLike]]
 
 
+@named
 class DrawMeasured(Generic[Drawn]):
     """Of each, `fill` is "surface" or "solid", `rule` "thin" or "cover", and `shell` how thick a surface is, in "voxels" or
     "units" (by default one voxel). `look` is `transform`, `priority`, `erase`, `lifetime` and `label`, as everywhere."""

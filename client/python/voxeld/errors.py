@@ -23,6 +23,10 @@ class InvalidValue(VoxelError, ValueError):
     """Any other argument."""
 
 
+class InvalidOption(InvalidValue, TypeError):
+    """An argument that a call does not have."""
+
+
 class ConnectionLost(VoxelError, ConnectionError):
     """There is no connection, and none will come; or what was sent on it is lost."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Optional, Sequence, Type
 
+import numpy as np
 import numpy.typing as npt
 
 from . import clip as clips
@@ -11,7 +12,8 @@ from . import operations, shapes, transforms, wire
 from .arrays import number, vector
 from .colors import numbers_each
 from .draw import Draw, Look, Make, checked_name
-from .errors import InvalidValue
+from .errors import InvalidOption, InvalidValue
+from .options import LOOK, leading_names, refused
 from .pieces import free_name, ids
 from .receipts import Accepted, Frame, Issue, Outcome
 from .shapes import choice
@@ -60,15 +62,21 @@ class Handle:
     def update(self, *args: Any, **changes: Any) -> Optional[Frame]:
         """Puts it up anew with some arguments changed, as they were named when it was made: h.update(positions),
         h.update(colors="red")."""
-        looks = {key: changes.pop(key) for key in ("transform", "priority", "erase", "lifetime", "label") if key in changes}
-        unknown = [key for key in changes if key not in self._options]
-        if unknown or len(args) > len(self._args):
-            raise InvalidValue(f"{self._make.__name__} has no {unknown[0]!r}" if unknown else
-                               f"{self._make.__name__} takes {len(self._args)} arguments, got {len(args)}")
+        call = self._make.__name__
+        if len(args) > len(self._args):
+            raise InvalidValue(f"{call} takes {len(self._args)} arguments, got {len(args)}")
+        leading = leading_names(getattr(Draw, call), len(self._args))
+        for key in changes:
+            if key in leading[:len(args)]:
+                raise InvalidOption(f"update() got {key!r} twice: first by its place")
+            if key not in (*leading, *self._options, *LOOK):
+                raise refused(call, key, (*leading, *self._options, *LOOK))
+        looks = {key: changes.pop(key) for key in LOOK if key in changes}
+        named = {key: changes.pop(key) for key in leading if key in changes}
         if "colors" in changes and "cmap" in self._options and "cmap" not in changes and not numbers_each(changes["colors"]):
             changes["cmap"] = None  # it was for the numbers that these colours replace
         before = self._args, self._options, self._look
-        self._args = (*args, *self._args[len(args):])
+        self._args = tuple(named.get(key, value) for key, value in zip(leading, (*args, *self._args[len(args):])))
         self._options = {**self._options, **changes}
         try:
             self._look = self._look.changed(**looks)
@@ -116,7 +124,7 @@ class Layer(Draw[Handle]):
                 raise InvalidValue(f"opacity is {opacity}; give 0 to 1")
             state.opacity = round(opacity * 255)
         if order is not None:
-            state.order = order
+            state.order = _order(order)
         if blend is not None:
             state.blend = choice(_BLENDS, blend, "blend")
         if transform is not None:
@@ -139,6 +147,12 @@ class Layer(Draw[Handle]):
 
     def clear(self) -> Optional[Frame]:
         return self._connection.clear(self.name)
+
+
+def _order(order: int) -> int:
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or not -2**31 <= order < 2**31:
+        raise InvalidValue(f"order is {order!r}; give a whole number, the higher is drawn over the lower")
+    return int(order)
 
 
 def put_parts(layer: str, name: str, shape: Sequence[wire.Packed], look: Look, uses: str = "") -> operations.Puts:

@@ -86,6 +86,10 @@ class Outcome:
     reason: str = ""            # lost, not_shown, untold
     stages: Stages = Stages()   # presented
 
+    def __repr__(self) -> str:
+        more = f", volume {self.volume}" if self.seen else f" by frame {self.by_frame_id}" if self.by_frame_id else ""
+        return f"<Outcome on {self.display!r}: {self.kind}{more}{': ' + self.reason if self.reason else ''}>"
+
     @property
     def seen(self) -> bool:
         """The display shows what the commit asked for."""

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import math
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -18,15 +18,19 @@ def identity() -> Matrix:
     return np.eye(4)
 
 
-def translate(x: float, y: float, z: float) -> Matrix:
+def translate(x: float | npt.ArrayLike, y: Optional[float] = None, z: Optional[float] = None) -> Matrix:
+    """By three numbers, or one array of three."""
+    if (y is None) != (z is None) or y is None and np.ndim(x) == 0:
+        raise InvalidArray(f"the translation is {', '.join(str(one) for one in (x, y, z) if one is not None)}; give x, y and z")
+    by: Any = x if y is None else (x, y, z)
     matrix = np.eye(4)
-    matrix[:3, 3] = vector((x, y, z), "translation")
+    matrix[:3, 3] = vector(by, "translation")
     return matrix
 
 
-def scale(x: float, y: Optional[float] = None, z: Optional[float] = None) -> Matrix:
-    """One factor for all, or three."""
-    factors = (x, x if y is None else y, x if z is None else z)
+def scale(x: float | npt.ArrayLike, y: Optional[float] = None, z: Optional[float] = None) -> Matrix:
+    """One factor for all, or three, as numbers or as one array."""
+    factors: Any = x if y is None and z is None and np.ndim(x) > 0 else (x, x if y is None else y, x if z is None else z)
     return np.diag([*vector(factors, "scale"), 1.0])
 
 

@@ -109,6 +109,11 @@ class Transforms(unittest.TestCase):
     def test_they_compose_the_right_one_first(self) -> None:
         matrix = transforms.translate(1, 2, 3) @ transforms.rotate("z", 90) @ transforms.scale(2)
         np.testing.assert_allclose(matrix @ [1, 0, 0, 1], [1, 4, 3, 1], atol=1e-12)
+        np.testing.assert_array_equal(transforms.translate((1, 2, 3)), transforms.translate(1, 2, 3))
+        np.testing.assert_array_equal(transforms.scale(np.array([1, 2, 3])), transforms.scale(1, 2, 3))
+        for wrong in ((1,), (1, 2), ((1, 2),), ((1, 2, 3), 4)):
+            with self.assertRaises(InvalidArray):
+                transforms.translate(*wrong)
         self.assertEqual(list(transforms.to_wire(transforms.translate(1, 2, 3)).m), [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3])
 
     def test_any_axis_turns_as_the_three_do(self) -> None:

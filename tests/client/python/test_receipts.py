@@ -190,5 +190,17 @@ class Latency(unittest.TestCase):
         self.assertIsNone(Stages(received_ns=1).total_ms())
 
 
+class Words(unittest.TestCase):
+    def test_an_outcome_is_a_line_at_a_prompt(self) -> None:
+        frame = pb.Receipt(outcome=pb.Outcome(display="sim", presented=pb.Presented(
+            volume=3, time_ns=9, stages=pb.Stages(received_ns=10**15, shown_ns=10**15 + 1)))).outcome
+        for outcome, told in ((frame, "<Outcome on 'sim': presented, volume 3>"),
+                              (pb.Outcome(display="a", unchanged=pb.Unchanged(volume=4)), "<Outcome on 'a': unchanged, volume 4>"),
+                              (pb.Outcome(display="a", superseded=pb.Superseded(by_frame_id=5)), "<Outcome on 'a': superseded by frame 5>"),
+                              (pb.Outcome(display="a", lost=pb.Lost(reason="unplugged")), "<Outcome on 'a': lost: unplugged>"),
+                              (pb.Outcome(display="a", not_shown=pb.NotShown(why=pb.NotShown.BLANKED)), "<Outcome on 'a': not_shown: blanked>")):
+            self.assertEqual(repr(receipts.Outcome.of(outcome)), told)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -230,7 +230,7 @@ class Drawing(Case):
         self.assertEqual((entity.primitive.sphere.radius, entity.primitive.color.rgb, entity.priority), (2, 0x00FF00, 3))
         self.assertEqual([entity.transform.m[3], entity.transform.m[7], entity.transform.m[11]], [1, 2, 3])
         np.testing.assert_array_equal(handle.transform, voxel.translate(1, 2, 3))
-        with self.assertRaisesRegex(voxel.InvalidValue, "sphere has no 'size'"):
+        with self.assertRaisesRegex(voxel.InvalidValue, r"sphere\(\) has no option 'size'"):
             handle.update(size=3)
         with self.assertRaises(voxel.InvalidArray):
             handle.update((0, 0, 0), -1)
