@@ -3,7 +3,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <csignal>
@@ -131,6 +134,31 @@ TEST(Contained, WhatGoesWrongIsSaid) {
               }),
               HasSubstr("p: the library that reads it crashed"));
   EXPECT_THAT(error([]() -> absl::StatusOr<Model> { std::abort(); }), HasSubstr("crashed"));
+}
+
+TEST(Contained, EndsWithWhoAsked) {
+  int line[2];  // open as long as the process that reads, which alone keeps its other end
+  ASSERT_EQ(::pipe(line), 0);
+  const pid_t asks = ::fork();
+  if (asks == 0) {
+    ::close(line[0]);
+    (void)ReadContained({.path = "p"}, [&line]() -> absl::StatusOr<Model> {
+      const pid_t self = ::getpid();
+      if (::write(line[1], &self, sizeof(self)) != sizeof(self)) std::abort();
+      while (true) ::pause();
+    });
+    ::_exit(0);
+  }
+  ::close(line[1]);
+  pid_t reads = 0;
+  ASSERT_EQ(::read(line[0], &reads, sizeof(reads)), ssize_t{sizeof(reads)});
+  ASSERT_EQ(::kill(asks, SIGKILL), 0);
+  ASSERT_EQ(::waitpid(asks, nullptr, 0), asks);
+  pollfd ended = {.fd = line[0], .events = POLLIN, .revents = 0};
+  const bool has = ::poll(&ended, 1, 30'000) == 1;
+  EXPECT_TRUE(has) << "it runs on";
+  if (!has) ::kill(reads, SIGKILL);
+  ::close(line[0]);
 }
 
 // ----------------------------------------------------------------------------------- what moves

@@ -265,6 +265,45 @@ TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
   EXPECT_THAT(model->note, HasSubstr("1 files that hold no image"));
 }
 
+// Elements that do not say their kind, in sequences that say their length.
+TEST_F(Volumes, SequencesOfImplicitElements) {
+  const auto implicit = [](uint16_t group, uint16_t element, std::string value) {
+    if (value.size() % 2 == 1) value += ' ';
+    std::string out;
+    Put(&out, 0, group);
+    Put(&out, 2, element);
+    Put(&out, 4, static_cast<uint32_t>(value.size()));
+    return out + value;
+  };
+  const auto picture = [&](const std::string& spacing, const std::string& pixels) {
+    const std::string meta = Element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                             Element(2, 3, "UI", "1.2.3") +
+                             Element(2, 0x10, "UI", "1.2.840.10008.1.2");
+    std::string size;
+    Put(&size, 0, static_cast<uint32_t>(meta.size()));
+    return std::string(128, '\0') + "DICM" + Element(2, 0, "UL", size) + meta +
+           implicit(8, 0x16, "1.2.840.10008.5.1.4.1.1.2 ") + implicit(8, 0x18, "1.2.3 ") +
+           implicit(0x28, 2, Short(1)) + implicit(0x28, 4, "MONOCHROME2") +
+           implicit(0x28, 0x10, Short(2)) + implicit(0x28, 0x11, Short(2)) +
+           implicit(0x28, 0x100, Short(16)) + implicit(0x28, 0x101, Short(16)) +
+           implicit(0x28, 0x102, Short(15)) + implicit(0x28, 0x103, Short(0)) + spacing +
+           implicit(0x7FE0, 0x10, pixels);
+  };
+  // One for all frames, and within it how far pixels are apart: each a sequence of one item.
+  const auto item = [&](const std::string& content) { return implicit(0xFFFE, 0xE000, content); };
+  const std::string shared = implicit(
+      0x5200, 0x9229, item(implicit(0x28, 0x9110, item(implicit(0x28, 0x30, "0.5\\0.25")))));
+  const SampledVolume volume = Read("a.dcm", picture(shared, "12345678"));
+  EXPECT_NEAR(volume.corners[7].x - volume.corners[0].x, 2 * 0.25, 1e-9);
+  EXPECT_NEAR(volume.corners[7].y - volume.corners[0].y, 2 * 0.5, 1e-9);
+  // Pixels, and texts, that look like an item are none.
+  const std::string looks("\xfe\xff\x00\xe0", 4);
+  EXPECT_EQ(Read("b.dcm", picture("", looks + "1234")).samples[0], 0xFFFE);
+  EXPECT_THAT(Import("c.dcm", picture(implicit(0x29, 0x10, looks + "1234"), "12345678")), IsOk());
+  EXPECT_THAT(Error("d.dcm", picture(implicit(0x5200, 0x9229, item("12345678")), "12345678")),
+              HasSubstr("truncated or damaged"));
+}
+
 TEST_F(Volumes, DicomThatIsWrong) {
   ASSERT_THAT(Import("a.dcm", Dicom("7", 0, 1)), IsOk());
   EXPECT_THAT(Error("a.dcm", "hello"), HasSubstr("DICOM is expected"));

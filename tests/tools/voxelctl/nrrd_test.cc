@@ -135,7 +135,7 @@ TEST_F(Volumes, NrrdThatIsWrong) {
                 HasSubstr("for \"datafile\""));
   }
   EXPECT_THAT(Error("a.nhdr", head + "encoding: raw\ndata file: gone.raw\n"),
-              HasSubstr("No such file"));
+              HasSubstr("a.nhdr: has \"gone.raw\" for \"datafile\"; No such file"));
 }
 
 TEST_F(Volumes, RawAsItIsTold) {

@@ -379,15 +379,52 @@ TEST_F(Drawings, WhatIsParsedAgainEnds) {
   for (int i = 0; i < 4000; ++i) body += "fill:red;";
   ASSERT_THAT(Import(Svg("<style>" + selectors + "{" + body + "}</style><path d='M0 0 1 1'/>")),
               IsOk());
-  // A million times a megabyte of blanks, and of places where nothing is drawn.
-  for (const std::string& data :
-       {std::string(1'000'000, ' '), "M0 0" + std::string(500'000, 'z')}) {
-    std::string uses = "<path id='u0' d='" + data + "'/>";
-    for (int i = 1; i < 20; ++i)
+  const auto repeated = [](const std::string& text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  // 131,072 times a megabyte, each of another kind, in half of the visits that are allowed.
+  const std::string line = "<path id='u0' d='M0 0 1 1' ";
+  for (const std::string& element : {"<path id='u0' d='M0 0" + std::string(500'000, 'z') + "'/>",
+                                     line + "transform='" + repeated("scale(1)", 120'000) + "'/>",
+                                     line + "class='" + repeated("a ", 500'000) + "'/>",
+                                     line + "class='" + repeated("none ", 200'000) + "'/>",
+                                     line + "fill='" + std::string(1'000'000, 'x') + "'/>",
+                                     "<g id='u0'>" + repeated("<!---->", 150'000) + "</g>"}) {
+    std::string uses = "<style>.a{fill:red}</style>" + element;
+    for (int i = 1; i < 18; ++i)
       uses += absl::StrCat("<g id='u", i, "'><use href='#u", i - 1, "'/><use href='#u", i - 1,
                            "'/></g>");
-    EXPECT_THAT(Error(Svg(uses)), HasSubstr("without end"));
+    EXPECT_THAT(Error(Svg("<defs>" + uses + "</defs><use href='#u17'/>")), HasSubstr("without end"))
+        << element.substr(0, 60);
   }
+  // Gradients that have their stops of one that has many.
+  std::string gradients = "<linearGradient id='g'>" + repeated("<stop/>", 100'000);
+  gradients += "</linearGradient>";
+  for (int i = 0; i < 10'000; ++i)
+    gradients += absl::StrCat("<linearGradient id='g", i,
+                              "' href='#g'/><path d='M0 0 1 1' fill=\"url(#g", i, ")\"/>");
+  EXPECT_THAT(Error(Svg(gradients)), HasSubstr("without end"));
+}
+
+// What is handed down to a hundred elements within each other is not a hundred times as long as the file.
+TEST(SvgStyles, PaintOfNoUseIsNotHandedDown) {
+  SvgStyle style;
+  style.Set("fill", "red");
+  style.Set("fill", std::string(2000, 'x'));
+  EXPECT_EQ(style.fill, "red");
+  style.Set("fill", "url(#" + std::string(500, 'x') + ")");
+  EXPECT_EQ(style.fill.size(), 506u);
+}
+
+// Much that is used once is no work without end.
+TEST_F(Drawings, ManyElementsAreRead) {
+  std::string body = "<style>.a{fill:red}.b{stroke:none}#c{opacity:1}</style>";
+  for (int i = 0; i < 100'000; ++i)
+    body += "<g class='a b' transform='translate(1 2)' fill='#ff0000' stroke='none'/>\n";
+  body += "<path d='M0 0 1 1 2 0z'/>";
+  ASSERT_THAT(Import(Svg(body)), IsOk());
 }
 
 TEST_F(Drawings, DamagedOnesEndWell) {

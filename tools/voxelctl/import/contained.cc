@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -150,7 +151,10 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   return model;
 }
 
-[[noreturn]] void RunChild(const std::function<bool(int)>& write, int descriptor) {
+[[noreturn]] void RunChild(const std::function<bool(int)>& write, int descriptor, pid_t parent) {
+  // Ends with the thread that waits for it, which may have ended already.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(1);
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -186,11 +190,12 @@ absl::StatusOr<Taken> Run(const SourceFile& file, const std::function<bool(int)>
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
   }
   const absl::Cleanup close = [descriptor] { ::close(descriptor); };
+  const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0) {
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
   }
-  if (child == 0) RunChild(write, descriptor);
+  if (child == 0) RunChild(write, descriptor, parent);
   int state = 0;
   while (::waitpid(child, &state, 0) < 0 && errno == EINTR) {
   }

@@ -11,7 +11,8 @@
 namespace voxeld::voxelctl {
 
 // What `read` returns (parts, format, note and up; no volumes), from a copy of this process with 4 GiB of memory, two minutes of the
-// processor and ten in all: if it crashes, runs away or takes more, that is InvalidArgument, and nothing of it is left here.
+// processor and ten in all: if it crashes, runs away or takes more, that is InvalidArgument, and nothing of it is left here. It ends
+// with the process that asked, however that ends.
 absl::StatusOr<Model> ReadContained(const SourceFile& file,
                                     const std::function<absl::StatusOr<Model>()>& read);
 

@@ -112,9 +112,7 @@ class Walker {
     }
     if (length > end - *at) return CutOff(tag, length, end - *at);
     const size_t after = *at + length;
-    const bool sequence = kind == "SQ" || (kind.empty() && length >= 8 &&
-                                           bytes_.substr(*at, 4) == "\xfe\xff\x00\xe0");
-    if (sequence) {
+    if (kind == "SQ" || (kind.empty() && tag != kPixels && BeginsWithItem(*at, length))) {
       if (absl::Status status = Items(at, after, tag, false, depth + 1); !status.ok())
         return status;
     } else {
@@ -122,6 +120,13 @@ class Walker {
     }
     *at = after;
     return absl::OkStatus();
+  }
+
+  // Whether a value that does not say its kind is a sequence: it is as if it were, and the item fits.
+  bool BeginsWithItem(size_t at, uint64_t length) const {
+    if (length < 8 || (uint32_t{U16(at)} << 16 | U16(at + 2)) != kItem) return false;
+    const uint32_t item = U32(at + 4);
+    return item == kUndefined || item <= length - 8;
   }
 
   // Items up to a delimiter or `end`; `fragments`: their contents are no elements.

@@ -25,10 +25,12 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
   std::string out;
   size_t read = 0;
-  while (out.size() < most) {
-    const size_t before = out.size();
-    // Grows with what comes, so that a short file that promises much takes little.
-    out.resize(std::min(most, before + std::max<uint64_t>(kStep, before)));
+  uint64_t written = 0;  // of `out`, the rest of which is room
+  while (written < most) {
+    // Grows with what comes, so that a short file that promises much takes little; and only then, since streams may be many
+    // and empty.
+    if (written == out.size()) out.resize(std::min(most, written + std::max(kStep, written)));
+    const uint64_t before = written;
     const size_t given = std::min<size_t>(packed.size() - read, uint64_t{1} << 30);
     const size_t room = std::min<size_t>(out.size() - before, uint64_t{1} << 30);
     // zlib does not write there.
@@ -38,7 +40,7 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
     stream.avail_out = static_cast<uInt>(room);
     const int result = inflate(&stream, Z_NO_FLUSH);
     read += given - stream.avail_in;
-    out.resize(before + room - stream.avail_out);
+    written = before + room - stream.avail_out;
     if (result == Z_STREAM_END) {
       // Some programs write several streams, one after another.
       if (kind == Deflated::kRaw || packed.size() - read < 2 ||
@@ -47,7 +49,7 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
       if (inflateReset(&stream) != Z_OK) break;
       continue;
     }
-    if (result != Z_OK || (out.size() == before && read == packed.size())) {
+    if (result != Z_OK || (written == before && read == packed.size())) {
       return FileError(file,
                        absl::StrCat("its compressed data are ",
                                     read == packed.size() ? "cut off" : "damaged", " after byte ",
@@ -55,6 +57,7 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
                        "copy the file again");
     }
   }
+  out.resize(written);
   return out;
 }
 

@@ -20,6 +20,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "tools/voxelctl/import/inflate.h"
 #include "tools/voxelctl/import/volume_samples.h"
 #include "tools/voxelctl/text/escape.h"
@@ -240,7 +241,12 @@ class Reader {
     if (path.is_absolute() || std::count(path.begin(), path.end(), "..") > 0) {
       return WrongField("datafile", "a file in the header's folder is expected");
     }
-    return ReadSourceFile((std::filesystem::path(file_.path).parent_path() / path).string());
+    const std::string beside = (std::filesystem::path(file_.path).parent_path() / path).string();
+    absl::StatusOr<SourceFile> read = ReadSourceFile(beside);
+    if (read.ok()) return read;
+    absl::string_view reason = read.status().message();
+    absl::ConsumePrefix(&reason, beside + ": ");
+    return WrongField("datafile", EscapeForTerminal(reason));
   }
 
   absl::Status Skip(absl::string_view* data, uint64_t wanted) const {

@@ -32,10 +32,14 @@ namespace {
 
 constexpr size_t kMostBytes = 64 << 20;
 constexpr int kMostDepth = 100;
-constexpr uint64_t kMostVisits = 1'000'000;
-constexpr double kLargest = 1e15;  // further out nothing is told apart
-constexpr size_t kBytesOfAVisit = 128;
+// Work, as bytes that are parsed: again wherever they are used, so that the file's size does not bound it.
+constexpr uint64_t kMostVisits = 1'000'000, kBytesOfAVisit = 128, kBytesOfARule = 32,
+                   kBytesOfAStep = 16;  // past an attribute, a class or a child
+// What uses nothing twice comes to less, unless its attributes are many and next to empty.
+constexpr uint64_t kMostWork = kMostVisits * kBytesOfAVisit + 2 * kMostBytes;
+constexpr double kLargest = 1e15;   // further out nothing is told apart
 constexpr int kMostReferences = 8;  // from one gradient to another
+
 class Drawer {
  public:
   explicit Drawer(const SourceFile& file) : file_(file) {}
@@ -43,6 +47,7 @@ class Drawer {
   absl::StatusOr<Model> Draw(xmlNode* root) {
     Collect(root, 0);
     if (absl::Status status = Visit(root, Matrix2(), SvgStyle(), 0); !status.ok()) return status;
+    if (work_ > kMostWork) return Endless(root);
     if (layers_.empty()) {
       return FileError(file_, "has no line that is to be seen",
                        "at least one path or shape is expected");
@@ -93,15 +98,32 @@ class Drawer {
     }
   }
 
-  // Text that is parsed again wherever it is used counts as visits do.
-  void Charge(size_t bytes) const { visits_ += bytes / kBytesOfAVisit; }
+  absl::Status Endless(const xmlNode* node) const {
+    return Wrong(node, "stands in elements that are within, or use, each other without end",
+                 absl::StrCat("at most ", kMostDepth, " deep are read"));
+  }
+
+  void Charge(uint64_t bytes) const { work_ += bytes; }
+
+  // All that may be parsed of the node itself.
+  void ChargeAttributes(const xmlNode* node) const {
+    for (const xmlAttr* attribute = node->properties; attribute != nullptr;
+         attribute = attribute->next) {
+      Charge(kBytesOfAStep);
+      for (const xmlNode* text = attribute->children; text != nullptr; text = text->next)
+        Charge(static_cast<uint64_t>(xmlStrlen(text->content)));
+    }
+  }
 
   SvgStyle StyleOf(const xmlNode* node, SvgStyle style) const {
+    Charge(kBytesOfAVisit);
+    ChargeAttributes(node);
     for (const char* property : kSvgProperties) style.Set(property, SvgAttribute(node, property));
     const auto apply = [&](const std::string& selector) {
+      Charge(kBytesOfAStep);
       const auto rule = rules_.find(selector);
       if (rule == rules_.end()) return;
-      Charge(rule->second.size());
+      Charge(kBytesOfARule + rule->second.size());
       style.SetAll(rule->second);
     };
     if (!rules_.empty()) {
@@ -111,17 +133,12 @@ class Drawer {
         apply(absl::StrCat(".", word));
       apply(absl::StrCat("#", SvgAttribute(node, "id")));
     }
-    const std::string own = SvgAttribute(node, "style");
-    Charge(own.size());
-    style.SetAll(own);
+    style.SetAll(SvgAttribute(node, "style"));
     return style;
   }
 
   absl::Status Visit(xmlNode* node, const Matrix2& outer, const SvgStyle& outer_style, int depth) {
-    if (depth > kMostDepth || ++visits_ > kMostVisits) {
-      return Wrong(node, "stands in elements that are within, or use, each other without end",
-                   absl::StrCat("at most ", kMostDepth, " deep are read"));
-    }
+    if (depth > kMostDepth || ++visits_ > kMostVisits || work_ > kMostWork) return Endless(node);
     const SvgStyle style = StyleOf(node, outer_style.Inherited());
     if (!style.displayed) return absl::OkStatus();
     const absl::string_view name = SvgName(node);
@@ -139,6 +156,7 @@ class Drawer {
         matrix = matrix * Matrix2{.e = SvgLength(node, "x", 0), .f = SvgLength(node, "y", 0)};
       }
       for (xmlNode* child = node->children; child != nullptr; child = child->next) {
+        Charge(kBytesOfAStep);
         if (child->type != XML_ELEMENT_NODE || SvgName(child) == "symbol") continue;
         if (absl::Status status = Visit(child, matrix, style, depth + 1); !status.ok())
           return status;
@@ -162,7 +180,6 @@ class Drawer {
       return absl::OkStatus();
     }
     if (!style.visible) return absl::OkStatus();
-    Charge(SvgAttribute(node, name == "path" ? "d" : "points").size());
     absl::StatusOr<std::vector<Polyline>> lines = SvgShape(node, kMaxModelVertices - points_);
     if (!lines.ok()) {
       return absl::Status(lines.status().code(),
@@ -181,7 +198,9 @@ class Drawer {
       const auto found = id.size() > 1 && id[0] == '#' ? ids_.find(id.substr(1)) : ids_.end();
       if (found == ids_.end()) return std::nullopt;
       double r = 0, g = 0, b = 0, count = 0;
-      for (const xmlNode* stop = found->second->children; stop != nullptr; stop = stop->next) {
+      for (const xmlNode* stop = found->second->children; stop != nullptr && work_ <= kMostWork;
+           stop = stop->next) {
+        Charge(kBytesOfAStep);
         if (stop->type != XML_ELEMENT_NODE || SvgName(stop) != "stop") continue;
         const std::optional<Rgb> color = ParseCssColor(StyleOf(stop, SvgStyle()).stop_color);
         if (!color) continue;
@@ -294,7 +313,8 @@ class Drawer {
   std::map<std::string, xmlNode*> ids_;
   CssRules rules_;
   std::map<std::string, uint64_t> left_out_;
-  mutable uint64_t visits_ = 0;
+  uint64_t visits_ = 0;
+  mutable uint64_t work_ = 0;                                                 // in bytes
   mutable std::map<std::string, std::optional<Rgb>, std::less<>> gradients_;  // by what names them
   uint64_t points_ = 0, unfilled_ = 0;
   FillBudget budget_;

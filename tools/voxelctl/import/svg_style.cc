@@ -17,6 +17,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kMostRules = 10'000, kMostRuleBytes = 4096;
+constexpr size_t kMostValueBytes = 1024;  // every element has its own copy
 
 constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
     {"aliceblue", 0xf0f8ff},
@@ -220,7 +221,7 @@ SvgStyle SvgStyle::Inherited() const {
 
 void SvgStyle::Set(absl::string_view property, absl::string_view value) {
   value = absl::StripAsciiWhitespace(value.substr(0, value.find('!')));
-  if (value.empty() || value == "inherit") return;
+  if (value.empty() || value.size() > kMostValueBytes || value == "inherit") return;
   const auto share = [value](double* out) {
     absl::string_view rest = value;
     double number = 0;

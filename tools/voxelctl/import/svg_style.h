@@ -26,7 +26,7 @@ struct SvgStyle {
 
   // What those within begin with.
   SvgStyle Inherited() const;
-  // Takes a property, such as "fill"; others are passed over.
+  // Takes a property, such as "fill"; others, and values of more than 1 KiB, are passed over.
   void Set(absl::string_view property, absl::string_view value);
   // "fill: red; stroke: none"
   void SetAll(absl::string_view declarations);
