@@ -2,7 +2,7 @@
 """A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
 resident memory, descriptors, threads and latencies are measured all the while, and lines are laid through them.
 
-usage: soak.py [--minutes M] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and PYTHONPATH.
+usage: soak.py [--minutes M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and PYTHONPATH.
 
 Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
 twelfths after the first, which is for warming up) lies above zero by more than GROWTH says an hour."""
@@ -194,6 +194,7 @@ def draw(path: str, rows: list[dict[str, float]]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=45)
+    parser.add_argument("--roles", default=",".join(ROLES), help="which clients there are (default: %(default)s)")
     parser.add_argument("--csv")
     parser.add_argument("--svg")
     parser.add_argument("--json", action="store_true")
@@ -218,7 +219,7 @@ def main() -> int:
                 time.sleep(0.05)
         stop = mp.Event()
         clients = []
-        for name in ROLES:
+        for name in options.roles.split(","):
             here, there = mp.Pipe()
             process = mp.Process(target=role, args=(name, server, stop, there))
             process.start()
