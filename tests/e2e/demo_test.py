@@ -148,6 +148,10 @@ class Demo(unittest.TestCase):
             self.assertRegex(told["globe"], r"^tools/setup \(npm's world-atlas\) brings world-atlas/countries-50m.json or .*, which is in none of /.*$")
             self.assertEqual([event["scene"] for event in events if "seen" in event], [name for name in NAMES if name not in missing])
 
+            told_in_words = subprocess.run([program, "demo", "--once", "--seconds", "0.2", "globe", "clock"], env=daemon.environment, capture_output=True,
+                                           text=True, timeout=LONG, check=True)
+            self.assertRegex(told_in_words.stderr, r"^globe: left out; tools/setup \(npm's world-atlas\) brings its data\nclock: ")
+
             alone = daemon.demo("globe", program=program)
             words, errors = alone.communicate(timeout=LONG)
             self.assertEqual(alone.returncode, 1)

@@ -106,9 +106,9 @@ class Reader:
                     missing = unsaid(block.text, output)
                     self._case.assertIsNone(missing, f"{guide}:{block.line}: not printed, or not in this order; what was printed:\n{output}")
                 elif block.kind == "sh" and re.fullmatch(r"voxeld(-emulator)?\b[^\n]*\n", block.text):
-                    output = self._serve(block.text)
+                    output = self.serve(block.text)
                 elif block.kind == "sh":
-                    output = self._shell(block.text)
+                    output = self.shell(block.text)
                 elif block.kind == "python":
                     output = self._type(block.text)
                 else:
@@ -116,7 +116,7 @@ class Reader:
                     continue
                 self.ran += 1
 
-    def _shell(self, text: str) -> str:
+    def shell(self, text: str) -> str:
         # What it leaves running ends with it: a process group of its own.
         with tempfile.TemporaryFile("w+") as output, tempfile.NamedTemporaryFile("r") as where:
             shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", f"{text}pwd >{where.name}"], cwd=self.folder, env=self.environment, stdout=output,
@@ -135,7 +135,7 @@ class Reader:
         self.folder = Path(ended)
         return said
 
-    def _serve(self, text: str) -> str:
+    def serve(self, text: str) -> str:
         self._end_service()
         words = text.replace("voxeld-emulator", "$EMULATOR", 1) if text.startswith("voxeld-") else \
             text.replace("voxeld", '$VOXELD --listen "$VOXELD_SERVER" --http off --log-level warn', 1)
@@ -208,6 +208,20 @@ class Guides(unittest.TestCase):
 
     def test_firmware(self) -> None:
         self.do("firmware.md", 10)
+
+    def test_what_the_readme_says_of_use_is_pasted_at_once(self) -> None:
+        reader = Reader(self)
+        (reader.folder / "tests").symlink_to(Path(os.environ["SOURCE"], "tests"))
+        readme = Path(os.environ["SOURCE"], "README.md").read_text(encoding="utf-8")
+        use = readme[readme.index("## Use\n"):]
+        pasted = next(one.text for one in blocks(use) if "voxelctl play" in one.text)
+        reader.serve("voxeld\n")
+        self.assertIn("export PATH", pasted)
+        # Fewer pictures; those of a gallery are tested elsewhere.
+        short = re.sub(r"(?m)^voxelctl gallery .*\n", "", pasted).replace("turn.gif", "turn.gif --frames 4")
+        said = reader.shell(short)
+        for made in ("picture.png", "turn.gif", "scene.npz", "preset.mcap"):
+            self.assertTrue((reader.folder / "build" / made).is_file(), said)
 
     def test_each_guide_has_its_test_and_no_link_of_theirs_is_dead(self) -> None:
         names = {path.name for path in GUIDES.glob("*.md")}

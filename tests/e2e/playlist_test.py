@@ -111,6 +111,22 @@ class Playlists(unittest.TestCase):
         none = voxelctl("--server", self.socket, "playlist", self.write('[[item]]\nfile = "b.mcap"\n'))
         self.assertEqual(none.returncode, 1)
         self.assertIn("give its item seconds", none.stderr)
+        # Of three that are gone, one has its hours at another time: none is waited for, and none is told twice.
+        tomorrow = "mon tue wed thu fri sat sun".split()[(datetime.date.today().weekday() + 2) % 7]
+        gone = voxelctl("--server", self.socket, "playlist", self.write(
+            '[[item]]\nfile = "gone.mcap"\nseconds = 1\n[[item]]\nfile = "lost.mcap"\n'
+            f'[[item]]\nfile = "night.mcap"\ndays = ["{tomorrow}"]\nfrom = "10:00"\nto = "11:00"\n'))
+        self.assertEqual(gone.returncode, 1, gone.stderr)
+        self.assertEqual(gone.stderr.count("gone.mcap"), 2, gone.stderr)  # that it is passed over, and why
+        self.assertRegex(gone.stderr, r"nothing of the playlist can be played:\nitem 2: .*lost\.mcap.*\nitem 3: .*night\.mcap")
+        # One that can be played at its hours is waited for; meanwhile what is gone is told once.
+        waits = self.write(f'cross_fade = 0\n[[item]]\nfile = "gone.mcap"\nseconds = 1\n[[item]]\nfile = "b.mcap"\nseconds = 1\ndays = ["{tomorrow}"]\n')
+        with subprocess.Popen([os.environ["VOXELCTL"], "--server", self.socket, "playlist", waits], stderr=subprocess.PIPE, text=True) as waiting:
+            assert waiting.stderr is not None
+            self.assertIn("gone.mcap is passed over", waiting.stderr.readline())
+            waiting.send_signal(signal.SIGINT)
+            self.assertEqual(waiting.wait(LONG), 0)
+            self.assertNotIn("gone.mcap", waiting.stderr.read())
         checked = voxelctl("playlist", "--check", self.write(
             '[[item]]\nfile = "gone.mcap"\n[[item]]\nfile = "a.mcap"\n[[item]]\nfile = "b.mcap"\nseconds = 1\n'))
         self.assertEqual(checked.returncode, 1)

@@ -68,12 +68,12 @@ TEST_F(CommandsTest, WhySaysWhatTheServerFound) {
   EXPECT_EQ(told.out,
             "box \"two\\u{1b}[2J\" in layer \"voxelctl\" of owner 7, on display \"fake\":\n"
             "it is \\u{1b}[2Jblack\nvoxels that it covers 1,234; that it lights 0; that clip and "
-            "mask leave 0; that are other by it 0\n");
+            "mask leave 0; that it changes 0\n");
   const Result near = RunTool({"why", "onee"});
   EXPECT_EQ(near.code, kExitFailure);
-  EXPECT_THAT(near.err, HasSubstr("no entity \"onee\" is in the scene; did you mean one?"));
+  EXPECT_THAT(near.err, HasSubstr("no entity \"onee\" is in the scene; did you mean \"one\"?"));
   EXPECT_THAT(RunTool({"why", "quite different"}).err,
-              HasSubstr("its commit has not come; known are one, two"));
+              HasSubstr("its commit has not come; there are \"one\", \"two\\u{1b}[2J\""));
 }
 
 TEST_F(CommandsTest, ALatticeIsListedAndPictured) {
@@ -307,7 +307,7 @@ TEST_F(CommandsTest, CtrlCEndsASpinCleanlyAndTheSceneStays) {
   player.join();
   EXPECT_EQ(result.code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("it is up and spins until Ctrl-C\n"));
-  EXPECT_THAT(result.err, HasSubstr("stays up"));
+  EXPECT_THAT(result.err, HasSubstr("stays up in the layer voxelctl, called \"1\", until"));
   EXPECT_FALSE(server_.log().deleted_all_mine);
 }
 

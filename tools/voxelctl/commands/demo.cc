@@ -79,6 +79,16 @@ void PassOver(const SceneAbout& about, const absl::Status& why, Console& console
   }
 }
 
+// Its data are not on this machine, which is no fault.
+void LeaveOut(const SceneAbout& about, const std::vector<std::string>& roots,
+              const absl::Status& why, Console& console) {
+  if (console.json()) return PassOver(about, why, console);
+  const auto missing = absl::c_find_if(
+      about.needs, [&](const SceneFile& file) { return !FindSceneFile(file, roots).ok(); });
+  const std::string by = missing == about.needs.end() ? "" : missing->brought_by;
+  console.Say(absl::StrCat(about.name, ": left out; ", by, by.empty() ? "" : " brings its data"));
+}
+
 class DemoPlayer {
  public:
   DemoPlayer(const DemoOptions& options, Connection& connection, Interrupt& interrupt,
@@ -259,7 +269,7 @@ absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrup
     if (files.ok()) {
       scenes.push_back({&scene, *std::move(files)});
     } else {
-      PassOver(scene, files.status(), console);
+      LeaveOut(scene, roots, files.status(), console);
     }
   }
   if (scenes.empty()) return absl::NotFoundError("none of these scenes can be played");

@@ -133,9 +133,12 @@ void Report(PlaySummary summary, Console& console) {
   }
   for (const client::Issue& issue : summary.tally.issues)
     console.Say(absl::StrCat(issue.applied ? "note: " : "issue: ", IssueForTerminal(issue)));
-  if (summary.still_up)
-    console.Say(
-        absl::StrCat("it stays up in the layer ", summary.layer, " until `voxelctl clear`"));
+  if (summary.still_up) {
+    const size_t files = summary.files.size();  // each is called by its number
+    console.Say(absl::StrCat("it stays up in the layer ", summary.layer, ", called \"1\"",
+                             files > 1 ? absl::StrCat(" to \"", files, "\"") : "",
+                             ", until `voxelctl clear`"));
+  }
 }
 
 }  // namespace voxeld::voxelctl

@@ -124,6 +124,9 @@ absl::Status Render(const TurntableOptions& options, Connection& connection, Int
   ShownVolume first;
   first.volume.number = shown->volume.number;
   first.up_to_date = shown->up_to_date;
+  if (!console.live() && !console.json() && options.frames > 1) {
+    console.Say(absl::StrCat("drawing ", options.frames, " pictures …"));  // no bar can be drawn
+  }
   sync::SystemClock clock;
   const sync::TimeNs began = clock.Now();
   const int at_once = options.live ? 1 : AtOnce(options);

@@ -1,7 +1,10 @@
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "daemon/suggest/suggest.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/text/escape.h"
@@ -11,9 +14,15 @@
 namespace voxeld::voxelctl {
 namespace {
 
+constexpr size_t kFew = 12;  // are listed
+
+std::string Quoted(const std::string& name) {
+  return absl::StrCat("\"", EscapeForTerminal(name), "\"");
+}
+
 std::string Name(const v1::EntityKey& key) {
-  return absl::StrCat("\"", EscapeForTerminal(key.id()), "\" in layer \"",
-                      EscapeForTerminal(key.layer()), "\" of owner ", key.owner());
+  return absl::StrCat(Quoted(key.id()), " in layer ", Quoted(key.layer()), " of owner ",
+                      key.owner());
 }
 
 // The one entity that is meant.
@@ -30,9 +39,14 @@ absl::StatusOr<v1::EntityKey> Find(const WhyOptions& options, Connection& connec
   }
   if (found.size() == 1) return found.front();
   if (found.size() > 1) {
+    const size_t told = std::min(found.size(), kFew);
+    const std::string names =
+        absl::StrJoin(found.begin(), found.begin() + static_cast<ptrdiff_t>(told), ", ",
+                      [](std::string* out, const v1::EntityKey& key) { out->append(Name(key)); });
     return absl::InvalidArgumentError(
-        absl::StrCat(found.size(), " entities have this id: ", Name(found[0]), ", ", Name(found[1]),
-                     found.size() > 2 ? ", …" : "", "; say which by --layer or --owner"));
+        absl::StrCat(found.size(), " entities have this id: ", names,
+                     told < found.size() ? absl::StrCat(" and ", found.size() - told, " more") : "",
+                     "; say which by --layer or --owner"));
   }
   request.clear_id_prefix();
   request.set_page_size(1000);
@@ -40,14 +54,15 @@ absl::StatusOr<v1::EntityKey> Find(const WhyOptions& options, Connection& connec
   if (!all.ok()) return all.status();
   std::vector<std::string> ids;
   for (const v1::EntityInfo& entity : all->entities()) ids.push_back(entity.key().id());
-  // A few are listed.
-  constexpr size_t kFew = 12;
   const std::string nearest = Nearest(options.id, ids);
   std::string hint;
-  if (ids.size() <= kFew && !ids.empty()) {
-    hint = EscapeForTerminal(Suggestion(options.id, ids));
-  } else if (!nearest.empty()) {
-    hint = absl::StrCat("; did you mean ", EscapeForTerminal(nearest), "?");
+  if (!nearest.empty()) {
+    hint = absl::StrCat("; did you mean ", Quoted(nearest), "?");
+  } else if (ids.size() <= kFew && !ids.empty()) {
+    hint = absl::StrCat("; there ", ids.size() == 1 ? "is " : "are ",
+                        absl::StrJoin(ids, ", ", [](std::string* out, const std::string& id) {
+                          out->append(Quoted(id));
+                        }));
   }
   return absl::NotFoundError(absl::StrCat(
       "no entity \"", EscapeForTerminal(options.id), "\" is in the scene",
@@ -75,7 +90,7 @@ absl::Status Why(const WhyOptions& options, Connection& connection, Console& con
                                   EscapeForTerminal(answer->text()), "\n");
   absl::StrAppend(&text, "voxels that it covers ", Grouped(answer->covered_voxels()),
                   "; that it lights ", Grouped(answer->lit_voxels()), "; that clip and mask leave ",
-                  Grouped(answer->left_voxels()), "; that are other by it ",
+                  Grouped(answer->left_voxels()), "; that it changes ",
                   Grouped(answer->seen_voxels()), "\n");
   console.Data(text);
   return absl::OkStatus();

@@ -71,19 +71,38 @@ class Player {
       if (interrupt_.requested()) break;
       if (status.ok()) {
         failed.clear();
+        told_.erase(*next);
         continue;
       }
-      failed.insert(*next);
-      const bool of_the_server = opened_ && IsOfTheServer(status);
-      if (of_the_server || failed.size() == playlist_.items.size()) return status;
-      console_.Say(absl::StrCat(EscapeForTerminal(item.file),
-                                " is passed over: ", EscapeForTerminal(status.message())));
+      const bool anew = failed.insert(*next).second;
+      if (opened_ && IsOfTheServer(status)) return status;
+      if (playlist_.items.size() == 1) return status;
+      if (told_.insert(*next).second) {
+        console_.Say(absl::StrCat(EscapeForTerminal(item.file),
+                                  " is passed over: ", EscapeForTerminal(status.message())));
+      }
+      if (anew) status = AnyOther(failed);
+      if (!status.ok() && anew) return status;
       if (Wait(kRest)) break;
     }
     return absl::OkStatus();
   }
 
  private:
+  // Whether one that has not `failed` can be played, now or at its hours; if none can: which are wrong in what.
+  absl::Status AnyOther(const std::set<size_t>& failed) const {
+    std::string faults;
+    for (size_t i = 0; i < playlist_.items.size(); ++i) {
+      if (failed.contains(i)) continue;
+      const absl::Status status = CheckPlayable(playlist_.items[i]);
+      if (status.ok()) return status;
+      absl::StrAppend(&faults, "\nitem ", i + 1, ": ",
+                      EscapeForTerminal(std::string(status.message())));
+    }
+    return absl::FailedPreconditionError(
+        absl::StrCat("nothing of the playlist can be played", faults.empty() ? "" : ":", faults));
+  }
+
   // As long as what is shown is to be on.
   absl::Status Stay(const PlaylistItem& item) {
     // One that is on for its own length plays while it comes and while it goes.
@@ -143,7 +162,8 @@ class Player {
   Console& console_;
   sync::SystemClock clock_;
   std::unique_ptr<Showing> shown_;
-  bool opened_ = false;  // the file of the item that came last
+  std::set<size_t> told_;  // of items: that they are passed over, since they were played last
+  bool opened_ = false;    // the file of the item that came last
 };
 
 absl::Status Check(const Playlist& playlist, const std::string& path, WeekMinute now,

@@ -15,8 +15,8 @@ namespace voxeld::voxelctl {
 // The local time of day and week.
 WeekMinute LocalWeekMinute();
 
-// Until an interrupt, which is no error, or, without `loop`, the end of the last. An item that cannot be played is told and
-// passed over; when none can, or the server goes away, that is the error. With --json a line for each item as it comes up.
+// Until an interrupt, which is no error, or, without `loop`, the end of the last. An item that cannot be played is told once and
+// passed over; when none can, be it at other hours, or the server goes away, that is the error. With --json a line for each item as it comes up.
 // With `check` the files alone are read, and what would be on now is told; InvalidArgument has every item that would be
 // passed over. `connect` is called when it is to be played.
 absl::Status PlayList(const PlaylistOptions& options, const Connector& connect,
