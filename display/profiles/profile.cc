@@ -19,16 +19,12 @@ namespace {
 
 constexpr const char* kEnding = ".toml";
 
-}  // namespace
-
-absl::StatusOr<Profile> ReadProfile(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return absl::NotFoundError(absl::StrCat("there is no file ", path));
-  }
+// `parse` gives the table, or throws what is wrong.
+template <typename Parse>
+absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
   toml::table root;
   try {
-    root = toml::parse_file(path);
+    root = parse();
   } catch (const toml::parse_error& wrong) {
     return absl::InvalidArgumentError(absl::StrCat(path, ":", wrong.source().begin.line, ":",
                                                    wrong.source().begin.column, ": ",
@@ -53,6 +49,20 @@ absl::StatusOr<Profile> ReadProfile(const std::string& path) {
     }
   }
   return profile;
+}
+
+}  // namespace
+
+absl::StatusOr<Profile> ReadProfile(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(absl::StrCat("there is no file ", path));
+  }
+  return ProfileOf(path, [&] { return toml::parse_file(path); });
+}
+
+absl::StatusOr<Profile> ParseProfile(std::string_view text, const std::string& name) {
+  return ProfileOf(name, [&] { return toml::parse(text, name); });
 }
 
 std::vector<std::string> ProfilePlaces(const std::function<std::string(const char*)>& environment,

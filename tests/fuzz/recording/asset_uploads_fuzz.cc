@@ -1,0 +1,144 @@
+// Assets: uploads that overlap, break off, go on and lie. What is whole has its hash; figures add up; nothing beyond the limits.
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/assets/asset_file.h"
+#include "daemon/assets/asset_store.h"
+#include "display/sync/fake_clock.h"
+#include "tests/fuzz/expect.h"
+#include "tests/fuzz/script.h"
+
+namespace voxeld::fuzz {
+namespace {
+
+using namespace voxeld::daemon::assets;  // NOLINT(google-build-using-namespace)
+
+constexpr int kMostSteps = 96;
+constexpr size_t kContents = 6;
+constexpr uint64_t kMostBytes = 24 << 10;
+
+// Contents of several sizes, one of them empty.
+std::string ContentOf(size_t number) {
+  constexpr size_t kSizes[kContents] = {0, 1, 100, 4096, 5000, 8192};
+  return std::string(kSizes[number], static_cast<char>('a' + number));
+}
+
+void Run(Script script) {
+  sync::FakeClock clock;
+  const AssetLimits limits{.max_asset_bytes = 8192,
+                           .max_bytes = kMostBytes,
+                           .max_assets = 4,
+                           .max_uploads = 3,
+                           .idle_limit_ns = sync::kSecond};
+  const std::unique_ptr<AssetStore> store = AssetStore::Open("", limits, clock, nullptr);
+  std::string contents[kContents], digests[kContents];
+  for (size_t i = 0; i < kContents; ++i) {
+    contents[i] = ContentOf(i);
+    digests[i] = HashBytes(contents[i]);
+  }
+  struct Upload {
+    size_t content = 0;
+    uint64_t at = 0;
+    bool true_so_far = true;
+  };
+  std::map<AssetStore::UploadId, Upload> uploads;
+  const auto any = [&]() -> std::map<AssetStore::UploadId, Upload>::iterator {
+    if (uploads.empty()) return uploads.end();
+    auto it = uploads.begin();
+    std::advance(it, script.Byte() % uploads.size());
+    return it;
+  };
+  for (int step = 0; step < kMostSteps && !script.done(); ++step) {
+    switch (script.Byte() % 8) {
+      case 0:
+      case 1: {
+        const size_t content = script.Byte() % kContents;
+        const uint8_t choice = script.Byte();
+        uint64_t size = contents[content].size(), offset = 0;
+        if (choice == 1) size = script.Number(8);
+        if (choice == 2) offset = script.Number(8);
+        if (choice > 128) {
+          for (const AssetState& state : store->List({&digests[content], 1})) offset = state.stored;
+        }
+        const auto begun = store->Begin(digests[content], size, offset);
+        ExpectSays(begun.status());
+        if (begun.ok()) uploads[*begun] = {content, offset, size == contents[content].size()};
+        break;
+      }
+      case 2:
+      case 3: {
+        const auto it = any();
+        if (it == uploads.end()) break;
+        Upload& upload = it->second;
+        const std::string& content = contents[upload.content];
+        const uint8_t choice = script.Byte();
+        std::string bytes = content.substr(std::min<size_t>(upload.at, content.size()), script.Below(65536) % 8193);
+        uint64_t offset = upload.at;
+        if (choice == 1) bytes = script.Text();
+        if (choice == 2) offset = script.Number(8);
+        const absl::Status status = store->Append(it->first, offset, bytes);
+        ExpectSays(status);
+        if (!status.ok()) break;
+        EXPECT_THAT_HOLDS(offset == upload.at && !bytes.empty());
+        upload.true_so_far &= content.compare(upload.at, bytes.size(), bytes) == 0;
+        upload.at += bytes.size();
+        break;
+      }
+      case 4: {
+        const auto it = any();
+        if (it == uploads.end()) break;
+        const auto finished = store->Finish(it->first);
+        ExpectSays(finished.status());
+        if (finished.ok()) EXPECT_THAT_HOLDS(*finished == contents[it->second.content].size());
+        uploads.erase(it);
+        break;
+      }
+      case 5: {
+        const auto it = any();
+        if (it == uploads.end()) break;
+        store->Abandon(it->first);
+        uploads.erase(it);
+        break;
+      }
+      case 6: {
+        clock.Advance(script.Byte() * 20 * sync::kMillisecond);
+        const auto it = any();
+        if (it != uploads.end()) store->Heard(it->first);
+        break;
+      }
+      default: {
+        const size_t content = script.Byte() % kContents;
+        const uint64_t offset = script.Flag() ? script.Number(8) : script.Byte(), size = script.Number(2);
+        const auto found = store->FindAsset(digests[content], offset, size);
+        ExpectSays(found.status());
+        if (found.ok()) {
+          EXPECT_THAT_HOLDS(found->bytes == std::string_view(contents[content]).substr(offset, size));
+        }
+        break;
+      }
+    }
+    uint64_t bytes = 0;
+    const std::vector<AssetState> all = store->ListAll();
+    EXPECT_THAT_HOLDS(all.size() <= limits.max_assets, all.size(), " assets");
+    for (const AssetState& state : all) {
+      bytes += state.stored;
+      const auto* const known = std::find(digests, digests + kContents, state.digest);
+      EXPECT_THAT_HOLDS(known != digests + kContents);
+      if (state.complete) EXPECT_THAT_HOLDS(state.stored == contents[known - digests].size());
+    }
+    EXPECT_THAT_HOLDS(bytes <= limits.max_bytes, bytes, " bytes");
+  }
+}
+
+}  // namespace
+}  // namespace voxeld::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  voxeld::fuzz::Run(voxeld::fuzz::Script(data, size));
+  return 0;
+}
