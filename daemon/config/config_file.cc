@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/config/config.h"
@@ -265,8 +266,17 @@ class FileReader {
     return absl::StrCat(name_, ":", source.begin.line, ":", source.begin.column);
   }
 
+  // A line of printable text, whatever keys and values are.
   void Error(const toml::source_region& source, const std::string& text) {
-    errors_.push_back(absl::StrCat(Where(source), ": ", text));
+    std::string line = absl::StrCat(Where(source), ": ");
+    for (const char c : text) {
+      if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) {
+        absl::StrAppend(&line, "\\x", absl::Hex(static_cast<unsigned char>(c), absl::kZeroPad2));
+      } else {
+        line += c;
+      }
+    }
+    errors_.push_back(std::move(line));
   }
 
   void Wrong(const toml::node& node, const std::string& key, const std::string& text) {

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "absl/strings/numbers.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
@@ -94,7 +95,8 @@ void OptionReader::Refuse(const std::string& key, std::string_view right) {
   const auto it = options_.options.find(key);
   status_ = absl::InvalidArgumentError(absl::StrCat(
       "display \"", options_.name, "\": ", key, " is \"",
-      it == options_.options.end() ? "" : it->second, "\"; it must be ", std::string(right)));
+      it == options_.options.end() ? "" : absl::Utf8SafeCHexEscape(it->second), "\"; it must be ",
+      std::string(right)));
 }
 
 std::string OptionReader::Text(const std::string& key, const std::string& fallback) {
@@ -193,7 +195,8 @@ absl::Status OptionReader::Finish() const {
   for (const auto& [key, value] : options_.options) {
     if (known_.contains(key)) continue;
     return absl::InvalidArgumentError(
-        absl::StrCat("display \"", options_.name, "\": there is no option ", key, " (\"", value,
+        absl::StrCat("display \"", options_.name, "\": there is no option ",
+                     absl::Utf8SafeCHexEscape(key), " (\"", absl::Utf8SafeCHexEscape(value),
                      "\") here; there are ", absl::StrJoin(known_, ", ")));
   }
   return absl::OkStatus();

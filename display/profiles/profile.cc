@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -36,8 +37,8 @@ absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
     const std::optional<std::string> value = OptionText(node);
     if (!value.has_value() || name == "name" || name == "profile") {
       return absl::InvalidArgumentError(absl::StrCat(
-          path, ":", node.source().begin.line, ":", node.source().begin.column, ": ", name,
-          value.has_value() ? " has no place in a profile: it is given where the display is"
+          path, ":", node.source().begin.line, ":", node.source().begin.column, ": ",
+          absl::Utf8SafeCHexEscape(name), value.has_value() ? " has no place in a profile: it is given where the display is"
                             : " is no text, number, boolean, or array of these"));
     }
     if (name == "title") {

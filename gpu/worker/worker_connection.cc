@@ -124,12 +124,14 @@ class Connection final : public WorkerConnection {
     options.kind = open->kind;
     options.threads = open->threads;
     options.device = open->device;
-    options.part = part_ = open->part;
+    options.part = open->part;
     options.index_bytes = open->index_bytes;
     options.inline_execution = true;
     absl::StatusOr<std::unique_ptr<Engine>> engine = hooks_.make_engine(options);
     if (!engine.ok()) return Answer(message.call, engine.status());
     engine_ = *std::move(engine);
+    part_ = open->part;
+    layout_.reset();  // it has no target yet
     ReadyMessage ready;
     ready.kind = engine_->info().kind;
     std::strncpy(ready.device, engine_->info().device.c_str(), sizeof(ready.device) - 1);

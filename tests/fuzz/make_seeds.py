@@ -193,6 +193,16 @@ def traffic(programs, folder):
         put("mcap_file", recorded[:8000], 16384)
     for number, name in enumerate(("ddp", "e131", "artnet")):
         packets = heard[name]
+        if name == "e131":  # another source, and another priority
+            for priority in (50, 150, 250):
+                for packet in packets[:1]:
+                    other = bytearray(packet)
+                    other[22:38] = bytes(range(16))
+                    other[108:109] = bytes([priority])
+                    packets.append(bytes(other))
+            put("light_datagrams", bytes([1, 3, 1]) + b"".join(b"\x40" + text(p) for p in [packets[0], *packets[-3:], packets[0]]))
+        if name == "artnet":
+            packets.append(b"Art-Net\0\x00\x20\x00\x0e\x00\x00")
         for packet in packets[:3] + packets[-3:]:
             put("light_datagrams", bytes([number, 3, 1]) + b"\x40" + text(packet))
         if packets:
@@ -313,10 +323,13 @@ def voxlink():
             put(target, start + whole + wait + second + wait + reads + wait)
             put(target, start + whole + wait + ahead + wait + missing + reads + wait)
             put(target, bytes([choice]) + mode + requests + start[1:] + whole + wait + bytes([11, 1, 11, 2]) + start[1:] + whole)
-    put("voxlink_decoder", b"\x00" + b"".join(bytes(p) + b"\x03" for p in (
+    put("voxlink_decoder", b"\x00" + b"".join(b"\x00" + bytes(p) + b"\x03" for p in (
         bytes([0, 1, 0, 6]) + text(b""),
         *(bytes([2, 1, i, j, 24, 7]) for i in range(3) for j in range(2)), bytes([3, 1, 1]),
         bytes([0, 2, 1, 6]) + text(b"\x01"), bytes([2, 2, 0, 0, 24, 9]), bytes([3, 2, 1]), bytes([4, 2, 0]), bytes([6, 7, 0]))))
+    damaged = b"\x00\x02" + bytes([0, 1, 0, 6]) + text(b"") + bytes([2, 1, 0, 0, 24, 7]) + bytes([8, 100, 0, 1]) + b"\x00"
+    put("voxlink_decoder", damaged)
+    put("voxlink_decoder", b"\x01\x00" + bytes([0, 5, 0, 17]) + text(b"") + b"\x01" + b"\x00" + bytes([0, 6, 5, 17]) + text(b"\x01\x00\xff") + b"\x01")
     put("voxlink_host", bytes([0, 7, 7, 0, 2, 40, 0, 9, 7, 10]) + bytes(80))
     fixed = struct.pack("<IHBBIIIIIIIIIIIHHII", 0, 0x0100, 0x1F, 4, 3, 65536, 1024, 2, 2, 1, 3, 30000, 30000, 30000, 0, 100, 250, 0, 0)
     shape = struct.pack("<BBBBIdddd", 1, 0, 0, 1, 2, 1.0, 1.0, 1.0, 0.0) + struct.pack("<d", 1.0)
@@ -330,6 +343,24 @@ def voxlink():
         block = bytearray(fixed + other)
         struct.pack_into("<I", block, 0, len(block))
         put("voxlink_capabilities", bytes(block))
+
+
+def programs():
+    """Programs of expressions, as gpu/implicit/program.h has them."""
+    code = lambda *instructions: [w for op, to, a, b, now in instructions for w in (op | to << 8 | a << 16 | b << 24, now & 0xFFFFFFFF)]
+    x, y, constant, pow_i, add, sin = 1, 2, 0, 16, 17, 11
+    surface = code((x, 0, 0, 0, 0), (y, 1, 0, 0, 0), (add, 2, 0, 1, 0), (sin, 3, 2, 2, 0), (pow_i, 4, 3, 3, 3))
+    wrong = code((x, 0, 0, 0, 0), (pow_i, 1, 0, 0, 2000))
+    one = code((constant, 0, 0, 0, 0x3F000000))
+
+    def program(surface, bound, color, by, slots, rings=(), table=()):
+        header = [len(surface) // 2, len(bound) // 2, len(color) // 2, by, slots[0], slots[1], 0, 0, 0, len(rings), 0, 0]
+        return struct.pack("<%dI" % (12 + len(surface) + len(bound) + len(color) + len(rings) + len(table)), *header, *surface, *bound,
+                           *color, *rings, *table)
+
+    for data in (program(surface, [], [], 0, (4, 0)), program(surface, one, one, 1, (4, 0)), program(wrong, [], [], 0, (1, 0)),
+                 program(surface, one, one, 2, (4, 0), (), range(256)), program(surface, [], [], 0, (4, 0), (3,))):
+        put("expression_program", b"\x03" + data)
 
 
 def sockets():
@@ -356,9 +387,15 @@ def sockets():
     put("local_packets", bytes([0, 1, 0, 16, 1, 0, 1, 0, 32, 2, 0, 4, 1, 4, 5, 0, 7, 200]))
     put("asset_uploads", bytes([0, 2, 0, 2, 0, 0, 100, 0, 4, 0, 7, 2, 0, 5, 100, 0, 1, 3, 3, 2, 0, 0, 0, 16, 4, 0]))
     open_, segment = bytes([0, 0, 0, 0]), lambda i: bytes([1, i, 0]) + text(b"")
-    put("worker_messages", open_ + segment(0) + segment(1) + bytes([3, 0, 0, 0, 0, 0]) + bytes([4]) + text(bytes(16)) + bytes([0, 0]) +
-        bytes([6, 1, 1, 0, 0, 2, 0xC0, 0x00]) + bytes([7, 1, 0, 0, 0, 4, 4, 4, 0, 64]) + bytes([2, 0, 0, 8, 2, 0]) + text(b"") + bytes([9, 2]))
-
+    for shape in range(5):
+        target = bytes([3, shape, 0, 0, 0, 0, 0, 0])
+        layer = bytes([5, 1, 0, 1, 255, 0, 0, 1, 0, 0, 0, 0, 0]) + bytes(4 * 64)
+        geometry = lambda kind, vertices, words=b"": bytes([0, kind, kind, 0x55, 0x01, 96]) + bytes([90] * 8) + bytes([vertices]) + text(words) + bytes(range(40, 40 + 3 * vertices))
+        for kind in range(1, 12):
+            drawable = bytes([3, kind % 8, kind % 8, 1, 3, 0, 0])
+            delta = bytes([4, 2]) + geometry(kind, 16, struct.pack("<6I", 0, 1, 2, 2, 1, 3)) + layer + drawable + bytes([0, 0])
+            frame = bytes([6, 1, 1, 0, 0, 2, 0xC0, 0x00]) + bytes([7, 1, 0, 0, 0, 4, 4, 4, 0, 64])
+            put("worker_messages", open_ + segment(0) + segment(1) + target + delta + frame + bytes([2, 0, 0, 8, 2, 0]) + text(b"") + bytes([9, 2]))
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -366,6 +403,7 @@ def main():
     args = parser.parse_args()
     texts()
     voxlink()
+    programs()
     sockets()
     if not (args.bin / "voxeld").exists():
         print(f"make_seeds: no voxeld in {args.bin}; without its traffic", file=sys.stderr)

@@ -56,6 +56,10 @@ void Run(Script script) {
       EXPECT_THAT_HOLDS(read.ok() == added.ok());
       if (read.ok()) {
         CheckDatagram(options.protocol, *read, packet);
+        if (read->kind == Datagram::Kind::kAsk) {
+          const auto reply = lights::ArtPollReply({127, 0, 0, 1}, 6454, options.first_universe, 9);
+          EXPECT_THAT_HOLDS(lights::ReadDatagram(Protocol::kArtNet, reply).ok());
+        }
       } else {
         ExpectSays(read.status());
         EXPECT_THAT_HOLDS(read.status() == added.status());

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <string>
@@ -28,6 +31,36 @@ std::string ContentOf(size_t number) {
   return std::string(kSizes[number], static_cast<char>('a' + number));
 }
 
+// In memory, and gone with the process.
+const std::string& Folder() {
+  static const std::string& folder = *new std::string([] {
+    char name[] = "/dev/shm/voxeld-fuzz-XXXXXX";
+    EXPECT_THAT_HOLDS(mkdtemp(name) != nullptr);
+    std::atexit([] { std::filesystem::remove_all(Folder()); });
+    return std::string(name);
+  }());
+  return folder;
+}
+
+// Of one of the files a byte is another, or its end is gone; or there is a file more.
+void Damage(const std::string& folder, Script& script) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  const uint8_t how = script.Byte();
+  if (files.empty() || how < 32) {
+    std::ofstream(folder + "/" + std::string(how % 80, 'a') + (how % 2 == 0 ? ".part" : "")) << "stray";
+    return;
+  }
+  const std::filesystem::path& path = files[script.Byte() % files.size()];
+  const uintmax_t size = std::filesystem::file_size(path);
+  if (how < 128) return std::filesystem::resize_file(path, size / 2);
+  if (size == 0) return;
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(static_cast<std::streamoff>(script.Below(65536) % size));
+  file.put('!');
+}
+
 void Run(Script script) {
   sync::FakeClock clock;
   const AssetLimits limits{.max_asset_bytes = 8192,
@@ -35,7 +68,9 @@ void Run(Script script) {
                            .max_assets = 4,
                            .max_uploads = 3,
                            .idle_limit_ns = sync::kSecond};
-  const std::unique_ptr<AssetStore> store = AssetStore::Open("", limits, clock, nullptr);
+  // In memory, or in a folder, which somebody may have put something into.
+  const std::string folder = script.Flag() ? Folder() : "";
+  std::unique_ptr<AssetStore> store = AssetStore::Open(folder, limits, clock, nullptr);
   std::string contents[kContents], digests[kContents];
   for (size_t i = 0; i < kContents; ++i) {
     contents[i] = ContentOf(i);
@@ -106,6 +141,12 @@ void Run(Script script) {
         break;
       }
       case 6: {
+        if (const uint8_t choice = script.Byte(); choice < 32) {  // the daemon starts anew
+          store = nullptr;
+          uploads.clear();
+          if (!folder.empty() && choice < 16) Damage(folder, script);
+          store = AssetStore::Open(folder, limits, clock, nullptr);
+        }
         clock.Advance(script.Byte() * 20 * sync::kMillisecond);
         const auto it = any();
         if (it != uploads.end()) store->Heard(it->first);
@@ -140,5 +181,8 @@ void Run(Script script) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   voxeld::fuzz::Run(voxeld::fuzz::Script(data, size));
+  for (const auto& entry : std::filesystem::directory_iterator(voxeld::fuzz::Folder())) {
+    std::filesystem::remove_all(entry.path());
+  }
   return 0;
 }

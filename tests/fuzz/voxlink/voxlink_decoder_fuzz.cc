@@ -38,9 +38,12 @@ void Run(Script script) {
   std::vector<std::byte> all;
   std::optional<DecodedVolume> last;
   absl::Status status;
+  // Packets go to one endpoint.
+  VoxlinkDecoder other(layout, kMostPayload);
+  ExpectSays(other.OnBytes(display::voxlink::kInterruptIn, {}, 0));
   while (!script.done() && all.size() < 64 << 10) {
     std::vector<std::byte> bytes;
-    AppendPacket(script, writer, bytes);
+    for (int i = script.Byte() % 8; i >= 0; --i) AppendPacket(script, writer, bytes);
     all.insert(all.end(), bytes.begin(), bytes.end());
     const size_t cut = bytes.empty() ? 0 : script.Byte() % bytes.size();
     for (const auto& piece : {std::span(bytes).first(cut), std::span(bytes).subspan(cut)}) {

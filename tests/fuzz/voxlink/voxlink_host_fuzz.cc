@@ -114,7 +114,12 @@ struct Ledger final : display::Display::Listener {
       EXPECT_THAT_HOLDS(static_cast<unsigned char>(c) >= 32, "a reason is not printable");
     }
   }
+  void OnHeld(uint64_t volume) override { held = volume; }
+  void OnOrdered(uint64_t volume, sync::TimeNs, bool taken) override {
+    if (!taken) held = volume;
+  }
   std::set<uint64_t> owed;
+  uint64_t held = 0;  // by the device; 0: none
 };
 
 class Host {
@@ -147,6 +152,8 @@ class Host {
   ~Host() { display_->Stop(); }
 
   void Run() {
+    holding_ = script_.Byte() % 4 == 1;
+    if (holding_) display_->SetHolding();
     EXPECT_THAT_HOLDS(display_->Start(&ledger_, [this] { woken_ = true; }).ok());
     // As captures have it: the driver's own bytes never break the protocol.
     display_->Watch([](const absl::StatusOr<display::DecodedVolume>& volume) {
@@ -160,9 +167,13 @@ class Host {
     Plug(true);
     (void)display_->SetBlank(false);
     (void)display_->SetBrightness(1);
+    (void)display_->SetPowerLimit(0);
     Submit(script_.Byte());
     // Beyond the longest back-off.
-    for (int i = 0; i < 120 && !ShowsTheNewest(); ++i) Pass(100 * kMillisecond);
+    for (int i = 0; i < 120 && !ShowsTheNewest(); ++i) {
+      Order(clock_.Now(), 0);
+      Pass(100 * kMillisecond);
+    }
     EXPECT_THAT_HOLDS(ledger_.owed.empty(), "volume ", *ledger_.owed.begin(), " has no outcome: ",
                       display_->state_reason());
     EXPECT_THAT_HOLDS(ShowsTheNewest(), display_->state_reason());
@@ -182,8 +193,14 @@ class Host {
     return true;
   }
 
+  void Order(sync::TimeNs at, uint32_t ahead) {
+    if (const uint64_t held = std::exchange(ledger_.held, 0); holding_ && held != 0) {
+      display_->OrderShown(held, at, ahead);
+    }
+  }
+
   void Step() {
-    switch (script_.Byte() % 8) {
+    switch (script_.Byte() % 10) {
       case 0:
       case 1:
         Submit(script_.Byte());
@@ -200,6 +217,16 @@ class Host {
         break;
       case 6:
         (void)display_->SetBrightness(script_.Byte() / 255.0);
+        (void)display_->SetPowerLimit(script_.Byte());
+        break;
+      case 7:
+        Order(clock_.Now() + script_.Byte() * 10 * kMillisecond, script_.Byte() % 4);
+        break;
+      case 8:
+        if (const uint64_t held = ledger_.held; holding_ && held != 0 && script_.Flag()) {
+          ledger_.held = 0;
+          display_->DropHeld(held, "fuzz");
+        }
         break;
       default:
         Pass(script_.Byte() * 10 * kMillisecond);
@@ -257,6 +284,7 @@ class Host {
   std::unique_ptr<display::voxlink::VoxlinkDisplay> display_;
   std::shared_ptr<display::SliceFrame> newest_;
   uint64_t volume_ = 0;
+  bool holding_ = false;
   bool woken_ = false;
   sync::TimeNs next_ = 0;
 };

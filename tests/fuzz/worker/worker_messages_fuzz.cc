@@ -11,10 +11,12 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_join.h"
 #include "display/crc/crc32c.h"
 #include "gpu/bulk/segment.h"
 #include "gpu/cpu/cpu_engine.h"
@@ -23,6 +25,7 @@
 #include "gpu/worker/worker_connection.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
+#include "tests/fuzz/worker/sound_delta.h"
 
 namespace voxeld::fuzz {
 namespace {
@@ -32,12 +35,17 @@ using namespace voxeld::gpu;  // NOLINT(google-build-using-namespace)
 constexpr int kMostMessages = 64;
 constexpr size_t kSegmentBytes = 16 << 10;
 
-int OpenDescriptors() {
+// What the descriptors that are open are of.
+std::multiset<std::string> OpenDescriptors() {
+  std::multiset<std::string> open;
   DIR* const folder = opendir("/proc/self/fd");
-  int count = 0;
-  while (readdir(folder) != nullptr) ++count;
+  while (const dirent* entry = readdir(folder)) {
+    char target[256];
+    const ssize_t size = readlinkat(dirfd(folder), entry->d_name, target, sizeof(target));
+    if (size > 0) open.emplace(target, static_cast<size_t>(size));
+  }
   closedir(folder);
-  return count;
+  return open;
 }
 
 // A display that is worked out in no time.
@@ -46,8 +54,22 @@ Target SmallTarget(Script& script) {
   display::PlanarStack stack{.width_px = 4, .height_px = 4};
   stack.positions_mm = {0, 1, 2, 3};
   target.geometry.shape = stack;
+  const uint8_t shape = script.Byte() % 8;
+  if (shape == 1) {
+    target.geometry.shape = display::Rotor{
+        .slices_per_turn = 4, .width_px = 4, .height_px = 4, .panels = {display::Rotor::Panel{}}};
+  } else if (shape == 2) {
+    target.geometry.shape =
+        display::Helix{.slices_per_turn = 4, .width_px = 4, .height_px = 4, .height_mm = 4, .radius_mm = 2};
+  } else if (shape == 3) {
+    target.geometry.shape = display::Lattice{.width_px = 4, .points_mm = {display::Vec3{0, 0, 0}, std::nullopt, display::Vec3{1, 1, 1}, std::nullopt}};
+  } else if (shape == 4) {
+    target.geometry.correction.emplace().displacement = display::DisplacementGrid{
+        .nx = 2, .ny = 2, .nz = 2, .low_mm = {0, 0, 0}, .high_mm = {4, 4, 4}, .at_mm = std::vector<display::Vec3>(8)};
+  }
   target.geometry.grid = {.nx = 4, .ny = 4, .nz = 4, .pitch_mm = {1, 1, 1}, .origin_mm = {}};
   target.layout = {.slices = 4, .width = 4, .height = 4, .sub_frames = 1 + script.Byte() % 2};
+  if (shape == 3) target.layout.slices = target.layout.height = 1;
   target.layout.format = static_cast<display::PixelFormat>(script.Byte() % 5);
   target.tone.lut.fill(display::Tone::Linear());
   return target;
@@ -58,7 +80,7 @@ bool IsSmall(const Target& target) {
   const int64_t most = 64;
   return grid.nx <= most && grid.ny <= most && grid.nz <= most && target.layout.width <= most &&
          target.layout.height <= most && target.layout.slices <= most &&
-         target.layout.sub_frames <= 4 && target.geometry.correction == std::nullopt;
+         target.layout.sub_frames <= 4;
 }
 
 class Owner {
@@ -123,6 +145,7 @@ class Owner {
         return Bulk(script, MessageType::kTarget, target);
       }
       case 4:
+        return Bulk(script, MessageType::kApply, SoundDelta(script));
       case 5: {
         const std::string text = script.Text();
         const auto* const data = reinterpret_cast<const std::byte*>(text.data());
@@ -234,8 +257,17 @@ class Owner {
 }  // namespace voxeld::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  static const int descriptors = voxeld::fuzz::OpenDescriptors();
+  // The first engine opens what stays open.
+  static const bool begun = [] {
+    constexpr uint8_t kOpen[] = {0, 0, 0, 0};
+    voxeld::fuzz::Owner().Run(voxeld::fuzz::Script(kOpen, sizeof(kOpen)));
+    return true;
+  }();
+  EXPECT_THAT_HOLDS(begun);
+  const auto before = voxeld::fuzz::OpenDescriptors();
   voxeld::fuzz::Owner().Run(voxeld::fuzz::Script(data, size));
-  EXPECT_THAT_HOLDS(voxeld::fuzz::OpenDescriptors() == descriptors, "descriptors are left open");
+  const auto after = voxeld::fuzz::OpenDescriptors();
+  EXPECT_THAT_HOLDS(after.size() == before.size(), "of ", before.size(), " descriptors there are ",
+                    after.size(), "; ", absl::StrJoin(after, ", "));
   return 0;
 }
