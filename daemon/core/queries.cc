@@ -106,8 +106,8 @@ void Core::Impl::GetEntity(const EntityKey& key, const Reply<EntityInfo>& reply)
   }
   if (found.empty()) {
     const std::string whose = key.owner == 0 ? "any owner" : absl::StrCat("owner ", key.owner);
-    return reply(absl::NotFoundError(
-        absl::StrFormat("no entity %s in layer %s of %s", Quoted(key.id), Quoted(key.layer), whose)));
+    return reply(absl::NotFoundError(absl::StrFormat("no entity %s in layer %s of %s",
+                                                     Quoted(key.id), Quoted(key.layer), whose)));
   }
   if (found.size() > 1) {
     return reply(absl::FailedPreconditionError(absl::StrFormat(

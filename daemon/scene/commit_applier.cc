@@ -257,10 +257,10 @@ void CommitApplier::Do(Operation& operation, Delete& del) {
   if (del.what == Delete::What::kId) {
     const EntityPtr* entity = draft_.FindEntity(key, del.id_or_prefix);
     if (entity != nullptr && guarded(**entity)) {
-      return Refuse(operation, del.layer, del.id_or_prefix, "delete.guard_sequence",
-                    Reason::kStaleSequence,
-                    absl::StrFormat("entity %s was upserted by sequence %d, after %d; it stays",
-                                    Quoted(del.id_or_prefix), (*entity)->sequence, del.guard_sequence));
+      return Refuse(
+          operation, del.layer, del.id_or_prefix, "delete.guard_sequence", Reason::kStaleSequence,
+          absl::StrFormat("entity %s was upserted by sequence %d, after %d; it stays",
+                          Quoted(del.id_or_prefix), (*entity)->sequence, del.guard_sequence));
     }
     if (entity != nullptr) draft_.RemoveEntity(key, del.id_or_prefix);
   } else {
@@ -274,9 +274,9 @@ void CommitApplier::Do(Operation& operation, SetTransform& set) {
   const OwnedName key = Key(set.layer);
   const EntityPtr* found = draft_.FindEntity(key, set.id);
   if (found == nullptr) {
-    return Refuse(
-        operation, set.layer, set.id, "set_transform.id", Reason::kNotFound,
-        absl::StrFormat("layer %s has no entity %s; upsert it first", Quoted(set.layer), Quoted(set.id)));
+    return Refuse(operation, set.layer, set.id, "set_transform.id", Reason::kNotFound,
+                  absl::StrFormat("layer %s has no entity %s; upsert it first", Quoted(set.layer),
+                                  Quoted(set.id)));
   }
   const Bounds bounds =
       MapBounds(set.transform, draft_.BoundsOf(author_.owner, (*found)->data.content));
@@ -347,8 +347,9 @@ void CommitApplier::Do(Operation& operation, FrameBegin& begin) {
 void CommitApplier::Do(Operation& operation, FrameEnd& end) {
   const auto it = frames_.find(end.layer);
   if (it == frames_.end()) {
-    return Refuse(operation, end.layer, "", "frame_end.layer", Reason::kOutOfOrder,
-                  absl::StrFormat("no frame is open in layer %s; begin one first", Quoted(end.layer)));
+    return Refuse(
+        operation, end.layer, "", "frame_end.layer", Reason::kOutOfOrder,
+        absl::StrFormat("no frame is open in layer %s; begin one first", Quoted(end.layer)));
   }
   Frame frame = std::move(it->second);
   frames_.erase(it);

@@ -129,11 +129,10 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
                                     Quoted(name), object.depth, limits_.max_instance_depth));
     }
     if (!std::isfinite(LargestMagnitude(object.bounds))) {
-      return refuse(
-          Reason::kOutOfRange,
-          absl::StrFormat("object %s would have a coordinate that is not finite after "
-                          "its transforms; it must be",
-                          Quoted(name)));
+      return refuse(Reason::kOutOfRange,
+                    absl::StrFormat("object %s would have a coordinate that is not finite after "
+                                    "its transforms; it must be",
+                                    Quoted(name)));
     }
     const Object* before = draft_.FindObject(Key(name));
     if (before == nullptr) continue;
@@ -147,8 +146,9 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
       const gpu::Affine& transform = (*draft_.FindEntity(layer, use.id))->data.transform;
       if (auto wrong =
               OutOfRange(draft_.FindLayer(layer)->transform, MapBounds(transform, object.bounds))) {
-        return refuse(Reason::kOutOfRange, absl::StrFormat("instance %s in layer %s: %s", Quoted(use.id),
-                                                           Quoted(use.layer), *wrong));
+        return refuse(Reason::kOutOfRange,
+                      absl::StrFormat("instance %s in layer %s: %s", Quoted(use.id),
+                                      Quoted(use.layer), *wrong));
       }
     }
   }
@@ -183,16 +183,16 @@ void CommitApplier::Do(Operation& operation, DeleteObject& del) {
     Refuse(operation, "", del.object, "delete_object.object", reason, std::move(message));
   };
   if (draft_.FindObject(Key(del.object)) == nullptr) {
-    return refuse(Reason::kNotFound, absl::StrFormat("object %s is not defined", Quoted(del.object)));
+    return refuse(Reason::kNotFound,
+                  absl::StrFormat("object %s is not defined", Quoted(del.object)));
   }
   const std::vector<UseKey> instances = InstancesOf(del.object);
   const std::vector<std::string> users = ObjectsUsing(del.object);
   if (!del.cascade && !(instances.empty() && users.empty())) {
-    return refuse(
-        Reason::kInUse,
-        absl::StrFormat("object %s has %d instances and is part of %d objects; delete "
-                        "those first, or say cascade",
-                        Quoted(del.object), instances.size(), users.size()));
+    return refuse(Reason::kInUse,
+                  absl::StrFormat("object %s has %d instances and is part of %d objects; delete "
+                                  "those first, or say cascade",
+                                  Quoted(del.object), instances.size(), users.size()));
   }
   for (const UseKey& use : instances) {
     EditLayer(Key(use.layer));

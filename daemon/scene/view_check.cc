@@ -27,7 +27,8 @@ absl::Status CheckView(const SnapshotPtr& scene, const DisplayView& view, const 
       status = absl::FailedPreconditionError(absl::StrFormat(
           "through this view entity %s of layer %s of owner %d would reach %g voxels on "
           "display \"%s\"; it must stay within ±%.0f",
-          Quoted(id), Quoted(key.name), key.owner, largest, view.display, limits.max_coordinate_voxels));
+          Quoted(id), Quoted(key.name), key.owner, largest, view.display,
+          limits.max_coordinate_voxels));
     });
   });
   return status;

@@ -8,8 +8,8 @@
 #include <utility>
 #include <variant>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/escaping.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
@@ -93,10 +93,10 @@ const std::string* OptionReader::Find(const std::string& key) {
 void OptionReader::Refuse(const std::string& key, std::string_view right) {
   if (!status_.ok()) return;
   const auto it = options_.options.find(key);
-  status_ = absl::InvalidArgumentError(absl::StrCat(
-      "display \"", options_.name, "\": ", key, " is \"",
-      it == options_.options.end() ? "" : absl::Utf8SafeCHexEscape(it->second), "\"; it must be ",
-      std::string(right)));
+  status_ = absl::InvalidArgumentError(
+      absl::StrCat("display \"", options_.name, "\": ", key, " is \"",
+                   it == options_.options.end() ? "" : absl::Utf8SafeCHexEscape(it->second),
+                   "\"; it must be ", std::string(right)));
 }
 
 std::string OptionReader::Text(const std::string& key, const std::string& fallback) {

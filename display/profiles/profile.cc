@@ -38,7 +38,8 @@ absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
     if (!value.has_value() || name == "name" || name == "profile") {
       return absl::InvalidArgumentError(absl::StrCat(
           path, ":", node.source().begin.line, ":", node.source().begin.column, ": ",
-          absl::Utf8SafeCHexEscape(name), value.has_value() ? " has no place in a profile: it is given where the display is"
+          absl::Utf8SafeCHexEscape(name),
+          value.has_value() ? " has no place in a profile: it is given where the display is"
                             : " is no text, number, boolean, or array of these"));
     }
     if (name == "title") {

@@ -19,12 +19,12 @@ namespace voxeld::fuzz {
 
 }  // namespace voxeld::fuzz
 
-#define EXPECT_THAT_HOLDS(condition, ...)                          \
-  do {                                                             \
-    if (!(condition)) {                                            \
-      ::voxeld::fuzz::Broken(__FILE__, __LINE__, #condition,       \
+#define EXPECT_THAT_HOLDS(condition, ...)                                    \
+  do {                                                                       \
+    if (!(condition)) {                                                      \
+      ::voxeld::fuzz::Broken(__FILE__, __LINE__, #condition,                 \
                              ::absl::StrCat("" __VA_OPT__(, ) __VA_ARGS__)); \
-    }                                                              \
+    }                                                                        \
   } while (false)
 
 namespace voxeld::fuzz {

@@ -11,6 +11,7 @@ import hashlib
 import os
 import pathlib
 import re
+import shutil
 import socket
 import sqlite3
 import struct
@@ -19,6 +20,7 @@ import sys
 import tempfile
 import threading
 import time
+import zlib
 from concurrent import futures
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -172,9 +174,9 @@ def traffic(programs, folder):
     for method, messages in recorder.calls:
         name = method.rsplit("/", 1)[1]
         if name == "Stream" and messages:
-            put("store", b"".join(bytes([8]) + text(m) + b"\x40" for m in messages))
+            put("store", b"".join(bytes([8]) + text(m) + b"\x40" for m in messages), 16384)
             for message in messages:
-                put("store", bytes([8]) + text(message) + b"\x40")
+                put("store", bytes([8]) + text(message) + b"\x40", 12288)
         elif name == "ApplyUpdate" and messages:
             put("store", bytes([6]) + text(messages[0]))
     kinds = {1: 0, 2: 2, 3: 1, 4: 3}
@@ -289,8 +291,57 @@ def texts():
     struct.pack_into("<f", nifti, 108, 352)
     nifti[344:348] = b"n+1\0"
     put("import_volumes", b"\x03" + bytes(nifti))
-    for path in (ROOT / "docs/images").rglob("*.png"):
-        put("pictures", path.read_bytes(), 8192)
+    pictures()
+
+
+def pictures():
+    """PNGs of every kind of pixel, 5x3, and a JPEG, by ffmpeg where it is."""
+    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    for kind, channels in ((0, 1), (2, 3), (3, 1), (4, 2), (6, 4)):
+        for depth in (1, 2, 4, 8, 16):
+            if (kind in (2, 4, 6) and depth < 8) or (kind == 3 and depth > 8):
+                continue
+            for interlaced in (0, 1):
+                row = (5 * channels * depth + 7) // 8
+                rows = b"".join(bytes([i % 5]) + bytes((37 * j + i) % 256 & (0x11 if kind == 3 else 0xFF) for j in range(row)) for i in range(3))
+                data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 5, 3, depth, kind, 0, 0, interlaced))
+                if kind == 3:
+                    data += chunk(b"PLTE", bytes(range(48))[: 3 * min(16, 2**depth)])
+                if kind in (0, 2, 3):
+                    data += chunk(b"tRNS", {0: b"\0\1", 2: b"\0\1\0\2\0\3", 3: b"\x80"}[kind])
+                data += chunk(b"gAMA", struct.pack(">I", 45455)) + chunk(b"IDAT", zlib.compress(rows * 3)) + chunk(b"IEND", b"")
+                put("pictures", data)
+    if shutil.which("ffmpeg") is None:
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        source = pathlib.Path(folder) / "a.png"
+        source.write_bytes(data)
+        for name, options in (("a.jpg", []), ("b.jpg", ["-pix_fmt", "gray"]), ("c.jpg", ["-pix_fmt", "yuvj444p"])):
+            subprocess.run(["ffmpeg", "-v", "quiet", "-i", source, *options, pathlib.Path(folder) / name], check=False)
+            if (pathlib.Path(folder) / name).exists():
+                put("pictures", (pathlib.Path(folder) / name).read_bytes())
+
+
+def requests():
+    """Of every kind that the wire has, alone and one after another, each followed by a commit."""
+    encode = lambda line: subprocess.run(["protoc", "-I", ROOT / "proto", "--encode=voxeld.v1.StreamRequest", "voxeld/v1/scene.proto"],
+                                         input=line.encode(), cwd=ROOT / "proto", capture_output=True, check=True).stdout
+    lines = [l for l in (ROOT / "tests/fuzz/wire/requests.txt").read_text().splitlines() if l and not l.startswith("#")]
+    # Payloads that are large enough not to be copied with the message.
+    zeros = lambda size: "\\000" * size
+    for kind in (f'points {{ vertices {{ count: 300 position_type: ELEMENT_TYPE_F32 positions: "{zeros(3600)}" color_type: ELEMENT_TYPE_RGB8 colors: "{zeros(900)}" }} }}',
+                 f'mesh {{ vertices {{ count: 300 position_type: ELEMENT_TYPE_I16 positions: "{zeros(1800)}" index_type: ELEMENT_TYPE_U16 index_count: 300 indices: "{zeros(600)}" }} }}'):
+        lines.append(f'upsert {{ layer: "a" id: "large" entity {{ primitive {{ {kind} }} }} }}')
+        lines.append(f'batch {{ upserts {{ layer: "a" id: "large" entity {{ primitive {{ {kind} }} }} }} }}')
+        lines.append(f'define_object {{ object: "o" definition {{ parts {{ primitive {{ {kind} }} }} }} }}')
+    commit = b"\x08" + text(encode("commit { frame_id: 1 }")) + b"\x00"
+    messages = [b"\x08" + text(encode(line)) + b"\x50" for line in lines]
+    for message in messages:
+        put("store", message + commit, 12288)
+    kinds = [m for m, l in zip(messages, lines) if not l.startswith("open")]
+    for at in range(0, len(kinds), 12):
+        put("store", b"".join(m + commit for m in kinds[at:at + 12]), 16384)
+    put("store", b"".join(m + commit for m, l in zip(messages, lines) if l.split()[0] not in ("open", "upsert")), 16384)
 
 
 # ---- protocols, by hand
@@ -377,6 +428,19 @@ def sockets():
             '{"clear": {"owner": "1", "layer": "a"}}', '{"unwatch": 1}')
     put("viewer_messages", b"\x00" + page)
     put("viewer_messages", b"\x01" + page)
+    advertise = (b'{"op": "advertise", "channels": [{"id": 1, "topic": "/m", "encoding": "protobuf", "schemaName": "foxglove.SceneUpdate", "schema": ""}, '
+                 b'{"id": 2, "topic": "/j", "encoding": "json", "schemaName": "foxglove.SceneUpdate"}, {"id": 3, "topic": "/t", "encoding": "cdr", "schemaName": "tf"}]}')
+    update = (b'{"deletions": [{"type": 1, "id": "a"}], "entities": [{"id": "a", "timestamp": {"sec": 1, "nsec": 0}, "lifetime": {"sec": 1, "nsec": 5}, '
+              b'"arrows": [{"pose": {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "shaft_length": 1, "shaft_diameter": 0.1, '
+              b'"head_length": 0.2, "head_diameter": 0.2, "color": {"r": 1, "g": 0, "b": 0, "a": 1}}], "cubes": [{"size": {"x": 1, "y": 1, "z": 1}}], '
+              b'"spheres": [{"size": {"x": 1, "y": 2, "z": 1}}], "cylinders": [{"size": {"x": 1, "y": 1, "z": 1}, "bottom_scale": 1, "top_scale": 0.5}], '
+              b'"lines": [{"type": 1, "thickness": 0.1, "scale_invariant": true, "points": [{"x": 0, "y": 0, "z": 0}, {"x": 1, "y": 1, "z": 1}], "colors": [], "indices": [0, 1]}], '
+              b'"triangles": [{"points": [{"x": 0}, {"x": 1}, {"y": 1}], "indices": [0, 1, 2]}], "texts": [{"text": "hi", "font_size": 1, "billboard": true}], "models": [{"url": "x"}]}]}')
+    head = lambda channel: b"\x01" + struct.pack("<IQ", channel, 5)
+    put("foxglove", b"\x00" + text(advertise) + b"\x01" + text(head(2) + update) + b"\x04\x20" + b"\x01" + text(head(2) + update) +
+        b"\x00" + text(b'{"op": "unadvertise", "channelIds": [1, 2]}'), 8192)
+    put("foxglove", b"\x03" + text(update))
+    put("foxglove", b"\x00" + text(advertise) + b"\x01" + text(head(1) + b"\x12\x05\x1a\x01a*\x00"))
     preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
     frame = lambda kind, flags, stream, body=b"": struct.pack(">I", len(body))[1:] + bytes([kind, flags]) + struct.pack(">I", stream) + body
     call = preface + frame(4, 0, 0) + frame(8, 0, 0, b"\x00\x00\x10\x00") + frame(1, 4, 1, b"\x83\x86")
@@ -402,6 +466,7 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build/host/bin", help="where voxeld and voxelctl are")
     args = parser.parse_args()
     texts()
+    requests()
     voxlink()
     programs()
     sockets()

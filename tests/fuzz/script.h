@@ -32,9 +32,7 @@ class Script {
     return value;
   }
   // Below `end` (1 to 65536).
-  uint32_t Below(uint32_t end) {
-    return static_cast<uint32_t>(Number(end <= 256 ? 1 : 2) % end);
-  }
+  uint32_t Below(uint32_t end) { return static_cast<uint32_t>(Number(end <= 256 ? 1 : 2) % end); }
 
   // Up to a backslash and a byte that is none, or to the end. Two backslashes are one of the text's.
   std::string Text() {

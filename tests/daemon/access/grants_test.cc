@@ -144,5 +144,10 @@ TEST(Scopes, ReadBackAsTheyAreWritten) {
   EXPECT_FALSE(ParseScopes("draw")->Hold(*ParseScopes("view draw")));
 }
 
+TEST(Scopes, AMessageIsPrintable) {
+  EXPECT_EQ(ParseScopes("vi\x1bw").status().message(),
+            "the scope \"vi\\x1bw\" is none; there are view, draw, control, and all or none alone");
+}
+
 }  // namespace
 }  // namespace voxeld::daemon::access

@@ -50,8 +50,7 @@ TEST(ObjectRules, NamesInMessagesArePrintable) {
       f.Commit(PutInstance("a", "x", "o\x01\n"), Define("p\x1b", {Use("p\x1b")}),
                PutInstance("a", "y", std::string(100, 'z')));
   ASSERT_EQ(result.issues.size(), 3u);
-  EXPECT_EQ(result.issues[0].message,
-            "object \"o\\x01\\n\" is not defined; define it first");
+  EXPECT_EQ(result.issues[0].message, "object \"o\\x01\\n\" is not defined; define it first");
   EXPECT_THAT(result.issues[1].message, HasSubstr("\"p\\x1b\" would contain itself"));
   EXPECT_THAT(result.issues[2].message, HasSubstr(std::string(64, 'z') + "…\""));
 }

@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   const std::string printed = daemon::ToToml(config);
   daemon::Config again;
-  const absl::Status reread = daemon::ReadConfigText(printed, "printed", &again);
+  const absl::Status reread = daemon::ReadConfigText(printed, "file", &again);
   EXPECT_THAT_HOLDS(reread.ok(), reread.ToString(), "\n", printed);
   EXPECT_THAT_HOLDS(daemon::ToToml(again) == printed, printed);
   EXPECT_THAT_HOLDS(again.displays.size() == config.displays.size());

@@ -27,7 +27,7 @@ void CheckGrant(const Grant& grant) {
 }  // namespace voxeld::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  using namespace voxeld;                // NOLINT(google-build-using-namespace)
+  using namespace voxeld;                  // NOLINT(google-build-using-namespace)
   using namespace voxeld::daemon::access;  // NOLINT(google-build-using-namespace)
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const absl::StatusOr<Scopes> scopes = ParseScopes(text);

@@ -52,8 +52,11 @@ void Run(Script script) {
   const bool control = script.Flag();
   testing::Simulation simulation({}, 2);
   simulation.Start();
-  auto shared = std::make_shared<viewer::ViewerShared>(viewer::ViewerShared{
-      .core = *simulation.core, .clock = simulation.clock, .options = {.version = "1"}, .places = {}});
+  auto shared =
+      std::make_shared<viewer::ViewerShared>(viewer::ViewerShared{.core = *simulation.core,
+                                                                  .clock = simulation.clock,
+                                                                  .options = {.version = "1"},
+                                                                  .places = {}});
   auto peer = std::make_shared<Peer>();
   std::unique_ptr<http::WebSocketService> service = viewer::NewViewerSocket(shared, peer, control);
   const auto settle = [&] {
@@ -76,7 +79,8 @@ void Run(Script script) {
         simulation.Show(script.Byte() % 2);
         break;
       case 2:
-        simulation.Send(client, script.Byte() + 1, testing::Put("a", "p", static_cast<float>(script.Byte() % 8)));
+        simulation.Send(client, script.Byte() + 1,
+                        testing::Put("a", "p", static_cast<float>(script.Byte() % 8)));
         break;
       default: {
         std::string text = script.Text();
@@ -85,7 +89,8 @@ void Run(Script script) {
         const Json json = Json::parse(text, nullptr, false);
         service->OnText(std::move(text));
         settle();
-        if (!json.is_object()) EXPECT_THAT_HOLDS(peer->errors == errors + 1, "garbage has no error");
+        if (!json.is_object())
+          EXPECT_THAT_HOLDS(peer->errors == errors + 1, "garbage has no error");
         break;
       }
     }

@@ -61,7 +61,8 @@ std::string Frame(uint8_t head, const std::string& payload) {
 class Session {
  public:
   explicit Session(Script& script) : script_(script) {
-    EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends_) == 0);
+    EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends_) ==
+                      0);
   }
   ~Session() {
     if (session_ != nullptr && closed_ == 0) session_->Close();
@@ -151,7 +152,8 @@ class Session {
       io_->poll();
       const ssize_t got = recv(ends_[0], bytes, sizeof(bytes), 0);
       if (got <= 0) break;
-      if (!answered_) accepted_ = std::string(bytes, static_cast<size_t>(got)).starts_with("HTTP/1.1 101");
+      if (!answered_)
+        accepted_ = std::string(bytes, static_cast<size_t>(got)).starts_with("HTTP/1.1 101");
       answered_ = true;
     } while (true);
     io_->restart();

@@ -6,7 +6,8 @@
 #include "tools/voxelctl/import/importer.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  static constexpr const char* kExtensions[] = {"obj", "stl", "gltf", "glb", "off", "3mf", "fbx", "dae"};
+  static constexpr const char* kExtensions[] = {"obj", "stl", "gltf", "glb",
+                                                "off", "3mf", "fbx",  "dae"};
   size_t which = 0;
   const voxeld::voxelctl::SourceFile file =
       voxeld::fuzz::FileOf(data, size, kExtensions, 8, &which);

@@ -16,7 +16,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   switch (which) {
     case 0:
       // A header that names files beside it reads those.
-      if (file.bytes.find("data file") != std::string::npos || file.bytes.find("datafile") != std::string::npos) break;
+      if (file.bytes.find("data file") != std::string::npos ||
+          file.bytes.find("datafile") != std::string::npos)
+        break;
       voxeld::fuzz::CheckModel(ReadNrrdVolume(file));
       break;
     case 1:

@@ -51,8 +51,8 @@ class Producer {
   void Connect() {
     if (socket_ >= 0) close(socket_);
     int ends[2];
-    EXPECT_THAT_HOLDS(
-        socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) == 0);
+    EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) ==
+                      0);
     socket_ = ends[0];
     connection_ = std::make_unique<local::Connection>(Descriptor(ends[1]), 0, nullptr);
   }
@@ -72,9 +72,11 @@ class Producer {
       packet = message.SerializeAsString();
       const int memory = memfd_create("fuzz", MFD_CLOEXEC | MFD_ALLOW_SEALING);
       const uint8_t seals = script.Byte();
-      const uint64_t real = (seals & 0x80) != 0 ? script.Below(65536) : std::min<uint64_t>(size, 65536);
+      const uint64_t real =
+          (seals & 0x80) != 0 ? script.Below(65536) : std::min<uint64_t>(size, 65536);
       EXPECT_THAT_HOLDS(ftruncate(memory, static_cast<off_t>(real)) == 0);
-      fcntl(memory, F_ADD_SEALS, (seals & 0x40) != 0 ? seals & 0x1F : F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE);
+      fcntl(memory, F_ADD_SEALS,
+            (seals & 0x40) != 0 ? seals & 0x1F : F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE);
       descriptors.push_back(memory);
     } else if (what == 4) {
       message.mutable_release()->set_id(script.Byte() % 8);

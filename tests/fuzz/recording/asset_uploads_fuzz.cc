@@ -45,11 +45,13 @@ const std::string& Folder() {
 // Of one of the files a byte is another, or its end is gone; or there is a file more.
 void Damage(const std::string& folder, Script& script) {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   const uint8_t how = script.Byte();
   if (files.empty() || how < 32) {
-    std::ofstream(folder + "/" + std::string(how % 80, 'a') + (how % 2 == 0 ? ".part" : "")) << "stray";
+    std::ofstream(folder + "/" + std::string(how % 80, 'a') + (how % 2 == 0 ? ".part" : ""))
+        << "stray";
     return;
   }
   const std::filesystem::path& path = files[script.Byte() % files.size()];
@@ -112,7 +114,8 @@ void Run(Script script) {
         Upload& upload = it->second;
         const std::string& content = contents[upload.content];
         const uint8_t choice = script.Byte();
-        std::string bytes = content.substr(std::min<size_t>(upload.at, content.size()), script.Below(65536) % 8193);
+        std::string bytes =
+            content.substr(std::min<size_t>(upload.at, content.size()), script.Below(65536) % 8193);
         uint64_t offset = upload.at;
         if (choice == 1) bytes = script.Text();
         if (choice == 2) offset = script.Number(8);
@@ -154,11 +157,13 @@ void Run(Script script) {
       }
       default: {
         const size_t content = script.Byte() % kContents;
-        const uint64_t offset = script.Flag() ? script.Number(8) : script.Byte(), size = script.Number(2);
+        const uint64_t offset = script.Flag() ? script.Number(8) : script.Byte(),
+                       size = script.Number(2);
         const auto found = store->FindAsset(digests[content], offset, size);
         ExpectSays(found.status());
         if (found.ok()) {
-          EXPECT_THAT_HOLDS(found->bytes == std::string_view(contents[content]).substr(offset, size));
+          EXPECT_THAT_HOLDS(found->bytes ==
+                            std::string_view(contents[content]).substr(offset, size));
         }
         break;
       }

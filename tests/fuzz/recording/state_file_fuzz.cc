@@ -35,7 +35,8 @@ const std::string& Folder() {
 
 void Run(const uint8_t* data, size_t size) {
   const std::string path = Folder() + "/state.db";
-  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   int64_t second = 0;
   auto opened = StateFile::Open({.path = path, .vfs = "", .now = [&] { return ++second; }});
   if (!opened.ok()) return ExpectSays(opened.status());
@@ -43,7 +44,8 @@ void Run(const uint8_t* data, size_t size) {
   Limits limits;
   limits.max_vertices_per_entity = 2048;
   limits.max_indices_per_entity = 4096;
-  const auto restored = ReadState(file, {.monotonic_ns = 1, .unix_ns = 1}, limits, nullptr, nullptr);
+  const auto restored =
+      ReadState(file, {.monotonic_ns = 1, .unix_ns = 1}, limits, nullptr, nullptr);
   if (!restored.ok()) {
     EXPECT_THAT_HOLDS(absl::IsDataLoss(restored.status()), restored.status().ToString());
     ExpectSays(restored.status());

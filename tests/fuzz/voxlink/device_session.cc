@@ -52,7 +52,8 @@ void DeviceSession::Step(Script& script) {
       const std::string data = script.Text();
       const bool in = request <= 2 || request == 4;
       Request(in ? voxlink::kRequestIn : voxlink::kRequestOut, request, value,
-              in ? 4096 : static_cast<uint16_t>(data.size()), in ? std::vector<std::byte>() : BytesOf(data));
+              in ? 4096 : static_cast<uint16_t>(data.size()),
+              in ? std::vector<std::byte>() : BytesOf(data));
       break;
     }
     case 2: {  // set up: SET_CONFIGURATION, START
@@ -155,7 +156,8 @@ void DeviceSession::Complete(uint64_t id, TransferStatus status, uint32_t actual
   } else {
     EXPECT_THAT_HOLDS(in.empty() && actual <= pending.out.size());
   }
-  if (pending.endpoint == voxlink::kInterruptIn && !in.empty() && pending.length == voxlink::kEventSize) {
+  if (pending.endpoint == voxlink::kInterruptIn && !in.empty() &&
+      pending.length == voxlink::kEventSize) {
     EXPECT_THAT_HOLDS(status == TransferStatus::kOk || status == TransferStatus::kShort);
     CheckEvent(in);
   }

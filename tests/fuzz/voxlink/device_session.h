@@ -17,8 +17,7 @@ namespace voxeld::fuzz {
 class DeviceSession {
  public:
   // Both outlive it. `look` is called after each step.
-  DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock,
-                std::function<void()> look);
+  DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock, std::function<void()> look);
 
   void Run(Script script);
 

@@ -18,7 +18,11 @@ using display::voxlink::VoxlinkDecoder;
 constexpr display::FrameLayout kLayouts[] = {
     {.slices = 3, .width = 4, .height = 2, .sub_frames = 2},
     {.slices = 17, .width = 2, .height = 2, .sub_frames = 1},
-    {.slices = 1, .width = 16, .height = 4, .sub_frames = 1, .format = display::PixelFormat::kRgb332},
+    {.slices = 1,
+     .width = 16,
+     .height = 4,
+     .sub_frames = 1,
+     .format = display::PixelFormat::kRgb332},
 };
 constexpr uint32_t kMostPayload = 64;
 

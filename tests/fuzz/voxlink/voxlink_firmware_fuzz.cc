@@ -33,8 +33,8 @@ void Run(Script script) {
   display::FirmwareDevice device(capabilities, display::UsbSpeed::kSuper, clock);
   DeviceSession session(device, clock, [&] {
     const auto light = device.Light();
-    EXPECT_THAT_HOLDS(light.empty() || light.size() == size_t{device.core().pictures} *
-                                                           device.core().picture_bytes);
+    EXPECT_THAT_HOLDS(light.empty() ||
+                      light.size() == size_t{device.core().pictures} * device.core().picture_bytes);
     for (const std::byte byte : light) (void)byte;
     EXPECT_THAT_HOLDS(device.core().header_have <= 40 && device.core().payload_have <= 256);
     EXPECT_THAT_HOLDS(device.core().events_count <= VOXLINK_EVENTS);

@@ -71,7 +71,8 @@ class LyingDevice final : public display::UsbDeviceModel {
       return complete_(id, static_cast<TransferStatus>(script_.Byte() % 7), 0, {});
     }
     if (asked.in == 0) {  // it took less, or so it says
-      return complete_(id, status, static_cast<uint32_t>(script_.Below(65536) % (asked.out + 1)), {});
+      return complete_(id, status, static_cast<uint32_t>(script_.Below(65536) % (asked.out + 1)),
+                       {});
     }
     std::vector<std::byte> told(in.begin(), in.end());
     if (lie < 0xC0) {  // some bytes are others
@@ -147,7 +148,8 @@ class Host {
     info_.geometry = config.geometry;
     info_.layout = {.slices = 4, .width = 3, .height = 2, .sub_frames = 1};
     info_.volumes_per_second = 10;
-    display_ = std::make_unique<display::voxlink::VoxlinkDisplay>(info_, std::move(transport), clock_);
+    display_ =
+        std::make_unique<display::voxlink::VoxlinkDisplay>(info_, std::move(transport), clock_);
   }
   ~Host() { display_->Stop(); }
 
@@ -156,9 +158,8 @@ class Host {
     if (holding_) display_->SetHolding();
     EXPECT_THAT_HOLDS(display_->Start(&ledger_, [this] { woken_ = true; }).ok());
     // As captures have it: the driver's own bytes never break the protocol.
-    display_->Watch([](const absl::StatusOr<display::DecodedVolume>& volume) {
-      ExpectSays(volume.status());
-    });
+    display_->Watch(
+        [](const absl::StatusOr<display::DecodedVolume>& volume) { ExpectSays(volume.status()); });
     Pass(0);
     for (int step = 0; step < kMostSteps && !script_.done(); ++step) Step();
     device_->TellTheTruth();
@@ -174,8 +175,8 @@ class Host {
       Order(clock_.Now(), 0);
       Pass(100 * kMillisecond);
     }
-    EXPECT_THAT_HOLDS(ledger_.owed.empty(), "volume ", *ledger_.owed.begin(), " has no outcome: ",
-                      display_->state_reason());
+    EXPECT_THAT_HOLDS(ledger_.owed.empty(), "volume ", *ledger_.owed.begin(),
+                      " has no outcome: ", display_->state_reason());
     EXPECT_THAT_HOLDS(ShowsTheNewest(), display_->state_reason());
     display_->Stop();
     EXPECT_THAT_HOLDS(ledger_.owed.empty());

@@ -24,7 +24,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     fuzz::ExpectSays(pixels.status());
     return 0;
   }
-  EXPECT_THAT_HOLDS(pixels->size() == size_t{static_cast<uint32_t>(width)} * static_cast<uint32_t>(height));
+  EXPECT_THAT_HOLDS(pixels->size() ==
+                    size_t{static_cast<uint32_t>(width)} * static_cast<uint32_t>(height));
   for (const uint32_t pixel : *pixels) EXPECT_THAT_HOLDS(pixel <= 0xFFFFFF);
   return 0;
 }

@@ -297,14 +297,14 @@ class Session {
   void Stream(Client& client, Script& script) {
     const std::string bytes = script.Text();
     const std::string_view whole[] = {bytes};
-    wire::Decoded decoded = wire::DecodeStreamRequest(whole, limits_, client.sequence, nullptr,
-                                                      Sources(), Fonts());
+    wire::Decoded decoded =
+        wire::DecodeStreamRequest(whole, limits_, client.sequence, nullptr, Sources(), Fonts());
     // In pieces it is the same.
     const size_t cut = bytes.size() * script.Byte() / 256;
     const std::string first = bytes.substr(0, cut), rest = bytes.substr(cut);
     const std::string_view pieces[] = {first, "", rest};
-    const wire::Decoded again = wire::DecodeStreamRequest(pieces, limits_, client.sequence, nullptr,
-                                                          Sources(), Fonts());
+    const wire::Decoded again =
+        wire::DecodeStreamRequest(pieces, limits_, client.sequence, nullptr, Sources(), Fonts());
     EXPECT_THAT_HOLDS(again.status == decoded.status, again.status.ToString());
     EXPECT_THAT_HOLDS(again.operations.size() == decoded.operations.size() &&
                       again.refused.issues.size() == decoded.refused.issues.size() &&

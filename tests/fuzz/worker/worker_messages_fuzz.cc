@@ -59,13 +59,20 @@ Target SmallTarget(Script& script) {
     target.geometry.shape = display::Rotor{
         .slices_per_turn = 4, .width_px = 4, .height_px = 4, .panels = {display::Rotor::Panel{}}};
   } else if (shape == 2) {
-    target.geometry.shape =
-        display::Helix{.slices_per_turn = 4, .width_px = 4, .height_px = 4, .height_mm = 4, .radius_mm = 2};
+    target.geometry.shape = display::Helix{
+        .slices_per_turn = 4, .width_px = 4, .height_px = 4, .height_mm = 4, .radius_mm = 2};
   } else if (shape == 3) {
-    target.geometry.shape = display::Lattice{.width_px = 4, .points_mm = {display::Vec3{0, 0, 0}, std::nullopt, display::Vec3{1, 1, 1}, std::nullopt}};
+    target.geometry.shape = display::Lattice{
+        .width_px = 4,
+        .points_mm = {display::Vec3{0, 0, 0}, std::nullopt, display::Vec3{1, 1, 1}, std::nullopt}};
   } else if (shape == 4) {
-    target.geometry.correction.emplace().displacement = display::DisplacementGrid{
-        .nx = 2, .ny = 2, .nz = 2, .low_mm = {0, 0, 0}, .high_mm = {4, 4, 4}, .at_mm = std::vector<display::Vec3>(8)};
+    target.geometry.correction.emplace().displacement =
+        display::DisplacementGrid{.nx = 2,
+                                  .ny = 2,
+                                  .nz = 2,
+                                  .low_mm = {0, 0, 0},
+                                  .high_mm = {4, 4, 4},
+                                  .at_mm = std::vector<display::Vec3>(8)};
   }
   target.geometry.grid = {.nx = 4, .ny = 4, .nz = 4, .pitch_mm = {1, 1, 1}, .origin_mm = {}};
   target.layout = {.slices = 4, .width = 4, .height = 4, .sub_frames = 1 + script.Byte() % 2};
@@ -86,7 +93,8 @@ bool IsSmall(const Target& target) {
 class Owner {
  public:
   Owner() {
-    hooks_.make_engine = [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
+    hooks_.make_engine =
+        [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
       if (options.kind != EngineKind::kCpu) return absl::FailedPreconditionError("no such engine");
       EngineOptions own = options;
       own.threads = 1;
@@ -193,8 +201,8 @@ class Owner {
   bool TellSegment(Script& script, bool bulk) {
     const uint32_t id = script.Byte() % 4u;
     const uint8_t choice = script.Byte();
-    const auto made = bulk ? Segment::CreateReadOnlyForOthers(kSegmentBytes)
-                           : Segment::Create(kSegmentBytes);
+    const auto made =
+        bulk ? Segment::CreateReadOnlyForOthers(kSegmentBytes) : Segment::Create(kSegmentBytes);
     EXPECT_THAT_HOLDS(made.ok(), made.status().ToString());
     const std::string text = script.Text();
     std::memcpy((*made)->bytes().data(), text.data(), std::min(text.size(), kSegmentBytes));
@@ -213,7 +221,8 @@ class Owner {
     const auto it = segments_.find(id);
     const size_t size = std::min(bytes.size(), kSegmentBytes);
     if (it != segments_.end()) std::copy_n(bytes.begin(), size, it->second->bytes().begin());
-    BulkMessage message{.segment = id, .crc = display::Crc32c(std::span(bytes).first(size)), .size = size};
+    BulkMessage message{
+        .segment = id, .crc = display::Crc32c(std::span(bytes).first(size)), .size = size};
     const uint8_t choice = script.Byte();
     if (choice == 1) message.crc ^= 1;
     if (choice == 2) message.size = script.Number(8);

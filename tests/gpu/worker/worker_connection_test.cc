@@ -21,7 +21,8 @@ namespace {
 class WorkerConnectionTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    hooks_.make_engine = [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
+    hooks_.make_engine =
+        [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
       if (options.kind != EngineKind::kCpu) return absl::FailedPreconditionError("no such engine");
       EngineOptions own = options;
       own.threads = 1;
@@ -68,13 +69,15 @@ class WorkerConnectionTest : public ::testing::Test {
     const std::vector<std::byte> bytes = EncodeTarget(target);
     std::memcpy(segment_->bytes().data(), bytes.data(), bytes.size());
     const BulkMessage bulk{1, display::Crc32c(bytes), bytes.size()};
-    if (absl::Status ended = Handle(MakeMessage(MessageType::kTarget, 2, bulk)); !ended.ok()) return ended;
+    if (absl::Status ended = Handle(MakeMessage(MessageType::kTarget, 2, bulk)); !ended.ok())
+      return ended;
     return Answered();
   }
   absl::Status Frame(uint64_t number) {
     const FrameMessage frame{
         .segment = 1, .frame = number, .holds = 0, .buffer_holds = 0, .pictures = 4, .bytes = 192};
-    if (absl::Status ended = Handle(MakeMessage(MessageType::kFrame, 3, frame)); !ended.ok()) return ended;
+    if (absl::Status ended = Handle(MakeMessage(MessageType::kFrame, 3, frame)); !ended.ok())
+      return ended;
     return Answered();
   }
 
