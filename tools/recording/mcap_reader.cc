@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "tools/recording/mcap.h"
 #include "tools/recording/mcap_bytes.h"
@@ -180,9 +181,10 @@ absl::Status McapReader::ReadChunk(std::string_view content,
   } else if (compression.empty()) {
     plain = std::string(compressed);
   } else {
-    return absl::UnimplementedError(absl::StrCat(
-        path_, " has a chunk packed by \"",
-        absl::string_view(compression.data(), compression.size()), "\"; zstd and none are read"));
+    return absl::UnimplementedError(
+        absl::StrCat(path_, " has a chunk packed by \"",
+                     absl::CHexEscape(absl::string_view(compression.data(), compression.size())),
+                     "\"; zstd and none are read"));
   }
   const auto found = static_cast<uint32_t>(
       crc32_z(0, reinterpret_cast<const unsigned char*>(plain.data()), plain.size()));

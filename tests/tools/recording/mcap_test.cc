@@ -173,6 +173,18 @@ TEST_F(McapTest, AChunkTakesNoMemoryForWhatIsNotThere) {
   }
 }
 
+TEST_F(McapTest, AChunkPackedOtherwiseSaysHowInPrintableText) {
+  McapBytes chunk;
+  chunk.Number(uint64_t{0}).Number(uint64_t{0}).Number(uint64_t{0}).Number(uint32_t{0});
+  chunk.Text("l\x1bz").Number(uint64_t{0});
+  std::ofstream(path_, std::ios::binary) << kMcapMagic << chunk.Record(kChunk);
+  auto reader = McapReader::Open(path_);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  const absl::Status status = (*reader)->Summarise().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("packed by \"l\\x1bz\"; zstd and none"));
+}
+
 TEST_F(McapTest, WhatIsNoneSaysSo) {
   EXPECT_TRUE(absl::IsNotFound(McapReader::Open(path_).status()));
   std::ofstream(path_) << "something else";
