@@ -9,7 +9,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/config/config.h"
@@ -268,15 +267,7 @@ class FileReader {
 
   // A line of printable text, whatever keys and values are.
   void Error(const toml::source_region& source, const std::string& text) {
-    std::string line = absl::StrCat(Where(source), ": ");
-    for (const char c : text) {
-      if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) {
-        absl::StrAppend(&line, "\\x", absl::Hex(static_cast<unsigned char>(c), absl::kZeroPad2));
-      } else {
-        line += c;
-      }
-    }
-    errors_.push_back(std::move(line));
+    errors_.push_back(absl::StrCat(Where(source), ": ", display::Printable(text)));
   }
 
   void Wrong(const toml::node& node, const std::string& key, const std::string& text) {
@@ -359,8 +350,8 @@ absl::Status ReadConfigText(std::string_view text, const std::string& name, Conf
     return status;
   } catch (const toml::parse_error& error) {
     const toml::source_position& at = error.source().begin;
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ":", at.line, ":", at.column, ": ", error.what()));
+    return absl::InvalidArgumentError(absl::StrCat(name, ":", at.line, ":", at.column, ": ",
+                                                   display::Printable(error.description())));
   }
 }
 

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "absl/status/status.h"
-#include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -29,7 +28,7 @@ absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
   } catch (const toml::parse_error& wrong) {
     return absl::InvalidArgumentError(absl::StrCat(path, ":", wrong.source().begin.line, ":",
                                                    wrong.source().begin.column, ": ",
-                                                   std::string(wrong.description())));
+                                                   Printable(wrong.description())));
   }
   Profile profile;
   for (const auto& [key, node] : root) {
@@ -38,7 +37,7 @@ absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
     if (!value.has_value() || name == "name" || name == "profile") {
       return absl::InvalidArgumentError(absl::StrCat(
           path, ":", node.source().begin.line, ":", node.source().begin.column, ": ",
-          absl::Utf8SafeCHexEscape(name),
+          Printable(name),
           value.has_value() ? " has no place in a profile: it is given where the display is"
                             : " is no text, number, boolean, or array of these"));
     }

@@ -111,7 +111,7 @@ def traffic(programs, folder):
     for name, sock in {**senders, "opc": opc}.items():
         more = {"e131": ",sync_universe=9", "artnet": ",sync=true"}.get(name, "")
         displays.append(f"{name}=network,protocol={name},address=127.0.0.1:{sock.getsockname()[1]},cube=4x4x4{more}")
-    command = [programs / "voxeld", "--listen", f"unix:{daemon}", "--http", "off", "--state-dir", folder / "state"]
+    command = [programs / "voxeld", "--listen", f"unix:{daemon}", "--http", "off"]
     for display in displays:
         command += ["--display", display]
     log = (folder / "voxeld.log").open("w")
@@ -160,10 +160,6 @@ def traffic(programs, folder):
             ctl("play", str(path))
         ctl("pattern", "axes")
         ctl("clear")
-        # What stays is kept.
-        for shape in examples:
-            ctl("draw", "--add", *shape)
-        time.sleep(1)
         record.terminate()
         record.wait()
         threads[0].join()
@@ -179,16 +175,6 @@ def traffic(programs, folder):
                 put("store", bytes([8]) + text(message) + b"\x40", 12288)
         elif name == "ApplyUpdate" and messages:
             put("store", bytes([6]) + text(messages[0]))
-    kinds = {1: 0, 2: 2, 3: 1, 4: 3}
-    database = sqlite3.connect(folder / "state/state.db")
-    for kind, row in database.execute("SELECT kind, bytes FROM rows"):
-        put("kept_rows", bytes([kinds[kind], 0]) + bytes(row))
-    database.execute("PRAGMA journal_mode=DELETE")
-    database.execute("DELETE FROM rows WHERE length(bytes) > 400")
-    database.commit()
-    database.execute("VACUUM")
-    database.close()
-    put("state_file", (folder / "state/state.db").read_bytes(), 65536)
     if recording.exists():
         recorded = recording.read_bytes()
         put("mcap_file", recorded, 1 << 20)
@@ -214,6 +200,33 @@ def traffic(programs, folder):
         put("opc_stream", b"\x40\x00\x00" + b"\x20" + text(whole[:1500]) + b"\x01\x05\x10")
         put("opc_stream", b"\x40\x00\x08" + b"".join(b"\x20" + text(whole[i:i + 70]) for i in range(0, 1400, 70)))
     print(f"{len(recorder.calls)} calls, {sum(len(p) for p in heard.values())} packets, {len(whole)} bytes of OPC")
+
+
+def kept(programs, folder):
+    """What outlives a daemon that an example of every shape was drawn with."""
+    address = f"unix:{folder}/k.sock"
+    process = subprocess.Popen([programs / "voxeld", "--listen", address, "--http", "off", "--state-dir", folder / "kept", "--display",
+                                "cube=simulated,size=24x24x24"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        time.sleep(1.5)
+        for shape in [*shapes(), ["object pin: sphere radius=0.1", "instance object=pin at=0.5,0,0 tint=red"]]:
+            subprocess.run([programs / "voxelctl", "--server", address, "draw", "--add", *shape], stdout=subprocess.DEVNULL,
+                           stderr=subprocess.DEVNULL, timeout=60, check=False)
+        time.sleep(1)
+    finally:
+        process.terminate()
+        process.wait()
+    kinds = {1: 0, 2: 2, 3: 1, 4: 3}
+    database = sqlite3.connect(folder / "kept/state.db")
+    for kind, row in database.execute("SELECT kind, bytes FROM rows"):
+        put("kept_rows", bytes([kinds[kind], 0]) + bytes(row))
+    database.execute("PRAGMA journal_mode=DELETE")
+    database.execute("DELETE FROM rows WHERE length(bytes) > 400 OR owner % 16 != 0")
+    database.commit()
+    database.execute("PRAGMA page_size=512")  # small inputs
+    database.execute("VACUUM")
+    database.close()
+    put("state_file", (folder / "kept/state.db").read_bytes(), 16384)
 
 
 # ---- files of the tree, and examples of the documents
@@ -474,6 +487,7 @@ def main():
         print(f"make_seeds: no voxeld in {args.bin}; without its traffic", file=sys.stderr)
         return 1
     with tempfile.TemporaryDirectory() as folder:
+        kept(args.bin, pathlib.Path(folder))
         traffic(args.bin, pathlib.Path(folder))
     for target in sorted(SEEDS.iterdir()):
         print(f"{target.name}: {len(list(target.iterdir()))}")

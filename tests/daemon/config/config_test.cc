@@ -447,5 +447,12 @@ TEST(Config, MessagesAreLinesOfPrintableText) {
   EXPECT_NE(message.find("unknown key un\\x0aknown"), std::string::npos) << message;
 }
 
+TEST(Config, WhatTheParserQuotesIsPrintable) {
+  Config config;
+  const std::string message(ReadConfigText("a = t\x1c", "t", &config).message());
+  EXPECT_EQ(message.rfind("t:1:", 0), 0u) << message;
+  for (const char c : message) EXPECT_FALSE(c >= 0 && c < 32) << message;
+}
+
 }  // namespace
 }  // namespace voxeld::daemon
