@@ -21,7 +21,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/suggest/suggest.h"
-#include "display/profiles/toml_options.h"
 
 namespace voxeld::daemon::access {
 namespace {
@@ -198,8 +197,9 @@ absl::StatusOr<Grants> ParseGrants(std::string_view text, const std::string& nam
     const toml::table root = toml::parse(text, name);
     return Reader(root, name).Take();
   } catch (const toml::parse_error& error) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ":", error.source().begin.line, ": ",
-                                                   display::Printable(error.description())));
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ":", error.source().begin.line, ": ",
+                     absl::Utf8SafeCHexEscape(std::string(error.description()))));
   }
 }
 
