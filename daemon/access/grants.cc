@@ -198,7 +198,8 @@ absl::StatusOr<Grants> ParseGrants(std::string_view text, const std::string& nam
     return Reader(root, name).Take();
   } catch (const toml::parse_error& error) {
     return absl::InvalidArgumentError(
-        absl::StrCat(name, ":", error.source().begin.line, ": ", error.what()));
+        absl::StrCat(name, ":", error.source().begin.line, ": ",
+                     absl::Utf8SafeCHexEscape(std::string(error.description()))));
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
@@ -61,7 +62,7 @@ absl::StatusOr<Scopes> ParseScopes(std::string_view text) {
     }
     if (!known) {
       return absl::InvalidArgumentError(
-          absl::StrCat("the scope \"", word,
+          absl::StrCat("the scope \"", absl::Utf8SafeCHexEscape(word),
                        "\" is none; there are view, draw, control, and all or none alone"));
     }
   }

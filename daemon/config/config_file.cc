@@ -265,8 +265,9 @@ class FileReader {
     return absl::StrCat(name_, ":", source.begin.line, ":", source.begin.column);
   }
 
+  // A line of printable text, whatever keys and values are.
   void Error(const toml::source_region& source, const std::string& text) {
-    errors_.push_back(absl::StrCat(Where(source), ": ", text));
+    errors_.push_back(absl::StrCat(Where(source), ": ", display::Printable(text)));
   }
 
   void Wrong(const toml::node& node, const std::string& key, const std::string& text) {
@@ -349,8 +350,8 @@ absl::Status ReadConfigText(std::string_view text, const std::string& name, Conf
     return status;
   } catch (const toml::parse_error& error) {
     const toml::source_position& at = error.source().begin;
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ":", at.line, ":", at.column, ": ", error.what()));
+    return absl::InvalidArgumentError(absl::StrCat(name, ":", at.line, ":", at.column, ": ",
+                                                   display::Printable(error.description())));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 
@@ -14,9 +15,12 @@ constexpr size_t kNameBytes = 64;
 
 absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
 
+// For messages, which are one line of printable text.
+std::string Shown(absl::string_view text) { return absl::Utf8SafeCHexEscape(text); }
+
 absl::Status Wrong(std::string_view text, const std::string& why) {
   return absl::InvalidArgumentError(
-      absl::StrCat("--display \"", View(text), "\" ", why,
+      absl::StrCat("--display \"", Shown(View(text)), "\" ", why,
                    "; give NAME=DRIVER[,KEY=VALUE…], such as rotor=simulated,geometry=rotor"));
 }
 
@@ -31,7 +35,7 @@ absl::Status CheckDisplayName(std::string_view name) {
   }
   if (right) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      absl::StrCat("the display name \"", View(name), "\" is not 1 to ", kNameBytes,
+      absl::StrCat("the display name \"", Shown(View(name)), "\" is not 1 to ", kNameBytes,
                    " letters, digits, '-', '_' or '.', beginning with a letter or digit"));
 }
 
@@ -53,10 +57,10 @@ absl::StatusOr<DisplayConfig> ParseDisplayOption(std::string_view text) {
       continue;
     }
     if (key.empty() || !has_value) {
-      return Wrong(text, absl::StrCat("has \"", item, "\", which is no KEY=VALUE"));
+      return Wrong(text, absl::StrCat("has \"", Shown(item), "\", which is no KEY=VALUE"));
     }
     if (!display.options.emplace(key, value).second) {
-      return Wrong(text, absl::StrCat("gives ", key, " twice"));
+      return Wrong(text, absl::StrCat("gives ", Shown(key), " twice"));
     }
   }
   return display;

@@ -7,6 +7,7 @@
 #include "absl/strings/str_join.h"
 #include "daemon/core/core_impl.h"
 #include "daemon/pipeline/view.h"
+#include "daemon/scene/quoted.h"
 #include "daemon/scene/view_check.h"
 
 namespace voxeld::daemon {
@@ -140,7 +141,7 @@ absl::StatusOr<Core::Impl::DisplaySlot*> Core::Impl::FindDisplay(const std::stri
   return absl::NotFoundError(
       names.empty()
           ? std::string("there are no displays")
-          : absl::StrCat("no display \"", name, "\"; there are: ", absl::StrJoin(names, ", ")));
+          : absl::StrCat("no display ", Quoted(name), "; there are: ", absl::StrJoin(names, ", ")));
 }
 
 template <typename T>

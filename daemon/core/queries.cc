@@ -9,6 +9,7 @@
 #include "absl/strings/str_split.h"
 #include "daemon/core/core_impl.h"
 #include "daemon/core/scene_info.h"
+#include "daemon/scene/quoted.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -29,7 +30,7 @@ absl::StatusOr<EntityKey> ParseToken(const std::string& token) {
       !absl::WebSafeBase64Unescape(parts[1], &key.layer) ||
       !absl::WebSafeBase64Unescape(parts[2], &key.id)) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "page_token is \"", token, "\"; it must be empty or the next_page_token of an answer"));
+        "page_token is ", Quoted(token), "; it must be empty or the next_page_token of an answer"));
   }
   return key;
 }
@@ -105,14 +106,14 @@ void Core::Impl::GetEntity(const EntityKey& key, const Reply<EntityInfo>& reply)
   }
   if (found.empty()) {
     const std::string whose = key.owner == 0 ? "any owner" : absl::StrCat("owner ", key.owner);
-    return reply(absl::NotFoundError(
-        absl::StrFormat("no entity \"%s\" in layer \"%s\" of %s", key.id, key.layer, whose)));
+    return reply(absl::NotFoundError(absl::StrFormat("no entity %s in layer %s of %s",
+                                                     Quoted(key.id), Quoted(key.layer), whose)));
   }
   if (found.size() > 1) {
     return reply(absl::FailedPreconditionError(absl::StrFormat(
-        "%d owners have an entity \"%s\" in a layer \"%s\", among them %d and %d; say "
+        "%d owners have an entity %s in a layer %s, among them %d and %d; say "
         "which owner",
-        found.size(), key.id, key.layer, found[0].key.owner, found[1].key.owner)));
+        found.size(), Quoted(key.id), Quoted(key.layer), found[0].key.owner, found[1].key.owner)));
   }
   reply(std::move(found.front()));
 }

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "daemon/scene/quoted.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -57,10 +58,10 @@ void CommitApplier::End() {
     issue.field = "frame_begin.layer";
     issue.reason = Reason::kOutOfOrder;
     issue.message = absl::StrFormat(
-        "the frame of layer \"%s\" was still open at the commit: its %d operations are discarded "
+        "the frame of layer %s was still open at the commit: its %d operations are discarded "
         "and "
         "the layer is as it was; send FrameEnd before Commit",
-        layer, frame.operations.size());
+        Quoted(layer), frame.operations.size());
     refusals_.Add(std::move(issue), limits_.max_issues_per_commit);
   }
   frames_.clear();
@@ -125,14 +126,14 @@ bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::strin
   };
   const OwnerTally& tally = draft_.tally(author_.owner);
   if (tally.layers >= limits_.max_layers_per_owner) {
-    return refuse(absl::StrFormat("layer \"%s\" would be one more than max_layers_per_owner, %d",
-                                  layer, limits_.max_layers_per_owner));
+    return refuse(absl::StrFormat("layer %s would be one more than max_layers_per_owner, %d",
+                                  Quoted(layer), limits_.max_layers_per_owner));
   }
   if (draft_.total().layers >= limits_.max_layers) {
     return refuse(
-        absl::StrFormat("layer \"%s\" would be one more than max_layers, %d, which all "
+        absl::StrFormat("layer %s would be one more than max_layers, %d, which all "
                         "owners share; orphaned layers can be cleared",
-                        layer, limits_.max_layers));
+                        Quoted(layer), limits_.max_layers));
   }
   auto over = OverQuota(tally.drawables, tally.bytes + Draft::LayerBytes(Key(layer)));
   return over.has_value() && refuse(*std::move(over));
@@ -183,7 +184,7 @@ void CommitApplier::Do(Operation& operation, Upsert& upsert) {
     if (draft_.FindObject(Key(instance->object)) == nullptr) {
       return refuse(
           "upsert.entity.primitive.instance.object", Reason::kNotFound,
-          absl::StrFormat("object \"%s\" is not defined; define it first", instance->object));
+          absl::StrFormat("object %s is not defined; define it first", Quoted(instance->object)));
     }
   }
   if (RefusedNewLayer(operation, upsert.layer, "upsert.layer")) return;
@@ -256,10 +257,10 @@ void CommitApplier::Do(Operation& operation, Delete& del) {
   if (del.what == Delete::What::kId) {
     const EntityPtr* entity = draft_.FindEntity(key, del.id_or_prefix);
     if (entity != nullptr && guarded(**entity)) {
-      return Refuse(operation, del.layer, del.id_or_prefix, "delete.guard_sequence",
-                    Reason::kStaleSequence,
-                    absl::StrFormat("entity \"%s\" was upserted by sequence %d, after %d; it stays",
-                                    del.id_or_prefix, (*entity)->sequence, del.guard_sequence));
+      return Refuse(
+          operation, del.layer, del.id_or_prefix, "delete.guard_sequence", Reason::kStaleSequence,
+          absl::StrFormat("entity %s was upserted by sequence %d, after %d; it stays",
+                          Quoted(del.id_or_prefix), (*entity)->sequence, del.guard_sequence));
     }
     if (entity != nullptr) draft_.RemoveEntity(key, del.id_or_prefix);
   } else {
@@ -273,9 +274,9 @@ void CommitApplier::Do(Operation& operation, SetTransform& set) {
   const OwnedName key = Key(set.layer);
   const EntityPtr* found = draft_.FindEntity(key, set.id);
   if (found == nullptr) {
-    return Refuse(
-        operation, set.layer, set.id, "set_transform.id", Reason::kNotFound,
-        absl::StrFormat("layer \"%s\" has no entity \"%s\"; upsert it first", set.layer, set.id));
+    return Refuse(operation, set.layer, set.id, "set_transform.id", Reason::kNotFound,
+                  absl::StrFormat("layer %s has no entity %s; upsert it first", Quoted(set.layer),
+                                  Quoted(set.id)));
   }
   const Bounds bounds =
       MapBounds(set.transform, draft_.BoundsOf(author_.owner, (*found)->data.content));
@@ -336,9 +337,9 @@ void CommitApplier::Do(Operation& operation, FrameBegin& begin) {
   const auto [it, fresh] = frames_.try_emplace(begin.layer);
   if (!fresh) {
     return Refuse(operation, begin.layer, "", "frame_begin.layer", Reason::kOutOfOrder,
-                  absl::StrFormat("the frame that sequence %d began in layer \"%s\" is still open; "
+                  absl::StrFormat("the frame that sequence %d began in layer %s is still open; "
                                   "frames do not nest, end it first",
-                                  it->second.begin_sequence, begin.layer));
+                                  it->second.begin_sequence, Quoted(begin.layer)));
   }
   it->second.begin_sequence = operation.sequence;
 }
@@ -346,8 +347,9 @@ void CommitApplier::Do(Operation& operation, FrameBegin& begin) {
 void CommitApplier::Do(Operation& operation, FrameEnd& end) {
   const auto it = frames_.find(end.layer);
   if (it == frames_.end()) {
-    return Refuse(operation, end.layer, "", "frame_end.layer", Reason::kOutOfOrder,
-                  absl::StrFormat("no frame is open in layer \"%s\"; begin one first", end.layer));
+    return Refuse(
+        operation, end.layer, "", "frame_end.layer", Reason::kOutOfOrder,
+        absl::StrFormat("no frame is open in layer %s; begin one first", Quoted(end.layer)));
   }
   Frame frame = std::move(it->second);
   frames_.erase(it);

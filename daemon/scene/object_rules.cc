@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_format.h"
 #include "daemon/scene/commit_applier.h"
+#include "daemon/scene/quoted.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -99,13 +100,13 @@ bool CommitApplier::RefusedDefinition(const Operation& operation, const DefineOb
         absl::StrFormat("define_object.definition.parts[%d].primitive.instance.object", i);
     if (*child == define.object || above.contains(*child)) {
       Refuse(operation, "", define.object, field, Reason::kCycle,
-             absl::StrFormat("object \"%s\" would contain itself through \"%s\"", define.object,
-                             *child));
+             absl::StrFormat("object %s would contain itself through %s", Quoted(define.object),
+                             Quoted(*child)));
       return true;
     }
     if (draft_.FindObject(Key(*child)) == nullptr) {
       Refuse(operation, "", define.object, field, Reason::kNotFound,
-             absl::StrFormat("object \"%s\" is not defined; define it first", *child));
+             absl::StrFormat("object %s is not defined; define it first", Quoted(*child)));
       return true;
     }
   }
@@ -123,16 +124,15 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
   for (const auto& [name, object] : derived) {
     if (object.depth > limits_.max_instance_depth) {
       return refuse(Reason::kCycle,
-                    absl::StrFormat("object \"%s\" would be %d deep; "
+                    absl::StrFormat("object %s would be %d deep; "
                                     "max_instance_depth is %d",
-                                    name, object.depth, limits_.max_instance_depth));
+                                    Quoted(name), object.depth, limits_.max_instance_depth));
     }
     if (!std::isfinite(LargestMagnitude(object.bounds))) {
-      return refuse(
-          Reason::kOutOfRange,
-          absl::StrFormat("object \"%s\" would have a coordinate that is not finite after "
-                          "its transforms; it must be",
-                          name));
+      return refuse(Reason::kOutOfRange,
+                    absl::StrFormat("object %s would have a coordinate that is not finite after "
+                                    "its transforms; it must be",
+                                    Quoted(name)));
     }
     const Object* before = draft_.FindObject(Key(name));
     if (before == nullptr) continue;
@@ -146,8 +146,9 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
       const gpu::Affine& transform = (*draft_.FindEntity(layer, use.id))->data.transform;
       if (auto wrong =
               OutOfRange(draft_.FindLayer(layer)->transform, MapBounds(transform, object.bounds))) {
-        return refuse(Reason::kOutOfRange, absl::StrFormat("instance \"%s\" in layer \"%s\": %s",
-                                                           use.id, use.layer, *wrong));
+        return refuse(Reason::kOutOfRange,
+                      absl::StrFormat("instance %s in layer %s: %s", Quoted(use.id),
+                                      Quoted(use.layer), *wrong));
       }
     }
   }
@@ -182,16 +183,16 @@ void CommitApplier::Do(Operation& operation, DeleteObject& del) {
     Refuse(operation, "", del.object, "delete_object.object", reason, std::move(message));
   };
   if (draft_.FindObject(Key(del.object)) == nullptr) {
-    return refuse(Reason::kNotFound, absl::StrFormat("object \"%s\" is not defined", del.object));
+    return refuse(Reason::kNotFound,
+                  absl::StrFormat("object %s is not defined", Quoted(del.object)));
   }
   const std::vector<UseKey> instances = InstancesOf(del.object);
   const std::vector<std::string> users = ObjectsUsing(del.object);
   if (!del.cascade && !(instances.empty() && users.empty())) {
-    return refuse(
-        Reason::kInUse,
-        absl::StrFormat("object \"%s\" has %d instances and is part of %d objects; delete "
-                        "those first, or say cascade",
-                        del.object, instances.size(), users.size()));
+    return refuse(Reason::kInUse,
+                  absl::StrFormat("object %s has %d instances and is part of %d objects; delete "
+                                  "those first, or say cascade",
+                                  Quoted(del.object), instances.size(), users.size()));
   }
   for (const UseKey& use : instances) {
     EditLayer(Key(use.layer));

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_format.h"
 #include "daemon/scene/draft.h"
+#include "daemon/scene/quoted.h"
 
 namespace voxeld::daemon {
 
@@ -24,9 +25,10 @@ absl::Status CheckView(const SnapshotPtr& scene, const DisplayView& view, const 
           reach(MapBounds(entity->data.transform, whole.BoundsOf(key.owner, entity->data.content)));
       if (largest <= limits.max_coordinate_voxels || !status.ok()) return;
       status = absl::FailedPreconditionError(absl::StrFormat(
-          "through this view entity \"%s\" of layer \"%s\" of owner %d would reach %g voxels on "
+          "through this view entity %s of layer %s of owner %d would reach %g voxels on "
           "display \"%s\"; it must stay within ±%.0f",
-          id, key.name, key.owner, largest, view.display, limits.max_coordinate_voxels));
+          Quoted(id), Quoted(key.name), key.owner, largest, view.display,
+          limits.max_coordinate_voxels));
     });
   });
   return status;

@@ -6,15 +6,14 @@
 #include <cmath>
 #include <limits>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "daemon/scene/quoted.h"
 #include "voxeld/v1/types.pb.h"
 
 namespace voxeld::daemon::wire {
 namespace {
 
 constexpr double kLeastDeterminant = 1e-12;
-constexpr size_t kQuotedBytes = 64;
 
 template <typename T>
 std::string ShowNumber(T value) {
@@ -50,14 +49,7 @@ std::string ShowBytes(uint64_t bytes, uint64_t element_bytes, std::string_view e
                       count == 1 ? "" : "s");
 }
 
-std::string Quote(std::string_view text) {
-  size_t size = std::min(text.size(), kQuotedBytes);
-  if (size < text.size()) {  // between characters, so that the message stays valid UTF-8
-    while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
-  }
-  return absl::StrCat("\"", absl::Utf8SafeCHexEscape(absl::string_view(text.data(), size)),
-                      size < text.size() ? "…\"" : "\"");
-}
+std::string Quote(std::string_view text) { return Quoted(text); }
 
 MaybeFault CheckName(const FieldPath& path, std::string_view name, uint32_t max_bytes) {
   if (name.empty()) {

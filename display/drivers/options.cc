@@ -8,6 +8,7 @@
 #include <utility>
 #include <variant>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -92,9 +93,10 @@ const std::string* OptionReader::Find(const std::string& key) {
 void OptionReader::Refuse(const std::string& key, std::string_view right) {
   if (!status_.ok()) return;
   const auto it = options_.options.find(key);
-  status_ = absl::InvalidArgumentError(absl::StrCat(
-      "display \"", options_.name, "\": ", key, " is \"",
-      it == options_.options.end() ? "" : it->second, "\"; it must be ", std::string(right)));
+  status_ = absl::InvalidArgumentError(
+      absl::StrCat("display \"", options_.name, "\": ", key, " is \"",
+                   it == options_.options.end() ? "" : absl::Utf8SafeCHexEscape(it->second),
+                   "\"; it must be ", std::string(right)));
 }
 
 std::string OptionReader::Text(const std::string& key, const std::string& fallback) {
@@ -193,7 +195,8 @@ absl::Status OptionReader::Finish() const {
   for (const auto& [key, value] : options_.options) {
     if (known_.contains(key)) continue;
     return absl::InvalidArgumentError(
-        absl::StrCat("display \"", options_.name, "\": there is no option ", key, " (\"", value,
+        absl::StrCat("display \"", options_.name, "\": there is no option ",
+                     absl::Utf8SafeCHexEscape(key), " (\"", absl::Utf8SafeCHexEscape(value),
                      "\") here; there are ", absl::StrJoin(known_, ", ")));
   }
   return absl::OkStatus();

@@ -19,20 +19,16 @@ namespace {
 
 constexpr const char* kEnding = ".toml";
 
-}  // namespace
-
-absl::StatusOr<Profile> ReadProfile(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return absl::NotFoundError(absl::StrCat("there is no file ", path));
-  }
+// `parse` gives the table, or throws what is wrong.
+template <typename Parse>
+absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
   toml::table root;
   try {
-    root = toml::parse_file(path);
+    root = parse();
   } catch (const toml::parse_error& wrong) {
     return absl::InvalidArgumentError(absl::StrCat(path, ":", wrong.source().begin.line, ":",
                                                    wrong.source().begin.column, ": ",
-                                                   std::string(wrong.description())));
+                                                   Printable(wrong.description())));
   }
   Profile profile;
   for (const auto& [key, node] : root) {
@@ -40,7 +36,8 @@ absl::StatusOr<Profile> ReadProfile(const std::string& path) {
     const std::optional<std::string> value = OptionText(node);
     if (!value.has_value() || name == "name" || name == "profile") {
       return absl::InvalidArgumentError(absl::StrCat(
-          path, ":", node.source().begin.line, ":", node.source().begin.column, ": ", name,
+          path, ":", node.source().begin.line, ":", node.source().begin.column, ": ",
+          Printable(name),
           value.has_value() ? " has no place in a profile: it is given where the display is"
                             : " is no text, number, boolean, or array of these"));
     }
@@ -53,6 +50,20 @@ absl::StatusOr<Profile> ReadProfile(const std::string& path) {
     }
   }
   return profile;
+}
+
+}  // namespace
+
+absl::StatusOr<Profile> ReadProfile(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(absl::StrCat("there is no file ", path));
+  }
+  return ProfileOf(path, [&] { return toml::parse_file(path); });
+}
+
+absl::StatusOr<Profile> ParseProfile(std::string_view text, const std::string& name) {
+  return ProfileOf(name, [&] { return toml::parse(text, name); });
 }
 
 std::vector<std::string> ProfilePlaces(const std::function<std::string(const char*)>& environment,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -18,6 +19,9 @@ struct Profile {
 
 // InvalidArgument with place, value and what would be right; NotFound: there is no such file.
 absl::StatusOr<Profile> ReadProfile(const std::string& path);
+
+// The same for text; `name` stands for the path in messages.
+absl::StatusOr<Profile> ParseProfile(std::string_view text, const std::string& name);
 
 // Where profiles are looked for by name, in order: $VOXELD_PROFILES, ../share/voxeld/profiles from
 // the program's folder, then /usr/share/voxeld/profiles. `environment`: a variable's value; empty

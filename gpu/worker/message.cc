@@ -80,13 +80,14 @@ absl::StatusOr<Message> ReceiveMessage(int socket) {
   do {
     got = recvmsg(socket, &in, MSG_CMSG_CLOEXEC);
   } while (got < 0 && errno == EINTR);
-  if (got < static_cast<ssize_t>(sizeof(header)) || (in.msg_flags & MSG_TRUNC) != 0) {
-    return absl::UnavailableError("the other process has ended");
-  }
-  for (cmsghdr* c = CMSG_FIRSTHDR(&in); c != nullptr; c = CMSG_NXTHDR(&in, c)) {
+  for (cmsghdr* c = got < 0 ? nullptr : CMSG_FIRSTHDR(&in); c != nullptr; c = CMSG_NXTHDR(&in, c)) {
     if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_RIGHTS) {
       std::memcpy(&message.fd, CMSG_DATA(c), sizeof(int));
     }
+  }
+  if (got < static_cast<ssize_t>(sizeof(header)) || (in.msg_flags & MSG_TRUNC) != 0) {
+    if (message.fd >= 0) close(message.fd);
+    return absl::UnavailableError("the other process has ended");
   }
   message.type = header.type;
   message.call = header.call;

@@ -2,24 +2,9 @@
 // comes over that, one call after another, until it ends.
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <span>
-
-#include "absl/status/statusor.h"
-#include "gpu/engine.h"
+#include "gpu/worker/worker_connection.h"
 
 namespace voxeld::gpu {
-
-// Called by all connections' threads.
-struct WorkerHooks {
-  // Makes the engine; must carry out calls inline.
-  std::function<absl::StatusOr<std::unique_ptr<Engine>>(const EngineOptions&)> make_engine;
-  // A segment came, or goes: to be pinned. May be empty.
-  std::function<void(std::span<std::byte>)> pin, unpin;
-  // The same of bulk memory, which cannot be written; `unpin` undoes it.
-  std::function<void(std::span<std::byte>)> pin_read_only;
-};
 
 // Serves the connections that come over `control`. Ends the process, at once and whatever its
 // engines do: with 0 when `control` ends, with 1 if what came was no protocol, with 3 when an engine

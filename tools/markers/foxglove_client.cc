@@ -2,16 +2,12 @@
 
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
-#include <boost/endian/conversion.hpp>
 #include <chrono>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -24,27 +20,11 @@ namespace {
 
 namespace asio = boost::asio;
 namespace beast = boost::beast;
-using Json = nlohmann::json;
 using Stream = beast::websocket::stream<asio::ip::tcp::socket>;
 
 // The same protocol by the name that it had, and by the one that newer servers want.
 constexpr char kProtocol[] = "foxglove.websocket.v1", kNewProtocol[] = "foxglove.sdk.v1";
 constexpr std::chrono::seconds kOpenTime(10);
-constexpr char kSchema[] = "foxglove.SceneUpdate";
-constexpr size_t kHeaderBytes = 13;  // kind, subscription, time
-constexpr uint8_t kMessageData = 1;
-constexpr size_t kMostPassedOver = 100, kMostChannels = 10'000, kMostNameBytes = 1024;
-
-std::string TextOf(const Json& object, const char* key) {
-  const auto at = object.find(key);
-  return at != object.end() && at->is_string() ? at->get<std::string>() : "";
-}
-
-std::optional<uint64_t> NumberOf(const Json& object, const char* key) {
-  const auto at = object.find(key);
-  if (at == object.end() || !at->is_number_unsigned()) return {};
-  return at->get<uint64_t>();
-}
 
 }  // namespace
 
@@ -81,7 +61,8 @@ absl::StatusOr<FoxgloveUrl> ParseFoxgloveUrl(std::string_view text) {
 
 class FoxgloveClient::Impl {
  public:
-  explicit Impl(const FoxgloveOptions& options) : options_(options), stream_(io_) {}
+  explicit Impl(const FoxgloveOptions& options)
+      : options_(options), stream_(io_), channels_(options.topics) {}
 
   absl::Status Open() {
     const FoxgloveUrl& url = options_.url;
@@ -140,25 +121,17 @@ class FoxgloveClient::Impl {
         if (absl::Status status = Told(bytes); !status.ok()) return status;
         continue;
       }
-      if (bytes.empty() || static_cast<uint8_t>(bytes[0]) != kMessageData)
-        continue;  // times, answers
-      if (bytes.size() < kHeaderBytes) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("a message of ", bytes.size(), " bytes ends within its header"));
-      }
-      const auto channel = channels_.find(
-          boost::endian::load_little_u32(reinterpret_cast<const unsigned char*>(bytes.data() + 1)));
-      if (channel == channels_.end()) continue;  // on its way while it was unsubscribed
-      return FoxgloveMessage{channel->second.topic, std::string(bytes.substr(kHeaderBytes)),
-                             channel->second.encoding};
+      absl::StatusOr<std::optional<FoxgloveMessage>> message = channels_.Data(bytes);
+      if (!message.ok()) return message.status();
+      if (message->has_value()) return **std::move(message);
     }
   }
 
   // Only the socket: the stream is the reading thread's.
   void Interrupt() { ::shutdown(stream_.next_layer().native_handle(), SHUT_RDWR); }
 
-  const std::vector<std::string>& passed_over() const { return passed_over_; }
-  size_t subscribed() const { return channels_.size(); }
+  const std::vector<std::string>& passed_over() const { return channels_.passed_over(); }
+  size_t subscribed() const { return channels_.subscribed(); }
 
  private:
   // What was begun, or what became of it in time.
@@ -172,65 +145,12 @@ class FoxgloveClient::Impl {
     *error = asio::error::timed_out;
   }
 
-  struct Channel {
-    std::string topic;
-    Encoding encoding = Encoding::kProtobuf;
-  };
-
   absl::Status Told(std::string_view text) {
-    const Json json = Json::parse(text, nullptr, false);
-    if (!json.is_object()) return absl::InvalidArgumentError("the server's text is no JSON object");
-    const std::string what = TextOf(json, "op");
-    if (what == "advertise") return Advertised(json);
-    if (what == "unadvertise") {
-      const auto ids = json.find("channelIds");
-      if (ids == json.end() || !ids->is_array()) return absl::OkStatus();
-      for (const Json& id : *ids) {
-        if (id.is_number_unsigned()) channels_.erase(static_cast<uint32_t>(id.get<uint64_t>()));
-      }
-    }
-    return absl::OkStatus();  // serverInfo, status and what later versions say
-  }
-
-  absl::Status Advertised(const Json& json) {
-    const auto channels = json.find("channels");
-    if (channels == json.end() || !channels->is_array()) {
-      return absl::InvalidArgumentError("the server advertises no list of channels");
-    }
-    Json wanted = Json::array();
-    for (const Json& channel : *channels) {
-      if (!channel.is_object()) continue;
-      const std::optional<uint64_t> id = NumberOf(channel, "id");
-      const std::string topic = TextOf(channel, "topic"), encoding = TextOf(channel, "encoding"),
-                        schema = TextOf(channel, "schemaName");
-      if (!id.has_value() || *id > UINT32_MAX || topic.size() > kMostNameBytes ||
-          schema.size() > kMostNameBytes || encoding.size() > kMostNameBytes) {
-        continue;
-      }
-      if (channels_.size() >= kMostChannels) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("the server has more than ", kMostChannels, " channels; name the topics"));
-      }
-      const bool asked =
-          options_.topics.empty() ||
-          std::find(options_.topics.begin(), options_.topics.end(), topic) != options_.topics.end();
-      const bool readable = schema == kSchema && (encoding == "protobuf" || encoding == "json");
-      if (!asked || !readable) {
-        if (asked && passed_over_.size() < kMostPassedOver) {
-          passed_over_.push_back(absl::StrCat(topic, " (", schema, ", ", encoding, ")"));
-        }
-        continue;
-      }
-      // A subscription goes by its channel's own number.
-      channels_[static_cast<uint32_t>(*id)] = {
-          topic, encoding == "json" ? Encoding::kJson : Encoding::kProtobuf};
-      wanted.push_back({{"id", *id}, {"channelId", *id}});
-    }
-    if (wanted.empty()) return absl::OkStatus();
-    const std::string text = Json{{"op", "subscribe"}, {"subscriptions", std::move(wanted)}}.dump();
+    const absl::StatusOr<std::string> answer = channels_.Told(text);
+    if (!answer.ok() || answer->empty()) return answer.status();
     beast::error_code error;
     stream_.text(true);
-    stream_.write(asio::buffer(text), error);
+    stream_.write(asio::buffer(*answer), error);
     if (!error) return absl::OkStatus();
     return absl::UnavailableError(absl::StrCat("the Foxglove server has gone: ", error.message()));
   }
@@ -238,8 +158,7 @@ class FoxgloveClient::Impl {
   const FoxgloveOptions options_;
   asio::io_context io_;
   Stream stream_;
-  std::map<uint32_t, Channel> channels_;  // by subscription
-  std::vector<std::string> passed_over_;
+  FoxgloveChannels channels_;
 };
 
 FoxgloveClient::FoxgloveClient(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -9,7 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "tools/markers/markers.h"
+#include "tools/markers/foxglove_channels.h"
 
 namespace voxeld::markers {
 
@@ -23,11 +23,6 @@ struct FoxgloveOptions {
   FoxgloveUrl url;
   std::vector<std::string> topics;          // empty: all
   uint64_t most_message_bytes = 64u << 20;  // a longer one ends the connection
-};
-
-struct FoxgloveMessage {
-  std::string topic, payload;
-  Encoding encoding = Encoding::kProtobuf;
 };
 
 // For one thread, but for Interrupt.

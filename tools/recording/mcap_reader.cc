@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <memory>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "tools/recording/mcap.h"
 #include "tools/recording/mcap_bytes.h"
@@ -28,6 +30,25 @@ absl::StatusOr<size_t> ReadAt(int file, uint64_t at, char* into, size_t size) {
     got += static_cast<size_t>(n);
   }
   return got;
+}
+
+// False unless it comes to just so many bytes. It takes memory for what is there, whatever size is said.
+bool Unpack(std::string_view compressed, uint64_t size, std::string* plain) {
+  const std::unique_ptr<ZSTD_DStream, size_t (*)(ZSTD_DStream*)> stream(ZSTD_createDStream(),
+                                                                        &ZSTD_freeDStream);
+  if (stream == nullptr) return false;
+  ZSTD_inBuffer in = {compressed.data(), compressed.size(), 0};
+  size_t left = 1;  // of the frame; 0: it ended
+  while (left > 0 || in.pos < in.size) {
+    const size_t before = plain->size(), consumed = in.pos;
+    plain->resize(std::min<uint64_t>(size, before + ZSTD_DStreamOutSize()));
+    ZSTD_outBuffer out = {plain->data() + before, plain->size() - before, 0};
+    left = ZSTD_decompressStream(stream.get(), &out, &in);
+    plain->resize(before + out.pos);
+    if (ZSTD_isError(left)) return false;
+    if (out.pos == 0 && in.pos == consumed && left > 0) return false;  // too long, or cut short
+  }
+  return plain->size() == size;
 }
 
 }  // namespace
@@ -156,16 +177,14 @@ absl::Status McapReader::ReadChunk(std::string_view content,
   if (!parse.ok() || size > kMostChunkBytes) return Damaged("a chunk is cut short, or too large");
   std::string plain;
   if (compression == "zstd") {
-    plain.resize(size);
-    const size_t got =
-        ZSTD_decompress(plain.data(), plain.size(), compressed.data(), compressed.size());
-    if (ZSTD_isError(got) || got != size) return Damaged("a chunk cannot be unpacked");
+    if (!Unpack(compressed, size, &plain)) return Damaged("a chunk cannot be unpacked");
   } else if (compression.empty()) {
     plain = std::string(compressed);
   } else {
-    return absl::UnimplementedError(absl::StrCat(
-        path_, " has a chunk packed by \"",
-        absl::string_view(compression.data(), compression.size()), "\"; zstd and none are read"));
+    return absl::UnimplementedError(
+        absl::StrCat(path_, " has a chunk packed by \"",
+                     absl::CHexEscape(absl::string_view(compression.data(), compression.size())),
+                     "\"; zstd and none are read"));
   }
   const auto found = static_cast<uint32_t>(
       crc32_z(0, reinterpret_cast<const unsigned char*>(plain.data()), plain.size()));

@@ -144,5 +144,16 @@ TEST(Scopes, ReadBackAsTheyAreWritten) {
   EXPECT_FALSE(ParseScopes("draw")->Hold(*ParseScopes("view draw")));
 }
 
+TEST(Grants, WhatTheParserQuotesIsPrintable) {
+  const std::string message(ParseGrants("a = t\x1c", "file").status().message());
+  EXPECT_EQ(message.rfind("file:1: ", 0), 0u) << message;
+  for (const char c : message) EXPECT_FALSE(c >= 0 && c < 32) << message;
+}
+
+TEST(Scopes, AMessageIsPrintable) {
+  EXPECT_EQ(ParseScopes("vi\x1bw").status().message(),
+            "the scope \"vi\\x1bw\" is none; there are view, draw, control, and all or none alone");
+}
+
 }  // namespace
 }  // namespace voxeld::daemon::access

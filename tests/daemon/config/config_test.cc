@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <unistd.h>
+#include <algorithm>
 
 #include <cstdio>
 #include <filesystem>
@@ -432,6 +433,25 @@ TEST(Suggest, WhatIsLikeAndNothingElse) {
   EXPECT_EQ(Nearest("", known), "");
   EXPECT_EQ(Nearest(std::string(100'000, 'x'), known), "");
   EXPECT_THAT(Suggestion("zebra", known), Not(HasSubstr("did you mean")));
+}
+
+TEST(Config, MessagesAreLinesOfPrintableText) {
+  Config config;
+  const absl::Status status = ReadConfigText(
+      "\"un\\nknown\" = 1\n[engine]\nkind = \"\\u001b[2J\"\n[[display]]\nname = \"a\\nb\"\ndriver "
+      "= \"simulated\"\n",
+      "t", &config);
+  const std::string message(status.message());
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 2) << message;
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\x1b'), 0) << message;
+  EXPECT_NE(message.find("unknown key un\\x0aknown"), std::string::npos) << message;
+}
+
+TEST(Config, WhatTheParserQuotesIsPrintable) {
+  Config config;
+  const std::string message(ReadConfigText("a = t\x1c", "t", &config).message());
+  EXPECT_EQ(message.rfind("t:1:", 0), 0u) << message;
+  for (const char c : message) EXPECT_FALSE(c >= 0 && c < 32) << message;
 }
 
 }  // namespace

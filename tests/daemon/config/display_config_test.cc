@@ -54,5 +54,14 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"sim=simulated,=3", "\"=3\", which is no KEY=VALUE"},
                       Case{"sim=simulated,a=1,a=2", "gives a twice"}));
 
+TEST(DisplayOption, MessagesArePrintable) {
+  for (const char* text :
+       {"a\x01=simulated", "a=simulated,\x01", "a=simulated,b\n=1,b\n=2", "a\x1b"}) {
+    const std::string message(ParseDisplayOption(text).status().message());
+    EXPECT_FALSE(message.empty());
+    for (const char c : message) EXPECT_FALSE(c >= 0 && c < 32) << message;
+  }
+}
+
 }  // namespace
 }  // namespace voxeld::daemon

@@ -347,5 +347,10 @@ TEST_F(IntakeTest, CommitsThatWaitAreLimitedInNumber) {
   EXPECT_EQ(sink->rooms, 1);
 }
 
+TEST(RefusalTally, NamesAreDescribedInPrintableText) {
+  const Issue issue{.layer = "a\n", .id = "b\x1b", .field = "upsert", .message = "is wrong"};
+  EXPECT_EQ(RefusalTally::Describe(issue), "a\\n/b\\x1b, upsert: is wrong");
+}
+
 }  // namespace
 }  // namespace voxeld::daemon

@@ -44,6 +44,17 @@ TEST(ObjectRules, AnInstanceNeedsItsObject) {
   EXPECT_EQ(Find(f, "p"), nullptr);
 }
 
+TEST(ObjectRules, NamesInMessagesArePrintable) {
+  StoreFixture f;
+  const CommitResult result =
+      f.Commit(PutInstance("a", "x", "o\x01\n"), Define("p\x1b", {Use("p\x1b")}),
+               PutInstance("a", "y", std::string(100, 'z')));
+  ASSERT_EQ(result.issues.size(), 3u);
+  EXPECT_EQ(result.issues[0].message, "object \"o\\x01\\n\" is not defined; define it first");
+  EXPECT_THAT(result.issues[1].message, HasSubstr("\"p\\x1b\" would contain itself"));
+  EXPECT_THAT(result.issues[2].message, HasSubstr(std::string(64, 'z') + "…\""));
+}
+
 TEST(ObjectRules, ObjectsBelongToTheirOwner) {
   StoreFixture f;
   f.Commit(MakeAuthor(2, 22), Define("theirs", {Part(1)}));

@@ -280,5 +280,14 @@ TEST(Registry, KnowsItsDrivers) {
   EXPECT_EQ((*display)->state(), DisplayState::kStopped);
 }
 
+TEST(Options, MessagesArePrintableWhateverValuesAre) {
+  EXPECT_NE(Refusal({{"size", "8\x1b[2J"}}).find("size is \"8\\x1b[2J\"; it must be "),
+            std::string::npos);
+  const DisplayOptions options{.name = "d", .driver = "x", .options = {{"si\nze", "\x01"}}};
+  OptionReader reader(options);
+  EXPECT_NE(reader.Finish().message().find("there is no option si\\nze (\"\\x01\") here"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace voxeld::display

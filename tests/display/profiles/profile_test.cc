@@ -56,6 +56,16 @@ TEST_F(Profiles, SayWhatIsWrongAndWhere) {
   EXPECT_EQ(ReadProfile("/nowhere/x.toml").status().code(), absl::StatusCode::kNotFound);
 }
 
+TEST_F(Profiles, OfTextAreTheSame) {
+  const char* const text = "driver = \"simulated\"\nsize = \"8x8x8\"\n";
+  const auto read = ReadProfile(Write("text.toml", text)), parsed = ParseProfile(text, "text");
+  ASSERT_TRUE(read.ok() && parsed.ok());
+  EXPECT_EQ(read->options, parsed->options);
+  EXPECT_THAT(std::string(ParseProfile("a = ", "here").status().message()),
+              testing::StartsWith("here:1:"));
+  EXPECT_THAT(ErrorOf("\"a\\u0007\" = {}\n"), HasSubstr("a\\x07 is no text"));
+}
+
 TEST_F(Profiles, AreFoundByNameOrPath) {
   const std::string path = Write("mine.toml", "slices = 3\n");
   EXPECT_EQ(*FindProfile("mine", {"/nowhere", folder_.string()}), path);

@@ -148,6 +148,43 @@ TEST_F(McapTest, DamageIsFoundAndSaysWhere) {
   EXPECT_THAT(std::string(read.status().message()), HasSubstr("is damaged at byte"));
 }
 
+// Sizes are believed as far as there is something.
+TEST_F(McapTest, AChunkTakesNoMemoryForWhatIsNotThere) {
+  rlimit before;
+  ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
+  for (const uint64_t size : {uint64_t{1}, uint64_t{3} << 30}) {
+    McapBytes chunk;
+    // An empty frame of zstd's, which says that there are `size` bytes.
+    chunk.Number(uint64_t{0}).Number(uint64_t{0}).Number(size).Number(uint32_t{0}).Text("zstd");
+    const std::string frame("\x28\xb5\x2f\xfd\x20\x00\x01\x00\x00", 9);
+    chunk.Number(uint64_t{frame.size()}).Raw(frame);
+    std::ofstream(path_, std::ios::binary) << kMcapMagic << chunk.Record(kChunk);
+    auto reader = McapReader::Open(path_);
+    ASSERT_TRUE(reader.ok()) << reader.status();
+#ifndef VOXELD_SANITIZED
+    rlimit small = before;  // whole gigabytes there are none
+    small.rlim_cur = rlim_t{2} << 30;
+    ASSERT_EQ(setrlimit(RLIMIT_AS, &small), 0);
+#endif
+    const absl::Status status = (*reader)->Summarise().status();
+    ASSERT_EQ(setrlimit(RLIMIT_AS, &before), 0);
+    EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("cannot be unpacked"));
+  }
+}
+
+TEST_F(McapTest, AChunkPackedOtherwiseSaysHowInPrintableText) {
+  McapBytes chunk;
+  chunk.Number(uint64_t{0}).Number(uint64_t{0}).Number(uint64_t{0}).Number(uint32_t{0});
+  chunk.Text("l\x1bz").Number(uint64_t{0});
+  std::ofstream(path_, std::ios::binary) << kMcapMagic << chunk.Record(kChunk);
+  auto reader = McapReader::Open(path_);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  const absl::Status status = (*reader)->Summarise().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("packed by \"l\\x1bz\"; zstd and none"));
+}
+
 TEST_F(McapTest, WhatIsNoneSaysSo) {
   EXPECT_TRUE(absl::IsNotFound(McapReader::Open(path_).status()));
   std::ofstream(path_) << "something else";

@@ -1,0 +1,24 @@
+#include "daemon/scene/quoted.h"
+
+#include <algorithm>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::daemon {
+namespace {
+
+constexpr size_t kMostBytes = 64;
+
+}  // namespace
+
+std::string Quoted(std::string_view text) {
+  size_t size = std::min(text.size(), kMostBytes);
+  if (size < text.size()) {  // between characters
+    while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
+  }
+  return absl::StrCat("\"", absl::Utf8SafeCHexEscape(absl::string_view(text.data(), size)),
+                      size < text.size() ? "…\"" : "\"");
+}
+
+}  // namespace voxeld::daemon

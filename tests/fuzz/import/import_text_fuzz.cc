@@ -1,0 +1,47 @@
+// Files of text: maps, points, molecules, drawings.
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "tests/fuzz/import/check_model.h"
+#include "tools/voxelctl/import/geojson.h"
+#include "tools/voxelctl/import/json_text.h"
+#include "tools/voxelctl/import/pdb_molecule.h"
+#include "tools/voxelctl/import/svg_drawing.h"
+#include "tools/voxelctl/import/text_points.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)
+  static constexpr const char* kExtensions[] = {"geojson", "topojson", "xyz", "csv", "pdb", "svg"};
+  size_t which = 0;
+  const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 6, &which);
+  switch (which) {
+    case 0:
+    case 1: {
+      const absl::StatusOr<nlohmann::json> document = ParseJson(file, file.bytes);
+      if (!document.ok()) {
+        voxeld::fuzz::ExpectSays(document.status());
+        break;
+      }
+      // As who calls them has seen to.
+      if (!document->is_object() || !document->contains("type") || !(*document)["type"].is_string())
+        break;
+      for (const bool globe : {false, true}) {
+        voxeld::fuzz::CheckModel(which == 0 ? ReadGeoJson(file, *document, globe)
+                                            : ReadTopoJson(file, *document, globe));
+      }
+      break;
+    }
+    case 2:
+    case 3:
+      voxeld::fuzz::CheckModel(ReadTextPoints(file));
+      break;
+    case 4:
+      voxeld::fuzz::CheckModel(ReadPdbMolecule(file, MoleculeStyle::kBalls));
+      break;
+    default:
+      voxeld::fuzz::CheckModel(ReadSvgDrawing(file));
+      break;
+  }
+  return 0;
+}

@@ -1,0 +1,44 @@
+// Volumes: NRRD, raw numbers; and of those that libraries read (NIfTI, DICOM) the checks before.
+
+#include <cstdint>
+
+#include "tests/fuzz/import/check_model.h"
+#include "tools/voxelctl/import/dicom_check.h"
+#include "tools/voxelctl/import/nifti_volume.h"
+#include "tools/voxelctl/import/nrrd_volume.h"
+#include "tools/voxelctl/import/raw_volume.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)
+  static constexpr const char* kExtensions[] = {"nrrd", "raw", "dcm", "nii"};
+  size_t which = 0;
+  const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 4, &which);
+  switch (which) {
+    case 0:
+      // A header that names files beside it reads those.
+      if (file.bytes.find("data file") != std::string::npos ||
+          file.bytes.find("datafile") != std::string::npos)
+        break;
+      voxeld::fuzz::CheckModel(ReadNrrdVolume(file));
+      break;
+    case 1:
+      for (const SampleType type : {SampleType::kU8, SampleType::kI16, SampleType::kF32}) {
+        voxeld::fuzz::CheckModel(ReadRawVolume(file, RawLayout{{2, 3, 4}, type, true}));
+      }
+      break;
+    case 2: {
+      LooksLikeDicom(file);
+      const absl::StatusOr<DicomFacts> facts = CheckDicom(file);
+      voxeld::fuzz::ExpectSays(facts.status());
+      if (!facts.ok()) break;
+      for (const auto& [from, count] : facts->pixels) {
+        EXPECT_THAT_HOLDS(from <= file.bytes.size() && count <= file.bytes.size() - from);
+      }
+      break;
+    }
+    default:
+      voxeld::fuzz::CheckModel(ReadNiftiVolume(file));
+      break;
+  }
+  return 0;
+}

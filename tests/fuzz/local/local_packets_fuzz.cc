@@ -1,0 +1,168 @@
+// The local socket, and a producer that means harm: packets over a real socket, with memfds of every size and seal. Each packet has
+// one answer; what is held counts, and goes with the connection.
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/core/budget.h"
+#include "daemon/local/connection.h"
+#include "daemon/local/doorbell.h"
+#include "daemon/local/tokens.h"
+#include "tests/fuzz/expect.h"
+#include "tests/fuzz/script.h"
+#include "voxeld/v1/local.pb.h"
+
+namespace voxeld::fuzz {
+namespace {
+
+using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
+
+constexpr int kMostPackets = 64;
+
+class Producer {
+ public:
+  Producer()
+      : tokens_({.max_memories = 4, .max_bytes = 64 << 10, .max_memories_total = 6},
+                *local::Doorbell::Make(), nullptr) {
+    registered_ = *tokens_.Register(1);
+    Connect();
+  }
+  ~Producer() {
+    connection_ = nullptr;
+    close(socket_);
+    EXPECT_THAT_HOLDS(registered_.memory->memories() == 0, "memory outlives its connection");
+  }
+
+  void Run(Script script) {
+    for (int i = 0; i < kMostPackets && !script.done(); ++i) Step(script);
+  }
+
+ private:
+  void Connect() {
+    if (socket_ >= 0) close(socket_);
+    int ends[2];
+    EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) ==
+                      0);
+    socket_ = ends[0];
+    connection_ = std::make_unique<local::Connection>(Descriptor(ends[1]), 0, nullptr);
+  }
+
+  void Step(Script& script) {
+    const uint8_t what = script.Byte() % 8;
+    std::string packet;
+    v1::LocalMessage message;
+    std::vector<int> descriptors;
+    if (what == 0) {
+      message.mutable_hello()->set_token(registered_.token);
+      packet = message.SerializeAsString();
+    } else if (what <= 3) {
+      const uint64_t size = what == 3 ? script.Number(8) : script.Below(65536);
+      message.mutable_memory()->set_id(script.Byte() % 8);
+      message.mutable_memory()->set_size(size);
+      packet = message.SerializeAsString();
+      const int memory = memfd_create("fuzz", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+      const uint8_t seals = script.Byte();
+      const uint64_t real =
+          (seals & 0x80) != 0 ? script.Below(65536) : std::min<uint64_t>(size, 65536);
+      EXPECT_THAT_HOLDS(ftruncate(memory, static_cast<off_t>(real)) == 0);
+      fcntl(memory, F_ADD_SEALS,
+            (seals & 0x40) != 0 ? seals & 0x1F : F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE);
+      descriptors.push_back(memory);
+    } else if (what == 4) {
+      message.mutable_release()->set_id(script.Byte() % 8);
+      packet = message.SerializeAsString();
+    } else if (what == 5) {  // no memfd
+      message.mutable_memory()->set_id(script.Byte() % 8);
+      message.mutable_memory()->set_size(script.Byte());
+      packet = message.SerializeAsString();
+      for (int i = script.Byte() % 4; i > 0; --i) descriptors.push_back(dup(socket_));
+    } else if (what == 6) {
+      packet = script.Text();
+      for (int i = script.Byte() % 3; i > 0; --i) descriptors.push_back(dup(socket_));
+    } else {
+      if (script.Byte() < 0x40) {
+        tokens_.Unregister(registered_.token);
+        registered_ = *tokens_.Register(1);
+      }
+      return Look();
+    }
+    Send(packet, descriptors);
+    for (const int descriptor : descriptors) close(descriptor);
+    const bool open = connection_->Serve(tokens_);
+    ReadAnswer(packet);
+    if (!open) Connect();
+    Look();
+  }
+
+  void Send(const std::string& packet, const std::vector<int>& descriptors) {
+    iovec part = {const_cast<char*>(packet.data()), packet.size()};
+    msghdr out = {};
+    out.msg_iov = &part;
+    out.msg_iovlen = 1;
+    alignas(cmsghdr) char control[CMSG_SPACE(4 * sizeof(int))] = {};
+    if (!descriptors.empty()) {
+      out.msg_control = control;
+      out.msg_controllen = CMSG_SPACE(descriptors.size() * sizeof(int));
+      cmsghdr* rights = CMSG_FIRSTHDR(&out);
+      rights->cmsg_level = SOL_SOCKET;
+      rights->cmsg_type = SCM_RIGHTS;
+      rights->cmsg_len = CMSG_LEN(descriptors.size() * sizeof(int));
+      std::memcpy(CMSG_DATA(rights), descriptors.data(), descriptors.size() * sizeof(int));
+    }
+    EXPECT_THAT_HOLDS(sendmsg(socket_, &out, MSG_NOSIGNAL) >= 0);
+  }
+
+  void ReadAnswer(const std::string& packet) {
+    char bytes[8192];
+    const ssize_t got = recv(socket_, bytes, sizeof(bytes), 0);
+    if (packet.empty()) return;  // that is the end
+    EXPECT_THAT_HOLDS(got > 0, "a packet has no answer");
+    v1::LocalAnswer answer;
+    EXPECT_THAT_HOLDS(answer.ParseFromArray(bytes, static_cast<int>(got)));
+    EXPECT_THAT_HOLDS(answer.what_case() != v1::LocalAnswer::WHAT_NOT_SET);
+    if (answer.has_refused()) {
+      ExpectSays(absl::InvalidArgumentError(answer.refused().message()));
+      EXPECT_THAT_HOLDS(!answer.refused().message().empty());
+    }
+    EXPECT_THAT_HOLDS(recv(socket_, bytes, sizeof(bytes), 0) <= 0, "a packet has two answers");
+  }
+
+  void Look() {
+    const local::LocalMemory& memory = *registered_.memory;
+    EXPECT_THAT_HOLDS(memory.memories() <= 4 && memory.bytes() <= 64 << 10);
+    for (uint64_t id = 0; id < 8; ++id) {
+      for (const uint64_t offset : {uint64_t{0}, uint64_t{100}, UINT64_MAX}) {
+        const auto range = memory.Find(id, offset, 16);
+        if (!range.ok()) {
+          ExpectSays(range.status());
+          continue;
+        }
+        EXPECT_THAT_HOLDS(range->bytes.size() == 16);
+        for (const char c : range->bytes) EXPECT_THAT_HOLDS(c == 0);
+      }
+    }
+  }
+
+  local::Tokens tokens_;
+  local::Tokens::Registered registered_;
+  int socket_ = -1;
+  std::unique_ptr<local::Connection> connection_;
+};
+
+}  // namespace
+}  // namespace voxeld::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  voxeld::fuzz::Producer().Run(voxeld::fuzz::Script(data, size));
+  return 0;
+}

@@ -1,0 +1,49 @@
+// A host of voxlink that means harm, as a script says, at the cable's end of a device model: requests, packets, reads, time, and
+// the plug. What must hold of any device is asked after each step.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "display/drivers/voxlink/packet.h"
+#include "display/sync/fake_clock.h"
+#include "display/usb/device_model.h"
+#include "tests/fuzz/script.h"
+
+namespace voxeld::fuzz {
+
+class DeviceSession {
+ public:
+  // Both outlive it. `look` is called after each step.
+  DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock, std::function<void()> look);
+
+  void Run(Script script);
+
+ private:
+  struct Pending {
+    std::vector<std::byte> out;
+    uint8_t endpoint = 0;
+    uint32_t length = 0;
+  };
+
+  void Step(Script& script);
+  void Submit(display::Urb urb, std::vector<std::byte> out);
+  void Complete(uint64_t id, display::TransferStatus status, uint32_t actual,
+                std::span<const std::byte> in);
+  void CheckEvent(std::span<const std::byte> bytes);
+  void Request(uint8_t type, uint8_t request, uint16_t value, uint16_t length,
+               std::vector<std::byte> out);
+
+  display::UsbDeviceModel& model_;
+  sync::FakeClock& clock_;
+  const std::function<void()> look_;
+  display::voxlink::PacketWriter writer_;
+  uint64_t next_id_ = 1;
+  std::map<uint64_t, Pending> pending_;
+  uint32_t next_event_ = 0;
+  bool numbered_ = false;  // events have come of this session
+};
+
+}  // namespace voxeld::fuzz

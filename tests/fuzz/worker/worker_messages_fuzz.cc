@@ -1,0 +1,282 @@
+// An engine's worker, and an owner that means harm or is broken: messages one after another, over a real socket, with real segments.
+// Each call has one answer, under its own number, and no descriptor is left.
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_join.h"
+#include "display/crc/crc32c.h"
+#include "gpu/bulk/segment.h"
+#include "gpu/cpu/cpu_engine.h"
+#include "gpu/worker/message.h"
+#include "gpu/worker/target_codec.h"
+#include "gpu/worker/worker_connection.h"
+#include "tests/fuzz/expect.h"
+#include "tests/fuzz/script.h"
+#include "tests/fuzz/worker/sound_delta.h"
+
+namespace voxeld::fuzz {
+namespace {
+
+using namespace voxeld::gpu;  // NOLINT(google-build-using-namespace)
+
+constexpr int kMostMessages = 64;
+constexpr size_t kSegmentBytes = 16 << 10;
+
+// What the descriptors that are open are of.
+std::multiset<std::string> OpenDescriptors() {
+  std::multiset<std::string> open;
+  DIR* const folder = opendir("/proc/self/fd");
+  while (const dirent* entry = readdir(folder)) {
+    char target[256];
+    const ssize_t size = readlinkat(dirfd(folder), entry->d_name, target, sizeof(target));
+    if (size > 0) open.emplace(target, static_cast<size_t>(size));
+  }
+  closedir(folder);
+  return open;
+}
+
+// A display that is worked out in no time.
+Target SmallTarget(Script& script) {
+  Target target;
+  display::PlanarStack stack{.width_px = 4, .height_px = 4};
+  stack.positions_mm = {0, 1, 2, 3};
+  target.geometry.shape = stack;
+  const uint8_t shape = script.Byte() % 8;
+  if (shape == 1) {
+    target.geometry.shape = display::Rotor{
+        .slices_per_turn = 4, .width_px = 4, .height_px = 4, .panels = {display::Rotor::Panel{}}};
+  } else if (shape == 2) {
+    target.geometry.shape = display::Helix{
+        .slices_per_turn = 4, .width_px = 4, .height_px = 4, .height_mm = 4, .radius_mm = 2};
+  } else if (shape == 3) {
+    target.geometry.shape = display::Lattice{
+        .width_px = 4,
+        .points_mm = {display::Vec3{0, 0, 0}, std::nullopt, display::Vec3{1, 1, 1}, std::nullopt}};
+  } else if (shape == 4) {
+    target.geometry.correction.emplace().displacement =
+        display::DisplacementGrid{.nx = 2,
+                                  .ny = 2,
+                                  .nz = 2,
+                                  .low_mm = {0, 0, 0},
+                                  .high_mm = {4, 4, 4},
+                                  .at_mm = std::vector<display::Vec3>(8)};
+  }
+  target.geometry.grid = {.nx = 4, .ny = 4, .nz = 4, .pitch_mm = {1, 1, 1}, .origin_mm = {}};
+  target.layout = {.slices = 4, .width = 4, .height = 4, .sub_frames = 1 + script.Byte() % 2};
+  if (shape == 3) target.layout.slices = target.layout.height = 1;
+  target.layout.format = static_cast<display::PixelFormat>(script.Byte() % 5);
+  target.tone.lut.fill(display::Tone::Linear());
+  return target;
+}
+
+bool IsSmall(const Target& target) {
+  const auto& grid = target.geometry.grid;
+  const int64_t most = 64;
+  return grid.nx <= most && grid.ny <= most && grid.nz <= most && target.layout.width <= most &&
+         target.layout.height <= most && target.layout.slices <= most &&
+         target.layout.sub_frames <= 4;
+}
+
+class Owner {
+ public:
+  Owner() {
+    hooks_.make_engine =
+        [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
+      if (options.kind != EngineKind::kCpu) return absl::FailedPreconditionError("no such engine");
+      EngineOptions own = options;
+      own.threads = 1;
+      return CreateCpuEngine(own, "");
+    };
+    EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_) == 0);
+    fcntl(ends_[0], F_SETFL, O_NONBLOCK);
+    worker_ = NewWorkerConnection(ends_[1], hooks_);
+  }
+  ~Owner() {
+    worker_ = nullptr;
+    close(ends_[0]);
+    close(ends_[1]);
+  }
+
+  void Run(Script script) {
+    for (int i = 0; i < kMostMessages && !script.done(); ++i) {
+      if (!Step(script)) return;
+    }
+  }
+
+ private:
+  // False: the worker has ended.
+  bool Step(Script& script) {
+    switch (script.Byte() % 11) {
+      case 0: {
+        OpenMessage open;
+        const uint8_t choice = script.Byte();
+        if (choice == 1) open.protocol = script.Byte();
+        if (choice == 2) open.kind = static_cast<EngineKind>(script.Byte() % 3);
+        if (choice >= 3) {
+          open.part = {.begin = static_cast<int8_t>(script.Byte()),
+                       .end = static_cast<int8_t>(script.Byte()),
+                       .rank = static_cast<int8_t>(script.Byte()),
+                       .ranks = static_cast<int8_t>(script.Byte())};
+        }
+        open.index_bytes = script.Number(2);
+        return Send(MakeMessage(MessageType::kOpen, ++call_, open), true);
+      }
+      case 1:
+        return TellSegment(script, false);
+      case 2: {
+        const SegmentMessage named{.segment = script.Byte() % 4u, .staging = script.Byte()};
+        segments_.erase(named.segment);
+        return Send(MakeMessage(MessageType::kDropSegment, 0, named), false);
+      }
+      case 3: {
+        std::vector<std::byte> target = EncodeTarget(SmallTarget(script));
+        if (script.Flag()) {
+          const size_t at = script.Below(65536) % target.size();
+          target[at] = static_cast<std::byte>(script.Byte());
+        }
+        const auto decoded = DecodeTarget(target);
+        if (decoded.ok() && !IsSmall(*decoded)) return true;
+        if (decoded.ok()) EXPECT_THAT_HOLDS(EncodeTarget(*decoded).size() <= target.size());
+        return Bulk(script, MessageType::kTarget, target);
+      }
+      case 4:
+        return Bulk(script, MessageType::kApply, SoundDelta(script));
+      case 5: {
+        const std::string text = script.Text();
+        const auto* const data = reinterpret_cast<const std::byte*>(text.data());
+        return Bulk(script, MessageType::kApply, {data, data + text.size()});
+      }
+      case 6: {
+        FrameMessage frame;
+        frame.segment = script.Byte() % 4u;
+        frame.frame = script.Byte();
+        frame.holds = script.Byte();
+        frame.buffer_holds = script.Byte();
+        const uint8_t choice = script.Byte();
+        frame.pictures = choice == 0 ? script.Number(8) : 4u * (1 + choice % 2);
+        frame.bytes = choice == 1 ? script.Number(8) : script.Number(2);
+        return Send(MakeMessage(MessageType::kFrame, ++call_, frame), true);
+      }
+      case 7: {
+        VoxelsMessage voxels;
+        voxels.segment = script.Byte() % 4u;
+        voxels.box = {static_cast<int8_t>(script.Byte()), static_cast<int8_t>(script.Byte()),
+                      static_cast<int8_t>(script.Byte()), static_cast<int8_t>(script.Byte()),
+                      static_cast<int8_t>(script.Byte()), static_cast<int8_t>(script.Byte())};
+        voxels.count = script.Flag() ? script.Number(8) : script.Byte();
+        return Send(MakeMessage(MessageType::kVoxels, ++call_, voxels), true);
+      }
+      case 8:
+        return TellSegment(script, true);
+      case 9: {
+        const BulkSegmentMessage named{.segment = script.Byte() % 4u, .size = 0};
+        return Send(MakeMessage(MessageType::kDropBulkSegment, 0, named), false);
+      }
+      default: {  // any message, with a descriptor or without
+        Message message;
+        message.type = static_cast<MessageType>(script.Byte());
+        message.call = script.Byte();
+        const std::string text = script.Text();
+        const auto* const data = reinterpret_cast<const std::byte*>(text.data());
+        message.body.assign(data, data + std::min<size_t>(text.size(), 4096));
+        if (script.Flag()) message.fd = ends_[0];
+        return Send(std::move(message), {});
+      }
+    }
+  }
+
+  bool TellSegment(Script& script, bool bulk) {
+    const uint32_t id = script.Byte() % 4u;
+    const uint8_t choice = script.Byte();
+    const auto made =
+        bulk ? Segment::CreateReadOnlyForOthers(kSegmentBytes) : Segment::Create(kSegmentBytes);
+    EXPECT_THAT_HOLDS(made.ok(), made.status().ToString());
+    const std::string text = script.Text();
+    std::memcpy((*made)->bytes().data(), text.data(), std::min(text.size(), kSegmentBytes));
+    const uint64_t size = choice == 1 ? script.Number(8) : kSegmentBytes;
+    Message message =
+        bulk ? MakeMessage(MessageType::kBulkSegment, 0, BulkSegmentMessage{id, size})
+             : MakeMessage(MessageType::kSegment, 0, SegmentMessage{id, choice % 2u, size});
+    if (choice != 2) message.fd = (*made)->fd();
+    if (!bulk) segments_[id] = *made;
+    return Send(message, false);
+  }
+
+  // Bytes in a segment, by a message that says their sum.
+  bool Bulk(Script& script, MessageType type, const std::vector<std::byte>& bytes) {
+    const uint32_t id = script.Byte() % 4u;
+    const auto it = segments_.find(id);
+    const size_t size = std::min(bytes.size(), kSegmentBytes);
+    if (it != segments_.end()) std::copy_n(bytes.begin(), size, it->second->bytes().begin());
+    BulkMessage message{
+        .segment = id, .crc = display::Crc32c(std::span(bytes).first(size)), .size = size};
+    const uint8_t choice = script.Byte();
+    if (choice == 1) message.crc ^= 1;
+    if (choice == 2) message.size = script.Number(8);
+    return Send(MakeMessage(type, ++call_, message), true);
+  }
+
+  // `answered`: whether it is a call; nothing: who knows.
+  bool Send(const Message& message, std::optional<bool> answered) {
+    EXPECT_THAT_HOLDS(SendMessage(ends_[0], message).ok());
+    absl::StatusOr<Message> received = ReceiveMessage(ends_[1]);
+    EXPECT_THAT_HOLDS(received.ok(), received.status().ToString());
+    EXPECT_THAT_HOLDS(received->type == message.type && received->call == message.call &&
+                      received->body == message.body);
+    const absl::Status status = worker_->Handle(*received);
+    EXPECT_THAT_HOLDS(received->fd < 0, "a descriptor is left");
+    ExpectSays(status);
+    const absl::StatusOr<Message> answer = ReceiveMessage(ends_[0]);
+    if (answered.has_value()) {
+      EXPECT_THAT_HOLDS(*answered ? answer.ok() || !status.ok() : !answer.ok());
+    }
+    if (answer.ok()) {
+      EXPECT_THAT_HOLDS(answer->call == message.call && answer->fd < 0);
+      EXPECT_THAT_HOLDS(!ReceiveMessage(ends_[0]).ok(), "a call has two answers");
+      if (answer->type == MessageType::kDone) {
+        const absl::Status done = StatusOf(*answer);
+        ExpectSays(done);
+        EXPECT_THAT_HOLDS(!absl::IsDataLoss(done) || absl::IsDataLoss(status));
+      }
+    }
+    return status.ok();
+  }
+
+  WorkerHooks hooks_;
+  int ends_[2] = {-1, -1};
+  std::unique_ptr<WorkerConnection> worker_;
+  std::map<uint32_t, std::shared_ptr<Segment>> segments_;
+  uint64_t call_ = 0;
+};
+
+}  // namespace
+}  // namespace voxeld::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  // The first engine opens what stays open.
+  static const bool begun = [] {
+    constexpr uint8_t kOpen[] = {0, 0, 0, 0};
+    voxeld::fuzz::Owner().Run(voxeld::fuzz::Script(kOpen, sizeof(kOpen)));
+    return true;
+  }();
+  EXPECT_THAT_HOLDS(begun);
+  const auto before = voxeld::fuzz::OpenDescriptors();
+  voxeld::fuzz::Owner().Run(voxeld::fuzz::Script(data, size));
+  const auto after = voxeld::fuzz::OpenDescriptors();
+  EXPECT_THAT_HOLDS(after.size() == before.size(), "of ", before.size(), " descriptors there are ",
+                    after.size(), "; ", absl::StrJoin(after, ", "));
+  return 0;
+}

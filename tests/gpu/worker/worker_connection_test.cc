@@ -1,0 +1,131 @@
+// What an owner that is broken may send: the worker answers, or ends, and reads nothing that is not there.
+#include "gpu/worker/worker_connection.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <memory>
+#include <utility>
+
+#include "display/crc/crc32c.h"
+#include "gpu/bulk/segment.h"
+#include "gpu/cpu/cpu_engine.h"
+#include "gpu/worker/target_codec.h"
+
+namespace voxeld::gpu {
+namespace {
+
+class WorkerConnectionTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    hooks_.make_engine =
+        [](const EngineOptions& options) -> absl::StatusOr<std::unique_ptr<Engine>> {
+      if (options.kind != EngineKind::kCpu) return absl::FailedPreconditionError("no such engine");
+      EngineOptions own = options;
+      own.threads = 1;
+      return CreateCpuEngine(own, "");
+    };
+    ASSERT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_), 0);
+    fcntl(ends_[0], F_SETFL, O_NONBLOCK);
+    connection_ = NewWorkerConnection(ends_[1], hooks_);
+  }
+  void TearDown() override {
+    connection_ = nullptr;
+    close(ends_[0]);
+    close(ends_[1]);
+  }
+
+  absl::Status Handle(Message message) { return connection_->Handle(message); }
+  // The status in the answer that came last.
+  absl::Status Answered() {
+    const absl::StatusOr<Message> answer = ReceiveMessage(ends_[0]);
+    if (!answer.ok()) return absl::InternalError("no answer");
+    return answer->type == MessageType::kDone ? StatusOf(*answer) : absl::OkStatus();
+  }
+  void Open(EngineKind kind, SlicePart part = {}) {
+    OpenMessage open;
+    open.kind = kind;
+    open.part = part;
+    ASSERT_TRUE(Handle(MakeMessage(MessageType::kOpen, 1, open)).ok());
+  }
+  void TellSegment() {
+    segment_ = *Segment::Create(4096);
+    Message message = MakeMessage(MessageType::kSegment, 0, SegmentMessage{1, 0, 4096});
+    message.fd = dup(segment_->fd());
+    ASSERT_TRUE(Handle(std::move(message)).ok());
+  }
+  // A display of 4x4 pixels in 4 slices.
+  absl::Status SetTarget() {
+    Target target;
+    display::PlanarStack stack{.width_px = 4, .height_px = 4};
+    stack.positions_mm = {0, 1, 2, 3};
+    target.geometry.shape = stack;
+    target.geometry.grid = {.nx = 4, .ny = 4, .nz = 4, .pitch_mm = {1, 1, 1}, .origin_mm = {}};
+    target.layout = {.slices = 4, .width = 4, .height = 4};
+    target.tone.lut.fill(display::Tone::Linear());
+    const std::vector<std::byte> bytes = EncodeTarget(target);
+    std::memcpy(segment_->bytes().data(), bytes.data(), bytes.size());
+    const BulkMessage bulk{1, display::Crc32c(bytes), bytes.size()};
+    if (absl::Status ended = Handle(MakeMessage(MessageType::kTarget, 2, bulk)); !ended.ok())
+      return ended;
+    return Answered();
+  }
+  absl::Status Frame(uint64_t number) {
+    const FrameMessage frame{
+        .segment = 1, .frame = number, .holds = 0, .buffer_holds = 0, .pictures = 4, .bytes = 192};
+    if (absl::Status ended = Handle(MakeMessage(MessageType::kFrame, 3, frame)); !ended.ok())
+      return ended;
+    return Answered();
+  }
+
+  WorkerHooks hooks_;
+  int ends_[2] = {-1, -1};
+  std::unique_ptr<WorkerConnection> connection_;
+  std::shared_ptr<Segment> segment_;
+};
+
+TEST_F(WorkerConnectionTest, AnEngineThatIsOpenedAnewHasNoTarget) {
+  Open(EngineKind::kCpu);
+  EXPECT_TRUE(Answered().ok());
+  TellSegment();
+  ASSERT_TRUE(SetTarget().ok());
+  EXPECT_TRUE(Frame(1).ok());
+  // Slices that the display which was has not.
+  Open(EngineKind::kCpu, {.begin = 40, .end = 80});
+  EXPECT_TRUE(Answered().ok());
+  EXPECT_EQ(Frame(2).code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST_F(WorkerConnectionTest, AnEngineThatCannotBeOpenedLeavesTheOneThatIs) {
+  Open(EngineKind::kCpu);
+  EXPECT_TRUE(Answered().ok());
+  TellSegment();
+  ASSERT_TRUE(SetTarget().ok());
+  Open(EngineKind::kCuda, {.begin = 40, .end = 80});
+  EXPECT_EQ(Answered().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_TRUE(Frame(1).ok());
+}
+
+TEST_F(WorkerConnectionTest, MoreVoxelsThanCanBeCountedInBytesAreInNoSegment) {
+  Open(EngineKind::kCpu);
+  TellSegment();
+  const VoxelsMessage voxels{1, {0, 0, 0, 4, 4, 4}, uint64_t{1} << 62};
+  EXPECT_EQ(Handle(MakeMessage(MessageType::kVoxels, 3, voxels)).code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(WorkerConnectionTest, ADescriptorThatNobodyAskedForIsClosed) {
+  Open(EngineKind::kCpu);
+  Message message = MakeMessage(MessageType::kDropSegment, 0, SegmentMessage{});
+  message.fd = dup(ends_[0]);
+  const int descriptor = message.fd;
+  EXPECT_FALSE(connection_->Handle(message).ok());
+  EXPECT_LT(message.fd, 0);
+  EXPECT_EQ(fcntl(descriptor, F_GETFD), -1);
+}
+
+}  // namespace
+}  // namespace voxeld::gpu
