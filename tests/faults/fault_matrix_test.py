@@ -447,6 +447,8 @@ class Matrix(unittest.TestCase):
                 cell.watch_health(0.5)
                 before = goes_on.commits if goes_on else 0
                 figures, lines = cell.metrics(), len(cell.said())
+                if isinstance(fault, Usb):  # its plan began with the daemon
+                    figures = {name: 1.0 for name in figures if "attaches" in name}
                 fault.run(cell)
                 if cell.daemon.poll() is not None:
                     self.assertTrue(fault.deadly, cell.said()[-2000:])

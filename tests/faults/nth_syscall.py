@@ -234,7 +234,7 @@ def run(call: str, error: str, n: int, stacks: bool = False) -> Result:
             wrong = wrong or ("" if status == 0 or late else f"it ended with {status} when it was asked to: {said.strip().splitlines()[-1:]}")
         else:
             how = "ended"
-            wrong = wrong or ("" if reason or re.search(r"error|failed|cannot", said, re.I) else f"it ended with {status} and did not say why")
+            wrong = wrong or ("" if reason or re.search(r"^voxeld: .|error|failed|cannot", said, re.I | re.M) else f"it ended with {status} and did not say why")
         # Unharmed, on the same state.
         again = Life(Path(name))
         process = again.start()

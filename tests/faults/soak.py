@@ -28,7 +28,7 @@ import voxeld as voxel
 EVERY = 2.0  # seconds from sample to sample
 LONG = 60.0
 PARTS = 12
-WARM = 20  # minutes; of a shorter run memory and latency are told, and not judged
+WARM = 20  # minutes; of a shorter run slopes are told, and receipts alone are judged
 # By what part of its level a quantity may grow in an hour; of whole numbers, by how many.
 GROWTH = {"resident_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
 WHOLE = ("descriptors", "threads")
@@ -261,7 +261,7 @@ def main() -> int:
             slope, half = line_through(times, values)
             level = float(np.median(values))
             slopes[key] = {"median": level, "least": float(values.min()), "most": float(values.max()), "an_hour": slope, "half_interval": half}
-            if key not in WHOLE and options.minutes < WARM:
+            if options.minutes < WARM:
                 continue
             if slope - half > (part if key in WHOLE else part * level):
                 wrong.append(f"{key} grows by {slope:.3f} an hour (± {half:.3f}) from {level:.1f}")
