@@ -2,6 +2,7 @@
 """So many clients at once, each with a layer of its own, which commit at a rate until a line comes in; then each waits for all that it is
 owed, and a line of JSON says what became of everything.
 usage: clients.py SERVER COUNT RATE [CERTIFICATE KEY NAME], the certificate being its own and its authority's in one."""
+import contextlib
 import json
 import sys
 import threading
@@ -25,8 +26,8 @@ def settle(frames: list[voxel.Frame]) -> None:
     """A commit has ended as it should: refused, lost with its connection, or accepted with an outcome for each display."""
     deadline = time.monotonic() + LONG
     for frame in frames:
-        while not frame.complete and time.monotonic() < deadline:
-            time.sleep(0.01)
+        with contextlib.suppress(voxel.VoxelError, TimeoutError):  # what came of it is looked at below
+            frame.wait_shown(timeout=max(0.0, deadline - time.monotonic()))
         with mutex:
             ends["commits"] += 1
             if frame.state == "refused":
@@ -40,6 +41,14 @@ def settle(frames: list[voxel.Frame]) -> None:
 
 
 def client(number: int) -> None:
+    try:
+        stream(number)
+    except BaseException:
+        over.release()
+        raise
+
+
+def stream(number: int) -> None:
     places = np.random.default_rng(number).uniform(-1, 1, (20, 3)).astype(np.float32)
     with voxel.connect(server, name=f"client {number}", timeout=LONG, credentials=who) as v:
         layer = v.layer(f"layer {number}")
@@ -61,10 +70,12 @@ def client(number: int) -> None:
         settle(frames)
         with mutex:
             ended.append(number)
+        over.release()
         all_ended.wait(LONG)  # until then what it drew stays
 
 
 ended: list[int] = []
+over = threading.Semaphore(0)  # for each client that has all that it is owed, or that failed
 all_ended = threading.Event()
 threads = [threading.Thread(target=client, args=(n,)) for n in range(count)]
 for thread in threads:
@@ -73,8 +84,8 @@ print("ready", flush=True)
 sys.stdin.readline()
 stop.set()
 deadline = time.monotonic() + 2 * LONG
-while len(ended) < count and any(thread.is_alive() for thread in threads) and time.monotonic() < deadline:
-    time.sleep(0.02)
+for _ in range(count):
+    over.acquire(timeout=max(0.0, deadline - time.monotonic()))
 print(json.dumps({**ends, "clients": len(ended)}), flush=True)
 sys.stdin.readline()  # until what is shown has been looked at
 all_ended.set()

@@ -104,7 +104,7 @@ class Cell:
             with contextlib.suppress(OSError, urllib.error.URLError):
                 with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=max(0.05, end - time.monotonic())) as answer:
                     self.told += answer.read().decode() + "\n"
-            time.sleep(0.05)
+            time.sleep(0.05)  # the pace at which it is asked
 
     def certificate(self, name: str) -> None:
         subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", f"/CN={name}",

@@ -89,7 +89,7 @@ class Life:
             with contextlib.suppress(OSError):  # also one whose log cannot be written is ready
                 with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/healthz", timeout=PATIENCE) as answer:
                     return bool(answer.read())
-            time.sleep(0.01)  # nothing tells when it listens
+            time.sleep(0.01)  # nothing tells when it listens, and its end is an answer too
         return False
 
     # ---- what it goes through

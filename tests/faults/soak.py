@@ -2,11 +2,13 @@
 """A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
 resident memory, descriptors, threads and latencies are measured all the while, and lines are laid through them.
 
-usage: soak.py [--minutes M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and PYTHONPATH.
+usage: soak.py [--minutes M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and PYTHONPATH
+(the client and tests/e2e).
 
 Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
 twelfths after the first, which is for warming up) lies above zero by more than GROWTH says an hour."""
 import argparse
+import contextlib
 import csv
 import json
 import multiprocessing as mp
@@ -24,6 +26,8 @@ from typing import Any, Callable
 
 import numpy as np
 import voxeld as voxel
+
+from polling import until
 
 EVERY = 2.0  # seconds from sample to sample
 LONG = 60.0
@@ -53,8 +57,9 @@ class Tally:
         left = []
         deadline = time.monotonic() + patience
         for frame in self.open:
-            while not frame.complete and time.monotonic() < deadline:
-                time.sleep(0.005)
+            if patience:
+                with contextlib.suppress(voxel.VoxelError, TimeoutError):  # what came of it is looked at below
+                    frame.wait_shown(timeout=max(0.0, deadline - time.monotonic()))
             if not frame.complete:
                 left.append(frame)
                 continue
@@ -207,16 +212,14 @@ def main() -> int:
              "--display", "stack=simulated,size=24x24x16,rate=60", "--display", "rotor=simulated,geometry=rotor,size=24x16,slices=60,rate=30",
              "--display", "lattice=simulated,profile=" + str(Path(__file__).parents[2] / "display/profiles/lattice-8.toml")],
             stdout=log, stderr=subprocess.STDOUT)
-        port = 0
-        deadline = time.monotonic() + LONG
-        while not port:
+
+        def listens() -> int:
             said = Path(f"{folder}/log").read_text(encoding="utf-8")
-            if match := re.search(r"http://127\.0\.0\.1:(\d+)/", said) or re.search(r"http[^\n]*?127\.0\.0\.1:(\d+)", said):
-                port = int(match[1])
-            elif daemon.poll() is not None or time.monotonic() > deadline:
-                sys.exit(f"voxeld does not start: {said}")
-            else:
-                time.sleep(0.05)
+            assert daemon.poll() is None, f"voxeld does not start: {said}"
+            match = re.search(r"http://127\.0\.0\.1:(\d+)/", said)
+            return int(match[1]) if match else 0
+
+        port = until(listens, "voxeld's page")
         stop = mp.Event()
         clients = []
         for name in options.roles.split(","):
@@ -275,10 +278,11 @@ def main() -> int:
     if options.json:
         print(json.dumps({"minutes": rows[-1]["minutes"], "receipts": sums, "slopes": slopes, "wrong": wrong}))
     else:
+        judged = "nothing grows, nothing is owed" if options.minutes >= WARM else "nothing is owed"
         print(f"{rows[-1]['minutes']:.1f} minutes, {len(rows)} samples; " + ", ".join(f"{count} {key}" for key, count in sums.items()))
         for key, each in slopes.items():
             print(f"{key}: median {each['median']:.2f} ({each['least']:.2f} to {each['most']:.2f}), {each['an_hour']:+.3f} an hour (± {each['half_interval']:.3f})")
-        print("\n".join(f"WRONG: {each}" for each in wrong) or "nothing grows, nothing is owed")
+        print("\n".join(f"WRONG: {each}" for each in wrong) or judged)
     return 1 if wrong else 0
 
 
