@@ -52,11 +52,12 @@ void Run(Script script) {
   const bool control = script.Flag();
   testing::Simulation simulation({}, 2);
   simulation.Start();
-  auto shared =
-      std::make_shared<viewer::ViewerShared>(viewer::ViewerShared{.core = *simulation.core,
-                                                                  .clock = simulation.clock,
-                                                                  .options = {.version = "1"},
-                                                                  .places = {}});
+  auto shared = std::make_shared<viewer::ViewerShared>(
+      viewer::ViewerShared{.core = *simulation.core,
+                           .clock = simulation.clock,
+                           .options = {.version = "1"},
+                           .play = viewer::ViewerPlay::Make({.why_not = "no player"}, nullptr),
+                           .places = {}});
   auto peer = std::make_shared<Peer>();
   std::unique_ptr<http::WebSocketService> service = viewer::NewViewerSocket(shared, peer, control);
   const auto settle = [&] {
