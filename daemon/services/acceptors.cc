@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/services/caller.h"
+#include "display/sync/mutex.h"
 
 namespace voxeld::daemon::services {
 namespace {
@@ -59,6 +60,8 @@ class TlsCredentials final : public grpc::ServerCredentials {
 };
 
 // Says whose a call's connection is.
+// A connection's calls share its AuthContext: it is written by the first of them, before any of their handlers reads it, and never
+// again, since what is added stays as long as the connection, and adding moves what others may be reading.
 class UserTeller final : public grpc::AuthMetadataProcessor {
  public:
   static constexpr int64_t kNobody = -1;
@@ -66,12 +69,18 @@ class UserTeller final : public grpc::AuthMetadataProcessor {
   bool IsBlocking() const override { return false; }
   grpc::Status Process(const InputMetadata&, grpc::AuthContext* context, OutputMetadata*,
                        OutputMetadata*) override {
-    context->AddProperty(kUserProperty, std::to_string(user.load()));
+    sync::MutexLock lock(mutex_);
+    if (context->FindPropertyValues(kUserProperty).empty()) {
+      context->AddProperty(kUserProperty, std::to_string(user.load()));
+    }
     return grpc::Status::OK;
   }
 
   // Set once, before the first connection comes.
   std::atomic<int64_t> user = kNobody;
+
+ private:
+  sync::Mutex mutex_;
 };
 
 struct UserSlot {
