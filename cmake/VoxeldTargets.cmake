@@ -59,6 +59,12 @@ endif()
 include(VoxeldHardening)
 target_link_libraries(voxeld_options INTERFACE Threads::Threads)
 
+# A program has what it calls, and not all of every source that it calls something of.
+if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_SANITIZE)
+  target_compile_options(voxeld_options INTERFACE $<$<COMPILE_LANGUAGE:C,CXX>:-ffunction-sections -fdata-sections>)
+  add_link_options(LINKER:--gc-sections)
+endif()
+
 # Warnings are for our own code only, not for what protoc generates.
 add_library(voxeld_warnings INTERFACE)
 target_compile_options(voxeld_warnings INTERFACE -Wall -Wextra -Wno-unused-parameter

@@ -36,6 +36,7 @@
 #include "daemon/play/setup.h"
 #include "daemon/process/end_limit.h"
 #include "daemon/process/process.h"
+#include "daemon/process/spare_threads.h"
 #include "daemon/process/supervisor.h"
 #include "daemon/reload/reloader.h"
 #include "daemon/services/health_watch.h"
@@ -56,6 +57,7 @@ constexpr int kUsageError = 2;
 constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
+constexpr int kSpareThreads = 8;
 
 int Fail(int code, const absl::Status& status) {
   std::fprintf(stderr, "voxeld: %s\n", std::string(status.message()).c_str());
@@ -358,8 +360,13 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
       log.Info("calls ended: their callers may not make them any more",
                {{"calls", absl::StrCat(ended)}});
   });
-  auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval,
-                                                 [&security] { security->Look(); });
+  auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval, [&] {
+    security->Look();
+    if (const uint64_t taken = SpareThreads::Refill(); taken > 0) {
+      log.Warn("the system gave no thread: spare ones were taken",
+               {{"threads", absl::StrCat(taken)}});
+    }
+  });
 
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
 
@@ -449,6 +456,9 @@ int Main(int argc, char** argv) {
   sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays make threads: main alone waits
 
+  if (absl::Status status = SpareThreads::Begin(kSpareThreads); !status.ok()) {
+    return Fail(1, status);
+  }
   sync::SystemClock clock;
   std::unique_ptr<display::LibusbBus> usb;  // made for the first display that asks for it
   const auto shared_usb = [&]() -> absl::StatusOr<display::UsbBus*> {
