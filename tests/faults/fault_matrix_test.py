@@ -303,6 +303,36 @@ class Memory(Fault):
         self.refused = self.refused or "memory" in str(issue)
 
 
+class MemoryCgroup(Fault):
+    """Half as much as a client brings, by a control group: the kernel ends the daemon, and whatever watches it starts it again."""
+
+    deadly = clients_are_cut = True
+
+    def run(self, cell: Cell) -> None:
+        first = Path("/sys/fs/cgroup/memory")  # version 1; of 2 there is one tree of all
+        tree, limit = (first, "memory.limit_in_bytes") if first.is_dir() else (Path("/sys/fs/cgroup"), "memory.max")
+        group = tree / f"voxeld-{cell.daemon.pid}"
+        try:
+            group.mkdir()
+        except OSError as error:
+            raise unittest.SkipTest(f"no control group for memory can be made here: {error}") from None
+        cell.test.addCleanup(group.rmdir)
+        size = int(re.search(r"RssAnon:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
+        (group / "cgroup.procs").write_text(str(cell.daemon.pid), encoding="ascii")
+        (group / limit).write_text(str(size + (24 << 20)), encoding="ascii")
+        brings = ("import sys, numpy as np, voxeld as voxel\n"
+                  "v = voxel.connect(sys.argv[1], name='large', timeout=60)\n"
+                  "v.points('large', np.zeros((4_000_000, 3), np.float32))\n"
+                  "v.commit().wait(60)\n")
+        client = subprocess.Popen([sys.executable, "-c", brings, cell.server], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            cell.daemon.wait(LONG)
+        finally:
+            client.kill()  # else it would bring the same to the next daemon
+            client.wait()
+        assert cell.daemon.returncode == -signal.SIGKILL, cell.said()[-2000:]
+
+
 class Descriptors(Fault):
     log, moved = r"[Tt]oo many open files", "voxeld_(accept_failures|probe_failures)_total"
 
@@ -420,7 +450,7 @@ FAULTS: dict[str, Callable[[], Fault]] = {
     "engine_killed": lambda: WorkerLost(signal.SIGKILL), "engine_hangs": lambda: WorkerLost(signal.SIGSTOP),
     "disk_full": lambda: Refused("pwrite64,ftruncate,fallocate", "ENOSPC"),
     "disk_read_only": lambda: Refused("pwrite64,fdatasync,fsync", "EROFS"),
-    "memory_limit": Memory, "descriptors_out": Descriptors, "clock_steps": ClockSteps, "client_stopped": StopClient, "daemon_stopped": StopDaemon, "viewer_stopped": StopViewer,
+    "memory_limit": Memory, "memory_cgroup": MemoryCgroup, "descriptors_out": Descriptors, "clock_steps": ClockSteps, "client_stopped": StopClient, "daemon_stopped": StopDaemon, "viewer_stopped": StopViewer,
     "network_stalls": lambda: Network("stalls"), "network_halves": lambda: Network("halves"), "network_cut": lambda: Network("cut"), "certificates_swapped": Certificates,
 }
 
