@@ -105,6 +105,7 @@ void VoxlinkScreen::Advance(sync::TimeNs now) {
         watchdog_ && !watchdog_dark_ ? heard_ + voxlink::kWatchdogNs : sync::kNever;
     if (std::min(sweep_start, dark_at) > now) break;
     if (dark_at <= sweep_start) {
+      silence_ = now - heard_;
       SetWatchdogDark(true);
       continue;
     }

@@ -44,6 +44,8 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
 
   bool blanked() const { return blanked_; }
   bool watchdog_dark() const { return watchdog_dark_; }
+  // How long the host had been silent when it last became dark for that: by the model's turn, which may be late. 0: never.
+  sync::TimeNs silence() const { return silence_; }
   // Light comes out: a volume is shown and nothing darkens it.
   bool lit() const { return running_ && shown_ != nullptr && !blanked_ && !watchdog_dark_; }
   const voxlink::VolumePtr& shown() const { return shown_; }
@@ -108,6 +110,7 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
   uint32_t underruns_ = 0;
 
   sync::TimeNs heard_ = 0;
+  sync::TimeNs silence_ = 0;
   bool watchdog_dark_ = false;
   bool blanked_ = false;
   uint64_t errors_ = 0;

@@ -277,6 +277,32 @@ TEST_F(OnUsb, LiesHurtNobody) {
   ExpectOtherMissedNothing();
 }
 
+// Light that moves is safe, and light that stands still may not be: a host that does nothing any more leaves nothing lit.
+TEST_F(OnUsb, AStoppedHostsDisplayIsDarkUntilItGoesOn) {
+  Plug();
+  StartDaemon();
+  ASSERT_TRUE(AwaitAllShowing());
+  ASSERT_TRUE(CommitUntilShown());
+  ASSERT_TRUE(Device()["lit"]);
+  std::vector<double> silence_ms, seen_ms;
+  for (int i = 0; i < 10; ++i) {
+    const auto stopped = steady_clock::now();
+    process_->Signal(SIGSTOP);
+    nlohmann::json device = Device();
+    while (device["lit"] && steady_clock::now() - stopped < e2e::kPatience) device = Device();
+    seen_ms.push_back(Milliseconds(steady_clock::now() - stopped));
+    EXPECT_FALSE(device["lit"]) << device.dump();
+    EXPECT_FALSE(device.contains("light_crc32c")) << device.dump();
+    silence_ms.push_back(device["silence_ns"].get<double>() / 1e6);
+    process_->Signal(SIGCONT);
+    ASSERT_TRUE(CommitUntilShown());
+    ExpectSameLight();
+  }
+  EXPECT_GE(*std::min_element(silence_ms.begin(), silence_ms.end()), 250);  // not before
+  PrintTimes("silence when it became dark", silence_ms);
+  PrintTimes("stopped to dark", seen_ms);
+}
+
 TEST_F(OnUsb, PulledAndPluggedInUnderLoad) {
   setvbuf(stdout, nullptr, _IOLBF, 0);
   int unplugs = 0;

@@ -30,6 +30,7 @@ nlohmann::json VoxlinkStatus(const VoxlinkDevice& device) {
       {"plugs", device.plugs()},
       {"running", screen.running()},
       {"lit", screen.lit()},
+      {"silence_ns", screen.silence()},
       {"bytes_received", device.bytes_received()},
       {"credit_excess", device.credit_excess()},
       {"errors", screen.errors()},

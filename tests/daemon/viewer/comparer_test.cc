@@ -5,10 +5,12 @@
 
 #include <atomic>
 #include <future>
+#include <memory>
 #include <optional>
 #include <thread>
 
 #include "display/sync/clock.h"
+#include "display/sync/fake_clock.h"
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon::viewer {
@@ -126,6 +128,30 @@ TEST_F(ComparerTest, WithoutRoomInTheBudgetItIsRefusedAndNothingStaysCharged) {
     EXPECT_EQ(status.ok(), fits) << status;
     EXPECT_EQ(budget->used_bytes(), 0u);
   }
+}
+
+TEST_F(ComparerTest, ASceneThatNobodyAsksForAnyMoreIsLetGo) {
+  sync::FakeClock clock;
+  Comparer comparer(clock, nullptr);
+  const auto idle = [&clock] {
+    while (clock.waiters() == 0) std::this_thread::yield();
+  };
+  scene_.Commit(Put("a", "x", 2));
+  std::weak_ptr<const Layer> layer;
+  scene_.store.snapshot()->layers.ForEach(
+      [&](const OwnedName&, const LayerPtr& each) { layer = each; });
+  std::promise<bool> promise;
+  Comparer::Task task = TaskOf();
+  task.done = [&](const absl::StatusOr<Comparison>& c) { promise.set_value(c.ok()); };
+  comparer.Post(std::move(task));
+  EXPECT_TRUE(promise.get_future().get());
+  scene_.Commit(DeleteId("a", "x"));  // from now on it is the comparer's alone
+  idle();
+  clock.Advance(Comparer::kLinger - 1);
+  idle();
+  EXPECT_FALSE(layer.expired());
+  clock.Advance(1);
+  while (!layer.expired()) std::this_thread::yield();
 }
 
 TEST_F(ComparerTest, OneMoreThanMayWaitIsRefusedAndThoseThatWaitAreCancelledAtTheEnd) {
