@@ -275,8 +275,6 @@ def main() -> int:
             writer = csv.DictWriter(file, rows[0].keys())
             writer.writeheader()
             writer.writerows(rows)
-    if options.svg:
-        draw(options.svg, rows)
     if options.json:
         print(json.dumps({"minutes": rows[-1]["minutes"], "receipts": sums, "slopes": slopes, "wrong": wrong}))
     else:
@@ -285,6 +283,8 @@ def main() -> int:
         for key, each in slopes.items():
             print(f"{key}: median {each['median']:.2f} ({each['least']:.2f} to {each['most']:.2f}), {each['an_hour']:+.3f} an hour (± {each['half_interval']:.3f})")
         print("\n".join(f"WRONG: {each}" for each in wrong) or judged)
+    if options.svg:
+        draw(options.svg, rows)
     return 1 if wrong else 0
 
 
