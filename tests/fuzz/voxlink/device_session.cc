@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "display/drivers/voxlink/protocol.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/voxlink/packets.h"
 
@@ -16,19 +17,18 @@ namespace voxlink = display::voxlink;
 namespace {
 
 constexpr size_t kMostPending = 64;  // URBs
-constexpr int kMostSteps = 256;
 
 }  // namespace
 
 DeviceSession::DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock,
-                             std::function<void()> look)
-    : model_(model), clock_(clock), look_(std::move(look)) {
+                             ExchangeKind kind, std::function<void()> look)
+    : model_(model), clock_(clock), kind_(kind), look_(std::move(look)) {
   model_.SetComplete([this](uint64_t id, TransferStatus status, uint32_t actual,
                             std::span<const std::byte> in) { Complete(id, status, actual, in); });
 }
 
 void DeviceSession::Run(Script script) {
-  for (int step = 0; step < kMostSteps && !script.done(); ++step) {
+  for (int step = 0; step < MostSteps(256) && !script.done(); ++step) {
     Step(script);
     look_();
   }
@@ -150,6 +150,7 @@ void DeviceSession::Complete(uint64_t id, TransferStatus status, uint32_t actual
   EXPECT_THAT_HOLDS(it != pending_.end(), "a transfer is completed that is not under way");
   const Pending pending = std::move(it->second);
   pending_.erase(it);
+  CountExchange(kind_, status == TransferStatus::kOk || status == TransferStatus::kShort);
   if (pending.length > 0) {
     EXPECT_THAT_HOLDS(in.size() <= pending.length);
     EXPECT_THAT_HOLDS(in.empty() || actual == in.size());

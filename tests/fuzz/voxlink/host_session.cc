@@ -20,6 +20,7 @@ HostSession::HostSession(Script& script) : script_(script) {
   config.max_sub_frames = 2;
   const uint8_t how = script_.Byte();
   holding_ = how % 4 == 1;
+  rare_ = (how >> 2 & 3) != 0;
   LyingDevice::Ways ways{.rarity = static_cast<uint8_t>(how >> 2 & 3)};
   if ((how & 0x80) != 0) {
     ways.sequence_shift = 0u - script_.Byte();
@@ -68,6 +69,17 @@ void HostSession::Run() {
   EXPECT_THAT_HOLDS(ShowsTheNewest(), display_->state_reason());
   display_->Stop();
   EXPECT_THAT_HOLDS(ledger_.owed.empty());
+  const display::DisplayStats& stats = display_->stats();
+  EXPECT_THAT_HOLDS(stats.volumes_submitted == volume_);
+  EXPECT_THAT_HOLDS(
+      stats.volumes_presented + stats.volumes_replaced + stats.volumes_lost == volume_,
+      "the volumes do not add up");
+  exchanges->attaches += stats.attaches;
+  exchanges->transfers_failed += stats.transfers_failed;
+  exchanges->slices_resent += stats.slices_resent;
+  exchanges->volumes_shown += stats.volumes_presented;
+  exchanges->volumes_lost += stats.volumes_lost;
+  ++exchanges->overcome;
 }
 
 bool HostSession::ShowsTheNewest() const {
@@ -98,10 +110,10 @@ void HostSession::Step() {
       Pass(script_.Byte() * kMillisecond);
       break;
     case 4:
-      Plug(script_.Flag());
+      Plug(rare_ ? script_.Byte() % 8 != 0 : script_.Flag());
       break;
     case 5:
-      (void)display_->SetBlank(script_.Flag());
+      (void)display_->SetBlank(rare_ ? script_.Byte() % 8 == 0 : script_.Flag());
       break;
     case 6:
       (void)display_->SetBrightness(script_.Byte() / 255.0);

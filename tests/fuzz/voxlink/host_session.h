@@ -67,6 +67,7 @@ class HostSession {
   std::shared_ptr<display::SliceFrame> newest_;
   uint64_t volume_ = 0;
   bool holding_ = false;
+  bool rare_ = false;  // lies, darkness and unplugged cables
   bool woken_ = false;
   sync::TimeNs next_ = 0;
 };
