@@ -5,6 +5,8 @@ import copy
 import json
 import struct
 
+import file_seeds
+
 
 def model():
     """A glTF document that has a bit of everything."""
@@ -131,6 +133,7 @@ def displays(put):
 
 
 def shapes(put):
+    file_seeds.files(put)
     displays(put)
     meshes(put)
     layouts(put)
