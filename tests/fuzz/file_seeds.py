@@ -221,3 +221,42 @@ def dicom(put):
 def files(put):
     for reader in (vox, pcd, las, ply, nrrd, nifti, dicom):
         reader(put)
+
+
+def recordings(put, encode):
+    """MCAP files; `encode` makes bytes of a WatchSceneResponse's text."""
+    string = lambda s: struct.pack("<I", len(s)) + s
+    record = lambda kind, body: bytes([kind]) + struct.pack("<Q", len(body)) + body
+    message = lambda body, number=0, channel=1: record(5, struct.pack("<HIQQ", channel, number, 5 + number, 5 + number) + body)
+    chunk = lambda records, packing=b"", size=None, crc=0, body=None: record(6, struct.pack("<QQQI", 0, 9, len(records) if size is None else size, crc) + string(packing) +
+                                                                             struct.pack("<Q", len(records if body is None else body)) + (records if body is None else body))
+    magic = b"\x89MCAP0\r\n"
+    head = record(1, string(b"") + string(b"seed")) + record(3, struct.pack("<H", 1) + string(b"voxeld.v1.WatchSceneResponse") + string(b"protobuf") + string(b"x"))
+    head += record(4, struct.pack("<HH", 1, 1) + string(b"voxeld/scene") + string(b"protobuf") + struct.pack("<I", 14) + string(b"a") + string(b"bcdef"))
+    box = 'primitive { box { size { x: 1 y: 1 z: 1 } } }'
+    layer = lambda name, number, more="visible: true": f'layers {{ owner: 1 layer: "{name}" number: {number} opacity: 255 {more} }} '
+    entity = lambda name, what=box, on="a": f'entities {{ info {{ key {{ owner: 1 layer: "{on}" id: "{name}" }} }} {what} }} '
+    thing = lambda name, what=box: f'objects {{ key {{ owner: 1 object: "{name}" }} definition {{ parts {{ {what} }} }} }} '
+    instance = lambda of: f'primitive {{ instance {{ object: "{of}" }} }}'
+    first = (layer("a", 1, 'visible: true mask_layer: "b"') + layer("b", 2, "") + layer("c" * 70, 3) + thing("o") + thing("p", instance("o")) + thing("q", instance("q")) + entity("x") + entity("y", instance("p")) +
+             entity("z", box, "b") + entity("w", box, "none") + "in_sync: 1")
+    steps = [first, 'removed_entities { owner: 1 layer: "a" id: "x" } ' + layer("a", 9) + "in_sync: 2", thing("o") + "in_sync: 3",
+             'removed_objects { owner: 1 object: "o" } removed_objects { owner: 1 object: "p" } removed_objects { owner: 1 object: "none" } in_sync: 4', 'removed_layers { owner: 1 layer: "a" } ' + layer("a", 10) + "in_sync: 5",
+             'removed_layers { owner: 1 layer: "b" } in_sync: 6']
+    told = [message(encode(step), i) for i, step in enumerate(steps)]
+    end = record(15, bytes(4))
+    whole = head + b"".join(told)
+    for body in (whole + end, whole, head + chunk(b"".join(told)) + end, head + chunk(b"".join(told), crc=1), head + chunk(b"".join(told), crc=zlib.crc32(b"".join(told))) + end, head + chunk(b"abc", b"lz4"), head + chunk(b"abc", b"zstd"),
+                 head + chunk(chunk(b"")), head + chunk(b"\5abc"), head + chunk(b"", size=1 << 40), head + record(6, b"abc"), head + record(3, b"a"), head + record(4, b"a"), head + record(5, b"a"), head + end,
+                 head + message(b"\xff\xff"), head + message(encode(steps[1]), channel=7), head + b"\0" + bytes(8), head + b"\5" + b"\xff" * 8, head + b"\5" + struct.pack("<Q", 99), head + record(4, struct.pack("<HH", 1, 1) + string(b"voxeld/scene") + string(b"")
+                 + struct.pack("<I", 99)), whole[:len(head) + 40], head + message(encode(layer("a", 1))) + told[1] + end, head + record(0x80, b"later") + told[0] + end,
+                 head + chunk(b"".join(told), b"zstd", body=b"\x28\xb5\x2f\xfd\x24\x03\x19\x00\x00abc\x00\x00\x00\x00"), head + b"".join(told[i % 6] for i in range(40)) + end):
+        put("mcap_file", magic + body, 16384)
+    # A block of zstd that is not compressed, without a checksum: a frame as whole as any.
+    plain = b"".join(told)
+    frame = b"\x28\xb5\x2f\xfd\xa0" + struct.pack("<I", len(plain)) + struct.pack("<I", len(plain) << 3 | 1)[:3] + plain
+    for packed in (frame, frame + b"\0", frame[:-9]):
+        put("mcap_file", magic + head + chunk(plain, b"zstd", body=packed) + end, 16384)
+    put("mcap_file", magic + head + chunk(plain, b"zstd", size=9, body=frame) + end, 16384)
+    put("mcap_file", b"none of it", 16384)
+    put("mcap_file", b"", 16384)

@@ -3,9 +3,13 @@ gives `put(target, bytes)`."""
 import base64
 import copy
 import json
+import pathlib
 import struct
+import subprocess
 
 import file_seeds
+
+PROTO = pathlib.Path(__file__).resolve().parents[2] / "proto"
 
 
 def model():
@@ -132,8 +136,14 @@ def displays(put):
         put("profile_text", text.encode())
 
 
+def encode(line):
+    return subprocess.run(["protoc", "-I", PROTO, "--encode=voxeld.v1.WatchSceneResponse", "voxeld/v1/scene.proto"], input=line.encode(), cwd=PROTO, capture_output=True,
+                          check=True).stdout
+
+
 def shapes(put):
     file_seeds.files(put)
+    file_seeds.recordings(put, encode)
     displays(put)
     meshes(put)
     layouts(put)
