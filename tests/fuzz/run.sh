@@ -46,9 +46,8 @@ seconds=${words[0]}
 out=${words[1]}
 targets=("${words[@]:2}")
 if [ ${#targets[@]} -eq 0 ]; then
-  for program in "$here"/bin/*_fuzz; do
-    name=$(basename "$program")
-    targets+=("${name%_fuzz}")
+  for name in "$here"/options/*; do
+    targets+=("$(basename "$name")")
   done
 fi
 for target in "${targets[@]}"; do
@@ -101,7 +100,7 @@ fuzz() {  # TARGET SECONDS
   end=$((begin + length * 1000000))
   # What breaks it ends it: as often as that it is begun again.
   for ((tries = 0; tries < 4; ++tries)); do
-    left=$(((end - ${EPOCHREALTIME/[.,]/}) / 1000000))
+    left=$(((end - ${EPOCHREALTIME/[.,]/} + 500000) / 1000000))
     [ "$left" -gt 0 ] || break
     (cd "$here" && exec "bin/${target}_fuzz" "${options[@]}" -timeout=20 -rss_limit_mb=2048 "-artifact_prefix=$out/found/$target-" \
       "-max_total_time=$left" -print_final_stats=1 "$inputs" "corpus/$target" 2>&1 >/dev/null) | follow "$target" "$begin"
