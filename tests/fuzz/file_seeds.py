@@ -92,20 +92,13 @@ def ply(put):
         files.append(head("element vertex 1", *every, form=form) + b"abc")
         files.append(head("element vertex 2", *xyz, "property list uchar int l", form=form) + struct.pack(order + "3fBi", 1, 2, 3, 1, 9) + struct.pack(order + "3fB", 1, 2, 3, 200))
         # As after a copy that took each CR LF for LF: a byte is lost before each 0x0A.
-        row = lambda i: struct.pack(order + "6f", i, 2, 3, 0, 0, 1)
-        whole = [bytearray(row(i)) for i in range(12)]
-        for lost in ((4,), (4, 8), (0,)):
-            body = b""
-            for i, entry in enumerate(whole):
-                entry = bytes(entry)
-                if i in lost:
-                    entry = entry[:4] + b"\n" + entry[6:]
-                body += entry
-            text = head("element vertex 12", *xyz, *normals, form=form)
-            files.append(text + body)
-            files.append(text + body[:-3])
-            files.append(text.replace(b"nz", b"no") + body)
-            files.append(text.replace(b"float nz", b"int nz") + body)
+        row = lambda i: bytearray(struct.pack(order + "6f", i % 5, i % 4, i % 3, 0, 0, 1))
+        text = head(*["comment"] * 110, "element vertex 40", *xyz, *normals, form=form)
+        for lost in ((14,), (14, 18, 23), (0,), (39,)):
+            for entry in (lambda r: r[:4] + b"\n" + r[6:], lambda r: r[:12] + b"\n" + r[15:], lambda r: b"\n" + r[2:], lambda r: r[:20]):
+                body = b"".join(bytes(entry(row(i)) if i in lost else row(i)) for i in range(40))
+                files.append(text + body)
+        files += [text + body[:-300], text.replace(b"nz", b"no") + body, text.replace(b"float nz", b"int nz") + body, text.replace(b"property float nz", b"property list uchar float nz") + body]
     for file in files:
         put("import_binary", b"\x02" + file)
 

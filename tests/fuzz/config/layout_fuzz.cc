@@ -17,8 +17,7 @@ namespace {
 
 namespace wiring = display::wiring;
 
-constexpr wiring::PixelNumbers kNumbers{
-    .a_slice = 16, .slices = 4, .a_strip = 8, .unit = "board"};
+constexpr wiring::PixelNumbers kNumbers{.a_slice = 16, .slices = 4, .a_strip = 8, .unit = "board"};
 
 void CheckTaken(const absl::StatusOr<display::Lattice>& lattice) {
   if (!lattice.ok()) {
