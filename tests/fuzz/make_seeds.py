@@ -23,6 +23,8 @@ import time
 import zlib
 from concurrent import futures
 
+import shape_seeds
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SEEDS = ROOT / "build/fuzz/seeds"
 CORPUS = ROOT / "build/fuzz/corpus"
@@ -483,9 +485,9 @@ def main():
     voxlink()
     programs()
     sockets()
+    shape_seeds.shapes(put)
     if not (args.bin / "voxeld").exists():
-        print(f"make_seeds: no voxeld in {args.bin}; without its traffic", file=sys.stderr)
-        return 1
+        return print(f"make_seeds: no voxeld in {args.bin}; without its traffic", file=sys.stderr) or 1
     with tempfile.TemporaryDirectory() as folder:
         kept(args.bin, pathlib.Path(folder))
         traffic(args.bin, pathlib.Path(folder))

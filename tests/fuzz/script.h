@@ -11,6 +11,10 @@
 
 namespace voxeld::fuzz {
 
+// Of a script no more steps are taken than this, so that no input takes long; programs that go on for long make it more.
+inline int steps_times = 1;
+inline int MostSteps(int usual) { return usual * steps_times; }
+
 class Script {
  public:
   Script(const uint8_t* data, size_t size) : rest_(data, size) {}

@@ -11,6 +11,7 @@
 
 #include "daemon/viewer/viewer_socket.h"
 #include "tests/daemon/fakes/simulation.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 
@@ -19,8 +20,6 @@ namespace {
 
 using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
 using Json = nlohmann::json;
-
-constexpr int kMostSteps = 48;
 
 class Peer final : public http::WebSocketPeer {
  public:
@@ -71,7 +70,7 @@ void Run(Script script) {
     EXPECT_THAT_HOLDS(shared->watches <= 64);
   };
   testing::Simulation::Client client = simulation.Open();
-  for (int step = 0; step < kMostSteps && !script.done() && !peer->closed; ++step) {
+  for (int step = 0; step < MostSteps(48) && !script.done() && !peer->closed; ++step) {
     switch (script.Byte() % 8) {
       case 0:
         simulation.Advance(script.Byte() * 50 * sync::kMillisecond);
@@ -90,6 +89,7 @@ void Run(Script script) {
         const Json json = Json::parse(text, nullptr, false);
         service->OnText(std::move(text));
         settle();
+        CountExchange(ExchangeKind::kViewer, peer->errors == errors);
         if (!json.is_object())
           EXPECT_THAT_HOLDS(peer->errors == errors + 1, "garbage has no error");
         break;

@@ -15,6 +15,7 @@
 #include "daemon/http/connection_stream.h"
 #include "daemon/http/web_socket.h"
 #include "daemon/http/web_socket_session.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 
@@ -24,8 +25,6 @@ namespace {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = daemon::http;
-
-constexpr int kMostSteps = 64;
 
 // Says back what it hears.
 class Echo final : public http::WebSocketService {
@@ -81,6 +80,7 @@ class Session {
     beast::error_code error;
     parser.put(asio::buffer(head), error);
     if (error || !parser.is_header_done()) {
+      CountExchange(ExchangeKind::kWebSocket, false);
       close(ends_[1]);
       return;
     }
@@ -93,7 +93,7 @@ class Session {
         },
         [this](http::WebSocketSession*) { ++closed_; });
     Poll();
-    for (int step = 0; step < kMostSteps && !script_.done() && closed_ == 0; ++step) Step();
+    for (int step = 0; step < MostSteps(64) && !script_.done() && closed_ == 0; ++step) Step();
   }
 
  private:
@@ -143,6 +143,7 @@ class Session {
   void Say(const std::string& bytes) {
     [[maybe_unused]] const ssize_t sent = send(ends_[0], bytes.data(), bytes.size(), MSG_NOSIGNAL);
     Poll();
+    CountExchange(ExchangeKind::kWebSocket, closed_ == 0);
   }
 
   void Poll() {

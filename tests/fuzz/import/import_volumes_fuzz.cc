@@ -1,6 +1,8 @@
 // Volumes: NRRD, raw numbers; and of those that libraries read (NIfTI, DICOM) the checks before.
 
+#include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "tests/fuzz/import/check_model.h"
 #include "tools/voxelctl/import/dicom_check.h"
@@ -28,9 +30,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       break;
     case 2: {
       LooksLikeDicom(file);
+      const absl::StatusOr<std::optional<SourceFile>> inflated = InflateDicom(file);
+      voxeld::fuzz::ExpectSays(inflated.status());
+      if (inflated.ok() && inflated->has_value()) {
+        voxeld::fuzz::ExpectSays(CheckDicom(**inflated).status());
+      }
       const absl::StatusOr<DicomFacts> facts = CheckDicom(file);
       voxeld::fuzz::ExpectSays(facts.status());
       if (!facts.ok()) break;
+      for (const double number : DicomNumbers(facts->orientation)) {
+        EXPECT_THAT_HOLDS(std::isfinite(number));
+      }
       for (const auto& [from, count] : facts->pixels) {
         EXPECT_THAT_HOLDS(from <= file.bytes.size() && count <= file.bytes.size() - from);
       }

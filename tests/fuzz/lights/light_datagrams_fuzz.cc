@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/lights/tally.h"
 #include "tests/fuzz/script.h"
@@ -54,6 +55,7 @@ void Run(Script script) {
       const absl::StatusOr<Datagram> read = lights::ReadDatagram(options.protocol, packet);
       const absl::StatusOr<Datagram> added = intake.AddDatagram(packet, now);
       EXPECT_THAT_HOLDS(read.ok() == added.ok());
+      CountExchange(ExchangeKind::kDatagram, read.ok());
       if (read.ok()) {
         CheckDatagram(options.protocol, *read, packet);
         if (read->kind == Datagram::Kind::kAsk) {

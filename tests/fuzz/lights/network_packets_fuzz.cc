@@ -9,6 +9,7 @@
 
 #include "display/drivers/network/decoder.h"
 #include "display/drivers/network/packets.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 
@@ -67,6 +68,7 @@ void Run(Script script) {
     }
     const absl::Status now = decoder.OnBytes(0, packet, 0);
     ExpectSays(now);
+    CountExchange(ExchangeKind::kNetwork, read.has_value());
     if (status.ok()) EXPECT_THAT_HOLDS(now.ok() || !read.has_value(), now.ToString());
     status = now;
     if (const auto volume = decoder.TakeVolume()) {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/lights/tally.h"
 #include "tests/fuzz/script.h"
@@ -57,6 +58,7 @@ void Run(Script script) {
         messages.emplace_back(message.channel * 256 + message.command,
                               std::vector<uint8_t>(message.data.begin(), message.data.end()));
         intake.AddMessage(message, now);
+        CountExchange(ExchangeKind::kOpc, intake.malformed().ok());
       });
     }
     EXPECT_THAT_HOLDS(intake.tally().messages == messages.size());

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "daemon/listen/greeting.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 
@@ -24,6 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   };
   Greeting whole(most), pieces(most);
   const Greeting::Verdict verdict = read(whole, received);
+  fuzz::CountExchange(fuzz::ExchangeKind::kGreeting, verdict != Greeting::Verdict::kWrong);
   Greeting::Verdict last = Greeting::Verdict::kMore;
   for (size_t at = 0; last == Greeting::Verdict::kMore; at += step) {
     const std::string_view some = std::string_view(received).substr(0, at);

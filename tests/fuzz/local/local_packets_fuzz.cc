@@ -18,6 +18,7 @@
 #include "daemon/local/connection.h"
 #include "daemon/local/doorbell.h"
 #include "daemon/local/tokens.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 #include "voxeld/v1/local.pb.h"
@@ -26,8 +27,6 @@ namespace voxeld::fuzz {
 namespace {
 
 using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
-
-constexpr int kMostPackets = 64;
 
 class Producer {
  public:
@@ -44,7 +43,7 @@ class Producer {
   }
 
   void Run(Script script) {
-    for (int i = 0; i < kMostPackets && !script.done(); ++i) Step(script);
+    for (int i = 0; i < MostSteps(64) && !script.done(); ++i) Step(script);
   }
 
  private:
@@ -130,6 +129,7 @@ class Producer {
     v1::LocalAnswer answer;
     EXPECT_THAT_HOLDS(answer.ParseFromArray(bytes, static_cast<int>(got)));
     EXPECT_THAT_HOLDS(answer.what_case() != v1::LocalAnswer::WHAT_NOT_SET);
+    CountExchange(ExchangeKind::kLocal, !answer.has_refused());
     if (answer.has_refused()) {
       ExpectSays(absl::InvalidArgumentError(answer.refused().message()));
       EXPECT_THAT_HOLDS(!answer.refused().message().empty());

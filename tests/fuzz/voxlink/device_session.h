@@ -10,14 +10,16 @@
 #include "display/drivers/voxlink/packet.h"
 #include "display/sync/fake_clock.h"
 #include "display/usb/device_model.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/script.h"
 
 namespace voxeld::fuzz {
 
 class DeviceSession {
  public:
-  // Both outlive it. `look` is called after each step.
-  DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock, std::function<void()> look);
+  // Both outlive it. `look` is called after each step; transfers are counted as `kind`.
+  DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock, ExchangeKind kind,
+                std::function<void()> look);
 
   void Run(Script script);
 
@@ -38,6 +40,7 @@ class DeviceSession {
 
   display::UsbDeviceModel& model_;
   sync::FakeClock& clock_;
+  const ExchangeKind kind_;
   const std::function<void()> look_;
   display::voxlink::PacketWriter writer_;
   uint64_t next_id_ = 1;

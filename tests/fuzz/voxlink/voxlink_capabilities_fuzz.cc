@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "display/drivers/voxlink/capabilities.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -12,6 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   namespace voxlink = display::voxlink;
   const auto block = std::as_bytes(std::span(data, size));
   const absl::StatusOr<voxlink::DeviceCapabilities> read = voxlink::ParseCapabilities(block);
+  fuzz::CountExchange(fuzz::ExchangeKind::kCapabilityBlock, read.ok());
   if (!read.ok()) {
     fuzz::ExpectSays(read.status());
     return 0;

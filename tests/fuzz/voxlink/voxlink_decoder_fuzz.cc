@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "display/drivers/voxlink/decoder.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 #include "tests/fuzz/voxlink/packets.h"
@@ -53,6 +54,7 @@ void Run(Script script) {
     for (const auto& piece : {std::span(bytes).first(cut), std::span(bytes).subspan(cut)}) {
       const absl::Status now = decoder.OnBytes(display::voxlink::kBulkOut, piece, 0);
       ExpectSays(now);
+      CountExchange(ExchangeKind::kDecoded, now.ok());
       EXPECT_THAT_HOLDS(status.ok() || now == status, "a fault does not go away");
       status = now;
       if (std::optional<DecodedVolume> volume = decoder.TakeVolume()) {

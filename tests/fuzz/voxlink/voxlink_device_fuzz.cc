@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "display/emulator/voxlink_device.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/voxlink/device_session.h"
 
@@ -30,7 +31,7 @@ void Run(Script script) {
   sync::FakeClock clock;
   display::emulator::VoxlinkDevice device(config, clock);
   uint64_t excess = 0;
-  DeviceSession session(device, clock, [&] {
+  DeviceSession session(device, clock, ExchangeKind::kModel, [&] {
     if (const auto seen = device.Seen()) {
       EXPECT_THAT_HOLDS(device.plugged(), "an unplugged device shows something");
       EXPECT_THAT_HOLDS(seen->pictures.size() == seen->layout.pictures());

@@ -4,6 +4,7 @@
 
 #include "display/drivers/voxlink/capabilities.h"
 #include "tests/display/drivers/firmware/firmware_device.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/voxlink/device_session.h"
 
@@ -31,7 +32,7 @@ void Run(Script script) {
       .geometry = {.shape = stack}};
   sync::FakeClock clock;
   display::FirmwareDevice device(capabilities, display::UsbSpeed::kSuper, clock);
-  DeviceSession session(device, clock, [&] {
+  DeviceSession session(device, clock, ExchangeKind::kFirmware, [&] {
     const auto light = device.Light();
     EXPECT_THAT_HOLDS(light.empty() ||
                       light.size() == size_t{device.core().pictures} * device.core().picture_bytes);

@@ -9,6 +9,7 @@
 #include "daemon/scene/commit_applier.h"
 #include "daemon/text/fonts.h"
 #include "daemon/wire/kept.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 
@@ -20,6 +21,7 @@ using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
 void Refused(const absl::Status& status) {
   EXPECT_THAT_HOLDS(absl::IsDataLoss(status) || absl::IsInvalidArgument(status), status.ToString());
   ExpectSays(status);
+  CountExchange(ExchangeKind::kKeptRow, false);
 }
 
 void Run(Script script) {
@@ -39,6 +41,7 @@ void Run(Script script) {
     case 0: {
       const auto owner = wire::DecodeKeptOwner(bytes);
       if (!owner.ok()) return Refused(owner.status());
+      CountExchange(ExchangeKind::kKeptRow, true);
       const auto again = wire::DecodeKeptOwner(wire::EncodeKept(*owner));
       EXPECT_THAT_HOLDS(again.ok() && wire::EncodeKept(*again) == wire::EncodeKept(*owner));
       break;
@@ -46,6 +49,7 @@ void Run(Script script) {
     case 1: {
       const auto layer = wire::DecodeKeptLayer(bytes, limits);
       if (!layer.ok()) return Refused(layer.status());
+      CountExchange(ExchangeKind::kKeptRow, true);
       CheckAlone(layer->operation, limits);
       EXPECT_THAT_HOLDS(std::holds_alternative<LayerState>(layer->operation.op));
       break;
@@ -53,6 +57,7 @@ void Run(Script script) {
     case 2: {
       const auto object = wire::DecodeKeptObject("object", bytes, limits, nullptr, &fonts);
       if (!object.ok()) return Refused(object.status());
+      CountExchange(ExchangeKind::kKeptRow, true);
       const auto* define = std::get_if<DefineObject>(&object->operation.op);
       EXPECT_THAT_HOLDS(define != nullptr && define->data != nullptr);
       CheckAlone(object->operation, limits);
@@ -70,6 +75,7 @@ void Run(Script script) {
       const auto entity =
           wire::DecodeKeptEntity("layer", "id", bytes, now, limits, nullptr, &fonts);
       if (!entity.ok()) return Refused(entity.status());
+      CountExchange(ExchangeKind::kKeptRow, true);
       if (!entity->has_value()) return;
       CheckAlone(**entity, limits);
       const auto* upsert = std::get_if<Upsert>(&(*entity)->op);

@@ -23,6 +23,7 @@
 #include "daemon/wire/kept.h"
 #include "daemon/wire/memory_source.h"
 #include "gpu/delta.h"
+#include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
 
@@ -30,8 +31,6 @@ namespace voxeld::fuzz {
 namespace {
 
 using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
-
-constexpr int kMostMessages = 32;
 
 Limits SmallLimits() {
   Limits limits;
@@ -254,7 +253,7 @@ class Session {
   }
 
   void Run(Script script) {
-    for (int message = 0; message < kMostMessages && !script.done(); ++message) {
+    for (int message = 0; message < MostSteps(32) && !script.done(); ++message) {
       const uint8_t what = script.Byte();
       Client& client = clients_[what & 1];
       switch (what >> 1 & 7) {
@@ -317,6 +316,7 @@ class Session {
   }
 
   void Take(Client& client, wire::Decoded decoded, bool update) {
+    CountExchange(ExchangeKind::kStore, decoded.status.ok() && decoded.refused.issues.empty());
     if (!decoded.status.ok()) {
       ExpectSays(decoded.status);
       EXPECT_THAT_HOLDS(decoded.operations.empty() && !decoded.open.has_value());
