@@ -68,6 +68,7 @@ struct CoreOptions {
   StateSink* state = nullptr;
   std::function<StateFigures()> state_figures;  // for Stats; from any thread. May be empty
   std::function<AssetFigures()> asset_figures;  // the same
+  std::function<ProcessFigures()> process_figures;  // the same
   // The listener's figures, for Stats; from any thread. May be empty.
   std::function<ListenFigures()> connections;
 };

@@ -262,7 +262,8 @@ void TopView::AddConnections(std::vector<TopLine>* out) const {
            ? TopStyle::kWarning
            : TopStyle::kPlain});
   for (const std::string& trouble : {c.unreachable(), c.access_trouble(), c.config_trouble(),
-                                     stats_.state().trouble(), stats_.assets().trouble()}) {
+                                     stats_.state().trouble(), stats_.assets().trouble(),
+                                     stats_.process().trouble()}) {
     if (!trouble.empty()) out->push_back({EscapeForTerminal(trouble), TopStyle::kBad});
   }
 }

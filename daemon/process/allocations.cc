@@ -1,0 +1,94 @@
+// What every allocation of the process comes by: operator new, and libraries in C, of which some abort when they get nothing.
+// The C library's own allocator does the work; what it has no memory for is tried again as long as the reserve helps.
+// The program defines the names that it would otherwise take from the C library, as that allows, under which its own are found
+// as __libc_….
+//
+// Linked into programs alone, never into a library: where a sanitizer has its own allocator, and beside another C library,
+// there is nothing here.
+#include <malloc.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+
+#include "daemon/process/memory_reserve.h"
+
+#if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
+
+extern "C" {
+void* __libc_malloc(size_t bytes);
+void* __libc_calloc(size_t count, size_t bytes);
+void* __libc_realloc(void* memory, size_t bytes);
+void* __libc_memalign(size_t alignment, size_t bytes);
+}
+
+namespace {
+
+using voxeld::daemon::MemoryReserve;
+
+// ENOMEM only where there is none in the end.
+template <typename Allocate>
+void* Try(size_t bytes, Allocate allocate) noexcept {
+  const int before = errno;
+  for (unsigned attempt = 0;; ++attempt) {
+    void* const memory = allocate();
+    if (memory != nullptr) [[likely]] {
+      if (attempt > 0) errno = before;
+      return memory;
+    }
+    // More than there can be: nothing would help.
+    if (bytes > PTRDIFF_MAX || !MemoryReserve::OfProcess().Help(bytes, attempt)) break;
+  }
+  errno = ENOMEM;
+  return nullptr;
+}
+
+bool IsPowerOfTwo(size_t number) { return number != 0 && (number & (number - 1)) == 0; }
+
+}  // namespace
+
+extern "C" {
+
+__attribute__((visibility("default"))) void* malloc(size_t bytes) {
+  return Try(bytes, [=] { return __libc_malloc(bytes); });
+}
+
+__attribute__((visibility("default"))) void* calloc(size_t count, size_t bytes) {
+  size_t all = 0;
+  if (__builtin_mul_overflow(count, bytes, &all)) all = SIZE_MAX;
+  return Try(all, [=] { return __libc_calloc(count, bytes); });
+}
+
+__attribute__((visibility("default"))) void* realloc(void* memory, size_t bytes) {
+  // That frees it, and answers nothing.
+  if (memory != nullptr && bytes == 0) return __libc_realloc(memory, 0);
+  return Try(bytes, [=] { return __libc_realloc(memory, bytes); });
+}
+
+__attribute__((visibility("default"))) void* memalign(size_t alignment, size_t bytes) {
+  return Try(bytes, [=] { return __libc_memalign(alignment, bytes); });
+}
+
+__attribute__((visibility("default"))) void* aligned_alloc(size_t alignment, size_t bytes) {
+  if (!IsPowerOfTwo(alignment)) {
+    errno = EINVAL;
+    return nullptr;
+  }
+  return memalign(alignment, bytes);
+}
+
+__attribute__((visibility("default"))) int posix_memalign(void** memory, size_t alignment,
+                                                          size_t bytes) {
+  if (!IsPowerOfTwo(alignment) || alignment % sizeof(void*) != 0) return EINVAL;
+  const int before = errno;
+  void* const found = memalign(alignment, bytes);
+  errno = before;
+  if (found == nullptr) return ENOMEM;
+  *memory = found;
+  return 0;
+}
+
+}  // extern "C"
+
+#endif
