@@ -105,11 +105,19 @@ class StagedEngine final : public gpu::Engine {
 
 }  // namespace
 
+namespace {
+constinit thread_local bool running = false;
+}
+
 void EngineStage::Run() {
   const Call call = std::move(calls.front());
   calls.pop_front();
+  running = true;
   call.run(false);
+  running = false;
 }
+
+bool EngineStage::IsRunning() { return running; }
 
 std::unique_ptr<gpu::Engine> MakeStagedEngine(std::shared_ptr<EngineStage> stage) {
   return std::make_unique<StagedEngine>(std::move(stage));
