@@ -33,8 +33,8 @@ using HashMap = absl::flat_hash_map<Key, Value, typename absl::flat_hash_map<Key
                                     typename absl::flat_hash_map<Key, Value>::key_equal,
                                     NeverThrowing<std::pair<const Key, Value>>>;
 template <typename Key>
-using HashSet = absl::flat_hash_set<Key, typename absl::flat_hash_set<Key>::hasher,
-                                    typename absl::flat_hash_set<Key>::key_equal,
-                                    NeverThrowing<Key>>;
+using HashSet =
+    absl::flat_hash_set<Key, typename absl::flat_hash_set<Key>::hasher,
+                        typename absl::flat_hash_set<Key>::key_equal, NeverThrowing<Key>>;
 
 }  // namespace voxeld::gpu

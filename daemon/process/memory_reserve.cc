@@ -47,7 +47,8 @@ void SayThatMemoryEnded(size_t bytes) noexcept {
 
 [[noreturn]] void End() {
   SayAtOnce(
-      "voxeld: it cannot go on without memory, and is ended; what was told to be durable is kept\n");
+      "voxeld: it cannot go on without memory, and is ended; what was told to be durable is "
+      "kept\n");
   _exit(1);
 }
 

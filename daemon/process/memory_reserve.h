@@ -17,8 +17,8 @@ class MemoryReserve {
   static constexpr size_t kMostParts = 64;
 
   struct Figures {
-    uint64_t failed = 0;   // allocations that the system had no memory for, at first
-    uint64_t refused = 0;  // of them those that there was no memory for in the end
+    uint64_t failed = 0;      // allocations that the system had no memory for, at first
+    uint64_t refused = 0;     // of them those that there was no memory for in the end
     uint64_t last_bytes = 0;  // what the last of them asked for
     uint64_t wanted_bytes = 0, held_bytes = 0;
   };

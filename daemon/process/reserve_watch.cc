@@ -41,15 +41,15 @@ ProcessFigures ReserveWatch::figures() const {
                          .reserve_held_bytes = now.held_bytes,
                          .trouble = ""};
   if (now.held_bytes < now.wanted_bytes) {
-    figures.trouble =
-        absl::StrCat("the system has no memory: of its reserve of ", now.wanted_bytes,
-                     " bytes the daemon has ", now.held_bytes, "; give the machine more, or lower max_memory_bytes");
+    figures.trouble = absl::StrCat("the system has no memory: of its reserve of ", now.wanted_bytes,
+                                   " bytes the daemon has ", now.held_bytes,
+                                   "; give the machine more, or lower max_memory_bytes");
   } else if (failed_ns_ > 0 && clock_.Now() - failed_ns_ < kTold) {
-    figures.trouble = absl::StrCat(
-        "the system had no memory ", (clock_.Now() - failed_ns_) / sync::kSecond, " s ago (",
-        now.failed, " allocations since the start, the last of ", now.last_bytes,
-        " bytes); the reserve helped ",
-        now.refused == 0 ? "them all" : absl::StrCat("all but ", now.refused));
+    figures.trouble =
+        absl::StrCat("the system had no memory ", (clock_.Now() - failed_ns_) / sync::kSecond,
+                     " s ago (", now.failed, " allocations since the start, the last of ",
+                     now.last_bytes, " bytes); the reserve helped ",
+                     now.refused == 0 ? "them all" : absl::StrCat("all but ", now.refused));
   }
   return figures;
 }

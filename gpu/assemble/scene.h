@@ -90,9 +90,7 @@ class Scene {
   absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk, SceneObserver& observer,
                      std::vector<std::unique_ptr<Drawable>>& gone);
 
-  const HashMap<uint64_t, std::unique_ptr<Drawable>>& drawables() const {
-    return drawables_;
-  }
+  const HashMap<uint64_t, std::unique_ptr<Drawable>>& drawables() const { return drawables_; }
   const HashMap<uint64_t, std::unique_ptr<Layer>>& layers() const { return layers_; }
   // Sees to it that every layer has its `clip`. `anew`: the view has changed.
   void MapClips(const Affine& view, bool anew);

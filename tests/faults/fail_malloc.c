@@ -116,7 +116,8 @@ static Site* Here(void) {
 }
 
 static int Describe(char* line, size_t size, const Site* site) {
-  int at = snprintf(line, size, "%016" PRIx64 " %" PRIu64, (uint64_t)site->id, (uint64_t)site->count);
+  int at =
+      snprintf(line, size, "%016" PRIx64 " %" PRIu64, (uint64_t)site->id, (uint64_t)site->count);
   for (int i = 0; i < kFrames && site->frames[i] != 0; ++i) {
     const struct link_map* object = ObjectOf(site->frames[i]);
     at += snprintf(line + at, size - (size_t)at, " %s+0x%" PRIxPTR, NameOf(object),

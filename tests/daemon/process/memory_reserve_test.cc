@@ -68,7 +68,8 @@ TEST(MemoryReserve, GivesUpAPartAfterTheOtherAndSaysOnceThatNothingIsLeft) {
   EXPECT_TRUE(reserve.Help(7, 0)) << "what the allocator keeps may help";
   EXPECT_FALSE(reserve.Help(7, 1));
   EXPECT_EQ(::testing::internal::GetCapturedStderr(),
-            "voxeld: out of memory: there are no 100 bytes to be had, and the reserve is used up or too small\n");
+            "voxeld: out of memory: there are no 100 bytes to be had, and the reserve is used up "
+            "or too small\n");
   EXPECT_EQ(reserve.figures().failed, 2u);
   EXPECT_EQ(reserve.figures().refused, 2u);
   EXPECT_EQ(reserve.figures().last_bytes, 7u);
@@ -172,8 +173,9 @@ void UseItUp() {
 }
 
 TEST(MemoryReserveDeathTest, WithoutMemoryTheProcessEndsWithAReason) {
-  EXPECT_EXIT(UseItUp(), ::testing::ExitedWithCode(1),
-              "out of memory: there are no [0-9]+ bytes to be had(.|\n)*it cannot go on without memory");
+  EXPECT_EXIT(
+      UseItUp(), ::testing::ExitedWithCode(1),
+      "out of memory: there are no [0-9]+ bytes to be had(.|\n)*it cannot go on without memory");
 }
 
 void UseItUpWhereSomebodyCopes() {

@@ -38,7 +38,8 @@ TEST_F(ReserveWatchTest, TakesBackWhatWasGivenUpAndTellsOfIt) {
 
   clock_.Advance(sync::kSecond);
   ASSERT_TRUE(reserve_.Help(4711, 0));
-  EXPECT_THAT(watch.figures().trouble, HasSubstr("of its reserve of 4194304 bytes the daemon has 2097152"));
+  EXPECT_THAT(watch.figures().trouble,
+              HasSubstr("of its reserve of 4194304 bytes the daemon has 2097152"));
   EXPECT_EQ(watch.figures().reserve_held_bytes, MemoryReserve::kPartBytes);
   EXPECT_EQ(Logged(), "") << "from within an allocation";
   watch.Look();
@@ -53,7 +54,8 @@ TEST_F(ReserveWatchTest, TakesBackWhatWasGivenUpAndTellsOfIt) {
   EXPECT_EQ(watch.figures().allocations_failed, 1u);
   EXPECT_EQ(watch.figures().allocations_refused, 0u);
   EXPECT_EQ(watch.figures().trouble,
-            "the system had no memory 3 s ago (1 allocations since the start, the last of 4711 bytes); the "
+            "the system had no memory 3 s ago (1 allocations since the start, the last of 4711 "
+            "bytes); the "
             "reserve helped them all");
   clock_.Advance(ReserveWatch::kTold);
   EXPECT_EQ(watch.figures().trouble, "");

@@ -199,7 +199,8 @@ TEST(OneFailure, EachAllocationOfSqlite) {
     EXPECT_EQ(sqlite3_memory_used(), 0) << "what it asked for is held";
     failed += now;
   }
-  std::cout << allocations << " allocations, " << failed << " of them told to the caller when they failed\n";
+  std::cout << allocations << " allocations, " << failed
+            << " of them told to the caller when they failed\n";
   EXPECT_GT(allocations, 100u);
   EXPECT_GT(failed, static_cast<int>(allocations / 3)) << "they fail, and nobody is told";
 }
