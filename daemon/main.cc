@@ -35,7 +35,6 @@
 #include "daemon/pipeline/view.h"
 #include "daemon/play/setup.h"
 #include "daemon/process/end_limit.h"
-#include "daemon/process/memory_reserve.h"
 #include "daemon/process/process.h"
 #include "daemon/process/reserve_watch.h"
 #include "daemon/process/supervisor.h"
@@ -218,7 +217,7 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
           const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
   std::optional<EndLimit> end_limit;  // of all that is below, to its last destructor
-  ReserveWatch reserve(MemoryReserve::OfProcess(), config.server.memory_reserve_bytes, clock, log);
+  ReserveWatch reserve(config.server.memory_reserve_bytes, clock, log);
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
   absl::StatusOr<std::unique_ptr<access::Security>> opened =
@@ -362,11 +361,10 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
       log.Info("calls ended: their callers may not make them any more",
                {{"calls", absl::StrCat(ended)}});
   });
-  auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval,
-                                                 [&security, &reserve] {
-                                                   security->Look();
-                                                   reserve.Look();
-                                                 });
+  auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval, [&] {
+    security->Look();
+    reserve.Look();
+  });
 
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
 
@@ -447,7 +445,6 @@ int Main(int argc, char** argv) {
       Supervisor::OfProcess();  // before there are other descriptors and threads
   RaiseDescriptorLimit();
   TuneProcess();
-  EndWhenMemoryEnds();
   umask(0007);  // sockets are for the user and the group from the moment that they exist
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <new>
 
 #include "daemon/process/memory_reserve.h"
 
@@ -90,5 +91,19 @@ __attribute__((visibility("default"))) int posix_memalign(void** memory, size_t 
 }
 
 }  // extern "C"
+
+// Who asks so copes; the C++ library's own would ask the handler first (EndWhenMemoryEnds).
+void* operator new(size_t bytes, const std::nothrow_t&) noexcept { return malloc(bytes); }
+void* operator new[](size_t bytes, const std::nothrow_t&) noexcept { return malloc(bytes); }
+void* operator new(size_t bytes, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+  return memalign(static_cast<size_t>(alignment), bytes);
+}
+void* operator new[](size_t bytes, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+  return memalign(static_cast<size_t>(alignment), bytes);
+}
+
+__attribute__((constructor(101))) static void BeforeAllElse() {
+  voxeld::daemon::EndWhenMemoryEnds();
+}
 
 #endif

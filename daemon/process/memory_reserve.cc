@@ -153,6 +153,7 @@ MemoryReserve::Figures MemoryReserve::figures() const noexcept {
 }
 
 void EndWhenMemoryEnds() {
+  if (std::get_terminate() == &OnTerminate) return;
   std::set_new_handler(&OnWant);
   others_end = std::set_terminate(&OnTerminate);
 }

@@ -53,7 +53,7 @@ class MemoryReserve {
   std::atomic<bool> said_ = false;
 };
 
-// From now on want of memory ends the process at once, with status 1 and a line on standard error: where operator new finds none
+// In programs that allocate by the reserve this is so before their main begins. From now on want of memory ends the process at once, with status 1 and a line on standard error: where operator new finds none
 // in the end and nobody has said that it copes (gpu/want_of_memory.h), and where a std::bad_alloc is caught by nobody. Uncaught
 // exceptions of other kinds end it as before.
 void EndWhenMemoryEnds();

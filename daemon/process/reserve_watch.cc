@@ -4,7 +4,7 @@
 
 namespace voxeld::daemon {
 
-ReserveWatch::ReserveWatch(MemoryReserve& reserve, size_t bytes, sync::Clock& clock, Logger& log)
+ReserveWatch::ReserveWatch(size_t bytes, sync::Clock& clock, Logger& log, MemoryReserve& reserve)
     : reserve_(reserve), bytes_(bytes), clock_(clock), log_(log) {
   Look();
 }

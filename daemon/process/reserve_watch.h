@@ -19,7 +19,8 @@ class ReserveWatch {
   static constexpr sync::TimeNs kTold = 60 * sync::kSecond;
 
   // Fills the reserve with `bytes`, if there are so many. All are to outlive it.
-  ReserveWatch(MemoryReserve& reserve, size_t bytes, sync::Clock& clock, Logger& log);
+  ReserveWatch(size_t bytes, sync::Clock& clock, Logger& log,
+               MemoryReserve& reserve = MemoryReserve::OfProcess());
 
   // Every second or so.
   void Look();

@@ -32,8 +32,8 @@ from pathlib import Path
 
 from life import PATIENCE, Life, again, end, judge
 
-# Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig).
-GIVES_UP = re.compile(r"^(libfontconfig|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
+# Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
+GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
 ENDED = "voxeld: out of memory: there are no"
 
 

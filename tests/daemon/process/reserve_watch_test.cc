@@ -30,7 +30,7 @@ class ReserveWatchTest : public ::testing::Test {
 };
 
 TEST_F(ReserveWatchTest, TakesBackWhatWasGivenUpAndTellsOfIt) {
-  ReserveWatch watch(reserve_, 2 * MemoryReserve::kPartBytes, clock_, log_);
+  ReserveWatch watch(2 * MemoryReserve::kPartBytes, clock_, log_, reserve_);
   EXPECT_EQ(reserve_.figures().held_bytes, 2 * MemoryReserve::kPartBytes);
   watch.Look();
   EXPECT_EQ(Logged(), "");
@@ -63,7 +63,7 @@ TEST_F(ReserveWatchTest, TakesBackWhatWasGivenUpAndTellsOfIt) {
 }
 
 TEST_F(ReserveWatchTest, SaysHowManyWereRefused) {
-  ReserveWatch watch(reserve_, 0, clock_, log_);
+  ReserveWatch watch(0, clock_, log_, reserve_);
   clock_.Advance(sync::kSecond);
   ::testing::internal::CaptureStderr();
   unsigned attempt = 0;
