@@ -28,21 +28,23 @@ namespace {
 
 using voxeld::daemon::MemoryReserve;
 
-// ENOMEM only where there is none in the end.
+// After the first attempt. ENOMEM where there is none in the end.
 template <typename Allocate>
-void* Try(size_t bytes, Allocate allocate) noexcept {
-  const int before = errno;
-  for (unsigned attempt = 0;; ++attempt) {
+[[gnu::noinline]] void* TryAgain(size_t bytes, Allocate allocate) noexcept {
+  // More than there can be: nothing would help.
+  if (bytes > PTRDIFF_MAX) return nullptr;
+  for (unsigned attempt = 0; MemoryReserve::OfProcess().Help(bytes, attempt); ++attempt) {
     void* const memory = allocate();
-    if (memory != nullptr) [[likely]] {
-      if (attempt > 0) errno = before;
-      return memory;
-    }
-    // More than there can be: nothing would help.
-    if (bytes > PTRDIFF_MAX || !MemoryReserve::OfProcess().Help(bytes, attempt)) break;
+    if (memory != nullptr) return memory;
   }
   errno = ENOMEM;
   return nullptr;
+}
+
+template <typename Allocate>
+[[gnu::always_inline]] inline void* Try(size_t bytes, Allocate allocate) noexcept {
+  void* const memory = allocate();
+  return memory != nullptr ? memory : TryAgain(bytes, allocate);
 }
 
 bool IsPowerOfTwo(size_t number) { return number != 0 && (number & (number - 1)) == 0; }
@@ -82,9 +84,7 @@ __attribute__((visibility("default"))) void* aligned_alloc(size_t alignment, siz
 __attribute__((visibility("default"))) int posix_memalign(void** memory, size_t alignment,
                                                           size_t bytes) {
   if (!IsPowerOfTwo(alignment) || alignment % sizeof(void*) != 0) return EINVAL;
-  const int before = errno;
   void* const found = memalign(alignment, bytes);
-  errno = before;
   if (found == nullptr) return ENOMEM;
   *memory = found;
   return 0;

@@ -153,14 +153,14 @@ def places() -> tuple[list[Place], int]:
         if not life.ready(process):
             sys.exit(f"voxeld does not start: {life.said()}")
         life.live()
+        rest = descriptors(process, 0)  # what it comes down to
+        status = end(process, process.pid)
         if life.told.failed or not life.told.shown or not life.told.durable:
             sys.exit(f"unharmed it failed: {life.told}")
-        least, fewer = descriptors(process, 0), 0  # what it comes down to
-        fewer = descriptors(process, least)
-        if (status := end(process, process.pid)) != 0:
+        if status != 0:
             sys.exit(f"unharmed it ended with {status}: {life.said()}")
         found = [place_of(line) for line in Path(name, "list").read_text(encoding="ascii").splitlines()]
-        return sorted(found, key=lambda place: place.site), max(least, fewer)
+        return sorted(found, key=lambda place: place.site), rest
 
 
 def say(last: Result, at: int, of: int) -> None:
