@@ -30,7 +30,7 @@ import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from life import PATIENCE, Life, again, end, judge
+from life import PATIENCE, Ending, Life, again, end, judge
 
 # Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
 GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
@@ -111,6 +111,8 @@ def run(way: str, place: Place, most_descriptors: int) -> Result:
         if way == "forever" and ENDED in said:
             gives_up = re.match("(anybody)", "anybody")  # who asks next is chance
         ending = judge(life, status, is_ready, alive, f"{gives_up[1]} asked, and gives up" if gives_up else "")
+        if way != "reserve" and is_ready and status == 1 and ENDED in said:
+            ending = Ending("ended")  # be it on its way to the end
         after = again(Path(name), life.told)
         wrong = wrong or ending.wrong or after
         if not met:
