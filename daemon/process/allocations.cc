@@ -17,12 +17,14 @@
 
 #if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
 
+// NOLINTBEGIN(bugprone-reserved-identifier): the C library's own names.
 extern "C" {
 void* __libc_malloc(size_t bytes);
 void* __libc_calloc(size_t count, size_t bytes);
 void* __libc_realloc(void* memory, size_t bytes);
 void* __libc_memalign(size_t alignment, size_t bytes);
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace {
 
