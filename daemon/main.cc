@@ -36,6 +36,7 @@
 #include "daemon/play/setup.h"
 #include "daemon/process/end_limit.h"
 #include "daemon/process/process.h"
+#include "daemon/process/reserve_watch.h"
 #include "daemon/process/spare_threads.h"
 #include "daemon/process/supervisor.h"
 #include "daemon/reload/reloader.h"
@@ -218,6 +219,7 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
           const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
   std::optional<EndLimit> end_limit;  // of all that is below, to its last destructor
+  ReserveWatch reserve(config.server.memory_reserve_bytes, clock, log);
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
   absl::StatusOr<std::unique_ptr<access::Security>> opened =
@@ -256,6 +258,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                  [assets = assets.get()] {
                    return assets == nullptr ? AssetFigures() : assets->figures();
                  },
+             .process_figures = [&reserve] { return reserve.figures(); },
              .connections =
                  [counters, security = security.get(), &reloads] {
                    ListenFigures figures = counters->Read();
@@ -366,6 +369,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
       log.Warn("the system gave no thread: spare ones were taken",
                {{"threads", absl::StrCat(taken)}});
     }
+    reserve.Look();
   });
 
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });

@@ -1,7 +1,7 @@
 #include "gpu/geometry_arrays.h"
 
+#include <cstdlib>
 #include <cstring>
-#include <new>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -9,7 +9,7 @@
 namespace voxeld::gpu {
 namespace {
 
-constexpr std::align_val_t kAlign{16};
+constexpr size_t kAlign = 16;
 
 }  // namespace
 
@@ -25,12 +25,13 @@ absl::StatusOr<GeometryArrays> GeometryArrays::Allocate(const GeometryRecord& re
     at = fresh->bytes.data();
     arrays.block_ = std::move(fresh->block);
   } else {
-    at = static_cast<std::byte*>(::operator new(layout.size, kAlign, std::nothrow));
+    at = static_cast<std::byte*>(
+        std::aligned_alloc(kAlign, (layout.size + kAlign - 1) / kAlign * kAlign));
     if (at == nullptr) {
       return absl::ResourceExhaustedError(
           absl::StrCat("the system has no ", layout.size, " bytes of memory left"));
     }
-    arrays.memory_ = {at, [](std::byte* memory) { ::operator delete(memory, kAlign); }};
+    arrays.memory_ = {at, [](std::byte* memory) { std::free(memory); }};
   }
   arrays.positions_ = {reinterpret_cast<float*>(at), size_t{record.vertex_count} * 3};
   arrays.indices_ = {reinterpret_cast<uint32_t*>(at + layout.indices), record.index_count};

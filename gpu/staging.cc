@@ -1,6 +1,7 @@
 #include "gpu/staging.h"
 
-#include <new>
+#include <cstdlib>
+#include <memory>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -8,20 +9,22 @@
 namespace voxeld::gpu {
 namespace {
 
-constexpr std::align_val_t kAlign{16};
+constexpr size_t kAlign = 16;
+
+struct Free {
+  void operator()(void* data) const { std::free(data); }
+};
+using Data = std::unique_ptr<void, Free>;
 
 class HeapMemory final : public StagingBlock::Memory {
  public:
-  HeapMemory(std::byte* data, size_t size, std::shared_ptr<std::atomic<uint64_t>> held)
-      : data_(data), size_(size), held_(std::move(held)) {}
-  ~HeapMemory() override {
-    ::operator delete(data_, kAlign);
-    held_->fetch_sub(size_);
-  }
-  std::span<std::byte> bytes() override { return {data_, size_}; }
+  HeapMemory(Data data, size_t size, std::shared_ptr<std::atomic<uint64_t>> held)
+      : data_(std::move(data)), size_(size), held_(std::move(held)) {}
+  ~HeapMemory() override { held_->fetch_sub(size_); }
+  std::span<std::byte> bytes() override { return {static_cast<std::byte*>(data_.get()), size_}; }
 
  private:
-  std::byte* data_;
+  const Data data_;
   size_t size_;
   std::shared_ptr<std::atomic<uint64_t>> held_;
 };
@@ -40,13 +43,14 @@ absl::StatusOr<StagingBlock> StagingPool::Acquire(size_t size) {
                                                        "; send less at once or raise the limit"));
     }
   } while (!held_->compare_exchange_weak(held, held + size));
-  void* data = ::operator new(size, kAlign, std::nothrow);
+  // Never 0 bytes, of which there may be none.
+  Data data(std::aligned_alloc(kAlign, (size / kAlign + 1) * kAlign));
   if (data == nullptr) {
     held_->fetch_sub(size);
     return absl::ResourceExhaustedError(
         absl::StrCat("staging: the system has no ", size, " bytes of memory left"));
   }
-  return StagingBlock(std::make_shared<HeapMemory>(static_cast<std::byte*>(data), size, held_));
+  return StagingBlock(std::make_shared<HeapMemory>(std::move(data), size, held_));
 }
 
 }  // namespace voxeld::gpu

@@ -12,6 +12,7 @@
 #include <charconv>
 #include <chrono>
 #include <fstream>
+#include <new>
 #include <set>
 #include <sstream>
 #include <vector>
@@ -238,7 +239,10 @@ absl::StatusOr<Grants> ReadGrants(const std::string& path) {
 std::string HashOf(std::string_view token) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
   unsigned length = 0;
-  EVP_Digest(token.data(), token.size(), digest.data(), &length, EVP_sha256(), nullptr);
+  // It fails without memory alone.
+  if (EVP_Digest(token.data(), token.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1) {
+    throw std::bad_alloc();
+  }
   return absl::BytesToHexString({reinterpret_cast<const char*>(digest.data()), length});
 }
 

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <memory>
+#include <new>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
@@ -26,19 +27,29 @@ absl::Status Failed(const char* what) {
   return no_room ? absl::ResourceExhaustedError(message) : absl::UnavailableError(message);
 }
 
+// Throws std::bad_alloc: a hash that lacks something would call content damaged that is not.
 class Hash {
  public:
   Hash() : context_(EVP_MD_CTX_new(), EVP_MD_CTX_free) {
-    EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr);
+    if (context_ == nullptr) throw std::bad_alloc();
+    Check(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr));
   }
-  void Add(std::string_view bytes) { EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()); }
+  void Add(std::string_view bytes) {
+    Check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()));
+  }
   std::string Finish() {
     std::string digest(static_cast<size_t>(EVP_MD_size(EVP_sha256())), '\0');
-    EVP_DigestFinal_ex(context_.get(), reinterpret_cast<unsigned char*>(digest.data()), nullptr);
+    Check(EVP_DigestFinal_ex(context_.get(), reinterpret_cast<unsigned char*>(digest.data()),
+                             nullptr));
     return digest;
   }
 
  private:
+  // Nothing else can be wrong with it.
+  static void Check(int done) {
+    if (done != 1) throw std::bad_alloc();
+  }
+
   std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context_;
 };
 

@@ -66,8 +66,9 @@ struct CoreOptions {
       state_event;
   // Keeps what outlives the daemon, and lives longer than the core; none: nothing does.
   StateSink* state = nullptr;
-  std::function<StateFigures()> state_figures;  // for Stats; from any thread. May be empty
-  std::function<AssetFigures()> asset_figures;  // the same
+  std::function<StateFigures()> state_figures;      // for Stats; from any thread. May be empty
+  std::function<AssetFigures()> asset_figures;      // the same
+  std::function<ProcessFigures()> process_figures;  // the same
   // The listener's figures, for Stats; from any thread. May be empty.
   std::function<ListenFigures()> connections;
 };

@@ -231,6 +231,7 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   if (options_.connections) stats.connections = options_.connections();
   if (options_.state_figures) stats.state = options_.state_figures();
   if (options_.asset_figures) stats.assets = options_.asset_figures();
+  if (options_.process_figures) stats.process = options_.process_figures();
   Collect<DisplayFigures>([](const FramePipeline& pipeline) { return pipeline.Figures(); },
                           [](const DisplaySlot& slot) {
                             DisplayFigures figures;

@@ -98,6 +98,14 @@ struct AssetFigures {
   std::string trouble;  // why they are not kept where they should be; empty: all is well
 };
 
+// The process as a whole.
+struct ProcessFigures {
+  uint64_t allocations_failed = 0;   // that the system had no memory for, at first
+  uint64_t allocations_refused = 0;  // of them those that the reserve did not help either
+  uint64_t reserve_bytes = 0, reserve_held_bytes = 0;  // that it is to have, and has
+  std::string trouble;  // that there was no memory just now; empty: all is well
+};
+
 struct Stats {
   int64_t time_ns = 0;
   std::string version;
@@ -121,6 +129,7 @@ struct Stats {
   ListenFigures connections;
   StateFigures state;
   AssetFigures assets;
+  ProcessFigures process;
   std::vector<DisplayFigures> displays;
 };
 

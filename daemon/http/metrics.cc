@@ -132,6 +132,17 @@ constexpr Row<AssetFigures> kAssetRows[] = {
      "Bytes of assets that came"},
 };
 
+constexpr Row<ProcessFigures> kProcessRows[] = {
+    {"voxeld_process_allocations_failed_total", &ProcessFigures::allocations_failed,
+     MetricType::Counter, "Allocations that the system had no memory for, at first"},
+    {"voxeld_process_allocations_refused_total", &ProcessFigures::allocations_refused,
+     MetricType::Counter, "Of them those that the reserve of memory did not help either"},
+    {"voxeld_process_reserve_bytes", &ProcessFigures::reserve_bytes, MetricType::Gauge,
+     "That the reserve of memory is to have"},
+    {"voxeld_process_reserve_held_bytes", &ProcessFigures::reserve_held_bytes, MetricType::Gauge,
+     "That it has"},
+};
+
 constexpr Row<DisplayFigures> kDisplayRows[] = {
     {"voxeld_display_lit_voxels", &DisplayFigures::lit_voxels, MetricType::Gauge,
      "Voxels that are not black"},
@@ -390,6 +401,10 @@ std::string MetricsText(const Stats& stats) {
   for (const auto& row : kAssetRows) {
     Add(families.New(row.name, row.type, row.help), {},
         static_cast<double>(stats.assets.*row.figure));
+  }
+  for (const auto& row : kProcessRows) {
+    Add(families.New(row.name, row.type, row.help), {},
+        static_cast<double>(stats.process.*row.figure));
   }
   AddDisplays(stats.displays, &families);
   return families.Text();

@@ -52,6 +52,9 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   if (!stats.connections.config_trouble.empty()) {
     reasons.push_back({{"what", "configuration"}, {"why", stats.connections.config_trouble}});
   }
+  if (!stats.process.trouble.empty()) {
+    reasons.push_back({{"what", "memory"}, {"why", stats.process.trouble}});
+  }
   for (const DisplayFigures& figures : stats.displays) {
     held = held || figures.volume_held;
     if (figures.engine_degraded.empty()) continue;

@@ -1,11 +1,12 @@
 #include "daemon/process/end_limit.h"
 
-#include <poll.h>
 #include <signal.h>
 #include <sys/time.h>
 #include <unistd.h>
 
 #include <string_view>
+
+#include "daemon/process/last_words.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -13,9 +14,7 @@ namespace {
 void EndNow(int) {
   constexpr std::string_view kWhy =
       "voxeld: it did not end in time, and is ended; what was told to be durable is kept\n";
-  pollfd out = {.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
-  // Nobody may read it any more.
-  if (poll(&out, 1, 0) == 1 && write(STDERR_FILENO, kWhy.data(), kWhy.size()) < 0) _exit(1);
+  SayAtOnce(kWhy);
   _exit(1);
 }
 

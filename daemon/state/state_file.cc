@@ -152,12 +152,22 @@ absl::Status StateFile::Prepare() {
         {Statements::kCommit, "COMMIT"}}) {
     if (const int code = statements_->Make(which, sql); code != SQLITE_OK) return Fault(code, sql);
   }
-  // Every page is looked at, before anybody relies on it.
+  // A page that could not be read, or had no memory, is found fault with as one that is damaged: what is wrong must be so again.
+  status = Check();
+  return absl::IsDataLoss(status) ? Check() : status;
+}
+
+// Every page is looked at, before anybody relies on it.
+absl::Status StateFile::Check() {
   sqlite3_stmt* check = nullptr;
   int code = sqlite3_prepare_v2(database_, "PRAGMA quick_check(1)", -1, &check, nullptr);
   if (code == SQLITE_OK) code = sqlite3_step(check);
   std::string found;
-  if (code == SQLITE_ROW) found = reinterpret_cast<const char*>(sqlite3_column_text(check, 0));
+  if (code == SQLITE_ROW) {
+    const unsigned char* text = sqlite3_column_text(check, 0);
+    if (text == nullptr) code = SQLITE_NOMEM;
+    if (text != nullptr) found = reinterpret_cast<const char*>(text);
+  }
   sqlite3_finalize(check);
   if (code != SQLITE_ROW) return Fault(code, "checking it");
   if (found == "ok") return absl::OkStatus();

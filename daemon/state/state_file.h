@@ -88,6 +88,7 @@ class StateFile {
   explicit StateFile(StateFileOptions options);
   absl::Status OpenDatabase();
   absl::Status Prepare();
+  absl::Status Check();
   absl::Status PutAside(const std::string& why);
   void Close();
   absl::Status Run(const char* sql);

@@ -12,6 +12,7 @@
 #include "daemon/viewer/volume_message.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
+#include "gpu/want_of_memory.h"
 
 namespace voxeld::daemon::viewer {
 namespace {
@@ -224,6 +225,7 @@ absl::StatusOr<Comparison> Comparer::Serve(const Task& task, References& referen
   if (absl::Status may = CheckComparable(task.info->geometry.grid); !may.ok()) return may;
   absl::StatusOr<Comparison> comparison = absl::UnknownError("");
   try {
+    const gpu::WantOfMemory caught;
     Reference& reference = references[task.display];
     comparison = Hold(task, reference);
     reference.used = clock_.Now();

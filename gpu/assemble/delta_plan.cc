@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "gpu/hash_map.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -66,7 +67,7 @@ class Planner final : public DeltaVisitor {
 
   absl::StatusOr<DeltaPlan> Finish() {
     // Changes to the scene's counts.
-    absl::flat_hash_map<uint64_t, int64_t> geometry_uses, layer_uses;
+    HashMap<uint64_t, int64_t> geometry_uses, layer_uses;
     for (const auto& [id, links] : drawables_) {
       if (const Drawable* before = forgotten_ ? nullptr : scene_.FindDrawable(id)) {
         --geometry_uses[before->record.geometry];
@@ -131,8 +132,8 @@ class Planner final : public DeltaVisitor {
   DeltaPlan plan_;
   bool forgotten_ = false;  // by a reset
   // What the delta says of an id, over what the scene holds.
-  absl::flat_hash_map<uint64_t, bool> geometries_, layers_;
-  absl::flat_hash_map<uint64_t, std::optional<Links>> drawables_;
+  HashMap<uint64_t, bool> geometries_, layers_;
+  HashMap<uint64_t, std::optional<Links>> drawables_;
 };
 
 }  // namespace

@@ -11,13 +11,14 @@ namespace voxeld::gpu {
 class Executor {
  public:
   // One index of a loop; `worker`, 0 to concurrency() − 1, names who runs it: no two run under the
-  // same number at once. Must not throw.
+  // same number at once. May throw for want of memory alone.
   using Body = std::function<void(size_t index, int worker)>;
 
   virtual ~Executor() = default;
   virtual int concurrency() const = 0;
   // Calls `body` once for each index in [0, count), in any order; returns when all are done.
-  // Indices are handed out in runs of `grain` (at least 1).
+  // Indices are handed out in runs of `grain` (at least 1). What a body throws first is thrown once none runs
+  // any more; some indices are then left out.
   virtual void For(size_t count, size_t grain, const Body& body) = 0;
 };
 

@@ -1,9 +1,12 @@
 #include <atomic>
+#include <exception>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "display/sync/mutex.h"
 #include "gpu/cpu/executor.h"
+#include "gpu/want_of_memory.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -46,19 +49,28 @@ class ThreadExecutor final : public Executor {
       grain_ = grain < 1 ? 1 : grain;
       next_ = 0;
       busy_ = threads_.size();
+      thrown_ = nullptr;
       ++loop_;
     }
     begin_.NotifyAll();
     Work(body, count, grain_, 0);
     sync::MutexLock lock(mutex_);
     while (busy_ != 0) end_.Wait(mutex_);
+    if (thrown_ != nullptr) std::rethrow_exception(std::exchange(thrown_, nullptr));
   }
 
  private:
   void Work(const Body& body, size_t count, size_t grain, int worker) {
-    for (size_t first = next_.fetch_add(grain); first < count; first = next_.fetch_add(grain)) {
-      const size_t last = first + grain < count ? first + grain : count;
-      for (size_t i = first; i < last; ++i) body(i, worker);
+    try {
+      const WantOfMemory caught;
+      for (size_t first = next_.fetch_add(grain); first < count; first = next_.fetch_add(grain)) {
+        const size_t last = first + grain < count ? first + grain : count;
+        for (size_t i = first; i < last; ++i) body(i, worker);
+      }
+    } catch (...) {
+      next_ = count;  // the others need not go on
+      sync::MutexLock lock(mutex_);
+      if (thrown_ == nullptr) thrown_ = std::current_exception();
     }
   }
 
@@ -89,6 +101,7 @@ class ThreadExecutor final : public Executor {
   size_t busy_ VOXELD_GUARDED_BY(mutex_) = 0;  // threads that have not finished this loop
   uint64_t loop_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool stopping_ VOXELD_GUARDED_BY(mutex_) = false;
+  std::exception_ptr thrown_ VOXELD_GUARDED_BY(mutex_);  // by the first that did, in this loop
   size_t grain_ = 1;  // written under the lock between loops only
   std::atomic<size_t> next_{0};
   std::vector<std::thread> threads_;

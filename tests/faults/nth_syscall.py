@@ -11,26 +11,15 @@ import argparse
 import collections
 import contextlib
 import json
-import os
 import random
 import re
-import signal
-import socket
 import subprocess
 import sys
 import tempfile
-import time
-import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Callable, Optional
 
-import grpc
-import numpy as np
-import voxeld as voxel
-
-PATIENCE = 8.0  # for what may not come any more
-ENDS = 30.0  # for a daemon to end by itself
+from life import Life, again, end, judge
 
 # What fails, and with what: errors that a system in want gives.
 ERRORS = {
@@ -50,118 +39,6 @@ THEIRS = re.compile(r"/(libgrpc|libgrpc\+\+|libgpr|ld-linux-x86-64|libsqlite3|li
 
 
 @dataclass
-class Told:
-    """What the daemon said, which has to be true."""
-
-    shown: bool = False  # the ball, in the volume of the last capture
-    durable: bool = False
-    failed: list[str] = field(default_factory=list)  # steps that were refused, with what was said
-
-
-class Life:
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.server = f"unix:{folder}/s"
-        self.port, self.pid = 0, 0
-        self.told = Told()
-
-    def config(self) -> str:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
-        return (f'[server]\nlisten = ["{self.server}"]\nhttp = "127.0.0.1:{self.port}"\n[state]\ndir = "{self.folder}/state"\n'
-                '[[display]]\nname = "stack"\ndriver = "simulated"\nsize = "12x12x8"\nrate = 100\n'
-                '[[display]]\nname = "rotor"\ndriver = "simulated"\ngeometry = "rotor"\nsize = "12x8"\nslices = 24\nrate = 100\n')
-
-    def start(self, *before: str) -> "subprocess.Popen[str]":
-        path = self.folder / "voxeld.toml"
-        path.write_text(self.config(), encoding="utf-8")
-        self.output = (self.folder / "output").open("w+", encoding="utf-8")
-        return subprocess.Popen([*before, os.environ["VOXELD"], "--config", str(path), "--log-level", "info", "--engine", "cpu"],
-                                stdin=subprocess.DEVNULL, stdout=self.output, stderr=subprocess.STDOUT, text=True, start_new_session=True)
-
-    def said(self) -> str:
-        return (self.folder / "output").read_text(encoding="utf-8", errors="replace")
-
-    def ready(self, process: "subprocess.Popen[str]") -> bool:
-        deadline = time.monotonic() + ENDS
-        while time.monotonic() < deadline and process.poll() is None:
-            with contextlib.suppress(OSError):  # also one whose log cannot be written is ready
-                with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/healthz", timeout=PATIENCE) as answer:
-                    return bool(answer.read())
-            time.sleep(0.01)  # nothing tells when it listens, and its end is an answer too
-        return False
-
-    # ---- what it goes through
-
-    def step(self, name: str, what: Callable[[], None]) -> None:
-        """What fails is noted and the next goes on; errors that are not the clients' own are the test's."""
-        try:
-            what()
-        except (voxel.VoxelError, grpc.RpcError, TimeoutError, ConnectionError, OSError, AssertionError) as error:
-            self.told.failed.append(f"{name}: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}")
-
-    def live(self) -> None:
-        for name in ("draw", "durable", "lifetimes", "asset", "page", "reload", "capture"):
-            self.step(name, getattr(self, name))
-
-    def connect(self, **more: object) -> voxel.Connection:
-        return voxel.connect(self.server, timeout=PATIENCE, **more)  # type: ignore[arg-type]
-
-    def draw(self) -> None:
-        with self.connect(name="one") as v:
-            v.layer("first").sphere("ball", radius=0.5, color="red", fill="solid")
-            v.points("cloud", np.zeros((3000, 3), np.float32))
-            outcomes = v.commit().wait_shown(timeout=PATIENCE)
-            assert len(outcomes) == 2, outcomes
-            v.lines("wrong", [[0, 0, 0], [1, 0, 0]], colors="blue")
-            v.commit().wait(PATIENCE)
-            v.displays(timeout=PATIENCE)
-            v.stats(timeout=PATIENCE)
-
-    def durable(self) -> None:
-        v = self.connect(name="two", on_disconnect="keep")
-        try:
-            v.layer("stays").box("box", size=(1, 1, 1), color="white", fill="solid")
-            frame = v.commit(durable=True).wait_durable(PATIENCE)
-            self.told.durable = bool(frame.durable)
-        finally:
-            v.close(PATIENCE)
-
-    def lifetimes(self) -> None:
-        with self.connect(name="three") as v:
-            ball = v.sphere("brief", radius=0.2, color="green")
-            ball.transform = voxel.translate(0.1, 0, 0)
-            v.commit().wait_shown(timeout=PATIENCE)
-            v.entities()
-            v.layers()
-
-    def asset(self) -> None:
-        with self.connect(name="four") as v:
-            v.upload(bytes(200_000))
-
-    def page(self) -> None:
-        for path in ("/healthz", "/metrics", "/"):
-            with urllib.request.urlopen(f"http://127.0.0.1:{self.port}{path}", timeout=PATIENCE) as answer:
-                assert answer.read()
-
-    def reload(self) -> None:
-        os.kill(self.pid, signal.SIGHUP)
-
-    def capture(self) -> None:
-        with self.connect(name="five", on_disconnect="clear") as v:
-            v.layer("last").sphere("ball", radius=0.3, color="red", fill="solid")
-            frame = v.commit()
-            outcomes = frame.wait_shown(timeout=PATIENCE)
-            assert frame.accepted is not None
-            picture = v.capture("stack", at_least_snapshot=frame.accepted.snapshot, timeout=PATIENCE).rgb
-            red = (picture[..., 0] > 100) & (picture[..., 1] < 50)
-            if "stack" in outcomes and outcomes["stack"].kind == "presented" and not red.any():
-                raise RuntimeError("it was told to be shown, and is not")
-            self.told.shown = bool(red.any())
-
-
-@dataclass
 class Result:
     call: str
     error: str
@@ -176,20 +53,6 @@ def pid_of(tracer: "subprocess.Popen[str]") -> int:
     with contextlib.suppress(OSError, ValueError):
         return int(Path(f"/proc/{tracer.pid}/task/{tracer.pid}/children").read_text(encoding="ascii").split()[0])
     return 0
-
-
-def end(tracer: "subprocess.Popen[str]", pid: int) -> Optional[int]:
-    """Its exit status when it was asked to end; None: it had to be killed."""
-    if pid:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGTERM)
-    try:
-        return tracer.wait(ENDS)
-    except subprocess.TimeoutExpired:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(tracer.pid, signal.SIGKILL)
-        tracer.wait()
-        return None
 
 
 def whose(trace: str) -> str:
@@ -217,48 +80,11 @@ def run(call: str, error: str, n: int, stacks: bool = False) -> Result:
                 wrong = str(untrue)
         alive = tracer.poll() is None
         status = end(tracer, life.pid)
-        said = life.said()
         theirs = whose(Path(name, "trace").read_text(encoding="utf-8", errors="replace")) if stacks else ""
-        reason = f"{theirs} asked, and gives up" if theirs else ""
-        if status is None:
-            how, wrong = "hung", "it did not end when it was asked to"
-        elif status < 0 or status > 128:
-            how = f"known: {reason}" if reason else "crashed"
-            wrong = wrong or ("" if reason else f"it ended by signal {abs(status) % 128}: {said.strip().splitlines()[-1:] }")
-        elif not is_ready:
-            how = "refused"
-            wrong = "" if said.strip() and status != 0 else f"it ended with {status} before it was ready, and said nothing"
-        elif alive:
-            late = "did not end in time" in said  # others wait for threads that they did not get; it is ended, and says so
-            how = "late" if late else "lived"
-            wrong = wrong or ("" if status == 0 or late else f"it ended with {status} when it was asked to: {said.strip().splitlines()[-1:]}")
-        else:
-            how = "ended"
-            wrong = wrong or ("" if reason or re.search(r"^voxeld: .|error|failed|cannot", said, re.I | re.M) else f"it ended with {status} and did not say why")
-        # Unharmed, on the same state.
-        again = Life(Path(name))
-        process = again.start()
-        again.pid = process.pid
-        if not again.ready(process):
-            wrong = wrong or f"it does not start any more: {again.said().strip().splitlines()[-1:]}"
-        elif life.told.durable:
-            again.step("durable after", lambda: again_has(again, wrong_if))
-            if again.told.failed:
-                wrong = wrong or f"what was told to be durable is not there: {again.told.failed}"
-        if end(process, process.pid) is None:
-            wrong = wrong or "the next one did not end"
-        return Result(call, error, n, how, wrong, life.told.failed)
-
-
-def wrong_if(right: bool, what: str) -> None:
-    if not right:
-        raise AssertionError(what)
-
-
-def again_has(life: Life, check: Callable[[bool, str], None]) -> None:
-    with life.connect(name="after") as v:
-        names = [entity.key.id for entity in v.entities()]
-        check("box" in names, f"entities are {names}")
+        ending = judge(life, status, is_ready, alive, f"{theirs} asked, and gives up" if theirs else "")
+        after = again(Path(name), life.told)
+        wrong = wrong or ending.wrong or after
+        return Result(call, error, n, ending.how, wrong, life.told.failed)
 
 
 def count() -> dict[str, int]:

@@ -32,7 +32,7 @@ class StagedEngine final : public gpu::Engine {
   void SetTarget(gpu::Target target, Done done) override {
     Queue([this, target = std::move(target), done = std::move(done)](bool cancelled) {
       if (cancelled || gone_) return done(Over(cancelled));
-      engine_->SetTarget(target, done);
+      engine_->SetTarget(target, [&](const absl::Status& status) { Answer(0, status, done); });
     });
   }
 
@@ -48,7 +48,7 @@ class StagedEngine final : public gpu::Engine {
       if (cancelled || gone_) return done(Over(cancelled));
       const absl::Status status = scene_.Apply(block.bytes().first(size), block.referred());
       if (!status.ok()) return done(status);
-      engine_->Apply(block, size, done);
+      engine_->Apply(block, size, [&](const absl::Status& applied) { Answer(0, applied, done); });
     });
   }
 
@@ -65,10 +65,7 @@ class StagedEngine final : public gpu::Engine {
       }
       engine_->SubmitFrame(request, buffer, [&](const absl::StatusOr<gpu::FrameResult>& result) {
         if (result.ok() && stage_->on_frame) stage_->on_frame(request.frame, scene_, buffer.bytes);
-        if (!result.ok()) {
-          done(result.status());
-          return;
-        }
+        if (!result.ok()) return Answer(request.frame, result.status(), done);
         // How long it took is no part of what a seed decides.
         gpu::FrameResult same = *result;
         same.assemble_ns = same.slice_ns = same.copy_ns = 1000;
@@ -82,6 +79,13 @@ class StagedEngine final : public gpu::Engine {
   }
 
  private:
+  // What failed by itself: it had no memory (tests/simulation/allocations_test.cc).
+  template <typename DoneFunction>
+  void Answer(uint64_t volume, const absl::Status& status, const DoneFunction& done) {
+    gone_ = gone_ || absl::IsDataLoss(status);
+    if (!status.ok() && stage_->on_failed) stage_->on_failed(volume, status);
+    done(status);
+  }
   static absl::Status Over(bool cancelled) {
     return cancelled ? absl::CancelledError("the engine was let go")
                      : absl::DataLossError("the engine is gone");
@@ -101,11 +105,19 @@ class StagedEngine final : public gpu::Engine {
 
 }  // namespace
 
+namespace {
+constinit thread_local bool running = false;
+}
+
 void EngineStage::Run() {
   const Call call = std::move(calls.front());
   calls.pop_front();
+  running = true;
   call.run(false);
+  running = false;
 }
+
+bool EngineStage::IsRunning() { return running; }
 
 std::unique_ptr<gpu::Engine> MakeStagedEngine(std::shared_ptr<EngineStage> stage) {
   return std::make_unique<StagedEngine>(std::move(stage));

@@ -40,6 +40,8 @@ struct EngineStage {
   sync::TimeNs Next() const { return calls.empty() ? sync::kNever : calls.front().due; }
   // Carries out the next call.
   void Run();
+  // Whether a call of any is being carried out, in this thread.
+  static bool IsRunning();
 };
 
 std::unique_ptr<gpu::Engine> MakeStagedEngine(std::shared_ptr<EngineStage> stage);

@@ -31,7 +31,8 @@ class Queries:
         self._metadata = credentials.metadata(server, who)
         self._channel = credentials.open_channel(server, who, [
             ("grpc.max_receive_message_length", -1), ("grpc.use_local_subchannel_pool", 1),
-            ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.min_reconnect_backoff_ms", 100),
+            # The least is also what an attempt may take, on slow networks and busy machines too; one that is refused ends at once.
+            ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.min_reconnect_backoff_ms", 10_000),
             ("grpc.max_reconnect_backoff_ms", 1000)])
         self._closed = False
 

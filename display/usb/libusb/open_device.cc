@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <limits>
+#include <new>
 #include <system_error>
 #include <utility>
 
@@ -34,7 +36,9 @@ unsigned Milliseconds(sync::TimeNs timeout) {
 }  // namespace
 
 struct OpenDevice::Pending {
-  Pending() : transfer(libusb_alloc_transfer(0)) {}
+  Pending() : transfer(libusb_alloc_transfer(0)) {
+    if (transfer == nullptr) throw std::bad_alloc();
+  }
   ~Pending() { libusb_free_transfer(transfer); }
   Pending(const Pending&) = delete;
   Pending& operator=(const Pending&) = delete;
@@ -86,9 +90,9 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> OpenDevice::Open(
   try {
     return std::unique_ptr<OpenDevice>(new OpenDevice(std::move(handle), entry, interface, budget,
                                                       clock, first_id, std::move(wake)));
-  } catch (const std::system_error& error) {
+  } catch (const std::exception& error) {
     return absl::UnavailableError(
-        absl::StrCat("no thread for ", NameOf(entry), ": ", error.what()));
+        absl::StrCat("no thread or memory for ", NameOf(entry), ": ", error.what()));
   }
 }
 

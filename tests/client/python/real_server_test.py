@@ -41,10 +41,11 @@ class Daemon:
 
 
 class Relay:
-    """A socket in front of the daemon's whose connections can be cut."""
+    """A socket in front of the daemon's whose connections can be cut. `late_s`: after which what comes passes, as on a slow network."""
 
-    def __init__(self, path: str, behind: str) -> None:
+    def __init__(self, path: str, behind: str, late_s: float = 0) -> None:
         self._behind = behind
+        self._late_s = late_s
         self._listener = socket.socket(socket.AF_UNIX)
         self._listener.bind(path)
         self._listener.listen()
@@ -70,10 +71,10 @@ class Relay:
             for a, b in ((near, far), (far, near)):
                 threading.Thread(target=self._copy, args=(a, b), daemon=True).start()
 
-    @staticmethod
-    def _copy(source: socket.socket, sink: socket.socket) -> None:
+    def _copy(self, source: socket.socket, sink: socket.socket) -> None:
         try:
             while data := source.recv(1 << 16):
+                time.sleep(self._late_s)
                 sink.sendall(data)
         except OSError:
             pass
@@ -106,6 +107,13 @@ class RealServer(unittest.TestCase):
         v = voxel.connect(server or self.daemon.server, timeout=LONG, **options)
         self.addCleanup(v.close)
         return v
+
+    def test_a_slow_network_keeps_nobody_away(self) -> None:
+        path = f"{self.folder}/slow.sock"
+        relay = Relay(path, self.daemon.path, late_s=0.3)
+        self.addCleanup(relay.close)
+        v = self.connect(f"unix:{path}")
+        self.assertEqual([display.name for display in v.displays(timeout=LONG)], ["stack"])
 
     def ids(self, v: voxel.Connection) -> list[str]:
         return sorted(entity.key.id for entity in v.entities(timeout=LONG))

@@ -30,7 +30,17 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   stats.applying = {3, 1'000'000, 2, 3};
   stats.assets = {
       .count = 4, .bytes = 55, .uploaded = 6, .evicted = 7, .damaged = 1, .bytes_in = 66};
+  stats.process = {.allocations_failed = 9,
+                   .allocations_refused = 2,
+                   .reserve_bytes = 4 << 20,
+                   .reserve_held_bytes = 2 << 20,
+                   .trouble = ""};
   const std::string text = MetricsText(stats);
+  EXPECT_THAT(text, HasSubstr("# TYPE voxeld_process_allocations_failed_total counter\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_failed_total 9\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_refused_total 2\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_reserve_bytes 4194304\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_reserve_held_bytes 2097152\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_memory_bytes{use=\"answers\"} 88\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_commit_applying_seconds{stat=\"p50\"} 0.001\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_assets 4\n"));
@@ -113,6 +123,12 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("the last volume is held"));
   stats.displays[0].volume_held = false;
   stats.displays[0].engine_degraded = "";
+  stats.process.trouble = "there was none";
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
+  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+            R"({"status":"degraded","reasons":[{"what":"memory","why":"there was none"}]})"
+            "\n");
+  stats.process.trouble = "";
   stats.connections.unreachable = "127.0.0.1:1: no answer came in time";
   EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
   EXPECT_EQ(HealthResponse(displays, stats, false).body,

@@ -29,6 +29,7 @@ struct CrashCalls {
   }
 
   static int Read(sqlite3_file* file, void* into, int count, sqlite3_int64 at) {
+    if (Of(file).disk->Fails()) return SQLITE_IOERR_READ;
     const std::string& now = (*Of(file).file)->now;
     const auto begin = static_cast<size_t>(at), size = static_cast<size_t>(count);
     const size_t have = begin >= now.size() ? 0 : std::min(size, now.size() - begin);
@@ -40,7 +41,7 @@ struct CrashCalls {
 
   static int Write(sqlite3_file* file, const void* from, int count, sqlite3_int64 at) {
     CrashDisk& disk = *Of(file).disk;
-    if (!disk.Step()) return SQLITE_IOERR_WRITE;
+    if (!disk.Step() || disk.Fails()) return SQLITE_IOERR_WRITE;
     CrashDisk::File& on = **Of(file).file;
     const auto begin = static_cast<size_t>(at), size = static_cast<size_t>(count);
     if (begin + size > on.now.size()) {
@@ -55,7 +56,7 @@ struct CrashCalls {
   }
 
   static int Truncate(sqlite3_file* file, sqlite3_int64 size) {
-    if (!Of(file).disk->Step()) return SQLITE_IOERR_TRUNCATE;
+    if (!Of(file).disk->Step() || Of(file).disk->Fails()) return SQLITE_IOERR_TRUNCATE;
     CrashDisk::File& on = **Of(file).file;
     on.now.resize(static_cast<size_t>(size));
     on.unsynced.push_back({static_cast<uint64_t>(size), {}, true});
@@ -63,7 +64,7 @@ struct CrashCalls {
   }
 
   static int Sync(sqlite3_file* file, int) {
-    if (!Of(file).disk->Step()) return SQLITE_IOERR_FSYNC;
+    if (!Of(file).disk->Step() || Of(file).disk->Fails()) return SQLITE_IOERR_FSYNC;
     CrashDisk::File& on = **Of(file).file;
     on.synced = on.now;
     on.unsynced.clear();
@@ -72,11 +73,15 @@ struct CrashCalls {
   }
 
   static int Size(sqlite3_file* file, sqlite3_int64* size) {
+    if (Of(file).disk->Fails()) return SQLITE_IOERR_FSTAT;
     *size = static_cast<sqlite3_int64>((*Of(file).file)->now.size());
     return SQLITE_OK;
   }
 
-  static int Lock(sqlite3_file*, int) { return SQLITE_OK; }
+  static int Lock(sqlite3_file* file, int) {
+    return Of(file).disk->Fails() ? SQLITE_IOERR_LOCK : SQLITE_OK;
+  }
+  static int Unlock(sqlite3_file*, int) { return SQLITE_OK; }
   static int CheckLock(sqlite3_file*, int* out) {
     *out = 0;
     return SQLITE_OK;
@@ -90,9 +95,13 @@ struct CrashCalls {
   static int Open(sqlite3_vfs* vfs, const char* name, sqlite3_file* file, int flags, int* out) {
     static const sqlite3_io_methods kMethods = {
         1,       &Close,     &Read,    &Write,      &Truncate,        &Sync,   &Size,   &Lock,
-        &Lock,   &CheckLock, &Control, &SectorSize, &Characteristics, nullptr, nullptr, nullptr,
+        &Unlock, &CheckLock, &Control, &SectorSize, &Characteristics, nullptr, nullptr, nullptr,
         nullptr, nullptr,    nullptr};
     CrashDisk& disk = DiskOf(vfs);
+    if (disk.Fails()) {
+      file->pMethods = nullptr;
+      return SQLITE_CANTOPEN;
+    }
     const std::string key = name == nullptr ? "temporary" : name;
     auto& found = disk.files_[key];
     const bool created = found == nullptr;
@@ -119,7 +128,7 @@ struct CrashCalls {
     CrashDisk& disk = DiskOf(vfs);
     const auto found = disk.files_.find(name);
     if (found == disk.files_.end()) return SQLITE_IOERR_DELETE_NOENT;
-    if (!disk.Step()) return SQLITE_IOERR_DELETE;
+    if (!disk.Step() || disk.Fails()) return SQLITE_IOERR_DELETE;
     disk.removed_[name] = found->second;
     disk.files_.erase(found);
     if (sync_folder != 0) disk.SyncFolder();
@@ -127,6 +136,7 @@ struct CrashCalls {
   }
 
   static int Access(sqlite3_vfs* vfs, const char* name, int, int* out) {
+    if (DiskOf(vfs).Fails()) return SQLITE_IOERR_ACCESS;
     *out = DiskOf(vfs).files_.contains(name) ? 1 : 0;
     return SQLITE_OK;
   }

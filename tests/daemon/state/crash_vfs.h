@@ -34,6 +34,14 @@ class CrashDisk {
   void StopAt(uint64_t step) { stop_at_ = step; }
   bool stopped() const { return steps_ >= stop_at_; }
 
+  // The n-th call of any kind from now on, reading included, fails once with an error of the disk's; 0: none.
+  void FailCall(uint64_t n) {
+    calls_ = 0;
+    fails_at_ = n;
+  }
+  // Since FailCall.
+  uint64_t calls() const { return calls_; }
+
   // The power was off and is back: what was not synced is lost by lot. All files are closed.
   void PowerCycle(uint32_t seed);
 
@@ -62,12 +70,14 @@ class CrashDisk {
 
   void SyncFolder();
   bool Step();  // false: the machine has stopped
+  bool Fails() { return ++calls_ == fails_at_; }
 
   const std::string vfs_;
   std::map<std::string, std::shared_ptr<File>> files_;
   std::map<std::string, std::shared_ptr<File>> removed_;  // unsynced removals
   uint64_t steps_ = 0, stop_at_ = UINT64_MAX;
   uint64_t room_ = UINT64_MAX;
+  uint64_t calls_ = 0, fails_at_ = 0;
   struct Registered;
   std::unique_ptr<Registered> registered_;
 };

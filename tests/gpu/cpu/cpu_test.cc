@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <new>
+#include <thread>
 #include <vector>
 
 #include "gpu/call_queue.h"
@@ -37,6 +39,32 @@ TEST(Executor, EveryKindRunsEachIndexOnce) {
     EXPECT_EQ(executor->concurrency(), threads);
     ExpectEachIndexOnce(*executor);
     ExpectEachIndexOnce(*MakeExecutor(threads));
+  }
+}
+
+TEST(Executor, WhatABodyThrowsComesOutOnceNoneRuns) {
+  for (int threads : {1, 2, 5}) {
+    for (bool own : {false, true}) {
+      std::unique_ptr<Executor> executor =
+          own ? MakeThreadExecutor(threads) : MakeExecutor(threads);
+      std::atomic<int> running{0};
+      // Whoever it comes to, the caller or another.
+      for (size_t at : {size_t{0}, size_t{499}, size_t{999}}) {
+        EXPECT_THROW(executor->For(1000, 1,
+                                   [&](size_t i, int) {
+                                     ++running;
+                                     if (i == at) {
+                                       --running;
+                                       throw std::bad_alloc();
+                                     }
+                                     std::this_thread::yield();
+                                     --running;
+                                   }),
+                     std::bad_alloc);
+        EXPECT_EQ(running, 0) << "it came out while others ran";
+      }
+      ExpectEachIndexOnce(*executor);
+    }
   }
 }
 

@@ -83,10 +83,11 @@ TEST(TopView, WhatTheServerSaysIsMadeFitForATerminal) {
   stats.mutable_displays(0)->set_state(v1::DISPLAY_STATE_LOST);
   stats.mutable_displays(0)->set_state_reason("why\x1b");
   stats.mutable_connections()->set_access_trouble("grants\x1b");
+  stats.mutable_process()->set_trouble("memory\x1b");
   view.Take(stats, Owners(1), "");
   EXPECT_THAT(Text(view), Not(HasSubstr("\x1b")));
   for (const char* words : {"evil\\u{1b}[2J", "lost\\u{1b}", "why\\u{1b}", "grants\\u{1b}",
-                            "client\\u{1b} 1", "9.9\\u{1b}"}) {
+                            "memory\\u{1b}", "client\\u{1b} 1", "9.9\\u{1b}"}) {
     EXPECT_THAT(Text(view), HasSubstr(words));
   }
   EXPECT_THAT(TopText(stats, Owners(1)), Not(HasSubstr("\x1b")));

@@ -261,8 +261,9 @@ void TopView::AddConnections(std::vector<TopLine>* out) const {
        Refused(c) + CutOff(c) > Refused(before_.connections()) + CutOff(before_.connections())
            ? TopStyle::kWarning
            : TopStyle::kPlain});
-  for (const std::string& trouble : {c.unreachable(), c.access_trouble(), c.config_trouble(),
-                                     stats_.state().trouble(), stats_.assets().trouble()}) {
+  for (const std::string& trouble :
+       {c.unreachable(), c.access_trouble(), c.config_trouble(), stats_.state().trouble(),
+        stats_.assets().trouble(), stats_.process().trouble()}) {
     if (!trouble.empty()) out->push_back({EscapeForTerminal(trouble), TopStyle::kBad});
   }
 }

@@ -1,0 +1,205 @@
+"""An ordinary life of the real voxeld, which tests make something fail in: start; drawing with receipts; a durable commit; captures and watched
+volumes; the page, metrics and health; an asset; reloading; the end. And what must hold of it, whatever fails: no signal ends the daemon, nothing
+hangs, a start that fails says why, what was told to be shown is shown, and what was told to be durable is there after the next start."""
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import time
+import urllib.request
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Callable, Mapping, Optional
+
+import grpc
+import numpy as np
+import voxeld as voxel
+
+PATIENCE = 8.0  # for what may not come any more
+ENDS = 30.0  # for a daemon to end by itself
+
+
+@dataclass
+class Told:
+    """What the daemon said, which has to be true."""
+
+    shown: bool = False  # the ball, in the volume of the last capture
+    durable: bool = False
+    failed: list[str] = field(default_factory=list)  # steps that were refused, with what was said
+
+
+class Life:
+    def __init__(self, folder: Path, server: str = "") -> None:
+        """`server`: more lines of the configuration's section."""
+        self.folder = folder
+        self.more = server
+        self.server = f"unix:{folder}/s"
+        self.port, self.pid = 0, 0
+        self.process: Optional["subprocess.Popen[str]"] = None
+        self.told = Told()
+
+    def config(self) -> str:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        return (f'[server]\nlisten = ["{self.server}"]\nhttp = "127.0.0.1:{self.port}"\n{self.more}\n[state]\ndir = "{self.folder}/state"\n'
+                '[[display]]\nname = "stack"\ndriver = "simulated"\nsize = "12x12x8"\nrate = 100\n'
+                '[[display]]\nname = "rotor"\ndriver = "simulated"\ngeometry = "rotor"\nsize = "12x8"\nslices = 24\nrate = 100\n')
+
+    def start(self, *before: str, environment: Optional[Mapping[str, str]] = None) -> "subprocess.Popen[str]":
+        path = self.folder / "voxeld.toml"
+        path.write_text(self.config(), encoding="utf-8")
+        self.output = (self.folder / "output").open("w+", encoding="utf-8")
+        self.process = subprocess.Popen([*before, os.environ["VOXELD"], "--config", str(path), "--log-level", "info", "--engine", "cpu"],
+                                        stdin=subprocess.DEVNULL, stdout=self.output, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+                                        env={**os.environ, **(environment or {})})
+        return self.process
+
+    def said(self) -> str:
+        return (self.folder / "output").read_text(encoding="utf-8", errors="replace")
+
+    def ready(self, process: "subprocess.Popen[str]") -> bool:
+        deadline = time.monotonic() + ENDS
+        while time.monotonic() < deadline and process.poll() is None:
+            with contextlib.suppress(OSError):  # also one whose log cannot be written is ready
+                with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/healthz", timeout=PATIENCE) as answer:
+                    return bool(answer.read())
+            time.sleep(0.01)  # nothing tells when it listens, and its end is an answer too
+        return False
+
+    # ---- what it goes through
+
+    def step(self, name: str, what: Callable[[], None]) -> None:
+        """What fails is noted and the next goes on; errors that are not the clients' own are the test's."""
+        try:
+            what()
+        except (voxel.VoxelError, grpc.RpcError, TimeoutError, ConnectionError, OSError, AssertionError) as error:
+            self.told.failed.append(f"{name}: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}")
+
+    def live(self) -> None:
+        for name in ("draw", "durable", "lifetimes", "asset", "page", "reload", "capture"):
+            if self.process is not None and self.process.poll() is not None:
+                self.told.failed.append(f"{name}: it had ended")
+                return
+            self.step(name, getattr(self, name))
+
+    def connect(self, **more: object) -> voxel.Connection:
+        return voxel.connect(self.server, timeout=PATIENCE, **more)  # type: ignore[arg-type]
+
+    def draw(self) -> None:
+        with self.connect(name="one") as v:
+            v.layer("first").sphere("ball", radius=0.5, color="red", fill="solid")
+            v.points("cloud", np.zeros((3000, 3), np.float32))
+            outcomes = v.commit().wait_shown(timeout=PATIENCE)
+            assert len(outcomes) == 2, outcomes
+            v.lines("wrong", [[0, 0, 0], [1, 0, 0]], colors="blue")
+            v.commit().wait(PATIENCE)
+            v.displays(timeout=PATIENCE)
+            v.stats(timeout=PATIENCE)
+
+    def durable(self) -> None:
+        v = self.connect(name="two", on_disconnect="keep")
+        try:
+            v.layer("stays").box("box", size=(1, 1, 1), color="white", fill="solid")
+            frame = v.commit(durable=True).wait_durable(PATIENCE)
+            self.told.durable = bool(frame.durable)
+        finally:
+            v.close(PATIENCE)
+
+    def lifetimes(self) -> None:
+        with self.connect(name="three") as v:
+            ball = v.sphere("brief", radius=0.2, color="green")
+            ball.transform = voxel.translate(0.1, 0, 0)
+            v.commit().wait_shown(timeout=PATIENCE)
+            v.entities()
+            v.layers()
+
+    def asset(self) -> None:
+        with self.connect(name="four") as v:
+            v.upload(bytes(200_000))
+
+    def page(self) -> None:
+        for path in ("/healthz", "/metrics", "/"):
+            with urllib.request.urlopen(f"http://127.0.0.1:{self.port}{path}", timeout=PATIENCE) as answer:
+                assert answer.read()
+
+    def reload(self) -> None:
+        os.kill(self.pid, signal.SIGHUP)
+
+    def capture(self) -> None:
+        with self.connect(name="five", on_disconnect="clear") as v:
+            v.layer("last").sphere("ball", radius=0.3, color="red", fill="solid")
+            frame = v.commit()
+            outcomes = frame.wait_shown(timeout=PATIENCE)
+            assert frame.accepted is not None
+            picture = v.capture("stack", at_least_snapshot=frame.accepted.snapshot, timeout=PATIENCE).rgb
+            red = (picture[..., 0] > 100) & (picture[..., 1] < 50)
+            if "stack" in outcomes and outcomes["stack"].kind == "presented" and not red.any():
+                raise RuntimeError("it was told to be shown, and is not")
+            self.told.shown = bool(red.any())
+
+
+def end(process: "subprocess.Popen[str]", pid: int) -> Optional[int]:
+    """Its exit status when it was asked to end; None: it had to be killed."""
+    if pid:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGTERM)
+    try:
+        return process.wait(ENDS)
+    except subprocess.TimeoutExpired:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return None
+
+
+@dataclass
+class Ending:
+    how: str  # lived, refused, ended, late, hung, crashed, known: …
+    wrong: str = ""
+
+
+def judge(life: Life, status: Optional[int], is_ready: bool, alive: bool, reason: str = "") -> Ending:
+    """What came of a life that ended with `status`; `alive`: until it was asked to end. `reason`: that the failure came to others' code, which ends
+    the process by its own decision."""
+    said = life.said()
+    if status is None:
+        return Ending("hung", "it did not end when it was asked to")
+    if status < 0 or status > 128:
+        if reason:
+            return Ending(f"known: {reason}")
+        return Ending("crashed", f"it ended by signal {abs(status) % 128}: {said.strip().splitlines()[-1:]}")
+    if not is_ready:
+        return Ending("refused", "" if said.strip() and status != 0 else f"it ended with {status} before it was ready, and said nothing")
+    if alive:
+        late = "did not end in time" in said  # others wait for threads that they did not get; it is ended, and says so
+        fine = status == 0 or late
+        return Ending("late" if late else "lived", "" if fine else f"it ended with {status} when it was asked to: {said.strip().splitlines()[-1:]}")
+    told = reason or re.search(r"^voxeld: .|error|failed|cannot", said, re.I | re.M)
+    return Ending("ended", "" if told else f"it ended with {status} and did not say why")
+
+
+def again(folder: Path, told: Told) -> str:
+    """Starts it once more, unharmed, on the same state; what was wrong then, or nothing."""
+    life = Life(folder)
+    process = life.start()
+    life.pid = process.pid
+    wrong = ""
+    if not life.ready(process):
+        wrong = f"it does not start any more: {life.said().strip().splitlines()[-1:]}"
+    elif told.durable:
+        life.step("durable after", lambda: has_box(life))
+        if life.told.failed:
+            wrong = f"what was told to be durable is not there: {life.told.failed}"
+    if end(process, process.pid) is None:
+        wrong = wrong or "the next one did not end"
+    return wrong
+
+
+def has_box(life: Life) -> None:
+    with life.connect(name="after") as v:
+        names = [entity.key.id for entity in v.entities()]
+        if "box" not in names:
+            raise AssertionError(f"entities are {names}")

@@ -1,0 +1,218 @@
+#!/usr/bin/env python3
+"""Every allocation of the daemon failed once: from each place that asks for memory, in the process and in the libraries of others, one allocation fails
+in an otherwise ordinary life of the real voxeld (life.py), and then it is started again on the same state, unharmed. A place is the four calls that
+led to it; what there is comes from a life in which nothing fails.
+
+usage: nth_allocation.py [--way reserve|bare|forever] [--sample N] [--seed N] [--sites HEX,…] [--jobs N] [--list] [--json]
+
+The way that it fails:
+  reserve   once: the daemon has its reserve, and nobody is to notice (the default)
+  bare      once, and what the daemon then tries fails too, and it has no reserve: whoever asked gets nothing
+  forever   from then on every allocation fails, for ever: it uses the reserve up, and ends
+
+What must hold: with the reserve the daemon lives, refuses nothing, and counts the failure; otherwise it lives, or ends with 1 and a line that says
+why, or by the abort of a library of others that gives up where it asked itself. In each case nothing hangs, what was told to be shown is shown, what
+was told to be durable is there after the next start, and in the end it has no more descriptors than unharmed. Paths are in VOXELD, FAIL_MALLOC (the
+preloaded library) and PYTHONPATH; ends with 1 if one did not."""
+import argparse
+import collections
+import concurrent.futures
+import json
+import multiprocessing
+import os
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from life import PATIENCE, Ending, Life, again, end, judge
+
+# Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
+GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
+ENDED = "voxeld: out of memory: there are no"
+
+
+@dataclass
+class Place:
+    site: str
+    count: int
+    stack: list[str]
+
+
+@dataclass
+class Result:
+    way: str
+    site: str
+    how: str  # lived, refused, ended, late, hung, crashed, missed, known: …
+    stack: list[str]  # innermost first
+    wrong: str = ""
+    once: str = ""  # what was wrong at first, and not again
+    failed: list[str] = field(default_factory=list)
+
+
+def place_of(line: str) -> Place:
+    site, count, *stack = line.split()
+    return Place(site, int(count), stack)
+
+
+def descriptors(process: "subprocess.Popen[str]", most: int) -> int:
+    """How many it has, once there are no more than `most`, or after a while."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            have = len(os.listdir(f"/proc/{process.pid}/fd"))
+        except OSError:
+            return 0
+        if have <= most or time.monotonic() > deadline:
+            return have
+        time.sleep(0.02)  # connections close by themselves, and nothing tells when
+
+
+def failures(life: Life) -> int:
+    """That the daemon counts itself; -1: it does not tell."""
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{life.port}/metrics", timeout=PATIENCE) as answer:
+            found = re.search(r"^voxeld_process_allocations_failed_total (\d+)", answer.read().decode(), re.M)
+            return int(found[1]) if found else -1
+    except OSError:
+        return -1
+
+
+def run(way: str, place: Place, most_descriptors: int) -> Result:
+    with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
+        life = Life(Path(name), "" if way == "reserve" else "memory_reserve_bytes = 0" if way == "bare" else "")
+        told = Path(name, "told")
+        process = life.start(environment={
+            "LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_SITE": place.site, "FAIL_MALLOC_TOLD": str(told),
+            "FAIL_MALLOC_TIMES": {"reserve": "1", "bare": "2", "forever": "0"}[way]})
+        life.pid = process.pid
+        is_ready = life.ready(process)
+        wrong = ""
+        if is_ready:
+            try:
+                life.live()
+            except RuntimeError as untrue:
+                wrong = str(untrue)
+        alive = process.poll() is None
+        left = descriptors(process, most_descriptors)
+        counted = failures(life) if alive and told.exists() else -1  # it may come with the end
+        status = end(process, process.pid)
+        said = life.said()
+        met = told.exists()
+        stack = place_of(told.read_text(encoding="ascii")).stack if met else place.stack
+        # What the reserve could not help either is told, whoever gives up then.
+        others = next((frame for frame in stack if not frame.startswith("libc.so")), "")
+        gives_up = GIVES_UP.match(others) if way != "reserve" and ENDED in said else None
+        if way == "forever" and ENDED in said:
+            gives_up = re.match("(anybody)", "anybody")  # who asks next is chance
+        ending = judge(life, status, is_ready, alive, f"{gives_up[1]} asked, and gives up" if gives_up else "")
+        if way != "reserve" and is_ready and status == 1 and ENDED in said:
+            ending = Ending("ended")  # be it on its way to the end
+        after = again(Path(name), life.told)
+        wrong = wrong or ending.wrong or after
+        if not met:
+            return Result(way, place.site, "missed", stack, wrong, failed=life.told.failed)
+        if way == "reserve":
+            if ending.how != "lived":
+                wrong = wrong or f"{ending.how}: {said.strip().splitlines()[-1:]}"
+            elif life.told.failed:
+                wrong = wrong or f"it refused what it could do: {life.told.failed}"
+            elif counted == 0:
+                wrong = wrong or "it did not count the failure"
+        elif ending.how in ("ended", "refused") and status != 1:
+            wrong = wrong or f"it ended with {status}"
+        elif ending.how == "ended" and ENDED not in said:
+            wrong = wrong or "it ended, and did not say that there was no memory"
+        if ending.how == "lived" and left > most_descriptors:
+            wrong = wrong or f"{left} descriptors are left, of {most_descriptors}"
+        return Result(way, place.site, ending.how, stack, wrong, failed=life.told.failed)
+
+
+def run_twice(way: str, place: Place, most_descriptors: int) -> Result:
+    """What is wrong must be so again: a machine that is busy with other things leaves clients waiting, too."""
+    first = run(way, place, most_descriptors)
+    if not first.wrong:
+        return first
+    second = run(way, place, most_descriptors)
+    if second.wrong:
+        second.wrong = f"{first.wrong}; and again: {second.wrong}"
+    else:
+        second.once = first.wrong
+    return second
+
+
+def places() -> tuple[list[Place], int]:
+    """Where memory is asked for in a life without failures, and how many descriptors there are before its end."""
+    with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
+        life = Life(Path(name))
+        process = life.start(environment={"LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_LIST": f"{name}/list"})
+        life.pid = process.pid
+        if not life.ready(process):
+            sys.exit(f"voxeld does not start: {life.said()}")
+        life.live()
+        rest = descriptors(process, 0)  # what it comes down to
+        status = end(process, process.pid)
+        if life.told.failed or not life.told.shown or not life.told.durable:
+            sys.exit(f"unharmed it failed: {life.told}")
+        if status != 0:
+            sys.exit(f"unharmed it ended with {status}: {life.said()}")
+        found = [place_of(line) for line in Path(name, "list").read_text(encoding="ascii").splitlines()]
+        return sorted(found, key=lambda place: place.site), rest
+
+
+def say(last: Result, at: int, of: int) -> None:
+    wrong = f"; WRONG: {last.wrong}" if last.wrong else f"; once: {last.once}" if last.once else ""
+    print(f"{at}/{of} {last.way} {last.site} {' '.join(last.stack[:2])}: {last.how}{wrong}", file=sys.stderr, flush=True)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--way", choices=["reserve", "bare", "forever"], action="append")
+    parser.add_argument("--sites", help="only these, by comma")
+    parser.add_argument("--sample", type=int, default=0, help="so many of each way, by chance")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=1, help="so many lives at a time")
+    parser.add_argument("--list", action="store_true", help="say where memory is asked for, and end")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    found, most_descriptors = places()
+    if options.list:
+        for place in found:
+            print(place.site, place.count, *place.stack)
+        print(f"{len(found)} places, {sum(place.count for place in found)} allocations, {most_descriptors} descriptors")
+        return 0
+    if options.sites:
+        found = [place for place in found if place.site in options.sites.split(",")]
+    cases = []
+    for way in options.way or ["reserve"]:
+        chosen = random.Random(options.seed).sample(found, min(options.sample or len(found), len(found)))
+        cases += [(way, place) for place in chosen]
+    results = []
+    # Each life has a client's process of its own: what gRPC keeps of one server would be in the next one's way.
+    with concurrent.futures.ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as jobs:
+        for last in jobs.map(run_twice, *zip(*cases), [most_descriptors] * len(cases)):
+            results.append(last)
+            if last.wrong or last.once or not options.json and (sys.stderr.isatty() or len(results) % 50 == 0):
+                say(last, len(results), len(cases))
+    if options.json:
+        print(json.dumps([vars(result) for result in results]))
+    else:
+        table: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+        for result in results:
+            table[result.way]["wrong" if result.wrong else result.how.split(":")[0]] += 1
+            table[result.way]["once"] += bool(result.once)
+        kinds = ("lived", "refused", "ended", "late", "known", "missed", "wrong", "once")
+        print(f"{'way':<10}" + "".join(f"{kind:>9}" for kind in kinds))
+        for way, counts in sorted(table.items()):
+            print(f"{way:<10}" + "".join(f"{counts[kind]:>9}" for kind in kinds))
+        print(f"{len(results)} cases of {len(found)} places, {sum(1 for result in results if result.wrong)} wrong")
+    return 1 if any(result.wrong for result in results) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
