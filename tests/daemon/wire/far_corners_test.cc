@@ -335,6 +335,45 @@ TEST_F(FarCorners, TransferFunctionsMayJumpAndTakeAColormap) {
   for (size_t i = 0; i < entries.size(); ++i) EXPECT_EQ(entries[i] & 0xFFFFFF, viridis[i]) << i;
 }
 
+TEST_F(FarCorners, TransferFunctionsMayEndInAStep) {
+  P volume = FullVolume();
+  v1::Transfer* const transfer = TransferOf(volume);
+  transfer->Clear();
+  for (const double value : {0.0, 1.0, 1.0}) transfer->add_values(value);
+  for (const uint32_t color : {0x0000FF, 0x0000FF, 0xFF0000}) transfer->add_colors(color);
+  const auto words = Group(volume).parts[0].geometry->arrays.indices();
+  const uint32_t* const table = &words[gpu::kSampleHeadWords];
+  EXPECT_EQ(table[254] & 0xFFFFFF, 0x0000FFu);
+  EXPECT_EQ(table[255] & 0xFFFFFF, 0xFF0000u) << "the last, and all beyond it";
+}
+
+TEST_F(FarCorners, WhatIsTooIntricateForTheEngineIsRefused) {
+  // Sixty-four numbers that are all needed until the end.
+  P p;
+  std::string text = "1";
+  for (int i = 0; i < 64; ++i) text += absl::StrCat("*sin(x+", i, ")");
+  for (int i = 63; i >= 0; --i)
+    text = absl::StrCat("(", text, "+sin(x+", i, "))*sin(x+", i * 7 % 64, ")");
+  p.mutable_implicit()->mutable_surface()->set_text(text);
+  limits_.max_expression_depth = 1000;
+  Content content;
+  const MaybeFault fault = FaultOf(p, &content);
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->field, "primitive.implicit");
+  EXPECT_EQ(fault->reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(fault->message, HasSubstr("intermediate results at once"));
+}
+
+TEST_F(FarCorners, AScaleOverNextToNothingColoursTextAllTheSame) {
+  P text = Text();
+  *text.mutable_color_scale() = Scaled().color_scale();
+  text.mutable_color_scale()->set_high(1e13);
+  EXPECT_EQ(Group(text).parts.size(), 3u);
+  text.mutable_text()->set_style(v1::Text::STROKES);
+  text.mutable_text()->set_text(" ");
+  EXPECT_EQ(Geometry(text).record.vertex_count, 0u) << "nothing is coloured";
+}
+
 TEST_F(FarCorners, NearestIsTheFilterThatWasAskedFor) {
   P volume = FullVolume();
   const auto filter = [&] {

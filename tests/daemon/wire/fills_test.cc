@@ -150,9 +150,32 @@ TEST(Fills, WhatCannotBeKeptIsRefusedWhereverMemoryEnds) {
   mesh.mutable_mesh()->mutable_texture()->set_picture(pictures::PngOf(2, 2, {1, 2, 3, 4}));
   mesh.mutable_mesh()->mutable_texture()->set_coordinates(std::string(6 * 8, '\0'));
   all.push_back(mesh);
+  // Large enough to lie in the pool each time that they are made anew.
+  v1::Primitive large;
+  *large.mutable_mesh()->mutable_vertices() = Corners(900);
+  all.push_back(large);
+  large.mutable_mesh()->set_fill(v1::FILL_LINES);
+  all.push_back(large);
+  large.mutable_mesh()->set_fill(v1::FILL_SURFACE);
+  large.mutable_mesh()->mutable_texture()->set_picture(
+      pictures::PngOf(32, 32, std::vector<uint32_t>(32 * 32, 5)));
+  large.mutable_mesh()->mutable_texture()->set_coordinates(std::string(900 * 8, '\0'));
+  all.push_back(large);
+  large.mutable_mesh()->clear_texture();
+  large.mutable_mesh()->mutable_vertices()->set_colors_of(v1::Vertices::ELEMENTS);
+  large.mutable_mesh()->mutable_vertices()->set_colors(std::string(900, 'c'));
+  all.push_back(large);
+  for (const v1::Primitive& primitive : FullPrimitives()) {
+    if (!primitive.has_height_map()) continue;
+    large = primitive;
+    large.mutable_height_map()->set_columns(30);
+    large.mutable_height_map()->set_rows(30);
+    large.mutable_height_map()->set_heights(std::string(900 * 4, '\0'));
+    all.push_back(large);
+  }
   int refused = 0;
   for (const v1::Primitive& primitive : all) {
-    SCOPED_TRACE(primitive.ShortDebugString());
+    SCOPED_TRACE(KindOf(primitive));
     bool fits = false;
     for (uint64_t limit = 64; limit <= 128 << 10; limit += 64 + limit / 512 * 64) {
       const auto pool = gpu::BulkPool::Create(

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+
 namespace voxeld::lights {
 namespace {
 
@@ -123,6 +125,43 @@ TEST(DdpDatagram, SaysWhatIsWrong) {
   EXPECT_THAT(Wrong(Protocol::kDdp, cut), HasSubstr("say 3 bytes of data; 2 are there"));
   EXPECT_THAT(Wrong(Protocol::kDdp, Ddp(0x41, 0, 0x1B, 0, {1, 2, 3, 4})),
               HasSubstr("byte 2 is 27"));
+}
+
+TEST(DdpDatagram, OfNothingIsAWordToShowOrNone) {
+  EXPECT_EQ(ReadDatagram(Protocol::kDdp, Ddp(0x41, 0, 0x0B, 0, {}))->kind, Datagram::Kind::kShow);
+  EXPECT_EQ(ReadDatagram(Protocol::kDdp, Ddp(0x40, 0, 0x0B, 0, {}))->kind, Datagram::Kind::kOther);
+}
+
+// Each field of the layers made another: refused, and by what it says.
+TEST(E131Datagram, EachFieldOfItsLayersCounts) {
+  const Bytes good = E131(3, 9, {1, 2, 3});
+  for (const size_t at :
+       {16u, 17u, 38u, 39u, 115u, 116u, 117u, 118u, 119u, 120u, 121u, 122u, 123u, 124u}) {
+    Bytes bad = good;
+    bad[at] ^= 0x01;
+    EXPECT_TRUE(absl::IsInvalidArgument(ReadDatagram(Protocol::kE131, bad).status())) << at;
+  }
+  // Its lengths are right, and it ends before its values.
+  for (const size_t size : {49u, 125u}) {
+    Bytes cut(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
+    for (const size_t at : {16u, 38u}) {
+      cut[at] = static_cast<uint8_t>(0x70 | (size - at) >> 8);
+      cut[at + 1] = static_cast<uint8_t>(size - at);
+    }
+    EXPECT_EQ(Wrong(Protocol::kE131, cut),
+              absl::StrCat("a packet of ", size, " bytes; it takes 126 at least"));
+  }
+  EXPECT_THAT(Wrong(Protocol::kE131, E131(3, 9, Bytes(513))), HasSubstr("512 are the most"));
+  EXPECT_EQ(ReadDatagram(Protocol::kE131, E131(3, 9, Bytes(512)))->values.size(), 512u);
+  EXPECT_EQ(Wrong(Protocol::kE131, E131(0, 9, {1})), "universe 0; 1 to 63999 are possible");
+  EXPECT_EQ(Wrong(Protocol::kE131, E131(64000, 9, {1})), "universe 64000; 1 to 63999 are possible");
+  EXPECT_TRUE(ReadDatagram(Protocol::kE131, E131(63999, 9, {1}, 200)).ok());
+  EXPECT_EQ(Wrong(Protocol::kE131, E131(1, 9, {1}, 201)), "priority 201; 200 is the most");
+}
+
+TEST(Datagrams, OpcHasNone) {
+  EXPECT_EQ(Wrong(Protocol::kOpc, {0, 0, 0, 0}),
+            "Open Pixel Control comes as a stream, not in packets");
 }
 
 TEST(E131Datagram, SaysWhatItHas) {
