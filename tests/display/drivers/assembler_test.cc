@@ -14,7 +14,7 @@ namespace {
 using Bytes = std::vector<std::byte>;
 
 // Six pictures of 24 bytes.
-constexpr FrameLayout kLayout{.slices = 3, .width = 4, .height = 2, .sub_frames = 2};
+constexpr FrameLayout kSixPictures{.slices = 3, .width = 4, .height = 2, .sub_frames = 2};
 
 PacketHeader Header(uint64_t volume, uint32_t slice = 0, uint16_t sub_frame = 0,
                     uint32_t offset = 0) {
@@ -51,7 +51,7 @@ std::vector<std::pair<uint32_t, uint32_t>> Missing(const VolumeAssembler& assemb
 using Runs = std::vector<std::pair<uint32_t, uint32_t>>;
 
 TEST(Assembler, BeginsWithWhatFits) {
-  VolumeAssembler assembler(kLayout);
+  VolumeAssembler assembler(kSixPictures);
   const Bytes whole = BeginOf(0, 6);
   const auto refused = [&](ErrorCode code, const PacketHeader& header, const Bytes& payload,
                            VolumePtr base) {
@@ -76,7 +76,7 @@ TEST(Assembler, BeginsWithWhatFits) {
 }
 
 TEST(Assembler, TellsWhatIsMissingInRuns) {
-  VolumeAssembler assembler(kLayout);
+  VolumeAssembler assembler(kSixPictures);
   EXPECT_EQ(Missing(assembler), Runs{});
   EXPECT_EQ(assembler.Finish(), nullptr) << "of nothing";
   ASSERT_EQ(assembler.Begin(Header(7), BeginOf(0, 6), nullptr), ErrorCode::kNone);
@@ -102,7 +102,7 @@ TEST(Assembler, TellsWhatIsMissingInRuns) {
 }
 
 TEST(Assembler, TakesTheOthersFromItsBase) {
-  VolumeAssembler assembler(kLayout);
+  VolumeAssembler assembler(kSixPictures);
   const VolumePtr base = Base(4);
   ASSERT_EQ(assembler.Begin(Header(5), BeginOf(4, 6, Bytes(1, std::byte{0b000101})), base),
             ErrorCode::kNone);
@@ -120,7 +120,7 @@ TEST(Assembler, TakesTheOthersFromItsBase) {
 }
 
 TEST(Assembler, FragmentsStayInTheirPicture) {
-  VolumeAssembler assembler(kLayout);
+  VolumeAssembler assembler(kSixPictures);
   ASSERT_EQ(assembler.Begin(Header(1), BeginOf(0, 6), nullptr), ErrorCode::kNone);
   EXPECT_EQ(assembler.Slice(Header(2), Bytes(24)), ErrorCode::kNotFilling) << "of another volume";
   EXPECT_EQ(assembler.Slice(Header(1, 3), Bytes(24)), ErrorCode::kBadPicture);

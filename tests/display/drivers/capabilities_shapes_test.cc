@@ -152,7 +152,7 @@ const Wrong kWrongs[] = {
        Put<uint32_t>(b, kShape + 4, 16385);
        SetFixed(b, [](auto& c) { c.slices = 16385 * 2; });
      },
-     "is 3277"},
+     "slices_per_turn is 16385; it must be slices (32770) / panels (2)"},
     {"rotor_long", [] { return RotorOf(); }, [](Block& b) { Resize(b, b.size() + 8); }, "128"},
     {"rotor_pitch_u", [] { return RotorOf(); }, [](Block& b) { Put(b, kPanel, -1.0); },
      "pitch is -1; it must be above 0"},
@@ -247,19 +247,19 @@ TEST(CapabilitiesShapes, OfACalibratedHelixOrLatticeWhatItIsMadeOfCounts) {
 }
 
 TEST(CapabilitiesShapes, ABitmapFitsAPayload) {
-  // With two sub-frames the bitmap has 2 · slices bits, and 16 bytes stand before it.
-  DeviceCapabilities device = Device(LatticeOf(4000));
-  device.fixed.max_payload = 1016;
-  const auto parsed = ParseCapabilities(EncodeCapabilities(device));
-  ASSERT_TRUE(parsed.ok()) << parsed.status();
-  FrameLayout layout = LayoutOf(*parsed);
-  layout.sub_frames = 2;
-  EXPECT_TRUE(CheckCapabilities(*parsed, LatticeOf(4000), layout).ok()) << "1,000 bytes and 16";
-  device.fixed.max_payload = 1015;
-  const auto less = ParseCapabilities(EncodeCapabilities(device));
-  ASSERT_TRUE(less.ok()) << less.status();
-  EXPECT_EQ(CheckCapabilities(*less, LatticeOf(4000), layout).message(),
-            "a bitmap of 8000 pictures is longer than the device's 1015 bytes of payload");
+  // With two sub-frames it has two bits a slice, and 16 bytes stand before it.
+  const auto check = [](int rows) {
+    DeviceCapabilities device = Device(LatticeOf(rows));
+    device.fixed.max_payload = 1024;
+    const auto parsed = ParseCapabilities(EncodeCapabilities(device));
+    EXPECT_TRUE(parsed.ok()) << parsed.status();
+    FrameLayout layout = LayoutOf(*parsed);
+    layout.sub_frames = 2;
+    return CheckCapabilities(*parsed, LatticeOf(rows), layout);
+  };
+  EXPECT_EQ(check(4032), absl::OkStatus()) << "1,008 bytes and 16";
+  EXPECT_EQ(check(4033).message(),
+            "a bitmap of 8066 pictures is longer than the device's 1024 bytes of payload");
 }
 
 }  // namespace
