@@ -236,6 +236,19 @@ TEST_F(GrantsFile, OfAnybodyElseIsNotTrusted) {
               HasSubstr("belongs to user 12345; it must be root's or the daemon's own"));
 }
 
+TEST_F(GrantsFile, OfTheDaemonsOwnUserIsTrusted) {
+  PutFile(path_, "");
+  ASSERT_EQ(chmod(folder_.c_str(), 0755), 0);
+  const bool root = geteuid() == 0;
+  if (root) {
+    ASSERT_EQ(chown(path_.c_str(), 12345, gid_t(-1)), 0);
+    ASSERT_EQ(seteuid(12345), 0);
+  }
+  const absl::Status status = ReadGrants(path_).status();
+  if (root) ASSERT_EQ(seteuid(0), 0);
+  EXPECT_TRUE(status.ok()) << status;
+}
+
 TEST_F(GrantsFile, ThatCannotBeReadIsAnError) {
   PutFile(path_, "# nothing\n", 0200);
   ASSERT_EQ(chmod(folder_.c_str(), 0755), 0);
@@ -262,6 +275,7 @@ TEST(Scopes, ReadBackAsTheyAreWritten) {
   EXPECT_EQ(ParseScopes("none")->Sentence(), "none");
   EXPECT_EQ(*ParseScopes("all"), Scopes::All());
   EXPECT_TRUE(ParseScopes("none")->empty());
+  EXPECT_EQ(ParseScopes("none")->ToString(), "none");
   EXPECT_TRUE(absl::IsInvalidArgument(ParseScopes("").status()));
   EXPECT_TRUE(absl::IsInvalidArgument(ParseScopes("view none").status()));
   EXPECT_TRUE(Scopes::All().Hold(*ParseScopes("draw")));
