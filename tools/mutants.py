@@ -1,6 +1,8 @@
 """What can be changed in a C++ file, one small thing at a time, and the file with all of that behind switches. Part of tools/mutate."""
 import bisect
 import collections
+import hashlib
+import json
 import pathlib
 import re
 import sys
@@ -113,7 +115,10 @@ class Finder:
         return re.sub(r"//[^\n]*|/\*.*?\*/", "", middle, flags=re.DOTALL).strip()
 
     def walk(self, cursor, parents):
-        kind = cursor.kind
+        try:
+            kind = cursor.kind
+        except ValueError:
+            return  # newer than the bindings: what a template requires, which the compiler decides
         if kind in (K.STATIC_ASSERT, K.MACRO_INSTANTIATION, K.ENUM_DECL, K.ALIAS_DECLARATION if hasattr(K, "ALIAS_DECLARATION") else K.TYPEDEF_DECL):
             return
         if kind == K.VAR_DECL:
@@ -277,6 +282,11 @@ def find_sites(job):
     if not cindex.Config.loaded:
         cindex.Config.set_library_file(LIBCLANG)
     text = (ROOT / path).read_text()
+    # Parsing takes longest, for what is included: what was found is kept for as long as file and tool are the same.
+    digest = hashlib.sha256("\0".join([text, pathlib.Path(__file__).read_text(), *arguments]).encode()).hexdigest()
+    kept = OUT / "sites" / f"{digest}.json"
+    if kept.exists():
+        return path, [Site(start, end, kind, tuple(alternatives)) for start, end, kind, alternatives in json.loads(kept.read_text())]
     unit = cindex.Index.create().parse(str(ROOT / path), args=arguments, options=cindex.TranslationUnit.PARSE_DETAILED_PROCESSING_RECORD)
     errors = [str(d) for d in unit.diagnostics if d.severity >= cindex.Diagnostic.Error]
     if errors:
@@ -286,7 +296,10 @@ def find_sites(job):
     for site in finder.sites:
         unique.setdefault((site.start, site.end, site.kind), site)
     # Outer before inner; of one extent what is wholly replaced last.
-    return path, sorted(unique.values(), key=lambda s: (s.start, -s.end, s.kind not in ("statement left out", "leaving left out"), s.kind != "condition"))
+    found = sorted(unique.values(), key=lambda s: (s.start, -s.end, s.kind not in ("statement left out", "leaving left out"), s.kind != "condition"))
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    kept.write_text(json.dumps(found))
+    return path, found
 
 
 class Mutant:
