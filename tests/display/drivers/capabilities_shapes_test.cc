@@ -222,6 +222,55 @@ TEST(CapabilitiesShapes, EitherWayRoundGoesThereAndBack) {
   }
 }
 
+// What is there and back is what was given, not what was read before.
+TEST(CapabilitiesShapes, EveryFieldGoesThereAndBack) {
+  const auto back = [](const Geometry& geometry) {
+    const auto parsed = ParseCapabilities(EncodeCapabilities(Device(geometry)));
+    EXPECT_TRUE(parsed.ok()) << parsed.status();
+    return parsed.ok() ? parsed->geometry : Geometry();
+  };
+  for (const bool u : {false, true}) {
+    for (const bool v : {false, true}) {
+      Geometry planar = Planar();
+      auto& stack = std::get<PlanarStack>(planar.shape);
+      stack.normal = u ? PlanarStack::Normal::kY : PlanarStack::Normal::kZ;
+      stack.pitch_u_mm = 0.3;
+      stack.pitch_v_mm = 0.7;
+      stack.mirror_u = u;
+      stack.mirror_v = v;
+      EXPECT_EQ(back(planar), planar);
+      Geometry rotor = RotorOf();
+      auto& panel = std::get<Rotor>(rotor.shape).panels[1];
+      panel = {.pitch_u_mm = 1.5,
+               .pitch_v_mm = 1.25,
+               .eccentricity_mm = 4,
+               .shift_u_mm = 5,
+               .shift_v_mm = 6,
+               .phase_turns = 0.75,
+               .mirror_u = u,
+               .mirror_v = v};
+      EXPECT_EQ(back(rotor), rotor);
+      Geometry helix = HelixOf(u);
+      auto& blades = std::get<Helix>(helix.shape);
+      blades.left_handed = v;
+      blades.mirror_u = v;
+      blades.mirror_v = u;
+      blades.phase_turns = 0.5;
+      blades.pitch_u_mm = 0.9;
+      blades.pitch_v_mm = 0.8;
+      EXPECT_EQ(back(helix), helix);
+    }
+  }
+  Geometry lattice = LatticeOf(2);
+  std::get<Lattice>(lattice.shape).cell_mm = {4, 5, 6};
+  EXPECT_EQ(back(lattice), lattice);
+  for (const size_t panels : {1u, 16u}) {
+    Geometry rotor = RotorOf();
+    std::get<Rotor>(rotor.shape).panels.resize(panels);
+    EXPECT_EQ(back(rotor), rotor) << panels;
+  }
+}
+
 FrameLayout LayoutOf(const DeviceCapabilities& device) {
   return {.slices = static_cast<int32_t>(device.fixed.slices),
           .width = static_cast<int32_t>(device.fixed.width),
