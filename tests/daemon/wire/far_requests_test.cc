@@ -245,6 +245,35 @@ TEST(FarUpdates, AreRefusedWhole) {
   EXPECT_THAT(refusal(), HasSubstr("operations[1].commit is set"));
 }
 
+// What an operation is of is what its message names.
+TEST(FarOperations, NameWhatTheyAreOf) {
+  const auto decoded = [](const v1::StreamRequest& request) {
+    const Decoded out = Decode(request);
+    EXPECT_THAT(out.refused.issues, IsEmpty());
+    return out.operations.at(0).op;
+  };
+  v1::StreamRequest request = MeshRequest();
+  EXPECT_EQ(std::get<Upsert>(decoded(request)).layer, "layer");
+  EXPECT_EQ(std::get<Upsert>(decoded(request)).id, "id");
+  request.mutable_set_transform()->set_layer("l");
+  request.mutable_set_transform()->set_id("i");
+  EXPECT_EQ(std::get<SetTransform>(decoded(request)).layer, "l");
+  EXPECT_EQ(std::get<SetTransform>(decoded(request)).id, "i");
+  request.mutable_layer_state()->set_layer("l");
+  EXPECT_EQ(std::get<LayerState>(decoded(request)).layer, "l");
+  request.mutable_frame_begin()->set_layer("l");
+  EXPECT_EQ(std::get<FrameBegin>(decoded(request)).layer, "l");
+  request.mutable_frame_end()->set_layer("l");
+  EXPECT_EQ(std::get<FrameEnd>(decoded(request)).layer, "l");
+  request.mutable_define_object()->set_object("o");
+  request.mutable_define_object()->mutable_definition();
+  EXPECT_EQ(std::get<DefineObject>(decoded(request)).object, "o");
+  request.mutable_delete_object()->set_object("o");
+  request.mutable_delete_object()->set_cascade(true);
+  EXPECT_EQ(std::get<DeleteObject>(decoded(request)).object, "o");
+  EXPECT_TRUE(std::get<DeleteObject>(decoded(request)).cascade);
+}
+
 TEST(FarLayers, HaveEveryBlendAndAMaskThatCanBeTakenAway) {
   v1::StreamRequest request;
   request.mutable_layer_state()->set_layer("l");
