@@ -31,7 +31,7 @@ if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE)
 endif()
 
 # Names of files, which differ from clone to clone, stand in messages as they are from the root.
-if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_SANITIZE)
+if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_INSTRUMENTED)
   target_compile_options(voxeld_options INTERFACE
     $<$<COMPILE_LANGUAGE:C,CXX>:-ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=build>)
 endif()

@@ -29,6 +29,7 @@ namespace {
 constexpr size_t kHashDigits = 64;
 constexpr size_t kMostFaults = 20;
 
+// `when` has an offset.
 int64_t UnixSeconds(const toml::date_time& when) {
   using std::chrono::day;
   using std::chrono::month;
@@ -38,7 +39,7 @@ int64_t UnixSeconds(const toml::date_time& when) {
   int64_t seconds =
       std::chrono::duration_cast<std::chrono::seconds>(date.time_since_epoch()).count();
   seconds += when.time.hour * 3600 + when.time.minute * 60 + when.time.second;
-  return seconds - (when.offset.has_value() ? when.offset->minutes * 60 : 0);
+  return seconds - when.offset->minutes * 60;
 }
 
 std::optional<uint32_t> UserNumber(const std::string& name) {

@@ -72,9 +72,9 @@ bool AddCylinder(const ClipCylinder& cylinder, gpu::LayerRecord& record) {
     const double row[4] = {across[0][a], across[1][a], axis[a], cylinder.start[a]};
     std::copy_n(row, 4, m + a * 4);
   }
+  // What is not finite leaves no number of it.
   const bool is_sound =
-      std::isnormal(gpu::Determinant(record.cylinders[record.cylinder_count - 1].unit)) &&
-      std::all_of(m, m + 12, [](double x) { return std::isfinite(x); });
+      std::isnormal(gpu::Determinant(record.cylinders[record.cylinder_count - 1].unit));
   return AddSlab(axis, Dot(axis, cylinder.start), Dot(axis, cylinder.end), record) && is_sound;
 }
 

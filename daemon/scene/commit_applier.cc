@@ -135,8 +135,10 @@ bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::strin
                         "owners share; orphaned layers can be cleared",
                         Quoted(layer), limits_.max_layers));
   }
-  auto over = OverQuota(tally.drawables, tally.bytes + Draft::LayerBytes(Key(layer)));
-  return over.has_value() && refuse(*std::move(over));
+  if (auto over = OverQuota(tally.drawables, tally.bytes + Draft::LayerBytes(Key(layer)))) {
+    return refuse(*std::move(over));
+  }
+  return false;
 }
 
 std::optional<std::string> CommitApplier::OverQuota(uint64_t drawables, uint64_t bytes) const {

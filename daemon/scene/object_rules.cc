@@ -155,8 +155,10 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
   const Object* old = draft_.FindObject(Key(define.object));
   const uint64_t bytes = tally.bytes - (old == nullptr ? 0 : old->bytes) +
                          Draft::ObjectBytes(define.object, *define.data);
-  auto over = OverQuota(drawables, bytes);
-  return over.has_value() && refuse(Reason::kQuotaExceeded, *std::move(over));
+  if (auto over = OverQuota(drawables, bytes)) {
+    return refuse(Reason::kQuotaExceeded, *std::move(over));
+  }
+  return false;
 }
 
 void CommitApplier::Do(Operation& operation, DefineObject& define) {

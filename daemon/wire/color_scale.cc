@@ -35,7 +35,7 @@ MaybeFault ToAlong(const FieldPath& path, const v1::ColorScale& in, Vector* out)
   Vector along;
   if (auto fault = ToVector(at, in.along(), &along)) return fault;
   const double square = gpu::implicit::Dot(along, along);
-  if (!(square > 0) || !std::isfinite(square)) {
+  if (!(square > 0)) {  // of three floats it is finite
     return Fault{at.ToString(), Reason::kInvalidValue, "has no direction; give one that is not 0"};
   }
   *out = 1 / square * along;

@@ -34,9 +34,7 @@ constexpr uint64_t kSmallBytes = 2048;
 constexpr size_t kArenaBytes = 4096;
 
 absl::Status OpenError(const Fault& fault) {
-  const std::string text = absl::StrCat(fault.field, " ", fault.message);
-  return fault.reason == Reason::kUnimplemented ? absl::UnimplementedError(text)
-                                                : absl::InvalidArgumentError(text);
+  return absl::InvalidArgumentError(absl::StrCat(fault.field, " ", fault.message));
 }
 
 MaybeFault ToPolicy(const FieldPath& path, const v1::Open& in, const Limits& limits,

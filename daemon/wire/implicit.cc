@@ -22,8 +22,9 @@ using gpu::implicit::Graph;
 using gpu::implicit::Parameters;
 using gpu::implicit::ProgramSource;
 
+// `name`: not empty (SplitNames).
 bool IsName(std::string_view name) {
-  if (name.empty() || absl::ascii_isdigit(static_cast<unsigned char>(name[0]))) return false;
+  if (absl::ascii_isdigit(static_cast<unsigned char>(name[0]))) return false;
   return std::all_of(name.begin(), name.end(), [](char c) {
     return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_';
   });

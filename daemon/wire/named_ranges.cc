@@ -72,9 +72,10 @@ MaybeFault FetchHeights(const FieldPath& path, const DecodeContext& context, v1:
   return {};
 }
 
+// `out` names some (NamesMore).
 MaybeFault FetchSamples(const FieldPath& path, const DecodeContext& context, v1::Grid* out) {
-  const v1::MemoryRange* samples = out->has_samples_in() ? &out->samples_in() : nullptr;
-  auto fault = Fetch(path, {"samples", "samples_in", samples, out->mutable_samples()}, context);
+  auto fault =
+      Fetch(path, {"samples", "samples_in", &out->samples_in(), out->mutable_samples()}, context);
   out->clear_samples_in();
   return fault;
 }

@@ -33,14 +33,6 @@ std::string Show(const Vector& v) {
   return absl::StrCat("(", wire::Show(v.x), ", ", wire::Show(v.y), ", ", wire::Show(v.z), ")");
 }
 
-template <typename Message>
-MaybeFault ToLook(const FieldPath& path, const Message& in, const Limits& limits,
-                  gpu::GeometryRecord* out) {
-  if (auto fault = ToFill(path, in.fill(), out)) return fault;
-  if (auto fault = ToRule(path, in.rule(), out)) return fault;
-  return ToShell(path, in.shell(), out->fill == gpu::Fill::kSurface, limits, out);
-}
-
 template <typename Shape>
 MaybeFault Finish(const FieldPath& path, const ShapeContext& context, const Shape& shape,
                   GeometryData* out) {
@@ -62,9 +54,10 @@ MaybeFault ToLookOrFrame(const FieldPath& path, const Message& in, const ShapeCo
                  "is FILL_SOLID, but it has no inside; give FILL_SURFACE, FILL_LINES or FILL_DOTS"};
   }
   if (auto fault = ToFill(path, in.fill(), &out->record, done)) return fault;
-  if (!*done) return ToLook(path, in, context.context, &out->record);
   if (auto fault = ToRule(path, in.rule(), &out->record)) return fault;
-  if (auto fault = ToShell(path, in.shell(), false, context.context, &out->record)) return fault;
+  const bool surface = !*done && out->record.fill == gpu::Fill::kSurface;
+  if (auto fault = ToShell(path, in.shell(), surface, context.context, &out->record)) return fault;
+  if (!*done) return {};
   return ToWireFrame(path, gpu::WireFrameOf(shape), in.fill() == v1::FILL_DOTS, context.context,
                      out);
 }

@@ -330,15 +330,15 @@ MaybeFault ToText(const FieldPath& primitive_path, const v1::Primitive& primitiv
   Wording wording;
   gpu::GeometryRecord look;
   look.color = color;
+  const bool lines = in.style() == v1::Text::OUTLINE || in.style() == v1::Text::STROKES;
+  if (!lines && in.style() != v1::Text::STYLE_UNSPECIFIED && in.style() != v1::Text::FILLED) {
+    return UnknownEnum(FieldPath(path, "style"), in.style(), "FILLED, OUTLINE, STROKES");
+  }
   if (auto fault = ToPlace(path, in, &place)) return fault;
   if (auto fault = ToWording(path, in, &wording)) return fault;
   if (auto fault = ToRule(path, in.rule(), &look)) return fault;
   if (auto fault = ToThickness(FieldPath(path, "thickness"), in.thickness(), context, &look)) {
     return fault;
-  }
-  const bool lines = in.style() == v1::Text::OUTLINE || in.style() == v1::Text::STROKES;
-  if (!lines && in.style() != v1::Text::STYLE_UNSPECIFIED && in.style() != v1::Text::FILLED) {
-    return UnknownEnum(FieldPath(path, "style"), in.style(), "FILLED, OUTLINE, STROKES");
   }
   if (!primitive.color_scale().scalars().empty()) {
     return Fault{FieldPath(scale_path, "scalars").ToString(), Reason::kInvalidValue,

@@ -21,9 +21,10 @@ uint32_t Get(View in, size_t at, size_t bytes) {
   return value;
 }
 
+// `in`: no shorter.
 template <size_t n>
 bool Begins(View in, const std::array<uint8_t, n>& with) {
-  return in.size() >= n && std::equal(with.begin(), with.end(), in.begin());
+  return std::equal(with.begin(), with.end(), in.begin());
 }
 
 template <typename... Words>

@@ -26,8 +26,9 @@ void PutBytes(Bytes& out, size_t at, std::span<const uint8_t> bytes) {
   std::memcpy(out.data() + at, bytes.data(), bytes.size());
 }
 
+// `in`: no shorter.
 bool Begins(View in, std::span<const uint8_t> with) {
-  return in.size() >= with.size() && std::memcmp(in.data(), with.data(), with.size()) == 0;
+  return std::memcmp(in.data(), with.data(), with.size()) == 0;
 }
 
 // The lengths of nested layers, each to the packet's end.

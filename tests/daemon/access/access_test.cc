@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cstdio>
+#include <ctime>
 #include <filesystem>
+#include <set>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/log/logger.h"
 #include "tests/daemon/access/certificates.h"
 
 namespace voxeld::daemon::access {
@@ -150,6 +154,154 @@ TEST_F(AccessTest, AFileThatIsWrongLetsNobodyNewIn) {
   EXPECT_TRUE(access->Look().ok());
   EXPECT_EQ(access->trouble(), "");
   EXPECT_TRUE(access->Identify({.token = "secret"}).ok());
+}
+
+TEST_F(AccessTest, ATokenExpiredBeforeItWasLookedAtChangesNothing) {
+  Put(Token("left", "secret", "\"draw\"", "expires = 1970-01-12T13:46:45Z") +  // 1,000,005
+      Token("right", "other", "\"draw\""));
+  now_ = 1'000'005;
+  const auto access = Make();
+  ASSERT_TRUE(access->Look().ok());
+  EXPECT_EQ(changes_, 1);
+  EXPECT_FALSE(access->Identify({.token = "secret"}).ok()) << "to the second";
+  EXPECT_TRUE(access->Identify({.token = "other"}).ok()) << "which never expires";
+  ASSERT_TRUE(access->Look().ok());
+  now_ += 5;
+  ASSERT_TRUE(access->Look().ok());
+  EXPECT_EQ(changes_, 1) << "nobody lost anything since the first look";
+}
+
+TEST_F(AccessTest, TheFileIsReadWhenItChangesOrWhenAskedTo) {
+  Put(Token("left", "secret", "\"draw\""));
+  const auto access = Make();
+  ASSERT_TRUE(access->Look().ok());
+  ASSERT_TRUE(access->Look().ok());
+  EXPECT_EQ(changes_, 1) << "as it was";
+  ASSERT_TRUE(access->Look(true).ok());
+  EXPECT_EQ(changes_, 2) << "whatever it looks like";
+  Put(Token("right", "secret", "\"draw\""));
+  ASSERT_TRUE(access->Look().ok());
+  EXPECT_EQ(changes_, 3);
+  EXPECT_EQ(access->Identify({.token = "secret"})->principal, "right");
+}
+
+TEST_F(AccessTest, OthersOptionsAreInForceAtOnceOrNotAtAll) {
+  Put(Token("left", "secret", "\"draw\""));
+  const auto access = Make();
+  ASSERT_TRUE(access->Look().ok());
+  const auto caller = access->Identify({.token = "secret"});
+  const std::string other = folder_ + "/other.toml";
+  PutFile(other, "[[token]]\n");
+  EXPECT_FALSE(access->Change({.grants = other, .anonymous = *ParseScopes("none")}).ok());
+  EXPECT_EQ(access->Identify({.token = "secret"})->principal, "left") << "those from before stay";
+  EXPECT_EQ(access->Identify({})->scopes, Scopes::All());
+  EXPECT_EQ(changes_, 1);
+
+  PutFile(other, Token("right", "secret", "\"view\"", "expires = 1970-01-12T13:46:45Z"));
+  ASSERT_TRUE(
+      access->Change({.grants = other, .anonymous = *ParseScopes("none"), .trusted = {8}}).ok());
+  EXPECT_EQ(changes_, 2);
+  EXPECT_EQ(access->Identify({.token = "secret"})->principal, "right");
+  EXPECT_TRUE(access->Identify({})->scopes.empty());
+  EXPECT_EQ(access->Identify({.user = 8})->scopes, Scopes::All());
+  EXPECT_FALSE(access->Recheck(*caller).ok());
+  ASSERT_TRUE(access->Look().ok());
+  EXPECT_EQ(changes_, 2) << "it has been read";
+  now_ = 1'000'006;
+  ASSERT_TRUE(access->Look().ok());
+  EXPECT_EQ(changes_, 3) << "expired since";
+
+  // No file any more: no tokens, and no trouble with one.
+  PutFile(other, "wrong");
+  ASSERT_FALSE(access->Look().ok());
+  ASSERT_NE(access->trouble(), "");
+  ASSERT_TRUE(access->Change({}).ok());
+  EXPECT_EQ(access->trouble(), "");
+  EXPECT_TRUE(absl::IsUnauthenticated(access->Identify({.token = "secret"}).status()));
+  EXPECT_TRUE(access->Look().ok());
+}
+
+TEST_F(AccessTest, NobodyNeedHearOfChanges) {
+  Put(Token("left", "secret", "\"draw\""));
+  Access access(
+      {.grants = path_}, [this] { return now_; }, nullptr);
+  EXPECT_TRUE(access.Look().ok());
+  EXPECT_TRUE(access.Change({.grants = path_}).ok());
+  EXPECT_TRUE(access.Identify({.token = "secret"}).ok());
+}
+
+TEST_F(AccessTest, TheSystemsClockIsUnixTime) {
+  const int64_t before = std::time(nullptr);
+  const int64_t told = Access::SystemWallClock()();
+  EXPECT_GE(told, before);
+  EXPECT_LE(told, std::time(nullptr));
+}
+
+TEST_F(AccessTest, TrustedAreRootAndTheDaemonsOwn) {
+  EXPECT_EQ(AccessOptions::TrustedUsers(), (std::set<uint32_t>{0, geteuid()}));
+  Access access(
+      {}, [this] { return now_; }, nullptr);
+  ASSERT_TRUE(access.Look().ok());
+  EXPECT_EQ(access.Identify({.user = 0})->who, "user 0");
+}
+
+// What the log says of the file: its events, each with what is told.
+class AccessLogTest : public AccessTest {
+ protected:
+  AccessLogTest()
+      : file_(std::tmpfile()), log_(Logger::Level::kDebug, Logger::Format::kText, fileno(file_)) {
+    EXPECT_EQ(std::fflush(file_), 0);
+  }
+  ~AccessLogTest() override { std::fclose(file_); }
+  // Since the last time.
+  std::string Said() {
+    std::string text;
+    char part[4096];
+    for (ssize_t got; (got = pread(fileno(file_), part, sizeof(part), at_)) > 0; at_ += got)
+      text.append(part, static_cast<size_t>(got));
+    return text;
+  }
+
+  std::FILE* const file_;
+  Logger log_;
+  off_t at_ = 0;
+};
+
+TEST_F(AccessLogTest, SaysWhatBecameOfTheFile) {
+  Put(Token("left", "secret", "\"draw\"") + "[[user]]\nname = \"7\"\nscopes = [\"draw\"]\n");
+  Access access(
+      {.grants = path_}, [this] { return now_; }, &log_);
+  ASSERT_TRUE(access.Look().ok());
+  const std::string first = Said();
+  EXPECT_THAT(first, HasSubstr("grants"));
+  EXPECT_THAT(first, ::testing::Not(HasSubstr("again")));
+  EXPECT_THAT(first, HasSubstr("tokens=1"));
+  EXPECT_THAT(first, HasSubstr("users=1"));
+  EXPECT_THAT(first, HasSubstr("certificates=0"));
+  ASSERT_TRUE(access.Look().ok());
+  EXPECT_EQ(Said(), "") << "nothing is new";
+  Put(Token("left", "secret", "\"view\""));
+  ASSERT_TRUE(access.Look().ok());
+  EXPECT_THAT(Said(), HasSubstr("the grants file was read again"));
+  Put("[[token]]\n");
+  ASSERT_FALSE(access.Look().ok());
+  EXPECT_THAT(Said(), HasSubstr("the grants file is wrong: nobody new is let in by it"));
+  ASSERT_FALSE(access.Look(true).ok());
+  EXPECT_EQ(Said(), "") << "as before";
+  Put(Token("left", "secret", "\"view\""));
+  ASSERT_TRUE(access.Look().ok());
+  EXPECT_THAT(Said(), HasSubstr("the grants file is right again"));
+}
+
+TEST_F(AccessLogTest, SaysThatTheFirstFileIsRightAfterAll) {
+  Put("[[token]]\n");
+  Access access(
+      {.grants = path_}, [this] { return now_; }, &log_);
+  ASSERT_FALSE(access.Look().ok());
+  EXPECT_THAT(Said(), HasSubstr("the grants file is wrong"));
+  Put("");
+  ASSERT_TRUE(access.Look().ok());
+  EXPECT_THAT(Said(), HasSubstr("the grants file is right again"));
 }
 
 TEST_F(AccessTest, WithoutAFileThereAreNoTokens) {

@@ -1,9 +1,12 @@
 #include "display/drivers/voxlink/decoder.h"
 
+#include <cstring>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "display/api/pixels.h"
+#include "display/crc/crc32c.h"
 #include "gtest/gtest.h"
 
 namespace voxeld::display::voxlink {
@@ -56,6 +59,21 @@ class Writer {
   SliceFrame frame_;
 };
 
+// The last packet that was written, as one of another type, with these flags, its header sound.
+void Retype(Bytes& out, size_t at, PacketType type, uint8_t flags = 0) {
+  auto header = Load<PacketHeader>(std::span(out).subspan(at));
+  header.type = static_cast<uint8_t>(type);
+  header.flags = flags;
+  header.header_crc = Crc32c(std::as_bytes(std::span(&header, 1)).first(kHeaderCrcOffset));
+  std::memcpy(out.data() + at, &header, sizeof(header));
+}
+// A packet of any type with a payload of so many bytes.
+void Any(Writer& writer, PacketType type, size_t payload, uint64_t volume = 0, uint8_t flags = 0) {
+  const size_t at = writer.out.size();
+  writer.packets.Slice(writer.out, volume, 0, 0, 0, Bytes(payload));
+  Retype(writer.out, at, type, flags);
+}
+
 absl::Status Decode(VoxlinkDecoder& decoder, const Bytes& bytes) {
   return decoder.OnBytes(kBulkOut, bytes, 0);
 }
@@ -98,6 +116,45 @@ TEST(Decoder, SlicesMayComeAgain) {
   writer.packets.End(writer.out, 1, true);
   ASSERT_TRUE(Decode(decoder, writer.out).ok());
   EXPECT_EQ(decoder.TakeVolume()->Rgb(), writer.Light());
+}
+
+TEST(Decoder, WhatIsForTheDeviceAloneIsPassedOver) {
+  Writer writer;
+  VoxlinkDecoder decoder(kLayout, kMaxPayload);
+  Any(writer, PacketType::kShow, sizeof(ShowPayload));
+  Any(writer, PacketType::kShow, sizeof(ShowAheadPayload), 0, kShowAhead);
+  writer.packets.Plain(writer.out, PacketType::kDrop, 3);
+  writer.Begin(5, 0);
+  writer.Picture(5, 0);
+  writer.packets.Plain(writer.out, PacketType::kAbort, 4);  // another than is being filled
+  for (size_t p = 1; p < 6; ++p) writer.Picture(5, p);
+  writer.packets.End(writer.out, 5, true);
+  ASSERT_TRUE(Decode(decoder, writer.out).ok());
+  EXPECT_EQ(decoder.TakeVolume()->volume, 5u);
+}
+
+TEST(Decoder, AVolumeThatWasNotTakenIsNoneOnceTheBytesAreWrong) {
+  Writer writer;
+  VoxlinkDecoder decoder(kLayout, kMaxPayload);
+  writer.Whole(1);
+  Any(writer, PacketType::kKeepalive, 1);
+  Any(writer, PacketType::kDrop, 1);                     // and what comes after it
+  writer.out.insert(writer.out.end(), 50, std::byte{});  // is no matter any more
+  const absl::Status status = Decode(decoder, writer.out);
+  EXPECT_TRUE(absl::IsDataLoss(status));
+  EXPECT_NE(status.message().find("KEEPALIVE"), std::string::npos) << "the first fault: " << status;
+  EXPECT_FALSE(decoder.TakeVolume().has_value());
+}
+
+TEST(Decoder, OfTwoBrokenPayloadsTheFirstIsTold) {
+  Writer writer;
+  VoxlinkDecoder decoder(kLayout, kMaxPayload);
+  for (const uint64_t volume : {7u, 8u}) {
+    writer.packets.Slice(writer.out, volume, 0, 0, 0, Bytes(4));
+    writer.out.back() ^= std::byte{1};
+  }
+  const absl::Status status = Decode(decoder, writer.out);
+  EXPECT_NE(status.message().find("volume 7"), std::string::npos) << status;
 }
 
 TEST(Decoder, AnAbortedVolumeIsForgotten) {
@@ -189,9 +246,40 @@ INSTANTIATE_TEST_SUITE_P(
                 w.Begin(2, 0);
                 w.packets.Slice(w.out, 2, 0, 0, 0, {});
               }},
+        Wrong{"EndWithPayload",
+              [](Writer& w) {
+                w.Begin(2, 1, 0);
+                Any(w, PacketType::kEnd, 1, 2);
+              }},
+        Wrong{"ShowTooShort",
+              [](Writer& w) { Any(w, PacketType::kShow, sizeof(ShowPayload) - 1); }},
+        Wrong{"ShowAheadTooShort",
+              [](Writer& w) { Any(w, PacketType::kShow, sizeof(ShowPayload), 0, kShowAhead); }},
+        Wrong{"ShowTooLong",
+              [](Writer& w) { Any(w, PacketType::kShow, sizeof(ShowAheadPayload)); }},
+        Wrong{"AbortWithPayload", [](Writer& w) { Any(w, PacketType::kAbort, 1); }},
+        Wrong{"DropWithPayload", [](Writer& w) { Any(w, PacketType::kDrop, 1); }},
+        Wrong{"KeepaliveWithPayload", [](Writer& w) { Any(w, PacketType::kKeepalive, 1); }},
+        Wrong{"BeginTooShort",
+              [](Writer& w) { Any(w, PacketType::kBegin, sizeof(BeginPayload) - 1, 2); }},
+        Wrong{"AbortedBeforeItsEnd",
+              [](Writer& w) {
+                w.Begin(2, 1, 0);
+                w.packets.Plain(w.out, PacketType::kAbort, 2);
+                w.packets.End(w.out, 2, true);
+              }},
         Wrong{"UnknownType",
               [](Writer& w) { w.packets.Plain(w.out, static_cast<PacketType>(99), 0); }}),
     [](const testing::TestParamInfo<Wrong>& param) { return std::string(param.param.what); });
+
+TEST(Decoder, TheFirstVolumeHasNoBase) {
+  Writer writer;
+  VoxlinkDecoder decoder(kLayout, kMaxPayload);
+  writer.Begin(3, 2, 1);
+  const absl::Status status = Decode(decoder, writer.out);
+  EXPECT_NE(status.message().find("the base is not the last whole volume"), std::string::npos)
+      << status;
+}
 
 TEST(Decoder, RefusesOtherEndpoints) {
   VoxlinkDecoder decoder(kLayout, kMaxPayload);

@@ -3,10 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <random>
 #include <string_view>
+#include <tuple>
 #include <vector>
+
+#include "absl/strings/str_cat.h"
 
 namespace voxeld::lights {
 namespace {
@@ -123,6 +127,124 @@ TEST(DdpDatagram, SaysWhatIsWrong) {
   EXPECT_THAT(Wrong(Protocol::kDdp, cut), HasSubstr("say 3 bytes of data; 2 are there"));
   EXPECT_THAT(Wrong(Protocol::kDdp, Ddp(0x41, 0, 0x1B, 0, {1, 2, 3, 4})),
               HasSubstr("byte 2 is 27"));
+}
+
+TEST(DdpDatagram, OfNothingIsAWordToShowOrNone) {
+  EXPECT_EQ(ReadDatagram(Protocol::kDdp, Ddp(0x41, 0, 0x0B, 0, {}))->kind, Datagram::Kind::kShow);
+  EXPECT_EQ(ReadDatagram(Protocol::kDdp, Ddp(0x40, 0, 0x0B, 0, {}))->kind, Datagram::Kind::kOther);
+}
+
+// Each field of the layers made another: refused, and by what it says.
+TEST(E131Datagram, EachFieldOfItsLayersCounts) {
+  const Bytes good = E131(3, 9, {1, 2, 3});
+  for (const size_t at :
+       {16u, 17u, 38u, 39u, 115u, 116u, 117u, 118u, 119u, 120u, 121u, 122u, 123u, 124u}) {
+    Bytes bad = good;
+    bad[at] ^= 0x01;
+    EXPECT_TRUE(absl::IsInvalidArgument(ReadDatagram(Protocol::kE131, bad).status())) << at;
+  }
+  // Its lengths are right, and it ends before its values.
+  for (const size_t size : {49u, 125u}) {
+    Bytes cut(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
+    for (const size_t at : {16u, 38u}) {
+      cut[at] = static_cast<uint8_t>(0x70 | (size - at) >> 8);
+      cut[at + 1] = static_cast<uint8_t>(size - at);
+    }
+    EXPECT_EQ(Wrong(Protocol::kE131, cut),
+              absl::StrCat("a packet of ", size, " bytes; it takes 126 at least"));
+  }
+  EXPECT_THAT(Wrong(Protocol::kE131, E131(3, 9, Bytes(513))), HasSubstr("512 are the most"));
+  EXPECT_EQ(ReadDatagram(Protocol::kE131, E131(3, 9, Bytes(512)))->values.size(), 512u);
+  EXPECT_EQ(Wrong(Protocol::kE131, E131(0, 9, {1})), "universe 0; 1 to 63999 are possible");
+  EXPECT_EQ(Wrong(Protocol::kE131, E131(64000, 9, {1})), "universe 64000; 1 to 63999 are possible");
+  EXPECT_TRUE(ReadDatagram(Protocol::kE131, E131(63999, 9, {1}, 200)).ok());
+  EXPECT_EQ(Wrong(Protocol::kE131, E131(1, 9, {1}, 201)), "priority 201; 200 is the most");
+}
+
+// Art-Net 4's table of ArtPollReply, field by field: 239 bytes, all that is not named here 0.
+TEST(ArtNetDatagram, AnAnswerIsAsItsTableHasIt) {
+  for (const auto& [first, universes, ports] : {std::tuple{0x1234, 3, 3}, std::tuple{0x123E, 9, 2},
+                                                std::tuple{0, 9, 4}, std::tuple{0, 0, 1}}) {
+    Bytes want(239);
+    const auto put = [&want](size_t at, std::string_view text) {
+      std::copy(text.begin(), text.end(), want.begin() + static_cast<std::ptrdiff_t>(at));
+    };
+    put(0, std::string_view("Art-Net\0\0\x21", 10));
+    want[10] = 10, want[13] = 7;
+    want[14] = 0x36, want[15] = 0x19;                   // port 6454, low byte first
+    want[18] = static_cast<uint8_t>(first >> 8);        // NetSwitch
+    want[19] = static_cast<uint8_t>(first >> 4 & 0xF);  // SubSwitch
+    want[23] = 0xD0;                                    // Status1
+    put(26, "voxeld");
+    put(44, "voxeld: lights of a volumetric display");
+    put(108, "#0001 [0000] ready");
+    want[173] = static_cast<uint8_t>(ports);
+    for (int i = 0; i < ports; ++i) {
+      want[static_cast<size_t>(174 + i)] = 0x80;
+      want[static_cast<size_t>(182 + i)] = 0x80;
+      want[static_cast<size_t>(190 + i)] = static_cast<uint8_t>((first & 0xF) + i);
+    }
+    want[212] = 0x08;
+    EXPECT_THAT(ArtPollReply({10, 0, 0, 7}, 6454, first, universes),
+                ::testing::ElementsAreArray(want))
+        << first;
+  }
+}
+
+TEST(ArtNetDatagram, EachLengthIsLookedAt) {
+  const Bytes good = ArtDmx(5, 0, {1, 2});
+  ASSERT_TRUE(ReadDatagram(Protocol::kArtNet, good).ok());
+  for (size_t size = 0; size < good.size(); ++size) {
+    const Bytes cut(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_FALSE(ReadDatagram(Protocol::kArtNet, cut).ok()) << size;
+  }
+  EXPECT_EQ(Wrong(Protocol::kArtNet, Bytes(9)), "a packet of 9 bytes; it takes 10 at least");
+  EXPECT_EQ(Wrong(Protocol::kArtNet, Bytes(good.begin(), good.begin() + 11)),
+            "a packet of 11 bytes; it takes 12 at least");
+  EXPECT_EQ(Wrong(Protocol::kArtNet, Bytes(good.begin(), good.begin() + 17)),
+            "a packet of 17 bytes; it takes 18 at least");
+  EXPECT_EQ(Wrong(Protocol::kArtNet, ArtDmx(5, 0, {1})),
+            "bytes 16 and 17 say 1 values; 2 to 512 are possible");
+  EXPECT_EQ(Wrong(Protocol::kArtNet, ArtDmx(5, 0, Bytes(513))),
+            "bytes 16 and 17 say 513 values; 2 to 512 are possible");
+  EXPECT_EQ(ReadDatagram(Protocol::kArtNet, ArtDmx(5, 0, Bytes(512)))->values.size(), 512u);
+  // What is for others may be as short as its operation.
+  Bytes other(good.begin(), good.begin() + 10);
+  other[9] = 0x60;
+  EXPECT_EQ(ReadDatagram(Protocol::kArtNet, other)->kind, Datagram::Kind::kOther);
+}
+
+TEST(DdpDatagram, WhatIsForOthersIsPassedOver) {
+  for (const uint8_t flag : {0x02, 0x04, 0x08}) {
+    EXPECT_EQ(ReadDatagram(Protocol::kDdp, Ddp(0x40 | flag, 0, 0x0B, 0, {1, 2, 3}))->kind,
+              Datagram::Kind::kOther);
+  }
+  Bytes other = Ddp(0x40, 0, 0x0B, 0, {1, 2, 3});
+  other[3] = 2;  // another output
+  EXPECT_EQ(ReadDatagram(Protocol::kDdp, other)->kind, Datagram::Kind::kOther);
+  other[3] = 255;
+  EXPECT_EQ(ReadDatagram(Protocol::kDdp, other)->kind, Datagram::Kind::kLights) << "for all";
+  EXPECT_EQ(Wrong(Protocol::kDdp, Bytes(9)), "a packet of 9 bytes; it takes 10 at least");
+  EXPECT_TRUE(ReadDatagram(Protocol::kDdp, Ddp(0x40, 0, 0, 0, {1, 2, 3})).ok());
+  EXPECT_TRUE(ReadDatagram(Protocol::kDdp, Ddp(0x40, 0, 1, 0, {1, 2, 3})).ok());
+  EXPECT_EQ(Wrong(Protocol::kDdp, Ddp(0x40, 0, 2, 0, {1, 2, 3})),
+            "byte 2 is 2; RGB of 8 bits is 11");
+}
+
+TEST(E131Datagram, ASyncPacketSaysItsNumberAndUniverse) {
+  const auto sync = ReadDatagram(Protocol::kE131, E131Sync(0x1234, 77));
+  ASSERT_TRUE(sync.ok()) << sync.status();
+  EXPECT_EQ(sync->kind, Datagram::Kind::kShow);
+  EXPECT_EQ(sync->sequence, 77);
+  EXPECT_EQ(sync->universe, 0x1234);
+  Bytes discovery = E131Sync(0x1234, 77);
+  discovery[43] = 2;
+  EXPECT_EQ(ReadDatagram(Protocol::kE131, discovery)->kind, Datagram::Kind::kOther);
+}
+
+TEST(Datagrams, OpcHasNone) {
+  EXPECT_EQ(Wrong(Protocol::kOpc, {0, 0, 0, 0}),
+            "Open Pixel Control comes as a stream, not in packets");
 }
 
 TEST(E131Datagram, SaysWhatItHas) {

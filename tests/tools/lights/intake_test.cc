@@ -213,6 +213,103 @@ TEST(Intake, PassesOverWhatComesLate) {
   ExpectSound(intake.tally(), intake);
 }
 
+TEST(Intake, OpcChannelsWithoutASizeAreWholePictures) {
+  // A channel has as many lights as there are, so that all but the first have none of them.
+  Intake intake({.protocol = Protocol::kOpc, .lights = 2});
+  intake.AddMessage(Opc(1, Bytes3(2, 10)), 0);
+  EXPECT_THAT(*intake.Take(), Each(10)) << "at once";
+  EXPECT_EQ(intake.due(), sync::kNever);
+  intake.AddMessage(Opc(2, Bytes3(2, 20)), 0);
+  EXPECT_EQ(intake.tally().outside, 1u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, AWordToShowIsOfItsSynchronisationAlone) {
+  Sender sender(E131Stream(100, 1, 7)), other(E131Stream(100, 2, 8));
+  Intake intake({.protocol = Protocol::kE131, .lights = 170});
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 1)), 0).ok());
+  ASSERT_TRUE(intake.AddDatagram(other.Sync(), 0).ok());
+  EXPECT_FALSE(intake.waiting());
+  EXPECT_EQ(intake.tally().other, 1u);
+  EXPECT_EQ(intake.tally().shows, 0u);
+  ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 0).ok());
+  EXPECT_TRUE(intake.Take().has_value());
+  ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 0).ok());
+  EXPECT_FALSE(intake.waiting()) << "nothing has come since";
+  EXPECT_EQ(intake.tally().shows, 2u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, ArtNetWaitsForSynchronisationOnceThereWasOne) {
+  display::network::StreamOptions stream;
+  stream.protocol = Protocol::kArtNet;
+  stream.first_universe = 4;
+  stream.sync_universe = 1;
+  Sender sender(stream);
+  Intake intake(
+      {.protocol = Protocol::kArtNet, .lights = 170, .first_universe = 4, .gather_ns = 4 * kMs});
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 1)), 10 * sync::kSecond).ok());
+  EXPECT_EQ(intake.due(), 10 * sync::kSecond + 4 * kMs);
+  ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 10 * sync::kSecond).ok());
+  EXPECT_THAT(*intake.Take(), Each(1));
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 2)), 11 * sync::kSecond).ok());
+  EXPECT_EQ(intake.due(), 14 * sync::kSecond) << "as long as sync packets may be apart";
+  ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 12 * sync::kSecond).ok());
+  EXPECT_THAT(*intake.Take(), Each(2));
+  // Those of universes before the first are nobody's.
+  stream.first_universe = 2;
+  Sender below(stream);
+  ASSERT_TRUE(intake.AddDatagram(below.Pixels(0, Bytes3(170, 3)), 12 * sync::kSecond).ok());
+  EXPECT_EQ(intake.tally().outside, 1u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, ADdpPushByItselfShowsWhatCame) {
+  Intake intake({.protocol = Protocol::kDdp, .lights = 1});
+  const Bytes lights = {0x40, 0, 0x0B, 1, 0, 0, 0, 0, 0, 3, 7, 8, 9};
+  const Bytes push = {0x41, 0, 0x0B, 1, 0, 0, 0, 0, 0, 0};
+  ASSERT_TRUE(intake.AddDatagram(lights, 0).ok());
+  EXPECT_FALSE(intake.waiting());
+  ASSERT_TRUE(intake.AddDatagram(push, 0).ok());
+  EXPECT_THAT(*intake.Take(), ElementsAre(7, 8, 9));
+  // Beyond the last light, pushed: what came before it is a picture, and nothing is none.
+  const Bytes beyond = {0x41, 0, 0x0B, 1, 0, 0, 0, 3, 0, 3, 1, 1, 1};
+  ASSERT_TRUE(intake.AddDatagram(beyond, 0).ok());
+  EXPECT_FALSE(intake.waiting());
+  ASSERT_TRUE(intake.AddDatagram(lights, 0).ok());
+  ASSERT_TRUE(intake.AddDatagram(beyond, 0).ok());
+  EXPECT_TRUE(intake.waiting());
+  EXPECT_EQ(intake.tally().outside, 2u);
+  ExpectSound(intake.tally(), intake);
+}
+
+TEST(Intake, AUniverseOfNoValuesSetsNothing) {
+  Intake intake({.protocol = Protocol::kE131, .lights = 170});
+  Sender sender(E131Stream(100, 1));
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, {}), 0).ok());
+  EXPECT_EQ(intake.tally().outside, 1u);
+  EXPECT_EQ(intake.due(), sync::kNever);
+}
+
+TEST(Intake, SourcesOfAUniverseAreSixteenAtTheMost) {
+  Intake intake({.protocol = Protocol::kE131, .lights = 170});
+  for (uint8_t id = 1; id <= 17; ++id) {
+    Sender sender(E131Stream(100, id));
+    ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, id)), 0).ok());
+  }
+  EXPECT_EQ(intake.tally().set, 16u);
+  EXPECT_EQ(intake.tally().outranked, 1u);
+  // One that is known goes on; another when they have fallen silent.
+  Sender first(E131Stream(100, 1));
+  first.Pixels(0, Bytes3(170, 1));
+  ASSERT_TRUE(intake.AddDatagram(first.Pixels(0, Bytes3(170, 1)), 1 * kMs).ok());
+  EXPECT_EQ(intake.tally().set, 17u);
+  Sender late(E131Stream(100, 17));
+  ASSERT_TRUE(intake.AddDatagram(late.Pixels(0, Bytes3(170, 1)), Intake::kSourceLife + 1).ok());
+  EXPECT_EQ(intake.tally().set, 18u);
+  ExpectSound(intake.tally(), intake);
+}
+
 TEST(Intake, AccountsForWhateverComes) {
   std::mt19937 random(3);
   for (const Protocol protocol : {Protocol::kDdp, Protocol::kE131, Protocol::kArtNet}) {
