@@ -70,8 +70,7 @@ const FaultCase kCases[] = {
     {"text_up", Text, [](P& p) { Set(p.mutable_text()->mutable_up(), 0, 0, 1); },
      "primitive.text.up", Reason::kInvalidValue, "lies along facing"},
     {"text_font", Text, [](P& p) { p.mutable_text()->set_font("No Such Family"); },
-     "primitive.text.font", Reason::kNotFound,
-     "is No Such Family, which is none; there are "},
+     "primitive.text.font", Reason::kNotFound, "is No Such Family, which is none; there are "},
     {"text_depth", Text,
      [](P& p) {
        p.mutable_text()->set_style(v1::Text::OUTLINE);
