@@ -245,7 +245,9 @@ TEST_F(GrantsFile, OfTheDaemonsOwnUserIsTrusted) {
     ASSERT_EQ(seteuid(12345), 0);
   }
   const absl::Status status = ReadGrants(path_).status();
-  if (root) ASSERT_EQ(seteuid(0), 0);
+  if (root) {
+    ASSERT_EQ(seteuid(0), 0);
+  }
   EXPECT_TRUE(status.ok()) << status;
 }
 
@@ -254,9 +256,13 @@ TEST_F(GrantsFile, ThatCannotBeReadIsAnError) {
   ASSERT_EQ(chmod(folder_.c_str(), 0755), 0);
   // Root reads whatever there is: somebody else for a moment, for whom root's file is as good as their own.
   const bool root = geteuid() == 0;
-  if (root) ASSERT_EQ(seteuid(12345), 0);
+  if (root) {
+    ASSERT_EQ(seteuid(12345), 0);
+  }
   const absl::Status status = ReadGrants(path_).status();
-  if (root) ASSERT_EQ(seteuid(0), 0);
+  if (root) {
+    ASSERT_EQ(seteuid(0), 0);
+  }
   EXPECT_TRUE(absl::IsUnavailable(status)) << status;
   EXPECT_THAT(std::string(status.message()), HasSubstr("cannot be read"));
 }

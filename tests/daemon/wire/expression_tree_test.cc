@@ -91,7 +91,9 @@ TEST(ExpressionTree, EachOperationIsWhatItsTextIs) {
     EXPECT_EQ(Words(tree), Words(text));
   }
   for (int op = T::X; op < T::Op_ARRAYSIZE; ++op) {
-    if (op != T::PARAMETER) EXPECT_TRUE(seen[op]) << T::Op_Name(op);
+    if (op != T::PARAMETER) {
+      EXPECT_TRUE(seen[op]) << T::Op_Name(op);
+    }
   }
 }
 

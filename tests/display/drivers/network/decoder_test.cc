@@ -50,10 +50,12 @@ TEST_P(Decoders, GiveBackWhatWasSentInTheLightsOrder) {
   EXPECT_EQ(volume->source, DecodedVolume::Source::kDecodedFromSent);
   EXPECT_FALSE(decoder.TakeVolume().has_value()) << "it has been taken";
   // What says when, or that it ends, changes nothing.
-  if (const Bytes sync = writer.Sync(); !sync.empty())
+  if (const Bytes sync = writer.Sync(); !sync.empty()) {
     EXPECT_TRUE(decoder.OnBytes(0, sync, 0).ok());
-  if (const Bytes end = writer.End(0, Light(90)); !end.empty())
+  }
+  if (const Bytes end = writer.End(0, Light(90)); !end.empty()) {
     EXPECT_TRUE(decoder.OnBytes(0, end, 0).ok());
+  }
   EXPECT_FALSE(decoder.TakeVolume().has_value());
   // One slice anew: the other is as it was.
   ASSERT_TRUE(decoder.OnBytes(0, writer.Pixels(1, Light(30), true), 0).ok());
