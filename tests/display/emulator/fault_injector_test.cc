@@ -251,9 +251,9 @@ TEST(FaultPlan, IsReadAndRefused) {
 }
 
 TEST(FaultPlan, WhatIsWrongIsShownEscapedAndNotAtLength) {
-  const auto control = ParseFaultPlan("t\001a\"\xffvalue\n");
+  const auto control = ParseFaultPlan("t\001y\"\xffvalue\n");
   EXPECT_TRUE(std::string(control.status().message())
-                  .starts_with("fault \"t\\x01a\\\"\\xffvalue\\n\": there is no '@'"))
+                  .starts_with("fault \"t\\x01y\\\"\\xffvalue\\n\": there is no '@'"))
       << control.status();
   const std::string longest(64, 'a');
   for (const char* rest : {"@t1", "@t1;stall@t1", ""}) {
